@@ -1,0 +1,64 @@
+//! The one error type of the crate: what was wrong, what was expected, and where.
+
+/// Shorthand for results of this crate.
+pub type Result<T> = std::result::Result<T, Error>;
+
+/// A question that was asked wrongly. Answers that do not exist are `Option`s, not errors.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// A camera parameter that no such lens can have.
+    #[error("camera model {model}: {parameter} = {value}, expected {expected}")]
+    InvalidCamera {
+        /// Name of the camera model.
+        model: &'static str,
+        /// Name of the offending parameter.
+        parameter: String,
+        /// The value that was given, as text.
+        value: String,
+        /// What would have been accepted.
+        expected: &'static str,
+    },
+    /// An option outside its domain.
+    #[error("option {name} = {value}, expected {expected}")]
+    InvalidOption {
+        /// Name of the option as the user writes it.
+        name: &'static str,
+        /// The value that was given, as text.
+        value: String,
+        /// What would have been accepted.
+        expected: &'static str,
+    },
+    /// An argument (array, image, rotation) of the wrong shape or content.
+    #[error("{name}: got {got}, expected {expected}")]
+    InvalidArgument {
+        /// Name of the argument.
+        name: &'static str,
+        /// What was given.
+        got: String,
+        /// What would have been accepted.
+        expected: String,
+    },
+}
+
+impl Error {
+    /// An [`Error::InvalidOption`] from any printable value.
+    pub fn option(name: &'static str, value: impl std::fmt::Display, expected: &'static str) -> Self {
+        Self::InvalidOption { name, value: value.to_string(), expected }
+    }
+
+    /// An [`Error::InvalidArgument`] from any printable values.
+    pub fn argument(name: &'static str, got: impl std::fmt::Display, expected: impl std::fmt::Display) -> Self {
+        Self::InvalidArgument { name, got: got.to_string(), expected: expected.to_string() }
+    }
+
+    /// An [`Error::InvalidCamera`] from any printable value.
+    pub fn camera(
+        model: &'static str,
+        parameter: impl Into<String>,
+        value: impl std::fmt::Display,
+        expected: &'static str,
+    ) -> Self {
+        Self::InvalidCamera { model, parameter: parameter.into(), value: value.to_string(), expected }
+    }
+}

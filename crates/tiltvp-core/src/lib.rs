@@ -1,0 +1,15 @@
+//! Orientation and calibration from the straight lines of man-made places.
+//!
+//! The floors of the house, from the ground up; a module imports only from floors below its own:
+//!
+//! 1. [`error`], [`geometry`]
+//! 2. [`camera`]
+//!
+//! Angles are radians, lengths metres, pixel centres integers, rays unit bearings. The camera frame has `z` along the
+//! optical axis, `x` to the right (columns) and `y` down (rows); the robot frame has `x` forward, `y` left, `z` up.
+
+pub mod camera;
+pub mod error;
+pub mod geometry;
+
+pub use error::{Error, Result};
