@@ -1,0 +1,122 @@
+//! A calibrated camera: a model, the size of its images, and the set of rays for which it answers.
+
+use nalgebra::{Matrix2x3, Matrix3x2, Vector2, Vector3};
+
+use super::any::Model;
+use crate::error::{Error, Result};
+
+/// A calibrated central camera.
+///
+/// If `mirror` is set the image is seen in a mirror: bearings have the `z` component of the model negated, so that the
+/// centre of the image of an upward-looking camera under a convex mirror looks down, as it does.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Camera {
+    width: u32,
+    height: u32,
+    model: Model,
+    mirror: bool,
+    max_theta_rad: f64,
+}
+
+impl Camera {
+    /// A camera with images of `width` x `height` pixels that answers wherever its model does.
+    ///
+    /// # Errors
+    /// [`Error::InvalidCamera`] if a side of the image is zero.
+    pub fn new(width: u32, height: u32, model: Model) -> Result<Self> {
+        if width == 0 || height == 0 {
+            return Err(Error::camera("camera", "width, height", format!("{width} x {height}"), "at least one pixel"));
+        }
+        let max_theta_rad = model.as_dyn().max_theta_rad();
+        Ok(Self { width, height, model, mirror: false, max_theta_rad })
+    }
+
+    /// The same camera that answers only within `max_theta_rad` of the ray through the centre of the image.
+    ///
+    /// # Errors
+    /// [`Error::InvalidCamera`] unless `0 < max_theta_rad <= pi`.
+    pub fn with_max_theta_rad(mut self, max_theta_rad: f64) -> Result<Self> {
+        if !(max_theta_rad > 0.0 && max_theta_rad <= std::f64::consts::PI) {
+            return Err(Error::camera("camera", "max_theta_rad", max_theta_rad, "an angle in (0, pi]"));
+        }
+        self.max_theta_rad = max_theta_rad.min(self.model.as_dyn().max_theta_rad());
+        Ok(self)
+    }
+
+    /// The same camera seen in a mirror: the `z` component of every bearing changes its sign.
+    #[must_use]
+    pub fn mirrored(mut self) -> Self {
+        self.mirror = !self.mirror;
+        self
+    }
+
+    /// Columns of the image.
+    pub fn width(&self) -> u32 {
+        self.width
+    }
+
+    /// Rows of the image.
+    pub fn height(&self) -> u32 {
+        self.height
+    }
+
+    /// The lens.
+    pub fn model(&self) -> &Model {
+        &self.model
+    }
+
+    /// Whether the image is seen in a mirror.
+    pub fn is_mirrored(&self) -> bool {
+        self.mirror
+    }
+
+    /// The largest angle, from the ray through the centre of the image, for which the camera answers, in radians.
+    pub fn max_theta_rad(&self) -> f64 {
+        self.max_theta_rad
+    }
+
+    /// Whether a pixel lies in the image, the outer halves of the border pixels included.
+    pub fn contains(&self, pixel: &Vector2<f64>) -> bool {
+        (-0.5..f64::from(self.width) - 0.5).contains(&pixel.x) && (-0.5..f64::from(self.height) - 0.5).contains(&pixel.y)
+    }
+
+    /// The pixel that sees a bearing of any positive length, `None` outside the valid set.
+    pub fn project(&self, bearing: &Vector3<f64>) -> Option<Vector2<f64>> {
+        let bearing = self.reflect(bearing);
+        self.within(&bearing).then(|| self.model.as_dyn().project(&bearing)).flatten()
+    }
+
+    /// The unit bearing that a pixel sees, `None` outside the valid set.
+    pub fn unproject(&self, pixel: &Vector2<f64>) -> Option<Vector3<f64>> {
+        let bearing = self.model.as_dyn().unproject(pixel)?;
+        self.within(&bearing).then(|| self.reflect(&bearing))
+    }
+
+    /// [`project`](Self::project) with `d pixel / d bearing`.
+    pub fn project_jacobian(&self, bearing: &Vector3<f64>) -> Option<(Vector2<f64>, Matrix2x3<f64>)> {
+        let bearing = self.reflect(bearing);
+        let (pixel, mut jacobian) =
+            self.within(&bearing).then(|| self.model.as_dyn().project_jacobian(&bearing)).flatten()?;
+        if self.mirror {
+            jacobian.column_mut(2).neg_mut();
+        }
+        Some((pixel, jacobian))
+    }
+
+    /// [`unproject`](Self::unproject) with `d bearing / d pixel`.
+    pub fn unproject_jacobian(&self, pixel: &Vector2<f64>) -> Option<(Vector3<f64>, Matrix3x2<f64>)> {
+        let (bearing, mut jacobian) = self.model.as_dyn().unproject_jacobian(pixel)?;
+        if self.mirror {
+            jacobian.row_mut(2).neg_mut();
+        }
+        self.within(&bearing).then(|| (self.reflect(&bearing), jacobian))
+    }
+
+    fn reflect(&self, bearing: &Vector3<f64>) -> Vector3<f64> {
+        if self.mirror { Vector3::new(bearing.x, bearing.y, -bearing.z) } else { *bearing }
+    }
+
+    fn within(&self, bearing: &Vector3<f64>) -> bool {
+        bearing.xy().norm().atan2(bearing.z) <= self.max_theta_rad
+    }
+}

@@ -1,0 +1,70 @@
+//! The equidistant fisheye, `r = f theta`: the angle from the axis is proportional to the distance from the centre.
+
+use nalgebra::{Matrix2x3, Matrix3x2, Vector2, Vector3};
+
+use super::model::CameraModel;
+use super::radial::{self, Radial};
+use crate::error::{Error, Result};
+
+/// Equidistant fisheye: `(u, v) = (cx, cy) + f theta (cos phi, sin phi)`, valid over the whole sphere but the backward axis.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Equidistant {
+    /// Focal length in pixels per radian.
+    pub focal_px: f64,
+    /// Column of the principal point in pixels.
+    pub cx: f64,
+    /// Row of the principal point in pixels.
+    pub cy: f64,
+}
+
+impl Equidistant {
+    /// Checks the parameters.
+    ///
+    /// # Errors
+    /// [`Error::InvalidCamera`] if the focal length is not positive or a number is not finite.
+    pub fn new(focal_px: f64, cx: f64, cy: f64) -> Result<Self> {
+        if !(focal_px.is_finite() && focal_px > 0.0) {
+            return Err(Error::camera("equidistant", "focal_px", focal_px, "a positive number of pixels per radian"));
+        }
+        for (name, value) in [("cx", cx), ("cy", cy)] {
+            if !value.is_finite() {
+                return Err(Error::camera("equidistant", name, value, "a finite number of pixels"));
+            }
+        }
+        Ok(Self { focal_px, cx, cy })
+    }
+}
+
+impl Radial for Equidistant {
+    fn radius(&self, theta: f64) -> Option<(f64, f64)> {
+        (theta < self.max_theta_rad()).then_some((self.focal_px * theta, self.focal_px))
+    }
+
+    fn theta(&self, radius: f64) -> Option<(f64, f64)> {
+        let theta = radius / self.focal_px;
+        (theta < self.max_theta_rad()).then_some((theta, 1.0 / self.focal_px))
+    }
+}
+
+impl CameraModel for Equidistant {
+    fn project(&self, bearing: &Vector3<f64>) -> Option<Vector2<f64>> {
+        self.project_jacobian(bearing).map(|(pixel, _)| pixel)
+    }
+
+    fn unproject(&self, pixel: &Vector2<f64>) -> Option<Vector3<f64>> {
+        self.unproject_jacobian(pixel).map(|(bearing, _)| bearing)
+    }
+
+    fn project_jacobian(&self, bearing: &Vector3<f64>) -> Option<(Vector2<f64>, Matrix2x3<f64>)> {
+        let (point, jacobian) = radial::project(self, bearing)?;
+        Some((point + Vector2::new(self.cx, self.cy), jacobian))
+    }
+
+    fn unproject_jacobian(&self, pixel: &Vector2<f64>) -> Option<(Vector3<f64>, Matrix3x2<f64>)> {
+        radial::unproject(self, &(pixel - Vector2::new(self.cx, self.cy)))
+    }
+
+    fn max_theta_rad(&self) -> f64 {
+        std::f64::consts::PI
+    }
+}
