@@ -77,7 +77,8 @@ impl Camera {
 
     /// Whether a pixel lies in the image, the outer halves of the border pixels included.
     pub fn contains(&self, pixel: &Vector2<f64>) -> bool {
-        (-0.5..f64::from(self.width) - 0.5).contains(&pixel.x) && (-0.5..f64::from(self.height) - 0.5).contains(&pixel.y)
+        (-0.5..f64::from(self.width) - 0.5).contains(&pixel.x)
+            && (-0.5..f64::from(self.height) - 0.5).contains(&pixel.y)
     }
 
     /// The pixel that sees a bearing of any positive length, `None` outside the valid set.
