@@ -4,11 +4,13 @@
 //!
 //! 1. [`error`], [`geometry`]
 //! 2. [`camera`], [`image`], [`robust`]
+//! 3. [`edges`]
 //!
 //! Angles are radians, lengths metres, pixel centres integers, rays unit bearings. The camera frame has `z` along the
 //! optical axis, `x` to the right (columns) and `y` down (rows); the robot frame has `x` forward, `y` left, `z` up.
 
 pub mod camera;
+pub mod edges;
 pub mod error;
 pub mod geometry;
 pub mod image;
