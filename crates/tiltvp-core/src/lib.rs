@@ -5,6 +5,7 @@
 //! 1. [`error`], [`geometry`]
 //! 2. [`camera`], [`image`], [`robust`]
 //! 3. [`edges`]
+//! 4. [`tilt`]
 //!
 //! Angles are radians, lengths metres, pixel centres integers, rays unit bearings. The camera frame has `z` along the
 //! optical axis, `x` to the right (columns) and `y` down (rows); the robot frame has `x` forward, `y` left, `z` up.
@@ -15,5 +16,6 @@ pub mod error;
 pub mod geometry;
 pub mod image;
 pub mod robust;
+pub mod tilt;
 
 pub use error::{Error, Result};

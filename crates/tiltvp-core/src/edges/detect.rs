@@ -6,49 +6,55 @@ use super::options::EdgeOptions;
 use super::region::Region;
 use crate::image::{ImageView, Smoother};
 
-/// Edge pixels in structure-of-arrays form.
+/// Edge pixels in structure-of-arrays form, in slot order.
 #[derive(Debug, Clone, Default)]
 pub struct EdgePixels {
-    /// Number of the pixel within the region.
-    pub slot: Vec<u32>,
-    /// Column.
-    pub u: Vec<u16>,
-    /// Row.
-    pub v: Vec<u16>,
-    /// Gradient along `u` (Scharr, unnormalised).
-    pub gx: Vec<f32>,
-    /// Gradient along `v`.
-    pub gy: Vec<f32>,
+    slot: Vec<u32>,
+    gx: Vec<f32>,
+    gy: Vec<f32>,
+    len: usize,
 }
 
 impl EdgePixels {
     /// No pixels, with room for `capacity` of them.
     pub fn with_capacity(capacity: usize) -> Self {
-        Self {
-            slot: Vec::with_capacity(capacity),
-            u: Vec::with_capacity(capacity),
-            v: Vec::with_capacity(capacity),
-            gx: Vec::with_capacity(capacity),
-            gy: Vec::with_capacity(capacity),
-        }
+        Self { slot: vec![0; capacity], gx: vec![0.0; capacity], gy: vec![0.0; capacity], len: 0 }
     }
 
     /// How many there are.
     pub fn len(&self) -> usize {
-        self.slot.len()
+        self.len
     }
 
     /// Whether there are none.
     pub fn is_empty(&self) -> bool {
-        self.slot.is_empty()
+        self.len == 0
     }
 
-    fn clear(&mut self) {
-        self.slot.clear();
-        self.u.clear();
-        self.v.clear();
-        self.gx.clear();
-        self.gy.clear();
+    /// Number of each pixel within the region.
+    pub fn slot(&self) -> &[u32] {
+        &self.slot[..self.len]
+    }
+
+    /// Gradient of each pixel along `u` (Scharr, unnormalised).
+    pub fn gx(&self) -> &[f32] {
+        &self.gx[..self.len]
+    }
+
+    /// Gradient of each pixel along `v`.
+    pub fn gy(&self) -> &[f32] {
+        &self.gy[..self.len]
+    }
+
+    /// Appends a pixel.
+    pub fn push(&mut self, slot: u32, gx: f32, gy: f32) {
+        if self.len == self.slot.len() {
+            self.slot.push(0);
+            self.gx.push(0.0);
+            self.gy.push(0.0);
+        }
+        (self.slot[self.len], self.gx[self.len], self.gy[self.len]) = (slot, gx, gy);
+        self.len += 1;
     }
 }
 
@@ -84,7 +90,7 @@ impl Detector {
     /// The image must have the size of the camera that the region was made for. Grows no vector that has room for the
     /// whole region.
     pub fn detect(&mut self, image: &ImageView<'_>, region: &Region, out: &mut EdgePixels) {
-        out.clear();
+        out.len = 0;
         // The region keeps clear of the border, so there is a pixel to the left of its first column.
         let left = region.columns().start.saturating_sub(1);
         let mut next_row = 0;
@@ -99,17 +105,11 @@ impl Detector {
             let (gx, gy, strength) = (&mut self.gx[..n], &mut self.gy[..n], &mut self.strength[..n]);
             scharr(above, middle, below, gx, gy, strength);
             for (start, block) in (0..n).step_by(BLOCK).zip(strength.chunks(BLOCK)) {
-                if !any_reaches(block, self.threshold_squared) {
-                    continue;
-                }
-                for (i, strength) in (start..).zip(block) {
-                    if *strength >= self.threshold_squared {
-                        out.slot.push((span.slot + i) as u32);
-                        out.u.push((span.first + i) as u16);
-                        out.v.push(span.v as u16);
-                        out.gx.push(gx[i]);
-                        out.gy.push(gy[i]);
-                    }
+                let mut strong = reaching(block, self.threshold_squared);
+                while strong != 0 {
+                    let i = start + strong.trailing_zeros() as usize;
+                    strong &= strong - 1;
+                    out.push((span.slot + i) as u32, gx[i], gy[i]);
                 }
             }
         }
@@ -117,11 +117,12 @@ impl Detector {
 }
 
 /// Pixels that are tested together.
-const BLOCK: usize = 16;
+const BLOCK: usize = 32;
 
+/// One bit for each pixel of a block that reaches the threshold.
 #[inline(always)]
-fn any_reaches(block: &[f32], threshold: f32) -> bool {
-    block.iter().fold(false, |any, x| any | (*x >= threshold))
+fn reaching(block: &[f32], threshold: f32) -> u32 {
+    block.iter().enumerate().fold(0, |bits, (i, x)| bits | (u32::from(*x >= threshold) << i))
 }
 
 /// The 3x3 Scharr derivatives (3, 10, 3) of the middle row and their squared magnitude; rows are one pixel wider on both sides.
@@ -164,8 +165,8 @@ mod tests {
             let gy = 3 * (at(u - 1, v + 1) - at(u - 1, v - 1) + at(u + 1, v + 1) - at(u + 1, v - 1))
                 + 10 * (at(u, v + 1) - at(u, v - 1));
             if gx * gx + gy * gy >= 300 * 300 {
-                assert_eq!((edges.slot[k], edges.u[k], edges.v[k]), (slot as u32, u as u16, v as u16));
-                assert_eq!((edges.gx[k], edges.gy[k]), (gx as f32, gy as f32));
+                assert_eq!((edges.slot()[k], region.place(slot)), (slot as u32, (u as u16, v as u16)));
+                assert_eq!((edges.gx()[k], edges.gy()[k]), (gx as f32, gy as f32));
                 k += 1;
             }
         }

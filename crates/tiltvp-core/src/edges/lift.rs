@@ -1,5 +1,6 @@
 //! From an edge pixel's gradient to the great circle that the edge lies on.
 
+use multiversion::multiversion;
 use nalgebra::{Matrix3, Matrix3x2, Vector2};
 
 use super::detect::EdgePixels;
@@ -52,24 +53,38 @@ impl LiftTable {
         weights: &mut Vec<f32>,
         places: &mut Vec<u32>,
     ) {
-        rows.clear();
-        weights.clear();
-        places.clear();
+        let n = edges.len();
+        weights.resize(n, 0.0);
+        places.resize(n, 0);
         let limit = (sin_max * sin_max) as f32;
-        for (place, ((slot, gx), gy)) in edges.slot.iter().zip(&edges.gx).zip(&edges.gy).enumerate() {
-            let Some([a, b, c, d, e, f]) = self.maps.get(*slot as usize) else { continue };
-            let z = e * gx + f * gy;
-            let x = a * gx + b * gy;
-            let y = c * gx + d * gy;
-            let squared = x * x + y * y + z * z;
-            if z * z <= limit * squared && squared > 0.0 {
-                let length = squared.sqrt();
-                let scale = 1.0 / length;
-                rows.push(x * scale, y * scale, z * scale);
-                weights.push(length);
-                places.push(place as u32);
+        rows.refill(n, |[x, y, z]| {
+            let (x, y, z) = (&mut x[..n], &mut y[..n], &mut z[..n]);
+            let (weights, places) = (&mut weights[..n], &mut places[..n]);
+            let mut kept = 0;
+            for (place, ((slot, gx), gy)) in edges.slot().iter().zip(edges.gx()).zip(edges.gy()).enumerate() {
+                let Some([a, b, c, d, e, f]) = self.maps.get(*slot as usize) else { continue };
+                let row = [a * gx + b * gy, c * gx + d * gy, e * gx + f * gy];
+                let squared = row[0] * row[0] + row[1] * row[1] + row[2] * row[2];
+                // Written always and kept if it passes: a branch here would be guessed wrong every third time.
+                (x[kept], y[kept], z[kept]) = (row[0], row[1], row[2]);
+                (weights[kept], places[kept]) = (squared, place as u32);
+                kept += usize::from(row[2] * row[2] <= limit * squared && squared > 0.0);
             }
-        }
+            normalise([&mut x[..kept], &mut y[..kept], &mut z[..kept]], &mut weights[..kept]);
+            kept
+        });
+        weights.truncate(rows.len());
+        places.truncate(rows.len());
+    }
+}
+
+/// Divides rows by their lengths, given squared lengths, and leaves the lengths behind.
+#[multiversion(targets("x86_64+avx512f+avx512vl", "x86_64+avx2"))]
+fn normalise([x, y, z]: [&mut [f32]; 3], squared: &mut [f32]) {
+    for (((x, y), z), length) in x.iter_mut().zip(y).zip(z).zip(squared) {
+        *length = length.sqrt();
+        let scale = 1.0 / *length;
+        (*x, *y, *z) = (*x * scale, *y * scale, *z * scale);
     }
 }
 
@@ -98,9 +113,7 @@ mod tests {
                     let (_, back) = camera.unproject_jacobian(&Vector2::new(u as f64, v as f64)).unwrap();
                     // I = f(truth . bearing): dI / d pixel = truth^T d bearing / d pixel.
                     let gradient = back.transpose() * truth * 1e4;
-                    edges.slot.push(slot as u32);
-                    edges.gx.push(gradient.x as f32);
-                    edges.gy.push(gradient.y as f32);
+                    edges.push(slot as u32, gradient.x as f32, gradient.y as f32);
                 }
             }
             let (mut rows, mut weights, mut places) = (Rows::default(), Vec::new(), Vec::new());

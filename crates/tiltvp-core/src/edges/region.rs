@@ -24,6 +24,8 @@ pub struct Span {
 pub struct Region {
     spans: Vec<Span>,
     bearings: Vec<Vector3<f64>>,
+    /// Column and row of each pixel.
+    places: Vec<(u16, u16)>,
     first_column: usize,
     end_column: usize,
 }
@@ -51,6 +53,13 @@ impl Region {
                 format!("{height} x {width}, as the camera's images"),
             ));
         }
+        if width.max(height) > usize::from(u16::MAX) {
+            return Err(Error::argument(
+                "camera",
+                format!("{width} x {height} pixels"),
+                "images of at most 65535 pixels a side",
+            ));
+        }
         let (lowest, highest) = (options.elevation_min_rad.sin(), options.elevation_max_rad.sin());
         let mut bearings = vec![None; width * height];
         for (i, bearing) in bearings.iter_mut().enumerate() {
@@ -60,7 +69,8 @@ impl Region {
             }
         }
         let clear = erode(&bearings.iter().map(Option::is_some).collect::<Vec<_>>(), width, height, options.reach_px());
-        let mut region = Self { spans: Vec::new(), bearings: Vec::new(), first_column: width, end_column: 0 };
+        let mut region =
+            Self { spans: Vec::new(), bearings: Vec::new(), places: Vec::new(), first_column: width, end_column: 0 };
         for v in 0..height {
             let mut open: Option<Span> = None;
             for u in 0..=width {
@@ -72,6 +82,7 @@ impl Region {
                     (Some(bearing), _) => {
                         open.get_or_insert(Span { v, first: u, end: u, slot: region.bearings.len() }).end = u + 1;
                         region.bearings.push(bearing);
+                        region.places.push((u as u16, v as u16));
                     }
                     (None, Some(span)) => {
                         region.first_column = region.first_column.min(span.first);
@@ -113,10 +124,14 @@ impl Region {
         self.first_column..self.end_column
     }
 
+    /// Column and row of the pixel `slot`; (0, 0) beyond the region.
+    pub fn place(&self, slot: usize) -> (u16, u16) {
+        self.places.get(slot).copied().unwrap_or_default()
+    }
+
     /// Each pixel `(u, v)` of the region with its bearing in the robot frame, in slot order.
     pub fn pixels(&self) -> impl Iterator<Item = (usize, usize, Vector3<f64>)> + '_ {
-        let places = self.spans.iter().flat_map(|span| (span.first..span.end).map(|u| (u, span.v)));
-        places.zip(&self.bearings).map(|((u, v), bearing)| (u, v, *bearing))
+        self.places.iter().zip(&self.bearings).map(|((u, v), bearing)| (usize::from(*u), usize::from(*v), *bearing))
     }
 }
 

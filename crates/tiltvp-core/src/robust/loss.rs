@@ -33,3 +33,12 @@ impl Gate {
         matches!(self, Self::Hard { .. })
     }
 }
+
+impl Gate {
+    /// The factor by which the gate multiplies the weight of a residual.
+    pub fn weight(self, residual: f64) -> f64 {
+        let (limit, inverse) = self.coefficients();
+        let squared = residual * residual;
+        if squared > limit { 0.0 } else { (1.0 - squared * inverse).max(0.0).powi(8) }
+    }
+}

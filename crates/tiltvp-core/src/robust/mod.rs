@@ -15,4 +15,4 @@ pub use problem::Problem;
 pub use ransac::{RansacOptions, ransac};
 pub use refit::{RejectRefitOptions, ReweightOptions, normal_quantile, reject_refit, reweight};
 pub use report::{FitReport, Stop};
-pub use rows::{Moments, Rows};
+pub use rows::{Moments, Real, Rows};

@@ -8,9 +8,9 @@ use super::loss::Gate;
 /// Rows in structure-of-arrays form, in single precision for pixels or double for the user's own numbers.
 #[derive(Debug, Clone, Default)]
 pub struct Rows<T> {
-    x: Vec<T>,
-    y: Vec<T>,
-    z: Vec<T>,
+    /// Columns `x`, `y`, `z`, each longer than the number of rows in use.
+    columns: [Vec<T>; 3],
+    len: usize,
 }
 
 /// Weighted moments of `(x, y, d)`, where `d` is the residual of the model at which they were taken.
@@ -30,47 +30,65 @@ pub struct Moments {
 impl<T: Real> Rows<T> {
     /// No rows, with room for `capacity` of them.
     pub fn with_capacity(capacity: usize) -> Self {
-        Self { x: Vec::with_capacity(capacity), y: Vec::with_capacity(capacity), z: Vec::with_capacity(capacity) }
+        let column = || vec![T::default(); capacity];
+        Self { columns: [column(), column(), column()], len: 0 }
     }
 
     /// Removes all rows and keeps the memory.
     pub fn clear(&mut self) {
-        self.x.clear();
-        self.y.clear();
-        self.z.clear();
+        self.len = 0;
     }
 
     /// Appends a row.
-    #[inline(always)]
     pub fn push(&mut self, x: T, y: T, z: T) {
-        self.x.push(x);
-        self.y.push(y);
-        self.z.push(z);
+        for (column, value) in self.columns.iter_mut().zip([x, y, z]) {
+            match column.get_mut(self.len) {
+                Some(place) => *place = value,
+                None => column.push(value),
+            }
+        }
+        self.len += 1;
+    }
+
+    /// Replaces all rows: `write` fills the columns, which have room for `capacity` rows, and returns how many it wrote.
+    pub fn refill(&mut self, capacity: usize, write: impl FnOnce([&mut [T]; 3]) -> usize) {
+        for column in &mut self.columns {
+            if column.len() < capacity {
+                column.resize(capacity, T::default());
+            }
+        }
+        self.len = write(self.columns.each_mut().map(Vec::as_mut_slice)).min(capacity);
     }
 
     /// How many rows there are.
     pub fn len(&self) -> usize {
-        self.x.len()
+        self.len
     }
 
     /// Whether there are none.
     pub fn is_empty(&self) -> bool {
-        self.x.is_empty()
+        self.len == 0
     }
 
     /// Row `index` in double precision.
     pub fn get(&self, index: usize) -> Option<Vector3<f64>> {
-        Some(Vector3::new(self.x.get(index)?.to_f64(), self.y.get(index)?.to_f64(), self.z.get(index)?.to_f64()))
+        let [x, y, z] = self.columns();
+        Some(Vector3::new(x.get(index)?.to_f64(), y.get(index)?.to_f64(), z.get(index)?.to_f64()))
     }
 
     /// All rows in double precision.
     pub fn iter(&self) -> impl Iterator<Item = Vector3<f64>> + '_ {
-        self.x.iter().zip(&self.y).zip(&self.z).map(|((x, y), z)| Vector3::new(x.to_f64(), y.to_f64(), z.to_f64()))
+        let [x, y, z] = self.columns();
+        x.iter().zip(y).zip(z).map(|((x, y), z)| Vector3::new(x.to_f64(), y.to_f64(), z.to_f64()))
+    }
+
+    fn columns(&self) -> [&[T]; 3] {
+        self.columns.each_ref().map(|column| &column[..self.len])
     }
 
     /// How many rows have a residual of at most `threshold`.
     pub fn count_within(&self, model: [f64; 3], threshold: f64) -> usize {
-        T::count([&self.x, &self.y, &self.z], model.map(T::from_f64), T::from_f64(threshold * threshold))
+        T::count(self.columns(), model.map(T::from_f64), T::from_f64(threshold * threshold))
     }
 
     /// Applies a gate about a model to the weights and takes the moments of what is left.
@@ -81,7 +99,7 @@ impl<T: Real> Rows<T> {
         let n = self.len().min(weights.len());
         for start in (0..n).step_by(BLOCK) {
             let part = start..(start + BLOCK).min(n);
-            let rows = [&self.x[part.clone()], &self.y[part.clone()], &self.z[part.clone()]];
+            let rows = self.columns().map(|column| &column[part.clone()]);
             T::gather(rows, &mut weights[part], model.map(T::from_f64), gains, gate.is_hard(), &mut total);
         }
         Moments {
@@ -133,10 +151,10 @@ impl Moments {
 }
 
 /// Rows added up in the rows' own precision before they are added in double precision.
-const BLOCK: usize = 1024;
+const BLOCK: usize = 512;
 
 /// Independent sums that are added up side by side, in the same order on every machine.
-const LANES: usize = 8;
+const LANES: usize = 16;
 
 /// Totals in double precision: weight, then the six moments.
 #[derive(Default)]
@@ -171,21 +189,22 @@ pub trait Real:
 #[inline(always)]
 fn count_body<T: Real>([x, y, z]: [&[T]; 3], [h0, h1, h2]: [T; 3], limit: T) -> usize {
     let mut lanes = [0u32; LANES];
-    let n = x.len().min(y.len()).min(z.len());
-    let whole = n - n % LANES;
-    for ((x, y), z) in x[..whole].chunks_exact(LANES).zip(y.chunks_exact(LANES)).zip(z.chunks_exact(LANES)) {
+    let within = |x: T, y: T, z: T| {
+        let d = x * h0 + y * h1 + z * h2;
+        u32::from(d * d <= limit)
+    };
+    let ((x, rest_x), (y, rest_y), (z, rest_z)) =
+        (x.as_chunks::<LANES>(), y.as_chunks::<LANES>(), z.as_chunks::<LANES>());
+    for ((x, y), z) in x.iter().zip(y).zip(z) {
         for i in 0..LANES {
-            let d = x[i] * h0 + y[i] * h1 + z[i] * h2;
-            lanes[i] += u32::from(d * d <= limit);
+            lanes[i] += within(x[i], y[i], z[i]);
         }
     }
-    for i in whole..n {
-        let d = x[i] * h0 + y[i] * h1 + z[i] * h2;
-        lanes[0] += u32::from(d * d <= limit);
-    }
-    lanes.iter().sum::<u32>() as usize
+    let rest: u32 = rest_x.iter().zip(rest_y).zip(rest_z).map(|((x, y), z)| within(*x, *y, *z)).sum();
+    (lanes.iter().sum::<u32>() + rest) as usize
 }
 
+/// One block: residuals and gated weights first, then each sum in lanes of its own, all of it in the first-level cache.
 #[inline(always)]
 fn gather_body<T: Real, const HARD: bool>(
     [x, y, z]: [&[T]; 3],
@@ -195,49 +214,71 @@ fn gather_body<T: Real, const HARD: bool>(
     total: &mut Total,
 ) {
     let (one, zero) = (T::from_f64(1.0), T::default());
-    let mut sums = [[zero; LANES]; 7];
-    let mut counts = [0u32; LANES];
-    let n = weights.len();
-    let (x, y, z) = (&x[..n], &y[..n], &z[..n]);
-    let mut one_row = |x: T, y: T, z: T, weight: &mut f32, lane: usize| {
-        let d = x * h0 + y * h1 + z * h2;
-        let dd = d * d;
-        let w = if HARD {
-            *weight = if dd <= limit { *weight } else { 0.0 };
-            T::from_f32(*weight)
+    let [mut d, mut w, mut wx, mut wy, mut wd] = [[zero; BLOCK]; 5];
+    let n = weights.len().min(BLOCK);
+    let (x, y, z, weights) = (&x[..n], &y[..n], &z[..n], &mut weights[..n]);
+    let mut count = 0u32;
+    for i in 0..n {
+        d[i] = x[i] * h0 + y[i] * h1 + z[i] * h2;
+        let dd = d[i] * d[i];
+        if HARD {
+            weights[i] = if dd <= limit { weights[i] } else { 0.0 };
+            w[i] = T::from_f32(weights[i]);
         } else {
             let t = one - dd * inverse;
             let t = if t > zero { t } else { zero };
             let t = t * t;
             let t = t * t;
-            T::from_f32(*weight) * t * t
-        };
-        counts[lane] += u32::from(w > zero);
-        let (wx, wy, wd) = (w * x, w * y, w * d);
-        sums[0][lane] = sums[0][lane] + w;
-        sums[1][lane] = sums[1][lane] + wx * x;
-        sums[2][lane] = sums[2][lane] + wx * y;
-        sums[3][lane] = sums[3][lane] + wy * y;
-        sums[4][lane] = sums[4][lane] + wx * d;
-        sums[5][lane] = sums[5][lane] + wy * d;
-        sums[6][lane] = sums[6][lane] + wd * d;
-    };
-    let whole = n - n % LANES;
-    for start in (0..whole).step_by(LANES) {
-        let part = start..start + LANES;
-        let (x, y, z) = (&x[part.clone()], &y[part.clone()], &z[part.clone()]);
-        let weights = &mut weights[part];
+            w[i] = T::from_f32(weights[i]) * (t * t);
+        }
+        count += u32::from(w[i] > zero);
+        wx[i] = w[i] * x[i];
+        wy[i] = w[i] * y[i];
+        wd[i] = w[i] * d[i];
+    }
+    let [d, w, wx, wy, wd] = [&d[..n], &w[..n], &wx[..n], &wy[..n], &wd[..n]];
+    total.count += count as usize;
+    total.sums[0] += sum(w);
+    total.sums[1] += dot(wx, x);
+    total.sums[2] += dot(wx, y);
+    total.sums[3] += dot(wy, y);
+    total.sums[4] += dot(wx, d);
+    total.sums[5] += dot(wy, d);
+    total.sums[6] += dot(wd, d);
+}
+
+/// The sum of `a`, in [`LANES`] partial sums that are then added up in double precision.
+#[inline(always)]
+fn sum<T: Real>(a: &[T]) -> f64 {
+    let mut lanes = [T::default(); LANES];
+    let (whole, rest) = a.as_chunks::<LANES>();
+    for a in whole {
         for i in 0..LANES {
-            one_row(x[i], y[i], z[i], &mut weights[i], i);
+            lanes[i] = lanes[i] + a[i];
         }
     }
-    for i in whole..n {
-        one_row(x[i], y[i], z[i], &mut weights[i], 0);
+    finish(lanes, rest.iter().copied())
+}
+
+/// The sum of `a b`.
+#[inline(always)]
+fn dot<T: Real>(a: &[T], b: &[T]) -> f64 {
+    let mut lanes = [T::default(); LANES];
+    let ((whole_a, rest_a), (whole_b, rest_b)) = (a.as_chunks::<LANES>(), b.as_chunks::<LANES>());
+    for (a, b) in whole_a.iter().zip(whole_b) {
+        for i in 0..LANES {
+            lanes[i] = lanes[i] + a[i] * b[i];
+        }
     }
-    total.count += counts.iter().sum::<u32>() as usize;
-    for (sum, lanes) in total.sums.iter_mut().zip(&sums) {
-        *sum += lanes.iter().map(|v| v.to_f64()).sum::<f64>();
+    finish(lanes, rest_a.iter().zip(rest_b).map(|(a, b)| *a * *b))
+}
+
+#[inline(always)]
+fn finish<T: Real>(mut lanes: [T; LANES], rest: impl Iterator<Item = T>) -> f64 {
+    for (lane, term) in lanes.iter_mut().zip(rest) {
+        *lane = *lane + term;
     }
+    lanes.iter().map(|lane| lane.to_f64()).sum()
 }
 
 /// Implements [`Real`] for one float type, with run-time dispatch to the machine's widest vectors.
