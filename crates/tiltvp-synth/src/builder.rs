@@ -31,6 +31,14 @@ pub(crate) struct Patch {
     pub(crate) uv: [f64; 2],
 }
 
+/// A rectangle of a patch that is really there, in shares of `du` and `dv`: walls have holes, but one light and texture.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Piece {
+    pub(crate) patch: usize,
+    pub(crate) low: [f64; 2],
+    pub(crate) high: [f64; 2],
+}
+
 /// An upright frame of the world: `x` and `y` horizontal, `z` up.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Frame {
@@ -117,6 +125,7 @@ impl Footprint {
 #[derive(Debug, Default)]
 pub(crate) struct Builder {
     pub(crate) patches: Vec<Patch>,
+    pub(crate) pieces: Vec<Piece>,
     pub(crate) materials: Vec<Material>,
     pub(crate) edges: Vec<Segment>,
     /// Where a low robot cannot stand.
@@ -141,16 +150,35 @@ impl Builder {
         self.matt(Texture::Paint { color: rgb(red, green, blue), mottle: 0.08, seed })
     }
 
+    /// Adds a whole patch.
+    pub(crate) fn patch(&mut self, patch: Patch) {
+        self.pieces.push(Piece { patch: self.patches.len(), low: [0.0; 2], high: [1.0; 2] });
+        self.patches.push(patch);
+    }
+
+    /// Adds the given rectangles `[low, high]` of a patch, in metres along its sides.
+    pub(crate) fn perforated(&mut self, patch: Patch, rectangles: &[[[f64; 2]; 2]]) {
+        let size = [patch.du.norm(), patch.dv.norm()];
+        let share = |at: [f64; 2]| [at[0] / size[0], at[1] / size[1]];
+        let index = self.patches.len();
+        self.patches.push(patch);
+        self.pieces.extend(rectangles.iter().map(|[low, high]| Piece {
+            patch: index,
+            low: share(*low),
+            high: share(*high),
+        }));
+    }
+
     /// A pane from three corners of a frame: origin, end of `u`, end of `v`; texture coordinates start at `uv`.
     pub(crate) fn pane(&mut self, frame: &Frame, corners: [[f64; 3]; 3], uv: [f64; 2], material: MaterialId) {
         let [o, u, v] = corners.map(|c| frame.point(c[0], c[1], c[2]));
-        self.patches.push(Patch { origin: o, du: u - o, dv: v - o, triangle: false, material, uv });
+        self.patch(Patch { origin: o, du: u - o, dv: v - o, triangle: false, material, uv });
     }
 
     /// A triangle of the world, seen from where its corners turn counter-clockwise.
     pub(crate) fn triangle(&mut self, corners: [Vector3<f64>; 3], material: MaterialId) {
         let [o, u, v] = corners;
-        self.patches.push(Patch { origin: o, du: u - o, dv: v - o, triangle: true, material, uv: [0.0, 0.0] });
+        self.patch(Patch { origin: o, du: u - o, dv: v - o, triangle: true, material, uv: [0.0, 0.0] });
     }
 
     /// A true vertical edge of the world.
@@ -178,7 +206,7 @@ impl Builder {
         );
         let mut face = |origin: Vector3<f64>, du: Vector3<f64>, dv: Vector3<f64>| {
             let shift = if endless { 0.37 * self.patches.len() as f64 } else { 0.0 };
-            self.patches.push(Patch { origin, du, dv, triangle: false, material, uv: [shift, shift] });
+            self.patch(Patch { origin, du, dv, triangle: false, material, uv: [shift, shift] });
         };
         face(origin, b, a);
         face(origin + c, a, b);
@@ -211,7 +239,7 @@ impl Builder {
         for k in 0..sides {
             let (b0, b1, t0, t1) = (ring(k, 0), ring(k + 1, 0), ring(k, 1), ring(k + 1, 1));
             if (radius[0] - radius[1]).abs() < 1e-12 {
-                self.patches.push(Patch {
+                self.patch(Patch {
                     origin: b0,
                     du: b1 - b0,
                     dv: t0 - b0,

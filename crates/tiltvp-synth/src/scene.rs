@@ -6,7 +6,7 @@ use parry3d_f64::query::{Ray, RayCast};
 use parry3d_f64::shape::TriMesh;
 use tiltvp_core::{Error, Result};
 
-use crate::builder::{Builder, Material, Patch};
+use crate::builder::{Builder, Material, Patch, Piece};
 
 /// Where a ray meets a patch first.
 #[derive(Debug, Clone, Copy)]
@@ -35,18 +35,17 @@ fn parry(v: &Vector3<f64>) -> Vector {
 impl Scene {
     /// Takes over the patches of a builder and builds their bounding volume hierarchy.
     pub(crate) fn new(builder: Builder) -> Result<Self> {
-        let Builder { patches, materials, .. } = builder;
-        let (mut vertices, mut indices) =
-            (Vec::with_capacity(4 * patches.len()), Vec::with_capacity(2 * patches.len()));
-        let mut patch_of_triangle = Vec::with_capacity(2 * patches.len());
-        for (k, patch) in patches.iter().enumerate() {
-            let first = vertices.len() as u32;
-            let Patch { origin, du, dv, .. } = patch;
-            vertices.extend([*origin, origin + du, origin + dv].iter().map(parry));
+        let Builder { patches, pieces, materials, .. } = builder;
+        let (mut vertices, mut indices) = (Vec::with_capacity(4 * pieces.len()), Vec::with_capacity(2 * pieces.len()));
+        let mut patch_of_triangle = Vec::with_capacity(2 * pieces.len());
+        for Piece { patch: k, low, high } in pieces {
+            let (patch, first) = (&patches[k], vertices.len() as u32);
+            let at = |s: f64, t: f64| parry(&(patch.origin + patch.du * s + patch.dv * t));
+            vertices.extend([at(low[0], low[1]), at(high[0], low[1]), at(low[0], high[1])]);
             indices.push([first, first + 1, first + 2]);
             patch_of_triangle.push(k as u32);
             if !patch.triangle {
-                vertices.push(parry(&(origin + du + dv)));
+                vertices.push(at(high[0], high[1]));
                 indices.push([first + 1, first + 3, first + 2]);
                 patch_of_triangle.push(k as u32);
             }

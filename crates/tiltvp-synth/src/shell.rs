@@ -1,6 +1,8 @@
 //! The shell of a room: floor, ceiling with its lights, walls, skirting, doors, windows and radiators.
 
-use crate::builder::{Builder, Column, Frame, Material, MaterialId};
+use nalgebra::Vector3;
+
+use crate::builder::{Builder, Column, Frame, Material, MaterialId, Patch};
 use crate::dice::Dice;
 use crate::options::RoomKind;
 use crate::plan::{Filling, Opening, Plan, Wall};
@@ -101,9 +103,17 @@ fn floor(plan: &Plan, builder: &mut Builder, dice: &mut Dice) {
     };
     let material = builder.matt(texture);
     let world = Frame::new(0.0, 0.0, 0.0);
-    for [x0, y0, x1, y1] in &plan.floors {
-        builder.pane(&world, [[*x0, *y0, 0.0], [*x1, *y0, 0.0], [*x0, *y1, 0.0]], [*x0, *y0], material);
-    }
+    let (_, end) = plan.bounds();
+    let patch = Patch {
+        origin: world.origin,
+        du: Vector3::x() * end.x,
+        dv: Vector3::y() * end.y,
+        triangle: false,
+        material,
+        uv: [0.0; 2],
+    };
+    let rectangles: Vec<_> = plan.floors.iter().map(|[x0, y0, x1, y1]| [[*x0, *y0], [*x1, *y1]]).collect();
+    builder.perforated(patch, &rectangles);
 }
 
 fn ceiling(plan: &Plan, builder: &mut Builder, dice: &mut Dice) {
@@ -120,8 +130,18 @@ fn ceiling(plan: &Plan, builder: &mut Builder, dice: &mut Dice) {
     let beam = if beam_wood { builder.paint(96, 64, 40) } else { builder.paint(216, 208, 194) };
     let world = Frame::new(0.0, 0.0, 0.0);
     let h = plan.height;
+    let (_, end) = plan.bounds();
+    let patch = Patch {
+        origin: world.point(0.0, 0.0, h),
+        du: Vector3::y() * end.y,
+        dv: Vector3::x() * end.x,
+        triangle: false,
+        material,
+        uv: [0.0; 2],
+    };
+    let rectangles: Vec<_> = plan.floors.iter().map(|[x0, y0, x1, y1]| [[*y0, *x0], [*y1, *x1]]).collect();
+    builder.perforated(patch, &rectangles);
     for [x0, y0, x1, y1] in plan.floors.iter().copied() {
-        builder.pane(&world, [[x0, y0, h], [x0, y1, h], [x1, y0, h]], [y0, x0], material);
         let (nx, ny) = (((x1 - x0) / 1.8).round().max(1.0) as usize, ((y1 - y0) / 2.0).round().max(1.0) as usize);
         for k in 0..nx * ny {
             let mut x = x0 + (x1 - x0) * ((k % nx) as f64 + 0.5) / nx as f64;
@@ -204,17 +224,27 @@ fn panels(wall: &Wall, height: f64, material: MaterialId, builder: &mut Builder)
         cuts.extend(opening.along);
     }
     cuts.sort_by(f64::total_cmp);
+    let mut rectangles = Vec::new();
     for pair in cuts.windows(2) {
         let (from, to) = (pair[0], pair[1]);
         let hole = wall.openings.iter().find(|o| o.along[0] < 0.5 * (from + to) && o.along[1] > 0.5 * (from + to));
         let parts = hole.map_or([[0.0, height], [0.0, 0.0]], |o| [[0.0, o.z[0]], [o.z[1], height]]);
         for [low, high] in parts {
             if high - low > 1e-6 && to - from > 1e-6 {
-                let corners = [[to, 0.0, low], [from, 0.0, low], [to, 0.0, high]];
-                builder.pane(&wall.frame, corners, [-to, low], material);
+                // Seen from the front, the wall's x runs to the left.
+                rectangles.push([[wall.length - to, low], [wall.length - from, high]]);
             }
         }
     }
+    let patch = Patch {
+        origin: wall.frame.point(wall.length, 0.0, 0.0),
+        du: wall.frame.vector(-wall.length, 0.0, 0.0),
+        dv: Vector3::z() * height,
+        triangle: false,
+        material,
+        uv: [-wall.length, 0.0],
+    };
+    builder.perforated(patch, &rectangles);
 }
 
 fn skirting(wall: &Wall, material: MaterialId, builder: &mut Builder) {

@@ -94,7 +94,7 @@ fn framed(frame: &Frame, size: [f64; 2], askew: f64, texture: Texture, rim: Mate
     bar(start + right * border, between, up * border);
     bar(start + right * border + height - up * border, between, up * border);
     let material = builder.matt(texture);
-    builder.patches.push(Patch {
+    builder.patch(Patch {
         origin: start + (right + up) * border + out * 0.012,
         du: between,
         dv: up * (size[1] - 2.0 * border),
