@@ -11,5 +11,7 @@
 pub mod camera;
 pub mod error;
 pub mod geometry;
+#[cfg(feature = "testing")]
+pub mod testing;
 
 pub use error::{Error, Result};

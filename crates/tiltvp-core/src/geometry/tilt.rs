@@ -24,7 +24,10 @@ impl Tilt {
 
     /// From the ground normal in the robot frame, of any length but zero.
     pub fn from_normal(normal: &Vector3<f64>) -> Option<Self> {
-        normal.try_normalize(f64::MIN_POSITIVE).filter(|n| n.iter().all(|x| x.is_finite())).map(|normal| Self { normal })
+        normal
+            .try_normalize(f64::MIN_POSITIVE)
+            .filter(|n| n.iter().all(|x| x.is_finite()))
+            .map(|normal| Self { normal })
     }
 
     /// From roll about `x` (to the right positive) and pitch about `y` (nose down positive), in radians: the lean of a
