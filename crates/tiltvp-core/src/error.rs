@@ -1,5 +1,7 @@
 //! The one error type of the crate: what was wrong, what was expected, and where.
 
+use std::borrow::Cow;
+
 /// Shorthand for results of this crate.
 pub type Result<T> = std::result::Result<T, Error>;
 
@@ -17,7 +19,7 @@ pub enum Error {
         /// The value that was given, as text.
         value: String,
         /// What would have been accepted.
-        expected: &'static str,
+        expected: Cow<'static, str>,
     },
     /// An option outside its domain.
     #[error("option {name} = {value}, expected {expected}")]
@@ -57,8 +59,8 @@ impl Error {
         model: &'static str,
         parameter: impl Into<String>,
         value: impl std::fmt::Display,
-        expected: &'static str,
+        expected: impl Into<Cow<'static, str>>,
     ) -> Self {
-        Self::InvalidCamera { model, parameter: parameter.into(), value: value.to_string(), expected }
+        Self::InvalidCamera { model, parameter: parameter.into(), value: value.to_string(), expected: expected.into() }
     }
 }

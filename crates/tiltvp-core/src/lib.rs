@@ -16,6 +16,8 @@ pub mod error;
 pub mod geometry;
 pub mod image;
 pub mod robust;
+#[cfg(feature = "testing")]
+pub mod testing;
 pub mod tilt;
 
 pub use error::{Error, Result};

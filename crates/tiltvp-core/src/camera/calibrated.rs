@@ -2,7 +2,9 @@
 
 use nalgebra::{Matrix2x3, Matrix3x2, Vector2, Vector3};
 
-use super::any::Model;
+use super::any::{Model, with_model};
+use super::model::CameraModel;
+use super::rim::Rim;
 use crate::error::{Error, Result};
 
 /// A calibrated central camera.
@@ -16,19 +18,30 @@ pub struct Camera {
     model: Model,
     mirror: bool,
     max_theta_rad: f64,
+    /// The limit, where it is tighter than the model's own.
+    limit: Option<Rim>,
+    /// The `z` of the model's ray through the centre of the image.
+    axis_z: f64,
 }
 
 impl Camera {
     /// A camera with images of `width` x `height` pixels that answers wherever its model does.
     ///
     /// # Errors
-    /// [`Error::InvalidCamera`] if a side of the image is zero.
+    /// [`Error::InvalidCamera`] if a side of the image is zero, or is not that of an equirectangular model.
     pub fn new(width: u32, height: u32, model: Model) -> Result<Self> {
         if width == 0 || height == 0 {
             return Err(Error::camera("camera", "width, height", format!("{width} x {height}"), "at least one pixel"));
         }
-        let max_theta_rad = model.as_dyn().max_theta_rad();
-        Ok(Self { width, height, model, mirror: false, max_theta_rad })
+        if let Model::Equirectangular(panorama) = &model
+            && panorama.size() != (width, height)
+        {
+            let (w, h) = panorama.size();
+            let expected = format!("{w} x {h}, the size of its equirectangular model");
+            return Err(Error::camera("camera", "width, height", format!("{width} x {height}"), expected));
+        }
+        let (max_theta_rad, axis_z) = (model.as_dyn().max_theta_rad(), model.as_dyn().axis_z());
+        Ok(Self { width, height, model, mirror: false, max_theta_rad, limit: None, axis_z })
     }
 
     /// The same camera that answers only within `max_theta_rad` of the ray through the centre of the image.
@@ -39,7 +52,9 @@ impl Camera {
         if !(max_theta_rad > 0.0 && max_theta_rad <= std::f64::consts::PI) {
             return Err(Error::camera("camera", "max_theta_rad", max_theta_rad, "an angle in (0, pi]"));
         }
-        self.max_theta_rad = max_theta_rad.min(self.model.as_dyn().max_theta_rad());
+        let own = self.model.as_dyn().max_theta_rad();
+        self.max_theta_rad = max_theta_rad.min(own);
+        self.limit = (max_theta_rad < own).then(|| Rim::new(max_theta_rad, 0.0));
         Ok(self)
     }
 
@@ -83,41 +98,71 @@ impl Camera {
 
     /// The pixel that sees a bearing of any positive length, `None` outside the valid set.
     pub fn project(&self, bearing: &Vector3<f64>) -> Option<Vector2<f64>> {
-        let bearing = self.reflect(bearing);
-        self.within(&bearing).then(|| self.model.as_dyn().project(&bearing)).flatten()
+        with_model!(&self.model, model => self.project_by(model, bearing))
     }
 
     /// The unit bearing that a pixel sees, `None` outside the valid set.
     pub fn unproject(&self, pixel: &Vector2<f64>) -> Option<Vector3<f64>> {
-        let bearing = self.model.as_dyn().unproject(pixel)?;
-        self.within(&bearing).then(|| self.reflect(&bearing))
+        with_model!(&self.model, model => self.unproject_by(model, pixel))
     }
 
     /// [`project`](Self::project) with `d pixel / d bearing`.
     pub fn project_jacobian(&self, bearing: &Vector3<f64>) -> Option<(Vector2<f64>, Matrix2x3<f64>)> {
+        with_model!(&self.model, model => self.project_jacobian_by(model, bearing))
+    }
+
+    /// [`unproject`](Self::unproject) with `d bearing / d pixel`.
+    pub fn unproject_jacobian(&self, pixel: &Vector2<f64>) -> Option<(Vector3<f64>, Matrix3x2<f64>)> {
+        with_model!(&self.model, model => self.unproject_jacobian_by(model, pixel))
+    }
+
+    #[inline]
+    pub(super) fn project_by(&self, model: &impl CameraModel, bearing: &Vector3<f64>) -> Option<Vector2<f64>> {
         let bearing = self.reflect(bearing);
-        let (pixel, mut jacobian) =
-            self.within(&bearing).then(|| self.model.as_dyn().project_jacobian(&bearing)).flatten()?;
+        self.within(&bearing).then(|| model.project(&bearing)).flatten()
+    }
+
+    #[inline]
+    pub(super) fn unproject_by(&self, model: &impl CameraModel, pixel: &Vector2<f64>) -> Option<Vector3<f64>> {
+        let bearing = model.unproject(pixel)?;
+        self.within(&bearing).then(|| self.reflect(&bearing))
+    }
+
+    #[inline]
+    pub(super) fn project_jacobian_by(
+        &self,
+        model: &impl CameraModel,
+        bearing: &Vector3<f64>,
+    ) -> Option<(Vector2<f64>, Matrix2x3<f64>)> {
+        let bearing = self.reflect(bearing);
+        let (pixel, mut jacobian) = self.within(&bearing).then(|| model.project_jacobian(&bearing)).flatten()?;
         if self.mirror {
             jacobian.column_mut(2).neg_mut();
         }
         Some((pixel, jacobian))
     }
 
-    /// [`unproject`](Self::unproject) with `d bearing / d pixel`.
-    pub fn unproject_jacobian(&self, pixel: &Vector2<f64>) -> Option<(Vector3<f64>, Matrix3x2<f64>)> {
-        let (bearing, mut jacobian) = self.model.as_dyn().unproject_jacobian(pixel)?;
+    #[inline]
+    pub(super) fn unproject_jacobian_by(
+        &self,
+        model: &impl CameraModel,
+        pixel: &Vector2<f64>,
+    ) -> Option<(Vector3<f64>, Matrix3x2<f64>)> {
+        let (bearing, mut jacobian) = model.unproject_jacobian(pixel)?;
         if self.mirror {
             jacobian.row_mut(2).neg_mut();
         }
         self.within(&bearing).then(|| (self.reflect(&bearing), jacobian))
     }
 
+    #[inline]
     fn reflect(&self, bearing: &Vector3<f64>) -> Vector3<f64> {
         if self.mirror { Vector3::new(bearing.x, bearing.y, -bearing.z) } else { *bearing }
     }
 
+    /// Whether a bearing of the model is within a limit that is tighter than the model's own.
+    #[inline]
     fn within(&self, bearing: &Vector3<f64>) -> bool {
-        bearing.xy().norm().atan2(bearing.z) <= self.max_theta_rad
+        self.limit.is_none_or(|limit| limit.admits(bearing.xy().norm(), self.axis_z * bearing.z))
     }
 }

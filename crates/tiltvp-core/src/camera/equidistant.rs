@@ -2,6 +2,7 @@
 
 use nalgebra::{Matrix2x3, Matrix3x2, Vector2, Vector3};
 
+use super::lens::{sane, seen};
 use super::model::CameraModel;
 use super::radial::{self, Radial};
 use crate::error::{Error, Result};
@@ -48,11 +49,11 @@ impl Radial for Equidistant {
 
 impl CameraModel for Equidistant {
     fn project(&self, bearing: &Vector3<f64>) -> Option<Vector2<f64>> {
-        self.project_jacobian(bearing).map(|(pixel, _)| pixel)
+        seen(radial::point(self, sane(bearing)?)? + Vector2::new(self.cx, self.cy))
     }
 
     fn unproject(&self, pixel: &Vector2<f64>) -> Option<Vector3<f64>> {
-        self.unproject_jacobian(pixel).map(|(bearing, _)| bearing)
+        radial::bearing(self, &seen(pixel - Vector2::new(self.cx, self.cy))?)
     }
 
     fn project_jacobian(&self, bearing: &Vector3<f64>) -> Option<(Vector2<f64>, Matrix2x3<f64>)> {

@@ -1,12 +1,42 @@
 //! Central camera models: pixels to unit bearings and back, past 90 degrees where the lens is.
 
 mod any;
+mod batch;
+mod brown;
 mod calibrated;
+mod conformance;
+mod difference;
+mod double_sphere;
 mod equidistant;
+mod equirectangular;
+mod extended_unified;
+mod grid;
+mod kannala_brandt;
+mod lens;
 mod model;
+mod ocam;
+mod parameters;
+mod pinhole;
+mod polynomial;
 mod radial;
+mod radial_polynomial;
+mod rim;
+mod solve;
+mod sphere;
+mod unified;
 
 pub use any::Model;
 pub use calibrated::Camera;
+pub use conformance::{Conformance, conformance};
+pub use difference::{Derivative, derivative};
+pub use double_sphere::DoubleSphere;
 pub use equidistant::Equidistant;
+pub use equirectangular::Equirectangular;
+pub use extended_unified::ExtendedUnified;
+pub use kannala_brandt::KannalaBrandt;
 pub use model::CameraModel;
+pub use ocam::Ocam;
+pub use parameters::Parameter;
+pub use pinhole::Pinhole;
+pub use radial_polynomial::RadialPolynomial;
+pub use unified::Unified;

@@ -19,6 +19,11 @@ pub trait CameraModel {
     /// [`unproject`](Self::unproject) with `d bearing / d pixel` of the unit bearing, per pixel.
     fn unproject_jacobian(&self, pixel: &Vector2<f64>) -> Option<(Vector3<f64>, Matrix3x2<f64>)>;
 
-    /// The largest angle from the optical axis that the model answers for, in radians.
+    /// The largest angle that the model answers for, from the ray through the centre of the image, in radians.
     fn max_theta_rad(&self) -> f64;
+
+    /// The `z` of the unit ray through the centre of the image: 1, or -1 for a mirror given in its physical frame.
+    fn axis_z(&self) -> f64 {
+        1.0
+    }
 }

@@ -64,3 +64,25 @@ pub(super) fn unproject(profile: &impl Radial, point: &Vector2<f64>) -> Option<(
     let xy = if theta <= ON_AXIS { point * dtheta } else { e * sin };
     Some((Vector3::new(xy.x, xy.y, cos), jacobian))
 }
+
+/// [`project`] without the derivative.
+#[inline]
+pub(super) fn point(profile: &impl Radial, bearing: &Vector3<f64>) -> Option<Vector2<f64>> {
+    let xy = bearing.xy();
+    let rho = xy.norm();
+    if rho <= ON_AXIS * bearing.z.abs() {
+        return if bearing.z > 0.0 { profile.radius(0.0).map(|(_, dr)| xy * (dr / bearing.z)) } else { None };
+    }
+    let (r, _) = profile.radius(rho.atan2(bearing.z))?;
+    Some(xy * (r / rho))
+}
+
+/// [`unproject`] without the derivative.
+#[inline]
+pub(super) fn bearing(profile: &impl Radial, point: &Vector2<f64>) -> Option<Vector3<f64>> {
+    let r = point.norm();
+    let (theta, dtheta) = profile.theta(r)?;
+    let (sin, cos) = theta.sin_cos();
+    let xy = if theta <= ON_AXIS { point * dtheta } else { point * (sin / r) };
+    Some(Vector3::new(xy.x, xy.y, cos))
+}
