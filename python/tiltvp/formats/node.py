@@ -79,7 +79,7 @@ class Node:
         """Any other key than `keys` here is an error that names the near ones."""
         for key in self.tree:
             if key not in keys:
-                near = difflib.get_close_matches(str(key), keys, 3) or keys
+                near = difflib.get_close_matches(str(key), keys, 3, cutoff=0.5) or keys
                 self.fail(f"unknown key {key!r}", "one of " + ", ".join(near))
 
     def items(self) -> list[Node]:

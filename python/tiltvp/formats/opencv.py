@@ -3,8 +3,7 @@
 What tells the models apart, in this order: a word of the file (`fisheye_model: 1`, `model: fisheye`, ...), `xi`, the
 number of coefficients. Four coefficients are k1 k2 p1 p2 to cv::calibrateCamera and k1 k2 k3 k4 to cv::fisheye; then
 the names decide: `K` with `D`, the argument names of cv::fisheye, against all the others, of which a file that mentions
-a fisheye is refused. The formats `opencv-pinhole` and `opencv-fisheye` say it
-outright. Pixel centres are at integers.
+a fisheye is refused. The formats `opencv-pinhole` and `opencv-fisheye` say it outright. Pixel centres are at integers.
 """
 
 from __future__ import annotations
@@ -105,12 +104,15 @@ def _camera(root: Node, tail: str, given: ImageSize | None, kind: str | None, na
     size = _size(root, given)
     values, skew = camera_matrix(matrix)
     notes: tuple[str, ...] = ()
-    kind = kind or _stated(root, xi)
+    stated = _stated(root, xi)
+    if kind is not None and stated is not None and kind != stated:
+        root.fail(f"the file says it is a {stated} camera", f"a {kind} camera, as format= says")
+    kind = kind or stated
     if kind is None:
         kind, notes = _inferred(matrix, coefficients, xi)
     parameters: Parameters
     if kind == "omnidir":
-        parameters = {"xi": root.need("xi" + tail, "Xi" + tail).number(), **values, **mei(coefficients)}
+        parameters = {"xi": root.need("xi" + tail, "Xi" + tail).numbers(1)[0], **values, **mei(coefficients)}
         if skew != 0.0:
             parameters["skew"] = skew
         return root.spec("unified", size, parameters, name, *notes)

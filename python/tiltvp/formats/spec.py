@@ -95,11 +95,9 @@ def first_fault(spec: CameraSpec) -> tuple[str, str, str] | None:
                 return f"{key} is {number}", "a finite number", key
         if key in _POSITIVE and isinstance(value, float) and value <= 0.0:
             return f"{key} is {value!r}", "a positive number", key
-    if spec.model == "ocam":
-        return _ocam_fault(spec.parameters)
     if spec.max_theta_rad is not None and not 0.0 < spec.max_theta_rad <= math.pi:
         return f"max_theta_rad is {spec.max_theta_rad!r}", "an angle above 0, at most pi", "max_theta_rad"
-    return None
+    return _ocam_fault(spec.parameters) if spec.model == "ocam" else None
 
 
 def _ocam_fault(parameters: Parameters) -> tuple[str, str, str] | None:
