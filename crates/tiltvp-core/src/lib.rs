@@ -3,15 +3,21 @@
 //! The floors of the house, from the ground up; a module imports only from floors below its own:
 //!
 //! 1. [`error`], [`geometry`]
-//! 2. [`camera`]
+//! 2. [`camera`], [`image`], [`robust`]
+//! 3. [`edges`]
+//! 4. [`tilt`]
 //!
 //! Angles are radians, lengths metres, pixel centres integers, rays unit bearings. The camera frame has `z` along the
 //! optical axis, `x` to the right (columns) and `y` down (rows); the robot frame has `x` forward, `y` left, `z` up.
 
 pub mod camera;
+pub mod edges;
 pub mod error;
 pub mod geometry;
+pub mod image;
+pub mod robust;
 #[cfg(feature = "testing")]
 pub mod testing;
+pub mod tilt;
 
 pub use error::{Error, Result};

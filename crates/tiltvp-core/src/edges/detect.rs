@@ -1,0 +1,175 @@
+//! Edge pixels: the Scharr gradient of the band's rows, and the pixels where it is strong.
+
+use multiversion::multiversion;
+
+use super::options::EdgeOptions;
+use super::region::Region;
+use crate::image::{ImageView, Smoother};
+
+/// Edge pixels in structure-of-arrays form, in slot order.
+#[derive(Debug, Clone, Default)]
+pub struct EdgePixels {
+    slot: Vec<u32>,
+    gx: Vec<f32>,
+    gy: Vec<f32>,
+    len: usize,
+}
+
+impl EdgePixels {
+    /// No pixels, with room for `capacity` of them.
+    pub fn with_capacity(capacity: usize) -> Self {
+        Self { slot: vec![0; capacity], gx: vec![0.0; capacity], gy: vec![0.0; capacity], len: 0 }
+    }
+
+    /// How many there are.
+    pub fn len(&self) -> usize {
+        self.len
+    }
+
+    /// Whether there are none.
+    pub fn is_empty(&self) -> bool {
+        self.len == 0
+    }
+
+    /// Number of each pixel within the region.
+    pub fn slot(&self) -> &[u32] {
+        &self.slot[..self.len]
+    }
+
+    /// Gradient of each pixel along `u` (Scharr, unnormalised).
+    pub fn gx(&self) -> &[f32] {
+        &self.gx[..self.len]
+    }
+
+    /// Gradient of each pixel along `v`.
+    pub fn gy(&self) -> &[f32] {
+        &self.gy[..self.len]
+    }
+
+    /// Appends a pixel.
+    pub fn push(&mut self, slot: u32, gx: f32, gy: f32) {
+        if self.len == self.slot.len() {
+            self.slot.push(0);
+            self.gx.push(0.0);
+            self.gy.push(0.0);
+        }
+        (self.slot[self.len], self.gx[self.len], self.gy[self.len]) = (slot, gx, gy);
+        self.len += 1;
+    }
+}
+
+/// Finds edge pixels, with rows of scratch that are made once.
+#[derive(Debug, Clone)]
+pub struct Detector {
+    smoother: Smoother,
+    threshold_squared: f32,
+    /// Three smoothed rows, row `v` in place `v % 3`, each one pixel wider than the region's columns on both sides.
+    rows: [Vec<f32>; 3],
+    gx: Vec<f32>,
+    gy: Vec<f32>,
+    strength: Vec<f32>,
+}
+
+impl Detector {
+    /// Scratch for a region.
+    pub fn new(region: &Region, options: &EdgeOptions) -> Self {
+        let width = region.columns().len() + 2;
+        let row = || vec![0.0; width];
+        Self {
+            smoother: Smoother::new(options.smoothing_px, width),
+            threshold_squared: (options.gradient_min * options.gradient_min) as f32,
+            rows: [row(), row(), row()],
+            gx: row(),
+            gy: row(),
+            strength: row(),
+        }
+    }
+
+    /// Writes the pixels of the region with a gradient magnitude of at least `gradient_min`, in slot order.
+    ///
+    /// The image must have the size of the camera that the region was made for. Grows no vector that has room for the
+    /// whole region.
+    pub fn detect(&mut self, image: &ImageView<'_>, region: &Region, out: &mut EdgePixels) {
+        out.len = 0;
+        // The region keeps clear of the border, so there is a pixel to the left of its first column.
+        let left = region.columns().start.saturating_sub(1);
+        let mut next_row = 0;
+        for span in region.spans() {
+            for v in next_row.max(span.v.saturating_sub(1))..=span.v + 1 {
+                self.smoother.row(image, v, left, &mut self.rows[v % 3]);
+            }
+            next_row = span.v + 2;
+            let n = span.end - span.first;
+            let columns = span.first - left - 1..span.end - left + 1;
+            let [above, middle, below] = [span.v + 2, span.v, span.v + 1].map(|v| &self.rows[v % 3][columns.clone()]);
+            let (gx, gy, strength) = (&mut self.gx[..n], &mut self.gy[..n], &mut self.strength[..n]);
+            scharr(above, middle, below, gx, gy, strength);
+            for (start, block) in (0..n).step_by(BLOCK).zip(strength.chunks(BLOCK)) {
+                let mut strong = reaching(block, self.threshold_squared);
+                while strong != 0 {
+                    let i = start + strong.trailing_zeros() as usize;
+                    strong &= strong - 1;
+                    out.push((span.slot + i) as u32, gx[i], gy[i]);
+                }
+            }
+        }
+    }
+}
+
+/// Pixels that are tested together.
+const BLOCK: usize = 32;
+
+/// One bit for each pixel of a block that reaches the threshold.
+#[inline(always)]
+fn reaching(block: &[f32], threshold: f32) -> u32 {
+    block.iter().enumerate().fold(0, |bits, (i, x)| bits | (u32::from(*x >= threshold) << i))
+}
+
+/// The 3x3 Scharr derivatives (3, 10, 3) of the middle row and their squared magnitude; rows are one pixel wider on both sides.
+#[multiversion(targets("x86_64+avx512f+avx512vl", "x86_64+avx2"))]
+fn scharr(above: &[f32], middle: &[f32], below: &[f32], gx: &mut [f32], gy: &mut [f32], strength: &mut [f32]) {
+    let n = gx.len();
+    let (above, middle, below) = (&above[..n + 2], &middle[..n + 2], &below[..n + 2]);
+    let (gy, strength) = (&mut gy[..n], &mut strength[..n]);
+    for i in 0..n {
+        let x = 3.0 * ((above[i + 2] - above[i]) + (below[i + 2] - below[i])) + 10.0 * (middle[i + 2] - middle[i]);
+        let y = 3.0 * ((below[i] - above[i]) + (below[i + 2] - above[i + 2])) + 10.0 * (below[i + 1] - above[i + 1]);
+        gx[i] = x;
+        gy[i] = y;
+        strength[i] = x * x + y * y;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::camera::{Camera, Equidistant, Model};
+    use nalgebra::Matrix3;
+
+    #[test]
+    fn gradients_equal_the_kernel_written_out() {
+        let lens = Equidistant::new(20.0, 31.5, 29.5).unwrap();
+        let camera = Camera::new(64, 60, Model::Equidistant(lens)).unwrap();
+        let options = EdgeOptions { gradient_min: 300.0, elevation_max_rad: 1.5, ..EdgeOptions::default() };
+        let region = Region::new(&camera, &Matrix3::identity(), &options, None).unwrap();
+        let data: Vec<u8> = (0..64 * 60u32).map(|i| (i.wrapping_mul(2_654_435_761) >> 24) as u8).collect();
+        let image = ImageView::new(&data, 64, 60, 64).unwrap();
+        let mut edges = EdgePixels::with_capacity(region.len());
+        Detector::new(&region, &options).detect(&image, &region, &mut edges);
+
+        let at = |u: usize, v: usize| i32::from(data[v * 64 + u]);
+        let mut k = 0;
+        for (slot, (u, v, _)) in region.pixels().enumerate() {
+            let gx = 3 * (at(u + 1, v - 1) - at(u - 1, v - 1) + at(u + 1, v + 1) - at(u - 1, v + 1))
+                + 10 * (at(u + 1, v) - at(u - 1, v));
+            let gy = 3 * (at(u - 1, v + 1) - at(u - 1, v - 1) + at(u + 1, v + 1) - at(u + 1, v - 1))
+                + 10 * (at(u, v + 1) - at(u, v - 1));
+            if gx * gx + gy * gy >= 300 * 300 {
+                assert_eq!((edges.slot()[k], region.place(slot)), (slot as u32, (u as u16, v as u16)));
+                assert_eq!((edges.gx()[k], edges.gy()[k]), (gx as f32, gy as f32));
+                k += 1;
+            }
+        }
+        assert!(k > 100 && k == edges.len());
+    }
+}

@@ -1,0 +1,129 @@
+//! From an edge pixel's gradient to the great circle that the edge lies on.
+
+use multiversion::multiversion;
+use nalgebra::{Matrix3, Matrix3x2, Vector2};
+
+use super::detect::EdgePixels;
+use super::region::Region;
+use crate::camera::Camera;
+use crate::robust::Rows;
+
+/// How the normal of an edge's great circle is made from the gradient.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum NormalKind {
+    /// The gradient is a covector and is pulled back by the projection, `m ~ (d pixel / d bearing)^T g`: exact for every lens.
+    Tangent,
+    /// The gradient is pushed forward like a vector, `m ~ (d bearing / d pixel) g` (paper 000 eq. 37, `v x (u x v)` in the
+    /// limit of a small step): exact only where the lens is conformal.
+    Gradient,
+}
+
+/// For each pixel of a region the 3x2 matrix that takes a gradient to a normal in the robot frame.
+#[derive(Debug, Clone)]
+pub struct LiftTable {
+    maps: Vec<[f32; 6]>,
+}
+
+impl LiftTable {
+    /// One matrix for each pixel of the region. Each is scaled so that the lens' resolution does not change the length
+    /// of normals: a gradient of one grey level per pixel across a radial edge gives a normal of length one.
+    pub fn new(camera: &Camera, robot_from_camera: &Matrix3<f64>, region: &Region, kind: NormalKind) -> Self {
+        let map = |u: usize, v: usize| -> [f32; 6] {
+            let pixel = Vector2::new(u as f64, v as f64);
+            let matrix: Option<Matrix3x2<f64>> =
+                camera.unproject_jacobian(&pixel).and_then(|(bearing, back)| match kind {
+                    NormalKind::Tangent => camera.project_jacobian(&bearing).map(|(_, forward)| forward.transpose()),
+                    NormalKind::Gradient => Some(back),
+                });
+            let Some(matrix) = matrix else { return [0.0; 6] };
+            let scale = (matrix.transpose() * matrix).trace().sqrt() / std::f64::consts::SQRT_2;
+            let matrix = robot_from_camera * matrix / scale;
+            std::array::from_fn(|i| matrix[(i / 2, i % 2)] as f32)
+        };
+        Self { maps: region.pixels().map(|(u, v, _)| map(u, v)).collect() }
+    }
+
+    /// Writes the unit normals of the edge pixels whose great circles pass within `asin(sin_max)` of the robot's vertical,
+    /// their magnitudes of gradient as weights, and their places among the edge pixels.
+    pub fn lift(
+        &self,
+        edges: &EdgePixels,
+        sin_max: f64,
+        rows: &mut Rows<f32>,
+        weights: &mut Vec<f32>,
+        places: &mut Vec<u32>,
+    ) {
+        let n = edges.len();
+        weights.resize(n, 0.0);
+        places.resize(n, 0);
+        let limit = (sin_max * sin_max) as f32;
+        rows.refill(n, |[x, y, z]| {
+            let (x, y, z) = (&mut x[..n], &mut y[..n], &mut z[..n]);
+            let (weights, places) = (&mut weights[..n], &mut places[..n]);
+            let mut kept = 0;
+            for (place, ((slot, gx), gy)) in edges.slot().iter().zip(edges.gx()).zip(edges.gy()).enumerate() {
+                let Some([a, b, c, d, e, f]) = self.maps.get(*slot as usize) else { continue };
+                let row = [a * gx + b * gy, c * gx + d * gy, e * gx + f * gy];
+                let squared = row[0] * row[0] + row[1] * row[1] + row[2] * row[2];
+                // Written always and kept if it passes: a branch here would be guessed wrong every third time.
+                (x[kept], y[kept], z[kept]) = (row[0], row[1], row[2]);
+                (weights[kept], places[kept]) = (squared, place as u32);
+                kept += usize::from(row[2] * row[2] <= limit * squared && squared > 0.0);
+            }
+            normalise([&mut x[..kept], &mut y[..kept], &mut z[..kept]], &mut weights[..kept]);
+            kept
+        });
+        weights.truncate(rows.len());
+        places.truncate(rows.len());
+    }
+}
+
+/// Divides rows by their lengths, given squared lengths, and leaves the lengths behind.
+#[multiversion(targets("x86_64+avx512f+avx512vl", "x86_64+avx2"))]
+fn normalise([x, y, z]: [&mut [f32]; 3], squared: &mut [f32]) {
+    for (((x, y), z), length) in x.iter_mut().zip(y).zip(z).zip(squared) {
+        *length = length.sqrt();
+        let scale = 1.0 / *length;
+        (*x, *y, *z) = (*x * scale, *y * scale, *z * scale);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::camera::{Equidistant, Model};
+    use crate::edges::EdgeOptions;
+    use nalgebra::Vector3;
+
+    /// The gradient of an edge along a great circle is across the circle's image, whatever the lens.
+    #[test]
+    fn tangent_normals_are_exact_and_gradient_normals_are_not() {
+        let lens = Equidistant::new(139.7, 319.5, 239.5).unwrap();
+        let camera = Camera::new(640, 480, Model::Equidistant(lens)).unwrap();
+        let options = EdgeOptions::default();
+        let identity = Matrix3::identity();
+        let region = Region::new(&camera, &identity, &options, None).unwrap();
+        let truth = Vector3::new(0.8, -0.6, 0.1).normalize();
+        let mut worst = [0.0f64; 2];
+        for (i, kind) in [NormalKind::Tangent, NormalKind::Gradient].into_iter().enumerate() {
+            let table = LiftTable::new(&camera, &identity, &region, kind);
+            let mut edges = EdgePixels::with_capacity(region.len());
+            for (slot, (u, v, bearing)) in region.pixels().enumerate() {
+                if bearing.dot(&truth).abs() < 0.005 {
+                    let (_, back) = camera.unproject_jacobian(&Vector2::new(u as f64, v as f64)).unwrap();
+                    // I = f(truth . bearing): dI / d pixel = truth^T d bearing / d pixel.
+                    let gradient = back.transpose() * truth * 1e4;
+                    edges.push(slot as u32, gradient.x as f32, gradient.y as f32);
+                }
+            }
+            let (mut rows, mut weights, mut places) = (Rows::default(), Vec::new(), Vec::new());
+            table.lift(&edges, 1.0, &mut rows, &mut weights, &mut places);
+            assert!(rows.len() > 50);
+            for row in rows.iter() {
+                worst[i] = worst[i].max(row.cross(&truth).norm().asin());
+            }
+        }
+        assert!(worst[0] < 0.006, "tangent normals are off by {} rad", worst[0]);
+        assert!(worst[1] > 0.02, "gradient normals are off by {} rad only", worst[1]);
+    }
+}

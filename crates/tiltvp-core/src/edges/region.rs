@@ -1,0 +1,198 @@
+//! The pixels of the elevation band, as spans of rows, computed once per camera.
+
+use nalgebra::{Matrix3, Vector2, Vector3};
+
+use super::options::{EdgeOptions, Mask};
+use crate::camera::Camera;
+use crate::error::{Error, Result};
+
+/// A run of pixels `first..end` of row `v`; `slot` numbers its first pixel among all pixels of the region.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Span {
+    /// Row.
+    pub v: usize,
+    /// First column.
+    pub first: usize,
+    /// One past the last column.
+    pub end: usize,
+    /// Number of the first pixel within the region.
+    pub slot: usize,
+}
+
+/// The pixels whose bearings lie in the elevation band, clear of everything that is not the world.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Region {
+    spans: Vec<Span>,
+    bearings: Vec<Vector3<f64>>,
+    /// Column and row of each pixel.
+    places: Vec<(u16, u16)>,
+    first_column: usize,
+    end_column: usize,
+}
+
+impl Region {
+    /// Walks over the image once.
+    ///
+    /// # Errors
+    /// [`Error::InvalidArgument`] if the mask has another size than the camera's images, [`Error::InvalidOption`] if no
+    /// pixel is left.
+    pub fn new(
+        camera: &Camera,
+        robot_from_camera: &Matrix3<f64>,
+        options: &EdgeOptions,
+        mask: Option<&Mask>,
+    ) -> Result<Self> {
+        let (width, height) = (camera.width() as usize, camera.height() as usize);
+        if let Some(mask) = mask
+            && mask.size() != (width, height)
+        {
+            let (w, h) = mask.size();
+            return Err(Error::argument(
+                "mask",
+                format!("{h} x {w}"),
+                format!("{height} x {width}, as the camera's images"),
+            ));
+        }
+        if width.max(height) > usize::from(u16::MAX) {
+            return Err(Error::argument(
+                "camera",
+                format!("{width} x {height} pixels"),
+                "images of at most 65535 pixels a side",
+            ));
+        }
+        let (lowest, highest) = (options.elevation_min_rad.sin(), options.elevation_max_rad.sin());
+        let mut bearings = vec![None; width * height];
+        for (i, bearing) in bearings.iter_mut().enumerate() {
+            let (u, v) = (i % width, i / width);
+            if mask.is_none_or(|mask| mask.usable(u, v)) {
+                *bearing = camera.unproject(&Vector2::new(u as f64, v as f64)).map(|b| robot_from_camera * b);
+            }
+        }
+        let clear = erode(&bearings.iter().map(Option::is_some).collect::<Vec<_>>(), width, height, options.reach_px());
+        let mut region =
+            Self { spans: Vec::new(), bearings: Vec::new(), places: Vec::new(), first_column: width, end_column: 0 };
+        for v in 0..height {
+            let mut open: Option<Span> = None;
+            for u in 0..=width {
+                let inside = (u < width && clear[v * width + u])
+                    .then(|| bearings[v * width + u])
+                    .flatten()
+                    .filter(|bearing| (lowest..=highest).contains(&bearing.z));
+                match (inside, &mut open) {
+                    (Some(bearing), _) => {
+                        open.get_or_insert(Span { v, first: u, end: u, slot: region.bearings.len() }).end = u + 1;
+                        region.bearings.push(bearing);
+                        region.places.push((u as u16, v as u16));
+                    }
+                    (None, Some(span)) => {
+                        region.first_column = region.first_column.min(span.first);
+                        region.end_column = region.end_column.max(span.end);
+                        region.spans.push(*span);
+                        open = None;
+                    }
+                    (None, None) => {}
+                }
+            }
+        }
+        if region.bearings.is_empty() {
+            return Err(Error::option(
+                "elevation_min_rad, elevation_max_rad",
+                format!("[{:.3}, {:.3}]", options.elevation_min_rad, options.elevation_max_rad),
+                "a band that some pixel of the camera sees: check robot_from_camera, the mask and the margin",
+            ));
+        }
+        Ok(region)
+    }
+
+    /// The spans, row by row.
+    pub fn spans(&self) -> &[Span] {
+        &self.spans
+    }
+
+    /// How many pixels there are.
+    pub fn len(&self) -> usize {
+        self.bearings.len()
+    }
+
+    /// Whether there are none (never, once made).
+    pub fn is_empty(&self) -> bool {
+        self.bearings.is_empty()
+    }
+
+    /// Columns `first..end` that hold all spans.
+    pub fn columns(&self) -> std::ops::Range<usize> {
+        self.first_column..self.end_column
+    }
+
+    /// Column and row of the pixel `slot`; (0, 0) beyond the region.
+    pub fn place(&self, slot: usize) -> (u16, u16) {
+        self.places.get(slot).copied().unwrap_or_default()
+    }
+
+    /// Each pixel `(u, v)` of the region with its bearing in the robot frame, in slot order.
+    pub fn pixels(&self) -> impl Iterator<Item = (usize, usize, Vector3<f64>)> + '_ {
+        self.places.iter().zip(&self.bearings).map(|((u, v), bearing)| (usize::from(*u), usize::from(*v), *bearing))
+    }
+}
+
+/// `true` where the whole square of `reach` pixels about a pixel is `true`; what lies outside the image is not.
+fn erode(inside: &[bool], width: usize, height: usize, reach: usize) -> Vec<bool> {
+    let shrink = |source: &[bool], length: usize, lines: usize, at: &dyn Fn(usize, usize) -> usize| {
+        let mut out = vec![false; source.len()];
+        for line in 0..lines {
+            let mut run = 0;
+            for i in 0..length {
+                run = if source[at(line, i)] { run + 1 } else { 0 };
+                if run > 2 * reach {
+                    out[at(line, i - reach)] = true;
+                }
+            }
+        }
+        out
+    };
+    let rows = shrink(inside, width, height, &|v, u| v * width + u);
+    shrink(&rows, height, width, &|u, v| v * width + u)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::camera::{Equidistant, Model};
+
+    fn camera() -> Camera {
+        let lens = Equidistant::new(139.7, 319.5, 239.5).unwrap();
+        Camera::new(640, 480, Model::Equidistant(lens)).unwrap().with_max_theta_rad(92.5f64.to_radians()).unwrap()
+    }
+
+    #[test]
+    fn spans_cover_the_annulus_in_slot_order() {
+        let region = Region::new(&camera(), &Matrix3::identity(), &EdgeOptions::default(), None).unwrap();
+        let area = std::f64::consts::PI * (219.4f64.powi(2) - 109.7f64.powi(2));
+        assert!((region.len() as f64 / area - 1.0).abs() < 0.005, "{} pixels, {area} expected", region.len());
+        let mut slot = 0;
+        for span in region.spans() {
+            assert_eq!(span.slot, slot);
+            slot += span.end - span.first;
+        }
+        assert_eq!(slot, region.len());
+        for (u, v, bearing) in region.pixels() {
+            let theta = (u as f64 - 319.5).hypot(v as f64 - 239.5) / 139.7;
+            assert!((theta.cos() - bearing.z).abs() < 1e-9);
+        }
+    }
+
+    #[test]
+    fn mask_and_margin_keep_clear() {
+        let usable: Vec<bool> = (0..640 * 480).map(|i| i % 640 > 320).collect();
+        let mask = Mask::new(640, 480, usable).unwrap();
+        let options = EdgeOptions { margin_px: 3.0, ..EdgeOptions::default() };
+        let region = Region::new(&camera(), &Matrix3::identity(), &options, Some(&mask)).unwrap();
+        assert_eq!(region.columns().start, 321 + 4);
+    }
+
+    #[test]
+    fn an_empty_band_is_refused() {
+        let options = EdgeOptions { elevation_min_rad: -1.5, elevation_max_rad: -1.0, ..EdgeOptions::default() };
+        assert!(Region::new(&camera(), &Matrix3::identity(), &options, None).is_err());
+    }
+}

@@ -1,0 +1,131 @@
+//! Separable Gaussian smoothing, one row at a time.
+
+use multiversion::multiversion;
+
+use super::view::ImageView;
+
+/// The part of the Gaussian's weight that may be cut off at both ends.
+const TAIL: f64 = 0.01;
+
+/// A sampled Gaussian and one row of scratch; `sigma = 0` copies rows.
+#[derive(Debug, Clone)]
+pub struct Smoother {
+    taps: Vec<f32>,
+    column_sums: Vec<f32>,
+}
+
+impl Smoother {
+    /// A Gaussian of `sigma_px` pixels for rows of at most `max_width` pixels.
+    pub fn new(sigma_px: f64, max_width: usize) -> Self {
+        let taps = gaussian_taps(sigma_px);
+        Self { column_sums: vec![0.0; max_width + 2 * taps.len()], taps }
+    }
+
+    /// How many pixels to each side a smoothed pixel is made from.
+    pub fn radius(sigma_px: f64) -> usize {
+        gaussian_taps(sigma_px).len() - 1
+    }
+
+    /// Writes columns `first..first + out.len()` of the smoothed row `v`.
+    ///
+    /// The image must reach `radius` pixels beyond these columns and this row; what lies outside counts as black.
+    pub fn row(&mut self, image: &ImageView<'_>, v: usize, first: usize, out: &mut [f32]) {
+        let radius = self.taps.len() - 1;
+        let from = first.saturating_sub(radius);
+        let to = (first + out.len() + radius).min(image.width());
+        let middle = image.row(v).get(from..to).unwrap_or(&[]);
+        if radius == 0 {
+            widen(middle, out);
+            return;
+        }
+        let sums = &mut self.column_sums[..middle.len()];
+        scale(middle, self.taps[0], sums);
+        for (offset, tap) in self.taps.iter().enumerate().skip(1) {
+            let above = v.checked_sub(offset).map_or(&[][..], |y| image.row(y)).get(from..to).unwrap_or(&[]);
+            let below = image.row(v + offset).get(from..to).unwrap_or(&[]);
+            add_scaled(above, below, *tap, sums);
+        }
+        let inner = first - from;
+        convolve(sums, inner, &self.taps, out);
+    }
+}
+
+/// Half of a sampled Gaussian, the centre first, normalised to a sum of one over both halves.
+fn gaussian_taps(sigma_px: f64) -> Vec<f32> {
+    if sigma_px <= 0.0 {
+        return vec![1.0];
+    }
+    let weight = |i: usize| (-0.5 * (i as f64 / sigma_px).powi(2)).exp();
+    let reach = (6.0 * sigma_px).ceil() as usize + 1;
+    let total = 1.0 + 2.0 * (1..=reach).map(weight).sum::<f64>();
+    let tail = |radius: usize| 2.0 * (radius + 1..=reach).map(weight).sum::<f64>() / total;
+    let radius = (1..reach).find(|&r| tail(r) < TAIL).unwrap_or(reach);
+    let kept = 1.0 + 2.0 * (1..=radius).map(weight).sum::<f64>();
+    (0..=radius).map(|i| (weight(i) / kept) as f32).collect()
+}
+
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512vl", "x86_64+avx2+fma"))]
+fn widen(row: &[u8], out: &mut [f32]) {
+    for (o, i) in out.iter_mut().zip(row) {
+        *o = f32::from(*i);
+    }
+}
+
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512vl", "x86_64+avx2+fma"))]
+fn scale(row: &[u8], tap: f32, out: &mut [f32]) {
+    for (o, i) in out.iter_mut().zip(row) {
+        *o = f32::from(*i) * tap;
+    }
+}
+
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512vl", "x86_64+avx2+fma"))]
+fn add_scaled(above: &[u8], below: &[u8], tap: f32, out: &mut [f32]) {
+    for ((o, a), b) in out.iter_mut().zip(above).zip(below) {
+        *o += (f32::from(*a) + f32::from(*b)) * tap;
+    }
+}
+
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512vl", "x86_64+avx2+fma"))]
+fn convolve(sums: &[f32], inner: usize, taps: &[f32], out: &mut [f32]) {
+    let length = out.len();
+    let window = |shift: usize| sums.get(shift..).unwrap_or(&[]);
+    for (o, centre) in out.iter_mut().zip(window(inner)) {
+        *o = centre * taps[0];
+    }
+    for (offset, tap) in taps.iter().enumerate().skip(1) {
+        let (Some(left), right) = (inner.checked_sub(offset), inner + offset) else { continue };
+        let right = window(right);
+        for ((o, l), r) in out.iter_mut().zip(window(left)).zip(right.iter().take(length)) {
+            *o += (l + r) * tap;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn smoothing_keeps_a_constant_and_spreads_a_point() {
+        let data = [50u8; 11 * 11];
+        let view = ImageView::new(&data, 11, 11, 11).unwrap();
+        let mut out = [0.0f32; 3];
+        Smoother::new(1.0, 11).row(&view, 5, 4, &mut out);
+        assert!(out.iter().all(|x| (x - 50.0).abs() < 1e-4), "{out:?}");
+
+        let mut data = [0u8; 11 * 11];
+        data[5 * 11 + 5] = 255;
+        let view = ImageView::new(&data, 11, 11, 11).unwrap();
+        Smoother::new(0.6, 11).row(&view, 5, 4, &mut out);
+        assert!(out[0] > 20.0 && (out[0] - out[2]).abs() < 1e-4 && out[1] > 3.0 * out[0], "{out:?}");
+    }
+
+    #[test]
+    fn no_smoothing_copies() {
+        let data: Vec<u8> = (0..30).collect();
+        let view = ImageView::new(&data, 6, 5, 6).unwrap();
+        let mut out = [0.0f32; 4];
+        Smoother::new(0.0, 6).row(&view, 2, 1, &mut out);
+        assert_eq!(out, [13.0, 14.0, 15.0, 16.0]);
+    }
+}

@@ -1,0 +1,49 @@
+//! A borrowed 8-bit grey image with any row stride.
+
+use crate::error::{Error, Result};
+
+/// Rows of 8-bit grey levels borrowed from the caller; pixel `(u, v)` is column `u` of row `v`.
+#[derive(Debug, Clone, Copy)]
+pub struct ImageView<'a> {
+    data: &'a [u8],
+    width: usize,
+    height: usize,
+    stride: usize,
+}
+
+impl<'a> ImageView<'a> {
+    /// `height` rows of `width` bytes, `stride` bytes from one row to the next.
+    ///
+    /// # Errors
+    /// [`Error::InvalidArgument`] if a side is zero, the stride is shorter than a row, or the data end too early.
+    pub fn new(data: &'a [u8], width: usize, height: usize, stride: usize) -> Result<Self> {
+        if width == 0 || height == 0 {
+            return Err(Error::argument("image", format!("{width} x {height} pixels"), "at least one pixel"));
+        }
+        let needed = (height - 1).checked_mul(stride).and_then(|n| n.checked_add(width));
+        if stride < width || needed.is_none_or(|n| n > data.len()) {
+            return Err(Error::argument(
+                "image",
+                format!("{} bytes with a stride of {stride}", data.len()),
+                format!("{height} rows of {width} bytes"),
+            ));
+        }
+        Ok(Self { data, width, height, stride })
+    }
+
+    /// Columns.
+    pub fn width(&self) -> usize {
+        self.width
+    }
+
+    /// Rows.
+    pub fn height(&self) -> usize {
+        self.height
+    }
+
+    /// Row `v`, or an empty slice below the image.
+    pub fn row(&self, v: usize) -> &'a [u8] {
+        let start = v * self.stride;
+        if v < self.height { self.data.get(start..start + self.width).unwrap_or(&[]) } else { &[] }
+    }
+}

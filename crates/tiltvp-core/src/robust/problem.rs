@@ -1,0 +1,45 @@
+//! What a robust fit asks of a model-fitting problem.
+
+use super::loss::Gate;
+
+/// A model-fitting problem that borrows its observations.
+///
+/// Fits go through a [`Summary`](Self::Summary), the sufficient statistics of a weighted subset, so that one pass over
+/// the observations both applies the last model's gate and prepares the next fit.
+pub trait Problem {
+    /// What is fitted.
+    type Model: Clone;
+    /// Sufficient statistics of a weighted subset of the observations.
+    type Summary;
+    /// How many observations determine a model.
+    const SAMPLE_SIZE: usize;
+
+    /// How many observations there are.
+    fn len(&self) -> usize;
+
+    /// Whether there are none.
+    fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// The model through `SAMPLE_SIZE` observations, `None` if they are degenerate.
+    fn fit_minimal(&self, sample: &[usize]) -> Option<Self::Model>;
+
+    /// How many observations have a residual of at most `threshold`, in the problem's unit.
+    fn consensus(&self, model: &Self::Model, threshold: f64) -> usize;
+
+    /// Applies a gate about a model and summarises what is left; a hard gate also sets the weights it rejects to zero.
+    fn summarise(&self, model: &Self::Model, gate: Gate, weights: &mut [f32]) -> Self::Summary;
+
+    /// The weighted least-squares model nearest to `near`, `None` if the observations do not determine one.
+    fn fit(&self, summary: &Self::Summary, near: &Self::Model) -> Option<Self::Model>;
+
+    /// Root of the weighted mean square residual of a model over the summarised observations.
+    fn rms(&self, summary: &Self::Summary, model: &Self::Model) -> f64;
+
+    /// How many observations a summary holds (those with a weight above zero).
+    fn count(summary: &Self::Summary) -> usize;
+
+    /// How far two models are apart, in the unit in which convergence is declared.
+    fn distance(&self, a: &Self::Model, b: &Self::Model) -> f64;
+}

@@ -1,0 +1,225 @@
+//! The common direction of great circles that a user brings: the same robust core on normals of any origin.
+
+use nalgebra::{Matrix2, Rotation3, Unit, Vector3};
+
+use super::refine::{RefineOptions, refine};
+use crate::error::{Error, Result};
+use crate::geometry::tangent_basis;
+use crate::robust::{Gate, Rows, Stop};
+
+/// Options of [`common_direction`].
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct CommonDirectionOptions {
+    /// How far in radians the great circles of inliers stray from the direction. Default 1 degree.
+    pub sigma_rad: f64,
+    /// A direction near which the answer lies. Default `(0, 0, 1)`.
+    pub prior: Vector3<f64>,
+    /// Largest angle in radians between the prior and the answer. Default 0.35 (20 degrees).
+    pub max_angle_rad: f64,
+}
+
+impl Default for CommonDirectionOptions {
+    fn default() -> Self {
+        Self { sigma_rad: 1f64.to_radians(), prior: Vector3::z(), max_angle_rad: 20f64.to_radians() }
+    }
+}
+
+/// A direction orthogonal to most of the normals.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CommonDirection {
+    /// Unit direction on the prior's side, `None` if the normals do not determine one.
+    pub direction: Option<Vector3<f64>>,
+    /// Covariance in squared radians in the tangent plane, in the basis of [`tangent_basis`]; infinite without a direction.
+    pub covariance_rad2: Matrix2<f64>,
+    /// For each normal whether its great circle passes within three `sigma_rad` of the direction.
+    pub inliers: Vec<bool>,
+    /// Root mean square residual in radians; NaN without a direction.
+    pub residual_rms_rad: f64,
+    /// Refits done.
+    pub iterations: u32,
+    /// Why the fit stopped.
+    pub stop: Stop,
+}
+
+/// Finds the direction that is most nearly orthogonal to the great-circle normals (of any length but zero).
+///
+/// Normals whose great circles do not pass within `max_angle_rad` of the prior cannot agree with an answer there and are
+/// left out first. The answer is independent of the signs of the normals and turns with them.
+///
+/// # Errors
+/// [`Error::InvalidArgument`] if a normal or weight is not finite, a normal is zero, a weight negative, or their numbers differ;
+/// [`Error::InvalidOption`] if an option is out of its domain.
+pub fn common_direction(
+    normals: &[Vector3<f64>],
+    weights: Option<&[f64]>,
+    options: &CommonDirectionOptions,
+) -> Result<CommonDirection> {
+    let prior = validate(normals, weights, options)?;
+    let upright_from_user = Rotation3::rotation_between(&prior, &Vector3::z())
+        .unwrap_or_else(|| Rotation3::from_axis_angle(&Unit::new_unchecked(Vector3::x()), std::f64::consts::PI));
+    let limit = options.max_angle_rad.sin();
+    let mut rows = Rows::<f64>::with_capacity(normals.len());
+    let mut kept = Vec::with_capacity(normals.len());
+    let mut row_weights = Vec::with_capacity(normals.len());
+    for (i, normal) in normals.iter().enumerate() {
+        let row = upright_from_user * normal.normalize();
+        let weight = weights.map_or(1.0, |weights| weights[i]) as f32;
+        if row.z.abs() <= limit && weight > 0.0 {
+            rows.push(row.x, row.y, row.z);
+            row_weights.push(weight);
+            kept.push(row);
+        }
+    }
+    let refining = RefineOptions { scale_rad: options.sigma_rad, ..RefineOptions::default() };
+    let report = refine(&rows, &refining, &mut row_weights, &mut Vec::new());
+    let found = report.model.filter(|o| o.z >= options.max_angle_rad.cos());
+    let stop = if report.model.is_some() && found.is_none() {
+        Stop::NoModel { trials: report.iterations }
+    } else {
+        report.stop
+    };
+    let Some(upright) = found else {
+        return Ok(CommonDirection {
+            direction: None,
+            covariance_rad2: Matrix2::repeat(f64::INFINITY),
+            inliers: vec![false; normals.len()],
+            residual_rms_rad: f64::NAN,
+            iterations: report.iterations,
+            stop,
+        });
+    };
+    let direction = upright_from_user.inverse() * upright;
+    let reach = (3.0 * options.sigma_rad).sin();
+    // Each normal is its own cluster: the user's normals are whole edges, not pixels.
+    let gate = Gate::Soft { scale: options.sigma_rad };
+    let (mut information, mut spread) = (Matrix2::zeros(), Matrix2::zeros());
+    let basis = tangent_basis(&direction);
+    for (row, weight) in kept.iter().zip(&row_weights) {
+        let d = row.dot(&upright);
+        let weight = f64::from(*weight) * gate.weight(d);
+        let xy = basis.transpose() * (upright_from_user.inverse() * row);
+        information += xy * xy.transpose() * weight;
+        spread += xy * xy.transpose() * (weight * d).powi(2);
+    }
+    let covariance =
+        information.try_inverse().map_or(Matrix2::repeat(f64::INFINITY), |inverse| inverse * spread * inverse);
+    Ok(CommonDirection {
+        direction: Some(direction),
+        covariance_rad2: covariance,
+        inliers: normals.iter().map(|n| n.normalize().dot(&direction).abs() <= reach).collect(),
+        residual_rms_rad: report.rms,
+        iterations: report.iterations,
+        stop,
+    })
+}
+
+/// Checks all inputs and returns the unit prior.
+fn validate(
+    normals: &[Vector3<f64>],
+    weights: Option<&[f64]>,
+    options: &CommonDirectionOptions,
+) -> Result<Vector3<f64>> {
+    for (i, normal) in normals.iter().enumerate() {
+        let length = normal.norm();
+        if !(length.is_finite() && length > 0.0) {
+            return Err(Error::argument(
+                "normals",
+                format!("{normal:?} in row {i}"),
+                "finite vectors that are not zero",
+            ));
+        }
+    }
+    if let Some(weights) = weights {
+        if weights.len() != normals.len() {
+            return Err(Error::argument(
+                "weights",
+                format!("{} values", weights.len()),
+                format!("{} values", normals.len()),
+            ));
+        }
+        if let Some(i) = weights.iter().position(|w| !(w.is_finite() && *w >= 0.0 && *w <= f64::from(f32::MAX))) {
+            return Err(Error::argument(
+                "weights",
+                format!("{} in row {i}", weights[i]),
+                "finite weights, zero or more",
+            ));
+        }
+    }
+    if !(options.sigma_rad > 0.0 && options.sigma_rad < 1.0) {
+        return Err(Error::option("sigma_rad", options.sigma_rad, "an angle strictly between 0 and 1 radian"));
+    }
+    if !(options.max_angle_rad > 0.0 && options.max_angle_rad < std::f64::consts::FRAC_PI_2) {
+        return Err(Error::option("max_angle_rad", options.max_angle_rad, "an angle strictly between 0 and pi/2"));
+    }
+    let prior = options.prior.try_normalize(f64::MIN_POSITIVE).filter(|p| p.iter().all(|x| x.is_finite()));
+    prior.ok_or_else(|| Error::argument("prior", format!("{:?}", options.prior), "a finite vector that is not zero"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn normals(direction: &Vector3<f64>, count: usize) -> Vec<Vector3<f64>> {
+        let basis = tangent_basis(direction);
+        (0..count)
+            .map(|i| {
+                let t = 2.4 * i as f64;
+                basis.column(0) * t.cos() + basis.column(1) * t.sin() + direction * (0.01 * (7.0 * t).sin())
+            })
+            .collect()
+    }
+
+    proptest! {
+        #[test]
+        fn finds_any_direction_near_its_prior(x in -1.0..1.0f64, y in -1.0..1.0f64, z in -1.0..1.0f64, lean in 0.0..0.15f64) {
+            prop_assume!(x * x + y * y + z * z > 0.01);
+            let truth = Vector3::new(x, y, z).normalize();
+            let prior = truth + tangent_basis(&truth).column(0) * lean;
+            let options = CommonDirectionOptions { prior, ..CommonDirectionOptions::default() };
+            let found = common_direction(&normals(&truth, 300), None, &options).unwrap();
+            prop_assert!((found.direction.unwrap() - truth).norm() < 2e-3);
+            prop_assert!(found.inliers.iter().all(|inlier| *inlier));
+        }
+
+        #[test]
+        fn never_panics(values in proptest::collection::vec(-1e3..1e3f64, 0..60)) {
+            let normals: Vec<_> = values.chunks_exact(3).map(|c| Vector3::new(c[0], c[1], c[2])).collect();
+            let _ = common_direction(&normals, None, &CommonDirectionOptions::default());
+        }
+    }
+
+    #[test]
+    fn covariance_matches_the_scatter_of_repeated_fits() {
+        let truth = Vector3::new(0.02, 0.03, 1.0).normalize();
+        let options = CommonDirectionOptions::default();
+        let (mut scatter, mut predicted, runs) = (Matrix2::zeros(), Matrix2::zeros(), 400);
+        for run in 0..runs {
+            let noisy: Vec<_> = normals(&truth, 80)
+                .iter()
+                .enumerate()
+                .map(|(i, n)| {
+                    let noise = ((i * 7919 + run * 104_729) % 10_007) as f64 / 10_007.0 - 0.5;
+                    n - truth * n.dot(&truth) + truth * (0.03 * noise)
+                })
+                .collect();
+            let found = common_direction(&noisy, None, &options).unwrap();
+            let error = tangent_basis(&truth).transpose() * found.direction.unwrap();
+            scatter += error * error.transpose() / f64::from(runs as u32);
+            predicted += found.covariance_rad2 / f64::from(runs as u32);
+        }
+        assert!((predicted.trace() / scatter.trace() - 1.0).abs() < 0.25, "{predicted} against {scatter}");
+    }
+
+    #[test]
+    fn says_why_there_is_no_answer() {
+        let options = CommonDirectionOptions::default();
+        let none = common_direction(&[], None, &options).unwrap();
+        assert!(none.direction.is_none() && none.stop == Stop::TooFew { have: 0, need: 2 });
+        let same = common_direction(&[Vector3::x(); 5], None, &options).unwrap();
+        assert!(same.direction.is_none() && matches!(same.stop, Stop::NoModel { .. }));
+        assert!(common_direction(&[Vector3::zeros()], None, &options).is_err());
+        assert!(common_direction(&[Vector3::x()], Some(&[1.0, 2.0]), &options).is_err());
+        assert!(none.covariance_rad2[(0, 0)].is_infinite());
+    }
+}

@@ -1,0 +1,118 @@
+//! From the shift of the vanishing point in the image to an angle: trained factors, and the closed-form gain of each pixel.
+
+use nalgebra::{Matrix3, Vector2, Vector3};
+
+use crate::camera::Camera;
+use crate::edges::Region;
+use crate::error::{Error, Result};
+
+/// How the image-space methods turn a shift in pixels into a lean (paper 000 eqs. 26 and 30).
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub enum Correction {
+    /// `alpha = l / a0` with the lens' own scale at the vanishing point, eq. 26: overestimates by about a half.
+    None,
+    /// `alpha = l / a` with a factor `a` in pixels per radian trained on images of known tilt, eqs. 30 and 31.
+    Factor(f64),
+    /// Each pixel's offset is divided by its own gain: no training images.
+    ///
+    /// A vertical edge at the bearing `v`, with unit normal `m0` and unit tangent `e = v x m0`, is moved by a lean `delta` to
+    /// the normal `m0 - (m0 . delta) / e_z e`. With `D = d bearing / d pixel` the edge offset of eq. 17 changes by
+    /// `G = |(D^T e) . (p - p_c)| / (|e_z| |D^T m0|)` pixels per radian. For a lens that is round about a vertical axis this is
+    /// `r^2 / (r'(theta) sin^2 theta)`.
+    #[default]
+    ClosedForm,
+}
+
+impl Correction {
+    /// Checks the factor.
+    ///
+    /// # Errors
+    /// [`Error::InvalidOption`] unless it is positive and finite.
+    pub fn validate(&self) -> Result<()> {
+        match *self {
+            Self::Factor(a) if !(a > 0.0 && a.is_finite()) => {
+                Err(Error::option("correction", a, "a positive factor, \"closed-form\" or none"))
+            }
+            _ => Ok(()),
+        }
+    }
+}
+
+/// Where the vertical vanishing point of an upright robot lies in the image, and how a lean moves it.
+#[derive(Debug, Clone)]
+pub(super) struct VanishingPoint {
+    /// The point `p_c` of eq. 2: of the zenith, or of the nadir where the zenith is out of the lens' reach.
+    pub pixel: Vector2<f64>,
+    /// The lens' scale there in pixels per radian, `a0` of eq. 26.
+    pub scale: f64,
+    /// `d (n_x, n_y) / d pixel` up to the scale: takes the unit direction of a shift to the unit direction of the lean.
+    direction: nalgebra::Matrix2<f64>,
+}
+
+impl VanishingPoint {
+    pub(super) fn new(camera: &Camera, robot_from_camera: &Matrix3<f64>) -> Option<Self> {
+        [1.0, -1.0].into_iter().find_map(|sign| {
+            let pixel = camera.project(&(robot_from_camera.transpose() * Vector3::new(0.0, 0.0, sign)))?;
+            let (_, back) = camera.unproject_jacobian(&pixel)?;
+            let scale = (2.0 / (back.transpose() * back).trace()).sqrt();
+            let direction = (robot_from_camera * back * (sign * scale)).fixed_rows::<2>(0).into_owned();
+            (scale.is_finite() && scale > 0.0).then_some(Self { pixel, scale, direction })
+        })
+    }
+
+    /// The horizontal part of the ground normal for a unit shift `(cos beta', sin beta')`: eqs. 28 and 29 for any lens.
+    pub(super) fn lean(&self, shift: &Vector2<f64>) -> Vector2<f64> {
+        self.direction * shift
+    }
+
+    /// The map from shifts to horizontal leans.
+    pub(super) fn direction(&self) -> &nalgebra::Matrix2<f64> {
+        &self.direction
+    }
+}
+
+/// The closed-form gain of each pixel of the region relative to their mean, and that mean in pixels per radian.
+pub(super) fn closed_form_gains(
+    camera: &Camera,
+    robot_from_camera: &Matrix3<f64>,
+    region: &Region,
+    centre: &VanishingPoint,
+) -> (Vec<f32>, f64) {
+    let gain = |u: usize, v: usize, bearing: Vector3<f64>| -> f64 {
+        let pixel = Vector2::new(u as f64, v as f64);
+        let Some((_, back)) = camera.unproject_jacobian(&pixel) else { return f64::NAN };
+        let back = robot_from_camera * back;
+        let Some(normal) = Vector3::z().cross(&bearing).try_normalize(1e-9) else { return f64::NAN };
+        let along = bearing.cross(&normal);
+        let across = (back.transpose() * normal).norm();
+        ((back.transpose() * along).dot(&(pixel - centre.pixel)) / (along.z * across)).abs()
+    };
+    let gains: Vec<f64> = region.pixels().map(|(u, v, bearing)| gain(u, v, bearing)).collect();
+    let usable = gains.iter().filter(|g| g.is_finite());
+    let mean = usable.clone().sum::<f64>() / (usable.count().max(1) as f64);
+    let relative = |g: &f64| if g.is_finite() && *g > 0.0 { (g / mean) as f32 } else { f32::NAN };
+    (gains.iter().map(relative).collect(), mean)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::camera::{Equidistant, Model};
+    use crate::edges::EdgeOptions;
+
+    #[test]
+    fn gains_of_an_equidistant_lens_are_those_of_the_formula() {
+        let lens = Equidistant::new(139.7, 319.5, 239.5).unwrap();
+        let camera = Camera::new(640, 480, Model::Equidistant(lens)).unwrap();
+        let identity = Matrix3::identity();
+        let region = Region::new(&camera, &identity, &EdgeOptions::default(), None).unwrap();
+        let centre = VanishingPoint::new(&camera, &identity).unwrap();
+        assert!((centre.scale - 139.7).abs() < 1e-9);
+        let (gains, mean) = closed_form_gains(&camera, &identity, &region, &centre);
+        for ((_, _, bearing), gain) in region.pixels().zip(&gains) {
+            let theta = bearing.xy().norm().atan2(bearing.z);
+            let expected = 139.7 * (theta / theta.sin()).powi(2);
+            assert!((f64::from(*gain) * mean / expected - 1.0).abs() < 1e-5);
+        }
+    }
+}

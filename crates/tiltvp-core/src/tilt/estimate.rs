@@ -1,0 +1,49 @@
+//! What an estimator answers.
+
+use nalgebra::Matrix2;
+
+use crate::geometry::Tilt;
+use crate::robust::Stop;
+
+/// The tilt of one image, with how sure the estimator is of it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TiltEstimate {
+    /// The lean, `None` if the image does not determine one (the reason is in [`stop`](Self::stop)).
+    pub tilt: Option<Tilt>,
+    /// Covariance in squared radians of the ground normal in its tangent plane, in the basis of
+    /// [`tangent_basis`](crate::geometry::tangent_basis) (close to the robot's `x` and `y`); infinite without a tilt.
+    pub covariance_rad2: Matrix2<f64>,
+    /// Probability, in `[0, 1]`, that the error is below two degrees; 0 without a tilt.
+    pub confidence: f64,
+    /// Edge pixels in the elevation band.
+    pub edge_pixels: usize,
+    /// Edge pixels that passed the prefilter.
+    pub prefiltered_pixels: usize,
+    /// Edge pixels that agree with the estimate.
+    pub inlier_pixels: usize,
+    /// The shift `l` of the vanishing point in pixels (eq. 20) before any factor; only of the image-space methods.
+    pub shift_px: Option<f64>,
+    /// Root mean square residual of the inliers: radians, or pixels for the image-space methods; NaN without a tilt.
+    pub residual_rms: f64,
+    /// Random samples or refits done.
+    pub iterations: u32,
+    /// Why the fit stopped.
+    pub stop: Stop,
+}
+
+/// One edge pixel of the last image, for pictures and experiments.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct EdgeElement {
+    /// Column.
+    pub u: u16,
+    /// Row.
+    pub v: u16,
+    /// Gradient direction in `[0, pi)` radians, eq. 16.
+    pub phi_rad: f64,
+    /// Edge offset in pixels, eq. 17; NaN where the vertical vanishing point is out of the lens' reach.
+    pub offset_px: f64,
+    /// Whether it passed the prefilter.
+    pub prefiltered: bool,
+    /// Whether it agrees with the estimate.
+    pub inlier: bool,
+}

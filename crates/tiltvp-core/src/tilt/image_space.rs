@@ -1,0 +1,134 @@
+//! The image-space methods of paper 000, section 2.1: a cosine fitted to the edge offsets.
+
+use nalgebra::Vector2;
+
+use super::correction::VanishingPoint;
+use crate::edges::{EdgePixels, Region};
+use crate::robust::{Gate, Moments, Problem, Rows};
+
+/// Edge offsets `s = A cos phi + B sin phi` (eq. 19): rows `(g cos phi, g sin phi, -s)`, model `(A, B)`, residuals in pixels
+/// (eq. 33). `g` is the relative closed-form gain of the pixel, or 1.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Offsets<'a> {
+    rows: &'a Rows<f32>,
+}
+
+impl<'a> Offsets<'a> {
+    pub(super) fn new(rows: &'a Rows<f32>) -> Self {
+        Self { rows }
+    }
+}
+
+impl Problem for Offsets<'_> {
+    type Model = Vector2<f64>;
+    type Summary = Moments;
+    const SAMPLE_SIZE: usize = 2;
+
+    fn len(&self) -> usize {
+        self.rows.len()
+    }
+
+    fn fit_minimal(&self, sample: &[usize]) -> Option<Vector2<f64>> {
+        let (i, j) = (self.rows.get(*sample.first()?)?, self.rows.get(*sample.get(1)?)?);
+        let determinant = i.x * j.y - i.y * j.x;
+        if determinant.abs() < 1e-9 {
+            return None;
+        }
+        Some(Vector2::new(i.y * j.z - i.z * j.y, i.z * j.x - i.x * j.z) / determinant)
+    }
+
+    fn consensus(&self, model: &Vector2<f64>, threshold: f64) -> usize {
+        self.rows.count_within([model.x, model.y, 1.0], threshold)
+    }
+
+    fn summarise(&self, model: &Vector2<f64>, gate: Gate, weights: &mut [f32]) -> Moments {
+        self.rows.moments([model.x, model.y, 1.0], gate, weights)
+    }
+
+    fn fit(&self, summary: &Moments, _near: &Vector2<f64>) -> Option<Vector2<f64>> {
+        let [a, b, _] = summary.model();
+        summary.step().map(|step| Vector2::new(a, b) + step)
+    }
+
+    fn rms(&self, summary: &Moments, model: &Vector2<f64>) -> f64 {
+        let [a, b, _] = summary.model();
+        (summary.sum_of_squares(&(model - Vector2::new(a, b))) / summary.weight).sqrt()
+    }
+
+    fn count(summary: &Moments) -> usize {
+        summary.count
+    }
+
+    /// `|l_n - l_(n-1)|`, the paper's measure of convergence.
+    fn distance(&self, a: &Vector2<f64>, b: &Vector2<f64>) -> f64 {
+        (a.norm() - b.norm()).abs()
+    }
+}
+
+/// `(cos phi, sin phi, s)` of an edge pixel, eqs. 16 and 17: the half-turn of the gradient with `phi` in `[0, pi)`.
+#[inline(always)]
+pub(super) fn edge_offset(centre: (f32, f32), (u, v): (u16, u16), gx: f32, gy: f32) -> (f32, f32, f32) {
+    let sign = if gy < 0.0 || (gy == 0.0 && gx < 0.0) { -1.0 } else { 1.0 };
+    let scale = sign / (gx * gx + gy * gy).sqrt();
+    let (cos, sin) = (gx * scale, gy * scale);
+    (cos, sin, cos * (f32::from(u) - centre.0) + sin * (f32::from(v) - centre.1))
+}
+
+/// Writes the rows of the edge pixels that pass the prefilter `|s| <= offset_max_px`, with unit weights, and their places.
+pub(super) fn offsets(
+    edges: &EdgePixels,
+    region: &Region,
+    centre: &VanishingPoint,
+    gains: &[f32],
+    offset_max_px: f64,
+    rows: &mut Rows<f32>,
+    weights: &mut Vec<f32>,
+    places: &mut Vec<u32>,
+) {
+    let n = edges.len();
+    places.resize(n, 0);
+    let limit = offset_max_px as f32;
+    let middle = (centre.pixel.x as f32, centre.pixel.y as f32);
+    rows.refill(n, |[x, y, z]| {
+        let (x, y, z, places) = (&mut x[..n], &mut y[..n], &mut z[..n], &mut places[..n]);
+        let mut kept = 0;
+        for (place, ((slot, gx), gy)) in edges.slot().iter().zip(edges.gx()).zip(edges.gy()).enumerate() {
+            let slot = *slot as usize;
+            let (cos, sin, s) = edge_offset(middle, region.place(slot), *gx, *gy);
+            let gain = gains.get(slot).copied().unwrap_or(1.0);
+            (x[kept], y[kept], z[kept], places[kept]) = (gain * cos, gain * sin, -s, place as u32);
+            kept += usize::from(s.abs() <= limit && gain > 0.0);
+        }
+        kept
+    });
+    places.truncate(rows.len());
+    weights.clear();
+    weights.resize(rows.len(), 1.0);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn phi_is_the_same_for_both_polarities() {
+        for (gx, gy) in [(3.0, 4.0), (-3.0, 4.0), (5.0, 0.0), (0.0, -2.0)] {
+            let a = edge_offset((10.0, 20.0), (40, 35), gx, gy);
+            let b = edge_offset((10.0, 20.0), (40, 35), -gx, -gy);
+            assert_eq!(a, b);
+            let phi = a.1.atan2(a.0);
+            assert!((0.0..std::f32::consts::PI).contains(&phi));
+        }
+    }
+
+    #[test]
+    fn two_offsets_give_the_shift() {
+        let shift = Vector2::new(7.0, -3.0);
+        let mut rows = Rows::default();
+        for phi in [0.3f32, 1.9] {
+            rows.push(phi.cos(), phi.sin(), -(7.0 * phi.cos() - 3.0 * phi.sin()));
+        }
+        let model = Offsets::new(&rows).fit_minimal(&[0, 1]).unwrap();
+        assert!((model - shift).norm() < 1e-5);
+    }
+}

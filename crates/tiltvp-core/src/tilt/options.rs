@@ -1,0 +1,153 @@
+//! Options of the tilt estimator; the paper's defaults are those of its table 3.
+
+use super::correction::Correction;
+use super::refine::RefineOptions;
+use crate::edges::{EdgeOptions, Mask, NormalKind};
+use crate::error::{Error, Result};
+
+/// The methods by name, the default first.
+pub const METHODS: [&str; 4] = ["refined", "image-space-ransac", "image-space-reject-refit", "vector-consensus"];
+
+/// How the tilt is estimated from the edge pixels.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Method {
+    /// Paper 000 section 2.1 with random sampling.
+    ImageSpaceRansac {
+        /// Largest residual of an inlier in pixels, `delta_s,max` of eq. 32. Default 10.
+        threshold_px: f64,
+        /// Largest edge offset in pixels that passes the prefilter, `s_max`. Default 40.
+        offset_max_px: f64,
+        /// From the shift to the angle.
+        correction: Correction,
+    },
+    /// Paper 000 section 2.1 with repeated trimming.
+    ImageSpaceRejectRefit {
+        /// Share of normal residuals kept each round; eq. 34 with `Q` read as the share kept. Default 0.8.
+        keep_fraction: f64,
+        /// Largest edge offset in pixels that passes the prefilter, `s_max`. Default 40.
+        offset_max_px: f64,
+        /// From the shift to the angle.
+        correction: Correction,
+    },
+    /// Paper 000 section 2.2.
+    VectorConsensus {
+        /// Largest angle in radians between an inlier's great circle and the vertical, `delta_o,max` of eq. 40. Default 5 degrees.
+        threshold_rad: f64,
+        /// Whether normals are made the paper's way or the exact way. Default the paper's.
+        normal: NormalKind,
+        /// The factor `a'` of eq. 45 by which the angle is divided, 1 for none. Default 1.
+        factor: f64,
+    },
+    /// Ours: tangent normals weighted by their gradients, trimmed from the upright prior, then a fading soft gate.
+    Refined(RefineOptions),
+}
+
+impl Method {
+    /// The name under which users ask for the method.
+    pub fn name(&self) -> &'static str {
+        match self {
+            Self::Refined(_) => METHODS[0],
+            Self::ImageSpaceRansac { .. } => METHODS[1],
+            Self::ImageSpaceRejectRefit { .. } => METHODS[2],
+            Self::VectorConsensus { .. } => METHODS[3],
+        }
+    }
+}
+
+/// Everything that can be chosen about a [`TiltEstimator`](super::TiltEstimator).
+#[derive(Debug, Clone, PartialEq)]
+pub struct TiltOptions {
+    /// The method and what belongs to it alone.
+    pub method: Method,
+    /// Which pixels are edges.
+    pub edges: EdgeOptions,
+    /// Largest lean expected, in radians: edges that would need a larger one are rejected first. Default 12 degrees for
+    /// the refined method and 7 for vector consensus; the image-space methods have `offset_max_px` instead, and this, where
+    /// given, sets it to the shift of that lean.
+    pub tilt_max_rad: Option<f64>,
+    /// Pixels that show the world and not the robot. Default all.
+    pub mask: Option<Mask>,
+    /// Seed of the random samples. Default 0.
+    pub seed: u64,
+}
+
+impl TiltOptions {
+    /// The defaults of a method.
+    ///
+    /// # Errors
+    /// [`Error::InvalidOption`] with the list of methods if there is none of that name.
+    pub fn for_method(name: &str) -> Result<Self> {
+        let (method, gradient_min, smoothing_px) = match name {
+            "image-space-ransac" => {
+                let correction = Correction::default();
+                (Method::ImageSpaceRansac { threshold_px: 10.0, offset_max_px: 40.0, correction }, 150.0, 0.0)
+            }
+            "image-space-reject-refit" => {
+                let correction = Correction::default();
+                (Method::ImageSpaceRejectRefit { keep_fraction: 0.8, offset_max_px: 40.0, correction }, 200.0, 0.0)
+            }
+            "vector-consensus" => {
+                let threshold_rad = 5f64.to_radians();
+                (Method::VectorConsensus { threshold_rad, normal: NormalKind::Gradient, factor: 1.0 }, 600.0, 0.0)
+            }
+            "refined" => (Method::Refined(RefineOptions::default()), 150.0, 0.6),
+            _ => {
+                return Err(Error::option(
+                    "method",
+                    format!("\"{name}\""),
+                    "\"refined\", \"image-space-ransac\", \"image-space-reject-refit\" or \"vector-consensus\"",
+                ));
+            }
+        };
+        Ok(Self {
+            method,
+            edges: EdgeOptions { gradient_min, smoothing_px, ..EdgeOptions::default() },
+            tilt_max_rad: None,
+            mask: None,
+            seed: 0,
+        })
+    }
+
+    /// Checks every field.
+    ///
+    /// # Errors
+    /// [`Error::InvalidOption`] with the name of the field.
+    pub fn validate(&self) -> Result<()> {
+        let positive = |name, value: f64, expected| {
+            if value > 0.0 && value.is_finite() { Ok(()) } else { Err(Error::option(name, value, expected)) }
+        };
+        self.edges.validate()?;
+        if let Some(tilt_max) = self.tilt_max_rad
+            && !(tilt_max > 0.0 && tilt_max < std::f64::consts::FRAC_PI_2)
+        {
+            return Err(Error::option("tilt_max_rad", tilt_max, "an angle strictly between 0 and pi/2"));
+        }
+        match &self.method {
+            Method::ImageSpaceRansac { threshold_px, offset_max_px, correction } => {
+                positive("threshold_px", *threshold_px, "a positive number of pixels")?;
+                positive("offset_max_px", *offset_max_px, "a positive number of pixels")?;
+                correction.validate()
+            }
+            Method::ImageSpaceRejectRefit { keep_fraction, offset_max_px, correction } => {
+                if !(*keep_fraction > 0.0 && *keep_fraction < 1.0) {
+                    return Err(Error::option("keep_fraction", keep_fraction, "a share strictly between 0 and 1"));
+                }
+                positive("offset_max_px", *offset_max_px, "a positive number of pixels")?;
+                correction.validate()
+            }
+            Method::VectorConsensus { threshold_rad, factor, .. } => {
+                if !(*threshold_rad > 0.0 && *threshold_rad < std::f64::consts::FRAC_PI_2) {
+                    return Err(Error::option("threshold_rad", threshold_rad, "an angle strictly between 0 and pi/2"));
+                }
+                positive("correction", *factor, "a positive factor")
+            }
+            Method::Refined(options) => options.validate(),
+        }
+    }
+
+    /// The prefilter's angle of the methods that work with normals.
+    pub(super) fn normal_tilt_max_rad(&self) -> f64 {
+        let default_deg: f64 = if matches!(self.method, Method::VectorConsensus { .. }) { 7.0 } else { 12.0 };
+        self.tilt_max_rad.unwrap_or(default_deg.to_radians())
+    }
+}

@@ -1,0 +1,162 @@
+//! Furnishing: which pieces stand where, so that they leave doors, windows and each other free.
+
+mod decor;
+mod palette;
+mod seating;
+mod storage;
+mod tables;
+
+use crate::builder::{Builder, Footprint, Frame};
+use crate::dice::Dice;
+use crate::options::{RoomKind, RoomOptions};
+use crate::plan::{Filling, Plan, Wall};
+use palette::Palette;
+
+/// The floor as it fills up.
+struct Layout<'a> {
+    plan: &'a Plan,
+    claims: Vec<Footprint>,
+}
+
+impl Layout<'_> {
+    /// Claims the rectangle `low..high` of a frame, if it is inside the room and free.
+    fn claim(&mut self, frame: &Frame, low: [f64; 2], high: [f64; 2]) -> bool {
+        let footprint = Footprint::new(frame, low, high);
+        let corners_inside = footprint.corners().iter().all(|c| {
+            // A hair inside, so that pieces may touch the walls.
+            self.plan.contains(&(footprint.center + (c - footprint.center) * 0.99))
+        });
+        let reflex_outside = self.plan.outline.iter().all(|corner| footprint.distance(corner) > 0.0);
+        let free = corners_inside && reflex_outside && !self.claims.iter().any(|other| other.overlaps(&footprint));
+        if free {
+            self.claims.push(footprint);
+        }
+        free
+    }
+}
+
+/// A piece that stands against a wall.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Piece {
+    Bookshelf,
+    Cupboard,
+    Sideboard,
+    Desk,
+    Sofa,
+    Rack,
+    Plant,
+    FloorLamp,
+    Bin,
+    Chair,
+}
+
+impl Piece {
+    /// Width, depth with the room in front that it needs, and height, metres.
+    fn size(self, dice: &mut Dice) -> [f64; 3] {
+        match self {
+            Self::Bookshelf => [dice.within(0.75, 1.3), 0.32, dice.within(1.6, 2.2)],
+            Self::Cupboard => [dice.within(0.8, 1.3), 0.45, dice.within(1.0, 2.1)],
+            Self::Sideboard => [dice.within(1.1, 1.8), 0.45, dice.within(0.6, 0.85)],
+            Self::Desk => [dice.within(1.3, 1.7), 1.35, 0.74],
+            Self::Sofa => [dice.within(1.6, 2.2), 0.9, 0.85],
+            Self::Rack => [dice.within(0.9, 1.2), 0.42, dice.within(1.8, 2.2)],
+            Self::Plant => [0.6, 0.6, dice.within(0.8, 1.7)],
+            Self::FloorLamp => [0.45, 0.45, dice.within(1.4, 1.7)],
+            Self::Bin => [0.3, 0.3, 0.35],
+            Self::Chair => [0.6, 0.65, 0.9],
+        }
+    }
+}
+
+/// Furnishes a room; returns the places the robot is meant for, none for anywhere.
+pub(crate) fn furnish(plan: &Plan, options: &RoomOptions, builder: &mut Builder, dice: &mut Dice) -> Vec<Footprint> {
+    let palette = Palette::draw(builder, dice);
+    let mut layout = Layout { plan, claims: Vec::new() };
+    for wall in &plan.walls {
+        for door in wall.openings.iter().filter(|o| o.filling == Filling::Door) {
+            layout.claim(&wall.frame, [door.along[0] - 0.1, 0.0], [door.along[1] + 0.1, 0.75]);
+        }
+    }
+    let places = tables::freestanding(&mut layout, &palette, builder, dice);
+    let mut order: Vec<usize> = (0..plan.walls.len()).collect();
+    for k in (1..order.len()).rev() {
+        order.swap(k, dice.below(k + 1));
+    }
+    for k in order {
+        let tall = along_wall(&plan.walls[k], &mut layout, &palette, options.clutter, builder, dice);
+        decor::hang(&plan.walls[k], &tall, plan, &palette, options.clutter, builder, dice);
+    }
+    places
+}
+
+/// Lines a wall with furniture; returns the intervals where something stands that hides the wall, with its height.
+fn along_wall(
+    wall: &Wall,
+    layout: &mut Layout<'_>,
+    palette: &Palette,
+    clutter: f64,
+    builder: &mut Builder,
+    dice: &mut Dice,
+) -> Vec<[f64; 3]> {
+    let mut taken = Vec::new();
+    let mut x = 0.05;
+    let kind = layout.plan.kind;
+    while x < wall.length - 0.3 {
+        if !dice.chance(0.25 + 0.75 * clutter) {
+            x += dice.within(0.4, 0.9);
+            continue;
+        }
+        let piece = choose(kind, dice);
+        let [width, depth, height] = piece.size(dice);
+        let blocks_light = height > 0.9 && !wall.is_free_of(Filling::Window, x, x + width, 0.1);
+        let frame = wall.frame.then(x, 0.012, 0.0, 0.0);
+        // A radiator keeps furniture a little off the wall under a window.
+        let off = if wall.is_free_of(Filling::Window, x, x + width, 0.0) { 0.0 } else { 0.12 };
+        let frame = frame.then(0.0, off, 0.0, 0.0);
+        if x + width > wall.length - 0.02 || blocks_light || !layout.claim(&frame, [0.0, 0.0], [width, depth]) {
+            x += 0.12;
+            continue;
+        }
+        build(piece, &frame, [width, height], palette, builder, dice);
+        taken.push([x, x + width, if piece == Piece::Sofa { 1.0 } else { height }]);
+        x += width + if dice.chance(0.5) { 0.03 } else { dice.within(0.1, 0.6) };
+    }
+    taken
+}
+
+fn choose(kind: RoomKind, dice: &mut Dice) -> Piece {
+    use Piece::{Bin, Bookshelf, Chair, Cupboard, Desk, FloorLamp, Plant, Rack, Sideboard, Sofa};
+    match kind {
+        RoomKind::Office => dice.pick([Bookshelf, Bookshelf, Cupboard, Desk, Desk, Desk, Plant, Bin, Sideboard, Chair]),
+        RoomKind::LivingRoom => {
+            dice.pick([Bookshelf, Bookshelf, Cupboard, Sideboard, Sideboard, Sofa, Sofa, Plant, FloorLamp, Chair])
+        }
+        RoomKind::Corridor => dice.pick([Bin, Plant, Cupboard, Chair, Bookshelf, Cupboard]),
+        RoomKind::LShaped => {
+            dice.pick([Bookshelf, Cupboard, Sideboard, Desk, Sofa, Plant, FloorLamp, Chair, Bookshelf, Rack])
+        }
+        RoomKind::Narrow => dice.pick([Rack, Rack, Rack, Cupboard, Bookshelf, Bin]),
+        RoomKind::UnderTable => dice.pick([Bookshelf, Cupboard, Sideboard, Sideboard, Plant, FloorLamp, Chair]),
+    }
+}
+
+fn build(piece: Piece, frame: &Frame, size: [f64; 2], palette: &Palette, builder: &mut Builder, dice: &mut Dice) {
+    let [width, height] = size;
+    match piece {
+        Piece::Bookshelf => storage::bookshelf(frame, width, height, palette, builder, dice),
+        Piece::Cupboard => storage::cupboard(frame, width, height, palette, builder, dice),
+        Piece::Sideboard => storage::sideboard(frame, width, height, palette, builder, dice),
+        Piece::Rack => storage::rack(frame, width, height, palette, builder, dice),
+        Piece::Desk => {
+            tables::desk(frame, width, palette, builder, dice);
+            seating::office_chair(&frame.then(0.5 * width, 1.0, 0.0, dice.within(2.2, 4.0)), palette, builder, dice);
+        }
+        Piece::Sofa => seating::sofa(frame, width, palette, builder, dice),
+        Piece::Plant => decor::plant(&frame.then(0.3, 0.3, 0.0, 0.0), height, palette, builder, dice),
+        Piece::FloorLamp => decor::floor_lamp(&frame.then(0.22, 0.22, 0.0, 0.0), height, palette, builder),
+        Piece::Bin => decor::bin(&frame.then(0.15, 0.15, 0.0, 0.0), palette, builder),
+        Piece::Chair => {
+            seating::chair(&frame.then(0.3, 0.35, 0.0, dice.within(-0.3, 0.3)), palette.chair, palette, builder, dice);
+        }
+    }
+}

@@ -1,0 +1,30 @@
+//! Seeded worlds with known truth: furnished, textured, lit rooms, ray-cast through any central camera.
+//!
+//! A [`World`] is drawn from [`RoomOptions`]; equal options give equal bytes, for any number of threads. [`render`] looks at
+//! it through a [`View`]: a lens given as a function from pixels to bearings, mounted on a robot that stands, and leans,
+//! somewhere in the room. What comes back is the image and the truth behind it.
+//!
+//! Lengths are metres, angles radians. The world frame has `z` up with the floor at `z = 0`; the robot frame has `x` forward,
+//! `y` left, `z` up; the camera frame has `z` along the optical axis, `x` to the right (columns), `y` down (rows).
+
+mod builder;
+mod dice;
+mod furniture;
+mod light;
+mod noise;
+mod options;
+mod outdoors;
+mod plan;
+mod render;
+mod scene;
+mod shell;
+mod texture;
+mod tone;
+mod view;
+mod world;
+
+pub use options::{RoomKind, RoomOptions};
+pub use render::{Rendering, Truth, render, render_panorama};
+pub use tone::{Exposure, Image, RenderOptions};
+pub use view::{Lens, RobotPose, View};
+pub use world::{Hit, Segment, World};

@@ -1,0 +1,350 @@
+//! The shell of a room: floor, ceiling with its lights, walls, skirting, doors, windows and radiators.
+
+use nalgebra::Vector3;
+
+use crate::builder::{Builder, Column, Frame, Material, MaterialId, Patch};
+use crate::dice::Dice;
+use crate::options::RoomKind;
+use crate::plan::{Filling, Opening, Plan, Wall};
+use crate::texture::{Motif, Texture, rgb, scale};
+
+/// Builds the shell of a plan.
+pub(crate) fn build(plan: &Plan, builder: &mut Builder, dice: &mut Dice) {
+    floor(plan, builder, dice);
+    ceiling(plan, builder, dice);
+    let tone = dice.within(0.85, 1.0);
+    let plain = wall_texture(plan.kind, false, tone, dice);
+    let accent = wall_texture(plan.kind, true, tone, dice);
+    let (plain, accent) = (builder.matt(plain), builder.matt(accent));
+    let chosen = dice.below(plan.walls.len());
+    let trims = Trims {
+        trim: match dice.below(3) {
+            0 => builder.paint(110, 72, 46),
+            1 => builder.paint(150, 150, 154),
+            _ => builder.paint(238, 236, 230),
+        },
+        door: door_leaf(builder, dice),
+        metal: builder.paint(70, 72, 76),
+        radiator: builder.paint(228, 226, 220),
+        glass: builder.material(Material::Glass),
+        curtain: (plan.kind == RoomKind::LivingRoom || (plan.kind == RoomKind::UnderTable && dice.chance(0.6)))
+            .then(|| curtain(builder, dice)),
+        bars: [1 + dice.below(3), dice.below(3)],
+    };
+    for (k, wall) in plan.walls.iter().enumerate() {
+        let own = if k == chosen { accent } else { plain };
+        panels(wall, plan.height, own, builder);
+        builder.edge(wall.frame.origin, plan.height);
+        skirting(wall, trims.trim, builder);
+        for opening in &wall.openings {
+            match opening.filling {
+                Filling::Door => door(&wall.frame, opening, own, &trims, builder),
+                Filling::Window => window(&wall.frame, opening, own, &trims, builder),
+            }
+        }
+    }
+}
+
+/// The materials of everything fixed to the walls.
+struct Trims {
+    trim: MaterialId,
+    door: MaterialId,
+    metal: MaterialId,
+    radiator: MaterialId,
+    glass: MaterialId,
+    curtain: Option<MaterialId>,
+    /// Upright and level bars per window.
+    bars: [usize; 2],
+}
+
+fn door_leaf(builder: &mut Builder, dice: &mut Dice) -> MaterialId {
+    if dice.chance(0.6) {
+        let seed = dice.seed();
+        let (light, dark) = dice.pick([
+            (rgb(190, 140, 90), rgb(130, 86, 50)),
+            (rgb(120, 78, 50), rgb(70, 42, 26)),
+            (rgb(214, 180, 136), rgb(172, 130, 88)),
+        ]);
+        builder.matt(Texture::Wood { light, dark, along_v: true, seed })
+    } else {
+        let (r, g, b) = dice.pick([(70, 96, 120), (226, 224, 216), (140, 60, 52), (92, 110, 92)]);
+        builder.paint(r, g, b)
+    }
+}
+
+fn curtain(builder: &mut Builder, dice: &mut Dice) -> MaterialId {
+    let color = dice.pick([rgb(170, 60, 50), rgb(205, 190, 160), rgb(70, 90, 120), rgb(110, 120, 80)]);
+    let seed = dice.seed();
+    builder.matt(Texture::Cloth { color, fold: 0.25, seed })
+}
+
+fn floor(plan: &Plan, builder: &mut Builder, dice: &mut Dice) {
+    let seed = dice.seed();
+    let planks = |light, dark| Texture::Planks { light, dark, width: 0.14, length: 1.3, seed };
+    let carpet = |color, speckle| Texture::Carpet { color, speckle, seed };
+    let tiles =
+        |color, joint, size| Texture::Tiles { color, joint, size: [size, size], gap: 0.008, variation: 0.12, seed };
+    let texture = match plan.kind {
+        RoomKind::Office => dice.pick([
+            carpet(rgb(84, 92, 104), rgb(40, 46, 56)),
+            carpet(rgb(120, 108, 96), rgb(66, 58, 52)),
+            planks(rgb(190, 160, 124), rgb(150, 116, 80)),
+        ]),
+        RoomKind::Corridor | RoomKind::Narrow => dice.pick([
+            tiles(rgb(176, 170, 160), rgb(110, 106, 100), 0.4),
+            tiles(rgb(140, 84, 64), rgb(180, 170, 160), 0.3),
+            carpet(rgb(70, 78, 92), rgb(36, 40, 50)),
+        ]),
+        _ => dice.pick([
+            planks(rgb(184, 134, 84), rgb(124, 80, 46)),
+            planks(rgb(120, 84, 56), rgb(76, 48, 30)),
+            tiles(rgb(206, 196, 178), rgb(140, 132, 120), 0.45),
+        ]),
+    };
+    let material = builder.matt(texture);
+    let world = Frame::new(0.0, 0.0, 0.0);
+    let (_, end) = plan.bounds();
+    let patch = Patch {
+        origin: world.origin,
+        du: Vector3::x() * end.x,
+        dv: Vector3::y() * end.y,
+        triangle: false,
+        material,
+        uv: [0.0; 2],
+    };
+    let rectangles: Vec<_> = plan.floors.iter().map(|[x0, y0, x1, y1]| [[*x0, *y0], [*x1, *y1]]).collect();
+    builder.perforated(patch, &rectangles);
+}
+
+fn ceiling(plan: &Plan, builder: &mut Builder, dice: &mut Dice) {
+    let seed = dice.seed();
+    let tiled = matches!(plan.kind, RoomKind::Office | RoomKind::Corridor);
+    let material = builder.matt(if tiled {
+        Texture::CeilingTiles { color: rgb(232, 230, 222), size: 0.6, seed }
+    } else {
+        Texture::Paint { color: rgb(236, 232, 224), mottle: 0.05, seed }
+    });
+    let lamp = builder.material(Material::Lamp(scale([1.0, 0.95, 0.85], plan.lamps)));
+    let rim = builder.paint(120, 120, 124);
+    let (beam_wood, pitch, beams) = (dice.chance(0.5), dice.within(0.7, 1.1), dice.chance(0.6) && !tiled);
+    let beam = if beam_wood { builder.paint(96, 64, 40) } else { builder.paint(216, 208, 194) };
+    let world = Frame::new(0.0, 0.0, 0.0);
+    let h = plan.height;
+    let (_, end) = plan.bounds();
+    let patch = Patch {
+        origin: world.point(0.0, 0.0, h),
+        du: Vector3::y() * end.y,
+        dv: Vector3::x() * end.x,
+        triangle: false,
+        material,
+        uv: [0.0; 2],
+    };
+    let rectangles: Vec<_> = plan.floors.iter().map(|[x0, y0, x1, y1]| [[*y0, *x0], [*y1, *x1]]).collect();
+    builder.perforated(patch, &rectangles);
+    for [x0, y0, x1, y1] in plan.floors.iter().copied() {
+        let (nx, ny) = (((x1 - x0) / 1.8).round().max(1.0) as usize, ((y1 - y0) / 2.0).round().max(1.0) as usize);
+        for k in 0..nx * ny {
+            let mut x = x0 + (x1 - x0) * ((k % nx) as f64 + 0.5) / nx as f64;
+            let mut y = y0 + (y1 - y0) * ((k / nx) as f64 + 0.5) / ny as f64;
+            if tiled {
+                // On the tiles' own grid.
+                x = (x / 0.6).floor() * 0.6 + 0.3;
+                y = if y1 - y0 > 2.5 { (y / 0.6).floor() * 0.6 + 0.3 } else { y };
+                builder.cuboid(&world, [x - 0.3, y - 0.3, h - 0.02], [x + 0.3, y + 0.3, h - 0.004], rim);
+                builder.pane(
+                    &world,
+                    [[x - 0.27, y - 0.27, h - 0.025], [x - 0.27, y + 0.27, h - 0.025], [x + 0.27, y - 0.27, h - 0.025]],
+                    [0.0; 2],
+                    lamp,
+                );
+            } else if plan.kind == RoomKind::Narrow {
+                builder.cuboid(&world, [x - 0.6, y - 0.06, h - 0.06], [x + 0.6, y + 0.06, h], rim);
+                builder.pane(
+                    &world,
+                    [[x - 0.58, y - 0.05, h - 0.065], [x - 0.58, y + 0.05, h - 0.065], [x + 0.58, y - 0.05, h - 0.065]],
+                    [0.0; 2],
+                    lamp,
+                );
+            } else if k == nx * ny / 2 || nx * ny < 3 {
+                pendant(&world.then(x, y, h, 0.0), lamp, rim, builder);
+            }
+        }
+        if beams {
+            let count = ((x1 - x0) / pitch) as usize;
+            for k in 0..count {
+                let x = x0 + (x1 - x0) * (k as f64 + 0.5) / count as f64;
+                builder.cuboid(&world, [x - 0.07, y0, h - 0.16], [x + 0.07, y1, h], beam);
+            }
+        }
+    }
+}
+
+/// A lantern on a cord below the ceiling.
+fn pendant(frame: &Frame, lamp: MaterialId, rim: MaterialId, builder: &mut Builder) {
+    builder.column(frame, &Column { at: [0.0, 0.0], z: [-0.45, 0.0], radius: [0.006, 0.006], sides: 4 }, rim);
+    builder.column(frame, &Column { at: [0.0, 0.0], z: [-0.50, -0.45], radius: [0.14, 0.05], sides: 12 }, rim);
+    builder.column(frame, &Column { at: [0.0, 0.0], z: [-0.64, -0.50], radius: [0.15, 0.14], sides: 8 }, lamp);
+}
+
+fn wall_texture(kind: RoomKind, accent: bool, tone: f64, dice: &mut Dice) -> Texture {
+    let seed = dice.seed();
+    let paint = |color| Texture::Paint { color: scale(color, tone), mottle: 0.10, seed };
+    let home = matches!(kind, RoomKind::LivingRoom | RoomKind::UnderTable | RoomKind::LShaped);
+    let motif = dice.pick([Motif::Stripes, Motif::Diamonds, Motif::Flowers]);
+    let (base, ink) = dice.pick([
+        (rgb(226, 214, 188), rgb(178, 150, 110)),
+        (rgb(196, 208, 200), rgb(130, 156, 146)),
+        (rgb(214, 196, 190), rgb(170, 120, 112)),
+        (rgb(150, 160, 176), rgb(196, 204, 214)),
+    ]);
+    if home && dice.chance(if accent { 0.8 } else { 0.45 }) {
+        let period = dice.within(0.16, 0.34);
+        return Texture::Wallpaper { base, ink, motif, period, seed };
+    }
+    if accent {
+        return dice.pick([
+            Texture::Brick { color: rgb(164, 84, 62), joint: rgb(190, 182, 170), seed },
+            paint(rgb(120, 140, 160)),
+            paint(rgb(176, 120, 84)),
+            paint(rgb(130, 150, 124)),
+        ]);
+    }
+    dice.pick([
+        paint(rgb(232, 228, 218)),
+        paint(rgb(222, 214, 196)),
+        paint(rgb(208, 216, 218)),
+        paint(rgb(214, 206, 200)),
+    ])
+}
+
+/// The wall itself, around its openings, and their reveals' edges.
+fn panels(wall: &Wall, height: f64, material: MaterialId, builder: &mut Builder) {
+    let mut cuts = vec![0.0, wall.length];
+    for opening in &wall.openings {
+        cuts.extend(opening.along);
+    }
+    cuts.sort_by(f64::total_cmp);
+    let mut rectangles = Vec::new();
+    for pair in cuts.windows(2) {
+        let (from, to) = (pair[0], pair[1]);
+        let hole = wall.openings.iter().find(|o| o.along[0] < 0.5 * (from + to) && o.along[1] > 0.5 * (from + to));
+        let parts = hole.map_or([[0.0, height], [0.0, 0.0]], |o| [[0.0, o.z[0]], [o.z[1], height]]);
+        for [low, high] in parts {
+            if high - low > 1e-6 && to - from > 1e-6 {
+                // Seen from the front, the wall's x runs to the left.
+                rectangles.push([[wall.length - to, low], [wall.length - from, high]]);
+            }
+        }
+    }
+    let patch = Patch {
+        origin: wall.frame.point(wall.length, 0.0, 0.0),
+        du: wall.frame.vector(-wall.length, 0.0, 0.0),
+        dv: Vector3::z() * height,
+        triangle: false,
+        material,
+        uv: [-wall.length, 0.0],
+    };
+    builder.perforated(patch, &rectangles);
+}
+
+fn skirting(wall: &Wall, material: MaterialId, builder: &mut Builder) {
+    let mut from = 0.0;
+    let mut doors: Vec<[f64; 2]> =
+        wall.openings.iter().filter(|o| o.filling == Filling::Door).map(|o| o.along).collect();
+    doors.sort_by(|a, b| a[0].total_cmp(&b[0]));
+    doors.push([wall.length + 0.07, wall.length]);
+    for [start, end] in doors {
+        if start - 0.07 > from {
+            builder.cuboid(&wall.frame, [from, 0.0, 0.0], [start - 0.07, 0.015, 0.09], material);
+        }
+        from = end + 0.07;
+    }
+}
+
+/// The four inner sides of an opening, down to `depth` behind the wall.
+fn reveal(frame: &Frame, opening: &Opening, depth: f64, material: MaterialId, sill: MaterialId, builder: &mut Builder) {
+    let ([x0, x1], [z0, z1], d) = (opening.along, opening.z, -depth);
+    builder.pane(frame, [[x0, d, z0], [x0, 0.0, z0], [x0, d, z1]], [0.0; 2], material);
+    builder.pane(frame, [[x1, 0.0, z0], [x1, d, z0], [x1, 0.0, z1]], [0.0; 2], material);
+    builder.pane(frame, [[x0, d, z1], [x0, 0.0, z1], [x1, d, z1]], [0.0; 2], material);
+    builder.pane(frame, [[x0, d, z0], [x1, d, z0], [x0, 0.0, z0]], [0.0; 2], sill);
+    for x in opening.along {
+        builder.edge(frame.point(x, 0.0, z0), z1 - z0);
+    }
+}
+
+fn door(frame: &Frame, opening: &Opening, wall: MaterialId, trims: &Trims, builder: &mut Builder) {
+    let ([x0, x1], z1) = (opening.along, opening.z[1]);
+    reveal(frame, opening, 0.1, wall, trims.metal, builder);
+    builder.pane(frame, [[x1, -0.09, 0.0], [x0, -0.09, 0.0], [x1, -0.09, z1]], [x0 + z1; 2], trims.door);
+    // Two raised fields, casing, handle.
+    for [low, high] in [[0.15, 0.85], [1.0, z1 - 0.15]] {
+        builder.cuboid(frame, [x0 + 0.13, -0.09, low], [x1 - 0.13, -0.075, high], trims.door);
+    }
+    builder.cuboid(frame, [x0 - 0.07, 0.0, 0.0], [x0, 0.025, z1 + 0.07], trims.trim);
+    builder.cuboid(frame, [x1, 0.0, 0.0], [x1 + 0.07, 0.025, z1 + 0.07], trims.trim);
+    builder.cuboid(frame, [x0, 0.0, z1], [x1, 0.025, z1 + 0.07], trims.trim);
+    builder.cuboid(frame, [x0 + 0.05, -0.075, 0.98], [x0 + 0.09, -0.065, 1.14], trims.metal);
+    builder.cuboid(frame, [x0 + 0.05, -0.03, 1.05], [x0 + 0.18, -0.015, 1.07], trims.metal);
+    // Light switch.
+    builder.cuboid(frame, [x0 - 0.24, 0.0, 1.05], [x0 - 0.16, 0.012, 1.13], trims.radiator);
+}
+
+fn window(frame: &Frame, opening: &Opening, wall: MaterialId, trims: &Trims, builder: &mut Builder) {
+    let ([x0, x1], [z0, z1]) = (opening.along, opening.z);
+    reveal(frame, opening, 0.2, wall, trims.trim, builder);
+    builder.pane(frame, [[x1, -0.16, z0], [x0, -0.16, z0], [x1, -0.16, z1]], [0.0; 2], trims.glass);
+    let mut bar = |low: [f64; 2], high: [f64; 2]| {
+        builder.cuboid(frame, [low[0], -0.155, low[1]], [high[0], -0.10, high[1]], trims.trim);
+    };
+    bar([x0, z0], [x0 + 0.06, z1]);
+    bar([x1 - 0.06, z0], [x1, z1]);
+    bar([x0 + 0.06, z0], [x1 - 0.06, z0 + 0.06]);
+    bar([x0 + 0.06, z1 - 0.06], [x1 - 0.06, z1]);
+    let [uprights, levels] = trims.bars;
+    for k in 1..=uprights {
+        let x = x0 + (x1 - x0) * k as f64 / (uprights + 1) as f64;
+        bar([x - 0.025, z0 + 0.06], [x + 0.025, z1 - 0.06]);
+    }
+    for k in 1..=levels {
+        let z = z0 + (z1 - z0) * k as f64 / (levels + 1) as f64;
+        bar([x0 + 0.06, z - 0.018], [x1 - 0.06, z + 0.018]);
+    }
+    if z0 > 0.5 {
+        builder.cuboid(frame, [x0 - 0.06, -0.1, z0 - 0.03], [x1 + 0.06, 0.1, z0], trims.trim);
+        radiator(&frame.then(0.5 * (x0 + x1), 0.03, 0.0, 0.0), 0.8 * (x1 - x0), z0 - 0.15, trims, builder);
+    }
+    if let Some(curtain) = trims.curtain {
+        builder.cuboid(frame, [x0 - 0.35, 0.06, z1 + 0.1], [x1 + 0.35, 0.085, z1 + 0.125], trims.metal);
+        for (from, to) in [(x0 - 0.3, x0 + 0.12), (x1 - 0.12, x1 + 0.3)] {
+            drape(frame, [from, to], [0.03, z1 + 0.11], curtain, builder);
+        }
+    }
+}
+
+/// A pleated curtain.
+fn drape(frame: &Frame, along: [f64; 2], z: [f64; 2], material: MaterialId, builder: &mut Builder) {
+    let pleats = (2.0 * (along[1] - along[0]) / 0.07).round() as usize;
+    let at = |k: usize| {
+        let x = along[1] + (along[0] - along[1]) * k as f64 / pleats as f64;
+        (x, if k.is_multiple_of(2) { 0.11 } else { 0.165 })
+    };
+    for k in 0..pleats {
+        let ((xa, ya), (xb, yb)) = (at(k), at(k + 1));
+        builder.pane(frame, [[xa, ya, z[0]], [xb, yb, z[0]], [xa, ya, z[1]]], [k as f64 * 0.05, 0.0], material);
+        builder.edge(frame.point(xa, ya, z[0]), z[1] - z[0]);
+    }
+}
+
+/// A panel radiator with upright fins.
+fn radiator(frame: &Frame, width: f64, height: f64, trims: &Trims, builder: &mut Builder) {
+    let (half, low) = (0.5 * width, 0.12);
+    builder.cuboid(frame, [-half, 0.02, low], [half, 0.05, height], trims.radiator);
+    let fins = (width / 0.07) as usize;
+    for k in 0..fins {
+        let x = -half + width * (k as f64 + 0.5) / fins as f64;
+        builder.cuboid(frame, [x - 0.014, 0.05, low + 0.02], [x + 0.014, 0.075, height - 0.02], trims.radiator);
+    }
+    builder.post(frame, [half - 0.05, 0.035, 0.0], [half - 0.05, 0.035, low], 0.02, trims.metal);
+    builder.solid(frame, [-half, 0.0], [half, 0.08]);
+}

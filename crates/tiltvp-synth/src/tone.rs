@@ -1,0 +1,205 @@
+//! From light to grey levels: exposure, blur, gamma, noise.
+
+use rayon::prelude::*;
+use tiltvp_core::{Error, Result};
+
+use crate::dice::Dice;
+use crate::texture::luminance;
+
+/// How light becomes brightness.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
+pub enum Exposure {
+    /// Like a camera's automatic: the mean level of the valid pixels becomes `mean_level`, in `(0, 1)` of full scale,
+    /// unless that would wash out more than a tenth of them.
+    Auto {
+        /// The mean level in `(0, 1)` of full scale.
+        mean_level: f64,
+    },
+    /// Radiance times `gain`; white in the room's light has a radiance of 1, display white is 1.
+    Fixed {
+        /// The factor, positive.
+        gain: f64,
+    },
+}
+
+/// How a view becomes an image.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RenderOptions {
+    /// Rays per pixel side, within `[1, 8]`: 3 casts 9 rays per pixel, each at a random place of its own ninth; 3 by default.
+    pub samples: usize,
+    /// Standard deviation of a Gaussian blur, pixels; 0 by default, for none.
+    pub blur_sigma_px: f64,
+    /// Standard deviation of Gaussian noise, grey levels of 255, independent in the grey image and each colour; 0 by default.
+    pub noise_sigma: f64,
+    /// Exposure; automatic to a mean level of 0.45 by default.
+    pub exposure: Exposure,
+    /// Exponent of the display curve, `level = light^(1/gamma)`, within `[0.5, 4]`; 2.2 by default.
+    pub gamma: f64,
+    /// Loss of light at 90 degrees off the axis, in `[0, 1]`, growing with the square of the angle; 0.25 by default.
+    pub vignetting: f64,
+    /// Seed of ray places and noise; 0 by default.
+    pub seed: u64,
+}
+
+impl Default for RenderOptions {
+    fn default() -> Self {
+        Self {
+            samples: 3,
+            blur_sigma_px: 0.0,
+            noise_sigma: 0.0,
+            exposure: Exposure::Auto { mean_level: 0.45 },
+            gamma: 2.2,
+            vignetting: 0.25,
+            seed: 0,
+        }
+    }
+}
+
+impl RenderOptions {
+    /// Checks every field's domain.
+    ///
+    /// # Errors
+    /// [`Error::InvalidOption`] for the first field outside its domain.
+    pub fn validate(&self) -> Result<()> {
+        if !(1..=8).contains(&self.samples) {
+            return Err(Error::option("render.samples", self.samples, "rays per pixel side in [1, 8]"));
+        }
+        if !(0.0..=50.0).contains(&self.blur_sigma_px) {
+            return Err(Error::option("render.blur_sigma_px", self.blur_sigma_px, "pixels in [0, 50]"));
+        }
+        if !(0.0..=255.0).contains(&self.noise_sigma) {
+            return Err(Error::option("render.noise_sigma", self.noise_sigma, "grey levels in [0, 255]"));
+        }
+        match self.exposure {
+            Exposure::Auto { mean_level } if !(mean_level > 0.0 && mean_level < 1.0) => {
+                return Err(Error::option("render.exposure.mean_level", mean_level, "a level within (0, 1)"));
+            }
+            Exposure::Fixed { gain } if !(gain > 0.0 && gain.is_finite()) => {
+                return Err(Error::option("render.exposure.gain", gain, "a positive number"));
+            }
+            _ => {}
+        }
+        if !(0.5..=4.0).contains(&self.gamma) {
+            return Err(Error::option("render.gamma", self.gamma, "an exponent in [0.5, 4]"));
+        }
+        if !(0.0..=1.0).contains(&self.vignetting) {
+            return Err(Error::option("render.vignetting", self.vignetting, "a share in [0, 1]"));
+        }
+        Ok(())
+    }
+}
+
+/// An 8-bit image, rows from the top.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Image {
+    /// Width, pixels.
+    pub width_px: usize,
+    /// Height, pixels.
+    pub height_px: usize,
+    /// Grey levels (Rec. 709 luminance), `height * width`.
+    pub gray: Vec<u8>,
+    /// Red, green, blue levels, `height * width * 3`.
+    pub rgb: Vec<u8>,
+}
+
+/// Light per pixel, and which pixels the lens reaches.
+pub(crate) struct Film {
+    pub(crate) width: usize,
+    pub(crate) light: Vec<[f32; 3]>,
+    pub(crate) valid: Vec<bool>,
+}
+
+impl Film {
+    /// Blurs, exposes and quantises. Pixels that the lens does not reach are 0, without noise.
+    pub(crate) fn develop(mut self, options: &RenderOptions) -> Image {
+        if options.blur_sigma_px > 0.0 {
+            self.blur(options.blur_sigma_px);
+        }
+        let gain = match options.exposure {
+            Exposure::Fixed { gain } => gain,
+            Exposure::Auto { mean_level } => self.automatic_gain(mean_level, options.gamma),
+        };
+        let (width, height) = (self.width, self.light.len() / self.width);
+        let (mut gray, mut rgb) = (vec![0u8; width * height], vec![0u8; 3 * width * height]);
+        gray.par_chunks_mut(width).zip(rgb.par_chunks_mut(3 * width)).enumerate().for_each(
+            |(y, (gray_row, rgb_row))| {
+                // One stream of noise per row: the same bytes for any number of threads.
+                let mut dice = Dice::new(options.seed, 1 + y as u64);
+                let mut quantise = |light: f64| {
+                    let noise = if options.noise_sigma > 0.0 { options.noise_sigma * dice.normal() } else { 0.0 };
+                    (255.0 * display(gain * light, options.gamma) + noise).round().clamp(0.0, 255.0) as u8
+                };
+                for x in 0..width {
+                    if self.valid[y * width + x] {
+                        let color = self.light[y * width + x].map(f64::from);
+                        gray_row[x] = quantise(luminance(color));
+                        for c in 0..3 {
+                            rgb_row[3 * x + c] = quantise(color[c]);
+                        }
+                    }
+                }
+            },
+        );
+        Image { width_px: width, height_px: height, gray, rgb }
+    }
+
+    /// The gain for which the mean level of every seventh valid pixel is as asked, by bisection of its logarithm; no more
+    /// than keeps nine tenths of them off the shoulder.
+    fn automatic_gain(&self, mean_level: f64, gamma: f64) -> f64 {
+        let mut light: Vec<f64> = (0..self.light.len())
+            .filter(|&k| self.valid[k])
+            .step_by(7)
+            .map(|k| luminance(self.light[k].map(f64::from)))
+            .collect();
+        if light.iter().all(|&l| l <= 0.0) {
+            return 1.0;
+        }
+        let (mut low, mut high) = (-12.0f64, 12.0f64);
+        for _ in 0..24 {
+            let middle = 0.5 * (low + high);
+            let gain = middle.exp();
+            let mean = light.iter().map(|l| display(gain * l, gamma)).sum::<f64>() / light.len() as f64;
+            if mean < mean_level { low = middle } else { high = middle }
+        }
+        light.sort_by(f64::total_cmp);
+        let bright = light[light.len() * 9 / 10].max(f64::MIN_POSITIVE);
+        (0.5 * (low + high)).exp().min(SHOULDER / bright)
+    }
+
+    /// Separable Gaussian, the border repeated.
+    fn blur(&mut self, sigma: f64) {
+        let radius = (3.0 * sigma).ceil() as isize;
+        let raw: Vec<f64> = (-radius..=radius).map(|k| (-0.5 * (k as f64 / sigma).powi(2)).exp()).collect();
+        let total: f64 = raw.iter().sum();
+        let kernel: Vec<f32> = raw.iter().map(|k| (k / total) as f32).collect();
+        let (width, height) = (self.width as isize, (self.light.len() / self.width) as isize);
+        for (dx, dy) in [(1, 0), (0, 1)] {
+            let source = self.light.clone();
+            self.light.par_chunks_mut(self.width).enumerate().for_each(|(y, row)| {
+                for (x, out) in row.iter_mut().enumerate() {
+                    *out = [0.0; 3];
+                    for (k, weight) in (-radius..=radius).zip(&kernel) {
+                        let sx = (x as isize + k * dx).clamp(0, width - 1);
+                        let sy = (y as isize + k * dy).clamp(0, height - 1);
+                        let light = source[(sy * width + sx) as usize];
+                        for c in 0..3 {
+                            out[c] += weight * light[c];
+                        }
+                    }
+                }
+            });
+        }
+    }
+}
+
+/// Share of full light up to which the display curve has no shoulder.
+const SHOULDER: f64 = 0.7;
+
+/// The display level in `[0, 1]`: straight up to the shoulder, which never quite clips.
+fn display(light: f64, gamma: f64) -> f64 {
+    let light = light.max(0.0);
+    let rest = 1.0 - SHOULDER;
+    let rolled = if light < SHOULDER { light } else { 1.0 - rest * (-(light - SHOULDER) / rest).exp() };
+    rolled.powf(1.0 / gamma)
+}

@@ -1,0 +1,1 @@
+"""Orientation and calibration from the straight lines of man-made places."""

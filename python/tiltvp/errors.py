@@ -1,0 +1,21 @@
+"""The exceptions of the package: everything it raises on purpose derives from `TiltvpError`."""
+
+
+class TiltvpError(Exception):
+    """Base of every error the package raises on purpose."""
+
+
+class InvalidInputError(TiltvpError, ValueError):
+    """An argument has the wrong shape, type or value."""
+
+
+class CalibrationError(TiltvpError, ValueError):
+    """A calibration file cannot be read as what it claims to be."""
+
+
+class UnsupportedFormatError(CalibrationError):
+    """A calibration file is well formed, but its format or its lens model is not supported."""
+
+
+class CalibrationNotFoundError(CalibrationError, FileNotFoundError):
+    """There is no calibration file at that path."""

@@ -1,0 +1,129 @@
+"""Calibration files of many tools, read into `CameraSpec`s: the table of formats and the one door, `read_cameras`."""
+
+from __future__ import annotations
+
+import difflib
+import os
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Final
+
+from tiltvp.errors import InvalidInputError, UnsupportedFormatError
+from tiltvp.formats import (
+    basalt,
+    boofcv,
+    camodocal,
+    colmap,
+    fisheye_calib_adapter,
+    gyroflow,
+    kalibr,
+    libper,
+    ocamcalib,
+    omnicalib,
+    opencv,
+    orbslam3,
+    own,
+    pyocamcalib,
+    ros,
+    stella_vslam,
+    vikit,
+    woodscape,
+)
+from tiltvp.formats.document import Document
+from tiltvp.formats.own import write_toml
+from tiltvp.formats.spec import MODELS, CameraSpec, ImageSize, ModelParameters
+
+__all__ = ["FORMATS", "MODELS", "CameraSpec", "Format", "ModelParameters", "read_cameras", "write_toml"]
+
+
+@dataclass(frozen=True)
+class Format:
+    """One format: its name for `format=`, whether a document looks like it, and how it is read."""
+
+    name: str
+    recognise: Callable[[Document], bool]
+    parse: Callable[[Document, ImageSize | None], list[CameraSpec]]
+
+
+FORMATS: Final[tuple[Format, ...]] = (
+    Format("tiltvp", own.recognise, own.parse),
+    Format("ocamcalib", ocamcalib.recognise, ocamcalib.parse),
+    Format("pyocamcalib", pyocamcalib.recognise, pyocamcalib.parse),
+    Format("opencv", opencv.recognise, opencv.parse),
+    Format("opencv-pinhole", opencv.never, opencv.parse_as_pinhole),
+    Format("opencv-fisheye", opencv.never, opencv.parse_as_fisheye),
+    Format("kalibr", kalibr.recognise, kalibr.parse),
+    Format("basalt", basalt.recognise, basalt.parse),
+    Format("colmap", colmap.recognise, colmap.parse),
+    Format("ros", ros.recognise, ros.parse),
+    Format("camodocal", camodocal.recognise, camodocal.parse),
+    Format("woodscape", woodscape.recognise, woodscape.parse),
+    Format("vikit", vikit.recognise, vikit.parse),
+    Format("stella-vslam", stella_vslam.recognise, stella_vslam.parse),
+    Format("orbslam3", orbslam3.recognise, orbslam3.parse),
+    Format("boofcv", boofcv.recognise, boofcv.parse),
+    Format("fisheye-calib-adapter", fisheye_calib_adapter.recognise, fisheye_calib_adapter.parse),
+    Format("libper", libper.recognise, libper.parse),
+    Format("gyroflow", gyroflow.recognise, gyroflow.parse),
+    Format("py-omnicalib", omnicalib.recognise, omnicalib.parse),
+)
+
+
+def read_cameras(
+    path: str | os.PathLike[str], format: str | None = None, image_size: ImageSize | None = None
+) -> list[CameraSpec]:
+    """All the cameras of a calibration file, in file order.
+
+    `format` is the name of one of `FORMATS`; without it the file is recognised by its content. `image_size` is (width,
+    height) in pixels, for files that do not carry it; it may not contradict a file that does. Raises `CalibrationError`
+    with the file, what is wrong, what was expected and where; `UnsupportedFormatError`, which is one, for a format or a
+    lens model that is not supported; `CalibrationNotFoundError`, which is one and a `FileNotFoundError`.
+    """
+    size = None if image_size is None else _checked_size(image_size)
+    chosen = None if format is None else _named(format)
+    document = Document.load(path)
+    chosen = chosen or _recognised(document)
+    return [replace(spec, format=chosen.name) for spec in chosen.parse(document, size)]
+
+
+def _checked_size(image_size: ImageSize) -> ImageSize:
+    try:
+        width, height = image_size
+        size = (int(width), int(height))
+    except (TypeError, ValueError, OverflowError):
+        raise InvalidInputError(f"image_size is {image_size!r}, expected (width, height) in pixels") from None
+    if size != (width, height) or min(size) < 1:
+        raise InvalidInputError(f"image_size is {image_size!r}, expected two whole numbers above 0")
+    return size
+
+
+def _named(name: str) -> Format:
+    words = {_plain(one.name): one for one in FORMATS}
+    chosen = words.get(_plain(str(name)))
+    if chosen is None:
+        near = [words[word].name for word in difflib.get_close_matches(_plain(str(name)), words, 3)]
+        meant = f"near it: {', '.join(near)}; all: " if near else "one of "
+        raise UnsupportedFormatError(
+            f"unknown format {name!r}, expected {meant}{', '.join(one.name for one in FORMATS)}, at format="
+        )
+    return chosen
+
+
+def _plain(name: str) -> str:
+    return "".join(letter for letter in name.lower() if letter.isalnum())
+
+
+def _recognised(document: Document) -> Format:
+    fitting = [one for one in FORMATS if one.recognise(document)]
+    if len(fitting) == 1:
+        return fitting[0]
+    if fitting:
+        names = " and ".join(one.name for one in fitting)
+        document.fail(f"could be {names}", "format= to say which", "the whole file")
+    why = f" (read as keys: {document.syntax_problem})" if document.syntax_problem else ""
+    document.fail(
+        f"no known calibration format{why}",
+        "one of " + ", ".join(one.name for one in FORMATS),
+        "the whole file",
+        UnsupportedFormatError,
+    )

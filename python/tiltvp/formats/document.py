@@ -1,0 +1,169 @@
+"""A calibration file as text, and as the tree of its YAML, JSON or XML, with every syntax error turned into ours."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import xml.etree.ElementTree as ElementTree
+from collections.abc import Hashable
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Final, NoReturn
+
+import yaml  # type: ignore[import-untyped, unused-ignore]
+
+from tiltvp.errors import CalibrationError, CalibrationNotFoundError
+
+Tree = dict[str, object]
+
+_LARGEST_BYTES: Final = 4 << 20
+_OPENCV_DIRECTIVE: Final = re.compile(r"\A%YAML[: ]*[\d.]*[^\n]*")
+
+
+@dataclass(frozen=True)
+class Document:
+    """The text of one calibration file; `tree` is its content if it is YAML, JSON or XML, and empty otherwise."""
+
+    path: Path
+    text: str
+
+    @staticmethod
+    def load(path: str | os.PathLike[str]) -> Document:
+        """Reads the file; a missing, unreadable, empty, oversized or binary one is a `CalibrationError`."""
+        try:
+            file = Path(path)
+            with file.open("rb") as stream:
+                raw = stream.read(_LARGEST_BYTES + 1)
+        except FileNotFoundError:
+            raise CalibrationNotFoundError(f"{path}: no such file, expected a calibration file, at this path") from None
+        except IsADirectoryError:
+            raise CalibrationError(f"{path}: is a folder, expected a calibration file, at this path") from None
+        except (OSError, ValueError, TypeError) as error:
+            raise CalibrationError(
+                f"{path!s}: cannot be read ({error}), expected a calibration file, at this path"
+            ) from None
+        if len(raw) > _LARGEST_BYTES:
+            raise CalibrationError(
+                f"{path}: larger than {_LARGEST_BYTES} bytes, expected a calibration file, at its end"
+            )
+        try:
+            text = raw.decode("utf-8-sig")
+        except UnicodeDecodeError as error:
+            raise CalibrationError(f"{path}: is not text, expected UTF-8, at byte {error.start}") from None
+        if not text.strip():
+            raise CalibrationError(f"{path}: is empty, expected a calibration, at line 1")
+        return Document(file, text.replace("\r\n", "\n").replace("\r", "\n"))
+
+    def fail(self, problem: str, expected: str, at: str, error: type[CalibrationError] = CalibrationError) -> NoReturn:
+        """Raises `error` in the one form all the messages of the readers have."""
+        raise error(f"{self.path}: {problem}, expected {expected}, at {at}")
+
+    @property
+    def tree(self) -> Tree:
+        """The mapping at the top of the file; empty if the file is not YAML, JSON or XML, or has no mapping there."""
+        return self._parsed[0]
+
+    @property
+    def syntax_problem(self) -> str:
+        """Why `tree` is empty; an empty string if it is not."""
+        return self._parsed[1]
+
+    @property
+    def is_xml(self) -> bool:
+        """Whether the text begins as XML does."""
+        return self.text.lstrip().startswith("<")
+
+    @cached_property
+    def content_lines(self) -> list[tuple[int, list[str]]]:
+        """(line number, words) of the lines that hold something besides a `#` comment."""
+        lines = ((number, line.split("#", 1)[0].split()) for number, line in enumerate(self.text.split("\n"), 1))
+        return [(number, words) for number, words in lines if words]
+
+    @cached_property
+    def _parsed(self) -> tuple[Tree, str]:
+        try:
+            start = self.text.lstrip()[:1]
+            if start == "<":
+                tree = _from_xml(self.text)
+            elif start in "{[":
+                tree = json.loads(self.text, object_pairs_hook=_from_pairs)
+            else:
+                tree = yaml.load(_plain_yaml(self.text), Loader=_Loader)
+        except (yaml.YAMLError, ElementTree.ParseError, ValueError, LookupError, RecursionError) as error:
+            return {}, " ".join(str(error).split()) or type(error).__name__
+        if not isinstance(tree, dict):
+            return {}, f"a {type(tree).__name__} at the top"
+        return {str(key): value for key, value in tree.items()}, ""
+
+
+def _plain_yaml(text: str) -> str:
+    """OpenCV's `%YAML:1.0` line is no YAML directive, and tabs are no YAML white space: both are made harmless."""
+    return _OPENCV_DIRECTIVE.sub("#", text.replace("\t", "    "))
+
+
+class _Loader(yaml.BaseLoader):  # type: ignore[misc, unused-ignore]
+    """Reads every scalar as its text and ignores tags (`!!opencv-matrix`), so that 1e-5 is not a matter of dialect."""
+
+    def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Hashable, object]:
+        if not isinstance(node, yaml.MappingNode):
+            raise yaml.constructor.ConstructorError(None, None, "expected a mapping", node.start_mark)
+        pairs: dict[Hashable, object] = {}
+        for key_node, value_node in node.value:
+            if not isinstance(key_node, yaml.ScalarNode):
+                raise yaml.constructor.ConstructorError(None, None, "found a key that is no word", key_node.start_mark)
+            key, value = key_node.value, self.construct_object(value_node, deep=True)
+            if key in pairs and not _same(pairs[key], value):
+                raise yaml.constructor.ConstructorError(
+                    None, None, f"found the key {key!r} twice with different values", key_node.start_mark
+                )
+            pairs[key] = value
+        return pairs
+
+
+def _same(one: object, other: object) -> bool:
+    try:
+        return one == other
+    except RecursionError:
+        return False
+
+
+def _from_pairs(pairs: list[tuple[str, object]]) -> Tree:
+    tree: Tree = {}
+    for key, value in pairs:
+        if key in tree and tree[key] != value:
+            raise ValueError(f"found the key {key!r} twice with different values")
+        tree[key] = value
+    return tree
+
+
+def _from_xml(text: str) -> object:
+    if "<!DOCTYPE" in text or "<!ENTITY" in text:
+        raise ValueError("found a document type declaration")
+    root = ElementTree.fromstring(text)
+    return {root.tag: _from_element(root)}
+
+
+def _from_element(element: ElementTree.Element) -> object:
+    """A leaf is its text, `_` children are a list (OpenCV), and so are children that repeat a name."""
+    children = list(element)
+    if not children:
+        return (element.text or "").strip()
+    if all(child.tag == "_" for child in children):
+        return [_from_element(child) for child in children]
+    tree: Tree = {}
+    for child in children:
+        value = _from_element(child)
+        earlier = tree.get(child.tag)
+        if child.tag not in tree:
+            tree[child.tag] = value
+        elif isinstance(earlier, _Repeated):
+            earlier.append(value)
+        else:
+            tree[child.tag] = _Repeated([earlier, value])
+    return tree
+
+
+class _Repeated(list[object]):
+    """The values of XML siblings of one name, in file order."""

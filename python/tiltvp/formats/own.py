@@ -1,0 +1,141 @@
+"""Our own TOML: every number of a `CameraSpec` comes back with the same bits.
+
+format = "tiltvp-camera"
+version = 1
+[[camera]]
+name = "cam0"
+model = "equidistant"
+width = 640
+height = 480
+[camera.parameters]
+focal_px = 139.7
+cx = 319.5
+cy = 239.5
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import secrets
+import tomllib
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Final
+
+import tomli_w
+
+from tiltvp.errors import CalibrationError
+from tiltvp.formats.document import Document
+from tiltvp.formats.node import Node
+from tiltvp.formats.spec import MODELS, CameraSpec, ImageSize, Parameters, first_fault
+
+_FORMAT: Final = "tiltvp-camera"
+_VERSION: Final = 1
+_MARK: Final = re.compile(r"^\s*format\s*=\s*[\"']tiltvp-camera[\"']", re.MULTILINE)
+_KEYS: Final = ("name", "model", "width", "height", "mirror", "max_theta_rad", "notes", "parameters")
+
+
+def recognise(document: Document) -> bool:
+    """It says `format = "tiltvp-camera"`."""
+    return _MARK.search(document.text) is not None
+
+
+def parse(document: Document, image_size: ImageSize | None) -> list[CameraSpec]:
+    """The cameras of the file, in file order."""
+    try:
+        tree = tomllib.loads(document.text)
+    except (ValueError, RecursionError) as error:
+        document.fail(f"is not TOML ({error})", "a file written by tiltvp", "the place named")
+    root = Node(document, tree)
+    root.only("format", "version", "camera")
+    if root.need("format").text() != _FORMAT:
+        root.need("format").fail(f"found {root.need('format').text()!r}", _FORMAT)
+    version = root.need("version")
+    if version.integer() != _VERSION:
+        version.refuse(f"version {version.integer()} is not supported", f"version {_VERSION}")
+    cameras = root.need("camera").items()
+    if not cameras:
+        root.fail("there is no camera", "one or more [[camera]]")
+    return [_camera(camera, image_size) for camera in cameras]
+
+
+def write_toml(spec: CameraSpec | Sequence[CameraSpec], path: str | os.PathLike[str]) -> None:
+    """Writes one camera, or several, to `path`; the file appears whole or not at all."""
+    specs = [spec] if isinstance(spec, CameraSpec) else list(spec)
+    if not specs:
+        raise CalibrationError(f"{path}: there is no camera to write, expected one or more, at spec")
+    for one in specs:
+        fault = first_fault(_as_floats(one))
+        if fault is not None:
+            raise CalibrationError(f"{path}: {fault[0]}, expected {fault[1]}, at {fault[2]}")
+    tree = {"format": _FORMAT, "version": _VERSION, "camera": [_table(_as_floats(one)) for one in specs]}
+    _write_whole(Path(path), tomli_w.dumps(tree).encode("utf-8"))
+
+
+def _camera(camera: Node, given: ImageSize | None) -> CameraSpec:
+    camera.only(*_KEYS)
+    model = camera.need("model")
+    known = MODELS.get(model.text())
+    if known is None:
+        model.refuse(f"the model {model.text()!r} is not supported", "one of " + ", ".join(MODELS))
+    size = camera.image_size(given, camera.need("width"), camera.need("height"), "the file")
+    group = camera.need("parameters")
+    group.only(*known.names)
+    parameters: Parameters = {}
+    for key in group.tree:
+        value = group.need(key)
+        parameters[key] = value.numbers() if key in known.lists else value.number()
+    name, mirror = camera.get("name"), camera.get("mirror")
+    limit, notes = camera.get("max_theta_rad"), camera.get("notes")
+    if name is not None and not isinstance(name.value, str):
+        name.text()
+    spec = replace(
+        group.spec(model.text(), size, parameters, str(name.value) if name else "cam0"),
+        mirror=mirror.flag() if mirror else False,
+        max_theta_rad=limit.number() if limit else None,
+        notes=tuple(str(note.value) for note in notes.items()) if notes else (),
+    )
+    fault = first_fault(spec)
+    if fault is not None:
+        camera.document.fail(fault[0], fault[1], f"{camera.at}.{fault[2]}")
+    return spec
+
+
+def _as_floats(spec: CameraSpec) -> CameraSpec:
+    parameters: Parameters = {
+        key: [float(number) for number in value] if isinstance(value, list | tuple) else float(value)
+        for key, value in spec.parameters.items()
+    }
+    limit = None if spec.max_theta_rad is None else float(spec.max_theta_rad)
+    return replace(spec, width=int(spec.width), height=int(spec.height), parameters=parameters, max_theta_rad=limit)
+
+
+def _table(spec: CameraSpec) -> dict[str, object]:
+    table: dict[str, object] = {"name": spec.name, "model": spec.model, "width": spec.width, "height": spec.height}
+    if spec.mirror:
+        table["mirror"] = True
+    if spec.max_theta_rad is not None:
+        table["max_theta_rad"] = spec.max_theta_rad
+    if spec.notes:
+        table["notes"] = list(spec.notes)
+    table["parameters"] = dict(spec.parameters)
+    return table
+
+
+def _write_whole(path: Path, content: bytes) -> None:
+    target = Path(os.path.realpath(path))
+    beside = target.with_name(f".{target.name}.{secrets.token_hex(8)}.part")
+    try:
+        with open(beside, "xb") as stream:
+            stream.write(content)
+            stream.flush()
+            os.fsync(stream.fileno())
+        os.replace(beside, target)
+    except OSError as error:
+        raise CalibrationError(
+            f"{path}: cannot be written ({error}), expected a writable place, at this path"
+        ) from None
+    finally:
+        beside.unlink(missing_ok=True)
