@@ -20,7 +20,7 @@ mod _core {
     #[pymodule_export]
     use crate::tilt::{
         CommonDirection, EdgeElements, TiltEstimate, TiltEstimator, common_direction, level_map,
-        tilt_error_rad,
+        normal_from_alpha_beta, tilt_error_rad,
     };
 
     #[pymodule_init]

@@ -194,3 +194,16 @@ pub(crate) fn level_map<'py>(
 pub(crate) fn tilt_error_rad(a: &Bound<'_, PyAny>, b: &Bound<'_, PyAny>) -> PyResult<f64> {
     Ok(tilt_from(a, "a")?.angle_to(&tilt_from(b, "b")?))
 }
+
+/// `(3,)` ground normal of a lean, eq. 1.
+#[pyfunction]
+pub(crate) fn normal_from_alpha_beta(
+    py: Python<'_>,
+    alpha_rad: f64,
+    beta_rad: f64,
+) -> PyResult<Bound<'_, PyArray1<f64>>> {
+    if !(alpha_rad.is_finite() && beta_rad.is_finite()) {
+        return Err(invalid(format!("alpha_rad, beta_rad = {alpha_rad}, {beta_rad}, expected finite angles")));
+    }
+    Ok(PyArray1::from_slice(py, Tilt::from_alpha_beta(alpha_rad, beta_rad).normal().as_slice()))
+}
