@@ -201,9 +201,11 @@ impl TiltEstimator {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads.min(images.len())).build().map_err(|error| {
             Error::option("threads", format!("{threads} ({error})"), "a number that the system can start")
         })?;
-        pool.install(|| {
+        // Collected in order first: a parallel collection into a `Result` returns whichever error it meets first.
+        let answers: Vec<Result<TiltEstimate>> = pool.install(|| {
             images.par_iter().map_init(|| self.scratch(), |scratch, image| self.estimate(image, scratch)).collect()
-        })
+        });
+        answers.into_iter().collect()
     }
 
     /// The edge pixels of the image that `scratch` has last seen.

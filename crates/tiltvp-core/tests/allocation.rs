@@ -1,0 +1,115 @@
+//! After the first image an estimate takes no memory from the heap, whatever the image.
+
+#![allow(clippy::unwrap_used)]
+
+mod scene;
+
+use std::alloc::{GlobalAlloc, Layout, System};
+use std::cell::Cell;
+
+use nalgebra::Matrix3;
+use scene::{constant, fisheye, noise, stripes};
+use tiltvp_core::camera::Camera;
+use tiltvp_core::edges::NormalKind;
+use tiltvp_core::geometry::Tilt;
+use tiltvp_core::tilt::{Correction, METHODS, Method, TiltEstimator, TiltOptions};
+
+thread_local! {
+    static ALLOCATIONS: Cell<usize> = const { Cell::new(0) };
+}
+
+/// The system's allocator, counting the requests of each thread.
+struct Counting;
+
+fn count() {
+    // While a thread ends its counter is gone, and nothing is measured.
+    let _ = ALLOCATIONS.try_with(|n| n.set(n.get() + 1));
+}
+
+// SAFETY: every call is handed to the system's allocator as it came.
+unsafe impl GlobalAlloc for Counting {
+    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
+        count();
+        // SAFETY: the caller's promises are those that `System` asks for.
+        unsafe { System.alloc(layout) }
+    }
+
+    unsafe fn alloc_zeroed(&self, layout: Layout) -> *mut u8 {
+        count();
+        // SAFETY: as above.
+        unsafe { System.alloc_zeroed(layout) }
+    }
+
+    unsafe fn realloc(&self, place: *mut u8, layout: Layout, size: usize) -> *mut u8 {
+        count();
+        // SAFETY: as above.
+        unsafe { System.realloc(place, layout, size) }
+    }
+
+    unsafe fn dealloc(&self, place: *mut u8, layout: Layout) {
+        // SAFETY: as above.
+        unsafe { System.dealloc(place, layout) }
+    }
+}
+
+#[global_allocator]
+static COUNTING: Counting = Counting;
+
+fn allocations(work: impl FnOnce()) -> usize {
+    let before = ALLOCATIONS.get();
+    work();
+    ALLOCATIONS.get() - before
+}
+
+/// The defaults of every method, and every choice that runs other code.
+fn choices() -> Vec<TiltOptions> {
+    let mut all: Vec<_> = METHODS.map(|name| TiltOptions::for_method(name).unwrap()).into();
+    for options in all.clone() {
+        let mut other = options;
+        match &mut other.method {
+            Method::ImageSpaceRansac { correction, .. } | Method::ImageSpaceRejectRefit { correction, .. } => {
+                *correction = Correction::None;
+            }
+            Method::VectorConsensus { normal, factor, .. } => (*normal, *factor) = (NormalKind::Tangent, 1.7),
+            Method::Refined(_) => other.edges.smoothing_px = 2.0,
+        }
+        // Every pixel of a noisy image is an edge.
+        other.edges.gradient_min = 1e-3;
+        other.tilt_max_rad = Some(1.5);
+        all.push(other);
+    }
+    all
+}
+
+fn camera() -> Camera {
+    fisheye(200)
+}
+
+#[test]
+fn no_estimate_after_the_first_allocates() {
+    let camera = camera();
+    let few = stripes(&camera, &Matrix3::identity(), &Tilt::from_alpha_beta(0.05, 1.0), 5, 0.0, 1);
+    let many = stripes(&camera, &Matrix3::identity(), &Tilt::from_alpha_beta(0.05, 1.0), 40, 3.0, 1);
+    let images = [constant(&camera, 128.0), few, many, noise(&camera, 7), noise(&camera, 8)];
+    for options in choices() {
+        let estimator = TiltEstimator::new(camera.clone(), Matrix3::identity(), options).unwrap();
+        let mut scratch = estimator.scratch();
+        // The first image has no edge at all: nothing can have grown to fit the next.
+        estimator.estimate(&images[0].view(), &mut scratch).unwrap();
+        let mut most = 0;
+        for (i, image) in images.iter().enumerate() {
+            let mut edges = 0;
+            let taken = allocations(|| edges = estimator.estimate(&image.view(), &mut scratch).unwrap().edge_pixels);
+            assert_eq!(taken, 0, "image {i}, {edges} edge pixels, {:?}", estimator.options());
+            let listed = allocations(|| assert_eq!(estimator.elements(&scratch).count(), edges));
+            assert_eq!(listed, 0, "elements of image {i}");
+            most = most.max(edges);
+        }
+        assert!(most * 10 > estimator.region_pixels() * 4, "{most} of {} pixels", estimator.region_pixels());
+    }
+}
+
+#[test]
+fn the_counter_counts() {
+    assert_eq!(allocations(|| drop(std::hint::black_box(vec![1u8; 100]))), 1);
+}
