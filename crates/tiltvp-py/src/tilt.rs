@@ -207,3 +207,13 @@ pub(crate) fn normal_from_alpha_beta(
     }
     Ok(PyArray1::from_slice(py, Tilt::from_alpha_beta(alpha_rad, beta_rad).normal().as_slice()))
 }
+
+/// `(3, 3)` rotation from the upright robot's frame to the leaning one's, without a turn about the vertical.
+#[pyfunction]
+pub(crate) fn leaning_from_upright<'py>(
+    py: Python<'py>,
+    normal: &Bound<'py, PyAny>,
+) -> PyResult<Bound<'py, PyArray2<f64>>> {
+    let rotation = tilt_from(normal, "normal")?.leaning_from_upright();
+    PyArray1::from_slice(py, rotation.transpose().as_slice()).reshape([3, 3])
+}
