@@ -56,8 +56,24 @@ pub struct Scratch {
     trimmed: Vec<f32>,
     /// Place of each row among the edge pixels.
     places: Vec<u32>,
-    /// The model and threshold that tell the inliers of the last image.
-    inliers: Option<([f64; 3], f64)>,
+    inliers: Inliers,
+}
+
+/// What tells the inliers of the last image.
+#[derive(Debug, Clone, Copy)]
+enum Inliers {
+    /// There was no fit.
+    None,
+    /// The rows with a weight above zero.
+    Weighted,
+    /// The rows with a residual of at most the threshold.
+    Within { model: [f64; 3], threshold: f64 },
+}
+
+impl Inliers {
+    fn weighted_if(found: bool) -> Self {
+        if found { Self::Weighted } else { Self::None }
+    }
 }
 
 /// A fit in the parameters of its rows, on the way to an estimate.
@@ -156,7 +172,7 @@ impl TiltEstimator {
             weights: Vec::with_capacity(n),
             trimmed: Vec::with_capacity(n),
             places: Vec::with_capacity(n),
-            inliers: None,
+            inliers: Inliers::None,
         }
     }
 
@@ -254,7 +270,7 @@ impl TiltEstimator {
             }
             Method::VectorConsensus { .. } | Method::Refined(_) => return Fit::none(),
         };
-        scratch.inliers = None;
+        scratch.inliers = Inliers::weighted_if(report.model.is_some());
         let shift = report.model.unwrap_or_default();
         let (l, alpha) = (shift.norm(), shift.norm() / factor);
         let lean = if l > 0.0 { centre.lean(&(shift / l)) } else { upright };
@@ -277,19 +293,20 @@ impl TiltEstimator {
     fn fit_normals(&self, table: &LiftTable, scratch: &mut Scratch) -> Fit {
         let Scratch { edges, rows, weights, places, trimmed, inliers, .. } = &mut *scratch;
         table.lift(edges, self.options.normal_tilt_max_rad().sin(), rows, weights, places);
-        *inliers = None;
         let (report, gate, factor) = match &self.options.method {
             Method::VectorConsensus { threshold_rad, factor, .. } => {
                 weights.fill(1.0);
                 let report =
                     vector_consensus(rows, &self.robot_from_camera, *threshold_rad, self.options.seed, weights);
+                *inliers = Inliers::weighted_if(report.model.is_some());
                 (report, Gate::Open, *factor)
             }
             Method::Refined(options) => {
                 let report = refine(rows, options, weights, trimmed);
-                if let Some(direction) = report.model {
-                    *inliers = Some((direction.into(), 2.0 * options.scale_rad));
-                }
+                *inliers = report.model.map_or(Inliers::None, |direction| Inliers::Within {
+                    model: direction.into(),
+                    threshold: 2.0 * options.scale_rad,
+                });
                 (report, Gate::Soft { scale: options.scale_rad }, 1.0)
             }
             Method::ImageSpaceRansac { .. } | Method::ImageSpaceRejectRefit { .. } => return Fit::none(),
@@ -302,7 +319,10 @@ impl TiltEstimator {
             model: report.model.unwrap_or_default().into(),
             gate,
             horizontal: Matrix2::identity() / factor,
-            inliers: inliers.map_or(report.inliers, |(model, threshold)| rows.count_within(model, threshold)),
+            inliers: match *inliers {
+                Inliers::Within { model, threshold } => rows.count_within(model, threshold),
+                Inliers::None | Inliers::Weighted => report.inliers,
+            },
             shift_px: None,
             rms: report.rms,
             iterations: report.iterations,
@@ -346,9 +366,10 @@ impl TiltEstimator {
 impl Scratch {
     /// Whether a row agreed with the last estimate.
     fn is_inlier(&self, row: usize) -> bool {
-        match (self.inliers, self.rows.get(row)) {
-            (Some((model, threshold)), Some(row)) => row.dot(&Vector3::from(model)).abs() <= threshold,
-            _ => self.weights.get(row).is_some_and(|weight| *weight > 0.0),
+        match self.inliers {
+            Inliers::None => false,
+            Inliers::Weighted => self.weights.get(row).is_some_and(|weight| *weight > 0.0),
+            Inliers::Within { model, threshold } => self.rows.is_within(row, model, threshold),
         }
     }
 }
