@@ -10,7 +10,7 @@ use super::options::{Method, TiltOptions};
 use super::refine::refine;
 use super::vector_consensus::vector_consensus;
 use crate::camera::Camera;
-use crate::edges::{Detector, EdgePixels, LiftTable, NormalKind, Region};
+use crate::edges::{Detector, EdgeOptions, EdgePixels, LiftTable, NormalKind, Region};
 use crate::error::{Error, Result};
 use crate::geometry::{Tilt, tangent_basis};
 use crate::image::ImageView;
@@ -50,6 +50,8 @@ enum Tables {
 #[derive(Debug, Clone)]
 pub struct Scratch {
     detector: Detector,
+    /// What the memory and the detector were made for.
+    made_for: Extent,
     edges: EdgePixels,
     rows: Rows<f32>,
     weights: Vec<f32>,
@@ -57,6 +59,14 @@ pub struct Scratch {
     /// Place of each row among the edge pixels.
     places: Vec<u32>,
     inliers: Inliers,
+}
+
+/// What an estimator's scratch depends on.
+#[derive(Debug, Clone, PartialEq)]
+struct Extent {
+    pixels: usize,
+    columns: std::ops::Range<usize>,
+    edges: EdgeOptions,
 }
 
 /// What tells the inliers of the last image.
@@ -167,6 +177,7 @@ impl TiltEstimator {
         let n = self.region.len();
         Scratch {
             detector: Detector::new(&self.region, &self.options.edges),
+            made_for: self.extent(),
             edges: EdgePixels::with_capacity(n),
             rows: Rows::with_capacity(n),
             weights: Vec::with_capacity(n),
@@ -176,10 +187,15 @@ impl TiltEstimator {
         }
     }
 
+    fn extent(&self) -> Extent {
+        Extent { pixels: self.region.len(), columns: self.region.columns(), edges: self.options.edges }
+    }
+
     /// The tilt of one image. An image without enough edges has an estimate without a tilt, not an error.
     ///
     /// # Errors
-    /// [`Error::InvalidArgument`] if the image has another size than the camera's.
+    /// [`Error::InvalidArgument`] if the image has another size than the camera's, or the scratch is that of an estimator
+    /// with another camera or other edge options.
     pub fn estimate(&self, image: &ImageView<'_>, scratch: &mut Scratch) -> Result<TiltEstimate> {
         let (width, height) = (self.camera.width() as usize, self.camera.height() as usize);
         if (image.width(), image.height()) != (width, height) {
@@ -188,6 +204,9 @@ impl TiltEstimator {
                 format!("{} x {} pixels", image.height(), image.width()),
                 format!("{height} x {width} (rows x columns), as the camera's images"),
             ));
+        }
+        if scratch.made_for != self.extent() {
+            return Err(Error::argument("scratch", "that of another estimator", "one made by this estimator"));
         }
         scratch.detector.detect(image, &self.region, &mut scratch.edges);
         let fit = match &self.tables {
