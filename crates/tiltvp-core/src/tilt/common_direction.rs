@@ -73,10 +73,9 @@ pub fn common_direction(
     let refining = RefineOptions { scale_rad: options.sigma_rad, ..RefineOptions::default() };
     let report = refine(&rows, &refining, &mut row_weights, &mut Vec::new());
     let found = report.model.filter(|o| o.z >= options.max_angle_rad.cos());
-    let stop = if report.model.is_some() && found.is_none() {
-        Stop::NoModel { trials: report.iterations }
-    } else {
-        report.stop
+    let stop = match (report.model, found) {
+        (Some(o), None) => Stop::OutOfReach { angle_rad: o.xy().norm().atan2(o.z), limit_rad: options.max_angle_rad },
+        _ => report.stop,
     };
     let Some(upright) = found else {
         return Ok(CommonDirection {
@@ -89,7 +88,7 @@ pub fn common_direction(
         });
     };
     let direction = upright_from_user.inverse() * upright;
-    let reach = (3.0 * options.sigma_rad).sin();
+    let reach = (3.0 * options.sigma_rad).min(std::f64::consts::FRAC_PI_2).sin();
     // Each normal is its own cluster: the user's normals are whole edges, not pixels.
     let gate = Gate::Soft { scale: options.sigma_rad };
     let (mut information, mut spread) = (Matrix2::zeros(), Matrix2::zeros());

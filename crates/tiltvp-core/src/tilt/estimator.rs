@@ -1,5 +1,7 @@
 //! From an image to a tilt: the tables of a camera, made once, and the scratch of a thread, grown once.
 
+use std::f64::consts::FRAC_PI_2;
+
 use nalgebra::{Matrix2, Matrix3, Vector2, Vector3};
 
 use super::confidence::{self, SECTORS};
@@ -128,7 +130,7 @@ impl TiltEstimator {
                     Correction::ClosedForm => closed_form_gains(&camera, &robot_from_camera, &region, centre),
                 };
                 let offset_max_px = options.tilt_max_rad.map_or(*offset_max_px, |tilt| tilt * factor);
-                if offset_max_px / factor >= std::f64::consts::FRAC_PI_2 {
+                if offset_max_px / factor >= FRAC_PI_2 {
                     return Err(Error::option(
                         "correction",
                         factor,
@@ -268,6 +270,7 @@ impl TiltEstimator {
 
     /// Paper 000 section 2.1.
     fn fit_offsets(&self, gains: &[f32], factor: f64, offset_max_px: f64, scratch: &mut Scratch) -> Fit {
+        scratch.inliers = Inliers::None;
         let Some(centre) = &self.centre else { return Fit::none() };
         let Scratch { edges, rows, weights, places, .. } = &mut *scratch;
         offsets(edges, &self.region, centre, gains, offset_max_px, rows, weights, places);
@@ -289,9 +292,12 @@ impl TiltEstimator {
             }
             Method::VectorConsensus { .. } | Method::Refined(_) => return Fit::none(),
         };
-        scratch.inliers = Inliers::weighted_if(report.model.is_some());
         let shift = report.model.unwrap_or_default();
         let (l, alpha) = (shift.norm(), shift.norm() / factor);
+        if alpha >= FRAC_PI_2 {
+            return Fit::out_of_reach(alpha, &report);
+        }
+        scratch.inliers = Inliers::weighted_if(report.model.is_some());
         let lean = if l > 0.0 { centre.lean(&(shift / l)) } else { upright };
         let lean = lean.try_normalize(1e-9).unwrap_or_default() * alpha.sin();
         let tilt = report.model.and_then(|_| Tilt::from_normal(&Vector3::new(lean.x, lean.y, alpha.cos())));
@@ -311,6 +317,7 @@ impl TiltEstimator {
     /// Paper 000 section 2.2, and the refined method.
     fn fit_normals(&self, table: &LiftTable, scratch: &mut Scratch) -> Fit {
         let Scratch { edges, rows, weights, places, trimmed, inliers, .. } = &mut *scratch;
+        *inliers = Inliers::None;
         table.lift(edges, self.options.normal_tilt_max_rad().sin(), rows, weights, places);
         let (report, gate, factor) = match &self.options.method {
             Method::VectorConsensus { threshold_rad, factor, .. } => {
@@ -330,7 +337,12 @@ impl TiltEstimator {
             }
             Method::ImageSpaceRansac { .. } | Method::ImageSpaceRejectRefit { .. } => return Fit::none(),
         };
-        let tilt = report.model.and_then(|normal| Tilt::from_normal(&normal)).map(|tilt| {
+        let tilt = report.model.and_then(|normal| Tilt::from_normal(&normal));
+        if let Some(alpha) = tilt.map(|tilt| tilt.alpha_rad() / factor).filter(|alpha| *alpha >= FRAC_PI_2) {
+            *inliers = Inliers::None;
+            return Fit::out_of_reach(alpha, &report);
+        }
+        let tilt = tilt.map(|tilt| {
             if factor == 1.0 { tilt } else { Tilt::from_alpha_beta(tilt.alpha_rad() / factor, tilt.beta_rad()) }
         });
         Fit {
@@ -394,6 +406,12 @@ impl Scratch {
 }
 
 impl Fit {
+    /// A fit with a lean that no image of a band of elevations can show.
+    fn out_of_reach<M>(alpha: f64, report: &FitReport<M>) -> Self {
+        let stop = Stop::OutOfReach { angle_rad: alpha, limit_rad: FRAC_PI_2 };
+        Self { iterations: report.iterations, stop, ..Self::none() }
+    }
+
     /// No fit at all: the method has no tables of this kind.
     fn none() -> Self {
         Self {
