@@ -91,6 +91,12 @@ impl<T: Real> Rows<T> {
         T::count(self.columns(), model.map(T::from_f64), T::from_f64(threshold * threshold))
     }
 
+    /// Whether row `index` has a residual of at most `threshold`, in the arithmetic of [`count_within`](Self::count_within).
+    pub fn is_within(&self, index: usize, model: [f64; 3], threshold: f64) -> bool {
+        let row = self.columns().map(|column| column.get(index..=index).unwrap_or(&[]));
+        T::count(row, model.map(T::from_f64), T::from_f64(threshold * threshold)) == 1
+    }
+
     /// Applies a gate about a model to the weights and takes the moments of what is left.
     pub fn moments(&self, model: [f64; 3], gate: Gate, weights: &mut [f32]) -> Moments {
         let (limit, inverse) = gate.coefficients();
