@@ -46,6 +46,7 @@ impl From<core::TiltEstimate> for TiltEstimate {
             Stop::IterationLimit { .. } => "iteration-limit",
             Stop::TooFew { .. } => "too-few",
             Stop::NoModel { .. } => "no-model",
+            Stop::OutOfReach { .. } => "out-of-reach",
         };
         Self {
             tilt: estimate.tilt,
