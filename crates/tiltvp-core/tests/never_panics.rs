@@ -10,8 +10,8 @@ use std::sync::LazyLock;
 
 use nalgebra::{Matrix3, Rotation3, Vector3};
 use proptest::prelude::*;
-use scene::{Image, constant, dice, fisheye, noise, stripes};
-use tiltvp_core::camera::{Camera, Equidistant, Model, Parameter};
+use scene::{Image, constant, dice, fisheye, noise, shrunk, stripes};
+use tiltvp_core::camera::{Camera, Equidistant, Model};
 use tiltvp_core::edges::{EdgeOptions, Mask, NormalKind};
 use tiltvp_core::geometry::Tilt;
 use tiltvp_core::image::ImageView;
@@ -21,32 +21,7 @@ use tiltvp_core::tilt::{
 };
 
 /// The lenses of the zoo over images of a few thousand pixels: what is in pixels shrinks with them.
-static SMALL: LazyLock<Vec<Camera>> = LazyLock::new(|| zoo().iter().map(|(_, camera)| small(camera)).collect());
-
-fn small(camera: &Camera) -> Camera {
-    let factor = 90.0 / f64::from(camera.width().max(camera.height()));
-    let size = |side: u32| (f64::from(side) * factor).round() as u32;
-    let (width, height) = (size(camera.width()), size(camera.height()));
-    let name = camera.model().name();
-    let mut parameters: Vec<_> =
-        camera.model().parameters().into_iter().map(|(name, value)| (name.to_owned(), value)).collect();
-    for (key, value) in &mut parameters {
-        match (key.as_str(), value) {
-            ("cx" | "cy" | "fx" | "fy" | "focal_px" | "skew", Parameter::Scalar(x)) => *x *= factor,
-            ("k1" | "k2" | "k3" | "k4", Parameter::Scalar(x)) if name == "radial_polynomial" => *x *= factor,
-            ("polynomial", Parameter::List(list)) => {
-                for (i, a) in list.iter_mut().enumerate() {
-                    *a *= factor.powi(1 - i as i32);
-                }
-            }
-            ("inverse_polynomial", Parameter::List(list)) => list.iter_mut().for_each(|a| *a *= factor),
-            _ => {}
-        }
-    }
-    let model = Model::from_parameters(name, width, height, &parameters).unwrap();
-    let small = Camera::new(width, height, model).unwrap();
-    if camera.is_mirrored() { small.mirrored() } else { small }
-}
+static SMALL: LazyLock<Vec<Camera>> = LazyLock::new(|| zoo().iter().map(|(_, camera)| shrunk(camera, 90)).collect());
 
 fn cameras() -> impl Strategy<Value = Camera> {
     let constructed = (1u32..90, 1u32..90, 0.5..80.0f64, -20.0..110.0f64, -20.0..110.0f64, 0.1..PI, any::<bool>())
