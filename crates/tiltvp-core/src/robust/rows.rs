@@ -88,13 +88,44 @@ impl<T: Real> Rows<T> {
 
     /// How many rows have a residual of at most `threshold`.
     pub fn count_within(&self, model: [f64; 3], threshold: f64) -> usize {
-        T::count(self.columns(), model.map(T::from_f64), T::from_f64(threshold * threshold))
+        self.count_to_beat(model, threshold, 0)
+    }
+
+    /// [`count_within`](Self::count_within) that stops as soon as it cannot exceed `to_beat`, with some count up to that.
+    pub fn count_to_beat(&self, model: [f64; 3], threshold: f64, to_beat: usize) -> usize {
+        let (model, limit) = (model.map(T::from_f64), T::from_f64(threshold * threshold));
+        let mut count = 0;
+        for start in (0..self.len).step_by(COUNTED) {
+            let end = (start + COUNTED).min(self.len);
+            count += T::count(self.columns().map(|column| &column[start..end]), model, limit);
+            if count + (self.len - end) <= to_beat {
+                break;
+            }
+        }
+        count
     }
 
     /// Whether row `index` has a residual of at most `threshold`, in the arithmetic of [`count_within`](Self::count_within).
     pub fn is_within(&self, index: usize, model: [f64; 3], threshold: f64) -> bool {
         let row = self.columns().map(|column| column.get(index..=index).unwrap_or(&[]));
         T::count(row, model.map(T::from_f64), T::from_f64(threshold * threshold)) == 1
+    }
+
+    /// Calls `visit(row, [weight, x, y, residual])` for each row whose weight, multiplied by the gate about a model, is above
+    /// zero.
+    pub fn for_each_gated(&self, model: [f64; 3], gate: Gate, weights: &[f32], mut visit: impl FnMut(usize, [f64; 4])) {
+        let [x, y, z] = self.columns();
+        let (limit, inverse) = gate.coefficients();
+        for (row, (((x, y), z), weight)) in x.iter().zip(y).zip(z).zip(weights).enumerate() {
+            let (x, y, z) = (x.to_f64(), y.to_f64(), z.to_f64());
+            let d = x * model[0] + y * model[1] + z * model[2];
+            let t = 1.0 - d * d * inverse;
+            if *weight > 0.0 && t > 0.0 && d * d <= limit {
+                let t = t * t;
+                let t = t * t;
+                visit(row, [f64::from(*weight) * (t * t), x, y, d]);
+            }
+        }
     }
 
     /// Applies a gate about a model to the weights and takes the moments of what is left.
@@ -155,6 +186,9 @@ impl Moments {
         map * Matrix3::new(xx, xy, xd, xy, yy, yd, xd, yd, dd) * map.transpose()
     }
 }
+
+/// Rows that are counted before looking whether the count can still matter.
+const COUNTED: usize = 2048;
 
 /// Rows added up in the rows' own precision before they are added in double precision.
 const BLOCK: usize = 512;

@@ -22,27 +22,23 @@ pub(super) fn clustered_covariance<T: Real>(
     model: [f64; 3],
     gate: Gate,
     weights: &[f32],
-    sectors: impl Iterator<Item = u8>,
+    sector: impl Fn(usize) -> u8,
 ) -> Option<Matrix2<f64>> {
     let mut scores = [Vector2::<f64>::zeros(); SECTORS];
-    let mut held = [0.0f64; SECTORS];
-    let mut information = Matrix2::<f64>::zeros();
-    for ((row, weight), sector) in rows.iter().zip(weights).zip(sectors) {
-        let d = row.x * model[0] + row.y * model[1] + row.z * model[2];
-        let weight = f64::from(*weight) * gate.weight(d);
-        if weight > 0.0 {
-            let xy = row.xy();
-            let sector = usize::from(sector) % SECTORS;
-            scores[sector] += xy * (weight * d);
-            held[sector] += weight;
-            information += xy * xy.transpose() * weight;
-        }
-    }
-    let occupied = held.iter().filter(|h| **h > 0.0).count() as f64;
+    let mut held = [false; SECTORS];
+    let [mut xx, mut xy, mut yy] = [0.0; 3];
+    rows.for_each_gated(model, gate, weights, |row, [weight, x, y, d]| {
+        let (wx, wy) = (weight * x, weight * y);
+        (xx, xy, yy) = (xx + wx * x, xy + wx * y, yy + wy * y);
+        let sector = usize::from(sector(row)) % SECTORS;
+        scores[sector] += Vector2::new(wx, wy) * d;
+        held[sector] = true;
+    });
+    let occupied = held.iter().filter(|held| **held).count() as f64;
     if occupied < 3.0 {
         return None;
     }
-    let inverse = information.try_inverse()?;
+    let inverse = Matrix2::new(xx, xy, xy, yy).try_inverse()?;
     let spread: Matrix2<f64> = scores.iter().map(|g| g * g.transpose()).sum();
     let covariance = inverse * spread * inverse * (occupied / (occupied - 2.0));
     covariance.iter().all(|x| x.is_finite()).then_some(covariance)
