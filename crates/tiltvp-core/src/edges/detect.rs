@@ -4,6 +4,7 @@ use multiversion::multiversion;
 
 use super::options::EdgeOptions;
 use super::region::Region;
+use super::screen::Screen;
 use crate::image::{ImageView, Smoother};
 
 /// Edge pixels in structure-of-arrays form, in slot order.
@@ -13,12 +14,13 @@ pub struct EdgePixels {
     gx: Vec<f32>,
     gy: Vec<f32>,
     len: usize,
+    strong: usize,
 }
 
 impl EdgePixels {
     /// No pixels, with room for `capacity` of them.
     pub fn with_capacity(capacity: usize) -> Self {
-        Self { slot: vec![0; capacity], gx: vec![0.0; capacity], gy: vec![0.0; capacity], len: 0 }
+        Self { slot: vec![0; capacity], gx: vec![0.0; capacity], gy: vec![0.0; capacity], len: 0, strong: 0 }
     }
 
     /// How many there are.
@@ -29,6 +31,11 @@ impl EdgePixels {
     /// Whether there are none.
     pub fn is_empty(&self) -> bool {
         self.len == 0
+    }
+
+    /// How many pixels had a strong gradient, those included that a screen has kept out.
+    pub fn strong(&self) -> usize {
+        self.strong
     }
 
     /// Number of each pixel within the region.
@@ -51,6 +58,7 @@ impl EdgePixels {
         self.make_room(self.len + 1);
         (self.slot[self.len], self.gx[self.len], self.gy[self.len]) = (slot, gx, gy);
         self.len += 1;
+        self.strong += 1;
     }
 
     fn make_room(&mut self, capacity: usize) {
@@ -89,14 +97,15 @@ impl Detector {
         }
     }
 
-    /// Writes the pixels of the region with a gradient magnitude of at least `gradient_min`, in slot order.
+    /// Writes the pixels of the region with a gradient magnitude of at least `gradient_min` that pass the screen, in slot
+    /// order.
     ///
     /// The image must have the size of the camera that the region was made for. Grows no vector that has room for the
     /// whole region.
-    pub fn detect(&mut self, image: &ImageView<'_>, region: &Region, out: &mut EdgePixels) {
+    pub fn detect(&mut self, image: &ImageView<'_>, region: &Region, screen: Option<&Screen>, out: &mut EdgePixels) {
         out.make_room(region.len());
         let (slots, gxs, gys) = (&mut out.slot[..], &mut out.gx[..], &mut out.gy[..]);
-        let mut len = 0;
+        let (mut len, mut strong_pixels) = (0, 0);
         // The region keeps clear of the border, so there is a pixel to the left of its first column.
         let left = region.columns().start.saturating_sub(1);
         let mut next_row = 0;
@@ -110,6 +119,9 @@ impl Detector {
             let [above, middle, below] = [span.v + 2, span.v, span.v + 1].map(|v| &self.rows[v % 3][columns.clone()]);
             let (gx, gy, strength) = (&mut self.gx[..n], &mut self.gy[..n], &mut self.strength[..n]);
             scharr(above, middle, below, gx, gy, strength);
+            if let Some(screen) = screen {
+                strong_pixels += screen.apply(span.slot, gx, gy, strength, self.threshold_squared);
+            }
             for (block, start) in strength.chunks(BLOCK).zip((0..n).step_by(BLOCK)) {
                 let mut strong = reaching(block, self.threshold_squared);
                 while strong != 0 {
@@ -121,6 +133,7 @@ impl Detector {
             }
         }
         out.len = len;
+        out.strong = if screen.is_some() { strong_pixels } else { len };
     }
 }
 
@@ -200,7 +213,7 @@ mod tests {
         let data: Vec<u8> = (0..64 * 60u32).map(|i| (i.wrapping_mul(2_654_435_761) >> 24) as u8).collect();
         let image = ImageView::new(&data, 64, 60, 64).unwrap();
         let mut edges = EdgePixels::with_capacity(region.len());
-        Detector::new(&region, &options).detect(&image, &region, &mut edges);
+        Detector::new(&region, &options).detect(&image, &region, None, &mut edges);
 
         let at = |u: usize, v: usize| i32::from(data[v * 64 + u]);
         let mut k = 0;
