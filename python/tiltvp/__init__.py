@@ -1,1 +1,39 @@
-"""Orientation and calibration from the straight lines of man-made places."""
+"""Orientation and calibration from the straight lines of man-made places.
+
+Robot frame: x forward, y left, z up. Camera frame: z along the optical axis, x right (u, columns), y down (v, rows),
+pixel centres at integers. `robot_from_camera` is R in v_robot = R v_camera. A lean (alpha, beta) has the ground normal
+(-sin a cos b, -sin a sin b, cos a) in the robot frame; beta = 0 is a forward lean. Radians and metres.
+"""
+
+from tiltvp._core import METHODS
+from tiltvp.cameras import Camera
+from tiltvp.images import read_image, write_image
+from tiltvp.plots.overlay import draw_edges
+from tiltvp.tilt import (
+    CommonDirection,
+    EdgeElements,
+    TiltEstimate,
+    TiltEstimator,
+    common_direction,
+    level,
+    normal_from_alpha_beta,
+    tilt_error_rad,
+)
+
+__version__ = "0.1.0"
+
+__all__ = [
+    "METHODS",
+    "Camera",
+    "CommonDirection",
+    "EdgeElements",
+    "TiltEstimate",
+    "TiltEstimator",
+    "common_direction",
+    "draw_edges",
+    "level",
+    "normal_from_alpha_beta",
+    "read_image",
+    "tilt_error_rad",
+    "write_image",
+]

@@ -10,7 +10,7 @@ class InvalidInputError(TiltvpError, ValueError):
 
 
 class CalibrationError(TiltvpError, ValueError):
-    """A calibration file cannot be read as what it claims to be."""
+    """A calibration file or a camera parameter cannot be what it claims to be."""
 
 
 class UnsupportedFormatError(CalibrationError):
@@ -19,3 +19,11 @@ class UnsupportedFormatError(CalibrationError):
 
 class CalibrationNotFoundError(CalibrationError, FileNotFoundError):
     """There is no calibration file at that path."""
+
+
+class ImageFileError(TiltvpError, OSError):
+    """An image file cannot be read or written."""
+
+
+class InternalError(TiltvpError, RuntimeError):
+    """A fault of the package itself, which should be reported."""

@@ -52,7 +52,7 @@ pub fn with_margin(camera: &Camera, margin_px: u32) -> Camera {
 
 /// An inverse polynomial of 33 terms with the large alternating numbers that OCamCalib writes.
 const INVERSE_33: [f64; 33] = [
-    276.0, 218.0, 71.1, 69.8, 73.7, 164.5, -373.2, -2690.8, 4329.4, 34287.0, -15201.0, -258423.0, -84849.0, 1.2047e6,
+    276.0, 218.0, 71.1, 69.8, 73.7, 164.5, -373.2, -2690.8, 4329.4, 34287.0, -15201.0, -258_423.0, -84849.0, 1.2047e6,
     1.1536e6, -3.3598e6, -5.5860e6, 4.5912e6, 1.48248e7, 1.5106e6, -2.19324e7, -1.64497e7, 1.40296e7, 2.51144e7,
     4.9814e6, -1.40991e7, -1.21211e7, -1.2274e6, 3.8719e6, 2.9106e6, 1.0119e6, 183_063.0, 13964.0,
 ];
@@ -91,7 +91,8 @@ fn pinholes() -> Vec<(&'static str, Camera)> {
 
 fn fisheyes() -> Vec<(&'static str, Camera)> {
     let frame = [("fx", 286.0), ("fy", 285.9), ("cx", 425.1), ("cy", 399.6)];
-    let folding = [("k1", -0.0081), ("k2", 0.0436), ("k3", -0.0405), ("k4", 0.0066)];
+    let stereo = [("k1", -0.0081), ("k2", 0.0436), ("k3", -0.0405), ("k4", 0.0066)];
+    let folding = [("k1", 0.0173), ("k2", -0.0255), ("k3", 0.0226), ("k4", -0.0073)];
     let growing = [("k1", 0.021), ("k2", 0.002), ("k3", 0.0004), ("k4", 0.00002)];
     let kannala_brandt = |k: &[(&str, f64)], size| camera("kannala_brandt", size, &[&frame[..], k].concat(), &[]);
     let wide = kannala_brandt(&growing, [850, 800]);
@@ -100,6 +101,7 @@ fn fisheyes() -> Vec<(&'static str, Camera)> {
     let woodscape = [("k1", 340.0), ("k2", -32.0), ("k3", 48.3), ("k4", -7.2), ("cx", 643.4), ("cy", 479.4)];
     let limited = |camera: &Camera, angle| camera.clone().with_max_theta_rad(angle).unwrap_or_else(|_| camera.clone());
     vec![
+        ("kannala_brandt", kannala_brandt(&stereo, [848, 800])),
         ("kannala_brandt folding", kannala_brandt(&folding, [848, 800])),
         ("kannala_brandt 360 deg", wide.clone()),
         ("kannala_brandt 185 deg", limited(&wide, half_field)),

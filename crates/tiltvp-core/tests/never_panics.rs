@@ -119,8 +119,9 @@ fn methods() -> impl Strategy<Value = Method> {
         }),
         (number(0.001, 1.0), normal, number(0.3, 3.0))
             .prop_map(|(threshold_rad, normal, factor)| { Method::VectorConsensus { threshold_rad, normal, factor } }),
-        (number(0.01, 0.99), number(0.001, 0.9))
-            .prop_map(|(keep_fraction, scale_rad)| Method::Refined(RefineOptions { keep_fraction, scale_rad })),
+        (number(0.01, 0.99), number(0.001, 0.9)).prop_map(|(keep_fraction, scale_rad)| Method::Refined(
+            RefineOptions { keep_fraction, scale_rad, ..RefineOptions::default() }
+        )),
     ]
 }
 

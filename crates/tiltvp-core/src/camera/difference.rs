@@ -12,7 +12,7 @@ pub struct Derivative<const N: usize> {
 }
 
 /// Steps tried, each half of the one before.
-const STEPS: usize = 13;
+const STEPS: usize = 16;
 /// Halvings allowed until the function has a value on both sides.
 const APPROACH: usize = 40;
 /// Extrapolations per step: the error goes with the step to the power of twice this.
@@ -43,11 +43,13 @@ pub fn derivative<const N: usize>(
             let mut row = [SVector::<f64, N>::zeros(); ORDER];
             row[0] = (right - left) / (2.0 * h);
             let depth = (filled + 1).min(ORDER);
+            // Where the values are rounded, neighbours may agree by chance.
+            let rounding = f64::EPSILON * (right.norm() + left.norm()) / h;
             let mut factor = 1.0;
             for i in 1..depth {
                 factor *= 4.0;
                 row[i] = (row[i - 1] * factor - previous[i - 1]) / (factor - 1.0);
-                let error = (row[i] - row[i - 1]).norm().max((row[i] - previous[i - 1]).norm());
+                let error = (row[i] - row[i - 1]).norm().max((row[i] - previous[i - 1]).norm()) + rounding;
                 if best.is_none_or(|b| error < b.error) {
                     best = Some(Derivative { value: row[i], error });
                 }

@@ -8,6 +8,7 @@ use super::polynomial::{evaluate, first_fall};
 use super::radial::{self, Radial};
 use super::rim::FOLD;
 use super::solve;
+use super::table::Table;
 use crate::error::{Error, Result};
 
 const NAME: &str = "kannala_brandt";
@@ -23,6 +24,8 @@ pub struct KannalaBrandt {
     factor: [f64; 5],
     max_theta: f64,
     max_radius: f64,
+    /// `theta` over `r`.
+    table: Table,
 }
 
 impl KannalaBrandt {
@@ -36,13 +39,17 @@ impl KannalaBrandt {
         let [k1, k2, k3, k4] = coefficients;
         let slope = [1.0 - FOLD, 0.0, 3.0 * k1, 0.0, 5.0 * k2, 0.0, 7.0 * k3, 0.0, 9.0 * k4];
         let max_theta = first_fall(&slope, std::f64::consts::PI).unwrap_or(std::f64::consts::PI);
-        let mut lens = Self { grid, factor: [1.0, k1, k2, k3, k4], max_theta, max_radius: 0.0 };
-        lens.max_radius = lens.profile(max_theta).0;
-        if max_theta <= 1e-6 || !lens.max_radius.is_finite() {
+        let factor = [1.0, k1, k2, k3, k4];
+        let max_radius = profile(&factor, max_theta).0;
+        if max_theta <= 1e-6 || !max_radius.is_finite() {
             let got = format!("{coefficients:?}");
             return Err(Error::camera(NAME, "k1 .. k4", got, "coefficients under which r(theta) grows at first"));
         }
-        Ok(lens)
+        let table = Table::new(max_radius, |radius| {
+            let theta = root(&factor, 0.0, max_theta, radius, radius);
+            (theta, 1.0 / profile(&factor, theta).1)
+        });
+        Ok(Self { grid, factor, max_theta, max_radius, table })
     }
 
     /// `[k1, k2, k3, k4]`.
@@ -50,19 +57,28 @@ impl KannalaBrandt {
         let [_, k1, k2, k3, k4] = self.factor;
         [k1, k2, k3, k4]
     }
+}
 
-    #[inline]
-    fn profile(&self, theta: f64) -> (f64, f64) {
-        let s = theta * theta;
-        let (factor, slope) = evaluate(&self.factor, s);
-        (theta * factor, factor + 2.0 * s * slope)
-    }
+/// `(r, dr/dtheta)`.
+#[inline]
+fn profile(factor: &[f64; 5], theta: f64) -> (f64, f64) {
+    let s = theta * theta;
+    let (factor, slope) = evaluate(factor, s);
+    (theta * factor, factor + 2.0 * s * slope)
+}
+
+#[inline]
+fn root(factor: &[f64; 5], low: f64, high: f64, start: f64, radius: f64) -> f64 {
+    solve::increasing(low, high, start, |theta| {
+        let (r, slope) = profile(factor, theta);
+        (r - radius, slope)
+    })
 }
 
 impl Radial for KannalaBrandt {
     #[inline]
     fn radius(&self, theta: f64) -> Option<(f64, f64)> {
-        (theta < self.max_theta).then(|| self.profile(theta))
+        (theta < self.max_theta).then(|| profile(&self.factor, theta))
     }
 
     #[inline]
@@ -70,11 +86,9 @@ impl Radial for KannalaBrandt {
         if radius >= self.max_radius {
             return None;
         }
-        let theta = solve::increasing(0.0, self.max_theta, radius, |theta| {
-            let (r, slope) = self.profile(theta);
-            (r - radius, slope)
-        });
-        Some((theta, 1.0 / self.profile(theta).1))
+        let (low, high, start) = self.table.around(radius);
+        let theta = root(&self.factor, low, high, start, radius);
+        Some((theta, 1.0 / profile(&self.factor, theta).1))
     }
 }
 

@@ -23,6 +23,7 @@ mod radial_polynomial;
 mod rim;
 mod solve;
 mod sphere;
+mod table;
 mod unified;
 
 pub use any::Model;

@@ -7,12 +7,10 @@ use super::lens::Lens;
 use super::polynomial::{evaluate, first_fall, product, root_bound, sum};
 use super::rim::FOLD;
 use super::solve;
+use super::table::Table;
 use crate::error::{Error, Result};
 
 const NAME: &str = "ocam";
-
-/// Cells of the table of `rho` over the angle that brackets the inverse.
-const CELLS: usize = 128;
 
 /// OCamCalib: the pixel of a point `(x, y)` is row `c x + d y + cy`, column `e x + y + cx`; its ray is `(x, y, f(rho))`
 /// with `f = a0 + a1 rho + a2 rho^2 + ..` and `rho = |(x, y)|`.
@@ -34,8 +32,8 @@ pub struct Ocam {
     sign: f64,
     inverse_polynomial: Vec<f64>,
     max_theta: f64,
-    /// `rho` at equal steps of the angle from the central ray; the last is the radius of the valid disc.
-    table: Vec<f64>,
+    /// `rho` over the angle from the central ray, up to the radius of the valid disc.
+    table: Table,
 }
 
 impl Ocam {
@@ -68,15 +66,13 @@ impl Ocam {
             Error::camera(NAME, "polynomial", format!("{polynomial:?}"), "rays that leave the axis as rho grows")
         })?;
         let max_theta = radius.atan2(evaluate(&depth, radius).0);
-        let mut ocam =
-            Self { grid, depth, sign, inverse_polynomial: inverse_polynomial.to_vec(), max_theta, table: Vec::new() };
-        ocam.table = (0..=CELLS)
-            .map(|i| {
-                let (t, z) = (max_theta * i as f64 / CELLS as f64).sin_cos();
-                if i == CELLS { radius } else { ocam.solve(0.0, radius, 0.5 * radius, t, z) }
-            })
-            .collect();
-        Ok(ocam)
+        let table = Table::new(max_theta, |theta| {
+            let (t, z) = theta.sin_cos();
+            let rho = if theta < max_theta { root(&depth, 0.0, radius, 0.5 * radius, t, z) } else { radius };
+            let (z, slope) = evaluate(&depth, rho);
+            (rho, (rho * rho + z * z) / (z - rho * slope))
+        });
+        Ok(Self { grid, depth, sign, inverse_polynomial: inverse_polynomial.to_vec(), max_theta, table })
     }
 
     /// `[a0, a1, ..]` as OCamCalib writes it.
@@ -97,7 +93,7 @@ impl Ocam {
 
     /// Radius of the valid disc in pixels.
     pub fn max_rho_px(&self) -> f64 {
-        self.table.last().copied().unwrap_or(0.0)
+        self.table.last()
     }
 
     /// The largest error in pixels, up to the angle `theta_rad` from the central ray, of the inverse polynomial of the
@@ -113,30 +109,30 @@ impl Ocam {
             let theta = end * f64::from(i) / 512.0;
             let (t, z) = theta.sin_cos();
             let elevation = self.sign * (theta - std::f64::consts::FRAC_PI_2);
-            (evaluate(&self.inverse_polynomial, elevation).0 - self.rho(t, z)).abs()
+            (evaluate(&self.inverse_polynomial, elevation).0 - self.rho(t, z).unwrap_or(self.table.last())).abs()
         };
         Some((0..=512).map(error).fold(0.0, f64::max))
     }
 
-    /// The root in a bracket of `rho z - depth(rho) t`, which grows through it.
+    /// `rho` of a ray at distance `t` from the axis and `z` along the central ray; `None` outside the valid disc.
     #[inline]
-    fn solve(&self, low: f64, high: f64, start: f64, t: f64, z: f64) -> f64 {
-        solve::increasing(low, high, start, |rho| {
-            let (depth, slope) = evaluate(&self.depth, rho);
-            (rho * z - depth * t, z - slope * t)
-        })
+    fn rho(&self, t: f64, z: f64) -> Option<f64> {
+        let theta = t.atan2(z);
+        if theta > self.max_theta {
+            return None;
+        }
+        let (low, high, start) = self.table.around(theta);
+        Some(root(&self.depth, low, high, start, t, z))
     }
+}
 
-    /// `rho` of a ray at distance `t` from the axis and `z` along the central ray, which must be on the valid disc.
-    #[inline]
-    fn rho(&self, t: f64, z: f64) -> f64 {
-        let at = t.atan2(z) / self.max_theta * CELLS as f64;
-        let cell = (at as usize).min(CELLS - 1);
-        let (low, high) = (self.table[cell], self.table[cell + 1]);
-        let start = low + (at - cell as f64) * (high - low);
-        // The knots themselves are rounded: a bracket wider by some bits holds the root.
-        self.solve(low * (1.0 - 1e-12), (high * (1.0 + 1e-12)).min(self.max_rho_px()), start, t, z)
-    }
+/// The root in a bracket of `rho z - depth(rho) t`, which grows through it.
+#[inline]
+fn root(depth: &[f64], low: f64, high: f64, start: f64, t: f64, z: f64) -> f64 {
+    solve::increasing(low, high, start, |rho| {
+        let (depth, slope) = evaluate(depth, rho);
+        (rho * z - depth * t, z - slope * t)
+    })
 }
 
 /// The radius of the disc where `theta(rho) = atan2(rho, depth(rho))` grows by at least [`FOLD`] of its growth at 0.
@@ -163,11 +159,9 @@ impl Lens for Ocam {
     #[inline]
     fn point(&self, bearing: &Vector3<f64>) -> Option<Vector2<f64>> {
         let xy = bearing.xy();
-        let (t, z) = (xy.norm(), self.sign * bearing.z);
-        if t.atan2(z) > self.max_theta {
-            return None;
-        }
-        Some(if t > 0.0 { xy * (self.rho(t, z) / t) } else { xy })
+        let t = xy.norm();
+        let rho = self.rho(t, self.sign * bearing.z)?;
+        Some(if t > 0.0 { xy * (rho / t) } else { xy })
     }
 
     /// With `g = rho z - depth t`: `d rho = (depth dt - rho dz) / (z - depth' t)`.
@@ -175,16 +169,13 @@ impl Lens for Ocam {
     fn point_jacobian(&self, bearing: &Vector3<f64>) -> Option<(Vector2<f64>, Matrix2x3<f64>)> {
         let xy = bearing.xy();
         let (t, z) = (xy.norm(), self.sign * bearing.z);
-        if t.atan2(z) > self.max_theta {
-            return None;
-        }
+        let rho = self.rho(t, z)?;
         let mut jacobian = Matrix2x3::zeros();
         if t == 0.0 {
             jacobian[(0, 0)] = self.depth.first()? / z;
             jacobian[(1, 1)] = jacobian[(0, 0)];
             return Some((xy, jacobian));
         }
-        let rho = self.rho(t, z);
         let (depth, slope) = evaluate(&self.depth, rho);
         let by_g = 1.0 / (z - slope * t);
         let e = xy / t;

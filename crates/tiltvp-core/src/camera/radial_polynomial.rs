@@ -8,6 +8,7 @@ use super::polynomial::{evaluate, first_fall};
 use super::radial::{self, Radial};
 use super::rim::FOLD;
 use super::solve;
+use super::table::Table;
 use crate::error::{Error, Result};
 
 const NAME: &str = "radial_polynomial";
@@ -22,6 +23,8 @@ pub struct RadialPolynomial {
     profile: [f64; 5],
     max_theta: f64,
     max_radius: f64,
+    /// `theta` over `rho`.
+    table: Table,
 }
 
 impl RadialPolynomial {
@@ -43,7 +46,11 @@ impl RadialPolynomial {
             let got = format!("{coefficients:?}");
             return Err(Error::camera(NAME, "k1 .. k4", got, "coefficients under which rho(theta) grows at first"));
         }
-        Ok(Self { grid, profile, max_theta, max_radius })
+        let table = Table::new(max_radius, |radius| {
+            let theta = root(&profile, 0.0, max_theta, radius / k1, radius);
+            (theta, 1.0 / evaluate(&profile, theta).1)
+        });
+        Ok(Self { grid, profile, max_theta, max_radius, table })
     }
 
     /// `[k1, k2, k3, k4]` in pixels.
@@ -51,6 +58,14 @@ impl RadialPolynomial {
         let [_, k1, k2, k3, k4] = self.profile;
         [k1, k2, k3, k4]
     }
+}
+
+#[inline]
+fn root(profile: &[f64; 5], low: f64, high: f64, start: f64, radius: f64) -> f64 {
+    solve::increasing(low, high, start, |theta| {
+        let (rho, slope) = evaluate(profile, theta);
+        (rho - radius, slope)
+    })
 }
 
 impl Radial for RadialPolynomial {
@@ -64,10 +79,8 @@ impl Radial for RadialPolynomial {
         if radius >= self.max_radius {
             return None;
         }
-        let theta = solve::increasing(0.0, self.max_theta, radius / self.profile[1], |theta| {
-            let (rho, slope) = evaluate(&self.profile, theta);
-            (rho - radius, slope)
-        });
+        let (low, high, start) = self.table.around(radius);
+        let theta = root(&self.profile, low, high, start, radius);
         Some((theta, 1.0 / evaluate(&self.profile, theta).1))
     }
 }

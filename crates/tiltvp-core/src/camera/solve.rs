@@ -1,5 +1,8 @@
 //! Newton's method that cannot leave its bracket: the inverse of a growing function.
 
+/// A step of Newton's method this small, relative to the root, leaves an error of its square.
+const DONE: f64 = 1e-10;
+
 /// The root of a growing function in `[low, high]`, to the last bits, from any start.
 ///
 /// `function` returns value and slope and changes its sign from negative to positive within the bracket. A step that
@@ -19,12 +22,13 @@ pub(super) fn increasing(mut low: f64, mut high: f64, start: f64, function: impl
             return x;
         }
         let mut next = x - value / slope;
-        if !(next >= low && next <= high && (next - x).abs() <= 0.5 * last) {
+        let newton = next >= low && next <= high && (next - x).abs() <= 0.5 * last;
+        if !newton {
             next = 0.5 * (low + high);
         }
         last = (next - x).abs();
         x = next;
-        if last <= 2.0 * f64::EPSILON * x.abs() {
+        if last <= if newton { DONE } else { f64::EPSILON } * x.abs() {
             return x;
         }
     }

@@ -48,13 +48,17 @@ impl EdgePixels {
 
     /// Appends a pixel.
     pub fn push(&mut self, slot: u32, gx: f32, gy: f32) {
-        if self.len == self.slot.len() {
-            self.slot.push(0);
-            self.gx.push(0.0);
-            self.gy.push(0.0);
-        }
+        self.make_room(self.len + 1);
         (self.slot[self.len], self.gx[self.len], self.gy[self.len]) = (slot, gx, gy);
         self.len += 1;
+    }
+
+    fn make_room(&mut self, capacity: usize) {
+        if self.slot.len() < capacity {
+            self.slot.resize(capacity, 0);
+            self.gx.resize(capacity, 0.0);
+            self.gy.resize(capacity, 0.0);
+        }
     }
 }
 
@@ -90,7 +94,9 @@ impl Detector {
     /// The image must have the size of the camera that the region was made for. Grows no vector that has room for the
     /// whole region.
     pub fn detect(&mut self, image: &ImageView<'_>, region: &Region, out: &mut EdgePixels) {
-        out.len = 0;
+        out.make_room(region.len());
+        let (slots, gxs, gys) = (&mut out.slot[..], &mut out.gx[..], &mut out.gy[..]);
+        let mut len = 0;
         // The region keeps clear of the border, so there is a pixel to the left of its first column.
         let left = region.columns().start.saturating_sub(1);
         let mut next_row = 0;
@@ -104,25 +110,51 @@ impl Detector {
             let [above, middle, below] = [span.v + 2, span.v, span.v + 1].map(|v| &self.rows[v % 3][columns.clone()]);
             let (gx, gy, strength) = (&mut self.gx[..n], &mut self.gy[..n], &mut self.strength[..n]);
             scharr(above, middle, below, gx, gy, strength);
-            for (start, block) in (0..n).step_by(BLOCK).zip(strength.chunks(BLOCK)) {
+            for (block, start) in strength.chunks(BLOCK).zip((0..n).step_by(BLOCK)) {
                 let mut strong = reaching(block, self.threshold_squared);
                 while strong != 0 {
                     let i = start + strong.trailing_zeros() as usize;
                     strong &= strong - 1;
-                    out.push((span.slot + i) as u32, gx[i], gy[i]);
+                    (slots[len], gxs[len], gys[len]) = ((span.slot + i) as u32, gx[i], gy[i]);
+                    len += 1;
                 }
             }
         }
+        out.len = len;
     }
 }
 
 /// Pixels that are tested together.
 const BLOCK: usize = 32;
 
-/// One bit for each pixel of a block that reaches the threshold.
+/// One bit for each pixel of a block, at most 32, that reaches the threshold.
 #[inline(always)]
 fn reaching(block: &[f32], threshold: f32) -> u32 {
+    #[cfg(target_arch = "x86_64")]
+    if let Ok(block) = <&[f32; BLOCK]>::try_from(block) {
+        return reaching_sse2(block, threshold);
+    }
+    reaching_scalar(block, threshold)
+}
+
+#[inline(always)]
+fn reaching_scalar(block: &[f32], threshold: f32) -> u32 {
     block.iter().enumerate().fold(0, |bits, (i, x)| bits | (u32::from(*x >= threshold) << i))
+}
+
+/// [`reaching_scalar`] with the sign bits of four comparisons at once; SSE2 is part of every x86-64.
+#[cfg(target_arch = "x86_64")]
+#[inline(always)]
+fn reaching_sse2(block: &[f32; BLOCK], threshold: f32) -> u32 {
+    use std::arch::x86_64::{_mm_cmpge_ps, _mm_movemask_ps, _mm_set1_ps, _mm_setr_ps};
+    // SAFETY: these intrinsics take and give values only and need no more than SSE2, which every x86-64 has.
+    unsafe {
+        let limit = _mm_set1_ps(threshold);
+        block.as_chunks::<4>().0.iter().rev().fold(0, |bits, [a, b, c, d]| {
+            let signs = _mm_movemask_ps(_mm_cmpge_ps(_mm_setr_ps(*a, *b, *c, *d), limit));
+            (bits << 4) | signs as u32
+        })
+    }
 }
 
 /// The 3x3 Scharr derivatives (3, 10, 3) of the middle row and their squared magnitude; rows are one pixel wider on both sides.
@@ -145,6 +177,19 @@ mod tests {
     use super::*;
     use crate::camera::{Camera, Equidistant, Model};
     use nalgebra::Matrix3;
+
+    #[test]
+    #[cfg(target_arch = "x86_64")]
+    fn vector_bits_equal_scalar_bits() {
+        for seed in 0..200u32 {
+            let block: [f32; BLOCK] = std::array::from_fn(|i| {
+                (seed.wrapping_mul(747_796_405).wrapping_add((i as u32).wrapping_mul(277_803_737)) >> 20) as f32
+            });
+            for threshold in [0.0, 100.0, 2000.0, block[7], f32::NAN, f32::INFINITY] {
+                assert_eq!(reaching_sse2(&block, threshold), reaching_scalar(&block, threshold));
+            }
+        }
+    }
 
     #[test]
     fn gradients_equal_the_kernel_written_out() {

@@ -71,7 +71,12 @@ pub fn common_direction(
             kept.push(row);
         }
     }
-    let refining = RefineOptions { scale_rad: options.sigma_rad, ..RefineOptions::default() };
+    let refining = RefineOptions {
+        scale_rad: options.sigma_rad,
+        tolerance_rad: 1e-10,
+        max_iterations: 50,
+        ..RefineOptions::default()
+    };
     let report = refine(&rows, &refining, &mut row_weights, &mut Vec::new());
     let found = report.model.filter(|o| o.z >= options.max_angle_rad.cos());
     let stop = match (report.model, found) {

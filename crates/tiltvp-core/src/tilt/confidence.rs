@@ -23,28 +23,22 @@ pub(super) fn clustered_covariance<T: Real>(
     model: [f64; 3],
     gate: Gate,
     weights: &[f32],
-    sectors: impl Iterator<Item = u8>,
+    sector: impl Fn(usize) -> u8,
 ) -> Option<Matrix2<f64>> {
     let mut scores = [Vector2::<f64>::zeros(); SECTORS];
-    let mut held = [0.0f64; SECTORS];
-    let mut information = Matrix2::<f64>::zeros();
-    for ((row, weight), sector) in rows.iter().zip(weights).zip(sectors) {
-        let d = row.x * model[0] + row.y * model[1] + row.z * model[2];
-        let own = f64::from(*weight);
-        let weight = own * gate.weight(d);
-        if weight > 0.0 {
-            let xy = row.xy();
-            let sector = usize::from(sector) % SECTORS;
-            scores[sector] += xy * (weight * d);
-            held[sector] += weight;
-            information += xy * xy.transpose() * (own * gate.slope(d));
-        }
-    }
-    let occupied = held.iter().filter(|h| **h > 0.0).count() as f64;
+    let mut held = [false; SECTORS];
+    let [mut xx, mut xy, mut yy] = [0.0; 3];
+    rows.for_each_gated(model, gate, weights, |row, [weight, slope, x, y, d]| {
+        (xx, xy, yy) = (xx + slope * x * x, xy + slope * x * y, yy + slope * y * y);
+        let sector = usize::from(sector(row)) % SECTORS;
+        scores[sector] += Vector2::new(x, y) * (weight * d);
+        held[sector] = true;
+    });
+    let occupied = held.iter().filter(|held| **held).count() as f64;
     if occupied < 3.0 {
         return None;
     }
-    let inverse = inverse_of_positive(&information)?;
+    let inverse = inverse_of_positive(&Matrix2::new(xx, xy, xy, yy))?;
     let spread: Matrix2<f64> = scores.iter().map(|g| g * g.transpose()).sum();
     let covariance = inverse * spread * inverse * (occupied / (occupied - 2.0));
     covariance.iter().all(|x| x.is_finite()).then_some(covariance)

@@ -252,8 +252,8 @@ impl TiltEstimator {
         let edges = &scratch.edges;
         (0..edges.len()).map(move |place| {
             let (u, v) = self.region.place(edges.slot()[place] as usize);
-            let middle = middle.unwrap_or((f32::NAN, f32::NAN));
-            let (cos, sin, s) = edge_offset(middle, (u, v), edges.gx()[place], edges.gy()[place]);
+            let (cu, cv) = middle.unwrap_or((f32::NAN, f32::NAN));
+            let [cos, sin, s] = edge_offset(f32::from(u) - cu, f32::from(v) - cv, edges.gx()[place], edges.gy()[place]);
             let prefiltered = scratch.places.get(next_row) == Some(&(place as u32));
             let inlier = prefiltered && scratch.is_inlier(next_row);
             next_row += usize::from(prefiltered);
@@ -363,18 +363,14 @@ impl TiltEstimator {
 
     /// Adds covariance and confidence.
     fn conclude(&self, fit: &Fit, scratch: &Scratch) -> TiltEstimate {
-        let sectors = scratch.places.iter().map(|place| {
-            scratch
-                .edges
-                .slot()
-                .get(*place as usize)
-                .and_then(|slot| self.sectors.get(*slot as usize))
-                .copied()
-                .unwrap_or(0)
-        });
+        let slots = scratch.edges.slot();
+        let sector = |row: usize| {
+            let slot = scratch.places.get(row).and_then(|place| slots.get(*place as usize));
+            slot.and_then(|slot| self.sectors.get(*slot as usize)).copied().unwrap_or(0)
+        };
         let covariance = fit.tilt.and_then(|tilt| {
             let covariance =
-                confidence::clustered_covariance(&scratch.rows, fit.model, fit.gate, &scratch.weights, sectors)?;
+                confidence::clustered_covariance(&scratch.rows, fit.model, fit.gate, &scratch.weights, sector)?;
             // A change of the normal's horizontal part is a change in its tangent plane, seen along the vertical.
             let plane = tangent_basis(&tilt.normal()).fixed_rows::<2>(0).try_inverse()? * fit.horizontal;
             Some(confidence::with_floor(plane * covariance * plane.transpose()))

@@ -6,6 +6,7 @@ mod correction;
 mod estimate;
 mod estimator;
 mod image_space;
+mod level;
 mod options;
 mod refine;
 mod vector_consensus;
@@ -14,5 +15,6 @@ pub use common_direction::{CommonDirection, CommonDirectionOptions, common_direc
 pub use correction::Correction;
 pub use estimate::{EdgeElement, TiltEstimate};
 pub use estimator::{Scratch, TiltEstimator};
+pub use level::level_map;
 pub use options::{METHODS, Method, TiltOptions};
 pub use refine::RefineOptions;

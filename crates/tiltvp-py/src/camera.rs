@@ -1,0 +1,210 @@
+//! `Camera`: the core's camera over arrays, by name and keyword.
+
+use nalgebra::{Matrix2x3, Matrix3x2, Vector2};
+use numpy::{PyArray1, PyArray2, PyArrayMethods};
+use pyo3::prelude::*;
+use pyo3::types::{PyDict, PyTuple, PyType};
+use tiltvp_core::camera::{self as core, Model, Parameter};
+
+use crate::call::{call, exception, invalid};
+use crate::convert;
+
+/// A calibrated central camera. The face class in `tiltvp.cameras` adds a constructor for each model, and files.
+#[pyclass(frozen, subclass, module = "tiltvp._core")]
+pub(crate) struct Camera {
+    pub(crate) inner: core::Camera,
+}
+
+#[pymethods]
+impl Camera {
+    #[new]
+    #[pyo3(signature = (model, *, width, height, max_theta_rad=None, mirror=false, **parameters))]
+    fn new(
+        model: &str,
+        width: i64,
+        height: i64,
+        max_theta_rad: Option<f64>,
+        mirror: bool,
+        parameters: Option<&Bound<'_, PyDict>>,
+    ) -> PyResult<Self> {
+        let side = |name: &str, value: i64| {
+            u32::try_from(value)
+                .map_err(|_| invalid(format!("{name} = {value}, expected a number of pixels from 1 to {}", u32::MAX)))
+        };
+        let (width, height) = (side("width", width)?, side("height", height)?);
+        let mut named = Vec::new();
+        for (key, value) in parameters.into_iter().flat_map(|dict| dict.iter()) {
+            let key: String = key.extract()?;
+            if value.is_none() {
+                continue;
+            }
+            let parameter = if let Ok(scalar) = value.extract::<f64>() {
+                Parameter::Scalar(scalar)
+            } else {
+                Parameter::List(convert::vector(&value, &key)?)
+            };
+            named.push((key, parameter));
+        }
+        let build = || {
+            let model = Model::from_parameters(model, width, height, &named)?;
+            let camera = core::Camera::new(width, height, model)?;
+            let camera = match max_theta_rad {
+                Some(limit) => camera.with_max_theta_rad(limit)?,
+                None => camera,
+            };
+            Ok(if mirror { camera.mirrored() } else { camera })
+        };
+        Ok(Self { inner: build().map_err(|error| exception(&error))? })
+    }
+
+    #[getter]
+    fn model(&self) -> &'static str {
+        self.inner.model().name()
+    }
+
+    #[getter]
+    fn width(&self) -> u32 {
+        self.inner.width()
+    }
+
+    #[getter]
+    fn height(&self) -> u32 {
+        self.inner.height()
+    }
+
+    #[getter]
+    fn max_theta_rad(&self) -> f64 {
+        self.inner.max_theta_rad()
+    }
+
+    #[getter]
+    fn mirror(&self) -> bool {
+        self.inner.is_mirrored()
+    }
+
+    #[getter]
+    fn parameters<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let dict = PyDict::new(py);
+        for (name, value) in self.inner.model().parameters() {
+            match value {
+                Parameter::Scalar(value) => dict.set_item(name, value)?,
+                Parameter::List(values) => dict.set_item(name, values)?,
+            }
+        }
+        Ok(dict)
+    }
+
+    fn project<'py>(&self, py: Python<'py>, bearings: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
+        let (bearings, single) = convert::rows::<3>(bearings, "bearings")?;
+        let mut pixels = vec![[0.0; 2]; bearings.len()];
+        call(py, || self.inner.project_all(&bearings, &mut pixels))?;
+        convert::to_rows(py, &pixels, single)
+    }
+
+    fn unproject<'py>(&self, py: Python<'py>, pixels: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
+        let (pixels, single) = convert::rows::<2>(pixels, "pixels")?;
+        let mut bearings = vec![[0.0; 3]; pixels.len()];
+        call(py, || self.inner.unproject_all(&pixels, &mut bearings))?;
+        convert::to_rows(py, &bearings, single)
+    }
+
+    fn project_jacobian<'py>(&self, py: Python<'py>, bearings: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyTuple>> {
+        let (bearings, single) = convert::rows::<3>(bearings, "bearings")?;
+        let mut pixels = vec![[0.0; 2]; bearings.len()];
+        let mut jacobians = vec![Matrix2x3::zeros(); bearings.len()];
+        call(py, || self.inner.project_jacobian_all(&bearings, &mut pixels, &mut jacobians))?;
+        let flat: Vec<f64> = jacobians.iter().flat_map(|j| j.transpose().as_slice().to_vec()).collect();
+        (convert::to_rows(py, &pixels, single)?, convert::to_matrices(py, &flat, [2, 3], single)?).into_pyobject(py)
+    }
+
+    fn unproject_jacobian<'py>(&self, py: Python<'py>, pixels: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyTuple>> {
+        let (pixels, single) = convert::rows::<2>(pixels, "pixels")?;
+        let mut bearings = vec![[0.0; 3]; pixels.len()];
+        let mut jacobians = vec![Matrix3x2::zeros(); pixels.len()];
+        call(py, || self.inner.unproject_jacobian_all(&pixels, &mut bearings, &mut jacobians))?;
+        let flat: Vec<f64> = jacobians.iter().flat_map(|j| j.transpose().as_slice().to_vec()).collect();
+        (convert::to_rows(py, &bearings, single)?, convert::to_matrices(py, &flat, [3, 2], single)?).into_pyobject(py)
+    }
+
+    /// Pixels that have a bearing.
+    fn valid_mask<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<bool>>> {
+        let (width, height) = (self.inner.width() as usize, self.inner.height() as usize);
+        let mask = call(py, || {
+            let seen = |i: usize| self.inner.unproject(&Vector2::new((i % width) as f64, (i / width) as f64)).is_some();
+            Ok((0..width * height).map(seen).collect::<Vec<bool>>())
+        })?;
+        PyArray1::from_vec(py, mask).reshape([height, width])
+    }
+
+    fn mirrored<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
+        let dict = Self::to_dict(slf)?;
+        dict.set_item("mirror", !slf.get().inner.is_mirrored())?;
+        slf.get_type().call((), Some(&dict))
+    }
+
+    /// Measured round trips and Jacobians, from the axis to the rim.
+    fn conformance<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let found = call(py, || Ok(core::conformance(&self.inner)))?;
+        let dict = PyDict::new(py);
+        dict.set_item("pixels_tested", found.pixels_tested)?;
+        dict.set_item("pixels_outside", found.pixels_outside)?;
+        dict.set_item("pixels_lost", found.pixels_lost)?;
+        dict.set_item("max_round_trip_px", found.max_round_trip_px)?;
+        dict.set_item("max_round_trip_rad", found.max_round_trip_rad)?;
+        dict.set_item("max_jacobian_error_relative", found.max_jacobian_error_relative)?;
+        dict.set_item("rim_theta_rad", found.rim_theta_rad)?;
+        Ok(dict)
+    }
+
+    fn to_dict<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyDict>> {
+        let camera = slf.get();
+        let dict = PyDict::new(slf.py());
+        dict.set_item("model", camera.model())?;
+        dict.set_item("width", camera.width())?;
+        dict.set_item("height", camera.height())?;
+        dict.set_item("max_theta_rad", camera.max_theta_rad())?;
+        dict.set_item("mirror", camera.mirror())?;
+        dict.update(camera.parameters(slf.py())?.as_mapping())?;
+        Ok(dict)
+    }
+
+    #[classmethod]
+    fn from_dict<'py>(cls: &Bound<'py, PyType>, values: &Bound<'py, PyDict>) -> PyResult<Bound<'py, PyAny>> {
+        for key in ["model", "width", "height"] {
+            if !values.contains(key)? {
+                return Err(invalid(format!("values: \"{key}\" is missing, expected a dict as to_dict makes it")));
+            }
+        }
+        cls.call((), Some(values))
+    }
+
+    fn __repr__(slf: &Bound<'_, Self>) -> PyResult<String> {
+        let dict = Self::to_dict(slf)?;
+        dict.del_item("model")?;
+        let mut items = Vec::new();
+        for (key, value) in dict.iter() {
+            items.push(format!("{key}={}", value.repr()?));
+        }
+        Ok(format!("Camera(\"{}\", {})", slf.get().model(), items.join(", ")))
+    }
+
+    fn __eq__(&self, other: &Bound<'_, PyAny>) -> bool {
+        other.cast::<Self>().is_ok_and(|other| self.inner == other.get().inner)
+    }
+
+    fn __hash__(slf: &Bound<'_, Self>) -> PyResult<isize> {
+        Self::__repr__(slf)?.into_pyobject(slf.py())?.hash()
+    }
+
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyTuple>> {
+        (slf.get_type().getattr("from_dict")?, (Self::to_dict(slf)?,)).into_pyobject(slf.py())
+    }
+
+    fn __copy__<'py>(slf: &Bound<'py, Self>) -> Bound<'py, Self> {
+        slf.clone()
+    }
+
+    fn __deepcopy__<'py>(slf: &Bound<'py, Self>, _memo: &Bound<'py, PyAny>) -> Bound<'py, Self> {
+        slf.clone()
+    }
+}

@@ -1,0 +1,126 @@
+//! The one door for arrays: what comes in is checked for type, shape and content, what goes out is fresh.
+
+use nalgebra::{Matrix2, Matrix3, Vector3};
+use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray2, PyUntypedArray, PyUntypedArrayMethods};
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+
+use crate::call::invalid;
+
+/// `numpy.asarray(value)`, refused unless it holds plain numbers.
+fn numbers<'py>(value: &Bound<'py, PyAny>, name: &str, expected: &str) -> PyResult<Bound<'py, PyUntypedArray>> {
+    let numpy = value.py().import("numpy")?;
+    let array = numpy
+        .call_method1("asarray", (value,))
+        .map_err(|error| invalid(format!("{name}: cannot be made an array ({error}), expected {expected}")))?;
+    let array = array.cast_into::<PyUntypedArray>()?;
+    let kind: String = array.dtype().getattr("kind")?.extract()?;
+    if !["f", "i", "u"].contains(&kind.as_str()) && !(kind == "b" && array.len() == 0) {
+        return Err(invalid(format!("{name}: dtype {}, expected {expected} of real numbers", array.dtype())));
+    }
+    Ok(array)
+}
+
+/// The values of an array as `f64` in row order.
+fn values(array: &Bound<'_, PyUntypedArray>) -> PyResult<Vec<f64>> {
+    let keywords = PyDict::new(array.py());
+    keywords.set_item("dtype", "float64")?;
+    let flat = array.py().import("numpy")?.call_method("ascontiguousarray", (array,), Some(&keywords))?;
+    flat.call_method1("reshape", (-1,))?.cast_into::<PyArray1<f64>>()?.to_vec().map_err(Into::into)
+}
+
+/// Rows of `K` numbers: `(N, K)`, or a single `(K,)`, which the second value tells. NaN is allowed.
+pub(crate) fn rows<const K: usize>(value: &Bound<'_, PyAny>, name: &str) -> PyResult<(Vec<[f64; K]>, bool)> {
+    let expected = format!("an array (N, {K}) or ({K},)");
+    let array = numbers(value, name, &expected)?;
+    let shape = array.shape().to_vec();
+    let single = match shape.as_slice() {
+        [k] if *k == K => true,
+        [_, k] if *k == K => false,
+        _ => return Err(invalid(format!("{name}: shape {shape:?}, expected {expected}"))),
+    };
+    Ok((values(&array)?.as_chunks::<K>().0.to_vec(), single))
+}
+
+/// A vector `(N,)`.
+pub(crate) fn vector(value: &Bound<'_, PyAny>, name: &str) -> PyResult<Vec<f64>> {
+    let array = numbers(value, name, "an array (N,)")?;
+    if array.ndim() != 1 {
+        return Err(invalid(format!("{name}: shape {:?}, expected an array (N,)", array.shape())));
+    }
+    values(&array)
+}
+
+/// A `(3, 3)` matrix.
+pub(crate) fn matrix3(value: &Bound<'_, PyAny>, name: &str) -> PyResult<Matrix3<f64>> {
+    let array = numbers(value, name, "an array (3, 3)")?;
+    if array.shape() != [3, 3] {
+        return Err(invalid(format!("{name}: shape {:?}, expected an array (3, 3)", array.shape())));
+    }
+    Ok(Matrix3::from_row_slice(&values(&array)?))
+}
+
+/// A `(3,)` vector.
+pub(crate) fn vector3(value: &Bound<'_, PyAny>, name: &str) -> PyResult<Vector3<f64>> {
+    match rows::<3>(value, name)? {
+        (rows, true) => Ok(rows.first().copied().unwrap_or_default().into()),
+        _ => Err(invalid(format!("{name}: shape (N, 3), expected an array (3,)"))),
+    }
+}
+
+/// A C-contiguous `(H, W)` array of bytes.
+pub(crate) fn gray<'py>(value: &Bound<'py, PyAny>, name: &str) -> PyResult<PyReadonlyArray2<'py, u8>> {
+    let Ok(array) = value.cast::<PyArray2<u8>>() else {
+        return Err(invalid(format!("{name}: {}, expected a (H, W) array of uint8", describe(value))));
+    };
+    let array = array.try_readonly().map_err(|error| invalid(format!("{name}: {error}")))?;
+    if !array.is_c_contiguous() {
+        return Err(invalid(format!("{name}: strided, expected C-contiguous rows")));
+    }
+    Ok(array)
+}
+
+/// A `(H, W)` array of bool, with its shape.
+pub(crate) fn mask(value: &Bound<'_, PyAny>, name: &str) -> PyResult<(usize, usize, Vec<bool>)> {
+    let Ok(array) = value.cast::<PyArray2<bool>>() else {
+        return Err(invalid(format!("{name}: {}, expected a (H, W) array of bool", describe(value))));
+    };
+    let (height, width) = (array.shape()[0], array.shape()[1]);
+    let flat = array.call_method0("ravel")?.cast_into::<PyArray1<bool>>()?;
+    Ok((height, width, flat.to_vec()?))
+}
+
+/// What a value is, for a message.
+fn describe(value: &Bound<'_, PyAny>) -> String {
+    match value.cast::<PyUntypedArray>() {
+        Ok(array) => format!("shape {:?} of {}", array.shape(), array.dtype()),
+        Err(_) => value.get_type().name().map_or_else(|_| "an object".to_owned(), |name| name.to_string()),
+    }
+}
+
+/// Fresh `(N, K)` array, or `(K,)` for a single row.
+pub(crate) fn to_rows<'py, const K: usize>(
+    py: Python<'py>,
+    rows: &[[f64; K]],
+    single: bool,
+) -> PyResult<Bound<'py, PyAny>> {
+    let flat = PyArray1::from_slice(py, rows.as_flattened());
+    Ok(if single { flat.into_any() } else { flat.reshape([rows.len(), K])?.into_any() })
+}
+
+/// Fresh `(N, R, C)` array, or `(R, C)` for a single matrix, from matrices in row order.
+pub(crate) fn to_matrices<'py>(
+    py: Python<'py>,
+    flat: &[f64],
+    shape: [usize; 2],
+    single: bool,
+) -> PyResult<Bound<'py, PyAny>> {
+    let array = PyArray1::from_slice(py, flat);
+    let [r, c] = shape;
+    Ok(if single { array.reshape([r, c])?.into_any() } else { array.reshape([flat.len() / (r * c), r, c])?.into_any() })
+}
+
+/// Fresh `(2, 2)` array.
+pub(crate) fn to_matrix2<'py>(py: Python<'py>, m: &Matrix2<f64>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+    PyArray1::from_slice(py, &[m[(0, 0)], m[(0, 1)], m[(1, 0)], m[(1, 1)]]).reshape([2, 2])
+}

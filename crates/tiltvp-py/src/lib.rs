@@ -1,0 +1,32 @@
+//! The Python extension `tiltvp._core`: checks, converts, releases the interpreter, calls the core, wraps.
+
+mod call;
+mod camera;
+mod convert;
+mod synth;
+mod tilt;
+
+use pyo3::prelude::*;
+
+/// What Rust computes for the Python package.
+#[pymodule]
+mod _core {
+    use pyo3::prelude::*;
+
+    #[pymodule_export]
+    use crate::camera::Camera;
+    #[pymodule_export]
+    use crate::synth::render_room;
+    #[pymodule_export]
+    use crate::tilt::{
+        CommonDirection, EdgeElements, TiltEstimate, TiltEstimator, common_direction, leaning_from_upright, level_map,
+        normal_from_alpha_beta, tilt_error_rad,
+    };
+
+    #[pymodule_init]
+    fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {
+        module.add("METHODS", tiltvp_core::tilt::METHODS.to_vec())?;
+        module.add("CAMERA_MODELS", tiltvp_core::camera::Model::names().collect::<Vec<_>>())?;
+        module.add("ROOM_KINDS", tiltvp_synth::RoomKind::ALL.map(tiltvp_synth::RoomKind::name).to_vec())
+    }
+}

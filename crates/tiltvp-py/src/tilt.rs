@@ -1,0 +1,219 @@
+//! `TiltEstimator`, `TiltEstimate`, `common_direction`: the core's tilt over arrays.
+
+mod direction;
+mod estimate;
+mod options;
+
+use std::sync::{Mutex, PoisonError};
+
+use nalgebra::Matrix3;
+use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray2, PyUntypedArrayMethods};
+use pyo3::prelude::*;
+use pyo3::types::{PyDict, PyTuple};
+use tiltvp_core::geometry::Tilt;
+use tiltvp_core::image::ImageView;
+use tiltvp_core::tilt::{self as core, Scratch};
+
+pub(crate) use self::direction::{CommonDirection, common_direction};
+pub(crate) use self::estimate::{EdgeElements, TiltEstimate};
+use crate::call::{call, exception, invalid};
+use crate::camera::Camera;
+use crate::convert;
+
+/// The tables of one camera and method, and the scratch of as many threads as have called at once.
+#[pyclass(frozen, subclass, module = "tiltvp._core")]
+pub(crate) struct TiltEstimator {
+    inner: core::TiltEstimator,
+    camera: Py<Camera>,
+    options: Py<PyDict>,
+    scratch: Mutex<Vec<Scratch>>,
+}
+
+#[pymethods]
+impl TiltEstimator {
+    #[new]
+    #[pyo3(signature = (camera, *, method=core::METHODS[0], robot_from_camera=None, **options))]
+    fn new(
+        py: Python<'_>,
+        camera: &Bound<'_, PyAny>,
+        method: &str,
+        robot_from_camera: Option<&Bound<'_, PyAny>>,
+        options: Option<&Bound<'_, PyDict>>,
+    ) -> PyResult<Self> {
+        let Ok(camera) = camera.cast::<Camera>() else {
+            return Err(invalid(format!("camera: {}, expected a tiltvp.Camera", camera.get_type().name()?)));
+        };
+        let rotation =
+            robot_from_camera.map_or(Ok(Matrix3::identity()), |r| convert::matrix3(r, "robot_from_camera"))?;
+        let parsed = options::parse(method, options)?;
+        let lens = camera.get().inner.clone();
+        let inner = call(py, move || core::TiltEstimator::new(lens, rotation, parsed))?;
+        let given = options.map_or_else(|| Ok(PyDict::new(py)), |options| options.copy())?;
+        Ok(Self { inner, camera: camera.clone().unbind(), options: given.unbind(), scratch: Mutex::new(Vec::new()) })
+    }
+
+    #[getter]
+    fn camera(&self, py: Python<'_>) -> Py<Camera> {
+        self.camera.clone_ref(py)
+    }
+
+    #[getter]
+    fn method(&self) -> &'static str {
+        self.inner.options().method.name()
+    }
+
+    #[getter]
+    fn robot_from_camera<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        PyArray1::from_slice(py, self.inner.robot_from_camera().transpose().as_slice()).reshape([3, 3])
+    }
+
+    /// The options that are in force, defaults included.
+    #[getter]
+    fn options<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        options::in_force(py, self.inner.options())
+    }
+
+    #[getter]
+    fn region_pixels(&self) -> usize {
+        self.inner.region_pixels()
+    }
+
+    /// The tilt of a C-contiguous `(H, W)` image of uint8.
+    fn estimate(&self, py: Python<'_>, image: &Bound<'_, PyAny>) -> PyResult<TiltEstimate> {
+        let image = convert::gray(image, "image")?;
+        let (view, inner) = (view(&image)?, &self.inner);
+        let mut scratch = self.borrow_scratch();
+        let estimate = call(py, || inner.estimate(&view, &mut scratch));
+        self.return_scratch(scratch);
+        Ok(TiltEstimate::from(estimate?))
+    }
+
+    /// The tilt of an image and its edge pixels.
+    fn estimate_with_edges(&self, py: Python<'_>, image: &Bound<'_, PyAny>) -> PyResult<(TiltEstimate, EdgeElements)> {
+        let image = convert::gray(image, "image")?;
+        let (view, inner) = (view(&image)?, &self.inner);
+        let mut scratch = self.borrow_scratch();
+        let outcome = call(py, || {
+            let estimate = inner.estimate(&view, &mut scratch)?;
+            Ok((estimate, inner.elements(&scratch).collect::<Vec<_>>()))
+        });
+        self.return_scratch(scratch);
+        let (estimate, elements) = outcome?;
+        let size = (inner.camera().width() as usize, inner.camera().height() as usize);
+        Ok((TiltEstimate::from(estimate), EdgeElements::new(elements, size)))
+    }
+
+    /// The tilts of many images.
+    #[pyo3(signature = (images, *, threads=1))]
+    fn estimate_many(
+        &self,
+        py: Python<'_>,
+        images: Vec<Bound<'_, PyAny>>,
+        threads: usize,
+    ) -> PyResult<Vec<TiltEstimate>> {
+        let named = images.iter().enumerate().map(|(i, image)| convert::gray(image, &format!("images[{i}]")));
+        let arrays = named.collect::<PyResult<Vec<_>>>()?;
+        let views = arrays.iter().map(view).collect::<PyResult<Vec<_>>>()?;
+        let estimates = call(py, || self.inner.estimate_many(&views, threads))?;
+        Ok(estimates.into_iter().map(TiltEstimate::from).collect())
+    }
+
+    fn __repr__(&self, py: Python<'_>) -> PyResult<String> {
+        let mut items = Vec::new();
+        for (key, value) in self.options.bind(py).iter() {
+            items.push(format!(", {key}={}", value.repr()?));
+        }
+        Ok(format!("TiltEstimator({}, method=\"{}\"{})", self.camera.bind(py).repr()?, self.method(), items.concat()))
+    }
+
+    fn __eq__(&self, other: &Bound<'_, PyAny>) -> bool {
+        other.cast::<Self>().is_ok_and(|other| {
+            let other = &other.get().inner;
+            (self.inner.camera(), self.inner.robot_from_camera(), self.inner.options())
+                == (other.camera(), other.robot_from_camera(), other.options())
+        })
+    }
+
+    fn __hash__(&self, py: Python<'_>) -> PyResult<isize> {
+        (self.camera.bind(py).hash()?, self.method()).into_pyobject(py)?.hash()
+    }
+
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyTuple>> {
+        let (py, this) = (slf.py(), slf.get());
+        let keywords = this.options.bind(py).copy()?;
+        keywords.set_item("method", this.method())?;
+        keywords.set_item("robot_from_camera", this.robot_from_camera(py)?)?;
+        let partial = py.import("functools")?.getattr("partial")?;
+        (partial.call((slf.get_type(), this.camera(py)), Some(&keywords))?, PyTuple::empty(py)).into_pyobject(py)
+    }
+}
+
+impl TiltEstimator {
+    fn borrow_scratch(&self) -> Scratch {
+        let free = self.scratch.lock().unwrap_or_else(PoisonError::into_inner).pop();
+        free.unwrap_or_else(|| self.inner.scratch())
+    }
+
+    fn return_scratch(&self, scratch: Scratch) {
+        self.scratch.lock().unwrap_or_else(PoisonError::into_inner).push(scratch);
+    }
+}
+
+fn view<'a>(image: &'a PyReadonlyArray2<'_, u8>) -> PyResult<ImageView<'a>> {
+    let shape = image.shape();
+    let data = image.as_slice().map_err(|error| invalid(format!("image: {error}")))?;
+    ImageView::new(data, shape[1], shape[0], shape[1]).map_err(|error| exception(&error))
+}
+
+/// A tilt from the ground normal in the robot frame.
+fn tilt_from(normal: &Bound<'_, PyAny>, name: &str) -> PyResult<Tilt> {
+    let vector = convert::vector3(normal, name)?;
+    Tilt::from_normal(&vector)
+        .ok_or_else(|| invalid(format!("{name}: {:?}, expected a finite vector that is not zero", vector.as_slice())))
+}
+
+/// `(H, W, 2)` float32: where each pixel of the upright image is found in the leaning one.
+#[pyfunction]
+#[pyo3(signature = (camera, normal, *, robot_from_camera=None))]
+pub(crate) fn level_map<'py>(
+    py: Python<'py>,
+    camera: &Bound<'py, Camera>,
+    normal: &Bound<'py, PyAny>,
+    robot_from_camera: Option<&Bound<'py, PyAny>>,
+) -> PyResult<Bound<'py, PyAny>> {
+    let tilt = tilt_from(normal, "normal")?;
+    let rotation = robot_from_camera.map_or(Ok(Matrix3::identity()), |r| convert::matrix3(r, "robot_from_camera"))?;
+    let camera = &camera.get().inner;
+    let map = call(py, || Ok(core::level_map(camera, &rotation, &tilt)))?;
+    let shape = [camera.height() as usize, camera.width() as usize, 2];
+    Ok(PyArray1::from_slice(py, map.as_flattened()).reshape(shape)?.into_any())
+}
+
+/// The angle in radians between two ground normals, eq. 44.
+#[pyfunction]
+pub(crate) fn tilt_error_rad(a: &Bound<'_, PyAny>, b: &Bound<'_, PyAny>) -> PyResult<f64> {
+    Ok(tilt_from(a, "a")?.angle_to(&tilt_from(b, "b")?))
+}
+
+/// `(3,)` ground normal of a lean, eq. 1.
+#[pyfunction]
+pub(crate) fn normal_from_alpha_beta(
+    py: Python<'_>,
+    alpha_rad: f64,
+    beta_rad: f64,
+) -> PyResult<Bound<'_, PyArray1<f64>>> {
+    if !(alpha_rad.is_finite() && beta_rad.is_finite()) {
+        return Err(invalid(format!("alpha_rad, beta_rad = {alpha_rad}, {beta_rad}, expected finite angles")));
+    }
+    Ok(PyArray1::from_slice(py, Tilt::from_alpha_beta(alpha_rad, beta_rad).normal().as_slice()))
+}
+
+/// `(3, 3)` rotation from the upright robot's frame to the leaning one's, without a turn about the vertical.
+#[pyfunction]
+pub(crate) fn leaning_from_upright<'py>(
+    py: Python<'py>,
+    normal: &Bound<'py, PyAny>,
+) -> PyResult<Bound<'py, PyArray2<f64>>> {
+    let rotation = tilt_from(normal, "normal")?.leaning_from_upright();
+    PyArray1::from_slice(py, rotation.transpose().as_slice()).reshape([3, 3])
+}

@@ -1,0 +1,5 @@
+"""The `tiltvp` command."""
+
+
+def main() -> None:
+    """Entry point."""

@@ -1,0 +1,98 @@
+"""Images as users have them, made the 8-bit grey levels that the core reads; image files."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import cv2
+import numpy as np
+
+from tiltvp.errors import ImageFileError, InvalidInputError
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike, NDArray
+
+__all__ = ["gray_from", "read_image", "write_image"]
+
+_EXPECTED = "(H, W) or (H, W, 3 or 4 in BGR order) of uint8, uint16, or float in [0, 1]"
+
+
+def gray_from(image: ArrayLike, name: str = "image") -> NDArray[np.uint8]:
+    """A C-contiguous (H, W) uint8 array from an image of any usual kind; the argument is never altered.
+
+    Colour is taken in OpenCV's order (BGR or BGRA), uint16 is scaled by 1 / 257 and floats in [0, 1] by 255, both
+    rounded. Raises `InvalidInputError` for other shapes and types, empty images, NaN, and floats outside [0, 1].
+    """
+    array = np.asarray(image)
+    if array.ndim not in (2, 3) or (array.ndim == 3 and array.shape[2] not in (1, 3, 4)):
+        raise InvalidInputError(f"{name}: shape {array.shape}, expected {_EXPECTED}")
+    if array.size == 0:
+        raise InvalidInputError(f"{name}: shape {array.shape} is empty, expected {_EXPECTED}")
+    levels = _bytes_from(array, name)
+    if levels.ndim == 3:
+        if levels.shape[2] == 1:
+            levels = levels[:, :, 0]
+        else:
+            code = cv2.COLOR_BGR2GRAY if levels.shape[2] == 3 else cv2.COLOR_BGRA2GRAY
+            levels = np.asarray(cv2.cvtColor(np.ascontiguousarray(levels), code), dtype=np.uint8)
+    return np.ascontiguousarray(levels)
+
+
+def _bytes_from(array: NDArray[Any], name: str) -> NDArray[np.uint8]:
+    if array.dtype == np.uint8:
+        return array
+    if array.dtype == np.uint16:
+        return np.asarray((array.astype(np.uint32) + 128) // 257, dtype=np.uint8)
+    if array.dtype == np.bool_:
+        return array.astype(np.uint8) * np.uint8(255)
+    if array.dtype.kind == "f":
+        low, high = float(array.min()), float(array.max())
+        if not (low >= 0.0 and high <= 1.0):
+            what = "NaN" if np.isnan(low) else f"values from {low:g} to {high:g}"
+            raise InvalidInputError(f"{name}: floats with {what}, expected floats in [0, 1]")
+        return np.asarray(np.rint(array * 255.0), dtype=np.uint8)
+    raise InvalidInputError(f"{name}: dtype {array.dtype}, expected {_EXPECTED}")
+
+
+def read_image(path: str | os.PathLike[str]) -> NDArray[np.uint8]:
+    """The image file as (H, W) or (H, W, 3) uint8, colour in BGR order. Raises `ImageFileError` with the path."""
+    file = Path(path)
+    try:
+        data = np.frombuffer(file.read_bytes(), dtype=np.uint8)
+    except OSError as error:
+        raise ImageFileError(f"{file}: {error.strerror or error}") from error
+    image = _decode(data)
+    if image is None:
+        raise ImageFileError(f"{file}: not an image that can be decoded ({data.size} bytes)")
+    return image
+
+
+def _decode(data: NDArray[np.uint8]) -> NDArray[np.uint8] | None:
+    if data.size == 0:
+        return None
+    try:
+        image = cv2.imdecode(data, cv2.IMREAD_ANYCOLOR)
+    except cv2.error:
+        return None
+    return None if image is None else np.asarray(image, dtype=np.uint8)
+
+
+def write_image(path: str | os.PathLike[str], image: NDArray[np.uint8]) -> None:
+    """Writes an image file whole or not at all; the ending says the format. Raises `ImageFileError` with the path."""
+    file = Path(path)
+    try:
+        done, data = cv2.imencode(file.suffix or ".png", image)
+    except cv2.error as error:
+        raise ImageFileError(f"{file}: cannot be encoded as {file.suffix!r}, expected .png, .jpg or the like") from error
+    if not done:
+        raise ImageFileError(f"{file}: cannot be encoded as {file.suffix!r}")
+    part = file.with_name(f".{file.name}.part")
+    try:
+        file.parent.mkdir(parents=True, exist_ok=True)
+        part.write_bytes(data.tobytes())
+        part.replace(file)
+    except OSError as error:
+        part.unlink(missing_ok=True)
+        raise ImageFileError(f"{file}: {error.strerror or error}") from error

@@ -1,0 +1,1 @@
+"""Pictures: table or image in, figure or image out."""

@@ -1,0 +1,101 @@
+"""The tilt of single images: the estimator over images of any usual kind, levelling, and pictures of edges."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import cv2
+import numpy as np
+
+from tiltvp import _core
+from tiltvp._core import CommonDirection, EdgeElements, TiltEstimate, common_direction, tilt_error_rad
+from tiltvp.errors import InvalidInputError
+from tiltvp.images import gray_from
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike, NDArray
+
+    from tiltvp.cameras import Camera
+
+__all__ = [
+    "CommonDirection",
+    "EdgeElements",
+    "TiltEstimate",
+    "TiltEstimator",
+    "common_direction",
+    "level",
+    "normal_from_alpha_beta",
+    "tilt_error_rad",
+]
+
+
+class TiltEstimator(_core.TiltEstimator):
+    """Estimates how far and in which direction a robot leans from single images of one camera.
+
+    Tables and scratch are made once. Call it with an image: (H, W) uint8, or colour (BGR), uint16, float in [0, 1], any
+    strides. The answer is a frozen `TiltEstimate`; an image without enough edges has an estimate with confidence 0, NaN
+    angles and a reason. Wrong shapes, NaN, empty images and impossible options raise `tiltvp.errors.InvalidInputError`.
+
+    Parameters
+    ----------
+    camera : tiltvp.Camera
+    method : {"refined", "image-space-ransac", "image-space-reject-refit", "vector-consensus"}
+    robot_from_camera : (3, 3) rotation `R`, v_robot = R v_camera; default identity: an upward camera, columns forward
+    gradient_min, smoothing_px, elevation_min_rad, elevation_max_rad, margin_px, tilt_max_rad, mask, seed
+        Options of every method: see the README. `mask` is (H, W) bool, True where the image shows the world.
+    keep_fraction, scale_rad
+        Of "refined"; `keep_fraction` also of "image-space-reject-refit".
+    threshold_px, offset_max_px, correction
+        Of the image-space methods; `correction` is "closed-form" (default), a factor in pixels per radian, or None.
+    threshold_rad, normal, correction
+        Of "vector-consensus"; `normal` is "gradient" (the paper's) or "tangent", `correction` a factor without unit.
+    """
+
+    __slots__ = ()
+
+    def __call__(self, image: ArrayLike) -> TiltEstimate:
+        """The tilt of one image."""
+        return self.estimate(gray_from(image))
+
+    def with_edges(self, image: ArrayLike) -> tuple[TiltEstimate, EdgeElements]:
+        """The tilt of one image and its edge pixels: position, phi and s of eqs. 16 and 17, prefiltered, inlier."""
+        return self.estimate_with_edges(gray_from(image))
+
+    def many(self, images: Sequence[ArrayLike], threads: int = 1) -> list[TiltEstimate]:
+        """The tilts of many images, in their order, the same for any number of threads."""
+        grays = [gray_from(image, f"images[{i}]") for i, image in enumerate(images)]
+        return super().estimate_many(grays, threads=threads)
+
+    estimate_many = many  # type: ignore[assignment]
+
+
+def normal_from_alpha_beta(alpha_rad: float, beta_rad: float) -> NDArray[np.float64]:
+    """The ground normal seen by a leaning robot, (-sin a cos b, -sin a sin b, cos a): shape (3,), eq. 1."""
+    return _core.normal_from_alpha_beta(alpha_rad, beta_rad)
+
+
+def level(
+    image: NDArray[Any],
+    camera: Camera,
+    tilt: TiltEstimate | tuple[float, float],
+    robot_from_camera: ArrayLike | None = None,
+) -> NDArray[Any]:
+    """The image as the untilted camera would have seen it, same shape and dtype; black where nothing was seen.
+
+    `tilt` is an estimate or (alpha_rad, beta_rad). Raises `InvalidInputError` if the image has another size than the
+    camera's or the estimate has no tilt.
+    """
+    array = np.asarray(image)
+    if array.ndim not in (2, 3) or array.shape[:2] != (camera.height, camera.width):
+        expected = f"({camera.height}, {camera.width}) or ({camera.height}, {camera.width}, channels)"
+        raise InvalidInputError(f"image: shape {array.shape}, expected {expected}, as the camera's images")
+    if isinstance(tilt, TiltEstimate):
+        if not tilt:
+            raise InvalidInputError(f"tilt: an estimate without a tilt ({tilt.reason}), expected one with a tilt")
+        normal = tilt.normal
+    else:
+        alpha_rad, beta_rad = tilt
+        normal = normal_from_alpha_beta(alpha_rad, beta_rad)
+    places = np.nan_to_num(_core.level_map(camera, normal, robot_from_camera=robot_from_camera), nan=-1e6)
+    return np.asarray(cv2.remap(array, places, None, cv2.INTER_LINEAR, borderMode=cv2.BORDER_CONSTANT))
