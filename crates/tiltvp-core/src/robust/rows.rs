@@ -111,9 +111,9 @@ impl<T: Real> Rows<T> {
         T::count(row, model.map(T::from_f64), T::from_f64(threshold * threshold)) == 1
     }
 
-    /// Calls `visit(row, [weight, x, y, residual])` for each row whose weight, multiplied by the gate about a model, is above
-    /// zero.
-    pub fn for_each_gated(&self, model: [f64; 3], gate: Gate, weights: &[f32], mut visit: impl FnMut(usize, [f64; 4])) {
+    /// Calls `visit(row, [weight, slope, x, y, residual])` for each row whose weight, multiplied by the gate about a model, is above
+    /// zero; `slope` is the weight multiplied by [`Gate::slope`].
+    pub fn for_each_gated(&self, model: [f64; 3], gate: Gate, weights: &[f32], mut visit: impl FnMut(usize, [f64; 5])) {
         let [x, y, z] = self.columns();
         let (limit, inverse) = gate.coefficients();
         for (row, (((x, y), z), weight)) in x.iter().zip(y).zip(z).zip(weights).enumerate() {
@@ -121,9 +121,9 @@ impl<T: Real> Rows<T> {
             let d = x * model[0] + y * model[1] + z * model[2];
             let t = 1.0 - d * d * inverse;
             if *weight > 0.0 && t > 0.0 && d * d <= limit {
-                let t = t * t;
-                let t = t * t;
-                visit(row, [f64::from(*weight) * (t * t), x, y, d]);
+                let (own, t2) = (f64::from(*weight), t * t);
+                let t4 = t2 * t2;
+                visit(row, [own * (t4 * t4), own * (t4 * t2 * t) * (17.0 * t - 16.0), x, y, d]);
             }
         }
     }
@@ -436,6 +436,15 @@ mod tests {
             assert_eq!(found.count, count, "{len} rows, {gate:?}");
             assert!((found.weight - weight).abs() < tolerance * scale, "{len} rows, {gate:?}");
             assert!((found.second_moments() - sum).norm() < tolerance * scale, "{len} rows, {gate:?}");
+            let mut visited = 0;
+            rows.for_each_gated(model, gate, &before, |i, [weight, slope, x, y, d]| {
+                let row = rows.get(i).unwrap();
+                let own = f64::from(before[i]);
+                assert_eq!((x, y, d), (row.x, row.y, row.x * model[0] + row.y * model[1] + row.z * model[2]));
+                assert!((weight - own * gate.weight(d)).abs() < 1e-9 && (slope - own * gate.slope(d)).abs() < 1e-9);
+                visited += 1;
+            });
+            assert_eq!(visited, count, "{len} rows, {gate:?}");
             if let Gate::Hard { threshold } = gate {
                 let within = rows.iter().filter(|row| gate.weight(row.dot(&Vector3::from(model))) > 0.0).count();
                 assert_eq!(rows.count_within(model, threshold), within, "{len} rows");

@@ -15,8 +15,9 @@ const FLOOR_RAD: f64 = 0.25 * std::f64::consts::PI / 180.0;
 
 /// The sandwich covariance `H^-1 (sum_c g_c g_c^T) H^-1` of a linear fit, with scores `g_c` summed over sectors of azimuth.
 ///
-/// `H = sum w (x, y)^T (x, y)` and `g_c = sum_(k in c) w d (x, y)`. `sectors` gives the sector of each row. `None` if
-/// fewer than three sectors hold anything or the fit is degenerate.
+/// `H = sum d(w d)/dd (x, y)^T (x, y)` and `g_c = sum_(k in c) w d (x, y)` (Huber's covariance of an M-estimate): with the weights
+/// themselves in `H`, clutter that fills the gate would count as evidence. `sectors` gives the sector of each row. `None` if
+/// fewer than three sectors hold anything or the fit is no minimum.
 pub(super) fn clustered_covariance<T: Real>(
     rows: &Rows<T>,
     model: [f64; 3],
@@ -27,21 +28,26 @@ pub(super) fn clustered_covariance<T: Real>(
     let mut scores = [Vector2::<f64>::zeros(); SECTORS];
     let mut held = [false; SECTORS];
     let [mut xx, mut xy, mut yy] = [0.0; 3];
-    rows.for_each_gated(model, gate, weights, |row, [weight, x, y, d]| {
-        let (wx, wy) = (weight * x, weight * y);
-        (xx, xy, yy) = (xx + wx * x, xy + wx * y, yy + wy * y);
+    rows.for_each_gated(model, gate, weights, |row, [weight, slope, x, y, d]| {
+        (xx, xy, yy) = (xx + slope * x * x, xy + slope * x * y, yy + slope * y * y);
         let sector = usize::from(sector(row)) % SECTORS;
-        scores[sector] += Vector2::new(wx, wy) * d;
+        scores[sector] += Vector2::new(x, y) * (weight * d);
         held[sector] = true;
     });
     let occupied = held.iter().filter(|held| **held).count() as f64;
     if occupied < 3.0 {
         return None;
     }
-    let inverse = Matrix2::new(xx, xy, xy, yy).try_inverse()?;
+    let inverse = inverse_of_positive(&Matrix2::new(xx, xy, xy, yy))?;
     let spread: Matrix2<f64> = scores.iter().map(|g| g * g.transpose()).sum();
     let covariance = inverse * spread * inverse * (occupied / (occupied - 2.0));
     covariance.iter().all(|x| x.is_finite()).then_some(covariance)
+}
+
+/// The inverse of a positive definite matrix.
+pub(super) fn inverse_of_positive(matrix: &Matrix2<f64>) -> Option<Matrix2<f64>> {
+    let (determinant, trace) = (matrix.determinant(), matrix.trace());
+    if trace > 0.0 && determinant > 1e-12 * trace * trace { matrix.try_inverse() } else { None }
 }
 
 /// Adds the floor of what no image tells.
