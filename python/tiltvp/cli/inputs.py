@@ -1,0 +1,71 @@
+"""From the words on the command line to image files, and from these to the names of what is written for them."""
+
+from __future__ import annotations
+
+import glob
+import os
+from collections import Counter
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Final
+
+IMAGE_ENDINGS: Final = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".pgm", ".ppm", ".pnm", ".webp", ".jp2")
+
+
+def find_images(words: Sequence[str]) -> tuple[list[Path], list[str]]:
+    """The image files that files, folders and glob patterns name, each once, and what is wrong with the words.
+
+    A folder stands for the images directly in it, a pattern for what it matches (`**` for folders below), both sorted.
+    """
+    files: list[Path] = []
+    problems: list[str] = []
+    for word in words:
+        path = Path(word)
+        if path.is_dir():
+            found = _images_of(path)
+            if not found:
+                problems.append(f"{word}: a folder without images, expected files that end in {' '.join(IMAGE_ENDINGS)}")
+        elif path.exists() or not glob.has_magic(word):
+            found = [path]
+        else:
+            found = [Path(match) for match in sorted(glob.glob(word, recursive=True)) if not os.path.isdir(match)]
+            if not found:
+                problems.append(f"{word}: no file fits this pattern")
+        files.extend(found)
+    once = {os.path.realpath(file): file for file in reversed(files)}
+    return [file for file in dict.fromkeys(files) if once[os.path.realpath(file)] is file], problems
+
+
+def _images_of(folder: Path) -> list[Path]:
+    return sorted(file for file in folder.iterdir() if file.suffix.lower() in IMAGE_ENDINGS and file.is_file())
+
+
+def distinct_names(files: Sequence[Path]) -> list[str]:
+    """A name without ending for each file: its stem, with its ending and then its folders put in where stems are equal.
+
+    Names that differ only in case count as equal, as some file systems have it.
+    """
+    names = [file.stem for file in files]
+    parts = [(file.stem, file.suffix.lstrip("."), Path(os.path.abspath(file)).parent.parts[1:]) for file in files]
+    for depth in range(1 + max((len(folders) for _, _, folders in parts), default=0)):
+        counts = Counter(name.lower() for name in names)
+        if max(counts.values(), default=1) == 1:
+            break
+        for i, (stem, ending, folders) in enumerate(parts):
+            if counts[names[i].lower()] > 1:
+                alike = [p for p in parts if p[0].lower() == stem.lower() and p[2] == folders]
+                words = [*folders[len(folders) - depth :], f"{stem}_{ending}" if len(alike) > 1 else stem]
+                names[i] = "_".join(words)
+    return _numbered(names)
+
+
+def _numbered(names: list[str]) -> list[str]:
+    """The names, with a number where two are still equal."""
+    taken: set[str] = set()
+    for i, name in enumerate(names):
+        number, candidate = 2, name
+        while candidate.lower() in taken:
+            candidate, number = f"{name}_{number}", number + 1
+        names[i] = candidate
+        taken.add(candidate.lower())
+    return names

@@ -1,0 +1,121 @@
+"""The answers for many images: as a table for people, in degrees, and as a file for programs, in radians."""
+
+from __future__ import annotations
+
+import math
+import os
+import secrets
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+from tiltvp.cli.terminal import new_table
+from tiltvp.errors import ImageFileError, InvalidInputError
+
+if TYPE_CHECKING:
+    import polars as pl
+    from rich.table import Table
+
+    from tiltvp import TiltEstimate
+
+ENDINGS: Final = (".csv", ".json", ".parquet")
+_NUMBERS: Final = (
+    "alpha_rad", "beta_rad", "roll_rad", "pitch_rad", "normal_x", "normal_y", "normal_z",
+    "covariance_xx_rad2", "covariance_xy_rad2", "covariance_yy_rad2", "sigma_rad", "confidence",
+)  # fmt: skip
+_COUNTS: Final = ("edge_pixels", "prefiltered_pixels", "inlier_pixels", "iterations")
+_MORE_NUMBERS: Final = ("shift_px", "residual_rms", "time_s")
+_WORDS: Final = ("stop", "reason", "error")
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What became of one image: an estimate and the seconds it took, or what went wrong."""
+
+    file: Path
+    estimate: TiltEstimate | None = None
+    time_s: float = math.nan
+    error: str | None = None
+
+
+def sigma_rad(estimate: TiltEstimate) -> float:
+    """One standard deviation of the normal in any one direction: the root of half the covariance's trace."""
+    covariance = estimate.covariance_rad2
+    return math.sqrt(0.5 * float(covariance[0, 0] + covariance[1, 1]))
+
+
+def degrees(value_rad: float, digits: int = 2) -> str:
+    """Degrees for people; a dash where there is no value."""
+    return f"{math.degrees(value_rad):.{digits}f}" if math.isfinite(value_rad) else "-"
+
+
+def people_table(outcomes: Sequence[Outcome]) -> Table:
+    """One row for each image, angles in degrees."""
+    columns = "alpha deg,beta deg,roll deg,pitch deg,confidence,1-sigma deg,edges px,inliers px,ms".split(",")
+    table = new_table(None, ("file", *columns, "reason"), left=("file", "reason"))
+    for outcome in outcomes:
+        e = outcome.estimate
+        if e is None:
+            table.add_row(str(outcome.file), *["-"] * len(columns), outcome.error or "", style="red")
+            continue
+        angles = [degrees(angle) for angle in (e.alpha_rad, e.beta_rad, e.roll_rad, e.pitch_rad)]
+        counts = (str(e.edge_pixels), str(e.inlier_pixels), f"{1e3 * outcome.time_s:.2f}")
+        sure = f"{e.confidence:.3f}"
+        style = "yellow" if not e else None
+        table.add_row(str(outcome.file), *angles, sure, degrees(sigma_rad(e)), *counts, e.reason, style=style)
+    return table
+
+
+def data_frame(outcomes: Sequence[Outcome], method: str) -> pl.DataFrame:
+    """One row for each image in SI units; null where there is no value, `error` where the image could not be used."""
+    import polars as pl
+
+    schema: dict[str, Any] = {"file": pl.String, "method": pl.String}
+    schema |= dict.fromkeys(_NUMBERS, pl.Float64) | dict.fromkeys(_COUNTS, pl.Int64)
+    schema |= dict.fromkeys(_MORE_NUMBERS, pl.Float64) | dict.fromkeys(_WORDS, pl.String)
+    rows = [{"file": str(outcome.file), "method": method} | _row(outcome) for outcome in outcomes]
+    return pl.DataFrame([{name: _plain(row.get(name)) for name in schema} for row in rows], schema=schema)
+
+
+def _row(outcome: Outcome) -> dict[str, object]:
+    e = outcome.estimate
+    if e is None:
+        return {"error": outcome.error}
+    normal, covariance = e.normal, e.covariance_rad2
+    row = {name: getattr(e, name) for name in ("alpha_rad", "beta_rad", "roll_rad", "pitch_rad", "confidence")}
+    row |= {f"normal_{axis}": float(normal[i]) for i, axis in enumerate("xyz")}
+    places = {"xx": (0, 0), "xy": (0, 1), "yy": (1, 1)}
+    row |= {f"covariance_{name}_rad2": float(covariance[place]) for name, place in places.items()}
+    row |= {name: getattr(e, name) for name in ("edge_pixels", "prefiltered_pixels", "inlier_pixels", "shift_px")}
+    return row | e.report | {"sigma_rad": sigma_rad(e), "time_s": outcome.time_s}
+
+
+def _plain(value: object) -> object:
+    return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+def check_ending(path: Path) -> None:
+    """Refuses a file of results in a format that cannot be written, before any work is done."""
+    if path.suffix.lower() not in ENDINGS:
+        raise InvalidInputError(f"--out {path}: ends in {path.suffix!r}, expected one of {', '.join(ENDINGS)}")
+
+
+def write_frame(frame: pl.DataFrame, path: Path) -> None:
+    """Writes the table whole or not at all; the ending says the format."""
+    check_ending(path)
+    part = path.with_name(f".{path.name}.{secrets.token_hex(8)}.part")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        match path.suffix.lower():
+            case ".csv":
+                frame.write_csv(part)
+            case ".json":
+                frame.write_json(part)
+            case _:
+                frame.write_parquet(part)
+        os.replace(part, path)
+    except OSError as error:
+        raise ImageFileError(f"{path}: cannot be written ({error.strerror or error})") from error
+    finally:
+        part.unlink(missing_ok=True)

@@ -1,0 +1,90 @@
+"""Where things are printed: tables on stdout; progress and complaints on stderr."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from rich.console import Console
+    from rich.progress import Progress
+    from rich.table import Table
+
+_WIDTH_IN_FILES = 240
+"""Columns that a table may take where there is no terminal to fit it into."""
+
+
+def output() -> Console:
+    """Standard output, made anew so that it is the one of now."""
+    from rich.console import Console
+
+    console = Console(highlight=False)
+    return console if console.is_terminal else Console(highlight=False, width=_WIDTH_IN_FILES)
+
+
+def say(text: str) -> None:
+    """One line on stdout, as it is."""
+    print(text)
+
+
+def complain(problem: str) -> None:
+    """One line on stderr."""
+    print("tiltvp: " + " ".join(problem.split()), file=sys.stderr, flush=True)
+
+
+def named(name: object, problem: str) -> str:
+    """The problem with the name of its file in front, unless it has it."""
+    return problem if str(name) in problem else f"{name}: {problem}"
+
+
+def new_table(title: str | None, columns: Iterable[str], left: Iterable[str] = ()) -> Table:
+    """A table of right-justified numbers; the columns in `left` hold words."""
+    from rich.box import SIMPLE_HEAD
+    from rich.table import Table
+
+    words = set(left)
+    table = Table(title=title, box=SIMPLE_HEAD, title_justify="left", pad_edge=False)
+    for column in columns:
+        if column in words:
+            table.add_column(column, overflow="fold")
+        else:
+            table.add_column(column, justify="right", no_wrap=True)
+    return table
+
+
+@contextmanager
+def progress_bar(total: int, what: str) -> Iterator[ProgressBar]:
+    """A bar on stderr for several things on a terminal, nothing otherwise; complaints go above it."""
+    if total < 2 or not sys.stderr.isatty():
+        yield ProgressBar(None)
+        return
+    from rich.console import Console
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+    console = Console(stderr=True, highlight=False)
+    columns = (TextColumn(what), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
+    with Progress(*columns, console=console, transient=True) as progress:
+        progress.add_task(what, total=total)
+        yield ProgressBar(progress)
+
+
+class ProgressBar:
+    """Counts what is done."""
+
+    def __init__(self, progress: Progress | None) -> None:
+        self._progress = progress
+
+    def advance(self) -> None:
+        """One more is done."""
+        if self._progress is not None:
+            self._progress.advance(self._progress.task_ids[0])
+
+    def complain(self, problem: str) -> None:
+        """One line on stderr, above the bar."""
+        if self._progress is None:
+            complain(problem)
+        else:
+            line = "tiltvp: " + " ".join(problem.split())
+            self._progress.console.print(line, markup=False, soft_wrap=True)
