@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 
     from tiltvp import Camera, EdgeElements, TiltEstimate
     from tiltvp.plots.demo import DemoData
+    from tiltvp.plots.offsets import Cosine
     from tiltvp.synth import RoomImage
 
 _RUNS: Final = 21
@@ -55,7 +56,7 @@ class Trial:
 def demo(
     *,
     out: Path = Path("out/demo"),
-    seed: int = 0,
+    seed: int = 8,
     alpha_deg: float = 4.0,
     beta_deg: float = 30.0,
     kind: str = "office",
@@ -162,7 +163,7 @@ def _pictures(camera: Camera, room: RoomImage, trials: Sequence[Trial]) -> dict[
         "overlay.png": draw_words(data.overlay, words_of(best.estimate, best.label)),
         "levelled.png": np.hstack(pair),
         "plot.png": figure_picture(demo_plot(cut), dpi=110.0),
-        "summary.png": figure_picture(demo_summary(cut), dpi=90.0),
+        "summary.png": figure_picture(demo_summary(cut), dpi=75.0),
     }
 
 
@@ -176,7 +177,7 @@ def _seen_square(camera: Camera) -> tuple[slice, slice]:
 
 
 def _demo_data(camera: Camera, room: RoomImage, trials: Sequence[Trial]) -> DemoData:
-    """The first trial is drawn over the image and levels it; the first with a shift gives the histogram."""
+    """The first trial is drawn and levels the image; the first with a shift tells how many pixels a radian of tilt is."""
     from tiltvp import level, normal_from_alpha_beta
     from tiltvp.plots.demo import DemoData
     from tiltvp.plots.marks import tilt_overlay
@@ -188,20 +189,28 @@ def _demo_data(camera: Camera, room: RoomImage, trials: Sequence[Trial]) -> Demo
     factor = shifted.estimate.shift_px / shifted.estimate.alpha_rad
     cosines = (
         cosine_of_tilt("true tilt", camera, true, factor * room.alpha_rad, colour="red", dashed=True),
-        cosine_of_tilt(f"fitted, {shifted.label}", camera, shifted.estimate.normal, shifted.estimate.shift_px),
+        _cosine(camera, best, factor, "tab:blue"),
+        _cosine(camera, shifted, factor, "tab:orange"),
     )
     levelled = level(room.bgr, camera, best.estimate) if best.estimate else room.bgr
     return DemoData(
         overlay=tilt_overlay(room.bgr, camera, best.estimate, best.edges),
         leaning=room.bgr,
         levelled=levelled,
-        phi_rad=shifted.edges.phi_rad,
-        offset_px=shifted.edges.offset_px,
+        phi_rad=best.edges.phi_rad,
+        offset_px=best.edges.offset_px,
         cosines=cosines,
         table=_frame(trials),
         alpha_rad=room.alpha_rad,
         beta_rad=room.beta_rad,
     )
+
+
+def _cosine(camera: Camera, trial: Trial, factor: float, colour: str) -> Cosine:
+    from tiltvp.plots.offsets import cosine_of_tilt
+
+    estimate = trial.estimate
+    return cosine_of_tilt(trial.label, camera, estimate.normal, factor * estimate.alpha_rad, colour=colour)
 
 
 def _frame(trials: Sequence[Trial]) -> pl.DataFrame:

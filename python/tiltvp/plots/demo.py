@@ -38,29 +38,26 @@ class DemoData:
 
 def demo_plot(data: DemoData) -> Figure:
     """Edges over the image and their (phi, s) histogram above, errors and leans of every method below."""
-    figure = Figure(figsize=(13.0, 10.4), layout="constrained")
-    grid = figure.add_gridspec(2, 2, height_ratios=(1.0, 0.68), width_ratios=(1.0, 1.0))
-    show_picture(figure.add_subplot(grid[0, 0]), data.overlay, "edges that agree: hue is their direction")
-    histogram = figure.add_subplot(grid[0, 1])
+    figure = Figure(figsize=(13.0, 11.0), layout="constrained")
+    above, below = figure.subfigures(2, 1, height_ratios=(1.0, 0.72))
+    picture, histogram = above.subplots(1, 2, width_ratios=(1.0, 1.0))
+    show_picture(picture, data.overlay, "edges that agree (hue: direction), horizon and zenith")
     draw_offset_histogram(histogram, data.phi_rad, data.offset_px, data.cosines)
-    histogram.set_title("offset of every edge pixel: a tilt is a cosine")
-    errors = figure.add_subplot(grid[1, 0])
+    histogram.set_title("offsets of all edge pixels: a tilt is a cosine")
+    errors, leans = below.subplots(1, 2, width_ratios=(1.0, 0.72))
     draw_method_errors(errors, data.table)
     errors.set_title("error of every method")
-    leans = figure.add_subplot(grid[1, 1])
     draw_leans(leans, data.table, alpha_rad=data.alpha_rad, beta_rad=data.beta_rad)
     leans.set_title("true and estimated lean")
-    leans.legend(loc="center left", bbox_to_anchor=(1.02, 0.5), frameon=False, fontsize="medium")
     return figure
 
 
 def demo_summary(data: DemoData) -> Figure:
     """One row for a README: the leaning image with its edges, the image made level, and the histogram."""
-    figure = Figure(figsize=(13.0, 4.6), layout="constrained")
-    grid = figure.add_gridspec(1, 3, width_ratios=(1.0, 1.0, 1.0))
-    show_picture(figure.add_subplot(grid[0, 0]), data.overlay, "a leaning robot's view: vertical edges, horizon, zenith")
-    show_picture(figure.add_subplot(grid[0, 1]), data.levelled, "made level by the estimate")
-    histogram = figure.add_subplot(grid[0, 2])
+    figure = Figure(figsize=(13.0, 4.7), layout="constrained")
+    edges, levelled, histogram = figure.subplots(1, 3)
+    show_picture(edges, data.overlay, "vertical edges of a leaning robot's view")
+    show_picture(levelled, data.levelled, "made level by the estimate")
     draw_offset_histogram(histogram, data.phi_rad, data.offset_px, data.cosines)
-    histogram.set_title("edge offsets, and the tilt that explains them")
+    histogram.set_title("edge offsets, and the tilt behind them")
     return figure
