@@ -35,19 +35,26 @@ class FieldOfView:
 
 
 def field_of_view(camera: Camera) -> FieldOfView:
-    """Measures the camera along its row, column and diagonals through the axis; a ray without a bearing ends the view."""
+    """Measures a camera along row, column and diagonals through its axis, as far as pixels have bearings."""
     sign = -1.0 if camera.mirror else 1.0
     axis = np.asarray(camera.project([0.0, 0.0, sign]), dtype=np.float64)
     last = np.array([camera.width - 1.0, camera.height - 1.0])
     if not (np.isfinite(axis).all() and (axis >= -0.5).all() and (axis <= last + 0.5).all()):
         axis = last / 2.0
 
+    def angles(border: NDArray[np.float64], steps: NDArray[np.float64]) -> NDArray[np.float64]:
+        bearings: NDArray[np.float64] = camera.unproject(axis + steps[:, None] * (border - axis))
+        return np.arctan2(np.hypot(bearings[:, 0], bearings[:, 1]), sign * bearings[:, 2])
+
     def reach(u: float, v: float) -> float:
         """The largest angle from the axis on the way to a pixel of the border."""
-        way = axis + np.linspace(0.0, 1.0, _SAMPLES)[:, None] * (np.array([u, v]) - axis)
-        bearings: NDArray[np.float64] = camera.unproject(way)
-        theta = np.arctan2(np.hypot(bearings[:, 0], bearings[:, 1]), sign * bearings[:, 2])
-        return float(np.nanmax(theta)) if np.isfinite(theta).any() else 0.0
+        border, steps = np.array([u, v]), np.linspace(0.0, 1.0, _SAMPLES)
+        seen = np.flatnonzero(np.isfinite(angles(border, steps)))
+        if not seen.size:
+            return 0.0
+        last_seen = int(seen[-1])
+        beyond = np.linspace(steps[last_seen], steps[min(last_seen + 1, _SAMPLES - 1)], _SAMPLES)
+        return float(np.nanmax(angles(border, beyond)))
 
     (u, v), (right, bottom) = axis, last
     mask = camera.valid_mask()

@@ -31,7 +31,7 @@ ROTATION_WORDS: Final[dict[str, tuple[tuple[float, float, float], ...]]] = {
 
 _KEYS: Final = ("robot_from_camera", "quaternion")
 _EXPECTED: Final = (
-    "nine numbers in three rows, or the key robot_from_camera with a 3x3 matrix, or the key quaternion with [x, y, z, w]"
+    "nine numbers in rows, or the key robot_from_camera with a 3x3 matrix, or the key quaternion with [x, y, z, w]"
 )
 _SLACK: Final = 1e-3
 """Files carry rounded numbers: a matrix or quaternion this close to a rotation is replaced by the nearest one."""
@@ -121,7 +121,7 @@ def _array(file: Path, key: str, value: object) -> Matrix:
 def _from_quaternion(q: Matrix, where: str) -> Matrix:
     norm = math.sqrt(float(q @ q))
     if not abs(norm - 1.0) <= _SLACK:
-        raise CalibrationError(f"{where}: a quaternion of length {norm:.6g}, expected length 1, in the order [x, y, z, w]")
+        raise CalibrationError(f"{where}: a quaternion of length {norm:.6g}, expected [x, y, z, w] of length 1")
     x, y, z, w = (float(value) / norm for value in q)
     return np.array(
         [

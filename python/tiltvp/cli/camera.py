@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 from cyclopts import App, Parameter
 
 from tiltvp.cli.options import Switch, image_size_from
-from tiltvp.cli.terminal import complain, named, new_table, output, say
+from tiltvp.cli.terminal import complain, named, new_table, say, show
 from tiltvp.errors import CalibrationError, InvalidInputError, TiltvpError
 
 if TYPE_CHECKING:
@@ -24,6 +24,10 @@ app = App(name="camera", help="Calibration files: their cameras, whether these a
 
 LARGEST_ROUND_TRIP_PX = 1e-6
 LARGEST_JACOBIAN_ERROR = 1e-6
+_CHECK_COLUMNS = (
+    "file", "camera", "model", "pixels", "lost", "round trip px", "round trip rad", "Jacobian error", "rim deg",
+    "verdict",
+)  # fmt: skip
 Format = Annotated[str | None, Parameter(name=("--format", "--camera-format"))]
 
 
@@ -42,9 +46,8 @@ def info(file: Path, /, *, format: Format = None, image_size: str | None = None,
     mirror
         The image is seen in a mirror.
     """
-    console = output()
     for spec in _specs(file, format, image_size):
-        console.print(_info_table(spec, _built(file, spec, mirror)))
+        show(_info_table(spec, _built(file, spec, mirror)))
 
 
 @app.command
@@ -79,7 +82,9 @@ def convert(
         if not chosen and camera_name.isdecimal():
             chosen = specs[int(camera_name) :][:1]
         if not chosen:
-            raise InvalidInputError(f"{file}: no camera {camera_name!r}, expected one of {', '.join(names)} or its number")
+            raise InvalidInputError(
+                f"{file}: no camera {camera_name!r}, expected one of {', '.join(names)} or a number"
+            )
         specs = chosen[:1]
     for spec in specs:
         _built(file, spec)
@@ -104,8 +109,7 @@ def check(files: list[Path], /, *, format: Format = None, image_size: str | None
     image_size
         WIDTHxHEIGHT in pixels, for formats that do not carry it.
     """
-    columns = "pixels,lost,round trip px,round trip rad,Jacobian error,rim deg".split(",")
-    table = new_table(None, ("file", "camera", "model", *columns, "verdict"), ("file", "camera", "model", "verdict"))
+    table = new_table(None, _CHECK_COLUMNS, ("file", "camera", "model", "verdict"))
     sound = True
     for file in files:
         try:
@@ -114,7 +118,7 @@ def check(files: list[Path], /, *, format: Format = None, image_size: str | None
         except TiltvpError as error:
             complain(named(file, str(error)))
             sound = False
-    output().print(table)
+    show(table)
     return 0 if sound else 1
 
 
@@ -127,7 +131,7 @@ def formats() -> None:
     for one in FORMATS:
         words = (sys.modules[one.parse.__module__].__doc__ or "").strip()
         table.add_row(one.name, " ".join(words.split("\n\n")[0].split()))
-    output().print(table)
+    show(table)
 
 
 def _specs(file: Path, format: str | None, image_size: str | None) -> list[CameraSpec]:

@@ -7,7 +7,7 @@ import statistics
 import sys
 import time
 from collections.abc import Sequence
-from contextlib import nullcontext
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Final
@@ -15,11 +15,13 @@ from typing import TYPE_CHECKING, Annotated, Final
 from cyclopts import Parameter
 
 from tiltvp.cli.results import degrees
-from tiltvp.cli.terminal import new_table, output, say
+from tiltvp.cli.terminal import new_table, say, show
 from tiltvp.cli.tilt import words_of
 
 if TYPE_CHECKING:
+    import numpy as np
     import polars as pl
+    from numpy.typing import NDArray
 
     from tiltvp import Camera, EdgeElements, TiltEstimate
     from tiltvp.plots.demo import DemoData
@@ -136,18 +138,18 @@ def _option_words(name: str, value: object) -> str:
 
 
 def _print_table(room: RoomImage, trials: Sequence[Trial]) -> None:
-    columns = "alpha deg,beta deg,error deg,confidence,edges px,inliers px,ms".split(",")
-    table = new_table("estimated against true", ("method", *columns), left=("method",))
+    columns = ("method", "alpha deg", "beta deg", "error deg", "confidence", "edges px", "inliers px", "ms")
+    table = new_table("estimated against true", columns, left=("method",))
     table.add_row("true", degrees(room.alpha_rad), degrees(room.beta_rad), *[""] * 5, style="bold")
     for trial in trials:
         e = trial.estimate
         angles = (degrees(e.alpha_rad), degrees(e.beta_rad), degrees(trial.error_rad))
         counts = (str(e.edge_pixels), str(e.inlier_pixels), f"{1e3 * trial.time_s:.2f}")
         table.add_row(trial.label, *angles, f"{e.confidence:.3f}", *counts)
-    output().print(table)
+    show(table)
 
 
-def _pictures(camera: Camera, room: RoomImage, trials: Sequence[Trial]) -> dict[str, object]:
+def _pictures(camera: Camera, room: RoomImage, trials: Sequence[Trial]) -> dict[str, NDArray[np.uint8]]:
     import numpy as np
 
     from tiltvp.plots.demo import demo_plot, demo_summary
@@ -177,7 +179,7 @@ def _seen_square(camera: Camera) -> tuple[slice, slice]:
 
 
 def _demo_data(camera: Camera, room: RoomImage, trials: Sequence[Trial]) -> DemoData:
-    """The first trial is drawn and levels the image; the first with a shift tells how many pixels a radian of tilt is."""
+    """The first trial is drawn and levels the image; the first with a shift tells the pixels per radian."""
     from tiltvp import level, normal_from_alpha_beta
     from tiltvp.plots.demo import DemoData
     from tiltvp.plots.marks import tilt_overlay
@@ -228,10 +230,11 @@ def _frame(trials: Sequence[Trial]) -> pl.DataFrame:
         }
         for trial in trials
     ]
-    return pl.DataFrame(rows, schema={"method": pl.String, **dict.fromkeys(("alpha_rad", "beta_rad", "error_rad"), pl.Float64)})
+    angles = dict.fromkeys(("alpha_rad", "beta_rad", "error_rad"), pl.Float64)
+    return pl.DataFrame(rows, schema={"method": pl.String, **angles})
 
 
-def _status(words: str) -> object:
+def _status(words: str) -> AbstractContextManager[object]:
     """A moving sign on stderr while something takes long, on a terminal."""
     if not sys.stderr.isatty():
         return nullcontext()

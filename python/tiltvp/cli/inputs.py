@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import glob
 import os
-from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Final
@@ -24,7 +23,7 @@ def find_images(words: Sequence[str]) -> tuple[list[Path], list[str]]:
         if path.is_dir():
             found = _images_of(path)
             if not found:
-                problems.append(f"{word}: a folder without images, expected files that end in {' '.join(IMAGE_ENDINGS)}")
+                problems.append(f"{word}: a folder without images, expected files in {' '.join(IMAGE_ENDINGS)}")
         elif path.exists() or not glob.has_magic(word):
             found = [path]
         else:
@@ -41,22 +40,35 @@ def _images_of(folder: Path) -> list[Path]:
 
 
 def distinct_names(files: Sequence[Path]) -> list[str]:
-    """A name without ending for each file: its stem, with its ending and then its folders put in where stems are equal.
+    """A name without ending for each file: its stem, with folders in front and the ending behind where stems are equal.
 
     Names that differ only in case count as equal, as some file systems have it.
     """
+    groups: dict[str, list[int]] = {}
+    for i, file in enumerate(files):
+        groups.setdefault(file.stem.lower(), []).append(i)
     names = [file.stem for file in files]
-    parts = [(file.stem, file.suffix.lstrip("."), Path(os.path.abspath(file)).parent.parts[1:]) for file in files]
-    for depth in range(1 + max((len(folders) for _, _, folders in parts), default=0)):
-        counts = Counter(name.lower() for name in names)
-        if max(counts.values(), default=1) == 1:
-            break
-        for i, (stem, ending, folders) in enumerate(parts):
-            if counts[names[i].lower()] > 1:
-                alike = [p for p in parts if p[0].lower() == stem.lower() and p[2] == folders]
-                words = [*folders[len(folders) - depth :], f"{stem}_{ending}" if len(alike) > 1 else stem]
-                names[i] = "_".join(words)
+    for places in groups.values():
+        if len(places) > 1:
+            for i, name in zip(places, _told_apart([files[i] for i in places]), strict=True):
+                names[i] = name
     return _numbered(names)
+
+
+def _told_apart(files: Sequence[Path]) -> list[str]:
+    """Names for files of one stem: as few folders as tell them apart, and the endings if one folder has several."""
+    folders = [Path(os.path.abspath(file)).parent.parts[1:] for file in files]
+    several = len(set(folders)) < len(folders)
+    ends = [f"{file.stem}_{file.suffix.lstrip('.')}" if several else file.stem for file in files]
+    most = max(map(len, folders))
+    names = ends
+    for depth in range(0 if len(set(folders)) == 1 else 1, most + 1):
+        names = [
+            "_".join([*parts[max(0, len(parts) - depth) :], end]) for parts, end in zip(folders, ends, strict=True)
+        ]
+        if len({name.lower() for name in names}) == len(names):
+            break
+    return names
 
 
 def _numbered(names: list[str]) -> list[str]:

@@ -18,6 +18,11 @@ if TYPE_CHECKING:
 
 _CAMERA = Group("Camera")
 _METHOD = Group("Method", help="An option that is not given has the default of its method.")
+_AS_THEY_ARE = (
+    "method", "margin_px", "gradient_min", "smoothing_px", "keep_fraction", "threshold_px", "offset_max_px", "normal",
+    "seed",
+)  # fmt: skip
+_ANGLES = ("elevation_min", "elevation_max", "tilt_max", "scale", "threshold")
 Switch = Annotated[bool, Parameter(negative="", show_default=False)]
 
 
@@ -117,9 +122,8 @@ class MethodOptions:
 
     def _given(self) -> dict[str, object]:
         """The keywords of `TiltEstimator`: what was not given is left to the library."""
-        plain = ("method", "margin_px", "gradient_min", "smoothing_px", "keep_fraction", "threshold_px", "offset_max_px")
-        options: dict[str, object] = {name: getattr(self, name) for name in (*plain, "normal", "seed")}
-        for name in ("elevation_min", "elevation_max", "tilt_max", "scale", "threshold"):
+        options: dict[str, object] = {name: getattr(self, name) for name in _AS_THEY_ARE}
+        for name in _ANGLES:
             degrees = getattr(self, f"{name}_deg")
             options[f"{name}_rad"] = None if degrees is None else math.radians(degrees)
         options = {name: value for name, value in options.items() if value is not None}

@@ -6,6 +6,7 @@ import math
 import os
 import secrets
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
@@ -19,6 +20,9 @@ if TYPE_CHECKING:
 
     from tiltvp import TiltEstimate
 
+_PEOPLE: Final = (
+    "alpha deg", "beta deg", "roll deg", "pitch deg", "confidence", "1-sigma deg", "edges px", "inliers px", "ms",
+)  # fmt: skip
 ENDINGS: Final = (".csv", ".json", ".parquet")
 _NUMBERS: Final = (
     "alpha_rad", "beta_rad", "roll_rad", "pitch_rad", "normal_x", "normal_y", "normal_z",
@@ -52,12 +56,11 @@ def degrees(value_rad: float, digits: int = 2) -> str:
 
 def people_table(outcomes: Sequence[Outcome]) -> Table:
     """One row for each image, angles in degrees."""
-    columns = "alpha deg,beta deg,roll deg,pitch deg,confidence,1-sigma deg,edges px,inliers px,ms".split(",")
-    table = new_table(None, ("file", *columns, "reason"), left=("file", "reason"))
+    table = new_table(None, ("file", *_PEOPLE, "reason"), left=("file", "reason"))
     for outcome in outcomes:
         e = outcome.estimate
         if e is None:
-            table.add_row(str(outcome.file), *["-"] * len(columns), outcome.error or "", style="red")
+            table.add_row(str(outcome.file), *["-"] * len(_PEOPLE), outcome.error or "", style="red")
             continue
         angles = [degrees(angle) for angle in (e.alpha_rad, e.beta_rad, e.roll_rad, e.pitch_rad)]
         counts = (str(e.edge_pixels), str(e.inlier_pixels), f"{1e3 * outcome.time_s:.2f}")
@@ -83,12 +86,15 @@ def _row(outcome: Outcome) -> dict[str, object]:
     if e is None:
         return {"error": outcome.error}
     normal, covariance = e.normal, e.covariance_rad2
-    row = {name: getattr(e, name) for name in ("alpha_rad", "beta_rad", "roll_rad", "pitch_rad", "confidence")}
+    row: dict[str, object] = {
+        name: getattr(e, name) for name in ("alpha_rad", "beta_rad", "roll_rad", "pitch_rad", "confidence")
+    }
     row |= {f"normal_{axis}": float(normal[i]) for i, axis in enumerate("xyz")}
     places = {"xx": (0, 0), "xy": (0, 1), "yy": (1, 1)}
     row |= {f"covariance_{name}_rad2": float(covariance[place]) for name, place in places.items()}
     row |= {name: getattr(e, name) for name in ("edge_pixels", "prefiltered_pixels", "inlier_pixels", "shift_px")}
-    return row | e.report | {"sigma_rad": sigma_rad(e), "time_s": outcome.time_s}
+    row |= e.report
+    return row | {"sigma_rad": sigma_rad(e), "time_s": outcome.time_s}
 
 
 def _plain(value: object) -> object:
@@ -118,4 +124,5 @@ def write_frame(frame: pl.DataFrame, path: Path) -> None:
     except OSError as error:
         raise ImageFileError(f"{path}: cannot be written ({error.strerror or error})") from error
     finally:
-        part.unlink(missing_ok=True)
+        with suppress(OSError):
+            part.unlink()

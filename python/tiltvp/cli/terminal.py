@@ -8,7 +8,6 @@ from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from rich.console import Console
     from rich.progress import Progress
     from rich.table import Table
 
@@ -16,12 +15,20 @@ _WIDTH_IN_FILES = 240
 """Columns that a table may take where there is no terminal to fit it into."""
 
 
-def output() -> Console:
-    """Standard output, made anew so that it is the one of now."""
+def show(*tables: Table) -> None:
+    """Tables on stdout: fitted to a terminal, and as wide as they are, without padding, in files and pipes."""
     from rich.console import Console
 
     console = Console(highlight=False)
-    return console if console.is_terminal else Console(highlight=False, width=_WIDTH_IN_FILES)
+    if console.is_terminal:
+        console.print(*tables)
+        return
+    console = Console(highlight=False, width=_WIDTH_IN_FILES)
+    with console.capture() as capture:
+        console.print(*tables)
+    for line in capture.get().splitlines():
+        if line.strip():
+            print(line.rstrip())
 
 
 def say(text: str) -> None:
@@ -31,7 +38,14 @@ def say(text: str) -> None:
 
 def complain(problem: str) -> None:
     """One line on stderr."""
-    print("tiltvp: " + " ".join(problem.split()), file=sys.stderr, flush=True)
+    print(_line(problem), file=sys.stderr, flush=True)
+
+
+def _line(problem: str) -> str:
+    """One line, in the words of the command line where the library speaks of its arguments."""
+    words = " ".join(problem.split())
+    words = words.replace("image_size=(width, height) from the caller", "--image-size WIDTHxHEIGHT")
+    return "tiltvp: " + words.replace("format= to say which", "--format or --camera-format to say which")
 
 
 def named(name: object, problem: str) -> str:
@@ -86,5 +100,4 @@ class ProgressBar:
         if self._progress is None:
             complain(problem)
         else:
-            line = "tiltvp: " + " ".join(problem.split())
-            self._progress.console.print(line, markup=False, soft_wrap=True)
+            self._progress.console.print(_line(problem), markup=False, soft_wrap=True)

@@ -15,7 +15,7 @@ from cyclopts import Parameter, validators
 from tiltvp.cli.inputs import distinct_names, find_images
 from tiltvp.cli.options import CameraOptions, MethodOptions
 from tiltvp.cli.results import Outcome, check_ending, data_frame, degrees, people_table, write_frame
-from tiltvp.cli.terminal import ProgressBar, complain, named, output, progress_bar
+from tiltvp.cli.terminal import ProgressBar, complain, named, progress_bar, show
 from tiltvp.errors import InvalidInputError, TiltvpError
 
 if TYPE_CHECKING:
@@ -59,14 +59,14 @@ def tilt(
     if out is not None:
         check_ending(out)
     if overlay is not None and level is not None and os.path.realpath(overlay) == os.path.realpath(level):
-        raise InvalidInputError(f"--overlay and --level are both {overlay}, expected two folders: the names would be equal")
+        raise InvalidInputError(f"--overlay and --level are both {overlay}, expected two folders")
     estimator = method.estimator(camera.load())
     files, problems = find_images(images)
     for problem in problems:
         complain(problem)
     work = Work(estimator, overlay, level)
     outcomes = _done(work, files, distinct_names(files), threads)
-    output().print(people_table(outcomes))
+    show(people_table(outcomes))
     if out is not None:
         write_frame(data_frame(outcomes, estimator.method), out)
     return 1 if problems or any(outcome.error for outcome in outcomes) else 0

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+import numpy as np
 from matplotlib.figure import Figure
 
 from tiltvp.plots.methods import draw_leans, draw_method_errors
@@ -12,7 +13,6 @@ from tiltvp.plots.offsets import Cosine, draw_offset_histogram
 from tiltvp.plots.picture import show_picture
 
 if TYPE_CHECKING:
-    import numpy as np
     import polars as pl
     from numpy.typing import NDArray
 
@@ -39,7 +39,8 @@ class DemoData:
 def demo_plot(data: DemoData) -> Figure:
     """Edges over the image and their (phi, s) histogram above, errors and leans of every method below."""
     figure = Figure(figsize=(13.0, 11.0), layout="constrained")
-    above, below = figure.subfigures(2, 1, height_ratios=(1.0, 0.72))
+    parts = np.ravel(np.asarray(figure.subfigures(2, 1, height_ratios=(1.0, 0.72)), dtype=object))
+    above, below = parts[0], parts[1]
     picture, histogram = above.subplots(1, 2, width_ratios=(1.0, 1.0))
     show_picture(picture, data.overlay, "edges that agree (hue: direction), horizon and zenith")
     draw_offset_histogram(histogram, data.phi_rad, data.offset_px, data.cosines)

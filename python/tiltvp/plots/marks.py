@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from typing import TYPE_CHECKING
 
 import cv2
@@ -34,7 +35,7 @@ def tilt_overlay(
     robot_from_camera: ArrayLike | None = None,
     words: str = "",
 ) -> Picture:
-    """The image in dimmed grey, (H, W, 3) BGR uint8: its inlier edges in colour, horizons and vanishing points, `words`.
+    """The image in dimmed grey, (H, W, 3) BGR uint8, with inlier edges in colour, horizons, zenith, nadir and `words`.
 
     Yellow are the horizon and the vertical vanishing points of the estimate, grey those of an upright robot.
     """
@@ -73,16 +74,28 @@ def draw_tilt(
 
 
 def draw_words(picture: Picture, words: str) -> Picture:
-    """A copy with one line of words in the upper left corner, as large as fits."""
+    """A copy with one line of words in the upper left corner, white with a black rim, as large as fits."""
     canvas = picture.copy()
-    font, width = cv2.FONT_HERSHEY_SIMPLEX, canvas.shape[1]
-    scale = min(canvas.shape[0] / 900.0, 0.97 * width / max(1, cv2.getTextSize(words, font, 1.0, 1)[0][0]))
-    height = cv2.getTextSize(words, font, scale, 1)[0][1]
-    place = (round(0.012 * width), round(0.012 * width) + height)
-    thick = max(1, round(2.0 * scale))
-    cv2.putText(canvas, words, place, font, scale, (0, 0, 0), 3 * thick, cv2.LINE_AA)
-    cv2.putText(canvas, words, place, font, scale, (255, 255, 255), thick, cv2.LINE_AA)
+    height, width = canvas.shape[:2]
+    space = max(2, round(0.012 * width))
+    ink = _ink(words)
+    scale = min(height / 38.0 / ink.shape[0], (width - 2.0 * space) / ink.shape[1], height / 2.0 / ink.shape[0])
+    if min(scale * ink.shape[0], scale * ink.shape[1]) < 1.0:
+        return canvas
+    ink = np.asarray(cv2.resize(ink, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA), dtype=np.uint8)
+    ink = np.pad(ink, 2)[: height - space, : width - space]
+    rim = np.asarray(cv2.dilate(ink, np.ones((5, 5), dtype=np.uint8)), dtype=np.float64)[:, :, None] / 255.0
+    part = canvas[space : space + ink.shape[0], space : space + ink.shape[1]]
+    part[:] = np.maximum((1.0 - rim) * part, ink[:, :, None]).astype(np.uint8)
     return canvas
+
+
+def _ink(words: str) -> Picture:
+    """The words, white on black, cut to what they cover; large, so that they can be made smaller."""
+    strip = np.zeros((120, 80 * (len(words) + 2)), dtype=np.uint8)
+    cv2.putText(strip, words, (40, 80), cv2.FONT_HERSHEY_SIMPLEX, 2.0, 255, 3, cv2.LINE_AA)
+    rows, columns = np.flatnonzero(strip.any(axis=1)), np.flatnonzero(strip.any(axis=0))
+    return strip[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1] if rows.size else strip
 
 
 def _horizon(camera: Camera, up: NDArray[np.float64]) -> list[tuple[NDArray[np.float64], NDArray[np.float64]]]:
@@ -93,8 +106,11 @@ def _horizon(camera: Camera, up: NDArray[np.float64]) -> list[tuple[NDArray[np.f
     turn = np.linspace(0.0, 2.0 * np.pi, _HORIZON_POINTS + 1)[:, None]
     places: NDArray[np.float64] = camera.project(np.cos(turn) * first + np.sin(turn) * np.cross(up, first))
     far = 0.1 * max(camera.width, camera.height)
-    pieces = zip(places[:-1], places[1:], strict=True)
-    return [(a, b) for a, b in pieces if np.isfinite(a).all() and np.isfinite(b).all() and np.abs(b - a).max() < far]
+    return [
+        (a, b)
+        for a, b in itertools.pairwise(places)
+        if np.isfinite(a).all() and np.isfinite(b).all() and np.abs(b - a).max() < far
+    ]
 
 
 def _inside(picture: Picture, place: NDArray[np.float64]) -> bool:

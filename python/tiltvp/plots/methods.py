@@ -58,8 +58,9 @@ def draw_leans(axes: Axes, table: pl.DataFrame, *, alpha_rad: float, beta_rad: f
         place = (-alpha * np.sin(beta), alpha * np.cos(beta))
         if np.isfinite(place).all():
             leans.append(place)
-            axes.plot(*place, marker=marker, color=colour, markersize=8, linestyle="none", label=row["method"], zorder=3)
-    axes.plot(*true, marker="+", color="red", markersize=16, markeredgewidth=2.4, linestyle="none", label="true", zorder=4)
+            label = row["method"]
+            axes.plot(*place, marker=marker, color=colour, markersize=8, linestyle="none", label=label, zorder=3)
+    axes.plot(*true, marker="+", color="red", markersize=16, markeredgewidth=2.4, label="true", zorder=4)
     axes.annotate("true", true, xytext=(9, 7), textcoords="offset points", color="red")
     places = np.array([*leans, (0.0, 0.0)])
     low, high = places.min(axis=0), places.max(axis=0)

@@ -53,7 +53,12 @@ def cosine_of_tilt(
 
 
 def draw_offset_histogram(
-    axes: Axes, phi_rad: ArrayLike, offset_px: ArrayLike, cosines: tuple[Cosine, ...] = (), *, offset_max_px: float = 40.0
+    axes: Axes,
+    phi_rad: ArrayLike,
+    offset_px: ArrayLike,
+    cosines: tuple[Cosine, ...] = (),
+    *,
+    offset_max_px: float = 40.0,
 ) -> None:
     """Draws the (phi, s) histogram, darker where more edge pixels are, and the cosines, on axes of yours."""
     phi, offset = np.asarray(phi_rad, dtype=np.float64), np.asarray(offset_px, dtype=np.float64)

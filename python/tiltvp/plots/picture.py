@@ -20,8 +20,9 @@ def figure_picture(figure: Figure, *, dpi: float = 150.0) -> NDArray[np.uint8]:
     """The figure rendered as (H, W, 3) BGR uint8; no window and no process-wide setting is involved."""
     figure.set_dpi(dpi)
     canvas = FigureCanvasAgg(figure)
-    canvas.draw()
-    return np.asarray(cv2.cvtColor(np.asarray(canvas.buffer_rgba()), cv2.COLOR_RGBA2BGR), dtype=np.uint8)
+    canvas.draw()  # type: ignore[no-untyped-call]
+    rgba = np.asarray(canvas.buffer_rgba())  # type: ignore[no-untyped-call]
+    return np.asarray(cv2.cvtColor(rgba, cv2.COLOR_RGBA2BGR), dtype=np.uint8)
 
 
 def show_picture(axes: Axes, bgr: NDArray[np.uint8], title: str = "") -> None:
