@@ -283,6 +283,15 @@ def test_overlay_and_level_of_equal_names(run: Run, world: Path, tmp_path: Path)
     assert tiltvp.read_image(level / "more_a.png").ndim == 2
 
 
+def test_names_are_shown_as_they_are(run: Run, world: Path, tmp_path: Path) -> None:
+    name = tmp_path / "[red]:smile: [x].png"
+    tiltvp.write_image(name, tiltvp.read_image(world / "images/a.png"))
+    said = run("tilt", name, "--camera", world / "camera.toml", "--overlay", tmp_path / "overlay")
+    assert said.code == 0
+    assert str(name) in said.out
+    assert (tmp_path / "overlay" / name.name).exists()
+
+
 def test_threads_do_not_change_results(run: Run, world: Path, tmp_path: Path) -> None:
     texts = []
     for threads in (1, 4):
@@ -452,3 +461,10 @@ def test_demo(run: Run, tmp_path: Path) -> None:
     found = tiltvp.normal_from_alpha_beta(math.radians(alpha), math.radians(beta))
     assert abs(math.degrees(tiltvp.tilt_error_rad(found, true)) - error) < 0.02
     assert error < 2.0
+
+
+@pytest.mark.parametrize(("alpha_deg", "kind"), [(0, "corridor"), (60, "under-table")])
+def test_demo_where_methods_find_little(run: Run, tmp_path: Path, alpha_deg: float, kind: str) -> None:
+    said = run("demo", "--out", tmp_path, "--width", 120, "--height", 90, "--alpha-deg", alpha_deg, "--kind", kind)
+    assert (said.code, said.err) == (0, "")
+    assert (tmp_path / "plot.png").exists()

@@ -129,8 +129,10 @@ def formats() -> None:
 
     table = new_table(None, ("format", "what it is"), ("format", "what it is"))
     for one in FORMATS:
-        words = (sys.modules[one.parse.__module__].__doc__ or "").strip()
-        table.add_row(one.name, " ".join(words.split("\n\n")[0].split()))
+        words = " ".join((sys.modules[one.parse.__module__].__doc__ or "").split("\n\n")[0].split())
+        family, _, kind = one.name.partition("-")
+        is_variant = any(other.name == family for other in FORMATS) and kind
+        table.add_row(one.name, f"The same as {family}, taken as a {kind} camera." if is_variant else words)
     show(table)
 
 

@@ -186,14 +186,18 @@ def _demo_data(camera: Camera, room: RoomImage, trials: Sequence[Trial]) -> Demo
     from tiltvp.plots.offsets import cosine_of_tilt
 
     best = trials[0]
-    shifted = next(trial for trial in trials if trial.estimate.shift_px is not None)
     true = normal_from_alpha_beta(room.alpha_rad, room.beta_rad)
-    factor = shifted.estimate.shift_px / shifted.estimate.alpha_rad
-    cosines = (
-        cosine_of_tilt("true tilt", camera, true, factor * room.alpha_rad, colour="red", dashed=True),
-        _cosine(camera, best, factor, "tab:blue"),
-        _cosine(camera, shifted, factor, "tab:orange"),
-    )
+    cosines: tuple[Cosine, ...] = ()
+    for shifted in trials:
+        estimate = shifted.estimate
+        if estimate and estimate.shift_px is not None and estimate.alpha_rad > 0.0:
+            factor = estimate.shift_px / estimate.alpha_rad
+            cosines = (
+                cosine_of_tilt("true tilt", camera, true, factor * room.alpha_rad, colour="red", dashed=True),
+                _cosine(camera, best, factor, "tab:blue"),
+                _cosine(camera, shifted, factor, "tab:orange"),
+            )
+            break
     levelled = level(room.bgr, camera, best.estimate) if best.estimate else room.bgr
     return DemoData(
         overlay=tilt_overlay(room.bgr, camera, best.estimate, best.edges),

@@ -60,15 +60,13 @@ def _told_apart(files: Sequence[Path]) -> list[str]:
     folders = [Path(os.path.abspath(file)).parent.parts[1:] for file in files]
     several = len(set(folders)) < len(folders)
     ends = [f"{file.stem}_{file.suffix.lstrip('.')}" if several else file.stem for file in files]
-    most = max(map(len, folders))
-    names = ends
-    for depth in range(0 if len(set(folders)) == 1 else 1, most + 1):
+    for depth in range(0 if len(set(folders)) == 1 else 1, max(map(len, folders)) + 1):
         names = [
             "_".join([*parts[max(0, len(parts) - depth) :], end]) for parts, end in zip(folders, ends, strict=True)
         ]
         if len({name.lower() for name in names}) == len(names):
-            break
-    return names
+            return names
+    return ["_".join([*parts[-1:], end]) for parts, end in zip(folders, ends, strict=True)]
 
 
 def _numbered(names: list[str]) -> list[str]:

@@ -21,8 +21,12 @@ if TYPE_CHECKING:
     from tiltvp import TiltEstimate
 
 _PEOPLE: Final = (
-    "alpha deg", "beta deg", "roll deg", "pitch deg", "confidence", "1-sigma deg", "edges px", "inliers px", "ms",
+    "file", "alpha deg", "beta deg", "roll deg", "pitch deg", "confidence", "1-sigma deg", "edges px", "inliers px",
+    "ms", "reason",
 )  # fmt: skip
+_PEOPLE_NARROW: Final = ("file", "alpha deg", "beta deg", "confidence", "1-sigma deg")
+_NUMBERS_WIDTH, _FILE_WIDTH = 135, 40
+"""Columns of text that all but the file and a folded reason take, and those that a long file name is granted."""
 ENDINGS: Final = (".csv", ".json", ".parquet")
 _NUMBERS: Final = (
     "alpha_rad", "beta_rad", "roll_rad", "pitch_rad", "normal_x", "normal_y", "normal_z",
@@ -54,20 +58,31 @@ def degrees(value_rad: float, digits: int = 2) -> str:
     return f"{math.degrees(value_rad):.{digits}f}" if math.isfinite(value_rad) else "-"
 
 
-def people_table(outcomes: Sequence[Outcome]) -> Table:
-    """One row for each image, angles in degrees."""
-    table = new_table(None, ("file", *_PEOPLE, "reason"), left=("file", "reason"))
-    for outcome in outcomes:
-        e = outcome.estimate
-        if e is None:
-            table.add_row(str(outcome.file), *["-"] * len(_PEOPLE), outcome.error or "", style="red")
-            continue
-        angles = [degrees(angle) for angle in (e.alpha_rad, e.beta_rad, e.roll_rad, e.pitch_rad)]
-        counts = (str(e.edge_pixels), str(e.inlier_pixels), f"{1e3 * outcome.time_s:.2f}")
-        sure = f"{e.confidence:.3f}"
-        style = "yellow" if not e else None
-        table.add_row(str(outcome.file), *angles, sure, degrees(sigma_rad(e)), *counts, e.reason, style=style)
+def people_table(outcomes: Sequence[Outcome], width: int) -> Table:
+    """One row for each image, angles in degrees; only the columns that matter most where `width` holds no more."""
+    rows = [_people_row(outcome) for outcome in outcomes]
+    longest = max((len(row["file"]) for row in rows), default=0)
+    columns = _PEOPLE if width >= _NUMBERS_WIDTH + min(longest, _FILE_WIDTH) else _PEOPLE_NARROW
+    table = new_table(None, columns, left=("file", "reason"))
+    for outcome, row in zip(outcomes, rows, strict=True):
+        style = "red" if outcome.estimate is None else None if outcome.estimate else "yellow"
+        table.add_row(*[row[column] for column in columns], style=style)
     return table
+
+
+def _people_row(outcome: Outcome) -> dict[str, str]:
+    row = dict.fromkeys(_PEOPLE, "-") | {"file": str(outcome.file), "reason": outcome.error or ""}
+    e = outcome.estimate
+    if e is None:
+        return row
+    angles = {name: degrees(getattr(e, f"{name}_rad")) for name in ("alpha", "beta", "roll", "pitch")}
+    row |= {f"{name} deg": words for name, words in angles.items()}
+    row |= {"confidence": f"{e.confidence:.3f}", "1-sigma deg": degrees(sigma_rad(e)), "reason": e.reason}
+    return row | {
+        "edges px": str(e.edge_pixels),
+        "inliers px": str(e.inlier_pixels),
+        "ms": f"{1e3 * outcome.time_s:.2f}",
+    }
 
 
 def data_frame(outcomes: Sequence[Outcome], method: str) -> pl.DataFrame:

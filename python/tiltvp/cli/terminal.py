@@ -19,16 +19,23 @@ def show(*tables: Table) -> None:
     """Tables on stdout: fitted to a terminal, and as wide as they are, without padding, in files and pipes."""
     from rich.console import Console
 
-    console = Console(highlight=False)
+    console = Console(highlight=False, markup=False, emoji=False, width=width())
     if console.is_terminal:
         console.print(*tables)
         return
-    console = Console(highlight=False, width=_WIDTH_IN_FILES)
     with console.capture() as capture:
         console.print(*tables)
     for line in capture.get().splitlines():
         if line.strip():
             print(line.rstrip())
+
+
+def width() -> int:
+    """Columns of text that a table may take."""
+    from rich.console import Console
+
+    console = Console()
+    return console.width if console.is_terminal else _WIDTH_IN_FILES
 
 
 def say(text: str) -> None:

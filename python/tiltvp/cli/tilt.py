@@ -15,7 +15,7 @@ from cyclopts import Parameter, validators
 from tiltvp.cli.inputs import distinct_names, find_images
 from tiltvp.cli.options import CameraOptions, MethodOptions
 from tiltvp.cli.results import Outcome, check_ending, data_frame, degrees, people_table, write_frame
-from tiltvp.cli.terminal import ProgressBar, complain, named, progress_bar, show
+from tiltvp.cli.terminal import ProgressBar, complain, named, progress_bar, show, width
 from tiltvp.errors import InvalidInputError, TiltvpError
 
 if TYPE_CHECKING:
@@ -66,7 +66,7 @@ def tilt(
         complain(problem)
     work = Work(estimator, overlay, level)
     outcomes = _done(work, files, distinct_names(files), threads)
-    show(people_table(outcomes))
+    show(people_table(outcomes, width()))
     if out is not None:
         write_frame(data_frame(outcomes, estimator.method), out)
     return 1 if problems or any(outcome.error for outcome in outcomes) else 0
