@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -94,5 +95,6 @@ def write_image(path: str | os.PathLike[str], image: NDArray[np.uint8]) -> None:
         part.write_bytes(data.tobytes())
         part.replace(file)
     except OSError as error:
-        part.unlink(missing_ok=True)
+        with suppress(OSError):
+            part.unlink()
         raise ImageFileError(f"{file}: {error.strerror or error}") from error
