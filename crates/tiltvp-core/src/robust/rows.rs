@@ -50,6 +50,14 @@ impl<T: Real> Rows<T> {
         self.len += 1;
     }
 
+    /// Appends every `stride`-th row of another set.
+    pub fn extend(&mut self, other: &Self, stride: usize) {
+        let [x, y, z] = other.columns();
+        for ((x, y), z) in x.iter().zip(y).zip(z).step_by(stride.max(1)) {
+            self.push(*x, *y, *z);
+        }
+    }
+
     /// Replaces all rows: `write` fills the columns, which have room for `capacity` rows, and returns how many it wrote.
     pub fn refill(&mut self, capacity: usize, write: impl FnOnce([&mut [T]; 3]) -> usize) {
         for column in &mut self.columns {
@@ -111,18 +119,19 @@ impl<T: Real> Rows<T> {
         T::count(row, model.map(T::from_f64), T::from_f64(threshold * threshold)) == 1
     }
 
-    /// Calls `visit(row, [weight, slope, x, y, residual])` for each row whose weight (one where none are given), multiplied by
-    /// the gate about a model, is above zero; `slope` is the weight multiplied by [`Gate::slope`].
+    /// Calls `visit(row, [weight, slope, x, y, residual])` for every `stride`-th row whose weight (one where none are given),
+    /// multiplied by the gate about a model, is above zero; `slope` is the weight multiplied by [`Gate::slope`].
     pub fn for_each_gated(
         &self,
         model: [f64; 3],
         gate: Gate,
         weights: Option<&[f32]>,
+        stride: usize,
         mut visit: impl FnMut(usize, [f64; 5]),
     ) {
         let [x, y, z] = self.columns();
         let (limit, inverse) = gate.coefficients();
-        for (row, ((x, y), z)) in x.iter().zip(y).zip(z).enumerate() {
+        for (row, ((x, y), z)) in x.iter().zip(y).zip(z).enumerate().step_by(stride.max(1)) {
             let (x, y, z) = (x.to_f64(), y.to_f64(), z.to_f64());
             let d = x * model[0] + y * model[1] + z * model[2];
             let own = weights.map_or(1.0, |weights| weights.get(row).copied().map_or(0.0, f64::from));
@@ -233,20 +242,11 @@ pub trait Real:
 
 #[inline(always)]
 fn count_body<T: Real>([x, y, z]: [&[T]; 3], [h0, h1, h2]: [T; 3], limit: T) -> usize {
-    let mut lanes = [0u32; LANES];
-    let within = |x: T, y: T, z: T| {
-        let d = x * h0 + y * h1 + z * h2;
+    let within = |((x, y), z): ((&T, &T), &T)| {
+        let d = *x * h0 + *y * h1 + *z * h2;
         u32::from(d * d <= limit)
     };
-    let ((x, rest_x), (y, rest_y), (z, rest_z)) =
-        (x.as_chunks::<LANES>(), y.as_chunks::<LANES>(), z.as_chunks::<LANES>());
-    for ((x, y), z) in x.iter().zip(y).zip(z) {
-        for i in 0..LANES {
-            lanes[i] += within(x[i], y[i], z[i]);
-        }
-    }
-    let rest: u32 = rest_x.iter().zip(rest_y).zip(rest_z).map(|((x, y), z)| within(*x, *y, *z)).sum();
-    (lanes.iter().sum::<u32>() + rest) as usize
+    x.iter().zip(y).zip(z).map(within).sum::<u32>() as usize
 }
 
 /// One block: residuals and gated weights first, then each sum in lanes of its own, all of it in the first-level cache.
@@ -442,7 +442,7 @@ mod tests {
             assert!((found.weight - weight).abs() < tolerance * scale, "{len} rows, {gate:?}");
             assert!((found.second_moments() - sum).norm() < tolerance * scale, "{len} rows, {gate:?}");
             let mut visited = 0;
-            rows.for_each_gated(model, gate, Some(&before), |i, [weight, slope, x, y, d]| {
+            rows.for_each_gated(model, gate, Some(&before), 1, |i, [weight, slope, x, y, d]| {
                 let row = rows.get(i).unwrap();
                 let own = f64::from(before[i]);
                 assert_eq!((x, y, d), (row.x, row.y, row.x * model[0] + row.y * model[1] + row.z * model[2]));

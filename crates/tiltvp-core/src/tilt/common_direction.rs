@@ -3,7 +3,7 @@
 use nalgebra::{Matrix2, Rotation3, Unit, Vector3};
 
 use super::confidence::inverse_of_positive;
-use super::refine::{RefineOptions, refine};
+use super::refine::{RefineOptions, Sparse, refine};
 use crate::error::{Error, Result};
 use crate::geometry::tangent_basis;
 use crate::robust::{Gate, Rows, Stop};
@@ -77,7 +77,7 @@ pub fn common_direction(
         max_iterations: 50,
         ..RefineOptions::default()
     };
-    let report = refine(&rows, &refining, &mut row_weights, &mut Vec::new());
+    let report = refine(&rows, &refining, &mut row_weights, &mut Sparse::default());
     let found = report.model.filter(|o| o.z >= options.max_angle_rad.cos());
     let stop = match (report.model, found) {
         (Some(o), None) => Stop::OutOfReach { angle_rad: o.xy().norm().atan2(o.z), limit_rad: options.max_angle_rad },

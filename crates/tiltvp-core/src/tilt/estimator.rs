@@ -9,7 +9,7 @@ use super::correction::{Correction, VanishingPoint, closed_form_gains};
 use super::estimate::{EdgeElement, TiltEstimate};
 use super::image_space::{Offsets, edge_offset, offsets};
 use super::options::{Method, TiltOptions};
-use super::refine::refine;
+use super::refine::{Sparse, refine};
 use super::vector_consensus::vector_consensus;
 use crate::camera::Camera;
 use crate::edges::{Detector, EdgeOptions, EdgePixels, LiftTable, NormalKind, Region, Screen};
@@ -61,7 +61,7 @@ pub struct Scratch {
     edges: EdgePixels,
     rows: Rows<f32>,
     weights: Vec<f32>,
-    trimmed: Vec<f32>,
+    sparse: Sparse<f32>,
     /// Place of each row among the edge pixels.
     places: Vec<u32>,
     inliers: Inliers,
@@ -194,7 +194,7 @@ impl TiltEstimator {
             edges: EdgePixels::with_capacity(n),
             rows: Rows::with_capacity(n),
             weights: Vec::with_capacity(n),
-            trimmed: Vec::with_capacity(n),
+            sparse: Sparse::with_capacity(n),
             places: Vec::with_capacity(n),
             inliers: Inliers::None,
         }
@@ -342,7 +342,7 @@ impl TiltEstimator {
 
     /// Paper 000 section 2.2, and the refined method.
     fn fit_normals(&self, table: &LiftTable, scratch: &mut Scratch) -> Fit {
-        let Scratch { edges, rows, weights, places, trimmed, inliers, .. } = &mut *scratch;
+        let Scratch { edges, rows, weights, places, sparse, inliers, .. } = &mut *scratch;
         *inliers = Inliers::None;
         table.lift(edges, self.options.normal_tilt_max_rad().sin(), rows, weights, places);
         let (report, gate, factor) = match &self.options.method {
@@ -354,7 +354,7 @@ impl TiltEstimator {
                 (report, Gate::Soft { scale: STRAY_RAD }, *factor)
             }
             Method::Refined(options) => {
-                let report = refine(rows, options, weights, trimmed);
+                let report = refine(rows, options, weights, sparse);
                 *inliers = report.model.map_or(Inliers::None, |direction| Inliers::Within {
                     model: direction.into(),
                     threshold: 2.0 * options.scale_rad,

@@ -52,24 +52,50 @@ const FADING: u32 = 2;
 /// Most rounds of trimming.
 const TRIMMING_ROUNDS: u32 = 15;
 
-/// Trims from the upright prior until the residuals are no larger than half the final scale or nothing changes, then
-/// reweights with a gate that fades to the final scale. `weights` are those of the normals and are not altered; `trimmed` is scratch.
+/// Rows that are enough to start from: trimming takes every so-manieth if there are several times more.
+const ENOUGH: usize = 2048;
+
+/// The rows that trimming works on.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Sparse<T> {
+    rows: Rows<T>,
+    weights: Vec<f32>,
+}
+
+impl<T: Real> Sparse<T> {
+    /// Room for the sparse rows of `capacity` rows.
+    pub(super) fn with_capacity(capacity: usize) -> Self {
+        let most = capacity.min(2 * ENOUGH);
+        Self { rows: Rows::with_capacity(most), weights: Vec::with_capacity(most) }
+    }
+
+    fn take(&mut self, rows: &Rows<T>, weights: &[f32]) {
+        let stride = (rows.len() / ENOUGH).max(1);
+        self.rows.clear();
+        self.weights.clear();
+        self.rows.extend(rows, stride);
+        self.weights.extend(weights.iter().step_by(stride));
+    }
+}
+
+/// Trims from the upright prior until the residuals are no larger than half the final scale or nothing changes, on a sample
+/// of the rows where there are many, then reweights all of them with a gate that fades to the final scale.
+///
+/// `weights` are those of the rows and are not altered; `sparse` is scratch.
 pub(super) fn refine<T: Real>(
     rows: &Rows<T>,
     options: &RefineOptions,
     weights: &mut [f32],
-    trimmed: &mut Vec<f32>,
+    sparse: &mut Sparse<T>,
 ) -> FitReport<Vector3<f64>> {
-    let problem = Direction::new(rows);
-    trimmed.clear();
-    trimmed.extend_from_slice(weights);
+    sparse.take(rows, weights);
     let trimming = RejectRefitOptions {
         keep_fraction: options.keep_fraction,
         max_iterations: TRIMMING_ROUNDS,
         tolerance: options.tolerance_rad,
         rms_min: 0.5 * options.scale_rad,
     };
-    let start = reject_refit(&problem, &trimming, &Vector3::z(), trimmed);
+    let start = reject_refit(&Direction::new(&sparse.rows), &trimming, &Vector3::z(), &mut sparse.weights);
     let Some(direction) = start.model else { return start };
     let fading = ReweightOptions {
         first_scale: 1.5 * options.scale_rad,
@@ -78,5 +104,5 @@ pub(super) fn refine<T: Real>(
         max_iterations: options.max_iterations,
         tolerance: options.tolerance_rad,
     };
-    reweight(&problem, &fading, &direction, weights)
+    reweight(&Direction::new(rows), &fading, &direction, weights)
 }
