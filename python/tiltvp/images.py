@@ -85,7 +85,9 @@ def write_image(path: str | os.PathLike[str], image: NDArray[np.uint8]) -> None:
     try:
         done, data = cv2.imencode(file.suffix or ".png", image)
     except cv2.error as error:
-        raise ImageFileError(f"{file}: cannot be encoded as {file.suffix!r}, expected .png, .jpg or the like") from error
+        raise ImageFileError(
+            f"{file}: cannot be encoded as {file.suffix!r}, expected .png, .jpg or the like"
+        ) from error
     if not done:
         raise ImageFileError(f"{file}: cannot be encoded as {file.suffix!r}")
     part = file.with_name(f".{file.name}.part")

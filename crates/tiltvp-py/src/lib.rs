@@ -19,7 +19,7 @@ mod _core {
     use crate::synth::render_room;
     #[pymodule_export]
     use crate::tilt::{
-        CommonDirection, EdgeElements, TiltEstimate, TiltEstimator, common_direction, level_map,
+        CommonDirection, EdgeElements, FitReport, TiltEstimate, TiltEstimator, common_direction, level_map,
         normal_from_alpha_beta, tilt_error_rad,
     };
 

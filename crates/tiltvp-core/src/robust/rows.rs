@@ -116,7 +116,7 @@ impl Moments {
     pub fn step(&self) -> Option<Vector2<f64>> {
         let [xx, xy, yy, xd, yd, _] = self.sums;
         let (determinant, trace) = (xx * yy - xy * xy, xx + yy);
-        if !(determinant > 1e-12 * trace * trace) {
+        if determinant.is_nan() || determinant <= 1e-12 * trace * trace {
             return None;
         }
         Some(Vector2::new(xy * yd - yy * xd, xy * xd - xx * yd) / determinant)

@@ -75,6 +75,7 @@ pub(super) fn edge_offset(centre: (f32, f32), (u, v): (u16, u16), gx: f32, gy: f
 }
 
 /// Writes the rows of the edge pixels that pass the prefilter `|s| <= offset_max_px`, with unit weights, and their places.
+#[expect(clippy::too_many_arguments, reason = "three tables in, three caller-owned vectors out")]
 pub(super) fn offsets(
     edges: &EdgePixels,
     region: &Region,
