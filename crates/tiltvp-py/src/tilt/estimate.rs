@@ -122,10 +122,9 @@ impl TiltEstimate {
     /// The attributes by name, those of the report among them; arrays as nested lists.
     fn to_dict<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let dict = PyDict::new(py);
-        dict.set_item("alpha_rad", self.alpha_rad())?;
-        dict.set_item("beta_rad", self.beta_rad())?;
-        dict.set_item("roll_rad", self.roll_rad())?;
-        dict.set_item("pitch_rad", self.pitch_rad())?;
+        for (key, angle) in self.angles() {
+            dict.set_item(key, angle)?;
+        }
         dict.set_item("normal", self.vector().as_slice().to_vec())?;
         let c = &self.covariance;
         dict.set_item("covariance_rad2", [[c[(0, 0)], c[(0, 1)]], [c[(1, 0)], c[(1, 1)]]])?;
@@ -149,7 +148,7 @@ impl TiltEstimate {
         let [[a, b], [c, d]] = covariance.0[..] else {
             return Err(invalid("values[\"covariance_rad2\"]: expected shape (2, 2)".to_owned()));
         };
-        Ok(Self {
+        let estimate = Self {
             tilt: Tilt::from_normal(&normal),
             covariance: Matrix2::new(a, b, c, d),
             confidence: convert::item(values, "confidence", "a number")?,
@@ -158,7 +157,14 @@ impl TiltEstimate {
             inlier_pixels: convert::item(values, "inlier_pixels", "a count")?,
             shift_px: convert::item(values, "shift_px", "a number or None")?,
             report: FitReport::read(values)?,
-        })
+        };
+        for (key, angle) in estimate.angles() {
+            let given: f64 = convert::item(values, key, "a number")?;
+            if (given - angle).abs() > 1e-9 || given.is_nan() != angle.is_nan() {
+                return Err(invalid(format!("values[\"{key}\"] = {given}, expected {angle}, as the normal has it")));
+            }
+        }
+        Ok(estimate)
     }
 
     fn __repr__(&self) -> String {
@@ -201,6 +207,16 @@ impl TiltEstimate {
 impl TiltEstimate {
     fn vector(&self) -> Vector3<f64> {
         self.tilt.map_or(Vector3::repeat(f64::NAN), |tilt| tilt.normal())
+    }
+
+    /// The angles that follow from the normal, by name.
+    fn angles(&self) -> [(&'static str, f64); 4] {
+        [
+            ("alpha_rad", self.alpha_rad()),
+            ("beta_rad", self.beta_rad()),
+            ("roll_rad", self.roll_rad()),
+            ("pitch_rad", self.pitch_rad()),
+        ]
     }
 
     /// Everything as bits, so that equal means the same bytes and NaN equals itself.
