@@ -200,6 +200,8 @@ CHANGES: dict[str, dict[str, Any]] = {
         "mask": HALF,
         "keep_fraction": 0.4,
         "scale_rad": 0.2,
+        "tolerance_rad": 0.1,
+        "max_iterations": 1,
     },
     "image-space-ransac": {
         "gradient_min": 400.0,
@@ -302,6 +304,9 @@ def test_options_in_force_are_keywords(camera: tiltvp.Camera, method: str) -> No
         ({"mask": [[True]]}, ["mask", "bool"]),
         ({"keep_fraction": 1.0}, ["keep_fraction"]),
         ({"scale_rad": 0.0}, ["scale_rad"]),
+        ({"tolerance_rad": -1.0}, ["tolerance_rad"]),
+        ({"max_iterations": 0}, ["max_iterations", "at least 1"]),
+        ({"max_iterations": -1}, ["max_iterations"]),
         ({"method": "image-space-ransac", "correction": "closed"}, ["closed-form"]),
         ({"method": "image-space-ransac", "correction": -3.0}, ["correction"]),
         ({"method": "image-space-ransac", "threshold_px": 0.0}, ["threshold_px"]),

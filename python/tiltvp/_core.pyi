@@ -21,6 +21,7 @@ __all__ = [
     "TiltEstimate",
     "TiltEstimator",
     "common_direction",
+    "leaning_from_upright",
     "level_map",
     "normal_from_alpha_beta",
     "render_room",
@@ -28,7 +29,9 @@ __all__ = [
 ]
 
 _Method: TypeAlias = Literal["refined", "image-space-ransac", "image-space-reject-refit", "vector-consensus"]
-_Stop: TypeAlias = Literal["confident", "trial-limit", "converged", "settled", "iteration-limit", "too-few", "no-model"]
+_Stop: TypeAlias = Literal[
+    "confident", "trial-limit", "converged", "settled", "iteration-limit", "too-few", "no-model", "out-of-reach"
+]
 
 METHODS: Final[list[str]]
 """The names of the methods of `TiltEstimator`, the default first."""
@@ -142,8 +145,8 @@ class FitReport:
 
         "confident": random sampling has drawn as many samples as its confidence needs; "trial-limit": it has drawn all
         it may. "converged": the model has stopped changing; "settled": the residuals are small enough;
-        "iteration-limit": refitting has been repeated as often as it may. "too-few" and "no-model" mean that there is
-        no answer: not enough observations, or all alike.
+        "iteration-limit": refitting has been repeated as often as it may. There is no answer after "too-few" observations,
+        "no-model" (they are all alike) and "out-of-reach" (an angle that the method cannot mean).
         """
 
     @property
@@ -310,6 +313,8 @@ class TiltEstimator:
         seed: SupportsIndex = ...,
         keep_fraction: float = ...,
         scale_rad: float = ...,
+        tolerance_rad: float = ...,
+        max_iterations: SupportsIndex = ...,
         threshold_px: float = ...,
         offset_max_px: float = ...,
         threshold_rad: float = ...,
@@ -347,6 +352,10 @@ class TiltEstimator:
             34 and 35 read as the share kept.
         scale_rad
             "refined": standard deviation of the soft gate at the end.
+        tolerance_rad
+            "refined": change of the direction below which it has converged.
+        max_iterations
+            "refined": most refits with the gate at its final scale.
         threshold_px
             "image-space-ransac": largest residual of an inlier, delta_s,max of eq. 32.
         offset_max_px
@@ -459,6 +468,12 @@ def common_direction(
 
     Raises `tiltvp.errors.InvalidInputError` for wrong shapes, zero or non-finite rows, negative weights and options out
     of their domain. Too few or degenerate normals give an answer without a direction, and a reason.
+    """
+
+def leaning_from_upright(normal: ArrayLike) -> NDArray[np.float64]:
+    """(3, 3): the rotation from the upright robot's frame to the leaning one's, without a turn about the vertical.
+
+    `normal` is the ground normal (3,) in the robot frame, of any length but zero.
     """
 
 def level_map(camera: Camera, normal: ArrayLike, *, robot_from_camera: ArrayLike | None = None) -> NDArray[np.float32]:

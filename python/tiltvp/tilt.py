@@ -39,6 +39,9 @@ __all__ = [
 ]
 
 
+_LEVELLED = ("uint8", "uint16", "int16", "float32", "float64")
+
+
 class TiltEstimator(_core.TiltEstimator):
     """Estimates how far and in which direction a robot leans from single images of one camera.
 
@@ -54,7 +57,7 @@ class TiltEstimator(_core.TiltEstimator):
     robot_from_camera : (3, 3) rotation R, v_robot = R v_camera; default identity: an upward camera, columns to the
     front gradient_min, smoothing_px, elevation_min_rad, elevation_max_rad, margin_px, tilt_max_rad, mask, seed
         Options of every method: see the README. `mask` is (H, W) bool, True where the image shows the world.
-    keep_fraction, scale_rad
+    keep_fraction, scale_rad, tolerance_rad, max_iterations
         Of "refined"; `keep_fraction` also of "image-space-reject-refit".
     threshold_px, offset_max_px, correction
         Of the image-space methods; `correction` is "closed-form" (default), a factor in pixels per radian, or None.
@@ -93,6 +96,9 @@ def level(
     if array.ndim not in (2, 3) or array.shape[:2] != (camera.height, camera.width):
         expected = f"({camera.height}, {camera.width}) or ({camera.height}, {camera.width}, channels)"
         raise InvalidInputError(f"image: shape {array.shape}, expected {expected}, as the camera's images")
+    if array.dtype not in _LEVELLED or (array.ndim == 3 and not 1 <= array.shape[2] <= 4):
+        kinds = ", ".join(_LEVELLED)
+        raise InvalidInputError(f"image: dtype {array.dtype}, shape {array.shape}, expected {kinds} of 1 to 4 channels")
     if isinstance(tilt, TiltEstimate):
         if not tilt:
             raise InvalidInputError(f"tilt: an estimate without a tilt ({tilt.reason}), expected one with a tilt")
@@ -102,4 +108,5 @@ def level(
         normal = normal_from_alpha_beta(alpha_rad, beta_rad)
     places = np.nan_to_num(_core.level_map(camera, normal, robot_from_camera=robot_from_camera), nan=-1e6)
     across, down = np.ascontiguousarray(places[:, :, 0]), np.ascontiguousarray(places[:, :, 1])
-    return np.asarray(cv2.remap(array, across, down, cv2.INTER_LINEAR, borderMode=cv2.BORDER_CONSTANT))
+    # OpenCV drops an axis of length one.
+    return np.asarray(cv2.remap(array, across, down, cv2.INTER_LINEAR)).reshape(array.shape)

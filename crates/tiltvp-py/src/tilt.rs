@@ -196,7 +196,7 @@ pub(crate) fn level_map<'py>(
     let tilt = tilt_from(normal, "normal")?;
     let rotation = robot_from_camera.map_or(Ok(Matrix3::identity()), |r| convert::matrix3(r, "robot_from_camera"))?;
     let camera = &camera.get().inner;
-    let map = call(py, || Ok(core::level_map(camera, &rotation, &tilt)))?;
+    let map = call(py, || core::level_map(camera, &rotation, &tilt))?;
     let shape = [camera.height() as usize, camera.width() as usize, 2];
     Ok(PyArray1::from_slice(py, map.as_flattened()).reshape(shape)?.into_any())
 }
@@ -218,4 +218,14 @@ pub(crate) fn normal_from_alpha_beta(
         return Err(invalid(format!("alpha_rad, beta_rad = {alpha_rad}, {beta_rad}, expected finite angles")));
     }
     Ok(PyArray1::from_slice(py, Tilt::from_alpha_beta(alpha_rad, beta_rad).normal().as_slice()))
+}
+
+/// `(3, 3)` rotation from the upright robot's frame to the leaning one's, without a turn about the vertical.
+#[pyfunction]
+pub(crate) fn leaning_from_upright<'py>(
+    py: Python<'py>,
+    normal: &Bound<'py, PyAny>,
+) -> PyResult<Bound<'py, PyArray2<f64>>> {
+    let rotation = tilt_from(normal, "normal")?.leaning_from_upright();
+    PyArray1::from_slice(py, rotation.transpose().as_slice()).reshape([3, 3])
 }

@@ -25,22 +25,22 @@ pub struct LiftTable {
 }
 
 impl LiftTable {
-    /// One matrix for each pixel of the region. Each is scaled so that the lens' resolution does not change the length
-    /// of normals: a gradient of one grey level per pixel across a radial edge gives a normal of length one.
+    /// One matrix for each pixel of the region, all divided by their root mean square, so that a gradient of one grey level
+    /// per pixel gives a normal of a length about one: longer where the lens shows the edge's direction better.
     pub fn new(camera: &Camera, robot_from_camera: &Matrix3<f64>, region: &Region, kind: NormalKind) -> Self {
-        let map = |u: usize, v: usize| -> [f32; 6] {
+        let map = |u: usize, v: usize| -> Matrix3x2<f64> {
             let pixel = Vector2::new(u as f64, v as f64);
-            let matrix: Option<Matrix3x2<f64>> =
-                camera.unproject_jacobian(&pixel).and_then(|(bearing, back)| match kind {
-                    NormalKind::Tangent => camera.project_jacobian(&bearing).map(|(_, forward)| forward.transpose()),
-                    NormalKind::Gradient => Some(back),
-                });
-            let Some(matrix) = matrix else { return [0.0; 6] };
-            let scale = (matrix.transpose() * matrix).trace().sqrt() / std::f64::consts::SQRT_2;
-            let matrix = robot_from_camera * matrix / scale;
-            std::array::from_fn(|i| matrix[(i / 2, i % 2)] as f32)
+            let matrix = camera.unproject_jacobian(&pixel).and_then(|(bearing, back)| match kind {
+                NormalKind::Tangent => camera.project_jacobian(&bearing).map(|(_, forward)| forward.transpose()),
+                NormalKind::Gradient => Some(back),
+            });
+            matrix.map_or(Matrix3x2::zeros(), |matrix| robot_from_camera * matrix)
         };
-        Self { maps: region.pixels().map(|(u, v, _)| map(u, v)).collect() }
+        let matrices: Vec<Matrix3x2<f64>> = region.pixels().map(|(u, v, _)| map(u, v)).collect();
+        let mean_square =
+            matrices.iter().map(Matrix3x2::norm_squared).sum::<f64>() / (2 * matrices.len().max(1)) as f64;
+        let scale = 1.0 / mean_square.sqrt().max(f64::MIN_POSITIVE);
+        Self { maps: matrices.iter().map(|m| std::array::from_fn(|i| (m[(i / 2, i % 2)] * scale) as f32)).collect() }
     }
 
     /// Writes the unit normals of the edge pixels whose great circles pass within `asin(sin_max)` of the robot's vertical,

@@ -28,25 +28,43 @@ impl Smoother {
 
     /// Writes columns `first..first + out.len()` of the smoothed row `v`.
     ///
-    /// The image must reach `radius` pixels beyond these columns and this row; what lies outside counts as black.
+    /// What lies outside the image counts as black. Takes no memory for rows of the width that it was made for.
     pub fn row(&mut self, image: &ImageView<'_>, v: usize, first: usize, out: &mut [f32]) {
         let radius = self.taps.len() - 1;
         let from = first.saturating_sub(radius);
         let to = (first + out.len() + radius).min(image.width());
-        let middle = image.row(v).get(from..to).unwrap_or(&[]);
+        let part = |v: usize| image.row(v).get(from..to).unwrap_or(&[]);
         if radius == 0 {
-            widen(middle, out);
+            out.fill(0.0);
+            widen(part(v), out);
             return;
         }
-        let sums = &mut self.column_sums[..middle.len()];
-        scale(middle, self.taps[0], sums);
-        for (offset, tap) in self.taps.iter().enumerate().skip(1) {
-            let above = v.checked_sub(offset).map_or(&[][..], |y| image.row(y)).get(from..to).unwrap_or(&[]);
-            let below = image.row(v + offset).get(from..to).unwrap_or(&[]);
-            add_scaled(above, below, *tap, sums);
+        // One sum for each column that the kernel reaches; those outside the image stay black.
+        let needed = out.len() + 2 * radius;
+        if self.column_sums.len() < needed {
+            self.column_sums.resize(needed, 0.0);
         }
-        let inner = first - from;
-        convolve(sums, inner, &self.taps, out);
+        let outside = from + radius - first;
+        let inside = outside..outside + to.saturating_sub(from);
+        self.column_sums[..inside.start].fill(0.0);
+        self.column_sums[inside.end..needed].fill(0.0);
+        let sums = &mut self.column_sums[inside];
+        if v < image.height() {
+            scale(part(v), self.taps[0], sums);
+        } else {
+            sums.fill(0.0);
+        }
+        for (offset, tap) in self.taps.iter().enumerate().skip(1) {
+            let above = v.checked_sub(offset).map_or(&[][..], part);
+            let below = part(v + offset);
+            if above.is_empty() || below.is_empty() {
+                add_scaled_one(above, *tap, sums);
+                add_scaled_one(below, *tap, sums);
+            } else {
+                add_scaled(above, below, *tap, sums);
+            }
+        }
+        convolve(&self.column_sums[..needed], &self.taps, out);
     }
 }
 
@@ -85,17 +103,23 @@ fn add_scaled(above: &[u8], below: &[u8], tap: f32, out: &mut [f32]) {
     }
 }
 
+/// For a row whose mirror image is outside.
+fn add_scaled_one(row: &[u8], tap: f32, out: &mut [f32]) {
+    for (o, i) in out.iter_mut().zip(row) {
+        *o += f32::from(*i) * tap;
+    }
+}
+
+/// `sums` reach as far beyond `out` on both sides as the taps do.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512vl", "x86_64+avx2+fma"))]
-fn convolve(sums: &[f32], inner: usize, taps: &[f32], out: &mut [f32]) {
-    let length = out.len();
-    let window = |shift: usize| sums.get(shift..).unwrap_or(&[]);
-    for (o, centre) in out.iter_mut().zip(window(inner)) {
+fn convolve(sums: &[f32], taps: &[f32], out: &mut [f32]) {
+    let (radius, length) = (taps.len() - 1, out.len());
+    let window = |shift: usize| &sums[shift..shift + length];
+    for (o, centre) in out.iter_mut().zip(window(radius)) {
         *o = centre * taps[0];
     }
     for (offset, tap) in taps.iter().enumerate().skip(1) {
-        let (Some(left), right) = (inner.checked_sub(offset), inner + offset) else { continue };
-        let right = window(right);
-        for ((o, l), r) in out.iter_mut().zip(window(left)).zip(right.iter().take(length)) {
+        for ((o, l), r) in out.iter_mut().zip(window(radius - offset)).zip(window(radius + offset)) {
             *o += (l + r) * tap;
         }
     }
@@ -118,6 +142,36 @@ mod tests {
         let view = ImageView::new(&data, 11, 11, 11).unwrap();
         Smoother::new(0.6, 11).row(&view, 5, 4, &mut out);
         assert!(out[0] > 20.0 && (out[0] - out[2]).abs() < 1e-4 && out[1] > 3.0 * out[0], "{out:?}");
+    }
+
+    #[test]
+    fn every_pixel_is_the_weighted_sum_with_black_outside() {
+        let (width, height) = (9usize, 7usize);
+        let data: Vec<u8> = (0..width * height).map(|i| (i * 83 % 251) as u8).collect();
+        let view = ImageView::new(&data, width, height, width).unwrap();
+        for sigma in [0.0, 0.6, 1.0, 2.5] {
+            let taps = gaussian_taps(sigma);
+            let radius = taps.len() as isize - 1;
+            let level = |u: isize, v: isize| {
+                let inside = (0..width as isize).contains(&u) && (0..height as isize).contains(&v);
+                if inside { f32::from(data[(v * width as isize + u) as usize]) } else { 0.0 }
+            };
+            let mut smoother = Smoother::new(sigma, width);
+            for v in 0..height as isize + 3 {
+                for first in 0..width {
+                    let mut out = vec![f32::NAN; width - first + 2];
+                    smoother.row(&view, v as usize, first, &mut out);
+                    for (i, found) in out.iter().enumerate() {
+                        let u = (first + i) as isize;
+                        let expected: f32 = (-radius..=radius)
+                            .flat_map(|y| (-radius..=radius).map(move |x| (x, y)))
+                            .map(|(x, y)| taps[x.unsigned_abs()] * taps[y.unsigned_abs()] * level(u + x, v + y))
+                            .sum();
+                        assert!((found - expected).abs() < 1e-3, "sigma {sigma}, ({u}, {v}): {found}, not {expected}");
+                    }
+                }
+            }
+        }
     }
 
     #[test]

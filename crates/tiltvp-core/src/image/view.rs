@@ -43,7 +43,10 @@ impl<'a> ImageView<'a> {
 
     /// Row `v`, or an empty slice below the image.
     pub fn row(&self, v: usize) -> &'a [u8] {
+        if v >= self.height {
+            return &[];
+        }
         let start = v * self.stride;
-        if v < self.height { self.data.get(start..start + self.width).unwrap_or(&[]) } else { &[] }
+        self.data.get(start..start + self.width).unwrap_or(&[])
     }
 }

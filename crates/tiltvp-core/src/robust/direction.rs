@@ -39,7 +39,7 @@ impl<T: Real> Problem for Direction<'_, T> {
     /// Eq. 36.
     fn fit_minimal(&self, sample: &[usize]) -> Option<Vector3<f64>> {
         let (first, second) = (self.rows.get(*sample.first()?)?, self.rows.get(*sample.get(1)?)?);
-        first.cross(&second).try_normalize(1e-9).map(upwards)
+        first.cross(&second).try_normalize(1e-9).and_then(upwards)
     }
 
     fn consensus(&self, model: &Vector3<f64>, threshold: f64) -> usize {
@@ -56,17 +56,17 @@ impl<T: Real> Problem for Direction<'_, T> {
             let moments: Matrix3<f64> = summary.second_moments();
             let scale = moments.trace();
             let inverse = (moments / scale).try_inverse()?;
-            return (inverse * plane).try_normalize(1e-12).map(upwards);
+            return (inverse * plane).try_normalize(1e-12).and_then(upwards);
         }
         let [x, y, z] = summary.model();
         let step = summary.step()?;
-        Vector3::new(x + step.x, y + step.y, z).try_normalize(1e-12).map(upwards)
+        Vector3::new(x + step.x, y + step.y, z).try_normalize(1e-12).and_then(upwards)
     }
 
     fn rms(&self, summary: &Moments, model: &Vector3<f64>) -> f64 {
         // In the chart of the summary's model the direction is (x, y, z) / scale.
         let at = Vector3::from(summary.model());
-        let scale = if model.z.abs() > 1e-9 { at.z / model.z } else { return f64::NAN };
+        let scale = at.z / model.z;
         let step = (model * scale - at).xy();
         (summary.sum_of_squares(&step) / summary.weight).sqrt() / scale.abs()
     }
@@ -80,10 +80,13 @@ impl<T: Real> Problem for Direction<'_, T> {
     }
 }
 
-/// The same line, pointing up.
-fn upwards(direction: Vector3<f64>) -> Vector3<f64> {
-    if direction.z < 0.0 { -direction } else { direction }
+/// The same line, pointing up; none for a horizontal one, which the chart about `+z` does not hold.
+fn upwards(direction: Vector3<f64>) -> Option<Vector3<f64>> {
+    (direction.z.abs() > LEAST_Z).then(|| direction * direction.z.signum())
 }
+
+/// The least `z` of a unit direction in the chart.
+const LEAST_Z: f64 = 1e-6;
 
 #[cfg(test)]
 mod tests {

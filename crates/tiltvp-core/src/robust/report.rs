@@ -45,6 +45,13 @@ pub enum Stop {
         /// Observations needed.
         need: usize,
     },
+    /// The model found is an angle that the method cannot mean.
+    OutOfReach {
+        /// The angle found, in radians.
+        angle_rad: f64,
+        /// The angle within which an answer means something, in radians.
+        limit_rad: f64,
+    },
     /// The observations do not determine a model (they are all alike).
     NoModel {
         /// Samples or refits tried.
@@ -55,7 +62,7 @@ pub enum Stop {
 impl Stop {
     /// Whether the fit has no model to offer.
     pub fn is_failure(self) -> bool {
-        matches!(self, Self::TooFew { .. } | Self::NoModel { .. })
+        matches!(self, Self::TooFew { .. } | Self::NoModel { .. } | Self::OutOfReach { .. })
     }
 }
 
@@ -70,6 +77,9 @@ impl fmt::Display for Stop {
             Self::Settled { rms, limit } => write!(f, "residuals settled at {rms:.2e} (limit {limit:.2e})"),
             Self::IterationLimit { limit } => write!(f, "limit of {limit} iterations reached"),
             Self::TooFew { have, need } => write!(f, "too few observations: {have}, at least {need} needed"),
+            Self::OutOfReach { angle_rad, limit_rad } => {
+                write!(f, "an angle of {angle_rad:.3} rad was found, beyond the limit of {limit_rad:.3} rad")
+            }
             Self::NoModel { trials } => write!(f, "no model: the observations are degenerate ({trials} tried)"),
         }
     }

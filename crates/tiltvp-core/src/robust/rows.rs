@@ -91,6 +91,12 @@ impl<T: Real> Rows<T> {
         T::count(self.columns(), model.map(T::from_f64), T::from_f64(threshold * threshold))
     }
 
+    /// Whether row `index` has a residual of at most `threshold`, in the arithmetic of [`count_within`](Self::count_within).
+    pub fn is_within(&self, index: usize, model: [f64; 3], threshold: f64) -> bool {
+        let row = self.columns().map(|column| column.get(index..=index).unwrap_or(&[]));
+        T::count(row, model.map(T::from_f64), T::from_f64(threshold * threshold)) == 1
+    }
+
     /// Applies a gate about a model to the weights and takes the moments of what is left.
     pub fn moments(&self, model: [f64; 3], gate: Gate, weights: &mut [f32]) -> Moments {
         let (limit, inverse) = gate.coefficients();
@@ -368,6 +374,46 @@ mod tests {
         };
         assert_relative_eq!(moments.sum_of_squares(&step), at(step), epsilon = 1e-12);
         assert!(at(step) < at(step + Vector2::new(1e-4, 0.0)) && at(step) < at(step - Vector2::new(0.0, 1e-4)));
+    }
+
+    /// Numbers of rows about multiples of the lanes and of the blocks, in both precisions, through every gate.
+    #[test]
+    fn any_number_of_rows_is_summed_once() {
+        fn check<T: Real>(len: usize, gate: Gate, tolerance: f64) {
+            let mut rows = Rows::<T>::default();
+            for i in 0..len {
+                let t = 0.37 * i as f64;
+                rows.push(T::from_f64(t.cos()), T::from_f64(t.sin()), T::from_f64(0.1 * (3.1 * t).sin()));
+            }
+            let model = [0.02, -0.03, 0.9];
+            let mut weights: Vec<f32> = (0..len).map(|i| (i % 5) as f32).collect();
+            let before = weights.clone();
+            let found = rows.moments(model, gate, &mut weights);
+            let (mut count, mut weight, mut sum) = (0, 0.0, Matrix3::zeros());
+            for ((row, own), after) in rows.iter().zip(&before).zip(&weights) {
+                let gated = gate.weight(row.dot(&Vector3::from(model)));
+                let w = f64::from(*own) * gated;
+                count += usize::from(w > 0.0);
+                weight += w;
+                sum += w * row * row.transpose();
+                assert_eq!(*after, if gate.is_hard() && gated == 0.0 { 0.0 } else { *own });
+            }
+            let scale = 1.0 + len as f64;
+            assert_eq!(found.count, count, "{len} rows, {gate:?}");
+            assert!((found.weight - weight).abs() < tolerance * scale, "{len} rows, {gate:?}");
+            assert!((found.second_moments() - sum).norm() < tolerance * scale, "{len} rows, {gate:?}");
+            if let Gate::Hard { threshold } = gate {
+                let within = rows.iter().filter(|row| gate.weight(row.dot(&Vector3::from(model))) > 0.0).count();
+                assert_eq!(rows.count_within(model, threshold), within, "{len} rows");
+                assert_eq!((0..len + 3).filter(|i| rows.is_within(*i, model, threshold)).count(), within);
+            }
+        }
+        for len in (0..=35).chain(500..530).chain([1023, 1024, 1025, 2 * BLOCK + LANES + 1]) {
+            for gate in [Gate::Open, Gate::Hard { threshold: 0.05 }, Gate::Soft { scale: 0.02 }] {
+                check::<f64>(len, gate, 1e-12);
+                check::<f32>(len, gate, 1e-5);
+            }
+        }
     }
 
     #[test]

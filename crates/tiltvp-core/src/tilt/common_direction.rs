@@ -62,7 +62,7 @@ pub fn common_direction(
     let mut kept = Vec::with_capacity(normals.len());
     let mut row_weights = Vec::with_capacity(normals.len());
     for (i, normal) in normals.iter().enumerate() {
-        let row = upright_from_user * normal.normalize();
+        let row = upright_from_user * unit(normal).unwrap_or_default();
         let weight = weights.map_or(1.0, |weights| weights[i]) as f32;
         if row.z.abs() <= limit && weight > 0.0 {
             rows.push(row.x, row.y, row.z);
@@ -70,13 +70,17 @@ pub fn common_direction(
             kept.push(row);
         }
     }
-    let refining = RefineOptions { scale_rad: options.sigma_rad, ..RefineOptions::default() };
+    let refining = RefineOptions {
+        scale_rad: options.sigma_rad,
+        tolerance_rad: 1e-10,
+        max_iterations: 50,
+        ..RefineOptions::default()
+    };
     let report = refine(&rows, &refining, &mut row_weights, &mut Vec::new());
     let found = report.model.filter(|o| o.z >= options.max_angle_rad.cos());
-    let stop = if report.model.is_some() && found.is_none() {
-        Stop::NoModel { trials: report.iterations }
-    } else {
-        report.stop
+    let stop = match (report.model, found) {
+        (Some(o), None) => Stop::OutOfReach { angle_rad: o.xy().norm().atan2(o.z), limit_rad: options.max_angle_rad },
+        _ => report.stop,
     };
     let Some(upright) = found else {
         return Ok(CommonDirection {
@@ -89,9 +93,10 @@ pub fn common_direction(
         });
     };
     let direction = upright_from_user.inverse() * upright;
-    let reach = (3.0 * options.sigma_rad).sin();
+    let reach = (3.0 * options.sigma_rad).min(std::f64::consts::FRAC_PI_2).sin();
     // Each normal is its own cluster: the user's normals are whole edges, not pixels.
     let gate = Gate::Soft { scale: options.sigma_rad };
+    let held = kept.iter().filter(|row| gate.weight(row.dot(&upright)) > 0.0).count();
     let (mut information, mut spread) = (Matrix2::zeros(), Matrix2::zeros());
     let basis = tangent_basis(&direction);
     for (row, weight) in kept.iter().zip(&row_weights) {
@@ -99,14 +104,19 @@ pub fn common_direction(
         let weight = f64::from(*weight) * gate.weight(d);
         let xy = basis.transpose() * (upright_from_user.inverse() * row);
         information += xy * xy.transpose() * weight;
-        spread += xy * xy.transpose() * (weight * d).powi(2);
+        // Two great circles always meet: their residuals are zero and tell nothing, so the stated sigma stands in.
+        let residual = if held > 2 { d } else { options.sigma_rad };
+        spread += xy * xy.transpose() * (weight * residual).powi(2);
+    }
+    if held > 2 {
+        spread *= held as f64 / (held as f64 - 2.0);
     }
     let covariance =
         information.try_inverse().map_or(Matrix2::repeat(f64::INFINITY), |inverse| inverse * spread * inverse);
     Ok(CommonDirection {
         direction: Some(direction),
         covariance_rad2: covariance,
-        inliers: normals.iter().map(|n| n.normalize().dot(&direction).abs() <= reach).collect(),
+        inliers: normals.iter().map(|n| unit(n).unwrap_or_default().dot(&direction).abs() <= reach).collect(),
         residual_rms_rad: report.rms,
         iterations: report.iterations,
         stop,
@@ -120,8 +130,7 @@ fn validate(
     options: &CommonDirectionOptions,
 ) -> Result<Vector3<f64>> {
     for (i, normal) in normals.iter().enumerate() {
-        let length = normal.norm();
-        if !(length.is_finite() && length > 0.0) {
+        if unit(normal).is_none() {
             return Err(Error::argument(
                 "normals",
                 format!("{normal:?} in row {i}"),
@@ -151,8 +160,14 @@ fn validate(
     if !(options.max_angle_rad > 0.0 && options.max_angle_rad < std::f64::consts::FRAC_PI_2) {
         return Err(Error::option("max_angle_rad", options.max_angle_rad, "an angle strictly between 0 and pi/2"));
     }
-    let prior = options.prior.try_normalize(f64::MIN_POSITIVE).filter(|p| p.iter().all(|x| x.is_finite()));
-    prior.ok_or_else(|| Error::argument("prior", format!("{:?}", options.prior), "a finite vector that is not zero"))
+    unit(&options.prior)
+        .ok_or_else(|| Error::argument("prior", format!("{:?}", options.prior), "a finite vector that is not zero"))
+}
+
+/// The unit vector of any finite vector but zero, however large or small.
+fn unit(vector: &Vector3<f64>) -> Option<Vector3<f64>> {
+    let largest = vector.amax();
+    (vector.iter().all(|x| x.is_finite()) && largest > 0.0).then(|| (vector / largest).normalize())
 }
 
 #[cfg(test)]

@@ -41,7 +41,7 @@ impl Correction {
 /// Where the vertical vanishing point of an upright robot lies in the image, and how a lean moves it.
 #[derive(Debug, Clone)]
 pub(super) struct VanishingPoint {
-    /// The point `p_c` of eq. 2: of the zenith, or of the nadir where the zenith is out of the lens' reach.
+    /// The point `p_c` of eq. 2: of the zenith, or of the nadir where that is what the lens is about.
     pub pixel: Vector2<f64>,
     /// The lens' scale there in pixels per radian, `a0` of eq. 26.
     pub scale: f64,
@@ -50,14 +50,21 @@ pub(super) struct VanishingPoint {
 }
 
 impl VanishingPoint {
+    /// Of zenith and nadir the one that is seen nearer to the middle of the image: a mirrored lens without a stated limit
+    /// has a pixel for the other too, but far outside of the image.
     pub(super) fn new(camera: &Camera, robot_from_camera: &Matrix3<f64>) -> Option<Self> {
-        [1.0, -1.0].into_iter().find_map(|sign| {
+        let middle = Vector2::new(f64::from(camera.width()) - 1.0, f64::from(camera.height()) - 1.0) / 2.0;
+        let point = |sign: f64| {
             let pixel = camera.project(&(robot_from_camera.transpose() * Vector3::new(0.0, 0.0, sign)))?;
             let (_, back) = camera.unproject_jacobian(&pixel)?;
             let scale = (2.0 / (back.transpose() * back).trace()).sqrt();
             let direction = (robot_from_camera * back * (sign * scale)).fixed_rows::<2>(0).into_owned();
             (scale.is_finite() && scale > 0.0).then_some(Self { pixel, scale, direction })
-        })
+        };
+        match (point(1.0), point(-1.0)) {
+            (Some(up), Some(down)) if (down.pixel - middle).norm() < (up.pixel - middle).norm() => Some(down),
+            (up, down) => up.or(down),
+        }
     }
 
     /// The horizontal part of the ground normal for a unit shift `(cos beta', sin beta')`: eqs. 28 and 29 for any lens.

@@ -1,5 +1,7 @@
 //! From an image to a tilt: the tables of a camera, made once, and the scratch of a thread, grown once.
 
+use std::f64::consts::FRAC_PI_2;
+
 use nalgebra::{Matrix2, Matrix3, Vector2, Vector3};
 
 use super::confidence::{self, SECTORS};
@@ -10,7 +12,7 @@ use super::options::{Method, TiltOptions};
 use super::refine::refine;
 use super::vector_consensus::vector_consensus;
 use crate::camera::Camera;
-use crate::edges::{Detector, EdgePixels, LiftTable, NormalKind, Region};
+use crate::edges::{Detector, EdgeOptions, EdgePixels, LiftTable, NormalKind, Region};
 use crate::error::{Error, Result};
 use crate::geometry::{Tilt, tangent_basis};
 use crate::image::ImageView;
@@ -50,14 +52,40 @@ enum Tables {
 #[derive(Debug, Clone)]
 pub struct Scratch {
     detector: Detector,
+    /// What the memory and the detector were made for.
+    made_for: Extent,
     edges: EdgePixels,
     rows: Rows<f32>,
     weights: Vec<f32>,
     trimmed: Vec<f32>,
     /// Place of each row among the edge pixels.
     places: Vec<u32>,
-    /// The model and threshold that tell the inliers of the last image.
-    inliers: Option<([f64; 3], f64)>,
+    inliers: Inliers,
+}
+
+/// What an estimator's scratch depends on.
+#[derive(Debug, Clone, PartialEq)]
+struct Extent {
+    pixels: usize,
+    columns: std::ops::Range<usize>,
+    edges: EdgeOptions,
+}
+
+/// What tells the inliers of the last image.
+#[derive(Debug, Clone, Copy)]
+enum Inliers {
+    /// There was no fit.
+    None,
+    /// The rows with a weight above zero.
+    Weighted,
+    /// The rows with a residual of at most the threshold.
+    Within { model: [f64; 3], threshold: f64 },
+}
+
+impl Inliers {
+    fn weighted_if(found: bool) -> Self {
+        if found { Self::Weighted } else { Self::None }
+    }
 }
 
 /// A fit in the parameters of its rows, on the way to an estimate.
@@ -102,7 +130,7 @@ impl TiltEstimator {
                     Correction::ClosedForm => closed_form_gains(&camera, &robot_from_camera, &region, centre),
                 };
                 let offset_max_px = options.tilt_max_rad.map_or(*offset_max_px, |tilt| tilt * factor);
-                if offset_max_px / factor >= std::f64::consts::FRAC_PI_2 {
+                if offset_max_px / factor >= FRAC_PI_2 {
                     return Err(Error::option(
                         "correction",
                         factor,
@@ -151,19 +179,25 @@ impl TiltEstimator {
         let n = self.region.len();
         Scratch {
             detector: Detector::new(&self.region, &self.options.edges),
+            made_for: self.extent(),
             edges: EdgePixels::with_capacity(n),
             rows: Rows::with_capacity(n),
             weights: Vec::with_capacity(n),
             trimmed: Vec::with_capacity(n),
             places: Vec::with_capacity(n),
-            inliers: None,
+            inliers: Inliers::None,
         }
+    }
+
+    fn extent(&self) -> Extent {
+        Extent { pixels: self.region.len(), columns: self.region.columns(), edges: self.options.edges }
     }
 
     /// The tilt of one image. An image without enough edges has an estimate without a tilt, not an error.
     ///
     /// # Errors
-    /// [`Error::InvalidArgument`] if the image has another size than the camera's.
+    /// [`Error::InvalidArgument`] if the image has another size than the camera's, or the scratch is that of an estimator
+    /// with another camera or other edge options.
     pub fn estimate(&self, image: &ImageView<'_>, scratch: &mut Scratch) -> Result<TiltEstimate> {
         let (width, height) = (self.camera.width() as usize, self.camera.height() as usize);
         if (image.width(), image.height()) != (width, height) {
@@ -172,6 +206,9 @@ impl TiltEstimator {
                 format!("{} x {} pixels", image.height(), image.width()),
                 format!("{height} x {width} (rows x columns), as the camera's images"),
             ));
+        }
+        if scratch.made_for != self.extent() {
+            return Err(Error::argument("scratch", "that of another estimator", "one made by this estimator"));
         }
         scratch.detector.detect(image, &self.region, &mut scratch.edges);
         let fit = match &self.tables {
@@ -233,6 +270,7 @@ impl TiltEstimator {
 
     /// Paper 000 section 2.1.
     fn fit_offsets(&self, gains: &[f32], factor: f64, offset_max_px: f64, scratch: &mut Scratch) -> Fit {
+        scratch.inliers = Inliers::None;
         let Some(centre) = &self.centre else { return Fit::none() };
         let Scratch { edges, rows, weights, places, .. } = &mut *scratch;
         offsets(edges, &self.region, centre, gains, offset_max_px, rows, weights, places);
@@ -254,9 +292,12 @@ impl TiltEstimator {
             }
             Method::VectorConsensus { .. } | Method::Refined(_) => return Fit::none(),
         };
-        scratch.inliers = None;
         let shift = report.model.unwrap_or_default();
         let (l, alpha) = (shift.norm(), shift.norm() / factor);
+        if alpha >= FRAC_PI_2 {
+            return Fit::out_of_reach(alpha, &report);
+        }
+        scratch.inliers = Inliers::weighted_if(report.model.is_some());
         let lean = if l > 0.0 { centre.lean(&(shift / l)) } else { upright };
         let lean = lean.try_normalize(1e-9).unwrap_or_default() * alpha.sin();
         let tilt = report.model.and_then(|_| Tilt::from_normal(&Vector3::new(lean.x, lean.y, alpha.cos())));
@@ -276,25 +317,32 @@ impl TiltEstimator {
     /// Paper 000 section 2.2, and the refined method.
     fn fit_normals(&self, table: &LiftTable, scratch: &mut Scratch) -> Fit {
         let Scratch { edges, rows, weights, places, trimmed, inliers, .. } = &mut *scratch;
+        *inliers = Inliers::None;
         table.lift(edges, self.options.normal_tilt_max_rad().sin(), rows, weights, places);
-        *inliers = None;
         let (report, gate, factor) = match &self.options.method {
             Method::VectorConsensus { threshold_rad, factor, .. } => {
                 weights.fill(1.0);
                 let report =
                     vector_consensus(rows, &self.robot_from_camera, *threshold_rad, self.options.seed, weights);
+                *inliers = Inliers::weighted_if(report.model.is_some());
                 (report, Gate::Open, *factor)
             }
             Method::Refined(options) => {
                 let report = refine(rows, options, weights, trimmed);
-                if let Some(direction) = report.model {
-                    *inliers = Some((direction.into(), 2.0 * options.scale_rad));
-                }
+                *inliers = report.model.map_or(Inliers::None, |direction| Inliers::Within {
+                    model: direction.into(),
+                    threshold: 2.0 * options.scale_rad,
+                });
                 (report, Gate::Soft { scale: options.scale_rad }, 1.0)
             }
             Method::ImageSpaceRansac { .. } | Method::ImageSpaceRejectRefit { .. } => return Fit::none(),
         };
-        let tilt = report.model.and_then(|normal| Tilt::from_normal(&normal)).map(|tilt| {
+        let tilt = report.model.and_then(|normal| Tilt::from_normal(&normal));
+        if let Some(alpha) = tilt.map(|tilt| tilt.alpha_rad() / factor).filter(|alpha| *alpha >= FRAC_PI_2) {
+            *inliers = Inliers::None;
+            return Fit::out_of_reach(alpha, &report);
+        }
+        let tilt = tilt.map(|tilt| {
             if factor == 1.0 { tilt } else { Tilt::from_alpha_beta(tilt.alpha_rad() / factor, tilt.beta_rad()) }
         });
         Fit {
@@ -302,7 +350,10 @@ impl TiltEstimator {
             model: report.model.unwrap_or_default().into(),
             gate,
             horizontal: Matrix2::identity() / factor,
-            inliers: inliers.map_or(report.inliers, |(model, threshold)| rows.count_within(model, threshold)),
+            inliers: match *inliers {
+                Inliers::Within { model, threshold } => rows.count_within(model, threshold),
+                Inliers::None | Inliers::Weighted => report.inliers,
+            },
             shift_px: None,
             rms: report.rms,
             iterations: report.iterations,
@@ -346,14 +397,21 @@ impl TiltEstimator {
 impl Scratch {
     /// Whether a row agreed with the last estimate.
     fn is_inlier(&self, row: usize) -> bool {
-        match (self.inliers, self.rows.get(row)) {
-            (Some((model, threshold)), Some(row)) => row.dot(&Vector3::from(model)).abs() <= threshold,
-            _ => self.weights.get(row).is_some_and(|weight| *weight > 0.0),
+        match self.inliers {
+            Inliers::None => false,
+            Inliers::Weighted => self.weights.get(row).is_some_and(|weight| *weight > 0.0),
+            Inliers::Within { model, threshold } => self.rows.is_within(row, model, threshold),
         }
     }
 }
 
 impl Fit {
+    /// A fit with a lean that no image of a band of elevations can show.
+    fn out_of_reach<M>(alpha: f64, report: &FitReport<M>) -> Self {
+        let stop = Stop::OutOfReach { angle_rad: alpha, limit_rad: FRAC_PI_2 };
+        Self { iterations: report.iterations, stop, ..Self::none() }
+    }
+
     /// No fit at all: the method has no tables of this kind.
     fn none() -> Self {
         Self {
@@ -372,7 +430,7 @@ impl Fit {
 
 /// # Errors
 /// [`Error::InvalidArgument`] unless the matrix is a rotation to about 1e-6.
-fn validate_rotation(matrix: &Matrix3<f64>) -> Result<()> {
+pub(super) fn validate_rotation(matrix: &Matrix3<f64>) -> Result<()> {
     let off = (matrix.transpose() * matrix - Matrix3::identity()).norm();
     if off < 1e-6 && matrix.determinant() > 0.0 {
         return Ok(());

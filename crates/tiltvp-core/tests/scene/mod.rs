@@ -3,7 +3,7 @@
 #![allow(dead_code)]
 
 use nalgebra::{Matrix3, Vector2, Vector3};
-use tiltvp_core::camera::{Camera, Equidistant, Model};
+use tiltvp_core::camera::{Camera, Equidistant, Model, Parameter};
 use tiltvp_core::geometry::Tilt;
 use tiltvp_core::image::ImageView;
 
@@ -94,4 +94,31 @@ pub(crate) fn stripes(
         let gauss = (0..4).map(|k| dice(seed + 2 + k, place) - 0.5).sum::<f64>() * 3f64.sqrt();
         radiance(&(world_from_camera * bearing), jacobian.norm()) + sigma * gauss
     })
+}
+
+/// The same lens over an image of at most `side` pixels a side: what is in pixels shrinks with it.
+pub(crate) fn shrunk(camera: &Camera, side: u32) -> Camera {
+    let factor = f64::from(side) / f64::from(camera.width().max(camera.height()));
+    let size = |side: u32| (f64::from(side) * factor).round() as u32;
+    let (width, height) = (size(camera.width()), size(camera.height()));
+    let name = camera.model().name();
+    let mut parameters: Vec<_> =
+        camera.model().parameters().into_iter().map(|(name, value)| (name.to_owned(), value)).collect();
+    for (key, value) in &mut parameters {
+        match (key.as_str(), value) {
+            ("cx" | "cy" | "fx" | "fy" | "focal_px" | "skew", Parameter::Scalar(x)) => *x *= factor,
+            ("k1" | "k2" | "k3" | "k4", Parameter::Scalar(x)) if name == "radial_polynomial" => *x *= factor,
+            ("polynomial", Parameter::List(list)) => {
+                for (i, a) in list.iter_mut().enumerate() {
+                    *a *= factor.powi(1 - i as i32);
+                }
+            }
+            ("inverse_polynomial", Parameter::List(list)) => list.iter_mut().for_each(|a| *a *= factor),
+            _ => {}
+        }
+    }
+    let model = Model::from_parameters(name, width, height, &parameters).unwrap();
+    let small = Camera::new(width, height, model).unwrap();
+    let small = small.with_max_theta_rad(camera.max_theta_rad()).unwrap();
+    if camera.is_mirrored() { small.mirrored() } else { small }
 }

@@ -27,7 +27,7 @@ fn own(method: &Method) -> &'static [&'static str] {
         Method::ImageSpaceRansac { .. } => &["threshold_px", "offset_max_px", "correction"],
         Method::ImageSpaceRejectRefit { .. } => &["keep_fraction", "offset_max_px", "correction"],
         Method::VectorConsensus { .. } => &["threshold_rad", "normal", "correction"],
-        Method::Refined(_) => &["keep_fraction", "scale_rad"],
+        Method::Refined(_) => &["keep_fraction", "scale_rad", "tolerance_rad", "max_iterations"],
     }
 }
 
@@ -104,6 +104,12 @@ fn set(options: &mut TiltOptions, key: &str, value: &Bound<'_, PyAny>) -> PyResu
             };
         }
         ("scale_rad", Method::Refined(refine)) => refine.scale_rad = number()?,
+        ("tolerance_rad", Method::Refined(refine)) => refine.tolerance_rad = number()?,
+        ("max_iterations", Method::Refined(refine)) => {
+            refine.max_iterations = value
+                .extract()
+                .map_err(|_| invalid(format!("option max_iterations = {value}, expected a whole number from 1")))?;
+        }
         (_, method) => return Err(unknown(value.py(), key, method)),
     }
     Ok(())
@@ -168,6 +174,8 @@ pub(super) fn in_force<'py>(py: Python<'py>, options: &TiltOptions) -> PyResult<
         Method::Refined(refine) => {
             dict.set_item("keep_fraction", refine.keep_fraction)?;
             dict.set_item("scale_rad", refine.scale_rad)?;
+            dict.set_item("tolerance_rad", refine.tolerance_rad)?;
+            dict.set_item("max_iterations", refine.max_iterations)?;
         }
     }
     Ok(dict)

@@ -35,6 +35,7 @@ impl FitReport {
             Stop::IterationLimit { .. } => "iteration-limit",
             Stop::TooFew { .. } => "too-few",
             Stop::NoModel { .. } => "no-model",
+            Stop::OutOfReach { .. } => "out-of-reach",
         };
         Self { stop: word.to_owned(), reason: stop.to_string(), iterations, residual_rms }
     }

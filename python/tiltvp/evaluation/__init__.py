@@ -1,0 +1,1 @@
+"""How well the methods do: metrics, runs over data with known tilt, tables."""
