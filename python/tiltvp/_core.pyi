@@ -145,7 +145,7 @@ class FitReport:
 
         "confident": random sampling has drawn as many samples as its confidence needs; "trial-limit": it has drawn all
         it may. "converged": the model has stopped changing; "settled": the residuals are small enough;
-        "iteration-limit": refitting has been repeated as often as it may. There is no answer after "too-few" observations,
+        "iteration-limit": refitting has been repeated as often as it may. No answer comes of "too-few" observations,
         "no-model" (they are all alike) and "out-of-reach" (an angle that the method cannot mean).
         """
 
@@ -288,6 +288,8 @@ class EdgeElements:
 
     def __len__(self) -> int: ...
     def __eq__(self, other: object, /) -> bool: ...
+    def __copy__(self) -> Self: ...
+    def __deepcopy__(self, _memo: object) -> Self: ...
     __hash__: ClassVar[None]  # type: ignore[assignment]
 
 @disjoint_base
@@ -400,7 +402,7 @@ class TiltEstimator:
     def _estimate_with_edges(self, image: NDArray[np.uint8]) -> tuple[TiltEstimate, EdgeElements]:
         """The tilt of such an image, and its edge pixels."""
 
-    def _estimate_many(self, images: list[NDArray[np.uint8]], *, threads: int = 1) -> list[TiltEstimate]:
+    def _estimate_many(self, images: list[NDArray[np.uint8]], *, threads: int | None = None) -> list[TiltEstimate]:
         """The tilts of many such images, in their order, the same for any number of threads."""
 
     def __eq__(self, other: object, /) -> bool: ...
@@ -497,9 +499,9 @@ def render_room(
     beta_rad: float,
     robot_from_camera: ArrayLike | None = None,
     noise_sigma: float = 2.0,
-    samples: int = 3,
+    samples: int | None = None,
 ) -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:
     """Grey (H, W) and RGB (H, W, 3) images of a seeded room of one of `ROOM_KINDS`, seen by a leaning robot.
 
-    `noise_sigma` is in grey levels, `samples` the rays per pixel and side. Raises `tiltvp.errors.InvalidInputError`.
+    `noise_sigma` is in grey levels, `samples` the rays per pixel and side (None: 3).
     """

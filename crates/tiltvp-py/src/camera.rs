@@ -21,17 +21,14 @@ impl Camera {
     #[pyo3(signature = (model, *, width, height, max_theta_rad=None, mirror=false, **parameters))]
     fn new(
         model: &str,
-        width: i64,
-        height: i64,
+        width: &Bound<'_, PyAny>,
+        height: &Bound<'_, PyAny>,
         max_theta_rad: Option<f64>,
         mirror: bool,
         parameters: Option<&Bound<'_, PyDict>>,
     ) -> PyResult<Self> {
-        let side = |name: &str, value: i64| {
-            u32::try_from(value)
-                .map_err(|_| invalid(format!("{name} = {value}, expected a number of pixels from 1 to {}", u32::MAX)))
-        };
-        let (width, height) = (side("width", width)?, side("height", height)?);
+        let pixels = format!("a whole number of pixels from 1 to {}", u32::MAX);
+        let (width, height) = (convert::whole(width, "width", &pixels)?, convert::whole(height, "height", &pixels)?);
         let mut named = Vec::new();
         for (key, value) in parameters.into_iter().flat_map(PyDictMethods::iter) {
             let key: String = key.extract()?;

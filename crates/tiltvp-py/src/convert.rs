@@ -90,6 +90,17 @@ pub(crate) fn mask(value: &Bound<'_, PyAny>, name: &str) -> PyResult<(usize, usi
     Ok((height, width, flat.to_vec()?))
 }
 
+/// A whole number that the type can hold.
+pub(crate) fn whole<'py, T>(value: &Bound<'py, PyAny>, name: &str, expected: &str) -> PyResult<T>
+where
+    T: for<'a> FromPyObject<'a, 'py>,
+{
+    value.extract().map_err(|_| {
+        let shown = value.repr().map_or_else(|_| "an object".to_owned(), |repr| repr.to_string());
+        invalid(format!("{name} = {shown}, expected {expected}"))
+    })
+}
+
 /// An item of a dict as `to_dict` makes it.
 pub(crate) fn item<'py, T>(values: &Bound<'py, PyDict>, key: &str, expected: &str) -> PyResult<T>
 where

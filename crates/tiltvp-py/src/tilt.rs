@@ -111,14 +111,15 @@ impl TiltEstimator {
     }
 
     /// The tilts of many C-contiguous `(H, W)` images of uint8.
-    #[pyo3(signature = (images, *, threads=1))]
+    #[pyo3(signature = (images, *, threads=None))]
     #[expect(clippy::needless_pass_by_value, reason = "what the interpreter hands over is owned")]
     fn _estimate_many(
         &self,
         py: Python<'_>,
         images: Vec<Bound<'_, PyAny>>,
-        threads: usize,
+        threads: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Vec<TiltEstimate>> {
+        let threads = threads.map_or(Ok(1), |threads| convert::whole(threads, "threads", "a whole number from 1"))?;
         let named = images.iter().enumerate().map(|(i, image)| convert::gray(image, &format!("images[{i}]")));
         let arrays = named.collect::<PyResult<Vec<_>>>()?;
         let views = arrays.iter().map(view).collect::<PyResult<Vec<_>>>()?;

@@ -109,7 +109,7 @@ class PanoramaViews:
     def render(
         self, normal: ArrayLike, *, yaw_rad: float = 0.0, noise_sigma: float = 2.0, seed: int = 0
     ) -> NDArray[np.uint8]:
-        """(H, W) uint8: what the robot sees whose ground normal is `normal` (3,); noise in grey levels, black outside."""
+        """(H, W) uint8: seen by a robot whose ground normal is `normal` (3,); noise in grey levels, outside black."""
         turn = np.array(
             [[np.cos(yaw_rad), -np.sin(yaw_rad), 0.0], [np.sin(yaw_rad), np.cos(yaw_rad), 0.0], [0.0, 0.0, 1.0]]
         )

@@ -319,4 +319,33 @@ impl EdgeElements {
             self.size == other.size && self.bits().eq(other.bits())
         })
     }
+
+    /// The value of its columns and its size, for pickle.
+    #[classmethod]
+    fn _from_rows(_cls: &Bound<'_, PyType>, rows: Vec<(u16, u16, f64, f64, bool, bool)>, size: (usize, usize)) -> Self {
+        let element = |(u, v, phi_rad, offset_px, prefiltered, inlier)| core::EdgeElement {
+            u,
+            v,
+            phi_rad,
+            offset_px,
+            prefiltered,
+            inlier,
+        };
+        Self { elements: rows.into_iter().map(element).collect(), size }
+    }
+
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyTuple>> {
+        let row = |e: &core::EdgeElement| (e.u, e.v, e.phi_rad, e.offset_px, e.prefiltered, e.inlier);
+        let this = slf.get();
+        let rows: Vec<_> = this.elements.iter().map(row).collect();
+        (slf.get_type().getattr("_from_rows")?, (rows, this.size)).into_pyobject(slf.py())
+    }
+
+    fn __copy__<'py>(slf: &Bound<'py, Self>) -> Bound<'py, Self> {
+        slf.clone()
+    }
+
+    fn __deepcopy__<'py>(slf: &Bound<'py, Self>, _memo: &Bound<'py, PyAny>) -> Bound<'py, Self> {
+        slf.clone()
+    }
 }
