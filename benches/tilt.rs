@@ -53,7 +53,10 @@ fn tables(bencher: Bencher, method: &str) {
 }
 
 mod stages {
-    use super::*;
+    use super::{
+        Bencher, CommonDirectionOptions, Detector, EdgeOptions, EdgePixels, Gate, ItemsCount, LiftTable, Matrix3,
+        NormalKind, PICTURE, Region, Rows, Vector3, black_box, common_direction, fisheye, view,
+    };
 
     fn edges_of(smoothing_px: f64) -> (Region, Detector, EdgePixels) {
         let options = EdgeOptions { smoothing_px, ..EdgeOptions::default() };
