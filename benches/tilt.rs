@@ -63,7 +63,7 @@ mod stages {
         let region = Region::new(&fisheye().unwrap(), &Matrix3::identity(), &options, None).unwrap();
         let mut detector = Detector::new(&region, &options);
         let mut edges = EdgePixels::with_capacity(region.len());
-        detector.detect(&view(&PICTURE).unwrap(), &region, &mut edges);
+        detector.detect(&view(&PICTURE).unwrap(), &region, None, &mut edges);
         (region, detector, edges)
     }
 
@@ -82,7 +82,7 @@ mod stages {
         let picture = view(&PICTURE).unwrap();
         bencher
             .counter(ItemsCount::new(region.len()))
-            .bench_local(|| detector.detect(black_box(&picture), &region, &mut edges));
+            .bench_local(|| detector.detect(black_box(&picture), &region, None, &mut edges));
     }
 
     /// From gradients to unit normals that pass the prefilter.

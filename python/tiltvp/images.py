@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import contextlib
 import os
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -100,6 +100,6 @@ def write_image(path: str | os.PathLike[str], image: NDArray[np.uint8]) -> None:
         part.write_bytes(data.tobytes())
         part.replace(file)
     except OSError as error:
-        with contextlib.suppress(OSError):
+        with suppress(OSError):
             part.unlink()
         raise ImageFileError(f"{file}: {error.strerror or error}") from error

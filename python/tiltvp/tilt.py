@@ -24,7 +24,7 @@ from tiltvp.images import gray_from
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
-    from tiltvp.cameras import Camera
+    from tiltvp._core import Camera
 
 __all__ = [
     "CommonDirection",

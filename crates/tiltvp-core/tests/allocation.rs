@@ -101,8 +101,6 @@ fn no_estimate_after_the_first_allocates() {
             let mut edges = 0;
             let taken = allocations(|| edges = estimator.estimate(&image.view(), &mut scratch).unwrap().edge_pixels);
             assert_eq!(taken, 0, "image {i}, {edges} edge pixels, {:?}", estimator.options());
-            let listed = allocations(|| assert_eq!(estimator.elements(&scratch).count(), edges));
-            assert_eq!(listed, 0, "elements of image {i}");
             most = most.max(edges);
         }
         assert!(most * 10 > estimator.region_pixels() * 4, "{most} of {} pixels", estimator.region_pixels());

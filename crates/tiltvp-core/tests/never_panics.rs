@@ -192,7 +192,8 @@ proptest! {
                 prop_assert!((tilt.normal().norm() - 1.0).abs() < 1e-9, "{:?}", found);
                 prop_assert!(tilt.normal().z >= 0.0, "a robot that leans by {} rad", tilt.alpha_rad());
             }
-            let elements: Vec<_> = estimator.elements(&scratch).collect();
+            let (again, elements) = estimator.estimate_with_elements(&image.view(), &mut scratch).unwrap();
+            prop_assert_eq!(format!("{again:?}"), format!("{found:?}"));
             prop_assert_eq!(elements.len(), found.edge_pixels);
             prop_assert_eq!(elements.iter().filter(|e| e.prefiltered).count(), found.prefiltered_pixels);
             prop_assert_eq!(elements.iter().filter(|e| e.inlier).count(), found.inlier_pixels, "{:?}", found);

@@ -222,7 +222,9 @@ fn wrong_values_of_a_method_are_refused_by_name() {
         };
         let vectors =
             |threshold_rad, factor| Method::VectorConsensus { threshold_rad, normal: NormalKind::Tangent, factor };
-        let refined = |keep_fraction, scale_rad| Method::Refined(RefineOptions { keep_fraction, scale_rad });
+        let refined = |keep_fraction, scale_rad| {
+            Method::Refined(RefineOptions { keep_fraction, scale_rad, ..RefineOptions::default() })
+        };
         for (name, method) in [
             ("threshold_px", ransac(wrong, 40.0, 200.0)),
             ("offset_max_px", ransac(10.0, wrong, 200.0)),

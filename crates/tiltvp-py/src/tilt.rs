@@ -100,10 +100,7 @@ impl TiltEstimator {
         let image = convert::gray(image, "image")?;
         let (view, inner) = (view(&image)?, &self.inner);
         let mut scratch = self.borrow_scratch();
-        let outcome = call(py, || {
-            let estimate = inner.estimate(&view, &mut scratch)?;
-            Ok((estimate, inner.elements(&scratch).collect::<Vec<_>>()))
-        });
+        let outcome = call(py, || inner.estimate_with_elements(&view, &mut scratch));
         self.return_scratch(scratch);
         let (estimate, elements) = outcome?;
         let size = (inner.camera().width() as usize, inner.camera().height() as usize);

@@ -1,5 +1,5 @@
-"""The `tiltvp` command."""
+"""The `tiltvp` command: what a person types. The only place of the package that prints."""
 
+from tiltvp.cli.app import main
 
-def main() -> None:
-    """Entry point."""
+__all__ = ["main"]

@@ -4,6 +4,7 @@ use multiversion::multiversion;
 
 use super::options::EdgeOptions;
 use super::region::Region;
+use super::screen::Screen;
 use crate::image::{ImageView, Smoother};
 
 /// Edge pixels in structure-of-arrays form, in slot order.
@@ -13,12 +14,13 @@ pub struct EdgePixels {
     gx: Vec<f32>,
     gy: Vec<f32>,
     len: usize,
+    strong: usize,
 }
 
 impl EdgePixels {
     /// No pixels, with room for `capacity` of them.
     pub fn with_capacity(capacity: usize) -> Self {
-        Self { slot: vec![0; capacity], gx: vec![0.0; capacity], gy: vec![0.0; capacity], len: 0 }
+        Self { slot: vec![0; capacity], gx: vec![0.0; capacity], gy: vec![0.0; capacity], len: 0, strong: 0 }
     }
 
     /// How many there are.
@@ -29,6 +31,11 @@ impl EdgePixels {
     /// Whether there are none.
     pub fn is_empty(&self) -> bool {
         self.len == 0
+    }
+
+    /// How many pixels had a strong gradient, those included that a screen has kept out.
+    pub fn strong(&self) -> usize {
+        self.strong
     }
 
     /// Number of each pixel within the region.
@@ -48,13 +55,18 @@ impl EdgePixels {
 
     /// Appends a pixel.
     pub fn push(&mut self, slot: u32, gx: f32, gy: f32) {
-        if self.len == self.slot.len() {
-            self.slot.push(0);
-            self.gx.push(0.0);
-            self.gy.push(0.0);
-        }
+        self.make_room(self.len + 1);
         (self.slot[self.len], self.gx[self.len], self.gy[self.len]) = (slot, gx, gy);
         self.len += 1;
+        self.strong += 1;
+    }
+
+    fn make_room(&mut self, capacity: usize) {
+        if self.slot.len() < capacity {
+            self.slot.resize(capacity, 0);
+            self.gx.resize(capacity, 0.0);
+            self.gy.resize(capacity, 0.0);
+        }
     }
 }
 
@@ -85,12 +97,15 @@ impl Detector {
         }
     }
 
-    /// Writes the pixels of the region with a gradient magnitude of at least `gradient_min`, in slot order.
+    /// Writes the pixels of the region with a gradient magnitude of at least `gradient_min` that pass the screen, in slot
+    /// order.
     ///
     /// The image must have the size of the camera that the region was made for. Grows no vector that has room for the
     /// whole region.
-    pub fn detect(&mut self, image: &ImageView<'_>, region: &Region, out: &mut EdgePixels) {
-        out.len = 0;
+    pub fn detect(&mut self, image: &ImageView<'_>, region: &Region, screen: Option<&Screen>, out: &mut EdgePixels) {
+        out.make_room(region.len());
+        let (slots, gxs, gys) = (&mut out.slot[..], &mut out.gx[..], &mut out.gy[..]);
+        let (mut len, mut strong_pixels) = (0, 0);
         // The region keeps clear of the border, so there is a pixel to the left of its first column.
         let left = region.columns().start.saturating_sub(1);
         let mut next_row = 0;
@@ -104,25 +119,55 @@ impl Detector {
             let [above, middle, below] = [span.v + 2, span.v, span.v + 1].map(|v| &self.rows[v % 3][columns.clone()]);
             let (gx, gy, strength) = (&mut self.gx[..n], &mut self.gy[..n], &mut self.strength[..n]);
             scharr(above, middle, below, gx, gy, strength);
-            for (start, block) in (0..n).step_by(BLOCK).zip(strength.chunks(BLOCK)) {
+            if let Some(screen) = screen {
+                strong_pixels += screen.apply(span.slot, gx, gy, strength, self.threshold_squared);
+            }
+            for (block, start) in strength.chunks(BLOCK).zip((0..n).step_by(BLOCK)) {
                 let mut strong = reaching(block, self.threshold_squared);
                 while strong != 0 {
                     let i = start + strong.trailing_zeros() as usize;
                     strong &= strong - 1;
-                    out.push((span.slot + i) as u32, gx[i], gy[i]);
+                    (slots[len], gxs[len], gys[len]) = ((span.slot + i) as u32, gx[i], gy[i]);
+                    len += 1;
                 }
             }
         }
+        out.len = len;
+        out.strong = if screen.is_some() { strong_pixels } else { len };
     }
 }
 
 /// Pixels that are tested together.
 const BLOCK: usize = 32;
 
-/// One bit for each pixel of a block that reaches the threshold.
+/// One bit for each pixel of a block, at most 32, that reaches the threshold.
 #[inline(always)]
 fn reaching(block: &[f32], threshold: f32) -> u32 {
+    #[cfg(target_arch = "x86_64")]
+    if let Ok(block) = <&[f32; BLOCK]>::try_from(block) {
+        return reaching_sse2(block, threshold);
+    }
+    reaching_scalar(block, threshold)
+}
+
+#[inline(always)]
+fn reaching_scalar(block: &[f32], threshold: f32) -> u32 {
     block.iter().enumerate().fold(0, |bits, (i, x)| bits | (u32::from(*x >= threshold) << i))
+}
+
+/// [`reaching_scalar`] with the sign bits of four comparisons at once; SSE2 is part of every x86-64.
+#[cfg(target_arch = "x86_64")]
+#[inline(always)]
+fn reaching_sse2(block: &[f32; BLOCK], threshold: f32) -> u32 {
+    use std::arch::x86_64::{_mm_cmpge_ps, _mm_movemask_ps, _mm_set1_ps, _mm_setr_ps};
+    // SAFETY: these intrinsics take and give values only and need no more than SSE2, which every x86-64 has.
+    unsafe {
+        let limit = _mm_set1_ps(threshold);
+        block.as_chunks::<4>().0.iter().rev().fold(0, |bits, [a, b, c, d]| {
+            let signs = _mm_movemask_ps(_mm_cmpge_ps(_mm_setr_ps(*a, *b, *c, *d), limit));
+            (bits << 4) | signs as u32
+        })
+    }
 }
 
 /// The 3x3 Scharr derivatives (3, 10, 3) of the middle row and their squared magnitude; rows are one pixel wider on both sides.
@@ -147,6 +192,19 @@ mod tests {
     use nalgebra::Matrix3;
 
     #[test]
+    #[cfg(target_arch = "x86_64")]
+    fn vector_bits_equal_scalar_bits() {
+        for seed in 0..200u32 {
+            let block: [f32; BLOCK] = std::array::from_fn(|i| {
+                (seed.wrapping_mul(747_796_405).wrapping_add((i as u32).wrapping_mul(277_803_737)) >> 20) as f32
+            });
+            for threshold in [0.0, 100.0, 2000.0, block[7], f32::NAN, f32::INFINITY] {
+                assert_eq!(reaching_sse2(&block, threshold), reaching_scalar(&block, threshold));
+            }
+        }
+    }
+
+    #[test]
     fn gradients_equal_the_kernel_written_out() {
         let lens = Equidistant::new(20.0, 31.5, 29.5).unwrap();
         let camera = Camera::new(64, 60, Model::Equidistant(lens)).unwrap();
@@ -155,7 +213,7 @@ mod tests {
         let data: Vec<u8> = (0..64 * 60u32).map(|i| (i.wrapping_mul(2_654_435_761) >> 24) as u8).collect();
         let image = ImageView::new(&data, 64, 60, 64).unwrap();
         let mut edges = EdgePixels::with_capacity(region.len());
-        Detector::new(&region, &options).detect(&image, &region, &mut edges);
+        Detector::new(&region, &options).detect(&image, &region, None, &mut edges);
 
         let at = |u: usize, v: usize| i32::from(data[v * 64 + u]);
         let mut k = 0;

@@ -5,6 +5,7 @@ use nalgebra::{Matrix3, Matrix3x2, Vector2};
 
 use super::detect::EdgePixels;
 use super::region::Region;
+use super::screen::Screen;
 use crate::camera::Camera;
 use crate::robust::Rows;
 
@@ -41,6 +42,17 @@ impl LiftTable {
             matrices.iter().map(Matrix3x2::norm_squared).sum::<f64>() / (2 * matrices.len().max(1)) as f64;
         let scale = 1.0 / mean_square.sqrt().max(f64::MIN_POSITIVE);
         Self { maps: matrices.iter().map(|m| std::array::from_fn(|i| (m[(i / 2, i % 2)] * scale) as f32)).collect() }
+    }
+
+    /// The screen of the test that [`lift`](Self::lift) makes: `|m_z| <= sin_max |m|` with `|m|` no more than the largest
+    /// stretch of the pixel's matrix.
+    pub fn screen(&self, sin_max: f64) -> Screen {
+        let vector = |[a, b, c, d, e, f]: &[f32; 6]| {
+            let (xx, xy, yy) = (a * a + c * c + e * e, a * b + c * d + e * f, b * b + d * d + f * f);
+            let largest = 0.5 * (xx + yy) + (0.25 * (xx - yy) * (xx - yy) + xy * xy).sqrt();
+            if largest > 0.0 { [e / largest.sqrt(), f / largest.sqrt()] } else { [0.0; 2] }
+        };
+        Screen::new(self.maps.iter().map(vector), sin_max)
     }
 
     /// Writes the unit normals of the edge pixels whose great circles pass within `asin(sin_max)` of the robot's vertical,

@@ -42,8 +42,8 @@ impl<T: Real> Problem for Direction<'_, T> {
         first.cross(&second).try_normalize(1e-9).and_then(upwards)
     }
 
-    fn consensus(&self, model: &Vector3<f64>, threshold: f64) -> usize {
-        self.rows.count_within((*model).into(), threshold)
+    fn consensus(&self, model: &Vector3<f64>, threshold: f64, to_beat: usize) -> usize {
+        self.rows.count_to_beat((*model).into(), threshold, to_beat)
     }
 
     fn summarise(&self, model: &Vector3<f64>, gate: Gate, weights: &mut [f32]) -> Moments {

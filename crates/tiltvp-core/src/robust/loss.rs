@@ -41,4 +41,30 @@ impl Gate {
         let squared = residual * residual;
         if squared > limit { 0.0 } else { (1.0 - squared * inverse).max(0.0).powi(8) }
     }
+
+    /// The derivative of `residual * weight(residual)`, which is what a fit feels of a small change of its model: negative in
+    /// the flanks of the soft gate, so that clutter spread evenly over the gate adds up to nothing.
+    pub fn slope(self, residual: f64) -> f64 {
+        let (limit, inverse) = self.coefficients();
+        let squared = residual * residual;
+        let t = (1.0 - squared * inverse).max(0.0);
+        if squared > limit { 0.0 } else { t.powi(7) * (17.0 * t - 16.0) }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn slope_is_the_derivative_of_the_weighted_residual() {
+        let h = 1e-6;
+        for gate in [Gate::Open, Gate::Hard { threshold: 0.5 }, Gate::Soft { scale: 0.2 }] {
+            for i in -100..100 {
+                let r = 0.01 * f64::from(i) + 0.005;
+                let numeric = ((r + h) * gate.weight(r + h) - (r - h) * gate.weight(r - h)) / (2.0 * h);
+                assert!((gate.slope(r) - numeric).abs() < 1e-6, "{gate:?} at {r}: {} {numeric}", gate.slope(r));
+            }
+        }
+    }
 }

@@ -25,8 +25,9 @@ pub trait Problem {
     /// The model through `SAMPLE_SIZE` observations, `None` if they are degenerate.
     fn fit_minimal(&self, sample: &[usize]) -> Option<Self::Model>;
 
-    /// How many observations have a residual of at most `threshold`, in the problem's unit.
-    fn consensus(&self, model: &Self::Model, threshold: f64) -> usize;
+    /// How many observations have a residual of at most `threshold`, in the problem's unit. Where that cannot exceed
+    /// `to_beat`, any count up to `to_beat` will do.
+    fn consensus(&self, model: &Self::Model, threshold: f64, to_beat: usize) -> usize;
 
     /// Applies a gate about a model and summarises what is left; a hard gate also sets the weights it rejects to zero.
     fn summarise(&self, model: &Self::Model, gate: Gate, weights: &mut [f32]) -> Self::Summary;

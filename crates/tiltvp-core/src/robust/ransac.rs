@@ -72,8 +72,9 @@ pub fn ransac<P: Problem>(
         trials += 1;
         sampler.draw(sample);
         let Some(model) = problem.fit_minimal(sample) else { continue };
-        let count = problem.consensus(&model, options.threshold);
-        if best.as_ref().is_none_or(|(most, _)| count > *most) {
+        let most = best.as_ref().map_or(0, |(most, _)| *most);
+        let count = problem.consensus(&model, options.threshold, most);
+        if best.is_none() || count > most {
             needed = trials_needed(count, len, P::SAMPLE_SIZE, options.confidence).max(1);
             best = Some((count, model));
         }

@@ -88,13 +88,44 @@ impl<T: Real> Rows<T> {
 
     /// How many rows have a residual of at most `threshold`.
     pub fn count_within(&self, model: [f64; 3], threshold: f64) -> usize {
-        T::count(self.columns(), model.map(T::from_f64), T::from_f64(threshold * threshold))
+        self.count_to_beat(model, threshold, 0)
+    }
+
+    /// [`count_within`](Self::count_within) that stops as soon as it cannot exceed `to_beat`, with some count up to that.
+    pub fn count_to_beat(&self, model: [f64; 3], threshold: f64, to_beat: usize) -> usize {
+        let (model, limit) = (model.map(T::from_f64), T::from_f64(threshold * threshold));
+        let mut count = 0;
+        for start in (0..self.len).step_by(COUNTED) {
+            let end = (start + COUNTED).min(self.len);
+            count += T::count(self.columns().map(|column| &column[start..end]), model, limit);
+            if count + (self.len - end) <= to_beat {
+                break;
+            }
+        }
+        count
     }
 
     /// Whether row `index` has a residual of at most `threshold`, in the arithmetic of [`count_within`](Self::count_within).
     pub fn is_within(&self, index: usize, model: [f64; 3], threshold: f64) -> bool {
         let row = self.columns().map(|column| column.get(index..=index).unwrap_or(&[]));
         T::count(row, model.map(T::from_f64), T::from_f64(threshold * threshold)) == 1
+    }
+
+    /// Calls `visit(row, [weight, slope, x, y, residual])` for each row whose weight, multiplied by the gate about a model, is above
+    /// zero; `slope` is the weight multiplied by [`Gate::slope`].
+    pub fn for_each_gated(&self, model: [f64; 3], gate: Gate, weights: &[f32], mut visit: impl FnMut(usize, [f64; 5])) {
+        let [x, y, z] = self.columns();
+        let (limit, inverse) = gate.coefficients();
+        for (row, (((x, y), z), weight)) in x.iter().zip(y).zip(z).zip(weights).enumerate() {
+            let (x, y, z) = (x.to_f64(), y.to_f64(), z.to_f64());
+            let d = x * model[0] + y * model[1] + z * model[2];
+            let t = 1.0 - d * d * inverse;
+            if *weight > 0.0 && t > 0.0 && d * d <= limit {
+                let (own, t2) = (f64::from(*weight), t * t);
+                let t4 = t2 * t2;
+                visit(row, [own * (t4 * t4), own * (t4 * t2 * t) * (17.0 * t - 16.0), x, y, d]);
+            }
+        }
     }
 
     /// Applies a gate about a model to the weights and takes the moments of what is left.
@@ -155,6 +186,9 @@ impl Moments {
         map * Matrix3::new(xx, xy, xd, xy, yy, yd, xd, yd, dd) * map.transpose()
     }
 }
+
+/// Rows that are counted before looking whether the count can still matter.
+const COUNTED: usize = 2048;
 
 /// Rows added up in the rows' own precision before they are added in double precision.
 const BLOCK: usize = 512;
@@ -402,6 +436,15 @@ mod tests {
             assert_eq!(found.count, count, "{len} rows, {gate:?}");
             assert!((found.weight - weight).abs() < tolerance * scale, "{len} rows, {gate:?}");
             assert!((found.second_moments() - sum).norm() < tolerance * scale, "{len} rows, {gate:?}");
+            let mut visited = 0;
+            rows.for_each_gated(model, gate, &before, |i, [weight, slope, x, y, d]| {
+                let row = rows.get(i).unwrap();
+                let own = f64::from(before[i]);
+                assert_eq!((x, y, d), (row.x, row.y, row.x * model[0] + row.y * model[1] + row.z * model[2]));
+                assert!((weight - own * gate.weight(d)).abs() < 1e-9 && (slope - own * gate.slope(d)).abs() < 1e-9);
+                visited += 1;
+            });
+            assert_eq!(visited, count, "{len} rows, {gate:?}");
             if let Gate::Hard { threshold } = gate {
                 let within = rows.iter().filter(|row| gate.weight(row.dot(&Vector3::from(model))) > 0.0).count();
                 assert_eq!(rows.count_within(model, threshold), within, "{len} rows");

@@ -15,37 +15,39 @@ const FLOOR_RAD: f64 = 0.25 * std::f64::consts::PI / 180.0;
 
 /// The sandwich covariance `H^-1 (sum_c g_c g_c^T) H^-1` of a linear fit, with scores `g_c` summed over sectors of azimuth.
 ///
-/// `H = sum w (x, y)^T (x, y)` and `g_c = sum_(k in c) w d (x, y)`. `sectors` gives the sector of each row. `None` if
-/// fewer than three sectors hold anything or the fit is degenerate.
+/// `H = sum d(w d)/dd (x, y)^T (x, y)` and `g_c = sum_(k in c) w d (x, y)` (Huber's covariance of an M-estimate): with the weights
+/// themselves in `H`, clutter that fills the gate would count as evidence. `sectors` gives the sector of each row. `None` if
+/// fewer than three sectors hold anything or the fit is no minimum.
 pub(super) fn clustered_covariance<T: Real>(
     rows: &Rows<T>,
     model: [f64; 3],
     gate: Gate,
     weights: &[f32],
-    sectors: impl Iterator<Item = u8>,
+    sector: impl Fn(usize) -> u8,
 ) -> Option<Matrix2<f64>> {
     let mut scores = [Vector2::<f64>::zeros(); SECTORS];
-    let mut held = [0.0f64; SECTORS];
-    let mut information = Matrix2::<f64>::zeros();
-    for ((row, weight), sector) in rows.iter().zip(weights).zip(sectors) {
-        let d = row.x * model[0] + row.y * model[1] + row.z * model[2];
-        let weight = f64::from(*weight) * gate.weight(d);
-        if weight > 0.0 {
-            let xy = row.xy();
-            let sector = usize::from(sector) % SECTORS;
-            scores[sector] += xy * (weight * d);
-            held[sector] += weight;
-            information += xy * xy.transpose() * weight;
-        }
-    }
-    let occupied = held.iter().filter(|h| **h > 0.0).count() as f64;
+    let mut held = [false; SECTORS];
+    let [mut xx, mut xy, mut yy] = [0.0; 3];
+    rows.for_each_gated(model, gate, weights, |row, [weight, slope, x, y, d]| {
+        (xx, xy, yy) = (xx + slope * x * x, xy + slope * x * y, yy + slope * y * y);
+        let sector = usize::from(sector(row)) % SECTORS;
+        scores[sector] += Vector2::new(x, y) * (weight * d);
+        held[sector] = true;
+    });
+    let occupied = held.iter().filter(|held| **held).count() as f64;
     if occupied < 3.0 {
         return None;
     }
-    let inverse = information.try_inverse()?;
+    let inverse = inverse_of_positive(&Matrix2::new(xx, xy, xy, yy))?;
     let spread: Matrix2<f64> = scores.iter().map(|g| g * g.transpose()).sum();
     let covariance = inverse * spread * inverse * (occupied / (occupied - 2.0));
     covariance.iter().all(|x| x.is_finite()).then_some(covariance)
+}
+
+/// The inverse of a positive definite matrix.
+pub(super) fn inverse_of_positive(matrix: &Matrix2<f64>) -> Option<Matrix2<f64>> {
+    let (determinant, trace) = (matrix.determinant(), matrix.trace());
+    if trace > 0.0 && determinant > 1e-12 * trace * trace { matrix.try_inverse() } else { None }
 }
 
 /// Adds the floor of what no image tells.

@@ -12,7 +12,7 @@ use super::options::{Method, TiltOptions};
 use super::refine::refine;
 use super::vector_consensus::vector_consensus;
 use crate::camera::Camera;
-use crate::edges::{Detector, EdgeOptions, EdgePixels, LiftTable, NormalKind, Region};
+use crate::edges::{Detector, EdgeOptions, EdgePixels, LiftTable, NormalKind, Region, Screen};
 use crate::error::{Error, Result};
 use crate::geometry::{Tilt, tangent_basis};
 use crate::image::ImageView;
@@ -34,6 +34,7 @@ pub struct TiltEstimator {
     robot_from_camera: Matrix3<f64>,
     options: TiltOptions,
     region: Region,
+    screen: Screen,
     sectors: Vec<u8>,
     centre: Option<VanishingPoint>,
     tables: Tables,
@@ -151,7 +152,14 @@ impl TiltEstimator {
             ((turn * SECTORS as f64) as usize).min(SECTORS - 1) as u8
         };
         let sectors = region.pixels().map(|(_, _, bearing)| sector(bearing)).collect();
-        Ok(Self { camera, robot_from_camera, options, region, sectors, centre, tables })
+        let screen = match (&tables, &centre) {
+            (Tables::Offsets { offset_max_px, .. }, Some(centre)) => {
+                Screen::of_offsets(&region, (centre.pixel.x, centre.pixel.y), *offset_max_px)
+            }
+            (Tables::Normals(table), _) => table.screen(options.normal_tilt_max_rad().sin()),
+            (Tables::Offsets { .. }, None) => Screen::of_offsets(&region, (0.0, 0.0), f64::INFINITY),
+        };
+        Ok(Self { camera, robot_from_camera, options, region, screen, sectors, centre, tables })
     }
 
     /// The camera.
@@ -210,7 +218,7 @@ impl TiltEstimator {
         if scratch.made_for != self.extent() {
             return Err(Error::argument("scratch", "that of another estimator", "one made by this estimator"));
         }
-        scratch.detector.detect(image, &self.region, &mut scratch.edges);
+        scratch.detector.detect(image, &self.region, Some(&self.screen), &mut scratch.edges);
         let fit = match &self.tables {
             Tables::Offsets { gains, factor, offset_max_px } => {
                 self.fit_offsets(gains, *factor, *offset_max_px, scratch)
@@ -245,27 +253,42 @@ impl TiltEstimator {
         answers.into_iter().collect()
     }
 
-    /// The edge pixels of the image that `scratch` has last seen.
-    pub fn elements<'a>(&'a self, scratch: &'a Scratch) -> impl Iterator<Item = EdgeElement> + 'a {
-        let mut next_row = 0;
-        let middle = self.centre.as_ref().map(|centre| (centre.pixel.x as f32, centre.pixel.y as f32));
-        let edges = &scratch.edges;
-        (0..edges.len()).map(move |place| {
-            let (u, v) = self.region.place(edges.slot()[place] as usize);
-            let middle = middle.unwrap_or((f32::NAN, f32::NAN));
-            let (cos, sin, s) = edge_offset(middle, (u, v), edges.gx()[place], edges.gy()[place]);
-            let prefiltered = scratch.places.get(next_row) == Some(&(place as u32));
-            let inlier = prefiltered && scratch.is_inlier(next_row);
-            next_row += usize::from(prefiltered);
+    /// The tilt of one image as [`estimate`](Self::estimate) gives it, and all its edge pixels. Allocates.
+    ///
+    /// # Errors
+    /// Those of [`estimate`](Self::estimate).
+    pub fn estimate_with_elements(
+        &self,
+        image: &ImageView<'_>,
+        scratch: &mut Scratch,
+    ) -> Result<(TiltEstimate, Vec<EdgeElement>)> {
+        let estimate = self.estimate(image, scratch)?;
+        let slots = scratch.edges.slot();
+        let rows: Vec<(u32, bool)> = scratch
+            .places
+            .iter()
+            .enumerate()
+            .map(|(row, place)| (slots[*place as usize], scratch.is_inlier(row)))
+            .collect();
+        let mut all = EdgePixels::with_capacity(self.region.len());
+        scratch.detector.detect(image, &self.region, None, &mut all);
+        let centre = self.centre.as_ref().map_or((f32::NAN, f32::NAN), |c| (c.pixel.x as f32, c.pixel.y as f32));
+        let mut rows = rows.into_iter().peekable();
+        let elements = all.slot().iter().zip(all.gx()).zip(all.gy()).map(|((slot, gx), gy)| {
+            let (u, v) = self.region.place(*slot as usize);
+            let [cos, sin, s] = edge_offset(f32::from(u) - centre.0, f32::from(v) - centre.1, *gx, *gy);
+            let row = rows.next_if(|(place, _)| place == slot);
             EdgeElement {
                 u,
                 v,
                 phi_rad: f64::from(sin).atan2(f64::from(cos)),
                 offset_px: f64::from(s),
-                prefiltered,
-                inlier,
+                prefiltered: row.is_some(),
+                inlier: row.is_some_and(|(_, inlier)| inlier),
             }
-        })
+        });
+        let elements = elements.collect();
+        Ok((estimate, elements))
     }
 
     /// Paper 000 section 2.1.
@@ -363,18 +386,14 @@ impl TiltEstimator {
 
     /// Adds covariance and confidence.
     fn conclude(&self, fit: &Fit, scratch: &Scratch) -> TiltEstimate {
-        let sectors = scratch.places.iter().map(|place| {
-            scratch
-                .edges
-                .slot()
-                .get(*place as usize)
-                .and_then(|slot| self.sectors.get(*slot as usize))
-                .copied()
-                .unwrap_or(0)
-        });
+        let slots = scratch.edges.slot();
+        let sector = |row: usize| {
+            let slot = scratch.places.get(row).and_then(|place| slots.get(*place as usize));
+            slot.and_then(|slot| self.sectors.get(*slot as usize)).copied().unwrap_or(0)
+        };
         let covariance = fit.tilt.and_then(|tilt| {
             let covariance =
-                confidence::clustered_covariance(&scratch.rows, fit.model, fit.gate, &scratch.weights, sectors)?;
+                confidence::clustered_covariance(&scratch.rows, fit.model, fit.gate, &scratch.weights, sector)?;
             // A change of the normal's horizontal part is a change in its tangent plane, seen along the vertical.
             let plane = tangent_basis(&tilt.normal()).fixed_rows::<2>(0).try_inverse()? * fit.horizontal;
             Some(confidence::with_floor(plane * covariance * plane.transpose()))
@@ -383,7 +402,7 @@ impl TiltEstimator {
             tilt: fit.tilt,
             covariance_rad2: covariance.unwrap_or(Matrix2::from_diagonal_element(f64::INFINITY)),
             confidence: covariance.map_or(0.0, |covariance| confidence::confidence(&covariance)),
-            edge_pixels: scratch.edges.len(),
+            edge_pixels: scratch.edges.strong(),
             prefiltered_pixels: scratch.rows.len(),
             inlier_pixels: fit.inliers,
             shift_px: fit.shift_px,

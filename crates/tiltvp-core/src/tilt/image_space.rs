@@ -1,5 +1,6 @@
 //! The image-space methods of paper 000, section 2.1: a cosine fitted to the edge offsets.
 
+use multiversion::multiversion;
 use nalgebra::Vector2;
 
 use super::correction::VanishingPoint;
@@ -37,8 +38,8 @@ impl Problem for Offsets<'_> {
         Some(Vector2::new(i.y * j.z - i.z * j.y, i.z * j.x - i.x * j.z) / determinant)
     }
 
-    fn consensus(&self, model: &Vector2<f64>, threshold: f64) -> usize {
-        self.rows.count_within([model.x, model.y, 1.0], threshold)
+    fn consensus(&self, model: &Vector2<f64>, threshold: f64, to_beat: usize) -> usize {
+        self.rows.count_to_beat([model.x, model.y, 1.0], threshold, to_beat)
     }
 
     fn summarise(&self, model: &Vector2<f64>, gate: Gate, weights: &mut [f32]) -> Moments {
@@ -65,13 +66,14 @@ impl Problem for Offsets<'_> {
     }
 }
 
-/// `(cos phi, sin phi, s)` of an edge pixel, eqs. 16 and 17: the half-turn of the gradient with `phi` in `[0, pi)`.
+/// `(cos phi, sin phi, s)` of an edge pixel at `(u, v)` from the vanishing point, eqs. 16 and 17: the half-turn of the
+/// gradient with `phi` in `[0, pi)`.
 #[inline(always)]
-pub(super) fn edge_offset(centre: (f32, f32), (u, v): (u16, u16), gx: f32, gy: f32) -> (f32, f32, f32) {
+pub(super) fn edge_offset(u: f32, v: f32, gx: f32, gy: f32) -> [f32; 3] {
     let sign = if gy < 0.0 || (gy == 0.0 && gx < 0.0) { -1.0 } else { 1.0 };
     let scale = sign / (gx * gx + gy * gy).sqrt();
     let (cos, sin) = (gx * scale, gy * scale);
-    (cos, sin, cos * (f32::from(u) - centre.0) + sin * (f32::from(v) - centre.1))
+    [cos, sin, cos * u + sin * v]
 }
 
 /// Writes the rows of the edge pixels that pass the prefilter `|s| <= offset_max_px`, with unit weights, and their places.
@@ -91,20 +93,57 @@ pub(super) fn offsets(
     let limit = offset_max_px as f32;
     let middle = (centre.pixel.x as f32, centre.pixel.y as f32);
     rows.refill(n, |[x, y, z]| {
-        let (x, y, z, places) = (&mut x[..n], &mut y[..n], &mut z[..n], &mut places[..n]);
+        let mut block = Block::default();
         let mut kept = 0;
-        for (place, ((slot, gx), gy)) in edges.slot().iter().zip(edges.gx()).zip(edges.gy()).enumerate() {
-            let slot = *slot as usize;
-            let (cos, sin, s) = edge_offset(middle, region.place(slot), *gx, *gy);
-            let gain = gains.get(slot).copied().unwrap_or(1.0);
-            (x[kept], y[kept], z[kept], places[kept]) = (gain * cos, gain * sin, -s, place as u32);
-            kept += usize::from(s.abs() <= limit && gain > 0.0);
+        for start in (0..n).step_by(BLOCK) {
+            let part = start..(start + BLOCK).min(n);
+            let slots = &edges.slot()[part.clone()];
+            for (place, slot) in block.places.iter_mut().zip(slots) {
+                let (u, v) = region.place(*slot as usize);
+                *place = [f32::from(u) - middle.0, f32::from(v) - middle.1];
+            }
+            block.fill(&edges.gx()[part.clone()], &edges.gy()[part]);
+            for (i, slot) in slots.iter().enumerate() {
+                let gain = gains.get(*slot as usize).copied().unwrap_or(1.0);
+                let [cos, sin, s] = block.rows[i];
+                // Written always and kept if it passes: a branch here would be guessed wrong too often.
+                (x[kept], y[kept], z[kept], places[kept]) = (gain * cos, gain * sin, -s, (start + i) as u32);
+                kept += usize::from(s.abs() <= limit && gain > 0.0);
+            }
         }
         kept
     });
     places.truncate(rows.len());
     weights.clear();
     weights.resize(rows.len(), 1.0);
+}
+
+/// Edge pixels whose offsets are computed together.
+const BLOCK: usize = 128;
+
+/// Places relative to the vanishing point, and `(cos phi, sin phi, s)` made from them.
+struct Block {
+    places: [[f32; 2]; BLOCK],
+    rows: [[f32; 3]; BLOCK],
+}
+
+impl Default for Block {
+    fn default() -> Self {
+        Self { places: [[0.0; 2]; BLOCK], rows: [[0.0; 3]; BLOCK] }
+    }
+}
+
+impl Block {
+    fn fill(&mut self, gx: &[f32], gy: &[f32]) {
+        fill_rows(&self.places, gx, gy, &mut self.rows);
+    }
+}
+
+#[multiversion(targets("x86_64+avx512f+avx512vl", "x86_64+avx2"))]
+fn fill_rows(places: &[[f32; 2]; BLOCK], gx: &[f32], gy: &[f32], rows: &mut [[f32; 3]; BLOCK]) {
+    for (((row, [u, v]), gx), gy) in rows.iter_mut().zip(places).zip(gx).zip(gy) {
+        *row = edge_offset(*u, *v, *gx, *gy);
+    }
 }
 
 #[cfg(test)]
@@ -114,10 +153,10 @@ mod tests {
     #[test]
     fn phi_is_the_same_for_both_polarities() {
         for (gx, gy) in [(3.0, 4.0), (-3.0, 4.0), (5.0, 0.0), (0.0, -2.0)] {
-            let a = edge_offset((10.0, 20.0), (40, 35), gx, gy);
-            let b = edge_offset((10.0, 20.0), (40, 35), -gx, -gy);
+            let a = edge_offset(30.0, 15.0, gx, gy);
+            let b = edge_offset(30.0, 15.0, -gx, -gy);
             assert_eq!(a, b);
-            let phi = a.1.atan2(a.0);
+            let phi = a[1].atan2(a[0]);
             assert!((0.0..std::f32::consts::PI).contains(&phi));
         }
     }

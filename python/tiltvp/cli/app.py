@@ -1,0 +1,47 @@
+"""The commands put together, and the one door out: what goes wrong is one line on stderr and an exit code."""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Sequence
+
+from cyclopts import App, CycloptsError
+
+from tiltvp import __version__
+from tiltvp.cli import camera, demo, tilt
+from tiltvp.cli.terminal import complain
+from tiltvp.errors import TiltvpError
+
+DONE, SOME_FAILED, WRONG_USE, INTERRUPTED = 0, 1, 2, 130
+
+app = App(
+    name="tiltvp",
+    help="A robot's tilt from the vertical edges in fisheye, mirror and panoramic images.",
+    version=__version__,
+    suppress_keyboard_interrupt=False,
+)
+app.command(tilt.tilt)
+app.command(demo.demo)
+app.command(camera.app)
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Runs the command line and gives the exit code: 0 done, 1 a file failed and the others are done, 2 wrong use."""
+    try:
+        code = app(arguments, exit_on_error=False, print_error=False, result_action="return_value")
+        sys.stdout.flush()
+        return code if isinstance(code, int) else DONE
+    except CycloptsError as error:
+        complain(f"{error} Try `tiltvp --help`.")
+        return WRONG_USE
+    except TiltvpError as error:
+        complain(str(error))
+        return WRONG_USE
+    except KeyboardInterrupt:
+        complain("interrupted")
+        return INTERRUPTED
+    except BrokenPipeError:
+        # Whoever read the output has seen enough; nothing more may be written to it, not even at exit.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return SOME_FAILED

@@ -1,0 +1,206 @@
+"""`tiltvp camera`: what calibration files say, whether their cameras keep their promises, and our own format."""
+
+from __future__ import annotations
+
+import math
+import os
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+from cyclopts import App, Parameter
+
+from tiltvp.cli.options import Switch, image_size_from
+from tiltvp.cli.terminal import complain, named, new_table, say, show
+from tiltvp.errors import CalibrationError, InvalidInputError, TiltvpError
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+    from tiltvp import Camera
+    from tiltvp.formats import CameraSpec
+
+app = App(name="camera", help="Calibration files: their cameras, whether these are sound, and other formats.")
+
+LARGEST_ROUND_TRIP_PX = 1e-6
+LARGEST_JACOBIAN_ERROR = 1e-6
+_CHECK_COLUMNS = (
+    "file", "camera", "model", "pixels", "lost", "round trip px", "round trip rad", "Jacobian error", "rim deg",
+    "verdict",
+)  # fmt: skip
+Format = Annotated[str | None, Parameter(name=("--format", "--camera-format"))]
+
+
+@app.command
+def info(file: Path, /, *, format: Format = None, image_size: str | None = None, mirror: Switch = False) -> None:
+    """Show model, size, parameters and field of view of every camera in a file.
+
+    Parameters
+    ----------
+    file
+        Calibration file.
+    format
+        Its format, where its content does not tell.
+    image_size
+        WIDTHxHEIGHT in pixels, for formats that do not carry it.
+    mirror
+        The image is seen in a mirror.
+    """
+    for spec in _specs(file, format, image_size):
+        show(_info_table(spec, _built(file, spec, mirror)))
+
+
+@app.command
+def convert(
+    file: Path, out: Path, /, *, format: Format = None, image_size: str | None = None, camera_name: str | None = None
+) -> None:
+    """Write the cameras of a file as tiltvp's own TOML.
+
+    Parameters
+    ----------
+    file
+        Calibration file.
+    out
+        File to write, whole or not at all; ends in .toml.
+    format
+        The format of FILE, where its content does not tell.
+    image_size
+        WIDTHxHEIGHT in pixels, for formats that do not carry it.
+    camera_name
+        Name or number of the one camera to write, the first being 0; otherwise all are.
+    """
+    from tiltvp.formats import write_toml
+
+    if out.suffix.lower() != ".toml":
+        raise InvalidInputError(f"{out}: ends in {out.suffix!r}, expected .toml")
+    if os.path.realpath(out) == os.path.realpath(file):
+        raise InvalidInputError(f"{out}: is the file to be read, expected another name")
+    specs = _specs(file, format, image_size)
+    if camera_name is not None:
+        names = [spec.name for spec in specs]
+        chosen = [spec for spec in specs if spec.name == camera_name]
+        if not chosen and camera_name.isdecimal():
+            chosen = specs[int(camera_name) :][:1]
+        if not chosen:
+            raise InvalidInputError(
+                f"{file}: no camera {camera_name!r}, expected one of {', '.join(names)} or a number"
+            )
+        specs = chosen[:1]
+    for spec in specs:
+        _built(file, spec)
+    out.parent.mkdir(parents=True, exist_ok=True)
+    write_toml(specs, out)
+    say(f"{out}: {len(specs)} camera{'s' if len(specs) > 1 else ''}, {', '.join(spec.model for spec in specs)}")
+
+
+@app.command
+def check(files: list[Path], /, *, format: Format = None, image_size: str | None = None) -> int:
+    """Measure round trips and Jacobians of every camera, from the axis to the rim.
+
+    The exit code is 1 if a pixel comes back more than 1e-6 pixels off or not at all, a Jacobian is more than 1e-6 off
+    relative to its norm, or a file cannot be read.
+
+    Parameters
+    ----------
+    files
+        Calibration files.
+    format
+        Their format, where their content does not tell.
+    image_size
+        WIDTHxHEIGHT in pixels, for formats that do not carry it.
+    """
+    table = new_table(None, _CHECK_COLUMNS, ("file", "camera", "model", "verdict"))
+    sound = True
+    for file in files:
+        try:
+            for spec in _specs(file, format, image_size):
+                sound &= _check_row(table, file, spec, _built(file, spec))
+        except TiltvpError as error:
+            complain(named(file, str(error)))
+            sound = False
+    show(table)
+    return 0 if sound else 1
+
+
+@app.command
+def formats() -> None:
+    """List the formats of calibration files that can be read."""
+    from tiltvp.formats import FORMATS
+
+    table = new_table(None, ("format", "what it is"), ("format", "what it is"))
+    for one in FORMATS:
+        words = " ".join((sys.modules[one.parse.__module__].__doc__ or "").split("\n\n")[0].split())
+        family, _, kind = one.name.partition("-")
+        is_variant = any(other.name == family for other in FORMATS) and kind
+        table.add_row(one.name, f"The same as {family}, taken as a {kind} camera." if is_variant else words)
+    show(table)
+
+
+def _specs(file: Path, format: str | None, image_size: str | None) -> list[CameraSpec]:
+    from tiltvp.formats import read_cameras
+
+    return read_cameras(file, format, image_size_from(image_size))
+
+
+def _built(file: Path, spec: CameraSpec, mirror: bool = False) -> Camera:
+    from tiltvp import Camera
+
+    try:
+        camera = Camera.from_spec(spec)
+    except CalibrationError as error:
+        raise CalibrationError(f"{file}: {spec.name}: {error}") from error
+    return camera.mirrored() if mirror and not camera.mirror else camera
+
+
+def _info_table(spec: CameraSpec, camera: Camera) -> Table:
+    from tiltvp.field_of_view import field_of_view
+
+    view = field_of_view(camera)
+    table = new_table(spec.name, ("", "value"), ("", "value"))
+    table.show_header = False
+
+    def angle(value_rad: float) -> str:
+        return f"{math.degrees(value_rad):.2f} deg"
+
+    table.add_row("model", camera.model + (", seen in a mirror" if camera.mirror else ""))
+    table.add_row("format", spec.format)
+    table.add_row("image size", f"{camera.width} x {camera.height} px")
+    for name, value in camera.parameters.items():
+        numbers = value if isinstance(value, list) else [value]
+        table.add_row(name, ", ".join(f"{number:.10g}" for number in numbers))
+    table.add_row("horizontal view", angle(view.horizontal_rad))
+    table.add_row("vertical view", angle(view.vertical_rad))
+    table.add_row("diagonal view", angle(view.diagonal_rad))
+    table.add_row("largest theta", f"{angle(camera.max_theta_rad)} from the axis")
+    table.add_row("axis", f"u {view.axis_px[0]:.3f}, v {view.axis_px[1]:.3f} px")
+    table.add_row("valid radius", f"{view.valid_radius_px:.1f} px around the axis")
+    table.add_row("valid pixels", f"{100.0 * view.valid_share:.1f} % of the image")
+    for note in spec.notes:
+        table.add_row("note", note)
+    return table
+
+
+def _check_row(table: Table, file: Path, spec: CameraSpec, camera: Camera) -> bool:
+    """Adds a row; whether the camera is sound."""
+    found = camera.conformance()
+    problems = []
+    if found["pixels_lost"]:
+        problems.append("pixels without a way back")
+    if not found["max_round_trip_px"] <= LARGEST_ROUND_TRIP_PX:
+        problems.append(f"round trip above {LARGEST_ROUND_TRIP_PX:g} px")
+    if not found["max_jacobian_error_relative"] <= LARGEST_JACOBIAN_ERROR:
+        problems.append(f"Jacobian error above {LARGEST_JACOBIAN_ERROR:g}")
+    table.add_row(
+        str(file),
+        spec.name,
+        camera.model,
+        str(found["pixels_tested"]),
+        str(found["pixels_lost"]),
+        f"{found['max_round_trip_px']:.1e}",
+        f"{found['max_round_trip_rad']:.1e}",
+        f"{found['max_jacobian_error_relative']:.1e}",
+        f"{math.degrees(found['rim_theta_rad']):.2f}",
+        ", ".join(problems) or "sound",
+        style="red" if problems else None,
+    )
+    return not problems

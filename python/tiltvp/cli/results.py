@@ -1,0 +1,143 @@
+"""The answers for many images: as a table for people, in degrees, and as a file for programs, in radians."""
+
+from __future__ import annotations
+
+import math
+import os
+import secrets
+from collections.abc import Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+from tiltvp.cli.terminal import new_table
+from tiltvp.errors import ImageFileError, InvalidInputError
+
+if TYPE_CHECKING:
+    import polars as pl
+    from rich.table import Table
+
+    from tiltvp import TiltEstimate
+
+_PEOPLE: Final = (
+    "file", "alpha deg", "beta deg", "roll deg", "pitch deg", "confidence", "1-sigma deg", "edges px", "inliers px",
+    "ms", "reason",
+)  # fmt: skip
+_PEOPLE_NARROW: Final = ("file", "alpha deg", "beta deg", "confidence", "1-sigma deg")
+_NUMBERS_WIDTH, _FILE_WIDTH = 135, 40
+"""Columns of text that all but the file and a folded reason take, and those that a long file name is granted."""
+ENDINGS: Final = (".csv", ".json", ".parquet")
+_NUMBERS: Final = (
+    "alpha_rad", "beta_rad", "roll_rad", "pitch_rad", "normal_x", "normal_y", "normal_z",
+    "covariance_xx_rad2", "covariance_xy_rad2", "covariance_yy_rad2", "sigma_rad", "confidence",
+)  # fmt: skip
+_COUNTS: Final = ("edge_pixels", "prefiltered_pixels", "inlier_pixels", "iterations")
+_MORE_NUMBERS: Final = ("shift_px", "residual_rms", "time_s")
+_WORDS: Final = ("stop", "reason", "error")
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What became of one image: an estimate and the seconds it took, or what went wrong."""
+
+    file: Path
+    estimate: TiltEstimate | None = None
+    time_s: float = math.nan
+    error: str | None = None
+
+
+def sigma_rad(estimate: TiltEstimate) -> float:
+    """One standard deviation of the normal in any one direction: the root of half the covariance's trace."""
+    covariance = estimate.covariance_rad2
+    return math.sqrt(0.5 * float(covariance[0, 0] + covariance[1, 1]))
+
+
+def degrees(value_rad: float, digits: int = 2) -> str:
+    """Degrees for people; a dash where there is no value."""
+    return f"{math.degrees(value_rad):.{digits}f}" if math.isfinite(value_rad) else "-"
+
+
+def people_table(outcomes: Sequence[Outcome], width: int) -> Table:
+    """One row for each image, angles in degrees; only the columns that matter most where `width` holds no more."""
+    rows = [_people_row(outcome) for outcome in outcomes]
+    longest = max((len(row["file"]) for row in rows), default=0)
+    columns = _PEOPLE if width >= _NUMBERS_WIDTH + min(longest, _FILE_WIDTH) else _PEOPLE_NARROW
+    table = new_table(None, columns, left=("file", "reason"))
+    for outcome, row in zip(outcomes, rows, strict=True):
+        style = "red" if outcome.estimate is None else None if outcome.estimate else "yellow"
+        table.add_row(*[row[column] for column in columns], style=style)
+    return table
+
+
+def _people_row(outcome: Outcome) -> dict[str, str]:
+    row = dict.fromkeys(_PEOPLE, "-") | {"file": str(outcome.file), "reason": outcome.error or ""}
+    e = outcome.estimate
+    if e is None:
+        return row
+    angles = {name: degrees(getattr(e, f"{name}_rad")) for name in ("alpha", "beta", "roll", "pitch")}
+    row |= {f"{name} deg": words for name, words in angles.items()}
+    row |= {"confidence": f"{e.confidence:.3f}", "1-sigma deg": degrees(sigma_rad(e)), "reason": e.reason}
+    return row | {
+        "edges px": str(e.edge_pixels),
+        "inliers px": str(e.inlier_pixels),
+        "ms": f"{1e3 * outcome.time_s:.2f}",
+    }
+
+
+def data_frame(outcomes: Sequence[Outcome], method: str) -> pl.DataFrame:
+    """One row for each image in SI units; null where there is no value, `error` where the image could not be used."""
+    import polars as pl
+
+    schema: dict[str, Any] = {"file": pl.String, "method": pl.String}
+    schema |= dict.fromkeys(_NUMBERS, pl.Float64) | dict.fromkeys(_COUNTS, pl.Int64)
+    schema |= dict.fromkeys(_MORE_NUMBERS, pl.Float64) | dict.fromkeys(_WORDS, pl.String)
+    rows = [{"file": str(outcome.file), "method": method} | _row(outcome) for outcome in outcomes]
+    return pl.DataFrame([{name: _plain(row.get(name)) for name in schema} for row in rows], schema=schema)
+
+
+def _row(outcome: Outcome) -> dict[str, object]:
+    e = outcome.estimate
+    if e is None:
+        return {"error": outcome.error}
+    normal, covariance = e.normal, e.covariance_rad2
+    row: dict[str, object] = {
+        name: getattr(e, name) for name in ("alpha_rad", "beta_rad", "roll_rad", "pitch_rad", "confidence")
+    }
+    row |= {f"normal_{axis}": float(normal[i]) for i, axis in enumerate("xyz")}
+    places = {"xx": (0, 0), "xy": (0, 1), "yy": (1, 1)}
+    row |= {f"covariance_{name}_rad2": float(covariance[place]) for name, place in places.items()}
+    row |= {name: getattr(e, name) for name in ("edge_pixels", "prefiltered_pixels", "inlier_pixels", "shift_px")}
+    row |= e.report.to_dict()
+    return row | {"sigma_rad": sigma_rad(e), "time_s": outcome.time_s}
+
+
+def _plain(value: object) -> object:
+    return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+def check_ending(path: Path) -> None:
+    """Refuses a file of results in a format that cannot be written, before any work is done."""
+    if path.suffix.lower() not in ENDINGS:
+        raise InvalidInputError(f"--out {path}: ends in {path.suffix!r}, expected one of {', '.join(ENDINGS)}")
+
+
+def write_frame(frame: pl.DataFrame, path: Path) -> None:
+    """Writes the table whole or not at all; the ending says the format."""
+    check_ending(path)
+    part = path.with_name(f".{path.name}.{secrets.token_hex(8)}.part")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        match path.suffix.lower():
+            case ".csv":
+                frame.write_csv(part)
+            case ".json":
+                frame.write_json(part)
+            case _:
+                frame.write_parquet(part)
+        os.replace(part, path)
+    except OSError as error:
+        raise ImageFileError(f"{path}: cannot be written ({error.strerror or error})") from error
+    finally:
+        with suppress(OSError):
+            part.unlink()

@@ -1,0 +1,110 @@
+"""Where things are printed: tables on stdout; progress and complaints on stderr."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from rich.progress import Progress
+    from rich.table import Table
+
+_WIDTH_IN_FILES = 240
+"""Columns that a table may take where there is no terminal to fit it into."""
+
+
+def show(*tables: Table) -> None:
+    """Tables on stdout: fitted to a terminal, and as wide as they are, without padding, in files and pipes."""
+    from rich.console import Console
+
+    console = Console(highlight=False, markup=False, emoji=False, width=width())
+    if console.is_terminal:
+        console.print(*tables)
+        return
+    with console.capture() as capture:
+        console.print(*tables)
+    for line in capture.get().splitlines():
+        if line.strip():
+            print(line.rstrip())
+
+
+def width() -> int:
+    """Columns of text that a table may take."""
+    from rich.console import Console
+
+    console = Console()
+    return console.width if console.is_terminal else _WIDTH_IN_FILES
+
+
+def say(text: str) -> None:
+    """One line on stdout, as it is."""
+    print(text)
+
+
+def complain(problem: str) -> None:
+    """One line on stderr."""
+    print(_line(problem), file=sys.stderr, flush=True)
+
+
+def _line(problem: str) -> str:
+    """One line, in the words of the command line where the library speaks of its arguments."""
+    words = " ".join(problem.split())
+    words = words.replace("image_size=(width, height) from the caller", "--image-size WIDTHxHEIGHT")
+    return "tiltvp: " + words.replace("format= to say which", "--format or --camera-format to say which")
+
+
+def named(name: object, problem: str) -> str:
+    """The problem with the name of its file in front, unless it has it."""
+    return problem if str(name) in problem else f"{name}: {problem}"
+
+
+def new_table(title: str | None, columns: Iterable[str], left: Iterable[str] = ()) -> Table:
+    """A table of right-justified numbers; the columns in `left` hold words."""
+    from rich.box import SIMPLE_HEAD
+    from rich.table import Table
+
+    words = set(left)
+    table = Table(title=title, box=SIMPLE_HEAD, title_justify="left", pad_edge=False)
+    for column in columns:
+        if column in words:
+            table.add_column(column, overflow="fold")
+        else:
+            table.add_column(column, justify="right", no_wrap=True)
+    return table
+
+
+@contextmanager
+def progress_bar(total: int, what: str) -> Iterator[ProgressBar]:
+    """A bar on stderr for several things on a terminal, nothing otherwise; complaints go above it."""
+    if total < 2 or not sys.stderr.isatty():
+        yield ProgressBar(None)
+        return
+    from rich.console import Console
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+    console = Console(stderr=True, highlight=False)
+    columns = (TextColumn(what), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
+    with Progress(*columns, console=console, transient=True) as progress:
+        progress.add_task(what, total=total)
+        yield ProgressBar(progress)
+
+
+class ProgressBar:
+    """Counts what is done."""
+
+    def __init__(self, progress: Progress | None) -> None:
+        self._progress = progress
+
+    def advance(self) -> None:
+        """One more is done."""
+        if self._progress is not None:
+            self._progress.advance(self._progress.task_ids[0])
+
+    def complain(self, problem: str) -> None:
+        """One line on stderr, above the bar."""
+        if self._progress is None:
+            complain(problem)
+        else:
+            self._progress.console.print(_line(problem), markup=False, soft_wrap=True)

@@ -1,0 +1,69 @@
+"""How much a camera sees: angles across the image, and which pixels see anything."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from tiltvp.cameras import Camera
+
+__all__ = ["FieldOfView", "field_of_view"]
+
+_SAMPLES = 2048
+
+
+@dataclass(frozen=True)
+class FieldOfView:
+    """Full angles through the axis in radians (beyond pi where the lens sees behind itself), and the valid pixels.
+
+    `axis_px` is the pixel (u, v) of the optical axis, `valid_radius_px` the distance from it to the farthest pixel that
+    has a bearing, `valid_share` the share of pixels that have one.
+    """
+
+    horizontal_rad: float
+    vertical_rad: float
+    diagonal_rad: float
+    axis_px: tuple[float, float]
+    valid_radius_px: float
+    valid_share: float
+
+
+def field_of_view(camera: Camera) -> FieldOfView:
+    """Measures a camera along row, column and diagonals through its axis, as far as pixels have bearings."""
+    sign = -1.0 if camera.mirror else 1.0
+    axis = np.asarray(camera.project([0.0, 0.0, sign]), dtype=np.float64)
+    last = np.array([camera.width - 1.0, camera.height - 1.0])
+    if not (np.isfinite(axis).all() and (axis >= -0.5).all() and (axis <= last + 0.5).all()):
+        axis = last / 2.0
+
+    def angles(border: NDArray[np.float64], steps: NDArray[np.float64]) -> NDArray[np.float64]:
+        bearings: NDArray[np.float64] = camera.unproject(axis + steps[:, None] * (border - axis))
+        return np.arctan2(np.hypot(bearings[:, 0], bearings[:, 1]), sign * bearings[:, 2])
+
+    def reach(u: float, v: float) -> float:
+        """The largest angle from the axis on the way to a pixel of the border."""
+        border, steps = np.array([u, v]), np.linspace(0.0, 1.0, _SAMPLES)
+        seen = np.flatnonzero(np.isfinite(angles(border, steps)))
+        if not seen.size:
+            return 0.0
+        last_seen = int(seen[-1])
+        beyond = np.linspace(steps[last_seen], steps[min(last_seen + 1, _SAMPLES - 1)], _SAMPLES)
+        return float(np.nanmax(angles(border, beyond)))
+
+    (u, v), (right, bottom) = axis, last
+    mask = camera.valid_mask()
+    rows, columns = np.nonzero(mask)
+    return FieldOfView(
+        horizontal_rad=reach(0.0, v) + reach(right, v),
+        vertical_rad=reach(u, 0.0) + reach(u, bottom),
+        diagonal_rad=max(reach(0.0, 0.0) + reach(right, bottom), reach(right, 0.0) + reach(0.0, bottom)),
+        axis_px=(float(u), float(v)),
+        valid_radius_px=math.sqrt(float(((columns - u) ** 2 + (rows - v) ** 2).max())) if rows.size else 0.0,
+        valid_share=float(mask.mean()),
+    )

@@ -1,0 +1,147 @@
+"""How the camera sits on the robot: `robot_from_camera` from a word or a small file."""
+
+from __future__ import annotations
+
+import difflib
+import math
+import os
+import re
+import tomllib
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from tiltvp.errors import CalibrationError, CalibrationNotFoundError, InvalidInputError
+from tiltvp.formats.document import Document
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    Matrix = NDArray[np.float64]
+
+__all__ = ["ROTATION_WORDS", "read_rotation"]
+
+ROTATION_WORDS: Final[dict[str, tuple[tuple[float, float, float], ...]]] = {
+    "up": ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)),
+    "forward": ((0.0, 0.0, 1.0), (-1.0, 0.0, 0.0), (0.0, -1.0, 0.0)),
+}
+"""`up`: the camera looks up, image columns point forward. `forward`: it looks forward, image rows point down."""
+
+_KEYS: Final = ("robot_from_camera", "quaternion")
+_EXPECTED: Final = (
+    "nine numbers in rows, or the key robot_from_camera with a 3x3 matrix, or the key quaternion with [x, y, z, w]"
+)
+_SLACK: Final = 1e-3
+"""Files carry rounded numbers: a matrix or quaternion this close to a rotation is replaced by the nearest one."""
+
+
+def read_rotation(source: str | os.PathLike[str]) -> Matrix:
+    """The (3, 3) rotation `R` of v_robot = R v_camera that a word of `ROTATION_WORDS` or a file names.
+
+    A file is nine numbers as text (white space or commas), or JSON, TOML or YAML with the key `robot_from_camera`, or
+    `quaternion` in the order [x, y, z, w]. What is within 1e-3 of a rotation is taken as the nearest rotation. Raises
+    `CalibrationError` with the file, what is wrong and what was expected; `InvalidInputError` for an unknown word.
+    """
+    if isinstance(source, str) and source in ROTATION_WORDS:
+        return np.array(ROTATION_WORDS[source])
+    file = Path(source)
+    if not file.exists():
+        raise _missing(str(source), is_word=file.name == str(source) and not file.suffix)
+    if file.is_dir():
+        raise CalibrationError(f"{file}: is a folder, expected a file with a rotation")
+    document = Document.load(file)
+    numbers = _plain_numbers(document.text)
+    if numbers is not None:
+        if len(numbers) != 9:
+            raise CalibrationError(f"{file}: {len(numbers)} numbers, expected {_EXPECTED}")
+        return _rotation(np.reshape(numbers, (3, 3)), file)
+    return _from_keys(file, _tree(document))
+
+
+def _missing(source: str, *, is_word: bool) -> Exception:
+    words = ", ".join(ROTATION_WORDS)
+    near = difflib.get_close_matches(source, ROTATION_WORDS, 1)
+    meant = f" (did you mean {near[0]}?)" if near else ""
+    if is_word:
+        return InvalidInputError(
+            f"robot_from_camera: {source!r} is no file and no word{meant}, expected a file or one of {words}"
+        )
+    return CalibrationNotFoundError(f"{source}: no such file, expected a file with a rotation, or one of {words}")
+
+
+def _plain_numbers(text: str) -> list[float] | None:
+    """The numbers of a text that holds nothing else but `#` comments; None for any other text."""
+    words = re.split(r"[\s,;]+", re.sub(r"#[^\n]*", " ", text).strip(" \t\n,;"))
+    try:
+        return [float(word) for word in words]
+    except ValueError:
+        return None
+
+
+def _tree(document: Document) -> dict[str, object]:
+    if document.path.suffix.lower() == ".toml":
+        try:
+            return tomllib.loads(document.text)
+        except (ValueError, RecursionError) as error:
+            raise CalibrationError(f"{document.path}: is not TOML ({error}), expected {_EXPECTED}") from None
+    if not document.tree:
+        raise CalibrationError(f"{document.path}: no rotation ({document.syntax_problem}), expected {_EXPECTED}")
+    return document.tree
+
+
+def _from_keys(file: Path, tree: dict[str, object]) -> Matrix:
+    found = [key for key in _KEYS if key in tree]
+    if len(found) != 1:
+        what = "both keys" if found else f"the keys {', '.join(list(tree)[:6])}"
+        raise CalibrationError(f"{file}: {what}, expected one of the keys {' and '.join(_KEYS)}")
+    key = found[0]
+    value = tree[key]
+    if isinstance(value, dict):
+        value = value.get("data", value)
+    array = _array(file, key, value)
+    if array.shape == (4,):
+        return _from_quaternion(array, f"{file}: {key}")
+    if key == "robot_from_camera" and array.shape in ((3, 3), (9,)):
+        return _rotation(array.reshape(3, 3), f"{file}: {key}")
+    expected = "3 x 3 numbers" if key == "robot_from_camera" else "[x, y, z, w]"
+    raise CalibrationError(f"{file}: {key} has the shape {array.shape}, expected {expected}")
+
+
+def _array(file: Path, key: str, value: object) -> Matrix:
+    if isinstance(value, str) or not isinstance(value, Sequence):
+        raise CalibrationError(f"{file}: {key} is {value!r}, expected a list of numbers")
+    try:
+        return np.array(value, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise CalibrationError(f"{file}: {key} is {value!r}, expected a list of numbers") from None
+
+
+def _from_quaternion(q: Matrix, where: str) -> Matrix:
+    norm = math.sqrt(float(q @ q))
+    if not abs(norm - 1.0) <= _SLACK:
+        raise CalibrationError(f"{where}: a quaternion of length {norm:.6g}, expected [x, y, z, w] of length 1")
+    x, y, z, w = (float(value) / norm for value in q)
+    return np.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+            [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+            [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
+        ]
+    )
+
+
+def _rotation(matrix: Matrix, where: object) -> Matrix:
+    if not np.isfinite(matrix).all():
+        raise CalibrationError(f"{where}: numbers that are not finite, expected a rotation")
+    off = float(np.linalg.norm(matrix.T @ matrix - np.eye(3)))
+    determinant = float(np.linalg.det(matrix))
+    if off > _SLACK or determinant < 0.0:
+        what = "a reflection" if off <= _SLACK else "no rotation"
+        raise CalibrationError(
+            f"{where}: {what} (determinant {determinant:.6g}, |R^T R - I| = {off:.2g}), "
+            "expected a rotation: orthonormal columns, determinant 1"
+        )
+    left, _, right = np.linalg.svd(matrix)
+    return np.asarray(left @ right, dtype=np.float64)

@@ -1,0 +1,470 @@
+"""The command line: tables, files, pictures, and one clear line for everything that is wrong."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import subprocess
+import sys
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import cv2
+import numpy as np
+import polars as pl
+import pytest
+
+import tiltvp
+from tiltvp.cli import main
+from tiltvp.cli.inputs import distinct_names, find_images
+from tiltvp.errors import CalibrationError, TiltvpError
+from tiltvp.rotations import read_rotation
+from tiltvp.synth import render_room
+
+FORWARD = [[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]]
+ALPHA_RAD, BETA_RAD = math.radians(4.0), math.radians(30.0)
+
+
+@dataclass(frozen=True)
+class Said:
+    """What a command left: its exit code and what it wrote."""
+
+    code: int
+    out: str
+    err: str
+
+
+Run = Callable[..., Said]
+
+
+@pytest.fixture
+def run(capfd: pytest.CaptureFixture[str]) -> Run:
+    """Runs `tiltvp` in this process."""
+
+    def run_main(*words: object) -> Said:
+        code = main([str(word) for word in words])
+        captured = capfd.readouterr()
+        return Said(code, captured.out, captured.err)
+
+    return run_main
+
+
+@pytest.fixture(scope="module")
+def world(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with a small camera, rooms seen by it (`images/a.png`, `images/b.png`), and files that are no images."""
+    folder = tmp_path_factory.mktemp("world")
+    camera = small_camera()
+    camera.save(folder / "camera.toml")
+    for name, seed in (("a", 1), ("b", 2)):
+        room = render_room(camera, seed=seed, alpha_rad=ALPHA_RAD, beta_rad=BETA_RAD)
+        tiltvp.write_image(folder / "images" / f"{name}.png", room.bgr)
+    tiltvp.write_image(folder / "more" / "a.png", room.gray)
+    tiltvp.write_image(folder / "small.png", np.zeros((20, 30), dtype=np.uint8))
+    (folder / "broken.png").write_bytes(b"this is no image")
+    (folder / "empty").mkdir()
+    return folder
+
+
+def small_camera() -> tiltvp.Camera:
+    """185 degrees on 240 x 180 pixels."""
+    limit = math.radians(92.5)
+    return tiltvp.Camera.equidistant(width=240, height=180, focal_px=52.4, cx=119.5, cy=89.5, max_theta_rad=limit)
+
+
+def one_line(text: str) -> str:
+    """The one line that a complaint has to be."""
+    assert text.startswith("tiltvp: "), text
+    assert text.count("\n") == 1, text
+    assert "Traceback" not in text
+    return text
+
+
+# --- the program -------------------------------------------------------------------------------------------------
+
+
+def test_help_is_quick_and_names_the_commands(run: Run) -> None:
+    said = run("--help")
+    assert said.code == 0
+    for command in ("tilt", "camera", "demo"):
+        assert command in said.out
+    program = "import sys; from tiltvp.cli import main; main(['--help']); print(sorted(sys.modules))"
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True, timeout=60)
+    for heavy in ("polars", "matplotlib"):
+        assert f"'{heavy}'" not in done.stdout
+
+
+def test_installed_program(world: Path) -> None:
+    program = Path(sys.executable).with_name("tiltvp")
+    done = subprocess.run([program, "--version"], capture_output=True, text=True, timeout=60)
+    assert (done.returncode, done.stdout.strip()) == (0, tiltvp.__version__)
+    done = subprocess.run(
+        [program, "tilt", "broken.png", "--camera", "camera.toml"],
+        cwd=world,
+        capture_output=True,
+        text=True,
+        timeout=60,
+    )
+    assert done.returncode == 1
+    assert "broken.png" in one_line(done.stderr)
+
+
+@pytest.mark.parametrize(
+    ("words", "hint"),
+    [
+        (["tilt", "x.png", "--camera", "camera.toml", "--tilt-max-dg", "3"], "--tilt-max-deg"),
+        (["tilt", "x.png", "--camera", "camera.toml", "--method", "refind"], "did you mean refined?"),
+        (["tilt", "x.png", "--camera", "camera.toml", "--camera-format", "opencvv"], "opencv"),
+        (["tilt", "x.png", "--camera", "camera.toml", "--threshold-px", "3"], "threshold_px"),
+        (["tilt", "x.png", "--camera", "camera.toml", "--camera-name", "cam7"], "cam0"),
+        (["tilt", "x.png", "--camera", "camera.toml", "--robot-from-camera", "foward"], "did you mean forward?"),
+        (["tilt", "x.png", "--camera", "camera.toml", "--image-size", "big"], "640x480"),
+        (["tilt", "x.png", "--camera", "camera.toml", "--out", "r.xls"], ".parquet"),
+        (["tilt", "x.png", "--camera", "camera.toml", "--overlay", "o", "--level", "./o"], "two folders"),
+        (["tilt", "x.png", "--camera", "camera.toml", "--elevation-min-deg", "60"], "elevation_max_rad"),
+        (["tilt", "x.png", "--camera", "camera.toml", "--threads", "0"], "threads"),
+        (
+            ["tilt", "x.png", "--camera", "camera.toml", "--correction", "some", "--method", "vector-consensus"],
+            "number",
+        ),
+        (["tilt", "x.png", "--camera", "camera.toml", "--mask", "small.png"], "mask"),
+        (["tilt", "x.png", "--camera", "camera.toml", "--mask", "none.png"], "none.png"),
+        (["tilt", "x.png", "--camera", "missing.yaml"], "missing.yaml"),
+        (["tilt", "x.png"], "--camera"),
+        (["tilt", "--camera", "camera.toml"], "IMAGES"),
+        (["tlt"], '"tilt"'),
+        (["camera", "infos"], '"info"'),
+        (["camera", "convert", "camera.toml", "out.yaml"], ".toml"),
+        (["camera", "convert", "camera.toml", "./camera.toml"], "another name"),
+        (["camera", "info", "broken.png"], "broken.png"),
+        (["demo", "--kind", "ofice"], "office"),
+    ],
+)
+def test_wrong_use_is_one_line_and_code_2(
+    run: Run, world: Path, monkeypatch: pytest.MonkeyPatch, words: list[str], hint: str
+) -> None:
+    monkeypatch.chdir(world)
+    said = run(*words)
+    assert said.code == 2
+    assert said.out == ""
+    assert hint in one_line(said.err)
+
+
+# --- tilt --------------------------------------------------------------------------------------------------------
+
+
+def test_tilt_writes_the_same_numbers_as_the_library(run: Run, world: Path, tmp_path: Path) -> None:
+    out = tmp_path / "deep" / "results.csv"
+    said = run("tilt", world / "images", "--camera", world / "camera.toml", "--out", out)
+    assert said.code == 0
+    assert said.err == ""
+    assert "alpha deg" in said.out
+    table = pl.read_csv(out)
+    assert [Path(file).name for file in table["file"]] == ["a.png", "b.png"]
+    estimator = tiltvp.TiltEstimator(small_camera())
+    for row in table.iter_rows(named=True):
+        expected = estimator(tiltvp.read_image(row["file"]))
+        assert row["alpha_rad"] == expected.alpha_rad
+        assert row["covariance_xy_rad2"] == expected.covariance_rad2[0, 1]
+        assert row["normal_z"] == expected.normal[2]
+        assert row["inlier_pixels"] == expected.inlier_pixels
+        assert (row["method"], row["reason"], row["error"]) == ("refined", expected.report.reason, None)
+        true = tiltvp.normal_from_alpha_beta(ALPHA_RAD, BETA_RAD)
+        assert tiltvp.tilt_error_rad(expected.normal, true) < math.radians(2.0)
+    assert f"{math.degrees(table['alpha_rad'][0]):.2f}" in said.out
+    assert sorted(file.name for file in out.parent.iterdir()) == ["results.csv"]
+
+
+def test_out_formats_hold_the_same(run: Run, world: Path, tmp_path: Path) -> None:
+    frames = []
+    for name in ("r.csv", "r.json", "r.parquet"):
+        assert (
+            run("tilt", world / "images/a.png", "--camera", world / "camera.toml", "--out", tmp_path / name).code == 0
+        )
+        read = {".csv": pl.read_csv, ".json": pl.read_json, ".parquet": pl.read_parquet}[Path(name).suffix]
+        frames.append(read(tmp_path / name).drop("time_s").to_dicts())
+    assert frames[0] == frames[1] == frames[2]
+
+
+def test_options_reach_the_core(run: Run, world: Path, tmp_path: Path) -> None:
+    common = ("tilt", world / "images/a.png", "--camera", world / "camera.toml", "--out", tmp_path / "r.json")
+    mask = np.zeros((180, 240), dtype=np.uint8)
+    mask[:, :120] = 255
+    tiltvp.write_image(tmp_path / "mask.png", mask)
+    (tmp_path / "r.txt").write_text("0 -1 0\n1 0 0\n0 0 1\n")
+    changes: list[tuple[object, ...]] = [
+        (),
+        ("--elevation-min-deg", "6"),
+        ("--elevation-max-deg", "30"),
+        ("--margin-px", "4"),
+        ("--gradient-min", "300"),
+        ("--smoothing-px", "1"),
+        ("--tilt-max-deg", "6"),
+        ("--keep-fraction", "0.6"),
+        ("--scale-deg", "1"),
+        ("--mask", tmp_path / "mask.png"),
+        ("--robot-from-camera", tmp_path / "r.txt"),
+        ("--mirror", "--elevation-min-deg", "-45", "--elevation-max-deg", "0"),
+        ("--method", "image-space-ransac"),
+        ("--method", "image-space-ransac", "--threshold-px", "2"),
+        ("--method", "image-space-ransac", "--offset-max-px", "9"),
+        ("--method", "image-space-ransac", "--seed", "5", "--threshold-px", "1"),
+        ("--method", "image-space-ransac", "--correction", "none"),
+        ("--method", "image-space-ransac", "--correction", "90.5"),
+        ("--method", "vector-consensus"),
+        ("--method", "vector-consensus", "--normal", "tangent"),
+        ("--method", "vector-consensus", "--threshold-deg", "2"),
+    ]
+    seen: dict[tuple[object, ...], tuple[object, ...]] = {}
+    for change in changes:
+        said = run(*common, *change)
+        assert said.code == 0, said.err
+        row = json.loads((tmp_path / "r.json").read_text())[0]
+        answer = (row["alpha_rad"], row["beta_rad"], row["confidence"], row["edge_pixels"], row["inlier_pixels"])
+        assert answer not in seen, f"{change} and {seen[answer]} give the same"
+        seen[answer] = change
+
+
+def test_what_cannot_be_read_is_named_and_the_others_are_done(run: Run, world: Path, tmp_path: Path) -> None:
+    out, overlay = tmp_path / "r.json", tmp_path / "overlay"
+    bad = (world / "broken.png", world / "small.png", world / "none.png", world / "empty", world / "no*.png")
+    words = (
+        "tilt",
+        *bad,
+        world / "images/a.png",
+        "--camera",
+        world / "camera.toml",
+        "--out",
+        out,
+        "--overlay",
+        overlay,
+    )
+    for threads in (1, 3):
+        said = run(*words, "--threads", threads)
+        assert said.code == 1
+        lines = said.err.splitlines()
+        assert len(lines) == len(bad)
+        for path in bad:
+            assert sum(str(path) in line for line in lines) == 1
+        rows = json.loads(out.read_text())
+        assert [row["error"] is None for row in rows] == [False, False, False, True]
+        assert [row["alpha_rad"] is None for row in rows] == [True, True, True, False]
+        assert [file.name for file in overlay.iterdir()] == ["a.png"]
+
+
+def test_an_image_without_edges_is_done_without_a_tilt(run: Run, world: Path, tmp_path: Path) -> None:
+    tiltvp.write_image(tmp_path / "black.png", np.zeros((180, 240), dtype=np.uint8))
+    words = ("--camera", world / "camera.toml", "--out", tmp_path / "r.json", "--overlay", tmp_path / "overlay")
+    said = run("tilt", tmp_path / "black.png", *words, "--level", tmp_path / "level")
+    assert (said.code, said.err) == (0, "")
+    row = json.loads((tmp_path / "r.json").read_text())[0]
+    assert (row["alpha_rad"], row["covariance_xx_rad2"], row["confidence"]) == (None, None, 0.0)
+    assert row["reason"] in said.out
+    assert (tmp_path / "overlay" / "black.png").exists()
+    assert not (tmp_path / "level").exists()
+
+
+def test_overlay_and_level_of_equal_names(run: Run, world: Path, tmp_path: Path) -> None:
+    overlay, level = tmp_path / "overlay", tmp_path / "level"
+    pattern = f"{world}/**/a.png"
+    said = run("tilt", pattern, "--camera", world / "camera.toml", "--overlay", overlay, "--level", level)
+    assert said.code == 0, said.err
+    for folder in (overlay, level):
+        assert sorted(file.name for file in folder.iterdir()) == ["images_a.png", "more_a.png"]
+    image = tiltvp.read_image(world / "images/a.png")
+    drawn = tiltvp.read_image(overlay / "images_a.png")
+    assert drawn.shape == image.shape
+    assert (drawn.max(axis=2) > drawn.min(axis=2) + 60).sum() > 100
+    levelled = tiltvp.read_image(level / "images_a.png")
+    camera = small_camera()
+    estimate = tiltvp.TiltEstimator(camera)(image)
+    assert np.array_equal(levelled, tiltvp.level(image, camera, estimate))
+    assert tiltvp.read_image(level / "more_a.png").ndim == 2
+
+
+def test_names_are_shown_as_they_are(run: Run, world: Path, tmp_path: Path) -> None:
+    name = tmp_path / "[red]:smile: [x].png"
+    tiltvp.write_image(name, tiltvp.read_image(world / "images/a.png"))
+    said = run("tilt", name, "--camera", world / "camera.toml", "--overlay", tmp_path / "overlay")
+    assert said.code == 0
+    assert str(name) in said.out
+    assert (tmp_path / "overlay" / name.name).exists()
+
+
+def test_threads_do_not_change_results(run: Run, world: Path, tmp_path: Path) -> None:
+    texts = []
+    for threads in (1, 4):
+        out = tmp_path / f"{threads}.json"
+        assert (
+            run("tilt", world / "images", "--camera", world / "camera.toml", "--out", out, "--threads", threads).code
+            == 0
+        )
+        texts.append([{**row, "time_s": 0.0} for row in json.loads(out.read_text())])
+    assert texts[0] == texts[1]
+
+
+def test_results_that_cannot_be_written(run: Run, world: Path, tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("in the way")
+    out = tmp_path / "file" / "r.csv"
+    said = run("tilt", world / "images/a.png", "--camera", world / "camera.toml", "--out", out)
+    assert said.code == 2
+    assert str(out) in one_line(said.err)
+
+
+def test_images_are_found_once_and_named_apart(tmp_path: Path) -> None:
+    for name in ("x/a.png", "x/a.jpg", "y/a.png", "y/B.png", "y/notes.txt", "y/b.PNG.txt"):
+        path = tmp_path / name
+        path.parent.mkdir(exist_ok=True)
+        path.write_bytes(b"")
+    os.symlink(tmp_path / "x" / "a.png", tmp_path / "x" / "link.png")
+    files, problems = find_images([str(tmp_path / "x/a.png"), str(tmp_path / "x"), f"{tmp_path}/*/[aB].png"])
+    assert not problems
+    assert [str(file.relative_to(tmp_path)) for file in files] == ["x/a.png", "x/a.jpg", "y/B.png", "y/a.png"]
+    names = distinct_names(files)
+    assert names == ["x_a_png", "x_a_jpg", "B", "y_a_png"]
+    assert distinct_names([Path("p/a.png"), Path("P/A.png"), Path("p_a.png")]) == ["p_a", "P_A_2", "p_a_3"]
+
+
+# --- the rotation of the camera on the robot -----------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("name", "text"),
+    [
+        ("r.txt", "# rows\n0 0 1\n-1 0 0\n0 -1 0\n"),
+        ("r.csv", "0,0,1\n-1,0,0\n0,-1,0\n"),
+        ("r.json", '{"robot_from_camera": [[0, 0, 1], [-1, 0, 0], [0, -1, 0]]}'),
+        ("r.json", '{"quaternion": [-0.5, 0.5, -0.5, 0.5]}'),
+        ("r.toml", "robot_from_camera = [[0, 0, 1], [-1, 0, 0], [0, -1, 0]]"),
+        ("r.toml", "robot_from_camera = [-0.5, 0.5, -0.5, 0.5]"),
+        ("r.yaml", "robot_from_camera:\n- [0, 0, 1]\n- [-1, 0, 0]\n- [0, -1, 0]\n"),
+        (
+            "r.yaml",
+            "%YAML:1.0\nrobot_from_camera: !!opencv-matrix\n   rows: 3\n   data: [0, 0, 1, -1, 0, 0, 0, -1, 0]\n",
+        ),
+        ("r.txt", "0 0.0001 1\n-1 0 0.0001\n0 -1 0\n"),
+    ],
+)
+def test_rotation_files(tmp_path: Path, name: str, text: str) -> None:
+    (tmp_path / name).write_text(text)
+    rotation = read_rotation(tmp_path / name)
+    assert np.abs(rotation - FORWARD).max() < 2e-4
+    assert np.abs(rotation.T @ rotation - np.eye(3)).max() < 1e-14
+    assert np.array_equal(read_rotation("forward"), FORWARD)
+    assert np.array_equal(read_rotation("up"), np.eye(3))
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "problem"),
+    [
+        ("r.txt", "1 0 0\n0 1 0\n0 0 -1\n", "reflection"),
+        ("r.txt", "2 0 0\n0 1 0\n0 0 1\n", "no rotation"),
+        ("r.txt", "1 0 0 0 1 0 0 0\n", "8 numbers"),
+        ("r.txt", "1 0 0\n0 nan 0\n0 0 1\n", "not finite"),
+        ("r.txt", "\n", "empty"),
+        ("r.json", '{"quaternion": [0, 0, 0, 2]}', "length 2"),
+        ("r.json", '{"quaternion": [[1, 0, 0], [0, 1, 0], [0, 0, 1]]}', "shape (3, 3)"),
+        ("r.json", '{"rotation": [0, 0, 0, 1]}', "rotation"),
+        ("r.json", '{"quaternion": [0, 0, 0, 1], "robot_from_camera": [0, 0, 0, 1]}', "both keys"),
+        ("r.yaml", "robot_from_camera: up\n", "a list of numbers"),
+        ("r.yaml", "robot_from_camera: [[1, 0], [0]]\n", "a list of numbers"),
+        ("r.toml", "robot_from_camera = [", "not TOML"),
+        ("r.yaml", "[", "no rotation"),
+    ],
+)
+def test_rotation_files_that_are_refused(tmp_path: Path, name: str, text: str, problem: str) -> None:
+    (tmp_path / name).write_text(text)
+    with pytest.raises(CalibrationError) as refusal:
+        read_rotation(tmp_path / name)
+    assert problem in str(refusal.value)
+    assert name in str(refusal.value)
+
+
+def test_rotation_that_is_not_there(tmp_path: Path) -> None:
+    for source in (tmp_path, tmp_path / "none.txt", "fwd"):
+        with pytest.raises(TiltvpError):
+            read_rotation(source)
+
+
+# --- camera ------------------------------------------------------------------------------------------------------
+
+
+def test_camera_info(run: Run, world: Path) -> None:
+    said = run("camera", "info", world / "camera.toml")
+    assert said.code == 0
+    for words in ("equidistant", "240 x 180 px", "focal_px", "52.4", "185.00 deg", "92.50 deg", "valid pixels"):
+        assert words in said.out
+    share = float(said.out.split("valid pixels")[1].split("%")[0])
+    assert abs(share - 100.0 * small_camera().valid_mask().mean()) < 0.1
+    assert "seen in a mirror" in run("camera", "info", world / "camera.toml", "--mirror").out
+
+
+def test_camera_convert_and_check(run: Run, tmp_path: Path) -> None:
+    chain = "\n".join(
+        f"{name}:\n  camera_model: pinhole\n  intrinsics: [{focal}, {focal}, 320.0, 240.0]\n"
+        "  distortion_model: equidistant\n  distortion_coeffs: [0.01, -0.002, 0.001, -0.0001]\n  resolution: [640, 480]"
+        for name, focal in (("cam0", 200.0), ("cam1", 210.0))
+    )
+    (tmp_path / "chain.yaml").write_text(chain)
+    said = run("camera", "convert", tmp_path / "chain.yaml", tmp_path / "both.toml")
+    assert (said.code, said.err) == (0, "")
+    for name in ("cam0", "cam1"):
+        loaded = tiltvp.Camera.load(tmp_path / "both.toml", camera=name)
+        assert loaded == tiltvp.Camera.load(tmp_path / "chain.yaml", camera=name)
+    for name in ("cam1", "1"):
+        words = ("camera", "convert", tmp_path / "chain.yaml", tmp_path / "one.toml", "--format", "kalibr")
+        assert run(*words, "--camera-name", name).code == 0
+        assert tiltvp.Camera.load(tmp_path / "one.toml") == loaded
+    said = run("camera", "check", tmp_path / "both.toml", tmp_path / "chain.yaml")
+    assert (said.code, said.err) == (0, "")
+    assert said.out.count("sound") == 4
+    said = run("camera", "check", tmp_path / "none.yaml", tmp_path / "both.toml")
+    assert said.code == 1
+    assert said.out.count("sound") == 2
+    assert "none.yaml" in one_line(said.err)
+
+
+def test_camera_formats(run: Run) -> None:
+    said = run("camera", "formats")
+    assert said.code == 0
+    for one in tiltvp.formats.FORMATS:
+        assert one.name in said.out
+
+
+def test_a_size_that_a_file_lacks_is_asked_for_by_its_option(run: Run, tmp_path: Path) -> None:
+    coefficients = "poly_incident_angle_to_radius: [0.0, 120.0]\npoly_radius_to_z: [-120.0, 0.0, 0.002]\n"
+    (tmp_path / "c.yml").write_text(coefficients + "principal_point: [160.0, 120.0]\n")
+    said = run("camera", "info", tmp_path / "c.yml", "--format", "py-omnicalib")
+    assert said.code == 2
+    assert "--image-size" in one_line(said.err)
+
+
+# --- demo --------------------------------------------------------------------------------------------------------
+
+
+def test_demo(run: Run, tmp_path: Path) -> None:
+    out = tmp_path / "demo"
+    said = run("demo", "--out", out, "--width", 240, "--height", 180, "--alpha-deg", 3, "--beta-deg", -60)
+    assert (said.code, said.err) == (0, "")
+    names = ["input.png", "overlay.png", "levelled.png", "plot.png", "summary.png"]
+    assert [line for line in said.out.splitlines() if line.endswith(".png")] == [str(out / name) for name in names]
+    for method in tiltvp.METHODS:
+        assert method in said.out
+    pictures = {name: cv2.imread(str(out / name)) for name in names}
+    assert pictures["input.png"].shape == (180, 240, 3)
+    assert pictures["levelled.png"].shape == (180, 480, 3)
+    assert pictures["plot.png"].std() > 20.0
+    row = next(line for line in said.out.splitlines() if line.split()[:1] == ["refined"])
+    alpha, beta, error = (float(word) for word in row.split()[1:4])
+    true = tiltvp.normal_from_alpha_beta(math.radians(3.0), math.radians(-60.0))
+    found = tiltvp.normal_from_alpha_beta(math.radians(alpha), math.radians(beta))
+    assert abs(math.degrees(tiltvp.tilt_error_rad(found, true)) - error) < 0.02
+    assert error < 2.0
+
+
+@pytest.mark.parametrize(("alpha_deg", "kind"), [(0, "corridor"), (60, "under-table")])
+def test_demo_where_methods_find_little(run: Run, tmp_path: Path, alpha_deg: float, kind: str) -> None:
+    said = run("demo", "--out", tmp_path, "--width", 120, "--height", 90, "--alpha-deg", alpha_deg, "--kind", kind)
+    assert (said.code, said.err) == (0, "")
+    assert (tmp_path / "plot.png").exists()
