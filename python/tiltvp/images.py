@@ -61,7 +61,10 @@ def _bytes_from(array: NDArray[Any], name: str) -> NDArray[np.uint8]:
 
 
 def read_image(path: str | os.PathLike[str]) -> NDArray[np.uint8]:
-    """The image file as (H, W) or (H, W, 3) uint8, colour in BGR order. Raises `ImageFileError` with the path."""
+    """The image file as (H, W) or (H, W, 3) uint8, colour in BGR order. Raises `ImageFileError` with the path.
+
+    Pixels stay where the sensor has them: a calibration knows nothing of the orientation tag of a photograph.
+    """
     file = Path(path)
     try:
         data = np.frombuffer(file.read_bytes(), dtype=np.uint8)
@@ -77,7 +80,7 @@ def _decode(data: NDArray[np.uint8]) -> NDArray[np.uint8] | None:
     if data.size == 0:
         return None
     try:
-        image = cv2.imdecode(data, cv2.IMREAD_ANYCOLOR)
+        image = cv2.imdecode(data, cv2.IMREAD_ANYCOLOR | cv2.IMREAD_IGNORE_ORIENTATION)
     except cv2.error:
         return None
     return None if image is None else np.asarray(image, dtype=np.uint8)

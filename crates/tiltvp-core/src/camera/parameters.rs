@@ -252,6 +252,9 @@ struct Values<'a> {
     entries: Vec<(&'static str, Entry<'a>)>,
 }
 
+/// No lens has a parameter beyond this: a number as large is a slip, and would overflow.
+const LARGEST: f64 = 1e15;
+
 enum Entry<'a> {
     Scalar(f64),
     List(&'a [f64]),
@@ -289,6 +292,13 @@ impl<'a> Values<'a> {
                     return Err(Error::camera(model, name, "missing", expected));
                 }
             };
+            let numbers = match &entry {
+                Entry::Scalar(x) => std::slice::from_ref(x),
+                Entry::List(x) => x,
+            };
+            if let Some(wrong) = numbers.iter().find(|x| x.is_nan() || x.abs() > LARGEST) {
+                return Err(Error::camera(model, name, wrong, "a finite number of ordinary size"));
+            }
             entries.push((name, entry));
         }
         Ok(Self { entries })

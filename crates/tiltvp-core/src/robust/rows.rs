@@ -111,17 +111,24 @@ impl<T: Real> Rows<T> {
         T::count(row, model.map(T::from_f64), T::from_f64(threshold * threshold)) == 1
     }
 
-    /// Calls `visit(row, [weight, slope, x, y, residual])` for each row whose weight, multiplied by the gate about a model, is above
-    /// zero; `slope` is the weight multiplied by [`Gate::slope`].
-    pub fn for_each_gated(&self, model: [f64; 3], gate: Gate, weights: &[f32], mut visit: impl FnMut(usize, [f64; 5])) {
+    /// Calls `visit(row, [weight, slope, x, y, residual])` for each row whose weight (one where none are given), multiplied by
+    /// the gate about a model, is above zero; `slope` is the weight multiplied by [`Gate::slope`].
+    pub fn for_each_gated(
+        &self,
+        model: [f64; 3],
+        gate: Gate,
+        weights: Option<&[f32]>,
+        mut visit: impl FnMut(usize, [f64; 5]),
+    ) {
         let [x, y, z] = self.columns();
         let (limit, inverse) = gate.coefficients();
-        for (row, (((x, y), z), weight)) in x.iter().zip(y).zip(z).zip(weights).enumerate() {
+        for (row, ((x, y), z)) in x.iter().zip(y).zip(z).enumerate() {
             let (x, y, z) = (x.to_f64(), y.to_f64(), z.to_f64());
             let d = x * model[0] + y * model[1] + z * model[2];
+            let own = weights.map_or(1.0, |weights| weights.get(row).copied().map_or(0.0, f64::from));
             let t = 1.0 - d * d * inverse;
-            if *weight > 0.0 && t > 0.0 && d * d <= limit {
-                let (own, t2) = (f64::from(*weight), t * t);
+            if own > 0.0 && t > 0.0 && d * d <= limit {
+                let t2 = t * t;
                 let t4 = t2 * t2;
                 visit(row, [own * (t4 * t4), own * (t4 * t2 * t) * (17.0 * t - 16.0), x, y, d]);
             }
@@ -153,10 +160,8 @@ impl Moments {
     pub fn step(&self) -> Option<Vector2<f64>> {
         let [xx, xy, yy, xd, yd, _] = self.sums;
         let (determinant, trace) = (xx * yy - xy * xy, xx + yy);
-        if determinant.is_nan() || determinant <= 1e-12 * trace * trace {
-            return None;
-        }
-        Some(Vector2::new(xy * yd - yy * xd, xy * xd - xx * yd) / determinant)
+        let determined = determinant > 1e-12 * trace * trace;
+        determined.then(|| Vector2::new(xy * yd - yy * xd, xy * xd - xx * yd) / determinant)
     }
 
     /// The model at which the moments were taken.
@@ -437,7 +442,7 @@ mod tests {
             assert!((found.weight - weight).abs() < tolerance * scale, "{len} rows, {gate:?}");
             assert!((found.second_moments() - sum).norm() < tolerance * scale, "{len} rows, {gate:?}");
             let mut visited = 0;
-            rows.for_each_gated(model, gate, &before, |i, [weight, slope, x, y, d]| {
+            rows.for_each_gated(model, gate, Some(&before), |i, [weight, slope, x, y, d]| {
                 let row = rows.get(i).unwrap();
                 let own = f64::from(before[i]);
                 assert_eq!((x, y, d), (row.x, row.y, row.x * model[0] + row.y * model[1] + row.z * model[2]));

@@ -16,13 +16,15 @@ const FLOOR_RAD: f64 = 0.25 * std::f64::consts::PI / 180.0;
 /// The sandwich covariance `H^-1 (sum_c g_c g_c^T) H^-1` of a linear fit, with scores `g_c` summed over sectors of azimuth.
 ///
 /// `H = sum d(w d)/dd (x, y)^T (x, y)` and `g_c = sum_(k in c) w d (x, y)` (Huber's covariance of an M-estimate): with the weights
-/// themselves in `H`, clutter that fills the gate would count as evidence. `sectors` gives the sector of each row. `None` if
-/// fewer than three sectors hold anything or the fit is no minimum.
+/// themselves in `H`, clutter that fills the gate would count as evidence. To it is added the square of `H^-1 sum_c g_c`, the
+/// way from the model to where the gated rows would have it: none for the fit they made, but telling for a model that was
+/// chosen otherwise. Weights are one where none are given. `None` if fewer than three sectors hold anything or the model is
+/// near no minimum.
 pub(super) fn clustered_covariance<T: Real>(
     rows: &Rows<T>,
     model: [f64; 3],
     gate: Gate,
-    weights: &[f32],
+    weights: Option<&[f32]>,
     sector: impl Fn(usize) -> u8,
 ) -> Option<Matrix2<f64>> {
     let mut scores = [Vector2::<f64>::zeros(); SECTORS];
@@ -40,7 +42,8 @@ pub(super) fn clustered_covariance<T: Real>(
     }
     let inverse = inverse_of_positive(&Matrix2::new(xx, xy, xy, yy))?;
     let spread: Matrix2<f64> = scores.iter().map(|g| g * g.transpose()).sum();
-    let covariance = inverse * spread * inverse * (occupied / (occupied - 2.0));
+    let away = inverse * scores.iter().sum::<Vector2<f64>>();
+    let covariance = inverse * spread * inverse * (occupied / (occupied - 2.0)) + away * away.transpose();
     covariance.iter().all(|x| x.is_finite()).then_some(covariance)
 }
 

@@ -24,6 +24,9 @@ const SHIFT_TOLERANCE_PX: f64 = 0.1;
 /// Most trimming rounds, `N_E` in the paper.
 const TRIMMING_ROUNDS: u32 = 15;
 
+/// How far in radians the edges of vertical things stray from the vertical, for the covariance of the paper's methods.
+const STRAY_RAD: f64 = 2.0 * std::f64::consts::PI / 180.0;
+
 /// Estimates the tilt of a robot from single images of one camera.
 ///
 /// Everything that depends only on the camera is computed here once; [`estimate`](Self::estimate) borrows it, so one
@@ -327,7 +330,7 @@ impl TiltEstimator {
         Fit {
             tilt,
             model: [shift.x, shift.y, 1.0],
-            gate: Gate::Open,
+            gate: Gate::Soft { scale: STRAY_RAD * factor },
             horizontal: centre.direction() / factor,
             inliers: report.inliers,
             shift_px: report.model.map(|_| l),
@@ -348,7 +351,7 @@ impl TiltEstimator {
                 let report =
                     vector_consensus(rows, &self.robot_from_camera, *threshold_rad, self.options.seed, weights);
                 *inliers = Inliers::weighted_if(report.model.is_some());
-                (report, Gate::Open, *factor)
+                (report, Gate::Soft { scale: STRAY_RAD }, *factor)
             }
             Method::Refined(options) => {
                 let report = refine(rows, options, weights, trimmed);
@@ -391,9 +394,10 @@ impl TiltEstimator {
             let slot = scratch.places.get(row).and_then(|place| slots.get(*place as usize));
             slot.and_then(|slot| self.sectors.get(*slot as usize)).copied().unwrap_or(0)
         };
+        // The paper's methods end with weights of what they have selected, which cannot tell how sure the selection was.
+        let weights = matches!(self.options.method, Method::Refined(_)).then_some(&scratch.weights[..]);
         let covariance = fit.tilt.and_then(|tilt| {
-            let covariance =
-                confidence::clustered_covariance(&scratch.rows, fit.model, fit.gate, &scratch.weights, sector)?;
+            let covariance = confidence::clustered_covariance(&scratch.rows, fit.model, fit.gate, weights, sector)?;
             // A change of the normal's horizontal part is a change in its tangent plane, seen along the vertical.
             let plane = tangent_basis(&tilt.normal()).fixed_rows::<2>(0).try_inverse()? * fit.horizontal;
             Some(confidence::with_floor(plane * covariance * plane.transpose()))
