@@ -41,6 +41,18 @@ test-python *arguments:
 test-real *arguments: setup
     {{bin}}/pytest --quiet tests/real_data {{arguments}}
 
+# Every method on views of upright panoramas of known tilt, in the folder panos of TILTVP_DATA.
+measure-panoramas *arguments: setup
+    {{bin}}/tiltvp measure panoramas "$TILTVP_DATA/panos" {{arguments}}
+
+# The refined method on panoramas as they were taken, against an inertial sensor.
+measure-inertial *arguments: setup
+    {{bin}}/tiltvp measure inertial "$TILTVP_DATA/panos_theta_imu" {{arguments}}
+
+# Round trips and Jacobians of the calibrations of TILTVP_DATA, as a table.
+measure-cameras: setup
+    {{bin}}/pytest --quiet --capture=no tests/real_data/test_camera_conformance.py
+
 # The benches of the core.
 bench *arguments:
     cargo bench --locked --package tiltvp-benches {{arguments}}
