@@ -169,7 +169,7 @@ def test_tilt_writes_the_same_numbers_as_the_library(run: Run, world: Path, tmp_
         assert row["covariance_xy_rad2"] == expected.covariance_rad2[0, 1]
         assert row["normal_z"] == expected.normal[2]
         assert row["inlier_pixels"] == expected.inlier_pixels
-        assert (row["method"], row["reason"], row["error"]) == ("refined", expected.report["reason"], None)
+        assert (row["method"], row["reason"], row["error"]) == ("refined", expected.report.reason, None)
         true = tiltvp.normal_from_alpha_beta(ALPHA_RAD, BETA_RAD)
         assert tiltvp.tilt_error_rad(expected.normal, true) < math.radians(2.0)
     assert f"{math.degrees(table['alpha_rad'][0]):.2f}" in said.out

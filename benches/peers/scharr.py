@@ -12,6 +12,7 @@ from collections.abc import Callable
 
 import cv2
 import numpy as np
+
 from tiltvp import METHODS, TiltEstimator, normal_from_alpha_beta
 from tiltvp.datasets.panoramas import TABLE_1_TILTS_DEG, PanoramaViews, paper_camera, read_panorama_index
 from tiltvp.synth import ROOM_KINDS, render_room
@@ -60,7 +61,9 @@ def main() -> None:
     camera = paper_camera()
     estimators = [(method, options, TiltEstimator(camera, method=method, **options)) for method, options in VARIANTS]
     # The box of the pixels above the horizon: 439 pixels in diameter.
-    boxes = [(image, np.ascontiguousarray(image[20:460, 100:540])) for image in images(arguments.panoramas, arguments.images)]
+    boxes = [
+        (image, np.ascontiguousarray(image[20:460, 100:540])) for image in images(arguments.panoramas, arguments.images)
+    ]
     ratios: dict[int, list[float]] = {i: [] for i in range(len(estimators))}
     times: dict[int, list[float]] = {i: [] for i in range(len(estimators))}
     scharr: list[float] = []
@@ -74,7 +77,9 @@ def main() -> None:
                 ratios[i].append(own / pair)
     print(f"cv2.Scharr pair on 440 x 440: median {1e6 * np.median(scharr):.0f} us")
     for i, (method, options, _) in enumerate(estimators):
-        words = ", ".join(f"{key}={value:.3g}" if isinstance(value, float) else f"{key}={value}" for key, value in options.items())
+        words = ", ".join(
+            f"{key}={value:.3g}" if isinstance(value, float) else f"{key}={value}" for key, value in options.items()
+        )
         print(f"{np.median(ratios[i]):6.2f} x  {1e6 * np.median(times[i]):6.0f} us  {method} {words}")
 
 

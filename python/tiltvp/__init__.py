@@ -12,6 +12,7 @@ from tiltvp.plots.overlay import draw_edges
 from tiltvp.tilt import (
     CommonDirection,
     EdgeElements,
+    FitReport,
     TiltEstimate,
     TiltEstimator,
     common_direction,
@@ -27,6 +28,7 @@ __all__ = [
     "Camera",
     "CommonDirection",
     "EdgeElements",
+    "FitReport",
     "TiltEstimate",
     "TiltEstimator",
     "common_direction",

@@ -4,14 +4,11 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Self
+from typing import Self
 
 from tiltvp import _core
 from tiltvp.errors import CalibrationError, InvalidInputError
 from tiltvp.formats import CameraSpec, read_cameras, write_toml
-
-if TYPE_CHECKING:
-    from numpy.typing import ArrayLike
 
 __all__ = ["Camera"]
 
@@ -19,10 +16,10 @@ __all__ = ["Camera"]
 class Camera(_core.Camera):
     """A calibrated central camera: pixels to unit bearings and back.
 
-    Camera frame: z along the optical axis, x right (columns u), y down (rows v); pixel centres at integers. Rows without
-    an answer are NaN. `mirror=True` says that the image is seen in a mirror: the z component of bearings is negated, as a
-    camera that looks up into a convex mirror needs. `max_theta_rad` limits the angle from the ray through the centre.
-    Impossible parameters raise `tiltvp.errors.CalibrationError`.
+    Camera frame: z along the optical axis, x right (columns u), y down (rows v); pixel centres at integers. Rows
+    without an answer are NaN. `mirror=True` says that the image is seen in a mirror: the z component of bearings is
+    negated, as a camera that looks up into a convex mirror needs. `max_theta_rad` limits the angle from the ray through
+    the centre. Impossible parameters raise `tiltvp.errors.CalibrationError`.
     """
 
     __slots__ = ()
@@ -111,7 +108,9 @@ class Camera(_core.Camera):
         )  # fmt: skip
 
     @classmethod
-    def equirectangular(cls, *, width: int, height: int, max_theta_rad: float | None = None, mirror: bool = False) -> Self:
+    def equirectangular(
+        cls, *, width: int, height: int, max_theta_rad: float | None = None, mirror: bool = False
+    ) -> Self:
         """A whole-sphere panorama: longitude ((u + 0.5) / width - 0.5) 2 pi, latitude (0.5 - (v + 0.5) / height) pi."""
         return cls("equirectangular", width=width, height=height, max_theta_rad=max_theta_rad, mirror=mirror)
 

@@ -26,7 +26,10 @@ def gray_from(image: ArrayLike, name: str = "image") -> NDArray[np.uint8]:
     Colour is taken in OpenCV's order (BGR or BGRA), uint16 is scaled by 1 / 257 and floats in [0, 1] by 255, both
     rounded. Raises `InvalidInputError` for other shapes and types, empty images, NaN, and floats outside [0, 1].
     """
-    array = np.asarray(image)
+    try:
+        array = np.asarray(image)
+    except ValueError as error:
+        raise InvalidInputError(f"{name}: cannot be made an array ({error}), expected {_EXPECTED}") from error
     if array.ndim not in (2, 3) or (array.ndim == 3 and array.shape[2] not in (1, 3, 4)):
         raise InvalidInputError(f"{name}: shape {array.shape}, expected {_EXPECTED}")
     if array.size == 0:
@@ -89,7 +92,9 @@ def write_image(path: str | os.PathLike[str], image: NDArray[np.uint8]) -> None:
     try:
         done, data = cv2.imencode(file.suffix or ".png", image)
     except cv2.error as error:
-        raise ImageFileError(f"{file}: cannot be encoded as {file.suffix!r}, expected .png, .jpg or the like") from error
+        raise ImageFileError(
+            f"{file}: cannot be encoded as {file.suffix!r}, expected .png, .jpg or the like"
+        ) from error
     if not done:
         raise ImageFileError(f"{file}: cannot be encoded as {file.suffix!r}")
     part = file.with_name(f".{file.name}.part")

@@ -21,7 +21,7 @@ ROOM_KINDS: tuple[str, ...] = tuple(_core.ROOM_KINDS)
 
 @dataclass(frozen=True)
 class RoomImage:
-    """What a leaning robot's camera sees in a room: `gray` (H, W) and `bgr` (H, W, 3), both uint8, and the true lean."""
+    """A leaning robot's view of a room: `gray` (H, W) and `bgr` (H, W, 3), both uint8, and the true lean."""
 
     gray: NDArray[np.uint8]
     bgr: NDArray[np.uint8]

@@ -1,26 +1,35 @@
-"""The tilt of single images: the estimator over images of any usual kind, levelling, and pictures of edges."""
+"""The tilt of single images: the estimator over images of any usual kind, and levelling."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any
 
 import cv2
 import numpy as np
 
 from tiltvp import _core
-from tiltvp._core import CommonDirection, EdgeElements, TiltEstimate, common_direction, tilt_error_rad
+from tiltvp._core import (
+    CommonDirection,
+    EdgeElements,
+    FitReport,
+    TiltEstimate,
+    common_direction,
+    normal_from_alpha_beta,
+    tilt_error_rad,
+)
 from tiltvp.errors import InvalidInputError
 from tiltvp.images import gray_from
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
-    from tiltvp.cameras import Camera
+    from tiltvp._core import Camera
 
 __all__ = [
     "CommonDirection",
     "EdgeElements",
+    "FitReport",
     "TiltEstimate",
     "TiltEstimator",
     "common_direction",
@@ -30,21 +39,25 @@ __all__ = [
 ]
 
 
+_LEVELLED = ("uint8", "uint16", "int16", "float32", "float64")
+
+
 class TiltEstimator(_core.TiltEstimator):
     """Estimates how far and in which direction a robot leans from single images of one camera.
 
     Tables and scratch are made once. Call it with an image: (H, W) uint8, or colour (BGR), uint16, float in [0, 1], any
     strides. The answer is a frozen `TiltEstimate`; an image without enough edges has an estimate with confidence 0, NaN
     angles and a reason. Wrong shapes, NaN, empty images and impossible options raise `tiltvp.errors.InvalidInputError`.
+    One estimator may be called from many threads at once; frozen, comparable, and to be pickled.
 
     Parameters
     ----------
     camera : tiltvp.Camera
     method : {"refined", "image-space-ransac", "image-space-reject-refit", "vector-consensus"}
-    robot_from_camera : (3, 3) rotation `R`, v_robot = R v_camera; default identity: an upward camera, columns forward
-    gradient_min, smoothing_px, elevation_min_rad, elevation_max_rad, margin_px, tilt_max_rad, mask, seed
+    robot_from_camera : (3, 3) rotation R, v_robot = R v_camera; default identity: an upward camera, columns to the
+    front gradient_min, smoothing_px, elevation_min_rad, elevation_max_rad, margin_px, tilt_max_rad, mask, seed
         Options of every method: see the README. `mask` is (H, W) bool, True where the image shows the world.
-    keep_fraction, scale_rad
+    keep_fraction, scale_rad, tolerance_rad, max_iterations
         Of "refined"; `keep_fraction` also of "image-space-reject-refit".
     threshold_px, offset_max_px, correction
         Of the image-space methods; `correction` is "closed-form" (default), a factor in pixels per radian, or None.
@@ -56,23 +69,16 @@ class TiltEstimator(_core.TiltEstimator):
 
     def __call__(self, image: ArrayLike) -> TiltEstimate:
         """The tilt of one image."""
-        return self.estimate(gray_from(image))
+        return self._estimate(gray_from(image))
 
     def with_edges(self, image: ArrayLike) -> tuple[TiltEstimate, EdgeElements]:
         """The tilt of one image and its edge pixels: position, phi and s of eqs. 16 and 17, prefiltered, inlier."""
-        return self.estimate_with_edges(gray_from(image))
+        return self._estimate_with_edges(gray_from(image))
 
-    def many(self, images: Sequence[ArrayLike], threads: int = 1) -> list[TiltEstimate]:
+    def estimate_many(self, images: Iterable[ArrayLike], *, threads: int = 1) -> list[TiltEstimate]:
         """The tilts of many images, in their order, the same for any number of threads."""
         grays = [gray_from(image, f"images[{i}]") for i, image in enumerate(images)]
-        return super().estimate_many(grays, threads=threads)
-
-    estimate_many = many  # type: ignore[assignment]
-
-
-def normal_from_alpha_beta(alpha_rad: float, beta_rad: float) -> NDArray[np.float64]:
-    """The ground normal seen by a leaning robot, (-sin a cos b, -sin a sin b, cos a): shape (3,), eq. 1."""
-    return _core.normal_from_alpha_beta(alpha_rad, beta_rad)
+        return self._estimate_many(grays, threads=threads)
 
 
 def level(
@@ -90,6 +96,9 @@ def level(
     if array.ndim not in (2, 3) or array.shape[:2] != (camera.height, camera.width):
         expected = f"({camera.height}, {camera.width}) or ({camera.height}, {camera.width}, channels)"
         raise InvalidInputError(f"image: shape {array.shape}, expected {expected}, as the camera's images")
+    if array.dtype not in _LEVELLED or (array.ndim == 3 and not 1 <= array.shape[2] <= 4):
+        kinds = ", ".join(_LEVELLED)
+        raise InvalidInputError(f"image: dtype {array.dtype}, shape {array.shape}, expected {kinds} of 1 to 4 channels")
     if isinstance(tilt, TiltEstimate):
         if not tilt:
             raise InvalidInputError(f"tilt: an estimate without a tilt ({tilt.reason}), expected one with a tilt")
@@ -98,4 +107,6 @@ def level(
         alpha_rad, beta_rad = tilt
         normal = normal_from_alpha_beta(alpha_rad, beta_rad)
     places = np.nan_to_num(_core.level_map(camera, normal, robot_from_camera=robot_from_camera), nan=-1e6)
-    return np.asarray(cv2.remap(array, places, None, cv2.INTER_LINEAR, borderMode=cv2.BORDER_CONSTANT))
+    across, down = np.ascontiguousarray(places[:, :, 0]), np.ascontiguousarray(places[:, :, 1])
+    # OpenCV drops an axis of length one.
+    return np.asarray(cv2.remap(array, across, down, cv2.INTER_LINEAR)).reshape(array.shape)

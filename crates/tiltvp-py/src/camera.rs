@@ -21,19 +21,16 @@ impl Camera {
     #[pyo3(signature = (model, *, width, height, max_theta_rad=None, mirror=false, **parameters))]
     fn new(
         model: &str,
-        width: i64,
-        height: i64,
+        width: &Bound<'_, PyAny>,
+        height: &Bound<'_, PyAny>,
         max_theta_rad: Option<f64>,
         mirror: bool,
         parameters: Option<&Bound<'_, PyDict>>,
     ) -> PyResult<Self> {
-        let side = |name: &str, value: i64| {
-            u32::try_from(value)
-                .map_err(|_| invalid(format!("{name} = {value}, expected a number of pixels from 1 to {}", u32::MAX)))
-        };
-        let (width, height) = (side("width", width)?, side("height", height)?);
+        let pixels = format!("a whole number of pixels from 1 to {}", u32::MAX);
+        let (width, height) = (convert::whole(width, "width", &pixels)?, convert::whole(height, "height", &pixels)?);
         let mut named = Vec::new();
-        for (key, value) in parameters.into_iter().flat_map(|dict| dict.iter()) {
+        for (key, value) in parameters.into_iter().flat_map(PyDictMethods::iter) {
             let key: String = key.extract()?;
             if value.is_none() {
                 continue;
@@ -57,31 +54,37 @@ impl Camera {
         Ok(Self { inner: build().map_err(|error| exception(&error))? })
     }
 
+    /// The name of the lens model.
     #[getter]
     fn model(&self) -> &'static str {
         self.inner.model().name()
     }
 
+    /// Columns of its images.
     #[getter]
     fn width(&self) -> u32 {
         self.inner.width()
     }
 
+    /// Rows of its images.
     #[getter]
     fn height(&self) -> u32 {
         self.inner.height()
     }
 
+    /// Largest angle in radians from the ray through the centre that has a pixel.
     #[getter]
     fn max_theta_rad(&self) -> f64 {
         self.inner.max_theta_rad()
     }
 
+    /// Whether the image is seen in a mirror: the z component of bearings is negated.
     #[getter]
     fn mirror(&self) -> bool {
         self.inner.is_mirrored()
     }
 
+    /// The model's parameters by name, defaults included: numbers and lists of numbers.
     #[getter]
     fn parameters<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let dict = PyDict::new(py);
@@ -94,6 +97,7 @@ impl Camera {
         Ok(dict)
     }
 
+    /// Bearings (N, 3) or (3,) of any length to pixels (N, 2) or (2,); NaN where the lens does not see.
     fn project<'py>(&self, py: Python<'py>, bearings: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
         let (bearings, single) = convert::rows::<3>(bearings, "bearings")?;
         let mut pixels = vec![[0.0; 2]; bearings.len()];
@@ -101,6 +105,7 @@ impl Camera {
         convert::to_rows(py, &pixels, single)
     }
 
+    /// Pixels (N, 2) or (2,) to unit bearings (N, 3) or (3,); NaN outside the valid set.
     fn unproject<'py>(&self, py: Python<'py>, pixels: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
         let (pixels, single) = convert::rows::<2>(pixels, "pixels")?;
         let mut bearings = vec![[0.0; 3]; pixels.len()];
@@ -108,6 +113,7 @@ impl Camera {
         convert::to_rows(py, &bearings, single)
     }
 
+    /// Pixels and the Jacobians (N, 2, 3) or (2, 3), pixels per unit of the bearing.
     fn project_jacobian<'py>(&self, py: Python<'py>, bearings: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyTuple>> {
         let (bearings, single) = convert::rows::<3>(bearings, "bearings")?;
         let mut pixels = vec![[0.0; 2]; bearings.len()];
@@ -117,6 +123,7 @@ impl Camera {
         (convert::to_rows(py, &pixels, single)?, convert::to_matrices(py, &flat, [2, 3], single)?).into_pyobject(py)
     }
 
+    /// Unit bearings and the Jacobians (N, 3, 2) or (3, 2), per pixel.
     fn unproject_jacobian<'py>(&self, py: Python<'py>, pixels: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyTuple>> {
         let (pixels, single) = convert::rows::<2>(pixels, "pixels")?;
         let mut bearings = vec![[0.0; 3]; pixels.len()];
@@ -126,7 +133,7 @@ impl Camera {
         (convert::to_rows(py, &bearings, single)?, convert::to_matrices(py, &flat, [3, 2], single)?).into_pyobject(py)
     }
 
-    /// Pixels that have a bearing.
+    /// Fresh (H, W) bool: the pixels that have a bearing.
     fn valid_mask<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<bool>>> {
         let (width, height) = (self.inner.width() as usize, self.inner.height() as usize);
         let mask = call(py, || {
@@ -136,13 +143,14 @@ impl Camera {
         PyArray1::from_vec(py, mask).reshape([height, width])
     }
 
+    /// The same camera with `mirror` turned over.
     fn mirrored<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
         let dict = Self::to_dict(slf)?;
         dict.set_item("mirror", !slf.get().inner.is_mirrored())?;
         slf.get_type().call((), Some(&dict))
     }
 
-    /// Measured round trips and Jacobians, from the axis to the rim.
+    /// Round trips and errors of the Jacobians, measured from the axis to the rim.
     fn conformance<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let found = call(py, || Ok(core::conformance(&self.inner)))?;
         let dict = PyDict::new(py);
@@ -156,6 +164,7 @@ impl Camera {
         Ok(dict)
     }
 
+    /// The keywords that make the camera, with `model` among them.
     fn to_dict<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyDict>> {
         let camera = slf.get();
         let dict = PyDict::new(slf.py());
@@ -168,6 +177,7 @@ impl Camera {
         Ok(dict)
     }
 
+    /// The camera of a dict as `to_dict` makes it.
     #[classmethod]
     fn from_dict<'py>(cls: &Bound<'py, PyType>, values: &Bound<'py, PyDict>) -> PyResult<Bound<'py, PyAny>> {
         for key in ["model", "width", "height"] {

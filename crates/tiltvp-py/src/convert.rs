@@ -15,7 +15,7 @@ fn numbers<'py>(value: &Bound<'py, PyAny>, name: &str, expected: &str) -> PyResu
         .map_err(|error| invalid(format!("{name}: cannot be made an array ({error}), expected {expected}")))?;
     let array = array.cast_into::<PyUntypedArray>()?;
     let kind: String = array.dtype().getattr("kind")?.extract()?;
-    if !["f", "i", "u"].contains(&kind.as_str()) && !(kind == "b" && array.len() == 0) {
+    if !["f", "i", "u"].contains(&kind.as_str()) {
         return Err(invalid(format!("{name}: dtype {}, expected {expected} of real numbers", array.dtype())));
     }
     Ok(array)
@@ -88,6 +88,42 @@ pub(crate) fn mask(value: &Bound<'_, PyAny>, name: &str) -> PyResult<(usize, usi
     let (height, width) = (array.shape()[0], array.shape()[1]);
     let flat = array.call_method0("ravel")?.cast_into::<PyArray1<bool>>()?;
     Ok((height, width, flat.to_vec()?))
+}
+
+/// A whole number that the type can hold.
+pub(crate) fn whole<'py, T>(value: &Bound<'py, PyAny>, name: &str, expected: &str) -> PyResult<T>
+where
+    T: for<'a> FromPyObject<'a, 'py>,
+{
+    value.extract().map_err(|_| {
+        let shown = value.repr().map_or_else(|_| "an object".to_owned(), |repr| repr.to_string());
+        invalid(format!("{name} = {shown}, expected {expected}"))
+    })
+}
+
+/// An item of a dict as `to_dict` makes it.
+pub(crate) fn item<'py, T>(values: &Bound<'py, PyDict>, key: &str, expected: &str) -> PyResult<T>
+where
+    T: for<'a> FromPyObject<'a, 'py>,
+{
+    let value = raw_item(values, key)?;
+    value.extract().map_err(|_| invalid(format!("values[\"{key}\"] = {value}, expected {expected}")))
+}
+
+/// An item of a dict as `to_dict` makes it, of any type.
+pub(crate) fn raw_item<'py>(values: &Bound<'py, PyDict>, key: &str) -> PyResult<Bound<'py, PyAny>> {
+    let value = values.get_item(key)?;
+    value.ok_or_else(|| invalid(format!("values: \"{key}\" is missing, expected a dict as to_dict makes it")))
+}
+
+/// Refuses a dict that has any other key than these.
+pub(crate) fn known_keys(values: &Bound<'_, PyDict>, keys: &[&str]) -> PyResult<()> {
+    for key in values.keys() {
+        if !key.extract::<&str>().is_ok_and(|key| keys.contains(&key)) {
+            return Err(invalid(format!("values: unknown key {key:?}, expected {}", keys.join(", "))));
+        }
+    }
+    Ok(())
 }
 
 /// What a value is, for a message.

@@ -3,6 +3,7 @@
 mod direction;
 mod estimate;
 mod options;
+mod report;
 
 use std::sync::{Mutex, PoisonError};
 
@@ -16,6 +17,7 @@ use tiltvp_core::tilt::{self as core, Scratch};
 
 pub(crate) use self::direction::{CommonDirection, common_direction};
 pub(crate) use self::estimate::{EdgeElements, TiltEstimate};
+pub(crate) use self::report::FitReport;
 use crate::call::{call, exception, invalid};
 use crate::camera::Camera;
 use crate::convert;
@@ -25,7 +27,8 @@ use crate::convert;
 pub(crate) struct TiltEstimator {
     inner: core::TiltEstimator,
     camera: Py<Camera>,
-    options: Py<PyDict>,
+    /// The options that the user has named.
+    given: Vec<String>,
     scratch: Mutex<Vec<Scratch>>,
 }
 
@@ -48,38 +51,42 @@ impl TiltEstimator {
         let parsed = options::parse(method, options)?;
         let lens = camera.get().inner.clone();
         let inner = call(py, move || core::TiltEstimator::new(lens, rotation, parsed))?;
-        let given = options.map_or_else(|| Ok(PyDict::new(py)), |options| options.copy())?;
-        Ok(Self { inner, camera: camera.clone().unbind(), options: given.unbind(), scratch: Mutex::new(Vec::new()) })
+        let given = options.map_or(Ok(Vec::new()), |options| options.keys().extract())?;
+        Ok(Self { inner, camera: camera.clone().unbind(), given, scratch: Mutex::new(Vec::new()) })
     }
 
+    /// The camera whose images are read.
     #[getter]
     fn camera(&self, py: Python<'_>) -> Py<Camera> {
         self.camera.clone_ref(py)
     }
 
+    /// The name of the method.
     #[getter]
     fn method(&self) -> &'static str {
         self.inner.options().method.name()
     }
 
+    /// Fresh (3, 3) float64: the rotation R in v_robot = R v_camera.
     #[getter]
     fn robot_from_camera<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
         PyArray1::from_slice(py, self.inner.robot_from_camera().transpose().as_slice()).reshape([3, 3])
     }
 
-    /// The options that are in force, defaults included.
+    /// The options that are in force, by name, defaults included.
     #[getter]
     fn options<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         options::in_force(py, self.inner.options())
     }
 
+    /// How many pixels are looked at: those of the elevation band, clear of the rim, the border and the mask.
     #[getter]
     fn region_pixels(&self) -> usize {
         self.inner.region_pixels()
     }
 
     /// The tilt of a C-contiguous `(H, W)` image of uint8.
-    fn estimate(&self, py: Python<'_>, image: &Bound<'_, PyAny>) -> PyResult<TiltEstimate> {
+    fn _estimate(&self, py: Python<'_>, image: &Bound<'_, PyAny>) -> PyResult<TiltEstimate> {
         let image = convert::gray(image, "image")?;
         let (view, inner) = (view(&image)?, &self.inner);
         let mut scratch = self.borrow_scratch();
@@ -89,7 +96,7 @@ impl TiltEstimator {
     }
 
     /// The tilt of an image and its edge pixels.
-    fn estimate_with_edges(&self, py: Python<'_>, image: &Bound<'_, PyAny>) -> PyResult<(TiltEstimate, EdgeElements)> {
+    fn _estimate_with_edges(&self, py: Python<'_>, image: &Bound<'_, PyAny>) -> PyResult<(TiltEstimate, EdgeElements)> {
         let image = convert::gray(image, "image")?;
         let (view, inner) = (view(&image)?, &self.inner);
         let mut scratch = self.borrow_scratch();
@@ -100,14 +107,16 @@ impl TiltEstimator {
         Ok((TiltEstimate::from(estimate), EdgeElements::new(elements, size)))
     }
 
-    /// The tilts of many images.
-    #[pyo3(signature = (images, *, threads=1))]
-    fn estimate_many(
+    /// The tilts of many C-contiguous `(H, W)` images of uint8.
+    #[pyo3(signature = (images, *, threads=None))]
+    #[expect(clippy::needless_pass_by_value, reason = "what the interpreter hands over is owned")]
+    fn _estimate_many(
         &self,
         py: Python<'_>,
         images: Vec<Bound<'_, PyAny>>,
-        threads: usize,
+        threads: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Vec<TiltEstimate>> {
+        let threads = threads.map_or(Ok(1), |threads| convert::whole(threads, "threads", "a whole number from 1"))?;
         let named = images.iter().enumerate().map(|(i, image)| convert::gray(image, &format!("images[{i}]")));
         let arrays = named.collect::<PyResult<Vec<_>>>()?;
         let views = arrays.iter().map(view).collect::<PyResult<Vec<_>>>()?;
@@ -116,11 +125,15 @@ impl TiltEstimator {
     }
 
     fn __repr__(&self, py: Python<'_>) -> PyResult<String> {
-        let mut items = Vec::new();
-        for (key, value) in self.options.bind(py).iter() {
-            items.push(format!(", {key}={}", value.repr()?));
+        let mut text = format!("TiltEstimator({}, method=\"{}\"", self.camera.bind(py).repr()?, self.method());
+        let options = self.options(py)?;
+        for key in &self.given {
+            let value = convert::raw_item(&options, key)?;
+            let is_mask = key == "mask" && !value.is_none();
+            let value = if is_mask { "<mask>".to_owned() } else { value.repr()?.to_string() };
+            text.extend([", ", key, "=", &value]);
         }
-        Ok(format!("TiltEstimator({}, method=\"{}\"{})", self.camera.bind(py).repr()?, self.method(), items.concat()))
+        Ok(text + ")")
     }
 
     fn __eq__(&self, other: &Bound<'_, PyAny>) -> bool {
@@ -137,7 +150,7 @@ impl TiltEstimator {
 
     fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyTuple>> {
         let (py, this) = (slf.py(), slf.get());
-        let keywords = this.options.bind(py).copy()?;
+        let keywords = this.options(py)?;
         keywords.set_item("method", this.method())?;
         keywords.set_item("robot_from_camera", this.robot_from_camera(py)?)?;
         let partial = py.import("functools")?.getattr("partial")?;
@@ -181,7 +194,7 @@ pub(crate) fn level_map<'py>(
     let tilt = tilt_from(normal, "normal")?;
     let rotation = robot_from_camera.map_or(Ok(Matrix3::identity()), |r| convert::matrix3(r, "robot_from_camera"))?;
     let camera = &camera.get().inner;
-    let map = call(py, || Ok(core::level_map(camera, &rotation, &tilt)))?;
+    let map = call(py, || core::level_map(camera, &rotation, &tilt))?;
     let shape = [camera.height() as usize, camera.width() as usize, 2];
     Ok(PyArray1::from_slice(py, map.as_flattened()).reshape(shape)?.into_any())
 }

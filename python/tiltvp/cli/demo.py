@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Final
+from typing import TYPE_CHECKING, Annotated, Any, Final
 
 from cyclopts import Parameter
 
@@ -32,7 +32,7 @@ _RUNS: Final = 21
 _FIELD_OF_VIEW_DEG: Final = 185.0
 _FOCAL_PER_HEIGHT: Final = 139.7 / 480.0
 
-METHODS: Final[tuple[tuple[str, dict[str, object]], ...]] = (
+METHODS: Final[tuple[tuple[str, dict[str, Any]], ...]] = (
     ("refined", {}),
     ("image-space-ransac", {}),
     ("image-space-reject-refit", {}),
@@ -115,7 +115,7 @@ def _camera(width: int, height: int) -> Camera:
     )
 
 
-def _trial(camera: Camera, room: RoomImage, method: str, options: dict[str, object]) -> Trial:
+def _trial(camera: Camera, room: RoomImage, method: str, options: dict[str, Any]) -> Trial:
     from tiltvp import TiltEstimator, normal_from_alpha_beta, tilt_error_rad
     from tiltvp.images import gray_from
 

@@ -7,7 +7,7 @@ import math
 import re
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Group, Parameter
 
@@ -120,9 +120,9 @@ class MethodOptions:
             raise InvalidInputError(f"--method {self.method!r}{meant}, expected one of {', '.join(METHODS)}")
         return TiltEstimator(camera, **options)
 
-    def _given(self) -> dict[str, object]:
+    def _given(self) -> dict[str, Any]:
         """The keywords of `TiltEstimator`: what was not given is left to the library."""
-        options: dict[str, object] = {name: getattr(self, name) for name in _AS_THEY_ARE}
+        options: dict[str, Any] = {name: getattr(self, name) for name in _AS_THEY_ARE}
         for name in _ANGLES:
             degrees = getattr(self, f"{name}_deg")
             options[f"{name}_rad"] = None if degrees is None else math.radians(degrees)

@@ -108,7 +108,7 @@ def _row(outcome: Outcome) -> dict[str, object]:
     places = {"xx": (0, 0), "xy": (0, 1), "yy": (1, 1)}
     row |= {f"covariance_{name}_rad2": float(covariance[place]) for name, place in places.items()}
     row |= {name: getattr(e, name) for name in ("edge_pixels", "prefiltered_pixels", "inlier_pixels", "shift_px")}
-    row |= e.report
+    row |= e.report.to_dict()
     return row | {"sigma_rad": sigma_rad(e), "time_s": outcome.time_s}
 
 

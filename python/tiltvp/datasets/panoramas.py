@@ -56,8 +56,8 @@ class Panorama:
 def read_panorama_index(directory: str | os.PathLike[str]) -> list[Panorama]:
     """The panoramas of a folder with an `INDEX.csv` of columns name, environment, tilt_x_deg, tilt_z_deg.
 
-    The room's zenith is proportional to (tan tilt_x, 1, tan tilt_z) with X towards longitude +90 degrees, Y up, Z towards
-    longitude 0. Raises `InvalidInputError` that names the file and the line.
+    The room's zenith is proportional to (tan tilt_x, 1, tan tilt_z) with X towards longitude +90 degrees, Y up, Z
+    towards longitude 0. Raises `InvalidInputError` that names the file and the line.
     """
     index = Path(directory) / "INDEX.csv"
     try:
@@ -109,7 +109,7 @@ class PanoramaViews:
     def render(
         self, normal: ArrayLike, *, yaw_rad: float = 0.0, noise_sigma: float = 2.0, seed: int = 0
     ) -> NDArray[np.uint8]:
-        """(H, W) uint8: what the robot sees whose ground normal is `normal` (3,); noise in grey levels, black outside."""
+        """(H, W) uint8: seen by a robot whose ground normal is `normal` (3,); noise in grey levels, outside black."""
         turn = np.array(
             [[np.cos(yaw_rad), -np.sin(yaw_rad), 0.0], [np.sin(yaw_rad), np.cos(yaw_rad), 0.0], [0.0, 0.0, 1.0]]
         )
@@ -119,9 +119,10 @@ class PanoramaViews:
         sphere = Camera.equirectangular(width=self._size[0], height=self._size[1])
         places = sphere.project(eye).astype(np.float32) + np.array([_WRAP, 0.0], dtype=np.float32)
         shape = (self._camera.height * self._samples, self._camera.width * self._samples)
-        values = cv2.remap(
-            self._image, places.reshape(*shape, 2), None, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE
-        ).astype(np.float32)
+        across, down = (np.ascontiguousarray(places[:, axis]).reshape(shape) for axis in (0, 1))
+        values = cv2.remap(self._image, across, down, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE).astype(
+            np.float32
+        )
         values[~self._seen.reshape(shape)] = 0.0
         n = self._samples
         levels = values.reshape(self._camera.height, n, self._camera.width, n).mean(axis=(1, 3))

@@ -52,7 +52,9 @@ VARIANTS: tuple[Variant, ...] = (
         trained=True,
     ),
     Variant(
-        "vector consensus, prefilter 10 degrees, uncorrected", "vector-consensus", {"tilt_max_rad": float(np.deg2rad(10.0))}
+        "vector consensus, prefilter 10 degrees, uncorrected",
+        "vector-consensus",
+        {"tilt_max_rad": float(np.deg2rad(10.0))},
     ),
     Variant(
         "vector consensus, prefilter 10 degrees, trained a'",
@@ -84,8 +86,8 @@ def estimate_views(
 ) -> pl.DataFrame:
     """A long table, one row for each panorama, lean and variant: estimates, counts and the true lean.
 
-    With `turn` each view also has a heading of its own, drawn with a fixed seed; errors are then turned back, so that the
-    reference's error stays constant within a location.
+    With `turn` each view also has a heading of its own, drawn with a fixed seed; errors are then turned back, so that
+    the reference's error stays constant within a location.
     """
     estimators = [(variant, TiltEstimator(camera, method=variant.method, **variant.options)) for variant in variants]
     rows: list[dict[str, object]] = []
@@ -99,7 +101,9 @@ def estimate_views(
             image = views.render(normal, yaw_rad=float(yaw), noise_sigma=noise_sigma, seed=1000 * number + place)
             for variant, estimator in estimators:
                 row = _row(estimator(image), variant)
-                row.update(name=panorama.name, location=panorama.location, alpha_true=alpha, beta_true=beta, yaw=float(yaw))
+                row.update(
+                    name=panorama.name, location=panorama.location, alpha_true=alpha, beta_true=beta, yaw=float(yaw)
+                )
                 rows.append(row)
         advance()
     return pl.DataFrame(rows, infer_schema_length=None)
@@ -118,8 +122,8 @@ def _row(estimate: TiltEstimate, variant: Variant) -> dict[str, object]:
         "covariance_xy": float(covariance[0, 1]),
         "covariance_yy": float(covariance[1, 1]),
         "inliers": estimate.inlier_pixels,
-        "iterations": estimate.iterations,
-        "stop": estimate.stop,
+        "iterations": estimate.report.iterations,
+        "stop": estimate.report.stop,
     }
 
 
@@ -132,7 +136,9 @@ def summarise(table: pl.DataFrame) -> pl.DataFrame:
     for (label,), part in table.group_by("variant", maintain_order=True):
         found = part.filter(pl.col("alpha").is_finite())
         factors = _trained_factors(found) if found["trained"].any() else np.ones(len(found))
-        measured = found["shift_px"].fill_null(np.nan).to_numpy() if found["trained"].any() else found["alpha"].to_numpy()
+        measured = (
+            found["shift_px"].fill_null(np.nan).to_numpy() if found["trained"].any() else found["alpha"].to_numpy()
+        )
         measured = np.where(np.isnan(measured), found["alpha"].to_numpy(), measured)
         offsets = _offsets(found, measured / factors)
         absolute = np.rad2deg(np.linalg.norm(offsets, axis=1))

@@ -14,8 +14,7 @@ from tiltvp.plots.overlay import draw_edges
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
-    from tiltvp._core import EdgeElements, TiltEstimate
-    from tiltvp.cameras import Camera
+    from tiltvp._core import Camera, EdgeElements, TiltEstimate
 
     Picture = NDArray[np.uint8]
     Colour = tuple[int, int, int]

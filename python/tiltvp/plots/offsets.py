@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from numpy.typing import ArrayLike, NDArray
 
-    from tiltvp.cameras import Camera
+    from tiltvp._core import Camera
 
 __all__ = ["Cosine", "cosine_of_tilt", "draw_offset_histogram", "offset_histogram"]
 

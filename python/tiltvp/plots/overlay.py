@@ -23,8 +23,8 @@ def draw_edges(
 ) -> NDArray[np.uint8]:
     """The image in grey, (H, W, 3) BGR uint8, with the edge pixels in colour.
 
-    Hue is `phi`, full saturation an offset of zero, none an offset of `offset_max_px` (where the camera does not see the
-    vertical there is no offset and all are saturated). `only` picks "prefiltered", "inlier" or "all" edge pixels.
+    Hue is `phi`, full saturation an offset of zero, none an offset of `offset_max_px` (where the camera does not see
+    the vertical there is no offset and all are saturated). `only` picks "prefiltered", "inlier" or "all" edge pixels.
     """
     gray = gray_from(image)
     picks = {"prefiltered": edges.prefiltered, "inlier": edges.inlier, "all": np.ones(len(edges), dtype=bool)}

@@ -22,8 +22,11 @@ impl Tilt {
         Self { normal: Vector3::new(-sin_a * cos_b, -sin_a * sin_b, cos_a) }
     }
 
-    /// From the ground normal in the robot frame, of any length but zero.
+    /// From the ground normal in the robot frame, of any length but zero. A unit vector is kept to the last bit.
     pub fn from_normal(normal: &Vector3<f64>) -> Option<Self> {
+        if (normal.norm_squared() - 1.0).abs() <= 8.0 * f64::EPSILON {
+            return Some(Self { normal: *normal });
+        }
         normal
             .try_normalize(f64::MIN_POSITIVE)
             .filter(|n| n.iter().all(|x| x.is_finite()))
@@ -110,6 +113,13 @@ mod tests {
             let tilt = Tilt::from_roll_pitch(roll, pitch);
             prop_assert!((tilt.roll_rad() - roll).abs() < 1e-9);
             prop_assert!((tilt.pitch_rad() - pitch).abs() < 1e-9);
+        }
+
+        #[test]
+        fn a_normal_is_kept_to_the_last_bit(x in -1e3..1e3f64, y in -1e3..1e3f64, z in -1e3..1e3f64) {
+            prop_assume!(x != 0.0 || y != 0.0 || z != 0.0);
+            let tilt = Tilt::from_normal(&Vector3::new(x, y, z));
+            prop_assert_eq!(tilt.and_then(|tilt| Tilt::from_normal(&tilt.normal())), tilt);
         }
 
         #[test]

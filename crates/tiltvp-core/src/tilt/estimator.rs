@@ -453,7 +453,7 @@ impl Fit {
 
 /// # Errors
 /// [`Error::InvalidArgument`] unless the matrix is a rotation to about 1e-6.
-fn validate_rotation(matrix: &Matrix3<f64>) -> Result<()> {
+pub(super) fn validate_rotation(matrix: &Matrix3<f64>) -> Result<()> {
     let off = (matrix.transpose() * matrix - Matrix3::identity()).norm();
     if off < 1e-6 && matrix.determinant() > 0.0 {
         return Ok(());

@@ -77,6 +77,7 @@ pub(super) fn edge_offset(u: f32, v: f32, gx: f32, gy: f32) -> [f32; 3] {
 }
 
 /// Writes the rows of the edge pixels that pass the prefilter `|s| <= offset_max_px`, with unit weights, and their places.
+#[expect(clippy::too_many_arguments, reason = "three tables in, three caller-owned vectors out")]
 pub(super) fn offsets(
     edges: &EdgePixels,
     region: &Region,

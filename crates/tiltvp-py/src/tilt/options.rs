@@ -34,7 +34,7 @@ fn own(method: &Method) -> &'static [&'static str] {
 /// The core's options of a method with the user's values set.
 pub(super) fn parse(method: &str, given: Option<&Bound<'_, PyDict>>) -> PyResult<TiltOptions> {
     let mut options = TiltOptions::for_method(method).map_err(|error| exception(&error))?;
-    for (key, value) in given.into_iter().flat_map(|dict| dict.iter()) {
+    for (key, value) in given.into_iter().flat_map(PyDictMethods::iter) {
         let key: String = key.extract()?;
         set(&mut options, &key, &value)?;
     }

@@ -1,0 +1,72 @@
+# The one place where a command is spelled. `just --list` shows all of them.
+
+set shell := ["bash", "-euo", "pipefail", "-c"]
+
+bin := ".venv/bin"
+export PIP_DISABLE_PIP_VERSION_CHECK := "1"
+
+# Lists the recipes.
+default:
+    @just --list
+
+# The virtual environment with the package, built for speed, and the tools that develop it.
+setup:
+    test -x {{bin}}/python || python3 -m venv .venv
+    {{bin}}/pip install --quiet --constraint requirements-dev.lock 'maturin>=1.9,<2'
+    PATH="$PWD/{{bin}}:$PATH" {{bin}}/pip install --quiet --no-build-isolation --constraint requirements-dev.lock --editable '.[dev]'
+
+# Sets up; renders rooms at known leans, estimates them with every method, prints a table, writes pictures.
+demo *arguments: setup
+    {{bin}}/tiltvp demo {{arguments}}
+
+# Sets up; checks and tests everything that needs no data.
+test: setup check test-rust test-python
+
+# Formats and lints of both languages. (Types, stubs and layers are among the Python tests, the core's layers among the Rust ones.)
+check:
+    cargo fmt --all --check
+    cargo clippy --locked --workspace --all-targets --quiet -- --deny warnings
+    {{bin}}/ruff check --quiet
+    {{bin}}/ruff format --check --quiet
+
+# The tests of the crates, their documentation's examples and the architecture.
+test-rust:
+    cargo test --locked --workspace --quiet
+
+# The tests of the Python package, without real data.
+test-python *arguments:
+    {{bin}}/pytest --quiet {{arguments}}
+
+# The tests on real data, in the folder that TILTVP_DATA names.
+test-real *arguments: setup
+    {{bin}}/pytest --quiet tests/real_data {{arguments}}
+
+# Every method on views of upright panoramas of known tilt, in the folder panos of TILTVP_DATA.
+measure-panoramas *arguments: setup
+    {{bin}}/tiltvp measure panoramas "$TILTVP_DATA/panos" {{arguments}}
+
+# The refined method on panoramas as they were taken, against an inertial sensor.
+measure-inertial *arguments: setup
+    {{bin}}/tiltvp measure inertial "$TILTVP_DATA/panos_theta_imu" {{arguments}}
+
+# Round trips and Jacobians of the calibrations of TILTVP_DATA, as a table.
+measure-cameras: setup
+    {{bin}}/pytest --quiet --capture=no tests/real_data/test_camera_conformance.py
+
+# The benches of the core.
+bench *arguments:
+    cargo bench --locked --package tiltvp-benches {{arguments}}
+
+# What every submission must pass.
+ci: test
+
+# Writes formatted sources.
+format:
+    cargo fmt --all
+    {{bin}}/ruff check --fix --quiet
+    {{bin}}/ruff format --quiet
+
+# Writes the versions now installed as the constraints of `setup`.
+lock:
+    echo '# Versions that the package is developed and tested with: constraints for pip, written by `just lock`.' > requirements-dev.lock
+    {{bin}}/pip freeze --exclude-editable | grep --invert-match '^rust-just' >> requirements-dev.lock

@@ -1,0 +1,507 @@
+"""What Rust computes for the package: cameras, the tilt of images, common directions, rendered rooms.
+
+Arrays that come in may have any strides and any real dtype unless a shape and dtype is asked for; they are never
+altered. Arrays that go out are fresh. Angles are radians. Equation numbers are those of Fleer 2017 (see the README).
+"""
+
+from typing import Any, ClassVar, Final, Literal, Self, SupportsIndex, TypeAlias, final
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from typing_extensions import disjoint_base
+
+__all__ = [
+    "CAMERA_MODELS",
+    "METHODS",
+    "ROOM_KINDS",
+    "Camera",
+    "CommonDirection",
+    "EdgeElements",
+    "FitReport",
+    "TiltEstimate",
+    "TiltEstimator",
+    "common_direction",
+    "leaning_from_upright",
+    "level_map",
+    "normal_from_alpha_beta",
+    "render_room",
+    "tilt_error_rad",
+]
+
+_Method: TypeAlias = Literal["refined", "image-space-ransac", "image-space-reject-refit", "vector-consensus"]
+_Stop: TypeAlias = Literal[
+    "confident", "trial-limit", "converged", "settled", "iteration-limit", "too-few", "no-model", "out-of-reach"
+]
+
+METHODS: Final[list[str]]
+"""The names of the methods of `TiltEstimator`, the default first."""
+
+CAMERA_MODELS: Final[list[str]]
+"""The names of the models of `Camera`."""
+
+ROOM_KINDS: Final[list[str]]
+"""The kinds of rooms that `render_room` builds."""
+
+@disjoint_base
+class Camera:
+    """A calibrated central camera: pixels to unit bearings and back.
+
+    Camera frame: z along the optical axis, x right (columns u), y down (rows v). Pixel centres are at integers. Frozen,
+    comparable, hashable, and to be pickled. `tiltvp.Camera` adds a constructor for each model, and calibration files.
+    """
+
+    def __new__(
+        cls,
+        model: str,
+        *,
+        width: int,
+        height: int,
+        max_theta_rad: float | None = None,
+        mirror: bool = False,
+        **parameters: ArrayLike | None,
+    ) -> Self:
+        """A camera of one of `CAMERA_MODELS` with the model's parameters by name; None leaves one at its default.
+
+        `max_theta_rad` in (0, pi] limits the angle from the ray through the centre; by default the lens' own limit
+        holds. Raises `tiltvp.errors.CalibrationError` for a model, a parameter or a value that no such lens has.
+        """
+
+    @property
+    def model(self) -> str:
+        """The name of the lens model."""
+
+    @property
+    def width(self) -> int:
+        """Columns of its images."""
+
+    @property
+    def height(self) -> int:
+        """Rows of its images."""
+
+    @property
+    def max_theta_rad(self) -> float:
+        """Largest angle in radians from the ray through the centre that has a pixel."""
+
+    @property
+    def mirror(self) -> bool:
+        """Whether the image is seen in a mirror: the z component of bearings is negated."""
+
+    @property
+    def parameters(self) -> dict[str, float | list[float]]:
+        """The model's parameters by name, defaults included; a fresh dict."""
+
+    def project(self, bearings: ArrayLike) -> NDArray[np.float64]:
+        """Bearings (N, 3) or (3,) of any length but zero to pixels (u, v), (N, 2) or (2,) float64.
+
+        Rows without an answer (behind the lens' reach, zero, not finite) are NaN. Pixels may lie outside the image.
+        Raises `tiltvp.errors.InvalidInputError` for other shapes and dtypes.
+        """
+
+    def unproject(self, pixels: ArrayLike) -> NDArray[np.float64]:
+        """Pixels (u, v), (N, 2) or (2,), to unit bearings, (N, 3) or (3,) float64; NaN rows outside the valid set.
+
+        Raises `tiltvp.errors.InvalidInputError` for other shapes and dtypes.
+        """
+
+    def project_jacobian(self, bearings: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Pixels as `project` gives them, and d pixel / d bearing at the given bearings: (N, 2, 3), (2, 3)."""
+
+    def unproject_jacobian(self, pixels: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Bearings as `unproject` gives them, and d bearing / d pixel: (N, 3, 2) or (3, 2)."""
+
+    def valid_mask(self) -> NDArray[np.bool_]:
+        """(H, W) bool: the pixels that have a bearing."""
+
+    def mirrored(self) -> Self:
+        """The same camera with `mirror` turned over."""
+
+    def conformance(self) -> dict[str, float]:
+        """Round trips and errors of the analytic Jacobians, measured from the axis to the rim.
+
+        Counts `pixels_tested`, `pixels_outside`, `pixels_lost` (0 for a camera that is right); the largest errors
+        `max_round_trip_px`, `max_round_trip_rad`, `max_jacobian_error_relative` (against central differences); and
+        `rim_theta_rad`, the largest angle that was tested.
+        """
+
+    def to_dict(self) -> dict[str, Any]:
+        """The keywords that make the camera, `model` among them."""
+
+    @classmethod
+    def from_dict(cls, values: dict[str, Any]) -> Self:
+        """The camera of a dict as `to_dict` makes it."""
+
+    def __eq__(self, other: object, /) -> bool: ...
+    def __hash__(self) -> int: ...
+    def __copy__(self) -> Self: ...
+    def __deepcopy__(self, _memo: object) -> Self: ...
+
+@final
+class FitReport:
+    """How a robust fit went, and why it stopped. Frozen, comparable, hashable, and to be pickled."""
+
+    @property
+    def stop(self) -> _Stop:
+        """Why the fit stopped, in a word.
+
+        "confident": random sampling has drawn as many samples as its confidence needs; "trial-limit": it has drawn all
+        it may. "converged": the model has stopped changing; "settled": the residuals are small enough;
+        "iteration-limit": refitting has been repeated as often as it may. No answer comes of "too-few" observations,
+        "no-model" (they are all alike) and "out-of-reach" (an angle that the method cannot mean).
+        """
+
+    @property
+    def reason(self) -> str:
+        """The same in a sentence, with the measured number and the limit."""
+
+    @property
+    def iterations(self) -> int:
+        """Random samples drawn or refits done."""
+
+    @property
+    def residual_rms(self) -> float:
+        """Root mean square residual: radians, or pixels of the image-space methods; NaN without a model."""
+
+    def to_dict(self) -> dict[str, Any]:
+        """The attributes by name."""
+
+    @classmethod
+    def from_dict(cls, values: dict[str, Any]) -> Self:
+        """The report of a dict as `to_dict` makes it."""
+
+    def __eq__(self, other: object, /) -> bool: ...
+    def __hash__(self) -> int: ...
+    def __copy__(self) -> Self: ...
+    def __deepcopy__(self, _memo: object) -> Self: ...
+
+@final
+class TiltEstimate:
+    """The tilt of one image. Frozen, comparable (to the last bit), hashable, and to be pickled. True if there is a
+    tilt.
+
+    Without a tilt the angles and the normal are NaN, the covariance is infinite, the confidence 0, and `reason` says
+    why.
+    """
+
+    @property
+    def alpha_rad(self) -> float:
+        """How far the robot leans, in [0, pi] radians (eq. 1)."""
+
+    @property
+    def beta_rad(self) -> float:
+        """In which direction it leans, in (-pi, pi] radians: 0 is forward, +pi/2 to the left (eq. 1)."""
+
+    @property
+    def roll_rad(self) -> float:
+        """Roll about the robot's x in radians, right side down positive (`Rz Ry Rx`, ROS REP 103)."""
+
+    @property
+    def pitch_rad(self) -> float:
+        """Pitch about the robot's y in radians, nose down positive (`Rz Ry Rx`, ROS REP 103)."""
+
+    @property
+    def normal(self) -> NDArray[np.float64]:
+        """(3,): the unit ground normal in the robot frame, (-sin a cos b, -sin a sin b, cos a) (eq. 1)."""
+
+    @property
+    def covariance_rad2(self) -> NDArray[np.float64]:
+        """(2, 2) in squared radians: covariance of the normal in its tangent plane.
+
+        Its axes are the robot's x and y, turned by the smallest rotation that takes z to the normal. Pixels of one edge
+        err together, so residuals are summed over 64 sectors of azimuth; 0.25 degrees a side stand for what no image
+        tells.
+        """
+
+    @property
+    def confidence(self) -> float:
+        """Probability, in [0, 1], that the error (eq. 44) is below two degrees, were it normal with that covariance."""
+
+    @property
+    def edge_pixels(self) -> int:
+        """Edge pixels in the elevation band."""
+
+    @property
+    def prefiltered_pixels(self) -> int:
+        """Edge pixels that passed the prefilter."""
+
+    @property
+    def inlier_pixels(self) -> int:
+        """Edge pixels that agree with the estimate."""
+
+    @property
+    def shift_px(self) -> float | None:
+        """The shift l of the vanishing point in pixels (eq. 20), before any factor; None but for the image-space
+        methods.
+        """
+
+    @property
+    def report(self) -> FitReport:
+        """How the fit went."""
+
+    @property
+    def reason(self) -> str:
+        """Why the fit stopped, in a sentence: `report.reason`."""
+
+    def to_dict(self) -> dict[str, Any]:
+        """The attributes by name, those of the report among them; arrays as nested lists. A row for a table."""
+
+    @classmethod
+    def from_dict(cls, values: dict[str, Any]) -> Self:
+        """The estimate of a dict as `to_dict` makes it, equal to the last bit."""
+
+    def __bool__(self) -> bool: ...
+    def __eq__(self, other: object, /) -> bool: ...
+    def __hash__(self) -> int: ...
+    def __copy__(self) -> Self: ...
+    def __deepcopy__(self, _memo: object) -> Self: ...
+
+@final
+class EdgeElements:
+    """The edge pixels of one image, in row order: where each is, its direction and offset, and what became of it."""
+
+    @property
+    def u(self) -> NDArray[np.uint16]:
+        """(N,): columns."""
+
+    @property
+    def v(self) -> NDArray[np.uint16]:
+        """(N,): rows."""
+
+    @property
+    def phi_rad(self) -> NDArray[np.float64]:
+        """(N,): gradient directions in [0, pi) radians (eq. 16)."""
+
+    @property
+    def offset_px(self) -> NDArray[np.float64]:
+        """(N,): edge offsets s in pixels (eq. 17); NaN where the lens sees neither zenith nor nadir."""
+
+    @property
+    def prefiltered(self) -> NDArray[np.bool_]:
+        """(N,): the pixels that passed the prefilter."""
+
+    @property
+    def inlier(self) -> NDArray[np.bool_]:
+        """(N,): the pixels that agree with the estimate."""
+
+    @property
+    def inlier_mask(self) -> NDArray[np.bool_]:
+        """(H, W): the same over the image."""
+
+    def __len__(self) -> int: ...
+    def __eq__(self, other: object, /) -> bool: ...
+    def __copy__(self) -> Self: ...
+    def __deepcopy__(self, _memo: object) -> Self: ...
+    __hash__: ClassVar[None]  # type: ignore[assignment]
+
+@disjoint_base
+class TiltEstimator:
+    """Estimates how far and in which direction a robot leans from single images of one camera.
+
+    The tables of the camera are made once. `tiltvp.TiltEstimator` takes images of any usual kind.
+    """
+
+    def __new__(
+        cls,
+        camera: Camera,
+        *,
+        method: _Method | str = ...,
+        robot_from_camera: ArrayLike | None = None,
+        gradient_min: float = ...,
+        smoothing_px: float = ...,
+        elevation_min_rad: float = ...,
+        elevation_max_rad: float = ...,
+        margin_px: float = ...,
+        tilt_max_rad: float | None = ...,
+        mask: NDArray[np.bool_] | None = ...,
+        seed: SupportsIndex = ...,
+        keep_fraction: float = ...,
+        scale_rad: float = ...,
+        tolerance_rad: float = ...,
+        max_iterations: SupportsIndex = ...,
+        threshold_px: float = ...,
+        offset_max_px: float = ...,
+        threshold_rad: float = ...,
+        normal: Literal["gradient", "tangent"] = ...,
+        correction: float | Literal["closed-form"] | None = ...,
+    ) -> Self:
+        """Makes the tables. Defaults depend on the method; `options` tells those in force.
+
+        Parameters
+        ----------
+        camera
+            The camera whose images will come.
+        method
+            One of `METHODS`.
+        robot_from_camera
+            (3, 3) rotation R with v_robot = R v_camera; default identity: an upward camera, columns to the front.
+        gradient_min
+            Least gradient magnitude of an edge pixel, I_min: Scharr kernel (3, 10, 3), 8-bit grey levels.
+        smoothing_px
+            Standard deviation of the Gaussian before that kernel, 0 to 10 pixels.
+        elevation_min_rad, elevation_max_rad
+            The band of elevations above the robot's horizon in which edges are looked for.
+        margin_px
+            Pixels kept clear of the rim, the image border and the mask, 0 to 1000.
+        tilt_max_rad
+            Largest lean expected, in (0, pi/2): edges that need a larger one are rejected first. None: 12 degrees of
+            "refined", 7 of "vector-consensus", and `offset_max_px` of the image-space methods, which this else
+            replaces.
+        mask
+            (H, W) bool, True where the image shows the world and not the robot itself. None: everywhere.
+        seed
+            Seed of the random samples, 0 to 2^64 - 1. Only the sampling methods draw any.
+        keep_fraction
+            "refined", "image-space-reject-refit": share of normal residuals that each round keeps, in (0, 1); Q of eqs.
+            34 and 35 read as the share kept.
+        scale_rad
+            "refined": standard deviation of the soft gate at the end.
+        tolerance_rad
+            "refined": change of the direction below which it has converged.
+        max_iterations
+            "refined": most refits with the gate at its final scale.
+        threshold_px
+            "image-space-ransac": largest residual of an inlier, delta_s,max of eq. 32.
+        offset_max_px
+            Image-space methods: largest edge offset that passes the prefilter, s_max.
+        threshold_rad
+            "vector-consensus": largest angle between an inlier's great circle and the vertical, delta_o,max of eq. 40.
+        normal
+            "vector-consensus": "gradient" is the paper's normal (eq. 37), "tangent" the exact one.
+        correction
+            Image-space methods: "closed-form" divides each offset by its pixel's own gain, a number is the factor a of
+            eq. 30 in pixels per radian, None is the lens' own scale of eq. 26. "vector-consensus": a number is the
+            factor a' of eq. 45, None is 1.
+
+        Raises `tiltvp.errors.InvalidInputError` for an option that the method does not have (it names the near ones) or
+        that is out of its domain, for an R that is no rotation, for a mask of another size than the camera's images,
+        and where no pixel sees the band.
+        """
+
+    @property
+    def camera(self) -> Camera:
+        """The camera whose images are read."""
+
+    @property
+    def method(self) -> str:
+        """The name of the method."""
+
+    @property
+    def robot_from_camera(self) -> NDArray[np.float64]:
+        """(3, 3): the rotation R in v_robot = R v_camera."""
+
+    @property
+    def options(self) -> dict[str, Any]:
+        """The options that are in force, by name, defaults included; a fresh dict, good as keywords."""
+
+    @property
+    def region_pixels(self) -> int:
+        """How many pixels are looked at: those of the elevation band, clear of the rim, the border and the mask."""
+
+    def _estimate(self, image: NDArray[np.uint8]) -> TiltEstimate:
+        """The tilt of a C-contiguous (H, W) image of uint8."""
+
+    def _estimate_with_edges(self, image: NDArray[np.uint8]) -> tuple[TiltEstimate, EdgeElements]:
+        """The tilt of such an image, and its edge pixels."""
+
+    def _estimate_many(self, images: list[NDArray[np.uint8]], *, threads: int | None = None) -> list[TiltEstimate]:
+        """The tilts of many such images, in their order, the same for any number of threads."""
+
+    def __eq__(self, other: object, /) -> bool: ...
+    def __hash__(self) -> int: ...
+
+@final
+class CommonDirection:
+    """A direction orthogonal to most of the normals. Frozen, comparable, hashable, pickled. True if there is one."""
+
+    @property
+    def direction(self) -> NDArray[np.float64]:
+        """(3,): the unit direction on the prior's side; NaN if the normals do not determine one."""
+
+    @property
+    def covariance_rad2(self) -> NDArray[np.float64]:
+        """(2, 2) in squared radians: covariance in the tangent plane of the direction; infinite without one.
+
+        Its axes are x and y, turned by the smallest rotation that takes z to the direction.
+        """
+
+    @property
+    def inliers(self) -> NDArray[np.bool_]:
+        """(N,): the normals whose great circles pass within three `sigma_rad` of the direction."""
+
+    @property
+    def report(self) -> FitReport:
+        """How the fit went; the residual is in radians."""
+
+    def to_dict(self) -> dict[str, Any]:
+        """The attributes by name, those of the report among them; arrays as nested lists."""
+
+    @classmethod
+    def from_dict(cls, values: dict[str, Any]) -> Self:
+        """The value of a dict as `to_dict` makes it."""
+
+    def __bool__(self) -> bool: ...
+    def __eq__(self, other: object, /) -> bool: ...
+    def __hash__(self) -> int: ...
+    def __copy__(self) -> Self: ...
+    def __deepcopy__(self, _memo: object) -> Self: ...
+
+def common_direction(
+    normals: ArrayLike,
+    *,
+    weights: ArrayLike | None = None,
+    sigma_rad: float | None = None,
+    prior: ArrayLike | None = None,
+    max_angle_rad: float | None = None,
+) -> CommonDirection:
+    """The direction most nearly orthogonal to great-circle normals (N, 3) of any length but zero and of either sign.
+
+    For people who bring line segments of their own, found in any central image: the normal of a segment's great circle
+    is the cross product of the bearings of its ends.
+
+    Parameters
+    ----------
+    weights
+        (N,), zero or more; None: all 1.
+    sigma_rad
+        How far the great circles of inliers stray from the direction; None: 1 degree.
+    prior
+        (3,) direction of any length, near which the answer lies; None: (0, 0, 1).
+    max_angle_rad
+        Largest angle between the prior and the answer, in (0, pi/2); None: 20 degrees.
+
+    Raises `tiltvp.errors.InvalidInputError` for wrong shapes, zero or non-finite rows, negative weights and options out
+    of their domain. Too few or degenerate normals give an answer without a direction, and a reason.
+    """
+
+def leaning_from_upright(normal: ArrayLike) -> NDArray[np.float64]:
+    """(3, 3): the rotation from the upright robot's frame to the leaning one's, without a turn about the vertical.
+
+    `normal` is the ground normal (3,) in the robot frame, of any length but zero.
+    """
+
+def level_map(camera: Camera, normal: ArrayLike, *, robot_from_camera: ArrayLike | None = None) -> NDArray[np.float32]:
+    """(H, W, 2): where each pixel (u, v) of the upright image is found in the leaning one; NaN where it was not seen.
+
+    `normal` is the ground normal (3,) in the robot frame, of any length but zero.
+    """
+
+def normal_from_alpha_beta(alpha_rad: float, beta_rad: float) -> NDArray[np.float64]:
+    """(3,): the ground normal of a lean, (-sin a cos b, -sin a sin b, cos a) (eq. 1)."""
+
+def tilt_error_rad(a: ArrayLike, b: ArrayLike) -> float:
+    """The angle in [0, pi] radians between two ground normals (3,), of any length but zero (eq. 44)."""
+
+def render_room(
+    camera: Camera,
+    *,
+    kind: str,
+    seed: int,
+    alpha_rad: float,
+    beta_rad: float,
+    robot_from_camera: ArrayLike | None = None,
+    noise_sigma: float = 2.0,
+    samples: int | None = None,
+) -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:
+    """Grey (H, W) and RGB (H, W, 3) images of a seeded room of one of `ROOM_KINDS`, seen by a leaning robot.
+
+    `noise_sigma` is in grey levels, `samples` the rays per pixel and side (None: 3).
+    """

@@ -1,0 +1,68 @@
+"""What the tests share: a small upward fisheye, and rooms rendered through it once per session."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+
+import cv2
+import numpy as np
+import pytest
+
+import tiltvp
+from tiltvp.synth import RoomImage, render_room
+
+SIDE = 256
+
+
+@pytest.fixture(scope="session", autouse=True)
+def one_opencv_thread() -> Iterator[None]:
+    """OpenCV keeps to one thread: its pool does not survive a fork, and the machine is shared."""
+    before = cv2.getNumThreads()
+    cv2.setNumThreads(1)
+    yield
+    cv2.setNumThreads(before)
+
+
+@pytest.fixture(scope="session")
+def camera() -> tiltvp.Camera:
+    """An equidistant fisheye of 190 degrees that looks up."""
+    middle = (SIDE - 1) / 2
+    return tiltvp.Camera.equidistant(
+        width=SIDE, height=SIDE, focal_px=76.0, cx=middle, cy=middle, max_theta_rad=math.radians(95)
+    )
+
+
+@pytest.fixture(scope="session")
+def render(camera: tiltvp.Camera) -> Callable[..., RoomImage]:
+    """Renders rooms through that camera, each only once."""
+    seen: dict[tuple[tuple[str, object], ...], RoomImage] = {}
+
+    def room(**keywords: object) -> RoomImage:
+        key = tuple(sorted(keywords.items()))
+        if key not in seen:
+            image = render_room(camera, **{"samples": 2, **keywords})  # type: ignore[arg-type]
+            image.gray.flags.writeable = image.bgr.flags.writeable = False
+            seen[key] = image
+        return seen[key]
+
+    return room
+
+
+@pytest.fixture(scope="session")
+def room(render: Callable[..., RoomImage]) -> RoomImage:
+    """A living room, leaning by 0.06 radians (3.4 degrees) to the front left."""
+    return render(kind="living-room", seed=1, alpha_rad=0.06, beta_rad=0.8)
+
+
+@pytest.fixture(scope="session")
+def upright_room(render: Callable[..., RoomImage]) -> RoomImage:
+    """The same room without any lean and without noise."""
+    return render(kind="living-room", seed=1, alpha_rad=0.0, beta_rad=0.0, noise_sigma=0.0)
+
+
+@pytest.fixture(scope="session")
+def images(room: RoomImage, upright_room: RoomImage) -> list[np.ndarray]:
+    """Seven images of the size of the camera, one of them without any edge."""
+    blank = np.full((SIDE, SIDE), 90, dtype=np.uint8)
+    return [room.gray, upright_room.gray, room.gray[::-1], room.gray[:, ::-1], blank, room.gray.T, upright_room.gray.T]

@@ -1,0 +1,98 @@
+"""Real fisheye and mirror photographs with their own calibrations: an estimate, or an honest reason for none."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import NamedTuple
+
+import cv2
+import numpy as np
+import pytest
+
+import tiltvp
+
+
+class Case(NamedTuple):
+    """A photograph and its calibration; `up` where the optical axis is vertical, `mirror` where it meets a mirror."""
+
+    image: str
+    calibration: str
+    up: bool = False
+    mirror: bool = False
+
+
+LAB = "jingdongZhang_Improved_Feature_Descriptor"
+
+CASES = [
+    Case("riyueshi_ocamcalib-plus/VMRImage0.jpg", "riyueshi_ocamcalib-plus/calib_results_catadioptric.txt", True, True),
+    Case("riyueshi_ocamcalib-plus/VMRImage4.jpg", "riyueshi_ocamcalib-plus/calib_results_catadioptric.txt", True, True),
+    Case("riyueshi_ocamcalib-plus/VMRImage8.jpg", "riyueshi_ocamcalib-plus/calib_results_catadioptric.txt", True, True),
+    Case("tasptz_py-omnicalib/KaidanOmni1.jpg", "tasptz_py-omnicalib/calibration.yml", True, True),
+    Case("matsuren_ocamcalib_undistort/img0.jpg", "matsuren_ocamcalib_undistort/calib_results_0.txt"),
+    Case("panyu2000_fisheye/fisheye_camera_000.jpg", "panyu2000_fisheye/camera_intrinsics.yaml"),
+    Case("lessthanoptimal_BoofCV-Data/front_table.jpg", "lessthanoptimal_BoofCV-Data/front.yaml"),
+    Case(f"{LAB}/m1.jpg", f"{LAB}/calib_results.txt"),
+    Case("eowjd0512_fisheye-calib-adapter/kalibr_image.png", "eowjd0512_fisheye-calib-adapter/kalibr_DS.yml"),
+    Case("valeoai_WoodScape/front.jpg", "valeoai_WoodScape/front.json"),
+]
+
+FORWARD = np.array([[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]])
+"""R of a camera that looks ahead: its z is the robot's x, its x the robot's -y, its y the robot's -z."""
+
+
+def load(data: Path, case: Case) -> tuple[tiltvp.Camera, np.ndarray]:
+    image = tiltvp.read_image(data / "omni" / case.image)
+    height, width = image.shape[:2]
+    path = data / "omni" / case.calibration
+    if case.calibration.endswith("calibration.yml"):
+        camera = tiltvp.Camera.load(path, image_size=(width, height))
+    else:
+        camera = tiltvp.Camera.load(path)
+    if (camera.width, camera.height) != (width, height):
+        image = cv2.resize(image, (camera.width, camera.height), interpolation=cv2.INTER_AREA)
+    return camera, np.asarray(image)
+
+
+@pytest.mark.parametrize("case", CASES, ids=[case.image for case in CASES])
+@pytest.mark.parametrize("method", tiltvp.METHODS)
+def test_a_finite_answer_or_a_reason(data: Path, case: Case, method: str) -> None:
+    camera, image = load(data, case)
+    # A camera below a mirror looks up at it and sees the world below itself and around.
+    options: dict[str, float] = {"elevation_min_rad": -math.radians(30), "elevation_max_rad": math.radians(30)}
+    rotation = np.eye(3) if case.up else FORWARD
+    try:
+        estimator = tiltvp.TiltEstimator(camera, method=method, robot_from_camera=rotation, **options)
+    except tiltvp.errors.InvalidInputError as refusal:
+        if not (method.startswith("image-space") and ("zenith" in str(refusal) or "correction" in str(refusal))):
+            raise
+        # The image-space methods need the vertical in view, and a camera that looks ahead may not see it.
+        return
+    estimate, edges = estimator.with_edges(image)
+    print(f"{case.image}: {method}: {estimate!r}")
+    assert estimate.edge_pixels == len(edges) > 500
+    assert edges.u.max() < camera.width
+    assert edges.v.max() < camera.height
+    assert estimate.reason
+    if not estimate:
+        assert estimate.confidence == 0.0
+        assert np.isnan(estimate.normal).all()
+        return
+    assert np.isfinite(estimate.normal).all()
+    assert 0.0 <= estimate.confidence <= 1.0
+    assert estimate.alpha_rad < math.pi / 2
+    levelled = tiltvp.level(image, camera, estimate, robot_from_camera=rotation)
+    assert levelled.shape == image.shape
+    assert levelled.any()
+
+
+@pytest.mark.parametrize("case", [case for case in CASES if case.mirror], ids=lambda case: case.image)
+def test_the_calibration_of_a_mirror_sees_all_round(data: Path, case: Case) -> None:
+    """Its bearings go round the axis once, and down past the horizon."""
+    camera, _ = load(data, case)
+    seen = camera.valid_mask()
+    v, u = np.nonzero(seen)
+    bearings = camera.unproject(np.column_stack([u, v]))
+    azimuths = np.unique(np.round(np.degrees(np.arctan2(bearings[:, 1], bearings[:, 0])) / 10))
+    assert len(azimuths) == 37
+    assert bearings[:, 2].min() < 0.2

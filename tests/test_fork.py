@@ -1,0 +1,76 @@
+"""A process that has worked may fork: its children work too, and end."""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import signal
+import sys
+import time
+import warnings
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+import tiltvp
+
+pytestmark = [
+    pytest.mark.skipif(not hasattr(os, "fork"), reason="this system cannot fork"),
+    # Forking beside other threads is what is tried here.
+    pytest.mark.filterwarnings("ignore:.*fork.*:DeprecationWarning"),
+]
+
+LONGEST_S = 60.0
+
+
+def in_a_child(work: Callable[[], bool]) -> bool:
+    """Whether `work` is true in a forked child that ends in time."""
+    child = os.fork()
+    if child == 0:
+        try:
+            os._exit(0 if work() else 3)
+        finally:
+            os._exit(4)
+    end = time.monotonic() + LONGEST_S
+    while time.monotonic() < end:
+        pid, status = os.waitpid(child, os.WNOHANG)
+        if pid:
+            return os.waitstatus_to_exitcode(status) == 0
+        time.sleep(0.01)
+    os.kill(child, signal.SIGKILL)
+    os.waitpid(child, 0)
+    pytest.fail(f"the child did not end within {LONGEST_S:.0f} s")
+
+
+@pytest.mark.parametrize("method", tiltvp.METHODS)
+def test_fork_after_use(camera: tiltvp.Camera, images: list[np.ndarray], method: str) -> None:
+    estimator = tiltvp.TiltEstimator(camera, method=method)
+    expected = estimator(images[0])
+    assert in_a_child(lambda: estimator(images[0]) == expected)
+    assert in_a_child(lambda: tiltvp.TiltEstimator(camera, method=method)(images[0]) == expected)
+
+
+def test_fork_after_a_batch(camera: tiltvp.Camera, images: list[np.ndarray]) -> None:
+    estimator = tiltvp.TiltEstimator(camera)
+    expected = estimator.estimate_many(images, threads=2)
+    assert in_a_child(lambda: estimator.estimate_many(images, threads=2) == expected)
+    assert in_a_child(lambda: estimator.estimate_many(images, threads=1) == expected)
+    assert estimator.estimate_many(images, threads=4) == expected
+
+
+def test_a_pool_of_forked_workers(camera: tiltvp.Camera, images: list[np.ndarray]) -> None:
+    estimator = tiltvp.TiltEstimator(camera)
+    expected = estimator.estimate_many(images, threads=2)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        with multiprocessing.get_context("fork").Pool(2) as pool:
+            assert pool.map_async(estimator, images).get(LONGEST_S) == expected
+            assert pool.map_async(estimator.with_edges, images[:1]).get(LONGEST_S)[0][0] == expected[0]
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="the same as the default there")
+def test_a_pool_of_fresh_workers(camera: tiltvp.Camera, images: list[np.ndarray]) -> None:
+    estimator = tiltvp.TiltEstimator(camera)
+    with multiprocessing.get_context("spawn").Pool(1) as pool:
+        assert pool.map_async(estimator, images[:2]).get(LONGEST_S) == [estimator(image) for image in images[:2]]

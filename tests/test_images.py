@@ -1,0 +1,119 @@
+"""Images of any usual kind as 8-bit grey levels, and image files."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+import tiltvp
+from tiltvp.errors import ImageFileError, InvalidInputError
+from tiltvp.images import gray_from
+
+LEVELS = np.arange(256, dtype=np.uint8).reshape(16, 16)
+
+
+def test_grey_levels_are_kept() -> None:
+    for same in (
+        LEVELS,
+        LEVELS.astype(np.uint16) * np.uint16(257),
+        LEVELS / 255.0,
+        (LEVELS / 255.0).astype(np.float16),
+    ):
+        gray = gray_from(same)
+        assert gray.dtype == np.uint8
+        assert gray.flags.c_contiguous
+        assert np.array_equal(gray, LEVELS)
+
+
+def test_rounds_to_the_nearest_level() -> None:
+    assert gray_from(np.array([[0, 128, 129, 65535, 65406]], np.uint16)).tolist() == [[0, 0, 1, 255, 254]]
+    assert gray_from(np.array([[0.0, 0.5 / 255 - 1e-9, 0.5 / 255 + 1e-9, 1.0]])).tolist() == [[0, 0, 1, 255]]
+    assert gray_from(np.array([[False, True]])).tolist() == [[0, 255]]
+
+
+def test_colour_is_in_the_order_of_opencv() -> None:
+    bgr = np.zeros((1, 3, 3), np.uint8)
+    bgr[0, 0, 0] = bgr[0, 1, 1] = bgr[0, 2, 2] = 255
+    expected = [[29, 150, 76]]
+    assert gray_from(bgr).tolist() == expected
+    assert gray_from(np.dstack([bgr, np.full((1, 3), 7, np.uint8)])).tolist() == expected
+    assert gray_from(bgr / 255.0).tolist() == expected
+    assert gray_from(bgr[:, ::-1]).tolist() == [expected[0][::-1]]
+    assert gray_from(LEVELS[:, :, None]).shape == (16, 16)
+
+
+def test_the_argument_is_not_altered() -> None:
+    image = np.dstack([LEVELS] * 3)
+    image.flags.writeable = False
+    gray_from(image)
+    assert np.array_equal(image, np.dstack([LEVELS] * 3))
+
+
+@pytest.mark.parametrize(
+    ("image", "words"),
+    [
+        (np.zeros(4), "shape (4,)"),
+        (np.zeros((4, 4, 5)), "shape (4, 4, 5)"),
+        (np.zeros((0, 4)), "empty"),
+        (np.zeros((4, 0, 3)), "empty"),
+        (np.zeros((4, 4), np.int32), "int32"),
+        (np.full((4, 4), np.nan), "NaN"),
+        (np.full((4, 4), 1.01), "1.01"),
+        (np.full((4, 4), -1e-3), "-0.001"),
+        (np.zeros((4, 4), complex), "complex"),
+        (np.zeros((4, 4), "datetime64[s]"), "datetime64"),
+        ([[1.0], [2.0, 3.0]], "picture"),
+    ],
+)
+def test_other_images_are_refused_by_name(image: object, words: str) -> None:
+    with pytest.raises(InvalidInputError) as refusal:
+        gray_from(image, "picture")  # type: ignore[arg-type]
+    assert words in str(refusal.value)
+    assert str(refusal.value).startswith("picture")
+
+
+@pytest.mark.parametrize("ending", [".png", ".bmp", ".tiff", ".pgm"])
+def test_files_without_loss_are_read_back(tmp_path: Path, ending: str) -> None:
+    path = tmp_path / "deeper" / f"image{ending}"
+    tiltvp.write_image(path, LEVELS)
+    assert np.array_equal(tiltvp.read_image(path), LEVELS)
+    assert [file.name for file in path.parent.iterdir()] == [path.name]
+
+
+def test_colour_and_odd_names(tmp_path: Path) -> None:
+    path = tmp_path / "Küche 1 台所.png"
+    colour = np.dstack([LEVELS, LEVELS.T, LEVELS[::-1]])
+    tiltvp.write_image(path, colour)
+    assert np.array_equal(tiltvp.read_image(path), colour)
+    assert np.array_equal(tiltvp.read_image(str(path)), colour)
+
+
+def test_files_of_16_bits_are_read_as_grey_levels(tmp_path: Path) -> None:
+    path = tmp_path / "deep.png"
+    cv2.imwrite(str(path), LEVELS.astype(np.uint16) * 257)
+    assert np.array_equal(gray_from(tiltvp.read_image(path)), LEVELS)
+
+
+def test_unreadable_files_are_named(tmp_path: Path) -> None:
+    empty, text, cut = tmp_path / "empty.png", tmp_path / "text.png", tmp_path / "cut.png"
+    empty.touch()
+    text.write_text("not an image")
+    tiltvp.write_image(cut, np.random.default_rng(0).integers(0, 256, (64, 64), np.uint8))
+    cut.write_bytes(cut.read_bytes()[:40])
+    for path in (empty, text, cut, tmp_path / "missing.png", tmp_path):
+        with pytest.raises(ImageFileError) as refusal:
+            tiltvp.read_image(path)
+        assert str(path) in str(refusal.value)
+        assert "\n" not in str(refusal.value)
+
+
+def test_unwritable_files_are_named(tmp_path: Path) -> None:
+    (tmp_path / "file").touch()
+    for path in (tmp_path / "image.unknown", tmp_path / "file" / "image.png"):
+        with pytest.raises(ImageFileError) as refusal:
+            tiltvp.write_image(path, LEVELS)
+        assert str(path) in str(refusal.value)
+    assert [file.name for file in tmp_path.iterdir()] == ["file"]
