@@ -2,8 +2,8 @@
 
 use nalgebra::{Vector2, Vector3};
 
+use crate::segment::Segment;
 use crate::texture::{Color, Texture, rgb};
-use crate::world::Segment;
 
 /// Index of a material in the scene.
 pub(crate) type MaterialId = usize;

@@ -17,6 +17,7 @@ mod outdoors;
 mod plan;
 mod render;
 mod scene;
+mod segment;
 mod shell;
 mod texture;
 mod tone;
@@ -25,6 +26,7 @@ mod world;
 
 pub use options::{RoomKind, RoomOptions};
 pub use render::{Rendering, Truth, render, render_panorama};
+pub use segment::Segment;
 pub use tone::{Exposure, Image, RenderOptions};
 pub use view::{Lens, RobotPose, View};
-pub use world::{Hit, Segment, World};
+pub use world::{Hit, World};

@@ -6,9 +6,10 @@ use tiltvp_core::geometry::{Tilt, angle_between};
 use tiltvp_core::{Error, Result};
 
 use crate::noise::hash_unit;
+use crate::segment::Segment;
 use crate::tone::{Film, Image, RenderOptions};
 use crate::view::{RobotPose, View};
-use crate::world::{Segment, World};
+use crate::world::World;
 
 /// What is known of a rendered image.
 #[derive(Debug, Clone, PartialEq)]

@@ -1,5 +1,6 @@
 //! A world: a furnished room with its light, ready to be looked at.
 
+use crate::segment::Segment;
 use nalgebra::{Vector2, Vector3};
 use tiltvp_core::{Error, Result};
 
@@ -10,6 +11,7 @@ use crate::options::RoomOptions;
 use crate::outdoors::Outdoors;
 use crate::plan::Plan;
 use crate::scene::Scene;
+use crate::segment::Segment;
 use crate::texture::Color;
 use crate::view::RobotPose;
 use crate::{furniture, shell};
@@ -20,15 +22,6 @@ const GLARE: f64 = 3.0;
 
 /// Radius of the circle a robot needs to stand, metres.
 const ROBOT_RADIUS_M: f64 = 0.22;
-
-/// A vertical edge of the world, metres, world frame.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Segment {
-    /// Lower end.
-    pub bottom: Vector3<f64>,
-    /// Upper end.
-    pub top: Vector3<f64>,
-}
 
 /// Where a ray meets the world first.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import csv
 import os
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
 import cv2
 import numpy as np
@@ -19,7 +20,9 @@ from tiltvp.images import gray_from, read_image
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
-__all__ = ["TABLE_1_TILTS_DEG", "Panorama", "PanoramaViews", "paper_camera", "read_panorama_index"]
+__all__ = ["TABLE_1_TILTS_DEG", "Panorama", "PanoramaViews", "paper_camera", "read_index", "read_panorama_index"]
+
+Item = TypeVar("Item")
 
 TABLE_1_TILTS_DEG: tuple[tuple[float, float], ...] = (
     (0.0, 0.0),
@@ -59,26 +62,35 @@ def read_panorama_index(directory: str | os.PathLike[str]) -> list[Panorama]:
     The room's zenith is proportional to (tan tilt_x, 1, tan tilt_z) with X towards longitude +90 degrees, Y up, Z
     towards longitude 0. Raises `InvalidInputError` that names the file and the line.
     """
+
+    def panorama(row: dict[str, str], folder: Path) -> Panorama:
+        tan_x, tan_z = (np.tan(np.deg2rad(float(row[key]))) for key in ("tilt_x_deg", "tilt_z_deg"))
+        x, y, z = (float(value) for value in np.array([tan_z, -tan_x, 1.0]) / np.sqrt(tan_x**2 + tan_z**2 + 1.0))
+        return Panorama(row["name"], folder / f"{row['name']}.jpg", row["environment"], (x, y, z))
+
+    return read_index(directory, ("name", "environment", "tilt_x_deg", "tilt_z_deg"), panorama)
+
+
+def read_index(
+    directory: str | os.PathLike[str], columns: Sequence[str], make: Callable[[dict[str, str], Path], Item]
+) -> list[Item]:
+    """`make(row, folder)` of each row of a folder's `INDEX.csv`; what it cannot read is named with file and line."""
     index = Path(directory) / "INDEX.csv"
     try:
         with index.open(newline="", encoding="utf-8") as lines:
             rows = list(csv.DictReader(lines))
     except OSError as error:
         raise InvalidInputError(f"{index}: {error.strerror or error}, expected an index of panoramas") from error
-    panoramas = []
+    items = []
     for number, row in enumerate(rows, start=2):
         try:
-            tan_x, tan_z = (np.tan(np.deg2rad(float(row[key]))) for key in ("tilt_x_deg", "tilt_z_deg"))
-            zenith = np.array([tan_z, -tan_x, 1.0]) / np.sqrt(tan_x**2 + tan_z**2 + 1.0)
-            name, location = row["name"], row["environment"]
+            items.append(make(row, index.parent))
         except (KeyError, ValueError, TypeError) as error:
-            expected = "name, environment, tilt_x_deg, tilt_z_deg"
-            raise InvalidInputError(f"{index}, line {number}: {error!r}, expected the columns {expected}") from error
-        x, y, z = (float(value) for value in zenith)
-        panoramas.append(Panorama(name, index.parent / f"{name}.jpg", location, (x, y, z)))
-    if not panoramas:
+            expected = f"the columns {', '.join(columns)}"
+            raise InvalidInputError(f"{index}, line {number}: {error!r}, expected {expected}") from error
+    if not items:
         raise InvalidInputError(f"{index}: no rows, expected a panorama in each")
-    return panoramas
+    return items
 
 
 class PanoramaViews:

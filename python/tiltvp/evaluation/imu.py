@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import os
 from collections.abc import Callable, Iterable
 from pathlib import Path
@@ -11,8 +10,7 @@ import numpy as np
 import polars as pl
 
 from tiltvp.cameras import Camera
-from tiltvp.datasets.panoramas import Panorama, PanoramaViews
-from tiltvp.errors import InvalidInputError
+from tiltvp.datasets.panoramas import Panorama, PanoramaViews, read_index
 from tiltvp.tilt import TiltEstimator
 
 __all__ = ["InertialPanorama", "estimate_leaning", "read_inertial_index", "summarise_inertial"]
@@ -31,21 +29,12 @@ class InertialPanorama:
 
 def read_inertial_index(directory: str | os.PathLike[str]) -> list[InertialPanorama]:
     """The panoramas of a folder with an `INDEX.csv` of columns name, environment, imu_pitch_deg, imu_roll_deg."""
-    index = Path(directory) / "INDEX.csv"
-    try:
-        with index.open(newline="", encoding="utf-8") as lines:
-            rows = list(csv.DictReader(lines))
-    except OSError as error:
-        raise InvalidInputError(f"{index}: {error.strerror or error}, expected an index of panoramas") from error
-    found = []
-    for number, row in enumerate(rows, start=2):
-        try:
-            panorama = Panorama(row["name"], index.parent / f"{row['name']}.jpg", row["environment"], None)
-            found.append(InertialPanorama(panorama, float(row["imu_pitch_deg"]), float(row["imu_roll_deg"])))
-        except (KeyError, ValueError, TypeError) as error:
-            expected = "name, environment, imu_pitch_deg, imu_roll_deg"
-            raise InvalidInputError(f"{index}, line {number}: {error!r}, expected the columns {expected}") from error
-    return found
+
+    def item(row: dict[str, str], folder: Path) -> InertialPanorama:
+        panorama = Panorama(row["name"], folder / f"{row['name']}.jpg", row["environment"], None)
+        return InertialPanorama(panorama, float(row["imu_pitch_deg"]), float(row["imu_roll_deg"]))
+
+    return read_index(directory, ("name", "environment", "imu_pitch_deg", "imu_roll_deg"), item)
 
 
 def estimate_leaning(

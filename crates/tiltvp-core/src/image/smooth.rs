@@ -49,12 +49,15 @@ impl Smoother {
         self.column_sums[..inside.start].fill(0.0);
         self.column_sums[inside.end..needed].fill(0.0);
         let sums = &mut self.column_sums[inside];
-        if v < image.height() {
+        let inside = v >= 1 && v + 1 < image.height();
+        if inside {
+            three_rows([part(v - 1), part(v), part(v + 1)], [self.taps[0], self.taps[1]], sums);
+        } else if v < image.height() {
             scale(part(v), self.taps[0], sums);
         } else {
             sums.fill(0.0);
         }
-        for (offset, tap) in self.taps.iter().enumerate().skip(1) {
+        for (offset, tap) in self.taps.iter().enumerate().skip(if inside { 2 } else { 1 }) {
             let above = v.checked_sub(offset).map_or(&[][..], part);
             let below = part(v + offset);
             if above.is_empty() || below.is_empty() {
@@ -96,6 +99,14 @@ fn scale(row: &[u8], tap: f32, out: &mut [f32]) {
     }
 }
 
+/// The middle row and its neighbours at once, which is all that narrow Gaussians take.
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512vl", "x86_64+avx2+fma"))]
+fn three_rows([above, middle, below]: [&[u8]; 3], [centre, side]: [f32; 2], out: &mut [f32]) {
+    for (((o, a), m), b) in out.iter_mut().zip(above).zip(middle).zip(below) {
+        *o = f32::from(*m) * centre + (f32::from(*a) + f32::from(*b)) * side;
+    }
+}
+
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512vl", "x86_64+avx2+fma"))]
 fn add_scaled(above: &[u8], below: &[u8], tap: f32, out: &mut [f32]) {
     for ((o, a), b) in out.iter_mut().zip(above).zip(below) {
@@ -110,15 +121,15 @@ fn add_scaled_one(row: &[u8], tap: f32, out: &mut [f32]) {
     }
 }
 
-/// `sums` reach as far beyond `out` on both sides as the taps do.
+/// `sums` reach as far beyond `out` on both sides as the taps do, of which there are at least two.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512vl", "x86_64+avx2+fma"))]
 fn convolve(sums: &[f32], taps: &[f32], out: &mut [f32]) {
     let (radius, length) = (taps.len() - 1, out.len());
     let window = |shift: usize| &sums[shift..shift + length];
-    for (o, centre) in out.iter_mut().zip(window(radius)) {
-        *o = centre * taps[0];
+    for (((o, l), c), r) in out.iter_mut().zip(window(radius - 1)).zip(window(radius)).zip(window(radius + 1)) {
+        *o = c * taps[0] + (l + r) * taps[1];
     }
-    for (offset, tap) in taps.iter().enumerate().skip(1) {
+    for (offset, tap) in taps.iter().enumerate().skip(2) {
         for ((o, l), r) in out.iter_mut().zip(window(radius - offset)).zip(window(radius + offset)) {
             *o += (l + r) * tap;
         }
