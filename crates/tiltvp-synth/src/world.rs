@@ -1,6 +1,5 @@
 //! A world: a furnished room with its light, ready to be looked at.
 
-use crate::segment::Segment;
 use nalgebra::{Vector2, Vector3};
 use tiltvp_core::{Error, Result};
 
