@@ -22,7 +22,9 @@ pub enum NormalKind {
 /// For each pixel of a region the 3x2 matrix that takes a gradient to a normal in the robot frame.
 #[derive(Debug, Clone)]
 pub struct LiftTable {
-    maps: Vec<[f32; 6]>,
+    /// Rows of the matrices in units of `unit`: half the memory of single precision, to a few thousandths of a degree.
+    maps: Vec<[i16; 6]>,
+    unit: f32,
 }
 
 impl LiftTable {
@@ -41,13 +43,17 @@ impl LiftTable {
         let mean_square =
             matrices.iter().map(Matrix3x2::norm_squared).sum::<f64>() / (2 * matrices.len().max(1)) as f64;
         let scale = 1.0 / mean_square.sqrt().max(f64::MIN_POSITIVE);
-        Self { maps: matrices.iter().map(|m| std::array::from_fn(|i| (m[(i / 2, i % 2)] * scale) as f32)).collect() }
+        let unit =
+            matrices.iter().map(Matrix3x2::amax).fold(0.0, f64::max).max(f64::MIN_POSITIVE) / f64::from(i16::MAX);
+        let entry = |m: &Matrix3x2<f64>| std::array::from_fn(|i| (m[(i / 2, i % 2)] / unit).round() as i16);
+        Self { maps: matrices.iter().map(entry).collect(), unit: (unit * scale) as f32 }
     }
 
     /// The screen of the test that [`lift`](Self::lift) makes: `|m_z| <= sin_max |m|` with `|m|` no more than the largest
     /// stretch of the pixel's matrix.
     pub fn screen(&self, sin_max: f64) -> Screen {
-        let vector = |[a, b, c, d, e, f]: &[f32; 6]| {
+        let vector = |map: &[i16; 6]| {
+            let [a, b, c, d, e, f] = map.map(f32::from);
             let (xx, xy, yy) = (a * a + c * c + e * e, a * b + c * d + e * f, b * b + d * d + f * f);
             let largest = 0.5 * (xx + yy) + (0.25 * (xx - yy) * (xx - yy) + xy * xy).sqrt();
             if largest > 0.0 { [e / largest.sqrt(), f / largest.sqrt()] } else { [0.0; 2] }
@@ -74,7 +80,8 @@ impl LiftTable {
             let (weights, places) = (&mut weights[..n], &mut places[..n]);
             let mut kept = 0;
             for (place, ((slot, gx), gy)) in edges.slot().iter().zip(edges.gx()).zip(edges.gy()).enumerate() {
-                let Some([a, b, c, d, e, f]) = self.maps.get(*slot as usize) else { continue };
+                let Some(map) = self.maps.get(*slot as usize) else { continue };
+                let [a, b, c, d, e, f] = map.map(f32::from);
                 let row = [a * gx + b * gy, c * gx + d * gy, e * gx + f * gy];
                 let squared = row[0] * row[0] + row[1] * row[1] + row[2] * row[2];
                 // Written always and kept if it passes: a branch here would be guessed wrong every third time.
@@ -82,7 +89,7 @@ impl LiftTable {
                 (weights[kept], places[kept]) = (squared, place as u32);
                 kept += usize::from(row[2] * row[2] <= limit * squared && squared > 0.0);
             }
-            normalise([&mut x[..kept], &mut y[..kept], &mut z[..kept]], &mut weights[..kept]);
+            normalise([&mut x[..kept], &mut y[..kept], &mut z[..kept]], &mut weights[..kept], self.unit);
             kept
         });
         weights.truncate(rows.len());
@@ -90,12 +97,13 @@ impl LiftTable {
     }
 }
 
-/// Divides rows by their lengths, given squared lengths, and leaves the lengths behind.
+/// Divides rows by their lengths, given squared lengths, and leaves the lengths times a unit behind.
 #[multiversion(targets("x86_64+avx512f+avx512vl", "x86_64+avx2"))]
-fn normalise([x, y, z]: [&mut [f32]; 3], squared: &mut [f32]) {
+fn normalise([x, y, z]: [&mut [f32]; 3], squared: &mut [f32], unit: f32) {
     for (((x, y), z), length) in x.iter_mut().zip(y).zip(z).zip(squared) {
-        *length = length.sqrt();
-        let scale = 1.0 / *length;
+        let root = length.sqrt();
+        let scale = 1.0 / root;
+        *length = root * unit;
         (*x, *y, *z) = (*x * scale, *y * scale, *z * scale);
     }
 }

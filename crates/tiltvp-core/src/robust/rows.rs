@@ -131,8 +131,8 @@ impl<T: Real> Rows<T> {
     ) {
         let [x, y, z] = self.columns();
         let (limit, inverse) = gate.coefficients();
-        for (row, ((x, y), z)) in x.iter().zip(y).zip(z).enumerate().step_by(stride.max(1)) {
-            let (x, y, z) = (x.to_f64(), y.to_f64(), z.to_f64());
+        for row in (0..self.len).step_by(stride.max(1)) {
+            let (x, y, z) = (x[row].to_f64(), y[row].to_f64(), z[row].to_f64());
             let d = x * model[0] + y * model[1] + z * model[2];
             let own = weights.map_or(1.0, |weights| weights.get(row).copied().map_or(0.0, f64::from));
             let t = 1.0 - d * d * inverse;
