@@ -29,9 +29,9 @@ check:
     {{bin}}/ruff check --quiet
     {{bin}}/ruff format --check --quiet
 
-# The tests of the crates, their documentation's examples and the architecture.
+# The tests of the crates, their documentation's examples and the architecture, with the same random cases every time.
 test-rust:
-    cargo test --locked --workspace --quiet
+    PROPTEST_RNG_SEED=20171028 cargo test --locked --workspace --quiet
 
 # The tests of the Python package, without real data.
 test-python *arguments:
@@ -52,6 +52,10 @@ measure-inertial *arguments: setup
 # Round trips and Jacobians of the calibrations of TILTVP_DATA, as a table.
 measure-cameras: setup
     {{bin}}/pytest --quiet --capture=no tests/real_data/test_camera_conformance.py
+
+# Each method's time as a ratio to OpenCV's pair of Scharr derivatives, in one process on one thread.
+measure-time *arguments: setup
+    {{bin}}/python benches/peers/scharr.py {{arguments}}
 
 # The benches of the core.
 bench *arguments:

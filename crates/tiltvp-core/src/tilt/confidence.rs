@@ -8,7 +8,7 @@ use crate::robust::{Gate, Real, Rows};
 pub(super) const SECTORS: usize = 64;
 
 /// Rows that are enough for a covariance.
-const ENOUGH: usize = 1500;
+const ENOUGH: usize = 4000;
 
 /// An error below this many radians counts as a good estimate.
 const GOOD_RAD: f64 = 2.0 * std::f64::consts::PI / 180.0;
