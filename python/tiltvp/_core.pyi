@@ -18,13 +18,13 @@ __all__ = [
     "CommonDirection",
     "EdgeElements",
     "FitReport",
+    "Room",
     "TiltEstimate",
     "TiltEstimator",
     "common_direction",
     "leaning_from_upright",
     "level_map",
     "normal_from_alpha_beta",
-    "render_room",
     "tilt_error_rad",
 ]
 
@@ -40,7 +40,7 @@ CAMERA_MODELS: Final[list[str]]
 """The names of the models of `Camera`."""
 
 ROOM_KINDS: Final[list[str]]
-"""The kinds of rooms that `render_room` builds."""
+"""The kinds of `Room`."""
 
 @disjoint_base
 class Camera:
@@ -490,18 +490,74 @@ def normal_from_alpha_beta(alpha_rad: float, beta_rad: float) -> NDArray[np.floa
 def tilt_error_rad(a: ArrayLike, b: ArrayLike) -> float:
     """The angle in [0, pi] radians between two ground normals (3,), of any length but zero (eq. 44)."""
 
-def render_room(
-    camera: Camera,
-    *,
-    kind: str,
-    seed: int,
-    alpha_rad: float,
-    beta_rad: float,
-    robot_from_camera: ArrayLike | None = None,
-    noise_sigma: float = 2.0,
-    samples: int | None = None,
-) -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:
-    """Grey (H, W) and RGB (H, W, 3) images of a seeded room of one of `ROOM_KINDS`, seen by a leaning robot.
+@disjoint_base
+class Room:
+    """A furnished, lit room of one of `ROOM_KINDS`, built once. `tiltvp.synth.Room` renders it.
 
-    `noise_sigma` is in grey levels, `samples` the rays per pixel and side (None: 3).
+    The world frame has z up and the floor at z = 0; metres. Frozen, comparable, hashable, and to be pickled.
     """
+
+    def __new__(cls, kind: str, seed: SupportsIndex, *, threads: SupportsIndex | None = None) -> Self:
+        """Builds and lights the room on `threads` threads (None: one per core), on which it does not depend."""
+
+    @property
+    def kind(self) -> str:
+        """Which of `ROOM_KINDS` it is."""
+
+    @property
+    def seed(self) -> int:
+        """The seed of everything in it."""
+
+    @property
+    def height_m(self) -> float:
+        """Height of the ceiling, metres."""
+
+    @property
+    def floor_outline_m(self) -> NDArray[np.float64]:
+        """(N, 2): the corners of the floor, counter-clockwise, metres."""
+
+    @property
+    def vertical_edges_m(self) -> NDArray[np.float64]:
+        """(N, 2, 3): lower and upper ends of the vertical edges of walls and furniture, visible or not, metres."""
+
+    def is_free(self, x_m: float, y_m: float) -> bool:
+        """Whether a round robot of 0.22 m radius and less than 0.4 m height can stand with its centre there."""
+
+    def free_poses(self, count: SupportsIndex, seed: SupportsIndex) -> NDArray[np.float64]:
+        """(count, 3): x_m, y_m, yaw_rad of poses at which the robot stands free, drawn by `seed`.
+
+        Raises `tiltvp.errors.InvalidInputError` if the room is too full.
+        """
+
+    def _render(
+        self,
+        camera: Camera,
+        *,
+        pose: ArrayLike,
+        alpha_rad: float,
+        beta_rad: float,
+        robot_from_camera: ArrayLike | None,
+        camera_height_m: float | None,
+        noise_sigma: float,
+        samples: SupportsIndex | None,
+        seed: SupportsIndex,
+        threads: SupportsIndex | None,
+    ) -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:
+        """Grey (H, W) and RGB (H, W, 3) images of the room."""
+
+    def _render_panorama(
+        self,
+        *,
+        pose: ArrayLike,
+        camera_height_m: float | None,
+        height: SupportsIndex,
+        noise_sigma: float,
+        samples: SupportsIndex | None,
+        seed: SupportsIndex,
+        threads: SupportsIndex | None,
+    ) -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:
+        """Grey (height, 2 height) and RGB (height, 2 height, 3) images of everything around a place."""
+
+    def __getnewargs__(self) -> tuple[str, int]: ...
+    def __eq__(self, other: object, /) -> bool: ...
+    def __hash__(self) -> int: ...

@@ -16,7 +16,7 @@ mod _core {
     #[pymodule_export]
     use crate::camera::Camera;
     #[pymodule_export]
-    use crate::synth::render_room;
+    use crate::synth::Room;
     #[pymodule_export]
     use crate::tilt::{
         CommonDirection, EdgeElements, FitReport, TiltEstimate, TiltEstimator, common_direction, leaning_from_upright,
