@@ -18,6 +18,7 @@ __all__ = [
     "CommonDirection",
     "EdgeElements",
     "FitReport",
+    "PixelRays",
     "Room",
     "TiltEstimate",
     "TiltEstimator",
@@ -26,6 +27,7 @@ __all__ = [
     "level_map",
     "normal_from_alpha_beta",
     "tilt_error_rad",
+    "tilt_from_wheel_heights",
 ]
 
 _Method: TypeAlias = Literal["refined", "image-space-ransac", "image-space-reject-refit", "vector-consensus"]
@@ -489,6 +491,39 @@ def normal_from_alpha_beta(alpha_rad: float, beta_rad: float) -> NDArray[np.floa
 
 def tilt_error_rad(a: ArrayLike, b: ArrayLike) -> float:
     """The angle in [0, pi] radians between two ground normals (3,), of any length but zero (eq. 44)."""
+
+def tilt_from_wheel_heights(
+    *, left_m: float, right_m: float, caster_m: float, half_track_m: float, caster_behind_m: float
+) -> tuple[float, float]:
+    """(alpha_rad, beta_rad) of a robot whose wheels stand at these heights above a common level (eqs. 42 and 43).
+
+    The main wheels are at (0, +-half_track_m) in the robot's frame, the caster at (-caster_behind_m, 0): r_w and r_c of
+    fig. 20. With h_r = right - left and h_c = caster - left the ground normal is
+    (-(2 h_c - h_r) / (2 r_c), -h_r / (2 r_w), cos alpha). Raises `tiltvp.errors.InvalidInputError` for lengths that are
+    not positive, heights that are not finite, and heights that no robot of this layout can stand at.
+    """
+
+@final
+class PixelRays:
+    """`samples` x `samples` rays in each pixel of a camera that sees anything, made once, to be met with panoramas."""
+
+    def __new__(cls, camera: Camera, *, samples: SupportsIndex) -> Self:
+        """Makes the rays, at the centres of equal parts of the pixels; `samples` is from 1 to 16."""
+
+    @property
+    def samples(self) -> int:
+        """Rays per pixel and side."""
+
+    @property
+    def pixels(self) -> NDArray[np.uint32]:
+        """(N,): places in row order, v width + u, of the pixels in which some ray is seen."""
+
+    def panorama_map(self, rotation: ArrayLike, *, width: SupportsIndex, height: SupportsIndex) -> NDArray[np.float32]:
+        """(2, samples^2, N): columns and rows of an equirectangular panorama of that size that the rays meet.
+
+        `rotation` (3, 3) takes bearings of the camera to the panorama's: x right, y down, z towards longitude 0. Rays
+        that the lens does not see are at -1e6, far outside.
+        """
 
 @disjoint_base
 class Room:
