@@ -117,6 +117,12 @@ class Camera:
     def mirrored(self) -> Self:
         """The same camera with `mirror` turned over."""
 
+    def scaled(self, factor: float) -> Self:
+        """The camera of the image resized by `factor`: what was at u is at factor (u + 1/2) - 1/2.
+
+        The size is rounded to whole pixels. Raises `tiltvp.errors.InvalidInputError` for a factor that is not positive.
+        """
+
     def conformance(self) -> dict[str, float]:
         """Round trips and errors of the analytic Jacobians, measured from the axis to the rim.
 

@@ -22,6 +22,7 @@ mod radial;
 mod radial_polynomial;
 mod rays;
 mod rim;
+mod scaled;
 mod solve;
 mod sphere;
 mod table;
