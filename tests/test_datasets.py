@@ -304,8 +304,6 @@ def test_rendered_rooms(small: tiltvp.Camera, tmp_path: Path) -> None:
     ]  # fmt: skip
     assert {image.environment for image in images} == {"narrow", "under-table"}
     assert render("two", threads=3) == one
-    first = "images/narrow-000-01_00.png"
-    assert render("less", rooms=1, threads=2)[first] == one[first]
 
 
 @pytest.mark.parametrize(
@@ -317,7 +315,7 @@ def test_rendered_rooms(small: tiltvp.Camera, tmp_path: Path) -> None:
         ({"seed": -1}, "seed = -1"),
         ({"samples": 0}, "samples = 0"),
         ({"threads": 0}, "threads = 0"),
-        ({"robot_from_camera": np.eye(2)}, "matmul|rotation|shape"),
+        ({"robot_from_camera": np.eye(2)}, "robot_from_camera"),
     ],
 )
 @pytest.mark.parametrize("what", ["panoramas", "rooms"])
@@ -335,9 +333,13 @@ def test_wrong_making(
 
 
 def test_nothing_is_left_of_a_failure(small: tiltvp.Camera, tmp_path: Path) -> None:
-    with pytest.raises(ZeroDivisionError), new_dataset(tmp_path / "out", small) as new:
-        new.write("a", np.zeros((48, 64), dtype=np.uint8), location="a", environment="x", alpha_rad=0.0, beta_rad=0.0)
-        raise ZeroDivisionError
+    def fail(directory: Path) -> None:
+        with new_dataset(directory, small) as new:
+            new.write("a", np.zeros((48, 64), np.uint8), location="a", environment="x", alpha_rad=0.0, beta_rad=0.0)
+            raise ZeroDivisionError
+
+    with pytest.raises(ZeroDivisionError):
+        fail(tmp_path / "out")
     assert list(tmp_path.iterdir()) == []
     (tmp_path / "mine").mkdir()
     (tmp_path / "mine" / "thesis.txt").write_text("years of work")

@@ -19,8 +19,9 @@ import tomli_w
 
 from tiltvp.datasets.description import DESCRIPTION
 from tiltvp.datasets.rows import ROWS, TiltImage
-from tiltvp.errors import InvalidInputError
+from tiltvp.errors import CalibrationError, InvalidInputError
 from tiltvp.images import write_image
+from tiltvp.rotations import rotation_from
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
@@ -78,6 +79,7 @@ def new_dataset(
     `InvalidInputError`.
     """
     target = Path(directory)
+    rotation = None if robot_from_camera is None else _rotation(robot_from_camera)
     _refuse_taken(target, force)
     part = target.absolute().parent / f".{target.absolute().name}.{os.getpid()}.part"
     try:
@@ -88,7 +90,7 @@ def new_dataset(
         new = NewDataset(part)
         yield new
         camera.save(part / _CAMERA)
-        _write_description(part, robot_from_camera, source or {})
+        _write_description(part, rotation, source or {})
         _write_rows(part, new.images)
         _refuse_taken(target, force)
         if target.exists():
@@ -129,10 +131,19 @@ def _refuse_taken(target: Path, force: bool) -> None:
         raise InvalidInputError(f"{target}: is no dataset, expected a folder with {DESCRIPTION}, or an empty one")
 
 
-def _write_description(directory: Path, robot_from_camera: ArrayLike | None, source: dict[str, Any]) -> None:
+def _rotation(robot_from_camera: ArrayLike) -> list[list[float]]:
+    rows: list[list[float]] = np.asarray(robot_from_camera, dtype=np.float64).tolist()
+    try:
+        rotation_from(rows, "robot_from_camera")
+    except CalibrationError as error:
+        raise InvalidInputError(str(error)) from None
+    return rows
+
+
+def _write_description(directory: Path, rotation: list[list[float]] | None, source: dict[str, Any]) -> None:
     table: dict[str, Any] = {"camera": _CAMERA}
-    if robot_from_camera is not None:
-        table["robot_from_camera"] = np.asarray(robot_from_camera, dtype=np.float64).tolist()
+    if rotation is not None:
+        table["robot_from_camera"] = rotation
     if source:
         table["source"] = source
     (directory / DESCRIPTION).write_text(tomli_w.dumps(table), encoding="utf-8")
