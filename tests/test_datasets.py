@@ -141,8 +141,8 @@ def test_digest(folder: Path, tmp_path_factory: pytest.TempPathFactory) -> None:
 CAMERA = 'camera = "cam.toml"\n'
 WRONG: list[tuple[str, str | None, list[str] | None, list[tuple[int | None, str]]]] = [
     ("no camera", "", None, [(None, "no key camera")]),
-    ("no such camera", 'camera = "c.yaml"', None, [(None, "c.yaml: no such file")]),
-    ("no calibration", 'camera = "images.csv"', None, [(None, "camera: ")]),
+    ("no such camera", 'camera = "c.yaml"', None, [(None, "camera 'c.yaml': no such file")]),
+    ("no calibration", 'camera = "images.csv"', None, [(None, "camera 'images.csv': ")]),
     ("no TOML", "camera = ", None, [(None, "is not TOML")]),
     ("unknown keys", CAMERA + "wheel = 1\nmirrored = true", None, [(None, "wheels?"), (None, "mirror?")]),
     ("wrong types", 'camera = 1\nmirror = "yes"', None, [(None, "camera = 1"), (None, "mirror ="), (None, "no key")]),

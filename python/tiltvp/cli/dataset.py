@@ -45,10 +45,11 @@ def check(directory: Path, /) -> int:
         findings = check_dataset(directory, bar.advance)
     if findings:
         columns = ("severity", "file", "line", "what is wrong", "expected")
-        table = new_table(None, columns, left=set(columns) - {"line"})
+        table = new_table(str(directory), columns, left=set(columns) - {"line"})
         for finding in findings:
             line = "" if finding.line is None else str(finding.line)
-            table.add_row(finding.severity, finding.file, line, finding.what, finding.expected)
+            file = os.path.relpath(finding.file, directory)
+            table.add_row(finding.severity, file, line, finding.what, finding.expected)
         show(table)
     errors = sum(finding.severity == "error" for finding in findings)
     if dataset is not None and not errors:

@@ -130,7 +130,8 @@ def _camera(file: Path, table: dict[str, Any], findings: Findings) -> Camera | N
             image_size=None if size is None else (size[0], size[1]),
         )
     except TiltvpError as error:
-        findings.add(file, None, f"camera: {error}", "a calibration file that can be read")
+        what, _, expected = str(error).removeprefix(f"{file.parent / table['camera']}: ").partition(", expected ")
+        findings.add(file, None, f"camera {table['camera']!r}: {what}", expected or _KEYS["camera"])
         return None
     return camera.mirrored() if table.get("mirror", False) and not camera.mirror else camera
 
