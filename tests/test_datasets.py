@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import tiltvp
-from tiltvp._core import tilt_from_wheel_heights
+from tiltvp import tilt_from_wheel_heights
 from tiltvp.datasets.check import check_dataset
 from tiltvp.datasets.folder import read_dataset
 from tiltvp.datasets.new import new_dataset
