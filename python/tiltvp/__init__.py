@@ -19,6 +19,7 @@ from tiltvp.tilt import (
     level,
     normal_from_alpha_beta,
     tilt_error_rad,
+    tilt_from_wheel_heights,
 )
 
 __version__ = "0.1.0"
@@ -37,5 +38,6 @@ __all__ = [
     "normal_from_alpha_beta",
     "read_image",
     "tilt_error_rad",
+    "tilt_from_wheel_heights",
     "write_image",
 ]

@@ -2,6 +2,8 @@
 
 mod bearing;
 mod tilt;
+mod wheels;
 
 pub use bearing::{angle_between, tangent_basis};
 pub use tilt::Tilt;
+pub use wheels::WheelLayout;
