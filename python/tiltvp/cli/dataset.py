@@ -214,6 +214,48 @@ def synth(
     _say_made(out)
 
 
+@app.command
+def degrade(
+    directory: Path,
+    /,
+    *,
+    out: Path,
+    seed: int = 0,
+    threads: int | None = None,
+    force: Switch = False,
+) -> None:
+    """Make a harder dataset of one that is there: each image half hidden, blurred or darkened, its truth the same.
+
+    Parameters
+    ----------
+    directory
+        The dataset.
+    out
+        Folder to make. It appears when it is whole.
+    seed
+        Seed of what befalls each image.
+    threads
+        How many threads; default is one per core.
+    force
+        Replace a dataset that is there.
+    """
+    from tiltvp.datasets.degrading import degrade_dataset
+    from tiltvp.datasets.folder import read_dataset
+
+    dataset = read_dataset(directory)
+    with progress_bar(len(dataset.images), "images") as bar:
+        degrade_dataset(
+            dataset,
+            out,
+            seed=seed,
+            threads=_threads(threads),
+            source=_made_by("degrade"),
+            force=force,
+            advance=bar.advance,
+        )
+    _say_made(out)
+
+
 def _camera(path: Path | None, name: str | None, scale: float) -> Camera:
     from tiltvp import Camera
     from tiltvp.datasets.panoramas import paper_camera
