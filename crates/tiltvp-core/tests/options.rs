@@ -11,7 +11,7 @@ use tiltvp_core::edges::{EdgeOptions, Mask, NormalKind};
 use tiltvp_core::geometry::Tilt;
 use tiltvp_core::tilt::{
     CommonDirectionOptions, Correction, METHODS, Method, RefineOptions, TiltEstimate, TiltEstimator, TiltOptions,
-    common_direction,
+    TrainedCorrection, common_direction,
 };
 
 const SIDE: u32 = 200;
@@ -89,7 +89,7 @@ fn every_option_of_the_image_space_methods_is_read() {
             }),
             ("offset_max_px", |o| {
                 let Method::ImageSpaceRansac { offset_max_px, .. } = &mut o.method else { return };
-                *offset_max_px = 20.0;
+                *offset_max_px = Some(8.0);
             }),
             ("correction none", |o| {
                 let Method::ImageSpaceRansac { correction, .. } = &mut o.method else { return };
@@ -97,7 +97,7 @@ fn every_option_of_the_image_space_methods_is_read() {
             }),
             ("correction factor", |o| {
                 let Method::ImageSpaceRansac { correction, .. } = &mut o.method else { return };
-                *correction = Correction::Factor(100.0);
+                *correction = Correction::factor(100.0);
             }),
             ("seed", |o| o.seed = 5),
         ],
@@ -111,7 +111,7 @@ fn every_option_of_the_image_space_methods_is_read() {
             }),
             ("offset_max_px", |o| {
                 let Method::ImageSpaceRejectRefit { offset_max_px, .. } = &mut o.method else { return };
-                *offset_max_px = 20.0;
+                *offset_max_px = Some(8.0);
             }),
             ("correction none", |o| {
                 let Method::ImageSpaceRejectRefit { correction, .. } = &mut o.method else { return };
@@ -119,7 +119,7 @@ fn every_option_of_the_image_space_methods_is_read() {
             }),
             ("correction factor", |o| {
                 let Method::ImageSpaceRejectRefit { correction, .. } = &mut o.method else { return };
-                *correction = Correction::Factor(100.0);
+                *correction = Correction::factor(100.0);
             }),
         ],
     );
@@ -139,8 +139,8 @@ fn every_option_of_the_methods_on_normals_is_read() {
                 *normal = NormalKind::Tangent;
             }),
             ("factor", |o| {
-                let Method::VectorConsensus { factor, .. } = &mut o.method else { return };
-                *factor = 1.8;
+                let Method::VectorConsensus { correction, .. } = &mut o.method else { return };
+                *correction = TrainedCorrection::Factor(1.8);
             }),
             ("seed", |o| o.seed = 5),
         ],
@@ -166,8 +166,8 @@ fn factors_divide_the_lean() {
     let with = |factor| {
         let method = Method::ImageSpaceRejectRefit {
             keep_fraction: 0.8,
-            offset_max_px: 40.0,
-            correction: Correction::Factor(factor),
+            offset_max_px: Some(40.0),
+            correction: Correction::factor(factor),
         };
         estimate(TiltOptions { method, ..defaults("image-space-reject-refit") })
     };
@@ -212,16 +212,18 @@ fn wrong_values_of_a_method_are_refused_by_name() {
     for wrong in [0.0, -1.0, f64::NAN, f64::INFINITY] {
         let ransac = |threshold_px, offset_max_px, factor| Method::ImageSpaceRansac {
             threshold_px,
-            offset_max_px,
-            correction: Correction::Factor(factor),
+            offset_max_px: Some(offset_max_px),
+            correction: Correction::factor(factor),
         };
         let trimming = |keep_fraction, offset_max_px, factor| Method::ImageSpaceRejectRefit {
             keep_fraction,
-            offset_max_px,
-            correction: Correction::Factor(factor),
+            offset_max_px: Some(offset_max_px),
+            correction: Correction::factor(factor),
         };
-        let vectors =
-            |threshold_rad, factor| Method::VectorConsensus { threshold_rad, normal: NormalKind::Tangent, factor };
+        let vectors = |threshold_rad, factor| {
+            let correction = TrainedCorrection::Factor(factor);
+            Method::VectorConsensus { threshold_rad, normal: NormalKind::Tangent, correction }
+        };
         let refined = |keep_fraction, scale_rad| {
             Method::Refined(RefineOptions { keep_fraction, scale_rad, ..RefineOptions::default() })
         };
