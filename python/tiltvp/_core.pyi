@@ -294,7 +294,7 @@ class EdgeElements:
 
 @final
 class ImageEdges:
-    """The edge pixels of one image and their gradients: every pixel of the band with a gradient of at least `gradient_min`.
+    """The edge pixels of one image and their gradients: every pixel of the band of at least `gradient_min`.
 
     `TiltEstimator.detect` makes them, `TiltEstimator.estimate_edges` takes them. Frozen, comparable, to be pickled.
     """
@@ -339,7 +339,7 @@ class AffineCorrection:
 
 @final
 class PosteriorCorrection:
-    """The mean and deviation of P(alpha | l) over a grid of shifts from zero, and the model of shifts they were made with.
+    """The mean and deviation of P(alpha | l) over a grid of shifts from zero, and the model of shifts behind it.
 
     `train_posterior` makes them. Applying one is one interpolation; shifts beyond the grid have the answer of its end.
     Frozen, comparable, hashable, pickled.
@@ -492,8 +492,8 @@ class TiltEstimator:
         threshold_px
             "image-space-ransac": largest residual of an inlier, delta_s,max of eq. 32.
         offset_max_px
-            Image-space methods: largest edge offset that passes the prefilter, s_max. None: the paper's 40 for its lens of
-            139.7 pixels per radian about the vertical, and in proportion for others.
+            Image-space methods: largest edge offset that passes the prefilter, s_max. None: the paper's 40 for its lens
+            of 139.7 pixels per radian about the vertical, and in proportion for others.
         threshold_rad
             "vector-consensus": largest angle between an inlier's great circle and the vertical, delta_o,max of eq. 40.
         normal
@@ -538,9 +538,9 @@ class TiltEstimator:
     def estimate_edges(self, edges: ImageEdges) -> TiltEstimate:
         """The tilt of the image that the edges are of, the same to the last bit as the image itself gives.
 
-        `edges` may be those of any estimator with equal camera, robot_from_camera, mask and edge options (gradient_min,
-        smoothing_px, elevations, margin_px); else `tiltvp.errors.InvalidInputError` says what differs. Other threads run
-        meanwhile.
+        `edges` may be those of any estimator with equal camera, robot_from_camera, mask and edge options
+        (gradient_min, smoothing_px, elevations, margin_px); else `tiltvp.errors.InvalidInputError` says what differs.
+        Other threads run meanwhile.
         """
 
     def _estimate_with_edges(self, image: NDArray[np.uint8]) -> tuple[TiltEstimate, EdgeElements]:
@@ -619,24 +619,22 @@ def common_direction(
 def train_factor(shift: ArrayLike, alpha_rad: ArrayLike) -> float:
     """The factor of eq. 31: the mean of shift / alpha over images of known leans (N,) above zero.
 
-    `shift` (N,) is `shift_px` of an image-space method, or `alpha_rad` of an uncorrected "vector-consensus". Leave images
-    without an estimate out. Raises `tiltvp.errors.InvalidInputError` for numbers that make no sense.
+    `shift` (N,) is `shift_px` of an image-space method, or `alpha_rad` of an uncorrected "vector-consensus". Leave out
+    images without an estimate. Raises `tiltvp.errors.InvalidInputError` for numbers that make no sense.
     """
 
 def train_affine(shift: ArrayLike, alpha_rad: ArrayLike) -> AffineCorrection:
     """The line alpha = shift / factor + offset through images of known leans (N,), by least squares of the shift.
 
-    The truth is known and the shift errs, and the line does not depend on how many images there are of each lean. Raises
-    `tiltvp.errors.InvalidInputError` for fewer than two different leans or shifts that do not grow with them.
+    The truth is known and the shift errs, and the line does not depend on how many images there are of each lean.
+    Raises `tiltvp.errors.InvalidInputError` for fewer than two different leans or shifts that do not grow with them.
     """
 
-def train_posterior(
-    shift: ArrayLike, alpha_rad: ArrayLike, *, prior: PriorOfTilt | None = None
-) -> PosteriorCorrection:
+def train_posterior(shift: ArrayLike, alpha_rad: ArrayLike, *, prior: PriorOfTilt | None = None) -> PosteriorCorrection:
     """P(alpha | l) from images of known leans (N,), at least ten, under a prior; None: `PriorOfTilt.empirical()`.
 
-    The shift is modelled as the length of a plane vector of mean length factor * alpha with normal errors that grow with
-    the lean (a Rice distribution), a share of which strays; the model is fitted by maximum likelihood. Raises
+    The shift is modelled as the length of a plane vector of mean length factor * alpha with normal errors that grow
+    with the lean (a Rice distribution), a share of which strays; the model is fitted by maximum likelihood. Raises
     `tiltvp.errors.InvalidInputError` for numbers that make no sense or shifts that do not grow with the lean.
     """
 

@@ -65,8 +65,8 @@ class TiltEstimator(_core.TiltEstimator):
         Of the image-space methods; `correction` is "closed-form" (default), a factor in pixels per radian, None, an
         `AffineCorrection` or a `PosteriorCorrection`.
     threshold_rad, normal, correction
-        Of "vector-consensus"; `normal` is "gradient" (the paper's) or "tangent", `correction` a factor without unit or one
-        of those trained on raw angles.
+        Of "vector-consensus"; `normal` is "gradient" (the paper's) or "tangent", `correction` a factor without unit
+        or one of those trained on raw angles.
     """
 
     __slots__ = ()

@@ -303,3 +303,47 @@ fn wrong_values_of_the_common_direction_are_refused_by_name() {
         assert!(error.contains("normals") && error.contains("row 7"), "{error}");
     }
 }
+
+/// A lean is a shift of the image only for a lens about the vertical.
+#[test]
+fn cameras_far_from_the_vertical_are_refused_by_the_image_space_methods() {
+    let about_x =
+        |degrees: f64| nalgebra::Rotation3::from_axis_angle(&Vector3::x_axis(), degrees.to_radians()).into_inner();
+    for method in METHODS {
+        for (degrees, served) in
+            [(0.0, true), (40.0, true), (50.0, false), (90.0, false), (130.0, false), (140.0, true)]
+        {
+            let mut options = defaults(method);
+            (options.edges.elevation_min_rad, options.edges.elevation_max_rad) = (-0.7, 0.7);
+            match TiltEstimator::new(fisheye(SIDE), about_x(degrees), options) {
+                Ok(_) => assert!(served || !method.starts_with("image"), "{method}, {degrees}"),
+                Err(error) => {
+                    assert!(!served && method.starts_with("image"), "{method}, {degrees}: {error}");
+                    assert!(error.to_string().contains("optical axis"), "{error}");
+                }
+            }
+        }
+    }
+}
+
+/// The paper's 40 pixels for its lens, and in proportion for others; a number that is too large is named.
+#[test]
+fn the_largest_offset_follows_the_lens() {
+    for method in &METHODS[1..3] {
+        let with = |offset: Option<f64>| {
+            let mut options = defaults(method);
+            match &mut options.method {
+                Method::ImageSpaceRansac { offset_max_px, .. }
+                | Method::ImageSpaceRejectRefit { offset_max_px, .. } => {
+                    *offset_max_px = offset;
+                }
+                Method::VectorConsensus { .. } | Method::Refined(_) => {}
+            }
+            options
+        };
+        let scale = 0.46 * f64::from(SIDE) / 92.5f64.to_radians();
+        let (own, same) = (estimate(with(None)), estimate(with(Some(40.0 * scale / 139.7))));
+        assert_eq!((own.tilt, own.prefiltered_pixels), (same.tilt, same.prefiltered_pixels), "{method}");
+        assert_eq!(refused(with(Some(900.0))), "offset_max_px");
+    }
+}

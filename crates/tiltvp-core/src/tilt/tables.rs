@@ -13,6 +13,9 @@ use super::trained::TrainedCorrection;
 use crate::edges::{LiftTable, NormalKind, Region, Screen};
 use crate::error::{Error, Result};
 
+/// Least cosine of the angle between the optical axis and the vertical for the image-space methods.
+const AXIS_COSINE_MIN: f64 = std::f64::consts::FRAC_1_SQRT_2;
+
 /// The pixels that are looked at, and what is known of each whatever the method.
 #[derive(Debug)]
 pub(super) struct Sight {
@@ -78,6 +81,15 @@ impl Tables {
                 "a camera that can see the zenith or the nadir; use \"refined\" for others",
             ));
         };
+        let axis_cosine = origin.robot_from_camera[(2, 2)].abs();
+        if axis_cosine < AXIS_COSINE_MIN {
+            return Err(Error::option(
+                "method",
+                options.method.name(),
+                "a camera whose optical axis is within 45 degrees of the vertical: these methods take a lean for a shift \
+                 of the image; use \"refined\" for others",
+            ));
+        }
         let gains = match (correction, like) {
             (Correction::ClosedForm, Some((_, Self::Offsets { gains, .. }, _))) if !gains.relative.is_empty() => {
                 Arc::clone(gains)
