@@ -223,7 +223,11 @@ fn estimates_are_what_corrections_of_their_shifts_are() {
         assert!((found.tilt.unwrap().alpha_rad() - line.apply(raw)).abs() < 1e-9, "{method}");
         assert!((found.tilt.unwrap().beta_rad() - plain.tilt.unwrap().beta_rad()).abs() < 1e-9, "{method}");
         let difference = found.covariance_rad2 - plain.covariance_rad2;
-        assert!(difference.norm() < 0.05 * plain.covariance_rad2.norm(), "{method}: {difference}");
+        // Along the lean the methods' own share of a smaller angle is smaller; across it nothing changes.
+        let along = plain.tilt.unwrap().normal().xy().normalize();
+        let across = nalgebra::Vector2::new(-along.y, along.x);
+        let sideways = across.dot(&(difference * across)).abs();
+        assert!(sideways < 0.05 * plain.covariance_rad2.norm(), "{method}: {difference}");
         assert_eq!(found.shift_px, plain.shift_px);
 
         let clamped = TrainedCorrection::Affine(AffineCorrection { factor, offset_rad: -1.0 });

@@ -63,17 +63,19 @@ impl Lean {
     }
 
     /// The covariance of the normal from that of the shift; `plane` takes horizontal changes to the tangent plane.
-    fn covariance(&self, shift: &Matrix2<f64>, plane: &Matrix2<f64>) -> Matrix2<f64> {
+    /// `share` is that of the lean by which the method may err.
+    fn covariance(&self, shift: &Matrix2<f64>, plane: &Matrix2<f64>, tilt: &Tilt, share: f64) -> Matrix2<f64> {
+        let complete = |covariance| confidence::with_floor(confidence::with_lean_error(covariance, tilt, share));
         match self {
             Self::Proportional(matrix) => {
                 let plane = plane * matrix;
-                confidence::with_floor(plane * shift * plane.transpose())
+                complete(plane * shift * plane.transpose())
             }
             Self::Bent { corrected, toward, direction } => {
                 let across = Vector2::new(-toward.y, toward.x);
                 let plane = plane * direction;
                 let matrix = plane * corrected.jacobian(toward, across.dot(&(shift * across)));
-                let covariance = confidence::with_floor(matrix * shift * matrix.transpose());
+                let covariance = complete(matrix * shift * matrix.transpose());
                 let radial = (plane * toward).normalize();
                 let own = radial.dot(&(covariance * radial));
                 // The training set has seen what this image may not know of itself.
@@ -210,10 +212,18 @@ impl TiltEstimator {
         // The paper's methods end with weights of what they have selected, which cannot tell how sure the selection was.
         let weights = matches!(self.options.method, Method::Refined(_)).then_some(&work.weights[..]);
         let covariance = fit.tilt.and_then(|tilt| {
-            let covariance = confidence::clustered_covariance(&work.rows, fit.model, fit.gate, weights, sector)?;
+            let covariance = confidence::clustered_covariance(
+                &work.rows,
+                fit.model,
+                fit.gate,
+                weights,
+                self.sight.region.pixels_per_rad(),
+                sector,
+            )?;
             // A change of the normal's horizontal part is a change in its tangent plane, seen along the vertical.
             let plane = tangent_basis(&tilt.normal()).fixed_rows::<2>(0).try_inverse()?;
-            Some(fit.lean.covariance(&covariance, &plane))
+            let share = if self.options.method.is_exact() { 0.0 } else { confidence::APPROXIMATE_SHARE };
+            Some(fit.lean.covariance(&covariance, &plane, &tilt, share))
         });
         TiltEstimate {
             tilt: fit.tilt,
