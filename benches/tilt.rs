@@ -81,7 +81,7 @@ mod stages {
         let (region, mut detector, mut edges) = edges_of(smoothing_px);
         let picture = view(&PICTURE).unwrap();
         bencher.counter(ItemsCount::new(region.len())).bench_local(|| {
-            detector.detect(black_box(&picture), &region, EdgeOptions::default().gradient_min, None, &mut edges)
+            detector.detect(black_box(&picture), &region, EdgeOptions::default().gradient_min, None, &mut edges);
         });
     }
 
