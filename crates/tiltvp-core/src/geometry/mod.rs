@@ -3,5 +3,5 @@
 mod bearing;
 mod tilt;
 
-pub use bearing::{angle_between, tangent_basis};
+pub use bearing::{angle_between, tangent_basis, tangent_exp, tangent_log, tangent_transport};
 pub use tilt::Tilt;
