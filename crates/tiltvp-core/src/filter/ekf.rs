@@ -69,8 +69,8 @@ mod tests {
     #[test]
     fn one_of_two_states_is_measured() {
         let covariance = Matrix2::new(4.0, 1.0, 1.0, 2.0);
-        let seen =
-            Innovation::new(covariance, Matrix1x2::new(1.0, 0.0), SMatrix::from_element(4.0), Vector1::new(2.0)).unwrap();
+        let seen = Innovation::new(covariance, Matrix1x2::new(1.0, 0.0), SMatrix::from_element(4.0), Vector1::new(2.0))
+            .unwrap();
         assert_relative_eq!(seen.nis(), 0.5);
         let (step, after) = seen.correct();
         assert_relative_eq!(step, SVector::from([1.0, 0.25]));
@@ -84,7 +84,8 @@ mod tests {
         assert!(!positive_semidefinite(&Matrix2::new(1.0, 0.5, 0.0, 1.0)));
         assert!(!positive_semidefinite(&Matrix2::new(f64::NAN, 0.0, 0.0, 1.0)));
         assert!(positive_semidefinite(&Matrix2::<f64>::zeros()));
-        let no_noise = Innovation::new(Matrix2::zeros(), Matrix2::identity(), Matrix2::zeros(), SVector::from([1.0, 0.0]));
+        let no_noise =
+            Innovation::new(Matrix2::zeros(), Matrix2::identity(), Matrix2::zeros(), SVector::from([1.0, 0.0]));
         assert!(no_noise.is_none());
     }
 }

@@ -28,9 +28,9 @@ pub struct TiltFilterState {
     pub scene: Vector2<f64>,
     /// Covariance of the error state, in squared radians.
     pub covariance: Matrix6<f64>,
-    /// The covariance of the last estimate fused, which says how much of `c` the next one shares.
-    pub seen: Option<Matrix2<f64>>,
-    /// Metres driven since.
+    /// The covariance of the best estimate of this place, `C`, of which `c` is a share; `None` before the first.
+    pub common: Option<Matrix2<f64>>,
+    /// Metres driven since the last estimate fused.
     pub driven_m: f64,
     /// The last estimate rejected by the gate, with its covariance, if nothing has been fused since.
     pub pending: Option<(Vector3<f64>, Matrix2<f64>)>,
@@ -51,9 +51,15 @@ pub struct TiltFilterState {
 /// threshold, a ramp) are left to the gate.
 ///
 /// **Measurement.** An estimate is `n` with an error of covariance `R` (and the noise floor). Images of one place err alike:
-/// a share `s` of `R` is the error `c` of the scene, a state, and only `1 - s` is new in each image. The scene turns with the
-/// floor, for walls out of plumb do, and is forgotten over the metres driven: `cov(c, c') = s exp(-driven / correlation)
-/// min(R, R')`. A robot that stands still therefore never knows its tilt better than by `s R`.
+/// the error `c` of the scene is a state, of which only so much is new in an image as the robot has driven on. Its covariance
+/// is `s C`, a share of that of the best image of the place: with `rho = exp(-driven / correlation)` and `K = min(C, R)`
+///
+/// ```text
+/// cov(c', c) = s rho K,   C' = rho^2 K + (1 - rho^2) R,   n measured = n + c' + noise of covariance R - s C'
+/// ```
+///
+/// The scene turns with the floor, for walls out of plumb do. A robot that stands still therefore never knows its tilt
+/// better than by the share `s` of its best image's covariance, however many images it takes.
 ///
 /// **Gate.** An estimate whose normalised innovation squared is beyond the chi-square gate is left out. If `jump_after` of
 /// them in a row agree with each other, the floor has changed: its tilt is forgotten, that of the mounting is not. If
@@ -151,7 +157,7 @@ impl TiltFilter {
         }
         state.floor = turned;
         state.scene = plane_turn * state.scene;
-        state.seen = state.seen.map(|seen| symmetric(&(plane_turn * seen * plane_turn.transpose())));
+        state.common = state.common.map(|common| symmetric(&(plane_turn * common * plane_turn.transpose())));
         state.driven_m += distance_m;
         let wheels = model::robot_from_wheels(&state.mounting);
         state.pending = state.pending.map(|(normal, covariance)| {
@@ -256,7 +262,7 @@ impl TiltFilter {
         let carry = tangent_transport(&measured.normal, &predicted);
         let noise = symmetric(&(carry * measured.covariance * carry.transpose()));
 
-        let (keep, fresh) = self.scene_motion(&noise);
+        let (keep, fresh, common) = self.scene_motion(&noise);
         let mut transition = Matrix6::identity();
         transition.fixed_view_mut::<2, 2>(SCENE, SCENE).copy_from(&keep);
         let mut covariance = transition * covariance * transition.transpose();
@@ -264,7 +270,7 @@ impl TiltFilter {
         let scene = keep * state.scene;
 
         let innovation = tangent_log(&predicted, &measured.normal) - scene;
-        let own = noise * (1.0 - self.options.correlated_share);
+        let own = noise - common * self.options.correlated_share;
         let Some(seen) = Innovation::new(symmetric(&covariance), self.jacobian(true), own, innovation) else {
             return (f64::INFINITY, None);
         };
@@ -279,7 +285,7 @@ impl TiltFilter {
             mounting,
             scene: scene + step.fixed_rows::<2>(SCENE),
             covariance: symmetric(&(moved * after * moved.transpose())),
-            seen: Some(noise),
+            common: Some(common),
             driven_m: 0.0,
             pending: None,
             agreeing: 0,
@@ -288,17 +294,18 @@ impl TiltFilter {
         (seen.nis(), Some(after))
     }
 
-    /// How much of the scene's error is kept from the last estimate fused to one of covariance `R'`, and the covariance of
-    /// what is new: `A = rho K R^-1` and `s (R' - rho^2 K R^-1 K)` with the common part `K = min(R, R')`.
-    fn scene_motion(&self, noise: &Matrix2<f64>) -> (Matrix2<f64>, Matrix2<f64>) {
+    /// What becomes of the scene's error before an estimate of covariance `R` is fused: the factor `A = rho K C^-1` of what
+    /// is kept, the covariance `s (C' - A C A^T)` of what is new, and `C'`.
+    fn scene_motion(&self, noise: &Matrix2<f64>) -> (Matrix2<f64>, Matrix2<f64>, Matrix2<f64>) {
         let share = self.options.correlated_share;
         let rho = (-self.state.driven_m / self.options.correlation_m).exp();
-        let kept = self.state.seen.and_then(|seen| {
-            let common = model::common_part(&seen, noise)?;
-            let keep = common * seen.try_inverse()? * rho;
-            Some((keep, symmetric(&(noise - keep * seen * keep.transpose())) * share))
+        let kept = self.state.common.and_then(|before| {
+            let shared = model::common_part(&before, noise)?;
+            let keep = shared * before.try_inverse()? * rho;
+            let common = symmetric(&(shared * (rho * rho) + noise * (1.0 - rho * rho)));
+            Some((keep, symmetric(&(common - keep * before * keep.transpose())) * share, common))
         });
-        kept.unwrap_or((Matrix2::zeros(), noise * share))
+        kept.unwrap_or((Matrix2::zeros(), noise * share, *noise))
     }
 
     /// The Jacobian of the ground normal by the error state, with or without the scene's error on top.
@@ -345,7 +352,7 @@ impl TiltFilterState {
             mounting: Vector3::z(),
             scene: Vector2::zeros(),
             covariance,
-            seen: None,
+            common: None,
             driven_m: 0.0,
             pending: None,
             agreeing: 0,
@@ -374,8 +381,8 @@ impl TiltFilterState {
                 Err(no_covariance(name, matrix))
             }
         };
-        if let Some(seen) = &self.seen {
-            spread("seen", seen)?;
+        if let Some(common) = &self.common {
+            spread("common", common)?;
         }
         if let Some((normal, covariance)) = &self.pending {
             unit("pending", normal)?;

@@ -31,17 +31,8 @@ pub(super) fn jacobians(floor: &Vector3<f64>, mounting: &Vector3<f64>) -> (Matri
     let q = m.dot(&f);
     let plane = Matrix2::identity() * (floor.z - a * q) - m * f.transpose() * a;
     let by_z = m * (q * a * a);
-    let derivative = Matrix3::new(
-        plane[(0, 0)],
-        plane[(0, 1)],
-        by_z.x,
-        plane[(1, 0)],
-        plane[(1, 1)],
-        by_z.y,
-        -f.x,
-        -f.y,
-        floor.z,
-    );
+    let derivative =
+        Matrix3::new(plane[(0, 0)], plane[(0, 1)], by_z.x, plane[(1, 0)], plane[(1, 1)], by_z.y, -f.x, -f.y, floor.z);
     (by_floor, at_normal * derivative * tangent_basis(mounting))
 }
 
