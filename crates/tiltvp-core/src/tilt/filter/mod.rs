@@ -171,9 +171,14 @@ impl TiltFilter {
 
     /// Fuses the tilt of an image, unless it has none, trusts itself too little, or is outside the gate; says what it did.
     pub fn update(&mut self, estimate: &TiltEstimate) -> Verdict {
-        match estimate.tilt {
-            Some(tilt) if positive_semidefinite(&estimate.covariance_rad2) => {
-                self.fuse(tilt.normal(), &estimate.covariance_rad2, estimate.confidence)
+        self.update_tilt(estimate.tilt, &estimate.covariance_rad2, estimate.confidence)
+    }
+
+    /// [`update`](Self::update) by what it looks at: the tilt, its covariance and its confidence.
+    pub fn update_tilt(&mut self, tilt: Option<Tilt>, covariance_rad2: &Matrix2<f64>, confidence: f64) -> Verdict {
+        match tilt {
+            Some(tilt) if positive_semidefinite(covariance_rad2) => {
+                self.fuse(tilt.normal(), covariance_rad2, confidence)
             }
             _ => Verdict::NoTilt,
         }
