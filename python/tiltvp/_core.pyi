@@ -533,8 +533,8 @@ class TiltFilter:
     lost_after
         After how many rejections in a row, agreeing or not, the floor's tilt is taken to be unknown (10).
     correlated_share, correlation_m
-        Share of an estimate's variance that the next image of the same place has in common with it (0.8), and the metres
-        after which that has fallen to 1/e (2).
+        Share of an estimate's variance that the next image of the same place has in common with it (0.9), and the
+        metres after which that has fallen to 1/e (2).
     noise_floor_rad
         Standard deviation that is added to that of every estimate (0.002).
     prior_rad
@@ -542,8 +542,8 @@ class TiltFilter:
     sigma_max_rad
         Largest standard deviation of an answer; beyond, the filter abstains (0.02).
     estimate_mounting, mounting_prior_rad, mounting_walk_rad_per_sqrt_m
-        Whether a lean of the robot itself is estimated beside that of the floor, its standard deviation before anything is
-        known (1.5 degrees), and how fast it changes (0.0002). Turning tells the two apart.
+        Whether a lean of the robot itself is estimated beside that of the floor, its standard deviation before anything
+        is known (1.5 degrees), and how fast it changes (0.0002). Turning tells the two apart.
 
     Raises `tiltvp.errors.InvalidInputError` for values out of their domain.
     """
@@ -596,8 +596,8 @@ class TiltFilter:
     def update(self, estimate: TiltEstimate | tuple[ArrayLike, ArrayLike], /) -> FilterStep:
         """Fuses an estimate, or says why not.
 
-        In its place a pair may stand: a ground normal (3,) of any length, and its covariance (2, 2) in squared radians in
-        the tangent plane. Its confidence is the probability of an error below two degrees under that covariance.
+        In its place a pair may stand: a ground normal (3,) of any length, and its covariance (2, 2) in squared radians
+        in the tangent plane. Its confidence is the probability of an error below two degrees under that covariance.
         """
 
     def step(

@@ -29,15 +29,18 @@ class Motion:
 def read_odometry(path: str | os.PathLike[str], files: Sequence[Path]) -> list[Motion]:
     """The motion that led to each of `files`, in their order, from a CSV of increments.
 
-    Columns: `yaw_rad` or `yaw_deg`, `distance_m`, at least one of the two kinds; and `file`, the images' names or paths, in
-    any order. Without `file` there is one row for each image, in their order. Raises `InvalidInputError` that names the
-    file and the line for columns and images that are not known, images without a row, and numbers that are none.
+    Columns: `yaw_rad` or `yaw_deg`, `distance_m`, at least one of the two kinds; and `file`, the images' names or
+    paths, in any order. Without `file` there is one row for each image, in their order. Raises `InvalidInputError` that
+    names the file and the line for columns and images that are not known, images without a row, and numbers that are
+    none.
     """
     name = os.fspath(path)
     try:
         text = Path(path).read_text(encoding="utf-8-sig")
     except OSError as error:
-        raise InvalidInputError(f"{name}: cannot be read ({error.strerror or error}), expected odometry as CSV") from error
+        raise InvalidInputError(
+            f"{name}: cannot be read ({error.strerror or error}), expected odometry as CSV"
+        ) from error
     except UnicodeDecodeError as error:
         raise InvalidInputError(f"{name}: not UTF-8, expected odometry as CSV") from error
     lines = csv.reader(text.splitlines())
@@ -102,5 +105,7 @@ def _by_file(name: str, motions: Sequence[tuple[int, dict[str, str], Motion]], f
         found[known[0]] = motion
     missing = [str(file) for i, file in enumerate(files) if i not in found]
     if missing:
-        raise InvalidInputError(f"{name}: no row for {missing[0]} ({len(missing)} missing), expected one for each image")
+        raise InvalidInputError(
+            f"{name}: no row for {missing[0]} ({len(missing)} missing), expected one for each image"
+        )
     return [found[i] for i in range(len(files))]

@@ -95,8 +95,8 @@ def level(
 ) -> NDArray[Any]:
     """The image as the untilted camera would have seen it, same shape and dtype; black where nothing was seen.
 
-    `tilt` is an estimate, a filter's or an image's, or (alpha_rad, beta_rad). Raises `InvalidInputError` if the image has another size than the
-    camera's or the estimate has no tilt.
+    `tilt` is an estimate, a filter's or an image's, or (alpha_rad, beta_rad). Raises
+    `InvalidInputError` if the image has another size than the camera's or the estimate has no tilt.
     """
     array = np.asarray(image)
     if array.ndim not in (2, 3) or array.shape[:2] != (camera.height, camera.width):

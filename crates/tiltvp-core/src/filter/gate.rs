@@ -51,7 +51,7 @@ const ANGLES: u32 = 64;
 ///
 /// with the eigenvalues `l1`, `l2` of `C`. 0 for a covariance that is infinite or no covariance.
 pub fn probability_within(covariance: &Matrix2<f64>, radius: f64) -> f64 {
-    if !covariance.iter().all(|x| x.is_finite()) || !(radius > 0.0) {
+    if !covariance.iter().all(|x| x.is_finite()) || radius.is_nan() || radius <= 0.0 {
         return 0.0;
     }
     let values = SymmetricEigen::new(0.5 * (covariance + covariance.transpose())).eigenvalues;

@@ -227,7 +227,7 @@ impl TiltFilter {
 
     fn fuse(&mut self, normal: Vector3<f64>, covariance_rad2: &Matrix2<f64>, confidence: f64) -> Verdict {
         let options = self.options;
-        if !(confidence >= options.confidence_min) {
+        if confidence.is_nan() || confidence < options.confidence_min {
             return Verdict::LowConfidence { confidence, limit: options.confidence_min };
         }
         let floor = Matrix2::identity() * (options.noise_floor_rad * options.noise_floor_rad);
@@ -394,7 +394,7 @@ impl TiltFilterState {
             spread("pending", covariance)?;
         }
         // Infinity is what a sum of very long ways comes to.
-        if !(self.driven_m >= 0.0) {
+        if self.driven_m.is_nan() || self.driven_m < 0.0 {
             return Err(Error::argument("driven_m", self.driven_m, "a number of metres"));
         }
         Ok(())

@@ -34,7 +34,7 @@ pub struct TiltFilterOptions {
     pub jump_after: u32,
     /// After how many rejections in a row, agreeing or not, the floor's tilt is taken to be unknown. Default 10.
     pub lost_after: u32,
-    /// Share of an estimate's variance that the next image of the same place has in common with it. Default 0.8.
+    /// Share of an estimate's variance that the next image of the same place has in common with it. Default 0.9.
     pub correlated_share: f64,
     /// Metres driven after which what images have in common has fallen to 1/e. Default 2.
     pub correlation_m: f64,
@@ -58,7 +58,7 @@ impl Default for TiltFilterOptions {
             confidence_min: 0.5,
             jump_after: 3,
             lost_after: 10,
-            correlated_share: 0.8,
+            correlated_share: 0.9,
             correlation_m: 2.0,
             noise_floor_rad: 0.002,
             prior_rad: 10f64.to_radians(),
