@@ -3,6 +3,7 @@
 mod direction;
 mod estimate;
 mod filter;
+mod filtered;
 mod options;
 mod report;
 
@@ -18,7 +19,8 @@ use tiltvp_core::tilt::{self as core, Scratch};
 
 pub(crate) use self::direction::{CommonDirection, common_direction};
 pub(crate) use self::estimate::{EdgeElements, TiltEstimate};
-pub(crate) use self::filter::{FilterStep, FilteredTilt, TiltFilter};
+pub(crate) use self::filter::TiltFilter;
+pub(crate) use self::filtered::{FilterStep, FilteredTilt};
 pub(crate) use self::report::FitReport;
 use crate::call::{call, exception, invalid};
 use crate::camera::Camera;
