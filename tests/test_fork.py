@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 
 import tiltvp
+from tiltvp.synth import Room
 
 pytestmark = [
     pytest.mark.skipif(not hasattr(os, "fork"), reason="this system cannot fork"),
@@ -57,6 +58,14 @@ def test_fork_after_a_batch(camera: tiltvp.Camera, images: list[np.ndarray]) -> 
     assert in_a_child(lambda: estimator.estimate_many(images, threads=2) == expected)
     assert in_a_child(lambda: estimator.estimate_many(images, threads=1) == expected)
     assert estimator.estimate_many(images, threads=4) == expected
+
+
+def test_fork_after_a_room(camera: tiltvp.Camera) -> None:
+    room = Room("narrow", 1)
+    pose = room.free_poses(1, 0)[0]
+    expected = room.render(camera, pose=pose, samples=1).gray
+    assert in_a_child(lambda: np.array_equal(room.render(camera, pose=pose, samples=1).gray, expected))
+    assert in_a_child(lambda: Room("narrow", 1) == room)
 
 
 def test_a_pool_of_forked_workers(camera: tiltvp.Camera, images: list[np.ndarray]) -> None:

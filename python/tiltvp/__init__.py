@@ -22,6 +22,7 @@ from tiltvp.tilt import (
     level,
     normal_from_alpha_beta,
     tilt_error_rad,
+    tilt_from_wheel_heights,
 )
 
 __version__ = "0.1.0"
@@ -43,5 +44,6 @@ __all__ = [
     "normal_from_alpha_beta",
     "read_image",
     "tilt_error_rad",
+    "tilt_from_wheel_heights",
     "write_image",
 ]

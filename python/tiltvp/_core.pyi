@@ -20,6 +20,8 @@ __all__ = [
     "FilterStep",
     "FilteredTilt",
     "FitReport",
+    "PixelRays",
+    "Room",
     "TiltEstimate",
     "TiltEstimator",
     "TiltFilter",
@@ -27,8 +29,8 @@ __all__ = [
     "leaning_from_upright",
     "level_map",
     "normal_from_alpha_beta",
-    "render_room",
     "tilt_error_rad",
+    "tilt_from_wheel_heights",
 ]
 
 _Method: TypeAlias = Literal["refined", "image-space-ransac", "image-space-reject-refit", "vector-consensus"]
@@ -44,7 +46,7 @@ CAMERA_MODELS: Final[list[str]]
 """The names of the models of `Camera`."""
 
 ROOM_KINDS: Final[list[str]]
-"""The kinds of rooms that `render_room` builds."""
+"""The kinds of `Room`."""
 
 @disjoint_base
 class Camera:
@@ -118,6 +120,12 @@ class Camera:
 
     def mirrored(self) -> Self:
         """The same camera with `mirror` turned over."""
+
+    def scaled(self, factor: float) -> Self:
+        """The camera of the image resized by `factor`: what was at u is at factor (u + 1/2) - 1/2.
+
+        The size is rounded to whole pixels. Raises `tiltvp.errors.InvalidInputError` for a factor that is not positive.
+        """
 
     def conformance(self) -> dict[str, float]:
         """Round trips and errors of the analytic Jacobians, measured from the axis to the rim.
@@ -700,18 +708,107 @@ def normal_from_alpha_beta(alpha_rad: float, beta_rad: float) -> NDArray[np.floa
 def tilt_error_rad(a: ArrayLike, b: ArrayLike) -> float:
     """The angle in [0, pi] radians between two ground normals (3,), of any length but zero (eq. 44)."""
 
-def render_room(
-    camera: Camera,
-    *,
-    kind: str,
-    seed: int,
-    alpha_rad: float,
-    beta_rad: float,
-    robot_from_camera: ArrayLike | None = None,
-    noise_sigma: float = 2.0,
-    samples: int | None = None,
-) -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:
-    """Grey (H, W) and RGB (H, W, 3) images of a seeded room of one of `ROOM_KINDS`, seen by a leaning robot.
+def tilt_from_wheel_heights(
+    *, left_m: float, right_m: float, caster_m: float, half_track_m: float, caster_behind_m: float
+) -> tuple[float, float]:
+    """(alpha_rad, beta_rad) of a robot whose wheels stand at these heights above a common level (eqs. 42 and 43).
 
-    `noise_sigma` is in grey levels, `samples` the rays per pixel and side (None: 3).
+    The main wheels are at (0, +-half_track_m) in the robot's frame, the caster at (-caster_behind_m, 0): r_w and r_c of
+    fig. 20. With h_r = right - left and h_c = caster - left the ground normal is
+    (-(2 h_c - h_r) / (2 r_c), -h_r / (2 r_w), cos alpha). Raises `tiltvp.errors.InvalidInputError` for lengths that are
+    not positive, heights that are not finite, and heights that no robot of this layout can stand at.
     """
+
+@final
+class PixelRays:
+    """`samples` x `samples` rays in each pixel of a camera that sees anything, made once, to be met with panoramas."""
+
+    def __new__(cls, camera: Camera, *, samples: SupportsIndex) -> Self:
+        """Makes the rays, at the centres of equal parts of the pixels; `samples` is from 1 to 16."""
+
+    @property
+    def samples(self) -> int:
+        """Rays per pixel and side."""
+
+    @property
+    def pixels(self) -> NDArray[np.uint32]:
+        """(N,): places in row order, v width + u, of the pixels in which some ray is seen."""
+
+    def panorama_map(self, rotation: ArrayLike, *, width: SupportsIndex, height: SupportsIndex) -> NDArray[np.float32]:
+        """(2, samples^2, N): columns and rows of an equirectangular panorama of that size that the rays meet.
+
+        `rotation` (3, 3) takes bearings of the camera to the panorama's: x right, y down, z towards longitude 0. Rays
+        that the lens does not see are at -1e6, far outside.
+        """
+
+@disjoint_base
+class Room:
+    """A furnished, lit room of one of `ROOM_KINDS`, built once. `tiltvp.synth.Room` renders it.
+
+    The world frame has z up and the floor at z = 0; metres. Frozen, comparable, hashable, and to be pickled.
+    """
+
+    def __new__(cls, kind: str, seed: SupportsIndex, *, threads: SupportsIndex | None = None) -> Self:
+        """Builds and lights the room on `threads` threads (None: one per core), on which it does not depend."""
+
+    @property
+    def kind(self) -> str:
+        """Which of `ROOM_KINDS` it is."""
+
+    @property
+    def seed(self) -> int:
+        """The seed of everything in it."""
+
+    @property
+    def height_m(self) -> float:
+        """Height of the ceiling, metres."""
+
+    @property
+    def floor_outline_m(self) -> NDArray[np.float64]:
+        """(N, 2): the corners of the floor, counter-clockwise, metres."""
+
+    @property
+    def vertical_edges_m(self) -> NDArray[np.float64]:
+        """(N, 2, 3): lower and upper ends of the vertical edges of walls and furniture, visible or not, metres."""
+
+    def is_free(self, x_m: float, y_m: float) -> bool:
+        """Whether a round robot of 0.22 m radius and less than 0.4 m height can stand with its centre there."""
+
+    def free_poses(self, count: SupportsIndex, seed: SupportsIndex) -> NDArray[np.float64]:
+        """(count, 3): x_m, y_m, yaw_rad of poses at which the robot stands free, drawn by `seed`.
+
+        Raises `tiltvp.errors.InvalidInputError` if the room is too full.
+        """
+
+    def _render(
+        self,
+        camera: Camera,
+        *,
+        pose: ArrayLike,
+        alpha_rad: float,
+        beta_rad: float,
+        robot_from_camera: ArrayLike | None,
+        camera_height_m: float | None,
+        noise_sigma: float,
+        samples: SupportsIndex | None,
+        seed: SupportsIndex,
+        threads: SupportsIndex | None,
+    ) -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:
+        """Grey (H, W) and RGB (H, W, 3) images of the room."""
+
+    def _render_panorama(
+        self,
+        *,
+        pose: ArrayLike,
+        camera_height_m: float | None,
+        height: SupportsIndex,
+        noise_sigma: float,
+        samples: SupportsIndex | None,
+        seed: SupportsIndex,
+        threads: SupportsIndex | None,
+    ) -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:
+        """Grey (height, 2 height) and RGB (height, 2 height, 3) images of everything around a place."""
+
+    def __getnewargs__(self) -> tuple[str, int]: ...
+    def __eq__(self, other: object, /) -> bool: ...
+    def __hash__(self) -> int: ...

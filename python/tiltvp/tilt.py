@@ -20,6 +20,7 @@ from tiltvp._core import (
     common_direction,
     normal_from_alpha_beta,
     tilt_error_rad,
+    tilt_from_wheel_heights,
 )
 from tiltvp.errors import InvalidInputError
 from tiltvp.images import gray_from
@@ -42,6 +43,7 @@ __all__ = [
     "level",
     "normal_from_alpha_beta",
     "tilt_error_rad",
+    "tilt_from_wheel_heights",
 ]
 
 

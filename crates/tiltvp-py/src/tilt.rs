@@ -13,7 +13,7 @@ use nalgebra::Matrix3;
 use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray2, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyTuple};
-use tiltvp_core::geometry::Tilt;
+use tiltvp_core::geometry::{Tilt, WheelLayout};
 use tiltvp_core::image::ImageView;
 use tiltvp_core::tilt::{self as core, Scratch};
 
@@ -220,6 +220,21 @@ pub(crate) fn normal_from_alpha_beta(
         return Err(invalid(format!("alpha_rad, beta_rad = {alpha_rad}, {beta_rad}, expected finite angles")));
     }
     Ok(PyArray1::from_slice(py, Tilt::from_alpha_beta(alpha_rad, beta_rad).normal().as_slice()))
+}
+
+/// `(alpha_rad, beta_rad)` of a robot whose wheels stand at these heights, eqs. 42 and 43.
+#[pyfunction]
+#[pyo3(signature = (*, left_m, right_m, caster_m, half_track_m, caster_behind_m))]
+pub(crate) fn tilt_from_wheel_heights(
+    left_m: f64,
+    right_m: f64,
+    caster_m: f64,
+    half_track_m: f64,
+    caster_behind_m: f64,
+) -> PyResult<(f64, f64)> {
+    let layout = WheelLayout { half_track_m, caster_behind_m };
+    let tilt = layout.tilt(left_m, right_m, caster_m).map_err(|error| exception(&error))?;
+    Ok((tilt.alpha_rad(), tilt.beta_rad()))
 }
 
 /// `(3, 3)` rotation from the upright robot's frame to the leaning one's, without a turn about the vertical.
