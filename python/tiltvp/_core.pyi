@@ -18,6 +18,8 @@ __all__ = [
     "Camera",
     "CommonDirection",
     "EdgeElements",
+    "FilterStep",
+    "FilteredTilt",
     "FitReport",
     "ImageEdges",
     "PixelRays",
@@ -26,6 +28,7 @@ __all__ = [
     "Room",
     "TiltEstimate",
     "TiltEstimator",
+    "TiltFilter",
     "apply_correction",
     "common_direction",
     "leaning_from_upright",
@@ -39,6 +42,7 @@ __all__ = [
 ]
 
 _Method: TypeAlias = Literal["refined", "image-space-ransac", "image-space-reject-refit", "vector-consensus"]
+_Verdict: TypeAlias = Literal["accepted", "jumped", "no-tilt", "low-confidence", "outside-gate", "lost"]
 _Stop: TypeAlias = Literal[
     "confident", "trial-limit", "converged", "settled", "iteration-limit", "too-few", "no-model", "out-of-reach"
 ]
@@ -568,6 +572,211 @@ class TiltEstimator:
 
     def __eq__(self, other: object, /) -> bool: ...
     def __hash__(self) -> int: ...
+
+@final
+class FilteredTilt:
+    """A tilt as a filter holds it to be. Frozen, comparable, hashable, pickled. False where the filter abstains.
+
+    The filter abstains where `sigma_rad` exceeds `sigma_max_rad`: angles and normal are NaN then, while covariance and
+    confidence still say how little is known.
+    """
+
+    @property
+    def alpha_rad(self) -> float:
+        """How far the robot leans, in [0, pi] radians (eq. 1)."""
+
+    @property
+    def beta_rad(self) -> float:
+        """In which direction it leans, in (-pi, pi] radians: 0 is forward, +pi/2 to the left (eq. 1)."""
+
+    @property
+    def roll_rad(self) -> float:
+        """Roll about the robot's x in radians, right side down positive (`Rz Ry Rx`, ROS REP 103)."""
+
+    @property
+    def pitch_rad(self) -> float:
+        """Pitch about the robot's y in radians, nose down positive (`Rz Ry Rx`, ROS REP 103)."""
+
+    @property
+    def normal(self) -> NDArray[np.float64]:
+        """(3,): the unit ground normal (eq. 1)."""
+
+    @property
+    def covariance_rad2(self) -> NDArray[np.float64]:
+        """(2, 2) in squared radians: covariance of the normal in its tangent plane, as that of a `TiltEstimate`."""
+
+    @property
+    def confidence(self) -> float:
+        """Probability, in [0, 1], that the error is below two degrees if it is normal with that covariance."""
+
+    @property
+    def sigma_rad(self) -> float:
+        """One standard deviation in any one direction: the root of half the covariance's trace."""
+
+    @property
+    def sigma_max_rad(self) -> float:
+        """The largest standard deviation of an answer: the filter's option."""
+
+    @property
+    def reason(self) -> str:
+        """The standard deviation beside its limit, in a sentence."""
+
+    def to_dict(self) -> dict[str, Any]:
+        """The attributes by name; arrays as nested lists."""
+
+    @classmethod
+    def from_dict(cls, values: dict[str, Any]) -> Self:
+        """The value of a dict as `to_dict` makes it."""
+
+    def __bool__(self) -> bool: ...
+    def __eq__(self, other: object, /) -> bool: ...
+    def __hash__(self) -> int: ...
+    def __copy__(self) -> Self: ...
+    def __deepcopy__(self, _memo: object) -> Self: ...
+
+@final
+class FilterStep:
+    """What a filter did with an estimate, and why. Frozen, comparable, hashable, pickled. True if it was fused."""
+
+    @property
+    def accepted(self) -> bool:
+        """Whether the estimate was fused."""
+
+    @property
+    def verdict(self) -> _Verdict:
+        """What was done, in a word.
+
+        Fused: "accepted", or "jumped", if so many rejected estimates agreed that the floor's tilt was forgotten. Left
+        out: "no-tilt", "low-confidence", "outside-gate", or "lost", if so many were rejected that the floor's tilt is
+        taken to be unknown.
+        """
+
+    @property
+    def reason(self) -> str:
+        """The same in a sentence, with the measured number and the limit."""
+
+    @property
+    def nis(self) -> float | None:
+        """The normalised innovation squared, of two degrees of freedom; None if it did not come to that."""
+
+    def to_dict(self) -> dict[str, Any]:
+        """The attributes by name."""
+
+    @classmethod
+    def from_dict(cls, values: dict[str, Any]) -> Self:
+        """The value of a dict as `to_dict` makes it."""
+
+    def __bool__(self) -> bool: ...
+    def __eq__(self, other: object, /) -> bool: ...
+    def __hash__(self) -> int: ...
+    def __copy__(self) -> Self: ...
+    def __deepcopy__(self, _memo: object) -> Self: ...
+
+@final
+class TiltFilter:
+    """Fuses the tilts of successive images: a Kalman filter of the ground normal on the sphere.
+
+    The floor's tilt turns with the robot's heading and walks slowly; errors that images of one place share are not
+    averaged away; estimates that say nothing or do not fit are left out, steps are followed. Changes as it goes; may be
+    pickled, copied and compared, state included, and used from several threads. See docs/tilt.md for the model.
+
+    Parameters
+    ----------
+    walk_rad_per_sqrt_m, walk_rad_per_sqrt_step
+        How fast the floor's tilt changes: per square root of a metre driven (default 0.01), and of a call of `predict`
+        (0.001).
+    gate_probability
+        Probability with which the gate lets an estimate pass whose covariance is right (0.999).
+    confidence_min
+        Least confidence of an estimate that is looked at (0.5).
+    jump_after
+        How many rejected estimates in a row have to agree with each other to be followed (3).
+    lost_after
+        After how many rejections in a row, agreeing or not, the floor's tilt is taken to be unknown (10).
+    correlated_share, correlation_m
+        Share of an estimate's variance that the next image of the same place has in common with it (0.9), and the
+        metres after which that has fallen to 1/e (2).
+    noise_floor_rad
+        Standard deviation that is added to that of every estimate (0.002).
+    prior_rad
+        Standard deviation of the floor's tilt before anything is known (10 degrees).
+    sigma_max_rad
+        Largest standard deviation of an answer; beyond, the filter abstains (0.02).
+    estimate_mounting, mounting_prior_rad, mounting_walk_rad_per_sqrt_m
+        Whether a lean of the robot itself is estimated beside that of the floor, its standard deviation before anything
+        is known (1.5 degrees), and how fast it changes (0.0002). Turning tells the two apart.
+
+    Raises `tiltvp.errors.InvalidInputError` for values out of their domain.
+    """
+
+    def __new__(
+        cls,
+        *,
+        walk_rad_per_sqrt_m: float | None = None,
+        walk_rad_per_sqrt_step: float | None = None,
+        gate_probability: float | None = None,
+        confidence_min: float | None = None,
+        jump_after: int | None = None,
+        lost_after: int | None = None,
+        correlated_share: float | None = None,
+        correlation_m: float | None = None,
+        noise_floor_rad: float | None = None,
+        prior_rad: float | None = None,
+        sigma_max_rad: float | None = None,
+        estimate_mounting: bool = False,
+        mounting_prior_rad: float | None = None,
+        mounting_walk_rad_per_sqrt_m: float | None = None,
+    ) -> Self: ...
+    @property
+    def options(self) -> dict[str, Any]:
+        """The options in force, by name, defaults included; a fresh dict, good as keywords."""
+
+    @property
+    def estimate(self) -> FilteredTilt:
+        """The ground normal in the robot's frame, as the filter holds it to be now."""
+
+    @property
+    def floor(self) -> FilteredTilt:
+        """The floor's part of it alone, in the frame of the wheels."""
+
+    @property
+    def mounting(self) -> FilteredTilt | None:
+        """The robot's own part alone, what it would see on level ground; None unless `estimate_mounting`."""
+
+    @property
+    def nis_limit(self) -> float:
+        """The largest normalised innovation squared that passes the gate."""
+
+    @property
+    def rejected(self) -> int:
+        """How many estimates in a row the gate has rejected: above 0, the estimate may be about to jump."""
+
+    def predict(self, yaw_rad: float | None = None, distance_m: float | None = None) -> None:
+        """The robot has turned (left positive) and driven (either way) since the last call; None: it has not."""
+
+    def update(self, estimate: TiltEstimate | tuple[ArrayLike, ArrayLike], /) -> FilterStep:
+        """Fuses an estimate, or says why not.
+
+        In its place a pair may stand: a ground normal (3,) of any length, and its covariance (2, 2) in squared radians
+        in the tangent plane. Its confidence is the probability of an error below two degrees under that covariance.
+        """
+
+    def step(
+        self,
+        estimate: TiltEstimate | tuple[ArrayLike, ArrayLike],
+        /,
+        yaw_rad: float | None = None,
+        distance_m: float | None = None,
+    ) -> FilterStep:
+        """`predict`, then `update`; where either is refused, the filter is as before."""
+
+    def reset(self) -> None:
+        """Forgets everything but the options."""
+
+    def __setstate__(self, state: dict[str, Any], /) -> None: ...
+    def __eq__(self, other: object, /) -> bool: ...
+    def __copy__(self) -> Self: ...
+    def __deepcopy__(self, _memo: object) -> Self: ...
 
 @final
 class CommonDirection:

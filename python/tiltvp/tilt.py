@@ -1,4 +1,4 @@
-"""The tilt of single images: the estimator over images of any usual kind, and levelling."""
+"""The tilt of single and of successive images: the estimator over images of any usual kind, the filter, levelling."""
 
 from __future__ import annotations
 
@@ -12,9 +12,12 @@ from tiltvp import _core
 from tiltvp._core import (
     CommonDirection,
     EdgeElements,
+    FilteredTilt,
+    FilterStep,
     FitReport,
     ImageEdges,
     TiltEstimate,
+    TiltFilter,
     common_direction,
     normal_from_alpha_beta,
     tilt_error_rad,
@@ -31,10 +34,13 @@ if TYPE_CHECKING:
 __all__ = [
     "CommonDirection",
     "EdgeElements",
+    "FilterStep",
+    "FilteredTilt",
     "FitReport",
     "ImageEdges",
     "TiltEstimate",
     "TiltEstimator",
+    "TiltFilter",
     "common_direction",
     "level",
     "normal_from_alpha_beta",
@@ -102,13 +108,13 @@ class TiltEstimator(_core.TiltEstimator):
 def level(
     image: NDArray[Any],
     camera: Camera,
-    tilt: TiltEstimate | tuple[float, float],
+    tilt: TiltEstimate | FilteredTilt | tuple[float, float],
     robot_from_camera: ArrayLike | None = None,
 ) -> NDArray[Any]:
     """The image as the untilted camera would have seen it, same shape and dtype; black where nothing was seen.
 
-    `tilt` is an estimate or (alpha_rad, beta_rad). Raises `InvalidInputError` if the image has another size than the
-    camera's or the estimate has no tilt.
+    `tilt` is an estimate, a filter's or an image's, or (alpha_rad, beta_rad). Raises
+    `InvalidInputError` if the image has another size than the camera's or the estimate has no tilt.
     """
     array = np.asarray(image)
     if array.ndim not in (2, 3) or array.shape[:2] != (camera.height, camera.width):
@@ -117,7 +123,7 @@ def level(
     if array.dtype not in _LEVELLED or (array.ndim == 3 and not 1 <= array.shape[2] <= 4):
         kinds = ", ".join(_LEVELLED)
         raise InvalidInputError(f"image: dtype {array.dtype}, shape {array.shape}, expected {kinds} of 1 to 4 channels")
-    if isinstance(tilt, TiltEstimate):
+    if isinstance(tilt, TiltEstimate | FilteredTilt):
         if not tilt:
             raise InvalidInputError(f"tilt: an estimate without a tilt ({tilt.reason}), expected one with a tilt")
         normal = tilt.normal

@@ -3,6 +3,8 @@
 mod correction;
 mod direction;
 mod estimate;
+mod filter;
+mod filtered;
 mod image_edges;
 mod options;
 mod report;
@@ -23,6 +25,8 @@ pub(crate) use self::correction::{
 };
 pub(crate) use self::direction::{CommonDirection, common_direction};
 pub(crate) use self::estimate::{EdgeElements, TiltEstimate};
+pub(crate) use self::filter::TiltFilter;
+pub(crate) use self::filtered::{FilterStep, FilteredTilt};
 pub(crate) use self::image_edges::ImageEdges;
 pub(crate) use self::report::FitReport;
 use crate::call::{call, exception, invalid};

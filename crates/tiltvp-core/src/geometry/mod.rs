@@ -4,6 +4,6 @@ mod bearing;
 mod tilt;
 mod wheels;
 
-pub use bearing::{angle_between, tangent_basis};
+pub use bearing::{angle_between, tangent_basis, tangent_exp, tangent_log, tangent_transport};
 pub use tilt::Tilt;
 pub use wheels::WheelLayout;

@@ -1,10 +1,11 @@
-//! The tilt of one image, from the vanishing point of its vertical edges (paper 000).
+//! The tilt of one image, from the vanishing point of its vertical edges (paper 000), and of successive images fused.
 
 mod common_direction;
 mod confidence;
 mod correction;
 mod estimate;
 mod estimator;
+mod filter;
 mod fit;
 mod image_edges;
 mod image_space;
@@ -23,6 +24,7 @@ pub use common_direction::{CommonDirection, CommonDirectionOptions, common_direc
 pub use correction::Correction;
 pub use estimate::{EdgeElement, TiltEstimate};
 pub use estimator::TiltEstimator;
+pub use filter::{FilteredTilt, MountingOptions, TiltFilter, TiltFilterOptions, TiltFilterState, Verdict};
 pub use image_edges::{EdgeOrigin, ImageEdges};
 pub use level::level_map;
 pub use options::{METHODS, Method, TiltOptions};

@@ -71,6 +71,13 @@ impl From<core::TiltEstimate> for TiltEstimate {
     }
 }
 
+impl TiltEstimate {
+    /// The part of it that a filter looks at.
+    pub(super) fn measurement(&self) -> (Option<Tilt>, Matrix2<f64>, f64) {
+        (self.tilt, self.covariance, self.confidence)
+    }
+}
+
 #[pymethods]
 impl TiltEstimate {
     /// How far the robot leans, in [0, pi] radians; NaN without a tilt.
