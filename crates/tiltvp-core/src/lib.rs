@@ -6,6 +6,7 @@
 //! 2. [`camera`], [`image`], [`robust`], [`filter`]
 //! 3. [`edges`]
 //! 4. [`tilt`]
+//! 5. [`selfcalib`]
 //!
 //! Angles are radians, lengths metres, pixel centres integers, rays unit bearings. The camera frame has `z` along the
 //! optical axis, `x` to the right (columns) and `y` down (rows); the robot frame has `x` forward, `y` left, `z` up.
@@ -17,6 +18,7 @@ pub mod filter;
 pub mod geometry;
 pub mod image;
 pub mod robust;
+pub mod selfcalib;
 #[cfg(feature = "testing")]
 pub mod testing;
 pub mod tilt;

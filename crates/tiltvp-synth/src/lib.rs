@@ -9,6 +9,7 @@
 
 mod builder;
 mod dice;
+mod drive;
 mod furniture;
 mod light;
 mod noise;
@@ -25,6 +26,7 @@ mod tone;
 mod view;
 mod world;
 
+pub use drive::{Drive, DriveKind, DriveOptions};
 pub use options::{RoomKind, RoomOptions};
 pub use render::{Rendering, Truth, render, render_panorama};
 pub use segment::Segment;

@@ -1,0 +1,85 @@
+//! The bearing of a landmark that is known by its direction and distance from a fixed point, with derivatives.
+
+use nalgebra::{Vector2, Vector3};
+
+/// A landmark: `point = anchor + exp(-closeness) (cos direction, sin direction)`.
+///
+/// The anchor is a number, not an unknown: the place at which the camera was thought to be when it first saw the landmark.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Landmark {
+    pub(super) anchor: Vector2<f64>,
+    pub(super) direction: f64,
+    /// The logarithm of the inverse distance, so that no landmark is behind the camera.
+    pub(super) closeness: f64,
+}
+
+/// A predicted bearing and its derivatives by everything it depends on.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Prediction {
+    pub(super) bearing: f64,
+    /// By the robot's (x, y, heading).
+    pub(super) by_pose: Vector3<f64>,
+    /// By the mounting's (x, y, yaw).
+    pub(super) by_mounting: Vector3<f64>,
+    /// By the landmark's direction and closeness.
+    pub(super) by_landmark: Vector2<f64>,
+}
+
+/// What the camera at `mounting` on a robot at `pose` sees, eq. 16 with the landmark in homogeneous coordinates:
+///
+/// ```text
+/// w = exp(closeness) (anchor - camera) + (cos direction, sin direction),   bearing = atan2(w) - heading - yaw
+/// ```
+pub(super) fn predict(pose: &Vector3<f64>, mounting: &Vector3<f64>, landmark: &Landmark) -> Prediction {
+    let (sin, cos) = pose.z.sin_cos();
+    let arm = Vector2::new(cos * mounting.x - sin * mounting.y, sin * mounting.x + cos * mounting.y);
+    let from_camera = landmark.anchor - pose.xy() - arm;
+    let (us, uc) = landmark.direction.sin_cos();
+    let q = landmark.closeness.exp();
+    let w = from_camera * q + Vector2::new(uc, us);
+    let scale = 1.0 / w.norm_squared();
+    let n = Vector2::new(-w.y, w.x) * scale;
+    let by_arm = n * -q;
+    Prediction {
+        bearing: w.y.atan2(w.x) - pose.z - mounting.z,
+        by_pose: Vector3::new(by_arm.x, by_arm.y, by_arm.y * arm.x - by_arm.x * arm.y - 1.0),
+        by_mounting: Vector3::new(cos * by_arm.x + sin * by_arm.y, cos * by_arm.y - sin * by_arm.x, -1.0),
+        by_landmark: Vector2::new((w.x * uc + w.y * us) * scale, q * n.dot(&from_camera)),
+    }
+}
+
+/// Where the camera is.
+pub(super) fn camera(pose: &Vector3<f64>, mounting: &Vector3<f64>) -> Vector2<f64> {
+    let (sin, cos) = pose.z.sin_cos();
+    pose.xy() + Vector2::new(cos * mounting.x - sin * mounting.y, sin * mounting.x + cos * mounting.y)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::wrap_angle;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn derivatives_are_those_of_central_differences(
+            pose in prop::array::uniform3(-1.0..1.0f64), mounting in prop::array::uniform3(-1.0..1.0f64),
+            anchor in prop::array::uniform2(-1.0..1.0f64), direction in -4.0..4.0f64, closeness in -4.0..-1.4f64,
+        ) {
+            let x: Vec<f64> = pose.into_iter().chain(mounting).chain([direction, closeness]).collect();
+            let at = |x: &[f64]| predict(
+                &Vector3::new(x[0], x[1], x[2]), &Vector3::new(x[3], x[4], x[5]),
+                &Landmark { anchor: anchor.into(), direction: x[6], closeness: x[7] },
+            );
+            let p = at(&x);
+            let given: Vec<f64> = p.by_pose.iter().chain(&p.by_mounting).chain(&p.by_landmark).copied().collect();
+            for i in 0..8 {
+                let (mut more, mut less) = (x.clone(), x.clone());
+                more[i] += 1e-6;
+                less[i] -= 1e-6;
+                let difference = wrap_angle(at(&more).bearing - at(&less).bearing) / 2e-6;
+                prop_assert!((difference - given[i]).abs() < 1e-7, "{i}: {difference} {}", given[i]);
+            }
+        }
+    }
+}

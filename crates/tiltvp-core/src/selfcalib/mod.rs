@@ -1,0 +1,25 @@
+//! Where a camera sits on a robot, from odometry and bearings of landmarks, found while the robot drives.
+//!
+//! The problem is that of section 7 of [Scaramuzza, Siegwart and Martinelli 2009]; equation numbers are those of the paper.
+//!
+//! [Scaramuzza, Siegwart and Martinelli 2009]: https://doi.org/10.1177/0278364908099858
+
+mod alarm;
+mod bound;
+mod calibrator;
+mod graph;
+mod measurement;
+mod mounting;
+mod observability;
+mod odometry;
+mod options;
+mod paper;
+mod recursive;
+
+pub use self::bound::cramer_rao_bound;
+pub use self::calibrator::{CalibrationStep, MountingEstimate, SelfCalibrator};
+pub use self::mounting::Mounting;
+pub use self::observability::{FeatureRange, Observability, PureMotion, observable_dimension};
+pub use self::odometry::{Leg, WheelMotion, Wheels};
+pub use self::options::{CALIBRATION_METHODS, CalibrationMethod, SelfCalibratorOptions};
+pub use self::paper::{Feature, dynamics, dynamics_jacobians, observation, observation_jacobians};
