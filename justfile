@@ -53,6 +53,10 @@ measure-inertial *arguments: setup
 measure-cameras: setup
     {{bin}}/pytest --quiet --capture=no tests/real_data/test_camera_conformance.py
 
+# Self-calibration on 1,000 simulated drives of each trajectory, and on the real logs in the folder odometry of TILTVP_DATA.
+measure-calibration *arguments: setup
+    {{bin}}/tiltvp measure calibration "$TILTVP_DATA/odometry" {{arguments}}
+
 # Each method's time as a ratio to OpenCV's pair of Scharr derivatives, in one process on one thread.
 measure-time *arguments: setup
     {{bin}}/python benches/peers/scharr.py {{arguments}}

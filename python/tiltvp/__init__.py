@@ -18,6 +18,15 @@ from tiltvp.corrections import (
 )
 from tiltvp.images import read_image, write_image
 from tiltvp.plots.overlay import draw_edges
+from tiltvp.selfcalib import (
+    CALIBRATION_METHODS,
+    CalibrationStep,
+    LogCalibration,
+    MountingEstimate,
+    SelfCalibrator,
+    calibrate,
+    wheel_displacements,
+)
 from tiltvp.tilt import (
     CommonDirection,
     EdgeElements,
@@ -38,8 +47,10 @@ from tiltvp.tilt import (
 __version__ = "0.1.0"
 
 __all__ = [
+    "CALIBRATION_METHODS",
     "METHODS",
     "AffineCorrection",
+    "CalibrationStep",
     "Camera",
     "CommonDirection",
     "EdgeElements",
@@ -47,12 +58,16 @@ __all__ = [
     "FilteredTilt",
     "FitReport",
     "ImageEdges",
+    "LogCalibration",
+    "MountingEstimate",
     "PosteriorCorrection",
     "PriorOfTilt",
+    "SelfCalibrator",
     "TiltEstimate",
     "TiltEstimator",
     "TiltFilter",
     "apply_correction",
+    "calibrate",
     "common_direction",
     "draw_edges",
     "level",
@@ -63,5 +78,6 @@ __all__ = [
     "train_affine",
     "train_factor",
     "train_posterior",
+    "wheel_displacements",
     "write_image",
 ]

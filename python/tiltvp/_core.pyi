@@ -11,10 +11,12 @@ from numpy.typing import ArrayLike, NDArray
 from typing_extensions import disjoint_base
 
 __all__ = [
+    "CALIBRATION_METHODS",
     "CAMERA_MODELS",
     "METHODS",
     "ROOM_KINDS",
     "AffineCorrection",
+    "CalibrationStep",
     "Camera",
     "CommonDirection",
     "EdgeElements",
@@ -22,23 +24,31 @@ __all__ = [
     "FilteredTilt",
     "FitReport",
     "ImageEdges",
+    "LogCalibration",
+    "MountingEstimate",
     "PixelRays",
     "PosteriorCorrection",
     "PriorOfTilt",
     "Room",
+    "SelfCalibrator",
+    "SimulatedDrive",
     "TiltEstimate",
     "TiltEstimator",
     "TiltFilter",
     "apply_correction",
+    "calibrate",
     "common_direction",
+    "consistency_band",
     "leaning_from_upright",
     "level_map",
     "normal_from_alpha_beta",
+    "simulate_drive",
     "tilt_error_rad",
     "tilt_from_wheel_heights",
     "train_affine",
     "train_factor",
     "train_posterior",
+    "wheel_displacements",
 ]
 
 _Method: TypeAlias = Literal["refined", "image-space-ransac", "image-space-reject-refit", "vector-consensus"]
@@ -47,6 +57,7 @@ _Stop: TypeAlias = Literal[
     "confident", "trial-limit", "converged", "settled", "iteration-limit", "too-few", "no-model", "out-of-reach"
 ]
 
+CALIBRATION_METHODS: Final[list[str]]
 METHODS: Final[list[str]]
 """The names of the methods of `TiltEstimator`, the default first."""
 
@@ -994,3 +1005,321 @@ class Room:
     def __getnewargs__(self) -> tuple[str, int]: ...
     def __eq__(self, other: object, /) -> bool: ...
     def __hash__(self) -> int: ...
+
+@final
+class CalibrationStep:
+    """What a step of a `SelfCalibrator` did."""
+
+    @property
+    def nis(self) -> float:
+        """Normalised innovation squared of the bearings that were fused: chi-square of `used` degrees of freedom."""
+
+    @property
+    def used(self) -> int:
+        """Bearings of known landmarks that were fused."""
+
+    @property
+    def rejected(self) -> int:
+        """Bearings of known landmarks that did not pass the gate."""
+
+    @property
+    def started(self) -> int:
+        """Landmarks seen for the first time."""
+
+    def __eq__(self, other: object, /) -> bool: ...
+    def __ne__(self, other: object, /) -> bool: ...
+
+@final
+class MountingEstimate:
+    """Where a camera sits on a robot, with how sure that is. True if it can be relied upon."""
+
+    @property
+    def x_m(self) -> float:
+        """How far the camera is in front of the middle of the wheel axle, metres."""
+
+    @property
+    def y_m(self) -> float:
+        """How far it is to the left of it, metres."""
+
+    @property
+    def yaw_rad(self) -> float:
+        """How far its x axis is turned to the left against the robot's, phi + psi, in (-pi, pi] radians."""
+
+    @property
+    def phi_rad(self) -> float:
+        """The paper's phi, the direction in which the camera is, in (-pi, pi] radians; means nothing where rho is near 0."""
+
+    @property
+    def rho_m(self) -> float:
+        """The paper's rho, the distance of the camera from the middle of the axle, metres."""
+
+    @property
+    def psi_rad(self) -> float:
+        """The paper's psi = yaw - phi, in (-pi, pi] radians; means nothing where rho is near 0."""
+
+    @property
+    def covariance_xy_yaw(self) -> NDArray[np.float64]:
+        """Fresh (3, 3) float64: covariance of (x, y, yaw)."""
+
+    @property
+    def covariance_phi_rho_psi(self) -> NDArray[np.float64]:
+        """Fresh (3, 3) float64: covariance of (phi, rho, psi); infinite where rho is 0."""
+
+    @property
+    def determined(self) -> list[str]:
+        """Which of "phi", "rho", "psi", "yaw" the motion so far has determined, without what was believed at the start.
+
+        Angles to 0.05 rad (phi and psi at a rho beyond three of its standard deviations only), rho to 0.02 m or 5 %.
+        """
+
+    @property
+    def sigma_of_drive(self) -> NDArray[np.float64]:
+        """Fresh (3,) float64: standard deviations of (phi, rho, psi) by the drive alone, without what was believed."""
+
+    @property
+    def advice(self) -> str:
+        """What motion would determine what is not determined yet."""
+
+    @property
+    def rho_near_zero(self) -> bool:
+        """Whether rho is not significantly above zero, where phi and psi mean nothing: use x, y and yaw."""
+
+    @property
+    def mean_nis(self) -> float:
+        """Mean normalised innovation squared of a bearing over the last steps: 1 if all is as assumed."""
+
+    @property
+    def alarm(self) -> bool:
+        """Whether bearings ever disagreed with the mounting over a window of steps, as after a bump."""
+
+    @property
+    def reason(self) -> str:
+        """What is determined, what motion would help, and whether there was an alarm, in a sentence."""
+
+    def to_dict(self) -> dict[str, Any]:
+        """The attributes by name; arrays as nested lists."""
+
+    def __bool__(self) -> bool: ...
+    def __eq__(self, other: object, /) -> bool: ...
+    def __ne__(self, other: object, /) -> bool: ...
+
+@final
+class SelfCalibrator:
+    """Estimates where a camera sits on a robot, step by step while it drives past landmarks. Changes as it goes.
+
+    Parameters
+    ----------
+    wheel_base_m
+        Distance between the wheels.
+    bearing_sigma_rad
+        Standard deviation of a bearing (0.5 degrees).
+    odometry_k_m
+        Variance of a wheel's displacement for each metre of it, metres (1e-5; eq. 31 of Scaramuzza 2009).
+    start, start_sigma
+        (x_m, y_m, yaw_rad) of the mounting as it is thought to be, and standard deviations (3,) or covariance (3, 3)
+        of them (0.3 m, 0.3 m, 0.5 rad).
+    method
+        "default", which does not diverge, or "paper", the filter of the paper exactly.
+    start_distance_m
+        Distance at which landmarks are thought to be (3).
+    start_distance_log_sigma, gate_probability, memory
+        Of "default": standard deviation of the logarithm of that distance (1.5), probability with which a bearing passes
+        the gate (0.9999), and poses that are kept to be linearised anew (400).
+    start_distance_sigma_m, odometry_inflation
+        Of "paper": standard deviation of that distance (2), and the factor by which the noise is inflated (5).
+
+    Raises `tiltvp.errors.InvalidInputError` for options out of their domain or of the other method.
+    """
+
+    def __new__(
+        cls,
+        *,
+        wheel_base_m: float,
+        bearing_sigma_rad: float | None = None,
+        odometry_k_m: float | None = None,
+        start: ArrayLike | None = None,
+        start_sigma: ArrayLike | None = None,
+        method: str = "default",
+        start_distance_m: float | None = None,
+        start_distance_log_sigma: float | None = None,
+        start_distance_sigma_m: float | None = None,
+        gate_probability: float | None = None,
+        memory: SupportsIndex | None = None,
+        odometry_inflation: float | None = None,
+    ) -> Self:
+        """Makes a filter that has seen nothing."""
+
+    @property
+    def options(self) -> dict[str, Any]:
+        """The options in force that the method reads, by name, defaults included; a fresh dict, good as keywords."""
+
+    def step(
+        self, delta_left_m: float, delta_right_m: float, landmark_ids: ArrayLike, bearings_rad: ArrayLike
+    ) -> CalibrationStep:
+        """Moves by the wheels' displacements, then looks: bearings (N,) of the landmarks of those whole numbers (N,).
+
+        Bearings are in the camera's frame, counter-clockwise; of those taken while the robot stands only the first of
+        each landmark counts. Raises `tiltvp.errors.InvalidInputError` for numbers that make no sense; the filter is
+        then as before.
+        """
+
+    def follow(self, odometry: ArrayLike, bearings: ArrayLike) -> list[MountingEstimate]:
+        """Steps through a whole log, (N, 2) left and right, (M, 3) step, landmark, bearing: the estimate after each step."""
+
+    @property
+    def estimate(self) -> MountingEstimate:
+        """The mounting as it is believed to be now."""
+
+    @property
+    def landmarks(self) -> int:
+        """Landmarks that are being followed."""
+
+    def reset(self) -> None:
+        """Forgets everything but the options."""
+
+    def __copy__(self) -> Self: ...
+    def __deepcopy__(self, _memo: object) -> Self: ...
+
+@final
+class LogCalibration:
+    """The mounting, and what else was estimated, from a whole log. True if it can be relied upon."""
+
+    @property
+    def mounting(self) -> MountingEstimate:
+        """The mounting; covariances are scaled by the residuals where these are larger than assumed."""
+
+    @property
+    def wheel_base_m(self) -> float:
+        """Distance between the wheels, metres, as given or as estimated."""
+
+    @property
+    def wheel_base_sigma_m(self) -> float:
+        """Standard deviation of it; 0 where it was not estimated."""
+
+    @property
+    def right_over_left(self) -> float:
+        """How much farther the right wheel goes than the left when both report the same: a ratio, 1 where not estimated."""
+
+    @property
+    def right_over_left_sigma(self) -> float:
+        """Standard deviation of it; 0 where it was not estimated."""
+
+    @property
+    def time_offset_s(self) -> float:
+        """By how much bearings are later than the odometry, seconds; 0 where it was not estimated."""
+
+    @property
+    def time_offset_sigma_s(self) -> float:
+        """Standard deviation of it; 0 where it was not estimated."""
+
+    @property
+    def bearings(self) -> int:
+        """Bearings that were used; of those taken at a standstill only the first."""
+
+    @property
+    def outliers(self) -> int:
+        """Bearings farther off than 4.5 standard deviations, which count for nothing."""
+
+    @property
+    def residual_rms(self) -> float:
+        """Root of the mean squared residual of the others, in standard deviations of a bearing."""
+
+    @property
+    def iterations(self) -> int:
+        """Linearisations."""
+
+    @property
+    def converged(self) -> bool:
+        """Whether the descent came to rest."""
+
+    def to_dict(self) -> dict[str, Any]:
+        """The attributes by name, those of the mounting among them; arrays as nested lists."""
+
+    def __bool__(self) -> bool: ...
+    def __eq__(self, other: object, /) -> bool: ...
+    def __ne__(self, other: object, /) -> bool: ...
+
+def calibrate(
+    odometry: ArrayLike,
+    bearings: ArrayLike,
+    *,
+    wheel_base_m: float,
+    bearing_sigma_rad: float | None = None,
+    odometry_k_m: float | None = None,
+    start: ArrayLike | None = None,
+    start_sigma: ArrayLike | None = None,
+    start_distance_m: float | None = None,
+    start_distance_log_sigma: float | None = None,
+    estimate_odometry: bool = False,
+    estimate_time_offset: bool = False,
+    times_s: ArrayLike | None = None,
+    max_iterations: int | None = None,
+) -> LogCalibration:
+    """The mounting from a whole log at once, by robust sparse least squares.
+
+    `odometry` (N, 2) are the displacements of the left and the right wheel, `bearings` (M, 3) rows of step (a row of the
+    odometry, after whose motion it was taken), landmark, bearing. Options as those of `SelfCalibrator`.
+
+    Parameters
+    ----------
+    estimate_odometry
+        Also the wheel base, and which wheel runs farther. Bearings have no scale: the mean displacement of both wheels
+        stays as reported.
+    estimate_time_offset, times_s
+        Also by how much the bearings are later than the odometry; (N,) times of the steps.
+    max_iterations
+        Most linearisations of each of the two descents (60).
+
+    Raises `tiltvp.errors.InvalidInputError` for numbers that make no sense and logs that determine nothing.
+    """
+
+def wheel_displacements(
+    distance_m: ArrayLike, heading_change_rad: ArrayLike, *, wheel_base_m: float
+) -> NDArray[np.float64]:
+    """(N, 2) displacements (left, right) of wheels that drive distances (N,) and turn (N,) to the left (eq. 15)."""
+
+def consistency_band(probability: float, dof: int, samples: int) -> tuple[float, float]:
+    """(low, high): where the mean of `samples` chi-square values of `dof` degrees of freedom falls with that probability.
+
+    The mean NEES of so many runs of a consistent filter falls there.
+    """
+
+@final
+class SimulatedDrive:
+    """A simulated drive past vertical lines, and the truth behind it."""
+
+    @property
+    def odometry(self) -> NDArray[np.float64]:
+        """Fresh (N, 2) float64: displacements of the left and the right wheel in each step, metres."""
+
+    @property
+    def bearings(self) -> NDArray[np.float64]:
+        """Fresh (M, 3) float64: step, landmark and bearing in radians of every bearing."""
+
+    @property
+    def poses(self) -> NDArray[np.float64]:
+        """Fresh (N, 3) float64: the true pose (x_m, y_m, heading_rad) after each step, from (0, 0, 0)."""
+
+    @property
+    def landmarks_m(self) -> NDArray[np.float64]:
+        """Fresh (L, 2) float64: where the lines are, metres."""
+
+    def cramer_rao_bound(self, *, start_sigma: ArrayLike) -> NDArray[np.float64]:
+        """(3, 3): the smallest covariance of (x, y, yaw) that an unbiased estimator can have on this drive."""
+
+def simulate_drive(
+    kind: str = "paper",
+    *,
+    seed: int = 0,
+    mounting: ArrayLike | None = None,
+    landmarks: int | None = None,
+    bearing_sigma_rad: float | None = None,
+    odometry_k_m: float | None = None,
+    wheel_base_m: float | None = None,
+    outliers: float | None = None,
+) -> SimulatedDrive:
+    """A drive past 10 vertical lines: "paper" (2.3 m straight on, half a turn), "alternating" or "straight".
+
+    `mounting` is (x_m, y_m, yaw_rad), None: the paper's phi = -0.34, rho = 0.23, psi = 0.33. The noise is that of the
+    defaults of `SelfCalibrator`, wheels are 0.4 m apart, `outliers` is the share of bearings that are of nothing.
+    """

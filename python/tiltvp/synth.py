@@ -1,4 +1,4 @@
-"""Seeded rooms with known truth, ray-cast through any camera: data for demos, tests and experiments."""
+"""Seeded rooms and drives with known truth: data for demos, tests and experiments."""
 
 from __future__ import annotations
 
@@ -8,13 +8,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from tiltvp import _core
+from tiltvp._core import SimulatedDrive, simulate_drive
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
     from tiltvp.cameras import Camera
 
-__all__ = ["ROOM_KINDS", "Room", "RoomImage", "render_room"]
+__all__ = ["ROOM_KINDS", "Room", "RoomImage", "SimulatedDrive", "render_room", "simulate_drive"]
 
 ROOM_KINDS: tuple[str, ...] = tuple(_core.ROOM_KINDS)
 

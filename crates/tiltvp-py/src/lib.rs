@@ -4,6 +4,7 @@ mod call;
 mod camera;
 mod convert;
 mod rays;
+mod selfcalib;
 mod synth;
 mod tilt;
 
@@ -19,6 +20,11 @@ mod _core {
     #[pymodule_export]
     use crate::rays::PixelRays;
     #[pymodule_export]
+    use crate::selfcalib::{
+        CalibrationStep, LogCalibration, MountingEstimate, SelfCalibrator, SimulatedDrive, calibrate, consistency_band,
+        simulate_drive, wheel_displacements,
+    };
+    #[pymodule_export]
     use crate::synth::Room;
     #[pymodule_export]
     use crate::tilt::{
@@ -31,6 +37,7 @@ mod _core {
     #[pymodule_init]
     fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {
         module.add("METHODS", tiltvp_core::tilt::METHODS.to_vec())?;
+        module.add("CALIBRATION_METHODS", tiltvp_core::selfcalib::CALIBRATION_METHODS.to_vec())?;
         module.add("CAMERA_MODELS", tiltvp_core::camera::Model::names().collect::<Vec<_>>())?;
         module.add("ROOM_KINDS", tiltvp_synth::RoomKind::ALL.map(tiltvp_synth::RoomKind::name).to_vec())
     }

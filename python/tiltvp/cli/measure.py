@@ -1,4 +1,4 @@
-"""`tiltvp measure`: the numbers of the methods on panoramas with known tilt."""
+"""`tiltvp measure`: the numbers of the methods on panoramas with known tilt, and of the self-calibration."""
 
 from __future__ import annotations
 
@@ -74,6 +74,40 @@ def inertial(directory: Path, /, *, samples: int = 2) -> None:
     with progress_bar(len(chosen), "panoramas") as bar:
         table = estimate_leaning(chosen, paper_camera(), samples=samples, advance=bar.advance)
     _show("Refined lean minus sensor, degrees, constant offset removed", summarise_inertial(table), "panoramas")
+
+
+@app.command
+def calibration(odometry: Path | None = None, /, *, runs: int = 1000, out: Path | None = None) -> None:
+    """Self-calibration on simulated drives, both filters, against the Cramer-Rao bound; and on real logs.
+
+    Parameters
+    ----------
+    odometry
+        Folder with victoria_park, brenner_lego and censi_khepera; without it only the simulated drives.
+    runs
+        Simulated drives of each trajectory.
+    out
+        Also write the table of all simulated runs as Parquet.
+    """
+    import polars as pl
+
+    from tiltvp.evaluation.calibration import real_logs, simulated_drives, summarise_drives
+    from tiltvp.selfcalib import consistency_band
+
+    parts, summaries = [], []
+    with progress_bar(4 * runs, "drives") as bar:
+        for kind in ("paper", "alternating"):
+            for method in ("default", "paper"):
+                table = simulated_drives(kind, method, runs, advance=bar.advance)
+                parts.append(table.with_columns(trajectory=pl.lit(kind), method=pl.lit(method)))
+                summaries.append({"trajectory": kind, "method": method, **summarise_drives(table)})
+    if out is not None:
+        pl.concat(parts).write_parquet(out)
+    low, high = consistency_band(0.95, 3, runs)
+    _show(f"Simulated drives; NEES of a consistent filter: {low:.3f} to {high:.3f}", pl.DataFrame(summaries), "method")
+    if odometry is not None:
+        with progress_bar(6, "logs") as bar:
+            _show("Real logs: error against the nominal mounting", real_logs(odometry, advance=bar.advance), "log")
 
 
 def _show(title: str, table: pl.DataFrame, words: str) -> None:

@@ -2,7 +2,7 @@
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn, Matrix3, Matrix3x2, Vector3};
 
-use super::measurement::{Landmark, predict};
+use super::measurement::{Landmark, predict, seen_at};
 use super::odometry::{Leg, WheelMotion, Wheels, between, compose, compose_jacobians};
 use crate::geometry::wrap_angle;
 
@@ -240,6 +240,47 @@ impl Graph {
         all
     }
 
+    /// The root of the mean squared whitened residual of the bearings.
+    pub(super) fn residual_rms(&self) -> f64 {
+        let all = self.residuals();
+        (all.iter().map(|r| r * r).sum::<f64>() / all.len().max(1) as f64).sqrt()
+    }
+
+    /// The largest whitened residual of a bearing.
+    pub(super) fn farthest(&self) -> f64 {
+        self.residuals().iter().fold(0.0, |far, r| r.abs().max(far))
+    }
+
+    /// Puts every landmark from `first` on that has a whitened residual of `limit` or more at the distance that its bearings
+    /// agree with best, in the direction of the first of them.
+    pub(super) fn place_landmarks(&mut self, first: usize, limit: f64) {
+        let mut seen: Vec<Vec<(Vector3<f64>, f64)>> = vec![Vec::new(); self.landmarks.len()];
+        for node in &self.nodes {
+            for sight in &node.sights {
+                seen[sight.landmark].push((node.pose, sight.bearing));
+            }
+        }
+        for (i, seen) in seen.iter().enumerate().skip(first) {
+            let off = |landmark: &Landmark| {
+                let one = |(pose, bearing): &(Vector3<f64>, f64)| {
+                    wrap_angle(predict(pose, &self.mounting, landmark).bearing - bearing).abs() / self.bearing_sigma
+                };
+                seen.iter().map(one).fold((0.0, 0.0f64), |(sum, far), r| (sum + r, far.max(r)))
+            };
+            let now = self.landmarks[i];
+            let Some((pose, bearing)) = seen.first().filter(|_| off(&now).1 >= limit) else { continue };
+            let prior = self.prior_mean[self.free.width() + 2 * i + 1];
+            let best = (-8..=8)
+                .filter_map(|k| seen_at(now.anchor, prior + 0.4 * f64::from(k), pose, &self.mounting, *bearing))
+                .min_by(|a, b| off(a).0.total_cmp(&off(b).0));
+            if let Some(mut best) = best {
+                // The same direction, in the turn of the circle in which it was.
+                best.direction = now.direction + wrap_angle(best.direction - now.direction);
+                self.landmarks[i] = best;
+            }
+        }
+    }
+
     /// The normal equations up to node `last`, damped by `damping` times their diagonal, all poses before it eliminated,
     /// and it too unless `keep`. `None` where they are singular.
     pub(super) fn eliminate(&self, last: usize, keep: bool, damping: f64) -> Option<Eliminated> {
@@ -395,7 +436,12 @@ impl Graph {
     fn moved(&self, damping: f64) -> Option<Self> {
         let last = self.nodes.len() - 1;
         let eliminated = self.eliminate(last, false, damping)?;
-        let step = factor(eliminated.information)?.solve(&eliminated.rhs);
+        let step = factor(eliminated.information.clone())?.solve(&eliminated.rhs);
+        self.moved_by(&eliminated, &step)
+    }
+
+    /// Moves the dense block by a step and the poses after it. `None` where something is not finite.
+    pub(super) fn moved_by(&self, eliminated: &Eliminated, step: &DVector<f64>) -> Option<Self> {
         let mut next = self.clone();
         let mut after = Vector3::zeros();
         for (link, node) in eliminated.links.iter().zip(&mut next.nodes[1..]).rev() {

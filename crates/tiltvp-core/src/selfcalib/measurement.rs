@@ -48,6 +48,23 @@ pub(super) fn predict(pose: &Vector3<f64>, mounting: &Vector3<f64>, landmark: &L
     }
 }
 
+/// The landmark of that closeness to the anchor that is seen at this bearing; `None` if there is none.
+pub(super) fn seen_at(
+    anchor: Vector2<f64>,
+    closeness: f64,
+    pose: &Vector3<f64>,
+    mounting: &Vector3<f64>,
+    bearing: f64,
+) -> Option<Landmark> {
+    let (sin, cos) = (bearing + pose.z + mounting.z).sin_cos();
+    let away = (anchor - camera(pose, mounting)) * closeness.exp();
+    let along = cos * away.x + sin * away.y;
+    let squared = along * along - away.norm_squared() + 1.0;
+    let reach = along + (squared >= 0.0).then(|| squared.sqrt())?;
+    let ray = Vector2::new(cos, sin) * reach - away;
+    (reach > 0.0).then_some(Landmark { anchor, direction: ray.y.atan2(ray.x), closeness })
+}
+
 /// Where the camera is.
 pub(super) fn camera(pose: &Vector3<f64>, mounting: &Vector3<f64>) -> Vector2<f64> {
     let (sin, cos) = pose.z.sin_cos();
@@ -61,6 +78,17 @@ mod tests {
     use proptest::prelude::*;
 
     proptest! {
+        #[test]
+        fn a_landmark_is_seen_where_it_was_put(
+            pose in prop::array::uniform3(-1.0..1.0f64), mounting in prop::array::uniform3(-1.0..1.0f64),
+            closeness in -2.0..0.0f64, bearing in -3.0..3.0f64,
+        ) {
+            let (pose, mounting) = (Vector3::from(pose), Vector3::from(mounting));
+            if let Some(landmark) = seen_at(Vector2::new(0.1, 0.2), closeness, &pose, &mounting, bearing) {
+                prop_assert!(wrap_angle(predict(&pose, &mounting, &landmark).bearing - bearing).abs() < 1e-9);
+            }
+        }
+
         #[test]
         fn derivatives_are_those_of_central_differences(
             pose in prop::array::uniform3(-1.0..1.0f64), mounting in prop::array::uniform3(-1.0..1.0f64),

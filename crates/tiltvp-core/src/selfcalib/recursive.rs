@@ -32,7 +32,7 @@ const MAX_MISSES: u32 = 5;
 
 /// How bearings count in the memory: first those far off linearly, then not at all.
 const FIRST: Loss = Loss::Linear(3.0);
-const THEN: Loss = Loss::Cut(4.5);
+const LIMIT: f64 = 4.5;
 
 /// What a step found.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -337,17 +337,27 @@ impl Recursive {
         let mut next = self.graph.clone();
         next.loss = FIRST;
         next.descend(iterations, 0.01, 0.0);
-        let Loss::Cut(limit) = THEN else { return };
-        if next.residuals().iter().any(|r| r.abs() > limit) {
-            next.loss = THEN;
+        // A landmark may have been caught at a wrong distance, or all of them with a wrong mounting.
+        for limit in [LIMIT, 0.0] {
+            if next.farthest() > LIMIT {
+                let mut other = next.clone();
+                other.place_landmarks(0, limit);
+                let descent = other.descend(2 * iterations, 0.01, 1e-3);
+                if descent.cost < next.cost() {
+                    next = other;
+                }
+            }
+        }
+        if next.farthest() > LIMIT {
+            next.loss = Loss::Cut(LIMIT);
             next.descend(2, 0.01, 0.0);
         }
         self.adopt(next);
     }
 
-    /// Takes a solution of the memory for mean and covariance.
-    fn adopt(&mut self, graph: Graph) {
-        let Some(covariance) = joint_covariance(&graph) else { return };
+    /// Takes a solution of the memory for mean and covariance, unless it has none.
+    fn adopt(&mut self, graph: Graph) -> bool {
+        let Some(covariance) = joint_covariance(&graph) else { return false };
         let dense = graph.dense();
         self.mean = dense.insert_rows(0, 3, 0.0);
         if let Some(node) = graph.nodes.last() {
@@ -356,6 +366,7 @@ impl Recursive {
         self.graph = graph;
         self.covariance = covariance;
         self.solved_sigma = Vector3::from_fn(|i, _| self.covariance[(MOUNTING + i, MOUNTING + i)].sqrt());
+        true
     }
 
     /// Sums up the nodes to `at` in the prior, seen from there, and forgets landmarks that have not been seen since.
@@ -407,9 +418,10 @@ impl Recursive {
                 place.is_some()
             });
         }
-        self.names = kept.iter().map(|slot| self.names[*slot]).collect();
-        self.misses = kept.iter().map(|slot| self.misses[*slot]).collect();
-        self.adopt(next);
+        if self.adopt(next) {
+            self.names = kept.iter().map(|slot| self.names[*slot]).collect();
+            self.misses = kept.iter().map(|slot| self.misses[*slot]).collect();
+        }
     }
 }
 

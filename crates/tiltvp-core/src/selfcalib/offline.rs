@@ -1,0 +1,336 @@
+//! The mounting from a whole log at once: robust sparse least squares, optionally with the wheels and a time offset.
+
+use std::collections::BTreeMap;
+
+use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
+
+use super::calibrator::{MountingEstimate, SelfCalibrator};
+use super::graph::{Descent, Free, Graph, Loss, Node, Sight, factor, information};
+use super::measurement::{Landmark, camera};
+use super::mounting::Mounting;
+use super::odometry::{Leg, WheelMotion, Wheels, compose};
+use super::options::{CalibrationMethod, SelfCalibratorOptions};
+use crate::error::{Error, Result};
+
+/// Poses with bearings after which the log so far is solved, so that new landmarks are placed from poses that are right.
+const STAGE: usize = 100;
+
+/// Poses after which a landmark that is seen again counts as another one: the odometry has drifted by then.
+const GAP: usize = 60;
+
+/// How bearings count: first those far off linearly, then not at all.
+const FIRST: Loss = Loss::Linear(2.0);
+const LIMIT: f64 = 4.5;
+
+/// A bearing of a log.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LogBearing {
+    /// The step after whose motion it was taken: a place in the list of readings.
+    pub step: usize,
+    /// The number that its landmark always has.
+    pub landmark: u64,
+    /// Radians in the camera's frame, counter-clockwise.
+    pub bearing_rad: f64,
+}
+
+/// What else than the mounting is estimated from a log.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LogOptions {
+    /// Start, noise and wheel base; the method is that of the filter that gives the first guess.
+    pub filter: SelfCalibratorOptions,
+    /// Whether the wheel base, and which wheel runs farther, are estimated too. Bearings have no scale: the mean displacement
+    /// of both wheels stays as reported. Default false.
+    pub estimate_odometry: bool,
+    /// Whether the time by which bearings are later than the odometry is estimated; needs times. Default false.
+    pub estimate_time_offset: bool,
+    /// Most linearisations of each of the two descents (robust, then without outliers). Default 60.
+    pub max_iterations: u32,
+}
+
+impl Default for LogOptions {
+    fn default() -> Self {
+        Self {
+            filter: SelfCalibratorOptions::default(),
+            estimate_odometry: false,
+            estimate_time_offset: false,
+            max_iterations: 60,
+        }
+    }
+}
+
+/// The mounting, and what else was estimated, from a whole log.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LogCalibration {
+    /// The mounting. Covariances are scaled by the residuals where these are larger than assumed.
+    pub estimate: MountingEstimate,
+    /// The wheels as they were given, or as estimated.
+    pub wheels: Wheels,
+    /// Standard deviations of the wheels' imbalance and of the wheel base in metres; 0 where not estimated.
+    pub wheels_sigma: [f64; 2],
+    /// By how much bearings are later than the odometry, seconds; 0 where not estimated.
+    pub time_offset_s: f64,
+    /// Standard deviation of it.
+    pub time_offset_sigma_s: f64,
+    /// Bearings that were used, those taken at a standstill but the first left out.
+    pub bearings: usize,
+    /// Bearings farther from their prediction than 4.5 standard deviations, which count for nothing.
+    pub outliers: usize,
+    /// Root of the mean squared residual of the others, in standard deviations of a bearing.
+    pub residual_rms: f64,
+    /// Linearisations.
+    pub iterations: u32,
+    /// Whether the descent came to rest.
+    pub converged: bool,
+}
+
+/// Fall of the cost below which the descent has come to rest.
+const TOLERANCE: f64 = 1e-3;
+
+/// Root mean square of whitened residuals of a solution beside which no other is looked for.
+const GOOD_RMS: f64 = 2.0;
+
+/// Priors on (imbalance, logarithm of the wheel base) and on the time offset in seconds: weak.
+const WHEELS_SIGMA: [f64; 2] = [0.2, 0.2];
+const OFFSET_SIGMA_S: f64 = 1.0;
+
+/// The mounting from a whole log.
+///
+/// # Errors
+/// [`Error::InvalidOption`] for options that make no sense, [`Error::InvalidArgument`] for numbers that are not finite, steps
+/// that do not exist, times that do not grow or are missing, and logs without a landmark that is seen twice.
+pub fn calibrate_log(
+    options: &LogOptions,
+    readings: &[WheelMotion],
+    times_s: Option<&[f64]>,
+    bearings: &[LogBearing],
+) -> Result<LogCalibration> {
+    options.filter.validate()?;
+    check(options, readings, times_s, bearings)?;
+    let mut order: Vec<LogBearing> = bearings.to_vec();
+    order.sort_by_key(|b| b.step);
+    let guesses = [first_guess(options, readings, &order)?, options.filter.start];
+    let mut best: Option<(Graph, Descent)> = None;
+    for guess in guesses {
+        let mut graph = assembled(options, &guess, readings, times_s, &order);
+        let first = graph.descend(options.max_iterations, TOLERANCE, 1e-3);
+        graph.loss = Loss::Cut(LIMIT);
+        let then = graph.descend(options.max_iterations, TOLERANCE, 1e-3);
+        let descent = Descent { iterations: first.iterations + then.iterations, ..then };
+        let good = descent.converged && graph.residual_rms() < GOOD_RMS;
+        if descent.cost.is_finite() && best.as_ref().is_none_or(|(_, best)| descent.cost < best.cost) {
+            best = Some((graph, descent));
+        }
+        if good {
+            break;
+        }
+    }
+    let Some((graph, descent)) = best else {
+        return Err(Error::argument("bearings", "a problem without a solution", "a drive past landmarks"));
+    };
+    report(options, &graph, &descent)
+}
+
+fn check(
+    options: &LogOptions,
+    readings: &[WheelMotion],
+    times_s: Option<&[f64]>,
+    bearings: &[LogBearing],
+) -> Result<()> {
+    for (i, r) in readings.iter().enumerate() {
+        if !(r.left_m.is_finite() && r.right_m.is_finite()) {
+            let got = format!("({}, {}) at step {i}", r.left_m, r.right_m);
+            return Err(Error::argument("odometry", got, "finite numbers of metres"));
+        }
+    }
+    for (i, b) in bearings.iter().enumerate() {
+        if b.step >= readings.len() {
+            let expected = format!("steps below {}, the length of the odometry", readings.len());
+            return Err(Error::argument("bearings", format!("step {} in row {i}", b.step), expected));
+        }
+        if !b.bearing_rad.is_finite() {
+            return Err(Error::argument(
+                "bearings",
+                format!("{} in row {i}", b.bearing_rad),
+                "finite angles in radians",
+            ));
+        }
+    }
+    match times_s {
+        None if options.estimate_time_offset => {
+            Err(Error::argument("times_s", "none", "the time of each step, to estimate a time offset"))
+        }
+        Some(times) if times.len() != readings.len() => {
+            let expected = format!("one for each of {} steps", readings.len());
+            Err(Error::argument("times_s", format!("{} times", times.len()), expected))
+        }
+        Some(times) => match times.windows(2).position(|t| !(t[1] >= t[0] && t[1].is_finite())) {
+            Some(i) => Err(Error::argument("times_s", format!("{} after {}", times[i + 1], times[i]), "growing times")),
+            None => Ok(()),
+        },
+        None => Ok(()),
+    }
+}
+
+/// What the default filter makes of the log.
+fn first_guess(options: &LogOptions, readings: &[WheelMotion], order: &[LogBearing]) -> Result<Mounting> {
+    let mut filter =
+        SelfCalibrator::new(SelfCalibratorOptions { method: CalibrationMethod::Default, ..options.filter })?;
+    let mut next = 0;
+    for (step, reading) in readings.iter().enumerate() {
+        let mut seen: BTreeMap<u64, f64> = BTreeMap::new();
+        while let Some(b) = order.get(next).filter(|b| b.step == step) {
+            seen.entry(b.landmark).or_insert(b.bearing_rad);
+            next += 1;
+        }
+        let (names, angles): (Vec<u64>, Vec<f64>) = seen.into_iter().unzip();
+        filter.step(reading, &names, &angles)?;
+    }
+    let found = filter.estimate().mounting;
+    Ok(if found.vector().iter().all(|x| x.is_finite()) { found } else { options.filter.start })
+}
+
+/// The problem of the whole log, solved roughly as it grows.
+fn assembled(
+    options: &LogOptions,
+    guess: &Mounting,
+    readings: &[WheelMotion],
+    times_s: Option<&[f64]>,
+    order: &[LogBearing],
+) -> Graph {
+    let mut graph = empty(options, guess);
+    let mut slots: BTreeMap<u64, (usize, usize)> = BTreeMap::new();
+    let (mut next, mut solved, mut placed) = (0, 1, 0);
+    for (step, reading) in readings.iter().enumerate() {
+        let seconds = times_s.map_or(0.0, |t| if step == 0 { 0.0 } else { t[step] - t[step - 1] });
+        if graph.nodes.len() >= solved + STAGE && graph.nodes.last().is_some_and(|n| !n.sights.is_empty()) {
+            graph.place_landmarks(placed, 0.0);
+            graph.descend(6, 1.0, 1e-3);
+            (solved, placed) = (graph.nodes.len(), graph.landmarks.len());
+        }
+        advance(&mut graph, reading, seconds);
+        while let Some(b) = order.get(next).filter(|b| b.step == step) {
+            look(&mut graph, &mut slots, b, &options.filter);
+            next += 1;
+        }
+    }
+    while graph.nodes.len() > 1 && graph.nodes.last().is_some_and(|node| node.sights.is_empty()) {
+        graph.nodes.pop();
+    }
+    graph.place_landmarks(placed, 0.0);
+    graph
+}
+
+fn empty(options: &LogOptions, guess: &Mounting) -> Graph {
+    let o = &options.filter;
+    let free = Free { wheels: options.estimate_odometry, offset: options.estimate_time_offset };
+    let width = free.width();
+    let mut prior_mean = DVector::zeros(width);
+    let mut prior_information = DMatrix::zeros(width, width);
+    prior_mean.fixed_rows_mut::<3>(0).copy_from(&o.start.vector());
+    let start = o.start_covariance.try_inverse().unwrap_or_else(Matrix3::zeros);
+    prior_information.fixed_view_mut::<3, 3>(0, 0).copy_from(&start);
+    let mut at = 3;
+    if free.wheels {
+        prior_mean[4] = o.wheel_base_m.ln();
+        for (k, sigma) in WHEELS_SIGMA.iter().enumerate() {
+            prior_information[(3 + k, 3 + k)] = 1.0 / (sigma * sigma);
+        }
+        at = 5;
+    }
+    if free.offset {
+        prior_information[(at, at)] = 1.0 / (OFFSET_SIGMA_S * OFFSET_SIGMA_S);
+    }
+    Graph {
+        mounting: guess.vector(),
+        wheels: Wheels::new(o.wheel_base_m),
+        offset_s: 0.0,
+        free,
+        k_m: o.odometry_k_m,
+        landmarks: Vec::new(),
+        nodes: vec![Node::anchor()],
+        prior_mean,
+        prior_information,
+        bearing_sigma: o.bearing_sigma_rad,
+        loss: FIRST,
+    }
+}
+
+/// Adds a step's motion.
+fn advance(graph: &mut Graph, reading: &WheelMotion, seconds: f64) {
+    if reading.left_m == 0.0 && reading.right_m == 0.0 {
+        return;
+    }
+    let leg = Leg::from_wheels(reading, &graph.wheels, graph.k_m);
+    let velocity = if seconds > 0.0 { leg.motion / seconds } else { Vector3::zeros() };
+    let alone = graph.nodes.len() == 1;
+    let Some(last) = graph.nodes.last_mut() else { return };
+    let pose = compose(&last.pose, &leg.motion);
+    if alone || !last.sights.is_empty() {
+        let information = information(&leg.covariance);
+        graph.nodes.push(Node { pose, leg, information, readings: vec![*reading], velocity, sights: Vec::new() });
+    } else {
+        last.leg = last.leg.then(&leg);
+        last.information = information(&last.leg.covariance);
+        last.readings.push(*reading);
+        last.velocity = velocity;
+        last.pose = pose;
+    }
+}
+
+/// Adds a bearing, with the slot and the last node of each landmark at hand, but for one of a landmark that has been seen from this pose before.
+fn look(
+    graph: &mut Graph,
+    slots: &mut BTreeMap<u64, (usize, usize)>,
+    seen: &LogBearing,
+    options: &SelfCalibratorOptions,
+) {
+    let here = graph.nodes.len() - 1;
+    let node = &graph.nodes[here];
+    let slot = if let Some((slot, last)) = slots.get(&seen.landmark).filter(|(_, last)| here - last <= GAP) {
+        if *last == here {
+            return;
+        }
+        *slot
+    } else {
+        let (pose, mounting) = (node.pose, graph.mounting);
+        let closeness = -options.start_distance_m.ln();
+        let direction = seen.bearing_rad + pose.z + mounting.z;
+        let landmark = Landmark { anchor: camera(&pose, &mounting), direction, closeness };
+        graph.add_landmark(landmark, closeness, options.start_distance_log_sigma)
+    };
+    slots.insert(seen.landmark, (slot, here));
+    graph.nodes[here].sights.push(Sight { landmark: slot, bearing: seen.bearing_rad });
+}
+
+fn report(options: &LogOptions, graph: &Graph, descent: &Descent) -> Result<LogCalibration> {
+    let o = &options.filter;
+    let residuals = graph.residuals();
+    let kept: Vec<f64> = residuals.iter().copied().filter(|r| r.abs() <= LIMIT).collect();
+    let free = kept.len().saturating_sub(graph.width()).max(1) as f64;
+    let sum: f64 = kept.iter().map(|r| r * r).sum();
+    let scale = (sum / free).max(1.0);
+    let nothing =
+        || Error::argument("bearings", "a drive that determines nothing", "landmarks seen from several poses");
+    let eliminated = graph.eliminate(graph.nodes.len() - 1, false, 0.0).ok_or_else(nothing)?;
+    let covariance = factor(eliminated.information).ok_or_else(nothing)?.inverse() * scale;
+    let sigma = |at: usize| covariance[(at, at)].sqrt();
+    let (wheels, offset) = (options.estimate_odometry, options.estimate_time_offset);
+    Ok(LogCalibration {
+        estimate: MountingEstimate::new(
+            Mounting::from_vector(&graph.mounting),
+            covariance.fixed_view::<3, 3>(0, 0).into(),
+            &(o.start_covariance * scale),
+            sum / kept.len().max(1) as f64,
+            false,
+        ),
+        wheels: graph.wheels,
+        wheels_sigma: if wheels { [sigma(3), sigma(4) * graph.wheels.base_m] } else { [0.0; 2] },
+        time_offset_s: graph.offset_s,
+        time_offset_sigma_s: if offset { sigma(if wheels { 5 } else { 3 }) } else { 0.0 },
+        bearings: residuals.len(),
+        outliers: residuals.len() - kept.len(),
+        residual_rms: (sum / kept.len().max(1) as f64).sqrt(),
+        iterations: descent.iterations,
+        converged: descent.converged,
+    })
+}
