@@ -1047,7 +1047,7 @@ class MountingEstimate:
 
     @property
     def phi_rad(self) -> float:
-        """The paper's phi, the direction in which the camera is, in (-pi, pi] radians; means nothing where rho is near 0."""
+        """The paper's phi, the direction of the camera, in (-pi, pi] radians; means nothing where rho is near 0."""
 
     @property
     def rho_m(self) -> float:
@@ -1067,7 +1067,7 @@ class MountingEstimate:
 
     @property
     def determined(self) -> list[str]:
-        """Which of "phi", "rho", "psi", "yaw" the motion so far has determined, without what was believed at the start.
+        """Which of "phi", "rho", "psi", "yaw" the motion so far has determined, beliefs at the start aside.
 
         Angles to 0.05 rad (phi and psi at a rho beyond three of its standard deviations only), rho to 0.02 m or 5 %.
         """
@@ -1085,8 +1085,8 @@ class MountingEstimate:
         """Whether rho is not significantly above zero, where phi and psi mean nothing: use x, y and yaw."""
 
     @property
-    def mean_nis(self) -> float:
-        """Mean normalised innovation squared of a bearing over the last steps: 1 if all is as assumed."""
+    def mean_nis(self) -> float | None:
+        """Mean normalised innovation squared of a bearing over the last steps: 1 if all is as assumed. None before."""
 
     @property
     def alarm(self) -> bool:
@@ -1123,8 +1123,8 @@ class SelfCalibrator:
     start_distance_m
         Distance at which landmarks are thought to be (3).
     start_distance_log_sigma, gate_probability, memory
-        Of "default": standard deviation of the logarithm of that distance (1.5), probability with which a bearing passes
-        the gate (0.9999), and poses that are kept to be linearised anew (400).
+        Of "default": standard deviation of the logarithm of that distance (1.5), probability with which a bearing
+        passes the gate (0.9999), and poses that are kept to be linearised anew (400).
     start_distance_sigma_m, odometry_inflation
         Of "paper": standard deviation of that distance (2), and the factor by which the noise is inflated (5).
 
@@ -1164,7 +1164,7 @@ class SelfCalibrator:
         """
 
     def follow(self, odometry: ArrayLike, bearings: ArrayLike) -> list[MountingEstimate]:
-        """Steps through a whole log, (N, 2) left and right, (M, 3) step, landmark, bearing: the estimate after each step."""
+        """Steps through a log, (N, 2) left and right, (M, 3) step, landmark, bearing: the estimate after each step."""
 
     @property
     def estimate(self) -> MountingEstimate:
@@ -1198,7 +1198,7 @@ class LogCalibration:
 
     @property
     def right_over_left(self) -> float:
-        """How much farther the right wheel goes than the left when both report the same: a ratio, 1 where not estimated."""
+        """The right wheel's way over the left's when both report the same; 1 where it was not estimated."""
 
     @property
     def right_over_left_sigma(self) -> float:
@@ -1257,7 +1257,7 @@ def calibrate(
 ) -> LogCalibration:
     """The mounting from a whole log at once, by robust sparse least squares.
 
-    `odometry` (N, 2) are the displacements of the left and the right wheel, `bearings` (M, 3) rows of step (a row of the
+    `odometry` (N, 2) are the displacements of left and right wheel, `bearings` (M, 3) rows of step (a row of the
     odometry, after whose motion it was taken), landmark, bearing. Options as those of `SelfCalibrator`.
 
     Parameters
@@ -1279,7 +1279,7 @@ def wheel_displacements(
     """(N, 2) displacements (left, right) of wheels that drive distances (N,) and turn (N,) to the left (eq. 15)."""
 
 def consistency_band(probability: float, dof: int, samples: int) -> tuple[float, float]:
-    """(low, high): where the mean of `samples` chi-square values of `dof` degrees of freedom falls with that probability.
+    """(low, high): the mean of `samples` chi-square values of `dof` degrees of freedom is there with that probability.
 
     The mean NEES of so many runs of a consistent filter falls there.
     """

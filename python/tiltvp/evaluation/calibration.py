@@ -31,9 +31,7 @@ _DIVERGED = 10.0
 """Standard deviations of the bound beyond which a run counts as diverged."""
 
 
-def simulated_drives(
-    kind: str, method: str, runs: int, *, advance: Callable[[], None] = lambda: None
-) -> pl.DataFrame:
+def simulated_drives(kind: str, method: str, runs: int, *, advance: Callable[[], None] = lambda: None) -> pl.DataFrame:
     """A row for each run: errors of x, y, yaw, phi, rho, psi, the bound's standard deviations of them, NEES, alarm.
 
     10 lines at unknown distances of 1 to 5 m, bearings of 0.5 degrees, K = 1e-5 m, start errors drawn with standard
@@ -80,13 +78,13 @@ def summarise_drives(table: pl.DataFrame) -> dict[str, float | int]:
     good = table.filter(~pl.col("diverged"))
     ratio = {
         f"rms / bound {n}": math.sqrt(
-            float(np.mean(np.square(good[f"error_{n}"]))) / float(np.mean(np.square(good[f"bound_{n}"])))
+            float(np.mean(np.square(good[f"error_{n}"].to_numpy())) / np.mean(np.square(good[f"bound_{n}"].to_numpy())))
         )
         if good.height
         else math.nan
         for n in ("x", "y", "yaw", "phi", "rho", "psi")
     }
-    nees = float(np.mean(good["nees"])) if good.height else math.nan
+    nees = float(np.mean(good["nees"].to_numpy())) if good.height else math.nan
     silent = good.filter((pl.col("nees") > 16.27) & ~pl.col("alarm")).height
     return {
         "runs": table.height,
@@ -112,7 +110,7 @@ def _wrapped(angle: float) -> float:
 def real_logs(folder: Path, *, advance: Callable[[], None] = lambda: None) -> pl.DataFrame:
     """Victoria Park from two starts, the LEGO robot, and Censi's three mountings, by the filter and from the whole log.
 
-    `folder` holds victoria_park, brenner_lego and censi_khepera. Errors against the nominal mounting, in mm and degrees.
+    `folder` holds victoria_park, brenner_lego and censi_khepera. Errors against the nominal mounting in mm and degrees.
     """
     rows = []
     for name, start, odometry, bearings, truth, options in _logs(folder):
@@ -172,14 +170,11 @@ def _json(path: Path) -> dict[str, Any]:
 
 
 def _censi(folder: Path, name: str) -> _Log:
-    """A log of wheel rates, with bearings of invented landmarks as the sensor's recorded motions would have seen them."""
+    """A log of wheel rates, with bearings of invented landmarks as the sensor's recorded motions have them."""
     answer = _json(folder / f"{name}_results.json")
     steps = [json.loads(line) for line in (folder / f"{name}.tuple").read_text().splitlines() if line.strip()]
     odometry = np.array(
-        [
-            [s["T"] * s["phi_l"] * answer["l_diam"] / 2.0, s["T"] * s["phi_r"] * answer["r_diam"] / 2.0]
-            for s in steps
-        ]
+        [[s["T"] * s["phi_l"] * answer["l_diam"] / 2.0, s["T"] * s["phi_r"] * answer["r_diam"] / 2.0] for s in steps]
     )
     pose, path = np.zeros(3), []
     for s in steps:
@@ -197,7 +192,9 @@ def _censi(folder: Path, name: str) -> _Log:
         rays = places - [x, y]
         seen = np.flatnonzero((np.hypot(*rays.T) < 2.5) & (np.hypot(*rays.T) > 0.3))
         angles = np.arctan2(rays[seen, 1], rays[seen, 0]) - heading + sigma * rng.normal(size=len(seen))
-        rows += [[step, landmark, math.remainder(angle, math.tau)] for landmark, angle in zip(seen, angles, strict=True)]
+        rows += [
+            [step, landmark, math.remainder(angle, math.tau)] for landmark, angle in zip(seen, angles, strict=True)
+        ]
     truth = np.array([answer["l_x"], answer["l_y"], answer["l_theta"]])
     start = (0.0, 0.0, round(answer["l_theta"] / (math.pi / 2)) * math.pi / 2)
     options = {

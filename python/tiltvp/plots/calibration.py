@@ -22,7 +22,7 @@ _ROWS = (
 def convergence(table: pl.DataFrame, truth: dict[str, float] | None = None) -> Figure:
     """phi, rho and psi over the steps, in a band of two standard deviations, beside their variances (logarithmic).
 
-    `table` is that of `tiltvp.selfcalib.convergence_table`; `truth` may hold phi_rad, rho_m, psi_rad to be drawn dashed.
+    `table` is that of `tiltvp.selfcalib.convergence_table`; `truth` may hold phi_rad, rho_m, psi_rad, drawn dashed.
     """
     figure = Figure(figsize=(11.0, 7.6), layout="constrained")
     axes = figure.subplots(3, 2, sharex=True)

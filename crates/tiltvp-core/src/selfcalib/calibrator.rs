@@ -23,8 +23,9 @@ pub struct MountingEstimate {
     pub covariance_phi_rho_psi: Matrix3<f64>,
     /// What the motion so far has determined.
     pub observability: Observability,
-    /// Mean normalised innovation squared per bearing over the last steps, 1 if all is as assumed; NaN before the first.
-    pub mean_nis: f64,
+    /// Mean normalised innovation squared per bearing over the last steps, 1 if all is as assumed; `None` before the
+    /// first.
+    pub mean_nis: Option<f64>,
     /// Whether innovations over a window of steps were ever too large: the mount was bumped, or an assumption is wrong.
     pub alarm: bool,
 }
@@ -35,7 +36,7 @@ impl MountingEstimate {
         mounting: Mounting,
         covariance_xy_yaw: Matrix3<f64>,
         start: &Matrix3<f64>,
-        mean_nis: f64,
+        mean_nis: Option<f64>,
         alarm: bool,
     ) -> Self {
         let j = mounting.polar_by_vector();
@@ -95,7 +96,7 @@ enum Filter {
 pub struct SelfCalibrator {
     options: SelfCalibratorOptions,
     filter: Filter,
-    last_nis: f64,
+    last_nis: Option<f64>,
 }
 
 impl SelfCalibrator {
@@ -109,7 +110,7 @@ impl SelfCalibrator {
             CalibrationMethod::Default => Filter::Default(Box::new(Recursive::new(&options)?)),
             CalibrationMethod::Paper => Filter::Paper(Box::new(PaperFilter::new(&options))),
         };
-        Ok(Self { options, filter, last_nis: f64::NAN })
+        Ok(Self { options, filter, last_nis: None })
     }
 
     /// The options in force.
@@ -140,7 +141,7 @@ impl SelfCalibrator {
             Filter::Paper(filter) => filter.step(motion, &seen),
         };
         if used > 0 {
-            self.last_nis = nis / used as f64;
+            self.last_nis = Some(nis / used as f64);
         }
         Ok(CalibrationStep { nis, used, rejected, started })
     }
@@ -159,7 +160,7 @@ impl SelfCalibrator {
         match &self.filter {
             Filter::Default(filter) => {
                 let (mounting, covariance) = filter.mounting();
-                let nis = filter.alarm.mean_nis().unwrap_or(f64::NAN);
+                let nis = filter.alarm.mean_nis();
                 MountingEstimate::new(Mounting::from_vector(&mounting), covariance, start, nis, filter.alarm.raised())
             }
             Filter::Paper(filter) => {

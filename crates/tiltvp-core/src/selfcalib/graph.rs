@@ -113,6 +113,9 @@ impl Loss {
     }
 }
 
+/// Jacobians of a pose by the node's pose and by the time offset.
+type ByPoseAndOffset = (Matrix3<f64>, Vector3<f64>);
+
 /// A pose that has been eliminated: `inverse (rhs - coupling dense - next pose_after)` gives it back.
 struct Link {
     inverse: Matrix3<f64>,
@@ -195,7 +198,7 @@ impl Graph {
     }
 
     /// The pose at which the bearings of a node were taken, with its Jacobian by the node's pose and by the time offset.
-    fn pose_of_sights(&self, node: &Node) -> (Vector3<f64>, Option<(Matrix3<f64>, Vector3<f64>)>) {
+    fn pose_of_sights(&self, node: &Node) -> (Vector3<f64>, Option<ByPoseAndOffset>) {
         if !self.free.offset && self.offset_s == 0.0 {
             return (node.pose, None);
         }
@@ -361,13 +364,7 @@ impl Graph {
                     rhs[c] -= coupling[0][c] * y.x + coupling[1][c] * y.y + coupling[2][c] * y.z;
                 }
                 let across = next.transpose() * inverse;
-                let mut onward: [Vec<f64>; 3] = std::array::from_fn(|_| vec![0.0; width]);
-                for (k, values) in onward.iter_mut().enumerate() {
-                    let (a, b, d) = (across[(k, 0)], across[(k, 1)], across[(k, 2)]);
-                    for c in 0..reach {
-                        values[c] = -(a * coupling[0][c] + b * coupling[1][c] + d * coupling[2][c]);
-                    }
-                }
+                let onward = carried(&across, &coupling, reach);
                 next_own -= across * next;
                 next_side -= across * side;
                 links.push(Link { inverse, coupling: std::mem::replace(&mut coupling, onward), next, rhs: side });
@@ -388,19 +385,8 @@ impl Graph {
         if !keep {
             return Some(Eliminated { links, information: dense, rhs });
         }
-        let mut whole = DMatrix::zeros(width + 3, width + 3);
-        whole.view_mut((3, 3), (width, width)).copy_from(&dense);
-        let mut whole_rhs = DVector::zeros(width + 3);
-        whole_rhs.rows_mut(3, width).copy_from(&rhs);
-        whole.fixed_view_mut::<3, 3>(0, 0).copy_from(&own);
-        whole_rhs.fixed_rows_mut::<3>(0).copy_from(&side);
-        for (k, values) in coupling.iter().enumerate() {
-            for c in 0..width {
-                whole[(k, 3 + c)] = values[c];
-                whole[(3 + c, k)] = values[c];
-            }
-        }
-        Some(Eliminated { links, information: whole, rhs: whole_rhs })
+        let (information, rhs) = joined(&own, &coupling, &side, &dense, &rhs);
+        Some(Eliminated { links, information, rhs })
     }
 
     /// The rows of a node's bearings.
@@ -543,6 +529,42 @@ impl Row {
             rhs[c] -= by * self.residual * w;
         }
     }
+}
+
+/// The normal equations of a pose and the dense block together.
+fn joined(
+    own: &Matrix3<f64>,
+    coupling: &[Vec<f64>; 3],
+    side: &Vector3<f64>,
+    dense: &DMatrix<f64>,
+    rhs: &DVector<f64>,
+) -> (DMatrix<f64>, DVector<f64>) {
+    let width = dense.nrows();
+    let mut whole = DMatrix::zeros(width + 3, width + 3);
+    whole.view_mut((3, 3), (width, width)).copy_from(dense);
+    whole.fixed_view_mut::<3, 3>(0, 0).copy_from(own);
+    for (k, values) in coupling.iter().enumerate() {
+        for (c, value) in values.iter().enumerate() {
+            whole[(k, 3 + c)] = *value;
+            whole[(3 + c, k)] = *value;
+        }
+    }
+    let mut whole_rhs = DVector::zeros(width + 3);
+    whole_rhs.rows_mut(3, width).copy_from(rhs);
+    whole_rhs.fixed_rows_mut::<3>(0).copy_from(side);
+    (whole, whole_rhs)
+}
+
+/// What the elimination of a pose adds to the couplings of the next one, `-across coupling`.
+fn carried(across: &Matrix3<f64>, coupling: &[Vec<f64>; 3], reach: usize) -> [Vec<f64>; 3] {
+    std::array::from_fn(|k| {
+        let mut values = vec![0.0; coupling[k].len()];
+        let (a, b, d) = (across[(k, 0)], across[(k, 1)], across[(k, 2)]);
+        for (c, value) in values.iter_mut().enumerate().take(reach) {
+            *value = -(a * coupling[0][c] + b * coupling[1][c] + d * coupling[2][c]);
+        }
+        values
+    })
 }
 
 /// `dense -= coupling^T inverse coupling` in the upper triangle of the first `reach` rows and columns.

@@ -78,6 +78,7 @@ const DISTANCE_SIGMA: (f64, f64) = (0.02, 0.05);
 
 /// What the motion so far has determined, without what was believed at the start.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[expect(clippy::struct_excessive_bools, reason = "one answer for each quantity")]
 pub struct Observability {
     /// Standard deviations of (phi, rho, psi) by the bearings and the odometry alone; infinite where they say nothing.
     pub sigma_phi_rho_psi: Vector3<f64>,

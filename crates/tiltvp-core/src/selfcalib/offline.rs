@@ -155,6 +155,10 @@ fn check(
             ));
         }
     }
+    let mut first: BTreeMap<u64, usize> = BTreeMap::new();
+    if !bearings.iter().any(|b| *first.entry(b.landmark).or_insert(b.step) != b.step) {
+        return Err(Error::argument("bearings", "no landmark seen twice", "landmarks seen from several poses"));
+    }
     match times_s {
         None if options.estimate_time_offset => {
             Err(Error::argument("times_s", "none", "the time of each step, to estimate a time offset"))
@@ -320,7 +324,7 @@ fn report(options: &LogOptions, graph: &Graph, descent: &Descent) -> Result<LogC
             Mounting::from_vector(&graph.mounting),
             covariance.fixed_view::<3, 3>(0, 0).into(),
             &(o.start_covariance * scale),
-            sum / kept.len().max(1) as f64,
+            Some(sum / kept.len().max(1) as f64),
             false,
         ),
         wheels: graph.wheels,

@@ -21,6 +21,9 @@ const MAX_ITERATIONS: u32 = 4;
 /// Poses up to which the memory is solved anew at every step.
 const YOUNG: usize = 40;
 
+/// Poses up to which other starts are tried where bearings do not fit.
+const SETTLED: usize = 160;
+
 /// Growth of the memory after which it is linearised anew.
 const GROWTH: f64 = 1.15;
 
@@ -337,11 +340,16 @@ impl Recursive {
         let mut next = self.graph.clone();
         next.loss = FIRST;
         next.descend(iterations, 0.01, 0.0);
-        // A landmark may have been caught at a wrong distance, or all of them with a wrong mounting.
-        for limit in [LIMIT, 0.0] {
+        // A landmark may have been caught at a wrong distance; while little is known, all of them with a wrong yaw.
+        let sigma = self.options.start_covariance[(2, 2)].sqrt();
+        let turns: &[f64] = if next.nodes.len() > SETTLED { &[0.0] } else { &[0.0, 0.0, 1.0, -1.0, 2.0, -2.0] };
+        for (i, turn) in turns.iter().enumerate() {
             if next.farthest() > LIMIT {
                 let mut other = next.clone();
-                other.place_landmarks(0, limit);
+                if *turn != 0.0 {
+                    other.mounting = self.options.start.vector() + Vector3::z() * (turn * sigma);
+                }
+                other.place_landmarks(0, if i == 0 { LIMIT } else { 0.0 });
                 let descent = other.descend(2 * iterations, 0.01, 1e-3);
                 if descent.cost < next.cost() {
                     next = other;
@@ -490,7 +498,9 @@ fn whiten(mut t: DMatrix<f64>, lower: &DMatrix<f64>) -> DMatrix<f64> {
             }
         }
         let scale = 1.0 / lower[(j, j)];
-        column.iter_mut().for_each(|value| *value *= scale);
+        for value in column.iter_mut() {
+            *value *= scale;
+        }
     }
     t
 }

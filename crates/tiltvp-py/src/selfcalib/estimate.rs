@@ -142,9 +142,9 @@ impl MountingEstimate {
         self.inner.observability.rho_near_zero
     }
 
-    /// Mean normalised innovation squared of a bearing over the last steps: 1 if all is as assumed.
+    /// Mean normalised innovation squared of a bearing over the last steps: 1 if all is as assumed. None before the first.
     #[getter]
-    fn mean_nis(&self) -> f64 {
+    fn mean_nis(&self) -> Option<f64> {
         self.inner.mean_nis
     }
 

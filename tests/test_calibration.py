@@ -1,0 +1,251 @@
+"""Self-calibration: simulated drives are recovered, what is not determined is said, and bad input is refused."""
+
+from __future__ import annotations
+
+import copy
+import csv
+import json
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import tiltvp
+from tiltvp.cli import main
+from tiltvp.drive_logs import read_drive_log
+from tiltvp.errors import InvalidInputError
+from tiltvp.plots.calibration import convergence
+from tiltvp.selfcalib import consistency_band, convergence_table, ros_static_transform, urdf_origin
+from tiltvp.synth import SimulatedDrive, simulate_drive
+
+TRUE = np.array([0.23 * math.cos(-0.34), 0.23 * math.sin(-0.34), -0.01])
+START = {"wheel_base_m": 0.4, "start": (0.2, 0.0, 0.0), "start_sigma": (0.2, 0.2, 0.6)}
+
+
+def error(e: tiltvp.MountingEstimate) -> np.ndarray:
+    return np.array([e.x_m, e.y_m, e.yaw_rad]) - TRUE
+
+
+def followed(drive: SimulatedDrive, **options: object) -> tiltvp.SelfCalibrator:
+    calibrator = tiltvp.SelfCalibrator(**{**START, **options})  # type: ignore[arg-type]
+    calibrator.follow(drive.odometry, drive.bearings)
+    return calibrator
+
+
+@pytest.mark.parametrize("kind", ["paper", "alternating"])
+def test_drives_are_recovered_and_errors_are_as_claimed(kind: str) -> None:
+    """NEES of 20 runs in the band that a consistent filter misses once in 1,000 times; the seeds are fixed."""
+    nees, squares, bounds = [], [], []
+    for seed in range(20):
+        drive = simulate_drive(kind, seed=seed)
+        e = followed(drive).estimate
+        assert e, e.reason
+        assert e.determined == ["phi", "rho", "psi", "yaw"]
+        nees.append(error(e) @ np.linalg.solve(e.covariance_xy_yaw, error(e)))
+        squares.append(error(e) ** 2)
+        bounds.append(np.diag(drive.cramer_rao_bound(start_sigma=(0.2, 0.2, 0.6))))
+    low, high = consistency_band(0.999, 3, 20)
+    assert low < np.mean(nees) < high
+    assert np.all(np.sqrt(np.mean(squares, axis=0) / np.mean(bounds, axis=0)) < 1.6)
+
+
+def test_whole_logs_agree_with_the_filter_and_shrug_at_outliers() -> None:
+    drive = simulate_drive("alternating", seed=4, outliers=0.03)
+    whole = tiltvp.calibrate(drive.odometry, drive.bearings, **START)
+    assert whole
+    assert 30 < whole.outliers < 120
+    assert np.all(np.abs(error(whole.mounting)) < 4.0 * np.sqrt(np.diag(whole.mounting.covariance_xy_yaw)))
+    filtered = followed(drive).estimate
+    assert np.all(np.abs(error(filtered)) < 5.0 * np.sqrt(np.diag(filtered.covariance_xy_yaw)))
+
+
+def test_wheels_and_time_offset() -> None:
+    drive = simulate_drive("alternating", seed=1, odometry_k_m=1e-7)
+    odometry = drive.odometry * [1.01, 0.99]
+    times = 0.1 * np.arange(len(odometry))
+    whole = tiltvp.calibrate(
+        odometry, drive.bearings, **{**START, "wheel_base_m": 0.42}, odometry_k_m=1e-6,
+        estimate_odometry=True, estimate_time_offset=True, times_s=times,
+    )  # fmt: skip
+    assert whole.wheel_base_m == pytest.approx(0.4, abs=0.004)
+    assert whole.right_over_left == pytest.approx(1.01 / 0.99, abs=0.004)
+    assert whole.time_offset_s == pytest.approx(0.0, abs=0.02)
+
+
+def test_driving_straight_on_determines_yaw_only_and_says_so() -> None:
+    e = followed(simulate_drive("straight", seed=3)).estimate
+    assert not e
+    assert e.determined == ["yaw"]
+    assert "rotate in place near a feature" in e.reason
+    assert abs(e.yaw_rad - TRUE[2]) < 3.0 * math.sqrt(e.covariance_xy_yaw[2, 2])
+    assert np.all(e.sigma_of_drive[[0, 2]] > 0.05)
+
+
+def test_a_camera_on_the_axle_has_no_phi_but_x_y_and_yaw() -> None:
+    drive = simulate_drive("alternating", seed=2, mounting=(0.0, 0.0, 0.5))
+    e = followed(drive).estimate
+    assert e.rho_near_zero
+    assert e.determined == ["rho", "yaw"]
+    assert e
+    assert "use x, y and yaw" in e.reason
+    assert abs(e.x_m) < 0.01
+    assert abs(e.yaw_rad - 0.5) < 0.02
+
+
+def test_a_bump_raises_the_alarm_and_an_undisturbed_drive_does_not() -> None:
+    drive = simulate_drive("alternating", seed=5)
+    assert not followed(drive).estimate.alarm
+    bumped = drive.bearings
+    bumped[bumped[:, 0] > 150, 2] -= 0.06
+    calibrator = tiltvp.SelfCalibrator(**START)
+    calibrator.follow(drive.odometry, bumped)
+    assert calibrator.estimate.alarm
+    assert not calibrator.estimate
+    assert "alarm" in calibrator.estimate.reason
+    calibrator.reset()
+    assert not calibrator.estimate.alarm
+
+
+def test_the_paper_filter_is_there_and_worse() -> None:
+    errors = {"default": [], "paper": []}
+    for seed in range(15):
+        drive = simulate_drive("alternating", seed=seed)
+        for method, found in errors.items():
+            found.append(np.abs(error(followed(drive, method=method, start_sigma=(0.05, 0.08, 0.5)).estimate)).max())
+    assert np.median(errors["default"]) < np.median(errors["paper"])
+
+
+def test_the_same_drive_gives_the_same_answer_by_steps_by_log_and_by_copy() -> None:
+    drive = simulate_drive("paper", seed=7)
+    stepped = tiltvp.SelfCalibrator(**START)
+    for step, (left, right) in enumerate(drive.odometry):
+        if step == 50:
+            stepped = copy.deepcopy(stepped)
+        seen = drive.bearings[drive.bearings[:, 0] == step]
+        done = stepped.step(left, right, seen[:, 1].astype(int), seen[:, 2])
+        assert done.used + done.rejected + done.started == len(seen)
+    assert stepped.estimate == followed(drive).estimate
+    assert stepped.landmarks == 10
+
+
+def test_motion_from_anything_else() -> None:
+    wheels = tiltvp.wheel_displacements([0.3, 0.0], [0.0, 0.5], wheel_base_m=0.4)
+    np.testing.assert_allclose(wheels, [[0.3, 0.3], [-0.1, 0.1]])
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ({"wheel_base_m": 0.0}, "wheel_base_m"),
+        ({"bearing_sigma_rad": -1.0}, "bearing_sigma_rad"),
+        ({"start_sigma": (0.1, 0.0, 0.1)}, "start_sigma"),
+        ({"start": (0.0, np.nan, 0.0)}, "start"),
+        ({"method": "papers"}, "method"),
+        ({"method": "paper", "start": (0.0, 0.0, 0.0)}, "start"),
+        ({"method": "paper", "memory": 20}, "memory"),
+        ({"odometry_inflation": 2.0}, "odometry_inflation"),
+        ({"memory": 2}, "memory"),
+        ({"gate_probability": 1.0}, "gate_probability"),
+    ],
+)
+def test_bad_options_are_refused(options: dict[str, object], words: str) -> None:
+    with pytest.raises(InvalidInputError, match=words):
+        tiltvp.SelfCalibrator(**{"wheel_base_m": 0.4, **options})  # type: ignore[arg-type]
+
+
+def test_bad_steps_are_refused_and_change_nothing() -> None:
+    calibrator = tiltvp.SelfCalibrator(wheel_base_m=0.4)
+    before = calibrator.estimate
+    for arguments in [
+        (math.nan, 0.1, [1], [0.5]), (0.1, 0.1, [1, 2], [0.5]), (0.1, 0.1, [1], [math.inf]),
+        (0.1, 0.1, [3, 3], [0.1, 0.2]), (0.1, 0.1, [1.5], [0.5]),
+    ]:  # fmt: skip
+        with pytest.raises(InvalidInputError):
+            calibrator.step(*arguments)
+    assert calibrator.estimate == before
+    for bearings in ([[5, 0, 0.1]], [[-1, 0, 0.1]], [[0, 0, math.nan]], np.empty((0, 3))):
+        with pytest.raises(InvalidInputError):
+            tiltvp.calibrate([[0.1, 0.1]] * 3, bearings, wheel_base_m=0.4)
+    with pytest.raises(InvalidInputError, match="times_s"):
+        tiltvp.calibrate([[0.1, 0.1]] * 3, [[0, 0, 0.1]], wheel_base_m=0.4, estimate_time_offset=True)
+
+
+def test_options_are_good_as_keywords_and_each_matters() -> None:
+    drive = simulate_drive("paper", seed=11)
+    for method, others in [
+        ("default", {"start_distance_log_sigma": 0.3, "gate_probability": 0.3, "memory": 30}),
+        ("paper", {"start_distance_sigma_m": 0.5, "odometry_inflation": 1.0}),
+    ]:
+        one = followed(drive, method=method, start_sigma=(0.05, 0.08, 0.5))
+        assert followed(drive, **one.options).estimate == one.estimate
+        common = {"bearing_sigma_rad": 0.02, "odometry_k_m": 1e-4, "start_distance_m": 1.5}
+        for name, value in {**common, **others}.items():
+            other = followed(drive, **{**one.options, name: value})
+            assert other.options[name] == value
+            assert other.estimate != one.estimate, name
+
+
+def test_snippets_and_convergence() -> None:
+    drive = simulate_drive("paper", seed=1)
+    history = tiltvp.SelfCalibrator(**START).follow(drive.odometry, drive.bearings)
+    table = convergence_table(history)
+    assert table.height == len(drive.odometry)
+    assert table["variance_psi"][-1] < 1e-3 < table["variance_psi"][5]
+    assert len(convergence(table, {"phi_rad": -0.34}).axes) == 6
+    e = history[-1]
+    assert f"--x {e.x_m:.6f} --y {e.y_m:.6f} --z 0.300000 --yaw {e.yaw_rad:.6f}" in ros_static_transform(e, z_m=0.3)
+    assert urdf_origin(e).startswith(f'<origin xyz="{e.x_m:.6f} {e.y_m:.6f}')
+    with pytest.raises(InvalidInputError, match="child"):
+        ros_static_transform(e, child="a; b")
+
+
+def write_log(folder: Path, drive: SimulatedDrive) -> tuple[Path, Path]:
+    odometry, bearings = folder / "odometry.csv", folder / "bearings.csv"
+    with odometry.open("w", newline="") as file:
+        rows = csv.writer(file)
+        rows.writerow(["step", "time_s", "delta_left_m", "delta_right_m"])
+        rows.writerows([i, 0.1 * i, left, right] for i, (left, right) in enumerate(drive.odometry))
+    with bearings.open("w", newline="") as file:
+        rows = csv.writer(file)
+        rows.writerow(["step", "landmark", "bearing_rad"])
+        rows.writerows([int(step), int(landmark), bearing] for step, landmark, bearing in drive.bearings)
+    return odometry, bearings
+
+
+def test_the_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    odometry, bearings = write_log(tmp_path, simulate_drive("paper", seed=1))
+    out, plot = tmp_path / "calib.json", tmp_path / "conv.png"
+    words = ["calibrate", str(odometry), str(bearings), "--wheel-base", "0.4", "--out", str(out), "--plot", str(plot)]
+    assert main(words) == 0
+    printed = capsys.readouterr().out
+    assert "static_transform_publisher" in printed
+    found = json.loads(out.read_text())
+    assert found["whole_log"]["mounting"]["rho_m"] == pytest.approx(0.23, abs=0.02)
+    assert plot.read_bytes().startswith(b"\x89PNG")
+    assert {path.name for path in tmp_path.iterdir()} == {"odometry.csv", "bearings.csv", "calib.json", "conv.png"}
+    straight = simulate_drive("straight", seed=1)
+    odometry, bearings = write_log(tmp_path, straight)
+    assert main(["calibrate", str(odometry), str(bearings), "--wheel-base", "0.4"]) == 1
+    assert "rotate in place" in capsys.readouterr().out
+    assert main([*words[:-1], str(tmp_path / "conv.jpg")]) == 2
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("step,delta_left_m\n0,1\n", "line 1"),
+        ("step,delta_left_m,delta_right_m\n0,1,x\n", "line 2"),
+        ("step,delta_left_m,delta_right_m\n1,0,0\n1,0,0\n", "line 3"),
+        ("step,delta_left_m,delta_right_m\n0,0\n", "2 cells"),
+        ("step,delta_left_m,delta_right_m\n", "no rows"),
+    ],
+)
+def test_bad_logs_are_refused_with_the_line(tmp_path: Path, text: str, words: str) -> None:
+    odometry, bearings = write_log(tmp_path, simulate_drive("paper", seed=1))
+    log = read_drive_log(odometry, bearings)
+    assert log.times_s is not None
+    assert log.odometry.shape == (len(log.times_s), 2)
+    odometry.write_text(text)
+    with pytest.raises(InvalidInputError, match=words):
+        read_drive_log(odometry, bearings)
