@@ -4,6 +4,7 @@ mod direction;
 mod estimate;
 mod options;
 mod report;
+mod sampling;
 
 use std::sync::{Mutex, PoisonError};
 

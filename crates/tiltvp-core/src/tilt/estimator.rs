@@ -16,7 +16,10 @@ use crate::edges::{Detector, EdgeOptions, EdgePixels, LiftTable, NormalKind, Reg
 use crate::error::{Error, Result};
 use crate::geometry::{Tilt, tangent_basis};
 use crate::image::ImageView;
-use crate::robust::{FitReport, Gate, RansacOptions, RejectRefitOptions, Rows, Stop, ransac, reject_refit};
+use crate::robust::{
+    FitReport, Gate, RansacOptions, RansacScratch, RejectRefitOptions, Rows, SampleOrder, Sampling, Stop, ransac,
+    reject_refit,
+};
 
 /// Change of the shift in pixels below which the paper's trimming has converged (section 2.1.4).
 const SHIFT_TOLERANCE_PX: f64 = 0.1;
@@ -64,7 +67,16 @@ pub struct Scratch {
     sparse: Sparse<f32>,
     /// Place of each row among the edge pixels.
     places: Vec<u32>,
+    sampling: SamplingScratch,
     inliers: Inliers,
+}
+
+/// What the sampling methods need beyond rows and weights.
+#[derive(Debug, Clone)]
+struct SamplingScratch {
+    /// Squared gradient of each row, where samples are drawn in its order.
+    quality: Vec<f32>,
+    ransac: RansacScratch,
 }
 
 /// What an estimator's scratch depends on.
@@ -196,6 +208,7 @@ impl TiltEstimator {
             weights: Vec::with_capacity(n),
             sparse: Sparse::with_capacity(n),
             places: Vec::with_capacity(n),
+            sampling: SamplingScratch::new(self.options.sampling(), n),
             inliers: Inliers::None,
         }
     }
@@ -294,13 +307,21 @@ impl TiltEstimator {
         Ok((estimate, elements))
     }
 
+    /// How the sampling methods sample, but for the threshold.
+    fn ransac_options(&self) -> RansacOptions {
+        let sampling = self.options.sampling();
+        RansacOptions { seed: self.options.seed, sampling, ..RansacOptions::with_threshold(f64::INFINITY) }
+    }
+
     /// Paper 000 section 2.1.
     fn fit_offsets(&self, gains: &[f32], factor: f64, offset_max_px: f64, scratch: &mut Scratch) -> Fit {
         scratch.inliers = Inliers::None;
         let Some(centre) = &self.centre else { return Fit::none() };
-        let Scratch { edges, rows, weights, places, .. } = &mut *scratch;
+        let Scratch { edges, rows, weights, places, sampling, .. } = &mut *scratch;
         offsets(edges, &self.region, centre, gains, offset_max_px, rows, weights, places);
-        let problem = Offsets::new(rows);
+        let ransac_options = self.ransac_options();
+        sampling.rank(&ransac_options, edges, places);
+        let problem = Offsets::new(rows, &sampling.quality);
         let upright = Vector2::zeros();
         let report: FitReport<Vector2<f64>> = match &self.options.method {
             Method::ImageSpaceRejectRefit { keep_fraction, .. } => {
@@ -313,8 +334,8 @@ impl TiltEstimator {
                 reject_refit(&problem, &options, &upright, weights)
             }
             Method::ImageSpaceRansac { threshold_px, .. } => {
-                let options = RansacOptions { seed: self.options.seed, ..RansacOptions::with_threshold(*threshold_px) };
-                ransac(&problem, &options, &upright, weights)
+                let options = RansacOptions { threshold: *threshold_px, ..ransac_options };
+                ransac(&problem, &options, &upright, weights, &mut sampling.ransac)
             }
             Method::VectorConsensus { .. } | Method::Refined(_) => return Fit::none(),
         };
@@ -342,14 +363,16 @@ impl TiltEstimator {
 
     /// Paper 000 section 2.2, and the refined method.
     fn fit_normals(&self, table: &LiftTable, scratch: &mut Scratch) -> Fit {
-        let Scratch { edges, rows, weights, places, sparse, inliers, .. } = &mut *scratch;
+        let Scratch { edges, rows, weights, places, sparse, sampling, inliers, .. } = &mut *scratch;
         *inliers = Inliers::None;
         table.lift(edges, self.options.normal_tilt_max_rad().sin(), rows, weights, places);
         let (report, gate, factor) = match &self.options.method {
             Method::VectorConsensus { threshold_rad, factor, .. } => {
                 weights.fill(1.0);
-                let report =
-                    vector_consensus(rows, &self.robot_from_camera, *threshold_rad, self.options.seed, weights);
+                let options = RansacOptions { threshold: threshold_rad.sin(), ..self.ransac_options() };
+                sampling.rank(&options, edges, places);
+                let (quality, scratch) = (&sampling.quality, &mut sampling.ransac);
+                let report = vector_consensus(rows, quality, &self.robot_from_camera, &options, weights, scratch);
                 *inliers = Inliers::weighted_if(report.model.is_some());
                 (report, Gate::Soft { scale: STRAY_RAD }, *factor)
             }
@@ -413,6 +436,23 @@ impl TiltEstimator {
             residual_rms: fit.rms,
             iterations: fit.iterations,
             stop: fit.stop,
+        }
+    }
+}
+
+impl SamplingScratch {
+    fn new(sampling: Sampling, capacity: usize) -> Self {
+        let ranked = if sampling.order == SampleOrder::Uniform { 0 } else { capacity };
+        Self { quality: Vec::with_capacity(ranked), ransac: RansacScratch::with_capacity(&sampling, capacity) }
+    }
+
+    /// Sets the quality of the rows at these places to their squared gradients, if samples are drawn in that order.
+    fn rank(&mut self, options: &RansacOptions, edges: &EdgePixels, places: &[u32]) {
+        self.quality.clear();
+        if options.sampling.order != SampleOrder::Uniform {
+            let (gx, gy) = (edges.gx(), edges.gy());
+            let squared = |place: &u32| gx[*place as usize].powi(2) + gy[*place as usize].powi(2);
+            self.quality.extend(places.iter().map(squared));
         }
     }
 }

@@ -4,6 +4,7 @@ use super::correction::Correction;
 use super::refine::RefineOptions;
 use crate::edges::{EdgeOptions, Mask, NormalKind};
 use crate::error::{Error, Result};
+use crate::robust::Sampling;
 
 /// The methods by name, the default first.
 pub const METHODS: [&str; 4] = ["refined", "image-space-ransac", "image-space-reject-refit", "vector-consensus"];
@@ -19,6 +20,8 @@ pub enum Method {
         offset_max_px: f64,
         /// From the shift to the angle.
         correction: Correction,
+        /// How samples are drawn, improved, scored and verified. Default the paper's way.
+        sampling: Sampling,
     },
     /// Paper 000 section 2.1 with repeated trimming.
     ImageSpaceRejectRefit {
@@ -37,6 +40,8 @@ pub enum Method {
         normal: NormalKind,
         /// The factor `a'` of eq. 45 by which the angle is divided, 1 for none. Default 1.
         factor: f64,
+        /// How samples are drawn, improved, scored and verified. Default the paper's way.
+        sampling: Sampling,
     },
     /// Ours: tangent normals weighted by their gradients, trimmed from the upright prior, then a fading soft gate.
     Refined(RefineOptions),
@@ -79,16 +84,20 @@ impl TiltOptions {
     pub fn for_method(name: &str) -> Result<Self> {
         let (method, gradient_min, smoothing_px) = match name {
             "image-space-ransac" => {
-                let correction = Correction::default();
-                (Method::ImageSpaceRansac { threshold_px: 10.0, offset_max_px: 40.0, correction }, 150.0, 0.0)
+                let (correction, sampling) = (Correction::default(), Sampling::default());
+                (Method::ImageSpaceRansac { threshold_px: 10.0, offset_max_px: 40.0, correction, sampling }, 150.0, 0.0)
             }
             "image-space-reject-refit" => {
                 let correction = Correction::default();
                 (Method::ImageSpaceRejectRefit { keep_fraction: 0.8, offset_max_px: 40.0, correction }, 200.0, 0.0)
             }
             "vector-consensus" => {
-                let threshold_rad = 5f64.to_radians();
-                (Method::VectorConsensus { threshold_rad, normal: NormalKind::Gradient, factor: 1.0 }, 600.0, 0.0)
+                let (threshold_rad, sampling) = (5f64.to_radians(), Sampling::default());
+                (
+                    Method::VectorConsensus { threshold_rad, normal: NormalKind::Gradient, factor: 1.0, sampling },
+                    600.0,
+                    0.0,
+                )
             }
             "refined" => (Method::Refined(RefineOptions::default()), 150.0, 0.6),
             _ => {
@@ -123,7 +132,8 @@ impl TiltOptions {
             return Err(Error::option("tilt_max_rad", tilt_max, "an angle strictly between 0 and pi/2"));
         }
         match &self.method {
-            Method::ImageSpaceRansac { threshold_px, offset_max_px, correction } => {
+            Method::ImageSpaceRansac { threshold_px, offset_max_px, correction, sampling } => {
+                sampling.validate()?;
                 positive("threshold_px", *threshold_px, "a positive number of pixels")?;
                 positive("offset_max_px", *offset_max_px, "a positive number of pixels")?;
                 correction.validate()
@@ -135,13 +145,22 @@ impl TiltOptions {
                 positive("offset_max_px", *offset_max_px, "a positive number of pixels")?;
                 correction.validate()
             }
-            Method::VectorConsensus { threshold_rad, factor, .. } => {
+            Method::VectorConsensus { threshold_rad, factor, sampling, .. } => {
+                sampling.validate()?;
                 if !(*threshold_rad > 0.0 && *threshold_rad < std::f64::consts::FRAC_PI_2) {
                     return Err(Error::option("threshold_rad", threshold_rad, "an angle strictly between 0 and pi/2"));
                 }
                 positive("correction", *factor, "a positive factor")
             }
             Method::Refined(options) => options.validate(),
+        }
+    }
+
+    /// How the sampling methods sample; the others do not.
+    pub(super) fn sampling(&self) -> Sampling {
+        match &self.method {
+            Method::ImageSpaceRansac { sampling, .. } | Method::VectorConsensus { sampling, .. } => *sampling,
+            Method::ImageSpaceRejectRefit { .. } | Method::Refined(_) => Sampling::default(),
         }
     }
 
