@@ -292,6 +292,23 @@ class EdgeElements:
     def __deepcopy__(self, _memo: object) -> Self: ...
     __hash__: ClassVar[None]  # type: ignore[assignment]
 
+@final
+class ImageEdges:
+    """The edge pixels of one image and their gradients: every pixel of the band with a gradient of at least `gradient_min`.
+
+    `TiltEstimator.detect` makes them, `TiltEstimator.estimate_edges` takes them. Frozen, comparable, to be pickled.
+    """
+
+    @property
+    def gradient_min(self) -> float:
+        """The least gradient magnitude that was asked for."""
+
+    def __len__(self) -> int: ...
+    def __eq__(self, other: object, /) -> bool: ...
+    def __copy__(self) -> Self: ...
+    def __deepcopy__(self, _memo: object) -> Self: ...
+    __hash__: ClassVar[None]  # type: ignore[assignment]
+
 @disjoint_base
 class TiltEstimator:
     """Estimates how far and in which direction a robot leans from single images of one camera.
@@ -305,6 +322,7 @@ class TiltEstimator:
         *,
         method: _Method | str = ...,
         robot_from_camera: ArrayLike | None = None,
+        _like: TiltEstimator | None = None,
         gradient_min: float = ...,
         smoothing_px: float = ...,
         elevation_min_rad: float = ...,
@@ -398,6 +416,17 @@ class TiltEstimator:
 
     def _estimate(self, image: NDArray[np.uint8]) -> TiltEstimate:
         """The tilt of a C-contiguous (H, W) image of uint8."""
+
+    def _detect(self, image: NDArray[np.uint8]) -> ImageEdges:
+        """The edge pixels of such an image."""
+
+    def estimate_edges(self, edges: ImageEdges) -> TiltEstimate:
+        """The tilt of the image that the edges are of, the same to the last bit as the image itself gives.
+
+        `edges` may be those of any estimator with equal camera, robot_from_camera, mask and edge options (gradient_min,
+        smoothing_px, elevations, margin_px); else `tiltvp.errors.InvalidInputError` says what differs. Other threads run
+        meanwhile.
+        """
 
     def _estimate_with_edges(self, image: NDArray[np.uint8]) -> tuple[TiltEstimate, EdgeElements]:
         """The tilt of such an image, and its edge pixels."""

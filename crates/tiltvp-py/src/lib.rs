@@ -19,8 +19,8 @@ mod _core {
     use crate::synth::render_room;
     #[pymodule_export]
     use crate::tilt::{
-        CommonDirection, EdgeElements, FitReport, TiltEstimate, TiltEstimator, common_direction, leaning_from_upright,
-        level_map, normal_from_alpha_beta, tilt_error_rad,
+        CommonDirection, EdgeElements, FitReport, ImageEdges, TiltEstimate, TiltEstimator, common_direction,
+        leaning_from_upright, level_map, normal_from_alpha_beta, tilt_error_rad,
     };
 
     #[pymodule_init]

@@ -2,11 +2,12 @@
 
 mod direction;
 mod estimate;
+mod image_edges;
 mod options;
 mod report;
 mod sampling;
 
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Arc, Mutex, PoisonError};
 
 use nalgebra::Matrix3;
 use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray2, PyUntypedArrayMethods};
@@ -18,6 +19,7 @@ use tiltvp_core::tilt::{self as core, Scratch};
 
 pub(crate) use self::direction::{CommonDirection, common_direction};
 pub(crate) use self::estimate::{EdgeElements, TiltEstimate};
+pub(crate) use self::image_edges::ImageEdges;
 pub(crate) use self::report::FitReport;
 use crate::call::{call, exception, invalid};
 use crate::camera::Camera;
@@ -30,20 +32,25 @@ pub(crate) struct TiltEstimator {
     camera: Py<Camera>,
     /// The options that the user has named.
     given: Vec<String>,
-    scratch: Mutex<Vec<Scratch>>,
+    /// Shared by the estimators that look at the same pixels.
+    scratch: Arc<Mutex<Vec<Scratch>>>,
 }
 
 #[pymethods]
 impl TiltEstimator {
     #[new]
-    #[pyo3(signature = (camera, *, method=core::METHODS[0], robot_from_camera=None, **options))]
+    #[pyo3(signature = (camera, *, method=core::METHODS[0], robot_from_camera=None, _like=None, **options))]
     fn new(
         py: Python<'_>,
         camera: &Bound<'_, PyAny>,
         method: &str,
         robot_from_camera: Option<&Bound<'_, PyAny>>,
+        _like: Option<&Bound<'_, Self>>,
         options: Option<&Bound<'_, PyDict>>,
     ) -> PyResult<Self> {
+        if let Some(like) = _like {
+            return like.get().with_options(py, options);
+        }
         let Ok(camera) = camera.cast::<Camera>() else {
             return Err(invalid(format!("camera: {}, expected a tiltvp.Camera", camera.get_type().name()?)));
         };
@@ -53,7 +60,7 @@ impl TiltEstimator {
         let lens = camera.get().inner.clone();
         let inner = call(py, move || core::TiltEstimator::new(lens, rotation, parsed))?;
         let given = options.map_or(Ok(Vec::new()), |options| options.keys().extract())?;
-        Ok(Self { inner, camera: camera.clone().unbind(), given, scratch: Mutex::new(Vec::new()) })
+        Ok(Self { inner, camera: camera.clone().unbind(), given, scratch: Arc::default() })
     }
 
     /// The camera whose images are read.
@@ -92,6 +99,28 @@ impl TiltEstimator {
         let (view, inner) = (view(&image)?, &self.inner);
         let mut scratch = self.borrow_scratch();
         let estimate = call(py, || inner.estimate(&view, &mut scratch));
+        self.return_scratch(scratch);
+        Ok(TiltEstimate::from(estimate?))
+    }
+
+    /// The edge pixels of a C-contiguous `(H, W)` image of uint8.
+    fn _detect(&self, py: Python<'_>, image: &Bound<'_, PyAny>) -> PyResult<ImageEdges> {
+        let image = convert::gray(image, "image")?;
+        let (view, inner) = (view(&image)?, &self.inner);
+        let mut scratch = self.borrow_scratch();
+        let edges = call(py, || inner.detect(&view, &mut scratch));
+        self.return_scratch(scratch);
+        Ok(ImageEdges::new(edges?, self.camera.clone_ref(py)))
+    }
+
+    /// The tilt of the image that the edges are of.
+    fn estimate_edges(&self, py: Python<'_>, edges: &Bound<'_, PyAny>) -> PyResult<TiltEstimate> {
+        let Ok(edges) = edges.cast::<ImageEdges>() else {
+            return Err(invalid(format!("edges: {}, expected a tiltvp.ImageEdges", edges.get_type().name()?)));
+        };
+        let (edges, inner) = (edges.get().inner(), &self.inner);
+        let mut scratch = self.borrow_scratch();
+        let estimate = call(py, || inner.estimate_edges(edges, &mut scratch));
         self.return_scratch(scratch);
         Ok(TiltEstimate::from(estimate?))
     }
@@ -160,6 +189,23 @@ impl TiltEstimator {
 }
 
 impl TiltEstimator {
+    /// An estimator of the same camera with some options changed, which shares tables and scratch where they are the same.
+    fn with_options(&self, py: Python<'_>, changes: Option<&Bound<'_, PyDict>>) -> PyResult<Self> {
+        let mut options = self.inner.options().clone();
+        options::change(&mut options, changes)?;
+        let inner = call(py, || self.inner.with_options(options))?;
+        let mut given = self.given.clone();
+        for key in changes.into_iter().flat_map(PyDictMethods::keys) {
+            let key: String = key.extract()?;
+            if !given.contains(&key) {
+                given.push(key);
+            }
+        }
+        let shares = inner.shares_scratch_with(&self.inner);
+        let scratch = if shares { Arc::clone(&self.scratch) } else { Arc::default() };
+        Ok(Self { inner, camera: self.camera.clone_ref(py), given, scratch })
+    }
+
     fn borrow_scratch(&self) -> Scratch {
         let free = self.scratch.lock().unwrap_or_else(PoisonError::into_inner).pop();
         free.unwrap_or_else(|| self.inner.scratch())

@@ -6,7 +6,7 @@ use super::problem::Problem;
 use super::prosac::{all_inliers, best_beginning};
 use super::report::{FitReport, Stop};
 use super::sampler::{Sampler, best_first, shuffled};
-use super::sampling::{SampleOrder, Sampling, Verification};
+use super::sampling::{SampleOrder, Sampling, Score, Verification};
 use super::verification::{PROBES, Verifier};
 use crate::error::{Error, Result};
 
@@ -61,14 +61,18 @@ pub struct RansacScratch {
 }
 
 impl RansacScratch {
-    /// Room for `capacity` observations, sampled in this way.
-    pub fn with_capacity(sampling: &Sampling, capacity: usize) -> Self {
-        let ordered = if sampling.order == SampleOrder::Uniform { 0 } else { capacity };
-        let probed = if sampling.verification == Verification::Full { 0 } else { capacity };
-        Self {
-            keys: Vec::with_capacity(ordered),
-            order: Vec::with_capacity(ordered),
-            probes: Vec::with_capacity(probed),
+    /// Makes room for `capacity` observations, sampled in this way, so that no fit of so many allocates.
+    pub fn reserve(&mut self, sampling: &Sampling, capacity: usize) {
+        let Self { keys, order, probes } = self;
+        if sampling.order != SampleOrder::Uniform {
+            keys.clear();
+            keys.reserve(capacity);
+            order.clear();
+            order.reserve(capacity);
+        }
+        if sampling.verification != Verification::Full {
+            probes.clear();
+            probes.reserve(capacity);
         }
     }
 }
@@ -126,7 +130,7 @@ pub fn ransac<P: Problem>(
             None => (model, score),
         };
         let inliers = match sampling.score {
-            super::Score::Count => score as usize,
+            Score::Count => score as usize,
             _ => problem.consensus(&model, threshold, 0),
         };
         let (pool, chance, share) = match sampling.order {

@@ -78,13 +78,22 @@ impl VanishingPoint {
     }
 }
 
+/// What a lean moves the edge offset of each pixel by.
+#[derive(Debug)]
+pub(super) struct Gains {
+    /// Of each pixel relative to the mean, NaN where there is none; empty where all count alike.
+    pub relative: Vec<f32>,
+    /// The mean, or the one factor of all, in pixels per radian.
+    pub mean: f64,
+}
+
 /// The closed-form gain of each pixel of the region relative to their mean, and that mean in pixels per radian.
 pub(super) fn closed_form_gains(
     camera: &Camera,
     robot_from_camera: &Matrix3<f64>,
     region: &Region,
     centre: &VanishingPoint,
-) -> (Vec<f32>, f64) {
+) -> Gains {
     let gain = |u: usize, v: usize, bearing: Vector3<f64>| -> f64 {
         let pixel = Vector2::new(u as f64, v as f64);
         let Some((_, back)) = camera.unproject_jacobian(&pixel) else { return f64::NAN };
@@ -98,7 +107,7 @@ pub(super) fn closed_form_gains(
     let usable = gains.iter().filter(|g| g.is_finite());
     let mean = usable.clone().sum::<f64>() / (usable.count().max(1) as f64);
     let relative = |g: &f64| if g.is_finite() && *g > 0.0 { (g / mean) as f32 } else { f32::NAN };
-    (gains.iter().map(relative).collect(), mean)
+    Gains { relative: gains.iter().map(relative).collect(), mean }
 }
 
 #[cfg(test)]
@@ -115,7 +124,7 @@ mod tests {
         let region = Region::new(&camera, &identity, &EdgeOptions::default(), None).unwrap();
         let centre = VanishingPoint::new(&camera, &identity).unwrap();
         assert!((centre.scale - 139.7).abs() < 1e-9);
-        let (gains, mean) = closed_form_gains(&camera, &identity, &region, &centre);
+        let Gains { relative: gains, mean } = closed_form_gains(&camera, &identity, &region, &centre);
         for ((_, _, bearing), gain) in region.pixels().zip(&gains) {
             let theta = bearing.xy().norm().atan2(bearing.z);
             let expected = 139.7 * (theta / theta.sin()).powi(2);

@@ -57,6 +57,15 @@ impl Method {
             Self::VectorConsensus { .. } => METHODS[3],
         }
     }
+
+    /// What the image-space methods have in common: the correction and the largest edge offset.
+    pub(super) fn offsets(&self) -> Option<(&Correction, f64)> {
+        match self {
+            Self::ImageSpaceRansac { correction, offset_max_px, .. }
+            | Self::ImageSpaceRejectRefit { correction, offset_max_px, .. } => Some((correction, *offset_max_px)),
+            Self::VectorConsensus { .. } | Self::Refined(_) => None,
+        }
+    }
 }
 
 /// Everything that can be chosen about a [`TiltEstimator`](super::TiltEstimator).

@@ -1,6 +1,5 @@
 //! Options by keyword: each name is set on the core's options of the method, and no default is written here.
 
-use numpy::{PyArray1, PyArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use tiltvp_core::edges::{Mask, NormalKind};
@@ -39,11 +38,17 @@ fn own(method: &Method) -> &'static [&'static str] {
 /// The core's options of a method with the user's values set.
 pub(super) fn parse(method: &str, given: Option<&Bound<'_, PyDict>>) -> PyResult<TiltOptions> {
     let mut options = TiltOptions::for_method(method).map_err(|error| exception(&error))?;
+    change(&mut options, given)?;
+    Ok(options)
+}
+
+/// Sets the user's values.
+pub(super) fn change(options: &mut TiltOptions, given: Option<&Bound<'_, PyDict>>) -> PyResult<()> {
     for (key, value) in given.into_iter().flat_map(PyDictMethods::iter) {
         let key: String = key.extract()?;
-        set(&mut options, &key, &value)?;
+        set(options, &key, &value)?;
     }
-    Ok(options)
+    Ok(())
 }
 
 fn set(options: &mut TiltOptions, key: &str, value: &Bound<'_, PyAny>) -> PyResult<()> {
@@ -150,11 +155,7 @@ pub(super) fn in_force<'py>(py: Python<'py>, options: &TiltOptions) -> PyResult<
     dict.set_item("elevation_max_rad", options.edges.elevation_max_rad)?;
     dict.set_item("margin_px", options.edges.margin_px)?;
     dict.set_item("tilt_max_rad", options.tilt_max_rad)?;
-    let mask = options.mask.as_ref().map(|mask| {
-        let (width, height) = mask.size();
-        let usable = (0..width * height).map(|i| mask.usable(i % width, i / width)).collect();
-        PyArray1::<bool>::from_vec(py, usable).reshape([height, width])
-    });
+    let mask = options.mask.as_ref().map(|mask| convert::to_mask(py, mask));
     dict.set_item("mask", mask.transpose()?)?;
     dict.set_item("seed", options.seed)?;
     let word = |correction: &Correction| -> PyResult<Py<PyAny>> {

@@ -1,0 +1,210 @@
+//! From edge pixels to an estimate: the fits of the methods, and what is concluded from them.
+
+use std::f64::consts::FRAC_PI_2;
+
+use nalgebra::{Matrix2, Vector2, Vector3};
+
+use super::confidence;
+use super::estimate::TiltEstimate;
+use super::estimator::TiltEstimator;
+use super::image_space::{Offsets, offsets};
+use super::options::Method;
+use super::refine::refine;
+use super::scratch::{Inliers, Work};
+use super::tables::Tables;
+use super::vector_consensus::vector_consensus;
+use crate::edges::{EdgePixels, LiftTable};
+use crate::geometry::{Tilt, tangent_basis};
+use crate::robust::{FitReport, Gate, RansacOptions, RejectRefitOptions, Stop, ransac, reject_refit};
+
+/// Change of the shift in pixels below which the paper's trimming has converged (section 2.1.4).
+const SHIFT_TOLERANCE_PX: f64 = 0.1;
+
+/// Most trimming rounds, `N_E` in the paper.
+const TRIMMING_ROUNDS: u32 = 15;
+
+/// How far in radians the edges of vertical things stray from the vertical, for the covariance of the paper's methods.
+const STRAY_RAD: f64 = 2.0 * std::f64::consts::PI / 180.0;
+
+/// A fit in the parameters of its rows, on the way to an estimate.
+struct Fit {
+    tilt: Option<Tilt>,
+    /// Row model and gate for the covariance.
+    model: [f64; 3],
+    gate: Gate,
+    /// From the row model's first two parameters to the horizontal part of the normal.
+    horizontal: Matrix2<f64>,
+    inliers: usize,
+    shift_px: Option<f64>,
+    rms: f64,
+    iterations: u32,
+    stop: Stop,
+}
+
+impl TiltEstimator {
+    /// The estimate of the edge pixels of an image. What passed a screen and what passed none give the same one: screens
+    /// keep out only what the prefilters reject.
+    pub(super) fn fit(&self, edges: &EdgePixels, work: &mut Work) -> TiltEstimate {
+        let fit = match &self.tables {
+            Tables::Offsets { gains, factor, offset_max_px } => {
+                self.fit_offsets(edges, &gains.relative, *factor, *offset_max_px, work)
+            }
+            Tables::Normals(table) => self.fit_normals(edges, table, work),
+        };
+        self.conclude(edges, &fit, work)
+    }
+
+    /// Paper 000 section 2.1.
+    fn fit_offsets(&self, edges: &EdgePixels, gains: &[f32], factor: f64, offset_max_px: f64, work: &mut Work) -> Fit {
+        work.inliers = Inliers::None;
+        let Some(centre) = &self.sight.centre else { return Fit::none() };
+        let Work { rows, weights, places, .. } = &mut *work;
+        offsets(edges, &self.sight.region, centre, gains, offset_max_px, rows, weights, places);
+        let sampling = self.options.sampling();
+        work.prepare(&sampling, edges);
+        let Work { rows, weights, quality, ransac: scratch, .. } = &mut *work;
+        let problem = Offsets::new(rows, quality);
+        let upright = Vector2::zeros();
+        let report: FitReport<Vector2<f64>> = match &self.options.method {
+            Method::ImageSpaceRejectRefit { keep_fraction, .. } => {
+                let options = RejectRefitOptions {
+                    keep_fraction: *keep_fraction,
+                    max_iterations: TRIMMING_ROUNDS,
+                    tolerance: SHIFT_TOLERANCE_PX,
+                    rms_min: 0.0,
+                };
+                reject_refit(&problem, &options, &upright, weights)
+            }
+            Method::ImageSpaceRansac { threshold_px, .. } => {
+                let seed = self.options.seed;
+                let options = RansacOptions { seed, sampling, ..RansacOptions::with_threshold(*threshold_px) };
+                ransac(&problem, &options, &upright, weights, scratch)
+            }
+            Method::VectorConsensus { .. } | Method::Refined(_) => return Fit::none(),
+        };
+        let shift = report.model.unwrap_or_default();
+        let (l, alpha) = (shift.norm(), shift.norm() / factor);
+        if alpha >= FRAC_PI_2 {
+            return Fit::out_of_reach(alpha, &report);
+        }
+        work.inliers = Inliers::weighted_if(report.model.is_some());
+        let lean = if l > 0.0 { centre.lean(&(shift / l)) } else { upright };
+        let lean = lean.try_normalize(1e-9).unwrap_or_default() * alpha.sin();
+        let tilt = report.model.and_then(|_| Tilt::from_normal(&Vector3::new(lean.x, lean.y, alpha.cos())));
+        Fit {
+            tilt,
+            model: [shift.x, shift.y, 1.0],
+            gate: Gate::Soft { scale: STRAY_RAD * factor },
+            horizontal: centre.direction() / factor,
+            inliers: report.inliers,
+            shift_px: report.model.map(|_| l),
+            rms: report.rms,
+            iterations: report.iterations,
+            stop: report.stop,
+        }
+    }
+
+    /// Paper 000 section 2.2, and the refined method.
+    fn fit_normals(&self, edges: &EdgePixels, table: &LiftTable, work: &mut Work) -> Fit {
+        let Work { rows, weights, places, .. } = &mut *work;
+        table.lift(edges, self.options.normal_tilt_max_rad().sin(), rows, weights, places);
+        let sampling = self.options.sampling();
+        work.prepare(&sampling, edges);
+        let Work { rows, weights, sparse, quality, ransac: scratch, inliers, .. } = &mut *work;
+        *inliers = Inliers::None;
+        let (report, gate, factor) = match &self.options.method {
+            Method::VectorConsensus { threshold_rad, factor, .. } => {
+                weights.fill(1.0);
+                let seed = self.options.seed;
+                let options = RansacOptions { seed, sampling, ..RansacOptions::with_threshold(threshold_rad.sin()) };
+                let rotation = &self.origin.robot_from_camera;
+                let report = vector_consensus(rows, quality, rotation, &options, weights, scratch);
+                *inliers = Inliers::weighted_if(report.model.is_some());
+                (report, Gate::Soft { scale: STRAY_RAD }, *factor)
+            }
+            Method::Refined(options) => {
+                let report = refine(rows, options, weights, sparse);
+                *inliers = report.model.map_or(Inliers::None, |direction| Inliers::Within {
+                    model: direction.into(),
+                    threshold: 2.0 * options.scale_rad,
+                });
+                (report, Gate::Soft { scale: options.scale_rad }, 1.0)
+            }
+            Method::ImageSpaceRansac { .. } | Method::ImageSpaceRejectRefit { .. } => return Fit::none(),
+        };
+        let tilt = report.model.and_then(|normal| Tilt::from_normal(&normal));
+        if let Some(alpha) = tilt.map(|tilt| tilt.alpha_rad() / factor).filter(|alpha| *alpha >= FRAC_PI_2) {
+            *inliers = Inliers::None;
+            return Fit::out_of_reach(alpha, &report);
+        }
+        let tilt = tilt.map(|tilt| {
+            if factor == 1.0 { tilt } else { Tilt::from_alpha_beta(tilt.alpha_rad() / factor, tilt.beta_rad()) }
+        });
+        Fit {
+            tilt,
+            model: report.model.unwrap_or_default().into(),
+            gate,
+            horizontal: Matrix2::identity() / factor,
+            inliers: match *inliers {
+                Inliers::Within { model, threshold } => rows.count_within(model, threshold),
+                Inliers::None | Inliers::Weighted => report.inliers,
+            },
+            shift_px: None,
+            rms: report.rms,
+            iterations: report.iterations,
+            stop: report.stop,
+        }
+    }
+
+    /// Adds covariance and confidence.
+    fn conclude(&self, edges: &EdgePixels, fit: &Fit, work: &Work) -> TiltEstimate {
+        let slots = edges.slot();
+        let sector = |row: usize| {
+            let slot = work.places.get(row).and_then(|place| slots.get(*place as usize));
+            slot.and_then(|slot| self.sight.sectors.get(*slot as usize)).copied().unwrap_or(0)
+        };
+        // The paper's methods end with weights of what they have selected, which cannot tell how sure the selection was.
+        let weights = matches!(self.options.method, Method::Refined(_)).then_some(&work.weights[..]);
+        let covariance = fit.tilt.and_then(|tilt| {
+            let covariance = confidence::clustered_covariance(&work.rows, fit.model, fit.gate, weights, sector)?;
+            // A change of the normal's horizontal part is a change in its tangent plane, seen along the vertical.
+            let plane = tangent_basis(&tilt.normal()).fixed_rows::<2>(0).try_inverse()? * fit.horizontal;
+            Some(confidence::with_floor(plane * covariance * plane.transpose()))
+        });
+        TiltEstimate {
+            tilt: fit.tilt,
+            covariance_rad2: covariance.unwrap_or(Matrix2::from_diagonal_element(f64::INFINITY)),
+            confidence: covariance.map_or(0.0, |covariance| confidence::confidence(&covariance)),
+            edge_pixels: edges.strong(),
+            prefiltered_pixels: work.rows.len(),
+            inlier_pixels: fit.inliers,
+            shift_px: fit.shift_px,
+            residual_rms: fit.rms,
+            iterations: fit.iterations,
+            stop: fit.stop,
+        }
+    }
+}
+
+impl Fit {
+    /// A fit with a lean that no image of a band of elevations can show.
+    fn out_of_reach<M>(alpha: f64, report: &FitReport<M>) -> Self {
+        let stop = Stop::OutOfReach { angle_rad: alpha, limit_rad: FRAC_PI_2 };
+        Self { iterations: report.iterations, stop, ..Self::none() }
+    }
+
+    /// No fit at all: the method has no tables of this kind.
+    fn none() -> Self {
+        Self {
+            tilt: None,
+            model: [0.0; 3],
+            gate: Gate::Open,
+            horizontal: Matrix2::identity(),
+            inliers: 0,
+            shift_px: None,
+            rms: f64::NAN,
+            iterations: 0,
+            stop: Stop::NoModel { trials: 0 },
+        }
+    }
+}
