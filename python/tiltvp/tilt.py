@@ -65,6 +65,9 @@ class TiltEstimator(_core.TiltEstimator):
         Of the image-space methods; `correction` is "closed-form" (default), a factor in pixels per radian, or None.
     threshold_rad, normal, correction
         Of "vector-consensus"; `normal` is "gradient" (the paper's) or "tangent", `correction` a factor without unit.
+    sampling, local_optimization, score, verification
+        Of "image-space-ransac" and "vector-consensus": "uniform" (default), "progressive" or "prosac"; a bool; "count"
+        (default), "msac" or "magsac"; "full" (default) or "sprt".
     """
 
     __slots__ = ()

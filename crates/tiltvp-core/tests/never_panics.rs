@@ -105,7 +105,7 @@ fn number(low: f64, high: f64) -> impl Strategy<Value = f64> {
 fn sampling() -> impl Strategy<Value = Sampling> {
     let order = prop_oneof![
         Just(SampleOrder::Uniform),
-        (0..100_000u32, number(0.01, 0.99))
+        (0..100_000u32, proptest::option::of(number(0.01, 0.99)))
             .prop_map(|(uniform_after, chance_share)| SampleOrder::Progressive { uniform_after, chance_share }),
     ];
     let local_optimization = proptest::option::of(

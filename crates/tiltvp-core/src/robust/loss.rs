@@ -72,7 +72,7 @@ impl Gate {
         let (limit, inverse) = self.coefficients();
         let squared = residual * residual;
         if matches!(self, Self::Marginal { .. }) {
-            return f64::from(MARGINAL.weight[cell((residual.abs() * inverse.sqrt()) as f32)]);
+            return f64::from(MARGINAL.weight[cell(((squared * inverse) as f32).sqrt())]);
         }
         if squared > limit { 0.0 } else { (1.0 - squared * inverse).max(0.0).powi(8) }
     }

@@ -5,6 +5,9 @@ use super::problem::Problem;
 /// The 95 % quantile of the chi-squared distribution that PROSAC's non-randomness test uses, for one side: `1.645^2`.
 const NON_RANDOM: f64 = 2.706;
 
+/// The shortest beginning that can end the sampling, as in USAC (Raguram et al. 2013).
+const SHORTEST: usize = 20;
+
 /// The beginning of `order`, or the whole, from which a sample of inliers is most probable: its size, that probability and
 /// its share of inliers. `inliers` is the number among all observations.
 pub(super) fn best_beginning<P: Problem>(
@@ -21,11 +24,11 @@ pub(super) fn best_beginning<P: Problem>(
     for (place, observation) in order.iter().enumerate() {
         count += problem.consensus_among(std::slice::from_ref(observation), model, threshold);
         let n = place + 1;
-        if n <= P::SAMPLE_SIZE || n == len {
+        if n < SHORTEST || n == len {
             continue;
         }
         // I_n >= I_n,min: more agree than the sample itself and chance explain, eqs. 7 to 9 by the normal approximation.
-        let others = (n - P::SAMPLE_SIZE) as f64;
+        let others = n.saturating_sub(P::SAMPLE_SIZE) as f64;
         let spread = (NON_RANDOM * others * chance_share * (1.0 - chance_share)).sqrt();
         let least = P::SAMPLE_SIZE as f64 + others * chance_share + spread;
         let probability = all_inliers(count, n, P::SAMPLE_SIZE);

@@ -134,8 +134,10 @@ pub fn ransac<P: Problem>(
             _ => problem.consensus(&model, threshold, 0),
         };
         let (pool, chance, share) = match sampling.order {
-            SampleOrder::Uniform => (len, all_inliers(inliers, len, P::SAMPLE_SIZE), inliers as f64 / len as f64),
-            SampleOrder::Progressive { chance_share, .. } => {
+            SampleOrder::Uniform | SampleOrder::Progressive { chance_share: None, .. } => {
+                (len, all_inliers(inliers, len, P::SAMPLE_SIZE), inliers as f64 / len as f64)
+            }
+            SampleOrder::Progressive { chance_share: Some(chance_share), .. } => {
                 best_beginning(problem, &model, threshold, inliers, order, chance_share)
             }
         };

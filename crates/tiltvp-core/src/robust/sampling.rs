@@ -21,14 +21,15 @@ pub enum SampleOrder {
     /// From all, alike.
     #[default]
     Uniform,
-    /// PROSAC (Chum and Matas 2005): from a pool of the best observations by [`Problem::quality`](super::Problem::quality)
-    /// that grows with the trials. Sampling stops when the whole or any beginning of the order, more consistent than
-    /// chance explains, holds enough inliers.
+    /// From a pool of the best observations by [`Problem::quality`](super::Problem::quality) that grows with the trials, as
+    /// PROSAC draws them (Chum and Matas 2005).
     Progressive {
         /// Trials after which the samples are those of uniform sampling, `T_N`. Default 200 000.
         uniform_after: u32,
-        /// Share of observations that agree with a wrong model by chance, `beta`, in (0, 1). Default 0.05.
-        chance_share: f64,
+        /// PROSAC's own stop, for observations whose errors are independent: sampling also ends when any beginning of the
+        /// order holds enough inliers, more than this share, `beta` in (0, 1), of chance agreement explains. Default none:
+        /// edge pixels repeat one another, and the few best may all lie on one wrong structure.
+        chance_share: Option<f64>,
     },
 }
 
@@ -66,9 +67,9 @@ pub enum Verification {
     #[default]
     Full,
     /// Wald's sequential probability ratio test on observations in random order (Matas and Chum 2005): a model is given up
-    /// as soon as it is likely to be a bad one. The shares are first guesses, which the loop replaces by what it finds.
+    /// as soon as it is likely to be a bad one. The shares are first guesses: the loop raises the one and learns the other.
     Sprt {
-        /// Share of observations that agree with a good model, `epsilon`, in (0, 1). Default 0.1.
+        /// Least share of observations that agree with a good model, `epsilon`, in (0, 1). Default 0.1.
         inlier_share: f64,
         /// Share that agrees with a bad one, `delta`, in (0, 1) and below `inlier_share`. Default 0.05.
         chance_share: f64,
@@ -78,9 +79,14 @@ pub enum Verification {
 }
 
 impl SampleOrder {
-    /// PROSAC with the constants of its authors.
+    /// The samples of PROSAC, stopped as uniform ones are.
     pub fn progressive() -> Self {
-        Self::Progressive { uniform_after: 200_000, chance_share: 0.05 }
+        Self::Progressive { uniform_after: 200_000, chance_share: None }
+    }
+
+    /// PROSAC with its own stop and the constants of its authors.
+    pub fn prosac() -> Self {
+        Self::Progressive { uniform_after: 200_000, chance_share: Some(0.05) }
     }
 }
 
@@ -118,7 +124,7 @@ impl Sampling {
             if uniform_after == 0 {
                 return Err(Error::option("uniform_after", uniform_after, "at least 1"));
             }
-            share("chance_share", chance_share)?;
+            chance_share.map_or(Ok(()), |value| share("chance_share", value))?;
         }
         if let Some(LocalOptimization { iterations, widening }) = self.local_optimization {
             if !(1..=1000).contains(&iterations) {
@@ -154,7 +160,7 @@ mod tests {
     #[test]
     fn wrong_values_are_refused_by_name() {
         let order = |uniform_after, chance_share| Sampling {
-            order: SampleOrder::Progressive { uniform_after, chance_share },
+            order: SampleOrder::Progressive { uniform_after, chance_share: Some(chance_share) },
             ..Sampling::default()
         };
         let local = |iterations, widening| Sampling {
@@ -181,7 +187,7 @@ mod tests {
             assert!(error.contains(name), "{name}: {error}");
         }
         let all = Sampling {
-            order: SampleOrder::progressive(),
+            order: SampleOrder::prosac(),
             local_optimization: Some(LocalOptimization::default()),
             score: Score::magsac(),
             verification: Verification::sprt(),

@@ -12,23 +12,58 @@ pub(super) const CELLS: usize = 1024;
 /// The quantile `k` of the normal distribution below whose absolute value 99 % lies: the threshold over the largest scale.
 const QUANTILE: f64 = 2.575_829_303_548_901;
 
-/// Gain and weight of MAGSAC++ by `|residual| / threshold`, at the middles of cells; zero from the threshold on.
+/// Degree of the polynomial that stands for the gain of MAGSAC++.
+pub(super) const DEGREE: usize = 10;
+
+/// Gain and weight of MAGSAC++ by `|residual| / threshold`.
 pub(super) struct Marginal {
-    pub(super) gain: [f32; 2 * CELLS],
+    /// Coefficients of the gain's polynomial in `2 |residual| / threshold - 1`, the constant first; off by less than 1e-3.
+    pub(super) gain: [f32; DEGREE + 1],
+    /// The weight at the middles of cells, one in the first; zero from the threshold on.
     pub(super) weight: [f32; 2 * CELLS],
 }
 
 /// The tables: the same numbers for every threshold.
 pub(super) static MARGINAL: LazyLock<Marginal> = LazyLock::new(|| {
-    let mut tables = Marginal { gain: [0.0; 2 * CELLS], weight: [0.0; 2 * CELLS] };
-    let most = weight_at(0.5 / CELLS as f64);
-    for cell in 0..CELLS {
-        let part = (cell as f64 + 0.5) / CELLS as f64;
-        tables.gain[cell] = gain_at(part) as f32;
-        tables.weight[cell] = (weight_at(part) / most) as f32;
+    let mut weight = [0.0; 2 * CELLS];
+    for (cell, weight) in weight.iter_mut().take(CELLS).enumerate() {
+        *weight = (weight_at((cell as f64 + 0.5) / CELLS as f64) / weight_most()) as f32;
     }
-    tables
+    Marginal { gain: gain_polynomial(), weight }
 });
+
+/// Interpolation at Chebyshev's points, by Newton's divided differences multiplied out.
+fn gain_polynomial() -> [f32; DEGREE + 1] {
+    let count = (DEGREE + 1) as f64;
+    let points: [f64; DEGREE + 1] = std::array::from_fn(|i| (std::f64::consts::PI * (i as f64 + 0.5) / count).cos());
+    let mut differences = points.map(|point| gain_at(0.5 * (point + 1.0)));
+    for order in 1..=DEGREE {
+        for i in (order..=DEGREE).rev() {
+            differences[i] = (differences[i] - differences[i - 1]) / (points[i] - points[i - order]);
+        }
+    }
+    let mut coefficients = [0.0; DEGREE + 1];
+    for i in (0..=DEGREE).rev() {
+        // Multiplied by (x - point), then the difference added.
+        for power in (0..=DEGREE).rev() {
+            let below = if power > 0 { coefficients[power - 1] } else { differences[i] };
+            coefficients[power] = below - points[i] * coefficients[power];
+        }
+    }
+    coefficients.map(|coefficient| coefficient as f32)
+}
+
+/// The gain of MAGSAC++ for a residual, given as a share of the threshold that is not negative.
+#[inline(always)]
+pub(super) fn marginal_gain(coefficients: &[f32; DEGREE + 1], part: f32) -> f32 {
+    let x = 2.0 * part - 1.0;
+    let mut gain = coefficients[DEGREE];
+    for power in (0..DEGREE).rev() {
+        gain = gain * x + coefficients[power];
+    }
+    let gain = if gain < 1.0 { gain } else { 1.0 };
+    if part < 1.0 && gain > 0.0 { gain } else { 0.0 }
+}
 
 /// The cell of a residual, given as a share of the threshold that is not negative.
 #[inline(always)]
@@ -91,7 +126,7 @@ impl Score {
         match self {
             Self::Count => f64::from(u8::from(part <= 1.0)),
             Self::Msac => (1.0 - part * part).max(0.0),
-            Self::Magsac { .. } => f64::from(MARGINAL.gain[cell(part as f32)]),
+            Self::Magsac { .. } => f64::from(marginal_gain(&MARGINAL.gain, part as f32)),
         }
     }
 
@@ -120,7 +155,7 @@ impl Score {
 }
 
 /// Change, in thresholds, below which sigma-consensus++ has converged.
-const STILL: f64 = 1e-4;
+const STILL: f64 = 1e-3;
 
 #[cfg(test)]
 mod tests {
@@ -156,9 +191,13 @@ mod tests {
     fn gains_fall_from_one_to_nothing() {
         for score in [Score::Count, Score::Msac, Score::magsac()] {
             let gains: Vec<f64> = (0..300).map(|i| score.gain(-0.01 * f64::from(i), 2.0)).collect();
-            assert!(gains[0] > 0.99 && gains.windows(2).all(|pair| pair[0] >= pair[1]), "{score:?}");
+            assert!(gains[0] > 0.99 && gains.windows(2).all(|pair| pair[0] >= pair[1] - 1e-3), "{score:?}");
             assert!(gains[201..].iter().all(|gain| *gain == 0.0), "{score:?}");
         }
         assert_eq!(Score::magsac().gain(f64::MAX, 1e-3), 0.0);
+        for i in 0..=1000 {
+            let part = 0.001 * f64::from(i);
+            assert!((Score::magsac().gain(part, 1.0) - gain_at(part.max(1e-12))).abs() < 1e-3, "{part}");
+        }
     }
 }

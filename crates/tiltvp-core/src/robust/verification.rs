@@ -69,6 +69,8 @@ impl Test {
 pub(super) struct Verifier<'a> {
     probes: &'a [u32],
     model_cost: f64,
+    /// Least share that a good model is taken to have.
+    least: f64,
     test: Option<Test>,
     /// Tests that were in force before, each with the number of trials it was.
     past: [(Option<Test>, u32); RECORDS],
@@ -82,14 +84,14 @@ pub(super) struct Verifier<'a> {
 impl<'a> Verifier<'a> {
     /// `probes` are observations in random order.
     pub(super) fn new(options: Verification, probes: &'a [u32]) -> Self {
-        let (model_cost, test, chance) = match options {
-            Verification::Full => (0.0, None, (0.0, 0.0)),
+        let (model_cost, least, test, chance) = match options {
+            Verification::Full => (0.0, 0.0, None, (0.0, 0.0)),
             Verification::Sprt { inlier_share, chance_share, model_cost } => {
                 let test = Test::design(inlier_share, chance_share, model_cost);
-                (model_cost, Some(test), (chance_share, 1.0))
+                (model_cost, inlier_share, Some(test), (chance_share, 1.0))
             }
         };
-        Self { probes, model_cost, test, past: [(None, 0); RECORDS], records: 0, trials: 0, chance }
+        Self { probes, model_cost, least, test, past: [(None, 0); RECORDS], records: 0, trials: 0, chance }
     }
 
     /// Whether a model is worth scoring. The share that agreed is learnt as that of a bad model if it is not.
@@ -127,7 +129,7 @@ impl<'a> Verifier<'a> {
     /// Learns that a share agrees with the best model.
     pub(super) fn learn_good(&mut self, share: f64) {
         if self.test.is_some() {
-            self.redesign(share, self.chance.0 / self.chance.1);
+            self.redesign(share.max(self.least), self.chance.0 / self.chance.1);
         }
     }
 
@@ -195,5 +197,76 @@ mod tests {
         assert!(tested.trials_needed(0, 1.0 / 6.0, 0.5, 0.9999) >= exact);
         tested.learn_good(0.5);
         assert!(tested.trials_needed(0, 1.0 / 6.0, 0.5, 0.9999) >= exact);
+    }
+
+    /// Models with a known share of agreeing observations, in an order that the model decides.
+    struct Agreement;
+
+    impl Problem for Agreement {
+        type Model = (u64, f64);
+        type Summary = ();
+        const SAMPLE_SIZE: usize = 1;
+
+        fn len(&self) -> usize {
+            PROBES
+        }
+        fn fit_minimal(&self, _: &[usize]) -> Option<Self::Model> {
+            None
+        }
+        fn consensus(&self, _: &Self::Model, _: f64, _: usize) -> usize {
+            0
+        }
+        fn consensus_among(&self, observations: &[u32], (model, share): &Self::Model, _: f64) -> usize {
+            let dice = |i: &u32| {
+                let mut x = (model << 32 | u64::from(*i)).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+                for _ in 0..3 {
+                    x = (x ^ (x >> 31)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+                }
+                (x >> 11) as f64 / (1u64 << 53) as f64
+            };
+            observations.iter().filter(|i| dice(i) < *share).count()
+        }
+        fn support(&self, _: &Self::Model, _: f64, _: super::super::Score, _: f64) -> f64 {
+            0.0
+        }
+        fn quality(&self, _: usize) -> f32 {
+            0.0
+        }
+        fn summarise(&self, _: &Self::Model, _: super::super::Gate, _: &mut [f32]) {}
+        fn fit(&self, (): &(), _: &Self::Model) -> Option<Self::Model> {
+            None
+        }
+        fn rms(&self, (): &(), _: &Self::Model) -> f64 {
+            0.0
+        }
+        fn count((): &()) -> usize {
+            0
+        }
+        fn distance(&self, _: &Self::Model, _: &Self::Model) -> f64 {
+            0.0
+        }
+    }
+
+    /// Of 20 000 good models at most a share `1 / A` is rejected (looks at every 16th observation reject fewer), and of bad
+    /// ones most are; the seeds are fixed.
+    #[test]
+    fn good_models_pass_at_the_stated_rate() {
+        let probes: Vec<u32> = (0..PROBES as u32).collect();
+        let options = Verification::Sprt { inlier_share: 0.4, chance_share: 0.15, model_cost: 100.0 };
+        let rejected = |share: f64| {
+            let count = 20_000;
+            let lost = (0..count).filter(|model| {
+                // A verifier of its own for each, so that nothing is learnt.
+                !Verifier::new(options, &probes).passes(&Agreement, &(*model, share), 1.0)
+            });
+            lost.count() as f64 / count as f64
+        };
+        let test = Test::design(0.4, 0.15, 100.0);
+        let stated = 1.0 / test.limit;
+        assert!(stated > 0.02 && stated < 0.1, "{stated}");
+        let (good, better, bad) = (rejected(0.4), rejected(0.5), rejected(0.15));
+        assert!(good < stated && good > 0.1 * stated, "{good} {stated}");
+        assert!(better < 1.0 - test.passes(0.5), "{better}");
+        assert!(bad > 0.9, "{bad}");
     }
 }

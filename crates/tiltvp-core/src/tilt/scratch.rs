@@ -25,11 +25,17 @@ pub(super) struct Work {
     pub sparse: Sparse<f32>,
     /// Place of each row among the edge pixels.
     pub places: Vec<u32>,
-    /// Squared gradient of each row, where samples are drawn in its order.
+    /// How promising each row is, where samples are drawn in its order.
     pub quality: Vec<f32>,
     pub ransac: RansacScratch,
     pub inliers: Inliers,
 }
+
+/// Pixels of one edge repeat one another: one in two to the power of this, scattered over the image, comes before the rest.
+const SPREAD_BITS: u32 = 4;
+
+/// A factor that is below the ratio of any two squared gradients.
+const LATER: f32 = 1e-18;
 
 /// What an estimator's scratch depends on.
 #[derive(Debug, Clone, PartialEq)]
@@ -89,16 +95,21 @@ impl Scratch {
 }
 
 impl Work {
-    /// Makes room for the way of sampling, and sets the quality of the rows if samples are drawn in its order.
+    /// Makes room for the way of sampling, and sets the quality of the rows, their squared gradients, if samples
+    /// are drawn in that order.
     pub(super) fn prepare(&mut self, sampling: &Sampling, edges: &EdgePixels) {
         let room = self.weights.capacity();
         self.ransac.reserve(sampling, room);
         self.quality.clear();
         if sampling.order != SampleOrder::Uniform {
             self.quality.reserve(room);
-            let (gx, gy) = (edges.gx(), edges.gy());
-            let squared = |place: &u32| gx[*place as usize].powi(2) + gy[*place as usize].powi(2);
-            self.quality.extend(self.places.iter().map(squared));
+            let (slots, gx, gy) = (edges.slot(), edges.gx(), edges.gy());
+            let quality = |place: &u32| {
+                let place = *place as usize;
+                let first = slots[place].wrapping_mul(0x9e37_79b1) >> (32 - SPREAD_BITS) == 0;
+                (gx[place].powi(2) + gy[place].powi(2)) * if first { 1.0 } else { LATER }
+            };
+            self.quality.extend(self.places.iter().map(quality));
         }
     }
 

@@ -16,7 +16,8 @@ pub(super) fn set(sampling: &mut Sampling, key: &str, value: &Bound<'_, PyAny>) 
     match (key, word.as_deref()) {
         ("sampling", Some("uniform")) => sampling.order = SampleOrder::Uniform,
         ("sampling", Some("progressive")) => sampling.order = SampleOrder::progressive(),
-        ("sampling", _) => return refused("\"uniform\" or \"progressive\""),
+        ("sampling", Some("prosac")) => sampling.order = SampleOrder::prosac(),
+        ("sampling", _) => return refused("\"uniform\", \"progressive\" or \"prosac\""),
         ("score", Some("count")) => sampling.score = Score::Count,
         ("score", Some("msac")) => sampling.score = Score::Msac,
         ("score", Some("magsac")) => sampling.score = Score::magsac(),
@@ -36,7 +37,8 @@ pub(super) fn set(sampling: &mut Sampling, key: &str, value: &Bound<'_, PyAny>) 
 pub(super) fn in_force(dict: &Bound<'_, PyDict>, sampling: &Sampling) -> PyResult<()> {
     let order = match sampling.order {
         SampleOrder::Uniform => "uniform",
-        SampleOrder::Progressive { .. } => "progressive",
+        SampleOrder::Progressive { chance_share: None, .. } => "progressive",
+        SampleOrder::Progressive { chance_share: Some(_), .. } => "prosac",
     };
     let score = match sampling.score {
         Score::Count => "count",
