@@ -57,8 +57,8 @@ def test_wrong_words_are_refused_by_name(option: dict[str, object], words: str) 
 
 
 def test_the_table_has_a_row_for_each_way_and_says_what_pays() -> None:
-    table = sample_views(room_views(1, CAMERA, samples=1, kinds=("office", "corridor")), CAMERA, seeds=2)
-    assert len(table) == 2 * 7 * len(SAMPLERS) * len(WAYS) * 2
+    table = sample_views(room_views(1, CAMERA, samples=1, kinds=("office", "corridor")), CAMERA, seeds=1)
+    assert len(table) == 2 * 7 * len(SAMPLERS) * len(WAYS)
     summary = summarise_sampling(table)
     assert summary["way"].to_list() == list(WAYS) * len(SAMPLERS)
     plain = summary.filter(pl.col("way") == "plain")

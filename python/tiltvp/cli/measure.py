@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 from cyclopts import App, Parameter
 
 from tiltvp.cli.terminal import new_table, progress_bar, say, show
+from tiltvp.errors import InvalidInputError
 
 if TYPE_CHECKING:
     import polars as pl
@@ -117,6 +118,8 @@ def sampling(
     from tiltvp.evaluation.sampling import panorama_views, room_views, sample_views, summarise_sampling
     from tiltvp.synth import ROOM_KINDS
 
+    if directory is None and rooms <= 0:
+        raise InvalidInputError(f"--rooms {rooms}, expected a folder of panoramas, or rooms to render")
     chosen = [] if directory is None else read_panorama_index(directory)[::every]
     camera, kinds = paper_camera(), ROOM_KINDS if kind is None else (kind,)
     sources = {
@@ -137,8 +140,9 @@ def sampling(
         summary = summarise_sampling(table)
         for (method,), part in summary.group_by("method", maintain_order=True):
             _show(f"{title}, {method}: degrees (eq. 44)", part.drop("method"), "way")
-            paying = part.filter(~pl.col("pays").is_in(["", "no"]))["way"].to_list()
-            say(f"Pays: {'; '.join(paying) or 'none'}.")
+            paying = part.filter(~pl.col("pays").is_in(["", "no"])).select("way", "pays", "image").iter_rows()
+            words = [f"{way} (in {what}, at {image:.2f} of an image's time)" for way, what, image in paying]
+            say(f"Pays: {'; '.join(words) or 'none'}.")
     if out is not None and tables:
         pl.concat(tables).write_parquet(out)
 
