@@ -7,6 +7,15 @@ pixel centres at integers. `robot_from_camera` is R in v_robot = R v_camera. A l
 
 from tiltvp._core import METHODS
 from tiltvp.cameras import Camera
+from tiltvp.corrections import (
+    AffineCorrection,
+    PosteriorCorrection,
+    PriorOfTilt,
+    apply_correction,
+    train_affine,
+    train_factor,
+    train_posterior,
+)
 from tiltvp.images import read_image, write_image
 from tiltvp.plots.overlay import draw_edges
 from tiltvp.tilt import (
@@ -26,18 +35,25 @@ __version__ = "0.1.0"
 
 __all__ = [
     "METHODS",
+    "AffineCorrection",
     "Camera",
     "CommonDirection",
     "EdgeElements",
     "FitReport",
     "ImageEdges",
+    "PosteriorCorrection",
+    "PriorOfTilt",
     "TiltEstimate",
     "TiltEstimator",
+    "apply_correction",
     "common_direction",
     "draw_edges",
     "level",
     "normal_from_alpha_beta",
     "read_image",
     "tilt_error_rad",
+    "train_affine",
+    "train_factor",
+    "train_posterior",
     "write_image",
 ]

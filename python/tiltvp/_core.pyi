@@ -14,18 +14,26 @@ __all__ = [
     "CAMERA_MODELS",
     "METHODS",
     "ROOM_KINDS",
+    "AffineCorrection",
     "Camera",
     "CommonDirection",
     "EdgeElements",
     "FitReport",
+    "ImageEdges",
+    "PosteriorCorrection",
+    "PriorOfTilt",
     "TiltEstimate",
     "TiltEstimator",
+    "apply_correction",
     "common_direction",
     "leaning_from_upright",
     "level_map",
     "normal_from_alpha_beta",
     "render_room",
     "tilt_error_rad",
+    "train_affine",
+    "train_factor",
+    "train_posterior",
 ]
 
 _Method: TypeAlias = Literal["refined", "image-space-ransac", "image-space-reject-refit", "vector-consensus"]
@@ -207,7 +215,8 @@ class TiltEstimate:
         """(2, 2) in squared radians: covariance of the normal in its tangent plane.
 
         Its axes are the robot's x and y, turned by the smallest rotation that takes z to the normal. Pixels of one edge
-        err together, so residuals are summed over 64 sectors of azimuth; 0.25 degrees a side stand for what no image
+        err together, so residuals are pooled over 64 sectors of azimuth; to them come the pull of a little unnoticed
+        clutter, a fifth of the lean for methods that approximate the lens, and 0.17 degrees a side for what no image
         tells.
         """
 
@@ -294,7 +303,7 @@ class EdgeElements:
 
 @final
 class ImageEdges:
-    """The edge pixels of one image and their gradients: every pixel of the band with a gradient of at least `gradient_min`.
+    """The edge pixels of one image and their gradients: every pixel of the band of at least `gradient_min`.
 
     `TiltEstimator.detect` makes them, `TiltEstimator.estimate_edges` takes them. Frozen, comparable, to be pickled.
     """
@@ -308,6 +317,119 @@ class ImageEdges:
     def __copy__(self) -> Self: ...
     def __deepcopy__(self, _memo: object) -> Self: ...
     __hash__: ClassVar[None]  # type: ignore[assignment]
+
+@final
+class AffineCorrection:
+    """alpha = shift / factor + offset_rad, but not below zero. Frozen, comparable, hashable, pickled.
+
+    Raises `tiltvp.errors.InvalidInputError` unless the factor is positive and both are finite.
+    """
+
+    def __new__(cls, factor: float, offset_rad: float) -> Self: ...
+    @property
+    def factor(self) -> float:
+        """Units of the shift per radian: pixels per radian, or none for raw angles."""
+
+    @property
+    def offset_rad(self) -> float:
+        """What is added, in radians."""
+
+    def to_dict(self) -> dict[str, float]:
+        """The attributes by name."""
+
+    @classmethod
+    def from_dict(cls, values: dict[str, Any]) -> Self:
+        """The correction of a dict as `to_dict` makes it."""
+
+    def __eq__(self, other: object, /) -> bool: ...
+    def __hash__(self) -> int: ...
+    def __copy__(self) -> Self: ...
+    def __deepcopy__(self, _memo: object) -> Self: ...
+
+@final
+class PosteriorCorrection:
+    """The mean and deviation of P(alpha | l) over a grid of shifts from zero, and the model of shifts behind it.
+
+    `train_posterior` makes them. Applying one is one interpolation; shifts beyond the grid have the answer of its end.
+    Frozen, comparable, hashable, pickled.
+    """
+
+    def __new__(
+        cls,
+        *,
+        factor: float,
+        spread: float,
+        spread_per_rad: float,
+        stray_share: float,
+        stray_max: float,
+        step: float,
+        mean_rad: ArrayLike,
+        std_rad: ArrayLike,
+    ) -> Self: ...
+    @property
+    def factor(self) -> float:
+        """Units of the shift per radian, by and large."""
+
+    @property
+    def spread(self) -> float:
+        """Standard deviation of the error of the upright robot's shift in each direction, in units of the shift."""
+
+    @property
+    def spread_per_rad(self) -> float:
+        """How it grows with the lean, in units of the shift per radian."""
+
+    @property
+    def stray_share(self) -> float:
+        """Share of shifts that have nothing to do with the lean."""
+
+    @property
+    def stray_max(self) -> float:
+        """Largest of these, in units of the shift."""
+
+    @property
+    def step(self) -> float:
+        """Distance between the shifts of the table, which begins at zero."""
+
+    @property
+    def mean_rad(self) -> NDArray[np.float64]:
+        """(N,): the mean lean in radians at each shift of the table; never falls."""
+
+    @property
+    def std_rad(self) -> NDArray[np.float64]:
+        """(N,): the standard deviation of the lean in radians at each shift of the table."""
+
+    def to_dict(self) -> dict[str, Any]:
+        """The attributes by name, arrays as lists."""
+
+    @classmethod
+    def from_dict(cls, values: dict[str, Any]) -> Self:
+        """The correction of a dict as `to_dict` makes it."""
+
+    def __eq__(self, other: object, /) -> bool: ...
+    def __hash__(self) -> int: ...
+    def __copy__(self) -> Self: ...
+    def __deepcopy__(self, _memo: object) -> Self: ...
+
+@final
+class PriorOfTilt:
+    """How leans are distributed where the robot goes. Frozen, comparable, hashable, pickled."""
+
+    @staticmethod
+    def empirical() -> PriorOfTilt:
+        """As in the training set, smoothed."""
+
+    @staticmethod
+    def uniform(max_rad: float) -> PriorOfTilt:
+        """Every lean up to `max_rad`, in (0, pi/2), is as likely."""
+
+    @staticmethod
+    def rayleigh(sigma_rad: float) -> PriorOfTilt:
+        """Leans forward and sideways are independent and normal, each with standard deviation `sigma_rad`."""
+
+    def __eq__(self, other: object, /) -> bool: ...
+    def __hash__(self) -> int: ...
+    def __copy__(self) -> Self: ...
+    def __deepcopy__(self, _memo: object) -> Self: ...
 
 @disjoint_base
 class TiltEstimator:
@@ -336,14 +458,14 @@ class TiltEstimator:
         tolerance_rad: float = ...,
         max_iterations: SupportsIndex = ...,
         threshold_px: float = ...,
-        offset_max_px: float = ...,
+        offset_max_px: float | None = ...,
         threshold_rad: float = ...,
         normal: Literal["gradient", "tangent"] = ...,
         sampling: Literal["uniform", "progressive", "prosac"] = ...,
         local_optimization: bool = ...,
         score: Literal["count", "msac", "magsac"] = ...,
         verification: Literal["full", "sprt"] = ...,
-        correction: float | Literal["closed-form"] | None = ...,
+        correction: float | AffineCorrection | PosteriorCorrection | Literal["closed-form"] | None = ...,
     ) -> Self:
         """Makes the tables. Defaults depend on the method; `options` tells those in force.
 
@@ -383,7 +505,8 @@ class TiltEstimator:
         threshold_px
             "image-space-ransac": largest residual of an inlier, delta_s,max of eq. 32.
         offset_max_px
-            Image-space methods: largest edge offset that passes the prefilter, s_max.
+            Image-space methods: largest edge offset that passes the prefilter, s_max. None: the paper's 40 for its lens
+            of 139.7 pixels per radian about the vertical, and in proportion for others.
         threshold_rad
             "vector-consensus": largest angle between an inlier's great circle and the vertical, delta_o,max of eq. 40.
         normal
@@ -404,7 +527,8 @@ class TiltEstimator:
         correction
             Image-space methods: "closed-form" divides each offset by its pixel's own gain, a number is the factor a of
             eq. 30 in pixels per radian, None is the lens' own scale of eq. 26. "vector-consensus": a number is the
-            factor a' of eq. 45, None is 1.
+            factor a' of eq. 45, None is 1. Both: an `AffineCorrection` or a `PosteriorCorrection`, trained on shifts in
+            pixels or on raw angles.
 
         Raises `tiltvp.errors.InvalidInputError` for an option that the method does not have (it names the near ones) or
         that is out of its domain, for an R that is no rotation, for a mask of another size than the camera's images,
@@ -440,9 +564,9 @@ class TiltEstimator:
     def estimate_edges(self, edges: ImageEdges) -> TiltEstimate:
         """The tilt of the image that the edges are of, the same to the last bit as the image itself gives.
 
-        `edges` may be those of any estimator with equal camera, robot_from_camera, mask and edge options (gradient_min,
-        smoothing_px, elevations, margin_px); else `tiltvp.errors.InvalidInputError` says what differs. Other threads run
-        meanwhile.
+        `edges` may be those of any estimator with equal camera, robot_from_camera, mask and edge options
+        (gradient_min, smoothing_px, elevations, margin_px); else `tiltvp.errors.InvalidInputError` says what differs.
+        Other threads run meanwhile.
         """
 
     def _estimate_with_edges(self, image: NDArray[np.uint8]) -> tuple[TiltEstimate, EdgeElements]:
@@ -516,6 +640,36 @@ def common_direction(
 
     Raises `tiltvp.errors.InvalidInputError` for wrong shapes, zero or non-finite rows, negative weights and options out
     of their domain. Too few or degenerate normals give an answer without a direction, and a reason.
+    """
+
+def train_factor(shift: ArrayLike, alpha_rad: ArrayLike) -> float:
+    """The factor of eq. 31: the mean of shift / alpha over images of known leans (N,) above zero.
+
+    `shift` (N,) is `shift_px` of an image-space method, or `alpha_rad` of an uncorrected "vector-consensus". Leave out
+    images without an estimate. Raises `tiltvp.errors.InvalidInputError` for numbers that make no sense.
+    """
+
+def train_affine(shift: ArrayLike, alpha_rad: ArrayLike) -> AffineCorrection:
+    """The line alpha = shift / factor + offset through images of known leans (N,), by least squares of the shift.
+
+    The truth is known and the shift errs, and the line does not depend on how many images there are of each lean.
+    Raises `tiltvp.errors.InvalidInputError` for fewer than two different leans or shifts that do not grow with them.
+    """
+
+def train_posterior(shift: ArrayLike, alpha_rad: ArrayLike, *, prior: PriorOfTilt | None = None) -> PosteriorCorrection:
+    """P(alpha | l) from images of known leans (N,), at least ten, under a prior; None: `PriorOfTilt.empirical()`.
+
+    The shift is modelled as the length of a plane vector of mean length factor * alpha with normal errors that grow
+    with the lean (a Rice distribution), a share of which strays; the model is fitted by maximum likelihood. Raises
+    `tiltvp.errors.InvalidInputError` for numbers that make no sense or shifts that do not grow with the lean.
+    """
+
+def apply_correction(
+    correction: float | AffineCorrection | PosteriorCorrection, shift: ArrayLike
+) -> NDArray[np.float64]:
+    """(N,): the leans in radians of shifts or raw angles (N,) of zero or more, as an estimator so corrected has them.
+
+    NaN stays NaN. A number is a factor by which the shift is divided.
     """
 
 def leaning_from_upright(normal: ArrayLike) -> NDArray[np.float64]:

@@ -19,8 +19,9 @@ mod _core {
     use crate::synth::render_room;
     #[pymodule_export]
     use crate::tilt::{
-        CommonDirection, EdgeElements, FitReport, ImageEdges, TiltEstimate, TiltEstimator, common_direction,
-        leaning_from_upright, level_map, normal_from_alpha_beta, tilt_error_rad,
+        AffineCorrection, CommonDirection, EdgeElements, FitReport, ImageEdges, PosteriorCorrection, PriorOfTilt,
+        TiltEstimate, TiltEstimator, apply_correction, common_direction, leaning_from_upright, level_map,
+        normal_from_alpha_beta, tilt_error_rad, train_affine, train_factor, train_posterior,
     };
 
     #[pymodule_init]

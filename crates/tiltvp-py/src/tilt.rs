@@ -1,11 +1,13 @@
 //! `TiltEstimator`, `TiltEstimate`, `common_direction`: the core's tilt over arrays.
 
+mod correction;
 mod direction;
 mod estimate;
 mod image_edges;
 mod options;
 mod report;
 mod sampling;
+mod values;
 
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -17,6 +19,9 @@ use tiltvp_core::geometry::Tilt;
 use tiltvp_core::image::ImageView;
 use tiltvp_core::tilt::{self as core, Scratch};
 
+pub(crate) use self::correction::{
+    AffineCorrection, PosteriorCorrection, PriorOfTilt, apply_correction, train_affine, train_factor, train_posterior,
+};
 pub(crate) use self::direction::{CommonDirection, common_direction};
 pub(crate) use self::estimate::{EdgeElements, TiltEstimate};
 pub(crate) use self::image_edges::ImageEdges;
@@ -40,6 +45,7 @@ pub(crate) struct TiltEstimator {
 impl TiltEstimator {
     #[new]
     #[pyo3(signature = (camera, *, method=core::METHODS[0], robot_from_camera=None, _like=None, **options))]
+    #[expect(clippy::used_underscore_binding, reason = "a keyword of the package's own")]
     fn new(
         py: Python<'_>,
         camera: &Bound<'_, PyAny>,

@@ -1,18 +1,19 @@
-//! From the shift of the vanishing point in the image to an angle: trained factors, and the closed-form gain of each pixel.
+//! From the shift of the vanishing point in the image to an angle: where it is, and the closed-form gain of each pixel.
 
 use nalgebra::{Matrix3, Vector2, Vector3};
 
+use super::trained::TrainedCorrection;
 use crate::camera::Camera;
 use crate::edges::Region;
-use crate::error::{Error, Result};
+use crate::error::Result;
 
 /// How the image-space methods turn a shift in pixels into a lean (paper 000 eqs. 26 and 30).
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, PartialEq, Default)]
 pub enum Correction {
     /// `alpha = l / a0` with the lens' own scale at the vanishing point, eq. 26: overestimates by about a half.
     None,
-    /// `alpha = l / a` with a factor `a` in pixels per radian trained on images of known tilt, eqs. 30 and 31.
-    Factor(f64),
+    /// Trained on images of known tilt: a factor in pixels per radian, eqs. 30 and 31, a line, or a posterior.
+    Trained(TrainedCorrection),
     /// Each pixel's offset is divided by its own gain: no training images.
     ///
     /// A vertical edge at the bearing `v`, with unit normal `m0` and unit tangent `e = v x m0`, is moved by a lean `delta` to
@@ -24,16 +25,19 @@ pub enum Correction {
 }
 
 impl Correction {
-    /// Checks the factor.
+    /// A trained factor in pixels per radian.
+    pub fn factor(factor: f64) -> Self {
+        Self::Trained(TrainedCorrection::Factor(factor))
+    }
+
+    /// Checks what is trained.
     ///
     /// # Errors
-    /// [`Error::InvalidOption`] unless it is positive and finite.
+    /// Those of [`TrainedCorrection::validate`].
     pub fn validate(&self) -> Result<()> {
-        match *self {
-            Self::Factor(a) if !(a > 0.0 && a.is_finite()) => {
-                Err(Error::option("correction", a, "a positive factor, \"closed-form\" or none"))
-            }
-            _ => Ok(()),
+        match self {
+            Self::Trained(trained) => trained.validate(),
+            Self::None | Self::ClosedForm => Ok(()),
         }
     }
 }

@@ -12,6 +12,7 @@ use super::options::Method;
 use super::refine::refine;
 use super::scratch::{Inliers, Work};
 use super::tables::Tables;
+use super::trained::{Corrected, TrainedCorrection};
 use super::vector_consensus::vector_consensus;
 use crate::edges::{EdgePixels, LiftTable};
 use crate::geometry::{Tilt, tangent_basis};
@@ -32,8 +33,7 @@ struct Fit {
     /// Row model and gate for the covariance.
     model: [f64; 3],
     gate: Gate,
-    /// From the row model's first two parameters to the horizontal part of the normal.
-    horizontal: Matrix2<f64>,
+    lean: Lean,
     inliers: usize,
     shift_px: Option<f64>,
     rms: f64,
@@ -41,13 +41,58 @@ struct Fit {
     stop: Stop,
 }
 
+/// No correction at all.
+const AS_IT_IS: TrainedCorrection = TrainedCorrection::Factor(1.0);
+
+/// How the row model's first two parameters, the shift, make the horizontal part of the normal.
+enum Lean {
+    /// By a matrix.
+    Proportional(Matrix2<f64>),
+    /// By the unit vector of the shift times a corrected angle, and then by a matrix.
+    Bent { corrected: Corrected, toward: Vector2<f64>, direction: Matrix2<f64> },
+}
+
+impl Lean {
+    fn new(correction: &TrainedCorrection, corrected: Corrected, shift: Vector2<f64>, direction: Matrix2<f64>) -> Self {
+        match correction {
+            TrainedCorrection::Factor(factor) => Self::Proportional(direction / *factor),
+            TrainedCorrection::Affine(_) | TrainedCorrection::Posterior(_) => {
+                Self::Bent { corrected, toward: shift.try_normalize(0.0).unwrap_or(Vector2::x()), direction }
+            }
+        }
+    }
+
+    /// The covariance of the normal from that of the shift; `plane` takes horizontal changes to the tangent plane.
+    /// `share` is that of the lean by which the method may err.
+    fn covariance(&self, shift: &Matrix2<f64>, plane: &Matrix2<f64>, tilt: &Tilt, share: f64) -> Matrix2<f64> {
+        let complete = |covariance| confidence::with_floor(confidence::with_lean_error(covariance, tilt, share));
+        match self {
+            Self::Proportional(matrix) => {
+                let plane = plane * matrix;
+                complete(plane * shift * plane.transpose())
+            }
+            Self::Bent { corrected, toward, direction } => {
+                let across = Vector2::new(-toward.y, toward.x);
+                let plane = plane * direction;
+                let matrix = plane * corrected.jacobian(toward, across.dot(&(shift * across)));
+                let covariance = complete(matrix * shift * matrix.transpose());
+                let radial = (plane * toward).normalize();
+                let own = radial.dot(&(covariance * radial));
+                // The training set has seen what this image may not know of itself.
+                let raised = (corrected.std_rad * corrected.std_rad - own).max(0.0);
+                covariance + radial * radial.transpose() * raised
+            }
+        }
+    }
+}
+
 impl TiltEstimator {
     /// The estimate of the edge pixels of an image. What passed a screen and what passed none give the same one: screens
     /// keep out only what the prefilters reject.
     pub(super) fn fit(&self, edges: &EdgePixels, work: &mut Work) -> TiltEstimate {
         let fit = match &self.tables {
-            Tables::Offsets { gains, factor, offset_max_px } => {
-                self.fit_offsets(edges, &gains.relative, *factor, *offset_max_px, work)
+            Tables::Offsets { gains, correction, offset_max_px } => {
+                self.fit_offsets(edges, &gains.relative, correction, *offset_max_px, work)
             }
             Tables::Normals(table) => self.fit_normals(edges, table, work),
         };
@@ -55,7 +100,14 @@ impl TiltEstimator {
     }
 
     /// Paper 000 section 2.1.
-    fn fit_offsets(&self, edges: &EdgePixels, gains: &[f32], factor: f64, offset_max_px: f64, work: &mut Work) -> Fit {
+    fn fit_offsets(
+        &self,
+        edges: &EdgePixels,
+        gains: &[f32],
+        correction: &TrainedCorrection,
+        offset_max_px: f64,
+        work: &mut Work,
+    ) -> Fit {
         work.inliers = Inliers::None;
         let Some(centre) = &self.sight.centre else { return Fit::none() };
         let Work { rows, weights, places, .. } = &mut *work;
@@ -83,7 +135,8 @@ impl TiltEstimator {
             Method::VectorConsensus { .. } | Method::Refined(_) => return Fit::none(),
         };
         let shift = report.model.unwrap_or_default();
-        let (l, alpha) = (shift.norm(), shift.norm() / factor);
+        let (l, corrected) = (shift.norm(), correction.at(shift.norm()));
+        let alpha = corrected.alpha_rad;
         if alpha >= FRAC_PI_2 {
             return Fit::out_of_reach(alpha, &report);
         }
@@ -94,8 +147,8 @@ impl TiltEstimator {
         Fit {
             tilt,
             model: [shift.x, shift.y, 1.0],
-            gate: Gate::Soft { scale: STRAY_RAD * factor },
-            horizontal: centre.direction() / factor,
+            gate: Gate::Soft { scale: STRAY_RAD * correction.factor() },
+            lean: Lean::new(correction, corrected, shift, *centre.direction()),
             inliers: report.inliers,
             shift_px: report.model.map(|_| l),
             rms: report.rms,
@@ -112,15 +165,15 @@ impl TiltEstimator {
         work.prepare(&sampling, edges);
         let Work { rows, weights, sparse, quality, ransac: scratch, inliers, .. } = &mut *work;
         *inliers = Inliers::None;
-        let (report, gate, factor) = match &self.options.method {
-            Method::VectorConsensus { threshold_rad, factor, .. } => {
+        let (report, gate, correction) = match &self.options.method {
+            Method::VectorConsensus { threshold_rad, correction, .. } => {
                 weights.fill(1.0);
                 let seed = self.options.seed;
                 let options = RansacOptions { seed, sampling, ..RansacOptions::with_threshold(threshold_rad.sin()) };
                 let rotation = &self.origin.robot_from_camera;
                 let report = vector_consensus(rows, quality, rotation, &options, weights, scratch);
                 *inliers = Inliers::weighted_if(report.model.is_some());
-                (report, Gate::Soft { scale: STRAY_RAD }, *factor)
+                (report, Gate::Soft { scale: STRAY_RAD }, correction)
             }
             Method::Refined(options) => {
                 let report = refine(rows, options, weights, sparse);
@@ -128,23 +181,25 @@ impl TiltEstimator {
                     model: direction.into(),
                     threshold: 2.0 * options.scale_rad,
                 });
-                (report, Gate::Soft { scale: options.scale_rad }, 1.0)
+                (report, Gate::Soft { scale: options.scale_rad }, &AS_IT_IS)
             }
             Method::ImageSpaceRansac { .. } | Method::ImageSpaceRejectRefit { .. } => return Fit::none(),
         };
         let tilt = report.model.and_then(|normal| Tilt::from_normal(&normal));
-        if let Some(alpha) = tilt.map(|tilt| tilt.alpha_rad() / factor).filter(|alpha| *alpha >= FRAC_PI_2) {
+        let corrected = correction.at(tilt.map_or(0.0, |tilt| tilt.alpha_rad()));
+        if tilt.is_some() && corrected.alpha_rad >= FRAC_PI_2 {
             *inliers = Inliers::None;
-            return Fit::out_of_reach(alpha, &report);
+            return Fit::out_of_reach(corrected.alpha_rad, &report);
         }
+        let horizontal = tilt.map_or(Vector2::zeros(), |tilt| tilt.normal().xy());
         let tilt = tilt.map(|tilt| {
-            if factor == 1.0 { tilt } else { Tilt::from_alpha_beta(tilt.alpha_rad() / factor, tilt.beta_rad()) }
+            if *correction == AS_IT_IS { tilt } else { Tilt::from_alpha_beta(corrected.alpha_rad, tilt.beta_rad()) }
         });
         Fit {
             tilt,
             model: report.model.unwrap_or_default().into(),
             gate,
-            horizontal: Matrix2::identity() / factor,
+            lean: Lean::new(correction, corrected, horizontal, Matrix2::identity()),
             inliers: match *inliers {
                 Inliers::Within { model, threshold } => rows.count_within(model, threshold),
                 Inliers::None | Inliers::Weighted => report.inliers,
@@ -166,10 +221,18 @@ impl TiltEstimator {
         // The paper's methods end with weights of what they have selected, which cannot tell how sure the selection was.
         let weights = matches!(self.options.method, Method::Refined(_)).then_some(&work.weights[..]);
         let covariance = fit.tilt.and_then(|tilt| {
-            let covariance = confidence::clustered_covariance(&work.rows, fit.model, fit.gate, weights, sector)?;
+            let covariance = confidence::clustered_covariance(
+                &work.rows,
+                fit.model,
+                fit.gate,
+                weights,
+                self.sight.region.pixels_per_rad(),
+                sector,
+            )?;
             // A change of the normal's horizontal part is a change in its tangent plane, seen along the vertical.
-            let plane = tangent_basis(&tilt.normal()).fixed_rows::<2>(0).try_inverse()? * fit.horizontal;
-            Some(confidence::with_floor(plane * covariance * plane.transpose()))
+            let plane = tangent_basis(&tilt.normal()).fixed_rows::<2>(0).try_inverse()?;
+            let share = if self.options.method.is_exact() { 0.0 } else { confidence::APPROXIMATE_SHARE };
+            Some(fit.lean.covariance(&covariance, &plane, &tilt, share))
         });
         TiltEstimate {
             tilt: fit.tilt,
@@ -199,7 +262,7 @@ impl Fit {
             tilt: None,
             model: [0.0; 3],
             gate: Gate::Open,
-            horizontal: Matrix2::identity(),
+            lean: Lean::Proportional(Matrix2::identity()),
             inliers: 0,
             shift_px: None,
             rms: f64::NAN,

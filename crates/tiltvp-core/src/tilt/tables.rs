@@ -8,9 +8,13 @@ use nalgebra::Vector3;
 use super::confidence::SECTORS;
 use super::correction::{Correction, Gains, VanishingPoint, closed_form_gains};
 use super::image_edges::EdgeOrigin;
-use super::options::{Method, TiltOptions};
+use super::options::{Method, TiltOptions, offset_max_px_of};
+use super::trained::TrainedCorrection;
 use crate::edges::{LiftTable, NormalKind, Region, Screen};
 use crate::error::{Error, Result};
+
+/// Least cosine of the angle between the optical axis and the vertical for the image-space methods.
+const AXIS_COSINE_MIN: f64 = std::f64::consts::FRAC_1_SQRT_2;
 
 /// The pixels that are looked at, and what is known of each whatever the method.
 #[derive(Debug)]
@@ -38,8 +42,8 @@ impl Sight {
 /// What the methods look up for each pixel of the region.
 #[derive(Debug, Clone)]
 pub(super) enum Tables {
-    /// Relative closed-form gains (none for a trained factor), and the factor `a` in pixels per radian.
-    Offsets { gains: Arc<Gains>, factor: f64, offset_max_px: f64 },
+    /// Relative closed-form gains (none for a trained correction), and the way from shift to angle.
+    Offsets { gains: Arc<Gains>, correction: TrainedCorrection, offset_max_px: f64 },
     /// Maps from gradients to normals.
     Normals(Arc<LiftTable>),
 }
@@ -77,6 +81,15 @@ impl Tables {
                 "a camera that can see the zenith or the nadir; use \"refined\" for others",
             ));
         };
+        let axis_cosine = origin.robot_from_camera[(2, 2)].abs();
+        if axis_cosine < AXIS_COSINE_MIN {
+            return Err(Error::option(
+                "method",
+                options.method.name(),
+                "a camera whose optical axis is within 45 degrees of the vertical: these methods take a lean for a shift \
+                 of the image; use \"refined\" for others",
+            ));
+        }
         let gains = match (correction, like) {
             (Correction::ClosedForm, Some((_, Self::Offsets { gains, .. }, _))) if !gains.relative.is_empty() => {
                 Arc::clone(gains)
@@ -86,19 +99,33 @@ impl Tables {
             }
             _ => Arc::new(Gains { relative: Vec::new(), mean: centre.scale }),
         };
-        let factor = if let Correction::Factor(factor) = correction { *factor } else { gains.mean };
-        let offset_max_px = options.tilt_max_rad.map_or(offset_max_px, |tilt| tilt * factor);
-        if offset_max_px / factor >= FRAC_PI_2 {
-            return Err(Error::option(
-                "correction",
-                factor,
-                "a factor with which the largest offset is a lean below pi/2; the raw shift is shift_px of the estimate",
-            ));
+        let correction = match correction {
+            Correction::Trained(trained) => trained.clone(),
+            Correction::None | Correction::ClosedForm => TrainedCorrection::Factor(gains.mean),
+        };
+        let own_max_px = offset_max_px.unwrap_or_else(|| offset_max_px_of(centre.scale));
+        let offset_max_px = options.tilt_max_rad.map_or(own_max_px, |tilt| correction.shift_of(tilt));
+        if correction.apply(offset_max_px) >= FRAC_PI_2 {
+            return Err(if options.method.offsets().is_some_and(|(_, given)| given.is_some()) {
+                Error::option(
+                    "offset_max_px",
+                    offset_max_px,
+                    "fewer pixels: an offset that the correction makes a lean below pi/2 (the paper's 40 are for 139.7 \
+                     pixels per radian; without a number it follows the lens)",
+                )
+            } else {
+                Error::option(
+                    "correction",
+                    correction.factor(),
+                    "a factor with which the largest offset is a lean below pi/2; the raw shift is shift_px of the \
+                     estimate",
+                )
+            });
         }
         let screen = match like {
             Some((_, Self::Offsets { .. }, screen)) => screen.with_limit(offset_max_px),
             _ => Screen::of_offsets(&sight.region, (centre.pixel.x, centre.pixel.y), offset_max_px),
         };
-        Ok((Self::Offsets { gains, factor, offset_max_px }, screen))
+        Ok((Self::Offsets { gains, correction, offset_max_px }, screen))
     }
 }

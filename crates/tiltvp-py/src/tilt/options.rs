@@ -3,9 +3,9 @@
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use tiltvp_core::edges::{Mask, NormalKind};
-use tiltvp_core::tilt::{Correction, Method, TiltOptions};
+use tiltvp_core::tilt::{Correction, Method, TiltOptions, TrainedCorrection};
 
-use super::sampling;
+use super::{correction, sampling};
 use crate::call::{exception, invalid};
 use crate::convert;
 
@@ -84,7 +84,7 @@ fn set(options: &mut TiltOptions, key: &str, value: &Bound<'_, PyAny>) -> PyResu
         (
             "offset_max_px",
             Method::ImageSpaceRansac { offset_max_px, .. } | Method::ImageSpaceRejectRefit { offset_max_px, .. },
-        ) => *offset_max_px = number()?,
+        ) => *offset_max_px = if value.is_none() { None } else { Some(number()?) },
         (
             "correction",
             Method::ImageSpaceRansac { correction, .. } | Method::ImageSpaceRejectRefit { correction, .. },
@@ -92,16 +92,15 @@ fn set(options: &mut TiltOptions, key: &str, value: &Bound<'_, PyAny>) -> PyResu
             *correction = match value.extract::<String>() {
                 _ if value.is_none() => Correction::None,
                 Ok(word) if word == "closed-form" => Correction::ClosedForm,
-                Ok(word) => {
-                    return Err(invalid(format!(
-                        "option correction = \"{word}\", expected \"closed-form\", a factor in pixels per radian, or None"
-                    )));
-                }
-                Err(_) => Correction::Factor(number()?),
+                _ => Correction::Trained(correction::parse(value, "option correction", "\"closed-form\", None, ")?),
             };
         }
-        ("correction", Method::VectorConsensus { factor, .. }) => {
-            *factor = if value.is_none() { 1.0 } else { number()? };
+        ("correction", Method::VectorConsensus { correction, .. }) => {
+            *correction = if value.is_none() {
+                TrainedCorrection::Factor(1.0)
+            } else {
+                correction::parse(value, "option correction", "None, ")?
+            };
         }
         ("keep_fraction", Method::ImageSpaceRejectRefit { keep_fraction, .. }) => *keep_fraction = number()?,
         ("keep_fraction", Method::Refined(refine)) => refine.keep_fraction = number()?,
@@ -161,7 +160,7 @@ pub(super) fn in_force<'py>(py: Python<'py>, options: &TiltOptions) -> PyResult<
     let word = |correction: &Correction| -> PyResult<Py<PyAny>> {
         Ok(match correction {
             Correction::None => py.None(),
-            Correction::Factor(factor) => factor.into_pyobject(py)?.into_any().unbind(),
+            Correction::Trained(trained) => correction::show(py, trained)?,
             Correction::ClosedForm => "closed-form".into_pyobject(py)?.into_any().unbind(),
         })
     };
@@ -177,11 +176,11 @@ pub(super) fn in_force<'py>(py: Python<'py>, options: &TiltOptions) -> PyResult<
             dict.set_item("offset_max_px", offset_max_px)?;
             dict.set_item("correction", word(correction)?)?;
         }
-        Method::VectorConsensus { threshold_rad, normal, factor, sampling } => {
+        Method::VectorConsensus { threshold_rad, normal, correction, sampling } => {
             sampling::in_force(&dict, sampling)?;
             dict.set_item("threshold_rad", threshold_rad)?;
             dict.set_item("normal", if *normal == NormalKind::Gradient { "gradient" } else { "tangent" })?;
-            dict.set_item("correction", factor)?;
+            dict.set_item("correction", correction::show(py, correction)?)?;
         }
         Method::Refined(refine) => {
             dict.set_item("keep_fraction", refine.keep_fraction)?;
