@@ -49,6 +49,10 @@ measure-panoramas *arguments: setup
 measure-inertial *arguments: setup
     {{bin}}/tiltvp measure inertial "$TILTVP_DATA/panos_theta_imu" {{arguments}}
 
+# The options of the sampling loop against plain RANSAC, on the same panoramas and on rendered rooms.
+measure-sampling *arguments: setup
+    {{bin}}/tiltvp measure sampling "$TILTVP_DATA/panos" {{arguments}}
+
 # Round trips and Jacobians of the calibrations of TILTVP_DATA, as a table.
 measure-cameras: setup
     {{bin}}/pytest --quiet --capture=no tests/real_data/test_camera_conformance.py
