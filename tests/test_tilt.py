@@ -71,6 +71,41 @@ def test_edges_belong_to_the_estimate(camera: tiltvp.Camera, room: RoomImage, me
     assert edges == estimator.with_edges(room.gray)[1]
 
 
+@pytest.mark.parametrize("method", tiltvp.METHODS)
+def test_edges_tell_their_normals(camera: tiltvp.Camera, room: RoomImage, method: str) -> None:
+    estimate, edges = tiltvp.TiltEstimator(camera, method=method).with_edges(room.gray)
+    normals = edges.normal
+    assert normals.shape == (len(edges), 3)
+    if method.startswith("image-space"):
+        assert np.isnan(normals).all()
+        return
+    assert np.linalg.norm(normals, axis=1) == pytest.approx(np.ones(len(edges)), abs=1e-6)
+    bearings = camera.unproject(np.stack([edges.u, edges.v], axis=1).astype(float))
+    assert np.einsum("ni,ni->n", normals, bearings) == pytest.approx(np.zeros(len(edges)), abs=5e-3)
+    away = np.arcsin(np.abs(normals @ estimate.normal))
+    # Inliers are within the threshold, of the random sample's direction where there is one.
+    assert away[edges.inlier].max() < math.radians(4.1 if method == "refined" else 10.0)
+
+
+def test_trimming_can_stop_early(camera: tiltvp.Camera, room: RoomImage) -> None:
+    runs = [
+        tiltvp.TiltEstimator(camera, method="image-space-reject-refit", max_iterations=most).with_edges(room.gray)
+        for most in (0, 1, 2, 15)
+    ]
+    plain, edges = runs[0]
+    assert plain.report.stop == "iteration-limit"
+    assert (edges.inlier == edges.prefiltered).all()
+    least_squares = np.linalg.lstsq(
+        np.stack([np.cos(edges.phi_rad), np.sin(edges.phi_rad)], axis=1)[edges.prefiltered],
+        edges.offset_px[edges.prefiltered],
+    )[0]
+    raw = tiltvp.TiltEstimator(camera, method="image-space-reject-refit", max_iterations=0, correction=None)
+    assert raw(room.gray).shift_px == pytest.approx(np.hypot(*least_squares), rel=1e-4)
+    kept = [run[1].inlier.sum() for run in runs]
+    assert kept == sorted(kept, reverse=True)
+    assert kept[0] > kept[1] > kept[2]
+
+
 def test_too_few_edges_are_an_answer(camera: tiltvp.Camera) -> None:
     for method in tiltvp.METHODS:
         estimate, edges = tiltvp.TiltEstimator(camera, method=method).with_edges(np.zeros((256, 256), np.uint8))
@@ -227,6 +262,7 @@ CHANGES: dict[str, dict[str, Any]] = {
         "keep_fraction": 0.4,
         "offset_max_px": 10.0,
         "correction": None,
+        "max_iterations": 1,
     },
     "vector-consensus": {
         "gradient_min": 200.0,
@@ -307,6 +343,7 @@ def test_options_in_force_are_keywords(camera: tiltvp.Camera, method: str) -> No
         ({"tolerance_rad": -1.0}, ["tolerance_rad"]),
         ({"max_iterations": 0}, ["max_iterations", "at least 1"]),
         ({"max_iterations": -1}, ["max_iterations"]),
+        ({"method": "image-space-reject-refit", "max_iterations": -1}, ["max_iterations", "from 0"]),
         ({"method": "image-space-ransac", "correction": "closed"}, ["closed-form"]),
         ({"method": "image-space-ransac", "correction": -3.0}, ["correction"]),
         ({"method": "image-space-ransac", "threshold_px": 0.0}, ["threshold_px"]),

@@ -296,6 +296,13 @@ class EdgeElements:
         """(N,): edge offsets s in pixels (eq. 17); NaN where the lens sees neither zenith nor nadir."""
 
     @property
+    def normal(self) -> NDArray[np.float64]:
+        """(N, 3): unit normals of the edges' great circles in the robot frame (eq. 37), of either sign.
+
+        Those of the method, before any prefilter; NaN for the image-space methods, which have none.
+        """
+
+    @property
     def prefiltered(self) -> NDArray[np.bool_]:
         """(N,): the pixels that passed the prefilter."""
 
@@ -513,7 +520,8 @@ class TiltEstimator:
         tolerance_rad
             "refined": change of the direction below which it has converged.
         max_iterations
-            "refined": most refits with the gate at its final scale.
+            "refined": most refits with the gate at its final scale. "image-space-reject-refit": most rounds of
+            rejecting and refitting, N_E; 0 is plain least squares.
         threshold_px
             "image-space-ransac": largest residual of an inlier, delta_s,max of eq. 32.
         offset_max_px

@@ -142,7 +142,7 @@ fn methods() -> impl Strategy<Value = Method> {
         ),
         (number(0.01, 0.99), prop::option::of(number(1.0, 80.0)), correction()).prop_map(
             |(keep_fraction, offset_max_px, correction)| {
-                Method::ImageSpaceRejectRefit { keep_fraction, offset_max_px, correction }
+                Method::ImageSpaceRejectRefit { keep_fraction, max_iterations: 15, offset_max_px, correction }
             }
         ),
         (number(0.001, 1.0), normal, number(0.3, 3.0), sampling()).prop_map(

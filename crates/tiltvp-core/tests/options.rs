@@ -230,6 +230,7 @@ fn factors_divide_the_lean() {
     let with = |factor| {
         let method = Method::ImageSpaceRejectRefit {
             keep_fraction: 0.8,
+            max_iterations: 15,
             offset_max_px: Some(40.0),
             correction: Correction::factor(factor),
         };
@@ -282,6 +283,7 @@ fn wrong_values_of_a_method_are_refused_by_name() {
         };
         let trimming = |keep_fraction, offset_max_px, factor| Method::ImageSpaceRejectRefit {
             keep_fraction,
+            max_iterations: 15,
             offset_max_px: Some(offset_max_px),
             correction: Correction::factor(factor),
         };

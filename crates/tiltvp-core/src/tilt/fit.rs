@@ -21,9 +21,6 @@ use crate::robust::{FitReport, Gate, RansacOptions, RejectRefitOptions, Stop, ra
 /// Change of the shift in pixels below which the paper's trimming has converged (section 2.1.4).
 const SHIFT_TOLERANCE_PX: f64 = 0.1;
 
-/// Most trimming rounds, `N_E` in the paper.
-const TRIMMING_ROUNDS: u32 = 15;
-
 /// How far in radians the edges of vertical things stray from the vertical, for the covariance of the paper's methods.
 const STRAY_RAD: f64 = 2.0 * std::f64::consts::PI / 180.0;
 
@@ -118,10 +115,10 @@ impl TiltEstimator {
         let problem = Offsets::new(rows, quality);
         let upright = Vector2::zeros();
         let report: FitReport<Vector2<f64>> = match &self.options.method {
-            Method::ImageSpaceRejectRefit { keep_fraction, .. } => {
+            Method::ImageSpaceRejectRefit { keep_fraction, max_iterations, .. } => {
                 let options = RejectRefitOptions {
                     keep_fraction: *keep_fraction,
-                    max_iterations: TRIMMING_ROUNDS,
+                    max_iterations: *max_iterations,
                     tolerance: SHIFT_TOLERANCE_PX,
                     rms_min: 0.0,
                 };

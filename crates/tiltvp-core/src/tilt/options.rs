@@ -39,6 +39,8 @@ pub enum Method {
     ImageSpaceRejectRefit {
         /// Share of normal residuals kept each round; eq. 34 with `Q` read as the share kept. Default 0.8.
         keep_fraction: f64,
+        /// Most rounds of rejecting and refitting, `N_E`; 0 is plain least squares. Default 15.
+        max_iterations: u32,
         /// Largest edge offset in pixels that passes the prefilter, `s_max`. Default, where there is none: the paper's 40 for
         /// its lens of 139.7 pixels per radian about the vertical, and in proportion for others.
         offset_max_px: Option<f64>,
@@ -125,7 +127,13 @@ impl TiltOptions {
             }
             "image-space-reject-refit" => {
                 let correction = Correction::default();
-                (Method::ImageSpaceRejectRefit { keep_fraction: 0.8, offset_max_px: None, correction }, 200.0, 0.0)
+                let method = Method::ImageSpaceRejectRefit {
+                    keep_fraction: 0.8,
+                    max_iterations: 15,
+                    offset_max_px: None,
+                    correction,
+                };
+                (method, 200.0, 0.0)
             }
             "vector-consensus" => {
                 let (threshold_rad, sampling) = (5f64.to_radians(), Sampling::default());
@@ -175,7 +183,7 @@ impl TiltOptions {
                 positive("offset_max_px", offset_max_px.unwrap_or(1.0), "a positive number of pixels")?;
                 correction.validate()
             }
-            Method::ImageSpaceRejectRefit { keep_fraction, offset_max_px, correction } => {
+            Method::ImageSpaceRejectRefit { keep_fraction, offset_max_px, correction, .. } => {
                 if !(*keep_fraction > 0.0 && *keep_fraction < 1.0) {
                     return Err(Error::option("keep_fraction", keep_fraction, "a share strictly between 0 and 1"));
                 }

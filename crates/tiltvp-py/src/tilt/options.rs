@@ -27,7 +27,7 @@ fn own(method: &Method) -> &'static [&'static str] {
         Method::ImageSpaceRansac { .. } => {
             &["threshold_px", "offset_max_px", "correction", "sampling", "local_optimization", "score", "verification"]
         }
-        Method::ImageSpaceRejectRefit { .. } => &["keep_fraction", "offset_max_px", "correction"],
+        Method::ImageSpaceRejectRefit { .. } => &["keep_fraction", "max_iterations", "offset_max_px", "correction"],
         Method::VectorConsensus { .. } => {
             &["threshold_rad", "normal", "correction", "sampling", "local_optimization", "score", "verification"]
         }
@@ -114,10 +114,9 @@ fn set(options: &mut TiltOptions, key: &str, value: &Bound<'_, PyAny>) -> PyResu
         }
         ("scale_rad", Method::Refined(refine)) => refine.scale_rad = number()?,
         ("tolerance_rad", Method::Refined(refine)) => refine.tolerance_rad = number()?,
-        ("max_iterations", Method::Refined(refine)) => {
-            refine.max_iterations = value
-                .extract()
-                .map_err(|_| invalid(format!("option max_iterations = {value}, expected a whole number from 1")))?;
+        ("max_iterations", Method::Refined(refine)) => refine.max_iterations = whole(key, value, 1)?,
+        ("max_iterations", Method::ImageSpaceRejectRefit { max_iterations, .. }) => {
+            *max_iterations = whole(key, value, 0)?;
         }
         (
             key @ ("sampling" | "local_optimization" | "score" | "verification"),
@@ -126,6 +125,10 @@ fn set(options: &mut TiltOptions, key: &str, value: &Bound<'_, PyAny>) -> PyResu
         (_, method) => return Err(unknown(value.py(), key, method)),
     }
     Ok(())
+}
+
+fn whole(key: &str, value: &Bound<'_, PyAny>, from: u32) -> PyResult<u32> {
+    value.extract().map_err(|_| invalid(format!("option {key} = {value}, expected a whole number from {from}")))
 }
 
 /// The error for an option that the method does not have: the near ones, then all.
@@ -171,8 +174,9 @@ pub(super) fn in_force<'py>(py: Python<'py>, options: &TiltOptions) -> PyResult<
             dict.set_item("offset_max_px", offset_max_px)?;
             dict.set_item("correction", word(correction)?)?;
         }
-        Method::ImageSpaceRejectRefit { keep_fraction, offset_max_px, correction } => {
+        Method::ImageSpaceRejectRefit { keep_fraction, max_iterations, offset_max_px, correction } => {
             dict.set_item("keep_fraction", keep_fraction)?;
+            dict.set_item("max_iterations", max_iterations)?;
             dict.set_item("offset_max_px", offset_max_px)?;
             dict.set_item("correction", word(correction)?)?;
         }
