@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
@@ -73,6 +73,18 @@ def new_table(title: str | None, columns: Iterable[str], left: Iterable[str] = (
         else:
             table.add_column(column, justify="right", no_wrap=True)
     return table
+
+
+@contextmanager
+def status(words: str) -> Iterator[Callable[[str], None]]:
+    """A moving sign on stderr while something takes long, on a terminal; what it gives changes the words."""
+    if not sys.stderr.isatty():
+        yield lambda _: None
+        return
+    from rich.console import Console
+
+    with Console(stderr=True).status(words) as sign:
+        yield lambda text: sign.update(text)
 
 
 @contextmanager
