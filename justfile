@@ -19,8 +19,19 @@ setup:
 demo *arguments: setup
     {{bin}}/tiltvp demo {{arguments}}
 
+# Debian's chromium, in which the tests open the page of a report.
+browser:
+    #!/usr/bin/env bash
+    set -euo pipefail
+    command -v chromium > /dev/null && exit
+    root=""
+    [ "$(id -u)" = 0 ] || root=sudo
+    $root apt-get update --quiet --quiet
+    DEBIAN_FRONTEND=noninteractive $root apt-get install --quiet --quiet --yes --no-install-recommends chromium > /dev/null
+    command -v chromium > /dev/null
+
 # Sets up; checks and tests everything that needs no data.
-test: setup check test-rust test-python
+test: setup browser check test-rust test-python
 
 # Formats and lints of both languages. (Types, stubs and layers are among the Python tests, the core's layers among the Rust ones.)
 check:
