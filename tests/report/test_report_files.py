@@ -19,6 +19,7 @@ from tiltvp.evaluation.runs import Run, read_run
 from tiltvp.evaluation.summary import errors
 from tiltvp.evaluation.variants import VARIANTS, best_of, best_rows, variant_points
 from tiltvp.plots.report import style
+from tiltvp.plots.report.errors import errors_by_environment
 from tiltvp.report.choice import choose_examples
 from tiltvp.report.contents import OtherRun, contents_of, scaling_of
 from tiltvp.report.files import PAGE, write_report
@@ -278,6 +279,16 @@ def test_cost_is_on_the_page_if_the_run_has_it(run: Path, tmp_path: Path) -> Non
     (copy / "scaling.csv").write_text("over,images\nimages,7\n")
     with pytest.raises(RunError, match=r"scaling\.csv.*megapixels"):
         scaling_of(copy)
+
+
+@pytest.mark.parametrize("count", [3, 40])
+def test_environments_are_all_named(count: int) -> None:
+    rows = [(variant, f"room {i:02d}", 1.0 + 0.01 * i) for variant in style.KNOWN for i in range(count)]
+    table = pl.DataFrame(rows, schema=["variant", "environment", "mean_deg"], orient="row")
+    overall = table.group_by("variant", maintain_order=True).agg(pl.col("mean_deg").mean())
+    (axes,) = errors_by_environment(table, overall).axes
+    ticks = axes.get_xticklabels() if count == 3 else axes.get_yticklabels()
+    assert [tick.get_text() for tick in ticks] == [f"room {i:02d}" for i in range(count)]
 
 
 def _stems(run: Run) -> set[str]:

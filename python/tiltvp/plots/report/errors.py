@@ -14,6 +14,8 @@ if TYPE_CHECKING:
 
 __all__ = ["cumulative_errors", "errors_by_environment", "errors_by_tilt"]
 
+_MOST_BARS = 12
+
 
 def cumulative_errors(table: pl.DataFrame, *, error_max_deg: float = 5.0) -> Figure:
     """Figure 21: share of images with an error of at most epsilon'. Columns `variant`, `error_rad` (null: no estimate).
@@ -54,8 +56,13 @@ def errors_by_tilt(table: pl.DataFrame, overall: pl.DataFrame) -> Figure:
 
 
 def errors_by_environment(table: pl.DataFrame, overall: pl.DataFrame) -> Figure:
-    """Figure 23. `table`: `variant`, `environment`, `mean_deg`; `overall`: `variant`, `mean_deg` of all images."""
+    """Figure 23. `table`: `variant`, `environment`, `mean_deg`; `overall`: `variant`, `mean_deg` of all images.
+
+    Bars for as many environments as the paper has and some more, a line of marks for each of many.
+    """
     places = table["environment"].unique().sort().to_list()
+    if len(places) > _MOST_BARS:
+        return _marks_by_environment(table, overall, places)
     variants = looks(overall["variant"])
     means = dict(overall.select("variant", "mean_deg").iter_rows())
     figure = blank_figure(4.6)
@@ -74,5 +81,23 @@ def errors_by_environment(table: pl.DataFrame, overall: pl.DataFrame) -> Figure:
     axes.set_ylim(bottom=0.0)
     tidy(axes, "environment", "mean error (degrees)")
     axes.grid(visible=False, axis="x")
+    legend_above(axes, columns=2)
+    return figure
+
+
+def _marks_by_environment(table: pl.DataFrame, overall: pl.DataFrame, places: list[str]) -> Figure:
+    """One line for each environment, from the top, and a mark on it for each variant."""
+    figure = blank_figure(1.3 + 0.19 * len(places))
+    axes = figure.add_subplot()
+    means = dict(overall.select("variant", "mean_deg").iter_rows())
+    for variant, look in looks(overall["variant"]).items():
+        by_place = dict(table.filter(table["variant"] == variant).select("environment", "mean_deg").iter_rows())
+        across = [by_place.get(place, np.nan) for place in places]
+        axes.plot(across, range(len(places)), look.marker, color=look.colour, markersize=6, label=variant)
+        axes.axvline(means[variant], color=look.colour, linestyle=look.line, linewidth=1.0, alpha=0.45)
+    axes.set_yticks(range(len(places)), places, fontsize=8)
+    axes.set_ylim(len(places) - 0.5, -0.5)
+    axes.set_xlim(left=0.0)
+    tidy(axes, "mean error (degrees)", "environment")
     legend_above(axes, columns=2)
     return figure
