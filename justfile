@@ -56,10 +56,20 @@ test-real *arguments: setup
 measure-panoramas *arguments: setup
     {{bin}}/tiltvp measure panoramas "$TILTVP_DATA/panos" {{arguments}}
 
-# The paper's sweep on views of all panoramas of TILTVP_DATA, and its tables. Remove out/database to begin anew.
+# The paper's sweep on views of all panoramas of TILTVP_DATA and on rendered rooms, as they are and made harder: the tables,
+# how far covariance and confidence can be trusted, and the report. Remove out/database to begin anew.
 measure-database *arguments: setup
     test -d out/database/panoramas || {{bin}}/tiltvp dataset render --panoramas "$TILTVP_DATA/panos" --out out/database/panoramas
-    {{bin}}/tiltvp evaluate out/database/panoramas --sweep paper --out out/database/run {{arguments}}
+    test -d out/database/rooms || {{bin}}/tiltvp dataset synth --rooms 18 --locations-per-room 2 --samples 2 --out out/database/rooms
+    for name in panoramas rooms; do \
+        test -d out/database/$name-degraded || {{bin}}/tiltvp dataset degrade out/database/$name --out out/database/$name-degraded; \
+    done
+    {{bin}}/tiltvp evaluate out/database/panoramas --sweep paper --out out/database/runs/panoramas {{arguments}}
+    for name in rooms panoramas-degraded rooms-degraded; do \
+        {{bin}}/tiltvp evaluate out/database/$name --sweep table3 --out out/database/runs/$name {{arguments}}; \
+    done
+    {{bin}}/tiltvp measure confidence out/database/runs/panoramas out/database/runs/rooms out/database/runs/panoramas-degraded out/database/runs/rooms-degraded
+    {{bin}}/tiltvp report out/database/runs/panoramas --out out/database/report
 
 # What an evaluation costs over the number of images and over their pixels.
 measure-scaling *arguments: setup

@@ -124,6 +124,43 @@ def scaling(
 
 
 @app.command
+def confidence(
+    runs: Annotated[list[Path], Parameter(consume_multiple=True)],
+    /,
+    *,
+    out: Path | None = None,
+) -> None:
+    """How far covariance and confidence can be trusted: the truths that regions hold, and failures that were foreseen.
+
+    Parameters
+    ----------
+    runs
+        Folders that `tiltvp evaluate` has written.
+    out
+        Also write the table: .csv, .json or .parquet.
+    """
+    from tiltvp.evaluation.runs import read_run
+    from tiltvp.evaluation.summary import errors
+    from tiltvp.evaluation.trust import trust
+    from tiltvp.evaluation.variants import best_rows
+
+    if out is not None:
+        check_ending(out)
+    tables = {}
+    for directory in runs:
+        table = read_run(directory).table
+        tables[directory.name] = best_rows(table, errors(table))
+    if len(tables) < len(runs):
+        raise InvalidInputError(f"{', '.join(map(str, runs))}: expected runs with names of their own")
+    table = trust(tables)
+    if out is not None:
+        write_frame(table, out)
+    show_frame(
+        "Failures (above 2 degrees) foreseen, and truths inside the covariance's regions", table, ["run", "variant"]
+    )
+
+
+@app.command
 def sampling(
     directory: Path | None = None,
     /,
