@@ -49,6 +49,10 @@ measure-panoramas *arguments: setup
 measure-inertial *arguments: setup
     {{bin}}/tiltvp measure inertial "$TILTVP_DATA/panos_theta_imu" {{arguments}}
 
+# Planar-motion pose estimation over tilt in rendered rooms, without and with tilt correction.
+measure-planar-pose *arguments: setup
+    {{bin}}/tiltvp measure planar-pose {{arguments}}
+
 # Round trips and Jacobians of the calibrations of TILTVP_DATA, as a table.
 measure-cameras: setup
     {{bin}}/pytest --quiet --capture=no tests/real_data/test_camera_conformance.py

@@ -5,14 +5,17 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-from cyclopts import App, Parameter
+from cyclopts import App, Parameter, validators
 
 from tiltvp.cli.terminal import new_table, progress_bar, show
+from tiltvp.errors import InvalidInputError
 
 if TYPE_CHECKING:
     import polars as pl
 
 app = App(name="measure", help="Measure the methods on images of known tilt.")
+
+_PICTURES = (".png", ".jpg", ".jpeg")
 
 
 @app.command
@@ -76,8 +79,63 @@ def inertial(directory: Path, /, *, samples: int = 2) -> None:
     _show("Refined lean minus sensor, degrees, constant offset removed", summarise_inertial(table), "panoramas")
 
 
-def _show(title: str, table: pl.DataFrame, words: str) -> None:
-    view = new_table(title, table.columns, left=[words])
+@app.command
+def planar_pose(
+    *,
+    pairs: Annotated[int, Parameter(validator=validators.Number(gte=1))] = 216,
+    seed: Annotated[int, Parameter(validator=validators.Number(gte=0))] = 0,
+    threads: Annotated[int | None, Parameter(validator=validators.Number(gte=1))] = None,
+    out: Path | None = None,
+    plot: Path | None = None,
+) -> None:
+    """Planar-motion pose estimation (min-warping) over tilt in rendered rooms, without and with tilt correction.
+
+    Parameters
+    ----------
+    pairs
+        Pairs of places, rounded up to whole rooms of twelve; at least two rooms.
+    seed
+        Seed of rooms, places, headings, leans and noise.
+    threads
+        Rooms worked on at once; by default one for each core.
+    out
+        Also write the long table, one row for each pair, lean and correction: .parquet, .csv or .json.
+    plot
+        Also draw the errors over tilt: .png or .jpg.
+    """
+    from tiltvp.cli.results import check_ending, write_frame
+    from tiltvp.evaluation.planar_pose import PlanarPoseExperiment, measure_planar_pose
+    from tiltvp.evaluation.planar_summary import crossings, summarise_planar_pose
+
+    if out is not None:
+        check_ending(out)
+    if plot is not None:
+        _check_picture(plot)
+    experiment = PlanarPoseExperiment(rooms=max(2, -(-pairs // 12)), seed=seed)
+    with progress_bar(experiment.steps, "places") as bar:
+        table = measure_planar_pose(experiment, threads=threads, advance=bar.advance)
+    summary = summarise_planar_pose(table)
+    pays = crossings(summary)
+    if out is not None:
+        write_frame(table, out)
+    if plot is not None:
+        from tiltvp.images import write_image
+        from tiltvp.plots.picture import figure_picture
+        from tiltvp.plots.planar_pose import planar_pose as planar_pose_figure
+
+        write_image(plot, figure_picture(planar_pose_figure(summary, pays)))
+    _show(f"Errors of min-warping in degrees, {experiment.rooms} rooms", summary, "error", "correction")
+    _show("Tilt in degrees beyond which a correction pays", pays, "error", "correction")
+
+
+def _check_picture(path: Path) -> None:
+    """Refuses a picture in a format that cannot be written, before any work is done."""
+    if path.suffix.lower() not in _PICTURES:
+        raise InvalidInputError(f"--plot {path}: ends in {path.suffix!r}, expected one of {', '.join(_PICTURES)}")
+
+
+def _show(title: str, table: pl.DataFrame, *words: str) -> None:
+    view = new_table(title, table.columns, left=words)
     for row in table.iter_rows():
         view.add_row(*("" if cell is None else f"{cell:.3f}" if isinstance(cell, float) else str(cell) for cell in row))
     show(view)
