@@ -90,6 +90,8 @@ def planar_pose(
 ) -> None:
     """Planar-motion pose estimation (min-warping) over tilt in rendered rooms, without and with tilt correction.
 
+    The table has the mean errors at each tilt, and the tilt beyond which a correction pays.
+
     Parameters
     ----------
     pairs
@@ -124,8 +126,11 @@ def planar_pose(
         from tiltvp.plots.planar_pose import planar_pose as planar_pose_figure
 
         write_image(plot, figure_picture(planar_pose_figure(summary, pays)))
-    _show(f"Errors of min-warping in degrees, {experiment.rooms} rooms", summary, "error", "correction")
-    _show("Tilt in degrees beyond which a correction pays", pays, "error", "correction")
+    means = summary.pivot("alpha_deg", index=["error", "correction"], values="mean_deg")
+    means = means.join(pays, on=["error", "correction"], how="left", maintain_order="left")
+    means = means.rename({"crossing_deg": "pays beyond"})
+    pairs_found = int(summary["pairs"].to_numpy().min())
+    _show(f"Mean errors of min-warping over tilt, degrees, {pairs_found} pairs", means, "error", "correction")
 
 
 def _check_picture(path: Path) -> None:

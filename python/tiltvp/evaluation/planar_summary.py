@@ -36,7 +36,7 @@ def summarise_planar_pose(table: pl.DataFrame, *, seed: int = 0) -> pl.DataFrame
                 {
                     "error": error,
                     "correction": correction,
-                    "alpha_deg": float(np.rad2deg(float(str(alpha)))),
+                    "alpha_deg": round(float(np.rad2deg(float(str(alpha)))), 9),
                     "pairs": len(part),
                     "mean_deg": float(errors.mean()),
                     "low_deg": low,

@@ -139,6 +139,8 @@ class MinWarping:
         return left + [[(-shift, plane) for shift, plane in matches] for matches in reversed(left)]
 
 
+_NEAR_I = np.array([0, 1, -1, 0, 0, 1, -1])
+_NEAR_J = np.array([0, 0, 0, 1, -1, 1, -1])
 _TINY = 1e-9
 _RATIOS = 9
 """Places within a column at which the ratio of distances is looked at."""
@@ -157,18 +159,20 @@ def _unit_columns(panorama: NDArray[np.float32]) -> NDArray[np.float32]:
 
 
 def _lowest(scores: Scores) -> tuple[float, float]:
-    """Row and column of the least score, between the entries where the paraboloid around it has a vertex near by."""
+    """Row and column of the least score, between the entries where the paraboloid around it has its vertex near by.
+
+    The neighbours are those six that stay neighbours when the two places change their roles.
+    """
     n = scores.shape[0]
     i, j = divmod(int(np.argmin(scores)), n)
-    around = scores[np.ix_(np.arange(i - 1, i + 2) % n, np.arange(j - 1, j + 2) % n)].astype(np.float64)
-    di, dj = (grid.ravel() for grid in np.meshgrid([-1.0, 0.0, 1.0], [-1.0, 0.0, 1.0], indexing="ij"))
-    terms = np.stack([np.ones(9), di, dj, di * di, di * dj, dj * dj], axis=1)
-    _, slope_i, slope_j, bend_ii, bend_ij, bend_jj = np.linalg.lstsq(terms, around.ravel(), rcond=None)[0]
+    around = scores[(i + _NEAR_I) % n, (j + _NEAR_J) % n].astype(np.float64)
+    terms = np.stack([np.ones(7), _NEAR_I, _NEAR_J, _NEAR_I**2, _NEAR_I * _NEAR_J, _NEAR_J**2], axis=1)
+    _, slope_i, slope_j, bend_ii, bend_ij, bend_jj = np.linalg.lstsq(terms, around, rcond=None)[0]
     hessian = np.array([[2.0 * bend_ii, bend_ij], [bend_ij, 2.0 * bend_jj]])
     if bend_ii <= 0.0 or np.linalg.det(hessian) <= 0.0:
         return float(i), float(j)
-    offset = np.clip(-np.linalg.solve(hessian, [slope_i, slope_j]), -1.0, 1.0)
-    return i + float(offset[0]), j + float(offset[1])
+    di, dj = (float(x) for x in -np.linalg.solve(hessian, [slope_i, slope_j]))
+    return (i + di, j + dj) if max(abs(di), abs(dj), abs(di - dj)) <= 1.0 else (float(i), float(j))
 
 
 def _wrapped(angle_rad: float) -> float:
