@@ -28,6 +28,7 @@ pub struct Region {
     places: Vec<(u16, u16)>,
     first_column: usize,
     end_column: usize,
+    pixels_per_rad: f64,
 }
 
 impl Region {
@@ -69,8 +70,14 @@ impl Region {
             }
         }
         let clear = erode(&bearings.iter().map(Option::is_some).collect::<Vec<_>>(), width, height, options.reach_px());
-        let mut region =
-            Self { spans: Vec::new(), bearings: Vec::new(), places: Vec::new(), first_column: width, end_column: 0 };
+        let mut region = Self {
+            spans: Vec::new(),
+            bearings: Vec::new(),
+            places: Vec::new(),
+            first_column: width,
+            end_column: 0,
+            pixels_per_rad: 0.0,
+        };
         for v in 0..height {
             let mut open: Option<Span> = None;
             for u in 0..=width {
@@ -101,7 +108,18 @@ impl Region {
                 "a band that some pixel of the camera sees: check robot_from_camera, the mask and the margin",
             ));
         }
+        region.pixels_per_rad = 1.0 / region.mean_solid_angle(camera).sqrt();
         Ok(region)
+    }
+
+    /// Mean solid angle of a pixel in steradians, over a sample of the pixels.
+    fn mean_solid_angle(&self, camera: &Camera) -> f64 {
+        let angle = |(u, v): &(u16, u16)| {
+            let (_, back) = camera.unproject_jacobian(&Vector2::new(f64::from(*u), f64::from(*v)))?;
+            Some(back.column(0).cross(&back.column(1)).norm())
+        };
+        let angles: Vec<f64> = self.places.iter().step_by(1 + self.places.len() / 1024).filter_map(angle).collect();
+        angles.iter().sum::<f64>() / angles.len().max(1) as f64
     }
 
     /// The spans, row by row.
@@ -122,6 +140,11 @@ impl Region {
     /// Columns `first..end` that hold all spans.
     pub fn columns(&self) -> std::ops::Range<usize> {
         self.first_column..self.end_column
+    }
+
+    /// Pixels per radian in the mean over the region: the root of the pixels per steradian.
+    pub fn pixels_per_rad(&self) -> f64 {
+        self.pixels_per_rad
     }
 
     /// Column and row of the pixel `slot`; (0, 0) beyond the region.
@@ -179,6 +202,9 @@ mod tests {
             let theta = (u as f64 - 319.5).hypot(v as f64 - 239.5) / 139.7;
             assert!((theta.cos() - bearing.z).abs() < 1e-9);
         }
+        // The band of elevations from 0 to 45 degrees has sqrt(2) pi steradians.
+        let mean = (area / (2f64.sqrt() * std::f64::consts::PI)).sqrt();
+        assert!((region.pixels_per_rad() / mean - 1.0).abs() < 0.01, "{} pixels per radian", region.pixels_per_rad());
     }
 
     #[test]

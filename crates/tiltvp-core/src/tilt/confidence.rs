@@ -2,6 +2,7 @@
 
 use nalgebra::{Matrix2, Vector2};
 
+use crate::geometry::Tilt;
 use crate::robust::{Gate, Real, Rows};
 
 /// Sectors of azimuth within which residuals are taken as one: an edge of a room rarely spans more.
@@ -14,41 +15,68 @@ const ENOUGH: usize = 4000;
 const GOOD_RAD: f64 = 2.0 * std::f64::consts::PI / 180.0;
 
 /// Standard deviation in radians of what no image tells: bent lenses, walls out of plumb, blur.
-const FLOOR_RAD: f64 = 0.25 * std::f64::consts::PI / 180.0;
+const FLOOR_RAD: f64 = 0.17 * std::f64::consts::PI / 180.0;
 
-/// The sandwich covariance `H^-1 (sum_c g_c g_c^T) H^-1` of a linear fit, with scores `g_c` summed over sectors of azimuth.
+/// Share of the pooled variance of the sectors' residuals that each sector brings into the estimate.
+const SECTOR_SHARE: f64 = 0.55;
+
+/// Length in radians of a stretch of clutter that may lie unnoticed at the most misleading residual.
+const CLUTTER_RAD: f64 = 0.056;
+
+/// The covariance of a gated linear fit whose errors are those of whole edges and not of pixels.
 ///
-/// `H = sum d(w d)/dd (x, y)^T (x, y)` and `g_c = sum_(k in c) w d (x, y)` (Huber's covariance of an M-estimate): with the weights
-/// themselves in `H`, clutter that fills the gate would count as evidence. To it is added the square of `H^-1 sum_c g_c`, the
+/// Residuals of one sector of azimuth err together: with the information `I_c = sum_(k in c) w (x, y)^T (x, y)` and the score
+/// `g_c = sum_(k in c) w d (x, y)` of each sector, the pooled variance of the sectors is
+/// `s^2 = (sum_c |g_c|^2 / tr I_c) / sum_c tr I_c`, of which a share comes through. Then
+/// `C = H^-1 (s^2 sum_c I_c^2 + b^2) H^-1`, where `b` is the pull of a little clutter that agrees with itself, which is what
+/// tells an image with few edges from one with many. `H = sum d(w d)/dd (x, y)^T (x, y)` has Huber's slope of the gate: with the
+/// weights themselves, clutter that fills the gate would count as evidence. To it is added the square of `H^-1 sum_c g_c`, the
 /// way from the model to where the gated rows would have it: none for the fit they made, but telling for a model that was
-/// chosen otherwise. Weights are one where none are given. `None` if fewer than three sectors hold anything or the model is
-/// near no minimum.
+/// chosen otherwise. Weights are one where none are given. The share, the clutter and the floor were set on every second
+/// location of 108 panoramas and 72 rendered rooms, as they are and darkened, blurred or half hidden, and checked on the others.
+///
+/// `None` if fewer than three sectors hold anything or the model is near no minimum.
 pub(super) fn clustered_covariance<T: Real>(
     rows: &Rows<T>,
     model: [f64; 3],
     gate: Gate,
     weights: Option<&[f32]>,
+    pixels_per_rad: f64,
     sector: impl Fn(usize) -> u8,
 ) -> Option<Matrix2<f64>> {
+    let Gate::Soft { scale } = gate else { return None };
     let mut scores = [Vector2::<f64>::zeros(); SECTORS];
-    let mut held = [false; SECTORS];
+    let mut information = [[0.0f64; 3]; SECTORS];
     let [mut xx, mut xy, mut yy] = [0.0; 3];
     // A sample of the rows is enough to tell how the sectors err: sums over it are proportional to sums over all.
-    let stride = rows.len() / ENOUGH;
+    let stride = (rows.len() / ENOUGH).max(1);
     rows.for_each_gated(model, gate, weights, stride, |row, [weight, slope, x, y, d]| {
         (xx, xy, yy) = (xx + slope * x * x, xy + slope * x * y, yy + slope * y * y);
         let sector = usize::from(sector(row)) % SECTORS;
         scores[sector] += Vector2::new(x, y) * (weight * d);
-        held[sector] = true;
+        let [a, b, c] = &mut information[sector];
+        (*a, *b, *c) = (*a + weight * x * x, *b + weight * x * y, *c + weight * y * y);
     });
-    let occupied = held.iter().filter(|held| **held).count() as f64;
-    if occupied < 3.0 {
+    let inverse = inverse_of_positive(&Matrix2::new(xx, xy, xy, yy))?;
+    let held = || information.iter().zip(&scores).filter(|([a, _, c], _)| a + c > 0.0);
+    if held().count() < 3 {
         return None;
     }
-    let inverse = inverse_of_positive(&Matrix2::new(xx, xy, xy, yy))?;
-    let spread: Matrix2<f64> = scores.iter().map(|g| g * g.transpose()).sum();
+    let total: f64 = held().map(|([a, _, c], _)| a + c).sum();
+    let pooled = held().map(|([a, _, c], score)| score.norm_squared() / (a + c)).sum::<f64>() / total;
+    let squares: Matrix2<f64> = held()
+        .map(|([a, b, c], _)| {
+            let block = Matrix2::new(*a, *b, *b, *c);
+            block * block
+        })
+        .sum();
+    let own = weights.map_or(1.0, |weights| {
+        weights.iter().map(|weight| f64::from(*weight)).sum::<f64>() / weights.len().max(1) as f64
+    });
+    let clutter = CLUTTER_RAD * pixels_per_rad / stride as f64 * own * scale;
+    let spread = squares * (SECTOR_SHARE * pooled) + Matrix2::identity() * (clutter * clutter);
     let away = inverse * scores.iter().sum::<Vector2<f64>>();
-    let covariance = inverse * spread * inverse * (occupied / (occupied - 2.0)) + away * away.transpose();
+    let covariance = inverse * spread * inverse + away * away.transpose();
     covariance.iter().all(|x| x.is_finite()).then_some(covariance)
 }
 
@@ -56,6 +84,16 @@ pub(super) fn clustered_covariance<T: Real>(
 pub(super) fn inverse_of_positive(matrix: &Matrix2<f64>) -> Option<Matrix2<f64>> {
     let (determinant, trace) = (matrix.determinant(), matrix.trace());
     if trace > 0.0 && determinant > 1e-12 * trace * trace { matrix.try_inverse() } else { None }
+}
+
+/// Share of the lean by which the methods that approximate the lens err beyond what their edges tell: with it nine in ten of
+/// their regions hold nine in ten truths on panoramas.
+pub(super) const APPROXIMATE_SHARE: f64 = 0.2;
+
+/// Adds the error of an angle that is right up to a share of itself, in the direction of the lean.
+pub(super) fn with_lean_error(covariance: Matrix2<f64>, tilt: &Tilt, share: f64) -> Matrix2<f64> {
+    let error = Vector2::new(tilt.beta_rad().cos(), tilt.beta_rad().sin()) * (share * tilt.alpha_rad());
+    covariance + error * error.transpose()
 }
 
 /// Adds the floor of what no image tells.

@@ -397,10 +397,19 @@ impl TiltEstimator {
         // The paper's methods end with weights of what they have selected, which cannot tell how sure the selection was.
         let weights = matches!(self.options.method, Method::Refined(_)).then_some(&scratch.weights[..]);
         let covariance = fit.tilt.and_then(|tilt| {
-            let covariance = confidence::clustered_covariance(&scratch.rows, fit.model, fit.gate, weights, sector)?;
+            let covariance = confidence::clustered_covariance(
+                &scratch.rows,
+                fit.model,
+                fit.gate,
+                weights,
+                self.region.pixels_per_rad(),
+                sector,
+            )?;
             // A change of the normal's horizontal part is a change in its tangent plane, seen along the vertical.
             let plane = tangent_basis(&tilt.normal()).fixed_rows::<2>(0).try_inverse()? * fit.horizontal;
-            Some(confidence::with_floor(plane * covariance * plane.transpose()))
+            let covariance = plane * covariance * plane.transpose();
+            let share = if self.options.method.is_exact() { 0.0 } else { confidence::APPROXIMATE_SHARE };
+            Some(confidence::with_floor(confidence::with_lean_error(covariance, &tilt, share)))
         });
         TiltEstimate {
             tilt: fit.tilt,

@@ -43,6 +43,11 @@ pub enum Method {
 }
 
 impl Method {
+    /// Whether the method's geometry is exact for every lens, so that its angle needs no correction.
+    pub(super) fn is_exact(&self) -> bool {
+        matches!(self, Self::Refined(_) | Self::VectorConsensus { normal: NormalKind::Tangent, .. })
+    }
+
     /// The name under which users ask for the method.
     pub fn name(&self) -> &'static str {
         match self {
