@@ -116,10 +116,10 @@ def planar_pose(
     experiment = PlanarPoseExperiment(rooms=max(2, -(-pairs // 12)), seed=seed)
     with progress_bar(experiment.steps, "places") as bar:
         table = measure_planar_pose(experiment, threads=threads, advance=bar.advance)
-    summary = summarise_planar_pose(table)
-    pays = crossings(summary)
     if out is not None:
         write_frame(table, out)
+    summary = summarise_planar_pose(table)
+    pays = crossings(summary)
     if plot is not None:
         from tiltvp.images import write_image
         from tiltvp.plots.picture import figure_picture
