@@ -82,7 +82,7 @@ def inertial(directory: Path, /, *, samples: int = 2) -> None:
 @app.command
 def planar_pose(
     *,
-    pairs: Annotated[int, Parameter(validator=validators.Number(gte=1))] = 216,
+    pairs: Annotated[int, Parameter(validator=validators.Number(gte=1))] = 180,
     seed: Annotated[int, Parameter(validator=validators.Number(gte=0))] = 0,
     threads: Annotated[int | None, Parameter(validator=validators.Number(gte=1))] = None,
     out: Path | None = None,

@@ -28,13 +28,17 @@ if TYPE_CHECKING:
 
     from tiltvp.cameras import Camera
 
-__all__ = ["CORRECTIONS", "PlanarPoseExperiment", "measure_planar_pose"]
+__all__ = ["CORRECTIONS", "KINDS", "PlanarPoseExperiment", "measure_planar_pose"]
 
 CORRECTIONS: tuple[str, ...] = ("none", "reject-refit, trained a", "reject-refit, closed form", "refined", "true tilt")
 """By what panoramas are made level: the paper's image-space method is there with the factor of eqs. 30 and 31,
 trained on all other rooms, and with the closed-form gain. An image without an estimate is left as it is."""
 
 Result = TypeVar("Result")
+
+KINDS: tuple[str, ...] = tuple(kind for kind in ROOM_KINDS if kind != "under-table")
+"""Under a table the world looks much the same after half a turn: upright min-warping takes one for the other in a
+quarter of the pairs, and that would drown what a lean does."""
 
 _PAPER = "image-space-reject-refit"
 _UPRIGHT = np.array([0.0, 0.0, 1.0])
@@ -72,9 +76,9 @@ class PlanarPoseExperiment:
     each of `tilts_deg` in a random direction. `samples` and `noise_sigma` are those of `tiltvp.synth.Room.render`.
     """
 
-    rooms: int = 18
+    rooms: int = 15
     seed: int = 0
-    kinds: tuple[str, ...] = ROOM_KINDS
+    kinds: tuple[str, ...] = KINDS
     places: int = 4
     tilts_deg: tuple[float, ...] = (0.0, 0.5, 1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0)
     distances_m: tuple[float, float] = (0.2, 1.0)

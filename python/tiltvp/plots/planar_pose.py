@@ -62,5 +62,5 @@ def planar_pose(summary: pl.DataFrame, crossings: pl.DataFrame) -> Figure:
         chosen = crossings.filter((crossings["error"] == error) & (crossings["correction"] == "refined"))
         draw_pose_errors(axes, summary, error, chosen["crossing_deg"].item() if len(chosen) else None)
         axes.set_title(f"{error} error of min-warping")
-    figure.axes[1].legend(loc="upper left", bbox_to_anchor=(0.2, 0.98), frameon=False)
+    figure.axes[1].legend(loc="upper left", bbox_to_anchor=(0.12, 0.86), frameon=False)
     return figure
