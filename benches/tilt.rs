@@ -63,7 +63,7 @@ mod stages {
         let region = Region::new(&fisheye().unwrap(), &Matrix3::identity(), &options, None).unwrap();
         let mut detector = Detector::new(&region, &options);
         let mut edges = EdgePixels::with_capacity(region.len());
-        detector.detect(&view(&PICTURE).unwrap(), &region, None, &mut edges);
+        detector.detect(&view(&PICTURE).unwrap(), &region, options.gradient_min, None, &mut edges);
         (region, detector, edges)
     }
 
@@ -80,9 +80,9 @@ mod stages {
     fn detect(bencher: Bencher, smoothing_px: f64) {
         let (region, mut detector, mut edges) = edges_of(smoothing_px);
         let picture = view(&PICTURE).unwrap();
-        bencher
-            .counter(ItemsCount::new(region.len()))
-            .bench_local(|| detector.detect(black_box(&picture), &region, None, &mut edges));
+        bencher.counter(ItemsCount::new(region.len())).bench_local(|| {
+            detector.detect(black_box(&picture), &region, EdgeOptions::default().gradient_min, None, &mut edges);
+        });
     }
 
     /// From gradients to unit normals that pass the prefilter.

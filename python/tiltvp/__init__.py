@@ -7,35 +7,61 @@ pixel centres at integers. `robot_from_camera` is R in v_robot = R v_camera. A l
 
 from tiltvp._core import METHODS
 from tiltvp.cameras import Camera
+from tiltvp.corrections import (
+    AffineCorrection,
+    PosteriorCorrection,
+    PriorOfTilt,
+    apply_correction,
+    train_affine,
+    train_factor,
+    train_posterior,
+)
 from tiltvp.images import read_image, write_image
 from tiltvp.plots.overlay import draw_edges
 from tiltvp.tilt import (
     CommonDirection,
     EdgeElements,
+    FilteredTilt,
+    FilterStep,
     FitReport,
+    ImageEdges,
     TiltEstimate,
     TiltEstimator,
+    TiltFilter,
     common_direction,
     level,
     normal_from_alpha_beta,
     tilt_error_rad,
+    tilt_from_wheel_heights,
 )
 
 __version__ = "0.1.0"
 
 __all__ = [
     "METHODS",
+    "AffineCorrection",
     "Camera",
     "CommonDirection",
     "EdgeElements",
+    "FilterStep",
+    "FilteredTilt",
     "FitReport",
+    "ImageEdges",
+    "PosteriorCorrection",
+    "PriorOfTilt",
     "TiltEstimate",
     "TiltEstimator",
+    "TiltFilter",
+    "apply_correction",
     "common_direction",
     "draw_edges",
     "level",
     "normal_from_alpha_beta",
     "read_image",
     "tilt_error_rad",
+    "tilt_from_wheel_heights",
+    "train_affine",
+    "train_factor",
+    "train_posterior",
     "write_image",
 ]

@@ -14,21 +14,35 @@ __all__ = [
     "CAMERA_MODELS",
     "METHODS",
     "ROOM_KINDS",
+    "AffineCorrection",
     "Camera",
     "CommonDirection",
     "EdgeElements",
+    "FilterStep",
+    "FilteredTilt",
     "FitReport",
+    "ImageEdges",
+    "PixelRays",
+    "PosteriorCorrection",
+    "PriorOfTilt",
     "Room",
     "TiltEstimate",
     "TiltEstimator",
+    "TiltFilter",
+    "apply_correction",
     "common_direction",
     "leaning_from_upright",
     "level_map",
     "normal_from_alpha_beta",
     "tilt_error_rad",
+    "tilt_from_wheel_heights",
+    "train_affine",
+    "train_factor",
+    "train_posterior",
 ]
 
 _Method: TypeAlias = Literal["refined", "image-space-ransac", "image-space-reject-refit", "vector-consensus"]
+_Verdict: TypeAlias = Literal["accepted", "jumped", "no-tilt", "low-confidence", "outside-gate", "lost"]
 _Stop: TypeAlias = Literal[
     "confident", "trial-limit", "converged", "settled", "iteration-limit", "too-few", "no-model", "out-of-reach"
 ]
@@ -114,6 +128,12 @@ class Camera:
 
     def mirrored(self) -> Self:
         """The same camera with `mirror` turned over."""
+
+    def scaled(self, factor: float) -> Self:
+        """The camera of the image resized by `factor`: what was at u is at factor (u + 1/2) - 1/2.
+
+        The size is rounded to whole pixels. Raises `tiltvp.errors.InvalidInputError` for a factor that is not positive.
+        """
 
     def conformance(self) -> dict[str, float]:
         """Round trips and errors of the analytic Jacobians, measured from the axis to the rim.
@@ -293,6 +313,136 @@ class EdgeElements:
     def __deepcopy__(self, _memo: object) -> Self: ...
     __hash__: ClassVar[None]  # type: ignore[assignment]
 
+@final
+class ImageEdges:
+    """The edge pixels of one image and their gradients: every pixel of the band of at least `gradient_min`.
+
+    `TiltEstimator.detect` makes them, `TiltEstimator.estimate_edges` takes them. Frozen, comparable, to be pickled.
+    """
+
+    @property
+    def gradient_min(self) -> float:
+        """The least gradient magnitude that was asked for."""
+
+    def __len__(self) -> int: ...
+    def __eq__(self, other: object, /) -> bool: ...
+    def __copy__(self) -> Self: ...
+    def __deepcopy__(self, _memo: object) -> Self: ...
+    __hash__: ClassVar[None]  # type: ignore[assignment]
+
+@final
+class AffineCorrection:
+    """alpha = shift / factor + offset_rad, but not below zero. Frozen, comparable, hashable, pickled.
+
+    Raises `tiltvp.errors.InvalidInputError` unless the factor is positive and both are finite.
+    """
+
+    def __new__(cls, factor: float, offset_rad: float) -> Self: ...
+    @property
+    def factor(self) -> float:
+        """Units of the shift per radian: pixels per radian, or none for raw angles."""
+
+    @property
+    def offset_rad(self) -> float:
+        """What is added, in radians."""
+
+    def to_dict(self) -> dict[str, float]:
+        """The attributes by name."""
+
+    @classmethod
+    def from_dict(cls, values: dict[str, Any]) -> Self:
+        """The correction of a dict as `to_dict` makes it."""
+
+    def __eq__(self, other: object, /) -> bool: ...
+    def __hash__(self) -> int: ...
+    def __copy__(self) -> Self: ...
+    def __deepcopy__(self, _memo: object) -> Self: ...
+
+@final
+class PosteriorCorrection:
+    """The mean and deviation of P(alpha | l) over a grid of shifts from zero, and the model of shifts behind it.
+
+    `train_posterior` makes them. Applying one is one interpolation; shifts beyond the grid have the answer of its end.
+    Frozen, comparable, hashable, pickled.
+    """
+
+    def __new__(
+        cls,
+        *,
+        factor: float,
+        spread: float,
+        spread_per_rad: float,
+        stray_share: float,
+        stray_max: float,
+        step: float,
+        mean_rad: ArrayLike,
+        std_rad: ArrayLike,
+    ) -> Self: ...
+    @property
+    def factor(self) -> float:
+        """Units of the shift per radian, by and large."""
+
+    @property
+    def spread(self) -> float:
+        """Standard deviation of the error of the upright robot's shift in each direction, in units of the shift."""
+
+    @property
+    def spread_per_rad(self) -> float:
+        """How it grows with the lean, in units of the shift per radian."""
+
+    @property
+    def stray_share(self) -> float:
+        """Share of shifts that have nothing to do with the lean."""
+
+    @property
+    def stray_max(self) -> float:
+        """Largest of these, in units of the shift."""
+
+    @property
+    def step(self) -> float:
+        """Distance between the shifts of the table, which begins at zero."""
+
+    @property
+    def mean_rad(self) -> NDArray[np.float64]:
+        """(N,): the mean lean in radians at each shift of the table; never falls."""
+
+    @property
+    def std_rad(self) -> NDArray[np.float64]:
+        """(N,): the standard deviation of the lean in radians at each shift of the table."""
+
+    def to_dict(self) -> dict[str, Any]:
+        """The attributes by name, arrays as lists."""
+
+    @classmethod
+    def from_dict(cls, values: dict[str, Any]) -> Self:
+        """The correction of a dict as `to_dict` makes it."""
+
+    def __eq__(self, other: object, /) -> bool: ...
+    def __hash__(self) -> int: ...
+    def __copy__(self) -> Self: ...
+    def __deepcopy__(self, _memo: object) -> Self: ...
+
+@final
+class PriorOfTilt:
+    """How leans are distributed where the robot goes. Frozen, comparable, hashable, pickled."""
+
+    @staticmethod
+    def empirical() -> PriorOfTilt:
+        """As in the training set, smoothed."""
+
+    @staticmethod
+    def uniform(max_rad: float) -> PriorOfTilt:
+        """Every lean up to `max_rad`, in (0, pi/2), is as likely."""
+
+    @staticmethod
+    def rayleigh(sigma_rad: float) -> PriorOfTilt:
+        """Leans forward and sideways are independent and normal, each with standard deviation `sigma_rad`."""
+
+    def __eq__(self, other: object, /) -> bool: ...
+    def __hash__(self) -> int: ...
+    def __copy__(self) -> Self: ...
+    def __deepcopy__(self, _memo: object) -> Self: ...
+
 @disjoint_base
 class TiltEstimator:
     """Estimates how far and in which direction a robot leans from single images of one camera.
@@ -306,6 +456,7 @@ class TiltEstimator:
         *,
         method: _Method | str = ...,
         robot_from_camera: ArrayLike | None = None,
+        _like: TiltEstimator | None = None,
         gradient_min: float = ...,
         smoothing_px: float = ...,
         elevation_min_rad: float = ...,
@@ -319,10 +470,10 @@ class TiltEstimator:
         tolerance_rad: float = ...,
         max_iterations: SupportsIndex = ...,
         threshold_px: float = ...,
-        offset_max_px: float = ...,
+        offset_max_px: float | None = ...,
         threshold_rad: float = ...,
         normal: Literal["gradient", "tangent"] = ...,
-        correction: float | Literal["closed-form"] | None = ...,
+        correction: float | AffineCorrection | PosteriorCorrection | Literal["closed-form"] | None = ...,
     ) -> Self:
         """Makes the tables. Defaults depend on the method; `options` tells those in force.
 
@@ -362,7 +513,8 @@ class TiltEstimator:
         threshold_px
             "image-space-ransac": largest residual of an inlier, delta_s,max of eq. 32.
         offset_max_px
-            Image-space methods: largest edge offset that passes the prefilter, s_max.
+            Image-space methods: largest edge offset that passes the prefilter, s_max. None: the paper's 40 for its lens
+            of 139.7 pixels per radian about the vertical, and in proportion for others.
         threshold_rad
             "vector-consensus": largest angle between an inlier's great circle and the vertical, delta_o,max of eq. 40.
         normal
@@ -370,7 +522,8 @@ class TiltEstimator:
         correction
             Image-space methods: "closed-form" divides each offset by its pixel's own gain, a number is the factor a of
             eq. 30 in pixels per radian, None is the lens' own scale of eq. 26. "vector-consensus": a number is the
-            factor a' of eq. 45, None is 1.
+            factor a' of eq. 45, None is 1. Both: an `AffineCorrection` or a `PosteriorCorrection`, trained on shifts in
+            pixels or on raw angles.
 
         Raises `tiltvp.errors.InvalidInputError` for an option that the method does not have (it names the near ones) or
         that is out of its domain, for an R that is no rotation, for a mask of another size than the camera's images,
@@ -400,6 +553,17 @@ class TiltEstimator:
     def _estimate(self, image: NDArray[np.uint8]) -> TiltEstimate:
         """The tilt of a C-contiguous (H, W) image of uint8."""
 
+    def _detect(self, image: NDArray[np.uint8]) -> ImageEdges:
+        """The edge pixels of such an image."""
+
+    def estimate_edges(self, edges: ImageEdges) -> TiltEstimate:
+        """The tilt of the image that the edges are of, the same to the last bit as the image itself gives.
+
+        `edges` may be those of any estimator with equal camera, robot_from_camera, mask and edge options
+        (gradient_min, smoothing_px, elevations, margin_px); else `tiltvp.errors.InvalidInputError` says what differs.
+        Other threads run meanwhile.
+        """
+
     def _estimate_with_edges(self, image: NDArray[np.uint8]) -> tuple[TiltEstimate, EdgeElements]:
         """The tilt of such an image, and its edge pixels."""
 
@@ -408,6 +572,211 @@ class TiltEstimator:
 
     def __eq__(self, other: object, /) -> bool: ...
     def __hash__(self) -> int: ...
+
+@final
+class FilteredTilt:
+    """A tilt as a filter holds it to be. Frozen, comparable, hashable, pickled. False where the filter abstains.
+
+    The filter abstains where `sigma_rad` exceeds `sigma_max_rad`: angles and normal are NaN then, while covariance and
+    confidence still say how little is known.
+    """
+
+    @property
+    def alpha_rad(self) -> float:
+        """How far the robot leans, in [0, pi] radians (eq. 1)."""
+
+    @property
+    def beta_rad(self) -> float:
+        """In which direction it leans, in (-pi, pi] radians: 0 is forward, +pi/2 to the left (eq. 1)."""
+
+    @property
+    def roll_rad(self) -> float:
+        """Roll about the robot's x in radians, right side down positive (`Rz Ry Rx`, ROS REP 103)."""
+
+    @property
+    def pitch_rad(self) -> float:
+        """Pitch about the robot's y in radians, nose down positive (`Rz Ry Rx`, ROS REP 103)."""
+
+    @property
+    def normal(self) -> NDArray[np.float64]:
+        """(3,): the unit ground normal (eq. 1)."""
+
+    @property
+    def covariance_rad2(self) -> NDArray[np.float64]:
+        """(2, 2) in squared radians: covariance of the normal in its tangent plane, as that of a `TiltEstimate`."""
+
+    @property
+    def confidence(self) -> float:
+        """Probability, in [0, 1], that the error is below two degrees if it is normal with that covariance."""
+
+    @property
+    def sigma_rad(self) -> float:
+        """One standard deviation in any one direction: the root of half the covariance's trace."""
+
+    @property
+    def sigma_max_rad(self) -> float:
+        """The largest standard deviation of an answer: the filter's option."""
+
+    @property
+    def reason(self) -> str:
+        """The standard deviation beside its limit, in a sentence."""
+
+    def to_dict(self) -> dict[str, Any]:
+        """The attributes by name; arrays as nested lists."""
+
+    @classmethod
+    def from_dict(cls, values: dict[str, Any]) -> Self:
+        """The value of a dict as `to_dict` makes it."""
+
+    def __bool__(self) -> bool: ...
+    def __eq__(self, other: object, /) -> bool: ...
+    def __hash__(self) -> int: ...
+    def __copy__(self) -> Self: ...
+    def __deepcopy__(self, _memo: object) -> Self: ...
+
+@final
+class FilterStep:
+    """What a filter did with an estimate, and why. Frozen, comparable, hashable, pickled. True if it was fused."""
+
+    @property
+    def accepted(self) -> bool:
+        """Whether the estimate was fused."""
+
+    @property
+    def verdict(self) -> _Verdict:
+        """What was done, in a word.
+
+        Fused: "accepted", or "jumped", if so many rejected estimates agreed that the floor's tilt was forgotten. Left
+        out: "no-tilt", "low-confidence", "outside-gate", or "lost", if so many were rejected that the floor's tilt is
+        taken to be unknown.
+        """
+
+    @property
+    def reason(self) -> str:
+        """The same in a sentence, with the measured number and the limit."""
+
+    @property
+    def nis(self) -> float | None:
+        """The normalised innovation squared, of two degrees of freedom; None if it did not come to that."""
+
+    def to_dict(self) -> dict[str, Any]:
+        """The attributes by name."""
+
+    @classmethod
+    def from_dict(cls, values: dict[str, Any]) -> Self:
+        """The value of a dict as `to_dict` makes it."""
+
+    def __bool__(self) -> bool: ...
+    def __eq__(self, other: object, /) -> bool: ...
+    def __hash__(self) -> int: ...
+    def __copy__(self) -> Self: ...
+    def __deepcopy__(self, _memo: object) -> Self: ...
+
+@final
+class TiltFilter:
+    """Fuses the tilts of successive images: a Kalman filter of the ground normal on the sphere.
+
+    The floor's tilt turns with the robot's heading and walks slowly; errors that images of one place share are not
+    averaged away; estimates that say nothing or do not fit are left out, steps are followed. Changes as it goes; may be
+    pickled, copied and compared, state included, and used from several threads. See docs/tilt.md for the model.
+
+    Parameters
+    ----------
+    walk_rad_per_sqrt_m, walk_rad_per_sqrt_step
+        How fast the floor's tilt changes: per square root of a metre driven (default 0.01), and of a call of `predict`
+        (0.001).
+    gate_probability
+        Probability with which the gate lets an estimate pass whose covariance is right (0.999).
+    confidence_min
+        Least confidence of an estimate that is looked at (0.5).
+    jump_after
+        How many rejected estimates in a row have to agree with each other to be followed (3).
+    lost_after
+        After how many rejections in a row, agreeing or not, the floor's tilt is taken to be unknown (10).
+    correlated_share, correlation_m
+        Share of an estimate's variance that the next image of the same place has in common with it (0.9), and the
+        metres after which that has fallen to 1/e (2).
+    noise_floor_rad
+        Standard deviation that is added to that of every estimate (0.002).
+    prior_rad
+        Standard deviation of the floor's tilt before anything is known (10 degrees).
+    sigma_max_rad
+        Largest standard deviation of an answer; beyond, the filter abstains (0.02).
+    estimate_mounting, mounting_prior_rad, mounting_walk_rad_per_sqrt_m
+        Whether a lean of the robot itself is estimated beside that of the floor, its standard deviation before anything
+        is known (1.5 degrees), and how fast it changes (0.0002). Turning tells the two apart.
+
+    Raises `tiltvp.errors.InvalidInputError` for values out of their domain.
+    """
+
+    def __new__(
+        cls,
+        *,
+        walk_rad_per_sqrt_m: float | None = None,
+        walk_rad_per_sqrt_step: float | None = None,
+        gate_probability: float | None = None,
+        confidence_min: float | None = None,
+        jump_after: int | None = None,
+        lost_after: int | None = None,
+        correlated_share: float | None = None,
+        correlation_m: float | None = None,
+        noise_floor_rad: float | None = None,
+        prior_rad: float | None = None,
+        sigma_max_rad: float | None = None,
+        estimate_mounting: bool = False,
+        mounting_prior_rad: float | None = None,
+        mounting_walk_rad_per_sqrt_m: float | None = None,
+    ) -> Self: ...
+    @property
+    def options(self) -> dict[str, Any]:
+        """The options in force, by name, defaults included; a fresh dict, good as keywords."""
+
+    @property
+    def estimate(self) -> FilteredTilt:
+        """The ground normal in the robot's frame, as the filter holds it to be now."""
+
+    @property
+    def floor(self) -> FilteredTilt:
+        """The floor's part of it alone, in the frame of the wheels."""
+
+    @property
+    def mounting(self) -> FilteredTilt | None:
+        """The robot's own part alone, what it would see on level ground; None unless `estimate_mounting`."""
+
+    @property
+    def nis_limit(self) -> float:
+        """The largest normalised innovation squared that passes the gate."""
+
+    @property
+    def rejected(self) -> int:
+        """How many estimates in a row the gate has rejected: above 0, the estimate may be about to jump."""
+
+    def predict(self, yaw_rad: float | None = None, distance_m: float | None = None) -> None:
+        """The robot has turned (left positive) and driven (either way) since the last call; None: it has not."""
+
+    def update(self, estimate: TiltEstimate | tuple[ArrayLike, ArrayLike], /) -> FilterStep:
+        """Fuses an estimate, or says why not.
+
+        In its place a pair may stand: a ground normal (3,) of any length, and its covariance (2, 2) in squared radians
+        in the tangent plane. Its confidence is the probability of an error below two degrees under that covariance.
+        """
+
+    def step(
+        self,
+        estimate: TiltEstimate | tuple[ArrayLike, ArrayLike],
+        /,
+        yaw_rad: float | None = None,
+        distance_m: float | None = None,
+    ) -> FilterStep:
+        """`predict`, then `update`; where either is refused, the filter is as before."""
+
+    def reset(self) -> None:
+        """Forgets everything but the options."""
+
+    def __setstate__(self, state: dict[str, Any], /) -> None: ...
+    def __eq__(self, other: object, /) -> bool: ...
+    def __copy__(self) -> Self: ...
+    def __deepcopy__(self, _memo: object) -> Self: ...
 
 @final
 class CommonDirection:
@@ -473,6 +842,36 @@ def common_direction(
     of their domain. Too few or degenerate normals give an answer without a direction, and a reason.
     """
 
+def train_factor(shift: ArrayLike, alpha_rad: ArrayLike) -> float:
+    """The factor of eq. 31: the mean of shift / alpha over images of known leans (N,) above zero.
+
+    `shift` (N,) is `shift_px` of an image-space method, or `alpha_rad` of an uncorrected "vector-consensus". Leave out
+    images without an estimate. Raises `tiltvp.errors.InvalidInputError` for numbers that make no sense.
+    """
+
+def train_affine(shift: ArrayLike, alpha_rad: ArrayLike) -> AffineCorrection:
+    """The line alpha = shift / factor + offset through images of known leans (N,), by least squares of the shift.
+
+    The truth is known and the shift errs, and the line does not depend on how many images there are of each lean.
+    Raises `tiltvp.errors.InvalidInputError` for fewer than two different leans or shifts that do not grow with them.
+    """
+
+def train_posterior(shift: ArrayLike, alpha_rad: ArrayLike, *, prior: PriorOfTilt | None = None) -> PosteriorCorrection:
+    """P(alpha | l) from images of known leans (N,), at least ten, under a prior; None: `PriorOfTilt.empirical()`.
+
+    The shift is modelled as the length of a plane vector of mean length factor * alpha with normal errors that grow
+    with the lean (a Rice distribution), a share of which strays; the model is fitted by maximum likelihood. Raises
+    `tiltvp.errors.InvalidInputError` for numbers that make no sense or shifts that do not grow with the lean.
+    """
+
+def apply_correction(
+    correction: float | AffineCorrection | PosteriorCorrection, shift: ArrayLike
+) -> NDArray[np.float64]:
+    """(N,): the leans in radians of shifts or raw angles (N,) of zero or more, as an estimator so corrected has them.
+
+    NaN stays NaN. A number is a factor by which the shift is divided.
+    """
+
 def leaning_from_upright(normal: ArrayLike) -> NDArray[np.float64]:
     """(3, 3): the rotation from the upright robot's frame to the leaning one's, without a turn about the vertical.
 
@@ -490,6 +889,39 @@ def normal_from_alpha_beta(alpha_rad: float, beta_rad: float) -> NDArray[np.floa
 
 def tilt_error_rad(a: ArrayLike, b: ArrayLike) -> float:
     """The angle in [0, pi] radians between two ground normals (3,), of any length but zero (eq. 44)."""
+
+def tilt_from_wheel_heights(
+    *, left_m: float, right_m: float, caster_m: float, half_track_m: float, caster_behind_m: float
+) -> tuple[float, float]:
+    """(alpha_rad, beta_rad) of a robot whose wheels stand at these heights above a common level (eqs. 42 and 43).
+
+    The main wheels are at (0, +-half_track_m) in the robot's frame, the caster at (-caster_behind_m, 0): r_w and r_c of
+    fig. 20. With h_r = right - left and h_c = caster - left the ground normal is
+    (-(2 h_c - h_r) / (2 r_c), -h_r / (2 r_w), cos alpha). Raises `tiltvp.errors.InvalidInputError` for lengths that are
+    not positive, heights that are not finite, and heights that no robot of this layout can stand at.
+    """
+
+@final
+class PixelRays:
+    """`samples` x `samples` rays in each pixel of a camera that sees anything, made once, to be met with panoramas."""
+
+    def __new__(cls, camera: Camera, *, samples: SupportsIndex) -> Self:
+        """Makes the rays, at the centres of equal parts of the pixels; `samples` is from 1 to 16."""
+
+    @property
+    def samples(self) -> int:
+        """Rays per pixel and side."""
+
+    @property
+    def pixels(self) -> NDArray[np.uint32]:
+        """(N,): places in row order, v width + u, of the pixels in which some ray is seen."""
+
+    def panorama_map(self, rotation: ArrayLike, *, width: SupportsIndex, height: SupportsIndex) -> NDArray[np.float32]:
+        """(2, samples^2, N): columns and rows of an equirectangular panorama of that size that the rays meet.
+
+        `rotation` (3, 3) takes bearings of the camera to the panorama's: x right, y down, z towards longitude 0. Rays
+        that the lens does not see are at -1e6, far outside.
+        """
 
 @disjoint_base
 class Room:

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
     Matrix = NDArray[np.float64]
 
-__all__ = ["ROTATION_WORDS", "read_rotation"]
+__all__ = ["ROTATION_WORDS", "read_rotation", "rotation_from"]
 
 ROTATION_WORDS: Final[dict[str, tuple[tuple[float, float, float], ...]]] = {
     "up": ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)),
@@ -58,6 +58,24 @@ def read_rotation(source: str | os.PathLike[str]) -> Matrix:
             raise CalibrationError(f"{file}: {len(numbers)} numbers, expected {_EXPECTED}")
         return _rotation(np.reshape(numbers, (3, 3)), file)
     return _from_keys(file, _tree(document))
+
+
+def rotation_from(value: object, where: str) -> Matrix:
+    """The (3, 3) rotation that a word of `ROTATION_WORDS` or three rows of three numbers stand for.
+
+    What is within 1e-3 of a rotation is taken as the nearest rotation. Raises `CalibrationError` that begins with
+    `where`.
+    """
+    if isinstance(value, str):
+        if value not in ROTATION_WORDS:
+            raise CalibrationError(
+                f"{where}: {value!r}, expected one of {', '.join(ROTATION_WORDS)}, or a 3 x 3 matrix"
+            )
+        return np.array(ROTATION_WORDS[value])
+    array = _array(where, value)
+    if array.shape != (3, 3):
+        raise CalibrationError(f"{where}: shape {array.shape}, expected 3 x 3 numbers")
+    return _rotation(array, where)
 
 
 def _missing(source: str, *, is_word: bool) -> Exception:
@@ -100,7 +118,7 @@ def _from_keys(file: Path, tree: dict[str, object]) -> Matrix:
     value = tree[key]
     if isinstance(value, dict):
         value = value.get("data", value)
-    array = _array(file, key, value)
+    array = _array(f"{file}: {key}", value)
     if array.shape == (4,):
         return _from_quaternion(array, f"{file}: {key}")
     if key == "robot_from_camera" and array.shape in ((3, 3), (9,)):
@@ -109,13 +127,13 @@ def _from_keys(file: Path, tree: dict[str, object]) -> Matrix:
     raise CalibrationError(f"{file}: {key} has the shape {array.shape}, expected {expected}")
 
 
-def _array(file: Path, key: str, value: object) -> Matrix:
+def _array(where: str, value: object) -> Matrix:
     if isinstance(value, str) or not isinstance(value, Sequence):
-        raise CalibrationError(f"{file}: {key} is {value!r}, expected a list of numbers")
+        raise CalibrationError(f"{where}: {value!r}, expected a list of numbers")
     try:
         return np.array(value, dtype=np.float64)
     except (TypeError, ValueError):
-        raise CalibrationError(f"{file}: {key} is {value!r}, expected a list of numbers") from None
+        raise CalibrationError(f"{where}: {value!r}, expected a list of numbers") from None
 
 
 def _from_quaternion(q: Matrix, where: str) -> Matrix:

@@ -1,9 +1,9 @@
-"""The tilt of single images: the estimator over images of any usual kind, and levelling."""
+"""The tilt of single and of successive images: the estimator over images of any usual kind, the filter, levelling."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Self
 
 import cv2
 import numpy as np
@@ -12,11 +12,16 @@ from tiltvp import _core
 from tiltvp._core import (
     CommonDirection,
     EdgeElements,
+    FilteredTilt,
+    FilterStep,
     FitReport,
+    ImageEdges,
     TiltEstimate,
+    TiltFilter,
     common_direction,
     normal_from_alpha_beta,
     tilt_error_rad,
+    tilt_from_wheel_heights,
 )
 from tiltvp.errors import InvalidInputError
 from tiltvp.images import gray_from
@@ -29,13 +34,18 @@ if TYPE_CHECKING:
 __all__ = [
     "CommonDirection",
     "EdgeElements",
+    "FilterStep",
+    "FilteredTilt",
     "FitReport",
+    "ImageEdges",
     "TiltEstimate",
     "TiltEstimator",
+    "TiltFilter",
     "common_direction",
     "level",
     "normal_from_alpha_beta",
     "tilt_error_rad",
+    "tilt_from_wheel_heights",
 ]
 
 
@@ -60,9 +70,11 @@ class TiltEstimator(_core.TiltEstimator):
     keep_fraction, scale_rad, tolerance_rad, max_iterations
         Of "refined"; `keep_fraction` also of "image-space-reject-refit".
     threshold_px, offset_max_px, correction
-        Of the image-space methods; `correction` is "closed-form" (default), a factor in pixels per radian, or None.
+        Of the image-space methods; `correction` is "closed-form" (default), a factor in pixels per radian, None, an
+        `AffineCorrection` or a `PosteriorCorrection`.
     threshold_rad, normal, correction
-        Of "vector-consensus"; `normal` is "gradient" (the paper's) or "tangent", `correction` a factor without unit.
+        Of "vector-consensus"; `normal` is "gradient" (the paper's) or "tangent", `correction` a factor without unit
+        or one of those trained on raw angles.
     """
 
     __slots__ = ()
@@ -70,6 +82,18 @@ class TiltEstimator(_core.TiltEstimator):
     def __call__(self, image: ArrayLike) -> TiltEstimate:
         """The tilt of one image."""
         return self._estimate(gray_from(image))
+
+    def detect(self, image: ArrayLike) -> ImageEdges:
+        """The edge pixels of one image, for `estimate_edges` of any estimator with equal camera and edge options."""
+        return self._detect(gray_from(image))
+
+    def with_options(self, **options: Any) -> Self:
+        """An estimator of the same camera, mounting and method with some options changed.
+
+        It shares every table that the change leaves alone: one for each of many thresholds takes next to no time and
+        memory. Raises `InvalidInputError` as the constructor does.
+        """
+        return type(self)(self.camera, _like=self, **options)
 
     def with_edges(self, image: ArrayLike) -> tuple[TiltEstimate, EdgeElements]:
         """The tilt of one image and its edge pixels: position, phi and s of eqs. 16 and 17, prefiltered, inlier."""
@@ -84,13 +108,13 @@ class TiltEstimator(_core.TiltEstimator):
 def level(
     image: NDArray[Any],
     camera: Camera,
-    tilt: TiltEstimate | tuple[float, float],
+    tilt: TiltEstimate | FilteredTilt | tuple[float, float],
     robot_from_camera: ArrayLike | None = None,
 ) -> NDArray[Any]:
     """The image as the untilted camera would have seen it, same shape and dtype; black where nothing was seen.
 
-    `tilt` is an estimate or (alpha_rad, beta_rad). Raises `InvalidInputError` if the image has another size than the
-    camera's or the estimate has no tilt.
+    `tilt` is an estimate, a filter's or an image's, or (alpha_rad, beta_rad). Raises
+    `InvalidInputError` if the image has another size than the camera's or the estimate has no tilt.
     """
     array = np.asarray(image)
     if array.ndim not in (2, 3) or array.shape[:2] != (camera.height, camera.width):
@@ -99,7 +123,7 @@ def level(
     if array.dtype not in _LEVELLED or (array.ndim == 3 and not 1 <= array.shape[2] <= 4):
         kinds = ", ".join(_LEVELLED)
         raise InvalidInputError(f"image: dtype {array.dtype}, shape {array.shape}, expected {kinds} of 1 to 4 channels")
-    if isinstance(tilt, TiltEstimate):
+    if isinstance(tilt, TiltEstimate | FilteredTilt):
         if not tilt:
             raise InvalidInputError(f"tilt: an estimate without a tilt ({tilt.reason}), expected one with a tilt")
         normal = tilt.normal

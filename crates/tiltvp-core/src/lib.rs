@@ -3,7 +3,7 @@
 //! The floors of the house, from the ground up; a module imports only from floors below its own:
 //!
 //! 1. [`error`], [`geometry`]
-//! 2. [`camera`], [`image`], [`robust`]
+//! 2. [`camera`], [`image`], [`robust`], [`filter`]
 //! 3. [`edges`]
 //! 4. [`tilt`]
 //!
@@ -13,6 +13,7 @@
 pub mod camera;
 pub mod edges;
 pub mod error;
+pub mod filter;
 pub mod geometry;
 pub mod image;
 pub mod robust;

@@ -12,7 +12,7 @@ use scene::{constant, fisheye, noise, stripes};
 use tiltvp_core::camera::Camera;
 use tiltvp_core::edges::NormalKind;
 use tiltvp_core::geometry::Tilt;
-use tiltvp_core::tilt::{Correction, METHODS, Method, TiltEstimator, TiltOptions};
+use tiltvp_core::tilt::{Correction, METHODS, Method, TiltEstimator, TiltOptions, TrainedCorrection};
 
 thread_local! {
     static ALLOCATIONS: Cell<usize> = const { Cell::new(0) };
@@ -70,7 +70,9 @@ fn choices() -> Vec<TiltOptions> {
             Method::ImageSpaceRansac { correction, .. } | Method::ImageSpaceRejectRefit { correction, .. } => {
                 *correction = Correction::None;
             }
-            Method::VectorConsensus { normal, factor, .. } => (*normal, *factor) = (NormalKind::Tangent, 1.7),
+            Method::VectorConsensus { normal, correction, .. } => {
+                (*normal, *correction) = (NormalKind::Tangent, TrainedCorrection::Factor(1.7));
+            }
             Method::Refined(_) => other.edges.smoothing_px = 2.0,
         }
         // Every pixel of a noisy image is an edge.

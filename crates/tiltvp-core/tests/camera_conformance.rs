@@ -48,6 +48,30 @@ fn every_camera_of_the_zoo_keeps_its_promises() {
 }
 
 #[test]
+fn a_resized_image_sees_the_same() {
+    for (name, camera) in ZOO.iter() {
+        for factor in [0.5, 2.0] {
+            let resized = camera.scaled(factor).unwrap();
+            assert_eq!(resized.is_mirrored(), camera.is_mirrored(), "{name}");
+            let mut seen = 0;
+            for k in 0..400 {
+                let (u, v) = (f64::from(k % 20) / 20.0, f64::from(k / 20) / 20.0);
+                let pixel = Vector2::new(u * f64::from(camera.width()), v * f64::from(camera.height()));
+                let place = (pixel + Vector2::repeat(0.5)) * factor - Vector2::repeat(0.5);
+                if let (Some(a), Some(b)) = (camera.unproject(&pixel), resized.unproject(&place)) {
+                    // An image of odd sides is not of half the size to the last pixel, and a panorama is stretched over it.
+                    let slack = if matches!(camera.model(), Model::Equirectangular(_)) { 0.01 } else { 1e-7 };
+                    assert!(angle_between(&a, &b) < slack, "{name} times {factor} at {pixel:?}: {a:?} {b:?}");
+                    seen += 1;
+                }
+            }
+            assert!(seen > 20, "{name} times {factor}: {seen}");
+        }
+        assert!(camera.scaled(0.0).is_err() && camera.scaled(f64::NAN).is_err() && camera.scaled(1e9).is_err());
+    }
+}
+
+#[test]
 fn parameters_make_the_same_model_again() {
     for (name, camera) in ZOO.iter() {
         let model = camera.model();

@@ -17,7 +17,8 @@ use tiltvp_core::geometry::Tilt;
 use tiltvp_core::image::ImageView;
 use tiltvp_core::testing::zoo;
 use tiltvp_core::tilt::{
-    CommonDirectionOptions, Correction, Method, RefineOptions, TiltEstimator, TiltOptions, common_direction,
+    CommonDirectionOptions, Correction, Method, RefineOptions, TiltEstimator, TiltOptions, TrainedCorrection,
+    common_direction,
 };
 
 /// The lenses of the zoo over images of a few thousand pixels: what is in pixels shrinks with them.
@@ -106,19 +107,25 @@ fn methods() -> impl Strategy<Value = Method> {
         prop_oneof![
             Just(Correction::None),
             Just(Correction::ClosedForm),
-            number(5.0, 500.0).prop_map(Correction::Factor)
+            number(5.0, 500.0).prop_map(Correction::factor)
         ]
     };
     let normal = prop_oneof![Just(NormalKind::Tangent), Just(NormalKind::Gradient)];
     prop_oneof![
-        (number(0.1, 30.0), number(1.0, 80.0), correction()).prop_map(|(threshold_px, offset_max_px, correction)| {
-            Method::ImageSpaceRansac { threshold_px, offset_max_px, correction }
+        (number(0.1, 30.0), prop::option::of(number(1.0, 80.0)), correction()).prop_map(
+            |(threshold_px, offset_max_px, correction)| {
+                Method::ImageSpaceRansac { threshold_px, offset_max_px, correction }
+            }
+        ),
+        (number(0.01, 0.99), prop::option::of(number(1.0, 80.0)), correction()).prop_map(
+            |(keep_fraction, offset_max_px, correction)| {
+                Method::ImageSpaceRejectRefit { keep_fraction, offset_max_px, correction }
+            }
+        ),
+        (number(0.001, 1.0), normal, number(0.3, 3.0)).prop_map(|(threshold_rad, normal, factor)| {
+            let correction = TrainedCorrection::Factor(factor);
+            Method::VectorConsensus { threshold_rad, normal, correction }
         }),
-        (number(0.01, 0.99), number(1.0, 80.0), correction()).prop_map(|(keep_fraction, offset_max_px, correction)| {
-            Method::ImageSpaceRejectRefit { keep_fraction, offset_max_px, correction }
-        }),
-        (number(0.001, 1.0), normal, number(0.3, 3.0))
-            .prop_map(|(threshold_rad, normal, factor)| { Method::VectorConsensus { threshold_rad, normal, factor } }),
         (number(0.01, 0.99), number(0.001, 0.9)).prop_map(|(keep_fraction, scale_rad)| Method::Refined(
             RefineOptions { keep_fraction, scale_rad, ..RefineOptions::default() }
         )),
@@ -254,11 +261,14 @@ fn scratch_of_another_estimator_is_refused() {
     for other in [
         make(60, EdgeOptions::default()),
         make(180, EdgeOptions::default()),
-        make(120, EdgeOptions { gradient_min: 400.0, ..EdgeOptions::default() }),
         make(120, EdgeOptions { smoothing_px: 1.0, ..EdgeOptions::default() }),
     ] {
         let error = own.estimate(&image.view(), &mut other.scratch()).unwrap_err();
         assert!(error.to_string().starts_with("scratch"), "{error}");
     }
-    assert!(own.estimate(&image.view(), &mut make(120, EdgeOptions::default()).scratch()).is_ok());
+    // How strong an edge must be takes no other memory.
+    let strict = EdgeOptions { gradient_min: 400.0, ..EdgeOptions::default() };
+    for same in [EdgeOptions::default(), strict] {
+        assert!(own.estimate(&image.view(), &mut make(120, same).scratch()).is_ok());
+    }
 }

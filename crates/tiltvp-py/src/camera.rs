@@ -150,6 +150,13 @@ impl Camera {
         slf.get_type().call((), Some(&dict))
     }
 
+    /// The camera of the image resized by a factor.
+    fn scaled<'py>(slf: &Bound<'py, Self>, factor: f64) -> PyResult<Bound<'py, PyAny>> {
+        let inner = slf.get().inner.scaled(factor).map_err(|error| exception(&error))?;
+        let dict = Self::to_dict(&Bound::new(slf.py(), Self { inner })?)?;
+        slf.get_type().call((), Some(&dict))
+    }
+
     /// Round trips and errors of the Jacobians, measured from the axis to the rim.
     fn conformance<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let found = call(py, || Ok(core::conformance(&self.inner)))?;

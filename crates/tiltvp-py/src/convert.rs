@@ -4,6 +4,7 @@ use nalgebra::{Matrix2, Matrix3, Vector3};
 use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray2, PyUntypedArray, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
+use tiltvp_core::edges::Mask;
 
 use crate::call::invalid;
 
@@ -88,6 +89,13 @@ pub(crate) fn mask(value: &Bound<'_, PyAny>, name: &str) -> PyResult<(usize, usi
     let (height, width) = (array.shape()[0], array.shape()[1]);
     let flat = array.call_method0("ravel")?.cast_into::<PyArray1<bool>>()?;
     Ok((height, width, flat.to_vec()?))
+}
+
+/// Fresh `(H, W)` array of bool.
+pub(crate) fn to_mask<'py>(py: Python<'py>, mask: &Mask) -> PyResult<Bound<'py, PyArray2<bool>>> {
+    let (width, height) = mask.size();
+    let usable = (0..width * height).map(|i| mask.usable(i % width, i / width)).collect();
+    PyArray1::from_vec(py, usable).reshape([height, width])
 }
 
 /// A whole number that the type can hold.

@@ -3,6 +3,7 @@
 mod call;
 mod camera;
 mod convert;
+mod rays;
 mod synth;
 mod tilt;
 
@@ -16,11 +17,15 @@ mod _core {
     #[pymodule_export]
     use crate::camera::Camera;
     #[pymodule_export]
+    use crate::rays::PixelRays;
+    #[pymodule_export]
     use crate::synth::Room;
     #[pymodule_export]
     use crate::tilt::{
-        CommonDirection, EdgeElements, FitReport, TiltEstimate, TiltEstimator, common_direction, leaning_from_upright,
-        level_map, normal_from_alpha_beta, tilt_error_rad,
+        AffineCorrection, CommonDirection, EdgeElements, FilterStep, FilteredTilt, FitReport, ImageEdges,
+        PosteriorCorrection, PriorOfTilt, TiltEstimate, TiltEstimator, TiltFilter, apply_correction, common_direction,
+        leaning_from_upright, level_map, normal_from_alpha_beta, tilt_error_rad, tilt_from_wheel_heights, train_affine,
+        train_factor, train_posterior,
     };
 
     #[pymodule_init]

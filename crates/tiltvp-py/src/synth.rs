@@ -60,7 +60,7 @@ impl Room {
     #[getter]
     fn vertical_edges_m<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         let ends = self.world.vertical_edges().iter().flat_map(|edge| [edge.bottom, edge.top]);
-        let flat: Vec<f64> = ends.flat_map(|end| <[f64; 3]>::from(end)).collect();
+        let flat: Vec<f64> = ends.flat_map(<[f64; 3]>::from).collect();
         convert::to_matrices(py, &flat, [2, 3], false)
     }
 

@@ -1,22 +1,33 @@
 //! `TiltEstimator`, `TiltEstimate`, `common_direction`: the core's tilt over arrays.
 
+mod correction;
 mod direction;
 mod estimate;
+mod filter;
+mod filtered;
+mod image_edges;
 mod options;
 mod report;
+mod values;
 
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Arc, Mutex, PoisonError};
 
 use nalgebra::Matrix3;
 use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray2, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyTuple};
-use tiltvp_core::geometry::Tilt;
+use tiltvp_core::geometry::{Tilt, WheelLayout};
 use tiltvp_core::image::ImageView;
 use tiltvp_core::tilt::{self as core, Scratch};
 
+pub(crate) use self::correction::{
+    AffineCorrection, PosteriorCorrection, PriorOfTilt, apply_correction, train_affine, train_factor, train_posterior,
+};
 pub(crate) use self::direction::{CommonDirection, common_direction};
 pub(crate) use self::estimate::{EdgeElements, TiltEstimate};
+pub(crate) use self::filter::TiltFilter;
+pub(crate) use self::filtered::{FilterStep, FilteredTilt};
+pub(crate) use self::image_edges::ImageEdges;
 pub(crate) use self::report::FitReport;
 use crate::call::{call, exception, invalid};
 use crate::camera::Camera;
@@ -29,20 +40,26 @@ pub(crate) struct TiltEstimator {
     camera: Py<Camera>,
     /// The options that the user has named.
     given: Vec<String>,
-    scratch: Mutex<Vec<Scratch>>,
+    /// Shared by the estimators that look at the same pixels.
+    scratch: Arc<Mutex<Vec<Scratch>>>,
 }
 
 #[pymethods]
 impl TiltEstimator {
     #[new]
-    #[pyo3(signature = (camera, *, method=core::METHODS[0], robot_from_camera=None, **options))]
+    #[pyo3(signature = (camera, *, method=core::METHODS[0], robot_from_camera=None, _like=None, **options))]
+    #[expect(clippy::used_underscore_binding, reason = "a keyword of the package's own")]
     fn new(
         py: Python<'_>,
         camera: &Bound<'_, PyAny>,
         method: &str,
         robot_from_camera: Option<&Bound<'_, PyAny>>,
+        _like: Option<&Bound<'_, Self>>,
         options: Option<&Bound<'_, PyDict>>,
     ) -> PyResult<Self> {
+        if let Some(like) = _like {
+            return like.get().with_options(py, options);
+        }
         let Ok(camera) = camera.cast::<Camera>() else {
             return Err(invalid(format!("camera: {}, expected a tiltvp.Camera", camera.get_type().name()?)));
         };
@@ -52,7 +69,7 @@ impl TiltEstimator {
         let lens = camera.get().inner.clone();
         let inner = call(py, move || core::TiltEstimator::new(lens, rotation, parsed))?;
         let given = options.map_or(Ok(Vec::new()), |options| options.keys().extract())?;
-        Ok(Self { inner, camera: camera.clone().unbind(), given, scratch: Mutex::new(Vec::new()) })
+        Ok(Self { inner, camera: camera.clone().unbind(), given, scratch: Arc::default() })
     }
 
     /// The camera whose images are read.
@@ -91,6 +108,28 @@ impl TiltEstimator {
         let (view, inner) = (view(&image)?, &self.inner);
         let mut scratch = self.borrow_scratch();
         let estimate = call(py, || inner.estimate(&view, &mut scratch));
+        self.return_scratch(scratch);
+        Ok(TiltEstimate::from(estimate?))
+    }
+
+    /// The edge pixels of a C-contiguous `(H, W)` image of uint8.
+    fn _detect(&self, py: Python<'_>, image: &Bound<'_, PyAny>) -> PyResult<ImageEdges> {
+        let image = convert::gray(image, "image")?;
+        let (view, inner) = (view(&image)?, &self.inner);
+        let mut scratch = self.borrow_scratch();
+        let edges = call(py, || inner.detect(&view, &mut scratch));
+        self.return_scratch(scratch);
+        Ok(ImageEdges::new(edges?, self.camera.clone_ref(py)))
+    }
+
+    /// The tilt of the image that the edges are of.
+    fn estimate_edges(&self, py: Python<'_>, edges: &Bound<'_, PyAny>) -> PyResult<TiltEstimate> {
+        let Ok(edges) = edges.cast::<ImageEdges>() else {
+            return Err(invalid(format!("edges: {}, expected a tiltvp.ImageEdges", edges.get_type().name()?)));
+        };
+        let (edges, inner) = (edges.get().inner(), &self.inner);
+        let mut scratch = self.borrow_scratch();
+        let estimate = call(py, || inner.estimate_edges(edges, &mut scratch));
         self.return_scratch(scratch);
         Ok(TiltEstimate::from(estimate?))
     }
@@ -159,6 +198,23 @@ impl TiltEstimator {
 }
 
 impl TiltEstimator {
+    /// An estimator of the same camera with some options changed, which shares tables and scratch where they are the same.
+    fn with_options(&self, py: Python<'_>, changes: Option<&Bound<'_, PyDict>>) -> PyResult<Self> {
+        let mut options = self.inner.options().clone();
+        options::change(&mut options, changes)?;
+        let inner = call(py, || self.inner.with_options(options))?;
+        let mut given = self.given.clone();
+        for key in changes.into_iter().flat_map(PyDictMethods::keys) {
+            let key: String = key.extract()?;
+            if !given.contains(&key) {
+                given.push(key);
+            }
+        }
+        let shares = inner.shares_scratch_with(&self.inner);
+        let scratch = if shares { Arc::clone(&self.scratch) } else { Arc::default() };
+        Ok(Self { inner, camera: self.camera.clone_ref(py), given, scratch })
+    }
+
     fn borrow_scratch(&self) -> Scratch {
         let free = self.scratch.lock().unwrap_or_else(PoisonError::into_inner).pop();
         free.unwrap_or_else(|| self.inner.scratch())
@@ -216,6 +272,21 @@ pub(crate) fn normal_from_alpha_beta(
         return Err(invalid(format!("alpha_rad, beta_rad = {alpha_rad}, {beta_rad}, expected finite angles")));
     }
     Ok(PyArray1::from_slice(py, Tilt::from_alpha_beta(alpha_rad, beta_rad).normal().as_slice()))
+}
+
+/// `(alpha_rad, beta_rad)` of a robot whose wheels stand at these heights, eqs. 42 and 43.
+#[pyfunction]
+#[pyo3(signature = (*, left_m, right_m, caster_m, half_track_m, caster_behind_m))]
+pub(crate) fn tilt_from_wheel_heights(
+    left_m: f64,
+    right_m: f64,
+    caster_m: f64,
+    half_track_m: f64,
+    caster_behind_m: f64,
+) -> PyResult<(f64, f64)> {
+    let layout = WheelLayout { half_track_m, caster_behind_m };
+    let tilt = layout.tilt(left_m, right_m, caster_m).map_err(|error| exception(&error))?;
+    Ok((tilt.alpha_rad(), tilt.beta_rad()))
 }
 
 /// `(3, 3)` rotation from the upright robot's frame to the leaning one's, without a turn about the vertical.

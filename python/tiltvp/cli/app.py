@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from cyclopts import App, CycloptsError
 
 from tiltvp import __version__
-from tiltvp.cli import camera, demo, measure, tilt
+from tiltvp.cli import camera, dataset, demo, measure, tilt
 from tiltvp.cli.terminal import complain
 from tiltvp.errors import TiltvpError
 
@@ -24,6 +24,7 @@ app = App(
 app.command(tilt.tilt)
 app.command(demo.demo)
 app.command(camera.app)
+app.command(dataset.app)
 app.command(measure.app)
 
 

@@ -19,10 +19,10 @@ if TYPE_CHECKING:
 _CAMERA = Group("Camera")
 _METHOD = Group("Method", help="An option that is not given has the default of its method.")
 _AS_THEY_ARE = (
-    "method", "margin_px", "gradient_min", "smoothing_px", "keep_fraction", "threshold_px", "offset_max_px", "normal",
-    "seed",
+    "method", "margin_px", "gradient_min", "smoothing_px", "keep_fraction", "max_iterations", "threshold_px",
+    "offset_max_px", "normal", "seed",
 )  # fmt: skip
-_ANGLES = ("elevation_min", "elevation_max", "tilt_max", "scale", "threshold")
+_ANGLES = ("elevation_min", "elevation_max", "tilt_max", "scale", "tolerance", "threshold")
 Switch = Annotated[bool, Parameter(negative="", show_default=False)]
 
 
@@ -93,6 +93,10 @@ class MethodOptions:
     """Share of residuals kept in each round of trimming."""
     scale_deg: float | None = None
     """Standard deviation of the soft gate of the refined method."""
+    tolerance_deg: float | None = None
+    """Change of the direction below which the refined method has converged."""
+    max_iterations: int | None = None
+    """Most refits of the refined method with the gate at its final scale."""
     threshold_px: float | None = None
     """Largest residual of an inlier of image-space-ransac."""
     threshold_deg: float | None = None

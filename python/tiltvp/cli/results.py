@@ -18,13 +18,15 @@ if TYPE_CHECKING:
     import polars as pl
     from rich.table import Table
 
-    from tiltvp import TiltEstimate
+    from tiltvp import FilteredTilt, TiltEstimate
 
 _PEOPLE: Final = (
     "file", "alpha deg", "beta deg", "roll deg", "pitch deg", "confidence", "1-sigma deg", "edges px", "inliers px",
     "ms", "reason",
 )  # fmt: skip
 _PEOPLE_NARROW: Final = ("file", "alpha deg", "beta deg", "confidence", "1-sigma deg")
+_JUDGED: Final = ("verdict",)
+_FILTERED: Final = ("filtered alpha deg", "filtered beta deg", "filtered 1-sigma deg")
 _NUMBERS_WIDTH, _FILE_WIDTH = 135, 40
 """Columns of text that all but the file and a folded reason take, and those that a long file name is granted."""
 ENDINGS: Final = (".csv", ".json", ".parquet")
@@ -39,15 +41,22 @@ _WORDS: Final = ("stop", "reason", "error")
 
 @dataclass(frozen=True)
 class Outcome:
-    """What became of one image: an estimate and the seconds it took, or what went wrong."""
+    """What became of one image: an estimate and the seconds it took, or what went wrong; and what was made of it."""
 
     file: Path
     estimate: TiltEstimate | None = None
     time_s: float = math.nan
     error: str | None = None
+    accepted: bool | None = None
+    """Whether it was sure enough, and with a filter whether it was fused; None where nobody asked."""
+    verdict: str | None = None
+    verdict_reason: str | None = None
+    nis: float | None = None
+    filtered: FilteredTilt | None = None
+    """What the filter held to be true after it; None without a filter."""
 
 
-def sigma_rad(estimate: TiltEstimate) -> float:
+def sigma_rad(estimate: TiltEstimate | FilteredTilt) -> float:
     """One standard deviation of the normal in any one direction: the root of half the covariance's trace."""
     covariance = estimate.covariance_rad2
     return math.sqrt(0.5 * float(covariance[0, 0] + covariance[1, 1]))
@@ -62,17 +71,31 @@ def people_table(outcomes: Sequence[Outcome], width: int) -> Table:
     """One row for each image, angles in degrees; only the columns that matter most where `width` holds no more."""
     rows = [_people_row(outcome) for outcome in outcomes]
     longest = max((len(row["file"]) for row in rows), default=0)
-    columns = _PEOPLE if width >= _NUMBERS_WIDTH + min(longest, _FILE_WIDTH) else _PEOPLE_NARROW
-    table = new_table(None, columns, left=("file", "reason"))
+    judged = _JUDGED if any(outcome.verdict for outcome in outcomes) else ()
+    filtered = _FILTERED if any(outcome.filtered is not None for outcome in outcomes) else ()
+    more = sum(len(name) + 2 for name in judged + filtered)
+    if width >= _NUMBERS_WIDTH + more + min(longest, _FILE_WIDTH):
+        columns = (*_PEOPLE[:-1], *filtered, *judged, _PEOPLE[-1])
+    else:
+        columns = (*_PEOPLE_NARROW, *filtered[:2], *judged)
+    table = new_table(None, columns, left=("file", "verdict", "reason"))
     for outcome, row in zip(outcomes, rows, strict=True):
-        style = "red" if outcome.estimate is None else None if outcome.estimate else "yellow"
+        style = "red" if outcome.estimate is None else "yellow" if _left_out(outcome) else None
         table.add_row(*[row[column] for column in columns], style=style)
     return table
 
 
+def _left_out(outcome: Outcome) -> bool:
+    return not outcome.estimate or outcome.accepted is False
+
+
 def _people_row(outcome: Outcome) -> dict[str, str]:
-    row = dict.fromkeys(_PEOPLE, "-") | {"file": str(outcome.file), "reason": outcome.error or ""}
-    e = outcome.estimate
+    row = dict.fromkeys((*_PEOPLE, *_FILTERED), "-") | {"file": str(outcome.file), "reason": outcome.error or ""}
+    row["verdict"] = outcome.verdict or "-"
+    e, filtered = outcome.estimate, outcome.filtered
+    if filtered is not None:
+        held = (filtered.alpha_rad, filtered.beta_rad, filtered.sigma_rad)
+        row |= {name: degrees(angle) for name, angle in zip(_FILTERED, held, strict=True)}
     if e is None:
         return row
     angles = {name: degrees(getattr(e, f"{name}_rad")) for name in ("alpha", "beta", "roll", "pitch")}
@@ -86,13 +109,21 @@ def _people_row(outcome: Outcome) -> dict[str, str]:
 
 
 def data_frame(outcomes: Sequence[Outcome], method: str) -> pl.DataFrame:
-    """One row for each image in SI units; null where there is no value, `error` where the image could not be used."""
+    """One row for each image in SI units; null where there is no value, `error` where the image could not be used.
+
+    Judged outcomes have `accepted`, `verdict` and `verdict_reason`; those of a filter also `nis`, and the filtered tilt
+    in columns `filtered_...`, null where the filter abstains but for covariance, sigma and confidence.
+    """
     import polars as pl
 
     schema: dict[str, Any] = {"file": pl.String, "method": pl.String}
     schema |= dict.fromkeys(_NUMBERS, pl.Float64) | dict.fromkeys(_COUNTS, pl.Int64)
     schema |= dict.fromkeys(_MORE_NUMBERS, pl.Float64) | dict.fromkeys(_WORDS, pl.String)
-    rows = [{"file": str(outcome.file), "method": method} | _row(outcome) for outcome in outcomes]
+    if any(outcome.accepted is not None for outcome in outcomes):
+        schema |= {"accepted": pl.Boolean, "verdict": pl.String, "verdict_reason": pl.String}
+    if any(outcome.filtered is not None for outcome in outcomes):
+        schema |= {"nis": pl.Float64} | {f"filtered_{name}": pl.Float64 for name in _NUMBERS}
+    rows = [{"file": str(outcome.file), "method": method} | _row(outcome) | _judged(outcome) for outcome in outcomes]
     return pl.DataFrame([{name: _plain(row.get(name)) for name in schema} for row in rows], schema=schema)
 
 
@@ -100,6 +131,21 @@ def _row(outcome: Outcome) -> dict[str, object]:
     e = outcome.estimate
     if e is None:
         return {"error": outcome.error}
+    row = _numbers(e)
+    row |= {name: getattr(e, name) for name in ("edge_pixels", "prefiltered_pixels", "inlier_pixels", "shift_px")}
+    row |= e.report.to_dict()
+    return row | {"time_s": outcome.time_s}
+
+
+def _judged(outcome: Outcome) -> dict[str, object]:
+    row: dict[str, object] = {name: getattr(outcome, name) for name in ("accepted", "verdict", "verdict_reason", "nis")}
+    if outcome.filtered is not None:
+        row |= {f"filtered_{name}": value for name, value in _numbers(outcome.filtered).items()}
+    return row
+
+
+def _numbers(e: TiltEstimate | FilteredTilt) -> dict[str, object]:
+    """The values of `_NUMBERS`."""
     normal, covariance = e.normal, e.covariance_rad2
     row: dict[str, object] = {
         name: getattr(e, name) for name in ("alpha_rad", "beta_rad", "roll_rad", "pitch_rad", "confidence")
@@ -107,9 +153,7 @@ def _row(outcome: Outcome) -> dict[str, object]:
     row |= {f"normal_{axis}": float(normal[i]) for i, axis in enumerate("xyz")}
     places = {"xx": (0, 0), "xy": (0, 1), "yy": (1, 1)}
     row |= {f"covariance_{name}_rad2": float(covariance[place]) for name, place in places.items()}
-    row |= {name: getattr(e, name) for name in ("edge_pixels", "prefiltered_pixels", "inlier_pixels", "shift_px")}
-    row |= e.report.to_dict()
-    return row | {"sigma_rad": sigma_rad(e), "time_s": outcome.time_s}
+    return row | {"sigma_rad": sigma_rad(e)}
 
 
 def _plain(value: object) -> object:

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Annotated, TypeVar
 
 from cyclopts import Parameter, validators
 
+from tiltvp.cli.filtering import FilterOptions
 from tiltvp.cli.inputs import distinct_names, find_images
 from tiltvp.cli.options import CameraOptions, MethodOptions
 from tiltvp.cli.results import Outcome, check_ending, data_frame, degrees, people_table, write_frame
@@ -25,6 +26,7 @@ if TYPE_CHECKING:
     from tiltvp import EdgeElements, TiltEstimate, TiltEstimator
 
 _METHOD_DEFAULTS = MethodOptions()
+_FILTER_DEFAULTS = FilterOptions()
 T = TypeVar("T")
 
 
@@ -34,6 +36,7 @@ def tilt(
     *,
     camera: CameraOptions,
     method: MethodOptions = _METHOD_DEFAULTS,
+    filtering: FilterOptions = _FILTER_DEFAULTS,
     out: Path | None = None,
     overlay: Path | None = None,
     level: Path | None = None,
@@ -52,7 +55,7 @@ def tilt(
     overlay
         Folder for the images with inlier edges in colour, horizon and vanishing points.
     level
-        Folder for the images made level.
+        Folder for the images made level, each by its own tilt.
     threads
         How many images are worked on at the same time.
     """
@@ -60,16 +63,28 @@ def tilt(
         check_ending(out)
     if overlay is not None and level is not None and os.path.realpath(overlay) == os.path.realpath(level):
         raise InvalidInputError(f"--overlay and --level are both {overlay}, expected two folders")
+    filtering.check()
     estimator = method.estimator(camera.load())
     files, problems = find_images(images)
     for problem in problems:
         complain(problem)
-    work = Work(estimator, overlay, level)
-    outcomes = _done(work, files, distinct_names(files), threads)
+    motions = filtering.motions(files)
+    work = Work(estimator, overlay, level, filtering)
+    outcomes = filtering.judged(_done(work, files, distinct_names(files), threads), motions)
     show(people_table(outcomes, width()))
     if out is not None:
         write_frame(data_frame(outcomes, estimator.method), out)
+    if filtering.filter_plot is not None:
+        _write_plot(outcomes, estimator.method, filtering.filter_plot)
     return 1 if problems or any(outcome.error for outcome in outcomes) else 0
+
+
+def _write_plot(outcomes: Sequence[Outcome], method: str, path: Path) -> None:
+    from tiltvp import write_image
+    from tiltvp.plots.filtering import filtered_tilt
+    from tiltvp.plots.picture import figure_picture
+
+    write_image(path, figure_picture(filtered_tilt(data_frame(outcomes, method))))
 
 
 def _done(work: Work, files: Sequence[Path], names: Sequence[str], threads: int) -> list[Outcome]:
@@ -102,6 +117,7 @@ class Work:
     estimator: TiltEstimator
     overlay: Path | None
     level: Path | None
+    filtering: FilterOptions
 
     def __call__(self, file: Path, name: str) -> Outcome:
         """Estimates, and writes the pictures asked for; any problem of this image becomes its outcome."""
@@ -121,7 +137,7 @@ class Work:
         else:
             (estimate, edges), time_s = _timed(lambda: self.estimator.with_edges(gray))
             write_image(self.overlay / f"{name}.png", self._overlay(gray, estimate, edges, file.name))
-        if self.level is not None and estimate:
+        if self.level is not None and estimate and self.filtering.accepts(estimate.confidence):
             rotation = self.estimator.robot_from_camera
             write_image(self.level / f"{name}.png", level(image, self.estimator.camera, estimate, rotation))
         return Outcome(file, estimate, time_s)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import functools
 import os
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -12,7 +13,7 @@ from typing import TYPE_CHECKING, TypeVar
 import cv2
 import numpy as np
 
-from tiltvp._core import leaning_from_upright
+from tiltvp._core import PixelRays, leaning_from_upright
 from tiltvp.cameras import Camera
 from tiltvp.errors import InvalidInputError
 from tiltvp.images import gray_from, read_image
@@ -94,52 +95,66 @@ def read_index(
 
 
 class PanoramaViews:
-    """Views of one panorama through one camera by a leaning robot."""
+    """Views of one panorama through one camera by a leaning robot. Good for several threads at once."""
 
     def __init__(
         self, panorama: Panorama, camera: Camera, *, robot_from_camera: ArrayLike | None = None, samples: int = 2,
         upright: bool = True,
     ) -> None:  # fmt: skip
         """`samples` x `samples` rays are averaged in each pixel; `upright` turns the panorama by its zenith first."""
-        if samples < 1:
-            raise InvalidInputError(f"samples = {samples}, expected 1 or more")
+        self._rays = _rays_of(camera, samples)
+        self._pixels = self._rays.pixels
+        self._shape = (camera.height, camera.width)
         image = gray_from(read_image(panorama.path), str(panorama.path))
         self._size = (image.shape[1], image.shape[0])
-        # A few columns of each side on the other, so that interpolation goes round.
-        self._image = np.concatenate([image[:, -_WRAP:], image, image[:, :_WRAP]], axis=1)
-        self._camera, self._samples = camera, samples
+        # A few columns of each side on the other, so that interpolation goes round, and the poles' rows once more.
+        self._image = np.pad(np.pad(image, ((0, 0), (_WRAP, _WRAP)), "wrap"), ((_WRAP, _WRAP), (0, 0)), "edge")
         zenith = panorama.zenith if upright and panorama.zenith is not None else (0.0, 0.0, 1.0)
-        self._panorama_from_upright = leaning_from_upright(zenith)
-        places = (np.arange(samples) + 0.5) / samples - 0.5
-        u = (np.arange(camera.width)[:, None] + places).ravel()
-        v = (np.arange(camera.height)[:, None] + places).ravel()
-        bearings = camera.unproject(np.stack(np.meshgrid(u, v), axis=-1).reshape(-1, 2))
-        rotation = np.eye(3) if robot_from_camera is None else np.asarray(robot_from_camera, dtype=np.float64)
-        self._seen = ~np.isnan(bearings[:, 0])
-        self._bearings = np.nan_to_num(bearings, nan=1.0) @ rotation.T
+        self._sphere_from_upright = _SPHERE_FROM_ROBOT @ leaning_from_upright(zenith)
+        self._robot_from_camera = np.eye(3) if robot_from_camera is None else np.asarray(robot_from_camera, np.float64)
 
     def render(
         self, normal: ArrayLike, *, yaw_rad: float = 0.0, noise_sigma: float = 2.0, seed: int = 0
     ) -> NDArray[np.uint8]:
-        """(H, W) uint8: seen by a robot whose ground normal is `normal` (3,); noise in grey levels, outside black."""
-        turn = np.array(
-            [[np.cos(yaw_rad), -np.sin(yaw_rad), 0.0], [np.sin(yaw_rad), np.cos(yaw_rad), 0.0], [0.0, 0.0, 1.0]]
-        )
-        directions = self._bearings @ (self._panorama_from_upright @ turn @ leaning_from_upright(normal).T).T
-        # Forward, left, up to the panorama's camera frame: right, down, forward.
-        eye = np.stack([-directions[:, 1], -directions[:, 2], directions[:, 0]], axis=1)
-        sphere = Camera.equirectangular(width=self._size[0], height=self._size[1])
-        places = sphere.project(eye).astype(np.float32) + np.array([_WRAP, 0.0], dtype=np.float32)
-        shape = (self._camera.height * self._samples, self._camera.width * self._samples)
-        across, down = (np.ascontiguousarray(places[:, axis]).reshape(shape) for axis in (0, 1))
-        values = cv2.remap(self._image, across, down, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE).astype(
-            np.float32
-        )
-        values[~self._seen.reshape(shape)] = 0.0
-        n = self._samples
-        levels = values.reshape(self._camera.height, n, self._camera.width, n).mean(axis=(1, 3))
-        levels += np.random.default_rng(seed).normal(0.0, noise_sigma, levels.shape).astype(np.float32)
-        return np.asarray(np.clip(np.rint(levels), 0, 255), dtype=np.uint8)
+        """(H, W) uint8: seen by a robot whose ground normal is `normal` (3,); noise in grey levels, outside black.
+
+        `yaw_rad` is the robot's heading, counter-clockwise from the middle of the panorama.
+        """
+        levels = self.levels(normal, yaw_rad=yaw_rad)
+        if noise_sigma > 0.0:
+            levels += np.random.default_rng(seed).normal(0.0, noise_sigma, levels.shape).astype(np.float32)
+        return np.asarray(np.clip(np.rint(levels, out=levels), 0, 255, out=levels), dtype=np.uint8)
+
+    def levels(self, normal: ArrayLike, *, yaw_rad: float = 0.0) -> NDArray[np.float32]:
+        """(H, W) float32: the grey levels of that view before noise and rounding."""
+        cos, sin = np.cos(yaw_rad), np.sin(yaw_rad)
+        turn = np.array([[cos, -sin, 0.0], [sin, cos, 0.0], [0.0, 0.0, 1.0]])
+        rotation = self._sphere_from_upright @ turn @ leaning_from_upright(normal).T @ self._robot_from_camera
+        across, down = self._rays.panorama_map(rotation, width=self._size[0], height=self._size[1])
+        across += _WRAP
+        down += _WRAP
+        n, seen = across.shape
+        sums = np.empty(seen, dtype=np.float32)
+        for start in range(0, seen, _BLOCK):
+            block = slice(start, start + _BLOCK)
+            # Rays that the lens does not see are far outside, where it is black.
+            values = cv2.remap(
+                self._image, across[:, block], down[:, block], cv2.INTER_LINEAR, borderMode=cv2.BORDER_CONSTANT
+            )
+            np.sum(values, axis=0, dtype=np.float32, out=sums[block])
+        levels = np.zeros(self._shape, dtype=np.float32)
+        levels.ravel()[self._pixels] = sums / n
+        return levels
+
+
+@functools.lru_cache(maxsize=2)
+def _rays_of(camera: Camera, samples: int) -> PixelRays:
+    return PixelRays(camera, samples=samples)
 
 
 _WRAP = 4
+_BLOCK = 16384
+"""Columns that are looked up at once; OpenCV takes less than 32767."""
+
+_SPHERE_FROM_ROBOT = np.array([[0.0, -1.0, 0.0], [0.0, 0.0, -1.0], [1.0, 0.0, 0.0]])
+"""Forward, left, up to the panorama's right, down, forward."""

@@ -22,9 +22,10 @@ impl Equidistant {
     /// Checks the parameters.
     ///
     /// # Errors
-    /// [`Error::InvalidCamera`] if the focal length is not positive or a number is not finite.
+    /// [`Error::InvalidCamera`] if the focal length is below `1e-100`, where squares of image points underflow, or a number is
+    /// not finite.
     pub fn new(focal_px: f64, cx: f64, cy: f64) -> Result<Self> {
-        if !(focal_px.is_finite() && focal_px > 0.0) {
+        if !(focal_px.is_finite() && focal_px >= 1e-100) {
             return Err(Error::camera("equidistant", "focal_px", focal_px, "a positive number of pixels per radian"));
         }
         for (name, value) in [("cx", cx), ("cy", cy)] {

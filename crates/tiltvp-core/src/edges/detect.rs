@@ -61,6 +61,16 @@ impl EdgePixels {
         self.strong += 1;
     }
 
+    /// Replaces all pixels by these.
+    pub fn refill(&mut self, slot: &[u32], gx: &[f32], gy: &[f32]) {
+        let n = slot.len().min(gx.len()).min(gy.len());
+        self.make_room(n);
+        self.slot[..n].copy_from_slice(&slot[..n]);
+        self.gx[..n].copy_from_slice(&gx[..n]);
+        self.gy[..n].copy_from_slice(&gy[..n]);
+        (self.len, self.strong) = (n, n);
+    }
+
     fn make_room(&mut self, capacity: usize) {
         if self.slot.len() < capacity {
             self.slot.resize(capacity, 0);
@@ -74,7 +84,6 @@ impl EdgePixels {
 #[derive(Debug, Clone)]
 pub struct Detector {
     smoother: Smoother,
-    threshold_squared: f32,
     /// Three smoothed rows, row `v` in place `v % 3`, each one pixel wider than the region's columns on both sides.
     rows: [Vec<f32>; 3],
     gx: Vec<f32>,
@@ -89,7 +98,6 @@ impl Detector {
         let row = || vec![0.0; width];
         Self {
             smoother: Smoother::new(options.smoothing_px, width),
-            threshold_squared: (options.gradient_min * options.gradient_min) as f32,
             rows: [row(), row(), row()],
             gx: row(),
             gy: row(),
@@ -102,7 +110,15 @@ impl Detector {
     ///
     /// The image must have the size of the camera that the region was made for. Grows no vector that has room for the
     /// whole region.
-    pub fn detect(&mut self, image: &ImageView<'_>, region: &Region, screen: Option<&Screen>, out: &mut EdgePixels) {
+    pub fn detect(
+        &mut self,
+        image: &ImageView<'_>,
+        region: &Region,
+        gradient_min: f64,
+        screen: Option<&Screen>,
+        out: &mut EdgePixels,
+    ) {
+        let threshold_squared = (gradient_min * gradient_min) as f32;
         out.make_room(region.len());
         let (slots, gxs, gys) = (&mut out.slot[..], &mut out.gx[..], &mut out.gy[..]);
         let (mut len, mut strong_pixels) = (0, 0);
@@ -120,10 +136,10 @@ impl Detector {
             let (gx, gy, strength) = (&mut self.gx[..n], &mut self.gy[..n], &mut self.strength[..n]);
             scharr(above, middle, below, gx, gy, strength);
             if let Some(screen) = screen {
-                strong_pixels += screen.apply(span.slot, gx, gy, strength, self.threshold_squared);
+                strong_pixels += screen.apply(span.slot, gx, gy, strength, threshold_squared);
             }
             for (block, start) in strength.chunks(BLOCK).zip((0..n).step_by(BLOCK)) {
-                let mut strong = reaching(block, self.threshold_squared);
+                let mut strong = reaching(block, threshold_squared);
                 while strong != 0 {
                     let i = start + strong.trailing_zeros() as usize;
                     strong &= strong - 1;
@@ -213,7 +229,7 @@ mod tests {
         let data: Vec<u8> = (0..64 * 60u32).map(|i| (i.wrapping_mul(2_654_435_761) >> 24) as u8).collect();
         let image = ImageView::new(&data, 64, 60, 64).unwrap();
         let mut edges = EdgePixels::with_capacity(region.len());
-        Detector::new(&region, &options).detect(&image, &region, None, &mut edges);
+        Detector::new(&region, &options).detect(&image, &region, options.gradient_min, None, &mut edges);
 
         let at = |u: usize, v: usize| i32::from(data[v * 64 + u]);
         let mut k = 0;

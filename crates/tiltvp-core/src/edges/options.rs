@@ -1,6 +1,7 @@
 //! Which pixels are looked at for edges.
 
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_4};
+use std::sync::Arc;
 
 use crate::error::{Error, Result};
 use crate::image::Smoother;
@@ -66,12 +67,12 @@ impl EdgeOptions {
     }
 }
 
-/// Which pixels may be used at all: `true` where the image shows the world and not the robot.
+/// Which pixels may be used at all: `true` where the image shows the world and not the robot. Clones share the pixels.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Mask {
     width: usize,
     height: usize,
-    usable: Vec<bool>,
+    usable: Arc<[bool]>,
 }
 
 impl Mask {
@@ -87,7 +88,7 @@ impl Mask {
                 format!("{height} x {width} values"),
             ));
         }
-        Ok(Self { width, height, usable })
+        Ok(Self { width, height, usable: usable.into() })
     }
 
     /// Columns and rows.

@@ -1,6 +1,6 @@
-//! Unit bearings: the angle between two, and a basis of the plane tangent to the sphere at one.
+//! Unit bearings: the angle between two, and the plane tangent to the sphere at one: basis, exponential, logarithm.
 
-use nalgebra::{Matrix3x2, Vector3};
+use nalgebra::{Matrix2, Matrix3x2, Rotation3, Vector2, Vector3};
 
 /// The angle between two vectors of any length, in `[0, pi]` radians, exact at both ends.
 ///
@@ -23,6 +23,38 @@ pub fn tangent_basis(n: &Vector3<f64>) -> Matrix3x2<f64> {
     Matrix3x2::new(1.0 - n.x * n.x * a, b, b, 1.0 - n.y * n.y * a, -n.x, -n.y)
 }
 
+/// The unit bearing that a walk of `|step|` radians along the great circle from the unit bearing `n` ends at; `step` is in
+/// the basis of [`tangent_basis`].
+pub fn tangent_exp(n: &Vector3<f64>, step: &Vector2<f64>) -> Vector3<f64> {
+    let length = step.norm();
+    if length == 0.0 {
+        return *n;
+    }
+    let along = tangent_basis(n) * (step / length);
+    (n * length.cos() + along * length.sin()).normalize()
+}
+
+/// The walk from the unit bearing `n` to the unit bearing `to`, in the basis of [`tangent_basis`] at `n`: the inverse of
+/// [`tangent_exp`] up to a length of pi. Where `to` is opposite to `n`, and every direction leads there, the first of the
+/// basis is taken.
+pub fn tangent_log(n: &Vector3<f64>, to: &Vector3<f64>) -> Vector2<f64> {
+    let angle = angle_between(n, to);
+    match (tangent_basis(n).transpose() * to).try_normalize(f64::MIN_POSITIVE) {
+        Some(direction) => direction * angle,
+        None if angle < 1.0 => Vector2::zeros(),
+        None => Vector2::new(angle, 0.0),
+    }
+}
+
+/// The rotation that takes tangent vectors at `from` to tangent vectors at `to` along the great circle between the two unit
+/// bearings, from the basis of [`tangent_basis`] at the one to that at the other.
+pub fn tangent_transport(from: &Vector3<f64>, to: &Vector3<f64>) -> Matrix2<f64> {
+    let rotation = Rotation3::rotation_between(from, to).unwrap_or_else(Rotation3::identity);
+    let turned = tangent_basis(to).transpose() * rotation.matrix() * tangent_basis(from);
+    // Opposite bearings have no shortest way; whatever is taken there stays a rotation.
+    if turned.determinant() > 0.5 { turned } else { Matrix2::identity() }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -40,6 +72,24 @@ mod tests {
             let (e1, e2) = (basis.column(0).into_owned(), basis.column(1).into_owned());
             prop_assert!((e1.norm() - 1.0).abs() < 1e-9 && (e2.norm() - 1.0).abs() < 1e-9);
             prop_assert!((e1.cross(&e2) - n).norm() < 1e-9);
+        }
+
+        #[test]
+        fn exponential_and_logarithm_are_inverse(n in unit(), x in -2.0..2.0f64, y in -2.0..2.0f64) {
+            let step = Vector2::new(x, y);
+            let there = tangent_exp(&n, &step);
+            prop_assert!((there.norm() - 1.0).abs() < 1e-14);
+            prop_assert!((angle_between(&n, &there) - step.norm()).abs() < 1e-9);
+            prop_assert!((tangent_log(&n, &there) - step).norm() < 1e-7);
+        }
+
+        #[test]
+        fn transport_is_a_rotation_that_keeps_the_way(n in unit(), to in unit()) {
+            prop_assume!(n.dot(&to) > -0.99);
+            let transport = tangent_transport(&n, &to);
+            prop_assert!((transport * transport.transpose() - Matrix2::identity()).norm() < 1e-9);
+            // The way on at the end is the way out, carried along.
+            prop_assert!((transport * tangent_log(&n, &to) + tangent_log(&to, &n)).norm() < 1e-7);
         }
 
         #[test]

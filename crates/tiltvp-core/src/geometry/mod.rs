@@ -2,6 +2,8 @@
 
 mod bearing;
 mod tilt;
+mod wheels;
 
-pub use bearing::{angle_between, tangent_basis};
+pub use bearing::{angle_between, tangent_basis, tangent_exp, tangent_log, tangent_transport};
 pub use tilt::Tilt;
+pub use wheels::WheelLayout;

@@ -2,6 +2,7 @@
 
 use nalgebra::{Matrix2, Vector2};
 
+use crate::filter::probability_within;
 use crate::geometry::Tilt;
 use crate::robust::{Gate, Real, Rows};
 
@@ -101,8 +102,7 @@ pub(super) fn with_floor(covariance: Matrix2<f64>) -> Matrix2<f64> {
     0.5 * (covariance + covariance.transpose()) + Matrix2::identity() * (FLOOR_RAD * FLOOR_RAD)
 }
 
-/// The probability that the error is below two degrees if it is normal with this covariance, taken as round.
+/// The probability that the error is below two degrees if it is normal with this covariance; 0 if that is not finite.
 pub(super) fn confidence(covariance: &Matrix2<f64>) -> f64 {
-    let variance = 0.5 * covariance.trace();
-    if variance.is_finite() && variance > 0.0 { -(-0.5 * GOOD_RAD * GOOD_RAD / variance).exp_m1() } else { 0.0 }
+    probability_within(covariance, GOOD_RAD)
 }

@@ -1,18 +1,19 @@
-//! From the shift of the vanishing point in the image to an angle: trained factors, and the closed-form gain of each pixel.
+//! From the shift of the vanishing point in the image to an angle: where it is, and the closed-form gain of each pixel.
 
 use nalgebra::{Matrix3, Vector2, Vector3};
 
+use super::trained::TrainedCorrection;
 use crate::camera::Camera;
 use crate::edges::Region;
-use crate::error::{Error, Result};
+use crate::error::Result;
 
 /// How the image-space methods turn a shift in pixels into a lean (paper 000 eqs. 26 and 30).
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, PartialEq, Default)]
 pub enum Correction {
     /// `alpha = l / a0` with the lens' own scale at the vanishing point, eq. 26: overestimates by about a half.
     None,
-    /// `alpha = l / a` with a factor `a` in pixels per radian trained on images of known tilt, eqs. 30 and 31.
-    Factor(f64),
+    /// Trained on images of known tilt: a factor in pixels per radian, eqs. 30 and 31, a line, or a posterior.
+    Trained(TrainedCorrection),
     /// Each pixel's offset is divided by its own gain: no training images.
     ///
     /// A vertical edge at the bearing `v`, with unit normal `m0` and unit tangent `e = v x m0`, is moved by a lean `delta` to
@@ -24,16 +25,19 @@ pub enum Correction {
 }
 
 impl Correction {
-    /// Checks the factor.
+    /// A trained factor in pixels per radian.
+    pub fn factor(factor: f64) -> Self {
+        Self::Trained(TrainedCorrection::Factor(factor))
+    }
+
+    /// Checks what is trained.
     ///
     /// # Errors
-    /// [`Error::InvalidOption`] unless it is positive and finite.
+    /// Those of [`TrainedCorrection::validate`].
     pub fn validate(&self) -> Result<()> {
-        match *self {
-            Self::Factor(a) if !(a > 0.0 && a.is_finite()) => {
-                Err(Error::option("correction", a, "a positive factor, \"closed-form\" or none"))
-            }
-            _ => Ok(()),
+        match self {
+            Self::Trained(trained) => trained.validate(),
+            Self::None | Self::ClosedForm => Ok(()),
         }
     }
 }
@@ -78,13 +82,22 @@ impl VanishingPoint {
     }
 }
 
+/// What a lean moves the edge offset of each pixel by.
+#[derive(Debug)]
+pub(super) struct Gains {
+    /// Of each pixel relative to the mean, NaN where there is none; empty where all count alike.
+    pub relative: Vec<f32>,
+    /// The mean, or the one factor of all, in pixels per radian.
+    pub mean: f64,
+}
+
 /// The closed-form gain of each pixel of the region relative to their mean, and that mean in pixels per radian.
 pub(super) fn closed_form_gains(
     camera: &Camera,
     robot_from_camera: &Matrix3<f64>,
     region: &Region,
     centre: &VanishingPoint,
-) -> (Vec<f32>, f64) {
+) -> Gains {
     let gain = |u: usize, v: usize, bearing: Vector3<f64>| -> f64 {
         let pixel = Vector2::new(u as f64, v as f64);
         let Some((_, back)) = camera.unproject_jacobian(&pixel) else { return f64::NAN };
@@ -98,7 +111,7 @@ pub(super) fn closed_form_gains(
     let usable = gains.iter().filter(|g| g.is_finite());
     let mean = usable.clone().sum::<f64>() / (usable.count().max(1) as f64);
     let relative = |g: &f64| if g.is_finite() && *g > 0.0 { (g / mean) as f32 } else { f32::NAN };
-    (gains.iter().map(relative).collect(), mean)
+    Gains { relative: gains.iter().map(relative).collect(), mean }
 }
 
 #[cfg(test)]
@@ -115,7 +128,7 @@ mod tests {
         let region = Region::new(&camera, &identity, &EdgeOptions::default(), None).unwrap();
         let centre = VanishingPoint::new(&camera, &identity).unwrap();
         assert!((centre.scale - 139.7).abs() < 1e-9);
-        let (gains, mean) = closed_form_gains(&camera, &identity, &region, &centre);
+        let Gains { relative: gains, mean } = closed_form_gains(&camera, &identity, &region, &centre);
         for ((_, _, bearing), gain) in region.pixels().zip(&gains) {
             let theta = bearing.xy().norm().atan2(bearing.z);
             let expected = 139.7 * (theta / theta.sin()).powi(2);

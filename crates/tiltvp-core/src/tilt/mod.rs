@@ -1,20 +1,35 @@
-//! The tilt of one image, from the vanishing point of its vertical edges (paper 000).
+//! The tilt of one image, from the vanishing point of its vertical edges (paper 000), and of successive images fused.
 
 mod common_direction;
 mod confidence;
 mod correction;
 mod estimate;
 mod estimator;
+mod filter;
+mod fit;
+mod image_edges;
 mod image_space;
 mod level;
 mod options;
+mod posterior;
 mod refine;
+mod scratch;
+mod shift_model;
+mod simplex;
+mod tables;
+mod trained;
 mod vector_consensus;
 
 pub use common_direction::{CommonDirection, CommonDirectionOptions, common_direction};
 pub use correction::Correction;
 pub use estimate::{EdgeElement, TiltEstimate};
-pub use estimator::{Scratch, TiltEstimator};
+pub use estimator::TiltEstimator;
+pub use filter::{FilteredTilt, MountingOptions, TiltFilter, TiltFilterOptions, TiltFilterState, Verdict};
+pub use image_edges::{EdgeOrigin, ImageEdges};
 pub use level::level_map;
 pub use options::{METHODS, Method, TiltOptions};
+pub use posterior::{PosteriorCorrection, PriorOfTilt, train_posterior};
 pub use refine::RefineOptions;
+pub use scratch::Scratch;
+pub use shift_model::ShiftModel;
+pub use trained::{AffineCorrection, TrainedCorrection, train_affine, train_factor};

@@ -2,8 +2,19 @@
 
 use super::correction::Correction;
 use super::refine::RefineOptions;
+use super::trained::TrainedCorrection;
 use crate::edges::{EdgeOptions, Mask, NormalKind};
 use crate::error::{Error, Result};
+
+/// `s_max` of the paper in pixels, and its lens' pixels per radian about the vertical.
+const PAPER_OFFSET_MAX_PX: f64 = 40.0;
+const PAPER_SCALE_PX: f64 = 139.7;
+
+/// The largest edge offset that means as large a lean as the paper's, for a lens of so many pixels per radian about the
+/// vertical, to a millionth of a pixel.
+pub(super) fn offset_max_px_of(scale_px: f64) -> f64 {
+    (PAPER_OFFSET_MAX_PX * scale_px / PAPER_SCALE_PX * 1e6).round() / 1e6
+}
 
 /// The methods by name, the default first.
 pub const METHODS: [&str; 4] = ["refined", "image-space-ransac", "image-space-reject-refit", "vector-consensus"];
@@ -15,8 +26,9 @@ pub enum Method {
     ImageSpaceRansac {
         /// Largest residual of an inlier in pixels, `delta_s,max` of eq. 32. Default 10.
         threshold_px: f64,
-        /// Largest edge offset in pixels that passes the prefilter, `s_max`. Default 40.
-        offset_max_px: f64,
+        /// Largest edge offset in pixels that passes the prefilter, `s_max`. Default, where there is none: the paper's 40 for
+        /// its lens of 139.7 pixels per radian about the vertical, and in proportion for others.
+        offset_max_px: Option<f64>,
         /// From the shift to the angle.
         correction: Correction,
     },
@@ -24,8 +36,9 @@ pub enum Method {
     ImageSpaceRejectRefit {
         /// Share of normal residuals kept each round; eq. 34 with `Q` read as the share kept. Default 0.8.
         keep_fraction: f64,
-        /// Largest edge offset in pixels that passes the prefilter, `s_max`. Default 40.
-        offset_max_px: f64,
+        /// Largest edge offset in pixels that passes the prefilter, `s_max`. Default, where there is none: the paper's 40 for
+        /// its lens of 139.7 pixels per radian about the vertical, and in proportion for others.
+        offset_max_px: Option<f64>,
         /// From the shift to the angle.
         correction: Correction,
     },
@@ -35,17 +48,26 @@ pub enum Method {
         threshold_rad: f64,
         /// Whether normals are made the paper's way or the exact way. Default the paper's.
         normal: NormalKind,
-        /// The factor `a'` of eq. 45 by which the angle is divided, 1 for none. Default 1.
-        factor: f64,
+        /// From the raw angle to the angle: the factor `a'` of eq. 45, or another. Default the factor 1.
+        correction: TrainedCorrection,
     },
     /// Ours: tangent normals weighted by their gradients, trimmed from the upright prior, then a fading soft gate.
     Refined(RefineOptions),
 }
 
 impl Method {
-    /// Whether the method's geometry is exact for every lens, so that its angle needs no correction.
-    pub(super) fn is_exact(&self) -> bool {
-        matches!(self, Self::Refined(_) | Self::VectorConsensus { normal: NormalKind::Tangent, .. })
+    /// Whether the angle errs by no more than the edges or the training set tell: the geometry is exact for every lens, or a
+    /// posterior knows what it is not.
+    pub(super) fn tells_its_error(&self) -> bool {
+        match self {
+            Self::Refined(_) => true,
+            Self::VectorConsensus { normal, correction, .. } => {
+                *normal == NormalKind::Tangent || matches!(correction, TrainedCorrection::Posterior(_))
+            }
+            Self::ImageSpaceRansac { correction, .. } | Self::ImageSpaceRejectRefit { correction, .. } => {
+                matches!(correction, Correction::Trained(TrainedCorrection::Posterior(_)))
+            }
+        }
     }
 
     /// The name under which users ask for the method.
@@ -55,6 +77,15 @@ impl Method {
             Self::ImageSpaceRansac { .. } => METHODS[1],
             Self::ImageSpaceRejectRefit { .. } => METHODS[2],
             Self::VectorConsensus { .. } => METHODS[3],
+        }
+    }
+
+    /// What the image-space methods have in common: the correction and the largest edge offset.
+    pub(super) fn offsets(&self) -> Option<(&Correction, Option<f64>)> {
+        match self {
+            Self::ImageSpaceRansac { correction, offset_max_px, .. }
+            | Self::ImageSpaceRejectRefit { correction, offset_max_px, .. } => Some((correction, *offset_max_px)),
+            Self::VectorConsensus { .. } | Self::Refined(_) => None,
         }
     }
 }
@@ -85,15 +116,16 @@ impl TiltOptions {
         let (method, gradient_min, smoothing_px) = match name {
             "image-space-ransac" => {
                 let correction = Correction::default();
-                (Method::ImageSpaceRansac { threshold_px: 10.0, offset_max_px: 40.0, correction }, 150.0, 0.0)
+                (Method::ImageSpaceRansac { threshold_px: 10.0, offset_max_px: None, correction }, 150.0, 0.0)
             }
             "image-space-reject-refit" => {
                 let correction = Correction::default();
-                (Method::ImageSpaceRejectRefit { keep_fraction: 0.8, offset_max_px: 40.0, correction }, 200.0, 0.0)
+                (Method::ImageSpaceRejectRefit { keep_fraction: 0.8, offset_max_px: None, correction }, 200.0, 0.0)
             }
             "vector-consensus" => {
                 let threshold_rad = 5f64.to_radians();
-                (Method::VectorConsensus { threshold_rad, normal: NormalKind::Gradient, factor: 1.0 }, 600.0, 0.0)
+                let correction = TrainedCorrection::Factor(1.0);
+                (Method::VectorConsensus { threshold_rad, normal: NormalKind::Gradient, correction }, 600.0, 0.0)
             }
             "refined" => (Method::Refined(RefineOptions::default()), 150.0, 0.6),
             _ => {
@@ -130,21 +162,21 @@ impl TiltOptions {
         match &self.method {
             Method::ImageSpaceRansac { threshold_px, offset_max_px, correction } => {
                 positive("threshold_px", *threshold_px, "a positive number of pixels")?;
-                positive("offset_max_px", *offset_max_px, "a positive number of pixels")?;
+                positive("offset_max_px", offset_max_px.unwrap_or(1.0), "a positive number of pixels")?;
                 correction.validate()
             }
             Method::ImageSpaceRejectRefit { keep_fraction, offset_max_px, correction } => {
                 if !(*keep_fraction > 0.0 && *keep_fraction < 1.0) {
                     return Err(Error::option("keep_fraction", keep_fraction, "a share strictly between 0 and 1"));
                 }
-                positive("offset_max_px", *offset_max_px, "a positive number of pixels")?;
+                positive("offset_max_px", offset_max_px.unwrap_or(1.0), "a positive number of pixels")?;
                 correction.validate()
             }
-            Method::VectorConsensus { threshold_rad, factor, .. } => {
+            Method::VectorConsensus { threshold_rad, correction, .. } => {
                 if !(*threshold_rad > 0.0 && *threshold_rad < std::f64::consts::FRAC_PI_2) {
                     return Err(Error::option("threshold_rad", threshold_rad, "an angle strictly between 0 and pi/2"));
                 }
-                positive("correction", *factor, "a positive factor")
+                correction.validate()
             }
             Method::Refined(options) => options.validate(),
         }

@@ -7,7 +7,8 @@ use pyo3::types::{PyDict, PyTuple, PyType};
 use tiltvp_core::tilt::{self as core, CommonDirectionOptions};
 
 use super::report::FitReport;
-use crate::call::{call, invalid};
+use super::values;
+use crate::call::call;
 use crate::convert;
 
 /// Keys of the dict of a `CommonDirection`.
@@ -32,9 +33,8 @@ impl CommonDirection {
 
     /// Everything as bits, so that equal means the same bytes and NaN equals itself.
     fn bits(&self) -> impl PartialEq + use<'_> {
-        let c = &self.covariance;
-        let entries = [c[(0, 0)], c[(0, 1)], c[(1, 0)], c[(1, 1)]];
-        (self.vector().map(f64::to_bits), entries.map(f64::to_bits), &self.inliers, self.report.bits())
+        let covariance = values::covariance_bits(&self.covariance);
+        (self.vector().map(f64::to_bits), covariance, &self.inliers, self.report.bits())
     }
 }
 
@@ -67,8 +67,7 @@ impl CommonDirection {
     fn to_dict<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let dict = PyDict::new(py);
         dict.set_item("direction", self.vector().to_vec())?;
-        let c = &self.covariance;
-        dict.set_item("covariance_rad2", [[c[(0, 0)], c[(0, 1)]], [c[(1, 0)], c[(1, 1)]]])?;
+        values::set_covariance(&dict, &self.covariance)?;
         dict.set_item("inliers", self.inliers.clone())?;
         dict.update(self.report.to_dict(py)?.as_mapping())?;
         Ok(dict)
@@ -77,17 +76,11 @@ impl CommonDirection {
     /// The value of a dict as `to_dict` makes it.
     #[classmethod]
     fn from_dict(_cls: &Bound<'_, PyType>, values: &Bound<'_, PyAny>) -> PyResult<Self> {
-        let values = values.cast::<PyDict>().map_err(|_| invalid("values: expected a dict".to_owned()))?;
-        convert::known_keys(values, &KEYS)?;
+        let values = values::dict(values, &KEYS)?;
         let direction = convert::vector3(&convert::raw_item(values, "direction")?, "values[\"direction\"]")?;
-        let covariance =
-            convert::rows::<2>(&convert::raw_item(values, "covariance_rad2")?, "values[\"covariance_rad2\"]")?;
-        let [[a, b], [c, d]] = covariance.0[..] else {
-            return Err(invalid("values[\"covariance_rad2\"]: expected shape (2, 2)".to_owned()));
-        };
         Ok(Self {
             direction: direction.iter().all(|x| x.is_finite()).then_some(direction),
-            covariance: Matrix2::new(a, b, c, d),
+            covariance: values::covariance(values)?,
             inliers: convert::item(values, "inliers", "a list of bool")?,
             report: FitReport::read(values)?,
         })

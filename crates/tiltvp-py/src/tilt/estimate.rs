@@ -8,6 +8,7 @@ use tiltvp_core::geometry::Tilt;
 use tiltvp_core::tilt as core;
 
 use super::report::FitReport;
+use super::values;
 use crate::call::invalid;
 use crate::convert;
 
@@ -70,6 +71,13 @@ impl From<core::TiltEstimate> for TiltEstimate {
     }
 }
 
+impl TiltEstimate {
+    /// The part of it that a filter looks at.
+    pub(super) fn measurement(&self) -> (Option<Tilt>, Matrix2<f64>, f64) {
+        (self.tilt, self.covariance, self.confidence)
+    }
+}
+
 #[pymethods]
 impl TiltEstimate {
     /// How far the robot leans, in [0, pi] radians; NaN without a tilt.
@@ -126,8 +134,7 @@ impl TiltEstimate {
             dict.set_item(key, angle)?;
         }
         dict.set_item("normal", self.vector().as_slice().to_vec())?;
-        let c = &self.covariance;
-        dict.set_item("covariance_rad2", [[c[(0, 0)], c[(0, 1)]], [c[(1, 0)], c[(1, 1)]]])?;
+        values::set_covariance(&dict, &self.covariance)?;
         dict.set_item("confidence", self.confidence)?;
         dict.set_item("edge_pixels", self.edge_pixels)?;
         dict.set_item("prefiltered_pixels", self.prefiltered_pixels)?;
@@ -140,17 +147,11 @@ impl TiltEstimate {
     /// The estimate of a dict as `to_dict` makes it.
     #[classmethod]
     fn from_dict(_cls: &Bound<'_, PyType>, values: &Bound<'_, PyAny>) -> PyResult<Self> {
-        let values = values.cast::<PyDict>().map_err(|_| invalid("values: expected a dict".to_owned()))?;
-        convert::known_keys(values, &KEYS)?;
+        let values = values::dict(values, &KEYS)?;
         let normal = convert::vector3(&convert::raw_item(values, "normal")?, "values[\"normal\"]")?;
-        let covariance =
-            convert::rows::<2>(&convert::raw_item(values, "covariance_rad2")?, "values[\"covariance_rad2\"]")?;
-        let [[a, b], [c, d]] = covariance.0[..] else {
-            return Err(invalid("values[\"covariance_rad2\"]: expected shape (2, 2)".to_owned()));
-        };
         let estimate = Self {
             tilt: Tilt::from_normal(&normal),
-            covariance: Matrix2::new(a, b, c, d),
+            covariance: values::covariance(values)?,
             confidence: convert::item(values, "confidence", "a number")?,
             edge_pixels: convert::item(values, "edge_pixels", "a count")?,
             prefiltered_pixels: convert::item(values, "prefiltered_pixels", "a count")?,
@@ -221,10 +222,10 @@ impl TiltEstimate {
 
     /// Everything as bits, so that equal means the same bytes and NaN equals itself.
     fn bits(&self) -> impl PartialEq + use<'_> {
-        let (n, c) = (self.vector(), self.covariance);
-        let numbers = [n.x, n.y, n.z, c[(0, 0)], c[(0, 1)], c[(1, 0)], c[(1, 1)], self.confidence];
+        let n = self.vector();
         (
-            numbers.map(f64::to_bits),
+            [n.x, n.y, n.z, self.confidence].map(f64::to_bits),
+            values::covariance_bits(&self.covariance),
             [self.edge_pixels, self.prefiltered_pixels, self.inlier_pixels],
             self.shift_px.map(f64::to_bits),
             self.report.bits(),

@@ -1,11 +1,11 @@
 //! Options by keyword: each name is set on the core's options of the method, and no default is written here.
 
-use numpy::{PyArray1, PyArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use tiltvp_core::edges::{Mask, NormalKind};
-use tiltvp_core::tilt::{Correction, Method, TiltOptions};
+use tiltvp_core::tilt::{Correction, Method, TiltOptions, TrainedCorrection};
 
+use super::correction;
 use crate::call::{exception, invalid};
 use crate::convert;
 
@@ -34,11 +34,17 @@ fn own(method: &Method) -> &'static [&'static str] {
 /// The core's options of a method with the user's values set.
 pub(super) fn parse(method: &str, given: Option<&Bound<'_, PyDict>>) -> PyResult<TiltOptions> {
     let mut options = TiltOptions::for_method(method).map_err(|error| exception(&error))?;
+    change(&mut options, given)?;
+    Ok(options)
+}
+
+/// Sets the user's values.
+pub(super) fn change(options: &mut TiltOptions, given: Option<&Bound<'_, PyDict>>) -> PyResult<()> {
     for (key, value) in given.into_iter().flat_map(PyDictMethods::iter) {
         let key: String = key.extract()?;
-        set(&mut options, &key, &value)?;
+        set(options, &key, &value)?;
     }
-    Ok(options)
+    Ok(())
 }
 
 fn set(options: &mut TiltOptions, key: &str, value: &Bound<'_, PyAny>) -> PyResult<()> {
@@ -74,7 +80,7 @@ fn set(options: &mut TiltOptions, key: &str, value: &Bound<'_, PyAny>) -> PyResu
         (
             "offset_max_px",
             Method::ImageSpaceRansac { offset_max_px, .. } | Method::ImageSpaceRejectRefit { offset_max_px, .. },
-        ) => *offset_max_px = number()?,
+        ) => *offset_max_px = if value.is_none() { None } else { Some(number()?) },
         (
             "correction",
             Method::ImageSpaceRansac { correction, .. } | Method::ImageSpaceRejectRefit { correction, .. },
@@ -82,16 +88,15 @@ fn set(options: &mut TiltOptions, key: &str, value: &Bound<'_, PyAny>) -> PyResu
             *correction = match value.extract::<String>() {
                 _ if value.is_none() => Correction::None,
                 Ok(word) if word == "closed-form" => Correction::ClosedForm,
-                Ok(word) => {
-                    return Err(invalid(format!(
-                        "option correction = \"{word}\", expected \"closed-form\", a factor in pixels per radian, or None"
-                    )));
-                }
-                Err(_) => Correction::Factor(number()?),
+                _ => Correction::Trained(correction::parse(value, "option correction", "\"closed-form\", None, ")?),
             };
         }
-        ("correction", Method::VectorConsensus { factor, .. }) => {
-            *factor = if value.is_none() { 1.0 } else { number()? };
+        ("correction", Method::VectorConsensus { correction, .. }) => {
+            *correction = if value.is_none() {
+                TrainedCorrection::Factor(1.0)
+            } else {
+                correction::parse(value, "option correction", "None, ")?
+            };
         }
         ("keep_fraction", Method::ImageSpaceRejectRefit { keep_fraction, .. }) => *keep_fraction = number()?,
         ("keep_fraction", Method::Refined(refine)) => refine.keep_fraction = number()?,
@@ -141,17 +146,13 @@ pub(super) fn in_force<'py>(py: Python<'py>, options: &TiltOptions) -> PyResult<
     dict.set_item("elevation_max_rad", options.edges.elevation_max_rad)?;
     dict.set_item("margin_px", options.edges.margin_px)?;
     dict.set_item("tilt_max_rad", options.tilt_max_rad)?;
-    let mask = options.mask.as_ref().map(|mask| {
-        let (width, height) = mask.size();
-        let usable = (0..width * height).map(|i| mask.usable(i % width, i / width)).collect();
-        PyArray1::<bool>::from_vec(py, usable).reshape([height, width])
-    });
+    let mask = options.mask.as_ref().map(|mask| convert::to_mask(py, mask));
     dict.set_item("mask", mask.transpose()?)?;
     dict.set_item("seed", options.seed)?;
     let word = |correction: &Correction| -> PyResult<Py<PyAny>> {
         Ok(match correction {
             Correction::None => py.None(),
-            Correction::Factor(factor) => factor.into_pyobject(py)?.into_any().unbind(),
+            Correction::Trained(trained) => correction::show(py, trained)?,
             Correction::ClosedForm => "closed-form".into_pyobject(py)?.into_any().unbind(),
         })
     };
@@ -166,10 +167,10 @@ pub(super) fn in_force<'py>(py: Python<'py>, options: &TiltOptions) -> PyResult<
             dict.set_item("offset_max_px", offset_max_px)?;
             dict.set_item("correction", word(correction)?)?;
         }
-        Method::VectorConsensus { threshold_rad, normal, factor } => {
+        Method::VectorConsensus { threshold_rad, normal, correction } => {
             dict.set_item("threshold_rad", threshold_rad)?;
             dict.set_item("normal", if *normal == NormalKind::Gradient { "gradient" } else { "tangent" })?;
-            dict.set_item("correction", factor)?;
+            dict.set_item("correction", correction::show(py, correction)?)?;
         }
         Method::Refined(refine) => {
             dict.set_item("keep_fraction", refine.keep_fraction)?;

@@ -4,7 +4,7 @@ use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyTuple, PyType};
 use tiltvp_core::robust::Stop;
 
-use crate::call::invalid;
+use super::values;
 use crate::convert;
 
 /// How a robust fit went: the word and the sentence for why it stopped, its iterations and its residual.
@@ -71,9 +71,7 @@ impl FitReport {
     /// The report of a dict as `to_dict` makes it.
     #[classmethod]
     fn from_dict(_cls: &Bound<'_, PyType>, values: &Bound<'_, PyAny>) -> PyResult<Self> {
-        let values = values.cast::<PyDict>().map_err(|_| invalid("values: expected a dict".to_owned()))?;
-        convert::known_keys(values, &["stop", "reason", "iterations", "residual_rms"])?;
-        Self::read(values)
+        Self::read(values::dict(values, &["stop", "reason", "iterations", "residual_rms"])?)
     }
 
     fn __repr__(&self) -> String {

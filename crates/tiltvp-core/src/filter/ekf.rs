@@ -1,0 +1,91 @@
+//! The correction of an extended Kalman filter of any size, in the error state: gate first, then correct.
+
+use nalgebra::{Cholesky, Const, SMatrix, SVector, SymmetricEigen};
+
+/// A measurement beside its prediction: what it says that was not known, and how uncertain that is.
+#[derive(Debug, Clone)]
+pub struct Innovation<const N: usize, const M: usize> {
+    covariance: SMatrix<f64, N, N>,
+    jacobian: SMatrix<f64, M, N>,
+    noise: SMatrix<f64, M, M>,
+    /// Measured minus predicted.
+    pub innovation: SVector<f64, M>,
+    factor: Cholesky<f64, Const<M>>,
+}
+
+impl<const N: usize, const M: usize> Innovation<N, M> {
+    /// From the covariance `P` of the error state, the Jacobian `H` of the measurement by the error state, the covariance
+    /// `R` of the measurement, and the innovation `y`. `None` unless `S = H P H^T + R` is positive definite.
+    pub fn new(
+        covariance: SMatrix<f64, N, N>,
+        jacobian: SMatrix<f64, M, N>,
+        noise: SMatrix<f64, M, M>,
+        innovation: SVector<f64, M>,
+    ) -> Option<Self> {
+        let spread = symmetric(&(jacobian * covariance * jacobian.transpose() + noise));
+        let factor = Cholesky::new(spread)?;
+        Some(Self { covariance, jacobian, noise, innovation, factor })
+    }
+
+    /// The normalised innovation squared `y^T S^-1 y`: chi-square of `M` degrees of freedom for a consistent filter.
+    pub fn nis(&self) -> f64 {
+        self.innovation.dot(&self.factor.solve(&self.innovation))
+    }
+
+    /// The mean of the error state and its covariance after the measurement, in Joseph's form.
+    pub fn correct(&self) -> (SVector<f64, N>, SMatrix<f64, N, N>) {
+        let gain = self.factor.solve(&(self.jacobian * self.covariance)).transpose();
+        let keep = SMatrix::<f64, N, N>::identity() - gain * self.jacobian;
+        let after = keep * self.covariance * keep.transpose() + gain * self.noise * gain.transpose();
+        (gain * self.innovation, symmetric(&after))
+    }
+}
+
+/// The symmetric part of a matrix.
+pub fn symmetric<const N: usize>(matrix: &SMatrix<f64, N, N>) -> SMatrix<f64, N, N> {
+    0.5 * (matrix + matrix.transpose())
+}
+
+/// Whether a matrix can be a covariance: finite, symmetric and without negative variances, to rounding.
+pub fn positive_semidefinite<const N: usize>(matrix: &SMatrix<f64, N, N>) -> bool {
+    let scale = matrix.amax();
+    if !scale.is_finite() || !matrix.iter().all(|x| x.is_finite()) {
+        return false;
+    }
+    if (matrix - matrix.transpose()).amax() > 1e-9 * scale {
+        return false;
+    }
+    // The dynamic form: nalgebra's fixed one has no bound for every N.
+    let dynamic = nalgebra::DMatrix::from_column_slice(N, N, symmetric(matrix).as_slice());
+    SymmetricEigen::new(dynamic).eigenvalues.iter().all(|value| *value >= -1e-9 * scale)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use approx::assert_relative_eq;
+    use nalgebra::{Matrix1x2, Matrix2, Vector1};
+
+    #[test]
+    fn one_of_two_states_is_measured() {
+        let covariance = Matrix2::new(4.0, 1.0, 1.0, 2.0);
+        let seen = Innovation::new(covariance, Matrix1x2::new(1.0, 0.0), SMatrix::from_element(4.0), Vector1::new(2.0))
+            .unwrap();
+        assert_relative_eq!(seen.nis(), 0.5);
+        let (step, after) = seen.correct();
+        assert_relative_eq!(step, SVector::from([1.0, 0.25]));
+        assert_relative_eq!(after, Matrix2::new(2.0, 0.5, 0.5, 1.875), max_relative = 1e-12);
+        assert!(positive_semidefinite(&after));
+    }
+
+    #[test]
+    fn what_is_no_covariance() {
+        assert!(!positive_semidefinite(&Matrix2::new(1.0, 2.0, 2.0, 1.0)));
+        assert!(!positive_semidefinite(&Matrix2::new(1.0, 0.5, 0.0, 1.0)));
+        assert!(!positive_semidefinite(&Matrix2::new(f64::NAN, 0.0, 0.0, 1.0)));
+        assert!(positive_semidefinite(&Matrix2::<f64>::zeros()));
+        let no_noise =
+            Innovation::new(Matrix2::zeros(), Matrix2::identity(), Matrix2::zeros(), SVector::from([1.0, 0.0]));
+        assert!(no_noise.is_none());
+    }
+}

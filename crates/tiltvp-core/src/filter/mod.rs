@@ -1,0 +1,11 @@
+//! Recursive estimation that knows no vision: Kalman corrections, chi-square gates, and whether a filter is consistent.
+
+mod chi_square;
+mod consistency;
+mod ekf;
+mod gate;
+
+pub use chi_square::{chi_square_cdf, chi_square_quantile};
+pub use consistency::{ConsistencyBand, squared_mahalanobis};
+pub use ekf::{Innovation, positive_semidefinite, symmetric};
+pub use gate::{Gate, probability_within};

@@ -1,0 +1,413 @@
+//! The tilt over time: a Kalman filter of the ground normal on the sphere, which fuses the estimates of successive images.
+
+mod model;
+mod options;
+mod report;
+
+use nalgebra::{Matrix2, Matrix2x6, Matrix6, Rotation2, Rotation3, Vector2, Vector3};
+
+pub use self::options::{MountingOptions, TiltFilterOptions};
+pub use self::report::{FilteredTilt, Verdict};
+use super::confidence;
+use super::estimate::TiltEstimate;
+use crate::error::{Error, Result};
+use crate::filter::{Gate, Innovation, positive_semidefinite, symmetric};
+use crate::geometry::{Tilt, tangent_basis, tangent_exp, tangent_log, tangent_transport};
+
+/// What a [`TiltFilter`] knows, but for its options: everything the next answer depends on.
+///
+/// The covariance is that of the error state (floor, mounting, scene), two numbers each: walks from the floor's and the
+/// mounting's normal in the basis of [`tangent_basis`] there, and the error that successive images share, in radians along
+/// the robot's `x` and `y`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TiltFilterState {
+    /// The ground normal in the frame of the wheels, `f`.
+    pub floor: Vector3<f64>,
+    /// The ground normal that the robot would see on level ground, `m`.
+    pub mounting: Vector3<f64>,
+    /// The error of the last estimate that the next image of the same place will share, `c`.
+    pub scene: Vector2<f64>,
+    /// Covariance of the error state, in squared radians.
+    pub covariance: Matrix6<f64>,
+    /// The covariance of the best estimate of this place, `C`, of which `c` is a share; `None` before the first.
+    pub common: Option<Matrix2<f64>>,
+    /// Metres driven since the last estimate fused.
+    pub driven_m: f64,
+    /// The last estimate rejected by the gate, with its covariance, if nothing has been fused since.
+    pub pending: Option<(Vector3<f64>, Matrix2<f64>)>,
+    /// How many rejected estimates in a row agree, that one included.
+    pub agreeing: u32,
+    /// How many estimates in a row the gate has rejected.
+    pub rejected: u32,
+}
+
+/// A recursive filter of the robot's ground normal.
+///
+/// **State.** On a floor that is plane but not level, the ground normal in the frame of the wheels, `f`, turns with the robot:
+/// after a turn of `yaw` to the left, `f' = Rz(-yaw) f`. A lean of the robot itself (a mounting error, a soft wheel, a load)
+/// stays where it is, `m`. The robot sees `n = B(m) f` with the smallest rotation `B(m)` that takes `z` to `m`. Without
+/// [`TiltFilterOptions::mounting`] `m` is `z`; with it, turning tells `f` and `m` apart.
+///
+/// **Motion.** The floor's tilt walks randomly, by a variance for each metre and one for each prediction; steps of it (a
+/// threshold, a ramp) are left to the gate.
+///
+/// **Measurement.** An estimate is `n` with an error of covariance `R` (and the noise floor). Images of one place err alike:
+/// the error `c` of the scene is a state, of which only so much is new in an image as the robot has driven on. Its covariance
+/// is `s C`, a share of that of the best image of the place: with `rho = exp(-driven / correlation)` and `K = min(C, R)`
+///
+/// ```text
+/// cov(c', c) = s rho K,   C' = rho^2 K + (1 - rho^2) R,   n measured = n + c' + noise of covariance R - s C'
+/// ```
+///
+/// The scene turns with the floor, for walls out of plumb do. A robot that stands still therefore never knows its tilt
+/// better than by the share `s` of its best image's covariance, however many images it takes.
+///
+/// **Gate.** An estimate whose normalised innovation squared is beyond the chi-square gate is left out. If `jump_after` of
+/// them in a row agree with each other, the floor has changed: its tilt is forgotten, that of the mounting is not. If
+/// `lost_after` in a row are left out, agreeing or not, the floor's tilt is unknown, and the filter abstains.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TiltFilter {
+    options: TiltFilterOptions,
+    gate: Gate,
+    state: TiltFilterState,
+}
+
+/// The floor's, the mounting's and the scene's place in the error state.
+const FLOOR: usize = 0;
+const MOUNTING: usize = 2;
+const SCENE: usize = 4;
+
+/// A checked measurement: the normal and its covariance, noise floor included, in the tangent basis at the normal.
+#[derive(Clone, Copy)]
+struct Measured {
+    normal: Vector3<f64>,
+    covariance: Matrix2<f64>,
+}
+
+impl TiltFilter {
+    /// A filter that knows nothing yet.
+    ///
+    /// # Errors
+    /// [`Error::InvalidOption`] of [`TiltFilterOptions::validate`].
+    pub fn new(options: TiltFilterOptions) -> Result<Self> {
+        options.validate()?;
+        let gate = Gate::new(options.gate_probability, 2)?;
+        Ok(Self { options, gate, state: TiltFilterState::unknown(&options) })
+    }
+
+    /// The filter of a state that [`state`](Self::state) gave.
+    ///
+    /// # Errors
+    /// [`Error::InvalidArgument`] unless normals have length one and covariances can be such, and the errors of `new`.
+    pub fn with_state(options: TiltFilterOptions, state: TiltFilterState) -> Result<Self> {
+        state.validate()?;
+        Ok(Self { state, ..Self::new(options)? })
+    }
+
+    /// The options.
+    pub fn options(&self) -> &TiltFilterOptions {
+        &self.options
+    }
+
+    /// Everything that is known.
+    pub fn state(&self) -> &TiltFilterState {
+        &self.state
+    }
+
+    /// The largest normalised innovation squared that passes the gate.
+    pub fn nis_limit(&self) -> f64 {
+        self.gate.limit()
+    }
+
+    /// Forgets everything.
+    pub fn reset(&mut self) {
+        self.state = TiltFilterState::unknown(&self.options);
+    }
+
+    /// The robot has turned by `yaw_rad` (to the left positive) and driven `distance_m` (in either direction) since the last
+    /// call.
+    ///
+    /// # Errors
+    /// [`Error::InvalidArgument`] unless both are finite; the filter is as before.
+    pub fn predict(&mut self, yaw_rad: f64, distance_m: f64) -> Result<()> {
+        for (name, value) in [("yaw_rad", yaw_rad), ("distance_m", distance_m)] {
+            if !value.is_finite() {
+                return Err(Error::argument(name, value, "a finite number"));
+            }
+        }
+        let (options, state) = (&self.options, &mut self.state);
+        let distance_m = distance_m.abs();
+        // No step, however long, makes a tilt more unknown than it was before anything was known.
+        let grown = |variance: f64, prior: f64| variance.min(prior * prior);
+        let walk = options.walk_rad_per_sqrt_m.powi(2) * distance_m + options.walk_rad_per_sqrt_step.powi(2);
+        let floor_walk = Matrix2::identity() * grown(walk, options.prior_rad);
+
+        let turn = Rotation3::from_axis_angle(&Vector3::z_axis(), -yaw_rad).into_inner();
+        let plane_turn = *Rotation2::new(-yaw_rad).matrix();
+        let turned = (turn * state.floor).normalize();
+        let mut transition = Matrix6::identity();
+        transition
+            .fixed_view_mut::<2, 2>(FLOOR, FLOOR)
+            .copy_from(&(tangent_basis(&turned).transpose() * turn * tangent_basis(&state.floor)));
+        transition.fixed_view_mut::<2, 2>(SCENE, SCENE).copy_from(&plane_turn);
+        state.covariance = symmetric(&(transition * state.covariance * transition.transpose()));
+        add(&mut state.covariance, FLOOR, &floor_walk);
+        if let Some(mounting) = &options.mounting {
+            let walk = grown(mounting.walk_rad_per_sqrt_m.powi(2) * distance_m, mounting.prior_rad);
+            add(&mut state.covariance, MOUNTING, &(Matrix2::identity() * walk));
+        }
+        state.floor = turned;
+        state.scene = plane_turn * state.scene;
+        state.common = state.common.map(|common| symmetric(&(plane_turn * common * plane_turn.transpose())));
+        state.driven_m += distance_m;
+        let wheels = model::robot_from_wheels(&state.mounting);
+        state.pending = state.pending.map(|(normal, covariance)| {
+            let robot_turn = wheels * turn * wheels.transpose();
+            let there = (robot_turn * normal).normalize();
+            let carried = tangent_basis(&there).transpose() * robot_turn * tangent_basis(&normal);
+            (there, symmetric(&(carried * covariance * carried.transpose() + floor_walk)))
+        });
+        Ok(())
+    }
+
+    /// Fuses the tilt of an image, unless it has none, trusts itself too little, or is outside the gate; says what it did.
+    pub fn update(&mut self, estimate: &TiltEstimate) -> Verdict {
+        self.update_tilt(estimate.tilt, &estimate.covariance_rad2, estimate.confidence)
+    }
+
+    /// [`update`](Self::update) by what it looks at: the tilt, its covariance and its confidence.
+    pub fn update_tilt(&mut self, tilt: Option<Tilt>, covariance_rad2: &Matrix2<f64>, confidence: f64) -> Verdict {
+        match tilt {
+            Some(tilt) if positive_semidefinite(covariance_rad2) => {
+                self.fuse(tilt.normal(), covariance_rad2, confidence)
+            }
+            _ => Verdict::NoTilt,
+        }
+    }
+
+    /// Fuses a ground normal of any length with a covariance in squared radians in its tangent plane, in the basis of
+    /// [`tangent_basis`]; its confidence is the probability of an error below two degrees under that covariance.
+    ///
+    /// # Errors
+    /// [`Error::InvalidArgument`] for a normal that is zero or not finite, and for a matrix that is no covariance; the filter
+    /// is as before.
+    pub fn update_normal(&mut self, normal: &Vector3<f64>, covariance_rad2: &Matrix2<f64>) -> Result<Verdict> {
+        let Some(tilt) = Tilt::from_normal(normal) else {
+            let got = format!("[{}, {}, {}]", normal.x, normal.y, normal.z);
+            return Err(Error::argument("normal", got, "a finite vector that is not zero"));
+        };
+        if !positive_semidefinite(covariance_rad2) {
+            return Err(no_covariance("covariance_rad2", covariance_rad2));
+        }
+        Ok(self.fuse(tilt.normal(), covariance_rad2, confidence::confidence(covariance_rad2)))
+    }
+
+    /// The ground normal in the robot's frame: floor and mounting together.
+    pub fn estimate(&self) -> FilteredTilt {
+        let state = &self.state;
+        let jacobian = self.jacobian(false);
+        let covariance = symmetric(&(jacobian * state.covariance * jacobian.transpose()));
+        self.filtered(&model::normal_of(&state.floor, &state.mounting), covariance)
+    }
+
+    /// The floor's part alone, in the frame of the wheels.
+    pub fn floor(&self) -> FilteredTilt {
+        self.filtered(&self.state.floor, self.state.covariance.fixed_view::<2, 2>(FLOOR, FLOOR).into_owned())
+    }
+
+    /// The robot's own part alone: what it would see on level ground. `None` if it is not estimated.
+    pub fn mounting(&self) -> Option<FilteredTilt> {
+        let covariance = self.state.covariance.fixed_view::<2, 2>(MOUNTING, MOUNTING).into_owned();
+        self.options.mounting.map(|_| self.filtered(&self.state.mounting, covariance))
+    }
+
+    fn filtered(&self, normal: &Vector3<f64>, covariance: Matrix2<f64>) -> FilteredTilt {
+        let tilt = Tilt::from_normal(normal).unwrap_or(Tilt::UPRIGHT);
+        FilteredTilt::new(tilt, covariance, self.options.sigma_max_rad)
+    }
+
+    fn fuse(&mut self, normal: Vector3<f64>, covariance_rad2: &Matrix2<f64>, confidence: f64) -> Verdict {
+        let options = self.options;
+        if confidence.is_nan() || confidence < options.confidence_min {
+            return Verdict::LowConfidence { confidence, limit: options.confidence_min };
+        }
+        let floor = Matrix2::identity() * (options.noise_floor_rad * options.noise_floor_rad);
+        let measured = Measured { normal, covariance: symmetric(covariance_rad2) + floor };
+        let limit = self.gate.limit();
+        let before = self.state.covariance;
+        let (nis, corrected) = self.corrected(&measured, &before);
+        if let Some(corrected) = corrected.filter(|_| self.gate.passes(nis)) {
+            self.state = corrected;
+            return Verdict::Accepted { nis, limit };
+        }
+        let agrees = self.state.pending.is_some_and(|pending| self.agree(pending, &measured));
+        let agreeing = if agrees { self.state.agreeing.saturating_add(1) } else { 1 };
+        let rejected = self.state.rejected.saturating_add(1);
+        if agreeing >= options.jump_after {
+            let mut open = before;
+            add(&mut open, FLOOR, &(Matrix2::identity() * (options.prior_rad * options.prior_rad)));
+            if let (_, Some(corrected)) = self.corrected(&measured, &open) {
+                self.state = corrected;
+                return Verdict::Jumped { nis, limit, agreeing };
+            }
+        }
+        if rejected >= options.lost_after {
+            self.forget_floor();
+            return Verdict::Lost { nis, limit, rejected };
+        }
+        let state = &mut self.state;
+        state.pending = Some((measured.normal, measured.covariance));
+        (state.agreeing, state.rejected) = (agreeing, rejected);
+        Verdict::OutsideGate { nis, limit, rejected }
+    }
+
+    /// The normalised innovation squared of a measurement, and the state after it, from the present means and a covariance.
+    fn corrected(&self, measured: &Measured, covariance: &Matrix6<f64>) -> (f64, Option<TiltFilterState>) {
+        let state = &self.state;
+        let predicted = model::normal_of(&state.floor, &state.mounting);
+        let carry = tangent_transport(&measured.normal, &predicted);
+        let noise = symmetric(&(carry * measured.covariance * carry.transpose()));
+
+        let (keep, fresh, common) = self.scene_motion(&noise);
+        let mut transition = Matrix6::identity();
+        transition.fixed_view_mut::<2, 2>(SCENE, SCENE).copy_from(&keep);
+        let mut covariance = transition * covariance * transition.transpose();
+        add(&mut covariance, SCENE, &fresh);
+        let scene = keep * state.scene;
+
+        let innovation = tangent_log(&predicted, &measured.normal) - scene;
+        let own = noise - common * self.options.correlated_share;
+        let Some(seen) = Innovation::new(symmetric(&covariance), self.jacobian(true), own, innovation) else {
+            return (f64::INFINITY, None);
+        };
+        let (step, after) = seen.correct();
+        let floor = tangent_exp(&state.floor, &step.fixed_rows::<2>(FLOOR).into_owned());
+        let mounting = tangent_exp(&state.mounting, &step.fixed_rows::<2>(MOUNTING).into_owned());
+        let mut moved = Matrix6::identity();
+        moved.fixed_view_mut::<2, 2>(FLOOR, FLOOR).copy_from(&tangent_transport(&state.floor, &floor));
+        moved.fixed_view_mut::<2, 2>(MOUNTING, MOUNTING).copy_from(&tangent_transport(&state.mounting, &mounting));
+        let after = TiltFilterState {
+            floor,
+            mounting,
+            scene: scene + step.fixed_rows::<2>(SCENE),
+            covariance: symmetric(&(moved * after * moved.transpose())),
+            common: Some(common),
+            driven_m: 0.0,
+            pending: None,
+            agreeing: 0,
+            rejected: 0,
+        };
+        (seen.nis(), Some(after))
+    }
+
+    /// What becomes of the scene's error before an estimate of covariance `R` is fused: the factor `A = rho K C^-1` of what
+    /// is kept, the covariance `s (C' - A C A^T)` of what is new, and `C'`.
+    fn scene_motion(&self, noise: &Matrix2<f64>) -> (Matrix2<f64>, Matrix2<f64>, Matrix2<f64>) {
+        let share = self.options.correlated_share;
+        let rho = (-self.state.driven_m / self.options.correlation_m).exp();
+        let kept = self.state.common.and_then(|before| {
+            let shared = model::common_part(&before, noise)?;
+            let keep = shared * before.try_inverse()? * rho;
+            let common = symmetric(&(shared * (rho * rho) + noise * (1.0 - rho * rho)));
+            Some((keep, symmetric(&(common - keep * before * keep.transpose())) * share, common))
+        });
+        kept.unwrap_or((Matrix2::zeros(), noise * share, *noise))
+    }
+
+    /// The Jacobian of the ground normal by the error state, with or without the scene's error on top.
+    fn jacobian(&self, with_scene: bool) -> Matrix2x6<f64> {
+        let (by_floor, by_mounting) = model::jacobians(&self.state.floor, &self.state.mounting);
+        let mut jacobian = Matrix2x6::zeros();
+        jacobian.fixed_view_mut::<2, 2>(0, FLOOR).copy_from(&by_floor);
+        if self.options.mounting.is_some() {
+            jacobian.fixed_view_mut::<2, 2>(0, MOUNTING).copy_from(&by_mounting);
+        }
+        if with_scene {
+            jacobian.fixed_view_mut::<2, 2>(0, SCENE).copy_from(&Matrix2::identity());
+        }
+        jacobian
+    }
+
+    /// Whether two measurements that the gate has rejected may be of one tilt.
+    fn agree(&self, (normal, covariance): (Vector3<f64>, Matrix2<f64>), measured: &Measured) -> bool {
+        let carry = tangent_transport(&measured.normal, &normal);
+        let spread = covariance + carry * measured.covariance * carry.transpose();
+        let way = tangent_log(&normal, &measured.normal);
+        crate::filter::squared_mahalanobis(&way, &symmetric(&spread)).is_some_and(|nis| self.gate.passes(nis))
+    }
+
+    /// The floor's tilt is as unknown as before the first image; the mounting stays.
+    fn forget_floor(&mut self) {
+        let mounting = self.state.mounting;
+        let covariance = self.state.covariance.fixed_view::<2, 2>(MOUNTING, MOUNTING).into_owned();
+        self.reset();
+        self.state.mounting = mounting;
+        self.state.covariance.fixed_view_mut::<2, 2>(MOUNTING, MOUNTING).copy_from(&covariance);
+    }
+}
+
+impl TiltFilterState {
+    fn unknown(options: &TiltFilterOptions) -> Self {
+        let mut covariance = Matrix6::zeros();
+        add(&mut covariance, FLOOR, &(Matrix2::identity() * options.prior_rad.powi(2)));
+        if let Some(mounting) = &options.mounting {
+            add(&mut covariance, MOUNTING, &(Matrix2::identity() * mounting.prior_rad.powi(2)));
+        }
+        Self {
+            floor: Vector3::z(),
+            mounting: Vector3::z(),
+            scene: Vector2::zeros(),
+            covariance,
+            common: None,
+            driven_m: 0.0,
+            pending: None,
+            agreeing: 0,
+            rejected: 0,
+        }
+    }
+
+    fn validate(&self) -> Result<()> {
+        let unit = |name, v: &Vector3<f64>| {
+            let good = (v.norm_squared() - 1.0).abs() < 1e-9;
+            let got = || format!("[{}, {}, {}]", v.x, v.y, v.z);
+            if good { Ok(()) } else { Err(Error::argument(name, got(), "a vector of length 1")) }
+        };
+        unit("floor", &self.floor)?;
+        unit("mounting", &self.mounting)?;
+        if !self.scene.iter().all(|x| x.is_finite()) {
+            return Err(Error::argument("scene", format!("[{}, {}]", self.scene.x, self.scene.y), "finite angles"));
+        }
+        if !positive_semidefinite(&self.covariance) {
+            return Err(Error::argument("covariance", "another matrix", "a covariance, symmetric and positive"));
+        }
+        let spread = |name, matrix: &Matrix2<f64>| {
+            if matrix.cholesky().is_some() && positive_semidefinite(matrix) {
+                Ok(())
+            } else {
+                Err(no_covariance(name, matrix))
+            }
+        };
+        if let Some(common) = &self.common {
+            spread("common", common)?;
+        }
+        if let Some((normal, covariance)) = &self.pending {
+            unit("pending", normal)?;
+            spread("pending", covariance)?;
+        }
+        // Infinity is what a sum of very long ways comes to.
+        if self.driven_m.is_nan() || self.driven_m < 0.0 {
+            return Err(Error::argument("driven_m", self.driven_m, "a number of metres"));
+        }
+        Ok(())
+    }
+}
+
+fn add(covariance: &mut Matrix6<f64>, at: usize, block: &Matrix2<f64>) {
+    let mut view = covariance.fixed_view_mut::<2, 2>(at, at);
+    view += block;
+}
+
+fn no_covariance(name: &'static str, m: &Matrix2<f64>) -> Error {
+    let got = format!("[[{}, {}], [{}, {}]]", m[(0, 0)], m[(0, 1)], m[(1, 0)], m[(1, 1)]);
+    Error::argument(name, got, "a covariance in squared radians, symmetric and positive")
+}

@@ -1,0 +1,127 @@
+//! The edge pixels of one image as a value of its own, and where they come from.
+
+use std::sync::Arc;
+
+use nalgebra::Matrix3;
+
+use crate::camera::Camera;
+use crate::edges::{EdgeOptions, EdgePixels, Mask};
+use crate::error::{Error, Result};
+
+/// What edge pixels depend on beside the image.
+#[derive(Debug, Clone, PartialEq)]
+pub struct EdgeOrigin {
+    /// The camera.
+    pub camera: Camera,
+    /// The rotation from the camera frame to the robot frame.
+    pub robot_from_camera: Matrix3<f64>,
+    /// Which pixels are edges.
+    pub options: EdgeOptions,
+    /// The pixels that may be used.
+    pub mask: Option<Mask>,
+}
+
+impl EdgeOrigin {
+    /// What differs first, with both values: (name, own, other's).
+    fn difference(&self, other: &Self) -> Option<(&'static str, String, String)> {
+        if self.camera != other.camera {
+            return Some(("camera", "another camera".to_owned(), "the estimator's".to_owned()));
+        }
+        if self.robot_from_camera != other.robot_from_camera {
+            return Some(("robot_from_camera", "another rotation".to_owned(), "the estimator's".to_owned()));
+        }
+        let (a, b) = (&self.options, &other.options);
+        let numbers = [
+            ("gradient_min", a.gradient_min, b.gradient_min),
+            ("smoothing_px", a.smoothing_px, b.smoothing_px),
+            ("elevation_min_rad", a.elevation_min_rad, b.elevation_min_rad),
+            ("elevation_max_rad", a.elevation_max_rad, b.elevation_max_rad),
+            ("margin_px", a.margin_px, b.margin_px),
+        ];
+        let different = numbers.into_iter().find(|(_, own, other)| own != other);
+        let different = different.map(|(name, own, other)| (name, own.to_string(), other.to_string()));
+        let word = |mask: &Option<Mask>| if mask.is_some() { "a mask" } else { "no mask" };
+        different.or_else(|| {
+            let own = if other.mask.is_some() && self.mask.is_some() { "another mask" } else { word(&self.mask) };
+            (self.mask != other.mask).then(|| ("mask", own.to_owned(), word(&other.mask).to_owned()))
+        })
+    }
+}
+
+/// The edge pixels of one image: every pixel of the band with a gradient of at least `gradient_min`, whatever the method.
+///
+/// [`TiltEstimator::detect`](super::TiltEstimator::detect) makes them; every estimator with an equal [`EdgeOrigin`] takes them.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ImageEdges {
+    origin: Arc<EdgeOrigin>,
+    slots: Arc<[u32]>,
+    gx: Arc<[f32]>,
+    gy: Arc<[f32]>,
+}
+
+impl ImageEdges {
+    /// Edge pixels by their numbers within the region, ascending, and their gradients along `u` and `v`.
+    ///
+    /// # Errors
+    /// [`Error::InvalidArgument`] unless there are as many gradients as pixels, all finite, and the numbers ascend.
+    pub fn new(origin: Arc<EdgeOrigin>, slots: &[u32], gx: &[f32], gy: &[f32]) -> Result<Self> {
+        if slots.len() != gx.len() || slots.len() != gy.len() {
+            let got = format!("{} pixels, {} and {} gradients", slots.len(), gx.len(), gy.len());
+            return Err(Error::argument("edges", got, "as many gradients as pixels"));
+        }
+        if !slots.is_sorted_by(|a, b| a < b) {
+            return Err(Error::argument("edges", "pixels out of order", "each pixel once, in ascending order"));
+        }
+        if !gx.iter().chain(gy).all(|g| g.is_finite()) {
+            return Err(Error::argument("edges", "gradients that are not finite", "finite gradients"));
+        }
+        Ok(Self { origin, slots: slots.into(), gx: gx.into(), gy: gy.into() })
+    }
+
+    /// What they depend on beside the image.
+    pub fn origin(&self) -> &Arc<EdgeOrigin> {
+        &self.origin
+    }
+
+    /// How many there are.
+    pub fn len(&self) -> usize {
+        self.slots.len()
+    }
+
+    /// Whether there are none.
+    pub fn is_empty(&self) -> bool {
+        self.slots.is_empty()
+    }
+
+    /// Number of each pixel within the region.
+    pub fn slots(&self) -> &[u32] {
+        &self.slots
+    }
+
+    /// Gradient of each pixel along `u` (Scharr, unnormalised).
+    pub fn gx(&self) -> &[f32] {
+        &self.gx
+    }
+
+    /// Gradient of each pixel along `v`.
+    pub fn gy(&self) -> &[f32] {
+        &self.gy
+    }
+
+    /// Copies them to where the fits read them, if they are of this origin.
+    ///
+    /// # Errors
+    /// [`Error::InvalidArgument`] that says what differs, or that there are pixels beyond the region.
+    pub(super) fn copy_to(&self, origin: &Arc<EdgeOrigin>, region_pixels: usize, out: &mut EdgePixels) -> Result<()> {
+        if !Arc::ptr_eq(&self.origin, origin)
+            && let Some((name, own, expected)) = self.origin.difference(origin)
+        {
+            return Err(Error::argument("edges", format!("edges with {name} = {own}"), format!("{name} = {expected}")));
+        }
+        if let Some(last) = self.slots.last().filter(|last| **last as usize >= region_pixels) {
+            return Err(Error::argument("edges", format!("pixel {last}"), format!("pixels below {region_pixels}")));
+        }
+        out.refill(&self.slots, &self.gx, &self.gy);
+        Ok(())
+    }
+}

@@ -1,0 +1,95 @@
+//! The memory that one thread works in, grown once.
+
+use super::refine::Sparse;
+use crate::edges::{Detector, EdgeOptions, EdgePixels, Region};
+use crate::robust::Rows;
+
+/// The memory that one thread works in; estimates after the first allocate nothing.
+///
+/// It serves all estimators that look at the same pixels: those made from one another by
+/// [`with_options`](super::TiltEstimator::with_options) without another band, margin, smoothing or mask.
+#[derive(Debug, Clone)]
+pub struct Scratch {
+    pub(super) detector: Detector,
+    /// What the memory and the detector were made for.
+    made_for: Extent,
+    pub(super) edges: EdgePixels,
+    pub(super) work: Work,
+}
+
+/// What the fits work in.
+#[derive(Debug, Clone)]
+pub(super) struct Work {
+    pub rows: Rows<f32>,
+    pub weights: Vec<f32>,
+    pub sparse: Sparse<f32>,
+    /// Place of each row among the edge pixels.
+    pub places: Vec<u32>,
+    pub inliers: Inliers,
+}
+
+/// What an estimator's scratch depends on.
+#[derive(Debug, Clone, PartialEq)]
+struct Extent {
+    pixels: usize,
+    columns: std::ops::Range<usize>,
+    smoothing_px: f64,
+}
+
+impl Extent {
+    fn new(region: &Region, options: &EdgeOptions) -> Self {
+        Self { pixels: region.len(), columns: region.columns(), smoothing_px: options.smoothing_px }
+    }
+}
+
+/// What tells the inliers of the last image.
+#[derive(Debug, Clone, Copy)]
+pub(super) enum Inliers {
+    /// There was no fit.
+    None,
+    /// The rows with a weight above zero.
+    Weighted,
+    /// The rows with a residual of at most the threshold.
+    Within { model: [f64; 3], threshold: f64 },
+}
+
+impl Inliers {
+    pub(super) fn weighted_if(found: bool) -> Self {
+        if found { Self::Weighted } else { Self::None }
+    }
+}
+
+impl Scratch {
+    /// Room for an image in which every pixel of the region is an edge.
+    pub(super) fn new(region: &Region, options: &EdgeOptions) -> Self {
+        let n = region.len();
+        Self {
+            detector: Detector::new(region, options),
+            made_for: Extent::new(region, options),
+            edges: EdgePixels::with_capacity(n),
+            work: Work {
+                rows: Rows::with_capacity(n),
+                weights: Vec::with_capacity(n),
+                sparse: Sparse::with_capacity(n),
+                places: Vec::with_capacity(n),
+                inliers: Inliers::None,
+            },
+        }
+    }
+
+    /// Whether it is of the right size for a region.
+    pub(super) fn serves(&self, region: &Region, options: &EdgeOptions) -> bool {
+        self.made_for == Extent::new(region, options)
+    }
+}
+
+impl Work {
+    /// Whether a row agreed with the last estimate.
+    pub(super) fn is_inlier(&self, row: usize) -> bool {
+        match self.inliers {
+            Inliers::None => false,
+            Inliers::Weighted => self.weights.get(row).is_some_and(|weight| *weight > 0.0),
+            Inliers::Within { model, threshold } => self.rows.is_within(row, model, threshold),
+        }
+    }
+}

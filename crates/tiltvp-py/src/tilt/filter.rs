@@ -1,0 +1,309 @@
+//! `TiltFilter`: successive tilts fused.
+
+use std::sync::{Mutex, MutexGuard, PoisonError};
+
+use nalgebra::{Matrix2, Matrix6, Vector2, Vector3};
+use pyo3::prelude::*;
+use pyo3::types::{PyDict, PyTuple};
+use tiltvp_core::geometry::Tilt;
+use tiltvp_core::tilt::{self as core, MountingOptions, TiltFilterOptions, TiltFilterState, Verdict};
+
+use super::estimate::TiltEstimate;
+use super::filtered::{FilterStep, FilteredTilt, matrix2, nested};
+use crate::call::{call, exception, invalid};
+use crate::convert;
+
+/// Keys of the dict of a state, by the way of pickle.
+const STATE_KEYS: [&str; 9] =
+    ["floor", "mounting", "scene", "covariance", "common", "driven_m", "pending", "agreeing", "rejected"];
+
+/// Fuses the tilts of successive images.
+#[pyclass(frozen, module = "tiltvp._core")]
+pub(crate) struct TiltFilter {
+    inner: Mutex<core::TiltFilter>,
+}
+
+impl TiltFilter {
+    fn lock(&self) -> MutexGuard<'_, core::TiltFilter> {
+        self.inner.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn copied(&self) -> Self {
+        Self { inner: Mutex::new(self.lock().clone()) }
+    }
+}
+
+#[pymethods]
+impl TiltFilter {
+    #[new]
+    #[pyo3(signature = (
+        *, walk_rad_per_sqrt_m=None, walk_rad_per_sqrt_step=None, gate_probability=None, confidence_min=None,
+        jump_after=None, lost_after=None, correlated_share=None, correlation_m=None, noise_floor_rad=None, prior_rad=None,
+        sigma_max_rad=None, estimate_mounting=false, mounting_prior_rad=None, mounting_walk_rad_per_sqrt_m=None
+    ))]
+    #[expect(clippy::too_many_arguments, reason = "keywords of the user")]
+    fn new(
+        walk_rad_per_sqrt_m: Option<&Bound<'_, PyAny>>,
+        walk_rad_per_sqrt_step: Option<&Bound<'_, PyAny>>,
+        gate_probability: Option<&Bound<'_, PyAny>>,
+        confidence_min: Option<&Bound<'_, PyAny>>,
+        jump_after: Option<&Bound<'_, PyAny>>,
+        lost_after: Option<&Bound<'_, PyAny>>,
+        correlated_share: Option<&Bound<'_, PyAny>>,
+        correlation_m: Option<&Bound<'_, PyAny>>,
+        noise_floor_rad: Option<&Bound<'_, PyAny>>,
+        prior_rad: Option<&Bound<'_, PyAny>>,
+        sigma_max_rad: Option<&Bound<'_, PyAny>>,
+        estimate_mounting: bool,
+        mounting_prior_rad: Option<&Bound<'_, PyAny>>,
+        mounting_walk_rad_per_sqrt_m: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<Self> {
+        let mut options = TiltFilterOptions::default();
+        let mut mounting = MountingOptions::default();
+        for (name, given, field) in [
+            ("walk_rad_per_sqrt_m", walk_rad_per_sqrt_m, &mut options.walk_rad_per_sqrt_m),
+            ("walk_rad_per_sqrt_step", walk_rad_per_sqrt_step, &mut options.walk_rad_per_sqrt_step),
+            ("gate_probability", gate_probability, &mut options.gate_probability),
+            ("confidence_min", confidence_min, &mut options.confidence_min),
+            ("correlated_share", correlated_share, &mut options.correlated_share),
+            ("correlation_m", correlation_m, &mut options.correlation_m),
+            ("noise_floor_rad", noise_floor_rad, &mut options.noise_floor_rad),
+            ("prior_rad", prior_rad, &mut options.prior_rad),
+            ("sigma_max_rad", sigma_max_rad, &mut options.sigma_max_rad),
+            ("mounting_prior_rad", mounting_prior_rad, &mut mounting.prior_rad),
+            ("mounting_walk_rad_per_sqrt_m", mounting_walk_rad_per_sqrt_m, &mut mounting.walk_rad_per_sqrt_m),
+        ] {
+            if let Some(value) = given {
+                if name.starts_with("mounting") && !estimate_mounting {
+                    return Err(invalid(format!("option {name}: given without estimate_mounting=True, expected both")));
+                }
+                *field = number(value, name)?;
+            }
+        }
+        for (name, given, field) in
+            [("jump_after", jump_after, &mut options.jump_after), ("lost_after", lost_after, &mut options.lost_after)]
+        {
+            if let Some(value) = given {
+                *field = convert::whole(value, &format!("option {name}"), "a whole number from 1")?;
+            }
+        }
+        options.mounting = estimate_mounting.then_some(mounting);
+        let inner = core::TiltFilter::new(options).map_err(|error| exception(&error))?;
+        Ok(Self { inner: Mutex::new(inner) })
+    }
+
+    /// The options in force, by name, defaults included; a fresh dict, good as keywords.
+    #[getter]
+    fn options<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let o = *self.lock().options();
+        let dict = PyDict::new(py);
+        dict.set_item("walk_rad_per_sqrt_m", o.walk_rad_per_sqrt_m)?;
+        dict.set_item("walk_rad_per_sqrt_step", o.walk_rad_per_sqrt_step)?;
+        dict.set_item("gate_probability", o.gate_probability)?;
+        dict.set_item("confidence_min", o.confidence_min)?;
+        dict.set_item("jump_after", o.jump_after)?;
+        dict.set_item("lost_after", o.lost_after)?;
+        dict.set_item("correlated_share", o.correlated_share)?;
+        dict.set_item("correlation_m", o.correlation_m)?;
+        dict.set_item("noise_floor_rad", o.noise_floor_rad)?;
+        dict.set_item("prior_rad", o.prior_rad)?;
+        dict.set_item("sigma_max_rad", o.sigma_max_rad)?;
+        dict.set_item("estimate_mounting", o.mounting.is_some())?;
+        if let Some(mounting) = o.mounting {
+            dict.set_item("mounting_prior_rad", mounting.prior_rad)?;
+            dict.set_item("mounting_walk_rad_per_sqrt_m", mounting.walk_rad_per_sqrt_m)?;
+        }
+        Ok(dict)
+    }
+
+    /// The robot has turned and driven since the last call.
+    #[pyo3(signature = (yaw_rad=None, distance_m=None))]
+    fn predict(
+        &self,
+        py: Python<'_>,
+        yaw_rad: Option<&Bound<'_, PyAny>>,
+        distance_m: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<()> {
+        let [yaw_rad, distance_m] = motion(yaw_rad, distance_m)?;
+        call(py, || self.lock().predict(yaw_rad, distance_m))
+    }
+
+    /// Fuses an estimate, or says why not.
+    #[pyo3(signature = (estimate, /))]
+    fn update(&self, py: Python<'_>, estimate: &Bound<'_, PyAny>) -> PyResult<FilterStep> {
+        let measured = measurement(estimate)?;
+        call(py, || fuse(&mut self.lock(), &measured)).map(FilterStep::from)
+    }
+
+    /// `predict`, then `update`; the filter is as before if either is refused.
+    #[pyo3(signature = (estimate, /, yaw_rad=None, distance_m=None))]
+    fn step(
+        &self,
+        py: Python<'_>,
+        estimate: &Bound<'_, PyAny>,
+        yaw_rad: Option<&Bound<'_, PyAny>>,
+        distance_m: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<FilterStep> {
+        let measured = measurement(estimate)?;
+        let [yaw_rad, distance_m] = motion(yaw_rad, distance_m)?;
+        let fused = call(py, || {
+            let mut inner = self.lock();
+            let mut next = inner.clone();
+            next.predict(yaw_rad, distance_m)?;
+            let verdict = fuse(&mut next, &measured)?;
+            *inner = next;
+            Ok(verdict)
+        });
+        fused.map(FilterStep::from)
+    }
+
+    /// The ground normal in the robot's frame, as the filter holds it to be now.
+    #[getter]
+    fn estimate(&self) -> FilteredTilt {
+        self.lock().estimate().into()
+    }
+
+    /// The floor's part of it alone, in the frame of the wheels.
+    #[getter]
+    fn floor(&self) -> FilteredTilt {
+        self.lock().floor().into()
+    }
+
+    /// The robot's own part alone, what it would see on level ground; None unless `estimate_mounting`.
+    #[getter]
+    fn mounting(&self) -> Option<FilteredTilt> {
+        self.lock().mounting().map(FilteredTilt::from)
+    }
+
+    /// The largest normalised innovation squared that passes the gate.
+    #[getter]
+    fn nis_limit(&self) -> f64 {
+        self.lock().nis_limit()
+    }
+
+    /// How many estimates in a row the gate has rejected.
+    #[getter]
+    fn rejected(&self) -> u32 {
+        self.lock().state().rejected
+    }
+
+    /// Forgets everything but the options.
+    fn reset(&self) {
+        self.lock().reset();
+    }
+
+    fn __repr__(&self, py: Python<'_>) -> PyResult<String> {
+        let words: Vec<String> = self
+            .options(py)?
+            .iter()
+            .map(|(key, value)| Ok(format!("{key}={}", value.repr()?)))
+            .collect::<PyResult<_>>()?;
+        Ok(format!("TiltFilter({})", words.join(", ")))
+    }
+
+    fn __eq__(&self, other: &Bound<'_, PyAny>) -> bool {
+        let Ok(other) = other.cast::<Self>() else { return false };
+        // One at a time: a filter may be compared with itself.
+        let mine = self.lock().clone();
+        mine == *other.get().lock()
+    }
+
+    fn __copy__(&self) -> Self {
+        self.copied()
+    }
+
+    fn __deepcopy__(&self, _memo: &Bound<'_, PyAny>) -> Self {
+        self.copied()
+    }
+
+    /// Sets what pickle has kept.
+    fn __setstate__(&self, state: &Bound<'_, PyAny>) -> PyResult<()> {
+        let values = state.cast::<PyDict>().map_err(|_| invalid("state: expected a dict".to_owned()))?;
+        let state = read_state(values)?;
+        let mut inner = self.lock();
+        *inner = core::TiltFilter::with_state(*inner.options(), state).map_err(|error| exception(&error))?;
+        Ok(())
+    }
+
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyTuple>> {
+        let (py, this) = (slf.py(), slf.get());
+        let make = py.import("functools")?.getattr("partial")?.call((slf.get_type(),), Some(&this.options(py)?))?;
+        let state = written_state(py, this.lock().state())?;
+        (make, PyTuple::empty(py), state).into_pyobject(py)
+    }
+}
+
+/// What there is to fuse: an estimate's tilt, covariance and confidence, or a normal and its covariance.
+enum Measurement {
+    Estimate(Option<Tilt>, Matrix2<f64>, f64),
+    Normal(Vector3<f64>, Matrix2<f64>),
+}
+
+fn measurement(value: &Bound<'_, PyAny>) -> PyResult<Measurement> {
+    if let Ok(estimate) = value.cast::<TiltEstimate>() {
+        let (tilt, covariance, confidence) = estimate.get().measurement();
+        return Ok(Measurement::Estimate(tilt, covariance, confidence));
+    }
+    let pair = value.cast::<PyTuple>().ok().filter(|pair| pair.len() == 2);
+    let Some(pair) = pair else {
+        let kind = value.get_type().name()?;
+        return Err(invalid(format!("estimate: {kind}, expected a TiltEstimate or a tuple (normal, covariance_rad2)")));
+    };
+    Ok(Measurement::Normal(
+        convert::vector3(&pair.get_item(0)?, "normal")?,
+        matrix2(&pair.get_item(1)?, "covariance_rad2")?,
+    ))
+}
+
+fn fuse(filter: &mut core::TiltFilter, measured: &Measurement) -> Result<Verdict, tiltvp_core::Error> {
+    match measured {
+        Measurement::Estimate(tilt, covariance, confidence) => Ok(filter.update_tilt(*tilt, covariance, *confidence)),
+        Measurement::Normal(normal, covariance) => filter.update_normal(normal, covariance),
+    }
+}
+
+/// The turn and the way of a prediction, nothing where not given.
+fn motion(yaw_rad: Option<&Bound<'_, PyAny>>, distance_m: Option<&Bound<'_, PyAny>>) -> PyResult<[f64; 2]> {
+    let read = |value: Option<&Bound<'_, PyAny>>, name| value.map_or(Ok(0.0), |value| number(value, name));
+    Ok([read(yaw_rad, "yaw_rad")?, read(distance_m, "distance_m")?])
+}
+
+fn number(value: &Bound<'_, PyAny>, name: &str) -> PyResult<f64> {
+    convert::whole(value, name, "a number")
+}
+
+fn written_state<'py>(py: Python<'py>, state: &TiltFilterState) -> PyResult<Bound<'py, PyDict>> {
+    let dict = PyDict::new(py);
+    dict.set_item("floor", state.floor.as_slice().to_vec())?;
+    dict.set_item("mounting", state.mounting.as_slice().to_vec())?;
+    dict.set_item("scene", state.scene.as_slice().to_vec())?;
+    dict.set_item("covariance", state.covariance.as_slice().to_vec())?;
+    dict.set_item("common", state.common.as_ref().map(nested))?;
+    dict.set_item("driven_m", state.driven_m)?;
+    dict.set_item("pending", state.pending.as_ref().map(|(normal, c)| (normal.as_slice().to_vec(), nested(c))))?;
+    dict.set_item("agreeing", state.agreeing)?;
+    dict.set_item("rejected", state.rejected)?;
+    Ok(dict)
+}
+
+fn read_state(values: &Bound<'_, PyDict>) -> PyResult<TiltFilterState> {
+    convert::known_keys(values, &STATE_KEYS)?;
+    let matrix = |rows: [[f64; 2]; 2]| Matrix2::new(rows[0][0], rows[0][1], rows[1][0], rows[1][1]);
+    let vector = |key: &str| convert::item::<[f64; 3]>(values, key, "three numbers").map(Vector3::from);
+    let covariance: Vec<f64> = convert::item(values, "covariance", "36 numbers")?;
+    if covariance.len() != 36 {
+        return Err(invalid(format!("state[\"covariance\"]: {} numbers, expected 36", covariance.len())));
+    }
+    let pending: Option<([f64; 3], [[f64; 2]; 2])> = convert::item(values, "pending", "None or a normal and a matrix")?;
+    Ok(TiltFilterState {
+        floor: vector("floor")?,
+        mounting: vector("mounting")?,
+        scene: Vector2::from(convert::item::<[f64; 2]>(values, "scene", "two numbers")?),
+        covariance: Matrix6::from_column_slice(&covariance),
+        common: convert::item::<Option<[[f64; 2]; 2]>>(values, "common", "None or a matrix")?.map(matrix),
+        driven_m: convert::item(values, "driven_m", "a number")?,
+        pending: pending.map(|(normal, covariance)| (normal.into(), matrix(covariance))),
+        agreeing: convert::item(values, "agreeing", "a count")?,
+        rejected: convert::item(values, "rejected", "a count")?,
+    })
+}

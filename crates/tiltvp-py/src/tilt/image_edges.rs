@@ -1,0 +1,100 @@
+//! `ImageEdges`: the edge pixels of one image, between finding them and fitting to them.
+
+use std::sync::Arc;
+
+use numpy::{PyArray1, PyArrayMethods, PyReadonlyArray1};
+use pyo3::prelude::*;
+use pyo3::types::{PyTuple, PyType};
+use tiltvp_core::edges::{EdgeOptions, Mask};
+use tiltvp_core::tilt::{self as core, EdgeOrigin};
+
+use crate::call::exception;
+use crate::camera::Camera;
+use crate::convert;
+
+/// The edge pixels of one image and their gradients: every pixel of the band with a gradient of at least `gradient_min`.
+#[pyclass(frozen, module = "tiltvp._core")]
+pub(crate) struct ImageEdges {
+    inner: core::ImageEdges,
+    camera: Py<Camera>,
+}
+
+impl ImageEdges {
+    pub(super) fn new(inner: core::ImageEdges, camera: Py<Camera>) -> Self {
+        Self { inner, camera }
+    }
+
+    pub(super) fn inner(&self) -> &core::ImageEdges {
+        &self.inner
+    }
+}
+
+#[pymethods]
+impl ImageEdges {
+    /// The least gradient magnitude that was asked for.
+    #[getter]
+    fn gradient_min(&self) -> f64 {
+        self.inner.origin().options.gradient_min
+    }
+
+    fn __len__(&self) -> usize {
+        self.inner.len()
+    }
+
+    fn __repr__(&self) -> String {
+        format!("ImageEdges({} edge pixels, gradient_min={})", self.inner.len(), self.gradient_min())
+    }
+
+    fn __eq__(&self, other: &Bound<'_, PyAny>) -> bool {
+        other.cast::<Self>().is_ok_and(|other| self.inner == other.get().inner)
+    }
+
+    /// The value of its parts, for pickle.
+    #[classmethod]
+    #[expect(clippy::needless_pass_by_value, reason = "what the interpreter hands over is owned")]
+    fn _from_parts(
+        _cls: &Bound<'_, PyType>,
+        camera: Py<Camera>,
+        robot_from_camera: &Bound<'_, PyAny>,
+        options: [f64; 5],
+        mask: Option<&Bound<'_, PyAny>>,
+        slots: PyReadonlyArray1<'_, u32>,
+        gradients: [PyReadonlyArray1<'_, f32>; 2],
+    ) -> PyResult<Self> {
+        let [gradient_min, smoothing_px, elevation_min_rad, elevation_max_rad, margin_px] = options;
+        let options = EdgeOptions { gradient_min, smoothing_px, elevation_min_rad, elevation_max_rad, margin_px };
+        let mask = mask.map(|mask| {
+            let (height, width, usable) = convert::mask(mask, "mask")?;
+            Mask::new(width, height, usable).map_err(|error| exception(&error))
+        });
+        let origin = EdgeOrigin {
+            camera: camera.get().inner.clone(),
+            robot_from_camera: convert::matrix3(robot_from_camera, "robot_from_camera")?,
+            options,
+            mask: mask.transpose()?,
+        };
+        let [gx, gy] = gradients.each_ref().map(|g| g.to_vec());
+        let inner = core::ImageEdges::new(Arc::new(origin), &slots.to_vec()?, &gx?, &gy?);
+        Ok(Self { inner: inner.map_err(|error| exception(&error))?, camera })
+    }
+
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyTuple>> {
+        let (py, this) = (slf.py(), slf.get());
+        let EdgeOrigin { robot_from_camera, options: o, mask, .. } = &**this.inner.origin();
+        let rotation = PyArray1::from_slice(py, robot_from_camera.transpose().as_slice()).reshape([3, 3])?;
+        let options = [o.gradient_min, o.smoothing_px, o.elevation_min_rad, o.elevation_max_rad, o.margin_px];
+        let mask = mask.as_ref().map(|mask| convert::to_mask(py, mask)).transpose()?;
+        let slots = PyArray1::from_slice(py, this.inner.slots());
+        let gradients = [this.inner.gx(), this.inner.gy()].map(|g| PyArray1::from_slice(py, g));
+        let parts = (this.camera.clone_ref(py), rotation, options, mask, slots, gradients);
+        (slf.get_type().getattr("_from_parts")?, parts).into_pyobject(py)
+    }
+
+    fn __copy__<'py>(slf: &Bound<'py, Self>) -> Bound<'py, Self> {
+        slf.clone()
+    }
+
+    fn __deepcopy__<'py>(slf: &Bound<'py, Self>, _memo: &Bound<'py, PyAny>) -> Bound<'py, Self> {
+        slf.clone()
+    }
+}

@@ -1,0 +1,103 @@
+"""From the tilt of each image to that of the drive: abstaining, and the filter over images in their order."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from cyclopts import Group, Parameter
+
+from tiltvp.cli.options import Switch
+from tiltvp.cli.results import Outcome
+from tiltvp.errors import InvalidInputError
+
+if TYPE_CHECKING:
+    from tiltvp import TiltFilter
+    from tiltvp.odometry import Motion
+
+_FILTER = Group("Abstaining and filtering")
+
+
+@Parameter(name="*", group=_FILTER)
+@dataclass(frozen=True, kw_only=True)
+class FilterOptions:
+    """What is made of the estimates together."""
+
+    confidence_min: float | None = None
+    """Least confidence: images below are marked as not accepted, not made level, and with --filter not fused."""
+    filter: Switch = False
+    """Fuse the images in their order, as taken one after the other on a drive: columns filtered_... and verdicts."""
+    odometry: Path | None = None
+    """CSV of the motion that led to each image: yaw_rad or yaw_deg, distance_m; file, or one row for each image."""
+    estimate_mounting: Switch = False
+    """Also estimate a lean of the robot itself, which turning tells from that of the floor."""
+    filter_plot: Path | None = None
+    """Picture of the tilt over the images, estimated and filtered (.png)."""
+
+    def check(self) -> None:
+        """Refuses what cannot be, before any work is done."""
+        for name, given in (
+            ("--odometry", self.odometry is not None),
+            ("--estimate-mounting", self.estimate_mounting),
+            ("--filter-plot", self.filter_plot is not None),
+        ):
+            if given and not self.filter:
+                raise InvalidInputError(f"{name} without --filter, expected both")
+        if self.filter_plot is not None and self.filter_plot.suffix.lower() != ".png":
+            raise InvalidInputError(
+                f"--filter-plot {self.filter_plot}: ends in {self.filter_plot.suffix!r}, expected .png"
+            )
+        if self.filter or self.confidence_min is not None:
+            self.make()
+
+    def make(self) -> TiltFilter:
+        """The filter with the options that were given."""
+        from tiltvp import TiltFilter
+
+        return TiltFilter(confidence_min=self.confidence_min, estimate_mounting=self.estimate_mounting)
+
+    def motions(self, files: Sequence[Path]) -> list[Motion]:
+        """What the robot did between the images; nothing that is known without odometry."""
+        from tiltvp.odometry import Motion, read_odometry
+
+        return [Motion()] * len(files) if self.odometry is None else read_odometry(self.odometry, files)
+
+    def accepts(self, confidence: float) -> bool:
+        """Whether an image is sure enough of itself."""
+        return self.confidence_min is None or confidence >= self.confidence_min
+
+    def judged(self, outcomes: Sequence[Outcome], motions: Sequence[Motion]) -> list[Outcome]:
+        """The outcomes with what was made of them."""
+        if self.filter:
+            return _filtered(outcomes, motions, self.make())
+        if self.confidence_min is not None:
+            return [self._marked(outcome) for outcome in outcomes]
+        return list(outcomes)
+
+    def _marked(self, outcome: Outcome) -> Outcome:
+        e = outcome.estimate
+        if e is None:
+            return replace(outcome, accepted=False, verdict="no-image", verdict_reason=outcome.error)
+        if not e:
+            return replace(outcome, accepted=False, verdict="no-tilt", verdict_reason=e.reason)
+        words = f"confidence {e.confidence:.3f}, at least {self.confidence_min:.3f} expected"
+        if self.accepts(e.confidence):
+            return replace(outcome, accepted=True, verdict="accepted", verdict_reason=words)
+        return replace(outcome, accepted=False, verdict="low-confidence", verdict_reason=words)
+
+
+def _filtered(outcomes: Sequence[Outcome], motions: Sequence[Motion], filter_: TiltFilter) -> list[Outcome]:
+    done = []
+    for outcome, motion in zip(outcomes, motions, strict=True):
+        filter_.predict(motion.yaw_rad, motion.distance_m)
+        if outcome.estimate is None:
+            told = replace(outcome, accepted=False, verdict="no-image", verdict_reason=outcome.error)
+        else:
+            step = filter_.update(outcome.estimate)
+            told = replace(
+                outcome, accepted=step.accepted, verdict=step.verdict, verdict_reason=step.reason, nis=step.nis
+            )
+        done.append(replace(told, filtered=filter_.estimate))
+    return done

@@ -1,0 +1,133 @@
+"""`tiltvp dataset`: what is wrong as a table, and folders made from panoramas and rooms."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+import tiltvp
+from tiltvp.cli import main
+from tiltvp.datasets.folder import read_dataset
+
+Run = Callable[..., tuple[int, str, str]]
+
+
+@pytest.fixture
+def run(capfd: pytest.CaptureFixture[str]) -> Run:
+    """Runs `tiltvp dataset` in this process: exit code, stdout, stderr."""
+
+    def run_main(*words: object) -> tuple[int, str, str]:
+        code = main(["dataset", *(str(word) for word in words)])
+        said = capfd.readouterr()
+        return code, said.out, said.err
+
+    return run_main
+
+
+@pytest.fixture(scope="module")
+def world(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with a small camera and two indexed panoramas."""
+    folder = tmp_path_factory.mktemp("world")
+    tiltvp.Camera.equidistant(width=64, height=48, focal_px=15.0, cx=31.5, cy=23.5, max_theta_rad=1.6).save(
+        folder / "camera.toml"
+    )
+    for name in ("hall", "attic"):
+        noise = np.random.default_rng(len(name)).integers(0, 256, (16, 32), dtype=np.uint8)
+        image = cv2.resize(noise, (128, 64), interpolation=cv2.INTER_CUBIC)
+        tiltvp.write_image(folder / "panos" / f"{name}.jpg", image)
+    rows = ["name,environment,tilt_x_deg,tilt_z_deg", "hall,house,0.1,-0.2", "attic,house,0,0"]
+    (folder / "panos" / "INDEX.csv").write_text("\n".join(rows) + "\n")
+    return folder
+
+
+def test_render_and_check(run: Run, world: Path, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    words = ("render", "--panoramas", world / "panos", "--out", out, "--camera", world / "camera.toml")
+    code, said, complaints = run(*words, "--tilts-deg", "0,0", "2,-90", "--resolution-scale", "0.5", "--threads", "2")
+    assert (code, complaints) == (0, "")
+    assert said == f"{out}: 4 images of 2 locations\n"
+    dataset = read_dataset(out)
+    assert (dataset.camera.width, dataset.camera.height) == (32, 24)
+    assert dataset.camera.parameters["focal_px"] == pytest.approx(7.5)
+    assert [image.location for image in dataset.images] == ["hall", "hall", "attic", "attic"]
+    assert {image.environment for image in dataset.images} == {"house"}
+    assert dataset.images[1].beta_rad == pytest.approx(-math.pi / 2)
+    assert dataset.source["made_by"] == "tiltvp dataset render"
+    assert dataset.source["camera"] == "camera.toml"
+    assert dataset.source["tilts_deg"] == "0,0 2,-90"
+    assert run("check", out) == (0, f"{out}: 4 images, 2 locations, 1 environments, 0 warnings\n", "")
+    code, _, complaints = run(*words)
+    assert code == 2
+    assert "exists, expected a new folder" in complaints
+    assert run(*words, "--force", "--turn", "--limit", "1")[0] == 0
+    assert len(read_dataset(out).images) == 7
+
+
+def test_tilts_of_a_file(run: Run, world: Path, tmp_path: Path) -> None:
+    table = tmp_path / "tilts.csv"
+    table.write_text("alpha_deg,beta_deg\n1,0\n\n2.5,-3\n")
+    words = ("render", "--panoramas", world / "panos", "--camera", world / "camera.toml", "--tilts-deg", table)
+    assert run(*words, "--out", tmp_path / "out")[0] == 0
+    assert [round(math.degrees(i.alpha_rad), 9) for i in read_dataset(tmp_path / "out").images] == [1.0, 2.5, 1.0, 2.5]
+    for text, problem in [
+        ("alpha,beta\n1,2\n", "expected the columns"),
+        ("alpha_deg,beta_deg\n1\n", "line 2"),
+        ("alpha_deg,beta_deg\n", "no tilts"),
+    ]:
+        table.write_text(text)
+        code, _, complaints = run(*words, "--out", tmp_path / "bad")
+        assert code == 2
+        assert problem in complaints
+    assert not (tmp_path / "bad").exists()
+
+
+def test_synth(run: Run, world: Path, tmp_path: Path) -> None:
+    out = tmp_path / "rooms"
+    code, said, complaints = run(
+        "synth", "--out", out, "--camera", world / "camera.toml", "--kinds", "narrow", "--rooms", 1,
+        "--locations-per-room", 2, "--tilts-deg", "1,0", "--samples", 1, "--noise-sigma", 0, "--camera-height-m", 0.2,
+    )  # fmt: skip
+    assert (code, complaints) == (0, "")
+    assert said == f"{out}: 2 images of 2 locations\n"
+    dataset = read_dataset(out)
+    assert dataset.source["camera_height_m"] == 0.2
+    assert dataset.read(dataset.images[0]).max() > 100
+
+
+@pytest.mark.parametrize(
+    ("words", "problem"),
+    [
+        (("--tilts-deg", "1;2"), "no such file|No such file"),
+        (("--tilts-deg", "1,2,3"), "expected ALPHA,BETA in degrees"),
+        (("--tilts-deg", "95,2"), "alpha from 0 to 90"),
+        (("--resolution-scale", "0"), "factor: got 0"),
+        (("--threads", "0"), "threads = 0"),
+        (("--robot-from-camera", "upp"), "did you mean up"),
+        (("--limit", "0"), "limit = 0"),
+        (("--samples", "99"), "samples = 99"),
+        (("--camera", "nowhere.yaml"), "nowhere.yaml"),
+    ],
+)
+def test_wrong_use(run: Run, world: Path, tmp_path: Path, words: tuple[str, ...], problem: str) -> None:
+    import re
+
+    code, said, complaints = run("render", "--panoramas", world / "panos", "--out", tmp_path / "out", *words)
+    assert (code, said) == (2, "")
+    assert len(complaints.splitlines()) == 1
+    assert re.search(problem, complaints), complaints
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_findings_are_a_table(run: Run, world: Path, tmp_path: Path) -> None:
+    (tmp_path / "dataset.toml").write_text('camera = "camera.toml"\nmirrored = true\n')
+    (tmp_path / "images.csv").write_text("file,location,environment,alpha_deg,beta_deg\na.png,a,x,0,0\n")
+    code, said, complaints = run("check", tmp_path)
+    assert (code, complaints) == (1, "")
+    for words in ("unknown key 'mirrored' (did you mean mirror?)", "no such file", "no file 'a.png'", "expected"):
+        assert words in said
+    assert run("check", tmp_path / "nothing")[0] == 1

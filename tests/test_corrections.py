@@ -1,0 +1,136 @@
+"""Corrections from Python: trained on arrays, applied to arrays and by estimators, and values like the others."""
+
+from __future__ import annotations
+
+import copy
+import pickle
+from typing import Any
+
+import numpy as np
+import pytest
+
+import tiltvp
+from tiltvp.errors import InvalidInputError
+from tiltvp.synth import RoomImage
+
+PAPERS = [method for method in tiltvp.METHODS if method != "refined"]
+
+
+def draws(count: int = 400, factor: float = 130.0, seed: int = 0) -> tuple[np.ndarray, np.ndarray]:
+    rng = np.random.default_rng(seed)
+    alpha = rng.uniform(0.005, 0.12, count)
+    return np.hypot(factor * alpha + rng.normal(0, 0.01 * factor, count), rng.normal(0, 0.01 * factor, count)), alpha
+
+
+def corrections(factor: float = 130.0) -> list[Any]:
+    shift, alpha = draws(factor=factor)
+    return [
+        tiltvp.train_factor(shift, alpha),
+        tiltvp.train_affine(shift, alpha),
+        tiltvp.train_posterior(shift, alpha),
+        tiltvp.train_posterior(shift, alpha, prior=tiltvp.PriorOfTilt.uniform(0.2)),
+        tiltvp.train_posterior(shift, alpha, prior=tiltvp.PriorOfTilt.rayleigh(0.05)),
+    ]
+
+
+def test_training_finds_the_law() -> None:
+    shift, alpha = draws(4000)
+    factor, affine, posterior, *_ = corrections()
+    assert factor == pytest.approx(np.mean(draws()[0] / draws()[1]))
+    assert affine.factor == pytest.approx(130.0, rel=0.05)
+    assert posterior.factor == pytest.approx(130.0, rel=0.03)
+    assert posterior.spread == pytest.approx(1.3, rel=0.2)
+    for correction in corrections():
+        error = tiltvp.apply_correction(correction, shift) - alpha
+        assert np.sqrt(np.mean(error**2)) < 0.012
+    assert (np.diff(posterior.mean_rad) >= 0.0).all()
+    assert posterior.std_rad.shape == posterior.mean_rad.shape
+
+
+@pytest.mark.parametrize("method", PAPERS)
+def test_estimators_apply_what_arrays_do(camera: tiltvp.Camera, room: RoomImage, method: str) -> None:
+    estimator = tiltvp.TiltEstimator(camera, method=method)
+    raw = estimator.with_options(correction=130.0 if method.startswith("image") else 1.0)(room.gray)
+    shift = raw.shift_px if raw.shift_px is not None else raw.alpha_rad
+    for correction in corrections(130.0 if method.startswith("image") else 1.8):
+        corrected = estimator.with_options(correction=correction)
+        found = corrected(room.gray)
+        assert found.alpha_rad == pytest.approx(tiltvp.apply_correction(correction, [shift])[0], abs=1e-9)
+        assert found.beta_rad == pytest.approx(raw.beta_rad, abs=1e-9)
+        assert corrected.options["correction"] == correction
+        assert pickle.loads(pickle.dumps(corrected)) == corrected
+        if isinstance(correction, tiltvp.PosteriorCorrection):
+            place = np.interp(shift, np.arange(len(correction.std_rad)) * correction.step, correction.std_rad)
+            along = found.normal[:2] / np.linalg.norm(found.normal[:2])
+            assert along @ found.covariance_rad2 @ along > 0.99 * place**2
+
+
+def test_applying_takes_nan_and_refuses_nonsense() -> None:
+    for correction in corrections():
+        alpha = tiltvp.apply_correction(correction, [0.0, 5.0, np.nan, 1e9])
+        assert np.isnan(alpha).tolist() == [False, False, True, False]
+        with pytest.raises(InvalidInputError, match="-1 in place 1"):
+            tiltvp.apply_correction(correction, [1.0, -1.0])
+    for wrong in (0.0, -3.0, np.nan, "line", None):
+        with pytest.raises(InvalidInputError, match="correction"):
+            tiltvp.apply_correction(wrong, [1.0])  # type: ignore[arg-type]
+    with pytest.raises(InvalidInputError, match=r"expected an array \(N,\)"):
+        tiltvp.apply_correction(3.0, [[1.0]])
+    assert tiltvp.apply_correction(tiltvp.AffineCorrection(100.0, -0.02), [1.0, 5.0]) == pytest.approx([0.0, 0.03])
+
+
+def test_values() -> None:
+    priors = [tiltvp.PriorOfTilt.empirical(), tiltvp.PriorOfTilt.uniform(0.2), tiltvp.PriorOfTilt.rayleigh(0.1)]
+    values = [*corrections()[1:], *priors]
+    for i, value in enumerate(values):
+        twins = [copy.copy(value), copy.deepcopy(value), pickle.loads(pickle.dumps(value))]
+        if i < 4:
+            twins.append(type(value).from_dict(value.to_dict()))
+        for twin in twins:
+            assert twin == value
+            assert hash(twin) == hash(value)
+            assert repr(twin) == repr(value)
+        assert all(value != other for j, other in enumerate(values) if j != i)
+        with pytest.raises(AttributeError):
+            value.factor = 3.0
+    posterior = values[1]
+    for key in posterior.to_dict():
+        with pytest.raises(InvalidInputError, match=key):
+            type(posterior).from_dict({k: v for k, v in posterior.to_dict().items() if k != key})
+    with pytest.raises(InvalidInputError, match="unknown key"):
+        type(posterior).from_dict({**posterior.to_dict(), "mean": 3.0})
+
+
+@pytest.mark.parametrize(
+    ("make", "words"),
+    [
+        (lambda: tiltvp.AffineCorrection(0.0, 0.0), "factor"),
+        (lambda: tiltvp.AffineCorrection(1.0, np.nan), "offset_rad"),
+        (lambda: tiltvp.PriorOfTilt.uniform(0.0), "max_rad"),
+        (lambda: tiltvp.PriorOfTilt.rayleigh(-1.0), "sigma_rad"),
+        (lambda: tiltvp.train_factor([1.0], [0.0]), "above zero"),
+        (lambda: tiltvp.train_factor([1.0, 2.0], [0.1]), "1 for 2 shifts"),
+        (lambda: tiltvp.train_affine([1.0, 2.0], [0.1, 0.1]), "leans that differ"),
+        (lambda: tiltvp.train_affine([2.0, 1.0], [0.1, 0.2]), "grow"),
+        (lambda: tiltvp.train_posterior([1.0] * 12, [np.nan] * 12), "alpha_rad: got NaN in place 0"),
+        (lambda: tiltvp.train_posterior([1.0] * 12, [0.1] * 12, prior="flat"), "prior"),  # type: ignore[arg-type]
+    ],
+)
+def test_nonsense_is_refused(make: Any, words: str) -> None:
+    with pytest.raises(InvalidInputError, match=words):
+        make()
+
+
+def test_the_prefilter_follows_the_lens() -> None:
+    """The same image at half the size: half the offset, the same lean."""
+    for method in PAPERS[:2]:
+        paper = tiltvp.Camera.equidistant(width=640, height=480, focal_px=139.7, cx=319.5, cy=239.5)
+        image = np.random.default_rng(0).integers(0, 256, (480, 640), np.uint8)
+        given = tiltvp.TiltEstimator(paper, method=method, offset_max_px=40.0)
+        assert tiltvp.TiltEstimator(paper, method=method)(image) == given(image)
+        small = tiltvp.Camera.equidistant(width=48, height=40, focal_px=10.5, cx=23.5, cy=19.5)
+        assert tiltvp.TiltEstimator(small, method=method).options["offset_max_px"] is None
+        with pytest.raises(InvalidInputError, match="offset_max_px = 40"):
+            tiltvp.TiltEstimator(small, method=method, offset_max_px=40.0)
+        with pytest.raises(InvalidInputError, match="correction = 1"):
+            tiltvp.TiltEstimator(paper, method=method, correction=1.0)
