@@ -45,6 +45,15 @@ test-real *arguments: setup
 measure-panoramas *arguments: setup
     {{bin}}/tiltvp measure panoramas "$TILTVP_DATA/panos" {{arguments}}
 
+# The paper's sweep on views of all panoramas of TILTVP_DATA, and its tables. Remove out/database to begin anew.
+measure-database *arguments: setup
+    test -d out/database/panoramas || {{bin}}/tiltvp dataset render --panoramas "$TILTVP_DATA/panos" --out out/database/panoramas
+    {{bin}}/tiltvp evaluate out/database/panoramas --sweep paper --out out/database/run {{arguments}}
+
+# What an evaluation costs over the number of images and over their pixels.
+measure-scaling *arguments: setup
+    {{bin}}/tiltvp measure scaling {{arguments}}
+
 # The refined method on panoramas as they were taken, against an inertial sensor.
 measure-inertial *arguments: setup
     {{bin}}/tiltvp measure inertial "$TILTVP_DATA/panos_theta_imu" {{arguments}}
@@ -52,6 +61,10 @@ measure-inertial *arguments: setup
 # Planar-motion pose estimation over tilt in rendered rooms, without and with tilt correction.
 measure-planar-pose *arguments: setup
     {{bin}}/tiltvp measure planar-pose {{arguments}}
+
+# The options of the sampling loop against plain RANSAC, on the same panoramas and on rendered rooms.
+measure-sampling *arguments: setup
+    {{bin}}/tiltvp measure sampling "$TILTVP_DATA/panos" {{arguments}}
 
 # Round trips and Jacobians of the calibrations of TILTVP_DATA, as a table.
 measure-cameras: setup

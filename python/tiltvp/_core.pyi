@@ -473,6 +473,10 @@ class TiltEstimator:
         offset_max_px: float | None = ...,
         threshold_rad: float = ...,
         normal: Literal["gradient", "tangent"] = ...,
+        sampling: Literal["uniform", "progressive", "prosac"] = ...,
+        local_optimization: bool = ...,
+        score: Literal["count", "msac", "magsac"] = ...,
+        verification: Literal["full", "sprt"] = ...,
         correction: float | AffineCorrection | PosteriorCorrection | Literal["closed-form"] | None = ...,
     ) -> Self:
         """Makes the tables. Defaults depend on the method; `options` tells those in force.
@@ -519,6 +523,19 @@ class TiltEstimator:
             "vector-consensus": largest angle between an inlier's great circle and the vertical, delta_o,max of eq. 40.
         normal
             "vector-consensus": "gradient" is the paper's normal (eq. 37), "tangent" the exact one.
+        sampling
+            "image-space-ransac", "vector-consensus": "uniform" draws samples from all edge pixels alike, "progressive"
+            from a growing pool of the strongest, "prosac" also stops as PROSAC does (Chum and Matas 2005), which
+            presumes that pixels err independently.
+        local_optimization
+            The same methods: whether each new best model is refined by iterated least squares (Chum, Matas and Kittler
+            2003; Lebeda, Matas and Chum 2012).
+        score
+            The same methods: the best model has the most inliers ("count"), the least truncated squares ("msac", Torr
+            and Zisserman 2000), or the best score marginalised over the noise ("magsac", MAGSAC++, Barath et al. 2020).
+        verification
+            The same methods: "full" scores every model, "sprt" gives up those that fail a sequential probability ratio
+            test (Matas and Chum 2005).
         correction
             Image-space methods: "closed-form" divides each offset by its pixel's own gain, a number is the factor a of
             eq. 30 in pixels per radian, None is the lens' own scale of eq. 26. "vector-consensus": a number is the

@@ -75,6 +75,9 @@ class TiltEstimator(_core.TiltEstimator):
     threshold_rad, normal, correction
         Of "vector-consensus"; `normal` is "gradient" (the paper's) or "tangent", `correction` a factor without unit
         or one of those trained on raw angles.
+    sampling, local_optimization, score, verification
+        Of "image-space-ransac" and "vector-consensus": "uniform" (default), "progressive" or "prosac"; a bool; "count"
+        (default), "msac" or "magsac"; "full" (default) or "sprt".
     """
 
     __slots__ = ()

@@ -5,7 +5,7 @@ use pyo3::types::PyDict;
 use tiltvp_core::edges::{Mask, NormalKind};
 use tiltvp_core::tilt::{Correction, Method, TiltOptions, TrainedCorrection};
 
-use super::correction;
+use super::{correction, sampling};
 use crate::call::{exception, invalid};
 use crate::convert;
 
@@ -24,9 +24,13 @@ const COMMON: [&str; 8] = [
 /// Options of one method alone.
 fn own(method: &Method) -> &'static [&'static str] {
     match method {
-        Method::ImageSpaceRansac { .. } => &["threshold_px", "offset_max_px", "correction"],
+        Method::ImageSpaceRansac { .. } => {
+            &["threshold_px", "offset_max_px", "correction", "sampling", "local_optimization", "score", "verification"]
+        }
         Method::ImageSpaceRejectRefit { .. } => &["keep_fraction", "offset_max_px", "correction"],
-        Method::VectorConsensus { .. } => &["threshold_rad", "normal", "correction"],
+        Method::VectorConsensus { .. } => {
+            &["threshold_rad", "normal", "correction", "sampling", "local_optimization", "score", "verification"]
+        }
         Method::Refined(_) => &["keep_fraction", "scale_rad", "tolerance_rad", "max_iterations"],
     }
 }
@@ -115,6 +119,10 @@ fn set(options: &mut TiltOptions, key: &str, value: &Bound<'_, PyAny>) -> PyResu
                 .extract()
                 .map_err(|_| invalid(format!("option max_iterations = {value}, expected a whole number from 1")))?;
         }
+        (
+            key @ ("sampling" | "local_optimization" | "score" | "verification"),
+            Method::ImageSpaceRansac { sampling, .. } | Method::VectorConsensus { sampling, .. },
+        ) => sampling::set(sampling, key, value)?,
         (_, method) => return Err(unknown(value.py(), key, method)),
     }
     Ok(())
@@ -157,7 +165,8 @@ pub(super) fn in_force<'py>(py: Python<'py>, options: &TiltOptions) -> PyResult<
         })
     };
     match &options.method {
-        Method::ImageSpaceRansac { threshold_px, offset_max_px, correction } => {
+        Method::ImageSpaceRansac { threshold_px, offset_max_px, correction, sampling } => {
+            sampling::in_force(&dict, sampling)?;
             dict.set_item("threshold_px", threshold_px)?;
             dict.set_item("offset_max_px", offset_max_px)?;
             dict.set_item("correction", word(correction)?)?;
@@ -167,7 +176,8 @@ pub(super) fn in_force<'py>(py: Python<'py>, options: &TiltOptions) -> PyResult<
             dict.set_item("offset_max_px", offset_max_px)?;
             dict.set_item("correction", word(correction)?)?;
         }
-        Method::VectorConsensus { threshold_rad, normal, correction } => {
+        Method::VectorConsensus { threshold_rad, normal, correction, sampling } => {
+            sampling::in_force(&dict, sampling)?;
             dict.set_item("threshold_rad", threshold_rad)?;
             dict.set_item("normal", if *normal == NormalKind::Gradient { "gradient" } else { "tangent" })?;
             dict.set_item("correction", correction::show(py, correction)?)?;
