@@ -79,6 +79,10 @@ measure-scaling *arguments: setup
 measure-inertial *arguments: setup
     {{bin}}/tiltvp measure inertial "$TILTVP_DATA/panos_theta_imu" {{arguments}}
 
+# Planar-motion pose estimation over tilt in rendered rooms, without and with tilt correction.
+measure-planar-pose *arguments: setup
+    {{bin}}/tiltvp measure planar-pose {{arguments}}
+
 # The options of the sampling loop against plain RANSAC, on the same panoramas and on rendered rooms.
 measure-sampling *arguments: setup
     {{bin}}/tiltvp measure sampling "$TILTVP_DATA/panos" {{arguments}}
