@@ -1,4 +1,4 @@
-"""How far an estimate's own words can be trusted: the covariance's regions, and the confidence as an alarm, over runs."""
+"""How far an estimate's own words can be trusted: the covariance's regions, and the confidence as an alarm."""
 
 from __future__ import annotations
 
