@@ -14,9 +14,11 @@ __all__ = [
     "CAMERA_MODELS",
     "METHODS",
     "ROOM_KINDS",
+    "WALL_PATTERNS",
     "AffineCorrection",
     "Camera",
     "CommonDirection",
+    "Drive",
     "EdgeElements",
     "FilterStep",
     "FilteredTilt",
@@ -1062,7 +1064,7 @@ class Drive:
         blur_sigma_px: float | None = None,
         threads: SupportsIndex | None = None,
     ) -> Self:
-        """Plans the drive, and gathers daylight on `threads` threads (None: one per core), on which it does not depend."""
+        """Plans the drive and gathers daylight on `threads` threads (None: one per core), which do not matter."""
 
     @property
     def room(self) -> Room:
@@ -1118,7 +1120,7 @@ class Drive:
 
     @property
     def odometry(self) -> NDArray[np.float64]:
-        """(N, 2): how far the left and right wheel rolled since the frame before, by their encoders; metres, first 0."""
+        """(N, 2): how far the left and right wheel rolled since the last frame, by their encoders; metres."""
 
     @property
     def true_odometry(self) -> NDArray[np.float64]:
@@ -1130,7 +1132,7 @@ class Drive:
 
     @property
     def edges_m(self) -> NDArray[np.float64]:
-        """(E, 4): x_m, y_m, lowest and highest z_m of the room's upright edges, visible or not; their row is their number.
+        """(E, 4): x_m, y_m, lowest and highest z_m of the room's upright edges, visible or not; the row is the number.
 
         All upright edges within 3 mm of a vertical line are one. Those of wallpaper and tiles come last.
         """
@@ -1142,9 +1144,7 @@ class Drive:
 
     def _truth(
         self, frame: SupportsIndex, *, threads: SupportsIndex | None = None
-    ) -> tuple[
-        NDArray[np.int64], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]
-    ]:
+    ) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
         """Edges in sight: numbers, bearings, elevations (M, 2), visible shares, contrasts."""
 
     def __len__(self) -> int: ...

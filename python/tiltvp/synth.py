@@ -65,10 +65,12 @@ class Room(_core.Room):
     """A furnished, lit room of one of `ROOM_KINDS`, built once: `Room(kind, seed)`. The same arguments, the same room.
 
     The world frame has z up and the floor at z = 0; metres. `threads` is how many build it, None for one per core; the
-    room does not depend on it. None stands for what is usual: `clutter` and `daylight` from 0 to 1 are how full it is and how
-    bright the day outside, `light_spacing_m` how finely light is gathered, `extent` from 1 to 4 how many times larger than
-    usual the floor is, `floor_gloss` from 0 to 1 how much it shines (0), and `wall_pattern` what all walls have in common, one
-    of `WALL_PATTERNS`: stripes, panels or tiles, equally spaced, or nothing (drawn). Comparable, hashable, and to be pickled. Raises `tiltvp.errors.InvalidInputError`.
+    room does not depend on it. None stands for what is usual: `clutter` and `daylight` from 0 to 1 are how full it is
+    and how bright the day outside, `light_spacing_m` how finely light is gathered, `extent` from 1 to 4 how many times
+    larger than usual the floor is, `floor_gloss` from 0 to 1 how much it shines (0), and `wall_pattern` what all walls
+    have in common, one of `WALL_PATTERNS`: stripes, panels or tiles, equally spaced, or nothing (drawn).
+
+    Comparable, hashable, and to be pickled. Raises `tiltvp.errors.InvalidInputError`.
     """
 
     __slots__ = ()
@@ -154,14 +156,15 @@ class Drive(_core.Drive):
     """A robot with a camera and wheel encoders that wanders through a room: `Drive(room, camera=camera)`.
 
     The same arguments give the same drive and the same bytes of every frame, in any order and for any `threads`. The
-    camera sits at `mount` (x_m, y_m, yaw_rad, height_m) on the robot, whose origin is on the floor between its wheels, and
-    is turned by `robot_from_camera` and then by the mount's yaw; `blind_rad` is the cone about its z axis in which it sees
-    only itself. From frame to frame the robot moves at most `step_m` and turns at most `turn_max_rad`. A reading of an
-    encoder has the variance `encoder_k_m` |d|; `wheel_radius_errors` is how much larger the left and the right wheel are,
-    relative, than the readings assume. Bumps lean the robot, about the camera's centre, by up to `bumps_max_rad`.
-    `lighting`, from 0 to 1, is how much lamps, daylight and exposure change along the way. `samples` is the rays per pixel
-    and side where surfaces meet; elsewhere it is one ray per pixel. None is for the default. Comparable, hashable, and to
-    be pickled. Raises `tiltvp.errors.InvalidInputError`.
+    camera sits at `mount` (x_m, y_m, yaw_rad, height_m) on the robot, whose origin is on the floor between its wheels,
+    and is turned by `robot_from_camera` and then by the mount's yaw; `blind_rad` is the cone about its z axis in which
+    it sees only itself. From frame to frame the robot moves at most `step_m` and turns at most `turn_max_rad`. A
+    reading of an encoder has the variance `encoder_k_m` |d|; `wheel_radius_errors` is how much larger the left and the right
+    wheel are, relative, than the readings assume. Bumps lean the robot, about the camera's centre, by up to
+    `bumps_max_rad`. `lighting`, from 0 to 1, is how much lamps, daylight and exposure change along the way. `samples`
+    is the rays per pixel and side where surfaces meet; elsewhere one ray per pixel will do. None is for the default.
+
+    Comparable, hashable, and to be pickled. Raises `tiltvp.errors.InvalidInputError`.
     """
 
     __slots__ = ()

@@ -39,8 +39,7 @@ impl Grid {
         for k in 0..nx * ny {
             let at = grid.center(k);
             grid.clearance[k] = world.clearance(at.x, at.y);
-            // Any place of the cell must do.
-            let is_wide = grid.clearance[k] > RADIUS_M.max(reach + 0.05) + 0.75 * CELL_M;
+            let is_wide = grid.clearance[k] > RADIUS_M.max(reach + 0.05) + CELL_M;
             grid.open[k] = is_wide && is_clear_above(world, &at, reach + 0.08, height);
         }
         grid.keep_largest_part();
@@ -50,6 +49,26 @@ impl Grid {
     /// Whether a robot can drive there.
     pub(crate) fn is_open(&self, at: &Vector2<f64>) -> bool {
         self.cell(at).is_some_and(|k| self.open[k])
+    }
+
+    /// Whether a robot has room there: close to a place where it can drive.
+    pub(crate) fn has_room(&self, at: &Vector2<f64>) -> bool {
+        self.is_within(0.97, at)
+    }
+
+    /// Whether a point is within so many sizes of a cell of the middle of an open one.
+    fn is_within(&self, sizes: f64, at: &Vector2<f64>) -> bool {
+        (0..9).any(|n| {
+            let aside = Vector2::new(f64::from(n % 3 - 1), f64::from(n / 3 - 1)) * CELL_M;
+            let near = self.cell(&(at + aside)).filter(|&k| self.open[k]);
+            near.is_some_and(|k| (self.center(k) - at).norm() < sizes * CELL_M)
+        })
+    }
+
+    /// Whether a robot has room all along a straight line.
+    fn is_straight(&self, from: &Vector2<f64>, to: &Vector2<f64>) -> bool {
+        let count = ((to - from).norm() / (0.4 * CELL_M)).ceil().max(1.0) as usize;
+        (1..=count).all(|k| self.is_within(0.85, &(from + (to - from) * (k as f64 / count as f64))))
     }
 
     /// The cells where a robot can drive.
@@ -70,17 +89,25 @@ impl Grid {
         within.then(|| j as usize * self.nx + i as usize)
     }
 
-    /// A smooth way from a point to a far place drawn at random.
-    pub(crate) fn way_from(&self, from: &Vector2<f64>, cells: &[usize], dice: &mut Dice) -> Vec<Vector2<f64>> {
+    /// A way from a point to a far place drawn at random, smooth or from cell to cell.
+    pub(crate) fn way_from(
+        &self,
+        from: &Vector2<f64>,
+        cells: &[usize],
+        smooth: bool,
+        dice: &mut Dice,
+    ) -> Vec<Vector2<f64>> {
         let target = (0..12)
             .map(|_| cells[dice.below(cells.len())])
             .max_by(|a, b| (self.center(*a) - from).norm().total_cmp(&(self.center(*b) - from).norm()));
-        let (Some(start), Some(target)) = (self.cell(from), target) else { return vec![*from] };
+        let away = |k: usize| (self.center(k) - from).norm();
+        let start = cells.iter().copied().min_by(|a, b| away(*a).total_cmp(&away(*b)));
+        let (Some(start), Some(target)) = (start, target) else { return vec![*from] };
         let mut way = self.shortest(start, target);
-        if let Some(first) = way.first_mut() {
-            *first = *from;
+        way.insert(0, *from);
+        if smooth {
+            self.smooth(&mut way);
         }
-        self.smooth(&mut way);
         way
     }
 
@@ -188,28 +215,37 @@ pub(crate) struct Follower {
     speed: f64,
     turn: f64,
     waited: usize,
+    careful: bool,
 }
 
 impl Follower {
     /// Goes along a way from its start, at rest.
     pub(crate) fn new(way: Vec<Vector2<f64>>) -> Self {
-        Self { way, at: 0, speed: 0.0, turn: 0.0, waited: 0 }
+        Self { way, at: 0, speed: 0.0, turn: 0.0, waited: 0, careful: false }
     }
 
     /// Takes another way, in full motion.
     pub(crate) fn follow(&mut self, way: Vec<Vector2<f64>>) {
+        self.careful = self.is_stuck();
         (self.way, self.at, self.waited) = (way, 0, 0);
     }
 
-    /// Whether the way is done, or leads nowhere.
+    /// Whether the way is done.
     pub(crate) fn is_done(&self) -> bool {
-        self.at + 2 >= self.way.len() || self.waited > 25
+        self.at + 2 >= self.way.len()
+    }
+
+    /// Whether the robot does not get on.
+    pub(crate) fn is_stuck(&self) -> bool {
+        self.waited > 10
     }
 
     /// The next step from where the robot is: distance in metres and turn in radians, at most `step_m` and `turn_max_rad`;
-    /// `is_open` says whether a motion ends, and passes, where there is room.
+    /// `is_open` says whether a motion ends, and passes, where there is room. It heads for the farthest point of the way, up
+    /// to a step of a person, that it can go to straight.
     pub(crate) fn next(
         &mut self,
+        grid: &Grid,
         at: &Vector2<f64>,
         yaw_rad: f64,
         limits: (f64, f64),
@@ -219,8 +255,13 @@ impl Follower {
         let window = self.at..(self.at + 12).min(self.way.len());
         let near = window.min_by(|a, b| (self.way[*a] - at).norm().total_cmp(&(self.way[*b] - at).norm()));
         self.at = near.unwrap_or(self.at);
-        let ahead = (self.at..self.way.len()).find(|k| (self.way[*k] - at).norm() > 0.32).unwrap_or(self.way.len() - 1);
-        let to = self.way[ahead] - at;
+        let last = self.way.len() - 1;
+        let far = (self.at..last).find(|k| (self.way[*k] - at).norm() > 0.45).unwrap_or(last);
+        let ahead = (self.at + 1..=far).rev().find(|k| grid.is_straight(at, &self.way[*k]));
+        // Where there is hardly room, from point to point.
+        self.careful &= self.at < 8;
+        let next = if (self.way[self.at] - at).norm() > 0.015 { self.at } else { (self.at + 1).min(last) };
+        let to = self.way[ahead.filter(|_| !self.careful).unwrap_or(next)] - at;
         let off = wrapped(to.y.atan2(to.x) - yaw_rad);
         let wished_turn = (0.3 * off).clamp(-turn_max_rad, turn_max_rad);
         let wished_speed = if off.abs() > 0.8 { 0.0 } else { step_m * (1.0 - off.abs()) };
@@ -228,7 +269,7 @@ impl Follower {
         let speed = self.speed + (wished_speed - self.speed).clamp(-2.0 * more, more);
         let turn = self.turn + (wished_turn - self.turn).clamp(-turn_more, turn_more);
         let speed = [speed, 0.5 * speed, 0.25 * speed].into_iter().find(|s| is_open(*s, turn)).unwrap_or(0.0);
-        self.waited = if speed < 0.02 * step_m && off.abs() < 0.2 { self.waited + 1 } else { 0 };
+        self.waited = if speed < 0.02 * step_m && off.abs() < 0.02 { self.waited + 1 } else { 0 };
         (self.speed, self.turn) = (speed, turn);
         (speed, turn)
     }

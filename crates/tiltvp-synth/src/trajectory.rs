@@ -44,23 +44,24 @@ impl Trajectory {
         }
         let mut dice = Dice::new(options.seed, WAY);
         let start = grid.center(cells[dice.below(cells.len())]);
-        let mut follower = Follower::new(grid.way_from(&start, &cells, &mut dice));
+        let mut follower = Follower::new(grid.way_from(&start, &cells, true, &mut dice));
         let yaw_rad = dice.within(-std::f64::consts::PI, std::f64::consts::PI);
         let mut poses = vec![RobotPose { x_m: start.x, y_m: start.y, yaw_rad }];
         let mut displacements_m = vec![[0.0; 2]];
         let mut pose = poses[0];
         while poses.len() < options.frames {
             let at = Vector2::new(pose.x_m, pose.y_m);
-            if follower.is_done() {
-                follower.follow(grid.way_from(&at, &cells, &mut dice));
+            if follower.is_done() || follower.is_stuck() {
+                follower.follow(grid.way_from(&at, &cells, !follower.is_stuck(), &mut dice));
             }
             let is_open = |distance: f64, turn: f64| {
                 [0.5, 1.0].iter().all(|part| {
                     let there = wheels.moved(pose, wheels.displacements(part * distance, part * turn));
-                    grid.is_open(&Vector2::new(there.x_m, there.y_m))
+                    grid.has_room(&Vector2::new(there.x_m, there.y_m))
                 })
             };
-            let (distance, turn) = follower.next(&at, pose.yaw_rad, (options.step_m, options.turn_max_rad), is_open);
+            let (distance, turn) =
+                follower.next(&grid, &at, pose.yaw_rad, (options.step_m, options.turn_max_rad), is_open);
             let rolled = wheels.displacements(distance, turn);
             pose = wheels.moved(pose, rolled);
             poses.push(pose);
@@ -79,7 +80,7 @@ fn bump(frame: usize, options: &DriveOptions) -> Tilt {
         return Tilt::UPRIGHT;
     }
     let seed = (options.seed ^ (options.seed >> 32)) as u32;
-    let wave = |stream: u32| 1.6 * fractal_noise(frame as f64 + 0.5, 0.5, 9.0, 3, 0.0, seed ^ (stream << 20));
+    let wave = |stream: u32| 1.6 * fractal_noise(frame as f64 + 0.5, 0.5, 12.0, 3, 0.0, seed ^ (stream << 20));
     let lean = Vector2::new(wave(1), wave(2));
     let share = lean.norm().min(1.0);
     Tilt::from_alpha_beta(options.bumps_max_rad * share, lean.y.atan2(lean.x))
