@@ -129,7 +129,8 @@ def test_a_drive_as_a_folder(drive: Drive, tmp_path: Path) -> None:
     assert np.array_equal(dataset.read(dataset.images[4]), drive.render(4).gray)
     motions = read_odometry(one / "odometry.csv", [image.path for image in dataset.images])
     assert np.allclose([(m.distance_m, m.yaw_rad) for m in motions], drive.motions)
-    rows = [row for row in csv.DictReader((one / "truth.csv").open()) if row["frame"] == "4"]
+    lines = (one / "truth.csv").read_text(encoding="utf-8").splitlines()
+    rows = [row for row in csv.DictReader(lines) if row["frame"] == "4"]
     truth = drive.truth(4)
     assert [int(row["edge"]) for row in rows] == truth.edges.tolist()
     assert [float(row["bearing_rad"]) for row in rows] == truth.bearings_rad.tolist()

@@ -1036,6 +1036,7 @@ class Room:
     def __eq__(self, other: object, /) -> bool: ...
     def __hash__(self) -> int: ...
 
+@disjoint_base
 class Drive:
     """A robot's way through a room, any frame of which can be rendered by `tiltvp.synth.Drive`.
 

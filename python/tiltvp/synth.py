@@ -159,8 +159,8 @@ class Drive(_core.Drive):
     camera sits at `mount` (x_m, y_m, yaw_rad, height_m) on the robot, whose origin is on the floor between its wheels,
     and is turned by `robot_from_camera` and then by the mount's yaw; `blind_rad` is the cone about its z axis in which
     it sees only itself. From frame to frame the robot moves at most `step_m` and turns at most `turn_max_rad`. A
-    reading of an encoder has the variance `encoder_k_m` |d|; `wheel_radius_errors` is how much larger the left and the right
-    wheel are, relative, than the readings assume. Bumps lean the robot, about the camera's centre, by up to
+    reading of an encoder has the variance `encoder_k_m` |d|; `wheel_radius_errors` is how much larger the left and the
+    right wheel are, relative, than the readings assume. Bumps lean the robot, about the camera's centre, by up to
     `bumps_max_rad`. `lighting`, from 0 to 1, is how much lamps, daylight and exposure change along the way. `samples`
     is the rays per pixel and side where surfaces meet; elsewhere one ray per pixel will do. None is for the default.
 
