@@ -209,17 +209,13 @@ impl<'a> Sweep<'a> {
             let direction = self.world_from_camera * bearing;
             let meeting = if n == 1 { middle } else { self.meet(tile, &direction) };
             let surfaces = meeting.surfaces();
-            let color = match known.iter().find(|(seen, _)| *seen == surfaces) {
-                Some((_, color)) => *color,
-                None => {
-                    let color = shade(&direction, meeting);
-                    // In the sun, or through a window, a surface has edges of its own.
-                    if !meeting.direct.is_none_or(|contact| self.world.is_patterned(&contact)) {
-                        known.push((surfaces, color));
-                    }
-                    color
-                }
-            };
+            let same = known.iter().find(|(seen, _)| *seen == surfaces).map(|(_, color)| *color);
+            let color = same.unwrap_or_else(|| shade(&direction, meeting));
+            // In the sun, or through a window, a surface has edges of its own.
+            let is_plain = meeting.direct.is_some_and(|contact| !self.world.is_patterned(&contact));
+            if same.is_none() && is_plain {
+                known.push((surfaces, color));
+            }
             for c in 0..3 {
                 sum[c] += color[c] / (n * n) as f64;
             }
