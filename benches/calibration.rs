@@ -7,7 +7,7 @@ use nalgebra::{Matrix3, Vector3};
 use tiltvp_core::selfcalib::{
     CalibrationMethod, LogBearing, LogOptions, Mounting, SelfCalibrator, SelfCalibratorOptions, calibrate_log,
 };
-use tiltvp_synth::{Drive, DriveKind, DriveOptions};
+use tiltvp_synth::{BearingDrive, BearingDriveKind, BearingDriveOptions};
 
 /// Steps that are timed, the last of the drive.
 const STEPS: usize = 60;
@@ -16,8 +16,12 @@ fn main() {
     divan::main();
 }
 
-fn drive(landmarks: usize) -> Drive {
-    Drive::new(&DriveOptions { kind: DriveKind::Alternating, landmarks, ..DriveOptions::default() })
+fn drive(landmarks: usize) -> BearingDrive {
+    BearingDrive::new(&BearingDriveOptions {
+        kind: BearingDriveKind::Alternating,
+        landmarks,
+        ..BearingDriveOptions::default()
+    })
 }
 
 fn options(method: CalibrationMethod) -> SelfCalibratorOptions {

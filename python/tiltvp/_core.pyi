@@ -15,10 +15,12 @@ __all__ = [
     "CAMERA_MODELS",
     "METHODS",
     "ROOM_KINDS",
+    "WALL_PATTERNS",
     "AffineCorrection",
     "CalibrationStep",
     "Camera",
     "CommonDirection",
+    "Drive",
     "EdgeElements",
     "FilterStep",
     "FilteredTilt",
@@ -66,6 +68,9 @@ CAMERA_MODELS: Final[list[str]]
 
 ROOM_KINDS: Final[list[str]]
 """The kinds of `Room`."""
+
+WALL_PATTERNS: Final[list[str]]
+"""What the walls of a `Room` may have in common."""
 
 @disjoint_base
 class Camera:
@@ -307,6 +312,13 @@ class EdgeElements:
         """(N,): edge offsets s in pixels (eq. 17); NaN where the lens sees neither zenith nor nadir."""
 
     @property
+    def normal(self) -> NDArray[np.float64]:
+        """(N, 3): unit normals of the edges' great circles in the robot frame (eq. 37), of either sign.
+
+        Those of the method, before any prefilter; NaN for the image-space methods, which have none.
+        """
+
+    @property
     def prefiltered(self) -> NDArray[np.bool_]:
         """(N,): the pixels that passed the prefilter."""
 
@@ -484,6 +496,10 @@ class TiltEstimator:
         offset_max_px: float | None = ...,
         threshold_rad: float = ...,
         normal: Literal["gradient", "tangent"] = ...,
+        sampling: Literal["uniform", "progressive", "prosac"] = ...,
+        local_optimization: bool = ...,
+        score: Literal["count", "msac", "magsac"] = ...,
+        verification: Literal["full", "sprt"] = ...,
         correction: float | AffineCorrection | PosteriorCorrection | Literal["closed-form"] | None = ...,
     ) -> Self:
         """Makes the tables. Defaults depend on the method; `options` tells those in force.
@@ -520,7 +536,8 @@ class TiltEstimator:
         tolerance_rad
             "refined": change of the direction below which it has converged.
         max_iterations
-            "refined": most refits with the gate at its final scale.
+            "refined": most refits with the gate at its final scale. "image-space-reject-refit": most rounds of
+            rejecting and refitting, N_E; 0 is plain least squares.
         threshold_px
             "image-space-ransac": largest residual of an inlier, delta_s,max of eq. 32.
         offset_max_px
@@ -530,6 +547,19 @@ class TiltEstimator:
             "vector-consensus": largest angle between an inlier's great circle and the vertical, delta_o,max of eq. 40.
         normal
             "vector-consensus": "gradient" is the paper's normal (eq. 37), "tangent" the exact one.
+        sampling
+            "image-space-ransac", "vector-consensus": "uniform" draws samples from all edge pixels alike, "progressive"
+            from a growing pool of the strongest, "prosac" also stops as PROSAC does (Chum and Matas 2005), which
+            presumes that pixels err independently.
+        local_optimization
+            The same methods: whether each new best model is refined by iterated least squares (Chum, Matas and Kittler
+            2003; Lebeda, Matas and Chum 2012).
+        score
+            The same methods: the best model has the most inliers ("count"), the least truncated squares ("msac", Torr
+            and Zisserman 2000), or the best score marginalised over the noise ("magsac", MAGSAC++, Barath et al. 2020).
+        verification
+            The same methods: "full" scores every model, "sprt" gives up those that fail a sequential probability ratio
+            test (Matas and Chum 2005).
         correction
             Image-space methods: "closed-form" divides each offset by its pixel's own gain, a number is the factor a of
             eq. 30 in pixels per radian, None is the lens' own scale of eq. 26. "vector-consensus": a number is the
@@ -941,7 +971,19 @@ class Room:
     The world frame has z up and the floor at z = 0; metres. Frozen, comparable, hashable, and to be pickled.
     """
 
-    def __new__(cls, kind: str, seed: SupportsIndex, *, threads: SupportsIndex | None = None) -> Self:
+    def __new__(
+        cls,
+        kind: str,
+        seed: SupportsIndex,
+        *,
+        clutter: float | None = None,
+        daylight: float | None = None,
+        light_spacing_m: float | None = None,
+        extent: float | None = None,
+        floor_gloss: float | None = None,
+        wall_pattern: str | None = None,
+        threads: SupportsIndex | None = None,
+    ) -> Self:
         """Builds and lights the room on `threads` threads (None: one per core), on which it does not depend."""
 
     @property
@@ -951,6 +993,30 @@ class Room:
     @property
     def seed(self) -> int:
         """The seed of everything in it."""
+
+    @property
+    def clutter(self) -> float:
+        """How full it is, from 0 to 1."""
+
+    @property
+    def daylight(self) -> float:
+        """Brightness of the day outside, from 0 to 1."""
+
+    @property
+    def light_spacing_m(self) -> float:
+        """Spacing of the points where light was gathered, metres."""
+
+    @property
+    def extent(self) -> float:
+        """How many times larger the floor is than the kind's own."""
+
+    @property
+    def floor_gloss(self) -> float:
+        """How much the floor shines, from 0 to 1."""
+
+    @property
+    def wall_pattern(self) -> str:
+        """Which of `WALL_PATTERNS` its walls have in common."""
 
     @property
     def height_m(self) -> float:
@@ -1002,7 +1068,124 @@ class Room:
     ) -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:
         """Grey (height, 2 height) and RGB (height, 2 height, 3) images of everything around a place."""
 
-    def __getnewargs__(self) -> tuple[str, int]: ...
+    def __getnewargs_ex__(self) -> tuple[tuple[str, int], dict[str, float | str]]: ...
+    def __eq__(self, other: object, /) -> bool: ...
+    def __hash__(self) -> int: ...
+
+@disjoint_base
+class Drive:
+    """A robot's way through a room, any frame of which can be rendered by `tiltvp.synth.Drive`.
+
+    Frozen, comparable, hashable, and to be pickled. N is the number of frames.
+    """
+
+    def __new__(
+        cls,
+        room: Room,
+        *,
+        camera: Camera,
+        robot_from_camera: ArrayLike | None = None,
+        mount: ArrayLike | None = None,
+        blind_rad: float | None = None,
+        frames: SupportsIndex | None = None,
+        seed: SupportsIndex | None = None,
+        step_m: float | None = None,
+        turn_max_rad: float | None = None,
+        wheel_base_m: float | None = None,
+        encoder_k_m: float | None = None,
+        wheel_radius_errors: ArrayLike | None = None,
+        bumps_max_rad: float | None = None,
+        lighting: float | None = None,
+        samples: SupportsIndex | None = None,
+        noise_sigma: float | None = None,
+        blur_sigma_px: float | None = None,
+        threads: SupportsIndex | None = None,
+    ) -> Self:
+        """Plans the drive and gathers daylight on `threads` threads (None: one per core), which do not matter."""
+
+    @property
+    def room(self) -> Room:
+        """The room."""
+
+    @property
+    def camera(self) -> Camera:
+        """The camera."""
+
+    @property
+    def frames(self) -> int:
+        """N, how many frames it has; also its `len`."""
+
+    @property
+    def seed(self) -> int:
+        """The seed of everything but the room."""
+
+    @property
+    def wheel_base_m(self) -> float:
+        """Distance between the wheels, metres."""
+
+    @property
+    def encoder_k_m(self) -> float:
+        """Variance of a reading per metre that a wheel rolls, metres."""
+
+    @property
+    def wheel_radius_errors(self) -> tuple[float, float]:
+        """How much larger the left and the right wheel are than the readings assume, relative."""
+
+    @property
+    def bumps_max_rad(self) -> float:
+        """Greatest lean from bumps, radians."""
+
+    @property
+    def lighting(self) -> float:
+        """How much the light changes along the way, from 0 to 1."""
+
+    @property
+    def mount(self) -> tuple[float, float, float, float]:
+        """x_m, y_m, yaw_rad, height_m of the camera's centre on the robot."""
+
+    @property
+    def robot_from_camera(self) -> NDArray[np.float64]:
+        """(3, 3): rotation from camera to robot coordinates, the mount's yaw included."""
+
+    @property
+    def poses(self) -> NDArray[np.float64]:
+        """(N, 3): true x_m, y_m, yaw_rad of the robot. Integrating `true_odometry` along arcs gives them exactly."""
+
+    @property
+    def tilts(self) -> NDArray[np.float64]:
+        """(N, 2): true alpha_rad, beta_rad."""
+
+    @property
+    def odometry(self) -> NDArray[np.float64]:
+        """(N, 2): how far the left and right wheel rolled since the last frame, by their encoders; metres."""
+
+    @property
+    def true_odometry(self) -> NDArray[np.float64]:
+        """(N, 2): how far they really rolled."""
+
+    @property
+    def motions(self) -> NDArray[np.float64]:
+        """(N, 2): distance in metres and turn in radians that `odometry` stands for."""
+
+    @property
+    def edges_m(self) -> NDArray[np.float64]:
+        """(E, 4): x_m, y_m, lowest and highest z_m of the room's upright edges, visible or not; the row is the number.
+
+        All upright edges within 3 mm of a vertical line are one. Those of wallpaper and tiles come last.
+        """
+
+    def _render(
+        self, frame: SupportsIndex, *, threads: SupportsIndex | None = None
+    ) -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:
+        """Grey (H, W) and RGB (H, W, 3) images of a frame."""
+
+    def _truth(
+        self, frame: SupportsIndex, *, threads: SupportsIndex | None = None
+    ) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+        """Edges in sight: numbers, bearings, elevations (M, 2), visible shares, contrasts."""
+
+    def __len__(self) -> int: ...
+    def __getnewargs_ex__(self) -> tuple[tuple[Room], dict[str, Any]]: ...
     def __eq__(self, other: object, /) -> bool: ...
     def __hash__(self) -> int: ...
 

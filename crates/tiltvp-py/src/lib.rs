@@ -3,6 +3,7 @@
 mod call;
 mod camera;
 mod convert;
+mod drive;
 mod rays;
 mod selfcalib;
 mod synth;
@@ -17,6 +18,8 @@ mod _core {
 
     #[pymodule_export]
     use crate::camera::Camera;
+    #[pymodule_export]
+    use crate::drive::Drive;
     #[pymodule_export]
     use crate::rays::PixelRays;
     #[pymodule_export]
@@ -39,6 +42,7 @@ mod _core {
         module.add("METHODS", tiltvp_core::tilt::METHODS.to_vec())?;
         module.add("CALIBRATION_METHODS", tiltvp_core::selfcalib::CALIBRATION_METHODS.to_vec())?;
         module.add("CAMERA_MODELS", tiltvp_core::camera::Model::names().collect::<Vec<_>>())?;
-        module.add("ROOM_KINDS", tiltvp_synth::RoomKind::ALL.map(tiltvp_synth::RoomKind::name).to_vec())
+        module.add("ROOM_KINDS", tiltvp_synth::RoomKind::ALL.map(tiltvp_synth::RoomKind::name).to_vec())?;
+        module.add("WALL_PATTERNS", tiltvp_synth::WallPattern::ALL.map(tiltvp_synth::WallPattern::name).to_vec())
     }
 }

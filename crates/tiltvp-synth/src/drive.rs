@@ -1,141 +1,259 @@
-//! Drives of a robot with a camera past vertical lines: wheel displacements and bearings with noise, and the truth behind.
+//! A drive: a robot with a camera and encoders on its way through a room, every frame of which can be looked at.
 
-use nalgebra::{Vector2, Vector3};
-use tiltvp_core::geometry::wrap_angle;
-use tiltvp_core::selfcalib::{Leg, Mounting, WheelMotion, Wheels};
+use std::sync::Arc;
 
-use crate::dice::Dice;
+use nalgebra::{Matrix3, Vector3};
+use rayon::prelude::*;
+use tiltvp_core::camera::Camera;
+use tiltvp_core::geometry::Tilt;
+use tiltvp_core::{Error, Result};
 
-/// A trajectory.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum DriveKind {
-    /// That of the paper's section 9.2: 2.3 m straight on in steps of 3.8 cm, then half a turn in place.
-    Paper,
-    /// Four times 1 m straight on and a quarter of a turn in place.
-    Alternating,
-    /// 4 m straight on, nothing else.
-    Straight,
-}
+use crate::encoders::Wheels;
+use crate::light::LightMap;
+use crate::lights::{Lights, Weather};
+use crate::sighting::{EdgeSighting, Lookout, UprightEdge, upright_edges};
+use crate::sweep::{Rays, Sweep};
+use crate::tone::{Exposure, Image, RenderOptions};
+use crate::trajectory::Trajectory;
+use crate::view::RobotPose;
+use crate::world::World;
 
-impl DriveKind {
-    /// Every trajectory.
-    pub const ALL: [Self; 3] = [Self::Paper, Self::Alternating, Self::Straight];
-
-    /// The name of the trajectory.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Paper => "paper",
-            Self::Alternating => "alternating",
-            Self::Straight => "straight",
-        }
-    }
-
-    /// Distance and turn of each step.
-    fn steps(self) -> Vec<(f64, f64)> {
-        let straight = |metres: f64| {
-            let count = (metres / 0.038).round();
-            vec![(metres / count, 0.0); count as usize]
-        };
-        let turn = |degrees: f64| {
-            let count = (degrees / 3.0).round();
-            vec![(0.0, (degrees / count).to_radians()); count as usize]
-        };
-        match self {
-            Self::Paper => [straight(2.3), turn(180.0)].concat(),
-            Self::Alternating => [straight(1.0), turn(90.0)].concat().repeat(4),
-            Self::Straight => straight(4.0),
-        }
-    }
-}
-
-/// What is drawn.
+/// Where the camera's centre is on the robot, and how it is turned.
 #[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Mount {
+    /// In front of the middle between the wheels, metres; 0 by default.
+    pub x_m: f64,
+    /// To the left of it, metres; 0 by default.
+    pub y_m: f64,
+    /// Turn of camera and mounting about the robot's `z`, counter-clockwise, radians; 0 by default.
+    pub yaw_rad: f64,
+    /// Above the floor, metres; 0.4 by default.
+    pub height_m: f64,
+}
+
+impl Default for Mount {
+    fn default() -> Self {
+        Self { x_m: 0.0, y_m: 0.0, yaw_rad: 0.0, height_m: 0.4 }
+    }
+}
+
+/// How a drive goes and what its camera is like: equal options give equal drives.
+#[derive(Debug, Clone, PartialEq)]
 pub struct DriveOptions {
-    /// The trajectory.
-    pub kind: DriveKind,
-    /// Seed of everything random.
+    /// How many frames, within `[1, 100000]`; 1500 by default.
+    pub frames: usize,
+    /// Seed of way, encoders, bumps, light and noise; 0 by default.
     pub seed: u64,
+    /// Greatest way from frame to frame, metres; 0.05 by default.
+    pub step_m: f64,
+    /// Greatest turn from frame to frame, radians; 0.08 by default.
+    pub turn_max_rad: f64,
     /// Where the camera is.
-    pub mounting: Mounting,
-    /// How many vertical lines there are.
-    pub landmarks: usize,
-    /// Standard deviation of a bearing, radians.
-    pub bearing_sigma_rad: f64,
-    /// Variance of a wheel's displacement per metre (eq. 31), metres.
-    pub odometry_k_m: f64,
-    /// Distance between the wheels, metres.
-    pub wheel_base_m: f64,
-    /// Probability that a bearing is that of nothing: anywhere on the circle.
-    pub outliers: f64,
+    pub mount: Mount,
+    /// How the camera sits in its mounting, which the mount's yaw turns; identity for a camera that looks up.
+    pub robot_from_camera: Matrix3<f64>,
+    /// Half angle of the cone around the camera's `z` axis in which it sees only itself, as under a mirror: black, radians
+    /// within `[0, 1.5]`; 0 by default.
+    pub blind_rad: f64,
+    /// Wheels and encoders.
+    pub wheels: Wheels,
+    /// Greatest lean from bumps, radians within `[0, 0.5]`; the robot leans about the camera's centre; 0 by default.
+    pub bumps_max_rad: f64,
+    /// How much lamps, daylight, their colours and the exposure change along the way, in `[0, 1]`; 0.5 by default.
+    pub lighting: f64,
+    /// Rays per pixel side where surfaces meet, within `[1, 8]`; elsewhere one ray per pixel will do; 3 by default.
+    pub samples: usize,
+    /// Standard deviation of Gaussian noise, grey levels; 2 by default.
+    pub noise_sigma: f64,
+    /// Standard deviation of a Gaussian blur, pixels; 0 by default, for none.
+    pub blur_sigma_px: f64,
 }
 
 impl Default for DriveOptions {
-    /// The paper's mounting, 10 lines, bearings of 0.5 degrees, K = 1e-5 m, wheels 0.4 m apart, no outliers.
     fn default() -> Self {
         Self {
-            kind: DriveKind::Paper,
+            frames: 1500,
             seed: 0,
-            mounting: Mounting::from_polar(-0.34, 0.23, 0.33),
-            landmarks: 10,
-            bearing_sigma_rad: 0.5f64.to_radians(),
-            odometry_k_m: 1e-5,
-            wheel_base_m: 0.4,
-            outliers: 0.0,
+            step_m: 0.05,
+            turn_max_rad: 0.08,
+            mount: Mount::default(),
+            robot_from_camera: Matrix3::identity(),
+            blind_rad: 0.0,
+            wheels: Wheels::default(),
+            bumps_max_rad: 0.0,
+            lighting: 0.5,
+            samples: 3,
+            noise_sigma: 2.0,
+            blur_sigma_px: 0.0,
         }
     }
 }
 
-/// A drive, step by step.
-#[derive(Debug, Clone, PartialEq)]
+impl DriveOptions {
+    /// Checks every field's domain.
+    ///
+    /// # Errors
+    /// [`Error::InvalidOption`] or [`Error::InvalidArgument`] for the first field outside its domain.
+    pub fn validate(&self) -> Result<()> {
+        if !(1..=100_000).contains(&self.frames) {
+            return Err(Error::option("drive.frames", self.frames, "a number in [1, 100000]"));
+        }
+        let Mount { x_m, y_m, yaw_rad, height_m } = self.mount;
+        let ranges = [
+            ("drive.step_m", self.step_m, 1e-4, 0.2, "metres in [1e-4, 0.2]"),
+            ("drive.turn_max_rad", self.turn_max_rad, 1e-3, 0.5, "radians in [1e-3, 0.5]"),
+            ("drive.mount.x_m", x_m, -1.0, 1.0, "metres in [-1, 1]"),
+            ("drive.mount.y_m", y_m, -1.0, 1.0, "metres in [-1, 1]"),
+            ("drive.mount.yaw_rad", yaw_rad, -7.0, 7.0, "radians in [-7, 7]"),
+            ("drive.mount.height_m", height_m, 0.05, 2.2, "metres in [0.05, 2.2]"),
+            ("drive.blind_rad", self.blind_rad, 0.0, 1.5, "radians in [0, 1.5]"),
+            ("drive.bumps_max_rad", self.bumps_max_rad, 0.0, 0.5, "radians in [0, 0.5]"),
+            ("drive.lighting", self.lighting, 0.0, 1.0, "a number in [0, 1]"),
+        ];
+        for (name, value, low, high, expected) in ranges {
+            if !(low..=high).contains(&value) {
+                return Err(Error::option(name, value, expected));
+            }
+        }
+        let rotation = &self.robot_from_camera;
+        let off = (rotation * rotation.transpose() - Matrix3::identity()).norm();
+        if !(off < 1e-6 && rotation.determinant() > 0.0) {
+            return Err(Error::argument("drive.robot_from_camera", rotation, "a rotation matrix"));
+        }
+        self.wheels.validate()?;
+        self.exposed(0.45, 0).validate()
+    }
+
+    /// Rotation from camera to robot coordinates, with the mount's yaw.
+    pub fn robot_from_mounted_camera(&self) -> Matrix3<f64> {
+        about_z(self.mount.yaw_rad) * self.robot_from_camera
+    }
+
+    fn exposed(&self, mean_level: f64, frame: usize) -> RenderOptions {
+        RenderOptions {
+            samples: self.samples,
+            blur_sigma_px: self.blur_sigma_px,
+            noise_sigma: self.noise_sigma,
+            exposure: Exposure::Auto { mean_level },
+            seed: self.seed ^ (frame as u64 + 1).rotate_left(40),
+            ..RenderOptions::default()
+        }
+    }
+}
+
+/// A robot's drive through a room.
 pub struct Drive {
-    /// What the wheels report.
-    pub readings: Vec<WheelMotion>,
-    /// The true pose (x, y, heading) after each step, from (0, 0, 0).
-    pub poses: Vec<Vector3<f64>>,
-    /// The places of the lines.
-    pub landmarks_m: Vec<Vector2<f64>>,
-    /// The bearing of every line after each step, in (-pi, pi].
-    pub bearings_rad: Vec<Vec<f64>>,
+    world: Arc<World>,
+    camera: Camera,
+    options: DriveOptions,
+    trajectory: Trajectory,
+    /// The light of the windows alone, where the light changes.
+    daylight: Option<LightMap>,
+    rays: Rays,
+    edges: Vec<UprightEdge>,
 }
 
 impl Drive {
-    /// Draws a drive. Lines are 1 to 5 m from the middle of the path, and never nearer than 0.6 m to the robot.
-    pub fn new(options: &DriveOptions) -> Self {
-        let mut dice = Dice::new(options.seed, 0);
-        let wheels = Wheels::new(options.wheel_base_m);
-        let (mut readings, mut poses) = (Vec::new(), Vec::new());
-        let mut pose = Vector3::zeros();
-        for (distance, turn) in options.kind.steps() {
-            let reading = WheelMotion::from_motion(distance, turn, options.wheel_base_m);
-            let mut noisy = |metres: f64| metres + (options.odometry_k_m * metres.abs()).sqrt() * dice.normal();
-            let driven = WheelMotion { left_m: noisy(reading.left_m), right_m: noisy(reading.right_m) };
-            let step = Leg::from_wheels(&driven, &wheels, 0.0).motion;
-            let (sin, cos) = f64::sin_cos(pose.z);
-            pose += Vector3::new(cos * step.x - sin * step.y, sin * step.x + cos * step.y, step.z);
-            readings.push(reading);
-            poses.push(pose);
+    /// Plans a drive. Light is gathered in parallel on the current rayon pool; the drive does not depend on it.
+    ///
+    /// # Errors
+    /// If the options are outside their domains, or the robot finds no space to drive in.
+    pub fn new(world: Arc<World>, camera: Camera, options: DriveOptions) -> Result<Self> {
+        options.validate()?;
+        if options.mount.height_m >= world.height_m() {
+            return Err(Error::option("drive.mount.height_m", options.mount.height_m, "a height below the ceiling"));
         }
-        let count = poses.len().max(1) as f64;
-        let middle = poses.iter().fold(Vector2::zeros(), |sum, pose| sum + pose.xy()) / count;
-        let mut landmarks_m = Vec::with_capacity(options.landmarks);
-        while landmarks_m.len() < options.landmarks {
-            let (distance, angle) = (dice.within(1.0, 5.0), dice.within(0.0, std::f64::consts::TAU));
-            let place = middle + Vector2::new(angle.cos(), angle.sin()) * distance;
-            if poses.iter().all(|pose| (pose.xy() - place).norm() > 0.6) {
-                landmarks_m.push(place);
-            }
-        }
-        let m = options.mounting;
-        let mut look = |pose: &Vector3<f64>, place: &Vector2<f64>| {
-            let (sin, cos) = pose.z.sin_cos();
-            let camera = pose.xy() + Vector2::new(cos * m.x_m - sin * m.y_m, sin * m.x_m + cos * m.y_m);
-            let ray = place - camera;
-            let noise = options.bearing_sigma_rad * dice.normal();
-            let astray = dice.chance(options.outliers).then(|| dice.within(-3.1, 3.1));
-            astray.unwrap_or_else(|| wrap_angle(ray.y.atan2(ray.x) - pose.z - m.yaw_rad + noise))
-        };
-        let bearings_rad =
-            poses.iter().map(|pose| landmarks_m.iter().map(|place| look(pose, place)).collect()).collect();
-        Self { readings, poses, landmarks_m, bearings_rad }
+        let trajectory = Trajectory::draw(&world, &options)?;
+        let daylight = (options.lighting > 0.0).then(|| world.daylight());
+        let (rays, edges) = (Rays::new(&camera, options.blind_rad), upright_edges(&world));
+        Ok(Self { world, camera, options, trajectory, daylight, rays, edges })
     }
+
+    /// How the drive goes.
+    pub fn options(&self) -> &DriveOptions {
+        &self.options
+    }
+
+    /// The camera.
+    pub fn camera(&self) -> &Camera {
+        &self.camera
+    }
+
+    /// Poses, leans and wheels.
+    pub fn trajectory(&self) -> &Trajectory {
+        &self.trajectory
+    }
+
+    /// The upright edges of the room, visible or not; an edge's place here is its number.
+    pub fn edges(&self) -> &[UprightEdge] {
+        &self.edges
+    }
+
+    /// The camera's centre in the world at a frame, metres.
+    ///
+    /// # Errors
+    /// [`Error::InvalidArgument`] if there is no such frame.
+    pub fn center(&self, frame: usize) -> Result<Vector3<f64>> {
+        let (pose, _) = self.state(frame)?;
+        let Mount { x_m, y_m, height_m, .. } = self.options.mount;
+        let (s, c) = pose.yaw_rad.sin_cos();
+        Ok(Vector3::new(pose.x_m + c * x_m - s * y_m, pose.y_m + s * x_m + c * y_m, height_m))
+    }
+
+    /// The image of a frame, rendered in parallel on the current rayon pool; its bytes depend on room, camera, options and
+    /// frame alone.
+    ///
+    /// # Errors
+    /// [`Error::InvalidArgument`] if there is no such frame.
+    pub fn render(&self, frame: usize) -> Result<Image> {
+        let (pose, tilt) = self.state(frame)?;
+        let (lights, level) = self.lights(frame);
+        let sweep = Sweep::new(&self.world, &self.rays, self.center(frame)?, self.world_from_camera(pose, tilt));
+        let options = self.options.exposed((0.45 * level).clamp(0.1, 0.8), frame);
+        Ok(sweep.film(&lights, &options).develop(&options))
+    }
+
+    /// The upright edges in sight at a frame, in the order of their numbers.
+    ///
+    /// # Errors
+    /// [`Error::InvalidArgument`] if there is no such frame.
+    pub fn sightings(&self, frame: usize) -> Result<Vec<EdgeSighting>> {
+        let (pose, tilt) = self.state(frame)?;
+        let (lights, _) = self.lights(frame);
+        let lookout = Lookout {
+            world: &self.world,
+            camera: &self.camera,
+            blind_rad: self.options.blind_rad,
+            pose,
+            center: self.center(frame)?,
+            camera_from_world: self.world_from_camera(pose, tilt).transpose(),
+            lights: &lights,
+        };
+        let numbered = self.edges.par_iter().enumerate();
+        Ok(numbered.filter_map(|(number, edge)| lookout.sight(number, edge)).collect())
+    }
+
+    fn state(&self, frame: usize) -> Result<(RobotPose, Tilt)> {
+        match (self.trajectory.poses.get(frame), self.trajectory.tilts.get(frame)) {
+            (Some(pose), Some(tilt)) => Ok((*pose, *tilt)),
+            _ => Err(Error::argument("frame", frame, format!("a frame below {}", self.trajectory.poses.len()))),
+        }
+    }
+
+    fn world_from_camera(&self, pose: RobotPose, tilt: Tilt) -> Matrix3<f64> {
+        let upright_from_leaning = tilt.leaning_from_upright().transpose();
+        about_z(pose.yaw_rad) * upright_from_leaning * self.options.robot_from_mounted_camera()
+    }
+
+    fn lights(&self, frame: usize) -> (Lights<'_>, f64) {
+        let Some(daylight) = &self.daylight else { return (Lights::STEADY, 1.0) };
+        let seed = (self.options.seed ^ (self.options.seed >> 32)) as u32;
+        let (lamps, day, level) = Weather { strength: self.options.lighting, seed }.at(frame);
+        (Lights { lamps, day, daylight: Some(daylight) }, level)
+    }
+}
+
+fn about_z(angle_rad: f64) -> Matrix3<f64> {
+    let (s, c) = angle_rad.sin_cos();
+    Matrix3::new(c, -s, 0.0, s, c, 0.0, 0.0, 0.0, 1.0)
 }

@@ -7,30 +7,42 @@
 //! Lengths are metres, angles radians. The world frame has `z` up with the floor at `z = 0`; the robot frame has `x` forward,
 //! `y` left, `z` up; the camera frame has `z` along the optical axis, `x` to the right (columns), `y` down (rows).
 
+mod bearing_drive;
 mod builder;
 mod dice;
 mod drive;
+mod encoders;
 mod furniture;
 mod light;
+mod lights;
 mod noise;
 mod options;
 mod outdoors;
 mod plan;
 mod render;
+mod route;
 mod scene;
 mod segment;
 mod shell;
+mod sighting;
+mod sweep;
 mod texture;
 mod threads;
+mod tiles;
 mod tone;
+mod trajectory;
 mod view;
 mod world;
 
-pub use drive::{Drive, DriveKind, DriveOptions};
-pub use options::{RoomKind, RoomOptions};
+pub use bearing_drive::{BearingDrive, BearingDriveKind, BearingDriveOptions};
+pub use drive::{Drive, DriveOptions, Mount};
+pub use encoders::Wheels;
+pub use options::{RoomKind, RoomOptions, WallPattern};
 pub use render::{Rendering, Truth, render, render_panorama};
 pub use segment::Segment;
+pub use sighting::{EdgeSighting, UprightEdge};
 pub use threads::on_threads;
 pub use tone::{Exposure, Image, RenderOptions};
+pub use trajectory::Trajectory;
 pub use view::{Lens, RobotPose, View};
 pub use world::{Hit, World};

@@ -5,7 +5,7 @@ use numpy::PyArray2;
 use pyo3::prelude::*;
 use tiltvp_core::Error;
 use tiltvp_core::selfcalib::{self as core, Mounting, SelfCalibratorOptions};
-use tiltvp_synth::{Drive, DriveKind, DriveOptions};
+use tiltvp_synth::{BearingDrive, BearingDriveKind, BearingDriveOptions};
 
 use super::estimate::matrix3;
 use crate::call::{call, invalid};
@@ -14,8 +14,8 @@ use crate::convert;
 /// A simulated drive, and the truth behind it.
 #[pyclass(frozen, module = "tiltvp._core")]
 pub(crate) struct SimulatedDrive {
-    options: DriveOptions,
-    drive: Drive,
+    options: BearingDriveOptions,
+    drive: BearingDrive,
 }
 
 #[pymethods]
@@ -95,11 +95,11 @@ pub(crate) fn simulate_drive(
     wheel_base_m: Option<f64>,
     outliers: Option<f64>,
 ) -> PyResult<SimulatedDrive> {
-    let Some(kind) = DriveKind::ALL.into_iter().find(|known| known.name() == kind) else {
-        let known = DriveKind::ALL.map(DriveKind::name).join(", ");
+    let Some(kind) = BearingDriveKind::ALL.into_iter().find(|known| known.name() == kind) else {
+        let known = BearingDriveKind::ALL.map(BearingDriveKind::name).join(", ");
         return Err(invalid(format!("kind = {kind:?}, expected one of {known}")));
     };
-    let mut options = DriveOptions { kind, seed, ..DriveOptions::default() };
+    let mut options = BearingDriveOptions { kind, seed, ..BearingDriveOptions::default() };
     if let Some(mounting) = mounting {
         let v = convert::vector3(mounting, "mounting")?;
         options.mounting = Mounting { x_m: v.x, y_m: v.y, yaw_rad: v.z };
@@ -121,6 +121,6 @@ pub(crate) fn simulate_drive(
     if options.wheel_base_m == 0.0 {
         return Err(invalid("wheel_base_m = 0, expected a positive number of metres".to_owned()));
     }
-    let drive = call(py, || Ok::<_, Error>(Drive::new(&options)))?;
+    let drive = call(py, || Ok::<_, Error>(BearingDrive::new(&options)))?;
     Ok(SimulatedDrive { options, drive })
 }

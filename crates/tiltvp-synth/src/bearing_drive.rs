@@ -1,0 +1,141 @@
+//! Drives of a robot with a camera past vertical lines: wheel displacements and bearings with noise, and the truth behind.
+
+use nalgebra::{Vector2, Vector3};
+use tiltvp_core::geometry::wrap_angle;
+use tiltvp_core::selfcalib::{Leg, Mounting, WheelMotion, Wheels};
+
+use crate::dice::Dice;
+
+/// A trajectory.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum BearingDriveKind {
+    /// That of the paper's section 9.2: 2.3 m straight on in steps of 3.8 cm, then half a turn in place.
+    Paper,
+    /// Four times 1 m straight on and a quarter of a turn in place.
+    Alternating,
+    /// 4 m straight on, nothing else.
+    Straight,
+}
+
+impl BearingDriveKind {
+    /// Every trajectory.
+    pub const ALL: [Self; 3] = [Self::Paper, Self::Alternating, Self::Straight];
+
+    /// The name of the trajectory.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Paper => "paper",
+            Self::Alternating => "alternating",
+            Self::Straight => "straight",
+        }
+    }
+
+    /// Distance and turn of each step.
+    fn steps(self) -> Vec<(f64, f64)> {
+        let straight = |metres: f64| {
+            let count = (metres / 0.038).round();
+            vec![(metres / count, 0.0); count as usize]
+        };
+        let turn = |degrees: f64| {
+            let count = (degrees / 3.0).round();
+            vec![(0.0, (degrees / count).to_radians()); count as usize]
+        };
+        match self {
+            Self::Paper => [straight(2.3), turn(180.0)].concat(),
+            Self::Alternating => [straight(1.0), turn(90.0)].concat().repeat(4),
+            Self::Straight => straight(4.0),
+        }
+    }
+}
+
+/// What is drawn.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct BearingDriveOptions {
+    /// The trajectory.
+    pub kind: BearingDriveKind,
+    /// Seed of everything random.
+    pub seed: u64,
+    /// Where the camera is.
+    pub mounting: Mounting,
+    /// How many vertical lines there are.
+    pub landmarks: usize,
+    /// Standard deviation of a bearing, radians.
+    pub bearing_sigma_rad: f64,
+    /// Variance of a wheel's displacement per metre (eq. 31), metres.
+    pub odometry_k_m: f64,
+    /// Distance between the wheels, metres.
+    pub wheel_base_m: f64,
+    /// Probability that a bearing is that of nothing: anywhere on the circle.
+    pub outliers: f64,
+}
+
+impl Default for BearingDriveOptions {
+    /// The paper's mounting, 10 lines, bearings of 0.5 degrees, K = 1e-5 m, wheels 0.4 m apart, no outliers.
+    fn default() -> Self {
+        Self {
+            kind: BearingDriveKind::Paper,
+            seed: 0,
+            mounting: Mounting::from_polar(-0.34, 0.23, 0.33),
+            landmarks: 10,
+            bearing_sigma_rad: 0.5f64.to_radians(),
+            odometry_k_m: 1e-5,
+            wheel_base_m: 0.4,
+            outliers: 0.0,
+        }
+    }
+}
+
+/// A drive, step by step.
+#[derive(Debug, Clone, PartialEq)]
+pub struct BearingDrive {
+    /// What the wheels report.
+    pub readings: Vec<WheelMotion>,
+    /// The true pose (x, y, heading) after each step, from (0, 0, 0).
+    pub poses: Vec<Vector3<f64>>,
+    /// The places of the lines.
+    pub landmarks_m: Vec<Vector2<f64>>,
+    /// The bearing of every line after each step, in (-pi, pi].
+    pub bearings_rad: Vec<Vec<f64>>,
+}
+
+impl BearingDrive {
+    /// Draws a drive. Lines are 1 to 5 m from the middle of the path, and never nearer than 0.6 m to the robot.
+    pub fn new(options: &BearingDriveOptions) -> Self {
+        let mut dice = Dice::new(options.seed, 0);
+        let wheels = Wheels::new(options.wheel_base_m);
+        let (mut readings, mut poses) = (Vec::new(), Vec::new());
+        let mut pose = Vector3::zeros();
+        for (distance, turn) in options.kind.steps() {
+            let reading = WheelMotion::from_motion(distance, turn, options.wheel_base_m);
+            let mut noisy = |metres: f64| metres + (options.odometry_k_m * metres.abs()).sqrt() * dice.normal();
+            let driven = WheelMotion { left_m: noisy(reading.left_m), right_m: noisy(reading.right_m) };
+            let step = Leg::from_wheels(&driven, &wheels, 0.0).motion;
+            let (sin, cos) = f64::sin_cos(pose.z);
+            pose += Vector3::new(cos * step.x - sin * step.y, sin * step.x + cos * step.y, step.z);
+            readings.push(reading);
+            poses.push(pose);
+        }
+        let count = poses.len().max(1) as f64;
+        let middle = poses.iter().fold(Vector2::zeros(), |sum, pose| sum + pose.xy()) / count;
+        let mut landmarks_m = Vec::with_capacity(options.landmarks);
+        while landmarks_m.len() < options.landmarks {
+            let (distance, angle) = (dice.within(1.0, 5.0), dice.within(0.0, std::f64::consts::TAU));
+            let place = middle + Vector2::new(angle.cos(), angle.sin()) * distance;
+            if poses.iter().all(|pose| (pose.xy() - place).norm() > 0.6) {
+                landmarks_m.push(place);
+            }
+        }
+        let m = options.mounting;
+        let mut look = |pose: &Vector3<f64>, place: &Vector2<f64>| {
+            let (sin, cos) = pose.z.sin_cos();
+            let camera = pose.xy() + Vector2::new(cos * m.x_m - sin * m.y_m, sin * m.x_m + cos * m.y_m);
+            let ray = place - camera;
+            let noise = options.bearing_sigma_rad * dice.normal();
+            let astray = dice.chance(options.outliers).then(|| dice.within(-3.1, 3.1));
+            astray.unwrap_or_else(|| wrap_angle(ray.y.atan2(ray.x) - pose.z - m.yaw_rad + noise))
+        };
+        let bearings_rad =
+            poses.iter().map(|pose| landmarks_m.iter().map(|place| look(pose, place)).collect()).collect();
+        Self { readings, poses, landmarks_m, bearings_rad }
+    }
+}
