@@ -168,7 +168,7 @@ def test_bad_steps_are_refused_and_change_nothing() -> None:
         with pytest.raises(InvalidInputError):
             tiltvp.calibrate([[0.1, 0.1]] * 3, bearings, wheel_base_m=0.4)
     with pytest.raises(InvalidInputError, match="times_s"):
-        tiltvp.calibrate([[0.1, 0.1]] * 3, [[0, 0, 0.1]], wheel_base_m=0.4, estimate_time_offset=True)
+        tiltvp.calibrate([[0.1, 0.1]] * 3, [[0, 0, 0.1], [2, 0, 0.1]], wheel_base_m=0.4, estimate_time_offset=True)
 
 
 def test_options_are_good_as_keywords_and_each_matters() -> None:

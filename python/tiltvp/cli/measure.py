@@ -111,10 +111,14 @@ def calibration(odometry: Path | None = None, /, *, runs: int = 1000, out: Path 
     if out is not None:
         pl.concat(parts).write_parquet(out)
     low, high = consistency_band(0.95, 3, runs)
-    show_frame(f"Simulated drives; NEES of a consistent filter: {low:.3f} to {high:.3f}", pl.DataFrame(summaries), ["method"])
+    show_frame(
+        f"Simulated drives; NEES of a consistent filter: {low:.3f} to {high:.3f}", pl.DataFrame(summaries), ["method"]
+    )
     if odometry is not None:
         with progress_bar(6, "logs") as bar:
-            show_frame("Real logs: error against the nominal mounting", real_logs(odometry, advance=bar.advance), ["log"])
+            show_frame(
+                "Real logs: error against the nominal mounting", real_logs(odometry, advance=bar.advance), ["log"]
+            )
 
 
 @app.command
