@@ -107,13 +107,14 @@ def _wrapped(angle: float) -> float:
     return math.remainder(angle, math.tau)
 
 
-def real_logs(folder: Path, *, advance: Callable[[], None] = lambda: None) -> pl.DataFrame:
+def real_logs(folder: Path, *, only: str = "", advance: Callable[[], None] = lambda: None) -> pl.DataFrame:
     """Victoria Park from two starts, the LEGO robot, and Censi's three mountings, by the filter and from the whole log.
 
     `folder` holds victoria_park, brenner_lego and censi_khepera. Errors against the nominal mounting in mm and degrees.
+    `only` picks the logs whose names hold it.
     """
     rows = []
-    for name, start, odometry, bearings, truth, options in _logs(folder):
+    for name, start, odometry, bearings, truth, options in _logs(folder, only):
         calibrator = SelfCalibrator(**options, start=start)
         calibrator.follow(odometry, bearings)
         rows.append(_row(name, "filter", calibrator.estimate, truth))
@@ -138,7 +139,7 @@ _Log = tuple[
 ]
 
 
-def _logs(folder: Path) -> Iterator[_Log]:
+def _logs(folder: Path, only: str) -> Iterator[_Log]:
     for name, starts, options in (
         (
             "victoria_park",
@@ -151,6 +152,8 @@ def _logs(folder: Path) -> Iterator[_Log]:
             {"odometry_k_m": 1e-3, "start_sigma": (0.1, 0.1, 0.3), "start_distance_m": 1.0},
         ),
     ):
+        if only not in name:
+            continue
         truth = _json(folder / name / "truth.json")
         log = read_drive_log(folder / name / "odometry.csv", folder / name / "bearings.csv")
         options |= {"wheel_base_m": truth["wheel_base_m"], "bearing_sigma_rad": truth["bearing_sigma_rad"]}
@@ -158,7 +161,8 @@ def _logs(folder: Path) -> Iterator[_Log]:
             nominal = np.array([truth["x_m"], truth["y_m"], truth["yaw_rad"]])
             yield f"{name} from {start}", start, log.odometry, log.bearings, nominal, options
     for name in ("lstraight", "l90", "lmov"):
-        yield _censi(folder / "censi_khepera", name)
+        if only in f"censi {name}":
+            yield _censi(folder / "censi_khepera", name)
 
 
 def _json(path: Path) -> dict[str, Any]:
@@ -169,10 +173,22 @@ def _json(path: Path) -> dict[str, Any]:
     return found
 
 
+def _records(path: Path) -> list[dict[str, Any]]:
+    """The JSON values of a file, one after the other."""
+    text, at, found = path.read_text(encoding="utf-8").strip(), 0, []
+    decoder = json.JSONDecoder()
+    while at < len(text):
+        value, at = decoder.raw_decode(text, at)
+        while at < len(text) and text[at].isspace():
+            at += 1
+        found.append(value)
+    return found
+
+
 def _censi(folder: Path, name: str) -> _Log:
     """A log of wheel rates, with bearings of invented landmarks as the sensor's recorded motions have them."""
     answer = _json(folder / f"{name}_results.json")
-    steps = [json.loads(line) for line in (folder / f"{name}.tuple").read_text().splitlines() if line.strip()]
+    steps = _records(folder / f"{name}.tuple")
     odometry = np.array(
         [[s["T"] * s["phi_l"] * answer["l_diam"] / 2.0, s["T"] * s["phi_r"] * answer["r_diam"] / 2.0] for s in steps]
     )
