@@ -62,7 +62,7 @@ def test_a_finite_answer_or_a_reason(data: Path, case: Case, method: str) -> Non
     options: dict[str, float] = {"elevation_min_rad": -math.radians(30), "elevation_max_rad": math.radians(30)}
     rotation = np.eye(3) if case.up else FORWARD
     if method.startswith("image-space") and not case.up:
-        # These methods take a lean for a shift of the image about the vertical, which a camera that looks ahead has far off.
+        # They take a lean for a shift of the image about the vertical, from which a camera that looks ahead is far.
         with pytest.raises(tiltvp.errors.InvalidInputError, match="within 45 degrees of the vertical"):
             tiltvp.TiltEstimator(camera, method=method, robot_from_camera=rotation, **options)
         return
