@@ -104,7 +104,7 @@ impl Default for RadialOptions {
 /// Options of a line extractor.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LineOptions {
-    /// Which pixels are looked at for edges. Default from 60 degrees below the horizon to 60 above it, else as for tilt.
+    /// Which pixels are looked at for edges. Default from 30 degrees below the horizon to 60 above it, else as for tilt.
     pub edges: EdgeOptions,
     /// Which pixels may be used at all. Default none: all.
     pub mask: Option<Mask>,
@@ -126,7 +126,7 @@ impl LineOptions {
             _ => return Err(Error::option("method", name, "\"great-circle\" or \"radial\"")),
         };
         let edges = EdgeOptions {
-            elevation_min_rad: -PI / 3.0,
+            elevation_min_rad: -PI / 6.0,
             elevation_max_rad: PI / 3.0,
             ..EdgeOptions::default()
         };
