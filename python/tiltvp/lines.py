@@ -126,7 +126,7 @@ def match(a: NDArray[np.float32], b: NDArray[np.float32], **options: Any) -> NDA
     """(M, 2) int64: rows of `a` and the rows of `b` that are the same lines, by rising row of `a`.
 
     The nearest descriptor (eq. 6) if it passes the tests of eqs. 8 to 10 with `f1`, `f2`, `f3`; `mutual` (default) asks
-    for the nearest both ways, `ordered` for matches in the lines' cyclic order. `expected_rad` (N_A,), `seen_rad` (N_B,)
-    and `gate_rad` leave only lines that are close to where they are expected.
+    for the nearest both ways, `ordered` for matches in the lines' cyclic order. `expected_rad` (N_A,), `seen_rad`
+    (N_B,) and `gate_rad` leave only lines that are close to where they are expected.
     """
     return _core.match_descriptors(a, b, **options)
