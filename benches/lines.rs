@@ -76,5 +76,7 @@ fn describe(bencher: Bencher) {
 fn matching(bencher: Bencher) {
     let (_, _, values) = found("great-circle", Some(10));
     let (mut scratch, mut matches, options) = (MatchScratch::default(), Vec::new(), MatchOptions::default());
-    bencher.bench_local(|| match_descriptors(black_box(&values), &values, 192, &options, None, &mut scratch, &mut matches));
+    bencher.bench_local(|| {
+        match_descriptors(black_box(&values), &values, 192, &options, None, &mut scratch, &mut matches)
+    });
 }

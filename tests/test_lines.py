@@ -103,6 +103,7 @@ OTHER_VALUES = [
     ("great-circle", {"lines_max": 2}), ("great-circle", {"descriptor_areas": 2}),
     ("great-circle", {"descriptor_areas": 3, "descriptor_overlapping": True}), ("great-circle", {"descriptor_bins": 8}),
     ("great-circle", {"descriptor_clip": 0.3}), ("great-circle", {"descriptor_window": 1.0}),
+    ("great-circle", {"descriptor_smoothing": 0.0}),
     ("great-circle", {"descriptor_normalisation": "whole"}), ("radial", {"radial_max_rad": 0.3}),
     ("radial", {"sectors": 300}), ("radial", {"length_min": 0.4}), ("radial", {"radius_min_px": 60.0}),
     ("radial", {"radius_max_px": 100.0}), ("radial", {"rim_radius_px": 100.0}), ("radial", {"center_search_px": 0.0}),
@@ -190,7 +191,7 @@ def test_a_drive_keeps_its_tracks(mirror: tiltvp.Camera, office: Room) -> None:
     for k in range(6):
         tilt = (0.04 * (k % 2), 0.8 * k)
         pose = (x, y, yaw + 0.05 * k)
-        image = office.render(mirror, pose=pose, alpha_rad=tilt[0], beta_rad=tilt[1], samples=1, seed=k)
+        image = office.render(mirror, pose=pose, alpha_rad=tilt[0], beta_rad=tilt[1], samples=3, seed=k)
         lines = extractor(image.gray, tilt)
         descriptors = extractor.describe(image.gray, lines)
         for tracker, turn, seen in zip(trackers, (0.05 if k else 0.0, None), known, strict=True):
@@ -209,7 +210,7 @@ def test_a_drive_keeps_its_tracks(mirror: tiltvp.Camera, office: Room) -> None:
 
 
 def test_similarity_matrices_are_darkest_on_the_diagonal(mirror: tiltvp.Camera, office: Room) -> None:
-    image = office.render(mirror, pose=office.free_poses(1, 4)[0], samples=1)
+    image = office.render(mirror, pose=office.free_poses(1, 4)[0], samples=3)
     extractor = tl.LineExtractor(mirror)
     lines = extractor.lines_at(np.radians(np.arange(0.0, 360.0, 10.0)))
     assert len(lines) == 36

@@ -883,6 +883,7 @@ class LineExtractor:
         descriptor_bins: SupportsIndex = ...,
         descriptor_clip: float = ...,
         descriptor_window: float = ...,
+        descriptor_smoothing: float = ...,
         descriptor_normalisation: Literal["area", "whole"] = ...,
     ) -> Self:
         """Makes the tables. `options` tells the options in force.
@@ -929,6 +930,8 @@ class LineExtractor:
             Bins of each orientation histogram, and the greatest value of one before the second normalisation.
         descriptor_window
             Standard deviation of the Gaussian window as a fraction of an area's radius.
+        descriptor_smoothing
+            Standard deviation of the Gaussian that smooths an area before its gradients are taken, the same fraction.
         descriptor_normalisation
             What has unit length: the pair of histograms of each "area" (eq. 3), or the "whole" (eq. 4).
 

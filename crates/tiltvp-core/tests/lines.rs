@@ -19,7 +19,7 @@ use tiltvp_core::lines::{
 fn mirror() -> Camera {
     let (xi, theta) = (0.95, 120f64.to_radians());
     let focal = 190.0 / (theta.sin() / (theta.cos() + xi));
-    let lens = Unified::new(xi, focal, focal, 201.3, 198.6).unwrap();
+    let lens = Unified::new(xi, [focal; 2], [201.3, 198.6], [0.0; 5], 0.0).unwrap();
     let camera = Camera::new(400, 400, Model::Unified(lens)).unwrap();
     camera.with_max_theta_rad(121f64.to_radians()).unwrap().mirrored()
 }

@@ -19,7 +19,8 @@ mod _core {
     use crate::camera::Camera;
     #[pymodule_export]
     use crate::lines::{
-        LineExtractor, LineTracker, Lines, TrackedLines, descriptor_distances, match_descriptors, ssd_matrix, zncc_matrix,
+        LineExtractor, LineTracker, Lines, TrackedLines, descriptor_distances, match_descriptors, ssd_matrix,
+        zncc_matrix,
     };
     #[pymodule_export]
     use crate::rays::PixelRays;

@@ -82,12 +82,7 @@ impl LineExtractor {
     }
 
     /// The lines of a C-contiguous `(H, W)` image of uint8.
-    fn _extract(
-        &self,
-        py: Python<'_>,
-        image: &Bound<'_, PyAny>,
-        normal: Option<&Bound<'_, PyAny>>,
-    ) -> PyResult<Lines> {
+    fn _extract(&self, py: Python<'_>, image: &Bound<'_, PyAny>, normal: Option<&Bound<'_, PyAny>>) -> PyResult<Lines> {
         let image = convert::gray(image, "image")?;
         let (view, inner) = (convert::view(&image)?, &self.inner);
         let tilt = normal.map(tilt_from).transpose()?;
@@ -181,6 +176,7 @@ impl LineExtractor {
 /// The lean of a frame from its ground normal.
 fn tilt_from(normal: &Bound<'_, PyAny>) -> PyResult<Tilt> {
     let normal = convert::vector3(normal, "normal")?;
-    Tilt::from_normal(&normal)
-        .ok_or_else(|| exception(&tiltvp_core::Error::argument("normal", format!("{normal:?}"), "a finite vector, not zero")))
+    Tilt::from_normal(&normal).ok_or_else(|| {
+        exception(&tiltvp_core::Error::argument("normal", format!("{normal:?}"), "a finite vector, not zero"))
+    })
 }

@@ -202,7 +202,14 @@ fn reaching_sse2(block: &[f32; BLOCK], threshold: f32) -> u32 {
 
 /// The 3x3 Scharr derivatives (3, 10, 3) of the middle row and their squared magnitude; rows are one pixel wider on both sides.
 #[multiversion(targets("x86_64+avx512f+avx512vl", "x86_64+avx2"))]
-pub(super) fn scharr(above: &[f32], middle: &[f32], below: &[f32], gx: &mut [f32], gy: &mut [f32], strength: &mut [f32]) {
+pub(super) fn scharr(
+    above: &[f32],
+    middle: &[f32],
+    below: &[f32],
+    gx: &mut [f32],
+    gy: &mut [f32],
+    strength: &mut [f32],
+) {
     let n = gx.len();
     let (above, middle, below) = (&above[..n + 2], &middle[..n + 2], &below[..n + 2]);
     let (gy, strength) = (&mut gy[..n], &mut strength[..n]);

@@ -70,7 +70,8 @@ pub(super) fn find_center(
         let place = Vector2::new((origin.0 + x as i64) as f64, (origin.1 + y as i64) as f64);
         inside && (place - near).amax() <= search_px + 1.0
     };
-    let best = (0..votes.len()).filter(|i| near_enough(*i)).max_by(|a, b| votes[*a].total_cmp(&votes[*b]).then(b.cmp(a)))?;
+    let best =
+        (0..votes.len()).filter(|i| near_enough(*i)).max_by(|a, b| votes[*a].total_cmp(&votes[*b]).then(b.cmp(a)))?;
     if votes[best] <= 0.0 {
         return None;
     }

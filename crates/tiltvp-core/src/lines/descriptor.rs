@@ -30,6 +30,9 @@ pub struct DescriptorOptions {
     pub clip: f64,
     /// Standard deviation of the Gaussian window as a fraction of an area's radius. Default 1/3.
     pub window: f64,
+    /// Standard deviation of the Gaussian that smooths an area before its gradients are taken, as a fraction of its radius, 0
+    /// for none. Default 1/12.
+    pub smoothing: f64,
     /// What has unit length. Default each area.
     pub normalisation: Normalisation,
 }
@@ -42,6 +45,7 @@ impl Default for DescriptorOptions {
             bins: 32,
             clip: 0.1,
             window: 1.0 / 3.0,
+            smoothing: 1.0 / 12.0,
             normalisation: Normalisation::Area,
         }
     }
@@ -57,6 +61,9 @@ impl DescriptorOptions {
         }
         if !(self.clip > 0.0 && self.clip <= 1.0) {
             return Err(Error::option("clip", self.clip, "a value above 0 and at most 1"));
+        }
+        if !(0.0..=1.0).contains(&self.smoothing) {
+            return Err(Error::option("smoothing", self.smoothing, "a fraction from 0 to 1"));
         }
         if !(self.window > 0.0 && self.window <= 100.0) {
             return Err(Error::option("window", self.window, "a fraction above 0 and at most 100"));
@@ -88,6 +95,9 @@ impl DescriptorOptions {
 pub(super) struct DescriptorScratch {
     patch: Patch,
     window: Vec<f32>,
+    /// Half of the smoothing Gaussian, the middle first.
+    kernel: Vec<f32>,
+    rows: Vec<f32>,
     /// Half of the samples across an area, and the window's width, that the window was made for.
     made_for: Option<(usize, f64)>,
 }
@@ -108,14 +118,16 @@ pub(super) fn describe(
     let (radius, _) = options.layout(low, high);
     let half = samples.unwrap_or((radius.ceil() as usize).clamp(2, 256));
     scratch.make_window(half, options.window);
+    scratch.make_kernel(options.smoothing * half as f64);
     let pitch = radius / half as f64;
-    let side = 2 * (half + 1) + 1;
+    let side = 2 * (half + scratch.kernel.len()) + 1;
     out.clear();
     out.resize(lines.lines.len() * options.values(), 0.0);
     for (line, values) in lines.lines.iter().zip(out.chunks_exact_mut(options.values())) {
         let (_, middles) = options.layout(low, high);
         for (middle, pair) in middles.zip(values.chunks_exact_mut(2 * options.bins)) {
             scratch.patch.sample(image, sight, chart, (line.bearing_rad, middle), pitch, (side, side));
+            smooth(&mut scratch.patch, &scratch.kernel, &mut scratch.rows);
             histograms(&scratch.patch, &scratch.window, half, options.bins, pair);
             if options.normalisation == Normalisation::Area {
                 normalise(pair, options.clip as f32);
@@ -128,6 +140,15 @@ pub(super) fn describe(
 }
 
 impl DescriptorScratch {
+    /// A Gaussian of a standard deviation in samples, to two deviations on either side.
+    fn make_kernel(&mut self, sigma: f64) {
+        let reach = (2.0 * sigma).round() as usize;
+        let weight = |k: usize| if k == 0 { 1.0 } else { (-0.5 * (k as f64 / sigma).powi(2)).exp() };
+        let sum = 1.0 + 2.0 * (1..=reach).map(weight).sum::<f64>();
+        self.kernel.clear();
+        self.kernel.extend((0..=reach).map(|k| (weight(k) / sum) as f32));
+    }
+
     /// Gaussian weights of the samples of an area, zero outside the circle.
     fn make_window(&mut self, half: usize, width: f64) {
         if self.made_for == Some((half, width)) {
@@ -143,6 +164,40 @@ impl DescriptorScratch {
         self.window.extend((0..n * n).map(weight));
         self.made_for = Some((half, width));
     }
+}
+
+/// Smooths a patch along and across; it loses the kernel's reach on every side.
+fn smooth(patch: &mut Patch, kernel: &[f32], rows: &mut Vec<f32>) {
+    let reach = kernel.len() - 1;
+    if reach == 0 {
+        return;
+    }
+    let (height, width) = (patch.rows - 2 * reach, patch.columns - 2 * reach);
+    rows.clear();
+    rows.resize(height * patch.columns, 0.0);
+    for (i, out) in rows.chunks_exact_mut(patch.columns).enumerate() {
+        let row = |k: usize| &patch.levels[k * patch.columns..(k + 1) * patch.columns];
+        for (x, level) in out.iter_mut().zip(row(i + reach)) {
+            *x = kernel[0] * level;
+        }
+        for (k, tap) in kernel.iter().enumerate().skip(1) {
+            for ((x, below), above) in out.iter_mut().zip(row(i + reach - k)).zip(row(i + reach + k)) {
+                *x += tap * (below + above);
+            }
+        }
+    }
+    for (out, row) in patch.levels.chunks_exact_mut(width).zip(rows.chunks_exact(patch.columns)) {
+        for (x, level) in out.iter_mut().zip(&row[reach..]) {
+            *x = kernel[0] * level;
+        }
+        for (k, tap) in kernel.iter().enumerate().skip(1) {
+            for ((x, left), right) in out.iter_mut().zip(&row[reach - k..]).zip(&row[reach + k..]) {
+                *x += tap * (left + right);
+            }
+        }
+    }
+    (patch.rows, patch.columns) = (height, width);
+    patch.levels.truncate(height * width);
 }
 
 /// Adds the gradients of a patch to the histograms of its two sides: left of the line, where azimuth is greater, first.
@@ -207,9 +262,7 @@ fn atan2(y: f32, x: f32) -> f32 {
     let a = if large > 0.0 { small / large } else { 0.0 };
     let s = a * a;
     // Abramowitz and Stegun 4.4.49.
-    let r = a
-        * (0.999_866
-            + s * (-0.330_299_5 + s * (0.180_141 + s * (-0.085_133 + s * 0.020_835_1))));
+    let r = a * (0.999_866 + s * (-0.330_299_5 + s * (0.180_141 + s * (-0.085_133 + s * 0.020_835_1))));
     let r = if y.abs() > x.abs() { 0.5 * PI - r } else { r };
     let r = if x < 0.0 { PI - r } else { r };
     if y < 0.0 { -r } else { r }

@@ -93,26 +93,17 @@ fn vote(candidates: &Candidates, bins: usize, votes: &mut [Vec<f32>; 2]) {
 }
 
 /// The local maxima of the smoothed histogram that are no neighbour of a higher one.
-fn find_peaks(
-    votes: &[f32],
-    smooth: &mut Vec<f32>,
-    options: &GreatCircleOptions,
-    rising: bool,
-    peaks: &mut Vec<Peak>,
-) {
+fn find_peaks(votes: &[f32], smooth: &mut Vec<f32>, options: &GreatCircleOptions, rising: bool, peaks: &mut Vec<Peak>) {
     let bins = votes.len();
     smooth.clear();
-    smooth.extend((0..bins).map(|b| {
-        0.25 * votes[(b + bins - 1) % bins] + 0.5 * votes[b] + 0.25 * votes[(b + 1) % bins]
-    }));
+    smooth
+        .extend((0..bins).map(|b| 0.25 * votes[(b + bins - 1) % bins] + 0.5 * votes[b] + 0.25 * votes[(b + 1) % bins]));
     let reach = ((0.5 * options.separation_rad / TAU * bins as f64) as usize).clamp(1, bins / 4);
     // A line of the least support that falls between bins, or has half of its pixels in the other polarity.
     let least = 0.25 * options.support_min_px as f32;
     for b in 0..bins {
         let here = smooth[b];
-        let higher = |offset: usize| {
-            smooth[(b + bins - offset) % bins] >= here || smooth[(b + offset) % bins] > here
-        };
+        let higher = |offset: usize| smooth[(b + bins - offset) % bins] >= here || smooth[(b + offset) % bins] > here;
         if here < least || (1..=reach).any(higher) {
             continue;
         }
@@ -150,9 +141,8 @@ fn keep_apart(fits: &mut Vec<Fit>, separation: f64) {
     let mut kept = 0;
     for i in 0..fits.len() {
         let (fit, mostly) = (fits[i], |fit: &Fit| 2 * fit.rising > fit.support);
-        let beside = |other: &Fit| {
-            mostly(other) == mostly(&fit) && wrap(other.azimuth - fit.azimuth).abs() < separation
-        };
+        let beside =
+            |other: &Fit| mostly(other) == mostly(&fit) && wrap(other.azimuth - fit.azimuth).abs() < separation;
         if !fits[..kept].iter().any(beside) {
             fits[kept] = fit;
             kept += 1;

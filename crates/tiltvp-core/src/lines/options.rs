@@ -37,7 +37,7 @@ pub struct GreatCircleOptions {
     pub bins: usize,
     /// Least angle between two lines of the same polarity, in radians. Default 1 degree.
     pub separation_rad: f64,
-    /// Least supported length of a line: the elevations that its runs of pixels cover, in radians. Default 10 degrees.
+    /// Least supported length of a line: the elevations that its runs of pixels cover, in radians. Default 15 degrees.
     pub length_min_rad: f64,
     /// Least number of pixels of a line. Default 15.
     pub support_min_px: u32,
@@ -57,7 +57,7 @@ impl Default for GreatCircleOptions {
             plane_max_rad: 5.0 * PI / 180.0,
             bins: 720,
             separation_rad: PI / 180.0,
-            length_min_rad: 10.0 * PI / 180.0,
+            length_min_rad: 15.0 * PI / 180.0,
             support_min_px: 15,
             gap_max_rad: 2.0 * PI / 180.0,
             run_min_px: 6,
@@ -104,7 +104,8 @@ impl Default for RadialOptions {
 /// Options of a line extractor.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LineOptions {
-    /// Which pixels are looked at for edges. Default from 30 degrees below the horizon to 60 above it, else as for tilt.
+    /// Which pixels are looked at for edges. Default from 30 degrees below the horizon to 60 above it, after smoothing by 0.6
+    /// pixels; else as for tilt.
     pub edges: EdgeOptions,
     /// Which pixels may be used at all. Default none: all.
     pub mask: Option<Mask>,
@@ -126,6 +127,7 @@ impl LineOptions {
             _ => return Err(Error::option("method", name, "\"great-circle\" or \"radial\"")),
         };
         let edges = EdgeOptions {
+            smoothing_px: 0.6,
             elevation_min_rad: -PI / 6.0,
             elevation_max_rad: PI / 3.0,
             ..EdgeOptions::default()

@@ -22,7 +22,8 @@ pub(super) fn keep_cyclic_order(matches: &mut Vec<Match>, m: usize) {
                 continue;
             }
             for j in 0..k {
-                let longer = count[j] + 1 > count[k] || (count[j] + 1 == count[k] && cost[j] < cost[k] - matches[(start + k) % n].distance);
+                let longer = count[j] + 1 > count[k]
+                    || (count[j] + 1 == count[k] && cost[j] < cost[k] - matches[(start + k) % n].distance);
                 if count[j] > 0 && turned(j) < turned(k) && longer {
                     (count[k], before[k]) = (count[j] + 1, j);
                     cost[k] = cost[j] + matches[(start + k) % n].distance;

@@ -104,7 +104,13 @@ impl Patch {
     }
 
     /// Samples one cell between four nodes, where places are nearly bilinear.
-    fn fill(&mut self, image: &ImageView<'_>, sight: &Sight, (row, column): (usize, usize), [a, b, c, d]: [[f32; 2]; 4]) {
+    fn fill(
+        &mut self,
+        image: &ImageView<'_>,
+        sight: &Sight,
+        (row, column): (usize, usize),
+        [a, b, c, d]: [[f32; 2]; 4],
+    ) {
         let unit = 1.0 / SUBDIVISIONS as f32;
         let mix = |p: [f32; 2], q: [f32; 2], t: f32| [p[0] + t * (q[0] - p[0]), p[1] + t * (q[1] - p[1])];
         for i in 0..SUBDIVISIONS.min(self.rows - row) {

@@ -88,8 +88,7 @@ pub(super) fn find(
     let gradient_min = (edges.gradient_min / 4.0) as f32;
     let mut center = radii.center;
     if options.center_search_px > 0.0 {
-        let found =
-            find_center(magnitude, image, gradient_min, &center, radii.rim, options.center_search_px, circle);
+        let found = find_center(magnitude, image, gradient_min, &center, radii.rim, options.center_search_px, circle);
         center = found.unwrap_or(center);
     }
     let (width, height) = (image.width(), image.height());
@@ -102,7 +101,9 @@ pub(super) fn find(
             let i = v * width + u;
             let (x, y) = ((u as f64 - center.x) as f32, (v as f64 - center.y) as f32);
             let distance = x.hypot(y);
-            if magnitude[i] < gradient_min || !sight.clear[i] || f64::from(distance) > radii.outer
+            if magnitude[i] < gradient_min
+                || !sight.clear[i]
+                || f64::from(distance) > radii.outer
                 || f64::from(distance) < radii.inner
             {
                 continue;

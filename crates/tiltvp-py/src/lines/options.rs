@@ -45,6 +45,7 @@ fn set(options: &mut LineOptions, key: &str, value: &Bound<'_, PyAny>) -> PyResu
         "descriptor_bins" => options.descriptor.bins = count()?,
         "descriptor_clip" => options.descriptor.clip = number()?,
         "descriptor_window" => options.descriptor.window = number()?,
+        "descriptor_smoothing" => options.descriptor.smoothing = number()?,
         "descriptor_normalisation" => {
             options.descriptor.normalisation = match value.extract::<String>().as_deref() {
                 Ok("area") => Normalisation::Area,
@@ -80,8 +81,7 @@ fn set(options: &mut LineOptions, key: &str, value: &Bound<'_, PyAny>) -> PyResu
 /// The error for an option that the method does not have: the near ones, then all.
 fn unknown(py: Python<'_>, key: &str, options: &LineOptions) -> PyResult<PyErr> {
     let names: Vec<String> = in_force(py, options)?.keys().extract()?;
-    let near: Vec<String> =
-        py.import("difflib")?.call_method1("get_close_matches", (key, names.clone()))?.extract()?;
+    let near: Vec<String> = py.import("difflib")?.call_method1("get_close_matches", (key, names.clone()))?.extract()?;
     let hint = if near.is_empty() { String::new() } else { format!(" (did you mean {}?)", near.join(" or ")) };
     let (method, names) = (options.method.name(), names.join(", "));
     Ok(invalid(format!("option {key}: unknown to method \"{method}\"{hint}, expected one of {names}")))
@@ -119,12 +119,13 @@ pub(super) fn in_force<'py>(py: Python<'py>, options: &LineOptions) -> PyResult<
             dict.set_item("center_search_px", o.center_search_px)?;
         }
     }
-    let DescriptorOptions { areas, overlapping, bins, clip, window, normalisation } = options.descriptor;
+    let DescriptorOptions { areas, overlapping, bins, clip, window, smoothing, normalisation } = options.descriptor;
     dict.set_item("descriptor_areas", areas)?;
     dict.set_item("descriptor_overlapping", overlapping)?;
     dict.set_item("descriptor_bins", bins)?;
     dict.set_item("descriptor_clip", clip)?;
     dict.set_item("descriptor_window", window)?;
+    dict.set_item("descriptor_smoothing", smoothing)?;
     let word = if normalisation == Normalisation::Area { "area" } else { "whole" };
     dict.set_item("descriptor_normalisation", word)?;
     Ok(dict)

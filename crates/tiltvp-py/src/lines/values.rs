@@ -100,7 +100,8 @@ impl Lines {
     }
 
     fn __repr__(&self) -> String {
-        let degrees: Vec<String> = self.inner.lines.iter().map(|l| format!("{:.1}", l.bearing_rad.to_degrees())).collect();
+        let degrees: Vec<String> =
+            self.inner.lines.iter().map(|l| format!("{:.1}", l.bearing_rad.to_degrees())).collect();
         format!("Lines({} at {} deg)", self.inner.lines.len(), degrees.join(", "))
     }
 
@@ -108,8 +109,15 @@ impl Lines {
         let bits = |lines: &core::Lines| -> Vec<u64> {
             let frame = lines.frame.center_px.map_or([u64::MAX; 2], |c| [c.x.to_bits(), c.y.to_bits()]);
             let line = |l: &Line| {
-                [l.bearing_rad, l.sigma_rad, f64::from(l.support_px), l.elevation_min_rad, l.elevation_max_rad, l.polarity]
-                    .map(f64::to_bits)
+                [
+                    l.bearing_rad,
+                    l.sigma_rad,
+                    f64::from(l.support_px),
+                    l.elevation_min_rad,
+                    l.elevation_max_rad,
+                    l.polarity,
+                ]
+                .map(f64::to_bits)
             };
             let normal = lines.frame.normal.iter().map(|x| x.to_bits());
             lines.lines.iter().flat_map(line).chain(frame).chain(normal).collect()
