@@ -19,8 +19,19 @@ setup:
 demo *arguments: setup
     {{bin}}/tiltvp demo {{arguments}}
 
+# Debian's chromium, in which the tests open the page of a report.
+browser:
+    #!/usr/bin/env bash
+    set -euo pipefail
+    command -v chromium > /dev/null && exit
+    root=""
+    [ "$(id -u)" = 0 ] || root=sudo
+    $root apt-get update --quiet --quiet
+    DEBIAN_FRONTEND=noninteractive $root apt-get install --quiet --quiet --yes --no-install-recommends chromium > /dev/null
+    command -v chromium > /dev/null
+
 # Sets up; checks and tests everything that needs no data.
-test: setup check test-rust test-python
+test: setup browser check test-rust test-python
 
 # Formats and lints of both languages. (Types, stubs and layers are among the Python tests, the core's layers among the Rust ones.)
 check:
@@ -45,9 +56,36 @@ test-real *arguments: setup
 measure-panoramas *arguments: setup
     {{bin}}/tiltvp measure panoramas "$TILTVP_DATA/panos" {{arguments}}
 
+# The paper's sweep on views of all panoramas of TILTVP_DATA and on rendered rooms, as they are and made harder: the tables,
+# how far covariance and confidence can be trusted, and the report. Remove out/database to begin anew.
+measure-database *arguments: setup
+    test -d out/database/panoramas || {{bin}}/tiltvp dataset render --panoramas "$TILTVP_DATA/panos" --out out/database/panoramas
+    test -d out/database/rooms || {{bin}}/tiltvp dataset synth --rooms 18 --locations-per-room 2 --samples 2 --out out/database/rooms
+    for name in panoramas rooms; do \
+        test -d out/database/$name-degraded || {{bin}}/tiltvp dataset degrade out/database/$name --out out/database/$name-degraded; \
+    done
+    {{bin}}/tiltvp evaluate out/database/panoramas --sweep paper --out out/database/runs/panoramas {{arguments}}
+    for name in rooms panoramas-degraded rooms-degraded; do \
+        {{bin}}/tiltvp evaluate out/database/$name --sweep table3 --out out/database/runs/$name {{arguments}}; \
+    done
+    {{bin}}/tiltvp measure confidence out/database/runs/panoramas out/database/runs/rooms out/database/runs/panoramas-degraded out/database/runs/rooms-degraded
+    {{bin}}/tiltvp report out/database/runs/panoramas --out out/database/report
+
+# What an evaluation costs over the number of images and over their pixels.
+measure-scaling *arguments: setup
+    {{bin}}/tiltvp measure scaling {{arguments}}
+
 # The refined method on panoramas as they were taken, against an inertial sensor.
 measure-inertial *arguments: setup
     {{bin}}/tiltvp measure inertial "$TILTVP_DATA/panos_theta_imu" {{arguments}}
+
+# Planar-motion pose estimation over tilt in rendered rooms, without and with tilt correction.
+measure-planar-pose *arguments: setup
+    {{bin}}/tiltvp measure planar-pose {{arguments}}
+
+# The options of the sampling loop against plain RANSAC, on the same panoramas and on rendered rooms.
+measure-sampling *arguments: setup
+    {{bin}}/tiltvp measure sampling "$TILTVP_DATA/panos" {{arguments}}
 
 # Round trips and Jacobians of the calibrations of TILTVP_DATA, as a table.
 measure-cameras: setup

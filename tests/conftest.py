@@ -10,7 +10,11 @@ import numpy as np
 import pytest
 
 import tiltvp
-from tiltvp.synth import RoomImage, render_room
+from evaluations import evaluated
+from tiltvp.datasets.folder import TiltDataset, read_dataset
+from tiltvp.datasets.new import new_dataset
+from tiltvp.evaluation.runs import Run
+from tiltvp.synth import Room, RoomImage, render_room
 
 SIDE = 256
 
@@ -59,6 +63,28 @@ def room(render: Callable[..., RoomImage]) -> RoomImage:
 def upright_room(render: Callable[..., RoomImage]) -> RoomImage:
     """The same room without any lean and without noise."""
     return render(kind="living-room", seed=1, alpha_rad=0.0, beta_rad=0.0, noise_sigma=0.0)
+
+
+@pytest.fixture(scope="session")
+def dataset(tmp_path_factory: pytest.TempPathFactory, camera: tiltvp.Camera) -> TiltDataset:
+    """A dataset of fifteen images: five places of one room, each at three leans, one image without any edge."""
+    folder = tmp_path_factory.mktemp("dataset") / "rooms"
+    scene = Room("living-room", 1, threads=1)
+    with new_dataset(folder, camera) as new:
+        for place, pose in enumerate(scene.free_poses(5, 1)):
+            for lean, (alpha_deg, beta_deg) in enumerate(((0.0, 0.0), (3.0, 0.0), (6.0, 137.0))):
+                alpha, beta = math.radians(alpha_deg), math.radians(beta_deg)
+                view = scene.render(camera, pose=pose, alpha_rad=alpha, beta_rad=beta, samples=2, seed=place)
+                gray = np.full_like(view.gray, 90) if (place, lean) == (1, 2) else view.gray
+                truth = {"location": f"place-{place}", "environment": "flat", "alpha_rad": alpha, "beta_rad": beta}
+                new.images.append(new.write(f"{place}{lean}", gray, **truth))
+    return read_dataset(folder)
+
+
+@pytest.fixture(scope="session")
+def whole(tmp_path_factory: pytest.TempPathFactory, dataset: TiltDataset) -> Run:
+    """The run of table 3's parameters over it, on one thread."""
+    return evaluated(dataset, tmp_path_factory.mktemp("whole") / "run")
 
 
 @pytest.fixture(scope="session")

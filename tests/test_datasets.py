@@ -14,6 +14,7 @@ import pytest
 import tiltvp
 from tiltvp import tilt_from_wheel_heights
 from tiltvp.datasets.check import check_dataset
+from tiltvp.datasets.degrading import HARDSHIPS, degrade_dataset, degrade_image
 from tiltvp.datasets.folder import read_dataset
 from tiltvp.datasets.new import new_dataset
 from tiltvp.datasets.rendering import find_panoramas, render_panoramas, render_rooms
@@ -356,3 +357,21 @@ def test_no_panoramas(tmp_path: Path) -> None:
     (tmp_path / "a.png").write_bytes(b"")
     with pytest.raises(InvalidInputError, match="limit = 0"):
         find_panoramas(tmp_path, 0)
+
+
+def test_a_degraded_dataset_is_harder_and_its_truth_the_same(tmp_path: Path) -> None:
+    camera = tiltvp.Camera.equidistant(width=96, height=72, focal_px=21.0, cx=47.5, cy=35.5, max_theta_rad=1.6)
+    render_rooms(camera, tmp_path / "plain", kinds=["office"], rooms=1, locations_per_room=2, samples=1, seed=4)
+    dataset = read_dataset(tmp_path / "plain")
+    for threads in (1, 2):
+        degrade_dataset(dataset, tmp_path / f"hard{threads}", seed=3, threads=threads)
+    hard = read_dataset(tmp_path / "hard1")
+    assert hard.digest() == read_dataset(tmp_path / "hard2").digest()
+    truth = [(image.location, image.environment, image.alpha_rad, image.beta_rad) for image in dataset.images]
+    assert [(image.location, image.environment, image.alpha_rad, image.beta_rad) for image in hard.images] == truth
+    assert {image.file.split("_")[-1] for image in hard.images} <= {f"{hardship}.png" for hardship in HARDSHIPS}
+    before, after = (np.stack([each.read(image) for image in each.images]).astype(float) for each in (dataset, hard))
+    gradients = [np.abs(np.diff(cv2.GaussianBlur(i, (0, 0), 2.0), axis=1)).mean() for i in (*before, *after)]
+    assert np.mean(gradients[len(before) :]) < 0.7 * np.mean(gradients[: len(before)])
+    with pytest.raises(InvalidInputError, match="hardship = 'wet', expected one of hidden, blurred, dark"):
+        degrade_image(np.zeros((72, 96), dtype=np.uint8), "wet", camera, np.random.default_rng(0))

@@ -71,7 +71,7 @@ def test_the_table_of_options_has_the_defaults_in_force(camera: tiltvp.Camera) -
     expected: dict[str, list[str]] = {}
     for name in dict.fromkeys(name for options in in_force for name in options):
         shown = [options.get(name, "–") for options in in_force]  # noqa: RUF001
-        expected[name] = [f"{value:g}" if isinstance(value, float | int) else str(value) for value in shown]
+        expected[name] = [f"{value:g}" if type(value) in (int, float) else str(value) for value in shown]
     assert written == expected
 
 

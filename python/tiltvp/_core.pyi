@@ -308,6 +308,13 @@ class EdgeElements:
         """(N,): edge offsets s in pixels (eq. 17); NaN where the lens sees neither zenith nor nadir."""
 
     @property
+    def normal(self) -> NDArray[np.float64]:
+        """(N, 3): unit normals of the edges' great circles in the robot frame (eq. 37), of either sign.
+
+        Those of the method, before any prefilter; NaN for the image-space methods, which have none.
+        """
+
+    @property
     def prefiltered(self) -> NDArray[np.bool_]:
         """(N,): the pixels that passed the prefilter."""
 
@@ -485,6 +492,10 @@ class TiltEstimator:
         offset_max_px: float | None = ...,
         threshold_rad: float = ...,
         normal: Literal["gradient", "tangent"] = ...,
+        sampling: Literal["uniform", "progressive", "prosac"] = ...,
+        local_optimization: bool = ...,
+        score: Literal["count", "msac", "magsac"] = ...,
+        verification: Literal["full", "sprt"] = ...,
         correction: float | AffineCorrection | PosteriorCorrection | Literal["closed-form"] | None = ...,
     ) -> Self:
         """Makes the tables. Defaults depend on the method; `options` tells those in force.
@@ -521,7 +532,8 @@ class TiltEstimator:
         tolerance_rad
             "refined": change of the direction below which it has converged.
         max_iterations
-            "refined": most refits with the gate at its final scale.
+            "refined": most refits with the gate at its final scale. "image-space-reject-refit": most rounds of
+            rejecting and refitting, N_E; 0 is plain least squares.
         threshold_px
             "image-space-ransac": largest residual of an inlier, delta_s,max of eq. 32.
         offset_max_px
@@ -531,6 +543,19 @@ class TiltEstimator:
             "vector-consensus": largest angle between an inlier's great circle and the vertical, delta_o,max of eq. 40.
         normal
             "vector-consensus": "gradient" is the paper's normal (eq. 37), "tangent" the exact one.
+        sampling
+            "image-space-ransac", "vector-consensus": "uniform" draws samples from all edge pixels alike, "progressive"
+            from a growing pool of the strongest, "prosac" also stops as PROSAC does (Chum and Matas 2005), which
+            presumes that pixels err independently.
+        local_optimization
+            The same methods: whether each new best model is refined by iterated least squares (Chum, Matas and Kittler
+            2003; Lebeda, Matas and Chum 2012).
+        score
+            The same methods: the best model has the most inliers ("count"), the least truncated squares ("msac", Torr
+            and Zisserman 2000), or the best score marginalised over the noise ("magsac", MAGSAC++, Barath et al. 2020).
+        verification
+            The same methods: "full" scores every model, "sprt" gives up those that fail a sequential probability ratio
+            test (Matas and Chum 2005).
         correction
             Image-space methods: "closed-form" divides each offset by its pixel's own gain, a number is the factor a of
             eq. 30 in pixels per radian, None is the lens' own scale of eq. 26. "vector-consensus": a number is the

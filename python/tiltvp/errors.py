@@ -25,5 +25,13 @@ class ImageFileError(TiltvpError, OSError):
     """An image file cannot be read or written."""
 
 
+class RunError(TiltvpError, RuntimeError):
+    """The folder of an evaluation's run cannot be continued or read, or its cluster cannot be used."""
+
+
+class MissingExtraError(TiltvpError, ImportError):
+    """Something needs packages that are installed with an extra, such as `tiltvp[report]`."""
+
+
 class InternalError(TiltvpError, RuntimeError):
     """A fault of the package itself, which should be reported."""

@@ -68,13 +68,16 @@ class TiltEstimator(_core.TiltEstimator):
     front gradient_min, smoothing_px, elevation_min_rad, elevation_max_rad, margin_px, tilt_max_rad, mask, seed
         Options of every method: see the README. `mask` is (H, W) bool, True where the image shows the world.
     keep_fraction, scale_rad, tolerance_rad, max_iterations
-        Of "refined"; `keep_fraction` also of "image-space-reject-refit".
+        Of "refined"; `keep_fraction` and `max_iterations` also of "image-space-reject-refit".
     threshold_px, offset_max_px, correction
         Of the image-space methods; `correction` is "closed-form" (default), a factor in pixels per radian, None, an
         `AffineCorrection` or a `PosteriorCorrection`.
     threshold_rad, normal, correction
         Of "vector-consensus"; `normal` is "gradient" (the paper's) or "tangent", `correction` a factor without unit
         or one of those trained on raw angles.
+    sampling, local_optimization, score, verification
+        Of "image-space-ransac" and "vector-consensus": "uniform" (default), "progressive" or "prosac"; a bool; "count"
+        (default), "msac" or "magsac"; "full" (default) or "sprt".
     """
 
     __slots__ = ()

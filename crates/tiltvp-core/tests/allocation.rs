@@ -12,6 +12,7 @@ use scene::{constant, fisheye, noise, stripes};
 use tiltvp_core::camera::Camera;
 use tiltvp_core::edges::NormalKind;
 use tiltvp_core::geometry::Tilt;
+use tiltvp_core::robust::{LocalOptimization, SampleOrder, Sampling, Score, Verification};
 use tiltvp_core::tilt::{Correction, METHODS, Method, TiltEstimator, TiltOptions, TrainedCorrection};
 
 thread_local! {
@@ -64,6 +65,19 @@ fn allocations(work: impl FnOnce()) -> usize {
 /// The defaults of every method, and every choice that runs other code.
 fn choices() -> Vec<TiltOptions> {
     let mut all: Vec<_> = METHODS.map(|name| TiltOptions::for_method(name).unwrap()).into();
+    for mut options in all.clone() {
+        if let Method::ImageSpaceRansac { sampling, .. } | Method::VectorConsensus { sampling, .. } =
+            &mut options.method
+        {
+            *sampling = Sampling {
+                order: SampleOrder::progressive(),
+                local_optimization: Some(LocalOptimization::default()),
+                score: Score::magsac(),
+                verification: Verification::sprt(),
+            };
+            all.push(options);
+        }
+    }
     for options in all.clone() {
         let mut other = options;
         match &mut other.method {

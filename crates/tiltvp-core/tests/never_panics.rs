@@ -15,6 +15,7 @@ use tiltvp_core::camera::{Camera, Equidistant, Model};
 use tiltvp_core::edges::{EdgeOptions, Mask, NormalKind};
 use tiltvp_core::geometry::Tilt;
 use tiltvp_core::image::ImageView;
+use tiltvp_core::robust::{LocalOptimization, SampleOrder, Sampling, Score, Verification};
 use tiltvp_core::testing::zoo;
 use tiltvp_core::tilt::{
     CommonDirectionOptions, Correction, Method, RefineOptions, TiltEstimator, TiltOptions, TrainedCorrection,
@@ -102,6 +103,28 @@ fn number(low: f64, high: f64) -> impl Strategy<Value = f64> {
     prop_oneof![60 => low..high, 1 => odd]
 }
 
+fn sampling() -> impl Strategy<Value = Sampling> {
+    let order = prop_oneof![
+        Just(SampleOrder::Uniform),
+        (0..100_000u32, proptest::option::of(number(0.01, 0.99)))
+            .prop_map(|(uniform_after, chance_share)| SampleOrder::Progressive { uniform_after, chance_share }),
+    ];
+    let local_optimization = proptest::option::of(
+        (0..6u32, number(1.0, 4.0)).prop_map(|(iterations, widening)| LocalOptimization { iterations, widening }),
+    );
+    let score =
+        prop_oneof![Just(Score::Count), Just(Score::Msac), (0..12u32).prop_map(|refits| Score::Magsac { refits })];
+    let verification = prop_oneof![
+        Just(Verification::Full),
+        (number(0.05, 0.95), number(0.01, 0.5), number(1.0, 1000.0)).prop_map(
+            |(inlier_share, chance_share, model_cost)| Verification::Sprt { inlier_share, chance_share, model_cost }
+        ),
+    ];
+    (order, local_optimization, score, verification).prop_map(|(order, local_optimization, score, verification)| {
+        Sampling { order, local_optimization, score, verification }
+    })
+}
+
 fn methods() -> impl Strategy<Value = Method> {
     let correction = || {
         prop_oneof![
@@ -112,20 +135,22 @@ fn methods() -> impl Strategy<Value = Method> {
     };
     let normal = prop_oneof![Just(NormalKind::Tangent), Just(NormalKind::Gradient)];
     prop_oneof![
-        (number(0.1, 30.0), prop::option::of(number(1.0, 80.0)), correction()).prop_map(
-            |(threshold_px, offset_max_px, correction)| {
-                Method::ImageSpaceRansac { threshold_px, offset_max_px, correction }
+        (number(0.1, 30.0), prop::option::of(number(1.0, 80.0)), correction(), sampling()).prop_map(
+            |(threshold_px, offset_max_px, correction, sampling)| {
+                Method::ImageSpaceRansac { threshold_px, offset_max_px, correction, sampling }
             }
         ),
         (number(0.01, 0.99), prop::option::of(number(1.0, 80.0)), correction()).prop_map(
             |(keep_fraction, offset_max_px, correction)| {
-                Method::ImageSpaceRejectRefit { keep_fraction, offset_max_px, correction }
+                Method::ImageSpaceRejectRefit { keep_fraction, max_iterations: 15, offset_max_px, correction }
             }
         ),
-        (number(0.001, 1.0), normal, number(0.3, 3.0)).prop_map(|(threshold_rad, normal, factor)| {
-            let correction = TrainedCorrection::Factor(factor);
-            Method::VectorConsensus { threshold_rad, normal, correction }
-        }),
+        (number(0.001, 1.0), normal, number(0.3, 3.0), sampling()).prop_map(
+            |(threshold_rad, normal, factor, sampling)| {
+                let correction = TrainedCorrection::Factor(factor);
+                Method::VectorConsensus { threshold_rad, normal, correction, sampling }
+            }
+        ),
         (number(0.01, 0.99), number(0.001, 0.9)).prop_map(|(keep_fraction, scale_rad)| Method::Refined(
             RefineOptions { keep_fraction, scale_rad, ..RefineOptions::default() }
         )),

@@ -9,6 +9,7 @@ use scene::{Image, dice, fisheye, stripes};
 use tiltvp_core::Error;
 use tiltvp_core::edges::{EdgeOptions, Mask, NormalKind};
 use tiltvp_core::geometry::Tilt;
+use tiltvp_core::robust::{LocalOptimization, SampleOrder, Sampling, Score, Verification};
 use tiltvp_core::tilt::{
     CommonDirectionOptions, Correction, METHODS, Method, RefineOptions, TiltEstimate, TiltEstimator, TiltOptions,
     TrainedCorrection, common_direction,
@@ -160,12 +161,76 @@ fn every_option_of_the_methods_on_normals_is_read() {
     );
 }
 
+/// The sampling of a sampling method.
+fn sampling(options: &mut TiltOptions) -> &mut Sampling {
+    match &mut options.method {
+        Method::ImageSpaceRansac { sampling, .. } | Method::VectorConsensus { sampling, .. } => sampling,
+        other => panic!("{other:?} does not sample"),
+    }
+}
+
+#[test]
+fn every_option_of_the_sampling_is_read() {
+    for method in ["image-space-ransac", "vector-consensus"] {
+        assert_read(
+            method,
+            &[
+                ("order", |o| sampling(o).order = SampleOrder::progressive()),
+                ("local_optimization", |o| sampling(o).local_optimization = Some(LocalOptimization::default())),
+                ("score magsac", |o| sampling(o).score = Score::magsac()),
+            ],
+        );
+    }
+}
+
+/// Each number of an option changes an answer or the number of trials.
+#[test]
+fn every_number_of_the_sampling_is_read() {
+    let with = |change: &dyn Fn(&mut Sampling)| {
+        let mut answers = Vec::new();
+        for method in ["image-space-ransac", "vector-consensus"] {
+            for seed in 0..4 {
+                let mut options = TiltOptions { seed, ..defaults(method) };
+                match &mut options.method {
+                    Method::ImageSpaceRansac { threshold_px, .. } => *threshold_px = 2.0,
+                    Method::VectorConsensus { threshold_rad, .. } => *threshold_rad = 0.02,
+                    _ => {}
+                }
+                change(sampling(&mut options));
+                let answer = estimate(options);
+                answers.push((answer.tilt, answer.iterations));
+            }
+        }
+        answers
+    };
+    let order =
+        |uniform_after, chance_share| with(&|s| s.order = SampleOrder::Progressive { uniform_after, chance_share });
+    assert_ne!(order(200_000, None), order(50, None));
+    assert_ne!(order(200_000, None), order(200_000, Some(0.05)));
+    assert_ne!(order(200_000, Some(0.05)), order(200_000, Some(0.9)));
+    let local =
+        |iterations, widening| with(&|s| s.local_optimization = Some(LocalOptimization { iterations, widening }));
+    assert_ne!(local(4, 2.0), local(2, 2.0));
+    assert_ne!(local(4, 2.0), local(4, 1.0));
+    let magsac = |refits| with(&|s| s.score = Score::Magsac { refits });
+    assert_ne!(magsac(0), magsac(10));
+    let sprt = |inlier_share, chance_share, model_cost| {
+        with(&|s| s.verification = Verification::Sprt { inlier_share, chance_share, model_cost })
+    };
+    assert_ne!(sprt(0.1, 0.05, 100.0), with(&|_| {}));
+    assert_ne!(with(&|s| s.score = Score::Msac), with(&|_| {}));
+    assert_ne!(sprt(0.05, 0.02, 50.0), sprt(0.9, 0.02, 50.0));
+    assert_ne!(sprt(0.1, 0.01, 50.0), sprt(0.1, 0.09, 50.0));
+    assert_ne!(sprt(0.1, 0.05, 1.0), sprt(0.1, 0.05, 1000.0));
+}
+
 /// A factor divides the lean and nothing else.
 #[test]
 fn factors_divide_the_lean() {
     let with = |factor| {
         let method = Method::ImageSpaceRejectRefit {
             keep_fraction: 0.8,
+            max_iterations: 15,
             offset_max_px: Some(40.0),
             correction: Correction::factor(factor),
         };
@@ -214,15 +279,22 @@ fn wrong_values_of_a_method_are_refused_by_name() {
             threshold_px,
             offset_max_px: Some(offset_max_px),
             correction: Correction::factor(factor),
+            sampling: Sampling::default(),
         };
         let trimming = |keep_fraction, offset_max_px, factor| Method::ImageSpaceRejectRefit {
             keep_fraction,
+            max_iterations: 15,
             offset_max_px: Some(offset_max_px),
             correction: Correction::factor(factor),
         };
         let vectors = |threshold_rad, factor| {
             let correction = TrainedCorrection::Factor(factor);
-            Method::VectorConsensus { threshold_rad, normal: NormalKind::Tangent, correction }
+            Method::VectorConsensus {
+                threshold_rad,
+                normal: NormalKind::Tangent,
+                correction,
+                sampling: Sampling::default(),
+            }
         };
         let refined = |keep_fraction, scale_rad| {
             Method::Refined(RefineOptions { keep_fraction, scale_rad, ..RefineOptions::default() })
@@ -241,6 +313,11 @@ fn wrong_values_of_a_method_are_refused_by_name() {
         ] {
             assert_eq!(refused(TiltOptions { method, ..defaults("refined") }), name, "{wrong}");
         }
+    }
+    for method in ["image-space-ransac", "vector-consensus"] {
+        let mut options = defaults(method);
+        sampling(&mut options).local_optimization = Some(LocalOptimization { iterations: 4, widening: 0.5 });
+        assert_eq!(refused(options), "widening");
     }
     let error = TiltOptions::for_method("refine").unwrap_err().to_string();
     for name in METHODS {

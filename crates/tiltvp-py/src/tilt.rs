@@ -8,6 +8,7 @@ mod filtered;
 mod image_edges;
 mod options;
 mod report;
+mod sampling;
 mod values;
 
 use std::sync::{Arc, Mutex, PoisonError};

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from cyclopts import App, CycloptsError
 
 from tiltvp import __version__
-from tiltvp.cli import camera, dataset, demo, measure, tilt
+from tiltvp.cli import camera, dataset, demo, evaluate, measure, report, tilt
 from tiltvp.cli.terminal import complain
 from tiltvp.errors import TiltvpError
 
@@ -25,7 +25,9 @@ app.command(tilt.tilt)
 app.command(demo.demo)
 app.command(camera.app)
 app.command(dataset.app)
+app.command(evaluate.evaluate)
 app.command(measure.app)
+app.command(report.report)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -1,18 +1,20 @@
-"""`tiltvp measure`: the numbers of the methods on panoramas with known tilt."""
+"""`tiltvp measure`: the numbers of the methods on panoramas with known tilt, and what they cost."""
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
-from cyclopts import App, Parameter
+from cyclopts import App, Parameter, validators
 
-from tiltvp.cli.terminal import new_table, progress_bar, show
-
-if TYPE_CHECKING:
-    import polars as pl
+from tiltvp.cli.planar_pose import planar_pose
+from tiltvp.cli.results import check_ending, show_frame, write_frame
+from tiltvp.cli.terminal import progress_bar, say
+from tiltvp.errors import InvalidInputError
 
 app = App(name="measure", help="Measure the methods on images of known tilt.")
+app.command(planar_pose)
 
 
 @app.command
@@ -41,19 +43,24 @@ def panoramas(
     turn
         Give each view a heading of its own.
     out
-        Also write the long table, one row for each image and method, as Parquet.
+        Also write the long table, one row for each image, combination and correction: .csv, .json or .parquet.
     """
     from tiltvp.datasets.panoramas import paper_camera, read_panorama_index
-    from tiltvp.evaluation.panoramas import estimate_views, summarise
+    from tiltvp.evaluation.combinations import choose
+    from tiltvp.evaluation.panoramas import evaluate_views
+    from tiltvp.evaluation.summary import errors, variants
 
+    if out is not None:
+        check_ending(out)
     chosen = read_panorama_index(directory)[::every]
     with progress_bar(len(chosen), "panoramas") as bar:
-        table = estimate_views(
-            chosen, paper_camera(), samples=samples, noise_sigma=noise_sigma, turn=turn, advance=bar.advance
-        )
+        table = evaluate_views(
+            chosen, paper_camera(), choose("table3"), samples=samples, noise_sigma=noise_sigma, turn=turn,
+            advance=bar.advance,
+        )  # fmt: skip
     if out is not None:
-        table.write_parquet(out)
-    _show(f"Errors in degrees (eq. 44), {len(chosen)} panoramas", summarise(table), "variant")
+        write_frame(table, out)
+    show_frame(f"Errors in degrees (eq. 44), {len(chosen)} panoramas", variants(errors(table)), ["variant"])
 
 
 @app.command
@@ -73,11 +80,153 @@ def inertial(directory: Path, /, *, samples: int = 2) -> None:
     chosen = read_inertial_index(directory)
     with progress_bar(len(chosen), "panoramas") as bar:
         table = estimate_leaning(chosen, paper_camera(), samples=samples, advance=bar.advance)
-    _show("Refined lean minus sensor, degrees, constant offset removed", summarise_inertial(table), "panoramas")
+    show_frame("Refined lean minus sensor, degrees, constant offset removed", summarise_inertial(table), ["panoramas"])
 
 
-def _show(title: str, table: pl.DataFrame, words: str) -> None:
-    view = new_table(title, table.columns, left=[words])
-    for row in table.iter_rows():
-        view.add_row(*("" if cell is None else f"{cell:.3f}" if isinstance(cell, float) else str(cell) for cell in row))
-    show(view)
+@app.command
+def scaling(
+    *,
+    images: Annotated[tuple[int, ...], Parameter(consume_multiple=True)] = (21, 42, 84, 168),
+    scales: Annotated[tuple[float, ...], Parameter(consume_multiple=True)] = (0.25, 0.5, 1.0, 2.0, 4.0),
+    sweep: str = "paper",
+    threads: Annotated[int | None, Parameter(validator=validators.Number(gte=1))] = None,
+    out: Path | None = None,
+) -> None:
+    """The time that an evaluation of rendered rooms takes, over the number of images and over their pixels.
+
+    Parameters
+    ----------
+    images
+        Numbers of images of 640 x 480.
+    scales
+        Pixels of an image, in multiples of 640 x 480.
+    sweep
+        What is tried: paper or table3.
+    threads
+        Images at the same time; all cores by default.
+    out
+        Also write the table: .csv, .json or .parquet.
+    """
+    from tiltvp.datasets.panoramas import paper_camera
+    from tiltvp.evaluation.combinations import choose
+    from tiltvp.evaluation.scaling import exponents, measure_scaling
+
+    if out is not None:
+        check_ending(out)
+    combinations = choose(sweep)
+    with progress_bar(len(images) + len(scales), "evaluations") as bar:
+        table = measure_scaling(
+            paper_camera(), combinations, images=images, scales=scales, threads=threads or os.cpu_count() or 1,
+            advance=bar.advance,
+        )  # fmt: skip
+    if out is not None:
+        write_frame(table, out)
+    show_frame(f"Seconds of an evaluation of {len(combinations)} combinations", table, ["over"])
+    show_frame("Exponents of growth: 1 is linear", exponents(table), ["over"])
+
+
+@app.command
+def confidence(
+    runs: Annotated[list[Path], Parameter(consume_multiple=True)],
+    /,
+    *,
+    out: Path | None = None,
+) -> None:
+    """How far covariance and confidence can be trusted: the truths that regions hold, and failures that were foreseen.
+
+    Parameters
+    ----------
+    runs
+        Folders that `tiltvp evaluate` has written.
+    out
+        Also write the table: .csv, .json or .parquet.
+    """
+    from tiltvp.evaluation.runs import read_run
+    from tiltvp.evaluation.summary import errors
+    from tiltvp.evaluation.trust import trust
+    from tiltvp.evaluation.variants import best_rows
+
+    if out is not None:
+        check_ending(out)
+    tables = {}
+    for directory in runs:
+        table = read_run(directory).table
+        tables[directory.name] = best_rows(table, errors(table))
+    if len(tables) < len(runs):
+        raise InvalidInputError(f"{', '.join(map(str, runs))}: expected runs with names of their own")
+    table = trust(tables)
+    if out is not None:
+        write_frame(table, out)
+    show_frame(
+        "Failures (above 2 degrees) foreseen, and truths inside the covariance's regions", table, ["run", "variant"]
+    )
+
+
+@app.command
+def sampling(
+    directory: Path | None = None,
+    /,
+    *,
+    every: int = 4,
+    rooms: int = 4,
+    kind: str | None = None,
+    seeds: int = 5,
+    samples: int = 2,
+    noise_sigma: float = 2.0,
+    out: Path | None = None,
+) -> None:
+    """Each option of the sampling loop, alone and together, against plain RANSAC: errors, trials, times, what pays.
+
+    Parameters
+    ----------
+    directory
+        Folder with the panoramas and an INDEX.csv of columns name, environment, tilt_x_deg, tilt_z_deg; without one,
+        rendered rooms alone are measured.
+    every
+        Take every so-manieth panorama.
+    rooms
+        Rendered rooms of each kind; 0 for none.
+    kind
+        Rooms of this kind alone.
+    seeds
+        Seeds for each image.
+    samples
+        Rays per pixel and side.
+    noise_sigma
+        Gaussian noise in grey levels.
+    out
+        Also write the long table, one row for each image, method, way and seed, as Parquet.
+    """
+    import polars as pl
+
+    from tiltvp.datasets.panoramas import TABLE_1_TILTS_DEG, paper_camera, read_panorama_index
+    from tiltvp.evaluation.sampling import panorama_views, room_views, sample_views, summarise_sampling
+    from tiltvp.synth import ROOM_KINDS
+
+    if directory is None and rooms <= 0:
+        raise InvalidInputError(f"--rooms {rooms}, expected a folder of panoramas, or rooms to render")
+    chosen = [] if directory is None else read_panorama_index(directory)[::every]
+    camera, kinds = paper_camera(), ROOM_KINDS if kind is None else (kind,)
+    sources = {
+        f"{len(chosen)} panoramas": (
+            len(chosen), panorama_views(chosen, camera, samples=samples, noise_sigma=noise_sigma)
+        ),
+        f"{rooms * len(kinds)} rooms": (
+            rooms * len(kinds), room_views(rooms, camera, samples=samples, noise_sigma=noise_sigma, kinds=kinds)
+        ),
+    }  # fmt: skip
+    tables = []
+    for title, (places, views) in sources.items():
+        if places == 0:
+            continue
+        with progress_bar(places * len(TABLE_1_TILTS_DEG), title) as bar:
+            table = sample_views(views, camera, seeds=seeds, advance=bar.advance)
+        tables.append(table.with_columns(source=pl.lit(title)))
+        summary = summarise_sampling(table)
+        for (method,), part in summary.group_by("method", maintain_order=True):
+            show_frame(f"{title}, {method}: degrees (eq. 44)", part.drop("method"), ["way"])
+            paying = part.filter(~pl.col("pays").is_in(["", "no"])).select("way", "pays", "image").iter_rows()
+            words = [f"{way} (in {what}, at {image:.2f} of an image's time)" for way, what, image in paying]
+            say(f"Pays: {'; '.join(words) or 'none'}.")
+    if out is not None and tables:
+        pl.concat(tables).write_parquet(out)

@@ -20,7 +20,7 @@ _CAMERA = Group("Camera")
 _METHOD = Group("Method", help="An option that is not given has the default of its method.")
 _AS_THEY_ARE = (
     "method", "margin_px", "gradient_min", "smoothing_px", "keep_fraction", "max_iterations", "threshold_px",
-    "offset_max_px", "normal", "seed",
+    "offset_max_px", "normal", "sampling", "local_optimization", "score", "verification", "seed",
 )  # fmt: skip
 _ANGLES = ("elevation_min", "elevation_max", "tilt_max", "scale", "tolerance", "threshold")
 Switch = Annotated[bool, Parameter(negative="", show_default=False)]
@@ -107,6 +107,14 @@ class MethodOptions:
     """gradient or tangent: the normals of vector-consensus."""
     correction: str | None = None
     """closed-form, none or a number: the factor from shift (or raw angle) to angle."""
+    sampling: str | None = None
+    """uniform, progressive or prosac: which samples image-space-ransac and vector-consensus draw."""
+    local_optimization: Annotated[bool | None, Parameter(negative="")] = None
+    """Refine each new best model by least squares before the next sample."""
+    score: str | None = None
+    """count, msac or magsac: what makes one model better than another."""
+    verification: str | None = None
+    """full or sprt: score every model, or give up those that fail a test."""
     seed: int | None = None
     """Seed of the random samples."""
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
-from tiltvp.cli.terminal import new_table
+from tiltvp.cli.terminal import new_table, show
 from tiltvp.errors import ImageFileError, InvalidInputError
 
 if TYPE_CHECKING:
@@ -158,6 +158,31 @@ def _numbers(e: TiltEstimate | FilteredTilt) -> dict[str, object]:
 
 def _plain(value: object) -> object:
     return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+def show_frame(title: str, frame: pl.DataFrame, words: Sequence[str], hidden: Sequence[str] = ()) -> None:
+    """A table of numbers on stdout; the columns in `words` hold words, those in `hidden` are left out.
+
+    The title has the unit of the columns that end in one.
+    """
+    shown = frame.select(name for name in frame.columns if name not in hidden)
+    table = new_table(title, (_heading(name) for name in shown.columns), left=words)
+    for row in shown.iter_rows():
+        table.add_row(*(_cell(cell) for cell in row))
+    show(table)
+
+
+def _heading(column: str) -> str:
+    """The name of a column without its unit, which the title of the table has."""
+    return column.removesuffix("_deg").removesuffix("_ms").replace("_", " ")
+
+
+def _cell(value: object) -> str:
+    if value is None:
+        return ""
+    if not isinstance(value, float):
+        return str(value)
+    return f"{value:.3f}" if abs(value) < 100.0 else f"{value:.1f}"
 
 
 def check_ending(path: Path) -> None:

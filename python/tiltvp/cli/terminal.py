@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
@@ -76,8 +76,23 @@ def new_table(title: str | None, columns: Iterable[str], left: Iterable[str] = (
 
 
 @contextmanager
-def progress_bar(total: int, what: str) -> Iterator[ProgressBar]:
-    """A bar on stderr for several things on a terminal, nothing otherwise; complaints go above it."""
+def status(words: str) -> Iterator[Callable[[str], None]]:
+    """A moving sign on stderr while something takes long, on a terminal; what it gives changes the words."""
+    if not sys.stderr.isatty():
+        yield lambda _: None
+        return
+    from rich.console import Console
+
+    with Console(stderr=True).status(words) as sign:
+        yield lambda text: sign.update(text)
+
+
+@contextmanager
+def progress_bar(total: int, what: str, *, done: int = 0) -> Iterator[ProgressBar]:
+    """A bar with the time left on stderr for several things on a terminal, nothing otherwise; complaints go above it.
+
+    What was `done` before counts as done, and not for the time left.
+    """
     if total < 2 or not sys.stderr.isatty():
         yield ProgressBar(None)
         return
@@ -87,7 +102,7 @@ def progress_bar(total: int, what: str) -> Iterator[ProgressBar]:
     console = Console(stderr=True, highlight=False)
     columns = (TextColumn(what), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
     with Progress(*columns, console=console, transient=True) as progress:
-        progress.add_task(what, total=total)
+        progress.add_task(what, total=total, completed=done)
         yield ProgressBar(progress)
 
 

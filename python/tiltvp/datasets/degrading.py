@@ -37,14 +37,14 @@ def degrade_image(
     gray: NDArray[np.uint8], hardship: str, camera: Camera, rng: np.random.Generator
 ) -> NDArray[np.uint8]:
     """(H, W) uint8: the image with one of `HARDSHIPS`, as strong as `rng` draws it."""
-    image = gray.astype(np.float32)
+    image: NDArray[np.float64] = gray.astype(np.float64)
     if hardship == "hidden":
         seen = _window(camera, rng)
         hidden = _HIDDEN_LEVEL + rng.normal(0.0, _NOISE, image.shape)
         image = seen * image + (1.0 - seen) * hidden
     elif hardship == "blurred":
-        image = cv2.GaussianBlur(image, (0, 0), rng.uniform(1.5, 8.0)).astype(np.float32)
-        image = image + rng.normal(0.0, _NOISE, image.shape)
+        blurred = cv2.GaussianBlur(image, (0, 0), rng.uniform(1.5, 8.0)).astype(np.float64)
+        image = blurred + rng.normal(0.0, _NOISE, image.shape)
     elif hardship == "dark":
         image = rng.uniform(0.04, 0.4) * image + rng.normal(0.0, rng.uniform(2.0, 6.0), image.shape)
     else:

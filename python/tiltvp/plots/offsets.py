@@ -59,6 +59,7 @@ def draw_offset_histogram(
     cosines: tuple[Cosine, ...] = (),
     *,
     offset_max_px: float = 40.0,
+    legend: bool = True,
 ) -> None:
     """Draws the (phi, s) histogram, darker where more edge pixels are, and the cosines, on axes of yours."""
     phi, offset = np.asarray(phi_rad, dtype=np.float64), np.asarray(offset_px, dtype=np.float64)
@@ -89,7 +90,7 @@ def draw_offset_histogram(
     axes.set(xlim=(0.0, 180.0), ylim=(-offset_max_px, offset_max_px), xticks=[0, 45, 90, 135, 180])
     axes.set_xlabel("gradient direction φ (degrees)")
     axes.set_ylabel("edge offset s (pixels)")
-    if cosines:
+    if cosines and legend:
         axes.legend(loc="upper right", framealpha=0.9)
 
 

@@ -61,6 +61,15 @@ impl LiftTable {
         Screen::new(self.maps.iter().map(vector), sin_max)
     }
 
+    /// The unit normal that [`lift`](Self::lift) makes of one edge pixel: its place in the region and its gradient. None for
+    /// a pixel without a map or a gradient of zero.
+    pub fn normal(&self, slot: usize, gx: f32, gy: f32) -> Option<[f32; 3]> {
+        let [a, b, c, d, e, f] = self.maps.get(slot)?.map(f32::from);
+        let [x, y, z] = [a * gx + b * gy, c * gx + d * gy, e * gx + f * gy];
+        let length = (x * x + y * y + z * z).sqrt();
+        (length > 0.0).then(|| [x / length, y / length, z / length])
+    }
+
     /// Writes the unit normals of the edge pixels whose great circles pass within `asin(sin_max)` of the robot's vertical,
     /// their magnitudes of gradient as weights, and their places among the edge pixels.
     pub fn lift(

@@ -5,6 +5,7 @@ use nalgebra::{Matrix3, Vector3};
 use super::loss::Gate;
 use super::problem::Problem;
 use super::rows::{Moments, Real, Rows};
+use super::sampling::Score;
 
 /// Unit normals of great circles (rows), a unit direction near `+z` (model), residuals `m . o` (the sine of an angle).
 ///
@@ -13,17 +14,24 @@ use super::rows::{Moments, Real, Rows};
 pub struct Direction<'a, T> {
     rows: &'a Rows<T>,
     plane: Option<Vector3<f64>>,
+    quality: &'a [f32],
 }
 
 impl<'a, T: Real> Direction<'a, T> {
     /// Least squares over directions of unit length (in the chart about the last estimate).
     pub fn new(rows: &'a Rows<T>) -> Self {
-        Self { rows, plane: None }
+        Self { rows, plane: None, quality: &[] }
     }
 
     /// Least squares with the added equation `plane . o = 1`, as paper 000 section 2.2.1 does with `(1, 1, 1)`.
     pub fn with_plane(rows: &'a Rows<T>, plane: Vector3<f64>) -> Self {
-        Self { rows, plane: Some(plane) }
+        Self { rows, plane: Some(plane), quality: &[] }
+    }
+
+    /// The same with a quality of each row for progressive sampling; without one all are alike.
+    #[must_use]
+    pub fn with_quality(self, quality: &'a [f32]) -> Self {
+        Self { quality, ..self }
     }
 }
 
@@ -44,6 +52,18 @@ impl<T: Real> Problem for Direction<'_, T> {
 
     fn consensus(&self, model: &Vector3<f64>, threshold: f64, to_beat: usize) -> usize {
         self.rows.count_to_beat((*model).into(), threshold, to_beat)
+    }
+
+    fn consensus_among(&self, observations: &[u32], model: &Vector3<f64>, threshold: f64) -> usize {
+        self.rows.count_among(observations, (*model).into(), threshold)
+    }
+
+    fn support(&self, model: &Vector3<f64>, threshold: f64, score: Score, to_beat: f64) -> f64 {
+        self.rows.support((*model).into(), threshold, score, to_beat)
+    }
+
+    fn quality(&self, index: usize) -> f32 {
+        self.quality.get(index).copied().unwrap_or_default()
     }
 
     fn summarise(&self, model: &Vector3<f64>, gate: Gate, weights: &mut [f32]) -> Moments {
@@ -90,7 +110,9 @@ const LEAST_Z: f64 = 1e-6;
 
 #[cfg(test)]
 mod tests {
-    use super::super::{RansacOptions, RejectRefitOptions, ReweightOptions, Stop, ransac, reject_refit, reweight};
+    use super::super::{
+        RansacOptions, RansacScratch, RejectRefitOptions, ReweightOptions, Stop, ransac, reject_refit, reweight,
+    };
     use super::*;
     use crate::geometry::tangent_basis;
     use approx::assert_abs_diff_eq;
@@ -118,7 +140,8 @@ mod tests {
         let near = Vector3::z();
 
         let mut weights = vec![1.0; rows.len()];
-        let sampled = ransac(&problem, &RansacOptions::with_threshold(0.01), &near, &mut weights);
+        let sampled =
+            ransac(&problem, &RansacOptions::with_threshold(0.01), &near, &mut weights, &mut RansacScratch::default());
         assert!(matches!(sampled.stop, Stop::Confident { .. }), "{}", sampled.stop);
         assert_abs_diff_eq!(sampled.model.unwrap(), truth, epsilon = 5e-4);
 
@@ -155,11 +178,23 @@ mod tests {
             rows.push(1.0, 0.0, 0.0);
         }
         let near = Vector3::z();
-        let report = ransac(&Direction::new(&rows), &RansacOptions::with_threshold(0.01), &near, &mut [1.0; 10]);
+        let report = ransac(
+            &Direction::new(&rows),
+            &RansacOptions::with_threshold(0.01),
+            &near,
+            &mut [1.0; 10],
+            &mut RansacScratch::default(),
+        );
         assert!(matches!(report.stop, Stop::NoModel { .. }) && report.model.is_none());
         let mut one = Rows::<f64>::with_capacity(1);
         one.push(1.0, 0.0, 0.0);
-        let report = ransac(&Direction::new(&one), &RansacOptions::with_threshold(0.01), &near, &mut [1.0]);
+        let report = ransac(
+            &Direction::new(&one),
+            &RansacOptions::with_threshold(0.01),
+            &near,
+            &mut [1.0],
+            &mut RansacScratch::default(),
+        );
         assert_eq!(report.stop, Stop::TooFew { have: 1, need: 2 });
     }
 }

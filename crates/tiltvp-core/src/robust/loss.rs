@@ -1,5 +1,7 @@
 //! How much an observation counts, given its residual.
 
+use super::score::{CELLS, MARGINAL, cell, slope_at, weight_most};
+
 /// The gate that a residual must pass.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Gate {
@@ -10,6 +12,17 @@ pub enum Gate {
         /// The largest residual that is kept.
         threshold: f64,
     },
+    /// Observations with a residual above the threshold do not count, this time.
+    Within {
+        /// The largest residual that counts.
+        threshold: f64,
+    },
+    /// Weights are multiplied by those of MAGSAC++ for one degree of freedom (Barath et al. 2020): the density of residuals
+    /// marginalised over noise of any scale, zero beyond the threshold.
+    Marginal {
+        /// The residual within which 99 % of the inliers of the largest scale lie.
+        threshold: f64,
+    },
     /// Weights are multiplied by a Gaussian of compact support, `max(0, 1 - r^2 / (16 scale^2))^8`, which follows
     /// `exp(-r^2 / (2 scale^2))` and vanishes beyond four scales.
     Soft {
@@ -18,19 +31,38 @@ pub enum Gate {
     },
 }
 
+/// How the kernels evaluate a gate.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Shape {
+    /// A threshold whose rejections last.
+    Hard,
+    /// A threshold.
+    Within,
+    /// The weights of a table.
+    Marginal,
+    /// A power of a parabola; of a flat one for the open gate.
+    Soft,
+}
+
 impl Gate {
-    /// The `(limit^2, 1 / reach^2, soft)` in which the kernels evaluate the gate.
+    /// The `(limit^2, 1 / reach^2)` in which the kernels evaluate the gate.
     pub(super) fn coefficients(self) -> (f64, f64) {
         match self {
             Self::Open => (f64::INFINITY, 0.0),
-            Self::Hard { threshold } => (threshold * threshold, 0.0),
+            Self::Hard { threshold } | Self::Within { threshold } => (threshold * threshold, 0.0),
+            Self::Marginal { threshold } => (threshold * threshold, 1.0 / (threshold * threshold)),
             Self::Soft { scale } => (f64::INFINITY, 1.0 / (16.0 * scale * scale)),
         }
     }
 
-    /// Whether the gate rejects for good.
-    pub(super) fn is_hard(self) -> bool {
-        matches!(self, Self::Hard { .. })
+    /// The kernel that evaluates the gate.
+    pub(super) fn shape(self) -> Shape {
+        match self {
+            Self::Hard { .. } => Shape::Hard,
+            Self::Within { .. } => Shape::Within,
+            Self::Marginal { .. } => Shape::Marginal,
+            Self::Open | Self::Soft { .. } => Shape::Soft,
+        }
     }
 }
 
@@ -39,6 +71,9 @@ impl Gate {
     pub fn weight(self, residual: f64) -> f64 {
         let (limit, inverse) = self.coefficients();
         let squared = residual * residual;
+        if matches!(self, Self::Marginal { .. }) {
+            return f64::from(MARGINAL.weight[cell(((squared * inverse) as f32).sqrt())]);
+        }
         if squared > limit { 0.0 } else { (1.0 - squared * inverse).max(0.0).powi(8) }
     }
 
@@ -47,6 +82,10 @@ impl Gate {
     pub fn slope(self, residual: f64) -> f64 {
         let (limit, inverse) = self.coefficients();
         let squared = residual * residual;
+        if matches!(self, Self::Marginal { .. }) {
+            let part = (residual.abs() * inverse.sqrt()).max(0.5 / CELLS as f64);
+            return if part < 1.0 { slope_at(part) / weight_most() } else { 0.0 };
+        }
         let t = (1.0 - squared * inverse).max(0.0);
         if squared > limit { 0.0 } else { t.powi(7) * (17.0 * t - 16.0) }
     }

@@ -1,18 +1,24 @@
 //! Robust fits that know no vision: one random-sampling loop, one trimming loop, one reweighting loop.
 
 mod direction;
+mod local;
 mod loss;
 mod problem;
+mod prosac;
 mod ransac;
 mod refit;
 mod report;
 mod rows;
 mod sampler;
+mod sampling;
+mod score;
+mod verification;
 
 pub use direction::Direction;
 pub use loss::Gate;
 pub use problem::Problem;
-pub use ransac::{RansacOptions, ransac};
+pub use ransac::{RansacOptions, RansacScratch, ransac};
 pub use refit::{RejectRefitOptions, ReweightOptions, normal_quantile, reject_refit, reweight};
 pub use report::{FitReport, Stop};
 pub use rows::{Moments, Real, Rows};
+pub use sampling::{LocalOptimization, SampleOrder, Sampling, Score, Verification};

@@ -1,6 +1,7 @@
 //! What a robust fit asks of a model-fitting problem.
 
 use super::loss::Gate;
+use super::sampling::Score;
 
 /// A model-fitting problem that borrows its observations.
 ///
@@ -28,6 +29,16 @@ pub trait Problem {
     /// How many observations have a residual of at most `threshold`, in the problem's unit. Where that cannot exceed
     /// `to_beat`, any count up to `to_beat` will do.
     fn consensus(&self, model: &Self::Model, threshold: f64, to_beat: usize) -> usize;
+
+    /// [`consensus`](Self::consensus) among the listed observations alone.
+    fn consensus_among(&self, observations: &[u32], model: &Self::Model, threshold: f64) -> usize;
+
+    /// The sum of [`Score::gain`] over all observations. Where that cannot exceed `to_beat`, any number up to `to_beat` will
+    /// do.
+    fn support(&self, model: &Self::Model, threshold: f64, score: Score, to_beat: f64) -> f64;
+
+    /// How promising an observation is as part of a sample, zero or more: progressive sampling begins with the largest.
+    fn quality(&self, index: usize) -> f32;
 
     /// Applies a gate about a model and summarises what is left; a hard gate also sets the weights it rejects to zero.
     fn summarise(&self, model: &Self::Model, gate: Gate, weights: &mut [f32]) -> Self::Summary;

@@ -1,9 +1,13 @@
 //! The one random-sampling loop (Fischler and Bolles 1981), as paper 000 section 2.1.4 uses it.
 
+use super::local::improve;
 use super::loss::Gate;
 use super::problem::Problem;
+use super::prosac::{all_inliers, best_beginning};
 use super::report::{FitReport, Stop};
-use super::sampler::Sampler;
+use super::sampler::{Sampler, best_first, shuffled};
+use super::sampling::{SampleOrder, Sampling, Score, Verification};
+use super::verification::{PROBES, Verifier};
 use crate::error::{Error, Result};
 
 /// Largest sample that a problem may ask for.
@@ -20,12 +24,14 @@ pub struct RansacOptions {
     pub confidence: f64,
     /// Seed of the generator. Default 0.
     pub seed: u64,
+    /// How samples are drawn, improved, scored and verified. Default the paper's way.
+    pub sampling: Sampling,
 }
 
 impl RansacOptions {
     /// The paper's limits with a threshold of one's own.
     pub fn with_threshold(threshold: f64) -> Self {
-        Self { threshold, max_trials: 1000, confidence: 0.9999, seed: 0 }
+        Self { threshold, max_trials: 1000, confidence: 0.9999, seed: 0, sampling: Sampling::default() }
     }
 
     /// Checks every field.
@@ -42,42 +48,103 @@ impl RansacOptions {
         if !(self.confidence > 0.0 && self.confidence < 1.0) {
             return Err(Error::option("confidence", self.confidence, "a probability strictly between 0 and 1"));
         }
-        Ok(())
+        self.sampling.validate()
     }
 }
 
-/// Draws minimal samples, keeps the model with the largest consensus, and refits it to its consensus set.
+/// The memory of the sampling loop: plain sampling needs none, the others grow it once.
+#[derive(Debug, Clone, Default)]
+pub struct RansacScratch {
+    keys: Vec<u64>,
+    order: Vec<u32>,
+    probes: Vec<u32>,
+}
+
+impl RansacScratch {
+    /// Makes room for `capacity` observations, sampled in this way, so that no fit of so many allocates.
+    pub fn reserve(&mut self, sampling: &Sampling, capacity: usize) {
+        let Self { keys, order, probes } = self;
+        if sampling.order != SampleOrder::Uniform {
+            keys.clear();
+            keys.reserve(capacity);
+            order.clear();
+            order.reserve(capacity);
+        }
+        if sampling.verification != Verification::Full {
+            probes.clear();
+            probes.reserve(capacity);
+        }
+    }
+}
+
+/// Draws minimal samples, keeps the model with the best score, and refits it to its consensus set.
 ///
-/// Sampling stops once `1 - (1 - P)^n > confidence`, with `P` the probability that one sample is drawn from the largest
-/// consensus set so far (without replacement), or at the limit. `weights` (one per observation, above zero) are those of
-/// the final fit; on return they are zero outside the consensus set.
+/// Sampling stops once `1 - (1 - P)^n > confidence`, with `P` the probability that one sample is drawn from the consensus
+/// set of the best model so far (without replacement) and survives the verification, or at the limit. `weights` (one per
+/// observation, above zero) are those of the final fit; on return they are zero outside the consensus set.
 pub fn ransac<P: Problem>(
     problem: &P,
     options: &RansacOptions,
     near: &P::Model,
     weights: &mut [f32],
+    scratch: &mut RansacScratch,
 ) -> FitReport<P::Model> {
     const { assert!(P::SAMPLE_SIZE <= MAX_SAMPLE) };
-    let len = problem.len();
+    let (len, threshold, sampling) = (problem.len(), options.threshold, &options.sampling);
     if len < P::SAMPLE_SIZE {
         return FitReport::failed(Stop::TooFew { have: len, need: P::SAMPLE_SIZE }, 0);
     }
-    let mut sampler = Sampler::new(options.seed, len);
+    let RansacScratch { keys, order, probes } = scratch;
+    let mut sampler = match sampling.order {
+        SampleOrder::Uniform => Sampler::uniform(options.seed, len),
+        SampleOrder::Progressive { uniform_after, .. } => {
+            // The pool grows by at most one with each trial.
+            best_first(problem, P::SAMPLE_SIZE + options.max_trials as usize, keys, order);
+            Sampler::progressive(options.seed, len, order, P::SAMPLE_SIZE, uniform_after)
+        }
+    };
+    if sampling.verification != Verification::Full {
+        shuffled(options.seed, len, PROBES, probes);
+    }
+    let mut verifier = Verifier::new(sampling.verification, probes);
     let mut sample = [0; MAX_SAMPLE];
     let sample = &mut sample[..P::SAMPLE_SIZE];
-    let mut best: Option<(usize, P::Model)> = None;
+    let mut best: Option<(f64, P::Model)> = None;
     let mut needed = options.max_trials;
     let mut trials = 0;
     while trials < needed.min(options.max_trials) {
         trials += 1;
         sampler.draw(sample);
         let Some(model) = problem.fit_minimal(sample) else { continue };
-        let most = best.as_ref().map_or(0, |(most, _)| *most);
-        let count = problem.consensus(&model, options.threshold, most);
-        if best.is_none() || count > most {
-            needed = trials_needed(count, len, P::SAMPLE_SIZE, options.confidence).max(1);
-            best = Some((count, model));
+        // The first model is scored whatever the test says, so that there is one to compare with.
+        if !verifier.passes(problem, &model, threshold) && best.is_some() {
+            continue;
         }
+        let most = best.as_ref().map_or(0.0, |(most, _)| *most);
+        let score = sampling.score.of(problem, &model, threshold, most);
+        if best.is_some() && score <= most {
+            continue;
+        }
+        let (model, score) = match sampling.local_optimization {
+            Some(local) => improve(problem, local, (threshold, sampling.score), (model, score), weights),
+            None => (model, score),
+        };
+        let inliers = match sampling.score {
+            Score::Count => score as usize,
+            _ => problem.consensus(&model, threshold, 0),
+        };
+        let (pool, chance, share) = match sampling.order {
+            SampleOrder::Uniform | SampleOrder::Progressive { chance_share: None, .. } => {
+                (len, all_inliers(inliers, len, P::SAMPLE_SIZE), inliers as f64 / len as f64)
+            }
+            SampleOrder::Progressive { chance_share: Some(chance_share), .. } => {
+                best_beginning(problem, &model, threshold, inliers, order, chance_share)
+            }
+        };
+        sampler.limit_pool(pool);
+        verifier.learn_good(inliers as f64 / len as f64);
+        needed = verifier.trials_needed(trials, chance, share, options.confidence).max(1);
+        best = Some((score, model));
     }
     let Some((_, model)) = best else {
         return FitReport::failed(Stop::NoModel { trials }, trials);
@@ -87,7 +154,8 @@ pub fn ransac<P: Problem>(
     } else {
         Stop::TrialLimit { limit: options.max_trials }
     };
-    let summary = problem.summarise(&model, Gate::Hard { threshold: options.threshold }, weights);
+    let model = sampling.score.refit(problem, model, threshold, weights);
+    let summary = problem.summarise(&model, Gate::Hard { threshold }, weights);
     let start = if problem.distance(&model, near).is_finite() { &model } else { near };
     let Some(refitted) = problem.fit(&summary, start) else {
         return FitReport::failed(Stop::NoModel { trials }, trials);
@@ -98,29 +166,5 @@ pub fn ransac<P: Problem>(
         inliers: P::count(&summary),
         iterations: trials,
         stop,
-    }
-}
-
-/// Smallest `n` with `1 - (1 - P)^n > confidence`, where `P` is the exact probability of an all-inlier sample.
-fn trials_needed(inliers: usize, len: usize, sample_size: usize, confidence: f64) -> u32 {
-    let all_inliers: f64 = (0..sample_size).map(|i| inliers.saturating_sub(i) as f64 / (len - i) as f64).product();
-    if all_inliers >= 1.0 {
-        return 1;
-    }
-    let needed = (1.0 - confidence).ln() / (-all_inliers).ln_1p();
-    if needed.is_finite() { (needed.floor() + 1.0).min(f64::from(u32::MAX)) as u32 } else { u32::MAX }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn trials_follow_the_exact_product_without_replacement() {
-        // Half of four observations: P = 2/4 * 1/3 = 1/6, not 1/4.
-        let exact = (1e-4f64.ln() / (5.0f64 / 6.0).ln()).floor() as u32 + 1;
-        assert_eq!(trials_needed(2, 4, 2, 0.9999), exact);
-        assert_eq!(trials_needed(4, 4, 2, 0.9999), 1);
-        assert_eq!(trials_needed(1, 4, 2, 0.9999), u32::MAX);
     }
 }

@@ -10,7 +10,7 @@ use crate::error::{Error, Result};
 pub struct RejectRefitOptions {
     /// Share of normally distributed residuals that each round keeps, in (0, 1).
     pub keep_fraction: f64,
-    /// Most rounds, `N_E` in the paper. Default 15.
+    /// Most rounds, `N_E` in the paper; 0 is plain least squares. Default 15.
     pub max_iterations: u32,
     /// Change of the model below which it has converged, in the problem's unit of distance.
     pub tolerance: f64,
@@ -26,9 +26,6 @@ impl RejectRefitOptions {
     pub fn validate(&self) -> Result<()> {
         if !(self.keep_fraction > 0.0 && self.keep_fraction < 1.0) {
             return Err(Error::option("keep_fraction", self.keep_fraction, "a share strictly between 0 and 1"));
-        }
-        if self.max_iterations == 0 {
-            return Err(Error::option("max_iterations", self.max_iterations, "at least 1"));
         }
         if !(self.tolerance >= 0.0 && self.rms_min >= 0.0) {
             return Err(Error::option("tolerance", self.tolerance, "a number that is not negative"));

@@ -3,7 +3,9 @@
 use multiversion::multiversion;
 use nalgebra::{Matrix2, Matrix3, Vector2, Vector3};
 
-use super::loss::Gate;
+use super::loss::{Gate, Shape};
+use super::sampling::Score;
+use super::score::{DEGREE, MARGINAL, cell, marginal_gain};
 
 /// Rows in structure-of-arrays form, in single precision for pixels or double for the user's own numbers.
 #[derive(Debug, Clone, Default)]
@@ -113,6 +115,38 @@ impl<T: Real> Rows<T> {
         count
     }
 
+    /// How many of the listed rows have a residual of at most `threshold`.
+    pub fn count_among(&self, rows: &[u32], model: [f64; 3], threshold: f64) -> usize {
+        let ([h0, h1, h2], limit) = (model.map(T::from_f64), T::from_f64(threshold * threshold));
+        let [x, y, z] = self.columns();
+        let within = |row: &u32| {
+            let place = *row as usize;
+            let (Some(x), Some(y), Some(z)) = (x.get(place), y.get(place), z.get(place)) else { return 0 };
+            let d = *x * h0 + *y * h1 + *z * h2;
+            usize::from(d * d <= limit)
+        };
+        rows.iter().map(within).sum()
+    }
+
+    /// The sum of [`Score::gain`] over all rows, or some number up to `to_beat` where it cannot exceed that.
+    pub fn support(&self, model: [f64; 3], threshold: f64, score: Score, to_beat: f64) -> f64 {
+        if score == Score::Count {
+            return self.count_to_beat(model, threshold, to_beat as usize) as f64;
+        }
+        let marginal = matches!(score, Score::Magsac { .. }).then(|| &MARGINAL.gain);
+        let (model, inverse) = (model.map(T::from_f64), T::from_f64(1.0 / threshold));
+        let mut total = 0.0;
+        for start in (0..self.len).step_by(BLOCK) {
+            let end = (start + BLOCK).min(self.len);
+            total += T::gain(self.columns().map(|column| &column[start..end]), model, inverse, marginal);
+            // No row gains more than one.
+            if total + (self.len - end) as f64 <= to_beat {
+                break;
+            }
+        }
+        total
+    }
+
     /// Whether row `index` has a residual of at most `threshold`, in the arithmetic of [`count_within`](Self::count_within).
     pub fn is_within(&self, index: usize, model: [f64; 3], threshold: f64) -> bool {
         let row = self.columns().map(|column| column.get(index..=index).unwrap_or(&[]));
@@ -131,12 +165,17 @@ impl<T: Real> Rows<T> {
     ) {
         let [x, y, z] = self.columns();
         let (limit, inverse) = gate.coefficients();
+        let tabulated = gate.shape() == Shape::Marginal;
         for row in (0..self.len).step_by(stride.max(1)) {
             let (x, y, z) = (x[row].to_f64(), y[row].to_f64(), z[row].to_f64());
             let d = x * model[0] + y * model[1] + z * model[2];
             let own = weights.map_or(1.0, |weights| weights.get(row).copied().map_or(0.0, f64::from));
             let t = 1.0 - d * d * inverse;
             if own > 0.0 && t > 0.0 && d * d <= limit {
+                if tabulated {
+                    visit(row, [own * gate.weight(d), own * gate.slope(d), x, y, d]);
+                    continue;
+                }
                 let t2 = t * t;
                 let t4 = t2 * t2;
                 visit(row, [own * (t4 * t4), own * (t4 * t2 * t) * (17.0 * t - 16.0), x, y, d]);
@@ -153,7 +192,7 @@ impl<T: Real> Rows<T> {
         for start in (0..n).step_by(BLOCK) {
             let part = start..(start + BLOCK).min(n);
             let rows = self.columns().map(|column| &column[part.clone()]);
-            T::gather(rows, &mut weights[part], model.map(T::from_f64), gains, gate.is_hard(), &mut total);
+            T::gather(rows, &mut weights[part], model.map(T::from_f64), gains, gate.shape(), &mut total);
         }
         Moments {
             count: total.count,
@@ -210,6 +249,12 @@ const BLOCK: usize = 512;
 /// Independent sums that are added up side by side, in the same order on every machine.
 const LANES: usize = 16;
 
+/// The shapes of gates as the kernels' parameters.
+const HARD: u8 = 0;
+const WITHIN: u8 = 1;
+const MARGINALS: u8 = 2;
+const SOFT: u8 = 3;
+
 /// Totals in double precision: weight, then the six moments.
 #[derive(Default)]
 pub struct Total {
@@ -227,6 +272,8 @@ pub trait Real:
     fn from_f32(value: f32) -> Self;
     /// Widens to double precision.
     fn to_f64(self) -> f64;
+    /// Rounds to single precision.
+    fn to_f32(self) -> f32;
     #[doc(hidden)]
     fn count(rows: [&[Self]; 3], model: [Self; 3], limit: Self) -> usize;
     #[doc(hidden)]
@@ -235,9 +282,11 @@ pub trait Real:
         weights: &mut [f32],
         model: [Self; 3],
         gains: (Self, Self),
-        hard: bool,
+        shape: Shape,
         total: &mut Total,
     );
+    #[doc(hidden)]
+    fn gain(rows: [&[Self]; 3], model: [Self; 3], inverse: Self, marginal: Option<&[f32; DEGREE + 1]>) -> f64;
 }
 
 #[inline(always)]
@@ -251,7 +300,7 @@ fn count_body<T: Real>([x, y, z]: [&[T]; 3], [h0, h1, h2]: [T; 3], limit: T) -> 
 
 /// One block: residuals and gated weights first, then each sum in lanes of its own, all of it in the first-level cache.
 #[inline(always)]
-fn gather_body<T: Real, const HARD: bool>(
+fn gather_body<T: Real, const SHAPE: u8>(
     [x, y, z]: [&[T]; 3],
     weights: &mut [f32],
     [h0, h1, h2]: [T; 3],
@@ -263,12 +312,17 @@ fn gather_body<T: Real, const HARD: bool>(
     let n = weights.len().min(BLOCK);
     let (x, y, z, weights) = (&x[..n], &y[..n], &z[..n], &mut weights[..n]);
     let mut count = 0u32;
+    let table = &*MARGINAL;
     for i in 0..n {
         d[i] = x[i] * h0 + y[i] * h1 + z[i] * h2;
         let dd = d[i] * d[i];
-        if HARD {
+        if SHAPE == HARD {
             weights[i] = if dd <= limit { weights[i] } else { 0.0 };
             w[i] = T::from_f32(weights[i]);
+        } else if SHAPE == WITHIN {
+            w[i] = T::from_f32(if dd <= limit { weights[i] } else { 0.0 });
+        } else if SHAPE == MARGINALS {
+            w[i] = T::from_f32(weights[i] * table.weight[cell((dd * inverse).to_f32().sqrt())]);
         } else {
             let t = one - dd * inverse;
             let t = if t > zero { t } else { zero };
@@ -290,6 +344,18 @@ fn gather_body<T: Real, const HARD: bool>(
     total.sums[4] += dot(wx, d);
     total.sums[5] += dot(wy, d);
     total.sums[6] += dot(wd, d);
+}
+
+/// One block: the gain of each residual, then their sum.
+#[inline(always)]
+fn gain_body<T: Real>([x, y, z]: [&[T]; 3], [h0, h1, h2]: [T; 3], gain: impl Fn(T) -> f32) -> f64 {
+    let mut gains = [0.0f32; BLOCK];
+    let n = x.len().min(BLOCK);
+    let (x, y, z, gains) = (&x[..n], &y[..n], &z[..n], &mut gains[..n]);
+    for i in 0..n {
+        gains[i] = gain(x[i] * h0 + y[i] * h1 + z[i] * h2);
+    }
+    sum(gains)
 }
 
 /// The sum of `a`, in [`LANES`] partial sums that are then added up in double precision.
@@ -343,13 +409,27 @@ macro_rules! real {
                 weights: &mut [f32],
                 model: [$float; 3],
                 gains: ($float, $float),
-                hard: bool,
+                shape: Shape,
                 total: &mut Total,
             ) {
-                if hard {
-                    gather_body::<$float, true>(rows, weights, model, gains, total);
-                } else {
-                    gather_body::<$float, false>(rows, weights, model, gains, total);
+                match shape {
+                    Shape::Hard => gather_body::<$float, HARD>(rows, weights, model, gains, total),
+                    Shape::Within => gather_body::<$float, WITHIN>(rows, weights, model, gains, total),
+                    Shape::Marginal => gather_body::<$float, MARGINALS>(rows, weights, model, gains, total),
+                    Shape::Soft => gather_body::<$float, SOFT>(rows, weights, model, gains, total),
+                }
+            }
+
+            #[multiversion(targets("x86_64+avx512f+avx512vl", "x86_64+avx2"))]
+            pub(super) fn gain(
+                rows: [&[$float]; 3],
+                model: [$float; 3],
+                inverse: $float,
+                marginal: Option<&[f32; DEGREE + 1]>,
+            ) -> f64 {
+                match marginal {
+                    Some(marginal) => gain_body(rows, model, |d| marginal_gain(marginal, (d * inverse).abs() as f32)),
+                    None => gain_body(rows, model, |d| (1.0 - (d * inverse) * (d * inverse)).max(0.0) as f32),
                 }
             }
         }
@@ -372,10 +452,16 @@ macro_rules! real {
                 weights: &mut [f32],
                 model: [Self; 3],
                 gains: (Self, Self),
-                hard: bool,
+                shape: Shape,
                 total: &mut Total,
             ) {
-                $module::gather(rows, weights, model, gains, hard, total);
+                $module::gather(rows, weights, model, gains, shape, total);
+            }
+            fn gain(rows: [&[Self]; 3], model: [Self; 3], inverse: Self, marginal: Option<&[f32; DEGREE + 1]>) -> f64 {
+                $module::gain(rows, model, inverse, marginal)
+            }
+            fn to_f32(self) -> f32 {
+                self as f32
             }
         }
     };
@@ -419,6 +505,8 @@ mod tests {
     #[test]
     fn any_number_of_rows_is_summed_once() {
         fn check<T: Real>(len: usize, gate: Gate, tolerance: f64) {
+            // The weights of a table jump, by less than this from its second cell on.
+            let tolerance = if matches!(gate, Gate::Marginal { .. }) { tolerance.max(2e-3) } else { tolerance };
             let mut rows = Rows::<T>::default();
             for i in 0..len {
                 let t = 0.37 * i as f64;
@@ -435,7 +523,7 @@ mod tests {
                 count += usize::from(w > 0.0);
                 weight += w;
                 sum += w * row * row.transpose();
-                assert_eq!(*after, if gate.is_hard() && gated == 0.0 { 0.0 } else { *own });
+                assert_eq!(*after, if matches!(gate, Gate::Hard { .. }) && gated == 0.0 { 0.0 } else { *own });
             }
             let scale = 1.0 + len as f64;
             assert_eq!(found.count, count, "{len} rows, {gate:?}");
@@ -457,7 +545,13 @@ mod tests {
             }
         }
         for len in (0..=35).chain(500..530).chain([1023, 1024, 1025, 2 * BLOCK + LANES + 1]) {
-            for gate in [Gate::Open, Gate::Hard { threshold: 0.05 }, Gate::Soft { scale: 0.02 }] {
+            for gate in [
+                Gate::Open,
+                Gate::Hard { threshold: 0.05 },
+                Gate::Within { threshold: 0.05 },
+                Gate::Marginal { threshold: 0.1 },
+                Gate::Soft { scale: 0.02 },
+            ] {
                 check::<f64>(len, gate, 1e-12);
                 check::<f32>(len, gate, 1e-5);
             }

@@ -42,6 +42,9 @@ pub struct EdgeElement {
     pub phi_rad: f64,
     /// Edge offset in pixels, eq. 17; NaN where the vertical vanishing point is out of the lens' reach.
     pub offset_px: f64,
+    /// Unit normal of the edge's great circle in the robot frame, as the method makes it (eq. 37 or exact); NaN for the
+    /// image-space methods, which have none.
+    pub normal: [f32; 3],
     /// Whether it passed the prefilter.
     pub prefiltered: bool,
     /// Whether it agrees with the estimate.

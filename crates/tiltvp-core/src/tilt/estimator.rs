@@ -206,11 +206,16 @@ impl TiltEstimator {
             let (u, v) = self.sight.region.place(*slot as usize);
             let [cos, sin, s] = edge_offset(f32::from(u) - centre.0, f32::from(v) - centre.1, *gx, *gy);
             let row = rows.next_if(|(place, _)| place == slot);
+            let normal = match &self.tables {
+                Tables::Normals(table) => table.normal(*slot as usize, *gx, *gy),
+                Tables::Offsets { .. } => None,
+            };
             EdgeElement {
                 u,
                 v,
                 phi_rad: f64::from(sin).atan2(f64::from(cos)),
                 offset_px: f64::from(s),
+                normal: normal.unwrap_or([f32::NAN; 3]),
                 prefiltered: row.is_some(),
                 inlier: row.is_some_and(|(_, inlier)| inlier),
             }

@@ -21,9 +21,6 @@ use crate::robust::{FitReport, Gate, RansacOptions, RejectRefitOptions, Stop, ra
 /// Change of the shift in pixels below which the paper's trimming has converged (section 2.1.4).
 const SHIFT_TOLERANCE_PX: f64 = 0.1;
 
-/// Most trimming rounds, `N_E` in the paper.
-const TRIMMING_ROUNDS: u32 = 15;
-
 /// How far in radians the edges of vertical things stray from the vertical, for the covariance of the paper's methods.
 const STRAY_RAD: f64 = 2.0 * std::f64::consts::PI / 180.0;
 
@@ -112,21 +109,25 @@ impl TiltEstimator {
         let Some(centre) = &self.sight.centre else { return Fit::none() };
         let Work { rows, weights, places, .. } = &mut *work;
         offsets(edges, &self.sight.region, centre, gains, offset_max_px, rows, weights, places);
-        let problem = Offsets::new(rows);
+        let sampling = self.options.sampling();
+        work.prepare(&sampling, edges);
+        let Work { rows, weights, quality, ransac: scratch, .. } = &mut *work;
+        let problem = Offsets::new(rows, quality);
         let upright = Vector2::zeros();
         let report: FitReport<Vector2<f64>> = match &self.options.method {
-            Method::ImageSpaceRejectRefit { keep_fraction, .. } => {
+            Method::ImageSpaceRejectRefit { keep_fraction, max_iterations, .. } => {
                 let options = RejectRefitOptions {
                     keep_fraction: *keep_fraction,
-                    max_iterations: TRIMMING_ROUNDS,
+                    max_iterations: *max_iterations,
                     tolerance: SHIFT_TOLERANCE_PX,
                     rms_min: 0.0,
                 };
                 reject_refit(&problem, &options, &upright, weights)
             }
             Method::ImageSpaceRansac { threshold_px, .. } => {
-                let options = RansacOptions { seed: self.options.seed, ..RansacOptions::with_threshold(*threshold_px) };
-                ransac(&problem, &options, &upright, weights)
+                let seed = self.options.seed;
+                let options = RansacOptions { seed, sampling, ..RansacOptions::with_threshold(*threshold_px) };
+                ransac(&problem, &options, &upright, weights, scratch)
             }
             Method::VectorConsensus { .. } | Method::Refined(_) => return Fit::none(),
         };
@@ -155,14 +156,19 @@ impl TiltEstimator {
 
     /// Paper 000 section 2.2, and the refined method.
     fn fit_normals(&self, edges: &EdgePixels, table: &LiftTable, work: &mut Work) -> Fit {
-        let Work { rows, weights, places, sparse, inliers } = &mut *work;
-        *inliers = Inliers::None;
+        let Work { rows, weights, places, .. } = &mut *work;
         table.lift(edges, self.options.normal_tilt_max_rad().sin(), rows, weights, places);
+        let sampling = self.options.sampling();
+        work.prepare(&sampling, edges);
+        let Work { rows, weights, sparse, quality, ransac: scratch, inliers, .. } = &mut *work;
+        *inliers = Inliers::None;
         let (report, gate, correction) = match &self.options.method {
             Method::VectorConsensus { threshold_rad, correction, .. } => {
                 weights.fill(1.0);
-                let report =
-                    vector_consensus(rows, &self.origin.robot_from_camera, *threshold_rad, self.options.seed, weights);
+                let seed = self.options.seed;
+                let options = RansacOptions { seed, sampling, ..RansacOptions::with_threshold(threshold_rad.sin()) };
+                let rotation = &self.origin.robot_from_camera;
+                let report = vector_consensus(rows, quality, rotation, &options, weights, scratch);
                 *inliers = Inliers::weighted_if(report.model.is_some());
                 (report, Gate::Soft { scale: STRAY_RAD }, correction)
             }

@@ -5,18 +5,20 @@ use nalgebra::Vector2;
 
 use super::correction::VanishingPoint;
 use crate::edges::{EdgePixels, Region};
-use crate::robust::{Gate, Moments, Problem, Rows};
+use crate::robust::{Gate, Moments, Problem, Rows, Score};
 
 /// Edge offsets `s = A cos phi + B sin phi` (eq. 19): rows `(g cos phi, g sin phi, -s)`, model `(A, B)`, residuals in pixels
 /// (eq. 33). `g` is the relative closed-form gain of the pixel, or 1.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Offsets<'a> {
     rows: &'a Rows<f32>,
+    quality: &'a [f32],
 }
 
 impl<'a> Offsets<'a> {
-    pub(super) fn new(rows: &'a Rows<f32>) -> Self {
-        Self { rows }
+    /// `quality` is that of each row for progressive sampling; without one all are alike.
+    pub(super) fn new(rows: &'a Rows<f32>, quality: &'a [f32]) -> Self {
+        Self { rows, quality }
     }
 }
 
@@ -40,6 +42,18 @@ impl Problem for Offsets<'_> {
 
     fn consensus(&self, model: &Vector2<f64>, threshold: f64, to_beat: usize) -> usize {
         self.rows.count_to_beat([model.x, model.y, 1.0], threshold, to_beat)
+    }
+
+    fn consensus_among(&self, observations: &[u32], model: &Vector2<f64>, threshold: f64) -> usize {
+        self.rows.count_among(observations, [model.x, model.y, 1.0], threshold)
+    }
+
+    fn support(&self, model: &Vector2<f64>, threshold: f64, score: Score, to_beat: f64) -> f64 {
+        self.rows.support([model.x, model.y, 1.0], threshold, score, to_beat)
+    }
+
+    fn quality(&self, index: usize) -> f32 {
+        self.quality.get(index).copied().unwrap_or_default()
     }
 
     fn summarise(&self, model: &Vector2<f64>, gate: Gate, weights: &mut [f32]) -> Moments {
@@ -168,7 +182,7 @@ mod tests {
         for phi in [0.3f32, 1.9] {
             rows.push(phi.cos(), phi.sin(), -(7.0 * phi.cos() - 3.0 * phi.sin()));
         }
-        let model = Offsets::new(&rows).fit_minimal(&[0, 1]).unwrap();
+        let model = Offsets::new(&rows, &[]).fit_minimal(&[0, 1]).unwrap();
         assert!((model - shift).norm() < 1e-5);
     }
 }

@@ -5,6 +5,7 @@ use super::refine::RefineOptions;
 use super::trained::TrainedCorrection;
 use crate::edges::{EdgeOptions, Mask, NormalKind};
 use crate::error::{Error, Result};
+use crate::robust::Sampling;
 
 /// `s_max` of the paper in pixels, and its lens' pixels per radian about the vertical.
 const PAPER_OFFSET_MAX_PX: f64 = 40.0;
@@ -31,11 +32,15 @@ pub enum Method {
         offset_max_px: Option<f64>,
         /// From the shift to the angle.
         correction: Correction,
+        /// How samples are drawn, improved, scored and verified. Default the paper's way.
+        sampling: Sampling,
     },
     /// Paper 000 section 2.1 with repeated trimming.
     ImageSpaceRejectRefit {
         /// Share of normal residuals kept each round; eq. 34 with `Q` read as the share kept. Default 0.8.
         keep_fraction: f64,
+        /// Most rounds of rejecting and refitting, `N_E`; 0 is plain least squares. Default 15.
+        max_iterations: u32,
         /// Largest edge offset in pixels that passes the prefilter, `s_max`. Default, where there is none: the paper's 40 for
         /// its lens of 139.7 pixels per radian about the vertical, and in proportion for others.
         offset_max_px: Option<f64>,
@@ -50,6 +55,8 @@ pub enum Method {
         normal: NormalKind,
         /// From the raw angle to the angle: the factor `a'` of eq. 45, or another. Default the factor 1.
         correction: TrainedCorrection,
+        /// How samples are drawn, improved, scored and verified. Default the paper's way.
+        sampling: Sampling,
     },
     /// Ours: tangent normals weighted by their gradients, trimmed from the upright prior, then a fading soft gate.
     Refined(RefineOptions),
@@ -115,17 +122,27 @@ impl TiltOptions {
     pub fn for_method(name: &str) -> Result<Self> {
         let (method, gradient_min, smoothing_px) = match name {
             "image-space-ransac" => {
-                let correction = Correction::default();
-                (Method::ImageSpaceRansac { threshold_px: 10.0, offset_max_px: None, correction }, 150.0, 0.0)
+                let (correction, sampling) = (Correction::default(), Sampling::default());
+                (Method::ImageSpaceRansac { threshold_px: 10.0, offset_max_px: None, correction, sampling }, 150.0, 0.0)
             }
             "image-space-reject-refit" => {
                 let correction = Correction::default();
-                (Method::ImageSpaceRejectRefit { keep_fraction: 0.8, offset_max_px: None, correction }, 200.0, 0.0)
+                let method = Method::ImageSpaceRejectRefit {
+                    keep_fraction: 0.8,
+                    max_iterations: 15,
+                    offset_max_px: None,
+                    correction,
+                };
+                (method, 200.0, 0.0)
             }
             "vector-consensus" => {
-                let threshold_rad = 5f64.to_radians();
+                let (threshold_rad, sampling) = (5f64.to_radians(), Sampling::default());
                 let correction = TrainedCorrection::Factor(1.0);
-                (Method::VectorConsensus { threshold_rad, normal: NormalKind::Gradient, correction }, 600.0, 0.0)
+                (
+                    Method::VectorConsensus { threshold_rad, normal: NormalKind::Gradient, correction, sampling },
+                    600.0,
+                    0.0,
+                )
             }
             "refined" => (Method::Refined(RefineOptions::default()), 150.0, 0.6),
             _ => {
@@ -160,25 +177,35 @@ impl TiltOptions {
             return Err(Error::option("tilt_max_rad", tilt_max, "an angle strictly between 0 and pi/2"));
         }
         match &self.method {
-            Method::ImageSpaceRansac { threshold_px, offset_max_px, correction } => {
+            Method::ImageSpaceRansac { threshold_px, offset_max_px, correction, sampling } => {
+                sampling.validate()?;
                 positive("threshold_px", *threshold_px, "a positive number of pixels")?;
                 positive("offset_max_px", offset_max_px.unwrap_or(1.0), "a positive number of pixels")?;
                 correction.validate()
             }
-            Method::ImageSpaceRejectRefit { keep_fraction, offset_max_px, correction } => {
+            Method::ImageSpaceRejectRefit { keep_fraction, offset_max_px, correction, .. } => {
                 if !(*keep_fraction > 0.0 && *keep_fraction < 1.0) {
                     return Err(Error::option("keep_fraction", keep_fraction, "a share strictly between 0 and 1"));
                 }
                 positive("offset_max_px", offset_max_px.unwrap_or(1.0), "a positive number of pixels")?;
                 correction.validate()
             }
-            Method::VectorConsensus { threshold_rad, correction, .. } => {
+            Method::VectorConsensus { threshold_rad, correction, sampling, .. } => {
+                sampling.validate()?;
                 if !(*threshold_rad > 0.0 && *threshold_rad < std::f64::consts::FRAC_PI_2) {
                     return Err(Error::option("threshold_rad", threshold_rad, "an angle strictly between 0 and pi/2"));
                 }
                 correction.validate()
             }
             Method::Refined(options) => options.validate(),
+        }
+    }
+
+    /// How the sampling methods sample; the others do not.
+    pub(super) fn sampling(&self) -> Sampling {
+        match &self.method {
+            Method::ImageSpaceRansac { sampling, .. } | Method::VectorConsensus { sampling, .. } => *sampling,
+            Method::ImageSpaceRejectRefit { .. } | Method::Refined(_) => Sampling::default(),
         }
     }
 

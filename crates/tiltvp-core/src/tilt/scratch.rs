@@ -2,7 +2,7 @@
 
 use super::refine::Sparse;
 use crate::edges::{Detector, EdgeOptions, EdgePixels, Region};
-use crate::robust::Rows;
+use crate::robust::{RansacScratch, Rows, SampleOrder, Sampling};
 
 /// The memory that one thread works in; estimates after the first allocate nothing.
 ///
@@ -25,8 +25,17 @@ pub(super) struct Work {
     pub sparse: Sparse<f32>,
     /// Place of each row among the edge pixels.
     pub places: Vec<u32>,
+    /// How promising each row is, where samples are drawn in its order.
+    pub quality: Vec<f32>,
+    pub ransac: RansacScratch,
     pub inliers: Inliers,
 }
+
+/// Pixels of one edge repeat one another: one in two to the power of this, scattered over the image, comes before the rest.
+const SPREAD_BITS: u32 = 4;
+
+/// A factor that is below the ratio of any two squared gradients.
+const LATER: f32 = 1e-18;
 
 /// What an estimator's scratch depends on.
 #[derive(Debug, Clone, PartialEq)]
@@ -72,6 +81,8 @@ impl Scratch {
                 weights: Vec::with_capacity(n),
                 sparse: Sparse::with_capacity(n),
                 places: Vec::with_capacity(n),
+                quality: Vec::new(),
+                ransac: RansacScratch::default(),
                 inliers: Inliers::None,
             },
         }
@@ -84,6 +95,24 @@ impl Scratch {
 }
 
 impl Work {
+    /// Makes room for the way of sampling, and sets the quality of the rows, their squared gradients, if samples
+    /// are drawn in that order.
+    pub(super) fn prepare(&mut self, sampling: &Sampling, edges: &EdgePixels) {
+        let room = self.weights.capacity();
+        self.ransac.reserve(sampling, room);
+        self.quality.clear();
+        if sampling.order != SampleOrder::Uniform {
+            self.quality.reserve(room);
+            let (slots, gx, gy) = (edges.slot(), edges.gx(), edges.gy());
+            let quality = |place: &u32| {
+                let place = *place as usize;
+                let first = slots[place].wrapping_mul(0x9e37_79b1) >> (32 - SPREAD_BITS) == 0;
+                (gx[place].powi(2) + gy[place].powi(2)) * if first { 1.0 } else { LATER }
+            };
+            self.quality.extend(self.places.iter().map(quality));
+        }
+    }
+
     /// Whether a row agreed with the last estimate.
     pub(super) fn is_inlier(&self, row: usize) -> bool {
         match self.inliers {

@@ -242,14 +242,19 @@ pub(crate) struct EdgeElements {
     size: (usize, usize),
 }
 
+/// An edge pixel as a pickle keeps it.
+type EdgeRow = (u16, u16, f64, f64, [f32; 3], bool, bool);
+
 impl EdgeElements {
     pub(super) fn new(elements: Vec<core::EdgeElement>, size: (usize, usize)) -> Self {
         Self { elements, size }
     }
 
-    fn bits(&self) -> impl Iterator<Item = (u16, u16, u64, u64, bool, bool)> + '_ {
-        let bits =
-            |e: &core::EdgeElement| (e.u, e.v, e.phi_rad.to_bits(), e.offset_px.to_bits(), e.prefiltered, e.inlier);
+    fn bits(&self) -> impl Iterator<Item = (u16, u16, u64, u64, [u32; 3], bool, bool)> + '_ {
+        let bits = |e: &core::EdgeElement| {
+            let normal = e.normal.map(f32::to_bits);
+            (e.u, e.v, e.phi_rad.to_bits(), e.offset_px.to_bits(), normal, e.prefiltered, e.inlier)
+        };
         self.elements.iter().map(bits)
     }
 }
@@ -278,6 +283,13 @@ impl EdgeElements {
     #[getter]
     fn offset_px<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
         PyArray1::from_iter(py, self.elements.iter().map(|e| e.offset_px))
+    }
+
+    /// Fresh (N, 3) float64: unit normals of the edges' great circles in the robot frame; NaN for the image-space methods.
+    #[getter]
+    fn normal<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        let entries = self.elements.iter().flat_map(|e| e.normal.map(f64::from));
+        PyArray1::from_iter(py, entries).reshape([self.elements.len(), 3])
     }
 
     /// Fresh (N,) bool: the pixels that passed the prefilter.
@@ -323,12 +335,13 @@ impl EdgeElements {
 
     /// The value of its columns and its size, for pickle.
     #[classmethod]
-    fn _from_rows(_cls: &Bound<'_, PyType>, rows: Vec<(u16, u16, f64, f64, bool, bool)>, size: (usize, usize)) -> Self {
-        let element = |(u, v, phi_rad, offset_px, prefiltered, inlier)| core::EdgeElement {
+    fn _from_rows(_cls: &Bound<'_, PyType>, rows: Vec<EdgeRow>, size: (usize, usize)) -> Self {
+        let element = |(u, v, phi_rad, offset_px, normal, prefiltered, inlier): EdgeRow| core::EdgeElement {
             u,
             v,
             phi_rad,
             offset_px,
+            normal,
             prefiltered,
             inlier,
         };
@@ -336,7 +349,7 @@ impl EdgeElements {
     }
 
     fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyTuple>> {
-        let row = |e: &core::EdgeElement| (e.u, e.v, e.phi_rad, e.offset_px, e.prefiltered, e.inlier);
+        let row = |e: &core::EdgeElement| (e.u, e.v, e.phi_rad, e.offset_px, e.normal, e.prefiltered, e.inlier);
         let this = slf.get();
         let rows: Vec<_> = this.elements.iter().map(row).collect();
         (slf.get_type().getattr("_from_rows")?, (rows, this.size)).into_pyobject(slf.py())

@@ -5,7 +5,7 @@ use pyo3::types::PyDict;
 use tiltvp_core::edges::{Mask, NormalKind};
 use tiltvp_core::tilt::{Correction, Method, TiltOptions, TrainedCorrection};
 
-use super::correction;
+use super::{correction, sampling};
 use crate::call::{exception, invalid};
 use crate::convert;
 
@@ -24,9 +24,13 @@ const COMMON: [&str; 8] = [
 /// Options of one method alone.
 fn own(method: &Method) -> &'static [&'static str] {
     match method {
-        Method::ImageSpaceRansac { .. } => &["threshold_px", "offset_max_px", "correction"],
-        Method::ImageSpaceRejectRefit { .. } => &["keep_fraction", "offset_max_px", "correction"],
-        Method::VectorConsensus { .. } => &["threshold_rad", "normal", "correction"],
+        Method::ImageSpaceRansac { .. } => {
+            &["threshold_px", "offset_max_px", "correction", "sampling", "local_optimization", "score", "verification"]
+        }
+        Method::ImageSpaceRejectRefit { .. } => &["keep_fraction", "max_iterations", "offset_max_px", "correction"],
+        Method::VectorConsensus { .. } => {
+            &["threshold_rad", "normal", "correction", "sampling", "local_optimization", "score", "verification"]
+        }
         Method::Refined(_) => &["keep_fraction", "scale_rad", "tolerance_rad", "max_iterations"],
     }
 }
@@ -110,14 +114,21 @@ fn set(options: &mut TiltOptions, key: &str, value: &Bound<'_, PyAny>) -> PyResu
         }
         ("scale_rad", Method::Refined(refine)) => refine.scale_rad = number()?,
         ("tolerance_rad", Method::Refined(refine)) => refine.tolerance_rad = number()?,
-        ("max_iterations", Method::Refined(refine)) => {
-            refine.max_iterations = value
-                .extract()
-                .map_err(|_| invalid(format!("option max_iterations = {value}, expected a whole number from 1")))?;
+        ("max_iterations", Method::Refined(refine)) => refine.max_iterations = whole(key, value, 1)?,
+        ("max_iterations", Method::ImageSpaceRejectRefit { max_iterations, .. }) => {
+            *max_iterations = whole(key, value, 0)?;
         }
+        (
+            key @ ("sampling" | "local_optimization" | "score" | "verification"),
+            Method::ImageSpaceRansac { sampling, .. } | Method::VectorConsensus { sampling, .. },
+        ) => sampling::set(sampling, key, value)?,
         (_, method) => return Err(unknown(value.py(), key, method)),
     }
     Ok(())
+}
+
+fn whole(key: &str, value: &Bound<'_, PyAny>, from: u32) -> PyResult<u32> {
+    value.extract().map_err(|_| invalid(format!("option {key} = {value}, expected a whole number from {from}")))
 }
 
 /// The error for an option that the method does not have: the near ones, then all.
@@ -157,17 +168,20 @@ pub(super) fn in_force<'py>(py: Python<'py>, options: &TiltOptions) -> PyResult<
         })
     };
     match &options.method {
-        Method::ImageSpaceRansac { threshold_px, offset_max_px, correction } => {
+        Method::ImageSpaceRansac { threshold_px, offset_max_px, correction, sampling } => {
+            sampling::in_force(&dict, sampling)?;
             dict.set_item("threshold_px", threshold_px)?;
             dict.set_item("offset_max_px", offset_max_px)?;
             dict.set_item("correction", word(correction)?)?;
         }
-        Method::ImageSpaceRejectRefit { keep_fraction, offset_max_px, correction } => {
+        Method::ImageSpaceRejectRefit { keep_fraction, max_iterations, offset_max_px, correction } => {
             dict.set_item("keep_fraction", keep_fraction)?;
+            dict.set_item("max_iterations", max_iterations)?;
             dict.set_item("offset_max_px", offset_max_px)?;
             dict.set_item("correction", word(correction)?)?;
         }
-        Method::VectorConsensus { threshold_rad, normal, correction } => {
+        Method::VectorConsensus { threshold_rad, normal, correction, sampling } => {
+            sampling::in_force(&dict, sampling)?;
             dict.set_item("threshold_rad", threshold_rad)?;
             dict.set_item("normal", if *normal == NormalKind::Gradient { "gradient" } else { "tangent" })?;
             dict.set_item("correction", correction::show(py, correction)?)?;

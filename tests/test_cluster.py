@@ -1,0 +1,81 @@
+"""Evaluations on a Dask cluster of two worker processes: the same table, also when a worker is killed half-way."""
+
+from __future__ import annotations
+
+import os
+import signal
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from dask.distributed import LocalCluster
+
+from evaluations import evaluated, same_bytes
+from tiltvp.cli import main
+from tiltvp.datasets.folder import TiltDataset
+from tiltvp.errors import RunError
+from tiltvp.evaluation import cluster as module
+from tiltvp.evaluation.combinations import choose
+from tiltvp.evaluation.experiment import open_experiment
+from tiltvp.evaluation.runs import Run
+
+NOBODY = "tcp://127.0.0.1:9"
+
+
+@pytest.fixture(scope="module")
+def cluster() -> Iterator[Any]:
+    """Two worker processes of one thread each, on a scheduler in this process."""
+    quiet = {"dashboard_address": None, "silence_logs": "CRITICAL"}
+    with LocalCluster(n_workers=2, threads_per_worker=1, processes=True, **quiet) as local:
+        yield local
+
+
+def test_the_same_table_on_a_cluster(tmp_path: Path, dataset: TiltDataset, whole: Run, cluster: Any) -> None:
+    run = evaluated(dataset, tmp_path / "run", cluster=cluster.scheduler_address)
+    assert same_bytes(run.table, whole.table)
+    assert {path.name for path in (tmp_path / "run").iterdir()} == {"manifest.json", "estimates.parquet"}
+
+
+def test_a_dataset_that_workers_do_not_see(tmp_path: Path, dataset: TiltDataset, cluster: Any) -> None:
+    class Moved(TiltDataset):
+        def digest(self, *_: object) -> str:
+            return "other"
+
+    fields = {name: getattr(dataset, name) for name in ("directory", "camera", "robot_from_camera", "mask", "images")}
+    with pytest.raises(RunError, match="a worker sees another dataset"):
+        evaluated(Moved(**fields), tmp_path / "run", cluster=cluster.scheduler_address)
+
+
+def test_a_worker_killed_half_way(
+    tmp_path: Path, dataset: TiltDataset, whole: Run, cluster: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(module, "_CHUNK", 1)
+    done: list[int] = []
+
+    def advance() -> None:
+        done.append(len(done))
+        if len(done) == 3:
+            os.kill(cluster.workers[0].pid, signal.SIGKILL)
+
+    with open_experiment(dataset, choose("table3"), tmp_path / "run", sweep="table3") as experiment:
+        experiment.estimate(cluster=cluster.scheduler_address, advance=advance)
+        assert same_bytes(experiment.conclude().table, whole.table)
+    assert len(done) == 15
+
+
+def test_nobody_answers(
+    tmp_path: Path, dataset: TiltDataset, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(module, "_PATIENCE_S", 0.5)
+    words = ["evaluate", str(dataset.directory), "--sweep", "table3", "--out", str(tmp_path / "run")]
+    for address in (NOBODY, "nowhere"):
+        assert main([*words, "--cluster", address]) == 2
+        assert f"tiltvp: {address}: no Dask scheduler answers" in capsys.readouterr().err
+
+
+def test_without_dask(tmp_path: Path, dataset: TiltDataset, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "dask.distributed", None)
+    with pytest.raises(RunError, match=r"pip install 'tiltvp\[cluster\]'"):
+        evaluated(dataset, tmp_path / "run", cluster=NOBODY)
