@@ -187,25 +187,27 @@ def test_a_drive_keeps_its_tracks(mirror: tiltvp.Camera, office: Room) -> None:
     x, y, yaw = office.free_poses(1, 4)[0]
     trackers = [tl.LineTracker(), tl.LineTracker(ordered=True)]
     known: list[dict[int, float]] = [{}, {}]
-    right = wrong = 0
+    right, wrong = [0, 0], [0, 0]
     for k in range(6):
         tilt = (0.04 * (k % 2), 0.8 * k)
         pose = (x, y, yaw + 0.05 * k)
         image = office.render(mirror, pose=pose, alpha_rad=tilt[0], beta_rad=tilt[1], samples=3, seed=k)
         lines = extractor(image.gray, tilt)
         descriptors = extractor.describe(image.gray, lines)
-        for tracker, turn, seen in zip(trackers, (0.05 if k else 0.0, None), known, strict=True):
+        for t, (tracker, turn, seen) in enumerate(zip(trackers, (0.05 if k else 0.0, None), known, strict=True)):
             tracked = tracker.update(lines, descriptors, yaw_change_rad=turn)
             assert tracked.frame == k
             assert len(set(tracked.track.tolist())) == len(lines)
             for track, bearing in zip(tracked.track.tolist(), (lines.bearing_rad + 0.05 * k).tolist(), strict=True):
                 if track in seen:
                     same = abs((bearing - seen[track] + math.pi) % (2 * math.pi) - math.pi) < 0.01
-                    right, wrong = right + same, wrong + (not same)
+                    right[t] += same
+                    wrong[t] += not same
                 seen[track] = bearing
         trackers[0] = pickle.loads(pickle.dumps(trackers[0]))
-    assert right > 60
-    assert wrong <= 0.03 * right
+    assert min(right) > 60
+    assert wrong[0] <= 0.01 * right[0]
+    assert wrong[1] <= 0.08 * right[1]
     assert trackers[0] == copy.copy(trackers[0]) != trackers[1]
 
 

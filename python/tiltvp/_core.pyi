@@ -1037,6 +1037,7 @@ class LineTracker:
         look_back: SupportsIndex = ...,
         gate_rad: float = ...,
         gate_growth_rad: float = ...,
+        bearing_weight: float = ...,
         extrapolate: bool = ...,
         f1: float = ...,
         f2: float = ...,
@@ -1053,6 +1054,8 @@ class LineTracker:
         gate_rad, gate_growth_rad
             Greatest difference from the predicted bearing, and how much more for each further frame back; where turns
             are known.
+        bearing_weight
+            What is added to the distance of descriptors at the gate, in proportion less closer to the predicted bearing.
         extrapolate
             Whether bearings are predicted to go on changing as they did, beside the turn of the robot.
         f1, f2, f3, mutual, ordered

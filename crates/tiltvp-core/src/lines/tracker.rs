@@ -15,10 +15,13 @@ pub struct TrackerOptions {
     /// How lines of two frames are matched.
     pub matching: MatchOptions,
     /// Greatest difference from the bearing that is predicted for one frame to the next, in radians, where the turn of the
-    /// robot is known. Default 0.2.
+    /// robot is known. Default 0.1.
     pub gate_rad: f64,
     /// How much wider the gate is for each further frame back, in radians. Default 0.02.
     pub gate_growth_rad: f64,
+    /// What is added to the distance of descriptors at the gate, in proportion less for bearings closer to the predicted one:
+    /// of lines that look alike the one in the right place is the nearest. Default 0.5.
+    pub bearing_weight: f64,
     /// Whether bearings are predicted to go on changing as they did, beside the turn of the robot. Default true.
     pub extrapolate: bool,
 }
@@ -28,8 +31,9 @@ impl Default for TrackerOptions {
         Self {
             look_back: 20,
             matching: MatchOptions::default(),
-            gate_rad: 0.2,
+            gate_rad: 0.1,
             gate_growth_rad: 0.02,
+            bearing_weight: 0.5,
             extrapolate: true,
         }
     }
@@ -47,6 +51,9 @@ impl TrackerOptions {
         }
         if !(self.gate_rad > 0.0 && self.gate_rad.is_finite()) {
             return Err(Error::option("gate_rad", self.gate_rad, "a positive angle"));
+        }
+        if !(self.bearing_weight >= 0.0 && self.bearing_weight.is_finite()) {
+            return Err(Error::option("bearing_weight", self.bearing_weight, "a distance of at least 0"));
         }
         if !(self.gate_growth_rad >= 0.0 && self.gate_growth_rad.is_finite()) {
             return Err(Error::option("gate_growth_rad", self.gate_growth_rad, "an angle of at least 0"));
@@ -182,13 +189,17 @@ impl LineTracker {
                 .then_some(self.options.gate_rad + self.options.gate_growth_rad * k as f64);
             let going_on = if self.options.extrapolate { steps } else { 0.0 };
             let expected = |j: usize| frame.bearings_rad[j] - turn + going_on * frame.rates_rad[j];
+            let off = |i: usize, j: usize| wrap(memory.bearings_rad[i] - expected(j)).abs();
             let allowed = |i: usize, j: usize| {
                 memory.tracks[i] == u64::MAX
                     && self.claimed.binary_search(&frame.tracks[j]).is_err()
-                    && gate.is_none_or(|gate| wrap(memory.bearings_rad[i] - expected(j)).abs() <= gate)
+                    && gate.is_none_or(|gate| off(i, j) <= gate)
             };
-            self.scratch.measure(descriptors, &frame.descriptors, width)?;
             let size = (lines.len(), frame.tracks.len());
+            self.scratch.measure(descriptors, &frame.descriptors, width)?;
+            if let Some(gate) = gate {
+                self.scratch.add(size, |i, j| self.options.bearing_weight * (off(i, j) / gate).min(1.0));
+            }
             select(&mut self.scratch, size, allowed, &self.options.matching, &mut self.matches);
             for found in &self.matches {
                 let track = frame.tracks[found.b];

@@ -86,10 +86,11 @@ impl LineTracker {
                 "look_back" => parsed.look_back = convert::whole(&value, &name, "a whole number from 1")?,
                 "gate_rad" => parsed.gate_rad = convert::whole(&value, &name, "an angle")?,
                 "gate_growth_rad" => parsed.gate_growth_rad = convert::whole(&value, &name, "an angle")?,
+                "bearing_weight" => parsed.bearing_weight = convert::whole(&value, &name, "a number")?,
                 "extrapolate" => parsed.extrapolate = convert::whole(&value, &name, "True or False")?,
                 _ if matching::set(&mut parsed.matching, &key, &value)? => {}
                 _ => {
-                    let expected = "look_back, gate_rad, gate_growth_rad, extrapolate, f1, f2, f3, mutual, ordered";
+                    let expected = "look_back, gate_rad, gate_growth_rad, bearing_weight, extrapolate, f1, f2, f3, mutual, ordered";
                     return Err(invalid(format!("{name}: unknown, expected one of {expected}")));
                 }
             }
@@ -106,6 +107,7 @@ impl LineTracker {
         dict.set_item("look_back", options.look_back)?;
         dict.set_item("gate_rad", options.gate_rad)?;
         dict.set_item("gate_growth_rad", options.gate_growth_rad)?;
+        dict.set_item("bearing_weight", options.bearing_weight)?;
         dict.set_item("extrapolate", options.extrapolate)?;
         matching::in_force(&dict, &options.matching)?;
         Ok(dict)
