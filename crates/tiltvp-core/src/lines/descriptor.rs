@@ -102,20 +102,29 @@ pub(super) struct DescriptorScratch {
     made_for: Option<(usize, f64)>,
 }
 
-/// Writes the descriptors of lines, one after the other. `range` is that along the lines, `samples` the radius of an area in
-/// samples.
+/// Where the lines of an image run, and how far descriptors reach along them.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Course<'a> {
+    pub(super) chart: Chart<'a>,
+    /// Elevations, or radii in pixels.
+    pub(super) low: f64,
+    pub(super) high: f64,
+    /// The radius of an area in samples; none for one sample a pixel.
+    pub(super) samples: Option<usize>,
+}
+
+/// Writes the descriptors of lines, one after the other.
 pub(super) fn describe(
     image: &ImageView<'_>,
     sight: &Sight,
-    chart: &Chart<'_>,
+    course: &Course<'_>,
     lines: &Lines,
-    (low, high): (f64, f64),
-    samples: Option<usize>,
     options: &DescriptorOptions,
     scratch: &mut DescriptorScratch,
     out: &mut Vec<f32>,
 ) {
-    let (radius, _) = options.layout(low, high);
+    let Course { chart, low, high, samples } = course;
+    let (radius, _) = options.layout(*low, *high);
     let half = samples.unwrap_or((radius.ceil() as usize).clamp(2, 256));
     scratch.make_window(half, options.window);
     scratch.make_kernel(options.smoothing * half as f64);
@@ -124,7 +133,7 @@ pub(super) fn describe(
     out.clear();
     out.resize(lines.lines.len() * options.values(), 0.0);
     for (line, values) in lines.lines.iter().zip(out.chunks_exact_mut(options.values())) {
-        let (_, middles) = options.layout(low, high);
+        let (_, middles) = options.layout(*low, *high);
         for (middle, pair) in middles.zip(values.chunks_exact_mut(2 * options.bins)) {
             scratch.patch.sample(image, sight, chart, (line.bearing_rad, middle), pitch, (side, side));
             smooth(&mut scratch.patch, &scratch.kernel, &mut scratch.rows);
@@ -215,8 +224,8 @@ fn histograms(patch: &Patch, window: &[f32], half: usize, bins: usize, out: &mut
             let across = above[j + 2] - above[j] + below[j + 2] - below[j] + 2.0 * (here[j + 2] - here[j]);
             let along = above[j] - below[j] + above[j + 2] - below[j + 2] + 2.0 * (above[j + 1] - below[j + 1]);
             let magnitude = weight * (across * across + along * along).sqrt();
-            // Written so that NaN, a sample that is not of the world, fails.
-            if !(magnitude > 0.0) {
+            // NaN is a sample that is not of the world.
+            if magnitude.is_nan() || magnitude <= 0.0 {
                 continue;
             }
             // Eq. 2: the share w goes to the bin above.
@@ -252,7 +261,9 @@ fn normalise(values: &mut [f32], clip: f32) {
 fn unit(values: &mut [f32]) {
     let length = values.iter().map(|x| x * x).sum::<f32>().sqrt();
     if length > 0.0 {
-        values.iter_mut().for_each(|x| *x /= length);
+        for value in values.iter_mut() {
+            *value /= length;
+        }
     }
 }
 

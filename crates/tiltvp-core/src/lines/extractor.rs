@@ -2,7 +2,7 @@
 
 use nalgebra::Matrix3;
 
-use super::descriptor::{DescriptorScratch, describe};
+use super::descriptor::{Course, DescriptorScratch, describe};
 use super::great_circle::{self, GreatCircleScratch};
 use super::line::{Line, LineFrame, Lines};
 use super::options::{LineMethod, LineOptions};
@@ -122,8 +122,7 @@ impl LineExtractor {
         let edges = &self.options.edges;
         match (&self.options.method, &self.radii) {
             (LineMethod::Radial(options), Some(radii)) => {
-                let turn = &self.robot_from_camera;
-                radial::find(image, &self.sight, radii, turn, edges, options, &mut scratch.radial, out);
+                radial::find(image, &self.sight, radii, edges.gradient_min, options, &mut scratch.radial, out);
             }
             (LineMethod::GreatCircle(options), _) => {
                 let tilt = tilt.copied().unwrap_or(Tilt::UPRIGHT);
@@ -187,8 +186,9 @@ impl LineExtractor {
         self.check_frame(&lines.frame)?;
         let chart = Chart::new(&self.camera, &self.robot_from_camera, &lines.frame);
         let samples = lines.frame.center_px.is_none().then_some(SAMPLES);
-        let (range, options) = (self.range(&lines.frame), &self.options.descriptor);
-        describe(image, &self.sight, &chart, lines, range, samples, options, &mut scratch.descriptor, out);
+        let (low, high) = self.range(&lines.frame);
+        let course = Course { chart, low, high, samples };
+        describe(image, &self.sight, &course, lines, &self.options.descriptor, &mut scratch.descriptor, out);
         Ok(())
     }
 

@@ -9,7 +9,6 @@ use super::line::{Line, LineFrame, Lines};
 use super::options::RadialOptions;
 use super::sight::Sight;
 use crate::camera::Camera;
-use crate::edges::EdgeOptions;
 use crate::image::ImageView;
 
 /// What the radial variant knows of the camera: where the radial lines meet, the radii, the rim.
@@ -19,6 +18,7 @@ pub(super) struct Radii {
     pub(super) inner: f64,
     pub(super) outer: f64,
     pub(super) rim: f64,
+    robot_from_camera: Matrix3<f64>,
 }
 
 /// Memory of the search.
@@ -67,6 +67,7 @@ impl Radii {
             inner: options.radius_min_px.unwrap_or(inner.min(outer)),
             outer: options.radius_max_px.unwrap_or(outer),
             rim: options.rim_radius_px.unwrap_or(rim),
+            robot_from_camera: *robot_from_camera,
         }
     }
 }
@@ -76,8 +77,7 @@ pub(super) fn find(
     image: &ImageView<'_>,
     sight: &Sight,
     radii: &Radii,
-    robot_from_camera: &Matrix3<f64>,
-    edges: &EdgeOptions,
+    gradient_min: f64,
     options: &RadialOptions,
     scratch: &mut RadialScratch,
     out: &mut Lines,
@@ -85,7 +85,7 @@ pub(super) fn find(
     let RadialScratch { gx, gy, magnitude, radial, center: circle, sectors } = scratch;
     sobel(image, gx, gy, magnitude);
     // The Scharr kernel's weights sum to 16, the Sobel kernel's to 4.
-    let gradient_min = (edges.gradient_min / 4.0) as f32;
+    let gradient_min = (gradient_min / 4.0) as f32;
     let mut center = radii.center;
     if options.center_search_px > 0.0 {
         let found = find_center(magnitude, image, gradient_min, &center, radii.rim, options.center_search_px, circle);
@@ -154,9 +154,9 @@ pub(super) fn find(
             ray.map_or(f64::NAN, |ray| f64::from(ray[2]).atan2(f64::from(ray[0].hypot(ray[1]))))
         };
         let ends = (elevation(sector.nearest), elevation(sector.farthest));
-        let direction = robot_from_camera * Vector3::new(angle.cos(), angle.sin(), 0.0);
+        let direction = radii.robot_from_camera * Vector3::new(angle.cos(), angle.sin(), 0.0);
         // A camera that is upside down on the robot sees azimuths the other way round.
-        let handed = if robot_from_camera[(2, 2)] < 0.0 { -1.0 } else { 1.0 };
+        let handed = if radii.robot_from_camera[(2, 2)] < 0.0 { -1.0 } else { 1.0 };
         out.lines.push(Line {
             bearing_rad: direction.y.atan2(direction.x),
             sigma_rad: TAU / n as f64 / 12f64.sqrt(),

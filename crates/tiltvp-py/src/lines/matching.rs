@@ -19,13 +19,20 @@ pub(super) fn descriptors(value: &Bound<'_, PyAny>, name: &str) -> PyResult<(Vec
     Ok((values, n, width))
 }
 
-/// Two sets of equal width.
-fn pair(a: &Bound<'_, PyAny>, b: &Bound<'_, PyAny>) -> PyResult<(Vec<f32>, Vec<f32>, usize, usize, usize)> {
+/// Two sets of rows of equal width.
+struct Pair {
+    a: Vec<f32>,
+    b: Vec<f32>,
+    rows: [usize; 2],
+    width: usize,
+}
+
+fn pair(a: &Bound<'_, PyAny>, b: &Bound<'_, PyAny>) -> PyResult<Pair> {
     let ((a, n, width), (b, m, other)) = (descriptors(a, "a")?, descriptors(b, "b")?);
     if width != other || width == 0 {
         return Err(invalid(format!("a, b: {width} and {other} values a row, expected as many, and at least one")));
     }
-    Ok((a, b, n, m, width))
+    Ok(Pair { a, b, rows: [n, m], width })
 }
 
 /// Sets the options of a matcher that are named, and returns whether the name is one.
@@ -65,7 +72,7 @@ pub(crate) fn match_descriptors<'py>(
     gate_rad: Option<f64>,
     options: Option<&Bound<'py, PyDict>>,
 ) -> PyResult<Bound<'py, PyArray2<i64>>> {
-    let (a, b, _, _, width) = pair(a, b)?;
+    let Pair { a, b, width, .. } = pair(a, b)?;
     let mut parsed = MatchOptions::default();
     for (key, value) in options.into_iter().flat_map(PyDictMethods::iter) {
         let key: String = key.extract()?;
@@ -98,11 +105,11 @@ fn matrix<'py>(
     py: Python<'py>,
     a: &Bound<'py, PyAny>,
     b: &Bound<'py, PyAny>,
-    of: fn(&[f32], &[f32], usize) -> Result<Vec<f64>, tiltvp_core::Error>,
+    of: impl FnOnce(&[f32], &[f32], usize) -> Result<Vec<f64>, tiltvp_core::Error> + Send,
 ) -> PyResult<Bound<'py, PyArray2<f64>>> {
-    let (a, b, n, m, width) = pair(a, b)?;
+    let Pair { a, b, rows, width } = pair(a, b)?;
     let values = call(py, || of(&a, &b, width))?;
-    PyArray1::from_vec(py, values).reshape([n, m])
+    PyArray1::from_vec(py, values).reshape(rows)
 }
 
 /// `(N_A, N_B)` Euclidean distances of descriptors, eq. 6.
