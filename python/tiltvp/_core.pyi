@@ -1056,7 +1056,7 @@ class LineTracker:
             Greatest difference from the predicted bearing where turns are known; the same, beside the line's own change
             per frame, where that is known from before; and how much more for each further frame back.
         bearing_weight
-            What is added to the distance of descriptors at the gate, in proportion less closer to the predicted bearing.
+            What is added to the distance of descriptors at the gate, in proportion less nearer the predicted bearing.
         extrapolate
             Whether bearings are predicted to go on changing as they did, beside the turn of the robot.
         f1, f2, f3, mutual, ordered

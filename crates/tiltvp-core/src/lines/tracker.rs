@@ -23,7 +23,7 @@ pub struct TrackerOptions {
     /// How much wider the gates are for each further frame back, in radians. Default 0.005.
     pub gate_growth_rad: f64,
     /// What is added to the distance of descriptors at the gate, in proportion less for bearings closer to the predicted one:
-    /// of lines that look alike the one in the right place is the nearest. Default 0.5.
+    /// of lines that look alike the one in the right place is the nearest. Default 1.
     pub bearing_weight: f64,
     /// Whether bearings are predicted to go on changing as they did, beside the turn of the robot. Default true.
     pub extrapolate: bool,
@@ -37,7 +37,7 @@ impl Default for TrackerOptions {
             gate_rad: 0.1,
             gate_settled_rad: 0.02,
             gate_growth_rad: 0.005,
-            bearing_weight: 0.5,
+            bearing_weight: 1.0,
             extrapolate: true,
         }
     }
