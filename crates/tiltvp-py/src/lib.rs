@@ -4,6 +4,7 @@ mod call;
 mod camera;
 mod convert;
 mod lines;
+mod drive;
 mod rays;
 mod synth;
 mod tilt;
@@ -22,6 +23,7 @@ mod _core {
         LineExtractor, LineTracker, Lines, TrackedLines, descriptor_distances, match_descriptors, ssd_matrix,
         zncc_matrix,
     };
+    use crate::drive::Drive;
     #[pymodule_export]
     use crate::rays::PixelRays;
     #[pymodule_export]
@@ -39,6 +41,7 @@ mod _core {
         module.add("METHODS", tiltvp_core::tilt::METHODS.to_vec())?;
         module.add("LINE_METHODS", tiltvp_core::lines::LINE_METHODS.to_vec())?;
         module.add("CAMERA_MODELS", tiltvp_core::camera::Model::names().collect::<Vec<_>>())?;
-        module.add("ROOM_KINDS", tiltvp_synth::RoomKind::ALL.map(tiltvp_synth::RoomKind::name).to_vec())
+        module.add("ROOM_KINDS", tiltvp_synth::RoomKind::ALL.map(tiltvp_synth::RoomKind::name).to_vec())?;
+        module.add("WALL_PATTERNS", tiltvp_synth::WallPattern::ALL.map(tiltvp_synth::WallPattern::name).to_vec())
     }
 }
