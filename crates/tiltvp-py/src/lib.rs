@@ -3,8 +3,8 @@
 mod call;
 mod camera;
 mod convert;
-mod lines;
 mod drive;
+mod lines;
 mod rays;
 mod synth;
 mod tilt;
@@ -19,11 +19,12 @@ mod _core {
     #[pymodule_export]
     use crate::camera::Camera;
     #[pymodule_export]
+    use crate::drive::Drive;
+    #[pymodule_export]
     use crate::lines::{
         LineExtractor, LineTracker, Lines, TrackedLines, descriptor_distances, match_descriptors, ssd_matrix,
         zncc_matrix,
     };
-    use crate::drive::Drive;
     #[pymodule_export]
     use crate::rays::PixelRays;
     #[pymodule_export]
