@@ -5,7 +5,7 @@
 //! 1. [`error`], [`geometry`]
 //! 2. [`camera`], [`image`], [`robust`], [`filter`]
 //! 3. [`edges`]
-//! 4. [`tilt`]
+//! 4. [`tilt`], [`lines`]
 //! 5. [`selfcalib`]
 //!
 //! Angles are radians, lengths metres, pixel centres integers, rays unit bearings. The camera frame has `z` along the
@@ -17,6 +17,7 @@ pub mod error;
 pub mod filter;
 pub mod geometry;
 pub mod image;
+pub mod lines;
 pub mod robust;
 pub mod selfcalib;
 #[cfg(feature = "testing")]

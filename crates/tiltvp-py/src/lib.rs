@@ -4,6 +4,7 @@ mod call;
 mod camera;
 mod convert;
 mod drive;
+mod lines;
 mod rays;
 mod selfcalib;
 mod synth;
@@ -20,6 +21,11 @@ mod _core {
     use crate::camera::Camera;
     #[pymodule_export]
     use crate::drive::Drive;
+    #[pymodule_export]
+    use crate::lines::{
+        LineExtractor, LineTracker, Lines, TrackedLines, descriptor_distances, match_descriptors, ssd_matrix,
+        zncc_matrix,
+    };
     #[pymodule_export]
     use crate::rays::PixelRays;
     #[pymodule_export]
@@ -41,6 +47,7 @@ mod _core {
     fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {
         module.add("METHODS", tiltvp_core::tilt::METHODS.to_vec())?;
         module.add("CALIBRATION_METHODS", tiltvp_core::selfcalib::CALIBRATION_METHODS.to_vec())?;
+        module.add("LINE_METHODS", tiltvp_core::lines::LINE_METHODS.to_vec())?;
         module.add("CAMERA_MODELS", tiltvp_core::camera::Model::names().collect::<Vec<_>>())?;
         module.add("ROOM_KINDS", tiltvp_synth::RoomKind::ALL.map(tiltvp_synth::RoomKind::name).to_vec())?;
         module.add("WALL_PATTERNS", tiltvp_synth::WallPattern::ALL.map(tiltvp_synth::WallPattern::name).to_vec())

@@ -2,10 +2,12 @@
 
 mod angle;
 mod bearing;
+mod rotation;
 mod tilt;
 mod wheels;
 
 pub use angle::wrap_angle;
 pub use bearing::{angle_between, tangent_basis, tangent_exp, tangent_log, tangent_transport};
+pub use rotation::validate_rotation;
 pub use tilt::Tilt;
 pub use wheels::WheelLayout;
