@@ -1,4 +1,4 @@
-"""What Rust computes for the package: cameras, the tilt of images, common directions, rendered rooms.
+"""What Rust computes for the package: cameras, the tilt of images, common directions, vertical lines, rooms.
 
 Arrays that come in may have any strides and any real dtype unless a shape and dtype is asked for; they are never
 altered. Arrays that go out are fresh. Angles are radians. Equation numbers are those of Fleer 2017 (see the README).
@@ -12,6 +12,7 @@ from typing_extensions import disjoint_base
 
 __all__ = [
     "CAMERA_MODELS",
+    "LINE_METHODS",
     "METHODS",
     "ROOM_KINDS",
     "AffineCorrection",
@@ -22,6 +23,9 @@ __all__ = [
     "FilteredTilt",
     "FitReport",
     "ImageEdges",
+    "LineExtractor",
+    "LineTracker",
+    "Lines",
     "PixelRays",
     "PosteriorCorrection",
     "PriorOfTilt",
@@ -29,16 +33,21 @@ __all__ = [
     "TiltEstimate",
     "TiltEstimator",
     "TiltFilter",
+    "TrackedLines",
     "apply_correction",
     "common_direction",
+    "descriptor_distances",
     "leaning_from_upright",
     "level_map",
+    "match_descriptors",
     "normal_from_alpha_beta",
+    "ssd_matrix",
     "tilt_error_rad",
     "tilt_from_wheel_heights",
     "train_affine",
     "train_factor",
     "train_posterior",
+    "zncc_matrix",
 ]
 
 _Method: TypeAlias = Literal["refined", "image-space-ransac", "image-space-reject-refit", "vector-consensus"]
@@ -52,6 +61,9 @@ METHODS: Final[list[str]]
 
 CAMERA_MODELS: Final[list[str]]
 """The names of the models of `Camera`."""
+
+LINE_METHODS: Final[list[str]]
+"""The names of the methods of `LineExtractor`, the default first."""
 
 ROOM_KINDS: Final[list[str]]
 """The kinds of `Room`."""
@@ -802,6 +814,313 @@ class TiltFilter:
     def __eq__(self, other: object, /) -> bool: ...
     def __copy__(self) -> Self: ...
     def __deepcopy__(self, _memo: object) -> Self: ...
+
+@final
+class Lines:
+    """The vertical lines of one image, by rising bearing. Frozen, comparable, to be pickled.
+
+    `LineExtractor` makes them. Bearings are azimuths atan2(y, x) about the vertical in the upright robot's frame (the
+    camera's without `robot_from_camera`).
+    """
+
+    @property
+    def bearing_rad(self) -> NDArray[np.float64]:
+        """(N,): azimuth about the vertical in the upright robot's frame, in (-pi, pi]."""
+
+    @property
+    def sigma_rad(self) -> NDArray[np.float64]:
+        """(N,): standard deviation of the bearing."""
+
+    @property
+    def support_px(self) -> NDArray[np.uint32]:
+        """(N,): edge pixels on the line, one across the edge."""
+
+    @property
+    def elevation_min_rad(self) -> NDArray[np.float64]:
+        """(N,): elevation of the lowest pixel above the upright robot's horizon."""
+
+    @property
+    def elevation_max_rad(self) -> NDArray[np.float64]:
+        """(N,): elevation of the highest pixel."""
+
+    @property
+    def polarity(self) -> NDArray[np.float64]:
+        """(N,) in [-1, 1]: share of the pixels that are brighter towards greater azimuth minus that of the others."""
+
+    @property
+    def normal(self) -> NDArray[np.float64]:
+        """(3,): the ground normal in the robot frame that was taken for the vertical."""
+
+    @property
+    def center_px(self) -> tuple[float, float] | None:
+        """Where radial lines meet, (u, v); None but for the method "radial"."""
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain numbers and lists, good for JSON."""
+
+    @classmethod
+    def from_dict(cls, values: dict[str, Any]) -> Self:
+        """The lines that `to_dict` wrote. Raises `tiltvp.errors.InvalidInputError` for anything else."""
+
+    def __len__(self) -> int: ...
+    def __eq__(self, other: object, /) -> bool: ...
+    def __copy__(self) -> Self: ...
+    def __deepcopy__(self, _memo: object) -> Self: ...
+    __hash__: ClassVar[None]  # type: ignore[assignment]
+
+@disjoint_base
+class LineExtractor:
+    """Finds and describes the vertical lines of single images of one camera.
+
+    The tables of the camera are made once. `tiltvp.lines.LineExtractor` takes images of any usual kind.
+    """
+
+    def __new__(
+        cls,
+        camera: Camera,
+        *,
+        method: Literal["great-circle", "radial"] | str = ...,
+        robot_from_camera: ArrayLike | None = None,
+        gradient_min: float = ...,
+        smoothing_px: float = ...,
+        elevation_min_rad: float = ...,
+        elevation_max_rad: float = ...,
+        margin_px: float = ...,
+        mask: NDArray[np.bool_] | None = ...,
+        plane_max_rad: float = ...,
+        bins: SupportsIndex = ...,
+        separation_rad: float = ...,
+        length_min_rad: float = ...,
+        support_min_px: SupportsIndex = ...,
+        gap_max_rad: float = ...,
+        run_min_px: SupportsIndex = ...,
+        tilt_sigma_rad: float = ...,
+        lines_max: SupportsIndex | None = ...,
+        radial_max_rad: float = ...,
+        sectors: SupportsIndex = ...,
+        length_min: float = ...,
+        radius_min_px: float | None = ...,
+        radius_max_px: float | None = ...,
+        rim_radius_px: float | None = ...,
+        center_search_px: float = ...,
+        descriptor_areas: SupportsIndex = ...,
+        descriptor_overlapping: bool = ...,
+        descriptor_bins: SupportsIndex = ...,
+        descriptor_clip: float = ...,
+        descriptor_window: float = ...,
+        descriptor_smoothing: float = ...,
+        descriptor_normalisation: Literal["area", "whole"] = ...,
+    ) -> Self:
+        """Makes the tables. `options` tells the options in force.
+
+        Parameters
+        ----------
+        camera
+            The camera whose images will come.
+        method
+            "great-circle": great circles through the vertical, by the camera model; "radial": lines through the rim's
+            centre, as the paper has them.
+        robot_from_camera
+            (3, 3) rotation R with v_robot = R v_camera; default identity: an upward camera, columns to the front.
+        gradient_min, smoothing_px, elevation_min_rad, elevation_max_rad, margin_px, mask
+            As those of `TiltEstimator`; the band is from 30 degrees below the horizon to 60 above it.
+        plane_max_rad
+            "great-circle": how far from the vertical the great circle of an edge pixel may pass.
+        bins
+            "great-circle": bins of the histogram over azimuth.
+        separation_rad
+            "great-circle": least angle between two lines of the same polarity.
+        length_min_rad, support_min_px
+            "great-circle": least elevation that the runs of pixels of a line cover, and least number of its pixels.
+        gap_max_rad, run_min_px
+            "great-circle": widest gap within a run of pixels, and least number of pixels of a run.
+        tilt_sigma_rad
+            "great-circle": standard deviation of the tilt that frames are given; lines may slant by as much.
+        lines_max
+            "great-circle": the most lines of an image, the longest ones. None: all.
+        radial_max_rad
+            "radial": how far a gradient may turn from the tangent of its circle about the centre.
+        sectors
+            "radial": number of sectors.
+        length_min
+            "radial": least length of a line as a fraction of the outer radius minus the inner.
+        radius_min_px, radius_max_px
+            "radial": inner and outer radius. None: those of the elevation band.
+        rim_radius_px, center_search_px
+            "radial": radius of the mirror's rim (None: that of the camera's valid pixels), and how far from the
+            calibrated centre the rim's is looked for in every frame; 0 keeps the calibrated one.
+        descriptor_areas, descriptor_overlapping
+            Number of circular areas along a line, and whether they overlap by half: 3, or 5 that overlap.
+        descriptor_bins, descriptor_clip
+            Bins of each orientation histogram, and the greatest value of one before the second normalisation.
+        descriptor_window
+            Standard deviation of the Gaussian window as a fraction of an area's radius.
+        descriptor_smoothing
+            Standard deviation of the Gaussian that smooths an area before its gradients are taken, the same fraction.
+        descriptor_normalisation
+            What has unit length: the pair of histograms of each "area" (eq. 3), or the "whole" (eq. 4).
+
+        Raises `tiltvp.errors.InvalidInputError` for an option that the method does not have (it names the near ones) or
+        that is out of its domain, for an R that is no rotation, for a mask of another size than the camera's images,
+        and where no pixel sees the band.
+        """
+
+    @property
+    def camera(self) -> Camera:
+        """The camera whose images are read."""
+
+    @property
+    def method(self) -> str:
+        """The name of the method."""
+
+    @property
+    def robot_from_camera(self) -> NDArray[np.float64]:
+        """(3, 3): the rotation R in v_robot = R v_camera."""
+
+    @property
+    def options(self) -> dict[str, Any]:
+        """The options that are in force, by name, defaults included; a fresh dict, good as keywords."""
+
+    @property
+    def band_rad(self) -> tuple[float, float]:
+        """Lowest and highest elevation that descriptors cover: what most directions see of the band."""
+
+    def _extract(self, image: NDArray[np.uint8], normal: ArrayLike | None) -> Lines:
+        """The lines of a C-contiguous (H, W) image of uint8."""
+
+    def _describe(self, image: NDArray[np.uint8], lines: Lines) -> NDArray[np.float32]:
+        """(N, K): descriptors of the lines of such an image."""
+
+    def _patches(self, image: NDArray[np.uint8], lines: Lines) -> NDArray[np.float32]:
+        """(N, rows, columns): grey levels about the lines of such an image."""
+
+    def _lines_at(self, bearing_rad: ArrayLike, normal: ArrayLike | None) -> Lines:
+        """Lines at any bearings, without support."""
+
+    def __eq__(self, other: object, /) -> bool: ...
+    def __hash__(self) -> int: ...
+
+@final
+class TrackedLines:
+    """The lines of one frame and whose they are. Frozen."""
+
+    @property
+    def frame(self) -> int:
+        """Number of the frame, from 0."""
+
+    @property
+    def track(self) -> NDArray[np.int64]:
+        """(N,): identity of each line, from 0, never given twice."""
+
+    @property
+    def frames_back(self) -> NDArray[np.int64]:
+        """(N,): how many frames ago each line was last seen, 0 for a new one."""
+
+    @property
+    def lines(self) -> Lines:
+        """The lines."""
+
+    def __len__(self) -> int: ...
+
+@final
+class LineTracker:
+    """Follows lines through successive frames: each gets the identity of the line it is, or a new one.
+
+    A line is looked for in the last frame, then in the one before, up to `look_back` frames. Where the turn of the
+    robot is known, bearings are predicted and far lines are no candidates. The same calls give the same answers.
+    Comparable, copied and pickled with all that it remembers.
+    """
+
+    def __new__(
+        cls,
+        *,
+        look_back: SupportsIndex = ...,
+        gate_rad: float = ...,
+        gate_growth_rad: float = ...,
+        bearing_weight: float = ...,
+        extrapolate: bool = ...,
+        f1: float = ...,
+        f2: float = ...,
+        f3: float = ...,
+        mutual: bool = ...,
+        ordered: bool = ...,
+    ) -> Self:
+        """A tracker that has seen nothing.
+
+        Parameters
+        ----------
+        look_back
+            How many frames back a line is looked for before it is taken for a new one.
+        gate_rad, gate_growth_rad
+            Greatest difference from the predicted bearing, and how much more for each further frame back; where turns
+            are known.
+        bearing_weight
+            What is added to the distance of descriptors at the gate, in proportion less closer to the predicted bearing.
+        extrapolate
+            Whether bearings are predicted to go on changing as they did, beside the turn of the robot.
+        f1, f2, f3, mutual, ordered
+            As those of `match_descriptors`.
+
+        Raises `tiltvp.errors.InvalidInputError` for an option that is unknown or out of its domain.
+        """
+
+    @property
+    def options(self) -> dict[str, Any]:
+        """The options in force, by name, defaults included; a fresh dict, good as keywords."""
+
+    @property
+    def next_frame(self) -> int:
+        """Number of the next frame."""
+
+    @property
+    def track_count(self) -> int:
+        """How many identities have been given."""
+
+    def update(
+        self, lines: Lines, descriptors: NDArray[np.float32], *, yaw_change_rad: float | None = None
+    ) -> TrackedLines:
+        """The next frame: its lines, their descriptors (N, K), and the turn since the last one, positive to the left.
+
+        Raises `tiltvp.errors.InvalidInputError` for descriptors of another number or width, and turns that are not
+        finite; the tracker is as before then.
+        """
+
+    def __eq__(self, other: object, /) -> bool: ...
+    def __copy__(self) -> Self: ...
+    def __deepcopy__(self, _memo: object) -> Self: ...
+    def __setstate__(self, state: tuple[int, int, list[Any]], /) -> None:
+        """Sets what pickle has kept."""
+    __hash__: ClassVar[None]  # type: ignore[assignment]
+
+def match_descriptors(
+    a: NDArray[np.float32],
+    b: NDArray[np.float32],
+    *,
+    expected_rad: ArrayLike | None = None,
+    seen_rad: ArrayLike | None = None,
+    gate_rad: float | None = None,
+    f1: float = ...,
+    f2: float = ...,
+    f3: float = ...,
+    mutual: bool = ...,
+    ordered: bool = ...,
+) -> NDArray[np.int64]:
+    """(M, 2): rows of `a` (N_A, K) and the rows of `b` (N_B, K) that are the same lines, by rising row of `a`.
+
+    The nearest descriptor, if its distance is at most `f1` (eq. 8 of Scaramuzza 2009), `f2` times the mean distance
+    (eq. 9), and `f3` times the second smallest (eq. 10). `mutual` asks for the nearest both ways, `ordered` for matches
+    in cyclic order, for rows by rising bearing. With bearings of `a` as expected in `b`, bearings of `b` and a greatest
+    difference, far lines are no candidates. Raises `tiltvp.errors.InvalidInputError`.
+    """
+
+def descriptor_distances(a: NDArray[np.float32], b: NDArray[np.float32]) -> NDArray[np.float64]:
+    """(N_A, N_B): Euclidean distances of descriptors, eq. 6 (Scaramuzza 2009)."""
+
+def ssd_matrix(a: NDArray[np.float32], b: NDArray[np.float32]) -> NDArray[np.float64]:
+    """(N_A, N_B): means of squared differences of patches (N, K), eq. 12 over the samples that both have."""
+
+def zncc_matrix(a: NDArray[np.float32], b: NDArray[np.float32]) -> NDArray[np.float64]:
+    """(N_A, N_B): zero-mean normalised cross-correlations of patches (N, K), eq. 13; 1 for equal ones."""
 
 @final
 class CommonDirection:

@@ -5,7 +5,7 @@
 //! 1. [`error`], [`geometry`]
 //! 2. [`camera`], [`image`], [`robust`], [`filter`]
 //! 3. [`edges`]
-//! 4. [`tilt`]
+//! 4. [`tilt`], [`lines`]
 //!
 //! Angles are radians, lengths metres, pixel centres integers, rays unit bearings. The camera frame has `z` along the
 //! optical axis, `x` to the right (columns) and `y` down (rows); the robot frame has `x` forward, `y` left, `z` up.
@@ -16,6 +16,7 @@ pub mod error;
 pub mod filter;
 pub mod geometry;
 pub mod image;
+pub mod lines;
 pub mod robust;
 #[cfg(feature = "testing")]
 pub mod testing;

@@ -5,8 +5,9 @@ use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray2, PyUntypedArray
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use tiltvp_core::edges::Mask;
+use tiltvp_core::image::ImageView;
 
-use crate::call::invalid;
+use crate::call::{exception, invalid};
 
 /// `numpy.asarray(value)`, refused unless it holds plain numbers.
 fn numbers<'py>(value: &Bound<'py, PyAny>, name: &str, expected: &str) -> PyResult<Bound<'py, PyUntypedArray>> {
@@ -79,6 +80,13 @@ pub(crate) fn gray<'py>(value: &Bound<'py, PyAny>, name: &str) -> PyResult<PyRea
         return Err(invalid(format!("{name}: strided, expected C-contiguous rows")));
     }
     Ok(array)
+}
+
+/// Such an array as the core sees it.
+pub(crate) fn view<'a>(image: &'a PyReadonlyArray2<'_, u8>) -> PyResult<ImageView<'a>> {
+    let shape = image.shape();
+    let data = image.as_slice().map_err(|error| invalid(format!("image: {error}")))?;
+    ImageView::new(data, shape[1], shape[0], shape[1]).map_err(|error| exception(&error))
 }
 
 /// A `(H, W)` array of bool, with its shape.

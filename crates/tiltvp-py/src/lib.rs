@@ -3,6 +3,7 @@
 mod call;
 mod camera;
 mod convert;
+mod lines;
 mod rays;
 mod synth;
 mod tilt;
@@ -16,6 +17,11 @@ mod _core {
 
     #[pymodule_export]
     use crate::camera::Camera;
+    #[pymodule_export]
+    use crate::lines::{
+        LineExtractor, LineTracker, Lines, TrackedLines, descriptor_distances, match_descriptors, ssd_matrix,
+        zncc_matrix,
+    };
     #[pymodule_export]
     use crate::rays::PixelRays;
     #[pymodule_export]
@@ -31,6 +37,7 @@ mod _core {
     #[pymodule_init]
     fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {
         module.add("METHODS", tiltvp_core::tilt::METHODS.to_vec())?;
+        module.add("LINE_METHODS", tiltvp_core::lines::LINE_METHODS.to_vec())?;
         module.add("CAMERA_MODELS", tiltvp_core::camera::Model::names().collect::<Vec<_>>())?;
         module.add("ROOM_KINDS", tiltvp_synth::RoomKind::ALL.map(tiltvp_synth::RoomKind::name).to_vec())
     }

@@ -14,11 +14,10 @@ mod values;
 use std::sync::{Arc, Mutex, PoisonError};
 
 use nalgebra::Matrix3;
-use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray2, PyUntypedArrayMethods};
+use numpy::{PyArray1, PyArray2, PyArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyTuple};
 use tiltvp_core::geometry::{Tilt, WheelLayout};
-use tiltvp_core::image::ImageView;
 use tiltvp_core::tilt::{self as core, Scratch};
 
 pub(crate) use self::correction::{
@@ -106,7 +105,7 @@ impl TiltEstimator {
     /// The tilt of a C-contiguous `(H, W)` image of uint8.
     fn _estimate(&self, py: Python<'_>, image: &Bound<'_, PyAny>) -> PyResult<TiltEstimate> {
         let image = convert::gray(image, "image")?;
-        let (view, inner) = (view(&image)?, &self.inner);
+        let (view, inner) = (convert::view(&image)?, &self.inner);
         let mut scratch = self.borrow_scratch();
         let estimate = call(py, || inner.estimate(&view, &mut scratch));
         self.return_scratch(scratch);
@@ -116,7 +115,7 @@ impl TiltEstimator {
     /// The edge pixels of a C-contiguous `(H, W)` image of uint8.
     fn _detect(&self, py: Python<'_>, image: &Bound<'_, PyAny>) -> PyResult<ImageEdges> {
         let image = convert::gray(image, "image")?;
-        let (view, inner) = (view(&image)?, &self.inner);
+        let (view, inner) = (convert::view(&image)?, &self.inner);
         let mut scratch = self.borrow_scratch();
         let edges = call(py, || inner.detect(&view, &mut scratch));
         self.return_scratch(scratch);
@@ -138,7 +137,7 @@ impl TiltEstimator {
     /// The tilt of an image and its edge pixels.
     fn _estimate_with_edges(&self, py: Python<'_>, image: &Bound<'_, PyAny>) -> PyResult<(TiltEstimate, EdgeElements)> {
         let image = convert::gray(image, "image")?;
-        let (view, inner) = (view(&image)?, &self.inner);
+        let (view, inner) = (convert::view(&image)?, &self.inner);
         let mut scratch = self.borrow_scratch();
         let outcome = call(py, || inner.estimate_with_elements(&view, &mut scratch));
         self.return_scratch(scratch);
@@ -159,7 +158,7 @@ impl TiltEstimator {
         let threads = threads.map_or(Ok(1), |threads| convert::whole(threads, "threads", "a whole number from 1"))?;
         let named = images.iter().enumerate().map(|(i, image)| convert::gray(image, &format!("images[{i}]")));
         let arrays = named.collect::<PyResult<Vec<_>>>()?;
-        let views = arrays.iter().map(view).collect::<PyResult<Vec<_>>>()?;
+        let views = arrays.iter().map(convert::view).collect::<PyResult<Vec<_>>>()?;
         let estimates = call(py, || self.inner.estimate_many(&views, threads))?;
         Ok(estimates.into_iter().map(TiltEstimate::from).collect())
     }
@@ -224,12 +223,6 @@ impl TiltEstimator {
     fn return_scratch(&self, scratch: Scratch) {
         self.scratch.lock().unwrap_or_else(PoisonError::into_inner).push(scratch);
     }
-}
-
-fn view<'a>(image: &'a PyReadonlyArray2<'_, u8>) -> PyResult<ImageView<'a>> {
-    let shape = image.shape();
-    let data = image.as_slice().map_err(|error| invalid(format!("image: {error}")))?;
-    ImageView::new(data, shape[1], shape[0], shape[1]).map_err(|error| exception(&error))
 }
 
 /// A tilt from the ground normal in the robot frame.

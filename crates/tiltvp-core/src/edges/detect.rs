@@ -53,9 +53,16 @@ impl EdgePixels {
         &self.gy[..self.len]
     }
 
+    /// Leaves none, and the room for them.
+    pub fn clear(&mut self) {
+        (self.len, self.strong) = (0, 0);
+    }
+
     /// Appends a pixel.
     pub fn push(&mut self, slot: u32, gx: f32, gy: f32) {
-        self.make_room(self.len + 1);
+        if self.slot.len() == self.len {
+            self.make_room(2 * self.len + 64);
+        }
         (self.slot[self.len], self.gx[self.len], self.gy[self.len]) = (slot, gx, gy);
         self.len += 1;
         self.strong += 1;
@@ -138,15 +145,10 @@ impl Detector {
             if let Some(screen) = screen {
                 strong_pixels += screen.apply(span.slot, gx, gy, strength, threshold_squared);
             }
-            for (block, start) in strength.chunks(BLOCK).zip((0..n).step_by(BLOCK)) {
-                let mut strong = reaching(block, threshold_squared);
-                while strong != 0 {
-                    let i = start + strong.trailing_zeros() as usize;
-                    strong &= strong - 1;
-                    (slots[len], gxs[len], gys[len]) = ((span.slot + i) as u32, gx[i], gy[i]);
-                    len += 1;
-                }
-            }
+            reaching_in(strength, threshold_squared, |i| {
+                (slots[len], gxs[len], gys[len]) = ((span.slot + i) as u32, gx[i], gy[i]);
+                len += 1;
+            });
         }
         out.len = len;
         out.strong = if screen.is_some() { strong_pixels } else { len };
@@ -155,6 +157,18 @@ impl Detector {
 
 /// Pixels that are tested together.
 const BLOCK: usize = 32;
+
+/// Calls with the place of each value that reaches the threshold.
+#[inline(always)]
+pub(super) fn reaching_in(values: &[f32], threshold: f32, mut with: impl FnMut(usize)) {
+    for (block, start) in values.chunks(BLOCK).zip((0..values.len()).step_by(BLOCK)) {
+        let mut strong = reaching(block, threshold);
+        while strong != 0 {
+            with(start + strong.trailing_zeros() as usize);
+            strong &= strong - 1;
+        }
+    }
+}
 
 /// One bit for each pixel of a block, at most 32, that reaches the threshold.
 #[inline(always)]
@@ -188,7 +202,14 @@ fn reaching_sse2(block: &[f32; BLOCK], threshold: f32) -> u32 {
 
 /// The 3x3 Scharr derivatives (3, 10, 3) of the middle row and their squared magnitude; rows are one pixel wider on both sides.
 #[multiversion(targets("x86_64+avx512f+avx512vl", "x86_64+avx2"))]
-fn scharr(above: &[f32], middle: &[f32], below: &[f32], gx: &mut [f32], gy: &mut [f32], strength: &mut [f32]) {
+pub(super) fn scharr(
+    above: &[f32],
+    middle: &[f32],
+    below: &[f32],
+    gx: &mut [f32],
+    gy: &mut [f32],
+    strength: &mut [f32],
+) {
     let n = gx.len();
     let (above, middle, below) = (&above[..n + 2], &middle[..n + 2], &below[..n + 2]);
     let (gy, strength) = (&mut gy[..n], &mut strength[..n]);

@@ -13,6 +13,7 @@ use super::tables::{Sight, Tables};
 use crate::camera::Camera;
 use crate::edges::{EdgeOptions, EdgePixels, Screen};
 use crate::error::{Error, Result};
+use crate::geometry::validate_rotation;
 use crate::image::ImageView;
 
 /// Estimates the tilt of a robot from single images of one camera.
@@ -222,19 +223,4 @@ impl TiltEstimator {
         let elements = elements.collect();
         Ok((estimate, elements))
     }
-}
-
-/// # Errors
-/// [`Error::InvalidArgument`] unless the matrix is a rotation to about 1e-6.
-pub(super) fn validate_rotation(matrix: &Matrix3<f64>) -> Result<()> {
-    let off = (matrix.transpose() * matrix - Matrix3::identity()).norm();
-    if off < 1e-6 && matrix.determinant() > 0.0 {
-        return Ok(());
-    }
-    let got = if matrix.iter().all(|x| x.is_finite()) {
-        format!("a matrix with determinant {:.6} and |R^T R - I| = {off:.2e}", matrix.determinant())
-    } else {
-        "a matrix that is not finite".to_owned()
-    };
-    Err(Error::argument("robot_from_camera", got, "a rotation: orthonormal columns, determinant 1"))
 }

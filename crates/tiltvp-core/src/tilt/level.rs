@@ -2,7 +2,6 @@
 
 use nalgebra::{Matrix3, Vector2};
 
-use super::estimator::validate_rotation;
 use crate::camera::Camera;
 use crate::error::Result;
 use crate::geometry::Tilt;
@@ -15,7 +14,7 @@ use crate::geometry::Tilt;
 /// # Errors
 /// [`Error::InvalidArgument`](crate::Error::InvalidArgument) if `robot_from_camera` is no rotation.
 pub fn level_map(camera: &Camera, robot_from_camera: &Matrix3<f64>, tilt: &Tilt) -> Result<Vec<[f32; 2]>> {
-    validate_rotation(robot_from_camera)?;
+    crate::geometry::validate_rotation(robot_from_camera)?;
     let rotation = robot_from_camera.transpose() * tilt.leaning_from_upright() * robot_from_camera;
     let place = |u: u32, v: u32| -> Option<[f32; 2]> {
         let bearing = camera.unproject(&Vector2::new(f64::from(u), f64::from(v)))?;

@@ -1,0 +1,22 @@
+//! What makes a matrix a rotation.
+
+use nalgebra::Matrix3;
+
+use crate::error::{Error, Result};
+
+/// Refuses a mounting `robot_from_camera` that is no rotation.
+///
+/// # Errors
+/// [`Error::InvalidArgument`] unless the matrix is a rotation to about 1e-6.
+pub fn validate_rotation(matrix: &Matrix3<f64>) -> Result<()> {
+    let off = (matrix.transpose() * matrix - Matrix3::identity()).norm();
+    if off < 1e-6 && matrix.determinant() > 0.0 {
+        return Ok(());
+    }
+    let got = if matrix.iter().all(|x| x.is_finite()) {
+        format!("a matrix with determinant {:.6} and |R^T R - I| = {off:.2e}", matrix.determinant())
+    } else {
+        "a matrix that is not finite".to_owned()
+    };
+    Err(Error::argument("robot_from_camera", got, "a rotation: orthonormal columns, determinant 1"))
+}

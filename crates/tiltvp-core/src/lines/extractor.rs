@@ -1,0 +1,221 @@
+//! From an image to its vertical lines and their descriptors: the tables of a camera, made once.
+
+use nalgebra::Matrix3;
+
+use super::descriptor::{Course, DescriptorScratch, describe};
+use super::great_circle::{self, GreatCircleScratch};
+use super::line::{Line, LineFrame, Lines};
+use super::options::{LineMethod, LineOptions};
+use super::patch::{Chart, Patch};
+use super::radial::{self, RadialScratch, Radii};
+use super::sight::Sight;
+use crate::camera::Camera;
+use crate::edges::{RidgeDetector, RidgePixels};
+use crate::error::{Error, Result};
+use crate::geometry::Tilt;
+use crate::image::ImageView;
+
+/// Samples of a descriptor from the middle of an area to its rim, along great circles.
+const SAMPLES: usize = 12;
+
+/// Finds and describes the vertical lines of single images of one camera.
+#[derive(Debug, Clone)]
+pub struct LineExtractor {
+    camera: Camera,
+    robot_from_camera: Matrix3<f64>,
+    options: LineOptions,
+    sight: Sight,
+    radii: Option<Radii>,
+}
+
+/// Memory for one thread.
+#[derive(Debug, Clone)]
+pub struct LineScratch {
+    detector: RidgeDetector,
+    ridge: RidgePixels,
+    great_circle: GreatCircleScratch,
+    radial: RadialScratch,
+    descriptor: DescriptorScratch,
+    region_pixels: usize,
+}
+
+impl LineExtractor {
+    /// Makes the tables. `robot_from_camera` is `R`, which takes bearings of the camera frame to the robot frame.
+    ///
+    /// # Errors
+    /// [`Error::InvalidOption`] or [`Error::InvalidArgument`] if an option is out of its domain, `R` is no rotation, the mask
+    /// does not fit the camera, or no pixel sees the elevation band.
+    pub fn new(camera: Camera, robot_from_camera: Matrix3<f64>, options: LineOptions) -> Result<Self> {
+        options.validate()?;
+        crate::geometry::validate_rotation(&robot_from_camera)?;
+        let sight = Sight::new(&camera, &robot_from_camera, &options)?;
+        let radii = match &options.method {
+            LineMethod::GreatCircle(_) => None,
+            LineMethod::Radial(radial) => Some(Radii::new(&camera, &robot_from_camera, &sight, radial)),
+        };
+        if let Some(radii) = radii
+            && radii.outer - radii.inner < 6.0
+        {
+            let got = format!("[{:.1}, {:.1}]", radii.inner, radii.outer);
+            return Err(Error::option("radius_min_px, radius_max_px", got, "radii at least 6 pixels apart"));
+        }
+        Ok(Self { camera, robot_from_camera, options, sight, radii })
+    }
+
+    /// The camera.
+    pub fn camera(&self) -> &Camera {
+        &self.camera
+    }
+
+    /// The rotation from the camera frame to the robot frame.
+    pub fn robot_from_camera(&self) -> &Matrix3<f64> {
+        &self.robot_from_camera
+    }
+
+    /// The options.
+    pub fn options(&self) -> &LineOptions {
+        &self.options
+    }
+
+    /// Lowest and highest elevation that descriptors cover, in radians.
+    pub fn band_rad(&self) -> (f64, f64) {
+        self.sight.band
+    }
+
+    /// Memory for one thread.
+    pub fn scratch(&self) -> LineScratch {
+        LineScratch {
+            detector: RidgeDetector::new(&self.sight.region, &self.options.edges),
+            ridge: RidgePixels::default(),
+            great_circle: GreatCircleScratch::default(),
+            radial: RadialScratch::default(),
+            descriptor: DescriptorScratch::default(),
+            region_pixels: self.sight.region.len(),
+        }
+    }
+
+    fn check(&self, image: &ImageView<'_>, scratch: &LineScratch) -> Result<()> {
+        if scratch.region_pixels != self.sight.region.len() {
+            return Err(Error::argument("scratch", "that of another extractor", "one made by this extractor"));
+        }
+        let (width, height) = (self.sight.width, self.sight.height);
+        if (image.width(), image.height()) == (width, height) {
+            return Ok(());
+        }
+        let got = format!("{} x {} pixels", image.height(), image.width());
+        Err(Error::argument("image", got, format!("{height} x {width} (rows x columns), as the camera's images")))
+    }
+
+    /// The vertical lines of an image, by rising bearing. `tilt` is the lean of the frame where it is known; the radial
+    /// variant knows none.
+    ///
+    /// # Errors
+    /// [`Error::InvalidArgument`] if the image has another size than the camera's, or the scratch is another extractor's.
+    pub fn extract(
+        &self,
+        image: &ImageView<'_>,
+        tilt: Option<&Tilt>,
+        scratch: &mut LineScratch,
+        out: &mut Lines,
+    ) -> Result<()> {
+        self.check(image, scratch)?;
+        let edges = &self.options.edges;
+        match (&self.options.method, &self.radii) {
+            (LineMethod::Radial(options), Some(radii)) => {
+                radial::find(image, &self.sight, radii, edges.gradient_min, options, &mut scratch.radial, out);
+            }
+            (LineMethod::GreatCircle(options), _) => {
+                let tilt = tilt.copied().unwrap_or(Tilt::UPRIGHT);
+                let reach = (options.plane_max_rad + tilt.alpha_rad()).min(std::f64::consts::FRAC_PI_2);
+                let screen = self.sight.screen.with_limit(reach.sin());
+                let LineScratch { detector, ridge, great_circle, .. } = scratch;
+                detector.detect(image, &self.sight.region, edges.gradient_min, Some(&screen), ridge);
+                let frame = LineFrame { normal: tilt.normal(), center_px: None };
+                great_circle::find(&self.sight, ridge, frame, options, great_circle, out);
+            }
+            (LineMethod::Radial(_), None) => {}
+        }
+        Ok(())
+    }
+
+    /// Lines at any bearings in the frame of an image, without support: to describe places where there may be no line.
+    pub fn lines_at(&self, bearings_rad: &[f64], tilt: Option<&Tilt>) -> Lines {
+        let (elevation_min_rad, elevation_max_rad) = self.sight.band;
+        let line = |bearing_rad: &f64| Line {
+            bearing_rad: *bearing_rad,
+            sigma_rad: 0.0,
+            support_px: 0,
+            elevation_min_rad,
+            elevation_max_rad,
+            polarity: 0.0,
+        };
+        let center_px = self.radii.map(|radii| radii.center);
+        let normal = tilt.filter(|_| center_px.is_none()).unwrap_or(&Tilt::UPRIGHT).normal();
+        Lines { lines: bearings_rad.iter().map(line).collect(), frame: LineFrame { normal, center_px } }
+    }
+
+    /// Where along lines of a frame descriptors reach: elevations, or radii in pixels.
+    fn range(&self, frame: &LineFrame) -> (f64, f64) {
+        match (frame.center_px, &self.radii) {
+            (Some(_), Some(radii)) => (radii.inner, radii.outer),
+            _ => self.sight.band,
+        }
+    }
+
+    fn check_frame(&self, frame: &LineFrame) -> Result<()> {
+        if frame.center_px.is_some() == self.radii.is_some() {
+            return Ok(());
+        }
+        Err(Error::argument("lines", "lines of the other method", "lines that this extractor's method found"))
+    }
+
+    /// The descriptors of the lines of an image, one after the other: paper 001 section 3 along the lines' great circles, or
+    /// along radii for lines of the radial variant.
+    ///
+    /// # Errors
+    /// [`Error::InvalidArgument`] if the image has another size than the camera's, the scratch is another extractor's, or the
+    /// lines are of the other method.
+    pub fn describe(
+        &self,
+        image: &ImageView<'_>,
+        lines: &Lines,
+        scratch: &mut LineScratch,
+        out: &mut Vec<f32>,
+    ) -> Result<()> {
+        self.check(image, scratch)?;
+        self.check_frame(&lines.frame)?;
+        let chart = Chart::new(&self.camera, &self.robot_from_camera, &lines.frame);
+        let samples = lines.frame.center_px.is_none().then_some(SAMPLES);
+        let (low, high) = self.range(&lines.frame);
+        let course = Course { chart, low, high, samples };
+        describe(image, &self.sight, &course, lines, &self.options.descriptor, &mut scratch.descriptor, out);
+        Ok(())
+    }
+
+    /// The grey levels of the rectangle about each line (paper 001 section 5): as wide as an area of the descriptor, as long
+    /// as the line's range; NaN where the world is not seen. Returns rows, which run along the line, and columns.
+    ///
+    /// # Errors
+    /// Those of [`describe`](Self::describe).
+    pub fn patches(
+        &self,
+        image: &ImageView<'_>,
+        lines: &Lines,
+        scratch: &LineScratch,
+        out: &mut Vec<f32>,
+    ) -> Result<(usize, usize)> {
+        self.check(image, scratch)?;
+        self.check_frame(&lines.frame)?;
+        let chart = Chart::new(&self.camera, &self.robot_from_camera, &lines.frame);
+        let (low, high) = self.range(&lines.frame);
+        let (rows, columns) = (6 * SAMPLES + 1, 2 * SAMPLES + 1);
+        let pitch = (high - low) / (6 * SAMPLES) as f64;
+        let mut patch = Patch::default();
+        out.clear();
+        for line in &lines.lines {
+            patch.sample(image, &self.sight, &chart, (line.bearing_rad, 0.5 * (low + high)), pitch, (rows, columns));
+            out.extend_from_slice(&patch.levels);
+        }
+        Ok((rows, columns))
+    }
+}

@@ -1,0 +1,185 @@
+//! The azimuth of one line, by weighted least squares over its pixels, and what of the line is seen.
+
+use super::candidates::{Candidate, Candidates, bin_of, wrap};
+use super::options::GreatCircleOptions;
+
+/// Gates about the line in pixels, from the first fit to the last.
+const GATES_PX: [f64; 4] = [3.0, 2.0, 1.5, 1.2];
+
+/// Pixels that err together along a line: neighbours share the grid's phase and the edge's crookedness.
+const ERRING_TOGETHER: f64 = 8.0;
+
+/// The least standard deviation of a pixel's place across the edge, in pixels, however well the pixels agree.
+const PIXEL_SIGMA_MIN_PX: f64 = 0.06;
+
+/// What no pixel of the line tells, in pixels: blur and neighbouring edges pull the whole line.
+const LINE_SIGMA_PX: f64 = 0.05;
+
+/// A line under work.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Fit {
+    pub(super) azimuth: f64,
+    /// How the azimuth turns with the tangent of the elevation.
+    slant: f64,
+    pub(super) sigma: f64,
+    pub(super) support: u32,
+    pub(super) rising: u32,
+    /// Lowest and highest tangent of the elevation.
+    pub(super) slopes: (f64, f64),
+    /// Elevation that the runs of pixels cover, radians.
+    pub(super) length: f64,
+    /// Radians per pixel across the line, in the mean.
+    pub(super) per_px: f64,
+}
+
+/// Scratch of the fits: the pixels of a line and their residuals, by elevation.
+#[derive(Debug, Clone, Default)]
+pub(super) struct FitScratch {
+    /// Places among the candidates.
+    members: Vec<u32>,
+    runs: Vec<u32>,
+}
+
+/// Fits a line of one polarity near an azimuth to the candidates that no line has yet; none if too little is left.
+pub(super) fn fit_line(
+    candidates: &Candidates,
+    near: f64,
+    rising: bool,
+    options: &GreatCircleOptions,
+    scratch: &mut FitScratch,
+) -> Option<Fit> {
+    let bins = candidates.starts.len() - 1;
+    let reach = (options.separation_rad / std::f64::consts::TAU * bins as f64).ceil() as usize + 1;
+    let middle = bin_of(near, bins);
+    let mut fit = Fit { azimuth: near, ..Fit::default() };
+    for (i, gate_px) in GATES_PX.into_iter().enumerate() {
+        let last = i + 1 == GATES_PX.len();
+        if !last {
+            scratch.members.clear();
+            for offset in 0..=(2 * reach).min(bins - 1) {
+                let bin = (middle + bins + offset - reach.min((bins - 1) / 2)) % bins;
+                for at in candidates.starts[bin]..candidates.starts[bin + 1] {
+                    let pixel = &candidates.pixels[at as usize];
+                    if pixel.rising == rising && !pixel.taken && residual_px(&fit, pixel).abs() < gate_px {
+                        scratch.members.push(at);
+                    }
+                }
+            }
+            if i == 1 {
+                keep_runs(candidates, options, scratch);
+            }
+        }
+        fit = solve(candidates, &scratch.members, &fit, gate_px, options)?;
+    }
+    let fit_ = fit;
+    scratch.members.retain(|at| residual_px(&fit_, &candidates.pixels[*at as usize]).abs() < GATES_PX[3]);
+    fit.length = keep_runs(candidates, options, scratch);
+    fit.support = scratch.members.len() as u32;
+    fit.rising = if rising { fit.support } else { 0 };
+    let slopes = |at: &u32| f64::from(candidates.pixels[*at as usize].slope);
+    fit.slopes = (scratch.members.first().map_or(0.0, slopes), scratch.members.last().map_or(0.0, slopes));
+    (fit.support > 0).then_some(fit)
+}
+
+/// Marks the pixels of the line that was fitted last, and those beside it that are its own.
+pub(super) fn take(candidates: &mut Candidates, scratch: &FitScratch) {
+    for at in &scratch.members {
+        candidates.pixels[*at as usize].taken = true;
+    }
+}
+
+/// How far a pixel's edge is from the line, in pixels across it.
+fn residual_px(fit: &Fit, pixel: &Candidate) -> f64 {
+    let slant = fit.slant * f64::from(pixel.slope);
+    wrap(f64::from(pixel.azimuth) - fit.azimuth - slant) / f64::from(pixel.per_px)
+}
+
+/// One step of iteratively reweighted least squares of `azimuth + slant tan(elevation)`, with a prior on the slant.
+fn solve(
+    candidates: &Candidates,
+    members: &[u32],
+    at: &Fit,
+    gate_px: f64,
+    options: &GreatCircleOptions,
+) -> Option<Fit> {
+    let (mut n, mut squares, mut wide) = (0.0, 0.0, 0.0);
+    let (mut s0, mut s1, mut s2, mut r0, mut r1) = (0.0, 0.0, 0.0, 0.0, 0.0);
+    for member in members {
+        let pixel = &candidates.pixels[*member as usize];
+        let residual = residual_px(at, pixel);
+        let share = 1.0 - (residual / gate_px).powi(2);
+        if share <= 0.0 {
+            continue;
+        }
+        let trust = share * share;
+        let (per_px, slope) = (f64::from(pixel.per_px), f64::from(pixel.slope));
+        let weight = trust / (per_px * per_px);
+        let turned = residual * per_px;
+        n += trust;
+        squares += trust * residual * residual;
+        wide += trust * per_px;
+        s0 += weight;
+        s1 += weight * slope;
+        s2 += weight * slope * slope;
+        r0 += weight * turned;
+        r1 += weight * slope * turned;
+    }
+    if n < 2.0 {
+        return None;
+    }
+    let variance = (squares / (n - 1.0).max(1.0)).max(PIXEL_SIGMA_MIN_PX.powi(2));
+    let information = 1.0 / (variance * ERRING_TOGETHER.min(n));
+    let prior = 1.0 / options.tilt_sigma_rad.powi(2);
+    let (a, b, c) = (information * s0, information * s1, information * s2 + prior);
+    let (x, y) = (information * r0, information * r1 - prior * at.slant);
+    let determinant = a * c - b * b;
+    if determinant.is_nan() || determinant <= 0.0 {
+        return None;
+    }
+    let per_px = wide / n;
+    Some(Fit {
+        azimuth: wrap(at.azimuth + (c * x - b * y) / determinant),
+        slant: at.slant + (a * y - b * x) / determinant,
+        sigma: (c / determinant + (LINE_SIGMA_PX * per_px).powi(2)).sqrt(),
+        per_px,
+        ..*at
+    })
+}
+
+/// Sorts the members by elevation, drops those in runs that are too short, and returns the elevation that the others cover.
+fn keep_runs(candidates: &Candidates, options: &GreatCircleOptions, scratch: &mut FitScratch) -> f64 {
+    let FitScratch { members, runs } = scratch;
+    let slope = |at: &u32| candidates.pixels[*at as usize].slope;
+    members.sort_unstable_by(|a, b| slope(a).total_cmp(&slope(b)).then(a.cmp(b)));
+    let elevation = |at: u32| f64::from(slope(&at)).atan();
+    runs.clear();
+    let (mut first, mut length) = (0, 0.0);
+    for end in 1..=members.len() {
+        if end < members.len() && elevation(members[end]) - elevation(members[end - 1]) <= options.gap_max_rad {
+            continue;
+        }
+        let run = &members[first..end];
+        if run.len() >= options.run_min_px as usize {
+            length += elevation(run[run.len() - 1]) - elevation(run[0]);
+            runs.extend_from_slice(run);
+        }
+        first = end;
+    }
+    std::mem::swap(members, runs);
+    length
+}
+
+/// Two fits of one line that is brighter on one side here and on the other there, as one.
+pub(super) fn joined(a: &Fit, b: &Fit) -> Fit {
+    let (wa, wb) = (a.sigma.powi(-2), b.sigma.powi(-2));
+    Fit {
+        azimuth: wrap(a.azimuth + wb / (wa + wb) * wrap(b.azimuth - a.azimuth)),
+        slant: a.slant,
+        sigma: (wa + wb).powf(-0.5),
+        support: a.support + b.support,
+        rising: a.rising + b.rising,
+        slopes: (a.slopes.0.min(b.slopes.0), a.slopes.1.max(b.slopes.1)),
+        length: (a.length + b.length).min(a.slopes.1.max(b.slopes.1).atan() - a.slopes.0.min(b.slopes.0).atan()),
+        per_px: 0.5 * (a.per_px + b.per_px),
+    }
+}

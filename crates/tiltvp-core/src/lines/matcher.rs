@@ -1,0 +1,197 @@
+//! Which lines of two images are the same: the nearest descriptor, if three tests agree (paper 001 section 4).
+
+use super::candidates::wrap;
+use super::dissimilarity::descriptor_distances;
+use super::order::keep_cyclic_order;
+use crate::error::{Error, Result};
+
+/// Options of the matcher.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct MatchOptions {
+    /// `F1`: the greatest distance of a match, eq. 8. Default 1.05.
+    pub distance_max: f64,
+    /// `F2`: the greatest share of the mean distance to all lines of the other image, eq. 9. Default 0.75.
+    pub mean_ratio_max: f64,
+    /// `F3`: the greatest share of the second smallest distance, eq. 10. Default 0.8.
+    pub second_ratio_max: f64,
+    /// Whether both lines must be nearest to each other, so that no line is matched twice. Default true.
+    pub mutual: bool,
+    /// Whether matches must keep the cyclic order of the lines. Default false.
+    pub ordered: bool,
+}
+
+impl Default for MatchOptions {
+    fn default() -> Self {
+        Self { distance_max: 1.05, mean_ratio_max: 0.75, second_ratio_max: 0.8, mutual: true, ordered: false }
+    }
+}
+
+impl MatchOptions {
+    /// Checks every field.
+    ///
+    /// # Errors
+    /// [`Error::InvalidOption`] with the name of the field.
+    pub fn validate(&self) -> Result<()> {
+        if !(self.distance_max > 0.0 && self.distance_max.is_finite()) {
+            return Err(Error::option("f1", self.distance_max, "a positive distance"));
+        }
+        for (name, ratio) in [("f2", self.mean_ratio_max), ("f3", self.second_ratio_max)] {
+            if !(ratio > 0.0 && ratio <= 1.0) {
+                return Err(Error::option(name, ratio, "a share above 0 and at most 1"));
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Line `a` of the first image is line `b` of the second.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Match {
+    /// Place in the first image.
+    pub a: usize,
+    /// Place in the second image.
+    pub b: usize,
+    /// Distance of the descriptors.
+    pub distance: f64,
+}
+
+/// What is known of the bearings: only lines that are close to where they are expected may match.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct BearingGate<'a> {
+    /// Bearings of the lines of the first image, where they are expected in the second, radians.
+    pub expected_rad: &'a [f64],
+    /// Bearings of the lines of the second image, radians.
+    pub seen_rad: &'a [f64],
+    /// The greatest difference, radians.
+    pub gate_rad: f64,
+}
+
+/// Memory of the matcher.
+#[derive(Debug, Clone, Default)]
+pub struct MatchScratch {
+    distances: Vec<f64>,
+    nearest: Vec<usize>,
+}
+
+/// The matches of descriptors of `width` values, by rising place in the first image. Lines must be sorted by bearing for the
+/// ordering constraint.
+///
+/// # Errors
+/// [`Error::InvalidOption`], or [`Error::InvalidArgument`] unless both hold whole rows and a gate has a bearing for each.
+pub fn match_descriptors(
+    a: &[f32],
+    b: &[f32],
+    width: usize,
+    options: &MatchOptions,
+    gate: Option<&BearingGate<'_>>,
+    scratch: &mut MatchScratch,
+    out: &mut Vec<Match>,
+) -> Result<()> {
+    options.validate()?;
+    descriptor_distances(a, b, width, &mut scratch.distances)?;
+    let (n, m) = (a.len() / width, b.len() / width);
+    if let Some(gate) = gate {
+        for (name, bearings, lines) in [("bearings of a", gate.expected_rad, n), ("bearings of b", gate.seen_rad, m)] {
+            if bearings.len() != lines {
+                return Err(Error::argument(name, format!("{} values", bearings.len()), format!("{lines}")));
+            }
+        }
+    }
+    let allowed = |i: usize, j: usize| {
+        gate.is_none_or(|gate| wrap(gate.expected_rad[i] - gate.seen_rad[j]).abs() <= gate.gate_rad)
+    };
+    select(scratch, (n, m), allowed, options, out);
+    Ok(())
+}
+
+impl MatchScratch {
+    /// Adds to the distances that are filled in.
+    pub(super) fn add(&mut self, (n, m): (usize, usize), more: impl Fn(usize, usize) -> f64) {
+        for i in 0..n {
+            for j in 0..m {
+                self.distances[i * m + j] += more(i, j);
+            }
+        }
+    }
+
+    /// Fills in the distances of descriptors of equal width.
+    pub(super) fn measure(&mut self, a: &[f32], b: &[f32], width: usize) -> Result<()> {
+        descriptor_distances(a, b, width, &mut self.distances)
+    }
+}
+
+/// The three tests and the constraints on distances already measured, among the pairs that are allowed.
+///
+/// A pair that is not allowed is neither nearest nor second nearest; the mean is over all lines, eq. 9. Where there is only
+/// one line to choose from there is no second one to compare with, and where the other image has only one no mean.
+pub(super) fn select(
+    scratch: &mut MatchScratch,
+    (n, m): (usize, usize),
+    allowed: impl Fn(usize, usize) -> bool,
+    options: &MatchOptions,
+    out: &mut Vec<Match>,
+) {
+    out.clear();
+    let MatchScratch { distances, nearest } = scratch;
+    if options.mutual {
+        nearest.clear();
+        nearest.extend((0..m).map(|j| {
+            let rows = (0..n).filter(|i| allowed(*i, j));
+            rows.min_by(|x, y| distances[x * m + j].total_cmp(&distances[y * m + j])).unwrap_or(usize::MAX)
+        }));
+    }
+    for i in 0..n {
+        let row = &distances[i * m..(i + 1) * m];
+        let (mut best, mut second) = (None, f64::INFINITY);
+        for (j, distance) in row.iter().enumerate().filter(|(j, _)| allowed(i, *j)) {
+            match best {
+                Some((_, least)) if *distance >= least => second = second.min(*distance),
+                Some((_, least)) => (best, second) = (Some((j, *distance)), least),
+                None => best = Some((j, *distance)),
+            }
+        }
+        let Some((j, least)) = best else { continue };
+        let mean = row.iter().sum::<f64>() / m as f64;
+        let passes = least <= options.distance_max
+            && (m < 2 || least <= options.mean_ratio_max * mean)
+            && (second.is_infinite() || least <= options.second_ratio_max * second);
+        if passes && (!options.mutual || nearest[j] == i) {
+            out.push(Match { a: i, b: j, distance: least });
+        }
+    }
+    if options.ordered {
+        keep_cyclic_order(out, m);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn matches(distances: &[f64], m: usize, options: &MatchOptions) -> Vec<(usize, usize)> {
+        let mut scratch = MatchScratch { distances: distances.to_vec(), nearest: Vec::new() };
+        let mut out = Vec::new();
+        select(&mut scratch, (distances.len() / m, m), |_, _| true, options, &mut out);
+        out.iter().map(|m| (m.a, m.b)).collect()
+    }
+
+    /// Table 1: the nearest passes tests 1 and 3 but not test 2.
+    #[test]
+    fn the_papers_example_fails_the_second_test_only() {
+        let row = [0.57, 0.72, 0.74, 0.78, 0.83];
+        let options = MatchOptions::default();
+        assert!(matches(&row, 5, &options).is_empty());
+        assert_eq!(matches(&row, 5, &MatchOptions { mean_ratio_max: 0.8, ..options }), [(0, 0)]);
+        let looser = MatchOptions { mean_ratio_max: 0.8, ..options };
+        assert!(matches(&row, 5, &MatchOptions { distance_max: 0.5, ..looser }).is_empty());
+        assert!(matches(&row, 5, &MatchOptions { second_ratio_max: 0.7, ..looser }).is_empty());
+    }
+
+    #[test]
+    fn mutual_lines_are_matched_once() {
+        let distances = [0.2, 0.9, 0.9, 0.1, 0.9, 0.9];
+        let options = MatchOptions::default();
+        assert_eq!(matches(&distances, 3, &options), [(1, 0)]);
+        assert_eq!(matches(&distances, 3, &MatchOptions { mutual: false, ..options }), [(0, 0), (1, 0)]);
+    }
+}

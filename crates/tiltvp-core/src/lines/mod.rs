@@ -1,0 +1,25 @@
+//! Vertical lines of single images: found, described, matched and followed (paper 001, sections 2 to 4 and 9.1).
+
+mod candidates;
+mod center;
+mod descriptor;
+mod dissimilarity;
+mod extractor;
+mod fit;
+mod great_circle;
+mod line;
+mod matcher;
+mod options;
+mod order;
+mod patch;
+mod radial;
+mod sight;
+mod tracker;
+
+pub use descriptor::{DescriptorOptions, Normalisation};
+pub use dissimilarity::{descriptor_distances, ssd_matrix, zncc_matrix};
+pub use extractor::{LineExtractor, LineScratch};
+pub use line::{Line, LineFrame, Lines};
+pub use matcher::{BearingGate, Match, MatchOptions, MatchScratch, match_descriptors};
+pub use options::{GreatCircleOptions, LINE_METHODS, LineMethod, LineOptions, RadialOptions};
+pub use tracker::{FrameMemory, LineTracker, TrackedLine, TrackerOptions, TrackerState};

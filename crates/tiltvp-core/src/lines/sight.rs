@@ -1,0 +1,80 @@
+//! What a line extractor computes once for a camera: the pixels it looks at, their rays, and the elevations it sees.
+
+use nalgebra::{Matrix3, Vector2};
+
+use super::options::LineOptions;
+use crate::camera::Camera;
+use crate::edges::{EdgeOptions, LiftTable, NormalKind, Region, Screen};
+use crate::error::Result;
+
+/// Tables of one camera.
+#[derive(Debug, Clone)]
+pub(super) struct Sight {
+    pub(super) region: Region,
+    pub(super) lift: LiftTable,
+    pub(super) screen: Screen,
+    /// Bearing of every pixel in the robot frame, NaN where there is none, in row order.
+    pub(super) rays: Vec<[f32; 3]>,
+    /// Whether the world is seen at a pixel and around it, in row order.
+    pub(super) clear: Vec<bool>,
+    pub(super) width: usize,
+    pub(super) height: usize,
+    /// Lowest and highest elevation, in radians, that are seen in most directions.
+    pub(super) band: (f64, f64),
+}
+
+impl Sight {
+    pub(super) fn new(camera: &Camera, robot_from_camera: &Matrix3<f64>, options: &LineOptions) -> Result<Self> {
+        // Ridges look at the neighbours' gradients.
+        let edges = EdgeOptions { margin_px: options.edges.margin_px + 1.0, ..options.edges };
+        let region = Region::new(camera, robot_from_camera, &edges, options.mask.as_ref())?;
+        let lift = LiftTable::new(camera, robot_from_camera, &region, NormalKind::Tangent);
+        let screen = lift.screen(1.0);
+        let (width, height) = (camera.width() as usize, camera.height() as usize);
+        let rays = (0..width * height).map(|i| {
+            let pixel = Vector2::new((i % width) as f64, (i / width) as f64);
+            camera.unproject(&pixel).map_or([f32::NAN; 3], |ray| {
+                let ray = robot_from_camera * ray;
+                [ray.x as f32, ray.y as f32, ray.z as f32]
+            })
+        });
+        let rays: Vec<[f32; 3]> = rays.collect();
+        let usable = |u: usize, v: usize| {
+            !rays[v * width + u][0].is_nan() && options.mask.as_ref().is_none_or(|mask| mask.usable(u, v))
+        };
+        let mut clear = vec![false; width * height];
+        for v in 1..height.saturating_sub(1) {
+            for u in 1..width.saturating_sub(1) {
+                clear[v * width + u] = (v - 1..=v + 1).all(|y| (u - 1..=u + 1).all(|x| usable(x, y)));
+            }
+        }
+        let band = band_of(&region);
+        Ok(Self { region, lift, screen, rays, clear, width, height, band })
+    }
+
+    /// The ray of a pixel, and whether it has one.
+    pub(super) fn ray(&self, u: usize, v: usize) -> Option<[f32; 3]> {
+        self.rays.get(v * self.width + u).copied().filter(|ray| !ray[0].is_nan())
+    }
+}
+
+/// The elevations that three quarters of the directions see, of those that see any.
+fn band_of(region: &Region) -> (f64, f64) {
+    const SECTORS: usize = 90;
+    let mut seen = [(f64::INFINITY, f64::NEG_INFINITY); SECTORS];
+    for (_, _, ray) in region.pixels() {
+        let turn = ray.y.atan2(ray.x) / std::f64::consts::TAU + 0.5;
+        let sector = &mut seen[((turn * SECTORS as f64) as usize).min(SECTORS - 1)];
+        let elevation = ray.z.atan2(ray.xy().norm());
+        *sector = (sector.0.min(elevation), sector.1.max(elevation));
+    }
+    let sorted = |pick: fn(&(f64, f64)) -> f64| {
+        let mut values: Vec<f64> = seen.iter().filter(|sector| sector.0 <= sector.1).map(pick).collect();
+        values.sort_by(f64::total_cmp);
+        values
+    };
+    let (lows, highs) = (sorted(|sector| sector.0), sorted(|sector| sector.1));
+    let (low, high) = (lows[3 * (lows.len() - 1) / 4], highs[(highs.len() - 1) / 4]);
+    // A camera that sees no elevation in most directions: what it sees in any.
+    if high - low > 0.05 { (low, high) } else { (lows[0], highs[highs.len() - 1].max(lows[0] + 0.05)) }
+}

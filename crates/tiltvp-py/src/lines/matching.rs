@@ -1,0 +1,147 @@
+//! Matches and dissimilarities of arrays of descriptors and patches.
+
+use numpy::{PyArray1, PyArray2, PyArrayMethods};
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+use tiltvp_core::lines::{self as core, BearingGate, MatchOptions};
+
+use crate::call::{call, invalid};
+use crate::convert;
+
+/// `(N, K)` numbers as `f32` in row order, and K.
+pub(super) fn descriptors(value: &Bound<'_, PyAny>, name: &str) -> PyResult<(Vec<f32>, usize, usize)> {
+    let array = value.cast::<PyArray2<f32>>().map_err(|_| {
+        let kind = value.get_type();
+        invalid(format!("{name}: {kind}, expected an (N, K) array of float32"))
+    })?;
+    let (n, width) = (array.readonly().as_array().nrows(), array.readonly().as_array().ncols());
+    let values: Vec<f32> = array.readonly().as_array().iter().copied().collect();
+    Ok((values, n, width))
+}
+
+/// Two sets of rows of equal width.
+struct Pair {
+    a: Vec<f32>,
+    b: Vec<f32>,
+    rows: [usize; 2],
+    width: usize,
+}
+
+fn pair(a: &Bound<'_, PyAny>, b: &Bound<'_, PyAny>) -> PyResult<Pair> {
+    let ((a, n, width), (b, m, other)) = (descriptors(a, "a")?, descriptors(b, "b")?);
+    if width != other || width == 0 {
+        return Err(invalid(format!("a, b: {width} and {other} values a row, expected as many, and at least one")));
+    }
+    Ok(Pair { a, b, rows: [n, m], width })
+}
+
+/// Sets the options of a matcher that are named, and returns whether the name is one.
+pub(super) fn set(options: &mut MatchOptions, key: &str, value: &Bound<'_, PyAny>) -> PyResult<bool> {
+    let name = format!("option {key}");
+    let number = || convert::whole::<f64>(value, &name, "a number");
+    let switch = || convert::whole::<bool>(value, &name, "True or False");
+    match key {
+        "f1" => options.distance_max = number()?,
+        "f2" => options.mean_ratio_max = number()?,
+        "f3" => options.second_ratio_max = number()?,
+        "mutual" => options.mutual = switch()?,
+        "ordered" => options.ordered = switch()?,
+        _ => return Ok(false),
+    }
+    Ok(true)
+}
+
+/// Adds the options of a matcher to a dict.
+pub(super) fn in_force(dict: &Bound<'_, PyDict>, options: &MatchOptions) -> PyResult<()> {
+    dict.set_item("f1", options.distance_max)?;
+    dict.set_item("f2", options.mean_ratio_max)?;
+    dict.set_item("f3", options.second_ratio_max)?;
+    dict.set_item("mutual", options.mutual)?;
+    dict.set_item("ordered", options.ordered)
+}
+
+/// The matches of two sets of descriptors.
+#[pyfunction]
+#[pyo3(signature = (a, b, *, expected_rad=None, seen_rad=None, gate_rad=None, **options))]
+pub(crate) fn match_descriptors<'py>(
+    py: Python<'py>,
+    a: &Bound<'py, PyAny>,
+    b: &Bound<'py, PyAny>,
+    expected_rad: Option<&Bound<'py, PyAny>>,
+    seen_rad: Option<&Bound<'py, PyAny>>,
+    gate_rad: Option<f64>,
+    options: Option<&Bound<'py, PyDict>>,
+) -> PyResult<Bound<'py, PyArray2<i64>>> {
+    let Pair { a, b, width, .. } = pair(a, b)?;
+    let mut parsed = MatchOptions::default();
+    for (key, value) in options.into_iter().flat_map(PyDictMethods::iter) {
+        let key: String = key.extract()?;
+        if !set(&mut parsed, &key, &value)? {
+            return Err(invalid(format!("option {key}: unknown, expected one of f1, f2, f3, mutual, ordered")));
+        }
+    }
+    let bearings = match (expected_rad, seen_rad, gate_rad) {
+        (Some(expected), Some(seen), Some(gate)) => {
+            Some((convert::vector(expected, "expected_rad")?, convert::vector(seen, "seen_rad")?, gate))
+        }
+        (None, None, None) => None,
+        _ => return Err(invalid("expected_rad, seen_rad, gate_rad: expected all three or none".to_owned())),
+    };
+    let matches = call(py, || {
+        let gate = bearings.as_ref().map(|(expected_rad, seen_rad, gate_rad)| BearingGate {
+            expected_rad,
+            seen_rad,
+            gate_rad: *gate_rad,
+        });
+        let (mut scratch, mut out) = (core::MatchScratch::default(), Vec::new());
+        core::match_descriptors(&a, &b, width, &parsed, gate.as_ref(), &mut scratch, &mut out)?;
+        Ok(out)
+    })?;
+    let flat: Vec<i64> = matches.iter().flat_map(|found| [found.a as i64, found.b as i64]).collect();
+    PyArray1::from_vec(py, flat).reshape([matches.len(), 2])
+}
+
+fn matrix<'py>(
+    py: Python<'py>,
+    a: &Bound<'py, PyAny>,
+    b: &Bound<'py, PyAny>,
+    of: impl FnOnce(&[f32], &[f32], usize) -> Result<Vec<f64>, tiltvp_core::Error> + Send,
+) -> PyResult<Bound<'py, PyArray2<f64>>> {
+    let Pair { a, b, rows, width } = pair(a, b)?;
+    let values = call(py, || of(&a, &b, width))?;
+    PyArray1::from_vec(py, values).reshape(rows)
+}
+
+/// `(N_A, N_B)` Euclidean distances of descriptors, eq. 6.
+#[pyfunction]
+pub(crate) fn descriptor_distances<'py>(
+    py: Python<'py>,
+    a: &Bound<'py, PyAny>,
+    b: &Bound<'py, PyAny>,
+) -> PyResult<Bound<'py, PyArray2<f64>>> {
+    matrix(py, a, b, |a, b, width| {
+        let mut out = Vec::new();
+        core::descriptor_distances(a, b, width, &mut out)?;
+        Ok(out)
+    })
+}
+
+/// `(N_A, N_B)` means of squared differences of patches, eq. 12.
+#[pyfunction]
+pub(crate) fn ssd_matrix<'py>(
+    py: Python<'py>,
+    a: &Bound<'py, PyAny>,
+    b: &Bound<'py, PyAny>,
+) -> PyResult<Bound<'py, PyArray2<f64>>> {
+    matrix(py, a, b, core::ssd_matrix)
+}
+
+/// `(N_A, N_B)` zero-mean normalised cross-correlations of patches, eq. 13.
+#[pyfunction]
+pub(crate) fn zncc_matrix<'py>(
+    py: Python<'py>,
+    a: &Bound<'py, PyAny>,
+    b: &Bound<'py, PyAny>,
+) -> PyResult<Bound<'py, PyArray2<f64>>> {
+    matrix(py, a, b, core::zncc_matrix)
+}

@@ -1,0 +1,132 @@
+"""Vertical lines of images: found, described, matched and followed (Scaramuzza, Siegwart and Martinelli 2009)."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from tiltvp import _core
+from tiltvp._core import (
+    LINE_METHODS,
+    FilteredTilt,
+    Lines,
+    LineTracker,
+    TiltEstimate,
+    TrackedLines,
+    descriptor_distances,
+    normal_from_alpha_beta,
+    ssd_matrix,
+    zncc_matrix,
+)
+from tiltvp.errors import InvalidInputError
+from tiltvp.images import gray_from
+
+if TYPE_CHECKING:
+    from typing import TypeAlias
+
+    import numpy as np
+    from numpy.typing import ArrayLike, NDArray
+
+    from tiltvp._core import Camera
+
+    Tilt: TypeAlias = TiltEstimate | FilteredTilt | ArrayLike
+
+__all__ = [
+    "LINE_METHODS",
+    "LineExtractor",
+    "LineTracker",
+    "Lines",
+    "TrackedLines",
+    "describe",
+    "descriptor_distances",
+    "extract",
+    "match",
+    "ssd_matrix",
+    "zncc_matrix",
+]
+
+
+class LineExtractor(_core.LineExtractor):
+    """Finds and describes the vertical lines of single images of one camera.
+
+    Tables and scratch are made once. Call it with an image: (H, W) uint8, or colour (BGR), uint16, float in [0, 1], any
+    strides; and with the lean of the frame where it is known. One extractor may be called from many threads at once;
+    frozen, comparable, and to be pickled. Options: see `tiltvp._core.LineExtractor` and docs/lines.md.
+    """
+
+    __slots__ = ()
+
+    def __call__(self, image: ArrayLike, tilt: Tilt | None = None) -> Lines:
+        """The vertical lines of one image, by rising bearing.
+
+        `tilt` is an estimate, a filter's or an image's, (alpha_rad, beta_rad), or a ground normal (3,); None: upright.
+        Bearings are azimuths about the vertical in the upright robot's frame. "radial" knows no tilt. Raises
+        `InvalidInputError` for an image of another size than the camera's and for an estimate without a tilt.
+        """
+        return self._extract(gray_from(image), _normal(tilt))
+
+    def describe(self, image: ArrayLike, lines: Lines) -> NDArray[np.float32]:
+        """(N, 192) float32: the descriptors of the lines of an image, eqs. 2 to 5; other options, other widths.
+
+        `lines` carry the frame that they were found in. Raises `InvalidInputError` for lines of the other method.
+        """
+        return self._describe(gray_from(image), lines)
+
+    def patches(self, image: ArrayLike, lines: Lines) -> NDArray[np.float32]:
+        """(N, rows, columns) float32: grey levels about each line, as `ssd_matrix` and `zncc_matrix` compare them.
+
+        Rows run along the line, from low to high, columns across it; NaN where the world is not seen. Reshape to
+        (N, -1) for the matrices.
+        """
+        return self._patches(gray_from(image), lines)
+
+    def lines_at(self, bearing_rad: ArrayLike, tilt: Tilt | None = None) -> Lines:
+        """Lines at any bearings (N,), without support: to describe places where there may be no line."""
+        return self._lines_at(bearing_rad, _normal(tilt))
+
+
+def _normal(tilt: Any) -> ArrayLike | None:
+    """The ground normal of whatever tells a lean."""
+    if tilt is None:
+        return None
+    if isinstance(tilt, TiltEstimate | FilteredTilt):
+        if not tilt:
+            raise InvalidInputError(f"tilt: an estimate without a tilt ({tilt.reason}), expected one with a tilt")
+        return tilt.normal
+    if isinstance(tilt, tuple) and len(tilt) == 2:
+        return normal_from_alpha_beta(*tilt)
+    return tilt  # type: ignore[no-any-return]
+
+
+def extract(
+    image: ArrayLike,
+    camera: Camera,
+    tilt: Tilt | None = None,
+    robot_from_camera: ArrayLike | None = None,
+    method: str = LINE_METHODS[0],
+    **options: Any,
+) -> Lines:
+    """The vertical lines of one image; for many of one camera make a `LineExtractor`, which keeps its tables."""
+    extractor = LineExtractor(camera, method=method, robot_from_camera=robot_from_camera, **options)
+    return extractor(image, tilt)
+
+
+def describe(
+    image: ArrayLike,
+    camera: Camera,
+    lines: Lines,
+    robot_from_camera: ArrayLike | None = None,
+    **options: Any,
+) -> NDArray[np.float32]:
+    """(N, 192) float32: the descriptors of lines; for many images of one camera make a `LineExtractor`."""
+    method = LINE_METHODS[0] if lines.center_px is None else LINE_METHODS[1]
+    return LineExtractor(camera, method=method, robot_from_camera=robot_from_camera, **options).describe(image, lines)
+
+
+def match(a: NDArray[np.float32], b: NDArray[np.float32], **options: Any) -> NDArray[np.int64]:
+    """(M, 2) int64: rows of `a` and the rows of `b` that are the same lines, by rising row of `a`.
+
+    The nearest descriptor (eq. 6) if it passes the tests of eqs. 8 to 10 with `f1`, `f2`, `f3`; `mutual` (default) asks
+    for the nearest both ways, `ordered` for matches in the lines' cyclic order. `expected_rad` (N_A,), `seen_rad`
+    (N_B,) and `gate_rad` leave only lines that are close to where they are expected.
+    """
+    return _core.match_descriptors(a, b, **options)

@@ -1,0 +1,55 @@
+"""Vertical lines of real mirror and fisheye photographs: door frames and walls are found where a person sees them."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+import tiltvp
+from tiltvp import lines as tl
+
+FORWARD = np.array([[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]])
+
+
+def photograph(data: Path, image: str, calibration: str) -> tuple[tiltvp.Camera, np.ndarray]:
+    camera = tiltvp.Camera.load(data / "omni" / calibration)
+    picture = tiltvp.read_image(data / "omni" / image)
+    if picture.shape[:2] != (camera.height, camera.width):
+        picture = np.asarray(cv2.resize(picture, (camera.width, camera.height), interpolation=cv2.INTER_AREA))
+    return camera, picture
+
+
+def test_the_doors_of_a_lift_lobby(data: Path) -> None:
+    folder = "matsuren_ocamcalib_undistort"
+    camera, image = photograph(data, f"{folder}/img0.jpg", f"{folder}/calib_results_0.txt")
+    tilt = tiltvp.TiltEstimator(camera, robot_from_camera=FORWARD)(image)
+    lines = tl.extract(image, camera, tilt, FORWARD, elevation_min_rad=-math.radians(45))
+    print(lines)
+    # Columns of edges that are plain to see, in the row through the middle of the image.
+    middle = camera.unproject([[u, 730.0] for u in (358, 552, 664, 875, 982, 1165, 1257)]) @ FORWARD.T
+    seen = np.degrees(np.arctan2(middle[:, 1], middle[:, 0]))
+    apart = np.abs(np.degrees(lines.bearing_rad)[:, None] - seen).min(axis=0)
+    assert 8 <= len(lines) <= 40
+    assert (apart < 1.5).sum() >= 6, apart
+    assert np.median(lines.sigma_rad) < math.radians(0.1)
+
+
+@pytest.mark.parametrize("name", ["VMRImage0", "VMRImage4", "VMRImage8"])
+def test_a_laboratory_in_a_mirror(data: Path, name: str) -> None:
+    folder = "riyueshi_ocamcalib-plus"
+    camera, image = photograph(data, f"{folder}/{name}.jpg", f"{folder}/calib_results_catadioptric.txt")
+    lines = tl.extract(image, camera, elevation_max_rad=math.radians(30))
+    radial = tl.extract(image, camera, method="radial", elevation_max_rad=math.radians(30), length_min=0.3)
+    print(name, lines, radial, radial.center_px)
+    assert 5 <= len(lines) <= 80
+    # The rim's circle is found close to the calibrated centre of the image.
+    assert radial.center_px is not None
+    assert math.dist(radial.center_px, (516.4, 383.0)) < 12.0
+    descriptors = tl.describe(image, camera, lines, elevation_max_rad=math.radians(30))
+    assert descriptors.shape == (len(lines), 192)
+    again = tl.match(descriptors, descriptors)
+    assert (again[:, 0] == again[:, 1]).all()
