@@ -15,9 +15,11 @@ __all__ = [
     "LINE_METHODS",
     "METHODS",
     "ROOM_KINDS",
+    "WALL_PATTERNS",
     "AffineCorrection",
     "Camera",
     "CommonDirection",
+    "Drive",
     "EdgeElements",
     "FilterStep",
     "FilteredTilt",
@@ -67,6 +69,9 @@ LINE_METHODS: Final[list[str]]
 
 ROOM_KINDS: Final[list[str]]
 """The kinds of `Room`."""
+
+WALL_PATTERNS: Final[list[str]]
+"""What the walls of a `Room` may have in common."""
 
 @disjoint_base
 class Camera:
@@ -1274,7 +1279,19 @@ class Room:
     The world frame has z up and the floor at z = 0; metres. Frozen, comparable, hashable, and to be pickled.
     """
 
-    def __new__(cls, kind: str, seed: SupportsIndex, *, threads: SupportsIndex | None = None) -> Self:
+    def __new__(
+        cls,
+        kind: str,
+        seed: SupportsIndex,
+        *,
+        clutter: float | None = None,
+        daylight: float | None = None,
+        light_spacing_m: float | None = None,
+        extent: float | None = None,
+        floor_gloss: float | None = None,
+        wall_pattern: str | None = None,
+        threads: SupportsIndex | None = None,
+    ) -> Self:
         """Builds and lights the room on `threads` threads (None: one per core), on which it does not depend."""
 
     @property
@@ -1284,6 +1301,30 @@ class Room:
     @property
     def seed(self) -> int:
         """The seed of everything in it."""
+
+    @property
+    def clutter(self) -> float:
+        """How full it is, from 0 to 1."""
+
+    @property
+    def daylight(self) -> float:
+        """Brightness of the day outside, from 0 to 1."""
+
+    @property
+    def light_spacing_m(self) -> float:
+        """Spacing of the points where light was gathered, metres."""
+
+    @property
+    def extent(self) -> float:
+        """How many times larger the floor is than the kind's own."""
+
+    @property
+    def floor_gloss(self) -> float:
+        """How much the floor shines, from 0 to 1."""
+
+    @property
+    def wall_pattern(self) -> str:
+        """Which of `WALL_PATTERNS` its walls have in common."""
 
     @property
     def height_m(self) -> float:
@@ -1335,6 +1376,123 @@ class Room:
     ) -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:
         """Grey (height, 2 height) and RGB (height, 2 height, 3) images of everything around a place."""
 
-    def __getnewargs__(self) -> tuple[str, int]: ...
+    def __getnewargs_ex__(self) -> tuple[tuple[str, int], dict[str, float | str]]: ...
+    def __eq__(self, other: object, /) -> bool: ...
+    def __hash__(self) -> int: ...
+
+@disjoint_base
+class Drive:
+    """A robot's way through a room, any frame of which can be rendered by `tiltvp.synth.Drive`.
+
+    Frozen, comparable, hashable, and to be pickled. N is the number of frames.
+    """
+
+    def __new__(
+        cls,
+        room: Room,
+        *,
+        camera: Camera,
+        robot_from_camera: ArrayLike | None = None,
+        mount: ArrayLike | None = None,
+        blind_rad: float | None = None,
+        frames: SupportsIndex | None = None,
+        seed: SupportsIndex | None = None,
+        step_m: float | None = None,
+        turn_max_rad: float | None = None,
+        wheel_base_m: float | None = None,
+        encoder_k_m: float | None = None,
+        wheel_radius_errors: ArrayLike | None = None,
+        bumps_max_rad: float | None = None,
+        lighting: float | None = None,
+        samples: SupportsIndex | None = None,
+        noise_sigma: float | None = None,
+        blur_sigma_px: float | None = None,
+        threads: SupportsIndex | None = None,
+    ) -> Self:
+        """Plans the drive and gathers daylight on `threads` threads (None: one per core), which do not matter."""
+
+    @property
+    def room(self) -> Room:
+        """The room."""
+
+    @property
+    def camera(self) -> Camera:
+        """The camera."""
+
+    @property
+    def frames(self) -> int:
+        """N, how many frames it has; also its `len`."""
+
+    @property
+    def seed(self) -> int:
+        """The seed of everything but the room."""
+
+    @property
+    def wheel_base_m(self) -> float:
+        """Distance between the wheels, metres."""
+
+    @property
+    def encoder_k_m(self) -> float:
+        """Variance of a reading per metre that a wheel rolls, metres."""
+
+    @property
+    def wheel_radius_errors(self) -> tuple[float, float]:
+        """How much larger the left and the right wheel are than the readings assume, relative."""
+
+    @property
+    def bumps_max_rad(self) -> float:
+        """Greatest lean from bumps, radians."""
+
+    @property
+    def lighting(self) -> float:
+        """How much the light changes along the way, from 0 to 1."""
+
+    @property
+    def mount(self) -> tuple[float, float, float, float]:
+        """x_m, y_m, yaw_rad, height_m of the camera's centre on the robot."""
+
+    @property
+    def robot_from_camera(self) -> NDArray[np.float64]:
+        """(3, 3): rotation from camera to robot coordinates, the mount's yaw included."""
+
+    @property
+    def poses(self) -> NDArray[np.float64]:
+        """(N, 3): true x_m, y_m, yaw_rad of the robot. Integrating `true_odometry` along arcs gives them exactly."""
+
+    @property
+    def tilts(self) -> NDArray[np.float64]:
+        """(N, 2): true alpha_rad, beta_rad."""
+
+    @property
+    def odometry(self) -> NDArray[np.float64]:
+        """(N, 2): how far the left and right wheel rolled since the last frame, by their encoders; metres."""
+
+    @property
+    def true_odometry(self) -> NDArray[np.float64]:
+        """(N, 2): how far they really rolled."""
+
+    @property
+    def motions(self) -> NDArray[np.float64]:
+        """(N, 2): distance in metres and turn in radians that `odometry` stands for."""
+
+    @property
+    def edges_m(self) -> NDArray[np.float64]:
+        """(E, 4): x_m, y_m, lowest and highest z_m of the room's upright edges, visible or not; the row is the number.
+
+        All upright edges within 3 mm of a vertical line are one. Those of wallpaper and tiles come last.
+        """
+
+    def _render(
+        self, frame: SupportsIndex, *, threads: SupportsIndex | None = None
+    ) -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:
+        """Grey (H, W) and RGB (H, W, 3) images of a frame."""
+
+    def _truth(
+        self, frame: SupportsIndex, *, threads: SupportsIndex | None = None
+    ) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+        """Edges in sight: numbers, bearings, elevations (M, 2), visible shares, contrasts."""
+
+    def __len__(self) -> int: ...
+    def __getnewargs_ex__(self) -> tuple[tuple[Room], dict[str, Any]]: ...
     def __eq__(self, other: object, /) -> bool: ...
     def __hash__(self) -> int: ...

@@ -14,6 +14,8 @@ from tiltvp.errors import InvalidInputError
 __all__ = ["Motion", "read_odometry"]
 
 _COLUMNS = ("file", "yaw_rad", "yaw_deg", "distance_m")
+_WHEELS = ("left_m", "right_m")
+"""Columns that may stand beside the motion that they add up to."""
 
 
 @dataclass(frozen=True)
@@ -30,9 +32,9 @@ def read_odometry(path: str | os.PathLike[str], files: Sequence[Path]) -> list[M
     """The motion that led to each of `files`, in their order, from a CSV of increments.
 
     Columns: `yaw_rad` or `yaw_deg`, `distance_m`, at least one of the two kinds; and `file`, the images' names or
-    paths, in any order. Without `file` there is one row for each image, in their order. Raises `InvalidInputError` that
-    names the file and the line for columns and images that are not known, images without a row, and numbers that are
-    none.
+    paths, in any order. Columns `left_m` and `right_m` of the wheels are not read. Without `file` there is one row for
+    each image, in their order. Raises `InvalidInputError` that names the file and the line for columns and images that
+    are not known, images without a row, and numbers that are none.
     """
     name = os.fspath(path)
     try:
@@ -64,13 +66,13 @@ def read_odometry(path: str | os.PathLike[str], files: Sequence[Path]) -> list[M
 def _check_header(name: str, header: Sequence[str]) -> None:
     where = f"{name}, line 1"
     for column in header:
-        if column not in _COLUMNS:
+        if column not in (*_COLUMNS, *_WHEELS):
             raise InvalidInputError(f"{where}: unknown column {column!r}, expected {', '.join(_COLUMNS)}")
         if header.count(column) > 1:
             raise InvalidInputError(f"{where}: column {column!r} twice, expected once")
     if "yaw_rad" in header and "yaw_deg" in header:
         raise InvalidInputError(f"{where}: columns yaw_rad and yaw_deg, expected one of them")
-    if not set(header) - {"file"}:
+    if not set(header) & {"yaw_rad", "yaw_deg", "distance_m"}:
         raise InvalidInputError(f"{where}: no motion, expected a column yaw_rad, yaw_deg or distance_m")
 
 

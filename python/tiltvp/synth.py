@@ -2,21 +2,53 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from tiltvp import _core
+from tiltvp.cameras import Camera
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
-    from tiltvp.cameras import Camera
-
-__all__ = ["ROOM_KINDS", "Room", "RoomImage", "render_room"]
+__all__ = [
+    "MIRROR_BLIND_RAD",
+    "ROOM_KINDS",
+    "WALL_PATTERNS",
+    "Drive",
+    "DriveTruth",
+    "Room",
+    "RoomImage",
+    "mirror_camera",
+    "render_room",
+]
 
 ROOM_KINDS: tuple[str, ...] = tuple(_core.ROOM_KINDS)
+WALL_PATTERNS: tuple[str, ...] = tuple(_core.WALL_PATTERNS)
+
+MIRROR_BLIND_RAD: float = math.radians(40.0)
+"""Half angle of the cone in which `mirror_camera` sees only itself."""
+
+
+def mirror_camera() -> Camera:
+    """A camera below a hyperbolic mirror like that of paper 001: 640 x 480, from 50 degrees down to 25 degrees up.
+
+    The middle, below 50 degrees, is where it sees itself: give drives `blind_rad=MIRROR_BLIND_RAD`.
+    """
+    return Camera.unified(
+        width=640,
+        height=480,
+        xi=0.95,
+        fx=136.0,
+        fy=136.0,
+        cx=319.5,
+        cy=239.5,
+        max_theta_rad=math.radians(115.0),
+        mirror=True,
+    )
 
 
 @dataclass(frozen=True)
@@ -33,7 +65,12 @@ class Room(_core.Room):
     """A furnished, lit room of one of `ROOM_KINDS`, built once: `Room(kind, seed)`. The same arguments, the same room.
 
     The world frame has z up and the floor at z = 0; metres. `threads` is how many build it, None for one per core; the
-    room does not depend on it. Comparable, hashable, and to be pickled. Raises `tiltvp.errors.InvalidInputError`.
+    room does not depend on it. None stands for what is usual: `clutter` and `daylight` from 0 to 1 are how full it is
+    and how bright the day outside, `light_spacing_m` how finely light is gathered, `extent` from 1 to 4 how many times
+    larger than usual the floor is, `floor_gloss` from 0 to 1 how much it shines (0), and `wall_pattern` what all walls
+    have in common, one of `WALL_PATTERNS`: stripes, panels or tiles, equally spaced, or nothing (drawn).
+
+    Comparable, hashable, and to be pickled. Raises `tiltvp.errors.InvalidInputError`.
     """
 
     __slots__ = ()
@@ -97,6 +134,50 @@ class Room(_core.Room):
             threads=threads,
         )
         return RoomImage(gray, np.ascontiguousarray(rgb[:, :, ::-1]), 0.0, 0.0)
+
+
+@dataclass(frozen=True, eq=False)
+class DriveTruth:
+    """The upright edges in sight at one frame of a drive, in the order of their numbers."""
+
+    edges: NDArray[np.int64]
+    """(M,): which rows of `Drive.edges_m`; an edge keeps its number all along the drive."""
+    bearings_rad: NDArray[np.float64]
+    """(M,): azimuth atan2(y, x), seen from the camera's centre, in the frame of the robot when levelled."""
+    elevations_rad: NDArray[np.float64]
+    """(M, 2): of the lowest and the highest point in sight, in the same frame."""
+    visible_share: NDArray[np.float64]
+    """(M,): share of the edge's height that is in the image with nothing before it, above 0."""
+    contrast: NDArray[np.float64]
+    """(M,): |a - b| / (a + b) of the luminances beside the edge, averaged over what is in sight."""
+
+
+class Drive(_core.Drive):
+    """A robot with a camera and wheel encoders that wanders through a room: `Drive(room, camera=camera)`.
+
+    The same arguments give the same drive and the same bytes of every frame, in any order and for any `threads`. The
+    camera sits at `mount` (x_m, y_m, yaw_rad, height_m) on the robot, whose origin is on the floor between its wheels,
+    and is turned by `robot_from_camera` and then by the mount's yaw; `blind_rad` is the cone about its z axis in which
+    it sees only itself. From frame to frame the robot moves at most `step_m` and turns at most `turn_max_rad`. A
+    reading of an encoder has the variance `encoder_k_m` |d|; `wheel_radius_errors` is how much larger the left and the
+    right wheel are, relative, than the readings assume. Bumps lean the robot, about the camera's centre, by up to
+    `bumps_max_rad`. `lighting`, from 0 to 1, is how much lamps, daylight and exposure change along the way. `samples`
+    is the rays per pixel and side where surfaces meet; elsewhere one ray per pixel will do. None is for the default.
+
+    Comparable, hashable, and to be pickled. Raises `tiltvp.errors.InvalidInputError`.
+    """
+
+    __slots__ = ()
+
+    def render(self, frame: int, *, threads: int | None = None) -> RoomImage:
+        """The image of one frame, on so many threads (None: one per core)."""
+        gray, rgb = self._render(frame, threads=threads)
+        alpha, beta = self.tilts[frame]
+        return RoomImage(gray, np.ascontiguousarray(rgb[:, :, ::-1]), float(alpha), float(beta))
+
+    def truth(self, frame: int, *, threads: int | None = None) -> DriveTruth:
+        """The upright edges in sight at one frame, however faint; silhouettes of round things are none."""
+        return DriveTruth(*self._truth(frame, threads=threads))
 
 
 def render_room(

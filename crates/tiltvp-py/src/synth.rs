@@ -1,8 +1,11 @@
 //! `Room`: a seeded room, built once, looked at as often as wished.
 
+use std::sync::Arc;
+
 use nalgebra::{Matrix3, Vector2};
 use numpy::{PyArray1, PyArray2, PyArray3, PyArrayMethods};
 use pyo3::prelude::*;
+use pyo3::types::PyDict;
 use tiltvp_core::geometry::Tilt;
 use tiltvp_synth::{Image, RenderOptions, RobotPose, RoomKind, RoomOptions, View, World, on_threads};
 
@@ -10,37 +13,100 @@ use crate::call::{call, exception, invalid};
 use crate::camera::Camera;
 use crate::convert;
 
-type Pictures<'py> = (Bound<'py, PyArray2<u8>>, Bound<'py, PyArray3<u8>>);
+pub(crate) type Pictures<'py> = (Bound<'py, PyArray2<u8>>, Bound<'py, PyArray3<u8>>);
 
 /// A furnished, lit room. The face class in `tiltvp.synth` says what its images are.
 #[pyclass(frozen, subclass, module = "tiltvp._core")]
 pub(crate) struct Room {
-    kind: RoomKind,
-    seed: u64,
-    world: World,
+    options: RoomOptions,
+    pub(crate) world: Arc<World>,
 }
 
 #[pymethods]
 impl Room {
     #[new]
-    #[pyo3(signature = (kind, seed, *, threads=None))]
-    fn new(py: Python<'_>, kind: &str, seed: &Bound<'_, PyAny>, threads: Option<&Bound<'_, PyAny>>) -> PyResult<Self> {
+    #[pyo3(signature = (
+        kind, seed, *, clutter=None, daylight=None, light_spacing_m=None, extent=None, floor_gloss=None,
+        wall_pattern=None, threads=None
+    ))]
+    #[expect(clippy::too_many_arguments, reason = "keyword-only on the Python side")]
+    fn new(
+        py: Python<'_>,
+        kind: &str,
+        seed: &Bound<'_, PyAny>,
+        clutter: Option<f64>,
+        daylight: Option<f64>,
+        light_spacing_m: Option<f64>,
+        extent: Option<f64>,
+        floor_gloss: Option<f64>,
+        wall_pattern: Option<&str>,
+        threads: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<Self> {
         let kind: RoomKind = kind.parse().map_err(|error| exception(&error))?;
         let (seed, threads) = (seed_from(seed)?, threads_from(threads)?);
-        let world = call(py, || on_threads(threads, || World::new(&RoomOptions::new(kind, seed)))?)?;
-        Ok(Self { kind, seed, world })
+        let own = RoomOptions::new(kind, seed);
+        let options = RoomOptions {
+            clutter: clutter.unwrap_or(own.clutter),
+            daylight: daylight.unwrap_or(own.daylight),
+            light_spacing_m: light_spacing_m.unwrap_or(own.light_spacing_m),
+            extent: extent.unwrap_or(own.extent),
+            floor_gloss: floor_gloss.unwrap_or(own.floor_gloss),
+            wall_pattern: match wall_pattern {
+                Some(name) => name.parse().map_err(|error| exception(&error))?,
+                None => own.wall_pattern,
+            },
+            ..own
+        };
+        let world = call(py, || on_threads(threads, || World::new(&options))?)?;
+        Ok(Self { options, world: Arc::new(world) })
     }
 
     /// Which of `ROOM_KINDS` it is.
     #[getter]
     fn kind(&self) -> &'static str {
-        self.kind.name()
+        self.options.kind.name()
     }
 
     /// The seed of everything in it.
     #[getter]
     fn seed(&self) -> u64 {
-        self.seed
+        self.options.seed
+    }
+
+    /// How full it is, from 0 to 1.
+    #[getter]
+    fn clutter(&self) -> f64 {
+        self.options.clutter
+    }
+
+    /// Brightness of the day outside, from 0 to 1.
+    #[getter]
+    fn daylight(&self) -> f64 {
+        self.options.daylight
+    }
+
+    /// Spacing of the points where light was gathered, metres.
+    #[getter]
+    fn light_spacing_m(&self) -> f64 {
+        self.options.light_spacing_m
+    }
+
+    /// How many times larger the floor is than the kind's own.
+    #[getter]
+    fn extent(&self) -> f64 {
+        self.options.extent
+    }
+
+    /// How much the floor shines, from 0 to 1.
+    #[getter]
+    fn floor_gloss(&self) -> f64 {
+        self.options.floor_gloss
+    }
+
+    /// Which of `WALL_PATTERNS` its walls have in common.
+    #[getter]
+    fn wall_pattern(&self) -> &'static str {
+        self.options.wall_pattern.name()
     }
 
     /// Height of the ceiling, metres.
@@ -150,31 +216,50 @@ impl Room {
     }
 
     fn __repr__(&self) -> String {
-        format!("Room(\"{}\", {})", self.kind, self.seed)
+        let (own, mut text) = (&self.options, format!("Room(\"{}\", {}", self.options.kind, self.options.seed));
+        let plain = RoomOptions::new(own.kind, own.seed);
+        let numbers = [
+            ("clutter", own.clutter, plain.clutter),
+            ("daylight", own.daylight, plain.daylight),
+            ("light_spacing_m", own.light_spacing_m, plain.light_spacing_m),
+            ("extent", own.extent, plain.extent),
+            ("floor_gloss", own.floor_gloss, plain.floor_gloss),
+        ];
+        for (name, value, _) in numbers.into_iter().filter(|(_, value, usual)| value != usual) {
+            text = format!("{text}, {name}={value:?}");
+        }
+        if own.wall_pattern != plain.wall_pattern {
+            text = format!("{text}, wall_pattern=\"{}\"", own.wall_pattern.name());
+        }
+        text + ")"
     }
 
     fn __eq__(&self, other: &Bound<'_, PyAny>) -> bool {
-        other.cast::<Self>().is_ok_and(|other| {
-            let other = other.get();
-            (self.kind, self.seed) == (other.kind, other.seed)
-        })
+        other.cast::<Self>().is_ok_and(|other| self.options == other.get().options)
     }
 
     fn __hash__(&self) -> u64 {
-        self.seed.wrapping_mul(31).wrapping_add(self.kind as u64)
+        self.options.seed.wrapping_mul(31).wrapping_add(self.options.kind as u64)
     }
 
-    fn __getnewargs__(&self) -> (&'static str, u64) {
-        (self.kind.name(), self.seed)
+    fn __getnewargs_ex__<'py>(&self, py: Python<'py>) -> PyResult<((&'static str, u64), Bound<'py, PyDict>)> {
+        let keywords = PyDict::new(py);
+        keywords.set_item("clutter", self.options.clutter)?;
+        keywords.set_item("daylight", self.options.daylight)?;
+        keywords.set_item("light_spacing_m", self.options.light_spacing_m)?;
+        keywords.set_item("extent", self.options.extent)?;
+        keywords.set_item("floor_gloss", self.options.floor_gloss)?;
+        keywords.set_item("wall_pattern", self.options.wall_pattern.name())?;
+        Ok(((self.options.kind.name(), self.options.seed), keywords))
     }
 }
 
-fn seed_from(seed: &Bound<'_, PyAny>) -> PyResult<u64> {
+pub(crate) fn seed_from(seed: &Bound<'_, PyAny>) -> PyResult<u64> {
     convert::whole(seed, "seed", "a whole number from 0 to 2^64 - 1")
 }
 
 /// How many threads; 0 for one per core.
-fn threads_from(threads: Option<&Bound<'_, PyAny>>) -> PyResult<usize> {
+pub(crate) fn threads_from(threads: Option<&Bound<'_, PyAny>>) -> PyResult<usize> {
     let Some(threads) = threads else { return Ok(0) };
     match convert::whole(threads, "threads", "a whole number from 1")? {
         0 => Err(invalid("threads = 0, expected a whole number from 1".to_owned())),
@@ -199,7 +284,7 @@ fn options_from(
     Ok(options)
 }
 
-fn pictures(py: Python<'_>, image: Image) -> PyResult<Pictures<'_>> {
+pub(crate) fn pictures(py: Python<'_>, image: Image) -> PyResult<Pictures<'_>> {
     let (width, height) = (image.width_px, image.height_px);
     let gray = PyArray1::from_vec(py, image.gray).reshape([height, width])?;
     Ok((gray, PyArray1::from_vec(py, image.rgb).reshape([height, width, 3])?))

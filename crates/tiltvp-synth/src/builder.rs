@@ -13,10 +13,22 @@ pub(crate) type MaterialId = usize;
 pub(crate) enum Material {
     /// Reflects light by Lambert's law.
     Matt(Texture),
+    /// Matt below a clear coat that mirrors, the given share of what polished stone does.
+    Polished(Texture, f64),
     /// Shines by itself with the given radiance.
     Lamp(Color),
     /// A window pane: the outdoors shows, and shines, through it.
     Glass,
+}
+
+impl Material {
+    /// What reflects light by Lambert's law, if anything does.
+    pub(crate) fn texture(&self) -> Option<&Texture> {
+        match self {
+            Self::Matt(texture) | Self::Polished(texture, _) => Some(texture),
+            Self::Lamp(_) | Self::Glass => None,
+        }
+    }
 }
 
 /// A flat parallelogram `origin + s du + t dv`, or the triangle of it with `s + t <= 1`; its front is `du x dv`.
@@ -128,6 +140,8 @@ pub(crate) struct Builder {
     pub(crate) pieces: Vec<Piece>,
     pub(crate) materials: Vec<Material>,
     pub(crate) edges: Vec<Segment>,
+    /// Upright edges that are painted on walls.
+    pub(crate) painted: Vec<Segment>,
     /// Where a low robot cannot stand.
     pub(crate) solids: Vec<Footprint>,
 }

@@ -7,7 +7,7 @@ use crate::builder::Material;
 use crate::noise::hash_unit;
 use crate::outdoors::Outdoors;
 use crate::scene::{Contact, Scene};
-use crate::texture::{Color, add, luminance, scale};
+use crate::texture::{Color, Texture, add, luminance, scale};
 
 /// How far points are lifted off their surface before rays start there, in metres.
 const LIFT_M: f64 = 2e-3;
@@ -61,6 +61,17 @@ pub(crate) struct LightMap {
 impl LightMap {
     /// Gathers the light of a scene at points about `spacing` metres apart.
     pub(crate) fn bake(scene: &Scene, outdoors: &Outdoors, spacing: f64) -> Self {
+        Self::gathered(scene, outdoors, spacing, &sources(scene, outdoors))
+    }
+
+    /// The part of [`bake`](Self::bake) that comes in through the windows.
+    pub(crate) fn bake_daylight(scene: &Scene, outdoors: &Outdoors, spacing: f64) -> Self {
+        let mut sources = sources(scene, outdoors);
+        sources.retain(|source| matches!(scene.material(source.patch), Material::Glass));
+        Self::gathered(scene, outdoors, spacing, &sources)
+    }
+
+    fn gathered(scene: &Scene, outdoors: &Outdoors, spacing: f64, sources: &[Source]) -> Self {
         let mut first = 0;
         let grids: Vec<Grid> = scene
             .patches
@@ -73,16 +84,11 @@ impl LightMap {
                 grid
             })
             .collect();
-        let means: Vec<Color> = scene
-            .materials
-            .iter()
-            .map(|m| if let Material::Matt(texture) = m { texture.mean() } else { [0.0; 3] })
-            .collect();
-        let sources = sources(scene, outdoors);
+        let means: Vec<Color> = scene.materials.iter().map(|m| m.texture().map_or([0.0; 3], Texture::mean)).collect();
 
         let direct = per_point(scene, &grids, |index, normal, point| {
             let sun = sun_reaches(scene, outdoors, normal, point);
-            (direct_light(scene, &sources, index, normal, point), sun)
+            (direct_light(scene, sources, index, normal, point), sun)
         });
         let lit: Vec<bool> = direct.iter().map(|d| d.1).collect();
         let spots = sun_spots(scene, outdoors, &grids, &means, &lit);
@@ -292,7 +298,7 @@ fn sources(scene: &Scene, outdoors: &Outdoors) -> Vec<Source> {
     (0..scene.patches.len())
         .filter_map(|patch| {
             let radiance = match scene.material(patch) {
-                Material::Matt(_) => return None,
+                Material::Matt(_) | Material::Polished(..) => return None,
                 Material::Lamp(radiance) => *radiance,
                 Material::Glass => [0.80, 0.88, 1.0].map(|c| c * 0.7 * outdoors.brightness),
             };

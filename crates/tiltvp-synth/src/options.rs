@@ -55,6 +55,47 @@ impl std::str::FromStr for RoomKind {
     }
 }
 
+/// What all walls of a room have in common.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Hash)]
+#[non_exhaustive]
+pub enum WallPattern {
+    /// Nothing: paint, wallpaper or brick as the seed draws them.
+    #[default]
+    Drawn,
+    /// The same upright stripes, again and again.
+    Stripes,
+    /// Upright battens on paint, equally spaced.
+    Panels,
+    /// Large tiles, all alike, with upright and level joints.
+    Tiles,
+}
+
+impl WallPattern {
+    /// Every pattern, in the order of declaration.
+    pub const ALL: [Self; 4] = [Self::Drawn, Self::Stripes, Self::Panels, Self::Tiles];
+
+    /// The pattern's name as a user writes it.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Drawn => "drawn",
+            Self::Stripes => "stripes",
+            Self::Panels => "panels",
+            Self::Tiles => "tiles",
+        }
+    }
+}
+
+impl std::str::FromStr for WallPattern {
+    type Err = Error;
+
+    fn from_str(name: &str) -> Result<Self> {
+        Self::ALL
+            .into_iter()
+            .find(|pattern| pattern.name() == name)
+            .ok_or_else(|| Error::option("room.wall_pattern", name, "one of drawn, stripes, panels, tiles"))
+    }
+}
+
 /// How a room is drawn: equal options give equal worlds.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RoomOptions {
@@ -70,11 +111,28 @@ pub struct RoomOptions {
     /// Spacing of the points where light is gathered, in metres, within `[0.02, 1]`; 0.15 by default. Finer is slower to
     /// build with sharper soft shadows.
     pub light_spacing_m: f64,
+    /// How many times larger the floor is than the kind's own, in `[1, 4]`; 1 by default. A corridor grows in length only;
+    /// other kinds grow both ways, into halls with pillars from 1.5 on.
+    pub extent: f64,
+    /// How much the floor shines, in `[0, 1]`: 0 is matt, 1 mirrors like polished stone under a clear lacquer, the more so
+    /// the flatter one looks; 0 by default.
+    pub floor_gloss: f64,
+    /// What all walls have in common; drawn, each on its own, by default.
+    pub wall_pattern: WallPattern,
 }
 
 impl Default for RoomOptions {
     fn default() -> Self {
-        Self { kind: RoomKind::Office, seed: 0, clutter: 0.7, daylight: 0.7, light_spacing_m: 0.15 }
+        Self {
+            kind: RoomKind::Office,
+            seed: 0,
+            clutter: 0.7,
+            daylight: 0.7,
+            light_spacing_m: 0.15,
+            extent: 1.0,
+            floor_gloss: 0.0,
+            wall_pattern: WallPattern::Drawn,
+        }
     }
 }
 
@@ -97,6 +155,12 @@ impl RoomOptions {
         }
         if !(0.02..=1.0).contains(&self.light_spacing_m) {
             return Err(Error::option("room.light_spacing_m", self.light_spacing_m, "metres in [0.02, 1]"));
+        }
+        if !(1.0..=4.0).contains(&self.extent) {
+            return Err(Error::option("room.extent", self.extent, "a factor in [1, 4]"));
+        }
+        if !(0.0..=1.0).contains(&self.floor_gloss) {
+            return Err(Error::option("room.floor_gloss", self.floor_gloss, "a number in [0, 1]"));
         }
         Ok(())
     }

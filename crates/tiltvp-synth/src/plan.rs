@@ -4,7 +4,7 @@ use nalgebra::{Vector2, Vector3};
 
 use crate::builder::Frame;
 use crate::dice::Dice;
-use crate::options::{RoomKind, RoomOptions};
+use crate::options::{RoomKind, RoomOptions, WallPattern};
 use crate::outdoors::Outdoors;
 
 /// What fills a hole in a wall.
@@ -50,6 +50,9 @@ pub(crate) struct Plan {
     pub(crate) outdoors: Outdoors,
     /// Radiance of the lamps.
     pub(crate) lamps: f64,
+    /// How much the floor shines, in `[0, 1]`.
+    pub(crate) floor_gloss: f64,
+    pub(crate) wall_pattern: WallPattern,
 }
 
 impl Plan {
@@ -64,6 +67,8 @@ impl Plan {
             RoomKind::Narrow => (dice.within(3.5, 6.0), dice.within(1.9, 2.3)),
             RoomKind::UnderTable => (dice.within(4.2, 5.5), dice.within(3.7, 4.6)),
         };
+        let (width, depth) =
+            (width * options.extent, depth * if kind == RoomKind::Corridor { 1.0 } else { options.extent });
         let height = dice.within(2.45, if kind == RoomKind::Narrow { 2.7 } else { 3.0 });
         let corner = Vector2::new;
         let (outline, floors) = if kind == RoomKind::LShaped {
@@ -96,7 +101,8 @@ impl Plan {
         pierce(kind, height, &mut walls, dice);
         let outdoors = day(options, &walls, dice);
         let lamps = if options.daylight < 0.3 || dice.chance(0.6) { dice.within(9.0, 16.0) } else { 1.5 };
-        Self { kind, outline, floors, height, walls, outdoors, lamps }
+        let (floor_gloss, wall_pattern) = (options.floor_gloss, options.wall_pattern);
+        Self { kind, outline, floors, height, walls, outdoors, lamps, floor_gloss, wall_pattern }
     }
 
     /// Whether a point of the ground is on the floor.

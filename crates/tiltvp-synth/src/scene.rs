@@ -21,6 +21,7 @@ pub(crate) struct Contact {
 pub(crate) struct Scene {
     pub(crate) patches: Vec<Patch>,
     pub(crate) materials: Vec<Material>,
+    pub(crate) pieces: Vec<Piece>,
     mesh: TriMesh,
     patch_of_triangle: Vec<u32>,
     /// Per patch the vectors whose dot products with `point - origin` are the coordinates along `du` and `dv`.
@@ -38,7 +39,7 @@ impl Scene {
         let Builder { patches, pieces, materials, .. } = builder;
         let (mut vertices, mut indices) = (Vec::with_capacity(4 * pieces.len()), Vec::with_capacity(2 * pieces.len()));
         let mut patch_of_triangle = Vec::with_capacity(2 * pieces.len());
-        for Piece { patch: k, low, high } in pieces {
+        for Piece { patch: k, low, high } in pieces.iter().copied() {
             let (patch, first) = (&patches[k], vertices.len() as u32);
             let at = |s: f64, t: f64| parry(&(patch.origin + patch.du * s + patch.dv * t));
             vertices.extend([at(low[0], low[1]), at(high[0], low[1]), at(low[0], high[1])]);
@@ -61,7 +62,7 @@ impl Scene {
             })
             .collect();
         let normals = patches.iter().map(|p| p.du.cross(&p.dv).try_normalize(0.0).unwrap_or_else(Vector3::z)).collect();
-        Ok(Self { patches, materials, mesh, patch_of_triangle, duals, normals })
+        Ok(Self { patches, materials, pieces, mesh, patch_of_triangle, duals, normals })
     }
 
     /// The first patch that a ray meets within `reach` metres; `direction` is a unit vector.
@@ -83,6 +84,11 @@ impl Scene {
     /// The unit normal of a patch's front.
     pub(crate) fn normal(&self, patch: usize) -> &Vector3<f64> {
         &self.normals[patch]
+    }
+
+    /// The vectors whose dot products with an offset from the patch's origin are its coordinates along `du` and `dv`.
+    pub(crate) fn duals(&self, patch: usize) -> &[Vector3<f64>; 2] {
+        &self.duals[patch]
     }
 
     /// What a patch is made of.

@@ -4,8 +4,9 @@ use nalgebra::Vector3;
 
 use crate::builder::{Builder, Column, Frame, Material, MaterialId, Patch};
 use crate::dice::Dice;
-use crate::options::RoomKind;
+use crate::options::{RoomKind, WallPattern};
 use crate::plan::{Filling, Opening, Plan, Wall};
+use crate::segment::Segment;
 use crate::texture::{Motif, Texture, rgb, scale};
 
 /// Builds the shell of a plan.
@@ -15,6 +16,8 @@ pub(crate) fn build(plan: &Plan, builder: &mut Builder, dice: &mut Dice) {
     let tone = dice.within(0.85, 1.0);
     let plain = wall_texture(plan.kind, false, tone, dice);
     let accent = wall_texture(plan.kind, true, tone, dice);
+    let (plain, accent) = repeated_texture(plan.wall_pattern).map_or((plain, accent), |same| (same, same));
+    let textures = [plain, accent];
     let (plain, accent) = (builder.matt(plain), builder.matt(accent));
     let chosen = dice.below(plan.walls.len());
     let trims = Trims {
@@ -35,12 +38,61 @@ pub(crate) fn build(plan: &Plan, builder: &mut Builder, dice: &mut Dice) {
         let own = if k == chosen { accent } else { plain };
         panels(wall, plan.height, own, builder);
         builder.edge(wall.frame.origin, plan.height);
+        paint_edges(wall, plan.height, &textures[usize::from(k == chosen)], builder);
+        if plan.wall_pattern == WallPattern::Panels {
+            battens(wall, plan.height, trims.trim, builder);
+        }
         skirting(wall, trims.trim, builder);
         for opening in &wall.openings {
             match opening.filling {
                 Filling::Door => door(&wall.frame, opening, own, &trims, builder),
                 Filling::Window => window(&wall.frame, opening, own, &trims, builder),
             }
+        }
+    }
+}
+
+/// The texture that all walls share, if they do.
+fn repeated_texture(pattern: WallPattern) -> Option<Texture> {
+    let (light, dark) = (rgb(222, 214, 196), rgb(150, 132, 104));
+    match pattern {
+        WallPattern::Drawn => None,
+        WallPattern::Stripes => {
+            Some(Texture::Wallpaper { base: light, ink: dark, motif: Motif::Stripes, period: 0.3, seed: 1 })
+        }
+        WallPattern::Panels => Some(Texture::Paint { color: light, mottle: 0.0, seed: 1 }),
+        WallPattern::Tiles => {
+            Some(Texture::Tiles { color: light, joint: dark, size: [0.4, 0.3], gap: 0.016, variation: 0.0, seed: 1 })
+        }
+    }
+}
+
+/// The heights at which a wall is there, `x` metres along it.
+fn solid_heights(wall: &Wall, x: f64, height: f64) -> [[f64; 2]; 2] {
+    let hole = wall.openings.iter().find(|o| o.along[0] < x && x < o.along[1]);
+    hole.map_or([[0.0, height], [height, height]], |o| [[0.0, o.z[0]], [o.z[1], height]])
+}
+
+/// The true upright edges of a wall's texture.
+fn paint_edges(wall: &Wall, height: f64, texture: &Texture, builder: &mut Builder) {
+    // Texture coordinates grow to the right, seen from the front, and the wall's x to the left.
+    for x in texture.upright_edges(-wall.length, 0.0).into_iter().map(|u| -u) {
+        for [low, high] in solid_heights(wall, x, height) {
+            if high - low > 0.1 {
+                builder
+                    .painted
+                    .push(Segment { bottom: wall.frame.point(x, 0.0, low), top: wall.frame.point(x, 0.0, high) });
+            }
+        }
+    }
+}
+
+/// Upright battens, equally spaced, wherever no opening is.
+fn battens(wall: &Wall, height: f64, material: MaterialId, builder: &mut Builder) {
+    for k in 1..(wall.length / 0.45) as usize {
+        let x = 0.45 * k as f64;
+        if wall.openings.iter().all(|o| x + 0.1 < o.along[0] || x - 0.06 > o.along[1]) {
+            builder.cuboid(&wall.frame, [x, 0.0, 0.09], [x + 0.045, 0.014, height], material);
         }
     }
 }
@@ -101,7 +153,11 @@ fn floor(plan: &Plan, builder: &mut Builder, dice: &mut Dice) {
             tiles(rgb(206, 196, 178), rgb(140, 132, 120), 0.45),
         ]),
     };
-    let material = builder.matt(texture);
+    let material = builder.material(if plan.floor_gloss > 0.0 {
+        Material::Polished(texture, plan.floor_gloss)
+    } else {
+        Material::Matt(texture)
+    });
     let world = Frame::new(0.0, 0.0, 0.0);
     let (_, end) = plan.bounds();
     let patch = Patch {

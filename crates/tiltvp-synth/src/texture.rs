@@ -39,6 +39,9 @@ pub(crate) enum Motif {
     Flowers,
 }
 
+/// The edges of the upright stripes of a wallpaper, in periods.
+const STRIPE_EDGES: [f64; 6] = [0.07, 0.13, 0.28, 0.72, 0.87, 0.93];
+
 /// A reflectance over surface coordinates `(u, v)` in metres: `u` to the right, `v` up, seen from the front.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum Texture {
@@ -132,6 +135,18 @@ impl Texture {
             Self::Screen { size, seed } => screen(u, v, size, footprint, seed),
             Self::Rug { size, base, ink, seed } => rug(u, v, size, [base, ink], footprint, seed),
         }
+    }
+
+    /// Where, from `low` to `high` along `u`, the texture has upright edges that run through all `v`, ascending.
+    pub(crate) fn upright_edges(&self, low: f64, high: f64) -> Vec<f64> {
+        let (period, steps): (f64, &[f64]) = match self {
+            Self::Wallpaper { motif: Motif::Stripes, period, .. } => (*period, &STRIPE_EDGES),
+            Self::Tiles { size, gap, .. } => (size[0], &[-0.5 * gap / size[0], 0.5 * gap / size[0]]),
+            _ => return Vec::new(),
+        };
+        let cells = (low / period).floor() as i64..=(high / period).ceil() as i64;
+        let at = cells.flat_map(|cell| steps.iter().map(move |step| (cell as f64 + step) * period));
+        at.filter(|u| (low..high).contains(u)).collect()
     }
 
     /// A typical reflectance, for light that bounces off the surface.

@@ -6,12 +6,14 @@ use tiltvp_core::{Error, Result};
 use crate::builder::{Builder, Footprint, Material};
 use crate::dice::Dice;
 use crate::light::{LightMap, sun_reaches};
+use crate::lights::Lights;
+use crate::options::RoomKind;
 use crate::options::RoomOptions;
 use crate::outdoors::Outdoors;
 use crate::plan::Plan;
-use crate::scene::Scene;
+use crate::scene::{Contact, Scene};
 use crate::segment::Segment;
-use crate::texture::Color;
+use crate::texture::{Color, mix};
 use crate::view::RobotPose;
 use crate::{furniture, shell};
 
@@ -50,6 +52,8 @@ pub struct World {
     unit: f64,
     outdoors: Outdoors,
     edges: Vec<Segment>,
+    painted: Vec<Segment>,
+    light_spacing_m: f64,
     solids: Vec<Footprint>,
     /// Where the robot is meant to stand; empty for anywhere.
     places: Vec<Footprint>,
@@ -70,11 +74,13 @@ impl World {
         shell::build(&plan, &mut builder, &mut dice);
         let places = furniture::furnish(&plan, options, &mut builder, &mut dice);
         let edges = std::mem::take(&mut builder.edges);
+        let painted = std::mem::take(&mut builder.painted);
         let solids = std::mem::take(&mut builder.solids);
         let scene = Scene::new(builder)?;
         let light = LightMap::bake(&scene, &outdoors, options.light_spacing_m);
         let unit = 1.0 / light.typical().max(1e-9);
-        Ok(Self { plan, scene, light, unit, outdoors, edges, solids, places })
+        let light_spacing_m = options.light_spacing_m;
+        Ok(Self { plan, scene, light, unit, outdoors, edges, painted, light_spacing_m, solids, places })
     }
 
     /// The vertical edges of walls, openings and furniture, visible or not.
@@ -142,31 +148,120 @@ impl World {
     /// The linear radiance that arrives from a unit direction, in units of white in the room's light; `spread` is
     /// the angle that the ray stands for, radians.
     pub(crate) fn radiance(&self, origin: &Vector3<f64>, direction: &Vector3<f64>, spread: f64) -> Color {
-        self.unscaled_radiance(origin, direction, spread).map(|c| (c * self.unit).min(GLARE))
+        let contact = self.scene.cast(origin, direction, 1e3);
+        self.seen(&Ray { origin, direction, spread }, contact, &Lights::STEADY, || {
+            let contact = contact?;
+            let (below, down) = mirrored(origin, direction);
+            let point = below + down * (contact.distance * (1.0 + 1e-9) + 1e-6);
+            let further = self.scene.cast(&point, &down, 1e3)?;
+            Some(Contact { distance: contact.distance + further.distance, ..further })
+        })
     }
 
-    fn unscaled_radiance(&self, origin: &Vector3<f64>, direction: &Vector3<f64>, spread: f64) -> Color {
-        let Some(contact) = self.scene.cast(origin, direction, 1e3) else {
-            return self.outdoors.radiance(direction);
+    /// The radiance that arrives along a ray that meets `contact` first; `reflected` is what the ray that the floor mirrors
+    /// meets, at its distance from the mirrored origin.
+    pub(crate) fn seen(
+        &self,
+        ray: &Ray<'_>,
+        contact: Option<Contact>,
+        lights: &Lights<'_>,
+        reflected: impl FnOnce() -> Option<Contact>,
+    ) -> Color {
+        let mut color = self.own_radiance(ray, contact, lights);
+        if let Some(contact) = contact
+            && let Material::Polished(_, gloss) = self.scene.material(contact.patch)
+        {
+            // Schlick's approximation of Fresnel's law.
+            let slant = self.scene.normal(contact.patch).dot(ray.direction).abs().min(1.0);
+            let share = gloss * (0.05 + 0.95 * (1.0 - slant).powi(5));
+            let (origin, direction) = mirrored(ray.origin, ray.direction);
+            let other = Ray { origin: &origin, direction: &direction, spread: ray.spread };
+            color = mix(color, self.own_radiance(&other, reflected(), lights), share);
+        }
+        color.map(|c| (c * self.unit).min(GLARE))
+    }
+
+    /// The radiance of what a ray meets, but for mirror images in it.
+    fn own_radiance(&self, ray: &Ray<'_>, contact: Option<Contact>, lights: &Lights<'_>) -> Color {
+        let Ray { origin, direction, spread } = *ray;
+        let outside = || tinted(self.outdoors.radiance(direction), lights.day);
+        let Some(contact) = contact else {
+            return outside();
         };
         match self.scene.material(contact.patch) {
-            Material::Lamp(radiance) => *radiance,
-            Material::Glass => self.outdoors.radiance(direction),
-            Material::Matt(texture) => {
+            Material::Lamp(radiance) => tinted(*radiance, lights.lamps),
+            Material::Glass => outside(),
+            Material::Matt(texture) | Material::Polished(texture, _) => {
                 let normal = self.scene.normal(contact.patch);
                 let slant = normal.dot(direction).abs().max(0.1);
                 let [u, v] = self.scene.texture_coordinates(&contact);
                 let reflectance = texture.reflectance(u, v, contact.distance * spread / slant);
-                let mut light = self.light.at(&contact);
+                let mut light = lights.shone(self.light.at(&contact), &contact);
                 if self.light.sun_may_reach(&contact) {
                     let point = origin + direction * (contact.distance - 1e-3);
                     if sun_reaches(&self.scene, &self.outdoors, normal, &point) {
                         let sun = self.outdoors.sun * normal.dot(&self.outdoors.towards_sun);
-                        light = [light[0] + sun, light[1] + 0.95 * sun, light[2] + 0.85 * sun];
+                        let sun = tinted([sun, 0.95 * sun, 0.85 * sun], lights.day);
+                        light = [light[0] + sun[0], light[1] + sun[1], light[2] + sun[2]];
                     }
                 }
                 [0, 1, 2].map(|c| reflectance[c] * light[c])
             }
         }
     }
+
+    /// Whether a surface may have sharp edges here that are not its own: shadows in the sun, the view through a window.
+    pub(crate) fn is_patterned(&self, contact: &Contact) -> bool {
+        self.light.sun_may_reach(contact) || matches!(self.scene.material(contact.patch), Material::Glass)
+    }
+
+    /// The light of the windows alone, at the points where the room's light is known.
+    pub(crate) fn daylight(&self) -> LightMap {
+        LightMap::bake_daylight(&self.scene, &self.outdoors, self.light_spacing_m)
+    }
+
+    /// The surfaces.
+    pub(crate) fn scene(&self) -> &Scene {
+        &self.scene
+    }
+
+    /// The true upright edges that are painted on walls.
+    pub(crate) fn painted_edges(&self) -> &[Segment] {
+        &self.painted
+    }
+
+    /// How far a point of the floor is from the next thing a low robot cannot drive over, metres; negative outside.
+    pub(crate) fn clearance(&self, x_m: f64, y_m: f64) -> f64 {
+        let point = Vector2::new(x_m, y_m);
+        if !self.plan.contains(&point) {
+            return -1.0;
+        }
+        self.solids.iter().map(|solid| solid.distance(&point)).fold(self.plan.distance_to_walls(&point), f64::min)
+    }
+
+    /// The least and the greatest corner of the floor.
+    pub(crate) fn bounds(&self) -> (Vector2<f64>, Vector2<f64>) {
+        self.plan.bounds()
+    }
+
+    /// The kind of place.
+    pub fn kind(&self) -> RoomKind {
+        self.plan.kind
+    }
+}
+
+/// A ray, and the angle that it stands for.
+pub(crate) struct Ray<'a> {
+    pub(crate) origin: &'a Vector3<f64>,
+    pub(crate) direction: &'a Vector3<f64>,
+    pub(crate) spread: f64,
+}
+
+/// A ray as the floor mirrors it.
+pub(crate) fn mirrored(origin: &Vector3<f64>, direction: &Vector3<f64>) -> (Vector3<f64>, Vector3<f64>) {
+    (Vector3::new(origin.x, origin.y, -origin.z), Vector3::new(direction.x, direction.y, -direction.z))
+}
+
+fn tinted(color: Color, tint: Color) -> Color {
+    [0, 1, 2].map(|c| color[c] * tint[c])
 }

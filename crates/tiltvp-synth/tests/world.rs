@@ -5,7 +5,9 @@
 use nalgebra::{Matrix3, Vector3};
 use tiltvp_core::Error;
 use tiltvp_core::geometry::Tilt;
-use tiltvp_synth::{Exposure, RenderOptions, RobotPose, RoomKind, RoomOptions, View, World, render, render_panorama};
+use tiltvp_synth::{
+    Exposure, RenderOptions, RobotPose, RoomKind, RoomOptions, View, WallPattern, World, render, render_panorama,
+};
 
 const WIDTH: usize = 96;
 const HEIGHT: usize = 72;
@@ -194,6 +196,10 @@ fn every_room_option_changes_the_world() {
         RoomOptions { clutter: 0.1, ..base.clone() },
         RoomOptions { daylight: 0.0, ..base.clone() },
         RoomOptions { light_spacing_m: 0.3, ..base.clone() },
+        RoomOptions { extent: 1.5, ..base.clone() },
+        RoomOptions { wall_pattern: WallPattern::Stripes, ..base.clone() },
+        RoomOptions { wall_pattern: WallPattern::Panels, ..base.clone() },
+        RoomOptions { wall_pattern: WallPattern::Tiles, ..base.clone() },
     ] {
         assert_ne!(first, picture(&room), "{room:?}");
     }
@@ -208,6 +214,9 @@ fn wrong_options_are_refused_by_name() {
     let room = RoomOptions::default();
     refused(RoomOptions { clutter: 1.5, ..room.clone() }.validate(), "room.clutter");
     refused(RoomOptions { daylight: f64::NAN, ..room.clone() }.validate(), "room.daylight");
+    refused(RoomOptions { extent: 0.5, ..room.clone() }.validate(), "room.extent");
+    refused(RoomOptions { floor_gloss: -0.5, ..room.clone() }.validate(), "room.floor_gloss");
+    refused("plaid".parse::<WallPattern>().map(|_| ()), "room.wall_pattern");
     refused(RoomOptions { light_spacing_m: 0.0, ..room }.validate(), "room.light_spacing_m");
     let base = RenderOptions::default();
     refused(RenderOptions { samples: 0, ..base.clone() }.validate(), "render.samples");
@@ -236,4 +245,21 @@ fn wrong_options_are_refused_by_name() {
 fn worlds_can_be_shared_between_threads() {
     fn shareable<T: Send + Sync>() {}
     shareable::<World>();
+}
+
+/// Seen in a floor that shines, the lamps are brighter than the floor itself.
+#[test]
+fn floors_shine_as_asked() {
+    let room = |floor_gloss| {
+        let base = RoomOptions { light_spacing_m: 0.6, daylight: 0.0, ..RoomOptions::new(RoomKind::Office, 4) };
+        World::new(&RoomOptions { floor_gloss, ..base }).unwrap()
+    };
+    let options = RenderOptions { samples: 1, exposure: Exposure::Fixed { gain: 0.3 }, ..RenderOptions::default() };
+    let (matt, glossy) = (room(0.0), room(1.0));
+    let pose = matt.free_poses(1, 0).unwrap()[0];
+    let floor =
+        |world: &World| render_panorama(world, pose, 1.2, 64, &options).unwrap().image.gray[128 * 40..].to_vec();
+    let brightest = |levels: &[u8]| levels.iter().copied().max().unwrap();
+    assert_ne!(floor(&matt), floor(&glossy));
+    assert!(brightest(&floor(&glossy)) > brightest(&floor(&matt)) + 10);
 }

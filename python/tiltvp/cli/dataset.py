@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import math
 import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -22,6 +23,7 @@ if TYPE_CHECKING:
 app = App(name="dataset", help="Folders of images with known lean: check them, or make them.")
 
 Tilts = Annotated[list[str] | None, Parameter(consume_multiple=True, negative="")]
+Mount = tuple[float, float, float, float]
 Words = Annotated[list[str] | None, Parameter(consume_multiple=True, negative="")]
 
 
@@ -212,6 +214,108 @@ def synth(
             advance=bar.advance,
         )
     _say_made(out)
+
+
+@app.command
+def drive(
+    *,
+    out: Path,
+    kind: str = "corridor",
+    frames: int | None = None,
+    camera: str = "mirror",
+    camera_name: str | None = None,
+    resolution_scale: float = 1.0,
+    robot_from_camera: str | None = None,
+    mount: Mount | None = None,
+    bumps_deg: float = 0.0,
+    lighting: float | None = None,
+    floor_gloss: float | None = None,
+    wall_pattern: str | None = None,
+    extent: float | None = None,
+    noise_sigma: float | None = None,
+    samples: int | None = None,
+    encoder_k_m: float | None = None,
+    seed: int = 0,
+    threads: int | None = None,
+    force: Switch = False,
+) -> None:
+    """Make a dataset of a robot's drive through a room: frames, odometry, and the identity of every upright edge.
+
+    Parameters
+    ----------
+    out
+        Folder to make. It appears when it is whole.
+    kind
+        Where to drive: corridor, hall, office, living-room, l-shaped, narrow or under-table.
+    frames
+        How many frames; default 1500.
+    camera
+        mirror (a camera below a hyperbolic mirror), fisheye (like the tilt paper's), or a calibration file.
+    camera_name
+        Name or number of the camera in a file of several; the first is 0.
+    resolution_scale
+        Take a camera with so many times the pixels per side; 0.75 makes 480 x 360.
+    robot_from_camera
+        How the camera sits in its mounting: up (the default), forward, or a file with a rotation.
+    mount
+        Where the camera is on the robot: metres to the front and to the left, degrees turned to the left, metres up;
+        default 0 0 0 0.4.
+    bumps_deg
+        Greatest lean from bumps.
+    lighting
+        How much the light changes along the way, from 0 to 1; default 0.5.
+    floor_gloss
+        How much the floor shines, from 0 to 1; default 0.4.
+    wall_pattern
+        What all walls have in common: drawn (nothing, the default), stripes, panels or tiles.
+    extent
+        How many times larger than usual the floor is, from 1 to 4; default is 2 for corridor and hall, 1 otherwise.
+    noise_sigma
+        Gaussian noise in grey levels; default 2.
+    samples
+        Rays per pixel and side where surfaces meet; default 3.
+    encoder_k_m
+        Variance of an encoder's reading per metre; default 1e-5.
+    seed
+        Seed of room, way, encoders, bumps, light and noise.
+    threads
+        How many threads; default is one per core.
+    force
+        Replace a dataset that is there.
+    """
+    from tiltvp.datasets.driving import drive_room, write_drive
+    from tiltvp.datasets.panoramas import paper_camera
+    from tiltvp.synth import MIRROR_BLIND_RAD, Drive, mirror_camera
+
+    if seed < 0:
+        raise InvalidInputError(f"seed = {seed}, expected 0 or more")
+    known = {"mirror": mirror_camera, "fisheye": paper_camera}
+    if camera in known:
+        lens = known[camera]()
+        lens = lens if resolution_scale == 1.0 else lens.scaled(resolution_scale)
+    else:
+        lens = _camera(Path(camera), camera_name, resolution_scale)
+    count = _threads(threads)
+    room = drive_room(kind, seed, extent=extent, floor_gloss=floor_gloss, wall_pattern=wall_pattern, threads=count)
+    made = Drive(
+        room,
+        camera=lens,
+        robot_from_camera=_rotation(robot_from_camera),
+        mount=None if mount is None else (mount[0], mount[1], math.radians(mount[2]), mount[3]),
+        blind_rad=MIRROR_BLIND_RAD if camera == "mirror" else None,
+        frames=frames,
+        seed=seed,
+        encoder_k_m=encoder_k_m,
+        bumps_max_rad=math.radians(bumps_deg),
+        lighting=lighting,
+        samples=samples,
+        noise_sigma=noise_sigma,
+        threads=count,
+    )
+    with progress_bar(len(made), "frames") as bar:
+        source = _made_by("drive") | {"camera": Path(camera).name}
+        write_drive(made, out, threads=count, source=source, force=force, advance=bar.advance)
+    say(f"{out}: {len(made)} frames of a drive of {made.motions[:, 0].sum():.1f} m")
 
 
 @app.command

@@ -63,6 +63,18 @@ class NewDataset:
         write_image(path, gray)
         return TiltImage(file, path, location, environment, alpha_rad, beta_rad, yaw_rad)
 
+    def write_table(self, name: str, header: Sequence[str], rows: Iterable[Sequence[object]]) -> None:
+        """Writes a CSV file of that name beside the images."""
+        text = io.StringIO()
+        table = csv.writer(text, lineterminator="\n")
+        table.writerow(header)
+        table.writerows(rows)
+        (self._directory / name).write_text(text.getvalue(), encoding="utf-8")
+
+    def write_toml(self, name: str, values: dict[str, Any]) -> None:
+        """Writes a TOML file of that name beside the images."""
+        (self._directory / name).write_text(tomli_w.dumps(values), encoding="utf-8")
+
 
 @contextmanager
 def new_dataset(

@@ -77,6 +77,9 @@ pub(crate) fn furnish(plan: &Plan, options: &RoomOptions, builder: &mut Builder,
             layout.claim(&wall.frame, [door.along[0] - 0.1, 0.0], [door.along[1] + 0.1, 0.75]);
         }
     }
+    if options.extent >= 1.5 && plan.kind != RoomKind::Corridor {
+        pillars(&mut layout, builder);
+    }
     let places = tables::freestanding(&mut layout, &palette, builder, dice);
     let mut order: Vec<usize> = (0..plan.walls.len()).collect();
     for k in (1..order.len()).rev() {
@@ -87,6 +90,23 @@ pub(crate) fn furnish(plan: &Plan, options: &RoomOptions, builder: &mut Builder,
         decor::hang(&plan.walls[k], &tall, plan, &palette, options.clutter, builder, dice);
     }
     places
+}
+
+/// Square pillars from floor to ceiling on an even grid.
+fn pillars(layout: &mut Layout<'_>, builder: &mut Builder) {
+    let paint = builder.paint(196, 192, 184);
+    for [x0, y0, x1, y1] in layout.plan.floors.clone() {
+        let count = |length: f64| ((length / 3.6) as usize).max(1);
+        let (nx, ny) = (count(x1 - x0), count(y1 - y0));
+        for k in 0..(nx - 1) * (ny - 1) {
+            let place = |low: f64, high: f64, at: usize, n: usize| low + (high - low) * (at + 1) as f64 / n as f64;
+            let frame = Frame::new(place(x0, x1, k % (nx - 1), nx), place(y0, y1, k / (nx - 1), ny), 0.0);
+            if layout.claim(&frame, [-0.6, -0.6], [0.6, 0.6]) {
+                builder.cuboid(&frame, [-0.18, -0.18, 0.0], [0.18, 0.18, layout.plan.height], paint);
+                builder.solid(&frame, [-0.18, -0.18], [0.18, 0.18]);
+            }
+        }
+    }
 }
 
 /// Lines a wall with furniture; returns the intervals where something stands that hides the wall, with its height.

@@ -1,0 +1,259 @@
+//! A drive: a robot with a camera and encoders on its way through a room, every frame of which can be looked at.
+
+use std::sync::Arc;
+
+use nalgebra::{Matrix3, Vector3};
+use rayon::prelude::*;
+use tiltvp_core::camera::Camera;
+use tiltvp_core::geometry::Tilt;
+use tiltvp_core::{Error, Result};
+
+use crate::encoders::Wheels;
+use crate::light::LightMap;
+use crate::lights::{Lights, Weather};
+use crate::sighting::{EdgeSighting, Lookout, UprightEdge, upright_edges};
+use crate::sweep::{Rays, Sweep};
+use crate::tone::{Exposure, Image, RenderOptions};
+use crate::trajectory::Trajectory;
+use crate::view::RobotPose;
+use crate::world::World;
+
+/// Where the camera's centre is on the robot, and how it is turned.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Mount {
+    /// In front of the middle between the wheels, metres; 0 by default.
+    pub x_m: f64,
+    /// To the left of it, metres; 0 by default.
+    pub y_m: f64,
+    /// Turn of camera and mounting about the robot's `z`, counter-clockwise, radians; 0 by default.
+    pub yaw_rad: f64,
+    /// Above the floor, metres; 0.4 by default.
+    pub height_m: f64,
+}
+
+impl Default for Mount {
+    fn default() -> Self {
+        Self { x_m: 0.0, y_m: 0.0, yaw_rad: 0.0, height_m: 0.4 }
+    }
+}
+
+/// How a drive goes and what its camera is like: equal options give equal drives.
+#[derive(Debug, Clone, PartialEq)]
+pub struct DriveOptions {
+    /// How many frames, within `[1, 100000]`; 1500 by default.
+    pub frames: usize,
+    /// Seed of way, encoders, bumps, light and noise; 0 by default.
+    pub seed: u64,
+    /// Greatest way from frame to frame, metres; 0.05 by default.
+    pub step_m: f64,
+    /// Greatest turn from frame to frame, radians; 0.08 by default.
+    pub turn_max_rad: f64,
+    /// Where the camera is.
+    pub mount: Mount,
+    /// How the camera sits in its mounting, which the mount's yaw turns; identity for a camera that looks up.
+    pub robot_from_camera: Matrix3<f64>,
+    /// Half angle of the cone around the camera's `z` axis in which it sees only itself, as under a mirror: black, radians
+    /// within `[0, 1.5]`; 0 by default.
+    pub blind_rad: f64,
+    /// Wheels and encoders.
+    pub wheels: Wheels,
+    /// Greatest lean from bumps, radians within `[0, 0.5]`; the robot leans about the camera's centre; 0 by default.
+    pub bumps_max_rad: f64,
+    /// How much lamps, daylight, their colours and the exposure change along the way, in `[0, 1]`; 0.5 by default.
+    pub lighting: f64,
+    /// Rays per pixel side where surfaces meet, within `[1, 8]`; elsewhere one ray per pixel will do; 3 by default.
+    pub samples: usize,
+    /// Standard deviation of Gaussian noise, grey levels; 2 by default.
+    pub noise_sigma: f64,
+    /// Standard deviation of a Gaussian blur, pixels; 0 by default, for none.
+    pub blur_sigma_px: f64,
+}
+
+impl Default for DriveOptions {
+    fn default() -> Self {
+        Self {
+            frames: 1500,
+            seed: 0,
+            step_m: 0.05,
+            turn_max_rad: 0.08,
+            mount: Mount::default(),
+            robot_from_camera: Matrix3::identity(),
+            blind_rad: 0.0,
+            wheels: Wheels::default(),
+            bumps_max_rad: 0.0,
+            lighting: 0.5,
+            samples: 3,
+            noise_sigma: 2.0,
+            blur_sigma_px: 0.0,
+        }
+    }
+}
+
+impl DriveOptions {
+    /// Checks every field's domain.
+    ///
+    /// # Errors
+    /// [`Error::InvalidOption`] or [`Error::InvalidArgument`] for the first field outside its domain.
+    pub fn validate(&self) -> Result<()> {
+        if !(1..=100_000).contains(&self.frames) {
+            return Err(Error::option("drive.frames", self.frames, "a number in [1, 100000]"));
+        }
+        let Mount { x_m, y_m, yaw_rad, height_m } = self.mount;
+        let ranges = [
+            ("drive.step_m", self.step_m, 1e-4, 0.2, "metres in [1e-4, 0.2]"),
+            ("drive.turn_max_rad", self.turn_max_rad, 1e-3, 0.5, "radians in [1e-3, 0.5]"),
+            ("drive.mount.x_m", x_m, -1.0, 1.0, "metres in [-1, 1]"),
+            ("drive.mount.y_m", y_m, -1.0, 1.0, "metres in [-1, 1]"),
+            ("drive.mount.yaw_rad", yaw_rad, -7.0, 7.0, "radians in [-7, 7]"),
+            ("drive.mount.height_m", height_m, 0.05, 2.2, "metres in [0.05, 2.2]"),
+            ("drive.blind_rad", self.blind_rad, 0.0, 1.5, "radians in [0, 1.5]"),
+            ("drive.bumps_max_rad", self.bumps_max_rad, 0.0, 0.5, "radians in [0, 0.5]"),
+            ("drive.lighting", self.lighting, 0.0, 1.0, "a number in [0, 1]"),
+        ];
+        for (name, value, low, high, expected) in ranges {
+            if !(low..=high).contains(&value) {
+                return Err(Error::option(name, value, expected));
+            }
+        }
+        let rotation = &self.robot_from_camera;
+        let off = (rotation * rotation.transpose() - Matrix3::identity()).norm();
+        if !(off < 1e-6 && rotation.determinant() > 0.0) {
+            return Err(Error::argument("drive.robot_from_camera", rotation, "a rotation matrix"));
+        }
+        self.wheels.validate()?;
+        self.exposed(0.45, 0).validate()
+    }
+
+    /// Rotation from camera to robot coordinates, with the mount's yaw.
+    pub fn robot_from_mounted_camera(&self) -> Matrix3<f64> {
+        about_z(self.mount.yaw_rad) * self.robot_from_camera
+    }
+
+    fn exposed(&self, mean_level: f64, frame: usize) -> RenderOptions {
+        RenderOptions {
+            samples: self.samples,
+            blur_sigma_px: self.blur_sigma_px,
+            noise_sigma: self.noise_sigma,
+            exposure: Exposure::Auto { mean_level },
+            seed: self.seed ^ (frame as u64 + 1).rotate_left(40),
+            ..RenderOptions::default()
+        }
+    }
+}
+
+/// A robot's drive through a room.
+pub struct Drive {
+    world: Arc<World>,
+    camera: Camera,
+    options: DriveOptions,
+    trajectory: Trajectory,
+    /// The light of the windows alone, where the light changes.
+    daylight: Option<LightMap>,
+    rays: Rays,
+    edges: Vec<UprightEdge>,
+}
+
+impl Drive {
+    /// Plans a drive. Light is gathered in parallel on the current rayon pool; the drive does not depend on it.
+    ///
+    /// # Errors
+    /// If the options are outside their domains, or the robot finds no space to drive in.
+    pub fn new(world: Arc<World>, camera: Camera, options: DriveOptions) -> Result<Self> {
+        options.validate()?;
+        if options.mount.height_m >= world.height_m() {
+            return Err(Error::option("drive.mount.height_m", options.mount.height_m, "a height below the ceiling"));
+        }
+        let trajectory = Trajectory::draw(&world, &options)?;
+        let daylight = (options.lighting > 0.0).then(|| world.daylight());
+        let (rays, edges) = (Rays::new(&camera, options.blind_rad), upright_edges(&world));
+        Ok(Self { world, camera, options, trajectory, daylight, rays, edges })
+    }
+
+    /// How the drive goes.
+    pub fn options(&self) -> &DriveOptions {
+        &self.options
+    }
+
+    /// The camera.
+    pub fn camera(&self) -> &Camera {
+        &self.camera
+    }
+
+    /// Poses, leans and wheels.
+    pub fn trajectory(&self) -> &Trajectory {
+        &self.trajectory
+    }
+
+    /// The upright edges of the room, visible or not; an edge's place here is its number.
+    pub fn edges(&self) -> &[UprightEdge] {
+        &self.edges
+    }
+
+    /// The camera's centre in the world at a frame, metres.
+    ///
+    /// # Errors
+    /// [`Error::InvalidArgument`] if there is no such frame.
+    pub fn center(&self, frame: usize) -> Result<Vector3<f64>> {
+        let (pose, _) = self.state(frame)?;
+        let Mount { x_m, y_m, height_m, .. } = self.options.mount;
+        let (s, c) = pose.yaw_rad.sin_cos();
+        Ok(Vector3::new(pose.x_m + c * x_m - s * y_m, pose.y_m + s * x_m + c * y_m, height_m))
+    }
+
+    /// The image of a frame, rendered in parallel on the current rayon pool; its bytes depend on room, camera, options and
+    /// frame alone.
+    ///
+    /// # Errors
+    /// [`Error::InvalidArgument`] if there is no such frame.
+    pub fn render(&self, frame: usize) -> Result<Image> {
+        let (pose, tilt) = self.state(frame)?;
+        let (lights, level) = self.lights(frame);
+        let sweep = Sweep::new(&self.world, &self.rays, self.center(frame)?, self.world_from_camera(pose, tilt));
+        let options = self.options.exposed((0.45 * level).clamp(0.1, 0.8), frame);
+        Ok(sweep.film(&lights, &options).develop(&options))
+    }
+
+    /// The upright edges in sight at a frame, in the order of their numbers.
+    ///
+    /// # Errors
+    /// [`Error::InvalidArgument`] if there is no such frame.
+    pub fn sightings(&self, frame: usize) -> Result<Vec<EdgeSighting>> {
+        let (pose, tilt) = self.state(frame)?;
+        let (lights, _) = self.lights(frame);
+        let lookout = Lookout {
+            world: &self.world,
+            camera: &self.camera,
+            blind_rad: self.options.blind_rad,
+            pose,
+            center: self.center(frame)?,
+            camera_from_world: self.world_from_camera(pose, tilt).transpose(),
+            lights: &lights,
+        };
+        let numbered = self.edges.par_iter().enumerate();
+        Ok(numbered.filter_map(|(number, edge)| lookout.sight(number, edge)).collect())
+    }
+
+    fn state(&self, frame: usize) -> Result<(RobotPose, Tilt)> {
+        match (self.trajectory.poses.get(frame), self.trajectory.tilts.get(frame)) {
+            (Some(pose), Some(tilt)) => Ok((*pose, *tilt)),
+            _ => Err(Error::argument("frame", frame, format!("a frame below {}", self.trajectory.poses.len()))),
+        }
+    }
+
+    fn world_from_camera(&self, pose: RobotPose, tilt: Tilt) -> Matrix3<f64> {
+        let upright_from_leaning = tilt.leaning_from_upright().transpose();
+        about_z(pose.yaw_rad) * upright_from_leaning * self.options.robot_from_mounted_camera()
+    }
+
+    fn lights(&self, frame: usize) -> (Lights<'_>, f64) {
+        let Some(daylight) = &self.daylight else { return (Lights::STEADY, 1.0) };
+        let seed = (self.options.seed ^ (self.options.seed >> 32)) as u32;
+        let (lamps, day, level) = Weather { strength: self.options.lighting, seed }.at(frame);
+        (Lights { lamps, day, daylight: Some(daylight) }, level)
+    }
+}
+
+fn about_z(angle_rad: f64) -> Matrix3<f64> {
+    let (s, c) = angle_rad.sin_cos();
+    Matrix3::new(c, -s, 0.0, s, c, 0.0, 0.0, 0.0, 1.0)
+}
