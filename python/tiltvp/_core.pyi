@@ -1060,7 +1060,7 @@ class LineTracker:
             Greatest difference from the predicted bearing, and how much more for each further frame back; where turns
             are known.
         bearing_weight
-            What is added to the distance of descriptors at the gate, in proportion less closer to the predicted bearing.
+            Added to the distance of descriptors at the gate, in proportion less closer to the predicted bearing.
         extrapolate
             Whether bearings are predicted to go on changing as they did, beside the turn of the robot.
         f1, f2, f3, mutual, ordered
