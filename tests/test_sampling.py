@@ -57,8 +57,8 @@ def test_wrong_words_are_refused_by_name(option: dict[str, object], words: str) 
 
 
 def test_the_table_has_a_row_for_each_way_and_says_what_pays() -> None:
-    table = sample_views(room_views(1, CAMERA, samples=1, kinds=("office", "corridor")), CAMERA, seeds=1)
-    assert len(table) == 2 * 7 * len(SAMPLERS) * len(WAYS)
+    table = sample_views(room_views(1, CAMERA, samples=1, kinds=("corridor",)), CAMERA, seeds=1)
+    assert len(table) == 7 * len(SAMPLERS) * len(WAYS)
     summary = summarise_sampling(table)
     assert summary["way"].to_list() == list(WAYS) * len(SAMPLERS)
     plain = summary.filter(pl.col("way") == "plain")
@@ -96,7 +96,7 @@ def test_the_command_prints_tables_and_writes_parquet(tmp_path: Path) -> None:
         "--rooms",
         "1",
         "--kind",
-        "office",
+        "narrow",
         "--seeds",
         "1",
         "--samples",

@@ -1041,6 +1041,7 @@ class LineTracker:
         *,
         look_back: SupportsIndex = ...,
         gate_rad: float = ...,
+        gate_settled_rad: float = ...,
         gate_growth_rad: float = ...,
         bearing_weight: float = ...,
         extrapolate: bool = ...,
@@ -1056,11 +1057,11 @@ class LineTracker:
         ----------
         look_back
             How many frames back a line is looked for before it is taken for a new one.
-        gate_rad, gate_growth_rad
-            Greatest difference from the predicted bearing, and how much more for each further frame back; where turns
-            are known.
+        gate_rad, gate_settled_rad, gate_growth_rad
+            Greatest difference from the predicted bearing where turns are known; the same, beside the line's own change
+            per frame, where that is known from before; and how much more for each further frame back.
         bearing_weight
-            Added to the distance of descriptors at the gate, in proportion less closer to the predicted bearing.
+            What is added to the distance of descriptors at the gate, in proportion less nearer the predicted bearing.
         extrapolate
             Whether bearings are predicted to go on changing as they did, beside the turn of the robot.
         f1, f2, f3, mutual, ordered

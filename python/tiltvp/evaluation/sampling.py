@@ -12,7 +12,7 @@ import polars as pl
 
 from tiltvp.datasets.panoramas import TABLE_1_TILTS_DEG, Panorama, PanoramaViews
 from tiltvp.evaluation.metrics import offset_rad, relative_errors_rad
-from tiltvp.synth import ROOM_KINDS, render_room
+from tiltvp.synth import ROOM_KINDS, Room
 from tiltvp.tilt import TiltEstimator, normal_from_alpha_beta
 
 if TYPE_CHECKING:
@@ -108,13 +108,15 @@ def room_views(
     """Rendered rooms, so many of each kind, at the same leans."""
     for kind in kinds:
         for seed in range(rooms):
+            room = Room(kind, seed)
+            pose = room.free_poses(1, seed)[0]
             for alpha_deg, beta_deg in TABLE_1_TILTS_DEG:
                 alpha, beta = float(np.deg2rad(alpha_deg)), float(np.deg2rad(beta_deg))
-                room = render_room(
-                    camera, kind=kind, seed=seed, alpha_rad=alpha, beta_rad=beta, noise_sigma=noise_sigma,
-                    samples=samples,
+                image = room.render(
+                    camera, pose=pose, alpha_rad=alpha, beta_rad=beta, noise_sigma=noise_sigma, samples=samples,
+                    seed=seed,
                 )  # fmt: skip
-                yield View(room.gray, f"{kind} {seed}", alpha, beta)
+                yield View(image.gray, f"{kind} {seed}", alpha, beta)
 
 
 def sample_views(

@@ -13,7 +13,7 @@ const ERRING_TOGETHER: f64 = 8.0;
 const PIXEL_SIGMA_MIN_PX: f64 = 0.06;
 
 /// What no pixel of the line tells, in pixels: blur and neighbouring edges pull the whole line.
-const LINE_SIGMA_PX: f64 = 0.05;
+const LINE_SIGMA_PX: f64 = 0.12;
 
 /// A line under work.
 #[derive(Debug, Clone, Copy, Default)]

@@ -17,10 +17,13 @@ pub struct TrackerOptions {
     /// Greatest difference from the bearing that is predicted for one frame to the next, in radians, where the turn of the
     /// robot is known. Default 0.1.
     pub gate_rad: f64,
-    /// How much wider the gate is for each further frame back, in radians. Default 0.02.
+    /// The same for a line whose change of bearing is known from before, to which as much as that change is added, but no
+    /// more than `gate_rad`; only with `extrapolate`. Default 0.02.
+    pub gate_settled_rad: f64,
+    /// How much wider the gates are for each further frame back, in radians. Default 0.005.
     pub gate_growth_rad: f64,
     /// What is added to the distance of descriptors at the gate, in proportion less for bearings closer to the predicted one:
-    /// of lines that look alike the one in the right place is the nearest. Default 0.5.
+    /// of lines that look alike the one in the right place is the nearest. Default 1.
     pub bearing_weight: f64,
     /// Whether bearings are predicted to go on changing as they did, beside the turn of the robot. Default true.
     pub extrapolate: bool,
@@ -32,8 +35,9 @@ impl Default for TrackerOptions {
             look_back: 20,
             matching: MatchOptions::default(),
             gate_rad: 0.1,
-            gate_growth_rad: 0.02,
-            bearing_weight: 0.5,
+            gate_settled_rad: 0.02,
+            gate_growth_rad: 0.005,
+            bearing_weight: 1.0,
             extrapolate: true,
         }
     }
@@ -51,6 +55,9 @@ impl TrackerOptions {
         }
         if !(self.gate_rad > 0.0 && self.gate_rad.is_finite()) {
             return Err(Error::option("gate_rad", self.gate_rad, "a positive angle"));
+        }
+        if !(self.gate_settled_rad > 0.0 && self.gate_settled_rad.is_finite()) {
+            return Err(Error::option("gate_settled_rad", self.gate_settled_rad, "a positive angle"));
         }
         if !(self.bearing_weight >= 0.0 && self.bearing_weight.is_finite()) {
             return Err(Error::option("bearing_weight", self.bearing_weight, "a distance of at least 0"));
@@ -80,8 +87,8 @@ pub struct TrackedLine {
 pub struct FrameMemory {
     /// Bearing of each line, radians.
     pub bearings_rad: Vec<f64>,
-    /// Change of each line's bearing per frame beside the turn of the robot, radians.
-    pub rates_rad: Vec<f64>,
+    /// Change of each line's bearing per frame beside the turn of the robot, radians, where it is known.
+    pub rates_rad: Vec<Option<f64>>,
     /// Identity of each line.
     pub tracks: Vec<u64>,
     /// Descriptors, one after the other.
@@ -168,7 +175,7 @@ impl LineTracker {
         let latest = self.state.frames.front();
         let mut memory = FrameMemory {
             bearings_rad: lines.iter().map(|line| line.bearing_rad).collect(),
-            rates_rad: vec![0.0; lines.len()],
+            rates_rad: vec![None; lines.len()],
             tracks: vec![u64::MAX; lines.len()],
             descriptors: descriptors.to_vec(),
             heading_rad: latest.map_or(0.0, |f| f.heading_rad) + yaw_change_rad.unwrap_or(0.0),
@@ -185,20 +192,25 @@ impl LineTracker {
             }
             let steps = (k + 1) as f64;
             let turn = memory.heading_rad - frame.heading_rad;
-            let gate = (frame.stretch == memory.stretch)
-                .then_some(self.options.gate_rad + self.options.gate_growth_rad * k as f64);
-            let going_on = if self.options.extrapolate { steps } else { 0.0 };
-            let expected = |j: usize| frame.bearings_rad[j] - turn + going_on * frame.rates_rad[j];
+            let options = &self.options;
+            let known_turn = frame.stretch == memory.stretch;
+            let rate = |j: usize| frame.rates_rad[j].filter(|_| options.extrapolate);
+            let expected = |j: usize| frame.bearings_rad[j] - turn + steps * rate(j).unwrap_or(0.0);
+            let gate = |j: usize| {
+                let wide = options.gate_rad;
+                let narrow = rate(j).map_or(wide, |rate| (options.gate_settled_rad + rate.abs()).min(wide));
+                narrow + options.gate_growth_rad * k as f64
+            };
             let off = |i: usize, j: usize| wrap(memory.bearings_rad[i] - expected(j)).abs();
             let allowed = |i: usize, j: usize| {
                 memory.tracks[i] == u64::MAX
                     && self.claimed.binary_search(&frame.tracks[j]).is_err()
-                    && gate.is_none_or(|gate| off(i, j) <= gate)
+                    && (!known_turn || off(i, j) <= gate(j))
             };
             let size = (lines.len(), frame.tracks.len());
             self.scratch.measure(descriptors, &frame.descriptors, width)?;
-            if let Some(gate) = gate {
-                self.scratch.add(size, |i, j| self.options.bearing_weight * (off(i, j) / gate).min(1.0));
+            if known_turn {
+                self.scratch.add(size, |i, j| options.bearing_weight * (off(i, j) / gate(j)).min(1.0));
             }
             select(&mut self.scratch, size, allowed, &self.options.matching, &mut self.matches);
             for found in &self.matches {
@@ -208,9 +220,9 @@ impl LineTracker {
                 self.claimed.insert(place, track);
                 memory.tracks[found.a] = track;
                 back[found.a] = (k + 1) as u32;
-                if gate.is_some() {
+                if known_turn {
                     let change = wrap(memory.bearings_rad[found.a] - frame.bearings_rad[found.b] + turn) / steps;
-                    memory.rates_rad[found.a] = change;
+                    memory.rates_rad[found.a] = Some(change);
                 }
             }
         }

@@ -85,12 +85,14 @@ impl LineTracker {
             match key.as_str() {
                 "look_back" => parsed.look_back = convert::whole(&value, &name, "a whole number from 1")?,
                 "gate_rad" => parsed.gate_rad = convert::whole(&value, &name, "an angle")?,
+                "gate_settled_rad" => parsed.gate_settled_rad = convert::whole(&value, &name, "an angle")?,
                 "gate_growth_rad" => parsed.gate_growth_rad = convert::whole(&value, &name, "an angle")?,
                 "bearing_weight" => parsed.bearing_weight = convert::whole(&value, &name, "a number")?,
                 "extrapolate" => parsed.extrapolate = convert::whole(&value, &name, "True or False")?,
                 _ if matching::set(&mut parsed.matching, &key, &value)? => {}
                 _ => {
-                    let expected = "look_back, gate_rad, gate_growth_rad, bearing_weight, extrapolate, f1, f2, f3, mutual, ordered";
+                    let expected = "look_back, gate_rad, gate_settled_rad, gate_growth_rad, bearing_weight, extrapolate, f1, f2, f3, \
+                         mutual, ordered";
                     return Err(invalid(format!("{name}: unknown, expected one of {expected}")));
                 }
             }
@@ -106,6 +108,7 @@ impl LineTracker {
         let dict = PyDict::new(py);
         dict.set_item("look_back", options.look_back)?;
         dict.set_item("gate_rad", options.gate_rad)?;
+        dict.set_item("gate_settled_rad", options.gate_settled_rad)?;
         dict.set_item("gate_growth_rad", options.gate_growth_rad)?;
         dict.set_item("bearing_weight", options.bearing_weight)?;
         dict.set_item("extrapolate", options.extrapolate)?;
@@ -206,4 +209,4 @@ impl LineTracker {
 }
 
 /// A frame as pickle keeps it.
-type Memory = (Vec<f64>, Vec<f64>, Vec<u64>, Vec<f32>, f64, u64);
+type Memory = (Vec<f64>, Vec<Option<f64>>, Vec<u64>, Vec<f32>, f64, u64);
