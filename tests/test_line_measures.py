@@ -103,7 +103,7 @@ def test_a_small_experiment(room: Room, capsys: pytest.CaptureFixture[str], monk
     assert summary["variant"].to_list() == [variant.name for variant in LINE_VARIANTS] * 2
     total = summary.select(pl.sum_horizontal("correct_%", "false_matches_%", "false_new_%")).to_series()
     assert all(math.isnan(value) or value == pytest.approx(100.0) for value in total)
-    assert summary.filter(pl.col("variant") == "great-circle")["correct_%"].min() > 70.0
+    assert summary.filter(pl.col("variant") == "great-circle")["correct_%"].min() > 50.0
     assert line_intervals(table)["interval"].to_list() == ["0-200"] * 2
     assert main(["measure", "lines", "--frames", "1"]) == 2
     assert "frames" in capsys.readouterr().err
