@@ -87,6 +87,10 @@ measure-planar-pose *arguments: setup
 measure-sampling *arguments: setup
     {{bin}}/tiltvp measure sampling "$TILTVP_DATA/panos" {{arguments}}
 
+# Vertical lines found and followed on rendered drives, upright and leaning, against the paper's recognition rates.
+measure-lines *arguments: setup
+    {{bin}}/tiltvp measure lines {{arguments}}
+
 # Round trips and Jacobians of the calibrations of TILTVP_DATA, as a table.
 measure-cameras: setup
     {{bin}}/pytest --quiet --capture=no tests/real_data/test_camera_conformance.py

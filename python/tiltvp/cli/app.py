@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from cyclopts import App, CycloptsError
 
 from tiltvp import __version__
-from tiltvp.cli import calibrate, camera, dataset, demo, evaluate, measure, report, tilt
+from tiltvp.cli import calibrate, camera, dataset, demo, evaluate, lines, measure, report, tilt, track
 from tiltvp.cli.terminal import complain
 from tiltvp.errors import TiltvpError
 
@@ -22,6 +22,8 @@ app = App(
     suppress_keyboard_interrupt=False,
 )
 app.command(tilt.tilt)
+app.command(lines.lines)
+app.command(track.track)
 app.command(calibrate.calibrate)
 app.command(demo.demo)
 app.command(camera.app)

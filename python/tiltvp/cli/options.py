@@ -140,13 +140,14 @@ class MethodOptions:
             options[f"{name}_rad"] = None if degrees is None else math.radians(degrees)
         options = {name: value for name, value in options.items() if value is not None}
         if self.mask is not None:
-            options["mask"] = _mask_from(self.mask)
+            options["mask"] = mask_from(self.mask)
         if self.correction is not None:
             options["correction"] = _correction_from(self.correction)
         return options
 
 
-def _mask_from(path: Path) -> object:
+def mask_from(path: Path) -> object:
+    """Where an image is bright."""
     from tiltvp import read_image
     from tiltvp.images import gray_from
 

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
     from tiltvp._core import Camera, Lines
 
-__all__ = ["draw_lines", "line_pixels"]
+__all__ = ["draw_lines", "line_pixels", "track_colour"]
 
 _POINTS = 32
 
@@ -63,7 +63,7 @@ def draw_lines(
         seen = pixels[np.isfinite(pixels).all(axis=1)]
         if not len(seen):
             continue
-        colour = _colour(name)
+        colour = track_colour(name)
         curve = np.rint(seen * 16.0).astype(np.int32).reshape(-1, 1, 2)
         cv2.polylines(canvas, [curve], False, colour, scale, cv2.LINE_AA, shift=4)
         if labels:
@@ -72,7 +72,7 @@ def draw_lines(
     return canvas
 
 
-def _colour(name: int) -> tuple[int, int, int]:
-    """A bright colour, far from that of neighbouring numbers."""
+def track_colour(name: int) -> tuple[int, int, int]:
+    """A bright colour (blue, green, red), far from those of neighbouring numbers."""
     red, green, blue = colorsys.hsv_to_rgb((name * 0.618034) % 1.0, 0.75, 1.0)
     return round(255 * blue), round(255 * green), round(255 * red)

@@ -1,0 +1,113 @@
+"""`tiltvp lines`: the vertical lines of each of many images."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from tiltvp.cli.inputs import distinct_names, find_images
+from tiltvp.cli.line_options import LineOptions
+from tiltvp.cli.options import CameraOptions
+from tiltvp.cli.results import check_ending, degrees, write_frame
+from tiltvp.cli.terminal import complain, named, new_table, progress_bar, show
+from tiltvp.errors import TiltvpError
+
+if TYPE_CHECKING:
+    import polars as pl
+
+    from tiltvp.lines import Lines
+
+_DEFAULTS = LineOptions()
+
+
+def lines(
+    images: list[str],
+    /,
+    *,
+    camera: CameraOptions,
+    options: LineOptions = _DEFAULTS,
+    out: Path | None = None,
+    overlay: Path | None = None,
+) -> int:
+    """Find the vertical lines of each image.
+
+    Images that cannot be read are named on stderr, the others are done, and the exit code is 1.
+
+    Parameters
+    ----------
+    images
+        Image files, folders of images, and glob patterns.
+    out
+        File for the lines in radians, one row for each: .csv, .json or .parquet.
+    overlay
+        Folder for the images with their lines in colour.
+    """
+    from tiltvp.images import gray_from, read_image, write_image
+    from tiltvp.plots.lines import draw_lines
+
+    if out is not None:
+        check_ending(out)
+    lens = camera.load()
+    extractor, tilt = options.extractor(lens), options.tilts(lens)
+    files, problems = find_images(images)
+    for problem in problems:
+        complain(problem)
+    found: list[tuple[str, Lines]] = []
+    failed = bool(problems)
+    with progress_bar(len(files), "images") as bar:
+        for file, name in zip(files, distinct_names(files), strict=True):
+            try:
+                gray = gray_from(read_image(file))
+                seen = extractor(gray, tilt(gray))
+                if overlay is not None:
+                    write_image(overlay / f"{name}.png", draw_lines(gray, lens, seen, extractor.robot_from_camera))
+                found.append((str(file), seen))
+            except TiltvpError as error:
+                bar.complain(named(file, str(error)))
+                failed = True
+            bar.advance()
+    table = new_table(
+        None, ("file", "line", "bearing deg", "1-sigma deg", "from deg", "to deg", "support px"), ["file"]
+    )
+    for row in line_table(found).iter_rows(named=True):
+        low, high = degrees(row["elevation_min_rad"], 1), degrees(row["elevation_max_rad"], 1)
+        bearing, sigma = degrees(row["bearing_rad"]), degrees(row["sigma_rad"], 3)
+        table.add_row(row["file"], str(row["line"]), bearing, sigma, low, high, str(row["support_px"]))
+    show(table)
+    if out is not None:
+        write_frame(line_table(found), out)
+    return 1 if failed else 0
+
+
+def line_columns(found: Lines) -> dict[str, Any]:
+    """The columns of a table that lines have by themselves."""
+    return {
+        "bearing_rad": found.bearing_rad,
+        "sigma_rad": found.sigma_rad,
+        "support_px": found.support_px,
+        "elevation_min_rad": found.elevation_min_rad,
+        "elevation_max_rad": found.elevation_max_rad,
+        "polarity": found.polarity,
+    }
+
+
+def line_table(found: list[tuple[str, Lines]]) -> pl.DataFrame:
+    """One row for each line of each image: file, line, bearing_rad, sigma_rad, support_px, elevations, polarity."""
+    import polars as pl
+
+    schema = {"file": pl.String, "line": pl.UInt32} | line_schema()
+    parts = [
+        pl.DataFrame({"file": [file] * len(seen), "line": range(len(seen)), **line_columns(seen)}, schema=schema)
+        for file, seen in found
+    ]
+    return pl.concat([pl.DataFrame(schema=schema), *parts])
+
+
+def line_schema() -> dict[str, Any]:
+    """Names and types of the columns that lines have by themselves."""
+    import polars as pl
+
+    angles = ("elevation_min_rad", "elevation_max_rad", "polarity")
+    return {"bearing_rad": pl.Float64, "sigma_rad": pl.Float64, "support_px": pl.UInt32} | dict.fromkeys(
+        angles, pl.Float64
+    )

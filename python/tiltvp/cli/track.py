@@ -1,0 +1,175 @@
+"""`tiltvp track`: the vertical lines of a drive, each with the same number in every frame that shows it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from contextlib import nullcontext
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+from cyclopts import Parameter, validators
+
+from tiltvp.cli.inputs import find_images
+from tiltvp.cli.line_options import LineOptions
+from tiltvp.cli.lines import line_columns, line_schema
+from tiltvp.cli.options import CameraOptions
+from tiltvp.cli.results import check_ending, write_frame
+from tiltvp.cli.terminal import complain, named, progress_bar, say
+from tiltvp.errors import ImageFileError, InvalidInputError, TiltvpError
+
+if TYPE_CHECKING:
+    import numpy as np
+    import polars as pl
+    from numpy.typing import NDArray
+
+    from tiltvp.lines import TrackedLines
+
+_DEFAULTS = LineOptions()
+
+
+def track(
+    source: str,
+    /,
+    *,
+    camera: CameraOptions,
+    options: LineOptions = _DEFAULTS,
+    out: Path,
+    odometry: Path | None = None,
+    plot: Path | None = None,
+    video: Path | None = None,
+    frame_rate: Annotated[float | None, Parameter(validator=validators.Number(gt=0))] = None,
+    look_back: Annotated[int | None, Parameter(validator=validators.Number(gte=1))] = None,
+) -> int:
+    """Follow vertical lines through the images of a folder, in the order of their names, or through a video.
+
+    Frames that cannot be read are named on stderr and skipped, and the exit code is 1.
+
+    Parameters
+    ----------
+    source
+        Folder of images, glob pattern, or video.
+    out
+        File for the tracks in radians, one row for each line of each frame: .csv, .json or .parquet.
+    odometry
+        CSV of the motion that led to each frame: yaw_rad or yaw_deg; file, or one row for each frame.
+    plot
+        Picture of the bearings over the frames, one colour for each track (.png).
+    video
+        The frames with their lines in the colours of their tracks: .mp4 or .avi.
+    frame_rate
+        Frames per second of that video: those of the source by default, 25 for images.
+    look_back
+        How many frames back a line is looked for before it counts as new.
+    """
+    from tiltvp.images import gray_from, write_image
+    from tiltvp.lines import LineTracker
+    from tiltvp.odometry import read_odometry
+    from tiltvp.plots.lines import draw_lines
+    from tiltvp.videos import video_writer
+
+    check_ending(out)
+    if plot is not None and plot.suffix.lower() != ".png":
+        raise InvalidInputError(f"--plot {plot}: ends in {plot.suffix!r}, expected .png")
+    lens = camera.load()
+    extractor, tilt = options.extractor(lens), options.tilts(lens)
+    tracker = LineTracker() if look_back is None else LineTracker(look_back=look_back)
+    frames = open_frames(source)
+    motions = None if odometry is None else read_odometry(odometry, frames.files)
+    tracked: list[tuple[int, str, TrackedLines]] = []
+    bad, turn_rad = 0, 0.0
+    showing = nullcontext() if video is None else video_writer(video, frame_rate or frames.rate_hz)
+    with showing as film, progress_bar(len(frames.files), "frames") as bar:
+        for number, image in enumerate(frames):
+            file = frames.files[number]
+            # The turn of a frame that is skipped belongs to the next.
+            turn_rad += 0.0 if motions is None else motions[number].yaw_rad
+            try:
+                if isinstance(image, TiltvpError):
+                    raise image
+                gray = gray_from(image)
+                lines = extractor(gray, tilt(gray))
+            except TiltvpError as error:
+                bar.complain(named(file, str(error)))
+                bad += 1
+            else:
+                descriptors = extractor.describe(gray, lines)
+                known = None if motions is None else turn_rad
+                found, turn_rad = tracker.update(lines, descriptors, yaw_change_rad=known), 0.0
+                tracked.append((number, str(file), found))
+                if film is not None:
+                    film.add(draw_lines(gray, lens, lines, extractor.robot_from_camera, tracks=found.track.tolist()))
+            bar.advance()
+    if not tracked:
+        raise InvalidInputError(f"{source}: {bad} frames, none of which can be read")
+    table = track_table(tracked)
+    write_frame(table, out)
+    if plot is not None:
+        from tiltvp.plots.picture import figure_picture
+        from tiltvp.plots.tracks import track_plot
+
+        write_image(plot, figure_picture(track_plot(table)))
+    skipped = f", {bad} skipped" if bad else ""
+    say(f"{out}: {len(tracked)} frames{skipped}, {table.height} lines, {tracker.track_count} tracks")
+    return 1 if bad else 0
+
+
+def track_table(tracked: Sequence[tuple[int, str, TrackedLines]]) -> pl.DataFrame:
+    """One row for each line of each frame: frame, file, track, frames_back (0: a new track), and the line's columns."""
+    import polars as pl
+
+    schema: dict[str, Any] = {"frame": pl.UInt32, "file": pl.String, "track": pl.Int64} | line_schema()
+    schema |= {"frames_back": pl.Int64}
+    parts = []
+    for frame, file, found in tracked:
+        n = len(found)
+        columns = {"frame": [frame] * n, "file": [file] * n, "track": found.track, **line_columns(found.lines)}
+        parts.append(pl.DataFrame(columns | {"frames_back": found.frames_back}, schema=schema))
+    return pl.concat([pl.DataFrame(schema=schema), *parts])
+
+
+@dataclass(frozen=True)
+class Frames:
+    """Where frames come from. Iterating gives each frame's image, or what is wrong with it."""
+
+    files: list[Path]
+    """What each frame is called; for videos the file and the number of the frame."""
+    rate_hz: float
+    video: Any = None
+    """The reader of a video; None for image files."""
+
+    def __iter__(self) -> Iterator[NDArray[np.uint8] | TiltvpError]:
+        from tiltvp.images import read_image
+
+        if self.video is None:
+            for file in self.files:
+                try:
+                    yield read_image(file)
+                except TiltvpError as error:
+                    yield error
+            return
+        count = 0
+        for _, image in zip(self.files, self.video, strict=False):
+            yield image
+            count += 1
+        for _ in self.files[count:]:
+            yield ImageFileError("cannot be decoded")
+
+
+def open_frames(source: str) -> Frames:
+    """The frames of a folder, a pattern or a video. Raises `TiltvpError` where there are none."""
+    from tiltvp.videos import VIDEO_ENDINGS, VideoReader
+
+    path = Path(source)
+    if path.suffix.lower() in VIDEO_ENDINGS and not path.is_dir():
+        reader = VideoReader(path)
+        if reader.count == 0:
+            raise ImageFileError(f"{path}: a video without frames")
+        digits = len(str(reader.count - 1))
+        return Frames([Path(f"{path}#{k:0{digits}d}") for k in range(reader.count)], reader.rate_hz, reader)
+    files, problems = find_images([source])
+    for problem in problems:
+        complain(problem)
+    if not files:
+        raise InvalidInputError(f"{source}: no frames, expected a folder of images, a pattern or a video")
+    return Frames(files, 25.0)

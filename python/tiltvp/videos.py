@@ -1,0 +1,107 @@
+"""Video files, read frame by frame and written whole or not at all."""
+
+from __future__ import annotations
+
+import os
+import secrets
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import cv2
+import numpy as np
+
+from tiltvp.errors import ImageFileError, InvalidInputError
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+__all__ = ["VIDEO_ENDINGS", "VideoReader", "VideoWriter", "video_writer"]
+
+VIDEO_ENDINGS: tuple[str, ...] = (".mp4", ".avi", ".mkv", ".mov", ".webm", ".m4v", ".mpg", ".mpeg")
+_CODECS = {".mp4": "mp4v", ".avi": "MJPG"}
+
+
+class VideoReader:
+    """The frames of a video in their order. Iterate once."""
+
+    def __init__(self, path: str | os.PathLike[str]) -> None:
+        """Opens the file. Raises `ImageFileError` with the path."""
+        self._path = Path(path)
+        if not self._path.is_file():
+            raise ImageFileError(f"{self._path}: no such file, expected a video")
+        self._capture = cv2.VideoCapture(str(self._path))
+        if not self._capture.isOpened():
+            raise ImageFileError(f"{self._path}: not a video that can be decoded")
+        self.count: int = max(0, int(self._capture.get(cv2.CAP_PROP_FRAME_COUNT)))
+        """How many frames the file says it has."""
+        rate = float(self._capture.get(cv2.CAP_PROP_FPS))
+        self.rate_hz: float = rate if np.isfinite(rate) and rate > 0.0 else 25.0
+        """Frames per second."""
+
+    def __iter__(self) -> Iterator[NDArray[np.uint8]]:
+        """(H, W, 3) BGR uint8."""
+        try:
+            while True:
+                done, image = self._capture.read()
+                if not done:
+                    return
+                yield np.asarray(image, dtype=np.uint8)
+        finally:
+            self._capture.release()
+
+
+class VideoWriter:
+    """Takes the frames of a video that is being written, all of the size of the first."""
+
+    def __init__(self, path: Path, rate_hz: float) -> None:
+        """Nothing is written before the first frame."""
+        self._path, self._rate_hz = path, rate_hz
+        self._writer: cv2.VideoWriter | None = None
+        self._shape: tuple[int, ...] = ()
+
+    def add(self, image: NDArray[np.uint8]) -> None:
+        """The next frame, (H, W, 3) BGR uint8."""
+        if self._writer is None:
+            self._shape = image.shape
+            code = cv2.VideoWriter.fourcc(*_CODECS[self._path.suffix.lower()])
+            self._writer = cv2.VideoWriter(str(self._path), code, self._rate_hz, (image.shape[1], image.shape[0]))
+            if not self._writer.isOpened():
+                raise ImageFileError(f"{self._path}: this OpenCV cannot write such a video")
+        if image.shape != self._shape:
+            raise InvalidInputError(f"video frame: shape {image.shape}, expected {self._shape}")
+        self._writer.write(image)
+
+    def close(self) -> None:
+        """Writes what is left."""
+        if self._writer is not None:
+            self._writer.release()
+
+
+@contextmanager
+def video_writer(path: str | os.PathLike[str], rate_hz: float = 25.0) -> Iterator[VideoWriter]:
+    """A video (.mp4 or .avi) that appears when the block ends, unless an exception leaves it or it has no frames.
+
+    Raises `InvalidInputError` for other endings, `ImageFileError` where it cannot be written.
+    """
+    file = Path(path)
+    if file.suffix.lower() not in _CODECS:
+        raise InvalidInputError(f"{file}: ends in {file.suffix!r}, expected {' or '.join(_CODECS)}")
+    # The ending, which says the format, stays at the end.
+    part = file.with_name(f".{file.stem}.{secrets.token_hex(8)}.part{file.suffix.lower()}")
+    writer = VideoWriter(part, rate_hz)
+    try:
+        file.parent.mkdir(parents=True, exist_ok=True)
+        yield writer
+        writer.close()
+        if part.exists():
+            os.replace(part, file)
+    except OSError as error:
+        if isinstance(error, ImageFileError):
+            raise
+        raise ImageFileError(f"{file}: cannot be written ({error.strerror or error})") from error
+    finally:
+        writer.close()
+        with suppress(OSError):
+            part.unlink()

@@ -1,0 +1,161 @@
+"""`tiltvp lines` and `tiltvp track`: tables, pictures and videos of a drive, and frames that cannot be used."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import polars as pl
+import pytest
+
+from tiltvp.cli import main
+from tiltvp.errors import ImageFileError, InvalidInputError
+from tiltvp.images import read_image, write_image
+from tiltvp.plots.tracks import track_plot
+from tiltvp.synth import MIRROR_BLIND_RAD, Drive, Room, mirror_camera
+from tiltvp.videos import VideoReader, video_writer
+
+FRAMES = 6
+Run = Callable[..., tuple[int, str, str]]
+
+
+@pytest.fixture
+def run(capfd: pytest.CaptureFixture[str]) -> Run:
+    """Runs `tiltvp` in this process: exit code, stdout, stderr."""
+
+    def run_main(*words: object) -> tuple[int, str, str]:
+        code = main([str(word) for word in words])
+        said = capfd.readouterr()
+        return code, said.out, said.err
+
+    return run_main
+
+
+@pytest.fixture(scope="module")
+def drive() -> Drive:
+    room = Room("corridor", 2, light_spacing_m=0.6)
+    camera = mirror_camera().scaled(0.6)
+    return Drive(room, camera=camera, blind_rad=MIRROR_BLIND_RAD, frames=FRAMES, seed=3, samples=2)
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory, drive: Drive) -> Path:
+    """A camera, its odometry and the frames of a drive."""
+    root = tmp_path_factory.mktemp("drive")
+    mirror_camera().scaled(0.6).save(root / "camera.toml")
+    for k in range(FRAMES):
+        write_image(root / "frames" / f"{k}.png", drive.render(k).gray)
+    rows = [f"{k}.png,{turn!r}" for k, turn in enumerate(drive.motions[:, 1].tolist())]
+    (root / "odometry.csv").write_text("\n".join(["file,yaw_rad", *rows]) + "\n")
+    return root
+
+
+def test_lines_of_images(run: Run, folder: Path, tmp_path: Path) -> None:
+    bad = tmp_path / "bad.png"
+    bad.write_bytes(b"nothing")
+    words = (folder / "frames" / "0.png", bad, "--camera", folder / "camera.toml", "--tilt", "refined")
+    code, said, complaints = run("lines", *words, "--out", tmp_path / "l.parquet", "--overlay", tmp_path / "seen")
+    assert code == 1
+    assert complaints.startswith(f"tiltvp: {bad}: not an image")
+    table = pl.read_parquet(tmp_path / "l.parquet")
+    assert table.height > 5
+    assert len(said.splitlines()) == table.height + 2
+    assert table.schema["support_px"] == pl.UInt32
+    assert table["line"].to_list() == list(range(table.height))
+    assert table["bearing_rad"].is_sorted()
+    assert read_image(tmp_path / "seen" / "0.png").shape == (288, 384, 3)
+    assert not (tmp_path / "seen" / "bad.png").exists()
+
+
+def test_options_reach_the_method(run: Run, folder: Path, tmp_path: Path) -> None:
+    words = ("lines", folder / "frames" / "0.png", "--camera", folder / "camera.toml", "--out", tmp_path / "l.csv")
+    assert run(*words, "--lines-max", "3")[0] == 0
+    assert pl.read_csv(tmp_path / "l.csv").height == 3
+    assert run(*words, "--method", "radial", "--length-min", "0.3")[0] == 0
+    code, _, complaints = run(*words, "--method", "radical")
+    assert (code, complaints.count("\n")) == (2, 1)
+    assert "did you mean radial?" in complaints
+    assert run(*words, "--method", "radial", "--lines-max", "3")[0] == 2
+    assert "expected one of upright, refined" in run(*words, "--tilt", "none")[2]
+
+
+def test_track_a_folder(run: Run, folder: Path, tmp_path: Path) -> None:
+    out, plot, film = tmp_path / "tracks.csv", tmp_path / "tracks.png", tmp_path / "overlay.mp4"
+    words = ("track", folder / "frames", "--camera", folder / "camera.toml", "--out", out)
+    code, said, complaints = run(*words, "--odometry", folder / "odometry.csv", "--plot", plot, "--video", film)
+    assert (code, complaints) == (0, "")
+    table = pl.read_csv(out)
+    count = table["track"].n_unique()
+    assert said == f"{out}: {FRAMES} frames, {table.height} lines, {count} tracks\n"
+    assert table.columns[:6] == ["frame", "file", "track", "bearing_rad", "sigma_rad", "support_px"]
+    assert table["frame"].unique().sort().to_list() == list(range(FRAMES))
+    assert table.select("frame", "track").is_unique().all()
+    assert count < 0.5 * table.height
+    assert table.filter(pl.col("frame") == 0)["frames_back"].to_list() == [0] * (table["frame"] == 0).sum()
+    assert read_image(plot).shape[2] == 3
+    assert [frame.shape for frame in VideoReader(film)] == [(288, 384, 3)] * FRAMES
+    again = tmp_path / "again.csv"
+    code, said, complaints = run("track", film, "--camera", folder / "camera.toml", "--out", again)
+    assert (code, complaints) == (0, "")
+    assert pl.read_csv(again)["file"][0] == f"{film}#0"
+
+
+def test_bad_frames_are_skipped_and_the_turn_is_kept(run: Run, folder: Path, tmp_path: Path) -> None:
+    frames = tmp_path / "frames"
+    frames.mkdir()
+    for k in range(FRAMES):
+        (frames / f"{k}.png").write_bytes((folder / "frames" / f"{k}.png").read_bytes() if k != 2 else b"")
+    write_image(frames / "3.png", np.zeros((4, 4), np.uint8))
+    words = ("--camera", folder / "camera.toml", "--odometry", folder / "odometry.csv")
+    code, said, complaints = run("track", frames, *words, "--out", tmp_path / "t.csv")
+    assert code == 1
+    assert complaints.splitlines()[0].startswith(f"tiltvp: {frames / '2.png'}: not an image")
+    assert complaints.splitlines()[1].startswith(f"tiltvp: {frames / '3.png'}: ")
+    assert f"{FRAMES - 2} frames, 2 skipped" in said
+    table = pl.read_csv(tmp_path / "t.csv")
+    assert table["frame"].unique().sort().to_list() == [0, 1, 4, 5]
+    kept = table.filter((pl.col("frame") == 4) & (pl.col("frames_back") > 0)).height
+    assert kept > 0.5 * (table["frame"] == 4).sum()
+
+
+def test_nothing_is_left_behind(run: Run, folder: Path, tmp_path: Path) -> None:
+    (tmp_path / "frames").mkdir()
+    (tmp_path / "frames" / "0.png").write_bytes(b"")
+    before = sorted(tmp_path.rglob("*"))
+    words = ("--camera", folder / "camera.toml", "--out", tmp_path / "t.csv")
+    code, _, complaints = run("track", tmp_path / "frames", *words, "--video", tmp_path / "v.mp4")
+    assert code == 2
+    assert "none of which can be read" in complaints
+    for wrong in (("--video", tmp_path / "v.gif"), ("--plot", tmp_path / "p.txt"), ("--odometry", tmp_path / "no.csv")):
+        assert run("track", folder / "frames", *words, *wrong)[0] == 2
+    assert run("track", tmp_path / "no.mp4", *words)[0] == 2
+    assert sorted(tmp_path.rglob("*")) == before
+
+
+def test_videos(tmp_path: Path) -> None:
+    (tmp_path / "text.mp4").write_bytes(b"text")
+    with pytest.raises(ImageFileError, match=r"text\.mp4: not a video"):
+        VideoReader(tmp_path / "text.mp4")
+    with video_writer(tmp_path / "empty.avi"):
+        pass
+    with pytest.raises(InvalidInputError, match="expected"):
+        _write(tmp_path / "a.avi", (8, 8, 3), (8, 9, 3))
+    assert [file.name for file in tmp_path.iterdir()] == ["text.mp4"]
+
+
+def _write(path: Path, *shapes: tuple[int, int, int]) -> None:
+    with video_writer(path) as film:
+        for shape in shapes:
+            film.add(np.zeros(shape, np.uint8))
+
+
+def test_the_plot_breaks_where_bearings_wrap() -> None:
+    bearings = [math.radians(angle) for angle in (170.0, -170.0, -150.0)]
+    table = pl.DataFrame({"frame": [0, 1, 2], "track": [7, 7, 7], "bearing_rad": bearings})
+    (axes,) = track_plot(table).axes
+    line = np.asarray(axes.lines[0].get_ydata(), dtype=float)
+    assert np.isnan(line).tolist() == [False, True, False, False]
+    assert [text.get_text() for text in axes.texts] == ["7"]
+    track_plot(table.clear())
