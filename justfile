@@ -69,6 +69,7 @@ measure-database *arguments: setup
         {{bin}}/tiltvp evaluate out/database/$name --sweep table3 --out out/database/runs/$name {{arguments}}; \
     done
     {{bin}}/tiltvp measure confidence out/database/runs/panoramas out/database/runs/rooms out/database/runs/panoramas-degraded out/database/runs/rooms-degraded
+    {{bin}}/tiltvp measure scaling --out out/database/runs/panoramas/scaling.parquet
     {{bin}}/tiltvp report out/database/runs/panoramas --out out/database/report
 
 # What an evaluation costs over the number of images and over their pixels.
