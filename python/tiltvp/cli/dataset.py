@@ -379,7 +379,7 @@ def _rotation(word: str | None) -> NDArray[np.float64] | None:
 
 
 def _threads(count: int | None) -> int:
-    return len(os.sched_getaffinity(0)) if count is None else count
+    return (os.cpu_count() or 1) if count is None else count
 
 
 def _tilts(words: list[str] | None) -> list[tuple[float, float]]:
