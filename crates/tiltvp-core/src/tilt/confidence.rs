@@ -87,8 +87,8 @@ pub(super) fn inverse_of_positive(matrix: &Matrix2<f64>) -> Option<Matrix2<f64>>
     if trace > 0.0 && determinant > 1e-12 * trace * trace { matrix.try_inverse() } else { None }
 }
 
-/// Share of the lean by which the methods that approximate the lens err beyond what their edges tell: with it nine in ten of
-/// their regions hold nine in ten truths on panoramas.
+/// Share of the lean by which the methods that approximate the lens err beyond what their edges tell: with it their 90 %
+/// regions hold about 90 % of the truths on 108 panoramas, the same ones on which it was chosen.
 pub(super) const APPROXIMATE_SHARE: f64 = 0.2;
 
 /// Adds the error of an angle that is right up to a share of itself, in the direction of the lean.
