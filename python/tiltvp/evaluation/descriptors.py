@@ -61,6 +61,8 @@ class DescriptorExperiment:
 
     frames_apart: tuple[int, ...] = (1, 2, 5, 10, 20, 40)
     """How far apart the frames of a pair are."""
+    every: int = 2
+    """Pairs begin at every so-manieth frame."""
     baseline_max_m: float = 2.0
     """Pairs with a longer way between them are left out."""
     clips: tuple[float, ...] = (0.02, 0.05, 0.1, 0.15, 0.2, 0.3, 0.5, 1.0)
@@ -72,6 +74,8 @@ class DescriptorExperiment:
     def __post_init__(self) -> None:
         if not self.frames_apart or min(self.frames_apart) < 1:
             raise InvalidInputError(f"frames_apart = {self.frames_apart}, expected whole numbers from 1")
+        if self.every < 1:
+            raise InvalidInputError(f"every = {self.every}, expected 1 or more")
         if not self.baseline_max_m > 0.0:
             raise InvalidInputError(f"baseline_max_m = {self.baseline_max_m}, expected a positive length")
 

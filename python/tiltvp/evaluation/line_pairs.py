@@ -17,14 +17,15 @@ if TYPE_CHECKING:
     from tiltvp.datasets.driven import DrivenFrames
     from tiltvp.synth import DriveTruth
 
-__all__ = ["FALSE", "OPEN", "RIGHT", "FramePair", "frame_pairs"]
+__all__ = ["FALSE", "OPEN", "RIGHT", "FramePair", "frame_pairs", "pair_verdicts"]
 
 OPEN: Final = 0
-"""The truth does not tell: the line is not farther than a pixel from the edge, but taken for another."""
+"""The truth does not tell."""
 FALSE: Final = 1
 RIGHT: Final = 2
 
 _PIXEL_RAD: Final = math.radians(0.3)
+_APART_RAD: Final = math.radians(1.5)
 
 
 class _Bearings(Protocol):
@@ -39,6 +40,8 @@ class _Which(Protocol):
 
     @property
     def frames_apart(self) -> tuple[int, ...]: ...
+    @property
+    def every(self) -> int: ...
     @property
     def baseline_max_m(self) -> float: ...
 
@@ -64,35 +67,40 @@ def frame_pairs(
     lines: Sequence[_Bearings],
     which: _Which,
 ) -> list[FramePair]:
-    """All pairs of frames that are as far apart as `which` says and both have lines.
+    """The pairs of frames that `which` asks for, of which both have lines.
 
     `edges` are those of `Identities` for each frame's `lines`.
     """
     pairs: list[FramePair] = []
     for apart in which.frames_apart:
-        for a in range(len(drive) - apart):
+        for a in range(0, len(drive) - apart, which.every):
             b = a + apart
             baseline = float(np.hypot(*(drive.poses[b, :2] - drive.poses[a, :2])))
             if baseline > which.baseline_max_m or not edges[a] or not edges[b]:
                 continue
-            verdicts = _verdicts(edges[a], edges[b], lines[b].bearing_rad, drive.truths[b])
+            verdicts = pair_verdicts(edges[a], edges[b], lines[b].bearing_rad, drive.truths[b])
             known = np.flatnonzero([bool(edge) for edge in edges[a]])
             pairs.append(FramePair(a, b, baseline, known, verdicts, (verdicts[known] == RIGHT).any(axis=1)))
     return pairs
 
 
-def _verdicts(
+def pair_verdicts(
     a: Sequence[frozenset[int]],
     b: Sequence[frozenset[int]],
     bearing_rad: NDArray[np.float64],
     truth: DriveTruth,
 ) -> NDArray[np.int8]:
-    """(N, M), by the edges that lines are on, and in the second frame by where the edges are seen."""
+    """(N, M): what it would be to match each line of a frame `a` with each of a frame `b`.
+
+    `a` and `b` are the edges that lines may be (`Identities`), `bearing_rad` (M,) and `truth` those of frame `b`. OPEN
+    is a line of `b` near the edge but taken for another, or, up to 1.5 degrees from it, for none.
+    """
+    limits = np.where([bool(other) for other in b], _PIXEL_RAD, _APART_RAD)
     verdicts = np.full((len(a), len(b)), FALSE, dtype=np.int8)
     for i, edges in enumerate(a):
         places = truth.bearings_rad[np.isin(truth.edges, list(edges))]
         if len(places):
-            near = np.abs(wrapped(bearing_rad[:, None] - places)).min(axis=1) <= _PIXEL_RAD
+            near = np.abs(wrapped(bearing_rad[:, None] - places)).min(axis=1) <= limits
             verdicts[i, near] = OPEN
         verdicts[i, [not edges.isdisjoint(other) for other in b]] = RIGHT
     return verdicts

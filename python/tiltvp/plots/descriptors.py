@@ -74,7 +74,12 @@ def correct_matches(table: pl.DataFrame) -> Figure:
         if by_powers:
             axes.set_xscale("log")
             values = part["value"].unique().sort().to_list()
-            axes.set_xticks(values, [f"{value:g}" for value in values])
+            # Labels of neighbours on a logarithmic axis must not touch.
+            last, labels = 0.0, []
+            for value in values:
+                labels.append(f"{value:g}" if value >= 1.45 * last else "")
+                last = value if labels[-1] else last
+            axes.set_xticks(values, labels)
             axes.minorticks_off()
         tidy(axes, label, "")
         axes.legend(frameon=False, fontsize=8, loc="lower center")
@@ -99,7 +104,7 @@ def rule_densities(table: pl.DataFrame, limits: dict[str, float], *, bins: int =
         axes.set_ylim(bottom=0.0)
         tidy(axes, label, "")
     figure.axes[0].set_ylabel("density")
-    figure.axes[0].legend(frameon=False, fontsize=9, loc="upper left")
+    figure.axes[2].legend(frameon=False, fontsize=9, loc="upper left")
     return figure
 
 
