@@ -92,6 +92,22 @@ measure-sampling *arguments: setup
 measure-lines *arguments: setup
     {{bin}}/tiltvp measure lines {{arguments}}
 
+# Two drives of 425 frames each, in whose frames every upright edge is known. Remove out/drives to begin anew.
+drives: setup
+    test -d out/drives/corridor || {{bin}}/tiltvp dataset drive --kind corridor --frames 425 --samples 2 --seed 7101 --out out/drives/corridor
+    test -d out/drives/hall || {{bin}}/tiltvp dataset drive --kind hall --frames 425 --samples 2 --seed 7102 --out out/drives/hall
+
+# The descriptor of vertical lines: figures 9 to 18 and 22 of paper 001, tables beside them, in out/descriptors.
+measure-descriptors *arguments: drives
+    {{bin}}/tiltvp measure descriptors out/drives/corridor out/drives/hall --out out/descriptors {{arguments}}
+
+# cv2 is that of opencv-contrib-python-headless, of the version that is installed without contrib, in a folder of its own.
+# Our vertical lines against OpenCV's LSD and LBD on the same frames: times as ratios, and how well pairs are matched.
+measure-line-peers *arguments: drives
+    test -d out/peers/opencv-contrib || {{bin}}/pip install --quiet --no-deps --target out/peers/opencv-contrib \
+        "opencv-contrib-python-headless==$({{bin}}/python -c 'from importlib.metadata import version; print(version("opencv-python-headless"))')"
+    PYTHONPATH="$PWD/out/peers/opencv-contrib" {{bin}}/python benches/peers/line_segments.py out/drives/corridor out/drives/hall {{arguments}}
+
 # Round trips and Jacobians of the calibrations of TILTVP_DATA, as a table.
 measure-cameras: setup
     {{bin}}/pytest --quiet --capture=no tests/real_data/test_camera_conformance.py

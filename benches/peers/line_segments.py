@@ -197,6 +197,7 @@ def run(drive: DrivenFrames, every: int, peers: dict[str, Peer]) -> None:
     ways = {
         "tiltvp": Ours(drive),
         "tiltvp, ten longest": Ours(drive, lines_max=10),
+        "tiltvp, from 6 degrees": Ours(drive, length_min_rad=math.radians(6.0)),
         "LSD + LBD, image": Segments(drive),
         "LSD + LBD, panorama": PanoramaSegments(drive),
     }
@@ -240,7 +241,7 @@ def main() -> None:
     for directory in arguments.drives:
         run(read_drive(directory), arguments.every, peers)
     own = np.array(peers["tiltvp, ten longest"].find_s)
-    print("Finding and describing the lines of a frame, and matching two frames; ratio to tiltvp's ten longest")
+    print("Finding and describing the lines of a frame (ratio to tiltvp's ten longest), and matching two frames")
     for name, peer in peers.items():
         ratio = np.median(np.array(peer.find_s) / own)
         print(

@@ -73,7 +73,7 @@ def descriptors(
     }.items():
         write_image(out / f"{name}.png", figure_picture(figure))
     total = sum(len(drive) for drive in known)
-    show_frame("Unlike directions that are as alike as neighbours (figures 9, 11, 12)", alike(directions), ["measure"])
+    show_frame("Directions that look alike (figures 9, 11, 12)", alike(directions), ["measure"])
     show_frame(f"Nearest is the same edge, {total} frames (figures 13 to 15)", tables.settings, ["sweep", "chart"])
     measures = tables.measures.pivot("frames_apart", index="measure", values="correct_%")
     show_frame("Nearest is the same edge, by frames apart, per cent", measures, ["measure"])
