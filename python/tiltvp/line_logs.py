@@ -15,7 +15,7 @@ from tiltvp.selfcalib import wheel_displacements
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
-    from tiltvp import TiltEstimate
+    from tiltvp._core import TiltEstimate
     from tiltvp.lines import LineExtractor, LineTracker, TrackedLines
     from tiltvp.odometry import Motion
 
