@@ -116,6 +116,10 @@ measure-cameras: setup
 measure-calibration *arguments: setup
     {{bin}}/tiltvp measure calibration "$TILTVP_DATA/odometry" {{arguments}}
 
+# Self-calibration from the pictures of rendered drives.
+measure-calibration-images *arguments: setup
+    {{bin}}/tiltvp measure calibration-images {{arguments}}
+
 # Each method's time as a ratio to OpenCV's pair of Scharr derivatives, in one process on one thread.
 measure-time *arguments: setup
     {{bin}}/python benches/peers/scharr.py {{arguments}}

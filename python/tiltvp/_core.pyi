@@ -47,6 +47,7 @@ __all__ = [
     "common_direction",
     "consistency_band",
     "descriptor_distances",
+    "drive_legs",
     "leaning_from_upright",
     "level_map",
     "match_descriptors",
@@ -1408,6 +1409,7 @@ class Drive:
         mount: ArrayLike | None = None,
         blind_rad: float | None = None,
         frames: SupportsIndex | None = None,
+        legs: ArrayLike | None = None,
         seed: SupportsIndex | None = None,
         step_m: float | None = None,
         turn_max_rad: float | None = None,
@@ -1809,6 +1811,9 @@ class SimulatedDrive:
 
     def cramer_rao_bound(self, *, start_sigma: ArrayLike) -> NDArray[np.float64]:
         """(3, 3): the smallest covariance of (x, y, yaw) that an unbiased estimator can have on this drive."""
+
+def drive_legs(kind: str = "paper") -> NDArray[np.float64]:
+    """(L, 2): distance in metres and turn in radians of the legs of a trajectory of `simulate_drive`."""
 
 def simulate_drive(
     kind: str = "paper",

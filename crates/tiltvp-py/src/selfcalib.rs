@@ -14,7 +14,7 @@ use tiltvp_core::selfcalib::{
     self as core, CalibrationMethod, LogBearing, LogOptions, Mounting, SelfCalibratorOptions, WheelMotion,
 };
 
-pub(crate) use self::drive::{SimulatedDrive, simulate_drive};
+pub(crate) use self::drive::{SimulatedDrive, drive_legs, simulate_drive};
 pub(crate) use self::estimate::{CalibrationStep, LogCalibration, MountingEstimate};
 use crate::call::{call, exception, invalid};
 use crate::convert;

@@ -35,7 +35,7 @@ mod view;
 mod world;
 
 pub use bearing_drive::{BearingDrive, BearingDriveKind, BearingDriveOptions};
-pub use drive::{Drive, DriveOptions, Mount};
+pub use drive::{Drive, DriveOptions, Mount, Way};
 pub use encoders::Wheels;
 pub use options::{RoomKind, RoomOptions, WallPattern};
 pub use render::{Rendering, Truth, render, render_panorama};

@@ -111,6 +111,16 @@ class LineOptions:
         return None if self.robot_from_camera is None else read_rotation(self.robot_from_camera)
 
 
+@Parameter(name="*", group=_LINES)
+@dataclass(frozen=True, kw_only=True)
+class DrivingLineOptions(LineOptions):
+    """How lines are found on a robot whose lean matters."""
+
+    tilt: str = "refined"
+    """How the lean of each frame is estimated: refined or another method of `tiltvp tilt`, or upright: the robot
+    stands upright. A frame without an estimate is taken to be upright."""
+
+
 def _check(option: str, word: str, known: Sequence[str]) -> None:
     if word not in known:
         near = difflib.get_close_matches(word, known, 1, 0.3)
