@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -112,8 +113,9 @@ def test_pairs_of_frames(driven: DrivenFrames) -> None:
     assert [(pair.a, pair.b) for pair in chosen] == [(k, k + 1) for k in range(5)] + [(k, k + 3) for k in range(3)]
     assert all(pair.findable.all() and pair.baseline_m < 0.5 for pair in chosen)
     assert not frame_pairs(driven, [[]] * FRAMES, lines, SMALL)
-    far = DescriptorExperiment(frames_apart=(5,), baseline_max_m=1e-6)
-    assert not frame_pairs(driven, edges, lines, far)
+    fast = replace(driven, poses=np.arange(3.0 * FRAMES).reshape(FRAMES, 3))
+    short = DescriptorExperiment(frames_apart=(1, 2), every=2, baseline_max_m=5.0)
+    assert [(pair.a, pair.b) for pair in frame_pairs(fast, edges, lines, short)] == [(0, 1), (2, 3), (4, 5)]
 
 
 @pytest.mark.parametrize("wrong", [{"frames_apart": ()}, {"frames_apart": (0,)}, {"every": 0}, {"baseline_max_m": 0.0}])
