@@ -3,8 +3,9 @@
 use multiversion::multiversion;
 
 use super::options::EdgeOptions;
-use super::region::Region;
+use super::region::{Region, Span};
 use super::screen::Screen;
+use super::sieve::{BLOCK as ROOM, Dispatch, Kept, Level, Rows, Sieve, Test, Vectors, expect, sieve, unpack};
 use crate::image::{ImageView, Smoother};
 
 /// Edge pixels in structure-of-arrays form, in slot order.
@@ -13,6 +14,8 @@ pub struct EdgePixels {
     slot: Vec<u32>,
     gx: Vec<f32>,
     gy: Vec<f32>,
+    /// Both, as the detector's kernels write them.
+    packed: Vec<u32>,
     len: usize,
     strong: usize,
 }
@@ -20,7 +23,9 @@ pub struct EdgePixels {
 impl EdgePixels {
     /// No pixels, with room for `capacity` of them.
     pub fn with_capacity(capacity: usize) -> Self {
-        Self { slot: vec![0; capacity], gx: vec![0.0; capacity], gy: vec![0.0; capacity], len: 0, strong: 0 }
+        let mut pixels = Self::default();
+        pixels.make_room(capacity);
+        pixels
     }
 
     /// How many there are.
@@ -78,11 +83,13 @@ impl EdgePixels {
         (self.len, self.strong) = (n, n);
     }
 
-    fn make_room(&mut self, capacity: usize) {
+    fn make_room(&mut self, pixels: usize) {
+        let capacity = pixels + ROOM;
         if self.slot.len() < capacity {
             self.slot.resize(capacity, 0);
             self.gx.resize(capacity, 0.0);
             self.gy.resize(capacity, 0.0);
+            self.packed.resize(capacity, 0);
         }
     }
 }
@@ -92,31 +99,44 @@ impl EdgePixels {
 pub struct Detector {
     smoother: Smoother,
     /// Three smoothed rows, row `v` in place `v % 3`, each one pixel wider than the region's columns on both sides.
-    rows: [Vec<f32>; 3],
-    gx: Vec<f32>,
-    gy: Vec<f32>,
-    strength: Vec<f32>,
+    rows: [Vec<i16>; 3],
+    /// The parts of rows that the spans' kernels reach, row by row: (row, first column, one past the last).
+    parts: Vec<(usize, usize, usize)>,
+}
+
+/// Parts of a row that are closer than this are smoothed as one.
+const GAP: usize = 32;
+
+/// What the kernels of a region's spans reach.
+fn reached(region: &Region) -> Vec<(usize, usize, usize)> {
+    let around = |span: &Span| (span.v - 1..=span.v + 1).map(|v| (v, span.first - 1, span.end + 1)).collect::<Vec<_>>();
+    let mut parts: Vec<_> = region.spans().iter().flat_map(around).collect();
+    parts.sort_unstable();
+    parts.dedup_by(|next, last| {
+        let joins = next.0 == last.0 && next.1 <= last.2 + GAP;
+        if joins {
+            last.2 = last.2.max(next.2);
+        }
+        joins
+    });
+    parts
 }
 
 impl Detector {
     /// Scratch for a region.
     pub fn new(region: &Region, options: &EdgeOptions) -> Self {
         let width = region.columns().len() + 2;
-        let row = || vec![0.0; width];
-        Self {
-            smoother: Smoother::new(options.smoothing_px, width),
-            rows: [row(), row(), row()],
-            gx: row(),
-            gy: row(),
-            strength: row(),
-        }
+        let smoother = Smoother::new(options.smoothing_px, width);
+        let row = || if smoother.copies() { Vec::new() } else { vec![0; width] };
+        let parts = if smoother.copies() { Vec::new() } else { reached(region) };
+        Self { rows: [row(), row(), row()], smoother, parts }
     }
 
     /// Writes the pixels of the region with a gradient magnitude of at least `gradient_min` that pass the screen, in slot
     /// order.
     ///
     /// The image must have the size of the camera that the region was made for. Grows no vector that has room for the
-    /// whole region.
+    /// whole region. Gradients are exact without smoothing, and multiples of 1/8 with it.
     pub fn detect(
         &mut self,
         image: &ImageView<'_>,
@@ -125,34 +145,65 @@ impl Detector {
         screen: Option<&Screen>,
         out: &mut EdgePixels,
     ) {
-        let threshold_squared = (gradient_min * gradient_min) as f32;
         out.make_room(region.len());
-        let (slots, gxs, gys) = (&mut out.slot[..], &mut out.gx[..], &mut out.gy[..]);
-        let (mut len, mut strong_pixels) = (0, 0);
-        // The region keeps clear of the border, so there is a pixel to the left of its first column.
-        let left = region.columns().start.saturating_sub(1);
-        let mut next_row = 0;
-        for span in region.spans() {
-            for v in next_row.max(span.v.saturating_sub(1))..=span.v + 1 {
-                self.smoother.row(image, v, left, &mut self.rows[v % 3]);
+        out.clear();
+        if self.smoother.copies() {
+            let least = least_squared::<u8>(gradient_min);
+            for span in region.spans() {
+                // The region keeps clear of the border.
+                let row = |v: usize| image.row(v).get(span.first - 1..=span.end).unwrap_or(&[]);
+                let rows = Rows { above: row(span.v - 1), middle: row(span.v), below: row(span.v + 1) };
+                expect(row(span.v + AHEAD));
+                keep(rows, span, least, screen, out);
             }
-            next_row = span.v + 2;
-            let n = span.end - span.first;
+            finish::<u8>(out);
+            return;
+        }
+        let (left, least) = (region.columns().start - 1, least_squared::<i16>(gradient_min));
+        let mut parts = self.parts.iter().peekable();
+        for span in region.spans() {
+            while let Some((v, first, end)) = parts.next_if(|(v, ..)| *v <= span.v + 1) {
+                let out = &mut self.rows[v % 3][first - left..end - left];
+                expect(image.row(v + AHEAD).get(*first..*end).unwrap_or(&[]));
+                self.smoother.fixed_row(image, *v, *first, out);
+            }
             let columns = span.first - left - 1..span.end - left + 1;
             let [above, middle, below] = [span.v + 2, span.v, span.v + 1].map(|v| &self.rows[v % 3][columns.clone()]);
-            let (gx, gy, strength) = (&mut self.gx[..n], &mut self.gy[..n], &mut self.strength[..n]);
-            scharr(above, middle, below, gx, gy, strength);
-            if let Some(screen) = screen {
-                strong_pixels += screen.apply(span.slot, gx, gy, strength, threshold_squared);
-            }
-            reaching_in(strength, threshold_squared, |i| {
-                (slots[len], gxs[len], gys[len]) = ((span.slot + i) as u32, gx[i], gy[i]);
-                len += 1;
-            });
+            keep(Rows { above, middle, below }, span, least, screen, out);
         }
-        out.len = len;
-        out.strong = if screen.is_some() { strong_pixels } else { len };
+        finish::<i16>(out);
     }
+}
+
+/// Rows that are asked for before they are needed: an image is rarely in the nearest cache.
+const AHEAD: usize = 6;
+
+/// The least squared gradient in the kernels' units. Casts of numbers that are too large give the largest, which no gradient
+/// reaches.
+fn least_squared<L: Level>(gradient_min: f64) -> i32 {
+    (gradient_min * f64::from(L::PARTS)).powi(2).ceil() as i32
+}
+
+/// Appends the pixels of a span that pass, their gradients still packed.
+fn keep<L: Level>(rows: Rows<'_, L>, span: &Span, at_least: i32, screen: Option<&Screen>, out: &mut EdgePixels)
+where
+    Dispatch: Sieve<L>,
+{
+    let n = span.end - span.first;
+    if [rows.above, rows.middle, rows.below].iter().any(|row| row.len() != n + 2) {
+        return;
+    }
+    let (vectors, limit) = screen.map_or((Vectors::None, 0.0), |screen| screen.of_span(span));
+    let test = Test { at_least, vectors, limit };
+    let kept = Kept { slots: &mut out.slot[out.len..], gradients: &mut out.packed[out.len..] };
+    let (len, strong) = sieve(rows, n, span.slot as u32, &test, kept);
+    (out.len, out.strong) = (out.len + len, out.strong + strong);
+}
+
+/// Unpacks the gradients.
+fn finish<L: Level>(out: &mut EdgePixels) {
+    let n = out.len;
+    unpack(&out.packed[..n], 1.0 / L::PARTS as f32, &mut out.gx[..n], &mut out.gy[..n]);
 }
 
 /// Pixels that are tested together.

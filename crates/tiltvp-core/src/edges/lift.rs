@@ -58,7 +58,7 @@ impl LiftTable {
             let largest = 0.5 * (xx + yy) + (0.25 * (xx - yy) * (xx - yy) + xy * xy).sqrt();
             if largest > 0.0 { [e / largest.sqrt(), f / largest.sqrt()] } else { [0.0; 2] }
         };
-        Screen::new(self.maps.iter().map(vector), sin_max)
+        Screen::new(&self.maps.iter().map(vector).collect::<Vec<_>>(), sin_max)
     }
 
     /// The unit normal that [`lift`](Self::lift) makes of one edge pixel: its place in the region and its gradient. None for
@@ -85,20 +85,24 @@ impl LiftTable {
         places.resize(n, 0);
         let limit = (sin_max * sin_max) as f32;
         rows.refill(n, |[x, y, z]| {
-            let (x, y, z) = (&mut x[..n], &mut y[..n], &mut z[..n]);
-            let (weights, places) = (&mut weights[..n], &mut places[..n]);
+            let mut block = Block::default();
             let mut kept = 0;
-            for (place, ((slot, gx), gy)) in edges.slot().iter().zip(edges.gx()).zip(edges.gy()).enumerate() {
-                let Some(map) = self.maps.get(*slot as usize) else { continue };
-                let [a, b, c, d, e, f] = map.map(f32::from);
-                let row = [a * gx + b * gy, c * gx + d * gy, e * gx + f * gy];
-                let squared = row[0] * row[0] + row[1] * row[1] + row[2] * row[2];
-                // Written always and kept if it passes: a branch here would be guessed wrong every third time.
-                (x[kept], y[kept], z[kept]) = (row[0], row[1], row[2]);
-                (weights[kept], places[kept]) = (squared, place as u32);
-                kept += usize::from(row[2] * row[2] <= limit * squared && squared > 0.0);
+            for start in (0..n).step_by(BLOCK) {
+                let part = start..(start + BLOCK).min(n);
+                let slots = &edges.slot()[part.clone()];
+                for (i, slot) in slots.iter().enumerate() {
+                    let [a, b, c, d, e, f] = self.maps.get(*slot as usize).copied().unwrap_or_default();
+                    let pair = |low: i16, high: i16| i32::from(low as u16) | (i32::from(high) << 16);
+                    (block.maps[0][i], block.maps[1][i], block.maps[2][i]) = (pair(a, b), pair(c, d), pair(e, f));
+                }
+                fill(&mut block, &edges.gx()[part.clone()], &edges.gy()[part], limit, self.unit);
+                for i in 0..slots.len() {
+                    // Written always and kept if it passes: a branch here would be guessed wrong every third time.
+                    (x[kept], y[kept], z[kept]) = (block.rows[0][i], block.rows[1][i], block.rows[2][i]);
+                    (weights[kept], places[kept]) = (block.weights[i], (start + i) as u32);
+                    kept += usize::from(block.weights[i] > 0.0);
+                }
             }
-            normalise([&mut x[..kept], &mut y[..kept], &mut z[..kept]], &mut weights[..kept], self.unit);
             kept
         });
         weights.truncate(rows.len());
@@ -106,14 +110,41 @@ impl LiftTable {
     }
 }
 
-/// Divides rows by their lengths, given squared lengths, and leaves the lengths times a unit behind.
+/// Edge pixels that are lifted together.
+const BLOCK: usize = 128;
+
+/// The rows of the maps of some pixels, two entries in a word, the normals made by them, and weights that are zero where the
+/// prefilter rejects.
+struct Block {
+    maps: [[i32; BLOCK]; 3],
+    rows: [[f32; BLOCK]; 3],
+    weights: [f32; BLOCK],
+}
+
+impl Default for Block {
+    fn default() -> Self {
+        Self { maps: [[0; BLOCK]; 3], rows: [[0.0; BLOCK]; 3], weights: [0.0; BLOCK] }
+    }
+}
+
+/// Lifts gradients; lengths are in a unit.
 #[multiversion(targets("x86_64+avx512f+avx512vl", "x86_64+avx2"))]
-fn normalise([x, y, z]: [&mut [f32]; 3], squared: &mut [f32], unit: f32) {
-    for (((x, y), z), length) in x.iter_mut().zip(y).zip(z).zip(squared) {
-        let root = length.sqrt();
+fn fill(block: &mut Block, gx: &[f32], gy: &[f32], limit: f32, unit: f32) {
+    let n = gx.len();
+    let [ab, cd, ef] = &block.maps;
+    let [x, y, z] = &mut block.rows;
+    let (ab, cd, ef) = (&ab[..n], &cd[..n], &ef[..n]);
+    let (x, y, z, weights) = (&mut x[..n], &mut y[..n], &mut z[..n], &mut block.weights[..n]);
+    let gy = &gy[..n];
+    for i in 0..n {
+        let along = |pair: i32| ((pair << 16) >> 16) as f32 * gx[i] + (pair >> 16) as f32 * gy[i];
+        let row = [along(ab[i]), along(cd[i]), along(ef[i])];
+        let squared = row[0] * row[0] + row[1] * row[1] + row[2] * row[2];
+        let root = squared.sqrt();
         let scale = 1.0 / root;
-        *length = root * unit;
-        (*x, *y, *z) = (*x * scale, *y * scale, *z * scale);
+        (x[i], y[i], z[i]) = (row[0] * scale, row[1] * scale, row[2] * scale);
+        let passes = (row[2] * row[2] <= limit * squared) & (squared > 0.0);
+        weights[i] = if passes { root * unit } else { 0.0 };
     }
 }
 

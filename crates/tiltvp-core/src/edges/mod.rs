@@ -6,6 +6,9 @@ mod options;
 mod region;
 mod ridge;
 mod screen;
+mod sieve;
+#[cfg(target_arch = "x86_64")]
+mod sieve_avx512;
 
 pub use detect::{Detector, EdgePixels};
 pub use lift::{LiftTable, NormalKind};

@@ -148,6 +148,7 @@ impl Region {
     }
 
     /// Column and row of the pixel `slot`; (0, 0) beyond the region.
+    #[inline]
     pub fn place(&self, slot: usize) -> (u16, u16) {
         self.places.get(slot).copied().unwrap_or_default()
     }

@@ -94,7 +94,7 @@ impl RidgeDetector {
             let marked = &mut self.marked[..n];
             marked.copy_from_slice(&here.strength[columns.clone()]);
             if let Some(screen) = screen {
-                screen.apply(span.slot, &here.gx[columns.clone()], &here.gy[columns], marked, threshold_squared);
+                screen.apply(span, &here.gx[columns.clone()], &here.gy[columns], marked);
             }
             reaching_in(marked, threshold_squared, |i| {
                 let (at, gx, gy) = (first + i, here.gx[first + i], here.gy[first + i]);

@@ -2,9 +2,8 @@
 
 use std::sync::Arc;
 
-use multiversion::multiversion;
-
-use super::region::Region;
+use super::region::{Region, Span};
+use super::sieve::Vectors;
 
 /// For each pixel of a region a vector `q`; a gradient `g` may belong to a vertical edge only if
 /// `(q . g)^2 <= limit |g|^2`.
@@ -12,62 +11,89 @@ use super::region::Region;
 /// Screens are necessary conditions, a hair wider than the exact test that follows, so they change no answer.
 #[derive(Debug, Clone)]
 pub struct Screen {
-    vectors: Arc<Vectors>,
+    vectors: Arc<Source>,
+    /// Squared, in units of the vectors.
     limit: f32,
 }
 
+/// Vectors in 16-bit integers.
 #[derive(Debug)]
-struct Vectors {
-    x: Vec<f32>,
-    y: Vec<f32>,
-    /// The largest component of all.
-    largest: f32,
+struct Source {
+    shape: Shape,
+    /// What one of them means.
+    unit: f64,
+}
+
+#[derive(Debug)]
+enum Shape {
+    /// One for each pixel.
+    Each(Vec<[i16; 2]>),
+    /// The way from a point to the pixel, in so many parts of a pixel, in which the point is given too.
+    From { centre: [i64; 2], parts: i16 },
 }
 
 /// How much wider than the exact test a screen is, for the rounding of single precision.
 const HAIR: f64 = 1.0 + 5e-5;
 
+/// What rounding both components of a vector adds at most to `|q . g| / |g|`, in units of the vectors.
+const ROUNDED: f64 = std::f64::consts::FRAC_1_SQRT_2 + 1e-3;
+
 impl Screen {
     /// One vector for each pixel of the region, in slot order, and the limit of `|q . g| / |g|`.
-    pub(super) fn new(vectors: impl Iterator<Item = [f32; 2]>, limit: f64) -> Self {
-        let (x, y): (Vec<f32>, Vec<f32>) = vectors.map(|[x, y]| (x, y)).unzip();
-        let largest = x.iter().chain(&y).fold(0.0, |most: f32, x| most.max(x.abs()));
-        Self { vectors: Arc::new(Vectors { x, y, largest }), limit: 0.0 }.with_limit(limit)
+    pub(super) fn new(vectors: &[[f32; 2]], limit: f64) -> Self {
+        let largest = vectors.iter().flatten().fold(0.0, |most: f32, x| most.max(x.abs()));
+        let unit = f64::from(largest.max(f32::MIN_POSITIVE)) / f64::from(i16::MAX);
+        let whole = |vector: &[f32; 2]| vector.map(|x| (f64::from(x) / unit).round() as i16);
+        let shape = Shape::Each(vectors.iter().map(whole).collect());
+        Self { vectors: Arc::new(Source { shape, unit }), limit: 0.0 }.with_limit(limit)
     }
 
     /// The same vectors, shared, with another limit.
     #[must_use]
     pub fn with_limit(&self, limit: f64) -> Self {
-        // Both tests sum two products in single precision: for small limits what they round off is more than a hair.
-        let wide = limit * HAIR + f64::from(4.0 * f32::EPSILON * self.vectors.largest);
-        Self { vectors: Arc::clone(&self.vectors), limit: (wide * wide) as f32 }
+        let wide = limit / self.vectors.unit * HAIR + ROUNDED;
+        Self { vectors: Arc::clone(&self.vectors), limit: ((wide * wide) as f32).min(f32::MAX) }
     }
 
     /// Edges whose straight continuation passes within `offset_max_px` of a point, eq. 17.
     pub fn of_offsets(region: &Region, centre: (f64, f64), offset_max_px: f64) -> Self {
-        let vector = |(u, v, _)| [(u as f64 - centre.0) as f32, (v as f64 - centre.1) as f32];
-        Self::new(region.pixels().map(vector), offset_max_px)
+        let away = |(u, v): (usize, usize)| [u as f64 - centre.0, v as f64 - centre.1];
+        let most = |(u, v, _)| away((u, v)).into_iter().fold(0.0, |most: f64, x| most.max(x.abs()));
+        let largest = region.pixels().map(most).fold(1.0, f64::max);
+        let parts = ((f64::from(i16::MAX) - 1.0) / largest).floor();
+        if parts < 8.0 {
+            let vectors: Vec<_> = region.pixels().map(|(u, v, _)| away((u, v)).map(|x| x as f32)).collect();
+            return Self::new(&vectors, offset_max_px);
+        }
+        let centre = [centre.0, centre.1].map(|x| (x * parts).round() as i64);
+        let shape = Shape::From { centre, parts: parts as i16 };
+        Self { vectors: Arc::new(Source { shape, unit: 1.0 / parts }), limit: 0.0 }.with_limit(offset_max_px)
     }
 
-    /// Marks with a negative strength the gradients of the pixels from `slot` on that fail, and returns how many were strong.
-    pub(super) fn apply(&self, slot: usize, gx: &[f32], gy: &[f32], strength: &mut [f32], threshold: f32) -> usize {
-        let pixels = slot..slot + strength.len();
-        match (self.vectors.x.get(pixels.clone()), self.vectors.y.get(pixels)) {
-            (Some(x), Some(y)) => screen([x, y, gx, gy], strength, self.limit, threshold) as usize,
-            _ => 0,
+    /// What the kernels need of it for a span.
+    pub(super) fn of_span(&self, span: &Span) -> (Vectors<'_>, f32) {
+        let vectors = match &self.vectors.shape {
+            Shape::Each(vectors) => Vectors::Each(vectors.get(span.slot..).unwrap_or(&[])),
+            Shape::From { centre: [u, v], parts } => {
+                let away = |x: usize, centre: i64| (x as i64 * i64::from(*parts) - centre) as i16;
+                Vectors::Line { first: [away(span.first, *u), away(span.v, *v)], step: *parts }
+            }
+        };
+        (vectors, self.limit)
+    }
+
+    /// Marks with a negative strength the gradients of a span's pixels that fail.
+    pub(super) fn apply(&self, span: &Span, gx: &[f32], gy: &[f32], strength: &mut [f32]) {
+        let (vectors, limit) = self.of_span(span);
+        let vector = |place: usize| match vectors {
+            Vectors::None => [0; 2],
+            Vectors::Each(each) => each.get(place).copied().unwrap_or_default(),
+            Vectors::Line { first: [x, y], step } => [x.wrapping_add(step.wrapping_mul(place as i16)), y],
+        };
+        for (place, ((gx, gy), strength)) in gx.iter().zip(gy).zip(strength).enumerate() {
+            let [x, y] = vector(place).map(f32::from);
+            let across = x * gx + y * gy;
+            *strength = if across * across <= limit * *strength { *strength } else { -1.0 };
         }
     }
-}
-
-#[multiversion(targets("x86_64+avx512f+avx512vl", "x86_64+avx2"))]
-fn screen([x, y, gx, gy]: [&[f32]; 4], strength: &mut [f32], limit: f32, threshold: f32) -> u32 {
-    let n = strength.len();
-    let (x, y, gx, gy) = (&x[..n], &y[..n], &gx[..n], &gy[..n]);
-    let mut strong = 0;
-    for i in 0..n {
-        let across = x[i] * gx[i] + y[i] * gy[i];
-        strong += u32::from(strength[i] >= threshold);
-        strength[i] = if across * across <= limit * strength[i] { strength[i] } else { -1.0 };
-    }
-    strong
 }

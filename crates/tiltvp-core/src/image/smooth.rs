@@ -12,13 +12,53 @@ const TAIL: f64 = 0.01;
 pub struct Smoother {
     taps: Vec<f32>,
     column_sums: Vec<f32>,
+    /// Scratch of the rows in fixed point: sums of columns in units of 1/256, and a row in single precision.
+    fixed_sums: Vec<u16>,
+    plain: Vec<f32>,
 }
+
+/// Units of a smoothed row in fixed point, of which a grey level has so many.
+const FIXED: f32 = 128.0;
 
 impl Smoother {
     /// A Gaussian of `sigma_px` pixels for rows of at most `max_width` pixels.
     pub fn new(sigma_px: f64, max_width: usize) -> Self {
         let taps = gaussian_taps(sigma_px);
-        Self { column_sums: vec![0.0; max_width + 2 * taps.len()], taps }
+        let (narrow, wide) = if taps.len() == 2 { (max_width + 2, 0) } else { (0, max_width) };
+        Self {
+            column_sums: vec![0.0; max_width + 2 * taps.len()],
+            fixed_sums: vec![0; narrow],
+            plain: vec![0.0; wide],
+            taps,
+        }
+    }
+
+    /// Whether rows are copied as they are.
+    pub fn copies(&self) -> bool {
+        self.taps.len() == 1
+    }
+
+    /// [`row`](Self::row) in units of 1/128 of a grey level, to about one of them.
+    ///
+    /// Columns and rows that the kernel reaches should lie within the image: others may be smoothed in single precision first,
+    /// which takes longer.
+    pub fn fixed_row(&mut self, image: &ImageView<'_>, v: usize, first: usize, out: &mut [i16]) {
+        let n = out.len();
+        let inside = first >= 1 && first + n < image.width() && v >= 1 && v + 1 < image.height();
+        if let ([centre, side], true) = (&self.taps[..], inside && self.fixed_sums.len() >= n + 2) {
+            let taps = [*centre, 2.0 * side].map(|tap| (tap * 65536.0).round() as u32);
+            let part = |v: usize| image.row(v).get(first - 1..=first + n).unwrap_or(&[]);
+            fixed_columns([part(v - 1), part(v), part(v + 1)], taps, &mut self.fixed_sums[..n + 2]);
+            fixed_rows(&self.fixed_sums[..n + 2], taps, out);
+            return;
+        }
+        let mut plain = std::mem::take(&mut self.plain);
+        if plain.len() < n {
+            plain.resize(n, 0.0);
+        }
+        self.row(image, v, first, &mut plain[..n]);
+        quantise(&plain[..n], out);
+        self.plain = plain;
     }
 
     /// How many pixels to each side a smoothed pixel is made from.
@@ -114,6 +154,40 @@ fn add_scaled(above: &[u8], below: &[u8], tap: f32, out: &mut [f32]) {
     }
 }
 
+/// The middle row and the mean of its neighbours, in units of 1/256 of a grey level, weighted by taps in units of 2^-16.
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512vl", "x86_64+avx2"))]
+fn fixed_columns([above, middle, below]: [&[u8]; 3], [centre, sides]: [u32; 2], out: &mut [u16]) {
+    let (centre, sides) = (centre as u16, sides as u16);
+    for (((o, a), m), b) in out.iter_mut().zip(above).zip(middle).zip(below) {
+        let mean = (u16::from(*a) + u16::from(*b)) << 7;
+        *o = high(u16::from(*m) << 8, centre) + high(mean, sides);
+    }
+}
+
+/// The same along a row of columns' sums, one wider on both sides, in units of 1/128.
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512vl", "x86_64+avx2"))]
+fn fixed_rows(sums: &[u16], [centre, sides]: [u32; 2], out: &mut [i16]) {
+    let (centre, sides) = (centre as u16, sides as u16);
+    let n = out.len();
+    let (left, middle, right) = (&sums[..n], &sums[1..=n], &sums[2..n + 2]);
+    for (((o, l), m), r) in out.iter_mut().zip(left).zip(middle).zip(right) {
+        *o = ((high(*m, centre) + high((*l >> 1) + (*r >> 1), sides)) >> 1) as i16;
+    }
+}
+
+/// The upper half of a product.
+#[inline(always)]
+fn high(a: u16, b: u16) -> u16 {
+    ((u32::from(a) * u32::from(b)) >> 16) as u16
+}
+
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512vl", "x86_64+avx2"))]
+fn quantise(row: &[f32], out: &mut [i16]) {
+    for (o, i) in out.iter_mut().zip(row) {
+        *o = (i * FIXED + 0.5) as i16;
+    }
+}
+
 /// For a row whose mirror image is outside.
 fn add_scaled_one(row: &[u8], tap: f32, out: &mut [f32]) {
     for (o, i) in out.iter_mut().zip(row) {
@@ -179,6 +253,28 @@ mod tests {
                             .map(|(x, y)| taps[x.unsigned_abs()] * taps[y.unsigned_abs()] * level(u + x, v + y))
                             .sum();
                         assert!((found - expected).abs() < 1e-3, "sigma {sigma}, ({u}, {v}): {found}, not {expected}");
+                    }
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn rows_in_fixed_point_are_the_rows_rounded() {
+        let (width, height) = (97usize, 12usize);
+        let data: Vec<u8> = (0..width * height).map(|i| (i * i * 83 % 256) as u8).collect();
+        for data in [data, vec![255; width * height]] {
+            let view = ImageView::new(&data, width, height, width).unwrap();
+            for sigma in [0.4, 0.6, 1.5] {
+                let mut smoother = Smoother::new(sigma, width);
+                for v in 0..height {
+                    for first in [0, 1, 5] {
+                        let (mut plain, mut fixed) = (vec![0.0f32; 91], vec![0i16; 91]);
+                        smoother.row(&view, v, first, &mut plain);
+                        smoother.fixed_row(&view, v, first, &mut fixed);
+                        for (p, f) in plain.iter().zip(&fixed) {
+                            assert!((p * FIXED - f32::from(*f)).abs() < 2.6 && *f <= 32640, "{p} {f}");
+                        }
                     }
                 }
             }
