@@ -70,6 +70,10 @@ impl<T: Real> Problem for Direction<'_, T> {
         self.rows.moments((*model).into(), gate, weights)
     }
 
+    fn trim(&self, before: &Moments, model: &Vector3<f64>, threshold: f64, weights: &mut [f32]) -> Moments {
+        self.rows.trim(before, (*model).into(), threshold, weights)
+    }
+
     fn fit(&self, summary: &Moments, _near: &Vector3<f64>) -> Option<Vector3<f64>> {
         if let Some(plane) = self.plane {
             // (S + p p^T) o = p has the solution o ~ S^-1 p.

@@ -36,6 +36,8 @@ pub enum Gate {
 pub enum Shape {
     /// A threshold whose rejections last.
     Hard,
+    /// The other side of [`Hard`](Self::Hard): what it newly rejects.
+    Rejected,
     /// A threshold.
     Within,
     /// The weights of a table.

@@ -1,6 +1,7 @@
 //! Robust fits that know no vision: one random-sampling loop, one trimming loop, one reweighting loop.
 
 mod direction;
+mod lanes;
 mod local;
 mod loss;
 mod problem;

@@ -43,6 +43,12 @@ pub trait Problem {
     /// Applies a gate about a model and summarises what is left; a hard gate also sets the weights it rejects to zero.
     fn summarise(&self, model: &Self::Model, gate: Gate, weights: &mut [f32]) -> Self::Summary;
 
+    /// What a hard gate about a model leaves of a summary of the observations with these weights; it sets the weights that it
+    /// rejects to zero.
+    fn trim(&self, _before: &Self::Summary, model: &Self::Model, threshold: f64, weights: &mut [f32]) -> Self::Summary {
+        self.summarise(model, Gate::Hard { threshold }, weights)
+    }
+
     /// The weighted least-squares model nearest to `near`, `None` if the observations do not determine one.
     fn fit(&self, summary: &Self::Summary, near: &Self::Model) -> Option<Self::Model>;
 

@@ -61,7 +61,7 @@ pub fn reject_refit<P: Problem>(
         if iterations > options.max_iterations {
             break Stop::IterationLimit { limit: options.max_iterations };
         }
-        let trimmed = problem.summarise(&model, Gate::Hard { threshold: quantile * rms }, weights);
+        let trimmed = problem.trim(&summary, &model, quantile * rms, weights);
         let Some(next) = problem.fit(&trimmed, &model) else {
             return FitReport::failed(Stop::NoModel { trials: iterations }, iterations);
         };

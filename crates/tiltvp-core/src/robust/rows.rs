@@ -3,6 +3,7 @@
 use multiversion::multiversion;
 use nalgebra::{Matrix2, Matrix3, Vector2, Vector3};
 
+use super::lanes::{self, HARD, LANES, REJECTED, SOFT, WITHIN};
 use super::loss::{Gate, Shape};
 use super::sampling::Score;
 use super::score::{DEGREE, MARGINAL, cell, marginal_gain};
@@ -24,6 +25,8 @@ pub struct Moments {
     pub count: usize,
     /// Sum of the weights.
     pub weight: f64,
+    /// The weight when they were last added up row by row.
+    whole: f64,
     sums: [f64; 6],
     /// The model `(h0, h1, h2)` at which the moments were taken.
     at: [f64; 3],
@@ -54,10 +57,17 @@ impl<T: Real> Rows<T> {
 
     /// Appends every `stride`-th row of another set.
     pub fn extend(&mut self, other: &Self, stride: usize) {
-        let [x, y, z] = other.columns();
-        for ((x, y), z) in x.iter().zip(y).zip(z).step_by(stride.max(1)) {
-            self.push(*x, *y, *z);
+        let (first, stride) = (self.len, stride.max(1));
+        let end = first + other.len.div_ceil(stride);
+        for (own, column) in self.columns.iter_mut().zip(other.columns()) {
+            if own.len() < end {
+                own.resize(end, T::default());
+            }
+            for (place, from) in own[first..end].iter_mut().zip((0..column.len()).step_by(stride)) {
+                *place = column[from];
+            }
         }
+        self.len = end;
     }
 
     /// Replaces all rows: `write` fills the columns, which have room for `capacity` rows, and returns how many it wrote.
@@ -153,8 +163,8 @@ impl<T: Real> Rows<T> {
         T::count(row, model.map(T::from_f64), T::from_f64(threshold * threshold)) == 1
     }
 
-    /// Calls `visit(row, [weight, slope, x, y, residual])` for every `stride`-th row whose weight (one where none are given),
-    /// multiplied by the gate about a model, is above zero; `slope` is the weight multiplied by [`Gate::slope`].
+    /// Calls `visit(row, [weight, slope, x, y, residual])` for every `stride`-th row: its weight (one where none are given)
+    /// multiplied by the gate about a model, and by [`Gate::slope`].
     pub fn for_each_gated(
         &self,
         model: [f64; 3],
@@ -163,47 +173,95 @@ impl<T: Real> Rows<T> {
         stride: usize,
         mut visit: impl FnMut(usize, [f64; 5]),
     ) {
-        let [x, y, z] = self.columns();
-        let (limit, inverse) = gate.coefficients();
-        let tabulated = gate.shape() == Shape::Marginal;
-        for row in (0..self.len).step_by(stride.max(1)) {
-            let (x, y, z) = (x[row].to_f64(), y[row].to_f64(), z[row].to_f64());
-            let d = x * model[0] + y * model[1] + z * model[2];
-            let own = weights.map_or(1.0, |weights| weights.get(row).copied().map_or(0.0, f64::from));
-            let t = 1.0 - d * d * inverse;
-            if own > 0.0 && t > 0.0 && d * d <= limit {
-                if tabulated {
-                    visit(row, [own * gate.weight(d), own * gate.slope(d), x, y, d]);
-                    continue;
+        let ([x, y, z], stride) = (self.columns(), stride.max(1));
+        let own = |row: usize| weights.map_or(1.0, |weights| weights.get(row).copied().map_or(0.0, f64::from));
+        let mut sample = Sample::default();
+        for first in (0..self.len).step_by(stride * SAMPLED) {
+            let rows = (first..self.len).step_by(stride).take(SAMPLED);
+            for (i, row) in rows.clone().enumerate() {
+                (sample.x[i], sample.y[i], sample.z[i]) = (x[row].to_f64(), y[row].to_f64(), z[row].to_f64());
+                sample.own[i] = own(row);
+            }
+            gate_sample(&mut sample, model, gate.coefficients());
+            for (i, row) in rows.enumerate() {
+                let (mut weight, mut slope, d) = (sample.weight[i], sample.slope[i], sample.d[i]);
+                if gate.shape() == Shape::Marginal {
+                    (weight, slope) = (sample.own[i] * gate.weight(d), sample.own[i] * gate.slope(d));
                 }
-                let t2 = t * t;
-                let t4 = t2 * t2;
-                visit(row, [own * (t4 * t4), own * (t4 * t2 * t) * (17.0 * t - 16.0), x, y, d]);
+                visit(row, [weight, slope, sample.x[i], sample.y[i], d]);
             }
         }
     }
 
     /// Applies a gate about a model to the weights and takes the moments of what is left.
     pub fn moments(&self, model: [f64; 3], gate: Gate, weights: &mut [f32]) -> Moments {
-        let (limit, inverse) = gate.coefficients();
-        let gains = (T::from_f64(limit), T::from_f64(inverse));
-        let mut total = Total::default();
-        let n = self.len().min(weights.len());
-        for start in (0..n).step_by(BLOCK) {
-            let part = start..(start + BLOCK).min(n);
-            let rows = self.columns().map(|column| &column[part.clone()]);
-            T::gather(rows, &mut weights[part], model.map(T::from_f64), gains, gate.shape(), &mut total);
-        }
+        let total = self.total(model, gate, gate.shape(), weights);
         Moments {
             count: total.count,
             weight: total.sums[0],
+            whole: total.sums[0],
             sums: std::array::from_fn(|i| total.sums[i + 1]),
             at: model,
         }
     }
+
+    fn total(&self, model: [f64; 3], gate: Gate, shape: Shape, weights: &mut [f32]) -> Total {
+        let (limit, inverse) = gate.coefficients();
+        let gains = (T::from_f64(limit), T::from_f64(inverse));
+        let mut total = Total::default();
+        let n = self.len().min(weights.len());
+        let block = if shape == Shape::Marginal { BLOCK } else { T::BLOCK };
+        for start in (0..n).step_by(block) {
+            let part = start..(start + block).min(n);
+            let rows = self.columns().map(|column| &column[part.clone()]);
+            T::gather(rows, &mut weights[part], model.map(T::from_f64), gains, shape, &mut total);
+        }
+        total
+    }
 }
 
+impl<T: Real> Rows<T> {
+    /// The moments after a hard gate about a model, given those before it: of the rows whose weights it sets to zero, their
+    /// moments are taken away. That takes less time than to add up the others, which happens where little would be left.
+    pub fn trim(&self, before: &Moments, model: [f64; 3], threshold: f64, weights: &mut [f32]) -> Moments {
+        let gate = Gate::Hard { threshold };
+        let Some(mut moments) = before.about(model).filter(|_| T::TRIMS) else {
+            return self.moments(model, gate, weights);
+        };
+        let gone = self.total(model, gate, Shape::Rejected, weights);
+        moments.count -= gone.count.min(moments.count);
+        moments.weight -= gone.sums[0];
+        for (sum, gone) in moments.sums.iter_mut().zip(&gone.sums[1..]) {
+            *sum -= gone;
+        }
+        if moments.weight < LEFT * moments.whole {
+            return self.moments(model, gate, weights);
+        }
+        moments
+    }
+}
+
+/// Share of the weight below which moments are added up anew, so that what was rounded off the others does not show.
+const LEFT: f64 = 0.2;
+
 impl Moments {
+    /// The same moments with the residuals of another model; `None` if `h2` is zero.
+    fn about(&self, model: [f64; 3]) -> Option<Self> {
+        let ([xx, xy, yy, xd, yd, dd], [h0, h1, h2]) = (self.sums, self.at);
+        // d' = a x + b y + k d.
+        let k = model[2] / h2;
+        let (a, b) = (model[0] - k * h0, model[1] - k * h1);
+        let sums = [
+            xx,
+            xy,
+            yy,
+            a * xx + b * xy + k * xd,
+            a * xy + b * yy + k * yd,
+            a * (a * xx + 2.0 * (b * xy + k * xd)) + b * (b * yy + 2.0 * k * yd) + k * k * dd,
+        ];
+        k.is_finite().then_some(Self { sums, at: model, ..*self })
+    }
+
     /// The change `(dh0, dh1)` of the model that minimises the weighted sum of squares, `h2` held; `None` if undetermined.
     pub fn step(&self) -> Option<Vector2<f64>> {
         let [xx, xy, yy, xd, yd, _] = self.sums;
@@ -240,20 +298,51 @@ impl Moments {
     }
 }
 
+/// Rows that are gated together.
+const SAMPLED: usize = 64;
+
+/// Some rows with their own weights, their residuals, and the weights and slopes that a gate gives them.
+struct Sample {
+    x: [f64; SAMPLED],
+    y: [f64; SAMPLED],
+    z: [f64; SAMPLED],
+    own: [f64; SAMPLED],
+    d: [f64; SAMPLED],
+    weight: [f64; SAMPLED],
+    slope: [f64; SAMPLED],
+}
+
+impl Default for Sample {
+    fn default() -> Self {
+        let zero = [0.0; SAMPLED];
+        Self { x: zero, y: zero, z: zero, own: zero, d: zero, weight: zero, slope: zero }
+    }
+}
+
+/// Evaluates a gate that is no table, given its coefficients.
+#[multiversion(targets("x86_64+avx512f+avx512vl", "x86_64+avx2"))]
+fn gate_sample(sample: &mut Sample, [h0, h1, h2]: [f64; 3], (limit, inverse): (f64, f64)) {
+    let Sample { x, y, z, own, d, weight, slope } = sample;
+    for i in 0..SAMPLED {
+        d[i] = x[i] * h0 + y[i] * h1 + z[i] * h2;
+        let squared = d[i] * d[i];
+        let t = 1.0 - squared * inverse;
+        let t = if t > 0.0 { t } else { 0.0 };
+        let (t2, own) = (t * t, if squared <= limit { own[i] } else { 0.0 });
+        let t4 = t2 * t2;
+        weight[i] = own * (t4 * t4);
+        slope[i] = own * (t4 * t2 * t) * (17.0 * t - 16.0);
+    }
+}
+
 /// Rows that are counted before looking whether the count can still matter.
-const COUNTED: usize = 2048;
+const COUNTED: usize = 1024;
 
 /// Rows added up in the rows' own precision before they are added in double precision.
 const BLOCK: usize = 512;
 
-/// Independent sums that are added up side by side, in the same order on every machine.
-const LANES: usize = 16;
-
-/// The shapes of gates as the kernels' parameters.
-const HARD: u8 = 0;
-const WITHIN: u8 = 1;
+/// The table of a gate as the kernels' parameter, beside those of [`lanes`].
 const MARGINALS: u8 = 2;
-const SOFT: u8 = 3;
 
 /// Totals in double precision: weight, then the six moments.
 #[derive(Default)]
@@ -262,10 +351,36 @@ pub struct Total {
     sums: [f64; 7],
 }
 
+impl Total {
+    /// Adds a block's count, and its sums lane by lane.
+    pub(super) fn add(&mut self, count: usize, lanes: &[[f32; LANES]; 7]) {
+        self.count += count;
+        for (sum, lanes) in self.sums.iter_mut().zip(lanes) {
+            *sum += lanes.iter().map(|lane| f64::from(*lane)).sum::<f64>();
+        }
+    }
+
+    #[cfg(test)]
+    pub(super) fn sums(&self) -> &[f64; 7] {
+        &self.sums
+    }
+
+    #[cfg(test)]
+    pub(super) fn count(&self) -> usize {
+        self.count
+    }
+}
+
 /// The arithmetic that rows are stored in: `f32` or `f64`.
 pub trait Real:
     Copy + Default + PartialOrd + std::ops::Add<Output = Self> + std::ops::Sub<Output = Self> + std::ops::Mul<Output = Self>
 {
+    /// Whether there is a kernel for [`Shape::Rejected`].
+    #[doc(hidden)]
+    const TRIMS: bool;
+    /// Rows added up in their own precision before they are added in double precision.
+    #[doc(hidden)]
+    const BLOCK: usize;
     /// Rounds from double precision.
     fn from_f64(value: f64) -> Self;
     /// Widens a weight.
@@ -287,15 +402,6 @@ pub trait Real:
     );
     #[doc(hidden)]
     fn gain(rows: [&[Self]; 3], model: [Self; 3], inverse: Self, marginal: Option<&[f32; DEGREE + 1]>) -> f64;
-}
-
-#[inline(always)]
-fn count_body<T: Real>([x, y, z]: [&[T]; 3], [h0, h1, h2]: [T; 3], limit: T) -> usize {
-    let within = |((x, y), z): ((&T, &T), &T)| {
-        let d = *x * h0 + *y * h1 + *z * h2;
-        u32::from(d * d <= limit)
-    };
-    x.iter().zip(y).zip(z).map(within).sum::<u32>() as usize
 }
 
 /// One block: residuals and gated weights first, then each sum in lanes of its own, all of it in the first-level cache.
@@ -394,14 +500,9 @@ fn finish<T: Real>(mut lanes: [T; LANES], rest: impl Iterator<Item = T>) -> f64 
 
 /// Implements [`Real`] for one float type, with run-time dispatch to the machine's widest vectors.
 macro_rules! real {
-    ($float:ty, $module:ident) => {
+    ($float:ty, $module:ident, $block:expr, $count:path, $gather:path) => {
         mod $module {
             use super::*;
-
-            #[multiversion(targets("x86_64+avx512f+avx512vl", "x86_64+avx2"))]
-            pub(super) fn count(rows: [&[$float]; 3], model: [$float; 3], limit: $float) -> usize {
-                count_body(rows, model, limit)
-            }
 
             #[multiversion(targets("x86_64+avx512f+avx512vl", "x86_64+avx2"))]
             pub(super) fn gather(
@@ -413,7 +514,7 @@ macro_rules! real {
                 total: &mut Total,
             ) {
                 match shape {
-                    Shape::Hard => gather_body::<$float, HARD>(rows, weights, model, gains, total),
+                    Shape::Hard | Shape::Rejected => gather_body::<$float, HARD>(rows, weights, model, gains, total),
                     Shape::Within => gather_body::<$float, WITHIN>(rows, weights, model, gains, total),
                     Shape::Marginal => gather_body::<$float, MARGINALS>(rows, weights, model, gains, total),
                     Shape::Soft => gather_body::<$float, SOFT>(rows, weights, model, gains, total),
@@ -435,6 +536,9 @@ macro_rules! real {
         }
 
         impl Real for $float {
+            const BLOCK: usize = $block;
+            const TRIMS: bool = $block == LONG;
+
             fn from_f64(value: f64) -> Self {
                 value as Self
             }
@@ -445,7 +549,7 @@ macro_rules! real {
                 f64::from(self)
             }
             fn count(rows: [&[Self]; 3], model: [Self; 3], limit: Self) -> usize {
-                $module::count(rows, model, limit)
+                $count(rows, model, limit)
             }
             fn gather(
                 rows: [&[Self]; 3],
@@ -455,7 +559,7 @@ macro_rules! real {
                 shape: Shape,
                 total: &mut Total,
             ) {
-                $module::gather(rows, weights, model, gains, shape, total);
+                $gather(rows, weights, model, gains, shape, total);
             }
             fn gain(rows: [&[Self]; 3], model: [Self; 3], inverse: Self, marginal: Option<&[f32; DEGREE + 1]>) -> f64 {
                 $module::gain(rows, model, inverse, marginal)
@@ -467,8 +571,39 @@ macro_rules! real {
     };
 }
 
-real!(f32, single);
-real!(f64, double);
+real!(f32, single, LONG, lanes::count, gather_single);
+real!(f64, double, BLOCK, count_double, double::gather);
+
+#[multiversion(targets("x86_64+avx512f+avx512vl", "x86_64+avx2"))]
+fn count_double([x, y, z]: [&[f64]; 3], [h0, h1, h2]: [f64; 3], limit: f64) -> usize {
+    let within = |((x, y), z): ((&f64, &f64), &f64)| {
+        let d = x * h0 + y * h1 + z * h2;
+        u32::from(d * d <= limit)
+    };
+    x.iter().zip(y).zip(z).map(within).sum::<u32>() as usize
+}
+
+/// [`BLOCK`] of sums in lanes.
+const LONG: usize = 2048;
+
+/// The kernel of a gate: by lanes, but for the table.
+fn gather_single(
+    rows: [&[f32]; 3],
+    weights: &mut [f32],
+    model: [f32; 3],
+    gains: (f32, f32),
+    shape: Shape,
+    total: &mut Total,
+) {
+    let gate = match shape {
+        Shape::Hard => HARD,
+        Shape::Within => WITHIN,
+        Shape::Soft => SOFT,
+        Shape::Rejected => REJECTED,
+        Shape::Marginal => return single::gather(rows, weights, model, gains, shape, total),
+    };
+    lanes::gather(rows, weights, model, [gains.0, gains.1], gate, total);
+}
 
 #[cfg(test)]
 mod tests {
@@ -535,7 +670,7 @@ mod tests {
                 let own = f64::from(before[i]);
                 assert_eq!((x, y, d), (row.x, row.y, row.x * model[0] + row.y * model[1] + row.z * model[2]));
                 assert!((weight - own * gate.weight(d)).abs() < 1e-9 && (slope - own * gate.slope(d)).abs() < 1e-9);
-                visited += 1;
+                visited += usize::from(weight > 0.0);
             });
             assert_eq!(visited, count, "{len} rows, {gate:?}");
             if let Gate::Hard { threshold } = gate {
@@ -556,6 +691,31 @@ mod tests {
                 check::<f32>(len, gate, 1e-5);
             }
         }
+    }
+
+    /// Trimming step by step, to ever less, is gating at once.
+    #[test]
+    fn trimmed_moments_are_those_of_what_is_left() {
+        let mut rows = Rows::<f32>::default();
+        for i in 0..5000 {
+            let t = 0.37 * f64::from(i);
+            rows.push(t.cos() as f32, t.sin() as f32, (20.0 * (3.1 * t).sin()) as f32);
+        }
+        let own: Vec<f32> = (0..5000).map(|i| (i % 5) as f32).collect();
+        let mut weights = own.clone();
+        let mut trimmed = rows.moments([0.0, 0.0, 1.0], Gate::Open, &mut weights);
+        for (i, threshold) in [30.0, 15.0, 14.0, 9.0, 3.0, 0.5, 0.4].into_iter().enumerate() {
+            let model = [0.1 * i as f64, -0.2 * i as f64, 1.0];
+            trimmed = rows.trim(&trimmed, model, threshold, &mut weights);
+            let mut left = weights.clone();
+            let whole = rows.moments(model, Gate::Hard { threshold }, &mut left);
+            assert_eq!((trimmed.count, &left), (whole.count, &weights));
+            assert_relative_eq!(trimmed.weight, whole.weight, max_relative = 1e-5);
+            let (a, b) = (trimmed.step().unwrap(), whole.step().unwrap());
+            assert!((a - b).norm() < 1e-3 && a.norm() > 1e-3, "{a} {b}");
+            assert_relative_eq!(trimmed.sum_of_squares(&a), whole.sum_of_squares(&b), max_relative = 1e-4);
+        }
+        assert!(trimmed.count > 10 && trimmed.count < 200, "{}", trimmed.count);
     }
 
     #[test]

@@ -1,0 +1,483 @@
+//! Sixteen numbers at a time: the one-pass kernels over rows of single precision, the same to the last bit with vectors of any
+//! width.
+
+use super::rows::Total;
+
+/// Numbers that are worked on together.
+pub(super) const LANES: usize = 16;
+
+/// Sixteen numbers of single precision, in whatever registers hold them.
+///
+/// Every operation rounds as IEEE 754 says and products are never fused with sums, so all implementations give the same bits.
+///
+/// # Safety
+/// All methods need a machine with the vectors that the implementation is made of.
+trait Lanes: Copy {
+    /// One bit or word for each number.
+    type Mask: Copy;
+    unsafe fn splat(value: f32) -> Self;
+    unsafe fn load(from: &[f32; LANES]) -> Self;
+    unsafe fn store(self, to: &mut [f32; LANES]);
+    unsafe fn add(a: Self, b: Self) -> Self;
+    unsafe fn sub(a: Self, b: Self) -> Self;
+    unsafe fn mul(a: Self, b: Self) -> Self;
+    /// The number where it is above zero, zero elsewhere.
+    unsafe fn positive(a: Self) -> Self;
+    unsafe fn at_most(a: Self, b: Self) -> Self::Mask;
+    unsafe fn below(a: Self, b: Self) -> Self::Mask;
+    /// The numbers of the mask, and zeros.
+    unsafe fn keep(a: Self, mask: Self::Mask) -> Self;
+    unsafe fn count(mask: Self::Mask) -> u32;
+}
+
+/// One number after the other, for every machine.
+#[derive(Clone, Copy)]
+struct Plain([f32; LANES]);
+
+impl Plain {
+    #[inline(always)]
+    fn zip(self, other: Self, with: impl Fn(f32, f32) -> f32) -> Self {
+        Self(std::array::from_fn(|i| with(self.0[i], other.0[i])))
+    }
+}
+
+impl Lanes for Plain {
+    type Mask = [bool; LANES];
+
+    #[inline(always)]
+    unsafe fn splat(value: f32) -> Self {
+        Self([value; LANES])
+    }
+    #[inline(always)]
+    unsafe fn load(from: &[f32; LANES]) -> Self {
+        Self(*from)
+    }
+    #[inline(always)]
+    unsafe fn store(self, to: &mut [f32; LANES]) {
+        *to = self.0;
+    }
+    #[inline(always)]
+    unsafe fn add(a: Self, b: Self) -> Self {
+        a.zip(b, |a, b| a + b)
+    }
+    #[inline(always)]
+    unsafe fn sub(a: Self, b: Self) -> Self {
+        a.zip(b, |a, b| a - b)
+    }
+    #[inline(always)]
+    unsafe fn mul(a: Self, b: Self) -> Self {
+        a.zip(b, |a, b| a * b)
+    }
+    #[inline(always)]
+    unsafe fn positive(a: Self) -> Self {
+        Self(a.0.map(|a| if a > 0.0 { a } else { 0.0 }))
+    }
+    #[inline(always)]
+    unsafe fn at_most(a: Self, b: Self) -> Self::Mask {
+        std::array::from_fn(|i| a.0[i] <= b.0[i])
+    }
+    #[inline(always)]
+    unsafe fn below(a: Self, b: Self) -> Self::Mask {
+        std::array::from_fn(|i| a.0[i] < b.0[i])
+    }
+    #[inline(always)]
+    unsafe fn keep(a: Self, mask: Self::Mask) -> Self {
+        Self(std::array::from_fn(|i| if mask[i] { a.0[i] } else { 0.0 }))
+    }
+    #[inline(always)]
+    unsafe fn count(mask: Self::Mask) -> u32 {
+        mask.iter().map(|held| u32::from(*held)).sum()
+    }
+}
+
+#[cfg(target_arch = "x86_64")]
+mod x86 {
+    use std::arch::x86_64::{
+        __m256, __m512, __mmask16, _CMP_LE_OQ, _CMP_LT_OQ, _mm256_add_ps, _mm256_and_ps, _mm256_cmp_ps,
+        _mm256_loadu_ps, _mm256_max_ps, _mm256_movemask_ps, _mm256_mul_ps, _mm256_set1_ps, _mm256_setzero_ps,
+        _mm256_storeu_ps, _mm256_sub_ps, _mm512_add_ps, _mm512_cmp_ps_mask, _mm512_loadu_ps, _mm512_maskz_mov_ps,
+        _mm512_max_ps, _mm512_mul_ps, _mm512_set1_ps, _mm512_setzero_ps, _mm512_storeu_ps, _mm512_sub_ps,
+    };
+
+    use super::{LANES, Lanes};
+
+    /// One register of 512 bits (AVX-512 F).
+    #[derive(Clone, Copy)]
+    pub(super) struct Wide(__m512);
+
+    /// A method as one intrinsic, or a few.
+    macro_rules! methods {
+        ($($name:ident($($argument:ident: $kind:ty),*) -> $out:ty $body:block)*) => {
+            $(
+                #[inline(always)]
+                unsafe fn $name($($argument: $kind),*) -> $out {
+                    // SAFETY: the caller vouches for the machine; references hold 16 numbers.
+                    unsafe { $body }
+                }
+            )*
+        };
+    }
+
+    impl Lanes for Wide {
+        type Mask = __mmask16;
+
+        methods! {
+            splat(value: f32) -> Self { Self(_mm512_set1_ps(value)) }
+            load(from: &[f32; LANES]) -> Self { Self(_mm512_loadu_ps(from.as_ptr())) }
+            add(a: Self, b: Self) -> Self { Self(_mm512_add_ps(a.0, b.0)) }
+            sub(a: Self, b: Self) -> Self { Self(_mm512_sub_ps(a.0, b.0)) }
+            mul(a: Self, b: Self) -> Self { Self(_mm512_mul_ps(a.0, b.0)) }
+            positive(a: Self) -> Self { Self(_mm512_max_ps(a.0, _mm512_setzero_ps())) }
+            at_most(a: Self, b: Self) -> __mmask16 { _mm512_cmp_ps_mask::<_CMP_LE_OQ>(a.0, b.0) }
+            below(a: Self, b: Self) -> __mmask16 { _mm512_cmp_ps_mask::<_CMP_LT_OQ>(a.0, b.0) }
+            keep(a: Self, mask: __mmask16) -> Self { Self(_mm512_maskz_mov_ps(mask, a.0)) }
+        }
+
+        #[inline(always)]
+        unsafe fn count(mask: __mmask16) -> u32 {
+            mask.count_ones()
+        }
+
+        #[inline(always)]
+        unsafe fn store(self, to: &mut [f32; LANES]) {
+            // SAFETY: the caller vouches for the machine, the reference holds 16 numbers.
+            unsafe { _mm512_storeu_ps(to.as_mut_ptr(), self.0) }
+        }
+    }
+
+    /// Two registers of 256 bits (AVX2).
+    #[derive(Clone, Copy)]
+    pub(super) struct Pair(__m256, __m256);
+
+    impl Lanes for Pair {
+        type Mask = (__m256, __m256);
+
+        methods! {
+            splat(value: f32) -> Self { Self(_mm256_set1_ps(value), _mm256_set1_ps(value)) }
+            load(from: &[f32; LANES]) -> Self {
+                Self(_mm256_loadu_ps(from.as_ptr()), _mm256_loadu_ps(from.as_ptr().add(8)))
+            }
+            add(a: Self, b: Self) -> Self { Self(_mm256_add_ps(a.0, b.0), _mm256_add_ps(a.1, b.1)) }
+            sub(a: Self, b: Self) -> Self { Self(_mm256_sub_ps(a.0, b.0), _mm256_sub_ps(a.1, b.1)) }
+            mul(a: Self, b: Self) -> Self { Self(_mm256_mul_ps(a.0, b.0), _mm256_mul_ps(a.1, b.1)) }
+            positive(a: Self) -> Self {
+                Self(_mm256_max_ps(a.0, _mm256_setzero_ps()), _mm256_max_ps(a.1, _mm256_setzero_ps()))
+            }
+            at_most(a: Self, b: Self) -> Self::Mask {
+                (_mm256_cmp_ps::<_CMP_LE_OQ>(a.0, b.0), _mm256_cmp_ps::<_CMP_LE_OQ>(a.1, b.1))
+            }
+            below(a: Self, b: Self) -> Self::Mask {
+                (_mm256_cmp_ps::<_CMP_LT_OQ>(a.0, b.0), _mm256_cmp_ps::<_CMP_LT_OQ>(a.1, b.1))
+            }
+            keep(a: Self, mask: Self::Mask) -> Self { Self(_mm256_and_ps(a.0, mask.0), _mm256_and_ps(a.1, mask.1)) }
+            count(mask: Self::Mask) -> u32 {
+                _mm256_movemask_ps(mask.0).count_ones() + _mm256_movemask_ps(mask.1).count_ones()
+            }
+        }
+
+        #[inline(always)]
+        unsafe fn store(self, to: &mut [f32; LANES]) {
+            // SAFETY: the caller vouches for the machine, the reference holds 16 numbers.
+            unsafe {
+                _mm256_storeu_ps(to.as_mut_ptr(), self.0);
+                _mm256_storeu_ps(to.as_mut_ptr().add(8), self.1);
+            }
+        }
+    }
+}
+
+/// Gates by what they do to a weight.
+pub(super) const HARD: u8 = 0;
+pub(super) const WITHIN: u8 = 1;
+pub(super) const SOFT: u8 = 3;
+/// A hard gate whose moments are those of the rows that it newly rejects.
+pub(super) const REJECTED: u8 = 4;
+
+/// The last, partial sixteen of a column, filled up with `with`.
+#[inline(always)]
+fn rest(part: &[f32], with: f32) -> [f32; LANES] {
+    let mut all = [with; LANES];
+    all[..part.len()].copy_from_slice(part);
+    all
+}
+
+/// `h . row`.
+#[inline(always)]
+unsafe fn residual<L: Lanes>([x, y, z]: [L; 3], [h0, h1, h2]: &[L; 3]) -> L {
+    // SAFETY: the caller vouches for the machine.
+    unsafe { L::add(L::add(L::mul(x, *h0), L::mul(y, *h1)), L::mul(z, *h2)) }
+}
+
+/// How many of sixteen rows have a squared residual of at most the limit.
+#[inline(always)]
+unsafe fn within<L: Lanes>([x, y, z]: [&[f32; LANES]; 3], model: &[L; 3], limit: L) -> u32 {
+    // SAFETY: the caller vouches for the machine.
+    unsafe {
+        let d = residual([L::load(x), L::load(y), L::load(z)], model);
+        L::count(L::at_most(L::mul(d, d), limit))
+    }
+}
+
+/// Counts rows `(x, y, z)` with `(h . row)^2 <= limit`.
+#[inline(always)]
+unsafe fn count_body<L: Lanes>([x, y, z]: [&[f32]; 3], model: [f32; 3], limit: f32) -> usize {
+    // SAFETY: the caller vouches for the machine.
+    unsafe {
+        let (model, limit) = ([L::splat(model[0]), L::splat(model[1]), L::splat(model[2])], L::splat(limit));
+        let ((x, last_x), (y, last_y), (z, last_z)) = (x.as_chunks(), y.as_chunks(), z.as_chunks());
+        let mut count = 0;
+        for ((x, y), z) in x.iter().zip(y).zip(z) {
+            count += within([x, y, z], &model, limit);
+        }
+        if !last_x.is_empty() {
+            // No number is at most anything if it is none.
+            let rows = [&rest(last_x, f32::NAN), &rest(last_y, 0.0), &rest(last_z, 0.0)];
+            count += within(rows, &model, limit);
+        }
+        count as usize
+    }
+}
+
+/// The sums of a block, lane by lane.
+struct Sums<L> {
+    sums: [L; 7],
+    count: u32,
+}
+
+impl<L: Lanes> Sums<L> {
+    #[inline(always)]
+    unsafe fn row<const GATE: u8>(
+        &mut self,
+        [x, y, z]: [&[f32; LANES]; 3],
+        weights: &mut [f32; LANES],
+        model: &[L; 3],
+        gains: &[L; 2],
+    ) {
+        // SAFETY: the caller vouches for the machine.
+        unsafe {
+            let (x, y, z, own) = (L::load(x), L::load(y), L::load(z), L::load(weights));
+            let d = residual([x, y, z], model);
+            let squared = L::mul(d, d);
+            let w = if GATE == SOFT {
+                let t = L::positive(L::sub(L::splat(1.0), L::mul(squared, gains[1])));
+                let t = L::mul(t, t);
+                let t = L::mul(t, t);
+                L::mul(own, L::mul(t, t))
+            } else {
+                L::keep(own, L::at_most(squared, gains[0]))
+            };
+            if GATE == HARD {
+                w.store(weights);
+            }
+            self.add(w, [x, y, d]);
+        }
+    }
+
+    /// Takes the rows that a hard gate rejects, which it does for good, if there are any.
+    #[inline(always)]
+    unsafe fn rejected(&mut self, [x, y, z]: [&[f32; LANES]; 3], weights: &mut [f32; LANES], model: &[L; 3], limit: L) {
+        // SAFETY: the caller vouches for the machine.
+        unsafe {
+            let (x, y, z, own) = (L::load(x), L::load(y), L::load(z), L::load(weights));
+            let d = residual([x, y, z], model);
+            let kept = L::keep(own, L::at_most(L::mul(d, d), limit));
+            let gone = L::sub(own, kept);
+            if L::count(L::below(L::splat(0.0), gone)) != 0 {
+                kept.store(weights);
+                self.add(gone, [x, y, d]);
+            }
+        }
+    }
+
+    /// Adds weighted rows.
+    #[inline(always)]
+    unsafe fn add(&mut self, w: L, [x, y, d]: [L; 3]) {
+        // SAFETY: the caller vouches for the machine.
+        unsafe {
+            self.count += L::count(L::below(L::splat(0.0), w));
+            let (wx, wy, wd) = (L::mul(w, x), L::mul(w, y), L::mul(w, d));
+            let [sw, xx, xy, yy, xd, yd, dd] = &mut self.sums;
+            // Written out: a loop would keep the sums in memory.
+            *sw = L::add(*sw, w);
+            *xx = L::add(*xx, L::mul(wx, x));
+            *xy = L::add(*xy, L::mul(wx, y));
+            *yy = L::add(*yy, L::mul(wy, y));
+            *xd = L::add(*xd, L::mul(wx, d));
+            *yd = L::add(*yd, L::mul(wy, d));
+            *dd = L::add(*dd, L::mul(wd, d));
+        }
+    }
+}
+
+/// Adds the moments of a block of rows to the total, and sets the weights that a hard gate rejects to zero.
+#[inline(always)]
+unsafe fn gather_body<L: Lanes, const GATE: u8>(
+    [x, y, z]: [&[f32]; 3],
+    weights: &mut [f32],
+    model: [f32; 3],
+    gains: [f32; 2],
+    total: &mut Total,
+) {
+    // SAFETY: the caller vouches for the machine.
+    unsafe {
+        let model = [L::splat(model[0]), L::splat(model[1]), L::splat(model[2])];
+        let gains = [L::splat(gains[0]), L::splat(gains[1])];
+        let mut sums = Sums { sums: [L::splat(0.0); 7], count: 0 };
+        let ((x, last_x), (y, last_y), (z, last_z)) = (x.as_chunks(), y.as_chunks(), z.as_chunks());
+        let (own, last_own) = weights.as_chunks_mut();
+        for (((x, y), z), own) in x.iter().zip(y).zip(z).zip(own) {
+            if GATE == REJECTED {
+                sums.rejected([x, y, z], own, &model, gains[0]);
+            } else {
+                sums.row::<GATE>([x, y, z], own, &model, &gains);
+            }
+        }
+        if !last_own.is_empty() {
+            let n = last_own.len();
+            let mut own = rest(last_own, 0.0);
+            let rows = [&rest(last_x, 0.0), &rest(last_y, 0.0), &rest(last_z, 0.0)];
+            if GATE == REJECTED {
+                sums.rejected(rows, &mut own, &model, gains[0]);
+            } else {
+                sums.row::<GATE>(rows, &mut own, &model, &gains);
+            }
+            last_own.copy_from_slice(&own[..n]);
+        }
+        let mut lanes = [[0.0; LANES]; 7];
+        for (lanes, sum) in lanes.iter_mut().zip(sums.sums) {
+            sum.store(lanes);
+        }
+        total.add(sums.count as usize, &lanes);
+    }
+}
+
+/// The kernels of one implementation, compiled for the machines that have its vectors.
+macro_rules! kernels {
+    ($module:ident, $lanes:ty $(, $features:literal)?) => {
+        pub(super) mod $module {
+            use super::{HARD, REJECTED, SOFT, Total, WITHIN, count_body, gather_body};
+
+            /// # Safety
+            /// The machine must have the vectors.
+            $(#[target_feature(enable = $features)])?
+            pub(in super::super) unsafe fn count(rows: [&[f32]; 3], model: [f32; 3], limit: f32) -> usize {
+                // SAFETY: the caller vouches for the machine.
+                unsafe { count_body::<$lanes>(rows, model, limit) }
+            }
+
+            /// # Safety
+            /// The machine must have the vectors.
+            $(#[target_feature(enable = $features)])?
+            pub(in super::super) unsafe fn gather(
+                rows: [&[f32]; 3],
+                weights: &mut [f32],
+                model: [f32; 3],
+                gains: [f32; 2],
+                gate: u8,
+                total: &mut Total,
+            ) {
+                // SAFETY: the caller vouches for the machine.
+                unsafe {
+                    match gate {
+                        HARD => gather_body::<$lanes, HARD>(rows, weights, model, gains, total),
+                        REJECTED => gather_body::<$lanes, REJECTED>(rows, weights, model, gains, total),
+                        WITHIN => gather_body::<$lanes, WITHIN>(rows, weights, model, gains, total),
+                        _ => gather_body::<$lanes, SOFT>(rows, weights, model, gains, total),
+                    }
+                }
+            }
+        }
+    };
+}
+
+kernels!(plain, super::Plain);
+#[cfg(target_arch = "x86_64")]
+kernels!(avx2, super::x86::Pair, "avx2,popcnt");
+#[cfg(target_arch = "x86_64")]
+kernels!(avx512, super::x86::Wide, "avx512f,popcnt");
+
+/// Calls a kernel with the widest vectors of this machine.
+macro_rules! dispatch {
+    ($kernel:ident($($argument:expr),*)) => {{
+        #[cfg(target_arch = "x86_64")]
+        {
+            if is_x86_feature_detected!("avx512f") && is_x86_feature_detected!("popcnt") {
+                // SAFETY: the machine has them.
+                return unsafe { avx512::$kernel($($argument),*) };
+            }
+            if is_x86_feature_detected!("avx2") && is_x86_feature_detected!("popcnt") {
+                // SAFETY: the machine has them.
+                return unsafe { avx2::$kernel($($argument),*) };
+            }
+        }
+        // SAFETY: every machine has single numbers.
+        unsafe { plain::$kernel($($argument),*) }
+    }};
+}
+
+/// Counts rows `(x, y, z)` with `(h . row)^2 <= limit`; columns must be of one length.
+pub(super) fn count(rows: [&[f32]; 3], model: [f32; 3], limit: f32) -> usize {
+    dispatch!(count(rows, model, limit))
+}
+
+/// Adds the moments of a block of rows to the total, weighted and gated: `gains` are the squared limit of a hard gate and the
+/// inverse squared reach of a soft one. Columns and weights must be of one length.
+pub(super) fn gather(
+    rows: [&[f32]; 3],
+    weights: &mut [f32],
+    model: [f32; 3],
+    gains: [f32; 2],
+    gate: u8,
+    total: &mut Total,
+) {
+    dispatch!(gather(rows, weights, model, gains, gate, total));
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Sums of a block as bits, its count, and the weights that it leaves.
+    fn moments(kernel: impl Fn([&[f32]; 3], &mut [f32], &mut Total), n: usize) -> (Vec<u64>, usize, Vec<u32>) {
+        let column = |k: usize| -> Vec<f32> {
+            (0..n).map(|i| ((i * (3 + k) + 7 * k) as f32 * 0.37).sin() * if k == 2 { 0.1 } else { 1.0 }).collect()
+        };
+        let (x, y, z) = (column(0), column(1), column(2));
+        let mut weights: Vec<f32> = (0..n).map(|i| (i % 7) as f32 * 0.3).collect();
+        let mut total = Total::default();
+        kernel([&x, &y, &z], &mut weights, &mut total);
+        let bits = total.sums().iter().map(|sum| sum.to_bits()).collect();
+        (bits, total.count(), weights.iter().map(|w| w.to_bits()).collect())
+    }
+
+    #[test]
+    #[cfg(target_arch = "x86_64")]
+    fn vectors_of_any_width_give_the_same_bits() {
+        let (model, gains) = ([0.02, -0.03, 0.9], [0.01, 90.0]);
+        for n in (0..70).chain([511, 512, 2048]) {
+            for gate in [HARD, WITHIN, SOFT, REJECTED] {
+                // SAFETY: every machine has single numbers.
+                let plain = moments(|r, w, t| unsafe { plain::gather(r, w, model, gains, gate, t) }, n);
+                if is_x86_feature_detected!("avx2") && is_x86_feature_detected!("popcnt") {
+                    // SAFETY: the machine has them.
+                    let found = moments(|r, w, t| unsafe { avx2::gather(r, w, model, gains, gate, t) }, n);
+                    assert_eq!(found, plain, "{n} rows, gate {gate}");
+                }
+                if is_x86_feature_detected!("avx512f") && is_x86_feature_detected!("popcnt") {
+                    // SAFETY: the machine has them.
+                    let found = moments(|r, w, t| unsafe { avx512::gather(r, w, model, gains, gate, t) }, n);
+                    assert_eq!(found, plain, "{n} rows, gate {gate}");
+                }
+            }
+            let rows: Vec<f32> = (0..n).map(|i| (i as f32 * 0.7).sin()).collect();
+            let rows = [&rows[..]; 3];
+            // SAFETY: every machine has single numbers.
+            let plain = unsafe { plain::count(rows, model, 0.3) };
+            assert_eq!(count(rows, model, 0.3), plain);
+            if is_x86_feature_detected!("avx2") && is_x86_feature_detected!("popcnt") {
+                // SAFETY: the machine has them.
+                assert_eq!(unsafe { avx2::count(rows, model, 0.3) }, plain);
+            }
+        }
+    }
+}
