@@ -9,7 +9,7 @@ use crate::robust::{Gate, Real, Rows};
 /// Sectors of azimuth within which residuals are taken as one: an edge of a room rarely spans more.
 pub(super) const SECTORS: usize = 64;
 
-/// Rows that are enough for a covariance.
+/// Most rows that a covariance is made from.
 const ENOUGH: usize = 4000;
 
 /// An error below this many radians counts as a good estimate.
@@ -46,27 +46,31 @@ pub(super) fn clustered_covariance<T: Real>(
     sector: impl Fn(usize) -> u8,
 ) -> Option<Matrix2<f64>> {
     let Gate::Soft { scale } = gate else { return None };
-    let mut scores = [Vector2::<f64>::zeros(); SECTORS];
-    let mut information = [[0.0f64; 3]; SECTORS];
+    // Information (xx, xy, yy) and score of each sector.
+    let mut sectors = [[0.0f64; 5]; SECTORS];
     let [mut xx, mut xy, mut yy] = [0.0; 3];
     // A sample of the rows is enough to tell how the sectors err: sums over it are proportional to sums over all.
-    let stride = (rows.len() / ENOUGH).max(1);
+    let stride = rows.len().div_ceil(ENOUGH).max(1);
     rows.for_each_gated(model, gate, weights, stride, |row, [weight, slope, x, y, d]| {
-        (xx, xy, yy) = (xx + slope * x * x, xy + slope * x * y, yy + slope * y * y);
-        let sector = usize::from(sector(row)) % SECTORS;
-        scores[sector] += Vector2::new(x, y) * (weight * d);
-        let [a, b, c] = &mut information[sector];
-        (*a, *b, *c) = (*a + weight * x * x, *b + weight * x * y, *c + weight * y * y);
+        let (sx, sy, wx, wy) = (slope * x, slope * y, weight * x, weight * y);
+        (xx, xy, yy) = (xx + sx * x, xy + sx * y, yy + sy * y);
+        let sums = &mut sectors[usize::from(sector(row)) % SECTORS];
+        // Written out: a loop would take its terms through memory.
+        sums[0] += wx * x;
+        sums[1] += wx * y;
+        sums[2] += wy * y;
+        sums[3] += wx * d;
+        sums[4] += wy * d;
     });
     let inverse = inverse_of_positive(&Matrix2::new(xx, xy, xy, yy))?;
-    let held = || information.iter().zip(&scores).filter(|([a, _, c], _)| a + c > 0.0);
+    let held = || sectors.iter().filter(|[a, _, c, ..]| a + c > 0.0);
     if held().count() < 3 {
         return None;
     }
-    let total: f64 = held().map(|([a, _, c], _)| a + c).sum();
-    let pooled = held().map(|([a, _, c], score)| score.norm_squared() / (a + c)).sum::<f64>() / total;
+    let total: f64 = held().map(|[a, _, c, ..]| a + c).sum();
+    let pooled = held().map(|[a, _, c, x, y]| (x * x + y * y) / (a + c)).sum::<f64>() / total;
     let squares: Matrix2<f64> = held()
-        .map(|([a, b, c], _)| {
+        .map(|[a, b, c, ..]| {
             let block = Matrix2::new(*a, *b, *b, *c);
             block * block
         })
@@ -76,7 +80,7 @@ pub(super) fn clustered_covariance<T: Real>(
     });
     let clutter = CLUTTER_RAD * pixels_per_rad / stride as f64 * own * scale;
     let spread = squares * (SECTOR_SHARE * pooled) + Matrix2::identity() * (clutter * clutter);
-    let away = inverse * scores.iter().sum::<Vector2<f64>>();
+    let away = inverse * sectors.iter().map(|[.., x, y]| Vector2::new(*x, *y)).sum::<Vector2<f64>>();
     let covariance = inverse * spread * inverse + away * away.transpose();
     covariance.iter().all(|x| x.is_finite()).then_some(covariance)
 }

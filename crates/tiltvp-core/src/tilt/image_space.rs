@@ -60,6 +60,10 @@ impl Problem for Offsets<'_> {
         self.rows.moments([model.x, model.y, 1.0], gate, weights)
     }
 
+    fn trim(&self, before: &Moments, model: &Vector2<f64>, threshold: f64, weights: &mut [f32]) -> Moments {
+        self.rows.trim(before, [model.x, model.y, 1.0], threshold, weights)
+    }
+
     fn fit(&self, summary: &Moments, _near: &Vector2<f64>) -> Option<Vector2<f64>> {
         let [a, b, _] = summary.model();
         summary.step().map(|step| Vector2::new(a, b) + step)
@@ -84,7 +88,7 @@ impl Problem for Offsets<'_> {
 /// gradient with `phi` in `[0, pi)`.
 #[inline(always)]
 pub(super) fn edge_offset(u: f32, v: f32, gx: f32, gy: f32) -> [f32; 3] {
-    let sign = if gy < 0.0 || (gy == 0.0 && gx < 0.0) { -1.0 } else { 1.0 };
+    let sign = if (gy < 0.0) | ((gy == 0.0) & (gx < 0.0)) { -1.0 } else { 1.0 };
     let scale = sign / (gx * gx + gy * gy).sqrt();
     let (cos, sin) = (gx * scale, gy * scale);
     [cos, sin, cos * u + sin * v]
@@ -112,17 +116,23 @@ pub(super) fn offsets(
         for start in (0..n).step_by(BLOCK) {
             let part = start..(start + BLOCK).min(n);
             let slots = &edges.slot()[part.clone()];
-            for (place, slot) in block.places.iter_mut().zip(slots) {
-                let (u, v) = region.place(*slot as usize);
-                *place = [f32::from(u) - middle.0, f32::from(v) - middle.1];
-            }
-            block.fill(&edges.gx()[part.clone()], &edges.gy()[part]);
             for (i, slot) in slots.iter().enumerate() {
-                let gain = gains.get(*slot as usize).copied().unwrap_or(1.0);
-                let [cos, sin, s] = block.rows[i];
+                let (u, v) = region.place(*slot as usize);
+                (block.u[i], block.v[i]) = (f32::from(u) - middle.0, f32::from(v) - middle.1);
+            }
+            if gains.is_empty() {
+                block.gain.fill(1.0);
+            } else {
+                for (gain, slot) in block.gain.iter_mut().zip(slots) {
+                    *gain = gains.get(*slot as usize).copied().unwrap_or(1.0);
+                }
+            }
+            fill(&mut block, &edges.gx()[part.clone()], &edges.gy()[part], limit);
+            for i in 0..slots.len() {
                 // Written always and kept if it passes: a branch here would be guessed wrong too often.
-                (x[kept], y[kept], z[kept], places[kept]) = (gain * cos, gain * sin, -s, (start + i) as u32);
-                kept += usize::from(s.abs() <= limit && gain > 0.0);
+                (x[kept], y[kept], z[kept]) = (block.u[i], block.v[i], block.s[i]);
+                places[kept] = (start + i) as u32;
+                kept += usize::from(block.gain[i] > 0.0);
             }
         }
         kept
@@ -135,28 +145,31 @@ pub(super) fn offsets(
 /// Edge pixels whose offsets are computed together.
 const BLOCK: usize = 128;
 
-/// Places relative to the vanishing point, and `(cos phi, sin phi, s)` made from them.
+/// Places relative to the vanishing point and gains, then rows and gains that are zero where the prefilter rejects.
 struct Block {
-    places: [[f32; 2]; BLOCK],
-    rows: [[f32; 3]; BLOCK],
+    u: [f32; BLOCK],
+    v: [f32; BLOCK],
+    s: [f32; BLOCK],
+    gain: [f32; BLOCK],
 }
 
 impl Default for Block {
     fn default() -> Self {
-        Self { places: [[0.0; 2]; BLOCK], rows: [[0.0; 3]; BLOCK] }
+        let zero = [0.0; BLOCK];
+        Self { u: zero, v: zero, s: zero, gain: zero }
     }
 }
 
-impl Block {
-    fn fill(&mut self, gx: &[f32], gy: &[f32]) {
-        fill_rows(&self.places, gx, gy, &mut self.rows);
-    }
-}
-
+/// Makes rows of places, in place.
 #[multiversion(targets("x86_64+avx512f+avx512vl", "x86_64+avx2"))]
-fn fill_rows(places: &[[f32; 2]; BLOCK], gx: &[f32], gy: &[f32], rows: &mut [[f32; 3]; BLOCK]) {
-    for (((row, [u, v]), gx), gy) in rows.iter_mut().zip(places).zip(gx).zip(gy) {
-        *row = edge_offset(*u, *v, *gx, *gy);
+fn fill(block: &mut Block, gx: &[f32], gy: &[f32], limit: f32) {
+    let n = gx.len();
+    let (u, v, s, gain) = (&mut block.u[..n], &mut block.v[..n], &mut block.s[..n], &mut block.gain[..n]);
+    let gy = &gy[..n];
+    for i in 0..n {
+        let [cos, sin, offset] = edge_offset(u[i], v[i], gx[i], gy[i]);
+        (u[i], v[i], s[i]) = (gain[i] * cos, gain[i] * sin, -offset);
+        gain[i] = if offset.abs() <= limit { gain[i] } else { 0.0 };
     }
 }
 
