@@ -30,8 +30,19 @@ browser:
     DEBIAN_FRONTEND=noninteractive $root apt-get install --quiet --quiet --yes --no-install-recommends chromium > /dev/null
     command -v chromium > /dev/null
 
+# Debian's valgrind, with which a test counts the instructions of an image.
+valgrind:
+    #!/usr/bin/env bash
+    set -euo pipefail
+    command -v valgrind > /dev/null && exit
+    root=""
+    [ "$(id -u)" = 0 ] || root=sudo
+    $root apt-get update --quiet --quiet
+    DEBIAN_FRONTEND=noninteractive $root apt-get install --quiet --quiet --yes --no-install-recommends valgrind > /dev/null
+    command -v valgrind > /dev/null
+
 # Sets up; checks and tests everything that needs no data.
-test: setup browser check test-rust test-python
+test: setup browser valgrind check test-rust test-python
 
 # Formats and lints of both languages. (Types, stubs and layers are among the Python tests, the core's layers among the Rust ones.)
 check:
@@ -119,6 +130,10 @@ measure-calibration *arguments: setup
 # Self-calibration from the pictures of rendered drives.
 measure-calibration-images *arguments: setup
     {{bin}}/tiltvp measure calibration-images {{arguments}}
+
+# Time over pixels from 0.1 to 12 megapixels with the exponent, and a batch on one and on two threads.
+measure-growth *arguments: setup
+    {{bin}}/python benches/peers/growth.py {{arguments}}
 
 # Each method's time as a ratio to OpenCV's pair of Scharr derivatives, in one process on one thread.
 measure-time *arguments: setup
