@@ -8,6 +8,7 @@ mod alarm;
 mod bound;
 mod calibrator;
 mod graph;
+mod loss;
 mod measurement;
 mod mounting;
 mod observability;
@@ -16,6 +17,7 @@ mod offline;
 mod options;
 mod paper;
 mod recursive;
+mod schur;
 
 pub use self::bound::cramer_rao_bound;
 pub use self::calibrator::{CalibrationStep, MountingEstimate, SelfCalibrator};

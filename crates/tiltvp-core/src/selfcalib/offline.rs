@@ -5,7 +5,8 @@ use std::collections::BTreeMap;
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 
 use super::calibrator::{MountingEstimate, SelfCalibrator};
-use super::graph::{Descent, Free, Graph, Loss, Node, Sight, factor, information};
+use super::graph::{Descent, Free, Graph, Node, Sight, factor, information};
+use super::loss::{Loss, Slip};
 use super::measurement::{Landmark, camera};
 use super::mounting::Mounting;
 use super::odometry::{Leg, WheelMotion, Wheels, compose};
@@ -21,6 +22,9 @@ const GAP: usize = 60;
 /// How bearings count: first those far off linearly, then not at all.
 const FIRST: Loss = Loss::Linear(2.0);
 const LIMIT: f64 = 4.5;
+
+/// How far a motion may be from what the wheels tell before it counts less.
+const SLIP: Slip = Slip(5.0);
 
 /// A bearing of a log.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -256,6 +260,7 @@ fn empty(options: &LogOptions, guess: &Mounting) -> Graph {
         prior_information,
         bearing_sigma: o.bearing_sigma_rad,
         loss: FIRST,
+        slip: SLIP,
     }
 }
 

@@ -3,7 +3,8 @@
 use nalgebra::{Cholesky, DMatrix, DVector, Matrix2, Matrix3, RowVector2, SMatrix, Vector2, Vector3};
 
 use super::alarm::Alarm;
-use super::graph::{Free, Graph, Loss, Node, Sight, factor, information};
+use super::graph::{Free, Graph, Node, Sight, factor, information};
+use super::loss::{Loss, Slip};
 use super::measurement::{Landmark, Prediction, camera, predict};
 use super::odometry::{Leg, WheelMotion, Wheels, between, compose, compose_jacobians};
 use super::options::SelfCalibratorOptions;
@@ -36,6 +37,9 @@ const MAX_MISSES: u32 = 5;
 /// How bearings count in the memory: first those far off linearly, then not at all.
 const FIRST: Loss = Loss::Linear(3.0);
 const LIMIT: f64 = 4.5;
+
+/// How far a motion may be from what the wheels tell before it counts less.
+const SLIP: Slip = Slip(5.0);
 
 /// What a step found.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -88,6 +92,7 @@ impl Recursive {
             prior_information: DMatrix::from_column_slice(3, 3, inverse3(&options.start_covariance).as_slice()),
             bearing_sigma: options.bearing_sigma_rad,
             loss: FIRST,
+            slip: SLIP,
         };
         let mut mean = DVector::zeros(LANDMARKS);
         mean.fixed_rows_mut::<3>(MOUNTING).copy_from(&start);
