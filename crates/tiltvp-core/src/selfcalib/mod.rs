@@ -8,6 +8,7 @@ mod alarm;
 mod bound;
 mod calibrator;
 mod graph;
+mod growing;
 mod loss;
 mod measurement;
 mod mounting;
