@@ -1,9 +1,9 @@
 //! A stretch of a drive as a sparse least-squares problem: poses in a chain, each tied to the mounting and the landmarks.
 
-use nalgebra::{Cholesky, DMatrix, DVector, Dyn, Matrix3, Vector3};
+use nalgebra::{Cholesky, DMatrix, DVector, Dyn, Matrix3, Vector2, Vector3};
 
 use super::loss::{Loss, Slip};
-use super::measurement::{Landmark, predict, seen_at};
+use super::measurement::{Landmark, camera, predict, seen_at};
 use super::odometry::{Leg, WheelMotion, Wheels, between, compose, compose_jacobians};
 use super::schur::Eliminated;
 use crate::geometry::wrap_angle;
@@ -124,6 +124,20 @@ impl Graph {
         g
     }
 
+    /// This problem with the wheels as given if they are free here but should not be.
+    pub(super) fn with_fixed_wheels(mut self, wheels: Wheels) -> Self {
+        if self.free.wheels {
+            self.prior_mean = self.prior_mean.remove_rows(3, 2);
+            self.prior_information = self.prior_information.remove_rows(3, 2).remove_columns(3, 2);
+            self.free.wheels = false;
+            self.wheels = wheels;
+            for node in self.nodes.iter_mut().skip(1) {
+                node.leg = legs(&node.readings, &wheels, self.k_m);
+            }
+        }
+        self
+    }
+
     fn set_dense(&mut self, g: &DVector<f64>) {
         self.mounting = g.fixed_rows::<3>(0).into();
         if self.free.wheels {
@@ -211,6 +225,25 @@ impl Graph {
     /// The largest whitened residual of a bearing.
     pub(super) fn farthest(&self) -> f64 {
         self.residuals().iter().fold(0.0, |far, r| r.abs().max(far))
+    }
+
+    /// Describes every landmark from where the camera is now thought to have been when it first saw it: seen from elsewhere
+    /// a landmark may have to pass through its anchor to get where it belongs. The prior must know nothing of directions.
+    pub(super) fn reanchor(&mut self) {
+        let mut done = vec![false; self.landmarks.len()];
+        for node in &self.nodes {
+            for sight in node.sights.iter().filter(|sight| !std::mem::replace(&mut done[sight.landmark], true)) {
+                let old = self.landmarks[sight.landmark];
+                let anchor = camera(&node.pose, &self.mounting);
+                let (sin, cos) = old.direction.sin_cos();
+                let away = old.anchor + Vector2::new(cos, sin) * (-old.closeness).exp() - anchor;
+                if away.norm() > 1e-6 {
+                    let turn = wrap_angle(away.y.atan2(away.x) - old.direction);
+                    let direction = old.direction + turn;
+                    self.landmarks[sight.landmark] = Landmark { anchor, direction, closeness: -away.norm().ln() };
+                }
+            }
+        }
     }
 
     /// Puts every landmark from `first` on that has a whitened residual of `limit` or more at the distance that its bearings

@@ -7,13 +7,15 @@ use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 use super::graph::{Free, Graph, Node, Sight, information};
 use super::loss::{Loss, Slip};
 use super::measurement::{Landmark, camera, predict, seen_at};
-use super::mounting::Mounting;
 use super::odometry::{Leg, WheelMotion, Wheels, compose};
 use super::offline::{LogBearing, LogOptions};
 use crate::geometry::wrap_angle;
 
 /// Poses with bearings after which the log so far is solved.
 const STAGE: usize = 50;
+
+/// Poses with bearings after which a landmark that is seen again counts as another one where loops are not closed.
+const GAP: usize = 60;
 
 /// Spread of the directions in which a landmark was seen from which on it joins, radians.
 const PARALLAX: f64 = 0.15;
@@ -38,29 +40,36 @@ type Waiting = BTreeMap<u64, Vec<(usize, f64)>>;
 struct Growing<'a> {
     options: &'a LogOptions,
     graph: Graph,
-    joined: BTreeMap<u64, usize>,
+    /// Slot and last node of the landmarks that have joined.
+    joined: BTreeMap<u64, (usize, usize)>,
     waiting: Waiting,
+    /// Poses after which a landmark counts as another one.
+    gap: usize,
     /// Whether something was seen from the last node.
     looked: bool,
 }
 
 /// The problem of the whole log, solved roughly as it grows; `free` is what is estimated meanwhile.
 ///
-/// A landmark joins once it has been seen from directions that differ, and keeps its place when it is seen again.
+/// A landmark joins once it has been seen from directions that differ. Where `loops` are closed it keeps its place when it is
+/// seen again; otherwise it counts as another one after some poses.
 pub(super) fn grown(
     options: &LogOptions,
-    guess: &Mounting,
+    guess: &Vector3<f64>,
     free: Free,
+    loops: bool,
     readings: &[WheelMotion],
     times_s: Option<&[f64]>,
     order: &[LogBearing],
 ) -> Graph {
     let graph = empty(options, guess, free);
-    let mut growing = Growing { options, graph, joined: BTreeMap::new(), waiting: Waiting::new(), looked: true };
+    let gap = if loops { usize::MAX } else { GAP };
+    let mut growing = Growing { options, graph, joined: BTreeMap::new(), waiting: Waiting::new(), gap, looked: true };
     let (mut rest, mut solved) = (order, 1);
     for (step, reading) in readings.iter().enumerate() {
         if growing.graph.nodes.len() >= solved + STAGE && growing.looked {
             growing.join(3, PARALLAX);
+            growing.graph.reanchor();
             growing.graph.descend(6, 1.0, 1e-3);
             solved = growing.graph.nodes.len();
         }
@@ -76,12 +85,14 @@ pub(super) fn grown(
         growing.graph.nodes.pop();
     }
     growing.join(3, PARALLAX);
+    growing.graph.reanchor();
     growing.graph.descend(6, 1.0, 1e-3);
+    growing.graph.reanchor();
     growing.join(1, 0.0);
     growing.graph
 }
 
-fn empty(options: &LogOptions, guess: &Mounting, free: Free) -> Graph {
+fn empty(options: &LogOptions, guess: &Vector3<f64>, free: Free) -> Graph {
     let o = &options.filter;
     let width = free.width();
     let mut prior_mean = DVector::zeros(width);
@@ -100,7 +111,7 @@ fn empty(options: &LogOptions, guess: &Mounting, free: Free) -> Graph {
         prior_information[(at, at)] = 1.0 / (OFFSET_SIGMA_S * OFFSET_SIGMA_S);
     }
     Graph {
-        mounting: guess.vector(),
+        mounting: *guess,
         wheels: Wheels::new(o.wheel_base_m),
         offset_s: 0.0,
         free,
@@ -143,14 +154,18 @@ impl Growing<'_> {
     fn look(&mut self, seen: &LogBearing) {
         let here = self.graph.nodes.len() - 1;
         self.looked = true;
-        if let Some(slot) = self.joined.get(&seen.landmark) {
-            let sights = &mut self.graph.nodes[here].sights;
-            if !sights.iter().any(|sight| sight.landmark == *slot) {
-                sights.push(Sight { landmark: *slot, bearing: seen.bearing_rad });
+        let gap = self.gap;
+        if let Some((slot, last)) = self.joined.get_mut(&seen.landmark).filter(|(_, last)| here - last <= gap) {
+            if *last < here {
+                self.graph.nodes[here].sights.push(Sight { landmark: *slot, bearing: seen.bearing_rad });
+                *last = here;
             }
             return;
         }
         let waiting = self.waiting.entry(seen.landmark).or_default();
+        if waiting.last().is_some_and(|(last, _)| here - last > gap) {
+            waiting.clear();
+        }
         if waiting.last().is_none_or(|(node, _)| *node != here) {
             waiting.push((here, seen.bearing_rad));
         }
@@ -172,10 +187,12 @@ impl Growing<'_> {
             }
             let o = &self.options.filter;
             let slot = self.graph.add_landmark(landmark, -o.start_distance_m.ln(), o.start_distance_log_sigma);
+            let mut last = 0;
             for (node, bearing) in self.waiting.remove(&name).into_iter().flatten() {
                 self.graph.nodes[node].sights.push(Sight { landmark: slot, bearing });
+                last = node;
             }
-            self.joined.insert(name, slot);
+            self.joined.insert(name, (slot, last));
         }
     }
 

@@ -2,6 +2,8 @@
 
 use std::collections::BTreeMap;
 
+use nalgebra::Vector3;
+
 use super::calibrator::{MountingEstimate, SelfCalibrator};
 use super::graph::{Descent, Free, Graph, factor};
 use super::growing::grown;
@@ -98,13 +100,26 @@ pub fn calibrate_log(
     order.sort_by_key(|b| b.step);
     let asked = Free { wheels: options.estimate_odometry, offset: options.estimate_time_offset };
     let mut best: Option<(Graph, Descent)> = None;
-    for (from_filter, free) in [(false, asked), (true, asked)] {
-        let guess = if from_filter { first_guess(options, readings, &order)? } else { options.filter.start };
-        let mut graph = grown(options, &guess, free, readings, times_s, &order);
+    let start = options.filter.start.vector();
+    let with_wheels = Free { wheels: true, ..asked };
+    for attempt in 0..4 {
+        let free = if attempt == 1 || attempt == 2 { with_wheels } else { asked };
+        let guess = match attempt {
+            2 => grown(options, &start, free, false, readings, times_s, &order).mounting,
+            3 => first_guess(options, readings, &order)?,
+            _ => start,
+        };
+        let mut graph = grown(options, &guess, free, true, readings, times_s, &order);
+        if free != asked {
+            graph.descend(options.max_iterations, TOLERANCE, 1e-3);
+            graph = graph.with_fixed_wheels(Wheels::new(options.filter.wheel_base_m));
+        }
+        if std::env::var("DBG").is_ok() {eprintln!("attempt {attempt} guess {guess:?} grown {:?} cost {}",graph.mounting,graph.cost());}
         let first = graph.descend(options.max_iterations, TOLERANCE, 1e-3);
         graph.loss = Loss::Cut(LIMIT);
         let then = graph.descend(options.max_iterations, TOLERANCE, 1e-3);
         let descent = Descent { iterations: first.iterations + then.iterations, ..then };
+        if std::env::var("DBG").is_ok() {eprintln!("   -> {descent:?} rms {} {:?}",graph.residual_rms(),graph.mounting);}
         let good = descent.converged && graph.residual_rms() < GOOD_RMS;
         if descent.cost.is_finite() && best.as_ref().is_none_or(|(_, best)| descent.cost < best.cost) {
             best = Some((graph, descent));
@@ -165,7 +180,7 @@ fn check(
 }
 
 /// What the default filter makes of the log.
-fn first_guess(options: &LogOptions, readings: &[WheelMotion], order: &[LogBearing]) -> Result<Mounting> {
+fn first_guess(options: &LogOptions, readings: &[WheelMotion], order: &[LogBearing]) -> Result<Vector3<f64>> {
     let mut filter =
         SelfCalibrator::new(SelfCalibratorOptions { method: CalibrationMethod::Default, ..options.filter })?;
     let mut next = 0;
@@ -178,8 +193,8 @@ fn first_guess(options: &LogOptions, readings: &[WheelMotion], order: &[LogBeari
         let (names, angles): (Vec<u64>, Vec<f64>) = seen.into_iter().unzip();
         filter.step(reading, &names, &angles)?;
     }
-    let found = filter.estimate().mounting;
-    Ok(if found.vector().iter().all(|x| x.is_finite()) { found } else { options.filter.start })
+    let found = filter.estimate().mounting.vector();
+    Ok(if found.iter().all(|x| x.is_finite()) { found } else { options.filter.start.vector() })
 }
 
 fn report(options: &LogOptions, graph: &Graph, descent: &Descent) -> Result<LogCalibration> {
