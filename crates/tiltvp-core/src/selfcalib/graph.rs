@@ -228,9 +228,12 @@ impl Graph {
     }
 
     /// Describes every landmark from where the camera is now thought to have been when it first saw it: seen from elsewhere
-    /// a landmark may have to pass through its anchor to get where it belongs. The prior must know nothing of directions.
+    /// a landmark may have to pass through its anchor to get where it belongs. Landmarks of which the prior knows the
+    /// direction stay as they are.
     pub(super) fn reanchor(&mut self) {
-        let mut done = vec![false; self.landmarks.len()];
+        let fixed = self.free.width();
+        let known = |slot| self.prior_information[(fixed + 2 * slot, fixed + 2 * slot)] > 0.0;
+        let mut done: Vec<bool> = (0..self.landmarks.len()).map(known).collect();
         for node in &self.nodes {
             for sight in node.sights.iter().filter(|sight| !std::mem::replace(&mut done[sight.landmark], true)) {
                 let old = self.landmarks[sight.landmark];

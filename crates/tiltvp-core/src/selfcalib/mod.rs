@@ -11,6 +11,7 @@ mod graph;
 mod growing;
 mod loss;
 mod measurement;
+mod memory;
 mod mounting;
 mod observability;
 mod odometry;
@@ -19,6 +20,7 @@ mod options;
 mod paper;
 mod recursive;
 mod schur;
+mod update;
 
 pub use self::bound::cramer_rao_bound;
 pub use self::calibrator::{CalibrationStep, MountingEstimate, SelfCalibrator};
