@@ -42,7 +42,7 @@ pub fn cramer_rao_bound(
     graph.mounting = truth;
     let mut slots = vec![None; landmarks_m.len()];
     for ((reading, pose), seen) in readings.iter().zip(poses).zip(sights) {
-        let leg = Leg::from_wheels(reading, &graph.wheels, graph.k_m);
+        let leg = Leg::from_wheels(reading, &graph.wheels, &graph.noise);
         let still = reading.left_m == 0.0 && reading.right_m == 0.0;
         if !still {
             match graph.nodes.last_mut() {

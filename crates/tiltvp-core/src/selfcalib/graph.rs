@@ -4,7 +4,7 @@ use nalgebra::{Cholesky, DMatrix, DVector, Dyn, Matrix3, Vector2, Vector3};
 
 use super::loss::{Loss, Slip};
 use super::measurement::{Landmark, camera, predict, seen_at};
-use super::odometry::{Leg, WheelMotion, Wheels, between, compose, compose_jacobians};
+use super::odometry::{Leg, MotionNoise, WheelMotion, Wheels, between, compose, compose_jacobians};
 use super::schur::Eliminated;
 use crate::geometry::wrap_angle;
 
@@ -76,7 +76,7 @@ pub(super) struct Graph {
     pub(super) wheels: Wheels,
     pub(super) offset_s: f64,
     pub(super) free: Free,
-    pub(super) k_m: f64,
+    pub(super) noise: MotionNoise,
     pub(super) landmarks: Vec<Landmark>,
     pub(super) nodes: Vec<Node>,
     /// Mean of the dense block before the bearings of the nodes.
@@ -132,7 +132,7 @@ impl Graph {
             self.free.wheels = false;
             self.wheels = wheels;
             for node in self.nodes.iter_mut().skip(1) {
-                node.leg = legs(&node.readings, &wheels, self.k_m);
+                node.leg = legs(&node.readings, &wheels, &self.noise);
             }
         }
         self
@@ -143,7 +143,7 @@ impl Graph {
         if self.free.wheels {
             self.wheels = Wheels { imbalance: g[3], base_m: g[4].exp() };
             for node in self.nodes.iter_mut().skip(1) {
-                node.leg = legs(&node.readings, &self.wheels, self.k_m);
+                node.leg = legs(&node.readings, &self.wheels, &self.noise);
             }
         }
         if self.free.offset {
@@ -341,6 +341,6 @@ pub(super) fn factor(information: DMatrix<f64>) -> Option<Cholesky<f64, Dyn>> {
 }
 
 /// The leg of readings in a row.
-pub(super) fn legs(readings: &[WheelMotion], wheels: &Wheels, k_m: f64) -> Leg {
-    readings.iter().fold(Leg::none(), |leg, reading| leg.then(&Leg::from_wheels(reading, wheels, k_m)))
+pub(super) fn legs(readings: &[WheelMotion], wheels: &Wheels, noise: &MotionNoise) -> Leg {
+    readings.iter().fold(Leg::none(), |leg, reading| leg.then(&Leg::from_wheels(reading, wheels, noise)))
 }

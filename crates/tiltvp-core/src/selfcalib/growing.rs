@@ -115,7 +115,7 @@ fn empty(options: &LogOptions, guess: &Vector3<f64>, free: Free) -> Graph {
         wheels: Wheels::new(o.wheel_base_m),
         offset_s: 0.0,
         free,
-        k_m: o.odometry_k_m,
+        noise: o.motion_noise(),
         landmarks: Vec::new(),
         nodes: vec![Node::anchor()],
         prior_mean,
@@ -133,7 +133,7 @@ impl Growing<'_> {
             return;
         }
         let graph = &mut self.graph;
-        let leg = Leg::from_wheels(reading, &graph.wheels, graph.k_m);
+        let leg = Leg::from_wheels(reading, &graph.wheels, &graph.noise);
         let velocity = if seconds > 0.0 { leg.motion / seconds } else { Vector3::zeros() };
         let Some(last) = graph.nodes.last_mut() else { return };
         let pose = compose(&last.pose, &leg.motion);

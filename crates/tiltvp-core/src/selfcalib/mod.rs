@@ -26,7 +26,7 @@ pub use self::bound::cramer_rao_bound;
 pub use self::calibrator::{CalibrationStep, MountingEstimate, SelfCalibrator};
 pub use self::mounting::Mounting;
 pub use self::observability::{FeatureRange, Observability, PureMotion, observable_dimension};
-pub use self::odometry::{Leg, WheelMotion, Wheels};
+pub use self::odometry::{Leg, MotionNoise, WheelMotion, Wheels};
 pub use self::offline::{LogBearing, LogCalibration, LogOptions, calibrate_log};
 pub use self::options::{CALIBRATION_METHODS, CalibrationMethod, SelfCalibratorOptions};
 pub use self::paper::{Feature, dynamics, dynamics_jacobians, observation, observation_jacobians};

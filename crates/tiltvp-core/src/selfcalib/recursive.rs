@@ -80,7 +80,7 @@ impl Recursive {
             wheels: Wheels::new(options.wheel_base_m),
             offset_s: 0.0,
             free: Free::default(),
-            k_m: options.odometry_k_m,
+            noise: options.motion_noise(),
             landmarks: Vec::new(),
             nodes: vec![Node::anchor()],
             prior_mean: DVector::from_column_slice(start.as_slice()),
@@ -178,7 +178,7 @@ impl Recursive {
         if motion.left_m == 0.0 && motion.right_m == 0.0 {
             return;
         }
-        let leg = Leg::from_wheels(motion, &self.graph.wheels, self.graph.k_m);
+        let leg = Leg::from_wheels(motion, &self.graph.wheels, &self.graph.noise);
         let nodes = &mut self.graph.nodes;
         let alone = nodes.len() == 1;
         let Some(last) = nodes.last_mut() else { return };

@@ -439,7 +439,7 @@ mod tests {
     use super::super::graph::{Free, Sight, information};
     use super::super::loss::{Loss, Slip};
     use super::super::measurement::{Landmark, camera};
-    use super::super::odometry::{Leg, WheelMotion, Wheels, compose};
+    use super::super::odometry::{Leg, MotionNoise, WheelMotion, Wheels, compose};
     use super::*;
     use nalgebra::Vector2;
 
@@ -452,7 +452,7 @@ mod tests {
             wheels,
             offset_s: 0.0,
             free,
-            k_m: 1e-4,
+            noise: MotionNoise::new(1e-4),
             landmarks: Vec::new(),
             nodes: vec![Node::anchor()],
             prior_mean: DVector::zeros(width),
@@ -469,7 +469,7 @@ mod tests {
         for i in 0..31usize {
             let bend = 0.02 * (i as f64 * 0.4).sin();
             let reading = WheelMotion { left_m: 0.1 - bend, right_m: 0.1 + bend };
-            let leg = Leg::from_wheels(&reading, &wheels, 1e-4);
+            let leg = Leg::from_wheels(&reading, &wheels, &MotionNoise::new(1e-4));
             let last = graph.nodes[i].pose;
             let pose = compose(&last, &leg.motion) + Vector3::new(1e-3, -2e-3, 3e-3) * (i as f64 * 1.3).sin();
             let seen = [i / 3, (i / 3 + 1) % 12, (i / 2 + 5) % 12];
