@@ -65,32 +65,30 @@ pub(super) fn grown(
     times_s: Option<&[f64]>,
     order: &[LogBearing],
 ) -> Graph {
-    let graph = empty(options, guess, free);
-    let gap = if loops { usize::MAX } else { GAP };
-    let mut growing = Growing { options, graph, joined: BTreeMap::new(), waiting: Waiting::new(), gap, looked: true };
-    let (mut rest, mut solved) = (order, 1);
-    for (step, reading) in readings.iter().enumerate() {
-        if growing.graph.nodes.len() >= solved + (solved / STAGE.0).clamp(STAGE.1, STAGE.2) && growing.looked {
-            growing.join(3, PARALLAX);
-            growing.graph.reanchor();
-            growing.graph.descend(6, 1.0, 1e-3);
-            solved = growing.graph.nodes.len();
-        }
-        let seconds = times_s.map_or(0.0, |t| if step == 0 { 0.0 } else { t[step] - t[step - 1] });
-        growing.advance(reading, seconds);
-        let (now, later) = rest.split_at(rest.partition_point(|b| b.step <= step));
-        rest = later;
-        for seen in now {
-            growing.look(seen);
-        }
-    }
-    if !growing.looked && growing.graph.nodes.len() > 1 {
-        growing.graph.nodes.pop();
-    }
+    let mut growing = Growing::new(options, guess, free, if loops { usize::MAX } else { GAP });
+    growing.read(readings, times_s, order, true);
     growing.join(3, PARALLAX);
     growing.graph.reanchor();
     growing.graph.descend(6, 1.0, 1e-3);
     growing.graph.reanchor();
+    growing.join(1, 0.0);
+    growing.graph
+}
+
+/// The problem of the whole log with the mounting and, as far as they match, the poses of another one.
+pub(super) fn along(
+    options: &LogOptions,
+    found: &Graph,
+    free: Free,
+    readings: &[WheelMotion],
+    times_s: Option<&[f64]>,
+    order: &[LogBearing],
+) -> Graph {
+    let mut growing = Growing::new(options, &found.mounting, free, usize::MAX);
+    growing.read(readings, times_s, order, false);
+    for (node, other) in growing.graph.nodes.iter_mut().zip(&found.nodes) {
+        node.pose = other.pose;
+    }
     growing.join(1, 0.0);
     growing.graph
 }
@@ -129,7 +127,36 @@ fn empty(options: &LogOptions, guess: &Vector3<f64>, free: Free) -> Graph {
     }
 }
 
-impl Growing<'_> {
+impl<'a> Growing<'a> {
+    fn new(options: &'a LogOptions, guess: &Vector3<f64>, free: Free, gap: usize) -> Self {
+        let graph = empty(options, guess, free);
+        Self { options, graph, joined: BTreeMap::new(), waiting: Waiting::new(), gap, looked: true }
+    }
+
+    /// Adds a log, solving it as it grows if `solve`; otherwise all landmarks wait.
+    fn read(&mut self, readings: &[WheelMotion], times_s: Option<&[f64]>, order: &[LogBearing], solve: bool) {
+        let (mut rest, mut solved) = (order, 1);
+        for (step, reading) in readings.iter().enumerate() {
+            let due = self.graph.nodes.len() >= solved + (solved / STAGE.0).clamp(STAGE.1, STAGE.2);
+            if solve && due && self.looked {
+                self.join(3, PARALLAX);
+                self.graph.reanchor();
+                self.graph.descend(6, 1.0, 1e-3);
+                solved = self.graph.nodes.len();
+            }
+            let seconds = times_s.map_or(0.0, |t| if step == 0 { 0.0 } else { t[step] - t[step - 1] });
+            self.advance(reading, seconds);
+            let (now, later) = rest.split_at(rest.partition_point(|b| b.step <= step));
+            rest = later;
+            for seen in now {
+                self.look(seen);
+            }
+        }
+        if !self.looked && self.graph.nodes.len() > 1 {
+            self.graph.nodes.pop();
+        }
+    }
+
     /// Adds a step's motion.
     fn advance(&mut self, reading: &WheelMotion, seconds: f64) {
         if reading.left_m == 0.0 && reading.right_m == 0.0 {

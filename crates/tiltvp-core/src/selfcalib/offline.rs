@@ -2,15 +2,14 @@
 
 use std::collections::BTreeMap;
 
-use nalgebra::Vector3;
-
-use super::calibrator::{MountingEstimate, SelfCalibrator};
+use super::calibrator::MountingEstimate;
 use super::graph::{Descent, Free, Graph, factor};
-use super::growing::grown;
+use super::growing::{along, grown};
 use super::loss::Loss;
 use super::mounting::Mounting;
 use super::odometry::{WheelMotion, Wheels};
 use super::options::{CalibrationMethod, SelfCalibratorOptions};
+use super::recursive::Recursive;
 use crate::error::{Error, Result};
 
 /// Standard deviations beyond which bearings are outliers.
@@ -90,7 +89,7 @@ enum Guess {
     Start,
     /// The log without loops.
     Open,
-    /// The default filter.
+    /// The default filter, poses too.
     Filter,
 }
 
@@ -114,17 +113,22 @@ pub fn calibrate_log(
     let start = options.filter.start.vector();
     let with_wheels = Free { wheels: true, ..asked };
     // Wheels that may give a little let loops close; a start far off may need a map without loops, or the filter's answer.
-    let attempts = [(with_wheels, Guess::Start), (asked, Guess::Start), (with_wheels, Guess::Open), (asked, Guess::Filter)];
+    let attempts = [(with_wheels, Guess::Start), (asked, Guess::Filter), (asked, Guess::Start), (with_wheels, Guess::Open)];
     for (i, (free, guess)) in attempts.into_iter().enumerate() {
-        if i == 1 && asked == with_wheels {
+        if i == 2 && asked == with_wheels {
             continue;
         }
-        let guess = match guess {
-            Guess::Start => start,
-            Guess::Open => grown(options, &start, free, false, readings, times_s, &order).mounting,
-            Guess::Filter => first_guess(options, readings, &order)?,
+        let mut graph = match guess {
+            Guess::Start => grown(options, &start, free, true, readings, times_s, &order),
+            Guess::Open => {
+                let open = grown(options, &start, free, false, readings, times_s, &order).mounting;
+                grown(options, &open, free, true, readings, times_s, &order)
+            }
+            Guess::Filter => {
+                let found = filtered(options, readings, &order)?;
+                along(options, &found, free, readings, times_s, &order)
+            }
         };
-        let mut graph = grown(options, &guess, free, true, readings, times_s, &order);
         if free != asked {
             graph.descend(options.max_iterations, TOLERANCE, 1e-3);
             graph = graph.with_fixed_wheels(Wheels::new(options.filter.wheel_base_m));
@@ -194,22 +198,22 @@ fn check(
     }
 }
 
-/// What the default filter makes of the log.
-fn first_guess(options: &LogOptions, readings: &[WheelMotion], order: &[LogBearing]) -> Result<Vector3<f64>> {
-    let mut filter =
-        SelfCalibrator::new(SelfCalibratorOptions { method: CalibrationMethod::Default, ..options.filter })?;
-    let mut next = 0;
+/// What the default filter makes of the log if it forgets nothing: its poses and the mounting.
+fn filtered(options: &LogOptions, readings: &[WheelMotion], order: &[LogBearing]) -> Result<Graph> {
+    let method = CalibrationMethod::Default;
+    let mut filter = Recursive::new(&SelfCalibratorOptions { method, memory: u32::MAX, ..options.filter })?;
+    let mut rest = order;
     for (step, reading) in readings.iter().enumerate() {
+        let (now, later) = rest.split_at(rest.partition_point(|b| b.step <= step));
+        rest = later;
         let mut seen: BTreeMap<u64, f64> = BTreeMap::new();
-        while let Some(b) = order.get(next).filter(|b| b.step == step) {
+        for b in now {
             seen.entry(b.landmark).or_insert(b.bearing_rad);
-            next += 1;
         }
-        let (names, angles): (Vec<u64>, Vec<f64>) = seen.into_iter().unzip();
-        filter.step(reading, &names, &angles)?;
+        let seen: Vec<(u64, f64)> = seen.into_iter().collect();
+        filter.step(reading, &seen);
     }
-    let found = filter.estimate().mounting.vector();
-    Ok(if found.iter().all(|x| x.is_finite()) { found } else { options.filter.start.vector() })
+    Ok(filter.into_graph())
 }
 
 fn report(options: &LogOptions, graph: &Graph, descent: &Descent) -> Result<LogCalibration> {
