@@ -124,6 +124,10 @@ measure-calibration-images *arguments: setup
 measure-time *arguments: setup
     {{bin}}/python benches/peers/scharr.py {{arguments}}
 
+# A step of the self-calibration filters against a dense NumPy filter of the paper's equations, in one process.
+measure-calibration-time *arguments: setup
+    OPENBLAS_NUM_THREADS=1 {{bin}}/python benches/peers/calibration_filter.py {{arguments}}
+
 # The benches of the core.
 bench *arguments:
     cargo bench --locked --package tiltvp-benches {{arguments}}
