@@ -7,6 +7,7 @@ mod drive;
 mod lines;
 mod rays;
 mod selfcalib;
+mod stereo;
 mod synth;
 mod tilt;
 
@@ -33,6 +34,8 @@ mod _core {
         CalibrationStep, LogCalibration, MountingEstimate, SelfCalibrator, SimulatedDrive, calibrate, consistency_band,
         simulate_drive, wheel_displacements,
     };
+    #[pymodule_export]
+    use crate::stereo::{Laboratory, StereoSequence};
     #[pymodule_export]
     use crate::synth::Room;
     #[pymodule_export]
