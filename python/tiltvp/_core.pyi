@@ -1392,6 +1392,184 @@ class Room:
     def __eq__(self, other: object, /) -> bool: ...
     def __hash__(self) -> int: ...
 
+@final
+class ComplementaryFilter:
+    """Rates of turn in the short run, a reference attitude in the long run: `ComplementaryFilter(reference_from_body)`.
+
+    The explicit complementary filter on rotations with corrections that arrive now and then: an attitude seen in an
+    image, say, among the readings of a gyroscope. `time_constant_s` (None: 0.15) is the time after which a difference
+    from the reference has shrunk to 1/e; `bias_time_constant_s` (None: 4) that over which a lasting difference becomes
+    a bias of the rates. Raises `tiltvp.errors.InvalidInputError`.
+    """
+
+    def __new__(
+        cls,
+        reference_from_body: ArrayLike,
+        *,
+        time_constant_s: float | None = None,
+        bias_time_constant_s: float | None = None,
+    ) -> Self:
+        """Starts at an attitude (3, 3), with no bias."""
+
+    @property
+    def time_constant_s(self) -> float:
+        """Time after which a difference from the reference has shrunk to 1/e."""
+
+    @property
+    def bias_time_constant_s(self) -> float:
+        """Time over which a lasting difference becomes a bias of the rates."""
+
+    @property
+    def reference_from_body(self) -> NDArray[np.float64]:
+        """(3, 3): the attitude now, which takes vectors of the body to the frame of the reference."""
+
+    @property
+    def bias_rad_s(self) -> NDArray[np.float64]:
+        """(3,): the bias of the rates, in the body's axes."""
+
+    def predict(self, rate_rad_s: ArrayLike, duration_s: float) -> None:
+        """Turns on by a rate (3,), in the body's axes, that holds for so long."""
+
+    def correct(self, reference_from_body: ArrayLike) -> NDArray[np.float64]:
+        """Moves towards a reference (3, 3) by the share 1 - exp(-t / time_constant_s), t the time since the last one.
+
+        Returns (3,): the difference that it found, as a rotation vector in the body's axes.
+        """
+
+@disjoint_base
+class Laboratory:
+    """A plain room with a coloured cuboid, to be looked at by `tiltvp.synth.StereoSequence`.
+
+    Frozen, comparable, hashable, and to be pickled.
+    """
+
+    def __new__(
+        cls,
+        seed: SupportsIndex,
+        *,
+        size_m: ArrayLike | None = None,
+        gamma_rad: float | None = None,
+        clutter: float | None = None,
+        side_light: float | None = None,
+        light_spacing_m: float | None = None,
+        threads: SupportsIndex | None = None,
+    ) -> Self:
+        """Builds and lights it on `threads` threads (None: one per core), which do not matter."""
+
+    @property
+    def seed(self) -> int:
+        """The seed of everything in it."""
+
+    @property
+    def size_m(self) -> tuple[float, float, float]:
+        """Lengths of the cuboid's edges x, y, z."""
+
+    @property
+    def gamma_rad(self) -> float:
+        """The angle between the cuboid's level edges."""
+
+    @property
+    def clutter(self) -> float:
+        """How full the walls are, from 0 to 1."""
+
+    @property
+    def side_light(self) -> float:
+        """Power of the lamp beside the cuboid, from 0 to 1."""
+
+    @property
+    def light_spacing_m(self) -> float:
+        """Spacing of the points where light was gathered."""
+
+    def __eq__(self, other: object) -> bool: ...
+    def __hash__(self) -> int: ...
+
+@disjoint_base
+class StereoSequence:
+    """A moving pair of cameras, any frame of which can be rendered by `tiltvp.synth.StereoSequence`.
+
+    Frozen, comparable, hashable, and to be pickled. N is the number of frames.
+    """
+
+    def __new__(
+        cls,
+        scene: Laboratory | Room,
+        *,
+        left: Camera,
+        right: Camera,
+        left_from_right: ArrayLike | None = None,
+        frames: SupportsIndex | None = None,
+        frame_rate_hz: float | None = None,
+        seed: SupportsIndex | None = None,
+        corner: SupportsIndex | None = None,
+        distance_m: ArrayLike | None = None,
+        roll_max_rad: float | None = None,
+        period_s: float | None = None,
+        samples: SupportsIndex | None = None,
+        noise_sigma: float | None = None,
+        blur_sigma_px: float | None = None,
+        exposure_s: float | None = None,
+        gain: float | None = None,
+    ) -> Self:
+        """Finds a motion in the scene."""
+
+    @property
+    def scene(self) -> Laboratory | Room:
+        """What is looked at."""
+
+    @property
+    def cameras(self) -> tuple[Camera, Camera]:
+        """The left and the right camera."""
+
+    @property
+    def seed(self) -> int:
+        """The seed of motion and noise."""
+
+    @property
+    def corner(self) -> int:
+        """Which of the scene's corners is looked at."""
+
+    @property
+    def frame_rate_hz(self) -> float:
+        """Frames per second."""
+
+    @property
+    def exposure_s(self) -> float:
+        """How long the shutter is open."""
+
+    @property
+    def left_from_right(self) -> NDArray[np.float64]:
+        """(4, 4): the right camera's pose in the left one's frame."""
+
+    @property
+    def times_s(self) -> NDArray[np.float64]:
+        """(N,): when each frame is taken."""
+
+    @property
+    def poses(self) -> NDArray[np.float64]:
+        """(N, 4, 4): `world_from_left` at each frame."""
+
+    def poses_at(self, times_s: ArrayLike) -> NDArray[np.float64]:
+        """(T, 4, 4): `world_from_left` at any times (T,)."""
+
+    def _corners(self) -> list[tuple[list[float], list[list[float]], list[float], str]]: ...
+    def _render(
+        self, frame: SupportsIndex, *, threads: SupportsIndex | None = None
+    ) -> tuple[NDArray[np.uint8], NDArray[np.uint8]]: ...
+    def _truth(
+        self, frame: SupportsIndex, *, threads: SupportsIndex | None = None
+    ) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]: ...
+    def _imu(
+        self,
+        *,
+        rate_hz: float | None = None,
+        seed: SupportsIndex | None = None,
+        gyroscope: ArrayLike | None = None,
+        accelerometer: ArrayLike | None = None,
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]: ...
+    def __len__(self) -> int: ...
+    def __eq__(self, other: object) -> bool: ...
+    def __hash__(self) -> int: ...
+
 @disjoint_base
 class Drive:
     """A robot's way through a room, any frame of which can be rendered by `tiltvp.synth.Drive`.

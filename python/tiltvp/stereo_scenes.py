@@ -1,4 +1,4 @@
-"""Pairs of cameras that move through rendered scenes, and the corners that they see: what `tiltvp.synth` offers of it."""
+"""Pairs of cameras that move through rendered scenes, and the corners that they see, for `tiltvp.synth`."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from tiltvp import _core
 from tiltvp.cameras import Camera
 from tiltvp.errors import InvalidInputError
 
-__all__ = ["Laboratory", "SceneCorner", "StereoSequence", "StereoTruth", "zed_cameras"]
+__all__ = ["ImuLog", "Laboratory", "SceneCorner", "StereoSequence", "StereoTruth", "zed_cameras"]
 
 
 def zed_cameras(width: int = 1280) -> tuple[Camera, Camera]:
@@ -39,13 +39,13 @@ def zed_cameras(width: int = 1280) -> tuple[Camera, Camera]:
 
 
 class Laboratory(_core.Laboratory):
-    """A plain room with a cuboid on its floor and a lamp beside it: `Laboratory(seed)`. The same arguments, the same room.
+    """A plain room with a cuboid on its floor and a lamp beside it: `Laboratory(seed)`.
 
-    Seen from the front, the cuboid's upper face is red, its left one green, its right one blue; the other faces are
-    grey. `size_m` is how long its edges x (above the blue face), y (upright) and z (above the green face) are,
-    `gamma_rad` the angle between x and z. `clutter`, from 0 to 1, is how full the walls are with furniture, and
-    `side_light`, from 0 to 1, the power of the lamp beside it. `light_spacing_m` is how finely light is gathered, on
-    `threads` threads (None: one per core), which do not matter. None is for the default.
+    The same arguments give the same room. Seen from the front, the cuboid's upper face is red, its left one green, its
+    right one blue; the other faces are grey. `size_m` is how long its edges x (above the blue face), y (upright) and z
+    (above the green face) are, `gamma_rad` the angle between x and z. `clutter`, from 0 to 1, is how full the walls are
+    with furniture, and `side_light`, from 0 to 1, the power of the lamp beside it. `light_spacing_m` is how finely light
+    is gathered, on `threads` threads (None: one per core), which do not matter. None is for the default.
 
     Comparable, hashable, and to be pickled. Raises `tiltvp.errors.InvalidInputError`.
     """
@@ -92,6 +92,20 @@ class StereoTruth:
     """(M, 2, 3): in either image, how long the edges x, y, z are from the vertex on to where they are hidden or end."""
 
 
+@dataclass(frozen=True, eq=False)
+class ImuLog:
+    """What an inertial sensor reads along a motion, at the left camera's centre and in its axes (x right, y down)."""
+
+    times_s: NDArray[np.float64]
+    """(M,): when."""
+    rates_rad_s: NDArray[np.float64]
+    """(M, 3): rates of turn."""
+    forces_m_s2: NDArray[np.float64]
+    """(M, 3): specific forces; at rest they point upwards, against gravity."""
+    rate_biases_rad_s: NDArray[np.float64]
+    """(M, 3): the true bias of the rates, which no sensor tells."""
+
+
 class StereoSequence(_core.StereoSequence):
     """A pair of cameras, held by hand, that looks at a corner of a scene: `StereoSequence(scene, left=..., right=...)`.
 
@@ -101,11 +115,12 @@ class StereoSequence(_core.StereoSequence):
     degrees of freedom, `distance_m` (least and greatest) away from the corner, rolling by up to `roll_max_rad`, with
     slow sways of about `period_s` and the tremor of hands. `left_from_right` is the right camera's pose in the left
     one's frame; None is 0.12 m to the right, turned by less than half a degree. The exposure is fixed by `gain`;
-    `exposure_s` is how long the shutter is open, for motion blur; `blur_sigma_px` is what lens and sensor do to a point,
-    `noise_sigma` in grey levels; `samples` the rays per pixel and side where surfaces meet. None is for the default.
+    `exposure_s` is how long the shutter is open, for motion blur; `blur_sigma_px` is what lens and sensor do to a
+    point, `noise_sigma` in grey levels; `samples` the rays per pixel and side where surfaces meet. None is for the
+    default.
 
-    `times_s` (N,), `poses` (N, 4, 4, `world_from_left`) and `poses_at(times_s)` are the truth of the motion, with z up in
-    the world. Comparable, hashable, and to be pickled. Raises `tiltvp.errors.InvalidInputError`.
+    `times_s` (N,), `poses` (N, 4, 4, `world_from_left`) and `poses_at(times_s)` are the truth of the motion, with z up
+    in the world. Comparable, hashable, and to be pickled. Raises `tiltvp.errors.InvalidInputError`.
     """
 
     @cached_property
@@ -116,15 +131,29 @@ class StereoSequence(_core.StereoSequence):
             for position, edges, lengths, kind in self._corners()
         )
 
-    def render(
-        self, frame: int, *, threads: int | None = None
-    ) -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:
+    def render(self, frame: int, *, threads: int | None = None) -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:
         """The left and the right image of a frame, (H, W, 3) in BGR order as everywhere, on so many threads."""
         return self._render(frame, threads=threads)
 
     def truth(self, frame: int, *, threads: int | None = None) -> StereoTruth:
         """The corners in sight at one frame, however faint."""
         return StereoTruth(*self._truth(frame, threads=threads))
+
+    def imu(
+        self,
+        *,
+        rate_hz: float | None = None,
+        seed: int = 0,
+        gyroscope: tuple[float, float, float, float, float] | None = None,
+        accelerometer: tuple[float, float, float, float, float] | None = None,
+    ) -> ImuLog:
+        """Readings of an inertial sensor along the motion, `rate_hz` a second (None: 200), of the grade of an MPU6050.
+
+        `gyroscope` and `accelerometer` are noise density (unit / sqrt(Hz)), standard deviation of the bias, its walk
+        (unit / sqrt(s)), standard deviation of scale and misalignment, and range (which 16 bits divide) in rad/s and
+        m/s^2. None: 0.005 deg/s/sqrt(Hz), 0.2 deg/s and +-250 deg/s; 400 ug/sqrt(Hz), 5 mg and +-2 g; scales to 0.5 %.
+        """
+        return ImuLog(*self._imu(rate_hz=rate_hz, seed=seed, gyroscope=gyroscope, accelerometer=accelerometer))
 
     def left_from_object(self, frame: int, corner: int | None = None) -> NDArray[np.float64]:
         """(4, 4): the pose in the left camera of a corner's object frame (None: of the corner that is looked at)."""

@@ -11,7 +11,7 @@ import numpy as np
 from tiltvp import _core
 from tiltvp._core import SimulatedDrive, simulate_drive
 from tiltvp.cameras import Camera
-from tiltvp.stereo_scenes import Laboratory, SceneCorner, StereoSequence, StereoTruth, zed_cameras
+from tiltvp.stereo_scenes import ImuLog, Laboratory, SceneCorner, StereoSequence, StereoTruth, zed_cameras
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
@@ -22,6 +22,7 @@ __all__ = [
     "WALL_PATTERNS",
     "Drive",
     "DriveTruth",
+    "ImuLog",
     "Laboratory",
     "Room",
     "RoomImage",

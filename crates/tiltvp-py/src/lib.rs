@@ -2,6 +2,7 @@
 
 mod call;
 mod camera;
+mod complementary;
 mod convert;
 mod drive;
 mod lines;
@@ -20,6 +21,8 @@ mod _core {
 
     #[pymodule_export]
     use crate::camera::Camera;
+    #[pymodule_export]
+    use crate::complementary::ComplementaryFilter;
     #[pymodule_export]
     use crate::drive::Drive;
     #[pymodule_export]

@@ -6,7 +6,10 @@ use nalgebra::{Isometry3, Matrix3, Rotation3, Translation3, UnitQuaternion, Vect
 use numpy::{PyArray1, PyArray3, PyArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use tiltvp_synth::{ColorImage, CornerSighting, LaboratoryOptions, StereoOptions, World, on_threads};
+use tiltvp_synth::{
+    ColorImage, CornerSighting, ImuChannel, ImuOptions, LaboratoryOptions, StereoOptions, World, imu_readings,
+    on_threads,
+};
 
 use crate::call::{call, invalid};
 use crate::camera::Camera;
@@ -16,6 +19,7 @@ use crate::synth::{Room, seed_from, threads_from};
 /// Position, directions of the edges x, y, z in rows, their lengths, and the kind, of a corner.
 type CornerParts = ([f64; 3], [[f64; 3]; 3], [f64; 3], &'static str);
 type Sightings<'py> = (Bound<'py, PyArray1<i64>>, Bound<'py, PyAny>, Bound<'py, PyAny>);
+type Readings<'py> = (Bound<'py, PyArray1<f64>>, Bound<'py, PyAny>, Bound<'py, PyAny>, Bound<'py, PyAny>);
 type Picture<'py> = Bound<'py, PyArray3<u8>>;
 
 /// A plain room with a coloured cuboid on its floor.
@@ -296,6 +300,38 @@ impl StereoSequence {
         ))
     }
 
+    /// Readings of an inertial sensor: times, rates (M, 3), forces (M, 3), the rates' true biases (M, 3).
+    #[pyo3(signature = (*, rate_hz=None, seed=None, gyroscope=None, accelerometer=None))]
+    fn _imu<'py>(
+        &self,
+        py: Python<'py>,
+        rate_hz: Option<f64>,
+        seed: Option<&Bound<'py, PyAny>>,
+        gyroscope: Option<&Bound<'py, PyAny>>,
+        accelerometer: Option<&Bound<'py, PyAny>>,
+    ) -> PyResult<Readings<'py>> {
+        let own = ImuOptions::default();
+        let options = ImuOptions {
+            rate_hz: rate_hz.unwrap_or(own.rate_hz),
+            seed: seed.map_or(Ok(own.seed), seed_from)?,
+            gyroscope: gyroscope.map_or(Ok(own.gyroscope), |channel| channel_from(channel, "gyroscope"))?,
+            accelerometer: accelerometer
+                .map_or(Ok(own.accelerometer), |channel| channel_from(channel, "accelerometer"))?,
+        };
+        let duration_s = self.inner.time_s(self.__len__() - 1);
+        let readings = call(py, || imu_readings(self.inner.motion(), duration_s, &options))?;
+        let rows = |value: fn(&tiltvp_synth::ImuReading) -> Vector3<f64>| {
+            let rows: Vec<[f64; 3]> = readings.iter().map(|reading| value(reading).into()).collect();
+            convert::to_rows(py, &rows, false)
+        };
+        Ok((
+            PyArray1::from_vec(py, readings.iter().map(|reading| reading.time_s).collect()),
+            rows(|reading| reading.rate_rad_s)?,
+            rows(|reading| reading.force_m_s2)?,
+            rows(|reading| reading.rate_bias_rad_s)?,
+        ))
+    }
+
     fn __len__(&self) -> usize {
         self.inner.options().frames
     }
@@ -359,6 +395,18 @@ fn range_from(range: &Bound<'_, PyAny>) -> PyResult<[f64; 2]> {
     match convert::vector(range, "distance_m")?.as_slice() {
         [low, high] => Ok([*low, *high]),
         other => Err(invalid(format!("distance_m: {} numbers, expected the least and the greatest", other.len()))),
+    }
+}
+
+fn channel_from(channel: &Bound<'_, PyAny>, name: &str) -> PyResult<ImuChannel> {
+    match convert::vector(channel, name)?.as_slice() {
+        &[noise_density, bias_sigma, bias_walk, scale_sigma, range] => {
+            Ok(ImuChannel { noise_density, bias_sigma, bias_walk, scale_sigma, range })
+        }
+        other => Err(invalid(format!(
+            "{name}: {} numbers, expected noise density, bias, bias walk, scale error and range",
+            other.len()
+        ))),
     }
 }
 

@@ -15,7 +15,7 @@ const HEIGHT_M: [f64; 2] = [0.4, 2.0];
 /// How far off the corner the optical axis points, to the side and up or down, radians.
 const AIM_RAD: [f64; 2] = [0.10, 0.06];
 /// Tremor of hands: metres, radians and hertz.
-const TREMOR: (f64, f64, f64) = (3e-4, 8e-4, 7.0);
+const TREMOR: (f64, f64, f64) = (1e-4, 5e-4, 6.0);
 
 /// A motion in time.
 #[derive(Debug, Clone)]
@@ -54,7 +54,7 @@ impl Handheld {
             slope,
             aim,
             roll,
-            tremor: std::array::from_fn(|_| Wave::draw(TREMOR.2, dice)),
+            tremor: std::array::from_fn(|_| Wave::pure(TREMOR.2, dice)),
         }
     }
 
@@ -115,12 +115,22 @@ struct Wave {
 }
 
 impl Wave {
+    /// A wave with overtones.
     fn draw(frequency_hz: f64, dice: &mut Dice) -> Self {
-        let mut term = |ratio: f64, share: f64| {
+        Self::mixed(frequency_hz, [(1.0, 0.55), (1.83, 0.27), (3.1, 0.13), (5.3, 0.05)], dice)
+    }
+
+    /// A wave of about one frequency.
+    fn pure(frequency_hz: f64, dice: &mut Dice) -> Self {
+        Self::mixed(frequency_hz, [(1.0, 0.4), (1.1, 0.3), (0.9, 0.2), (1.3, 0.1)], dice)
+    }
+
+    fn mixed(frequency_hz: f64, shares: [(f64, f64); 4], dice: &mut Dice) -> Self {
+        let term = |(ratio, share): (f64, f64)| {
             let turns = std::f64::consts::TAU * frequency_hz * ratio * dice.within(0.8, 1.25);
             [turns, dice.within(0.0, std::f64::consts::TAU), share]
         };
-        Self { terms: [term(1.0, 0.55), term(1.83, 0.27), term(3.1, 0.13), term(5.3, 0.05)] }
+        Self { terms: shares.map(term) }
     }
 
     fn at(&self, time_s: f64) -> f64 {
