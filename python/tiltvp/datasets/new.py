@@ -101,7 +101,7 @@ def new_dataset(
 
 @contextmanager
 def new_folder(directory: str | os.PathLike[str], *, force: bool = False) -> Iterator[NewDataset]:
-    """A folder to be filled in a `with` block, dataset.toml included; it appears or is refused as `new_dataset` does."""
+    """A folder to be filled in a `with` block, dataset.toml included; else as `new_dataset`."""
     target = Path(directory)
     _refuse_taken(target, force)
     part = target.absolute().parent / f".{target.absolute().name}.{os.getpid()}.part"
