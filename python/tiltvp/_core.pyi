@@ -1509,8 +1509,9 @@ class StereoSequence:
         blur_sigma_px: float | None = None,
         exposure_s: float | None = None,
         gain: float | None = None,
+        threads: SupportsIndex | None = None,
     ) -> Self:
-        """Finds a motion in the scene."""
+        """Finds a motion in the scene and makes rays on `threads` threads (None: one per core), which do not matter."""
 
     @property
     def scene(self) -> Laboratory | Room:

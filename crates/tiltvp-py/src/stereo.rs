@@ -148,7 +148,7 @@ impl StereoSequence {
     #[pyo3(signature = (
         scene, *, left, right, left_from_right=None, frames=None, frame_rate_hz=None, seed=None, corner=None,
         distance_m=None, roll_max_rad=None, period_s=None, samples=None, noise_sigma=None, blur_sigma_px=None,
-        exposure_s=None, gain=None
+        exposure_s=None, gain=None, threads=None
     ))]
     #[expect(clippy::too_many_arguments, reason = "keyword-only on the Python side")]
     fn new(
@@ -169,6 +169,7 @@ impl StereoSequence {
         blur_sigma_px: Option<f64>,
         exposure_s: Option<f64>,
         gain: Option<f64>,
+        threads: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Self> {
         let own = StereoOptions::default();
         let options = StereoOptions {
@@ -189,7 +190,8 @@ impl StereoSequence {
         };
         let world = world_of(scene)?;
         let cameras = [left.get().inner.clone(), right.get().inner.clone()];
-        let inner = call(py, || tiltvp_synth::StereoSequence::new(world, cameras, options))?;
+        let threads = threads_from(threads)?;
+        let inner = call(py, || on_threads(threads, || tiltvp_synth::StereoSequence::new(world, cameras, options))?)?;
         Ok(Self { scene: scene.clone().unbind(), left: left.clone().unbind(), right: right.clone().unbind(), inner })
     }
 

@@ -99,7 +99,7 @@ pub struct ImuReading {
     pub rate_bias_rad_s: Vector3<f64>,
 }
 
-/// The readings along a motion, from time 0 to `duration_s`.
+/// The readings along a motion, from time 0 to `duration_s` or just beyond.
 ///
 /// # Errors
 /// If the options are outside their domains.
@@ -107,7 +107,7 @@ pub fn imu_readings(motion: &Handheld, duration_s: f64, options: &ImuOptions) ->
     options.validate()?;
     let mut gyroscope = Sensor::new(options.gyroscope, options.rate_hz, options.seed, 1 << 35);
     let mut accelerometer = Sensor::new(options.accelerometer, options.rate_hz, options.seed, (1 << 35) + 1);
-    let count = (duration_s * options.rate_hz).floor().max(0.0) as usize + 1;
+    let count = (duration_s * options.rate_hz).ceil().max(0.0) as usize + 1;
     let readings = (0..count).map(|k| {
         let time_s = k as f64 / options.rate_hz;
         let (rate, force) = truth(motion, time_s);

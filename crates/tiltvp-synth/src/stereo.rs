@@ -21,6 +21,10 @@ const TRIALS: usize = 30;
 const CLEAR_M: f64 = 0.12;
 /// Most pictures that a blurred one is averaged from.
 const SHARPS: usize = 8;
+/// Edges of corners that are looked at first, metres.
+const LARGE_M: f64 = 0.35;
+/// Least length of its edges in the images, all along, of a corner that is looked at, pixels.
+const IN_SIGHT_PX: f64 = 15.0;
 /// Points at which an edge is looked for.
 const EDGE_POINTS: usize = 64;
 
@@ -146,7 +150,7 @@ pub struct StereoSequence {
 }
 
 impl StereoSequence {
-    /// Finds a motion for a pair in a world.
+    /// Finds a motion for a pair in a world, and makes its rays in parallel on the current rayon pool; neither depends on it.
     ///
     /// # Errors
     /// If the options are outside their domains, or there is no space to move in.
@@ -157,19 +161,23 @@ impl StereoSequence {
             return Err(Error::option("stereo.corner", corner, "the number of one of the world's corners"));
         }
         let mut dice = Dice::new(options.seed, 1 << 34);
-        let mut order: Vec<usize> = match options.corner {
-            Some(corner) => vec![corner],
-            None if world.has_cuboid() => vec![0],
-            None => (0..corners.len()).filter(|&k| Handheld::suits(&corners[k])).collect(),
+        let is_large = |k: &usize| corners[*k].lengths_m.iter().all(|length| *length >= LARGE_M);
+        let (mut order, mut small): (Vec<usize>, Vec<usize>) = match options.corner {
+            Some(corner) => (vec![corner], Vec::new()),
+            None if world.has_cuboid() => (vec![0], Vec::new()),
+            None => (0..corners.len()).filter(|&k| Handheld::suits(&corners[k])).partition(is_large),
         };
-        for k in (1..order.len()).rev() {
-            order.swap(k, dice.below(k + 1));
+        for order in [&mut order, &mut small] {
+            for k in (1..order.len()).rev() {
+                order.swap(k, dice.below(k + 1));
+            }
         }
+        order.append(&mut small);
         for &corner in &order {
             for trial in 0..TRIALS {
                 let reach = if 2 * trial < TRIALS { 1.0 } else { 0.4 };
                 let motion = Handheld::draw(&corners[corner], &options, reach, &mut dice);
-                if is_free(&world, &cameras, &options, &motion, &corners[corner]) {
+                if is_good(&world, &cameras, &options, &motion, &corners[corner]) {
                     let rays = cameras.each_ref().map(|camera| Rays::new(camera, 0.0));
                     return Ok(Self { world, cameras, options, corner, motion, rays });
                 }
@@ -263,24 +271,30 @@ impl StereoSequence {
         self.pose(frame)?;
         let eyes = [0, 1].map(|eye| (self.eye_pose(self.time_s(frame), eye), &self.cameras[eye]));
         let numbered = self.world.corners().par_iter().enumerate();
-        Ok(numbered.filter_map(|(number, corner)| self.sight(number, corner, &eyes)).collect())
+        Ok(numbered.filter_map(|(number, corner)| sight(&self.world, number, corner, &eyes)).collect())
     }
+}
 
-    fn sight(&self, number: usize, corner: &Corner, eyes: &[(Isometry3<f64>, &Camera); 2]) -> Option<CornerSighting> {
-        let mut sighting = CornerSighting { corner: number, vertex_px: [Vector2::zeros(); 2], edges_px: [[0.0; 3]; 2] };
-        for (eye, (pose, camera)) in eyes.iter().enumerate() {
-            let vertex = seen(&self.world, camera, pose, &corner.position)?;
-            sighting.vertex_px[eye] = vertex;
-            for (k, (edge, length)) in corner.edges.iter().zip(corner.lengths_m).enumerate() {
-                let end = (1..=EDGE_POINTS)
-                    .map(|at| corner.position + edge * (length * at as f64 / EDGE_POINTS as f64))
-                    .map_while(|point| seen(&self.world, camera, pose, &point))
-                    .last();
-                sighting.edges_px[eye][k] = end.map_or(0.0, |end| (end - vertex).norm());
-            }
+/// What is in sight of a corner, if its vertex is for both eyes.
+fn sight(
+    world: &World,
+    number: usize,
+    corner: &Corner,
+    eyes: &[(Isometry3<f64>, &Camera); 2],
+) -> Option<CornerSighting> {
+    let mut sighting = CornerSighting { corner: number, vertex_px: [Vector2::zeros(); 2], edges_px: [[0.0; 3]; 2] };
+    for (eye, (pose, camera)) in eyes.iter().enumerate() {
+        let vertex = seen(world, camera, pose, &corner.position)?;
+        sighting.vertex_px[eye] = vertex;
+        for (k, (edge, length)) in corner.edges.iter().zip(corner.lengths_m).enumerate() {
+            let end = (1..=EDGE_POINTS)
+                .map(|at| corner.position + edge * (length * at as f64 / EDGE_POINTS as f64))
+                .map_while(|point| seen(world, camera, pose, &point))
+                .last();
+            sighting.edges_px[eye][k] = end.map_or(0.0, |end| (end - vertex).norm());
         }
-        Some(sighting)
     }
+    Some(sighting)
 }
 
 /// The pixel at which a point of a surface is in sight.
@@ -292,21 +306,21 @@ fn seen(world: &World, camera: &Camera, pose: &Isometry3<f64>, point: &Vector3<f
     (camera.contains(&pixel) && clear()).then_some(pixel)
 }
 
-/// Whether all along a motion the cameras are free in the room, and the corner in both images.
-fn is_free(world: &World, cameras: &[Camera; 2], options: &StereoOptions, motion: &Handheld, corner: &Corner) -> bool {
-    // Ten looks a second tell; no hand moves the cameras far in between.
+/// Whether all along a motion the cameras are free in the room, and the corner with its edges in both images.
+fn is_good(world: &World, cameras: &[Camera; 2], options: &StereoOptions, motion: &Handheld, corner: &Corner) -> bool {
+    // Five looks a second tell; no hand moves the cameras far in between.
     let duration = options.frames as f64 / options.frame_rate_hz;
-    let looks = (10.0 * duration).ceil() as usize + 1;
+    let looks = (5.0 * duration).ceil() as usize + 1;
     (0..looks).all(|k| {
         let left = motion.pose(k as f64 * duration / looks as f64);
         let poses = [left, left * options.left_from_right];
-        poses.iter().zip(cameras).all(|(pose, camera)| {
-            let center = pose.translation.vector;
-            world.contains(&center)
-                && seen(world, camera, pose, &corner.position).is_some()
-                && [Vector3::x(), Vector3::y(), Vector3::z()]
-                    .iter()
-                    .all(|d| [*d, -d].iter().all(|d| world.scene().is_clear(&center, d, CLEAR_M)))
-        })
+        let is_free = |center: &Vector3<f64>| {
+            let axes = [Vector3::x(), Vector3::y(), Vector3::z()];
+            let clear = |d: Vector3<f64>| world.scene().is_clear(center, &d, CLEAR_M);
+            world.contains(center) && axes.iter().all(|d| clear(*d) && clear(-d))
+        };
+        poses.iter().all(|pose| is_free(&pose.translation.vector))
+            && sight(world, 0, corner, &[(poses[0], &cameras[0]), (poses[1], &cameras[1])])
+                .is_some_and(|seen| seen.edges_px.as_flattened().iter().all(|length| *length >= IN_SIGHT_PX))
     })
 }

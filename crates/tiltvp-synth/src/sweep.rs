@@ -25,11 +25,12 @@ pub(crate) struct Rays {
 }
 
 impl Rays {
-    /// The rays through the middles of all pixels that see more than `blind_rad` aside of the camera's `z` axis.
+    /// The rays through the middles of all pixels, made in parallel on the current rayon pool, that see more than `blind_rad` aside of the camera's `z` axis.
     pub(crate) fn new(camera: &Camera, blind_rad: f64) -> Self {
         let (width, height) = (camera.width() as usize, camera.height() as usize);
         let middle = |k: usize| Vector2::new((k % width) as f64, (k / width) as f64);
         let bearings: Vec<_> = (0..width * height)
+            .into_par_iter()
             .map(|k| camera.unproject(&middle(k)).filter(|b| b.xy().norm().atan2(b.z.abs()) >= blind_rad))
             .collect();
         let step = |k: usize, aside: Vector2<f64>| {
@@ -40,7 +41,8 @@ impl Rays {
                 _ => Vector3::zeros(),
             }
         };
-        let steps: Vec<_> = (0..width * height).map(|k| [step(k, Vector2::x()), step(k, Vector2::y())]).collect();
+        let steps: Vec<_> =
+            (0..width * height).into_par_iter().map(|k| [step(k, Vector2::x()), step(k, Vector2::y())]).collect();
         let cones = SIDES.map(|side| {
             let (nx, ny) = (width.div_ceil(side), height.div_ceil(side));
             let of_tile = |tile: usize| {
@@ -50,7 +52,7 @@ impl Rays {
                 let margin = known.iter().map(|&k| steps[k][0].norm() + steps[k][1].norm()).fold(0.0, f64::max);
                 Cone::around(&directions, margin)
             };
-            (0..nx * ny).map(of_tile).collect()
+            (0..nx * ny).into_par_iter().map(of_tile).collect()
         });
         let angle = |b: &Vector3<f64>| b.xy().norm().atan2(b.z.abs()) / std::f64::consts::FRAC_PI_2;
         let off_axis = bearings.iter().map(|b| b.as_ref().map_or(0.0, angle)).collect();

@@ -399,6 +399,7 @@ def stereo(
         noise_sigma=noise_sigma,
         blur_sigma_px=blur_sigma,
         exposure_s=exposure_ms / 1000.0,
+        threads=count,
     )
     with progress_bar(len(sequence), "frames") as bar:
         write_stereo(sequence, out, threads=count, source=_made_by("stereo"), force=force, advance=bar.advance)
