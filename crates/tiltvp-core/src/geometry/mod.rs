@@ -2,12 +2,14 @@
 
 mod angle;
 mod bearing;
+mod great_circle;
 mod rotation;
 mod tilt;
 mod wheels;
 
 pub use angle::wrap_angle;
 pub use bearing::{angle_between, tangent_basis, tangent_exp, tangent_log, tangent_transport};
+pub use great_circle::{GreatCircleFit, fit_great_circle};
 pub use rotation::validate_rotation;
 pub use tilt::Tilt;
 pub use wheels::WheelLayout;

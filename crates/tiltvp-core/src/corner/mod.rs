@@ -1,0 +1,13 @@
+//! Attitude and position from corners: one vertex and three edges, one vertical and two horizontal.
+//!
+//! The problem is that of [Liu et al. 2018]; equation and section numbers are those of the paper. Everything is in unit
+//! bearings, so that any central camera will do: what the paper calls the standard model (the vertex turned to the optical
+//! axis) is the pencil of planes through the vertex's bearing here.
+//!
+//! [Liu et al. 2018]: https://arxiv.org/abs/1812.10952
+
+mod rays;
+mod vertex;
+
+pub use self::rays::FittedRay;
+pub use self::vertex::{CornerFeature, Edge};
