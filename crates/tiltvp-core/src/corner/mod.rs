@@ -6,8 +6,16 @@
 //!
 //! [Liu et al. 2018]: https://arxiv.org/abs/1812.10952
 
+mod attitude;
+mod gamma;
 mod rays;
+mod screening;
+mod standard;
 mod vertex;
 
+pub use self::attitude::{CornerAttitude, CornerAttitudes, IncludedAngle, corner_attitudes};
+pub use self::gamma::included_angle;
 pub use self::rays::FittedRay;
+pub use self::screening::Screening;
+pub use self::standard::{CornerCase, StandardType};
 pub use self::vertex::{CornerFeature, Edge};
