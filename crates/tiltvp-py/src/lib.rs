@@ -3,6 +3,7 @@
 mod call;
 mod camera;
 mod convert;
+mod corner;
 mod drive;
 mod lines;
 mod rays;
@@ -19,6 +20,8 @@ mod _core {
 
     #[pymodule_export]
     use crate::camera::Camera;
+    #[pymodule_export]
+    use crate::corner::{CornerDetector, CornerFeature};
     #[pymodule_export]
     use crate::drive::Drive;
     #[pymodule_export]
@@ -47,6 +50,7 @@ mod _core {
     fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {
         module.add("METHODS", tiltvp_core::tilt::METHODS.to_vec())?;
         module.add("CALIBRATION_METHODS", tiltvp_core::selfcalib::CALIBRATION_METHODS.to_vec())?;
+        module.add("CORNER_METHODS", tiltvp_core::corner::CORNER_METHODS.to_vec())?;
         module.add("LINE_METHODS", tiltvp_core::lines::LINE_METHODS.to_vec())?;
         module.add("CAMERA_MODELS", tiltvp_core::camera::Model::names().collect::<Vec<_>>())?;
         module.add("ROOM_KINDS", tiltvp_synth::RoomKind::ALL.map(tiltvp_synth::RoomKind::name).to_vec())?;
