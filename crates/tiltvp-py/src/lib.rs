@@ -21,7 +21,7 @@ mod _core {
     #[pymodule_export]
     use crate::camera::Camera;
     #[pymodule_export]
-    use crate::corner::{CornerDetector, CornerFeature};
+    use crate::corner::{CornerDetector, CornerEstimate, CornerFeature, CornerHypothesis, CornerPoseEstimator};
     #[pymodule_export]
     use crate::drive::Drive;
     #[pymodule_export]

@@ -186,5 +186,6 @@ fn course_of(line: &Line, vertex: &Vector3<f64>, px_per_rad: f64, options: &Colo
         search_px: options.search_px,
         step_min: options.step_min,
         threshold_px: options.threshold_px,
+        ray_sigma_px: options.ray_sigma_px,
     })
 }

@@ -135,5 +135,6 @@ fn course_of(segments: &[Segment], ray: RayEnd, vertex: &Vector3<f64>, options: 
         search_px: options.search_px,
         step_min: options.step_min,
         threshold_px: options.threshold_px,
+        ray_sigma_px: options.ray_sigma_px,
     })
 }

@@ -9,8 +9,10 @@
 mod attitude;
 mod coloured;
 mod coloured_edges;
+mod consensus;
 mod detector;
 mod edge_place;
+mod estimator;
 mod fusion;
 mod gamma;
 mod general;
@@ -30,6 +32,7 @@ mod vertex;
 
 pub use self::attitude::{CornerAttitude, CornerAttitudes, IncludedAngle, corner_attitudes};
 pub use self::detector::{CornerDetector, CornerScratch, Window};
+pub use self::estimator::{CornerEstimate, CornerPoseEstimator, EstimatorOptions, Frame, Hypothesis, Verdict};
 pub use self::fusion::{FusedPose, fuse_rays};
 pub use self::gamma::included_angle;
 pub use self::options::{

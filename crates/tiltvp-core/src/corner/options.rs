@@ -62,6 +62,8 @@ pub struct ColouredOptions {
     pub step_min: f64,
     /// Largest distance of a place of the edge from its ray, in pixels. Default 0.6.
     pub threshold_px: f64,
+    /// What places of an edge do not tell: how far either end of a ray may be off, in pixels. Default 0.03.
+    pub ray_sigma_px: f64,
     /// Least number of places that agree with a ray. Default 15.
     pub support_min_px: u32,
     /// Largest root mean square distance of the vertex from the three rays, in pixels. Default 1.
@@ -81,6 +83,7 @@ impl Default for ColouredOptions {
             refine_px: 2.0,
             step_min: 8.0,
             threshold_px: 0.6,
+            ray_sigma_px: 0.03,
             support_min_px: 15,
             residual_max_px: 1.0,
         }
@@ -118,6 +121,9 @@ pub struct GeneralOptions {
     pub step_min: f64,
     /// Largest distance of a place of the edge from its ray, in pixels. Default 0.7.
     pub threshold_px: f64,
+    /// What places of an edge do not tell, as real edges are bevelled and worn: how far either end of a ray may be off, in
+    /// pixels. Default 0.2.
+    pub ray_sigma_px: f64,
     /// Least number of places that agree with a ray. Default 20.
     pub support_min_px: u32,
     /// Least share of the places along a ray that agree with it. Default 0.6.
@@ -145,6 +151,7 @@ impl Default for GeneralOptions {
             search_px: 2.5,
             step_min: 2.0,
             threshold_px: 0.7,
+            ray_sigma_px: 0.2,
             support_min_px: 20,
             support_min_share: 0.6,
             residual_max_px: 1.5,
@@ -202,6 +209,7 @@ impl ColouredOptions {
         within("refine_px", self.refine_px, 1.0..=15.0, "from 1 to 15 pixels")?;
         within("step_min", self.step_min, 0.1..=255.0, "a step of light from 0.1 to 255")?;
         within("threshold_px", self.threshold_px, 0.05..=10.0, "from 0.05 to 10 pixels")?;
+        within("ray_sigma_px", self.ray_sigma_px, 0.0..=10.0, "from 0 to 10 pixels")?;
         within("support_min_px", f64::from(self.support_min_px), 2.0..=1e6, "from 2 to 1000000 pixels")?;
         within("residual_max_px", self.residual_max_px, 0.01..=100.0, "from 0.01 to 100 pixels")
     }
@@ -224,6 +232,7 @@ impl GeneralOptions {
         within("search_px", self.search_px, 1.0..=15.0, "from 1 to 15 pixels")?;
         within("step_min", self.step_min, 0.1..=255.0, "a step of light from 0.1 to 255")?;
         within("threshold_px", self.threshold_px, 0.05..=10.0, "from 0.05 to 10 pixels")?;
+        within("ray_sigma_px", self.ray_sigma_px, 0.0..=10.0, "from 0 to 10 pixels")?;
         within("support_min_px", f64::from(self.support_min_px), 2.0..=1e6, "from 2 to 1000000 pixels")?;
         within("support_min_share", self.support_min_share, 0.0..=1.0, "a share from 0 to 1")?;
         within("residual_max_px", self.residual_max_px, 0.01..=100.0, "from 0.01 to 100 pixels")?;

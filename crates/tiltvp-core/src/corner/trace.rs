@@ -14,9 +14,6 @@ const ERRING_TOGETHER: f64 = 4.0;
 /// The least standard deviation of one profile's place, in pixels, however well the profiles agree.
 const PLACE_SIGMA_MIN_PX: f64 = 0.05;
 
-/// What no profile tells: how far either end of a whole ray may be off, in pixels.
-const RAY_SIGMA_PX: f64 = 0.03;
-
 /// Longest profile, in samples.
 const PROFILE_MAX: usize = 41;
 
@@ -37,13 +34,14 @@ pub(super) struct Course {
     pub(super) step_min: f64,
     /// Largest distance of a profile's edge from the fitted circle, in pixels.
     pub(super) threshold_px: f64,
+    /// What no profile tells: how far either end of a whole ray may be off, in pixels.
+    pub(super) ray_sigma_px: f64,
 }
 
 /// A place of the edge.
 #[derive(Debug, Clone, Copy)]
 struct Place {
     along_rad: f64,
-    step: f64,
     rad_per_px: f64,
 }
 
@@ -51,13 +49,8 @@ struct Place {
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Traced {
     pub(super) ray: FittedRay,
-    /// Angles from the vertex of the first and the last profile that agrees.
-    pub(super) from_rad: f64,
-    pub(super) to_rad: f64,
     /// The share of the profiles that agree.
     pub(super) share: f64,
-    /// Mean step across the edge over the profiles that agree, positive, in the units of the signal.
-    pub(super) step: f64,
     /// Pixels per radian along the ray.
     pub(super) px_per_rad: f64,
 }
@@ -110,10 +103,10 @@ pub(super) fn trace(
             }
         }
         let found = if inside { edge_place(profile, course.search_px, course.step_min) } else { None };
-        let Some(EdgePlace { shift, step }) = found else { continue };
+        let Some(EdgePlace { shift, .. }) = found else { continue };
         // In the chart of the ray: x along the vertex, y along the ray, z the expected normal.
         rows.push(cos, sin, shift / px_per_rad);
-        places.push(Place { along_rad: angle - 1.0 / pace, step, rad_per_px: 1.0 / px_per_rad.abs() });
+        places.push(Place { along_rad: angle - 1.0 / pace, rad_per_px: 1.0 / px_per_rad.abs() });
     }
     if places.len() < support_min.max(2) {
         return None;
@@ -149,7 +142,7 @@ pub(super) fn trace(
     information /= sigma * sigma * ERRING_TOGETHER;
     let ends = [first, last].map(|angle| Vector2::new(angle.cos(), angle.sin()));
     let from_ends = nalgebra::Matrix2::from_rows(&[ends[0].transpose(), ends[1].transpose()]).try_inverse()?;
-    let whole = from_ends * from_ends.transpose() * (RAY_SIGMA_PX * rad_per_px).powi(2);
+    let whole = from_ends * from_ends.transpose() * (course.ray_sigma_px * rad_per_px).powi(2);
     let in_chart = information.try_inverse()? + whole;
     // The chart's plane is tangent at the expected normal, which is close to the fitted one.
     let basis = tangent_basis(&normal);
@@ -163,12 +156,5 @@ pub(super) fn trace(
         support,
         residual_rms_rad: rms,
     };
-    Some(Traced {
-        ray,
-        from_rad: first,
-        to_rad: last,
-        share: support as f64 / looked_at.max(1) as f64,
-        step: agreeing().map(|(place, _)| place.step.abs()).sum::<f64>() / support as f64,
-        px_per_rad: 1.0 / rad_per_px,
-    })
+    Some(Traced { ray, share: support as f64 / looked_at.max(1) as f64, px_per_rad: 1.0 / rad_per_px })
 }

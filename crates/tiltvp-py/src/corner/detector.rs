@@ -146,6 +146,10 @@ impl CornerDetector {
 }
 
 impl CornerDetector {
+    pub(super) fn inner(&self) -> &core::CornerDetector {
+        &self.inner
+    }
+
     /// Runs `work` without the interpreter, with a scratch that no other thread has.
     fn with_scratch(
         &self,

@@ -38,6 +38,8 @@ fn set(options: &mut DetectorOptions, key: &str, value: &Bound<'_, PyAny>) -> Py
         ("step_min", CornerMethod::General(o)) => o.step_min = number()?,
         ("threshold_px", CornerMethod::Coloured(o)) => o.threshold_px = number()?,
         ("threshold_px", CornerMethod::General(o)) => o.threshold_px = number()?,
+        ("ray_sigma_px", CornerMethod::Coloured(o)) => o.ray_sigma_px = number()?,
+        ("ray_sigma_px", CornerMethod::General(o)) => o.ray_sigma_px = number()?,
         ("support_min_px", CornerMethod::Coloured(o)) => o.support_min_px = pixels()?,
         ("support_min_px", CornerMethod::General(o)) => o.support_min_px = pixels()?,
         ("residual_max_px", CornerMethod::Coloured(o)) => o.residual_max_px = number()?,
@@ -116,6 +118,7 @@ pub(super) fn in_force<'py>(py: Python<'py>, options: &DetectorOptions) -> PyRes
             dict.set_item("refine_px", o.refine_px)?;
             dict.set_item("step_min", o.step_min)?;
             dict.set_item("threshold_px", o.threshold_px)?;
+            dict.set_item("ray_sigma_px", o.ray_sigma_px)?;
             dict.set_item("support_min_px", o.support_min_px)?;
             dict.set_item("residual_max_px", o.residual_max_px)?;
         }
@@ -134,6 +137,7 @@ pub(super) fn in_force<'py>(py: Python<'py>, options: &DetectorOptions) -> PyRes
             dict.set_item("search_px", o.search_px)?;
             dict.set_item("step_min", o.step_min)?;
             dict.set_item("threshold_px", o.threshold_px)?;
+            dict.set_item("ray_sigma_px", o.ray_sigma_px)?;
             dict.set_item("support_min_px", o.support_min_px)?;
             dict.set_item("support_min_share", o.support_min_share)?;
             dict.set_item("residual_max_px", o.residual_max_px)?;
