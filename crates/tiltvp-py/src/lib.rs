@@ -4,6 +4,7 @@ mod call;
 mod camera;
 mod complementary;
 mod convert;
+mod corner;
 mod drive;
 mod lines;
 mod rays;
@@ -23,6 +24,8 @@ mod _core {
     use crate::camera::Camera;
     #[pymodule_export]
     use crate::complementary::ComplementaryFilter;
+    #[pymodule_export]
+    use crate::corner::{CornerDetector, CornerEstimate, CornerFeature, CornerHypothesis, CornerPoseEstimator};
     #[pymodule_export]
     use crate::drive::Drive;
     #[pymodule_export]
@@ -53,6 +56,7 @@ mod _core {
     fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {
         module.add("METHODS", tiltvp_core::tilt::METHODS.to_vec())?;
         module.add("CALIBRATION_METHODS", tiltvp_core::selfcalib::CALIBRATION_METHODS.to_vec())?;
+        module.add("CORNER_METHODS", tiltvp_core::corner::CORNER_METHODS.to_vec())?;
         module.add("LINE_METHODS", tiltvp_core::lines::LINE_METHODS.to_vec())?;
         module.add("CAMERA_MODELS", tiltvp_core::camera::Model::names().collect::<Vec<_>>())?;
         module.add("ROOM_KINDS", tiltvp_synth::RoomKind::ALL.map(tiltvp_synth::RoomKind::name).to_vec())?;

@@ -2,16 +2,17 @@
 
 use std::sync::Arc;
 
-use nalgebra::{Isometry3, Matrix3, Rotation3, Translation3, UnitQuaternion, Vector3};
+use nalgebra::{Isometry3, Matrix4, Rotation3, Translation3, UnitQuaternion, Vector3};
 use numpy::{PyArray1, PyArray3, PyArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
+use tiltvp_core::geometry::RigidMotion;
 use tiltvp_synth::{
     ColorImage, CornerSighting, ImuChannel, ImuOptions, LaboratoryOptions, StereoOptions, World, imu_readings,
     on_threads,
 };
 
-use crate::call::{call, invalid};
+use crate::call::{call, exception, invalid};
 use crate::camera::Camera;
 use crate::convert;
 use crate::synth::{Room, seed_from, threads_from};
@@ -413,20 +414,15 @@ fn channel_from(channel: &Bound<'_, PyAny>, name: &str) -> PyResult<ImuChannel> 
 }
 
 /// A rigid motion from a (4, 4) matrix.
-fn pose_from(value: &Bound<'_, PyAny>, name: &str) -> PyResult<Isometry3<f64>> {
-    let (rows, single) = convert::rows::<4>(value, name)?;
-    let expected = "a rigid motion (4, 4) with last row 0, 0, 0, 1";
-    let [a, b, c, [0.0, 0.0, 0.0, 1.0]] = rows.as_slice() else {
-        return Err(invalid(format!("{name}: {} rows, expected {expected}", rows.len())));
-    };
-    let rotation = Matrix3::from_fn(|i, j| [a, b, c][i][j]);
-    let off = (rotation * rotation.transpose() - Matrix3::identity()).norm();
-    let shift = Vector3::new(a[3], b[3], c[3]);
-    if single || !(off < 1e-6 && rotation.determinant() > 0.0 && shift.iter().all(|x| x.is_finite())) {
-        return Err(invalid(format!("{name}: not a rotation and a shift, expected {expected}")));
+fn pose_from(value: &Bound<'_, PyAny>, name: &'static str) -> PyResult<Isometry3<f64>> {
+    let (rows, _) = convert::rows::<4>(value, name)?;
+    let flat: Vec<f64> = rows.into_iter().flatten().collect();
+    if flat.len() != 16 {
+        return Err(invalid(format!("{name}: {} rows of 4, expected an array (4, 4)", flat.len() / 4)));
     }
-    let turn = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(rotation));
-    Ok(Isometry3::from_parts(Translation3::from(shift), turn))
+    let motion = RigidMotion::from_matrix(name, &Matrix4::from_row_slice(&flat)).map_err(|error| exception(&error))?;
+    let turn = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(motion.rotation));
+    Ok(Isometry3::from_parts(Translation3::from(motion.translation_m), turn))
 }
 
 fn to_poses<'py>(py: Python<'py>, poses: &[Isometry3<f64>], single: bool) -> PyResult<Bound<'py, PyAny>> {

@@ -45,7 +45,8 @@ fn the_cuboids_corner_is_upright_and_right_handed() {
 /// Along either upper edge of the cuboid, red is above, and green to the left, blue to the right below.
 #[test]
 fn faces_have_their_colours_and_edges_are_where_the_truth_is() {
-    let sequence = sequence(StereoOptions { frames: 60, noise_sigma: 0.0, distance_m: [1.0, 1.6], ..Default::default() });
+    let sequence =
+        sequence(StereoOptions { frames: 60, noise_sigma: 0.0, distance_m: [1.0, 1.6], ..Default::default() });
     let corner = laboratory().corners()[0];
     for frame in [0, 20, 59] {
         let pose = sequence.pose(frame).unwrap();
@@ -95,7 +96,8 @@ fn distances_and_rooms_are_kept_to() {
     let room = RoomOptions { light_spacing_m: 1.0, ..RoomOptions::new(RoomKind::Office, 3) };
     let room = Arc::new(World::new(&room).unwrap());
     assert!(room.corners().iter().filter(|corner| corner.kind == CornerKind::Hollow).count() == 8);
-    let sequence = StereoSequence::new(room.clone(), [small(), small()], StereoOptions { frames: 30, ..Default::default() });
+    let sequence =
+        StereoSequence::new(room.clone(), [small(), small()], StereoOptions { frames: 30, ..Default::default() });
     assert!(sequence.unwrap().corner() < room.corners().len());
 }
 
@@ -104,12 +106,8 @@ fn distances_and_rooms_are_kept_to() {
 fn inertial_readings_follow_the_motion() {
     let sequence = sequence(StereoOptions { frames: 61, ..Default::default() });
     let perfect = |range| ImuChannel { noise_density: 0.0, bias_sigma: 0.0, bias_walk: 0.0, scale_sigma: 0.0, range };
-    let options = ImuOptions {
-        rate_hz: 1000.0,
-        gyroscope: perfect(8.0),
-        accelerometer: perfect(40.0),
-        ..ImuOptions::default()
-    };
+    let options =
+        ImuOptions { rate_hz: 1000.0, gyroscope: perfect(8.0), accelerometer: perfect(40.0), ..ImuOptions::default() };
     let readings = imu_readings(sequence.motion(), sequence.time_s(60), &options).unwrap();
     assert_eq!(readings.len(), 2001);
     let mut turned = sequence.pose(0).unwrap().rotation;

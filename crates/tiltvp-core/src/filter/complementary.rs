@@ -6,7 +6,7 @@
 use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
 
 use crate::error::{Error, Result};
-use crate::geometry::validate_rotation;
+use crate::geometry::check_rotation;
 
 /// How quickly the filter follows its reference.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -68,7 +68,7 @@ impl ComplementaryFilter {
     /// For options outside their domains and a matrix that is no rotation.
     pub fn new(options: ComplementaryOptions, attitude: &Matrix3<f64>) -> Result<Self> {
         options.validate()?;
-        validate_rotation(attitude)?;
+        check_rotation("reference_from_body", attitude)?;
         let attitude = quaternion(attitude);
         Ok(Self { options, attitude, bias_rad_s: Vector3::zeros(), unseen_s: 0.0 })
     }
@@ -112,7 +112,7 @@ impl ComplementaryFilter {
     /// # Errors
     /// [`Error::InvalidArgument`] for a matrix that is no rotation.
     pub fn correct(&mut self, reference_from_body: &Matrix3<f64>) -> Result<Vector3<f64>> {
-        validate_rotation(reference_from_body)?;
+        check_rotation("reference_from_body", reference_from_body)?;
         let difference = (self.attitude.inverse() * quaternion(reference_from_body)).scaled_axis();
         let share = -(-self.unseen_s / self.options.time_constant_s).exp_m1();
         self.attitude *= UnitQuaternion::from_scaled_axis(difference * share);
