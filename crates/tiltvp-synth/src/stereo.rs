@@ -23,8 +23,8 @@ const CLEAR_M: f64 = 0.12;
 const SHARPS: usize = 8;
 /// Edges of corners that are looked at first, metres.
 const LARGE_M: f64 = 0.35;
-/// Least length of its edges in the images, all along, of a corner that is looked at, pixels.
-const IN_SIGHT_PX: f64 = 15.0;
+/// Least length of its edges in the images, all along, of a corner that is looked at, in widths of an image.
+const IN_SIGHT: f64 = 0.012;
 /// Points at which an edge is looked for.
 const EDGE_POINTS: usize = 64;
 
@@ -311,6 +311,7 @@ fn is_good(world: &World, cameras: &[Camera; 2], options: &StereoOptions, motion
     // Five looks a second tell; no hand moves the cameras far in between.
     let duration = options.frames as f64 / options.frame_rate_hz;
     let looks = (5.0 * duration).ceil() as usize + 1;
+    let least = cameras.each_ref().map(|camera| IN_SIGHT * f64::from(camera.width()));
     (0..looks).all(|k| {
         let left = motion.pose(k as f64 * duration / looks as f64);
         let poses = [left, left * options.left_from_right];
@@ -320,7 +321,8 @@ fn is_good(world: &World, cameras: &[Camera; 2], options: &StereoOptions, motion
             world.contains(center) && axes.iter().all(|d| clear(*d) && clear(-d))
         };
         poses.iter().all(|pose| is_free(&pose.translation.vector))
-            && sight(world, 0, corner, &[(poses[0], &cameras[0]), (poses[1], &cameras[1])])
-                .is_some_and(|seen| seen.edges_px.as_flattened().iter().all(|length| *length >= IN_SIGHT_PX))
+            && sight(world, 0, corner, &[(poses[0], &cameras[0]), (poses[1], &cameras[1])]).is_some_and(|seen| {
+                seen.edges_px.iter().zip(least).all(|(eye, least)| eye.iter().all(|px| *px >= least))
+            })
     })
 }
