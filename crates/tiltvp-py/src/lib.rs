@@ -3,6 +3,7 @@
 mod call;
 mod camera;
 mod convert;
+mod corner;
 mod drive;
 mod lines;
 mod rays;
@@ -19,6 +20,11 @@ mod _core {
 
     #[pymodule_export]
     use crate::camera::Camera;
+    #[pymodule_export]
+    use crate::corner::{
+        CornerAttitude, CornerAttitudes, CornerFeature, CornerPose, ResolvedAttitude, corner_attitudes, corner_poses,
+        fit_corner, included_angle, resolve_corners, screen_corner, solve_corner, solve_corners, triangulate,
+    };
     #[pymodule_export]
     use crate::drive::Drive;
     #[pymodule_export]

@@ -12,20 +12,22 @@ mod gamma;
 mod pose;
 mod position;
 mod prior;
+mod properties;
 mod rays;
 mod resolve;
-mod screening;
+
 mod standard;
 mod vertex;
 
 pub use self::attitude::{CornerAttitude, CornerAttitudes, IncludedAngle, corner_attitudes};
 pub use self::fusion::{FusedPose, fuse_rays};
 pub use self::gamma::included_angle;
-pub use self::pose::{CornerOptions, CornerPose, corner_poses};
+pub use self::pose::{CornerPose, PoseOptions, corner_poses};
 pub use self::position::{Sighting, TriangulatedPoint, triangulate};
 pub use self::prior::{AttitudePrior, VerticalSense};
+pub use self::properties::Screening;
 pub use self::rays::FittedRay;
 pub use self::resolve::{Alignment, ResolvedAttitude, View, resolve};
-pub use self::screening::Screening;
+
 pub use self::standard::{CornerCase, StandardType};
 pub use self::vertex::{CornerFeature, Edge};

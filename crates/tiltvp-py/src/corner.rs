@@ -1,0 +1,18 @@
+//! Corners over arrays: features, attitudes and poses.
+
+mod attitude;
+mod feature;
+mod matrix;
+mod pose;
+mod prior;
+mod resolved;
+mod solve;
+
+pub(crate) use self::attitude::{CornerAttitude, CornerAttitudes};
+pub(crate) use self::feature::CornerFeature;
+pub(crate) use self::pose::CornerPose;
+pub(crate) use self::resolved::ResolvedAttitude;
+pub(crate) use self::solve::{
+    corner_attitudes, corner_poses, fit_corner, included_angle, resolve_corners, screen_corner, solve_corner,
+    solve_corners, triangulate,
+};
