@@ -6,7 +6,7 @@ use nalgebra::{DMatrix, DVector, Matrix3, Rotation3, SVector, UnitQuaternion, Ve
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use tiltvp_core::corner::{
-    Alignment, AttitudePrior, CornerFeature, FittedRay, IncludedAngle, PoseOptions, Sighting, VerticalSense, View,
+    Alignment, AttitudePrior, CornerFeature, CornerOptions, FittedRay, IncludedAngle, Sighting, VerticalSense, View,
     corner_attitudes, corner_poses, included_angle, resolve, triangulate,
 };
 use tiltvp_core::filter::{ConsistencyBand, squared_mahalanobis};
@@ -186,7 +186,7 @@ fn two_cameras_reach_the_bound_and_choose_rightly() {
         else {
             continue;
         };
-        let options = PoseOptions { angle: IncludedAngle::exact(truth.gamma_rad), ..PoseOptions::default() };
+        let options = CornerOptions { angle: IncludedAngle::exact(truth.gamma_rad), ..CornerOptions::default() };
         let sound = |f: &CornerFeature| {
             let found = corner_attitudes(f, &options.angle).unwrap();
             !found.is_empty() && found.iter().all(|a| a.sensitivity < 10.0)

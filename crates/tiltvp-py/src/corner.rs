@@ -1,14 +1,21 @@
-//! Corners over arrays: features, attitudes and poses.
+//! Corners over arrays: features, attitudes and poses, and what finds them in images.
 
 mod attitude;
+mod detector;
+mod estimate;
+mod estimator;
 mod feature;
 mod matrix;
+mod options;
 mod pose;
 mod prior;
 mod resolved;
 mod solve;
 
 pub(crate) use self::attitude::{CornerAttitude, CornerAttitudes};
+pub(crate) use self::detector::CornerDetector;
+pub(crate) use self::estimate::{CornerEstimate, CornerHypothesis};
+pub(crate) use self::estimator::CornerPoseEstimator;
 pub(crate) use self::feature::CornerFeature;
 pub(crate) use self::pose::CornerPose;
 pub(crate) use self::resolved::ResolvedAttitude;

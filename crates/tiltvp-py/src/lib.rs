@@ -22,8 +22,9 @@ mod _core {
     use crate::camera::Camera;
     #[pymodule_export]
     use crate::corner::{
-        CornerAttitude, CornerAttitudes, CornerFeature, CornerPose, ResolvedAttitude, corner_attitudes, corner_poses,
-        fit_corner, included_angle, resolve_corners, screen_corner, solve_corner, solve_corners, triangulate,
+        CornerAttitude, CornerAttitudes, CornerDetector, CornerEstimate, CornerFeature, CornerHypothesis, CornerPose,
+        CornerPoseEstimator, ResolvedAttitude, corner_attitudes, corner_poses, fit_corner, included_angle,
+        resolve_corners, screen_corner, solve_corner, solve_corners, triangulate,
     };
     #[pymodule_export]
     use crate::drive::Drive;
@@ -53,6 +54,7 @@ mod _core {
     fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {
         module.add("METHODS", tiltvp_core::tilt::METHODS.to_vec())?;
         module.add("CALIBRATION_METHODS", tiltvp_core::selfcalib::CALIBRATION_METHODS.to_vec())?;
+        module.add("CORNER_METHODS", tiltvp_core::corner::CORNER_METHODS.to_vec())?;
         module.add("LINE_METHODS", tiltvp_core::lines::LINE_METHODS.to_vec())?;
         module.add("CAMERA_MODELS", tiltvp_core::camera::Model::names().collect::<Vec<_>>())?;
         module.add("ROOM_KINDS", tiltvp_synth::RoomKind::ALL.map(tiltvp_synth::RoomKind::name).to_vec())?;

@@ -7,27 +7,44 @@
 //! [Liu et al. 2018]: https://arxiv.org/abs/1812.10952
 
 mod attitude;
+mod coloured;
+mod coloured_edges;
+mod consensus;
+mod detector;
+mod edge_place;
+mod estimator;
 mod fusion;
 mod gamma;
+mod general;
+mod junctions;
+mod options;
 mod pose;
 mod position;
 mod prior;
-mod properties;
 mod rays;
 mod resolve;
-
+mod screening;
+mod segmentation;
+mod segments;
 mod standard;
+mod trace;
 mod vertex;
 
 pub use self::attitude::{CornerAttitude, CornerAttitudes, IncludedAngle, corner_attitudes};
+pub use self::detector::{CornerDetector, CornerScratch, Window};
+pub use self::estimator::{CornerEstimate, CornerPoseEstimator, EstimatorOptions, Frame, Hypothesis, Verdict};
 pub use self::fusion::{FusedPose, fuse_rays};
 pub use self::gamma::included_angle;
-pub use self::pose::{CornerPose, PoseOptions, corner_poses};
+pub use self::options::{
+    CORNER_METHODS, ColouredOptions, CornerMethod, DetectorOptions, GeneralOptions, OrientationChoice,
+};
+pub use self::pose::{CornerOptions, CornerPose, corner_poses};
 pub use self::position::{Sighting, TriangulatedPoint, triangulate};
 pub use self::prior::{AttitudePrior, VerticalSense};
-pub use self::properties::Screening;
 pub use self::rays::FittedRay;
 pub use self::resolve::{Alignment, ResolvedAttitude, View, resolve};
-
+pub use self::screening::Screening;
+pub use self::segmentation::{ColorOptions, Primary};
+pub use self::segments::Segment;
 pub use self::standard::{CornerCase, StandardType};
 pub use self::vertex::{CornerFeature, Edge};

@@ -14,7 +14,7 @@ use crate::geometry::RigidMotion;
 
 /// What is known of a corner before it is looked at.
 #[derive(Debug, Clone, PartialEq)]
-pub struct PoseOptions {
+pub struct CornerOptions {
     /// The angle between the horizontal edges.
     pub angle: IncludedAngle,
     /// Whether the edges x, y, z are a right-handed triple, where the object is known; that tells the interpretations apart.
@@ -26,7 +26,7 @@ pub struct PoseOptions {
     pub fuse: bool,
 }
 
-impl Default for PoseOptions {
+impl Default for CornerOptions {
     fn default() -> Self {
         Self { angle: IncludedAngle::RIGHT, right_handed: None, priors: Vec::new(), fuse: true }
     }
@@ -82,7 +82,7 @@ pub fn corner_poses(
     left: &CornerFeature,
     right: &CornerFeature,
     left_from_right: &RigidMotion,
-    options: &PoseOptions,
+    options: &CornerOptions,
 ) -> Result<Vec<CornerPose>> {
     let of_left = corner_attitudes(left, &options.angle)?;
     let of_right = corner_attitudes(right, &options.angle)?;

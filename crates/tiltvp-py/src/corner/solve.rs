@@ -3,7 +3,9 @@
 use nalgebra::{Matrix2, Matrix3, Matrix4, Vector3};
 use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
-use tiltvp_core::corner::{self as core, Alignment, FittedRay, IncludedAngle, PoseOptions, Screening, Sighting, View};
+use tiltvp_core::corner::{
+    self as core, Alignment, CornerOptions, FittedRay, IncludedAngle, Screening, Sighting, View,
+};
 use tiltvp_core::geometry::RigidMotion;
 
 use super::attitude::{CornerAttitude, CornerAttitudes};
@@ -226,7 +228,7 @@ pub(crate) fn corner_poses(
     fuse: bool,
 ) -> PyResult<Vec<CornerPose>> {
     let angle = IncludedAngle { gamma_rad, sigma_rad: gamma_sigma_rad };
-    let options = PoseOptions { angle, right_handed, priors: prior::parse(priors)?, fuse };
+    let options = CornerOptions { angle, right_handed, priors: prior::parse(priors)?, fuse };
     let motion = motion(left_from_right, "left_from_right")?;
     let (left, right) = (left.get().inner(), right.get().inner());
     let poses = call(py, || core::corner_poses(left, right, &motion, &options))?;
