@@ -92,6 +92,10 @@ measure-sampling *arguments: setup
 measure-lines *arguments: setup
     {{bin}}/tiltvp measure lines {{arguments}}
 
+# Poses of corners: the closed form on random poses, and rendered sequences of a hand-held stereo pair, with plots.
+measure-corners *arguments: setup
+    {{bin}}/tiltvp measure corners --out out/corners {{arguments}}
+
 # Round trips and Jacobians of the calibrations of TILTVP_DATA, as a table.
 measure-cameras: setup
     {{bin}}/pytest --quiet --capture=no tests/real_data/test_camera_conformance.py

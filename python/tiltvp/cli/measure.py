@@ -8,12 +8,14 @@ from typing import Annotated
 
 from cyclopts import App, Parameter, validators
 
+from tiltvp.cli.corner_measures import corners
 from tiltvp.cli.planar_pose import planar_pose
 from tiltvp.cli.results import check_ending, show_frame, write_frame
 from tiltvp.cli.terminal import progress_bar, say
 from tiltvp.errors import InvalidInputError
 
 app = App(name="measure", help="Measure the methods on images of known tilt.")
+app.command(corners)
 app.command(planar_pose)
 
 

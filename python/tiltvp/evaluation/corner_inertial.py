@@ -17,7 +17,13 @@ if TYPE_CHECKING:
 
     from tiltvp.synth import ImuLog, StereoSequence
 
-__all__ = ["CONVENTIONAL", "compare_inertial", "conventional_angles", "filter_attitudes", "summarise_inertial_comparison"]
+__all__ = [
+    "CONVENTIONAL",
+    "compare_inertial",
+    "conventional_angles",
+    "filter_attitudes",
+    "summarise_inertial_comparison",
+]
 
 CONVENTIONAL: Final = ("complementary", "Mahony")
 """The complementary filter of angles, and the explicit one on rotations, as the `ahrs` package has them."""
@@ -38,10 +44,10 @@ def compare_inertial(
     """Errors of roll, pitch and yaw in degrees, with columns `method` and `time_s`.
 
     `attitudes` are the estimates `camera_from_object` of each frame, or None. Methods: the image alone, at its frames;
-    `ComplementaryFilter` with the image as its reference, and `CONVENTIONAL`, filters of accelerometer and gyroscope, at
-    the readings of a simulated sensor (`StereoSequence.imu` of that seed). The latter know no yaw; each has the time
-    constant that suits the truth best. Angles are those of the board that holds the cameras, x forward and z up (ROS
-    REP 103). Raises `InvalidInputError` where the package is missing or no frame has an attitude.
+    `ComplementaryFilter` with the image as its reference, and `CONVENTIONAL`, filters of accelerometer and gyroscope,
+    at the readings of a simulated sensor (`StereoSequence.imu` of that seed). The latter know no yaw; each has the
+    time constant that suits the truth best. Angles are those of the board that holds the cameras, x forward and z up
+    (ROS REP 103). Raises `InvalidInputError` where the package is missing or no frame has an attitude.
     """
     imu = sequence.imu(seed=seed)
     corner = sequence.corners[sequence.corner]
@@ -105,7 +111,7 @@ def filter_attitudes(imu: ImuLog, seen: dict[float, NDArray[np.float64]]) -> NDA
 def conventional_angles(imu: ImuLog, method: str, time_constant_s: float) -> NDArray[np.float64]:
     """(M, 3): roll, pitch and yaw (NaN) in radians, from one of the filters `CONVENTIONAL` of the `ahrs` package."""
     try:
-        from ahrs.filters import Complementary, Mahony
+        from ahrs.filters import Complementary, Mahony  # type: ignore[import-untyped]
     except ImportError as error:
         raise InvalidInputError("ahrs: not installed, expected pip install 'tiltvp[imu]'") from error
 

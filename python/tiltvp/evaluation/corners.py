@@ -70,9 +70,7 @@ class CornerScene:
         else:
             scene = Room(self.kind, seed, threads=threads)
         left, right = zed_cameras(self.width)
-        return StereoSequence(
-            scene, left=left, right=right, frames=frames, seed=seed, threads=threads, **self.options
-        )
+        return StereoSequence(scene, left=left, right=right, frames=frames, seed=seed, threads=threads, **self.options)
 
 
 CORNER_SCENES: tuple[CornerScene, ...] = (
@@ -183,9 +181,7 @@ def _gray(image: NDArray[np.uint8]) -> NDArray[np.uint8]:
     return np.asarray(cv2.cvtColor(image, cv2.COLOR_BGR2GRAY), dtype=np.uint8)
 
 
-def _judged(
-    scene: CornerScene, sequence: StereoSequence, frame: int, estimate: _core.CornerEstimate
-) -> dict[str, Any]:
+def _judged(scene: CornerScene, sequence: StereoSequence, frame: int, estimate: _core.CornerEstimate) -> dict[str, Any]:
     target = sequence.left_from_object(frame)
     row: dict[str, Any] = {
         "frame": frame,
@@ -226,10 +222,8 @@ def _judged(
     }
 
 
-def _nearest(
-    sequence: StereoSequence, frame: int, pose: _core.CornerHypothesis
-) -> tuple[int, NDArray[np.float64]]:
-    """The true corner of a room that an estimate is of, or -1, and its pose with level edges named as the estimate does."""
+def _nearest(sequence: StereoSequence, frame: int, pose: _core.CornerHypothesis) -> tuple[int, NDArray[np.float64]]:
+    """The true corner that an estimate is of, or -1, and its pose with level edges named as the estimate does."""
     from_world = np.linalg.inv(sequence.poses_at([sequence.times_s[frame]])[0])
     vertices = np.array([corner.position_m for corner in sequence.corners]) @ from_world[:3, :3].T + from_world[:3, 3]
     away = np.linalg.norm(vertices - pose.vertex_m, axis=1)
