@@ -108,6 +108,10 @@ measure-line-peers *arguments: drives
         "opencv-contrib-python-headless==$({{bin}}/python -c 'from importlib.metadata import version; print(version("opencv-python-headless"))')"
     PYTHONPATH="$PWD/out/peers/opencv-contrib" {{bin}}/python benches/peers/line_segments.py out/drives/corridor out/drives/hall {{arguments}}
 
+# Poses of corners: the closed form on random poses, and rendered sequences of a hand-held stereo pair, with plots.
+measure-corners *arguments: setup
+    {{bin}}/tiltvp measure corners --out out/corners {{arguments}}
+
 # Round trips and Jacobians of the calibrations of TILTVP_DATA, as a table.
 measure-cameras: setup
     {{bin}}/pytest --quiet --capture=no tests/real_data/test_camera_conformance.py
