@@ -1823,7 +1823,11 @@ class SelfCalibrator:
         Distance at which landmarks are thought to be (3).
     start_distance_log_sigma, gate_probability, memory
         Of "default": standard deviation of the logarithm of that distance (1.5), probability with which a bearing
-        passes the gate (0.9999), and poses that are kept to be linearised anew (400).
+        passes the gate (0.9999), and poses that are kept to be linearised anew (400). Landmarks that are not seen from
+        the poses kept are forgotten: keep a whole drive's for loops to close.
+    step_sigma_m, step_sigma_rad
+        Of "default": standard deviations of every step's motion, in either direction and in turning, beside those that
+        grow with the wheels' displacements (0).
     start_distance_sigma_m, odometry_inflation
         Of "paper": standard deviation of that distance (2), and the factor by which the noise is inflated (5).
 
@@ -1845,6 +1849,8 @@ class SelfCalibrator:
         gate_probability: float | None = None,
         memory: SupportsIndex | None = None,
         odometry_inflation: float | None = None,
+        step_sigma_m: float | None = None,
+        step_sigma_rad: float | None = None,
     ) -> Self:
         """Makes a filter that has seen nothing."""
 
@@ -1953,6 +1959,8 @@ def calibrate(
     estimate_time_offset: bool = False,
     times_s: ArrayLike | None = None,
     max_iterations: int | None = None,
+    step_sigma_m: float | None = None,
+    step_sigma_rad: float | None = None,
 ) -> LogCalibration:
     """The mounting from a whole log at once, by robust sparse least squares.
 
