@@ -104,6 +104,10 @@ measure-calibration *arguments: setup
 measure-time *arguments: setup
     {{bin}}/python benches/peers/scharr.py {{arguments}}
 
+# Coloured cubes before a pair of cameras against marker cubes by OpenCV: errors and times, in one process on one thread.
+measure-markers *arguments: setup
+    {{bin}}/python benches/peers/corner.py {{arguments}}
+
 # The benches of the core.
 bench *arguments:
     cargo bench --locked --package tiltvp-benches {{arguments}}
