@@ -27,6 +27,22 @@ pub(super) fn renamed(attitude: &Matrix3<f64>, near: &Matrix3<f64>) -> Matrix3<f
     namings().map(|naming| attitude * naming).max_by(|a, b| cosine(a).total_cmp(&cosine(b))).unwrap_or(*attitude)
 }
 
+/// Whether every two rays are at least this far apart at the vertex: those of one edge, found twice, are not.
+pub(super) fn rays_apart(feature: &CornerFeature, least_rad: f64) -> bool {
+    let vertex = feature.vertex();
+    let along = feature.rays().map(|ray| ray.normal.cross(&vertex).normalize());
+    let most = least_rad.cos();
+    along[0].dot(&along[1]) <= most && along[1].dot(&along[2]) <= most && along[2].dot(&along[0]) <= most
+}
+
+/// Whether a feature has an attitude, its edges named at will, within `most_rad` of this one.
+pub(super) fn fits(feature: &CornerFeature, angle: &IncludedAngle, attitude: &Matrix3<f64>, most_rad: f64) -> bool {
+    corner_attitudes(feature, angle).is_ok_and(|found| {
+        let mut own = found.iter().map(|own| renamed(&own.camera_from_object, attitude));
+        own.any(|own| apart(&own, attitude) <= most_rad)
+    })
+}
+
 /// The angle between two attitudes, radians.
 pub(super) fn apart(a: &Matrix3<f64>, b: &Matrix3<f64>) -> f64 {
     Rotation3::from_matrix_unchecked(a.transpose() * b).angle()

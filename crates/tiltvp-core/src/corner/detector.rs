@@ -1,10 +1,12 @@
 //! From an image to its corners: the tables of a camera, made once.
 
-use nalgebra::Vector3;
+use nalgebra::{Matrix3, Vector3};
 
 use super::attitude::{IncludedAngle, corner_attitudes};
 use super::coloured::{self, ColouredScratch};
+use super::completion::complete;
 use super::general::{self, GeneralScratch};
+use super::guided::{Expected, find_near};
 use super::options::{CornerMethod, DetectorOptions};
 use super::segments::{Segment, SegmentFinder};
 use super::vertex::CornerFeature;
@@ -133,13 +135,52 @@ impl CornerDetector {
             return Err(Error::argument("method", "coloured", "general, for grey images"));
         };
         let (angle, least) = (IncludedAngle::exact(options.gamma_rad), options.vertical_max_rad.cos());
-        let accept = |corner: &CornerFeature| {
-            let upright = |edge: &Vector3<f64>| vertical.is_none_or(|vertical| edge.dot(vertical).abs() >= least);
-            corner_attitudes(corner, &angle)
-                .is_ok_and(|attitudes| attitudes.iter().any(|attitude| upright(&attitude.edges[1])))
+        // The vertical is the edge nearest to the prior, or to the image's columns where there is none.
+        let closeness = |corner: &CornerFeature| {
+            let attitudes = corner_attitudes(corner, &angle).ok()?;
+            let near = |upright: &Vector3<f64>| {
+                let cosines = attitudes.iter().map(|attitude| attitude.edges[1].dot(upright).abs());
+                cosines.max_by(f64::total_cmp)
+            };
+            match vertical {
+                Some(vertical) => near(vertical).filter(|cosine| *cosine >= least),
+                None => near(&Vector3::y()),
+            }
         };
-        general::find(&self.camera, finder, image, options, &self.light, vertical, accept, memory, out);
+        general::find(&self.camera, finder, image, options, &self.light, vertical, closeness, memory, out);
         Ok(())
+    }
+
+    /// The corner near where it is expected; none if it is not there, and for the coloured front end, which finds its corner
+    /// anywhere. `search_px` is how far from there, none for the option.
+    pub(super) fn find_near(
+        &self,
+        image: &ImageView<'_>,
+        expected: &Expected,
+        search_px: Option<f64>,
+        scratch: &mut CornerScratch,
+    ) -> Option<CornerFeature> {
+        let (CornerMethod::General(options), Some(memory)) = (&self.options.method, &mut scratch.general) else {
+            return None;
+        };
+        let search_px = search_px.unwrap_or(options.follow_px);
+        find_near(&self.camera, image, expected, search_px, options, &self.light, &mut memory.trace)
+    }
+
+    /// The corners whose edges run along the columns of a rotation, two of them among the segments of the image that was looked
+    /// at last with this scratch; added to `out`. None for the coloured front end and where edges are not at right angles.
+    pub(super) fn complete(
+        &self,
+        image: &ImageView<'_>,
+        camera_from_object: &Matrix3<f64>,
+        scratch: &mut CornerScratch,
+        out: &mut Vec<CornerFeature>,
+    ) {
+        if let (CornerMethod::General(options), Some(memory)) = (&self.options.method, &mut scratch.general)
+            && options.gamma_rad == std::f64::consts::FRAC_PI_2
+        {
+            complete(&self.camera, image, camera_from_object, options, &self.light, memory, out);
+        }
     }
 
     /// The line segments of the last grey image, the longest first; none for the coloured front end.

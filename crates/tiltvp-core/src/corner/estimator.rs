@@ -2,9 +2,10 @@
 
 use nalgebra::{Matrix3, Matrix6, Vector3};
 
-use super::attitude::IncludedAngle;
-use super::consensus::{agreement, apart, renamed, weight};
+use super::attitude::{IncludedAngle, corner_attitudes};
+use super::consensus::{agreement, apart, fits, renamed, weight};
 use super::detector::{CornerDetector, CornerScratch};
+use super::guided::Expected;
 use super::options::CornerMethod;
 use super::pose::{CornerOptions, CornerPose, corner_poses};
 use super::prior::{AttitudePrior, VerticalSense};
@@ -33,7 +34,7 @@ pub struct EstimatorOptions {
     /// How far attitudes of several features of one image may be apart, radians. Default 3 degrees.
     pub agree_max_rad: f64,
     /// How far the attitudes of one corner in both images may be apart, and the rays from the fused pose, in standard
-    /// deviations of the covariances as they are: root mean square per degree of freedom. Default 8.
+    /// deviations of the covariances as they are: root mean square per degree of freedom. Default 4.
     pub misfit_max: f64,
     /// The least and the largest distance of a vertex, metres. Default 0.05 and 100.
     pub distance_m: [f64; 2],
@@ -51,7 +52,7 @@ impl Default for EstimatorOptions {
             turn_sigma_rad: 6f64.to_radians(),
             forget_after: 10,
             agree_max_rad: 3f64.to_radians(),
-            misfit_max: 8.0,
+            misfit_max: 4.0,
             distance_m: [0.05, 100.0],
             probability_min: 0.9,
         }
@@ -169,6 +170,8 @@ pub struct CornerEstimate {
     pub chosen_right: Option<usize>,
     /// Whether the pose before was a prior.
     pub followed: bool,
+    /// The number of the corner that is the object: it grows where another corner than before has become the object.
+    pub object: u32,
 }
 
 impl CornerEstimate {
@@ -178,11 +181,23 @@ impl CornerEstimate {
     }
 }
 
-/// The last pose, and how many frames ago it was.
-#[derive(Debug, Clone, Copy, PartialEq)]
+/// The last pose, the corners it is from, and how many frames ago it was.
+#[derive(Debug, Clone, PartialEq)]
 struct Track {
     pose: Hypothesis,
+    corners: [Vec<CornerFeature>; 2],
     age: u32,
+    object: u32,
+}
+
+impl Track {
+    /// Whether a pose is one of the same corner: from one image any corner of the same upright world is.
+    fn is_of(&self, pose: &Hypothesis) -> bool {
+        match (self.pose.vertex_m, pose.vertex_m) {
+            (Some(last), Some(vertex)) => (vertex - last).norm() <= MOVED * last.norm(),
+            _ => true,
+        }
+    }
 }
 
 /// Finds the pose of a corner in the frames of a sequence, by one camera (attitude alone) or by two.
@@ -192,6 +207,7 @@ pub struct CornerPoseEstimator {
     right: Option<(CornerDetector, RigidMotion)>,
     options: EstimatorOptions,
     track: Option<Track>,
+    objects: u32,
     scratch: [CornerScratch; 2],
 }
 
@@ -217,7 +233,7 @@ impl CornerPoseEstimator {
             }
         }
         let scratch = [left.scratch(), right.as_ref().map_or(left.scratch(), |(right, _)| right.scratch())];
-        Ok(Self { left, right, options, track: None, scratch })
+        Ok(Self { left, right, options, track: None, objects: 0, scratch })
     }
 
     /// The left or only camera's detector.
@@ -242,7 +258,7 @@ impl CornerPoseEstimator {
 
     /// The direction of the vertical in the left camera's frame, from the last pose or from before.
     fn vertical(&self) -> Option<Vector3<f64>> {
-        let last = self.track.map(|track| track.pose.camera_from_object.column(1).into_owned());
+        let last = self.track.as_ref().map(|track| track.pose.camera_from_object.column(1).into_owned());
         last.or(self.options.down)
     }
 
@@ -276,15 +292,17 @@ impl CornerPoseEstimator {
         if let Some(track) = &mut self.track {
             track.age += 1;
         }
-        if self.track.is_some_and(|track| track.age > self.options.forget_after) {
+        if self.track.as_ref().is_some_and(|track| track.age > self.options.forget_after) {
             self.track = None;
         }
         let vertical = self.vertical();
         let mut features = [Vec::new(), Vec::new()];
-        detect(&self.left, left, vertical.as_ref(), &mut self.scratch[0], &mut features[0])?;
+        let followed = self.track.as_ref().map_or(&[][..], |track| &track.corners[..]);
+        let [of_left, of_right] = [0, 1].map(|side| followed.get(side).map_or(&[][..], Vec::as_slice));
+        detect(&self.left, left, vertical.as_ref(), of_left, &mut self.scratch[0], &mut features[0])?;
         if let (Some((detector, left_from_right)), Some(right)) = (&self.right, right) {
             let vertical = vertical.map(|vertical| left_from_right.rotation.transpose() * vertical);
-            detect(detector, right, vertical.as_ref(), &mut self.scratch[1], &mut features[1])?;
+            detect(detector, right, vertical.as_ref(), of_right, &mut self.scratch[1], &mut features[1])?;
         }
         let mut estimate = CornerEstimate {
             hypotheses: Vec::new(),
@@ -293,13 +311,19 @@ impl CornerPoseEstimator {
             chosen_left: Vec::new(),
             chosen_right: None,
             followed: self.track.is_some(),
+            object: self.objects,
         };
+        let attitude = self.attitude(&estimate.features)?;
+        if let Some(attitude) = &attitude {
+            self.add_completed(left, right, attitude, &mut estimate.features);
+            self.add_transferred([left, right.unwrap_or(left)], attitude, &mut estimate.features)?;
+        }
         if estimate.features[0].is_empty() {
             estimate.verdict = Verdict::NoneLeft;
         } else if right.is_some() && estimate.features[1].is_empty() {
             estimate.verdict = Verdict::NoneRight;
         } else if self.right.is_some() {
-            self.by_pair(&mut estimate)?;
+            self.by_pair(attitude.as_ref(), &mut estimate)?;
         } else {
             self.by_one(&mut estimate)?;
         }
@@ -307,10 +331,148 @@ impl CornerPoseEstimator {
             let decided = best.probability >= self.options.probability_min;
             estimate.verdict = if decided { Verdict::Found } else { Verdict::Ambiguous };
         }
-        if let Some(pose) = estimate.pose() {
-            self.track = Some(Track { pose: *pose, age: 0 });
+        if let Some(pose) = estimate.hypotheses.first().filter(|_| estimate.verdict == Verdict::Found) {
+            if !self.track.as_ref().is_some_and(|track| track.is_of(pose)) {
+                self.objects += 1;
+                estimate.object = self.objects;
+            }
+            let turned = self.right.as_ref().map_or(Matrix3::identity(), |(_, motion)| motion.rotation.transpose());
+            let parallel = |side: usize, attitude: Matrix3<f64>| -> Vec<CornerFeature> {
+                let fits =
+                    |corner: &&CornerFeature| fits(corner, &self.options.angle, &attitude, self.options.agree_max_rad);
+                let mut out: Vec<CornerFeature> = Vec::new();
+                for corner in estimate.features[side].iter().filter(fits) {
+                    // The longest rays of each vertex.
+                    let apart_rad = |other: &CornerFeature| other.vertex().angle(&corner.vertex());
+                    match out.iter_mut().find(|other| apart_rad(other) < SAME_VERTEX_RAD) {
+                        Some(other) if weight(other) < weight(corner) => *other = *corner,
+                        Some(_) => {}
+                        None => out.push(*corner),
+                    }
+                }
+                out
+            };
+            let corners = [parallel(0, pose.camera_from_object), parallel(1, turned * pose.camera_from_object)];
+            self.track = Some(Track { pose: *pose, corners, age: 0, object: estimate.object });
         }
         Ok(estimate)
+    }
+
+    /// The attitude by which corners are completed: that of the frame before, or the likeliest that one image's corners agree
+    /// on, with their edges at right angles.
+    fn attitude(&self, features: &[Vec<CornerFeature>; 2]) -> Result<Option<Matrix3<f64>>> {
+        if self.is_one_object() || self.options.angle != IncludedAngle::RIGHT {
+            return Ok(None);
+        }
+        let priors = self.priors(false);
+        let turned = self.right.as_ref().map_or(Matrix3::identity(), |(_, motion)| motion.rotation);
+        for (features, rotation) in features.iter().zip([Matrix3::identity(), turned]) {
+            let priors = if rotation == Matrix3::identity() { &priors[..] } else { &[] };
+            let Some(agreed) = agreement(features, &self.options.angle, self.options.agree_max_rad, priors)? else {
+                continue;
+            };
+            let view = |attitudes| View { attitudes, common_from_camera: rotation };
+            let views: Vec<View<'_>> = agreed.attitudes.iter().map(view).collect();
+            let resolved = resolve(&views, Alignment::Manhattan, self.right_handed(), &self.priors(false))?;
+            if let Some(best) = resolved.first() {
+                return Ok(Some(best.common_from_object));
+            }
+        }
+        Ok(self.track.as_ref().map(|track| track.pose.camera_from_object))
+    }
+
+    /// Adds the corners of which two edges were found and the third is known from an attitude in the left camera's frame.
+    fn add_completed(
+        &mut self,
+        left: &Frame<'_>,
+        right: Option<&Frame<'_>>,
+        attitude: &Matrix3<f64>,
+        features: &mut [Vec<CornerFeature>; 2],
+    ) {
+        // The vertical is the axis nearest to what is known of it, so that edges are named as those found before.
+        let attitude = self.vertical().map_or(*attitude, |vertical| upright(attitude, &vertical));
+        let (angle, most_rad) = (self.options.angle, self.options.agree_max_rad);
+        let mut found = Vec::new();
+        let mut add =
+            |detector: &CornerDetector, frame: &Frame<'_>, own: Matrix3<f64>, scratch: &mut _, side: usize| {
+                if let Frame::Gray(image) = frame {
+                    found.clear();
+                    detector.complete(image, &own, scratch, &mut found);
+                    features[side].extend(found.iter().filter(|corner| fits(corner, &angle, &own, most_rad)));
+                }
+            };
+        add(&self.left, left, attitude, &mut self.scratch[0], 0);
+        if let (Some((detector, motion)), Some(right)) = (&self.right, right) {
+            add(detector, right, motion.rotation.transpose() * attitude, &mut self.scratch[1], 1);
+        }
+    }
+
+    /// Adds the corners of either image to those of the other one where they are seen there: each is looked for along its
+    /// epipolar line, near the distance of the last pose where there is one.
+    fn add_transferred(
+        &mut self,
+        frames: [&Frame<'_>; 2],
+        attitude: &Matrix3<f64>,
+        features: &mut [Vec<CornerFeature>; 2],
+    ) -> Result<()> {
+        let Some((detector, left_from_right)) = &self.right else { return Ok(()) };
+        let right_from_left = left_from_right.inverse();
+        let detectors = [&self.left, detector];
+        let attitudes = [*attitude, right_from_left.rotation * attitude];
+        let (angle, most_rad) = (self.options.angle, self.options.agree_max_rad);
+        let mut found: [Vec<CornerFeature>; 2] = [Vec::new(), Vec::new()];
+        for (own, other, other_from_own) in [(0, 1, &right_from_left), (1, 0, left_from_right)] {
+            let Frame::Gray(image) = frames[other] else { continue };
+            let mut order: Vec<&CornerFeature> = features[own].iter().collect();
+            order.sort_by(|a, b| weight(b).total_cmp(&weight(a)));
+            for corner in order.into_iter().take(TRANSFERRED_MAX) {
+                let admitted = corner_attitudes(corner, &angle)?;
+                let near = admitted.iter().find(|admitted| {
+                    let renamed = renamed(&admitted.camera_from_object, &attitudes[own]);
+                    apart(&renamed, &attitudes[own]) <= most_rad
+                });
+                let Some(near) = near else { continue };
+                let mut best: Option<CornerFeature> = None;
+                for distance_m in self.distances(detectors[other], &corner.vertex(), other_from_own) {
+                    let expected = Expected::transferred(corner, &near.edges, distance_m, other_from_own);
+                    let seen = expected.and_then(|expected| {
+                        detectors[other].find_near(image, &expected, Some(EPIPOLAR_STEP_PX), &mut self.scratch[other])
+                    });
+                    let Some(seen) = seen.filter(|seen| fits(seen, &angle, &attitudes[other], most_rad)) else {
+                        continue;
+                    };
+                    if best.as_ref().is_none_or(|best| weight(&seen) > weight(best)) {
+                        best = Some(seen);
+                    }
+                }
+                found[other].extend(best);
+            }
+        }
+        for (features, found) in features.iter_mut().zip(found) {
+            features.extend(found);
+        }
+        Ok(())
+    }
+
+    /// Distances of a point along a bearing of one camera, so that the other one sees them a step apart; only those near that of
+    /// the last pose, where there is one.
+    fn distances(&self, other: &CornerDetector, bearing: &Vector3<f64>, other_from_own: &RigidMotion) -> Vec<f64> {
+        let [nearest, farthest] = self.options.distance_m;
+        let last = self.track.as_ref().and_then(|track| track.pose.vertex_m).map(|vertex| vertex.norm());
+        let (near, far) = last.map_or((nearest, farthest), |last| (last * (1.0 - NEAR_LAST), last * (1.0 + NEAR_LAST)));
+        let mut out = Vec::new();
+        let mut before: Option<nalgebra::Vector2<f64>> = None;
+        for step in 0..=DISTANCES {
+            let share = f64::from(step) / f64::from(DISTANCES);
+            let distance_m = 1.0 / (1.0 / far + share * (1.0 / near - 1.0 / far));
+            let Some(pixel) = other.camera().project(&other_from_own.point(&(bearing * distance_m))) else { continue };
+            let moved = before.is_none_or(|before| (pixel - before).norm() >= EPIPOLAR_STEP_PX);
+            if moved && other.camera().contains(&pixel) {
+                out.push(distance_m);
+                before = Some(pixel);
+            }
+        }
+        out
     }
 
     /// Whether edges and object are the same from frame to frame, as those of the coloured cuboid are.
@@ -363,8 +525,9 @@ impl CornerPoseEstimator {
         }
     }
 
-    /// The poses of the pair of features, one of each image, that fits best; near the last vertex where there is one.
-    fn by_pair(&self, estimate: &mut CornerEstimate) -> Result<()> {
+    /// The poses of the pair of features, one of each image, that fits best; near the last vertex where there is one. Where
+    /// an `attitude` is known on which several corners agree, pairs that do not are left out.
+    fn by_pair(&self, attitude: Option<&Matrix3<f64>>, estimate: &mut CornerEstimate) -> Result<()> {
         let Some((_, left_from_right)) = &self.right else { return Ok(()) };
         let options = CornerOptions {
             angle: self.options.angle,
@@ -379,11 +542,18 @@ impl CornerPoseEstimator {
                 let poses = corner_poses(left, right, left_from_right, &options)?;
                 let Some(pose) = poses.first() else { continue };
                 let misfit = (pose.chi_square / 6.0).sqrt();
+                let agrees = |attitude: &Matrix3<f64>| {
+                    let own = renamed(&pose.camera_from_object, attitude);
+                    apart(&own, attitude) <= self.options.agree_max_rad
+                };
+                if attitude.is_some_and(|attitude| !agrees(attitude)) {
+                    continue;
+                }
                 if misfit > self.options.misfit_max || !(nearest..=farthest).contains(&pose.vertex_m.norm()) {
                     continue;
                 }
-                let mut score = weight(left).min(weight(right)) / (1.0 + misfit / self.options.misfit_max);
-                if let Some(last) = self.track.and_then(|track| track.pose.vertex_m) {
+                let mut score = weight(left).min(weight(right)) / (1.0 + misfit * misfit);
+                if let Some(last) = self.track.as_ref().and_then(|track| track.pose.vertex_m) {
                     // The same corner is near where it was.
                     let moved = (pose.vertex_m - last).norm() / last.norm();
                     score /= 1.0 + (moved / MOVED).powi(2);
@@ -413,18 +583,48 @@ impl CornerPoseEstimator {
     }
 }
 
+/// The same axes with the one that is nearest to a vertical as the second.
+fn upright(attitude: &Matrix3<f64>, vertical: &Vector3<f64>) -> Matrix3<f64> {
+    let nearest = attitude.tr_mul(vertical).abs().imax();
+    let axis = |k: usize| attitude.column((nearest + k) % 3).into_owned();
+    Matrix3::from_columns(&[axis(2), axis(0), axis(1)])
+}
+
+/// Most corners of the left image that are looked for in the right one, those with the longest rays.
+const TRANSFERRED_MAX: usize = 8;
+
+/// Distances that are tried before those are dropped that are less than a step apart.
+const DISTANCES: u32 = 1000;
+
+/// How far from the last vertex' distance other corners may be, as a share of it.
+const NEAR_LAST: f64 = 0.35;
+
+/// How far apart vertices of different corners are, radians.
+const SAME_VERTEX_RAD: f64 = 0.01;
+
+/// How far apart the places are at which a corner is looked for along its epipolar line, in pixels.
+const EPIPOLAR_STEP_PX: f64 = 4.0;
+
 /// The share of its distance by which a vertex moves in the camera's frame from one frame to the next.
 const MOVED: f64 = 0.1;
 
+/// The corners of an image: those that are near where they were, and those that are found anew.
 fn detect(
     detector: &CornerDetector,
     frame: &Frame<'_>,
     vertical: Option<&Vector3<f64>>,
+    followed: &[CornerFeature],
     scratch: &mut CornerScratch,
     out: &mut Vec<CornerFeature>,
 ) -> Result<()> {
     match frame {
-        Frame::Gray(image) => detector.detect_general(image, vertical, scratch, out),
+        Frame::Gray(image) => {
+            detector.detect_general(image, vertical, scratch, out)?;
+            let again =
+                followed.iter().filter_map(|last| detector.find_near(image, &Expected::of(last), None, scratch));
+            out.extend(again);
+            Ok(())
+        }
         Frame::Color(image) => {
             out.extend(detector.detect_coloured(image, None, scratch)?);
             Ok(())

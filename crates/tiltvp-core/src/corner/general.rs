@@ -2,6 +2,7 @@
 
 use nalgebra::Vector3;
 
+use super::consensus::rays_apart;
 use super::junctions::{self, Junction, RayEnd};
 use super::options::GeneralOptions;
 use super::segments::{Segment, SegmentFinder, SegmentScratch};
@@ -28,8 +29,9 @@ pub(super) struct GeneralScratch {
     pub(super) segments: SegmentScratch,
     meetings: Vec<Vec<(usize, Vector3<f64>, f64)>>,
     junctions: Vec<Junction>,
-    traced: Vec<Option<Option<Traced>>>,
-    trace: TraceScratch,
+    /// For each end of a segment, the vertices from which its ray was followed, and what came of it.
+    traced: Vec<Vec<(Vector3<f64>, Option<Traced>)>>,
+    pub(super) trace: TraceScratch,
 }
 
 impl GeneralScratch {
@@ -44,7 +46,7 @@ impl GeneralScratch {
     }
 }
 
-/// The corners of an image, the best first.
+/// The corners of an image, the best first. `closeness` is a factor on how good a corner is, none where it is none at all.
 pub(super) fn find(
     camera: &Camera,
     finder: &SegmentFinder,
@@ -52,7 +54,7 @@ pub(super) fn find(
     options: &GeneralOptions,
     light: &LightTable,
     vertical: Option<&Vector3<f64>>,
-    accept: impl Fn(&CornerFeature) -> bool,
+    closeness: impl Fn(&CornerFeature) -> Option<f64>,
     scratch: &mut GeneralScratch,
     out: &mut Vec<CornerFeature>,
 ) {
@@ -61,32 +63,43 @@ pub(super) fn find(
     finder.find(camera, image, options, segments);
     let segments = &segments.segments;
     junctions::find(camera, segments, vertical, options, meetings, junctions);
-    traced.clear();
-    traced.resize(2 * segments.len(), None);
+    traced.iter_mut().for_each(Vec::clear);
+    traced.resize(2 * segments.len(), Vec::new());
     let mut scored: Vec<(f64, CornerFeature)> = Vec::new();
     for junction in junctions.iter() {
         let mut rays = [None; 3];
         for (ray, end) in rays.iter_mut().zip(junction.rays) {
+            let segment = &segments[end.segment];
+            let near_rad = SAME_VERTEX_PX * segment.ends[0].angle(&segment.ends[1]) / segment.length_px;
             let known = &mut traced[2 * end.segment + end.end];
-            *ray = *known.get_or_insert_with(|| {
-                let course = course_of(segments, end, &junction.vertex, options);
-                let signal = |u, v| light.gray(image, u, v);
-                trace(camera, &course?, options.support_min_px as usize, signal, memory)
-            });
+            *ray = match known.iter().find(|(vertex, _)| vertex.angle(&junction.vertex) < near_rad) {
+                Some((_, found)) => *found,
+                None => {
+                    let course = course_of(segments, end, &junction.vertex, options);
+                    let support_min = options.support_min_px as usize;
+                    let found = course
+                        .and_then(|course| trace(camera, &course, support_min, |u, v| light.gray(image, u, v), memory));
+                    known.push((junction.vertex, found));
+                    found
+                }
+            };
+            if ray.is_none_or(|traced| traced.share < options.support_min_share) {
+                *ray = None;
+                break;
+            }
         }
         let [Some(x), Some(y), Some(z)] = rays else { continue };
         let rays = [x, y, z];
-        if rays.iter().any(|traced| traced.share < options.support_min_share) {
-            continue;
-        }
         let Some(corner) = CornerFeature::from_rays(rays.map(|traced| traced.ray)) else { continue };
-        if corner.residual_rad() * y.px_per_rad > options.residual_max_px || !accept(&corner) {
+        let good = corner.residual_rad() * y.px_per_rad <= options.residual_max_px;
+        if !good || !rays_apart(&corner, options.ray_angle_min_rad) {
             continue;
         }
+        let Some(closeness) = closeness(&corner) else { continue };
         let shortest = rays.iter().map(|traced| traced.ray.support).min().unwrap_or(0) as f64;
         let longest: f64 = rays.iter().map(|traced| (traced.ray.support as f64).min(200.0)).sum();
         let off = corner.residual_rad() * y.px_per_rad / options.residual_max_px;
-        scored.push(((shortest + 0.3 * longest) / (1.0 + off), corner));
+        scored.push((closeness * (shortest + 0.3 * longest) / (1.0 + off), corner));
     }
     scored.sort_by(|a, b| b.0.total_cmp(&a.0));
     for (_, corner) in scored {

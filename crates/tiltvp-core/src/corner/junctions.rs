@@ -41,8 +41,8 @@ impl RayEnd {
 
 /// Two rays that begin where their lines cross.
 #[derive(Debug, Clone, Copy)]
-struct Meeting {
-    place: Vector3<f64>,
+pub(super) struct Meeting {
+    pub(super) place: Vector3<f64>,
     gap_share: f64,
 }
 
@@ -98,7 +98,7 @@ pub(super) fn find(
 }
 
 /// Where the lines of two ends cross, if both rays begin there and run away from it.
-fn meeting(segments: &[Segment], a: RayEnd, b: RayEnd, options: &GeneralOptions) -> Option<Meeting> {
+pub(super) fn meeting(segments: &[Segment], a: RayEnd, b: RayEnd, options: &GeneralOptions) -> Option<Meeting> {
     let (first, second) = (&segments[a.segment], &segments[b.segment]);
     if a.segment == b.segment {
         return None;

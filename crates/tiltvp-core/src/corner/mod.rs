@@ -9,6 +9,7 @@
 mod attitude;
 mod coloured;
 mod coloured_edges;
+mod completion;
 mod consensus;
 mod detector;
 mod edge_place;
@@ -16,6 +17,7 @@ mod estimator;
 mod fusion;
 mod gamma;
 mod general;
+mod guided;
 mod junctions;
 mod options;
 mod pose;

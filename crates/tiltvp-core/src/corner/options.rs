@@ -103,9 +103,9 @@ pub struct GeneralOptions {
     pub segment_min_px: f64,
     /// Largest distance of a segment's pixels from its great circle, in pixels. Default 1.2.
     pub segment_threshold_px: f64,
-    /// How far from the vertex a ray may begin, in pixels. Default 12.
+    /// How far from the vertex a segment may begin, in pixels. Default 40.
     pub gap_max_px: f64,
-    /// The same as a share of the ray's length. Default 0.15.
+    /// The same as a share of the segment's length, if that is more. Default 0.2.
     pub gap_max_share: f64,
     /// How far beyond the vertex a segment may reach, in pixels. Default 5.
     pub overshoot_max_px: f64,
@@ -117,7 +117,9 @@ pub struct GeneralOptions {
     pub vertical_max_rad: f64,
     /// How far from a segment the edge is looked for, in pixels. Default 2.5.
     pub search_px: f64,
-    /// Least step across an edge, in the light of grey levels out of 255. Default 2.
+    /// How far from where it was a corner is looked for in the next frame, in pixels. Default 8.
+    pub follow_px: f64,
+    /// Least step across an edge, in the light of grey levels out of 255. Default 1.
     pub step_min: f64,
     /// Largest distance of a place of the edge from its ray, in pixels. Default 0.7.
     pub threshold_px: f64,
@@ -128,6 +130,8 @@ pub struct GeneralOptions {
     pub support_min_px: u32,
     /// Least share of the places along a ray that agree with it. Default 0.6.
     pub support_min_share: f64,
+    /// The same for a corner that is looked for near where it is expected. Default 0.4.
+    pub guided_min_share: f64,
     /// Largest root mean square distance of the vertex from the three rays, in pixels. Default 1.5.
     pub residual_max_px: f64,
     /// Most corners of an image, the best ones. Default 12.
@@ -142,18 +146,20 @@ impl Default for GeneralOptions {
             margin_px: 4.0,
             segment_min_px: 20.0,
             segment_threshold_px: 1.2,
-            gap_max_px: 12.0,
-            gap_max_share: 0.15,
+            gap_max_px: 40.0,
+            gap_max_share: 0.2,
             overshoot_max_px: 5.0,
             ray_angle_min_rad: 10.0 * PI / 180.0,
             gamma_rad: FRAC_PI_2,
             vertical_max_rad: 20.0 * PI / 180.0,
             search_px: 2.5,
-            step_min: 2.0,
+            follow_px: 8.0,
+            step_min: 1.0,
             threshold_px: 0.7,
             ray_sigma_px: 0.2,
             support_min_px: 20,
             support_min_share: 0.6,
+            guided_min_share: 0.4,
             residual_max_px: 1.5,
             corners_max: 12,
         }
@@ -230,11 +236,13 @@ impl GeneralOptions {
         within("gamma_rad", self.gamma_rad, 0.1..=3.0, "an angle from 0.1 to 3 rad")?;
         within("vertical_max_rad", self.vertical_max_rad, 0.001..=1.5, angle)?;
         within("search_px", self.search_px, 1.0..=15.0, "from 1 to 15 pixels")?;
+        within("follow_px", self.follow_px, 1.0..=15.0, "from 1 to 15 pixels")?;
         within("step_min", self.step_min, 0.1..=255.0, "a step of light from 0.1 to 255")?;
         within("threshold_px", self.threshold_px, 0.05..=10.0, "from 0.05 to 10 pixels")?;
         within("ray_sigma_px", self.ray_sigma_px, 0.0..=10.0, "from 0 to 10 pixels")?;
         within("support_min_px", f64::from(self.support_min_px), 2.0..=1e6, "from 2 to 1000000 pixels")?;
         within("support_min_share", self.support_min_share, 0.0..=1.0, "a share from 0 to 1")?;
+        within("guided_min_share", self.guided_min_share, 0.0..=1.0, "a share from 0 to 1")?;
         within("residual_max_px", self.residual_max_px, 0.01..=100.0, "from 0.01 to 100 pixels")?;
         within("corners_max", f64::from(self.corners_max), 1.0..=1000.0, "from 1 to 1000")
     }

@@ -157,6 +157,13 @@ impl CornerEstimate {
         self.inner.followed
     }
 
+    /// The number of the corner that is the object, from 1: it grows where another corner has become the object; from one
+    /// camera, whose attitude all parallel corners share, only after the poses before were forgotten.
+    #[getter]
+    fn object(&self) -> u32 {
+        self.inner.object
+    }
+
     fn __bool__(&self) -> bool {
         self.inner.pose().is_some()
     }

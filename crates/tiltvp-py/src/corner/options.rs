@@ -67,6 +67,8 @@ fn set(options: &mut DetectorOptions, key: &str, value: &Bound<'_, PyAny>) -> Py
         ("gamma_rad", CornerMethod::General(o)) => o.gamma_rad = number()?,
         ("vertical_max_rad", CornerMethod::General(o)) => o.vertical_max_rad = number()?,
         ("support_min_share", CornerMethod::General(o)) => o.support_min_share = number()?,
+        ("follow_px", CornerMethod::General(o)) => o.follow_px = number()?,
+        ("guided_min_share", CornerMethod::General(o)) => o.guided_min_share = number()?,
         ("corners_max", CornerMethod::General(o)) => o.corners_max = pixels()?,
         _ => return Ok(false),
     }
@@ -141,6 +143,8 @@ pub(super) fn in_force<'py>(py: Python<'py>, options: &DetectorOptions) -> PyRes
             dict.set_item("support_min_px", o.support_min_px)?;
             dict.set_item("support_min_share", o.support_min_share)?;
             dict.set_item("residual_max_px", o.residual_max_px)?;
+            dict.set_item("follow_px", o.follow_px)?;
+            dict.set_item("guided_min_share", o.guided_min_share)?;
             dict.set_item("corners_max", o.corners_max)?;
         }
     }
