@@ -59,9 +59,11 @@ pub(crate) fn solve_corners(
     };
     let vertex = rows(vertex, "vertex")?;
     let rays = [rows(x_ray, "x_ray")?, rows(y_ray, "y_ray")?, rows(z_ray, "z_ray")?];
-    let gamma = match gamma_rad.extract::<f64>() {
-        Ok(gamma) => vec![gamma; vertex.len()],
-        Err(_) => convert::vector(gamma_rad, "gamma_rad")?,
+    // An array of one would pass for a number, with a warning.
+    let many = gamma_rad.getattr("ndim").and_then(|ndim| ndim.extract::<usize>()).is_ok_and(|ndim| ndim > 0);
+    let gamma = match (!many).then(|| gamma_rad.extract::<f64>()) {
+        Some(Ok(gamma)) => vec![gamma; vertex.len()],
+        _ => convert::vector(gamma_rad, "gamma_rad")?,
     };
     let lengths = [rays[0].len(), rays[1].len(), rays[2].len(), gamma.len()];
     if lengths.iter().any(|length| *length != vertex.len()) {
