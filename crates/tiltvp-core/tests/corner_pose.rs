@@ -1,5 +1,7 @@
 //! Poses from noisy rays: errors at the Cramer-Rao bound, covariances that are true, hypotheses told apart.
 
+#![allow(clippy::unwrap_used)]
+
 use std::f64::consts::FRAC_PI_2;
 
 use nalgebra::{DMatrix, DVector, Matrix3, Rotation3, SVector, UnitQuaternion, Vector3};
@@ -162,7 +164,7 @@ fn one_camera_reaches_the_bound_and_knows_it() {
             vertex_nees.push(squared_mahalanobis(&miss, &feature.vertex_covariance()).unwrap());
         }
     }
-    let ratio: f64 = (squares / bounds as f64).sqrt();
+    let ratio: f64 = f64::sqrt(squares / bounds);
     assert!(ratio < 1.1, "rms {ratio} times the bound");
     // One run in 10,000 leaves each band.
     let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64;
@@ -223,7 +225,7 @@ fn two_cameras_reach_the_bound_and_choose_rightly() {
         assert_eq!(best.right_handed, truth.side > 0.0);
     }
     for (squares, bounds) in squares.iter().zip(bounds) {
-        let ratio: f64 = (squares / bounds as f64).sqrt();
+        let ratio: f64 = f64::sqrt(squares / bounds);
         assert!(ratio < 1.1, "rms {ratio} times the bound");
     }
     let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64;
