@@ -2,12 +2,14 @@
 
 mod call;
 mod camera;
+mod complementary;
 mod convert;
 mod corner;
 mod drive;
 mod lines;
 mod rays;
 mod selfcalib;
+mod stereo;
 mod synth;
 mod tilt;
 
@@ -21,7 +23,13 @@ mod _core {
     #[pymodule_export]
     use crate::camera::Camera;
     #[pymodule_export]
-    use crate::corner::{CornerDetector, CornerEstimate, CornerFeature, CornerHypothesis, CornerPoseEstimator};
+    use crate::complementary::ComplementaryFilter;
+    #[pymodule_export]
+    use crate::corner::{
+        CornerAttitude, CornerAttitudes, CornerDetector, CornerEstimate, CornerFeature, CornerHypothesis, CornerPose,
+        CornerPoseEstimator, ResolvedAttitude, corner_attitudes, corner_poses, fit_corner, included_angle,
+        resolve_corners, screen_corner, solve_corner, solve_corners, triangulate,
+    };
     #[pymodule_export]
     use crate::drive::Drive;
     #[pymodule_export]
@@ -36,6 +44,8 @@ mod _core {
         CalibrationStep, LogCalibration, MountingEstimate, SelfCalibrator, SimulatedDrive, calibrate, consistency_band,
         simulate_drive, wheel_displacements,
     };
+    #[pymodule_export]
+    use crate::stereo::{Laboratory, StereoSequence};
     #[pymodule_export]
     use crate::synth::Room;
     #[pymodule_export]

@@ -12,6 +12,7 @@ pub use angle::wrap_angle;
 pub use bearing::{angle_between, tangent_basis, tangent_exp, tangent_log, tangent_transport};
 pub use great_circle::{GreatCircleFit, fit_great_circle};
 pub use rigid::RigidMotion;
+pub(crate) use rotation::check_rotation;
 pub use rotation::validate_rotation;
 pub use tilt::Tilt;
 pub use wheels::WheelLayout;

@@ -13,7 +13,7 @@ pub fn validate_rotation(matrix: &Matrix3<f64>) -> Result<()> {
 }
 
 /// Refuses an argument of any name that is no rotation.
-pub(super) fn check_rotation(name: &'static str, matrix: &Matrix3<f64>) -> Result<()> {
+pub(crate) fn check_rotation(name: &'static str, matrix: &Matrix3<f64>) -> Result<()> {
     let off = (matrix.transpose() * matrix - Matrix3::identity()).norm();
     if off < 1e-6 && matrix.determinant() > 0.0 {
         return Ok(());
