@@ -206,6 +206,9 @@ pub(super) fn roots(projected: &Projected, g: f64) -> [Option<f64>; 2] {
 /// The largest step that the correction of rounding may be, radians.
 const CORRECTION_MAX: f64 = 1e-4;
 
+/// Rotations smaller than this are their first-order term, to rounding, radians.
+const FIRST_ORDER: f64 = 1e-9;
+
 /// The attitude of one root in one interpretation, with its covariance.
 ///
 /// An edge of the half-plane of `d` at the angle `a` from the line of sight `v` is `sin a d + cos a v`. With the vertical
@@ -261,8 +264,11 @@ fn attitude(
     let (sin_gamma, cos_gamma) = (angle.gamma_rad.sin(), angle.cosine());
     let correction = inverse.column(2) * -pencil.normal[2].dot(&(edges[0] * cos_gamma + third * (side * sin_gamma)));
     if correction.norm() < CORRECTION_MAX {
-        let turn = Rotation3::new(correction);
-        rotation = turn.matrix() * rotation;
+        rotation = if correction.norm_squared() < FIRST_ORDER * FIRST_ORDER {
+            rotation + correction.cross_matrix() * rotation
+        } else {
+            Rotation3::new(correction).matrix() * rotation
+        };
         edges = [
             rotation.column(0).into_owned(),
             rotation.column(1).into_owned(),

@@ -3,8 +3,8 @@
 use nalgebra::{Matrix3, Vector3};
 
 use super::attitude::{IncludedAngle, corner_attitudes};
-use super::completion::complete;
 use super::coloured::{self, ColouredScratch};
+use super::completion::complete;
 use super::general::{self, GeneralScratch};
 use super::guided::{Expected, find_near};
 use super::options::{CornerMethod, DetectorOptions};

@@ -77,9 +77,8 @@ pub(super) fn find(
                 None => {
                     let course = course_of(segments, end, &junction.vertex, options);
                     let support_min = options.support_min_px as usize;
-                    let found = course.and_then(|course| {
-                        trace(camera, &course, support_min, |u, v| light.gray(image, u, v), memory)
-                    });
+                    let found = course
+                        .and_then(|course| trace(camera, &course, support_min, |u, v| light.gray(image, u, v), memory));
                     known.push((junction.vertex, found));
                     found
                 }

@@ -41,7 +41,10 @@ impl Expected {
         let mut far = [Vector3::zeros(); 3];
         for ((far, ray), edge) in far.iter_mut().zip(corner.rays()).zip(edges) {
             // The point of the edge that is seen at the far end: vertex + s edge, along `toward`.
-            let across = (Vector3::from(vertex) - ray.toward * ray.toward.dot(&vertex), edge - ray.toward * ray.toward.dot(edge));
+            let across = (
+                Vector3::from(vertex) - ray.toward * ray.toward.dot(&vertex),
+                edge - ray.toward * ray.toward.dot(edge),
+            );
             let length_m = -across.0.dot(&across.1) / across.1.norm_squared();
             if !(length_m > 0.0 && length_m.is_finite()) {
                 return None;

@@ -1,6 +1,6 @@
 //! What is known of the attitude beforehand: the vertical, the camera's elevation, or a whole attitude.
 
-use nalgebra::{Matrix2, Matrix3, Vector3};
+use nalgebra::{Matrix2, Matrix3, Rotation3, UnitQuaternion, Vector3};
 
 use crate::error::{Error, Result};
 use crate::filter::positive_semidefinite;
@@ -166,5 +166,5 @@ pub(super) fn gaussian(off: &Vector3<f64>, covariance: &Matrix3<f64>) -> (f64, f
 
 /// The rotation vector of a rotation, of length in [0, pi].
 pub(super) fn rotation_vector(rotation: &Matrix3<f64>) -> Vector3<f64> {
-    nalgebra::UnitQuaternion::from_matrix(rotation).scaled_axis()
+    UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(*rotation)).scaled_axis()
 }
