@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 import polars as pl
 
-from tiltvp import _core
+from tiltvp.corner_images import CornerEstimate, CornerHypothesis, CornerPoseEstimator
 from tiltvp.datasets.new import in_order
 from tiltvp.errors import InvalidInputError
 from tiltvp.evaluation.corner_inertial import compare_inertial
@@ -150,16 +150,14 @@ def summarise_corners(table: pl.DataFrame) -> pl.DataFrame:
     )
 
 
-def _estimates(
-    scene: CornerScene, sequence: StereoSequence, threads: int
-) -> Iterator[tuple[_core.CornerEstimate, float]]:
+def _estimates(scene: CornerScene, sequence: StereoSequence, threads: int) -> Iterator[tuple[CornerEstimate, float]]:
     """What the estimator says of each frame in turn, and the processor time it took, milliseconds."""
-    left, right = (_core.CornerDetector(camera, method=scene.method) for camera in sequence.cameras)
     known: dict[str, Any] = {"gamma_rad": math.radians(scene.gamma_deg)}
     if scene.kind != "laboratory":
         # What tells upright edges from level ones is how the board is held, as its accelerometer has it on average.
         known["down"] = -sequence.imu(seed=sequence.seed).forces_m_s2.mean(axis=0)
-    estimator = _core.CornerPoseEstimator(left, right, sequence.left_from_right, **known)
+    left, right = sequence.cameras
+    estimator = CornerPoseEstimator(left, right, sequence.left_from_right, method=scene.method, **known)
     stop = Event()
 
     def render(frame: int) -> Pair:
@@ -169,19 +167,12 @@ def _estimates(
 
     with closing(in_order(render, range(len(sequence)), threads, stop)) as pairs:
         for pair in pairs:
-            images = pair if scene.method == "coloured" else tuple(_gray(image) for image in pair)
             start = time.thread_time()
-            estimate = estimator._observe(*images)
+            estimate = estimator(*pair)
             yield estimate, 1000.0 * (time.thread_time() - start)
 
 
-def _gray(image: NDArray[np.uint8]) -> NDArray[np.uint8]:
-    import cv2
-
-    return np.asarray(cv2.cvtColor(image, cv2.COLOR_BGR2GRAY), dtype=np.uint8)
-
-
-def _judged(scene: CornerScene, sequence: StereoSequence, frame: int, estimate: _core.CornerEstimate) -> dict[str, Any]:
+def _judged(scene: CornerScene, sequence: StereoSequence, frame: int, estimate: CornerEstimate) -> dict[str, Any]:
     target = sequence.left_from_object(frame)
     row: dict[str, Any] = {
         "frame": frame,
@@ -222,7 +213,7 @@ def _judged(scene: CornerScene, sequence: StereoSequence, frame: int, estimate: 
     }
 
 
-def _nearest(sequence: StereoSequence, frame: int, pose: _core.CornerHypothesis) -> tuple[int, NDArray[np.float64]]:
+def _nearest(sequence: StereoSequence, frame: int, pose: CornerHypothesis) -> tuple[int, NDArray[np.float64]]:
     """The true corner that an estimate is of, or -1, and its pose with level edges named as the estimate does."""
     from_world = np.linalg.inv(sequence.poses_at([sequence.times_s[frame]])[0])
     vertices = np.array([corner.position_m for corner in sequence.corners]) @ from_world[:3, :3].T + from_world[:3, 3]
