@@ -47,7 +47,8 @@ pub(super) fn fits(feature: &CornerFeature, attitude: &Matrix3<f64>, most_rad: f
 
 /// The angle between two attitudes, radians.
 pub(super) fn apart(a: &Matrix3<f64>, b: &Matrix3<f64>) -> f64 {
-    Rotation3::from_matrix_unchecked(a.transpose() * b).angle()
+    // |a - b| = 2 sqrt 2 sin(angle / 2), exact for small angles.
+    2.0 * ((a - b).norm() / 8f64.sqrt()).min(1.0).asin()
 }
 
 /// The features that agree, the one that says most first, and the attitudes of each.

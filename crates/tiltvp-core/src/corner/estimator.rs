@@ -136,6 +136,8 @@ impl Verdict {
 pub struct Hypothesis {
     /// The rotation from the object's frame to the left camera's.
     pub camera_from_object: Matrix3<f64>,
+    /// The directions of the edges x, y, z of the corner away from its vertex, left camera's frame, unit vectors.
+    pub edges: [Vector3<f64>; 3],
     /// The vertex in the left camera's frame, metres; none from one image.
     pub vertex_m: Option<Vector3<f64>>,
     /// Covariance of the attitude's rotation vector (left camera's frame, radians) and of the vertex (metres; zero from one
@@ -501,6 +503,7 @@ impl CornerPoseEstimator {
                 covariance.fixed_view_mut::<3, 3>(0, 0).copy_from(&resolved.covariance);
                 Some(Hypothesis {
                     camera_from_object: self.named(resolved.common_from_object),
+                    edges: chosen.edges,
                     vertex_m: None,
                     covariance,
                     probability: resolved.probability,
@@ -560,8 +563,11 @@ impl CornerPoseEstimator {
                 let prior: f64 = priors.iter().map(|p| p.ln_likelihood(&fused.rig_from_object, &spread)).sum();
                 // Real edges miss by more than their covariances say; the likelihoods allow for as much as the limit.
                 let scale = (0.25 * self.options.misfit_max).max(1.0).powi(2);
+                let (sin, cos) = self.options.angle.gamma_rad.sin_cos();
+                let edges = [Vector3::x(), Vector3::y(), Vector3::new(cos, 0.0, side * sin)];
                 let pose = Hypothesis {
                     camera_from_object: fused.rig_from_object,
+                    edges: edges.map(|edge| fused.rig_from_object * edge),
                     vertex_m: Some(fused.vertex_m),
                     covariance: fused.covariance,
                     probability: 0.0,
