@@ -55,6 +55,7 @@ __all__ = [
     "corner_attitudes",
     "corner_poses",
     "descriptor_distances",
+    "drive_legs",
     "fit_corner",
     "included_angle",
     "leaning_from_upright",
@@ -1602,6 +1603,7 @@ class Drive:
         mount: ArrayLike | None = None,
         blind_rad: float | None = None,
         frames: SupportsIndex | None = None,
+        legs: ArrayLike | None = None,
         seed: SupportsIndex | None = None,
         step_m: float | None = None,
         turn_max_rad: float | None = None,
@@ -1821,7 +1823,11 @@ class SelfCalibrator:
         Distance at which landmarks are thought to be (3).
     start_distance_log_sigma, gate_probability, memory
         Of "default": standard deviation of the logarithm of that distance (1.5), probability with which a bearing
-        passes the gate (0.9999), and poses that are kept to be linearised anew (400).
+        passes the gate (0.9999), and poses that are kept to be linearised anew (400). Landmarks that are not seen from
+        the poses kept are forgotten: keep a whole drive's for loops to close.
+    step_sigma_m, step_sigma_rad
+        Of "default": standard deviations of every step's motion, in either direction and in turning, beside those that
+        grow with the wheels' displacements (0).
     start_distance_sigma_m, odometry_inflation
         Of "paper": standard deviation of that distance (2), and the factor by which the noise is inflated (5).
 
@@ -1843,6 +1849,8 @@ class SelfCalibrator:
         gate_probability: float | None = None,
         memory: SupportsIndex | None = None,
         odometry_inflation: float | None = None,
+        step_sigma_m: float | None = None,
+        step_sigma_rad: float | None = None,
     ) -> Self:
         """Makes a filter that has seen nothing."""
 
@@ -1951,6 +1959,8 @@ def calibrate(
     estimate_time_offset: bool = False,
     times_s: ArrayLike | None = None,
     max_iterations: int | None = None,
+    step_sigma_m: float | None = None,
+    step_sigma_rad: float | None = None,
 ) -> LogCalibration:
     """The mounting from a whole log at once, by robust sparse least squares.
 
@@ -2003,6 +2013,9 @@ class SimulatedDrive:
 
     def cramer_rao_bound(self, *, start_sigma: ArrayLike) -> NDArray[np.float64]:
         """(3, 3): the smallest covariance of (x, y, yaw) that an unbiased estimator can have on this drive."""
+
+def drive_legs(kind: str = "paper") -> NDArray[np.float64]:
+    """(L, 2): distance in metres and turn in radians of the legs of a trajectory of `simulate_drive`."""
 
 def simulate_drive(
     kind: str = "paper",
