@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from tiltvp import _core
-from tiltvp._core import SimulatedDrive, simulate_drive
+from tiltvp._core import SimulatedDrive, drive_legs, simulate_drive
 from tiltvp.cameras import Camera
 from tiltvp.stereo_scenes import ImuLog, Laboratory, SceneCorner, StereoSequence, StereoTruth, zed_cameras
 
@@ -30,6 +30,7 @@ __all__ = [
     "SimulatedDrive",
     "StereoSequence",
     "StereoTruth",
+    "drive_legs",
     "mirror_camera",
     "render_room",
     "simulate_drive",
@@ -163,7 +164,10 @@ class DriveTruth:
 
 
 class Drive(_core.Drive):
-    """A robot with a camera and wheel encoders that wanders through a room: `Drive(room, camera=camera)`.
+    """A robot with a camera and wheel encoders that drives through a room: `Drive(room, camera=camera)`.
+
+    It wanders for `frames` frames, or drives `legs` (L, 2): distance in metres and turn in radians of arcs, from a
+    place with room for all of them; `drive_legs("paper")` are those of the paper's calibration.
 
     The same arguments give the same drive and the same bytes of every frame, in any order and for any `threads`. The
     camera sits at `mount` (x_m, y_m, yaw_rad, height_m) on the robot, whose origin is on the floor between its wheels,

@@ -42,7 +42,7 @@ mod _core {
     #[pymodule_export]
     use crate::selfcalib::{
         CalibrationStep, LogCalibration, MountingEstimate, SelfCalibrator, SimulatedDrive, calibrate, consistency_band,
-        simulate_drive, wheel_displacements,
+        drive_legs, simulate_drive, wheel_displacements,
     };
     #[pymodule_export]
     use crate::stereo::{Laboratory, StereoSequence};

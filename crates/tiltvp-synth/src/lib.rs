@@ -41,7 +41,7 @@ mod world;
 
 pub use bearing_drive::{BearingDrive, BearingDriveKind, BearingDriveOptions};
 pub use corner::{Corner, CornerKind};
-pub use drive::{Drive, DriveOptions, Mount};
+pub use drive::{Drive, DriveOptions, Mount, Way};
 pub use encoders::Wheels;
 pub use handheld::Handheld;
 pub use imu::{GRAVITY_M_S2, ImuChannel, ImuOptions, ImuReading, imu_readings};

@@ -247,14 +247,19 @@ impl StereoSequence {
         Film::scaled(sum, 1.0 / count as f32).develop_color(&options)
     }
 
-    /// How many sharp pictures a frame is averaged from: as many as pixels that the corner moves while the shutter is open.
+    /// How many sharp pictures a frame is averaged from: as many as pixels that the vertex, or the end of one of its edges,
+    /// moves while the shutter is open.
     fn sharps(&self, time_s: f64, eye: usize) -> usize {
-        let vertex = self.world.corners()[self.corner].position;
-        let [start, end] = [-0.5, 0.5].map(|side| {
-            let pose = self.eye_pose(time_s + side * self.options.exposure_s, eye);
-            self.cameras[eye].project(&pose.inverse_transform_point(&vertex.into()).coords)
-        });
-        let moved = start.zip(end).map_or(0.0, |(start, end)| (end - start).norm());
+        let corner = &self.world.corners()[self.corner];
+        let ends = corner.edges.iter().zip(corner.lengths_m).map(|(edge, length)| corner.position + edge * length);
+        let [start, end] = [-0.5, 0.5].map(|side| self.eye_pose(time_s + side * self.options.exposure_s, eye));
+        let place = |pose: &Isometry3<f64>, point: &Vector3<f64>| {
+            self.cameras[eye].project(&pose.inverse_transform_point(&(*point).into()).coords)
+        };
+        let moved = ends
+            .chain([corner.position])
+            .filter_map(|point| Some((place(&end, &point)? - place(&start, &point)?).norm()))
+            .fold(0.0, f64::max);
         (moved.ceil() as usize).clamp(1, SHARPS)
     }
 

@@ -5,9 +5,11 @@ from __future__ import annotations
 import csv
 import math
 import os
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
+import numpy as np
 from cyclopts import App, Parameter
 
 from tiltvp.cli.options import Switch
@@ -15,7 +17,6 @@ from tiltvp.cli.terminal import new_table, progress_bar, say, show
 from tiltvp.errors import InvalidInputError
 
 if TYPE_CHECKING:
-    import numpy as np
     from numpy.typing import NDArray
 
     from tiltvp import Camera
@@ -222,6 +223,7 @@ def drive(
     out: Path,
     kind: str = "corridor",
     frames: int | None = None,
+    legs: Words = None,
     camera: str = "mirror",
     camera_name: str | None = None,
     resolution_scale: float = 1.0,
@@ -248,7 +250,9 @@ def drive(
     kind
         Where to drive: corridor, hall, office, living-room, l-shaped, narrow or under-table.
     frames
-        How many frames; default 1500.
+        How many frames of wandering; default 1500.
+    legs
+        Instead of wandering, the legs of a way, METRES,DEGREES each (2.3,0 0,180); or paper, alternating or straight.
     camera
         mirror (a camera below a hyperbolic mirror), fisheye (like the tilt paper's), or a calibration file.
     camera_name
@@ -304,6 +308,7 @@ def drive(
         mount=None if mount is None else (mount[0], mount[1], math.radians(mount[2]), mount[3]),
         blind_rad=MIRROR_BLIND_RAD if camera == "mirror" else None,
         frames=frames,
+        legs=None if legs is None else _legs(legs),
         seed=seed,
         encoder_k_m=encoder_k_m,
         bumps_max_rad=math.radians(bumps_deg),
@@ -466,6 +471,18 @@ def _rotation(word: str | None) -> NDArray[np.float64] | None:
     return None if word is None else read_rotation(word)
 
 
+def _legs(words: Sequence[str]) -> NDArray[np.float64]:
+    """(L, 2) metres and radians, from pairs or the name of a trajectory."""
+    from tiltvp.synth import drive_legs
+
+    if len(words) == 1 and "," not in words[0]:
+        return drive_legs(words[0])
+    return np.array([_pair(word.split(","), f"--legs {word!r}", "METRES,DEGREES") for word in words]) * (
+        1.0,
+        np.pi / 180.0,
+    )
+
+
 def _threads(count: int | None) -> int:
     return (os.cpu_count() or 1) if count is None else count
 
@@ -498,12 +515,12 @@ def _tilts_of_file(file: Path) -> list[tuple[float, float]]:
     return [_pair(row, f"{file}, line {number}: {','.join(row)!r}") for number, row in rows[1:]]
 
 
-def _pair(cells: list[str], where: str) -> tuple[float, float]:
+def _pair(cells: list[str], where: str, expected: str = "ALPHA,BETA in degrees") -> tuple[float, float]:
     try:
-        alpha, beta = (float(cell) for cell in cells)
+        first, second = (float(cell) for cell in cells)
     except ValueError:
-        raise InvalidInputError(f"{where}, expected ALPHA,BETA in degrees") from None
-    return alpha, beta
+        raise InvalidInputError(f"{where}, expected {expected}") from None
+    return first, second
 
 
 def _made_by(command: str) -> dict[str, str]:

@@ -17,10 +17,22 @@ if TYPE_CHECKING:
 
     from tiltvp.synth import ImuLog, StereoSequence
 
-__all__ = ["compare_inertial", "conventional_angles", "filter_attitudes", "summarise_inertial_comparison"]
+__all__ = [
+    "CONVENTIONAL",
+    "compare_inertial",
+    "conventional_angles",
+    "filter_attitudes",
+    "summarise_inertial_comparison",
+]
+
+CONVENTIONAL: Final = ("complementary", "Mahony")
+"""The complementary filter of angles, and the explicit one on rotations, as the `ahrs` package has them."""
 
 _TIME_CONSTANTS_S: Final = (0.5, 1.0, 2.0, 5.0, 10.0, 20.0)
-"""What the conventional filter is tried with; the best one is compared."""
+"""What the conventional filters are tried with; the best one of each is compared."""
+
+_INTEGRAL_SHARE: Final = 0.05
+"""Integral gain of the explicit complementary filter, in shares of its proportional one."""
 
 _FORWARD: Final = np.array(ROTATION_WORDS["forward"])
 """From a camera to the board that holds it, and alike from an object's frame, y downwards, to one with z upwards."""
@@ -32,10 +44,10 @@ def compare_inertial(
     """Errors of roll, pitch and yaw in degrees, with columns `method` and `time_s`.
 
     `attitudes` are the estimates `camera_from_object` of each frame, or None. Methods: the image alone, at its frames;
-    `ComplementaryFilter` with the image as its reference, and the `ahrs` package's complementary filter of accelerometer
-    and gyroscope, at the readings of a simulated sensor (`StereoSequence.imu` of that seed). The latter knows no yaw.
-    Angles are those of the board that holds the cameras, x forward and z up (ROS REP 103). Raises `InvalidInputError`
-    where the package is missing or no frame has an attitude.
+    `ComplementaryFilter` with the image as its reference, and `CONVENTIONAL`, filters of accelerometer and gyroscope,
+    at the readings of a simulated sensor (`StereoSequence.imu` of that seed). The latter know no yaw; each has the
+    time constant that suits the truth best. Angles are those of the board that holds the cameras, x forward and z up
+    (ROS REP 103). Raises `InvalidInputError` where the package is missing or no frame has an attitude.
     """
     imu = sequence.imu(seed=seed)
     corner = sequence.corners[sequence.corner]
@@ -53,12 +65,10 @@ def compare_inertial(
         _errors("image", frames, _board_angles(images), at_frames),
         _errors("gyroscope + image", imu.times_s[known], _board_angles(level), truth[known]),
     ]
-    conventional = [
-        (float(np.sqrt(np.mean(_wrapped(angles[:, :2] - truth[:, :2])[known] ** 2))), angles)
-        for angles in (conventional_angles(imu, tau) for tau in _TIME_CONSTANTS_S)
-    ]
-    best = min(conventional, key=lambda one: one[0])[1]
-    tables.append(_errors("gyroscope + accelerometer (ahrs)", imu.times_s[known], best[known], truth[known]))
+    for method in CONVENTIONAL:
+        every = [conventional_angles(imu, method, tau)[known] for tau in _TIME_CONSTANTS_S]
+        best = min(every, key=lambda angles: float(np.sum(_wrapped(angles - truth[known])[:, :2] ** 2)))
+        tables.append(_errors(f"gyroscope + accelerometer, {method}", imu.times_s[known], best, truth[known]))
     return pl.concat(tables)
 
 
@@ -80,33 +90,42 @@ def filter_attitudes(imu: ImuLog, seen: dict[float, NDArray[np.float64]]) -> NDA
     out = np.full((len(imu.times_s), 3, 3), np.nan)
     waiting = sorted(seen.items())
     fusion: ComplementaryFilter | None = None
-    before = 0.0
+    before = float(imu.times_s[0])
     for k, time in enumerate(imu.times_s.tolist()):
-        if fusion is not None:
-            fusion.predict(imu.rates_rad_s[k], time - before)
-        before = time
+        rate = 0.5 * (imu.rates_rad_s[max(k - 1, 0)] + imu.rates_rad_s[k])
         while waiting and waiting[0][0] <= time + 1e-9:
-            attitude = waiting.pop(0)[1].T
+            moment, attitude = waiting.pop(0)
             if fusion is None:
-                fusion = ComplementaryFilter(attitude)
+                fusion = ComplementaryFilter(attitude.T)
             else:
-                fusion.correct(attitude)
+                fusion.predict(rate, max(moment - before, 0.0))
+                fusion.correct(attitude.T)
+            before = max(moment, before)
         if fusion is not None:
+            fusion.predict(rate, max(time - before, 0.0))
             out[k] = fusion.reference_from_body
+        before = time
     return out
 
 
-def conventional_angles(imu: ImuLog, time_constant_s: float) -> NDArray[np.float64]:
-    """(M, 3): roll, pitch and yaw (NaN) in radians, from the complementary filter of the `ahrs` package."""
+def conventional_angles(imu: ImuLog, method: str, time_constant_s: float) -> NDArray[np.float64]:
+    """(M, 3): roll, pitch and yaw (NaN) in radians, from one of the filters `CONVENTIONAL` of the `ahrs` package."""
     try:
-        from ahrs.filters import Complementary
+        from ahrs.filters import Complementary, Mahony  # type: ignore[import-untyped]
     except ImportError as error:
         raise InvalidInputError("ahrs: not installed, expected pip install 'tiltvp[imu]'") from error
 
     step_s = float(np.median(np.diff(imu.times_s)))
-    gain = time_constant_s / (time_constant_s + step_s)
     rates, forces = imu.rates_rad_s @ _FORWARD.T, imu.forces_m_s2 @ _FORWARD.T
-    angles = np.array(Complementary(gyr=rates, acc=forces, frequency=1.0 / step_s, gain=gain).W, dtype=np.float64)
+    if method == "complementary":
+        gain = time_constant_s / (time_constant_s + step_s)
+        angles = np.array(Complementary(gyr=rates, acc=forces, frequency=1.0 / step_s, gain=gain).W, dtype=np.float64)
+    else:
+        gain = 1.0 / time_constant_s
+        filtered = Mahony(gyr=rates, acc=forces, frequency=1.0 / step_s, k_P=gain, k_I=_INTEGRAL_SHARE * gain)
+        w, x, y, z = np.asarray(filtered.Q, dtype=np.float64).T
+        roll = np.arctan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y))
+        angles = np.column_stack([roll, np.arcsin(np.clip(2.0 * (w * y - z * x), -1.0, 1.0)), roll])
     angles[:, 2] = np.nan
     return angles
 
