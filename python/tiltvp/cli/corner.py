@@ -123,7 +123,7 @@ def corner(
     if trajectory is not None:
         write_trajectory(table, trajectory)
     if plot is not None:
-        from tiltvp.plots.corners import pose_plot
+        from tiltvp.plots.corner_overlay import pose_plot
         from tiltvp.plots.picture import figure_picture
 
         write_image(plot, figure_picture(pose_plot(table)))
@@ -163,7 +163,7 @@ def _pairs(frames: Frames, others: Frames | None) -> Any:
 
 
 def _drawn(image: NDArray[np.uint8], camera: Camera, estimate: CornerEstimate) -> NDArray[np.uint8]:
-    from tiltvp.plots.corners import draw_box, draw_corners
+    from tiltvp.plots.corner_overlay import draw_box, draw_corners
 
     canvas = draw_corners(image, camera, estimate.features_left, estimate.chosen_left)
     pose = estimate.pose

@@ -341,8 +341,7 @@ impl CornerPoseEstimator {
             }
             let turned = self.right.as_ref().map_or(Matrix3::identity(), |(_, motion)| motion.rotation.transpose());
             let parallel = |side: usize, attitude: Matrix3<f64>| -> Vec<CornerFeature> {
-                let fits =
-                    |corner: &&CornerFeature| fits(corner, &self.options.angle, &attitude, self.options.agree_max_rad);
+                let fits = |corner: &&CornerFeature| fits(corner, &attitude, self.options.agree_max_rad);
                 let mut out: Vec<CornerFeature> = Vec::new();
                 for corner in estimate.features[side].iter().filter(fits) {
                     // The longest rays of each vertex.
@@ -401,7 +400,7 @@ impl CornerPoseEstimator {
                 if let Frame::Gray(image) = frame {
                     found.clear();
                     detector.complete(image, &own, scratch, &mut found);
-                    features[side].extend(found.iter().filter(|corner| fits(corner, &angle, &own, most_rad)));
+                    features[side].extend(found.iter().filter(|corner| fits(corner, &own, most_rad)));
                 }
             };
         add(&self.left, left, attitude, &mut self.scratch[0], 0);
@@ -441,9 +440,7 @@ impl CornerPoseEstimator {
                     let seen = expected.and_then(|expected| {
                         detectors[other].find_near(image, &expected, Some(EPIPOLAR_STEP_PX), &mut self.scratch[other])
                     });
-                    let Some(seen) = seen.filter(|seen| fits(seen, &angle, &attitudes[other], most_rad)) else {
-                        continue;
-                    };
+                    let Some(seen) = seen.filter(|seen| fits(seen, &attitudes[other], most_rad)) else { continue };
                     if best.as_ref().is_none_or(|best| weight(&seen) > weight(best)) {
                         best = Some(seen);
                     }
