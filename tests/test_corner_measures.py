@@ -12,7 +12,7 @@ from tiltvp.cli import main
 from tiltvp.errors import InvalidInputError
 from tiltvp.evaluation.corner_closed_form import exact_poses, noisy_poses, summarise_exact, summarise_noisy
 from tiltvp.evaluation.corners import CORNER_SCENES, CornerExperiment, CornerScene, measure_corners, summarise_corners
-from tiltvp.plots.corner_errors import corner_errors, inertial_errors
+from tiltvp.plots.corners import corner_errors, inertial_errors
 from tiltvp.plots.picture import figure_picture
 
 

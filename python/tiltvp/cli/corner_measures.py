@@ -64,7 +64,7 @@ def _sequences(frames: int, names: tuple[str, ...], seed: int, threads: int, out
     from tiltvp.evaluation.corner_inertial import summarise_inertial_comparison
     from tiltvp.evaluation.corners import CORNER_SCENES, CornerExperiment, measure_corners, summarise_corners
     from tiltvp.images import write_image
-    from tiltvp.plots.corner_errors import corner_errors, inertial_errors
+    from tiltvp.plots.corners import corner_errors, inertial_errors
     from tiltvp.plots.picture import figure_picture
 
     known = {scene.name: scene for scene in CORNER_SCENES}
