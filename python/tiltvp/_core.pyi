@@ -4,6 +4,7 @@ Arrays that come in may have any strides and any real dtype unless a shape and d
 altered. Arrays that go out are fresh. Angles are radians. Equation numbers are those of Fleer 2017 (see the README).
 """
 
+import builtins
 from collections.abc import Iterable, Sequence
 from typing import Any, ClassVar, Final, Literal, Self, SupportsIndex, TypeAlias, final
 
@@ -14,6 +15,7 @@ from typing_extensions import disjoint_base
 __all__ = [
     "CALIBRATION_METHODS",
     "CAMERA_MODELS",
+    "CORNER_METHODS",
     "LINE_METHODS",
     "METHODS",
     "ROOM_KINDS",
@@ -24,8 +26,12 @@ __all__ = [
     "CommonDirection",
     "CornerAttitude",
     "CornerAttitudes",
+    "CornerDetector",
+    "CornerEstimate",
     "CornerFeature",
+    "CornerHypothesis",
     "CornerPose",
+    "CornerPoseEstimator",
     "Drive",
     "EdgeElements",
     "FilterStep",
@@ -91,6 +97,8 @@ METHODS: Final[list[str]]
 CAMERA_MODELS: Final[list[str]]
 """The names of the models of `Camera`."""
 
+CORNER_METHODS: list[str]
+CORNER_METHODS: Final[list[str]]
 LINE_METHODS: Final[list[str]]
 """The names of the methods of `LineExtractor`, the default first."""
 
@@ -2089,6 +2097,160 @@ class CornerFeature:
     def __deepcopy__(self, _memo: Any) -> Self: ...
 
 @final
+class CornerDetector:
+    """Finds corners in single images of one camera; `tiltvp.corner.CornerDetector` takes images of any usual kind."""
+
+    def __new__(
+        cls,
+        camera: Camera,
+        *,
+        method: Literal["coloured", "general"] | str = ...,
+        mask: NDArray[np.bool_] | None = None,
+        **options: Any,
+    ) -> Self:
+        """Makes the tables. `options` tells the options in force; docs/corner.md says what they mean."""
+
+    @property
+    def camera(self) -> Camera:
+        """The camera whose images are read."""
+
+    @property
+    def method(self) -> str:
+        """The name of the front end."""
+
+    @property
+    def mask(self) -> NDArray[np.bool_] | None:
+        """Fresh (H, W) bool, or None: which pixels may be used."""
+
+    @property
+    def options(self) -> dict[str, Any]:
+        """The options that are in force, by name, defaults included."""
+
+    def _detect_gray(self, image: NDArray[np.uint8], vertical: ArrayLike | None) -> list[CornerFeature]: ...
+    def _detect_color(self, image: NDArray[np.uint8]) -> list[CornerFeature]: ...
+    def _segments(self, image: NDArray[np.uint8]) -> NDArray[np.float64]: ...
+    def __eq__(self, other: object) -> bool: ...
+    def __hash__(self) -> int: ...
+
+class CornerHypothesis:
+    """One explanation of what is seen: an attitude, from two cameras also a place, and how likely it is."""
+
+    @property
+    def camera_from_object(self) -> NDArray[np.float64]:
+        """Fresh (3, 3): the rotation from the object's frame to the left camera's."""
+
+    @property
+    def edges(self) -> NDArray[np.float64]:
+        """Fresh (3, 3), rows x, y, z: directions of the corner's edges away from its vertex, left camera's frame."""
+
+    @property
+    def vertex_m(self) -> NDArray[np.float64] | None:
+        """Fresh (3,): the vertex in the left camera's frame, metres; None from one image."""
+
+    @property
+    def camera_in_object_m(self) -> NDArray[np.float64] | None:
+        """Fresh (3,): where the left camera is in the object's frame, metres; None from one image."""
+
+    @property
+    def covariance(self) -> NDArray[np.float64]:
+        """Fresh (6, 6): of the attitude's rotation vector (radians) and of the vertex (metres), left camera's frame."""
+
+    @property
+    def probability(self) -> float:
+        """The probability that it is this one, in [0, 1]."""
+
+    @property
+    def right_handed(self) -> bool:
+        """Whether the edges x, y, z are a right-handed triple, as of an outer corner."""
+
+    @property
+    def misfit(self) -> float:
+        """Root mean square misfit per degree of freedom in standard deviations; 0 for a single feature."""
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain numbers and lists, good for JSON."""
+
+    def __eq__(self, other: object) -> bool: ...
+
+class CornerEstimate:
+    """What one frame tells of a corner: the likeliest pose if one stands out, and all hypotheses. False without a pose."""
+
+    @property
+    def pose(self) -> CornerHypothesis | None:
+        """The pose; None where none stands out."""
+
+    @property
+    def hypotheses(self) -> list[CornerHypothesis]:
+        """All hypotheses, the likeliest first."""
+
+    @property
+    def confidence(self) -> float:
+        """The probability of the likeliest hypothesis; 0 where there is none."""
+
+    @property
+    def reason(self) -> str:
+        """Why there is no pose; empty where there is one."""
+
+    @property
+    def features_left(self) -> list[CornerFeature]:
+        """The corners of the left or only image."""
+
+    @property
+    def features_right(self) -> list[CornerFeature]:
+        """The corners of the right image."""
+
+    @property
+    def chosen_left(self) -> list[int]:
+        """Which corners of the left image the pose is from, the one that is its object first."""
+
+    @property
+    def chosen_right(self) -> int | None:
+        """Which corner of the right image it is from, or None."""
+
+    @property
+    def followed(self) -> bool:
+        """Whether the pose of a frame before was a prior."""
+
+    @property
+    def object(self) -> int:
+        """The number of the corner that is the object, from 1: it grows where another corner has become the object."""
+
+    def __bool__(self) -> bool: ...
+    def __eq__(self, other: builtins.object) -> bool: ...
+
+class CornerPoseEstimator:
+    """Poses from the images of one camera or a pair; `tiltvp.corner.CornerPoseEstimator` takes cameras and any images."""
+
+    def __new__(
+        cls,
+        left: CornerDetector,
+        right: CornerDetector | None = None,
+        left_from_right: ArrayLike | None = None,
+        **options: Any,
+    ) -> Self: ...
+    @property
+    def left(self) -> CornerDetector:
+        """The detector of the left or only camera."""
+
+    @property
+    def right(self) -> CornerDetector | None:
+        """The detector of the right camera, or None."""
+
+    @property
+    def left_from_right(self) -> NDArray[np.float64] | None:
+        """Fresh (4, 4), or None: the right camera's pose in the left one's frame."""
+
+    @property
+    def options(self) -> dict[str, Any]:
+        """The options that are in force, by name, defaults included."""
+
+    @property
+    def _coloured(self) -> bool: ...
+    def reset(self) -> None:
+        """Forgets the poses of the frames before."""
+
+    def _observe(self, left: NDArray[np.uint8], right: NDArray[np.uint8] | None) -> CornerEstimate: ...
+
 class CornerAttitude:
     """One attitude that the rays of a corner admit. Frozen, comparable (bit by bit), hashable, and to be pickled."""
 

@@ -14,6 +14,13 @@ import numpy as np
 
 from tiltvp import _core
 from tiltvp._core import CornerAttitude, CornerAttitudes, CornerFeature, CornerPose, ResolvedAttitude
+from tiltvp.corner_images import (
+    CORNER_METHODS,
+    CornerDetector,
+    CornerEstimate,
+    CornerHypothesis,
+    CornerPoseEstimator,
+)
 from tiltvp.errors import InvalidInputError
 
 if TYPE_CHECKING:
@@ -25,10 +32,15 @@ if TYPE_CHECKING:
     Prior: TypeAlias = "GravityPrior | ElevationPrior | KnownAttitude"
 
 __all__ = [
+    "CORNER_METHODS",
     "CornerAttitude",
     "CornerAttitudes",
+    "CornerDetector",
+    "CornerEstimate",
     "CornerFeature",
+    "CornerHypothesis",
     "CornerPose",
+    "CornerPoseEstimator",
     "ElevationPrior",
     "GravityPrior",
     "KnownAttitude",

@@ -55,7 +55,7 @@ pub(super) fn find(
     window: &super::detector::Window,
     scratch: &mut ColouredScratch,
 ) -> Option<CornerFeature> {
-    scratch.labels.fill(image, &options.color, window.columns.clone(), window.rows.clone());
+    scratch.labels.fill(image, &options.color, window.columns.clone(), window.rows.clone(), options.label_step_px as usize);
     let orientations: &[Orientation] = match options.orientation {
         OrientationChoice::Upright => &[Orientation::Upright],
         OrientationChoice::UpsideDown => &[Orientation::UpsideDown],
@@ -65,7 +65,7 @@ pub(super) fn find(
     let mut found = false;
     for orientation in orientations {
         scratch.candidates.find(&scratch.labels, width, *orientation);
-        found = scratch.candidates.fewest() >= options.candidates_min as usize;
+        found = scratch.candidates.fewest() >= (options.candidates_min / options.label_step_px.pow(2)).max(2) as usize;
         if found {
             break;
         }

@@ -26,8 +26,9 @@ impl EdgeCandidates {
     pub(super) fn find(&mut self, labels: &Labels, width: usize, orientation: Orientation) {
         self.edges.iter_mut().for_each(Vec::clear);
         let [x_edge, y_edge, z_edge] = &mut self.edges;
-        let (columns, rows) = (labels.columns.len(), labels.rows.len());
-        let (left, top) = (2 * labels.columns.start as i32, 2 * labels.rows.start as i32);
+        let ([columns, rows], step) = (labels.size, labels.step as i32);
+        let [left, top] = labels.origin.map(|first| 2 * first as i32);
+        let width = width.div_ceil(labels.step.max(1));
         let (w, upright) = (width as i32, orientation == Orientation::Upright);
         for v in 0..rows {
             let row = labels.row(v);
@@ -40,7 +41,7 @@ impl EdgeCandidates {
                 let Some(skipped) = row[at..].iter().position(|label| *label > TOP) else { break };
                 let u = at + skipped;
                 at = u + 1;
-                let place = |du: i32, dv: i32| [left + 2 * u as i32 + du, top + 2 * v as i32 + dv];
+                let place = |du: i32, dv: i32| [left + step * (2 * u as i32 + du), top + step * (2 * v as i32 + dv)];
                 let above = beyond.get(u).copied().unwrap_or(NONE);
                 if row[u] == RIGHT {
                     let beside = if upright { u.checked_sub(width) } else { Some(u + width) };
@@ -81,7 +82,7 @@ mod tests {
                 labels[at] = label;
             }
         }
-        Labels { labels, columns: 100..160, rows: 50..90 }
+        Labels { labels, origin: [100, 50], size: [60, 40], step: 1 }
     }
 
     #[test]

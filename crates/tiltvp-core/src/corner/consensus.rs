@@ -35,17 +35,20 @@ pub(super) fn rays_apart(feature: &CornerFeature, least_rad: f64) -> bool {
     along[0].dot(&along[1]) <= most && along[1].dot(&along[2]) <= most && along[2].dot(&along[0]) <= most
 }
 
-/// Whether a feature has an attitude, its edges named at will, within `most_rad` of this one.
-pub(super) fn fits(feature: &CornerFeature, angle: &IncludedAngle, attitude: &Matrix3<f64>, most_rad: f64) -> bool {
-    corner_attitudes(feature, angle).is_ok_and(|found| {
-        let mut own = found.iter().map(|own| renamed(&own.camera_from_object, attitude));
-        own.any(|own| apart(&own, attitude) <= most_rad)
-    })
+/// Whether the rays are images of edges along the three axes of an attitude, one each, within `most_rad`.
+pub(super) fn fits(feature: &CornerFeature, attitude: &Matrix3<f64>, most_rad: f64) -> bool {
+    let nearest = feature.rays().map(|ray| {
+        let sines = attitude.tr_mul(&ray.normal).abs();
+        (sines.imin(), sines.min())
+    });
+    let [x, y, z] = nearest.map(|(axis, _)| axis);
+    x != y && y != z && z != x && nearest.iter().all(|(_, sine)| *sine <= most_rad.sin())
 }
 
 /// The angle between two attitudes, radians.
 pub(super) fn apart(a: &Matrix3<f64>, b: &Matrix3<f64>) -> f64 {
-    Rotation3::from_matrix_unchecked(a.transpose() * b).angle()
+    // |a - b| = 2 sqrt 2 sin(angle / 2), exact for small angles.
+    2.0 * ((a - b).norm() / 8f64.sqrt()).min(1.0).asin()
 }
 
 /// The features that agree, the one that says most first, and the attitudes of each.

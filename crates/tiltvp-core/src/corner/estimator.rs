@@ -5,9 +5,10 @@ use nalgebra::{Matrix3, Matrix6, Vector3};
 use super::attitude::{IncludedAngle, corner_attitudes};
 use super::consensus::{agreement, apart, fits, renamed, weight};
 use super::detector::{CornerDetector, CornerScratch};
+use super::fusion::fuse_rays;
 use super::guided::Expected;
 use super::options::CornerMethod;
-use super::pose::{CornerOptions, CornerPose, corner_poses};
+use super::position::{Sighting, triangulate};
 use super::prior::{AttitudePrior, VerticalSense};
 use super::resolve::{Alignment, View, resolve};
 use super::vertex::CornerFeature;
@@ -31,10 +32,10 @@ pub struct EstimatorOptions {
     pub turn_sigma_rad: f64,
     /// Frames without a pose after which the last one is forgotten; 0 never follows. Default 10.
     pub forget_after: u32,
-    /// How far attitudes of several features of one image may be apart, radians. Default 3 degrees.
+    /// How far attitudes of several features of one image may be apart, radians. Default 4 degrees.
     pub agree_max_rad: f64,
     /// How far the attitudes of one corner in both images may be apart, and the rays from the fused pose, in standard
-    /// deviations of the covariances as they are: root mean square per degree of freedom. Default 4.
+    /// deviations of the covariances as they are: root mean square per degree of freedom. Default 5.
     pub misfit_max: f64,
     /// The least and the largest distance of a vertex, metres. Default 0.05 and 100.
     pub distance_m: [f64; 2],
@@ -51,8 +52,8 @@ impl Default for EstimatorOptions {
             down_sigma_rad: 15f64.to_radians(),
             turn_sigma_rad: 6f64.to_radians(),
             forget_after: 10,
-            agree_max_rad: 3f64.to_radians(),
-            misfit_max: 4.0,
+            agree_max_rad: 4f64.to_radians(),
+            misfit_max: 5.0,
             distance_m: [0.05, 100.0],
             probability_min: 0.9,
         }
@@ -135,6 +136,8 @@ impl Verdict {
 pub struct Hypothesis {
     /// The rotation from the object's frame to the left camera's.
     pub camera_from_object: Matrix3<f64>,
+    /// The directions of the edges x, y, z of the corner away from its vertex, left camera's frame, unit vectors.
+    pub edges: [Vector3<f64>; 3],
     /// The vertex in the left camera's frame, metres; none from one image.
     pub vertex_m: Option<Vector3<f64>>,
     /// Covariance of the attitude's rotation vector (left camera's frame, radians) and of the vertex (metres; zero from one
@@ -313,7 +316,7 @@ impl CornerPoseEstimator {
             followed: self.track.is_some(),
             object: self.objects,
         };
-        let attitude = self.attitude(&estimate.features)?;
+        let attitude = if self.right.is_some() { self.attitude(&estimate.features)? } else { None };
         if let Some(attitude) = &attitude {
             self.add_completed(left, right, attitude, &mut estimate.features);
             self.add_transferred([left, right.unwrap_or(left)], attitude, &mut estimate.features)?;
@@ -338,8 +341,7 @@ impl CornerPoseEstimator {
             }
             let turned = self.right.as_ref().map_or(Matrix3::identity(), |(_, motion)| motion.rotation.transpose());
             let parallel = |side: usize, attitude: Matrix3<f64>| -> Vec<CornerFeature> {
-                let fits =
-                    |corner: &&CornerFeature| fits(corner, &self.options.angle, &attitude, self.options.agree_max_rad);
+                let fits = |corner: &&CornerFeature| fits(corner, &attitude, self.options.agree_max_rad);
                 let mut out: Vec<CornerFeature> = Vec::new();
                 for corner in estimate.features[side].iter().filter(fits) {
                     // The longest rays of each vertex.
@@ -391,14 +393,14 @@ impl CornerPoseEstimator {
     ) {
         // The vertical is the axis nearest to what is known of it, so that edges are named as those found before.
         let attitude = self.vertical().map_or(*attitude, |vertical| upright(attitude, &vertical));
-        let (angle, most_rad) = (self.options.angle, self.options.agree_max_rad);
+        let most_rad = self.options.agree_max_rad;
         let mut found = Vec::new();
         let mut add =
             |detector: &CornerDetector, frame: &Frame<'_>, own: Matrix3<f64>, scratch: &mut _, side: usize| {
                 if let Frame::Gray(image) = frame {
                     found.clear();
                     detector.complete(image, &own, scratch, &mut found);
-                    features[side].extend(found.iter().filter(|corner| fits(corner, &angle, &own, most_rad)));
+                    features[side].extend(found.iter().filter(|corner| fits(corner, &own, most_rad)));
                 }
             };
         add(&self.left, left, attitude, &mut self.scratch[0], 0);
@@ -438,9 +440,7 @@ impl CornerPoseEstimator {
                     let seen = expected.and_then(|expected| {
                         detectors[other].find_near(image, &expected, Some(EPIPOLAR_STEP_PX), &mut self.scratch[other])
                     });
-                    let Some(seen) = seen.filter(|seen| fits(seen, &angle, &attitudes[other], most_rad)) else {
-                        continue;
-                    };
+                    let Some(seen) = seen.filter(|seen| fits(seen, &attitudes[other], most_rad)) else { continue };
                     if best.as_ref().is_none_or(|best| weight(&seen) > weight(best)) {
                         best = Some(seen);
                     }
@@ -503,6 +503,7 @@ impl CornerPoseEstimator {
                 covariance.fixed_view_mut::<3, 3>(0, 0).copy_from(&resolved.covariance);
                 Some(Hypothesis {
                     camera_from_object: self.named(resolved.common_from_object),
+                    edges: chosen.edges,
                     vertex_m: None,
                     covariance,
                     probability: resolved.probability,
@@ -525,23 +526,82 @@ impl CornerPoseEstimator {
         }
     }
 
+    /// Every pose that the rays of one corner in both images admit, the likeliest first. The attitudes of either image start the
+    /// fit to all six rays, so that a view that alone says little (two rays in line) does no harm.
+    fn pair_poses(
+        &self,
+        [left, right]: [&CornerFeature; 2],
+        left_from_right: &RigidMotion,
+        priors: &[AttitudePrior],
+    ) -> Result<Vec<Hypothesis>> {
+        let cameras = [(left, RigidMotion::identity()), (right, left_from_right.inverse())];
+        let sighting = |corner: &CornerFeature, rig_from_camera| Sighting {
+            bearing: corner.vertex(),
+            covariance: corner.vertex_covariance(),
+            rig_from_camera,
+        };
+        let seen = [sighting(left, RigidMotion::identity()), sighting(right, *left_from_right)];
+        let Some(vertex) = triangulate(&seen) else { return Ok(Vec::new()) };
+        let mut found: Vec<(f64, Hypothesis)> = Vec::new();
+        for (corner, rotation) in [(left, Matrix3::identity()), (right, left_from_right.rotation)] {
+            for own in corner_attitudes(corner, &self.options.angle)?.iter() {
+                let right_handed = own.is_right_handed();
+                if self.right_handed().is_some_and(|wanted| wanted != right_handed) {
+                    continue;
+                }
+                let (start, side) = (rotation * own.camera_from_object, if right_handed { 1.0 } else { -1.0 });
+                let Some(fused) = fuse_rays(&cameras, &self.options.angle, side, &start, &vertex.point_m) else {
+                    continue;
+                };
+                let known = |(_, other): &(f64, Hypothesis)| {
+                    apart(&other.camera_from_object, &fused.rig_from_object) < SAME_POSE_RAD
+                };
+                if found.iter().any(known) {
+                    continue;
+                }
+                let spread = fused.covariance.fixed_view::<3, 3>(0, 0).into_owned();
+                let prior: f64 = priors.iter().map(|p| p.ln_likelihood(&fused.rig_from_object, &spread)).sum();
+                // Real edges miss by more than their covariances say; the likelihoods allow for as much as the limit.
+                let scale = (0.25 * self.options.misfit_max).max(1.0).powi(2);
+                let (sin, cos) = self.options.angle.gamma_rad.sin_cos();
+                let edges = [Vector3::x(), Vector3::y(), Vector3::new(cos, 0.0, side * sin)];
+                let pose = Hypothesis {
+                    camera_from_object: fused.rig_from_object,
+                    edges: edges.map(|edge| fused.rig_from_object * edge),
+                    vertex_m: Some(fused.vertex_m),
+                    covariance: fused.covariance,
+                    probability: 0.0,
+                    right_handed,
+                    misfit: (fused.chi_square / 6.0).sqrt(),
+                };
+                found.push((prior - 0.5 * fused.chi_square / scale, pose));
+            }
+        }
+        found.sort_by(|a, b| b.0.total_cmp(&a.0));
+        let best = found.first().map_or(0.0, |(most, _)| *most);
+        let total: f64 = found.iter().map(|(ln, _)| (ln - best).exp()).sum();
+        let named = |(ln, pose): (f64, Hypothesis)| Hypothesis {
+            camera_from_object: self.named(pose.camera_from_object),
+            probability: (ln - best).exp() / total,
+            ..pose
+        };
+        Ok(found.into_iter().map(named).filter(|pose| pose.probability >= PROBABILITY_MIN).collect())
+    }
+
     /// The poses of the pair of features, one of each image, that fits best; near the last vertex where there is one. Where
     /// an `attitude` is known on which several corners agree, pairs that do not are left out.
     fn by_pair(&self, attitude: Option<&Matrix3<f64>>, estimate: &mut CornerEstimate) -> Result<()> {
         let Some((_, left_from_right)) = &self.right else { return Ok(()) };
-        let options = CornerOptions {
-            angle: self.options.angle,
-            right_handed: self.right_handed(),
-            priors: self.priors(self.is_one_object()),
-            ..CornerOptions::default()
-        };
+        let priors = self.priors(self.is_one_object());
         let [nearest, farthest] = self.options.distance_m;
-        let mut best: Option<(f64, Vec<CornerPose>, usize, usize)> = None;
+        let mut best: Option<(f64, Vec<Hypothesis>, usize, usize)> = None;
         for (i, left) in estimate.features[0].iter().enumerate() {
             for (j, right) in estimate.features[1].iter().enumerate() {
-                let poses = corner_poses(left, right, left_from_right, &options)?;
-                let Some(pose) = poses.first() else { continue };
-                let misfit = (pose.chi_square / 6.0).sqrt();
+                let poses = self.pair_poses([left, right], left_from_right, &priors)?;
+                let Some((pose, vertex)) = poses.first().and_then(|pose| Some((pose, pose.vertex_m?))) else {
+                    continue;
+                };
+                let misfit = pose.misfit;
                 let agrees = |attitude: &Matrix3<f64>| {
                     let own = renamed(&pose.camera_from_object, attitude);
                     apart(&own, attitude) <= self.options.agree_max_rad
@@ -549,17 +609,17 @@ impl CornerPoseEstimator {
                 if attitude.is_some_and(|attitude| !agrees(attitude)) {
                     continue;
                 }
-                if misfit > self.options.misfit_max || !(nearest..=farthest).contains(&pose.vertex_m.norm()) {
+                if misfit > self.options.misfit_max || !(nearest..=farthest).contains(&vertex.norm()) {
                     continue;
                 }
                 let mut score = weight(left).min(weight(right)) / (1.0 + misfit * misfit);
                 if let Some(last) = self.track.as_ref().and_then(|track| track.pose.vertex_m) {
                     // The same corner is near where it was.
-                    let moved = (pose.vertex_m - last).norm() / last.norm();
+                    let moved = (vertex - last).norm() / last.norm();
                     score /= 1.0 + (moved / MOVED).powi(2);
                 }
                 if let Some(track) = &self.track {
-                    let turned = apart(&self.named(pose.camera_from_object), &track.pose.camera_from_object);
+                    let turned = apart(&pose.camera_from_object, &track.pose.camera_from_object);
                     score /= 1.0 + (turned / self.options.turn_sigma_rad).powi(2);
                 }
                 if best.as_ref().is_none_or(|(most, ..)| score > *most) {
@@ -568,15 +628,7 @@ impl CornerPoseEstimator {
             }
         }
         if let Some((_, poses, i, j)) = best {
-            let hypothesis = |pose: &CornerPose| Hypothesis {
-                camera_from_object: self.named(pose.camera_from_object),
-                vertex_m: Some(pose.vertex_m),
-                covariance: pose.covariance,
-                probability: pose.probability,
-                right_handed: pose.right_handed,
-                misfit: (pose.chi_square / 6.0).sqrt(),
-            };
-            estimate.hypotheses = poses.iter().map(hypothesis).collect();
+            estimate.hypotheses = poses;
             (estimate.chosen_left, estimate.chosen_right) = (vec![i], Some(j));
         }
         Ok(())
@@ -592,6 +644,12 @@ fn upright(attitude: &Matrix3<f64>, vertical: &Vector3<f64>) -> Matrix3<f64> {
 
 /// Most corners of the left image that are looked for in the right one, those with the longest rays.
 const TRANSFERRED_MAX: usize = 8;
+
+/// How far apart attitudes of different hypotheses are, radians: fits from two starts end this close.
+const SAME_POSE_RAD: f64 = 0.035;
+
+/// The least probability of a hypothesis that is returned.
+const PROBABILITY_MIN: f64 = 1e-9;
 
 /// Distances that are tried before those are dropped that are less than a step apart.
 const DISTANCES: u32 = 1000;

@@ -46,9 +46,12 @@ pub struct ColouredOptions {
     pub color: ColorOptions,
     /// Which way the camera is held.
     pub orientation: OrientationChoice,
+    /// Every how many-th pixel is labelled, along rows and columns; the rays are fitted to all pixels whatever it is.
+    /// Default 2; the paper's is 1.
+    pub label_step_px: u32,
     /// How far apart the faces on both sides of an edge are looked for, in pixels (the paper's search width). Default 8.
     pub search_width_px: u32,
-    /// Least number of candidates of each edge. Default 40.
+    /// Least number of candidates of each edge, if every pixel were labelled. Default 40.
     pub candidates_min: u32,
     /// Largest distance of a candidate from the line that RANSAC fits, in pixels. Default 1.5.
     pub line_threshold_px: f64,
@@ -75,6 +78,7 @@ impl Default for ColouredOptions {
         Self {
             color: ColorOptions::default(),
             orientation: OrientationChoice::default(),
+            label_step_px: 2,
             search_width_px: 8,
             candidates_min: 40,
             line_threshold_px: 1.5,
@@ -208,6 +212,7 @@ fn within(name: &'static str, value: f64, range: std::ops::RangeInclusive<f64>, 
 impl ColouredOptions {
     fn validate(&self) -> Result<()> {
         self.color.validate()?;
+        within("label_step_px", f64::from(self.label_step_px), 1.0..=16.0, "from 1 to 16 pixels")?;
         within("search_width_px", f64::from(self.search_width_px), 2.0..=100.0, "from 2 to 100 pixels")?;
         within("candidates_min", f64::from(self.candidates_min), 2.0..=1e6, "from 2 to 1000000")?;
         within("line_threshold_px", self.line_threshold_px, 0.1..=20.0, "from 0.1 to 20 pixels")?;

@@ -82,40 +82,45 @@ pub(super) const TOP: u8 = 1;
 pub(super) const LEFT: u8 = 2;
 pub(super) const RIGHT: u8 = 3;
 
-/// The label of each pixel of a window of the image.
+/// The labels of every `step`-th pixel of a window of the image, in both directions.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Labels {
     pub(super) labels: Vec<u8>,
-    pub(super) columns: std::ops::Range<usize>,
-    pub(super) rows: std::ops::Range<usize>,
+    /// First column and row, in pixels.
+    pub(super) origin: [usize; 2],
+    /// How many columns and rows of labels there are.
+    pub(super) size: [usize; 2],
+    pub(super) step: usize,
 }
 
 impl Labels {
-    /// Labels every pixel of a window.
+    /// Labels every `step`-th pixel of a window.
     pub(super) fn fill(
         &mut self,
         image: &ColorView<'_>,
         options: &ColorOptions,
         columns: std::ops::Range<usize>,
         rows: std::ops::Range<usize>,
+        step: usize,
     ) {
-        let width = columns.len();
-        self.labels.resize(width * rows.len(), NONE);
+        let step = step.max(1);
+        (self.origin, self.step) = ([columns.start, rows.start], step);
+        self.size = [columns.len().div_ceil(step), rows.len().div_ceil(step)];
+        self.labels.resize(self.size[0] * self.size[1], NONE);
         let share = (options.chromaticity_min * 256.0).round() as u16;
         let mut by_byte = [NONE; 3];
         for (face, label) in options.faces.into_iter().zip([TOP, LEFT, RIGHT]) {
             by_byte[face.byte()] = label;
         }
-        for (v, out) in rows.clone().zip(self.labels.chunks_exact_mut(width.max(1))) {
+        for (v, out) in rows.step_by(step).zip(self.labels.chunks_exact_mut(self.size[0].max(1))) {
             let row = image.row(v).get(3 * columns.start..3 * columns.end).unwrap_or(&[]);
-            label_row(row, share, options.intensity_min, by_byte, out);
+            label_row(row, step, share, options.intensity_min, by_byte, out);
         }
-        (self.columns, self.rows) = (columns, rows);
     }
 
     /// The labels of row `i` of the window.
     pub(super) fn row(&self, i: usize) -> &[u8] {
-        let width = self.columns.len();
+        let width = self.size[0];
         self.labels.get(i * width..(i + 1) * width).unwrap_or(&[])
     }
 }
@@ -123,9 +128,9 @@ impl Labels {
 /// A pixel is of a colour whose value is at least `intensity` and at least `share / 256` of the sum; with a share above a
 /// third of it the strongest colour is the only candidate, but for ties of two, which are none.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512vl", "x86_64+avx2+fma"))]
-fn label_row(row: &[u8], share: u16, intensity: u8, by_byte: [u8; 3], out: &mut [u8]) {
-    for (pixel, label) in row.chunks_exact(3).zip(out) {
-        let [b, g, r] = [pixel[0], pixel[1], pixel[2]];
+fn label_row(row: &[u8], step: usize, share: u16, intensity: u8, by_byte: [u8; 3], out: &mut [u8]) {
+    for (pixel, label) in row.chunks(3 * step).zip(out) {
+        let Some([b, g, r]) = pixel.first_chunk::<3>().copied() else { continue };
         let needed = (u32::from(b) + u32::from(g) + u32::from(r)) * u32::from(share);
         let passes = |c: u8, others: u8| {
             u8::from((u32::from(c) << 8) >= needed) & u8::from(c >= intensity.max(1)) & u8::from(c > others)
@@ -153,12 +158,14 @@ mod tests {
         let bytes: Vec<u8> = bgr.into_iter().flatten().collect();
         let image = ColorView::new(&bytes, 8, 1, 24).unwrap();
         let mut labels = Labels::default();
-        labels.fill(&image, &ColorOptions::default(), 0..8, 0..1);
+        labels.fill(&image, &ColorOptions::default(), 0..8, 0..1, 1);
         assert_eq!(labels.row(0), [TOP, LEFT, RIGHT, NONE, NONE, NONE, TOP, NONE]);
-        labels.fill(&image, &ColorOptions::default(), 1..3, 0..1);
+        labels.fill(&image, &ColorOptions::default(), 1..3, 0..1, 1);
         assert_eq!(labels.row(0), [LEFT, RIGHT]);
+        labels.fill(&image, &ColorOptions::default(), 1..8, 0..1, 3);
+        assert_eq!(labels.row(0), [LEFT, NONE, NONE]);
         let faces = [Primary::Blue, Primary::Red, Primary::Green];
-        labels.fill(&image, &ColorOptions { faces, ..ColorOptions::default() }, 0..8, 0..1);
+        labels.fill(&image, &ColorOptions { faces, ..ColorOptions::default() }, 0..8, 0..1, 1);
         assert_eq!(labels.row(0)[..3], [LEFT, RIGHT, TOP]);
     }
 

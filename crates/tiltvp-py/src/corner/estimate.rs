@@ -7,6 +7,7 @@ use pyo3::types::PyDict;
 use tiltvp_core::corner::{self as core, Hypothesis};
 
 use super::feature::CornerFeature;
+use crate::convert;
 
 /// One explanation of what is seen: an attitude, from two cameras also a place, and how likely it is.
 #[pyclass(frozen, module = "tiltvp._core")]
@@ -37,6 +38,13 @@ impl CornerHypothesis {
     #[getter]
     fn camera_from_object<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
         rotation(py, &self.inner.camera_from_object)
+    }
+
+    /// Fresh (3, 3) float64, rows x, y, z: directions of the corner's edges away from its vertex, left camera's frame. The
+    /// frame of `camera_from_object` keeps its axes from frame to frame, whatever the edges are called.
+    #[getter]
+    fn edges<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        convert::to_rows(py, &self.inner.edges.map(<[f64; 3]>::from), false)
     }
 
     /// Fresh (3,) float64: the vertex in the left camera's frame, metres; None from one image.

@@ -50,6 +50,7 @@ fn set(options: &mut DetectorOptions, key: &str, value: &Bound<'_, PyAny>) -> Py
         }
         ("faces", CornerMethod::Coloured(o)) => o.color.faces = faces(value)?,
         ("orientation", CornerMethod::Coloured(o)) => o.orientation = orientation(value)?,
+        ("label_step_px", CornerMethod::Coloured(o)) => o.label_step_px = pixels()?,
         ("search_width_px", CornerMethod::Coloured(o)) => o.search_width_px = pixels()?,
         ("candidates_min", CornerMethod::Coloured(o)) => o.candidates_min = pixels()?,
         ("line_threshold_px", CornerMethod::Coloured(o)) => o.line_threshold_px = number()?,
@@ -112,6 +113,7 @@ pub(super) fn in_force<'py>(py: Python<'py>, options: &DetectorOptions) -> PyRes
             dict.set_item("faces", o.color.faces.map(Primary::letter).into_iter().collect::<String>())?;
             let word = ORIENTATIONS.into_iter().find(|(_, choice)| *choice == o.orientation);
             dict.set_item("orientation", word.map(|(name, _)| name))?;
+            dict.set_item("label_step_px", o.label_step_px)?;
             dict.set_item("search_width_px", o.search_width_px)?;
             dict.set_item("candidates_min", o.candidates_min)?;
             dict.set_item("line_threshold_px", o.line_threshold_px)?;
