@@ -39,7 +39,7 @@ __all__ = ["StereoSpec", "read_stereo", "write_stereo_toml"]
 _FORMAT: Final = "tiltvp-stereo"
 _VERSION: Final = 1
 _MARK: Final = re.compile(r"^\s*format\s*=\s*[\"']tiltvp-stereo[\"']", re.MULTILINE)
-_EXPECTED: Final = "a camchain of Kalibr with two cameras, or a file with format = \"tiltvp-stereo\""
+_EXPECTED: Final = 'a camchain of Kalibr with two cameras, or a file with format = "tiltvp-stereo"'
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,7 +53,9 @@ class StereoSpec:
 
 
 def read_stereo(path: str | os.PathLike[str], image_size: ImageSize | None = None) -> StereoSpec:
-    """The pair of a file. Raises `tiltvp.errors.CalibrationError` that says what was wrong, what was expected and where."""
+    """The pair of a file. Raises `tiltvp.errors.CalibrationError` that says what was wrong, what was expected and
+    where.
+    """
     document = Document.load(path)
     if _MARK.search(document.text) is not None:
         return _own(document, image_size)
@@ -104,7 +106,9 @@ def _motion(node: Node) -> NDArray[np.float64]:
     nearest = u @ v
     off = float(np.abs(nearest - matrix[:3, :3]).max())
     if off > 1e-3 or np.linalg.det(nearest) < 0.0 or not np.array_equal(matrix[3], [0.0, 0.0, 0.0, 1.0]):
-        node.fail(f"is no rigid motion (its rotation is off by {off:.1e})", "a rotation, a translation, and 0 0 0 1 below")
+        node.fail(
+            f"is no rigid motion (its rotation is off by {off:.1e})", "a rotation, a translation, and 0 0 0 1 below"
+        )
     motion = np.eye(4)
     motion[:3, :3], motion[:3, 3] = nearest, matrix[:3, 3]
     if not np.linalg.norm(motion[:3, 3]) > 0.0:
