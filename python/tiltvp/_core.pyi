@@ -97,7 +97,6 @@ METHODS: Final[list[str]]
 CAMERA_MODELS: Final[list[str]]
 """The names of the models of `Camera`."""
 
-CORNER_METHODS: list[str]
 CORNER_METHODS: Final[list[str]]
 LINE_METHODS: Final[list[str]]
 """The names of the methods of `LineExtractor`, the default first."""
@@ -2096,7 +2095,7 @@ class CornerFeature:
     def __copy__(self) -> Self: ...
     def __deepcopy__(self, _memo: Any) -> Self: ...
 
-@final
+@disjoint_base
 class CornerDetector:
     """Finds corners in single images of one camera; `tiltvp.corner.CornerDetector` takes images of any usual kind."""
 
@@ -2132,6 +2131,7 @@ class CornerDetector:
     def __eq__(self, other: object) -> bool: ...
     def __hash__(self) -> int: ...
 
+@final
 class CornerHypothesis:
     """One explanation of what is seen: an attitude, from two cameras also a place, and how likely it is."""
 
@@ -2172,8 +2172,11 @@ class CornerHypothesis:
 
     def __eq__(self, other: object) -> bool: ...
 
+@final
 class CornerEstimate:
-    """What one frame tells of a corner: the likeliest pose if one stands out, and all hypotheses. False without a pose."""
+    """What one frame tells of a corner: the likeliest pose if one stands out, and all hypotheses. False without a
+    pose.
+    """
 
     @property
     def pose(self) -> CornerHypothesis | None:
@@ -2218,8 +2221,11 @@ class CornerEstimate:
     def __bool__(self) -> bool: ...
     def __eq__(self, other: builtins.object) -> bool: ...
 
+@disjoint_base
 class CornerPoseEstimator:
-    """Poses from the images of one camera or a pair; `tiltvp.corner.CornerPoseEstimator` takes cameras and any images."""
+    """Poses from the images of one camera or a pair; `tiltvp.corner.CornerPoseEstimator` takes cameras and any
+    images.
+    """
 
     def __new__(
         cls,
@@ -2251,6 +2257,7 @@ class CornerPoseEstimator:
 
     def _observe(self, left: NDArray[np.uint8], right: NDArray[np.uint8] | None) -> CornerEstimate: ...
 
+@final
 class CornerAttitude:
     """One attitude that the rays of a corner admit. Frozen, comparable (bit by bit), hashable, and to be pickled."""
 

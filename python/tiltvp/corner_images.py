@@ -35,9 +35,9 @@ class CornerDetector(_core.CornerDetector):
     """Finds corners in single images of one camera: `CornerDetector(camera, method="coloured")`.
 
     "coloured" finds the corner of a cuboid whose upper, left and right face are red, green and blue (`faces="rgb"`),
-    "general" those of rooms, boxes and buildings, by line segments. Tables and scratch are made once; one detector may be
-    called from many threads at once; frozen, comparable, and to be pickled. `options` lists all options, docs/corners.md
-    says what they mean.
+    "general" those of rooms, boxes and buildings, by line segments. Tables and scratch are made once; one detector
+    may be called from many threads at once; frozen, comparable, and to be pickled. `options` lists all options,
+    docs/corners.md says what they mean.
     """
 
     __slots__ = ()
@@ -45,8 +45,8 @@ class CornerDetector(_core.CornerDetector):
     def __call__(self, image: ArrayLike, vertical: ArrayLike | None = None) -> list[CornerFeature]:
         """The corners of one image, the best first; at most one for "coloured", which needs colour.
 
-        `vertical` (3,), for "general", is a direction along the vertical in the camera frame, up or down: it says which of
-        the three rays is the vertical one. Without it that is the one nearest to the image's columns. Raises
+        `vertical` (3,), for "general", is a direction along the vertical in the camera frame, up or down: it says
+        which of the three rays is the vertical one. Without it that is the one nearest to the image's columns. Raises
         `InvalidInputError` for an image of another size than the camera's.
         """
         if self.method == "coloured":
@@ -63,9 +63,9 @@ class CornerPoseEstimator(_core.CornerPoseEstimator):
 
     `left` and `right` are cameras or `CornerDetector`s; `left_from_right` (4, 4) is the right camera's pose in the left
     one's frame, metres. Without `right` only the attitude is estimated. Call it with the images of one frame after the
-    other: the last pose is the prior for the next one. `gamma_rad` is the angle between the corner's level edges, `down`
-    (3,) the direction down in the left camera's frame as far as it is known. Other options are the estimator's, or those
-    of detectors that are made here for `method`.
+    other: the last pose is the prior for the next one. `gamma_rad` is the angle between the corner's level edges,
+    `down` (3,) the direction down in the left camera's frame as far as it is known. Other options are the
+    estimator's, or those of detectors that are made here for `method`.
     """
 
     def __new__(
@@ -93,6 +93,8 @@ class CornerPoseEstimator(_core.CornerPoseEstimator):
         return super().__new__(cls, detector(left), other, left_from_right, **own)
 
     def __call__(self, left: ArrayLike, right: ArrayLike | None = None) -> CornerEstimate:
-        """What one frame tells; false if no pose stands out, `reason` says why. One image for one camera, two for a pair."""
+        """What one frame tells; false if no pose stands out, `reason` says why. One image for one camera, two for a
+        pair.
+        """
         made = bgr_from if self._coloured else gray_from
         return self._observe(made(left), None if right is None else made(right))

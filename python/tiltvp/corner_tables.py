@@ -29,8 +29,8 @@ def pose_table(estimates: Sequence[tuple[float, str, CornerEstimate]]) -> pl.Dat
     """One row for each frame: time_s, file, found, the camera in the object's frame, and how sure it is.
 
     qx..qw and x_m..z_m are `object_from_camera`; the object's frame has y along the vertical edge away from the vertex.
-    roll, pitch and yaw are those of `object_from_camera` about the camera's z, x and y axis. The standard deviations are
-    of the rotation vector and of the vertex in the camera's frame. Null where there is no pose, from one camera no
+    roll, pitch and yaw are those of `object_from_camera` about the camera's z, x and y axis. The standard deviations
+    are of the rotation vector and of the vertex in the camera's frame. Null where there is no pose, from one camera no
     position.
     """
     import polars as pl

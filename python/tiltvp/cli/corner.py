@@ -44,8 +44,8 @@ def corner(
 ) -> int:
     """Find a corner in each image, or pair of images, and from it the camera's attitude, with a pair also its position.
 
-    The last pose is where the next one is looked for. Images that cannot be read are named on stderr and skipped, and the
-    exit code is 1; images without a corner have rows without a pose that say why.
+    The last pose is where the next one is looked for. Images that cannot be read are named on stderr and skipped,
+    and the exit code is 1; images without a corner have rows without a pose that say why.
 
     Parameters
     ----------
@@ -54,15 +54,15 @@ def corner(
     right
         The same of the right camera, with as many frames.
     calibration
-        Of two cameras: a camchain of Kalibr or a TOML of tiltvp with left, right and left_from_right. Of one camera: any
-        format that `tiltvp camera formats` lists.
+        Of two cameras: a camchain of Kalibr or a TOML of tiltvp with left, right and left_from_right. Of one camera:
+        any format that `tiltvp camera formats` lists.
     method
         coloured: a cuboid with red, green and blue faces; general: corners of rooms, boxes and buildings.
     gamma
         Angle between the corner's level edges, degrees.
     pitch
-        How far the left camera looks above the horizon, degrees, held without roll: negative looks down. Roughly; it says
-        which of the edges is vertical, for the first image.
+        How far the left camera looks above the horizon, degrees, held without roll: negative looks down. Roughly; it
+        says which of the edges is vertical, for the first image.
     out
         File for the poses, one row for each frame: .csv, .json or .parquet.
     trajectory
@@ -112,7 +112,7 @@ def corner(
                 estimates.append((number / rate_hz, str(file), estimate))
                 if overlay is not None:
                     name = f"{Path(file).stem}_{number:06d}.png" if "#" in file.name else f"{Path(file).stem}.png"
-                    write_image(overlay / name, _drawn(images[0], camera, estimate))
+                    write_image(overlay / name, drawn(images[0], camera, estimate))
             bar.advance()
     if not estimates:
         raise InvalidInputError(f"{left}: {bad} frames, none of which can be used")
@@ -161,7 +161,8 @@ def _pairs(frames: Frames, others: Frames | None) -> Any:
     return zip(frames, others, strict=True)
 
 
-def _drawn(image: NDArray[np.uint8], camera: Camera, estimate: CornerEstimate) -> NDArray[np.uint8]:
+def drawn(image: NDArray[np.uint8], camera: Camera, estimate: CornerEstimate) -> NDArray[np.uint8]:
+    """The image with its corners and the imaginary box."""
     from tiltvp.plots.corner_overlay import draw_box, draw_corners
 
     canvas = draw_corners(image, camera, estimate.features_left, estimate.chosen_left)

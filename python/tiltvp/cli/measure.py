@@ -9,6 +9,7 @@ from typing import Annotated
 from cyclopts import App, Parameter, validators
 
 from tiltvp.cli.corner_measures import corners
+from tiltvp.cli.corner_real import corners_real
 from tiltvp.cli.descriptors import descriptors
 from tiltvp.cli.planar_pose import planar_pose
 from tiltvp.cli.results import check_ending, show_frame, write_frame
@@ -17,6 +18,7 @@ from tiltvp.errors import InvalidInputError
 
 app = App(name="measure", help="Measure the methods on images of known tilt.")
 app.command(corners)
+app.command(corners_real)
 app.command(descriptors)
 app.command(planar_pose)
 

@@ -53,7 +53,9 @@ class StereoSpec:
 
 
 def read_stereo(path: str | os.PathLike[str], image_size: ImageSize | None = None) -> StereoSpec:
-    """The pair of a file. Raises `tiltvp.errors.CalibrationError` that says what was wrong, what was expected and where."""
+    """The pair of a file. Raises `tiltvp.errors.CalibrationError` that says what was wrong, what was expected and
+    where.
+    """
     document = Document.load(path)
     if _MARK.search(document.text) is not None:
         return _own(document, image_size)

@@ -1,8 +1,9 @@
-"""Corners drawn over their image: rays, vertices, and the imaginary box of each (paper 004, fig. 1c); poses over time."""
+"""Corners over their image: rays, vertices and imaginary boxes (paper 004, fig. 1c); poses over time."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import cv2
@@ -30,7 +31,9 @@ _LENGTH = 0.15
 def draw_corners(
     image: ArrayLike, camera: Camera, features: Sequence[CornerFeature], chosen: Iterable[int] = ()
 ) -> NDArray[np.uint8]:
-    """The image in dimmed grey, (H, W, 3) BGR uint8, with the rays x red, y green, z blue; those not `chosen` are thin."""
+    """The image in dimmed grey, (H, W, 3) BGR uint8, with the rays x red, y green, z blue; those not `chosen` are
+    thin.
+    """
     gray = gray_from(image)
     canvas = np.asarray(cv2.cvtColor((gray * 0.75).astype(np.uint8), cv2.COLOR_GRAY2BGR), dtype=np.uint8)
     wanted = set(chosen)
@@ -69,7 +72,7 @@ def _curve(
     canvas: NDArray[np.uint8], camera: Camera, points: NDArray[np.float64], colour: tuple[int, int, int], width: int
 ) -> None:
     pixels = camera.project(points)
-    for a, b in zip(pixels[:-1], pixels[1:], strict=True):
+    for a, b in pairwise(pixels):
         start, end = _whole(a), _whole(b)
         if start is not None and end is not None:
             cv2.line(canvas, start, end, colour, width, cv2.LINE_AA)
