@@ -4,6 +4,7 @@ use std::f64::consts::{PI, TAU};
 
 use nalgebra::Matrix3;
 
+use super::arctan::atan2;
 use super::sight::Sight;
 use crate::edges::RidgePixels;
 use crate::robust::Rows;
@@ -27,6 +28,8 @@ pub(super) struct Candidate {
     pub(super) azimuth: f32,
     /// How far the azimuth turns for one pixel across the edge, radians, positive.
     pub(super) per_px: f32,
+    /// One over that.
+    pub(super) px_per_rad: f32,
     /// Tangent of the elevation.
     pub(super) slope: f32,
     /// Whether it is brighter towards greater azimuth.
@@ -73,9 +76,10 @@ impl Candidates {
             let edge = a + (b - a) * shift.abs();
             let normal = turn * row.cast::<f32>();
             self.unsorted.push(Candidate {
-                azimuth: a.y.atan2(a.x) + shift.abs() * per_px,
+                azimuth: atan2(a.y, a.x) + shift.abs() * per_px,
                 per_px: per_px.abs(),
-                slope: edge.z / edge.x.hypot(edge.y),
+                px_per_rad: 1.0 / per_px.abs(),
+                slope: edge.z / (edge.x * edge.x + edge.y * edge.y).sqrt(),
                 rising: normal.y * a.x - normal.x * a.y > 0.0,
                 taken: false,
             });
@@ -110,6 +114,19 @@ impl Candidates {
 pub(super) fn bin_of(azimuth: f64, bins: usize) -> usize {
     let turn = (azimuth + PI) / TAU;
     (((turn - turn.floor()) * bins as f64) as usize).min(bins - 1)
+}
+
+/// The difference of two angles of one turn in `[-pi, pi]`, without a division.
+#[inline]
+pub(super) fn difference(a: f64, b: f64) -> f64 {
+    let turned = a - b;
+    if turned > PI {
+        turned - TAU
+    } else if turned < -PI {
+        turned + TAU
+    } else {
+        turned
+    }
 }
 
 /// The angle in `(-pi, pi]`.
