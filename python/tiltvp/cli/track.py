@@ -77,13 +77,17 @@ def track(
     frames = open_frames(source)
     motions = None if odometry is None else read_odometry(odometry, frames.files)
     tracked: list[tuple[int, str, TrackedLines]] = []
-    bad, turn_rad = 0, 0.0
+    # A file without distances tells turns only.
+    drives = motions is not None and any(motion.distance_m for motion in motions)
+    bad, turn_rad, distance_m = 0, 0.0, 0.0
     showing = nullcontext() if video is None else video_writer(video, frame_rate or frames.rate_hz)
     with showing as film, progress_bar(len(frames.files), "frames") as bar:
         for number, image in enumerate(frames):
             file = frames.files[number]
-            # The turn of a frame that is skipped belongs to the next.
-            turn_rad += 0.0 if motions is None else motions[number].yaw_rad
+            # The motion of a frame that is skipped belongs to the next.
+            if motions is not None:
+                turn_rad += motions[number].yaw_rad
+                distance_m += motions[number].distance_m
             try:
                 if isinstance(image, TiltvpError):
                     raise image
@@ -94,8 +98,13 @@ def track(
                 bad += 1
             else:
                 descriptors = extractor.describe(gray, lines)
-                known = None if motions is None else turn_rad
-                found, turn_rad = tracker.update(lines, descriptors, yaw_change_rad=known), 0.0
+                found = tracker.update(
+                    lines,
+                    descriptors,
+                    yaw_change_rad=None if motions is None else turn_rad,
+                    distance_m=distance_m if drives else None,
+                )
+                turn_rad, distance_m = 0.0, 0.0
                 tracked.append((number, str(file), found))
                 if film is not None:
                     film.add(draw_lines(gray, lens, lines, extractor.robot_from_camera, tracks=found.track.tolist()))

@@ -6,8 +6,11 @@ use super::options::GreatCircleOptions;
 /// Gates about the line in pixels, from the first fit to the last.
 const GATES_PX: [f64; 4] = [3.0, 2.0, 1.5, 1.2];
 
-/// Pixels that err together along a line: neighbours share the grid's phase and the edge's crookedness.
+/// Pixels that count as one against the prior of the slant: neighbours share the grid's phase and the edge's crookedness.
 const ERRING_TOGETHER: f64 = 8.0;
+
+/// Pixels that count as one for what is known in the end: an edge beside the line pulls at most of its length.
+const PULLED_TOGETHER: f64 = 40.0;
 
 /// The least standard deviation of a pixel's place across the edge, in pixels, however well the pixels agree.
 const PIXEL_SIGMA_MIN_PX: f64 = 0.06;
@@ -139,10 +142,12 @@ fn solve(
         return None;
     }
     let per_px = wide / n;
+    let known = 1.0 / (variance * PULLED_TOGETHER.min(n));
+    let (ka, kb, kc) = (known * s0, known * s1, known * s2 + prior);
     Some(Fit {
         azimuth: wrap(at.azimuth + (c * x - b * y) / determinant),
         slant: at.slant + (a * y - b * x) / determinant,
-        sigma: (c / determinant + (LINE_SIGMA_PX * per_px).powi(2)).sqrt(),
+        sigma: (kc / (ka * kc - kb * kb) + (LINE_SIGMA_PX * per_px).powi(2)).sqrt(),
         per_px,
         ..*at
     })

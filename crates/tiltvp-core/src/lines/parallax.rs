@@ -55,7 +55,8 @@ impl Parallax {
         let [bb, bn, nn] = self.covariance;
         let Some(distance) = motion.distance_m else {
             self.bearing_rad = wrap(self.bearing_rad - motion.turn_rad + self.nearness);
-            self.covariance = [bb + 2.0 * bn + nn + DRIFT_RAD * DRIFT_RAD, bn + nn, nn + RATE_DRIFT_RAD * RATE_DRIFT_RAD];
+            self.covariance =
+                [bb + 2.0 * bn + nn + DRIFT_RAD * DRIFT_RAD, bn + nn, nn + RATE_DRIFT_RAD * RATE_DRIFT_RAD];
             return;
         };
         let [tx, ty] = shift_of(distance, motion.turn_rad, options.camera_m);
@@ -121,8 +122,7 @@ mod tests {
         let place = [0.1 + 2.0 * bearing.cos(), -0.05 + 2.0 * bearing.sin()];
         let (radius, yaw) = (0.2 / 0.3, 0.3f64);
         let robot = [radius * yaw.sin(), radius * (1.0 - yaw.cos())];
-        let camera =
-            [robot[0] + 0.1 * yaw.cos() + 0.05 * yaw.sin(), robot[1] + 0.1 * yaw.sin() - 0.05 * yaw.cos()];
+        let camera = [robot[0] + 0.1 * yaw.cos() + 0.05 * yaw.sin(), robot[1] + 0.1 * yaw.sin() - 0.05 * yaw.cos()];
         let (dx, dy) = (place[0] - camera[0], place[1] - camera[1]);
         assert!((edge.bearing_rad - (dy.atan2(dx) - yaw)).abs() < 1e-12);
         assert!((edge.nearness - 1.0 / dx.hypot(dy)).abs() < 1e-12);

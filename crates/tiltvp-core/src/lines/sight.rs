@@ -62,7 +62,10 @@ impl Sight {
     /// The ray of a pixel, and whether it has one.
     #[inline]
     pub(super) fn ray(&self, u: usize, v: usize) -> Option<[f32; 3]> {
-        self.rays.get(v * self.width + u).filter(|ray| ray[0] != NO_RAY).map(|ray| ray.map(|x| f32::from(x) * UNIT))
+        match self.rays.get(v * self.width + u) {
+            Some([x, y, z]) if *x != NO_RAY => Some([f32::from(*x) * UNIT, f32::from(*y) * UNIT, f32::from(*z) * UNIT]),
+            _ => None,
+        }
     }
 }
 

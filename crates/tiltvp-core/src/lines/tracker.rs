@@ -8,7 +8,6 @@ use super::candidates::wrap;
 use super::dissimilarity::descriptor_distance;
 use super::line::{Line, Lines};
 use super::matcher::{Match, MatchOptions, MatchScratch, select};
-use super::order::keep_cyclic_order;
 use super::parallax::{Motion, Parallax};
 use crate::error::{Error, Result};
 
@@ -187,7 +186,11 @@ impl LineTracker {
         };
         let is_true = |edge: &Followed| is_known(&edge.track) && edge.seen < state.next_frame;
         if !state.frames.iter().all(is_whole) || !state.followed.iter().all(is_true) {
-            return Err(Error::argument("state", "frames or tracks whose parts disagree", "a state that a tracker gave"));
+            return Err(Error::argument(
+                "state",
+                "frames or tracks whose parts disagree",
+                "a state that a tracker gave",
+            ));
         }
         Ok(Self { options, state, ..Self::default() })
     }
@@ -245,28 +248,16 @@ impl LineTracker {
             if frame.tracks.is_empty() || self.scratch.measure(descriptors, &frame.descriptors, width).is_err() {
                 continue;
             }
-            let allowed = |i: usize, j: usize| {
-                continued[i].is_none() && claimed.binary_search(&frame.tracks[j]).is_err()
-            };
-            let options = MatchOptions { ordered: false, ..self.options.matching };
-            select(&mut self.scratch, (lines.len(), frame.tracks.len()), allowed, &options, &mut self.matches);
-            if self.options.matching.ordered {
-                // In order with those that later frames have matched.
-                let place = |track: u64| frame.tracks.iter().position(|other| *other == track);
-                let before = continued.iter().enumerate().filter_map(|(a, known)| {
-                    let b = place((*known)?.0)?;
-                    Some(Match { a, b, distance: 0.0 })
-                });
-                self.matches.extend(before);
-                self.matches.sort_by_key(|found| found.a);
-                keep_cyclic_order(&mut self.matches, frame.tracks.len());
-            }
+            let size = (lines.len(), frame.tracks.len());
+            select(&mut self.scratch, size, |_, _| true, &self.options.matching, &mut self.matches);
+            // Of a line whose nearest is another's no second best is taken.
             for found in &self.matches {
                 let track = frame.tracks[found.b];
-                // Without the mutual check two lines may claim one: the first has it.
                 let Err(place) = claimed.binary_search(&track) else { continue };
-                claimed.insert(place, track);
-                continued[found.a] = Some((track, (k + 1) as u32));
+                if continued[found.a].is_none() {
+                    claimed.insert(place, track);
+                    continued[found.a] = Some((track, (k + 1) as u32));
+                }
             }
         }
         continued
@@ -323,13 +314,14 @@ impl LineTracker {
         }
         for edge in &mut state.followed {
             edge.parallax.bearing_rad = wrap(edge.parallax.bearing_rad + common);
+            edge.parallax.covariance[0] += turn_variance;
         }
         let frame = state.next_frame;
         let mut continued = vec![None; n];
         for (i, line) in lines.iter().enumerate() {
             let Some(j) = pairs[i] else { continue };
             let edge = &mut state.followed[j];
-            edge.parallax.correct(line.bearing_rad, line_variance(line, options) + turn_variance, options);
+            edge.parallax.correct(line.bearing_rad, line_variance(line, options), options);
             continued[i] = Some((edge.track, (frame - edge.seen) as u32));
         }
         continued
