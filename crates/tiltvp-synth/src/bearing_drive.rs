@@ -30,21 +30,23 @@ impl BearingDriveKind {
         }
     }
 
+    /// Distance in metres and turn in radians of each leg.
+    pub fn legs(self) -> Vec<(f64, f64)> {
+        let (straight, turn) = (|metres| (metres, 0.0), |degrees: f64| (0.0, degrees.to_radians()));
+        match self {
+            Self::Paper => vec![straight(2.3), turn(180.0)],
+            Self::Alternating => [straight(1.0), turn(90.0)].repeat(4),
+            Self::Straight => vec![straight(4.0)],
+        }
+    }
+
     /// Distance and turn of each step.
     fn steps(self) -> Vec<(f64, f64)> {
-        let straight = |metres: f64| {
-            let count = (metres / 0.038).round();
-            vec![(metres / count, 0.0); count as usize]
+        let steps = |(distance, turn): (f64, f64)| {
+            let count = (distance / 0.038).max(turn / 3f64.to_radians()).round();
+            vec![(distance / count, turn / count); count as usize]
         };
-        let turn = |degrees: f64| {
-            let count = (degrees / 3.0).round();
-            vec![(0.0, (degrees / count).to_radians()); count as usize]
-        };
-        match self {
-            Self::Paper => [straight(2.3), turn(180.0)].concat(),
-            Self::Alternating => [straight(1.0), turn(90.0)].concat().repeat(4),
-            Self::Straight => straight(4.0),
-        }
+        self.legs().into_iter().flat_map(steps).collect()
     }
 }
 
