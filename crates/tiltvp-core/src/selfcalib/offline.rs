@@ -113,7 +113,8 @@ pub fn calibrate_log(
     let start = options.filter.start.vector();
     let with_wheels = Free { wheels: true, ..asked };
     // Wheels that may give a little let loops close; a start far off may need a map without loops, or the filter's answer.
-    let attempts = [(with_wheels, Guess::Start), (asked, Guess::Filter), (asked, Guess::Start), (with_wheels, Guess::Open)];
+    let attempts =
+        [(with_wheels, Guess::Start), (asked, Guess::Filter), (asked, Guess::Start), (with_wheels, Guess::Open)];
     for (i, (free, guess)) in attempts.into_iter().enumerate() {
         if i == 2 && asked == with_wheels {
             continue;
