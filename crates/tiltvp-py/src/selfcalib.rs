@@ -96,8 +96,7 @@ impl SelfCalibrator {
         step_sigma_m: Option<f64>,
         step_sigma_rad: Option<f64>,
     ) -> PyResult<Self> {
-        let given =
-            Given {
+        let given = Given {
             bearing_sigma_rad,
             odometry_k_m,
             step_sigma_m,
@@ -291,17 +290,16 @@ pub(crate) fn calibrate(
     step_sigma_m: Option<f64>,
     step_sigma_rad: Option<f64>,
 ) -> PyResult<LogCalibration> {
-    let given =
-        Given {
-            bearing_sigma_rad,
-            odometry_k_m,
-            step_sigma_m,
-            step_sigma_rad,
-            start,
-            start_sigma,
-            start_distance_m,
-            start_distance_log_sigma,
-        };
+    let given = Given {
+        bearing_sigma_rad,
+        odometry_k_m,
+        step_sigma_m,
+        step_sigma_rad,
+        start,
+        start_sigma,
+        start_distance_m,
+        start_distance_log_sigma,
+    };
     let defaults = LogOptions::default();
     let options = LogOptions {
         filter: options(wheel_base_m, &given)?,

@@ -55,7 +55,13 @@ pub(super) fn find(
     window: &super::detector::Window,
     scratch: &mut ColouredScratch,
 ) -> Option<CornerFeature> {
-    scratch.labels.fill(image, &options.color, window.columns.clone(), window.rows.clone(), options.label_step_px as usize);
+    scratch.labels.fill(
+        image,
+        &options.color,
+        window.columns.clone(),
+        window.rows.clone(),
+        options.label_step_px as usize,
+    );
     let orientations: &[Orientation] = match options.orientation {
         OrientationChoice::Upright => &[Orientation::Upright],
         OrientationChoice::UpsideDown => &[Orientation::UpsideDown],

@@ -114,12 +114,16 @@ pub fn calibrate_log(
             graph.descend(options.max_iterations, TOLERANCE, 1e-3);
             graph = graph.with_fixed_wheels(Wheels::new(options.filter.wheel_base_m));
         }
-        if std::env::var("DBG").is_ok() {eprintln!("attempt {attempt} guess {guess:?} grown {:?} cost {}",graph.mounting,graph.cost());}
+        if std::env::var("DBG").is_ok() {
+            eprintln!("attempt {attempt} guess {guess:?} grown {:?} cost {}", graph.mounting, graph.cost());
+        }
         let first = graph.descend(options.max_iterations, TOLERANCE, 1e-3);
         graph.loss = Loss::Cut(LIMIT);
         let then = graph.descend(options.max_iterations, TOLERANCE, 1e-3);
         let descent = Descent { iterations: first.iterations + then.iterations, ..then };
-        if std::env::var("DBG").is_ok() {eprintln!("   -> {descent:?} rms {} {:?}",graph.residual_rms(),graph.mounting);}
+        if std::env::var("DBG").is_ok() {
+            eprintln!("   -> {descent:?} rms {} {:?}", graph.residual_rms(), graph.mounting);
+        }
         let good = descent.converged && graph.residual_rms() < GOOD_RMS;
         if descent.cost.is_finite() && best.as_ref().is_none_or(|(_, best)| descent.cost < best.cost) {
             best = Some((graph, descent));
