@@ -84,6 +84,7 @@ def test_truth_is_among_the_solutions_of_many() -> None:
     best = np.full(count, np.inf)
     np.minimum.at(best, found.corner, off / limit)
     assert best.max() < 1
+    assert corner.solve_many(vertex[:1], *(ray[:1] for ray in rays), gamma[:1]).of(0) == found.of(0)
     one = corner.solve(vertex[7], *(ray[7] for ray in rays), gamma[7])
     assert one == found.of(7)
     assert found.edges.shape == (len(found), 3, 3)
@@ -226,6 +227,10 @@ def test_bad_input_is_refused(pose: tuple[Array, Array, float]) -> None:
         corner.resolve([feature], priors=[1])  # type: ignore[list-item]
     with pytest.raises(InvalidInputError, match="down"):
         corner.resolve([feature], priors=[corner.GravityPrior((0, 2, 0), 0.1)])
+    with pytest.raises(InvalidInputError, match="camera_from_object"):
+        corner.KnownAttitude.of([[1, 2], [3, 4]], 0.1)
+    with pytest.raises(InvalidInputError, match="rotation"):
+        corner.resolve([feature], priors=[corner.KnownAttitude.of(np.eye(3) * 2, 0.1)])
     with pytest.raises(InvalidInputError, match="common_from_camera"):
         corner.resolve([feature], common_from_camera=[])
     with pytest.raises(InvalidInputError, match="alignment"):

@@ -1065,20 +1065,26 @@ class TrackedLines:
 class LineTracker:
     """Follows lines through successive frames: each gets the identity of the line it is, or a new one.
 
-    A line is looked for in the last frame, then in the one before, up to `look_back` frames. Where the turn of the
-    robot is known, bearings are predicted and far lines are no candidates. The same calls give the same answers.
-    Comparable, copied and pickled with all that it remembers.
+    Where the robot's motion is known, each track's bearing is predicted from the last one and from how near the edge is,
+    as far as bearings have told, and all lines find their tracks together: by bearings, descriptors and sides, at the
+    least cost in all. Where it is not, a line is looked for in the last frame, then in the one before, up to
+    `look_back` frames. The same calls give the same answers. Comparable, copied and pickled with all that it remembers.
     """
 
     def __new__(
         cls,
         *,
         look_back: SupportsIndex = ...,
-        gate_rad: float = ...,
-        gate_settled_rad: float = ...,
-        gate_growth_rad: float = ...,
-        bearing_weight: float = ...,
-        extrapolate: bool = ...,
+        nearest_m: float = ...,
+        camera_m: tuple[float, float] = ...,
+        turn_sigma_rad: float = ...,
+        distance_sigma: float = ...,
+        rate_sigma_rad: float = ...,
+        bearing_sigma_rad: float = ...,
+        gate_sigmas: float = ...,
+        descriptor_sigma: float = ...,
+        descriptor_max: float = ...,
+        new_cost: float = ...,
         f1: float = ...,
         f2: float = ...,
         f3: float = ...,
@@ -1091,15 +1097,21 @@ class LineTracker:
         ----------
         look_back
             How many frames back a line is looked for before it is taken for a new one.
-        gate_rad, gate_settled_rad, gate_growth_rad
-            Greatest difference from the predicted bearing where turns are known; the same, beside the line's own change
-            per frame, where that is known from before; and how much more for each further frame back.
-        bearing_weight
-            What is added to the distance of descriptors at the gate, in proportion less nearer the predicted bearing.
-        extrapolate
-            Whether bearings are predicted to go on changing as they did, beside the turn of the robot.
+        nearest_m, camera_m
+            The least distance of an edge from the camera, and where the camera's centre is on the robot: x and y from
+            the middle between the wheels; metres.
+        turn_sigma_rad, distance_sigma
+            Standard deviations of a turn and, as a share of it, of a distance driven.
+        rate_sigma_rad
+            Standard deviation of the change of a bearing per frame beside the turn, where no distance is given.
+        bearing_sigma_rad, gate_sigmas
+            Standard deviation of a bearing beside the line's own, and how many of them bearings may be off.
+        descriptor_sigma, descriptor_max
+            Standard deviation and greatest value of the distance between descriptors of one line.
+        new_cost
+            What a new track costs, against the sum of squared deviations of a line that goes on.
         f1, f2, f3, mutual, ordered
-            As those of `match_descriptors`.
+            As those of `match_descriptors`, where the motion is unknown.
 
         Raises `tiltvp.errors.InvalidInputError` for an option that is unknown or out of its domain.
         """
@@ -1117,18 +1129,24 @@ class LineTracker:
         """How many identities have been given."""
 
     def update(
-        self, lines: Lines, descriptors: NDArray[np.float32], *, yaw_change_rad: float | None = None
+        self,
+        lines: Lines,
+        descriptors: NDArray[np.float32],
+        *,
+        yaw_change_rad: float | None = None,
+        distance_m: float | None = None,
     ) -> TrackedLines:
-        """The next frame: its lines, their descriptors (N, K), and the turn since the last one, positive to the left.
+        """The next frame: its lines, their descriptors (N, K), and the robot's motion since the last one.
 
-        Raises `tiltvp.errors.InvalidInputError` for descriptors of another number or width, and turns that are not
-        finite; the tracker is as before then.
+        `yaw_change_rad` is its turn, positive to the left, `distance_m` how far the middle between its wheels went along
+        the arc, negative backwards. Raises `tiltvp.errors.InvalidInputError` for descriptors of another number or width,
+        motions that are not finite, and a distance without a turn; the tracker is as before then.
         """
 
     def __eq__(self, other: object, /) -> bool: ...
     def __copy__(self) -> Self: ...
     def __deepcopy__(self, _memo: object) -> Self: ...
-    def __setstate__(self, state: tuple[int, int, list[Any]], /) -> None:
+    def __setstate__(self, state: tuple[int, int, list[Any], list[Any]], /) -> None:
         """Sets what pickle has kept."""
     __hash__: ClassVar[None]  # type: ignore[assignment]
 

@@ -21,6 +21,7 @@ from tiltvp.corner_images import (
     CornerHypothesis,
     CornerPoseEstimator,
 )
+from tiltvp.errors import InvalidInputError
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -104,7 +105,10 @@ class KnownAttitude:
     @classmethod
     def of(cls, camera_from_object: ArrayLike, sigma_rad: float) -> KnownAttitude:
         """From a (3, 3) rotation that may be off by `sigma_rad` about any axis."""
-        rotation = np.asarray(camera_from_object, dtype=np.float64)
+        rotation = np.asarray(camera_from_object)
+        if rotation.shape != (3, 3) or rotation.dtype.kind not in "fiu":
+            got = f"shape {rotation.shape} of {rotation.dtype}"
+            raise InvalidInputError(f"camera_from_object: {got}, expected an array (3, 3) of real numbers")
         rows = tuple(tuple(float(x) for x in row) for row in rotation)
         return cls(rows, tuple(tuple(float(x) for x in row) for row in np.eye(3) * sigma_rad**2))
 
@@ -126,7 +130,7 @@ def solve(
     the camera and the angle is obtuse (III-C); none where no such corner looks like this. Raises
     `InvalidInputError` for a ray's point at the vertex, for what is not finite, and unless 0 < gamma_rad < pi.
     """
-    return _core.solve_corner(vertex, x_ray, y_ray, z_ray, float(gamma_rad))
+    return _core.solve_corner(vertex, x_ray, y_ray, z_ray, gamma_rad)
 
 
 def solve_many(
@@ -143,19 +147,19 @@ def fit(x: ArrayLike, y: ArrayLike, z: ArrayLike, *, sigma_rad: float) -> Corner
     deviation of each bearing across its ray. Raises `InvalidInputError` for bearings that are no three rays with a
     common vertex.
     """
-    return _core.fit_corner(x, y, z, float(sigma_rad))
+    return _core.fit_corner(x, y, z, sigma_rad)
 
 
 def attitudes(
     feature: CornerFeature, gamma_rad: float = _RIGHT, *, gamma_sigma_rad: float = 0.0
 ) -> list[CornerAttitude]:
     """Every attitude that a feature admits, with the covariance that its rays' covariances and gamma's bring."""
-    return _core.corner_attitudes(feature, float(gamma_rad), float(gamma_sigma_rad))
+    return _core.corner_attitudes(feature, gamma_rad, gamma_sigma_rad)
 
 
 def screen(feature: CornerFeature, gamma_rad: float = _RIGHT) -> str | None:
     """Why no corner of that angle looks like the feature (section II-A3), in a sentence; None if one does."""
-    return _core.screen_corner(feature, float(gamma_rad))
+    return _core.screen_corner(feature, gamma_rad)
 
 
 def included_angle(
@@ -190,9 +194,7 @@ def resolve(
     is no corner of that angle.
     """
     cameras = [np.eye(3)] * len(features) if common_from_camera is None else list(common_from_camera)
-    return _core.resolve_corners(
-        list(features), cameras, float(gamma_rad), float(gamma_sigma_rad), alignment, right_handed, priors
-    )
+    return _core.resolve_corners(list(features), cameras, gamma_rad, gamma_sigma_rad, alignment, right_handed, priors)
 
 
 def poses(
@@ -213,9 +215,7 @@ def poses(
     `right_handed` and by `priors` (left camera's frame). With `fuse` the six rays are fused by least squares from
     there. Empty where either feature is no corner of that angle, and where the vertex is before neither camera.
     """
-    return _core.corner_poses(
-        left, right, left_from_right, float(gamma_rad), float(gamma_sigma_rad), right_handed, priors, fuse
-    )
+    return _core.corner_poses(left, right, left_from_right, gamma_rad, gamma_sigma_rad, right_handed, priors, fuse)
 
 
 def triangulate(

@@ -1,5 +1,7 @@
 //! Corners at known poses: the truth among the attitudes, in every case, and errors as large as the covariance says.
 
+#![allow(clippy::unwrap_used)]
+
 use std::f64::consts::{FRAC_PI_2, PI};
 
 use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3, Vector4};

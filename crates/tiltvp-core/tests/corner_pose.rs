@@ -1,13 +1,15 @@
 //! Poses from noisy rays: errors at the Cramer-Rao bound, covariances that are true, hypotheses told apart.
 
+#![allow(clippy::unwrap_used)]
+
 use std::f64::consts::FRAC_PI_2;
 
 use nalgebra::{DMatrix, DVector, Matrix3, Rotation3, SVector, UnitQuaternion, Vector3};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use tiltvp_core::corner::{
-    Alignment, AttitudePrior, CornerFeature, CornerOptions, FittedRay, IncludedAngle, Sighting, VerticalSense, View,
-    corner_attitudes, corner_poses, included_angle, resolve, triangulate,
+    Alignment, AttitudePrior, CornerFeature, CornerOptions, CornerPose, FittedRay, IncludedAngle, Sighting,
+    VerticalSense, View, corner_attitudes, corner_poses, included_angle, resolve, triangulate,
 };
 use tiltvp_core::filter::{ConsistencyBand, squared_mahalanobis};
 use tiltvp_core::geometry::{RigidMotion, tangent_basis, tangent_log};
@@ -162,7 +164,7 @@ fn one_camera_reaches_the_bound_and_knows_it() {
             vertex_nees.push(squared_mahalanobis(&miss, &feature.vertex_covariance()).unwrap());
         }
     }
-    let ratio: f64 = (squares / bounds as f64).sqrt();
+    let ratio: f64 = f64::sqrt(squares / bounds);
     assert!(ratio < 1.1, "rms {ratio} times the bound");
     // One run in 10,000 leaves each band.
     let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64;
@@ -223,7 +225,7 @@ fn two_cameras_reach_the_bound_and_choose_rightly() {
         assert_eq!(best.right_handed, truth.side > 0.0);
     }
     for (squares, bounds) in squares.iter().zip(bounds) {
-        let ratio: f64 = (squares / bounds as f64).sqrt();
+        let ratio: f64 = f64::sqrt(squares / bounds);
         assert!(ratio < 1.1, "rms {ratio} times the bound");
     }
     let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64;
@@ -234,6 +236,45 @@ fn two_cameras_reach_the_bound_and_choose_rightly() {
     let deviation = (expected * (1.0 - expected / 1000.0)).max(1.0).sqrt();
     assert!((right - expected).abs() < 4.0 * deviation + 1.0, "{right} right of {expected} expected, {told} told");
     assert!(told > 700.0, "{told}");
+}
+
+#[test]
+fn an_angle_that_is_known_roughly_is_found_with_the_pose() {
+    let mut dice = ChaCha8Rng::seed_from_u64(7);
+    let (left_from_right, right_from_left) = right_camera();
+    let (mut nees, mut chi) = (Vec::new(), Vec::new());
+    while nees.len() < 1000 {
+        let truth = Truth::random(&mut dice);
+        let sigma_rad = 0.005;
+        let guess = IncludedAngle { gamma_rad: truth.gamma_rad + sigma_rad * normal(&mut dice), sigma_rad };
+        if guess.validate().is_err() {
+            continue;
+        }
+        let (Some(left), Some(right)) =
+            (truth.feature(&RigidMotion::identity(), &mut dice), truth.feature(&right_from_left, &mut dice))
+        else {
+            continue;
+        };
+        let sound = |f: &CornerFeature| {
+            let found = corner_attitudes(f, &guess).unwrap();
+            !found.is_empty() && found.iter().all(|a| a.sensitivity < 5.0)
+        };
+        if !sound(&left) || !sound(&right) {
+            continue;
+        }
+        let options = CornerOptions { angle: guess, ..CornerOptions::default() };
+        let found = corner_poses(&left, &right, &left_from_right, &options).unwrap();
+        let error = |pose: &CornerPose| rotation_error(&pose.camera_from_object, &truth.rotation);
+        let best = found.iter().min_by(|a, b| error(a).norm().total_cmp(&error(b).norm())).unwrap();
+        let (off, away) = (error(best), truth.vertex_m - best.vertex_m);
+        let all = SVector::<f64, 6>::from_iterator(off.iter().chain(away.iter()).copied());
+        nees.push(squared_mahalanobis(&all, &best.covariance).unwrap());
+        chi.push(best.chi_square);
+    }
+    let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64;
+    let band = ConsistencyBand::of_mean(0.9999, 6, 1000).unwrap();
+    assert!(band.holds(mean(&nees)), "nees {} {band:?}", mean(&nees));
+    assert!(band.holds(mean(&chi)), "chi-square {} {band:?}", mean(&chi));
 }
 
 #[test]

@@ -362,6 +362,10 @@ fn door(frame: &Frame, opening: &Opening, wall: MaterialId, trims: &Trims, build
     let ([x0, x1], z1) = (opening.along, opening.z[1]);
     reveal(frame, opening, 0.1, wall, trims.metal, builder);
     builder.pane(frame, [[x1, -0.09, 0.0], [x0, -0.09, 0.0], [x1, -0.09, z1]], [x0 + z1; 2], trims.door);
+    // Where the leaf meets the reveal.
+    for x in opening.along {
+        builder.edge(frame.point(x, -0.09, 0.0), z1);
+    }
     // Two raised fields, casing, handle.
     for [low, high] in [[0.15, 0.85], [1.0, z1 - 0.15]] {
         builder.cuboid(frame, [x0 + 0.13, -0.09, low], [x1 - 0.13, -0.075, high], trims.door);
@@ -419,6 +423,8 @@ fn drape(frame: &Frame, along: [f64; 2], z: [f64; 2], material: MaterialId, buil
         builder.pane(frame, [[xa, ya, z[0]], [xb, yb, z[0]], [xa, ya, z[1]]], [k as f64 * 0.05, 0.0], material);
         builder.edge(frame.point(xa, ya, z[0]), z[1] - z[0]);
     }
+    let (x, y) = at(pleats);
+    builder.edge(frame.point(x, y, z[0]), z[1] - z[0]);
 }
 
 /// A panel radiator with upright fins.

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 import polars as pl
 
-from tiltvp import _core
+from tiltvp.corner_images import CornerEstimate, CornerHypothesis, CornerPoseEstimator
 from tiltvp.datasets.new import in_order
 from tiltvp.errors import InvalidInputError
 from tiltvp.evaluation.corner_inertial import compare_inertial
@@ -56,6 +56,8 @@ class CornerScene:
     """Angle between the cuboid's level edges."""
     options: dict[str, Any] = field(default_factory=dict)
     """Of `StereoSequence`."""
+    known: dict[str, Any] = field(default_factory=dict)
+    """Options of `CornerPoseEstimator`: what is known beforehand, but for gamma, and which way is down in a room."""
 
     @property
     def method(self) -> str:
@@ -73,17 +75,21 @@ class CornerScene:
         return StereoSequence(scene, left=left, right=right, frames=frames, seed=seed, threads=threads, **self.options)
 
 
+_OUTER: Final[dict[str, Any]] = {"right_handed": True}
+"""The colours name the edges, and whose corner it is is known: an outer one."""
+
 CORNER_SCENES: tuple[CornerScene, ...] = (
-    CornerScene("cuboid"),
-    CornerScene("cuboid, 1080p", share=0.1, width=1920),
-    CornerScene("cuboid, shutter 8 ms", share=0.1, options={"exposure_s": 0.008, "blur_sigma_px": 1.0}),
-    CornerScene("cuboid, gamma 70 deg", share=0.1, gamma_deg=70.0),
-    CornerScene("cuboid, gamma 115 deg", share=0.1, gamma_deg=115.0),
+    CornerScene("cuboid", known=_OUTER),
+    CornerScene("cuboid, inner or outer", share=0.1),
+    CornerScene("cuboid, 1080p", share=0.1, width=1920, known=_OUTER),
+    CornerScene("cuboid, shutter 8 ms", share=0.1, options={"exposure_s": 0.008, "blur_sigma_px": 1.0}, known=_OUTER),
+    CornerScene("cuboid, gamma 70 deg", share=0.1, gamma_deg=70.0, known=_OUTER),
+    CornerScene("cuboid, gamma 115 deg", share=0.1, gamma_deg=115.0, known=_OUTER),
     CornerScene("office", kind="office", share=0.1),
     CornerScene("living-room", kind="living-room", share=0.1),
     CornerScene("l-shaped", kind="l-shaped", share=0.1),
 )
-"""The paper's cuboid in both resolutions, blurred, of other angles, and corners of rooms and furniture."""
+"""The paper's cuboid, also without a word on which side is seen, in full HD, blurred, of other angles; corners of rooms."""
 
 
 @dataclass(frozen=True)
@@ -150,16 +156,14 @@ def summarise_corners(table: pl.DataFrame) -> pl.DataFrame:
     )
 
 
-def _estimates(
-    scene: CornerScene, sequence: StereoSequence, threads: int
-) -> Iterator[tuple[_core.CornerEstimate, float]]:
+def _estimates(scene: CornerScene, sequence: StereoSequence, threads: int) -> Iterator[tuple[CornerEstimate, float]]:
     """What the estimator says of each frame in turn, and the processor time it took, milliseconds."""
-    left, right = (_core.CornerDetector(camera, method=scene.method) for camera in sequence.cameras)
-    known: dict[str, Any] = {"gamma_rad": math.radians(scene.gamma_deg)}
+    known: dict[str, Any] = {"gamma_rad": math.radians(scene.gamma_deg)} | scene.known
     if scene.kind != "laboratory":
         # What tells upright edges from level ones is how the board is held, as its accelerometer has it on average.
         known["down"] = -sequence.imu(seed=sequence.seed).forces_m_s2.mean(axis=0)
-    estimator = _core.CornerPoseEstimator(left, right, sequence.left_from_right, **known)
+    left, right = sequence.cameras
+    estimator = CornerPoseEstimator(left, right, sequence.left_from_right, method=scene.method, **known)
     stop = Event()
 
     def render(frame: int) -> Pair:
@@ -169,19 +173,12 @@ def _estimates(
 
     with closing(in_order(render, range(len(sequence)), threads, stop)) as pairs:
         for pair in pairs:
-            images = pair if scene.method == "coloured" else tuple(_gray(image) for image in pair)
             start = time.thread_time()
-            estimate = estimator._observe(*images)
+            estimate = estimator(*pair)
             yield estimate, 1000.0 * (time.thread_time() - start)
 
 
-def _gray(image: NDArray[np.uint8]) -> NDArray[np.uint8]:
-    import cv2
-
-    return np.asarray(cv2.cvtColor(image, cv2.COLOR_BGR2GRAY), dtype=np.uint8)
-
-
-def _judged(scene: CornerScene, sequence: StereoSequence, frame: int, estimate: _core.CornerEstimate) -> dict[str, Any]:
+def _judged(scene: CornerScene, sequence: StereoSequence, frame: int, estimate: CornerEstimate) -> dict[str, Any]:
     target = sequence.left_from_object(frame)
     row: dict[str, Any] = {
         "frame": frame,
@@ -222,7 +219,7 @@ def _judged(scene: CornerScene, sequence: StereoSequence, frame: int, estimate: 
     }
 
 
-def _nearest(sequence: StereoSequence, frame: int, pose: _core.CornerHypothesis) -> tuple[int, NDArray[np.float64]]:
+def _nearest(sequence: StereoSequence, frame: int, pose: CornerHypothesis) -> tuple[int, NDArray[np.float64]]:
     """The true corner that an estimate is of, or -1, and its pose with level edges named as the estimate does."""
     from_world = np.linalg.inv(sequence.poses_at([sequence.times_s[frame]])[0])
     vertices = np.array([corner.position_m for corner in sequence.corners]) @ from_world[:3, :3].T + from_world[:3, 3]

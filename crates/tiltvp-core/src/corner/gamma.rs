@@ -21,7 +21,7 @@ pub fn included_angle(
 ) -> Option<IncludedAngle> {
     let pencil = &feature.pencil;
     let upright = vertical.dot(&pencil.vertex);
-    if !(upright.abs() > 1e-9) {
+    if upright.abs() <= 1e-9 || upright.is_nan() {
         return None;
     }
     // Both edges, how they turn about the vertical with the errors of the pencil's vertex and of the vertical.

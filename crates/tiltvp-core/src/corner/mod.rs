@@ -4,7 +4,7 @@
 //! bearings, so that any central camera will do: what the paper calls the standard model (the vertex turned to the optical
 //! axis) is the pencil of planes through the vertex's bearing here.
 //!
-//! [Liu et al. 2018]: https://arxiv.org/abs/1812.10952
+//! [Liu et al. 2018]: https://deepai.org/publication/trove-feature-detection-for-online-pose-recovery-by-binocular-cameras
 
 mod attitude;
 mod coloured;

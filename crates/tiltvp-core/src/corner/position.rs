@@ -49,7 +49,8 @@ pub fn triangulate(sightings: &[Sighting]) -> Option<TriangulatedPoint> {
         right += across * sighting.rig_from_camera.translation_m;
     }
     // The least eigenvalue is about half of the squared angle between the lines of sight.
-    if !(matrix.symmetric_eigenvalues().min() > PARALLEL) {
+    let apart = matrix.symmetric_eigenvalues().min();
+    if apart <= PARALLEL || apart.is_nan() {
         return None;
     }
     let mut point = matrix.try_inverse()? * right;
@@ -60,7 +61,8 @@ pub fn triangulate(sightings: &[Sighting]) -> Option<TriangulatedPoint> {
             let to = rotation.transpose() * (point - sighting.rig_from_camera.translation_m);
             let distance = to.norm();
             let seen = to / distance;
-            if !(seen.dot(&sighting.bearing) > 0.0) {
+            let ahead = seen.dot(&sighting.bearing);
+            if ahead <= 0.0 || ahead.is_nan() {
                 return None;
             }
             let basis = tangent_basis(&sighting.bearing).transpose();

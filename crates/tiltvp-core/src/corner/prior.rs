@@ -84,14 +84,15 @@ impl AttitudePrior {
         };
         match self {
             Self::Gravity { down, sigma_rad, .. } => {
-                if !((down.norm_squared() - 1.0).abs() < 1e-6) {
+                let off = (down.norm_squared() - 1.0).abs();
+                if off >= 1e-6 || off.is_nan() {
                     let [x, y, z]: [f64; 3] = (*down).into();
                     return Err(Error::argument("down", format!("({x}, {y}, {z})"), "a unit vector"));
                 }
                 positive(*sigma_rad)
             }
             Self::Elevation { elevation_rad, sigma_rad, .. } => {
-                if !(elevation_rad.abs() <= std::f64::consts::FRAC_PI_2) {
+                if elevation_rad.abs() > std::f64::consts::FRAC_PI_2 || elevation_rad.is_nan() {
                     return Err(Error::argument("elevation_rad", elevation_rad, "an angle in [-pi/2, pi/2]"));
                 }
                 positive(*sigma_rad)

@@ -203,3 +203,85 @@ impl Pencil {
         Some(Self { vertex, normal, along, vertex_covariance, lever, noise })
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use approx::assert_abs_diff_eq;
+    use nalgebra::Vector2;
+
+    /// A ray of a vertex along z in the direction `angle`, its plane shifted from the vertex by `off`, with these variances
+    /// of the shift and of the angle.
+    fn ray(angle: f64, off: f64, variances: [f64; 2]) -> FittedRay {
+        let (sin, cos) = angle.sin_cos();
+        let normal = (Vector3::new(-sin, cos, 0.0) * off.cos() + Vector3::z() * off.sin()).normalize();
+        let basis = tangent_basis(&normal);
+        let (shift, turn) = (basis.transpose() * Vector3::z(), basis.transpose() * Vector3::new(cos, sin, 0.0));
+        let covariance = shift * shift.transpose() * variances[0] + turn * turn.transpose() * variances[1];
+        let toward = Vector3::new(0.2 * cos, 0.2 * sin, 1.0).normalize();
+        FittedRay { normal, covariance, toward, support: 9, residual_rms_rad: 0.0 }
+    }
+
+    #[test]
+    fn the_vertex_is_nearest_to_the_three_by_their_variances() {
+        let even = [1e-6, 1e-6];
+        let rays = [ray(0.0, 1e-3, even), ray(2.0, 1e-3, even), ray(-2.0, 1e-3, even)];
+        let feature = CornerFeature::from_rays(rays).unwrap();
+        // Along the plane's normals: least squares of (sin w, -cos w) v = off.
+        let (mut matrix, mut right) = (Matrix2::zeros(), Vector2::zeros());
+        for angle in [0.0f64, 2.0, -2.0] {
+            let across = Vector2::new(angle.sin(), -angle.cos());
+            matrix += across * across.transpose();
+            right += across * 1e-3;
+        }
+        let expected = matrix.try_inverse().unwrap() * right;
+        assert_abs_diff_eq!(feature.vertex().xy(), expected, epsilon = 1e-8);
+        assert!(feature.residual_rad() > 1e-4 && feature.chi_square() > 0.01);
+        // One ray that is worth next to nothing leaves the vertex to the others.
+        let rays = [ray(0.0, 0.0, even), ray(2.0, 0.0, even), ray(-2.0, 1e-2, [1.0, 1.0])];
+        let feature = CornerFeature::from_rays(rays).unwrap();
+        assert_abs_diff_eq!(feature.vertex().xy(), Vector2::zeros(), epsilon = 1e-6);
+        assert!(feature.meets_probability() > 0.9);
+        let sure = [1e-12, 1e-12];
+        let rays = [ray(0.0, 1e-3, sure), ray(2.0, 1e-3, sure), ray(-2.0, 1e-3, sure)];
+        assert!(CornerFeature::from_rays(rays).unwrap().meets_probability() < 1e-6);
+    }
+
+    #[test]
+    fn signs_of_normals_and_the_order_of_calls_do_not_matter() {
+        let rays = [ray(0.1, 1e-3, [2e-6, 1e-6]), ray(2.0, 0.0, [1e-6, 3e-6]), ray(-2.2, -1e-3, [1e-6, 1e-6])];
+        let feature = CornerFeature::from_rays(rays).unwrap();
+        let turned = CornerFeature::from_rays([rays[0].reversed(), rays[1], rays[2].reversed()]).unwrap();
+        assert_abs_diff_eq!(feature.vertex(), turned.vertex(), epsilon = 1e-12);
+        assert_abs_diff_eq!(feature.vertex_covariance(), turned.vertex_covariance(), epsilon = 1e-16);
+        for (a, b) in feature.rays().iter().zip(turned.rays()) {
+            assert_abs_diff_eq!(a.normal, b.normal, epsilon = 1e-12);
+            assert_abs_diff_eq!(a.covariance, b.covariance, epsilon = 1e-16);
+            assert!(feature.vertex().cross(&a.toward).dot(&a.normal) > 0.0);
+        }
+        assert_eq!(CornerFeature::from_rays(*feature.rays()).unwrap(), feature);
+        for plane in feature.pencil.normal {
+            assert_abs_diff_eq!(plane.dot(&feature.vertex()), 0.0, epsilon = 1e-15);
+        }
+    }
+
+    #[test]
+    fn what_is_no_feature() {
+        let even = [1e-6, 1e-6];
+        let rays = [ray(0.0, 0.0, even), ray(2.0, 0.0, even), ray(-2.0, 0.0, even)];
+        assert!(CornerFeature::from_rays([rays[0], rays[0], rays[0]]).is_none());
+        let mut at_vertex = rays;
+        at_vertex[1].toward = Vector3::z();
+        assert!(CornerFeature::from_rays(at_vertex).is_none());
+        for spoil in [
+            |ray: &mut FittedRay| ray.normal *= 2.0,
+            |ray: &mut FittedRay| ray.toward.x = f64::NAN,
+            |ray: &mut FittedRay| ray.covariance[(0, 0)] = -1.0,
+            |ray: &mut FittedRay| ray.covariance[(0, 1)] = 1.0,
+        ] {
+            let mut spoilt = rays;
+            spoil(&mut spoilt[2]);
+            assert!(!spoilt[2].is_valid() && CornerFeature::from_rays(spoilt).is_none());
+        }
+    }
+}

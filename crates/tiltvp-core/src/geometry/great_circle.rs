@@ -42,7 +42,7 @@ pub fn fit_great_circle(weighted: impl IntoIterator<Item = (Vector3<f64>, f64)>)
     let information: Matrix2<f64> = basis.transpose() * moments * basis;
     // A normal that could as well be any of a whole circle of normals is no fit.
     let spread = information.symmetric_eigenvalues().min() / total;
-    if !(spread > LEAST_SPREAD) {
+    if spread <= LEAST_SPREAD || spread.is_nan() {
         return None;
     }
     let covariance = information.try_inverse()?;

@@ -213,7 +213,15 @@ impl LineExtractor {
         let mut patch = Patch::default();
         out.clear();
         for line in &lines.lines {
-            patch.sample(image, &self.sight, &chart, (line.bearing_rad, 0.5 * (low + high)), pitch, (rows, columns));
+            patch.sample(
+                image,
+                &self.sight,
+                &chart,
+                (line.bearing_rad, 0.5 * (low + high)),
+                pitch,
+                (rows, columns),
+                None,
+            );
             out.extend_from_slice(&patch.levels);
         }
         Ok((rows, columns))

@@ -216,12 +216,6 @@ impl Graph {
         all
     }
 
-    /// The root of the mean squared whitened residual of the bearings.
-    pub(super) fn residual_rms(&self) -> f64 {
-        let all = self.residuals();
-        (all.iter().map(|r| r * r).sum::<f64>() / all.len().max(1) as f64).sqrt()
-    }
-
     /// The largest whitened residual of a bearing.
     pub(super) fn farthest(&self) -> f64 {
         self.residuals().iter().fold(0.0, |far, r| r.abs().max(far))

@@ -11,14 +11,17 @@ use super::odometry::{Leg, WheelMotion, Wheels, compose};
 use super::offline::{LogBearing, LogOptions};
 use crate::geometry::wrap_angle;
 
-/// Poses with bearings after which the log so far is solved.
-const STAGE: usize = 50;
+/// Poses with bearings after which the log so far is solved: a share of those that there are, within bounds.
+const STAGE: (usize, usize, usize) = (5, 5, 50);
 
 /// Poses with bearings after which a landmark that is seen again counts as another one where loops are not closed.
 const GAP: usize = 60;
 
 /// Spread of the directions in which a landmark was seen from which on it joins, radians.
 const PARALLAX: f64 = 0.15;
+
+/// Poses from which a landmark was seen after which it joins in any case.
+const PATIENCE: usize = 12;
 
 /// Share of the spread, beside standard deviations, by which the bearings of a landmark may disagree when it joins.
 const DISAGREEMENT: (f64, f64) = (0.1, 6.0);
@@ -67,7 +70,7 @@ pub(super) fn grown(
     let mut growing = Growing { options, graph, joined: BTreeMap::new(), waiting: Waiting::new(), gap, looked: true };
     let (mut rest, mut solved) = (order, 1);
     for (step, reading) in readings.iter().enumerate() {
-        if growing.graph.nodes.len() >= solved + STAGE && growing.looked {
+        if growing.graph.nodes.len() >= solved + (solved / STAGE.0).clamp(STAGE.1, STAGE.2) && growing.looked {
             growing.join(3, PARALLAX);
             growing.graph.reanchor();
             growing.graph.descend(6, 1.0, 1e-3);
@@ -171,18 +174,16 @@ impl Growing<'_> {
         }
     }
 
-    /// Gives a place to the landmarks that were seen so often, from directions so different.
+    /// Gives a place to the landmarks that were seen so often, from directions so different or for long.
     fn join(&mut self, sights: usize, parallax: f64) {
         let names: Vec<u64> = self.waiting.keys().copied().collect();
         for name in names {
             let Some(seen) = self.waiting.get(&name).filter(|seen| seen.len() >= sights) else { continue };
             let spread = self.spread(seen);
-            if spread < parallax {
-                continue;
-            }
             let (landmark, off) = self.placed(seen);
             let (share, sigmas) = DISAGREEMENT;
-            if parallax > 0.0 && off > share * spread + sigmas * self.graph.bearing_sigma {
+            let agree = off <= share * spread + sigmas * self.graph.bearing_sigma;
+            if !(sights == 1 || spread >= parallax && agree || seen.len() >= PATIENCE) {
                 continue;
             }
             let o = &self.options.filter;
@@ -223,12 +224,17 @@ impl Growing<'_> {
         };
         let at = |closeness: f64| seen_at(anchor, closeness, &first, &graph.mounting, bearing);
         let direction = bearing + first.z + graph.mounting.z;
-        let mut best = -self.options.filter.start_distance_m.ln();
+        let prior = -self.options.filter.start_distance_m.ln();
+        let unlikely = |closeness: f64| {
+            let sigmas = (closeness - prior) / self.options.filter.start_distance_log_sigma;
+            0.5 * sigmas * sigmas * graph.bearing_sigma / seen.len() as f64
+        };
+        let mut best = prior;
         for step in [0.4, 0.05] {
             let near = best;
             best = (-8..=8)
                 .map(|k| near + step * f64::from(k))
-                .filter_map(|closeness| Some((closeness, off(&at(closeness)?))))
+                .filter_map(|closeness| Some((closeness, off(&at(closeness)?) + unlikely(closeness))))
                 .min_by(|a, b| a.1.total_cmp(&b.1))
                 .map_or(near, |(closeness, _)| closeness);
         }

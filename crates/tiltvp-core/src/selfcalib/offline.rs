@@ -80,8 +80,19 @@ pub struct LogCalibration {
 /// Fall of the cost below which the descent has come to rest.
 const TOLERANCE: f64 = 1e-3;
 
-/// Root mean square of whitened residuals of a solution beside which no other is looked for.
-const GOOD_RMS: f64 = 2.0;
+/// Share of outliers of a solution beside which no other is looked for.
+const FEW: f64 = 0.03;
+
+/// Where an attempt takes its first guess of the mounting from.
+#[derive(Clone, Copy)]
+enum Guess {
+    /// The options.
+    Start,
+    /// The log without loops.
+    Open,
+    /// The default filter.
+    Filter,
+}
 
 /// The mounting from a whole log.
 ///
@@ -102,29 +113,29 @@ pub fn calibrate_log(
     let mut best: Option<(Graph, Descent)> = None;
     let start = options.filter.start.vector();
     let with_wheels = Free { wheels: true, ..asked };
-    for attempt in 0..4 {
-        let free = if attempt == 1 || attempt == 2 { with_wheels } else { asked };
-        let guess = match attempt {
-            2 => grown(options, &start, free, false, readings, times_s, &order).mounting,
-            3 => first_guess(options, readings, &order)?,
-            _ => start,
+    // Wheels that may give a little let loops close; a start far off may need a map without loops, or the filter's answer.
+    let attempts = [(with_wheels, Guess::Start), (asked, Guess::Start), (with_wheels, Guess::Open), (asked, Guess::Filter)];
+    for (i, (free, guess)) in attempts.into_iter().enumerate() {
+        if i == 1 && asked == with_wheels {
+            continue;
+        }
+        let guess = match guess {
+            Guess::Start => start,
+            Guess::Open => grown(options, &start, free, false, readings, times_s, &order).mounting,
+            Guess::Filter => first_guess(options, readings, &order)?,
         };
         let mut graph = grown(options, &guess, free, true, readings, times_s, &order);
         if free != asked {
             graph.descend(options.max_iterations, TOLERANCE, 1e-3);
             graph = graph.with_fixed_wheels(Wheels::new(options.filter.wheel_base_m));
         }
-        if std::env::var("DBG").is_ok() {
-            eprintln!("attempt {attempt} guess {guess:?} grown {:?} cost {}", graph.mounting, graph.cost());
-        }
         let first = graph.descend(options.max_iterations, TOLERANCE, 1e-3);
         graph.loss = Loss::Cut(LIMIT);
         let then = graph.descend(options.max_iterations, TOLERANCE, 1e-3);
         let descent = Descent { iterations: first.iterations + then.iterations, ..then };
-        if std::env::var("DBG").is_ok() {
-            eprintln!("   -> {descent:?} rms {} {:?}", graph.residual_rms(), graph.mounting);
-        }
-        let good = descent.converged && graph.residual_rms() < GOOD_RMS;
+        let residuals = graph.residuals();
+        let outliers = residuals.iter().filter(|r| r.abs() > LIMIT).count();
+        let good = descent.converged && (outliers as f64) < FEW * residuals.len() as f64;
         if descent.cost.is_finite() && best.as_ref().is_none_or(|(_, best)| descent.cost < best.cost) {
             best = Some((graph, descent));
         }

@@ -108,7 +108,7 @@ impl Recursive {
             let far = (0..LANDMARKS).any(|i| moved[i].abs() > 0.05 * self.covariance[(i, i)].sqrt().max(1e-6));
             self.mean = now;
             if !far || iteration + 1 == MAX_ITERATIONS {
-                self.covariance.gemm(-1.0, &whitened, &whitened.transpose(), 1.0);
+                subtract_square(&mut self.covariance, &whitened);
                 break;
             }
             for row in &mut rows {
@@ -135,22 +135,44 @@ fn entries(row: &Row) -> [(usize, f64); 8] {
     ]
 }
 
-/// `T L^-T`, column by column.
+/// Columns that are worked on at once.
+const BLOCK: usize = 24;
+
+/// `T L^-T`, block by block of columns: what the blocks before have in it is taken out first.
 fn whiten(mut t: DMatrix<f64>, lower: &DMatrix<f64>) -> DMatrix<f64> {
-    let rows = t.nrows();
-    for j in 0..t.ncols() {
-        let (done, rest) = t.as_mut_slice().split_at_mut(j * rows);
-        let column = &mut rest[..rows];
-        for (k, before) in done.chunks_exact(rows).enumerate() {
-            let factor = lower[(j, k)];
-            for (value, before) in column.iter_mut().zip(before) {
-                *value -= factor * before;
-            }
+    let (rows, columns) = t.shape();
+    for first in (0..columns).step_by(BLOCK) {
+        let width = BLOCK.min(columns - first);
+        let (done, mut rest) = t.columns_range_pair_mut(..first, first..first + width);
+        if first > 0 {
+            rest.gemm(-1.0, &done, &lower.view((first, 0), (width, first)).transpose(), 1.0);
         }
-        let scale = 1.0 / lower[(j, j)];
-        for value in column.iter_mut() {
-            *value *= scale;
+        let block = &mut t.as_mut_slice()[first * rows..(first + width) * rows];
+        for j in 0..width {
+            let (done, rest) = block.split_at_mut(j * rows);
+            let column = &mut rest[..rows];
+            for (k, before) in done.chunks_exact(rows).enumerate() {
+                let factor = lower[(first + j, first + k)];
+                for (value, before) in column.iter_mut().zip(before) {
+                    *value -= factor * before;
+                }
+            }
+            let scale = 1.0 / lower[(first + j, first + j)];
+            for value in column.iter_mut() {
+                *value *= scale;
+            }
         }
     }
     t
+}
+
+/// `P - W W^T` of a symmetric `P`: its lower half in blocks of columns, and the upper half from that.
+fn subtract_square(p: &mut DMatrix<f64>, w: &DMatrix<f64>) {
+    let n = p.nrows();
+    for first in (0..n).step_by(BLOCK) {
+        let (width, height) = (BLOCK.min(n - first), n - first);
+        let own = w.rows(first, width).transpose();
+        p.view_mut((first, first), (height, width)).gemm(-1.0, &w.rows(first, height), &own, 1.0);
+    }
+    p.fill_upper_triangle_with_lower_triangle();
 }

@@ -26,6 +26,10 @@ fn exact(vertex: [f64; 3], rays: [[f64; 3]; 3], place: &str) -> PyResult<core::C
     })
 }
 
+fn is_unit(vector: &Vector3<f64>) -> bool {
+    (vector.norm_squared() - 1.0).abs() < 1e-6
+}
+
 /// Every attitude that a corner seen at exact bearings may have.
 #[pyfunction]
 pub(crate) fn solve_corner(
@@ -59,9 +63,11 @@ pub(crate) fn solve_corners(
     };
     let vertex = rows(vertex, "vertex")?;
     let rays = [rows(x_ray, "x_ray")?, rows(y_ray, "y_ray")?, rows(z_ray, "z_ray")?];
-    let gamma = match gamma_rad.extract::<f64>() {
-        Ok(gamma) => vec![gamma; vertex.len()],
-        Err(_) => convert::vector(gamma_rad, "gamma_rad")?,
+    // An array of one would pass for a number, with a warning.
+    let many = gamma_rad.getattr("ndim").and_then(|ndim| ndim.extract::<usize>()).is_ok_and(|ndim| ndim > 0);
+    let gamma = match (!many).then(|| gamma_rad.extract::<f64>()) {
+        Some(Ok(gamma)) => vec![gamma; vertex.len()],
+        _ => convert::vector(gamma_rad, "gamma_rad")?,
     };
     let lengths = [rays[0].len(), rays[1].len(), rays[2].len(), gamma.len()];
     if lengths.iter().any(|length| *length != vertex.len()) {
@@ -101,7 +107,7 @@ pub(crate) fn fit_corner(
         if single || rows.len() < 2 {
             return Err(invalid(format!("{name}: expected an array (N, 3) of at least two bearings")));
         }
-        if let Some(row) = rows.iter().position(|row| !((Vector3::from(*row).norm_squared() - 1.0).abs() < 1e-6)) {
+        if let Some(row) = rows.iter().position(|row| !is_unit(&Vector3::from(*row))) {
             return Err(invalid(format!("{name}: row {row} is {:?}, expected a unit vector", rows[row])));
         }
         given.push(rows);
@@ -163,7 +169,7 @@ pub(crate) fn included_angle(
     vertical_covariance_rad2: &Bound<'_, PyAny>,
 ) -> PyResult<Option<(f64, f64)>> {
     let vertical = convert::vector3(vertical, "vertical")?;
-    if !((vertical.norm_squared() - 1.0).abs() < 1e-6) {
+    if !is_unit(&vertical) {
         return Err(invalid(format!("vertical: of length {}, expected a unit vector", vertical.norm())));
     }
     let covariance = convert::matrix3(vertical_covariance_rad2, "vertical_covariance_rad2")?;
@@ -174,7 +180,7 @@ pub(crate) fn included_angle(
 /// The attitudes that several features agree on, the likeliest first.
 #[pyfunction]
 #[pyo3(signature = (features, common_from_camera, gamma_rad, gamma_sigma_rad, alignment, right_handed, priors))]
-#[expect(clippy::too_many_arguments, reason = "named on the Python side")]
+#[expect(clippy::too_many_arguments, clippy::needless_pass_by_value, reason = "named in Python; lists are extracted")]
 pub(crate) fn resolve_corners(
     py: Python<'_>,
     features: Vec<Bound<'_, CornerFeature>>,
@@ -251,7 +257,7 @@ fn motion(value: &Bound<'_, PyAny>, name: &'static str) -> PyResult<RigidMotion>
 /// The point that bearings of two or more cameras meet in: (3,) metres, (3, 3) square metres, and chi-square; None where
 /// they are parallel or the point would be behind a camera.
 #[pyfunction]
-#[expect(clippy::type_complexity, reason = "a tuple of arrays")]
+#[expect(clippy::type_complexity, clippy::needless_pass_by_value, reason = "a tuple of arrays; lists are extracted")]
 pub(crate) fn triangulate<'py>(
     py: Python<'py>,
     bearings: &Bound<'py, PyAny>,
@@ -270,7 +276,7 @@ pub(crate) fn triangulate<'py>(
     let mut sightings = Vec::new();
     for ((row, covariance), camera) in rows.iter().zip(&covariances_rad2).zip(&rig_from_camera) {
         let bearing = Vector3::from(*row);
-        if !((bearing.norm_squared() - 1.0).abs() < 1e-6) {
+        if !is_unit(&bearing) {
             return Err(invalid(format!("bearings: {row:?}, expected unit vectors")));
         }
         let (entries, _) = convert::rows::<2>(covariance, "covariances_rad2")?;
