@@ -108,6 +108,10 @@ measure-line-peers *arguments: drives
         "opencv-contrib-python-headless==$({{bin}}/python -c 'from importlib.metadata import version; print(version("opencv-python-headless"))')"
     PYTHONPATH="$PWD/out/peers/opencv-contrib" {{bin}}/python benches/peers/line_segments.py out/drives/corridor out/drives/hall {{arguments}}
 
+# Corners of a real cabinet and a real box: attitude against motion capture, sizes, smoothness.
+measure-corners-real folder *arguments: setup
+    {{bin}}/tiltvp measure corners-real {{folder}} --overlay out/corners-real {{arguments}}
+
 # Poses of corners: the closed form on random poses, and rendered sequences of a hand-held stereo pair, with plots.
 measure-corners *arguments: setup
     {{bin}}/tiltvp measure corners --out out/corners {{arguments}}

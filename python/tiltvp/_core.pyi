@@ -2146,7 +2146,7 @@ class CornerDetector:
         mask: NDArray[np.bool_] | None = None,
         **options: Any,
     ) -> Self:
-        """Makes the tables. `options` tells the options in force; docs/corner.md says what they mean."""
+        """Makes the tables. `options` tells the options in force; docs/corner_images.md says what they mean."""
 
     @property
     def camera(self) -> Camera:

@@ -37,7 +37,7 @@ class CornerDetector(_core.CornerDetector):
     "coloured" finds the corner of a cuboid whose upper, left and right face are red, green and blue (`faces="rgb"`),
     "general" those of rooms, boxes and buildings, by line segments. Tables and scratch are made once; one detector
     may be called from many threads at once; frozen, comparable, and to be pickled. `options` lists all options,
-    docs/corners.md says what they mean.
+    docs/corner_images.md says what they mean.
     """
 
     __slots__ = ()

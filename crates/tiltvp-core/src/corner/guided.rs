@@ -13,8 +13,8 @@ use crate::image::{ImageView, LightTable};
 /// Pixels about the vertex where the edges' gradients mix.
 const CLEAR_OF_VERTEX_PX: f64 = 4.0;
 
-/// Pixels at the far end of a ray that are left out.
-const CLEAR_OF_END_PX: f64 = 2.0;
+/// How far beyond its end a ray is looked for, in pixels: what follows a ray must not shorten it from frame to frame.
+const BEYOND_END_PX: f64 = 1.0;
 
 /// Where a corner is expected: its vertex, and a bearing at the far end of each of the rays x, y, z.
 #[derive(Debug, Clone, Copy)]
@@ -85,7 +85,7 @@ pub(super) fn find_near(
                 normal,
                 vertex: (vertex - normal * normal.dot(&vertex)).try_normalize(0.5)?,
                 from_rad: CLEAR_OF_VERTEX_PX / px_per_rad,
-                to_rad: vertex.angle(far) - CLEAR_OF_END_PX / px_per_rad,
+                to_rad: vertex.angle(far) + BEYOND_END_PX / px_per_rad,
                 search_px,
                 step_min: options.step_min,
                 threshold_px: options.threshold_px,
