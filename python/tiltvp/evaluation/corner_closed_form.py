@@ -130,7 +130,8 @@ def noisy_poses(
 def summarise_noisy(table: pl.DataFrame) -> pl.DataFrame:
     """Errors against the bound, 1 at best: of all poses by their information, and of the firm ones as they are.
 
-    Firm are those with a bound below a tenth of a degree. Where two roots fall together the bound has no end, and errors, which have one, are far below it.
+    Firm are those with a bound below a tenth of a degree. Where two roots fall together the bound has no end, and
+    errors, which have one, are far below it.
     """
     firm = pl.col("bound_rad2") < np.deg2rad(_FIRM_DEG) ** 2
     squared, bound = pl.col("squared_rad2").filter(firm).mean(), pl.col("bound_rad2").filter(firm).mean()
