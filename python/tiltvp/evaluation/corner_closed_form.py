@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 __all__ = ["BATCH", "exact_poses", "noisy_poses", "summarise_exact", "summarise_noisy"]
 
 _GAMMA_RAD: Final = (np.deg2rad(17.0), np.deg2rad(160.0))
+_FIRM_DEG: Final = 0.1
 BATCH: Final = 20_000
 """Poses that are solved at a time."""
 
@@ -127,11 +128,12 @@ def noisy_poses(
 
 
 def summarise_noisy(table: pl.DataFrame) -> pl.DataFrame:
-    """Errors against the bound, 1 at best: of all poses by their information, and of those with a bound below a degree.
+    """Errors against the bound, 1 at best: of all poses by their information, and of the firm ones as they are.
 
-    Where two roots fall together the bound has no end, and errors, which have one, are far below it.
+    Firm are those with a bound below a tenth of a degree. Where two roots fall together the bound has no end, and
+    errors, which have one, are far below it.
     """
-    firm = pl.col("bound_rad2") < np.deg2rad(1.0) ** 2
+    firm = pl.col("bound_rad2") < np.deg2rad(_FIRM_DEG) ** 2
     squared, bound = pl.col("squared_rad2").filter(firm).mean(), pl.col("bound_rad2").filter(firm).mean()
     return table.select(
         poses=pl.col("poses").first(),

@@ -89,7 +89,7 @@ CORNER_SCENES: tuple[CornerScene, ...] = (
     CornerScene("living-room", kind="living-room", share=0.1),
     CornerScene("l-shaped", kind="l-shaped", share=0.1),
 )
-"""The paper's cuboid, also without a word on which side is seen, in full HD, blurred, of other angles; corners of rooms."""
+"""The paper's cuboid: with and without a word on its side, in full HD, blurred, of other angles; corners of rooms."""
 
 
 @dataclass(frozen=True)
