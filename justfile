@@ -92,6 +92,26 @@ measure-sampling *arguments: setup
 measure-lines *arguments: setup
     {{bin}}/tiltvp measure lines {{arguments}}
 
+# Two drives of 425 frames each, in whose frames every upright edge is known. Remove out/drives to begin anew.
+drives: setup
+    test -d out/drives/corridor || {{bin}}/tiltvp dataset drive --kind corridor --frames 425 --samples 2 --seed 7101 --out out/drives/corridor
+    test -d out/drives/hall || {{bin}}/tiltvp dataset drive --kind hall --frames 425 --samples 2 --seed 7102 --out out/drives/hall
+
+# The descriptor of vertical lines: figures 9 to 18 and 22 of paper 001, tables beside them, in out/descriptors.
+measure-descriptors *arguments: drives
+    {{bin}}/tiltvp measure descriptors out/drives/corridor out/drives/hall --out out/descriptors {{arguments}}
+
+# cv2 is that of opencv-contrib-python-headless, of the version that is installed without contrib, in a folder of its own.
+# Our vertical lines against OpenCV's LSD and LBD on the same frames: times as ratios, and how well pairs are matched.
+measure-line-peers *arguments: drives
+    test -d out/peers/opencv-contrib || {{bin}}/pip install --quiet --no-deps --target out/peers/opencv-contrib \
+        "opencv-contrib-python-headless==$({{bin}}/python -c 'from importlib.metadata import version; print(version("opencv-python-headless"))')"
+    PYTHONPATH="$PWD/out/peers/opencv-contrib" {{bin}}/python benches/peers/line_segments.py out/drives/corridor out/drives/hall {{arguments}}
+
+# Poses of corners: the closed form on random poses, and rendered sequences of a hand-held stereo pair, with plots.
+measure-corners *arguments: setup
+    {{bin}}/tiltvp measure corners --out out/corners {{arguments}}
+
 # Round trips and Jacobians of the calibrations of TILTVP_DATA, as a table.
 measure-cameras: setup
     {{bin}}/pytest --quiet --capture=no tests/real_data/test_camera_conformance.py
@@ -100,9 +120,21 @@ measure-cameras: setup
 measure-calibration *arguments: setup
     {{bin}}/tiltvp measure calibration "$TILTVP_DATA/odometry" {{arguments}}
 
+# Self-calibration from the pictures of rendered drives.
+measure-calibration-images *arguments: setup
+    {{bin}}/tiltvp measure calibration-images {{arguments}}
+
 # Each method's time as a ratio to OpenCV's pair of Scharr derivatives, in one process on one thread.
 measure-time *arguments: setup
     {{bin}}/python benches/peers/scharr.py {{arguments}}
+
+# Coloured cubes before a pair of cameras against marker cubes by OpenCV: errors and times, in one process on one thread.
+measure-markers *arguments: setup
+    {{bin}}/python benches/peers/corner.py {{arguments}}
+
+# A step of the self-calibration filters against a dense NumPy filter of the paper's equations, in one process.
+measure-calibration-time *arguments: setup
+    OPENBLAS_NUM_THREADS=1 {{bin}}/python benches/peers/calibration_filter.py {{arguments}}
 
 # The benches of the core.
 bench *arguments:

@@ -15,7 +15,7 @@ __all__ = ["Motion", "read_odometry"]
 
 _COLUMNS = ("file", "yaw_rad", "yaw_deg", "distance_m")
 _WHEELS = ("left_m", "right_m")
-"""Columns that may stand beside the motion that they add up to."""
+"""Columns that may stand, both, beside the motion that they add up to."""
 
 
 @dataclass(frozen=True)
@@ -25,16 +25,18 @@ class Motion:
     yaw_rad: float = 0.0
     """How far it turned, to the left positive."""
     distance_m: float = 0.0
-    """How far it drove, in either direction."""
+    """How far it drove, forwards positive."""
+    wheels_m: tuple[float, float] | None = None
+    """How far the left and the right wheel rolled; None where that is not recorded."""
 
 
 def read_odometry(path: str | os.PathLike[str], files: Sequence[Path]) -> list[Motion]:
     """The motion that led to each of `files`, in their order, from a CSV of increments.
 
     Columns: `yaw_rad` or `yaw_deg`, `distance_m`, at least one of the two kinds; and `file`, the images' names or
-    paths, in any order. Columns `left_m` and `right_m` of the wheels are not read. Without `file` there is one row for
-    each image, in their order. Raises `InvalidInputError` that names the file and the line for columns and images that
-    are not known, images without a row, and numbers that are none.
+    paths, in any order; and `left_m` and `right_m`, what the wheels rolled, beside them. Without `file` there is one
+    row for each image, in their order. Raises `InvalidInputError` that names the file and the line for columns and
+    images that are not known, images without a row, and numbers that are none.
     """
     name = os.fspath(path)
     try:
@@ -72,13 +74,15 @@ def _check_header(name: str, header: Sequence[str]) -> None:
             raise InvalidInputError(f"{where}: column {column!r} twice, expected once")
     if "yaw_rad" in header and "yaw_deg" in header:
         raise InvalidInputError(f"{where}: columns yaw_rad and yaw_deg, expected one of them")
+    if len(set(header) & set(_WHEELS)) == 1:
+        raise InvalidInputError(f"{where}: one of the columns left_m and right_m, expected both or none")
     if not set(header) & {"yaw_rad", "yaw_deg", "distance_m"}:
         raise InvalidInputError(f"{where}: no motion, expected a column yaw_rad, yaw_deg or distance_m")
 
 
 def _motion(where: str, row: dict[str, str]) -> Motion:
     numbers = {}
-    for column in ("yaw_rad", "yaw_deg", "distance_m"):
+    for column in ("yaw_rad", "yaw_deg", "distance_m", *_WHEELS):
         word = row.get(column, "0")
         try:
             numbers[column] = float(word)
@@ -86,7 +90,8 @@ def _motion(where: str, row: dict[str, str]) -> Motion:
             numbers[column] = math.nan
         if not math.isfinite(numbers[column]):
             raise InvalidInputError(f"{where}: {column} = {word!r}, expected a finite number")
-    return Motion(numbers["yaw_rad"] + math.radians(numbers["yaw_deg"]), numbers["distance_m"])
+    wheels = (numbers["left_m"], numbers["right_m"]) if "left_m" in row else None
+    return Motion(numbers["yaw_rad"] + math.radians(numbers["yaw_deg"]), numbers["distance_m"], wheels)
 
 
 def _by_file(name: str, motions: Sequence[tuple[int, dict[str, str], Motion]], files: Sequence[Path]) -> list[Motion]:

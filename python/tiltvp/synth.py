@@ -1,4 +1,4 @@
-"""Seeded rooms and drives with known truth: data for demos, tests and experiments."""
+"""Seeded rooms, drives and stereo sequences with known truth: data for demos, tests and experiments."""
 
 from __future__ import annotations
 
@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from tiltvp import _core
-from tiltvp._core import SimulatedDrive, simulate_drive
+from tiltvp._core import SimulatedDrive, drive_legs, simulate_drive
 from tiltvp.cameras import Camera
+from tiltvp.stereo_scenes import ImuLog, Laboratory, SceneCorner, StereoSequence, StereoTruth, zed_cameras
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
@@ -21,12 +22,19 @@ __all__ = [
     "WALL_PATTERNS",
     "Drive",
     "DriveTruth",
+    "ImuLog",
+    "Laboratory",
     "Room",
     "RoomImage",
+    "SceneCorner",
     "SimulatedDrive",
+    "StereoSequence",
+    "StereoTruth",
+    "drive_legs",
     "mirror_camera",
     "render_room",
     "simulate_drive",
+    "zed_cameras",
 ]
 
 ROOM_KINDS: tuple[str, ...] = tuple(_core.ROOM_KINDS)
@@ -156,7 +164,10 @@ class DriveTruth:
 
 
 class Drive(_core.Drive):
-    """A robot with a camera and wheel encoders that wanders through a room: `Drive(room, camera=camera)`.
+    """A robot with a camera and wheel encoders that drives through a room: `Drive(room, camera=camera)`.
+
+    It wanders for `frames` frames, or drives `legs` (L, 2): distance in metres and turn in radians of arcs, from a
+    place with room for all of them; `drive_legs("paper")` are those of the paper's calibration.
 
     The same arguments give the same drive and the same bytes of every frame, in any order and for any `threads`. The
     camera sits at `mount` (x_m, y_m, yaw_rad, height_m) on the robot, whose origin is on the floor between its wheels,

@@ -4,7 +4,7 @@ use nalgebra::Matrix3;
 use numpy::PyArray1;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use tiltvp_synth::{DriveOptions, Mount, Wheels, on_threads};
+use tiltvp_synth::{DriveOptions, Mount, Way, Wheels, on_threads};
 
 use crate::call::{call, invalid};
 use crate::camera::Camera;
@@ -26,7 +26,7 @@ pub(crate) struct Drive {
 impl Drive {
     #[new]
     #[pyo3(signature = (
-        room, *, camera, robot_from_camera=None, mount=None, blind_rad=None, frames=None, seed=None, step_m=None, turn_max_rad=None,
+        room, *, camera, robot_from_camera=None, mount=None, blind_rad=None, frames=None, legs=None, seed=None, step_m=None, turn_max_rad=None,
         wheel_base_m=None, encoder_k_m=None, wheel_radius_errors=None, bumps_max_rad=None, lighting=None, samples=None,
         noise_sigma=None, blur_sigma_px=None, threads=None
     ))]
@@ -38,6 +38,7 @@ impl Drive {
         mount: Option<&Bound<'_, PyAny>>,
         blind_rad: Option<f64>,
         frames: Option<&Bound<'_, PyAny>>,
+        legs: Option<&Bound<'_, PyAny>>,
         seed: Option<&Bound<'_, PyAny>>,
         step_m: Option<f64>,
         turn_max_rad: Option<f64>,
@@ -53,7 +54,7 @@ impl Drive {
     ) -> PyResult<Self> {
         let own = DriveOptions::default();
         let options = DriveOptions {
-            frames: frames.map_or(Ok(own.frames), |n| convert::whole(n, "frames", "a whole number from 1"))?,
+            way: way_from(frames, legs, own.way)?,
             seed: seed.map_or(Ok(own.seed), seed_from)?,
             step_m: step_m.unwrap_or(own.step_m),
             turn_max_rad: turn_max_rad.unwrap_or(own.turn_max_rad),
@@ -93,7 +94,7 @@ impl Drive {
     /// How many frames it has.
     #[getter]
     fn frames(&self) -> usize {
-        self.inner.options().frames
+        self.inner.trajectory().poses.len()
     }
 
     /// The seed of everything but the room.
@@ -234,13 +235,13 @@ impl Drive {
     }
 
     fn __len__(&self) -> usize {
-        self.inner.options().frames
+        self.inner.trajectory().poses.len()
     }
 
     fn __repr__(&self, py: Python<'_>) -> PyResult<String> {
         let options = self.inner.options();
         let room = self.room.bind(py).repr()?;
-        Ok(format!("Drive({room}, frames={}, seed={})", options.frames, options.seed))
+        Ok(format!("Drive({room}, frames={}, seed={})", self.frames(), options.seed))
     }
 
     fn __eq__(&self, py: Python<'_>, other: &Bound<'_, PyAny>) -> PyResult<bool> {
@@ -251,7 +252,7 @@ impl Drive {
     }
 
     fn __hash__(&self) -> u64 {
-        self.inner.options().seed.wrapping_mul(31).wrapping_add(self.inner.options().frames as u64)
+        self.inner.options().seed.wrapping_mul(31).wrapping_add(self.frames() as u64)
     }
 
     fn __getnewargs_ex__<'py>(&self, py: Python<'py>) -> PyResult<((Py<Room>,), Bound<'py, PyDict>)> {
@@ -261,7 +262,10 @@ impl Drive {
         keywords.set_item("robot_from_camera", matrix(py, &options.robot_from_camera)?)?;
         keywords.set_item("mount", self.mount())?;
         keywords.set_item("blind_rad", options.blind_rad)?;
-        keywords.set_item("frames", options.frames)?;
+        match &options.way {
+            Way::Wander { frames } => keywords.set_item("frames", frames)?,
+            Way::Legs(legs) => keywords.set_item("legs", legs.clone())?,
+        }
         keywords.set_item("seed", options.seed)?;
         keywords.set_item("step_m", options.step_m)?;
         keywords.set_item("turn_max_rad", options.turn_max_rad)?;
@@ -279,12 +283,26 @@ impl Drive {
 
 impl Drive {
     fn frame(&self, frame: &Bound<'_, PyAny>) -> PyResult<usize> {
-        convert::whole(frame, "frame", &format!("a whole number below {}", self.inner.options().frames))
+        convert::whole(frame, "frame", &format!("a whole number below {}", self.inner.trajectory().poses.len()))
     }
 }
 
 fn matrix<'py>(py: Python<'py>, matrix: &Matrix3<f64>) -> PyResult<Bound<'py, PyAny>> {
     convert::to_matrices(py, matrix.transpose().as_slice(), [3, 3], true)
+}
+
+fn way_from(frames: Option<&Bound<'_, PyAny>>, legs: Option<&Bound<'_, PyAny>>, own: Way) -> PyResult<Way> {
+    match (frames, legs) {
+        (Some(_), Some(_)) => {
+            Err(invalid("frames and legs, expected one of them: legs have as many frames as they need".into()))
+        }
+        (Some(frames), None) => Ok(Way::Wander { frames: convert::whole(frames, "frames", "a whole number from 1")? }),
+        (None, Some(legs)) => {
+            let (rows, _) = convert::rows::<2>(legs, "legs")?;
+            Ok(Way::Legs(rows.iter().map(|[distance_m, turn_rad]| (*distance_m, *turn_rad)).collect()))
+        }
+        (None, None) => Ok(own),
+    }
 }
 
 fn mount_from(mount: &Bound<'_, PyAny>) -> PyResult<Mount> {

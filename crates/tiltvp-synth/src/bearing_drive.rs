@@ -2,7 +2,7 @@
 
 use nalgebra::{Vector2, Vector3};
 use tiltvp_core::geometry::wrap_angle;
-use tiltvp_core::selfcalib::{Leg, Mounting, WheelMotion, Wheels};
+use tiltvp_core::selfcalib::{Leg, MotionNoise, Mounting, WheelMotion, Wheels};
 
 use crate::dice::Dice;
 
@@ -30,21 +30,23 @@ impl BearingDriveKind {
         }
     }
 
+    /// Distance in metres and turn in radians of each leg.
+    pub fn legs(self) -> Vec<(f64, f64)> {
+        let (straight, turn) = (|metres| (metres, 0.0), |degrees: f64| (0.0, degrees.to_radians()));
+        match self {
+            Self::Paper => vec![straight(2.3), turn(180.0)],
+            Self::Alternating => [straight(1.0), turn(90.0)].repeat(4),
+            Self::Straight => vec![straight(4.0)],
+        }
+    }
+
     /// Distance and turn of each step.
     fn steps(self) -> Vec<(f64, f64)> {
-        let straight = |metres: f64| {
-            let count = (metres / 0.038).round();
-            vec![(metres / count, 0.0); count as usize]
+        let steps = |(distance, turn): (f64, f64)| {
+            let count = (distance / 0.038).max(turn / 3f64.to_radians()).round();
+            vec![(distance / count, turn / count); count as usize]
         };
-        let turn = |degrees: f64| {
-            let count = (degrees / 3.0).round();
-            vec![(0.0, (degrees / count).to_radians()); count as usize]
-        };
-        match self {
-            Self::Paper => [straight(2.3), turn(180.0)].concat(),
-            Self::Alternating => [straight(1.0), turn(90.0)].concat().repeat(4),
-            Self::Straight => straight(4.0),
-        }
+        self.legs().into_iter().flat_map(steps).collect()
     }
 }
 
@@ -109,7 +111,7 @@ impl BearingDrive {
             let reading = WheelMotion::from_motion(distance, turn, options.wheel_base_m);
             let mut noisy = |metres: f64| metres + (options.odometry_k_m * metres.abs()).sqrt() * dice.normal();
             let driven = WheelMotion { left_m: noisy(reading.left_m), right_m: noisy(reading.right_m) };
-            let step = Leg::from_wheels(&driven, &wheels, 0.0).motion;
+            let step = Leg::from_wheels(&driven, &wheels, &MotionNoise::new(0.0)).motion;
             let (sin, cos) = f64::sin_cos(pose.z);
             pose += Vector3::new(cos * step.x - sin * step.y, sin * step.x + cos * step.y, step.z);
             readings.push(reading);

@@ -37,11 +37,24 @@ impl Default for Mount {
     }
 }
 
+/// Where a robot goes.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Way {
+    /// From one far place to another, for so many frames within `[1, 100000]`.
+    Wander {
+        /// How many frames.
+        frames: usize,
+    },
+    /// Along arcs, one after the other, from a place and in a direction in which there is room for them: distance in metres and
+    /// turn in radians of each.
+    Legs(Vec<(f64, f64)>),
+}
+
 /// How a drive goes and what its camera is like: equal options give equal drives.
 #[derive(Debug, Clone, PartialEq)]
 pub struct DriveOptions {
-    /// How many frames, within `[1, 100000]`; 1500 by default.
-    pub frames: usize,
+    /// Where the robot goes; it wanders for 1500 frames by default.
+    pub way: Way,
     /// Seed of way, encoders, bumps, light and noise; 0 by default.
     pub seed: u64,
     /// Greatest way from frame to frame, metres; 0.05 by default.
@@ -72,7 +85,7 @@ pub struct DriveOptions {
 impl Default for DriveOptions {
     fn default() -> Self {
         Self {
-            frames: 1500,
+            way: Way::Wander { frames: 1500 },
             seed: 0,
             step_m: 0.05,
             turn_max_rad: 0.08,
@@ -95,9 +108,7 @@ impl DriveOptions {
     /// # Errors
     /// [`Error::InvalidOption`] or [`Error::InvalidArgument`] for the first field outside its domain.
     pub fn validate(&self) -> Result<()> {
-        if !(1..=100_000).contains(&self.frames) {
-            return Err(Error::option("drive.frames", self.frames, "a number in [1, 100000]"));
-        }
+        self.validate_way()?;
         let Mount { x_m, y_m, yaw_rad, height_m } = self.mount;
         let ranges = [
             ("drive.step_m", self.step_m, 1e-4, 0.2, "metres in [1e-4, 0.2]"),
@@ -122,6 +133,26 @@ impl DriveOptions {
         }
         self.wheels.validate()?;
         self.exposed(0.45, 0).validate()
+    }
+
+    fn validate_way(&self) -> Result<()> {
+        match &self.way {
+            Way::Wander { frames } if !(1..=100_000).contains(frames) => {
+                Err(Error::option("drive.frames", frames, "a number in [1, 100000]"))
+            }
+            Way::Legs(legs) => {
+                let known = |(distance, turn): &(f64, f64)| (-100.0..=100.0).contains(distance) && turn.abs() <= 100.0;
+                let moves = legs.iter().any(|(distance, turn)| *distance != 0.0 || *turn != 0.0);
+                match legs.iter().find(|leg| !known(leg)) {
+                    Some(leg) => Err(Error::option("drive.legs", format!("{leg:?}"), "numbers in [-100, 100]")),
+                    None if !moves => {
+                        Err(Error::option("drive.legs", format!("{legs:?}"), "a leg that moves the robot"))
+                    }
+                    None => Ok(()),
+                }
+            }
+            Way::Wander { .. } => Ok(()),
+        }
     }
 
     /// Rotation from camera to robot coordinates, with the mount's yaw.

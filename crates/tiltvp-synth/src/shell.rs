@@ -52,6 +52,30 @@ pub(crate) fn build(plan: &Plan, builder: &mut Builder, dice: &mut Dice) {
     }
 }
 
+/// Builds a shell without colours: grey floor, white walls, grey doors, tiled ceiling.
+pub(crate) fn build_plain(plan: &Plan, builder: &mut Builder) {
+    lay(Texture::Paint { color: rgb(128, 128, 126), mottle: 0.12, seed: 1 }, plan, builder);
+    ceiling(plan, builder, &mut Dice::new(0, 0));
+    let wall = builder.matt(Texture::Paint { color: rgb(216, 216, 212), mottle: 0.05, seed: 2 });
+    let trims = Trims {
+        trim: builder.paint(150, 150, 154),
+        door: builder.paint(176, 178, 180),
+        metal: builder.paint(70, 72, 76),
+        radiator: builder.paint(228, 226, 220),
+        glass: builder.material(Material::Glass),
+        curtain: None,
+        bars: [1, 1],
+    };
+    for own in &plan.walls {
+        panels(own, plan.height, wall, builder);
+        builder.edge(own.frame.origin, plan.height);
+        skirting(own, trims.trim, builder);
+        for opening in &own.openings {
+            door(&own.frame, opening, wall, &trims, builder);
+        }
+    }
+}
+
 /// The texture that all walls share, if they do.
 fn repeated_texture(pattern: WallPattern) -> Option<Texture> {
     let (light, dark) = (rgb(222, 214, 196), rgb(150, 132, 104));
@@ -153,6 +177,11 @@ fn floor(plan: &Plan, builder: &mut Builder, dice: &mut Dice) {
             tiles(rgb(206, 196, 178), rgb(140, 132, 120), 0.45),
         ]),
     };
+    lay(texture, plan, builder);
+}
+
+/// Lays a floor of one texture.
+fn lay(texture: Texture, plan: &Plan, builder: &mut Builder) {
     let material = builder.material(if plan.floor_gloss > 0.0 {
         Material::Polished(texture, plan.floor_gloss)
     } else {

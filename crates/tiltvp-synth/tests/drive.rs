@@ -2,14 +2,15 @@
 
 #![allow(clippy::unwrap_used, clippy::panic)]
 
+use std::f64::consts::PI;
 use std::sync::Arc;
 
 use nalgebra::{Matrix3, Vector3};
 use tiltvp_core::Error;
 use tiltvp_core::camera::{Camera, Equidistant, Model};
-use tiltvp_core::geometry::Tilt;
+use tiltvp_core::geometry::{Tilt, wrap_angle};
 use tiltvp_synth::{
-    Drive, DriveOptions, Mount, RobotPose, RoomKind, RoomOptions, WallPattern, Wheels, World, on_threads,
+    Drive, DriveOptions, Mount, RobotPose, RoomKind, RoomOptions, WallPattern, Way, Wheels, World, on_threads,
 };
 
 fn world(kind: RoomKind, seed: u64) -> Arc<World> {
@@ -28,8 +29,28 @@ fn drive(world: &Arc<World>, options: DriveOptions) -> Drive {
 }
 
 #[test]
+fn legs_are_driven_where_there_is_room() {
+    let world = world(RoomKind::Office, 5);
+    let legs = vec![(1.0, 0.0), (0.0, PI), (0.5, -0.5)];
+    let options = DriveOptions { way: Way::Legs(legs), seed: 2, ..DriveOptions::default() };
+    let drive = drive(&world, options.clone());
+    let poses = &drive.trajectory().poses;
+    assert_eq!(poses.len(), 1 + 20 + 40 + 10);
+    let (first, turned, last) = (poses[0], poses[60], poses[70]);
+    assert!(((first.x_m - turned.x_m).hypot(first.y_m - turned.y_m) - 1.0).abs() < 1e-9);
+    assert!((wrap_angle(last.yaw_rad - first.yaw_rad) - wrap_angle(PI - 0.5)).abs() < 1e-9);
+    assert!(poses.iter().all(|pose| world.is_free(pose.x_m, pose.y_m)));
+    let refused = |legs| {
+        Drive::new(Arc::clone(&world), fisheye(96, 28.0), DriveOptions { way: Way::Legs(legs), ..options.clone() })
+    };
+    assert!(matches!(refused(vec![(90.0, 0.0)]), Err(Error::InvalidArgument { .. })));
+    assert!(matches!(refused(vec![]), Err(Error::InvalidOption { .. })));
+    assert!(matches!(refused(vec![(f64::NAN, 0.0)]), Err(Error::InvalidOption { .. })));
+}
+
+#[test]
 fn wheels_add_up_to_the_poses_exactly() {
-    let options = DriveOptions { frames: 400, seed: 5, ..DriveOptions::default() };
+    let options = DriveOptions { way: Way::Wander { frames: 400 }, seed: 5, ..DriveOptions::default() };
     let drive = drive(&world(RoomKind::Office, 1), options.clone());
     let way = drive.trajectory();
     assert_eq!([way.poses.len(), way.tilts.len(), way.displacements_m.len(), way.odometry_m.len()], [400; 4]);
@@ -65,7 +86,7 @@ fn a_quarter_turn_ends_where_it_should() {
 #[test]
 fn encoders_err_by_the_model_of_chong_and_kleeman() {
     let wheels = Wheels { encoder_k_m: 3e-5, radius_errors: [0.02, -0.01], ..Wheels::default() };
-    let options = DriveOptions { frames: 10_001, wheels, ..DriveOptions::default() };
+    let options = DriveOptions { way: Way::Wander { frames: 10_001 }, wheels, ..DriveOptions::default() };
     let drive = drive(&world(RoomKind::Corridor, 1), options);
     let way = drive.trajectory();
     let (mut sum, mut count) = (0.0, 0.0);
@@ -89,7 +110,10 @@ fn ways_are_free_smooth_and_lead_far() {
         let room = RoomOptions { light_spacing_m: 1.0, extent, ..RoomOptions::new(kind, 3) };
         let world = Arc::new(World::new(&room).unwrap());
         let mount = Mount { x_m: 0.1, y_m: -0.05, yaw_rad: 0.3, height_m: 0.5 };
-        let drive = drive(&world, DriveOptions { frames: 1500, mount, lighting: 0.0, ..DriveOptions::default() });
+        let drive = drive(
+            &world,
+            DriveOptions { way: Way::Wander { frames: 1500 }, mount, lighting: 0.0, ..DriveOptions::default() },
+        );
         let way = drive.trajectory();
         let (mut low, mut high) = (way.poses[0], way.poses[0]);
         for (k, pose) in way.poses.iter().enumerate() {
@@ -108,7 +132,12 @@ fn bumps_are_as_large_as_asked_and_smooth() {
     let most = 5f64.to_radians();
     let drive = drive(
         &world(RoomKind::Narrow, 0),
-        DriveOptions { frames: 2000, bumps_max_rad: most, lighting: 0.0, ..DriveOptions::default() },
+        DriveOptions {
+            way: Way::Wander { frames: 2000 },
+            bumps_max_rad: most,
+            lighting: 0.0,
+            ..DriveOptions::default()
+        },
     );
     let tilts = &drive.trajectory().tilts;
     let leans: Vec<f64> = tilts.iter().map(Tilt::alpha_rad).collect();
@@ -124,7 +153,8 @@ fn same_seed_same_bytes_for_any_number_of_threads_and_order() {
             let room =
                 RoomOptions { light_spacing_m: 0.6, floor_gloss: 0.5, ..RoomOptions::new(RoomKind::Corridor, 3) };
             let world = Arc::new(World::new(&room).unwrap());
-            let options = DriveOptions { frames: 12, bumps_max_rad: 0.05, ..DriveOptions::default() };
+            let options =
+                DriveOptions { way: Way::Wander { frames: 12 }, bumps_max_rad: 0.05, ..DriveOptions::default() };
             let drive = drive(&world, options);
             let mut frames: Vec<_> = order.iter().map(|k| (*k, drive.render(*k).unwrap())).collect();
             frames.sort_by_key(|frame| frame.0);
@@ -140,7 +170,7 @@ fn same_seed_same_bytes_for_any_number_of_threads_and_order() {
 #[test]
 fn every_drive_option_changes_something() {
     let world = world(RoomKind::Office, 2);
-    let base = DriveOptions { frames: 40, ..DriveOptions::default() };
+    let base = DriveOptions { way: Way::Wander { frames: 40 }, ..DriveOptions::default() };
     let of = |options: &DriveOptions| {
         let drive = drive(&world, options.clone());
         (drive.trajectory().clone(), drive.render(29).unwrap())
@@ -150,7 +180,7 @@ fn every_drive_option_changes_something() {
     let quarter = Matrix3::new(0.0, -1.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0);
     let wheels = Wheels::default();
     for options in [
-        DriveOptions { frames: 41, ..base.clone() },
+        DriveOptions { way: Way::Wander { frames: 41 }, ..base.clone() },
         DriveOptions { seed: 1, ..base.clone() },
         DriveOptions { step_m: 0.03, ..base.clone() },
         DriveOptions { turn_max_rad: 0.04, ..base.clone() },
@@ -184,7 +214,13 @@ fn the_truth_lies_on_the_edges_of_leaning_pictures() {
     let world = Arc::new(World::new(&room).unwrap());
     let camera = fisheye(480, 140.0);
     let mount = Mount { x_m: 0.1, y_m: 0.05, yaw_rad: 0.4, height_m: 0.4 };
-    let options = DriveOptions { frames: 12, mount, bumps_max_rad: 0.09, noise_sigma: 0.0, ..DriveOptions::default() };
+    let options = DriveOptions {
+        way: Way::Wander { frames: 12 },
+        mount,
+        bumps_max_rad: 0.09,
+        noise_sigma: 0.0,
+        ..DriveOptions::default()
+    };
     let drive = Drive::new(Arc::clone(&world), camera.clone(), options.clone()).unwrap();
     let (mut on, mut beside, mut count) = (0.0, 0.0, 0);
     for frame in [1, 3, 5, 7, 9, 11] {
@@ -230,7 +266,8 @@ fn the_truth_lies_on_the_edges_of_leaning_pictures() {
 
 #[test]
 fn identities_last() {
-    let drive = drive(&world(RoomKind::Office, 5), DriveOptions { frames: 60, ..DriveOptions::default() });
+    let drive =
+        drive(&world(RoomKind::Office, 5), DriveOptions { way: Way::Wander { frames: 60 }, ..DriveOptions::default() });
     for frame in [0, 30, 59] {
         let pose = drive.trajectory().poses[frame];
         let center = drive.center(frame).unwrap();
@@ -251,7 +288,7 @@ fn wrong_options_are_refused_by_name() {
         other => panic!("{expected}: {other:?}"),
     };
     let base = DriveOptions::default();
-    refused(DriveOptions { frames: 0, ..base.clone() }, "drive.frames");
+    refused(DriveOptions { way: Way::Wander { frames: 0 }, ..base.clone() }, "drive.frames");
     refused(DriveOptions { step_m: f64::NAN, ..base.clone() }, "drive.step_m");
     refused(DriveOptions { turn_max_rad: 0.0, ..base.clone() }, "drive.turn_max_rad");
     refused(DriveOptions { mount: Mount { x_m: 2.0, ..base.mount }, ..base.clone() }, "drive.mount.x_m");
@@ -267,6 +304,7 @@ fn wrong_options_are_refused_by_name() {
     let wheels = Wheels { radius_errors: [0.0, f64::NAN], ..Wheels::default() };
     refused(DriveOptions { wheels, ..base.clone() }, "drive.wheels.radius_errors");
     assert!(DriveOptions { robot_from_camera: Matrix3::zeros(), ..base.clone() }.validate().is_err());
-    let drive = drive(&world(RoomKind::Narrow, 0), DriveOptions { frames: 3, lighting: 0.0, ..base });
+    let drive =
+        drive(&world(RoomKind::Narrow, 0), DriveOptions { way: Way::Wander { frames: 3 }, lighting: 0.0, ..base });
     assert!(drive.render(3).is_err() && drive.sightings(3).is_err() && drive.center(3).is_err());
 }

@@ -5,11 +5,15 @@ from __future__ import annotations
 import json
 import os
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
+from cyclopts import Parameter, validators
 
-from tiltvp.cli.options import Switch
+from tiltvp.cli.calibrate_inputs import log_of_images, log_of_tables
+from tiltvp.cli.line_options import DrivingLineOptions
+from tiltvp.cli.options import CameraOptions, Switch
+from tiltvp.cli.results import check_ending, write_frame
 from tiltvp.cli.terminal import new_table, say, show
 from tiltvp.errors import InvalidInputError
 
@@ -17,14 +21,21 @@ if TYPE_CHECKING:
     from tiltvp import LogCalibration, MountingEstimate
 
 NOT_DETERMINED = 1
+_LINES = DrivingLineOptions()
 
 
 def calibrate(
-    odometry: Path,
-    bearings: Path,
+    odometry_log: Path | None = None,
+    bearings_log: Path | None = None,
     /,
     *,
     wheel_base: float,
+    images: str | None = None,
+    odometry: Path | None = None,
+    camera: CameraOptions | None = None,
+    options: DrivingLineOptions = _LINES,
+    track_frames_min: Annotated[int, Parameter(validator=validators.Number(gte=2))] = 3,
+    tracks: Path | None = None,
     start: tuple[float, float, float] = (0.0, 0.0, 0.0),
     start_sigma: tuple[float, float, float] | None = None,
     bearing_sigma_deg: float | None = None,
@@ -39,25 +50,36 @@ def calibrate(
     out: Path | None = None,
     plot: Path | None = None,
 ) -> int:
-    """Where a camera (or any sensor of bearings) sits on a robot, from the log of a drive past landmarks.
+    """Where a camera (or any sensor of bearings) sits on a robot, from a drive past landmarks.
 
-    Prints what the filter found step by step, and what the whole log says at once; exit code 1 if the drive has not
-    determined everything.
+    From two tables, ODOMETRY.csv BEARINGS.csv; or from pictures, --images FOLDER --camera FILE --odometry CSV: the lean
+    of each, its vertical lines, and which line is which from image to image. Prints what the filter found step by step,
+    and what the whole log says at once; exit code 1 if the drive has not determined everything or
+    images could not be read.
 
     Parameters
     ----------
-    odometry
+    odometry_log
         CSV with the columns step, delta_left_m, delta_right_m, and time_s if known.
-    bearings
+    bearings_log
         CSV with the columns step, landmark, bearing_rad.
     wheel_base
         Distance between the wheels, metres.
+    images
+        Folder of images in the order of their names, glob pattern, or video.
+    odometry
+        CSV of the motion that led to each image: yaw_rad or yaw_deg, and distance_m; file, or one row for each image;
+        left_m and right_m, what the wheels rolled, where that is recorded.
+    track_frames_min
+        A line counts if it is seen in so many images.
+    tracks
+        Also write the lines of all images, as `tiltvp track` does: .csv, .json or .parquet.
     start
         x and y in metres and yaw in radians of the mounting as it is thought to be.
     start_sigma
         Their standard deviations.
     bearing_sigma_deg
-        Standard deviation of a bearing.
+        Standard deviation of a bearing; for images by default the median of what the lines' own are.
     odometry_k
         Variance of a wheel's displacement for each metre of it, metres.
     start_distance
@@ -81,20 +103,37 @@ def calibrate(
     """
     from tiltvp import SelfCalibrator
     from tiltvp import calibrate as calibrate_log
-    from tiltvp.drive_logs import read_drive_log
     from tiltvp.selfcalib import convergence_table, ros_static_transform, urdf_origin
 
     for name, path, suffix in (("--out", out, ".json"), ("--plot", plot, ".png")):
         if path is not None and path.suffix.lower() != suffix:
             raise InvalidInputError(f"{name} {path}: ends in {path.suffix!r}, expected {suffix}")
-    log = read_drive_log(odometry, bearings)
-    if estimate_time_offset and log.times_s is None:
-        raise InvalidInputError(f"{odometry}: no column time_s, expected one with --estimate-time-offset")
+    bad, bearing_sigma_rad = 0, None if bearing_sigma_deg is None else float(np.radians(bearing_sigma_deg))
+    if images is None:
+        for name, value in (("--odometry", odometry), ("--camera", camera), ("--tracks", tracks)):
+            if value is not None:
+                raise InvalidInputError(f"{name} without --images, which it is for")
+        log = log_of_tables(odometry_log, bearings_log, with_times=estimate_time_offset)
+    else:
+        if odometry_log is not None:
+            raise InvalidInputError(f"{odometry_log}: a log beside --images, expected one of them")
+        if estimate_time_offset:
+            raise InvalidInputError("--estimate-time-offset with --images, whose times are not known")
+        if tracks is not None:
+            check_ending(tracks)
+        log, table, bad = log_of_images(
+            images, camera, options, odometry, wheel_base_m=wheel_base, track_frames_min=track_frames_min
+        )
+        if tracks is not None:
+            write_frame(table, tracks)
+        if bearing_sigma_rad is None:
+            bearing_sigma_rad = float(np.median(table["sigma_rad"].to_numpy()))
+        say(f"{images}: {len(log.bearings)} bearings of {len(set(log.bearings[:, 1].tolist()))} lines")
     common: dict[str, Any] = {
         "wheel_base_m": wheel_base,
         "start": start,
         "start_sigma": start_sigma,
-        "bearing_sigma_rad": None if bearing_sigma_deg is None else float(np.radians(bearing_sigma_deg)),
+        "bearing_sigma_rad": bearing_sigma_rad,
         "odometry_k_m": odometry_k,
         "start_distance_m": start_distance,
     }
@@ -127,7 +166,7 @@ def calibrate(
         partial = out.with_name(f".{out.name}.partial")
         partial.write_text(json.dumps(_jsonable(found), indent=1, allow_nan=False) + "\n", encoding="utf-8")
         os.replace(partial, out)
-    return 0 if whole else NOT_DETERMINED
+    return 0 if whole and not bad else NOT_DETERMINED
 
 
 def _plain(value: object) -> object:

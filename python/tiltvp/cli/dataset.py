@@ -5,9 +5,11 @@ from __future__ import annotations
 import csv
 import math
 import os
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
+import numpy as np
 from cyclopts import App, Parameter
 
 from tiltvp.cli.options import Switch
@@ -15,7 +17,6 @@ from tiltvp.cli.terminal import new_table, progress_bar, say, show
 from tiltvp.errors import InvalidInputError
 
 if TYPE_CHECKING:
-    import numpy as np
     from numpy.typing import NDArray
 
     from tiltvp import Camera
@@ -222,6 +223,7 @@ def drive(
     out: Path,
     kind: str = "corridor",
     frames: int | None = None,
+    legs: Words = None,
     camera: str = "mirror",
     camera_name: str | None = None,
     resolution_scale: float = 1.0,
@@ -248,7 +250,9 @@ def drive(
     kind
         Where to drive: corridor, hall, office, living-room, l-shaped, narrow or under-table.
     frames
-        How many frames; default 1500.
+        How many frames of wandering; default 1500.
+    legs
+        Instead of wandering, the legs of a way, METRES,DEGREES each (2.3,0 0,180); or paper, alternating or straight.
     camera
         mirror (a camera below a hyperbolic mirror), fisheye (like the tilt paper's), or a calibration file.
     camera_name
@@ -304,6 +308,7 @@ def drive(
         mount=None if mount is None else (mount[0], mount[1], math.radians(mount[2]), mount[3]),
         blind_rad=MIRROR_BLIND_RAD if camera == "mirror" else None,
         frames=frames,
+        legs=None if legs is None else _legs(legs),
         seed=seed,
         encoder_k_m=encoder_k_m,
         bumps_max_rad=math.radians(bumps_deg),
@@ -316,6 +321,94 @@ def drive(
         source = _made_by("drive") | {"camera": Path(camera).name}
         write_drive(made, out, threads=count, source=source, force=force, advance=bar.advance)
     say(f"{out}: {len(made)} frames of a drive of {made.motions[:, 0].sum():.1f} m")
+
+
+@app.command
+def stereo(
+    *,
+    out: Path,
+    kind: str = "laboratory",
+    frames: int | None = None,
+    width: int = 1280,
+    distance: tuple[float, float] | None = None,
+    gamma_deg: float = 90.0,
+    corner: int | None = None,
+    clutter: float | None = None,
+    exposure_ms: float = 0.0,
+    blur_sigma: float | None = None,
+    noise_sigma: float | None = None,
+    samples: int | None = None,
+    seed: int = 0,
+    threads: int | None = None,
+    force: Switch = False,
+) -> None:
+    """Make a sequence of a hand-held stereo pair that looks at a corner: images, calibration, poses, inertial data.
+
+    Parameters
+    ----------
+    out
+        Folder to make. It appears when it is whole.
+    kind
+        What is looked at: laboratory (a coloured cuboid), or a room: office, living-room, corridor, l-shaped, narrow or
+        under-table.
+    frames
+        How many frames, 30 a second; default 1000.
+    width
+        Width of the images: 1280 (x 720) or 1920 (x 1080).
+    distance
+        Least and greatest distance from the corner in metres; default 1 3.
+    gamma_deg
+        Angle between the level edges of the cuboid.
+    corner
+        Number of the corner that is looked at; default is the cuboid's, or one of a room that can be approached.
+    clutter
+        How much furniture there is, from 0 to 1.
+    exposure_ms
+        How long the shutter is open, for motion blur.
+    blur_sigma
+        What lens and sensor do to a point, in pixels; default 0.6.
+    noise_sigma
+        Gaussian noise in grey levels; default 2.
+    samples
+        Rays per pixel and side where surfaces meet; default 3.
+    seed
+        Seed of scene, motion and noise.
+    threads
+        How many threads; default is one per core.
+    force
+        Replace a dataset that is there.
+    """
+    from tiltvp.datasets.stereo import write_stereo
+    from tiltvp.synth import Laboratory, Room, StereoSequence, zed_cameras
+
+    if seed < 0:
+        raise InvalidInputError(f"seed = {seed}, expected 0 or more")
+    count = _threads(threads)
+    left, right = zed_cameras(width)
+    if kind != "laboratory" and gamma_deg != 90.0:
+        raise InvalidInputError(f"--gamma-deg {gamma_deg}, expected it with --kind laboratory alone")
+    scene = (
+        Laboratory(seed, gamma_rad=math.radians(gamma_deg), clutter=clutter, threads=count)
+        if kind == "laboratory"
+        else Room(kind, seed, clutter=clutter, threads=count)
+    )
+    sequence = StereoSequence(
+        scene,
+        left=left,
+        right=right,
+        frames=frames,
+        seed=seed,
+        corner=corner,
+        distance_m=distance,
+        samples=samples,
+        noise_sigma=noise_sigma,
+        blur_sigma_px=blur_sigma,
+        exposure_s=exposure_ms / 1000.0,
+        threads=count,
+    )
+    with progress_bar(len(sequence), "frames") as bar:
+        write_stereo(sequence, out, threads=count, source=_made_by("stereo"), force=force, advance=bar.advance)
+    say(f"{out}: {len(sequence)} pairs of images")
 
 
 @app.command
@@ -378,6 +471,18 @@ def _rotation(word: str | None) -> NDArray[np.float64] | None:
     return None if word is None else read_rotation(word)
 
 
+def _legs(words: Sequence[str]) -> NDArray[np.float64]:
+    """(L, 2) metres and radians, from pairs or the name of a trajectory."""
+    from tiltvp.synth import drive_legs
+
+    if len(words) == 1 and "," not in words[0]:
+        return drive_legs(words[0])
+    return np.array([_pair(word.split(","), f"--legs {word!r}", "METRES,DEGREES") for word in words]) * (
+        1.0,
+        np.pi / 180.0,
+    )
+
+
 def _threads(count: int | None) -> int:
     return (os.cpu_count() or 1) if count is None else count
 
@@ -410,12 +515,12 @@ def _tilts_of_file(file: Path) -> list[tuple[float, float]]:
     return [_pair(row, f"{file}, line {number}: {','.join(row)!r}") for number, row in rows[1:]]
 
 
-def _pair(cells: list[str], where: str) -> tuple[float, float]:
+def _pair(cells: list[str], where: str, expected: str = "ALPHA,BETA in degrees") -> tuple[float, float]:
     try:
-        alpha, beta = (float(cell) for cell in cells)
+        first, second = (float(cell) for cell in cells)
     except ValueError:
-        raise InvalidInputError(f"{where}, expected ALPHA,BETA in degrees") from None
-    return alpha, beta
+        raise InvalidInputError(f"{where}, expected {expected}") from None
+    return first, second
 
 
 def _made_by(command: str) -> dict[str, str]:

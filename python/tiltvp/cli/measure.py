@@ -8,12 +8,18 @@ from typing import Annotated
 
 from cyclopts import App, Parameter, validators
 
+from tiltvp.cli.corner_measures import corners
+from tiltvp.cli.corner_real import corners_real
+from tiltvp.cli.descriptors import descriptors
 from tiltvp.cli.planar_pose import planar_pose
 from tiltvp.cli.results import check_ending, show_frame, write_frame
 from tiltvp.cli.terminal import progress_bar, say
 from tiltvp.errors import InvalidInputError
 
 app = App(name="measure", help="Measure the methods on images of known tilt.")
+app.command(corners)
+app.command(corners_real)
+app.command(descriptors)
 app.command(planar_pose)
 
 
@@ -119,6 +125,50 @@ def calibration(odometry: Path | None = None, /, *, runs: int = 1000, out: Path 
             show_frame(
                 "Real logs: error against the nominal mounting", real_logs(odometry, advance=bar.advance), ["log"]
             )
+
+
+@app.command(name="calibration-images")
+def calibration_images(
+    *,
+    drives: Annotated[int, Parameter(validator=validators.Number(gte=1))] = 2,
+    kinds: Annotated[tuple[str, ...], Parameter(consume_multiple=True)] = ("hall", "corridor"),
+    leans_deg: Annotated[tuple[float, ...], Parameter(consume_multiple=True)] = (0.0, 3.0),
+    trajectory: str = "paper",
+    seed: Annotated[int, Parameter(validator=validators.Number(gte=0))] = 9101,
+    threads: Annotated[int | None, Parameter(validator=validators.Number(gte=1))] = None,
+    out: Path | None = None,
+) -> None:
+    """Self-calibration from the pictures of rendered drives: tilt, lines, tracks, mounting; errors in degrees and mm.
+
+    Parameters
+    ----------
+    drives
+        Drives of each kind and lean.
+    kinds
+        Where to drive: corridor, hall, office, living-room, l-shaped, narrow or under-table.
+    leans_deg
+        Greatest leans from bumps.
+    trajectory
+        paper or alternating.
+    seed
+        Seed of the first room and drive.
+    threads
+        Frames rendered at the same time; all cores by default.
+    out
+        Also write the table: .csv, .json or .parquet.
+    """
+    from tiltvp.evaluation.calibration_images import PictureExperiment, picture_drives
+
+    if out is not None:
+        check_ending(out)
+    experiment = PictureExperiment(
+        kinds=kinds, leans_max_deg=leans_deg, drives=drives, seed=seed, trajectory=trajectory
+    )
+    with progress_bar(len(experiment.cases), "drives") as bar:
+        table = picture_drives(experiment, threads=threads or os.cpu_count() or 1, advance=bar.advance)
+    if out is not None:
+        write_frame(table, out)
+    show_frame(f"From pictures, errors along the {trajectory} trajectory, degrees and mm", table, ["kind", "by"])
 
 
 @app.command

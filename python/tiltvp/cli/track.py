@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,7 +15,7 @@ from tiltvp.cli.line_options import LineOptions
 from tiltvp.cli.lines import line_columns, line_schema
 from tiltvp.cli.options import CameraOptions
 from tiltvp.cli.results import check_ending, write_frame
-from tiltvp.cli.terminal import complain, named, progress_bar, say
+from tiltvp.cli.terminal import ProgressBar, complain, named, progress_bar, say
 from tiltvp.errors import ImageFileError, InvalidInputError, TiltvpError
 
 if TYPE_CHECKING:
@@ -23,7 +23,10 @@ if TYPE_CHECKING:
     import polars as pl
     from numpy.typing import NDArray
 
-    from tiltvp.lines import TrackedLines
+    from tiltvp import TiltEstimate
+    from tiltvp.line_logs import FollowedFrame
+    from tiltvp.lines import LineExtractor, LineTracker, TrackedLines
+    from tiltvp.odometry import Motion
 
 _DEFAULTS = LineOptions()
 
@@ -62,7 +65,7 @@ def track(
     look_back
         How many frames back a line is looked for before it counts as new.
     """
-    from tiltvp.images import gray_from, write_image
+    from tiltvp.images import write_image
     from tiltvp.lines import LineTracker
     from tiltvp.odometry import read_odometry
     from tiltvp.plots.lines import draw_lines
@@ -77,38 +80,15 @@ def track(
     frames = open_frames(source)
     motions = None if odometry is None else read_odometry(odometry, frames.files)
     tracked: list[tuple[int, str, TrackedLines]] = []
-    # A file without distances tells turns only.
-    drives = motions is not None and any(motion.distance_m for motion in motions)
-    bad, turn_rad, distance_m = 0, 0.0, 0.0
     showing = nullcontext() if video is None else video_writer(video, frame_rate or frames.rate_hz)
     with showing as film, progress_bar(len(frames.files), "frames") as bar:
-        for number, image in enumerate(frames):
-            file = frames.files[number]
-            # The motion of a frame that is skipped belongs to the next.
-            if motions is not None:
-                turn_rad += motions[number].yaw_rad
-                distance_m += motions[number].distance_m
-            try:
-                if isinstance(image, TiltvpError):
-                    raise image
-                gray = gray_from(image)
-                lines = extractor(gray, tilt(gray))
-            except TiltvpError as error:
-                bar.complain(named(file, str(error)))
-                bad += 1
-            else:
-                descriptors = extractor.describe(gray, lines)
-                found = tracker.update(
-                    lines,
-                    descriptors,
-                    yaw_change_rad=None if motions is None else turn_rad,
-                    distance_m=distance_m if drives else None,
-                )
-                turn_rad, distance_m = 0.0, 0.0
-                tracked.append((number, str(file), found))
-                if film is not None:
-                    film.add(draw_lines(gray, lens, lines, extractor.robot_from_camera, tracks=found.track.tolist()))
-            bar.advance()
+        for frame in followed(frames, extractor, tracker, tilt, motions, bar):
+            found = frame.tracked
+            tracked.append((frame.number, str(frames.files[frame.number]), found))
+            if film is not None:
+                rotation, tracks = extractor.robot_from_camera, found.track.tolist()
+                film.add(draw_lines(frame.gray, lens, found.lines, rotation, tracks=tracks))
+    bad = len(frames.files) - len(tracked)
     if not tracked:
         raise InvalidInputError(f"{source}: {bad} frames, none of which can be read")
     table = track_table(tracked)
@@ -121,6 +101,27 @@ def track(
     skipped = f", {bad} skipped" if bad else ""
     say(f"{out}: {len(tracked)} frames{skipped}, {table.height} lines, {tracker.track_count} tracks")
     return 1 if bad else 0
+
+
+def followed(
+    frames: Frames,
+    extractor: LineExtractor,
+    tracker: LineTracker,
+    tilt: Callable[[NDArray[np.uint8]], TiltEstimate | None],
+    motions: Sequence[Motion] | None,
+    bar: ProgressBar,
+) -> Iterator[FollowedFrame]:
+    """The frames that can be used, with their lines; the others are complained about."""
+    from tiltvp.line_logs import follow_lines
+
+    for file, frame in zip(
+        frames.files, follow_lines(frames, extractor, tracker, tilt=tilt, motions=motions), strict=True
+    ):
+        if isinstance(frame, TiltvpError):
+            bar.complain(named(file, str(frame)))
+        else:
+            yield frame
+        bar.advance()
 
 
 def track_table(tracked: Sequence[tuple[int, str, TrackedLines]]) -> pl.DataFrame:

@@ -15,7 +15,7 @@ from tiltvp.datasets.rows import TiltImage
 from tiltvp.errors import InvalidInputError
 from tiltvp.synth import ROOM_KINDS, Drive, DriveTruth, Room
 
-__all__ = ["DRIVE_KINDS", "drive_room", "write_drive"]
+__all__ = ["DRIVE_KINDS", "POSES", "TRUTH", "drive_room", "write_drive"]
 
 _PLACES: Final = {"corridor": ("corridor", 2.0), "hall": ("office", 2.0)}
 """Kind of room and how many times larger than usual it is."""
@@ -24,8 +24,9 @@ DRIVE_KINDS: tuple[str, ...] = ("corridor", "hall", *(kind for kind in ROOM_KIND
 """Places to drive in: a long corridor, a hall with pillars, and the rooms of `ROOM_KINDS`."""
 
 _ODOMETRY: Final = ("file", "left_m", "right_m", "distance_m", "yaw_rad")
-_POSES: Final = ("frame", "file", "x_m", "y_m", "yaw_rad", "alpha_rad", "beta_rad", "left_m", "right_m")
-_TRUTH: Final = (
+POSES: Final = ("frame", "file", "x_m", "y_m", "yaw_rad", "alpha_rad", "beta_rad", "left_m", "right_m")
+"""Columns of poses.csv."""
+TRUTH: Final = (
     "frame",
     "edge",
     "bearing_rad",
@@ -34,6 +35,7 @@ _TRUTH: Final = (
     "visible_share",
     "contrast",
 )
+"""Columns of truth.csv."""
 _EDGES: Final = ("edge", "x_m", "y_m", "low_m", "high_m")
 
 
@@ -115,9 +117,9 @@ def write_drive(
         read = zip(files, drive.odometry.tolist(), drive.motions.tolist(), strict=True)
         new.write_table("odometry.csv", _ODOMETRY, ((file, *wheels, *motion) for file, wheels, motion in read))
         state = zip(files, drive.poses.tolist(), drive.tilts.tolist(), drive.true_odometry.tolist(), strict=True)
-        new.write_table("poses.csv", _POSES, ((k, file, *a, *b, *c) for k, (file, a, b, c) in enumerate(state)))
+        new.write_table("poses.csv", POSES, ((k, file, *a, *b, *c) for k, (file, a, b, c) in enumerate(state)))
         new.write_table("edges.csv", _EDGES, ((k, *edge) for k, edge in enumerate(drive.edges_m.tolist())))
-        new.write_table("truth.csv", _TRUTH, truth)
+        new.write_table("truth.csv", TRUTH, truth)
         new.write_toml("drive.toml", _description(drive))
 
 

@@ -95,10 +95,7 @@ pub(crate) fn simulate_drive(
     wheel_base_m: Option<f64>,
     outliers: Option<f64>,
 ) -> PyResult<SimulatedDrive> {
-    let Some(kind) = BearingDriveKind::ALL.into_iter().find(|known| known.name() == kind) else {
-        let known = BearingDriveKind::ALL.map(BearingDriveKind::name).join(", ");
-        return Err(invalid(format!("kind = {kind:?}, expected one of {known}")));
-    };
+    let kind = kind_from(kind)?;
     let mut options = BearingDriveOptions { kind, seed, ..BearingDriveOptions::default() };
     if let Some(mounting) = mounting {
         let v = convert::vector3(mounting, "mounting")?;
@@ -123,4 +120,19 @@ pub(crate) fn simulate_drive(
     }
     let drive = call(py, || Ok::<_, Error>(BearingDrive::new(&options)))?;
     Ok(SimulatedDrive { options, drive })
+}
+
+/// (L, 2): distance in metres and turn in radians of the legs of a trajectory.
+#[pyfunction]
+#[pyo3(signature = (kind="paper"))]
+pub(crate) fn drive_legs<'py>(py: Python<'py>, kind: &str) -> PyResult<Bound<'py, PyAny>> {
+    let rows: Vec<[f64; 2]> = kind_from(kind)?.legs().into_iter().map(Into::into).collect();
+    convert::to_rows(py, &rows, false)
+}
+
+fn kind_from(name: &str) -> PyResult<BearingDriveKind> {
+    BearingDriveKind::ALL.into_iter().find(|known| known.name() == name).ok_or_else(|| {
+        let known = BearingDriveKind::ALL.map(BearingDriveKind::name).join(", ");
+        invalid(format!("kind = {name:?}, expected one of {known}"))
+    })
 }

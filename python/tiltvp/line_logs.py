@@ -1,0 +1,99 @@
+"""Lines followed through the images of a drive, and their bearings as a log that self-calibration takes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from tiltvp.errors import InvalidInputError, TiltvpError
+from tiltvp.images import gray_from
+from tiltvp.selfcalib import wheel_displacements
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike, NDArray
+
+    from tiltvp._core import TiltEstimate
+    from tiltvp.lines import LineExtractor, LineTracker, TrackedLines
+    from tiltvp.odometry import Motion
+
+__all__ = ["FollowedFrame", "bearing_log", "displacements", "follow_lines"]
+
+
+@dataclass(frozen=True)
+class FollowedFrame:
+    """An image of a drive and the lines in it."""
+
+    number: int
+    """Of the frame in the drive, from 0; frames that cannot be used count."""
+    gray: NDArray[np.uint8]
+    """(H, W)."""
+    tracked: TrackedLines
+    """The lines and whose they are."""
+
+
+def follow_lines(
+    images: Iterable[NDArray[np.uint8] | TiltvpError],
+    extractor: LineExtractor,
+    tracker: LineTracker,
+    *,
+    tilt: Callable[[NDArray[np.uint8]], TiltEstimate | ArrayLike | None] = lambda _: None,
+    motions: Sequence[Motion] | None = None,
+) -> Iterator[FollowedFrame | TiltvpError]:
+    """For each image, grey or BGR, its lines as `tracker` has them, or what is wrong with it.
+
+    `tilt` tells the lean of a grey image (None: upright); `motions`, one for each image, what the robot did since the
+    one before. The motion of a frame that cannot be used is added to that of the next. Raises `InvalidInputError` if
+    there are more images than motions.
+    """
+    # Motions without any distance tell turns only.
+    drives = motions is not None and any(motion.distance_m for motion in motions)
+    turn_rad, distance_m = 0.0, 0.0
+    for number, image in enumerate(images):
+        if motions is not None:
+            if number >= len(motions):
+                raise InvalidInputError(f"motions: {len(motions)}, expected one for each image")
+            turn_rad += motions[number].yaw_rad
+            distance_m += motions[number].distance_m
+        try:
+            if isinstance(image, TiltvpError):
+                raise image
+            gray = gray_from(image)
+            lines = extractor(gray, tilt(gray))
+        except TiltvpError as error:
+            yield error
+            continue
+        tracked = tracker.update(
+            lines,
+            extractor.describe(gray, lines),
+            yaw_change_rad=None if motions is None else turn_rad,
+            distance_m=distance_m if drives else None,
+        )
+        turn_rad, distance_m = 0.0, 0.0
+        yield FollowedFrame(number, gray, tracked)
+
+
+def bearing_log(frames: Iterable[FollowedFrame], *, frames_min: int = 2) -> NDArray[np.float64]:
+    """(M, 3): number of the frame, track, bearing in radians, of tracks seen in at least `frames_min` frames."""
+    rows = [
+        (frame.number, track, bearing)
+        for frame in frames
+        for track, bearing in zip(frame.tracked.track.tolist(), frame.tracked.lines.bearing_rad.tolist(), strict=True)
+    ]
+    table = np.array(rows, dtype=np.float64).reshape(-1, 3)
+    _, which, counts = np.unique(table[:, 1], return_inverse=True, return_counts=True)
+    return table[counts[which] >= frames_min]
+
+
+def displacements(motions: Sequence[Motion], *, wheel_base_m: float) -> NDArray[np.float64]:
+    """(N, 2): how far left and right wheels rolled up to each frame: as recorded, or as distance and turn have it."""
+    derived = wheel_displacements(
+        [motion.distance_m for motion in motions], [motion.yaw_rad for motion in motions], wheel_base_m=wheel_base_m
+    )
+    recorded = [motion.wheels_m for motion in motions]
+    return np.array(
+        [rolled if wheels is None else wheels for wheels, rolled in zip(recorded, derived.tolist(), strict=True)],
+        dtype=np.float64,
+    ).reshape(-1, 2)

@@ -1,0 +1,100 @@
+"""From the images of a drive to the log that self-calibration takes, in the library and on the command line."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import polars as pl
+import pytest
+
+from tiltvp.cli import main
+from tiltvp.datasets.driving import write_drive
+from tiltvp.errors import ImageFileError, InvalidInputError
+from tiltvp.line_logs import FollowedFrame, bearing_log, displacements, follow_lines
+from tiltvp.lines import LineExtractor, LineTracker
+from tiltvp.odometry import Motion, read_odometry
+from tiltvp.selfcalib import wheel_displacements
+from tiltvp.synth import MIRROR_BLIND_RAD, Drive, Room, drive_legs, mirror_camera
+
+LEGS = [(0.25, 0.0), (0.0, 0.4)]
+
+
+@pytest.fixture(scope="module")
+def drive() -> Drive:
+    room = Room("corridor", 2, light_spacing_m=0.6)
+    camera = mirror_camera().scaled(0.6)
+    return Drive(room, camera=camera, blind_rad=MIRROR_BLIND_RAD, legs=LEGS, seed=3, samples=2, mount=(0.1, 0, 0, 0.4))
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory, drive: Drive) -> Path:
+    out = tmp_path_factory.mktemp("drives") / "drive"
+    write_drive(drive, out)
+    return out
+
+
+def test_the_legs_are_what_is_driven(drive: Drive) -> None:
+    assert len(drive) == 1 + 5 + 5
+    np.testing.assert_allclose(np.diff(drive.poses[5:, 2]), 0.08, atol=1e-12)
+    np.testing.assert_allclose(np.hypot(*(drive.poses[5, :2] - drive.poses[0, :2])), 0.25, atol=1e-12)
+    assert drive_legs("paper").shape == (2, 2)
+    with pytest.raises(InvalidInputError, match="frames and legs"):
+        Drive(drive.room, camera=drive.camera, legs=LEGS, frames=3)
+    with pytest.raises(InvalidInputError, match="expected legs that a robot has room for"):
+        Drive(drive.room, camera=drive.camera, legs=[(80.0, 0.0)])
+
+
+def test_frames_that_cannot_be_used_are_told_and_their_motion_kept(drive: Drive) -> None:
+    images = [drive.render(k).gray for k in range(4)]
+    motions = [Motion(yaw, distance) for distance, yaw in drive.motions[:4].tolist()]
+    bad = ImageFileError("cannot be decoded")
+    followed = list(
+        follow_lines([*images[:2], bad, images[3]], LineExtractor(drive.camera), LineTracker(), motions=motions)
+    )
+    assert followed[2] is bad
+    frames = [frame for frame in followed if isinstance(frame, FollowedFrame)]
+    assert [frame.number for frame in frames] == [0, 1, 3]
+    log = bearing_log(frames)
+    assert set(log[:, 0].tolist()) <= {0.0, 1.0, 3.0}
+    assert np.unique(log[:, 1], return_counts=True)[1].min() >= 2
+    assert bearing_log([]).shape == (0, 3)
+    with pytest.raises(InvalidInputError, match="expected one for each image"):
+        list(follow_lines(images, LineExtractor(drive.camera), LineTracker(), motions=motions[:2]))
+
+
+def test_wheels_are_as_recorded_or_as_the_motion_has_them(folder: Path, drive: Drive) -> None:
+    files = sorted((folder / "images").iterdir())
+    motions = read_odometry(folder / "odometry.csv", files)
+    np.testing.assert_array_equal(displacements(motions, wheel_base_m=0.5), drive.odometry)
+    bare = [Motion(motion.yaw_rad, motion.distance_m) for motion in motions]
+    expected = wheel_displacements(drive.motions[:, 0], drive.motions[:, 1], wheel_base_m=0.5)
+    np.testing.assert_array_equal(displacements(bare, wheel_base_m=0.5), expected)
+
+
+def test_calibrate_from_images(folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    out, tracks = tmp_path / "found.json", tmp_path / "tracks.csv"
+    words = [
+        "calibrate",
+        "--images",
+        str(folder / "images"),
+        "--camera",
+        str(folder / "camera.toml"),
+        "--wheel-base",
+        "0.35",
+    ]
+    odometry = ["--odometry", str(folder / "odometry.csv")]
+    start = ["--start", "0.1", "0", "0", "--start-sigma", "0.05", "0.05", "0.2"]
+    assert main([*words, *odometry, *start, "--out", str(out), "--tracks", str(tracks)]) in (0, 1)
+    found = json.loads(out.read_text())
+    table = pl.read_csv(tracks)
+    assert found["options"]["bearing_sigma_rad"] == pytest.approx(table["sigma_rad"].median())
+    kept = table.filter(pl.len().over("track") >= 3)
+    assert found["whole_log"]["bearings"] == kept.height > 100
+    assert "bearings of" in capsys.readouterr().out
+    for missing, given in (("--odometry", []), ("one of them", [*odometry, "log.csv"])):
+        assert main([words[0], *given[2:], *words[1:], *given[:2]]) == 2
+        assert missing in capsys.readouterr().err
+    assert main(["calibrate", "--wheel-base", "0.35"]) == 2
+    assert "no log of bearings" in capsys.readouterr().err
