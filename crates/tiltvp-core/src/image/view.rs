@@ -57,8 +57,7 @@ impl<'a> ImageView<'a> {
             return None;
         }
         let at = v * self.stride + u;
-        let [a, b] = *self.data.get(at..at + 2)?.as_array::<2>()?;
-        let [c, d] = *self.data.get(at + self.stride..at + self.stride + 2)?.as_array::<2>()?;
-        Some([a, b, c, d])
+        let (above, below) = (self.data.get(at..at + 2)?, self.data.get(at + self.stride..at + self.stride + 2)?);
+        Some([above[0], above[1], below[0], below[1]])
     }
 }

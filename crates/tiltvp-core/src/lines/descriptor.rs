@@ -6,7 +6,7 @@ use multiversion::multiversion;
 
 use super::arctan::atan2;
 use super::line::Lines;
-use super::patch::{Chart, Patch};
+use super::patch::{Chart, Patch, Raster};
 use super::sight::Sight;
 use crate::error::{Error, Result};
 use crate::image::ImageView;
@@ -135,13 +135,14 @@ pub(super) fn describe(
     scratch.make_kernel(options.smoothing * half as f64);
     let pitch = radius / half as f64;
     let side = 2 * (half + scratch.kernel.len()) + 1;
+    let reach = Some((half + scratch.kernel.len()) as f64 + 0.5);
+    let raster = Raster { pitch, rows: side, columns: side, reach };
     out.clear();
     out.resize(lines.lines.len() * options.values(), 0.0);
     for (line, values) in lines.lines.iter().zip(out.chunks_exact_mut(options.values())) {
         let (_, middles) = options.layout(*low, *high);
         for (middle, pair) in middles.zip(values.chunks_exact_mut(2 * options.bins)) {
-            let reach = (half + scratch.kernel.len()) as f64 + 0.5;
-            scratch.patch.sample(image, sight, chart, (line.bearing_rad, middle), pitch, (side, side), Some(reach));
+            scratch.patch.sample(image, sight, chart, (line.bearing_rad, middle), &raster);
             smooth(&mut scratch.patch, &scratch.kernel, &mut scratch.rows);
             histograms(&scratch.patch, &scratch.window, half, &mut scratch.gradients, options.bins, pair);
             if options.normalisation == Normalisation::Area {

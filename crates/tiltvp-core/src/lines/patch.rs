@@ -58,6 +58,19 @@ impl<'a> Chart<'a> {
     }
 }
 
+/// Which places of a rectangle are sampled.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Raster {
+    /// From sample to sample, in the chart's unit.
+    pub(super) pitch: f64,
+    /// Along the line.
+    pub(super) rows: usize,
+    /// Across the line.
+    pub(super) columns: usize,
+    /// How many samples from the middle are needed; the others may be NaN. None for all.
+    pub(super) reach: Option<f64>,
+}
+
 /// A resampled rectangle of grey levels, NaN where the world is not seen.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Patch {
@@ -69,18 +82,16 @@ pub(super) struct Patch {
 }
 
 impl Patch {
-    /// Samples `rows x columns` places, `pitch` apart, about the middle of a line; with a `reach` at least those within so many
-    /// samples of the middle, the others may be NaN.
+    /// Samples a raster about the middle of a line.
     pub(super) fn sample(
         &mut self,
         image: &ImageView<'_>,
         sight: &Sight,
         chart: &Chart<'_>,
         (bearing, middle): (f64, f64),
-        pitch: f64,
-        (rows, columns): (usize, usize),
-        reach: Option<f64>,
+        raster: &Raster,
     ) {
+        let Raster { pitch, rows, columns, reach } = *raster;
         (self.rows, self.columns) = (rows, columns);
         let (node_rows, node_columns) = (rows.div_ceil(SUBDIVISIONS) + 1, columns.div_ceil(SUBDIVISIONS) + 1);
         let place = chart.around(bearing, middle);

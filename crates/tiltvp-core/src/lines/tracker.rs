@@ -312,17 +312,21 @@ impl LineTracker {
                 (common, turn_variance) = common_offset(offsets, options.turn_sigma_rad);
             }
         }
-        for edge in &mut state.followed {
-            edge.parallax.bearing_rad = wrap(edge.parallax.bearing_rad + common);
-            edge.parallax.covariance[0] += turn_variance;
-        }
         let frame = state.next_frame;
         let mut continued = vec![None; n];
+        // The turn that tracks agree on is theirs already: a track that took its nearness from it would pull it along, frame
+        // after frame. Each takes in its bearing by the turn as it was given.
         for (i, line) in lines.iter().enumerate() {
             let Some(j) = pairs[i] else { continue };
             let edge = &mut state.followed[j];
-            edge.parallax.correct(line.bearing_rad, line_variance(line, options), options);
             continued[i] = Some((edge.track, (frame - edge.seen) as u32));
+            edge.seen = frame;
+            edge.parallax.covariance[0] += options.turn_sigma_rad.powi(2);
+            edge.parallax.correct(line.bearing_rad, line_variance(line, options), options);
+        }
+        for edge in state.followed.iter_mut().filter(|edge| edge.seen != frame) {
+            edge.parallax.bearing_rad = wrap(edge.parallax.bearing_rad + common);
+            edge.parallax.covariance[0] += turn_variance;
         }
         continued
     }
