@@ -119,6 +119,14 @@ measure-line-peers *arguments: drives
         "opencv-contrib-python-headless==$({{bin}}/python -c 'from importlib.metadata import version; print(version("opencv-python-headless"))')"
     PYTHONPATH="$PWD/out/peers/opencv-contrib" {{bin}}/python benches/peers/line_segments.py out/drives/corridor out/drives/hall {{arguments}}
 
+# Corners of a real cabinet and a real box: attitude against motion capture, sizes, smoothness.
+measure-corners-real folder *arguments: setup
+    {{bin}}/tiltvp measure corners-real {{folder}} --overlay out/corners-real {{arguments}}
+
+# Poses of corners: the closed form on random poses, and rendered sequences of a hand-held stereo pair, with plots.
+measure-corners *arguments: setup
+    {{bin}}/tiltvp measure corners --out out/corners {{arguments}}
+
 # Round trips and Jacobians of the calibrations of TILTVP_DATA, as a table.
 measure-cameras: setup
     {{bin}}/pytest --quiet --capture=no tests/real_data/test_camera_conformance.py
@@ -138,6 +146,14 @@ measure-growth *arguments: setup
 # Each method's time as a ratio to OpenCV's pair of Scharr derivatives, in one process on one thread.
 measure-time *arguments: setup
     {{bin}}/python benches/peers/scharr.py {{arguments}}
+
+# Coloured cubes before a pair of cameras against marker cubes by OpenCV: errors and times, in one process on one thread.
+measure-markers *arguments: setup
+    {{bin}}/python benches/peers/corner.py {{arguments}}
+
+# A step of the self-calibration filters against a dense NumPy filter of the paper's equations, in one process.
+measure-calibration-time *arguments: setup
+    OPENBLAS_NUM_THREADS=1 {{bin}}/python benches/peers/calibration_filter.py {{arguments}}
 
 # The benches of the core.
 bench *arguments:

@@ -6,6 +6,7 @@ import copy
 import csv
 import json
 import math
+import pickle
 from pathlib import Path
 
 import numpy as np
@@ -249,3 +250,39 @@ def test_bad_logs_are_refused_with_the_line(tmp_path: Path, text: str, words: st
     odometry.write_text(text)
     with pytest.raises(InvalidInputError, match=words):
         read_drive_log(odometry, bearings)
+
+
+def test_answers_come_back_from_dicts_pickles_and_copies() -> None:
+    drive = simulate_drive("paper", seed=2)
+    calibrator = tiltvp.SelfCalibrator(**START)  # type: ignore[arg-type]
+    step = calibrator.step(0.1, 0.1, [1, 2], [0.3, -0.4])
+    whole = tiltvp.calibrate(drive.odometry, drive.bearings, estimate_odometry=True, **START)
+    for value in (step, whole.mounting, whole):
+        assert type(value).from_dict(value.to_dict()) == value
+        assert pickle.loads(pickle.dumps(value)) == value
+        assert copy.copy(value) == copy.deepcopy(value) == value
+    values = whole.mounting.to_dict()
+    for changed in ({"surplus": 1}, {"x_m": "far"}, {"determined": ["beta"]}, {"covariance_xy_yaw": [[1.0]]}):
+        with pytest.raises(InvalidInputError, match=next(iter(changed))):
+            tiltvp.MountingEstimate.from_dict(values | changed)
+
+
+def test_noise_of_steps_widens_what_is_believed() -> None:
+    drive = simulate_drive("paper", seed=2)
+    plain, wide = (
+        followed(drive, step_sigma_m=m, step_sigma_rad=rad).estimate for m, rad in ((0.0, 0.0), (2e-3, 5e-3))
+    )
+    assert np.all(np.diag(wide.covariance_xy_yaw) > np.diag(plain.covariance_xy_yaw))
+    with pytest.raises(InvalidInputError, match="step_sigma_rad"):
+        tiltvp.SelfCalibrator(wheel_base_m=0.4, step_sigma_rad=-1.0)
+
+
+def test_a_slip_of_the_wheels_does_not_move_the_mounting() -> None:
+    drive = simulate_drive("alternating", seed=3)
+    odometry = drive.odometry.copy()
+    odometry[len(odometry) // 2] += [0.15, -0.1]
+    e = tiltvp.calibrate(odometry, drive.bearings, **START).mounting
+    assert np.all(np.abs(error(e)) < 4.0 * np.sqrt(np.diag(e.covariance_xy_yaw)))
+    calibrator = tiltvp.SelfCalibrator(**START)  # type: ignore[arg-type]
+    e = calibrator.follow(odometry, drive.bearings)[-1]
+    assert np.all(np.abs(error(e)) < 4.0 * np.sqrt(np.diag(e.covariance_xy_yaw)))

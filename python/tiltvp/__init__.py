@@ -5,7 +5,7 @@ pixel centres at integers. `robot_from_camera` is R in v_robot = R v_camera. A l
 (-sin a cos b, -sin a sin b, cos a) in the robot frame; beta = 0 is a forward lean. Radians and metres.
 """
 
-from tiltvp._core import METHODS
+from tiltvp._core import METHODS, ComplementaryFilter
 from tiltvp.cameras import Camera
 from tiltvp.corrections import (
     AffineCorrection,
@@ -53,6 +53,7 @@ __all__ = [
     "CalibrationStep",
     "Camera",
     "CommonDirection",
+    "ComplementaryFilter",
     "EdgeElements",
     "FilterStep",
     "FilteredTilt",

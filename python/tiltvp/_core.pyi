@@ -4,6 +4,8 @@ Arrays that come in may have any strides and any real dtype unless a shape and d
 altered. Arrays that go out are fresh. Angles are radians. Equation numbers are those of Fleer 2017 (see the README).
 """
 
+import builtins
+from collections.abc import Iterable, Sequence
 from typing import Any, ClassVar, Final, Literal, Self, SupportsIndex, TypeAlias, final
 
 import numpy as np
@@ -13,6 +15,7 @@ from typing_extensions import disjoint_base
 __all__ = [
     "CALIBRATION_METHODS",
     "CAMERA_MODELS",
+    "CORNER_METHODS",
     "LINE_METHODS",
     "METHODS",
     "ROOM_KINDS",
@@ -21,6 +24,14 @@ __all__ = [
     "CalibrationStep",
     "Camera",
     "CommonDirection",
+    "CornerAttitude",
+    "CornerAttitudes",
+    "CornerDetector",
+    "CornerEstimate",
+    "CornerFeature",
+    "CornerHypothesis",
+    "CornerPose",
+    "CornerPoseEstimator",
     "Drive",
     "EdgeElements",
     "FilterStep",
@@ -35,6 +46,7 @@ __all__ = [
     "PixelRays",
     "PosteriorCorrection",
     "PriorOfTilt",
+    "ResolvedAttitude",
     "Room",
     "SelfCalibrator",
     "SimulatedDrive",
@@ -46,19 +58,28 @@ __all__ = [
     "calibrate",
     "common_direction",
     "consistency_band",
+    "corner_attitudes",
+    "corner_poses",
     "descriptor_distances",
     "drive_legs",
+    "fit_corner",
+    "included_angle",
     "leaning_from_upright",
     "level_map",
     "match_descriptors",
     "normal_from_alpha_beta",
+    "resolve_corners",
+    "screen_corner",
     "simulate_drive",
+    "solve_corner",
+    "solve_corners",
     "ssd_matrix",
     "tilt_error_rad",
     "tilt_from_wheel_heights",
     "train_affine",
     "train_factor",
     "train_posterior",
+    "triangulate",
     "wheel_displacements",
     "zncc_matrix",
 ]
@@ -76,6 +97,7 @@ METHODS: Final[list[str]]
 CAMERA_MODELS: Final[list[str]]
 """The names of the models of `Camera`."""
 
+CORNER_METHODS: Final[list[str]]
 LINE_METHODS: Final[list[str]]
 """The names of the methods of `LineExtractor`, the default first."""
 
@@ -1043,20 +1065,26 @@ class TrackedLines:
 class LineTracker:
     """Follows lines through successive frames: each gets the identity of the line it is, or a new one.
 
-    A line is looked for in the last frame, then in the one before, up to `look_back` frames. Where the turn of the
-    robot is known, bearings are predicted and far lines are no candidates. The same calls give the same answers.
-    Comparable, copied and pickled with all that it remembers.
+    Where the robot's motion is known, each track's bearing is predicted from the last one and from how near the edge is,
+    as far as bearings have told, and all lines find their tracks together: by bearings, descriptors and sides, at the
+    least cost in all. Where it is not, a line is looked for in the last frame, then in the one before, up to
+    `look_back` frames. The same calls give the same answers. Comparable, copied and pickled with all that it remembers.
     """
 
     def __new__(
         cls,
         *,
         look_back: SupportsIndex = ...,
-        gate_rad: float = ...,
-        gate_settled_rad: float = ...,
-        gate_growth_rad: float = ...,
-        bearing_weight: float = ...,
-        extrapolate: bool = ...,
+        nearest_m: float = ...,
+        camera_m: tuple[float, float] = ...,
+        turn_sigma_rad: float = ...,
+        distance_sigma: float = ...,
+        rate_sigma_rad: float = ...,
+        bearing_sigma_rad: float = ...,
+        gate_sigmas: float = ...,
+        descriptor_sigma: float = ...,
+        descriptor_max: float = ...,
+        new_cost: float = ...,
         f1: float = ...,
         f2: float = ...,
         f3: float = ...,
@@ -1069,15 +1097,21 @@ class LineTracker:
         ----------
         look_back
             How many frames back a line is looked for before it is taken for a new one.
-        gate_rad, gate_settled_rad, gate_growth_rad
-            Greatest difference from the predicted bearing where turns are known; the same, beside the line's own change
-            per frame, where that is known from before; and how much more for each further frame back.
-        bearing_weight
-            What is added to the distance of descriptors at the gate, in proportion less nearer the predicted bearing.
-        extrapolate
-            Whether bearings are predicted to go on changing as they did, beside the turn of the robot.
+        nearest_m, camera_m
+            The least distance of an edge from the camera, and where the camera's centre is on the robot: x and y from
+            the middle between the wheels; metres.
+        turn_sigma_rad, distance_sigma
+            Standard deviations of a turn and, as a share of it, of a distance driven.
+        rate_sigma_rad
+            Standard deviation of the change of a bearing per frame beside the turn, where no distance is given.
+        bearing_sigma_rad, gate_sigmas
+            Standard deviation of a bearing beside the line's own, and how many of them bearings may be off.
+        descriptor_sigma, descriptor_max
+            Standard deviation and greatest value of the distance between descriptors of one line.
+        new_cost
+            What a new track costs, against the sum of squared deviations of a line that goes on.
         f1, f2, f3, mutual, ordered
-            As those of `match_descriptors`.
+            As those of `match_descriptors`, where the motion is unknown.
 
         Raises `tiltvp.errors.InvalidInputError` for an option that is unknown or out of its domain.
         """
@@ -1095,18 +1129,24 @@ class LineTracker:
         """How many identities have been given."""
 
     def update(
-        self, lines: Lines, descriptors: NDArray[np.float32], *, yaw_change_rad: float | None = None
+        self,
+        lines: Lines,
+        descriptors: NDArray[np.float32],
+        *,
+        yaw_change_rad: float | None = None,
+        distance_m: float | None = None,
     ) -> TrackedLines:
-        """The next frame: its lines, their descriptors (N, K), and the turn since the last one, positive to the left.
+        """The next frame: its lines, their descriptors (N, K), and the robot's motion since the last one.
 
-        Raises `tiltvp.errors.InvalidInputError` for descriptors of another number or width, and turns that are not
-        finite; the tracker is as before then.
+        `yaw_change_rad` is its turn, positive to the left, `distance_m` how far the middle between its wheels went along
+        the arc, negative backwards. Raises `tiltvp.errors.InvalidInputError` for descriptors of another number or width,
+        motions that are not finite, and a distance without a turn; the tracker is as before then.
         """
 
     def __eq__(self, other: object, /) -> bool: ...
     def __copy__(self) -> Self: ...
     def __deepcopy__(self, _memo: object) -> Self: ...
-    def __setstate__(self, state: tuple[int, int, list[Any]], /) -> None:
+    def __setstate__(self, state: tuple[int, int, list[Any], list[Any]], /) -> None:
         """Sets what pickle has kept."""
     __hash__: ClassVar[None]  # type: ignore[assignment]
 
@@ -1393,6 +1433,185 @@ class Room:
     def __eq__(self, other: object, /) -> bool: ...
     def __hash__(self) -> int: ...
 
+@final
+class ComplementaryFilter:
+    """Rates of turn in the short run, a reference attitude in the long run: `ComplementaryFilter(reference_from_body)`.
+
+    The explicit complementary filter on rotations with corrections that arrive now and then: an attitude seen in an
+    image, say, among the readings of a gyroscope. `time_constant_s` (None: 0.15) is the time after which a difference
+    from the reference has shrunk to 1/e; `bias_time_constant_s` (None: 4) that over which a lasting difference becomes
+    a bias of the rates. Raises `tiltvp.errors.InvalidInputError`.
+    """
+
+    def __new__(
+        cls,
+        reference_from_body: ArrayLike,
+        *,
+        time_constant_s: float | None = None,
+        bias_time_constant_s: float | None = None,
+    ) -> Self:
+        """Starts at an attitude (3, 3), with no bias."""
+
+    @property
+    def time_constant_s(self) -> float:
+        """Time after which a difference from the reference has shrunk to 1/e."""
+
+    @property
+    def bias_time_constant_s(self) -> float:
+        """Time over which a lasting difference becomes a bias of the rates."""
+
+    @property
+    def reference_from_body(self) -> NDArray[np.float64]:
+        """(3, 3): the attitude now, which takes vectors of the body to the frame of the reference."""
+
+    @property
+    def bias_rad_s(self) -> NDArray[np.float64]:
+        """(3,): the bias of the rates, in the body's axes."""
+
+    def predict(self, rate_rad_s: ArrayLike, duration_s: float) -> None:
+        """Turns on by a rate (3,), in the body's axes, that holds for so long."""
+
+    def correct(self, reference_from_body: ArrayLike) -> NDArray[np.float64]:
+        """Moves towards a reference (3, 3) by the share 1 - exp(-t / time_constant_s), t the time since the last one.
+
+        Returns (3,): the difference that it found, as a rotation vector in the body's axes.
+        """
+
+@disjoint_base
+class Laboratory:
+    """A plain room with a coloured cuboid, to be looked at by `tiltvp.synth.StereoSequence`.
+
+    Frozen, comparable, hashable, and to be pickled.
+    """
+
+    def __new__(
+        cls,
+        seed: SupportsIndex,
+        *,
+        size_m: ArrayLike | None = None,
+        gamma_rad: float | None = None,
+        clutter: float | None = None,
+        side_light: float | None = None,
+        light_spacing_m: float | None = None,
+        threads: SupportsIndex | None = None,
+    ) -> Self:
+        """Builds and lights it on `threads` threads (None: one per core), which do not matter."""
+
+    @property
+    def seed(self) -> int:
+        """The seed of everything in it."""
+
+    @property
+    def size_m(self) -> tuple[float, float, float]:
+        """Lengths of the cuboid's edges x, y, z."""
+
+    @property
+    def gamma_rad(self) -> float:
+        """The angle between the cuboid's level edges."""
+
+    @property
+    def clutter(self) -> float:
+        """How full the walls are, from 0 to 1."""
+
+    @property
+    def side_light(self) -> float:
+        """Power of the lamp beside the cuboid, from 0 to 1."""
+
+    @property
+    def light_spacing_m(self) -> float:
+        """Spacing of the points where light was gathered."""
+
+    def __eq__(self, other: object) -> bool: ...
+    def __hash__(self) -> int: ...
+
+@disjoint_base
+class StereoSequence:
+    """A moving pair of cameras, any frame of which can be rendered by `tiltvp.synth.StereoSequence`.
+
+    Frozen, comparable, hashable, and to be pickled. N is the number of frames.
+    """
+
+    def __new__(
+        cls,
+        scene: Laboratory | Room,
+        *,
+        left: Camera,
+        right: Camera,
+        left_from_right: ArrayLike | None = None,
+        frames: SupportsIndex | None = None,
+        frame_rate_hz: float | None = None,
+        seed: SupportsIndex | None = None,
+        corner: SupportsIndex | None = None,
+        distance_m: ArrayLike | None = None,
+        roll_max_rad: float | None = None,
+        period_s: float | None = None,
+        samples: SupportsIndex | None = None,
+        noise_sigma: float | None = None,
+        blur_sigma_px: float | None = None,
+        exposure_s: float | None = None,
+        gain: float | None = None,
+        threads: SupportsIndex | None = None,
+    ) -> Self:
+        """Finds a motion in the scene and makes rays on `threads` threads (None: one per core), which do not matter."""
+
+    @property
+    def scene(self) -> Laboratory | Room:
+        """What is looked at."""
+
+    @property
+    def cameras(self) -> tuple[Camera, Camera]:
+        """The left and the right camera."""
+
+    @property
+    def seed(self) -> int:
+        """The seed of motion and noise."""
+
+    @property
+    def corner(self) -> int:
+        """Which of the scene's corners is looked at."""
+
+    @property
+    def frame_rate_hz(self) -> float:
+        """Frames per second."""
+
+    @property
+    def exposure_s(self) -> float:
+        """How long the shutter is open."""
+
+    @property
+    def left_from_right(self) -> NDArray[np.float64]:
+        """(4, 4): the right camera's pose in the left one's frame."""
+
+    @property
+    def times_s(self) -> NDArray[np.float64]:
+        """(N,): when each frame is taken."""
+
+    @property
+    def poses(self) -> NDArray[np.float64]:
+        """(N, 4, 4): `world_from_left` at each frame."""
+
+    def poses_at(self, times_s: ArrayLike) -> NDArray[np.float64]:
+        """(T, 4, 4): `world_from_left` at any times (T,)."""
+
+    def _corners(self) -> list[tuple[list[float], list[list[float]], list[float], str]]: ...
+    def _render(
+        self, frame: SupportsIndex, *, threads: SupportsIndex | None = None
+    ) -> tuple[NDArray[np.uint8], NDArray[np.uint8]]: ...
+    def _truth(
+        self, frame: SupportsIndex, *, threads: SupportsIndex | None = None
+    ) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]: ...
+    def _imu(
+        self,
+        *,
+        rate_hz: float | None = None,
+        seed: SupportsIndex | None = None,
+        gyroscope: ArrayLike | None = None,
+        accelerometer: ArrayLike | None = None,
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]: ...
+    def __len__(self) -> int: ...
+    def __eq__(self, other: object) -> bool: ...
+    def __hash__(self) -> int: ...
+
 @disjoint_base
 class Drive:
     """A robot's way through a room, any frame of which can be rendered by `tiltvp.synth.Drive`.
@@ -1531,6 +1750,15 @@ class CalibrationStep:
     def started(self) -> int:
         """Landmarks seen for the first time."""
 
+    def to_dict(self) -> dict[str, Any]:
+        """The attributes by name."""
+
+    @classmethod
+    def from_dict(cls, values: dict[str, Any], /) -> Self:
+        """The step of a dict as `to_dict` makes it."""
+
+    def __copy__(self) -> Self: ...
+    def __deepcopy__(self, memo: object, /) -> Self: ...
     def __eq__(self, other: object, /) -> bool: ...
     def __ne__(self, other: object, /) -> bool: ...
 
@@ -1604,7 +1832,13 @@ class MountingEstimate:
     def to_dict(self) -> dict[str, Any]:
         """The attributes by name; arrays as nested lists."""
 
+    @classmethod
+    def from_dict(cls, values: dict[str, Any], /) -> Self:
+        """The estimate of a dict as `to_dict` makes it."""
+
     def __bool__(self) -> bool: ...
+    def __copy__(self) -> Self: ...
+    def __deepcopy__(self, memo: object, /) -> Self: ...
     def __eq__(self, other: object, /) -> bool: ...
     def __ne__(self, other: object, /) -> bool: ...
 
@@ -1629,7 +1863,11 @@ class SelfCalibrator:
         Distance at which landmarks are thought to be (3).
     start_distance_log_sigma, gate_probability, memory
         Of "default": standard deviation of the logarithm of that distance (1.5), probability with which a bearing
-        passes the gate (0.9999), and poses that are kept to be linearised anew (400).
+        passes the gate (0.9999), and poses that are kept to be linearised anew (400). Landmarks that are not seen from
+        the poses kept are forgotten: keep a whole drive's for loops to close.
+    step_sigma_m, step_sigma_rad
+        Of "default": standard deviations of every step's motion, in either direction and in turning, beside those that
+        grow with the wheels' displacements (0).
     start_distance_sigma_m, odometry_inflation
         Of "paper": standard deviation of that distance (2), and the factor by which the noise is inflated (5).
 
@@ -1651,6 +1889,8 @@ class SelfCalibrator:
         gate_probability: float | None = None,
         memory: SupportsIndex | None = None,
         odometry_inflation: float | None = None,
+        step_sigma_m: float | None = None,
+        step_sigma_rad: float | None = None,
     ) -> Self:
         """Makes a filter that has seen nothing."""
 
@@ -1740,7 +1980,13 @@ class LogCalibration:
     def to_dict(self) -> dict[str, Any]:
         """The attributes by name, those of the mounting among them; arrays as nested lists."""
 
+    @classmethod
+    def from_dict(cls, values: dict[str, Any], /) -> Self:
+        """The calibration of a dict as `to_dict` makes it."""
+
     def __bool__(self) -> bool: ...
+    def __copy__(self) -> Self: ...
+    def __deepcopy__(self, memo: object, /) -> Self: ...
     def __eq__(self, other: object, /) -> bool: ...
     def __ne__(self, other: object, /) -> bool: ...
 
@@ -1759,6 +2005,8 @@ def calibrate(
     estimate_time_offset: bool = False,
     times_s: ArrayLike | None = None,
     max_iterations: int | None = None,
+    step_sigma_m: float | None = None,
+    step_sigma_rad: float | None = None,
 ) -> LogCalibration:
     """The mounting from a whole log at once, by robust sparse least squares.
 
@@ -1831,3 +2079,485 @@ def simulate_drive(
     `mounting` is (x_m, y_m, yaw_rad), None: the paper's phi = -0.34, rho = 0.23, psi = 0.33. The noise is that of the
     defaults of `SelfCalibrator`, wheels are 0.4 m apart, `outliers` is the share of bearings that are of nothing.
     """
+
+@final
+class CornerFeature:
+    """One vertex and the three rays x, y (the vertical one) and z of a corner, as one camera sees it.
+
+    Frozen, comparable, and to be pickled.
+    """
+
+    @property
+    def vertex(self) -> NDArray[np.float64]:
+        """(3,): unit bearing of the vertex, camera frame."""
+
+    @property
+    def vertex_covariance_rad2(self) -> NDArray[np.float64]:
+        """(2, 2) in squared radians: covariance of the vertex in its tangent plane."""
+
+    @property
+    def residual_rad(self) -> float:
+        """Root mean square of the vertex' distances from the three rays' great circles, radians."""
+
+    @property
+    def meets_probability(self) -> float:
+        """The probability that three edges that do meet miss their vertex by more."""
+
+    @property
+    def normals(self) -> NDArray[np.float64]:
+        """(3, 3), rows x, y, z: unit normals of the rays' great circles, `vertex x toward` up to length."""
+
+    @property
+    def toward(self) -> NDArray[np.float64]:
+        """(3, 3), rows x, y, z: a unit bearing near the far end of each ray."""
+
+    @property
+    def ray_covariances_rad2(self) -> NDArray[np.float64]:
+        """(3, 2, 2) in squared radians: covariance of each normal in its tangent plane."""
+
+    @property
+    def support_px(self) -> list[int]:
+        """How many places of each ray it was fitted to."""
+
+    @property
+    def ray_rms_rad(self) -> list[float]:
+        """Root mean square distance of these from each ray, radians."""
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain numbers and lists, good for JSON."""
+
+    @classmethod
+    def from_dict(cls, values: dict[str, Any]) -> Self:
+        """The corner that `to_dict` wrote."""
+
+    def __eq__(self, other: object, /) -> bool: ...
+    def __copy__(self) -> Self: ...
+    def __deepcopy__(self, _memo: Any) -> Self: ...
+
+@disjoint_base
+class CornerDetector:
+    """Finds corners in single images of one camera; `tiltvp.corner.CornerDetector` takes images of any usual kind."""
+
+    def __new__(
+        cls,
+        camera: Camera,
+        *,
+        method: Literal["coloured", "general"] | str = ...,
+        mask: NDArray[np.bool_] | None = None,
+        **options: Any,
+    ) -> Self:
+        """Makes the tables. `options` tells the options in force; docs/corner_images.md says what they mean."""
+
+    @property
+    def camera(self) -> Camera:
+        """The camera whose images are read."""
+
+    @property
+    def method(self) -> str:
+        """The name of the front end."""
+
+    @property
+    def mask(self) -> NDArray[np.bool_] | None:
+        """Fresh (H, W) bool, or None: which pixels may be used."""
+
+    @property
+    def options(self) -> dict[str, Any]:
+        """The options that are in force, by name, defaults included."""
+
+    def _detect_gray(self, image: NDArray[np.uint8], vertical: ArrayLike | None) -> list[CornerFeature]: ...
+    def _detect_color(self, image: NDArray[np.uint8]) -> list[CornerFeature]: ...
+    def _segments(self, image: NDArray[np.uint8]) -> NDArray[np.float64]: ...
+    def __eq__(self, other: object) -> bool: ...
+    def __hash__(self) -> int: ...
+
+@final
+class CornerHypothesis:
+    """One explanation of what is seen: an attitude, from two cameras also a place, and how likely it is."""
+
+    @property
+    def camera_from_object(self) -> NDArray[np.float64]:
+        """Fresh (3, 3): the rotation from the object's frame to the left camera's."""
+
+    @property
+    def edges(self) -> NDArray[np.float64]:
+        """Fresh (3, 3), rows x, y, z: directions of the corner's edges away from its vertex, left camera's frame."""
+
+    @property
+    def vertex_m(self) -> NDArray[np.float64] | None:
+        """Fresh (3,): the vertex in the left camera's frame, metres; None from one image."""
+
+    @property
+    def camera_in_object_m(self) -> NDArray[np.float64] | None:
+        """Fresh (3,): where the left camera is in the object's frame, metres; None from one image."""
+
+    @property
+    def covariance(self) -> NDArray[np.float64]:
+        """Fresh (6, 6): of the attitude's rotation vector (radians) and of the vertex (metres), left camera's frame."""
+
+    @property
+    def probability(self) -> float:
+        """The probability that it is this one, in [0, 1]."""
+
+    @property
+    def right_handed(self) -> bool:
+        """Whether the edges x, y, z are a right-handed triple, as of an outer corner."""
+
+    @property
+    def misfit(self) -> float:
+        """Root mean square misfit per degree of freedom in standard deviations; 0 for a single feature."""
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain numbers and lists, good for JSON."""
+
+    def __eq__(self, other: object) -> bool: ...
+
+@final
+class CornerEstimate:
+    """What one frame tells of a corner: the likeliest pose if one stands out, and all hypotheses. False without a
+    pose.
+    """
+
+    @property
+    def pose(self) -> CornerHypothesis | None:
+        """The pose; None where none stands out."""
+
+    @property
+    def hypotheses(self) -> list[CornerHypothesis]:
+        """All hypotheses, the likeliest first."""
+
+    @property
+    def confidence(self) -> float:
+        """The probability of the likeliest hypothesis; 0 where there is none."""
+
+    @property
+    def reason(self) -> str:
+        """Why there is no pose; empty where there is one."""
+
+    @property
+    def features_left(self) -> list[CornerFeature]:
+        """The corners of the left or only image."""
+
+    @property
+    def features_right(self) -> list[CornerFeature]:
+        """The corners of the right image."""
+
+    @property
+    def chosen_left(self) -> list[int]:
+        """Which corners of the left image the pose is from, the one that is its object first."""
+
+    @property
+    def chosen_right(self) -> int | None:
+        """Which corner of the right image it is from, or None."""
+
+    @property
+    def followed(self) -> bool:
+        """Whether the pose of a frame before was a prior."""
+
+    @property
+    def object(self) -> int:
+        """The number of the corner that is the object, from 1: it grows where another corner has become the object."""
+
+    def __bool__(self) -> bool: ...
+    def __eq__(self, other: builtins.object) -> bool: ...
+
+@disjoint_base
+class CornerPoseEstimator:
+    """Poses from the images of one camera or a pair; `tiltvp.corner.CornerPoseEstimator` takes cameras and any
+    images.
+    """
+
+    def __new__(
+        cls,
+        left: CornerDetector,
+        right: CornerDetector | None = None,
+        left_from_right: ArrayLike | None = None,
+        **options: Any,
+    ) -> Self: ...
+    @property
+    def left(self) -> CornerDetector:
+        """The detector of the left or only camera."""
+
+    @property
+    def right(self) -> CornerDetector | None:
+        """The detector of the right camera, or None."""
+
+    @property
+    def left_from_right(self) -> NDArray[np.float64] | None:
+        """Fresh (4, 4), or None: the right camera's pose in the left one's frame."""
+
+    @property
+    def options(self) -> dict[str, Any]:
+        """The options that are in force, by name, defaults included."""
+
+    @property
+    def _coloured(self) -> bool: ...
+    def reset(self) -> None:
+        """Forgets the poses of the frames before."""
+
+    def _observe(self, left: NDArray[np.uint8], right: NDArray[np.uint8] | None) -> CornerEstimate: ...
+
+@final
+class CornerAttitude:
+    """One attitude that the rays of a corner admit. Frozen, comparable (bit by bit), hashable, and to be pickled."""
+
+    @property
+    def camera_from_object(self) -> NDArray[np.float64]:
+        """(3, 3): the rotation R in v_camera = R v_object, whose columns are the edge x, the edge y, and x cross y."""
+
+    @property
+    def edges(self) -> NDArray[np.float64]:
+        """(3, 3): the directions of the edges x, y, z away from the vertex, camera frame, one a row."""
+
+    @property
+    def alpha_rad(self) -> float:
+        """The angle between the vertical edge and the line of sight to the vertex, in [0, pi] radians."""
+
+    @property
+    def mirrored(self) -> bool:
+        """Whether this is the second of the two interpretations (fig. 3c), the inner instead of the outer corner."""
+
+    @property
+    def case(self) -> str:
+        """How the edges of the imaginary box stand: "all-away", "one-perpendicular" or "one-toward"."""
+
+    @property
+    def right_handed(self) -> bool:
+        """Whether the edges x, y, z are a right-handed triple; the two interpretations differ in it."""
+
+    @property
+    def covariance_rad2(self) -> NDArray[np.float64]:
+        """(3, 3) in squared radians: covariance of the rotation vector w, camera frame, of the error.
+
+        The true rotation is exp(w) times `camera_from_object`. Infinite where two roots fall together.
+        """
+
+    @property
+    def sensitivity(self) -> float:
+        """Radians of attitude per radian of the rays' angles about the vertex; infinite where roots fall together."""
+
+    def to_dict(self) -> dict[str, Any]:
+        """The attributes by name; arrays as nested lists."""
+
+    @classmethod
+    def from_dict(cls, values: dict[str, Any]) -> Self:
+        """The value of a dict as `to_dict` makes it."""
+
+    def __eq__(self, other: object, /) -> bool: ...
+    def __hash__(self) -> int: ...
+    def __copy__(self) -> Self: ...
+    def __deepcopy__(self, _memo: Any) -> Self: ...
+
+@final
+class CornerAttitudes:
+    """Every attitude of many corners, as arrays of as many rows as there are attitudes.
+
+    Frozen, comparable, hashable, and to be pickled.
+    """
+
+    @property
+    def corners(self) -> int:
+        """How many corners were asked for; several attitudes or none may belong to each."""
+
+    @property
+    def corner(self) -> NDArray[np.int64]:
+        """(M,): to which corner each attitude belongs, rising."""
+
+    @property
+    def camera_from_object(self) -> NDArray[np.float64]:
+        """(M, 3, 3): the rotations R in v_camera = R v_object."""
+
+    @property
+    def edges(self) -> NDArray[np.float64]:
+        """(M, 3, 3): the directions of the edges x, y, z away from the vertex, camera frame, one a row."""
+
+    @property
+    def alpha_rad(self) -> NDArray[np.float64]:
+        """(M,): the angles between the vertical edge and the line of sight, radians."""
+
+    @property
+    def mirrored(self) -> NDArray[np.bool_]:
+        """(M,): whether it is the second of two interpretations."""
+
+    @property
+    def case(self) -> list[str]:
+        """How the edges of the imaginary boxes stand, by name."""
+
+    @property
+    def right_handed(self) -> NDArray[np.bool_]:
+        """(M,): whether the edges x, y, z are a right-handed triple."""
+
+    @property
+    def sensitivity(self) -> NDArray[np.float64]:
+        """(M,): radians of attitude per radian of the rays' angles about the vertex."""
+
+    def of(self, corner: int) -> list[CornerAttitude]:
+        """The attitudes of one corner, by its number."""
+
+    def __len__(self) -> int: ...
+    def to_dict(self) -> dict[str, Any]:
+        """The number of corners and, for each attitude, its corner and its own dict."""
+
+    @classmethod
+    def from_dict(cls, values: dict[str, Any]) -> Self:
+        """The value of a dict as `to_dict` makes it."""
+
+    def __eq__(self, other: object, /) -> bool: ...
+    def __hash__(self) -> int: ...
+    def __copy__(self) -> Self: ...
+    def __deepcopy__(self, _memo: Any) -> Self: ...
+
+@final
+class ResolvedAttitude:
+    """One attitude that several features agree on, with how likely it is among all such.
+
+    Frozen, comparable, hashable, and to be pickled.
+    """
+
+    @property
+    def common_from_object(self) -> NDArray[np.float64]:
+        """(3, 3): the rotation from the first feature's object to the frame that all features share."""
+
+    @property
+    def covariance_rad2(self) -> NDArray[np.float64]:
+        """(3, 3) in squared radians: covariance of the rotation vector, common frame, of the error."""
+
+    @property
+    def probability(self) -> float:
+        """The probability that it is this one and none of the others, in [0, 1]."""
+
+    @property
+    def choice(self) -> tuple[int, ...]:
+        """Which attitude of each feature it is, in the order of `tiltvp.corner.attitudes`."""
+
+    @property
+    def chi_square(self) -> float:
+        """How far the features are apart: chi-square of three degrees of freedom per feature after the first.
+
+        Two where only the vertical is shared.
+        """
+
+    def to_dict(self) -> dict[str, Any]:
+        """The attributes by name; arrays as nested lists."""
+
+    @classmethod
+    def from_dict(cls, values: dict[str, Any]) -> Self:
+        """The value of a dict as `to_dict` makes it."""
+
+    def __eq__(self, other: object, /) -> bool: ...
+    def __ne__(self, other: object, /) -> bool: ...
+    def __hash__(self) -> int: ...
+    def __copy__(self) -> Self: ...
+    def __deepcopy__(self, _memo: Any) -> Self: ...
+
+@final
+class CornerPose:
+    """One pose of a corner before a pair of cameras. Frozen, comparable, hashable, and to be pickled."""
+
+    @property
+    def camera_from_object(self) -> NDArray[np.float64]:
+        """(3, 3): the rotation R in v_camera = R v_object, of the left camera."""
+
+    @property
+    def vertex_m(self) -> NDArray[np.float64]:
+        """(3,): the vertex, which is the object's origin, in the left camera's frame, metres."""
+
+    @property
+    def covariance(self) -> NDArray[np.float64]:
+        """(6, 6): covariance of the rotation vector (radians) and of the vertex (metres), left camera's frame."""
+
+    @property
+    def probability(self) -> float:
+        """The probability that it is this pose and none of the others that the rays admit, in [0, 1]."""
+
+    @property
+    def mirrored(self) -> bool:
+        """Whether this is the second of the two interpretations in the left image (fig. 3c)."""
+
+    @property
+    def case(self) -> str:
+        """How the edges of the imaginary box stand to the left camera's line of sight."""
+
+    @property
+    def right_handed(self) -> bool:
+        """Whether the edges x, y, z are a right-handed triple."""
+
+    @property
+    def chi_square(self) -> float:
+        """The squared misses of the rays, each by its covariance: chi-square of six degrees of freedom."""
+
+    @property
+    def fused(self) -> bool:
+        """Whether all six rays were fused; where not, covariances between attitude and vertex are left out."""
+
+    @property
+    def camera_in_object_m(self) -> NDArray[np.float64]:
+        """(3,): where the left camera is in the object's frame, metres."""
+
+    @property
+    def camera_in_object_covariance_m2(self) -> NDArray[np.float64]:
+        """(3, 3): its covariance, square metres."""
+
+    def to_dict(self) -> dict[str, Any]:
+        """The attributes by name; arrays as nested lists."""
+
+    @classmethod
+    def from_dict(cls, values: dict[str, Any]) -> Self:
+        """The value of a dict as `to_dict` makes it."""
+
+    def __eq__(self, other: object, /) -> bool: ...
+    def __ne__(self, other: object, /) -> bool: ...
+    def __hash__(self) -> int: ...
+    def __copy__(self) -> Self: ...
+    def __deepcopy__(self, _memo: Any) -> Self: ...
+
+def solve_corner(
+    vertex: ArrayLike, x_ray: ArrayLike, y_ray: ArrayLike, z_ray: ArrayLike, gamma_rad: float
+) -> list[CornerAttitude]:
+    """Every attitude that a corner seen at exact bearings may have; see `tiltvp.corner.solve`."""
+
+def solve_corners(
+    vertex: ArrayLike, x_ray: ArrayLike, y_ray: ArrayLike, z_ray: ArrayLike, gamma_rad: ArrayLike
+) -> CornerAttitudes:
+    """The same for many corners at once; see `tiltvp.corner.solve_many`."""
+
+def fit_corner(x: ArrayLike, y: ArrayLike, z: ArrayLike, sigma_rad: float) -> CornerFeature:
+    """A corner from unit bearings along its rays; see `tiltvp.corner.fit`."""
+
+def corner_attitudes(feature: CornerFeature, gamma_rad: float, gamma_sigma_rad: float) -> list[CornerAttitude]:
+    """Every attitude that a feature admits, with covariance; see `tiltvp.corner.attitudes`."""
+
+def screen_corner(feature: CornerFeature, gamma_rad: float) -> str | None:
+    """Why a feature is no corner of that angle, in a sentence; None if it is one."""
+
+def included_angle(
+    feature: CornerFeature, vertical: ArrayLike, vertical_covariance_rad2: ArrayLike
+) -> tuple[float, float] | None:
+    """The included angle of the horizontal edges and its standard deviation; see `tiltvp.corner.included_angle`."""
+
+def resolve_corners(
+    features: Sequence[CornerFeature],
+    common_from_camera: Sequence[ArrayLike],
+    gamma_rad: float,
+    gamma_sigma_rad: float,
+    alignment: str,
+    right_handed: bool | None,
+    priors: Iterable[Any],
+) -> list[ResolvedAttitude]:
+    """The attitudes that several features agree on, the likeliest first; see `tiltvp.corner.resolve`."""
+
+def corner_poses(
+    left: CornerFeature,
+    right: CornerFeature,
+    left_from_right: ArrayLike,
+    gamma_rad: float,
+    gamma_sigma_rad: float,
+    right_handed: bool | None,
+    priors: Iterable[Any],
+    fuse: bool,
+) -> list[CornerPose]:
+    """The poses that explain the features of a pair of cameras, the likeliest first; see `tiltvp.corner.poses`."""
+
+def triangulate(
+    bearings: ArrayLike, covariances_rad2: Sequence[ArrayLike], rig_from_camera: Sequence[ArrayLike]
+) -> tuple[NDArray[np.float64], NDArray[np.float64], float] | None:
+    """The point that bearings of two or more cameras meet in; see `tiltvp.corner.triangulate`."""

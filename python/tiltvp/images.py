@@ -15,7 +15,7 @@ from tiltvp.errors import ImageFileError, InvalidInputError
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
-__all__ = ["gray_from", "read_image", "write_image"]
+__all__ = ["bgr_from", "gray_from", "read_image", "write_image"]
 
 _EXPECTED = "(H, W) or (H, W, 3 or 4 in BGR order) of uint8, uint16, or float in [0, 1]"
 
@@ -42,6 +42,21 @@ def gray_from(image: ArrayLike, name: str = "image") -> NDArray[np.uint8]:
             code = cv2.COLOR_BGR2GRAY if levels.shape[2] == 3 else cv2.COLOR_BGRA2GRAY
             levels = np.asarray(cv2.cvtColor(np.ascontiguousarray(levels), code), dtype=np.uint8)
     return np.ascontiguousarray(levels)
+
+
+def bgr_from(image: ArrayLike, name: str = "image") -> NDArray[np.uint8]:
+    """A C-contiguous (H, W, 3) uint8 array in BGR order from a colour image of any usual kind; never altered.
+
+    As `gray_from`; grey images are refused too.
+    """
+    expected = "(H, W, 3 or 4 in BGR order) of uint8, uint16, or float in [0, 1]"
+    try:
+        array = np.asarray(image)
+    except ValueError as error:
+        raise InvalidInputError(f"{name}: cannot be made an array ({error}), expected {expected}") from error
+    if array.ndim != 3 or array.shape[2] not in (3, 4) or array.size == 0:
+        raise InvalidInputError(f"{name}: shape {array.shape}, expected {expected}")
+    return np.ascontiguousarray(_bytes_from(array[:, :, :3], name))
 
 
 def _bytes_from(array: NDArray[Any], name: str) -> NDArray[np.uint8]:

@@ -48,12 +48,15 @@ def follow_lines(
     one before. The motion of a frame that cannot be used is added to that of the next. Raises `InvalidInputError` if
     there are more images than motions.
     """
-    turn_rad = 0.0
+    # Motions without any distance tell turns only.
+    drives = motions is not None and any(motion.distance_m for motion in motions)
+    turn_rad, distance_m = 0.0, 0.0
     for number, image in enumerate(images):
         if motions is not None:
             if number >= len(motions):
                 raise InvalidInputError(f"motions: {len(motions)}, expected one for each image")
             turn_rad += motions[number].yaw_rad
+            distance_m += motions[number].distance_m
         try:
             if isinstance(image, TiltvpError):
                 raise image
@@ -62,9 +65,13 @@ def follow_lines(
         except TiltvpError as error:
             yield error
             continue
-        known = None if motions is None else turn_rad
-        tracked = tracker.update(lines, extractor.describe(gray, lines), yaw_change_rad=known)
-        turn_rad = 0.0
+        tracked = tracker.update(
+            lines,
+            extractor.describe(gray, lines),
+            yaw_change_rad=None if motions is None else turn_rad,
+            distance_m=distance_m if drives else None,
+        )
+        turn_rad, distance_m = 0.0, 0.0
         yield FollowedFrame(number, gray, tracked)
 
 

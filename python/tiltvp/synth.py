@@ -1,4 +1,4 @@
-"""Seeded rooms and drives with known truth: data for demos, tests and experiments."""
+"""Seeded rooms, drives and stereo sequences with known truth: data for demos, tests and experiments."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ import numpy as np
 from tiltvp import _core
 from tiltvp._core import SimulatedDrive, drive_legs, simulate_drive
 from tiltvp.cameras import Camera
+from tiltvp.stereo_scenes import ImuLog, Laboratory, SceneCorner, StereoSequence, StereoTruth, zed_cameras
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
@@ -21,13 +22,19 @@ __all__ = [
     "WALL_PATTERNS",
     "Drive",
     "DriveTruth",
+    "ImuLog",
+    "Laboratory",
     "Room",
     "RoomImage",
+    "SceneCorner",
     "SimulatedDrive",
+    "StereoSequence",
+    "StereoTruth",
     "drive_legs",
     "mirror_camera",
     "render_room",
     "simulate_drive",
+    "zed_cameras",
 ]
 
 ROOM_KINDS: tuple[str, ...] = tuple(_core.ROOM_KINDS)

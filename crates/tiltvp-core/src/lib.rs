@@ -5,13 +5,14 @@
 //! 1. [`error`], [`geometry`]
 //! 2. [`camera`], [`image`], [`robust`], [`filter`]
 //! 3. [`edges`]
-//! 4. [`tilt`], [`lines`]
+//! 4. [`tilt`], [`corner`], [`lines`]
 //! 5. [`selfcalib`]
 //!
 //! Angles are radians, lengths metres, pixel centres integers, rays unit bearings. The camera frame has `z` along the
 //! optical axis, `x` to the right (columns) and `y` down (rows); the robot frame has `x` forward, `y` left, `z` up.
 
 pub mod camera;
+pub mod corner;
 pub mod edges;
 pub mod error;
 pub mod filter;

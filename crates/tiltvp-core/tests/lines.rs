@@ -11,8 +11,8 @@ use scene::{Image, constant, dice, fisheye, noise, stripes};
 use tiltvp_core::camera::{Camera, Model, Unified};
 use tiltvp_core::geometry::Tilt;
 use tiltvp_core::lines::{
-    Line, LineExtractor, LineOptions, LineTracker, Lines, MatchOptions, MatchScratch, TrackedLine, TrackerOptions,
-    TrackerState, descriptor_distances, match_descriptors,
+    Line, LineExtractor, LineOptions, LineTracker, Lines, MatchOptions, MatchScratch, Motion, TrackedLine,
+    TrackerOptions, TrackerState, descriptor_distances, match_descriptors,
 };
 
 /// A hyperbolic mirror that is seen from 30 degrees above the horizon to the camera below.
@@ -84,7 +84,8 @@ fn bearings_are_true_for_any_camera_mounting_and_lean() {
         let nees = squares / all.len() as f64;
         println!("{name}: {} lines, rms {:.4} deg, NEES {nees:.2}", all.len(), rms.to_degrees());
         assert!(all.len() > 70 && rms < 0.05f64.to_radians(), "{name}: {} lines, rms {rms}", all.len());
-        assert!((0.005..2.0).contains(&nees), "{name}: NEES {nees}");
+        // The floor of the standard deviations is for rooms, whose edges are no perfect steps.
+        assert!((0.01..1.0).contains(&nees), "{name}: NEES {nees}");
     }
 }
 
@@ -218,7 +219,8 @@ fn a_known_turn_keeps_far_lines_apart_and_unknown_turns_do_not() {
     let see = |tracker: &mut LineTracker, bearing: f64, turn: Option<f64>| {
         let mut out = Vec::new();
         let (lines, descriptors) = frame(&[0, 1, 2], |name| bearing + 1.0 * name as f64);
-        tracker.update(&lines, &descriptors, turn, &mut out).unwrap();
+        let motion = turn.map(|turn_rad| Motion { turn_rad, distance_m: Some(0.0) });
+        tracker.update(&lines, &descriptors, motion.as_ref(), &mut out).unwrap();
         out.iter().map(|line| line.track).collect::<Vec<_>>()
     };
     let mut tracker = LineTracker::default();
@@ -229,6 +231,111 @@ fn a_known_turn_keeps_far_lines_apart_and_unknown_turns_do_not() {
     assert_eq!(see(&mut tracker, 2.0, None), [3, 4, 5]);
     let state = TrackerState { next_track: 1, ..tracker.state().clone() };
     assert!(LineTracker::with_state(TrackerOptions::default(), state).is_err());
+}
+
+/// Edges around a robot that drives to and fro, the nearest half a metre away, three of them alike: each keeps its track, also
+/// after frames without it.
+#[test]
+fn a_known_motion_keeps_near_edges_and_edges_that_look_alike_on_their_tracks() {
+    let edges: Vec<[f64; 2]> =
+        vec![[0.2, 0.7], [0.3, -0.6], [2.0, 1.0], [2.0, 1.08], [2.0, 1.16], [-1.5, 2.0], [0.3, -2.0], [-1.2, -0.8]];
+    for (camera_m, seed) in [([0.0; 2], 1), ([0.15, -0.1], 2)] {
+        let mut tracker = LineTracker::new(TrackerOptions { camera_m, ..TrackerOptions::default() }).unwrap();
+        let (mut x, mut y, mut yaw, mut out) = (0.0f64, 0.0f64, 0.0f64, Vec::new());
+        for k in 0..40u64 {
+            let (distance, turn) = if (10..30).contains(&k) { (-0.04, -0.03) } else { (0.04, -0.03) };
+            if k > 0 {
+                let chord = distance * (0.5f64 * turn).sin() / (0.5 * turn);
+                (x, y) = (x + chord * (yaw + 0.5 * turn).cos(), y + chord * (yaw + 0.5 * turn).sin());
+                yaw += turn;
+            }
+            let (s, c) = yaw.sin_cos();
+            let at = [x + c * camera_m[0] - s * camera_m[1], y + s * camera_m[0] + c * camera_m[1]];
+            let bearing = |name: usize| {
+                let angle = (edges[name][1] - at[1]).atan2(edges[name][0] - at[0]) - yaw;
+                angle.sin().atan2(angle.cos()) + 2e-3 * (dice(seed, 100 * k + name as u64) - 0.5)
+            };
+            // Edge 6 blinks, edges 2 to 4 have one descriptor.
+            let names: Vec<usize> = (0..edges.len()).filter(|name| *name != 6 || k % 4 == 0).collect();
+            let (lines, mut descriptors) = frame(&names, bearing);
+            for (i, name) in names.iter().enumerate().filter(|(_, name)| (3..5).contains(*name)) {
+                descriptors[i * 64 + name] = 0.0;
+                descriptors[i * 64 + 2] = 1.0;
+            }
+            // Encoders err.
+            let told = Motion {
+                turn_rad: if k > 0 { turn + 0.01 * (dice(seed + 9, k) - 0.5) } else { 0.0 },
+                distance_m: Some(if k > 0 { distance } else { 0.0 }),
+            };
+            tracker.update(&lines, &descriptors, Some(&told), &mut out).unwrap();
+            for (tracked, name) in out.iter().zip(&names) {
+                assert_eq!(tracked.track as usize, *name, "frame {k}");
+            }
+        }
+    }
+}
+
+/// What a tracker makes of three frames by a distance and a turn, by a turn alone, and by nothing.
+fn course(options: TrackerOptions) -> (Vec<Vec<TrackedLine>>, TrackerState) {
+    let mut tracker = LineTracker::new(options).unwrap();
+    let mut all = Vec::new();
+    let metric = Motion { turn_rad: 0.02, distance_m: Some(0.05) };
+    for (k, motion) in [None, Some(metric), Some(Motion { distance_m: None, ..metric }), None].iter().enumerate() {
+        let off = k as f64;
+        let (lines, mut descriptors) = frame(&[0, 1, 2, 3, 4], |name| 0.5 + name as f64 - 0.02 * off);
+        let mut lines = lines;
+        // One is off, one looks another way, one is off and looks another way.
+        lines.lines[1].bearing_rad -= 0.045 * off;
+        for (line, share) in [(2, 0.6 * off), (3, 0.3 * off)] {
+            descriptors[line * 64 + 40 + k] = share as f32;
+        }
+        lines.lines[3].bearing_rad += 0.02 * off;
+        let mut out = Vec::new();
+        tracker.update(&lines, &descriptors, motion.as_ref(), &mut out).unwrap();
+        all.push(out);
+    }
+    (all, tracker.state().clone())
+}
+
+#[test]
+fn every_option_of_the_tracker_is_read() {
+    let plain = TrackerOptions::default();
+    let matching = |distance_max, mean_ratio_max, second_ratio_max| TrackerOptions {
+        matching: MatchOptions { distance_max, mean_ratio_max, second_ratio_max, ..plain.matching },
+        ..plain
+    };
+    for (name, options) in [
+        ("look_back", TrackerOptions { look_back: 2, ..plain }),
+        ("f1", matching(0.1, 0.75, 0.8)),
+        ("f2", matching(1.05, 0.1, 0.8)),
+        ("f3", matching(1.05, 0.75, 0.1)),
+        ("nearest_m", TrackerOptions { nearest_m: 1.0, ..plain }),
+        ("camera_m", TrackerOptions { camera_m: [0.3, 0.1], ..plain }),
+        ("turn_sigma_rad", TrackerOptions { turn_sigma_rad: 0.05, ..plain }),
+        ("distance_sigma", TrackerOptions { distance_sigma: 0.9, ..plain }),
+        ("rate_sigma_rad", TrackerOptions { rate_sigma_rad: 0.001, ..plain }),
+        ("bearing_sigma_rad", TrackerOptions { bearing_sigma_rad: 0.02, ..plain }),
+        ("gate_sigmas", TrackerOptions { gate_sigmas: 0.2, ..plain }),
+        ("descriptor_sigma", TrackerOptions { descriptor_sigma: 0.1, ..plain }),
+        ("descriptor_max", TrackerOptions { descriptor_max: 0.1, ..plain }),
+        ("new_cost", TrackerOptions { new_cost: 1.0, ..plain }),
+    ] {
+        let (mine, other) = (course(plain), course(options));
+        // The last frame is matched without a motion: only tracks tell how it went.
+        let tracks = |all: &[Vec<TrackedLine>]| all.concat().iter().map(|line| line.track).collect::<Vec<_>>();
+        let told = |c: &(Vec<Vec<TrackedLine>>, TrackerState)| (tracks(&c.0), c.1.frames.len());
+        let near = |c: &TrackerOptions| {
+            let mut tracker = LineTracker::new(*c).unwrap();
+            let metric = Motion { turn_rad: 0.02, distance_m: Some(0.05) };
+            let mut out = Vec::new();
+            for k in 0..2 {
+                let (lines, descriptors) = frame(&[0, 1], |name| 0.5 + name as f64 - 0.02 * f64::from(k));
+                tracker.update(&lines, &descriptors, Some(&metric), &mut out).unwrap();
+            }
+            tracker.state().followed.clone()
+        };
+        assert!(told(&mine) != told(&other) || near(&plain) != near(&options), "{name} changes nothing");
+    }
 }
 
 #[test]

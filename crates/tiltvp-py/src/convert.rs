@@ -1,11 +1,14 @@
 //! The one door for arrays: what comes in is checked for type, shape and content, what goes out is fresh.
 
 use nalgebra::{Matrix2, Matrix3, Vector3};
-use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray2, PyUntypedArray, PyUntypedArrayMethods};
+use numpy::{
+    PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray2, PyReadonlyArray3, PyUntypedArray,
+    PyUntypedArrayMethods,
+};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use tiltvp_core::edges::Mask;
-use tiltvp_core::image::ImageView;
+use tiltvp_core::image::{ColorView, ImageView};
 
 use crate::call::{exception, invalid};
 
@@ -87,6 +90,26 @@ pub(crate) fn view<'a>(image: &'a PyReadonlyArray2<'_, u8>) -> PyResult<ImageVie
     let shape = image.shape();
     let data = image.as_slice().map_err(|error| invalid(format!("image: {error}")))?;
     ImageView::new(data, shape[1], shape[0], shape[1]).map_err(|error| exception(&error))
+}
+
+/// A C-contiguous `(H, W, 3)` array of bytes.
+pub(crate) fn color<'py>(value: &Bound<'py, PyAny>, name: &str) -> PyResult<PyReadonlyArray3<'py, u8>> {
+    let array = value.cast::<PyArray3<u8>>().ok().filter(|array| array.shape()[2] == 3);
+    let Some(array) = array else {
+        return Err(invalid(format!("{name}: {}, expected a (H, W, 3) array of uint8", describe(value))));
+    };
+    let array = array.try_readonly().map_err(|error| invalid(format!("{name}: {error}")))?;
+    if !array.is_c_contiguous() {
+        return Err(invalid(format!("{name}: strided, expected C-contiguous rows")));
+    }
+    Ok(array)
+}
+
+/// Such an array as the core sees it.
+pub(crate) fn color_view<'a>(image: &'a PyReadonlyArray3<'_, u8>) -> PyResult<ColorView<'a>> {
+    let shape = image.shape();
+    let data = image.as_slice().map_err(|error| invalid(format!("image: {error}")))?;
+    ColorView::new(data, shape[1], shape[0], 3 * shape[1]).map_err(|error| exception(&error))
 }
 
 /// A `(H, W)` array of bool, with its shape.

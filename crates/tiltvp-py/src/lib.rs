@@ -2,11 +2,14 @@
 
 mod call;
 mod camera;
+mod complementary;
 mod convert;
+mod corner;
 mod drive;
 mod lines;
 mod rays;
 mod selfcalib;
+mod stereo;
 mod synth;
 mod tilt;
 
@@ -19,6 +22,14 @@ mod _core {
 
     #[pymodule_export]
     use crate::camera::Camera;
+    #[pymodule_export]
+    use crate::complementary::ComplementaryFilter;
+    #[pymodule_export]
+    use crate::corner::{
+        CornerAttitude, CornerAttitudes, CornerDetector, CornerEstimate, CornerFeature, CornerHypothesis, CornerPose,
+        CornerPoseEstimator, ResolvedAttitude, corner_attitudes, corner_poses, fit_corner, included_angle,
+        resolve_corners, screen_corner, solve_corner, solve_corners, triangulate,
+    };
     #[pymodule_export]
     use crate::drive::Drive;
     #[pymodule_export]
@@ -34,6 +45,8 @@ mod _core {
         drive_legs, simulate_drive, wheel_displacements,
     };
     #[pymodule_export]
+    use crate::stereo::{Laboratory, StereoSequence};
+    #[pymodule_export]
     use crate::synth::Room;
     #[pymodule_export]
     use crate::tilt::{
@@ -47,6 +60,7 @@ mod _core {
     fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {
         module.add("METHODS", tiltvp_core::tilt::METHODS.to_vec())?;
         module.add("CALIBRATION_METHODS", tiltvp_core::selfcalib::CALIBRATION_METHODS.to_vec())?;
+        module.add("CORNER_METHODS", tiltvp_core::corner::CORNER_METHODS.to_vec())?;
         module.add("LINE_METHODS", tiltvp_core::lines::LINE_METHODS.to_vec())?;
         module.add("CAMERA_MODELS", tiltvp_core::camera::Model::names().collect::<Vec<_>>())?;
         module.add("ROOM_KINDS", tiltvp_synth::RoomKind::ALL.map(tiltvp_synth::RoomKind::name).to_vec())?;

@@ -30,6 +30,8 @@ pub(crate) struct SelfCalibrator {
 struct Given<'a, 'py> {
     bearing_sigma_rad: Option<f64>,
     odometry_k_m: Option<f64>,
+    step_sigma_m: Option<f64>,
+    step_sigma_rad: Option<f64>,
     start: Option<&'a Bound<'py, PyAny>>,
     start_sigma: Option<&'a Bound<'py, PyAny>>,
     start_distance_m: Option<f64>,
@@ -41,6 +43,8 @@ fn options(wheel_base_m: f64, given: &Given<'_, '_>) -> PyResult<SelfCalibratorO
     for (value, field) in [
         (given.bearing_sigma_rad, &mut options.bearing_sigma_rad),
         (given.odometry_k_m, &mut options.odometry_k_m),
+        (given.step_sigma_m, &mut options.step_sigma_m),
+        (given.step_sigma_rad, &mut options.step_sigma_rad),
         (given.start_distance_m, &mut options.start_distance_m),
         (given.start_distance_log_sigma, &mut options.start_distance_log_sigma),
     ] {
@@ -73,7 +77,7 @@ impl SelfCalibrator {
     #[pyo3(signature = (
         *, wheel_base_m, bearing_sigma_rad=None, odometry_k_m=None, start=None, start_sigma=None, method="default",
         start_distance_m=None, start_distance_log_sigma=None, start_distance_sigma_m=None, gate_probability=None,
-        memory=None, odometry_inflation=None
+        memory=None, odometry_inflation=None, step_sigma_m=None, step_sigma_rad=None
     ))]
     #[expect(clippy::too_many_arguments, reason = "keywords of the user")]
     fn new(
@@ -89,9 +93,19 @@ impl SelfCalibrator {
         gate_probability: Option<f64>,
         memory: Option<&Bound<'_, PyAny>>,
         odometry_inflation: Option<f64>,
+        step_sigma_m: Option<f64>,
+        step_sigma_rad: Option<f64>,
     ) -> PyResult<Self> {
-        let given =
-            Given { bearing_sigma_rad, odometry_k_m, start, start_sigma, start_distance_m, start_distance_log_sigma };
+        let given = Given {
+            bearing_sigma_rad,
+            odometry_k_m,
+            step_sigma_m,
+            step_sigma_rad,
+            start,
+            start_sigma,
+            start_distance_m,
+            start_distance_log_sigma,
+        };
         let mut options = options(wheel_base_m, &given)?;
         options.method = CalibrationMethod::from_name(method).map_err(|error| exception(&error))?;
         let paper = options.method == CalibrationMethod::Paper;
@@ -100,6 +114,8 @@ impl SelfCalibrator {
             ("odometry_inflation", odometry_inflation.is_some(), true),
             ("gate_probability", gate_probability.is_some(), false),
             ("memory", memory.is_some(), false),
+            ("step_sigma_m", step_sigma_m.is_some(), false),
+            ("step_sigma_rad", step_sigma_rad.is_some(), false),
             ("start_distance_log_sigma", start_distance_log_sigma.is_some(), false),
         ] {
             if given && paper != of_paper {
@@ -134,6 +150,8 @@ impl SelfCalibrator {
                 dict.set_item("start_distance_log_sigma", o.start_distance_log_sigma)?;
                 dict.set_item("gate_probability", o.gate_probability)?;
                 dict.set_item("memory", o.memory)?;
+                dict.set_item("step_sigma_m", o.step_sigma_m)?;
+                dict.set_item("step_sigma_rad", o.step_sigma_rad)?;
             }
             CalibrationMethod::Paper => {
                 dict.set_item("start_distance_sigma_m", o.start_distance_sigma_m)?;
@@ -251,7 +269,7 @@ fn log(odometry: &Bound<'_, PyAny>, bearings: &Bound<'_, PyAny>) -> PyResult<(Ve
 #[pyo3(signature = (
     odometry, bearings, *, wheel_base_m, bearing_sigma_rad=None, odometry_k_m=None, start=None, start_sigma=None,
     start_distance_m=None, start_distance_log_sigma=None, estimate_odometry=false, estimate_time_offset=false,
-    times_s=None, max_iterations=None
+    times_s=None, max_iterations=None, step_sigma_m=None, step_sigma_rad=None
 ))]
 #[expect(clippy::too_many_arguments, reason = "keywords of the user")]
 pub(crate) fn calibrate(
@@ -269,9 +287,19 @@ pub(crate) fn calibrate(
     estimate_time_offset: bool,
     times_s: Option<&Bound<'_, PyAny>>,
     max_iterations: Option<u32>,
+    step_sigma_m: Option<f64>,
+    step_sigma_rad: Option<f64>,
 ) -> PyResult<LogCalibration> {
-    let given =
-        Given { bearing_sigma_rad, odometry_k_m, start, start_sigma, start_distance_m, start_distance_log_sigma };
+    let given = Given {
+        bearing_sigma_rad,
+        odometry_k_m,
+        step_sigma_m,
+        step_sigma_rad,
+        start,
+        start_sigma,
+        start_distance_m,
+        start_distance_log_sigma,
+    };
     let defaults = LogOptions::default();
     let options = LogOptions {
         filter: options(wheel_base_m, &given)?,

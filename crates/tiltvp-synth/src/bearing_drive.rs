@@ -2,7 +2,7 @@
 
 use nalgebra::{Vector2, Vector3};
 use tiltvp_core::geometry::wrap_angle;
-use tiltvp_core::selfcalib::{Leg, Mounting, WheelMotion, Wheels};
+use tiltvp_core::selfcalib::{Leg, MotionNoise, Mounting, WheelMotion, Wheels};
 
 use crate::dice::Dice;
 
@@ -111,7 +111,7 @@ impl BearingDrive {
             let reading = WheelMotion::from_motion(distance, turn, options.wheel_base_m);
             let mut noisy = |metres: f64| metres + (options.odometry_k_m * metres.abs()).sqrt() * dice.normal();
             let driven = WheelMotion { left_m: noisy(reading.left_m), right_m: noisy(reading.right_m) };
-            let step = Leg::from_wheels(&driven, &wheels, 0.0).motion;
+            let step = Leg::from_wheels(&driven, &wheels, &MotionNoise::new(0.0)).motion;
             let (sin, cos) = f64::sin_cos(pose.z);
             pose += Vector3::new(cos * step.x - sin * step.y, sin * step.x + cos * step.y, step.z);
             readings.push(reading);

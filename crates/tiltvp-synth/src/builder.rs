@@ -2,6 +2,7 @@
 
 use nalgebra::{Vector2, Vector3};
 
+use crate::corner::{self, Corner};
 use crate::segment::Segment;
 use crate::texture::{Color, Texture, rgb};
 
@@ -142,6 +143,8 @@ pub(crate) struct Builder {
     pub(crate) edges: Vec<Segment>,
     /// Upright edges that are painted on walls.
     pub(crate) painted: Vec<Segment>,
+    /// Where an upright and two level edges meet.
+    pub(crate) corners: Vec<Corner>,
     /// Where a low robot cannot stand.
     pub(crate) solids: Vec<Footprint>,
 }
@@ -231,6 +234,9 @@ impl Builder {
         if c.xy().norm() < 1e-9 && c.z > 0.1 && a.norm().min(b.norm()) > 0.01 {
             for corner in [origin, origin + a, origin + a + b, origin + b] {
                 self.edge(corner, c.z);
+            }
+            if a.z.abs() < 1e-9 && b.z.abs() < 1e-9 {
+                self.corners.extend(corner::of_box(origin, edges));
             }
         }
     }

@@ -171,7 +171,7 @@ impl LightMap {
     fn nearest(&self, contact: &Contact) -> usize {
         let grid = self.grids[contact.patch];
         let [nu, nv] = grid.counts;
-        let near = |t: f64, n: usize| (t * (n - 1) as f64).round() as usize;
+        let near = |t: f64, n: usize| (t * (n - 1) as f64 + 0.5) as usize;
         grid.first + near(contact.at[1], nv) * nu + near(contact.at[0], nu)
     }
 }

@@ -52,6 +52,30 @@ pub(crate) fn build(plan: &Plan, builder: &mut Builder, dice: &mut Dice) {
     }
 }
 
+/// Builds a shell without colours: grey floor, white walls, grey doors, tiled ceiling.
+pub(crate) fn build_plain(plan: &Plan, builder: &mut Builder) {
+    lay(Texture::Paint { color: rgb(128, 128, 126), mottle: 0.12, seed: 1 }, plan, builder);
+    ceiling(plan, builder, &mut Dice::new(0, 0));
+    let wall = builder.matt(Texture::Paint { color: rgb(216, 216, 212), mottle: 0.05, seed: 2 });
+    let trims = Trims {
+        trim: builder.paint(150, 150, 154),
+        door: builder.paint(176, 178, 180),
+        metal: builder.paint(70, 72, 76),
+        radiator: builder.paint(228, 226, 220),
+        glass: builder.material(Material::Glass),
+        curtain: None,
+        bars: [1, 1],
+    };
+    for own in &plan.walls {
+        panels(own, plan.height, wall, builder);
+        builder.edge(own.frame.origin, plan.height);
+        skirting(own, trims.trim, builder);
+        for opening in &own.openings {
+            door(&own.frame, opening, wall, &trims, builder);
+        }
+    }
+}
+
 /// The texture that all walls share, if they do.
 fn repeated_texture(pattern: WallPattern) -> Option<Texture> {
     let (light, dark) = (rgb(222, 214, 196), rgb(150, 132, 104));
@@ -153,6 +177,11 @@ fn floor(plan: &Plan, builder: &mut Builder, dice: &mut Dice) {
             tiles(rgb(206, 196, 178), rgb(140, 132, 120), 0.45),
         ]),
     };
+    lay(texture, plan, builder);
+}
+
+/// Lays a floor of one texture.
+fn lay(texture: Texture, plan: &Plan, builder: &mut Builder) {
     let material = builder.material(if plan.floor_gloss > 0.0 {
         Material::Polished(texture, plan.floor_gloss)
     } else {
@@ -333,6 +362,10 @@ fn door(frame: &Frame, opening: &Opening, wall: MaterialId, trims: &Trims, build
     let ([x0, x1], z1) = (opening.along, opening.z[1]);
     reveal(frame, opening, 0.1, wall, trims.metal, builder);
     builder.pane(frame, [[x1, -0.09, 0.0], [x0, -0.09, 0.0], [x1, -0.09, z1]], [x0 + z1; 2], trims.door);
+    // Where the leaf meets the reveal.
+    for x in opening.along {
+        builder.edge(frame.point(x, -0.09, 0.0), z1);
+    }
     // Two raised fields, casing, handle.
     for [low, high] in [[0.15, 0.85], [1.0, z1 - 0.15]] {
         builder.cuboid(frame, [x0 + 0.13, -0.09, low], [x1 - 0.13, -0.075, high], trims.door);
@@ -390,6 +423,8 @@ fn drape(frame: &Frame, along: [f64; 2], z: [f64; 2], material: MaterialId, buil
         builder.pane(frame, [[xa, ya, z[0]], [xb, yb, z[0]], [xa, ya, z[1]]], [k as f64 * 0.05, 0.0], material);
         builder.edge(frame.point(xa, ya, z[0]), z[1] - z[0]);
     }
+    let (x, y) = at(pleats);
+    builder.edge(frame.point(x, y, z[0]), z[1] - z[0]);
 }
 
 /// A panel radiator with upright fins.

@@ -18,16 +18,19 @@ pub(crate) struct Rays {
     bearings: Vec<Option<Vector3<f64>>>,
     /// Per pixel, for one pixel to the right and one down.
     steps: Vec<[Vector3<f64>; 2]>,
+    /// The angle off the axis, in right angles.
+    off_axis: Vec<f64>,
     /// Per side of [`SIDES`], row by row.
     cones: Vec<Vec<Option<Cone>>>,
 }
 
 impl Rays {
-    /// The rays through the middles of all pixels that see more than `blind_rad` aside of the camera's `z` axis.
+    /// The rays through the middles of all pixels, made in parallel on the current rayon pool, that see more than `blind_rad` aside of the camera's `z` axis.
     pub(crate) fn new(camera: &Camera, blind_rad: f64) -> Self {
         let (width, height) = (camera.width() as usize, camera.height() as usize);
         let middle = |k: usize| Vector2::new((k % width) as f64, (k / width) as f64);
         let bearings: Vec<_> = (0..width * height)
+            .into_par_iter()
             .map(|k| camera.unproject(&middle(k)).filter(|b| b.xy().norm().atan2(b.z.abs()) >= blind_rad))
             .collect();
         let step = |k: usize, aside: Vector2<f64>| {
@@ -38,7 +41,8 @@ impl Rays {
                 _ => Vector3::zeros(),
             }
         };
-        let steps: Vec<_> = (0..width * height).map(|k| [step(k, Vector2::x()), step(k, Vector2::y())]).collect();
+        let steps: Vec<_> =
+            (0..width * height).into_par_iter().map(|k| [step(k, Vector2::x()), step(k, Vector2::y())]).collect();
         let cones = SIDES.map(|side| {
             let (nx, ny) = (width.div_ceil(side), height.div_ceil(side));
             let of_tile = |tile: usize| {
@@ -48,9 +52,11 @@ impl Rays {
                 let margin = known.iter().map(|&k| steps[k][0].norm() + steps[k][1].norm()).fold(0.0, f64::max);
                 Cone::around(&directions, margin)
             };
-            (0..nx * ny).map(of_tile).collect()
+            (0..nx * ny).into_par_iter().map(of_tile).collect()
         });
-        Self { width, height, bearings, steps, cones: cones.into() }
+        let angle = |b: &Vector3<f64>| b.xy().norm().atan2(b.z.abs()) / std::f64::consts::FRAC_PI_2;
+        let off_axis = bearings.iter().map(|b| b.as_ref().map_or(0.0, angle)).collect();
+        Self { width, height, bearings, steps, off_axis, cones: cones.into() }
     }
 
     /// The ray through a place of a pixel, from its middle on.
@@ -85,10 +91,17 @@ struct Meeting {
     mirrored: Option<Contact>,
 }
 
+/// Stands for no surface.
+const NOTHING: u32 = u32::MAX;
+
+/// Stands for the surfaces of a pixel without a ray.
+const BLIND: [u32; 2] = [u32::MAX - 1; 2];
+
 impl Meeting {
-    /// Which surfaces are seen.
-    fn surfaces(&self) -> [Option<usize>; 2] {
-        [self.direct, self.mirrored].map(|contact| contact.map(|c| c.patch))
+    /// Which surfaces are seen, directly and mirrored.
+    fn surfaces(&self) -> [u32; 2] {
+        let number = |contact: &Option<Contact>| contact.as_ref().map_or(NOTHING, |c| c.patch as u32);
+        [number(&self.direct), number(&self.mirrored)]
     }
 }
 
@@ -135,21 +148,26 @@ impl<'a> Sweep<'a> {
                 (tiles, met)
             })
             .collect();
-        let met: Vec<Option<Meeting>> = bands.iter().flat_map(|band| band.1.iter().copied()).collect();
+        let surface = |met: &Option<Meeting>| met.as_ref().map_or(BLIND, Meeting::surfaces);
+        let surfaces: Vec<[u32; 2]> = bands.iter().flat_map(|band| band.1.iter().map(surface)).collect();
         let mut light = vec![[0f32; 3]; width * height];
-        light.par_chunks_mut(side * width).zip(&bands).enumerate().for_each(|(band, (light, (tiles, _)))| {
+        light.par_chunks_mut(side * width).zip(&bands).enumerate().for_each(|(band, (light, (tiles, met)))| {
+            let first = band * side * width;
             for tile in tiles {
                 for k in pixels(tile.at, SIDES[SIDES.len() - 1], [width, height]) {
-                    if let Some(meeting) = met[k] {
-                        let single = options.samples == 1 || !self.is_mixed(&met, k);
-                        let samples = if single { 1 } else { options.samples };
-                        let color = self.pixel(tile, k, meeting, samples, lights);
-                        light[k - band * side * width] = self.dimmed(k, color, options.vignetting);
+                    if let Some(meeting) = met[k - first] {
+                        let single = options.samples == 1 || !self.is_mixed(&surfaces, &meeting, k);
+                        let color = if single {
+                            self.shade(k, meeting, lights)
+                        } else {
+                            self.pixel(tile, k, options.samples, lights)
+                        };
+                        light[k - first] = self.dimmed(k, color, options.vignetting);
                     }
                 }
             }
         });
-        Film { width, light, valid: met.iter().map(Option::is_some).collect() }
+        Film { width, light, valid: self.rays.bearings.iter().map(Option::is_some).collect() }
     }
 
     /// Sorts out what the rays of a tile, and of those in it, may meet.
@@ -184,30 +202,42 @@ impl<'a> Sweep<'a> {
     }
 
     /// Whether a pixel sees another surface than one of its neighbours, or what it sees has edges of its own.
-    fn is_mixed(&self, met: &[Option<Meeting>], k: usize) -> bool {
+    fn is_mixed(&self, surfaces: &[[u32; 2]], meeting: &Meeting, k: usize) -> bool {
         let width = self.rays.width;
         let (x, y) = (k % width, k / width);
-        let Some(own) = met[k] else { return false };
-        let rows = y.saturating_sub(1)..=(y + 1).min(self.rays.height - 1);
-        let mut near = rows.flat_map(|y| (x.saturating_sub(1)..=(x + 1).min(width - 1)).map(move |x| y * width + x));
-        near.any(|other| met[other].is_some_and(|other| other.surfaces() != own.surfaces()))
-            || own.direct.is_some_and(|contact| self.world.is_patterned(&contact))
+        let (first, last) = (x.saturating_sub(1), (x + 1).min(width - 1));
+        for row in y.saturating_sub(1)..=(y + 1).min(self.rays.height - 1) {
+            for other in &surfaces[row * width + first..=row * width + last] {
+                if *other != surfaces[k] && *other != BLIND {
+                    return true;
+                }
+            }
+        }
+        meeting.direct.is_some_and(|contact| self.world.is_patterned(&contact))
+    }
+
+    /// The light on a pixel from its middle's ray.
+    fn shade(&self, k: usize, meeting: Meeting, lights: &Lights<'_>) -> [f64; 3] {
+        let Some(bearing) = self.rays.bearings[k] else { return [0.0; 3] };
+        let (direction, spread) = (self.world_from_camera * bearing, self.rays.steps[k][0].norm());
+        let ray = Ray { origin: &self.center, direction: &direction, spread };
+        self.world.seen(&ray, meeting.direct, lights, || meeting.mirrored)
     }
 
     /// The light on a pixel: `n` by `n` rays say how much of it each surface fills, and one of them what that looks like.
-    fn pixel(&self, tile: &Tile, k: usize, middle: Meeting, n: usize, lights: &Lights<'_>) -> [f64; 3] {
+    fn pixel(&self, tile: &Tile, k: usize, n: usize, lights: &Lights<'_>) -> [f64; 3] {
         let spread = self.rays.steps[k][0].norm() / n as f64;
         let shade = |direction: &Vector3<f64>, meeting: Meeting| {
             let ray = Ray { origin: &self.center, direction, spread };
             self.world.seen(&ray, meeting.direct, lights, || meeting.mirrored)
         };
-        let mut known: Vec<([Option<usize>; 2], [f64; 3])> = Vec::new();
+        let mut known: Vec<([u32; 2], [f64; 3])> = Vec::with_capacity(4);
         let mut sum = [0.0; 3];
         for sample in 0..n * n {
             let place = |cell: usize| (cell as f64 + 0.5) / n as f64 - 0.5;
             let Some(bearing) = self.rays.bearing(k, place(sample % n), place(sample / n)) else { continue };
             let direction = self.world_from_camera * bearing;
-            let meeting = if n == 1 { middle } else { self.meet(tile, &direction) };
+            let meeting = self.meet(tile, &direction);
             let surfaces = meeting.surfaces();
             let same = known.iter().find(|(seen, _)| *seen == surfaces).map(|(_, color)| *color);
             let color = same.unwrap_or_else(|| shade(&direction, meeting));
@@ -225,8 +255,7 @@ impl<'a> Sweep<'a> {
 
     /// The light that the lens lets through at a pixel.
     fn dimmed(&self, k: usize, color: [f64; 3], vignetting: f64) -> [f32; 3] {
-        let off_axis = self.rays.bearings[k].map_or(0.0, |b| b.xy().norm().atan2(b.z.abs()));
-        let off_axis = off_axis / std::f64::consts::FRAC_PI_2;
+        let off_axis = self.rays.off_axis[k];
         let kept = (1.0 - vignetting * off_axis * off_axis).max(0.0);
         color.map(|c| (c * kept) as f32)
     }

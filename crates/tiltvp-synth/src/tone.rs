@@ -103,6 +103,17 @@ pub struct Image {
     pub rgb: Vec<u8>,
 }
 
+/// An 8-bit colour image, rows from the top.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct ColorImage {
+    /// Width, pixels.
+    pub width_px: usize,
+    /// Height, pixels.
+    pub height_px: usize,
+    /// Blue, green, red levels, `height * width * 3`.
+    pub bgr: Vec<u8>,
+}
+
 /// Light per pixel, and which pixels the lens reaches.
 pub(crate) struct Film {
     pub(crate) width: usize,
@@ -142,6 +153,52 @@ impl Film {
             },
         );
         Image { width_px: width, height_px: height, gray, rgb }
+    }
+
+    /// [`develop`](Self::develop) for colours alone and a fixed exposure, from tables: quicker by an order of magnitude, at
+    /// 1/50 of a level.
+    pub(crate) fn develop_color(mut self, options: &RenderOptions) -> ColorImage {
+        if options.blur_sigma_px > 0.0 {
+            self.blur(options.blur_sigma_px);
+        }
+        let gain = match options.exposure {
+            Exposure::Fixed { gain } => gain,
+            Exposure::Auto { mean_level } => self.automatic_gain(mean_level, options.gamma),
+        };
+        let (curve, noise) = (Curve::new(options.gamma), normal_quantiles(options.noise_sigma));
+        let (width, height) = (self.width, self.light.len() / self.width);
+        let mut bgr = vec![0u8; 3 * width * height];
+        bgr.par_chunks_mut(3 * width).enumerate().for_each(|(y, row)| {
+            // One stream of noise per row: the same bytes for any number of threads.
+            let mut dice = Dice::new(options.seed, 1 + y as u64);
+            for (x, pixel) in row.chunks_exact_mut(3).enumerate() {
+                let k = y * width + x;
+                let bits = dice.bits();
+                if self.valid[k] {
+                    for (c, level) in pixel.iter_mut().enumerate() {
+                        let noise = noise[(bits >> (16 * c)) as usize & 0xFFFF];
+                        *level = (curve.level(gain as f32 * self.light[k][2 - c]) + noise + 0.5) as u8;
+                    }
+                }
+            }
+        });
+        ColorImage { width_px: width, height_px: height, bgr }
+    }
+
+    /// The sum of the light of two films.
+    pub(crate) fn plus(mut self, other: &Self) -> Self {
+        for (own, other) in self.light.iter_mut().zip(&other.light) {
+            *own = [own[0] + other[0], own[1] + other[1], own[2] + other[2]];
+        }
+        self
+    }
+
+    /// So many times the light.
+    pub(crate) fn scaled(mut self, factor: f32) -> Self {
+        for light in &mut self.light {
+            *light = light.map(|l| l * factor);
+        }
+        self
     }
 
     /// The gain for which the mean level of every seventh valid pixel is as asked, by bisection of its logarithm; no more
@@ -191,6 +248,45 @@ impl Film {
             });
         }
     }
+}
+
+/// The display curve as a table over the square root of the light, which straightens it out where it is steep.
+struct Curve {
+    levels: Vec<f32>,
+}
+
+impl Curve {
+    const STEPS: usize = 4096;
+    /// The greatest light of the table; what is brighter is white to a hundredth of a level.
+    const REACH: f32 = 4.0;
+
+    fn new(gamma: f64) -> Self {
+        let root = |k: usize| f64::from(Self::REACH).sqrt() * k as f64 / Self::STEPS as f64;
+        Self { levels: (0..=Self::STEPS + 1).map(|k| (255.0 * display(root(k).powi(2), gamma)) as f32).collect() }
+    }
+
+    /// The level, of 255.
+    fn level(&self, light: f32) -> f32 {
+        let at = light.clamp(0.0, Self::REACH).sqrt() * (Self::STEPS as f32 / Self::REACH.sqrt());
+        let (k, share) = (at as usize, at.fract());
+        self.levels[k] + share * (self.levels[k + 1] - self.levels[k])
+    }
+}
+
+/// The 65,536 quantiles of a normal distribution in the middles of as many equal shares.
+fn normal_quantiles(sigma: f64) -> Vec<f32> {
+    const COUNT: usize = 1 << 16;
+    // Bisection of the cumulative distribution would do; its inverse by integration is quicker: dz = dp / density.
+    let mut half = Vec::with_capacity(COUNT / 2);
+    let (mut z, step) = (0.0f64, 1.0 / COUNT as f64);
+    let slope = |z: f64| std::f64::consts::TAU.sqrt() * (0.5 * z * z).exp();
+    for k in 0..COUNT / 2 {
+        let width = if k == 0 { 0.5 * step } else { step };
+        let middle = z + 0.5 * width * slope(z);
+        z += width * slope(middle);
+        half.push((sigma * z) as f32);
+    }
+    half.iter().rev().map(|z| -z).chain(half.iter().copied()).collect()
 }
 
 /// Share of full light up to which the display curve has no shoulder.

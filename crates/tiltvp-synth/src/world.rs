@@ -4,7 +4,9 @@ use nalgebra::{Vector2, Vector3};
 use tiltvp_core::{Error, Result};
 
 use crate::builder::{Builder, Footprint, Material};
+use crate::corner::{self, Corner};
 use crate::dice::Dice;
+use crate::laboratory::LaboratoryOptions;
 use crate::light::{LightMap, sun_reaches};
 use crate::lights::Lights;
 use crate::options::RoomKind;
@@ -15,7 +17,7 @@ use crate::scene::{Contact, Scene};
 use crate::segment::Segment;
 use crate::texture::{Color, mix};
 use crate::view::RobotPose;
-use crate::{furniture, shell};
+use crate::{furniture, laboratory, shell};
 
 /// Greatest radiance that the camera sees, in units of white in the room's light: what is brighter is burnt out anyway, and
 /// would fray the edges of windows and lamps.
@@ -53,6 +55,9 @@ pub struct World {
     outdoors: Outdoors,
     edges: Vec<Segment>,
     painted: Vec<Segment>,
+    corners: Vec<Corner>,
+    /// Whether the first of the corners is the coloured cuboid's.
+    cuboid: bool,
     light_spacing_m: f64,
     solids: Vec<Footprint>,
     /// Where the robot is meant to stand; empty for anywhere.
@@ -69,23 +74,67 @@ impl World {
         options.validate()?;
         let mut dice = Dice::new(options.seed, options.kind as u64);
         let plan = Plan::draw(options, &mut dice);
-        let outdoors = plan.outdoors;
         let mut builder = Builder::default();
         shell::build(&plan, &mut builder, &mut dice);
         let places = furniture::furnish(&plan, options, &mut builder, &mut dice);
+        let mut corners = corner::of_room(&plan);
+        corners.append(&mut builder.corners);
+        Self::lit(plan, builder, corners, places, options.light_spacing_m)
+    }
+
+    /// Draws and lights a laboratory with a coloured cuboid, whose corner is the first of the world's. Light is gathered in
+    /// parallel on the current rayon pool; the world does not depend on it.
+    ///
+    /// # Errors
+    /// If the options are outside their domains.
+    pub fn laboratory(options: &LaboratoryOptions) -> Result<Self> {
+        options.validate()?;
+        let mut builder = Builder::default();
+        let plan = laboratory::build(options, &mut builder);
+        let mut corners = std::mem::take(&mut builder.corners);
+        corners.extend(corner::of_room(&plan));
+        Ok(Self { cuboid: true, ..Self::lit(plan, builder, corners, Vec::new(), options.light_spacing_m)? })
+    }
+
+    fn lit(
+        plan: Plan,
+        mut builder: Builder,
+        corners: Vec<Corner>,
+        places: Vec<Footprint>,
+        light_spacing_m: f64,
+    ) -> Result<Self> {
+        let outdoors = plan.outdoors;
         let edges = std::mem::take(&mut builder.edges);
         let painted = std::mem::take(&mut builder.painted);
         let solids = std::mem::take(&mut builder.solids);
         let scene = Scene::new(builder)?;
-        let light = LightMap::bake(&scene, &outdoors, options.light_spacing_m);
+        let light = LightMap::bake(&scene, &outdoors, light_spacing_m);
         let unit = 1.0 / light.typical().max(1e-9);
-        let light_spacing_m = options.light_spacing_m;
-        Ok(Self { plan, scene, light, unit, outdoors, edges, painted, light_spacing_m, solids, places })
+        Ok(Self {
+            plan,
+            scene,
+            light,
+            unit,
+            outdoors,
+            edges,
+            painted,
+            corners,
+            cuboid: false,
+            light_spacing_m,
+            solids,
+            places,
+        })
     }
 
     /// The vertical edges of walls, openings and furniture, visible or not.
     pub fn vertical_edges(&self) -> &[Segment] {
         &self.edges
+    }
+
+    /// Where an upright and two level edges of room and boxes meet, visible or not. In a laboratory the first is the coloured
+    /// cuboid's; in a room those of the room itself come first.
+    pub fn corners(&self) -> &[Corner] {
+        &self.corners
     }
 
     /// The corners of the floor, counter-clockwise, metres.
@@ -242,6 +291,11 @@ impl World {
     /// The least and the greatest corner of the floor.
     pub(crate) fn bounds(&self) -> (Vector2<f64>, Vector2<f64>) {
         self.plan.bounds()
+    }
+
+    /// Whether the first of the corners is a laboratory's coloured cuboid's.
+    pub(crate) fn has_cuboid(&self) -> bool {
+        self.cuboid
     }
 
     /// The kind of place.

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from cyclopts import App, CycloptsError
 
 from tiltvp import __version__
-from tiltvp.cli import calibrate, camera, dataset, demo, evaluate, lines, measure, report, tilt, track
+from tiltvp.cli import calibrate, camera, corner, dataset, demo, evaluate, lines, measure, report, tilt, track
 from tiltvp.cli.terminal import complain
 from tiltvp.errors import TiltvpError
 
@@ -24,6 +24,7 @@ app = App(
 app.command(tilt.tilt)
 app.command(lines.lines)
 app.command(track.track)
+app.command(corner.corner)
 app.command(calibrate.calibrate)
 app.command(demo.demo)
 app.command(camera.app)

@@ -324,6 +324,94 @@ def drive(
 
 
 @app.command
+def stereo(
+    *,
+    out: Path,
+    kind: str = "laboratory",
+    frames: int | None = None,
+    width: int = 1280,
+    distance: tuple[float, float] | None = None,
+    gamma_deg: float = 90.0,
+    corner: int | None = None,
+    clutter: float | None = None,
+    exposure_ms: float = 0.0,
+    blur_sigma: float | None = None,
+    noise_sigma: float | None = None,
+    samples: int | None = None,
+    seed: int = 0,
+    threads: int | None = None,
+    force: Switch = False,
+) -> None:
+    """Make a sequence of a hand-held stereo pair that looks at a corner: images, calibration, poses, inertial data.
+
+    Parameters
+    ----------
+    out
+        Folder to make. It appears when it is whole.
+    kind
+        What is looked at: laboratory (a coloured cuboid), or a room: office, living-room, corridor, l-shaped, narrow or
+        under-table.
+    frames
+        How many frames, 30 a second; default 1000.
+    width
+        Width of the images: 1280 (x 720) or 1920 (x 1080).
+    distance
+        Least and greatest distance from the corner in metres; default 1 3.
+    gamma_deg
+        Angle between the level edges of the cuboid.
+    corner
+        Number of the corner that is looked at; default is the cuboid's, or one of a room that can be approached.
+    clutter
+        How much furniture there is, from 0 to 1.
+    exposure_ms
+        How long the shutter is open, for motion blur.
+    blur_sigma
+        What lens and sensor do to a point, in pixels; default 0.6.
+    noise_sigma
+        Gaussian noise in grey levels; default 2.
+    samples
+        Rays per pixel and side where surfaces meet; default 3.
+    seed
+        Seed of scene, motion and noise.
+    threads
+        How many threads; default is one per core.
+    force
+        Replace a dataset that is there.
+    """
+    from tiltvp.datasets.stereo import write_stereo
+    from tiltvp.synth import Laboratory, Room, StereoSequence, zed_cameras
+
+    if seed < 0:
+        raise InvalidInputError(f"seed = {seed}, expected 0 or more")
+    count = _threads(threads)
+    left, right = zed_cameras(width)
+    if kind != "laboratory" and gamma_deg != 90.0:
+        raise InvalidInputError(f"--gamma-deg {gamma_deg}, expected it with --kind laboratory alone")
+    scene = (
+        Laboratory(seed, gamma_rad=math.radians(gamma_deg), clutter=clutter, threads=count)
+        if kind == "laboratory"
+        else Room(kind, seed, clutter=clutter, threads=count)
+    )
+    sequence = StereoSequence(
+        scene,
+        left=left,
+        right=right,
+        frames=frames,
+        seed=seed,
+        corner=corner,
+        distance_m=distance,
+        samples=samples,
+        noise_sigma=noise_sigma,
+        blur_sigma_px=blur_sigma,
+        exposure_s=exposure_ms / 1000.0,
+        threads=count,
+    )
+    with progress_bar(len(sequence), "frames") as bar:
+        write_stereo(sequence, out, threads=count, source=_made_by("stereo"), force=force, advance=bar.advance)
+    say(f"{out}: {len(sequence)} pairs of images")
+
+
+@app.command
 def degrade(
     directory: Path,
     /,

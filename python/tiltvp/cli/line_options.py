@@ -7,9 +7,9 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
-from cyclopts import Group, Parameter
+from cyclopts import Group, Parameter, validators
 
 from tiltvp.cli.options import mask_from
 from tiltvp.errors import InvalidInputError
@@ -38,6 +38,8 @@ class LineOptions:
     tilt: str = _UPRIGHT
     """upright: the robot stands upright; or how the lean of each frame is estimated: refined or another method of
     `tiltvp tilt`. A frame without an estimate is taken to be upright."""
+    tilt_confidence_min: Annotated[float, Parameter(validator=validators.Number(gte=0, lte=1))] = 0.5
+    """A frame whose estimated lean is less confident is taken to be upright."""
     robot_from_camera: str | None = None
     """How the camera sits on the robot: up (the default), forward, or a file with a rotation."""
     elevation_min_deg: float | None = None
@@ -101,7 +103,7 @@ class LineOptions:
 
         def tilt(gray: NDArray[np.uint8]) -> TiltEstimate | None:
             estimate = estimator(gray)
-            return estimate if estimate else None
+            return estimate if estimate and estimate.confidence >= self.tilt_confidence_min else None
 
         return tilt
 

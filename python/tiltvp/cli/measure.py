@@ -8,6 +8,8 @@ from typing import Annotated
 
 from cyclopts import App, Parameter, validators
 
+from tiltvp.cli.corner_measures import corners
+from tiltvp.cli.corner_real import corners_real
 from tiltvp.cli.descriptors import descriptors
 from tiltvp.cli.planar_pose import planar_pose
 from tiltvp.cli.results import check_ending, show_frame, write_frame
@@ -15,6 +17,8 @@ from tiltvp.cli.terminal import progress_bar, say
 from tiltvp.errors import InvalidInputError
 
 app = App(name="measure", help="Measure the methods on images of known tilt.")
+app.command(corners)
+app.command(corners_real)
 app.command(descriptors)
 app.command(planar_pose)
 
@@ -86,7 +90,7 @@ def inertial(directory: Path, /, *, samples: int = 2) -> None:
 
 
 @app.command
-def calibration(odometry: Path | None = None, /, *, runs: int = 1000, out: Path | None = None) -> None:
+def calibration(odometry: Path | None = None, /, *, runs: int = 1000, only: str = "", out: Path | None = None) -> None:
     """Self-calibration on simulated drives, both filters, against the Cramer-Rao bound; and on real logs.
 
     Parameters
@@ -95,32 +99,43 @@ def calibration(odometry: Path | None = None, /, *, runs: int = 1000, out: Path 
         Folder with victoria_park, brenner_lego and censi_khepera; without it only the simulated drives.
     runs
         Simulated drives of each trajectory.
+    only
+        Only the parts whose names hold this: "simulated paper default", "simulated paper paper", "simulated alternating
+        default", "simulated alternating paper" (trajectory and method), "victoria_park", "brenner_lego",
+        "censi lstraight", "censi l90", "censi lmov".
     out
         Also write the table of all simulated runs as Parquet.
     """
     import polars as pl
 
-    from tiltvp.evaluation.calibration import real_logs, simulated_drives, summarise_drives
+    from tiltvp.evaluation.calibration import LOG_PARTS, LOGS, real_logs, simulated_drives, summarise_drives
     from tiltvp.selfcalib import consistency_band
 
+    drives = [
+        (kind, method)
+        for kind in ("paper", "alternating")
+        for method in ("default", "paper")
+        if only in f"simulated {kind} {method}"
+    ]
+    logs = [name for name in LOGS if only in name] if odometry is not None else []
+    if not drives and not logs:
+        raise InvalidInputError(f'--only {only}: no part of that name, expected for example "simulated" or "victoria"')
     parts, summaries = [], []
-    with progress_bar(4 * runs, "drives") as bar:
-        for kind in ("paper", "alternating"):
-            for method in ("default", "paper"):
+    if drives:
+        with progress_bar(len(drives) * runs, "drives") as bar:
+            for kind, method in drives:
                 table = simulated_drives(kind, method, runs, advance=bar.advance)
                 parts.append(table.with_columns(trajectory=pl.lit(kind), method=pl.lit(method)))
                 summaries.append({"trajectory": kind, "method": method, **summarise_drives(table)})
-    if out is not None:
-        pl.concat(parts).write_parquet(out)
-    low, high = consistency_band(0.95, 3, runs)
-    show_frame(
-        f"Simulated drives; NEES of a consistent filter: {low:.3f} to {high:.3f}", pl.DataFrame(summaries), ["method"]
-    )
-    if odometry is not None:
-        with progress_bar(6, "logs") as bar:
-            show_frame(
-                "Real logs: error against the nominal mounting", real_logs(odometry, advance=bar.advance), ["log"]
-            )
+        if out is not None:
+            pl.concat(parts).write_parquet(out)
+        low, high = consistency_band(0.95, 3, runs)
+        title = f"Simulated drives; NEES of a consistent filter: {low:.3f} to {high:.3f}"
+        show_frame(title, pl.DataFrame(summaries), ["method"])
+    if odometry is not None and logs:
+        with progress_bar(LOG_PARTS * len(logs), "logs") as bar:
+            table = real_logs(odometry, only=only, advance=bar.advance)
+        show_frame("Real logs: error against the nominal mounting", table, ["log"])
 
 
 @app.command(name="calibration-images")

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
     from tiltvp.cameras import Camera
 
-__all__ = ["NewDataset", "in_order", "new_dataset"]
+__all__ = ["NewDataset", "in_order", "new_dataset", "new_folder"]
 
 _CAMERA: Final = "camera.toml"
 _IMAGES: Final = "images"
@@ -42,7 +42,8 @@ class NewDataset:
 
     def __init__(self, directory: Path) -> None:
         """In a folder that nobody else uses."""
-        self._directory = directory
+        self.directory = directory
+        """Where it is until it is whole."""
         self.images: list[TiltImage] = []
         """The rows of the table, to be put in order by who makes them."""
 
@@ -59,7 +60,7 @@ class NewDataset:
     ) -> TiltImage:
         """Writes one image, (H, W) uint8 or (H, W, 3) in BGR order, as a PNG of that name; its row is the caller's."""
         file = f"{_IMAGES}/{name}.png"
-        path = self._directory / file
+        path = self.directory / file
         write_image(path, gray)
         return TiltImage(file, path, location, environment, alpha_rad, beta_rad, yaw_rad)
 
@@ -69,11 +70,11 @@ class NewDataset:
         table = csv.writer(text, lineterminator="\n")
         table.writerow(header)
         table.writerows(rows)
-        (self._directory / name).write_text(text.getvalue(), encoding="utf-8")
+        (self.directory / name).write_text(text.getvalue(), encoding="utf-8")
 
     def write_toml(self, name: str, values: dict[str, Any]) -> None:
         """Writes a TOML file of that name beside the images."""
-        (self._directory / name).write_text(tomli_w.dumps(values), encoding="utf-8")
+        (self.directory / name).write_text(tomli_w.dumps(values), encoding="utf-8")
 
 
 @contextmanager
@@ -90,8 +91,18 @@ def new_dataset(
     An existing folder is refused unless `force`, which replaces an empty folder or a dataset, and nothing else. Raises
     `InvalidInputError`.
     """
-    target = Path(directory)
     rotation = None if robot_from_camera is None else _rotation(robot_from_camera)
+    with new_folder(directory, force=force) as new:
+        yield new
+        camera.save(new.directory / _CAMERA)
+        _write_description(new.directory, rotation, source or {})
+        _write_rows(new.directory, new.images)
+
+
+@contextmanager
+def new_folder(directory: str | os.PathLike[str], *, force: bool = False) -> Iterator[NewDataset]:
+    """A folder to be filled in a `with` block, dataset.toml included; else as `new_dataset`."""
+    target = Path(directory)
     _refuse_taken(target, force)
     part = target.absolute().parent / f".{target.absolute().name}.{os.getpid()}.part"
     try:
@@ -99,11 +110,7 @@ def new_dataset(
     except OSError as error:
         raise InvalidInputError(f"{target}: {error.strerror or error}, expected a place for a new folder") from error
     try:
-        new = NewDataset(part)
-        yield new
-        camera.save(part / _CAMERA)
-        _write_description(part, rotation, source or {})
-        _write_rows(part, new.images)
+        yield NewDataset(part)
         _refuse_taken(target, force)
         if target.exists():
             old = part.with_suffix(".old")

@@ -37,7 +37,7 @@ class LineVariant:
     tilt: Literal["upright", "refined", "true"]
     """What the robot's lean is taken for: none, the estimate of the frame, or the truth."""
     odometry: bool
-    """Whether the tracker is told how far the robot has turned."""
+    """Whether the tracker is told what the encoders say: how far the robot has gone and turned."""
     extractor: dict[str, Any] = field(default_factory=dict)
     """Options of `LineExtractor` that are not the default."""
     tracker: dict[str, Any] = field(default_factory=dict)
@@ -146,7 +146,7 @@ def measure_lines(
                 tilts = {"upright": None, "refined": estimate if estimate else None, "true": (alpha, beta)}
                 everywhere = edge_bearings(drive, frame)
                 for run in runs:
-                    row = run(gray, tilts[run.variant.tilt], truth, everywhere, float(drive.motions[frame, 1]))
+                    row = run(gray, tilts[run.variant.tilt], truth, everywhere, drive.motions[frame].tolist())
                     place = {"kind": kind, "lean_max_deg": lean_deg, "frame": frame, "lean_rad": alpha}
                     rows.append(place | {"variant": run.variant.name} | row)
                 advance()
@@ -166,14 +166,20 @@ class _Run:
         self._judge = Judge(int(self._tracker.options["look_back"]))
 
     def __call__(
-        self, gray: NDArray[np.uint8], tilt: Any, truth: DriveTruth, everywhere: NDArray[np.float64], turn_rad: float
+        self,
+        gray: NDArray[np.uint8],
+        tilt: Any,
+        truth: DriveTruth,
+        everywhere: NDArray[np.float64],
+        motion: tuple[float, float],
     ) -> dict[str, Any]:
         clock = [time.thread_time()]
         lines = self._extractor(gray, None if self.variant.extractor.get("method") == "radial" else tilt)
         clock.append(time.thread_time())
         descriptors = self._extractor.describe(gray, lines)
         clock.append(time.thread_time())
-        tracked = self._tracker.update(lines, descriptors, yaw_change_rad=turn_rad if self.variant.odometry else None)
+        told = dict(zip(("distance_m", "yaw_change_rad"), motion, strict=True)) if self.variant.odometry else {}
+        tracked = self._tracker.update(lines, descriptors, **told)
         clock.append(time.thread_time())
         known: Identities = identities(lines, truth, length_min_rad=self._length_min_rad)
         errors = known.error_rad[np.isfinite(known.error_rad)]

@@ -58,7 +58,7 @@ def parse(document: Document, image_size: ImageSize | None) -> list[CameraSpec]:
     cameras = root.need("camera").items()
     if not cameras:
         root.fail("there is no camera", "one or more [[camera]]")
-    return [_camera(camera, image_size) for camera in cameras]
+    return [camera_from(camera, image_size) for camera in cameras]
 
 
 def write_toml(spec: CameraSpec | Sequence[CameraSpec], path: str | os.PathLike[str]) -> None:
@@ -67,14 +67,15 @@ def write_toml(spec: CameraSpec | Sequence[CameraSpec], path: str | os.PathLike[
     if not specs:
         raise CalibrationError(f"{path}: there is no camera to write, expected one or more, at spec")
     for one in specs:
-        fault = first_fault(_as_floats(one))
+        fault = first_fault(as_floats(one))
         if fault is not None:
             raise CalibrationError(f"{path}: {fault[0]}, expected {fault[1]}, at {fault[2]}")
-    tree = {"format": _FORMAT, "version": _VERSION, "camera": [_table(_as_floats(one)) for one in specs]}
-    _write_whole(Path(path), tomli_w.dumps(tree).encode("utf-8"))
+    tree = {"format": _FORMAT, "version": _VERSION, "camera": [camera_table(as_floats(one)) for one in specs]}
+    write_whole(Path(path), tomli_w.dumps(tree).encode("utf-8"))
 
 
-def _camera(camera: Node, given: ImageSize | None) -> CameraSpec:
+def camera_from(camera: Node, given: ImageSize | None) -> CameraSpec:
+    """The camera of one table."""
     camera.only(*_KEYS)
     model = camera.need("model")
     known = MODELS.get(model.text())
@@ -103,7 +104,8 @@ def _camera(camera: Node, given: ImageSize | None) -> CameraSpec:
     return spec
 
 
-def _as_floats(spec: CameraSpec) -> CameraSpec:
+def as_floats(spec: CameraSpec) -> CameraSpec:
+    """The same camera with plain floats and integers."""
     parameters: Parameters = {
         key: [float(number) for number in value] if isinstance(value, list | tuple) else float(value)
         for key, value in spec.parameters.items()
@@ -112,7 +114,8 @@ def _as_floats(spec: CameraSpec) -> CameraSpec:
     return replace(spec, width=int(spec.width), height=int(spec.height), parameters=parameters, max_theta_rad=limit)
 
 
-def _table(spec: CameraSpec) -> dict[str, object]:
+def camera_table(spec: CameraSpec) -> dict[str, object]:
+    """The table of one camera."""
     table: dict[str, object] = {"name": spec.name, "model": spec.model, "width": spec.width, "height": spec.height}
     if spec.mirror:
         table["mirror"] = True
@@ -124,7 +127,8 @@ def _table(spec: CameraSpec) -> dict[str, object]:
     return table
 
 
-def _write_whole(path: Path, content: bytes) -> None:
+def write_whole(path: Path, content: bytes) -> None:
+    """Writes a file that appears whole or not at all."""
     target = Path(os.path.realpath(path))
     beside = target.with_name(f".{target.name}.{secrets.token_hex(8)}.part")
     try:

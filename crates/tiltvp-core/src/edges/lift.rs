@@ -143,8 +143,8 @@ fn fill(block: &mut Block, gx: &[f32], gy: &[f32], limit: f32, unit: f32) {
         let root = squared.sqrt();
         let scale = 1.0 / root;
         (x[i], y[i], z[i]) = (row[0] * scale, row[1] * scale, row[2] * scale);
-        let passes = (row[2] * row[2] <= limit * squared) & (squared > 0.0);
-        weights[i] = if passes { root * unit } else { 0.0 };
+        // The length is zero where the gradient is.
+        weights[i] = if row[2] * row[2] <= limit * squared { root * unit } else { 0.0 };
     }
 }
 

@@ -2,12 +2,17 @@
 
 mod angle;
 mod bearing;
+mod great_circle;
+mod rigid;
 mod rotation;
 mod tilt;
 mod wheels;
 
 pub use angle::wrap_angle;
 pub use bearing::{angle_between, tangent_basis, tangent_exp, tangent_log, tangent_transport};
+pub use great_circle::{GreatCircleFit, fit_great_circle};
+pub use rigid::RigidMotion;
+pub(crate) use rotation::check_rotation;
 pub use rotation::validate_rotation;
 pub use tilt::Tilt;
 pub use wheels::WheelLayout;

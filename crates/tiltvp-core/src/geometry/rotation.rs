@@ -9,6 +9,11 @@ use crate::error::{Error, Result};
 /// # Errors
 /// [`Error::InvalidArgument`] unless the matrix is a rotation to about 1e-6.
 pub fn validate_rotation(matrix: &Matrix3<f64>) -> Result<()> {
+    check_rotation("robot_from_camera", matrix)
+}
+
+/// Refuses an argument of any name that is no rotation.
+pub(crate) fn check_rotation(name: &'static str, matrix: &Matrix3<f64>) -> Result<()> {
     let off = (matrix.transpose() * matrix - Matrix3::identity()).norm();
     if off < 1e-6 && matrix.determinant() > 0.0 {
         return Ok(());
@@ -18,5 +23,5 @@ pub fn validate_rotation(matrix: &Matrix3<f64>) -> Result<()> {
     } else {
         "a matrix that is not finite".to_owned()
     };
-    Err(Error::argument("robot_from_camera", got, "a rotation: orthonormal columns, determinant 1"))
+    Err(Error::argument(name, got, "a rotation: orthonormal columns, determinant 1"))
 }

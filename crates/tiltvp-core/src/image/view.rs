@@ -49,4 +49,15 @@ impl<'a> ImageView<'a> {
         let start = v * self.stride;
         self.data.get(start..start + self.width).unwrap_or(&[])
     }
+
+    /// The levels of the pixels `(u, v)`, `(u + 1, v)`, `(u, v + 1)`, `(u + 1, v + 1)`, if all are in the image.
+    #[inline]
+    pub(crate) fn quad(&self, u: usize, v: usize) -> Option<[u8; 4]> {
+        if u + 1 >= self.width || v + 1 >= self.height {
+            return None;
+        }
+        let at = v * self.stride + u;
+        let (above, below) = (self.data.get(at..at + 2)?, self.data.get(at + self.stride..at + self.stride + 2)?);
+        Some([above[0], above[1], below[0], below[1]])
+    }
 }

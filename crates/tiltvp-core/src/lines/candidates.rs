@@ -4,6 +4,7 @@ use std::f64::consts::{PI, TAU};
 
 use nalgebra::Matrix3;
 
+use super::arctan::atan2;
 use super::sight::Sight;
 use crate::edges::RidgePixels;
 use crate::robust::Rows;
@@ -27,6 +28,8 @@ pub(super) struct Candidate {
     pub(super) azimuth: f32,
     /// How far the azimuth turns for one pixel across the edge, radians, positive.
     pub(super) per_px: f32,
+    /// One over that.
+    pub(super) px_per_rad: f32,
     /// Tangent of the elevation.
     pub(super) slope: f32,
     /// Whether it is brighter towards greater azimuth.
@@ -50,7 +53,11 @@ impl Candidates {
         let reach = (plane_max_rad + lean).min(PI / 2.0).sin();
         sight.lift.lift(&ridge.edges, reach, &mut self.rows, &mut self.weights, &mut self.places);
         let limit = plane_max_rad.sin();
-        let turn: Matrix3<f32> = robot_from_upright.transpose().cast();
+        let turn: [[f32; 3]; 3] = std::array::from_fn(|i| std::array::from_fn(|j| robot_from_upright[(j, i)] as f32));
+        let upright = |[x, y, z]: [f32; 3]| {
+            let row = |[a, b, c]: [f32; 3]| a * x + b * y + c * z;
+            (row(turn[0]), row(turn[1]), row(turn[2]))
+        };
         self.unsorted.clear();
         let (slots, gx, gy) = (ridge.edges.slot(), ridge.edges.gx(), ridge.edges.gy());
         for (row, place) in self.rows.iter().zip(&self.places) {
@@ -64,19 +71,21 @@ impl Candidates {
             let step = |at: usize| if shift < 0.0 { at.saturating_sub(1) } else { at + 1 };
             let next = if gx[place].abs() >= gy[place].abs() { sight.ray(step(u), v) } else { sight.ray(u, step(v)) };
             let (Some(here), Some(next)) = (sight.ray(u, v), next) else { continue };
-            let (a, b) = (turn * nalgebra::Vector3::from(here), turn * nalgebra::Vector3::from(next));
-            let flat = a.x * a.x + a.y * a.y;
-            let per_px = (a.x * b.y - a.y * b.x) / flat.max(1e-6);
+            let ((ax, ay, az), (bx, by, bz)) = (upright(here), upright(next));
+            let flat = ax * ax + ay * ay;
+            let per_px = (ax * by - ay * bx) / flat.max(1e-6);
             if per_px.abs() < 1e-6 || flat < 1e-4 {
                 continue;
             }
-            let edge = a + (b - a) * shift.abs();
-            let normal = turn * row.cast::<f32>();
+            let share = shift.abs();
+            let (x, y, z) = (ax + share * (bx - ax), ay + share * (by - ay), az + share * (bz - az));
+            let (nx, ny, _) = upright([row.x as f32, row.y as f32, row.z as f32]);
             self.unsorted.push(Candidate {
-                azimuth: a.y.atan2(a.x) + shift.abs() * per_px,
+                azimuth: atan2(ay, ax) + share * per_px,
                 per_px: per_px.abs(),
-                slope: edge.z / edge.x.hypot(edge.y),
-                rising: normal.y * a.x - normal.x * a.y > 0.0,
+                px_per_rad: 1.0 / per_px.abs(),
+                slope: z / (x * x + y * y).sqrt(),
+                rising: ny * ax - nx * ay > 0.0,
                 taken: false,
             });
         }
@@ -110,6 +119,19 @@ impl Candidates {
 pub(super) fn bin_of(azimuth: f64, bins: usize) -> usize {
     let turn = (azimuth + PI) / TAU;
     (((turn - turn.floor()) * bins as f64) as usize).min(bins - 1)
+}
+
+/// The difference of two angles of one turn in `[-pi, pi]`, without a division.
+#[inline]
+pub(super) fn difference(a: f64, b: f64) -> f64 {
+    let turned = a - b;
+    if turned > PI {
+        turned - TAU
+    } else if turned < -PI {
+        turned + TAU
+    } else {
+        turned
+    }
 }
 
 /// The angle in `(-pi, pi]`.

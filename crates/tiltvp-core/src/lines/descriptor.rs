@@ -2,8 +2,11 @@
 
 use std::f32::consts::{PI, TAU};
 
+use multiversion::multiversion;
+
+use super::arctan::atan2;
 use super::line::Lines;
-use super::patch::{Chart, Patch};
+use super::patch::{Chart, Patch, Raster};
 use super::sight::Sight;
 use crate::error::{Error, Result};
 use crate::image::ImageView;
@@ -98,6 +101,8 @@ pub(super) struct DescriptorScratch {
     /// Half of the smoothing Gaussian, the middle first.
     kernel: Vec<f32>,
     rows: Vec<f32>,
+    /// Magnitudes and places in the histogram of one row.
+    gradients: [Vec<f32>; 2],
     /// Half of the samples across an area, and the window's width, that the window was made for.
     made_for: Option<(usize, f64)>,
 }
@@ -130,14 +135,16 @@ pub(super) fn describe(
     scratch.make_kernel(options.smoothing * half as f64);
     let pitch = radius / half as f64;
     let side = 2 * (half + scratch.kernel.len()) + 1;
+    let reach = Some((half + scratch.kernel.len()) as f64 + 0.5);
+    let raster = Raster { pitch, rows: side, columns: side, reach };
     out.clear();
     out.resize(lines.lines.len() * options.values(), 0.0);
     for (line, values) in lines.lines.iter().zip(out.chunks_exact_mut(options.values())) {
         let (_, middles) = options.layout(*low, *high);
         for (middle, pair) in middles.zip(values.chunks_exact_mut(2 * options.bins)) {
-            scratch.patch.sample(image, sight, chart, (line.bearing_rad, middle), pitch, (side, side));
+            scratch.patch.sample(image, sight, chart, (line.bearing_rad, middle), &raster);
             smooth(&mut scratch.patch, &scratch.kernel, &mut scratch.rows);
-            histograms(&scratch.patch, &scratch.window, half, options.bins, pair);
+            histograms(&scratch.patch, &scratch.window, half, &mut scratch.gradients, options.bins, pair);
             if options.normalisation == Normalisation::Area {
                 normalise(pair, options.clip as f32);
             }
@@ -210,29 +217,36 @@ fn smooth(patch: &mut Patch, kernel: &[f32], rows: &mut Vec<f32>) {
 }
 
 /// Adds the gradients of a patch to the histograms of its two sides: left of the line, where azimuth is greater, first.
-fn histograms(patch: &Patch, window: &[f32], half: usize, bins: usize, out: &mut [f32]) {
+fn histograms(patch: &Patch, window: &[f32], half: usize, gradients: &mut [Vec<f32>; 2], bins: usize, out: &mut [f32]) {
     let (width, n) = (patch.columns, 2 * half + 1);
     let (left, right) = out.split_at_mut(bins);
-    let scale = bins as f32 / TAU;
-    for i in 0..n {
-        let [below, here, above] = [i, i + 1, i + 2].map(|row| &patch.levels[row * width..(row + 1) * width]);
-        for j in 0..n {
-            let weight = window[i * n + j];
-            if weight == 0.0 {
-                continue;
-            }
-            let across = above[j + 2] - above[j] + below[j + 2] - below[j] + 2.0 * (here[j + 2] - here[j]);
-            let along = above[j] - below[j] + above[j + 2] - below[j + 2] + 2.0 * (above[j + 1] - below[j + 1]);
-            let magnitude = weight * (across * across + along * along).sqrt();
+    let [magnitudes, places] = gradients;
+    for values in [&mut *magnitudes, &mut *places] {
+        values.clear();
+        values.resize(n, 0.0);
+    }
+    for (i, weights) in window.chunks_exact(n).enumerate() {
+        let rows = [i, i + 1, i + 2].map(|row| &patch.levels[row * width..(row + 1) * width]);
+        // Nothing of the circle is as far from its middle line as the ends of the rows near its top.
+        let first = weights.iter().position(|weight| *weight > 0.0).unwrap_or(n);
+        let inside = first..n - first.min(n);
+        if inside.is_empty() {
+            continue;
+        }
+        let [below, here, above] = rows.map(|row| &row[first..inside.end + 2]);
+        let (magnitudes, places) = (&mut magnitudes[inside.clone()], &mut places[inside.clone()]);
+        gradients_of([below, here, above], &weights[inside.clone()], bins as f32 / TAU, magnitudes, places);
+        for ((j, magnitude), place) in inside.zip(magnitudes).zip(places) {
+            let (magnitude, place) = (*magnitude, *place);
             // NaN is a sample that is not of the world.
             if magnitude.is_nan() || magnitude <= 0.0 {
                 continue;
             }
             // Eq. 2: the share w goes to the bin above.
-            let place = (atan2(across, along) + PI) * scale;
-            let bin = place as usize;
+            let bin = place as i32 as usize;
             let share = place - bin as f32;
-            let (bin, next) = (bin % bins, (bin + 1) % bins);
+            let bin = if bin >= bins { bin - bins } else { bin };
+            let next = if bin + 1 == bins { 0 } else { bin + 1 };
             let vote = |side: &mut [f32], magnitude: f32| {
                 side[bin] += magnitude * (1.0 - share);
                 side[next] += magnitude * share;
@@ -246,6 +260,27 @@ fn histograms(patch: &Patch, window: &[f32], half: usize, bins: usize, out: &mut
                 }
             }
         }
+    }
+}
+
+/// Weighted magnitudes of the Sobel gradients of one row, and their orientations in bins; rows are one sample wider on both
+/// sides.
+#[multiversion(targets("x86_64+avx512f+avx512vl", "x86_64+avx2"))]
+fn gradients_of(
+    [below, here, above]: [&[f32]; 3],
+    weights: &[f32],
+    bins_per_rad: f32,
+    magnitudes: &mut [f32],
+    places: &mut [f32],
+) {
+    let n = weights.len();
+    let (below, here, above) = (&below[..n + 2], &here[..n + 2], &above[..n + 2]);
+    let (magnitudes, places) = (&mut magnitudes[..n], &mut places[..n]);
+    for j in 0..n {
+        let across = above[j + 2] - above[j] + below[j + 2] - below[j] + 2.0 * (here[j + 2] - here[j]);
+        let along = above[j] - below[j] + above[j + 2] - below[j + 2] + 2.0 * (above[j + 1] - below[j + 1]);
+        magnitudes[j] = weights[j] * (across * across + along * along).sqrt();
+        places[j] = (atan2(across, along) + PI) * bins_per_rad;
     }
 }
 
@@ -267,31 +302,9 @@ fn unit(values: &mut [f32]) {
     }
 }
 
-/// `atan2` to 1e-5 rad, by a polynomial on the octant.
-fn atan2(y: f32, x: f32) -> f32 {
-    let (large, small) = if x.abs() >= y.abs() { (x.abs(), y.abs()) } else { (y.abs(), x.abs()) };
-    let a = if large > 0.0 { small / large } else { 0.0 };
-    let s = a * a;
-    // Abramowitz and Stegun 4.4.49.
-    let r = a * (0.999_866 + s * (-0.330_299_5 + s * (0.180_141 + s * (-0.085_133 + s * 0.020_835_1))));
-    let r = if y.abs() > x.abs() { 0.5 * PI - r } else { r };
-    let r = if x < 0.0 { PI - r } else { r };
-    if y < 0.0 { -r } else { r }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn the_polynomial_is_an_arc_tangent() {
-        for i in 0..10_000 {
-            let angle = (f64::from(i) / 5000.0 - 1.0) * std::f64::consts::PI;
-            let (y, x) = ((3.0 * angle.sin()) as f32, (3.0 * angle.cos()) as f32);
-            assert!((atan2(y, x) - y.atan2(x)).abs() < 2e-5);
-        }
-        assert_eq!(atan2(0.0, 0.0), 0.0);
-    }
 
     #[test]
     fn areas_touch_or_overlap_by_half() {

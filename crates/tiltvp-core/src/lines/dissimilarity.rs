@@ -35,12 +35,17 @@ fn squared_distance(a: &[f32], b: &[f32]) -> f32 {
     sums.iter().sum::<f32>() + rest
 }
 
+/// Euclidean distance of two descriptors, eq. 6.
+pub(super) fn descriptor_distance(a: &[f32], b: &[f32]) -> f64 {
+    f64::from(squared_distance(a, b)).sqrt()
+}
+
 /// Euclidean distances of descriptors of `width` values, eq. 6: `(N_A, N_B)` in row order.
 ///
 /// # Errors
 /// [`Error::InvalidArgument`] unless both hold whole rows.
 pub fn descriptor_distances(a: &[f32], b: &[f32], width: usize, out: &mut Vec<f64>) -> Result<()> {
-    matrix(a, b, width, |a, b| f64::from(squared_distance(a, b)).sqrt(), out)
+    matrix(a, b, width, descriptor_distance, out)
 }
 
 /// Means of the squared differences of patches of `width` samples, eq. 12, over the samples that both have: NaN where there

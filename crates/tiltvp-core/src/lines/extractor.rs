@@ -6,7 +6,7 @@ use super::descriptor::{Course, DescriptorScratch, describe};
 use super::great_circle::{self, GreatCircleScratch};
 use super::line::{Line, LineFrame, Lines};
 use super::options::{LineMethod, LineOptions};
-use super::patch::{Chart, Patch};
+use super::patch::{Chart, Patch, Raster};
 use super::radial::{self, RadialScratch, Radii};
 use super::sight::Sight;
 use crate::camera::Camera;
@@ -209,11 +209,11 @@ impl LineExtractor {
         let chart = Chart::new(&self.camera, &self.robot_from_camera, &lines.frame);
         let (low, high) = self.range(&lines.frame);
         let (rows, columns) = (6 * SAMPLES + 1, 2 * SAMPLES + 1);
-        let pitch = (high - low) / (6 * SAMPLES) as f64;
+        let raster = Raster { pitch: (high - low) / (6 * SAMPLES) as f64, rows, columns, reach: None };
         let mut patch = Patch::default();
         out.clear();
         for line in &lines.lines {
-            patch.sample(image, &self.sight, &chart, (line.bearing_rad, 0.5 * (low + high)), pitch, (rows, columns));
+            patch.sample(image, &self.sight, &chart, (line.bearing_rad, 0.5 * (low + high)), &raster);
             out.extend_from_slice(&patch.levels);
         }
         Ok((rows, columns))

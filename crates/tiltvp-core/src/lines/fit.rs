@@ -1,13 +1,16 @@
 //! The azimuth of one line, by weighted least squares over its pixels, and what of the line is seen.
 
-use super::candidates::{Candidate, Candidates, bin_of, wrap};
+use super::candidates::{Candidate, Candidates, bin_of, difference, wrap};
 use super::options::GreatCircleOptions;
 
 /// Gates about the line in pixels, from the first fit to the last.
 const GATES_PX: [f64; 4] = [3.0, 2.0, 1.5, 1.2];
 
-/// Pixels that err together along a line: neighbours share the grid's phase and the edge's crookedness.
+/// Pixels that count as one against the prior of the slant: neighbours share the grid's phase and the edge's crookedness.
 const ERRING_TOGETHER: f64 = 8.0;
+
+/// Pixels that count as one for what is known in the end: an edge beside the line pulls at most of its length.
+const PULLED_TOGETHER: f64 = 40.0;
 
 /// The least standard deviation of a pixel's place across the edge, in pixels, however well the pixels agree.
 const PIXEL_SIGMA_MIN_PX: f64 = 0.06;
@@ -89,9 +92,10 @@ pub(super) fn take(candidates: &mut Candidates, scratch: &FitScratch) {
 }
 
 /// How far a pixel's edge is from the line, in pixels across it.
+#[inline]
 fn residual_px(fit: &Fit, pixel: &Candidate) -> f64 {
     let slant = fit.slant * f64::from(pixel.slope);
-    wrap(f64::from(pixel.azimuth) - fit.azimuth - slant) / f64::from(pixel.per_px)
+    (difference(f64::from(pixel.azimuth), fit.azimuth) - slant) * f64::from(pixel.px_per_rad)
 }
 
 /// One step of iteratively reweighted least squares of `azimuth + slant tan(elevation)`, with a prior on the slant.
@@ -104,16 +108,17 @@ fn solve(
 ) -> Option<Fit> {
     let (mut n, mut squares, mut wide) = (0.0, 0.0, 0.0);
     let (mut s0, mut s1, mut s2, mut r0, mut r1) = (0.0, 0.0, 0.0, 0.0, 0.0);
+    let narrow = gate_px.powi(-2);
     for member in members {
         let pixel = &candidates.pixels[*member as usize];
         let residual = residual_px(at, pixel);
-        let share = 1.0 - (residual / gate_px).powi(2);
+        let share = 1.0 - residual * residual * narrow;
         if share <= 0.0 {
             continue;
         }
         let trust = share * share;
         let (per_px, slope) = (f64::from(pixel.per_px), f64::from(pixel.slope));
-        let weight = trust / (per_px * per_px);
+        let weight = trust * f64::from(pixel.px_per_rad).powi(2);
         let turned = residual * per_px;
         n += trust;
         squares += trust * residual * residual;
@@ -137,10 +142,12 @@ fn solve(
         return None;
     }
     let per_px = wide / n;
+    let known = 1.0 / (variance * PULLED_TOGETHER.min(n));
+    let (ka, kb, kc) = (known * s0, known * s1, known * s2 + prior);
     Some(Fit {
         azimuth: wrap(at.azimuth + (c * x - b * y) / determinant),
         slant: at.slant + (a * y - b * x) / determinant,
-        sigma: (c / determinant + (LINE_SIGMA_PX * per_px).powi(2)).sqrt(),
+        sigma: (kc / (ka * kc - kb * kb) + (LINE_SIGMA_PX * per_px).powi(2)).sqrt(),
         per_px,
         ..*at
     })
@@ -151,16 +158,19 @@ fn keep_runs(candidates: &Candidates, options: &GreatCircleOptions, scratch: &mu
     let FitScratch { members, runs } = scratch;
     let slope = |at: &u32| candidates.pixels[*at as usize].slope;
     members.sort_unstable_by(|a, b| slope(a).total_cmp(&slope(b)).then(a.cmp(b)));
-    let elevation = |at: u32| f64::from(slope(&at)).atan();
+    let elevation = |at: &u32| f64::from(slope(at)).atan();
+    // tan(a - b) = (tan a - tan b) / (1 + tan a tan b), for angles less than a right one apart.
+    let gap = if options.gap_max_rad < 1.5 { options.gap_max_rad.tan() as f32 } else { f32::INFINITY };
+    let is_near = |a: f32, b: f32| b - a <= gap * (1.0 + a * b).max(1e-6);
     runs.clear();
     let (mut first, mut length) = (0, 0.0);
     for end in 1..=members.len() {
-        if end < members.len() && elevation(members[end]) - elevation(members[end - 1]) <= options.gap_max_rad {
+        if end < members.len() && is_near(slope(&members[end - 1]), slope(&members[end])) {
             continue;
         }
         let run = &members[first..end];
         if run.len() >= options.run_min_px as usize {
-            length += elevation(run[run.len() - 1]) - elevation(run[0]);
+            length += elevation(&run[run.len() - 1]) - elevation(&run[0]);
             runs.extend_from_slice(run);
         }
         first = end;

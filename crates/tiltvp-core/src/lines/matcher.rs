@@ -105,15 +105,6 @@ pub fn match_descriptors(
 }
 
 impl MatchScratch {
-    /// Adds to the distances that are filled in.
-    pub(super) fn add(&mut self, (n, m): (usize, usize), more: impl Fn(usize, usize) -> f64) {
-        for i in 0..n {
-            for j in 0..m {
-                self.distances[i * m + j] += more(i, j);
-            }
-        }
-    }
-
     /// Fills in the distances of descriptors of equal width.
     pub(super) fn measure(&mut self, a: &[f32], b: &[f32], width: usize) -> Result<()> {
         descriptor_distances(a, b, width, &mut self.distances)

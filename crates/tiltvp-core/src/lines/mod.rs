@@ -1,5 +1,7 @@
 //! Vertical lines of single images: found, described, matched and followed (paper 001, sections 2 to 4 and 9.1).
 
+mod arctan;
+mod assignment;
 mod candidates;
 mod center;
 mod descriptor;
@@ -11,6 +13,7 @@ mod line;
 mod matcher;
 mod options;
 mod order;
+mod parallax;
 mod patch;
 mod radial;
 mod sight;
@@ -22,4 +25,5 @@ pub use extractor::{LineExtractor, LineScratch};
 pub use line::{Line, LineFrame, Lines};
 pub use matcher::{BearingGate, Match, MatchOptions, MatchScratch, match_descriptors};
 pub use options::{GreatCircleOptions, LINE_METHODS, LineMethod, LineOptions, RadialOptions};
-pub use tracker::{FrameMemory, LineTracker, TrackedLine, TrackerOptions, TrackerState};
+pub use parallax::{Motion, Parallax};
+pub use tracker::{Followed, FrameMemory, LineTracker, TrackedLine, TrackerOptions, TrackerState};

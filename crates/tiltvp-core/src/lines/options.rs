@@ -45,7 +45,7 @@ pub struct GreatCircleOptions {
     pub gap_max_rad: f64,
     /// Least number of pixels of a run. Default 6.
     pub run_min_px: u32,
-    /// Standard deviation of the tilt that the frame is given, in radians: lines may slant by as much. Default 0.3 degrees.
+    /// Standard deviation of the tilt that the frame is given, in radians: lines may slant by as much. Default 0.5 degrees.
     pub tilt_sigma_rad: f64,
     /// The most lines of an image, the longest ones; none for all. Default none.
     pub lines_max: Option<usize>,
@@ -61,7 +61,7 @@ impl Default for GreatCircleOptions {
             support_min_px: 15,
             gap_max_rad: 2.0 * PI / 180.0,
             run_min_px: 6,
-            tilt_sigma_rad: 0.3 * PI / 180.0,
+            tilt_sigma_rad: 0.5 * PI / 180.0,
             lines_max: None,
         }
     }
@@ -104,7 +104,7 @@ impl Default for RadialOptions {
 /// Options of a line extractor.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LineOptions {
-    /// Which pixels are looked at for edges. Default from 30 degrees below the horizon to 60 above it, after smoothing by 0.6
+    /// Which pixels are looked at for edges. Default from 30 degrees below the horizon to 60 above it, after smoothing by 0.5
     /// pixels; else as for tilt.
     pub edges: EdgeOptions,
     /// Which pixels may be used at all. Default none: all.
@@ -127,7 +127,7 @@ impl LineOptions {
             _ => return Err(Error::option("method", name, "\"great-circle\" or \"radial\"")),
         };
         let edges = EdgeOptions {
-            smoothing_px: 0.6,
+            smoothing_px: 0.5,
             elevation_min_rad: -PI / 6.0,
             elevation_max_rad: PI / 3.0,
             ..EdgeOptions::default()

@@ -58,6 +58,19 @@ impl<'a> Chart<'a> {
     }
 }
 
+/// Which places of a rectangle are sampled.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Raster {
+    /// From sample to sample, in the chart's unit.
+    pub(super) pitch: f64,
+    /// Along the line.
+    pub(super) rows: usize,
+    /// Across the line.
+    pub(super) columns: usize,
+    /// How many samples from the middle are needed; the others may be NaN. None for all.
+    pub(super) reach: Option<f64>,
+}
+
 /// A resampled rectangle of grey levels, NaN where the world is not seen.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Patch {
@@ -69,31 +82,42 @@ pub(super) struct Patch {
 }
 
 impl Patch {
-    /// Samples `rows x columns` places, `pitch` apart, about the middle of a line.
+    /// Samples a raster about the middle of a line.
     pub(super) fn sample(
         &mut self,
         image: &ImageView<'_>,
         sight: &Sight,
         chart: &Chart<'_>,
         (bearing, middle): (f64, f64),
-        pitch: f64,
-        (rows, columns): (usize, usize),
+        raster: &Raster,
     ) {
+        let Raster { pitch, rows, columns, reach } = *raster;
         (self.rows, self.columns) = (rows, columns);
         let (node_rows, node_columns) = (rows.div_ceil(SUBDIVISIONS) + 1, columns.div_ceil(SUBDIVISIONS) + 1);
         let place = chart.around(bearing, middle);
-        let offset = |i: usize, n: usize| (i as f64 - 0.5 * (n as f64 - 1.0)) * pitch;
+        let offset = |i: usize, n: usize| (i * SUBDIVISIONS) as f64 - 0.5 * (n as f64 - 1.0);
+        let far = reach.map_or(f64::INFINITY, |reach| (reach + 1.5 * SUBDIVISIONS as f64).powi(2));
         self.nodes.clear();
         for i in 0..node_rows {
-            let along = offset(i * SUBDIVISIONS, rows);
+            let along = offset(i, rows);
             self.nodes.extend((0..node_columns).map(|j| {
-                place(along, offset(j * SUBDIVISIONS, columns)).map(|pixel| [pixel.x as f32, pixel.y as f32])
+                let across = offset(j, columns);
+                if along * along + across * across > far {
+                    return None;
+                }
+                place(along * pitch, across * pitch).map(|pixel| [pixel.x as f32, pixel.y as f32])
             }));
         }
         self.levels.clear();
         self.levels.resize(rows * columns, f32::NAN);
+        let near = reach.map_or(f64::INFINITY, |reach| reach * reach);
+        // From the middle to the nearest point of a cell.
+        let gap = |start: f64| (-start - SUBDIVISIONS as f64).max(start).max(0.0);
         for i in 0..node_rows - 1 {
             for j in 0..node_columns - 1 {
+                if gap(offset(i, rows)).powi(2) + gap(offset(j, columns)).powi(2) > near {
+                    continue;
+                }
                 let at = i * node_columns + j;
                 let corners = [at, at + 1, at + node_columns, at + node_columns + 1].map(|k| self.nodes[k]);
                 if let [Some(a), Some(b), Some(c), Some(d)] = corners {
@@ -112,31 +136,35 @@ impl Patch {
         [a, b, c, d]: [[f32; 2]; 4],
     ) {
         let unit = 1.0 / SUBDIVISIONS as f32;
-        let mix = |p: [f32; 2], q: [f32; 2], t: f32| [p[0] + t * (q[0] - p[0]), p[1] + t * (q[1] - p[1])];
+        let mix = |p: f32, q: f32, t: f32| p + t * (q - p);
+        let count = SUBDIVISIONS.min(self.columns - column);
         for i in 0..SUBDIVISIONS.min(self.rows - row) {
-            let (left, right) = (mix(a, c, i as f32 * unit), mix(b, d, i as f32 * unit));
-            let line = (row + i) * self.columns + column;
-            for j in 0..SUBDIVISIONS.min(self.columns - column) {
-                let [x, y] = mix(left, right, j as f32 * unit);
-                self.levels[line + j] = level_at(image, sight, x, y);
+            let t = i as f32 * unit;
+            let (x, y) = (mix(a[0], c[0], t), mix(a[1], c[1], t));
+            let (dx, dy) = (unit * (mix(b[0], d[0], t) - x), unit * (mix(b[1], d[1], t) - y));
+            let start = (row + i) * self.columns + column;
+            for (j, level) in self.levels[start..start + count].iter_mut().enumerate() {
+                *level = level_at(image, sight, x + j as f32 * dx, y + j as f32 * dy);
             }
         }
     }
 }
 
 /// The grey level between four pixels, NaN where the world is not seen.
+#[inline]
 fn level_at(image: &ImageView<'_>, sight: &Sight, x: f32, y: f32) -> f32 {
     // Written so that NaN fails.
-    if !(x >= 0.0 && y >= 0.0 && x < (sight.width - 1) as f32 && y < (sight.height - 1) as f32) {
+    if !(x >= 0.0 && y >= 0.0) {
         return f32::NAN;
     }
-    let (u, v) = (x as usize, y as usize);
-    if !sight.clear[v * sight.width + u] {
-        return f32::NAN;
-    }
+    let (u, v) = (x as i32, y as i32);
     let (s, t) = (x - u as f32, y - v as f32);
-    let (above, below) = (image.row(v), image.row(v + 1));
-    let top = f32::from(above[u]) + s * (f32::from(above[u + 1]) - f32::from(above[u]));
-    let bottom = f32::from(below[u]) + s * (f32::from(below[u + 1]) - f32::from(below[u]));
+    let (u, v) = (u as usize, v as usize);
+    if u >= sight.width || !sight.clear.get(v * sight.width + u).is_some_and(|clear| *clear) {
+        return f32::NAN;
+    }
+    let Some([a, b, c, d]) = image.quad(u, v) else { return f32::NAN };
+    let (a, b, c, d) = (f32::from(a), f32::from(b), f32::from(c), f32::from(d));
+    let (top, bottom) = (a + s * (b - a), c + s * (d - c));
     top + t * (bottom - top)
 }

@@ -60,7 +60,7 @@ impl Radii {
                 outer = outer.max(radius(u, v));
             }
         }
-        let valid = (0..sight.rays.len()).filter(|i| !sight.rays[*i][0].is_nan());
+        let valid = (0..sight.width * sight.height).filter(|i| sight.ray(i % sight.width, i / sight.width).is_some());
         let rim = valid.map(|i| radius(i % sight.width, i / sight.width)).fold(0.0, f64::max) + 0.5;
         Self {
             center,

@@ -7,14 +7,21 @@ use crate::camera::Camera;
 use crate::edges::{EdgeOptions, LiftTable, NormalKind, Region, Screen};
 use crate::error::Result;
 
+/// The unit of a table of bearings.
+const UNIT: f32 = 1.0 / 32767.0;
+
+/// First component of what is no bearing.
+const NO_RAY: i16 = i16::MIN;
+
 /// Tables of one camera.
 #[derive(Debug, Clone)]
 pub(super) struct Sight {
     pub(super) region: Region,
     pub(super) lift: LiftTable,
     pub(super) screen: Screen,
-    /// Bearing of every pixel in the robot frame, NaN where there is none, in row order.
-    pub(super) rays: Vec<[f32; 3]>,
+    /// Bearing of every pixel in the robot frame, in row order and units of [`UNIT`]: half the memory of single precision, to
+    /// a thousandth of a degree. [`NO_RAY`] where there is none.
+    rays: Vec<[i16; 3]>,
     /// Whether the world is seen at a pixel and around it, in row order.
     pub(super) clear: Vec<bool>,
     pub(super) width: usize,
@@ -33,14 +40,14 @@ impl Sight {
         let (width, height) = (camera.width() as usize, camera.height() as usize);
         let rays = (0..width * height).map(|i| {
             let pixel = Vector2::new((i % width) as f64, (i / width) as f64);
-            camera.unproject(&pixel).map_or([f32::NAN; 3], |ray| {
-                let ray = robot_from_camera * ray;
-                [ray.x as f32, ray.y as f32, ray.z as f32]
+            camera.unproject(&pixel).map_or([NO_RAY; 3], |ray| {
+                let ray = (robot_from_camera * ray) / f64::from(UNIT);
+                [ray.x, ray.y, ray.z].map(|x| x.round().clamp(-32767.0, 32767.0) as i16)
             })
         });
-        let rays: Vec<[f32; 3]> = rays.collect();
+        let rays: Vec<[i16; 3]> = rays.collect();
         let usable = |u: usize, v: usize| {
-            !rays[v * width + u][0].is_nan() && options.mask.as_ref().is_none_or(|mask| mask.usable(u, v))
+            rays[v * width + u][0] != NO_RAY && options.mask.as_ref().is_none_or(|mask| mask.usable(u, v))
         };
         let mut clear = vec![false; width * height];
         for v in 1..height.saturating_sub(1) {
@@ -53,8 +60,12 @@ impl Sight {
     }
 
     /// The ray of a pixel, and whether it has one.
+    #[inline]
     pub(super) fn ray(&self, u: usize, v: usize) -> Option<[f32; 3]> {
-        self.rays.get(v * self.width + u).copied().filter(|ray| !ray[0].is_nan())
+        match self.rays.get(v * self.width + u) {
+            Some([x, y, z]) if *x != NO_RAY => Some([f32::from(*x) * UNIT, f32::from(*y) * UNIT, f32::from(*z) * UNIT]),
+            _ => None,
+        }
     }
 }
 

@@ -1,10 +1,14 @@
-//! Lines followed through successive frames: matched with the last frame that shows them, up to a number of frames back.
+//! Lines followed through successive frames: on tracks whose bearings are predicted where the robot's motion is known, else
+//! matched with the last frame that shows them.
 
 use std::collections::VecDeque;
 
+use super::assignment::{AssignmentScratch, FORBIDDEN, assign};
 use super::candidates::wrap;
+use super::dissimilarity::descriptor_distance;
 use super::line::{Line, Lines};
 use super::matcher::{Match, MatchOptions, MatchScratch, select};
+use super::parallax::{Motion, Parallax};
 use crate::error::{Error, Result};
 
 /// Options of the tracker.
@@ -12,21 +16,30 @@ use crate::error::{Error, Result};
 pub struct TrackerOptions {
     /// How many frames back a line is looked for before it is taken for a new one. Default 20.
     pub look_back: usize,
-    /// How lines of two frames are matched.
+    /// How lines of two frames are matched where the motion is unknown.
     pub matching: MatchOptions,
-    /// Greatest difference from the bearing that is predicted for one frame to the next, in radians, where the turn of the
-    /// robot is known. Default 0.1.
-    pub gate_rad: f64,
-    /// The same for a line whose change of bearing is known from before, to which as much as that change is added, but no
-    /// more than `gate_rad`; only with `extrapolate`. Default 0.02.
-    pub gate_settled_rad: f64,
-    /// How much wider the gates are for each further frame back, in radians. Default 0.005.
-    pub gate_growth_rad: f64,
-    /// What is added to the distance of descriptors at the gate, in proportion less for bearings closer to the predicted one:
-    /// of lines that look alike the one in the right place is the nearest. Default 1.
-    pub bearing_weight: f64,
-    /// Whether bearings are predicted to go on changing as they did, beside the turn of the robot. Default true.
-    pub extrapolate: bool,
+    /// The least distance of an edge from the camera, metres: how far bearings may change while nothing else is known. Default
+    /// 0.3.
+    pub nearest_m: f64,
+    /// Where the camera's centre is on the robot, x and y from the middle between the wheels, metres. Default (0, 0).
+    pub camera_m: [f64; 2],
+    /// Standard deviation of a turn that is given, radians. Default 0.005.
+    pub turn_sigma_rad: f64,
+    /// Standard deviation of a distance driven that is given, as a share of it. Default 0.03.
+    pub distance_sigma: f64,
+    /// Standard deviation of the change of a bearing per frame beside the turn, where no distance is given, radians. Default
+    /// 0.05.
+    pub rate_sigma_rad: f64,
+    /// Standard deviation of a bearing beside the line's own, from neighbouring edges that blend, radians. Default 0.12 degrees.
+    pub bearing_sigma_rad: f64,
+    /// The greatest difference from a predicted bearing, in standard deviations. Default 3.5.
+    pub gate_sigmas: f64,
+    /// Standard deviation of the distance between descriptors of one line. Default 0.35.
+    pub descriptor_sigma: f64,
+    /// The greatest distance between descriptors of one line at its predicted bearing. Default 1.25.
+    pub descriptor_max: f64,
+    /// What a new track costs, to be held against the squared deviations of a line that goes on. Default 18.
+    pub new_cost: f64,
 }
 
 impl Default for TrackerOptions {
@@ -34,11 +47,16 @@ impl Default for TrackerOptions {
         Self {
             look_back: 20,
             matching: MatchOptions::default(),
-            gate_rad: 0.1,
-            gate_settled_rad: 0.02,
-            gate_growth_rad: 0.005,
-            bearing_weight: 1.0,
-            extrapolate: true,
+            nearest_m: 0.3,
+            camera_m: [0.0; 2],
+            turn_sigma_rad: 0.005,
+            distance_sigma: 0.03,
+            rate_sigma_rad: 0.05,
+            bearing_sigma_rad: 0.12f64.to_radians(),
+            gate_sigmas: 3.5,
+            descriptor_sigma: 0.35,
+            descriptor_max: 1.25,
+            new_cost: 18.0,
         }
     }
 }
@@ -53,17 +71,27 @@ impl TrackerOptions {
         if !(1..=100_000).contains(&self.look_back) {
             return Err(Error::option("look_back", self.look_back, "a whole number of frames from 1 to 100000"));
         }
-        if !(self.gate_rad > 0.0 && self.gate_rad.is_finite()) {
-            return Err(Error::option("gate_rad", self.gate_rad, "a positive angle"));
+        for (name, value, expected) in [
+            ("nearest_m", self.nearest_m, "a positive distance"),
+            ("turn_sigma_rad", self.turn_sigma_rad, "a positive angle"),
+            ("rate_sigma_rad", self.rate_sigma_rad, "a positive angle"),
+            ("bearing_sigma_rad", self.bearing_sigma_rad, "a positive angle"),
+            ("gate_sigmas", self.gate_sigmas, "a positive number"),
+            ("descriptor_sigma", self.descriptor_sigma, "a positive distance"),
+            ("descriptor_max", self.descriptor_max, "a positive distance"),
+            ("new_cost", self.new_cost, "a positive number"),
+        ] {
+            if !(value > 0.0 && value <= 1e6) {
+                return Err(Error::option(name, value, expected));
+            }
         }
-        if !(self.gate_settled_rad > 0.0 && self.gate_settled_rad.is_finite()) {
-            return Err(Error::option("gate_settled_rad", self.gate_settled_rad, "a positive angle"));
+        if !(self.distance_sigma >= 0.0 && self.distance_sigma <= 10.0) {
+            return Err(Error::option("distance_sigma", self.distance_sigma, "a share from 0 to 10"));
         }
-        if !(self.bearing_weight >= 0.0 && self.bearing_weight.is_finite()) {
-            return Err(Error::option("bearing_weight", self.bearing_weight, "a distance of at least 0"));
-        }
-        if !(self.gate_growth_rad >= 0.0 && self.gate_growth_rad.is_finite()) {
-            return Err(Error::option("gate_growth_rad", self.gate_growth_rad, "an angle of at least 0"));
+        for value in self.camera_m {
+            if !(-10.0..=10.0).contains(&value) {
+                return Err(Error::option("camera_m", value, "metres from -10 to 10"));
+            }
         }
         Ok(())
     }
@@ -85,18 +113,25 @@ pub struct TrackedLine {
 /// What the tracker remembers of a frame.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct FrameMemory {
-    /// Bearing of each line, radians.
-    pub bearings_rad: Vec<f64>,
-    /// Change of each line's bearing per frame beside the turn of the robot, radians, where it is known.
-    pub rates_rad: Vec<Option<f64>>,
     /// Identity of each line.
     pub tracks: Vec<u64>,
     /// Descriptors, one after the other.
     pub descriptors: Vec<f32>,
-    /// Heading of the robot since the turn became known, radians.
-    pub heading_rad: f64,
-    /// Number of the stretch of frames between which the turns are known.
-    pub stretch: u64,
+}
+
+/// What the tracker remembers of a track that is followed by its bearing.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Followed {
+    /// Identity.
+    pub track: u64,
+    /// Number of the frame that showed it last.
+    pub seen: u64,
+    /// Where it is expected in the latest frame.
+    pub parallax: Parallax,
+    /// [`Line::polarity`] when it was seen last.
+    pub polarity: f64,
+    /// Descriptor when it was seen last.
+    pub descriptor: Vec<f32>,
 }
 
 /// All that a tracker remembers.
@@ -108,6 +143,8 @@ pub struct TrackerState {
     pub next_track: u64,
     /// The last frames, the latest first.
     pub frames: VecDeque<FrameMemory>,
+    /// Tracks of the frames since the motion is known, and of the one before.
+    pub followed: Vec<Followed>,
 }
 
 /// Follows lines through successive frames (paper 001 section 9.1). The same calls give the same answers.
@@ -117,8 +154,15 @@ pub struct LineTracker {
     state: TrackerState,
     scratch: MatchScratch,
     matches: Vec<Match>,
-    claimed: Vec<u64>,
+    assignment: AssignmentScratch,
+    costs: Vec<f64>,
+    distances: Vec<f64>,
+    pairs: Vec<Option<usize>>,
+    offsets: Vec<(f64, f64)>,
 }
+
+/// A line that goes on: its track, and how many frames ago it was seen.
+type Continued = Option<(u64, u32)>;
 
 impl LineTracker {
     /// A tracker that has seen nothing.
@@ -135,13 +179,18 @@ impl LineTracker {
     /// [`Error::InvalidOption`], or [`Error::InvalidArgument`] for a state that no tracker has.
     pub fn with_state(options: TrackerOptions, state: TrackerState) -> Result<Self> {
         options.validate()?;
-        for frame in &state.frames {
-            let n = frame.tracks.len();
-            let known = frame.tracks.iter().all(|track| *track < state.next_track);
-            let whole = if n == 0 { frame.descriptors.is_empty() } else { frame.descriptors.len().is_multiple_of(n) };
-            if frame.bearings_rad.len() != n || frame.rates_rad.len() != n || !known || !whole {
-                return Err(Error::argument("state", "a frame whose parts disagree", "a state that a tracker gave"));
-            }
+        let is_known = |track: &u64| *track < state.next_track;
+        let is_whole = |frame: &FrameMemory| match frame.tracks.len() {
+            0 => frame.descriptors.is_empty(),
+            n => frame.descriptors.len().is_multiple_of(n) && frame.tracks.iter().all(is_known),
+        };
+        let is_true = |edge: &Followed| is_known(&edge.track) && edge.seen < state.next_frame;
+        if !state.frames.iter().all(is_whole) || !state.followed.iter().all(is_true) {
+            return Err(Error::argument(
+                "state",
+                "frames or tracks whose parts disagree",
+                "a state that a tracker gave",
+            ));
         }
         Ok(Self { options, state, ..Self::default() })
     }
@@ -158,111 +207,213 @@ impl LineTracker {
 
     /// The next frame: gives each of its lines the identity of the line it is, or a new one.
     ///
-    /// `descriptors` hold as many values for each line. `yaw_change_rad` is the turn of the robot since the last frame,
-    /// positive to the left; where it is known, bearings are predicted and far ones are no candidates.
+    /// `descriptors` hold as many values for each line. `motion` is what the robot did since the last frame: where it is known,
+    /// bearings are predicted, and all lines find their tracks together; where it is not, only lines of the last frame are
+    /// predicted after it.
     ///
     /// # Errors
-    /// [`Error::InvalidArgument`] unless there is a descriptor for each line, as wide as those before, and the turn is finite.
+    /// [`Error::InvalidArgument`] unless there is a descriptor for each line, as wide as those before, and the motion is finite.
     pub fn update(
         &mut self,
         lines: &Lines,
         descriptors: &[f32],
-        yaw_change_rad: Option<f64>,
+        motion: Option<&Motion>,
         out: &mut Vec<TrackedLine>,
     ) -> Result<()> {
         let lines = &lines.lines;
-        let width = self.check(lines, descriptors, yaw_change_rad)?;
-        let latest = self.state.frames.front();
-        let mut memory = FrameMemory {
-            bearings_rad: lines.iter().map(|line| line.bearing_rad).collect(),
-            rates_rad: vec![None; lines.len()],
-            tracks: vec![u64::MAX; lines.len()],
-            descriptors: descriptors.to_vec(),
-            heading_rad: latest.map_or(0.0, |f| f.heading_rad) + yaw_change_rad.unwrap_or(0.0),
-            stretch: latest.map_or(0, |f| f.stretch) + u64::from(yaw_change_rad.is_none()),
+        let width = self.check(lines, descriptors, motion)?;
+        let continued = match motion {
+            Some(motion) => self.follow(lines, descriptors, width, motion),
+            None => self.look_back(lines, descriptors, width),
         };
-        let mut back = vec![0u32; lines.len()];
-        self.claimed.clear();
-        for (k, frame) in self.state.frames.iter().enumerate() {
-            if self.claimed.len() == lines.len() || width == 0 {
-                break;
-            }
-            if frame.tracks.is_empty() {
-                continue;
-            }
-            let steps = (k + 1) as f64;
-            let turn = memory.heading_rad - frame.heading_rad;
-            let options = &self.options;
-            let known_turn = frame.stretch == memory.stretch;
-            let rate = |j: usize| frame.rates_rad[j].filter(|_| options.extrapolate);
-            let expected = |j: usize| frame.bearings_rad[j] - turn + steps * rate(j).unwrap_or(0.0);
-            let gate = |j: usize| {
-                let wide = options.gate_rad;
-                let narrow = rate(j).map_or(wide, |rate| (options.gate_settled_rad + rate.abs()).min(wide));
-                narrow + options.gate_growth_rad * k as f64
-            };
-            let off = |i: usize, j: usize| wrap(memory.bearings_rad[i] - expected(j)).abs();
-            let allowed = |i: usize, j: usize| {
-                memory.tracks[i] == u64::MAX
-                    && self.claimed.binary_search(&frame.tracks[j]).is_err()
-                    && (!known_turn || off(i, j) <= gate(j))
-            };
-            let size = (lines.len(), frame.tracks.len());
-            self.scratch.measure(descriptors, &frame.descriptors, width)?;
-            if known_turn {
-                self.scratch.add(size, |i, j| options.bearing_weight * (off(i, j) / gate(j)).min(1.0));
-            }
-            select(&mut self.scratch, size, allowed, &self.options.matching, &mut self.matches);
-            for found in &self.matches {
-                let track = frame.tracks[found.b];
-                // Without the mutual check two lines may claim one: the first has it.
-                let Err(place) = self.claimed.binary_search(&track) else { continue };
-                self.claimed.insert(place, track);
-                memory.tracks[found.a] = track;
-                back[found.a] = (k + 1) as u32;
-                if known_turn {
-                    let change = wrap(memory.bearings_rad[found.a] - frame.bearings_rad[found.b] + turn) / steps;
-                    memory.rates_rad[found.a] = Some(change);
-                }
-            }
-        }
-        for track in memory.tracks.iter_mut().filter(|track| **track == u64::MAX) {
-            *track = self.state.next_track;
-            self.state.next_track += 1;
-        }
+        let frame = self.state.next_frame;
         out.clear();
-        out.extend(lines.iter().zip(&memory.tracks).zip(&back).map(|((line, track), back)| TrackedLine {
-            frame: self.state.next_frame,
-            track: *track,
-            frames_back: *back,
-            line: *line,
-        }));
-        self.state.next_frame += 1;
-        self.state.frames.truncate(self.options.look_back - 1);
-        self.state.frames.push_front(memory);
+        for (line, known) in lines.iter().zip(continued) {
+            let (track, frames_back) = known.unwrap_or((self.state.next_track, 0));
+            self.state.next_track = self.state.next_track.max(track + 1);
+            out.push(TrackedLine { frame, track, frames_back, line: *line });
+        }
+        self.remember(descriptors, width, motion, out);
         Ok(())
     }
 
+    /// Each line on the track of the last frame that shows it (paper 001 section 9.1).
+    fn look_back(&mut self, lines: &[Line], descriptors: &[f32], width: usize) -> Vec<Continued> {
+        let mut continued: Vec<Continued> = vec![None; lines.len()];
+        let mut claimed: Vec<u64> = Vec::new();
+        for (k, frame) in self.state.frames.iter().enumerate() {
+            if claimed.len() == lines.len() || width == 0 {
+                break;
+            }
+            if frame.tracks.is_empty() || self.scratch.measure(descriptors, &frame.descriptors, width).is_err() {
+                continue;
+            }
+            let size = (lines.len(), frame.tracks.len());
+            select(&mut self.scratch, size, |_, _| true, &self.options.matching, &mut self.matches);
+            // Of a line whose nearest is another's no second best is taken.
+            for found in &self.matches {
+                let track = frame.tracks[found.b];
+                let Err(place) = claimed.binary_search(&track) else { continue };
+                if continued[found.a].is_none() {
+                    claimed.insert(place, track);
+                    continued[found.a] = Some((track, (k + 1) as u32));
+                }
+            }
+        }
+        continued
+    }
+
+    /// All lines on tracks together, by predicted bearings and descriptors: first with the turn as it is given, then with the
+    /// turn that most tracks agree on.
+    fn follow(&mut self, lines: &[Line], descriptors: &[f32], width: usize, motion: &Motion) -> Vec<Continued> {
+        let Self { options, state, assignment, costs, distances, pairs, offsets, .. } = self;
+        for edge in &mut state.followed {
+            edge.parallax.predict(motion, options);
+        }
+        let (n, m) = (lines.len(), state.followed.len());
+        let gate = |i: usize, j: usize, turn_variance: f64| {
+            let edge = &state.followed[j].parallax;
+            let off = wrap(lines[i].bearing_rad - edge.bearing_rad);
+            (off, edge.covariance[0] + line_variance(&lines[i], options) + turn_variance)
+        };
+        distances.clear();
+        distances.resize(n * m, f64::NAN);
+        let (mut common, mut turn_variance) = (0.0, options.turn_sigma_rad.powi(2));
+        for pass in 0..2 {
+            costs.clear();
+            for i in 0..n {
+                for (j, edge) in state.followed.iter().enumerate() {
+                    let (off, variance) = gate(i, j, turn_variance);
+                    let squared = wrap(off - common).powi(2) / variance;
+                    // A line does not change sides: what is brighter on the left stays so.
+                    if squared > options.gate_sigmas.powi(2) || lines[i].polarity * edge.polarity < -0.5 {
+                        costs.push(FORBIDDEN);
+                        continue;
+                    }
+                    let distance = &mut distances[i * m + j];
+                    if distance.is_nan() {
+                        let values = &descriptors[i * width..(i + 1) * width];
+                        *distance = descriptor_distance(values, &edge.descriptor);
+                    }
+                    costs.push(if *distance > options.descriptor_max {
+                        FORBIDDEN
+                    } else {
+                        squared
+                            + (*distance / options.descriptor_sigma).powi(2)
+                            + (variance / options.bearing_sigma_rad.powi(2)).ln()
+                    });
+                }
+            }
+            assign(costs, (n, m), options.new_cost, assignment, pairs);
+            if pass == 0 {
+                offsets.clear();
+                let found = pairs.iter().enumerate().filter_map(|(i, j)| Some((i, (*j)?)));
+                offsets.extend(found.map(|(i, j)| gate(i, j, 0.0)));
+                (common, turn_variance) = common_offset(offsets, options.turn_sigma_rad);
+            }
+        }
+        let frame = state.next_frame;
+        let mut continued = vec![None; n];
+        // The turn that tracks agree on is theirs already: a track that took its nearness from it would pull it along, frame
+        // after frame. Each takes in its bearing by the turn as it was given.
+        for (i, line) in lines.iter().enumerate() {
+            let Some(j) = pairs[i] else { continue };
+            let edge = &mut state.followed[j];
+            continued[i] = Some((edge.track, (frame - edge.seen) as u32));
+            edge.seen = frame;
+            edge.parallax.covariance[0] += options.turn_sigma_rad.powi(2);
+            edge.parallax.correct(line.bearing_rad, line_variance(line, options), options);
+        }
+        for edge in state.followed.iter_mut().filter(|edge| edge.seen != frame) {
+            edge.parallax.bearing_rad = wrap(edge.parallax.bearing_rad + common);
+            edge.parallax.covariance[0] += turn_variance;
+        }
+        continued
+    }
+
+    /// Keeps the lines of a frame.
+    fn remember(&mut self, descriptors: &[f32], width: usize, motion: Option<&Motion>, tracked: &[TrackedLine]) {
+        let Self { options, state, .. } = self;
+        let frame = state.next_frame;
+        if motion.is_none() {
+            state.followed.clear();
+        }
+        for (i, found) in tracked.iter().enumerate() {
+            let values = &descriptors[i * width..(i + 1) * width];
+            let place = state.followed.iter().position(|edge| edge.track == found.track);
+            if let Some(edge) = place.map(|place| &mut state.followed[place]) {
+                (edge.seen, edge.polarity) = (frame, found.line.polarity);
+                edge.descriptor.copy_from_slice(values);
+            } else {
+                let is_metric = motion.is_none_or(|motion| motion.distance_m.is_some());
+                let variance = line_variance(&found.line, options);
+                state.followed.push(Followed {
+                    track: found.track,
+                    seen: frame,
+                    parallax: Parallax::new(found.line.bearing_rad, variance, is_metric, options),
+                    polarity: found.line.polarity,
+                    descriptor: values.to_vec(),
+                });
+            }
+        }
+        state.followed.retain(|edge| frame + 1 - edge.seen <= options.look_back as u64);
+        state.next_frame += 1;
+        state.frames.truncate(options.look_back - 1);
+        let tracks = tracked.iter().map(|line| line.track).collect();
+        state.frames.push_front(FrameMemory { tracks, descriptors: descriptors.to_vec() });
+    }
+
     /// The number of values of a descriptor, 0 without lines.
-    fn check(&self, lines: &[Line], descriptors: &[f32], yaw_change_rad: Option<f64>) -> Result<usize> {
-        if let Some(turn) = yaw_change_rad
-            && !turn.is_finite()
-        {
-            return Err(Error::argument("yaw_change_rad", turn, "a finite angle, or none"));
+    fn check(&self, lines: &[Line], descriptors: &[f32], motion: Option<&Motion>) -> Result<usize> {
+        if let Some(motion) = motion {
+            if !motion.turn_rad.is_finite() {
+                return Err(Error::argument("yaw_change_rad", motion.turn_rad, "a finite angle, or none"));
+            }
+            if let Some(distance) = motion.distance_m.filter(|distance| !distance.is_finite()) {
+                return Err(Error::argument("distance_m", distance, "a finite distance, or none"));
+            }
         }
         let width = descriptors.len().checked_div(lines.len()).unwrap_or(0);
         if descriptors.len() != lines.len() * width || (width == 0 && !lines.is_empty()) {
             let got = format!("{} values for {} lines", descriptors.len(), lines.len());
             return Err(Error::argument("descriptors", got, "as many values for each line"));
         }
-        let before = self.state.frames.iter().find(|frame| !frame.tracks.is_empty());
-        if let Some(before) = before
-            && width > 0
-            && before.descriptors.len() / before.tracks.len() != width
-        {
-            let expected = format!("{}, as before", before.descriptors.len() / before.tracks.len());
-            return Err(Error::argument("descriptors", format!("{width} values for each line"), expected));
+        let frames = self.state.frames.iter().filter(|frame| !frame.tracks.is_empty());
+        let widths = frames.map(|frame| frame.descriptors.len() / frame.tracks.len());
+        let mut widths = widths.chain(self.state.followed.iter().map(|edge| edge.descriptor.len()));
+        match widths.find(|before| width > 0 && *before != width) {
+            None => Ok(width),
+            Some(before) => {
+                let expected = format!("{before}, as before");
+                Err(Error::argument("descriptors", format!("{width} values for each line"), expected))
+            }
         }
-        Ok(width)
     }
+}
+
+/// The variance of a line's bearing.
+fn line_variance(line: &Line, options: &TrackerOptions) -> f64 {
+    line.sigma_rad.powi(2) + options.bearing_sigma_rad.powi(2)
+}
+
+/// What most offsets agree on, each with its variance, and its variance; before any it is zero with a standard deviation. The
+/// weighted median, and the mean of those within three standard deviations of it.
+fn common_offset(offsets: &mut [(f64, f64)], sigma: f64) -> (f64, f64) {
+    if offsets.len() < 3 {
+        return (0.0, sigma * sigma);
+    }
+    offsets.sort_unstable_by(|a, b| a.0.total_cmp(&b.0));
+    let half = 0.5 * offsets.iter().map(|(_, variance)| 1.0 / variance).sum::<f64>();
+    let mut sum = 0.0;
+    let median = offsets.iter().find(|(_, variance)| {
+        sum += 1.0 / variance;
+        sum >= half
+    });
+    let median = median.map_or(0.0, |(off, _)| *off);
+    let (mut weights, mut mean) = (sigma.powi(-2), 0.0);
+    for (off, variance) in offsets.iter().filter(|(off, variance)| (off - median).powi(2) < 9.0 * variance) {
+        weights += 1.0 / variance;
+        mean += off / variance;
+    }
+    (mean / weights, 1.0 / weights)
 }

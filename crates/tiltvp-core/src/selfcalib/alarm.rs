@@ -14,11 +14,14 @@ const PROBABILITY: f64 = 1.0 - 1e-6;
 /// How much larger than expected the innovations of noise that is not quite as assumed may be.
 const EXCESS: f64 = 2.0;
 
+/// Share of bearings that may be of something else, as no tracker is without: so many that the gate rejected count nothing.
+const STRAY: f64 = 0.1;
+
 /// The innovations of the last steps.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub(super) struct Alarm {
-    /// (normalised innovations squared, rejected ones counting as the gate's limit; how many).
-    steps: VecDeque<(f64, u32)>,
+    /// Normalised innovations squared of the bearings that were used, how many, and how many were rejected.
+    steps: VecDeque<(f64, usize, usize)>,
     raised: bool,
 }
 
@@ -31,20 +34,25 @@ impl Alarm {
         if self.steps.len() == WINDOW {
             self.steps.pop_front();
         }
-        self.steps.push_back((outcome.nis + limit * outcome.rejected as f64, count as u32));
-        let (sum, dof) = self.sums();
-        let beyond = self.steps.len() == WINDOW && sum > EXCESS * f64::from(dof);
-        self.raised |= beyond && sum > chi_square_quantile(PROBABILITY, dof);
+        self.steps.push_back((outcome.nis, outcome.used, outcome.rejected));
+        let (sum, used, rejected) = self.sums();
+        // Rejected ones beyond the share count as the gate's limit.
+        let beyond = (rejected as f64 - STRAY * (used + rejected) as f64).max(0.0).round();
+        let (sum, dof) = (sum + limit * beyond, used as f64 + beyond);
+        let large = self.steps.len() == WINDOW && sum > EXCESS * dof;
+        self.raised |= large && sum > chi_square_quantile(PROBABILITY, dof as u32);
     }
 
-    fn sums(&self) -> (f64, u32) {
-        self.steps.iter().fold((0.0, 0), |(sum, dof), (nis, count)| (sum + nis, dof + count))
+    fn sums(&self) -> (f64, usize, usize) {
+        self.steps
+            .iter()
+            .fold((0.0, 0, 0), |(sum, used, rejected), (nis, more, less)| (sum + nis, used + more, rejected + less))
     }
 
     /// The mean normalised innovation squared of the window, 1 for a filter that is right; `None` before the first.
     pub(super) fn mean_nis(&self) -> Option<f64> {
-        let (sum, dof) = self.sums();
-        (dof > 0).then(|| sum / f64::from(dof))
+        let (sum, used, _) = self.sums();
+        (used > 0).then(|| sum / used as f64)
     }
 
     /// Whether a window was ever too large.

@@ -2,7 +2,8 @@
 
 use nalgebra::{Matrix3, Vector2, Vector3};
 
-use super::graph::{Loss, Node, Sight, factor, information};
+use super::graph::{Node, Sight, factor, information};
+use super::loss::{Loss, Slip};
 use super::measurement::{Landmark, camera};
 use super::mounting::Mounting;
 use super::odometry::{Leg, WheelMotion};
@@ -41,7 +42,7 @@ pub fn cramer_rao_bound(
     graph.mounting = truth;
     let mut slots = vec![None; landmarks_m.len()];
     for ((reading, pose), seen) in readings.iter().zip(poses).zip(sights) {
-        let leg = Leg::from_wheels(reading, &graph.wheels, graph.k_m);
+        let leg = Leg::from_wheels(reading, &graph.wheels, &graph.noise);
         let still = reading.left_m == 0.0 && reading.right_m == 0.0;
         if !still {
             match graph.nodes.last_mut() {
@@ -81,6 +82,7 @@ pub fn cramer_rao_bound(
     }
     // The information of a bearing does not depend on its residual, but for its weight.
     graph.loss = Loss::Linear(f64::INFINITY);
+    graph.slip = Slip::NEVER;
     let last = graph.nodes.len() - 1;
     let singular = || Error::argument("sights", "a drive that determines nothing", "bearings of landmarks");
     let whole = graph.eliminate(last, false, 0.0).and_then(|e| factor(e.information)).ok_or_else(singular)?.inverse();

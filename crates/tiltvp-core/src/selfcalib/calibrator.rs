@@ -136,7 +136,7 @@ impl SelfCalibrator {
     pub fn step(&mut self, motion: &WheelMotion, landmarks: &[u64], bearings_rad: &[f64]) -> Result<CalibrationStep> {
         check(motion, landmarks, bearings_rad)?;
         let seen: Vec<(u64, f64)> = landmarks.iter().copied().zip(bearings_rad.iter().copied()).collect();
-        let Outcome { nis, used, rejected, started } = match &mut self.filter {
+        let Outcome { nis, used, rejected, started, .. } = match &mut self.filter {
             Filter::Default(filter) => filter.step(motion, &seen),
             Filter::Paper(filter) => filter.step(motion, &seen),
         };

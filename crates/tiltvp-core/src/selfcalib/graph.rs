@@ -1,9 +1,11 @@
 //! A stretch of a drive as a sparse least-squares problem: poses in a chain, each tied to the mounting and the landmarks.
 
-use nalgebra::{Cholesky, DMatrix, DVector, Dyn, Matrix3, Matrix3x2, Vector3};
+use nalgebra::{Cholesky, DMatrix, DVector, Dyn, Matrix3, Vector2, Vector3};
 
-use super::measurement::{Landmark, predict, seen_at};
-use super::odometry::{Leg, WheelMotion, Wheels, between, compose, compose_jacobians};
+use super::loss::{Loss, Slip};
+use super::measurement::{Landmark, camera, predict, seen_at};
+use super::odometry::{Leg, MotionNoise, WheelMotion, Wheels, between, compose, compose_jacobians};
+use super::schur::Eliminated;
 use crate::geometry::wrap_angle;
 
 /// A bearing of a landmark.
@@ -60,7 +62,7 @@ impl Free {
         3 + 2 * usize::from(self.wheels) + usize::from(self.offset)
     }
 
-    fn offset_at(self) -> usize {
+    pub(super) fn offset_at(self) -> usize {
         3 + 2 * usize::from(self.wheels)
     }
 }
@@ -74,7 +76,7 @@ pub(super) struct Graph {
     pub(super) wheels: Wheels,
     pub(super) offset_s: f64,
     pub(super) free: Free,
-    pub(super) k_m: f64,
+    pub(super) noise: MotionNoise,
     pub(super) landmarks: Vec<Landmark>,
     pub(super) nodes: Vec<Node>,
     /// Mean of the dense block before the bearings of the nodes.
@@ -83,54 +85,11 @@ pub(super) struct Graph {
     pub(super) prior_information: DMatrix<f64>,
     pub(super) bearing_sigma: f64,
     pub(super) loss: Loss,
-}
-
-/// How bearings far from their prediction count; thresholds are standard deviations.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) enum Loss {
-    /// Beyond it linearly (Huber).
-    Linear(f64),
-    /// Beyond it not at all.
-    Cut(f64),
-}
-
-impl Loss {
-    fn cost(self, r: f64) -> f64 {
-        let r = r.abs();
-        match self {
-            Self::Linear(k) if r > k => k * (r - 0.5 * k),
-            Self::Cut(k) if r > k => 0.5 * k * k,
-            _ => 0.5 * r * r,
-        }
-    }
-
-    fn weight(self, r: f64) -> f64 {
-        match self {
-            Self::Linear(k) if r.abs() > k => k / r.abs(),
-            Self::Cut(k) if r.abs() > k => 0.0,
-            _ => 1.0,
-        }
-    }
+    pub(super) slip: Slip,
 }
 
 /// Jacobians of a pose by the node's pose and by the time offset.
 type ByPoseAndOffset = (Matrix3<f64>, Vector3<f64>);
-
-/// A pose that has been eliminated: `inverse (rhs - coupling dense - next pose_after)` gives it back.
-struct Link {
-    inverse: Matrix3<f64>,
-    coupling: [Vec<f64>; 3],
-    next: Matrix3<f64>,
-    rhs: Vector3<f64>,
-}
-
-/// The normal equations of the dense block, and of the last pose if it was kept, with the other poses eliminated.
-pub(super) struct Eliminated {
-    links: Vec<Link>,
-    /// Information about (last pose if kept, dense block); symmetric.
-    pub(super) information: DMatrix<f64>,
-    pub(super) rhs: DVector<f64>,
-}
 
 /// How an optimisation ended.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -165,12 +124,26 @@ impl Graph {
         g
     }
 
+    /// This problem with the wheels as given if they are free here but should not be.
+    pub(super) fn with_fixed_wheels(mut self, wheels: Wheels) -> Self {
+        if self.free.wheels {
+            self.prior_mean = self.prior_mean.remove_rows(3, 2);
+            self.prior_information = self.prior_information.remove_rows(3, 2).remove_columns(3, 2);
+            self.free.wheels = false;
+            self.wheels = wheels;
+            for node in self.nodes.iter_mut().skip(1) {
+                node.leg = legs(&node.readings, &wheels, &self.noise);
+            }
+        }
+        self
+    }
+
     fn set_dense(&mut self, g: &DVector<f64>) {
         self.mounting = g.fixed_rows::<3>(0).into();
         if self.free.wheels {
             self.wheels = Wheels { imbalance: g[3], base_m: g[4].exp() };
             for node in self.nodes.iter_mut().skip(1) {
-                node.leg = legs(&node.readings, &self.wheels, self.k_m);
+                node.leg = legs(&node.readings, &self.wheels, &self.noise);
             }
         }
         if self.free.offset {
@@ -198,7 +171,7 @@ impl Graph {
     }
 
     /// The pose at which the bearings of a node were taken, with its Jacobian by the node's pose and by the time offset.
-    fn pose_of_sights(&self, node: &Node) -> (Vector3<f64>, Option<ByPoseAndOffset>) {
+    pub(super) fn pose_of_sights(&self, node: &Node) -> (Vector3<f64>, Option<ByPoseAndOffset>) {
         if !self.free.offset && self.offset_s == 0.0 {
             return (node.pose, None);
         }
@@ -218,7 +191,7 @@ impl Graph {
         for pair in self.nodes.windows(2) {
             let [before, node] = pair else { continue };
             let r = between(&before.pose, &node.pose) - node.leg.motion;
-            cost += 0.5 * r.dot(&(node.information * r));
+            cost += self.slip.cost(r.dot(&(node.information * r)));
         }
         for node in &self.nodes {
             let (pose, _) = self.pose_of_sights(node);
@@ -243,15 +216,31 @@ impl Graph {
         all
     }
 
-    /// The root of the mean squared whitened residual of the bearings.
-    pub(super) fn residual_rms(&self) -> f64 {
-        let all = self.residuals();
-        (all.iter().map(|r| r * r).sum::<f64>() / all.len().max(1) as f64).sqrt()
-    }
-
     /// The largest whitened residual of a bearing.
     pub(super) fn farthest(&self) -> f64 {
         self.residuals().iter().fold(0.0, |far, r| r.abs().max(far))
+    }
+
+    /// Describes every landmark from where the camera is now thought to have been when it first saw it: seen from elsewhere
+    /// a landmark may have to pass through its anchor to get where it belongs. Landmarks of which the prior knows the
+    /// direction stay as they are.
+    pub(super) fn reanchor(&mut self) {
+        let fixed = self.free.width();
+        let known = |slot| self.prior_information[(fixed + 2 * slot, fixed + 2 * slot)] > 0.0;
+        let mut done: Vec<bool> = (0..self.landmarks.len()).map(known).collect();
+        for node in &self.nodes {
+            for sight in node.sights.iter().filter(|sight| !std::mem::replace(&mut done[sight.landmark], true)) {
+                let old = self.landmarks[sight.landmark];
+                let anchor = camera(&node.pose, &self.mounting);
+                let (sin, cos) = old.direction.sin_cos();
+                let away = old.anchor + Vector2::new(cos, sin) * (-old.closeness).exp() - anchor;
+                if away.norm() > 1e-6 {
+                    let turn = wrap_angle(away.y.atan2(away.x) - old.direction);
+                    let direction = old.direction + turn;
+                    self.landmarks[sight.landmark] = Landmark { anchor, direction, closeness: -away.norm().ln() };
+                }
+            }
+        }
     }
 
     /// Puts every landmark from `first` on that has a whitened residual of `limit` or more at the distance that its bearings
@@ -284,140 +273,6 @@ impl Graph {
         }
     }
 
-    /// The normal equations up to node `last`, damped by `damping` times their diagonal, all poses before it eliminated,
-    /// and it too unless `keep`. `None` where they are singular.
-    pub(super) fn eliminate(&self, last: usize, keep: bool, damping: f64) -> Option<Eliminated> {
-        let (width, fixed) = (self.width(), self.free.width());
-        let mut dense = self.prior_information.clone();
-        let mut rhs = -(&self.prior_information * (self.dense() - &self.prior_mean));
-        let mut links = Vec::with_capacity(last);
-        // Of the pose at hand: its own block, its couplings to the dense block (the first `reach` columns), its side.
-        let mut own = Matrix3::zeros();
-        let mut coupling: [Vec<f64>; 3] = std::array::from_fn(|_| vec![0.0; width]);
-        let mut side = Vector3::zeros();
-        let mut reach = fixed;
-        for i in 0..=last {
-            let node = &self.nodes[i];
-            let sights = self.linearised(node);
-            for row in &sights {
-                reach = reach.max(row.at + 2);
-                row.add_dense(&mut dense, &mut rhs, fixed);
-                if i > 0 {
-                    own += row.by_pose * row.by_pose.transpose() * row.weight;
-                    side -= row.by_pose * (row.weight * row.residual);
-                    for (k, values) in coupling.iter_mut().enumerate() {
-                        row.add_to(values, row.by_pose[k] * row.weight, fixed);
-                    }
-                }
-            }
-            let mut next = Matrix3::zeros();
-            let (mut next_own, mut next_side) = (Matrix3::zeros(), Vector3::zeros());
-            let mut next_by_wheels = Matrix3x2::zeros();
-            if i < last {
-                let after = &self.nodes[i + 1];
-                let b = between(&node.pose, &after.pose);
-                let (sin, cos) = node.pose.z.sin_cos();
-                let by_after = Matrix3::new(cos, sin, 0.0, -sin, cos, 0.0, 0.0, 0.0, 1.0);
-                let by_before = Matrix3::new(-cos, -sin, b.y, sin, -cos, -b.x, 0.0, 0.0, -1.0);
-                let r = b - after.leg.motion;
-                let (wb, wa) = (after.information * by_before, after.information * by_after);
-                let wr = after.information * r;
-                next = by_before.transpose() * wa;
-                next_own = by_after.transpose() * wa;
-                next_side = -(by_after.transpose() * wr);
-                if i > 0 {
-                    own += by_before.transpose() * wb;
-                    side -= by_before.transpose() * wr;
-                }
-                if self.free.wheels {
-                    let j = -after.leg.by_wheels;
-                    let jt = j.transpose();
-                    let block = jt * after.information * j;
-                    let r = jt * wr;
-                    for a in 0..2 {
-                        for b in 0..2 {
-                            dense[(3 + a, 3 + b)] += block[(a, b)];
-                        }
-                        rhs[3 + a] -= r[a];
-                    }
-                    next_by_wheels = by_after.transpose() * after.information * j;
-                    if i > 0 {
-                        let here = by_before.transpose() * after.information * j;
-                        for (k, values) in coupling.iter_mut().enumerate() {
-                            values[3] += here[(k, 0)];
-                            values[4] += here[(k, 1)];
-                        }
-                    }
-                }
-            }
-            if i == last && keep {
-                break;
-            }
-            if i > 0 {
-                for k in 0..3 {
-                    own[(k, k)] *= 1.0 + damping;
-                }
-                let inverse = Cholesky::new(own)?.inverse();
-                subtract_outer(&mut dense, &inverse, &coupling, reach);
-                let y = inverse * side;
-                for c in 0..reach {
-                    rhs[c] -= coupling[0][c] * y.x + coupling[1][c] * y.y + coupling[2][c] * y.z;
-                }
-                let across = next.transpose() * inverse;
-                let onward = carried(&across, &coupling, reach);
-                next_own -= across * next;
-                next_side -= across * side;
-                links.push(Link { inverse, coupling: std::mem::replace(&mut coupling, onward), next, rhs: side });
-            }
-            own = next_own;
-            side = next_side;
-            if self.free.wheels && i < last {
-                for (k, values) in coupling.iter_mut().enumerate() {
-                    values[3] += next_by_wheels[(k, 0)];
-                    values[4] += next_by_wheels[(k, 1)];
-                }
-            }
-        }
-        dense.fill_lower_triangle_with_upper_triangle();
-        for k in 0..width {
-            dense[(k, k)] *= 1.0 + damping;
-        }
-        if !keep {
-            return Some(Eliminated { links, information: dense, rhs });
-        }
-        let (information, rhs) = joined(&own, &coupling, &side, &dense, &rhs);
-        Some(Eliminated { links, information, rhs })
-    }
-
-    /// The rows of a node's bearings.
-    fn linearised(&self, node: &Node) -> Vec<Row> {
-        let (pose, moved) = self.pose_of_sights(node);
-        let fixed = self.free.width();
-        let row = |sight: &Sight| {
-            let p = predict(&pose, &self.mounting, &self.landmarks[sight.landmark]);
-            let s = 1.0 / self.bearing_sigma;
-            let residual = wrap_angle(p.bearing - sight.bearing) * s;
-            let mut by_fixed = [0.0; 6];
-            by_fixed[..3].copy_from_slice((p.by_mounting * s).as_slice());
-            let mut by_pose = p.by_pose * s;
-            if let Some((first, by_offset)) = moved {
-                if self.free.offset {
-                    by_fixed[self.free.offset_at()] = by_pose.dot(&by_offset);
-                }
-                by_pose = first.transpose() * by_pose;
-            }
-            Row {
-                by_pose,
-                by_fixed,
-                at: fixed + 2 * sight.landmark,
-                by_landmark: [p.by_landmark.x * s, p.by_landmark.y * s],
-                residual,
-                weight: self.loss.weight(residual),
-            }
-        };
-        node.sights.iter().map(row).collect()
-    }
-
     /// Moves every unknown by the solution of the damped normal equations. `None` where they are singular.
     fn moved(&self, damping: f64) -> Option<Self> {
         let last = self.nodes.len() - 1;
@@ -427,16 +282,10 @@ impl Graph {
     }
 
     /// Moves the dense block by a step and the poses after it. `None` where something is not finite.
-    pub(super) fn moved_by(&self, eliminated: &Eliminated, step: &DVector<f64>) -> Option<Self> {
+    fn moved_by(&self, eliminated: &Eliminated, step: &DVector<f64>) -> Option<Self> {
         let mut next = self.clone();
-        let mut after = Vector3::zeros();
-        for (link, node) in eliminated.links.iter().zip(&mut next.nodes[1..]).rev() {
-            let mut side = link.rhs - link.next * after;
-            for (k, values) in link.coupling.iter().enumerate() {
-                side[k] -= values.iter().zip(step.iter()).map(|(a, b)| a * b).sum::<f64>();
-            }
-            after = link.inverse * side;
-            node.pose += after;
+        for (node, step) in next.nodes.iter_mut().zip(eliminated.poses(step, self.nodes.len())) {
+            node.pose += step;
         }
         let dense = next.dense() + step;
         if !dense.iter().all(|x| x.is_finite()) {
@@ -486,98 +335,6 @@ pub(super) fn factor(information: DMatrix<f64>) -> Option<Cholesky<f64, Dyn>> {
 }
 
 /// The leg of readings in a row.
-pub(super) fn legs(readings: &[WheelMotion], wheels: &Wheels, k_m: f64) -> Leg {
-    readings.iter().fold(Leg::none(), |leg, reading| leg.then(&Leg::from_wheels(reading, wheels, k_m)))
-}
-
-/// A bearing's whitened residual, its derivatives, and its weight.
-struct Row {
-    by_pose: Vector3<f64>,
-    by_fixed: [f64; 6],
-    at: usize,
-    by_landmark: [f64; 2],
-    residual: f64,
-    weight: f64,
-}
-
-impl Row {
-    fn add_to(&self, values: &mut [f64], scale: f64, fixed: usize) {
-        for (value, by) in values[..fixed].iter_mut().zip(&self.by_fixed) {
-            *value += by * scale;
-        }
-        values[self.at] += self.by_landmark[0] * scale;
-        values[self.at + 1] += self.by_landmark[1] * scale;
-    }
-
-    /// Adds to the upper triangle.
-    fn add_dense(&self, dense: &mut DMatrix<f64>, rhs: &mut DVector<f64>, fixed: usize) {
-        let w = self.weight;
-        for c in 0..fixed {
-            for r in 0..=c {
-                dense[(r, c)] += self.by_fixed[r] * self.by_fixed[c] * w;
-            }
-            rhs[c] -= self.by_fixed[c] * self.residual * w;
-        }
-        for (k, by) in self.by_landmark.iter().enumerate() {
-            let c = self.at + k;
-            for r in 0..fixed {
-                dense[(r, c)] += self.by_fixed[r] * by * w;
-            }
-            for j in 0..=k {
-                dense[(self.at + j, c)] += self.by_landmark[j] * by * w;
-            }
-            rhs[c] -= by * self.residual * w;
-        }
-    }
-}
-
-/// The normal equations of a pose and the dense block together.
-fn joined(
-    own: &Matrix3<f64>,
-    coupling: &[Vec<f64>; 3],
-    side: &Vector3<f64>,
-    dense: &DMatrix<f64>,
-    rhs: &DVector<f64>,
-) -> (DMatrix<f64>, DVector<f64>) {
-    let width = dense.nrows();
-    let mut whole = DMatrix::zeros(width + 3, width + 3);
-    whole.view_mut((3, 3), (width, width)).copy_from(dense);
-    whole.fixed_view_mut::<3, 3>(0, 0).copy_from(own);
-    for (k, values) in coupling.iter().enumerate() {
-        for (c, value) in values.iter().enumerate() {
-            whole[(k, 3 + c)] = *value;
-            whole[(3 + c, k)] = *value;
-        }
-    }
-    let mut whole_rhs = DVector::zeros(width + 3);
-    whole_rhs.rows_mut(3, width).copy_from(rhs);
-    whole_rhs.fixed_rows_mut::<3>(0).copy_from(side);
-    (whole, whole_rhs)
-}
-
-/// What the elimination of a pose adds to the couplings of the next one, `-across coupling`.
-fn carried(across: &Matrix3<f64>, coupling: &[Vec<f64>; 3], reach: usize) -> [Vec<f64>; 3] {
-    std::array::from_fn(|k| {
-        let mut values = vec![0.0; coupling[k].len()];
-        let (a, b, d) = (across[(k, 0)], across[(k, 1)], across[(k, 2)]);
-        for (c, value) in values.iter_mut().enumerate().take(reach) {
-            *value = -(a * coupling[0][c] + b * coupling[1][c] + d * coupling[2][c]);
-        }
-        values
-    })
-}
-
-/// `dense -= coupling^T inverse coupling` in the upper triangle of the first `reach` rows and columns.
-fn subtract_outer(dense: &mut DMatrix<f64>, inverse: &Matrix3<f64>, coupling: &[Vec<f64>; 3], reach: usize) {
-    let rows = dense.nrows();
-    let [b0, b1, b2] = coupling.each_ref().map(|b| &b[..reach]);
-    for (c, column) in dense.as_mut_slice().chunks_exact_mut(rows).take(reach).enumerate() {
-        let y = inverse * Vector3::new(b0[c], b1[c], b2[c]);
-        if y == Vector3::zeros() {
-            continue;
-        }
-        for (((value, b0), b1), b2) in column[..=c].iter_mut().zip(b0).zip(b1).zip(b2) {
-            *value -= b0 * y.x + b1 * y.y + b2 * y.z;
-        }
-    }
+pub(super) fn legs(readings: &[WheelMotion], wheels: &Wheels, noise: &MotionNoise) -> Leg {
+    readings.iter().fold(Leg::none(), |leg, reading| leg.then(&Leg::from_wheels(reading, wheels, noise)))
 }

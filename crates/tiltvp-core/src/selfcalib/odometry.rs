@@ -56,6 +56,24 @@ impl Wheels {
     }
 }
 
+/// How far the motion of a step may be from what the wheels tell.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct MotionNoise {
+    /// Variance of a wheel's displacement for each metre of it (eq. 31), metres.
+    pub k_m: f64,
+    /// Standard deviation of a step in either direction, whatever its length, metres.
+    pub step_sigma_m: f64,
+    /// Standard deviation of the turn of a step, whatever its size, radians.
+    pub step_sigma_rad: f64,
+}
+
+impl MotionNoise {
+    /// That of eq. 31 alone.
+    pub fn new(k_m: f64) -> Self {
+        Self { k_m, step_sigma_m: 0.0, step_sigma_rad: 0.0 }
+    }
+}
+
 /// Share of the distance's variance that is given to motion along the axle, which wheels do not report.
 const SIDEWAYS_SHARE: f64 = 0.01;
 
@@ -76,11 +94,11 @@ impl Leg {
         Self { motion: Vector3::zeros(), covariance: Matrix3::zeros(), by_wheels: Matrix3x2::zeros() }
     }
 
-    /// The motion along an arc that wheel readings tell, with the noise of eq. 31.
+    /// The motion along an arc that wheel readings tell, with the noise of eq. 31 and that of a step.
     ///
     /// With `d = (right + left) / 2` and `t = (right - left) / base` the chord is `d sin(t/2) / (t/2)` in the direction
     /// `t / 2`; eq. 14 takes `d` for it.
-    pub fn from_wheels(readings: &WheelMotion, wheels: &Wheels, k_m: f64) -> Self {
+    pub fn from_wheels(readings: &WheelMotion, wheels: &Wheels, noise: &MotionNoise) -> Self {
         let true_motion = wheels.corrected(readings);
         let (d, t) = (true_motion.distance_m(), true_motion.turn_rad(wheels.base_m));
         let (sin, cos) = (0.5 * t).sin_cos();
@@ -91,11 +109,14 @@ impl Leg {
         let by_turn = Vector3::new(0.5 * d * (slope * cos - s * sin), 0.5 * d * (slope * sin + s * cos), 1.0);
         let (by_right, by_left) =
             (0.5 * by_distance + by_turn / wheels.base_m, 0.5 * by_distance - by_turn / wheels.base_m);
-        let noise = true_motion.covariance(k_m);
+        let step = noise.step_sigma_m * noise.step_sigma_m;
+        let step = Vector3::new(step, step, noise.step_sigma_rad * noise.step_sigma_rad);
+        let noise = true_motion.covariance(noise.k_m);
         let sideways = Vector3::new(-sin, cos, 0.0);
         let covariance = by_right * by_right.transpose() * noise[(0, 0)]
             + by_left * by_left.transpose() * noise[(1, 1)]
-            + sideways * sideways.transpose() * (SIDEWAYS_SHARE * 0.25 * noise.trace());
+            + sideways * sideways.transpose() * (SIDEWAYS_SHARE * 0.25 * noise.trace())
+            + Matrix3::from_diagonal(&step);
         let by_imbalance = by_right * true_motion.right_m - by_left * true_motion.left_m;
         Self { motion, covariance, by_wheels: Matrix3x2::from_columns(&[by_imbalance, by_turn * -t]) }
     }
@@ -143,7 +164,7 @@ mod tests {
     use proptest::prelude::*;
 
     fn leg(left_m: f64, right_m: f64, wheels: &Wheels) -> Leg {
-        Leg::from_wheels(&WheelMotion { left_m, right_m }, wheels, 1e-5)
+        Leg::from_wheels(&WheelMotion { left_m, right_m }, wheels, &MotionNoise::new(1e-5))
     }
 
     proptest! {

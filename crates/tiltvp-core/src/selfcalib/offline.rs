@@ -2,24 +2,17 @@
 
 use std::collections::BTreeMap;
 
-use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
-
-use super::calibrator::{MountingEstimate, SelfCalibrator};
-use super::graph::{Descent, Free, Graph, Loss, Node, Sight, factor, information};
-use super::measurement::{Landmark, camera};
+use super::calibrator::MountingEstimate;
+use super::graph::{Descent, Free, Graph, factor};
+use super::growing::{along, grown};
+use super::loss::Loss;
 use super::mounting::Mounting;
-use super::odometry::{Leg, WheelMotion, Wheels, compose};
+use super::odometry::{WheelMotion, Wheels};
 use super::options::{CalibrationMethod, SelfCalibratorOptions};
+use super::recursive::Recursive;
 use crate::error::{Error, Result};
 
-/// Poses with bearings after which the log so far is solved, so that new landmarks are placed from poses that are right.
-const STAGE: usize = 100;
-
-/// Poses after which a landmark that is seen again counts as another one: the odometry has drifted by then.
-const GAP: usize = 60;
-
-/// How bearings count: first those far off linearly, then not at all.
-const FIRST: Loss = Loss::Linear(2.0);
+/// Standard deviations beyond which bearings are outliers.
 const LIMIT: f64 = 4.5;
 
 /// A bearing of a log.
@@ -86,12 +79,19 @@ pub struct LogCalibration {
 /// Fall of the cost below which the descent has come to rest.
 const TOLERANCE: f64 = 1e-3;
 
-/// Root mean square of whitened residuals of a solution beside which no other is looked for.
-const GOOD_RMS: f64 = 2.0;
+/// Share of outliers of a solution beside which no other is looked for.
+const FEW: f64 = 0.03;
 
-/// Priors on (imbalance, logarithm of the wheel base) and on the time offset in seconds: weak.
-const WHEELS_SIGMA: [f64; 2] = [0.2, 0.2];
-const OFFSET_SIGMA_S: f64 = 1.0;
+/// Where an attempt takes its first guess of the mounting from.
+#[derive(Clone, Copy)]
+enum Guess {
+    /// The options.
+    Start,
+    /// The log without loops.
+    Open,
+    /// The default filter, poses too.
+    Filter,
+}
 
 /// The mounting from a whole log.
 ///
@@ -108,15 +108,39 @@ pub fn calibrate_log(
     check(options, readings, times_s, bearings)?;
     let mut order: Vec<LogBearing> = bearings.to_vec();
     order.sort_by_key(|b| b.step);
-    let guesses = [first_guess(options, readings, &order)?, options.filter.start];
+    let asked = Free { wheels: options.estimate_odometry, offset: options.estimate_time_offset };
     let mut best: Option<(Graph, Descent)> = None;
-    for guess in guesses {
-        let mut graph = assembled(options, &guess, readings, times_s, &order);
+    let start = options.filter.start.vector();
+    let with_wheels = Free { wheels: true, ..asked };
+    // Wheels that may give a little let loops close; a start far off may need a map without loops, or the filter's answer.
+    let attempts =
+        [(with_wheels, Guess::Start), (asked, Guess::Filter), (asked, Guess::Start), (with_wheels, Guess::Open)];
+    for (i, (free, guess)) in attempts.into_iter().enumerate() {
+        if i == 2 && asked == with_wheels {
+            continue;
+        }
+        let mut graph = match guess {
+            Guess::Start => grown(options, &start, free, true, readings, times_s, &order),
+            Guess::Open => {
+                let open = grown(options, &start, free, false, readings, times_s, &order).mounting;
+                grown(options, &open, free, true, readings, times_s, &order)
+            }
+            Guess::Filter => {
+                let found = filtered(options, readings, &order)?;
+                along(options, &found, free, readings, times_s, &order)
+            }
+        };
+        if free != asked {
+            graph.descend(options.max_iterations, TOLERANCE, 1e-3);
+            graph = graph.with_fixed_wheels(Wheels::new(options.filter.wheel_base_m));
+        }
         let first = graph.descend(options.max_iterations, TOLERANCE, 1e-3);
         graph.loss = Loss::Cut(LIMIT);
         let then = graph.descend(options.max_iterations, TOLERANCE, 1e-3);
         let descent = Descent { iterations: first.iterations + then.iterations, ..then };
-        let good = descent.converged && graph.residual_rms() < GOOD_RMS;
+        let residuals = graph.residuals();
+        let outliers = residuals.iter().filter(|r| r.abs() > LIMIT).count();
+        let good = descent.converged && (outliers as f64) < FEW * residuals.len() as f64;
         if descent.cost.is_finite() && best.as_ref().is_none_or(|(_, best)| descent.cost < best.cost) {
             best = Some((graph, descent));
         }
@@ -175,135 +199,22 @@ fn check(
     }
 }
 
-/// What the default filter makes of the log.
-fn first_guess(options: &LogOptions, readings: &[WheelMotion], order: &[LogBearing]) -> Result<Mounting> {
-    let mut filter =
-        SelfCalibrator::new(SelfCalibratorOptions { method: CalibrationMethod::Default, ..options.filter })?;
-    let mut next = 0;
+/// What the default filter makes of the log if it forgets nothing: its poses and the mounting.
+fn filtered(options: &LogOptions, readings: &[WheelMotion], order: &[LogBearing]) -> Result<Graph> {
+    let method = CalibrationMethod::Default;
+    let mut filter = Recursive::new(&SelfCalibratorOptions { method, memory: u32::MAX, ..options.filter })?;
+    let mut rest = order;
     for (step, reading) in readings.iter().enumerate() {
+        let (now, later) = rest.split_at(rest.partition_point(|b| b.step <= step));
+        rest = later;
         let mut seen: BTreeMap<u64, f64> = BTreeMap::new();
-        while let Some(b) = order.get(next).filter(|b| b.step == step) {
+        for b in now {
             seen.entry(b.landmark).or_insert(b.bearing_rad);
-            next += 1;
         }
-        let (names, angles): (Vec<u64>, Vec<f64>) = seen.into_iter().unzip();
-        filter.step(reading, &names, &angles)?;
+        let seen: Vec<(u64, f64)> = seen.into_iter().collect();
+        filter.step(reading, &seen);
     }
-    let found = filter.estimate().mounting;
-    Ok(if found.vector().iter().all(|x| x.is_finite()) { found } else { options.filter.start })
-}
-
-/// The problem of the whole log, solved roughly as it grows.
-fn assembled(
-    options: &LogOptions,
-    guess: &Mounting,
-    readings: &[WheelMotion],
-    times_s: Option<&[f64]>,
-    order: &[LogBearing],
-) -> Graph {
-    let mut graph = empty(options, guess);
-    let mut slots: BTreeMap<u64, (usize, usize)> = BTreeMap::new();
-    let (mut next, mut solved, mut placed) = (0, 1, 0);
-    for (step, reading) in readings.iter().enumerate() {
-        let seconds = times_s.map_or(0.0, |t| if step == 0 { 0.0 } else { t[step] - t[step - 1] });
-        if graph.nodes.len() >= solved + STAGE && graph.nodes.last().is_some_and(|n| !n.sights.is_empty()) {
-            graph.place_landmarks(placed, 0.0);
-            graph.descend(6, 1.0, 1e-3);
-            (solved, placed) = (graph.nodes.len(), graph.landmarks.len());
-        }
-        advance(&mut graph, reading, seconds);
-        while let Some(b) = order.get(next).filter(|b| b.step == step) {
-            look(&mut graph, &mut slots, b, &options.filter);
-            next += 1;
-        }
-    }
-    while graph.nodes.len() > 1 && graph.nodes.last().is_some_and(|node| node.sights.is_empty()) {
-        graph.nodes.pop();
-    }
-    graph.place_landmarks(placed, 0.0);
-    graph
-}
-
-fn empty(options: &LogOptions, guess: &Mounting) -> Graph {
-    let o = &options.filter;
-    let free = Free { wheels: options.estimate_odometry, offset: options.estimate_time_offset };
-    let width = free.width();
-    let mut prior_mean = DVector::zeros(width);
-    let mut prior_information = DMatrix::zeros(width, width);
-    prior_mean.fixed_rows_mut::<3>(0).copy_from(&o.start.vector());
-    let start = o.start_covariance.try_inverse().unwrap_or_else(Matrix3::zeros);
-    prior_information.fixed_view_mut::<3, 3>(0, 0).copy_from(&start);
-    let mut at = 3;
-    if free.wheels {
-        prior_mean[4] = o.wheel_base_m.ln();
-        for (k, sigma) in WHEELS_SIGMA.iter().enumerate() {
-            prior_information[(3 + k, 3 + k)] = 1.0 / (sigma * sigma);
-        }
-        at = 5;
-    }
-    if free.offset {
-        prior_information[(at, at)] = 1.0 / (OFFSET_SIGMA_S * OFFSET_SIGMA_S);
-    }
-    Graph {
-        mounting: guess.vector(),
-        wheels: Wheels::new(o.wheel_base_m),
-        offset_s: 0.0,
-        free,
-        k_m: o.odometry_k_m,
-        landmarks: Vec::new(),
-        nodes: vec![Node::anchor()],
-        prior_mean,
-        prior_information,
-        bearing_sigma: o.bearing_sigma_rad,
-        loss: FIRST,
-    }
-}
-
-/// Adds a step's motion.
-fn advance(graph: &mut Graph, reading: &WheelMotion, seconds: f64) {
-    if reading.left_m == 0.0 && reading.right_m == 0.0 {
-        return;
-    }
-    let leg = Leg::from_wheels(reading, &graph.wheels, graph.k_m);
-    let velocity = if seconds > 0.0 { leg.motion / seconds } else { Vector3::zeros() };
-    let alone = graph.nodes.len() == 1;
-    let Some(last) = graph.nodes.last_mut() else { return };
-    let pose = compose(&last.pose, &leg.motion);
-    if alone || !last.sights.is_empty() {
-        let information = information(&leg.covariance);
-        graph.nodes.push(Node { pose, leg, information, readings: vec![*reading], velocity, sights: Vec::new() });
-    } else {
-        last.leg = last.leg.then(&leg);
-        last.information = information(&last.leg.covariance);
-        last.readings.push(*reading);
-        last.velocity = velocity;
-        last.pose = pose;
-    }
-}
-
-/// Adds a bearing, with the slot and the last node of each landmark at hand, but for one of a landmark that has been seen from this pose before.
-fn look(
-    graph: &mut Graph,
-    slots: &mut BTreeMap<u64, (usize, usize)>,
-    seen: &LogBearing,
-    options: &SelfCalibratorOptions,
-) {
-    let here = graph.nodes.len() - 1;
-    let node = &graph.nodes[here];
-    let slot = if let Some((slot, last)) = slots.get(&seen.landmark).filter(|(_, last)| here - last <= GAP) {
-        if *last == here {
-            return;
-        }
-        *slot
-    } else {
-        let (pose, mounting) = (node.pose, graph.mounting);
-        let closeness = -options.start_distance_m.ln();
-        let direction = seen.bearing_rad + pose.z + mounting.z;
-        let landmark = Landmark { anchor: camera(&pose, &mounting), direction, closeness };
-        graph.add_landmark(landmark, closeness, options.start_distance_log_sigma)
-    };
-    slots.insert(seen.landmark, (slot, here));
-    graph.nodes[here].sights.push(Sight { landmark: slot, bearing: seen.bearing_rad });
+    Ok(filter.into_graph())
 }
 
 fn report(options: &LogOptions, graph: &Graph, descent: &Descent) -> Result<LogCalibration> {

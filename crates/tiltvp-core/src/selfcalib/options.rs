@@ -3,6 +3,7 @@
 use nalgebra::{Matrix3, Vector3};
 
 use super::mounting::Mounting;
+use super::odometry::MotionNoise;
 use crate::error::{Error, Result};
 use crate::filter::positive_semidefinite;
 
@@ -51,6 +52,10 @@ pub struct SelfCalibratorOptions {
     pub bearing_sigma_rad: f64,
     /// Variance of a wheel's displacement for each metre of it (eq. 31), metres. Default 1e-5.
     pub odometry_k_m: f64,
+    /// Standard deviation of every step's motion in either direction, beside eq. 31, metres (method "default"). Default 0.
+    pub step_sigma_m: f64,
+    /// Standard deviation of every step's turn, beside eq. 31, radians (method "default"). Default 0.
+    pub step_sigma_rad: f64,
     /// The mounting as it is thought to be. Default: the origin.
     pub start: Mounting,
     /// Covariance of (x, y, yaw) at the start. Default: 0.3 m, 0.3 m, 0.5 rad.
@@ -77,6 +82,8 @@ impl Default for SelfCalibratorOptions {
             wheel_base_m: 1.0,
             bearing_sigma_rad: 0.5f64.to_radians(),
             odometry_k_m: 1e-5,
+            step_sigma_m: 0.0,
+            step_sigma_rad: 0.0,
             start: Mounting::default(),
             start_covariance: Matrix3::from_diagonal(&Vector3::new(0.09, 0.09, 0.25)),
             gate_probability: 0.9999,
@@ -90,6 +97,11 @@ impl Default for SelfCalibratorOptions {
 }
 
 impl SelfCalibratorOptions {
+    /// The noise of the wheels, and of steps.
+    pub fn motion_noise(&self) -> MotionNoise {
+        MotionNoise { k_m: self.odometry_k_m, step_sigma_m: self.step_sigma_m, step_sigma_rad: self.step_sigma_rad }
+    }
+
     /// Checks every field.
     ///
     /// # Errors
@@ -105,6 +117,11 @@ impl SelfCalibratorOptions {
         positive("start_distance_m", self.start_distance_m, "a positive number of metres")?;
         positive("start_distance_sigma_m", self.start_distance_sigma_m, "a positive number of metres")?;
         positive("odometry_inflation", self.odometry_inflation, "a positive factor")?;
+        for (name, value) in [("step_sigma_m", self.step_sigma_m), ("step_sigma_rad", self.step_sigma_rad)] {
+            if !(value >= 0.0 && value.is_finite()) {
+                return Err(Error::option(name, value, "a number from 0"));
+            }
+        }
         let p = self.gate_probability;
         if !(p > 0.0 && p < 1.0) {
             return Err(Error::option("gate_probability", p, "a probability strictly between 0 and 1"));

@@ -282,7 +282,7 @@ mod tests {
         fn short_steps_follow_the_plane(x in -3.0..3.0f64, y in 1.0..3.0f64, heading in -3.0..3.0f64) {
             let f = Feature { distance_m: x.hypot(y), theta_rad: heading - y.atan2(x) };
             let motion = WheelMotion { left_m: 1e-4, right_m: 1.5e-4 };
-            let leg = Leg::from_wheels(&motion, &Wheels::new(0.4), 1e-5);
+            let leg = Leg::from_wheels(&motion, &Wheels::new(0.4), &crate::selfcalib::odometry::MotionNoise::new(1e-5));
             let pose = compose(&Vector3::new(x, y, heading), &leg.motion);
             let next = dynamics(&f, &motion, 0.4);
             prop_assert!((next.distance_m - pose.x.hypot(pose.y)).abs() < 1e-7);

@@ -1,12 +1,11 @@
 //! `LineTracker`: identities of lines through successive frames.
 
-use std::collections::VecDeque;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use numpy::PyArray1;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyTuple};
-use tiltvp_core::lines::{self as core, FrameMemory, TrackerOptions, TrackerState};
+use tiltvp_core::lines::{self as core, Followed, FrameMemory, Motion, Parallax, TrackerOptions, TrackerState};
 
 use super::matching;
 use super::values::Lines;
@@ -84,15 +83,21 @@ impl LineTracker {
             let name = format!("option {key}");
             match key.as_str() {
                 "look_back" => parsed.look_back = convert::whole(&value, &name, "a whole number from 1")?,
-                "gate_rad" => parsed.gate_rad = convert::whole(&value, &name, "an angle")?,
-                "gate_settled_rad" => parsed.gate_settled_rad = convert::whole(&value, &name, "an angle")?,
-                "gate_growth_rad" => parsed.gate_growth_rad = convert::whole(&value, &name, "an angle")?,
-                "bearing_weight" => parsed.bearing_weight = convert::whole(&value, &name, "a number")?,
-                "extrapolate" => parsed.extrapolate = convert::whole(&value, &name, "True or False")?,
+                "nearest_m" => parsed.nearest_m = convert::whole(&value, &name, "a distance")?,
+                "camera_m" => parsed.camera_m = convert::whole(&value, &name, "x and y")?,
+                "turn_sigma_rad" => parsed.turn_sigma_rad = convert::whole(&value, &name, "an angle")?,
+                "distance_sigma" => parsed.distance_sigma = convert::whole(&value, &name, "a share")?,
+                "rate_sigma_rad" => parsed.rate_sigma_rad = convert::whole(&value, &name, "an angle")?,
+                "bearing_sigma_rad" => parsed.bearing_sigma_rad = convert::whole(&value, &name, "an angle")?,
+                "gate_sigmas" => parsed.gate_sigmas = convert::whole(&value, &name, "a number")?,
+                "descriptor_sigma" => parsed.descriptor_sigma = convert::whole(&value, &name, "a distance")?,
+                "descriptor_max" => parsed.descriptor_max = convert::whole(&value, &name, "a distance")?,
+                "new_cost" => parsed.new_cost = convert::whole(&value, &name, "a number")?,
                 _ if matching::set(&mut parsed.matching, &key, &value)? => {}
                 _ => {
-                    let expected = "look_back, gate_rad, gate_settled_rad, gate_growth_rad, bearing_weight, extrapolate, f1, f2, f3, \
-                         mutual, ordered";
+                    let expected = "look_back, nearest_m, camera_m, turn_sigma_rad, distance_sigma, rate_sigma_rad, \
+                         bearing_sigma_rad, gate_sigmas, descriptor_sigma, descriptor_max, new_cost, f1, f2, f3, mutual, \
+                         ordered";
                     return Err(invalid(format!("{name}: unknown, expected one of {expected}")));
                 }
             }
@@ -107,11 +112,16 @@ impl LineTracker {
         let options = *self.lock().options();
         let dict = PyDict::new(py);
         dict.set_item("look_back", options.look_back)?;
-        dict.set_item("gate_rad", options.gate_rad)?;
-        dict.set_item("gate_settled_rad", options.gate_settled_rad)?;
-        dict.set_item("gate_growth_rad", options.gate_growth_rad)?;
-        dict.set_item("bearing_weight", options.bearing_weight)?;
-        dict.set_item("extrapolate", options.extrapolate)?;
+        dict.set_item("nearest_m", options.nearest_m)?;
+        dict.set_item("camera_m", PyTuple::new(py, options.camera_m)?)?;
+        dict.set_item("turn_sigma_rad", options.turn_sigma_rad)?;
+        dict.set_item("distance_sigma", options.distance_sigma)?;
+        dict.set_item("rate_sigma_rad", options.rate_sigma_rad)?;
+        dict.set_item("bearing_sigma_rad", options.bearing_sigma_rad)?;
+        dict.set_item("gate_sigmas", options.gate_sigmas)?;
+        dict.set_item("descriptor_sigma", options.descriptor_sigma)?;
+        dict.set_item("descriptor_max", options.descriptor_max)?;
+        dict.set_item("new_cost", options.new_cost)?;
         matching::in_force(&dict, &options.matching)?;
         Ok(dict)
     }
@@ -129,14 +139,19 @@ impl LineTracker {
     }
 
     /// The next frame.
-    #[pyo3(signature = (lines, descriptors, *, yaw_change_rad=None))]
+    #[pyo3(signature = (lines, descriptors, *, yaw_change_rad=None, distance_m=None))]
     fn update(
         &self,
         py: Python<'_>,
         lines: &Bound<'_, Lines>,
         descriptors: &Bound<'_, PyAny>,
         yaw_change_rad: Option<f64>,
+        distance_m: Option<f64>,
     ) -> PyResult<TrackedLines> {
+        if yaw_change_rad.is_none() && distance_m.is_some() {
+            return Err(invalid("distance_m: given without yaw_change_rad, expected both or neither".to_owned()));
+        }
+        let motion = yaw_change_rad.map(|turn_rad| Motion { turn_rad, distance_m });
         let (values, n, _) = matching::descriptors(descriptors, "descriptors")?;
         let inner = lines.get().inner();
         if n != inner.lines.len() {
@@ -145,7 +160,7 @@ impl LineTracker {
         let (frame, tracked) = call(py, || {
             let mut tracker = self.lock();
             let (frame, mut out) = (tracker.state().next_frame, Vec::new());
-            tracker.update(inner, &values, yaw_change_rad, &mut out)?;
+            tracker.update(inner, &values, motion.as_ref(), &mut out)?;
             Ok((frame, out))
         })?;
         Ok(TrackedLines { frame, tracked, lines: lines.clone().unbind() })
@@ -175,21 +190,16 @@ impl LineTracker {
     }
 
     /// Sets what pickle has kept.
-    fn __setstate__(&self, state: (u64, u64, Vec<Memory>)) -> PyResult<()> {
-        let (next_frame, next_track, frames) = state;
-        let frames: VecDeque<FrameMemory> = frames
-            .into_iter()
-            .map(|(bearings_rad, rates_rad, tracks, descriptors, heading_rad, stretch)| FrameMemory {
-                bearings_rad,
-                rates_rad,
-                tracks,
-                descriptors,
-                heading_rad,
-                stretch,
-            })
-            .collect();
+    fn __setstate__(&self, state: (u64, u64, Vec<Memory>, Vec<Edge>)) -> PyResult<()> {
+        let (next_frame, next_track, frames, followed) = state;
+        let frames = frames.into_iter().map(|(tracks, descriptors)| FrameMemory { tracks, descriptors }).collect();
+        let edge = |((track, seen), (bearing_rad, nearness, covariance, is_metric), polarity, descriptor): Edge| {
+            let parallax = Parallax { bearing_rad, nearness, covariance, is_metric };
+            Followed { track, seen, parallax, polarity, descriptor }
+        };
+        let followed = followed.into_iter().map(edge).collect();
         let mut inner = self.lock();
-        let state = TrackerState { next_frame, next_track, frames };
+        let state = TrackerState { next_frame, next_track, frames, followed };
         *inner = core::LineTracker::with_state(*inner.options(), state).map_err(|error| exception(&error))?;
         Ok(())
     }
@@ -198,15 +208,20 @@ impl LineTracker {
         let (py, this) = (slf.py(), slf.get());
         let make = py.import("functools")?.getattr("partial")?.call((slf.get_type(),), Some(&this.options(py)?))?;
         let tracker = this.lock();
-        let memory = |frame: &FrameMemory| -> Memory {
-            let f = frame.clone();
-            (f.bearings_rad, f.rates_rad, f.tracks, f.descriptors, f.heading_rad, f.stretch)
+        let edge = |edge: &Followed| -> Edge {
+            let Parallax { bearing_rad, nearness, covariance, is_metric } = edge.parallax;
+            let place = (bearing_rad, nearness, covariance, is_metric);
+            ((edge.track, edge.seen), place, edge.polarity, edge.descriptor.clone())
         };
         let state = tracker.state();
-        let frames: Vec<Memory> = state.frames.iter().map(memory).collect();
-        (make, PyTuple::empty(py), (state.next_frame, state.next_track, frames)).into_pyobject(py)
+        let frames: Vec<Memory> = state.frames.iter().map(|f| (f.tracks.clone(), f.descriptors.clone())).collect();
+        let followed: Vec<Edge> = state.followed.iter().map(edge).collect();
+        (make, PyTuple::empty(py), (state.next_frame, state.next_track, frames, followed)).into_pyobject(py)
     }
 }
 
 /// A frame as pickle keeps it.
-type Memory = (Vec<f64>, Vec<Option<f64>>, Vec<u64>, Vec<f32>, f64, u64);
+type Memory = (Vec<u64>, Vec<f32>);
+
+/// A track that is followed, as pickle keeps it.
+type Edge = ((u64, u64), (f64, f64, [f64; 3], bool), f64, Vec<f32>);

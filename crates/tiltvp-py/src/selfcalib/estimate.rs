@@ -3,12 +3,27 @@
 use nalgebra::{Matrix3, Vector3};
 use numpy::{PyArray1, PyArray2, PyArrayMethods};
 use pyo3::prelude::*;
-use pyo3::types::PyDict;
+use pyo3::types::{PyDict, PyTuple, PyType};
 use tiltvp_core::selfcalib as core;
+
+use crate::call::invalid;
+use crate::convert::{item, known_keys};
 
 /// Fresh `(3, 3)` array.
 pub(super) fn matrix3<'py>(py: Python<'py>, m: &Matrix3<f64>) -> PyResult<Bound<'py, PyArray2<f64>>> {
     PyArray1::from_slice(py, m.transpose().as_slice()).reshape([3, 3])
+}
+
+/// A matrix of a dict.
+fn matrix_item(values: &Bound<'_, PyDict>, key: &str) -> PyResult<Matrix3<f64>> {
+    let rows: [[f64; 3]; 3] = item(values, key, "three rows of three numbers")?;
+    Ok(Matrix3::from_fn(|r, c| rows[r][c]))
+}
+
+/// A vector of a dict.
+fn vector_item(values: &Bound<'_, PyDict>, key: &str) -> PyResult<Vector3<f64>> {
+    let numbers: [f64; 3] = item(values, key, "three numbers")?;
+    Ok(Vector3::from(numbers))
 }
 
 fn nested(m: &Matrix3<f64>) -> Vec<Vec<f64>> {
@@ -45,6 +60,42 @@ impl CalibrationStep {
         let Self { nis, used, rejected, started } = self;
         format!("CalibrationStep(nis={nis:.3}, used={used}, rejected={rejected}, started={started})")
     }
+
+    /// The attributes by name.
+    fn to_dict<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let dict = PyDict::new(py);
+        dict.set_item("nis", self.nis)?;
+        dict.set_item("used", self.used)?;
+        dict.set_item("rejected", self.rejected)?;
+        dict.set_item("started", self.started)?;
+        Ok(dict)
+    }
+
+    /// The step of a dict as `to_dict` makes it.
+    #[classmethod]
+    fn from_dict(_cls: &Bound<'_, PyType>, values: &Bound<'_, PyDict>) -> PyResult<Self> {
+        known_keys(values, &["nis", "used", "rejected", "started"])?;
+        let count = |key| item(values, key, "a whole number from 0");
+        Ok(Self {
+            nis: item(values, "nis", "a number")?,
+            used: count("used")?,
+            rejected: count("rejected")?,
+            started: count("started")?,
+        })
+    }
+
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyTuple>> {
+        let py = slf.py();
+        (slf.get_type().getattr("from_dict")?, (slf.get().to_dict(py)?,)).into_pyobject(py)
+    }
+
+    fn __copy__<'py>(slf: &Bound<'py, Self>) -> Bound<'py, Self> {
+        slf.clone()
+    }
+
+    fn __deepcopy__<'py>(slf: &Bound<'py, Self>, _memo: &Bound<'py, PyAny>) -> Bound<'py, Self> {
+        slf.clone()
+    }
 }
 
 /// Where a camera sits on a robot, with how sure that is.
@@ -59,6 +110,29 @@ impl From<core::MountingEstimate> for MountingEstimate {
         Self { inner }
     }
 }
+
+/// What a drive can determine.
+const DETERMINABLE: [&str; 4] = ["phi", "rho", "psi", "yaw"];
+
+/// The keys of an estimate's dict.
+const ESTIMATE_KEYS: [&str; 16] = [
+    "x_m",
+    "y_m",
+    "yaw_rad",
+    "phi_rad",
+    "rho_m",
+    "psi_rad",
+    "covariance_xy_yaw",
+    "covariance_phi_rho_psi",
+    "determined",
+    "sigma_of_drive",
+    "sigma_of_drive_xy_yaw",
+    "advice",
+    "rho_near_zero",
+    "mean_nis",
+    "alarm",
+    "reason",
+];
 
 impl MountingEstimate {
     fn determined_names(&self) -> Vec<&'static str> {
@@ -179,6 +253,8 @@ impl MountingEstimate {
         dict.set_item("determined", self.determined_names())?;
         let sigma: Vector3<f64> = self.inner.observability.sigma_phi_rho_psi;
         dict.set_item("sigma_of_drive", sigma.as_slice().to_vec())?;
+        let sigma: Vector3<f64> = self.inner.observability.sigma_xy_yaw;
+        dict.set_item("sigma_of_drive_xy_yaw", sigma.as_slice().to_vec())?;
         dict.set_item("advice", self.advice())?;
         dict.set_item("rho_near_zero", self.rho_near_zero())?;
         dict.set_item("mean_nis", self.mean_nis())?;
@@ -190,6 +266,50 @@ impl MountingEstimate {
     fn __repr__(&self) -> String {
         let m = &self.inner.mounting;
         format!("MountingEstimate(x_m={:.4}, y_m={:.4}, yaw_rad={:.4}): {}", m.x_m, m.y_m, m.yaw_rad, self.inner)
+    }
+
+    /// The estimate of a dict as `to_dict` makes it; what follows from the other items is not read.
+    #[classmethod]
+    fn from_dict(_cls: &Bound<'_, PyType>, values: &Bound<'_, PyDict>) -> PyResult<Self> {
+        known_keys(values, &ESTIMATE_KEYS)?;
+        let number = |key| item::<f64>(values, key, "a number");
+        let determined: Vec<String> = item(values, "determined", "a list of names")?;
+        if let Some(name) = determined.iter().find(|name| !DETERMINABLE.contains(&name.as_str())) {
+            let expected = DETERMINABLE.join(", ");
+            return Err(invalid(format!("values[\"determined\"]: unknown name {name:?}, expected {expected}")));
+        }
+        let has = |name: &str| determined.iter().any(|found| found == name);
+        Ok(Self {
+            inner: core::MountingEstimate {
+                mounting: core::Mounting { x_m: number("x_m")?, y_m: number("y_m")?, yaw_rad: number("yaw_rad")? },
+                covariance_xy_yaw: matrix_item(values, "covariance_xy_yaw")?,
+                covariance_phi_rho_psi: matrix_item(values, "covariance_phi_rho_psi")?,
+                observability: core::Observability {
+                    sigma_phi_rho_psi: vector_item(values, "sigma_of_drive")?,
+                    sigma_xy_yaw: vector_item(values, "sigma_of_drive_xy_yaw")?,
+                    phi: has("phi"),
+                    rho: has("rho"),
+                    psi: has("psi"),
+                    yaw: has("yaw"),
+                    rho_near_zero: item(values, "rho_near_zero", "true or false")?,
+                },
+                mean_nis: item(values, "mean_nis", "a number or None")?,
+                alarm: item(values, "alarm", "true or false")?,
+            },
+        })
+    }
+
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyTuple>> {
+        let py = slf.py();
+        (slf.get_type().getattr("from_dict")?, (slf.get().to_dict(py)?,)).into_pyobject(py)
+    }
+
+    fn __copy__<'py>(slf: &Bound<'py, Self>) -> Bound<'py, Self> {
+        slf.clone()
+    }
+
+    fn __deepcopy__<'py>(slf: &Bound<'py, Self>, _memo: &Bound<'py, PyAny>) -> Bound<'py, Self> {
+        slf.clone()
     }
 }
 
@@ -205,6 +325,24 @@ impl From<core::LogCalibration> for LogCalibration {
         Self { inner }
     }
 }
+
+/// The keys of a log calibration's dict.
+const LOG_KEYS: [&str; 14] = [
+    "mounting",
+    "wheel_base_m",
+    "wheel_base_sigma_m",
+    "right_over_left",
+    "right_over_left_sigma",
+    "imbalance",
+    "imbalance_sigma",
+    "time_offset_s",
+    "time_offset_sigma_s",
+    "bearings",
+    "outliers",
+    "residual_rms",
+    "iterations",
+    "converged",
+];
 
 #[pymethods]
 impl LogCalibration {
@@ -293,6 +431,8 @@ impl LogCalibration {
         dict.set_item("wheel_base_sigma_m", self.wheel_base_sigma_m())?;
         dict.set_item("right_over_left", self.right_over_left())?;
         dict.set_item("right_over_left_sigma", self.right_over_left_sigma())?;
+        dict.set_item("imbalance", self.inner.wheels.imbalance)?;
+        dict.set_item("imbalance_sigma", self.inner.wheels_sigma[0])?;
         dict.set_item("time_offset_s", self.time_offset_s())?;
         dict.set_item("time_offset_sigma_s", self.time_offset_sigma_s())?;
         dict.set_item("bearings", self.bearings())?;
@@ -301,6 +441,43 @@ impl LogCalibration {
         dict.set_item("iterations", self.iterations())?;
         dict.set_item("converged", self.converged())?;
         Ok(dict)
+    }
+
+    /// The calibration of a dict as `to_dict` makes it; what follows from the other items is not read.
+    #[classmethod]
+    fn from_dict(_cls: &Bound<'_, PyType>, values: &Bound<'_, PyDict>) -> PyResult<Self> {
+        known_keys(values, &LOG_KEYS)?;
+        let number = |key| item::<f64>(values, key, "a number");
+        let count = |key| item(values, key, "a whole number from 0");
+        let mounting: Bound<'_, PyDict> = item(values, "mounting", "a dict")?;
+        let mounting = MountingEstimate::from_dict(&values.py().get_type::<MountingEstimate>(), &mounting)?;
+        Ok(Self {
+            inner: core::LogCalibration {
+                estimate: mounting.inner,
+                wheels: core::Wheels { imbalance: number("imbalance")?, base_m: number("wheel_base_m")? },
+                wheels_sigma: [number("imbalance_sigma")?, number("wheel_base_sigma_m")?],
+                time_offset_s: number("time_offset_s")?,
+                time_offset_sigma_s: number("time_offset_sigma_s")?,
+                bearings: count("bearings")?,
+                outliers: count("outliers")?,
+                residual_rms: number("residual_rms")?,
+                iterations: item(values, "iterations", "a whole number from 0")?,
+                converged: item(values, "converged", "true or false")?,
+            },
+        })
+    }
+
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyTuple>> {
+        let py = slf.py();
+        (slf.get_type().getattr("from_dict")?, (slf.get().to_dict(py)?,)).into_pyobject(py)
+    }
+
+    fn __copy__<'py>(slf: &Bound<'py, Self>) -> Bound<'py, Self> {
+        slf.clone()
+    }
+
+    fn __deepcopy__<'py>(slf: &Bound<'py, Self>, _memo: &Bound<'py, PyAny>) -> Bound<'py, Self> {
+        slf.clone()
     }
 
     fn __repr__(&self) -> String {

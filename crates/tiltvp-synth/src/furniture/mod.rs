@@ -92,6 +92,21 @@ pub(crate) fn furnish(plan: &Plan, options: &RoomOptions, builder: &mut Builder,
     places
 }
 
+/// Lines the walls of a room with furniture, and leaves its middle free.
+pub(crate) fn furnish_walls(plan: &Plan, clutter: f64, builder: &mut Builder, dice: &mut Dice) {
+    let palette = Palette::draw(builder, dice);
+    let mut layout = Layout { plan, claims: Vec::new() };
+    for wall in &plan.walls {
+        for door in &wall.openings {
+            layout.claim(&wall.frame, [door.along[0] - 0.1, 0.0], [door.along[1] + 0.1, 0.75]);
+        }
+    }
+    for wall in &plan.walls {
+        let tall = along_wall(wall, &mut layout, &palette, clutter, builder, dice);
+        decor::hang(wall, &tall, plan, &palette, clutter, builder, dice);
+    }
+}
+
 /// Square pillars from floor to ceiling on an even grid.
 fn pillars(layout: &mut Layout<'_>, builder: &mut Builder) {
     let paint = builder.paint(196, 192, 184);

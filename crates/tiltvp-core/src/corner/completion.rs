@@ -1,0 +1,127 @@
+//! Corners of which two edges were found as segments and the third is known from an attitude.
+
+use nalgebra::{Matrix3, Vector3};
+
+use super::consensus::rays_apart;
+use super::general::GeneralScratch;
+use super::junctions::{RayEnd, meeting};
+use super::options::GeneralOptions;
+use super::trace::{Course, Traced, trace};
+use super::vertex::CornerFeature;
+use crate::camera::Camera;
+use crate::image::{ImageView, LightTable};
+
+/// How far from the direction of its axis a segment's great circle may pass: 2.5 degrees.
+const AXIS_SINE: f64 = 0.0436;
+
+/// Most crossings that are followed up, those of the longest segments.
+const CROSSINGS_MAX: usize = 60;
+
+/// Least length along which a third edge is looked for, in pixels.
+const THIRD_MIN_PX: f64 = 30.0;
+
+/// A crossing of two segments along two of the axes.
+struct Crossing {
+    ends: [RayEnd; 2],
+    axes: [usize; 2],
+    place: Vector3<f64>,
+    shorter_px: f64,
+}
+
+/// Corners of an image whose edges run along the columns of `camera_from_object`, at right angles, added to `out`: two of
+/// their edges are segments of the image that was looked at last, the third is followed from where these cross.
+pub(super) fn complete(
+    camera: &Camera,
+    image: &ImageView<'_>,
+    camera_from_object: &Matrix3<f64>,
+    options: &GeneralOptions,
+    light: &LightTable,
+    scratch: &mut GeneralScratch,
+    out: &mut Vec<CornerFeature>,
+) {
+    let segments = &scratch.segments.segments;
+    let axis_of = |normal: &Vector3<f64>| {
+        let sines = camera_from_object.tr_mul(normal).abs();
+        Some(sines.imin()).filter(|axis| sines[*axis] < AXIS_SINE)
+    };
+    let along: Vec<(usize, usize)> = segments
+        .iter()
+        .enumerate()
+        .filter_map(|(place, segment)| axis_of(&segment.normal).map(|axis| (place, axis)))
+        .collect();
+    let mut crossings = Vec::new();
+    for (i, (first, a)) in along.iter().enumerate() {
+        for (second, b) in along.iter().skip(i + 1) {
+            if a == b {
+                continue;
+            }
+            let shorter_px = segments[*first].length_px.min(segments[*second].length_px);
+            for (end, other) in [(0, 0), (0, 1), (1, 0), (1, 1)] {
+                let ends = [RayEnd { segment: *first, end }, RayEnd { segment: *second, end: other }];
+                if let Some(found) = meeting(segments, ends[0], ends[1], options) {
+                    crossings.push(Crossing { ends, axes: [*a, *b], place: found.place, shorter_px });
+                }
+            }
+        }
+    }
+    crossings.sort_by(|a, b| b.shorter_px.total_cmp(&a.shorter_px));
+    crossings.truncate(CROSSINGS_MAX);
+    for crossing in &crossings {
+        let Some(place) = camera.project_jacobian(&crossing.place) else { continue };
+        let px_per_rad = place.1.norm() / 2f64.sqrt();
+        let course = |normal: Vector3<f64>, to_rad: f64| Course {
+            normal,
+            vertex: (crossing.place - normal * normal.dot(&crossing.place)).normalize(),
+            from_rad: 4.0 / px_per_rad,
+            to_rad,
+            search_px: options.search_px,
+            step_min: options.step_min,
+            threshold_px: options.threshold_px,
+            ray_sigma_px: options.ray_sigma_px,
+        };
+        let support_min = options.support_min_px as usize;
+        let memory = &mut scratch.trace;
+        let mut follow = |course: &Course| -> Option<Traced> {
+            let found = trace(camera, course, support_min, |u, v| light.gray(image, u, v), memory)?;
+            Some(found).filter(|found| found.share >= options.support_min_share)
+        };
+        let third = 3 - crossing.axes[0] - crossing.axes[1];
+        let mut rays: [Option<Traced>; 3] = [None; 3];
+        for (ray, axis) in crossing.ends.iter().zip(crossing.axes) {
+            let segment = &segments[ray.segment];
+            let normal = if ray.end == 0 { segment.normal } else { -segment.normal };
+            rays[axis] = follow(&course(normal, crossing.place.angle(ray.far(segments)) - 2.0 / px_per_rad));
+            if rays[axis].is_none() {
+                break;
+            }
+        }
+        if crossing.axes.iter().any(|axis| rays[*axis].is_none()) {
+            continue;
+        }
+        let to_rad = THIRD_MIN_PX.max(0.8 * crossing.shorter_px) / px_per_rad;
+        let direction = camera_from_object.column(third).into_owned();
+        for sign in [1.0, -1.0] {
+            let Some(normal) = crossing.place.cross(&(direction * sign)).try_normalize(0.05) else { continue };
+            rays[third] = follow(&course(normal, to_rad));
+            let [Some(x), Some(y), Some(z)] = rays else { continue };
+            let Some(corner) = clockwise([x, y, z]) else { continue };
+            let good = corner.residual_rad() * px_per_rad <= options.residual_max_px;
+            if good && rays_apart(&corner, options.ray_angle_min_rad) {
+                out.push(corner);
+            }
+        }
+    }
+}
+
+/// The feature of three rays with x and z named so that x, y, z are clockwise in the image.
+fn clockwise(traced: [Traced; 3]) -> Option<CornerFeature> {
+    let [x, y, z] = traced.map(|traced| traced.ray);
+    let corner = CornerFeature::from_rays([x, y, z])?;
+    let vertex = corner.vertex();
+    let along = corner.rays().map(|ray| ray.normal.cross(&vertex));
+    let turn = |direction: &Vector3<f64>| {
+        let angle = vertex.dot(&along[1].cross(direction)).atan2(along[1].dot(direction));
+        if angle < 0.0 { angle + std::f64::consts::TAU } else { angle }
+    };
+    if turn(&along[0]) > turn(&along[2]) { Some(corner) } else { CornerFeature::from_rays([z, y, x]) }
+}

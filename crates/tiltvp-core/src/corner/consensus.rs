@@ -1,0 +1,101 @@
+//! Which features of one image are corners of one upright world: those whose attitudes agree.
+
+use nalgebra::{Matrix3, Rotation3, Vector3};
+
+use super::attitude::{CornerAttitudes, IncludedAngle, corner_attitudes};
+use super::prior::AttitudePrior;
+use super::vertex::CornerFeature;
+use crate::error::Result;
+
+/// How much a feature says, in pixels: its shortest ray, and a share of all three.
+pub(super) fn weight(feature: &CornerFeature) -> f64 {
+    let support = feature.rays().map(|ray| ray.support as f64);
+    let shortest = support.iter().copied().fold(f64::INFINITY, f64::min);
+    shortest + 0.3 * support.iter().map(|pixels| pixels.min(200.0)).sum::<f64>()
+}
+
+/// The eight namings of a corner with right angles: quarter turns about the vertical, and the vertical up or down.
+pub(super) fn namings() -> impl Iterator<Item = Matrix3<f64>> {
+    let quarter = |k: i32| Rotation3::from_axis_angle(&Vector3::y_axis(), f64::from(k) * std::f64::consts::FRAC_PI_2);
+    let over = [Matrix3::identity(), Matrix3::from_diagonal(&Vector3::new(1.0, -1.0, -1.0))];
+    (0..4).flat_map(move |k| over.map(|over| quarter(k).matrix() * over))
+}
+
+/// The naming of an attitude that is nearest to another attitude.
+pub(super) fn renamed(attitude: &Matrix3<f64>, near: &Matrix3<f64>) -> Matrix3<f64> {
+    let cosine = |turned: &Matrix3<f64>| (near.transpose() * turned).trace();
+    namings().map(|naming| attitude * naming).max_by(|a, b| cosine(a).total_cmp(&cosine(b))).unwrap_or(*attitude)
+}
+
+/// Whether every two rays are at least this far apart at the vertex: those of one edge, found twice, are not.
+pub(super) fn rays_apart(feature: &CornerFeature, least_rad: f64) -> bool {
+    let vertex = feature.vertex();
+    let along = feature.rays().map(|ray| ray.normal.cross(&vertex).normalize());
+    let most = least_rad.cos();
+    along[0].dot(&along[1]) <= most && along[1].dot(&along[2]) <= most && along[2].dot(&along[0]) <= most
+}
+
+/// Whether the rays are images of edges along the three axes of an attitude, one each, within `most_rad`.
+pub(super) fn fits(feature: &CornerFeature, attitude: &Matrix3<f64>, most_rad: f64) -> bool {
+    let nearest = feature.rays().map(|ray| {
+        let sines = attitude.tr_mul(&ray.normal).abs();
+        (sines.imin(), sines.min())
+    });
+    let [x, y, z] = nearest.map(|(axis, _)| axis);
+    x != y && y != z && z != x && nearest.iter().all(|(_, sine)| *sine <= most_rad.sin())
+}
+
+/// The angle between two attitudes, radians.
+pub(super) fn apart(a: &Matrix3<f64>, b: &Matrix3<f64>) -> f64 {
+    // |a - b| = 2 sqrt 2 sin(angle / 2), exact for small angles.
+    2.0 * ((a - b).norm() / 8f64.sqrt()).min(1.0).asin()
+}
+
+/// The features that agree, the one that says most first, and the attitudes of each.
+pub(super) struct Agreement {
+    pub(super) members: Vec<usize>,
+    pub(super) attitudes: Vec<CornerAttitudes>,
+}
+
+/// The set of features with the most to say of which each has an attitude within `agree_max_rad` of a common one, their
+/// edges at right angles and parallel but named at will; `priors` count as one more voice. Where the angle is not right, the
+/// best feature alone.
+pub(super) fn agreement(
+    features: &[CornerFeature],
+    angle: &IncludedAngle,
+    agree_max_rad: f64,
+    priors: &[AttitudePrior],
+) -> Result<Option<Agreement>> {
+    let found = features.iter().map(|feature| corner_attitudes(feature, angle)).collect::<Result<Vec<_>>>()?;
+    let alone = angle.gamma_rad != std::f64::consts::FRAC_PI_2;
+    let mut best: Option<(f64, Vec<usize>)> = None;
+    for (i, own) in found.iter().enumerate() {
+        for reference in own.iter() {
+            let voice =
+                |prior: &AttitudePrior| prior.ln_likelihood(&reference.camera_from_object, &reference.covariance);
+            let doubt = priors.iter().map(voice).sum::<f64>();
+            let mut members = vec![i];
+            for (j, others) in found.iter().enumerate() {
+                let agrees = others.iter().any(|other| {
+                    let turned = renamed(&other.camera_from_object, &reference.camera_from_object);
+                    apart(&turned, &reference.camera_from_object) <= agree_max_rad
+                });
+                if !alone && j != i && agrees {
+                    members.push(j);
+                }
+            }
+            let score = members.iter().map(|j| weight(&features[*j])).sum::<f64>() + PIXELS_PER_DOUBT * doubt;
+            if best.as_ref().is_none_or(|(most, _)| score > *most) {
+                best = Some((score, members));
+            }
+        }
+    }
+    Ok(best.map(|(_, mut members)| {
+        members.sort_by(|a, b| weight(&features[*b]).total_cmp(&weight(&features[*a])).then(a.cmp(b)));
+        let attitudes = members.iter().map(|j| found[*j]).collect();
+        Agreement { members, attitudes }
+    }))
+}
+
+/// How many pixels of features outweigh one unit of a prior's log-likelihood.
+const PIXELS_PER_DOUBT: f64 = 30.0;

@@ -1,0 +1,190 @@
+//! From an image to its corners: the tables of a camera, made once.
+
+use nalgebra::{Matrix3, Vector3};
+
+use super::attitude::{IncludedAngle, corner_attitudes};
+use super::coloured::{self, ColouredScratch};
+use super::completion::complete;
+use super::general::{self, GeneralScratch};
+use super::guided::{Expected, find_near};
+use super::options::{CornerMethod, DetectorOptions};
+use super::segments::{Segment, SegmentFinder};
+use super::vertex::CornerFeature;
+use crate::camera::Camera;
+use crate::edges::Mask;
+use crate::error::{Error, Result};
+use crate::image::{ColorView, ImageView, LightTable};
+
+/// The part of an image that is looked at.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Window {
+    /// Columns.
+    pub columns: std::ops::Range<usize>,
+    /// Rows.
+    pub rows: std::ops::Range<usize>,
+}
+
+/// Finds corners in single images of one camera.
+#[derive(Debug, Clone)]
+pub struct CornerDetector {
+    camera: Camera,
+    options: DetectorOptions,
+    mask: Option<Mask>,
+    light: LightTable,
+    finder: Option<SegmentFinder>,
+}
+
+/// Memory for one thread.
+#[derive(Debug, Clone)]
+pub struct CornerScratch {
+    coloured: ColouredScratch,
+    general: Option<GeneralScratch>,
+}
+
+impl CornerDetector {
+    /// Makes the tables.
+    ///
+    /// # Errors
+    /// [`Error::InvalidOption`] or [`Error::InvalidArgument`] if an option is out of its domain, or the mask does not fit the
+    /// camera or leaves nothing.
+    pub fn new(camera: Camera, options: DetectorOptions, mask: Option<Mask>) -> Result<Self> {
+        options.validate()?;
+        let light = LightTable::new(options.display_gamma)?;
+        let finder = match &options.method {
+            CornerMethod::Coloured(_) => None,
+            CornerMethod::General(general) => Some(SegmentFinder::new(&camera, general, mask.as_ref())?),
+        };
+        Ok(Self { camera, options, mask, light, finder })
+    }
+
+    /// The camera.
+    pub fn camera(&self) -> &Camera {
+        &self.camera
+    }
+
+    /// The options.
+    pub fn options(&self) -> &DetectorOptions {
+        &self.options
+    }
+
+    /// Which pixels may be used; none for all. The coloured front end knows no mask.
+    pub fn mask(&self) -> Option<&Mask> {
+        self.mask.as_ref()
+    }
+
+    /// Memory for one thread.
+    pub fn scratch(&self) -> CornerScratch {
+        CornerScratch {
+            coloured: ColouredScratch::default(),
+            general: self.finder.as_ref().map(|finder| GeneralScratch::new(finder.scratch())),
+        }
+    }
+
+    fn check(&self, width: usize, height: usize) -> Result<()> {
+        let expected = (self.camera.width() as usize, self.camera.height() as usize);
+        if (width, height) == expected {
+            return Ok(());
+        }
+        let (w, h) = expected;
+        Err(Error::argument(
+            "image",
+            format!("{height} x {width} pixels"),
+            format!("{h} x {w} (rows x columns), as the camera's images"),
+        ))
+    }
+
+    /// The coloured cuboid's corner; at most one. `window` is the part of the image to look at, none for all of it.
+    ///
+    /// # Errors
+    /// [`Error::InvalidArgument`] if the image has another size than the camera's, or the detector is for grey images.
+    pub fn detect_coloured(
+        &self,
+        image: &ColorView<'_>,
+        window: Option<&Window>,
+        scratch: &mut CornerScratch,
+    ) -> Result<Option<CornerFeature>> {
+        self.check(image.width(), image.height())?;
+        let CornerMethod::Coloured(options) = &self.options.method else {
+            return Err(Error::argument("method", "general", "coloured, for images in colour"));
+        };
+        let whole = Window { columns: 0..image.width(), rows: 0..image.height() };
+        let window = window.map_or(whole.clone(), |window| Window {
+            columns: window.columns.start.min(whole.columns.end)..window.columns.end.min(whole.columns.end),
+            rows: window.rows.start.min(whole.rows.end)..window.rows.end.min(whole.rows.end),
+        });
+        Ok(coloured::find(&self.camera, image, options, &self.light, &window, &mut scratch.coloured))
+    }
+
+    /// The corners of a grey image, the best first. `vertical` is a unit vector along the vertical in the camera frame, either
+    /// way: the vertical ray is the one that agrees with it, and features without one are screened out. Without it that ray
+    /// may be any, which all the same leaves the attitude of a corner with right angles but for the names of its edges.
+    ///
+    /// # Errors
+    /// [`Error::InvalidArgument`] if the image has another size than the camera's, or the detector is for coloured images.
+    pub fn detect_general(
+        &self,
+        image: &ImageView<'_>,
+        vertical: Option<&Vector3<f64>>,
+        scratch: &mut CornerScratch,
+        out: &mut Vec<CornerFeature>,
+    ) -> Result<()> {
+        self.check(image.width(), image.height())?;
+        let (CornerMethod::General(options), Some(finder), Some(memory)) =
+            (&self.options.method, &self.finder, &mut scratch.general)
+        else {
+            return Err(Error::argument("method", "coloured", "general, for grey images"));
+        };
+        let (angle, least) = (IncludedAngle::exact(options.gamma_rad), options.vertical_max_rad.cos());
+        // The vertical is the edge nearest to the prior, or to the image's columns where there is none.
+        let closeness = |corner: &CornerFeature| {
+            let attitudes = corner_attitudes(corner, &angle).ok()?;
+            let near = |upright: &Vector3<f64>| {
+                let cosines = attitudes.iter().map(|attitude| attitude.edges[1].dot(upright).abs());
+                cosines.max_by(f64::total_cmp)
+            };
+            match vertical {
+                Some(vertical) => near(vertical).filter(|cosine| *cosine >= least),
+                None => near(&Vector3::y()),
+            }
+        };
+        general::find(&self.camera, finder, image, options, &self.light, vertical, closeness, memory, out);
+        Ok(())
+    }
+
+    /// The corner near where it is expected; none if it is not there, and for the coloured front end, which finds its corner
+    /// anywhere. `search_px` is how far from there, none for the option.
+    pub(super) fn find_near(
+        &self,
+        image: &ImageView<'_>,
+        expected: &Expected,
+        search_px: Option<f64>,
+        scratch: &mut CornerScratch,
+    ) -> Option<CornerFeature> {
+        let (CornerMethod::General(options), Some(memory)) = (&self.options.method, &mut scratch.general) else {
+            return None;
+        };
+        let search_px = search_px.unwrap_or(options.follow_px);
+        find_near(&self.camera, image, expected, search_px, options, &self.light, &mut memory.trace)
+    }
+
+    /// The corners whose edges run along the columns of a rotation, two of them among the segments of the image that was looked
+    /// at last with this scratch; added to `out`. None for the coloured front end and where edges are not at right angles.
+    pub(super) fn complete(
+        &self,
+        image: &ImageView<'_>,
+        camera_from_object: &Matrix3<f64>,
+        scratch: &mut CornerScratch,
+        out: &mut Vec<CornerFeature>,
+    ) {
+        if let (CornerMethod::General(options), Some(memory)) = (&self.options.method, &mut scratch.general)
+            && options.gamma_rad == std::f64::consts::FRAC_PI_2
+        {
+            complete(&self.camera, image, camera_from_object, options, &self.light, memory, out);
+        }
+    }
+
+    /// The line segments of the last grey image, the longest first; none for the coloured front end.
+    pub fn segments<'a>(&self, scratch: &'a CornerScratch) -> &'a [Segment] {
+        scratch.general.as_ref().map_or(&[], |memory| &memory.segments.segments)
+    }
+}

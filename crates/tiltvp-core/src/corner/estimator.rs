@@ -1,0 +1,691 @@
+//! From images to poses: corners found in one image or a pair, resolved, and followed from frame to frame.
+
+use nalgebra::{Matrix3, Matrix6, Vector3};
+
+use super::attitude::{IncludedAngle, corner_attitudes};
+use super::consensus::{agreement, apart, fits, renamed, weight};
+use super::detector::{CornerDetector, CornerScratch};
+use super::fusion::fuse_rays;
+use super::guided::Expected;
+use super::options::CornerMethod;
+use super::position::{Sighting, triangulate};
+use super::prior::{AttitudePrior, VerticalSense};
+use super::resolve::{Alignment, View, resolve};
+use super::vertex::CornerFeature;
+use crate::error::{Error, Result};
+use crate::geometry::RigidMotion;
+use crate::image::{ColorView, ImageView};
+
+/// What is known, and how far frames are apart.
+#[derive(Debug, Clone, PartialEq)]
+pub struct EstimatorOptions {
+    /// The angle between the horizontal edges. Default a right one.
+    pub angle: IncludedAngle,
+    /// Whether the edges x, y, z, clockwise in the image, are a right-handed triple: true for outer corners, false for inner
+    /// ones, none where both are possible. Default none; the coloured cuboid's is an outer one.
+    pub right_handed: Option<bool>,
+    /// The direction down in the left camera's frame, before anything was seen; none where nothing is known. Default none.
+    pub down: Option<Vector3<f64>>,
+    /// Standard deviation of that direction, radians. Default 15 degrees.
+    pub down_sigma_rad: f64,
+    /// How far the camera may turn from one frame to the next, radians, as a standard deviation. Default 6 degrees.
+    pub turn_sigma_rad: f64,
+    /// Frames without a pose after which the last one is forgotten; 0 never follows. Default 10.
+    pub forget_after: u32,
+    /// How far attitudes of several features of one image may be apart, radians. Default 4 degrees.
+    pub agree_max_rad: f64,
+    /// How far the attitudes of one corner in both images may be apart, and the rays from the fused pose, in standard
+    /// deviations of the covariances as they are: root mean square per degree of freedom. Default 5.
+    pub misfit_max: f64,
+    /// The least and the largest distance of a vertex, metres. Default 0.05 and 100.
+    pub distance_m: [f64; 2],
+    /// Least probability of the best hypothesis; below it none is chosen. Default 0.9.
+    pub probability_min: f64,
+}
+
+impl Default for EstimatorOptions {
+    fn default() -> Self {
+        Self {
+            angle: IncludedAngle::RIGHT,
+            right_handed: None,
+            down: None,
+            down_sigma_rad: 15f64.to_radians(),
+            turn_sigma_rad: 6f64.to_radians(),
+            forget_after: 10,
+            agree_max_rad: 4f64.to_radians(),
+            misfit_max: 5.0,
+            distance_m: [0.05, 100.0],
+            probability_min: 0.9,
+        }
+    }
+}
+
+impl EstimatorOptions {
+    /// Checks every field.
+    ///
+    /// # Errors
+    /// [`Error::InvalidOption`] or [`Error::InvalidArgument`] with the name of the field.
+    pub fn validate(&self) -> Result<()> {
+        self.angle.validate()?;
+        let positive = |name, value: f64, expected| {
+            if value > 0.0 && value.is_finite() { Ok(()) } else { Err(Error::option(name, value, expected)) }
+        };
+        if let Some(down) = &self.down
+            && !((down.norm() - 1.0).abs() < 1e-6)
+        {
+            return Err(Error::argument("down", format!("a vector of length {}", down.norm()), "a unit vector"));
+        }
+        positive("down_sigma_rad", self.down_sigma_rad, "a positive angle")?;
+        positive("turn_sigma_rad", self.turn_sigma_rad, "a positive angle")?;
+        positive("agree_max_rad", self.agree_max_rad, "a positive angle")?;
+        positive("misfit_max", self.misfit_max, "a positive number of standard deviations")?;
+        let [nearest, farthest] = self.distance_m;
+        if !(nearest > 0.0 && farthest > nearest) {
+            return Err(Error::option(
+                "distance_m",
+                format!("[{nearest}, {farthest}]"),
+                "0 < nearest < farthest, metres",
+            ));
+        }
+        if !(0.0..=1.0).contains(&self.probability_min) {
+            return Err(Error::option("probability_min", self.probability_min, "a probability from 0 to 1"));
+        }
+        Ok(())
+    }
+}
+
+/// An image of the kind that the detector wants.
+#[derive(Debug, Clone, Copy)]
+pub enum Frame<'a> {
+    /// For the general front end.
+    Gray(ImageView<'a>),
+    /// For the coloured cuboid.
+    Color(ColorView<'a>),
+}
+
+/// Why there is a pose, or none.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Verdict {
+    /// One hypothesis stands out.
+    Found,
+    /// No corner in the left image.
+    NoneLeft,
+    /// No corner in the right image.
+    NoneRight,
+    /// No corner of the one image fits one of the other, or none fits the included angle.
+    NoneFits,
+    /// There are several hypotheses and nothing to choose by.
+    Ambiguous,
+}
+
+impl Verdict {
+    /// In words.
+    pub fn reason(self) -> &'static str {
+        match self {
+            Self::Found => "",
+            Self::NoneLeft => "no corner in the left image",
+            Self::NoneRight => "no corner in the right image",
+            Self::NoneFits => "no corner that fits",
+            Self::Ambiguous => "several hypotheses and nothing to choose by",
+        }
+    }
+}
+
+/// One explanation of what is seen.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Hypothesis {
+    /// The rotation from the object's frame to the left camera's.
+    pub camera_from_object: Matrix3<f64>,
+    /// The directions of the edges x, y, z of the corner away from its vertex, left camera's frame, unit vectors.
+    pub edges: [Vector3<f64>; 3],
+    /// The vertex in the left camera's frame, metres; none from one image.
+    pub vertex_m: Option<Vector3<f64>>,
+    /// Covariance of the attitude's rotation vector (left camera's frame, radians) and of the vertex (metres; zero from one
+    /// image).
+    pub covariance: Matrix6<f64>,
+    /// The probability that it is this one, in [0, 1].
+    pub probability: f64,
+    /// Whether the edges x, y, z are a right-handed triple.
+    pub right_handed: bool,
+    /// Root mean square misfit per degree of freedom, in standard deviations of the rays; 0 for a single feature.
+    pub misfit: f64,
+}
+
+impl Hypothesis {
+    /// Where the left camera is in the object's frame, metres.
+    pub fn camera_in_object_m(&self) -> Option<Vector3<f64>> {
+        self.vertex_m.map(|vertex| -(self.camera_from_object.transpose() * vertex))
+    }
+}
+
+/// What one frame tells.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CornerEstimate {
+    /// All hypotheses, the likeliest first.
+    pub hypotheses: Vec<Hypothesis>,
+    /// Why there is a pose, or none.
+    pub verdict: Verdict,
+    /// The corners of the left and of the right image.
+    pub features: [Vec<CornerFeature>; 2],
+    /// Which features of the left image the pose is from, the one that stands for the object first.
+    pub chosen_left: Vec<usize>,
+    /// Which feature of the right image it is from.
+    pub chosen_right: Option<usize>,
+    /// Whether the pose before was a prior.
+    pub followed: bool,
+    /// The number of the corner that is the object: it grows where another corner than before has become the object.
+    pub object: u32,
+}
+
+impl CornerEstimate {
+    /// The pose, if one stands out.
+    pub fn pose(&self) -> Option<&Hypothesis> {
+        self.hypotheses.first().filter(|_| self.verdict == Verdict::Found)
+    }
+}
+
+/// The last pose, the corners it is from, and how many frames ago it was.
+#[derive(Debug, Clone, PartialEq)]
+struct Track {
+    pose: Hypothesis,
+    corners: [Vec<CornerFeature>; 2],
+    age: u32,
+    object: u32,
+}
+
+impl Track {
+    /// Whether a pose is one of the same corner: from one image any corner of the same upright world is.
+    fn is_of(&self, pose: &Hypothesis) -> bool {
+        match (self.pose.vertex_m, pose.vertex_m) {
+            (Some(last), Some(vertex)) => (vertex - last).norm() <= MOVED * last.norm(),
+            _ => true,
+        }
+    }
+}
+
+/// Finds the pose of a corner in the frames of a sequence, by one camera (attitude alone) or by two.
+#[derive(Debug, Clone)]
+pub struct CornerPoseEstimator {
+    left: CornerDetector,
+    right: Option<(CornerDetector, RigidMotion)>,
+    options: EstimatorOptions,
+    track: Option<Track>,
+    objects: u32,
+    scratch: [CornerScratch; 2],
+}
+
+impl CornerPoseEstimator {
+    /// With one camera or two; `left_from_right` is the right camera's pose in the left one's frame.
+    ///
+    /// # Errors
+    /// [`Error::InvalidOption`] or [`Error::InvalidArgument`] for options out of their domain and for two detectors of
+    /// different front ends.
+    pub fn new(
+        left: CornerDetector,
+        right: Option<(CornerDetector, RigidMotion)>,
+        options: EstimatorOptions,
+    ) -> Result<Self> {
+        options.validate()?;
+        if let Some((right, left_from_right)) = &right {
+            let names = [left.options().method.name(), right.options().method.name()];
+            if names[0] != names[1] {
+                return Err(Error::argument("right", names[1], format!("the method of left, {}", names[0])));
+            }
+            if left_from_right.translation_m.norm() <= 0.0 {
+                return Err(Error::argument("left_from_right", "no baseline", "two cameras at different places"));
+            }
+        }
+        let scratch = [left.scratch(), right.as_ref().map_or(left.scratch(), |(right, _)| right.scratch())];
+        Ok(Self { left, right, options, track: None, objects: 0, scratch })
+    }
+
+    /// The left or only camera's detector.
+    pub fn left(&self) -> &CornerDetector {
+        &self.left
+    }
+
+    /// The right camera's detector and its pose in the left one's frame.
+    pub fn right(&self) -> Option<&(CornerDetector, RigidMotion)> {
+        self.right.as_ref()
+    }
+
+    /// The options.
+    pub fn options(&self) -> &EstimatorOptions {
+        &self.options
+    }
+
+    /// Forgets what was seen.
+    pub fn reset(&mut self) {
+        self.track = None;
+    }
+
+    /// The direction of the vertical in the left camera's frame, from the last pose or from before.
+    fn vertical(&self) -> Option<Vector3<f64>> {
+        let last = self.track.as_ref().map(|track| track.pose.camera_from_object.column(1).into_owned());
+        last.or(self.options.down)
+    }
+
+    fn priors(&self, same_object: bool) -> Vec<AttitudePrior> {
+        let Some(track) = &self.track else {
+            let gravity = |down| AttitudePrior::Gravity {
+                down,
+                sigma_rad: self.options.down_sigma_rad,
+                sense: VerticalSense::Either,
+            };
+            return self.options.down.map(gravity).into_iter().collect();
+        };
+        let sigma_rad = self.options.turn_sigma_rad * f64::from(track.age).sqrt();
+        let rotation = track.pose.camera_from_object;
+        if same_object {
+            let covariance = Matrix3::from_diagonal_element(sigma_rad * sigma_rad);
+            return vec![AttitudePrior::Attitude { camera_from_object: rotation, covariance }];
+        }
+        vec![AttitudePrior::Gravity { down: rotation.column(1).into_owned(), sigma_rad, sense: VerticalSense::Either }]
+    }
+
+    /// What a frame tells: the image of the left or only camera, and that of the right one where there are two.
+    ///
+    /// # Errors
+    /// [`Error::InvalidArgument`] for images of another size or kind than the detectors', and for one image too many or few.
+    pub fn observe(&mut self, left: &Frame<'_>, right: Option<&Frame<'_>>) -> Result<CornerEstimate> {
+        if right.is_some() != self.right.is_some() {
+            let (got, expected) = if right.is_some() { ("an image", "none") } else { ("none", "an image") };
+            return Err(Error::argument("right image", got, format!("{expected}, as there are cameras")));
+        }
+        if let Some(track) = &mut self.track {
+            track.age += 1;
+        }
+        if self.track.as_ref().is_some_and(|track| track.age > self.options.forget_after) {
+            self.track = None;
+        }
+        let vertical = self.vertical();
+        let mut features = [Vec::new(), Vec::new()];
+        let followed = self.track.as_ref().map_or(&[][..], |track| &track.corners[..]);
+        let [of_left, of_right] = [0, 1].map(|side| followed.get(side).map_or(&[][..], Vec::as_slice));
+        detect(&self.left, left, vertical.as_ref(), of_left, &mut self.scratch[0], &mut features[0])?;
+        if let (Some((detector, left_from_right)), Some(right)) = (&self.right, right) {
+            let vertical = vertical.map(|vertical| left_from_right.rotation.transpose() * vertical);
+            detect(detector, right, vertical.as_ref(), of_right, &mut self.scratch[1], &mut features[1])?;
+        }
+        let mut estimate = CornerEstimate {
+            hypotheses: Vec::new(),
+            verdict: Verdict::NoneFits,
+            features,
+            chosen_left: Vec::new(),
+            chosen_right: None,
+            followed: self.track.is_some(),
+            object: self.objects,
+        };
+        let attitude = if self.right.is_some() { self.attitude(&estimate.features)? } else { None };
+        if let Some(attitude) = &attitude {
+            self.add_completed(left, right, attitude, &mut estimate.features);
+            self.add_transferred([left, right.unwrap_or(left)], attitude, &mut estimate.features)?;
+        }
+        if estimate.features[0].is_empty() {
+            estimate.verdict = Verdict::NoneLeft;
+        } else if right.is_some() && estimate.features[1].is_empty() {
+            estimate.verdict = Verdict::NoneRight;
+        } else if self.right.is_some() {
+            self.by_pair(attitude.as_ref(), &mut estimate)?;
+        } else {
+            self.by_one(&mut estimate)?;
+        }
+        if let Some(best) = estimate.hypotheses.first() {
+            let decided = best.probability >= self.options.probability_min;
+            estimate.verdict = if decided { Verdict::Found } else { Verdict::Ambiguous };
+        }
+        if let Some(pose) = estimate.hypotheses.first().filter(|_| estimate.verdict == Verdict::Found) {
+            if !self.track.as_ref().is_some_and(|track| track.is_of(pose)) {
+                self.objects += 1;
+                estimate.object = self.objects;
+            }
+            let turned = self.right.as_ref().map_or(Matrix3::identity(), |(_, motion)| motion.rotation.transpose());
+            let parallel = |side: usize, attitude: Matrix3<f64>| -> Vec<CornerFeature> {
+                let fits = |corner: &&CornerFeature| fits(corner, &attitude, self.options.agree_max_rad);
+                let mut out: Vec<CornerFeature> = Vec::new();
+                for corner in estimate.features[side].iter().filter(fits) {
+                    // The longest rays of each vertex.
+                    let apart_rad = |other: &CornerFeature| other.vertex().angle(&corner.vertex());
+                    match out.iter_mut().find(|other| apart_rad(other) < SAME_VERTEX_RAD) {
+                        Some(other) if weight(other) < weight(corner) => *other = *corner,
+                        Some(_) => {}
+                        None => out.push(*corner),
+                    }
+                }
+                out
+            };
+            let corners = [parallel(0, pose.camera_from_object), parallel(1, turned * pose.camera_from_object)];
+            self.track = Some(Track { pose: *pose, corners, age: 0, object: estimate.object });
+        }
+        Ok(estimate)
+    }
+
+    /// The attitude by which corners are completed: that of the frame before, or the likeliest that one image's corners agree
+    /// on, with their edges at right angles.
+    fn attitude(&self, features: &[Vec<CornerFeature>; 2]) -> Result<Option<Matrix3<f64>>> {
+        if self.is_one_object() || self.options.angle != IncludedAngle::RIGHT {
+            return Ok(None);
+        }
+        let priors = self.priors(false);
+        let turned = self.right.as_ref().map_or(Matrix3::identity(), |(_, motion)| motion.rotation);
+        for (features, rotation) in features.iter().zip([Matrix3::identity(), turned]) {
+            let priors = if rotation == Matrix3::identity() { &priors[..] } else { &[] };
+            let Some(agreed) = agreement(features, &self.options.angle, self.options.agree_max_rad, priors)? else {
+                continue;
+            };
+            let view = |attitudes| View { attitudes, common_from_camera: rotation };
+            let views: Vec<View<'_>> = agreed.attitudes.iter().map(view).collect();
+            let resolved = resolve(&views, Alignment::Manhattan, self.right_handed(), &self.priors(false))?;
+            if let Some(best) = resolved.first() {
+                return Ok(Some(best.common_from_object));
+            }
+        }
+        Ok(self.track.as_ref().map(|track| track.pose.camera_from_object))
+    }
+
+    /// Adds the corners of which two edges were found and the third is known from an attitude in the left camera's frame.
+    fn add_completed(
+        &mut self,
+        left: &Frame<'_>,
+        right: Option<&Frame<'_>>,
+        attitude: &Matrix3<f64>,
+        features: &mut [Vec<CornerFeature>; 2],
+    ) {
+        // The vertical is the axis nearest to what is known of it, so that edges are named as those found before.
+        let attitude = self.vertical().map_or(*attitude, |vertical| upright(attitude, &vertical));
+        let most_rad = self.options.agree_max_rad;
+        let mut found = Vec::new();
+        let mut add =
+            |detector: &CornerDetector, frame: &Frame<'_>, own: Matrix3<f64>, scratch: &mut _, side: usize| {
+                if let Frame::Gray(image) = frame {
+                    found.clear();
+                    detector.complete(image, &own, scratch, &mut found);
+                    features[side].extend(found.iter().filter(|corner| fits(corner, &own, most_rad)));
+                }
+            };
+        add(&self.left, left, attitude, &mut self.scratch[0], 0);
+        if let (Some((detector, motion)), Some(right)) = (&self.right, right) {
+            add(detector, right, motion.rotation.transpose() * attitude, &mut self.scratch[1], 1);
+        }
+    }
+
+    /// Adds the corners of either image to those of the other one where they are seen there: each is looked for along its
+    /// epipolar line, near the distance of the last pose where there is one.
+    fn add_transferred(
+        &mut self,
+        frames: [&Frame<'_>; 2],
+        attitude: &Matrix3<f64>,
+        features: &mut [Vec<CornerFeature>; 2],
+    ) -> Result<()> {
+        let Some((detector, left_from_right)) = &self.right else { return Ok(()) };
+        let right_from_left = left_from_right.inverse();
+        let detectors = [&self.left, detector];
+        let attitudes = [*attitude, right_from_left.rotation * attitude];
+        let (angle, most_rad) = (self.options.angle, self.options.agree_max_rad);
+        let mut found: [Vec<CornerFeature>; 2] = [Vec::new(), Vec::new()];
+        for (own, other, other_from_own) in [(0, 1, &right_from_left), (1, 0, left_from_right)] {
+            let Frame::Gray(image) = frames[other] else { continue };
+            let mut order: Vec<&CornerFeature> = features[own].iter().collect();
+            order.sort_by(|a, b| weight(b).total_cmp(&weight(a)));
+            for corner in order.into_iter().take(TRANSFERRED_MAX) {
+                let admitted = corner_attitudes(corner, &angle)?;
+                let near = admitted.iter().find(|admitted| {
+                    let renamed = renamed(&admitted.camera_from_object, &attitudes[own]);
+                    apart(&renamed, &attitudes[own]) <= most_rad
+                });
+                let Some(near) = near else { continue };
+                let mut best: Option<CornerFeature> = None;
+                for distance_m in self.distances(detectors[other], &corner.vertex(), other_from_own) {
+                    let expected = Expected::transferred(corner, &near.edges, distance_m, other_from_own);
+                    let seen = expected.and_then(|expected| {
+                        detectors[other].find_near(image, &expected, Some(EPIPOLAR_STEP_PX), &mut self.scratch[other])
+                    });
+                    let Some(seen) = seen.filter(|seen| fits(seen, &attitudes[other], most_rad)) else { continue };
+                    if best.as_ref().is_none_or(|best| weight(&seen) > weight(best)) {
+                        best = Some(seen);
+                    }
+                }
+                found[other].extend(best);
+            }
+        }
+        for (features, found) in features.iter_mut().zip(found) {
+            features.extend(found);
+        }
+        Ok(())
+    }
+
+    /// Distances of a point along a bearing of one camera, so that the other one sees them a step apart; only those near that of
+    /// the last pose, where there is one.
+    fn distances(&self, other: &CornerDetector, bearing: &Vector3<f64>, other_from_own: &RigidMotion) -> Vec<f64> {
+        let [nearest, farthest] = self.options.distance_m;
+        let last = self.track.as_ref().and_then(|track| track.pose.vertex_m).map(|vertex| vertex.norm());
+        let (near, far) = last.map_or((nearest, farthest), |last| (last * (1.0 - NEAR_LAST), last * (1.0 + NEAR_LAST)));
+        let mut out = Vec::new();
+        let mut before: Option<nalgebra::Vector2<f64>> = None;
+        for step in 0..=DISTANCES {
+            let share = f64::from(step) / f64::from(DISTANCES);
+            let distance_m = 1.0 / (1.0 / far + share * (1.0 / near - 1.0 / far));
+            let Some(pixel) = other.camera().project(&other_from_own.point(&(bearing * distance_m))) else { continue };
+            let moved = before.is_none_or(|before| (pixel - before).norm() >= EPIPOLAR_STEP_PX);
+            if moved && other.camera().contains(&pixel) {
+                out.push(distance_m);
+                before = Some(pixel);
+            }
+        }
+        out
+    }
+
+    /// Whether edges and object are the same from frame to frame, as those of the coloured cuboid are.
+    fn is_one_object(&self) -> bool {
+        matches!(self.left.options().method, CornerMethod::Coloured(_))
+    }
+
+    fn right_handed(&self) -> Option<bool> {
+        self.options.right_handed.or(self.is_one_object().then_some(true))
+    }
+
+    /// Attitudes from one image: of all features that agree with one another.
+    fn by_one(&self, estimate: &mut CornerEstimate) -> Result<()> {
+        let features = &estimate.features[0];
+        let priors = self.priors(self.is_one_object());
+        let Some(agreed) = agreement(features, &self.options.angle, self.options.agree_max_rad, &priors)? else {
+            return Ok(());
+        };
+        let view = |attitudes| View { attitudes, common_from_camera: Matrix3::identity() };
+        let views: Vec<View<'_>> = agreed.attitudes.iter().map(view).collect();
+        let alignment = if views.len() > 1 { Alignment::Manhattan } else { Alignment::Same };
+        let resolved = resolve(&views, alignment, self.right_handed(), &priors)?;
+        estimate.hypotheses = resolved
+            .iter()
+            .filter_map(|resolved| {
+                let chosen = agreed.attitudes.first()?.get(*resolved.choice.first()?)?;
+                let mut covariance = Matrix6::zeros();
+                covariance.fixed_view_mut::<3, 3>(0, 0).copy_from(&resolved.covariance);
+                Some(Hypothesis {
+                    camera_from_object: self.named(resolved.common_from_object),
+                    edges: chosen.edges,
+                    vertex_m: None,
+                    covariance,
+                    probability: resolved.probability,
+                    right_handed: chosen.is_right_handed(),
+                    misfit: (resolved.chi_square / (3 * (views.len() - 1)).max(1) as f64).sqrt(),
+                })
+            })
+            .collect();
+        estimate.chosen_left = agreed.members;
+        Ok(())
+    }
+
+    /// The attitude with its edges named as they were in the frame before.
+    fn named(&self, attitude: Matrix3<f64>) -> Matrix3<f64> {
+        match &self.track {
+            Some(track) if !self.is_one_object() && self.options.angle == IncludedAngle::RIGHT => {
+                renamed(&attitude, &track.pose.camera_from_object)
+            }
+            _ => attitude,
+        }
+    }
+
+    /// Every pose that the rays of one corner in both images admit, the likeliest first. The attitudes of either image start the
+    /// fit to all six rays, so that a view that alone says little (two rays in line) does no harm.
+    fn pair_poses(
+        &self,
+        [left, right]: [&CornerFeature; 2],
+        left_from_right: &RigidMotion,
+        priors: &[AttitudePrior],
+    ) -> Result<Vec<Hypothesis>> {
+        let cameras = [(left, RigidMotion::identity()), (right, left_from_right.inverse())];
+        let sighting = |corner: &CornerFeature, rig_from_camera| Sighting {
+            bearing: corner.vertex(),
+            covariance: corner.vertex_covariance(),
+            rig_from_camera,
+        };
+        let seen = [sighting(left, RigidMotion::identity()), sighting(right, *left_from_right)];
+        let Some(vertex) = triangulate(&seen) else { return Ok(Vec::new()) };
+        let mut found: Vec<(f64, Hypothesis)> = Vec::new();
+        for (corner, rotation) in [(left, Matrix3::identity()), (right, left_from_right.rotation)] {
+            for own in corner_attitudes(corner, &self.options.angle)?.iter() {
+                let right_handed = own.is_right_handed();
+                if self.right_handed().is_some_and(|wanted| wanted != right_handed) {
+                    continue;
+                }
+                let (start, side) = (rotation * own.camera_from_object, if right_handed { 1.0 } else { -1.0 });
+                let Some(fused) = fuse_rays(&cameras, &self.options.angle, side, &start, &vertex.point_m) else {
+                    continue;
+                };
+                let known = |(_, other): &(f64, Hypothesis)| {
+                    apart(&other.camera_from_object, &fused.rig_from_object) < SAME_POSE_RAD
+                };
+                if found.iter().any(known) {
+                    continue;
+                }
+                let spread = fused.covariance.fixed_view::<3, 3>(0, 0).into_owned();
+                let prior: f64 = priors.iter().map(|p| p.ln_likelihood(&fused.rig_from_object, &spread)).sum();
+                // Real edges miss by more than their covariances say; the likelihoods allow for as much as the limit.
+                let scale = (0.25 * self.options.misfit_max).max(1.0).powi(2);
+                let (sin, cos) = self.options.angle.gamma_rad.sin_cos();
+                let edges = [Vector3::x(), Vector3::y(), Vector3::new(cos, 0.0, side * sin)];
+                let pose = Hypothesis {
+                    camera_from_object: fused.rig_from_object,
+                    edges: edges.map(|edge| fused.rig_from_object * edge),
+                    vertex_m: Some(fused.vertex_m),
+                    covariance: fused.covariance,
+                    probability: 0.0,
+                    right_handed,
+                    misfit: (fused.chi_square / 6.0).sqrt(),
+                };
+                found.push((prior - 0.5 * fused.chi_square / scale, pose));
+            }
+        }
+        found.sort_by(|a, b| b.0.total_cmp(&a.0));
+        let best = found.first().map_or(0.0, |(most, _)| *most);
+        let total: f64 = found.iter().map(|(ln, _)| (ln - best).exp()).sum();
+        let named = |(ln, pose): (f64, Hypothesis)| Hypothesis {
+            camera_from_object: self.named(pose.camera_from_object),
+            probability: (ln - best).exp() / total,
+            ..pose
+        };
+        Ok(found.into_iter().map(named).filter(|pose| pose.probability >= PROBABILITY_MIN).collect())
+    }
+
+    /// The poses of the pair of features, one of each image, that fits best; near the last vertex where there is one. Where
+    /// an `attitude` is known on which several corners agree, pairs that do not are left out.
+    fn by_pair(&self, attitude: Option<&Matrix3<f64>>, estimate: &mut CornerEstimate) -> Result<()> {
+        let Some((_, left_from_right)) = &self.right else { return Ok(()) };
+        let priors = self.priors(self.is_one_object());
+        let [nearest, farthest] = self.options.distance_m;
+        let mut best: Option<(f64, Vec<Hypothesis>, usize, usize)> = None;
+        for (i, left) in estimate.features[0].iter().enumerate() {
+            for (j, right) in estimate.features[1].iter().enumerate() {
+                let poses = self.pair_poses([left, right], left_from_right, &priors)?;
+                let Some((pose, vertex)) = poses.first().and_then(|pose| Some((pose, pose.vertex_m?))) else {
+                    continue;
+                };
+                let misfit = pose.misfit;
+                let agrees = |attitude: &Matrix3<f64>| {
+                    let own = renamed(&pose.camera_from_object, attitude);
+                    apart(&own, attitude) <= self.options.agree_max_rad
+                };
+                if attitude.is_some_and(|attitude| !agrees(attitude)) {
+                    continue;
+                }
+                if misfit > self.options.misfit_max || !(nearest..=farthest).contains(&vertex.norm()) {
+                    continue;
+                }
+                let mut score = weight(left).min(weight(right)) / (1.0 + misfit * misfit);
+                if let Some(last) = self.track.as_ref().and_then(|track| track.pose.vertex_m) {
+                    // The same corner is near where it was.
+                    let moved = (vertex - last).norm() / last.norm();
+                    score /= 1.0 + (moved / MOVED).powi(2);
+                }
+                if let Some(track) = &self.track {
+                    let turned = apart(&pose.camera_from_object, &track.pose.camera_from_object);
+                    score /= 1.0 + (turned / self.options.turn_sigma_rad).powi(2);
+                }
+                if best.as_ref().is_none_or(|(most, ..)| score > *most) {
+                    best = Some((score, poses, i, j));
+                }
+            }
+        }
+        if let Some((_, poses, i, j)) = best {
+            estimate.hypotheses = poses;
+            (estimate.chosen_left, estimate.chosen_right) = (vec![i], Some(j));
+        }
+        Ok(())
+    }
+}
+
+/// The same axes with the one that is nearest to a vertical as the second.
+fn upright(attitude: &Matrix3<f64>, vertical: &Vector3<f64>) -> Matrix3<f64> {
+    let nearest = attitude.tr_mul(vertical).abs().imax();
+    let axis = |k: usize| attitude.column((nearest + k) % 3).into_owned();
+    Matrix3::from_columns(&[axis(2), axis(0), axis(1)])
+}
+
+/// Most corners of the left image that are looked for in the right one, those with the longest rays.
+const TRANSFERRED_MAX: usize = 8;
+
+/// How far apart attitudes of different hypotheses are, radians: fits from two starts end this close.
+const SAME_POSE_RAD: f64 = 0.035;
+
+/// The least probability of a hypothesis that is returned.
+const PROBABILITY_MIN: f64 = 1e-9;
+
+/// Distances that are tried before those are dropped that are less than a step apart.
+const DISTANCES: u32 = 1000;
+
+/// How far from the last vertex' distance other corners may be, as a share of it.
+const NEAR_LAST: f64 = 0.35;
+
+/// How far apart vertices of different corners are, radians.
+const SAME_VERTEX_RAD: f64 = 0.01;
+
+/// How far apart the places are at which a corner is looked for along its epipolar line, in pixels.
+const EPIPOLAR_STEP_PX: f64 = 4.0;
+
+/// The share of its distance by which a vertex moves in the camera's frame from one frame to the next.
+const MOVED: f64 = 0.1;
+
+/// The corners of an image: those that are near where they were, and those that are found anew.
+fn detect(
+    detector: &CornerDetector,
+    frame: &Frame<'_>,
+    vertical: Option<&Vector3<f64>>,
+    followed: &[CornerFeature],
+    scratch: &mut CornerScratch,
+    out: &mut Vec<CornerFeature>,
+) -> Result<()> {
+    match frame {
+        Frame::Gray(image) => {
+            detector.detect_general(image, vertical, scratch, out)?;
+            let again =
+                followed.iter().filter_map(|last| detector.find_near(image, &Expected::of(last), None, scratch));
+            out.extend(again);
+            Ok(())
+        }
+        Frame::Color(image) => {
+            out.extend(detector.detect_coloured(image, None, scratch)?);
+            Ok(())
+        }
+    }
+}

@@ -1,0 +1,126 @@
+//! The pose of a corner before a pair of cameras: attitudes of both, resolved; the vertex triangulated; all rays fused.
+
+use nalgebra::{Matrix3, Matrix6, SMatrix, Vector3};
+
+use super::attitude::{CornerAttitude, IncludedAngle, corner_attitudes};
+use super::fusion::fuse_rays;
+use super::position::{Sighting, triangulate};
+use super::prior::AttitudePrior;
+use super::resolve::{Alignment, View, resolve};
+use super::standard::CornerCase;
+use super::vertex::CornerFeature;
+use crate::error::Result;
+use crate::geometry::RigidMotion;
+
+/// What is known of a corner before it is looked at.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CornerOptions {
+    /// The angle between the horizontal edges.
+    pub angle: IncludedAngle,
+    /// Whether the edges x, y, z are a right-handed triple, where the object is known; that tells the interpretations apart.
+    pub right_handed: Option<bool>,
+    /// Knowledge of the attitude, in the left camera's frame.
+    pub priors: Vec<AttitudePrior>,
+    /// Whether all six rays are fused by least squares, which reaches the Cramer-Rao bound; else the attitudes' mean by
+    /// their covariances and the triangulated vertex stand as they are.
+    pub fuse: bool,
+}
+
+impl Default for CornerOptions {
+    fn default() -> Self {
+        Self { angle: IncludedAngle::RIGHT, right_handed: None, priors: Vec::new(), fuse: true }
+    }
+}
+
+/// One pose of a corner before a pair of cameras.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct CornerPose {
+    /// The rotation from the object's frame to the left camera's; see
+    /// [`CornerAttitude::camera_from_object`](super::CornerAttitude).
+    pub camera_from_object: Matrix3<f64>,
+    /// The vertex, which is the object's origin, in the left camera's frame, metres.
+    pub vertex_m: Vector3<f64>,
+    /// Covariance of the attitude's rotation vector (left camera's frame, radians) and of the vertex (metres).
+    pub covariance: Matrix6<f64>,
+    /// The probability that it is this pose and none of the others that the rays admit, in [0, 1].
+    pub probability: f64,
+    /// Whether it is the second of the two interpretations (fig. 3c) in the left image.
+    pub mirrored: bool,
+    /// How the edges of the imaginary box stand to the left camera's line of sight.
+    pub case: CornerCase,
+    /// Whether the edges x, y, z are a right-handed triple.
+    pub right_handed: bool,
+    /// The squared misses of the rays, each by its covariance: chi-square of six degrees of freedom.
+    pub chi_square: f64,
+    /// Whether all six rays were fused; where not, the covariances between attitude and vertex are left out.
+    pub fused: bool,
+}
+
+impl CornerPose {
+    /// Where the left camera is in the object's frame, `-R^T P`, metres.
+    pub fn camera_in_object_m(&self) -> Vector3<f64> {
+        -(self.camera_from_object.transpose() * self.vertex_m)
+    }
+
+    /// The covariance of [`camera_in_object_m`](Self::camera_in_object_m), square metres.
+    pub fn camera_in_object_covariance_m2(&self) -> Matrix3<f64> {
+        let back = self.camera_from_object.transpose();
+        let mut by_pose = SMatrix::<f64, 3, 6>::zeros();
+        by_pose.fixed_view_mut::<3, 3>(0, 0).copy_from(&(back * -self.vertex_m.cross_matrix()));
+        by_pose.fixed_view_mut::<3, 3>(0, 3).copy_from(&-back);
+        by_pose * self.covariance * by_pose.transpose()
+    }
+}
+
+/// Every pose that explains the features of both cameras, the likeliest first; their probabilities add up to 1.
+///
+/// Empty where either feature is no corner of that angle (or hand), and where the vertex is before neither camera.
+///
+/// # Errors
+/// [`Error::InvalidArgument`](crate::Error::InvalidArgument) for an included angle, priors or a mounting that are none.
+pub fn corner_poses(
+    left: &CornerFeature,
+    right: &CornerFeature,
+    left_from_right: &RigidMotion,
+    options: &CornerOptions,
+) -> Result<Vec<CornerPose>> {
+    let of_left = corner_attitudes(left, &options.angle)?;
+    let of_right = corner_attitudes(right, &options.angle)?;
+    let views = [
+        View { attitudes: &of_left, common_from_camera: Matrix3::identity() },
+        View { attitudes: &of_right, common_from_camera: left_from_right.rotation },
+    ];
+    let resolved = resolve(&views, Alignment::Same, options.right_handed, &options.priors)?;
+    let sighting = |feature: &CornerFeature, rig_from_camera| Sighting {
+        bearing: feature.vertex(),
+        covariance: feature.vertex_covariance(),
+        rig_from_camera,
+    };
+    let Some(vertex) = triangulate(&[sighting(left, RigidMotion::identity()), sighting(right, *left_from_right)])
+    else {
+        return Ok(Vec::new());
+    };
+    let cameras = [(left, RigidMotion::identity()), (right, left_from_right.inverse())];
+    let poses = resolved.iter().filter_map(|resolved| {
+        let chosen: &CornerAttitude = of_left.get(*resolved.choice.first()?)?;
+        let side = if chosen.is_right_handed() { 1.0 } else { -1.0 };
+        let start = &resolved.common_from_object;
+        let fused = if options.fuse { fuse_rays(&cameras, &options.angle, side, start, &vertex.point_m) } else { None };
+        let mut apart = Matrix6::zeros();
+        apart.fixed_view_mut::<3, 3>(0, 0).copy_from(&resolved.covariance);
+        apart.fixed_view_mut::<3, 3>(3, 3).copy_from(&vertex.covariance_m2);
+        let chi_square = resolved.chi_square + vertex.chi_square + left.chi_square() + right.chi_square();
+        Some(CornerPose {
+            camera_from_object: fused.map_or(*start, |fused| fused.rig_from_object),
+            vertex_m: fused.map_or(vertex.point_m, |fused| fused.vertex_m),
+            covariance: fused.map_or(apart, |fused| fused.covariance),
+            probability: resolved.probability,
+            mirrored: chosen.mirrored,
+            case: chosen.case,
+            right_handed: chosen.is_right_handed(),
+            chi_square: fused.map_or(chi_square, |fused| fused.chi_square),
+            fused: fused.is_some(),
+        })
+    });
+    Ok(poses.collect())
+}

@@ -1,0 +1,198 @@
+//! Line segments: ridge pixels grown together where their gradients agree, and split until each lies on one great circle.
+
+use nalgebra::{Matrix3, Vector2, Vector3};
+
+use super::options::GeneralOptions;
+use crate::camera::Camera;
+use crate::edges::{EdgeOptions, Mask, Region, RidgeDetector, RidgePixels};
+use crate::error::Result;
+use crate::geometry::fit_great_circle;
+use crate::image::ImageView;
+
+/// Cosine of the largest angle between a pixel's gradient and that of the pixels it joins: 22.5 degrees.
+const AGREEING_COS: f32 = 0.9239;
+
+/// How far from a pixel its followers are looked for, in pixels.
+const REACH: usize = 2;
+
+/// Most segments of an image, the longest ones.
+const SEGMENTS_MAX: usize = 160;
+
+/// A straight piece of an edge.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Segment {
+    /// Unit normal of its great circle, camera frame.
+    pub normal: Vector3<f64>,
+    /// Unit bearings of its ends, on the circle: from the first to the second is a positive turn about the normal.
+    pub ends: [Vector3<f64>; 2],
+    /// Pixels of its ends.
+    pub ends_px: [Vector2<f64>; 2],
+    /// Distance of its ends in pixels.
+    pub length_px: f64,
+}
+
+/// The pixels that are looked at, which are the same for every image of a camera.
+#[derive(Debug, Clone)]
+pub(super) struct SegmentFinder {
+    region: Region,
+    edges: EdgeOptions,
+}
+
+/// Memory for one thread.
+#[derive(Debug, Clone)]
+pub(super) struct SegmentScratch {
+    detector: RidgeDetector,
+    ridge: RidgePixels,
+    /// One above the place among the ridge pixels, for each pixel of the image; 0 elsewhere and once taken.
+    owner: Vec<u32>,
+    order: Vec<u32>,
+    members: Vec<u32>,
+    points: Vec<(Vector2<f64>, Vector3<f64>)>,
+    pub(super) segments: Vec<Segment>,
+}
+
+impl SegmentFinder {
+    /// Tables for a camera.
+    pub(super) fn new(camera: &Camera, options: &GeneralOptions, mask: Option<&Mask>) -> Result<Self> {
+        let edges = EdgeOptions {
+            gradient_min: options.gradient_min,
+            smoothing_px: options.smoothing_px,
+            elevation_min_rad: -std::f64::consts::FRAC_PI_2,
+            elevation_max_rad: std::f64::consts::FRAC_PI_2,
+            margin_px: options.margin_px.max(2.0),
+        };
+        Ok(Self { region: Region::new(camera, &Matrix3::identity(), &edges, mask)?, edges })
+    }
+
+    /// Memory for one thread.
+    pub(super) fn scratch(&self) -> SegmentScratch {
+        SegmentScratch {
+            detector: RidgeDetector::new(&self.region, &self.edges),
+            ridge: RidgePixels::default(),
+            owner: Vec::new(),
+            order: Vec::new(),
+            members: Vec::new(),
+            points: Vec::new(),
+            segments: Vec::new(),
+        }
+    }
+
+    /// Fills `scratch.segments`, the longest first.
+    pub(super) fn find(
+        &self,
+        camera: &Camera,
+        image: &ImageView<'_>,
+        options: &GeneralOptions,
+        scratch: &mut SegmentScratch,
+    ) {
+        let SegmentScratch { detector, ridge, owner, order, members, points, segments } = scratch;
+        detector.detect(image, &self.region, self.edges.gradient_min, None, ridge);
+        let (slots, gx, gy) = (ridge.edges.slot(), ridge.edges.gx(), ridge.edges.gy());
+        let width = image.width();
+        owner.clear();
+        owner.resize(width * image.height(), 0);
+        let place = |i: usize| {
+            let (u, v) = self.region.place(slots[i] as usize);
+            (usize::from(u), usize::from(v))
+        };
+        for i in 0..slots.len() {
+            let (u, v) = place(i);
+            owner[v * width + u] = i as u32 + 1;
+        }
+        order.clear();
+        order.extend(0..slots.len() as u32);
+        let strength = |i: &u32| gx[*i as usize].powi(2) + gy[*i as usize].powi(2);
+        order.sort_unstable_by(|a, b| strength(b).total_cmp(&strength(a)).then(a.cmp(b)));
+        segments.clear();
+        for seed in order.iter() {
+            let (u, v) = place(*seed as usize);
+            if owner[v * width + u] == 0 {
+                continue;
+            }
+            owner[v * width + u] = 0;
+            members.clear();
+            members.push(*seed);
+            let unit = |i: usize| {
+                let length = gx[i].hypot(gy[i]);
+                [gx[i] / length, gy[i] / length]
+            };
+            let mut sum = unit(*seed as usize);
+            let mut next = 0;
+            while let Some(at) = members.get(next) {
+                next += 1;
+                let (u, v) = place(*at as usize);
+                // The region keeps more than the reach clear of the image's border.
+                for v in v - REACH..=v + REACH {
+                    let row = &mut owner[v * width..(v + 1) * width];
+                    for slot in &mut row[u - REACH..=u + REACH] {
+                        let Some(candidate) = slot.checked_sub(1) else { continue };
+                        let [x, y] = unit(candidate as usize);
+                        if x * sum[0] + y * sum[1] > AGREEING_COS * sum[0].hypot(sum[1]) {
+                            *slot = 0;
+                            sum = [sum[0] + x, sum[1] + y];
+                            members.push(candidate);
+                        }
+                    }
+                }
+            }
+            if (members.len() as f64) < 0.7 * options.segment_min_px {
+                continue;
+            }
+            points.clear();
+            points.extend(members.iter().filter_map(|i| {
+                let (i, (u, v)) = (*i as usize, place(*i as usize));
+                let shift = f64::from(ridge.shift_px()[i]);
+                let along_u = gx[i].abs() >= gy[i].abs();
+                let (du, dv) = if along_u { (shift, 0.0) } else { (0.0, shift) };
+                let pixel = Vector2::new(u as f64 + du, v as f64 + dv);
+                camera.unproject(&pixel).map(|bearing| (pixel, bearing))
+            }));
+            // Along the edge, which is across the mean gradient.
+            let along = Vector2::new(f64::from(-sum[1]), f64::from(sum[0]));
+            points.sort_unstable_by(|(a, _), (b, _)| a.dot(&along).total_cmp(&b.dot(&along)));
+            split(camera, points, options, segments);
+        }
+        segments.sort_unstable_by(|a, b| b.length_px.total_cmp(&a.length_px));
+        segments.truncate(SEGMENTS_MAX);
+    }
+}
+
+/// Appends the points as one segment, or the halves on both sides of the point that is farthest from the circle through
+/// the ends.
+fn split(
+    camera: &Camera,
+    points: &[(Vector2<f64>, Vector3<f64>)],
+    options: &GeneralOptions,
+    segments: &mut Vec<Segment>,
+) {
+    let (Some((first_px, first)), Some((last_px, last))) = (points.first(), points.last()) else { return };
+    let length_px = (last_px - first_px).norm();
+    if length_px < options.segment_min_px || (points.len() as f64) < 0.6 * length_px {
+        if points.len() < 8 || length_px < options.segment_min_px {
+            return;
+        }
+    }
+    let Some(chord) = first.cross(last).try_normalize(1e-9) else { return };
+    let px_per_rad = length_px / first.angle(last);
+    let farthest = points
+        .iter()
+        .enumerate()
+        .map(|(i, (_, bearing))| (i, chord.dot(bearing).abs() * px_per_rad))
+        .max_by(|a, b| a.1.total_cmp(&b.1));
+    let Some((at, distance)) = farthest else { return };
+    let fit = fit_great_circle(points.iter().map(|(_, bearing)| (*bearing, 1.0)));
+    let straight = fit.filter(|fit| {
+        let worst = points.iter().map(|(_, bearing)| fit.normal.dot(bearing).abs()).fold(0.0, f64::max);
+        worst * px_per_rad <= options.segment_threshold_px
+    });
+    if let Some(fit) = straight {
+        let normal = if fit.normal.dot(&chord) < 0.0 { -fit.normal } else { fit.normal };
+        let onto = |bearing: &Vector3<f64>| (bearing - normal * normal.dot(bearing)).normalize();
+        let ends = [onto(first), onto(last)];
+        let [Some(a), Some(b)] = ends.map(|end| camera.project(&end)) else { return };
+        segments.push(Segment { normal, ends, ends_px: [a, b], length_px });
+    } else if distance > 0.5 * options.segment_threshold_px && at > 0 && at + 1 < points.len() {
+        split(camera, &points[..=at], options, segments);
+        split(camera, &points[at..], options, segments);
+    }
+}

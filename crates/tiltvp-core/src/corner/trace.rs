@@ -1,0 +1,160 @@
+//! One ray followed through the image: places of its edge between pixels, and the great circle through them.
+
+use nalgebra::{Matrix2, Vector2, Vector3};
+
+use super::edge_place::{EdgePlace, SHOULDER, edge_place};
+use super::rays::FittedRay;
+use crate::camera::Camera;
+use crate::geometry::tangent_basis;
+use crate::robust::{Direction, Gate, Problem, RansacOptions, RansacScratch, Rows, ransac};
+
+/// Profiles along a ray that err together: neighbours share pixels and the edge's crookedness.
+const ERRING_TOGETHER: f64 = 4.0;
+
+/// The least standard deviation of one profile's place, in pixels, however well the profiles agree.
+const PLACE_SIGMA_MIN_PX: f64 = 0.05;
+
+/// Longest profile, in samples.
+const PROFILE_MAX: usize = 41;
+
+/// Where a ray is expected, and how far from there it is looked for.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Course {
+    /// Unit normal of the expected great circle.
+    pub(super) normal: Vector3<f64>,
+    /// Unit bearing of the vertex, on the circle.
+    pub(super) vertex: Vector3<f64>,
+    /// Angle from the vertex at which the ray is followed first, in radians.
+    pub(super) from_rad: f64,
+    /// Angle at which it ends.
+    pub(super) to_rad: f64,
+    /// Largest distance of the edge from the expected circle, in pixels.
+    pub(super) search_px: f64,
+    /// Least step across the edge, in the units of the signal.
+    pub(super) step_min: f64,
+    /// Largest distance of a profile's edge from the fitted circle, in pixels.
+    pub(super) threshold_px: f64,
+    /// What no profile tells: how far either end of a whole ray may be off, in pixels.
+    pub(super) ray_sigma_px: f64,
+}
+
+/// A place of the edge.
+#[derive(Debug, Clone, Copy)]
+struct Place {
+    along_rad: f64,
+    rad_per_px: f64,
+}
+
+/// A ray that was followed.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Traced {
+    pub(super) ray: FittedRay,
+    /// The share of the profiles that agree.
+    pub(super) share: f64,
+    /// Pixels per radian along the ray.
+    pub(super) px_per_rad: f64,
+}
+
+/// Memory of the fits.
+#[derive(Debug, Clone, Default)]
+pub(super) struct TraceScratch {
+    rows: Rows<f64>,
+    places: Vec<Place>,
+    weights: Vec<f32>,
+    ransac: RansacScratch,
+}
+
+/// Follows a ray from its vertex: at each pixel along it the `signal` (a function of the pixel `(u, v)`) is sampled across
+/// it, the edge is found between samples, and a great circle is fitted robustly. None if less than `support_min` agree.
+pub(super) fn trace(
+    camera: &Camera,
+    course: &Course,
+    support_min: usize,
+    signal: impl Fn(f64, f64) -> Option<f64>,
+    scratch: &mut TraceScratch,
+) -> Option<Traced> {
+    let TraceScratch { rows, places, weights, ransac: memory } = scratch;
+    rows.clear();
+    places.clear();
+    let along = course.normal.cross(&course.vertex).try_normalize(1e-9)?;
+    let half = (course.search_px.ceil() as usize + SHOULDER).min(PROFILE_MAX / 2);
+    let mut profile = [0.0; PROFILE_MAX];
+    let profile = &mut profile[..2 * half + 1];
+    let (mut angle, mut looked_at) = (course.from_rad, 0_usize);
+    while angle <= course.to_rad {
+        let (sin, cos) = angle.sin_cos();
+        let (bearing, onwards) = (course.vertex * cos + along * sin, along * cos - course.vertex * sin);
+        let Some((pixel, jacobian)) = camera.project_jacobian(&bearing) else { break };
+        let (forwards, sideways) = (jacobian * onwards, jacobian * course.normal);
+        let pace = forwards.norm();
+        if pace.is_nan() || pace <= 0.0 {
+            break;
+        }
+        let across = Vector2::new(-forwards.y, forwards.x) / pace;
+        let px_per_rad = sideways.dot(&across);
+        angle += 1.0 / pace;
+        looked_at += 1;
+        let mut inside = true;
+        for (i, value) in profile.iter_mut().enumerate() {
+            let place = pixel + across * (i as f64 - half as f64);
+            match signal(place.x, place.y) {
+                Some(level) => *value = level,
+                None => inside = false,
+            }
+        }
+        let found = if inside { edge_place(profile, course.search_px, course.step_min) } else { None };
+        let Some(EdgePlace { shift, .. }) = found else { continue };
+        // In the chart of the ray: x along the vertex, y along the ray, z the expected normal.
+        rows.push(cos, sin, shift / px_per_rad);
+        places.push(Place { along_rad: angle - 1.0 / pace, rad_per_px: 1.0 / px_per_rad.abs() });
+    }
+    if places.len() < support_min.max(2) {
+        return None;
+    }
+    let rad_per_px = places.iter().map(|place| place.rad_per_px).sum::<f64>() / places.len() as f64;
+    weights.clear();
+    weights.extend(places.iter().map(|place| (rad_per_px / place.rad_per_px).powi(2) as f32));
+    let threshold = course.threshold_px * rad_per_px;
+    let options = RansacOptions { max_trials: 60, ..RansacOptions::with_threshold(threshold) };
+    let problem = Direction::new(rows);
+    let report = ransac(&problem, &options, &Vector3::z(), weights, memory);
+    let refined = report.model?;
+    // The consensus set of a minimal sample is not that of the refit.
+    weights.iter_mut().zip(places.iter()).for_each(|(w, p)| *w = (rad_per_px / p.rad_per_px).powi(2) as f32);
+    let summary = problem.summarise(&refined, Gate::Hard { threshold }, weights);
+    let model = problem.fit(&summary, &refined)?;
+    let rms = problem.rms(&summary, &model);
+
+    let agreeing = || places.iter().zip(weights.iter()).filter(|(_, weight)| **weight > 0.0);
+    let support = agreeing().count();
+    if support < support_min.max(2) {
+        return None;
+    }
+    let (first, last) = (agreeing().next()?.0.along_rad, agreeing().last()?.0.along_rad);
+    let chart = [course.vertex, along, course.normal];
+    let normal = (chart[0] * model.x + chart[1] * model.y + chart[2] * model.z).try_normalize(1e-9)?;
+    let sigma = (rms * rms + (PLACE_SIGMA_MIN_PX * rad_per_px).powi(2)).sqrt();
+    let mut information = Matrix2::zeros();
+    for (place, weight) in agreeing() {
+        let at = Vector2::new(place.along_rad.cos(), place.along_rad.sin());
+        information += at * at.transpose() * f64::from(*weight);
+    }
+    information /= sigma * sigma * ERRING_TOGETHER;
+    let ends = [first, last].map(|angle| Vector2::new(angle.cos(), angle.sin()));
+    let from_ends = nalgebra::Matrix2::from_rows(&[ends[0].transpose(), ends[1].transpose()]).try_inverse()?;
+    let whole = from_ends * from_ends.transpose() * (course.ray_sigma_px * rad_per_px).powi(2);
+    let in_chart = information.try_inverse()? + whole;
+    // The chart's plane is tangent at the expected normal, which is close to the fitted one.
+    let basis = tangent_basis(&normal);
+    let turn = basis.transpose() * nalgebra::Matrix3x2::from_columns(&[chart[0], chart[1]]);
+    let (sin, cos) = last.sin_cos();
+    let toward = chart[0] * cos + chart[1] * sin;
+    let ray = FittedRay {
+        normal,
+        covariance: turn * in_chart * turn.transpose(),
+        toward: (toward - normal * normal.dot(&toward)).try_normalize(1e-9)?,
+        support,
+        residual_rms_rad: rms,
+    };
+    Some(Traced { ray, share: support as f64 / looked_at.max(1) as f64, px_per_rad: 1.0 / rad_per_px })
+}

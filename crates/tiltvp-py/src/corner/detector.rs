@@ -1,0 +1,165 @@
+//! `CornerDetector`: corners of single images of one camera.
+
+use std::sync::{Mutex, PoisonError};
+
+use pyo3::prelude::*;
+use pyo3::types::{PyDict, PyTuple};
+use tiltvp_core::corner::{self as core, CornerScratch};
+use tiltvp_core::edges::Mask;
+
+use super::feature::CornerFeature;
+use super::options;
+use crate::call::{call, exception, invalid};
+use crate::camera::Camera;
+use crate::convert;
+
+/// The tables of one camera and front end, and the scratch of as many threads as have called at once.
+#[pyclass(frozen, subclass, module = "tiltvp._core")]
+pub(crate) struct CornerDetector {
+    inner: core::CornerDetector,
+    camera: Py<Camera>,
+    scratch: Mutex<Vec<CornerScratch>>,
+}
+
+#[pymethods]
+impl CornerDetector {
+    #[new]
+    #[pyo3(signature = (camera, *, method=core::CORNER_METHODS[0], mask=None, **options))]
+    fn new(
+        py: Python<'_>,
+        camera: &Bound<'_, PyAny>,
+        method: &str,
+        mask: Option<&Bound<'_, PyAny>>,
+        options: Option<&Bound<'_, PyDict>>,
+    ) -> PyResult<Self> {
+        let Ok(camera) = camera.cast::<Camera>() else {
+            return Err(invalid(format!("camera: {}, expected a tiltvp.Camera", camera.get_type().name()?)));
+        };
+        let parsed = options::parse(method, options)?;
+        let mask = mask.map(|mask| -> PyResult<Mask> {
+            let (height, width, usable) = convert::mask(mask, "mask")?;
+            Mask::new(width, height, usable).map_err(|error| exception(&error))
+        });
+        let mask = mask.transpose()?;
+        let lens = camera.get().inner.clone();
+        let inner = call(py, move || core::CornerDetector::new(lens, parsed, mask))?;
+        Ok(Self { inner, camera: camera.clone().unbind(), scratch: Mutex::default() })
+    }
+
+    /// The camera whose images are read.
+    #[getter]
+    fn camera(&self, py: Python<'_>) -> Py<Camera> {
+        self.camera.clone_ref(py)
+    }
+
+    /// The name of the front end.
+    #[getter]
+    fn method(&self) -> &'static str {
+        self.inner.options().method.name()
+    }
+
+    /// Fresh (H, W) bool, or None: which pixels may be used.
+    #[getter]
+    fn mask<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyAny>>> {
+        self.inner.mask().map(|mask| Ok(convert::to_mask(py, mask)?.into_any())).transpose()
+    }
+
+    /// The options that are in force, by name, defaults included.
+    #[getter]
+    fn options<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        options::in_force(py, self.inner.options())
+    }
+
+    /// The corners of a C-contiguous `(H, W)` image of uint8; `vertical` is a direction of the camera frame.
+    fn _detect_gray(
+        &self,
+        py: Python<'_>,
+        image: &Bound<'_, PyAny>,
+        vertical: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<Vec<CornerFeature>> {
+        let image = convert::gray(image, "image")?;
+        let (view, inner) = (convert::view(&image)?, &self.inner);
+        let prior = vertical.map(|vertical| convert::vector3(vertical, "vertical")).transpose()?;
+        let prior = match prior.map(|vertical| vertical.try_normalize(1e-12)) {
+            Some(None) => return Err(invalid("vertical: a vector without a direction, expected one".to_owned())),
+            Some(Some(vertical)) => Some(vertical),
+            None => None,
+        };
+        let mut found = Vec::new();
+        self.with_scratch(py, |scratch| inner.detect_general(&view, prior.as_ref(), scratch, &mut found))?;
+        Ok(found.into_iter().map(CornerFeature::new).collect())
+    }
+
+    /// The corner of a C-contiguous `(H, W, 3)` image of uint8, blue first; at most one.
+    fn _detect_color(&self, py: Python<'_>, image: &Bound<'_, PyAny>) -> PyResult<Vec<CornerFeature>> {
+        let image = convert::color(image, "image")?;
+        let (view, inner) = (convert::color_view(&image)?, &self.inner);
+        let mut found = None;
+        self.with_scratch(py, |scratch| {
+            found = inner.detect_coloured(&view, None, scratch)?;
+            Ok(())
+        })?;
+        Ok(found.into_iter().map(CornerFeature::new).collect())
+    }
+
+    /// `(N, 4)` float64: the ends `(u, v, u, v)` of the line segments of a C-contiguous `(H, W)` image of uint8.
+    fn _segments<'py>(&self, py: Python<'py>, image: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
+        let image = convert::gray(image, "image")?;
+        let (view, inner) = (convert::view(&image)?, &self.inner);
+        let (mut found, mut rows) = (Vec::new(), Vec::new());
+        self.with_scratch(py, |scratch| {
+            inner.detect_general(&view, None, scratch, &mut found)?;
+            rows = inner
+                .segments(scratch)
+                .iter()
+                .map(|s| [s.ends_px[0].x, s.ends_px[0].y, s.ends_px[1].x, s.ends_px[1].y])
+                .collect();
+            Ok(())
+        })?;
+        convert::to_rows(py, &rows, false)
+    }
+
+    fn __repr__(&self, py: Python<'_>) -> PyResult<String> {
+        Ok(format!("CornerDetector({}, method=\"{}\")", self.camera.bind(py).repr()?, self.method()))
+    }
+
+    fn __eq__(&self, other: &Bound<'_, PyAny>) -> bool {
+        other.cast::<Self>().is_ok_and(|other| {
+            let other = &other.get().inner;
+            (self.inner.camera(), self.inner.options(), self.inner.mask())
+                == (other.camera(), other.options(), other.mask())
+        })
+    }
+
+    fn __hash__(&self, py: Python<'_>) -> PyResult<isize> {
+        (self.camera.bind(py).hash()?, self.method()).into_pyobject(py)?.hash()
+    }
+
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyTuple>> {
+        let (py, this) = (slf.py(), slf.get());
+        let keywords = this.options(py)?;
+        keywords.set_item("method", this.method())?;
+        keywords.set_item("mask", this.mask(py)?)?;
+        let partial = py.import("functools")?.getattr("partial")?;
+        (partial.call((slf.get_type(), this.camera(py)), Some(&keywords))?, PyTuple::empty(py)).into_pyobject(py)
+    }
+}
+
+impl CornerDetector {
+    pub(super) fn inner(&self) -> &core::CornerDetector {
+        &self.inner
+    }
+
+    /// Runs `work` without the interpreter, with a scratch that no other thread has.
+    fn with_scratch(
+        &self,
+        py: Python<'_>,
+        work: impl FnOnce(&mut CornerScratch) -> Result<(), tiltvp_core::Error> + Send,
+    ) -> PyResult<()> {
+        let free = self.scratch.lock().unwrap_or_else(PoisonError::into_inner).pop();
+        let mut scratch = free.unwrap_or_else(|| self.inner.scratch());
+        let outcome = call(py, || work(&mut scratch));
+        self.scratch.lock().unwrap_or_else(PoisonError::into_inner).push(scratch);
+        outcome
+    }
+}

@@ -1,0 +1,172 @@
+//! A plain laboratory with a coloured cuboid on its floor and a lamp beside it.
+
+use nalgebra::{Vector2, Vector3};
+use tiltvp_core::{Error, Result};
+
+use crate::builder::{Builder, Column, Footprint, Frame, Material, Patch};
+use crate::corner::{Corner, CornerKind, of_box};
+use crate::dice::Dice;
+use crate::options::{RoomKind, WallPattern};
+use crate::outdoors::Outdoors;
+use crate::plan::{Filling, Opening, Plan, Wall};
+use crate::{furniture, shell};
+
+/// Width, depth and height of the room, metres.
+const ROOM_M: [f64; 3] = [9.0, 8.0, 2.9];
+
+/// How far behind the middle of the room the cuboid is, seen from where it is looked at, metres.
+const BEHIND_M: f64 = 0.8;
+
+/// Radiance of the lamp beside the cuboid at full power.
+const LAMP: f64 = 60.0;
+
+/// How a laboratory is drawn: equal options give equal worlds.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LaboratoryOptions {
+    /// Seed of furniture, of the cuboid's turn and of its place; 0 by default.
+    pub seed: u64,
+    /// Lengths of the cuboid's edges `x` (at the foot of the blue face's upper edge), `y` (its height) and `z`, metres within
+    /// `[0.1, 1]`; 0.40, 0.36, 0.34 by default.
+    pub size_m: [f64; 3],
+    /// The angle between the level edges `x` and `z`, radians within `[0.5, 2.6]`; a right angle by default.
+    pub gamma_rad: f64,
+    /// How full the walls are with furniture, in `[0, 1]`; 0.3 by default.
+    pub clutter: f64,
+    /// Power of the lamp beside the cuboid, in `[0, 1]`; 1 by default.
+    pub side_light: f64,
+    /// Spacing of the points where light is gathered, metres within `[0.02, 1]`; 0.15 by default.
+    pub light_spacing_m: f64,
+}
+
+impl Default for LaboratoryOptions {
+    fn default() -> Self {
+        Self {
+            seed: 0,
+            size_m: [0.40, 0.36, 0.34],
+            gamma_rad: std::f64::consts::FRAC_PI_2,
+            clutter: 0.3,
+            side_light: 1.0,
+            light_spacing_m: 0.15,
+        }
+    }
+}
+
+impl LaboratoryOptions {
+    /// Checks every field's domain.
+    ///
+    /// # Errors
+    /// [`Error::InvalidOption`] for the first field outside its domain.
+    pub fn validate(&self) -> Result<()> {
+        let [x, y, z] = self.size_m;
+        let ranges = [
+            ("laboratory.size_m", x, 0.1, 1.0, "edges x, y, z of metres in [0.1, 1]"),
+            ("laboratory.size_m", y, 0.1, 1.0, "edges x, y, z of metres in [0.1, 1]"),
+            ("laboratory.size_m", z, 0.1, 1.0, "edges x, y, z of metres in [0.1, 1]"),
+            ("laboratory.gamma_rad", self.gamma_rad, 0.5, 2.6, "radians in [0.5, 2.6]"),
+            ("laboratory.clutter", self.clutter, 0.0, 1.0, "a number in [0, 1]"),
+            ("laboratory.side_light", self.side_light, 0.0, 1.0, "a number in [0, 1]"),
+            ("laboratory.light_spacing_m", self.light_spacing_m, 0.02, 1.0, "metres in [0.02, 1]"),
+        ];
+        for (name, value, low, high, expected) in ranges {
+            if !(low..=high).contains(&value) {
+                return Err(Error::option(name, value, expected));
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Builds the room; returns its plan. The first of the builder's corners is the cuboid's coloured one.
+pub(crate) fn build(options: &LaboratoryOptions, builder: &mut Builder) -> Plan {
+    let mut dice = Dice::new(options.seed, 1 << 33);
+    let plan = plan(dice.seed());
+    shell::build_plain(&plan, builder);
+    let towards = dice.within(-std::f64::consts::PI, std::f64::consts::PI);
+    let middle = Vector2::new(0.5 * ROOM_M[0], 0.5 * ROOM_M[1]);
+    let place = middle - Vector2::new(towards.cos(), towards.sin()) * BEHIND_M;
+    let corner = cuboid(options, place, towards, builder);
+    lamp(options, &corner, towards, builder);
+    furniture::furnish_walls(&plan, options.clutter, builder, &mut dice);
+    // The cuboid's corner is the one that is looked at.
+    builder.corners.insert(0, corner);
+    plan
+}
+
+/// Four walls with two doors, and the lamps of the ceiling alone.
+fn plan(seed: u32) -> Plan {
+    let [width, depth, height] = ROOM_M;
+    let outline =
+        vec![Vector2::new(0.0, 0.0), Vector2::new(width, 0.0), Vector2::new(width, depth), Vector2::new(0.0, depth)];
+    let walls = (0..4)
+        .map(|k| {
+            let (from, to) = (outline[k], outline[(k + 1) % 4]);
+            let length = (to - from).norm();
+            let frame = Frame { origin: Vector3::new(from.x, from.y, 0.0), x: (to - from) / length };
+            let door = Opening { filling: Filling::Door, along: [1.1, 2.0], z: [0.0, 2.05] };
+            Wall { frame, length, openings: if k % 2 == 1 { vec![door] } else { Vec::new() } }
+        })
+        .collect();
+    Plan {
+        kind: RoomKind::Office,
+        outline,
+        floors: vec![[0.0, 0.0, width, depth]],
+        height,
+        walls,
+        outdoors: Outdoors { brightness: 0.0, towards_sun: Vector3::z(), sun: 0.0, seed },
+        lamps: 10.0,
+        floor_gloss: 0.0,
+        wall_pattern: WallPattern::Drawn,
+    }
+}
+
+/// The cuboid with its corner at a place, seen from the direction `towards`: red on top, green to the left, blue to the right.
+fn cuboid(options: &LaboratoryOptions, place: Vector2<f64>, towards: f64, builder: &mut Builder) -> Corner {
+    let [length_x, height, length_z] = options.size_m;
+    let level = |azimuth: f64, length: f64| Vector3::new(azimuth.cos(), azimuth.sin(), 0.0) * length;
+    // Seen from the front, x runs to the back and the right, z to the back and the left.
+    let behind = towards + std::f64::consts::PI;
+    let (x, z) = (level(behind - 0.5 * options.gamma_rad, length_x), level(behind + 0.5 * options.gamma_rad, length_z));
+    let up = Vector3::z() * height;
+    let foot = Vector3::new(place.x, place.y, 0.0);
+    let [red, green, blue] = [(176, 34, 32), (38, 138, 56), (34, 66, 168)].map(|(r, g, b)| builder.paint(r, g, b));
+    let gray = builder.paint(150, 150, 150);
+    let mut face = |origin: Vector3<f64>, du: Vector3<f64>, dv: Vector3<f64>, material| {
+        builder.patch(Patch { origin, du, dv, triangle: false, material, uv: [0.0; 2] });
+    };
+    face(foot + up, x, z, red);
+    face(foot, up, z, green);
+    face(foot, x, up, blue);
+    face(foot + x, z, up, gray);
+    face(foot + z, up, x, gray);
+    builder.edges.extend(
+        [foot, foot + x, foot + x + z, foot + z].map(|bottom| crate::segment::Segment { bottom, top: bottom + up }),
+    );
+    let solid = Frame { origin: foot, x: x.xy().normalize() };
+    let reach = length_x.max(length_z);
+    builder.solids.push(Footprint::new(&solid, [-reach, 0.0], [length_x + reach, reach]));
+    let corner = Corner::new(foot + up, -up, [x, z], CornerKind::Solid);
+    builder.corners.extend(of_box(foot, [x, z, up]).filter(|other| other.position != corner.position));
+    corner
+}
+
+/// A lamp on a stand, beside the cuboid.
+fn lamp(options: &LaboratoryOptions, corner: &Corner, towards: f64, builder: &mut Builder) {
+    if options.side_light <= 0.0 {
+        return;
+    }
+    let azimuth = towards + 1.35;
+    let stand = Frame::new(corner.position.x + 2.0 * azimuth.cos(), corner.position.y + 2.0 * azimuth.sin(), azimuth);
+    let metal = builder.paint(60, 60, 64);
+    builder.column(&stand, &Column { at: [0.0, 0.0], z: [0.0, 1.55], radius: [0.015, 0.015], sides: 8 }, metal);
+    let shine = builder.material(Material::Lamp([1.0, 0.97, 0.92].map(|c| LAMP * options.side_light * c)));
+    let center = stand.point(-0.03, 0.0, 1.65);
+    let facing = (corner.position - center).normalize();
+    let across = Vector3::z().cross(&facing).normalize();
+    let up = facing.cross(&across);
+    let (du, dv) = (across * 0.5, up * 0.4);
+    let origin = center - 0.5 * (du + dv);
+    builder.patch(Patch { origin, du, dv, triangle: false, material: shine, uv: [0.0; 2] });
+    let back = origin - facing * 0.02;
+    builder.patch(Patch { origin: back, du: dv, dv: du, triangle: false, material: metal, uv: [0.0; 2] });
+    builder.solid(&stand, [-0.25, -0.25], [0.25, 0.25]);
+}

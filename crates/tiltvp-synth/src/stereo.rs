@@ -1,0 +1,333 @@
+//! A pair of cameras, held by hand, that looks at a corner of a world: every frame can be rendered, and its truth is known.
+
+use std::sync::Arc;
+
+use nalgebra::{Isometry3, Matrix3, Translation3, UnitQuaternion, Vector2, Vector3};
+use rayon::prelude::*;
+use tiltvp_core::camera::Camera;
+use tiltvp_core::{Error, Result};
+
+use crate::corner::Corner;
+use crate::dice::Dice;
+use crate::handheld::Handheld;
+use crate::lights::Lights;
+use crate::sweep::{Rays, Sweep};
+use crate::tone::{ColorImage, Exposure, Film, RenderOptions};
+use crate::world::World;
+
+/// How many motions are tried, per corner.
+const TRIALS: usize = 30;
+/// How far from walls and furniture the cameras stay, metres.
+const CLEAR_M: f64 = 0.12;
+/// Most pictures that a blurred one is averaged from.
+const SHARPS: usize = 8;
+/// Edges of corners that are looked at first, metres.
+const LARGE_M: f64 = 0.35;
+/// Least length of its edges in the images, all along, of a corner that is looked at, in widths of an image.
+const IN_SIGHT: f64 = 0.012;
+/// Points at which an edge is looked for.
+const EDGE_POINTS: usize = 64;
+
+/// How a pair moves and what its cameras are like: equal options give equal sequences.
+#[derive(Debug, Clone, PartialEq)]
+pub struct StereoOptions {
+    /// How many frames, within `[1, 100000]`; 1000 by default.
+    pub frames: usize,
+    /// Frames per second, within `[1, 1000]`; 30 by default.
+    pub frame_rate_hz: f64,
+    /// Seed of motion and noise; 0 by default.
+    pub seed: u64,
+    /// Which of the world's corners is looked at; by default a laboratory's cuboid, or one that can be approached.
+    pub corner: Option<usize>,
+    /// Least and greatest distance from the corner, metres, within `[0.3, 20]`; 1 and 3 by default. In a room it stays nearer
+    /// where there is no space.
+    pub distance_m: [f64; 2],
+    /// Greatest roll, radians within `[0, 1.5]`; 0.2 by default.
+    pub roll_max_rad: f64,
+    /// Period of the slowest sway, seconds within `[1, 1000]`; 15 by default.
+    pub period_s: f64,
+    /// The right camera's pose in the left one's frame; by default 0.12 m to the right, and turned by less than half a degree,
+    /// as a pair is before rectification.
+    pub left_from_right: Isometry3<f64>,
+    /// Rays per pixel side where surfaces meet, within `[1, 8]`; elsewhere one ray per pixel will do; 3 by default.
+    pub samples: usize,
+    /// Standard deviation of Gaussian noise, grey levels of 255; 2 by default.
+    pub noise_sigma: f64,
+    /// Standard deviation of a Gaussian blur, pixels, for what lens and sensor do to a point; 0.6 by default.
+    pub blur_sigma_px: f64,
+    /// How long the shutter is open, seconds within `[0, 0.1]`; 0 by default, for no motion blur.
+    pub exposure_s: f64,
+    /// Factor from the room's light to display white, the same for all frames, within `[0.05, 20]`; 0.8 by default.
+    pub gain: f64,
+}
+
+impl Default for StereoOptions {
+    fn default() -> Self {
+        let turn = UnitQuaternion::from_scaled_axis(Vector3::new(0.003, -0.005, 0.004));
+        Self {
+            frames: 1000,
+            frame_rate_hz: 30.0,
+            seed: 0,
+            corner: None,
+            distance_m: [1.0, 3.0],
+            roll_max_rad: 0.2,
+            period_s: 15.0,
+            left_from_right: Isometry3::from_parts(Translation3::new(0.12, 0.0, 0.0), turn),
+            samples: 3,
+            noise_sigma: 2.0,
+            blur_sigma_px: 0.6,
+            exposure_s: 0.0,
+            gain: 0.8,
+        }
+    }
+}
+
+impl StereoOptions {
+    /// Checks every field's domain.
+    ///
+    /// # Errors
+    /// [`Error::InvalidOption`] for the first field outside its domain.
+    pub fn validate(&self) -> Result<()> {
+        if !(1..=100_000).contains(&self.frames) {
+            return Err(Error::option("stereo.frames", self.frames, "a number in [1, 100000]"));
+        }
+        let [near, far] = self.distance_m;
+        let ranges = [
+            ("stereo.frame_rate_hz", self.frame_rate_hz, 1.0, 1000.0, "hertz in [1, 1000]"),
+            ("stereo.distance_m", near, 0.3, far, "least and greatest metres, ascending, in [0.3, 20]"),
+            ("stereo.distance_m", far, near, 20.0, "least and greatest metres, ascending, in [0.3, 20]"),
+            ("stereo.roll_max_rad", self.roll_max_rad, 0.0, 1.5, "radians in [0, 1.5]"),
+            ("stereo.period_s", self.period_s, 1.0, 1000.0, "seconds in [1, 1000]"),
+            ("stereo.exposure_s", self.exposure_s, 0.0, 0.1, "seconds in [0, 0.1]"),
+            ("stereo.gain", self.gain, 0.05, 20.0, "a factor in [0.05, 20]"),
+            (
+                "stereo.left_from_right",
+                self.left_from_right.translation.vector.norm(),
+                0.0,
+                2.0,
+                "a baseline of at most 2 metres",
+            ),
+        ];
+        for (name, value, low, high, expected) in ranges {
+            if !(low..=high).contains(&value) {
+                return Err(Error::option(name, value, expected));
+            }
+        }
+        self.developed(0, 0).validate()
+    }
+
+    fn developed(&self, frame: usize, eye: u64) -> RenderOptions {
+        RenderOptions {
+            samples: self.samples,
+            blur_sigma_px: self.blur_sigma_px,
+            noise_sigma: self.noise_sigma,
+            exposure: Exposure::Fixed { gain: self.gain },
+            seed: self.seed ^ (2 * frame as u64 + 1 + eye).rotate_left(40),
+            ..RenderOptions::default()
+        }
+    }
+}
+
+/// A corner in sight at one frame.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct CornerSighting {
+    /// Number of the corner.
+    pub corner: usize,
+    /// Where its vertex is in the left and in the right image, pixels.
+    pub vertex_px: [Vector2<f64>; 2],
+    /// In either image, how long the edges `x`, `y`, `z` are, from the vertex on to where they are hidden or end, pixels.
+    pub edges_px: [[f64; 3]; 2],
+}
+
+/// A moving pair in a world.
+pub struct StereoSequence {
+    world: Arc<World>,
+    cameras: [Camera; 2],
+    options: StereoOptions,
+    corner: usize,
+    motion: Handheld,
+    rays: [Rays; 2],
+}
+
+impl StereoSequence {
+    /// Finds a motion for a pair in a world, and makes its rays in parallel on the current rayon pool; neither depends on it.
+    ///
+    /// # Errors
+    /// If the options are outside their domains, or there is no space to move in.
+    pub fn new(world: Arc<World>, cameras: [Camera; 2], options: StereoOptions) -> Result<Self> {
+        options.validate()?;
+        let corners = world.corners();
+        if let Some(corner) = options.corner.filter(|&corner| corner >= corners.len()) {
+            return Err(Error::option("stereo.corner", corner, "the number of one of the world's corners"));
+        }
+        let mut dice = Dice::new(options.seed, 1 << 34);
+        let is_large = |k: &usize| corners[*k].lengths_m.iter().all(|length| *length >= LARGE_M);
+        let (mut order, mut small): (Vec<usize>, Vec<usize>) = match options.corner {
+            Some(corner) => (vec![corner], Vec::new()),
+            None if world.has_cuboid() => (vec![0], Vec::new()),
+            None => (0..corners.len()).filter(|&k| Handheld::suits(&corners[k])).partition(is_large),
+        };
+        for order in [&mut order, &mut small] {
+            for k in (1..order.len()).rev() {
+                order.swap(k, dice.below(k + 1));
+            }
+        }
+        order.append(&mut small);
+        for &corner in &order {
+            for trial in 0..TRIALS {
+                let reach = if 2 * trial < TRIALS { 1.0 } else { 0.4 };
+                let motion = Handheld::draw(&corners[corner], &options, reach, &mut dice);
+                if is_good(&world, &cameras, &options, &motion, &corners[corner]) {
+                    let rays = cameras.each_ref().map(|camera| Rays::new(camera, 0.0));
+                    return Ok(Self { world, cameras, options, corner, motion, rays });
+                }
+            }
+        }
+        Err(Error::argument("stereo.corner", format!("{} corners", order.len()), "one with space to look at it"))
+    }
+
+    /// How the pair moves.
+    pub fn options(&self) -> &StereoOptions {
+        &self.options
+    }
+
+    /// The left and the right camera.
+    pub fn cameras(&self) -> &[Camera; 2] {
+        &self.cameras
+    }
+
+    /// Number of the corner that is looked at.
+    pub fn corner(&self) -> usize {
+        self.corner
+    }
+
+    /// The motion of the left camera, at any time.
+    pub fn motion(&self) -> &Handheld {
+        &self.motion
+    }
+
+    /// When a frame is taken, seconds.
+    pub fn time_s(&self, frame: usize) -> f64 {
+        frame as f64 / self.options.frame_rate_hz
+    }
+
+    /// The pose of the left camera in the world at a frame (`world_from_left`).
+    ///
+    /// # Errors
+    /// [`Error::InvalidArgument`] if there is no such frame.
+    pub fn pose(&self, frame: usize) -> Result<Isometry3<f64>> {
+        if frame >= self.options.frames {
+            return Err(Error::argument("frame", frame, format!("a frame below {}", self.options.frames)));
+        }
+        Ok(self.motion.pose(self.time_s(frame)))
+    }
+
+    /// The left and the right image of a frame, rendered in parallel on the current rayon pool; their bytes depend on world,
+    /// cameras, options and frame alone.
+    ///
+    /// # Errors
+    /// [`Error::InvalidArgument`] if there is no such frame.
+    pub fn render(&self, frame: usize) -> Result<[ColorImage; 2]> {
+        self.pose(frame)?;
+        Ok([0, 1].map(|eye| self.eye(frame, eye)))
+    }
+
+    fn eye(&self, frame: usize, eye: usize) -> ColorImage {
+        let options = self.options.developed(frame, eye as u64);
+        let (middle_s, open_s) = (self.time_s(frame), self.options.exposure_s);
+        let count = self.sharps(middle_s, eye);
+        let film = |k: usize| {
+            let time_s = middle_s + open_s * ((k as f64 + 0.5) / count as f64 - 0.5);
+            let pose = self.eye_pose(time_s, eye);
+            let turn: Matrix3<f64> = pose.rotation.to_rotation_matrix().into_inner();
+            Sweep::new(&self.world, &self.rays[eye], pose.translation.vector, turn).film(&Lights::STEADY, &options)
+        };
+        let first = film(0);
+        let sum = (1..count).fold(first, |sum, k| sum.plus(&film(k)));
+        Film::scaled(sum, 1.0 / count as f32).develop_color(&options)
+    }
+
+    /// How many sharp pictures a frame is averaged from: as many as pixels that the vertex, or the end of one of its edges,
+    /// moves while the shutter is open.
+    fn sharps(&self, time_s: f64, eye: usize) -> usize {
+        let corner = &self.world.corners()[self.corner];
+        let ends = corner.edges.iter().zip(corner.lengths_m).map(|(edge, length)| corner.position + edge * length);
+        let [start, end] = [-0.5, 0.5].map(|side| self.eye_pose(time_s + side * self.options.exposure_s, eye));
+        let place = |pose: &Isometry3<f64>, point: &Vector3<f64>| {
+            self.cameras[eye].project(&pose.inverse_transform_point(&(*point).into()).coords)
+        };
+        let moved = ends
+            .chain([corner.position])
+            .filter_map(|point| Some((place(&end, &point)? - place(&start, &point)?).norm()))
+            .fold(0.0, f64::max);
+        (moved.ceil() as usize).clamp(1, SHARPS)
+    }
+
+    fn eye_pose(&self, time_s: f64, eye: usize) -> Isometry3<f64> {
+        let left = self.motion.pose(time_s);
+        if eye == 0 { left } else { left * self.options.left_from_right }
+    }
+
+    /// The corners whose vertex is in sight in both images of a frame, in the order of their numbers.
+    ///
+    /// # Errors
+    /// [`Error::InvalidArgument`] if there is no such frame.
+    pub fn sightings(&self, frame: usize) -> Result<Vec<CornerSighting>> {
+        self.pose(frame)?;
+        let eyes = [0, 1].map(|eye| (self.eye_pose(self.time_s(frame), eye), &self.cameras[eye]));
+        let numbered = self.world.corners().par_iter().enumerate();
+        Ok(numbered.filter_map(|(number, corner)| sight(&self.world, number, corner, &eyes)).collect())
+    }
+}
+
+/// What is in sight of a corner, if its vertex is for both eyes.
+fn sight(
+    world: &World,
+    number: usize,
+    corner: &Corner,
+    eyes: &[(Isometry3<f64>, &Camera); 2],
+) -> Option<CornerSighting> {
+    let mut sighting = CornerSighting { corner: number, vertex_px: [Vector2::zeros(); 2], edges_px: [[0.0; 3]; 2] };
+    for (eye, (pose, camera)) in eyes.iter().enumerate() {
+        let vertex = seen(world, camera, pose, &corner.position)?;
+        sighting.vertex_px[eye] = vertex;
+        for (k, (edge, length)) in corner.edges.iter().zip(corner.lengths_m).enumerate() {
+            let end = (1..=EDGE_POINTS)
+                .map(|at| corner.position + edge * (length * at as f64 / EDGE_POINTS as f64))
+                .map_while(|point| seen(world, camera, pose, &point))
+                .last();
+            sighting.edges_px[eye][k] = end.map_or(0.0, |end| (end - vertex).norm());
+        }
+    }
+    Some(sighting)
+}
+
+/// The pixel at which a point of a surface is in sight.
+fn seen(world: &World, camera: &Camera, pose: &Isometry3<f64>, point: &Vector3<f64>) -> Option<Vector2<f64>> {
+    let pixel = camera.project(&pose.inverse_transform_point(&(*point).into()).coords)?;
+    let ray = point - pose.translation.vector;
+    let length = ray.norm();
+    let clear = || world.scene().is_clear(&pose.translation.vector, &(ray / length), length - 2e-3 - 5e-4 * length);
+    (camera.contains(&pixel) && clear()).then_some(pixel)
+}
+
+/// Whether all along a motion the cameras are free in the room, and the corner with its edges in both images.
+fn is_good(world: &World, cameras: &[Camera; 2], options: &StereoOptions, motion: &Handheld, corner: &Corner) -> bool {
+    // Five looks a second tell; no hand moves the cameras far in between.
+    let duration = options.frames as f64 / options.frame_rate_hz;
+    let looks = (5.0 * duration).ceil() as usize + 1;
+    let least = cameras.each_ref().map(|camera| IN_SIGHT * f64::from(camera.width()));
+    (0..looks).all(|k| {
+        let left = motion.pose(k as f64 * duration / looks as f64);
+        let poses = [left, left * options.left_from_right];
+        let is_free = |center: &Vector3<f64>| {
+            let axes = [Vector3::x(), Vector3::y(), Vector3::z()];
+            let clear = |d: Vector3<f64>| world.scene().is_clear(center, &d, CLEAR_M);
+            world.contains(center) && axes.iter().all(|d| clear(*d) && clear(-d))
+        };
+        poses.iter().all(|pose| is_free(&pose.translation.vector))
+            && sight(world, 0, corner, &[(poses[0], &cameras[0]), (poses[1], &cameras[1])]).is_some_and(|seen| {
+                seen.edges_px.iter().zip(least).all(|(eye, least)| eye.iter().all(|px| *px >= least))
+            })
+    })
+}

@@ -1,0 +1,175 @@
+"""`tiltvp corner`: the pose of a camera or a pair of cameras before a corner, image after image."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+from cyclopts import Parameter, validators
+
+from tiltvp.cli.options import image_size_from
+from tiltvp.cli.results import check_ending, write_frame
+from tiltvp.cli.terminal import named, progress_bar, say
+from tiltvp.cli.track import Frames, open_frames
+from tiltvp.errors import InvalidInputError, TiltvpError
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from tiltvp import Camera
+    from tiltvp.corner import CornerEstimate, CornerPoseEstimator
+
+_ANGLE = Parameter(validator=validators.Number(gt=0, lt=180))
+_POSE = ("roll_deg", "pitch_deg", "yaw_deg", "x_m", "y_m", "z_m")
+
+
+def corner(
+    left: str,
+    right: str | None = None,
+    /,
+    *,
+    calibration: Path,
+    method: str = "coloured",
+    gamma: Annotated[float, _ANGLE] = 90.0,
+    pitch: Annotated[float | None, Parameter(validator=validators.Number(gte=-90, lte=90))] = None,
+    out: Path | None = None,
+    trajectory: Path | None = None,
+    overlay: Path | None = None,
+    plot: Path | None = None,
+    frame_rate: Annotated[float | None, Parameter(validator=validators.Number(gt=0))] = None,
+    image_size: str | None = None,
+    independent: Annotated[bool, Parameter(negative="")] = False,
+) -> int:
+    """Find a corner in each image, or pair of images, and from it the camera's attitude, with a pair also its position.
+
+    The last pose is where the next one is looked for. Images that cannot be read are named on stderr and skipped,
+    and the exit code is 1; images without a corner have rows without a pose that say why.
+
+    Parameters
+    ----------
+    left
+        Image, folder of images, glob pattern, or video of the left or only camera.
+    right
+        The same of the right camera, with as many frames.
+    calibration
+        Of two cameras: a camchain of Kalibr or a TOML of tiltvp with left, right and left_from_right. Of one camera:
+        any format that `tiltvp camera formats` lists.
+    method
+        coloured: a cuboid with red, green and blue faces; general: corners of rooms, boxes and buildings.
+    gamma
+        Angle between the corner's level edges, degrees.
+    pitch
+        How far the left camera looks above the horizon, degrees, held without roll: negative looks down. Roughly; it
+        says which of the edges is vertical, for the first image.
+    out
+        File for the poses, one row for each frame: .csv, .json or .parquet.
+    trajectory
+        File for the trajectory in TUM's format: time, position and quaternion of the camera in the object's frame.
+    overlay
+        Folder for the left images with corners and imaginary boxes.
+    plot
+        Picture of attitude and position over time (.png).
+    frame_rate
+        Frames per second: by default those of the video, 25 for images.
+    image_size
+        WIDTHxHEIGHT in pixels, for calibrations that do not carry it.
+    independent
+        Look at every frame anew.
+    """
+    from tiltvp.corner_tables import pose_table, write_trajectory
+    from tiltvp.images import write_image
+
+    if out is not None:
+        check_ending(out)
+    if plot is not None and plot.suffix.lower() != ".png":
+        raise InvalidInputError(f"--plot {plot}: ends in {plot.suffix!r}, expected .png")
+    camera, estimator = _estimator(
+        calibration, right is not None, method, math.radians(gamma), pitch, image_size_from(image_size)
+    )
+    frames = open_frames(left)
+    others = None if right is None else open_frames(right)
+    if others is not None and len(others.files) != len(frames.files):
+        raise InvalidInputError(f"{right}: {len(others.files)} frames, expected {len(frames.files)} as in {left}")
+    rate_hz = frame_rate or frames.rate_hz
+    estimates: list[tuple[float, str, CornerEstimate]] = []
+    bad = 0
+    with progress_bar(len(frames.files), "frames") as bar:
+        for number, images in enumerate(_pairs(frames, others)):
+            file = frames.files[number]
+            try:
+                for image in images:
+                    if isinstance(image, TiltvpError):
+                        raise image
+                if independent:
+                    estimator.reset()
+                estimate = estimator(*images)
+            except TiltvpError as error:
+                bar.complain(named(file, str(error)))
+                bad += 1
+            else:
+                estimates.append((number / rate_hz, str(file), estimate))
+                if overlay is not None:
+                    name = f"{Path(file).stem}_{number:06d}.png" if "#" in file.name else f"{Path(file).stem}.png"
+                    write_image(overlay / name, drawn(images[0], camera, estimate))
+            bar.advance()
+    if not estimates:
+        raise InvalidInputError(f"{left}: {bad} frames, none of which can be used")
+    table = pose_table(estimates)
+    if out is not None:
+        write_frame(table, out)
+    if trajectory is not None:
+        write_trajectory(table, trajectory)
+    if plot is not None:
+        from tiltvp.plots.corner_overlay import pose_plot
+        from tiltvp.plots.picture import figure_picture
+
+        write_image(plot, figure_picture(pose_plot(table)))
+    found = sum(bool(estimate) for _, _, estimate in estimates)
+    skipped = f", {bad} skipped" if bad else ""
+    say(f"{left}: {len(estimates)} frames{skipped}, {found} with a pose")
+    return 1 if bad else 0
+
+
+def _estimator(
+    calibration: Path,
+    is_pair: bool,
+    method: str,
+    gamma_rad: float,
+    pitch_deg: float | None,
+    image_size: tuple[int, int] | None,
+) -> tuple[Camera, CornerPoseEstimator]:
+    from tiltvp import Camera
+    from tiltvp.corner import CornerPoseEstimator
+    from tiltvp.stereo_rigs import StereoRig
+
+    options: dict[str, Any] = {"method": method, "gamma_rad": gamma_rad}
+    if pitch_deg is not None:
+        pitch_rad = math.radians(pitch_deg)
+        options["down"] = (0.0, math.cos(pitch_rad), -math.sin(pitch_rad))
+    if not is_pair:
+        camera = Camera.load(calibration, image_size=image_size)
+        return camera, CornerPoseEstimator(camera, **options)
+    rig = StereoRig.load(calibration, image_size=image_size)
+    return rig.left, CornerPoseEstimator(rig.left, rig.right, rig.left_from_right, **options)
+
+
+def _pairs(frames: Frames, others: Frames | None) -> Any:
+    if others is None:
+        return ((image,) for image in frames)
+    return zip(frames, others, strict=True)
+
+
+def drawn(image: NDArray[np.uint8], camera: Camera, estimate: CornerEstimate) -> NDArray[np.uint8]:
+    """The image with its corners and the imaginary box."""
+    from tiltvp.plots.corner_overlay import draw_box, draw_corners
+
+    canvas = draw_corners(image, camera, estimate.features_left, estimate.chosen_left)
+    pose = estimate.pose
+    if pose is not None:
+        vertex = pose.vertex_m
+        if vertex is None:
+            vertex = estimate.features_left[estimate.chosen_left[0]].vertex
+        draw_box(canvas, camera, vertex, pose.edges)
+    return canvas

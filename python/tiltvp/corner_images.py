@@ -1,0 +1,100 @@
+"""Corners in images: found, and the pose of a camera or a pair of cameras before them (Liu et al. 2018)."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from tiltvp import _core
+from tiltvp._core import CORNER_METHODS, CornerEstimate, CornerFeature, CornerHypothesis
+from tiltvp.errors import InvalidInputError
+from tiltvp.images import bgr_from, gray_from
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike, NDArray
+
+    from tiltvp._core import Camera
+
+__all__ = [
+    "CORNER_METHODS",
+    "CornerDetector",
+    "CornerEstimate",
+    "CornerFeature",
+    "CornerHypothesis",
+    "CornerPoseEstimator",
+]
+
+_OF_ESTIMATOR = (
+    "gamma_rad", "gamma_sigma_rad", "right_handed", "down", "down_sigma_rad", "turn_sigma_rad", "forget_after",
+    "agree_max_rad", "misfit_max", "distance_min_m", "distance_max_m", "probability_min",
+)  # fmt: skip
+
+
+class CornerDetector(_core.CornerDetector):
+    """Finds corners in single images of one camera: `CornerDetector(camera, method="coloured")`.
+
+    "coloured" finds the corner of a cuboid whose upper, left and right face are red, green and blue (`faces="rgb"`),
+    "general" those of rooms, boxes and buildings, by line segments. Tables and scratch are made once; one detector
+    may be called from many threads at once; frozen, comparable, and to be pickled. `options` lists all options,
+    docs/corner_images.md says what they mean.
+    """
+
+    __slots__ = ()
+
+    def __call__(self, image: ArrayLike, vertical: ArrayLike | None = None) -> list[CornerFeature]:
+        """The corners of one image, the best first; at most one for "coloured", which needs colour.
+
+        `vertical` (3,), for "general", is a direction along the vertical in the camera frame, up or down: it says
+        which of the three rays is the vertical one. Without it that is the one nearest to the image's columns. Raises
+        `InvalidInputError` for an image of another size than the camera's.
+        """
+        if self.method == "coloured":
+            return self._detect_color(bgr_from(image))
+        return self._detect_gray(gray_from(image), vertical)
+
+    def segments(self, image: ArrayLike) -> NDArray[np.float64]:
+        """(N, 4): the ends (u, v, u, v) of the line segments that "general" joins, in pixels, the longest first."""
+        return self._segments(gray_from(image))
+
+
+class CornerPoseEstimator(_core.CornerPoseEstimator):
+    """The pose of one camera, or of a pair, before a corner: `CornerPoseEstimator(left, right, left_from_right)`.
+
+    `left` and `right` are cameras or `CornerDetector`s; `left_from_right` (4, 4) is the right camera's pose in the left
+    one's frame, metres. Without `right` only the attitude is estimated. Call it with the images of one frame after the
+    other: the last pose is the prior for the next one. `gamma_rad` is the angle between the corner's level edges,
+    `down` (3,) the direction down in the left camera's frame as far as it is known. Other options are the
+    estimator's, or those of detectors that are made here for `method`.
+    """
+
+    def __new__(
+        cls,
+        left: Camera | CornerDetector,
+        right: Camera | CornerDetector | None = None,
+        left_from_right: ArrayLike | None = None,
+        *,
+        method: str = CORNER_METHODS[0],
+        **options: Any,
+    ) -> CornerPoseEstimator:
+        own = {name: options.pop(name) for name in _OF_ESTIMATOR if name in options}
+        if method == "general" and "gamma_rad" in own:
+            options.setdefault("gamma_rad", own["gamma_rad"])
+
+        def detector(camera: Camera | CornerDetector) -> CornerDetector:
+            if not isinstance(camera, _core.CornerDetector):
+                return CornerDetector(camera, method=method, **options)
+            if options:
+                names = ", ".join(options)
+                raise InvalidInputError(f"options {names}: given beside a CornerDetector, expected with cameras only")
+            return camera
+
+        other = None if right is None else detector(right)
+        return super().__new__(cls, detector(left), other, left_from_right, **own)
+
+    def __call__(self, left: ArrayLike, right: ArrayLike | None = None) -> CornerEstimate:
+        """What one frame tells; false if no pose stands out, `reason` says why. One image for one camera, two for a
+        pair.
+        """
+        made = bgr_from if self._coloured else gray_from
+        return self._observe(made(left), None if right is None else made(right))

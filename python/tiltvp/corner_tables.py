@@ -1,0 +1,106 @@
+"""Poses before a corner as tables and trajectories."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from tiltvp.errors import InvalidInputError
+
+if TYPE_CHECKING:
+    import polars as pl
+    from numpy.typing import NDArray
+
+    from tiltvp._core import CornerEstimate
+
+__all__ = ["pose_table", "quaternion", "roll_pitch_yaw", "write_trajectory"]
+
+_QUATERNION = ("qx", "qy", "qz", "qw")
+_POSITION = ("x_m", "y_m", "z_m")
+_ANGLES = ("roll_deg", "pitch_deg", "yaw_deg")
+_SIGMAS = ("sigma_rx_rad", "sigma_ry_rad", "sigma_rz_rad", "sigma_x_m", "sigma_y_m", "sigma_z_m")
+
+
+def pose_table(estimates: Sequence[tuple[float, str, CornerEstimate]]) -> pl.DataFrame:
+    """One row for each frame: time_s, file, found, the camera in the object's frame, and how sure it is.
+
+    qx..qw and x_m..z_m are `object_from_camera`; the object's frame has y along the vertical edge away from the vertex.
+    roll, pitch and yaw are those of `object_from_camera` about the camera's z, x and y axis. The standard deviations
+    are of the rotation vector and of the vertex in the camera's frame. Null where there is no pose, from one camera no
+    position.
+    """
+    import polars as pl
+
+    schema: dict[str, pl.DataType] = {"time_s": pl.Float64(), "file": pl.String(), "found": pl.Boolean()}
+    schema |= dict.fromkeys((*_ANGLES, *_QUATERNION, *_POSITION, *_SIGMAS), pl.Float64())
+    schema |= {"confidence": pl.Float64(), "hypotheses": pl.Int64(), "misfit": pl.Float64(), "object": pl.Int64()}
+    schema |= {"corners_left": pl.Int64(), "corners_right": pl.Int64(), "reason": pl.String()}
+    rows = []
+    for time_s, file, estimate in estimates:
+        row: dict[str, object] = dict.fromkeys(schema)
+        row |= {"time_s": time_s, "file": file, "found": bool(estimate), "confidence": estimate.confidence}
+        row |= {"hypotheses": len(estimate.hypotheses), "reason": estimate.reason, "object": estimate.object}
+        row |= {"corners_left": len(estimate.features_left), "corners_right": len(estimate.features_right)}
+        pose = estimate.pose
+        if pose is not None:
+            turn = pose.camera_from_object.T
+            angles = np.degrees(roll_pitch_yaw(turn))
+            row |= dict(zip(_ANGLES, angles.tolist(), strict=True))
+            row |= dict(zip(_QUATERNION, quaternion(turn).tolist(), strict=True))
+            sigmas = np.sqrt(np.diag(pose.covariance))
+            place = pose.camera_in_object_m
+            count = 3 if place is None else 6
+            row |= dict(zip(_SIGMAS[:count], sigmas[:count].tolist(), strict=True))
+            if place is not None:
+                row |= dict(zip(_POSITION, place.tolist(), strict=True))
+            row["misfit"] = pose.misfit
+        rows.append(row)
+    return pl.DataFrame(rows, schema=schema)
+
+
+def write_trajectory(table: pl.DataFrame, path: str | os.PathLike[str]) -> None:
+    """The poses of a table in TUM's format: time x y z qx qy qz qw, a line for each; whole or not at all.
+
+    Raises `InvalidInputError` where no row has a position, and where the file cannot be written.
+    """
+    columns = ["time_s", *_POSITION, *_QUATERNION]
+    rows = table.select(columns).drop_nulls()
+    if rows.height == 0:
+        raise InvalidInputError(f"{path}: no pose has a position, expected the images of two cameras")
+    lines = ["# time_s x_m y_m z_m qx qy qz qw of object_from_camera"]
+    lines += [" ".join(f"{value:.9f}" for value in row) for row in rows.iter_rows()]
+    file = Path(path)
+    part = file.with_name(f".{file.name}.part")
+    try:
+        file.parent.mkdir(parents=True, exist_ok=True)
+        part.write_text("\n".join(lines) + "\n", encoding="utf-8")
+        part.replace(file)
+    except OSError as error:
+        raise InvalidInputError(f"{file}: cannot be written ({error.strerror or error})") from error
+
+
+def quaternion(rotation: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(4,): x, y, z, w of a rotation (3, 3), w not negative."""
+    (xx, xy, xz), (yx, yy, yz), (zx, zy, zz) = rotation
+    symmetric = np.array([
+        [xx - yy - zz, xy + yx, xz + zx, zy - yz],
+        [xy + yx, yy - xx - zz, yz + zy, xz - zx],
+        [xz + zx, yz + zy, zz - xx - yy, yx - xy],
+        [zy - yz, xz - zx, yx - xy, xx + yy + zz],
+    ])  # fmt: skip
+    found: NDArray[np.float64] = np.linalg.eigh(symmetric)[1][:, -1]
+    return found if found[3] >= 0 else -found
+
+
+def roll_pitch_yaw(object_from_camera: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(3,): radians about the camera's z, x and y axis in R = Ry(yaw) Rx(pitch) Rz(roll), of a camera whose y is down.
+
+    All zero where the camera's axes are the object's, the paper's initial orientation.
+    """
+    r = object_from_camera
+    pitch = np.arctan2(-r[1, 2], np.hypot(r[0, 2], r[2, 2]))
+    return np.array([np.arctan2(r[1, 0], r[1, 1]), pitch, np.arctan2(r[0, 2], r[2, 2])])

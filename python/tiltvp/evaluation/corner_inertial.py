@@ -1,0 +1,159 @@
+"""Attitudes of corners as the reference of a complementary filter, against one that has an accelerometer alone."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+import polars as pl
+
+from tiltvp._core import ComplementaryFilter
+from tiltvp.errors import InvalidInputError
+from tiltvp.rotations import ROTATION_WORDS
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from tiltvp.synth import ImuLog, StereoSequence
+
+__all__ = [
+    "CONVENTIONAL",
+    "compare_inertial",
+    "conventional_angles",
+    "filter_attitudes",
+    "summarise_inertial_comparison",
+]
+
+CONVENTIONAL: Final = ("complementary", "Mahony")
+"""The complementary filter of angles, and the explicit one on rotations, as the `ahrs` package has them."""
+
+_TIME_CONSTANTS_S: Final = (0.5, 1.0, 2.0, 5.0, 10.0, 20.0)
+"""What the conventional filters are tried with; the best one of each is compared."""
+
+_INTEGRAL_SHARE: Final = 0.05
+"""Integral gain of the explicit complementary filter, in shares of its proportional one."""
+
+_FORWARD: Final = np.array(ROTATION_WORDS["forward"])
+"""From a camera to the board that holds it, and alike from an object's frame, y downwards, to one with z upwards."""
+
+
+def compare_inertial(
+    sequence: StereoSequence, attitudes: Sequence[NDArray[np.float64] | None], *, seed: int = 0
+) -> pl.DataFrame:
+    """Errors of roll, pitch and yaw in degrees, with columns `method` and `time_s`.
+
+    `attitudes` are the estimates `camera_from_object` of each frame, or None. Methods: the image alone, at its frames;
+    `ComplementaryFilter` with the image as its reference, and `CONVENTIONAL`, filters of accelerometer and gyroscope,
+    at the readings of a simulated sensor (`StereoSequence.imu` of that seed). The latter know no yaw; each has the
+    time constant that suits the truth best. Angles are those of the board that holds the cameras, x forward and z up
+    (ROS REP 103). Raises `InvalidInputError` where the package is missing or no frame has an attitude.
+    """
+    imu = sequence.imu(seed=seed)
+    corner = sequence.corners[sequence.corner]
+    truth = _board_angles(_level(sequence.poses_at(imu.times_s), corner.world_from_object))
+    seen = {float(t): a for t, a in zip(sequence.times_s, attitudes, strict=True) if a is not None}
+    if not seen:
+        raise InvalidInputError("attitudes: none in any frame, expected some")
+    frames = np.array(list(seen))
+    images = np.stack([_FORWARD @ a.T @ _FORWARD.T for a in seen.values()])
+    at_frames = _board_angles(_level(sequence.poses_at(frames), corner.world_from_object))
+    fused = filter_attitudes(imu, seen)
+    known = np.isfinite(fused).all(axis=(1, 2))
+    level = np.einsum("ij,njk,lk->nil", _FORWARD, fused[known], _FORWARD)
+    tables = [
+        _errors("image", frames, _board_angles(images), at_frames),
+        _errors("gyroscope + image", imu.times_s[known], _board_angles(level), truth[known]),
+    ]
+    for method in CONVENTIONAL:
+        every = [conventional_angles(imu, method, tau)[known] for tau in _TIME_CONSTANTS_S]
+        best = min(every, key=lambda angles: float(np.sum(_wrapped(angles - truth[known])[:, :2] ** 2)))
+        tables.append(_errors(f"gyroscope + accelerometer, {method}", imu.times_s[known], best, truth[known]))
+    return pl.concat(tables)
+
+
+def summarise_inertial_comparison(table: pl.DataFrame) -> pl.DataFrame:
+    """Root mean square and greatest errors in degrees, by method."""
+    angles = ("roll", "pitch", "yaw")
+    return table.group_by("method", maintain_order=True).agg(
+        pl.len().alias("readings"),
+        *((pl.col(name) ** 2).mean().sqrt().alias(f"{name} rms") for name in angles),
+        *(pl.col(name).abs().max().alias(f"{name} max") for name in angles),
+    )
+
+
+def filter_attitudes(imu: ImuLog, seen: dict[float, NDArray[np.float64]]) -> NDArray[np.float64]:
+    """(M, 3, 3): `object_from_camera` at each reading, NaN before the first of the attitudes `seen`.
+
+    `seen` has `camera_from_object` by time in seconds; an attitude is used at the first reading that is not before it.
+    """
+    out = np.full((len(imu.times_s), 3, 3), np.nan)
+    waiting = sorted(seen.items())
+    fusion: ComplementaryFilter | None = None
+    before = float(imu.times_s[0])
+    for k, time in enumerate(imu.times_s.tolist()):
+        rate = 0.5 * (imu.rates_rad_s[max(k - 1, 0)] + imu.rates_rad_s[k])
+        while waiting and waiting[0][0] <= time + 1e-9:
+            moment, attitude = waiting.pop(0)
+            if fusion is None:
+                fusion = ComplementaryFilter(attitude.T)
+            else:
+                fusion.predict(rate, max(moment - before, 0.0))
+                fusion.correct(attitude.T)
+            before = max(moment, before)
+        if fusion is not None:
+            fusion.predict(rate, max(time - before, 0.0))
+            out[k] = fusion.reference_from_body
+        before = time
+    return out
+
+
+def conventional_angles(imu: ImuLog, method: str, time_constant_s: float) -> NDArray[np.float64]:
+    """(M, 3): roll, pitch and yaw (NaN) in radians, from one of the filters `CONVENTIONAL` of the `ahrs` package."""
+    try:
+        from ahrs.filters import Complementary, Mahony  # type: ignore[import-untyped]
+    except ImportError as error:
+        raise InvalidInputError("ahrs: not installed, expected pip install 'tiltvp[imu]'") from error
+
+    step_s = float(np.median(np.diff(imu.times_s)))
+    rates, forces = imu.rates_rad_s @ _FORWARD.T, imu.forces_m_s2 @ _FORWARD.T
+    if method == "complementary":
+        gain = time_constant_s / (time_constant_s + step_s)
+        angles = np.array(Complementary(gyr=rates, acc=forces, frequency=1.0 / step_s, gain=gain).W, dtype=np.float64)
+    else:
+        gain = 1.0 / time_constant_s
+        filtered = Mahony(gyr=rates, acc=forces, frequency=1.0 / step_s, k_P=gain, k_I=_INTEGRAL_SHARE * gain)
+        w, x, y, z = np.asarray(filtered.Q, dtype=np.float64).T
+        roll = np.arctan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y))
+        angles = np.column_stack([roll, np.arcsin(np.clip(2.0 * (w * y - z * x), -1.0, 1.0)), roll])
+    angles[:, 2] = np.nan
+    return angles
+
+
+def _level(poses: NDArray[np.float64], world_from_object: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(N, 3, 3): rotations of the board in the levelled object frame, from `world_from_left`."""
+    camera = np.einsum("ji,njk->nik", world_from_object, poses[:, :3, :3])
+    level: NDArray[np.float64] = np.einsum("ij,njk,lk->nil", _FORWARD, camera, _FORWARD)
+    return level
+
+
+def _board_angles(rotations: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(N, 3): roll, pitch, yaw of Rz(yaw) Ry(pitch) Rx(roll), radians."""
+    r = rotations
+    roll = np.arctan2(r[:, 2, 1], r[:, 2, 2])
+    pitch = np.arctan2(-r[:, 2, 0], np.hypot(r[:, 2, 1], r[:, 2, 2]))
+    return np.column_stack([roll, pitch, np.arctan2(r[:, 1, 0], r[:, 0, 0])])
+
+
+def _wrapped(angles: NDArray[np.float64]) -> NDArray[np.float64]:
+    wrapped: NDArray[np.float64] = (angles + np.pi) % (2.0 * np.pi) - np.pi
+    return wrapped
+
+
+def _errors(
+    method: str, times: NDArray[np.float64], angles: NDArray[np.float64], truth: NDArray[np.float64]
+) -> pl.DataFrame:
+    errors = np.degrees(_wrapped(angles - truth))
+    columns: dict[str, Any] = {"method": [method] * len(times), "time_s": times}
+    columns |= {name: errors[:, k] for k, name in enumerate(("roll", "pitch", "yaw"))}
+    return pl.DataFrame(columns).with_columns(pl.col("roll", "pitch", "yaw").fill_nan(None))

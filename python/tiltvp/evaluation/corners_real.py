@@ -1,0 +1,252 @@
+"""Corners of real things: a cabinet before motion capture, and a box of tea before a pair of cameras."""
+
+from __future__ import annotations
+
+import math
+import xml.etree.ElementTree as ElementTree
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from itertools import product
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tiltvp.cameras import Camera
+from tiltvp.corner import CornerEstimate, CornerPoseEstimator
+from tiltvp.errors import InvalidInputError
+from tiltvp.images import read_image
+from tiltvp.stereo_rigs import StereoRig
+from tiltvp.videos import VideoReader
+
+Show = Callable[[int, NDArray[np.uint8], CornerEstimate], None]
+"""Takes the number of a frame, its (left) image, and what was found."""
+
+__all__ = [
+    "CABINET_PITCH_DEG",
+    "TEA_BOX_MM",
+    "TEA_BOX_PITCH_DEG",
+    "Cabinet",
+    "TeaBox",
+    "cabinet",
+    "cabinet_camera",
+    "steps",
+    "tea_box",
+    "tea_box_rig",
+]
+
+Matrix = NDArray[np.float64]
+CABINET_PITCH_DEG: Final = -45.0
+"""Roughly how the camera was held, which says which edge of the first image is vertical."""
+TEA_BOX_PITCH_DEG: Final = -45.0
+TEA_BOX_MM: Final = (165.0, 68.0, 80.0)
+_INTRINSICS: Final = (535.4, 539.2, 320.1, 247.6)
+_SAME_LINE_RAD: Final = math.radians(0.4)
+
+
+@dataclass(frozen=True)
+class Cabinet:
+    """What became of the cabinet's images."""
+
+    frames: int
+    places: NDArray[np.int64]
+    """(N,): which images had a pose."""
+    error_deg: Matrix
+    """(N,): angle between estimated and true attitude after one constant turn about the vertical."""
+    free_error_deg: Matrix
+    """(N,): the same after one constant turn about any axis."""
+    lean_deg: float
+    """How far the cabinet's vertical is from that of the motion capture."""
+
+
+@dataclass(frozen=True)
+class TeaBox:
+    """What became of the pairs of images of the box."""
+
+    frames: int
+    places: NDArray[np.int64]
+    """(N,): which pairs had a pose."""
+    objects: NDArray[np.int64]
+    """(N,): the number of the corner that each pose is of."""
+    vertex_m: Matrix
+    """(N, 3)"""
+    attitudes: Matrix
+    """(N, 3, 3): `camera_from_object`."""
+    angles_deg: Matrix
+    """(N, 3): between the edges x y, y z, z x, each where the planes of its two rays meet: nothing makes them right."""
+    lengths_mm: dict[str, Matrix]
+    """Lengths of edges: `long`, from one corner to the other, `ends`, from a corner to where the ray x or z that is
+    not the long one ends, and `height`, to where the ray y does."""
+
+
+def cabinet(folder: Path, advance: Callable[[], None] = lambda: None, show: Show | None = None) -> Cabinet:
+    """The attitude of the one camera in each image of the cabinet, against motion capture."""
+    files = sorted((folder / "raw_imgs").glob("*.jpg"))
+    truth = np.loadtxt(folder / "truth_cam_poses.txt", ndmin=2)
+    if not files or len(files) != len(truth):
+        raise InvalidInputError(f"{folder}: {len(files)} images and {len(truth)} poses, expected as many of both")
+    estimator = CornerPoseEstimator(cabinet_camera(), method="general", down=_down(CABINET_PITCH_DEG))
+    places, seen = [], []
+    for place, file in enumerate(files):
+        image = read_image(file)
+        estimate = estimator(image)
+        if show is not None:
+            show(place, image, estimate)
+        if estimate.pose is not None:
+            places.append(place)
+            seen.append(_rotation(truth[place, 4:8]) @ estimate.pose.camera_from_object)
+        advance()
+    if not seen:
+        raise InvalidInputError(f"{folder}: no corner in any image")
+    mean = seen[len(seen) // 2]
+    for _ in range(10):
+        renamed = [
+            max((turn @ naming for naming in _namings()), key=lambda a: float(np.trace(mean.T @ a))) for turn in seen
+        ]
+        mean = mean @ _exp(np.median([_log(mean.T @ turn) for turn in renamed], axis=0))
+    lean = math.acos(min(1.0, abs(float(mean[2, 1]))))
+    up = mean[:, 1] * np.sign(mean[2, 1])
+    axis = np.cross(up, [0.0, 0.0, 1.0])
+    level = _exp(axis) @ mean
+    for _ in range(5):
+        level = level @ _exp(np.array([0.0, np.mean([_log(level.T @ turn)[1] for turn in renamed]), 0.0]))
+    errors = [[np.degrees(np.linalg.norm(_log(one.T @ turn))) for turn in renamed] for one in (level, mean)]
+    return Cabinet(len(files), np.array(places), np.array(errors[0]), np.array(errors[1]), math.degrees(lean))
+
+
+def cabinet_camera() -> Camera:
+    """The camera of the cabinet's images, whose distortion has been taken out."""
+    fx, fy, cx, cy = _INTRINSICS
+    return Camera.pinhole(width=640, height=480, fx=fx, fy=fy, cx=cx, cy=cy)
+
+
+def tea_box_rig(folder: Path) -> StereoRig:
+    """The cameras of the box, from ViSP's files."""
+    cameras = []
+    for side in ("left", "right"):
+        tree = ElementTree.parse(folder / f"teabox_{side}.xml")
+        values = {name: float(tree.findtext(f".//camera/{name}") or "nan") for name in ("px", "py", "u0", "v0")}
+        cameras.append(
+            Camera.pinhole(width=640, height=480, fx=values["px"], fy=values["py"], cx=values["u0"], cy=values["v0"])
+        )
+    right_from_left: Matrix = np.loadtxt(folder / "cRightMcLeft.txt")
+    u, _, v = np.linalg.svd(right_from_left[:3, :3])
+    right_from_left[:3, :3] = u @ v
+    return StereoRig(cameras[0], cameras[1], np.asarray(np.linalg.inv(right_from_left), dtype=np.float64))
+
+
+def tea_box(folder: Path, advance: Callable[[], None] = lambda: None, show: Show | None = None) -> TeaBox:
+    """The pose of the pair of cameras before the box, in each pair of frames, and the box' angles and lengths."""
+    rig = tea_box_rig(folder)
+    estimator = CornerPoseEstimator(
+        rig.left, rig.right, rig.left_from_right, method="general", down=_down(TEA_BOX_PITCH_DEG)
+    )
+    videos = [VideoReader(folder / f"teabox_{side}.mp4") for side in ("left", "right")]
+    lengths: dict[str, list[float]] = {"long": [], "ends": [], "height": []}
+    rows = []
+    frames = 0
+    for place, (left, right) in enumerate(zip(*videos, strict=True)):
+        frames += 1
+        estimate = estimator(left, right)
+        if show is not None:
+            show(place, left, estimate)
+        pose = estimate.pose
+        if pose is not None and pose.vertex_m is not None and estimate.chosen_right is not None:
+            rows.append((place, estimate.object, pose.vertex_m, pose.camera_from_object, _angles(estimate, rig)))
+            for name, length in _lengths(estimate):
+                lengths[name].append(1e3 * length)
+        advance()
+    if not rows:
+        raise InvalidInputError(f"{folder}: no corner in any pair of frames")
+    places, objects, vertices, attitudes, angles = zip(*rows, strict=True)
+    return TeaBox(
+        frames, np.array(places), np.array(objects), np.array(vertices), np.array(attitudes), np.array(angles),
+        {name: np.array(values) for name, values in lengths.items()},
+    )  # fmt: skip
+
+
+def steps(box: TeaBox) -> tuple[Matrix, Matrix]:
+    """How far vertex (mm) and attitude (degrees) move between neighbouring frames of the same corner."""
+    next_to = (np.diff(box.places) == 1) & (np.diff(box.objects) == 0)
+    move = 1e3 * np.linalg.norm(np.diff(box.vertex_m, axis=0), axis=1)
+    turn = [
+        np.degrees(np.linalg.norm(_log(a.T @ b))) for a, b in zip(box.attitudes[:-1], box.attitudes[1:], strict=True)
+    ]
+    return move[next_to], np.array(turn)[next_to]
+
+
+def _angles(estimate: CornerEstimate, rig: StereoRig) -> Matrix:
+    """(3,): degrees between the edges, each along the line in which the planes of its rays in both images meet."""
+    left, right = estimate.features_left[estimate.chosen_left[0]], estimate.features_right[estimate.chosen_right or 0]
+    turned = right.normals @ rig.left_from_right[:3, :3].T
+    edges = np.cross(left.normals, turned)
+    edges /= np.linalg.norm(edges, axis=1, keepdims=True)
+    assert estimate.pose is not None
+    edges *= np.sign((edges * estimate.pose.edges).sum(axis=1, keepdims=True))
+    cosines = np.clip([edges[0] @ edges[1], edges[1] @ edges[2], edges[2] @ edges[0]], -1.0, 1.0)
+    return np.asarray(np.degrees(np.arccos(cosines)), dtype=np.float64)
+
+
+def _lengths(estimate: CornerEstimate) -> Iterator[tuple[str, float]]:
+    """Lengths of the edges from the vertex, metres: to another corner of the left image, or to where a ray ends."""
+    assert estimate.pose is not None
+    assert estimate.pose.vertex_m is not None
+    vertex, edges = estimate.pose.vertex_m, estimate.pose.edges
+    feature = estimate.features_left[estimate.chosen_left[0]]
+    long: int | None = None
+    for axis in (0, 2):
+        normal = np.cross(vertex, edges[axis])
+        normal /= np.linalg.norm(normal)
+        for other in estimate.features_left:
+            if abs(float(normal @ other.vertex)) < _SAME_LINE_RAD:
+                length = _along(vertex, edges[axis], other.vertex)
+                if length > 0.12:
+                    long = axis
+                    yield "long", length
+    if long is not None:
+        yield "ends", _along(vertex, edges[2 - long], feature.toward[2 - long])
+        yield "height", _along(vertex, edges[1], feature.toward[1])
+
+
+def _along(vertex: Matrix, edge: Matrix, bearing: Matrix) -> float:
+    """How far from the vertex along an edge the point is that is nearest to a line of sight."""
+    aside = np.eye(3) - np.outer(bearing, bearing)
+    return float(-(aside @ vertex) @ (aside @ edge) / ((aside @ edge) @ (aside @ edge)))
+
+
+def _down(pitch_deg: float) -> tuple[float, float, float]:
+    pitch = math.radians(pitch_deg)
+    return 0.0, math.cos(pitch), -math.sin(pitch)
+
+
+def _namings() -> Iterator[Matrix]:
+    for quarter, over in product(range(4), (1.0, -1.0)):
+        yield _exp(np.array([0.0, 0.5 * math.pi * quarter, 0.0])) @ np.diag([1.0, over, over])
+
+
+def _exp(vector: Matrix) -> Matrix:
+    angle = float(np.linalg.norm(vector))
+    if angle == 0.0:
+        return np.eye(3)
+    x, y, z = vector / angle
+    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    turn: Matrix = np.eye(3) + math.sin(angle) * cross + (1.0 - math.cos(angle)) * cross @ cross
+    return turn
+
+
+def _log(rotation: Matrix) -> Matrix:
+    axis = np.array([rotation[2, 1] - rotation[1, 2], rotation[0, 2] - rotation[2, 0], rotation[1, 0] - rotation[0, 1]])
+    sine = float(np.linalg.norm(axis))
+    angle = math.atan2(sine, float(np.trace(rotation)) - 1.0)
+    return np.asarray(axis * (angle / sine if sine > 1e-12 else 0.5), dtype=np.float64)
+
+
+def _rotation(quaternion: Matrix) -> Matrix:
+    """From x, y, z, w, to the digits that the file has."""
+    x, y, z, w = quaternion / np.linalg.norm(quaternion)
+    return np.array([
+        [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+        [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+        [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
+    ])  # fmt: skip

@@ -1,0 +1,123 @@
+"""Pairs of cameras: Kalibr's camchain with two cameras, and our own TOML.
+
+format = "tiltvp-stereo"
+version = 1
+left_from_right = [[1, 0, 0, 0.12], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]
+[left]
+model = "pinhole"
+width = 1280
+height = 720
+[left.parameters]
+fx = 702.0
+...
+[right]
+...
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import tomllib
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+import tomli_w
+from numpy.typing import NDArray
+
+from tiltvp.errors import CalibrationError
+from tiltvp.formats import kalibr
+from tiltvp.formats.document import Document
+from tiltvp.formats.node import Node
+from tiltvp.formats.own import as_floats, camera_from, camera_table, write_whole
+from tiltvp.formats.spec import CameraSpec, ImageSize
+
+__all__ = ["StereoSpec", "read_stereo", "write_stereo_toml"]
+
+_FORMAT: Final = "tiltvp-stereo"
+_VERSION: Final = 1
+_MARK: Final = re.compile(r"^\s*format\s*=\s*[\"']tiltvp-stereo[\"']", re.MULTILINE)
+_EXPECTED: Final = 'a camchain of Kalibr with two cameras, or a file with format = "tiltvp-stereo"'
+
+
+@dataclass(frozen=True, eq=False)
+class StereoSpec:
+    """Two cameras and how they sit to each other, as a file tells."""
+
+    left: CameraSpec
+    right: CameraSpec
+    left_from_right: NDArray[np.float64]
+    """(4, 4): takes points of the right camera's frame to the left one's, metres."""
+
+
+def read_stereo(path: str | os.PathLike[str], image_size: ImageSize | None = None) -> StereoSpec:
+    """The pair of a file. Raises `tiltvp.errors.CalibrationError` that says what was wrong, what was expected and
+    where.
+    """
+    document = Document.load(path)
+    if _MARK.search(document.text) is not None:
+        return _own(document, image_size)
+    if kalibr.recognise(document):
+        return _camchain(document, image_size)
+    document.fail("is no calibration of a pair of cameras", _EXPECTED, "the top of the file")
+
+
+def write_stereo_toml(spec: StereoSpec, path: str | os.PathLike[str]) -> None:
+    """Writes a pair to `path`; the file appears whole or not at all."""
+    tree = {"format": _FORMAT, "version": _VERSION, "left_from_right": np.asarray(spec.left_from_right).tolist()}
+    tree |= {"left": camera_table(as_floats(spec.left)), "right": camera_table(as_floats(spec.right))}
+    write_whole(Path(path), tomli_w.dumps(tree).encode("utf-8"))
+
+
+def _own(document: Document, image_size: ImageSize | None) -> StereoSpec:
+    try:
+        tree = tomllib.loads(document.text)
+    except (ValueError, RecursionError) as error:
+        document.fail(f"is not TOML ({error})", "a file written by tiltvp", "the place named")
+    root = Node(document, tree)
+    root.only("format", "version", "left_from_right", "left", "right")
+    version = root.need("version")
+    if version.integer() != _VERSION:
+        version.refuse(f"version {version.integer()} is not supported", f"version {_VERSION}")
+    left, right = (camera_from(root.need(side), image_size) for side in ("left", "right"))
+    return StereoSpec(left, right, _motion(root.need("left_from_right")))
+
+
+def _camchain(document: Document, image_size: ImageSize | None) -> StereoSpec:
+    cameras = kalibr.parse(document, image_size)
+    if len(cameras) != 2:
+        document.fail(f"{len(cameras)} cameras", "two, the left one first", "the top of the file")
+    names = [key for key in document.tree if re.fullmatch(r"cam\d+", key)]
+    right_from_left = _motion(Node.root(document).need(names[1]).need("T_cn_cnm1"))
+    return StereoSpec(cameras[0], cameras[1], _inverse(right_from_left))
+
+
+def _motion(node: Node) -> NDArray[np.float64]:
+    """A (4, 4) rigid motion; a rotation to the digits that files have is made one to all."""
+    try:
+        matrix = np.array(node.value, dtype=np.float64)
+    except (ValueError, TypeError):
+        matrix = np.zeros(0)
+    if matrix.shape != (4, 4) or not np.isfinite(matrix).all():
+        node.fail("is no (4, 4) matrix of numbers", "four rows of four numbers")
+    u, _, v = np.linalg.svd(matrix[:3, :3])
+    nearest = u @ v
+    off = float(np.abs(nearest - matrix[:3, :3]).max())
+    if off > 1e-3 or np.linalg.det(nearest) < 0.0 or not np.array_equal(matrix[3], [0.0, 0.0, 0.0, 1.0]):
+        node.fail(
+            f"is no rigid motion (its rotation is off by {off:.1e})", "a rotation, a translation, and 0 0 0 1 below"
+        )
+    motion = np.eye(4)
+    motion[:3, :3], motion[:3, 3] = nearest, matrix[:3, 3]
+    if not np.linalg.norm(motion[:3, 3]) > 0.0:
+        raise CalibrationError(f"{node.document.path}: no baseline, expected two places, at {node.at}")
+    return motion
+
+
+def _inverse(motion: NDArray[np.float64]) -> NDArray[np.float64]:
+    back = np.eye(4)
+    back[:3, :3] = motion[:3, :3].T
+    back[:3, 3] = -motion[:3, :3].T @ motion[:3, 3]
+    return back

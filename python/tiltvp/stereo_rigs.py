@@ -1,0 +1,39 @@
+"""`StereoRig`: a pair of calibrated cameras and how they sit to each other, from calibration files."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass
+from typing import Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tiltvp.cameras import Camera
+from tiltvp.formats.stereo import StereoSpec, read_stereo, write_stereo_toml
+
+__all__ = ["StereoRig"]
+
+
+@dataclass(frozen=True, eq=False)
+class StereoRig:
+    """Two cameras of any lens models."""
+
+    left: Camera
+    right: Camera
+    left_from_right: NDArray[np.float64]
+    """(4, 4): the right camera's pose in the left one's frame, metres."""
+
+    @classmethod
+    def load(cls, path: str | os.PathLike[str], *, image_size: tuple[int, int] | None = None) -> Self:
+        """From a camchain of Kalibr with two cameras, the left one first, or from our own TOML.
+
+        Raises `tiltvp.errors.CalibrationError` that says what was wrong, what was expected and where.
+        """
+        spec = read_stereo(path, image_size)
+        return cls(Camera.from_spec(spec.left), Camera.from_spec(spec.right), spec.left_from_right)
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Writes our own TOML, whole or not at all."""
+        spec = StereoSpec(self.left.to_spec("left"), self.right.to_spec("right"), self.left_from_right)
+        write_stereo_toml(spec, path)

@@ -1,0 +1,31 @@
+"""Corners of real things: a cabinet before motion capture, a box of tea before a pair of cameras."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from tiltvp.evaluation import corners_real as real
+
+
+def test_the_cabinet_against_motion_capture(data: Path) -> None:
+    found = real.cabinet(data / "corner" / "cube_slam_cabinet")
+    rms = float(np.sqrt(np.mean(found.error_deg**2)))
+    print(f"{len(found.places)} of {found.frames}, rms {rms:.2f} deg, leaning {found.lean_deg:.2f} deg")
+    assert len(found.places) >= 0.8 * found.frames
+    assert rms <= 1.0
+    # Both the cabinet and the capture's frame are level, so that one turn about the vertical brings them together.
+    assert found.lean_deg < 0.5
+
+
+def test_the_tea_box_before_two_cameras(data: Path) -> None:
+    box = real.tea_box(data / "corner" / "visp_teabox_stereo")
+    step_mm, turn_deg = real.steps(box)
+    medians = {name: float(np.median(values)) for name, values in box.lengths_mm.items()}
+    print(f"{len(box.places)} of {box.frames}, {medians}, angles {np.median(box.angles_deg, axis=0)}")
+    assert len(box.places) >= 0.7 * box.frames
+    assert np.median(step_mm) < 4.0
+    assert np.median(turn_deg) < 1.0
+    # The long edge comes out 3 % short from either of its corners, as if the files' baseline were.
+    assert abs(medians["long"] - 165.0) < 7.0

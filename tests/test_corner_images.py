@@ -1,0 +1,177 @@
+"""Corners in drawn images: both front ends, one camera and two, rigs on disk, the command line."""
+
+from __future__ import annotations
+
+import math
+import pickle
+from pathlib import Path
+
+import cv2
+import numpy as np
+import polars as pl
+import pytest
+
+import tiltvp
+from tiltvp.cli.app import main
+from tiltvp.corner import CornerDetector, CornerPoseEstimator
+from tiltvp.errors import CalibrationError, InvalidInputError
+from tiltvp.stereo_rigs import StereoRig
+
+CAMERA = tiltvp.Camera.pinhole(width=480, height=360, fx=400.0, fy=400.0, cx=240.0, cy=180.0)
+COLOURS = {"top": (30, 40, 220), "left": (50, 190, 40), "right": (210, 60, 30)}
+GREYS = {"top": (200, 200, 200), "left": (120, 120, 120), "right": (60, 60, 60)}
+LEFT_FROM_RIGHT = np.eye(4)
+LEFT_FROM_RIGHT[:3, 3] = (0.12, 0.01, -0.02)
+
+
+def turn(axis: str, degrees: float) -> np.ndarray:
+    c, s = math.cos(math.radians(degrees)), math.sin(math.radians(degrees))
+    rows = {"x": [[1, 0, 0], [0, c, -s], [0, s, c]], "y": [[c, 0, s], [0, 1, 0], [-s, 0, c]]}
+    return np.array(rows.get(axis, [[c, -s, 0], [s, c, 0], [0, 0, 1]]), dtype=np.float64)
+
+
+def pose(yaw: float = 40.0, pitch: float = 28.0, roll: float = 4.0) -> tuple[np.ndarray, np.ndarray]:
+    """The cuboid's frame (y down, x and z to the back) and its corner, in the camera's frame."""
+    return turn("z", roll) @ turn("x", pitch) @ turn("y", -yaw), np.array([0.02, -0.03, 1.2])
+
+
+def drawn(
+    rotation: np.ndarray, vertex: np.ndarray, faces: dict[str, tuple[int, int, int]], fine: int = 8
+) -> np.ndarray:
+    """The cuboid in front of grey, every pixel the mean light of `fine` squared places."""
+    x, y, z = 0.3 * rotation.T
+    corners = {"top": (x, x + z, z), "left": (z, y + z, y), "right": (y, x + y, x)}
+    picture = np.full((360 * fine, 480 * fine, 3), 150, np.uint8)
+    for face, (a, b, c) in corners.items():
+        points = np.array([vertex, vertex + a, vertex + b, vertex + c])
+        pixels = points[:, :2] / points[:, 2:] * 400.0 + (240.0, 180.0)
+        cv2.fillPoly(picture, [np.rint(((pixels + 0.5) * fine - 0.5) * 16).astype(np.int32)], faces[face], shift=4)
+    light = (picture.astype(np.float32) / 255.0) ** 2.2
+    light = cv2.GaussianBlur(cv2.resize(light, (480, 360), interpolation=cv2.INTER_AREA), (0, 0), 0.7)
+    noise = np.random.default_rng(5).normal(0.0, 1.0, light.shape)
+    return np.clip(np.rint(255.0 * light ** (1 / 2.2) + noise), 0, 255).astype(np.uint8)
+
+
+def off_deg(found: np.ndarray, true: np.ndarray) -> float:
+    return math.degrees(2.0 * math.asin(min(1.0, float(np.linalg.norm(found - true)) / math.sqrt(8.0))))
+
+
+def pair(faces: dict[str, tuple[int, int, int]]) -> tuple[np.ndarray, np.ndarray]:
+    rotation, vertex = pose()
+    return drawn(rotation, vertex, faces), drawn(rotation, vertex - LEFT_FROM_RIGHT[:3, 3], faces)
+
+
+@pytest.mark.parametrize("yaw", [25.0, 45.0, 62.0])
+def test_one_camera_finds_the_coloured_cuboid(yaw: float) -> None:
+    rotation, vertex = pose(yaw)
+    estimate = CornerPoseEstimator(CAMERA)(drawn(rotation, vertex, COLOURS))
+    assert estimate, estimate.reason
+    assert estimate.pose is not None
+    assert estimate.pose.vertex_m is None
+    assert off_deg(estimate.pose.camera_from_object, rotation) < 0.3
+    assert estimate.pose.right_handed
+
+
+def test_a_camera_upside_down_finds_it_too() -> None:
+    rotation, vertex = pose()
+    image = np.ascontiguousarray(drawn(rotation, vertex, COLOURS)[::-1, ::-1])
+    found = CornerDetector(CAMERA)(image)
+    assert len(found) == 1
+    assert not CornerDetector(CAMERA, orientation="upright")(image)
+
+
+def test_two_cameras_find_its_place() -> None:
+    rotation, vertex = pose()
+    estimator = CornerPoseEstimator(CAMERA, CAMERA, LEFT_FROM_RIGHT)
+    estimate = estimator(*pair(COLOURS))
+    assert estimate, estimate.reason
+    assert off_deg(estimate.pose.camera_from_object, rotation) < 0.2
+    assert np.linalg.norm(estimate.pose.vertex_m - vertex) < 0.01
+    assert np.linalg.norm(estimate.pose.camera_in_object_m + rotation.T @ vertex) < 0.01
+    assert not estimate.followed
+    assert estimator(*pair(COLOURS)).followed
+
+
+def test_grey_corners_are_found_by_segments() -> None:
+    rotation, _ = pose()
+    down = rotation[:, 1]
+    detector = CornerDetector(CAMERA, method="general")
+    left, right = pair(GREYS)
+    assert len(detector.segments(left)) >= 6
+    assert detector(left, down)
+    estimate = CornerPoseEstimator(CAMERA, CAMERA, LEFT_FROM_RIGHT, method="general", down=down)(left, right)
+    assert estimate, estimate.reason
+    assert estimate.pose.misfit < 3.0
+    # Any corner of the cuboid will do: its edges run along the same axes.
+    axes = np.abs(estimate.pose.camera_from_object.T @ rotation)
+    assert np.allclose(np.sort(axes.ravel())[-3:], 1.0, atol=1e-4)
+
+
+def test_values_and_options() -> None:
+    detector = CornerDetector(CAMERA, faces="gbr", chromaticity_min=0.5)
+    again = pickle.loads(pickle.dumps(detector))
+    assert again == detector
+    assert again.options["faces"] == "gbr"
+    [feature] = CornerDetector(CAMERA)(drawn(*pose(), COLOURS))
+    assert pickle.loads(pickle.dumps(feature)) == feature
+    assert np.isclose(np.linalg.norm(feature.vertex), 1.0)
+    for wrong in (
+        {"faces": "rrb"},
+        {"chromaticity_min": 0.1},
+        {"chromatic": 1},
+        {"method": "none"},
+        {"gradient_min": 60},
+    ):
+        with pytest.raises(InvalidInputError, match=next(iter(wrong))):
+            CornerDetector(CAMERA, **wrong)
+    with pytest.raises(InvalidInputError, match="360 x 480"):
+        CornerDetector(CAMERA)(np.zeros((10, 10, 3), np.uint8))
+    with pytest.raises(InvalidInputError, match="shape"):
+        CornerDetector(CAMERA)(np.zeros((360, 480), np.uint8))
+    with pytest.raises(InvalidInputError, match="left_from_right"):
+        CornerPoseEstimator(CAMERA, CAMERA)
+    with pytest.raises(InvalidInputError, match="misfit_max"):
+        CornerPoseEstimator(CAMERA, misfit_max=-1.0)
+    blank = np.full((360, 480, 3), 128, np.uint8)
+    empty = CornerPoseEstimator(CAMERA)(blank)
+    assert not empty
+    assert empty.pose is None
+    assert "left" in empty.reason
+
+
+def test_rigs_come_back_from_disk(tmp_path: Path) -> None:
+    rig = StereoRig(CAMERA, CAMERA, LEFT_FROM_RIGHT)
+    rig.save(tmp_path / "rig.toml")
+    again = StereoRig.load(tmp_path / "rig.toml")
+    assert again.left == CAMERA
+    assert np.allclose(again.left_from_right, LEFT_FROM_RIGHT, atol=1e-15)
+    CAMERA.save(tmp_path / "one.toml")
+    with pytest.raises(CalibrationError, match="pair of cameras"):
+        StereoRig.load(tmp_path / "one.toml")
+    lens = "camera_model: pinhole, distortion_model: none, distortion_coeffs: [], intrinsics: [400, 400, 240, 180]"
+    camera = f"{{{lens}, resolution: [480, 360]"
+    motion = np.linalg.inv(LEFT_FROM_RIGHT).tolist()
+    (tmp_path / "chain.yaml").write_text(f"cam0: {camera}}}\ncam1: {camera}, T_cn_cnm1: {motion}}}\n")
+    chain = StereoRig.load(tmp_path / "chain.yaml")
+    assert np.allclose(chain.left_from_right, LEFT_FROM_RIGHT, atol=1e-12)
+
+
+def test_the_command_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    StereoRig(CAMERA, CAMERA, LEFT_FROM_RIGHT).save(tmp_path / "rig.toml")
+    CAMERA.save(tmp_path / "one.toml")
+    for side, image in zip(("left", "right"), pair(COLOURS), strict=True):
+        tiltvp.write_image(tmp_path / side / "a.png", image)
+    left, right = str(tmp_path / "left"), str(tmp_path / "right")
+    out, path = tmp_path / "poses.csv", tmp_path / "poses.txt"
+    words = ["corner", left, right, "--calibration", str(tmp_path / "rig.toml"), "--out", str(out)]
+    more = ["--overlay", str(tmp_path / "over"), "--trajectory", str(path), "--plot", str(tmp_path / "plot.png")]
+    assert main([*words, *more]) == 0
+    assert "1 with a pose" in capsys.readouterr().out
+    [row] = pl.read_csv(out).iter_rows(named=True)
+    rotation, vertex = pose()
+    assert np.allclose([row[name] for name in ("x_m", "y_m", "z_m")], -rotation.T @ vertex, atol=0.01)
+    assert len(path.read_text().splitlines()) == 2
+    assert tiltvp.read_image(tmp_path / "over" / "a.png").shape == (360, 480, 3)
+    assert (tmp_path / "plot.png").exists()
+    assert main(["corner", left, "--calibration", str(tmp_path / "one.toml"), "--out", str(out)]) == 0
+    assert main(["corner", left, right, "--calibration", str(tmp_path / "one.toml")]) == 2

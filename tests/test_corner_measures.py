@@ -1,0 +1,83 @@
+"""What `tiltvp measure corners` measures: the closed form, noise against its bound, poses in rendered sequences."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import polars as pl
+import pytest
+
+from tiltvp.cli import main
+from tiltvp.errors import InvalidInputError
+from tiltvp.evaluation.corner_closed_form import exact_poses, noisy_poses, summarise_exact, summarise_noisy
+from tiltvp.evaluation.corners import CORNER_SCENES, CornerExperiment, CornerScene, measure_corners, summarise_corners
+from tiltvp.plots.corners import corner_errors, inertial_errors
+from tiltvp.plots.picture import figure_picture
+
+
+def test_the_truth_is_among_the_hypotheses() -> None:
+    table = exact_poses(5000, seed=3)
+    assert table["pose"].to_list() == list(range(5000))
+    summary = summarise_exact(table).row(0, named=True)
+    assert summary["without"] == 0
+    assert summary["max_rad"] < 1e-9
+    assert summary["hypotheses"] >= 2
+    assert table.equals(exact_poses(5000, seed=3))
+
+
+def test_noise_is_as_the_bound_says() -> None:
+    """300 poses: the mean of as many chi-squares of 3 over 3 is within 0.8 and 1.25 but for one seed in 10,000."""
+    summary = summarise_noisy(noisy_poses(300, seed=5)).row(0, named=True)
+    assert 0.8**0.5 < summary["weighted_over_bound"] < 1.25**0.5
+    assert 2.4 < summary["nees_of_3"] < 3.75
+    assert 0.85 < summary["rms_over_bound"] < 1.15
+    assert summary["firm"] > 200
+
+
+@pytest.fixture(scope="module")
+def measured() -> tuple[pl.DataFrame, pl.DataFrame]:
+    scene = CornerScene("cuboid", options={"distance_m": (1.0, 1.3), "samples": 2})
+    return measure_corners(CornerExperiment(frames=12, scenes=(scene,)), threads=2)
+
+
+def test_poses_of_the_cuboid_are_close(measured: tuple[pl.DataFrame, pl.DataFrame]) -> None:
+    table, inertial = measured
+    summary = summarise_corners(table).row(0, named=True)
+    assert summary["frames"] == 12
+    assert summary["found"] > 0.9
+    assert summary["flips"] == 0
+    assert summary["attitude rms deg"] < 0.2
+    assert summary["position rms mm"] < 10.0
+    assert set(inertial["method"]) >= {"image", "gyroscope + image", "gyroscope + accelerometer, Mahony"}
+    found = table.filter("found")
+    angles = found.select((pl.col("roll_deg") ** 2 + pl.col("pitch_deg") ** 2 + pl.col("yaw_deg") ** 2).sqrt())
+    assert np.allclose(angles.to_series(), found["attitude_deg"])
+
+
+def test_plots_show_what_the_tables_hold(measured: tuple[pl.DataFrame, pl.DataFrame]) -> None:
+    table, inertial = measured
+    lost = table.with_columns(
+        found=pl.col("frame") != 3,
+        **{name: pl.when(pl.col("frame") != 3).then(name) for name in ("roll_deg", "pitch_deg", "yaw_deg")},
+    )
+    figure = corner_errors(lost, "cuboid")
+    labels = [text.get_text() for axes in figure.axes for text in axes.get_legend().get_texts()]
+    assert labels == ["roll", "pitch", "yaw", "x", "y", "z", "no corner found"]
+    assert figure_picture(figure, dpi=50).std() > 5
+    rows = inertial_errors(inertial).axes
+    assert len(rows[0].lines) - 1 == 4
+    assert len(rows[2].lines) - 1 == 2
+
+
+def test_the_command_measures_and_refuses(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["measure", "corners", "--poses", "500", "--noisy-poses", "20", "--frames", "0"]) == 0
+    assert "Cramer-Rao" in capsys.readouterr().out
+    asked = ["measure", "corners", "--poses", "0", "--noisy-poses", "0", "--frames", "20"]
+    assert main([*asked, "--scenes", "attic"]) != 0
+    assert CORNER_SCENES[0].name in capsys.readouterr().err
+    (tmp_path / "file").write_text("")
+    assert main([*asked, "--out", str(tmp_path / "file")]) != 0
+    assert "expected a folder" in capsys.readouterr().err
+    with pytest.raises(InvalidInputError, match="frames"):
+        CornerExperiment(frames=1)
