@@ -167,15 +167,16 @@ fn sieve_body<L: Level + Default>(
         strong += passing.count_ones() as usize;
         match test.vectors {
             Vectors::None => {}
-            Vectors::Each(each) => match each[start..].first_chunk() {
-                Some(each) => passing &= screened(each, &mut block, test.limit),
-                None => {
+            Vectors::Each(each) => {
+                let each = &each[start..];
+                passing &= if let Some(each) = each.first_chunk() {
+                    screened(each, &mut block, test.limit)
+                } else {
                     let mut rest = [[0; 2]; BLOCK];
-                    let own = each.len().min(start + BLOCK) - start;
-                    rest[..own].copy_from_slice(&each[start..start + own]);
-                    passing &= screened(&rest, &mut block, test.limit);
-                }
-            },
+                    rest[..each.len()].copy_from_slice(each);
+                    screened(&rest, &mut block, test.limit)
+                };
+            }
             Vectors::Line { first: [x, y], step } => {
                 let mut line = [[0, y]; BLOCK];
                 for (i, vector) in line.iter_mut().enumerate() {
@@ -230,8 +231,8 @@ fn gradients_of<L: Level>([a, m, b]: [&[L; BLOCK + 2]; 3], block: &mut Block) {
 /// One bit for each pixel that passes the screen.
 #[inline(always)]
 fn screened(vectors: &[[i16; 2]; BLOCK], block: &mut Block, limit: f32) -> u32 {
-    for i in 0..BLOCK {
-        let (x, y) = (i32::from(vectors[i][0]), i32::from(vectors[i][1]));
+    for (i, vector) in vectors.iter().enumerate() {
+        let (x, y) = (i32::from(vector[0]), i32::from(vector[1]));
         let across = (x * i32::from(block.gx[i]) + y * i32::from(block.gy[i])) as f32;
         block.screened[i] = if across * across <= limit * block.squared[i] as f32 { 0x80 } else { 0 };
     }

@@ -240,6 +240,7 @@ unsafe fn sieve_span<L: VectorLevel, const SCREEN: u8>(
 ) -> (usize, usize) {
     // SAFETY: as the caller vouches: blocks are whole within n, and the last one is masked.
     unsafe {
+        let Kept { slots, gradients } = kept;
         let count = _mm512_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15);
         let (mut line, mut step, mut each) = (count, count, std::ptr::null());
         match test.vectors {
@@ -259,8 +260,8 @@ unsafe fn sieve_span<L: VectorLevel, const SCREEN: u8>(
             step,
             each,
             slot,
-            slots: kept.slots.as_mut_ptr(),
-            gradients: kept.gradients.as_mut_ptr(),
+            slots: slots.as_mut_ptr(),
+            gradients: gradients.as_mut_ptr(),
         };
         let mut state = State { line, len: 0, strong: 0 };
         let [above, middle, below] = [rows[0].as_ptr(), rows[1].as_ptr(), rows[2].as_ptr()];

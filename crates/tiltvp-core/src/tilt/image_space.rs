@@ -88,7 +88,7 @@ impl Problem for Offsets<'_> {
 /// gradient with `phi` in `[0, pi)`.
 #[inline(always)]
 pub(super) fn edge_offset(u: f32, v: f32, gx: f32, gy: f32) -> [f32; 3] {
-    let sign = if (gy < 0.0) | ((gy == 0.0) & (gx < 0.0)) { -1.0 } else { 1.0 };
+    let sign = if gy < 0.0 || (gy == 0.0 && gx < 0.0) { -1.0 } else { 1.0 };
     let scale = sign / (gx * gx + gy * gy).sqrt();
     let (cos, sin) = (gx * scale, gy * scale);
     [cos, sin, cos * u + sin * v]
