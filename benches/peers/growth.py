@@ -52,7 +52,11 @@ def growth(pictures: list[np.ndarray], method: str, rounds: int) -> list[float]:
         estimator = TiltEstimator(scaled_camera(width, height), method=method)
         scaled = [cv2.resize(picture, (width, height), interpolation=cv2.INTER_LINEAR) for picture in pictures]
         seconds.append(
-            float(np.mean([fastest(lambda image=image, estimator=estimator: estimator(image), rounds) for image in scaled]))
+            float(
+                np.mean(
+                    [fastest(lambda image=image, estimator=estimator: estimator(image), rounds) for image in scaled]
+                )
+            )
         )
     return seconds
 
