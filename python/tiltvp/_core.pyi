@@ -1065,9 +1065,9 @@ class TrackedLines:
 class LineTracker:
     """Follows lines through successive frames: each gets the identity of the line it is, or a new one.
 
-    Where the robot's motion is known, each track's bearing is predicted from the last one and from how near the edge is,
-    as far as bearings have told, and all lines find their tracks together: by bearings, descriptors and sides, at the
-    least cost in all. Where it is not, a line is looked for in the last frame, then in the one before, up to
+    Where the robot's motion is known, each track's bearing is predicted from the last one and from how near the edge
+    is, as far as bearings have told, and all lines find their tracks together: by bearings, descriptors and sides, at
+    the least cost in all. Where it is not, a line is looked for in the last frame, then in the one before, up to
     `look_back` frames. The same calls give the same answers. Comparable, copied and pickled with all that it remembers.
     """
 
@@ -1138,9 +1138,9 @@ class LineTracker:
     ) -> TrackedLines:
         """The next frame: its lines, their descriptors (N, K), and the robot's motion since the last one.
 
-        `yaw_change_rad` is its turn, positive to the left, `distance_m` how far the middle between its wheels went along
-        the arc, negative backwards. Raises `tiltvp.errors.InvalidInputError` for descriptors of another number or width,
-        motions that are not finite, and a distance without a turn; the tracker is as before then.
+        `yaw_change_rad` is its turn, positive to the left, `distance_m` how far the middle between its wheels went
+        along the arc, negative backwards. Raises `tiltvp.errors.InvalidInputError` for descriptors of another number or
+        width, motions that are not finite, and a distance without a turn; the tracker is as before then.
         """
 
     def __eq__(self, other: object, /) -> bool: ...

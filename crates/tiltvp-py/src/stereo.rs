@@ -431,5 +431,5 @@ fn to_poses<'py>(py: Python<'py>, poses: &[Isometry3<f64>], single: bool) -> PyR
 }
 
 fn picture(py: Python<'_>, image: ColorImage) -> PyResult<Picture<'_>> {
-    Ok(PyArray1::from_vec(py, image.bgr).reshape([image.height_px, image.width_px, 3])?)
+    PyArray1::from_vec(py, image.bgr).reshape([image.height_px, image.width_px, 3])
 }

@@ -86,7 +86,7 @@ pub(super) fn find(
     }
     let [Some(x), Some(y), Some(z)] = lines else { return None };
     let lines = [x, y, z];
-    let mut vertex = meeting_point(&lines)?;
+    let mut vertex = meeting_point(&lines);
     let px_per_rad = camera.project_jacobian(&vertex).map(|(_, jacobian)| jacobian.norm() / 2f64.sqrt())?;
     let [top, left, right] = options.color.faces;
     let faces = [(top, right), (left, right), (top, left)];
@@ -165,12 +165,12 @@ fn fit_line(
 }
 
 /// Where three lines meet, by unweighted least squares (eqs. 25 to 27 in bearings).
-fn meeting_point(lines: &[Line; 3]) -> Option<Vector3<f64>> {
+fn meeting_point(lines: &[Line; 3]) -> Vector3<f64> {
     let moments: nalgebra::Matrix3<f64> = lines.iter().map(|line| line.normal * line.normal.transpose()).sum();
     let eigen = moments.symmetric_eigen();
     let vertex = eigen.eigenvectors.column(eigen.eigenvalues.imin()).normalize();
     let side: Vector3<f64> = lines.iter().map(|line| line.middle).sum();
-    Some(if vertex.dot(&side) < 0.0 { -vertex } else { vertex })
+    if vertex.dot(&side) < 0.0 { -vertex } else { vertex }
 }
 
 /// Where the ray of a line runs, away from the vertex; none if the vertex is in the middle of the candidates.

@@ -82,7 +82,7 @@ mod tests {
                 labels[at] = label;
             }
         }
-        Labels { labels, origin: [100, 50], size: [60, 40], step: 1 }
+        Labels { values: labels, origin: [100, 50], size: [60, 40], step: 1 }
     }
 
     #[test]

@@ -104,7 +104,7 @@ pub(super) fn complete(
             let Some(normal) = crossing.place.cross(&(direction * sign)).try_normalize(0.05) else { continue };
             rays[third] = follow(&course(normal, to_rad));
             let [Some(x), Some(y), Some(z)] = rays else { continue };
-            let Some(corner) = clockwise([x, y, z]) else { continue };
+            let Some(corner) = clockwise(&[x, y, z]) else { continue };
             let good = corner.residual_rad() * px_per_rad <= options.residual_max_px;
             if good && rays_apart(&corner, options.ray_angle_min_rad) {
                 out.push(corner);
@@ -114,8 +114,8 @@ pub(super) fn complete(
 }
 
 /// The feature of three rays with x and z named so that x, y, z are clockwise in the image.
-fn clockwise(traced: [Traced; 3]) -> Option<CornerFeature> {
-    let [x, y, z] = traced.map(|traced| traced.ray);
+fn clockwise(traced: &[Traced; 3]) -> Option<CornerFeature> {
+    let [x, y, z] = [traced[0].ray, traced[1].ray, traced[2].ray];
     let corner = CornerFeature::from_rays([x, y, z])?;
     let vertex = corner.vertex();
     let along = corner.rays().map(|ray| ray.normal.cross(&vertex));

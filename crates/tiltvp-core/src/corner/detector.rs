@@ -147,7 +147,8 @@ impl CornerDetector {
                 None => near(&Vector3::y()),
             }
         };
-        general::find(&self.camera, finder, image, options, &self.light, vertical, closeness, memory, out);
+        let search = general::Search { camera: &self.camera, finder, options, light: &self.light, vertical };
+        general::find(&search, image, closeness, memory, out);
         Ok(())
     }
 

@@ -71,7 +71,7 @@ impl EstimatorOptions {
             if value > 0.0 && value.is_finite() { Ok(()) } else { Err(Error::option(name, value, expected)) }
         };
         if let Some(down) = &self.down
-            && !((down.norm() - 1.0).abs() < 1e-6)
+            && ((down.norm() - 1.0).abs() >= 1e-6 || down.norm().is_nan())
         {
             return Err(Error::argument("down", format!("a vector of length {}", down.norm()), "a unit vector"));
         }

@@ -46,18 +46,25 @@ impl GeneralScratch {
     }
 }
 
+/// What corners are looked for with.
+pub(super) struct Search<'a> {
+    pub(super) camera: &'a Camera,
+    pub(super) finder: &'a SegmentFinder,
+    pub(super) options: &'a GeneralOptions,
+    pub(super) light: &'a LightTable,
+    /// A direction along the vertical, where it is known.
+    pub(super) vertical: Option<&'a Vector3<f64>>,
+}
+
 /// The corners of an image, the best first. `closeness` is a factor on how good a corner is, none where it is none at all.
 pub(super) fn find(
-    camera: &Camera,
-    finder: &SegmentFinder,
+    search: &Search<'_>,
     image: &ImageView<'_>,
-    options: &GeneralOptions,
-    light: &LightTable,
-    vertical: Option<&Vector3<f64>>,
     closeness: impl Fn(&CornerFeature) -> Option<f64>,
     scratch: &mut GeneralScratch,
     out: &mut Vec<CornerFeature>,
 ) {
+    let Search { camera, finder, options, light, vertical } = *search;
     out.clear();
     let GeneralScratch { segments, meetings, junctions, traced, trace: memory } = scratch;
     finder.find(camera, image, options, segments);
@@ -72,16 +79,15 @@ pub(super) fn find(
             let segment = &segments[end.segment];
             let near_rad = SAME_VERTEX_PX * segment.ends[0].angle(&segment.ends[1]) / segment.length_px;
             let known = &mut traced[2 * end.segment + end.end];
-            *ray = match known.iter().find(|(vertex, _)| vertex.angle(&junction.vertex) < near_rad) {
-                Some((_, found)) => *found,
-                None => {
-                    let course = course_of(segments, end, &junction.vertex, options);
-                    let support_min = options.support_min_px as usize;
-                    let found = course
-                        .and_then(|course| trace(camera, &course, support_min, |u, v| light.gray(image, u, v), memory));
-                    known.push((junction.vertex, found));
-                    found
-                }
+            *ray = if let Some((_, found)) = known.iter().find(|(at, _)| at.angle(&junction.vertex) < near_rad) {
+                *found
+            } else {
+                let course = course_of(segments, end, &junction.vertex, options);
+                let support_min = options.support_min_px as usize;
+                let found = course
+                    .and_then(|course| trace(camera, &course, support_min, |u, v| light.gray(image, u, v), memory));
+                known.push((junction.vertex, found));
+                found
             };
             if ray.is_none_or(|traced| traced.share < options.support_min_share) {
                 *ray = None;

@@ -85,7 +85,7 @@ pub(super) const RIGHT: u8 = 3;
 /// The labels of every `step`-th pixel of a window of the image, in both directions.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Labels {
-    pub(super) labels: Vec<u8>,
+    pub(super) values: Vec<u8>,
     /// First column and row, in pixels.
     pub(super) origin: [usize; 2],
     /// How many columns and rows of labels there are.
@@ -106,13 +106,13 @@ impl Labels {
         let step = step.max(1);
         (self.origin, self.step) = ([columns.start, rows.start], step);
         self.size = [columns.len().div_ceil(step), rows.len().div_ceil(step)];
-        self.labels.resize(self.size[0] * self.size[1], NONE);
+        self.values.resize(self.size[0] * self.size[1], NONE);
         let share = (options.chromaticity_min * 256.0).round() as u16;
         let mut by_byte = [NONE; 3];
         for (face, label) in options.faces.into_iter().zip([TOP, LEFT, RIGHT]) {
             by_byte[face.byte()] = label;
         }
-        for (v, out) in rows.step_by(step).zip(self.labels.chunks_exact_mut(self.size[0].max(1))) {
+        for (v, out) in rows.step_by(step).zip(self.values.chunks_exact_mut(self.size[0].max(1))) {
             let row = image.row(v).get(3 * columns.start..3 * columns.end).unwrap_or(&[]);
             label_row(row, step, share, options.intensity_min, by_byte, out);
         }
@@ -121,7 +121,7 @@ impl Labels {
     /// The labels of row `i` of the window.
     pub(super) fn row(&self, i: usize) -> &[u8] {
         let width = self.size[0];
-        self.labels.get(i * width..(i + 1) * width).unwrap_or(&[])
+        self.values.get(i * width..(i + 1) * width).unwrap_or(&[])
     }
 }
 

@@ -167,10 +167,8 @@ fn split(
 ) {
     let (Some((first_px, first)), Some((last_px, last))) = (points.first(), points.last()) else { return };
     let length_px = (last_px - first_px).norm();
-    if length_px < options.segment_min_px || (points.len() as f64) < 0.6 * length_px {
-        if points.len() < 8 || length_px < options.segment_min_px {
-            return;
-        }
+    if length_px < options.segment_min_px || (points.len() < 8 && (points.len() as f64) < 0.6 * length_px) {
+        return;
     }
     let Some(chord) = first.cross(last).try_normalize(1e-9) else { return };
     let px_per_rad = length_px / first.angle(last);

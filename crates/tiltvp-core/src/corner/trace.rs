@@ -79,7 +79,7 @@ pub(super) fn trace(
     let along = course.normal.cross(&course.vertex).try_normalize(1e-9)?;
     let half = (course.search_px.ceil() as usize + SHOULDER).min(PROFILE_MAX / 2);
     let mut profile = [0.0; PROFILE_MAX];
-    let profile = &mut profile[..2 * half + 1];
+    let profile = &mut profile[..=2 * half];
     let (mut angle, mut looked_at) = (course.from_rad, 0_usize);
     while angle <= course.to_rad {
         let (sin, cos) = angle.sin_cos();
@@ -130,7 +130,7 @@ pub(super) fn trace(
     if support < support_min.max(2) {
         return None;
     }
-    let (first, last) = (agreeing().next()?.0.along_rad, agreeing().last()?.0.along_rad);
+    let (first, last) = (agreeing().next()?.0.along_rad, agreeing().next_back()?.0.along_rad);
     let chart = [course.vertex, along, course.normal];
     let normal = (chart[0] * model.x + chart[1] * model.y + chart[2] * model.z).try_normalize(1e-9)?;
     let sigma = (rms * rms + (PLACE_SIGMA_MIN_PX * rad_per_px).powi(2)).sqrt();

@@ -87,7 +87,7 @@ impl CornerDetector {
         };
         let mut found = Vec::new();
         self.with_scratch(py, |scratch| inner.detect_general(&view, prior.as_ref(), scratch, &mut found))?;
-        Ok(found.into_iter().map(CornerFeature::new).collect())
+        Ok(found.iter().map(CornerFeature::new).collect())
     }
 
     /// The corner of a C-contiguous `(H, W, 3)` image of uint8, blue first; at most one.
@@ -99,7 +99,7 @@ impl CornerDetector {
             found = inner.detect_coloured(&view, None, scratch)?;
             Ok(())
         })?;
-        Ok(found.into_iter().map(CornerFeature::new).collect())
+        Ok(found.iter().map(CornerFeature::new).collect())
     }
 
     /// `(N, 4)` float64: the ends `(u, v, u, v)` of the line segments of a C-contiguous `(H, W)` image of uint8.

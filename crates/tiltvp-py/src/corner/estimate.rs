@@ -99,7 +99,7 @@ impl CornerHypothesis {
         let (own, dict) = (&self.inner, PyDict::new(py));
         let rows: Vec<Vec<f64>> = own.camera_from_object.row_iter().map(|row| row.iter().copied().collect()).collect();
         dict.set_item("camera_from_object", rows)?;
-        dict.set_item("vertex_m", own.vertex_m.map(|vertex| <[f64; 3]>::from(vertex)))?;
+        dict.set_item("vertex_m", own.vertex_m.map(<[f64; 3]>::from))?;
         let rows: Vec<Vec<f64>> = own.covariance.row_iter().map(|row| row.iter().copied().collect()).collect();
         dict.set_item("covariance", rows)?;
         dict.set_item("probability", own.probability)?;
@@ -138,13 +138,13 @@ impl CornerEstimate {
     /// The corners of the left or only image.
     #[getter]
     fn features_left(&self) -> Vec<CornerFeature> {
-        self.inner.features[0].iter().map(|feature| CornerFeature::new(*feature)).collect()
+        self.inner.features[0].iter().map(CornerFeature::new).collect()
     }
 
     /// The corners of the right image.
     #[getter]
     fn features_right(&self) -> Vec<CornerFeature> {
-        self.inner.features[1].iter().map(|feature| CornerFeature::new(*feature)).collect()
+        self.inner.features[1].iter().map(CornerFeature::new).collect()
     }
 
     /// Which corners of the left image the pose is from, the one that is its object first.

@@ -19,8 +19,8 @@ pub(crate) struct CornerFeature {
 }
 
 impl CornerFeature {
-    pub(crate) fn new(inner: core::CornerFeature) -> Self {
-        Self { inner }
+    pub(crate) fn new(inner: &core::CornerFeature) -> Self {
+        Self { inner: *inner }
     }
 
     pub(crate) fn inner(&self) -> &core::CornerFeature {

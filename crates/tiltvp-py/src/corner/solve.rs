@@ -118,7 +118,7 @@ pub(crate) fn fit_corner(
     };
     let rays = call(py, || Ok(given.iter().map(fit).collect::<Option<Vec<_>>>()))?;
     let feature = rays.and_then(|rays| core::CornerFeature::from_rays(rays.try_into().ok()?));
-    feature.map(CornerFeature::new).ok_or_else(|| {
+    feature.as_ref().map(CornerFeature::new).ok_or_else(|| {
         invalid("x, y, z: rays that are no great circles or do not meet, expected three that do".to_owned())
     })
 }
