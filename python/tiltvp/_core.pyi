@@ -24,6 +24,7 @@ __all__ = [
     "CalibrationStep",
     "Camera",
     "CommonDirection",
+    "ComplementaryFilter",
     "CornerAttitude",
     "CornerAttitudes",
     "CornerDetector",
@@ -38,6 +39,7 @@ __all__ = [
     "FilteredTilt",
     "FitReport",
     "ImageEdges",
+    "Laboratory",
     "LineExtractor",
     "LineTracker",
     "Lines",
@@ -50,6 +52,7 @@ __all__ = [
     "Room",
     "SelfCalibrator",
     "SimulatedDrive",
+    "StereoSequence",
     "TiltEstimate",
     "TiltEstimator",
     "TiltFilter",
@@ -1521,8 +1524,9 @@ class Laboratory:
     def light_spacing_m(self) -> float:
         """Spacing of the points where light was gathered."""
 
-    def __eq__(self, other: object) -> bool: ...
+    def __eq__(self, other: object, /) -> bool: ...
     def __hash__(self) -> int: ...
+    def __getnewargs_ex__(self) -> tuple[tuple[int], dict[str, Any]]: ...
 
 @disjoint_base
 class StereoSequence:
@@ -1609,8 +1613,9 @@ class StereoSequence:
         accelerometer: ArrayLike | None = None,
     ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]: ...
     def __len__(self) -> int: ...
-    def __eq__(self, other: object) -> bool: ...
+    def __eq__(self, other: object, /) -> bool: ...
     def __hash__(self) -> int: ...
+    def __getnewargs_ex__(self) -> tuple[tuple[Any], dict[str, Any]]: ...
 
 @disjoint_base
 class Drive:
@@ -1754,7 +1759,7 @@ class CalibrationStep:
         """The attributes by name."""
 
     @classmethod
-    def from_dict(cls, values: dict[str, Any], /) -> Self:
+    def from_dict(cls, values: dict[str, Any]) -> Self:
         """The step of a dict as `to_dict` makes it."""
 
     def __copy__(self) -> Self: ...
@@ -1833,7 +1838,7 @@ class MountingEstimate:
         """The attributes by name; arrays as nested lists."""
 
     @classmethod
-    def from_dict(cls, values: dict[str, Any], /) -> Self:
+    def from_dict(cls, values: dict[str, Any]) -> Self:
         """The estimate of a dict as `to_dict` makes it."""
 
     def __bool__(self) -> bool: ...
@@ -1981,7 +1986,7 @@ class LogCalibration:
         """The attributes by name, those of the mounting among them; arrays as nested lists."""
 
     @classmethod
-    def from_dict(cls, values: dict[str, Any], /) -> Self:
+    def from_dict(cls, values: dict[str, Any]) -> Self:
         """The calibration of a dict as `to_dict` makes it."""
 
     def __bool__(self) -> bool: ...
@@ -2167,7 +2172,7 @@ class CornerDetector:
     def _detect_gray(self, image: NDArray[np.uint8], vertical: ArrayLike | None) -> list[CornerFeature]: ...
     def _detect_color(self, image: NDArray[np.uint8]) -> list[CornerFeature]: ...
     def _segments(self, image: NDArray[np.uint8]) -> NDArray[np.float64]: ...
-    def __eq__(self, other: object) -> bool: ...
+    def __eq__(self, other: object, /) -> bool: ...
     def __hash__(self) -> int: ...
 
 @final
@@ -2209,7 +2214,7 @@ class CornerHypothesis:
     def to_dict(self) -> dict[str, Any]:
         """Plain numbers and lists, good for JSON."""
 
-    def __eq__(self, other: object) -> bool: ...
+    def __eq__(self, other: object, /) -> bool: ...
 
 @final
 class CornerEstimate:
@@ -2258,7 +2263,7 @@ class CornerEstimate:
         """The number of the corner that is the object, from 1: it grows where another corner has become the object."""
 
     def __bool__(self) -> bool: ...
-    def __eq__(self, other: builtins.object) -> bool: ...
+    def __eq__(self, other: builtins.object, /) -> bool: ...
 
 @disjoint_base
 class CornerPoseEstimator:
