@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
     Matrix = NDArray[np.float64]
 
-__all__ = ["ROTATION_WORDS", "read_rotation", "rotation_from"]
+__all__ = ["ROTATION_WORDS", "about_vertical", "read_rotation", "rotation_from"]
 
 ROTATION_WORDS: Final[dict[str, tuple[tuple[float, float, float], ...]]] = {
     "up": ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)),
@@ -35,6 +35,12 @@ _EXPECTED: Final = (
 )
 _SLACK: Final = 1e-3
 """Files carry rounded numbers: a matrix or quaternion this close to a rotation is replaced by the nearest one."""
+
+
+def about_vertical(angle_rad: float) -> Matrix:
+    """(3, 3): the turn to the left about the robot's z axis."""
+    c, s = math.cos(angle_rad), math.sin(angle_rad)
+    return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
 
 
 def read_rotation(source: str | os.PathLike[str]) -> Matrix:

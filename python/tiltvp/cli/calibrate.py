@@ -122,7 +122,13 @@ def calibrate(
         if tracks is not None:
             check_ending(tracks)
         log, table, bad = log_of_images(
-            images, camera, options, odometry, wheel_base_m=wheel_base, track_frames_min=track_frames_min
+            images,
+            camera,
+            options,
+            odometry,
+            wheel_base_m=wheel_base,
+            start=start,
+            track_frames_min=track_frames_min,
         )
         if tracks is not None:
             write_frame(table, tracks)

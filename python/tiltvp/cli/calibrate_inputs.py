@@ -40,9 +40,13 @@ def log_of_images(
     odometry: Path | None,
     *,
     wheel_base_m: float,
+    start: tuple[float, float, float],
     track_frames_min: int,
 ) -> tuple[DriveLog, pl.DataFrame, int]:
-    """The log of a drive's images: the lean of each, its lines, and whose they are; the tracks; how many were bad."""
+    """The log of a drive's images: the lean of each, its lines, and whose they are; the tracks; how many were bad.
+
+    Tracks are predicted with the mounting (x_m, y_m, yaw_rad) as it is thought to be.
+    """
     from tiltvp.drive_logs import DriveLog
     from tiltvp.line_logs import bearing_log, displacements
     from tiltvp.lines import LineTracker
@@ -52,14 +56,18 @@ def log_of_images(
         missing = "--camera" if camera is None else "--odometry"
         raise InvalidInputError(f"--images {source} without {missing}, expected {_FORMS}")
     lens = camera.load()
-    extractor, tilt = options.extractor(lens), options.tilts(lens)
+    x_m, y_m, yaw_rad = start
+    extractor, tilt = options.extractor(lens, yaw_rad=yaw_rad), options.tilts(lens, yaw_rad=yaw_rad)
+    tracker = LineTracker(camera_m=(x_m, y_m))
     frames = open_frames(source)
     motions = read_odometry(odometry, frames.files)
     with progress_bar(len(frames.files), "frames") as bar:
-        seen = list(followed(frames, extractor, LineTracker(), tilt, motions, bar))
+        seen = list(followed(frames, extractor, tracker, tilt, motions, bar))
     bearings = bearing_log(seen, frames_min=track_frames_min)
     if not len(bearings):
         raise InvalidInputError(f"{source}: no line is seen in {track_frames_min} of {len(frames.files)} frames")
+    # From the robot's frame back to the camera's.
+    bearings[:, 2] -= yaw_rad
     log = DriveLog(displacements(motions, wheel_base_m=wheel_base_m), bearings, None)
     tracks = track_table([(frame.number, str(frames.files[frame.number]), frame.tracked) for frame in seen])
     return log, tracks, len(frames.files) - len(seen)

@@ -73,8 +73,8 @@ class LineOptions:
     center_search_px: float | None = None
     """radial: how far from the calibrated centre the rim's is looked for; 0 keeps the calibrated one."""
 
-    def extractor(self, camera: Camera) -> LineExtractor:
-        """The extractor with the options that were given."""
+    def extractor(self, camera: Camera, *, yaw_rad: float = 0.0) -> LineExtractor:
+        """The extractor with the options that were given, for a camera that is further turned by `yaw_rad`."""
         from tiltvp.lines import LINE_METHODS, LineExtractor
 
         _check("--method", self.method or LINE_METHODS[0], LINE_METHODS)
@@ -85,18 +85,16 @@ class LineOptions:
         options = {name: value for name, value in options.items() if value is not None}
         if self.mask is not None:
             options["mask"] = mask_from(self.mask)
-        return LineExtractor(camera, robot_from_camera=self._rotation(), **options)
+        return LineExtractor(camera, robot_from_camera=self._rotation(yaw_rad), **options)
 
-    def tilts(self, camera: Camera) -> Callable[[NDArray[np.uint8]], TiltEstimate | None]:
+    def tilts(self, camera: Camera, *, yaw_rad: float = 0.0) -> Callable[[NDArray[np.uint8]], TiltEstimate | None]:
         """What tells the lean of a grey image: None where the robot is taken to be upright."""
         from tiltvp import METHODS, TiltEstimator
 
         _check("--tilt", self.tilt, (_UPRIGHT, *METHODS))
         if self.tilt == _UPRIGHT:
             return lambda _: None
-        options: dict[str, Any] = {"method": self.tilt}
-        if self.robot_from_camera is not None:
-            options["robot_from_camera"] = self._rotation()
+        options: dict[str, Any] = {"method": self.tilt, "robot_from_camera": self._rotation(yaw_rad)}
         if self.mask is not None:
             options["mask"] = mask_from(self.mask)
         estimator = TiltEstimator(camera, **options)
@@ -107,10 +105,10 @@ class LineOptions:
 
         return tilt
 
-    def _rotation(self) -> NDArray[np.float64] | None:
-        from tiltvp.rotations import read_rotation
+    def _rotation(self, yaw_rad: float) -> NDArray[np.float64]:
+        from tiltvp.rotations import about_vertical, read_rotation
 
-        return None if self.robot_from_camera is None else read_rotation(self.robot_from_camera)
+        return about_vertical(yaw_rad) @ read_rotation(self.robot_from_camera or "up")
 
 
 @Parameter(name="*", group=_LINES)

@@ -17,6 +17,7 @@ from tiltvp.datasets.new import in_order
 from tiltvp.line_logs import FollowedFrame, bearing_log, follow_lines
 from tiltvp.lines import LineExtractor, LineTracker
 from tiltvp.odometry import Motion
+from tiltvp.rotations import about_vertical
 from tiltvp.selfcalib import MountingEstimate, SelfCalibrator, calibrate
 from tiltvp.synth import MIRROR_BLIND_RAD, Drive, drive_legs, mirror_camera
 from tiltvp.tilt import TiltEstimator
@@ -77,12 +78,14 @@ def picture_drives(
             seed=seed,
             threads=threads,
         )
-        frames = list(_followed(drive, threads))
+        start = _start(seed)
+        frames = list(_followed(drive, start, threads))
         sigma_rad = float(np.median(np.concatenate([frame.tracked.lines.sigma_rad for frame in frames])))
         bearings = bearing_log(frames, frames_min=3)
+        bearings[:, 2] -= start[2]
         options: dict[str, Any] = {
             "wheel_base_m": drive.wheel_base_m, "bearing_sigma_rad": sigma_rad,
-            "start": _start(seed), "start_sigma": _START_SIGMA,
+            "start": start, "start_sigma": _START_SIGMA,
         }  # fmt: skip
         calibrator = SelfCalibrator(**options)
         calibrator.follow(drive.odometry, bearings)
@@ -99,10 +102,12 @@ def _start(seed: int) -> tuple[float, float, float]:
     return max(rho, 0.05) * math.cos(phi), max(rho, 0.05) * math.sin(phi), phi + psi
 
 
-def _followed(drive: Drive, threads: int) -> Iterator[FollowedFrame]:
-    """The frames of a drive, rendered on so many threads, with their lines."""
-    camera = drive.camera
-    estimator, extractor = TiltEstimator(camera), LineExtractor(camera)
+def _followed(drive: Drive, start: tuple[float, float, float], threads: int) -> Iterator[FollowedFrame]:
+    """The frames of a drive, rendered on so many threads, with their lines as seen from the mounting at the start."""
+    camera, (x_m, y_m, yaw_rad) = drive.camera, start
+    rotation = about_vertical(yaw_rad)
+    estimator = TiltEstimator(camera, robot_from_camera=rotation)
+    extractor, tracker = LineExtractor(camera, robot_from_camera=rotation), LineTracker(camera_m=(x_m, y_m))
     motions = [
         Motion(yaw, distance, (left, right))
         for (distance, yaw), (left, right) in zip(drive.motions.tolist(), drive.odometry.tolist(), strict=True)
@@ -114,7 +119,7 @@ def _followed(drive: Drive, threads: int) -> Iterator[FollowedFrame]:
 
     with closing(in_order(lambda k: drive.render(k, threads=1), range(len(drive)), threads, Event())) as views:
         images = (view.gray for view in views)
-        for frame in follow_lines(images, extractor, LineTracker(), tilt=tilt, motions=motions):
+        for frame in follow_lines(images, extractor, tracker, tilt=tilt, motions=motions):
             if isinstance(frame, Exception):
                 raise frame
             yield frame
