@@ -43,6 +43,7 @@ def track(
     video: Path | None = None,
     frame_rate: Annotated[float | None, Parameter(validator=validators.Number(gt=0))] = None,
     look_back: Annotated[int | None, Parameter(validator=validators.Number(gte=1))] = None,
+    camera_at: tuple[float, float] | None = None,
 ) -> int:
     """Follow vertical lines through the images of a folder, in the order of their names, or through a video.
 
@@ -64,6 +65,9 @@ def track(
         Frames per second of that video: those of the source by default, 25 for images.
     look_back
         How many frames back a line is looked for before it counts as new.
+    camera_at
+        Where the camera is on the robot, for what distances of the odometry do to bearings: metres to the front and to
+        the left of the middle between the wheels; default 0 0.
     """
     from tiltvp.images import write_image
     from tiltvp.lines import LineTracker
@@ -76,7 +80,8 @@ def track(
         raise InvalidInputError(f"--plot {plot}: ends in {plot.suffix!r}, expected .png")
     lens = camera.load()
     extractor, tilt = options.extractor(lens), options.tilts(lens)
-    tracker = LineTracker() if look_back is None else LineTracker(look_back=look_back)
+    given: dict[str, Any] = {"look_back": look_back, "camera_m": camera_at}
+    tracker = LineTracker(**{name: value for name, value in given.items() if value is not None})
     frames = open_frames(source)
     motions = None if odometry is None else read_odometry(odometry, frames.files)
     tracked: list[tuple[int, str, TrackedLines]] = []
