@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from tiltvp.errors import InvalidInputError
+from tiltvp.rotations import quaternion
 
 if TYPE_CHECKING:
     import polars as pl
@@ -17,7 +18,7 @@ if TYPE_CHECKING:
 
     from tiltvp._core import CornerEstimate
 
-__all__ = ["pose_table", "quaternion", "roll_pitch_yaw", "write_trajectory"]
+__all__ = ["pose_table", "roll_pitch_yaw", "write_trajectory"]
 
 _QUATERNION = ("qx", "qy", "qz", "qw")
 _POSITION = ("x_m", "y_m", "z_m")
@@ -81,19 +82,6 @@ def write_trajectory(table: pl.DataFrame, path: str | os.PathLike[str]) -> None:
         part.replace(file)
     except OSError as error:
         raise InvalidInputError(f"{file}: cannot be written ({error.strerror or error})") from error
-
-
-def quaternion(rotation: NDArray[np.float64]) -> NDArray[np.float64]:
-    """(4,): x, y, z, w of a rotation (3, 3), w not negative."""
-    (xx, xy, xz), (yx, yy, yz), (zx, zy, zz) = rotation
-    symmetric = np.array([
-        [xx - yy - zz, xy + yx, xz + zx, zy - yz],
-        [xy + yx, yy - xx - zz, yz + zy, xz - zx],
-        [xz + zx, yz + zy, zz - xx - yy, yx - xy],
-        [zy - yz, xz - zx, yx - xy, xx + yy + zz],
-    ])  # fmt: skip
-    found: NDArray[np.float64] = np.linalg.eigh(symmetric)[1][:, -1]
-    return found if found[3] >= 0 else -found
 
 
 def roll_pitch_yaw(object_from_camera: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
     Matrix = NDArray[np.float64]
 
-__all__ = ["ROTATION_WORDS", "about_vertical", "read_rotation", "rotation_from"]
+__all__ = ["ROTATION_WORDS", "about_vertical", "quaternion", "read_rotation", "rotation_from"]
 
 ROTATION_WORDS: Final[dict[str, tuple[tuple[float, float, float], ...]]] = {
     "up": ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)),
@@ -41,6 +41,19 @@ def about_vertical(angle_rad: float) -> Matrix:
     """(3, 3): the turn to the left about the robot's z axis."""
     c, s = math.cos(angle_rad), math.sin(angle_rad)
     return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+
+
+def quaternion(rotation: NDArray[np.floating]) -> Matrix:
+    """(4,): x, y, z, w of a rotation (3, 3), w not negative: the main eigenvector of Bar-Itzhack's matrix."""
+    (xx, xy, xz), (yx, yy, yz), (zx, zy, zz) = rotation
+    symmetric = np.array([
+        [xx - yy - zz, xy + yx, xz + zx, zy - yz],
+        [xy + yx, yy - xx - zz, yz + zy, xz - zx],
+        [xz + zx, yz + zy, zz - xx - yy, yx - xy],
+        [zy - yz, xz - zx, yx - xy, xx + yy + zz],
+    ])  # fmt: skip
+    found: Matrix = np.linalg.eigh(symmetric)[1][:, -1]
+    return found if found[3] >= 0 else -found
 
 
 def read_rotation(source: str | os.PathLike[str]) -> Matrix:

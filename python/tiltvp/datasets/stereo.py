@@ -12,12 +12,12 @@ from typing import Any, Final
 
 import numpy as np
 import yaml
-from numpy.typing import NDArray
 
 from tiltvp import _core
 from tiltvp.datasets.new import NewDataset, in_order, new_folder
 from tiltvp.errors import InvalidInputError
 from tiltvp.images import write_image
+from tiltvp.rotations import quaternion
 from tiltvp.synth import Laboratory, StereoSequence, StereoTruth
 
 __all__ = ["CALIBRATION", "POSES", "write_stereo"]
@@ -107,22 +107,9 @@ def _trajectory(sequence: StereoSequence) -> str:
     lines = ["# time_s x_m y_m z_m qx qy qz qw of object_from_left"]
     for frame, time in enumerate(sequence.times_s.tolist()):
         pose = np.linalg.inv(sequence.left_from_object(frame))
-        values = [time, *pose[:3, 3].tolist(), *_quaternion(pose[:3, :3]).tolist()]
+        values = [time, *pose[:3, 3].tolist(), *quaternion(pose[:3, :3]).tolist()]
         lines.append(" ".join(f"{value:.9f}" for value in values))
     return "\n".join(lines) + "\n"
-
-
-def _quaternion(rotation: NDArray[np.floating]) -> NDArray[np.float64]:
-    """(4,): x, y, z, w, with w not negative: the eigenvector of the largest eigenvalue of Bar-Itzhack's matrix."""
-    (xx, xy, xz), (yx, yy, yz), (zx, zy, zz) = rotation
-    symmetric = np.array([
-        [xx - yy - zz, xy + yx, xz + zx, zy - yz],
-        [xy + yx, yy - xx - zz, yz + zy, xz - zx],
-        [xz + zx, yz + zy, zz - xx - yy, yx - xy],
-        [zy - yz, xz - zx, yx - xy, xx + yy + zz],
-    ])  # fmt: skip
-    quaternion: NDArray[np.float64] = np.linalg.eigh(symmetric)[1][:, -1]
-    return quaternion if quaternion[3] >= 0 else -quaternion
 
 
 def _camchain(sequence: StereoSequence) -> dict[str, Any]:
