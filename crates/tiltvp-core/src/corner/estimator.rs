@@ -5,6 +5,8 @@ use nalgebra::{Matrix3, Matrix6, Vector3};
 use super::attitude::{IncludedAngle, corner_attitudes};
 use super::consensus::{agreement, apart, fits, renamed, weight};
 use super::detector::{CornerDetector, CornerScratch};
+use super::estimate::{CornerEstimate, Hypothesis, Verdict};
+use super::estimator_options::EstimatorOptions;
 use super::fusion::fuse_rays;
 use super::guided::Expected;
 use super::options::CornerMethod;
@@ -16,84 +18,6 @@ use crate::error::{Error, Result};
 use crate::geometry::RigidMotion;
 use crate::image::{ColorView, ImageView};
 
-/// What is known, and how far frames are apart.
-#[derive(Debug, Clone, PartialEq)]
-pub struct EstimatorOptions {
-    /// The angle between the horizontal edges. Default a right one.
-    pub angle: IncludedAngle,
-    /// Whether the edges x, y, z, clockwise in the image, are a right-handed triple: true for outer corners, false for inner
-    /// ones, none where both are possible. Default none; the coloured cuboid's is an outer one.
-    pub right_handed: Option<bool>,
-    /// The direction down in the left camera's frame, before anything was seen; none where nothing is known. Default none.
-    pub down: Option<Vector3<f64>>,
-    /// Standard deviation of that direction, radians. Default 15 degrees.
-    pub down_sigma_rad: f64,
-    /// How far the camera may turn from one frame to the next, radians, as a standard deviation. Default 6 degrees.
-    pub turn_sigma_rad: f64,
-    /// Frames without a pose after which the last one is forgotten; 0 never follows. Default 10.
-    pub forget_after: u32,
-    /// How far attitudes of several features of one image may be apart, radians. Default 4 degrees.
-    pub agree_max_rad: f64,
-    /// How far the attitudes of one corner in both images may be apart, and the rays from the fused pose, in standard
-    /// deviations of the covariances as they are: root mean square per degree of freedom. Default 5.
-    pub misfit_max: f64,
-    /// The least and the largest distance of a vertex, metres. Default 0.05 and 100.
-    pub distance_m: [f64; 2],
-    /// Least probability of the best hypothesis; below it none is chosen. Default 0.9.
-    pub probability_min: f64,
-}
-
-impl Default for EstimatorOptions {
-    fn default() -> Self {
-        Self {
-            angle: IncludedAngle::RIGHT,
-            right_handed: None,
-            down: None,
-            down_sigma_rad: 15f64.to_radians(),
-            turn_sigma_rad: 6f64.to_radians(),
-            forget_after: 10,
-            agree_max_rad: 4f64.to_radians(),
-            misfit_max: 5.0,
-            distance_m: [0.05, 100.0],
-            probability_min: 0.9,
-        }
-    }
-}
-
-impl EstimatorOptions {
-    /// Checks every field.
-    ///
-    /// # Errors
-    /// [`Error::InvalidOption`] or [`Error::InvalidArgument`] with the name of the field.
-    pub fn validate(&self) -> Result<()> {
-        self.angle.validate()?;
-        let positive = |name, value: f64, expected| {
-            if value > 0.0 && value.is_finite() { Ok(()) } else { Err(Error::option(name, value, expected)) }
-        };
-        if let Some(down) = &self.down
-            && ((down.norm() - 1.0).abs() >= 1e-6 || down.norm().is_nan())
-        {
-            return Err(Error::argument("down", format!("a vector of length {}", down.norm()), "a unit vector"));
-        }
-        positive("down_sigma_rad", self.down_sigma_rad, "a positive angle")?;
-        positive("turn_sigma_rad", self.turn_sigma_rad, "a positive angle")?;
-        positive("agree_max_rad", self.agree_max_rad, "a positive angle")?;
-        positive("misfit_max", self.misfit_max, "a positive number of standard deviations")?;
-        let [nearest, farthest] = self.distance_m;
-        if !(nearest > 0.0 && farthest > nearest) {
-            return Err(Error::option(
-                "distance_m",
-                format!("[{nearest}, {farthest}]"),
-                "0 < nearest < farthest, metres",
-            ));
-        }
-        if !(0.0..=1.0).contains(&self.probability_min) {
-            return Err(Error::option("probability_min", self.probability_min, "a probability from 0 to 1"));
-        }
-        Ok(())
-    }
-}
-
 /// An image of the kind that the detector wants.
 #[derive(Debug, Clone, Copy)]
 pub enum Frame<'a> {
@@ -101,87 +25,6 @@ pub enum Frame<'a> {
     Gray(ImageView<'a>),
     /// For the coloured cuboid.
     Color(ColorView<'a>),
-}
-
-/// Why there is a pose, or none.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Verdict {
-    /// One hypothesis stands out.
-    Found,
-    /// No corner in the left image.
-    NoneLeft,
-    /// No corner in the right image.
-    NoneRight,
-    /// No corner of the one image fits one of the other, or none fits the included angle.
-    NoneFits,
-    /// There are several hypotheses and nothing to choose by.
-    Ambiguous,
-}
-
-impl Verdict {
-    /// In words.
-    pub fn reason(self) -> &'static str {
-        match self {
-            Self::Found => "",
-            Self::NoneLeft => "no corner in the left image",
-            Self::NoneRight => "no corner in the right image",
-            Self::NoneFits => "no corner that fits",
-            Self::Ambiguous => "several hypotheses and nothing to choose by",
-        }
-    }
-}
-
-/// One explanation of what is seen.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Hypothesis {
-    /// The rotation from the object's frame to the left camera's.
-    pub camera_from_object: Matrix3<f64>,
-    /// The directions of the edges x, y, z of the corner away from its vertex, left camera's frame, unit vectors.
-    pub edges: [Vector3<f64>; 3],
-    /// The vertex in the left camera's frame, metres; none from one image.
-    pub vertex_m: Option<Vector3<f64>>,
-    /// Covariance of the attitude's rotation vector (left camera's frame, radians) and of the vertex (metres; zero from one
-    /// image).
-    pub covariance: Matrix6<f64>,
-    /// The probability that it is this one, in [0, 1].
-    pub probability: f64,
-    /// Whether the edges x, y, z are a right-handed triple.
-    pub right_handed: bool,
-    /// Root mean square misfit per degree of freedom, in standard deviations of the rays; 0 for a single feature.
-    pub misfit: f64,
-}
-
-impl Hypothesis {
-    /// Where the left camera is in the object's frame, metres.
-    pub fn camera_in_object_m(&self) -> Option<Vector3<f64>> {
-        self.vertex_m.map(|vertex| -(self.camera_from_object.transpose() * vertex))
-    }
-}
-
-/// What one frame tells.
-#[derive(Debug, Clone, PartialEq)]
-pub struct CornerEstimate {
-    /// All hypotheses, the likeliest first.
-    pub hypotheses: Vec<Hypothesis>,
-    /// Why there is a pose, or none.
-    pub verdict: Verdict,
-    /// The corners of the left and of the right image.
-    pub features: [Vec<CornerFeature>; 2],
-    /// Which features of the left image the pose is from, the one that stands for the object first.
-    pub chosen_left: Vec<usize>,
-    /// Which feature of the right image it is from.
-    pub chosen_right: Option<usize>,
-    /// Whether the pose before was a prior.
-    pub followed: bool,
-    /// The number of the corner that is the object: it grows where another corner than before has become the object.
-    pub object: u32,
-}
-
-impl CornerEstimate {
-    /// The pose, if one stands out.
-    pub fn pose(&self) -> Option<&Hypothesis> {
-        self.hypotheses.first().filter(|_| self.verdict == Verdict::Found)
-    }
 }
 
 /// The last pose, the corners it is from, and how many frames ago it was.

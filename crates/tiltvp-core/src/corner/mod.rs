@@ -13,7 +13,9 @@ mod completion;
 mod consensus;
 mod detector;
 mod edge_place;
+mod estimate;
 mod estimator;
+mod estimator_options;
 mod fusion;
 mod gamma;
 mod general;
@@ -34,7 +36,9 @@ mod vertex;
 
 pub use self::attitude::{CornerAttitude, CornerAttitudes, IncludedAngle, corner_attitudes};
 pub use self::detector::{CornerDetector, CornerScratch, Window};
-pub use self::estimator::{CornerEstimate, CornerPoseEstimator, EstimatorOptions, Frame, Hypothesis, Verdict};
+pub use self::estimate::{CornerEstimate, Hypothesis, Verdict};
+pub use self::estimator::{CornerPoseEstimator, Frame};
+pub use self::estimator_options::EstimatorOptions;
 pub use self::fusion::{FusedPose, fuse_rays};
 pub use self::gamma::included_angle;
 pub use self::options::{
