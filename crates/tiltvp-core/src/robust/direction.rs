@@ -4,7 +4,8 @@ use nalgebra::{Matrix3, Vector3};
 
 use super::loss::Gate;
 use super::problem::Problem;
-use super::rows::{Moments, Real, Rows};
+use super::real::Real;
+use super::rows::{Moments, Rows};
 use super::sampling::Score;
 
 /// Unit normals of great circles (rows), a unit direction near `+z` (model), residuals `m . o` (the sine of an angle).

@@ -1,7 +1,7 @@
 //! Sixteen numbers at a time: the one-pass kernels over rows of single precision, the same to the last bit with vectors of any
 //! width.
 
-use super::rows::Total;
+use super::real::Total;
 
 /// Numbers that are worked on together.
 pub(super) const LANES: usize = 16;
