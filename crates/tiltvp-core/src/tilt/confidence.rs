@@ -9,7 +9,7 @@ use crate::robust::{Gate, Real, Rows};
 /// Sectors of azimuth within which residuals are taken as one: an edge of a room rarely spans more.
 pub(super) const SECTORS: usize = 64;
 
-/// Most rows that a covariance is made from.
+/// Rows that are enough for a covariance.
 const ENOUGH: usize = 4000;
 
 /// An error below this many radians counts as a good estimate.
@@ -50,7 +50,7 @@ pub(super) fn clustered_covariance<T: Real>(
     let mut sectors = [[0.0f64; 5]; SECTORS];
     let [mut xx, mut xy, mut yy] = [0.0; 3];
     // A sample of the rows is enough to tell how the sectors err: sums over it are proportional to sums over all.
-    let stride = rows.len().div_ceil(ENOUGH).max(1);
+    let stride = (rows.len() / ENOUGH).max(1);
     rows.for_each_gated(model, gate, weights, stride, |row, [weight, slope, x, y, d]| {
         let (sx, sy, wx, wy) = (slope * x, slope * y, weight * x, weight * y);
         (xx, xy, yy) = (xx + sx * x, xy + sx * y, yy + sy * y);
