@@ -30,7 +30,7 @@ impl Level for u8 {
     }
 }
 
-/// Smoothed levels in units of 1/128, up to 255: gradients in units of 1/8, rounded three times, up to 32640.
+/// Smoothed levels in units of 1/128, up to 255: gradients in units of 1/8, up to 32640, exact for levels in whole eighths.
 impl Level for i16 {
     const PARTS: i32 = 8;
 

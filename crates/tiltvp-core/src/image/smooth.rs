@@ -17,8 +17,11 @@ pub struct Smoother {
     plain: Vec<f32>,
 }
 
-/// Units of a smoothed row in fixed point, of which a grey level has so many.
-const FIXED: f32 = 128.0;
+/// Steps in which such rows are rounded.
+const EIGHTHS: f32 = 8.0;
+
+/// Units of the taps of narrow kernels.
+const TAP_UNITS: f32 = 256.0;
 
 impl Smoother {
     /// A Gaussian of `sigma_px` pixels for rows of at most `max_width` pixels.
@@ -38,7 +41,7 @@ impl Smoother {
         self.taps.len() == 1
     }
 
-    /// [`row`](Self::row) in units of 1/128 of a grey level, to about one of them.
+    /// [`row`](Self::row) rounded to 1/8 of a grey level, in units of 1/128.
     ///
     /// Columns and rows that the kernel reaches should lie within the image: others may be smoothed in single precision first,
     /// which takes longer.
@@ -46,7 +49,7 @@ impl Smoother {
         let n = out.len();
         let inside = first >= 1 && first + n < image.width() && v >= 1 && v + 1 < image.height();
         if let ([centre, side], true) = (&self.taps[..], inside && self.fixed_sums.len() >= n + 2) {
-            let taps = [*centre, 2.0 * side].map(|tap| (tap * 65536.0).round() as u32);
+            let taps = [*centre, *side].map(|tap| (tap * TAP_UNITS) as u32);
             let part = |v: usize| image.row(v).get(first - 1..=first + n).unwrap_or(&[]);
             fixed_columns([part(v - 1), part(v), part(v + 1)], taps, &mut self.fixed_sums[..n + 2]);
             fixed_rows(&self.fixed_sums[..n + 2], taps, out);
@@ -111,7 +114,8 @@ impl Smoother {
     }
 }
 
-/// Half of a sampled Gaussian, the centre first, normalised to a sum of one over both halves.
+/// Half of a sampled Gaussian, the centre first, normalised to a sum of one over both halves; if there are but two taps, in
+/// whole units of 1/256.
 fn gaussian_taps(sigma_px: f64) -> Vec<f32> {
     if sigma_px <= 0.0 {
         return vec![1.0];
@@ -122,6 +126,11 @@ fn gaussian_taps(sigma_px: f64) -> Vec<f32> {
     let tail = |radius: usize| 2.0 * (radius + 1..=reach).map(weight).sum::<f64>() / total;
     let radius = (1..reach).find(|&r| tail(r) < TAIL).unwrap_or(reach);
     let kept = 1.0 + 2.0 * (1..=radius).map(weight).sum::<f64>();
+    if radius == 1 {
+        // So that sums of three by three pixels are exact in whole numbers.
+        let side = (f64::from(TAP_UNITS) * weight(1) / kept).round() as f32 / TAP_UNITS;
+        return vec![1.0 - 2.0 * side, side];
+    }
     (0..=radius).map(|i| (weight(i) / kept) as f32).collect()
 }
 
@@ -154,37 +163,31 @@ fn add_scaled(above: &[u8], below: &[u8], tap: f32, out: &mut [f32]) {
     }
 }
 
-/// The middle row and the mean of its neighbours, in units of 1/256 of a grey level, weighted by taps in units of 2^-16.
+/// The middle row and its neighbours weighted by taps in units of 1/256, exactly, in units of 1/256 of a grey level.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512vl", "x86_64+avx2"))]
-fn fixed_columns([above, middle, below]: [&[u8]; 3], [centre, sides]: [u32; 2], out: &mut [u16]) {
-    let (centre, sides) = (centre as u16, sides as u16);
+fn fixed_columns([above, middle, below]: [&[u8]; 3], [centre, side]: [u32; 2], out: &mut [u16]) {
+    let (centre, side) = (centre as u16, side as u16);
     for (((o, a), m), b) in out.iter_mut().zip(above).zip(middle).zip(below) {
-        let mean = (u16::from(*a) + u16::from(*b)) << 7;
-        *o = high(u16::from(*m) << 8, centre) + high(mean, sides);
+        *o = u16::from(*m) * centre + (u16::from(*a) + u16::from(*b)) * side;
     }
 }
 
-/// The same along a row of columns' sums, one wider on both sides, in units of 1/128.
+/// The same along a row of columns' sums, one wider on both sides, rounded once, to 1/8 of a grey level; halves go to the even
+/// one. So turned and negative images are smoothed alike, and Scharr gradients of the row are exact in units of 1/8.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512vl", "x86_64+avx2"))]
-fn fixed_rows(sums: &[u16], [centre, sides]: [u32; 2], out: &mut [i16]) {
-    let (centre, sides) = (centre as u16, sides as u16);
+fn fixed_rows(sums: &[u16], [centre, side]: [u32; 2], out: &mut [i16]) {
     let n = out.len();
     let (left, middle, right) = (&sums[..n], &sums[1..=n], &sums[2..n + 2]);
     for (((o, l), m), r) in out.iter_mut().zip(left).zip(middle).zip(right) {
-        *o = ((high(*m, centre) + high((*l >> 1) + (*r >> 1), sides)) >> 1) as i16;
+        let sum = u32::from(*m) * centre + (u32::from(*l) + u32::from(*r)) * side;
+        *o = (((sum + 4095 + ((sum >> 13) & 1)) >> 13) << 4) as i16;
     }
-}
-
-/// The upper half of a product.
-#[inline(always)]
-fn high(a: u16, b: u16) -> u16 {
-    ((u32::from(a) * u32::from(b)) >> 16) as u16
 }
 
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512vl", "x86_64+avx2"))]
 fn quantise(row: &[f32], out: &mut [i16]) {
     for (o, i) in out.iter_mut().zip(row) {
-        *o = (i * FIXED + 0.5) as i16;
+        *o = ((i * EIGHTHS).round_ties_even() as i16) << 4;
     }
 }
 
@@ -273,7 +276,7 @@ mod tests {
                         smoother.row(&view, v, first, &mut plain);
                         smoother.fixed_row(&view, v, first, &mut fixed);
                         for (p, f) in plain.iter().zip(&fixed) {
-                            assert!((p * FIXED - f32::from(*f)).abs() < 2.6 && *f <= 32640, "{p} {f}");
+                            assert!((p * 128.0 - f32::from(*f)).abs() < 8.01 && *f <= 32640, "{p} {f}");
                         }
                     }
                 }
