@@ -19,7 +19,7 @@ import cv2
 import numpy as np
 
 from tiltvp import Camera, corner
-from tiltvp._core import CornerDetector
+from tiltvp.corner import CornerDetector
 
 SIZE_PX = (1280, 720)
 FOCAL_PX = 702.0
@@ -160,7 +160,7 @@ class Coloured:
 
     def __call__(self, left: np.ndarray, right: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
         """Rotation and translation, left camera from object."""
-        features = [self.detector._detect_color(image) for image in (left, right)]
+        features = [self.detector(image) for image in (left, right)]
         if not all(features):
             return None
         found = corner.poses(features[0][0], features[1][0], self.left_from_right)
