@@ -10,11 +10,13 @@ import numpy as np
 import polars as pl
 import pytest
 
+import tiltvp
 from tiltvp.cli import main
+from tiltvp.cli.line_options import LineOptions
 from tiltvp.errors import ImageFileError, InvalidInputError
 from tiltvp.images import read_image, write_image
 from tiltvp.plots.tracks import track_plot
-from tiltvp.synth import MIRROR_BLIND_RAD, Drive, Room, mirror_camera
+from tiltvp.synth import MIRROR_BLIND_RAD, Drive, Room, RoomImage, mirror_camera
 from tiltvp.videos import VideoReader, video_writer
 
 FRAMES = 6
@@ -100,6 +102,16 @@ def test_track_a_folder(run: Run, folder: Path, tmp_path: Path) -> None:
     code, said, complaints = run("track", film, "--camera", folder / "camera.toml", "--out", again)
     assert (code, complaints) == (0, "")
     assert pl.read_csv(again)["file"][0] == f"{film}#0"
+
+
+def test_a_lean_that_loses_lines_is_not_believed(
+    room: RoomImage, upright_room: RoomImage, camera: tiltvp.Camera, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    options = LineOptions(tilt="refined")
+    estimate = tiltvp.TiltEstimator(camera)(room.gray)
+    assert options.tilts(camera)(room.gray) == estimate
+    monkeypatch.setattr(tiltvp, "TiltEstimator", lambda *_, **__: lambda _: estimate)
+    assert options.tilts(camera)(upright_room.gray) is None
 
 
 def test_bad_frames_are_skipped_and_the_turn_is_kept(run: Run, folder: Path, tmp_path: Path) -> None:

@@ -100,6 +100,7 @@ OTHER_VALUES = [
     ("great-circle", {"separation_rad": 0.2}), ("great-circle", {"length_min_rad": 0.5}),
     ("great-circle", {"support_min_px": 60}), ("great-circle", {"gap_max_rad": 0.3}),
     ("great-circle", {"run_min_px": 20}), ("great-circle", {"tilt_sigma_rad": 0.05}),
+    ("great-circle", {"covered_min": 1.0}), ("great-circle", {"scatter_max_px": 0.1}),
     ("great-circle", {"lines_max": 2}), ("great-circle", {"descriptor_areas": 2}),
     ("great-circle", {"descriptor_areas": 3, "descriptor_overlapping": True}), ("great-circle", {"descriptor_bins": 8}),
     ("great-circle", {"descriptor_clip": 0.3}), ("great-circle", {"descriptor_window": 1.0}),
@@ -238,7 +239,7 @@ def test_lines_are_drawn_where_they_are(room: RoomImage, camera: tiltvp.Camera) 
     assert picture.shape == (*room.gray.shape, 3)
     assert picture.dtype == np.uint8
     u, v = np.rint(pixels[0, 16]).astype(int)
-    assert picture[v, u].max() > 100 > picture[v, u].min()
+    assert np.ptp(picture[v, u].astype(int)) > 60
     with pytest.raises(InvalidInputError, match="tracks"):
         draw_lines(room.gray, camera, lines, tracks=[1])
 

@@ -936,6 +936,8 @@ class LineExtractor:
         support_min_px: SupportsIndex = ...,
         gap_max_rad: float = ...,
         run_min_px: SupportsIndex = ...,
+        covered_min: float = ...,
+        scatter_max_px: float = ...,
         tilt_sigma_rad: float = ...,
         lines_max: SupportsIndex | None = ...,
         radial_max_rad: float = ...,
@@ -976,6 +978,10 @@ class LineExtractor:
             "great-circle": least elevation that the runs of pixels of a line cover, and least number of its pixels.
         gap_max_rad, run_min_px
             "great-circle": widest gap within a run of pixels, and least number of pixels of a run.
+        covered_min
+            "great-circle": least share of the elevations from a line's lowest to its highest pixel that its runs cover.
+        scatter_max_px
+            "great-circle": greatest standard deviation of the pixels about their line.
         tilt_sigma_rad
             "great-circle": standard deviation of the tilt that frames are given; lines may slant by as much.
         lines_max

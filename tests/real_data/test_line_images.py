@@ -11,6 +11,8 @@ import pytest
 
 import tiltvp
 from tiltvp import lines as tl
+from tiltvp.cli.line_options import LineOptions
+from tiltvp.images import gray_from
 
 FORWARD = np.array([[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]])
 
@@ -53,3 +55,11 @@ def test_a_laboratory_in_a_mirror(data: Path, name: str) -> None:
     assert descriptors.shape == (len(lines), 192)
     again = tl.match(descriptors, descriptors)
     assert (again[:, 0] == again[:, 1]).all()
+
+
+@pytest.mark.parametrize(("name", "believed"), [("VMRImage2", True), ("VMRImage4", True), ("VMRImage8", False)])
+def test_a_chessboard_that_is_held_up_is_not_taken_for_a_lean(data: Path, name: str, believed: bool) -> None:
+    folder = "riyueshi_ocamcalib-plus"
+    camera, image = photograph(data, f"{folder}/{name}.jpg", f"{folder}/calib_results_catadioptric.txt")
+    tilt = LineOptions(tilt="refined", elevation_max_deg=30.0).tilts(camera)(gray_from(image))
+    assert (tilt is not None) == believed

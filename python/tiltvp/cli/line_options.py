@@ -26,6 +26,8 @@ _AS_THEY_ARE = ("method", "margin_px", "gradient_min", "smoothing_px", "support_
                 "length_min", "rim_radius_px", "center_search_px")  # fmt: skip
 _ANGLES = ("elevation_min", "elevation_max", "length_min", "separation", "tilt_sigma")
 _UPRIGHT = "upright"
+_SUPPORT_KEPT = 0.75
+"""The least share of the upright robot's edge pixels on lines that lines keep under a lean that is believed."""
 
 
 @Parameter(name="*", group=_LINES)
@@ -39,7 +41,7 @@ class LineOptions:
     """upright: the robot stands upright; or how the lean of each frame is estimated: refined or another method of
     `tiltvp tilt`. A frame without an estimate is taken to be upright."""
     tilt_confidence_min: Annotated[float, Parameter(validator=validators.Number(gte=0, lte=1))] = 0.5
-    """A frame whose estimated lean is less confident is taken to be upright."""
+    """A frame whose estimated lean is less confident, or leaves far less of its lines, is taken to be upright."""
     robot_from_camera: str | None = None
     """How the camera sits on the robot: up (the default), forward, or a file with a rotation."""
     elevation_min_deg: float | None = None
@@ -97,11 +99,15 @@ class LineOptions:
         options: dict[str, Any] = {"method": self.tilt, "robot_from_camera": self._rotation(yaw_rad)}
         if self.mask is not None:
             options["mask"] = mask_from(self.mask)
-        estimator = TiltEstimator(camera, **options)
+        estimator, extractor = TiltEstimator(camera, **options), self.extractor(camera, yaw_rad=yaw_rad)
 
         def tilt(gray: NDArray[np.uint8]) -> TiltEstimate | None:
             estimate = estimator(gray)
-            return estimate if estimate and estimate.confidence >= self.tilt_confidence_min else None
+            if not estimate or estimate.confidence < self.tilt_confidence_min:
+                return None
+            # Under a true lean verticals are lines; edges that mislead the estimate make fewer.
+            leaning, upright = (int(extractor(gray, lean).support_px.sum()) for lean in (estimate, None))
+            return estimate if leaning >= _SUPPORT_KEPT * upright else None
 
         return tilt
 

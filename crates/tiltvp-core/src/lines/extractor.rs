@@ -16,7 +16,7 @@ use crate::geometry::Tilt;
 use crate::image::ImageView;
 
 /// Samples of a descriptor from the middle of an area to its rim, along great circles.
-const SAMPLES: usize = 12;
+const SAMPLES: usize = 18;
 
 /// Finds and describes the vertical lines of single images of one camera.
 #[derive(Debug, Clone)]

@@ -25,6 +25,8 @@ pub(super) struct Fit {
     /// How the azimuth turns with the tangent of the elevation.
     slant: f64,
     pub(super) sigma: f64,
+    /// Standard deviation of the pixels about the line, pixels.
+    pub(super) scatter_px: f64,
     pub(super) support: u32,
     pub(super) rising: u32,
     /// Lowest and highest tangent of the elevation.
@@ -148,6 +150,7 @@ fn solve(
         azimuth: wrap(at.azimuth + (c * x - b * y) / determinant),
         slant: at.slant + (a * y - b * x) / determinant,
         sigma: (kc / (ka * kc - kb * kb) + (LINE_SIGMA_PX * per_px).powi(2)).sqrt(),
+        scatter_px: variance.sqrt(),
         per_px,
         ..*at
     })
@@ -179,13 +182,26 @@ fn keep_runs(candidates: &Candidates, options: &GreatCircleOptions, scratch: &mu
     length
 }
 
+impl Fit {
+    /// Whether it is long enough, and one edge rather than two that blend or several short ones that happen to be in line.
+    pub(super) fn is_one_line(&self, options: &GreatCircleOptions) -> bool {
+        let extent = self.slopes.1.atan() - self.slopes.0.atan();
+        self.support >= options.support_min_px
+            && self.length >= options.length_min_rad
+            && self.length >= options.covered_min * extent
+            && self.scatter_px <= options.scatter_max_px
+    }
+}
+
 /// Two fits of one line that is brighter on one side here and on the other there, as one.
 pub(super) fn joined(a: &Fit, b: &Fit) -> Fit {
     let (wa, wb) = (a.sigma.powi(-2), b.sigma.powi(-2));
+    let (na, nb) = (f64::from(a.support), f64::from(b.support));
     Fit {
         azimuth: wrap(a.azimuth + wb / (wa + wb) * wrap(b.azimuth - a.azimuth)),
         slant: a.slant,
         sigma: (wa + wb).powf(-0.5),
+        scatter_px: ((na * a.scatter_px.powi(2) + nb * b.scatter_px.powi(2)) / (na + nb)).sqrt(),
         support: a.support + b.support,
         rising: a.rising + b.rising,
         slopes: (a.slopes.0.min(b.slopes.0), a.slopes.1.max(b.slopes.1)),

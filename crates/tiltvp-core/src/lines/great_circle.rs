@@ -58,7 +58,7 @@ pub(super) fn find(
         }
     }
     join(fits);
-    fits.retain(|fit| fit.support >= options.support_min_px && fit.length >= options.length_min_rad);
+    fits.retain(|fit| fit.is_one_line(options));
     keep_apart(fits, options.separation_rad);
     if let Some(most) = options.lines_max {
         fits.truncate(most);

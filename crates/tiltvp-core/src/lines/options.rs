@@ -45,6 +45,12 @@ pub struct GreatCircleOptions {
     pub gap_max_rad: f64,
     /// Least number of pixels of a run. Default 6.
     pub run_min_px: u32,
+    /// Least share of the elevations from the lowest to the highest pixel of a line that its runs cover, from 0 to 1: lines that
+    /// cover less are short edges in line by chance. Default 0.6.
+    pub covered_min: f64,
+    /// Greatest standard deviation of the pixels about their line, in pixels: lines that scatter more are edges that blend.
+    /// Default 0.36.
+    pub scatter_max_px: f64,
     /// Standard deviation of the tilt that the frame is given, in radians: lines may slant by as much. Default 0.5 degrees.
     pub tilt_sigma_rad: f64,
     /// The most lines of an image, the longest ones; none for all. Default none.
@@ -61,6 +67,8 @@ impl Default for GreatCircleOptions {
             support_min_px: 15,
             gap_max_rad: 2.0 * PI / 180.0,
             run_min_px: 6,
+            covered_min: 0.6,
+            scatter_max_px: 0.36,
             tilt_sigma_rad: 0.5 * PI / 180.0,
             lines_max: None,
         }
@@ -163,6 +171,8 @@ impl GreatCircleOptions {
         within("support_min_px", f64::from(self.support_min_px), 3.0..=1e6, "at least 3 pixels")?;
         within("gap_max_rad", self.gap_max_rad, 1e-4..=PI, "an angle from 1e-4 to pi")?;
         within("run_min_px", f64::from(self.run_min_px), 1.0..=1e6, "at least 1 pixel")?;
+        within("covered_min", self.covered_min, 0.0..=1.0, "a share from 0 to 1")?;
+        within("scatter_max_px", self.scatter_max_px, 0.01..=100.0, "a distance from 0.01 to 100 pixels")?;
         within("tilt_sigma_rad", self.tilt_sigma_rad, 1e-6..=0.5, "an angle from 1e-6 to 0.5 rad")?;
         if self.lines_max == Some(0) {
             return Err(Error::option("lines_max", 0, "at least 1, or none"));

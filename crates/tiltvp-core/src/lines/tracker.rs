@@ -30,9 +30,9 @@ pub struct TrackerOptions {
     /// Standard deviation of the change of a bearing per frame beside the turn, where no distance is given, radians. Default
     /// 0.05.
     pub rate_sigma_rad: f64,
-    /// Standard deviation of a bearing beside the line's own, from neighbouring edges that blend, radians. Default 0.12 degrees.
+    /// Standard deviation of a bearing beside the line's own, from neighbouring edges that blend, radians. Default 0.1 degrees.
     pub bearing_sigma_rad: f64,
-    /// The greatest difference from a predicted bearing, in standard deviations. Default 3.5.
+    /// The greatest difference from a predicted bearing, in standard deviations. Default 3.
     pub gate_sigmas: f64,
     /// Standard deviation of the distance between descriptors of one line. Default 0.35.
     pub descriptor_sigma: f64,
@@ -52,8 +52,8 @@ impl Default for TrackerOptions {
             turn_sigma_rad: 0.005,
             distance_sigma: 0.03,
             rate_sigma_rad: 0.05,
-            bearing_sigma_rad: 0.12f64.to_radians(),
-            gate_sigmas: 3.5,
+            bearing_sigma_rad: 0.1f64.to_radians(),
+            gate_sigmas: 3.0,
             descriptor_sigma: 0.35,
             descriptor_max: 1.25,
             new_cost: 18.0,

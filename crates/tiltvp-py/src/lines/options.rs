@@ -61,6 +61,8 @@ fn set(options: &mut LineOptions, key: &str, value: &Bound<'_, PyAny>) -> PyResu
             ("support_min_px", LineMethod::GreatCircle(o)) => o.support_min_px = pixels()?,
             ("gap_max_rad", LineMethod::GreatCircle(o)) => o.gap_max_rad = number()?,
             ("run_min_px", LineMethod::GreatCircle(o)) => o.run_min_px = pixels()?,
+            ("covered_min", LineMethod::GreatCircle(o)) => o.covered_min = number()?,
+            ("scatter_max_px", LineMethod::GreatCircle(o)) => o.scatter_max_px = number()?,
             ("tilt_sigma_rad", LineMethod::GreatCircle(o)) => o.tilt_sigma_rad = number()?,
             ("lines_max", LineMethod::GreatCircle(o)) => {
                 o.lines_max = if value.is_none() { None } else { Some(count()?) };
@@ -106,6 +108,8 @@ pub(super) fn in_force<'py>(py: Python<'py>, options: &LineOptions) -> PyResult<
             dict.set_item("support_min_px", o.support_min_px)?;
             dict.set_item("gap_max_rad", o.gap_max_rad)?;
             dict.set_item("run_min_px", o.run_min_px)?;
+            dict.set_item("covered_min", o.covered_min)?;
+            dict.set_item("scatter_max_px", o.scatter_max_px)?;
             dict.set_item("tilt_sigma_rad", o.tilt_sigma_rad)?;
             dict.set_item("lines_max", o.lines_max)?;
         }
