@@ -45,9 +45,10 @@ def drawn(
     noise: float = 1.0,
     beyond: bool = False,
 ) -> np.ndarray:
-    """The cuboid in front of grey, every pixel the mean light of `fine` squared places; highlights above 0.7 are rolled off.
+    """The cuboid in front of grey, every pixel the mean light of `fine` squared places.
 
-    `beyond`: where the line of the edge x goes on behind the cuboid, things of the colours of its two faces meet.
+    Light above 0.7 is rolled off. `beyond`: where the line of the edge x goes on behind the cuboid, things of the
+    colours of its two faces meet.
     """
     x, y, z = 0.3 * rotation.T
     corners = {"top": (x, x + z, z), "left": (z, y + z, y), "right": (y, x + y, x)}
