@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 import pickle
 from pathlib import Path
@@ -174,6 +175,24 @@ def test_values_and_options() -> None:
     assert not empty
     assert empty.pose is None
     assert "left" in empty.reason
+
+
+def test_estimates_are_kept() -> None:
+    seen = CornerPoseEstimator(CAMERA, CAMERA, LEFT_FROM_RIGHT)(*pair(COLOURS))
+    blank = np.full((360, 480, 3), 128, np.uint8)
+    for estimate in (seen, CornerPoseEstimator(CAMERA)(blank)):
+        for again in (
+            pickle.loads(pickle.dumps(estimate)),
+            type(estimate).from_dict(json.loads(json.dumps(estimate.to_dict()))),
+        ):
+            assert again == estimate
+            assert again.to_dict() == estimate.to_dict()
+            assert again.reason == estimate.reason
+    assert pickle.loads(pickle.dumps(seen.pose)) == seen.pose
+    with pytest.raises(InvalidInputError, match="reason"):
+        type(seen).from_dict(seen.to_dict() | {"reason": "none"})
+    with pytest.raises(InvalidInputError, match="camera_from_object"):
+        type(seen.pose).from_dict(seen.pose.to_dict() | {"camera_from_object": [1.0]})
 
 
 def test_rigs_come_back_from_disk(tmp_path: Path) -> None:
