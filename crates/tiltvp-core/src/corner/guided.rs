@@ -72,7 +72,10 @@ pub(super) fn find_near(
     let mut vertex = expected.vertex;
     let mut normals = expected.far.map(|far| vertex.cross(&far).try_normalize(1e-6));
     let mut found = None;
-    for search_px in [search_px, options.search_px] {
+    // So far about a long ray there are other edges too: the first pass only has to lead to the second.
+    for (search_px, least_share) in
+        [(search_px, 0.5 * options.guided_min_share), (options.search_px, options.guided_min_share)]
+    {
         let pixel = camera.project_jacobian(&vertex)?;
         if !camera.contains(&pixel.0) {
             return None;
@@ -93,7 +96,7 @@ pub(super) fn find_near(
             };
             let signal = |u, v| light.gray(image, u, v);
             let traced = trace(camera, &course, options.support_min_px as usize, signal, scratch)?;
-            if traced.share < options.guided_min_share {
+            if traced.share < least_share {
                 return None;
             }
             *ray = Some(traced.ray);

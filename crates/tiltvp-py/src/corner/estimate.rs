@@ -159,6 +159,22 @@ impl CornerEstimate {
         self.inner.chosen_right
     }
 
+    /// Fresh (3,) float64: how long the edges x, y, z are, metres, to where lines along the others meet them; NaN where no
+    /// image shows that. From two grey images and with right angles.
+    #[getter]
+    fn edge_lengths_m<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        let lengths = self.inner.ends.map(|end| end.map_or(f64::NAN, |end| end.length_m));
+        PyArray1::from_slice(py, &lengths)
+    }
+
+    /// Fresh (3, 3) float64, rows x, y, z: where these edges end in the left camera's frame, metres, from both images alone; NaN
+    /// where only one of them shows it, or none.
+    #[getter]
+    fn edge_ends_m<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        let place = |end: core::EdgeEnd| end.place_m.map(<[f64; 3]>::from);
+        convert::to_rows(py, &self.inner.ends.map(|end| end.and_then(place).unwrap_or([f64::NAN; 3])), false)
+    }
+
     /// Whether the pose of a frame before was a prior.
     #[getter]
     fn followed(&self) -> bool {

@@ -1,0 +1,117 @@
+//! What is followed from frame to frame: the last pose, its corners in the images, and other corners of the same object.
+
+use nalgebra::Vector3;
+
+use super::estimate::Hypothesis;
+use super::vertex::CornerFeature;
+
+/// The share of its distance by which a vertex moves in the camera's frame from one frame to the next.
+pub(super) const MOVED: f64 = 0.1;
+
+/// How far apart places of one corner of the object may be, as a share of its distance from the camera.
+const SAME_PLACE: f64 = 0.03;
+
+/// In how many frames a corner has to have been in one place of the object before it can stand in for the followed one.
+const SEEN_MIN: u32 = 3;
+
+/// Most other corners that are remembered, those seen most often.
+const OTHERS_MAX: usize = 32;
+
+/// Another corner of the object, and where it is in the object's frame.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Landmark {
+    place_m: Vector3<f64>,
+    seen: u32,
+}
+
+/// The last pose, the corners it is from, and how many frames ago it was.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Track {
+    pub(super) pose: Hypothesis,
+    pub(super) corners: [Vec<CornerFeature>; 2],
+    pub(super) age: u32,
+    pub(super) object: u32,
+    others: Vec<Landmark>,
+}
+
+impl Track {
+    /// Whether a pose is one of the same corner: from one image any corner of the same upright world is.
+    pub(super) fn is_of(&self, pose: &Hypothesis) -> bool {
+        match (self.pose.vertex_m, pose.vertex_m) {
+            (Some(last), Some(vertex)) => (vertex - last).norm() <= reach_m(&last),
+            _ => true,
+        }
+    }
+
+    /// Whether a pose is one of the same corner, or of another one that has been seen where it would be now.
+    pub(super) fn admits(&self, pose: &Hypothesis) -> bool {
+        let (Some(last), Some(vertex)) = (self.pose.vertex_m, pose.vertex_m) else { return true };
+        let known = self.others.iter().filter(|other| other.seen >= SEEN_MIN);
+        let mut places = known.map(|other| last + self.pose.camera_from_object * other.place_m);
+        self.is_of(pose) || places.any(|place| (vertex - place).norm() <= reach_m(&place))
+    }
+
+    /// The track after a frame with a pose, from the `corners` of its images; `seen` are the poses of all corners of that
+    /// frame that fit.
+    pub(super) fn next(
+        before: Option<Self>,
+        pose: &Hypothesis,
+        corners: [Vec<CornerFeature>; 2],
+        object: u32,
+        seen: &[Hypothesis],
+    ) -> Self {
+        let mut others = before.map_or_else(Vec::new, |track| track.seen_from(pose));
+        if let Some(vertex) = pose.vertex_m {
+            let nearness_m = SAME_PLACE * vertex.norm();
+            let mut again = vec![false; others.len()];
+            for place in seen.iter().filter_map(|other| other.vertex_m) {
+                let place_m = pose.camera_from_object.tr_mul(&(place - vertex));
+                let is_here = |other: &Landmark| (other.place_m - place_m).norm() <= nearness_m;
+                if place_m.norm() <= nearness_m {
+                    continue;
+                }
+                match others.iter().position(is_here) {
+                    Some(known) if !again[known] => {
+                        again[known] = true;
+                        let other = &mut others[known];
+                        other.seen += 1;
+                        other.place_m += (place_m - other.place_m) / f64::from(other.seen);
+                    }
+                    Some(_) => {}
+                    None => {
+                        others.push(Landmark { place_m, seen: 1 });
+                        again.push(true);
+                    }
+                }
+            }
+            others.sort_by_key(|other| std::cmp::Reverse(other.seen));
+            others.truncate(OTHERS_MAX);
+        }
+        Self { pose: *pose, corners, age: 0, object, others }
+    }
+
+    /// The other corners as seen from the one that a pose is of, which may be one of them.
+    fn seen_from(mut self, pose: &Hypothesis) -> Vec<Landmark> {
+        let (Some(last), Some(vertex)) = (self.pose.vertex_m, pose.vertex_m) else { return Vec::new() };
+        if self.is_of(pose) {
+            return self.others;
+        }
+        let off_m = |other: &Landmark| (last + self.pose.camera_from_object * other.place_m - vertex).norm();
+        let nearest = (0..self.others.len()).min_by(|a, b| off_m(&self.others[*a]).total_cmp(&off_m(&self.others[*b])));
+        let Some(origin) = nearest.filter(|place| off_m(&self.others[*place]) <= reach_m(&vertex)) else {
+            return Vec::new();
+        };
+        let origin_m = self.others[origin].place_m;
+        // The corner that was followed is one of the others from now on.
+        self.others[origin] = Landmark { place_m: Vector3::zeros(), seen: SEEN_MIN };
+        for other in &mut self.others {
+            other.place_m -= origin_m;
+        }
+        self.others
+    }
+}
+
+/// How far a vertex can have moved from a place since the last pose.
+fn reach_m(place: &Vector3<f64>) -> f64 {
+    MOVED * place.norm()
+}
