@@ -87,7 +87,7 @@ fn meetings<'a>(seen: &Seen<'_>, segments: &'a [Segment], axis: usize, px_per_ra
         let Some(crossing) = normal.cross(&segment.normal).try_normalize(0.05) else { continue };
         let crossing = if crossing.dot(&vertex) < 0.0 { -crossing } else { crossing };
         let angle = crossing.dot(&along).atan2(crossing.dot(&vertex));
-        let own_px = segment.length_px / segment.ends[0].angle(&segment.ends[1]);
+        let own_px = segment.px_per_rad;
         let aside = segment.ends.map(|end| end.angle(&crossing) * own_px);
         let inside = aside[0].max(aside[1]) < segment.length_px;
         let off_px = aside[0].min(aside[1]);

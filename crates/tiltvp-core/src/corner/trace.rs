@@ -73,6 +73,18 @@ pub(super) fn trace(
     signal: impl Fn(f64, f64) -> Option<f64>,
     scratch: &mut TraceScratch,
 ) -> Option<Traced> {
+    trace_every(1.0, camera, course, support_min, signal, scratch)
+}
+
+/// The same with places `stride_px` pixels apart along the ray.
+pub(super) fn trace_every(
+    stride_px: f64,
+    camera: &Camera,
+    course: &Course,
+    support_min: usize,
+    signal: impl Fn(f64, f64) -> Option<f64>,
+    scratch: &mut TraceScratch,
+) -> Option<Traced> {
     let TraceScratch { rows, places, weights, ransac: memory } = scratch;
     rows.clear();
     places.clear();
@@ -92,7 +104,7 @@ pub(super) fn trace(
         }
         let across = Vector2::new(-forwards.y, forwards.x) / pace;
         let px_per_rad = sideways.dot(&across);
-        angle += 1.0 / pace;
+        angle += stride_px / pace;
         looked_at += 1;
         let mut inside = true;
         for (i, value) in profile.iter_mut().enumerate() {
@@ -106,7 +118,7 @@ pub(super) fn trace(
         let Some(EdgePlace { shift, .. }) = found else { continue };
         // In the chart of the ray: x along the vertex, y along the ray, z the expected normal.
         rows.push(cos, sin, shift / px_per_rad);
-        places.push(Place { along_rad: angle - 1.0 / pace, rad_per_px: 1.0 / px_per_rad.abs() });
+        places.push(Place { along_rad: angle - stride_px / pace, rad_per_px: 1.0 / px_per_rad.abs() });
     }
     if places.len() < support_min.max(2) {
         return None;
