@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 __all__ = ["own_places", "truth_near"]
 
-_SAME_M: Final = 0.15
+_SAME_M: Final = 0.08
 """An estimate is of the listed corner that is this near."""
 
 _BESIDE_M: Final = 1.0

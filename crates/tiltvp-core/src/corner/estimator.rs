@@ -14,8 +14,9 @@ use super::options::CornerMethod;
 use super::position::{Sighting, triangulate};
 use super::prior::{AttitudePrior, VerticalSense};
 use super::resolve::{Alignment, View, resolve};
-use super::track::{MOVED, Track};
+use super::track::Track;
 use super::vertex::CornerFeature;
+use super::voices::Voices;
 use crate::error::{Error, Result};
 use crate::geometry::RigidMotion;
 use crate::image::{ColorView, ImageView};
@@ -418,11 +419,13 @@ impl CornerPoseEstimator {
                 let scale = (0.25 * self.options.misfit_max).max(1.0).powi(2);
                 let (sin, cos) = self.options.angle.gamma_rad.sin_cos();
                 let edges = [Vector3::x(), Vector3::y(), Vector3::new(cos, 0.0, side * sin)];
+                // What edges miss by that do not quite meet, or belong to more than one thing, the covariances do not know.
+                let doubt = if self.is_one_object() { 1.0 } else { (fused.chi_square / 6.0).max(1.0) };
                 let pose = Hypothesis {
                     camera_from_object: fused.rig_from_object,
                     edges: edges.map(|edge| fused.rig_from_object * edge),
                     vertex_m: Some(fused.vertex_m),
-                    covariance: fused.covariance,
+                    covariance: fused.covariance * doubt,
                     probability: 0.0,
                     right_handed,
                     misfit: (fused.chi_square / 6.0).sqrt(),
@@ -450,6 +453,7 @@ impl CornerPoseEstimator {
         let priors = self.priors(self.is_one_object());
         let [nearest, farthest] = self.options.distance_m;
         let mut best: Option<(f64, Vec<Hypothesis>, usize, usize)> = None;
+        let voices = Voices::new(&estimate.features, left_from_right);
         for (i, left) in estimate.features[0].iter().enumerate() {
             for (j, right) in estimate.features[1].iter().enumerate() {
                 let poses = self.pair_poses([left, right], left_from_right, &priors)?;
@@ -467,18 +471,17 @@ impl CornerPoseEstimator {
                 if misfit > self.options.misfit_max || !(nearest..=farthest).contains(&vertex.norm()) {
                     continue;
                 }
-                if misfit <= 0.5 * self.options.misfit_max {
+                let fits_well = misfit <= 0.5 * self.options.misfit_max;
+                if fits_well {
                     seen.push(*pose);
                 }
-                if !self.is_one_object() && self.track.as_ref().is_some_and(|track| !track.admits(pose)) {
-                    continue;
-                }
-                let mut score = weight(left).min(weight(right)) / (1.0 + misfit * misfit);
-                if let Some(last) = self.track.as_ref().and_then(|track| track.pose.vertex_m) {
-                    // The same corner is near where it was.
-                    let moved = (vertex - last).norm() / last.norm();
-                    score /= 1.0 + (moved / MOVED).powi(2);
-                }
+                let likely = match &self.track {
+                    Some(track) if !self.is_one_object() => track.likelihood(pose, fits_well),
+                    _ => Some(1.0),
+                };
+                let Some(likely) = likely else { continue };
+                let agreeing = voices.agreeing(pose);
+                let mut score = likely * agreeing * weight(left).min(weight(right)) / (1.0 + misfit * misfit);
                 if let Some(track) = &self.track {
                     let turned = apart(&pose.camera_from_object, &track.pose.camera_from_object);
                     score /= 1.0 + (turned / self.options.turn_sigma_rad).powi(2);
@@ -524,6 +527,9 @@ const SAME_VERTEX_RAD: f64 = 0.01;
 /// How far apart the places are at which a corner is looked for along its epipolar line, in pixels.
 const EPIPOLAR_STEP_PX: f64 = 4.0;
 
+/// How far from where it was a corner is looked for first, in pixels.
+const HARDLY_MOVED_PX: f64 = 3.0;
+
 /// The corners of an image: those that are near where they were, and those that are found anew.
 fn detect(
     detector: &CornerDetector,
@@ -536,8 +542,11 @@ fn detect(
     match frame {
         Frame::Gray(image) => {
             detector.detect_general(image, vertical, scratch, out)?;
-            let again =
-                followed.iter().filter_map(|last| detector.find_near(image, &Expected::of(last), None, scratch));
+            // Most hardly move, and the less is looked at the fewer other edges there are.
+            let again = followed.iter().map(Expected::of).filter_map(|last| {
+                let near = detector.find_near(image, &last, Some(HARDLY_MOVED_PX), scratch);
+                near.or_else(|| detector.find_near(image, &last, None, scratch))
+            });
             out.extend(again);
             Ok(())
         }

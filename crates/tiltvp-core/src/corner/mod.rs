@@ -35,6 +35,7 @@ mod standard;
 mod trace;
 mod track;
 mod vertex;
+mod voices;
 
 pub use self::attitude::{CornerAttitude, CornerAttitudes, IncludedAngle, corner_attitudes};
 pub use self::detector::{CornerDetector, CornerScratch, Window};

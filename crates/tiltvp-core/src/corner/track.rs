@@ -6,13 +6,25 @@ use super::estimate::Hypothesis;
 use super::vertex::CornerFeature;
 
 /// The share of its distance by which a vertex moves in the camera's frame from one frame to the next.
-pub(super) const MOVED: f64 = 0.1;
+const MOVED: f64 = 0.1;
 
 /// How far apart places of one corner of the object may be, as a share of its distance from the camera.
 const SAME_PLACE: f64 = 0.03;
 
 /// In how many frames a corner has to have been in one place of the object before it can stand in for the followed one.
 const SEEN_MIN: u32 = 3;
+
+/// How much less likely another corner of the object is than the one that is followed.
+const STAND_IN: f64 = 0.3;
+
+/// How much less likely a corner is that has not been seen before.
+const STRANGE: f64 = 0.03;
+
+/// How many times as far as before a vertex may move to count half.
+const PACES: f64 = 2.0;
+
+/// The share of its distance that is added to that.
+const PACE_MIN: f64 = 0.005;
 
 /// Most other corners that are remembered, those seen most often.
 const OTHERS_MAX: usize = 32;
@@ -32,6 +44,8 @@ pub(super) struct Track {
     pub(super) age: u32,
     pub(super) object: u32,
     others: Vec<Landmark>,
+    /// How far the vertex moved in the camera's frame from the pose before to the last one, as a share of its distance.
+    pace: f64,
 }
 
 impl Track {
@@ -43,12 +57,23 @@ impl Track {
         }
     }
 
-    /// Whether a pose is one of the same corner, or of another one that has been seen where it would be now.
-    pub(super) fn admits(&self, pose: &Hypothesis) -> bool {
-        let (Some(last), Some(vertex)) = (self.pose.vertex_m, pose.vertex_m) else { return true };
+    /// How likely a pose is the next one, from 0 to 1: near where the same corner was, or, which counts less, near where another
+    /// one of the object has been seen before, or, if it `fits_well`, of any other one. None if it is none of them.
+    pub(super) fn likelihood(&self, pose: &Hypothesis, fits_well: bool) -> Option<f64> {
+        let (Some(last), Some(vertex)) = (self.pose.vertex_m, pose.vertex_m) else { return Some(1.0) };
         let known = self.others.iter().filter(|other| other.seen >= SEEN_MIN);
-        let mut places = known.map(|other| last + self.pose.camera_from_object * other.place_m);
-        self.is_of(pose) || places.any(|place| (vertex - place).norm() <= reach_m(&place))
+        let others = known.map(|other| (STAND_IN, last + self.pose.camera_from_object * other.place_m));
+        // Motion is much the same from frame to frame.
+        let usual = (PACES * self.pace + PACE_MIN).min(MOVED);
+        let near = |(factor, place): (f64, Vector3<f64>)| {
+            let moved = (vertex - place).norm() / place.norm();
+            (moved <= MOVED).then(|| factor / (1.0 + (moved / usual).powi(2)))
+        };
+        std::iter::once((1.0, last))
+            .chain(others)
+            .filter_map(near)
+            .chain(fits_well.then_some(STRANGE))
+            .max_by(f64::total_cmp)
     }
 
     /// The track after a frame with a pose, from the `corners` of its images; `seen` are the poses of all corners of that
@@ -60,6 +85,11 @@ impl Track {
         object: u32,
         seen: &[Hypothesis],
     ) -> Self {
+        let moved = |track: &Self| {
+            let (last, vertex) = (track.pose.vertex_m?, pose.vertex_m?);
+            track.is_of(pose).then(|| (vertex - last).norm() / last.norm() / f64::from(track.age.max(1)))
+        };
+        let pace = before.as_ref().and_then(moved).unwrap_or(MOVED);
         let mut others = before.map_or_else(Vec::new, |track| track.seen_from(pose));
         if let Some(vertex) = pose.vertex_m {
             let nearness_m = SAME_PLACE * vertex.norm();
@@ -87,7 +117,7 @@ impl Track {
             others.sort_by_key(|other| std::cmp::Reverse(other.seen));
             others.truncate(OTHERS_MAX);
         }
-        Self { pose: *pose, corners, age: 0, object, others }
+        Self { pose: *pose, corners, age: 0, object, others, pace }
     }
 
     /// The other corners as seen from the one that a pose is of, which may be one of them.
