@@ -118,6 +118,7 @@ pub(super) fn seen_ends(seen: &Seen<'_>, scratch: &mut GeneralScratch) -> [Optio
                 to_rad,
                 search_px: seen.options.search_px,
                 step_min: seen.options.step_min,
+                step_share_min: 0.0,
                 threshold_px: seen.options.threshold_px,
                 ray_sigma_px: seen.options.ray_sigma_px,
             };
