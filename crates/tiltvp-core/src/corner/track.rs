@@ -145,3 +145,57 @@ impl Track {
 fn reach_m(place: &Vector3<f64>) -> f64 {
     MOVED * place.norm()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::{Matrix3, Matrix6};
+
+    fn pose(vertex_m: Vector3<f64>) -> Hypothesis {
+        Hypothesis {
+            camera_from_object: Matrix3::identity(),
+            edges: [Vector3::x(), Vector3::y(), Vector3::z()],
+            vertex_m: Some(vertex_m),
+            covariance: Matrix6::identity(),
+            probability: 1.0,
+            right_handed: true,
+            misfit: 0.5,
+        }
+    }
+
+    /// A corner two metres away that moves to the right, and another one half a metre beside it.
+    fn followed(frames: u32) -> Track {
+        let none = || [Vec::new(), Vec::new()];
+        let mut track = None;
+        for frame in 0..frames {
+            let own = pose(Vector3::new(0.01 * f64::from(frame), 0.0, 2.0));
+            let other = pose(Vector3::new(0.5 + 0.01 * f64::from(frame), 0.0, 2.0));
+            track = Some(Track::next(track, &own, none(), 1, &[own, other]));
+        }
+        track.unwrap()
+    }
+
+    #[test]
+    fn the_followed_corner_comes_before_known_ones_and_these_before_strangers() {
+        let track = followed(SEEN_MIN);
+        let at = |x: f64, fits_well| track.likelihood(&pose(Vector3::new(x, 0.0, 2.0)), fits_well);
+        let (same, jumped, known) = (at(0.03, false).unwrap(), at(0.15, false).unwrap(), at(0.53, false).unwrap());
+        assert!(same > 2.0 * jumped && same > 2.0 * known && known > at(-0.5, true).unwrap());
+        assert_eq!(at(-0.5, false), None);
+        assert!(track.is_of(&pose(Vector3::new(0.03, 0.0, 2.0))) && !track.is_of(&pose(Vector3::new(0.53, 0.0, 2.0))));
+        // A corner that was seen too rarely is a stranger.
+        assert_eq!(followed(SEEN_MIN - 1).likelihood(&pose(Vector3::new(0.52, 0.0, 2.0)), false), None);
+    }
+
+    #[test]
+    fn a_corner_that_stands_in_knows_the_one_before() {
+        let track =
+            Track::next(Some(followed(5)), &pose(Vector3::new(0.55, 0.0, 2.0)), [Vec::new(), Vec::new()], 2, &[]);
+        assert!(track.likelihood(&pose(Vector3::new(0.05, 0.0, 2.0)), false).is_some());
+        assert_eq!(track.likelihood(&pose(Vector3::new(1.05, 0.0, 2.0)), false), None);
+        // From a stranger nothing is known.
+        let track =
+            Track::next(Some(followed(5)), &pose(Vector3::new(-0.7, 0.0, 2.0)), [Vec::new(), Vec::new()], 2, &[]);
+        assert_eq!(track.likelihood(&pose(Vector3::new(0.05, 0.0, 2.0)), false), None);
+    }
+}
