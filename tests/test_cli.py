@@ -97,8 +97,9 @@ def test_help_is_quick_and_names_the_commands(run: Run) -> None:
 
 def test_installed_program(world: Path) -> None:
     program = Path(sys.executable).with_name("tiltvp")
-    done = subprocess.run([program, "--version"], capture_output=True, text=True, timeout=60)
-    assert (done.returncode, done.stdout.strip()) == (0, tiltvp.__version__)
+    for command in ([program], [sys.executable, "-m", "tiltvp"]):
+        done = subprocess.run([*command, "--version"], capture_output=True, text=True, timeout=60)
+        assert (done.returncode, done.stdout.strip()) == (0, tiltvp.__version__)
     done = subprocess.run(
         [program, "tilt", "broken.png", "--camera", "camera.toml"],
         cwd=world,
