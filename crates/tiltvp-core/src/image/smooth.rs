@@ -41,7 +41,7 @@ impl Smoother {
         self.taps.len() == 1
     }
 
-    /// [`row`](Self::row) rounded to 1/8 of a grey level, in units of 1/128.
+    /// [`row`](Self::row) rounded to 1/8 of a grey level, in that unit.
     ///
     /// Columns and rows that the kernel reaches should lie within the image: others may be smoothed in single precision first,
     /// which takes longer.
@@ -180,14 +180,14 @@ fn fixed_rows(sums: &[u16], [centre, side]: [u32; 2], out: &mut [i16]) {
     let (left, middle, right) = (&sums[..n], &sums[1..=n], &sums[2..n + 2]);
     for (((o, l), m), r) in out.iter_mut().zip(left).zip(middle).zip(right) {
         let sum = u32::from(*m) * centre + (u32::from(*l) + u32::from(*r)) * side;
-        *o = (((sum + 4095 + ((sum >> 13) & 1)) >> 13) << 4) as i16;
+        *o = ((sum + 4095 + ((sum >> 13) & 1)) >> 13) as i16;
     }
 }
 
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512vl", "x86_64+avx2"))]
 fn quantise(row: &[f32], out: &mut [i16]) {
     for (o, i) in out.iter_mut().zip(row) {
-        *o = ((i * EIGHTHS).round_ties_even() as i16) << 4;
+        *o = (i * EIGHTHS).round_ties_even() as i16;
     }
 }
 
@@ -276,7 +276,7 @@ mod tests {
                         smoother.row(&view, v, first, &mut plain);
                         smoother.fixed_row(&view, v, first, &mut fixed);
                         for (p, f) in plain.iter().zip(&fixed) {
-                            assert!((p * 128.0 - f32::from(*f)).abs() < 8.01 && *f <= 32640, "{p} {f}");
+                            assert!((p * 8.0 - f32::from(*f)).abs() < 0.501 && *f <= 2040, "{p} {f}");
                         }
                     }
                 }

@@ -273,7 +273,7 @@ impl<L: Lanes> Sums<L> {
         }
     }
 
-    /// Takes the rows that a hard gate rejects, which it does for good, if there are any.
+    /// Takes the rows that a hard gate rejects, which it does for good.
     #[inline(always)]
     unsafe fn rejected(&mut self, [x, y, z]: [&[f32; LANES]; 3], weights: &mut [f32; LANES], model: &[L; 3], limit: L) {
         // SAFETY: the caller vouches for the machine.
@@ -281,11 +281,9 @@ impl<L: Lanes> Sums<L> {
             let (x, y, z, own) = (L::load(x), L::load(y), L::load(z), L::load(weights));
             let d = residual([x, y, z], model);
             let kept = L::keep(own, L::at_most(L::mul(d, d), limit));
-            let gone = L::sub(own, kept);
-            if L::count(L::below(L::splat(0.0), gone)) != 0 {
-                kept.store(weights);
-                self.add(gone, [x, y, d]);
-            }
+            // No branch: most sixteens have one that is rejected, at first.
+            kept.store(weights);
+            self.add(L::sub(own, kept), [x, y, d]);
         }
     }
 

@@ -1,6 +1,5 @@
 //! Observations that are linear in the model: rows `(x, y, z)` with residual `x h0 + y h1 + z h2`, and their one-pass kernels.
 
-use multiversion::multiversion;
 use nalgebra::{Matrix2, Matrix3, Vector2, Vector3};
 
 use super::loss::{Gate, Shape};
@@ -102,7 +101,7 @@ impl<T: Real> Rows<T> {
         x.iter().zip(y).zip(z).map(|((x, y), z)| Vector3::new(x.to_f64(), y.to_f64(), z.to_f64()))
     }
 
-    fn columns(&self) -> [&[T]; 3] {
+    pub(super) fn columns(&self) -> [&[T]; 3] {
         self.columns.each_ref().map(|column| &column[..self.len])
     }
 
@@ -161,36 +160,6 @@ impl<T: Real> Rows<T> {
     pub fn is_within(&self, index: usize, model: [f64; 3], threshold: f64) -> bool {
         let row = self.columns().map(|column| column.get(index..=index).unwrap_or(&[]));
         T::count(row, model.map(T::from_f64), T::from_f64(threshold * threshold)) == 1
-    }
-
-    /// Calls `visit(row, [weight, slope, x, y, residual])` for every `stride`-th row: its weight (one where none are given)
-    /// multiplied by the gate about a model, and by [`Gate::slope`].
-    pub fn for_each_gated(
-        &self,
-        model: [f64; 3],
-        gate: Gate,
-        weights: Option<&[f32]>,
-        stride: usize,
-        mut visit: impl FnMut(usize, [f64; 5]),
-    ) {
-        let ([x, y, z], stride) = (self.columns(), stride.max(1));
-        let own = |row: usize| weights.map_or(1.0, |weights| weights.get(row).copied().map_or(0.0, f64::from));
-        let mut sample = Sample::default();
-        for first in (0..self.len).step_by(stride * SAMPLED) {
-            let rows = (first..self.len).step_by(stride).take(SAMPLED);
-            for (i, row) in rows.clone().enumerate() {
-                (sample.x[i], sample.y[i], sample.z[i]) = (x[row].to_f64(), y[row].to_f64(), z[row].to_f64());
-                sample.own[i] = own(row);
-            }
-            gate_sample(&mut sample, model, gate.coefficients());
-            for (i, row) in rows.enumerate() {
-                let (mut weight, mut slope, d) = (sample.weight[i], sample.slope[i], sample.d[i]);
-                if gate.shape() == Shape::Marginal {
-                    (weight, slope) = (sample.own[i] * gate.weight(d), sample.own[i] * gate.slope(d));
-                }
-                visit(row, [weight, slope, sample.x[i], sample.y[i], d]);
-            }
-        }
     }
 
     /// Applies a gate about a model to the weights and takes the moments of what is left.
@@ -298,43 +267,6 @@ impl Moments {
     }
 }
 
-/// Rows that are gated together.
-const SAMPLED: usize = 64;
-
-/// Some rows with their own weights, their residuals, and the weights and slopes that a gate gives them.
-struct Sample {
-    x: [f64; SAMPLED],
-    y: [f64; SAMPLED],
-    z: [f64; SAMPLED],
-    own: [f64; SAMPLED],
-    d: [f64; SAMPLED],
-    weight: [f64; SAMPLED],
-    slope: [f64; SAMPLED],
-}
-
-impl Default for Sample {
-    fn default() -> Self {
-        let zero = [0.0; SAMPLED];
-        Self { x: zero, y: zero, z: zero, own: zero, d: zero, weight: zero, slope: zero }
-    }
-}
-
-/// Evaluates a gate that is no table, given its coefficients.
-#[multiversion(targets("x86_64+avx512f+avx512vl", "x86_64+avx2"))]
-fn gate_sample(sample: &mut Sample, [h0, h1, h2]: [f64; 3], (limit, inverse): (f64, f64)) {
-    let Sample { x, y, z, own, d, weight, slope } = sample;
-    for i in 0..SAMPLED {
-        d[i] = x[i] * h0 + y[i] * h1 + z[i] * h2;
-        let squared = d[i] * d[i];
-        let t = 1.0 - squared * inverse;
-        let t = if t > 0.0 { t } else { 0.0 };
-        let (t2, own) = (t * t, if squared <= limit { own[i] } else { 0.0 });
-        let t4 = t2 * t2;
-        weight[i] = own * (t4 * t4);
-        slope[i] = own * (t4 * t2 * t) * (17.0 * t - 16.0);
-    }
-}
-
 /// Rows that are counted before looking whether the count can still matter.
 const COUNTED: usize = 1024;
 
@@ -398,15 +330,6 @@ mod tests {
             assert_eq!(found.count, count, "{len} rows, {gate:?}");
             assert!((found.weight - weight).abs() < tolerance * scale, "{len} rows, {gate:?}");
             assert!((found.second_moments() - sum).norm() < tolerance * scale, "{len} rows, {gate:?}");
-            let mut visited = 0;
-            rows.for_each_gated(model, gate, Some(&before), 1, |i, [weight, slope, x, y, d]| {
-                let row = rows.get(i).unwrap();
-                let own = f64::from(before[i]);
-                assert_eq!((x, y, d), (row.x, row.y, row.x * model[0] + row.y * model[1] + row.z * model[2]));
-                assert!((weight - own * gate.weight(d)).abs() < 1e-9 && (slope - own * gate.slope(d)).abs() < 1e-9);
-                visited += usize::from(weight > 0.0);
-            });
-            assert_eq!(visited, count, "{len} rows, {gate:?}");
             if let Gate::Hard { threshold } = gate {
                 let within = rows.iter().filter(|row| gate.weight(row.dot(&Vector3::from(model))) > 0.0).count();
                 assert_eq!(rows.count_within(model, threshold), within, "{len} rows");
