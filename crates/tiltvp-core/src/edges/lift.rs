@@ -83,7 +83,7 @@ impl LiftTable {
         slots: &mut Vec<u32>,
         places: &mut Vec<u32>,
     ) {
-        let n = edges.len();
+        let (n, last) = if self.maps.is_empty() { (0, 0) } else { (edges.len(), self.maps.len() - 1) };
         weights.resize(n + ROOM, 0.0);
         slots.resize(n + ROOM, 0);
         places.resize(n + ROOM, 0);
@@ -96,7 +96,8 @@ impl LiftTable {
                 let numbers = &edges.slot()[part.clone()];
                 let [ab, cd, ef] = &mut block.maps;
                 for (((slot, ab), cd), ef) in numbers.iter().zip(ab).zip(cd).zip(ef) {
-                    [*ab, *cd, *ef] = self.maps.get(*slot as usize).copied().unwrap_or_default();
+                    // None is beyond the last, and to say so costs less than to look.
+                    [*ab, *cd, *ef] = self.maps[(*slot as usize).min(last)];
                 }
                 let count = numbers.len();
                 fill(&mut block, &edges.gx()[part.clone()], &edges.gy()[part], limit, self.unit);

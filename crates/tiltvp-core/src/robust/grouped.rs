@@ -1,7 +1,6 @@
 //! Sums of gated rows by group, in one pass: what a covariance is made of when the rows of a group err together.
 
-use multiversion::multiversion;
-
+use super::lanes::{self, LANES};
 use super::loss::Gate;
 use super::rows::Rows;
 
@@ -18,30 +17,26 @@ pub struct GroupSums {
 }
 
 /// Groups are summed in so many turns, so that the rows of one need not wait for each other.
-const TURNS: usize = 4;
+pub(super) const TURNS: usize = 4;
 
-/// Rows that are worked on together.
-const BLOCK: usize = 64;
-
-/// Lanes of the sums over all groups.
-const LANES: usize = 16;
-
-/// Partial sums.
-struct Partial {
-    /// Information and the first score, the second score.
-    groups: [[([f32; 4], f32); GROUPS]; TURNS],
-    slopes: [[f32; LANES]; 3],
+/// The terms of sixteen rows.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Terms {
+    /// Information and first score of rows 0, 4, 8, 12, then of rows 1, 5, 9, 13, and so on.
+    pub fours: [[[f32; 4]; TURNS]; TURNS],
+    /// The second score, row by row.
+    pub last: [f32; LANES],
 }
 
-impl Default for Partial {
-    fn default() -> Self {
-        Self { groups: [[([0.0; 4], 0.0); GROUPS]; TURNS], slopes: [[0.0; LANES]; 3] }
-    }
-}
+/// Sums of groups in single precision; the last three numbers of each are not used.
+pub(super) type Turns = [[[f32; 8]; GROUPS]; TURNS];
+
+/// Sixteens that are worked on together.
+const BLOCK: usize = 8;
 
 impl Rows<f32> {
     /// Sums over every `stride`-th row, with soft gates about a model. Weights are one where none are given. Row `i` is of the
-    /// group `group_of[members[i]]`, the first one where there is none.
+    /// group `group_of[members[i]]`, the last one where there is none.
     ///
     /// Single precision, partial sums of at most a few thousand rows, the same on every machine.
     pub fn sums_by_group(
@@ -52,105 +47,80 @@ impl Rows<f32> {
         stride: usize,
         (members, group_of): (&[u32], &[u8]),
     ) -> GroupSums {
-        let (stride, inverse) = (stride.max(1), gate.coefficients().1 as f32);
+        let stride = stride.max(1);
+        let gains = [gate.coefficients().1 as f32, 0.0];
         let model = model.map(|h| h as f32);
-        let columns = self.columns();
-        let mut partial = Partial::default();
-        let mut rows = Sample::default();
-        for first in (0..self.len()).step_by(stride * BLOCK) {
-            let n = (self.len() - first).div_ceil(stride).min(BLOCK);
-            rows.take(columns, weights, first, stride, n);
-            for i in 0..n {
-                let member = members.get(first + i * stride).copied().unwrap_or(0);
-                rows.groups[i] = group_of.get(member as usize).copied().unwrap_or(0) % GROUPS as u8;
+        let mut turns = [[[0.0; 8]; GROUPS]; TURNS];
+        let mut slopes = [[0.0; LANES]; 3];
+        let mut terms = [Terms { fours: [[[0.0; 4]; TURNS]; TURNS], last: [0.0; LANES] }; BLOCK];
+        let (zero, one) = ([0.0; LANES * BLOCK], [1.0; LANES * BLOCK]);
+        let [mut x, mut y, mut z, mut own] = [zero; 4];
+        for first in (0..self.len()).step_by(stride * LANES * BLOCK) {
+            let n = (self.len() - first).div_ceil(stride).min(LANES * BLOCK);
+            let count = n.div_ceil(LANES);
+            let whole = first..first + LANES * count;
+            let direct = stride == 1 && n == LANES * count;
+            if direct {
+                let rows = self.columns().map(|column| &column[whole.clone()]);
+                let weights = weights.map_or(&one[..n], |weights| &weights[whole]);
+                lanes::terms(rows, weights, model, gains, &mut terms[..count], &mut slopes);
+            } else {
+                let take = |from: &[f32], to: &mut [f32]| {
+                    let every = from[first..].iter().step_by(stride);
+                    to.iter_mut().zip(every).for_each(|(to, from)| *to = *from);
+                };
+                for (column, to) in self.columns().into_iter().zip([&mut x, &mut y, &mut z]) {
+                    take(column, &mut to[..n]);
+                }
+                match weights {
+                    Some(weights) => take(weights, &mut own[..n]),
+                    None => own[..n].fill(1.0),
+                }
+                own[n..].fill(0.0);
+                let end = LANES * count;
+                lanes::terms([&x[..end], &y[..end], &z[..end]], &own[..end], model, gains, &mut terms[..count], &mut slopes);
             }
-            add(&rows, model, inverse, &mut partial);
+            let last = group_of.len().saturating_sub(1);
+            for (k, terms) in terms[..count].iter().enumerate() {
+                let held = LANES.min(n - k * LANES);
+                let mut groups = [0u8; LANES];
+                let members = members.get(first + k * LANES * stride..).unwrap_or(&[]);
+                if let (1, Some(members), false) = (stride, members.first_chunk::<LANES>(), group_of.is_empty()) {
+                    for (group, member) in groups.iter_mut().zip(members) {
+                        *group = group_of[(*member as usize).min(last)];
+                    }
+                } else if !group_of.is_empty() {
+                    for (group, member) in groups[..held].iter_mut().zip(members.iter().step_by(stride)) {
+                        *group = group_of[(*member as usize).min(last)];
+                    }
+                }
+                add(&mut turns, terms, &groups);
+            }
         }
         let mut sums = GroupSums { groups: [[0.0; 5]; GROUPS], slopes: [0.0; 3] };
-        for turn in &partial.groups {
-            for (sums, (quad, last)) in sums.groups.iter_mut().zip(turn) {
-                for (sum, part) in sums.iter_mut().zip(quad.iter().chain([last])) {
-                    *sum += f64::from(*part);
-                }
+        for turn in &turns {
+            for (sums, parts) in sums.groups.iter_mut().zip(turn) {
+                sums.iter_mut().zip(parts).for_each(|(sum, part)| *sum += f64::from(*part));
             }
         }
-        for (sum, lanes) in sums.slopes.iter_mut().zip(&partial.slopes) {
+        for (sum, lanes) in sums.slopes.iter_mut().zip(&slopes) {
             *sum = lanes.iter().map(|lane| f64::from(*lane)).sum();
         }
         sums
     }
 }
 
-/// Some rows with their own weights, and their groups; weights beyond the last are zero.
-struct Sample {
-    x: [f32; BLOCK],
-    y: [f32; BLOCK],
-    z: [f32; BLOCK],
-    own: [f32; BLOCK],
-    groups: [u8; BLOCK],
-}
-
-impl Default for Sample {
-    fn default() -> Self {
-        let zero = [0.0; BLOCK];
-        Self { x: zero, y: zero, z: zero, own: zero, groups: [0; BLOCK] }
-    }
-}
-
-impl Sample {
-    fn take(&mut self, [x, y, z]: [&[f32]; 3], weights: Option<&[f32]>, first: usize, stride: usize, n: usize) {
-        let copy = |from: &[f32], to: &mut [f32; BLOCK]| {
-            if stride == 1 {
-                to[..n].copy_from_slice(&from[first..first + n]);
-            } else {
-                to.iter_mut().zip(from[first..].iter().step_by(stride)).for_each(|(to, from)| *to = *from);
-            }
-        };
-        copy(x, &mut self.x);
-        copy(y, &mut self.y);
-        copy(z, &mut self.z);
-        match weights {
-            Some(weights) => copy(weights, &mut self.own),
-            None => self.own = [1.0; BLOCK],
-        }
-        self.own[n..].fill(0.0);
-    }
-}
-
-/// Adds a block.
-#[multiversion(targets("x86_64+avx512f+avx512vl", "x86_64+avx2"))]
-fn add(rows: &Sample, [h0, h1, h2]: [f32; 3], inverse: f32, partial: &mut Partial) {
-    let Sample { x, y, z, own, groups } = rows;
-    let mut terms = [[0.0f32; 4]; BLOCK];
-    let mut last = [0.0f32; BLOCK];
-    let [mut sx, mut sy, mut sxy] = [[0.0f32; BLOCK]; 3];
-    for i in 0..BLOCK {
-        let d = x[i] * h0 + y[i] * h1 + z[i] * h2;
-        let t = 1.0 - d * d * inverse;
-        let t = if t > 0.0 { t } else { 0.0 };
-        let t2 = t * t;
-        let t4 = t2 * t2;
-        let w = own[i] * (t4 * t4);
-        let s = own[i] * (t4 * t2 * t) * (17.0 * t - 16.0);
-        let (wx, wy) = (w * x[i], w * y[i]);
-        terms[i] = [wx * x[i], wx * y[i], wy * y[i], wx * d];
-        last[i] = wy * d;
-        (sx[i], sxy[i], sy[i]) = (s * x[i] * x[i], s * x[i] * y[i], s * y[i] * y[i]);
-    }
-    for (lanes, terms) in partial.slopes.iter_mut().zip([&sx, &sxy, &sy]) {
-        for terms in terms.as_chunks::<LANES>().0 {
-            for (lane, term) in lanes.iter_mut().zip(terms) {
-                *lane += term;
-            }
-        }
-    }
-    for ((fours, last), groups) in
-        terms.as_chunks::<TURNS>().0.iter().zip(last.as_chunks::<TURNS>().0).zip(groups.as_chunks::<TURNS>().0)
-    {
-        for i in 0..TURNS {
-            let (quad, second) = &mut partial.groups[i][usize::from(groups[i]) % GROUPS];
-            *quad = std::array::from_fn(|k| quad[k] + fours[i][k]);
-            *second += last[i];
+/// Adds the terms of sixteen rows to those of their groups.
+#[inline]
+fn add(turns: &mut Turns, terms: &Terms, groups: &[u8; LANES]) {
+    for (k, groups) in groups.as_chunks::<TURNS>().0.iter().enumerate() {
+        for (j, turn) in turns.iter_mut().enumerate() {
+            let sums = &mut turn[usize::from(groups[j]) % GROUPS];
+            let four = &terms.fours[j][k];
+            let [a, b, c, d, e, ..] = *sums;
+            let quad = [a + four[0], b + four[1], c + four[2], d + four[3]];
+            sums[..4].copy_from_slice(&quad);
+            sums[4] = e + terms.last[TURNS * k + j];
         }
     }
 }

@@ -1,5 +1,6 @@
 //! Robust fits that know no vision: one random-sampling loop, one trimming loop, one reweighting loop.
 
+mod aligned;
 mod compaction;
 mod direction;
 mod grouped;

@@ -2,6 +2,7 @@
 
 use multiversion::multiversion;
 
+use super::aligned::Dense;
 use super::lanes::{self, HARD, LANES, REJECTED, SOFT, WITHIN};
 use super::loss::Shape;
 use super::score::{DEGREE, MARGINAL, cell, marginal_gain};
@@ -40,8 +41,9 @@ impl Total {
 }
 
 /// The arithmetic that rows are stored in: `f32` or `f64`.
+#[expect(private_bounds, reason = "what numbers are dense is told by the two that there are")]
 pub trait Real:
-    Copy + Default + PartialOrd + std::ops::Add<Output = Self> + std::ops::Sub<Output = Self> + std::ops::Mul<Output = Self>
+    Dense + PartialOrd + std::ops::Add<Output = Self> + std::ops::Sub<Output = Self> + std::ops::Mul<Output = Self>
 {
     /// Whether there is a kernel for [`Shape::Rejected`].
     #[doc(hidden)]

@@ -2,6 +2,7 @@
 
 use nalgebra::{Matrix2, Matrix3, Vector2, Vector3};
 
+use super::aligned::Aligned;
 use super::loss::{Gate, Shape};
 use super::real::{BLOCK, Real, Total};
 use super::sampling::Score;
@@ -11,7 +12,7 @@ use super::score::MARGINAL;
 #[derive(Debug, Clone, Default)]
 pub struct Rows<T> {
     /// Columns `x`, `y`, `z`, each longer than the number of rows in use.
-    columns: [Vec<T>; 3],
+    columns: [Aligned<T>; 3],
     len: usize,
 }
 
@@ -34,7 +35,7 @@ pub struct Moments {
 impl<T: Real> Rows<T> {
     /// No rows, with room for `capacity` of them.
     pub fn with_capacity(capacity: usize) -> Self {
-        let column = || vec![T::default(); capacity];
+        let column = || Aligned::zeros(capacity);
         Self { columns: [column(), column(), column()], len: 0 }
     }
 
@@ -45,11 +46,10 @@ impl<T: Real> Rows<T> {
 
     /// Appends a row.
     pub fn push(&mut self, x: T, y: T, z: T) {
+        let room = if self.columns[0].len() > self.len { 0 } else { 2 * self.len + 1 };
         for (column, value) in self.columns.iter_mut().zip([x, y, z]) {
-            match column.get_mut(self.len) {
-                Some(place) => *place = value,
-                None => column.push(value),
-            }
+            column.grow(room);
+            column.as_mut_slice()[self.len] = value;
         }
         self.len += 1;
     }
@@ -59,10 +59,8 @@ impl<T: Real> Rows<T> {
         let (first, stride) = (self.len, stride.max(1));
         let end = first + other.len.div_ceil(stride);
         for (own, column) in self.columns.iter_mut().zip(other.columns()) {
-            if own.len() < end {
-                own.resize(end, T::default());
-            }
-            for (place, from) in own[first..end].iter_mut().zip((0..column.len()).step_by(stride)) {
+            own.grow(end);
+            for (place, from) in own.as_mut_slice()[first..end].iter_mut().zip((0..column.len()).step_by(stride)) {
                 *place = column[from];
             }
         }
@@ -71,12 +69,8 @@ impl<T: Real> Rows<T> {
 
     /// Replaces all rows: `write` fills the columns, which have room for `capacity` rows, and returns how many it wrote.
     pub fn refill(&mut self, capacity: usize, write: impl FnOnce([&mut [T]; 3]) -> usize) {
-        for column in &mut self.columns {
-            if column.len() < capacity {
-                column.resize(capacity, T::default());
-            }
-        }
-        self.len = write(self.columns.each_mut().map(Vec::as_mut_slice)).min(capacity);
+        self.columns.iter_mut().for_each(|column| column.grow(capacity));
+        self.len = write(self.columns.each_mut().map(Aligned::as_mut_slice)).min(capacity);
     }
 
     /// How many rows there are.
@@ -102,7 +96,7 @@ impl<T: Real> Rows<T> {
     }
 
     pub(super) fn columns(&self) -> [&[T]; 3] {
-        self.columns.each_ref().map(|column| &column[..self.len])
+        self.columns.each_ref().map(|column| &column.as_slice()[..self.len])
     }
 
     /// How many rows have a residual of at most `threshold`.

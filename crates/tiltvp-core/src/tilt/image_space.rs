@@ -114,9 +114,7 @@ pub(super) fn offsets(edges: &EdgePixels, centre: &VanishingPoint, gains: &[f32]
             if gains.is_empty() {
                 block.gain.fill(1.0);
             } else {
-                for (gain, slot) in block.gain.iter_mut().zip(numbers) {
-                    *gain = gains.get(*slot as usize).copied().unwrap_or(1.0);
-                }
+                look_up(gains, numbers, &mut block.gain);
             }
             let count = numbers.len();
             fill(&mut block, &edges.place()[part.clone()], middle, &edges.gx()[part.clone()], &edges.gy()[part], limit);
@@ -129,6 +127,15 @@ pub(super) fn offsets(edges: &EdgePixels, centre: &VanishingPoint, gains: &[f32]
     places.truncate(rows.len());
     weights.clear();
     weights.resize(rows.len(), 1.0);
+}
+
+/// The gains of pixels. Numbers beyond the last, of which there are none, take the last: that costs less than to look whether
+/// there are any.
+fn look_up(gains: &[f32], numbers: &[u32], out: &mut [f32]) {
+    let Some(last) = gains.len().checked_sub(1) else { return };
+    for (gain, number) in out.iter_mut().zip(numbers) {
+        *gain = gains[(*number as usize).min(last)];
+    }
 }
 
 /// Edge pixels whose offsets are computed together.
