@@ -118,6 +118,28 @@ impl<T: Real> Rows<T> {
         count
     }
 
+    /// [`count_to_beat`](Self::count_to_beat) of several models at once, of none where there is none: rows come from further
+    /// caches once for all.
+    pub fn count_each_to_beat(
+        &self,
+        models: impl Iterator<Item = Option<[f64; 3]>> + Clone,
+        threshold: f64,
+        to_beat: usize,
+        counts: &mut [usize],
+    ) {
+        let limit = T::from_f64(threshold * threshold);
+        counts.fill(0);
+        for start in (0..self.len).step_by(COUNTED) {
+            let end = (start + COUNTED).min(self.len);
+            let rows = self.columns().map(|column| &column[start..end]);
+            for (model, count) in models.clone().zip(&mut *counts) {
+                if let Some(model) = model.filter(|_| *count + (self.len - start) > to_beat) {
+                    *count += T::count(rows, model.map(T::from_f64), limit);
+                }
+            }
+        }
+    }
+
     /// How many of the listed rows have a residual of at most `threshold`.
     pub fn count_among(&self, rows: &[u32], model: [f64; 3], threshold: f64) -> usize {
         let ([h0, h1, h2], limit) = (model.map(T::from_f64), T::from_f64(threshold * threshold));
@@ -327,6 +349,15 @@ mod tests {
             if let Gate::Hard { threshold } = gate {
                 let within = rows.iter().filter(|row| gate.weight(row.dot(&Vector3::from(model))) > 0.0).count();
                 assert_eq!(rows.count_within(model, threshold), within, "{len} rows");
+                let other = [0.3, 0.1, 0.8];
+                for to_beat in [0, within / 2, len] {
+                    let mut counts = [7; 3];
+                    rows.count_each_to_beat([model, other, model].into_iter().map(Some), threshold, to_beat, &mut counts);
+                    for (count, model) in counts.iter().zip([model, other, model]) {
+                        let alone = rows.count_to_beat(model, threshold, 0);
+                        assert!(*count == alone || (*count <= to_beat && alone <= to_beat), "{len} rows");
+                    }
+                }
                 assert_eq!((0..len + 3).filter(|i| rows.is_within(*i, model, threshold)).count(), within);
             }
         }
