@@ -132,8 +132,11 @@ struct Part {
     end: usize,
 }
 
-/// Smoothed rows that are kept: three, and a power of two.
-const ROWS: usize = 4;
+/// Rows whose pixels are tested together.
+const TOGETHER: usize = 8;
+
+/// Smoothed rows that are kept: those and their neighbours, and a power of two.
+const ROWS: usize = 16;
 
 /// Parts of a row that are closer than this are smoothed as one.
 const GAP: usize = 32;
@@ -197,8 +200,9 @@ impl Detector {
             let test = Test { at_least: least_squared::<i16>(gradient_min), vectors, limit };
             let (left, width) = (region.columns().start - 1, region.columns().len() + 2);
             let mut parts = self.parts.iter().peekable();
-            for blocks in self.blocks.chunk_by(|a, b| a.v() == b.v()) {
-                while let Some(Part { v, first, end }) = parts.next_if(|part| part.v <= blocks[0].v() + 1) {
+            for blocks in self.blocks.chunk_by(|a, b| a.v() / TOGETHER == b.v() / TOGETHER) {
+                let last = blocks[blocks.len() - 1].v();
+                while let Some(Part { v, first, end }) = parts.next_if(|part| part.v <= last + 1) {
                     expect(image.row(v + AHEAD).get(*first..*end).unwrap_or(&[]));
                     let row = &mut self.levels[v % ROWS * width..][first - left..end - left];
                     self.smoother.fixed_row(image, *v, *first, row);

@@ -94,6 +94,9 @@ impl LiftTable {
             for start in (0..n).step_by(BLOCK) {
                 let part = start..(start + BLOCK).min(n);
                 let numbers = &edges.slot()[part.clone()];
+                for slot in edges.slot()[part.end..].iter().take(BLOCK) {
+                    expect(&self.maps, *slot as usize);
+                }
                 let [ab, cd, ef] = &mut block.maps;
                 for (((slot, ab), cd), ef) in numbers.iter().zip(ab).zip(cd).zip(ef) {
                     // None is beyond the last, and to say so costs less than to look.
@@ -111,6 +114,19 @@ impl LiftTable {
         slots.truncate(rows.len());
         places.truncate(rows.len());
     }
+}
+
+/// Asks for what will be read soon.
+#[inline(always)]
+fn expect<T>(table: &[T], place: usize) {
+    #[cfg(target_arch = "x86_64")]
+    {
+        use std::arch::x86_64::{_MM_HINT_T0, _mm_prefetch};
+        // SAFETY: asking for memory reads none, wherever it is, and every x86-64 can.
+        unsafe { _mm_prefetch::<_MM_HINT_T0>(table.as_ptr().wrapping_add(place).cast()) };
+    }
+    #[cfg(not(target_arch = "x86_64"))]
+    let _ = (table, place);
 }
 
 /// The entries of a word, the lower first.

@@ -57,8 +57,8 @@ fn plain(sums: &[i16], [centre, side]: [i16; 2], out: &mut [i16]) {
 #[cfg(target_arch = "x86_64")]
 mod wide {
     use std::arch::x86_64::{
-        __m512i, _mm512_add_epi16, _mm512_add_epi32, _mm512_madd_epi16, _mm512_mask_and_epi32, _mm512_mask_storeu_epi16,
-        _mm512_maskz_loadu_epi16, _mm512_packs_epi32, _mm512_set1_epi16, _mm512_set1_epi32, _mm512_srai_epi32,
+        __m512i, _mm512_add_epi16, _mm512_add_epi32, _mm512_loadu_si512, _mm512_madd_epi16, _mm512_mask_and_epi32, _mm512_mask_storeu_epi16,
+        _mm512_maskz_loadu_epi16, _mm512_packs_epi32, _mm512_set1_epi16, _mm512_set1_epi32, _mm512_srai_epi32, _mm512_storeu_si512,
         _mm512_testn_epi32_mask, _mm512_unpackhi_epi16, _mm512_unpacklo_epi16,
     };
 
@@ -73,23 +73,46 @@ mod wide {
             let sides = _mm512_set1_epi16(side);
             let middles = _mm512_set1_epi32((i32::from(HALF_UNIT.1) << 16) | i32::from(centre as u16));
             let (offset, grey) = (_mm512_set1_epi16(HALF_UNIT.0), _mm512_set1_epi16(MIDDLE as i16));
-            for first in (0..out.len()).step_by(32) {
-                let own = u32::MAX >> (first + 32).saturating_sub(out.len());
+            let whole = out.len() / 32 * 32;
+            let mut first = 0;
+            while first < whole {
                 let from = sums.as_ptr().add(first);
+                let l = _mm512_loadu_si512(from.cast());
+                let m = _mm512_loadu_si512(from.add(1).cast());
+                let r = _mm512_loadu_si512(from.add(2).cast());
+                let levels = levels([l, m, r], sides, middles, offset, grey);
+                _mm512_storeu_si512(out.as_mut_ptr().add(first).cast(), levels);
+                first += 32;
+            }
+            if whole < out.len() {
+                let own = u32::MAX >> (whole + 32 - out.len());
+                let from = sums.as_ptr().add(whole);
                 let l = _mm512_maskz_loadu_epi16(own, from);
                 let m = _mm512_maskz_loadu_epi16(own, from.add(1));
                 let r = _mm512_maskz_loadu_epi16(own, from.add(2));
-                let low = sum(
-                    _mm512_madd_epi16(_mm512_unpacklo_epi16(l, r), sides),
-                    _mm512_madd_epi16(_mm512_unpacklo_epi16(m, offset), middles),
-                );
-                let high = sum(
-                    _mm512_madd_epi16(_mm512_unpackhi_epi16(l, r), sides),
-                    _mm512_madd_epi16(_mm512_unpackhi_epi16(m, offset), middles),
-                );
-                let levels = _mm512_add_epi16(_mm512_packs_epi32(low, high), grey);
-                _mm512_mask_storeu_epi16(out.as_mut_ptr().add(first), own, levels);
+                let levels = levels([l, m, r], sides, middles, offset, grey);
+                _mm512_mask_storeu_epi16(out.as_mut_ptr().add(whole), own, levels);
             }
+        }
+    }
+
+    /// Levels of 32 pixels.
+    ///
+    /// # Safety
+    /// The machine must have the features.
+    #[inline(always)]
+    unsafe fn levels([l, m, r]: [__m512i; 3], sides: __m512i, middles: __m512i, offset: __m512i, grey: __m512i) -> __m512i {
+        // SAFETY: the caller vouches for the machine.
+        unsafe {
+            let low = sum(
+                _mm512_madd_epi16(_mm512_unpacklo_epi16(l, r), sides),
+                _mm512_madd_epi16(_mm512_unpacklo_epi16(m, offset), middles),
+            );
+            let high = sum(
+                _mm512_madd_epi16(_mm512_unpackhi_epi16(l, r), sides),
+                _mm512_madd_epi16(_mm512_unpackhi_epi16(m, offset), middles),
+            );
+            _mm512_add_epi16(_mm512_packs_epi32(low, high), grey)
         }
     }
 
