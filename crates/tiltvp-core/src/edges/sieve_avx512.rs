@@ -5,13 +5,13 @@
 //! where they are compacted. There are no closures in the kernels: they would be compiled for plain machines.
 
 use std::arch::x86_64::{
-    __m512i, _CMP_LE_OQ, _mm256_storeu_si256, _mm512_add_epi16, _mm512_add_epi32, _mm512_castsi512_si128,
+    __m512i, _CMP_LE_OQ, _MM_HINT_T0, _mm256_storeu_si256, _mm512_add_epi16, _mm512_add_epi32, _mm512_castsi512_si128,
     _mm512_castsi512_si256, _mm512_cmpge_epi32_mask, _mm512_cvtepi32_ps, _mm512_cvtepu8_epi32,
     _mm512_extracti32x4_epi32, _mm512_loadu_si512, _mm512_madd_epi16, _mm512_maddubs_epi16, _mm512_mask_cmp_ps_mask,
     _mm512_maskz_compress_epi8, _mm512_maskz_compress_epi16, _mm512_maskz_loadu_epi32, _mm512_mul_ps,
     _mm512_mullo_epi16, _mm512_permutex2var_epi64, _mm512_set1_epi16, _mm512_set1_epi32, _mm512_set1_ps,
-    _mm512_setr_epi64, _mm512_shuffle_i32x4, _mm512_storeu_si512, _mm512_sub_epi16, _mm512_unpackhi_epi8, _mm512_unpackhi_epi16,
-    _mm512_unpacklo_epi8, _mm512_unpacklo_epi16, _pdep_u64, _pext_u64,
+    _mm512_setr_epi64, _mm512_shuffle_i32x4, _mm512_storeu_si512, _mm512_sub_epi16, _mm512_unpackhi_epi8,
+    _mm512_unpackhi_epi16, _mm512_unpacklo_epi8, _mm512_unpacklo_epi16, _pdep_u64, _mm_prefetch, _pext_u64,
 };
 
 use super::sieve::{BLOCK, Block, Kept, Level, Levels, REACH, Test, Vectors};
@@ -65,9 +65,7 @@ pub(super) trait VectorLevel: Sized {
     unsafe fn in_order(bits: u64) -> u64 {
         let [a, b, c, d] = Self::SIXTEENS;
         // SAFETY: the caller vouches for the machine.
-        unsafe {
-            _pdep_u64(bits, a) | _pdep_u64(bits >> 16, b) | _pdep_u64(bits >> 32, c) | _pdep_u64(bits >> 48, d)
-        }
+        unsafe { _pdep_u64(bits, a) | _pdep_u64(bits >> 16, b) | _pdep_u64(bits >> 32, c) | _pdep_u64(bits >> 48, d) }
     }
 }
 
@@ -186,12 +184,12 @@ unsafe fn slopes_of_words(a: *const i16, m: *const i16, b: *const i16) -> [__m51
         let (three, ten) = (_mm512_set1_epi16(3), _mm512_set1_epi16(10));
         let x = _mm512_mullo_epi16(_mm512_add_epi16(falling, rising), three);
         let y = _mm512_mullo_epi16(_mm512_sub_epi16(falling, rising), three);
-        [
-            _mm512_add_epi16(x, _mm512_mullo_epi16(along, ten)),
-            _mm512_add_epi16(y, _mm512_mullo_epi16(down, ten)),
-        ]
+        [_mm512_add_epi16(x, _mm512_mullo_epi16(along, ten)), _mm512_add_epi16(y, _mm512_mullo_epi16(down, ten))]
     }
 }
+
+/// Rows that are asked for before they are needed.
+const AHEAD: usize = 6;
 
 /// Blocks that wait to be compacted: their gradients stay in the nearest cache.
 const ENOUGH: usize = 48;
@@ -273,6 +271,11 @@ unsafe fn test_blocks<L: Level, const SCREEN: u8>(
         let mut strong = 0;
         let mut rest = [[L::default(); REACH]; 3];
         for block in blocks {
+            if levels.places == usize::MAX {
+                // An image is rarely in the nearest cache.
+                let place = (block.v() + AHEAD) * levels.stride + (block.place & 0xffff) as usize;
+                _mm_prefetch::<_MM_HINT_T0>(levels.data.as_ptr().wrapping_add(place).cast());
+            }
             let slopes = L::slopes(levels.around(block, &mut rest));
             let g = [
                 _mm512_unpacklo_epi16(slopes[0][0], slopes[1][0]),
@@ -418,9 +421,27 @@ unsafe fn compact<L: Level>(waiting: &mut Waiting, kept: &mut Kept<'_>) {
                 _mm512_storeu_si512(kept.gy.as_mut_ptr().add(len).cast(), y0);
                 _mm512_storeu_si512(kept.gx.as_mut_ptr().add(after).cast(), x1);
                 _mm512_storeu_si512(kept.gy.as_mut_ptr().add(after).cast(), y1);
-                store_numbers(_mm512_extracti32x4_epi32::<1>(numbers), slot, place, slots.add(len + 16), places.add(len + 16));
-                store_numbers(_mm512_extracti32x4_epi32::<2>(numbers), slot, place, slots.add(len + 32), places.add(len + 32));
-                store_numbers(_mm512_extracti32x4_epi32::<3>(numbers), slot, place, slots.add(len + 48), places.add(len + 48));
+                store_numbers(
+                    _mm512_extracti32x4_epi32::<1>(numbers),
+                    slot,
+                    place,
+                    slots.add(len + 16),
+                    places.add(len + 16),
+                );
+                store_numbers(
+                    _mm512_extracti32x4_epi32::<2>(numbers),
+                    slot,
+                    place,
+                    slots.add(len + 32),
+                    places.add(len + 32),
+                );
+                store_numbers(
+                    _mm512_extracti32x4_epi32::<3>(numbers),
+                    slot,
+                    place,
+                    slots.add(len + 48),
+                    places.add(len + 48),
+                );
             }
             len += count;
         }
@@ -463,8 +484,7 @@ mod tests {
         let room = 3 * WIDTH;
         let (mut slots, mut places) = (vec![0; room], vec![0; room]);
         let (mut gx, mut gy) = (vec![0; room], vec![0; room]);
-        let mut kept =
-            Kept { slots: &mut slots, places: &mut places, gx: &mut gx, gy: &mut gy, len: 0, strong: 0 };
+        let mut kept = Kept { slots: &mut slots, places: &mut places, gx: &mut gx, gy: &mut gy, len: 0, strong: 0 };
         with(&mut kept);
         let (len, strong) = (kept.len, kept.strong);
         slots.truncate(len);
@@ -522,7 +542,9 @@ mod tests {
         if is_available() {
             for k in 0..64 {
                 // SAFETY: the machine has the instructions.
-                let (a, b) = unsafe { (u8::in_order(<u8 as VectorLevel>::own(1 << k)), i16::in_order(<i16 as VectorLevel>::own(1 << k))) };
+                let (a, b) = unsafe {
+                    (u8::in_order(<u8 as VectorLevel>::own(1 << k)), i16::in_order(<i16 as VectorLevel>::own(1 << k)))
+                };
                 assert_eq!((a, b), (1 << k, 1 << k));
             }
         }

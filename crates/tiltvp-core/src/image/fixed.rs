@@ -57,9 +57,9 @@ fn plain(sums: &[i16], [centre, side]: [i16; 2], out: &mut [i16]) {
 #[cfg(target_arch = "x86_64")]
 mod wide {
     use std::arch::x86_64::{
-        __m512i, _mm512_add_epi16, _mm512_add_epi32, _mm512_loadu_si512, _mm512_madd_epi16, _mm512_mask_and_epi32, _mm512_mask_storeu_epi16,
-        _mm512_maskz_loadu_epi16, _mm512_packs_epi32, _mm512_set1_epi16, _mm512_set1_epi32, _mm512_srai_epi32, _mm512_storeu_si512,
-        _mm512_testn_epi32_mask, _mm512_unpackhi_epi16, _mm512_unpacklo_epi16,
+        __m512i, _mm512_add_epi16, _mm512_add_epi32, _mm512_loadu_si512, _mm512_madd_epi16, _mm512_mask_and_epi32,
+        _mm512_mask_storeu_epi16, _mm512_maskz_loadu_epi16, _mm512_packs_epi32, _mm512_set1_epi16, _mm512_set1_epi32,
+        _mm512_srai_epi32, _mm512_storeu_si512, _mm512_testn_epi32_mask, _mm512_unpackhi_epi16, _mm512_unpacklo_epi16,
     };
 
     use super::{BITS, HALF_UNIT, MIDDLE};
@@ -101,7 +101,13 @@ mod wide {
     /// # Safety
     /// The machine must have the features.
     #[inline(always)]
-    unsafe fn levels([l, m, r]: [__m512i; 3], sides: __m512i, middles: __m512i, offset: __m512i, grey: __m512i) -> __m512i {
+    unsafe fn levels(
+        [l, m, r]: [__m512i; 3],
+        sides: __m512i,
+        middles: __m512i,
+        offset: __m512i,
+        grey: __m512i,
+    ) -> __m512i {
         // SAFETY: the caller vouches for the machine.
         unsafe {
             let low = sum(

@@ -51,4 +51,5 @@ impl<T: Dense> Aligned<T> {
     }
 }
 
-const _: () = assert!(size_of::<Line<f32>>() == LINE * size_of::<f32>() && size_of::<Line<f64>>() == LINE * size_of::<f64>());
+const _: () =
+    assert!(size_of::<Line<f32>>() == LINE * size_of::<f32>() && size_of::<Line<f64>>() == LINE * size_of::<f64>());

@@ -58,9 +58,8 @@ fn plain(block: &Block<'_>, n: usize, kept: &mut Kept<'_>) {
 #[cfg(target_arch = "x86_64")]
 mod wide {
     use std::arch::x86_64::{
-        _CMP_LT_OQ, _mm512_add_epi32, _mm512_castsi512_ps, _mm512_mask_cmp_ps_mask,
-        _mm512_maskz_compress_epi32, _mm512_maskz_loadu_epi32, _mm512_set1_epi32, _mm512_setr_epi32,
-        _mm512_setzero_ps, _mm512_storeu_si512,
+        _CMP_LT_OQ, _mm512_add_epi32, _mm512_castsi512_ps, _mm512_mask_cmp_ps_mask, _mm512_maskz_compress_epi32,
+        _mm512_maskz_loadu_epi32, _mm512_set1_epi32, _mm512_setr_epi32, _mm512_setzero_ps, _mm512_storeu_si512,
     };
 
     use super::{Block, Kept, ROOM};
@@ -72,7 +71,8 @@ mod wide {
         let [x, y, z, w] = block.columns;
         let [to_x, to_y, to_z, to_w] = &mut kept.columns;
         let from = [x.as_ptr().cast(), y.as_ptr().cast(), z.as_ptr().cast(), block.numbers.as_ptr().cast::<i32>()];
-        let to = [to_x.as_mut_ptr().cast(), to_y.as_mut_ptr().cast(), to_z.as_mut_ptr().cast(), kept.numbers.as_mut_ptr()];
+        let to =
+            [to_x.as_mut_ptr().cast(), to_y.as_mut_ptr().cast(), to_z.as_mut_ptr().cast(), kept.numbers.as_mut_ptr()];
         let (weights, places) = (to_w.as_mut_ptr(), kept.places.as_mut_ptr());
         let mut len = kept.len;
         // SAFETY: as the caller vouches; what a mask leaves out is not read.
@@ -109,7 +109,8 @@ mod tests {
 
     fn found(kernel: fn(&Block<'_>, &mut Kept<'_>), n: usize) -> Found {
         let column = |k: usize| -> Vec<f32> { (0..n).map(|i| (i * (k + 3)) as f32 * 0.7 - 3.0).collect() };
-        let weights: Vec<f32> = (0..n).map(|i| if i % 7 < 3 { (i % 5) as f32 } else { -1.0 * (i % 2) as f32 }).collect();
+        let weights: Vec<f32> =
+            (0..n).map(|i| if i % 7 < 3 { (i % 5) as f32 } else { -1.0 * (i % 2) as f32 }).collect();
         let (x, y, z) = (column(0), column(1), column(2));
         let numbers: Vec<u32> = (0..n as u32).map(|i| 3 * i + 1).collect();
         let block = Block { columns: [&x, &y, &z, &weights], numbers: &numbers, first: 40 };

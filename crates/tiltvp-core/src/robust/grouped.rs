@@ -78,7 +78,14 @@ impl Rows<f32> {
                 }
                 own[n..].fill(0.0);
                 let end = LANES * count;
-                lanes::terms([&x[..end], &y[..end], &z[..end]], &own[..end], model, gains, &mut terms[..count], &mut slopes);
+                lanes::terms(
+                    [&x[..end], &y[..end], &z[..end]],
+                    &own[..end],
+                    model,
+                    gains,
+                    &mut terms[..count],
+                    &mut slopes,
+                );
             }
             let last = group_of.len().saturating_sub(1);
             for (k, terms) in terms[..count].iter().enumerate() {

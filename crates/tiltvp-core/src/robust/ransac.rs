@@ -139,8 +139,7 @@ pub fn ransac<P: Problem>(
         }
         let most = best.as_ref().map_or(0.0, |(most, _)| *most);
         // Counts are exact in double precision.
-        let score =
-            if ahead > 1 { counts[next] as f64 } else { sampling.score.of(problem, &model, threshold, most) };
+        let score = if ahead > 1 { counts[next] as f64 } else { sampling.score.of(problem, &model, threshold, most) };
         if best.is_some() && score <= most {
             continue;
         }

@@ -25,7 +25,11 @@ impl Total {
     pub(super) fn add(&mut self, count: usize, lanes: &[[f32; LANES]; 7]) {
         self.count += count;
         for (sum, lanes) in self.sums.iter_mut().zip(lanes) {
-            *sum += lanes.iter().map(|lane| f64::from(*lane)).sum::<f64>();
+            let mut fours = [0.0; 4];
+            for four in lanes.as_chunks::<4>().0 {
+                fours.iter_mut().zip(four).for_each(|(sum, lane)| *sum += f64::from(*lane));
+            }
+            *sum += (fours[0] + fours[1]) + (fours[2] + fours[3]);
         }
     }
 

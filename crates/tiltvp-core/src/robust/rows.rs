@@ -352,7 +352,12 @@ mod tests {
                 let other = [0.3, 0.1, 0.8];
                 for to_beat in [0, within / 2, len] {
                     let mut counts = [7; 3];
-                    rows.count_each_to_beat([model, other, model].into_iter().map(Some), threshold, to_beat, &mut counts);
+                    rows.count_each_to_beat(
+                        [model, other, model].into_iter().map(Some),
+                        threshold,
+                        to_beat,
+                        &mut counts,
+                    );
                     for (count, model) in counts.iter().zip([model, other, model]) {
                         let alone = rows.count_to_beat(model, threshold, 0);
                         assert!(*count == alone || (*count <= to_beat && alone <= to_beat), "{len} rows");
