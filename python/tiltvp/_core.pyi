@@ -2177,7 +2177,10 @@ class CornerDetector:
 
 @final
 class CornerHypothesis:
-    """One explanation of what is seen: an attitude, from two cameras also a place, and how likely it is."""
+    """One explanation of what is seen: an attitude, from two cameras also a place, and how likely it is.
+
+    Frozen, comparable, and to be pickled.
+    """
 
     @property
     def camera_from_object(self) -> NDArray[np.float64]:
@@ -2214,12 +2217,20 @@ class CornerHypothesis:
     def to_dict(self) -> dict[str, Any]:
         """Plain numbers and lists, good for JSON."""
 
+    @classmethod
+    def from_dict(cls, values: dict[str, Any]) -> Self:
+        """The hypothesis that `to_dict` wrote."""
+
     def __eq__(self, other: object, /) -> bool: ...
+    def __copy__(self) -> Self: ...
+    def __deepcopy__(self, _memo: Any) -> Self: ...
 
 @final
 class CornerEstimate:
     """What one frame tells of a corner: the likeliest pose if one stands out, and all hypotheses. False without a
     pose.
+
+    Frozen, comparable, and to be pickled.
     """
 
     @property
@@ -2262,8 +2273,17 @@ class CornerEstimate:
     def object(self) -> int:
         """The number of the corner that is the object, from 1: it grows where another corner has become the object."""
 
+    def to_dict(self) -> dict[str, Any]:
+        """Plain numbers and lists, good for JSON."""
+
+    @classmethod
+    def from_dict(cls, values: dict[str, Any]) -> Self:
+        """The estimate that `to_dict` wrote."""
+
     def __bool__(self) -> bool: ...
     def __eq__(self, other: builtins.object, /) -> bool: ...
+    def __copy__(self) -> Self: ...
+    def __deepcopy__(self, _memo: Any) -> Self: ...
 
 @disjoint_base
 class CornerPoseEstimator:

@@ -76,6 +76,7 @@ pub(super) fn complete(
             to_rad,
             search_px: options.search_px,
             step_min: options.step_min,
+            step_share_min: 0.0,
             threshold_px: options.threshold_px,
             ray_sigma_px: options.ray_sigma_px,
         };

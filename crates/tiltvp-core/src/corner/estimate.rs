@@ -20,6 +20,9 @@ pub enum Verdict {
 }
 
 impl Verdict {
+    /// All of them.
+    pub const ALL: [Self; 5] = [Self::Found, Self::NoneLeft, Self::NoneRight, Self::NoneFits, Self::Ambiguous];
+
     /// In words.
     pub fn reason(self) -> &'static str {
         match self {

@@ -153,6 +153,7 @@ fn course_of(segments: &[Segment], ray: RayEnd, vertex: &Vector3<f64>, options: 
         to_rad: to_rad - CLEAR_OF_END_PX / px_per_rad,
         search_px: options.search_px,
         step_min: options.step_min,
+        step_share_min: 0.0,
         threshold_px: options.threshold_px,
         ray_sigma_px: options.ray_sigma_px,
     })

@@ -88,6 +88,7 @@ pub(super) fn find_near(
                 to_rad: vertex.angle(far) + BEYOND_END_PX / px_per_rad,
                 search_px,
                 step_min: options.step_min,
+                step_share_min: 0.0,
                 threshold_px: options.threshold_px,
                 ray_sigma_px: options.ray_sigma_px,
             };

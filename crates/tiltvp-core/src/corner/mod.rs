@@ -20,6 +20,7 @@ mod fusion;
 mod gamma;
 mod general;
 mod guided;
+mod highlights;
 mod junctions;
 mod options;
 mod pose;
