@@ -90,7 +90,8 @@ mod stages {
     fn lift(bencher: Bencher) {
         let (region, _, edges) = edges_of(0.6);
         let table = LiftTable::new(&fisheye().unwrap(), &Matrix3::identity(), &region, NormalKind::Tangent);
-        let (mut rows, mut weights, mut places) = (Rows::default(), Vec::new(), Vec::new());
+        let (mut rows, mut weights) = (Rows::default(), Vec::new());
+        let (mut slots, mut places) = (Vec::new(), Vec::new());
         let sin_max = 12f64.to_radians().sin();
         bencher
             .counter(ItemsCount::new(edges.len()))

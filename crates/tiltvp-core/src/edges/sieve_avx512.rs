@@ -5,13 +5,13 @@
 //! where they are compacted. There are no closures in the kernels: they would be compiled for plain machines.
 
 use std::arch::x86_64::{
-    __m512i, _CMP_LE_OQ, _MM_HINT_T0, _mm256_storeu_si256, _mm512_add_epi16, _mm512_add_epi32, _mm512_castsi512_si128,
-    _mm512_castsi512_si256, _mm512_cmpge_epi32_mask, _mm512_cvtepi32_ps, _mm512_cvtepu8_epi32,
+    __m512i, _CMP_LE_OQ, _MM_HINT_T0, _mm_prefetch, _mm256_storeu_si256, _mm512_add_epi16, _mm512_add_epi32,
+    _mm512_castsi512_si128, _mm512_castsi512_si256, _mm512_cmpge_epi32_mask, _mm512_cvtepi32_ps, _mm512_cvtepu8_epi32,
     _mm512_extracti32x4_epi32, _mm512_loadu_si512, _mm512_madd_epi16, _mm512_maddubs_epi16, _mm512_mask_cmp_ps_mask,
     _mm512_maskz_compress_epi8, _mm512_maskz_compress_epi16, _mm512_maskz_loadu_epi32, _mm512_mul_ps,
     _mm512_mullo_epi16, _mm512_permutex2var_epi64, _mm512_set1_epi16, _mm512_set1_epi32, _mm512_set1_ps,
     _mm512_setr_epi64, _mm512_shuffle_i32x4, _mm512_storeu_si512, _mm512_sub_epi16, _mm512_unpackhi_epi8,
-    _mm512_unpackhi_epi16, _mm512_unpacklo_epi8, _mm512_unpacklo_epi16, _pdep_u64, _mm_prefetch, _pext_u64,
+    _mm512_unpackhi_epi16, _mm512_unpacklo_epi8, _mm512_unpacklo_epi16, _pdep_u64, _pext_u64,
 };
 
 use super::sieve::{BLOCK, Block, Kept, Level, Levels, REACH, Test, Vectors};

@@ -56,12 +56,8 @@ impl<T: Real> Problem for Direction<'_, T> {
     }
 
     fn consensus_of_each(&self, models: &[Option<Vector3<f64>>], threshold: f64, to_beat: usize, counts: &mut [usize]) {
-        self.rows.count_each_to_beat(
-            models.iter().map(|model| model.map(|model| model.into())),
-            threshold,
-            to_beat,
-            counts,
-        );
+        let models = models.iter().map(|model| model.map(Into::into));
+        self.rows.count_each_to_beat(&models, threshold, to_beat, counts);
     }
 
     fn consensus_among(&self, observations: &[u32], model: &Vector3<f64>, threshold: f64) -> usize {

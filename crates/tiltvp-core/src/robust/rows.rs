@@ -122,7 +122,7 @@ impl<T: Real> Rows<T> {
     /// caches once for all.
     pub fn count_each_to_beat(
         &self,
-        models: impl Iterator<Item = Option<[f64; 3]>> + Clone,
+        models: &(impl Iterator<Item = Option<[f64; 3]>> + Clone),
         threshold: f64,
         to_beat: usize,
         counts: &mut [usize],
@@ -353,7 +353,7 @@ mod tests {
                 for to_beat in [0, within / 2, len] {
                     let mut counts = [7; 3];
                     rows.count_each_to_beat(
-                        [model, other, model].into_iter().map(Some),
+                        &[model, other, model].into_iter().map(Some),
                         threshold,
                         to_beat,
                         &mut counts,

@@ -46,12 +46,8 @@ impl Problem for Offsets<'_> {
     }
 
     fn consensus_of_each(&self, models: &[Option<Vector2<f64>>], threshold: f64, to_beat: usize, counts: &mut [usize]) {
-        self.rows.count_each_to_beat(
-            models.iter().map(|model| model.map(|model| [model.x, model.y, 1.0])),
-            threshold,
-            to_beat,
-            counts,
-        );
+        let models = models.iter().map(|model| model.map(|model| [model.x, model.y, 1.0]));
+        self.rows.count_each_to_beat(&models, threshold, to_beat, counts);
     }
 
     fn consensus_among(&self, observations: &[u32], model: &Vector2<f64>, threshold: f64) -> usize {
