@@ -116,9 +116,9 @@ impl LiftTable {
     }
 }
 
-/// Asks for what will be read soon.
+/// Asks for an entry that will be read soon.
 #[inline(always)]
-fn expect<T>(table: &[T], place: usize) {
+pub(crate) fn expect<T>(table: &[T], place: usize) {
     #[cfg(target_arch = "x86_64")]
     {
         use std::arch::x86_64::{_MM_HINT_T0, _mm_prefetch};

@@ -11,6 +11,7 @@ mod sieve;
 mod sieve_avx512;
 
 pub use detect::{Detector, EdgePixels};
+pub(crate) use lift::expect;
 pub use lift::{LiftTable, NormalKind};
 pub use options::{EdgeOptions, Mask};
 pub use region::{Region, Span};

@@ -109,8 +109,7 @@ mod tests {
 
     fn found(kernel: fn(&Block<'_>, &mut Kept<'_>), n: usize) -> Found {
         let column = |k: usize| -> Vec<f32> { (0..n).map(|i| (i * (k + 3)) as f32 * 0.7 - 3.0).collect() };
-        let weights: Vec<f32> =
-            (0..n).map(|i| if i % 7 < 3 { (i % 5) as f32 } else { -1.0 * (i % 2) as f32 }).collect();
+        let weights: Vec<f32> = (0..n).map(|i| if i % 7 < 3 { (i % 5) as f32 } else { -((i % 2) as f32) }).collect();
         let (x, y, z) = (column(0), column(1), column(2));
         let numbers: Vec<u32> = (0..n as u32).map(|i| 3 * i + 1).collect();
         let block = Block { columns: [&x, &y, &z, &weights], numbers: &numbers, first: 40 };
