@@ -118,7 +118,7 @@ impl LiftTable {
 
 /// Asks for an entry that will be read soon.
 #[inline(always)]
-pub(crate) fn expect<T>(table: &[T], place: usize) {
+fn expect<T>(table: &[T], place: usize) {
     #[cfg(target_arch = "x86_64")]
     {
         use std::arch::x86_64::{_MM_HINT_T0, _mm_prefetch};

@@ -11,7 +11,6 @@ mod sieve;
 mod sieve_avx512;
 
 pub use detect::{Detector, EdgePixels};
-pub(crate) use lift::expect;
 pub use lift::{LiftTable, NormalKind};
 pub use options::{EdgeOptions, Mask};
 pub use region::{Region, Span};

@@ -5,7 +5,7 @@ use nalgebra::Vector2;
 
 use super::correction::VanishingPoint;
 use super::scratch::Work;
-use crate::edges::{EdgePixels, expect};
+use crate::edges::EdgePixels;
 use crate::robust::{Block as Rest, Gate, Kept, Moments, Problem, ROOM, Rows, Score, compact};
 
 /// Edge offsets `s = A cos phi + B sin phi` (eq. 19): rows `(g cos phi, g sin phi, -s)`, model `(A, B)`, residuals in pixels
@@ -119,9 +119,6 @@ pub(super) fn offsets(edges: &EdgePixels, centre: &VanishingPoint, gains: &[f32]
             if gains.is_empty() {
                 block.gain.fill(1.0);
             } else {
-                for slot in edges.slot()[part.end..].iter().take(BLOCK) {
-                    expect(gains, *slot as usize);
-                }
                 look_up(gains, numbers, &mut block.gain);
             }
             let count = numbers.len();
