@@ -145,6 +145,22 @@ def test_grey_corners_are_found_by_segments() -> None:
     assert np.allclose(np.sort(axes.ravel())[-3:], 1.0, atol=1e-4)
 
 
+def test_edges_are_as_long_as_they_are() -> None:
+    """All three of the grey cuboid's end where two others meet them, 0.3 m from the vertex."""
+    rotation, vertex = pose()
+    left, right = (image[..., 0] for image in pair(GREYS))
+    estimator = CornerPoseEstimator(CAMERA, CAMERA, LEFT_FROM_RIGHT, method="general", down=rotation[:, 1])
+    estimate = estimator(left, right)
+    assert estimate, estimate.reason
+    assert np.allclose(estimate.edge_lengths_m, 0.3, atol=0.006)
+    ends = vertex + 0.3 * estimate.pose.edges
+    assert np.allclose(estimate.edge_ends_m, ends, atol=0.012)
+    assert type(estimate).from_dict(json.loads(json.dumps(estimate.to_dict()))) == estimate
+    alone = CornerPoseEstimator(CAMERA, method="general", down=rotation[:, 1])(left)
+    assert np.isnan(alone.edge_lengths_m).all()
+    assert np.isnan(alone.edge_ends_m).all()
+
+
 def test_values_and_options() -> None:
     detector = CornerDetector(CAMERA, faces="gbr", chromaticity_min=0.5)
     again = pickle.loads(pickle.dumps(detector))

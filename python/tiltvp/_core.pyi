@@ -2266,6 +2266,18 @@ class CornerEstimate:
         """Which corner of the right image it is from, or None."""
 
     @property
+    def edge_lengths_m(self) -> NDArray[np.float64]:
+        """Fresh (3,): how long the edges x, y, z are, metres, to where lines along the others meet them; NaN where no
+        image shows that. From two grey images and with right angles.
+        """
+
+    @property
+    def edge_ends_m(self) -> NDArray[np.float64]:
+        """Fresh (3, 3), rows x, y, z: where these edges end in the left camera's frame, metres, from both images alone;
+        NaN where only one of them shows it, or none.
+        """
+
+    @property
     def followed(self) -> bool:
         """Whether the pose of a frame before was a prior."""
 

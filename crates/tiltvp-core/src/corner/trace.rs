@@ -111,6 +111,18 @@ pub(super) fn trace(
     signal: impl Fn(f64, f64) -> Option<f64>,
     scratch: &mut TraceScratch,
 ) -> Option<Traced> {
+    trace_every(1.0, camera, course, support_min, signal, scratch)
+}
+
+/// The same with places `stride_px` pixels apart along the ray.
+pub(super) fn trace_every(
+    stride_px: f64,
+    camera: &Camera,
+    course: &Course,
+    support_min: usize,
+    signal: impl Fn(f64, f64) -> Option<f64>,
+    scratch: &mut TraceScratch,
+) -> Option<Traced> {
     let TraceScratch { rows, places, steps, weights, ransac: memory } = scratch;
     rows.clear();
     places.clear();
@@ -122,7 +134,7 @@ pub(super) fn trace(
     while angle <= course.to_rad {
         let Some(Crossing { pixel, across, pace, px_per_rad }) = course.crossing(camera, angle) else { break };
         let along_rad = angle;
-        angle += 1.0 / pace;
+        angle += stride_px / pace;
         looked_at += 1;
         let mut inside = true;
         for (i, value) in profile.iter_mut().enumerate() {

@@ -16,8 +16,18 @@ const KEYS: [&str; 7] =
     ["camera_from_object", "edges", "vertex_m", "covariance", "probability", "right_handed", "misfit"];
 
 /// Keys of the dict of a `CornerEstimate`.
-const ESTIMATE_KEYS: [&str; 8] =
-    ["hypotheses", "reason", "features_left", "features_right", "chosen_left", "chosen_right", "followed", "object"];
+const ESTIMATE_KEYS: [&str; 10] = [
+    "hypotheses",
+    "reason",
+    "features_left",
+    "features_right",
+    "chosen_left",
+    "chosen_right",
+    "edge_lengths_m",
+    "edge_ends_m",
+    "followed",
+    "object",
+];
 
 /// One explanation of what is seen: an attitude, from two cameras also a place, and how likely it is.
 #[pyclass(frozen, module = "tiltvp._core")]
@@ -196,6 +206,22 @@ impl CornerEstimate {
         self.inner.chosen_right
     }
 
+    /// Fresh (3,) float64: how long the edges x, y, z are, metres, to where lines along the others meet them; NaN where no
+    /// image shows that. From two grey images and with right angles.
+    #[getter]
+    fn edge_lengths_m<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        let lengths = self.inner.ends.map(|end| end.map_or(f64::NAN, |end| end.length_m));
+        PyArray1::from_slice(py, &lengths)
+    }
+
+    /// Fresh (3, 3) float64, rows x, y, z: where these edges end in the left camera's frame, metres, from both images alone; NaN
+    /// where only one of them shows it, or none.
+    #[getter]
+    fn edge_ends_m<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        let place = |end: core::EdgeEnd| end.place_m.map(<[f64; 3]>::from);
+        convert::to_rows(py, &self.inner.ends.map(|end| end.and_then(place).unwrap_or([f64::NAN; 3])), false)
+    }
+
     /// Whether the pose of a frame before was a prior.
     #[getter]
     fn followed(&self) -> bool {
@@ -237,6 +263,9 @@ impl CornerEstimate {
         }
         dict.set_item("chosen_left", own.chosen_left.clone())?;
         dict.set_item("chosen_right", own.chosen_right)?;
+        dict.set_item("edge_lengths_m", own.ends.map(|end| end.map(|end| end.length_m)))?;
+        let place = |end: core::EdgeEnd| end.place_m.map(<[f64; 3]>::from);
+        dict.set_item("edge_ends_m", own.ends.map(|end| end.and_then(place)))?;
         dict.set_item("followed", own.followed)?;
         dict.set_item("object", own.object)?;
         Ok(dict)
@@ -254,6 +283,10 @@ impl CornerEstimate {
         let verdict = Verdict::ALL.into_iter().find(|verdict| verdict.reason() == reason);
         let verdict =
             verdict.ok_or_else(|| invalid(format!("reason: {reason:?}, expected one that `reason` gives")))?;
+        let lengths: [Option<f64>; 3] = convert::item(values, "edge_lengths_m", "three numbers or None")?;
+        let places: [Option<[f64; 3]>; 3] = convert::item(values, "edge_ends_m", "three places or None")?;
+        let end =
+            |k: usize| lengths[k].map(|length_m| core::EdgeEnd { length_m, place_m: places[k].map(Vector3::from) });
         let hypotheses = dicts("hypotheses")?;
         let hypotheses = hypotheses.iter().map(|values| Ok(CornerHypothesis::from_dict(cls, values)?.inner));
         Ok(Self {
@@ -263,6 +296,7 @@ impl CornerEstimate {
                 features: [features("features_left")?, features("features_right")?],
                 chosen_left: convert::item(values, "chosen_left", "whole numbers")?,
                 chosen_right: convert::item(values, "chosen_right", "a whole number or None")?,
+                ends: [end(0), end(1), end(2)],
                 followed: convert::item(values, "followed", "True or False")?,
                 object: convert::item(values, "object", "a whole number")?,
             },

@@ -1,0 +1,323 @@
+//! From images to poses: corners found in one image or a pair, resolved, and followed from frame to frame.
+
+mod pairs;
+mod transfer;
+
+use nalgebra::{Matrix3, Matrix6, Vector3};
+
+use super::attitude::IncludedAngle;
+use super::consensus::{agreement, fits, renamed, weight};
+use super::detector::{CornerDetector, CornerScratch};
+use super::ends::{EdgeEnd, edge_ends};
+use super::estimate::{CornerEstimate, Hypothesis, Verdict};
+use super::estimator_options::EstimatorOptions;
+use super::guided::Expected;
+use super::options::CornerMethod;
+use super::prior::{AttitudePrior, VerticalSense};
+use super::resolve::{Alignment, View, resolve};
+use super::track::Track;
+use super::vertex::CornerFeature;
+use crate::error::{Error, Result};
+use crate::geometry::RigidMotion;
+use crate::image::{ColorView, ImageView};
+
+/// An image of the kind that the detector wants.
+#[derive(Debug, Clone, Copy)]
+pub enum Frame<'a> {
+    /// For the general front end.
+    Gray(ImageView<'a>),
+    /// For the coloured cuboid.
+    Color(ColorView<'a>),
+}
+
+/// Finds the pose of a corner in the frames of a sequence, by one camera (attitude alone) or by two.
+#[derive(Debug, Clone)]
+pub struct CornerPoseEstimator {
+    left: CornerDetector,
+    right: Option<(CornerDetector, RigidMotion)>,
+    options: EstimatorOptions,
+    track: Option<Track>,
+    objects: u32,
+    scratch: [CornerScratch; 2],
+}
+
+impl CornerPoseEstimator {
+    /// With one camera or two; `left_from_right` is the right camera's pose in the left one's frame.
+    ///
+    /// # Errors
+    /// [`Error::InvalidOption`] or [`Error::InvalidArgument`] for options out of their domain and for two detectors of
+    /// different front ends.
+    pub fn new(
+        left: CornerDetector,
+        right: Option<(CornerDetector, RigidMotion)>,
+        options: EstimatorOptions,
+    ) -> Result<Self> {
+        options.validate()?;
+        if let Some((right, left_from_right)) = &right {
+            let names = [left.options().method.name(), right.options().method.name()];
+            if names[0] != names[1] {
+                return Err(Error::argument("right", names[1], format!("the method of left, {}", names[0])));
+            }
+            if left_from_right.translation_m.norm() <= 0.0 {
+                return Err(Error::argument("left_from_right", "no baseline", "two cameras at different places"));
+            }
+        }
+        let scratch = [left.scratch(), right.as_ref().map_or(left.scratch(), |(right, _)| right.scratch())];
+        Ok(Self { left, right, options, track: None, objects: 0, scratch })
+    }
+
+    /// The left or only camera's detector.
+    pub fn left(&self) -> &CornerDetector {
+        &self.left
+    }
+
+    /// The right camera's detector and its pose in the left one's frame.
+    pub fn right(&self) -> Option<&(CornerDetector, RigidMotion)> {
+        self.right.as_ref()
+    }
+
+    /// The options.
+    pub fn options(&self) -> &EstimatorOptions {
+        &self.options
+    }
+
+    /// Forgets what was seen.
+    pub fn reset(&mut self) {
+        self.track = None;
+    }
+
+    /// The direction of the vertical in the left camera's frame, from the last pose or from before.
+    fn vertical(&self) -> Option<Vector3<f64>> {
+        let last = self.track.as_ref().map(|track| track.pose.camera_from_object.column(1).into_owned());
+        last.or(self.options.down)
+    }
+
+    fn priors(&self, same_object: bool) -> Vec<AttitudePrior> {
+        let Some(track) = &self.track else {
+            let gravity = |down| AttitudePrior::Gravity {
+                down,
+                sigma_rad: self.options.down_sigma_rad,
+                sense: VerticalSense::Either,
+            };
+            return self.options.down.map(gravity).into_iter().collect();
+        };
+        let sigma_rad = self.options.turn_sigma_rad * f64::from(track.age).sqrt();
+        let rotation = track.pose.camera_from_object;
+        if same_object {
+            let covariance = Matrix3::from_diagonal_element(sigma_rad * sigma_rad);
+            return vec![AttitudePrior::Attitude { camera_from_object: rotation, covariance }];
+        }
+        vec![AttitudePrior::Gravity { down: rotation.column(1).into_owned(), sigma_rad, sense: VerticalSense::Either }]
+    }
+
+    /// What a frame tells: the image of the left or only camera, and that of the right one where there are two.
+    ///
+    /// # Errors
+    /// [`Error::InvalidArgument`] for images of another size or kind than the detectors', and for one image too many or few.
+    pub fn observe(&mut self, left: &Frame<'_>, right: Option<&Frame<'_>>) -> Result<CornerEstimate> {
+        if right.is_some() != self.right.is_some() {
+            let (got, expected) = if right.is_some() { ("an image", "none") } else { ("none", "an image") };
+            return Err(Error::argument("right image", got, format!("{expected}, as there are cameras")));
+        }
+        if let Some(track) = &mut self.track {
+            track.age += 1;
+        }
+        if self.track.as_ref().is_some_and(|track| track.age > self.options.forget_after) {
+            self.track = None;
+        }
+        let vertical = self.vertical();
+        let mut features = [Vec::new(), Vec::new()];
+        let followed = self.track.as_ref().map_or(&[][..], |track| &track.corners[..]);
+        let [of_left, of_right] = [0, 1].map(|side| followed.get(side).map_or(&[][..], Vec::as_slice));
+        detect(&self.left, left, vertical.as_ref(), of_left, &mut self.scratch[0], &mut features[0])?;
+        if let (Some((detector, left_from_right)), Some(right)) = (&self.right, right) {
+            let vertical = vertical.map(|vertical| left_from_right.rotation.transpose() * vertical);
+            detect(detector, right, vertical.as_ref(), of_right, &mut self.scratch[1], &mut features[1])?;
+        }
+        let mut estimate = CornerEstimate {
+            hypotheses: Vec::new(),
+            verdict: Verdict::NoneFits,
+            features,
+            chosen_left: Vec::new(),
+            chosen_right: None,
+            ends: [None; 3],
+            followed: self.track.is_some(),
+            object: self.objects,
+        };
+        let attitude = if self.right.is_some() { self.attitude(&estimate.features)? } else { None };
+        if let Some(attitude) = &attitude {
+            self.add_completed(left, right, attitude, &mut estimate.features);
+            self.add_transferred([left, right.unwrap_or(left)], attitude, &mut estimate.features)?;
+        }
+        let mut seen = Vec::new();
+        if estimate.features[0].is_empty() {
+            estimate.verdict = Verdict::NoneLeft;
+        } else if right.is_some() && estimate.features[1].is_empty() {
+            estimate.verdict = Verdict::NoneRight;
+        } else if self.right.is_some() {
+            seen = self.by_pair(attitude.as_ref(), &mut estimate)?;
+        } else {
+            self.by_one(&mut estimate)?;
+        }
+        if let Some(best) = estimate.hypotheses.first() {
+            let decided = best.probability >= self.options.probability_min;
+            estimate.verdict = if decided { Verdict::Found } else { Verdict::Ambiguous };
+        }
+        if let Some(right) = right {
+            estimate.ends = self.ends([left, right], &estimate);
+        }
+        if let Some(pose) = estimate.hypotheses.first().filter(|_| estimate.verdict == Verdict::Found) {
+            if !self.track.as_ref().is_some_and(|track| track.is_of(pose)) {
+                self.objects += 1;
+                estimate.object = self.objects;
+            }
+            let turned = self.right.as_ref().map_or(Matrix3::identity(), |(_, motion)| motion.rotation.transpose());
+            let parallel = |side: usize, attitude: Matrix3<f64>| -> Vec<CornerFeature> {
+                let fits = |corner: &&CornerFeature| fits(corner, &attitude, self.options.agree_max_rad);
+                let mut out: Vec<CornerFeature> = Vec::new();
+                for corner in estimate.features[side].iter().filter(fits) {
+                    // The longest rays of each vertex.
+                    let apart_rad = |other: &CornerFeature| other.vertex().angle(&corner.vertex());
+                    match out.iter_mut().find(|other| apart_rad(other) < SAME_VERTEX_RAD) {
+                        Some(other) if weight(other) < weight(corner) => *other = *corner,
+                        Some(_) => {}
+                        None => out.push(*corner),
+                    }
+                }
+                out
+            };
+            let corners = [parallel(0, pose.camera_from_object), parallel(1, turned * pose.camera_from_object)];
+            self.track = Some(Track::next(self.track.take(), pose, corners, estimate.object, &seen));
+        }
+        Ok(estimate)
+    }
+
+    /// Where the edges of the pose end.
+    fn ends(&mut self, frames: [&Frame<'_>; 2], estimate: &CornerEstimate) -> [Option<EdgeEnd>; 3] {
+        let (Some((detector, left_from_right)), Some(pose), Some(chosen)) =
+            (&self.right, estimate.pose(), estimate.chosen_right)
+        else {
+            return [None; 3];
+        };
+        let (Some(vertex_m), [Frame::Gray(left), Frame::Gray(right)]) = (pose.vertex_m, frames) else {
+            return [None; 3];
+        };
+        if self.options.angle != IncludedAngle::RIGHT {
+            return [None; 3];
+        }
+        let corners = [&estimate.features[0][estimate.chosen_left[0]], &estimate.features[1][chosen]];
+        let [first, second] = &mut self.scratch;
+        let seen = [
+            self.left.ends(left, corners[0], pose, &RigidMotion::identity(), first),
+            detector.ends(right, corners[1], pose, &left_from_right.inverse(), second),
+        ];
+        edge_ends(seen, left_from_right, &vertex_m)
+    }
+
+    /// The attitude by which corners are completed: that of the frame before, or the likeliest that one image's corners agree
+    /// on, with their edges at right angles.
+    fn attitude(&self, features: &[Vec<CornerFeature>; 2]) -> Result<Option<Matrix3<f64>>> {
+        if self.is_one_object() || self.options.angle != IncludedAngle::RIGHT {
+            return Ok(None);
+        }
+        let priors = self.priors(false);
+        let turned = self.right.as_ref().map_or(Matrix3::identity(), |(_, motion)| motion.rotation);
+        for (features, rotation) in features.iter().zip([Matrix3::identity(), turned]) {
+            let priors = if rotation == Matrix3::identity() { &priors[..] } else { &[] };
+            let Some(agreed) = agreement(features, &self.options.angle, self.options.agree_max_rad, priors)? else {
+                continue;
+            };
+            let view = |attitudes| View { attitudes, common_from_camera: rotation };
+            let views: Vec<View<'_>> = agreed.attitudes.iter().map(view).collect();
+            let resolved = resolve(&views, Alignment::Manhattan, self.right_handed(), &self.priors(false))?;
+            if let Some(best) = resolved.first() {
+                return Ok(Some(best.common_from_object));
+            }
+        }
+        Ok(self.track.as_ref().map(|track| track.pose.camera_from_object))
+    }
+
+    /// Whether edges and object are the same from frame to frame, as those of the coloured cuboid are.
+    fn is_one_object(&self) -> bool {
+        matches!(self.left.options().method, CornerMethod::Coloured(_))
+    }
+
+    fn right_handed(&self) -> Option<bool> {
+        self.options.right_handed.or(self.is_one_object().then_some(true))
+    }
+
+    /// Attitudes from one image: of all features that agree with one another.
+    fn by_one(&self, estimate: &mut CornerEstimate) -> Result<()> {
+        let features = &estimate.features[0];
+        let priors = self.priors(self.is_one_object());
+        let Some(agreed) = agreement(features, &self.options.angle, self.options.agree_max_rad, &priors)? else {
+            return Ok(());
+        };
+        let view = |attitudes| View { attitudes, common_from_camera: Matrix3::identity() };
+        let views: Vec<View<'_>> = agreed.attitudes.iter().map(view).collect();
+        let alignment = if views.len() > 1 { Alignment::Manhattan } else { Alignment::Same };
+        let resolved = resolve(&views, alignment, self.right_handed(), &priors)?;
+        estimate.hypotheses = resolved
+            .iter()
+            .filter_map(|resolved| {
+                let chosen = agreed.attitudes.first()?.get(*resolved.choice.first()?)?;
+                let mut covariance = Matrix6::zeros();
+                covariance.fixed_view_mut::<3, 3>(0, 0).copy_from(&resolved.covariance);
+                Some(Hypothesis {
+                    camera_from_object: self.named(resolved.common_from_object),
+                    edges: chosen.edges,
+                    vertex_m: None,
+                    covariance,
+                    probability: resolved.probability,
+                    right_handed: chosen.is_right_handed(),
+                    misfit: (resolved.chi_square / (3 * (views.len() - 1)).max(1) as f64).sqrt(),
+                })
+            })
+            .collect();
+        estimate.chosen_left = agreed.members;
+        Ok(())
+    }
+
+    /// The attitude with its edges named as they were in the frame before.
+    fn named(&self, attitude: Matrix3<f64>) -> Matrix3<f64> {
+        match &self.track {
+            Some(track) if !self.is_one_object() && self.options.angle == IncludedAngle::RIGHT => {
+                renamed(&attitude, &track.pose.camera_from_object)
+            }
+            _ => attitude,
+        }
+    }
+}
+
+/// How far apart vertices of different corners are, radians.
+const SAME_VERTEX_RAD: f64 = 0.01;
+
+/// How far from where it was a corner is looked for first, in pixels.
+const HARDLY_MOVED_PX: f64 = 3.0;
+
+/// The corners of an image: those that are near where they were, and those that are found anew.
+fn detect(
+    detector: &CornerDetector,
+    frame: &Frame<'_>,
+    vertical: Option<&Vector3<f64>>,
+    followed: &[CornerFeature],
+    scratch: &mut CornerScratch,
+    out: &mut Vec<CornerFeature>,
+) -> Result<()> {
+    match frame {
+        Frame::Gray(image) => {
+            detector.detect_general(image, vertical, scratch, out)?;
+            // Most hardly move, and the less is looked at the fewer other edges there are.
+            let again = followed.iter().map(Expected::of).filter_map(|last| {
+                let near = detector.find_near(image, &last, Some(HARDLY_MOVED_PX), scratch);
+                near.or_else(|| detector.find_near(image, &last, None, scratch))
+            });
+            out.extend(again);
+            Ok(())
+        }
+        Frame::Color(image) => {
+            out.extend(detector.detect_coloured(image, None, scratch)?);
+            Ok(())
+        }
+    }
+}
