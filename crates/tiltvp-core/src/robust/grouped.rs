@@ -1,6 +1,6 @@
 //! Sums of gated rows by group, in one pass: what a covariance is made of when the rows of a group err together.
 
-use super::lanes::{self, LANES};
+use super::lanes::{self, LANES, TURNS, Terms};
 use super::loss::Gate;
 use super::rows::Rows;
 
@@ -14,18 +14,6 @@ pub struct GroupSums {
     pub groups: [[f64; 5]; GROUPS],
     /// Of all groups the information `(xx, xy, yy)` with [`Gate::slope`] instead of the gate.
     pub slopes: [f64; 3],
-}
-
-/// Groups are summed in so many turns, so that the rows of one need not wait for each other.
-pub(super) const TURNS: usize = 4;
-
-/// The terms of sixteen rows.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Terms {
-    /// Information and first score of rows 0, 4, 8, 12, then of rows 1, 5, 9, 13, and so on.
-    pub fours: [[[f32; 4]; TURNS]; TURNS],
-    /// The second score, row by row.
-    pub last: [f32; LANES],
 }
 
 /// Sums of groups in single precision; the last three numbers of each are not used.

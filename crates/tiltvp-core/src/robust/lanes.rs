@@ -1,11 +1,22 @@
 //! Sixteen numbers at a time: the one-pass kernels over rows of single precision, the same to the last bit with vectors of any
 //! width.
 
-use super::grouped::{TURNS, Terms};
 use super::real::Total;
 
 /// Numbers that are worked on together.
 pub(super) const LANES: usize = 16;
+
+/// Groups are summed in so many turns, so that the rows of one need not wait for each other.
+pub(super) const TURNS: usize = 4;
+
+/// The terms of sixteen rows.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Terms {
+    /// Information and first score of rows 0, 4, 8, 12, then of rows 1, 5, 9, 13, and so on.
+    pub fours: [[[f32; 4]; TURNS]; TURNS],
+    /// The second score, row by row.
+    pub last: [f32; LANES],
+}
 
 /// Sixteen numbers of single precision, in whatever registers hold them.
 ///
