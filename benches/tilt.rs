@@ -71,7 +71,7 @@ mod stages {
         let (region, _, edges) = edges_of(0.6);
         let table = LiftTable::new(&fisheye().unwrap(), &Matrix3::identity(), &region, NormalKind::Tangent);
         let (mut rows, mut weights, mut places) = (Rows::default(), Vec::new(), Vec::new());
-        table.lift(&edges, 12f64.to_radians().sin(), &mut rows, &mut weights, &mut places);
+        table.lift(&edges, 12f64.to_radians().sin(), &mut rows, &mut weights, &mut Vec::new(), &mut places);
         (rows, weights)
     }
 
@@ -90,11 +90,12 @@ mod stages {
     fn lift(bencher: Bencher) {
         let (region, _, edges) = edges_of(0.6);
         let table = LiftTable::new(&fisheye().unwrap(), &Matrix3::identity(), &region, NormalKind::Tangent);
-        let (mut rows, mut weights, mut places) = (Rows::default(), Vec::new(), Vec::new());
+        let (mut rows, mut weights) = (Rows::default(), Vec::new());
+        let (mut slots, mut places) = (Vec::new(), Vec::new());
         let sin_max = 12f64.to_radians().sin();
         bencher
             .counter(ItemsCount::new(edges.len()))
-            .bench_local(|| table.lift(black_box(&edges), sin_max, &mut rows, &mut weights, &mut places));
+            .bench_local(|| table.lift(black_box(&edges), sin_max, &mut rows, &mut weights, &mut slots, &mut places));
     }
 
     /// One pass of a refit, by its gate.

@@ -5,17 +5,19 @@ use multiversion::multiversion;
 use super::options::EdgeOptions;
 use super::region::{Region, Span};
 use super::screen::Screen;
-use super::sieve::{BLOCK as ROOM, Dispatch, Kept, Level, Rows, Sieve, Test, Vectors, expect, sieve, unpack};
+use super::sieve::{BLOCK as ROOM, Block, Kept, Level, Levels, REACH, Sieve, Test, Vectors, expect, place, widen};
 use crate::image::{ImageView, Smoother};
 
 /// Edge pixels in structure-of-arrays form, in slot order.
 #[derive(Debug, Clone, Default)]
 pub struct EdgePixels {
     slot: Vec<u32>,
+    /// Row and column.
+    place: Vec<u32>,
     gx: Vec<f32>,
     gy: Vec<f32>,
-    /// Both, as the detector's kernels write them.
-    packed: Vec<u32>,
+    /// Gradients as the detector's kernels write them.
+    raw: [Vec<i16>; 2],
     len: usize,
     strong: usize,
 }
@@ -48,6 +50,11 @@ impl EdgePixels {
         &self.slot[..self.len]
     }
 
+    /// Row (in the upper half) and column (in the lower) of each pixel.
+    pub fn place(&self) -> &[u32] {
+        &self.place[..self.len]
+    }
+
     /// Gradient of each pixel along `u` (Scharr, unnormalised).
     pub fn gx(&self) -> &[f32] {
         &self.gx[..self.len]
@@ -63,59 +70,89 @@ impl EdgePixels {
         (self.len, self.strong) = (0, 0);
     }
 
-    /// Appends a pixel.
-    pub fn push(&mut self, slot: u32, gx: f32, gy: f32) {
-        if self.slot.len() == self.len {
+    /// Appends the pixel `slot` of a region.
+    pub fn push(&mut self, region: &Region, slot: u32, gx: f32, gy: f32) {
+        if self.slot.len() <= self.len {
             self.make_room(2 * self.len + 64);
         }
         (self.slot[self.len], self.gx[self.len], self.gy[self.len]) = (slot, gx, gy);
+        self.place[self.len] = place_of(region, slot);
         self.len += 1;
         self.strong += 1;
     }
 
-    /// Replaces all pixels by these.
-    pub fn refill(&mut self, slot: &[u32], gx: &[f32], gy: &[f32]) {
+    /// Replaces all pixels by these of a region.
+    pub fn refill(&mut self, region: &Region, slot: &[u32], gx: &[f32], gy: &[f32]) {
         let n = slot.len().min(gx.len()).min(gy.len());
         self.make_room(n);
         self.slot[..n].copy_from_slice(&slot[..n]);
         self.gx[..n].copy_from_slice(&gx[..n]);
         self.gy[..n].copy_from_slice(&gy[..n]);
+        for (place, slot) in self.place.iter_mut().zip(&slot[..n]) {
+            *place = place_of(region, *slot);
+        }
         (self.len, self.strong) = (n, n);
     }
 
     fn make_room(&mut self, pixels: usize) {
-        let capacity = pixels + ROOM;
+        let capacity = pixels + 2 * ROOM;
         if self.slot.len() < capacity {
             self.slot.resize(capacity, 0);
+            self.place.resize(capacity, 0);
             self.gx.resize(capacity, 0.0);
             self.gy.resize(capacity, 0.0);
-            self.packed.resize(capacity, 0);
+            self.raw.iter_mut().for_each(|raw| raw.resize(capacity, 0));
         }
     }
+}
+
+fn place_of(region: &Region, slot: u32) -> u32 {
+    let (u, v) = region.place(slot as usize);
+    place(usize::from(v), usize::from(u))
 }
 
 /// Finds edge pixels, with rows of scratch that are made once.
 #[derive(Debug, Clone)]
 pub struct Detector {
     smoother: Smoother,
-    /// Three smoothed rows, row `v` in place `v % 3`, each one pixel wider than the region's columns on both sides.
-    rows: [Vec<i16>; 3],
-    /// The parts of rows that the spans' kernels reach, row by row: (row, first column, one past the last).
-    parts: Vec<(usize, usize, usize)>,
+    /// Smoothed rows, row `v` in place `v % ROWS`, each one pixel wider than the region's columns on both sides.
+    levels: Vec<i16>,
+    /// The parts of rows that the spans' kernels reach, row by row.
+    parts: Vec<Part>,
+    /// The spans.
+    blocks: Vec<Block>,
+    sieve: Sieve,
 }
+
+/// Columns `first..end` of row `v`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+struct Part {
+    v: usize,
+    first: usize,
+    end: usize,
+}
+
+/// Rows whose pixels are tested together.
+const TOGETHER: usize = 8;
+
+/// Smoothed rows that are kept: those and their neighbours, and a power of two.
+const ROWS: usize = 16;
 
 /// Parts of a row that are closer than this are smoothed as one.
 const GAP: usize = 32;
 
 /// What the kernels of a region's spans reach.
-fn reached(region: &Region) -> Vec<(usize, usize, usize)> {
-    let around = |span: &Span| (span.v - 1..=span.v + 1).map(|v| (v, span.first - 1, span.end + 1)).collect::<Vec<_>>();
-    let mut parts: Vec<_> = region.spans().iter().flat_map(around).collect();
+fn reached(region: &Region) -> Vec<Part> {
+    let around = |span: &Span| {
+        let (first, end) = (span.first - 1, span.end + 1);
+        (span.v - 1..=span.v + 1).map(move |v| Part { v, first, end })
+    };
+    let mut parts: Vec<Part> = region.spans().iter().flat_map(around).collect();
     parts.sort_unstable();
     parts.dedup_by(|next, last| {
-        let joins = next.0 == last.0 && next.1 <= last.2 + GAP;
+        let joins = next.v == last.v && next.first <= last.end + GAP;
         if joins {
-            last.2 = last.2.max(next.2);
+            last.end = last.end.max(next.end);
         }
         joins
     });
@@ -126,17 +163,20 @@ impl Detector {
     /// Scratch for a region.
     pub fn new(region: &Region, options: &EdgeOptions) -> Self {
         let width = region.columns().len() + 2;
-        let smoother = Smoother::new(options.smoothing_px, width);
-        let row = || if smoother.copies() { Vec::new() } else { vec![0; width] };
-        let parts = if smoother.copies() { Vec::new() } else { reached(region) };
-        Self { rows: [row(), row(), row()], smoother, parts }
+        let (smoother, sieve) = (Smoother::new(options.smoothing_px, width), Sieve::new());
+        if smoother.copies() {
+            let blocks = sieve.blocks::<u8>(region);
+            return Self { smoother, levels: Vec::new(), parts: Vec::new(), blocks, sieve };
+        }
+        let blocks = sieve.blocks::<i16>(region);
+        Self { smoother, levels: vec![0; ROWS * width + REACH], parts: reached(region), blocks, sieve }
     }
 
     /// Writes the pixels of the region with a gradient magnitude of at least `gradient_min` that pass the screen, in slot
     /// order.
     ///
-    /// The image must have the size of the camera that the region was made for. Grows no vector that has room for the
-    /// whole region. Gradients are exact without smoothing, and multiples of 1/8 with it.
+    /// The region must be that which the detector was made for, and the image must have the size of its camera. Grows no
+    /// vector that has room for the whole region. Gradients are exact without smoothing, and multiples of 1/8 with it.
     pub fn detect(
         &mut self,
         image: &ImageView<'_>,
@@ -147,31 +187,36 @@ impl Detector {
     ) {
         out.make_room(region.len());
         out.clear();
-        if self.smoother.copies() {
-            let least = least_squared::<u8>(gradient_min);
-            for span in region.spans() {
-                // The region keeps clear of the border.
-                let row = |v: usize| image.row(v).get(span.first - 1..=span.end).unwrap_or(&[]);
-                let rows = Rows { above: row(span.v - 1), middle: row(span.v), below: row(span.v + 1) };
-                expect(row(span.v + AHEAD));
-                keep(rows, span, least, screen, out);
+        let (vectors, limit) = screen.map_or((Vectors::None, 0.0), Screen::vectors);
+        let [gx, gy] = &mut out.raw;
+        let mut kept = Kept { slots: &mut out.slot, places: &mut out.place, gx, gy, len: 0, strong: 0 };
+        let unit = if self.smoother.copies() {
+            let test = Test { at_least: least_squared::<u8>(gradient_min), vectors, limit };
+            let levels = Levels { data: image.data(), stride: image.stride(), places: usize::MAX, left: 0 };
+            self.sieve.sift(&levels, &self.blocks, &test, &mut kept);
+            self.sieve.finish::<u8>(&mut kept);
+            u8::PARTS
+        } else {
+            let test = Test { at_least: least_squared::<i16>(gradient_min), vectors, limit };
+            let (left, width) = (region.columns().start - 1, region.columns().len() + 2);
+            let mut parts = self.parts.iter().peekable();
+            for blocks in self.blocks.chunk_by(|a, b| a.v() / TOGETHER == b.v() / TOGETHER) {
+                let last = blocks[blocks.len() - 1].v();
+                while let Some(Part { v, first, end }) = parts.next_if(|part| part.v <= last + 1) {
+                    expect(image.row(v + AHEAD).get(*first..*end).unwrap_or(&[]));
+                    let row = &mut self.levels[v % ROWS * width..][first - left..end - left];
+                    self.smoother.fixed_row(image, *v, *first, row);
+                }
+                let levels = Levels { data: &self.levels[..], stride: width, places: ROWS - 1, left };
+                self.sieve.sift(&levels, blocks, &test, &mut kept);
             }
-            finish::<u8>(out);
-            return;
-        }
-        let (left, least) = (region.columns().start - 1, least_squared::<i16>(gradient_min));
-        let mut parts = self.parts.iter().peekable();
-        for span in region.spans() {
-            while let Some((v, first, end)) = parts.next_if(|(v, ..)| *v <= span.v + 1) {
-                let out = &mut self.rows[v % 3][first - left..end - left];
-                expect(image.row(v + AHEAD).get(*first..*end).unwrap_or(&[]));
-                self.smoother.fixed_row(image, *v, *first, out);
-            }
-            let columns = span.first - left - 1..span.end - left + 1;
-            let [above, middle, below] = [span.v + 2, span.v, span.v + 1].map(|v| &self.rows[v % 3][columns.clone()]);
-            keep(Rows { above, middle, below }, span, least, screen, out);
-        }
-        finish::<i16>(out);
+            self.sieve.finish::<i16>(&mut kept);
+            i16::PARTS
+        };
+        (out.len, out.strong) = (kept.len, kept.strong);
+        let (n, unit) = (out.len, 1.0 / unit as f32);
+        widen(&gx[..n], unit, &mut out.gx[..n]);
+        widen(&gy[..n], unit, &mut out.gy[..n]);
     }
 }
 
@@ -182,28 +227,6 @@ const AHEAD: usize = 6;
 /// reaches.
 fn least_squared<L: Level>(gradient_min: f64) -> i32 {
     (gradient_min * f64::from(L::PARTS)).powi(2).ceil() as i32
-}
-
-/// Appends the pixels of a span that pass, their gradients still packed.
-fn keep<L: Level>(rows: Rows<'_, L>, span: &Span, at_least: i32, screen: Option<&Screen>, out: &mut EdgePixels)
-where
-    Dispatch: Sieve<L>,
-{
-    let n = span.end - span.first;
-    if [rows.above, rows.middle, rows.below].iter().any(|row| row.len() != n + 2) {
-        return;
-    }
-    let (vectors, limit) = screen.map_or((Vectors::None, 0.0), |screen| screen.of_span(span));
-    let test = Test { at_least, vectors, limit };
-    let kept = Kept { slots: &mut out.slot[out.len..], gradients: &mut out.packed[out.len..] };
-    let (len, strong) = sieve(rows, n, span.slot as u32, &test, kept);
-    (out.len, out.strong) = (out.len + len, out.strong + strong);
-}
-
-/// Unpacks the gradients.
-fn finish<L: Level>(out: &mut EdgePixels) {
-    let n = out.len;
-    unpack(&out.packed[..n], 1.0 / L::PARTS as f32, &mut out.gx[..n], &mut out.gy[..n]);
 }
 
 /// Pixels that are tested together.

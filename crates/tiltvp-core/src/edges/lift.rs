@@ -7,7 +7,7 @@ use super::detect::EdgePixels;
 use super::region::Region;
 use super::screen::Screen;
 use crate::camera::Camera;
-use crate::robust::Rows;
+use crate::robust::{Block as Rest, Kept, ROOM, Rows, compact};
 
 /// How the normal of an edge's great circle is made from the gradient.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -22,8 +22,9 @@ pub enum NormalKind {
 /// For each pixel of a region the 3x2 matrix that takes a gradient to a normal in the robot frame.
 #[derive(Debug, Clone)]
 pub struct LiftTable {
-    /// Rows of the matrices in units of `unit`: half the memory of single precision, to a few thousandths of a degree.
-    maps: Vec<[i16; 6]>,
+    /// Rows of the matrices, two entries of 16 bits in a word, in units of `unit`: half the memory of single precision, to a few
+    /// thousandths of a degree.
+    maps: Vec<[u32; 3]>,
     unit: f32,
 }
 
@@ -45,15 +46,16 @@ impl LiftTable {
         let scale = 1.0 / mean_square.sqrt().max(f64::MIN_POSITIVE);
         let unit =
             matrices.iter().map(Matrix3x2::amax).fold(0.0, f64::max).max(f64::MIN_POSITIVE) / f64::from(i16::MAX);
-        let entry = |m: &Matrix3x2<f64>| std::array::from_fn(|i| (m[(i / 2, i % 2)] / unit).round() as i16);
-        Self { maps: matrices.iter().map(entry).collect(), unit: (unit * scale) as f32 }
+        let entry = |m: &Matrix3x2<f64>, i: usize, j: usize| u32::from((m[(i, j)] / unit).round() as i16 as u16);
+        let words = |m: &Matrix3x2<f64>| std::array::from_fn(|i| entry(m, i, 0) | (entry(m, i, 1) << 16));
+        Self { maps: matrices.iter().map(words).collect(), unit: (unit * scale) as f32 }
     }
 
     /// The screen of the test that [`lift`](Self::lift) makes: `|m_z| <= sin_max |m|` with `|m|` no more than the largest
     /// stretch of the pixel's matrix.
     pub fn screen(&self, sin_max: f64) -> Screen {
-        let vector = |map: &[i16; 6]| {
-            let [a, b, c, d, e, f] = map.map(f32::from);
+        let vector = |map: &[u32; 3]| {
+            let [[a, b], [c, d], [e, f]] = map.map(entries);
             let (xx, xy, yy) = (a * a + c * c + e * e, a * b + c * d + e * f, b * b + d * d + f * f);
             let largest = 0.5 * (xx + yy) + (0.25 * (xx - yy) * (xx - yy) + xy * xy).sqrt();
             if largest > 0.0 { [e / largest.sqrt(), f / largest.sqrt()] } else { [0.0; 2] }
@@ -64,50 +66,72 @@ impl LiftTable {
     /// The unit normal that [`lift`](Self::lift) makes of one edge pixel: its place in the region and its gradient. None for
     /// a pixel without a map or a gradient of zero.
     pub fn normal(&self, slot: usize, gx: f32, gy: f32) -> Option<[f32; 3]> {
-        let [a, b, c, d, e, f] = self.maps.get(slot)?.map(f32::from);
+        let [[a, b], [c, d], [e, f]] = self.maps.get(slot)?.map(entries);
         let [x, y, z] = [a * gx + b * gy, c * gx + d * gy, e * gx + f * gy];
         let length = (x * x + y * y + z * z).sqrt();
         (length > 0.0).then(|| [x / length, y / length, z / length])
     }
 
     /// Writes the unit normals of the edge pixels whose great circles pass within `asin(sin_max)` of the robot's vertical,
-    /// their magnitudes of gradient as weights, and their places among the edge pixels.
+    /// their magnitudes of gradient as weights, their pixels within the region, and their places among the edge pixels.
     pub fn lift(
         &self,
         edges: &EdgePixels,
         sin_max: f64,
         rows: &mut Rows<f32>,
         weights: &mut Vec<f32>,
+        slots: &mut Vec<u32>,
         places: &mut Vec<u32>,
     ) {
-        let n = edges.len();
-        weights.resize(n, 0.0);
-        places.resize(n, 0);
+        let (n, last) = if self.maps.is_empty() { (0, 0) } else { (edges.len(), self.maps.len() - 1) };
+        weights.resize(n + ROOM, 0.0);
+        slots.resize(n + ROOM, 0);
+        places.resize(n + ROOM, 0);
         let limit = (sin_max * sin_max) as f32;
-        rows.refill(n, |[x, y, z]| {
+        rows.refill(n + ROOM, |[x, y, z]| {
             let mut block = Block::default();
-            let mut kept = 0;
+            let mut kept = Kept { columns: [x, y, z, weights], numbers: slots, places, len: 0 };
             for start in (0..n).step_by(BLOCK) {
                 let part = start..(start + BLOCK).min(n);
-                let slots = &edges.slot()[part.clone()];
-                for (i, slot) in slots.iter().enumerate() {
-                    let [a, b, c, d, e, f] = self.maps.get(*slot as usize).copied().unwrap_or_default();
-                    let pair = |low: i16, high: i16| i32::from(low as u16) | (i32::from(high) << 16);
-                    (block.maps[0][i], block.maps[1][i], block.maps[2][i]) = (pair(a, b), pair(c, d), pair(e, f));
+                let numbers = &edges.slot()[part.clone()];
+                for slot in edges.slot()[part.end..].iter().take(BLOCK) {
+                    expect(&self.maps, *slot as usize);
                 }
+                let [ab, cd, ef] = &mut block.maps;
+                for (((slot, ab), cd), ef) in numbers.iter().zip(ab).zip(cd).zip(ef) {
+                    // None is beyond the last, and to say so costs less than to look.
+                    [*ab, *cd, *ef] = self.maps[(*slot as usize).min(last)];
+                }
+                let count = numbers.len();
                 fill(&mut block, &edges.gx()[part.clone()], &edges.gy()[part], limit, self.unit);
-                for i in 0..slots.len() {
-                    // Written always and kept if it passes: a branch here would be guessed wrong every third time.
-                    (x[kept], y[kept], z[kept]) = (block.rows[0][i], block.rows[1][i], block.rows[2][i]);
-                    (weights[kept], places[kept]) = (block.weights[i], (start + i) as u32);
-                    kept += usize::from(block.weights[i] > 0.0);
-                }
+                let [x, y, z] = block.rows.each_ref().map(|row| &row[..count]);
+                let columns = [x, y, z, &block.weights[..count]];
+                compact(&Rest { columns, numbers, first: start }, &mut kept);
             }
-            kept
+            kept.len
         });
         weights.truncate(rows.len());
+        slots.truncate(rows.len());
         places.truncate(rows.len());
     }
+}
+
+/// Asks for an entry that will be read soon.
+#[inline(always)]
+fn expect<T>(table: &[T], place: usize) {
+    #[cfg(target_arch = "x86_64")]
+    {
+        use std::arch::x86_64::{_MM_HINT_T0, _mm_prefetch};
+        // SAFETY: asking for memory reads none, wherever it is, and every x86-64 can.
+        unsafe { _mm_prefetch::<_MM_HINT_T0>(table.as_ptr().wrapping_add(place).cast()) };
+    }
+    #[cfg(not(target_arch = "x86_64"))]
+    let _ = (table, place);
+}
+
+/// The entries of a word, the lower first.
+fn entries(pair: u32) -> [f32; 2] {
+    [f32::from(pair as u16 as i16), f32::from((pair >> 16) as u16 as i16)]
 }
 
 /// Edge pixels that are lifted together.
@@ -116,7 +140,7 @@ const BLOCK: usize = 128;
 /// The rows of the maps of some pixels, two entries in a word, the normals made by them, and weights that are zero where the
 /// prefilter rejects.
 struct Block {
-    maps: [[i32; BLOCK]; 3],
+    maps: [[u32; BLOCK]; 3],
     rows: [[f32; BLOCK]; 3],
     weights: [f32; BLOCK],
 }
@@ -137,7 +161,7 @@ fn fill(block: &mut Block, gx: &[f32], gy: &[f32], limit: f32, unit: f32) {
     let (x, y, z, weights) = (&mut x[..n], &mut y[..n], &mut z[..n], &mut block.weights[..n]);
     let gy = &gy[..n];
     for i in 0..n {
-        let along = |pair: i32| ((pair << 16) >> 16) as f32 * gx[i] + (pair >> 16) as f32 * gy[i];
+        let along = |pair: u32| ((pair << 16) as i32 >> 16) as f32 * gx[i] + (pair as i32 >> 16) as f32 * gy[i];
         let row = [along(ab[i]), along(cd[i]), along(ef[i])];
         let squared = row[0] * row[0] + row[1] * row[1] + row[2] * row[2];
         let root = squared.sqrt();
@@ -173,11 +197,11 @@ mod tests {
                     let (_, back) = camera.unproject_jacobian(&Vector2::new(u as f64, v as f64)).unwrap();
                     // I = f(truth . bearing): dI / d pixel = truth^T d bearing / d pixel.
                     let gradient = back.transpose() * truth * 1e4;
-                    edges.push(slot as u32, gradient.x as f32, gradient.y as f32);
+                    edges.push(&region, slot as u32, gradient.x as f32, gradient.y as f32);
                 }
             }
-            let (mut rows, mut weights, mut places) = (Rows::default(), Vec::new(), Vec::new());
-            table.lift(&edges, 1.0, &mut rows, &mut weights, &mut places);
+            let (mut rows, mut weights) = (Rows::default(), Vec::new());
+            table.lift(&edges, 1.0, &mut rows, &mut weights, &mut Vec::new(), &mut Vec::new());
             assert!(rows.len() > 50);
             for row in rows.iter() {
                 worst[i] = worst[i].max(row.cross(&truth).norm().asin());

@@ -105,7 +105,7 @@ impl RidgeDetector {
                 };
                 let middle = here.strength[at];
                 if middle > before && middle >= after {
-                    out.edges.push((span.slot + i) as u32, gx, gy);
+                    out.edges.push(region, (span.slot + i) as u32, gx, gy);
                     out.shift_px.push(top_of(before.sqrt(), middle.sqrt(), after.sqrt()));
                 }
             });

@@ -29,7 +29,7 @@ enum Shape {
     /// One for each pixel.
     Each(Vec<[i16; 2]>),
     /// The way from a point to the pixel, in so many parts of a pixel, in which the point is given too.
-    From { centre: [i64; 2], parts: i16 },
+    From { centre: [i32; 2], parts: i16 },
 }
 
 /// How much wider than the exact test a screen is, for the rounding of single precision.
@@ -65,30 +65,28 @@ impl Screen {
             let vectors: Vec<_> = region.pixels().map(|(u, v, _)| away((u, v)).map(|x| x as f32)).collect();
             return Self::new(&vectors, offset_max_px);
         }
-        let centre = [centre.0, centre.1].map(|x| (x * parts).round() as i64);
+        let centre = [centre.0, centre.1].map(|x| (x * parts).round() as i32);
         let shape = Shape::From { centre, parts: parts as i16 };
         Self { vectors: Arc::new(Source { shape, unit: 1.0 / parts }), limit: 0.0 }.with_limit(offset_max_px)
     }
 
-    /// What the kernels need of it for a span.
-    pub(super) fn of_span(&self, span: &Span) -> (Vectors<'_>, f32) {
+    /// What the kernels need of it: vectors and limit.
+    pub(super) fn vectors(&self) -> (Vectors<'_>, f32) {
         let vectors = match &self.vectors.shape {
-            Shape::Each(vectors) => Vectors::Each(vectors.get(span.slot..).unwrap_or(&[])),
-            Shape::From { centre: [u, v], parts } => {
-                let away = |x: usize, centre: i64| (x as i64 * i64::from(*parts) - centre) as i16;
-                Vectors::Line { first: [away(span.first, *u), away(span.v, *v)], step: *parts }
-            }
+            Shape::Each(vectors) => Vectors::Each(vectors),
+            Shape::From { centre, parts } => Vectors::From { centre: *centre, parts: *parts },
         };
         (vectors, self.limit)
     }
 
     /// Marks with a negative strength the gradients of a span's pixels that fail.
     pub(super) fn apply(&self, span: &Span, gx: &[f32], gy: &[f32], strength: &mut [f32]) {
-        let (vectors, limit) = self.of_span(span);
+        let (vectors, limit) = self.vectors();
+        let away = |x: usize, parts: i16, centre: i32| (x as i32 * i32::from(parts)).wrapping_sub(centre) as i16;
         let vector = |place: usize| match vectors {
             Vectors::None => [0; 2],
-            Vectors::Each(each) => each.get(place).copied().unwrap_or_default(),
-            Vectors::Line { first: [x, y], step } => [x.wrapping_add(step.wrapping_mul(place as i16)), y],
+            Vectors::Each(each) => each.get(span.slot + place).copied().unwrap_or_default(),
+            Vectors::From { centre: [u, v], parts } => [away(span.first + place, parts, u), away(span.v, parts, v)],
         };
         for (place, ((gx, gy), strength)) in gx.iter().zip(gy).zip(strength).enumerate() {
             let [x, y] = vector(place).map(f32::from);

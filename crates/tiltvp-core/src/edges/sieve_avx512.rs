@@ -1,60 +1,103 @@
-//! [`sieve`](super::sieve) with vectors of 512 bits: gradients of 32 or 64 pixels at a time, compacted by the machine's own
-//! instruction.
+//! [`Sieve`](super::sieve::Sieve) with vectors of 512 bits: 64 pixels are tested at a time, and blocks in which some pass wait to
+//! be compacted together.
+//!
+//! Gradients, and masks of pixels, are in the order in which the machine unpacks levels; they are put in the order of the pixels
+//! where they are compacted. There are no closures in the kernels: they would be compiled for plain machines.
 
 use std::arch::x86_64::{
-    __m512, __m512i, __mmask16, _CMP_LE_OQ, _mm512_add_epi16, _mm512_add_epi32, _mm512_cmpge_epi32_mask,
-    _mm512_cvtepi32_ps, _mm512_loadu_si512, _mm512_madd_epi16, _mm512_maddubs_epi16, _mm512_mask_cmp_ps_mask,
-    _mm512_maskz_compress_epi32, _mm512_maskz_loadu_epi8, _mm512_maskz_loadu_epi16, _mm512_maskz_loadu_epi32,
-    _mm512_mul_ps, _mm512_mulhrs_epi16, _mm512_mullo_epi16, _mm512_permutexvar_epi64, _mm512_set1_epi16,
-    _mm512_set1_epi32, _mm512_set1_ps, _mm512_setr_epi32, _mm512_setr_epi64, _mm512_setzero_si512,
-    _mm512_shuffle_i32x4, _mm512_storeu_si512, _mm512_sub_epi16, _mm512_unpackhi_epi8, _mm512_unpackhi_epi16,
-    _mm512_unpacklo_epi8, _mm512_unpacklo_epi16,
+    __m512i, _CMP_LE_OQ, _MM_HINT_T0, _mm_prefetch, _mm256_storeu_si256, _mm512_add_epi16, _mm512_add_epi32,
+    _mm512_castsi512_si128, _mm512_castsi512_si256, _mm512_cmpge_epi32_mask, _mm512_cvtepi32_ps, _mm512_cvtepu8_epi32,
+    _mm512_extracti32x4_epi32, _mm512_loadu_si512, _mm512_madd_epi16, _mm512_maddubs_epi16, _mm512_mask_cmp_ps_mask,
+    _mm512_maskz_compress_epi8, _mm512_maskz_compress_epi16, _mm512_maskz_loadu_epi32, _mm512_mul_ps,
+    _mm512_mullo_epi16, _mm512_permutex2var_epi64, _mm512_set1_epi16, _mm512_set1_epi32, _mm512_set1_ps,
+    _mm512_setr_epi64, _mm512_shuffle_i32x4, _mm512_storeu_si512, _mm512_sub_epi16, _mm512_unpackhi_epi8,
+    _mm512_unpackhi_epi16, _mm512_unpacklo_epi8, _mm512_unpacklo_epi16, _pdep_u64, _pext_u64,
 };
 
-use super::sieve::{BLOCK, Kept, Level, Rows, TEN, THREE, Test, Vectors};
+use super::sieve::{BLOCK, Block, Kept, Level, Levels, REACH, Test, Vectors};
 
-/// Whether this machine has them.
-#[inline]
+/// Whether this machine has them, and compacts 8- and 16-bit numbers.
 pub(super) fn is_available() -> bool {
     is_x86_feature_detected!("avx512f")
         && is_x86_feature_detected!("avx512bw")
         && is_x86_feature_detected!("avx512vl")
+        && is_x86_feature_detected!("avx512vbmi2")
         && is_x86_feature_detected!("bmi2")
         && is_x86_feature_detected!("popcnt")
 }
 
-/// A level of which many are read at once.
-pub(super) trait VectorLevel: Level {
-    /// How many, at most 64.
-    const AT_ONCE: usize;
+/// Gradients of a block, 32 along `u` in each of two vectors and as many along `v`.
+type Slopes = [[__m512i; 2]; 2];
 
-    /// The gradients of the pixels between and below the pointers' and one to the right, as words of `gy` and `gx`, 16 to a
-    /// vector in order. With `MASKED` only the pixels of the mask count.
+/// A level of which many are read at once.
+pub(super) trait VectorLevel: Sized {
+    /// For each sixteen of the kernels' order, the pixels of its bits.
+    const SIXTEENS: [u64; 4];
+    /// Where the 64-bit words of both vectors of gradients go for the first 32 pixels; 4 more for the others.
+    const WORDS: [i64; 8];
+
+    /// The gradients of the pixels between the levels.
     ///
     /// # Safety
-    /// The levels of the pixels (of the mask) and of the two columns to the right must be readable, and the machine must be as
-    /// [`is_available`] asks.
-    unsafe fn gradients<const MASKED: bool>(rows: [*const Self; 3], mask: u64) -> [__m512i; 4];
+    /// The machine must be as [`is_available`] asks.
+    unsafe fn slopes(rows: [&[Self; REACH]; 3]) -> Slopes;
+
+    /// From 32-bit words of 64 pixels in their order to the order of the kernels.
+    ///
+    /// # Safety
+    /// The machine must be as [`is_available`] asks.
+    unsafe fn scatter(words: [__m512i; 4]) -> [__m512i; 4];
+
+    /// One bit for each pixel, in the order of the kernels.
+    fn own(pixels: u64) -> u64 {
+        assert!(is_available());
+        Self::SIXTEENS.into_iter().rev().fold(0, |bits, sixteen| {
+            // SAFETY: the machine has the instruction.
+            (bits << 16) | unsafe { _pext_u64(pixels, sixteen) }
+        })
+    }
+
+    /// From the order of the kernels to that of the pixels.
+    ///
+    /// # Safety
+    /// The machine must be as [`is_available`] asks.
+    #[inline(always)]
+    unsafe fn in_order(bits: u64) -> u64 {
+        let [a, b, c, d] = Self::SIXTEENS;
+        // SAFETY: the caller vouches for the machine.
+        unsafe { _pdep_u64(bits, a) | _pdep_u64(bits >> 16, b) | _pdep_u64(bits >> 32, c) | _pdep_u64(bits >> 48, d) }
+    }
 }
 
 /// Bytes are multiplied by 3 or 10 with both signs and added in pairs.
 impl VectorLevel for u8 {
-    const AT_ONCE: usize = 64;
+    const SIXTEENS: [u64; 4] =
+        [0x000f_000f_000f_000f, 0x00f0_00f0_00f0_00f0, 0x0f00_0f00_0f00_0f00, 0xf000_f000_f000_f000];
+    const WORDS: [i64; 8] = [0, 1, 8, 9, 2, 3, 10, 11];
 
     #[inline(always)]
-    unsafe fn gradients<const MASKED: bool>([above, middle, below]: [*const u8; 3], mask: u64) -> [__m512i; 4] {
-        // SAFETY: the caller vouches for the levels and the machine.
+    unsafe fn slopes([above, middle, below]: [&[u8; REACH]; 3]) -> Slopes {
+        // SAFETY: the caller vouches for the machine; there are 66 levels in each row.
         unsafe {
-            let [a0, a1, a2] = bytes::<MASKED>(above, mask);
-            let [m0, _, m2] = bytes::<MASKED>(middle, mask);
-            let [b0, b1, b2] = bytes::<MASKED>(below, mask);
-            let x = weighted_bytes([(a0, a2), (b0, b2), (m0, m2)]);
-            let y = weighted_bytes([(a0, b0), (a2, b2), (a1, b1)]);
-            // Pixels 0 to 3 of every 16, then 4 to 7, and so on: the registers' quarters are transposed.
-            let (v0, v1) = (_mm512_unpacklo_epi16(x[0], y[0]), _mm512_unpackhi_epi16(x[0], y[0]));
-            let (v2, v3) = (_mm512_unpacklo_epi16(x[1], y[1]), _mm512_unpackhi_epi16(x[1], y[1]));
-            let (t0, t1) = (_mm512_shuffle_i32x4::<0x44>(v0, v1), _mm512_shuffle_i32x4::<0xee>(v0, v1));
-            let (t2, t3) = (_mm512_shuffle_i32x4::<0x44>(v2, v3), _mm512_shuffle_i32x4::<0xee>(v2, v3));
+            let (a, m, b) = (above.as_ptr(), middle.as_ptr(), below.as_ptr());
+            let a0 = _mm512_loadu_si512(a.cast());
+            let a1 = _mm512_loadu_si512(a.add(1).cast());
+            let a2 = _mm512_loadu_si512(a.add(2).cast());
+            let m0 = _mm512_loadu_si512(m.cast());
+            let m2 = _mm512_loadu_si512(m.add(2).cast());
+            let b0 = _mm512_loadu_si512(b.cast());
+            let b1 = _mm512_loadu_si512(b.add(1).cast());
+            let b2 = _mm512_loadu_si512(b.add(2).cast());
+            [weighted_bytes([(a0, a2), (b0, b2), (m0, m2)]), weighted_bytes([(a0, b0), (a2, b2), (a1, b1)])]
+        }
+    }
+
+    #[inline(always)]
+    unsafe fn scatter([a, b, c, d]: [__m512i; 4]) -> [__m512i; 4] {
+        // SAFETY: the caller vouches for the machine.
+        unsafe {
+            let (t0, t1) = (_mm512_shuffle_i32x4::<0x44>(a, b), _mm512_shuffle_i32x4::<0xee>(a, b));
+            let (t2, t3) = (_mm512_shuffle_i32x4::<0x44>(c, d), _mm512_shuffle_i32x4::<0xee>(c, d));
             [
                 _mm512_shuffle_i32x4::<0x88>(t0, t2),
                 _mm512_shuffle_i32x4::<0xdd>(t0, t2),
@@ -65,34 +108,10 @@ impl VectorLevel for u8 {
     }
 }
 
-/// 64 levels, those one to the right, and two.
-///
-/// # Safety
-/// See [`VectorLevel::gradients`].
-#[inline(always)]
-unsafe fn bytes<const MASKED: bool>(row: *const u8, mask: u64) -> [__m512i; 3] {
-    // SAFETY: the caller vouches for the levels and the machine; levels beyond the mask are not read.
-    unsafe {
-        if MASKED {
-            [
-                _mm512_maskz_loadu_epi8(mask, row.cast()),
-                _mm512_maskz_loadu_epi8(mask, row.add(1).cast()),
-                _mm512_maskz_loadu_epi8(mask, row.add(2).cast()),
-            ]
-        } else {
-            [
-                _mm512_loadu_si512(row.cast()),
-                _mm512_loadu_si512(row.add(1).cast()),
-                _mm512_loadu_si512(row.add(2).cast()),
-            ]
-        }
-    }
-}
-
 /// Three parts of the first two differences and ten of the last: of bytes 0 to 7 of every 16, and of 8 to 15.
 ///
 /// # Safety
-/// See [`VectorLevel::gradients`].
+/// The machine must be as [`is_available`] asks.
 #[inline(always)]
 unsafe fn weighted_bytes([p, q, r]: [(__m512i, __m512i); 3]) -> [__m512i; 2] {
     // SAFETY: the caller vouches for the machine.
@@ -118,263 +137,391 @@ unsafe fn weighted_bytes([p, q, r]: [(__m512i, __m512i); 3]) -> [__m512i; 2] {
 }
 
 impl VectorLevel for i16 {
-    const AT_ONCE: usize = 32;
+    const SIXTEENS: [u64; 4] = [0x0f0f_0f0f, 0xf0f0_f0f0, 0x0f0f_0f0f << 32, 0xf0f0_f0f0 << 32];
+    const WORDS: [i64; 8] = [0, 1, 2, 3, 4, 5, 6, 7];
 
     #[inline(always)]
-    unsafe fn gradients<const MASKED: bool>([above, middle, below]: [*const i16; 3], mask: u64) -> [__m512i; 4] {
-        // SAFETY: the caller vouches for the levels and the machine.
+    unsafe fn slopes([above, middle, below]: [&[i16; REACH]; 3]) -> Slopes {
+        // SAFETY: the caller vouches for the machine; there are 66 levels in each row.
         unsafe {
-            let [a0, a1, a2] = words::<MASKED>(above, mask as u32);
-            let [m0, _, m2] = words::<MASKED>(middle, mask as u32);
-            let [b0, b1, b2] = words::<MASKED>(below, mask as u32);
-            let x = weighted_words([(a0, a2), (b0, b2), (m0, m2)]);
-            let y = weighted_words([(a0, b0), (a2, b2), (a1, b1)]);
-            // Unpacking then gives pixels 0 to 15 and 16 to 31.
-            let order = _mm512_setr_epi64(0, 4, 1, 5, 2, 6, 3, 7);
-            let (x, y) = (_mm512_permutexvar_epi64(order, x), _mm512_permutexvar_epi64(order, y));
-            let none = _mm512_setzero_si512();
-            [_mm512_unpacklo_epi16(x, y), _mm512_unpackhi_epi16(x, y), none, none]
+            let (a, m, b) = (above.as_ptr(), middle.as_ptr(), below.as_ptr());
+            let [x0, y0] = slopes_of_words(a, m, b);
+            let [x1, y1] = slopes_of_words(a.add(32), m.add(32), b.add(32));
+            [[x0, x1], [y0, y1]]
         }
     }
-}
 
-/// 32 levels, those one to the right, and two.
-///
-/// # Safety
-/// See [`VectorLevel::gradients`].
-#[inline(always)]
-unsafe fn words<const MASKED: bool>(row: *const i16, mask: u32) -> [__m512i; 3] {
-    // SAFETY: the caller vouches for the levels and the machine; levels beyond the mask are not read.
-    unsafe {
-        if MASKED {
+    #[inline(always)]
+    unsafe fn scatter([a, b, c, d]: [__m512i; 4]) -> [__m512i; 4] {
+        // SAFETY: the caller vouches for the machine.
+        unsafe {
+            let low = _mm512_setr_epi64(0, 1, 4, 5, 8, 9, 12, 13);
+            let high = _mm512_setr_epi64(2, 3, 6, 7, 10, 11, 14, 15);
             [
-                _mm512_maskz_loadu_epi16(mask, row),
-                _mm512_maskz_loadu_epi16(mask, row.add(1)),
-                _mm512_maskz_loadu_epi16(mask, row.add(2)),
-            ]
-        } else {
-            [
-                _mm512_loadu_si512(row.cast()),
-                _mm512_loadu_si512(row.add(1).cast()),
-                _mm512_loadu_si512(row.add(2).cast()),
+                _mm512_permutex2var_epi64(a, low, b),
+                _mm512_permutex2var_epi64(a, high, b),
+                _mm512_permutex2var_epi64(c, low, d),
+                _mm512_permutex2var_epi64(c, high, d),
             ]
         }
     }
 }
 
-/// [`Level::weigh`]: three parts of the first two differences and ten of the last.
+/// The gradients of 32 pixels.
 ///
 /// # Safety
-/// See [`VectorLevel::gradients`].
+/// The machine must be as [`is_available`] asks, and there must be 34 levels in each row.
 #[inline(always)]
-unsafe fn weighted_words([p, q, r]: [(__m512i, __m512i); 3]) -> __m512i {
-    // SAFETY: the caller vouches for the machine.
+unsafe fn slopes_of_words(a: *const i16, m: *const i16, b: *const i16) -> [__m512i; 2] {
+    // SAFETY: as the caller vouches.
     unsafe {
-        let (three, ten) = (_mm512_set1_epi16(THREE as i16), _mm512_set1_epi16(TEN as i16));
-        let sides = _mm512_add_epi16(
-            _mm512_mulhrs_epi16(_mm512_sub_epi16(p.1, p.0), three),
-            _mm512_mulhrs_epi16(_mm512_sub_epi16(q.1, q.0), three),
-        );
-        _mm512_add_epi16(sides, _mm512_mulhrs_epi16(_mm512_sub_epi16(r.1, r.0), ten))
+        let (a0, a2) = (_mm512_loadu_si512(a.cast()), _mm512_loadu_si512(a.add(2).cast()));
+        let (b0, b2) = (_mm512_loadu_si512(b.cast()), _mm512_loadu_si512(b.add(2).cast()));
+        let along = _mm512_sub_epi16(_mm512_loadu_si512(m.add(2).cast()), _mm512_loadu_si512(m.cast()));
+        let down = _mm512_sub_epi16(_mm512_loadu_si512(b.add(1).cast()), _mm512_loadu_si512(a.add(1).cast()));
+        // Of the corners' differences, half of the sum and half of the difference of both diagonals.
+        let (falling, rising) = (_mm512_sub_epi16(b2, a0), _mm512_sub_epi16(a2, b0));
+        let (three, ten) = (_mm512_set1_epi16(3), _mm512_set1_epi16(10));
+        let x = _mm512_mullo_epi16(_mm512_add_epi16(falling, rising), three);
+        let y = _mm512_mullo_epi16(_mm512_sub_epi16(falling, rising), three);
+        [_mm512_add_epi16(x, _mm512_mullo_epi16(along, ten)), _mm512_add_epi16(y, _mm512_mullo_epi16(down, ten))]
     }
 }
 
-/// See [`super::sieve::sieve`]; the machine must have what [`is_available`] asks for.
-pub(super) fn sieve<L: VectorLevel>(
-    rows: Rows<'_, L>,
-    n: usize,
-    slot: u32,
-    test: &Test<'_>,
-    kept: Kept<'_>,
-) -> (usize, usize) {
-    let Rows { above, middle, below } = rows;
-    let rows = [&above[..n + 2], &middle[..n + 2], &below[..n + 2]];
-    assert!(is_available() && kept.slots.len() >= n + BLOCK && kept.gradients.len() >= n + BLOCK);
-    if let Vectors::Each(each) = test.vectors {
-        assert!(each.len() >= n);
-    }
-    // SAFETY: the machine has the features, rows hold n + 2 levels, there are n vectors and room for n + BLOCK words.
-    unsafe {
-        match test.vectors {
-            Vectors::None => sieve_span::<L, NONE>(rows, n, slot, test, kept),
-            Vectors::Each(_) => sieve_span::<L, EACH>(rows, n, slot, test, kept),
-            Vectors::Line { .. } => sieve_span::<L, LINE>(rows, n, slot, test, kept),
-        }
+/// Rows that are asked for before they are needed.
+const AHEAD: usize = 6;
+
+/// Blocks that wait to be compacted: their gradients stay in the nearest cache.
+const ENOUGH: usize = 48;
+
+/// Blocks with pixels that pass.
+#[derive(Debug, Clone)]
+pub(super) struct Waiting {
+    gradients: [[[i16; BLOCK]; 2]; ENOUGH],
+    /// The pixels that pass instead of the block's own.
+    blocks: [Block; ENOUGH],
+    len: usize,
+}
+
+impl Default for Waiting {
+    fn default() -> Self {
+        let none = Block { own: 0, slot: 0, place: 0 };
+        Self { gradients: [[[0; BLOCK]; 2]; ENOUGH], blocks: [none; ENOUGH], len: 0 }
     }
 }
 
 const NONE: u8 = 0;
 const EACH: u8 = 1;
-const LINE: u8 = 2;
+const FROM: u8 = 2;
 
-/// What does not change from block to block.
-struct Constants {
-    at_least: __m512i,
-    limit: __m512,
-    count: __m512i,
-    /// What the screening vectors grow by over 16 pixels.
-    step: __m512i,
-    /// The screening vector of each pixel of the span.
-    each: *const i32,
-    slot: u32,
-    slots: *mut u32,
-    gradients: *mut u32,
-}
-
-/// What does.
-struct State {
-    line: __m512i,
-    len: usize,
-    strong: usize,
-}
-
-/// # Safety
-/// See [`sieve`].
-#[target_feature(enable = "avx512f,avx512bw,avx512vl,bmi2,popcnt")]
-unsafe fn sieve_span<L: VectorLevel, const SCREEN: u8>(
-    rows: [&[L]; 3],
-    n: usize,
-    slot: u32,
+/// Tests blocks; see [`super::sieve::Sieve::sift`].
+pub(super) fn sift<L: Level>(
+    levels: &Levels<'_, L>,
+    blocks: &[Block],
     test: &Test<'_>,
-    kept: Kept<'_>,
-) -> (usize, usize) {
-    // SAFETY: as the caller vouches: blocks are whole within n, and the last one is masked.
+    waiting: &mut Waiting,
+    kept: &mut Kept<'_>,
+) {
+    assert!(is_available());
+    // SAFETY: the machine has the features.
     unsafe {
-        let Kept { slots, gradients } = kept;
-        let count = _mm512_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15);
-        let (mut line, mut step, mut each) = (count, count, std::ptr::null());
         match test.vectors {
-            Vectors::Line { first: [x, y], step: by } => {
-                let first = (i32::from(y) << 16) | i32::from(x as u16);
-                let along = _mm512_mullo_epi16(count, _mm512_set1_epi32(i32::from(by as u16)));
-                line = _mm512_add_epi16(_mm512_set1_epi32(first), along);
-                step = _mm512_set1_epi32(i32::from((16 * i32::from(by)) as u16));
-            }
-            Vectors::Each(vectors) => each = vectors.as_ptr().cast(),
-            Vectors::None => {}
+            Vectors::None => test_blocks::<L, NONE>(levels, blocks, test, waiting, kept),
+            Vectors::Each(_) => test_blocks::<L, EACH>(levels, blocks, test, waiting, kept),
+            Vectors::From { .. } => test_blocks::<L, FROM>(levels, blocks, test, waiting, kept),
         }
-        let constants = Constants {
-            at_least: _mm512_set1_epi32(test.at_least),
-            limit: _mm512_set1_ps(test.limit),
-            count,
-            step,
-            each,
-            slot,
-            slots: slots.as_mut_ptr(),
-            gradients: gradients.as_mut_ptr(),
-        };
-        let mut state = State { line, len: 0, strong: 0 };
-        let [above, middle, below] = [rows[0].as_ptr(), rows[1].as_ptr(), rows[2].as_ptr()];
-        let mut start = 0;
-        while start + L::AT_ONCE <= n {
-            let g = L::gradients::<false>([above.add(start), middle.add(start), below.add(start)], 0);
-            keep::<SCREEN, false>(g[0], start, u16::MAX, &constants, &mut state);
-            keep::<SCREEN, false>(g[1], start + 16, u16::MAX, &constants, &mut state);
-            if L::AT_ONCE > 32 {
-                keep::<SCREEN, false>(g[2], start + 32, u16::MAX, &constants, &mut state);
-                keep::<SCREEN, false>(g[3], start + 48, u16::MAX, &constants, &mut state);
-            }
-            start += L::AT_ONCE;
-        }
-        if start < n {
-            let mask = (1u64 << (n - start)) - 1;
-            let g = L::gradients::<true>([above.add(start), middle.add(start), below.add(start)], mask);
-            keep::<SCREEN, true>(g[0], start, mask as __mmask16, &constants, &mut state);
-            if mask >> 16 != 0 {
-                keep::<SCREEN, true>(g[1], start + 16, (mask >> 16) as __mmask16, &constants, &mut state);
-            }
-            if mask >> 32 != 0 {
-                keep::<SCREEN, true>(g[2], start + 32, (mask >> 32) as __mmask16, &constants, &mut state);
-                keep::<SCREEN, true>(g[3], start + 48, (mask >> 48) as __mmask16, &constants, &mut state);
-            }
-        }
-        (state.len, if SCREEN == NONE { state.len } else { state.strong })
     }
 }
 
-/// Tests the gradients of the 16 pixels from `start` on and appends those of the mask that pass.
-///
+/// Compacts what waits.
+pub(super) fn finish<L: Level>(waiting: &mut Waiting, kept: &mut Kept<'_>) {
+    assert!(is_available());
+    // SAFETY: the machine has the features.
+    unsafe { compact::<L>(waiting, kept) };
+}
+
 /// # Safety
-/// The machine must have the features, `each` must hold the pixels (of the mask) if the screen is of that kind, and there must
-/// be room for 16 more words.
-#[inline(always)]
-unsafe fn keep<const SCREEN: u8, const MASKED: bool>(
-    g: __m512i,
-    start: usize,
-    own: __mmask16,
-    constants: &Constants,
-    state: &mut State,
+/// The machine must be as [`is_available`] asks.
+#[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vbmi2,bmi2,popcnt")]
+unsafe fn test_blocks<L: Level, const SCREEN: u8>(
+    levels: &Levels<'_, L>,
+    blocks: &[Block],
+    test: &Test<'_>,
+    waiting: &mut Waiting,
+    kept: &mut Kept<'_>,
 ) {
     // SAFETY: as the caller vouches.
     unsafe {
-        let squared = _mm512_madd_epi16(g, g);
-        let mut strong = _mm512_cmpge_epi32_mask(squared, constants.at_least);
-        if MASKED {
-            strong &= own;
+        let (at_least, limit) = (_mm512_set1_epi32(test.at_least), _mm512_set1_ps(test.limit));
+        // How far the screening vectors of each sixteen of the kernels' order are from the first.
+        let mut along = [_mm512_set1_epi32(0); 4];
+        let (mut centre, mut parts, mut each): ([i32; 2], i32, &[[i16; 2]]) = ([0; 2], 0, &[]);
+        match test.vectors {
+            Vectors::From { centre: point, parts: many } => {
+                (centre, parts) = (point, i32::from(many));
+                let mut k = 0;
+                while k < 4 {
+                    along[k] = _mm512_mullo_epi16(pixels(L::SIXTEENS[k]), _mm512_set1_epi32(parts & 0xffff));
+                    k += 1;
+                }
+            }
+            Vectors::Each(vectors) => each = vectors,
+            Vectors::None => {}
         }
-        let mut passing = strong;
-        if SCREEN != NONE {
-            let vectors = if SCREEN == LINE {
-                state.line
-            } else if MASKED {
-                _mm512_maskz_loadu_epi32(own, constants.each.wrapping_add(start))
+        let mut strong = 0;
+        let mut rest = [[L::default(); REACH]; 3];
+        for block in blocks {
+            if levels.places == usize::MAX {
+                // An image is rarely in the nearest cache.
+                let place = (block.v() + AHEAD) * levels.stride + (block.place & 0xffff) as usize;
+                _mm_prefetch::<_MM_HINT_T0>(levels.data.as_ptr().wrapping_add(place).cast());
+            }
+            let slopes = L::slopes(levels.around(block, &mut rest));
+            let g = [
+                _mm512_unpacklo_epi16(slopes[0][0], slopes[1][0]),
+                _mm512_unpackhi_epi16(slopes[0][0], slopes[1][0]),
+                _mm512_unpacklo_epi16(slopes[0][1], slopes[1][1]),
+                _mm512_unpackhi_epi16(slopes[0][1], slopes[1][1]),
+            ];
+            let (mut squared, mut all) = ([at_least; 4], [0; 4]);
+            let mut k = 0;
+            while k < 4 {
+                squared[k] = _mm512_madd_epi16(g[k], g[k]);
+                all[k] = _mm512_cmpge_epi32_mask(squared[k], at_least);
+                k += 1;
+            }
+            let found = word(all) & block.own;
+            strong += found.count_ones() as usize;
+            let mut passing = found;
+            if SCREEN != NONE {
+                let mut q = along;
+                if SCREEN == FROM {
+                    let x = (block.place & 0xffff) as i32 * parts - centre[0];
+                    let y = (block.place >> 16) as i32 * parts - centre[1];
+                    let first = _mm512_set1_epi32((y << 16) | (x & 0xffff));
+                    let mut k = 0;
+                    while k < 4 {
+                        q[k] = _mm512_add_epi16(first, along[k]);
+                        k += 1;
+                    }
+                } else {
+                    q = vectors_of::<L>(each, block);
+                }
+                let mut k = 0;
+                while k < 4 {
+                    let across = _mm512_cvtepi32_ps(_mm512_madd_epi16(q[k], g[k]));
+                    let most = _mm512_mul_ps(limit, _mm512_cvtepi32_ps(squared[k]));
+                    all[k] = _mm512_mask_cmp_ps_mask::<_CMP_LE_OQ>(all[k], _mm512_mul_ps(across, across), most);
+                    k += 1;
+                }
+                passing = word(all) & block.own;
+            }
+            if passing != 0 {
+                if waiting.len == ENOUGH {
+                    compact::<L>(waiting, kept);
+                }
+                let at = waiting.len;
+                let [x, y] = &mut waiting.gradients[at];
+                _mm512_storeu_si512(x.as_mut_ptr().cast(), slopes[0][0]);
+                _mm512_storeu_si512(x.as_mut_ptr().add(32).cast(), slopes[0][1]);
+                _mm512_storeu_si512(y.as_mut_ptr().cast(), slopes[1][0]);
+                _mm512_storeu_si512(y.as_mut_ptr().add(32).cast(), slopes[1][1]);
+                waiting.blocks[at] = Block { own: passing, ..*block };
+                waiting.len = at + 1;
+            }
+        }
+        kept.strong += strong;
+    }
+}
+
+/// Four masks of 16 as one.
+#[inline(always)]
+fn word([a, b, c, d]: [u16; 4]) -> u64 {
+    u64::from(u32::from(a) | (u32::from(b) << 16)) | (u64::from(u32::from(c) | (u32::from(d) << 16)) << 32)
+}
+
+/// The numbers of 16 pixels, one for each bit.
+///
+/// # Safety
+/// The machine must be as [`is_available`] asks.
+#[inline(always)]
+unsafe fn pixels(mut bits: u64) -> __m512i {
+    let mut numbers = [0i32; 16];
+    for number in &mut numbers {
+        *number = bits.trailing_zeros() as i32;
+        bits &= bits.wrapping_sub(1);
+    }
+    // SAFETY: the caller vouches for the machine; there are 16 numbers.
+    unsafe { _mm512_loadu_si512(numbers.as_ptr().cast()) }
+}
+
+/// The screening vectors of a block in the order of the kernels; those beyond the last are zeros.
+///
+/// # Safety
+/// The machine must be as [`is_available`] asks.
+#[inline(always)]
+unsafe fn vectors_of<L: Level>(each: &[[i16; 2]], block: &Block) -> [__m512i; 4] {
+    let each = each.get(block.slot as usize..).unwrap_or(&[]);
+    let there = u64::MAX >> BLOCK.saturating_sub(each.len()).min(BLOCK - 1);
+    let from: *const i32 = each.as_ptr().cast();
+    // SAFETY: the caller vouches for the machine; what the masks leave out is not read.
+    unsafe {
+        let a = _mm512_maskz_loadu_epi32(there as u16, from);
+        let b = _mm512_maskz_loadu_epi32((there >> 16) as u16, from.wrapping_add(16));
+        let c = _mm512_maskz_loadu_epi32((there >> 32) as u16, from.wrapping_add(32));
+        let d = _mm512_maskz_loadu_epi32((there >> 48) as u16, from.wrapping_add(48));
+        L::scatter([a, b, c, d])
+    }
+}
+
+/// Appends what waits.
+///
+/// # Safety
+/// The machine must be as [`is_available`] asks.
+#[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vbmi2,bmi2,popcnt")]
+unsafe fn compact<L: Level>(waiting: &mut Waiting, kept: &mut Kept<'_>) {
+    let blocks = &waiting.blocks[..waiting.len];
+    let count = blocks.iter().map(|block| block.own.count_ones() as usize).sum::<usize>();
+    let room = kept.slots.len().min(kept.places.len()).min(kept.gx.len()).min(kept.gy.len());
+    assert!(room >= kept.len + count + BLOCK);
+    let numbers: [u8; BLOCK] = std::array::from_fn(|i| i as u8);
+    // SAFETY: the caller vouches for the machine, and there is room for all and a block more.
+    unsafe {
+        let numbers = _mm512_loadu_si512(numbers.as_ptr().cast());
+        let [a, b, c, d, e, f, g, h] = L::WORDS;
+        let low = _mm512_setr_epi64(a, b, c, d, e, f, g, h);
+        let more = if L::WORDS[2] == 8 { 4 } else { 8 };
+        let high = _mm512_setr_epi64(a + more, b + more, c + more, d + more, e + more, f + more, g + more, h + more);
+        let (slots, places) = (kept.slots.as_mut_ptr(), kept.places.as_mut_ptr());
+        let mut len = kept.len;
+        for (block, [x, y]) in blocks.iter().zip(&waiting.gradients) {
+            let passing = L::in_order(block.own);
+            let (first, second) = (passing as u32, (passing >> 32) as u32);
+            let after = len + first.count_ones() as usize;
+            let x = [_mm512_loadu_si512(x.as_ptr().cast()), _mm512_loadu_si512(x.as_ptr().add(32).cast())];
+            let y = [_mm512_loadu_si512(y.as_ptr().cast()), _mm512_loadu_si512(y.as_ptr().add(32).cast())];
+            let x0 = _mm512_maskz_compress_epi16(first, _mm512_permutex2var_epi64(x[0], low, x[1]));
+            let y0 = _mm512_maskz_compress_epi16(first, _mm512_permutex2var_epi64(y[0], low, y[1]));
+            let x1 = _mm512_maskz_compress_epi16(second, _mm512_permutex2var_epi64(x[0], high, x[1]));
+            let y1 = _mm512_maskz_compress_epi16(second, _mm512_permutex2var_epi64(y[0], high, y[1]));
+            let numbers = _mm512_maskz_compress_epi8(passing, numbers);
+            let (slot, place) = (_mm512_set1_epi32(block.slot as i32), _mm512_set1_epi32(block.place as i32));
+            let lowest = _mm512_cvtepu8_epi32(_mm512_castsi512_si128(numbers));
+            _mm512_storeu_si512(slots.add(len).cast(), _mm512_add_epi32(lowest, slot));
+            _mm512_storeu_si512(places.add(len).cast(), _mm512_add_epi32(lowest, place));
+            let count = passing.count_ones() as usize;
+            // Most blocks hold a few.
+            if count <= 16 {
+                _mm256_storeu_si256(kept.gx.as_mut_ptr().add(len).cast(), _mm512_castsi512_si256(x0));
+                _mm256_storeu_si256(kept.gy.as_mut_ptr().add(len).cast(), _mm512_castsi512_si256(y0));
+                _mm256_storeu_si256(kept.gx.as_mut_ptr().add(after).cast(), _mm512_castsi512_si256(x1));
+                _mm256_storeu_si256(kept.gy.as_mut_ptr().add(after).cast(), _mm512_castsi512_si256(y1));
             } else {
-                _mm512_loadu_si512(constants.each.add(start).cast())
-            };
-            let across = _mm512_cvtepi32_ps(_mm512_madd_epi16(vectors, g));
-            let most = _mm512_mul_ps(constants.limit, _mm512_cvtepi32_ps(squared));
-            passing = _mm512_mask_cmp_ps_mask::<_CMP_LE_OQ>(strong, _mm512_mul_ps(across, across), most);
-            state.strong += strong.count_ones() as usize;
+                _mm512_storeu_si512(kept.gx.as_mut_ptr().add(len).cast(), x0);
+                _mm512_storeu_si512(kept.gy.as_mut_ptr().add(len).cast(), y0);
+                _mm512_storeu_si512(kept.gx.as_mut_ptr().add(after).cast(), x1);
+                _mm512_storeu_si512(kept.gy.as_mut_ptr().add(after).cast(), y1);
+                store_numbers(
+                    _mm512_extracti32x4_epi32::<1>(numbers),
+                    slot,
+                    place,
+                    slots.add(len + 16),
+                    places.add(len + 16),
+                );
+                store_numbers(
+                    _mm512_extracti32x4_epi32::<2>(numbers),
+                    slot,
+                    place,
+                    slots.add(len + 32),
+                    places.add(len + 32),
+                );
+                store_numbers(
+                    _mm512_extracti32x4_epi32::<3>(numbers),
+                    slot,
+                    place,
+                    slots.add(len + 48),
+                    places.add(len + 48),
+                );
+            }
+            len += count;
         }
-        if SCREEN == LINE {
-            state.line = _mm512_add_epi16(state.line, constants.step);
-        }
-        // Most hold nothing that passes a screen.
-        if passing != 0 {
-            let first = _mm512_set1_epi32(constants.slot.wrapping_add(start as u32) as i32);
-            let slots = _mm512_maskz_compress_epi32(passing, _mm512_add_epi32(constants.count, first));
-            _mm512_storeu_si512(constants.slots.add(state.len).cast(), slots);
-            let gradients = _mm512_maskz_compress_epi32(passing, g);
-            _mm512_storeu_si512(constants.gradients.add(state.len).cast(), gradients);
-            state.len += passing.count_ones() as usize;
-        }
+        kept.len = len;
+    }
+    waiting.len = 0;
+}
+
+/// Writes 16 pixels' numbers and places.
+///
+/// # Safety
+/// The machine must be as [`is_available`] asks, with room for 16 words at both pointers.
+#[inline(always)]
+unsafe fn store_numbers(
+    numbers: std::arch::x86_64::__m128i,
+    slot: __m512i,
+    place: __m512i,
+    slots: *mut u32,
+    places: *mut u32,
+) {
+    // SAFETY: as the caller vouches.
+    unsafe {
+        let numbers = _mm512_cvtepu8_epi32(numbers);
+        _mm512_storeu_si512(slots.cast(), _mm512_add_epi32(numbers, slot));
+        _mm512_storeu_si512(places.cast(), _mm512_add_epi32(numbers, place));
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use super::super::sieve::{portable_levels, portable_smoothed};
+    use super::super::sieve::place;
     use super::*;
 
-    /// A kernel for levels.
-    type Kernel<L> = fn(Rows<'_, L>, usize, u32, &Test<'_>, Kept<'_>) -> (usize, usize);
+    const WIDTH: usize = 300;
 
-    /// What a kernel finds: slots, gradients, how many were strong.
-    fn found<L: Level>(kernel: Kernel<L>, rows: Rows<'_, L>, n: usize, test: &Test<'_>) -> (Vec<u32>, Vec<u32>, usize) {
-        let (mut slots, mut gradients) = (vec![0; n + BLOCK], vec![0; n + BLOCK]);
-        let (len, strong) = kernel(rows, n, 17, test, Kept { slots: &mut slots, gradients: &mut gradients });
+    /// What a kernel finds: slots, places, gradients, how many were strong.
+    type Found = (Vec<u32>, Vec<u32>, Vec<i16>, Vec<i16>, usize);
+
+    fn found(with: impl FnOnce(&mut Kept<'_>)) -> Found {
+        let room = 3 * WIDTH;
+        let (mut slots, mut places) = (vec![0; room], vec![0; room]);
+        let (mut gx, mut gy) = (vec![0; room], vec![0; room]);
+        let mut kept = Kept { slots: &mut slots, places: &mut places, gx: &mut gx, gy: &mut gy, len: 0, strong: 0 };
+        with(&mut kept);
+        let (len, strong) = (kept.len, kept.strong);
         slots.truncate(len);
-        gradients.truncate(len);
-        (slots, gradients, strong)
+        places.truncate(len);
+        gx.truncate(len);
+        gy.truncate(len);
+        (slots, places, gx, gy, strong)
     }
 
-    fn compare<L: VectorLevel>(plain: Kernel<L>, levels: &[L], at_least: i32) {
-        let vectors: Vec<[i16; 2]> = (0..200).map(|i| [(i * 307 - 30_000) as i16, (20_000 - i * 11) as i16]).collect();
-        let mut passing = 0;
+    fn compare<L: Level>(data: &[L], at_least: i32) {
+        let each: Vec<[i16; 2]> = (0..WIDTH as i16).map(|i| [i * 107 - 30_000, 20_000 - i * 11]).collect();
+        let levels = Levels { data, stride: WIDTH, places: usize::MAX, left: 0 };
+        let (mut passing, mut waiting) = (0, Waiting::default());
         for n in (1..150).chain([200]) {
-            let rows = Rows { above: &levels[..n + 2], middle: &levels[300..n + 302], below: &levels[600..n + 602] };
-            for vectors in
-                [Vectors::None, Vectors::Each(&vectors[..n]), Vectors::Line { first: [-9000, 8000], step: 91 }]
-            {
-                for at_least in [1, at_least, i32::MAX] {
-                    let test = Test { at_least, vectors, limit: 1e8 };
-                    let ours = found(sieve::<L>, rows, n, &test);
-                    assert_eq!(ours, found(plain, rows, n, &test), "{n} pixels, {test:?}");
-                    passing += ours.0.len();
+            // The last ones reach the end of the data.
+            for first in [1, 9, WIDTH - 1 - n] {
+                let cut = (0..n).step_by(BLOCK).map(|k| {
+                    let own = u64::MAX >> (k + BLOCK).saturating_sub(n);
+                    Block { own, slot: k as u32, place: place(1, first + k) }
+                });
+                let plain: Vec<Block> = cut.collect();
+                let ours: Vec<Block> = plain.iter().map(|block| Block { own: L::own(block.own), ..*block }).collect();
+                let from = Vectors::From { centre: [9000, -8000], parts: 91 };
+                for vectors in [Vectors::None, Vectors::Each(&each[..n]), from] {
+                    for at_least in [1, at_least, i32::MAX] {
+                        let test = Test { at_least, vectors, limit: 1e8 };
+                        let wide = found(|kept| {
+                            sift(&levels, &ours, &test, &mut waiting, kept);
+                            finish::<L>(&mut waiting, kept);
+                        });
+                        assert_eq!(wide, found(|kept| L::portable(&levels, &plain, &test, kept)), "{n}, {test:?}");
+                        passing += wide.0.len();
+                    }
                 }
             }
         }
-        assert!(passing > 10_000, "{passing}");
+        assert!(passing > 30_000, "{passing}");
     }
 
     #[test]
@@ -383,13 +530,23 @@ mod tests {
             return;
         }
         let random = |i: u32| i.wrapping_mul(2_654_435_761).rotate_left(11).wrapping_mul(0x85eb_ca6b) >> 16;
-        let levels: Vec<u8> = (0..1000).map(|i| random(i) as u8).collect();
-        compare(portable_levels, &levels, 500 * 500);
-        let extreme: Vec<u8> = (0..1000).map(|i| if random(i) & 1 == 1 { 255 } else { 0 }).collect();
-        compare(portable_levels, &extreme, 500 * 500);
-        let smoothed: Vec<i16> = (0..1000).map(|i| (random(i) % 32_641) as i16).collect();
-        compare(portable_smoothed, &smoothed, 4000 * 4000);
-        let extreme: Vec<i16> = (0..1000).map(|i| if random(i) & 1 == 1 { 32_640 } else { 0 }).collect();
-        compare(portable_smoothed, &extreme, 4000 * 4000);
+        let numbers = || 0..3 * WIDTH as u32;
+        compare::<u8>(&numbers().map(|i| random(i) as u8).collect::<Vec<_>>(), 500 * 500);
+        compare::<u8>(&numbers().map(|i| if random(i) & 1 == 1 { 255 } else { 0 }).collect::<Vec<_>>(), 500 * 500);
+        compare::<i16>(&numbers().map(|i| (random(i) % 2041) as i16).collect::<Vec<_>>(), 4000 * 4000);
+        compare::<i16>(&numbers().map(|i| if random(i) & 1 == 1 { 2040 } else { 0 }).collect::<Vec<_>>(), 4000 * 4000);
+    }
+
+    #[test]
+    fn orders_are_each_others_inverses() {
+        if is_available() {
+            for k in 0..64 {
+                // SAFETY: the machine has the instructions.
+                let (a, b) = unsafe {
+                    (u8::in_order(<u8 as VectorLevel>::own(1 << k)), i16::in_order(<i16 as VectorLevel>::own(1 << k)))
+                };
+                assert_eq!((a, b), (1 << k, 1 << k));
+            }
+        }
     }
 }

@@ -1,5 +1,7 @@
 //! Gates: how far a measurement may be from its prediction, and how likely an error is to stay within a radius.
 
+use std::sync::LazyLock;
+
 use nalgebra::{Matrix2, SymmetricEigen};
 
 use super::chi_square::chi_square_quantile;
@@ -41,6 +43,11 @@ impl Gate {
 /// Angles at which [`probability_within`] looks, over a quarter of a turn.
 const ANGLES: u32 = 64;
 
+/// Sines and cosines of these angles.
+static DIRECTIONS: LazyLock<[(f64, f64); ANGLES as usize]> = LazyLock::new(|| {
+    std::array::from_fn(|i| (std::f64::consts::FRAC_PI_2 * (i as f64 + 0.5) / f64::from(ANGLES)).sin_cos())
+});
+
 /// The probability that a normal error in the plane with this covariance is shorter than `radius`, in the same unit.
 ///
 /// With the error written as `C^(1/2) r (cos t, sin t)`, `t` is uniform and `r^2 / 2` exponential, so that
@@ -58,13 +65,11 @@ pub fn probability_within(covariance: &Matrix2<f64>, radius: f64) -> f64 {
     if values.min() < -1e-12 * values.max().abs() {
         return 0.0;
     }
-    let at = |i: u32| {
-        let angle = std::f64::consts::FRAC_PI_2 * (f64::from(i) + 0.5) / f64::from(ANGLES);
-        let (sin, cos) = angle.sin_cos();
+    let at = |(sin, cos): &(f64, f64)| {
         let variance = (values[0] * cos * cos + values[1] * sin * sin).max(0.0);
         -(-0.5 * radius * radius / variance).exp_m1()
     };
-    (0..ANGLES).map(at).sum::<f64>() / f64::from(ANGLES)
+    DIRECTIONS.iter().map(at).sum::<f64>() / f64::from(ANGLES)
 }
 
 #[cfg(test)]

@@ -1,6 +1,7 @@
 //! Images as the core sees them: borrowed rows of grey levels or colours, and rows and places made from them.
 
 mod color;
+mod fixed;
 mod linear;
 mod smooth;
 mod view;

@@ -2,6 +2,7 @@
 
 use multiversion::multiversion;
 
+use super::fixed::{fixed_columns, fixed_rows};
 use super::view::ImageView;
 
 /// The part of the Gaussian's weight that may be cut off at both ends.
@@ -12,8 +13,8 @@ const TAIL: f64 = 0.01;
 pub struct Smoother {
     taps: Vec<f32>,
     column_sums: Vec<f32>,
-    /// Scratch of the rows in fixed point: sums of columns in units of 1/256, and a row in single precision.
-    fixed_sums: Vec<u16>,
+    /// Scratch of the rows in fixed point: sums of columns, and a row in single precision.
+    fixed_sums: Vec<i16>,
     plain: Vec<f32>,
 }
 
@@ -41,7 +42,7 @@ impl Smoother {
         self.taps.len() == 1
     }
 
-    /// [`row`](Self::row) rounded to 1/8 of a grey level, in units of 1/128.
+    /// [`row`](Self::row) rounded to 1/8 of a grey level, in that unit.
     ///
     /// Columns and rows that the kernel reaches should lie within the image: others may be smoothed in single precision first,
     /// which takes longer.
@@ -49,7 +50,7 @@ impl Smoother {
         let n = out.len();
         let inside = first >= 1 && first + n < image.width() && v >= 1 && v + 1 < image.height();
         if let ([centre, side], true) = (&self.taps[..], inside && self.fixed_sums.len() >= n + 2) {
-            let taps = [*centre, *side].map(|tap| (tap * TAP_UNITS) as u32);
+            let taps = [*centre, *side].map(|tap| (tap * TAP_UNITS) as i16);
             let part = |v: usize| image.row(v).get(first - 1..=first + n).unwrap_or(&[]);
             fixed_columns([part(v - 1), part(v), part(v + 1)], taps, &mut self.fixed_sums[..n + 2]);
             fixed_rows(&self.fixed_sums[..n + 2], taps, out);
@@ -163,31 +164,10 @@ fn add_scaled(above: &[u8], below: &[u8], tap: f32, out: &mut [f32]) {
     }
 }
 
-/// The middle row and its neighbours weighted by taps in units of 1/256, exactly, in units of 1/256 of a grey level.
-#[multiversion(targets("x86_64+avx512f+avx512bw+avx512vl", "x86_64+avx2"))]
-fn fixed_columns([above, middle, below]: [&[u8]; 3], [centre, side]: [u32; 2], out: &mut [u16]) {
-    let (centre, side) = (centre as u16, side as u16);
-    for (((o, a), m), b) in out.iter_mut().zip(above).zip(middle).zip(below) {
-        *o = u16::from(*m) * centre + (u16::from(*a) + u16::from(*b)) * side;
-    }
-}
-
-/// The same along a row of columns' sums, one wider on both sides, rounded once, to 1/8 of a grey level; halves go to the even
-/// one. So turned and negative images are smoothed alike, and Scharr gradients of the row are exact in units of 1/8.
-#[multiversion(targets("x86_64+avx512f+avx512bw+avx512vl", "x86_64+avx2"))]
-fn fixed_rows(sums: &[u16], [centre, side]: [u32; 2], out: &mut [i16]) {
-    let n = out.len();
-    let (left, middle, right) = (&sums[..n], &sums[1..=n], &sums[2..n + 2]);
-    for (((o, l), m), r) in out.iter_mut().zip(left).zip(middle).zip(right) {
-        let sum = u32::from(*m) * centre + (u32::from(*l) + u32::from(*r)) * side;
-        *o = (((sum + 4095 + ((sum >> 13) & 1)) >> 13) << 4) as i16;
-    }
-}
-
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512vl", "x86_64+avx2"))]
 fn quantise(row: &[f32], out: &mut [i16]) {
     for (o, i) in out.iter_mut().zip(row) {
-        *o = ((i * EIGHTHS).round_ties_even() as i16) << 4;
+        *o = (i * EIGHTHS).round_ties_even() as i16;
     }
 }
 
@@ -276,7 +256,7 @@ mod tests {
                         smoother.row(&view, v, first, &mut plain);
                         smoother.fixed_row(&view, v, first, &mut fixed);
                         for (p, f) in plain.iter().zip(&fixed) {
-                            assert!((p * 128.0 - f32::from(*f)).abs() < 8.01 && *f <= 32640, "{p} {f}");
+                            assert!((p * 8.0 - f32::from(*f)).abs() < 0.501 && *f <= 2040, "{p} {f}");
                         }
                     }
                 }

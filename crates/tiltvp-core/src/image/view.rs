@@ -41,6 +41,16 @@ impl<'a> ImageView<'a> {
         self.height
     }
 
+    /// All levels, row after row; what lies between rows may be anything.
+    pub(crate) fn data(&self) -> &'a [u8] {
+        self.data
+    }
+
+    /// From the begin of a row to that of the next.
+    pub(crate) fn stride(&self) -> usize {
+        self.stride
+    }
+
     /// Row `v`, or an empty slice below the image.
     pub fn row(&self, v: usize) -> &'a [u8] {
         if v >= self.height {

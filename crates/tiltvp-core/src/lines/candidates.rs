@@ -18,6 +18,7 @@ pub(super) struct Candidates {
     unsorted: Vec<Candidate>,
     rows: Rows<f32>,
     weights: Vec<f32>,
+    slots: Vec<u32>,
     places: Vec<u32>,
 }
 
@@ -51,7 +52,7 @@ impl Candidates {
         let up = robot_from_upright.column(2).into_owned();
         let lean = up.xy().norm().atan2(up.z);
         let reach = (plane_max_rad + lean).min(PI / 2.0).sin();
-        sight.lift.lift(&ridge.edges, reach, &mut self.rows, &mut self.weights, &mut self.places);
+        sight.lift.lift(&ridge.edges, reach, &mut self.rows, &mut self.weights, &mut self.slots, &mut self.places);
         let limit = plane_max_rad.sin();
         let turn: [[f32; 3]; 3] = std::array::from_fn(|i| std::array::from_fn(|j| robot_from_upright[(j, i)] as f32));
         let upright = |[x, y, z]: [f32; 3]| {
@@ -59,13 +60,13 @@ impl Candidates {
             (row(turn[0]), row(turn[1]), row(turn[2]))
         };
         self.unsorted.clear();
-        let (slots, gx, gy) = (ridge.edges.slot(), ridge.edges.gx(), ridge.edges.gy());
-        for (row, place) in self.rows.iter().zip(&self.places) {
+        let (gx, gy) = (ridge.edges.gx(), ridge.edges.gy());
+        for ((row, slot), place) in self.rows.iter().zip(&self.slots).zip(&self.places) {
             if row.dot(&up).abs() > limit {
                 continue;
             }
             let place = *place as usize;
-            let (u, v) = sight.region.place(slots[place] as usize);
+            let (u, v) = sight.region.place(*slot as usize);
             let (u, v) = (usize::from(u), usize::from(v));
             let shift = ridge.shift_px()[place];
             let step = |at: usize| if shift < 0.0 { at.saturating_sub(1) } else { at + 1 };

@@ -55,6 +55,11 @@ impl<T: Real> Problem for Direction<'_, T> {
         self.rows.count_to_beat((*model).into(), threshold, to_beat)
     }
 
+    fn consensus_of_each(&self, models: &[Option<Vector3<f64>>], threshold: f64, to_beat: usize, counts: &mut [usize]) {
+        let models = models.iter().map(|model| model.map(Into::into));
+        self.rows.count_each_to_beat(&models, threshold, to_beat, counts);
+    }
+
     fn consensus_among(&self, observations: &[u32], model: &Vector3<f64>, threshold: f64) -> usize {
         self.rows.count_among(observations, (*model).into(), threshold)
     }

@@ -6,6 +6,18 @@ use super::real::Total;
 /// Numbers that are worked on together.
 pub(super) const LANES: usize = 16;
 
+/// Groups are summed in so many turns, so that the rows of one need not wait for each other.
+pub(super) const TURNS: usize = 4;
+
+/// The terms of sixteen rows.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Terms {
+    /// Information and first score of rows 0, 4, 8, 12, then of rows 1, 5, 9, 13, and so on.
+    pub fours: [[[f32; 4]; TURNS]; TURNS],
+    /// The second score, row by row.
+    pub last: [f32; LANES],
+}
+
 /// Sixteen numbers of single precision, in whatever registers hold them.
 ///
 /// Every operation rounds as IEEE 754 says and products are never fused with sums, so all implementations give the same bits.
@@ -28,6 +40,8 @@ trait Lanes: Copy {
     /// The numbers of the mask, and zeros.
     unsafe fn keep(a: Self, mask: Self::Mask) -> Self;
     unsafe fn count(mask: Self::Mask) -> u32;
+    /// Four numbers of every row together, see [`Terms::fours`].
+    unsafe fn store_fours(columns: [Self; 4], to: &mut [[[f32; 4]; TURNS]; TURNS]);
 }
 
 /// One number after the other, for every machine.
@@ -88,18 +102,29 @@ impl Lanes for Plain {
     unsafe fn count(mask: Self::Mask) -> u32 {
         mask.iter().map(|held| u32::from(*held)).sum()
     }
+    #[inline(always)]
+    unsafe fn store_fours(columns: [Self; 4], to: &mut [[[f32; 4]; TURNS]; TURNS]) {
+        for row in 0..LANES {
+            for (column, to) in columns.iter().zip(&mut to[row % TURNS][row / TURNS]) {
+                *to = column.0[row];
+            }
+        }
+    }
 }
 
 #[cfg(target_arch = "x86_64")]
 mod x86 {
     use std::arch::x86_64::{
-        __m256, __m512, __mmask16, _CMP_LE_OQ, _CMP_LT_OQ, _mm256_add_ps, _mm256_and_ps, _mm256_cmp_ps,
-        _mm256_loadu_ps, _mm256_max_ps, _mm256_movemask_ps, _mm256_mul_ps, _mm256_set1_ps, _mm256_setzero_ps,
-        _mm256_storeu_ps, _mm256_sub_ps, _mm512_add_ps, _mm512_cmp_ps_mask, _mm512_loadu_ps, _mm512_maskz_mov_ps,
-        _mm512_max_ps, _mm512_mul_ps, _mm512_set1_ps, _mm512_setzero_ps, _mm512_storeu_ps, _mm512_sub_ps,
+        __m256, __m512, __mmask16, _CMP_LE_OQ, _CMP_LT_OQ, _mm256_add_ps, _mm256_and_ps, _mm256_castps_pd,
+        _mm256_cmp_ps, _mm256_loadu_ps, _mm256_max_ps, _mm256_movemask_ps, _mm256_mul_ps, _mm256_set1_ps,
+        _mm256_setzero_ps, _mm256_storeu_pd, _mm256_storeu_ps, _mm256_sub_ps, _mm256_unpackhi_pd, _mm256_unpackhi_ps,
+        _mm256_unpacklo_pd, _mm256_unpacklo_ps, _mm512_add_ps, _mm512_castps_pd, _mm512_cmp_ps_mask, _mm512_loadu_ps,
+        _mm512_maskz_mov_ps, _mm512_max_ps, _mm512_mul_ps, _mm512_set1_ps, _mm512_setzero_ps, _mm512_storeu_pd,
+        _mm512_storeu_ps, _mm512_sub_ps, _mm512_unpackhi_pd, _mm512_unpackhi_ps, _mm512_unpacklo_pd,
+        _mm512_unpacklo_ps,
     };
 
-    use super::{LANES, Lanes};
+    use super::{LANES, Lanes, TURNS};
 
     /// One register of 512 bits (AVX-512 F).
     #[derive(Clone, Copy)]
@@ -139,9 +164,41 @@ mod x86 {
         }
 
         #[inline(always)]
+        unsafe fn store_fours([a, b, c, d]: [Self; 4], to: &mut [[[f32; 4]; TURNS]; TURNS]) {
+            // SAFETY: the caller vouches for the machine, the references hold 16 numbers each.
+            unsafe {
+                let low = (_mm512_unpacklo_ps(a.0, b.0), _mm512_unpacklo_ps(c.0, d.0));
+                let high = (_mm512_unpackhi_ps(a.0, b.0), _mm512_unpackhi_ps(c.0, d.0));
+                let low = (_mm512_castps_pd(low.0), _mm512_castps_pd(low.1));
+                let high = (_mm512_castps_pd(high.0), _mm512_castps_pd(high.1));
+                _mm512_storeu_pd(to[0].as_mut_ptr().cast(), _mm512_unpacklo_pd(low.0, low.1));
+                _mm512_storeu_pd(to[1].as_mut_ptr().cast(), _mm512_unpackhi_pd(low.0, low.1));
+                _mm512_storeu_pd(to[2].as_mut_ptr().cast(), _mm512_unpacklo_pd(high.0, high.1));
+                _mm512_storeu_pd(to[3].as_mut_ptr().cast(), _mm512_unpackhi_pd(high.0, high.1));
+            }
+        }
+
+        #[inline(always)]
         unsafe fn store(self, to: &mut [f32; LANES]) {
             // SAFETY: the caller vouches for the machine, the reference holds 16 numbers.
             unsafe { _mm512_storeu_ps(to.as_mut_ptr(), self.0) }
+        }
+    }
+
+    /// [`Lanes::store_fours`] of eight rows, from `first` fours on.
+    ///
+    /// # Safety
+    /// The machine must have AVX2.
+    #[inline(always)]
+    unsafe fn store_half([a, b, c, d]: [__m256; 4], to: &mut [[[f32; 4]; TURNS]; TURNS], first: usize) {
+        // SAFETY: the caller vouches for the machine, and two fours follow the first.
+        unsafe {
+            let low = (_mm256_castps_pd(_mm256_unpacklo_ps(a, b)), _mm256_castps_pd(_mm256_unpacklo_ps(c, d)));
+            let high = (_mm256_castps_pd(_mm256_unpackhi_ps(a, b)), _mm256_castps_pd(_mm256_unpackhi_ps(c, d)));
+            _mm256_storeu_pd(to[0][first..first + 2].as_mut_ptr().cast(), _mm256_unpacklo_pd(low.0, low.1));
+            _mm256_storeu_pd(to[1][first..first + 2].as_mut_ptr().cast(), _mm256_unpackhi_pd(low.0, low.1));
+            _mm256_storeu_pd(to[2][first..first + 2].as_mut_ptr().cast(), _mm256_unpacklo_pd(high.0, high.1));
+            _mm256_storeu_pd(to[3][first..first + 2].as_mut_ptr().cast(), _mm256_unpackhi_pd(high.0, high.1));
         }
     }
 
@@ -172,6 +229,15 @@ mod x86 {
             keep(a: Self, mask: Self::Mask) -> Self { Self(_mm256_and_ps(a.0, mask.0), _mm256_and_ps(a.1, mask.1)) }
             count(mask: Self::Mask) -> u32 {
                 _mm256_movemask_ps(mask.0).count_ones() + _mm256_movemask_ps(mask.1).count_ones()
+            }
+        }
+
+        #[inline(always)]
+        unsafe fn store_fours([a, b, c, d]: [Self; 4], to: &mut [[[f32; 4]; TURNS]; TURNS]) {
+            // SAFETY: the caller vouches for the machine, the references hold 16 numbers each.
+            unsafe {
+                store_half([a.0, b.0, c.0, d.0], to, 0);
+                store_half([a.1, b.1, c.1, d.1], to, 2);
             }
         }
 
@@ -273,7 +339,7 @@ impl<L: Lanes> Sums<L> {
         }
     }
 
-    /// Takes the rows that a hard gate rejects, which it does for good, if there are any.
+    /// Takes the rows that a hard gate rejects, which it does for good.
     #[inline(always)]
     unsafe fn rejected(&mut self, [x, y, z]: [&[f32; LANES]; 3], weights: &mut [f32; LANES], model: &[L; 3], limit: L) {
         // SAFETY: the caller vouches for the machine.
@@ -281,11 +347,9 @@ impl<L: Lanes> Sums<L> {
             let (x, y, z, own) = (L::load(x), L::load(y), L::load(z), L::load(weights));
             let d = residual([x, y, z], model);
             let kept = L::keep(own, L::at_most(L::mul(d, d), limit));
-            let gone = L::sub(own, kept);
-            if L::count(L::below(L::splat(0.0), gone)) != 0 {
-                kept.store(weights);
-                self.add(gone, [x, y, d]);
-            }
+            // No branch: most sixteens have one that is rejected, at first.
+            kept.store(weights);
+            self.add(L::sub(own, kept), [x, y, d]);
         }
     }
 
@@ -351,11 +415,51 @@ unsafe fn gather_body<L: Lanes, const GATE: u8>(
     }
 }
 
+/// The terms of whole sixteens of rows with a soft gate, and their sums with its slope, lane by lane.
+#[inline(always)]
+unsafe fn terms_body<L: Lanes>(
+    [x, y, z]: [&[f32]; 3],
+    weights: &[f32],
+    model: [f32; 3],
+    gains: [f32; 2],
+    terms: &mut [Terms],
+    slopes: &mut [[f32; LANES]; 3],
+) {
+    // SAFETY: the caller vouches for the machine.
+    unsafe {
+        let model = [L::splat(model[0]), L::splat(model[1]), L::splat(model[2])];
+        let (inverse, one) = (L::splat(gains[0]), L::splat(1.0));
+        let [xx, xy, yy] = slopes;
+        let (mut sum_xx, mut sum_xy, mut sum_yy) = (L::load(xx), L::load(xy), L::load(yy));
+        let ((x, _), (y, _), (z, _)) = (x.as_chunks(), y.as_chunks(), z.as_chunks());
+        let (weights, _) = weights.as_chunks();
+        for ((((x, y), z), own), terms) in x.iter().zip(y).zip(z).zip(weights).zip(terms) {
+            let (x, y, own) = (L::load(x), L::load(y), L::load(own));
+            let d = residual([x, y, L::load(z)], &model);
+            let t = L::positive(L::sub(one, L::mul(L::mul(d, d), inverse)));
+            let t2 = L::mul(t, t);
+            let t4 = L::mul(t2, t2);
+            let w = L::mul(own, L::mul(t4, t4));
+            let steep = L::sub(L::mul(L::splat(17.0), t), L::splat(16.0));
+            let s = L::mul(L::mul(own, L::mul(L::mul(t4, t2), t)), steep);
+            let (wx, wy, sx, sy) = (L::mul(w, x), L::mul(w, y), L::mul(s, x), L::mul(s, y));
+            sum_xx = L::add(sum_xx, L::mul(sx, x));
+            sum_xy = L::add(sum_xy, L::mul(sx, y));
+            sum_yy = L::add(sum_yy, L::mul(sy, y));
+            L::store_fours([L::mul(wx, x), L::mul(wx, y), L::mul(wy, y), L::mul(wx, d)], &mut terms.fours);
+            L::mul(wy, d).store(&mut terms.last);
+        }
+        sum_xx.store(xx);
+        sum_xy.store(xy);
+        sum_yy.store(yy);
+    }
+}
+
 /// The kernels of one implementation, compiled for the machines that have its vectors.
 macro_rules! kernels {
     ($module:ident, $lanes:ty $(, $features:literal)?) => {
         pub(super) mod $module {
-            use super::{HARD, REJECTED, SOFT, Total, WITHIN, count_body, gather_body};
+            use super::{HARD, LANES, REJECTED, SOFT, Terms, Total, WITHIN, count_body, gather_body, terms_body};
 
             /// # Safety
             /// The machine must have the vectors.
@@ -363,6 +467,21 @@ macro_rules! kernels {
             pub(in super::super) unsafe fn count(rows: [&[f32]; 3], model: [f32; 3], limit: f32) -> usize {
                 // SAFETY: the caller vouches for the machine.
                 unsafe { count_body::<$lanes>(rows, model, limit) }
+            }
+
+            /// # Safety
+            /// The machine must have the vectors.
+            $(#[target_feature(enable = $features)])?
+            pub(in super::super) unsafe fn terms(
+                rows: [&[f32]; 3],
+                weights: &[f32],
+                model: [f32; 3],
+                gains: [f32; 2],
+                terms: &mut [Terms],
+                slopes: &mut [[f32; LANES]; 3],
+            ) {
+                // SAFETY: the caller vouches for the machine.
+                unsafe { terms_body::<$lanes>(rows, weights, model, gains, terms, slopes) }
             }
 
             /// # Safety
@@ -418,6 +537,19 @@ macro_rules! dispatch {
 /// Counts rows `(x, y, z)` with `(h . row)^2 <= limit`; columns must be of one length.
 pub(super) fn count(rows: [&[f32]; 3], model: [f32; 3], limit: f32) -> usize {
     dispatch!(count(rows, model, limit))
+}
+
+/// Writes the terms of whole sixteens of rows with a soft gate, whose inverse squared reach is the first of the gains, and adds
+/// them up with its slope instead. Columns and weights must be of one length, with terms for each sixteen.
+pub(super) fn terms(
+    rows: [&[f32]; 3],
+    weights: &[f32],
+    model: [f32; 3],
+    gains: [f32; 2],
+    terms: &mut [Terms],
+    slopes: &mut [[f32; LANES]; 3],
+) {
+    dispatch!(terms(rows, weights, model, gains, terms, slopes));
 }
 
 /// Adds the moments of a block of rows to the total, weighted and gated: `gains` are the squared limit of a hard gate and the

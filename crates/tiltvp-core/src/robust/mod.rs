@@ -1,6 +1,9 @@
 //! Robust fits that know no vision: one random-sampling loop, one trimming loop, one reweighting loop.
 
+mod aligned;
+mod compaction;
 mod direction;
+mod grouped;
 mod lanes;
 mod local;
 mod loss;
@@ -16,7 +19,9 @@ mod sampling;
 mod score;
 mod verification;
 
+pub(crate) use compaction::{Block, Kept, ROOM, compact};
 pub use direction::Direction;
+pub use grouped::{GROUPS, GroupSums};
 pub use loss::Gate;
 pub use problem::Problem;
 pub use ransac::{RansacOptions, RansacScratch, ransac};

@@ -30,6 +30,13 @@ pub trait Problem {
     /// `to_beat`, any count up to `to_beat` will do.
     fn consensus(&self, model: &Self::Model, threshold: f64, to_beat: usize) -> usize;
 
+    /// [`consensus`](Self::consensus) of several models, one count for each; none for those that are none.
+    fn consensus_of_each(&self, models: &[Option<Self::Model>], threshold: f64, to_beat: usize, counts: &mut [usize]) {
+        for (model, count) in models.iter().zip(counts) {
+            *count = model.as_ref().map_or(0, |model| self.consensus(model, threshold, to_beat));
+        }
+    }
+
     /// [`consensus`](Self::consensus) among the listed observations alone.
     fn consensus_among(&self, observations: &[u32], model: &Self::Model, threshold: f64) -> usize;
 

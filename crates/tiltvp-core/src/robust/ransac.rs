@@ -13,6 +13,9 @@ use crate::error::{Error, Result};
 /// Largest sample that a problem may ask for.
 const MAX_SAMPLE: usize = 8;
 
+/// Models that are counted at once, where nothing learnt from one bears on the next sample.
+const AT_ONCE: usize = 8;
+
 /// Options of [`ransac`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RansacOptions {
@@ -112,16 +115,31 @@ pub fn ransac<P: Problem>(
     let mut best: Option<(f64, P::Model)> = None;
     let mut needed = options.max_trials;
     let mut trials = 0;
+    // Samples drawn ahead of what is known of them; they are looked at in turn, so that all is as if they had not been.
+    let ahead = if *sampling == Sampling::default() { AT_ONCE } else { 1 };
+    let (mut models, mut counts, mut drawn) = ([const { None }; AT_ONCE], [0; AT_ONCE], 0..0);
     while trials < needed.min(options.max_trials) {
+        if drawn.is_empty() {
+            drawn = 0..ahead.min((needed.min(options.max_trials) - trials) as usize);
+            for model in &mut models[drawn.clone()] {
+                sampler.draw(sample);
+                *model = problem.fit_minimal(sample);
+            }
+            if ahead > 1 {
+                let most = best.as_ref().map_or(0.0, |(most, _)| *most) as usize;
+                problem.consensus_of_each(&models[drawn.clone()], threshold, most, &mut counts[drawn.clone()]);
+            }
+        }
         trials += 1;
-        sampler.draw(sample);
-        let Some(model) = problem.fit_minimal(sample) else { continue };
+        let Some(next) = drawn.next() else { break };
+        let Some(model) = models[next].take() else { continue };
         // The first model is scored whatever the test says, so that there is one to compare with.
         if !verifier.passes(problem, &model, threshold) && best.is_some() {
             continue;
         }
         let most = best.as_ref().map_or(0.0, |(most, _)| *most);
-        let score = sampling.score.of(problem, &model, threshold, most);
+        // Counts are exact in double precision.
+        let score = if ahead > 1 { counts[next] as f64 } else { sampling.score.of(problem, &model, threshold, most) };
         if best.is_some() && score <= most {
             continue;
         }

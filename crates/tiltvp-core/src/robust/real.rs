@@ -2,6 +2,7 @@
 
 use multiversion::multiversion;
 
+use super::aligned::Dense;
 use super::lanes::{self, HARD, LANES, REJECTED, SOFT, WITHIN};
 use super::loss::Shape;
 use super::score::{DEGREE, MARGINAL, cell, marginal_gain};
@@ -24,7 +25,11 @@ impl Total {
     pub(super) fn add(&mut self, count: usize, lanes: &[[f32; LANES]; 7]) {
         self.count += count;
         for (sum, lanes) in self.sums.iter_mut().zip(lanes) {
-            *sum += lanes.iter().map(|lane| f64::from(*lane)).sum::<f64>();
+            let mut fours = [0.0; 4];
+            for four in lanes.as_chunks::<4>().0 {
+                fours.iter_mut().zip(four).for_each(|(sum, lane)| *sum += f64::from(*lane));
+            }
+            *sum += (fours[0] + fours[1]) + (fours[2] + fours[3]);
         }
     }
 
@@ -40,8 +45,9 @@ impl Total {
 }
 
 /// The arithmetic that rows are stored in: `f32` or `f64`.
+#[expect(private_bounds, reason = "what numbers are dense is told by the two that there are")]
 pub trait Real:
-    Copy + Default + PartialOrd + std::ops::Add<Output = Self> + std::ops::Sub<Output = Self> + std::ops::Mul<Output = Self>
+    Dense + PartialOrd + std::ops::Add<Output = Self> + std::ops::Sub<Output = Self> + std::ops::Mul<Output = Self>
 {
     /// Whether there is a kernel for [`Shape::Rejected`].
     #[doc(hidden)]

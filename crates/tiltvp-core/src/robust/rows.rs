@@ -1,8 +1,8 @@
 //! Observations that are linear in the model: rows `(x, y, z)` with residual `x h0 + y h1 + z h2`, and their one-pass kernels.
 
-use multiversion::multiversion;
 use nalgebra::{Matrix2, Matrix3, Vector2, Vector3};
 
+use super::aligned::Aligned;
 use super::loss::{Gate, Shape};
 use super::real::{BLOCK, Real, Total};
 use super::sampling::Score;
@@ -12,7 +12,7 @@ use super::score::MARGINAL;
 #[derive(Debug, Clone, Default)]
 pub struct Rows<T> {
     /// Columns `x`, `y`, `z`, each longer than the number of rows in use.
-    columns: [Vec<T>; 3],
+    columns: [Aligned<T>; 3],
     len: usize,
 }
 
@@ -35,7 +35,7 @@ pub struct Moments {
 impl<T: Real> Rows<T> {
     /// No rows, with room for `capacity` of them.
     pub fn with_capacity(capacity: usize) -> Self {
-        let column = || vec![T::default(); capacity];
+        let column = || Aligned::zeros(capacity);
         Self { columns: [column(), column(), column()], len: 0 }
     }
 
@@ -46,11 +46,10 @@ impl<T: Real> Rows<T> {
 
     /// Appends a row.
     pub fn push(&mut self, x: T, y: T, z: T) {
+        let room = if self.columns[0].len() > self.len { 0 } else { 2 * self.len + 1 };
         for (column, value) in self.columns.iter_mut().zip([x, y, z]) {
-            match column.get_mut(self.len) {
-                Some(place) => *place = value,
-                None => column.push(value),
-            }
+            column.grow(room);
+            column.as_mut_slice()[self.len] = value;
         }
         self.len += 1;
     }
@@ -60,10 +59,8 @@ impl<T: Real> Rows<T> {
         let (first, stride) = (self.len, stride.max(1));
         let end = first + other.len.div_ceil(stride);
         for (own, column) in self.columns.iter_mut().zip(other.columns()) {
-            if own.len() < end {
-                own.resize(end, T::default());
-            }
-            for (place, from) in own[first..end].iter_mut().zip((0..column.len()).step_by(stride)) {
+            own.grow(end);
+            for (place, from) in own.as_mut_slice()[first..end].iter_mut().zip((0..column.len()).step_by(stride)) {
                 *place = column[from];
             }
         }
@@ -72,12 +69,8 @@ impl<T: Real> Rows<T> {
 
     /// Replaces all rows: `write` fills the columns, which have room for `capacity` rows, and returns how many it wrote.
     pub fn refill(&mut self, capacity: usize, write: impl FnOnce([&mut [T]; 3]) -> usize) {
-        for column in &mut self.columns {
-            if column.len() < capacity {
-                column.resize(capacity, T::default());
-            }
-        }
-        self.len = write(self.columns.each_mut().map(Vec::as_mut_slice)).min(capacity);
+        self.columns.iter_mut().for_each(|column| column.grow(capacity));
+        self.len = write(self.columns.each_mut().map(Aligned::as_mut_slice)).min(capacity);
     }
 
     /// How many rows there are.
@@ -102,8 +95,8 @@ impl<T: Real> Rows<T> {
         x.iter().zip(y).zip(z).map(|((x, y), z)| Vector3::new(x.to_f64(), y.to_f64(), z.to_f64()))
     }
 
-    fn columns(&self) -> [&[T]; 3] {
-        self.columns.each_ref().map(|column| &column[..self.len])
+    pub(super) fn columns(&self) -> [&[T]; 3] {
+        self.columns.each_ref().map(|column| &column.as_slice()[..self.len])
     }
 
     /// How many rows have a residual of at most `threshold`.
@@ -123,6 +116,28 @@ impl<T: Real> Rows<T> {
             }
         }
         count
+    }
+
+    /// [`count_to_beat`](Self::count_to_beat) of several models at once, of none where there is none: rows come from further
+    /// caches once for all.
+    pub fn count_each_to_beat(
+        &self,
+        models: &(impl Iterator<Item = Option<[f64; 3]>> + Clone),
+        threshold: f64,
+        to_beat: usize,
+        counts: &mut [usize],
+    ) {
+        let limit = T::from_f64(threshold * threshold);
+        counts.fill(0);
+        for start in (0..self.len).step_by(COUNTED) {
+            let end = (start + COUNTED).min(self.len);
+            let rows = self.columns().map(|column| &column[start..end]);
+            for (model, count) in models.clone().zip(&mut *counts) {
+                if let Some(model) = model.filter(|_| *count + (self.len - start) > to_beat) {
+                    *count += T::count(rows, model.map(T::from_f64), limit);
+                }
+            }
+        }
     }
 
     /// How many of the listed rows have a residual of at most `threshold`.
@@ -161,36 +176,6 @@ impl<T: Real> Rows<T> {
     pub fn is_within(&self, index: usize, model: [f64; 3], threshold: f64) -> bool {
         let row = self.columns().map(|column| column.get(index..=index).unwrap_or(&[]));
         T::count(row, model.map(T::from_f64), T::from_f64(threshold * threshold)) == 1
-    }
-
-    /// Calls `visit(row, [weight, slope, x, y, residual])` for every `stride`-th row: its weight (one where none are given)
-    /// multiplied by the gate about a model, and by [`Gate::slope`].
-    pub fn for_each_gated(
-        &self,
-        model: [f64; 3],
-        gate: Gate,
-        weights: Option<&[f32]>,
-        stride: usize,
-        mut visit: impl FnMut(usize, [f64; 5]),
-    ) {
-        let ([x, y, z], stride) = (self.columns(), stride.max(1));
-        let own = |row: usize| weights.map_or(1.0, |weights| weights.get(row).copied().map_or(0.0, f64::from));
-        let mut sample = Sample::default();
-        for first in (0..self.len).step_by(stride * SAMPLED) {
-            let rows = (first..self.len).step_by(stride).take(SAMPLED);
-            for (i, row) in rows.clone().enumerate() {
-                (sample.x[i], sample.y[i], sample.z[i]) = (x[row].to_f64(), y[row].to_f64(), z[row].to_f64());
-                sample.own[i] = own(row);
-            }
-            gate_sample(&mut sample, model, gate.coefficients());
-            for (i, row) in rows.enumerate() {
-                let (mut weight, mut slope, d) = (sample.weight[i], sample.slope[i], sample.d[i]);
-                if gate.shape() == Shape::Marginal {
-                    (weight, slope) = (sample.own[i] * gate.weight(d), sample.own[i] * gate.slope(d));
-                }
-                visit(row, [weight, slope, sample.x[i], sample.y[i], d]);
-            }
-        }
     }
 
     /// Applies a gate about a model to the weights and takes the moments of what is left.
@@ -298,43 +283,6 @@ impl Moments {
     }
 }
 
-/// Rows that are gated together.
-const SAMPLED: usize = 64;
-
-/// Some rows with their own weights, their residuals, and the weights and slopes that a gate gives them.
-struct Sample {
-    x: [f64; SAMPLED],
-    y: [f64; SAMPLED],
-    z: [f64; SAMPLED],
-    own: [f64; SAMPLED],
-    d: [f64; SAMPLED],
-    weight: [f64; SAMPLED],
-    slope: [f64; SAMPLED],
-}
-
-impl Default for Sample {
-    fn default() -> Self {
-        let zero = [0.0; SAMPLED];
-        Self { x: zero, y: zero, z: zero, own: zero, d: zero, weight: zero, slope: zero }
-    }
-}
-
-/// Evaluates a gate that is no table, given its coefficients.
-#[multiversion(targets("x86_64+avx512f+avx512vl", "x86_64+avx2"))]
-fn gate_sample(sample: &mut Sample, [h0, h1, h2]: [f64; 3], (limit, inverse): (f64, f64)) {
-    let Sample { x, y, z, own, d, weight, slope } = sample;
-    for i in 0..SAMPLED {
-        d[i] = x[i] * h0 + y[i] * h1 + z[i] * h2;
-        let squared = d[i] * d[i];
-        let t = 1.0 - squared * inverse;
-        let t = if t > 0.0 { t } else { 0.0 };
-        let (t2, own) = (t * t, if squared <= limit { own[i] } else { 0.0 });
-        let t4 = t2 * t2;
-        weight[i] = own * (t4 * t4);
-        slope[i] = own * (t4 * t2 * t) * (17.0 * t - 16.0);
-    }
-}
-
 /// Rows that are counted before looking whether the count can still matter.
 const COUNTED: usize = 1024;
 
@@ -398,18 +346,23 @@ mod tests {
             assert_eq!(found.count, count, "{len} rows, {gate:?}");
             assert!((found.weight - weight).abs() < tolerance * scale, "{len} rows, {gate:?}");
             assert!((found.second_moments() - sum).norm() < tolerance * scale, "{len} rows, {gate:?}");
-            let mut visited = 0;
-            rows.for_each_gated(model, gate, Some(&before), 1, |i, [weight, slope, x, y, d]| {
-                let row = rows.get(i).unwrap();
-                let own = f64::from(before[i]);
-                assert_eq!((x, y, d), (row.x, row.y, row.x * model[0] + row.y * model[1] + row.z * model[2]));
-                assert!((weight - own * gate.weight(d)).abs() < 1e-9 && (slope - own * gate.slope(d)).abs() < 1e-9);
-                visited += usize::from(weight > 0.0);
-            });
-            assert_eq!(visited, count, "{len} rows, {gate:?}");
             if let Gate::Hard { threshold } = gate {
                 let within = rows.iter().filter(|row| gate.weight(row.dot(&Vector3::from(model))) > 0.0).count();
                 assert_eq!(rows.count_within(model, threshold), within, "{len} rows");
+                let other = [0.3, 0.1, 0.8];
+                for to_beat in [0, within / 2, len] {
+                    let mut counts = [7; 3];
+                    rows.count_each_to_beat(
+                        &[model, other, model].into_iter().map(Some),
+                        threshold,
+                        to_beat,
+                        &mut counts,
+                    );
+                    for (count, model) in counts.iter().zip([model, other, model]) {
+                        let alone = rows.count_to_beat(model, threshold, 0);
+                        assert!(*count == alone || (*count <= to_beat && alone <= to_beat), "{len} rows");
+                    }
+                }
                 assert_eq!((0..len + 3).filter(|i| rows.is_within(*i, model, threshold)).count(), within);
             }
         }

@@ -4,10 +4,10 @@ use nalgebra::{Matrix2, Vector2};
 
 use crate::filter::probability_within;
 use crate::geometry::Tilt;
-use crate::robust::{Gate, Real, Rows};
+use crate::robust::{GROUPS, Gate, GroupSums, Rows};
 
 /// Sectors of azimuth within which residuals are taken as one: an edge of a room rarely spans more.
-pub(super) const SECTORS: usize = 64;
+pub(super) const SECTORS: usize = GROUPS;
 
 /// Rows that are enough for a covariance.
 const ENOUGH: usize = 4000;
@@ -33,35 +33,23 @@ const CLUTTER_RAD: f64 = 0.056;
 /// tells an image with few edges from one with many. `H = sum d(w d)/dd (x, y)^T (x, y)` has Huber's slope of the gate: with the
 /// weights themselves, clutter that fills the gate would count as evidence. To it is added the square of `H^-1 sum_c g_c`, the
 /// way from the model to where the gated rows would have it: none for the fit they made, but telling for a model that was
-/// chosen otherwise. Weights are one where none are given. The share, the clutter and the floor were set on every second
+/// chosen otherwise. Weights are one where none are given; `sector_of` has the pixel of each row and the sector of each pixel. The share, the clutter and the floor were set on every second
 /// location of 108 panoramas and 72 rendered rooms, as they are and darkened, blurred or half hidden, and checked on the others.
 ///
 /// `None` if fewer than three sectors hold anything or the model is near no minimum.
-pub(super) fn clustered_covariance<T: Real>(
-    rows: &Rows<T>,
+pub(super) fn clustered_covariance(
+    rows: &Rows<f32>,
     model: [f64; 3],
     gate: Gate,
     weights: Option<&[f32]>,
     pixels_per_rad: f64,
-    sector: impl Fn(usize) -> u8,
+    sector_of: (&[u32], &[u8]),
 ) -> Option<Matrix2<f64>> {
     let Gate::Soft { scale } = gate else { return None };
-    // Information (xx, xy, yy) and score of each sector.
-    let mut sectors = [[0.0f64; 5]; SECTORS];
-    let [mut xx, mut xy, mut yy] = [0.0; 3];
     // A sample of the rows is enough to tell how the sectors err: sums over it are proportional to sums over all.
     let stride = (rows.len() / ENOUGH).max(1);
-    rows.for_each_gated(model, gate, weights, stride, |row, [weight, slope, x, y, d]| {
-        let (sx, sy, wx, wy) = (slope * x, slope * y, weight * x, weight * y);
-        (xx, xy, yy) = (xx + sx * x, xy + sx * y, yy + sy * y);
-        let sums = &mut sectors[usize::from(sector(row)) % SECTORS];
-        // Written out: a loop would take its terms through memory.
-        sums[0] += wx * x;
-        sums[1] += wx * y;
-        sums[2] += wy * y;
-        sums[3] += wx * d;
-        sums[4] += wy * d;
-    });
+    let GroupSums { groups: sectors, slopes: [xx, xy, yy] } =
+        rows.sums_by_group(model, gate, weights, stride, sector_of);
     let inverse = inverse_of_positive(&Matrix2::new(xx, xy, xy, yy))?;
     let held = || sectors.iter().filter(|[a, _, c, ..]| a + c > 0.0);
     if held().count() < 3 {
@@ -75,14 +63,26 @@ pub(super) fn clustered_covariance<T: Real>(
             block * block
         })
         .sum();
-    let own = weights.map_or(1.0, |weights| {
-        weights.iter().map(|weight| f64::from(*weight)).sum::<f64>() / weights.len().max(1) as f64
-    });
+    let own = weights.map_or(1.0, mean);
     let clutter = CLUTTER_RAD * pixels_per_rad / stride as f64 * own * scale;
     let spread = squares * (SECTOR_SHARE * pooled) + Matrix2::identity() * (clutter * clutter);
     let away = inverse * sectors.iter().map(|[.., x, y]| Vector2::new(*x, *y)).sum::<Vector2<f64>>();
     let covariance = inverse * spread * inverse + away * away.transpose();
     covariance.iter().all(|x| x.is_finite()).then_some(covariance)
+}
+
+/// The mean, in lanes of single precision that are added up in double precision every now and then.
+fn mean(values: &[f32]) -> f64 {
+    let mut total = 0.0;
+    for part in values.chunks(1024) {
+        let mut lanes = [0.0f32; 16];
+        let (whole, rest) = part.as_chunks::<16>();
+        for values in whole {
+            lanes.iter_mut().zip(values).for_each(|(lane, value)| *lane += value);
+        }
+        total += lanes.iter().chain(rest).map(|value| f64::from(*value)).sum::<f64>();
+    }
+    total / values.len().max(1) as f64
 }
 
 /// The inverse of a positive definite matrix.

@@ -155,7 +155,7 @@ impl TiltEstimator {
     pub fn estimate_edges(&self, image_edges: &ImageEdges, scratch: &mut Scratch) -> Result<TiltEstimate> {
         self.check_scratch(scratch)?;
         let Scratch { edges, work, .. } = scratch;
-        image_edges.copy_to(&self.origin, self.sight.region.len(), edges)?;
+        image_edges.copy_to(&self.origin, &self.sight.region, edges)?;
         Ok(self.fit(edges, work))
     }
 
@@ -194,10 +194,9 @@ impl TiltEstimator {
         scratch: &mut Scratch,
     ) -> Result<(TiltEstimate, Vec<EdgeElement>)> {
         let estimate = self.estimate(image, scratch)?;
-        let Scratch { detector, edges, work, .. } = scratch;
-        let slots = edges.slot();
+        let Scratch { detector, work, .. } = scratch;
         let rows: Vec<(u32, bool)> =
-            work.places.iter().enumerate().map(|(row, place)| (slots[*place as usize], work.is_inlier(row))).collect();
+            work.slots.iter().enumerate().map(|(row, slot)| (*slot, work.is_inlier(row))).collect();
         let mut all = EdgePixels::with_capacity(self.sight.region.len());
         detector.detect(image, &self.sight.region, self.options.edges.gradient_min, None, &mut all);
         let centre = self.sight.centre.as_ref().map_or((f32::NAN, f32::NAN), |c| (c.pixel.x as f32, c.pixel.y as f32));

@@ -107,8 +107,7 @@ impl TiltEstimator {
     ) -> Fit {
         work.inliers = Inliers::None;
         let Some(centre) = &self.sight.centre else { return Fit::none() };
-        let Work { rows, weights, places, .. } = &mut *work;
-        offsets(edges, &self.sight.region, centre, gains, offset_max_px, rows, weights, places);
+        offsets(edges, centre, gains, offset_max_px, work);
         let sampling = self.options.sampling();
         work.prepare(&sampling, edges);
         let Work { rows, weights, quality, ransac: scratch, .. } = &mut *work;
@@ -156,8 +155,8 @@ impl TiltEstimator {
 
     /// Paper 000 section 2.2, and the refined method.
     fn fit_normals(&self, edges: &EdgePixels, table: &LiftTable, work: &mut Work) -> Fit {
-        let Work { rows, weights, places, .. } = &mut *work;
-        table.lift(edges, self.options.normal_tilt_max_rad().sin(), rows, weights, places);
+        let Work { rows, weights, slots, places, .. } = &mut *work;
+        table.lift(edges, self.options.normal_tilt_max_rad().sin(), rows, weights, slots, places);
         let sampling = self.options.sampling();
         work.prepare(&sampling, edges);
         let Work { rows, weights, sparse, quality, ransac: scratch, inliers, .. } = &mut *work;
@@ -210,11 +209,6 @@ impl TiltEstimator {
 
     /// Adds covariance and confidence.
     fn conclude(&self, edges: &EdgePixels, fit: &Fit, work: &Work) -> TiltEstimate {
-        let slots = edges.slot();
-        let sector = |row: usize| {
-            let slot = work.places.get(row).and_then(|place| slots.get(*place as usize));
-            slot.and_then(|slot| self.sight.sectors.get(*slot as usize)).copied().unwrap_or(0)
-        };
         // The paper's methods end with weights of what they have selected, which cannot tell how sure the selection was.
         let weights = matches!(self.options.method, Method::Refined(_)).then_some(&work.weights[..]);
         let covariance = fit.tilt.and_then(|tilt| {
@@ -224,7 +218,7 @@ impl TiltEstimator {
                 fit.gate,
                 weights,
                 self.sight.region.pixels_per_rad(),
-                sector,
+                (&work.slots, &self.sight.sectors),
             )?;
             // A change of the normal's horizontal part is a change in its tangent plane, seen along the vertical.
             let plane = tangent_basis(&tilt.normal()).fixed_rows::<2>(0).try_inverse()?;

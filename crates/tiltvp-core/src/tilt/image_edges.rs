@@ -5,7 +5,7 @@ use std::sync::Arc;
 use nalgebra::Matrix3;
 
 use crate::camera::Camera;
-use crate::edges::{EdgeOptions, EdgePixels, Mask};
+use crate::edges::{EdgeOptions, EdgePixels, Mask, Region};
 use crate::error::{Error, Result};
 
 /// What edge pixels depend on beside the image.
@@ -112,16 +112,16 @@ impl ImageEdges {
     ///
     /// # Errors
     /// [`Error::InvalidArgument`] that says what differs, or that there are pixels beyond the region.
-    pub(super) fn copy_to(&self, origin: &Arc<EdgeOrigin>, region_pixels: usize, out: &mut EdgePixels) -> Result<()> {
+    pub(super) fn copy_to(&self, origin: &Arc<EdgeOrigin>, region: &Region, out: &mut EdgePixels) -> Result<()> {
         if !Arc::ptr_eq(&self.origin, origin)
             && let Some((name, own, expected)) = self.origin.difference(origin)
         {
             return Err(Error::argument("edges", format!("edges with {name} = {own}"), format!("{name} = {expected}")));
         }
-        if let Some(last) = self.slots.last().filter(|last| **last as usize >= region_pixels) {
-            return Err(Error::argument("edges", format!("pixel {last}"), format!("pixels below {region_pixels}")));
+        if let Some(last) = self.slots.last().filter(|last| **last as usize >= region.len()) {
+            return Err(Error::argument("edges", format!("pixel {last}"), format!("pixels below {}", region.len())));
         }
-        out.refill(&self.slots, &self.gx, &self.gy);
+        out.refill(region, &self.slots, &self.gx, &self.gy);
         Ok(())
     }
 }

@@ -4,8 +4,9 @@ use multiversion::multiversion;
 use nalgebra::Vector2;
 
 use super::correction::VanishingPoint;
-use crate::edges::{EdgePixels, Region};
-use crate::robust::{Gate, Moments, Problem, Rows, Score};
+use super::scratch::Work;
+use crate::edges::EdgePixels;
+use crate::robust::{Block as Rest, Gate, Kept, Moments, Problem, ROOM, Rows, Score, compact};
 
 /// Edge offsets `s = A cos phi + B sin phi` (eq. 19): rows `(g cos phi, g sin phi, -s)`, model `(A, B)`, residuals in pixels
 /// (eq. 33). `g` is the relative closed-form gain of the pixel, or 1.
@@ -42,6 +43,11 @@ impl Problem for Offsets<'_> {
 
     fn consensus(&self, model: &Vector2<f64>, threshold: f64, to_beat: usize) -> usize {
         self.rows.count_to_beat([model.x, model.y, 1.0], threshold, to_beat)
+    }
+
+    fn consensus_of_each(&self, models: &[Option<Vector2<f64>>], threshold: f64, to_beat: usize, counts: &mut [usize]) {
+        let models = models.iter().map(|model| model.map(|model| [model.x, model.y, 1.0]));
+        self.rows.count_each_to_beat(&models, threshold, to_beat, counts);
     }
 
     fn consensus_among(&self, observations: &[u32], model: &Vector2<f64>, threshold: f64) -> usize {
@@ -94,58 +100,53 @@ pub(super) fn edge_offset(u: f32, v: f32, gx: f32, gy: f32) -> [f32; 3] {
     [cos, sin, cos * u + sin * v]
 }
 
-/// Writes the rows of the edge pixels that pass the prefilter `|s| <= offset_max_px`, with unit weights, and their places.
-#[expect(clippy::too_many_arguments, reason = "three tables in, three caller-owned vectors out")]
-pub(super) fn offsets(
-    edges: &EdgePixels,
-    region: &Region,
-    centre: &VanishingPoint,
-    gains: &[f32],
-    offset_max_px: f64,
-    rows: &mut Rows<f32>,
-    weights: &mut Vec<f32>,
-    places: &mut Vec<u32>,
-) {
+/// Writes the rows of the edge pixels that pass the prefilter `|s| <= offset_max_px`, with unit weights, their pixels, and their
+/// places.
+pub(super) fn offsets(edges: &EdgePixels, centre: &VanishingPoint, gains: &[f32], offset_max_px: f64, work: &mut Work) {
+    let Work { rows, weights, slots, places, .. } = work;
     let n = edges.len();
-    places.resize(n, 0);
+    weights.resize(n + ROOM, 0.0);
+    slots.resize(n + ROOM, 0);
+    places.resize(n + ROOM, 0);
     let limit = offset_max_px as f32;
     let middle = (centre.pixel.x as f32, centre.pixel.y as f32);
-    rows.refill(n, |[x, y, z]| {
+    rows.refill(n + ROOM, |[x, y, z]| {
         let mut block = Block::default();
-        let mut kept = 0;
+        let mut kept = Kept { columns: [x, y, z, weights], numbers: slots, places, len: 0 };
         for start in (0..n).step_by(BLOCK) {
             let part = start..(start + BLOCK).min(n);
-            let slots = &edges.slot()[part.clone()];
-            for (i, slot) in slots.iter().enumerate() {
-                let (u, v) = region.place(*slot as usize);
-                (block.u[i], block.v[i]) = (f32::from(u) - middle.0, f32::from(v) - middle.1);
-            }
+            let numbers = &edges.slot()[part.clone()];
             if gains.is_empty() {
                 block.gain.fill(1.0);
             } else {
-                for (gain, slot) in block.gain.iter_mut().zip(slots) {
-                    *gain = gains.get(*slot as usize).copied().unwrap_or(1.0);
-                }
+                look_up(gains, numbers, &mut block.gain);
             }
-            fill(&mut block, &edges.gx()[part.clone()], &edges.gy()[part], limit);
-            for i in 0..slots.len() {
-                // Written always and kept if it passes: a branch here would be guessed wrong too often.
-                (x[kept], y[kept], z[kept]) = (block.u[i], block.v[i], block.s[i]);
-                places[kept] = (start + i) as u32;
-                kept += usize::from(block.gain[i] > 0.0);
-            }
+            let count = numbers.len();
+            fill(&mut block, &edges.place()[part.clone()], middle, &edges.gx()[part.clone()], &edges.gy()[part], limit);
+            let columns = [&block.u[..count], &block.v[..count], &block.s[..count], &block.gain[..count]];
+            compact(&Rest { columns, numbers, first: start }, &mut kept);
         }
-        kept
+        kept.len
     });
+    slots.truncate(rows.len());
     places.truncate(rows.len());
     weights.clear();
     weights.resize(rows.len(), 1.0);
 }
 
+/// The gains of pixels. Numbers beyond the last, of which there are none, take the last: that costs less than to look whether
+/// there are any.
+fn look_up(gains: &[f32], numbers: &[u32], out: &mut [f32]) {
+    let Some(last) = gains.len().checked_sub(1) else { return };
+    for (gain, number) in out.iter_mut().zip(numbers) {
+        *gain = gains[(*number as usize).min(last)];
+    }
+}
+
 /// Edge pixels whose offsets are computed together.
 const BLOCK: usize = 128;
 
-/// Places relative to the vanishing point and gains, then rows and gains that are zero where the prefilter rejects.
+/// Gains, then rows and gains that are zero where the prefilter rejects.
 struct Block {
     u: [f32; BLOCK],
     v: [f32; BLOCK],
@@ -160,14 +161,15 @@ impl Default for Block {
     }
 }
 
-/// Makes rows of places, in place.
+/// Makes rows of places, which hold the row in the upper half and the column in the lower.
 #[multiversion(targets("x86_64+avx512f+avx512vl", "x86_64+avx2"))]
-fn fill(block: &mut Block, gx: &[f32], gy: &[f32], limit: f32) {
+fn fill(block: &mut Block, places: &[u32], middle: (f32, f32), gx: &[f32], gy: &[f32], limit: f32) {
     let n = gx.len();
     let (u, v, s, gain) = (&mut block.u[..n], &mut block.v[..n], &mut block.s[..n], &mut block.gain[..n]);
-    let gy = &gy[..n];
+    let (gy, places) = (&gy[..n], &places[..n]);
     for i in 0..n {
-        let [cos, sin, offset] = edge_offset(u[i], v[i], gx[i], gy[i]);
+        let (column, row) = ((places[i] & 0xffff) as i32 as f32, (places[i] >> 16) as i32 as f32);
+        let [cos, sin, offset] = edge_offset(column - middle.0, row - middle.1, gx[i], gy[i]);
         (u[i], v[i], s[i]) = (gain[i] * cos, gain[i] * sin, -offset);
         gain[i] = if offset.abs() <= limit { gain[i] } else { 0.0 };
     }

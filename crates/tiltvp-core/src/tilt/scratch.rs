@@ -2,7 +2,7 @@
 
 use super::refine::Sparse;
 use crate::edges::{Detector, EdgeOptions, EdgePixels, Region};
-use crate::robust::{RansacScratch, Rows, SampleOrder, Sampling};
+use crate::robust::{ROOM, RansacScratch, Rows, SampleOrder, Sampling};
 
 /// The memory that one thread works in; estimates after the first allocate nothing.
 ///
@@ -23,6 +23,8 @@ pub(super) struct Work {
     pub rows: Rows<f32>,
     pub weights: Vec<f32>,
     pub sparse: Sparse<f32>,
+    /// Pixel of each row within the region.
+    pub slots: Vec<u32>,
     /// Place of each row among the edge pixels.
     pub places: Vec<u32>,
     /// How promising each row is, where samples are drawn in its order.
@@ -77,10 +79,11 @@ impl Scratch {
             made_for: Extent::new(region, options),
             edges: EdgePixels::with_capacity(n),
             work: Work {
-                rows: Rows::with_capacity(n),
-                weights: Vec::with_capacity(n),
+                rows: Rows::with_capacity(n + ROOM),
+                weights: Vec::with_capacity(n + ROOM),
                 sparse: Sparse::with_capacity(n),
-                places: Vec::with_capacity(n),
+                slots: Vec::with_capacity(n + ROOM),
+                places: Vec::with_capacity(n + ROOM),
                 quality: Vec::new(),
                 ransac: RansacScratch::default(),
                 inliers: Inliers::None,
