@@ -7,6 +7,8 @@
 mod alarm;
 mod bound;
 mod calibrator;
+mod dense;
+mod descent;
 mod graph;
 mod growing;
 mod loss;
@@ -18,7 +20,9 @@ mod odometry;
 mod offline;
 mod options;
 mod paper;
+mod pose_block;
 mod recursive;
+mod rows;
 mod schur;
 mod update;
 

@@ -3,17 +3,16 @@
 use std::collections::BTreeMap;
 
 use super::calibrator::MountingEstimate;
-use super::graph::{Descent, Free, Graph, factor};
+use super::dense::Factor;
+use super::descent::Descent;
+use super::graph::{Free, Graph};
 use super::growing::{along, grown};
-use super::loss::Loss;
+use super::loss::{LIMIT, Loss};
 use super::mounting::Mounting;
 use super::odometry::{WheelMotion, Wheels};
 use super::options::{CalibrationMethod, SelfCalibratorOptions};
 use super::recursive::Recursive;
 use crate::error::{Error, Result};
-
-/// Standard deviations beyond which bearings are outliers.
-const LIMIT: f64 = 4.5;
 
 /// A bearing of a log.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -227,7 +226,7 @@ fn report(options: &LogOptions, graph: &Graph, descent: &Descent) -> Result<LogC
     let nothing =
         || Error::argument("bearings", "a drive that determines nothing", "landmarks seen from several poses");
     let eliminated = graph.eliminate(graph.nodes.len() - 1, false, 0.0).ok_or_else(nothing)?;
-    let covariance = factor(eliminated.information).ok_or_else(nothing)?.inverse() * scale;
+    let covariance = Factor::touched(eliminated.information).ok_or_else(nothing)?.inverse() * scale;
     let sigma = |at: usize| covariance[(at, at)].sqrt();
     let (wheels, offset) = (options.estimate_odometry, options.estimate_time_offset);
     Ok(LogCalibration {

@@ -4,9 +4,9 @@ use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 
 use super::alarm::Alarm;
 use super::graph::{Free, Graph, Node, Sight, information};
-use super::loss::Slip;
+use super::loss::{LIMIT, Slip};
 use super::measurement::{Landmark, Prediction, camera, predict};
-use super::memory::{FIRST, LIMIT};
+use super::memory::FIRST;
 use super::odometry::{Leg, WheelMotion, Wheels, compose, compose_jacobians};
 use super::options::SelfCalibratorOptions;
 use super::update::Row;
@@ -19,13 +19,13 @@ pub(super) const MOUNTING: usize = 3;
 pub(super) const LANDMARKS: usize = 6;
 
 /// Poses up to which the memory is solved anew at every step.
-const YOUNG: usize = 40;
+pub(super) const YOUNG: usize = 40;
 
 /// Growth of the memory after which it is linearised anew.
-const GROWTH: f64 = 1.15;
+const GROWTH: f64 = 2.0;
 
 /// Standard deviations that the mounting may move before the memory is linearised anew.
-const MOVED: f64 = 0.5;
+const MOVED: f64 = 1.0;
 
 /// Rejections in a row after which a landmark is taken to be another one.
 const MAX_MISSES: u32 = 5;
@@ -65,7 +65,9 @@ pub(super) struct Recursive {
     pub(super) names: Vec<Option<u64>>,
     pub(super) misses: Vec<u32>,
     next_linearisation: usize,
-    /// Standard deviations of the mounting when the memory was last solved.
+    /// Poses that there were when the memory was last solved.
+    pub(super) solved: usize,
+    /// Standard deviations of the mounting then.
     pub(super) solved_sigma: Vector3<f64>,
     /// Covariance that the last motion added to the pose.
     pub(super) motion_noise: Matrix3<f64>,
@@ -102,6 +104,7 @@ impl Recursive {
             names: Vec::new(),
             misses: Vec::new(),
             next_linearisation: 3,
+            solved: 1,
             solved_sigma: options.start_covariance.diagonal().map(f64::sqrt),
             motion_noise: Matrix3::zeros(),
             alarm: Alarm::default(),
@@ -211,7 +214,7 @@ impl Recursive {
         }
     }
 
-    fn pose(&self) -> Vector3<f64> {
+    pub(super) fn pose(&self) -> Vector3<f64> {
         self.mean.fixed_rows::<3>(0).into()
     }
 
