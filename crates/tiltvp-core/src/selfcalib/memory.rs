@@ -24,7 +24,7 @@ impl Recursive {
     pub(super) fn linearise(&mut self, iterations: u32) {
         let before = self.graph.landmarks.clone();
         self.graph.loss = FIRST;
-        if self.graph.nodes.len() >= YOUNG {
+        if self.graph.nodes.len() >= YOUNG && !self.alarm.uneasy() {
             self.take_filtered();
         }
         self.graph.reanchor();

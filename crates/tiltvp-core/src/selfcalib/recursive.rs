@@ -21,11 +21,13 @@ pub(super) const LANDMARKS: usize = 6;
 /// Poses up to which the memory is solved anew at every step.
 pub(super) const YOUNG: usize = 40;
 
-/// Growth of the memory after which it is linearised anew.
+/// Growth of the memory after which it is linearised anew where innovations are as they should be, and where they are not.
 const GROWTH: f64 = 2.0;
+const GROWTH_UNEASY: f64 = 1.15;
 
-/// Standard deviations that the mounting may move before the memory is linearised anew.
+/// Standard deviations that the mounting may move before the memory is linearised anew, likewise.
 const MOVED: f64 = 1.0;
+const MOVED_UNEASY: f64 = 0.5;
 
 /// Rejections in a row after which a landmark is taken to be another one.
 const MAX_MISSES: u32 = 5;
@@ -131,7 +133,8 @@ impl Recursive {
         let rejected = self.update(seen, &mut outcome);
         let nodes = self.graph.nodes.len();
         let moved = self.mean.fixed_rows::<3>(MOUNTING) - self.graph.mounting;
-        let far = moved.iter().zip(&self.solved_sigma).any(|(moved, sigma)| moved.abs() > MOVED * sigma);
+        let limit = if self.alarm.uneasy() { MOVED_UNEASY } else { MOVED };
+        let far = moved.iter().zip(&self.solved_sigma).any(|(moved, sigma)| moved.abs() > limit * sigma);
         let disputed = rejected.iter().any(|slot| self.misses[*slot] >= DISPUTED || self.was_away(*slot));
         let due = nodes >= self.next_linearisation || far || disputed || outcome.slipped;
         let mut judged = outcome;
@@ -142,7 +145,8 @@ impl Recursive {
                 self.fold(nodes / 2);
             }
             let nodes = self.graph.nodes.len();
-            let grown = if nodes < YOUNG { nodes + 1 } else { (nodes as f64 * GROWTH) as usize };
+            let growth = if self.alarm.uneasy() { GROWTH_UNEASY } else { GROWTH };
+            let grown = if nodes < YOUNG { nodes + 1 } else { (nodes as f64 * growth) as usize };
             self.next_linearisation = grown.max(nodes + 1);
         }
         for (name, misses) in self.names.iter_mut().zip(&self.misses) {
