@@ -3,6 +3,7 @@
 use nalgebra::{DMatrix, DVector, Matrix2, RowVector2, SMatrix, Vector2, Vector3};
 
 use super::dense::Factor;
+use super::descent::Settled;
 use super::graph::Node;
 use super::loss::{LIMIT, Loss};
 use super::measurement::Landmark;
@@ -50,13 +51,29 @@ impl Recursive {
         }
         let fit = solved.as_ref().map(|solved| solved.fit);
         if fit.is_some_and(|fit| fit.beyond > 0 && (fit.beyond as f64) < FEW * fit.bearings as f64) {
-            self.graph.loss = Loss::Cut(LIMIT);
-            solved = self.graph.settle(2, TOLERANCE);
+            solved = self.leave_out(iterations);
         }
         if !solved.is_some_and(|solved| self.adopt(solved.information)) {
             // The filter's mean and covariance are about these.
             self.graph.landmarks = before;
         }
+    }
+
+    /// Solves the memory without the bearings that are far off, and without landmarks that are no points.
+    fn leave_out(&mut self, iterations: u32) -> Option<Settled> {
+        self.graph.loss = Loss::Cut(LIMIT);
+        let solved = self.graph.settle(2, TOLERANCE);
+        let (slots, bearings) = self.graph.distrust();
+        if bearings == 0 {
+            return solved;
+        }
+        for slot in slots {
+            self.distrusted.extend(self.names[slot].take());
+        }
+        self.graph.loss = FIRST;
+        self.graph.settle(iterations, TOLERANCE);
+        self.graph.loss = Loss::Cut(LIMIT);
+        self.graph.settle(2, TOLERANCE)
     }
 
     /// Starts the memory from the filter's mean: the poses since the last solution are bent to end where the filter is.

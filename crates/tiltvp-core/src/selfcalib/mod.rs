@@ -9,6 +9,7 @@ mod bound;
 mod calibrator;
 mod dense;
 mod descent;
+mod distrust;
 mod graph;
 mod growing;
 mod loss;
