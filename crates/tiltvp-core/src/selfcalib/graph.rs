@@ -84,6 +84,8 @@ pub(super) struct Graph {
     /// Information about it.
     pub(super) prior_information: DMatrix<f64>,
     pub(super) bearing_sigma: f64,
+    /// By which factor the bearings of each landmark scatter more than `bearing_sigma`.
+    pub(super) spreads: Vec<f64>,
     pub(super) loss: Loss,
     pub(super) slip: Slip,
 }
@@ -159,6 +161,7 @@ impl Graph {
         self.prior_information = information.insert_rows(n, 2, 0.0).insert_columns(n, 2, 0.0);
         self.prior_information[(n + 1, n + 1)] = 1.0 / (sigma * sigma);
         self.landmarks.push(landmark);
+        self.spreads.push(1.0);
         self.landmarks.len() - 1
     }
 
@@ -184,7 +187,8 @@ impl Graph {
     /// How well it fits.
     pub(super) fn fit(&self) -> Fit {
         let away = self.dense() - &self.prior_mean;
-        let mut fit = Fit { cost: 0.5 * away.dot(&(&self.prior_information * &away)), ..Fit::default() };
+        let cost = 0.5 * away.dot(&(&self.prior_information * &away)) + self.cost_of_spreads();
+        let mut fit = Fit { cost, ..Fit::default() };
         for pair in self.nodes.windows(2) {
             let [before, node] = pair else { continue };
             let r = between(&before.pose, &node.pose) - node.leg.motion;
@@ -202,7 +206,7 @@ impl Graph {
         for node in &self.nodes {
             let view = Viewpoint::new(&self.pose_of_sights(node).0, &self.mounting);
             let residual = |sight: &Sight| wrap_angle(view.bearing(&rays[sight.landmark]) - sight.bearing);
-            all.extend(node.sights.iter().map(|sight| residual(sight) / self.bearing_sigma));
+            all.extend(node.sights.iter().map(|s| residual(s) / (self.bearing_sigma * self.spreads[s.landmark])));
         }
         all
     }

@@ -122,6 +122,7 @@ fn empty(options: &LogOptions, guess: &Vector3<f64>, free: Free) -> Graph {
         prior_mean,
         prior_information,
         bearing_sigma: o.bearing_sigma_rad,
+        spreads: Vec::new(),
         loss: FIRST,
         slip: SLIP,
     }

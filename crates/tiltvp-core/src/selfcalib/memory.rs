@@ -59,16 +59,12 @@ impl Recursive {
         }
     }
 
-    /// Solves the memory without the bearings that are far off, and without landmarks that are no points.
+    /// Solves the memory without the bearings that are far off, and with less of landmarks that are no points.
     fn leave_out(&mut self, iterations: u32) -> Option<Settled> {
         self.graph.loss = Loss::Cut(LIMIT);
         let solved = self.graph.settle(2, TOLERANCE);
-        let (slots, bearings) = self.graph.distrust();
-        if bearings == 0 {
+        if !self.graph.weigh_landmarks() {
             return solved;
-        }
-        for slot in slots {
-            self.distrusted.extend(self.names[slot].take());
         }
         self.graph.loss = FIRST;
         self.graph.settle(iterations, TOLERANCE);
@@ -139,6 +135,7 @@ impl Recursive {
         next.prior_mean = mean + &by_joint * ahead;
         next.prior_information = prior.inverse();
         next.landmarks = landmarks;
+        next.spreads = kept.iter().map(|slot| self.graph.spreads[*slot]).collect();
         next.nodes = self.graph.nodes[at..].to_vec();
         next.nodes[0] = Node::anchor();
         for node in &mut next.nodes[1..] {

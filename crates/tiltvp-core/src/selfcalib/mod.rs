@@ -9,7 +9,6 @@ mod bound;
 mod calibrator;
 mod dense;
 mod descent;
-mod distrust;
 mod graph;
 mod growing;
 mod loss;
@@ -25,6 +24,7 @@ mod pose_block;
 mod recursive;
 mod rows;
 mod schur;
+mod spread;
 mod update;
 
 pub use self::bound::cramer_rao_bound;

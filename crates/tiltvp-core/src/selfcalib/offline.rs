@@ -65,8 +65,7 @@ pub struct LogCalibration {
     pub time_offset_sigma_s: f64,
     /// Bearings that were used, those taken at a standstill but the first left out.
     pub bearings: usize,
-    /// Bearings farther from their prediction than 4.5 standard deviations, which count for nothing, and all those of landmarks
-    /// of which more than a fifth are: these are no points.
+    /// Bearings farther from their prediction than 4.5 standard deviations, which count for nothing.
     pub outliers: usize,
     /// Root of the mean squared residual of the others, in standard deviations of a bearing.
     pub residual_rms: f64,
@@ -79,7 +78,7 @@ pub struct LogCalibration {
 /// Fall of the cost below which the descent has come to rest.
 const TOLERANCE: f64 = 1e-3;
 
-/// How often landmarks that are no points are looked for.
+/// How often landmarks are weighed by how far their bearings scatter.
 const JUDGEMENTS: usize = 4;
 
 /// Share of outliers of a solution beside which no other is looked for.
@@ -112,7 +111,7 @@ pub fn calibrate_log(
     let mut order: Vec<LogBearing> = bearings.to_vec();
     order.sort_by_key(|b| b.step);
     let asked = Free { wheels: options.estimate_odometry, offset: options.estimate_time_offset };
-    let mut best: Option<(Graph, Descent, usize)> = None;
+    let mut best: Option<(Graph, Descent)> = None;
     let start = options.filter.start.vector();
     let with_wheels = Free { wheels: true, ..asked };
     // Wheels that may give a little let loops close; a start far off may need a map without loops, or the filter's answer.
@@ -140,36 +139,32 @@ pub fn calibrate_log(
         let first = graph.descend(options.max_iterations, TOLERANCE, 1e-3);
         graph.loss = Loss::Cut(LIMIT);
         let mut then = graph.descend(options.max_iterations, TOLERANCE, 1e-3);
-        let (mut iterations, mut gone) = (first.iterations + then.iterations, 0);
+        let mut iterations = first.iterations + then.iterations;
         for _ in 0..JUDGEMENTS {
-            let (_, bearings) = graph.distrust();
-            if bearings == 0 {
+            if !graph.weigh_landmarks() {
                 break;
             }
-            gone += bearings;
             for loss in [FIRST, Loss::Cut(LIMIT)] {
                 graph.loss = loss;
                 then = graph.descend(options.max_iterations, TOLERANCE, 1e-3);
                 iterations += then.iterations;
             }
         }
-        // A bearing that is left out costs as much as any other that is.
-        let cost = then.cost + 0.5 * LIMIT * LIMIT * gone as f64;
-        let descent = Descent { iterations, cost, ..then };
+        let descent = Descent { iterations, ..then };
         let residuals = graph.residuals();
         let outliers = residuals.iter().filter(|r| r.abs() > LIMIT).count();
         let good = descent.converged && (outliers as f64) < FEW * residuals.len() as f64;
-        if descent.cost.is_finite() && best.as_ref().is_none_or(|(_, best, _)| descent.cost < best.cost) {
-            best = Some((graph, descent, gone));
+        if descent.cost.is_finite() && best.as_ref().is_none_or(|(_, best)| descent.cost < best.cost) {
+            best = Some((graph, descent));
         }
         if good {
             break;
         }
     }
-    let Some((graph, descent, gone)) = best else {
+    let Some((graph, descent)) = best else {
         return Err(Error::argument("bearings", "a problem without a solution", "a drive past landmarks"));
     };
-    report(options, &graph, &descent, gone)
+    report(options, &graph, &descent)
 }
 
 fn check(
@@ -235,7 +230,7 @@ fn filtered(options: &LogOptions, readings: &[WheelMotion], order: &[LogBearing]
     Ok(filter.into_graph())
 }
 
-fn report(options: &LogOptions, graph: &Graph, descent: &Descent, gone: usize) -> Result<LogCalibration> {
+fn report(options: &LogOptions, graph: &Graph, descent: &Descent) -> Result<LogCalibration> {
     let o = &options.filter;
     let residuals = graph.residuals();
     let kept: Vec<f64> = residuals.iter().copied().filter(|r| r.abs() <= LIMIT).collect();
@@ -260,8 +255,8 @@ fn report(options: &LogOptions, graph: &Graph, descent: &Descent, gone: usize) -
         wheels_sigma: if wheels { [sigma(3), sigma(4) * graph.wheels.base_m] } else { [0.0; 2] },
         time_offset_s: graph.offset_s,
         time_offset_sigma_s: if offset { sigma(if wheels { 5 } else { 3 }) } else { 0.0 },
-        bearings: residuals.len() + gone,
-        outliers: residuals.len() - kept.len() + gone,
+        bearings: residuals.len(),
+        outliers: residuals.len() - kept.len(),
         residual_rms: (sum / kept.len().max(1) as f64).sqrt(),
         iterations: descent.iterations,
         converged: descent.converged,

@@ -1,7 +1,5 @@
 //! The default filter: landmarks by the logarithm of inverse distance, gated and iterated updates, and a memory that is linearised anew.
 
-use std::collections::BTreeSet;
-
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 
 use super::alarm::Alarm;
@@ -68,8 +66,6 @@ pub(super) struct Recursive {
     /// Names of the landmarks; `None` once a name means another one.
     pub(super) names: Vec<Option<u64>>,
     pub(super) misses: Vec<u32>,
-    /// Names of landmarks that are no points, whose bearings count nothing.
-    pub(super) distrusted: BTreeSet<u64>,
     next_linearisation: usize,
     /// Poses that there were when the memory was last solved.
     pub(super) solved: usize,
@@ -94,6 +90,7 @@ impl Recursive {
             prior_mean: DVector::from_column_slice(start.as_slice()),
             prior_information: DMatrix::from_column_slice(3, 3, inverse3(&options.start_covariance).as_slice()),
             bearing_sigma: options.bearing_sigma_rad,
+            spreads: Vec::new(),
             loss: FIRST,
             slip: SLIP,
         };
@@ -109,7 +106,6 @@ impl Recursive {
             covariance,
             names: Vec::new(),
             misses: Vec::new(),
-            distrusted: BTreeSet::new(),
             next_linearisation: 3,
             solved: 1,
             solved_sigma: options.start_covariance.diagonal().map(f64::sqrt),
@@ -247,7 +243,6 @@ impl Recursive {
                         rows.push(Row { slot, bearing, p: self.expect(slot) });
                     }
                 }
-                None if self.distrusted.contains(&name) => {}
                 None => fresh.push((name, bearing)),
             }
         }

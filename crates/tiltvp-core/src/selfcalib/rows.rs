@@ -130,9 +130,10 @@ impl Graph {
     pub(super) fn linearised<'a>(&'a self, node: &'a Node, rays: &'a [Ray]) -> impl Iterator<Item = Row> + 'a {
         let (pose, moved) = self.pose_of_sights(node);
         let view = Viewpoint::new(&pose, &self.mounting);
-        let (fixed, s) = (self.free.width(), 1.0 / self.bearing_sigma);
+        let fixed = self.free.width();
         node.sights.iter().map(move |sight| {
             let p = view.see(&rays[sight.landmark]);
+            let s = 1.0 / (self.bearing_sigma * self.spreads[sight.landmark]);
             let residual = wrap_angle(p.bearing - sight.bearing) * s;
             let mut by_fixed = [0.0; 6];
             by_fixed[..3].copy_from_slice((p.by_mounting * s).as_slice());

@@ -97,7 +97,7 @@ impl Graph {
         let mut dense = self.prior_information.clone();
         let away = self.dense() - &self.prior_mean;
         let mut rhs = -(&self.prior_information * &away);
-        let mut fit = Fit { cost: -0.5 * away.dot(&rhs), ..Fit::default() };
+        let mut fit = Fit { cost: self.cost_of_spreads() - 0.5 * away.dot(&rhs), ..Fit::default() };
         let (rays, mut fall) = (self.rays(), 0.0);
         for row in self.linearised(&self.nodes[0], &rays) {
             fit.note(row.residual, self.loss);
@@ -241,13 +241,15 @@ mod tests {
             prior_mean: DVector::zeros(width),
             prior_information: DMatrix::identity(width, width),
             bearing_sigma: 0.01,
+            spreads: Vec::new(),
             loss: Loss::Linear(2.0),
             slip: Slip(5.0),
         };
         for i in 0..12 {
             let direction = f64::from(i) * 0.7 - 3.0;
             let anchor = Vector2::new(f64::from(i % 3), 0.1 * f64::from(i));
-            graph.add_landmark(Landmark { anchor, direction, closeness: -0.8 }, -0.8, 1.5);
+            let slot = graph.add_landmark(Landmark { anchor, direction, closeness: -0.8 }, -0.8, 1.5);
+            graph.spreads[slot] = 1.0 + 0.1 * f64::from(i);
         }
         for i in 0..31usize {
             let bend = 0.02 * (i as f64 * 0.4).sin();

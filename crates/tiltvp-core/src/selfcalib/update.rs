@@ -36,11 +36,15 @@ impl Recursive {
         spread
     }
 
+    /// The variance of a row's bearing.
+    fn noise(&self, row: &Row) -> f64 {
+        (self.graph.bearing_sigma * self.graph.spreads[row.slot]).powi(2)
+    }
+
     /// Which rows pass the gate.
     fn gated(&self, rows: &[Row], spread: &DMatrix<f64>) -> Vec<bool> {
-        let noise = self.options.bearing_sigma_rad.powi(2);
         let passes = |(column, row): (usize, &Row)| {
-            let variance = along(row, &spread.as_slice()[column * spread.nrows()..]) + noise;
+            let variance = along(row, &spread.as_slice()[column * spread.nrows()..]) + self.noise(row);
             let y = wrap_angle(row.bearing - row.p.bearing);
             self.gate.passes(y * y / variance)
         };
@@ -49,7 +53,6 @@ impl Recursive {
 
     /// Fuses the rows that pass the gate, and says which slots did not.
     pub(super) fn fuse(&mut self, mut rows: Vec<Row>, outcome: &mut Outcome) -> Vec<usize> {
-        let noise = self.options.bearing_sigma_rad.powi(2);
         let mut spread = self.spread(&rows);
         let mut passes = self.gated(&rows, &spread);
         let failed = passes.iter().filter(|passed| !**passed).count();
@@ -95,7 +98,7 @@ impl Recursive {
                 for (row, value) in rows[j..].iter().zip(&mut s.column_mut(j).as_mut_slice()[j..]) {
                     *value = along(row, spread);
                 }
-                s[(j, j)] += noise;
+                s[(j, j)] += self.noise(&rows[j]);
             }
             let Some(factor) = Factor::new(s) else { return rejected };
             let whitened = factor.whiten(std::mem::replace(&mut spread, DMatrix::zeros(0, 0)));
