@@ -217,12 +217,15 @@ def write_log(folder: Path, drive: SimulatedDrive) -> tuple[Path, Path]:
 def test_the_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     odometry, bearings = write_log(tmp_path, simulate_drive("paper", seed=1))
     out, plot = tmp_path / "calib.json", tmp_path / "conv.png"
-    words = ["calibrate", str(odometry), str(bearings), "--wheel-base", "0.4", "--out", str(out), "--plot", str(plot)]
+    words = ["calibrate", str(odometry), str(bearings), "--wheel-base", "0.4", "--step-sigma", "1e-4"]
+    words += ["--step-sigma-deg", "0.01", "--out", str(out), "--plot", str(plot)]
     assert main(words) == 0
     printed = capsys.readouterr().out
     assert "static_transform_publisher" in printed
     found = json.loads(out.read_text())
     assert found["whole_log"]["mounting"]["rho_m"] == pytest.approx(0.23, abs=0.02)
+    assert found["options"]["step_sigma_m"] == 1e-4
+    assert found["options"]["step_sigma_rad"] == pytest.approx(math.radians(0.01))
     assert plot.read_bytes().startswith(b"\x89PNG")
     assert {path.name for path in tmp_path.iterdir()} == {"odometry.csv", "bearings.csv", "calib.json", "conv.png"}
     straight = simulate_drive("straight", seed=1)

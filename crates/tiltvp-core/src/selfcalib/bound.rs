@@ -77,7 +77,7 @@ pub fn cramer_rao_bound(
             if let Some(node) = graph.nodes.last_mut()
                 && !node.sights.iter().any(|s| s.landmark == slot)
             {
-                node.sights.push(Sight { landmark: slot, bearing: 0.0 });
+                node.sights.push(Sight::new(slot, 0.0));
             }
         }
     }

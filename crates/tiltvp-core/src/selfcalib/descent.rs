@@ -94,23 +94,37 @@ impl Graph {
 
     /// Gauss and Newton's descent until the linear problem foretells the cost to within `tolerance`, or [`Self::descend`]
     /// where a step leads up. The normal equations there, with the last pose, and how well it fits; `None` where they are
-    /// singular.
-    pub(super) fn settle(&mut self, max_iterations: u32, tolerance: f64) -> Option<Settled> {
+    /// singular. Of a `rough` start the first step is taken without asking what it foretells.
+    pub(super) fn settle(&mut self, max_iterations: u32, tolerance: f64, rough: bool) -> Option<Settled> {
         let last = self.nodes.len() - 1;
+        let mut reached = f64::INFINITY;
+        let mut before = self.state();
         for iteration in 0..max_iterations {
-            let before = self.state();
-            let Some(here) = self.eliminate(last, true, 0.0) else { break };
-            let foretold = self.step(&here).map(|fall| here.fit.cost - here.fall - fall);
-            let fit = self.fit();
-            if foretold.is_none() || !(fit.cost <= here.fit.cost * (1.0 + 1e-9)) {
-                self.restore(&before);
-                self.descend(max_iterations - iteration, tolerance, 1e-4);
-                break;
+            let here = self.eliminate(last, true, 0.0).filter(|here| here.fit.cost <= reached * (1.0 + 1e-9));
+            let Some(here) = here else { break };
+            before = self.state();
+            reached = here.fit.cost;
+            let Some(fall) = self.step(&here) else { break };
+            if rough && iteration == 0 {
+                continue;
             }
-            if foretold.is_some_and(|foretold| (fit.cost - foretold).abs() < tolerance) {
+            let fit = self.fit();
+            if (fit.cost - (here.fit.cost - here.fall - fall)).abs() < tolerance {
                 return Some(Settled { information: here.information, fit });
             }
+            if !(fit.cost <= reached * (1.0 + 1e-9)) {
+                self.restore(&before);
+                self.descend(max_iterations - iteration, tolerance, 1e-4);
+                return self.settled();
+            }
+            reached = fit.cost;
         }
+        let settled = self.settled().filter(|settled| settled.fit.cost <= reached * (1.0 + 1e-9));
+        if settled.is_some() {
+            return settled;
+        }
+        self.restore(&before);
+        self.descend(max_iterations, tolerance, 1e-4);
         self.settled()
     }
 

@@ -13,6 +13,15 @@ use crate::geometry::wrap_angle;
 pub(super) struct Sight {
     pub(super) landmark: usize,
     pub(super) bearing: f64,
+    /// Cosine and sine of it.
+    pub(super) along: Vector2<f64>,
+}
+
+impl Sight {
+    pub(super) fn new(landmark: usize, bearing: f64) -> Self {
+        let (sin, cos) = bearing.sin_cos();
+        Self { landmark, bearing, along: Vector2::new(cos, sin) }
+    }
 }
 
 /// A pose of the robot, the motion that led to it from the one before, and what was seen there.
@@ -205,7 +214,7 @@ impl Graph {
         let (rays, mut all) = (self.rays(), Vec::new());
         for node in &self.nodes {
             let view = Viewpoint::new(&self.pose_of_sights(node).0, &self.mounting);
-            let residual = |sight: &Sight| wrap_angle(view.bearing(&rays[sight.landmark]) - sight.bearing);
+            let residual = |sight: &Sight| view.past(&rays[sight.landmark], &sight.along);
             all.extend(node.sights.iter().map(|s| residual(s) / (self.bearing_sigma * self.spreads[s.landmark])));
         }
         all

@@ -25,11 +25,12 @@ impl Recursive {
     pub(super) fn linearise(&mut self, iterations: u32) {
         let before = self.graph.landmarks.clone();
         self.graph.loss = FIRST;
-        if self.graph.nodes.len() >= YOUNG && !self.alarm.uneasy() {
+        let old = self.graph.nodes.len() >= YOUNG && !self.alarm.uneasy();
+        if old {
             self.take_filtered();
         }
         self.graph.reanchor();
-        let mut solved = self.graph.settle(iterations, TOLERANCE);
+        let mut solved = self.graph.settle(iterations, TOLERANCE, old);
         // A landmark may have been caught at a wrong distance; while little is known, all of them with a wrong yaw.
         let sigma = self.options.start_covariance[(2, 2)].sqrt();
         let turns: &[f64] = if self.graph.nodes.len() > SETTLED { &[0.0] } else { &[0.0, 0.0, 1.0, -1.0, 2.0, -2.0] };
@@ -62,14 +63,14 @@ impl Recursive {
     /// Solves the memory without the bearings that are far off, and with less of landmarks that are no points.
     fn leave_out(&mut self, iterations: u32) -> Option<Settled> {
         self.graph.loss = Loss::Cut(LIMIT);
-        let solved = self.graph.settle(2, TOLERANCE);
+        let solved = self.graph.settle(2, TOLERANCE, false);
         if !self.graph.weigh_landmarks() {
             return solved;
         }
         self.graph.loss = FIRST;
-        self.graph.settle(iterations, TOLERANCE);
+        self.graph.settle(iterations, TOLERANCE, false);
         self.graph.loss = Loss::Cut(LIMIT);
-        self.graph.settle(2, TOLERANCE)
+        self.graph.settle(2, TOLERANCE, false)
     }
 
     /// Starts the memory from the filter's mean: the poses since the last solution are bent to end where the filter is.

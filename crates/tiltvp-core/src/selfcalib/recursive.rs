@@ -5,7 +5,7 @@ use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 use super::alarm::Alarm;
 use super::graph::{Free, Graph, Node, Sight, information};
 use super::loss::{LIMIT, Slip};
-use super::measurement::{Landmark, Prediction, camera, predict};
+use super::measurement::{Landmark, Prediction, Viewpoint, camera, predict};
 use super::memory::FIRST;
 use super::odometry::{Leg, WheelMotion, Wheels, compose, compose_jacobians};
 use super::options::SelfCalibratorOptions;
@@ -223,31 +223,37 @@ impl Recursive {
         self.mean.fixed_rows::<3>(0).into()
     }
 
-    /// What is expected of a landmark.
-    pub(super) fn expect(&self, slot: usize) -> Prediction {
+    /// Where the camera is thought to be.
+    pub(super) fn view(&self) -> Viewpoint {
+        Viewpoint::new(&self.pose(), &self.mean.fixed_rows::<3>(MOUNTING).into())
+    }
+
+    /// What is expected of a landmark from there.
+    pub(super) fn expect(&self, slot: usize, view: &Viewpoint) -> Prediction {
         let at = LANDMARKS + 2 * slot;
         let anchor = self.graph.landmarks[slot].anchor;
         let landmark = Landmark { anchor, direction: self.mean[at], closeness: self.mean[at + 1] };
-        predict(&self.pose(), &self.mean.fixed_rows::<3>(MOUNTING).into(), &landmark)
+        view.see(&landmark.ray())
     }
 
     fn update(&mut self, seen: &[(u64, f64)], outcome: &mut Outcome) -> Vec<usize> {
         let mut rows = Vec::with_capacity(seen.len());
         let mut fresh = Vec::new();
+        let view = self.view();
         for &(name, bearing) in seen {
             match self.names.iter().position(|known| *known == Some(name)) {
                 Some(slot) => {
                     // The robot has not moved since it was seen: nothing new.
                     let again = self.graph.nodes.last().is_some_and(|n| n.sights.iter().any(|s| s.landmark == slot));
                     if !again {
-                        rows.push(Row { slot, bearing, p: self.expect(slot) });
+                        rows.push(Row { slot, bearing, p: self.expect(slot, &view) });
                     }
                 }
                 None => fresh.push((name, bearing)),
             }
         }
         if let Some(node) = self.graph.nodes.last_mut() {
-            node.sights.extend(rows.iter().map(|row| Sight { landmark: row.slot, bearing: row.bearing }));
+            node.sights.extend(rows.iter().map(|row| Sight::new(row.slot, row.bearing)));
         }
         let rejected = self.fuse(rows, outcome);
         for (name, bearing) in fresh {
@@ -289,7 +295,7 @@ impl Recursive {
         self.names.push(Some(name));
         self.misses.push(0);
         if let Some(node) = self.graph.nodes.last_mut() {
-            node.sights.push(Sight { landmark: slot, bearing });
+            node.sights.push(Sight::new(slot, bearing));
         }
     }
 }

@@ -7,7 +7,6 @@ use super::loss::{LIMIT, Loss};
 use super::measurement::{Landmark, Ray, Viewpoint};
 use super::odometry::between;
 use super::pose_block::Gathered;
-use crate::geometry::wrap_angle;
 
 /// How well a problem fits where it was linearised.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -126,33 +125,35 @@ impl Graph {
         blocks
     }
 
-    /// The rows of a node's bearings of landmarks at the ends of such rays.
-    pub(super) fn linearised<'a>(&'a self, node: &'a Node, rays: &'a [Ray]) -> impl Iterator<Item = Row> + 'a {
+    /// Gives `each` the rows of a node's bearings of landmarks at the ends of such rays.
+    #[inline]
+    pub(super) fn linearised(&self, node: &Node, rays: &[Ray], mut each: impl FnMut(&Row)) {
         let (pose, moved) = self.pose_of_sights(node);
         let view = Viewpoint::new(&pose, &self.mounting);
         let fixed = self.free.width();
-        node.sights.iter().map(move |sight| {
-            let p = view.see(&rays[sight.landmark]);
+        for sight in &node.sights {
+            let ray = &rays[sight.landmark];
+            let p = view.slopes(ray);
             let s = 1.0 / (self.bearing_sigma * self.spreads[sight.landmark]);
-            let residual = wrap_angle(p.bearing - sight.bearing) * s;
+            let residual = view.past(ray, &sight.along) * s;
             let mut by_fixed = [0.0; 6];
             by_fixed[..3].copy_from_slice((p.by_mounting * s).as_slice());
             let mut by_pose = p.by_pose * s;
-            if let Some((first, by_offset)) = moved {
+            if let Some((first, by_offset)) = &moved {
                 if self.free.offset {
-                    by_fixed[self.free.offset_at()] = by_pose.dot(&by_offset);
+                    by_fixed[self.free.offset_at()] = by_pose.dot(by_offset);
                 }
                 by_pose = first.transpose() * by_pose;
             }
-            Row {
+            each(&Row {
                 by_pose,
                 by_fixed,
                 at: fixed + 2 * sight.landmark,
                 by_landmark: [p.by_landmark.x * s, p.by_landmark.y * s],
                 residual,
                 weight: self.loss.weight(residual),
-            }
-        })
+            });
+        }
     }
 }
 

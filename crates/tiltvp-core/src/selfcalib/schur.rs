@@ -99,10 +99,10 @@ impl Graph {
         let mut rhs = -(&self.prior_information * &away);
         let mut fit = Fit { cost: self.cost_of_spreads() - 0.5 * away.dot(&rhs), ..Fit::default() };
         let (rays, mut fall) = (self.rays(), 0.0);
-        for row in self.linearised(&self.nodes[0], &rays) {
+        self.linearised(&self.nodes[0], &rays, |row| {
             fit.note(row.residual, self.loss);
             row.add_dense(&mut dense, &mut rhs, row.at, fixed);
-        }
+        });
         let mut at = Gathered::new(width);
         let (mut runs, mut between) = (Vec::new(), Vec::new());
         let (mut left, mut reach) = (0, fixed);
@@ -126,12 +126,12 @@ impl Graph {
                 fall += link.fall();
                 between.push((left, link));
             }
-            for row in self.linearised(&self.nodes[right], &rays) {
+            self.linearised(&self.nodes[right], &rays, |row| {
                 fit.note(row.residual, self.loss);
                 row.add_dense(&mut dense, &mut rhs, row.at, fixed);
-                next.add_row(&row, row.at, fixed);
+                next.add_row(row, row.at, fixed);
                 reach = reach.max(row.at + 2);
-            }
+            });
             runs.push(run);
             (at, left) = (next, right);
         }
@@ -185,12 +185,12 @@ impl Graph {
         let mut before = leg.across.transpose();
         let mut at = after_leg(&leg, width, self.free.wheels);
         for i in left + 1..right {
-            for row in self.linearised(&self.nodes[i], rays) {
+            self.linearised(&self.nodes[i], rays, |row| {
                 fit.note(row.residual, self.loss);
                 let place = places[(row.at - fixed) / 2];
                 row.add_dense(&mut dense, &mut rhs, place, fixed);
-                at.add_row(&row, place, fixed);
-            }
+                at.add_row(row, place, fixed);
+            });
             leg = self.leg_blocks(i, &mut dense, &mut rhs);
             fit.cost += leg.cost;
             at.own += leg.before;
@@ -261,7 +261,7 @@ mod tests {
             let mounting = graph.mounting;
             let sights = seen.iter().filter(|_| i % 4 != 2).map(|slot| {
                 let p = predict(&pose, &mounting, &graph.landmarks[*slot]);
-                Sight { landmark: *slot, bearing: p.bearing + 0.02 * (i as f64 + 3.0 * *slot as f64).cos() }
+                Sight::new(*slot, p.bearing + 0.02 * (i as f64 + 3.0 * *slot as f64).cos())
             });
             let sights = sights.collect();
             let velocity = leg.motion;

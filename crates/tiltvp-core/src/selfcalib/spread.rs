@@ -48,6 +48,7 @@ impl Graph {
 
     /// What the scatters add to half the sum of squared residuals, so that solutions with others can be compared.
     pub(super) fn cost_of_spreads(&self) -> f64 {
-        self.nodes.iter().flat_map(|node| &node.sights).map(|sight| self.spreads[sight.landmark].ln()).sum()
+        let logarithms: Vec<f64> = self.spreads.iter().map(|spread| spread.ln()).collect();
+        self.nodes.iter().flat_map(|node| &node.sights).map(|sight| logarithms[sight.landmark]).sum()
     }
 }

@@ -115,8 +115,9 @@ impl Recursive {
                 subtract_square(&mut self.covariance, &whitened);
                 break;
             }
+            let view = self.view();
             for row in &mut rows {
-                row.p = self.expect(row.slot);
+                row.p = self.expect(row.slot, &view);
             }
         }
         rejected
