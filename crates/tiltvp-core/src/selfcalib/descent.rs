@@ -112,7 +112,7 @@ impl Graph {
             if (fit.cost - (here.fit.cost - here.fall - fall)).abs() < tolerance {
                 return Some(Settled { information: here.information, fit });
             }
-            if !(fit.cost <= reached * (1.0 + 1e-9)) {
+            if fit.cost.is_nan() || fit.cost > reached * (1.0 + 1e-9) {
                 self.restore(&before);
                 self.descend(max_iterations - iteration, tolerance, 1e-4);
                 return self.settled();
