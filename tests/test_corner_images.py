@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 import pickle
 from pathlib import Path
@@ -19,6 +20,7 @@ from tiltvp.stereo_rigs import StereoRig
 
 CAMERA = tiltvp.Camera.pinhole(width=480, height=360, fx=400.0, fy=400.0, cx=240.0, cy=180.0)
 COLOURS = {"top": (30, 40, 220), "left": (50, 190, 40), "right": (210, 60, 30)}
+LIT_FROM_ABOVE = {"top": (45, 55, 255), "left": (35, 120, 28), "right": (130, 38, 20)}
 GREYS = {"top": (200, 200, 200), "left": (120, 120, 120), "right": (60, 60, 60)}
 LEFT_FROM_RIGHT = np.eye(4)
 LEFT_FROM_RIGHT[:3, 3] = (0.12, 0.01, -0.02)
@@ -36,9 +38,19 @@ def pose(yaw: float = 40.0, pitch: float = 28.0, roll: float = 4.0) -> tuple[np.
 
 
 def drawn(
-    rotation: np.ndarray, vertex: np.ndarray, faces: dict[str, tuple[int, int, int]], fine: int = 8
+    rotation: np.ndarray,
+    vertex: np.ndarray,
+    faces: dict[str, tuple[int, int, int]],
+    fine: int = 8,
+    *,
+    noise: float = 1.0,
+    beyond: bool = False,
 ) -> np.ndarray:
-    """The cuboid in front of grey, every pixel the mean light of `fine` squared places."""
+    """The cuboid in front of grey, every pixel the mean light of `fine` squared places.
+
+    Light above 0.7 is rolled off. `beyond`: where the line of the edge x goes on behind the cuboid, things of the
+    colours of its two faces meet.
+    """
     x, y, z = 0.3 * rotation.T
     corners = {"top": (x, x + z, z), "left": (z, y + z, y), "right": (y, x + y, x)}
     picture = np.full((360 * fine, 480 * fine, 3), 150, np.uint8)
@@ -46,10 +58,20 @@ def drawn(
         points = np.array([vertex, vertex + a, vertex + b, vertex + c])
         pixels = points[:, :2] / points[:, 2:] * 400.0 + (240.0, 180.0)
         cv2.fillPoly(picture, [np.rint(((pixels + 0.5) * fine - 0.5) * 16).astype(np.int32)], faces[face], shift=4)
+    if beyond:
+        for face, side in (("top", -y), ("right", y)):
+            points = np.array([vertex + 2.0 * x, vertex + 2.4 * x, vertex + 2.4 * x + side, vertex + 2.0 * x + side])
+            pixels = points[:, :2] / points[:, 2:] * 400.0 + (240.0, 180.0)
+            cv2.fillPoly(picture, [np.rint(((pixels + 0.5) * fine - 0.5) * 16).astype(np.int32)], faces[face], shift=4)
     light = (picture.astype(np.float32) / 255.0) ** 2.2
     light = cv2.GaussianBlur(cv2.resize(light, (480, 360), interpolation=cv2.INTER_AREA), (0, 0), 0.7)
-    noise = np.random.default_rng(5).normal(0.0, 1.0, light.shape)
+    light = np.where(light < 0.7, light, 1.0 - 0.3 * np.exp((0.7 - light) / 0.3))
+    noise = np.random.default_rng(5).normal(0.0, noise, light.shape)
     return np.clip(np.rint(255.0 * light ** (1 / 2.2) + noise), 0, 255).astype(np.uint8)
+
+
+def off_px(found: np.ndarray, true: np.ndarray) -> np.ndarray:
+    return 400.0 * (found / found[2] - true / true[2])[:2]
 
 
 def off_deg(found: np.ndarray, true: np.ndarray) -> float:
@@ -70,6 +92,22 @@ def test_one_camera_finds_the_coloured_cuboid(yaw: float) -> None:
     assert estimate.pose.vertex_m is None
     assert off_deg(estimate.pose.camera_from_object, rotation) < 0.3
     assert estimate.pose.right_handed
+
+
+def test_highlights_do_not_move_the_vertex() -> None:
+    rotation, vertex = pose()
+    (found,) = CornerDetector(CAMERA)(drawn(rotation, vertex, LIT_FROM_ABOVE))
+    assert np.hypot(*off_px(found.vertex, vertex)) < 0.05
+
+
+def test_rays_end_where_the_cuboid_does() -> None:
+    rotation, vertex = pose()
+    plain, behind = (
+        CornerDetector(CAMERA)(drawn(rotation, vertex, COLOURS, noise=4.0, beyond=beyond))[0]
+        for beyond in (False, True)
+    )
+    assert abs(behind.support_px[0] - plain.support_px[0]) <= 8
+    assert np.hypot(*off_px(behind.vertex, vertex)) < 0.1
 
 
 def test_a_camera_upside_down_finds_it_too() -> None:
@@ -107,6 +145,22 @@ def test_grey_corners_are_found_by_segments() -> None:
     assert np.allclose(np.sort(axes.ravel())[-3:], 1.0, atol=1e-4)
 
 
+def test_edges_are_as_long_as_they_are() -> None:
+    """All three of the grey cuboid's end where two others meet them, 0.3 m from the vertex."""
+    rotation, vertex = pose()
+    left, right = (image[..., 0] for image in pair(GREYS))
+    estimator = CornerPoseEstimator(CAMERA, CAMERA, LEFT_FROM_RIGHT, method="general", down=rotation[:, 1])
+    estimate = estimator(left, right)
+    assert estimate, estimate.reason
+    assert np.allclose(estimate.edge_lengths_m, 0.3, atol=0.006)
+    ends = vertex + 0.3 * estimate.pose.edges
+    assert np.allclose(estimate.edge_ends_m, ends, atol=0.012)
+    assert type(estimate).from_dict(json.loads(json.dumps(estimate.to_dict()))) == estimate
+    alone = CornerPoseEstimator(CAMERA, method="general", down=rotation[:, 1])(left)
+    assert np.isnan(alone.edge_lengths_m).all()
+    assert np.isnan(alone.edge_ends_m).all()
+
+
 def test_values_and_options() -> None:
     detector = CornerDetector(CAMERA, faces="gbr", chromaticity_min=0.5)
     again = pickle.loads(pickle.dumps(detector))
@@ -137,6 +191,24 @@ def test_values_and_options() -> None:
     assert not empty
     assert empty.pose is None
     assert "left" in empty.reason
+
+
+def test_estimates_are_kept() -> None:
+    seen = CornerPoseEstimator(CAMERA, CAMERA, LEFT_FROM_RIGHT)(*pair(COLOURS))
+    blank = np.full((360, 480, 3), 128, np.uint8)
+    for estimate in (seen, CornerPoseEstimator(CAMERA)(blank)):
+        for again in (
+            pickle.loads(pickle.dumps(estimate)),
+            type(estimate).from_dict(json.loads(json.dumps(estimate.to_dict()))),
+        ):
+            assert again == estimate
+            assert again.to_dict() == estimate.to_dict()
+            assert again.reason == estimate.reason
+    assert pickle.loads(pickle.dumps(seen.pose)) == seen.pose
+    with pytest.raises(InvalidInputError, match="reason"):
+        type(seen).from_dict(seen.to_dict() | {"reason": "none"})
+    with pytest.raises(InvalidInputError, match="camera_from_object"):
+        type(seen.pose).from_dict(seen.pose.to_dict() | {"camera_from_object": [1.0]})
 
 
 def test_rigs_come_back_from_disk(tmp_path: Path) -> None:

@@ -3,17 +3,21 @@
 from __future__ import annotations
 
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import polars as pl
 import pytest
 
 from tiltvp.cli import main
+from tiltvp.corner import CornerHypothesis
 from tiltvp.errors import InvalidInputError
 from tiltvp.evaluation.corner_closed_form import exact_poses, noisy_poses, summarise_exact, summarise_noisy
+from tiltvp.evaluation.corner_rooms import truth_near
 from tiltvp.evaluation.corners import CORNER_SCENES, CornerExperiment, CornerScene, measure_corners, summarise_corners
 from tiltvp.plots.corners import corner_errors, inertial_errors
 from tiltvp.plots.picture import figure_picture
+from tiltvp.stereo_scenes import SceneCorner
 
 
 def test_the_truth_is_among_the_hypotheses() -> None:
@@ -53,6 +57,29 @@ def test_poses_of_the_cuboid_are_close(measured: tuple[pl.DataFrame, pl.DataFram
     found = table.filter("found")
     angles = found.select((pl.col("roll_deg") ** 2 + pl.col("pitch_deg") ** 2 + pl.col("yaw_deg") ** 2).sqrt())
     assert np.allclose(angles.to_series(), found["attitude_deg"])
+
+
+def test_in_rooms_axes_may_be_named_at_will_and_corners_lack_in_the_list() -> None:
+    turn = np.array([[0.8, -0.6, 0.0], [0.6, 0.8, 0.0], [0.0, 0.0, 1.0]])
+    listed = SceneCorner(np.array([0.2, 0.1, 2.0]), turn.T, np.ones(3), "solid")
+    sequence = SimpleNamespace(corners=(listed,), times_s=np.zeros(1), poses_at=lambda _: np.eye(4)[None])
+
+    def seen(rotation: np.ndarray, vertex: tuple[float, float, float]) -> CornerHypothesis:
+        return CornerHypothesis.from_dict({
+            "camera_from_object": rotation.tolist(), "edges": rotation.T.tolist(), "vertex_m": list(vertex),
+            "covariance": np.eye(6).tolist(), "probability": 1.0, "right_handed": True, "misfit": 0.0,
+        })  # fmt: skip
+
+    over = listed.world_from_object @ np.diag([-1.0, -1.0, 1.0])
+    own = np.array([1.0, 0.0, 2.0])
+    number, truth = truth_near(sequence, 0, seen(over, (0.2, 0.1, 2.03)), own)  # type: ignore[arg-type]
+    assert number == 0
+    assert np.allclose(truth[:3, :3], over)
+    assert np.allclose(truth[:3, 3], listed.position_m)
+    number, truth = truth_near(sequence, 0, seen(over, (1.01, 0.0, 2.0)), own)  # type: ignore[arg-type]
+    assert number == -1
+    assert np.allclose(truth[:3, :3], over)
+    assert np.allclose(truth[:3, 3], own)
 
 
 def test_plots_show_what_the_tables_hold(measured: tuple[pl.DataFrame, pl.DataFrame]) -> None:

@@ -2177,7 +2177,10 @@ class CornerDetector:
 
 @final
 class CornerHypothesis:
-    """One explanation of what is seen: an attitude, from two cameras also a place, and how likely it is."""
+    """One explanation of what is seen: an attitude, from two cameras also a place, and how likely it is.
+
+    Frozen, comparable, and to be pickled.
+    """
 
     @property
     def camera_from_object(self) -> NDArray[np.float64]:
@@ -2214,12 +2217,20 @@ class CornerHypothesis:
     def to_dict(self) -> dict[str, Any]:
         """Plain numbers and lists, good for JSON."""
 
+    @classmethod
+    def from_dict(cls, values: dict[str, Any]) -> Self:
+        """The hypothesis that `to_dict` wrote."""
+
     def __eq__(self, other: object, /) -> bool: ...
+    def __copy__(self) -> Self: ...
+    def __deepcopy__(self, _memo: Any) -> Self: ...
 
 @final
 class CornerEstimate:
     """What one frame tells of a corner: the likeliest pose if one stands out, and all hypotheses. False without a
     pose.
+
+    Frozen, comparable, and to be pickled.
     """
 
     @property
@@ -2255,6 +2266,18 @@ class CornerEstimate:
         """Which corner of the right image it is from, or None."""
 
     @property
+    def edge_lengths_m(self) -> NDArray[np.float64]:
+        """Fresh (3,): how long the edges x, y, z are, metres, to where lines along the others meet them; NaN where no
+        image shows that. From two grey images and with right angles.
+        """
+
+    @property
+    def edge_ends_m(self) -> NDArray[np.float64]:
+        """Fresh (3, 3), rows x, y, z: where these edges end in the left camera's frame, metres, from both images alone;
+        NaN where only one of them shows it, or none.
+        """
+
+    @property
     def followed(self) -> bool:
         """Whether the pose of a frame before was a prior."""
 
@@ -2262,8 +2285,17 @@ class CornerEstimate:
     def object(self) -> int:
         """The number of the corner that is the object, from 1: it grows where another corner has become the object."""
 
+    def to_dict(self) -> dict[str, Any]:
+        """Plain numbers and lists, good for JSON."""
+
+    @classmethod
+    def from_dict(cls, values: dict[str, Any]) -> Self:
+        """The estimate that `to_dict` wrote."""
+
     def __bool__(self) -> bool: ...
     def __eq__(self, other: builtins.object, /) -> bool: ...
+    def __copy__(self) -> Self: ...
+    def __deepcopy__(self, _memo: Any) -> Self: ...
 
 @disjoint_base
 class CornerPoseEstimator:

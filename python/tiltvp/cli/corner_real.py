@@ -59,14 +59,18 @@ def corners_real(folder: Path, /, *, overlay: Path | None = None) -> None:
         box = real.tea_box(box_folder, bar.advance, lambda place, image, e: draw("teabox", rig.left, place, image, e))
     table = new_table("Tea box, two cameras", ("what", "value"), ["what"])
     table.add_row("pairs with a pose", f"{len(box.places)} of {box.frames}")
-    angles = " ".join(f"{angle:.1f}" for angle in np.median(box.angles_deg, axis=0))
-    table.add_row("median angles x y, y z, z x (deg)", angles)
+    angles = " ".join(f"{angle:.1f}" for angle in np.nanmedian(box.angles_deg, axis=0))
+    table.add_row("median angles x y, y z, z x, vertex to vertex (deg)", angles)
     for name, values in box.lengths_mm.items():
-        if len(values):
-            table.add_row(
-                f"length, {name}: median, quartiles (mm)",
-                " ".join(f"{x:.1f}" for x in np.quantile(values, (0.5, 0.25, 0.75))),
-            )
+        middle, low, high = np.nanquantile(values, (0.5, 0.25, 0.75))
+        table.add_row(
+            f"{name}: by the ruler; pairs, median, quartiles (mm)",
+            f"{real.TEA_BOX_MM[name]:.0f}; {np.isfinite(values).sum()}, {middle:.1f}, {low:.1f} {high:.1f}",
+        )
+    for number in np.unique(box.objects):
+        of = box.objects == number
+        medians = " x ".join(f"{np.nanmedian(values[of]):.1f}" for values in box.lengths_mm.values())
+        table.add_row(f"corner {number}, {np.count_nonzero(of)} pairs: long x depth x height (mm)", medians)
     step_mm, turn_deg = real.steps(box)
     table.add_row(
         "from frame to frame: median, 95 % (mm)", f"{np.median(step_mm):.1f} {np.quantile(step_mm, 0.95):.1f}"

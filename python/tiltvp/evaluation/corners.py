@@ -14,10 +14,11 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 import polars as pl
 
-from tiltvp.corner_images import CornerEstimate, CornerHypothesis, CornerPoseEstimator
+from tiltvp.corner_images import CornerEstimate, CornerPoseEstimator
 from tiltvp.datasets.new import in_order
 from tiltvp.errors import InvalidInputError
 from tiltvp.evaluation.corner_inertial import compare_inertial
+from tiltvp.evaluation.corner_rooms import own_places, truth_near
 from tiltvp.synth import Laboratory, Room, StereoSequence, zed_cameras
 
 if TYPE_CHECKING:
@@ -29,9 +30,6 @@ __all__ = ["CORNER_SCENES", "CornerExperiment", "CornerScene", "measure_corners"
 
 _FLIP_DEG: Final = 20.0
 """An attitude that is farther off is another interpretation, not a noisy one."""
-
-_SAME_M: Final = 0.15
-"""In a room, an estimate is of the true corner that is this near."""
 
 _SCHEMA: Final[dict[str, Any]] = (
     {"scene": pl.String, "frame": pl.UInt32, "time_s": pl.Float64, "distance_m": pl.Float64, "found": pl.Boolean}
@@ -117,19 +115,26 @@ def measure_corners(
 
     Angles are components of the error's rotation vector in the left camera: pitch about x, yaw about y, roll about z.
     x_m, y_m, z_m are errors of the left camera's place in the corner's frame. `nees` is the squared error of attitude
-    and vertex by its covariance, 6 on average at best. In rooms the truth is that of the true corner near the estimate,
-    in whichever of four ways its level edges are named; where none is near, `corner` is -1 and there are no errors.
-    `ms` is the processor time of one pair. `advance` is called after each frame.
+    and vertex by its covariance, 6 on average at best. In rooms the truth is that of the listed corner near the
+    estimate, in whichever of eight ways its axes are named. Where none is near, as the list has no corners with an
+    edge below 0.15 m and none of furniture made of boards, `corner` is -1, the attitude is compared with that of the
+    walls and of corners beside it, and the place, without `nees`, with the object's own median in the world. `ms` is
+    the processor time of one pair. `advance` is called after each frame.
     """
     rows: list[dict[str, Any]] = []
     inertial: list[pl.DataFrame] = []
     for k, (scene, frames) in enumerate(zip(experiment.scenes, experiment.lengths(), strict=True)):
         sequence = scene.sequence(frames, experiment.seed + k, threads)
-        attitudes: list[NDArray[np.float64] | None] = []
-        for frame, (estimate, ms) in enumerate(_estimates(scene, sequence, threads)):
-            rows.append({"scene": scene.name, "ms": ms} | _judged(scene, sequence, frame, estimate))
-            attitudes.append(None if estimate.pose is None else estimate.pose.camera_from_object)
+        estimates: list[CornerEstimate] = []
+        times_ms: list[float] = []
+        for estimate, ms in _estimates(scene, sequence, threads):
+            estimates.append(estimate)
+            times_ms.append(ms)
             advance()
+        places = own_places(sequence, estimates)
+        for frame, (estimate, ms) in enumerate(zip(estimates, times_ms, strict=True)):
+            rows.append({"scene": scene.name, "ms": ms} | _judged(scene, sequence, frame, estimate, places))
+        attitudes = [None if estimate.pose is None else estimate.pose.camera_from_object for estimate in estimates]
         if scene.kind == "laboratory" and not inertial and any(a is not None for a in attitudes):
             inertial.append(compare_inertial(sequence, attitudes, seed=experiment.seed))
     return pl.DataFrame(rows, schema=_SCHEMA), pl.concat(inertial) if inertial else pl.DataFrame()
@@ -143,7 +148,7 @@ def summarise_corners(table: pl.DataFrame) -> pl.DataFrame:
     return table.group_by("scene", maintain_order=True).agg(
         pl.len().alias("frames"),
         pl.col("found").mean().alias("found"),
-        pl.col("corner").filter(pl.col("found")).ge(0).mean().alias("known corner"),
+        pl.col("corner").filter(pl.col("found")).ge(0).mean().alias("listed corner"),
         (attitude**2).mean().sqrt().alias("attitude rms deg"),
         attitude.quantile(0.99).alias("99 % deg"),
         (position**2).filter(kept).mean().sqrt().mul(1000).alias("position rms mm"),
@@ -178,7 +183,13 @@ def _estimates(scene: CornerScene, sequence: StereoSequence, threads: int) -> It
             yield estimate, 1000.0 * (time.thread_time() - start)
 
 
-def _judged(scene: CornerScene, sequence: StereoSequence, frame: int, estimate: CornerEstimate) -> dict[str, Any]:
+def _judged(
+    scene: CornerScene,
+    sequence: StereoSequence,
+    frame: int,
+    estimate: CornerEstimate,
+    places: dict[int, NDArray[np.float64]],
+) -> dict[str, Any]:
     target = sequence.left_from_object(frame)
     row: dict[str, Any] = {
         "frame": frame,
@@ -196,9 +207,7 @@ def _judged(scene: CornerScene, sequence: StereoSequence, frame: int, estimate: 
     if scene.kind == "laboratory":
         number, truth = sequence.corner, target
     else:
-        number, truth = _nearest(sequence, frame, pose)
-        if number < 0:
-            return row
+        number, truth = truth_near(sequence, frame, pose, places[estimate.object])
     row["corner"] = number
     turn = _rotation_vector(truth[:3, :3] @ pose.camera_from_object.T)
     shift = truth[:3, 3] - pose.vertex_m
@@ -215,29 +224,8 @@ def _judged(scene: CornerScene, sequence: StereoSequence, frame: int, estimate: 
         "x_m": x,
         "y_m": y,
         "z_m": z,
-        "nees": float(error @ np.linalg.solve(pose.covariance, error)),
+        "nees": float(error @ np.linalg.solve(pose.covariance, error)) if number >= 0 else None,
     }
-
-
-def _nearest(sequence: StereoSequence, frame: int, pose: CornerHypothesis) -> tuple[int, NDArray[np.float64]]:
-    """The true corner that an estimate is of, or -1, and its pose with level edges named as the estimate does."""
-    from_world = np.linalg.inv(sequence.poses_at([sequence.times_s[frame]])[0])
-    vertices = np.array([corner.position_m for corner in sequence.corners]) @ from_world[:3, :3].T + from_world[:3, 3]
-    away = np.linalg.norm(vertices - pose.vertex_m, axis=1)
-    number = int(np.argmin(away))
-    if away[number] > _SAME_M:
-        return -1, np.eye(4)
-    # Of corners in one place, as of stacked boxes, and of names for the level edges, those nearest to the estimate.
-    same = np.flatnonzero(away < away[number] + 1e-6)
-    quarter = np.array([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]])
-    turns = [np.linalg.matrix_power(quarter, k) for k in range(4)]
-    every = [
-        (int(k), from_world[:3, :3] @ sequence.corners[k].world_from_object @ turn) for k in same for turn in turns
-    ]
-    number, rotation = max(every, key=lambda one: float(np.trace(one[1] @ pose.camera_from_object.T)))
-    truth = np.eye(4)
-    truth[:3, :3], truth[:3, 3] = rotation, vertices[number]
-    return number, truth
 
 
 def _rotation_vector(rotation: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -40,9 +40,10 @@ Matrix = NDArray[np.float64]
 CABINET_PITCH_DEG: Final = -45.0
 """Roughly how the camera was held, which says which edge of the first image is vertical."""
 TEA_BOX_PITCH_DEG: Final = -45.0
-TEA_BOX_MM: Final = (165.0, 68.0, 80.0)
+TEA_BOX_MM: Final = {"long": 165.0, "depth": 68.0, "height": 80.0}
+"""By ViSP's model of the box."""
 _INTRINSICS: Final = (535.4, 539.2, 320.1, 247.6)
-_SAME_LINE_RAD: Final = math.radians(0.4)
+_LONG_MM: Final = 110.0
 
 
 @dataclass(frozen=True)
@@ -74,10 +75,10 @@ class TeaBox:
     attitudes: Matrix
     """(N, 3, 3): `camera_from_object`."""
     angles_deg: Matrix
-    """(N, 3): between the edges x y, y z, z x, each where the planes of its two rays meet: nothing makes them right."""
+    """(N, 3): between the edges x y, y z, z x, each from the vertex to its end, both triangulated: nothing makes them
+    right. NaN where an end is not seen in both images."""
     lengths_mm: dict[str, Matrix]
-    """Lengths of edges: `long`, from one corner to the other, `ends`, from a corner to where the ray x or z that is
-    not the long one ends, and `height`, to where the ray y does."""
+    """(N,) each: lengths of the edges `long`, `depth` and `height`, from vertex to vertex; NaN where no end is seen."""
 
 
 def cabinet(folder: Path, advance: Callable[[], None] = lambda: None, show: Show | None = None) -> Cabinet:
@@ -143,7 +144,6 @@ def tea_box(folder: Path, advance: Callable[[], None] = lambda: None, show: Show
         rig.left, rig.right, rig.left_from_right, method="general", down=_down(TEA_BOX_PITCH_DEG)
     )
     videos = [VideoReader(folder / f"teabox_{side}.mp4") for side in ("left", "right")]
-    lengths: dict[str, list[float]] = {"long": [], "ends": [], "height": []}
     rows = []
     frames = 0
     for place, (left, right) in enumerate(zip(*videos, strict=True)):
@@ -153,16 +153,16 @@ def tea_box(folder: Path, advance: Callable[[], None] = lambda: None, show: Show
             show(place, left, estimate)
         pose = estimate.pose
         if pose is not None and pose.vertex_m is not None and estimate.chosen_right is not None:
-            rows.append((place, estimate.object, pose.vertex_m, pose.camera_from_object, _angles(estimate, rig)))
-            for name, length in _lengths(estimate):
-                lengths[name].append(1e3 * length)
+            rows.append((
+                place, estimate.object, pose.vertex_m, pose.camera_from_object, _angles(estimate), _lengths_mm(estimate)
+            ))  # fmt: skip
         advance()
     if not rows:
         raise InvalidInputError(f"{folder}: no corner in any pair of frames")
-    places, objects, vertices, attitudes, angles = zip(*rows, strict=True)
+    places, objects, vertices, attitudes, angles, lengths = zip(*rows, strict=True)
     return TeaBox(
         frames, np.array(places), np.array(objects), np.array(vertices), np.array(attitudes), np.array(angles),
-        {name: np.array(values) for name, values in lengths.items()},
+        dict(zip(TEA_BOX_MM, np.array(lengths).T, strict=True)),
     )  # fmt: skip
 
 
@@ -176,43 +176,23 @@ def steps(box: TeaBox) -> tuple[Matrix, Matrix]:
     return move[next_to], np.array(turn)[next_to]
 
 
-def _angles(estimate: CornerEstimate, rig: StereoRig) -> Matrix:
-    """(3,): degrees between the edges, each along the line in which the planes of its rays in both images meet."""
-    left, right = estimate.features_left[estimate.chosen_left[0]], estimate.features_right[estimate.chosen_right or 0]
-    turned = right.normals @ rig.left_from_right[:3, :3].T
-    edges = np.cross(left.normals, turned)
-    edges /= np.linalg.norm(edges, axis=1, keepdims=True)
+def _angles(estimate: CornerEstimate) -> Matrix:
+    """(3,): degrees between the edges, each from the triangulated vertex to its triangulated end."""
     assert estimate.pose is not None
-    edges *= np.sign((edges * estimate.pose.edges).sum(axis=1, keepdims=True))
+    assert estimate.pose.vertex_m is not None
+    edges = estimate.edge_ends_m - estimate.pose.vertex_m
+    edges /= np.linalg.norm(edges, axis=1, keepdims=True)
     cosines = np.clip([edges[0] @ edges[1], edges[1] @ edges[2], edges[2] @ edges[0]], -1.0, 1.0)
     return np.asarray(np.degrees(np.arccos(cosines)), dtype=np.float64)
 
 
-def _lengths(estimate: CornerEstimate) -> Iterator[tuple[str, float]]:
-    """Lengths of the edges from the vertex, metres: to another corner of the left image, or to where a ray ends."""
-    assert estimate.pose is not None
-    assert estimate.pose.vertex_m is not None
-    vertex, edges = estimate.pose.vertex_m, estimate.pose.edges
-    feature = estimate.features_left[estimate.chosen_left[0]]
-    long: int | None = None
-    for axis in (0, 2):
-        normal = np.cross(vertex, edges[axis])
-        normal /= np.linalg.norm(normal)
-        for other in estimate.features_left:
-            if abs(float(normal @ other.vertex)) < _SAME_LINE_RAD:
-                length = _along(vertex, edges[axis], other.vertex)
-                if length > 0.12:
-                    long = axis
-                    yield "long", length
-    if long is not None:
-        yield "ends", _along(vertex, edges[2 - long], feature.toward[2 - long])
-        yield "height", _along(vertex, edges[1], feature.toward[1])
-
-
-def _along(vertex: Matrix, edge: Matrix, bearing: Matrix) -> float:
-    """How far from the vertex along an edge the point is that is nearest to a line of sight."""
-    aside = np.eye(3) - np.outer(bearing, bearing)
-    return float(-(aside @ vertex) @ (aside @ edge) / ((aside @ edge) @ (aside @ edge)))
+def _lengths_mm(estimate: CornerEstimate) -> tuple[float, float, float]:
+    """The edges long, depth and height: y is the upright one, of the others the longer one is long."""
+    x, y, z = (1e3 * estimate.edge_lengths_m).tolist()
+    level = [length for length in (x, z) if not math.isnan(length)]
+    long = [length for length in level if length > _LONG_MM]
+    short = [length for length in level if length <= _LONG_MM]
+    return (max(long, default=math.nan), min(short, default=math.nan), y)
 
 
 def _down(pitch_deg: float) -> tuple[float, float, float]:

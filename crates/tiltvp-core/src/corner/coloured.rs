@@ -3,6 +3,7 @@
 use nalgebra::{Vector2, Vector3};
 
 use super::coloured_edges::{Doubled, EdgeCandidates, Orientation};
+use super::highlights::trusts;
 use super::options::{ColouredOptions, OrientationChoice};
 use super::segmentation::{Labels, Primary};
 use super::trace::{Course, TraceScratch, Traced, trace};
@@ -22,6 +23,9 @@ const CLEAR_OF_VERTEX_PX: f64 = 5.0;
 
 /// Pixels at the far end of a ray that are left out: there it meets other edges.
 const CLEAR_OF_END_PX: f64 = 3.0;
+
+/// The least step of a place as a share of those next to the vertex: two faces are as different all along their edge.
+const STEP_SHARE_MIN: f64 = 0.5;
 
 /// Memory of the front end.
 #[derive(Debug, Clone, Default)]
@@ -96,7 +100,8 @@ pub(super) fn find(
         let mut traced: [Option<Traced>; 3] = [None; 3];
         for ((traced, course), (a, b)) in traced.iter_mut().zip(&courses).zip(faces) {
             let course = course.as_ref()?;
-            let signal = difference(image, light, a, b);
+            let trusts = trusts(camera, course, image, light, (a, b));
+            let signal = difference(image, light, (a, b), trusts);
             *traced = trace(camera, course, options.support_min_px as usize, signal, &mut scratch.trace);
         }
         let [Some(x), Some(y), Some(z)] = traced else { return None };
@@ -107,6 +112,7 @@ pub(super) fn find(
             *course = course.map(|course| Course {
                 normal: traced.ray.normal,
                 vertex: (vertex - traced.ray.normal * traced.ray.normal.dot(&vertex)).normalize(),
+                to_rad: vertex.angle(&traced.ray.toward),
                 search_px: options.refine_px,
                 ..course
             });
@@ -117,10 +123,15 @@ pub(super) fn find(
 }
 
 /// How much brighter the one primary is than the other: across the edge between their faces one rises where the other falls,
-/// so that what clipping and glare do to both cancels.
-fn difference(image: &ColorView<'_>, light: &LightTable, a: Primary, b: Primary) -> impl Fn(f64, f64) -> Option<f64> {
+/// so that what glare does to both cancels.
+fn difference(
+    image: &ColorView<'_>,
+    light: &LightTable,
+    (a, b): (Primary, Primary),
+    trusts: [f64; 2],
+) -> impl Fn(f64, f64) -> Option<f64> {
     let (a, b) = (a.byte(), b.byte());
-    move |u, v| light.color(image, u, v).map(|levels| levels[a] - levels[b])
+    move |u, v| light.color(image, u, v).map(|levels| trusts[0] * levels[a] - trusts[1] * levels[b])
 }
 
 /// RANSAC over the candidates of an edge, lifted to bearings: only these are rectified.
@@ -191,6 +202,7 @@ fn course_of(line: &Line, vertex: &Vector3<f64>, px_per_rad: f64, options: &Colo
         to_rad: far - CLEAR_OF_END_PX / px_per_rad,
         search_px: options.search_px,
         step_min: options.step_min,
+        step_share_min: STEP_SHARE_MIN,
         threshold_px: options.threshold_px,
         ray_sigma_px: options.ray_sigma_px,
     })

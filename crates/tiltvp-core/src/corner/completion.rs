@@ -6,7 +6,7 @@ use super::consensus::rays_apart;
 use super::general::GeneralScratch;
 use super::junctions::{RayEnd, meeting};
 use super::options::GeneralOptions;
-use super::trace::{Course, Traced, trace};
+use super::trace::{Course, Traced, trace_every};
 use super::vertex::CornerFeature;
 use crate::camera::Camera;
 use crate::image::{ImageView, LightTable};
@@ -19,6 +19,9 @@ const CROSSINGS_MAX: usize = 60;
 
 /// Least length along which a third edge is looked for, in pixels.
 const THIRD_MIN_PX: f64 = 30.0;
+
+/// How far apart the places are that tell at first whether there is a third edge, in pixels.
+const GLIMPSE_PX: f64 = 3.0;
 
 /// A crossing of two segments along two of the axes.
 struct Crossing {
@@ -76,21 +79,35 @@ pub(super) fn complete(
             to_rad,
             search_px: options.search_px,
             step_min: options.step_min,
+            step_share_min: 0.0,
             threshold_px: options.threshold_px,
             ray_sigma_px: options.ray_sigma_px,
         };
-        let support_min = options.support_min_px as usize;
+        let support_min = f64::from(options.support_min_px);
         let memory = &mut scratch.trace;
-        let mut follow = |course: &Course| -> Option<Traced> {
-            let found = trace(camera, course, support_min, |u, v| light.gray(image, u, v), memory)?;
-            Some(found).filter(|found| found.share >= options.support_min_share)
+        let mut follow = |course: &Course, stride_px: f64, least_share: f64| -> Option<Traced> {
+            let signal = |u, v| light.gray(image, u, v);
+            let found = trace_every(stride_px, camera, course, (support_min / stride_px) as usize, signal, memory)?;
+            Some(found).filter(|found| found.share >= least_share)
         };
+        let share_min = options.support_min_share;
         let third = 3 - crossing.axes[0] - crossing.axes[1];
+        let to_rad = THIRD_MIN_PX.max(0.8 * crossing.shorter_px) / px_per_rad;
+        let direction = camera_from_object.column(third).into_owned();
+        // Most crossings have no third edge, which every third pixel tells.
+        let thirds = [direction, -direction].map(|direction| {
+            let course = course(crossing.place.cross(&direction).try_normalize(0.05)?, to_rad);
+            follow(&course, GLIMPSE_PX, 0.8 * share_min).map(|_| course)
+        });
+        if thirds.iter().all(Option::is_none) {
+            continue;
+        }
         let mut rays: [Option<Traced>; 3] = [None; 3];
         for (ray, axis) in crossing.ends.iter().zip(crossing.axes) {
             let segment = &segments[ray.segment];
             let normal = if ray.end == 0 { segment.normal } else { -segment.normal };
-            rays[axis] = follow(&course(normal, crossing.place.angle(ray.far(segments)) - 2.0 / px_per_rad));
+            let course = course(normal, crossing.place.angle(ray.far(segments)) - 2.0 / px_per_rad);
+            rays[axis] = follow(&course, 1.0, share_min);
             if rays[axis].is_none() {
                 break;
             }
@@ -98,11 +115,8 @@ pub(super) fn complete(
         if crossing.axes.iter().any(|axis| rays[*axis].is_none()) {
             continue;
         }
-        let to_rad = THIRD_MIN_PX.max(0.8 * crossing.shorter_px) / px_per_rad;
-        let direction = camera_from_object.column(third).into_owned();
-        for sign in [1.0, -1.0] {
-            let Some(normal) = crossing.place.cross(&(direction * sign)).try_normalize(0.05) else { continue };
-            rays[third] = follow(&course(normal, to_rad));
+        for course in thirds.iter().flatten() {
+            rays[third] = follow(course, 1.0, share_min);
             let [Some(x), Some(y), Some(z)] = rays else { continue };
             let Some(corner) = clockwise(&[x, y, z]) else { continue };
             let good = corner.residual_rad() * px_per_rad <= options.residual_max_px;

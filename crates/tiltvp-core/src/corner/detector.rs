@@ -5,6 +5,8 @@ use nalgebra::{Matrix3, Vector3};
 use super::attitude::{IncludedAngle, corner_attitudes};
 use super::coloured::{self, ColouredScratch};
 use super::completion::complete;
+use super::ends::{Seen, SeenEnd, seen_ends};
+use super::estimate::Hypothesis;
 use super::general::{self, GeneralScratch};
 use super::guided::{Expected, find_near};
 use super::options::{CornerMethod, DetectorOptions};
@@ -13,6 +15,7 @@ use super::vertex::CornerFeature;
 use crate::camera::Camera;
 use crate::edges::Mask;
 use crate::error::{Error, Result};
+use crate::geometry::RigidMotion;
 use crate::image::{ColorView, ImageView, LightTable};
 
 /// The part of an image that is looked at.
@@ -182,6 +185,34 @@ impl CornerDetector {
         {
             complete(&self.camera, image, camera_from_object, options, &self.light, memory, out);
         }
+    }
+
+    /// Where the edges of a corner end in the image that was looked at last with this scratch; none for the coloured front end.
+    /// `pose` is of the left camera, `camera_from_left` takes it to this one.
+    pub(super) fn ends(
+        &self,
+        image: &ImageView<'_>,
+        corner: &CornerFeature,
+        pose: &Hypothesis,
+        camera_from_left: &RigidMotion,
+        scratch: &mut CornerScratch,
+    ) -> [Option<SeenEnd>; 3] {
+        let (CornerMethod::General(options), Some(memory), Some(vertex_m)) =
+            (&self.options.method, &mut scratch.general, &pose.vertex_m)
+        else {
+            return [None; 3];
+        };
+        let seen = Seen {
+            camera: &self.camera,
+            image,
+            options,
+            light: &self.light,
+            corner,
+            camera_from_object: camera_from_left.rotation * pose.camera_from_object,
+            edges: pose.edges.map(|edge| camera_from_left.rotation * edge),
+            vertex_m: camera_from_left.point(vertex_m),
+        };
+        seen_ends(&seen, memory)
     }
 
     /// The line segments of the last grey image, the longest first; none for the coloured front end.

@@ -2,6 +2,7 @@
 
 use nalgebra::{Matrix3, Matrix6, Vector3};
 
+use super::ends::EdgeEnd;
 use super::vertex::CornerFeature;
 
 /// Why there is a pose, or none.
@@ -20,6 +21,9 @@ pub enum Verdict {
 }
 
 impl Verdict {
+    /// All of them.
+    pub const ALL: [Self; 5] = [Self::Found, Self::NoneLeft, Self::NoneRight, Self::NoneFits, Self::Ambiguous];
+
     /// In words.
     pub fn reason(self) -> &'static str {
         match self {
@@ -72,6 +76,9 @@ pub struct CornerEstimate {
     pub chosen_left: Vec<usize>,
     /// Which feature of the right image it is from.
     pub chosen_right: Option<usize>,
+    /// Where the edges x, y, z of the pose end, where lines along the others meet them; from two grey images with edges at right
+    /// angles.
+    pub ends: [Option<EdgeEnd>; 3],
     /// Whether the pose before was a prior.
     pub followed: bool,
     /// The number of the corner that is the object: it grows where another corner than before has become the object.

@@ -5,6 +5,7 @@ use nalgebra::{Matrix3, Matrix6, Vector3};
 use super::attitude::{IncludedAngle, corner_attitudes};
 use super::consensus::{agreement, apart, fits, renamed, weight};
 use super::detector::{CornerDetector, CornerScratch};
+use super::ends::{EdgeEnd, edge_ends};
 use super::estimate::{CornerEstimate, Hypothesis, Verdict};
 use super::estimator_options::EstimatorOptions;
 use super::fusion::fuse_rays;
@@ -13,7 +14,9 @@ use super::options::CornerMethod;
 use super::position::{Sighting, triangulate};
 use super::prior::{AttitudePrior, VerticalSense};
 use super::resolve::{Alignment, View, resolve};
+use super::track::Track;
 use super::vertex::CornerFeature;
+use super::voices::Voices;
 use crate::error::{Error, Result};
 use crate::geometry::RigidMotion;
 use crate::image::{ColorView, ImageView};
@@ -25,25 +28,6 @@ pub enum Frame<'a> {
     Gray(ImageView<'a>),
     /// For the coloured cuboid.
     Color(ColorView<'a>),
-}
-
-/// The last pose, the corners it is from, and how many frames ago it was.
-#[derive(Debug, Clone, PartialEq)]
-struct Track {
-    pose: Hypothesis,
-    corners: [Vec<CornerFeature>; 2],
-    age: u32,
-    object: u32,
-}
-
-impl Track {
-    /// Whether a pose is one of the same corner: from one image any corner of the same upright world is.
-    fn is_of(&self, pose: &Hypothesis) -> bool {
-        match (self.pose.vertex_m, pose.vertex_m) {
-            (Some(last), Some(vertex)) => (vertex - last).norm() <= MOVED * last.norm(),
-            _ => true,
-        }
-    }
 }
 
 /// Finds the pose of a corner in the frames of a sequence, by one camera (attitude alone) or by two.
@@ -156,6 +140,7 @@ impl CornerPoseEstimator {
             features,
             chosen_left: Vec::new(),
             chosen_right: None,
+            ends: [None; 3],
             followed: self.track.is_some(),
             object: self.objects,
         };
@@ -164,18 +149,22 @@ impl CornerPoseEstimator {
             self.add_completed(left, right, attitude, &mut estimate.features);
             self.add_transferred([left, right.unwrap_or(left)], attitude, &mut estimate.features)?;
         }
+        let mut seen = Vec::new();
         if estimate.features[0].is_empty() {
             estimate.verdict = Verdict::NoneLeft;
         } else if right.is_some() && estimate.features[1].is_empty() {
             estimate.verdict = Verdict::NoneRight;
         } else if self.right.is_some() {
-            self.by_pair(attitude.as_ref(), &mut estimate)?;
+            seen = self.by_pair(attitude.as_ref(), &mut estimate)?;
         } else {
             self.by_one(&mut estimate)?;
         }
         if let Some(best) = estimate.hypotheses.first() {
             let decided = best.probability >= self.options.probability_min;
             estimate.verdict = if decided { Verdict::Found } else { Verdict::Ambiguous };
+        }
+        if let Some(right) = right {
+            estimate.ends = self.ends([left, right], &estimate);
         }
         if let Some(pose) = estimate.hypotheses.first().filter(|_| estimate.verdict == Verdict::Found) {
             if !self.track.as_ref().is_some_and(|track| track.is_of(pose)) {
@@ -198,9 +187,31 @@ impl CornerPoseEstimator {
                 out
             };
             let corners = [parallel(0, pose.camera_from_object), parallel(1, turned * pose.camera_from_object)];
-            self.track = Some(Track { pose: *pose, corners, age: 0, object: estimate.object });
+            self.track = Some(Track::next(self.track.take(), pose, corners, estimate.object, &seen));
         }
         Ok(estimate)
+    }
+
+    /// Where the edges of the pose end.
+    fn ends(&mut self, frames: [&Frame<'_>; 2], estimate: &CornerEstimate) -> [Option<EdgeEnd>; 3] {
+        let (Some((detector, left_from_right)), Some(pose), Some(chosen)) =
+            (&self.right, estimate.pose(), estimate.chosen_right)
+        else {
+            return [None; 3];
+        };
+        let (Some(vertex_m), [Frame::Gray(left), Frame::Gray(right)]) = (pose.vertex_m, frames) else {
+            return [None; 3];
+        };
+        if self.options.angle != IncludedAngle::RIGHT {
+            return [None; 3];
+        }
+        let corners = [&estimate.features[0][estimate.chosen_left[0]], &estimate.features[1][chosen]];
+        let [first, second] = &mut self.scratch;
+        let seen = [
+            self.left.ends(left, corners[0], pose, &RigidMotion::identity(), first),
+            detector.ends(right, corners[1], pose, &left_from_right.inverse(), second),
+        ];
+        edge_ends(seen, left_from_right, &vertex_m)
     }
 
     /// The attitude by which corners are completed: that of the frame before, or the likeliest that one image's corners agree
@@ -408,11 +419,13 @@ impl CornerPoseEstimator {
                 let scale = (0.25 * self.options.misfit_max).max(1.0).powi(2);
                 let (sin, cos) = self.options.angle.gamma_rad.sin_cos();
                 let edges = [Vector3::x(), Vector3::y(), Vector3::new(cos, 0.0, side * sin)];
+                // What edges miss by that do not quite meet, or belong to more than one thing, the covariances do not know.
+                let doubt = if self.is_one_object() { 1.0 } else { (fused.chi_square / 6.0).max(1.0) };
                 let pose = Hypothesis {
                     camera_from_object: fused.rig_from_object,
                     edges: edges.map(|edge| fused.rig_from_object * edge),
                     vertex_m: Some(fused.vertex_m),
-                    covariance: fused.covariance,
+                    covariance: fused.covariance * doubt,
                     probability: 0.0,
                     right_handed,
                     misfit: (fused.chi_square / 6.0).sqrt(),
@@ -431,13 +444,16 @@ impl CornerPoseEstimator {
         Ok(found.into_iter().map(named).filter(|pose| pose.probability >= PROBABILITY_MIN).collect())
     }
 
-    /// The poses of the pair of features, one of each image, that fits best; near the last vertex where there is one. Where
-    /// an `attitude` is known on which several corners agree, pairs that do not are left out.
-    fn by_pair(&self, attitude: Option<&Matrix3<f64>>, estimate: &mut CornerEstimate) -> Result<()> {
-        let Some((_, left_from_right)) = &self.right else { return Ok(()) };
+    /// The poses of the pair of features, one of each image, that fits best; of the corner that is followed or one that is known
+    /// beside it, where there is one. Where an `attitude` is known on which several corners agree, pairs that do not are left
+    /// out. Returns the poses of all pairs that fit well, chosen or not.
+    fn by_pair(&self, attitude: Option<&Matrix3<f64>>, estimate: &mut CornerEstimate) -> Result<Vec<Hypothesis>> {
+        let mut seen = Vec::new();
+        let Some((_, left_from_right)) = &self.right else { return Ok(seen) };
         let priors = self.priors(self.is_one_object());
         let [nearest, farthest] = self.options.distance_m;
         let mut best: Option<(f64, Vec<Hypothesis>, usize, usize)> = None;
+        let voices = Voices::new(&estimate.features, left_from_right);
         for (i, left) in estimate.features[0].iter().enumerate() {
             for (j, right) in estimate.features[1].iter().enumerate() {
                 let poses = self.pair_poses([left, right], left_from_right, &priors)?;
@@ -455,12 +471,17 @@ impl CornerPoseEstimator {
                 if misfit > self.options.misfit_max || !(nearest..=farthest).contains(&vertex.norm()) {
                     continue;
                 }
-                let mut score = weight(left).min(weight(right)) / (1.0 + misfit * misfit);
-                if let Some(last) = self.track.as_ref().and_then(|track| track.pose.vertex_m) {
-                    // The same corner is near where it was.
-                    let moved = (vertex - last).norm() / last.norm();
-                    score /= 1.0 + (moved / MOVED).powi(2);
+                let fits_well = misfit <= 0.5 * self.options.misfit_max;
+                if fits_well {
+                    seen.push(*pose);
                 }
+                let likely = match &self.track {
+                    Some(track) if !self.is_one_object() => track.likelihood(pose, fits_well),
+                    _ => Some(1.0),
+                };
+                let Some(likely) = likely else { continue };
+                let agreeing = voices.agreeing(pose);
+                let mut score = likely * agreeing * weight(left).min(weight(right)) / (1.0 + misfit * misfit);
                 if let Some(track) = &self.track {
                     let turned = apart(&pose.camera_from_object, &track.pose.camera_from_object);
                     score /= 1.0 + (turned / self.options.turn_sigma_rad).powi(2);
@@ -474,7 +495,7 @@ impl CornerPoseEstimator {
             estimate.hypotheses = poses;
             (estimate.chosen_left, estimate.chosen_right) = (vec![i], Some(j));
         }
-        Ok(())
+        Ok(seen)
     }
 }
 
@@ -506,8 +527,8 @@ const SAME_VERTEX_RAD: f64 = 0.01;
 /// How far apart the places are at which a corner is looked for along its epipolar line, in pixels.
 const EPIPOLAR_STEP_PX: f64 = 4.0;
 
-/// The share of its distance by which a vertex moves in the camera's frame from one frame to the next.
-const MOVED: f64 = 0.1;
+/// How far from where it was a corner is looked for first, in pixels.
+const HARDLY_MOVED_PX: f64 = 3.0;
 
 /// The corners of an image: those that are near where they were, and those that are found anew.
 fn detect(
@@ -521,8 +542,11 @@ fn detect(
     match frame {
         Frame::Gray(image) => {
             detector.detect_general(image, vertical, scratch, out)?;
-            let again =
-                followed.iter().filter_map(|last| detector.find_near(image, &Expected::of(last), None, scratch));
+            // Most hardly move, and the less is looked at the fewer other edges there are.
+            let again = followed.iter().map(Expected::of).filter_map(|last| {
+                let near = detector.find_near(image, &last, Some(HARDLY_MOVED_PX), scratch);
+                near.or_else(|| detector.find_near(image, &last, None, scratch))
+            });
             out.extend(again);
             Ok(())
         }

@@ -127,7 +127,7 @@ fn course_of(segments: &[Segment], ray: RayEnd, vertex: &Vector3<f64>, options: 
     let normal = if ray.end == 0 { segment.normal } else { -segment.normal };
     let along = normal.cross(&on_line);
     let angle_of = |bearing: &Vector3<f64>| bearing.dot(&along).atan2(bearing.dot(&on_line));
-    let px_per_rad = segment.length_px / segment.ends[0].angle(&segment.ends[1]);
+    let px_per_rad = segment.px_per_rad;
     let mut to_rad = angle_of(ray.far(segments));
     let gap_rad = options.gap_max_px.max(options.gap_max_share * segment.length_px) / px_per_rad;
     for _ in 0..3 {
@@ -153,6 +153,7 @@ fn course_of(segments: &[Segment], ray: RayEnd, vertex: &Vector3<f64>, options: 
         to_rad: to_rad - CLEAR_OF_END_PX / px_per_rad,
         search_px: options.search_px,
         step_min: options.step_min,
+        step_share_min: 0.0,
         threshold_px: options.threshold_px,
         ray_sigma_px: options.ray_sigma_px,
     })

@@ -4,7 +4,7 @@ use nalgebra::Vector3;
 
 use super::consensus::rays_apart;
 use super::options::GeneralOptions;
-use super::trace::{Course, TraceScratch, trace};
+use super::trace::{Course, TraceScratch, trace_every};
 use super::vertex::CornerFeature;
 use crate::camera::Camera;
 use crate::geometry::RigidMotion;
@@ -72,7 +72,11 @@ pub(super) fn find_near(
     let mut vertex = expected.vertex;
     let mut normals = expected.far.map(|far| vertex.cross(&far).try_normalize(1e-6));
     let mut found = None;
-    for search_px in [search_px, options.search_px] {
+    // So far about a long ray there are other edges too: the first pass, along every third pixel, only has to lead to the
+    // second.
+    for (search_px, stride_px, least_share) in
+        [(search_px, 3.0, 0.5 * options.guided_min_share), (options.search_px, 1.0, options.guided_min_share)]
+    {
         let pixel = camera.project_jacobian(&vertex)?;
         if !camera.contains(&pixel.0) {
             return None;
@@ -88,12 +92,14 @@ pub(super) fn find_near(
                 to_rad: vertex.angle(far) + BEYOND_END_PX / px_per_rad,
                 search_px,
                 step_min: options.step_min,
+                step_share_min: 0.0,
                 threshold_px: options.threshold_px,
                 ray_sigma_px: options.ray_sigma_px,
             };
             let signal = |u, v| light.gray(image, u, v);
-            let traced = trace(camera, &course, options.support_min_px as usize, signal, scratch)?;
-            if traced.share < options.guided_min_share {
+            let support_min = (f64::from(options.support_min_px) / stride_px) as usize;
+            let traced = trace_every(stride_px, camera, &course, support_min, signal, scratch)?;
+            if traced.share < least_share {
                 return None;
             }
             *ray = Some(traced.ray);

@@ -83,7 +83,7 @@ pub(super) fn find(
                 if rays[0].segment == rays[2].segment || between < options.ray_angle_min_rad.sin() {
                     continue;
                 }
-                let px_per_rad = segment.length_px / segment.ends[0].angle(&segment.ends[1]);
+                let px_per_rad = segment.px_per_rad;
                 if place.angle(other_place) * px_per_rad > 2.0 * LOOSE_PX {
                     continue;
                 }
@@ -103,6 +103,12 @@ pub(super) fn meeting(segments: &[Segment], a: RayEnd, b: RayEnd, options: &Gene
     if a.segment == b.segment {
         return None;
     }
+    // Both begin near the crossing, so they begin near each other.
+    let widest_px = |segment: &Segment| options.gap_max_px.max(options.gap_max_share * segment.length_px);
+    let reach_rad = |segment: &Segment| widest_px(segment).max(options.overshoot_max_px) / segment.px_per_rad;
+    if (a.near(segments) - b.near(segments)).norm() > reach_rad(first) + reach_rad(second) {
+        return None;
+    }
     let crossing = first.normal.cross(&second.normal);
     if crossing.norm() < options.ray_angle_min_rad.sin() {
         return None;
@@ -111,14 +117,11 @@ pub(super) fn meeting(segments: &[Segment], a: RayEnd, b: RayEnd, options: &Gene
     let place = if crossing.dot(a.near(segments)) < 0.0 { -crossing } else { crossing };
     let mut gap_share = 0.0;
     for (ray, segment) in [(a, first), (b, second)] {
-        let length = segment.ends[0].angle(&segment.ends[1]);
-        let px_per_rad = segment.length_px / length;
         let (near, far) = (ray.near(segments), ray.far(segments));
         // Positive where the segment begins beyond the crossing.
         let sign = if place.cross(near).dot(&near.cross(far)) < 0.0 { -1.0 } else { 1.0 };
-        let gap_px = sign * place.angle(near) * px_per_rad;
-        let widest = options.gap_max_px.max(options.gap_max_share * segment.length_px);
-        if gap_px < -options.overshoot_max_px || gap_px > widest {
+        let gap_px = sign * place.angle(near) * segment.px_per_rad;
+        if gap_px < -options.overshoot_max_px || gap_px > widest_px(segment) {
             return None;
         }
         gap_share += gap_px.abs() / segment.length_px;

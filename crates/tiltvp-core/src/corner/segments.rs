@@ -29,6 +29,8 @@ pub struct Segment {
     pub ends_px: [Vector2<f64>; 2],
     /// Distance of its ends in pixels.
     pub length_px: f64,
+    /// Pixels per radian along it.
+    pub px_per_rad: f64,
 }
 
 /// The pixels that are looked at, which are the same for every image of a camera.
@@ -36,6 +38,9 @@ pub struct Segment {
 pub(super) struct SegmentFinder {
     region: Region,
     edges: EdgeOptions,
+    /// For each row its one span of pixels: the first column, one past the last, and the slot of the first; none for rows
+    /// with several spans.
+    rows: Vec<Option<(usize, usize, usize)>>,
 }
 
 /// Memory for one thread.
@@ -61,7 +66,30 @@ impl SegmentFinder {
             elevation_max_rad: std::f64::consts::FRAC_PI_2,
             margin_px: options.margin_px.max(2.0),
         };
-        Ok(Self { region: Region::new(camera, &Matrix3::identity(), &edges, mask)?, edges })
+        let region = Region::new(camera, &Matrix3::identity(), &edges, mask)?;
+        let mut spans_in = vec![0_u32; camera.height() as usize];
+        let mut rows = vec![None; camera.height() as usize];
+        for span in region.spans() {
+            spans_in[span.v] += 1;
+            rows[span.v] = (spans_in[span.v] == 1).then_some((span.first, span.end, span.slot));
+        }
+        Ok(Self { region, edges, rows })
+    }
+
+    /// The unit bearing of a place a share of a pixel from the pixel `(u, v)` that is number `slot`, along the row or the
+    /// column; between the bearings of pixel centres where both are known.
+    fn bearing(&self, camera: &Camera, slot: usize, (u, v): (usize, usize), shift: (f64, f64)) -> Option<Vector3<f64>> {
+        let step = |at: usize, by: f64| if by < 0.0 { at.checked_sub(1) } else { Some(at + usize::from(by > 0.0)) };
+        let beside = || {
+            let (u, v) = (step(u, shift.0)?, step(v, shift.1)?);
+            let (first, end, start) = (*self.rows.get(v)?)?;
+            (first..end).contains(&u).then(|| start + u - first)
+        };
+        let between = || {
+            let (here, there) = (self.region.bearing(slot)?, self.region.bearing(beside()?)?);
+            (here + (there - here) * shift.0.abs().max(shift.1.abs())).try_normalize(0.5)
+        };
+        between().or_else(|| camera.unproject(&Vector2::new(u as f64 + shift.0, v as f64 + shift.1)))
     }
 
     /// Memory for one thread.
@@ -144,8 +172,8 @@ impl SegmentFinder {
                 let shift = f64::from(ridge.shift_px()[i]);
                 let along_u = gx[i].abs() >= gy[i].abs();
                 let (du, dv) = if along_u { (shift, 0.0) } else { (0.0, shift) };
-                let pixel = Vector2::new(u as f64 + du, v as f64 + dv);
-                camera.unproject(&pixel).map(|bearing| (pixel, bearing))
+                let bearing = self.bearing(camera, slots[i] as usize, (u, v), (du, dv))?;
+                Some((Vector2::new(u as f64 + du, v as f64 + dv), bearing))
             }));
             // Along the edge, which is across the mean gradient.
             let along = Vector2::new(f64::from(-sum[1]), f64::from(sum[0]));
@@ -188,7 +216,7 @@ fn split(
         let onto = |bearing: &Vector3<f64>| (bearing - normal * normal.dot(bearing)).normalize();
         let ends = [onto(first), onto(last)];
         let [Some(a), Some(b)] = ends.map(|end| camera.project(&end)) else { return };
-        segments.push(Segment { normal, ends, ends_px: [a, b], length_px });
+        segments.push(Segment { normal, ends, ends_px: [a, b], length_px, px_per_rad });
     } else if distance > 0.5 * options.segment_threshold_px && at > 0 && at + 1 < points.len() {
         split(camera, &points[..=at], options, segments);
         split(camera, &points[at..], options, segments);

@@ -14,6 +14,9 @@ const ERRING_TOGETHER: f64 = 4.0;
 /// The least standard deviation of one profile's place, in pixels, however well the profiles agree.
 const PLACE_SIGMA_MIN_PX: f64 = 0.05;
 
+/// Longest gap in a ray whose places are alike: what comes after a longer one is something else.
+const GAP_MAX_PX: usize = 12;
+
 /// Longest profile, in samples.
 const PROFILE_MAX: usize = 41;
 
@@ -32,16 +35,50 @@ pub(super) struct Course {
     pub(super) search_px: f64,
     /// Least step across the edge, in the units of the signal.
     pub(super) step_min: f64,
+    /// The least step as a share of those next to the vertex, of the same sign; 0 where what is beside the edge may change
+    /// along it.
+    pub(super) step_share_min: f64,
     /// Largest distance of a profile's edge from the fitted circle, in pixels.
     pub(super) threshold_px: f64,
     /// What no profile tells: how far either end of a whole ray may be off, in pixels.
     pub(super) ray_sigma_px: f64,
 }
 
+/// Where a profile crosses a ray.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Crossing {
+    pub(super) pixel: Vector2<f64>,
+    /// Unit vector of the image across the ray.
+    pub(super) across: Vector2<f64>,
+    /// Pixels per radian along the ray.
+    pub(super) pace: f64,
+    /// Pixels along `across` per radian towards the ray's normal.
+    pub(super) px_per_rad: f64,
+}
+
+impl Course {
+    /// The profile at an angle from the vertex.
+    pub(super) fn crossing(&self, camera: &Camera, angle_rad: f64) -> Option<Crossing> {
+        let along = self.normal.cross(&self.vertex).try_normalize(1e-9)?;
+        let (sin, cos) = angle_rad.sin_cos();
+        let (bearing, onwards) = (self.vertex * cos + along * sin, along * cos - self.vertex * sin);
+        let (pixel, jacobian) = camera.project_jacobian(&bearing)?;
+        let (forwards, sideways) = (jacobian * onwards, jacobian * self.normal);
+        let pace = forwards.norm();
+        let across = Vector2::new(-forwards.y, forwards.x) / pace;
+        (pace > 0.0).then(|| Crossing { pixel, across, pace, px_per_rad: sideways.dot(&across) })
+    }
+}
+
 /// A place of the edge.
 #[derive(Debug, Clone, Copy)]
 struct Place {
+    /// Which profile of the ray it is from.
+    profile: usize,
     along_rad: f64,
+    /// Distance from the expected circle, in radians.
+    shift_rad: f64,
+    step: f64,
     rad_per_px: f64,
 }
 
@@ -60,6 +97,7 @@ pub(super) struct Traced {
 pub(super) struct TraceScratch {
     rows: Rows<f64>,
     places: Vec<Place>,
+    steps: Vec<f64>,
     weights: Vec<f32>,
     ransac: RansacScratch,
 }
@@ -73,7 +111,19 @@ pub(super) fn trace(
     signal: impl Fn(f64, f64) -> Option<f64>,
     scratch: &mut TraceScratch,
 ) -> Option<Traced> {
-    let TraceScratch { rows, places, weights, ransac: memory } = scratch;
+    trace_every(1.0, camera, course, support_min, signal, scratch)
+}
+
+/// The same with places `stride_px` pixels apart along the ray.
+pub(super) fn trace_every(
+    stride_px: f64,
+    camera: &Camera,
+    course: &Course,
+    support_min: usize,
+    signal: impl Fn(f64, f64) -> Option<f64>,
+    scratch: &mut TraceScratch,
+) -> Option<Traced> {
+    let TraceScratch { rows, places, steps, weights, ransac: memory } = scratch;
     rows.clear();
     places.clear();
     let along = course.normal.cross(&course.vertex).try_normalize(1e-9)?;
@@ -82,17 +132,9 @@ pub(super) fn trace(
     let profile = &mut profile[..=2 * half];
     let (mut angle, mut looked_at) = (course.from_rad, 0_usize);
     while angle <= course.to_rad {
-        let (sin, cos) = angle.sin_cos();
-        let (bearing, onwards) = (course.vertex * cos + along * sin, along * cos - course.vertex * sin);
-        let Some((pixel, jacobian)) = camera.project_jacobian(&bearing) else { break };
-        let (forwards, sideways) = (jacobian * onwards, jacobian * course.normal);
-        let pace = forwards.norm();
-        if pace.is_nan() || pace <= 0.0 {
-            break;
-        }
-        let across = Vector2::new(-forwards.y, forwards.x) / pace;
-        let px_per_rad = sideways.dot(&across);
-        angle += 1.0 / pace;
+        let Some(Crossing { pixel, across, pace, px_per_rad }) = course.crossing(camera, angle) else { break };
+        let along_rad = angle;
+        angle += stride_px / pace;
         looked_at += 1;
         let mut inside = true;
         for (i, value) in profile.iter_mut().enumerate() {
@@ -103,10 +145,17 @@ pub(super) fn trace(
             }
         }
         let found = if inside { edge_place(profile, course.search_px, course.step_min) } else { None };
-        let Some(EdgePlace { shift, .. }) = found else { continue };
+        let Some(EdgePlace { shift, step }) = found else { continue };
+        let (shift_rad, rad_per_px) = (shift / px_per_rad, 1.0 / px_per_rad.abs());
+        places.push(Place { profile: looked_at, along_rad, shift_rad, step, rad_per_px });
+    }
+    if course.step_share_min > 0.0 && !places.is_empty() {
+        keep_alike(places, course.step_share_min, support_min, steps);
+    }
+    for place in places.iter() {
         // In the chart of the ray: x along the vertex, y along the ray, z the expected normal.
-        rows.push(cos, sin, shift / px_per_rad);
-        places.push(Place { along_rad: angle - 1.0 / pace, rad_per_px: 1.0 / px_per_rad.abs() });
+        let (sin, cos) = place.along_rad.sin_cos();
+        rows.push(cos, sin, place.shift_rad);
     }
     if places.len() < support_min.max(2) {
         return None;
@@ -157,4 +206,17 @@ pub(super) fn trace(
         residual_rms_rad: rms,
     };
     Some(Traced { ray, share: support as f64 / looked_at.max(1) as f64, px_per_rad: 1.0 / rad_per_px })
+}
+
+/// Keeps the places whose steps are at least a share of the median of the first ones, up to the first gap.
+fn keep_alike(places: &mut Vec<Place>, step_share_min: f64, first: usize, steps: &mut Vec<f64>) {
+    steps.clear();
+    steps.extend(places.iter().take(first.max(1)).map(|place| place.step));
+    let middle = steps.len() / 2;
+    let (_, median, _) = steps.select_nth_unstable_by(middle, f64::total_cmp);
+    let median = *median;
+    places.retain(|place| place.step * median >= step_share_min * median * median);
+    if let Some(gap) = places.windows(2).position(|pair| pair[1].profile - pair[0].profile > GAP_MAX_PX) {
+        places.truncate(gap + 1);
+    }
 }

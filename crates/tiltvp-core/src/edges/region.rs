@@ -153,6 +153,12 @@ impl Region {
         self.places.get(slot).copied().unwrap_or_default()
     }
 
+    /// The unit bearing of the pixel `slot` in the robot frame; none beyond the region.
+    #[inline]
+    pub fn bearing(&self, slot: usize) -> Option<&Vector3<f64>> {
+        self.bearings.get(slot)
+    }
+
     /// Each pixel `(u, v)` of the region with its bearing in the robot frame, in slot order.
     pub fn pixels(&self) -> impl Iterator<Item = (usize, usize, Vector3<f64>)> + '_ {
         self.places.iter().zip(&self.bearings).map(|((u, v), bearing)| (usize::from(*u), usize::from(*v), *bearing))

@@ -1,13 +1,33 @@
 //! `CornerEstimate` and `CornerHypothesis`: what a frame tells, as frozen Python values.
 
-use nalgebra::Matrix3;
-use numpy::{PyArray1, PyArray2, PyArrayMethods};
+use nalgebra::Vector3;
+use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
-use pyo3::types::PyDict;
-use tiltvp_core::corner::{self as core, Hypothesis};
+use pyo3::types::{PyDict, PyTuple, PyType};
+use tiltvp_core::corner::{self as core, Hypothesis, Verdict};
 
 use super::feature::CornerFeature;
+use super::matrix;
+use crate::call::invalid;
 use crate::convert;
+
+/// Keys of the dict of a `CornerHypothesis`.
+const KEYS: [&str; 7] =
+    ["camera_from_object", "edges", "vertex_m", "covariance", "probability", "right_handed", "misfit"];
+
+/// Keys of the dict of a `CornerEstimate`.
+const ESTIMATE_KEYS: [&str; 10] = [
+    "hypotheses",
+    "reason",
+    "features_left",
+    "features_right",
+    "chosen_left",
+    "chosen_right",
+    "edge_lengths_m",
+    "edge_ends_m",
+    "followed",
+    "object",
+];
 
 /// One explanation of what is seen: an attitude, from two cameras also a place, and how likely it is.
 #[pyclass(frozen, module = "tiltvp._core")]
@@ -27,17 +47,13 @@ impl CornerEstimate {
     }
 }
 
-fn rotation<'py>(py: Python<'py>, matrix: &Matrix3<f64>) -> PyResult<Bound<'py, PyArray2<f64>>> {
-    PyArray1::from_slice(py, matrix.transpose().as_slice()).reshape([3, 3])
-}
-
 #[pymethods]
 impl CornerHypothesis {
     /// Fresh (3, 3) float64: the rotation from the object's frame (y along the vertical edge, away from the vertex, x along
     /// the edge x) to the left camera's.
     #[getter]
     fn camera_from_object<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        rotation(py, &self.inner.camera_from_object)
+        matrix::to_array(py, &self.inner.camera_from_object)
     }
 
     /// Fresh (3, 3) float64, rows x, y, z: directions of the corner's edges away from its vertex, left camera's frame. The
@@ -63,7 +79,7 @@ impl CornerHypothesis {
     /// (metres; zero from one image).
     #[getter]
     fn covariance<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        PyArray1::from_slice(py, self.inner.covariance.as_slice()).reshape([6, 6])
+        matrix::to_array(py, &self.inner.covariance)
     }
 
     /// The probability that it is this one, in [0, 1].
@@ -97,15 +113,46 @@ impl CornerHypothesis {
     /// Plain numbers and lists, good for JSON.
     fn to_dict<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let (own, dict) = (&self.inner, PyDict::new(py));
-        let rows: Vec<Vec<f64>> = own.camera_from_object.row_iter().map(|row| row.iter().copied().collect()).collect();
-        dict.set_item("camera_from_object", rows)?;
+        dict.set_item("camera_from_object", matrix::nested(&own.camera_from_object))?;
+        dict.set_item("edges", own.edges.map(<[f64; 3]>::from))?;
         dict.set_item("vertex_m", own.vertex_m.map(<[f64; 3]>::from))?;
-        let rows: Vec<Vec<f64>> = own.covariance.row_iter().map(|row| row.iter().copied().collect()).collect();
-        dict.set_item("covariance", rows)?;
+        dict.set_item("covariance", matrix::nested(&own.covariance))?;
         dict.set_item("probability", own.probability)?;
         dict.set_item("right_handed", own.right_handed)?;
         dict.set_item("misfit", own.misfit)?;
         Ok(dict)
+    }
+
+    /// The hypothesis that `to_dict` wrote.
+    #[classmethod]
+    fn from_dict(_cls: &Bound<'_, PyType>, values: &Bound<'_, PyDict>) -> PyResult<Self> {
+        convert::known_keys(values, &KEYS)?;
+        let edges: [[f64; 3]; 3] = convert::item(values, "edges", "three rows of three numbers")?;
+        let vertex_m: Option<[f64; 3]> = convert::item(values, "vertex_m", "three numbers or None")?;
+        Ok(Self {
+            inner: Hypothesis {
+                camera_from_object: matrix::item(values, "camera_from_object")?,
+                edges: edges.map(Vector3::from),
+                vertex_m: vertex_m.map(Vector3::from),
+                covariance: matrix::item(values, "covariance")?,
+                probability: convert::item(values, "probability", "a number")?,
+                right_handed: convert::item(values, "right_handed", "True or False")?,
+                misfit: convert::item(values, "misfit", "a number")?,
+            },
+        })
+    }
+
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyTuple>> {
+        let py = slf.py();
+        (slf.get_type().getattr("from_dict")?, (slf.get().to_dict(py)?,)).into_pyobject(py)
+    }
+
+    fn __copy__<'py>(slf: &Bound<'py, Self>) -> Bound<'py, Self> {
+        slf.clone()
+    }
+
+    fn __deepcopy__<'py>(slf: &Bound<'py, Self>, _memo: &Bound<'py, PyAny>) -> Bound<'py, Self> {
+        slf.clone()
     }
 }
 
@@ -159,6 +206,22 @@ impl CornerEstimate {
         self.inner.chosen_right
     }
 
+    /// Fresh (3,) float64: how long the edges x, y, z are, metres, to where lines along the others meet them; NaN where no
+    /// image shows that. From two grey images and with right angles.
+    #[getter]
+    fn edge_lengths_m<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        let lengths = self.inner.ends.map(|end| end.map_or(f64::NAN, |end| end.length_m));
+        PyArray1::from_slice(py, &lengths)
+    }
+
+    /// Fresh (3, 3) float64, rows x, y, z: where these edges end in the left camera's frame, metres, from both images alone; NaN
+    /// where only one of them shows it, or none.
+    #[getter]
+    fn edge_ends_m<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        let place = |end: core::EdgeEnd| end.place_m.map(<[f64; 3]>::from);
+        convert::to_rows(py, &self.inner.ends.map(|end| end.and_then(place).unwrap_or([f64::NAN; 3])), false)
+    }
+
     /// Whether the pose of a frame before was a prior.
     #[getter]
     fn followed(&self) -> bool {
@@ -186,5 +249,70 @@ impl CornerEstimate {
 
     fn __eq__(&self, other: &Bound<'_, PyAny>) -> bool {
         other.cast::<Self>().is_ok_and(|other| self.inner == other.get().inner)
+    }
+
+    /// Plain numbers and lists, good for JSON.
+    fn to_dict<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let (own, dict) = (&self.inner, PyDict::new(py));
+        let hypotheses = own.hypotheses.iter().map(|inner| CornerHypothesis { inner: *inner }.to_dict(py));
+        dict.set_item("hypotheses", hypotheses.collect::<PyResult<Vec<_>>>()?)?;
+        dict.set_item("reason", own.verdict.reason())?;
+        for (key, features) in ["features_left", "features_right"].into_iter().zip(&own.features) {
+            let features = features.iter().map(|inner| CornerFeature::new(inner).to_dict(py));
+            dict.set_item(key, features.collect::<PyResult<Vec<_>>>()?)?;
+        }
+        dict.set_item("chosen_left", own.chosen_left.clone())?;
+        dict.set_item("chosen_right", own.chosen_right)?;
+        dict.set_item("edge_lengths_m", own.ends.map(|end| end.map(|end| end.length_m)))?;
+        let place = |end: core::EdgeEnd| end.place_m.map(<[f64; 3]>::from);
+        dict.set_item("edge_ends_m", own.ends.map(|end| end.and_then(place)))?;
+        dict.set_item("followed", own.followed)?;
+        dict.set_item("object", own.object)?;
+        Ok(dict)
+    }
+
+    /// The estimate that `to_dict` wrote.
+    #[classmethod]
+    fn from_dict(cls: &Bound<'_, PyType>, values: &Bound<'_, PyDict>) -> PyResult<Self> {
+        convert::known_keys(values, &ESTIMATE_KEYS)?;
+        let dicts = |key: &str| convert::item::<Vec<Bound<'_, PyDict>>>(values, key, "a list of dicts");
+        let features = |key: &str| -> PyResult<Vec<core::CornerFeature>> {
+            dicts(key)?.iter().map(|values| Ok(*CornerFeature::from_dict(cls, values)?.inner())).collect()
+        };
+        let reason: String = convert::item(values, "reason", "a string")?;
+        let verdict = Verdict::ALL.into_iter().find(|verdict| verdict.reason() == reason);
+        let verdict =
+            verdict.ok_or_else(|| invalid(format!("reason: {reason:?}, expected one that `reason` gives")))?;
+        let lengths: [Option<f64>; 3] = convert::item(values, "edge_lengths_m", "three numbers or None")?;
+        let places: [Option<[f64; 3]>; 3] = convert::item(values, "edge_ends_m", "three places or None")?;
+        let end =
+            |k: usize| lengths[k].map(|length_m| core::EdgeEnd { length_m, place_m: places[k].map(Vector3::from) });
+        let hypotheses = dicts("hypotheses")?;
+        let hypotheses = hypotheses.iter().map(|values| Ok(CornerHypothesis::from_dict(cls, values)?.inner));
+        Ok(Self {
+            inner: core::CornerEstimate {
+                hypotheses: hypotheses.collect::<PyResult<_>>()?,
+                verdict,
+                features: [features("features_left")?, features("features_right")?],
+                chosen_left: convert::item(values, "chosen_left", "whole numbers")?,
+                chosen_right: convert::item(values, "chosen_right", "a whole number or None")?,
+                ends: [end(0), end(1), end(2)],
+                followed: convert::item(values, "followed", "True or False")?,
+                object: convert::item(values, "object", "a whole number")?,
+            },
+        })
+    }
+
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyTuple>> {
+        let py = slf.py();
+        (slf.get_type().getattr("from_dict")?, (slf.get().to_dict(py)?,)).into_pyobject(py)
+    }
+
+    fn __copy__<'py>(slf: &Bound<'py, Self>) -> Bound<'py, Self> {
+        slf.clone()
+    }
+
+    fn __deepcopy__<'py>(slf: &Bound<'py, Self>, _memo: &Bound<'py, PyAny>) -> Bound<'py, Self> {
+        slf.clone()
     }
 }

@@ -101,7 +101,7 @@ impl CornerFeature {
     }
 
     /// Plain numbers and lists, good for JSON.
-    fn to_dict<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+    pub(super) fn to_dict<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let dict = PyDict::new(py);
         let rays = self.inner.rays();
         let rows = |pick: fn(&FittedRay) -> Vector3<f64>| rays.map(|ray| <[f64; 3]>::from(pick(&ray)));
@@ -117,7 +117,7 @@ impl CornerFeature {
 
     /// The corner that `to_dict` wrote.
     #[classmethod]
-    fn from_dict(_cls: &Bound<'_, PyType>, values: &Bound<'_, PyDict>) -> PyResult<Self> {
+    pub(super) fn from_dict(_cls: &Bound<'_, PyType>, values: &Bound<'_, PyDict>) -> PyResult<Self> {
         convert::known_keys(values, &KEYS)?;
         let rows = |key: &str| convert::item::<[[f64; 3]; 3]>(values, key, "three rows of three numbers");
         let (normals, toward) = (rows("normals")?, rows("toward")?);

@@ -1,0 +1,72 @@
+"""What an estimate in a rendered room is of: a corner of the list of the scene's, or one that the list lacks."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import product
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from tiltvp.corner_images import CornerEstimate, CornerHypothesis
+from tiltvp.synth import StereoSequence
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+__all__ = ["own_places", "truth_near"]
+
+_SAME_M: Final = 0.08
+"""An estimate is of the listed corner that is this near."""
+
+_BESIDE_M: Final = 1.0
+"""Corners that are this near may be of the same piece of furniture, and their edges parallel."""
+
+_QUARTER: Final = np.array([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]])
+_NAMINGS: Final = [
+    np.linalg.matrix_power(_QUARTER, k) @ np.diag([1.0, over, over]) for k, over in product(range(4), (1.0, -1.0))
+]
+"""An object's axes keep their directions from corner to corner, whichever way the edges of each run along them."""
+
+
+def own_places(sequence: StereoSequence, estimates: Sequence[CornerEstimate]) -> dict[int, NDArray[np.float64]]:
+    """For each number of an object its median place in the world, by the true motion."""
+    seen: dict[int, list[NDArray[np.float64]]] = {}
+    for world_from_left, estimate in zip(sequence.poses_at(sequence.times_s), estimates, strict=False):
+        pose = estimate.pose
+        if pose is not None and pose.vertex_m is not None:
+            place = world_from_left[:3, :3] @ pose.vertex_m + world_from_left[:3, 3]
+            seen.setdefault(estimate.object, []).append(place)
+    return {number: np.median(places, axis=0) for number, places in seen.items()}
+
+
+def truth_near(
+    sequence: StereoSequence, frame: int, pose: CornerHypothesis, own_place_m: NDArray[np.float64]
+) -> tuple[int, NDArray[np.float64]]:
+    """The listed corner that an estimate is of, or -1, and its pose (4, 4) in the left camera.
+
+    Where none is near the place is `own_place_m`, in the world, which tells how steady estimates are and not whether
+    they are right; the attitude is that of the room's walls or of a corner beside it. Axes are named as the estimate
+    has them.
+    """
+    assert pose.vertex_m is not None
+    from_world = np.linalg.inv(sequence.poses_at([sequence.times_s[frame]])[0])
+    corners = sequence.corners
+    vertices = np.array([corner.position_m for corner in corners]) @ from_world[:3, :3].T + from_world[:3, 3]
+    away = np.linalg.norm(vertices - pose.vertex_m, axis=1)
+    number = int(np.argmin(away))
+    truth = np.eye(4)
+    if away[number] <= _SAME_M:
+        # Of corners in one place, as of stacked boxes, the one nearest to the estimate.
+        candidates = np.flatnonzero(away < away[number] + 1e-6)
+        truth[:3, 3] = vertices[number]
+    else:
+        number = -1
+        # The room's own corners come first.
+        candidates = np.union1d([0], np.flatnonzero(away <= _BESIDE_M))
+        truth[:3, 3] = from_world[:3, :3] @ own_place_m + from_world[:3, 3]
+    every = [
+        (int(k), from_world[:3, :3] @ corners[k].world_from_object @ naming) for k in candidates for naming in _NAMINGS
+    ]
+    nearest, truth[:3, :3] = max(every, key=lambda one: float(np.trace(one[1] @ pose.camera_from_object.T)))
+    return (number if number < 0 else nearest), truth
