@@ -133,7 +133,7 @@ def check(odometry: NDArray[np.float64], seen: NDArray[np.float64]) -> None:
 
 
 def compare(drive: SimulatedDrive, landmarks: int, rounds: int) -> dict[str, NDArray[np.float64]]:
-    """Of each filter by name the (N,) seconds of its steps, each the median of rounds in which all filters take turns."""
+    """Of each filter by name the (N,) seconds of its steps, each the median of rounds in which all take turns."""
     odometry, names = drive.odometry, np.arange(landmarks)
     seen = drive.bearings[:, 2].reshape(len(odometry), landmarks)
     check(odometry, seen)
