@@ -27,6 +27,15 @@ const CLEAR_OF_END_PX: f64 = 3.0;
 /// The least step of a place as a share of those next to the vertex: two faces are as different all along their edge.
 const STEP_SHARE_MIN: f64 = 0.5;
 
+/// The part of an image that is looked at.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Window {
+    /// Columns.
+    pub columns: std::ops::Range<usize>,
+    /// Rows.
+    pub rows: std::ops::Range<usize>,
+}
+
 /// Memory of the front end.
 #[derive(Debug, Clone, Default)]
 pub(super) struct ColouredScratch {
@@ -56,7 +65,7 @@ pub(super) fn find(
     image: &ColorView<'_>,
     options: &ColouredOptions,
     light: &LightTable,
-    window: &super::detector::Window,
+    window: &Window,
     scratch: &mut ColouredScratch,
 ) -> Option<CornerFeature> {
     scratch.labels.fill(

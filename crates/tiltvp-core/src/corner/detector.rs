@@ -3,7 +3,7 @@
 use nalgebra::{Matrix3, Vector3};
 
 use super::attitude::{IncludedAngle, corner_attitudes};
-use super::coloured::{self, ColouredScratch};
+use super::coloured::{self, ColouredScratch, Window};
 use super::completion::complete;
 use super::ends::{Seen, SeenEnd, seen_ends};
 use super::estimate::Hypothesis;
@@ -17,15 +17,6 @@ use crate::edges::Mask;
 use crate::error::{Error, Result};
 use crate::geometry::RigidMotion;
 use crate::image::{ColorView, ImageView, LightTable};
-
-/// The part of an image that is looked at.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Window {
-    /// Columns.
-    pub columns: std::ops::Range<usize>,
-    /// Rows.
-    pub rows: std::ops::Range<usize>,
-}
 
 /// Finds corners in single images of one camera.
 #[derive(Debug, Clone)]

@@ -39,7 +39,8 @@ mod vertex;
 mod voices;
 
 pub use self::attitude::{CornerAttitude, CornerAttitudes, IncludedAngle, corner_attitudes};
-pub use self::detector::{CornerDetector, CornerScratch, Window};
+pub use self::coloured::Window;
+pub use self::detector::{CornerDetector, CornerScratch};
 pub use self::ends::EdgeEnd;
 pub use self::estimate::{CornerEstimate, Hypothesis, Verdict};
 pub use self::estimator::{CornerPoseEstimator, Frame};

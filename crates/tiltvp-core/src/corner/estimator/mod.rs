@@ -1,22 +1,22 @@
 //! From images to poses: corners found in one image or a pair, resolved, and followed from frame to frame.
 
+mod pairs;
+mod transfer;
+
 use nalgebra::{Matrix3, Matrix6, Vector3};
 
-use super::attitude::{IncludedAngle, corner_attitudes};
-use super::consensus::{agreement, apart, fits, renamed, weight};
+use super::attitude::IncludedAngle;
+use super::consensus::{agreement, fits, renamed, weight};
 use super::detector::{CornerDetector, CornerScratch};
 use super::ends::{EdgeEnd, edge_ends};
 use super::estimate::{CornerEstimate, Hypothesis, Verdict};
 use super::estimator_options::EstimatorOptions;
-use super::fusion::fuse_rays;
 use super::guided::Expected;
 use super::options::CornerMethod;
-use super::position::{Sighting, triangulate};
 use super::prior::{AttitudePrior, VerticalSense};
 use super::resolve::{Alignment, View, resolve};
 use super::track::Track;
 use super::vertex::CornerFeature;
-use super::voices::Voices;
 use crate::error::{Error, Result};
 use crate::geometry::RigidMotion;
 use crate::image::{ColorView, ImageView};
@@ -237,98 +237,6 @@ impl CornerPoseEstimator {
         Ok(self.track.as_ref().map(|track| track.pose.camera_from_object))
     }
 
-    /// Adds the corners of which two edges were found and the third is known from an attitude in the left camera's frame.
-    fn add_completed(
-        &mut self,
-        left: &Frame<'_>,
-        right: Option<&Frame<'_>>,
-        attitude: &Matrix3<f64>,
-        features: &mut [Vec<CornerFeature>; 2],
-    ) {
-        // The vertical is the axis nearest to what is known of it, so that edges are named as those found before.
-        let attitude = self.vertical().map_or(*attitude, |vertical| upright(attitude, &vertical));
-        let most_rad = self.options.agree_max_rad;
-        let mut found = Vec::new();
-        let mut add =
-            |detector: &CornerDetector, frame: &Frame<'_>, own: Matrix3<f64>, scratch: &mut _, side: usize| {
-                if let Frame::Gray(image) = frame {
-                    found.clear();
-                    detector.complete(image, &own, scratch, &mut found);
-                    features[side].extend(found.iter().filter(|corner| fits(corner, &own, most_rad)));
-                }
-            };
-        add(&self.left, left, attitude, &mut self.scratch[0], 0);
-        if let (Some((detector, motion)), Some(right)) = (&self.right, right) {
-            add(detector, right, motion.rotation.transpose() * attitude, &mut self.scratch[1], 1);
-        }
-    }
-
-    /// Adds the corners of either image to those of the other one where they are seen there: each is looked for along its
-    /// epipolar line, near the distance of the last pose where there is one.
-    fn add_transferred(
-        &mut self,
-        frames: [&Frame<'_>; 2],
-        attitude: &Matrix3<f64>,
-        features: &mut [Vec<CornerFeature>; 2],
-    ) -> Result<()> {
-        let Some((detector, left_from_right)) = &self.right else { return Ok(()) };
-        let right_from_left = left_from_right.inverse();
-        let detectors = [&self.left, detector];
-        let attitudes = [*attitude, right_from_left.rotation * attitude];
-        let (angle, most_rad) = (self.options.angle, self.options.agree_max_rad);
-        let mut found: [Vec<CornerFeature>; 2] = [Vec::new(), Vec::new()];
-        for (own, other, other_from_own) in [(0, 1, &right_from_left), (1, 0, left_from_right)] {
-            let Frame::Gray(image) = frames[other] else { continue };
-            let mut order: Vec<&CornerFeature> = features[own].iter().collect();
-            order.sort_by(|a, b| weight(b).total_cmp(&weight(a)));
-            for corner in order.into_iter().take(TRANSFERRED_MAX) {
-                let admitted = corner_attitudes(corner, &angle)?;
-                let near = admitted.iter().find(|admitted| {
-                    let renamed = renamed(&admitted.camera_from_object, &attitudes[own]);
-                    apart(&renamed, &attitudes[own]) <= most_rad
-                });
-                let Some(near) = near else { continue };
-                let mut best: Option<CornerFeature> = None;
-                for distance_m in self.distances(detectors[other], &corner.vertex(), other_from_own) {
-                    let expected = Expected::transferred(corner, &near.edges, distance_m, other_from_own);
-                    let seen = expected.and_then(|expected| {
-                        detectors[other].find_near(image, &expected, Some(EPIPOLAR_STEP_PX), &mut self.scratch[other])
-                    });
-                    let Some(seen) = seen.filter(|seen| fits(seen, &attitudes[other], most_rad)) else { continue };
-                    if best.as_ref().is_none_or(|best| weight(&seen) > weight(best)) {
-                        best = Some(seen);
-                    }
-                }
-                found[other].extend(best);
-            }
-        }
-        for (features, found) in features.iter_mut().zip(found) {
-            features.extend(found);
-        }
-        Ok(())
-    }
-
-    /// Distances of a point along a bearing of one camera, so that the other one sees them a step apart; only those near that of
-    /// the last pose, where there is one.
-    fn distances(&self, other: &CornerDetector, bearing: &Vector3<f64>, other_from_own: &RigidMotion) -> Vec<f64> {
-        let [nearest, farthest] = self.options.distance_m;
-        let last = self.track.as_ref().and_then(|track| track.pose.vertex_m).map(|vertex| vertex.norm());
-        let (near, far) = last.map_or((nearest, farthest), |last| (last * (1.0 - NEAR_LAST), last * (1.0 + NEAR_LAST)));
-        let mut out = Vec::new();
-        let mut before: Option<nalgebra::Vector2<f64>> = None;
-        for step in 0..=DISTANCES {
-            let share = f64::from(step) / f64::from(DISTANCES);
-            let distance_m = 1.0 / (1.0 / far + share * (1.0 / near - 1.0 / far));
-            let Some(pixel) = other.camera().project(&other_from_own.point(&(bearing * distance_m))) else { continue };
-            let moved = before.is_none_or(|before| (pixel - before).norm() >= EPIPOLAR_STEP_PX);
-            if moved && other.camera().contains(&pixel) {
-                out.push(distance_m);
-                before = Some(pixel);
-            }
-        }
-        out
-    }
-
     /// Whether edges and object are the same from frame to frame, as those of the coloured cuboid are.
     fn is_one_object(&self) -> bool {
         matches!(self.left.options().method, CornerMethod::Coloured(_))
@@ -379,153 +287,10 @@ impl CornerPoseEstimator {
             _ => attitude,
         }
     }
-
-    /// Every pose that the rays of one corner in both images admit, the likeliest first. The attitudes of either image start the
-    /// fit to all six rays, so that a view that alone says little (two rays in line) does no harm.
-    fn pair_poses(
-        &self,
-        [left, right]: [&CornerFeature; 2],
-        left_from_right: &RigidMotion,
-        priors: &[AttitudePrior],
-    ) -> Result<Vec<Hypothesis>> {
-        let cameras = [(left, RigidMotion::identity()), (right, left_from_right.inverse())];
-        let sighting = |corner: &CornerFeature, rig_from_camera| Sighting {
-            bearing: corner.vertex(),
-            covariance: corner.vertex_covariance(),
-            rig_from_camera,
-        };
-        let seen = [sighting(left, RigidMotion::identity()), sighting(right, *left_from_right)];
-        let Some(vertex) = triangulate(&seen) else { return Ok(Vec::new()) };
-        let mut found: Vec<(f64, Hypothesis)> = Vec::new();
-        for (corner, rotation) in [(left, Matrix3::identity()), (right, left_from_right.rotation)] {
-            for own in corner_attitudes(corner, &self.options.angle)?.iter() {
-                let right_handed = own.is_right_handed();
-                if self.right_handed().is_some_and(|wanted| wanted != right_handed) {
-                    continue;
-                }
-                let (start, side) = (rotation * own.camera_from_object, if right_handed { 1.0 } else { -1.0 });
-                let Some(fused) = fuse_rays(&cameras, &self.options.angle, side, &start, &vertex.point_m) else {
-                    continue;
-                };
-                let known = |(_, other): &(f64, Hypothesis)| {
-                    apart(&other.camera_from_object, &fused.rig_from_object) < SAME_POSE_RAD
-                };
-                if found.iter().any(known) {
-                    continue;
-                }
-                let spread = fused.covariance.fixed_view::<3, 3>(0, 0).into_owned();
-                let prior: f64 = priors.iter().map(|p| p.ln_likelihood(&fused.rig_from_object, &spread)).sum();
-                // Real edges miss by more than their covariances say; the likelihoods allow for as much as the limit.
-                let scale = (0.25 * self.options.misfit_max).max(1.0).powi(2);
-                let (sin, cos) = self.options.angle.gamma_rad.sin_cos();
-                let edges = [Vector3::x(), Vector3::y(), Vector3::new(cos, 0.0, side * sin)];
-                // What edges miss by that do not quite meet, or belong to more than one thing, the covariances do not know.
-                let doubt = if self.is_one_object() { 1.0 } else { (fused.chi_square / 6.0).max(1.0) };
-                let pose = Hypothesis {
-                    camera_from_object: fused.rig_from_object,
-                    edges: edges.map(|edge| fused.rig_from_object * edge),
-                    vertex_m: Some(fused.vertex_m),
-                    covariance: fused.covariance * doubt,
-                    probability: 0.0,
-                    right_handed,
-                    misfit: (fused.chi_square / 6.0).sqrt(),
-                };
-                found.push((prior - 0.5 * fused.chi_square / scale, pose));
-            }
-        }
-        found.sort_by(|a, b| b.0.total_cmp(&a.0));
-        let best = found.first().map_or(0.0, |(most, _)| *most);
-        let total: f64 = found.iter().map(|(ln, _)| (ln - best).exp()).sum();
-        let named = |(ln, pose): (f64, Hypothesis)| Hypothesis {
-            camera_from_object: self.named(pose.camera_from_object),
-            probability: (ln - best).exp() / total,
-            ..pose
-        };
-        Ok(found.into_iter().map(named).filter(|pose| pose.probability >= PROBABILITY_MIN).collect())
-    }
-
-    /// The poses of the pair of features, one of each image, that fits best; of the corner that is followed or one that is known
-    /// beside it, where there is one. Where an `attitude` is known on which several corners agree, pairs that do not are left
-    /// out. Returns the poses of all pairs that fit well, chosen or not.
-    fn by_pair(&self, attitude: Option<&Matrix3<f64>>, estimate: &mut CornerEstimate) -> Result<Vec<Hypothesis>> {
-        let mut seen = Vec::new();
-        let Some((_, left_from_right)) = &self.right else { return Ok(seen) };
-        let priors = self.priors(self.is_one_object());
-        let [nearest, farthest] = self.options.distance_m;
-        let mut best: Option<(f64, Vec<Hypothesis>, usize, usize)> = None;
-        let voices = Voices::new(&estimate.features, left_from_right);
-        for (i, left) in estimate.features[0].iter().enumerate() {
-            for (j, right) in estimate.features[1].iter().enumerate() {
-                let poses = self.pair_poses([left, right], left_from_right, &priors)?;
-                let Some((pose, vertex)) = poses.first().and_then(|pose| Some((pose, pose.vertex_m?))) else {
-                    continue;
-                };
-                let misfit = pose.misfit;
-                let agrees = |attitude: &Matrix3<f64>| {
-                    let own = renamed(&pose.camera_from_object, attitude);
-                    apart(&own, attitude) <= self.options.agree_max_rad
-                };
-                if attitude.is_some_and(|attitude| !agrees(attitude)) {
-                    continue;
-                }
-                if misfit > self.options.misfit_max || !(nearest..=farthest).contains(&vertex.norm()) {
-                    continue;
-                }
-                let fits_well = misfit <= 0.5 * self.options.misfit_max;
-                if fits_well {
-                    seen.push(*pose);
-                }
-                let likely = match &self.track {
-                    Some(track) if !self.is_one_object() => track.likelihood(pose, fits_well),
-                    _ => Some(1.0),
-                };
-                let Some(likely) = likely else { continue };
-                let agreeing = voices.agreeing(pose);
-                let mut score = likely * agreeing * weight(left).min(weight(right)) / (1.0 + misfit * misfit);
-                if let Some(track) = &self.track {
-                    let turned = apart(&pose.camera_from_object, &track.pose.camera_from_object);
-                    score /= 1.0 + (turned / self.options.turn_sigma_rad).powi(2);
-                }
-                if best.as_ref().is_none_or(|(most, ..)| score > *most) {
-                    best = Some((score, poses, i, j));
-                }
-            }
-        }
-        if let Some((_, poses, i, j)) = best {
-            estimate.hypotheses = poses;
-            (estimate.chosen_left, estimate.chosen_right) = (vec![i], Some(j));
-        }
-        Ok(seen)
-    }
 }
-
-/// The same axes with the one that is nearest to a vertical as the second.
-fn upright(attitude: &Matrix3<f64>, vertical: &Vector3<f64>) -> Matrix3<f64> {
-    let nearest = attitude.tr_mul(vertical).abs().imax();
-    let axis = |k: usize| attitude.column((nearest + k) % 3).into_owned();
-    Matrix3::from_columns(&[axis(2), axis(0), axis(1)])
-}
-
-/// Most corners of the left image that are looked for in the right one, those with the longest rays.
-const TRANSFERRED_MAX: usize = 8;
-
-/// How far apart attitudes of different hypotheses are, radians: fits from two starts end this close.
-const SAME_POSE_RAD: f64 = 0.035;
-
-/// The least probability of a hypothesis that is returned.
-const PROBABILITY_MIN: f64 = 1e-9;
-
-/// Distances that are tried before those are dropped that are less than a step apart.
-const DISTANCES: u32 = 1000;
-
-/// How far from the last vertex' distance other corners may be, as a share of it.
-const NEAR_LAST: f64 = 0.35;
 
 /// How far apart vertices of different corners are, radians.
 const SAME_VERTEX_RAD: f64 = 0.01;
-
-/// How far apart the places are at which a corner is looked for along its epipolar line, in pixels.
-const EPIPOLAR_STEP_PX: f64 = 4.0;
 
 /// How far from where it was a corner is looked for first, in pixels.
 const HARDLY_MOVED_PX: f64 = 3.0;

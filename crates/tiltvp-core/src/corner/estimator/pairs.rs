@@ -1,0 +1,145 @@
+//! Poses from pairs of corners, one of each image.
+
+use nalgebra::{Matrix3, Vector3};
+
+use super::CornerPoseEstimator;
+use crate::corner::attitude::corner_attitudes;
+use crate::corner::consensus::{apart, renamed, weight};
+use crate::corner::estimate::{CornerEstimate, Hypothesis};
+use crate::corner::fusion::fuse_rays;
+use crate::corner::position::{Sighting, triangulate};
+use crate::corner::prior::AttitudePrior;
+use crate::corner::vertex::CornerFeature;
+use crate::corner::voices::Voices;
+use crate::error::Result;
+use crate::geometry::RigidMotion;
+
+/// How far apart attitudes of different hypotheses are, radians: fits from two starts end this close.
+const SAME_POSE_RAD: f64 = 0.035;
+
+/// The least probability of a hypothesis that is returned.
+const PROBABILITY_MIN: f64 = 1e-9;
+
+impl CornerPoseEstimator {
+    /// Every pose that the rays of one corner in both images admit, the likeliest first. The attitudes of either image start the
+    /// fit to all six rays, so that a view that alone says little (two rays in line) does no harm.
+    fn pair_poses(
+        &self,
+        [left, right]: [&CornerFeature; 2],
+        left_from_right: &RigidMotion,
+        priors: &[AttitudePrior],
+    ) -> Result<Vec<Hypothesis>> {
+        let cameras = [(left, RigidMotion::identity()), (right, left_from_right.inverse())];
+        let sighting = |corner: &CornerFeature, rig_from_camera| Sighting {
+            bearing: corner.vertex(),
+            covariance: corner.vertex_covariance(),
+            rig_from_camera,
+        };
+        let seen = [sighting(left, RigidMotion::identity()), sighting(right, *left_from_right)];
+        let Some(vertex) = triangulate(&seen) else { return Ok(Vec::new()) };
+        let mut found: Vec<(f64, Hypothesis)> = Vec::new();
+        for (corner, rotation) in [(left, Matrix3::identity()), (right, left_from_right.rotation)] {
+            for own in corner_attitudes(corner, &self.options.angle)?.iter() {
+                let right_handed = own.is_right_handed();
+                if self.right_handed().is_some_and(|wanted| wanted != right_handed) {
+                    continue;
+                }
+                let (start, side) = (rotation * own.camera_from_object, if right_handed { 1.0 } else { -1.0 });
+                let Some(fused) = fuse_rays(&cameras, &self.options.angle, side, &start, &vertex.point_m) else {
+                    continue;
+                };
+                let known = |(_, other): &(f64, Hypothesis)| {
+                    apart(&other.camera_from_object, &fused.rig_from_object) < SAME_POSE_RAD
+                };
+                if found.iter().any(known) {
+                    continue;
+                }
+                let spread = fused.covariance.fixed_view::<3, 3>(0, 0).into_owned();
+                let prior: f64 = priors.iter().map(|p| p.ln_likelihood(&fused.rig_from_object, &spread)).sum();
+                // Real edges miss by more than their covariances say; the likelihoods allow for as much as the limit.
+                let scale = (0.25 * self.options.misfit_max).max(1.0).powi(2);
+                let (sin, cos) = self.options.angle.gamma_rad.sin_cos();
+                let edges = [Vector3::x(), Vector3::y(), Vector3::new(cos, 0.0, side * sin)];
+                // What edges miss by that do not quite meet, or belong to more than one thing, the covariances do not know.
+                let doubt = if self.is_one_object() { 1.0 } else { (fused.chi_square / 6.0).max(1.0) };
+                let pose = Hypothesis {
+                    camera_from_object: fused.rig_from_object,
+                    edges: edges.map(|edge| fused.rig_from_object * edge),
+                    vertex_m: Some(fused.vertex_m),
+                    covariance: fused.covariance * doubt,
+                    probability: 0.0,
+                    right_handed,
+                    misfit: (fused.chi_square / 6.0).sqrt(),
+                };
+                found.push((prior - 0.5 * fused.chi_square / scale, pose));
+            }
+        }
+        found.sort_by(|a, b| b.0.total_cmp(&a.0));
+        let best = found.first().map_or(0.0, |(most, _)| *most);
+        let total: f64 = found.iter().map(|(ln, _)| (ln - best).exp()).sum();
+        let named = |(ln, pose): (f64, Hypothesis)| Hypothesis {
+            camera_from_object: self.named(pose.camera_from_object),
+            probability: (ln - best).exp() / total,
+            ..pose
+        };
+        Ok(found.into_iter().map(named).filter(|pose| pose.probability >= PROBABILITY_MIN).collect())
+    }
+
+    /// The poses of the pair of features, one of each image, that fits best; of the corner that is followed or one that is known
+    /// beside it, where there is one. Where an `attitude` is known on which several corners agree, pairs that do not are left
+    /// out. Returns the poses of all pairs that fit well, chosen or not.
+    pub(super) fn by_pair(
+        &self,
+        attitude: Option<&Matrix3<f64>>,
+        estimate: &mut CornerEstimate,
+    ) -> Result<Vec<Hypothesis>> {
+        let mut seen = Vec::new();
+        let Some((_, left_from_right)) = &self.right else { return Ok(seen) };
+        let priors = self.priors(self.is_one_object());
+        let [nearest, farthest] = self.options.distance_m;
+        let mut best: Option<(f64, Vec<Hypothesis>, usize, usize)> = None;
+        let voices = Voices::new(&estimate.features, left_from_right);
+        for (i, left) in estimate.features[0].iter().enumerate() {
+            for (j, right) in estimate.features[1].iter().enumerate() {
+                let poses = self.pair_poses([left, right], left_from_right, &priors)?;
+                let Some((pose, vertex)) = poses.first().and_then(|pose| Some((pose, pose.vertex_m?))) else {
+                    continue;
+                };
+                let misfit = pose.misfit;
+                let agrees = |attitude: &Matrix3<f64>| {
+                    let own = renamed(&pose.camera_from_object, attitude);
+                    apart(&own, attitude) <= self.options.agree_max_rad
+                };
+                if attitude.is_some_and(|attitude| !agrees(attitude)) {
+                    continue;
+                }
+                if misfit > self.options.misfit_max || !(nearest..=farthest).contains(&vertex.norm()) {
+                    continue;
+                }
+                let fits_well = misfit <= 0.5 * self.options.misfit_max;
+                if fits_well {
+                    seen.push(*pose);
+                }
+                let likely = match &self.track {
+                    Some(track) if !self.is_one_object() => track.likelihood(pose, fits_well),
+                    _ => Some(1.0),
+                };
+                let Some(likely) = likely else { continue };
+                let agreeing = voices.agreeing(pose);
+                let mut score = likely * agreeing * weight(left).min(weight(right)) / (1.0 + misfit * misfit);
+                if let Some(track) = &self.track {
+                    let turned = apart(&pose.camera_from_object, &track.pose.camera_from_object);
+                    score /= 1.0 + (turned / self.options.turn_sigma_rad).powi(2);
+                }
+                if best.as_ref().is_none_or(|(most, ..)| score > *most) {
+                    best = Some((score, poses, i, j));
+                }
+            }
+        }
+        if let Some((_, poses, i, j)) = best {
+            estimate.hypotheses = poses;
+            (estimate.chosen_left, estimate.chosen_right) = (vec![i], Some(j));
+        }
+        Ok(seen)
+    }
+}
