@@ -61,6 +61,20 @@ def test_whole_logs_agree_with_the_filter_and_shrug_at_outliers() -> None:
     assert np.all(np.abs(error(filtered)) < 5.0 * np.sqrt(np.diag(filtered.covariance_xy_yaw)))
 
 
+def test_landmarks_that_are_no_points_do_not_pull() -> None:
+    """Two of ten landmarks slide by up to two degrees, slowly, as the edges of round things do."""
+    drive = simulate_drive("alternating", seed=3)
+    bearings = drive.bearings.copy()
+    for landmark in (0, 1):
+        slides = bearings[:, 1] == landmark
+        bearings[slides, 2] += math.radians(2.0) * np.sin(np.arange(np.count_nonzero(slides)) / 15.0)
+    whole = tiltvp.calibrate(drive.odometry, bearings, **START).mounting
+    calibrator = tiltvp.SelfCalibrator(**START)  # type: ignore[arg-type]
+    calibrator.follow(drive.odometry, bearings)
+    for e in (whole, calibrator.estimate):
+        assert np.all(np.abs(error(e)) < 4.0 * np.sqrt(np.diag(e.covariance_xy_yaw)))
+
+
 def test_wheels_and_time_offset() -> None:
     drive = simulate_drive("alternating", seed=1, odometry_k_m=1e-7)
     odometry = drive.odometry * [1.01, 0.99]
@@ -217,12 +231,15 @@ def write_log(folder: Path, drive: SimulatedDrive) -> tuple[Path, Path]:
 def test_the_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     odometry, bearings = write_log(tmp_path, simulate_drive("paper", seed=1))
     out, plot = tmp_path / "calib.json", tmp_path / "conv.png"
-    words = ["calibrate", str(odometry), str(bearings), "--wheel-base", "0.4", "--out", str(out), "--plot", str(plot)]
+    words = ["calibrate", str(odometry), str(bearings), "--wheel-base", "0.4", "--step-sigma", "1e-4"]
+    words += ["--step-sigma-deg", "0.01", "--out", str(out), "--plot", str(plot)]
     assert main(words) == 0
     printed = capsys.readouterr().out
     assert "static_transform_publisher" in printed
     found = json.loads(out.read_text())
     assert found["whole_log"]["mounting"]["rho_m"] == pytest.approx(0.23, abs=0.02)
+    assert found["options"]["step_sigma_m"] == 1e-4
+    assert found["options"]["step_sigma_rad"] == pytest.approx(math.radians(0.01))
     assert plot.read_bytes().startswith(b"\x89PNG")
     assert {path.name for path in tmp_path.iterdir()} == {"odometry.csv", "bearings.csv", "calib.json", "conv.png"}
     straight = simulate_drive("straight", seed=1)

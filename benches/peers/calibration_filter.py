@@ -2,8 +2,9 @@
 
 The peer is what one writes from the textbook with NumPy alone: the paper's state, dynamics, observation and Jacobians
 (eqs. 28 to 31, appendix A.4), whole matrices F P F^T + G Q G^T, S, K. As a check, after ten steps it must be where
-`method="paper"` is. Prints the time of a step, median and mean over the last steps of a drive (of the default filter
-some steps linearise its memory anew), and the ratio of the peer's to ours. Run it with OPENBLAS_NUM_THREADS=1.
+`method="paper"` is. Prints the time of a step over the last steps of a drive: median, mean, 99th percentile and worst
+(of the default filter some steps linearise its memory anew), the mean over the whole drive, and the ratio of the peer's
+median and mean to ours. Run it with OPENBLAS_NUM_THREADS=1.
 """
 
 from __future__ import annotations
@@ -97,14 +98,14 @@ class DenseFilter:
         self.p = 0.5 * (p + p.T)
 
 
-def timed(steps: int, work: Callable[[int], object], count: int) -> NDArray[np.float64]:
-    """Seconds of each of the last `count` of so many steps, all of which are done."""
+def timed(steps: int, work: Callable[[int], object]) -> NDArray[np.float64]:
+    """Seconds of each of so many steps."""
     seconds = []
     for k in range(steps):
         start = time.perf_counter()
         work(k)
         seconds.append(time.perf_counter() - start)
-    return np.array(seconds[-count:])
+    return np.array(seconds)
 
 
 def calibrator(method: str) -> SelfCalibrator:
@@ -131,21 +132,21 @@ def check(odometry: NDArray[np.float64], seen: NDArray[np.float64]) -> None:
         raise SystemExit(f"the peer and method='paper' are {off} apart: not the same filter")
 
 
-def compare(drive: SimulatedDrive, landmarks: int, rounds: int, count: int) -> list[tuple[str, float, float]]:
-    """Name, median and mean seconds of a step of each filter, all in turn in each round."""
+def compare(drive: SimulatedDrive, landmarks: int, rounds: int) -> dict[str, NDArray[np.float64]]:
+    """Of each filter by name the (N,) seconds of its steps, each the median of rounds in which all take turns."""
     odometry, names = drive.odometry, np.arange(landmarks)
     seen = drive.bearings[:, 2].reshape(len(odometry), landmarks)
     check(odometry, seen)
     found: dict[str, list[NDArray[np.float64]]] = {}
     for _ in range(rounds):
         peer = DenseFilter(seen[0])
-        peer_steps = timed(len(odometry) - 1, lambda k, f=peer: f.step(*odometry[k + 1], seen[k + 1]), count)
+        peer_steps = timed(len(odometry) - 1, lambda k, f=peer: f.step(*odometry[k + 1], seen[k + 1]))
         found.setdefault("dense NumPy", []).append(peer_steps)
         for method in ("paper", "default"):
             ours = calibrator(method)
-            steps = timed(len(odometry), lambda k, f=ours: f.step(*odometry[k], names, seen[k]), count)
+            steps = timed(len(odometry), lambda k, f=ours: f.step(*odometry[k], names, seen[k]))
             found.setdefault(f"tiltvp {method}", []).append(steps)
-    return [(name, float(np.median(rows)), float(np.mean(rows))) for name, rows in found.items()]
+    return {name: np.median(rows, axis=0) for name, rows in found.items()}
 
 
 def main() -> None:
@@ -154,13 +155,17 @@ def main() -> None:
     parser.add_argument("--rounds", type=int, default=5)
     parser.add_argument("--steps", type=int, default=100, help="steps that are timed, the last of the drive")
     arguments = parser.parse_args()
-    print(f"{'features':>8}  {'filter':<16}{'median us':>10}{'mean us':>10}{'peer / ours':>13}")
+    heads = ("median us", "mean us", "99 % us", "worst us", "all: mean", "peer / ours")
+    print(f"{'features':>8}  {'filter':<16}" + "".join(f"{head:>13}" for head in heads))
     for landmarks in (10, 100):
         drive = simulate_drive("alternating", seed=1, landmarks=landmarks, wheel_base_m=BASE_M, odometry_k_m=K_M)
-        rows = compare(drive, landmarks, arguments.rounds, arguments.steps)
-        for name, median, mean in rows:
-            ratios = f"{rows[0][1] / median:.1f}, {rows[0][2] / mean:.1f}"
-            print(f"{landmarks:>8}  {name:<16}{1e6 * median:>10.1f}{1e6 * mean:>10.1f}{ratios:>13}")
+        found = compare(drive, landmarks, arguments.rounds)
+        peer = next(iter(found.values()))[-arguments.steps :]
+        for name, seconds in found.items():
+            last = seconds[-arguments.steps :]
+            numbers = (np.median(last), last.mean(), np.percentile(last, 99), last.max(), seconds.mean())
+            ratios = f"{np.median(peer) / numbers[0]:.1f}, {peer.mean() / numbers[1]:.1f}"
+            print(f"{landmarks:>8}  {name:<16}" + "".join(f"{1e6 * n:>13.1f}" for n in numbers) + f"{ratios:>13}")
 
 
 if __name__ == "__main__":

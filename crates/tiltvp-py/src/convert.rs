@@ -49,6 +49,13 @@ pub(crate) fn rows<const K: usize>(value: &Bound<'_, PyAny>, name: &str) -> PyRe
 
 /// A vector `(N,)`.
 pub(crate) fn vector(value: &Bound<'_, PyAny>, name: &str) -> PyResult<Vec<f64>> {
+    // Arrays as they mostly come are read without a detour through numpy.
+    if let Some(values) = value.cast::<PyArray1<f64>>().ok().and_then(|array| array.to_vec().ok()) {
+        return Ok(values);
+    }
+    if let Some(values) = value.cast::<PyArray1<i64>>().ok().and_then(|array| array.to_vec().ok()) {
+        return Ok(values.into_iter().map(|value| value as f64).collect());
+    }
     let array = numbers(value, name, "an array (N,)")?;
     if array.ndim() != 1 {
         return Err(invalid(format!("{name}: shape {:?}, expected an array (N,)", array.shape())));

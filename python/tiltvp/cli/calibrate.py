@@ -40,6 +40,8 @@ def calibrate(
     start_sigma: tuple[float, float, float] | None = None,
     bearing_sigma_deg: float | None = None,
     odometry_k: float | None = None,
+    step_sigma: float | None = None,
+    step_sigma_deg: float | None = None,
     start_distance: float | None = None,
     method: str = "default",
     estimate_odometry: Switch = False,
@@ -82,6 +84,10 @@ def calibrate(
         Standard deviation of a bearing; for images by default the median of what the lines' own are.
     odometry_k
         Variance of a wheel's displacement for each metre of it, metres.
+    step_sigma
+        Standard deviation of each step's motion in either direction, whatever its length, metres.
+    step_sigma_deg
+        Standard deviation of each step's turn, whatever its size.
     start_distance
         Distance at which landmarks are thought to be, metres.
     method
@@ -141,6 +147,8 @@ def calibrate(
         "start_sigma": start_sigma,
         "bearing_sigma_rad": bearing_sigma_rad,
         "odometry_k_m": odometry_k,
+        "step_sigma_m": step_sigma,
+        "step_sigma_rad": None if step_sigma_deg is None else float(np.radians(step_sigma_deg)),
         "start_distance_m": start_distance,
     }
     calibrator = SelfCalibrator(**common, method=method)

@@ -14,6 +14,12 @@ const PROBABILITY: f64 = 1.0 - 1e-6;
 /// How much larger than expected the innovations of noise that is not quite as assumed may be.
 const EXCESS: f64 = 2.0;
 
+/// How much larger than expected innovations may be where all is well.
+const UNEASY: f64 = 1.5;
+
+/// Share of bearings that may be rejected where all is well.
+const REJECTED: f64 = 0.02;
+
 /// Share of bearings that may be of something else, as no tracker is without: so many that the gate rejected count nothing.
 const STRAY: f64 = 0.1;
 
@@ -53,6 +59,12 @@ impl Alarm {
     pub(super) fn mean_nis(&self) -> Option<f64> {
         let (sum, used, _) = self.sums();
         (used > 0).then(|| sum / used as f64)
+    }
+
+    /// Whether a window was ever too large, or innovations are larger now than they should be, or too many were rejected.
+    pub(super) fn uneasy(&self) -> bool {
+        let (sum, used, rejected) = self.sums();
+        self.raised || sum > UNEASY * used as f64 || rejected as f64 > REJECTED * (used + rejected) as f64
     }
 
     /// Whether a window was ever too large.

@@ -2,7 +2,8 @@
 
 use nalgebra::{Matrix3, Vector2, Vector3};
 
-use super::graph::{Node, Sight, factor, information};
+use super::dense::Factor;
+use super::graph::{Node, Sight, information};
 use super::loss::{Loss, Slip};
 use super::measurement::{Landmark, camera};
 use super::mounting::Mounting;
@@ -76,7 +77,7 @@ pub fn cramer_rao_bound(
             if let Some(node) = graph.nodes.last_mut()
                 && !node.sights.iter().any(|s| s.landmark == slot)
             {
-                node.sights.push(Sight { landmark: slot, bearing: 0.0 });
+                node.sights.push(Sight::new(slot, 0.0));
             }
         }
     }
@@ -85,6 +86,7 @@ pub fn cramer_rao_bound(
     graph.slip = Slip::NEVER;
     let last = graph.nodes.len() - 1;
     let singular = || Error::argument("sights", "a drive that determines nothing", "bearings of landmarks");
-    let whole = graph.eliminate(last, false, 0.0).and_then(|e| factor(e.information)).ok_or_else(singular)?.inverse();
+    let whole =
+        graph.eliminate(last, false, 0.0).and_then(|e| Factor::touched(e.information)).ok_or_else(singular)?.inverse();
     Ok(whole.fixed_view::<3, 3>(0, 0).into())
 }

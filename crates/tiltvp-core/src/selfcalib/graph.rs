@@ -1,11 +1,11 @@
 //! A stretch of a drive as a sparse least-squares problem: poses in a chain, each tied to the mounting and the landmarks.
 
-use nalgebra::{Cholesky, DMatrix, DVector, Dyn, Matrix3, Vector2, Vector3};
+use nalgebra::{DMatrix, DVector, Matrix3, Vector2, Vector3};
 
 use super::loss::{Loss, Slip};
-use super::measurement::{Landmark, camera, predict, seen_at};
+use super::measurement::{Landmark, Viewpoint, camera, predict, seen_at};
 use super::odometry::{Leg, MotionNoise, WheelMotion, Wheels, between, compose, compose_jacobians};
-use super::schur::Eliminated;
+use super::rows::Fit;
 use crate::geometry::wrap_angle;
 
 /// A bearing of a landmark.
@@ -13,6 +13,15 @@ use crate::geometry::wrap_angle;
 pub(super) struct Sight {
     pub(super) landmark: usize,
     pub(super) bearing: f64,
+    /// Cosine and sine of it.
+    pub(super) along: Vector2<f64>,
+}
+
+impl Sight {
+    pub(super) fn new(landmark: usize, bearing: f64) -> Self {
+        let (sin, cos) = bearing.sin_cos();
+        Self { landmark, bearing, along: Vector2::new(cos, sin) }
+    }
 }
 
 /// A pose of the robot, the motion that led to it from the one before, and what was seen there.
@@ -84,20 +93,14 @@ pub(super) struct Graph {
     /// Information about it.
     pub(super) prior_information: DMatrix<f64>,
     pub(super) bearing_sigma: f64,
+    /// By which factor the bearings of each landmark scatter more than `bearing_sigma`.
+    pub(super) spreads: Vec<f64>,
     pub(super) loss: Loss,
     pub(super) slip: Slip,
 }
 
 /// Jacobians of a pose by the node's pose and by the time offset.
 type ByPoseAndOffset = (Matrix3<f64>, Vector3<f64>);
-
-/// How an optimisation ended.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Descent {
-    pub(super) iterations: u32,
-    pub(super) converged: bool,
-    pub(super) cost: f64,
-}
 
 impl Graph {
     /// Numbers in the dense block.
@@ -138,7 +141,7 @@ impl Graph {
         self
     }
 
-    fn set_dense(&mut self, g: &DVector<f64>) {
+    pub(super) fn set_dense(&mut self, g: &DVector<f64>) {
         self.mounting = g.fixed_rows::<3>(0).into();
         if self.free.wheels {
             self.wheels = Wheels { imbalance: g[3], base_m: g[4].exp() };
@@ -167,6 +170,7 @@ impl Graph {
         self.prior_information = information.insert_rows(n, 2, 0.0).insert_columns(n, 2, 0.0);
         self.prior_information[(n + 1, n + 1)] = 1.0 / (sigma * sigma);
         self.landmarks.push(landmark);
+        self.spreads.push(1.0);
         self.landmarks.len() - 1
     }
 
@@ -186,39 +190,34 @@ impl Graph {
 
     /// Half the sum of the squared, whitened residuals.
     pub(super) fn cost(&self) -> f64 {
+        self.fit().cost
+    }
+
+    /// How well it fits.
+    pub(super) fn fit(&self) -> Fit {
         let away = self.dense() - &self.prior_mean;
-        let mut cost = 0.5 * away.dot(&(&self.prior_information * &away));
+        let cost = 0.5 * away.dot(&(&self.prior_information * &away)) + self.cost_of_spreads();
+        let mut fit = Fit { cost, ..Fit::default() };
         for pair in self.nodes.windows(2) {
             let [before, node] = pair else { continue };
             let r = between(&before.pose, &node.pose) - node.leg.motion;
-            cost += self.slip.cost(r.dot(&(node.information * r)));
+            fit.cost += self.slip.cost(r.dot(&(node.information * r)));
         }
-        for node in &self.nodes {
-            let (pose, _) = self.pose_of_sights(node);
-            for sight in &node.sights {
-                let p = predict(&pose, &self.mounting, &self.landmarks[sight.landmark]);
-                cost += self.loss.cost(wrap_angle(p.bearing - sight.bearing) / self.bearing_sigma);
-            }
+        for residual in self.residuals() {
+            fit.note(residual, self.loss);
         }
-        cost
+        fit
     }
 
     /// The whitened residuals of all bearings, in the order of nodes and sights.
     pub(super) fn residuals(&self) -> Vec<f64> {
-        let mut all = Vec::new();
+        let (rays, mut all) = (self.rays(), Vec::new());
         for node in &self.nodes {
-            let (pose, _) = self.pose_of_sights(node);
-            all.extend(node.sights.iter().map(|sight| {
-                let p = predict(&pose, &self.mounting, &self.landmarks[sight.landmark]);
-                wrap_angle(p.bearing - sight.bearing) / self.bearing_sigma
-            }));
+            let view = Viewpoint::new(&self.pose_of_sights(node).0, &self.mounting);
+            let residual = |sight: &Sight| view.past(&rays[sight.landmark], &sight.along);
+            all.extend(node.sights.iter().map(|s| residual(s) / (self.bearing_sigma * self.spreads[s.landmark])));
         }
         all
-    }
-
-    /// The largest whitened residual of a bearing.
-    pub(super) fn farthest(&self) -> f64 {
-        self.residuals().iter().fold(0.0, |far, r| r.abs().max(far))
     }
 
     /// Describes every landmark from where the camera is now thought to have been when it first saw it: seen from elsewhere
@@ -272,66 +271,6 @@ impl Graph {
             }
         }
     }
-
-    /// Moves every unknown by the solution of the damped normal equations. `None` where they are singular.
-    fn moved(&self, damping: f64) -> Option<Self> {
-        let last = self.nodes.len() - 1;
-        let eliminated = self.eliminate(last, false, damping)?;
-        let step = factor(eliminated.information.clone())?.solve(&eliminated.rhs);
-        self.moved_by(&eliminated, &step)
-    }
-
-    /// Moves the dense block by a step and the poses after it. `None` where something is not finite.
-    fn moved_by(&self, eliminated: &Eliminated, step: &DVector<f64>) -> Option<Self> {
-        let mut next = self.clone();
-        for (node, step) in next.nodes.iter_mut().zip(eliminated.poses(step, self.nodes.len())) {
-            node.pose += step;
-        }
-        let dense = next.dense() + step;
-        if !dense.iter().all(|x| x.is_finite()) {
-            return None;
-        }
-        next.set_dense(&dense);
-        Some(next)
-    }
-
-    /// Levenberg and Marquardt's descent until the cost falls by less than `tolerance`.
-    pub(super) fn descend(&mut self, max_iterations: u32, tolerance: f64, mut damping: f64) -> Descent {
-        let mut cost = self.cost();
-        let mut iterations = 0;
-        while iterations < max_iterations {
-            iterations += 1;
-            let next = self.moved(damping);
-            let lower = next.map(|next| (next.cost(), next)).filter(|(c, _)| c.is_finite() && *c <= cost + 1e-9 * cost);
-            if let Some((next_cost, next)) = lower {
-                let gain = cost - next_cost;
-                (*self, cost) = (next, next_cost);
-                let was = damping;
-                damping = if damping < 1e-9 { 0.0 } else { 0.1 * damping };
-                if gain < tolerance && was < 1e-2 {
-                    return Descent { iterations, converged: true, cost };
-                }
-            } else {
-                damping = if damping == 0.0 { 1e-4 } else { 10.0 * damping };
-                if damping > 1e9 {
-                    break;
-                }
-            }
-        }
-        Descent { iterations, converged: false, cost }
-    }
-}
-
-/// The Cholesky factor of an information matrix, with a touch of regularisation where rounding makes it indefinite.
-pub(super) fn factor(information: DMatrix<f64>) -> Option<Cholesky<f64, Dyn>> {
-    if let Some(factor) = Cholesky::new(information.clone()) {
-        return Some(factor);
-    }
-    let mut touched = information;
-    for k in 0..touched.nrows() {
-        touched[(k, k)] = touched[(k, k)] * (1.0 + 1e-9) + 1e-12;
-    }
-    Cholesky::new(touched)
 }
 
 /// The leg of readings in a row.

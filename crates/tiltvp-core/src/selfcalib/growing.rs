@@ -122,6 +122,7 @@ fn empty(options: &LogOptions, guess: &Vector3<f64>, free: Free) -> Graph {
         prior_mean,
         prior_information,
         bearing_sigma: o.bearing_sigma_rad,
+        spreads: Vec::new(),
         loss: FIRST,
         slip: SLIP,
     }
@@ -187,7 +188,7 @@ impl<'a> Growing<'a> {
         let gap = self.gap;
         if let Some((slot, last)) = self.joined.get_mut(&seen.landmark).filter(|(_, last)| here - last <= gap) {
             if *last < here {
-                self.graph.nodes[here].sights.push(Sight { landmark: *slot, bearing: seen.bearing_rad });
+                self.graph.nodes[here].sights.push(Sight::new(*slot, seen.bearing_rad));
                 *last = here;
             }
             return;
@@ -217,7 +218,7 @@ impl<'a> Growing<'a> {
             let slot = self.graph.add_landmark(landmark, -o.start_distance_m.ln(), o.start_distance_log_sigma);
             let mut last = 0;
             for (node, bearing) in self.waiting.remove(&name).into_iter().flatten() {
-                self.graph.nodes[node].sights.push(Sight { landmark: slot, bearing });
+                self.graph.nodes[node].sights.push(Sight::new(slot, bearing));
                 last = node;
             }
             self.joined.insert(name, (slot, last));

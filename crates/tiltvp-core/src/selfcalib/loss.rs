@@ -30,6 +30,9 @@ impl Loss {
     }
 }
 
+/// Standard deviations beyond which a bearing is an outlier.
+pub(super) const LIMIT: f64 = 4.5;
+
 /// How motions far from what the wheels tell count: beyond so many standard deviations logarithmically, since wheels slip.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Slip(pub(super) f64);

@@ -2,6 +2,9 @@
 
 use nalgebra::{Vector2, Vector3};
 
+/// Tangent up to which the series of the arcus tangent is as good as the function, to within 1e-12.
+const SMALL: f64 = 0.1;
+
 /// A landmark: `point = anchor + exp(-closeness) (cos direction, sin direction)`.
 ///
 /// The anchor is a number, not an unknown: the place at which the camera was thought to be when it first saw the landmark.
@@ -25,27 +28,89 @@ pub(super) struct Prediction {
     pub(super) by_landmark: Vector2<f64>,
 }
 
-/// What the camera at `mounting` on a robot at `pose` sees, eq. 16 with the landmark in homogeneous coordinates:
-///
-/// ```text
-/// w = exp(closeness) (anchor - camera) + (cos direction, sin direction),   bearing = atan2(w) - heading - yaw
-/// ```
-pub(super) fn predict(pose: &Vector3<f64>, mounting: &Vector3<f64>, landmark: &Landmark) -> Prediction {
-    let (sin, cos) = pose.z.sin_cos();
-    let arm = Vector2::new(cos * mounting.x - sin * mounting.y, sin * mounting.x + cos * mounting.y);
-    let from_camera = landmark.anchor - pose.xy() - arm;
-    let (us, uc) = landmark.direction.sin_cos();
-    let q = landmark.closeness.exp();
-    let w = from_camera * q + Vector2::new(uc, us);
-    let scale = 1.0 / w.norm_squared();
-    let n = Vector2::new(-w.y, w.x) * scale;
-    let by_arm = n * -q;
-    Prediction {
-        bearing: w.y.atan2(w.x) - pose.z - mounting.z,
-        by_pose: Vector3::new(by_arm.x, by_arm.y, by_arm.y * arm.x - by_arm.x * arm.y - 1.0),
-        by_mounting: Vector3::new(cos * by_arm.x + sin * by_arm.y, cos * by_arm.y - sin * by_arm.x, -1.0),
-        by_landmark: Vector2::new((w.x * uc + w.y * us) * scale, q * n.dot(&from_camera)),
+/// A landmark as predictions take it, for many of the same one.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Ray {
+    anchor: Vector2<f64>,
+    /// The unit vector of its direction.
+    along: Vector2<f64>,
+    /// The inverse of its distance.
+    inverse: f64,
+}
+
+impl Landmark {
+    pub(super) fn ray(&self) -> Ray {
+        let (sin, cos) = self.direction.sin_cos();
+        Ray { anchor: self.anchor, along: Vector2::new(cos, sin), inverse: self.closeness.exp() }
     }
+}
+
+/// Where the camera is and looks, for predictions of many landmarks.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Viewpoint {
+    /// From the robot to the camera.
+    arm: Vector2<f64>,
+    place: Vector2<f64>,
+    /// Cosine and sine of the robot's heading.
+    heading: (f64, f64),
+    /// Heading and yaw, with cosine and sine.
+    turn: f64,
+    turned: (f64, f64),
+}
+
+impl Viewpoint {
+    /// Of a camera at `mounting` on a robot at `pose`.
+    pub(super) fn new(pose: &Vector3<f64>, mounting: &Vector3<f64>) -> Self {
+        let (sin, cos) = pose.z.sin_cos();
+        let arm = Vector2::new(cos * mounting.x - sin * mounting.y, sin * mounting.x + cos * mounting.y);
+        let turn = pose.z + mounting.z;
+        let (turn_sin, turn_cos) = turn.sin_cos();
+        Self { arm, place: pose.xy() + arm, heading: (cos, sin), turn, turned: (turn_cos, turn_sin) }
+    }
+
+    /// What is seen of a landmark, eq. 16 in homogeneous coordinates:
+    ///
+    /// ```text
+    /// w = exp(closeness) (anchor - camera) + (cos direction, sin direction),   bearing = atan2(w) - heading - yaw
+    /// ```
+    pub(super) fn see(&self, ray: &Ray) -> Prediction {
+        let w = (ray.anchor - self.place) * ray.inverse + ray.along;
+        Prediction { bearing: w.y.atan2(w.x) - self.turn, ..self.slopes(ray) }
+    }
+
+    /// The derivatives of what is seen of a landmark; the bearing itself is left out.
+    pub(super) fn slopes(&self, ray: &Ray) -> Prediction {
+        let (from_camera, q, u, (cos, sin)) = (ray.anchor - self.place, ray.inverse, ray.along, self.heading);
+        let w = from_camera * q + u;
+        let scale = 1.0 / w.norm_squared();
+        let n = Vector2::new(-w.y, w.x) * scale;
+        let by_arm = n * -q;
+        Prediction {
+            bearing: f64::NAN,
+            by_pose: Vector3::new(by_arm.x, by_arm.y, by_arm.y * self.arm.x - by_arm.x * self.arm.y - 1.0),
+            by_mounting: Vector3::new(cos * by_arm.x + sin * by_arm.y, cos * by_arm.y - sin * by_arm.x, -1.0),
+            by_landmark: Vector2::new(w.dot(&u) * scale, q * n.dot(&from_camera)),
+        }
+    }
+
+    /// By how much the bearing of a landmark is past one whose cosine and sine are given, in (-pi, pi].
+    pub(super) fn past(&self, ray: &Ray, along: &Vector2<f64>) -> f64 {
+        let w = (ray.anchor - self.place) * ray.inverse + ray.along;
+        let (cos, sin) = self.turned;
+        let there = Vector2::new(cos * along.x - sin * along.y, sin * along.x + cos * along.y);
+        let (across, ahead) = (there.x * w.y - there.y * w.x, there.dot(&w));
+        if across.abs() > SMALL * ahead {
+            return across.atan2(ahead);
+        }
+        // The series of the arcus tangent.
+        let (t, s) = (across / ahead, (across / ahead).powi(2));
+        t * (1.0 - s * (1.0 / 3.0 - s * (0.2 - s * (1.0 / 7.0 - s / 9.0))))
+    }
+}
+
+/// What the camera at `mounting` on a robot at `pose` sees of a landmark.
+pub(super) fn predict(pose: &Vector3<f64>, mounting: &Vector3<f64>, landmark: &Landmark) -> Prediction {
+    Viewpoint::new(pose, mounting).see(&landmark.ray())
 }
 
 /// The landmark of that closeness to the anchor that is seen at this bearing; `None` if there is none.
@@ -85,7 +150,13 @@ mod tests {
         ) {
             let (pose, mounting) = (Vector3::from(pose), Vector3::from(mounting));
             if let Some(landmark) = seen_at(Vector2::new(0.1, 0.2), closeness, &pose, &mounting, bearing) {
-                prop_assert!(wrap_angle(predict(&pose, &mounting, &landmark).bearing - bearing).abs() < 1e-9);
+                let seen = predict(&pose, &mounting, &landmark).bearing;
+                prop_assert!(wrap_angle(seen - bearing).abs() < 1e-9);
+                for off in [0.0, 0.05, -0.0999, 0.3, -2.0] {
+                    let (sin, cos) = (bearing + off).sin_cos();
+                    let past = Viewpoint::new(&pose, &mounting).past(&landmark.ray(), &Vector2::new(cos, sin));
+                    prop_assert!((past - wrap_angle(seen - bearing - off)).abs() < 1e-11);
+                }
             }
         }
 

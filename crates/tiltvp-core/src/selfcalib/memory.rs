@@ -2,62 +2,97 @@
 
 use nalgebra::{DMatrix, DVector, Matrix2, RowVector2, SMatrix, Vector2, Vector3};
 
-use super::graph::{Graph, Node, factor};
-use super::loss::Loss;
+use super::dense::Factor;
+use super::descent::Settled;
+use super::graph::Node;
+use super::loss::{LIMIT, Loss};
 use super::measurement::Landmark;
 use super::odometry::between;
-use super::recursive::{MOUNTING, Recursive};
+use super::recursive::{MOUNTING, Recursive, YOUNG};
 
 /// Poses up to which other starts are tried where bearings do not fit.
 const SETTLED: usize = 160;
 
 /// How bearings count in the memory: first those far off linearly, then not at all, if these are few.
 pub(super) const FIRST: Loss = Loss::Linear(3.0);
-pub(super) const LIMIT: f64 = 4.5;
 const FEW: f64 = 0.03;
+
+/// How far the cost may be from what the linear problem foretells where the memory is at rest.
+const TOLERANCE: f64 = 0.05;
 
 impl Recursive {
     /// Linearises the memory about its own solution, and takes that for mean and covariance.
     pub(super) fn linearise(&mut self, iterations: u32) {
-        let mut next = self.graph.clone();
-        next.loss = FIRST;
-        next.reanchor();
-        next.descend(iterations, 0.01, 0.0);
+        let before = self.graph.landmarks.clone();
+        self.graph.loss = FIRST;
+        let old = self.graph.nodes.len() >= YOUNG && !self.alarm.uneasy();
+        if old {
+            self.take_filtered();
+        }
+        self.graph.reanchor();
+        let mut solved = self.graph.settle(iterations, TOLERANCE, old);
         // A landmark may have been caught at a wrong distance; while little is known, all of them with a wrong yaw.
         let sigma = self.options.start_covariance[(2, 2)].sqrt();
-        let turns: &[f64] = if next.nodes.len() > SETTLED { &[0.0] } else { &[0.0, 0.0, 1.0, -1.0, 2.0, -2.0] };
+        let turns: &[f64] = if self.graph.nodes.len() > SETTLED { &[0.0] } else { &[0.0, 0.0, 1.0, -1.0, 2.0, -2.0] };
         for (i, turn) in turns.iter().enumerate() {
-            if next.farthest() > LIMIT {
-                let mut other = next.clone();
-                if *turn != 0.0 {
-                    other.mounting = self.options.start.vector() + Vector3::z() * (turn * sigma);
-                }
-                other.place_landmarks(0, if i == 0 { LIMIT } else { 0.0 });
-                let descent = other.descend(2 * iterations, 0.01, 1e-3);
-                if descent.cost < next.cost() {
-                    next = other;
-                }
+            let fit = solved.as_ref().map(|solved| solved.fit);
+            if fit.is_some_and(|fit| fit.beyond == 0) {
+                break;
+            }
+            let mut other = self.graph.clone();
+            if *turn != 0.0 {
+                other.mounting = self.options.start.vector() + Vector3::z() * (turn * sigma);
+            }
+            other.place_landmarks(0, if i == 0 { LIMIT } else { 0.0 });
+            let descent = other.descend(2 * iterations, TOLERANCE, 1e-3);
+            if fit.is_none_or(|fit| descent.cost < fit.cost) {
+                self.graph = other;
+                solved = self.graph.settled();
             }
         }
-        let residuals = next.residuals();
-        let outliers = residuals.iter().filter(|r| r.abs() > LIMIT).count();
-        if outliers > 0 && (outliers as f64) < FEW * residuals.len() as f64 {
-            next.loss = Loss::Cut(LIMIT);
-            next.descend(2, 0.01, 0.0);
+        let fit = solved.as_ref().map(|solved| solved.fit);
+        if fit.is_some_and(|fit| fit.beyond > 0 && (fit.beyond as f64) < FEW * fit.bearings as f64) {
+            solved = self.leave_out(iterations);
         }
-        self.adopt(next);
+        if !solved.is_some_and(|solved| self.adopt(solved.information)) {
+            // The filter's mean and covariance are about these.
+            self.graph.landmarks = before;
+        }
     }
 
-    /// Takes a solution of the memory for mean and covariance, unless it has none.
-    fn adopt(&mut self, graph: Graph) -> bool {
-        let Some(covariance) = joint_covariance(&graph) else { return false };
-        let dense = graph.dense();
-        self.mean = dense.insert_rows(0, 3, 0.0);
-        if let Some(node) = graph.nodes.last() {
+    /// Solves the memory without the bearings that are far off, and with less of landmarks that are no points.
+    fn leave_out(&mut self, iterations: u32) -> Option<Settled> {
+        self.graph.loss = Loss::Cut(LIMIT);
+        let solved = self.graph.settle(2, TOLERANCE, false);
+        if !self.graph.weigh_landmarks() {
+            return solved;
+        }
+        self.graph.loss = FIRST;
+        self.graph.settle(iterations, TOLERANCE, false);
+        self.graph.loss = Loss::Cut(LIMIT);
+        self.graph.settle(2, TOLERANCE, false)
+    }
+
+    /// Starts the memory from the filter's mean: the poses since the last solution are bent to end where the filter is.
+    fn take_filtered(&mut self) {
+        self.graph.set_dense(&self.mean.rows(3, self.mean.len() - 3).into_owned());
+        let (here, nodes) = (self.pose(), &mut self.graph.nodes);
+        let Some(away) = nodes.last().map(|node| here - node.pose) else { return };
+        let count = nodes.len().saturating_sub(self.solved) as f64;
+        for (k, node) in nodes.iter_mut().skip(self.solved).enumerate() {
+            node.pose += away * ((k + 1) as f64 / count);
+        }
+    }
+
+    /// Takes the memory's solution for mean and covariance, whose inverse is given, unless it has none.
+    fn adopt(&mut self, information: DMatrix<f64>) -> bool {
+        let Some(factor) = Factor::touched(information) else { return false };
+        self.covariance = factor.inverse();
+        self.mean = self.graph.dense().insert_rows(0, 3, 0.0);
+        if let Some(node) = self.graph.nodes.last() {
             self.mean.fixed_rows_mut::<3>(0).copy_from(&node.pose);
         }
-        self.graph = graph;
-        self.covariance = covariance;
+        self.solved = self.graph.nodes.len();
         self.solved_sigma = Vector3::from_fn(|i, _| self.covariance[(MOUNTING + i, MOUNTING + i)].sqrt());
         true
     }
@@ -65,8 +100,8 @@ impl Recursive {
     /// Sums up the nodes to `at` in the prior, seen from there, and forgets landmarks that have not been seen since.
     pub(super) fn fold(&mut self, at: usize) {
         let Some(eliminated) = self.graph.eliminate(at, true, 0.0) else { return };
-        let Some(joint) = factor(eliminated.information) else { return };
-        let ahead = joint.solve(&eliminated.rhs);
+        let Some(joint) = Factor::touched(eliminated.information) else { return };
+        let Some(ahead) = joint.solve(&eliminated.rhs) else { return };
         let joint = joint.inverse();
         let origin = self.graph.nodes[at].pose;
         let (sin, cos) = origin.z.sin_cos();
@@ -96,11 +131,12 @@ impl Recursive {
             landmarks.push(Landmark { anchor, direction, closeness: old.closeness });
         }
         let prior = &by_joint * joint * by_joint.transpose();
-        let Some(prior) = factor(0.5 * (&prior + prior.transpose())) else { return };
+        let Some(prior) = Factor::touched(0.5 * (&prior + prior.transpose())) else { return };
         let mut next = self.graph.clone();
         next.prior_mean = mean + &by_joint * ahead;
         next.prior_information = prior.inverse();
         next.landmarks = landmarks;
+        next.spreads = kept.iter().map(|slot| self.graph.spreads[*slot]).collect();
         next.nodes = self.graph.nodes[at..].to_vec();
         next.nodes[0] = Node::anchor();
         for node in &mut next.nodes[1..] {
@@ -111,24 +147,15 @@ impl Recursive {
                 place.is_some()
             });
         }
-        if self.adopt(next) {
+        let Some(solved) = next.settled() else { return };
+        let before = std::mem::replace(&mut self.graph, next);
+        if self.adopt(solved.information) {
             self.names = kept.iter().map(|slot| self.names[*slot]).collect();
             self.misses = kept.iter().map(|slot| self.misses[*slot]).collect();
+        } else {
+            self.graph = before;
         }
     }
-}
-
-/// The covariance of (last pose, mounting, landmarks).
-fn joint_covariance(graph: &Graph) -> Option<DMatrix<f64>> {
-    let last = graph.nodes.len() - 1;
-    if last > 0 {
-        let inverse = factor(graph.eliminate(last, true, 0.0)?.information)?.inverse();
-        return Some(inverse);
-    }
-    let inverse = factor(graph.eliminate(0, false, 0.0)?.information)?.inverse();
-    let mut covariance = DMatrix::zeros(inverse.nrows() + 3, inverse.nrows() + 3);
-    covariance.view_mut((3, 3), inverse.shape()).copy_from(&inverse);
-    Some(covariance)
 }
 
 /// How the direction and the closeness of a landmark, as seen from the place of the robot, change with the pose that

@@ -7,6 +7,8 @@
 mod alarm;
 mod bound;
 mod calibrator;
+mod dense;
+mod descent;
 mod graph;
 mod growing;
 mod loss;
@@ -18,8 +20,11 @@ mod odometry;
 mod offline;
 mod options;
 mod paper;
+mod pose_block;
 mod recursive;
+mod rows;
 mod schur;
+mod spread;
 mod update;
 
 pub use self::bound::cramer_rao_bound;

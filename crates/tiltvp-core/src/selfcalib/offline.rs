@@ -3,17 +3,16 @@
 use std::collections::BTreeMap;
 
 use super::calibrator::MountingEstimate;
-use super::graph::{Descent, Free, Graph, factor};
-use super::growing::{along, grown};
-use super::loss::Loss;
+use super::dense::Factor;
+use super::descent::Descent;
+use super::graph::{Free, Graph};
+use super::growing::{FIRST, along, grown};
+use super::loss::{LIMIT, Loss};
 use super::mounting::Mounting;
 use super::odometry::{WheelMotion, Wheels};
 use super::options::{CalibrationMethod, SelfCalibratorOptions};
 use super::recursive::Recursive;
 use crate::error::{Error, Result};
-
-/// Standard deviations beyond which bearings are outliers.
-const LIMIT: f64 = 4.5;
 
 /// A bearing of a log.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -79,6 +78,9 @@ pub struct LogCalibration {
 /// Fall of the cost below which the descent has come to rest.
 const TOLERANCE: f64 = 1e-3;
 
+/// How often landmarks are weighed by how far their bearings scatter.
+const JUDGEMENTS: usize = 4;
+
 /// Share of outliers of a solution beside which no other is looked for.
 const FEW: f64 = 0.03;
 
@@ -136,8 +138,19 @@ pub fn calibrate_log(
         }
         let first = graph.descend(options.max_iterations, TOLERANCE, 1e-3);
         graph.loss = Loss::Cut(LIMIT);
-        let then = graph.descend(options.max_iterations, TOLERANCE, 1e-3);
-        let descent = Descent { iterations: first.iterations + then.iterations, ..then };
+        let mut then = graph.descend(options.max_iterations, TOLERANCE, 1e-3);
+        let mut iterations = first.iterations + then.iterations;
+        for _ in 0..JUDGEMENTS {
+            if !graph.weigh_landmarks() {
+                break;
+            }
+            for loss in [FIRST, Loss::Cut(LIMIT)] {
+                graph.loss = loss;
+                then = graph.descend(options.max_iterations, TOLERANCE, 1e-3);
+                iterations += then.iterations;
+            }
+        }
+        let descent = Descent { iterations, ..then };
         let residuals = graph.residuals();
         let outliers = residuals.iter().filter(|r| r.abs() > LIMIT).count();
         let good = descent.converged && (outliers as f64) < FEW * residuals.len() as f64;
@@ -227,7 +240,7 @@ fn report(options: &LogOptions, graph: &Graph, descent: &Descent) -> Result<LogC
     let nothing =
         || Error::argument("bearings", "a drive that determines nothing", "landmarks seen from several poses");
     let eliminated = graph.eliminate(graph.nodes.len() - 1, false, 0.0).ok_or_else(nothing)?;
-    let covariance = factor(eliminated.information).ok_or_else(nothing)?.inverse() * scale;
+    let covariance = Factor::touched(eliminated.information).ok_or_else(nothing)?.inverse() * scale;
     let sigma = |at: usize| covariance[(at, at)].sqrt();
     let (wheels, offset) = (options.estimate_odometry, options.estimate_time_offset);
     Ok(LogCalibration {

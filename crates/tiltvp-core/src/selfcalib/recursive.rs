@@ -4,9 +4,9 @@ use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 
 use super::alarm::Alarm;
 use super::graph::{Free, Graph, Node, Sight, information};
-use super::loss::Slip;
-use super::measurement::{Landmark, Prediction, camera, predict};
-use super::memory::{FIRST, LIMIT};
+use super::loss::{LIMIT, Slip};
+use super::measurement::{Landmark, Prediction, Viewpoint, camera, predict};
+use super::memory::FIRST;
 use super::odometry::{Leg, WheelMotion, Wheels, compose, compose_jacobians};
 use super::options::SelfCalibratorOptions;
 use super::update::Row;
@@ -19,13 +19,15 @@ pub(super) const MOUNTING: usize = 3;
 pub(super) const LANDMARKS: usize = 6;
 
 /// Poses up to which the memory is solved anew at every step.
-const YOUNG: usize = 40;
+pub(super) const YOUNG: usize = 40;
 
-/// Growth of the memory after which it is linearised anew.
-const GROWTH: f64 = 1.15;
+/// Growth of the memory after which it is linearised anew where innovations are as they should be, and where they are not.
+const GROWTH: f64 = 2.0;
+const GROWTH_UNEASY: f64 = 1.15;
 
-/// Standard deviations that the mounting may move before the memory is linearised anew.
-const MOVED: f64 = 0.5;
+/// Standard deviations that the mounting may move before the memory is linearised anew, likewise.
+const MOVED: f64 = 1.0;
+const MOVED_UNEASY: f64 = 0.5;
 
 /// Rejections in a row after which a landmark is taken to be another one.
 const MAX_MISSES: u32 = 5;
@@ -65,7 +67,9 @@ pub(super) struct Recursive {
     pub(super) names: Vec<Option<u64>>,
     pub(super) misses: Vec<u32>,
     next_linearisation: usize,
-    /// Standard deviations of the mounting when the memory was last solved.
+    /// Poses that there were when the memory was last solved.
+    pub(super) solved: usize,
+    /// Standard deviations of the mounting then.
     pub(super) solved_sigma: Vector3<f64>,
     /// Covariance that the last motion added to the pose.
     pub(super) motion_noise: Matrix3<f64>,
@@ -86,6 +90,7 @@ impl Recursive {
             prior_mean: DVector::from_column_slice(start.as_slice()),
             prior_information: DMatrix::from_column_slice(3, 3, inverse3(&options.start_covariance).as_slice()),
             bearing_sigma: options.bearing_sigma_rad,
+            spreads: Vec::new(),
             loss: FIRST,
             slip: SLIP,
         };
@@ -102,6 +107,7 @@ impl Recursive {
             names: Vec::new(),
             misses: Vec::new(),
             next_linearisation: 3,
+            solved: 1,
             solved_sigma: options.start_covariance.diagonal().map(f64::sqrt),
             motion_noise: Matrix3::zeros(),
             alarm: Alarm::default(),
@@ -128,7 +134,8 @@ impl Recursive {
         let rejected = self.update(seen, &mut outcome);
         let nodes = self.graph.nodes.len();
         let moved = self.mean.fixed_rows::<3>(MOUNTING) - self.graph.mounting;
-        let far = moved.iter().zip(&self.solved_sigma).any(|(moved, sigma)| moved.abs() > MOVED * sigma);
+        let limit = if self.alarm.uneasy() { MOVED_UNEASY } else { MOVED };
+        let far = moved.iter().zip(&self.solved_sigma).any(|(moved, sigma)| moved.abs() > limit * sigma);
         let disputed = rejected.iter().any(|slot| self.misses[*slot] >= DISPUTED || self.was_away(*slot));
         let due = nodes >= self.next_linearisation || far || disputed || outcome.slipped;
         let mut judged = outcome;
@@ -139,7 +146,8 @@ impl Recursive {
                 self.fold(nodes / 2);
             }
             let nodes = self.graph.nodes.len();
-            let grown = if nodes < YOUNG { nodes + 1 } else { (nodes as f64 * GROWTH) as usize };
+            let growth = if self.alarm.uneasy() { GROWTH_UNEASY } else { GROWTH };
+            let grown = if nodes < YOUNG { nodes + 1 } else { (nodes as f64 * growth) as usize };
             self.next_linearisation = grown.max(nodes + 1);
         }
         for (name, misses) in self.names.iter_mut().zip(&self.misses) {
@@ -211,35 +219,41 @@ impl Recursive {
         }
     }
 
-    fn pose(&self) -> Vector3<f64> {
+    pub(super) fn pose(&self) -> Vector3<f64> {
         self.mean.fixed_rows::<3>(0).into()
     }
 
-    /// What is expected of a landmark.
-    pub(super) fn expect(&self, slot: usize) -> Prediction {
+    /// Where the camera is thought to be.
+    pub(super) fn view(&self) -> Viewpoint {
+        Viewpoint::new(&self.pose(), &self.mean.fixed_rows::<3>(MOUNTING).into())
+    }
+
+    /// What is expected of a landmark from there.
+    pub(super) fn expect(&self, slot: usize, view: &Viewpoint) -> Prediction {
         let at = LANDMARKS + 2 * slot;
         let anchor = self.graph.landmarks[slot].anchor;
         let landmark = Landmark { anchor, direction: self.mean[at], closeness: self.mean[at + 1] };
-        predict(&self.pose(), &self.mean.fixed_rows::<3>(MOUNTING).into(), &landmark)
+        view.see(&landmark.ray())
     }
 
     fn update(&mut self, seen: &[(u64, f64)], outcome: &mut Outcome) -> Vec<usize> {
         let mut rows = Vec::with_capacity(seen.len());
         let mut fresh = Vec::new();
+        let view = self.view();
         for &(name, bearing) in seen {
             match self.names.iter().position(|known| *known == Some(name)) {
                 Some(slot) => {
                     // The robot has not moved since it was seen: nothing new.
                     let again = self.graph.nodes.last().is_some_and(|n| n.sights.iter().any(|s| s.landmark == slot));
                     if !again {
-                        rows.push(Row { slot, bearing, p: self.expect(slot) });
+                        rows.push(Row { slot, bearing, p: self.expect(slot, &view) });
                     }
                 }
                 None => fresh.push((name, bearing)),
             }
         }
         if let Some(node) = self.graph.nodes.last_mut() {
-            node.sights.extend(rows.iter().map(|row| Sight { landmark: row.slot, bearing: row.bearing }));
+            node.sights.extend(rows.iter().map(|row| Sight::new(row.slot, row.bearing)));
         }
         let rejected = self.fuse(rows, outcome);
         for (name, bearing) in fresh {
@@ -281,7 +295,7 @@ impl Recursive {
         self.names.push(Some(name));
         self.misses.push(0);
         if let Some(node) = self.graph.nodes.last_mut() {
-            node.sights.push(Sight { landmark: slot, bearing });
+            node.sights.push(Sight::new(slot, bearing));
         }
     }
 }

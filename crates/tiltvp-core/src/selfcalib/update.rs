@@ -1,7 +1,8 @@
 //! The update of the default filter: bearings of known landmarks, gated and iterated.
 
-use nalgebra::{Cholesky, DMatrix, DVector};
+use nalgebra::{DMatrix, DVector};
 
+use super::dense::{Factor, combine, subtract_square};
 use super::measurement::Prediction;
 use super::recursive::{LANDMARKS, Outcome, Recursive};
 use crate::geometry::wrap_angle;
@@ -27,19 +28,23 @@ impl Recursive {
     fn spread(&self, rows: &[Row]) -> DMatrix<f64> {
         let n = self.covariance.nrows();
         let mut spread = DMatrix::zeros(n, rows.len());
-        for (row, mut out) in rows.iter().zip(spread.column_iter_mut()) {
-            for (at, by) in entries(row) {
-                out.axpy(by, &self.covariance.column(at), 1.0);
-            }
+        let covariance = self.covariance.as_slice();
+        for (row, out) in rows.iter().zip(spread.as_mut_slice().chunks_exact_mut(n)) {
+            let entries = entries(row);
+            combine(out, entries.map(|(at, _)| &covariance[at * n..(at + 1) * n]), entries.map(|(_, by)| by));
         }
         spread
     }
 
+    /// The variance of a row's bearing.
+    fn noise(&self, row: &Row) -> f64 {
+        (self.graph.bearing_sigma * self.graph.spreads[row.slot]).powi(2)
+    }
+
     /// Which rows pass the gate.
     fn gated(&self, rows: &[Row], spread: &DMatrix<f64>) -> Vec<bool> {
-        let noise = self.options.bearing_sigma_rad.powi(2);
         let passes = |(column, row): (usize, &Row)| {
-            let variance = entries(row).iter().map(|(at, by)| by * spread[(*at, column)]).sum::<f64>() + noise;
+            let variance = along(row, &spread.as_slice()[column * spread.nrows()..]) + self.noise(row);
             let y = wrap_angle(row.bearing - row.p.bearing);
             self.gate.passes(y * y / variance)
         };
@@ -48,7 +53,6 @@ impl Recursive {
 
     /// Fuses the rows that pass the gate, and says which slots did not.
     pub(super) fn fuse(&mut self, mut rows: Vec<Row>, outcome: &mut Outcome) -> Vec<usize> {
-        let noise = self.options.bearing_sigma_rad.powi(2);
         let mut spread = self.spread(&rows);
         let mut passes = self.gated(&rows, &spread);
         let failed = passes.iter().filter(|passed| !**passed).count();
@@ -85,20 +89,20 @@ impl Recursive {
                 spread = self.spread(&rows);
                 let back = &self.mean - &before;
                 for (row, y) in rows.iter().zip(innovation.iter_mut()) {
-                    *y += entries(row).iter().map(|(at, by)| by * back[*at]).sum::<f64>();
+                    *y += along(row, back.as_slice());
                 }
             }
             let mut s = DMatrix::zeros(rows.len(), rows.len());
-            for (i, row) in rows.iter().enumerate() {
-                let entries = entries(row);
-                for j in 0..=i {
-                    s[(i, j)] = entries.iter().map(|(at, by)| by * spread[(*at, j)]).sum();
+            let n = self.covariance.nrows();
+            for (j, spread) in spread.as_slice().chunks_exact(n).enumerate() {
+                for (row, value) in rows[j..].iter().zip(&mut s.column_mut(j).as_mut_slice()[j..]) {
+                    *value = along(row, spread);
                 }
-                s[(i, i)] += noise;
+                s[(j, j)] += self.noise(&rows[j]);
             }
-            let Some(lower) = Cholesky::new(s).map(Cholesky::unpack) else { return rejected };
-            let whitened = whiten(spread.clone(), &lower);
-            let Some(y) = lower.solve_lower_triangular(&innovation) else { return rejected };
+            let Some(factor) = Factor::new(s) else { return rejected };
+            let whitened = factor.whiten(std::mem::replace(&mut spread, DMatrix::zeros(0, 0)));
+            let Some(y) = factor.whitened(&innovation) else { return rejected };
             if iteration == 0 {
                 outcome.nis = y.norm_squared();
             }
@@ -111,8 +115,9 @@ impl Recursive {
                 subtract_square(&mut self.covariance, &whitened);
                 break;
             }
+            let view = self.view();
             for row in &mut rows {
-                row.p = self.expect(row.slot);
+                row.p = self.expect(row.slot, &view);
             }
         }
         rejected
@@ -135,44 +140,11 @@ fn entries(row: &Row) -> [(usize, f64); 8] {
     ]
 }
 
-/// Columns that are worked on at once.
-const BLOCK: usize = 24;
-
-/// `T L^-T`, block by block of columns: what the blocks before have in it is taken out first.
-fn whiten(mut t: DMatrix<f64>, lower: &DMatrix<f64>) -> DMatrix<f64> {
-    let (rows, columns) = t.shape();
-    for first in (0..columns).step_by(BLOCK) {
-        let width = BLOCK.min(columns - first);
-        let (done, mut rest) = t.columns_range_pair_mut(..first, first..first + width);
-        if first > 0 {
-            rest.gemm(-1.0, &done, &lower.view((first, 0), (width, first)).transpose(), 1.0);
-        }
-        let block = &mut t.as_mut_slice()[first * rows..(first + width) * rows];
-        for j in 0..width {
-            let (done, rest) = block.split_at_mut(j * rows);
-            let column = &mut rest[..rows];
-            for (k, before) in done.chunks_exact(rows).enumerate() {
-                let factor = lower[(first + j, first + k)];
-                for (value, before) in column.iter_mut().zip(before) {
-                    *value -= factor * before;
-                }
-            }
-            let scale = 1.0 / lower[(first + j, first + j)];
-            for value in column.iter_mut() {
-                *value *= scale;
-            }
-        }
-    }
-    t
-}
-
-/// `P - W W^T` of a symmetric `P`: its lower half in blocks of columns, and the upper half from that.
-fn subtract_square(p: &mut DMatrix<f64>, w: &DMatrix<f64>) {
-    let n = p.nrows();
-    for first in (0..n).step_by(BLOCK) {
-        let (width, height) = (BLOCK.min(n - first), n - first);
-        let own = w.rows(first, width).transpose();
-        p.view_mut((first, first), (height, width)).gemm(-1.0, &w.rows(first, height), &own, 1.0);
-    }
-    p.fill_upper_triangle_with_lower_triangle();
+/// The product of a row of the Jacobian and a vector.
+fn along(row: &Row, vector: &[f64]) -> f64 {
+    let at = LANDMARKS + 2 * row.slot;
+    let (p, head, own) = (&row.p, &vector[..LANDMARKS], &vector[at..at + 2]);
+    let first = p.by_pose.x * head[0] + p.by_pose.y * head[1] + p.by_pose.z * head[2];
+    let second = p.by_mounting.x * head[3] + p.by_mounting.y * head[4] + p.by_mounting.z * head[5];
+    first + second + (p.by_landmark.x * own[0] + p.by_landmark.y * own[1])
 }
