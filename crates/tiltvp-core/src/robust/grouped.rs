@@ -1,8 +1,9 @@
 //! Sums of gated rows by group, in one pass: what a covariance is made of when the rows of a group err together.
 
-use super::lanes::{self, LANES, TURNS, Terms};
+use super::lanes::{self, Terms};
 use super::loss::Gate;
 use super::rows::Rows;
+use super::vectors::{LANES, TURNS};
 
 /// Most groups.
 pub const GROUPS: usize = 64;

@@ -17,6 +17,8 @@ mod rows;
 mod sampler;
 mod sampling;
 mod score;
+mod total;
+mod vectors;
 mod verification;
 
 pub(crate) use compaction::{Block, Kept, ROOM, compact};

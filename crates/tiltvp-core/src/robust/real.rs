@@ -3,46 +3,17 @@
 use multiversion::multiversion;
 
 use super::aligned::Dense;
-use super::lanes::{self, HARD, LANES, REJECTED, SOFT, WITHIN};
+use super::lanes::{self, HARD, REJECTED, SOFT, WITHIN};
 use super::loss::Shape;
 use super::score::{DEGREE, MARGINAL, cell, marginal_gain};
+use super::total::Total;
+use super::vectors::LANES;
 
 /// Rows added up in the rows' own precision before they are added in double precision.
 pub(super) const BLOCK: usize = 512;
 
 /// The table of a gate as the kernels' parameter, beside those of [`lanes`].
 const MARGINALS: u8 = 2;
-
-/// Totals in double precision: weight, then the six moments.
-#[derive(Default)]
-pub struct Total {
-    pub(super) count: usize,
-    pub(super) sums: [f64; 7],
-}
-
-impl Total {
-    /// Adds a block's count, and its sums lane by lane.
-    pub(super) fn add(&mut self, count: usize, lanes: &[[f32; LANES]; 7]) {
-        self.count += count;
-        for (sum, lanes) in self.sums.iter_mut().zip(lanes) {
-            let mut fours = [0.0; 4];
-            for four in lanes.as_chunks::<4>().0 {
-                fours.iter_mut().zip(four).for_each(|(sum, lane)| *sum += f64::from(*lane));
-            }
-            *sum += (fours[0] + fours[1]) + (fours[2] + fours[3]);
-        }
-    }
-
-    #[cfg(test)]
-    pub(super) fn sums(&self) -> &[f64; 7] {
-        &self.sums
-    }
-
-    #[cfg(test)]
-    pub(super) fn count(&self) -> usize {
-        self.count
-    }
-}
 
 /// The arithmetic that rows are stored in: `f32` or `f64`.
 #[expect(private_bounds, reason = "what numbers are dense is told by the two that there are")]

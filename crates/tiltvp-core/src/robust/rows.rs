@@ -4,9 +4,10 @@ use nalgebra::{Matrix2, Matrix3, Vector2, Vector3};
 
 use super::aligned::Aligned;
 use super::loss::{Gate, Shape};
-use super::real::{BLOCK, Real, Total};
+use super::real::{BLOCK, Real};
 use super::sampling::Score;
 use super::score::MARGINAL;
+use super::total::Total;
 
 /// Rows in structure-of-arrays form, in single precision for pixels or double for the user's own numbers.
 #[derive(Debug, Clone, Default)]
@@ -288,7 +289,7 @@ const COUNTED: usize = 1024;
 
 #[cfg(test)]
 mod tests {
-    use super::super::lanes::LANES;
+    use super::super::vectors::LANES;
     use super::*;
     use approx::assert_relative_eq;
 
