@@ -166,7 +166,7 @@ impl TiltEstimator {
     /// that has one.
     #[cfg(feature = "rayon")]
     pub fn estimate_many(&self, images: &[ImageView<'_>], threads: usize) -> Result<Vec<TiltEstimate>> {
-        use rayon::prelude::*;
+        use std::sync::atomic::{AtomicUsize, Ordering};
         if threads == 0 {
             return Err(Error::option("threads", threads, "at least 1"));
         }
@@ -177,11 +177,18 @@ impl TiltEstimator {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads.min(images.len())).build().map_err(|error| {
             Error::option("threads", format!("{threads} ({error})"), "a number that the system can start")
         })?;
-        // Collected in order first: a parallel collection into a `Result` returns whichever error it meets first.
-        let answers: Vec<Result<TiltEstimate>> = pool.install(|| {
-            images.par_iter().map_init(|| self.scratch(), |scratch, image| self.estimate(image, scratch)).collect()
+        // Each thread has one memory, and takes the next image when it has done the one before.
+        let next = AtomicUsize::new(0);
+        let by_thread = pool.broadcast(|_| {
+            let mut scratch = self.scratch();
+            let one = || next.fetch_add(1, Ordering::Relaxed);
+            std::iter::repeat_with(one)
+                .map_while(|i| images.get(i).map(|image| (i, self.estimate(image, &mut scratch))))
+                .collect::<Vec<_>>()
         });
-        answers.into_iter().collect()
+        let mut answers: Vec<_> = by_thread.into_iter().flatten().collect();
+        answers.sort_unstable_by_key(|(i, _)| *i);
+        answers.into_iter().map(|(_, answer)| answer).collect()
     }
 
     /// The tilt of one image as [`estimate`](Self::estimate) gives it, and all its edge pixels. Allocates.
