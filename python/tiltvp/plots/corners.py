@@ -51,7 +51,8 @@ def corner_errors(table: pl.DataFrame, title: str = "") -> Figure:
         lower.legend(loc="lower right", frameon=False)
     lower.set_xlabel("time (s)")
     for axes in (upper, middle):
-        axes.legend(loc="upper right", ncols=3, frameon=False)
+        # Above the panel, where no curve is.
+        axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), borderaxespad=0.1, ncols=3, frameon=False)
     if title:
         figure.suptitle(title)
     return figure
