@@ -2,7 +2,7 @@
 
 use super::candidates::wrap;
 use super::dissimilarity::descriptor_distances;
-use super::order::keep_cyclic_order;
+use super::order::{Match, keep_cyclic_order};
 use crate::error::{Error, Result};
 
 /// Options of the matcher.
@@ -42,17 +42,6 @@ impl MatchOptions {
         }
         Ok(())
     }
-}
-
-/// Line `a` of the first image is line `b` of the second.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Match {
-    /// Place in the first image.
-    pub a: usize,
-    /// Place in the second image.
-    pub b: usize,
-    /// Distance of the descriptors.
-    pub distance: f64,
 }
 
 /// What is known of the bearings: only lines that are close to where they are expected may match.

@@ -18,12 +18,15 @@ mod patch;
 mod radial;
 mod sight;
 mod tracker;
+mod tracker_options;
 
 pub use descriptor::{DescriptorOptions, Normalisation};
 pub use dissimilarity::{descriptor_distances, ssd_matrix, zncc_matrix};
 pub use extractor::{LineExtractor, LineScratch};
 pub use line::{Line, LineFrame, Lines};
-pub use matcher::{BearingGate, Match, MatchOptions, MatchScratch, match_descriptors};
+pub use matcher::{BearingGate, MatchOptions, MatchScratch, match_descriptors};
 pub use options::{GreatCircleOptions, LINE_METHODS, LineMethod, LineOptions, RadialOptions};
+pub use order::Match;
 pub use parallax::{Motion, Parallax};
-pub use tracker::{Followed, FrameMemory, LineTracker, TrackedLine, TrackerOptions, TrackerState};
+pub use tracker::{Followed, FrameMemory, LineTracker, TrackedLine, TrackerState};
+pub use tracker_options::TrackerOptions;

@@ -1,6 +1,15 @@
-//! The ordering constraint: lines keep their cyclic order about the robot.
+//! Matches, and the ordering constraint: lines keep their cyclic order about the robot.
 
-use super::matcher::Match;
+/// Line `a` of the first image is line `b` of the second.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Match {
+    /// Place in the first image.
+    pub a: usize,
+    /// Place in the second image.
+    pub b: usize,
+    /// Distance of the descriptors.
+    pub distance: f64,
+}
 
 /// Keeps the most matches whose second indices rise cyclically with the first, of these those nearest in sum. The matches
 /// must be sorted by first index; `m` is the number of lines that second indices number.

@@ -1,7 +1,7 @@
 //! The bearing of an upright edge and how near it is: what a motion of the robot makes of them, and what a new bearing tells.
 
 use super::candidates::wrap;
-use super::tracker::TrackerOptions;
+use super::tracker_options::TrackerOptions;
 
 /// What the robot did between two frames.
 #[derive(Debug, Clone, Copy, PartialEq)]
