@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 from tiltvp import _core
 from tiltvp._core import (
@@ -44,6 +44,9 @@ __all__ = [
     "zncc_matrix",
 ]
 
+_SUPPORT_KEPT: Final = 0.75
+"""The least share of the upright robot's edge pixels on lines that lines keep under a lean that is believed."""
+
 
 class LineExtractor(_core.LineExtractor):
     """Finds and describes the vertical lines of single images of one camera.
@@ -63,6 +66,18 @@ class LineExtractor(_core.LineExtractor):
         `InvalidInputError` for an image of another size than the camera's and for an estimate without a tilt.
         """
         return self._extract(gray_from(image), _normal(tilt))
+
+    def believes(self, image: ArrayLike, tilt: TiltEstimate, *, confidence_min: float = 0.5) -> bool:
+        """Whether an estimate of the lean is confident enough, and the lines of the image do not speak against it.
+
+        Under a true lean verticals are lines; edges that mislead the estimate make fewer: the edge pixels on lines must
+        be at least three quarters of those of an upright robot. Costs two extractions. False for an estimate without
+        a tilt.
+        """
+        if not tilt or tilt.confidence < confidence_min:
+            return False
+        leaning, upright = (int(self(image, lean).support_px.sum()) for lean in (tilt, None))
+        return leaning >= _SUPPORT_KEPT * upright
 
     def describe(self, image: ArrayLike, lines: Lines) -> NDArray[np.float32]:
         """(N, 192) float32: the descriptors of the lines of an image, eqs. 2 to 5; other options, other widths.

@@ -26,8 +26,6 @@ _AS_THEY_ARE = ("method", "margin_px", "gradient_min", "smoothing_px", "support_
                 "length_min", "rim_radius_px", "center_search_px")  # fmt: skip
 _ANGLES = ("elevation_min", "elevation_max", "length_min", "separation", "tilt_sigma")
 _UPRIGHT = "upright"
-_SUPPORT_KEPT = 0.75
-"""The least share of the upright robot's edge pixels on lines that lines keep under a lean that is believed."""
 
 
 @Parameter(name="*", group=_LINES)
@@ -103,11 +101,8 @@ class LineOptions:
 
         def tilt(gray: NDArray[np.uint8]) -> TiltEstimate | None:
             estimate = estimator(gray)
-            if not estimate or estimate.confidence < self.tilt_confidence_min:
-                return None
-            # Under a true lean verticals are lines; edges that mislead the estimate make fewer.
-            leaning, upright = (int(extractor(gray, lean).support_px.sum()) for lean in (estimate, None))
-            return estimate if leaning >= _SUPPORT_KEPT * upright else None
+            believed = extractor.believes(gray, estimate, confidence_min=self.tilt_confidence_min)
+            return estimate if believed else None
 
         return tilt
 

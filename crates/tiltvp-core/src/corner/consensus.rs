@@ -7,6 +7,9 @@ use super::prior::AttitudePrior;
 use super::vertex::CornerFeature;
 use crate::error::Result;
 
+/// Vertices whose bearings are closer than this are one, radians.
+pub(super) const SAME_VERTEX_RAD: f64 = 0.01;
+
 /// How much a feature says, in pixels: its shortest ray, and a share of all three.
 pub(super) fn weight(feature: &CornerFeature) -> f64 {
     let support = feature.rays().map(|ray| ray.support as f64);

@@ -2,7 +2,7 @@
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::consensus::weight;
+use super::consensus::{SAME_VERTEX_RAD, weight};
 use super::estimate::Hypothesis;
 use super::vertex::CornerFeature;
 use crate::geometry::RigidMotion;
@@ -12,9 +12,6 @@ const HALF_SINE: f64 = 0.0175;
 
 /// What a pose counts that no other corner agrees with; one that all agree with counts 1 more.
 const ALONE: f64 = 1.0;
-
-/// Corners whose bearings are closer than this share a vertex, and say nothing new.
-const SAME_VERTEX_RAD: f64 = 0.01;
 
 /// One corner's voice.
 struct Voice {
@@ -50,6 +47,7 @@ impl Voices {
         let Some(vertex_m) = pose.vertex_m else { return 1.0 };
         let own = [vertex_m, self.right_from_left.point(&vertex_m)];
         let (mut agreeing, mut all) = (0.0, 0.0);
+        // Those of the pose's own vertex say nothing new.
         for voice in self.voices.iter().filter(|voice| voice.vertex.angle(&own[voice.side]) > SAME_VERTEX_RAD) {
             let off = |normal: &Vector3<f64>| pose.camera_from_object.tr_mul(normal).abs().min();
             let most = voice.normals.iter().map(off).fold(0.0, f64::max);

@@ -421,53 +421,22 @@ unsafe fn compact<L: Level>(waiting: &mut Waiting, kept: &mut Kept<'_>) {
                 _mm512_storeu_si512(kept.gy.as_mut_ptr().add(len).cast(), y0);
                 _mm512_storeu_si512(kept.gx.as_mut_ptr().add(after).cast(), x1);
                 _mm512_storeu_si512(kept.gy.as_mut_ptr().add(after).cast(), y1);
-                store_numbers(
+                let others = [
                     _mm512_extracti32x4_epi32::<1>(numbers),
-                    slot,
-                    place,
-                    slots.add(len + 16),
-                    places.add(len + 16),
-                );
-                store_numbers(
                     _mm512_extracti32x4_epi32::<2>(numbers),
-                    slot,
-                    place,
-                    slots.add(len + 32),
-                    places.add(len + 32),
-                );
-                store_numbers(
                     _mm512_extracti32x4_epi32::<3>(numbers),
-                    slot,
-                    place,
-                    slots.add(len + 48),
-                    places.add(len + 48),
-                );
+                ];
+                for (at, numbers) in (len + 16..).step_by(16).zip(others) {
+                    let numbers = _mm512_cvtepu8_epi32(numbers);
+                    _mm512_storeu_si512(slots.add(at).cast(), _mm512_add_epi32(numbers, slot));
+                    _mm512_storeu_si512(places.add(at).cast(), _mm512_add_epi32(numbers, place));
+                }
             }
             len += count;
         }
         kept.len = len;
     }
     waiting.len = 0;
-}
-
-/// Writes 16 pixels' numbers and places.
-///
-/// # Safety
-/// The machine must be as [`is_available`] asks, with room for 16 words at both pointers.
-#[inline(always)]
-unsafe fn store_numbers(
-    numbers: std::arch::x86_64::__m128i,
-    slot: __m512i,
-    place: __m512i,
-    slots: *mut u32,
-    places: *mut u32,
-) {
-    // SAFETY: as the caller vouches.
-    unsafe {
-        let numbers = _mm512_cvtepu8_epi32(numbers);
-        _mm512_storeu_si512(slots.cast(), _mm512_add_epi32(numbers, slot));
-        _mm512_storeu_si512(places.cast(), _mm512_add_epi32(numbers, place));
-    }
 }
 
 #[cfg(test)]

@@ -6,7 +6,7 @@ mod transfer;
 use nalgebra::{Matrix3, Matrix6, Vector3};
 
 use super::attitude::IncludedAngle;
-use super::consensus::{agreement, fits, renamed, weight};
+use super::consensus::{SAME_VERTEX_RAD, agreement, fits, renamed, weight};
 use super::detector::{CornerDetector, CornerScratch};
 use super::ends::{EdgeEnd, edge_ends};
 use super::estimate::{CornerEstimate, Hypothesis, Verdict};
@@ -288,9 +288,6 @@ impl CornerPoseEstimator {
         }
     }
 }
-
-/// How far apart vertices of different corners are, radians.
-const SAME_VERTEX_RAD: f64 = 0.01;
 
 /// How far from where it was a corner is looked for first, in pixels.
 const HARDLY_MOVED_PX: f64 = 3.0;
