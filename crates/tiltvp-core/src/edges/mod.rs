@@ -9,6 +9,7 @@ mod screen;
 mod sieve;
 #[cfg(target_arch = "x86_64")]
 mod sieve_avx512;
+mod thinning;
 
 pub use detect::{Detector, EdgePixels};
 pub use lift::{LiftTable, NormalKind};
