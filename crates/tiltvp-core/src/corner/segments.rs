@@ -19,6 +19,9 @@ const REACH: usize = 2;
 /// How many pixels ahead bearings are asked for.
 const AHEAD: usize = 8;
 
+/// Pixels from one end of the reach to the other.
+const SPAN: usize = 2 * REACH + 1;
+
 /// Most segments of an image, the longest ones.
 const SEGMENTS_MAX: usize = 160;
 
@@ -52,9 +55,9 @@ pub(super) struct SegmentFinder {
 pub(super) struct SegmentScratch {
     detector: RidgeDetector,
     ridge: RidgePixels,
-    /// One above the place among the ridge pixels, for each pixel of the image; 0 elsewhere and once taken, so that all are 0
-    /// after an image.
+    /// The place among the ridge pixels, for each pixel of the image that is one.
     owner: Vec<u32>,
+    free: Free,
     /// Places among the ridge pixels in the lower half, in the upper what is less for stronger ones.
     order: Vec<u64>,
     /// Directions of the ridge pixels' gradients.
@@ -62,6 +65,50 @@ pub(super) struct SegmentScratch {
     members: Vec<u32>,
     points: Vec<(Vector2<f64>, Vector3<f64>)>,
     pub(super) segments: Vec<Segment>,
+}
+
+/// A bit for each pixel: whether it is a ridge pixel that has not been taken. All are zero after an image.
+#[derive(Debug, Clone, Default)]
+struct Free {
+    bits: Vec<u8>,
+    /// Bytes from row to row, some more than the pixels need.
+    stride: usize,
+}
+
+impl Free {
+    fn make(&mut self, width: usize, height: usize) {
+        let stride = width / 8 + 4;
+        if (self.stride, self.bits.len()) != (stride, stride * height) {
+            self.stride = stride;
+            self.bits.clear();
+            self.bits.resize(stride * height, 0);
+        }
+    }
+
+    #[inline(always)]
+    fn add(&mut self, u: usize, v: usize) {
+        self.bits[v * self.stride + u / 8] |= 1 << (u % 8);
+    }
+
+    /// Whether it was there to be taken.
+    #[inline(always)]
+    fn take(&mut self, u: usize, v: usize) -> bool {
+        let (byte, bit) = (&mut self.bits[v * self.stride + u / 8], 1 << (u % 8));
+        let was = *byte & bit != 0;
+        *byte &= !bit;
+        was
+    }
+
+    /// The bits of the pixels within reach, row by row, the first the lowest.
+    #[inline(always)]
+    fn around(&self, u: usize, v: usize) -> u32 {
+        let (byte, shift) = ((u - REACH) / 8, (u - REACH) % 8);
+        (0..SPAN).fold(0, |around, row| {
+            let at = (v - REACH + row) * self.stride + byte;
+            let bits = self.bits[at..at + 2].iter().rev().fold(0, |bits, byte| bits << 8 | u32::from(*byte));
+            around | (bits >> shift & ((1 << SPAN) - 1)) << (SPAN * row)
+        })
+    }
 }
 
 impl SegmentFinder {
@@ -108,6 +155,7 @@ impl SegmentFinder {
             detector: RidgeDetector::new(&self.region, &self.edges),
             ridge: RidgePixels::default(),
             owner: Vec::new(),
+            free: Free::default(),
             order: Vec::new(),
             units: Vec::new(),
             members: Vec::new(),
@@ -124,19 +172,18 @@ impl SegmentFinder {
         options: &GeneralOptions,
         scratch: &mut SegmentScratch,
     ) {
-        let SegmentScratch { detector, ridge, owner, order, units, members, points, segments } = scratch;
+        let SegmentScratch { detector, ridge, owner, free, order, units, members, points, segments } = scratch;
         detector.detect(image, &self.region, self.edges.gradient_min, None, ridge);
         let (slots, gx, gy) = (ridge.edges.slot(), ridge.edges.gx(), ridge.edges.gy());
         let width = image.width();
-        if owner.len() != width * image.height() {
-            owner.clear();
-            owner.resize(width * image.height(), 0);
-        }
+        owner.resize(width * image.height(), 0);
+        free.make(width, image.height());
         let places = ridge.edges.place();
         let place = |i: usize| ((places[i] & 0xffff) as usize, (places[i] >> 16) as usize);
         for i in 0..slots.len() {
             let (u, v) = place(i);
-            owner[v * width + u] = i as u32 + 1;
+            owner[v * width + u] = i as u32;
+            free.add(u, v);
         }
         units.resize(slots.len(), [0.0; 2]);
         directions(gx, gy, units);
@@ -154,10 +201,9 @@ impl SegmentFinder {
         segments.clear();
         for seed in order.iter().map(|key| *key as u32) {
             let (u, v) = place(seed as usize);
-            if owner[v * width + u] == 0 {
+            if !free.take(u, v) {
                 continue;
             }
-            owner[v * width + u] = 0;
             members.clear();
             members.push(seed);
             let mut sum = units[seed as usize];
@@ -167,17 +213,18 @@ impl SegmentFinder {
                 next += 1;
                 let (u, v) = place(*at as usize);
                 // The region keeps more than the reach clear of the image's border.
-                for v in v - REACH..=v + REACH {
-                    let row = &mut owner[v * width..(v + 1) * width];
-                    for slot in &mut row[u - REACH..=u + REACH] {
-                        let Some(candidate) = slot.checked_sub(1) else { continue };
-                        let [x, y] = units[candidate as usize];
-                        if x * sum[0] + y * sum[1] > least {
-                            *slot = 0;
-                            sum = [sum[0] + x, sum[1] + y];
-                            least = AGREEING_COS * length(sum);
-                            members.push(candidate);
-                        }
+                let mut around = free.around(u, v);
+                while around != 0 {
+                    let place = around.trailing_zeros() as usize;
+                    around &= around - 1;
+                    let (u, v) = (u - REACH + place % SPAN, v - REACH + place / SPAN);
+                    let candidate = owner[v * width + u];
+                    let [x, y] = units[candidate as usize];
+                    if x * sum[0] + y * sum[1] > least {
+                        free.take(u, v);
+                        sum = [sum[0] + x, sum[1] + y];
+                        least = AGREEING_COS * length(sum);
+                        members.push(candidate);
                     }
                 }
             }

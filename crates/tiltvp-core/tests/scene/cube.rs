@@ -8,7 +8,7 @@ use tiltvp_core::image::ColorView;
 const SIDE_M: f64 = 0.3;
 
 /// Rays per pixel and side.
-const RAYS: usize = 3;
+const RAYS: usize = 2;
 
 /// Blue, green and red of the upper, the left and the right face, and of the wall behind.
 const COLOURS: [[f64; 3]; 4] = [[40.0, 40.0, 190.0], [34.0, 128.0, 34.0], [133.0, 35.0, 28.0], [150.0, 152.0, 149.0]];
