@@ -29,13 +29,13 @@ const LIMITS: [(&str, u64); 9] = [
     ("trimmed_image", 1330),
     ("consensus_image", 630),
     // Its lines, and their descriptors.
-    ("extracted_lines", 99999),
-    ("described_lines", 99999),
+    ("extracted_lines", 4400),
+    ("described_lines", 32_200),
     // Two images of 320 x 180 pixels to the corner of the coloured cube in each.
-    ("segmented_pair", 99999),
+    ("segmented_pair", 6100),
     // Ten steps of the self-calibration early in a drive, with 10 and with 100 landmarks.
-    ("steps_among_10", 99999),
-    ("steps_among_100", 99999),
+    ("steps_among_10", 1450),
+    ("steps_among_100", 101_000),
 ];
 
 type Measured = fn(&TiltEstimator, &ImageView<'_>, &mut Scratch) -> Option<TiltEstimate>;

@@ -21,6 +21,7 @@ mod radial;
 mod sight;
 mod tracker;
 mod tracker_options;
+mod tracker_state;
 
 pub use descriptor_options::{DescriptorOptions, Normalisation};
 pub use dissimilarity::{descriptor_distances, ssd_matrix, zncc_matrix};
@@ -30,5 +31,6 @@ pub use matcher::{BearingGate, MatchOptions, MatchScratch, match_descriptors};
 pub use options::{GreatCircleOptions, LINE_METHODS, LineMethod, LineOptions, RadialOptions};
 pub use order::Match;
 pub use parallax::{Motion, Parallax};
-pub use tracker::{Followed, FrameMemory, LineTracker, TrackedLine, TrackerState};
+pub use tracker::LineTracker;
 pub use tracker_options::TrackerOptions;
+pub use tracker_state::{Followed, FrameMemory, TrackedLine, TrackerState};
