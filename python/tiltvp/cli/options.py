@@ -1,6 +1,6 @@
 """The options that commands share, and their way from words and degrees to what the library takes."""
 
-# Annotations are evaluated: classes of other files inherit these options, where cyclopts would look for the types in vain.
+# Annotations are evaluated: other files inherit these options, and there cyclopts would not find the names of types.
 
 import difflib
 import math
