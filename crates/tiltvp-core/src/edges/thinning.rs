@@ -30,7 +30,7 @@ pub(super) fn scharr(
     }
 }
 
-/// The gradients of a span's pixels, and the squared magnitudes about them.
+/// The gradients of pixels in whole blocks of [`MARKED`], and the squared magnitudes about them.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Around<'a> {
     pub(super) gx: &'a [f32],
@@ -45,30 +45,49 @@ pub(super) struct Around<'a> {
 /// where `|gx| >= |gy|`, in the column elsewhere. The others are marked with zero.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512vl", "x86_64+avx2"))]
 pub(super) fn mark(around: &Around<'_>, least: f32, marks: &mut [u8]) {
-    mark_where(around, least, marks, |_, _, _, _| true);
+    mark_where(around, least, marks, std::iter::repeat(|_, _, _, _| true));
 }
 
 /// The same where also `(q . g)^2 <= limit |g|^2`, with a vector `q` for each pixel.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512vl", "x86_64+avx2"))]
 pub(super) fn mark_screened(around: &Around<'_>, least: f32, vectors: &[[i16; 2]], limit: f32, marks: &mut [u8]) {
-    let vectors = &vectors[..around.gx.len()];
-    mark_where(around, least, marks, |i, x, y, strength| {
-        let across = f32::from(vectors[i][0]) * x + f32::from(vectors[i][1]) * y;
-        across * across <= limit * strength
+    let tests = vectors.as_chunks::<MARKED>().0.iter().map(|vectors| {
+        move |i: usize, x: f32, y: f32, strength: f32| {
+            let across = f32::from(vectors[i][0]) * x + f32::from(vectors[i][1]) * y;
+            across * across <= limit * strength
+        }
     });
+    mark_where(around, least, marks, tests);
 }
 
+/// With a test for each block.
 #[inline(always)]
-fn mark_where(around: &Around<'_>, least: f32, marks: &mut [u8], passes: impl Fn(usize, f32, f32, f32) -> bool) {
-    let n = around.gx.len();
+fn mark_where<T: Fn(usize, f32, f32, f32) -> bool>(
+    around: &Around<'_>,
+    least: f32,
+    marks: &mut [u8],
+    tests: impl Iterator<Item = T>,
+) {
+    let blocks = |values| <[f32]>::as_chunks::<MARKED>(values).0.iter();
     let Around { gx, gy, above, here, below } = *around;
-    let (gy, above, here, below) = (&gy[..n], &above[..n], &here[..n + 2], &below[..n]);
-    for (i, mark) in marks[..n].iter_mut().enumerate() {
-        let (x, y, middle) = (gx[i], gy[i], here[i + 1]);
-        let in_row = x.abs() >= y.abs();
-        let (before, after) = (if in_row { here[i] } else { above[i] }, if in_row { here[i + 2] } else { below[i] });
-        let greatest = u8::from(middle > before) & u8::from(middle >= after);
-        *mark = u8::from(middle >= least) & greatest & u8::from(passes(i, x, y, middle));
+    let gradients = blocks(gx).zip(blocks(gy)).zip(blocks(above).zip(blocks(below)));
+    let starts = (0..).step_by(MARKED).map_while(|start| here[start..].first_chunk::<{ MARKED + 2 }>());
+    for (((gradients, here), marks), passes) in gradients.zip(starts).zip(marks.as_chunks_mut::<MARKED>().0).zip(tests)
+    {
+        let ((gx, gy), (above, below)) = gradients;
+        let mut marked = [0; MARKED];
+        for (i, marked) in marked.iter_mut().enumerate() {
+            let (x, y, middle) = (gx[i], gy[i], here[i + 1]);
+            // Both are looked at: to look at one of two places would take a look for each pixel.
+            let in_row = u32::from(middle > here[i]) & u32::from(middle >= here[i + 2]);
+            let in_column = u32::from(middle > above[i]) & u32::from(middle >= below[i]);
+            let along_row = u32::from(x.abs() >= y.abs());
+            let greatest = (along_row & in_row) | ((along_row ^ 1) & in_column);
+            *marked = u32::from(middle >= least) & greatest & u32::from(passes(i, x, y, middle));
+        }
+        for (mark, marked) in marks.iter_mut().zip(marked) {
+            *mark = marked as u8;
+        }
     }
 }
 
@@ -115,7 +134,7 @@ mod tests {
 
     #[test]
     fn the_machine_marks_the_same_pixels_as_a_loop() {
-        for n in (0..70).chain([500]) {
+        for n in [0, MARKED, 3 * MARKED, 16 * MARKED] {
             let (gx, gy) = (noise(n, 1), noise(n, 1000));
             let [above, here, below] = [3, 5, 7].map(|seed| noise(n + 2, seed));
             let around = Around { gx: &gx, gy: &gy, above: &above, here: &here, below: &below };
