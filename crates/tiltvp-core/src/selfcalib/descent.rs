@@ -43,7 +43,7 @@ impl Graph {
     /// Moves every unknown by the solution of normal equations, of which the last pose may be part. `None`, and nothing
     /// moves, where they are singular or something is not finite. By how much the cost falls, were it quadratic, due to what
     /// was not eliminated.
-    fn step(&mut self, eliminated: &Eliminated) -> Option<f64> {
+    pub(super) fn step(&mut self, eliminated: &Eliminated) -> Option<f64> {
         let step = Factor::touched(eliminated.information.clone())?.solve(&eliminated.rhs)?;
         let fall = 0.5 * step.dot(&eliminated.rhs);
         let width = self.width();

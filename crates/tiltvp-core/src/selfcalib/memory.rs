@@ -9,6 +9,7 @@ use super::loss::{LIMIT, Loss};
 use super::measurement::Landmark;
 use super::odometry::between;
 use super::recursive::{MOUNTING, Recursive, YOUNG};
+use super::rows::Fit;
 
 /// Poses up to which other starts are tried where bearings do not fit.
 const SETTLED: usize = 160;
@@ -21,11 +22,12 @@ const FEW: f64 = 0.03;
 const TOLERANCE: f64 = 0.05;
 
 impl Recursive {
-    /// Linearises the memory about its own solution, and takes that for mean and covariance.
-    pub(super) fn linearise(&mut self, iterations: u32) {
+    /// Linearises the memory about its own solution, and takes that for mean and covariance; the search for it starts where
+    /// the filter is, if that is `trusted`.
+    pub(super) fn linearise(&mut self, iterations: u32, trusted: bool) {
         let before = self.graph.landmarks.clone();
         self.graph.loss = FIRST;
-        let old = self.graph.nodes.len() >= YOUNG && !self.alarm.uneasy();
+        let old = trusted && self.graph.nodes.len() >= YOUNG && !self.alarm.uneasy();
         if old {
             self.take_filtered();
         }
@@ -51,8 +53,11 @@ impl Recursive {
             }
         }
         let fit = solved.as_ref().map(|solved| solved.fit);
-        if fit.is_some_and(|fit| fit.beyond > 0 && (fit.beyond as f64) < FEW * fit.bearings as f64) {
+        let few = |fit: Fit| (fit.beyond as f64) < FEW * fit.bearings as f64;
+        if fit.is_some_and(|fit| fit.beyond > 0 && few(fit)) {
             solved = self.leave_out(iterations);
+        } else if self.graph.nodes.len() >= YOUNG && fit.is_some_and(few) && self.graph.weigh_landmarks() {
+            solved = self.graph.settle(iterations, TOLERANCE, false);
         }
         if !solved.is_some_and(|solved| self.adopt(solved.information)) {
             // The filter's mean and covariance are about these.

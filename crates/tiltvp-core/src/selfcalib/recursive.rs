@@ -29,6 +29,14 @@ const GROWTH_UNEASY: f64 = 1.15;
 const MOVED: f64 = 1.0;
 const MOVED_UNEASY: f64 = 0.5;
 
+/// Share of the mounting's standard deviations at the last solution from which on it is solved anew: where so much is learned
+/// at once the Jacobians that it was learned with are not those of the answer.
+const SHRUNK: f64 = 0.5;
+
+/// Standard deviations beyond which the filter is not believed to have moved the mounting: the memory is solved from where it
+/// was.
+const WILD: f64 = 3.0;
+
 /// Rejections in a row after which a landmark is taken to be another one.
 const MAX_MISSES: u32 = 5;
 
@@ -51,6 +59,8 @@ pub(super) struct Outcome {
     pub(super) started: usize,
     /// Whether most landmarks were not where they should be, so that the motion was taken to be nearly unknown.
     pub(super) slipped: bool,
+    /// Whether the bearings contradict one another so much that none was fused before the memory was asked.
+    pub(super) disputed: bool,
 }
 
 /// The filter's state: (pose, mounting, landmarks) with its covariance, and the memory that it came from.
@@ -135,12 +145,16 @@ impl Recursive {
         let nodes = self.graph.nodes.len();
         let moved = self.mean.fixed_rows::<3>(MOUNTING) - self.graph.mounting;
         let limit = if self.alarm.uneasy() { MOVED_UNEASY } else { MOVED };
-        let far = moved.iter().zip(&self.solved_sigma).any(|(moved, sigma)| moved.abs() > limit * sigma);
-        let disputed = rejected.iter().any(|slot| self.misses[*slot] >= DISPUTED || self.was_away(*slot));
-        let due = nodes >= self.next_linearisation || far || disputed || outcome.slipped;
+        let sigmas = moved.iter().zip(&self.solved_sigma).map(|(moved, sigma)| moved.abs() / sigma).fold(0.0, f64::max);
+        let now = |i| self.covariance[(MOUNTING + i, MOUNTING + i)].sqrt();
+        let shrunk = (0..3).any(|i| now(i) < SHRUNK * self.solved_sigma[i]);
+        let disputed =
+            outcome.disputed || rejected.iter().any(|slot| self.misses[*slot] >= DISPUTED || self.was_away(*slot));
+        let due = nodes >= self.next_linearisation || sigmas > limit || shrunk || disputed || outcome.slipped;
         let mut judged = outcome;
         if due && nodes > 2 && self.graph.nodes.last().is_some_and(|node| !node.sights.is_empty()) {
-            self.linearise(if nodes < YOUNG { 12 } else { 4 });
+            let trusted = !outcome.disputed && !shrunk && sigmas < WILD;
+            self.linearise(if nodes < YOUNG || !trusted { 12 } else { 4 }, trusted);
             self.judge(&rejected, &mut judged);
             if nodes > self.options.memory as usize {
                 self.fold(nodes / 2);
