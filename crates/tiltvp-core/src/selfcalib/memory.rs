@@ -59,7 +59,7 @@ impl Recursive {
         } else if self.graph.nodes.len() >= YOUNG && fit.is_some_and(few) && self.graph.weigh_landmarks() {
             solved = self.graph.settle(iterations, TOLERANCE, false);
         }
-        if !solved.is_some_and(|solved| self.adopt(solved.information)) {
+        if !solved.is_some_and(|solved| self.adopt(&solved)) {
             // The filter's mean and covariance are about these.
             self.graph.landmarks = before;
         }
@@ -89,10 +89,11 @@ impl Recursive {
         }
     }
 
-    /// Takes the memory's solution for mean and covariance, whose inverse is given, unless it has none.
-    fn adopt(&mut self, information: DMatrix<f64>) -> bool {
-        let Some(factor) = Factor::touched(information) else { return false };
+    /// Takes the memory's solution for mean and covariance, unless it has none.
+    fn adopt(&mut self, solved: &Settled) -> bool {
+        let Some(factor) = Factor::touched(solved.equations.information.clone()) else { return false };
         self.covariance = factor.inverse();
+        self.widening = self.graph.widening(&solved.equations, &self.covariance);
         self.mean = self.graph.dense().insert_rows(0, 3, 0.0);
         if let Some(node) = self.graph.nodes.last() {
             self.mean.fixed_rows_mut::<3>(0).copy_from(&node.pose);
@@ -154,7 +155,7 @@ impl Recursive {
         }
         let Some(solved) = next.settled() else { return };
         let before = std::mem::replace(&mut self.graph, next);
-        if self.adopt(solved.information) {
+        if self.adopt(&solved) {
             self.names = kept.iter().map(|slot| self.names[*slot]).collect();
             self.misses = kept.iter().map(|slot| self.misses[*slot]).collect();
         } else {

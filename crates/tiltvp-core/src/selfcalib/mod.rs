@@ -7,6 +7,7 @@
 mod alarm;
 mod bound;
 mod calibrator;
+mod clustered;
 mod dense;
 mod descent;
 mod graph;

@@ -2,6 +2,8 @@
 
 use std::collections::BTreeMap;
 
+use nalgebra::Matrix3;
+
 use super::calibrator::MountingEstimate;
 use super::dense::Factor;
 use super::descent::Descent;
@@ -240,13 +242,16 @@ fn report(options: &LogOptions, graph: &Graph, descent: &Descent) -> Result<LogC
     let nothing =
         || Error::argument("bearings", "a drive that determines nothing", "landmarks seen from several poses");
     let eliminated = graph.eliminate(graph.nodes.len() - 1, false, 0.0).ok_or_else(nothing)?;
-    let covariance = Factor::touched(eliminated.information).ok_or_else(nothing)?.inverse() * scale;
+    let covariance = Factor::touched(eliminated.information.clone()).ok_or_else(nothing)?.inverse();
+    let widening = graph.widening(&eliminated, &covariance);
+    let covariance = covariance * scale;
+    let mounting: Matrix3<f64> = covariance.fixed_view::<3, 3>(0, 0).into();
     let sigma = |at: usize| covariance[(at, at)].sqrt();
     let (wheels, offset) = (options.estimate_odometry, options.estimate_time_offset);
     Ok(LogCalibration {
         estimate: MountingEstimate::new(
             Mounting::from_vector(&graph.mounting),
-            covariance.fixed_view::<3, 3>(0, 0).into(),
+            widening * mounting * widening.transpose(),
             &(o.start_covariance * scale),
             Some(sum / kept.len().max(1) as f64),
             false,

@@ -81,6 +81,8 @@ pub(super) struct Recursive {
     pub(super) solved: usize,
     /// Standard deviations of the mounting then.
     pub(super) solved_sigma: Vector3<f64>,
+    /// By which factor errors that the bearings of a landmark have in common widen what is said of the mounting.
+    pub(super) widening: Matrix3<f64>,
     /// Covariance that the last motion added to the pose.
     pub(super) motion_noise: Matrix3<f64>,
     pub(super) alarm: Alarm,
@@ -119,13 +121,15 @@ impl Recursive {
             next_linearisation: 3,
             solved: 1,
             solved_sigma: options.start_covariance.diagonal().map(f64::sqrt),
+            widening: Matrix3::identity(),
             motion_noise: Matrix3::zeros(),
             alarm: Alarm::default(),
         })
     }
 
     pub(super) fn mounting(&self) -> (Vector3<f64>, Matrix3<f64>) {
-        (self.mean.fixed_rows::<3>(MOUNTING).into(), self.covariance.fixed_view::<3, 3>(MOUNTING, MOUNTING).into())
+        let own: Matrix3<f64> = self.covariance.fixed_view::<3, 3>(MOUNTING, MOUNTING).into();
+        (self.mean.fixed_rows::<3>(MOUNTING).into(), self.widening * own * self.widening.transpose())
     }
 
     /// The least-squares problem of what has been seen.
