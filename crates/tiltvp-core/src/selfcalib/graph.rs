@@ -209,6 +209,13 @@ impl Graph {
         fit
     }
 
+    /// Whether the motion to a node is farther from what the wheels tell than they explain without slipping.
+    pub(super) fn slipped(&self, to: usize) -> bool {
+        let (before, node) = (&self.nodes[to - 1], &self.nodes[to]);
+        let r = between(&before.pose, &node.pose) - node.leg.motion;
+        self.slip.weight(r.dot(&(node.information * r))) < 1.0
+    }
+
     /// The whitened residuals of all bearings, in the order of nodes and sights.
     pub(super) fn residuals(&self) -> Vec<f64> {
         let (rays, mut all) = (self.rays(), Vec::new());

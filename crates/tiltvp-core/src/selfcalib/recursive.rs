@@ -31,7 +31,7 @@ const MOVED_UNEASY: f64 = 0.5;
 
 /// Share of the mounting's standard deviations at the last solution from which on it is solved anew: where so much is learned
 /// at once the Jacobians that it was learned with are not those of the answer.
-const SHRUNK: f64 = 0.5;
+const SHRUNK: f64 = 0.6;
 
 /// Standard deviations beyond which the filter is not believed to have moved the mounting: the memory is solved from where it
 /// was.
@@ -59,8 +59,9 @@ pub(super) struct Outcome {
     pub(super) started: usize,
     /// Whether most landmarks were not where they should be, so that the motion was taken to be nearly unknown.
     pub(super) slipped: bool,
-    /// Whether the bearings contradict one another so much that none was fused before the memory was asked.
-    pub(super) disputed: bool,
+    /// Normalised innovation squared of bearings that contradict one another so much that none was fused before the memory was
+    /// asked; 0 where they do not.
+    pub(super) contradiction: f64,
 }
 
 /// The filter's state: (pose, mounting, landmarks) with its covariance, and the memory that it came from.
@@ -152,12 +153,12 @@ impl Recursive {
         let sigmas = moved.iter().zip(&self.solved_sigma).map(|(moved, sigma)| moved.abs() / sigma).fold(0.0, f64::max);
         let now = |i| self.covariance[(MOUNTING + i, MOUNTING + i)].sqrt();
         let shrunk = (0..3).any(|i| now(i) < SHRUNK * self.solved_sigma[i]);
-        let disputed =
-            outcome.disputed || rejected.iter().any(|slot| self.misses[*slot] >= DISPUTED || self.was_away(*slot));
+        let disputed = outcome.contradiction > 0.0
+            || rejected.iter().any(|slot| self.misses[*slot] >= DISPUTED || self.was_away(*slot));
         let due = nodes >= self.next_linearisation || sigmas > limit || shrunk || disputed || outcome.slipped;
         let mut judged = outcome;
         if due && nodes > 2 && self.graph.nodes.last().is_some_and(|node| !node.sights.is_empty()) {
-            let trusted = !outcome.disputed && !shrunk && sigmas < WILD;
+            let trusted = outcome.contradiction == 0.0 && !shrunk && sigmas < WILD;
             self.linearise(if nodes < YOUNG || !trusted { 12 } else { 4 }, trusted);
             self.judge(&rejected, &mut judged);
             if nodes > self.options.memory as usize {
@@ -183,10 +184,15 @@ impl Recursive {
         !before.flat_map(|node| &node.sights).any(|sight| sight.landmark == slot)
     }
 
-    /// Counts bearings that did not pass the gate as fused where the memory, solved anew, agrees with them.
+    /// Counts bearings that did not pass the gate as fused where the memory, solved anew, agrees with them; but a contradiction
+    /// that it could solve only by a motion far from what the wheels tell stays one.
     fn judge(&mut self, rejected: &[usize], outcome: &mut Outcome) {
         let Some(node) = self.graph.nodes.last() else { return };
         let (pose, _) = self.graph.pose_of_sights(node);
+        if outcome.contradiction > 0.0 && self.graph.slipped(self.graph.nodes.len() - 1) {
+            (outcome.nis, outcome.used, outcome.rejected) = (outcome.contradiction, rejected.len(), 0);
+            return;
+        }
         for sight in node.sights.iter().filter(|sight| rejected.contains(&sight.landmark)) {
             let p = predict(&pose, &self.graph.mounting, &self.graph.landmarks[sight.landmark]);
             let r = wrap_angle(p.bearing - sight.bearing) / self.graph.bearing_sigma;

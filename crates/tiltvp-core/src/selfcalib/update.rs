@@ -106,9 +106,9 @@ impl Recursive {
             if iteration == 0 {
                 outcome.nis = y.norm_squared();
                 // Each for itself may be where it could be, but not all of them together.
-                outcome.disputed = outcome.nis > self.gate.limit() * rows.len() as f64;
-                if outcome.disputed {
+                if outcome.nis > self.gate.limit() * rows.len() as f64 {
                     rejected.extend(rows.iter().map(|row| row.slot));
+                    outcome.contradiction = outcome.nis;
                     (outcome.nis, outcome.used, outcome.rejected) = (0.0, 0, rejected.len());
                     return rejected;
                 }
