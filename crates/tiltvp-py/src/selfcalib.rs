@@ -1,7 +1,10 @@
 //! `SelfCalibrator`, `calibrate`, `simulate_drive`: where a camera sits on a robot, over arrays.
 
 mod drive;
-mod estimate;
+mod log;
+mod matrices;
+mod mounting;
+mod step;
 
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
@@ -15,7 +18,9 @@ use tiltvp_core::selfcalib::{
 };
 
 pub(crate) use self::drive::{SimulatedDrive, drive_legs, simulate_drive};
-pub(crate) use self::estimate::{CalibrationStep, LogCalibration, MountingEstimate};
+pub(crate) use self::log::LogCalibration;
+pub(crate) use self::mounting::MountingEstimate;
+pub(crate) use self::step::CalibrationStep;
 use crate::call::{call, exception, invalid};
 use crate::convert;
 
@@ -142,7 +147,7 @@ impl SelfCalibrator {
         dict.set_item("bearing_sigma_rad", o.bearing_sigma_rad)?;
         dict.set_item("odometry_k_m", o.odometry_k_m)?;
         dict.set_item("start", (o.start.x_m, o.start.y_m, o.start.yaw_rad))?;
-        dict.set_item("start_sigma", estimate::matrix3(py, &o.start_covariance)?)?;
+        dict.set_item("start_sigma", matrices::matrix3(py, &o.start_covariance)?)?;
         dict.set_item("method", o.method.name())?;
         dict.set_item("start_distance_m", o.start_distance_m)?;
         match o.method {

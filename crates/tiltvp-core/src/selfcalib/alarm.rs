@@ -2,7 +2,7 @@
 
 use std::collections::VecDeque;
 
-use super::recursive::Outcome;
+use super::outcome::Outcome;
 use crate::filter::chi_square_quantile;
 
 /// Steps with bearings that the test looks back on.

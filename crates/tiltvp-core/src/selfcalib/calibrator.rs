@@ -8,8 +8,9 @@ use super::mounting::Mounting;
 use super::observability::Observability;
 use super::odometry::WheelMotion;
 use super::options::{CalibrationMethod, SelfCalibratorOptions};
+use super::outcome::Outcome;
 use super::paper::PaperFilter;
-use super::recursive::{Outcome, Recursive};
+use super::recursive::Recursive;
 use crate::error::{Error, Result};
 
 /// A mounting as it is believed to be.

@@ -4,7 +4,7 @@ use nalgebra::{DVector, Vector3};
 
 use super::dense::Factor;
 use super::graph::Graph;
-use super::rows::Fit;
+use super::loss::Fit;
 use super::schur::Eliminated;
 
 /// How an optimisation ended.

@@ -2,10 +2,9 @@
 
 use nalgebra::{DMatrix, DVector, Matrix3, Vector2, Vector3};
 
-use super::loss::{Loss, Slip};
+use super::loss::{Fit, Loss, Slip};
 use super::measurement::{Landmark, Viewpoint, camera, predict, seen_at};
 use super::odometry::{Leg, MotionNoise, WheelMotion, Wheels, between, compose, compose_jacobians};
-use super::rows::Fit;
 use crate::geometry::wrap_angle;
 
 /// A bearing of a landmark.

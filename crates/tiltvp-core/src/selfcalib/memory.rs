@@ -5,17 +5,15 @@ use nalgebra::{DMatrix, DVector, Matrix2, RowVector2, SMatrix, Vector2, Vector3}
 use super::dense::Factor;
 use super::descent::Settled;
 use super::graph::Node;
-use super::loss::{LIMIT, Loss};
+use super::loss::{Fit, LIMIT, Loss};
 use super::measurement::Landmark;
 use super::odometry::between;
-use super::recursive::{MOUNTING, Recursive, YOUNG};
-use super::rows::Fit;
+use super::recursive::{FIRST, MOUNTING, Recursive, YOUNG};
 
 /// Poses up to which other starts are tried where bearings do not fit.
 const SETTLED: usize = 160;
 
-/// How bearings count in the memory: first those far off linearly, then not at all, if these are few.
-pub(super) const FIRST: Loss = Loss::Linear(3.0);
+/// Share of the bearings that may be far off: then they count not at all.
 const FEW: f64 = 0.03;
 
 /// How far the cost may be from what the linear problem foretells where the memory is at rest.

@@ -5,7 +5,7 @@ use nalgebra::{Cholesky, DMatrix, DVector, Matrix2, Matrix3, RowVector2, RowVect
 use super::mounting::Mounting;
 use super::odometry::WheelMotion;
 use super::options::SelfCalibratorOptions;
-use super::recursive::Outcome;
+use super::outcome::Outcome;
 use crate::geometry::wrap_angle;
 
 /// A feature in polar coordinates: `D`, the distance of the robot from it, and `theta`, the robot's heading against the

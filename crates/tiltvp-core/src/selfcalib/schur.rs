@@ -7,9 +7,9 @@
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 
 use super::graph::Graph;
+use super::loss::Fit;
 use super::measurement::Ray;
-use super::pose_block::{Gathered, Link, eliminate_pose, joined};
-use super::rows::{Fit, after_leg};
+use super::pose_block::{Gathered, Link, after_leg, eliminate_pose, joined};
 
 /// Poses of a run.
 const RUN: usize = 20;

@@ -4,7 +4,8 @@ use nalgebra::{DMatrix, DVector};
 
 use super::dense::{Factor, combine, subtract_square};
 use super::measurement::Prediction;
-use super::recursive::{LANDMARKS, Outcome, Recursive};
+use super::outcome::Outcome;
+use super::recursive::{LANDMARKS, Recursive};
 use crate::geometry::wrap_angle;
 
 /// Most linearisations of one update.
