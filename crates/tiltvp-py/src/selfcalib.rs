@@ -10,7 +10,7 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use nalgebra::{Matrix3, Vector3};
 use pyo3::prelude::*;
-use pyo3::types::PyDict;
+use pyo3::types::{PyBytes, PyDict, PyTuple};
 use tiltvp_core::Error;
 use tiltvp_core::filter::ConsistencyBand;
 use tiltvp_core::selfcalib::{
@@ -233,8 +233,29 @@ impl SelfCalibrator {
         self.lock().reset().map_err(|error| exception(&error))
     }
 
+    fn __eq__(&self, other: &Bound<'_, PyAny>) -> bool {
+        let Ok(other) = other.cast::<Self>() else { return false };
+        // One at a time: a calibrator may be compared with itself.
+        let mine = self.lock().clone();
+        mine == *other.get().lock()
+    }
+
     fn __copy__(&self) -> Self {
         Self { inner: Mutex::new(self.lock().clone()) }
+    }
+
+    /// Sets what pickle has kept.
+    fn __setstate__(&self, state: &[u8]) -> PyResult<()> {
+        let kept = postcard::from_bytes::<core::SelfCalibrator>(state).ok().filter(core::SelfCalibrator::is_consistent);
+        *self.lock() = kept.ok_or_else(|| invalid("state: expected the bytes that pickle keeps".to_owned()))?;
+        Ok(())
+    }
+
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyTuple>> {
+        let (py, this) = (slf.py(), slf.get());
+        let make = py.import("functools")?.getattr("partial")?.call((slf.get_type(),), Some(&this.options(py)?))?;
+        let state = postcard::to_stdvec(&*this.lock()).map_err(|error| invalid(format!("state: {error}")))?;
+        (make, PyTuple::empty(py), PyBytes::new(py, &state)).into_pyobject(py)
     }
 
     fn __deepcopy__(&self, _memo: &Bound<'_, PyAny>) -> Self {

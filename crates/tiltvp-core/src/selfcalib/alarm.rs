@@ -25,6 +25,7 @@ const STRAY: f64 = 0.1;
 
 /// The innovations of the last steps.
 #[derive(Debug, Clone, PartialEq, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct Alarm {
     /// Normalised innovations squared of the bearings that were used, how many, and how many were rejected.
     steps: VecDeque<(f64, usize, usize)>,

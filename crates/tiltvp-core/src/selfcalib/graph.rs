@@ -9,6 +9,7 @@ use crate::geometry::wrap_angle;
 
 /// A bearing of a landmark.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct Sight {
     pub(super) landmark: usize,
     pub(super) bearing: f64,
@@ -25,6 +26,7 @@ impl Sight {
 
 /// A pose of the robot, the motion that led to it from the one before, and what was seen there.
 #[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct Node {
     pub(super) pose: Vector3<f64>,
     pub(super) leg: Leg,
@@ -59,6 +61,7 @@ pub(super) fn information(covariance: &Matrix3<f64>) -> Matrix3<f64> {
 
 /// What is estimated beside the mounting and the landmarks.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct Free {
     pub(super) wheels: bool,
     pub(super) offset: bool,
@@ -79,6 +82,7 @@ impl Free {
 ///
 /// Minimises half the sum of the squared, whitened residuals of motions, bearings (with a robust loss) and the prior.
 #[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct Graph {
     pub(super) mounting: Vector3<f64>,
     pub(super) wheels: Wheels,

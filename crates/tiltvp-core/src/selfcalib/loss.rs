@@ -2,6 +2,7 @@
 
 /// How bearings far from their prediction count; thresholds are standard deviations.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(super) enum Loss {
     /// Beyond it linearly (Huber).
     Linear(f64),
@@ -35,6 +36,7 @@ pub(super) const LIMIT: f64 = 4.5;
 
 /// How motions far from what the wheels tell count: beyond so many standard deviations logarithmically, since wheels slip.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct Slip(pub(super) f64);
 
 impl Slip {

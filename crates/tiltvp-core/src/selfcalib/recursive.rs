@@ -25,7 +25,8 @@ pub(super) const FIRST: Loss = Loss::Linear(3.0);
 const SLIP: Slip = Slip(5.0);
 
 /// The filter's state: (pose, mounting, landmarks) with its covariance, and the memory that it came from.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct Recursive {
     pub(super) options: SelfCalibratorOptions,
     pub(super) gate: Gate,
@@ -87,6 +88,21 @@ impl Recursive {
             motion_noise: Matrix3::zeros(),
             alarm: Alarm::default(),
         })
+    }
+
+    /// Whether there are as many of everything as there are landmarks, and none else is seen.
+    pub(super) fn is_consistent(&self) -> bool {
+        let (graph, count) = (&self.graph, self.names.len());
+        let width = graph.free.width() + 2 * count;
+        let sights = || graph.nodes.iter().flat_map(|node| &node.sights);
+        [self.misses.len(), graph.landmarks.len(), graph.spreads.len()].iter().all(|len| *len == count)
+            && self.mean.len() == 3 + width
+            && self.covariance.shape() == (3 + width, 3 + width)
+            && graph.prior_mean.len() == width
+            && graph.prior_information.shape() == (width, width)
+            && graph.free == Free::default()
+            && !graph.nodes.is_empty()
+            && sights().all(|sight| sight.landmark < count)
     }
 
     pub(super) fn mounting(&self) -> (Vector3<f64>, Matrix3<f64>) {
