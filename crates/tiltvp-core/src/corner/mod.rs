@@ -24,6 +24,7 @@ mod guided;
 mod highlights;
 mod junctions;
 mod options;
+mod parallels;
 mod pose;
 mod position;
 mod prior;

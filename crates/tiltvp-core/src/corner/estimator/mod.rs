@@ -13,6 +13,7 @@ use super::estimate::{CornerEstimate, Hypothesis, Verdict};
 use super::estimator_options::EstimatorOptions;
 use super::guided::Expected;
 use super::options::CornerMethod;
+use super::parallels::{CommonAttitude, Line, common_attitude};
 use super::prior::{AttitudePrior, VerticalSense};
 use super::resolve::{Alignment, View, resolve};
 use super::track::Track;
@@ -144,7 +145,11 @@ impl CornerPoseEstimator {
             followed: self.track.is_some(),
             object: self.objects,
         };
-        let attitude = if self.right.is_some() { self.attitude(&estimate.features)? } else { None };
+        let mut attitude = if self.right.is_some() { self.attitude(&estimate.features)? } else { None };
+        let common = attitude.as_ref().and_then(|attitude| self.common(attitude));
+        if let Some(common) = &common {
+            attitude = Some(common.camera_from_object);
+        }
         if let Some(attitude) = &attitude {
             self.add_completed(left, right, attitude, &mut estimate.features);
             self.add_transferred([left, right.unwrap_or(left)], attitude, &mut estimate.features)?;
@@ -155,7 +160,7 @@ impl CornerPoseEstimator {
         } else if right.is_some() && estimate.features[1].is_empty() {
             estimate.verdict = Verdict::NoneRight;
         } else if self.right.is_some() {
-            seen = self.by_pair(attitude.as_ref(), &mut estimate)?;
+            seen = self.by_pair(attitude.as_ref(), common.as_ref(), &mut estimate)?;
         } else {
             self.by_one(&mut estimate)?;
         }
@@ -235,6 +240,16 @@ impl CornerPoseEstimator {
             }
         }
         Ok(self.track.as_ref().map(|track| track.pose.camera_from_object))
+    }
+
+    /// The attitude near a first one that all straight edges of both images have in common.
+    fn common(&self, attitude: &Matrix3<f64>) -> Option<CommonAttitude> {
+        let (detector, left_from_right) = self.right.as_ref()?;
+        let [first, second] = &self.scratch;
+        let identity = Matrix3::identity();
+        let of_left = Line::of(self.left.segments(first), &identity);
+        let lines: Vec<Line> = of_left.chain(Line::of(detector.segments(second), &left_from_right.rotation)).collect();
+        common_attitude(&lines, attitude)
     }
 
     /// Whether edges and object are the same from frame to frame, as those of the coloured cuboid are.

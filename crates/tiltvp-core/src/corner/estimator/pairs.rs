@@ -6,7 +6,8 @@ use super::CornerPoseEstimator;
 use crate::corner::attitude::corner_attitudes;
 use crate::corner::consensus::{apart, renamed, weight};
 use crate::corner::estimate::{CornerEstimate, Hypothesis};
-use crate::corner::fusion::fuse_rays;
+use crate::corner::fusion::{fuse_rays, fuse_rays_with};
+use crate::corner::parallels::CommonAttitude;
 use crate::corner::position::{Sighting, triangulate};
 use crate::corner::prior::AttitudePrior;
 use crate::corner::vertex::CornerFeature;
@@ -28,6 +29,7 @@ impl CornerPoseEstimator {
         [left, right]: [&CornerFeature; 2],
         left_from_right: &RigidMotion,
         priors: &[AttitudePrior],
+        common: Option<&CommonAttitude>,
     ) -> Result<Vec<Hypothesis>> {
         let cameras = [(left, RigidMotion::identity()), (right, left_from_right.inverse())];
         let sighting = |corner: &CornerFeature, rig_from_camera| Sighting {
@@ -45,9 +47,23 @@ impl CornerPoseEstimator {
                     continue;
                 }
                 let (start, side) = (rotation * own.camera_from_object, if right_handed { 1.0 } else { -1.0 });
-                let Some(fused) = fuse_rays(&cameras, &self.options.angle, side, &start, &vertex.point_m) else {
+                let Some(mut fused) = fuse_rays(&cameras, &self.options.angle, side, &start, &vertex.point_m) else {
                     continue;
                 };
+                let mut freedom = 6.0;
+                if let Some(common) = common {
+                    let named = renamed(&common.camera_from_object, &fused.rig_from_object);
+                    if apart(&named, &fused.rig_from_object) <= self.options.parallel_max_rad {
+                        let common = CommonAttitude { camera_from_object: named, ..*common };
+                        let angle = &self.options.angle;
+                        let Some(again) =
+                            fuse_rays_with(&cameras, angle, side, &named, &fused.vertex_m, Some(&common))
+                        else {
+                            continue;
+                        };
+                        (fused, freedom) = (again, 9.0);
+                    }
+                }
                 let known = |(_, other): &(f64, Hypothesis)| {
                     apart(&other.camera_from_object, &fused.rig_from_object) < SAME_POSE_RAD
                 };
@@ -61,7 +77,7 @@ impl CornerPoseEstimator {
                 let (sin, cos) = self.options.angle.gamma_rad.sin_cos();
                 let edges = [Vector3::x(), Vector3::y(), Vector3::new(cos, 0.0, side * sin)];
                 // What edges miss by that do not quite meet, or belong to more than one thing, the covariances do not know.
-                let doubt = if self.is_one_object() { 1.0 } else { (fused.chi_square / 6.0).max(1.0) };
+                let doubt = if self.is_one_object() { 1.0 } else { (fused.chi_square / freedom).max(1.0) };
                 let pose = Hypothesis {
                     camera_from_object: fused.rig_from_object,
                     edges: edges.map(|edge| fused.rig_from_object * edge),
@@ -69,7 +85,7 @@ impl CornerPoseEstimator {
                     covariance: fused.covariance * doubt,
                     probability: 0.0,
                     right_handed,
-                    misfit: (fused.chi_square / 6.0).sqrt(),
+                    misfit: (fused.chi_square / freedom).sqrt(),
                 };
                 found.push((prior - 0.5 * fused.chi_square / scale, pose));
             }
@@ -91,6 +107,7 @@ impl CornerPoseEstimator {
     pub(super) fn by_pair(
         &self,
         attitude: Option<&Matrix3<f64>>,
+        common: Option<&CommonAttitude>,
         estimate: &mut CornerEstimate,
     ) -> Result<Vec<Hypothesis>> {
         let mut seen = Vec::new();
@@ -101,7 +118,7 @@ impl CornerPoseEstimator {
         let voices = Voices::new(&estimate.features, left_from_right);
         for (i, left) in estimate.features[0].iter().enumerate() {
             for (j, right) in estimate.features[1].iter().enumerate() {
-                let poses = self.pair_poses([left, right], left_from_right, &priors)?;
+                let poses = self.pair_poses([left, right], left_from_right, &priors, common)?;
                 let Some((pose, vertex)) = poses.first().and_then(|pose| Some((pose, pose.vertex_m?))) else {
                     continue;
                 };
