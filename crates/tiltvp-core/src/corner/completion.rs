@@ -88,7 +88,7 @@ pub(super) fn complete(
         let mut follow = |course: &Course, stride_px: f64, least_share: f64| -> Option<Traced> {
             let signal = |u, v| light.gray(image, u, v);
             let found = trace_every(stride_px, camera, course, (support_min / stride_px) as usize, signal, memory)?;
-            Some(found).filter(|found| found.share >= least_share)
+            Some(found).filter(|found| found.share >= least_share && (stride_px > 1.0 || found.begins_at_vertex()))
         };
         let share_min = options.support_min_share;
         let third = 3 - crossing.axes[0] - crossing.axes[1];

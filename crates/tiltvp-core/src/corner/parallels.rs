@@ -55,6 +55,8 @@ impl Line {
 pub(super) struct CommonAttitude {
     pub(super) camera_from_object: Matrix3<f64>,
     pub(super) covariance: Matrix3<f64>,
+    /// How far the edges miss their axes, in the standard deviations that they should have: 1 at least.
+    pub(super) scatter: f64,
 }
 
 /// The attitude near `start` along whose axes most edges run, by robust least squares; none if there are too few.
@@ -87,7 +89,7 @@ pub(super) fn common_attitude(lines: &[Line], start: &Matrix3<f64>) -> Option<Co
         }
         let inverse = information.try_inverse()?;
         if step == STEPS {
-            return Some(CommonAttitude { camera_from_object: rotation, covariance: inverse * ERRING_TOGETHER });
+            return Some(CommonAttitude { camera_from_object: rotation, covariance: inverse * ERRING_TOGETHER, scatter });
         }
         if step == STEPS / 2 {
             let middle = missed.len() / 2;

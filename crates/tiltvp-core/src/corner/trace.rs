@@ -17,6 +17,12 @@ const PLACE_SIGMA_MIN_PX: f64 = 0.05;
 /// Longest gap in a ray whose places are alike: what comes after a longer one is something else.
 const GAP_MAX_PX: usize = 12;
 
+/// The first pixels of a ray, which tell it from an edge that begins elsewhere and happens to point at the vertex.
+const FIRST_PX: f64 = 20.0;
+
+/// Least share of the first profiles that agree with the ray.
+const FIRST_SHARE: f64 = 0.3;
+
 /// Longest profile, in samples.
 const PROFILE_MAX: usize = 41;
 
@@ -88,8 +94,17 @@ pub(super) struct Traced {
     pub(super) ray: FittedRay,
     /// The share of the profiles that agree.
     pub(super) share: f64,
+    /// The share of the first ones.
+    first_share: f64,
     /// Pixels per radian along the ray.
     pub(super) px_per_rad: f64,
+}
+
+impl Traced {
+    /// Whether the edge is seen next to the vertex, so that it begins there.
+    pub(super) fn begins_at_vertex(&self) -> bool {
+        self.first_share >= FIRST_SHARE
+    }
 }
 
 /// Memory of the fits.
@@ -205,7 +220,15 @@ pub(super) fn trace_every(
         support,
         residual_rms_rad: rms,
     };
-    Some(Traced { ray, share: support as f64 / looked_at.max(1) as f64, px_per_rad: 1.0 / rad_per_px })
+    let share = |agree: usize, of: usize| agree as f64 / of.max(1) as f64;
+    let first_profiles = ((FIRST_PX / stride_px) as usize).min(looked_at);
+    let first = agreeing().filter(|(place, _)| place.profile <= first_profiles).count();
+    Some(Traced {
+        ray,
+        share: share(support, looked_at),
+        first_share: share(first, first_profiles),
+        px_per_rad: 1.0 / rad_per_px,
+    })
 }
 
 /// Keeps the places whose steps are at least a share of the median of the first ones, up to the first gap.

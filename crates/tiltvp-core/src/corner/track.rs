@@ -23,7 +23,13 @@ const STRANGE: f64 = 0.03;
 /// How many times as far as before a vertex may move to count half.
 const PACES: f64 = 2.0;
 
+/// How many times as far as before a vertex may move from one frame to the next and be the same.
+const JUMP: f64 = 3.0;
+
 /// The share of its distance that is added to that.
+const JUMP_MIN: f64 = 0.02;
+
+/// The share of its distance that is added to that which counts half.
 const PACE_MIN: f64 = 0.005;
 
 /// Most other corners that are remembered, those seen most often.
@@ -52,7 +58,10 @@ impl Track {
     /// Whether a pose is one of the same corner: from one image any corner of the same upright world is.
     pub(super) fn is_of(&self, pose: &Hypothesis) -> bool {
         match (self.pose.vertex_m, pose.vertex_m) {
-            (Some(last), Some(vertex)) => (vertex - last).norm() <= reach_m(&last),
+            (Some(last), Some(vertex)) => {
+                let reach = (JUMP * self.pace * f64::from(self.age.max(1)) + JUMP_MIN).min(MOVED);
+                (vertex - last).norm() <= reach * last.norm()
+            }
             _ => true,
         }
     }

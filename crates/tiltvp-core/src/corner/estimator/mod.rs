@@ -236,7 +236,7 @@ impl CornerPoseEstimator {
             let views: Vec<View<'_>> = agreed.attitudes.iter().map(view).collect();
             let resolved = resolve(&views, Alignment::Manhattan, self.right_handed(), &self.priors(false))?;
             if let Some(best) = resolved.first() {
-                return Ok(Some(best.common_from_object));
+                return Ok(Some(self.upright(best.common_from_object)));
             }
         }
         Ok(self.track.as_ref().map(|track| track.pose.camera_from_object))
