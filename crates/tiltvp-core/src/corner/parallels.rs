@@ -57,6 +57,8 @@ pub(super) struct CommonAttitude {
     pub(super) covariance: Matrix3<f64>,
     /// How far the edges miss their axes, in the standard deviations that they should have: 1 at least.
     pub(super) scatter: f64,
+    /// How many edges run along the axes, those that miss them counting less.
+    pub(super) support: f64,
 }
 
 /// The attitude near `start` along whose axes most edges run, by robust least squares; none if there are too few.
@@ -68,7 +70,7 @@ pub(super) fn common_attitude(lines: &[Line], start: &Matrix3<f64>) -> Option<Co
     for step in 0..=STEPS {
         let mut information = Matrix3::from_diagonal_element(START_SIGMA_RAD.powi(-2));
         let mut pull = rotation_from(start, &rotation) * START_SIGMA_RAD.powi(-2);
-        let mut missed = Vec::with_capacity(lines.len());
+        let (mut missed, mut support) = (Vec::with_capacity(lines.len()), 0.0);
         for line in lines {
             let off = rotation.tr_mul(&line.normal);
             let axis = off.abs().imin();
@@ -78,7 +80,9 @@ pub(super) fn common_attitude(lines: &[Line], start: &Matrix3<f64>) -> Option<Co
             }
             let sigma = line.sigma_rad * scatter;
             missed.push(miss.abs() / line.sigma_rad);
-            let weight = (sigma * sigma * (1.0 + (miss / (HALF_SIGMAS * sigma)).powi(2))).recip();
+            let trust = |sigma: f64| (1.0 + (miss / (HALF_SIGMAS * sigma)).powi(2)).recip();
+            support += trust(line.sigma_rad);
+            let weight = trust(sigma) / (sigma * sigma);
             // Turning the axis by w changes normal . axis by w . (axis x normal).
             let by_turn = rotation.column(axis).cross(&line.normal);
             information += by_turn * by_turn.transpose() * weight;
@@ -89,7 +93,8 @@ pub(super) fn common_attitude(lines: &[Line], start: &Matrix3<f64>) -> Option<Co
         }
         let inverse = information.try_inverse()?;
         if step == STEPS {
-            return Some(CommonAttitude { camera_from_object: rotation, covariance: inverse * ERRING_TOGETHER, scatter });
+            let covariance = inverse * ERRING_TOGETHER;
+            return Some(CommonAttitude { camera_from_object: rotation, covariance, scatter, support });
         }
         if step == STEPS / 2 {
             let middle = missed.len() / 2;
@@ -107,4 +112,13 @@ const MEDIAN_TO_SIGMA: f64 = 1.4826;
 /// The small rotation vector that takes one attitude to another.
 fn rotation_from(from: &Matrix3<f64>, to: &Matrix3<f64>) -> Vector3<f64> {
     super::prior::rotation_vector(&(to * from.transpose()))
+}
+
+/// How far apart attitudes about one vertical are tried, radians: 4.5 degrees, of which each reaches 2 to either side.
+const TURN_RAD: f64 = std::f64::consts::FRAC_PI_2 / 20.0;
+
+/// Attitudes with the vertical of `upright` and every heading, up to quarter turns.
+pub(super) fn headings(upright: &Matrix3<f64>) -> impl Iterator<Item = Matrix3<f64>> {
+    let turn = |k: u8| Rotation3::from_axis_angle(&Vector3::y_axis(), f64::from(k) * TURN_RAD);
+    (1..20).map(move |k| upright * turn(k).matrix())
 }

@@ -6,14 +6,14 @@ mod transfer;
 use nalgebra::{Matrix3, Matrix6, Vector3};
 
 use super::attitude::IncludedAngle;
-use super::consensus::{SAME_VERTEX_RAD, agreement, fits, renamed, weight};
+use super::consensus::{SAME_VERTEX_RAD, agreement, apart, fits, renamed, weight};
 use super::detector::{CornerDetector, CornerScratch};
 use super::ends::{EdgeEnd, edge_ends};
 use super::estimate::{CornerEstimate, Hypothesis, Verdict};
 use super::estimator_options::EstimatorOptions;
 use super::guided::Expected;
 use super::options::CornerMethod;
-use super::parallels::{CommonAttitude, Line, common_attitude};
+use super::parallels::{CommonAttitude, Line, common_attitude, headings};
 use super::prior::{AttitudePrior, VerticalSense};
 use super::resolve::{Alignment, View, resolve};
 use super::track::Track;
@@ -145,11 +145,9 @@ impl CornerPoseEstimator {
             followed: self.track.is_some(),
             object: self.objects,
         };
-        let mut attitude = if self.right.is_some() { self.attitude(&estimate.features)? } else { None };
-        let common = attitude.as_ref().and_then(|attitude| self.common(attitude));
-        if let Some(common) = &common {
-            attitude = Some(common.camera_from_object);
-        }
+        let starts = if self.right.is_some() { self.attitudes(&estimate.features)? } else { Vec::new() };
+        let common = self.common(&starts);
+        let attitude = common.map(|common| common.camera_from_object).or(starts.first().copied());
         if let Some(attitude) = &attitude {
             self.add_completed(left, right, attitude, &mut estimate.features);
             self.add_transferred([left, right.unwrap_or(left)], attitude, &mut estimate.features)?;
@@ -219,11 +217,12 @@ impl CornerPoseEstimator {
         edge_ends(seen, left_from_right, &vertex_m)
     }
 
-    /// The attitude by which corners are completed: that of the frame before, or the likeliest that one image's corners agree
-    /// on, with their edges at right angles.
-    fn attitude(&self, features: &[Vec<CornerFeature>; 2]) -> Result<Option<Matrix3<f64>>> {
+    /// The attitudes by which corners may be completed: the likeliest ones that one image's corners agree on, with their edges
+    /// at right angles, and that of the frame before.
+    fn attitudes(&self, features: &[Vec<CornerFeature>; 2]) -> Result<Vec<Matrix3<f64>>> {
+        let mut out = Vec::new();
         if self.is_one_object() || self.options.angle != IncludedAngle::RIGHT {
-            return Ok(None);
+            return Ok(out);
         }
         let priors = self.priors(false);
         let turned = self.right.as_ref().map_or(Matrix3::identity(), |(_, motion)| motion.rotation);
@@ -235,21 +234,43 @@ impl CornerPoseEstimator {
             let view = |attitudes| View { attitudes, common_from_camera: rotation };
             let views: Vec<View<'_>> = agreed.attitudes.iter().map(view).collect();
             let resolved = resolve(&views, Alignment::Manhattan, self.right_handed(), &self.priors(false))?;
-            if let Some(best) = resolved.first() {
-                return Ok(Some(self.upright(best.common_from_object)));
-            }
+            out.extend(resolved.first().map(|best| self.upright(best.common_from_object)));
         }
-        Ok(self.track.as_ref().map(|track| track.pose.camera_from_object))
+        out.extend(self.track.as_ref().map(|track| track.pose.camera_from_object));
+        Ok(out)
     }
 
-    /// The attitude near a first one that all straight edges of both images have in common.
-    fn common(&self, attitude: &Matrix3<f64>) -> Option<CommonAttitude> {
+    /// The attitude near one of `starts` that most straight edges of both images have in common.
+    fn common(&self, starts: &[Matrix3<f64>]) -> Option<CommonAttitude> {
         let (detector, left_from_right) = self.right.as_ref()?;
         let [first, second] = &self.scratch;
         let identity = Matrix3::identity();
         let of_left = Line::of(self.left.segments(first), &identity);
         let lines: Vec<Line> = of_left.chain(Line::of(detector.segments(second), &left_from_right.rotation)).collect();
-        common_attitude(&lines, attitude)
+        let near = |common: &CommonAttitude, other: Option<&Matrix3<f64>>, most_rad: f64| {
+            other.is_some_and(|other| apart(&renamed(&common.camera_from_object, other), other) < most_rad)
+        };
+        let last = self.track.as_ref().map(|track| &track.pose.camera_from_object);
+        // The object may be turned against the rest of the room.
+        let liking = |common: &CommonAttitude| {
+            let of_corners = if near(common, starts.first(), self.options.agree_max_rad) { OBJECT } else { 1.0 };
+            of_corners * if near(common, last, self.options.turn_sigma_rad) { OBJECT } else { 1.0 }
+        };
+        let best = |starts: &mut dyn Iterator<Item = Matrix3<f64>>| {
+            let found = starts.filter_map(|start| common_attitude(&lines, &start));
+            let scored = found.map(|common| (common.support * liking(&common), common));
+            scored.max_by(|a, b| a.0.total_cmp(&b.0))
+        };
+        let own = best(&mut starts.iter().copied());
+        if own.as_ref().is_some_and(|(_, common)| common.support >= MOST * lines.len() as f64) {
+            return own.map(|(_, common)| common);
+        }
+        let others = best(&mut headings(starts.first()?));
+        let chosen = match (own, others) {
+            (Some(own), Some(other)) if other.0 > own.0 => Some(other),
+            (own, other) => own.or(other),
+        };
+        chosen.map(|(_, common)| common)
     }
 
     /// Whether edges and object are the same from frame to frame, as those of the coloured cuboid are.
@@ -303,6 +324,12 @@ impl CornerPoseEstimator {
         }
     }
 }
+
+/// How many times as much edges count along the axes of corners of the left image, and along those of the frame before.
+const OBJECT: f64 = 1.5;
+
+/// The share of all edges along the axes of one attitude that leaves no doubt.
+const MOST: f64 = 0.4;
 
 /// How far from where it was a corner is looked for first, in pixels.
 const HARDLY_MOVED_PX: f64 = 3.0;
