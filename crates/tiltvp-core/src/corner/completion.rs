@@ -20,6 +20,12 @@ const CROSSINGS_MAX: usize = 60;
 /// Least length along which a third edge is looked for, in pixels.
 const THIRD_MIN_PX: f64 = 30.0;
 
+/// How long a third edge is where it ends early, as a table top's: nearly all of it has to be seen.
+const SHORT_PX: f64 = 16.0;
+
+/// Least share of a short third edge that is seen.
+const SHORT_SHARE: f64 = 0.8;
+
 /// How far apart the places are that tell at first whether there is a third edge, in pixels.
 const GLIMPSE_PX: f64 = 3.0;
 
@@ -87,6 +93,8 @@ pub(super) fn complete(
         let memory = &mut scratch.trace;
         let mut follow = |course: &Course, stride_px: f64, least_share: f64| -> Option<Traced> {
             let signal = |u, v| light.gray(image, u, v);
+            let profiles = (course.to_rad - course.from_rad) * px_per_rad;
+            let support_min = support_min.min(SHORT_SHARE * profiles);
             let found = trace_every(stride_px, camera, course, (support_min / stride_px) as usize, signal, memory)?;
             Some(found).filter(|found| found.share >= least_share && (stride_px > 1.0 || found.begins_at_vertex()))
         };
@@ -97,7 +105,8 @@ pub(super) fn complete(
         // Most crossings have no third edge, which every third pixel tells.
         let thirds = [direction, -direction].map(|direction| {
             let course = course(crossing.place.cross(&direction).try_normalize(0.05)?, to_rad);
-            follow(&course, GLIMPSE_PX, 0.8 * share_min).map(|_| course)
+            let long = follow(&course, GLIMPSE_PX, 0.8 * share_min).map(|_| (course, share_min));
+            long.or(Some((Course { to_rad: SHORT_PX / px_per_rad, ..course }, SHORT_SHARE)))
         });
         if thirds.iter().all(Option::is_none) {
             continue;
@@ -115,8 +124,8 @@ pub(super) fn complete(
         if crossing.axes.iter().any(|axis| rays[*axis].is_none()) {
             continue;
         }
-        for course in thirds.iter().flatten() {
-            rays[third] = follow(course, 1.0, share_min);
+        for (course, least_share) in thirds.iter().flatten() {
+            rays[third] = follow(course, 1.0, *least_share);
             let [Some(x), Some(y), Some(z)] = rays else { continue };
             let Some(corner) = clockwise(&[x, y, z]) else { continue };
             let good = corner.residual_rad() * px_per_rad <= options.residual_max_px;

@@ -6,7 +6,7 @@ mod transfer;
 use nalgebra::{Matrix3, Matrix6, Vector3};
 
 use super::attitude::IncludedAngle;
-use super::consensus::{SAME_VERTEX_RAD, agreement, apart, fits, renamed, weight};
+use super::consensus::{SAME_VERTEX_RAD, agreement, fits, renamed, weight};
 use super::detector::{CornerDetector, CornerScratch};
 use super::ends::{EdgeEnd, edge_ends};
 use super::estimate::{CornerEstimate, Hypothesis, Verdict};
@@ -240,37 +240,23 @@ impl CornerPoseEstimator {
         Ok(out)
     }
 
-    /// The attitude near one of `starts` that most straight edges of both images have in common.
+    /// The attitude that most straight edges of both images have in common; where most have none, that near the first of `starts`.
     fn common(&self, starts: &[Matrix3<f64>]) -> Option<CommonAttitude> {
         let (detector, left_from_right) = self.right.as_ref()?;
         let [first, second] = &self.scratch;
         let identity = Matrix3::identity();
         let of_left = Line::of(self.left.segments(first), &identity);
         let lines: Vec<Line> = of_left.chain(Line::of(detector.segments(second), &left_from_right.rotation)).collect();
-        let near = |common: &CommonAttitude, other: Option<&Matrix3<f64>>, most_rad: f64| {
-            other.is_some_and(|other| apart(&renamed(&common.camera_from_object, other), other) < most_rad)
-        };
-        let last = self.track.as_ref().map(|track| &track.pose.camera_from_object);
-        // The object may be turned against the rest of the room.
-        let liking = |common: &CommonAttitude| {
-            let of_corners = if near(common, starts.first(), self.options.agree_max_rad) { OBJECT } else { 1.0 };
-            of_corners * if near(common, last, self.options.turn_sigma_rad) { OBJECT } else { 1.0 }
-        };
-        let best = |starts: &mut dyn Iterator<Item = Matrix3<f64>>| {
-            let found = starts.filter_map(|start| common_attitude(&lines, &start));
-            let scored = found.map(|common| (common.support * liking(&common), common));
-            scored.max_by(|a, b| a.0.total_cmp(&b.0))
-        };
-        let own = best(&mut starts.iter().copied());
-        if own.as_ref().is_some_and(|(_, common)| common.support >= MOST * lines.len() as f64) {
-            return own.map(|(_, common)| common);
+        let of_corners = common_attitude(&lines, starts.first()?);
+        let most = MOST * lines.len() as f64;
+        if of_corners.as_ref().is_some_and(|common| common.support >= most) {
+            return of_corners;
         }
-        let others = best(&mut headings(starts.first()?));
-        let chosen = match (own, others) {
-            (Some(own), Some(other)) if other.0 > own.0 => Some(other),
-            (own, other) => own.or(other),
-        };
-        chosen.map(|(_, common)| common)
+        // Corners may be false, or turned against most of the room.
+        let others = starts.iter().skip(1).copied().chain(headings(&starts[0]));
+        let found = others.filter_map(|start| common_attitude(&lines, &start));
+        let best = found.max_by(|a, b| a.support.total_cmp(&b.support));
+        best.filter(|common| common.support >= most).or(of_corners)
     }
 
     /// Whether edges and object are the same from frame to frame, as those of the coloured cuboid are.
@@ -324,9 +310,6 @@ impl CornerPoseEstimator {
         }
     }
 }
-
-/// How many times as much edges count along the axes of corners of the left image, and along those of the frame before.
-const OBJECT: f64 = 1.5;
 
 /// The share of all edges along the axes of one attitude that leaves no doubt.
 const MOST: f64 = 0.4;
