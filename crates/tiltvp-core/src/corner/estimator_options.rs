@@ -71,6 +71,9 @@ impl EstimatorOptions {
         positive("down_sigma_rad", self.down_sigma_rad, "a positive angle")?;
         positive("turn_sigma_rad", self.turn_sigma_rad, "a positive angle")?;
         positive("agree_max_rad", self.agree_max_rad, "a positive angle")?;
+        if !(0.0..=std::f64::consts::PI).contains(&self.parallel_max_rad) {
+            return Err(Error::option("parallel_max_rad", self.parallel_max_rad, "an angle from 0 to pi"));
+        }
         positive("misfit_max", self.misfit_max, "a positive number of standard deviations")?;
         let [nearest, farthest] = self.distance_m;
         if !(nearest > 0.0 && farthest > nearest) {

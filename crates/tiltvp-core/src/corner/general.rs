@@ -89,7 +89,7 @@ pub(super) fn find(
                 known.push((junction.vertex, found));
                 found
             };
-            if ray.is_none_or(|traced| traced.share < options.support_min_share || !traced.begins_at_vertex()) {
+            if ray.is_none_or(|traced| traced.share < options.support_min_share) {
                 *ray = None;
                 break;
             }

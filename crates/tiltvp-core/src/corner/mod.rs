@@ -60,4 +60,5 @@ pub use self::screening::Screening;
 pub use self::segmentation::{ColorOptions, Primary};
 pub use self::segments::Segment;
 pub use self::standard::{CornerCase, StandardType};
+pub use self::track::{Landmark, Track};
 pub use self::vertex::{CornerFeature, Edge};

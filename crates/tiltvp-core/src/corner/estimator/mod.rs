@@ -82,6 +82,18 @@ impl CornerPoseEstimator {
         &self.options
     }
 
+    /// The number of objects so far, and what is kept of the last one, if it is not forgotten.
+    pub fn state(&self) -> (u32, Option<&Track>) {
+        (self.objects, self.track.as_ref())
+    }
+
+    /// The same estimator that goes on from a state.
+    #[must_use]
+    pub fn with_state(mut self, objects: u32, track: Option<Track>) -> Self {
+        (self.objects, self.track) = (objects, track);
+        self
+    }
+
     /// Forgets what was seen.
     pub fn reset(&mut self) {
         self.track = None;
