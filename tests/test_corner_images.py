@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import json
 import math
 import pickle
@@ -209,6 +210,28 @@ def test_estimates_are_kept() -> None:
         type(seen).from_dict(seen.to_dict() | {"reason": "none"})
     with pytest.raises(InvalidInputError, match="camera_from_object"):
         type(seen.pose).from_dict(seen.pose.to_dict() | {"camera_from_object": [1.0]})
+
+
+@pytest.mark.parametrize(("method", "faces"), [("coloured", COLOURS), ("general", GREYS)])
+def test_estimators_go_on_where_they_were(method: str, faces: dict[str, tuple[int, int, int]]) -> None:
+    images = pair(faces)
+    estimator = CornerPoseEstimator(CAMERA, CAMERA, LEFT_FROM_RIGHT, method=method, down=(0.0, 1.0, 0.0))
+    new = pickle.loads(pickle.dumps(estimator))
+    assert new == estimator
+    assert estimator(*images)
+    assert new != estimator
+    again = [pickle.loads(pickle.dumps(estimator)), copy.copy(estimator), copy.deepcopy(estimator)]
+    for one in again:
+        assert type(one) is CornerPoseEstimator
+        assert one == estimator
+        assert str(one.options) == str(estimator.options)
+    following = estimator(*images)
+    assert following.followed
+    for one in again:
+        assert one(*images) == following
+        assert one == estimator
+    estimator.reset()
+    assert estimator != again[0]
 
 
 def test_rigs_come_back_from_disk(tmp_path: Path) -> None:

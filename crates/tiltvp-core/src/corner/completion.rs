@@ -3,7 +3,7 @@
 use nalgebra::{Matrix3, Vector3};
 
 use super::consensus::rays_apart;
-use super::general::GeneralScratch;
+use super::general::{ERRING_TOGETHER, GeneralScratch};
 use super::junctions::{RayEnd, meeting};
 use super::options::GeneralOptions;
 use super::trace::{Course, Traced, trace_every};
@@ -87,6 +87,7 @@ pub(super) fn complete(
             step_min: options.step_min,
             step_share_min: 0.0,
             threshold_px: options.threshold_px,
+            erring_together: ERRING_TOGETHER,
             ray_sigma_px: options.ray_sigma_px,
         };
         let support_min = f64::from(options.support_min_px);

@@ -8,9 +8,6 @@ use crate::camera::Camera;
 use crate::geometry::tangent_basis;
 use crate::robust::{Direction, Gate, Problem, RansacOptions, RansacScratch, Rows, ransac};
 
-/// Profiles along a ray that err together: neighbours share pixels and the edge's crookedness.
-const ERRING_TOGETHER: f64 = 4.0;
-
 /// The least standard deviation of one profile's place, in pixels, however well the profiles agree.
 const PLACE_SIGMA_MIN_PX: f64 = 0.05;
 
@@ -46,6 +43,8 @@ pub(super) struct Course {
     pub(super) step_share_min: f64,
     /// Largest distance of a profile's edge from the fitted circle, in pixels.
     pub(super) threshold_px: f64,
+    /// How many profiles along the ray err together: neighbours share pixels and the edge's crookedness.
+    pub(super) erring_together: f64,
     /// What no profile tells: how far either end of a whole ray may be off, in pixels.
     pub(super) ray_sigma_px: f64,
 }
@@ -203,7 +202,7 @@ pub(super) fn trace_every(
         let at = Vector2::new(place.along_rad.cos(), place.along_rad.sin());
         information += at * at.transpose() * f64::from(*weight);
     }
-    information /= sigma * sigma * ERRING_TOGETHER;
+    information /= sigma * sigma * course.erring_together;
     let ends = [first, last].map(|angle| Vector2::new(angle.cos(), angle.sin()));
     let from_ends = nalgebra::Matrix2::from_rows(&[ends[0].transpose(), ends[1].transpose()]).try_inverse()?;
     let whole = from_ends * from_ends.transpose() * (course.ray_sigma_px * rad_per_px).powi(2);
