@@ -19,6 +19,9 @@ use crate::geometry::RigidMotion;
 /// How far apart attitudes of different hypotheses are, radians: fits from two starts end this close.
 const SAME_POSE_RAD: f64 = 0.035;
 
+/// The share of the largest misfit up to which a corner that was not seen before can stand in for the followed one.
+const WELL: f64 = 0.4;
+
 /// The least probability of a hypothesis that is returned.
 const PROBABILITY_MIN: f64 = 1e-9;
 
@@ -145,7 +148,7 @@ impl CornerPoseEstimator {
                 if misfit > self.options.misfit_max || !(nearest..=farthest).contains(&vertex.norm()) {
                     continue;
                 }
-                let fits_well = misfit <= 0.5 * self.options.misfit_max;
+                let fits_well = misfit <= WELL * self.options.misfit_max;
                 if fits_well {
                     seen.push(*pose);
                 }
