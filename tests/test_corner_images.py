@@ -146,6 +146,21 @@ def test_grey_corners_are_found_by_segments() -> None:
     assert np.allclose(np.sort(axes.ravel())[-3:], 1.0, atol=1e-4)
 
 
+def test_parallel_edges_tell_the_attitude() -> None:
+    images = pair(GREYS)
+    found = {}
+    for most_rad in (0.0, 0.05):
+        estimator = CornerPoseEstimator(
+            CAMERA, CAMERA, LEFT_FROM_RIGHT, method="general", down=(0.0, 1.0, 0.0), parallel_max_rad=most_rad
+        )
+        assert estimator.options["parallel_max_rad"] == most_rad
+        found[most_rad] = estimator(*images).pose
+    spread = {most_rad: np.trace(pose.covariance[:3, :3]) for most_rad, pose in found.items()}
+    assert spread[0.05] < spread[0.0]
+    with pytest.raises(InvalidInputError, match="parallel_max_rad"):
+        CornerPoseEstimator(CAMERA, parallel_max_rad=-0.1)
+
+
 def test_edges_are_as_long_as_they_are() -> None:
     """All three of the grey cuboid's end where two others meet them, 0.3 m from the vertex."""
     rotation, vertex = pose()

@@ -122,3 +122,58 @@ pub(super) fn headings(upright: &Matrix3<f64>) -> impl Iterator<Item = Matrix3<f
     let turn = |k: u8| Rotation3::from_axis_angle(&Vector3::y_axis(), f64::from(k) * TURN_RAD);
     (1..20).map(move |k| upright * turn(k).matrix())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// `count` lines along each axis of an attitude, off by the given misses in turn, seen from many sides.
+    fn lines(attitude: &Matrix3<f64>, count: u32, misses: &[f64]) -> Vec<Line> {
+        let mut out = Vec::new();
+        for axis in 0..3 {
+            for k in 0..count {
+                let along = attitude.column(axis).into_owned();
+                let aside = Vector3::new(f64::from(k).sin(), f64::from(2 * k + 1).cos(), 1.5).cross(&along).normalize();
+                let miss = misses[out.len() % misses.len()];
+                out.push(Line { normal: aside * miss.cos() + along * miss.sin(), sigma_rad: 0.002 });
+            }
+        }
+        out
+    }
+
+    fn off_rad(found: &CommonAttitude, attitude: &Matrix3<f64>) -> f64 {
+        rotation_from(attitude, &found.camera_from_object).norm()
+    }
+
+    #[test]
+    fn edges_of_other_things_hardly_move_the_attitude() {
+        let attitude = *Rotation3::from_euler_angles(0.5, -0.3, 0.2).matrix();
+        let start = Rotation3::from_euler_angles(0.01, -0.015, 0.01).matrix() * attitude;
+        let true_ones = lines(&attitude, 12, &[0.001, -0.001, 0.0]);
+        let found = common_attitude(&true_ones, &start).unwrap();
+        assert!(off_rad(&found, &attitude) < 5e-4, "{}", off_rad(&found, &attitude));
+        assert_eq!(found.scatter, 1.0);
+        let other = Rotation3::from_euler_angles(0.0, 0.4, 0.0).matrix() * attitude;
+        let both: Vec<Line> = true_ones.iter().copied().chain(lines(&other, 4, &[0.0])).collect();
+        assert!(off_rad(&common_attitude(&both, &start).unwrap(), &attitude) < 1e-3);
+        assert!(common_attitude(&true_ones[..9], &start).is_none());
+    }
+
+    #[test]
+    fn edges_that_scatter_say_so() {
+        let attitude = *Rotation3::from_euler_angles(-0.4, 0.2, 0.1).matrix();
+        let steady = common_attitude(&lines(&attitude, 12, &[0.001, -0.001]), &attitude).unwrap();
+        let loose = common_attitude(&lines(&attitude, 12, &[0.008, -0.008]), &attitude).unwrap();
+        assert!(loose.scatter > 3.0 && loose.covariance.trace() > 4.0 * steady.covariance.trace());
+        assert!(loose.support < steady.support);
+    }
+
+    #[test]
+    fn headings_keep_the_vertical() {
+        let attitude = *Rotation3::from_euler_angles(0.5, -0.3, 0.2).matrix();
+        let turned: Vec<Matrix3<f64>> = headings(&attitude).collect();
+        assert!(turned.iter().all(|turned| (turned.column(1) - attitude.column(1)).norm() < 1e-12));
+        // Every heading is within the reach of one of them.
+        assert!(TURN_RAD / 2.0 <= 1.2 * REACH_SINE && (turned.len() + 1) as f64 * TURN_RAD > 1.57);
+    }
+}

@@ -1,5 +1,6 @@
 //! From images to poses: corners found in one image or a pair, resolved, and followed from frame to frame.
 
+mod common;
 mod pairs;
 mod transfer;
 
@@ -13,7 +14,6 @@ use super::estimate::{CornerEstimate, Hypothesis, Verdict};
 use super::estimator_options::EstimatorOptions;
 use super::guided::Expected;
 use super::options::CornerMethod;
-use super::parallels::{CommonAttitude, Line, common_attitude, headings};
 use super::prior::{AttitudePrior, VerticalSense};
 use super::resolve::{Alignment, View, resolve};
 use super::track::Track;
@@ -229,48 +229,6 @@ impl CornerPoseEstimator {
         edge_ends(seen, left_from_right, &vertex_m)
     }
 
-    /// The attitudes by which corners may be completed: the likeliest ones that one image's corners agree on, with their edges
-    /// at right angles, and that of the frame before.
-    fn attitudes(&self, features: &[Vec<CornerFeature>; 2]) -> Result<Vec<Matrix3<f64>>> {
-        let mut out = Vec::new();
-        if self.is_one_object() || self.options.angle != IncludedAngle::RIGHT {
-            return Ok(out);
-        }
-        let priors = self.priors(false);
-        let turned = self.right.as_ref().map_or(Matrix3::identity(), |(_, motion)| motion.rotation);
-        for (features, rotation) in features.iter().zip([Matrix3::identity(), turned]) {
-            let priors = if rotation == Matrix3::identity() { &priors[..] } else { &[] };
-            let Some(agreed) = agreement(features, &self.options.angle, self.options.agree_max_rad, priors)? else {
-                continue;
-            };
-            let view = |attitudes| View { attitudes, common_from_camera: rotation };
-            let views: Vec<View<'_>> = agreed.attitudes.iter().map(view).collect();
-            let resolved = resolve(&views, Alignment::Manhattan, self.right_handed(), &self.priors(false))?;
-            out.extend(resolved.first().map(|best| self.upright(best.common_from_object)));
-        }
-        out.extend(self.track.as_ref().map(|track| track.pose.camera_from_object));
-        Ok(out)
-    }
-
-    /// The attitude that most straight edges of both images have in common; where most have none, that near the first of `starts`.
-    fn common(&self, starts: &[Matrix3<f64>]) -> Option<CommonAttitude> {
-        let (detector, left_from_right) = self.right.as_ref()?;
-        let [first, second] = &self.scratch;
-        let identity = Matrix3::identity();
-        let of_left = Line::of(self.left.segments(first), &identity);
-        let lines: Vec<Line> = of_left.chain(Line::of(detector.segments(second), &left_from_right.rotation)).collect();
-        let of_corners = common_attitude(&lines, starts.first()?);
-        let most = MOST * lines.len() as f64;
-        if of_corners.as_ref().is_some_and(|common| common.support >= most) {
-            return of_corners;
-        }
-        // Corners may be false, or turned against most of the room.
-        let others = starts.iter().skip(1).copied().chain(headings(&starts[0]));
-        let found = others.filter_map(|start| common_attitude(&lines, &start));
-        let best = found.max_by(|a, b| a.support.total_cmp(&b.support));
-        best.filter(|common| common.support >= most).or(of_corners)
-    }
-
     /// Whether edges and object are the same from frame to frame, as those of the coloured cuboid are.
     fn is_one_object(&self) -> bool {
         matches!(self.left.options().method, CornerMethod::Coloured(_))
@@ -322,9 +280,6 @@ impl CornerPoseEstimator {
         }
     }
 }
-
-/// The share of all edges along the axes of one attitude that leaves no doubt.
-const MOST: f64 = 0.4;
 
 /// How far from where it was a corner is looked for first, in pixels.
 const HARDLY_MOVED_PX: f64 = 3.0;
