@@ -48,8 +48,8 @@ impl CornerEstimate {
 }
 
 impl CornerHypothesis {
-    pub(super) fn new(inner: Hypothesis) -> Self {
-        Self { inner }
+    pub(super) fn new(inner: &Hypothesis) -> Self {
+        Self { inner: *inner }
     }
 
     pub(super) fn inner(&self) -> &Hypothesis {

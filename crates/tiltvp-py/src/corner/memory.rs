@@ -15,7 +15,7 @@ const KEYS: [&str; 7] = ["pose", "corners_left", "corners_right", "age", "object
 /// Plain numbers and lists.
 pub(super) fn to_dict<'py>(py: Python<'py>, track: &Track) -> PyResult<Bound<'py, PyDict>> {
     let dict = PyDict::new(py);
-    dict.set_item("pose", CornerHypothesis::new(track.pose).to_dict(py)?)?;
+    dict.set_item("pose", CornerHypothesis::new(&track.pose).to_dict(py)?)?;
     for (key, corners) in ["corners_left", "corners_right"].into_iter().zip(&track.corners) {
         let corners = corners.iter().map(|corner| CornerFeature::new(corner).to_dict(py));
         dict.set_item(key, PyList::new(py, corners.collect::<PyResult<Vec<_>>>()?)?)?;
