@@ -1,6 +1,7 @@
 //! Robust fits that know no vision: one random-sampling loop, one trimming loop, one reweighting loop.
 
 mod aligned;
+mod census;
 mod compaction;
 mod direction;
 mod grouped;
@@ -21,6 +22,7 @@ mod total;
 mod vectors;
 mod verification;
 
+pub use census::Census;
 pub(crate) use compaction::{Block, Kept, ROOM, compact};
 pub use direction::Direction;
 pub use grouped::{GROUPS, GroupSums};

@@ -6,7 +6,7 @@ use nalgebra::Vector2;
 use super::correction::VanishingPoint;
 use super::scratch::Work;
 use crate::edges::EdgePixels;
-use crate::robust::{Block as Rest, Gate, Kept, Moments, Problem, ROOM, Rows, Score, compact};
+use crate::robust::{Block as Rest, Census, Gate, Kept, Moments, Problem, ROOM, Rows, Score, compact};
 
 /// Edge offsets `s = A cos phi + B sin phi` (eq. 19): rows `(g cos phi, g sin phi, -s)`, model `(A, B)`, residuals in pixels
 /// (eq. 33). `g` is the relative closed-form gain of the pixel, or 1.
@@ -48,6 +48,15 @@ impl Problem for Offsets<'_> {
     fn consensus_of_each(&self, models: &[Option<Vector2<f64>>], threshold: f64, to_beat: usize, counts: &mut [usize]) {
         let models = models.iter().map(|model| model.map(|model| [model.x, model.y, 1.0]));
         self.rows.count_each_to_beat(&models, threshold, to_beat, counts);
+    }
+
+    fn take_census(&self, threshold: f64, census: &mut Census) -> bool {
+        census.take(self.rows, threshold, 1.0);
+        true
+    }
+
+    fn consensus_at_most(&self, census: &Census, model: &Vector2<f64>) -> usize {
+        census.at_most([model.x, model.y, 1.0])
     }
 
     fn consensus_among(&self, observations: &[u32], model: &Vector2<f64>, threshold: f64) -> usize {

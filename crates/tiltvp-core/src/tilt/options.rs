@@ -202,10 +202,10 @@ impl TiltOptions {
     }
 
     /// How the sampling methods sample; the others do not.
-    pub(super) fn sampling(&self) -> Sampling {
+    pub(super) fn sampling(&self) -> Option<Sampling> {
         match &self.method {
-            Method::ImageSpaceRansac { sampling, .. } | Method::VectorConsensus { sampling, .. } => *sampling,
-            Method::ImageSpaceRejectRefit { .. } | Method::Refined(_) => Sampling::default(),
+            Method::ImageSpaceRansac { sampling, .. } | Method::VectorConsensus { sampling, .. } => Some(*sampling),
+            Method::ImageSpaceRejectRefit { .. } | Method::Refined(_) => None,
         }
     }
 

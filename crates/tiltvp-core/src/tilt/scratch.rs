@@ -98,12 +98,13 @@ impl Scratch {
 }
 
 impl Work {
-    /// Makes room for the way of sampling, and sets the quality of the rows, their squared gradients, if samples
-    /// are drawn in that order.
-    pub(super) fn prepare(&mut self, sampling: &Sampling, edges: &EdgePixels) {
+    /// Makes room for the way of sampling, if samples are drawn at all, and sets the quality of the rows, their squared
+    /// gradients, if they are drawn in that order.
+    pub(super) fn prepare(&mut self, sampling: Option<&Sampling>, edges: &EdgePixels) {
+        self.quality.clear();
+        let Some(sampling) = sampling else { return };
         let room = self.weights.capacity();
         self.ransac.reserve(sampling, room);
-        self.quality.clear();
         if sampling.order != SampleOrder::Uniform {
             self.quality.reserve(room);
             let (slots, gx, gy) = (edges.slot(), edges.gx(), edges.gy());
