@@ -28,6 +28,12 @@ pub(super) trait Lanes: Copy {
     /// The numbers of the mask, and zeros.
     unsafe fn keep(a: Self, mask: Self::Mask) -> Self;
     unsafe fn count(mask: Self::Mask) -> u32;
+    /// Without its sign.
+    unsafe fn abs(a: Self) -> Self;
+    /// Numbers of both masks.
+    unsafe fn both(a: Self::Mask, b: Self::Mask) -> Self::Mask;
+    /// Numbers of the first mask that are not of the second.
+    unsafe fn but_not(a: Self::Mask, b: Self::Mask) -> Self::Mask;
     /// Four numbers of every row together, see [`Terms::fours`].
     unsafe fn store_fours(columns: [Self; 4], to: &mut [[[f32; 4]; TURNS]; TURNS]);
 }
@@ -91,6 +97,18 @@ impl Lanes for Plain {
         mask.iter().map(|held| u32::from(*held)).sum()
     }
     #[inline(always)]
+    unsafe fn abs(a: Self) -> Self {
+        Self(a.0.map(f32::abs))
+    }
+    #[inline(always)]
+    unsafe fn both(a: Self::Mask, b: Self::Mask) -> Self::Mask {
+        std::array::from_fn(|i| a[i] && b[i])
+    }
+    #[inline(always)]
+    unsafe fn but_not(a: Self::Mask, b: Self::Mask) -> Self::Mask {
+        std::array::from_fn(|i| a[i] && !b[i])
+    }
+    #[inline(always)]
     unsafe fn store_fours(columns: [Self; 4], to: &mut [[[f32; 4]; TURNS]; TURNS]) {
         for row in 0..LANES {
             for (column, to) in columns.iter().zip(&mut to[row % TURNS][row / TURNS]) {
@@ -103,13 +121,13 @@ impl Lanes for Plain {
 #[cfg(target_arch = "x86_64")]
 pub(super) mod x86 {
     use std::arch::x86_64::{
-        __m256, __m512, __mmask16, _CMP_LE_OQ, _CMP_LT_OQ, _mm256_add_ps, _mm256_and_ps, _mm256_castps_pd,
-        _mm256_cmp_ps, _mm256_loadu_ps, _mm256_max_ps, _mm256_movemask_ps, _mm256_mul_ps, _mm256_set1_ps,
-        _mm256_setzero_ps, _mm256_storeu_pd, _mm256_storeu_ps, _mm256_sub_ps, _mm256_unpackhi_pd, _mm256_unpackhi_ps,
-        _mm256_unpacklo_pd, _mm256_unpacklo_ps, _mm512_add_ps, _mm512_castps_pd, _mm512_cmp_ps_mask, _mm512_loadu_ps,
-        _mm512_maskz_mov_ps, _mm512_max_ps, _mm512_mul_ps, _mm512_set1_ps, _mm512_setzero_ps, _mm512_storeu_pd,
-        _mm512_storeu_ps, _mm512_sub_ps, _mm512_unpackhi_pd, _mm512_unpackhi_ps, _mm512_unpacklo_pd,
-        _mm512_unpacklo_ps,
+        __m256, __m512, __mmask16, _CMP_LE_OQ, _CMP_LT_OQ, _mm256_add_ps, _mm256_and_ps, _mm256_andnot_ps,
+        _mm256_castps_pd, _mm256_cmp_ps, _mm256_loadu_ps, _mm256_max_ps, _mm256_movemask_ps, _mm256_mul_ps,
+        _mm256_set1_ps, _mm256_setzero_ps, _mm256_storeu_pd, _mm256_storeu_ps, _mm256_sub_ps, _mm256_unpackhi_pd,
+        _mm256_unpackhi_ps, _mm256_unpacklo_pd, _mm256_unpacklo_ps, _mm512_abs_ps, _mm512_add_ps, _mm512_castps_pd,
+        _mm512_cmp_ps_mask, _mm512_loadu_ps, _mm512_maskz_mov_ps, _mm512_max_ps, _mm512_mul_ps, _mm512_set1_ps,
+        _mm512_setzero_ps, _mm512_storeu_pd, _mm512_storeu_ps, _mm512_sub_ps, _mm512_unpackhi_pd, _mm512_unpackhi_ps,
+        _mm512_unpacklo_pd, _mm512_unpacklo_ps,
     };
 
     use super::{LANES, Lanes, TURNS};
@@ -144,11 +162,20 @@ pub(super) mod x86 {
             at_most(a: Self, b: Self) -> __mmask16 { _mm512_cmp_ps_mask::<_CMP_LE_OQ>(a.0, b.0) }
             below(a: Self, b: Self) -> __mmask16 { _mm512_cmp_ps_mask::<_CMP_LT_OQ>(a.0, b.0) }
             keep(a: Self, mask: __mmask16) -> Self { Self(_mm512_maskz_mov_ps(mask, a.0)) }
+            abs(a: Self) -> Self { Self(_mm512_abs_ps(a.0)) }
         }
 
         #[inline(always)]
         unsafe fn count(mask: __mmask16) -> u32 {
             mask.count_ones()
+        }
+        #[inline(always)]
+        unsafe fn both(a: __mmask16, b: __mmask16) -> __mmask16 {
+            a & b
+        }
+        #[inline(always)]
+        unsafe fn but_not(a: __mmask16, b: __mmask16) -> __mmask16 {
+            a & !b
         }
 
         #[inline(always)]
@@ -215,6 +242,14 @@ pub(super) mod x86 {
                 (_mm256_cmp_ps::<_CMP_LT_OQ>(a.0, b.0), _mm256_cmp_ps::<_CMP_LT_OQ>(a.1, b.1))
             }
             keep(a: Self, mask: Self::Mask) -> Self { Self(_mm256_and_ps(a.0, mask.0), _mm256_and_ps(a.1, mask.1)) }
+            abs(a: Self) -> Self {
+                let sign = _mm256_set1_ps(-0.0);
+                Self(_mm256_andnot_ps(sign, a.0), _mm256_andnot_ps(sign, a.1))
+            }
+            both(a: Self::Mask, b: Self::Mask) -> Self::Mask { (_mm256_and_ps(a.0, b.0), _mm256_and_ps(a.1, b.1)) }
+            but_not(a: Self::Mask, b: Self::Mask) -> Self::Mask {
+                (_mm256_andnot_ps(b.0, a.0), _mm256_andnot_ps(b.1, a.1))
+            }
             count(mask: Self::Mask) -> u32 {
                 _mm256_movemask_ps(mask.0).count_ones() + _mm256_movemask_ps(mask.1).count_ones()
             }
