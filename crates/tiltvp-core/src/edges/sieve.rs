@@ -75,6 +75,15 @@ impl<'a, L: Level> Levels<'a, L> {
     pub(super) fn around(&self, block: &Block, rest: &'a mut [[L; REACH]; 3]) -> [&'a [L; REACH]; 3] {
         let (u, v) = ((block.place & 0xffff) as usize, (block.place >> 16) as usize);
         let column = u - 1 - self.left;
+        if self.places == usize::MAX {
+            // All three are within what spans them, which is the one thing to look at.
+            let first = (v - 1) * self.stride + column;
+            let span = self.data.get(first..first + 2 * self.stride + REACH);
+            let row = |k: usize| span.and_then(|span| span.get(k * self.stride..).and_then(<[L]>::first_chunk));
+            if let (Some(a), Some(m), Some(b)) = (row(0), row(1), row(2)) {
+                return [a, m, b];
+            }
+        }
         let [a, m, b] = [v - 1, v, v + 1].map(|v| (v & self.places) * self.stride + column);
         let whole = |at: usize| self.data.get(at..at + REACH).and_then(<[L]>::first_chunk);
         if let (Some(a), Some(m), Some(b)) = (whole(a), whole(m), whole(b)) {

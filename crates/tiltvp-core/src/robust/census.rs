@@ -72,8 +72,10 @@ impl Default for Parts {
 impl Census {
     /// Makes room, so that taking one allocates nothing.
     pub(super) fn reserve(&mut self) {
-        self.begun.reserve(DIRECTIONS * PLACES);
-        self.ended.reserve(DIRECTIONS * PLACES);
+        for table in [&mut self.begun, &mut self.ended] {
+            table.clear();
+            table.reserve(DIRECTIONS * PLACES);
+        }
     }
 
     /// Whether a census saves time where so many models are still to be counted over so many rows. Times are in rows that are

@@ -127,12 +127,14 @@ impl<L: Lanes> Sums<L> {
             let (x, y, z, own) = (L::load(x), L::load(y), L::load(z), L::load(weights));
             let d = residual::<L, ONE>([x, y, z], model);
             let held = L::below(L::splat(0.0), own);
-            let summed = if GATE == OPEN {
-                held
-            } else {
-                let near = L::at_most(L::abs(d), reach);
-                L::keep(own, near).store(weights);
-                if GATE == REJECTED { L::but_not(held, near) } else { L::both(held, near) }
+            let far = L::beyond_of(held, L::abs(d), reach);
+            if GATE != OPEN {
+                L::clear(weights, far);
+            }
+            let summed = match GATE {
+                OPEN => held,
+                REJECTED => far,
+                _ => L::at_most_of(held, L::abs(d), reach),
             };
             self.count += L::count(summed);
             self.add_products(L::keep(x, summed), L::keep(y, summed), L::keep(d, summed), [x, y, d]);

@@ -30,10 +30,12 @@ pub(super) trait Lanes: Copy {
     unsafe fn count(mask: Self::Mask) -> u32;
     /// Without its sign.
     unsafe fn abs(a: Self) -> Self;
-    /// Numbers of both masks.
-    unsafe fn both(a: Self::Mask, b: Self::Mask) -> Self::Mask;
-    /// Numbers of the first mask that are not of the second.
-    unsafe fn but_not(a: Self::Mask, b: Self::Mask) -> Self::Mask;
+    /// Numbers of the mask that are at most the others.
+    unsafe fn at_most_of(mask: Self::Mask, a: Self, b: Self) -> Self::Mask;
+    /// Numbers of the mask that are not.
+    unsafe fn beyond_of(mask: Self::Mask, a: Self, b: Self) -> Self::Mask;
+    /// Zeros for the numbers of the mask, as they are for the others.
+    unsafe fn clear(to: &mut [f32; LANES], mask: Self::Mask);
     /// Four numbers of every row together, see [`Terms::fours`].
     unsafe fn store_fours(columns: [Self; 4], to: &mut [[[f32; 4]; TURNS]; TURNS]);
 }
@@ -101,12 +103,16 @@ impl Lanes for Plain {
         Self(a.0.map(f32::abs))
     }
     #[inline(always)]
-    unsafe fn both(a: Self::Mask, b: Self::Mask) -> Self::Mask {
-        std::array::from_fn(|i| a[i] && b[i])
+    unsafe fn at_most_of(mask: Self::Mask, a: Self, b: Self) -> Self::Mask {
+        std::array::from_fn(|i| mask[i] && a.0[i] <= b.0[i])
     }
     #[inline(always)]
-    unsafe fn but_not(a: Self::Mask, b: Self::Mask) -> Self::Mask {
-        std::array::from_fn(|i| a[i] && !b[i])
+    unsafe fn beyond_of(mask: Self::Mask, a: Self, b: Self) -> Self::Mask {
+        std::array::from_fn(|i| mask[i] && !(a.0[i] <= b.0[i]))
+    }
+    #[inline(always)]
+    unsafe fn clear(to: &mut [f32; LANES], mask: Self::Mask) {
+        to.iter_mut().zip(mask).for_each(|(to, masked)| *to = if masked { 0.0 } else { *to });
     }
     #[inline(always)]
     unsafe fn store_fours(columns: [Self; 4], to: &mut [[[f32; 4]; TURNS]; TURNS]) {
@@ -121,13 +127,13 @@ impl Lanes for Plain {
 #[cfg(target_arch = "x86_64")]
 pub(super) mod x86 {
     use std::arch::x86_64::{
-        __m256, __m512, __mmask16, _CMP_LE_OQ, _CMP_LT_OQ, _mm256_add_ps, _mm256_and_ps, _mm256_andnot_ps,
+        __m256, __m512, __mmask16, _CMP_LE_OQ, _CMP_LT_OQ, _CMP_NLE_UQ, _mm256_add_ps, _mm256_and_ps, _mm256_andnot_ps,
         _mm256_castps_pd, _mm256_cmp_ps, _mm256_loadu_ps, _mm256_max_ps, _mm256_movemask_ps, _mm256_mul_ps,
         _mm256_set1_ps, _mm256_setzero_ps, _mm256_storeu_pd, _mm256_storeu_ps, _mm256_sub_ps, _mm256_unpackhi_pd,
         _mm256_unpackhi_ps, _mm256_unpacklo_pd, _mm256_unpacklo_ps, _mm512_abs_ps, _mm512_add_ps, _mm512_castps_pd,
-        _mm512_cmp_ps_mask, _mm512_loadu_ps, _mm512_maskz_mov_ps, _mm512_max_ps, _mm512_mul_ps, _mm512_set1_ps,
-        _mm512_setzero_ps, _mm512_storeu_pd, _mm512_storeu_ps, _mm512_sub_ps, _mm512_unpackhi_pd, _mm512_unpackhi_ps,
-        _mm512_unpacklo_pd, _mm512_unpacklo_ps,
+        _mm512_cmp_ps_mask, _mm512_loadu_ps, _mm512_mask_cmp_ps_mask, _mm512_mask_storeu_ps, _mm512_maskz_mov_ps,
+        _mm512_max_ps, _mm512_mul_ps, _mm512_set1_ps, _mm512_setzero_ps, _mm512_storeu_pd, _mm512_storeu_ps,
+        _mm512_sub_ps, _mm512_unpackhi_pd, _mm512_unpackhi_ps, _mm512_unpacklo_pd, _mm512_unpacklo_ps,
     };
 
     use super::{LANES, Lanes, TURNS};
@@ -163,6 +169,12 @@ pub(super) mod x86 {
             below(a: Self, b: Self) -> __mmask16 { _mm512_cmp_ps_mask::<_CMP_LT_OQ>(a.0, b.0) }
             keep(a: Self, mask: __mmask16) -> Self { Self(_mm512_maskz_mov_ps(mask, a.0)) }
             abs(a: Self) -> Self { Self(_mm512_abs_ps(a.0)) }
+            at_most_of(mask: __mmask16, a: Self, b: Self) -> __mmask16 {
+                _mm512_mask_cmp_ps_mask::<_CMP_LE_OQ>(mask, a.0, b.0)
+            }
+            beyond_of(mask: __mmask16, a: Self, b: Self) -> __mmask16 {
+                _mm512_mask_cmp_ps_mask::<_CMP_NLE_UQ>(mask, a.0, b.0)
+            }
         }
 
         #[inline(always)]
@@ -170,12 +182,9 @@ pub(super) mod x86 {
             mask.count_ones()
         }
         #[inline(always)]
-        unsafe fn both(a: __mmask16, b: __mmask16) -> __mmask16 {
-            a & b
-        }
-        #[inline(always)]
-        unsafe fn but_not(a: __mmask16, b: __mmask16) -> __mmask16 {
-            a & !b
+        unsafe fn clear(to: &mut [f32; LANES], mask: __mmask16) {
+            // SAFETY: the caller vouches for the machine, the reference holds 16 numbers.
+            unsafe { _mm512_mask_storeu_ps(to.as_mut_ptr(), mask, _mm512_setzero_ps()) }
         }
 
         #[inline(always)]
@@ -246,9 +255,17 @@ pub(super) mod x86 {
                 let sign = _mm256_set1_ps(-0.0);
                 Self(_mm256_andnot_ps(sign, a.0), _mm256_andnot_ps(sign, a.1))
             }
-            both(a: Self::Mask, b: Self::Mask) -> Self::Mask { (_mm256_and_ps(a.0, b.0), _mm256_and_ps(a.1, b.1)) }
-            but_not(a: Self::Mask, b: Self::Mask) -> Self::Mask {
-                (_mm256_andnot_ps(b.0, a.0), _mm256_andnot_ps(b.1, a.1))
+            at_most_of(mask: Self::Mask, a: Self, b: Self) -> Self::Mask {
+                let near = Self::at_most(a, b);
+                (_mm256_and_ps(mask.0, near.0), _mm256_and_ps(mask.1, near.1))
+            }
+            beyond_of(mask: Self::Mask, a: Self, b: Self) -> Self::Mask {
+                let near = Self::at_most(a, b);
+                (_mm256_andnot_ps(near.0, mask.0), _mm256_andnot_ps(near.1, mask.1))
+            }
+            clear(to: &mut [f32; LANES], mask: Self::Mask) -> () {
+                let own = Self::load(to);
+                Self(_mm256_andnot_ps(mask.0, own.0), _mm256_andnot_ps(mask.1, own.1)).store(to);
             }
             count(mask: Self::Mask) -> u32 {
                 _mm256_movemask_ps(mask.0).count_ones() + _mm256_movemask_ps(mask.1).count_ones()

@@ -45,11 +45,15 @@ struct Extent {
     pixels: usize,
     columns: std::ops::Range<usize>,
     smoothing_px: f64,
+    first: (u16, u16),
+    last: (u16, u16),
 }
 
 impl Extent {
     fn new(region: &Region, options: &EdgeOptions) -> Self {
-        Self { pixels: region.len(), columns: region.columns(), smoothing_px: options.smoothing_px }
+        let (pixels, last) = (region.len(), region.len().saturating_sub(1));
+        let (first, last) = (region.place(0), region.place(last));
+        Self { pixels, columns: region.columns(), smoothing_px: options.smoothing_px, first, last }
     }
 }
 
