@@ -1,6 +1,6 @@
 //! How much an observation counts, given its residual.
 
-use super::score::{CELLS, MARGINAL, cell, slope_at, weight_most};
+use super::marginal::{CELLS, MARGINAL, cell, slope_at, weight_most};
 
 /// The gate that a residual must pass.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -8,6 +8,7 @@ mod grouped;
 mod lanes;
 mod local;
 mod loss;
+mod marginal;
 mod problem;
 mod prosac;
 mod ransac;

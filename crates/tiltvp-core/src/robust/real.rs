@@ -5,7 +5,7 @@ use multiversion::multiversion;
 use super::aligned::Dense;
 use super::lanes::{self, HARD, ONES, OPEN, REJECTED, SOFT, WITHIN};
 use super::loss::Shape;
-use super::score::{DEGREE, MARGINAL, cell, marginal_gain};
+use super::marginal::{DEGREE, MARGINAL, cell, marginal_gain};
 use super::total::Total;
 use super::vectors::LANES;
 

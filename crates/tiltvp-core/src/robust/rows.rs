@@ -4,9 +4,9 @@ use nalgebra::{Matrix2, Matrix3, Vector2, Vector3};
 
 use super::aligned::Aligned;
 use super::loss::{Gate, Shape};
+use super::marginal::MARGINAL;
 use super::real::{BLOCK, Real};
 use super::sampling::Score;
-use super::score::MARGINAL;
 use super::total::Total;
 
 /// Rows in structure-of-arrays form, in single precision for pixels or double for the user's own numbers.
