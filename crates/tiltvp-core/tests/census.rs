@@ -74,7 +74,7 @@ fn normals(seed: u64, len: u64, inliers: f64, noise: f64) -> Rows<f32> {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(48))]
+    #![proptest_config(ProptestConfig { cases: 48, failure_persistence: None, ..ProptestConfig::default() })]
     #[test]
     fn a_census_changes_nothing(seed in 0..u64::MAX, len in 4000..25_000u64, inliers in 0.0..0.4f64, wide in 0.2..3.0f64) {
         let rows = normals(seed, len, inliers, 0.02);
