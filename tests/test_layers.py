@@ -42,6 +42,13 @@ def test_importing_is_light(module: str) -> None:
     assert done.stdout.strip() == "[]"
 
 
+def test_one_import_brings_the_topics() -> None:
+    topics = ["tiltvp.corner.solve", "tiltvp.lines.extract", "tiltvp.synth.render_room"]
+    script = f"import tiltvp; print(*(thing.__name__ for thing in ({', '.join(topics)})))"
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, timeout=60, check=True)
+    assert done.stdout.split() == ["solve", "extract", "render_room"]
+
+
 def test_only_the_command_line_prints() -> None:
     for path in MODULES:
         if "cli" not in path.parts:

@@ -5,6 +5,7 @@ pixel centres at integers. `robot_from_camera` is R in v_robot = R v_camera. A l
 (-sin a cos b, -sin a sin b, cos a) in the robot frame; beta = 0 is a forward lean. Radians and metres.
 """
 
+from tiltvp import corner, lines, synth
 from tiltvp._core import METHODS, ComplementaryFilter
 from tiltvp.cameras import Camera
 from tiltvp.corrections import (
@@ -70,10 +71,13 @@ __all__ = [
     "apply_correction",
     "calibrate",
     "common_direction",
+    "corner",
     "draw_edges",
     "level",
+    "lines",
     "normal_from_alpha_beta",
     "read_image",
+    "synth",
     "tilt_error_rad",
     "tilt_from_wheel_heights",
     "train_affine",

@@ -4,7 +4,7 @@ use nalgebra::{Isometry3, Matrix3, Rotation3, Translation3, UnitQuaternion, Vect
 
 use crate::corner::{Corner, CornerKind};
 use crate::dice::Dice;
-use crate::stereo::StereoOptions;
+use crate::stereo_options::StereoOptions;
 
 /// How far from the planes of the corner's faces the cameras stay, radians.
 const MARGIN_RAD: f64 = 0.17;

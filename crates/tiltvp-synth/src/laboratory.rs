@@ -3,9 +3,10 @@
 use nalgebra::{Vector2, Vector3};
 use tiltvp_core::{Error, Result};
 
-use crate::builder::{Builder, Column, Footprint, Frame, Material, Patch};
+use crate::builder::{Builder, Column, Footprint, Material, Patch};
 use crate::corner::{Corner, CornerKind, of_box};
 use crate::dice::Dice;
+use crate::frame::Frame;
 use crate::options::{RoomKind, WallPattern};
 use crate::outdoors::Outdoors;
 use crate::plan::{Filling, Opening, Plan, Wall};

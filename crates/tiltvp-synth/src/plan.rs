@@ -2,8 +2,8 @@
 
 use nalgebra::{Vector2, Vector3};
 
-use crate::builder::Frame;
 use crate::dice::Dice;
+use crate::frame::Frame;
 use crate::options::{RoomKind, RoomOptions, WallPattern};
 use crate::outdoors::Outdoors;
 

@@ -2,8 +2,9 @@
 
 use nalgebra::Vector3;
 
-use crate::builder::{Builder, Column, Frame, Material, MaterialId, Patch};
+use crate::builder::{Builder, Column, Material, MaterialId, Patch};
 use crate::dice::Dice;
+use crate::frame::Frame;
 use crate::options::{RoomKind, WallPattern};
 use crate::plan::{Filling, Opening, Plan, Wall};
 use crate::segment::Segment;

@@ -7,7 +7,7 @@ use tiltvp_core::geometry::Tilt;
 use tiltvp_core::{Error, Result};
 
 use crate::dice::Dice;
-use crate::drive::{DriveOptions, Way};
+use crate::drive_options::{DriveOptions, Way};
 use crate::noise::fractal_noise;
 use crate::route::{Follower, Grid};
 use crate::view::RobotPose;

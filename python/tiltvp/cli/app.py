@@ -6,7 +6,7 @@ import os
 import sys
 from collections.abc import Sequence
 
-from cyclopts import App, CycloptsError
+from cyclopts import App, CycloptsError, Parameter
 
 from tiltvp import __version__
 from tiltvp.cli import calibrate, camera, corner, dataset, demo, evaluate, lines, measure, report, tilt, track
@@ -17,8 +17,10 @@ DONE, SOME_FAILED, WRONG_USE, INTERRUPTED = 0, 1, 2, 130
 
 app = App(
     name="tiltvp",
-    help="A robot's tilt from the vertical edges in fisheye, mirror and panoramic images.",
+    help="Orientation and calibration from the straight lines of man-made places: a robot's tilt, vertical lines, "
+    "where a camera sits on a robot, and the pose of corners.",
     version=__version__,
+    default_parameter=Parameter(negative_iterable=()),
     suppress_keyboard_interrupt=False,
 )
 app.command(tilt.tilt)

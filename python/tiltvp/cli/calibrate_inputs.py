@@ -5,10 +5,11 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from tiltvp.cli.frames import open_frames
 from tiltvp.cli.line_options import LineOptions
 from tiltvp.cli.options import CameraOptions
 from tiltvp.cli.terminal import progress_bar
-from tiltvp.cli.track import followed, open_frames, track_table
+from tiltvp.cli.track import followed, track_table
 from tiltvp.errors import InvalidInputError
 
 if TYPE_CHECKING:

@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter, validators
 
+from tiltvp.cli.frames import Frames, open_frames
 from tiltvp.cli.options import image_size_from
 from tiltvp.cli.results import check_ending, write_frame
 from tiltvp.cli.terminal import named, progress_bar, say
-from tiltvp.cli.track import Frames, open_frames
 from tiltvp.errors import InvalidInputError, TiltvpError
 
 if TYPE_CHECKING:

@@ -6,12 +6,11 @@ import difflib
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Group, Parameter, validators
 
-from tiltvp.cli.options import mask_from
+from tiltvp.cli.options import EdgeOptions, mask_from
 from tiltvp.errors import InvalidInputError
 
 if TYPE_CHECKING:
@@ -30,7 +29,7 @@ _UPRIGHT = "upright"
 
 @Parameter(name="*", group=_LINES)
 @dataclass(frozen=True, kw_only=True)
-class LineOptions:
+class LineOptions(EdgeOptions):
     """How lines are found."""
 
     method: str | None = None
@@ -40,20 +39,6 @@ class LineOptions:
     `tiltvp tilt`. A frame without an estimate is taken to be upright."""
     tilt_confidence_min: Annotated[float, Parameter(validator=validators.Number(gte=0, lte=1))] = 0.5
     """A frame whose estimated lean is less confident, or leaves far less of its lines, is taken to be upright."""
-    robot_from_camera: str | None = None
-    """How the camera sits on the robot: up (the default), forward, or a file with a rotation."""
-    elevation_min_deg: float | None = None
-    """Lowest elevation that is looked at, above the robot's horizon."""
-    elevation_max_deg: float | None = None
-    """Highest elevation that is looked at."""
-    margin_px: float | None = None
-    """Pixels kept clear of the lens' rim, the image border and the mask."""
-    mask: Path | None = None
-    """Image of the camera's size, white where the world is seen and black where the robot is."""
-    gradient_min: float | None = None
-    """Least gradient magnitude of an edge pixel (3x3 Scharr kernel, 8 bit)."""
-    smoothing_px: float | None = None
-    """Standard deviation of the Gaussian before the kernel."""
     length_min_deg: float | None = None
     """great-circle: least elevation that a line covers."""
     separation_deg: float | None = None

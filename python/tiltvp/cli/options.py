@@ -1,6 +1,6 @@
 """The options that commands share, and their way from words and degrees to what the library takes."""
 
-from __future__ import annotations
+# Annotations are evaluated: other files inherit these options, and there cyclopts would not find the names of types.
 
 import difflib
 import math
@@ -52,7 +52,7 @@ class CameraOptions:
     mirror: Switch = False
     """The image is seen in a mirror."""
 
-    def load(self) -> Camera:
+    def load(self) -> "Camera":
         """The camera."""
         from tiltvp import Camera
 
@@ -66,13 +66,12 @@ class CameraOptions:
         return camera.mirrored() if self.mirror and not camera.mirror else camera
 
 
-@Parameter(name="*", group=_METHOD)
 @dataclass(frozen=True, kw_only=True)
-class MethodOptions:
-    """How the tilt is estimated."""
+class EdgeOptions:
+    """Where edges are looked for, and what is one."""
 
     method: str | None = None
-    """refined, image-space-ransac, image-space-reject-refit or vector-consensus."""
+    """Name of the method."""
     robot_from_camera: str | None = None
     """How the camera sits on the robot: up (the default), forward, or a file with a rotation."""
     elevation_min_deg: float | None = None
@@ -89,6 +88,15 @@ class MethodOptions:
     """Least gradient magnitude of an edge pixel (3x3 Scharr kernel, 8 bit)."""
     smoothing_px: float | None = None
     """Standard deviation of the Gaussian before the kernel."""
+
+
+@Parameter(name="*", group=_METHOD)
+@dataclass(frozen=True, kw_only=True)
+class MethodOptions(EdgeOptions):
+    """How the tilt is estimated."""
+
+    method: str | None = None
+    """refined, image-space-ransac, image-space-reject-refit or vector-consensus."""
     tilt_max_deg: float | None = None
     """Largest tilt expected: edges that would need a larger one are rejected first."""
     keep_fraction: float | None = None
@@ -120,7 +128,7 @@ class MethodOptions:
     seed: int | None = None
     """Seed of the random samples."""
 
-    def estimator(self, camera: Camera) -> TiltEstimator:
+    def estimator(self, camera: "Camera") -> "TiltEstimator":
         """The estimator with the options that were given."""
         from tiltvp import METHODS, TiltEstimator
         from tiltvp.rotations import read_rotation

@@ -4,19 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import nullcontext
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter, validators
 
-from tiltvp.cli.inputs import find_images
+from tiltvp.cli.frames import Frames, open_frames
 from tiltvp.cli.line_options import LineOptions
 from tiltvp.cli.lines import line_columns, line_schema
 from tiltvp.cli.options import CameraOptions
 from tiltvp.cli.results import check_ending, write_frame
-from tiltvp.cli.terminal import ProgressBar, complain, named, progress_bar, say
-from tiltvp.errors import ImageFileError, InvalidInputError, TiltvpError
+from tiltvp.cli.terminal import ProgressBar, named, progress_bar, say
+from tiltvp.errors import InvalidInputError, TiltvpError
 
 if TYPE_CHECKING:
     import numpy as np
@@ -141,50 +140,3 @@ def track_table(tracked: Sequence[tuple[int, str, TrackedLines]]) -> pl.DataFram
         columns = {"frame": [frame] * n, "file": [file] * n, "track": found.track, **line_columns(found.lines)}
         parts.append(pl.DataFrame(columns | {"frames_back": found.frames_back}, schema=schema))
     return pl.concat([pl.DataFrame(schema=schema), *parts])
-
-
-@dataclass(frozen=True)
-class Frames:
-    """Where frames come from. Iterating gives each frame's image, or what is wrong with it."""
-
-    files: list[Path]
-    """What each frame is called; for videos the file and the number of the frame."""
-    rate_hz: float
-    video: Any = None
-    """The reader of a video; None for image files."""
-
-    def __iter__(self) -> Iterator[NDArray[np.uint8] | TiltvpError]:
-        from tiltvp.images import read_image
-
-        if self.video is None:
-            for file in self.files:
-                try:
-                    yield read_image(file)
-                except TiltvpError as error:
-                    yield error
-            return
-        count = 0
-        for _, image in zip(self.files, self.video, strict=False):
-            yield image
-            count += 1
-        for _ in self.files[count:]:
-            yield ImageFileError("cannot be decoded")
-
-
-def open_frames(source: str) -> Frames:
-    """The frames of a folder, a pattern or a video. Raises `TiltvpError` where there are none."""
-    from tiltvp.videos import VIDEO_ENDINGS, VideoReader
-
-    path = Path(source)
-    if path.suffix.lower() in VIDEO_ENDINGS and not path.is_dir():
-        reader = VideoReader(path)
-        if reader.count == 0:
-            raise ImageFileError(f"{path}: a video without frames")
-        digits = len(str(reader.count - 1))
-        return Frames([Path(f"{path}#{k:0{digits}d}") for k in range(reader.count)], reader.rate_hz, reader)
-    files, problems = find_images([source])
-    for problem in problems:
-        complain(problem)
-    if not files:
-        raise InvalidInputError(f"{source}: no frames, expected a folder of images, a pattern or a video")
-    return Frames(files, 25.0)

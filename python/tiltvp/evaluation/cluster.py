@@ -82,7 +82,7 @@ def _client(distributed: Any, address: str) -> Any:
 
 def _estimate_chunk(job: str, numbers: Sequence[int]) -> list[tuple[int, pl.DataFrame]]:
     """The task that a worker does."""
-    from tiltvp.evaluation.experiment import evaluate_images
+    from tiltvp.evaluation.each_image import evaluate_images
 
     dataset, runner = _prepared(job)
     return list(evaluate_images(dataset, runner, numbers))
@@ -92,7 +92,7 @@ def _estimate_chunk(job: str, numbers: Sequence[int]) -> list[tuple[int, pl.Data
 def _prepared(job: str) -> tuple[TiltDataset, ImageRunner]:
     """The dataset and the estimators, made once in each worker."""
     from tiltvp.datasets.folder import read_dataset
-    from tiltvp.evaluation.experiment import runner_of
+    from tiltvp.evaluation.each_image import runner_of
 
     asked = json.loads(job)
     own = metadata.version("tiltvp")

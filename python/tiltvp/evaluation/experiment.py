@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import ThreadPoolExecutor, as_completed
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -11,15 +10,14 @@ from typing import TYPE_CHECKING
 from tiltvp.errors import InvalidInputError
 from tiltvp.evaluation.combinations import Combination
 from tiltvp.evaluation.crossval import cross_validated
-from tiltvp.evaluation.runner import ImageRunner, View
+from tiltvp.evaluation.each_image import evaluate_images, runner_of
+from tiltvp.evaluation.runner import ImageRunner
 from tiltvp.evaluation.runs import Run, RunFolder, new_manifest, open_run, read_run
 
 if TYPE_CHECKING:
-    import polars as pl
-
     from tiltvp.datasets.folder import TiltDataset
 
-__all__ = ["Experiment", "evaluate_images", "open_experiment", "runner_of", "view_of"]
+__all__ = ["Experiment", "open_experiment"]
 
 
 def _nothing() -> None:
@@ -95,35 +93,3 @@ class Experiment:
         if self.folder.whole:
             return read_run(self.folder.directory)
         return self.folder.finish(cross_validated(self.folder.parts(), threads=threads, advance=advance))
-
-
-def runner_of(dataset: TiltDataset, combinations: Sequence[Combination], seed: int) -> ImageRunner:
-    """The estimators for the camera of a dataset."""
-    return ImageRunner(
-        dataset.camera, combinations, robot_from_camera=dataset.robot_from_camera, mask=dataset.mask, seed=seed
-    )
-
-
-def view_of(dataset: TiltDataset, number: int) -> View:
-    """What a dataset knows of one of its images."""
-    image = dataset.images[number]
-    return View(number, image.file, image.location, image.environment, image.alpha_rad, image.beta_rad, image.yaw_rad)
-
-
-def evaluate_images(
-    dataset: TiltDataset, runner: ImageRunner, numbers: Sequence[int], threads: int = 1
-) -> Iterator[tuple[int, pl.DataFrame]]:
-    """The rows of these images as they come, with their numbers; the fits of `threads` images run at the same time."""
-
-    def one(number: int) -> tuple[int, pl.DataFrame]:
-        return number, runner(dataset.read(dataset.images[number]), view_of(dataset, number))
-
-    if threads == 1:
-        yield from map(one, numbers)
-        return
-    pool = ThreadPoolExecutor(threads)
-    try:
-        for future in as_completed([pool.submit(one, number) for number in numbers]):
-            yield future.result()
-    finally:
-        pool.shutdown(cancel_futures=True)

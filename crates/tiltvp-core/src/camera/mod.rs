@@ -18,6 +18,7 @@ mod ocam;
 mod parameters;
 mod pinhole;
 mod polynomial;
+mod profile;
 mod radial;
 mod radial_polynomial;
 mod rays;

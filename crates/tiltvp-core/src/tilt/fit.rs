@@ -5,6 +5,7 @@ use std::f64::consts::FRAC_PI_2;
 use nalgebra::{Matrix2, Vector2, Vector3};
 
 use super::confidence;
+use super::corrected::Corrected;
 use super::estimate::TiltEstimate;
 use super::estimator::TiltEstimator;
 use super::image_space::{Offsets, offsets};
@@ -12,7 +13,7 @@ use super::options::Method;
 use super::refine::refine;
 use super::scratch::{Inliers, Work};
 use super::tables::Tables;
-use super::trained::{Corrected, TrainedCorrection};
+use super::trained::TrainedCorrection;
 use super::vector_consensus::vector_consensus;
 use crate::edges::{EdgePixels, LiftTable};
 use crate::geometry::{Tilt, tangent_basis};

@@ -2,6 +2,7 @@
 
 mod common_direction;
 mod confidence;
+mod corrected;
 mod correction;
 mod estimate;
 mod estimator;
@@ -18,6 +19,7 @@ mod shift_model;
 mod simplex;
 mod tables;
 mod trained;
+mod training_set;
 mod vector_consensus;
 
 pub use common_direction::{CommonDirection, CommonDirectionOptions, common_direction};

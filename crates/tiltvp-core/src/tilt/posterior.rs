@@ -2,8 +2,9 @@
 
 use std::sync::Arc;
 
+use super::corrected::Corrected;
 use super::shift_model::ShiftModel;
-use super::trained::{Corrected, check_training};
+use super::training_set::check_training;
 use crate::error::{Error, Result};
 
 /// How leans are distributed where the robot goes, `P(alpha)`.

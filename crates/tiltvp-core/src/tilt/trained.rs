@@ -1,8 +1,8 @@
 //! Corrections of the angle that are trained on images of known tilt: a factor, a line, or a posterior (paper 000 section 5.1).
 
-use nalgebra::{Matrix2, Vector2};
-
+use super::corrected::Corrected;
 use super::posterior::PosteriorCorrection;
+use super::training_set::check_training;
 use crate::error::{Error, Result};
 
 /// From what a method measures, a shift in pixels or a raw angle in radians, to the lean.
@@ -44,28 +44,6 @@ fn positive_factor(factor: f64) -> Result<()> {
         return Ok(());
     }
     Err(Error::option("correction", factor, "a positive factor"))
-}
-
-/// A corrected angle, and how it depends on what was measured.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Corrected {
-    pub shift: f64,
-    pub alpha_rad: f64,
-    /// `d alpha / d l`, that of the unclamped line where it is clamped.
-    pub slope: f64,
-    /// Standard deviation of the angle that the training set tells, 0 where it tells none.
-    pub std_rad: f64,
-}
-
-impl Corrected {
-    /// The derivative of `alpha u` by the shift vector `l u`, for a unit vector `u` that errs sideways with a variance in
-    /// squared units of the shift: the farther the shift is from zero, the better its direction is known.
-    pub(super) fn jacobian(&self, toward: &Vector2<f64>, sideways_variance: f64) -> Matrix2<f64> {
-        let across = Vector2::new(-toward.y, toward.x);
-        let spread = (self.shift * self.shift + sideways_variance.max(0.0)).sqrt();
-        let sideways = if spread > 0.0 { (self.alpha_rad / spread).max(self.slope) } else { self.slope };
-        toward * toward.transpose() * self.slope + across * across.transpose() * sideways
-    }
 }
 
 impl TrainedCorrection {
@@ -117,25 +95,6 @@ impl TrainedCorrection {
             Self::Factor(_) | Self::Posterior(_) => alpha_rad * self.factor(),
         }
     }
-}
-
-/// Checks a training set: shifts and true leans, as many of each.
-///
-/// # Errors
-/// [`Error::InvalidArgument`] that says where and what.
-pub(super) fn check_training(shift: &[f64], alpha_rad: &[f64], least: usize) -> Result<()> {
-    if shift.len() != alpha_rad.len() || shift.len() < least {
-        let expected = format!("as many leans as shifts, at least {least}");
-        return Err(Error::argument("alpha_rad", format!("{} for {} shifts", alpha_rad.len(), shift.len()), expected));
-    }
-    let wrong = |values: &[f64], most: f64| values.iter().position(|x| !(*x >= 0.0 && *x < most));
-    if let Some(i) = wrong(shift, f64::INFINITY) {
-        return Err(Error::argument("shift", format!("{} in place {i}", shift[i]), "finite numbers of zero or more"));
-    }
-    if let Some(i) = wrong(alpha_rad, std::f64::consts::FRAC_PI_2) {
-        return Err(Error::argument("alpha_rad", format!("{} in place {i}", alpha_rad[i]), "angles in [0, pi/2)"));
-    }
-    Ok(())
 }
 
 /// The factor `a` of eq. 31: the mean of `l / alpha` over images of known leans above zero.

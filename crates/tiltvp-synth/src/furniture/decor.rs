@@ -3,8 +3,9 @@
 use nalgebra::Vector3;
 
 use super::palette::Palette;
-use crate::builder::{Builder, Column, Frame, MaterialId, Patch};
+use crate::builder::{Builder, Column, MaterialId, Patch};
 use crate::dice::Dice;
+use crate::frame::Frame;
 use crate::options::RoomKind;
 use crate::plan::{Filling, Plan, Wall};
 use crate::texture::{Texture, rgb};

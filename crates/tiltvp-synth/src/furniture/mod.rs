@@ -6,8 +6,9 @@ mod seating;
 mod storage;
 mod tables;
 
-use crate::builder::{Builder, Footprint, Frame};
+use crate::builder::{Builder, Footprint};
 use crate::dice::Dice;
+use crate::frame::Frame;
 use crate::options::{RoomKind, RoomOptions};
 use crate::plan::{Filling, Plan, Wall};
 use palette::Palette;

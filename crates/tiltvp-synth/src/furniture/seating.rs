@@ -1,8 +1,9 @@
 //! Chairs with legs that stand out, office chairs, stools and sofas.
 
 use super::palette::{ChairStyle, Palette};
-use crate::builder::{Builder, Column, Frame};
+use crate::builder::{Builder, Column};
 use crate::dice::Dice;
+use crate::frame::Frame;
 
 /// A four-legged chair around the frame's origin, its back at `-y`.
 pub(crate) fn chair(frame: &Frame, style: ChairStyle, palette: &Palette, builder: &mut Builder, dice: &mut Dice) {

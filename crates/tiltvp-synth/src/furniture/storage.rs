@@ -2,8 +2,9 @@
 
 use super::decor;
 use super::palette::Palette;
-use crate::builder::{Builder, Column, Frame};
+use crate::builder::{Builder, Column};
 use crate::dice::Dice;
+use crate::frame::Frame;
 use crate::texture::Texture;
 
 /// An open shelf full of books, its back against `y = 0`.

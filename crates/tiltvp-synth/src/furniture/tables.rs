@@ -2,8 +2,9 @@
 
 use super::palette::Palette;
 use super::{Layout, decor, seating};
-use crate::builder::{Builder, Footprint, Frame, Material};
+use crate::builder::{Builder, Footprint, Material};
 use crate::dice::Dice;
+use crate::frame::Frame;
 use crate::options::RoomKind;
 use crate::texture::{Texture, rgb};
 
