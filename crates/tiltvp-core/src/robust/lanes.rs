@@ -401,7 +401,7 @@ mod tests {
             (0..n).map(|i| ((i * (3 + k) + 7 * k) as f32 * 0.37).sin() * if k == 2 { 0.1 } else { 1.0 }).collect()
         };
         let (x, y, z) = (column(0), column(1), column(2));
-        let mut weights: Vec<f32> = (0..n).map(|i| weight(i)).collect();
+        let mut weights: Vec<f32> = (0..n).map(weight).collect();
         let mut total = Total::default();
         kernel([&x, &y, &z], &mut weights, &mut total);
         let bits = total.sums().iter().map(|sum| sum.to_bits()).collect();
@@ -413,7 +413,8 @@ mod tests {
     fn vectors_of_any_width_give_the_same_bits() {
         let (gates, gains) = ([HARD, WITHIN, SOFT, REJECTED, OPEN], [0.1, 90.0]);
         let each = |gate: &u8| [(*gate, [0.02, -0.03, 0.9]), (*gate, [0.02, -0.03, 1.0])];
-        let (any, ones): (fn(usize) -> f32, fn(usize) -> f32) = (|i| (i % 7) as f32 * 0.3, |i| (i % 3).min(1) as f32);
+        let any: fn(usize) -> f32 = |i| (i % 7) as f32 * 0.3;
+        let ones: fn(usize) -> f32 = |i| (i % 3).min(1) as f32;
         for n in (0..70).chain([511, 512, 2048]) {
             for (gate, model) in gates.iter().flat_map(each) {
                 for (gate, weight) in [(gate, any), (gate, ones), (ONES + gate, ones)] {

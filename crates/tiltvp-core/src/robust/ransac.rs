@@ -88,6 +88,23 @@ impl RansacScratch {
     }
 }
 
+/// Counts the consensus of models, or of those that may beat the best. What a census bounds from above by the best count has any
+/// count up to that: it would not be taken, however many there are.
+fn count_hopeful<P: Problem>(
+    problem: &P,
+    census: Option<&Census>,
+    models: &[Option<P::Model>],
+    (threshold, to_beat): (f64, usize),
+    counts: &mut [usize],
+) {
+    let Some(census) = census else { return problem.consensus_of_each(models, threshold, to_beat, counts) };
+    let mut hopeful = [const { None }; BOUNDED_AT_ONCE];
+    for (hopeful, model) in hopeful.iter_mut().zip(models) {
+        *hopeful = model.clone().filter(|model| problem.consensus_at_most(census, model) > to_beat);
+    }
+    problem.consensus_of_each(&hopeful[..models.len()], threshold, to_beat, counts);
+}
+
 /// Draws minimal samples, keeps the model with the best score, and refits it to its consensus set.
 ///
 /// Sampling stops once `1 - (1 - P)^n > confidence`, with `P` the probability that one sample is drawn from the consensus
@@ -133,12 +150,10 @@ pub fn ransac<P: Problem>(
             if plain && !bounded && best.is_some() && Census::pays(len, left) {
                 bounded = problem.take_census(threshold, census);
             }
-            let ahead = if bounded {
-                BOUNDED_AT_ONCE
-            } else if plain {
-                AT_ONCE
-            } else {
-                1
+            let ahead = match (plain, bounded) {
+                (false, _) => 1,
+                (true, false) => AT_ONCE,
+                (true, true) => BOUNDED_AT_ONCE,
             };
             drawn = 0..ahead.min(left as usize);
             for model in &mut models[drawn.clone()] {
@@ -146,14 +161,8 @@ pub fn ransac<P: Problem>(
                 *model = problem.fit_minimal(sample);
             }
             if plain {
-                let most = best.as_ref().map_or(0.0, |(most, _)| *most) as usize;
-                // A model that cannot beat the best is as good as any that does not: its count is not asked for.
-                let may_beat = |model: &P::Model| !bounded || problem.consensus_at_most(census, model) > most;
-                let mut hopeful = [const { None }; BOUNDED_AT_ONCE];
-                for (hopeful, model) in hopeful.iter_mut().zip(&models[drawn.clone()]) {
-                    *hopeful = model.clone().filter(may_beat);
-                }
-                problem.consensus_of_each(&hopeful[drawn.clone()], threshold, most, &mut counts[drawn.clone()]);
+                let (census, most) = (bounded.then_some(&*census), best.as_ref().map_or(0, |(most, _)| *most as usize));
+                count_hopeful(problem, census, &models[drawn.clone()], (threshold, most), &mut counts[drawn.clone()]);
             }
         }
         trials += 1;

@@ -1,5 +1,7 @@
 //! Sixteen numbers of single precision at a time, in vectors of any width: the operations that the kernels are written in.
 
+use std::cmp::Ordering;
+
 /// Numbers that are worked on together.
 pub(super) const LANES: usize = 16;
 
@@ -108,7 +110,7 @@ impl Lanes for Plain {
     }
     #[inline(always)]
     unsafe fn beyond_of(mask: Self::Mask, a: Self, b: Self) -> Self::Mask {
-        std::array::from_fn(|i| mask[i] && !(a.0[i] <= b.0[i]))
+        std::array::from_fn(|i| mask[i] && a.0[i].partial_cmp(&b.0[i]).is_none_or(Ordering::is_gt))
     }
     #[inline(always)]
     unsafe fn clear(to: &mut [f32; LANES], mask: Self::Mask) {
