@@ -13,6 +13,7 @@ mod sieve_avx512;
 mod sieve_portable;
 #[cfg(target_arch = "x86_64")]
 mod slopes_avx512;
+mod thinning;
 
 pub use detect::{Detector, EdgePixels};
 pub use lift::{LiftTable, NormalKind};

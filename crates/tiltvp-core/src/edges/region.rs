@@ -5,6 +5,7 @@ use nalgebra::{Matrix3, Vector2, Vector3};
 use super::options::{EdgeOptions, Mask};
 use crate::camera::Camera;
 use crate::error::{Error, Result};
+use crate::image::expect;
 
 /// A run of pixels `first..end` of row `v`; `slot` numbers its first pixel among all pixels of the region.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -187,6 +188,12 @@ impl Region {
     #[inline]
     pub fn bearing(&self, slot: usize) -> Option<&Vector3<f64>> {
         self.bearings.get(slot)
+    }
+
+    /// Asks for the bearing of a pixel that will be read soon.
+    #[inline]
+    pub(crate) fn expect(&self, slot: usize) {
+        expect(&self.bearings, slot);
     }
 
     /// Each pixel `(u, v)` of the region with its bearing in the robot frame, in slot order.
