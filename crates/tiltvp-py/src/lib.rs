@@ -6,6 +6,7 @@ mod complementary;
 mod convert;
 mod corner;
 mod drive;
+mod laboratory;
 mod lines;
 mod rays;
 mod selfcalib;
@@ -33,6 +34,8 @@ mod _core {
     #[pymodule_export]
     use crate::drive::Drive;
     #[pymodule_export]
+    use crate::laboratory::Laboratory;
+    #[pymodule_export]
     use crate::lines::{
         LineExtractor, LineTracker, Lines, TrackedLines, descriptor_distances, match_descriptors, ssd_matrix,
         zncc_matrix,
@@ -45,7 +48,7 @@ mod _core {
         drive_legs, simulate_drive, wheel_displacements,
     };
     #[pymodule_export]
-    use crate::stereo::{Laboratory, StereoSequence};
+    use crate::stereo::StereoSequence;
     #[pymodule_export]
     use crate::synth::Room;
     #[pymodule_export]
