@@ -29,11 +29,11 @@ const LIMITS: [(&str, u64); 9] = [
     ("trimmed_image", 1330),
     ("consensus_image", 630),
     // Its lines, and their descriptors.
-    ("extracted_lines", 4400),
+    ("extracted_lines", 4120),
     ("described_lines", 32_200),
     // Two images of 320 x 180 pixels to the corner of the coloured cube in each.
-    ("segmented_pair", 6100),
-    // Ten steps of the self-calibration early in a drive, with 10 and with 100 landmarks.
+    ("segmented_pair", 5600),
+    // Ten steps of the self-calibration amid a drive, with 10 and with 100 landmarks.
     ("steps_among_10", 1450),
     ("steps_among_100", 101_000),
 ];
