@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import json
 import math
 import pickle
@@ -145,6 +146,21 @@ def test_grey_corners_are_found_by_segments() -> None:
     assert np.allclose(np.sort(axes.ravel())[-3:], 1.0, atol=1e-4)
 
 
+def test_parallel_edges_tell_the_attitude() -> None:
+    images = pair(GREYS)
+    found = {}
+    for most_rad in (0.0, 0.05):
+        estimator = CornerPoseEstimator(
+            CAMERA, CAMERA, LEFT_FROM_RIGHT, method="general", down=(0.0, 1.0, 0.0), parallel_max_rad=most_rad
+        )
+        assert estimator.options["parallel_max_rad"] == most_rad
+        found[most_rad] = estimator(*images).pose
+    spread = {most_rad: np.trace(pose.covariance[:3, :3]) for most_rad, pose in found.items()}
+    assert spread[0.05] < spread[0.0]
+    with pytest.raises(InvalidInputError, match="parallel_max_rad"):
+        CornerPoseEstimator(CAMERA, parallel_max_rad=-0.1)
+
+
 def test_edges_are_as_long_as_they_are() -> None:
     """All three of the grey cuboid's end where two others meet them, 0.3 m from the vertex."""
     rotation, vertex = pose()
@@ -209,6 +225,28 @@ def test_estimates_are_kept() -> None:
         type(seen).from_dict(seen.to_dict() | {"reason": "none"})
     with pytest.raises(InvalidInputError, match="camera_from_object"):
         type(seen.pose).from_dict(seen.pose.to_dict() | {"camera_from_object": [1.0]})
+
+
+@pytest.mark.parametrize(("method", "faces"), [("coloured", COLOURS), ("general", GREYS)])
+def test_estimators_go_on_where_they_were(method: str, faces: dict[str, tuple[int, int, int]]) -> None:
+    images = pair(faces)
+    estimator = CornerPoseEstimator(CAMERA, CAMERA, LEFT_FROM_RIGHT, method=method, down=(0.0, 1.0, 0.0))
+    new = pickle.loads(pickle.dumps(estimator))
+    assert new == estimator
+    assert estimator(*images)
+    assert new != estimator
+    again = [pickle.loads(pickle.dumps(estimator)), copy.copy(estimator), copy.deepcopy(estimator)]
+    for one in again:
+        assert type(one) is CornerPoseEstimator
+        assert one == estimator
+        assert str(one.options) == str(estimator.options)
+    following = estimator(*images)
+    assert following.followed
+    for one in again:
+        assert one(*images) == following
+        assert one == estimator
+    estimator.reset()
+    assert estimator != again[0]
 
 
 def test_rigs_come_back_from_disk(tmp_path: Path) -> None:

@@ -27,7 +27,7 @@ __all__ = [
 
 _OF_ESTIMATOR = (
     "gamma_rad", "gamma_sigma_rad", "right_handed", "down", "down_sigma_rad", "turn_sigma_rad", "forget_after",
-    "agree_max_rad", "misfit_max", "distance_min_m", "distance_max_m", "probability_min",
+    "agree_max_rad", "parallel_max_rad", "misfit_max", "distance_min_m", "distance_max_m", "probability_min",
 )  # fmt: skip
 
 
@@ -65,7 +65,8 @@ class CornerPoseEstimator(_core.CornerPoseEstimator):
     one's frame, metres. Without `right` only the attitude is estimated. Call it with the images of one frame after the
     other: the last pose is the prior for the next one. `gamma_rad` is the angle between the corner's level edges,
     `down` (3,) the direction down in the left camera's frame as far as it is known. Other options are the
-    estimator's, or those of detectors that are made here for `method`.
+    estimator's, or those of detectors that are made here for `method`. Comparable; copies and pickles go on from the
+    same last pose.
     """
 
     def __new__(

@@ -6,6 +6,7 @@ mod estimate;
 mod estimator;
 mod feature;
 mod matrix;
+mod memory;
 mod options;
 mod pose;
 mod prior;

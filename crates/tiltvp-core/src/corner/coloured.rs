@@ -24,6 +24,9 @@ const CLEAR_OF_VERTEX_PX: f64 = 5.0;
 /// Pixels at the far end of a ray that are left out: there it meets other edges.
 const CLEAR_OF_END_PX: f64 = 3.0;
 
+/// Profiles along a ray that err together: neighbours share pixels.
+const ERRING_TOGETHER: f64 = 2.0;
+
 /// The least step of a place as a share of those next to the vertex: two faces are as different all along their edge.
 const STEP_SHARE_MIN: f64 = 0.5;
 
@@ -213,6 +216,7 @@ fn course_of(line: &Line, vertex: &Vector3<f64>, px_per_rad: f64, options: &Colo
         step_min: options.step_min,
         step_share_min: STEP_SHARE_MIN,
         threshold_px: options.threshold_px,
+        erring_together: ERRING_TOGETHER,
         ray_sigma_px: options.ray_sigma_px,
     })
 }

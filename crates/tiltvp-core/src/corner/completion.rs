@@ -3,7 +3,7 @@
 use nalgebra::{Matrix3, Vector3};
 
 use super::consensus::rays_apart;
-use super::general::GeneralScratch;
+use super::general::{ERRING_TOGETHER, GeneralScratch};
 use super::junctions::{RayEnd, meeting};
 use super::options::GeneralOptions;
 use super::trace::{Course, Traced, trace_every};
@@ -19,6 +19,12 @@ const CROSSINGS_MAX: usize = 60;
 
 /// Least length along which a third edge is looked for, in pixels.
 const THIRD_MIN_PX: f64 = 30.0;
+
+/// How long a third edge is where it ends early, as a table top's: nearly all of it has to be seen.
+const SHORT_PX: f64 = 16.0;
+
+/// Least share of a short third edge that is seen.
+const SHORT_SHARE: f64 = 0.8;
 
 /// How far apart the places are that tell at first whether there is a third edge, in pixels.
 const GLIMPSE_PX: f64 = 3.0;
@@ -81,14 +87,17 @@ pub(super) fn complete(
             step_min: options.step_min,
             step_share_min: 0.0,
             threshold_px: options.threshold_px,
+            erring_together: ERRING_TOGETHER,
             ray_sigma_px: options.ray_sigma_px,
         };
         let support_min = f64::from(options.support_min_px);
         let memory = &mut scratch.trace;
         let mut follow = |course: &Course, stride_px: f64, least_share: f64| -> Option<Traced> {
             let signal = |u, v| light.gray(image, u, v);
+            let profiles = (course.to_rad - course.from_rad) * px_per_rad;
+            let support_min = support_min.min(SHORT_SHARE * profiles);
             let found = trace_every(stride_px, camera, course, (support_min / stride_px) as usize, signal, memory)?;
-            Some(found).filter(|found| found.share >= least_share)
+            Some(found).filter(|found| found.share >= least_share && (stride_px > 1.0 || found.begins_at_vertex()))
         };
         let share_min = options.support_min_share;
         let third = 3 - crossing.axes[0] - crossing.axes[1];
@@ -97,7 +106,8 @@ pub(super) fn complete(
         // Most crossings have no third edge, which every third pixel tells.
         let thirds = [direction, -direction].map(|direction| {
             let course = course(crossing.place.cross(&direction).try_normalize(0.05)?, to_rad);
-            follow(&course, GLIMPSE_PX, 0.8 * share_min).map(|_| course)
+            let long = follow(&course, GLIMPSE_PX, 0.8 * share_min).map(|_| (course, share_min));
+            long.or(Some((Course { to_rad: SHORT_PX / px_per_rad, ..course }, SHORT_SHARE)))
         });
         if thirds.iter().all(Option::is_none) {
             continue;
@@ -115,8 +125,8 @@ pub(super) fn complete(
         if crossing.axes.iter().any(|axis| rays[*axis].is_none()) {
             continue;
         }
-        for course in thirds.iter().flatten() {
-            rays[third] = follow(course, 1.0, share_min);
+        for (course, least_share) in thirds.iter().flatten() {
+            rays[third] = follow(course, 1.0, *least_share);
             let [Some(x), Some(y), Some(z)] = rays else { continue };
             let Some(corner) = clockwise(&[x, y, z]) else { continue };
             let good = corner.residual_rad() * px_per_rad <= options.residual_max_px;

@@ -2,7 +2,7 @@
 
 use nalgebra::{Matrix2, Matrix3, Vector3};
 
-use super::general::GeneralScratch;
+use super::general::{ERRING_TOGETHER, GeneralScratch};
 use super::options::GeneralOptions;
 use super::position::{Sighting, triangulate};
 use super::segments::Segment;
@@ -120,6 +120,7 @@ pub(super) fn seen_ends(seen: &Seen<'_>, scratch: &mut GeneralScratch) -> [Optio
                 step_min: seen.options.step_min,
                 step_share_min: 0.0,
                 threshold_px: seen.options.threshold_px,
+                erring_together: ERRING_TOGETHER,
                 ray_sigma_px: seen.options.ray_sigma_px,
             };
             trace(seen.camera, &course, PLACES_MIN, |u, v| seen.light.gray(seen.image, u, v), memory)

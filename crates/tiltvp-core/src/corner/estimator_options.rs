@@ -23,6 +23,9 @@ pub struct EstimatorOptions {
     pub forget_after: u32,
     /// How far attitudes of several features of one image may be apart, radians. Default 4 degrees.
     pub agree_max_rad: f64,
+    /// How far a corner's own attitude may be from that which all straight edges of a pair of images have in common, radians,
+    /// for its edges to be taken as parallel to them; 0 takes none as parallel. Default 4 degrees.
+    pub parallel_max_rad: f64,
     /// How far the attitudes of one corner in both images may be apart, and the rays from the fused pose, in standard
     /// deviations of the covariances as they are: root mean square per degree of freedom. Default 5.
     pub misfit_max: f64,
@@ -42,6 +45,7 @@ impl Default for EstimatorOptions {
             turn_sigma_rad: 6f64.to_radians(),
             forget_after: 10,
             agree_max_rad: 4f64.to_radians(),
+            parallel_max_rad: 4f64.to_radians(),
             misfit_max: 5.0,
             distance_m: [0.05, 100.0],
             probability_min: 0.9,
@@ -67,6 +71,9 @@ impl EstimatorOptions {
         positive("down_sigma_rad", self.down_sigma_rad, "a positive angle")?;
         positive("turn_sigma_rad", self.turn_sigma_rad, "a positive angle")?;
         positive("agree_max_rad", self.agree_max_rad, "a positive angle")?;
+        if !(0.0..=std::f64::consts::PI).contains(&self.parallel_max_rad) {
+            return Err(Error::option("parallel_max_rad", self.parallel_max_rad, "an angle from 0 to pi"));
+        }
         positive("misfit_max", self.misfit_max, "a positive number of standard deviations")?;
         let [nearest, farthest] = self.distance_m;
         if !(nearest > 0.0 && farthest > nearest) {

@@ -3,6 +3,8 @@
 use nalgebra::{Cholesky, Matrix2, Matrix3, Matrix6, Rotation3, SMatrix, Vector3, Vector6};
 
 use super::attitude::IncludedAngle;
+use super::parallels::CommonAttitude;
+use super::prior::rotation_vector;
 use super::vertex::CornerFeature;
 use crate::geometry::{RigidMotion, tangent_basis};
 
@@ -48,6 +50,18 @@ pub fn fuse_rays(
     rig_from_object: &Matrix3<f64>,
     vertex_m: &Vector3<f64>,
 ) -> Option<FusedPose> {
+    fuse_rays_with(cameras, angle, side, rig_from_object, vertex_m, None)
+}
+
+/// The same with an attitude that is known from elsewhere, which counts three more degrees of freedom.
+pub(super) fn fuse_rays_with(
+    cameras: &[(&CornerFeature, RigidMotion)],
+    angle: &IncludedAngle,
+    side: f64,
+    rig_from_object: &Matrix3<f64>,
+    vertex_m: &Vector3<f64>,
+    known_attitude: Option<&CommonAttitude>,
+) -> Option<FusedPose> {
     if cameras.len() < 2 {
         return None;
     }
@@ -59,6 +73,15 @@ pub fn fuse_rays(
         let edges = [Vector3::x(), Vector3::y(), Vector3::new(cos_gamma, 0.0, side * sin_gamma)];
         let (mut information, mut pull, mut chi_square) = (Matrix6::zeros(), Vector6::zeros(), 0.0);
         let mut opening = Opening::default();
+        if let Some(known) = known_attitude {
+            let weight = known.covariance.try_inverse()?;
+            let off = rotation_vector(&(rotation * known.camera_from_object.transpose()));
+            let mut own = information.fixed_view_mut::<3, 3>(0, 0);
+            own += weight;
+            let mut own = pull.fixed_rows_mut::<3>(0);
+            own += weight * off;
+            chi_square += off.dot(&(weight * off));
+        }
         for ((feature, camera_from_rig), weights) in cameras.iter().zip(&weights) {
             let point = camera_from_rig.point(&vertex);
             for (index, ((ray, weight), edge)) in feature.rays().iter().zip(weights).zip(&edges).enumerate() {

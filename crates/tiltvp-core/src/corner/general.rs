@@ -11,6 +11,9 @@ use super::vertex::CornerFeature;
 use crate::camera::Camera;
 use crate::image::{ImageView, LightTable};
 
+/// Profiles along a ray that err together: neighbours share pixels, and edges are crooked.
+pub(super) const ERRING_TOGETHER: f64 = 4.0;
+
 /// Pixels about the vertex where the edges' gradients mix.
 const CLEAR_OF_VERTEX_PX: f64 = 4.0;
 
@@ -155,6 +158,7 @@ fn course_of(segments: &[Segment], ray: RayEnd, vertex: &Vector3<f64>, options: 
         step_min: options.step_min,
         step_share_min: 0.0,
         threshold_px: options.threshold_px,
+        erring_together: ERRING_TOGETHER,
         ray_sigma_px: options.ray_sigma_px,
     })
 }

@@ -3,6 +3,7 @@
 use nalgebra::Vector3;
 
 use super::consensus::rays_apart;
+use super::general::ERRING_TOGETHER;
 use super::options::GeneralOptions;
 use super::trace::{Course, TraceScratch, trace_every};
 use super::vertex::CornerFeature;
@@ -94,6 +95,7 @@ pub(super) fn find_near(
                 step_min: options.step_min,
                 step_share_min: 0.0,
                 threshold_px: options.threshold_px,
+                erring_together: ERRING_TOGETHER,
                 ray_sigma_px: options.ray_sigma_px,
             };
             let signal = |u, v| light.gray(image, u, v);

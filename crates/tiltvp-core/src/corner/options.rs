@@ -65,7 +65,7 @@ pub struct ColouredOptions {
     pub step_min: f64,
     /// Largest distance of a place of the edge from its ray, in pixels. Default 0.6.
     pub threshold_px: f64,
-    /// What places of an edge do not tell: how far either end of a ray may be off, in pixels. Default 0.02.
+    /// What places of an edge do not tell: how far either end of a ray may be off, in pixels. Default 0.01.
     pub ray_sigma_px: f64,
     /// Least number of places that agree with a ray. Default 15.
     pub support_min_px: u32,
@@ -87,7 +87,7 @@ impl Default for ColouredOptions {
             refine_px: 2.0,
             step_min: 8.0,
             threshold_px: 0.6,
-            ray_sigma_px: 0.02,
+            ray_sigma_px: 0.01,
             support_min_px: 15,
             residual_max_px: 1.0,
         }

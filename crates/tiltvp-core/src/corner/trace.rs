@@ -8,14 +8,17 @@ use crate::camera::Camera;
 use crate::geometry::tangent_basis;
 use crate::robust::{Direction, Gate, Problem, RansacOptions, RansacScratch, Rows, ransac};
 
-/// Profiles along a ray that err together: neighbours share pixels and the edge's crookedness.
-const ERRING_TOGETHER: f64 = 4.0;
-
 /// The least standard deviation of one profile's place, in pixels, however well the profiles agree.
 const PLACE_SIGMA_MIN_PX: f64 = 0.05;
 
 /// Longest gap in a ray whose places are alike: what comes after a longer one is something else.
 const GAP_MAX_PX: usize = 12;
+
+/// The first pixels of a ray, which tell it from an edge that begins elsewhere and happens to point at the vertex.
+const FIRST_PX: f64 = 20.0;
+
+/// Least share of the first profiles that agree with the ray.
+const FIRST_SHARE: f64 = 0.3;
 
 /// Longest profile, in samples.
 const PROFILE_MAX: usize = 41;
@@ -40,6 +43,8 @@ pub(super) struct Course {
     pub(super) step_share_min: f64,
     /// Largest distance of a profile's edge from the fitted circle, in pixels.
     pub(super) threshold_px: f64,
+    /// How many profiles along the ray err together: neighbours share pixels and the edge's crookedness.
+    pub(super) erring_together: f64,
     /// What no profile tells: how far either end of a whole ray may be off, in pixels.
     pub(super) ray_sigma_px: f64,
 }
@@ -88,8 +93,17 @@ pub(super) struct Traced {
     pub(super) ray: FittedRay,
     /// The share of the profiles that agree.
     pub(super) share: f64,
+    /// The share of the first ones.
+    first_share: f64,
     /// Pixels per radian along the ray.
     pub(super) px_per_rad: f64,
+}
+
+impl Traced {
+    /// Whether the edge is seen next to the vertex, so that it begins there.
+    pub(super) fn begins_at_vertex(&self) -> bool {
+        self.first_share >= FIRST_SHARE
+    }
 }
 
 /// Memory of the fits.
@@ -188,7 +202,7 @@ pub(super) fn trace_every(
         let at = Vector2::new(place.along_rad.cos(), place.along_rad.sin());
         information += at * at.transpose() * f64::from(*weight);
     }
-    information /= sigma * sigma * ERRING_TOGETHER;
+    information /= sigma * sigma * course.erring_together;
     let ends = [first, last].map(|angle| Vector2::new(angle.cos(), angle.sin()));
     let from_ends = nalgebra::Matrix2::from_rows(&[ends[0].transpose(), ends[1].transpose()]).try_inverse()?;
     let whole = from_ends * from_ends.transpose() * (course.ray_sigma_px * rad_per_px).powi(2);
@@ -205,7 +219,15 @@ pub(super) fn trace_every(
         support,
         residual_rms_rad: rms,
     };
-    Some(Traced { ray, share: support as f64 / looked_at.max(1) as f64, px_per_rad: 1.0 / rad_per_px })
+    let share = |agree: usize, of: usize| agree as f64 / of.max(1) as f64;
+    let first_profiles = ((FIRST_PX / stride_px) as usize).min(looked_at);
+    let first = agreeing().filter(|(place, _)| place.profile <= first_profiles).count();
+    Some(Traced {
+        ray,
+        share: share(support, looked_at),
+        first_share: share(first, first_profiles),
+        px_per_rad: 1.0 / rad_per_px,
+    })
 }
 
 /// Keeps the places whose steps are at least a share of the median of the first ones, up to the first gap.

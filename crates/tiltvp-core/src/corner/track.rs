@@ -23,36 +23,52 @@ const STRANGE: f64 = 0.03;
 /// How many times as far as before a vertex may move to count half.
 const PACES: f64 = 2.0;
 
+/// How many times as far as before a vertex may move from one frame to the next and be the same.
+const JUMP: f64 = 3.0;
+
 /// The share of its distance that is added to that.
+const JUMP_MIN: f64 = 0.02;
+
+/// The share of its distance that is added to that which counts half.
 const PACE_MIN: f64 = 0.005;
 
 /// Most other corners that are remembered, those seen most often.
 const OTHERS_MAX: usize = 32;
 
-/// Another corner of the object, and where it is in the object's frame.
+/// Another corner of the object.
 #[derive(Debug, Clone, Copy, PartialEq)]
-struct Landmark {
-    place_m: Vector3<f64>,
-    seen: u32,
+pub struct Landmark {
+    /// Where it is in the object's frame, metres.
+    pub place_m: Vector3<f64>,
+    /// In how many frames it was seen.
+    pub seen: u32,
 }
 
-/// The last pose, the corners it is from, and how many frames ago it was.
+/// What an estimator keeps from frame to frame: the last pose, its corners in the images, and other corners of the object.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Track {
-    pub(super) pose: Hypothesis,
-    pub(super) corners: [Vec<CornerFeature>; 2],
-    pub(super) age: u32,
-    pub(super) object: u32,
-    others: Vec<Landmark>,
+pub struct Track {
+    /// The last pose.
+    pub pose: Hypothesis,
+    /// The corners along its axes in the left and in the right image.
+    pub corners: [Vec<CornerFeature>; 2],
+    /// How many frames ago it was.
+    pub age: u32,
+    /// The number of the corner that is the object.
+    pub object: u32,
+    /// Other corners of the object, those seen most often first.
+    pub others: Vec<Landmark>,
     /// How far the vertex moved in the camera's frame from the pose before to the last one, as a share of its distance.
-    pace: f64,
+    pub pace: f64,
 }
 
 impl Track {
     /// Whether a pose is one of the same corner: from one image any corner of the same upright world is.
     pub(super) fn is_of(&self, pose: &Hypothesis) -> bool {
         match (self.pose.vertex_m, pose.vertex_m) {
-            (Some(last), Some(vertex)) => (vertex - last).norm() <= reach_m(&last),
+            (Some(last), Some(vertex)) => {
+                let reach = (JUMP * self.pace * f64::from(self.age.max(1)) + JUMP_MIN).min(MOVED);
+                (vertex - last).norm() <= reach * last.norm()
+            }
             _ => true,
         }
     }
@@ -89,7 +105,8 @@ impl Track {
             let (last, vertex) = (track.pose.vertex_m?, pose.vertex_m?);
             track.is_of(pose).then(|| (vertex - last).norm() / last.norm() / f64::from(track.age.max(1)))
         };
-        let pace = before.as_ref().and_then(moved).unwrap_or(MOVED);
+        // The camera moves on as before where another corner has become the object.
+        let pace = before.as_ref().map_or(MOVED, |track| moved(track).unwrap_or(track.pace));
         let mut others = before.map_or_else(Vec::new, |track| track.seen_from(pose));
         if let Some(vertex) = pose.vertex_m {
             let nearness_m = SAME_PLACE * vertex.norm();

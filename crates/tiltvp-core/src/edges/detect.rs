@@ -1,9 +1,10 @@
 //! Edge pixels: the Scharr gradient of the band's rows, and the pixels where it is strong.
 
+use super::block::{BLOCK as ROOM, Block, Kept, Level, Levels, REACH, Test, Vectors, place};
 use super::options::EdgeOptions;
 use super::region::{Region, Span};
 use super::screen::Screen;
-use super::sieve::{BLOCK as ROOM, Block, Kept, Level, Levels, REACH, Sieve, Test, Vectors, expect, place, widen};
+use super::sieve::{Sieve, expect, widen};
 use crate::image::{ImageView, Smoother};
 
 /// Edge pixels in structure-of-arrays form, in slot order.

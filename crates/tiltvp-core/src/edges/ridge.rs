@@ -1,10 +1,10 @@
 //! Ridge pixels: edge pixels thinned to one pixel across the edge, with the place of the edge between pixels.
 
+use super::block::place;
 use super::detect::EdgePixels;
 use super::options::EdgeOptions;
 use super::region::Region;
 use super::screen::Screen;
-use super::sieve::place;
 use super::thinning::{Around, MARKED, each_mark, mark, mark_screened, scharr, tops};
 use crate::image::{ImageView, Smoother};
 

@@ -2,8 +2,8 @@
 
 use std::sync::Arc;
 
+use super::block::Vectors;
 use super::region::{Region, Span};
-use super::sieve::Vectors;
 
 /// For each pixel of a region a vector `q`; a gradient `g` may belong to a vertical edge only if
 /// `(q . g)^2 <= limit |g|^2`.

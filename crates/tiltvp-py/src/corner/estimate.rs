@@ -47,6 +47,16 @@ impl CornerEstimate {
     }
 }
 
+impl CornerHypothesis {
+    pub(super) fn new(inner: &Hypothesis) -> Self {
+        Self { inner: *inner }
+    }
+
+    pub(super) fn inner(&self) -> &Hypothesis {
+        &self.inner
+    }
+}
+
 #[pymethods]
 impl CornerHypothesis {
     /// Fresh (3, 3) float64: the rotation from the object's frame (y along the vertical edge, away from the vertex, x along
@@ -111,7 +121,7 @@ impl CornerHypothesis {
     }
 
     /// Plain numbers and lists, good for JSON.
-    fn to_dict<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+    pub(super) fn to_dict<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let (own, dict) = (&self.inner, PyDict::new(py));
         dict.set_item("camera_from_object", matrix::nested(&own.camera_from_object))?;
         dict.set_item("edges", own.edges.map(<[f64; 3]>::from))?;
@@ -125,7 +135,7 @@ impl CornerHypothesis {
 
     /// The hypothesis that `to_dict` wrote.
     #[classmethod]
-    fn from_dict(_cls: &Bound<'_, PyType>, values: &Bound<'_, PyDict>) -> PyResult<Self> {
+    pub(super) fn from_dict(_cls: &Bound<'_, PyType>, values: &Bound<'_, PyDict>) -> PyResult<Self> {
         convert::known_keys(values, &KEYS)?;
         let edges: [[f64; 3]; 3] = convert::item(values, "edges", "three rows of three numbers")?;
         let vertex_m: Option<[f64; 3]> = convert::item(values, "vertex_m", "three numbers or None")?;

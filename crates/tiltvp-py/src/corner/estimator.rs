@@ -1,21 +1,22 @@
 //! `CornerPoseEstimator`: poses from the images of one camera or a pair, frame after frame.
 
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use nalgebra::Matrix4;
 use numpy::{PyArray1, PyArray2, PyArrayMethods};
 use pyo3::prelude::*;
-use pyo3::types::PyDict;
+use pyo3::types::{PyDict, PyTuple};
 use tiltvp_core::corner::{self as core, CornerMethod, EstimatorOptions, Frame, IncludedAngle};
 use tiltvp_core::geometry::RigidMotion;
 
 use super::detector::CornerDetector;
 use super::estimate::CornerEstimate;
+use super::memory;
 use crate::call::{call, exception, invalid};
 use crate::convert;
 
 /// Names of the options.
-const OPTIONS: [&str; 12] = [
+const OPTIONS: [&str; 13] = [
     "gamma_rad",
     "gamma_sigma_rad",
     "right_handed",
@@ -24,13 +25,14 @@ const OPTIONS: [&str; 12] = [
     "turn_sigma_rad",
     "forget_after",
     "agree_max_rad",
+    "parallel_max_rad",
     "misfit_max",
     "distance_min_m",
     "distance_max_m",
     "probability_min",
 ];
 
-/// The detectors of one camera or a pair, and the last pose.
+/// The detectors of one camera or a pair, and the last pose. Comparable, and to be copied and pickled with what was seen.
 #[pyclass(frozen, subclass, module = "tiltvp._core")]
 pub(crate) struct CornerPoseEstimator {
     inner: Mutex<core::CornerPoseEstimator>,
@@ -107,7 +109,7 @@ impl CornerPoseEstimator {
 
     /// Forgets the poses of the frames before.
     fn reset(&self) {
-        self.inner.lock().unwrap_or_else(PoisonError::into_inner).reset();
+        self.lock().reset();
     }
 
     /// What one frame tells: C-contiguous images of uint8, (H, W, 3) or (H, W) as `_coloured` says.
@@ -142,6 +144,48 @@ impl CornerPoseEstimator {
             None => format!("CornerPoseEstimator({left})"),
         })
     }
+
+    fn __eq__(&self, py: Python<'_>, other: &Bound<'_, PyAny>) -> PyResult<bool> {
+        let Ok(other) = other.cast::<Self>() else { return Ok(false) };
+        let other = other.get();
+        let right = match (&self.right, &other.right) {
+            (Some(own), Some(other)) => own.bind(py).eq(other)?,
+            (own, other) => own.is_none() && other.is_none(),
+        };
+        if !right || !self.left.bind(py).eq(&other.left)? {
+            return Ok(false);
+        }
+        // One at a time: an estimator may be compared with itself.
+        let own = self.lock().clone();
+        let inner = other.lock();
+        Ok((own.options(), own.state(), &self.left_from_right)
+            == (inner.options(), inner.state(), &other.left_from_right))
+    }
+
+    /// Sets what pickle has kept.
+    fn __setstate__(slf: &Bound<'_, Self>, state: (u32, Option<Bound<'_, PyDict>>)) -> PyResult<()> {
+        let (objects, track) = state;
+        let track = track.map(|values| memory::from_dict(&slf.get_type(), &values)).transpose()?;
+        let mut inner = slf.get().lock();
+        *inner = inner.clone().with_state(objects, track);
+        Ok(())
+    }
+
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyTuple>> {
+        let (py, this) = (slf.py(), slf.get());
+        let cameras = (slf.get_type(), this.left(py), this.right(py), this.left_from_right(py)?);
+        let make = py.import("functools")?.getattr("partial")?.call(cameras, Some(&this.options(py)?))?;
+        let inner = this.lock();
+        let (objects, track) = inner.state();
+        let track = track.map(|track| memory::to_dict(py, track)).transpose()?;
+        (make, PyTuple::empty(py), (objects, track)).into_pyobject(py)
+    }
+}
+
+impl CornerPoseEstimator {
+    fn lock(&self) -> MutexGuard<'_, core::CornerPoseEstimator> {
+        self.inner.lock().unwrap_or_else(PoisonError::into_inner)
+    }
 }
 
 fn motion_from(value: &Bound<'_, PyAny>) -> PyResult<RigidMotion> {
@@ -172,6 +216,7 @@ fn parse(given: Option<&Bound<'_, PyDict>>) -> PyResult<EstimatorOptions> {
             "turn_sigma_rad" => options.turn_sigma_rad = number()?,
             "forget_after" => options.forget_after = convert::whole(&value, &name, "a whole number of frames")?,
             "agree_max_rad" => options.agree_max_rad = number()?,
+            "parallel_max_rad" => options.parallel_max_rad = number()?,
             "misfit_max" => options.misfit_max = number()?,
             "distance_min_m" => options.distance_m[0] = number()?,
             "distance_max_m" => options.distance_m[1] = number()?,
@@ -192,6 +237,7 @@ fn in_force<'py>(py: Python<'py>, options: &EstimatorOptions) -> PyResult<Bound<
     dict.set_item("turn_sigma_rad", options.turn_sigma_rad)?;
     dict.set_item("forget_after", options.forget_after)?;
     dict.set_item("agree_max_rad", options.agree_max_rad)?;
+    dict.set_item("parallel_max_rad", options.parallel_max_rad)?;
     dict.set_item("misfit_max", options.misfit_max)?;
     dict.set_item("distance_min_m", options.distance_m[0])?;
     dict.set_item("distance_max_m", options.distance_m[1])?;

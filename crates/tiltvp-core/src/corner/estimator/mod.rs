@@ -1,5 +1,6 @@
 //! From images to poses: corners found in one image or a pair, resolved, and followed from frame to frame.
 
+mod common;
 mod pairs;
 mod transfer;
 
@@ -81,6 +82,18 @@ impl CornerPoseEstimator {
         &self.options
     }
 
+    /// The number of objects so far, and what is kept of the last one, if it is not forgotten.
+    pub fn state(&self) -> (u32, Option<&Track>) {
+        (self.objects, self.track.as_ref())
+    }
+
+    /// The same estimator that goes on from a state.
+    #[must_use]
+    pub fn with_state(mut self, objects: u32, track: Option<Track>) -> Self {
+        (self.objects, self.track) = (objects, track);
+        self
+    }
+
     /// Forgets what was seen.
     pub fn reset(&mut self) {
         self.track = None;
@@ -144,7 +157,9 @@ impl CornerPoseEstimator {
             followed: self.track.is_some(),
             object: self.objects,
         };
-        let attitude = if self.right.is_some() { self.attitude(&estimate.features)? } else { None };
+        let starts = if self.right.is_some() { self.attitudes(&estimate.features)? } else { Vec::new() };
+        let common = self.common(&starts);
+        let attitude = common.map(|common| common.camera_from_object).or(starts.first().copied());
         if let Some(attitude) = &attitude {
             self.add_completed(left, right, attitude, &mut estimate.features);
             self.add_transferred([left, right.unwrap_or(left)], attitude, &mut estimate.features)?;
@@ -155,7 +170,7 @@ impl CornerPoseEstimator {
         } else if right.is_some() && estimate.features[1].is_empty() {
             estimate.verdict = Verdict::NoneRight;
         } else if self.right.is_some() {
-            seen = self.by_pair(attitude.as_ref(), &mut estimate)?;
+            seen = self.by_pair(attitude.as_ref(), common.as_ref(), &mut estimate)?;
         } else {
             self.by_one(&mut estimate)?;
         }
@@ -212,29 +227,6 @@ impl CornerPoseEstimator {
             detector.ends(right, corners[1], pose, &left_from_right.inverse(), second),
         ];
         edge_ends(seen, left_from_right, &vertex_m)
-    }
-
-    /// The attitude by which corners are completed: that of the frame before, or the likeliest that one image's corners agree
-    /// on, with their edges at right angles.
-    fn attitude(&self, features: &[Vec<CornerFeature>; 2]) -> Result<Option<Matrix3<f64>>> {
-        if self.is_one_object() || self.options.angle != IncludedAngle::RIGHT {
-            return Ok(None);
-        }
-        let priors = self.priors(false);
-        let turned = self.right.as_ref().map_or(Matrix3::identity(), |(_, motion)| motion.rotation);
-        for (features, rotation) in features.iter().zip([Matrix3::identity(), turned]) {
-            let priors = if rotation == Matrix3::identity() { &priors[..] } else { &[] };
-            let Some(agreed) = agreement(features, &self.options.angle, self.options.agree_max_rad, priors)? else {
-                continue;
-            };
-            let view = |attitudes| View { attitudes, common_from_camera: rotation };
-            let views: Vec<View<'_>> = agreed.attitudes.iter().map(view).collect();
-            let resolved = resolve(&views, Alignment::Manhattan, self.right_handed(), &self.priors(false))?;
-            if let Some(best) = resolved.first() {
-                return Ok(Some(best.common_from_object));
-            }
-        }
-        Ok(self.track.as_ref().map(|track| track.pose.camera_from_object))
     }
 
     /// Whether edges and object are the same from frame to frame, as those of the coloured cuboid are.

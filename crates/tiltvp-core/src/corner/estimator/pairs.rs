@@ -3,10 +3,12 @@
 use nalgebra::{Matrix3, Vector3};
 
 use super::CornerPoseEstimator;
-use crate::corner::attitude::corner_attitudes;
+use super::transfer::upright;
+use crate::corner::attitude::{IncludedAngle, corner_attitudes};
 use crate::corner::consensus::{apart, renamed, weight};
 use crate::corner::estimate::{CornerEstimate, Hypothesis};
-use crate::corner::fusion::fuse_rays;
+use crate::corner::fusion::{FusedPose, fuse_rays, fuse_rays_with};
+use crate::corner::parallels::CommonAttitude;
 use crate::corner::position::{Sighting, triangulate};
 use crate::corner::prior::AttitudePrior;
 use crate::corner::vertex::CornerFeature;
@@ -16,6 +18,9 @@ use crate::geometry::RigidMotion;
 
 /// How far apart attitudes of different hypotheses are, radians: fits from two starts end this close.
 const SAME_POSE_RAD: f64 = 0.035;
+
+/// The share of the largest misfit up to which a corner that was not seen before can stand in for the followed one.
+const WELL: f64 = 0.4;
 
 /// The least probability of a hypothesis that is returned.
 const PROBABILITY_MIN: f64 = 1e-9;
@@ -28,6 +33,7 @@ impl CornerPoseEstimator {
         [left, right]: [&CornerFeature; 2],
         left_from_right: &RigidMotion,
         priors: &[AttitudePrior],
+        common: Option<&CommonAttitude>,
     ) -> Result<Vec<Hypothesis>> {
         let cameras = [(left, RigidMotion::identity()), (right, left_from_right.inverse())];
         let sighting = |corner: &CornerFeature, rig_from_camera| Sighting {
@@ -45,9 +51,18 @@ impl CornerPoseEstimator {
                     continue;
                 }
                 let (start, side) = (rotation * own.camera_from_object, if right_handed { 1.0 } else { -1.0 });
-                let Some(fused) = fuse_rays(&cameras, &self.options.angle, side, &start, &vertex.point_m) else {
+                let Some(mut fused) = fuse_rays(&cameras, &self.options.angle, side, &start, &vertex.point_m) else {
                     continue;
                 };
+                let mut misfit = (fused.chi_square / 6.0).sqrt();
+                // What edges miss by that do not quite meet, or belong to more than one thing, the covariances do not know.
+                let mut doubt = if self.is_one_object() { 1.0 } else { (misfit * misfit).max(1.0) };
+                if let Some(common) = common.and_then(|common| self.parallel(common, &fused)) {
+                    let Some(with) = fuse_with(&cameras, &self.options.angle, side, &fused, &common) else { continue };
+                    (fused, misfit, doubt) = with;
+                }
+                let as_seen = fused.rig_from_object;
+                let fused = FusedPose { rig_from_object: self.upright(fused.rig_from_object), ..fused };
                 let known = |(_, other): &(f64, Hypothesis)| {
                     apart(&other.camera_from_object, &fused.rig_from_object) < SAME_POSE_RAD
                 };
@@ -60,18 +75,16 @@ impl CornerPoseEstimator {
                 let scale = (0.25 * self.options.misfit_max).max(1.0).powi(2);
                 let (sin, cos) = self.options.angle.gamma_rad.sin_cos();
                 let edges = [Vector3::x(), Vector3::y(), Vector3::new(cos, 0.0, side * sin)];
-                // What edges miss by that do not quite meet, or belong to more than one thing, the covariances do not know.
-                let doubt = if self.is_one_object() { 1.0 } else { (fused.chi_square / 6.0).max(1.0) };
                 let pose = Hypothesis {
                     camera_from_object: fused.rig_from_object,
-                    edges: edges.map(|edge| fused.rig_from_object * edge),
+                    edges: edges.map(|edge| as_seen * edge),
                     vertex_m: Some(fused.vertex_m),
                     covariance: fused.covariance * doubt,
                     probability: 0.0,
                     right_handed,
-                    misfit: (fused.chi_square / 6.0).sqrt(),
+                    misfit,
                 };
-                found.push((prior - 0.5 * fused.chi_square / scale, pose));
+                found.push((prior - 3.0 * misfit * misfit / scale, pose));
             }
         }
         found.sort_by(|a, b| b.0.total_cmp(&a.0));
@@ -85,12 +98,31 @@ impl CornerPoseEstimator {
         Ok(found.into_iter().map(named).filter(|pose| pose.probability >= PROBABILITY_MIN).collect())
     }
 
+    /// The attitude that all edges of the frame have in common, named as a corner's own one that is near to it.
+    fn parallel(&self, common: &CommonAttitude, own: &FusedPose) -> Option<CommonAttitude> {
+        let named = renamed(&common.camera_from_object, &own.rig_from_object);
+        let near = apart(&named, &own.rig_from_object) <= self.options.parallel_max_rad;
+        near.then_some(CommonAttitude { camera_from_object: named, ..*common })
+    }
+
+    /// The same attitude with its axes in another order if another one than the second is nearest to the vertical: with right
+    /// angles any edge of a corner may be the upright one.
+    pub(super) fn upright(&self, attitude: Matrix3<f64>) -> Matrix3<f64> {
+        match self.vertical() {
+            Some(vertical) if !self.is_one_object() && self.options.angle == IncludedAngle::RIGHT => {
+                upright(&attitude, &vertical)
+            }
+            _ => attitude,
+        }
+    }
+
     /// The poses of the pair of features, one of each image, that fits best; of the corner that is followed or one that is known
     /// beside it, where there is one. Where an `attitude` is known on which several corners agree, pairs that do not are left
     /// out. Returns the poses of all pairs that fit well, chosen or not.
     pub(super) fn by_pair(
         &self,
         attitude: Option<&Matrix3<f64>>,
+        common: Option<&CommonAttitude>,
         estimate: &mut CornerEstimate,
     ) -> Result<Vec<Hypothesis>> {
         let mut seen = Vec::new();
@@ -101,7 +133,7 @@ impl CornerPoseEstimator {
         let voices = Voices::new(&estimate.features, left_from_right);
         for (i, left) in estimate.features[0].iter().enumerate() {
             for (j, right) in estimate.features[1].iter().enumerate() {
-                let poses = self.pair_poses([left, right], left_from_right, &priors)?;
+                let poses = self.pair_poses([left, right], left_from_right, &priors, common)?;
                 let Some((pose, vertex)) = poses.first().and_then(|pose| Some((pose, pose.vertex_m?))) else {
                     continue;
                 };
@@ -116,7 +148,7 @@ impl CornerPoseEstimator {
                 if misfit > self.options.misfit_max || !(nearest..=farthest).contains(&vertex.norm()) {
                     continue;
                 }
-                let fits_well = misfit <= 0.5 * self.options.misfit_max;
+                let fits_well = misfit <= WELL * self.options.misfit_max;
                 if fits_well {
                     seen.push(*pose);
                 }
@@ -143,3 +175,28 @@ impl CornerPoseEstimator {
         Ok(seen)
     }
 }
+
+/// A corner's pose with the attitude that is known from other edges; its misfit in standard deviations of the rays, which
+/// scatter as the other edges do; and the factor by which the covariance is larger than it seems.
+fn fuse_with(
+    cameras: &[(&CornerFeature, RigidMotion)],
+    angle: &IncludedAngle,
+    side: f64,
+    own: &FusedPose,
+    common: &CommonAttitude,
+) -> Option<(FusedPose, f64, f64)> {
+    let start = &common.camera_from_object;
+    let variance = common.scatter * common.scatter;
+    let fuse = |doubt: f64| {
+        let known = CommonAttitude { covariance: common.covariance / doubt, ..*common };
+        fuse_rays_with(cameras, angle, side, start, &own.vertex_m, Some(&known))
+    };
+    // What the rays miss by, their covariances do not know, and so they count less.
+    let doubt = |fused: &FusedPose| (fused.chi_square / FREEDOM).max(variance);
+    let first = doubt(&fuse(variance)?);
+    let fused = fuse(first)?;
+    Some((fused, (fused.chi_square / FREEDOM / variance).sqrt(), doubt(&fused)))
+}
+
+/// Degrees of freedom of twelve numbers of the rays and three of the attitude less six of the pose.
+const FREEDOM: f64 = 9.0;

@@ -118,7 +118,7 @@ impl CornerPoseEstimator {
 }
 
 /// The same axes with the one that is nearest to a vertical as the second.
-fn upright(attitude: &Matrix3<f64>, vertical: &Vector3<f64>) -> Matrix3<f64> {
+pub(super) fn upright(attitude: &Matrix3<f64>, vertical: &Vector3<f64>) -> Matrix3<f64> {
     let nearest = attitude.tr_mul(vertical).abs().imax();
     let axis = |k: usize| attitude.column((nearest + k) % 3).into_owned();
     Matrix3::from_columns(&[axis(2), axis(0), axis(1)])
