@@ -642,8 +642,8 @@ class TiltEstimator:
         """The tilt of the image that the edges are of, the same to the last bit as the image itself gives.
 
         `edges` may be those of any estimator with equal camera, robot_from_camera, mask and edge options
-        (gradient_min, smoothing_px, elevations, margin_px, row_stride); else `tiltvp.errors.InvalidInputError` says what differs.
-        Other threads run meanwhile.
+        (gradient_min, smoothing_px, elevations, margin_px, row_stride); else `tiltvp.errors.InvalidInputError` says
+        what differs. Other threads run meanwhile.
         """
 
     def _estimate_with_edges(self, image: NDArray[np.uint8]) -> tuple[TiltEstimate, EdgeElements]:

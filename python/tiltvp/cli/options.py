@@ -19,8 +19,8 @@ if TYPE_CHECKING:
 _CAMERA = Group("Camera")
 _METHOD = Group("Method", help="An option that is not given has the default of its method.")
 _AS_THEY_ARE = (
-    "method", "margin_px", "row_stride", "gradient_min", "smoothing_px", "keep_fraction", "max_iterations", "threshold_px",
-    "offset_max_px", "normal", "sampling", "local_optimization", "score", "verification", "seed",
+    "method", "margin_px", "row_stride", "gradient_min", "smoothing_px", "keep_fraction", "max_iterations",
+    "threshold_px", "offset_max_px", "normal", "sampling", "local_optimization", "score", "verification", "seed",
 )  # fmt: skip
 _ANGLES = ("elevation_min", "elevation_max", "tilt_max", "scale", "tolerance", "threshold")
 Switch = Annotated[bool, Parameter(negative="", show_default=False)]

@@ -1,4 +1,4 @@
-//! [`Sieve`](super::sieve::Sieve) with vectors of 512 bits: 64 pixels are tested at a time, and blocks in which some pass wait to
+//! The sieve with vectors of 512 bits: 64 pixels are tested at a time, and blocks in which some pass wait to
 //! be compacted together.
 //!
 //! There are no closures in the kernels: they would be compiled for plain machines.
@@ -41,7 +41,7 @@ const NONE: u8 = 0;
 const EACH: u8 = 1;
 const FROM: u8 = 2;
 
-/// Tests blocks; see [`super::sieve::Sieve::sift`].
+/// Tests blocks; as the sieve asks.
 pub(super) fn sift<L: Level + VectorLevel>(
     levels: &Levels<'_, L>,
     blocks: &[Block],

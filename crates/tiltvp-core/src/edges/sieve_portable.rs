@@ -1,4 +1,4 @@
-//! [`Sieve`](super::sieve::Sieve) in loops that the compiler makes vectors of, for every machine.
+//! The sieve in loops that the compiler makes vectors of, for every machine.
 
 use multiversion::multiversion;
 
