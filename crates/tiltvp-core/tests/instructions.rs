@@ -29,13 +29,13 @@ const LIMITS: [(&str, u64); 9] = [
     ("trimmed_image", 1260),
     ("consensus_image", 585),
     // Its lines, and their descriptors.
-    ("extracted_lines", 4400),
+    ("extracted_lines", 4120),
     ("described_lines", 32_200),
     // Two images of 320 x 180 pixels to the corner of the coloured cube in each.
-    ("segmented_pair", 6100),
-    // Ten steps of the self-calibration early in a drive, with 10 and with 100 landmarks.
-    ("steps_among_10", 1450),
-    ("steps_among_100", 101_000),
+    ("segmented_pair", 6000),
+    // Ten steps of the self-calibration amid a drive, with 10 and with 100 landmarks.
+    ("steps_among_10", 17_700),
+    ("steps_among_100", 579_000),
 ];
 
 type Measured = fn(&TiltEstimator, &ImageView<'_>, &mut Scratch) -> Option<TiltEstimate>;
