@@ -44,6 +44,18 @@ valgrind:
 # Sets up; checks and tests everything that needs no data.
 test: setup browser valgrind check test-rust test-python
 
+# The core for 64-bit ARM, by the compiler alone. (Not among the tests: it needs the target's standard library, `rustup target add
+# aarch64-unknown-linux-gnu`.)
+check-aarch64:
+    cargo check --locked --package tiltvp-core --target aarch64-unknown-linux-gnu
+
+# Which functions of the core are vector code on 64-bit ARM: instructions, those of them on vectors, and the name.
+vectors-aarch64:
+    mkdir -p target
+    cargo rustc --locked --release --package tiltvp-core --lib --target aarch64-unknown-linux-gnu -- --emit asm=target/aarch64.s -C codegen-units=1 -C debuginfo=0
+    awk '/^_[A-Za-z0-9_$.]*:/ { name = $1 } /^\t[a-z]/ { all[name]++ } /[ ,]v[0-9]+\.(16b|8h|4s|2d|8b|4h|2s)/ { vector[name]++ } \
+        END { for (name in vector) if (vector[name] >= 25) printf "%6d %6d  %s\n", all[name], vector[name], name }' target/aarch64.s | sort --key=2 --reverse --numeric-sort
+
 # Formats and lints of both languages. (Types, stubs and layers are among the Python tests, the core's layers among the Rust ones.)
 check:
     cargo fmt --all --check

@@ -284,6 +284,26 @@ def test_answers_come_back_from_dicts_pickles_and_copies() -> None:
             tiltvp.MountingEstimate.from_dict(values | changed)
 
 
+@pytest.mark.parametrize("method", ["default", "paper"])
+def test_a_pickled_calibrator_goes_on_as_if_nothing_had_been(method: str) -> None:
+    """With a memory so short that it was summed up, and in the middle of a drive."""
+    drive = simulate_drive("alternating", seed=3)
+    options = {"memory": 40} if method == "default" else {}
+    whole = tiltvp.SelfCalibrator(**START, method=method, **options)
+    half = len(drive.odometry) // 2
+    first = drive.bearings[:, 0] < half
+    whole.follow(drive.odometry[:half], drive.bearings[first])
+    kept = pickle.loads(pickle.dumps(whole))
+    assert kept == whole == copy.copy(whole)
+    assert kept.estimate == whole.estimate
+    rest = drive.bearings[~first] - (half, 0, 0)
+    for calibrator in (whole, kept):
+        calibrator.follow(drive.odometry[half:], rest)
+    assert kept == whole != tiltvp.SelfCalibrator(**START, method=method, **options)
+    with pytest.raises(InvalidInputError, match="state"):
+        whole.__setstate__(b"not a state")
+
+
 def test_noise_of_steps_widens_what_is_believed() -> None:
     drive = simulate_drive("paper", seed=2)
     plain, wide = (

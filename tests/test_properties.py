@@ -108,9 +108,9 @@ def test_any_numbers_make_a_camera_or_are_refused(model: str, data: st.DataObjec
 
 
 OPTIONS = [
-    "gradient_min", "smoothing_px", "elevation_min_rad", "elevation_max_rad", "margin_px", "tilt_max_rad", "seed",
-    "keep_fraction", "scale_rad", "tolerance_rad", "max_iterations", "threshold_px", "offset_max_px", "threshold_rad",
-    "normal", "correction", "other",
+    "gradient_min", "smoothing_px", "elevation_min_rad", "elevation_max_rad", "margin_px", "tilt_max_rad", "row_stride",
+    "seed", "keep_fraction", "scale_rad", "tolerance_rad", "max_iterations", "threshold_px", "offset_max_px",
+    "threshold_rad", "normal", "correction", "other",
 ]  # fmt: skip
 
 

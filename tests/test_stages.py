@@ -65,6 +65,7 @@ def test_edges_serve_every_method(camera: tiltvp.Camera, room: RoomImage) -> Non
         ({"elevation_min_rad": 0.1}, ["elevation_min_rad = 0.1"]),
         ({"elevation_max_rad": 0.5}, ["elevation_max_rad = 0.5"]),
         ({"margin_px": 4.0}, ["margin_px = 4"]),
+        ({"row_stride": 2}, ["row_stride = 2", "expected row_stride = 1"]),
         ({"mask": HALF}, ["mask = a mask", "no mask"]),
         ({"robot_from_camera": np.diag([-1.0, -1.0, 1.0])}, ["robot_from_camera"]),
     ],
@@ -106,7 +107,7 @@ CHANGES: dict[str, list[dict[str, Any]]] = {
     "refined": [{"scale_rad": 0.02}, {"gradient_min": 80.0}, {"mask": HALF}, {"tilt_max_rad": 0.1}],
     "image-space-ransac": [{"threshold_px": 4.0}, {"gradient_min": 300.0}, {"correction": None}, {"seed": 4}],
     "image-space-reject-refit": [{"keep_fraction": 0.6}, {"smoothing_px": 1.0}, {"correction": 200.0}],
-    "vector-consensus": [{"threshold_rad": 0.02}, {"normal": "tangent"}, {"margin_px": 3.0}],
+    "vector-consensus": [{"threshold_rad": 0.02}, {"normal": "tangent"}, {"margin_px": 3.0}, {"row_stride": 3}],
 }
 
 

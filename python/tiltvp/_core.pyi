@@ -525,6 +525,7 @@ class TiltEstimator:
         margin_px: float = ...,
         tilt_max_rad: float | None = ...,
         mask: NDArray[np.bool_] | None = ...,
+        row_stride: SupportsIndex = ...,
         seed: SupportsIndex = ...,
         keep_fraction: float = ...,
         scale_rad: float = ...,
@@ -564,6 +565,8 @@ class TiltEstimator:
             replaces.
         mask
             (H, W) bool, True where the image shows the world and not the robot itself. None: everywhere.
+        row_stride
+            Every so-manieth row of the image is looked at, from 1: less time, and less sure an answer.
         seed
             Seed of the random samples, 0 to 2^64 - 1. Only the sampling methods draw any.
         keep_fraction
@@ -639,8 +642,8 @@ class TiltEstimator:
         """The tilt of the image that the edges are of, the same to the last bit as the image itself gives.
 
         `edges` may be those of any estimator with equal camera, robot_from_camera, mask and edge options
-        (gradient_min, smoothing_px, elevations, margin_px); else `tiltvp.errors.InvalidInputError` says what differs.
-        Other threads run meanwhile.
+        (gradient_min, smoothing_px, elevations, margin_px, row_stride); else `tiltvp.errors.InvalidInputError` says
+        what differs. Other threads run meanwhile.
         """
 
     def _estimate_with_edges(self, image: NDArray[np.uint8]) -> tuple[TiltEstimate, EdgeElements]:
@@ -1933,6 +1936,8 @@ class SelfCalibrator:
     def reset(self) -> None:
         """Forgets everything but the options."""
 
+    def __eq__(self, other: object, /) -> bool: ...
+    def __setstate__(self, state: bytes, /) -> None: ...
     def __copy__(self) -> Self: ...
     def __deepcopy__(self, _memo: object) -> Self: ...
 

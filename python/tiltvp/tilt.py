@@ -64,8 +64,9 @@ class TiltEstimator(_core.TiltEstimator):
     ----------
     camera : tiltvp.Camera
     method : {"refined", "image-space-ransac", "image-space-reject-refit", "vector-consensus"}
-    robot_from_camera : (3, 3) rotation R, v_robot = R v_camera; default identity: an upward camera, columns to the
-    front gradient_min, smoothing_px, elevation_min_rad, elevation_max_rad, margin_px, tilt_max_rad, mask, seed
+    robot_from_camera : (3, 3) rotation R, v_robot = R v_camera; default identity: an upward camera, columns to
+        the front.
+    gradient_min, smoothing_px, elevation_min_rad, elevation_max_rad, margin_px, tilt_max_rad, mask, row_stride, seed
         Options of every method: see the README. `mask` is (H, W) bool, True where the image shows the world.
     keep_fraction, scale_rad, tolerance_rad, max_iterations
         Of "refined"; `keep_fraction` and `max_iterations` also of "image-space-reject-refit".

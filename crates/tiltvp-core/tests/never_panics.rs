@@ -170,8 +170,16 @@ fn edge_options() -> impl Strategy<Value = EdgeOptions> {
 }
 
 fn options() -> impl Strategy<Value = TiltOptions> {
-    (methods(), edge_options(), prop::option::of(number(0.01, 1.5)), any::<u64>())
-        .prop_map(|(method, edges, tilt_max_rad, seed)| TiltOptions { method, edges, tilt_max_rad, mask: None, seed })
+    (methods(), edge_options(), prop::option::of(number(0.01, 1.5)), 1..4u32, any::<u64>()).prop_map(
+        |(method, edges, tilt_max_rad, row_stride, seed)| TiltOptions {
+            method,
+            edges,
+            tilt_max_rad,
+            mask: None,
+            row_stride,
+            seed,
+        },
+    )
 }
 
 /// No mask, one of the right size with holes, or one of another size.

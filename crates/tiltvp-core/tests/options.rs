@@ -59,13 +59,14 @@ fn assert_read(method: &str, changes: &[(&str, Change)]) {
     }
 }
 
-const EDGES: [(&str, Change); 7] = [
+const EDGES: [(&str, Change); 8] = [
     ("gradient_min", |o| o.edges.gradient_min *= 1.3),
     ("smoothing_px", |o| o.edges.smoothing_px += 0.7),
     ("elevation_min_rad", |o| o.edges.elevation_min_rad = 0.2),
     ("elevation_max_rad", |o| o.edges.elevation_max_rad = 0.5),
     ("margin_px", |o| o.edges.margin_px = 6.0),
     ("tilt_max_rad", |o| o.tilt_max_rad = Some(0.1)),
+    ("row_stride", |o| o.row_stride = 2),
     ("mask", |o| {
         let n = SIDE as usize;
         o.mask = Some(Mask::new(n, n, (0..n * n).map(|i| i % n > n / 3).collect()).unwrap());
@@ -260,6 +261,9 @@ fn wrong_values_are_refused_by_name() {
                 *field(&mut options.edges) = wrong;
                 assert_eq!(refused(options), name, "{method}, {name} = {wrong}");
             }
+        }
+        for wrong in [0, 1000] {
+            assert_eq!(refused(TiltOptions { row_stride: wrong, ..defaults(method) }), "row_stride");
         }
         for wrong in [0.0, -0.1, 1.6, f64::NAN] {
             assert_eq!(refused(TiltOptions { tilt_max_rad: Some(wrong), ..defaults(method) }), "tilt_max_rad");

@@ -96,12 +96,13 @@ fn estimators_with_other_options_are_as_good_as_new() {
 fn every_kind_of_change_is_taken_up() {
     let n = SIDE as usize;
     let image = &images()[4];
-    let changes: [fn(&mut TiltOptions); 8] = [
+    let changes: [fn(&mut TiltOptions); 9] = [
         |o| o.edges.gradient_min *= 1.5,
         |o| o.edges.smoothing_px += 1.0,
         |o| o.edges.elevation_min_rad = 0.2,
         |o| o.edges.elevation_max_rad = 0.5,
         |o| o.edges.margin_px = 6.0,
+        |o| o.row_stride = 3,
         |o| o.mask = Some(Mask::new(160, 160, (0..160 * 160).map(|i| i % 160 > 50).collect()).unwrap()),
         |o| match &mut o.method {
             Method::ImageSpaceRansac { correction, .. } | Method::ImageSpaceRejectRefit { correction, .. } => {

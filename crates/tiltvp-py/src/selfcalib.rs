@@ -1,13 +1,16 @@
 //! `SelfCalibrator`, `calibrate`, `simulate_drive`: where a camera sits on a robot, over arrays.
 
 mod drive;
-mod estimate;
+mod log;
+mod matrices;
+mod mounting;
+mod step;
 
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use nalgebra::{Matrix3, Vector3};
 use pyo3::prelude::*;
-use pyo3::types::PyDict;
+use pyo3::types::{PyBytes, PyDict, PyTuple};
 use tiltvp_core::Error;
 use tiltvp_core::filter::ConsistencyBand;
 use tiltvp_core::selfcalib::{
@@ -15,7 +18,9 @@ use tiltvp_core::selfcalib::{
 };
 
 pub(crate) use self::drive::{SimulatedDrive, drive_legs, simulate_drive};
-pub(crate) use self::estimate::{CalibrationStep, LogCalibration, MountingEstimate};
+pub(crate) use self::log::LogCalibration;
+pub(crate) use self::mounting::MountingEstimate;
+pub(crate) use self::step::CalibrationStep;
 use crate::call::{call, exception, invalid};
 use crate::convert;
 
@@ -142,7 +147,7 @@ impl SelfCalibrator {
         dict.set_item("bearing_sigma_rad", o.bearing_sigma_rad)?;
         dict.set_item("odometry_k_m", o.odometry_k_m)?;
         dict.set_item("start", (o.start.x_m, o.start.y_m, o.start.yaw_rad))?;
-        dict.set_item("start_sigma", estimate::matrix3(py, &o.start_covariance)?)?;
+        dict.set_item("start_sigma", matrices::matrix3(py, &o.start_covariance)?)?;
         dict.set_item("method", o.method.name())?;
         dict.set_item("start_distance_m", o.start_distance_m)?;
         match o.method {
@@ -228,8 +233,29 @@ impl SelfCalibrator {
         self.lock().reset().map_err(|error| exception(&error))
     }
 
+    fn __eq__(&self, other: &Bound<'_, PyAny>) -> bool {
+        let Ok(other) = other.cast::<Self>() else { return false };
+        // One at a time: a calibrator may be compared with itself.
+        let mine = self.lock().clone();
+        mine == *other.get().lock()
+    }
+
     fn __copy__(&self) -> Self {
         Self { inner: Mutex::new(self.lock().clone()) }
+    }
+
+    /// Sets what pickle has kept.
+    fn __setstate__(&self, state: &[u8]) -> PyResult<()> {
+        let kept = postcard::from_bytes::<core::SelfCalibrator>(state).ok().filter(core::SelfCalibrator::is_consistent);
+        *self.lock() = kept.ok_or_else(|| invalid("state: expected the bytes that pickle keeps".to_owned()))?;
+        Ok(())
+    }
+
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyTuple>> {
+        let (py, this) = (slf.py(), slf.get());
+        let make = py.import("functools")?.getattr("partial")?.call((slf.get_type(),), Some(&this.options(py)?))?;
+        let state = postcard::to_stdvec(&*this.lock()).map_err(|error| invalid(format!("state: {error}")))?;
+        (make, PyTuple::empty(py), PyBytes::new(py, &state)).into_pyobject(py)
     }
 
     fn __deepcopy__(&self, _memo: &Bound<'_, PyAny>) -> Self {

@@ -1,4 +1,4 @@
-"""`tiltvp measure`: the numbers of the methods on panoramas with known tilt, what they cost, and self-calibration."""
+"""`tiltvp measure`: the tilt methods on panoramas and rooms, and what they cost; other measures join here."""
 
 from __future__ import annotations
 
@@ -8,18 +8,23 @@ from typing import Annotated
 
 from cyclopts import App, Parameter, validators
 
+from tiltvp.cli.calibration_measures import calibration, calibration_images
 from tiltvp.cli.corner_measures import corners
 from tiltvp.cli.corner_real import corners_real
 from tiltvp.cli.descriptors import descriptors
+from tiltvp.cli.line_measures import lines
 from tiltvp.cli.planar_pose import planar_pose
 from tiltvp.cli.results import check_ending, show_frame, write_frame
 from tiltvp.cli.terminal import progress_bar, say
 from tiltvp.errors import InvalidInputError
 
-app = App(name="measure", help="Measure the methods on images of known tilt.")
+app = App(name="measure", help="Measure how well all this works, where the truth is known.")
+app.command(calibration)
+app.command(calibration_images)
 app.command(corners)
 app.command(corners_real)
 app.command(descriptors)
+app.command(lines)
 app.command(planar_pose)
 
 
@@ -87,99 +92,6 @@ def inertial(directory: Path, /, *, samples: int = 2) -> None:
     with progress_bar(len(chosen), "panoramas") as bar:
         table = estimate_leaning(chosen, paper_camera(), samples=samples, advance=bar.advance)
     show_frame("Refined lean minus sensor, degrees, constant offset removed", summarise_inertial(table), ["panoramas"])
-
-
-@app.command
-def calibration(odometry: Path | None = None, /, *, runs: int = 1000, only: str = "", out: Path | None = None) -> None:
-    """Self-calibration on simulated drives, both filters, against the Cramer-Rao bound; and on real logs.
-
-    Parameters
-    ----------
-    odometry
-        Folder with victoria_park, brenner_lego and censi_khepera; without it only the simulated drives.
-    runs
-        Simulated drives of each trajectory.
-    only
-        Only the parts whose names hold this: "simulated paper default", "simulated paper paper", "simulated alternating
-        default", "simulated alternating paper" (trajectory and method), "victoria_park", "brenner_lego",
-        "censi lstraight", "censi l90", "censi lmov".
-    out
-        Also write the table of all simulated runs as Parquet.
-    """
-    import polars as pl
-
-    from tiltvp.evaluation.calibration import LOG_PARTS, LOGS, real_logs, simulated_drives, summarise_drives
-    from tiltvp.selfcalib import consistency_band
-
-    drives = [
-        (kind, method)
-        for kind in ("paper", "alternating")
-        for method in ("default", "paper")
-        if only in f"simulated {kind} {method}"
-    ]
-    logs = [name for name in LOGS if only in name] if odometry is not None else []
-    if not drives and not logs:
-        raise InvalidInputError(f'--only {only}: no part of that name, expected for example "simulated" or "victoria"')
-    parts, summaries = [], []
-    if drives:
-        with progress_bar(len(drives) * runs, "drives") as bar:
-            for kind, method in drives:
-                table = simulated_drives(kind, method, runs, advance=bar.advance)
-                parts.append(table.with_columns(trajectory=pl.lit(kind), method=pl.lit(method)))
-                summaries.append({"trajectory": kind, "method": method, **summarise_drives(table)})
-        if out is not None:
-            pl.concat(parts).write_parquet(out)
-        low, high = consistency_band(0.95, 3, runs)
-        title = f"Simulated drives; NEES of a consistent filter: {low:.3f} to {high:.3f}"
-        show_frame(title, pl.DataFrame(summaries), ["method"])
-    if odometry is not None and logs:
-        with progress_bar(LOG_PARTS * len(logs), "logs") as bar:
-            table = real_logs(odometry, only=only, advance=bar.advance)
-        show_frame("Real logs: error against the nominal mounting", table, ["log"])
-
-
-@app.command(name="calibration-images")
-def calibration_images(
-    *,
-    drives: Annotated[int, Parameter(validator=validators.Number(gte=1))] = 2,
-    kinds: Annotated[tuple[str, ...], Parameter(consume_multiple=True)] = ("hall", "corridor"),
-    leans_deg: Annotated[tuple[float, ...], Parameter(consume_multiple=True)] = (0.0, 3.0),
-    trajectory: str = "paper",
-    seed: Annotated[int, Parameter(validator=validators.Number(gte=0))] = 9101,
-    threads: Annotated[int | None, Parameter(validator=validators.Number(gte=1))] = None,
-    out: Path | None = None,
-) -> None:
-    """Self-calibration from the pictures of rendered drives: tilt, lines, tracks, mounting; errors in degrees and mm.
-
-    Parameters
-    ----------
-    drives
-        Drives of each kind and lean.
-    kinds
-        Where to drive: corridor, hall, office, living-room, l-shaped, narrow or under-table.
-    leans_deg
-        Greatest leans from bumps.
-    trajectory
-        paper or alternating.
-    seed
-        Seed of the first room and drive.
-    threads
-        Frames rendered at the same time; all cores by default.
-    out
-        Also write the table: .csv, .json or .parquet.
-    """
-    from tiltvp.evaluation.calibration_images import PictureExperiment, picture_drives
-
-    if out is not None:
-        check_ending(out)
-    experiment = PictureExperiment(
-        kinds=kinds, leans_max_deg=leans_deg, drives=drives, seed=seed, trajectory=trajectory
-    )
-    with progress_bar(len(experiment.cases), "drives") as bar:
-        table = picture_drives(experiment, threads=threads or os.cpu_count() or 1, advance=bar.advance)
-    if out is not None:
-        write_frame(table, out)
-    show_frame(f"From pictures, errors along the {trajectory} trajectory, degrees and mm", table, ["kind", "by"])
 
 
 @app.command
@@ -329,49 +241,3 @@ def sampling(
             say(f"Pays: {'; '.join(words) or 'none'}.")
     if out is not None and tables:
         pl.concat(tables).write_parquet(out)
-
-
-@app.command
-def lines(
-    *,
-    frames: Annotated[int, Parameter(validator=validators.Number(gte=2))] = 400,
-    kinds: Annotated[tuple[str, ...], Parameter(consume_multiple=True)] = ("corridor", "hall"),
-    leans_deg: Annotated[tuple[float, ...], Parameter(consume_multiple=True)] = (0.0, 5.0),
-    seed: Annotated[int, Parameter(validator=validators.Number(gte=0))] = 9001,
-    samples: Annotated[int, Parameter(validator=validators.Number(gte=1))] = 2,
-    threads: Annotated[int | None, Parameter(validator=validators.Number(gte=1))] = None,
-    out: Path | None = None,
-) -> None:
-    """How well vertical lines are found and followed on rendered drives below a mirror, by us and as the paper has it.
-
-    Tables have the rates of correct matches, false matches and false new entries (table 3 of paper 001), errors of
-    bearings, the share of true edges that are found, and processor times.
-
-    Parameters
-    ----------
-    frames
-        Frames of each drive; there is one for each kind and lean.
-    kinds
-        Where to drive: corridor, hall, office, living-room, l-shaped, narrow or under-table.
-    leans_deg
-        Greatest leans from bumps; each kind has the same way for all.
-    seed
-        Seed of the first room and drive.
-    samples
-        Rays per pixel and side where surfaces meet.
-    threads
-        Frames rendered at the same time; all cores by default.
-    out
-        Also write the long table, one row for each frame and variant: .csv, .json or .parquet.
-    """
-    from tiltvp.evaluation.lines import LineExperiment, line_intervals, measure_lines, summarise_lines
-
-    if out is not None:
-        check_ending(out)
-    experiment = LineExperiment(frames=frames, kinds=kinds, leans_max_deg=leans_deg, seed=seed, samples=samples)
-    with progress_bar(experiment.steps, "frames") as bar:
-        table = measure_lines(experiment, threads=threads or os.cpu_count() or 1, advance=bar.advance)
-    if out is not None:
-        write_frame(table, out)
-    show_frame(f"Vertical lines on {experiment.steps} frames, angles in degrees", summarise_lines(table), ["variant"])
-    show_frame("Recognition rate of the default variant", line_intervals(table), ["kind", "interval"])

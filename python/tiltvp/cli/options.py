@@ -19,8 +19,8 @@ if TYPE_CHECKING:
 _CAMERA = Group("Camera")
 _METHOD = Group("Method", help="An option that is not given has the default of its method.")
 _AS_THEY_ARE = (
-    "method", "margin_px", "gradient_min", "smoothing_px", "keep_fraction", "max_iterations", "threshold_px",
-    "offset_max_px", "normal", "sampling", "local_optimization", "score", "verification", "seed",
+    "method", "margin_px", "row_stride", "gradient_min", "smoothing_px", "keep_fraction", "max_iterations",
+    "threshold_px", "offset_max_px", "normal", "sampling", "local_optimization", "score", "verification", "seed",
 )  # fmt: skip
 _ANGLES = ("elevation_min", "elevation_max", "tilt_max", "scale", "tolerance", "threshold")
 Switch = Annotated[bool, Parameter(negative="", show_default=False)]
@@ -82,6 +82,8 @@ class EdgeOptions:
     """Pixels kept clear of the lens' rim, the image border and the mask."""
     mask: Path | None = None
     """Image of the camera's size, white where the world is seen and black where the robot is."""
+    row_stride: int | None = None
+    """Look at every so-manieth row of the image only: less time, and less sure an answer."""
     gradient_min: float | None = None
     """Least gradient magnitude of an edge pixel (3x3 Scharr kernel, 8 bit)."""
     smoothing_px: float | None = None

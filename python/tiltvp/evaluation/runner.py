@@ -27,7 +27,7 @@ __all__ = ["ImageRunner", "View"]
 P = ParamSpec("P")
 T = TypeVar("T")
 
-_EDGE_OPTIONS = ("gradient_min", "smoothing_px", "elevation_min_rad", "elevation_max_rad", "margin_px")
+_EDGE_OPTIONS = ("gradient_min", "smoothing_px", "elevation_min_rad", "elevation_max_rad", "margin_px", "row_stride")
 """What edge pixels depend on beside the camera, its mounting and the mask."""
 
 _PARAMETERS = ("gradient_min", "keep_fraction", "threshold_px", "threshold_rad")

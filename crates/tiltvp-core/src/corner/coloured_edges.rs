@@ -14,6 +14,17 @@ pub(super) enum Orientation {
 /// Twice the pixel coordinates of candidates: midpoints between two labelled pixels lie on half pixels.
 pub(super) type Doubled = [i32; 2];
 
+/// Labels that are looked at together: most of an image shows none of the faces.
+const BLOCK: usize = 64;
+
+/// The places of labels of the left and the right face.
+fn faces_below(row: &[u8]) -> impl Iterator<Item = usize> {
+    let blocks = row.chunks(BLOCK).zip((0..).step_by(BLOCK));
+    blocks
+        .filter(|(block, _)| block.iter().fold(NONE, |most, label| most.max(*label)) > TOP)
+        .flat_map(|(block, start)| block.iter().zip(start..).filter(|(label, _)| **label > TOP).map(|(_, place)| place))
+}
+
 /// Candidates of the x edge (top and right face), the y edge (left and right face) and the z edge (top and left face).
 #[derive(Debug, Clone, Default)]
 pub(super) struct EdgeCandidates {
@@ -26,7 +37,7 @@ impl EdgeCandidates {
     pub(super) fn find(&mut self, labels: &Labels, width: usize, orientation: Orientation) {
         self.edges.iter_mut().for_each(Vec::clear);
         let [x_edge, y_edge, z_edge] = &mut self.edges;
-        let ([columns, rows], step) = (labels.size, labels.step as i32);
+        let (rows, step) = (labels.size[1], labels.step as i32);
         let [left, top] = labels.origin.map(|first| 2 * first as i32);
         let width = width.div_ceil(labels.step.max(1));
         let (w, upright) = (width as i32, orientation == Orientation::Upright);
@@ -35,12 +46,7 @@ impl EdgeCandidates {
             let beyond = if upright { v.checked_sub(width) } else { Some(v + width).filter(|v| *v < rows) };
             let beyond = beyond.map_or(&[][..], |v| labels.row(v));
             let sideways = if upright { -w } else { w };
-            let mut at = 0;
-            while at < columns {
-                // Most of the image shows none of the faces.
-                let Some(skipped) = row[at..].iter().position(|label| *label > TOP) else { break };
-                let u = at + skipped;
-                at = u + 1;
+            for u in faces_below(row) {
                 let place = |du: i32, dv: i32| [left + step * (2 * u as i32 + du), top + step * (2 * v as i32 + dv)];
                 let above = beyond.get(u).copied().unwrap_or(NONE);
                 if row[u] == RIGHT {

@@ -107,14 +107,15 @@ impl Labels {
         (self.origin, self.step) = ([columns.start, rows.start], step);
         self.size = [columns.len().div_ceil(step), rows.len().div_ceil(step)];
         self.values.resize(self.size[0] * self.size[1], NONE);
-        let share = (options.chromaticity_min * 256.0).round() as u16;
-        let mut by_byte = [NONE; 3];
+        let mut labels = [NONE; 3];
         for (face, label) in options.faces.into_iter().zip([TOP, LEFT, RIGHT]) {
-            by_byte[face.byte()] = label;
+            labels[face.byte()] = label;
         }
+        let share = (options.chromaticity_min * 256.0).round() as u16;
+        let face = Face { share, intensity: options.intensity_min, labels };
         for (v, out) in rows.step_by(step).zip(self.values.chunks_exact_mut(self.size[0].max(1))) {
             let row = image.row(v).get(3 * columns.start..3 * columns.end).unwrap_or(&[]);
-            label_row(row, step, share, options.intensity_min, by_byte, out);
+            label_row(row, step, face, out);
         }
     }
 
@@ -125,18 +126,78 @@ impl Labels {
     }
 }
 
-/// A pixel is of a colour whose value is at least `intensity` and at least `share / 256` of the sum; with a share above a
-/// third of it the strongest colour is the only candidate, but for ties of two, which are none.
-#[multiversion(targets("x86_64+avx512f+avx512bw+avx512vl", "x86_64+avx2+fma"))]
-fn label_row(row: &[u8], step: usize, share: u16, intensity: u8, by_byte: [u8; 3], out: &mut [u8]) {
-    for (pixel, label) in row.chunks(3 * step).zip(out) {
-        let Some([b, g, r]) = pixel.first_chunk::<3>().copied() else { continue };
-        let needed = (u32::from(b) + u32::from(g) + u32::from(r)) * u32::from(share);
-        let passes = |c: u8, others: u8| {
-            u8::from((u32::from(c) << 8) >= needed) & u8::from(c >= intensity.max(1)) & u8::from(c > others)
+/// What a pixel must be to be of a colour: the strongest of three that differ, at least `intensity`, and at least `share / 256`
+/// of their sum; with a share above a third the strongest colour is the only candidate.
+#[derive(Debug, Clone, Copy)]
+struct Face {
+    share: u16,
+    intensity: u8,
+    /// Labels of blue, green and red.
+    labels: [u8; 3],
+}
+
+/// Pixels that are labelled together.
+const BLOCK: usize = 64;
+
+/// Labels every `step`-th pixel of a row of blue, green and red.
+#[multiversion(targets("x86_64+avx2", "x86_64+sse4.1"))]
+fn label_row(row: &[u8], step: usize, face: Face, out: &mut [u8]) {
+    let (blocks, _) = out.as_chunks_mut::<BLOCK>();
+    let mut done = 0;
+    for (pixels, out) in row.chunks_exact(3 * step * BLOCK).zip(blocks) {
+        // With steps that the compiler knows, colours are told apart in registers.
+        let planes = match step {
+            1 => planes(pixels, 1),
+            2 => planes(pixels, 2),
+            _ => planes(pixels, step),
         };
-        *label = passes(b, g.max(r)) * by_byte[0] + passes(g, b.max(r)) * by_byte[1] + passes(r, b.max(g)) * by_byte[2];
+        *out = labels(&planes, face);
+        done += BLOCK;
     }
+    for (pixels, out) in
+        row[(3 * step * done).min(row.len())..].chunks(3 * step * BLOCK).zip(out[done..].chunks_mut(BLOCK))
+    {
+        let found = labels(&planes(pixels, step), face);
+        out.copy_from_slice(&found[..out.len()]);
+    }
+}
+
+/// Blue, green and red of every `step`-th pixel, black beyond the last.
+#[inline(always)]
+fn planes(pixels: &[u8], step: usize) -> [[u8; BLOCK]; 3] {
+    let mut planes = [[0; BLOCK]; 3];
+    if pixels.len() == 3 * step * BLOCK {
+        let [b, g, r] = &mut planes;
+        for k in 0..BLOCK {
+            (b[k], g[k], r[k]) = (pixels[3 * step * k], pixels[3 * step * k + 1], pixels[3 * step * k + 2]);
+        }
+    } else {
+        for (k, pixel) in pixels.chunks(3 * step).enumerate() {
+            for (plane, level) in planes.iter_mut().zip(pixel) {
+                plane[k] = *level;
+            }
+        }
+    }
+    planes
+}
+
+#[inline(always)]
+fn labels([b, g, r]: &[[u8; BLOCK]; 3], face: Face) -> [u8; BLOCK] {
+    // In products of 16 bits by 16 bits the upper half is `share / 256` of the sum, and the lower what is left.
+    let (share, least) = (face.share << 2, face.intensity.max(1));
+    let mut out = [NONE; BLOCK];
+    for (k, out) in out.iter_mut().enumerate() {
+        let (b, g, r) = (b[k], g[k], r[k]);
+        let sum = (u16::from(b) + u16::from(g) + u16::from(r)) << 6;
+        let product = u32::from(sum) * u32::from(share);
+        let needed = (product >> 16) as u16 + u16::from(product as u16 != 0);
+        let most = b.max(g).max(r);
+        let of = |colour: u8, others: u8, label: u8| if colour > others { label } else { NONE };
+        let [blue, green, red] = face.labels;
+        let label = of(b, g.max(r), blue) | of(g, b.max(r), green) | of(r, b.max(g), red);
+        *out = if u16::from(most) >= needed && most >= least { label } else { NONE };
+    }
+    out
 }
 
 #[cfg(test)]
@@ -167,6 +228,29 @@ mod tests {
         let faces = [Primary::Blue, Primary::Red, Primary::Green];
         labels.fill(&image, &ColorOptions { faces, ..ColorOptions::default() }, 0..8, 0..1, 1);
         assert_eq!(labels.row(0)[..3], [LEFT, RIGHT, TOP]);
+    }
+
+    #[test]
+    fn blocks_are_labelled_as_pixels_are_one_by_one() {
+        let bytes: Vec<u8> = (0..3 * 1300u32).map(|i| (i.wrapping_mul(2_654_435_761) >> 23) as u8 & 0xf8).collect();
+        for (share, intensity) in [(115, 50), (87, 0), (256, 1), (128, 200)] {
+            let face = Face { share, intensity, labels: [3, 2, 1] };
+            for (pixels, step) in
+                [(1, 1), (63, 1), (64, 1), (300, 1), (1300, 2), (127, 2), (400, 3), (1297, 5), (9, 16)]
+            {
+                let row = &bytes[..3 * pixels];
+                let mut out = vec![9; pixels.div_ceil(step)];
+                label_row(row, step, face, &mut out);
+                for (k, label) in out.into_iter().enumerate() {
+                    let [b, g, r] = [0, 1, 2].map(|c| u32::from(row[3 * k * step + c]));
+                    let passes = |c: u32, others: u32| {
+                        256 * c >= (b + g + r) * u32::from(share) && c >= u32::from(intensity.max(1)) && c > others
+                    };
+                    let all = [(passes(b, g.max(r)), 3), (passes(g, b.max(r)), 2), (passes(r, b.max(g)), 1)];
+                    assert_eq!(label, all.into_iter().find(|(passes, _)| *passes).map_or(NONE, |(_, label)| label));
+                }
+            }
+        }
     }
 
     #[test]

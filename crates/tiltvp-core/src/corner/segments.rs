@@ -1,5 +1,6 @@
 //! Line segments: ridge pixels grown together where their gradients agree, and split until each lies on one great circle.
 
+use multiversion::multiversion;
 use nalgebra::{Matrix3, Vector2, Vector3};
 
 use super::options::GeneralOptions;
@@ -14,6 +15,12 @@ const AGREEING_COS: f32 = 0.9239;
 
 /// How far from a pixel its followers are looked for, in pixels.
 const REACH: usize = 2;
+
+/// How many pixels ahead bearings are asked for.
+const AHEAD: usize = 8;
+
+/// Pixels from one end of the reach to the other.
+const SPAN: usize = 2 * REACH + 1;
 
 /// Most segments of an image, the longest ones.
 const SEGMENTS_MAX: usize = 160;
@@ -48,12 +55,60 @@ pub(super) struct SegmentFinder {
 pub(super) struct SegmentScratch {
     detector: RidgeDetector,
     ridge: RidgePixels,
-    /// One above the place among the ridge pixels, for each pixel of the image; 0 elsewhere and once taken.
+    /// The place among the ridge pixels, for each pixel of the image that is one.
     owner: Vec<u32>,
-    order: Vec<u32>,
+    free: Free,
+    /// Places among the ridge pixels in the lower half, in the upper what is less for stronger ones.
+    order: Vec<u64>,
+    /// Directions of the ridge pixels' gradients.
+    units: Vec<[f32; 2]>,
     members: Vec<u32>,
     points: Vec<(Vector2<f64>, Vector3<f64>)>,
     pub(super) segments: Vec<Segment>,
+}
+
+/// A bit for each pixel: whether it is a ridge pixel that has not been taken. All are zero after an image.
+#[derive(Debug, Clone, Default)]
+struct Free {
+    bits: Vec<u8>,
+    /// Bytes from row to row, some more than the pixels need.
+    stride: usize,
+}
+
+impl Free {
+    fn make(&mut self, width: usize, height: usize) {
+        let stride = width / 8 + 4;
+        if (self.stride, self.bits.len()) != (stride, stride * height) {
+            self.stride = stride;
+            self.bits.clear();
+            self.bits.resize(stride * height, 0);
+        }
+    }
+
+    #[inline(always)]
+    fn add(&mut self, u: usize, v: usize) {
+        self.bits[v * self.stride + u / 8] |= 1 << (u % 8);
+    }
+
+    /// Whether it was there to be taken.
+    #[inline(always)]
+    fn take(&mut self, u: usize, v: usize) -> bool {
+        let (byte, bit) = (&mut self.bits[v * self.stride + u / 8], 1 << (u % 8));
+        let was = *byte & bit != 0;
+        *byte &= !bit;
+        was
+    }
+
+    /// The bits of the pixels within reach, row by row, the first the lowest.
+    #[inline(always)]
+    fn around(&self, u: usize, v: usize) -> u32 {
+        let (byte, shift) = ((u - REACH) / 8, (u - REACH) % 8);
+        (0..SPAN).fold(0, |around, row| {
+            let at = (v - REACH + row) * self.stride + byte;
+            let bits = self.bits[at..at + 2].iter().rev().fold(0, |bits, byte| bits << 8 | u32::from(*byte));
+            around | (bits >> shift & ((1 << SPAN) - 1)) << (SPAN * row)
+        })
+    }
 }
 
 impl SegmentFinder {
@@ -76,17 +131,19 @@ impl SegmentFinder {
         Ok(Self { region, edges, rows })
     }
 
+    /// The slot of the pixel beside `(u, v)` on whose side a place is, where it is known.
+    fn beside(&self, (u, v): (usize, usize), shift: (f64, f64)) -> Option<usize> {
+        let step = |at: usize, by: f64| if by < 0.0 { at.checked_sub(1) } else { Some(at + usize::from(by > 0.0)) };
+        let (u, v) = (step(u, shift.0)?, step(v, shift.1)?);
+        let (first, end, start) = (*self.rows.get(v)?)?;
+        (first..end).contains(&u).then(|| start + u - first)
+    }
+
     /// The unit bearing of a place a share of a pixel from the pixel `(u, v)` that is number `slot`, along the row or the
     /// column; between the bearings of pixel centres where both are known.
     fn bearing(&self, camera: &Camera, slot: usize, (u, v): (usize, usize), shift: (f64, f64)) -> Option<Vector3<f64>> {
-        let step = |at: usize, by: f64| if by < 0.0 { at.checked_sub(1) } else { Some(at + usize::from(by > 0.0)) };
-        let beside = || {
-            let (u, v) = (step(u, shift.0)?, step(v, shift.1)?);
-            let (first, end, start) = (*self.rows.get(v)?)?;
-            (first..end).contains(&u).then(|| start + u - first)
-        };
         let between = || {
-            let (here, there) = (self.region.bearing(slot)?, self.region.bearing(beside()?)?);
+            let (here, there) = (self.region.bearing(slot)?, self.region.bearing(self.beside((u, v), shift)?)?);
             (here + (there - here) * shift.0.abs().max(shift.1.abs())).try_normalize(0.5)
         };
         between().or_else(|| camera.unproject(&Vector2::new(u as f64 + shift.0, v as f64 + shift.1)))
@@ -98,7 +155,9 @@ impl SegmentFinder {
             detector: RidgeDetector::new(&self.region, &self.edges),
             ridge: RidgePixels::default(),
             owner: Vec::new(),
+            free: Free::default(),
             order: Vec::new(),
+            units: Vec::new(),
             members: Vec::new(),
             points: Vec::new(),
             segments: Vec::new(),
@@ -113,53 +172,59 @@ impl SegmentFinder {
         options: &GeneralOptions,
         scratch: &mut SegmentScratch,
     ) {
-        let SegmentScratch { detector, ridge, owner, order, members, points, segments } = scratch;
+        let SegmentScratch { detector, ridge, owner, free, order, units, members, points, segments } = scratch;
         detector.detect(image, &self.region, self.edges.gradient_min, None, ridge);
         let (slots, gx, gy) = (ridge.edges.slot(), ridge.edges.gx(), ridge.edges.gy());
         let width = image.width();
-        owner.clear();
         owner.resize(width * image.height(), 0);
-        let place = |i: usize| {
-            let (u, v) = self.region.place(slots[i] as usize);
-            (usize::from(u), usize::from(v))
-        };
+        free.make(width, image.height());
+        let places = ridge.edges.place();
+        let place = |i: usize| ((places[i] & 0xffff) as usize, (places[i] >> 16) as usize);
         for i in 0..slots.len() {
             let (u, v) = place(i);
-            owner[v * width + u] = i as u32 + 1;
+            owner[v * width + u] = i as u32;
+            free.add(u, v);
         }
+        units.resize(slots.len(), [0.0; 2]);
+        directions(gx, gy, units);
         order.clear();
-        order.extend(0..slots.len() as u32);
-        let strength = |i: &u32| gx[*i as usize].powi(2) + gy[*i as usize].powi(2);
-        order.sort_unstable_by(|a, b| strength(b).total_cmp(&strength(a)).then(a.cmp(b)));
+        order.extend(gx.iter().zip(gy).enumerate().map(|(i, (x, y))| {
+            // Bits of numbers that are not negative are ordered as the numbers are.
+            u64::from(!(x * x + y * y).to_bits()) << 32 | i as u64
+        }));
+        order.sort_unstable();
+        // Which pixel beside it a ridge pixel's edge is next to, by its shift along the row or the column.
+        let shift = |i: usize| {
+            let shift = f64::from(ridge.shift_px()[i]);
+            if gx[i].abs() >= gy[i].abs() { (shift, 0.0) } else { (0.0, shift) }
+        };
         segments.clear();
-        for seed in order.iter() {
-            let (u, v) = place(*seed as usize);
-            if owner[v * width + u] == 0 {
+        for seed in order.iter().map(|key| *key as u32) {
+            let (u, v) = place(seed as usize);
+            if !free.take(u, v) {
                 continue;
             }
-            owner[v * width + u] = 0;
             members.clear();
-            members.push(*seed);
-            let unit = |i: usize| {
-                let length = gx[i].hypot(gy[i]);
-                [gx[i] / length, gy[i] / length]
-            };
-            let mut sum = unit(*seed as usize);
+            members.push(seed);
+            let mut sum = units[seed as usize];
+            let mut least = AGREEING_COS * length(sum);
             let mut next = 0;
             while let Some(at) = members.get(next) {
                 next += 1;
                 let (u, v) = place(*at as usize);
                 // The region keeps more than the reach clear of the image's border.
-                for v in v - REACH..=v + REACH {
-                    let row = &mut owner[v * width..(v + 1) * width];
-                    for slot in &mut row[u - REACH..=u + REACH] {
-                        let Some(candidate) = slot.checked_sub(1) else { continue };
-                        let [x, y] = unit(candidate as usize);
-                        if x * sum[0] + y * sum[1] > AGREEING_COS * sum[0].hypot(sum[1]) {
-                            *slot = 0;
-                            sum = [sum[0] + x, sum[1] + y];
-                            members.push(candidate);
-                        }
+                let mut around = free.around(u, v);
+                while around != 0 {
+                    let place = around.trailing_zeros() as usize;
+                    around &= around - 1;
+                    let (u, v) = (u - REACH + place % SPAN, v - REACH + place / SPAN);
+                    let candidate = owner[v * width + u];
+                    let [x, y] = units[candidate as usize];
+                    if x * sum[0] + y * sum[1] > least {
+                        free.take(u, v);
+                        sum = [sum[0] + x, sum[1] + y];
+                        least = AGREEING_COS * length(sum);
+                        members.push(candidate);
                     }
                 }
             }
@@ -167,11 +232,14 @@ impl SegmentFinder {
                 continue;
             }
             points.clear();
-            points.extend(members.iter().filter_map(|i| {
+            points.extend(members.iter().enumerate().filter_map(|(k, i)| {
+                if let Some(later) = members.get(k + AHEAD) {
+                    let later = *later as usize;
+                    self.region.expect(slots[later] as usize);
+                    self.region.expect(self.beside(place(later), shift(later)).unwrap_or(0));
+                }
                 let (i, (u, v)) = (*i as usize, place(*i as usize));
-                let shift = f64::from(ridge.shift_px()[i]);
-                let along_u = gx[i].abs() >= gy[i].abs();
-                let (du, dv) = if along_u { (shift, 0.0) } else { (0.0, shift) };
+                let (du, dv) = shift(i);
                 let bearing = self.bearing(camera, slots[i] as usize, (u, v), (du, dv))?;
                 Some((Vector2::new(u as f64 + du, v as f64 + dv), bearing))
             }));
@@ -182,6 +250,21 @@ impl SegmentFinder {
         }
         segments.sort_unstable_by(|a, b| b.length_px.total_cmp(&a.length_px));
         segments.truncate(SEGMENTS_MAX);
+    }
+}
+
+/// Length of a vector, rounded once.
+#[inline(always)]
+fn length([x, y]: [f32; 2]) -> f32 {
+    (f64::from(x) * f64::from(x) + f64::from(y) * f64::from(y)).sqrt() as f32
+}
+
+/// Unit vectors along gradients.
+#[multiversion(targets("x86_64+avx512f+avx512vl", "x86_64+avx2"))]
+fn directions(gx: &[f32], gy: &[f32], out: &mut [[f32; 2]]) {
+    for ((x, y), out) in gx.iter().zip(gy).zip(out) {
+        let length = length([*x, *y]);
+        *out = [x / length, y / length];
     }
 }
 

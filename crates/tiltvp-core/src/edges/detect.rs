@@ -1,11 +1,10 @@
 //! Edge pixels: the Scharr gradient of the band's rows, and the pixels where it is strong.
 
-use multiversion::multiversion;
-
+use super::block::{BLOCK as ROOM, Block, Kept, Level, Levels, REACH, Test, Vectors, place};
 use super::options::EdgeOptions;
 use super::region::{Region, Span};
 use super::screen::Screen;
-use super::sieve::{BLOCK as ROOM, Block, Kept, Level, Levels, REACH, Sieve, Test, Vectors, expect, place, widen};
+use super::sieve::{Sieve, expect, widen};
 use crate::image::{ImageView, Smoother};
 
 /// Edge pixels in structure-of-arrays form, in slot order.
@@ -72,11 +71,22 @@ impl EdgePixels {
 
     /// Appends the pixel `slot` of a region.
     pub fn push(&mut self, region: &Region, slot: u32, gx: f32, gy: f32) {
-        if self.slot.len() <= self.len {
-            self.make_room(2 * self.len + 64);
+        self.make_room_for(1);
+        self.put(slot, place_of(region, slot), gx, gy);
+    }
+
+    /// Makes room for so many more.
+    pub(super) fn make_room_for(&mut self, more: usize) {
+        if self.slot.len() < self.len + more {
+            self.make_room(2 * self.len + more);
         }
-        (self.slot[self.len], self.gx[self.len], self.gy[self.len]) = (slot, gx, gy);
-        self.place[self.len] = place_of(region, slot);
+    }
+
+    /// Appends a pixel for which there is room.
+    #[inline]
+    pub(super) fn put(&mut self, slot: u32, place: u32, gx: f32, gy: f32) {
+        let at = self.len;
+        (self.slot[at], self.place[at], self.gx[at], self.gy[at]) = (slot, place, gx, gy);
         self.len += 1;
         self.strong += 1;
     }
@@ -229,91 +239,11 @@ fn least_squared<L: Level>(gradient_min: f64) -> i32 {
     (gradient_min * f64::from(L::PARTS)).powi(2).ceil() as i32
 }
 
-/// Pixels that are tested together.
-const BLOCK: usize = 32;
-
-/// Calls with the place of each value that reaches the threshold.
-#[inline(always)]
-pub(super) fn reaching_in(values: &[f32], threshold: f32, mut with: impl FnMut(usize)) {
-    for (block, start) in values.chunks(BLOCK).zip((0..values.len()).step_by(BLOCK)) {
-        let mut strong = reaching(block, threshold);
-        while strong != 0 {
-            with(start + strong.trailing_zeros() as usize);
-            strong &= strong - 1;
-        }
-    }
-}
-
-/// One bit for each pixel of a block, at most 32, that reaches the threshold.
-#[inline(always)]
-fn reaching(block: &[f32], threshold: f32) -> u32 {
-    #[cfg(target_arch = "x86_64")]
-    if let Ok(block) = <&[f32; BLOCK]>::try_from(block) {
-        return reaching_sse2(block, threshold);
-    }
-    reaching_scalar(block, threshold)
-}
-
-#[inline(always)]
-fn reaching_scalar(block: &[f32], threshold: f32) -> u32 {
-    block.iter().enumerate().fold(0, |bits, (i, x)| bits | (u32::from(*x >= threshold) << i))
-}
-
-/// [`reaching_scalar`] with the sign bits of four comparisons at once; SSE2 is part of every x86-64.
-#[cfg(target_arch = "x86_64")]
-#[inline(always)]
-fn reaching_sse2(block: &[f32; BLOCK], threshold: f32) -> u32 {
-    use std::arch::x86_64::{_mm_cmpge_ps, _mm_movemask_ps, _mm_set1_ps, _mm_setr_ps};
-    // SAFETY: these intrinsics take and give values only and need no more than SSE2, which every x86-64 has.
-    unsafe {
-        let limit = _mm_set1_ps(threshold);
-        block.as_chunks::<4>().0.iter().rev().fold(0, |bits, [a, b, c, d]| {
-            let signs = _mm_movemask_ps(_mm_cmpge_ps(_mm_setr_ps(*a, *b, *c, *d), limit));
-            (bits << 4) | signs as u32
-        })
-    }
-}
-
-/// The 3x3 Scharr derivatives (3, 10, 3) of the middle row and their squared magnitude; rows are one pixel wider on both sides.
-#[multiversion(targets("x86_64+avx512f+avx512vl", "x86_64+avx2"))]
-pub(super) fn scharr(
-    above: &[f32],
-    middle: &[f32],
-    below: &[f32],
-    gx: &mut [f32],
-    gy: &mut [f32],
-    strength: &mut [f32],
-) {
-    let n = gx.len();
-    let (above, middle, below) = (&above[..n + 2], &middle[..n + 2], &below[..n + 2]);
-    let (gy, strength) = (&mut gy[..n], &mut strength[..n]);
-    for i in 0..n {
-        let x = 3.0 * ((above[i + 2] - above[i]) + (below[i + 2] - below[i])) + 10.0 * (middle[i + 2] - middle[i]);
-        let y = 3.0 * ((below[i] - above[i]) + (below[i + 2] - above[i + 2])) + 10.0 * (below[i + 1] - above[i + 1]);
-        gx[i] = x;
-        gy[i] = y;
-        strength[i] = x * x + y * y;
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::camera::{Camera, Equidistant, Model};
     use nalgebra::Matrix3;
-
-    #[test]
-    #[cfg(target_arch = "x86_64")]
-    fn vector_bits_equal_scalar_bits() {
-        for seed in 0..200u32 {
-            let block: [f32; BLOCK] = std::array::from_fn(|i| {
-                (seed.wrapping_mul(747_796_405).wrapping_add((i as u32).wrapping_mul(277_803_737)) >> 20) as f32
-            });
-            for threshold in [0.0, 100.0, 2000.0, block[7], f32::NAN, f32::INFINITY] {
-                assert_eq!(reaching_sse2(&block, threshold), reaching_scalar(&block, threshold));
-            }
-        }
-    }
 
     #[test]
     fn gradients_equal_the_kernel_written_out() {

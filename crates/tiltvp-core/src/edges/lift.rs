@@ -7,6 +7,7 @@ use super::detect::EdgePixels;
 use super::region::Region;
 use super::screen::Screen;
 use crate::camera::Camera;
+use crate::image::expect;
 use crate::robust::{Block as Rest, Kept, ROOM, Rows, compact};
 
 /// How the normal of an edge's great circle is made from the gradient.
@@ -114,19 +115,6 @@ impl LiftTable {
         slots.truncate(rows.len());
         places.truncate(rows.len());
     }
-}
-
-/// Asks for an entry that will be read soon.
-#[inline(always)]
-fn expect<T>(table: &[T], place: usize) {
-    #[cfg(target_arch = "x86_64")]
-    {
-        use std::arch::x86_64::{_MM_HINT_T0, _mm_prefetch};
-        // SAFETY: asking for memory reads none, wherever it is, and every x86-64 can.
-        unsafe { _mm_prefetch::<_MM_HINT_T0>(table.as_ptr().wrapping_add(place).cast()) };
-    }
-    #[cfg(not(target_arch = "x86_64"))]
-    let _ = (table, place);
 }
 
 /// The entries of a word, the lower first.

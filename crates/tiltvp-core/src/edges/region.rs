@@ -5,6 +5,7 @@ use nalgebra::{Matrix3, Vector2, Vector3};
 use super::options::{EdgeOptions, Mask};
 use crate::camera::Camera;
 use crate::error::{Error, Result};
+use crate::image::expect;
 
 /// A run of pixels `first..end` of row `v`; `slot` numbers its first pixel among all pixels of the region.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -112,6 +113,36 @@ impl Region {
         Ok(region)
     }
 
+    /// Every `stride`-th row of it: those whose number is a multiple. Pixels per radian fall as pixels do.
+    ///
+    /// # Errors
+    /// [`Error::InvalidOption`] if no pixel is left, or for a stride of zero.
+    pub fn every_row(self, stride: u32) -> Result<Self> {
+        if stride == 1 {
+            return Ok(self);
+        }
+        let mut thinned = Self {
+            spans: Vec::new(),
+            bearings: Vec::new(),
+            places: Vec::new(),
+            first_column: usize::MAX,
+            end_column: 0,
+            pixels_per_rad: self.pixels_per_rad / f64::from(stride),
+        };
+        for span in self.spans.iter().filter(|span| span.v.checked_rem(stride as usize) == Some(0)) {
+            let own = span.slot..span.slot + span.end - span.first;
+            thinned.spans.push(Span { slot: thinned.bearings.len(), ..*span });
+            thinned.bearings.extend_from_slice(&self.bearings[own.clone()]);
+            thinned.places.extend_from_slice(&self.places[own]);
+            thinned.first_column = thinned.first_column.min(span.first);
+            thinned.end_column = thinned.end_column.max(span.end);
+        }
+        if thinned.bearings.is_empty() {
+            return Err(Error::option("row_stride", stride, "a number of rows from 1 on that leaves some of the band"));
+        }
+        Ok(thinned)
+    }
+
     /// Mean solid angle of a pixel in steradians, over a sample of the pixels.
     fn mean_solid_angle(&self, camera: &Camera) -> f64 {
         let angle = |(u, v): &(u16, u16)| {
@@ -142,7 +173,7 @@ impl Region {
         self.first_column..self.end_column
     }
 
-    /// Pixels per radian in the mean over the region: the root of the pixels per steradian.
+    /// Pixels per radian in the mean over the region: the root of the pixels per steradian, divided by the stride of rows.
     pub fn pixels_per_rad(&self) -> f64 {
         self.pixels_per_rad
     }
@@ -157,6 +188,12 @@ impl Region {
     #[inline]
     pub fn bearing(&self, slot: usize) -> Option<&Vector3<f64>> {
         self.bearings.get(slot)
+    }
+
+    /// Asks for the bearing of a pixel that will be read soon.
+    #[inline]
+    pub(crate) fn expect(&self, slot: usize) {
+        expect(&self.bearings, slot);
     }
 
     /// Each pixel `(u, v)` of the region with its bearing in the robot frame, in slot order.
@@ -221,6 +258,20 @@ mod tests {
         let options = EdgeOptions { margin_px: 3.0, ..EdgeOptions::default() };
         let region = Region::new(&camera(), &Matrix3::identity(), &options, Some(&mask)).unwrap();
         assert_eq!(region.columns().start, 321 + 4);
+    }
+
+    #[test]
+    fn thinned_rows_are_those_of_the_whole() {
+        let whole = Region::new(&camera(), &Matrix3::identity(), &EdgeOptions::default(), None).unwrap();
+        for stride in [2, 3, 7] {
+            let thinned = whole.clone().every_row(stride).unwrap();
+            assert!(thinned.pixels().eq(whole.pixels().filter(|(_, v, _)| v % stride as usize == 0)));
+            let ends = thinned.spans().iter().map(|span| span.slot + span.end - span.first);
+            assert!(ends.eq(thinned.spans().iter().skip(1).map(|span| span.slot).chain([thinned.len()])));
+            assert!((thinned.pixels_per_rad() * f64::from(stride) / whole.pixels_per_rad() - 1.0).abs() < 1e-12);
+        }
+        assert_eq!(whole.clone().every_row(1).unwrap(), whole);
+        assert!(whole.clone().every_row(0).is_err() && whole.every_row(1000).is_err());
     }
 
     #[test]

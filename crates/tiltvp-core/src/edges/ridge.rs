@@ -1,9 +1,11 @@
 //! Ridge pixels: edge pixels thinned to one pixel across the edge, with the place of the edge between pixels.
 
-use super::detect::{EdgePixels, reaching_in, scharr};
+use super::block::place;
+use super::detect::EdgePixels;
 use super::options::EdgeOptions;
 use super::region::Region;
 use super::screen::Screen;
+use super::thinning::{Around, MARKED, each_mark, mark, mark_screened, scharr, tops};
 use crate::image::{ImageView, Smoother};
 
 /// Edge pixels of greatest gradient magnitude across their edge, in slot order.
@@ -12,6 +14,8 @@ pub struct RidgePixels {
     /// The pixels and their gradients.
     pub edges: EdgePixels,
     shift_px: Vec<f32>,
+    /// Squared magnitudes before, at and after the pixels, across their edges.
+    across: [Vec<f32>; 3],
 }
 
 impl RidgePixels {
@@ -36,24 +40,27 @@ struct Gradients {
 #[derive(Debug, Clone)]
 pub struct RidgeDetector {
     smoother: Smoother,
-    /// Three smoothed rows, row `v` in place `v % 3`, each two pixels wider than the region's columns on both sides.
+    /// Three smoothed rows, row `v` in place `v % 3`, each at least two pixels wider than the region's columns on both sides.
     smoothed: [Vec<f32>; 3],
-    /// Three rows of gradients, row `v` in place `v % 3`, each one pixel wider than the region's columns on both sides.
+    /// Three rows of gradients, row `v` in place `v % 3`, each at least one pixel wider than the region's columns on both sides.
     gradients: [Gradients; 3],
-    marked: Vec<f32>,
+    marks: Vec<u8>,
+    /// The screen's vectors of a span, where they are not stored.
+    vectors: Vec<[i16; 2]>,
 }
 
 impl RidgeDetector {
     /// Scratch for a region.
     pub fn new(region: &Region, options: &EdgeOptions) -> Self {
         let width = region.columns().len() + 4;
-        let row = || vec![0.0; width];
+        let row = || vec![0.0; width + MARKED];
         let gradients = || Gradients { gx: row(), gy: row(), strength: row() };
         Self {
             smoother: Smoother::new(options.smoothing_px, width),
             smoothed: [row(), row(), row()],
             gradients: [gradients(), gradients(), gradients()],
-            marked: row(),
+            marks: vec![0; width + MARKED],
+            vectors: Vec::new(),
         }
     }
 
@@ -68,9 +75,11 @@ impl RidgeDetector {
         screen: Option<&Screen>,
         out: &mut RidgePixels,
     ) {
-        let threshold_squared = (gradient_min * gradient_min) as f32;
-        out.edges.clear();
-        out.shift_px.clear();
+        let least = (gradient_min * gradient_min) as f32;
+        let RidgePixels { edges, shift_px, across } = out;
+        let [before, middle, after] = across;
+        edges.clear();
+        [&mut *before, middle, after].into_iter().for_each(Vec::clear);
         // The region keeps two pixels clear of the border.
         let left = region.columns().start.saturating_sub(2);
         let inner = region.columns().len() + 2;
@@ -78,7 +87,7 @@ impl RidgeDetector {
         for span in region.spans() {
             for row in next_gradient.max(span.v.saturating_sub(1))..=span.v + 1 {
                 for v in next_row.max(row.saturating_sub(1))..=row + 1 {
-                    self.smoother.row(image, v, left, &mut self.smoothed[v % 3]);
+                    self.smoother.row(image, v, left, &mut self.smoothed[v % 3][..inner + 2]);
                 }
                 next_row = row + 2;
                 let [above, middle, below] = [row + 2, row, row + 1].map(|v| &self.smoothed[v % 3][..inner + 2]);
@@ -90,31 +99,35 @@ impl RidgeDetector {
             // Gradients begin one column to the right of `left`.
             let first = span.first - left - 1;
             let [above, here, below] = [span.v + 2, span.v, span.v + 1].map(|v| &self.gradients[v % 3]);
-            let columns = first..first + n;
-            let marked = &mut self.marked[..n];
-            marked.copy_from_slice(&here.strength[columns.clone()]);
-            if let Some(screen) = screen {
-                screen.apply(span, &here.gx[columns.clone()], &here.gy[columns], marked);
-            }
-            reaching_in(marked, threshold_squared, |i| {
-                let (at, gx, gy) = (first + i, here.gx[first + i], here.gy[first + i]);
-                let (before, after) = if gx.abs() >= gy.abs() {
-                    (here.strength[at - 1], here.strength[at + 1])
-                } else {
-                    (above.strength[at], below.strength[at])
-                };
-                let middle = here.strength[at];
-                if middle > before && middle >= after {
-                    out.edges.push(region, (span.slot + i) as u32, gx, gy);
-                    out.shift_px.push(top_of(before.sqrt(), middle.sqrt(), after.sqrt()));
+            // Whole blocks: what comes after the span is not looked at.
+            let wide = n.next_multiple_of(MARKED);
+            let around = Around {
+                gx: &here.gx[first..first + wide],
+                gy: &here.gy[first..first + wide],
+                above: &above.strength[first..first + wide],
+                here: &here.strength[first - 1..=first + wide],
+                below: &below.strength[first..first + wide],
+            };
+            let marks = &mut self.marks[..wide];
+            match screen {
+                Some(screen) => {
+                    let (vectors, limit) = screen.of_span(span, wide, &mut self.vectors);
+                    mark_screened(&around, least, vectors, limit, marks);
                 }
+                None => mark(&around, least, marks),
+            }
+            let marks = &marks[..n];
+            edges.make_room_for(n);
+            each_mark(marks, |i| {
+                let (gx, gy, strength) = (around.gx[i], around.gy[i], around.here[i + 1]);
+                let in_row = gx.abs() >= gy.abs();
+                before.push(if in_row { around.here[i] } else { around.above[i] });
+                middle.push(strength);
+                after.push(if in_row { around.here[i + 2] } else { around.below[i] });
+                edges.put((span.slot + i) as u32, place(span.v, span.first + i), gx, gy);
             });
         }
+        shift_px.resize(middle.len(), 0.0);
+        tops(before, middle, after, shift_px);
     }
-}
-
-/// Where the parabola through three values at -1, 0 and 1 is highest.
-fn top_of(before: f32, middle: f32, after: f32) -> f32 {
-    let bend = 2.0 * middle - before - after;
-    if bend > 0.0 { (0.5 * (after - before) / bend).clamp(-0.5, 0.5) } else { 0.0 }
 }

@@ -2,8 +2,8 @@
 
 use std::sync::Arc;
 
+use super::block::Vectors;
 use super::region::{Region, Span};
-use super::sieve::Vectors;
 
 /// For each pixel of a region a vector `q`; a gradient `g` may belong to a vertical edge only if
 /// `(q . g)^2 <= limit |g|^2`.
@@ -79,19 +79,23 @@ impl Screen {
         (vectors, self.limit)
     }
 
-    /// Marks with a negative strength the gradients of a span's pixels that fail.
-    pub(super) fn apply(&self, span: &Span, gx: &[f32], gy: &[f32], strength: &mut [f32]) {
+    /// The vectors of the `n` pixels from a span's first on, in `room` where they are not all stored, and the limit. What is
+    /// none of the span's may be anything.
+    pub(super) fn of_span<'a>(&'a self, span: &Span, n: usize, room: &'a mut Vec<[i16; 2]>) -> (&'a [[i16; 2]], f32) {
         let (vectors, limit) = self.vectors();
-        let away = |x: usize, parts: i16, centre: i32| (x as i32 * i32::from(parts)).wrapping_sub(centre) as i16;
-        let vector = |place: usize| match vectors {
-            Vectors::None => [0; 2],
-            Vectors::Each(each) => each.get(span.slot + place).copied().unwrap_or_default(),
-            Vectors::From { centre: [u, v], parts } => [away(span.first + place, parts, u), away(span.v, parts, v)],
-        };
-        for (place, ((gx, gy), strength)) in gx.iter().zip(gy).zip(strength).enumerate() {
-            let [x, y] = vector(place).map(f32::from);
-            let across = x * gx + y * gy;
-            *strength = if across * across <= limit * *strength { *strength } else { -1.0 };
+        room.clear();
+        match vectors {
+            Vectors::None => {}
+            Vectors::Each(each) => match each.get(span.slot..span.slot + n) {
+                Some(own) => return (own, limit),
+                None => room.extend_from_slice(each.get(span.slot..).unwrap_or(&[])),
+            },
+            Vectors::From { centre: [u, v], parts } => {
+                let away = |x: usize, centre: i32| (x as i32 * i32::from(parts)).wrapping_sub(centre) as i16;
+                room.extend((span.first..span.end).map(|x| [away(x, u), away(span.v, v)]));
+            }
         }
+        room.resize(n, [0; 2]);
+        (room, limit)
     }
 }

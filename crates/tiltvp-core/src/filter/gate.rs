@@ -9,6 +9,7 @@ use crate::error::{Error, Result};
 
 /// A limit on the normalised innovation squared of `dof` dimensions that a true measurement passes with a given probability.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Gate {
     limit: f64,
 }

@@ -11,7 +11,7 @@ use crate::error::{Error, Result};
 #[derive(Debug, Clone, PartialEq)]
 pub struct LightTable {
     gamma: f64,
-    light: Vec<f64>,
+    light: Box<[f64; 256]>,
 }
 
 impl LightTable {
@@ -23,8 +23,8 @@ impl LightTable {
         if !(0.5..=4.0).contains(&gamma) {
             return Err(Error::option("display_gamma", gamma, "an exponent from 0.5 to 4"));
         }
-        let light = (0..256).map(|level| 255.0 * (f64::from(level) / 255.0).powf(gamma)).collect();
-        Ok(Self { gamma, light })
+        let light = std::array::from_fn(|level| 255.0 * (level as f64 / 255.0).powf(gamma));
+        Ok(Self { gamma, light: Box::new(light) })
     }
 
     /// The exponent.
@@ -33,18 +33,16 @@ impl LightTable {
     }
 
     /// The light of a level.
+    #[inline]
     pub fn of(&self, level: u8) -> f64 {
-        self.light.get(usize::from(level)).copied().unwrap_or_default()
+        self.light[usize::from(level)]
     }
 
     /// The light of a grey image between pixel centres, bilinear; `None` where that would need pixels outside the image.
     pub fn gray(&self, image: &ImageView<'_>, u: f64, v: f64) -> Option<f64> {
         let (column, row, du, dv) = corner_of(u, v, image.width(), image.height())?;
-        let along = |row: &[u8]| -> Option<f64> {
-            let (left, right) = (self.of(*row.get(column)?), self.of(*row.get(column + 1)?));
-            Some(left + (right - left) * du)
-        };
-        let (top, bottom) = (along(image.row(row))?, along(image.row(row + 1))?);
+        let [a, b, c, d] = image.quad(column, row)?.map(|level| self.of(level));
+        let (top, bottom) = (a + (b - a) * du, c + (d - c) * du);
         Some(top + (bottom - top) * dv)
     }
 

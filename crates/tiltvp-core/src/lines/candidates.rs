@@ -2,6 +2,7 @@
 
 use std::f64::consts::{PI, TAU};
 
+use multiversion::multiversion;
 use nalgebra::Matrix3;
 
 use super::arctan::atan2;
@@ -19,7 +20,9 @@ pub(super) struct Candidates {
     rows: Rows<f32>,
     weights: Vec<f32>,
     slots: Vec<u32>,
-    places: Vec<u32>,
+    /// Places among the ridge pixels.
+    numbers: Vec<u32>,
+    block: Box<Block>,
 }
 
 /// A pixel that may be on a vertical line.
@@ -52,44 +55,44 @@ impl Candidates {
         let up = robot_from_upright.column(2).into_owned();
         let lean = up.xy().norm().atan2(up.z);
         let reach = (plane_max_rad + lean).min(PI / 2.0).sin();
-        sight.lift.lift(&ridge.edges, reach, &mut self.rows, &mut self.weights, &mut self.slots, &mut self.places);
+        sight.lift.lift(&ridge.edges, reach, &mut self.rows, &mut self.weights, &mut self.slots, &mut self.numbers);
         let limit = plane_max_rad.sin();
         let turn: [[f32; 3]; 3] = std::array::from_fn(|i| std::array::from_fn(|j| robot_from_upright[(j, i)] as f32));
-        let upright = |[x, y, z]: [f32; 3]| {
-            let row = |[a, b, c]: [f32; 3]| a * x + b * y + c * z;
-            (row(turn[0]), row(turn[1]), row(turn[2]))
+        let (gx, gy) = (ridge.edges.gx(), ridge.edges.gy());
+        let place = |number: u32| {
+            let place = ridge.edges.place()[number as usize];
+            ((place & 0xffff) as usize, (place >> 16) as usize)
+        };
+        // The pixel beside, on whose side the edge is.
+        let beside = |number: u32| {
+            let ((u, v), number) = (place(number), number as usize);
+            let step = |at: usize| if ridge.shift_px()[number] < 0.0 { at.saturating_sub(1) } else { at + 1 };
+            if gx[number].abs() >= gy[number].abs() { (step(u), v) } else { (u, step(v)) }
         };
         self.unsorted.clear();
-        let (gx, gy) = (ridge.edges.gx(), ridge.edges.gy());
-        for ((row, slot), place) in self.rows.iter().zip(&self.slots).zip(&self.places) {
+        let (block, mut n) = (&mut self.block, 0);
+        for (k, (row, number)) in self.rows.iter().zip(&self.numbers).enumerate() {
+            if let Some(later) = self.numbers.get(k + AHEAD) {
+                sight.expect(place(*later).0, place(*later).1, beside(*later).1);
+            }
             if row.dot(&up).abs() > limit {
                 continue;
             }
-            let place = *place as usize;
-            let (u, v) = sight.region.place(*slot as usize);
-            let (u, v) = (usize::from(u), usize::from(v));
-            let shift = ridge.shift_px()[place];
-            let step = |at: usize| if shift < 0.0 { at.saturating_sub(1) } else { at + 1 };
-            let next = if gx[place].abs() >= gy[place].abs() { sight.ray(step(u), v) } else { sight.ray(u, step(v)) };
-            let (Some(here), Some(next)) = (sight.ray(u, v), next) else { continue };
-            let ((ax, ay, az), (bx, by, bz)) = (upright(here), upright(next));
-            let flat = ax * ax + ay * ay;
-            let per_px = (ax * by - ay * bx) / flat.max(1e-6);
-            if per_px.abs() < 1e-6 || flat < 1e-4 {
-                continue;
+            let ((u, v), (nu, nv)) = (place(*number), beside(*number));
+            let (Some(here), Some(next)) = (sight.ray(u, v), sight.ray(nu, nv)) else { continue };
+            for i in 0..3 {
+                (block.here[i][n], block.next[i][n], block.normal[i][n]) = (here[i], next[i], row[i] as f32);
             }
-            let share = shift.abs();
-            let (x, y, z) = (ax + share * (bx - ax), ay + share * (by - ay), az + share * (bz - az));
-            let (nx, ny, _) = upright([row.x as f32, row.y as f32, row.z as f32]);
-            self.unsorted.push(Candidate {
-                azimuth: atan2(ay, ax) + share * per_px,
-                per_px: per_px.abs(),
-                px_per_rad: 1.0 / per_px.abs(),
-                slope: z / (x * x + y * y).sqrt(),
-                rising: ny * ax - nx * ay > 0.0,
-                taken: false,
-            });
+            block.share[n] = ridge.shift_px()[*number as usize].abs();
+            n += 1;
+            if n == BLOCK {
+                place_edges(block, &turn);
+                block.append(n, &mut self.unsorted);
+                n = 0;
+            }
         }
+        place_edges(block, &turn);
+        block.append(n, &mut self.unsorted);
         self.sort(bins);
     }
 
@@ -113,6 +116,82 @@ impl Candidates {
         }
         self.starts.rotate_right(1);
         self.starts[0] = 0;
+    }
+}
+
+/// Ridge pixels whose edges are placed together.
+const BLOCK: usize = 64;
+
+/// How many pixels ahead rays are asked for.
+const AHEAD: usize = 12;
+
+/// Ridge pixels: rays of each and of one beside, how far the edge is from the one to the other, and the normals of their great
+/// circles; and what follows from it.
+#[derive(Debug, Clone)]
+struct Block {
+    here: [[f32; BLOCK]; 3],
+    next: [[f32; BLOCK]; 3],
+    normal: [[f32; BLOCK]; 3],
+    share: [f32; BLOCK],
+    azimuth: [f32; BLOCK],
+    /// Zero where the azimuth is not known.
+    per_px: [f32; BLOCK],
+    slope: [f32; BLOCK],
+    /// Above zero where it is brighter towards greater azimuth.
+    rise: [f32; BLOCK],
+}
+
+impl Default for Block {
+    fn default() -> Self {
+        let (none, three) = ([0.0; BLOCK], [[0.0; BLOCK]; 3]);
+        Self {
+            here: three,
+            next: three,
+            normal: three,
+            share: none,
+            azimuth: none,
+            per_px: none,
+            slope: none,
+            rise: none,
+        }
+    }
+}
+
+impl Block {
+    /// Appends those of the first `n` pixels whose azimuth is known.
+    fn append(&self, n: usize, out: &mut Vec<Candidate>) {
+        let known = (0..n).filter(|k| self.per_px[*k] > 0.0);
+        out.extend(known.map(|k| Candidate {
+            azimuth: self.azimuth[k],
+            per_px: self.per_px[k],
+            px_per_rad: 1.0 / self.per_px[k],
+            slope: self.slope[k],
+            rising: self.rise[k] > 0.0,
+            taken: false,
+        }));
+    }
+}
+
+/// Places the edges of a block between their pixels, in the upright frame, whose axes are the rows of `turn`.
+#[multiversion(targets("x86_64+avx512f+avx512vl", "x86_64+avx2"))]
+fn place_edges(block: &mut Block, turn: &[[f32; 3]; 3]) {
+    let Block { here, next, normal, share, azimuth, per_px, slope, rise } = block;
+    let upright = |axis: usize, [x, y, z]: &[[f32; BLOCK]; 3], k: usize| {
+        let [a, b, c] = turn[axis];
+        a * x[k] + b * y[k] + c * z[k]
+    };
+    for k in 0..BLOCK {
+        let (ax, ay, az) = (upright(0, here, k), upright(1, here, k), upright(2, here, k));
+        let (bx, by, bz) = (upright(0, next, k), upright(1, next, k), upright(2, next, k));
+        let flat = ax * ax + ay * ay;
+        let turned = (ax * by - ay * bx) / flat.max(1e-6);
+        let share = share[k];
+        let (x, y, z) = (ax + share * (bx - ax), ay + share * (by - ay), az + share * (bz - az));
+        azimuth[k] = atan2(ay, ax) + share * turned;
+        let known = turned.abs() >= 1e-6 && flat >= 1e-4;
+        per_px[k] = if known { turned.abs() } else { 0.0 };
+        slope[k] = z / (x * x + y * y).sqrt();
+        rise[k] = upright(1, normal, k) * ax - upright(0, normal, k) * ay;
     }
 }
 

@@ -2,7 +2,7 @@
 
 use std::f64::consts::{FRAC_PI_2, PI};
 
-use super::descriptor::DescriptorOptions;
+use super::descriptor_options::DescriptorOptions;
 use crate::edges::{EdgeOptions, Mask};
 use crate::error::{Error, Result};
 

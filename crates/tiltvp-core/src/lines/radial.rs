@@ -102,7 +102,7 @@ pub(super) fn find(
             let (x, y) = ((u as f64 - center.x) as f32, (v as f64 - center.y) as f32);
             let distance = x.hypot(y);
             if magnitude[i] < gradient_min
-                || !sight.clear[i]
+                || sight.clearance[i] == 0
                 || f64::from(distance) > radii.outer
                 || f64::from(distance) < radii.inner
             {

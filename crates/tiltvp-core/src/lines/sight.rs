@@ -6,6 +6,7 @@ use super::options::LineOptions;
 use crate::camera::Camera;
 use crate::edges::{EdgeOptions, LiftTable, NormalKind, Region, Screen};
 use crate::error::Result;
+use crate::image::expect;
 
 /// The unit of a table of bearings.
 const UNIT: f32 = 1.0 / 32767.0;
@@ -22,8 +23,9 @@ pub(super) struct Sight {
     /// Bearing of every pixel in the robot frame, in row order and units of [`UNIT`]: half the memory of single precision, to
     /// a thousandth of a degree. [`NO_RAY`] where there is none.
     rays: Vec<[i16; 3]>,
-    /// Whether the world is seen at a pixel and around it, in row order.
-    pub(super) clear: Vec<bool>,
+    /// How many pixels away, along rows, columns or both, the nearest is at or around which the world is not seen, at most 255;
+    /// in row order.
+    pub(super) clearance: Vec<u8>,
     pub(super) width: usize,
     pub(super) height: usize,
     /// Lowest and highest elevation, in radians, that are seen in most directions.
@@ -49,14 +51,30 @@ impl Sight {
         let usable = |u: usize, v: usize| {
             rays[v * width + u][0] != NO_RAY && options.mask.as_ref().is_none_or(|mask| mask.usable(u, v))
         };
-        let mut clear = vec![false; width * height];
+        let mut clear = vec![0; width * height];
         for v in 1..height.saturating_sub(1) {
             for u in 1..width.saturating_sub(1) {
-                clear[v * width + u] = (v - 1..=v + 1).all(|y| (u - 1..=u + 1).all(|x| usable(x, y)));
+                let sees = (v - 1..=v + 1).all(|y| (u - 1..=u + 1).all(|x| usable(x, y)));
+                clear[v * width + u] = u8::MAX * u8::from(sees);
             }
         }
+        let clearance = distances(clear, width);
         let band = band_of(&region);
-        Ok(Self { region, lift, screen, rays, clear, width, height, band })
+        Ok(Self { region, lift, screen, rays, clearance, width, height, band })
+    }
+
+    /// Whether the world is seen at every pixel up to `reach` away from `(u, v)`, along rows, columns or both, and around it.
+    #[inline]
+    pub(super) fn is_clear_around(&self, u: i32, v: i32, reach: u32) -> bool {
+        let (Ok(u), Ok(v)) = (usize::try_from(u), usize::try_from(v)) else { return false };
+        u < self.width && self.clearance.get(v * self.width + u).is_some_and(|clear| u32::from(*clear) > reach)
+    }
+
+    /// Asks for the rays of a pixel and one above or below it, which will be read soon.
+    #[inline]
+    pub(super) fn expect(&self, u: usize, v: usize, beside: usize) {
+        expect(&self.rays, v * self.width + u);
+        expect(&self.rays, beside * self.width + u);
     }
 
     /// The ray of a pixel, and whether it has one.
@@ -67,6 +85,23 @@ impl Sight {
             _ => None,
         }
     }
+}
+
+/// From 255 and 0 the distances to the nearest 0, along rows, columns or both, of an image whose border is 0.
+fn distances(mut values: Vec<u8>, width: usize) -> Vec<u8> {
+    let relax = |values: &mut [u8], at: usize, before: [usize; 4]| {
+        let nearest = before.into_iter().map(|k| values[k]).min().unwrap_or(0);
+        values[at] = values[at].min(nearest.saturating_add(1));
+    };
+    let inner = |at: &usize| (1..width.saturating_sub(1)).contains(&(at % width));
+    let rows = width..values.len().saturating_sub(width);
+    for at in rows.clone().filter(inner) {
+        relax(&mut values, at, [at - 1, at - width - 1, at - width, at - width + 1]);
+    }
+    for at in rows.rev().filter(inner) {
+        relax(&mut values, at, [at + 1, at + width - 1, at + width, at + width + 1]);
+    }
+    values
 }
 
 /// The elevations that three quarters of the directions see, of those that see any.
@@ -88,4 +123,22 @@ fn band_of(region: &Region) -> (f64, f64) {
     let (low, high) = (lows[3 * (lows.len() - 1) / 4], highs[(highs.len() - 1) / 4]);
     // A camera that sees no elevation in most directions: what it sees in any.
     if high - low > 0.05 { (low, high) } else { (lows[0], highs[highs.len() - 1].max(lows[0] + 0.05)) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn distances_are_those_to_the_nearest_zero() {
+        let (width, height) = (23, 17);
+        let edge = |at: usize, n: usize| at == 0 || at + 1 == n;
+        let zero = |i: usize| edge(i % width, width) || edge(i / width, height) || (i * 7919).is_multiple_of(83);
+        let values: Vec<u8> = (0..width * height).map(|i| if zero(i) { 0 } else { 255 }).collect();
+        for (at, found) in distances(values, width).into_iter().enumerate() {
+            let away = |i: usize| (i % width).abs_diff(at % width).max((i / width).abs_diff(at / width));
+            let nearest = (0..width * height).filter(|i| zero(*i)).map(away).min().unwrap();
+            assert_eq!(usize::from(found), nearest);
+        }
+    }
 }

@@ -1,8 +1,6 @@
 //! Lines followed through successive frames: on tracks whose bearings are predicted where the robot's motion is known, else
 //! matched with the last frame that shows them.
 
-use std::collections::VecDeque;
-
 use super::assignment::{AssignmentScratch, FORBIDDEN, assign};
 use super::candidates::wrap;
 use super::dissimilarity::descriptor_distance;
@@ -11,57 +9,8 @@ use super::matcher::{MatchScratch, select};
 use super::order::Match;
 use super::parallax::{Motion, Parallax};
 use super::tracker_options::TrackerOptions;
+use super::tracker_state::{Followed, FrameMemory, TrackedLine, TrackerState};
 use crate::error::{Error, Result};
-
-/// A line of a frame and whose it is.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct TrackedLine {
-    /// Number of the frame, from 0.
-    pub frame: u64,
-    /// Identity, from 0; never given twice.
-    pub track: u64,
-    /// How many frames ago the line was last seen; 0 for a new one.
-    pub frames_back: u32,
-    /// The line.
-    pub line: Line,
-}
-
-/// What the tracker remembers of a frame.
-#[derive(Debug, Clone, PartialEq, Default)]
-pub struct FrameMemory {
-    /// Identity of each line.
-    pub tracks: Vec<u64>,
-    /// Descriptors, one after the other.
-    pub descriptors: Vec<f32>,
-}
-
-/// What the tracker remembers of a track that is followed by its bearing.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Followed {
-    /// Identity.
-    pub track: u64,
-    /// Number of the frame that showed it last.
-    pub seen: u64,
-    /// Where it is expected in the latest frame.
-    pub parallax: Parallax,
-    /// [`Line::polarity`] when it was seen last.
-    pub polarity: f64,
-    /// Descriptor when it was seen last.
-    pub descriptor: Vec<f32>,
-}
-
-/// All that a tracker remembers.
-#[derive(Debug, Clone, PartialEq, Default)]
-pub struct TrackerState {
-    /// Number of the next frame.
-    pub next_frame: u64,
-    /// Identity of the next new line.
-    pub next_track: u64,
-    /// The last frames, the latest first.
-    pub frames: VecDeque<FrameMemory>,
-    /// Tracks of the frames since the motion is known, and of the one before.
-    pub followed: Vec<Followed>,
-}
 
 /// Follows lines through successive frames (paper 001 section 9.1). The same calls give the same answers.
 #[derive(Debug, Clone, Default)]
@@ -95,19 +44,7 @@ impl LineTracker {
     /// [`Error::InvalidOption`], or [`Error::InvalidArgument`] for a state that no tracker has.
     pub fn with_state(options: TrackerOptions, state: TrackerState) -> Result<Self> {
         options.validate()?;
-        let is_known = |track: &u64| *track < state.next_track;
-        let is_whole = |frame: &FrameMemory| match frame.tracks.len() {
-            0 => frame.descriptors.is_empty(),
-            n => frame.descriptors.len().is_multiple_of(n) && frame.tracks.iter().all(is_known),
-        };
-        let is_true = |edge: &Followed| is_known(&edge.track) && edge.seen < state.next_frame;
-        if !state.frames.iter().all(is_whole) || !state.followed.iter().all(is_true) {
-            return Err(Error::argument(
-                "state",
-                "frames or tracks whose parts disagree",
-                "a state that a tracker gave",
-            ));
-        }
+        state.validate()?;
         Ok(Self { options, state, ..Self::default() })
     }
 
@@ -294,10 +231,7 @@ impl LineTracker {
             let got = format!("{} values for {} lines", descriptors.len(), lines.len());
             return Err(Error::argument("descriptors", got, "as many values for each line"));
         }
-        let frames = self.state.frames.iter().filter(|frame| !frame.tracks.is_empty());
-        let widths = frames.map(|frame| frame.descriptors.len() / frame.tracks.len());
-        let mut widths = widths.chain(self.state.followed.iter().map(|edge| edge.descriptor.len()));
-        match widths.find(|before| width > 0 && *before != width) {
+        match self.state.widths().find(|before| width > 0 && *before != width) {
             None => Ok(width),
             Some(before) => {
                 let expected = format!("{before}, as before");

@@ -2,6 +2,7 @@
 
 use nalgebra::{Matrix3, Vector3};
 
+use super::census::Census;
 use super::loss::Gate;
 use super::problem::Problem;
 use super::real::Real;
@@ -60,6 +61,15 @@ impl<T: Real> Problem for Direction<'_, T> {
         self.rows.count_each_to_beat(&models, threshold, to_beat, counts);
     }
 
+    fn take_census(&self, threshold: f64, census: &mut Census) -> bool {
+        census.take(self.rows, threshold, LEAST_COUNTED_Z);
+        true
+    }
+
+    fn consensus_at_most(&self, census: &Census, model: &Vector3<f64>) -> usize {
+        census.at_most((*model).into())
+    }
+
     fn consensus_among(&self, observations: &[u32], model: &Vector3<f64>, threshold: f64) -> usize {
         self.rows.count_among(observations, (*model).into(), threshold)
     }
@@ -114,6 +124,9 @@ impl<T: Real> Problem for Direction<'_, T> {
 fn upwards(direction: Vector3<f64>) -> Option<Vector3<f64>> {
     (direction.z.abs() > LEAST_Z).then(|| direction * direction.z.signum())
 }
+
+/// The least `z` of directions of which a census tells something: those within 14 degrees of `+z`.
+const LEAST_COUNTED_Z: f64 = 0.97;
 
 /// The least `z` of a unit direction in the chart.
 const LEAST_Z: f64 = 1e-6;

@@ -76,21 +76,16 @@ impl Rows<f32> {
                     &mut slopes,
                 );
             }
-            let last = group_of.len().saturating_sub(1);
             for (k, terms) in terms[..count].iter().enumerate() {
-                let held = LANES.min(n - k * LANES);
-                let mut groups = [0u8; LANES];
                 let members = members.get(first + k * LANES * stride..).unwrap_or(&[]);
-                if let (1, Some(members), false) = (stride, members.first_chunk::<LANES>(), group_of.is_empty()) {
-                    for (group, member) in groups.iter_mut().zip(members) {
-                        *group = group_of[(*member as usize).min(last)];
-                    }
-                } else if !group_of.is_empty() {
-                    for (group, member) in groups[..held].iter_mut().zip(members.iter().step_by(stride)) {
-                        *group = group_of[(*member as usize).min(last)];
+                match members.first_chunk::<LANES>() {
+                    Some(members) if stride == 1 => add(&mut turns, terms, |row| group(group_of, members[row])),
+                    _ => {
+                        // Rows beyond the last have no weight, whatever their group.
+                        let of = |row: usize| members.get(row * stride).map_or(0, |member| group(group_of, *member));
+                        add(&mut turns, terms, of);
                     }
                 }
-                add(&mut turns, terms, &groups);
             }
         }
         let mut sums = GroupSums { groups: [[0.0; 5]; GROUPS], slopes: [0.0; 3] };
@@ -106,12 +101,19 @@ impl Rows<f32> {
     }
 }
 
+/// The group of a member, that of the last one for those beyond, the first where there are none.
+#[inline(always)]
+fn group(group_of: &[u8], member: u32) -> usize {
+    let last = group_of.len().wrapping_sub(1);
+    group_of.get((member as usize).min(last)).map_or(0, |group| usize::from(*group) % GROUPS)
+}
+
 /// Adds the terms of sixteen rows to those of their groups.
-#[inline]
-fn add(turns: &mut Turns, terms: &Terms, groups: &[u8; LANES]) {
-    for (k, groups) in groups.as_chunks::<TURNS>().0.iter().enumerate() {
+#[inline(always)]
+fn add(turns: &mut Turns, terms: &Terms, group: impl Fn(usize) -> usize) {
+    for k in 0..LANES / TURNS {
         for (j, turn) in turns.iter_mut().enumerate() {
-            let sums = &mut turn[usize::from(groups[j]) % GROUPS];
+            let sums = &mut turn[group(TURNS * k + j)];
             let four = &terms.fours[j][k];
             let [a, b, c, d, e, ..] = *sums;
             let quad = [a + four[0], b + four[1], c + four[2], d + four[3]];

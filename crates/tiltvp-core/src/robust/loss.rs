@@ -1,6 +1,6 @@
 //! How much an observation counts, given its residual.
 
-use super::score::{CELLS, MARGINAL, cell, slope_at, weight_most};
+use super::marginal::{CELLS, MARGINAL, cell, slope_at, weight_most};
 
 /// The gate that a residual must pass.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -42,17 +42,19 @@ pub enum Shape {
     Within,
     /// The weights of a table.
     Marginal,
-    /// A power of a parabola; of a flat one for the open gate.
+    /// A power of a parabola.
     Soft,
+    /// None.
+    Open,
 }
 
 impl Gate {
-    /// The `(limit^2, 1 / reach^2)` in which the kernels evaluate the gate.
+    /// The limit, and `1 / reach^2`, in which the kernels evaluate the gate.
     pub(super) fn coefficients(self) -> (f64, f64) {
         match self {
             Self::Open => (f64::INFINITY, 0.0),
-            Self::Hard { threshold } | Self::Within { threshold } => (threshold * threshold, 0.0),
-            Self::Marginal { threshold } => (threshold * threshold, 1.0 / (threshold * threshold)),
+            Self::Hard { threshold } | Self::Within { threshold } => (threshold, 0.0),
+            Self::Marginal { threshold } => (threshold, 1.0 / (threshold * threshold)),
             Self::Soft { scale } => (f64::INFINITY, 1.0 / (16.0 * scale * scale)),
         }
     }
@@ -63,7 +65,8 @@ impl Gate {
             Self::Hard { .. } => Shape::Hard,
             Self::Within { .. } => Shape::Within,
             Self::Marginal { .. } => Shape::Marginal,
-            Self::Open | Self::Soft { .. } => Shape::Soft,
+            Self::Soft { .. } => Shape::Soft,
+            Self::Open => Shape::Open,
         }
     }
 }
@@ -76,7 +79,7 @@ impl Gate {
         if matches!(self, Self::Marginal { .. }) {
             return f64::from(MARGINAL.weight[cell(((squared * inverse) as f32).sqrt())]);
         }
-        if squared > limit { 0.0 } else { (1.0 - squared * inverse).max(0.0).powi(8) }
+        if squared > limit * limit { 0.0 } else { (1.0 - squared * inverse).max(0.0).powi(8) }
     }
 
     /// The derivative of `residual * weight(residual)`, which is what a fit feels of a small change of its model: negative in
@@ -89,7 +92,7 @@ impl Gate {
             return if part < 1.0 { slope_at(part) / weight_most() } else { 0.0 };
         }
         let t = (1.0 - squared * inverse).max(0.0);
-        if squared > limit { 0.0 } else { t.powi(7) * (17.0 * t - 16.0) }
+        if squared > limit * limit { 0.0 } else { t.powi(7) * (17.0 * t - 16.0) }
     }
 }
 

@@ -1,12 +1,14 @@
 //! Robust fits that know no vision: one random-sampling loop, one trimming loop, one reweighting loop.
 
 mod aligned;
+mod census;
 mod compaction;
 mod direction;
 mod grouped;
 mod lanes;
 mod local;
 mod loss;
+mod marginal;
 mod problem;
 mod prosac;
 mod ransac;
@@ -21,6 +23,7 @@ mod total;
 mod vectors;
 mod verification;
 
+pub use census::Census;
 pub(crate) use compaction::{Block, Kept, ROOM, compact};
 pub use direction::Direction;
 pub use grouped::{GROUPS, GroupSums};

@@ -1,5 +1,6 @@
 //! What a robust fit asks of a model-fitting problem.
 
+use super::census::Census;
 use super::loss::Gate;
 use super::sampling::Score;
 
@@ -35,6 +36,17 @@ pub trait Problem {
         for (model, count) in models.iter().zip(counts) {
             *count = model.as_ref().map_or(0, |model| self.consensus(model, threshold, to_beat));
         }
+    }
+
+    /// Takes the census by which [`consensus_at_most`](Self::consensus_at_most) bounds the consensus of models for a threshold;
+    /// whether there is one for such problems.
+    fn take_census(&self, _threshold: f64, _census: &mut Census) -> bool {
+        false
+    }
+
+    /// No less than the [`consensus`](Self::consensus) of a model for the threshold of the census that was taken.
+    fn consensus_at_most(&self, _census: &Census, _model: &Self::Model) -> usize {
+        self.len()
     }
 
     /// [`consensus`](Self::consensus) among the listed observations alone.

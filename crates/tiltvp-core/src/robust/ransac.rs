@@ -1,5 +1,6 @@
 //! The one random-sampling loop (Fischler and Bolles 1981), as paper 000 section 2.1.4 uses it.
 
+use super::census::Census;
 use super::local::improve;
 use super::loss::Gate;
 use super::problem::Problem;
@@ -15,6 +16,9 @@ const MAX_SAMPLE: usize = 8;
 
 /// Models that are counted at once, where nothing learnt from one bears on the next sample.
 const AT_ONCE: usize = 8;
+
+/// Models of which those are counted at once that a census leaves.
+const BOUNDED_AT_ONCE: usize = 32;
 
 /// Options of [`ransac`].
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -61,12 +65,13 @@ pub struct RansacScratch {
     keys: Vec<u64>,
     order: Vec<u32>,
     probes: Vec<u32>,
+    census: Census,
 }
 
 impl RansacScratch {
     /// Makes room for `capacity` observations, sampled in this way, so that no fit of so many allocates.
     pub fn reserve(&mut self, sampling: &Sampling, capacity: usize) {
-        let Self { keys, order, probes } = self;
+        let Self { keys, order, probes, census } = self;
         if sampling.order != SampleOrder::Uniform {
             keys.clear();
             keys.reserve(capacity);
@@ -77,7 +82,27 @@ impl RansacScratch {
             probes.clear();
             probes.reserve(capacity);
         }
+        if *sampling == Sampling::default() && Census::pays(capacity, u32::MAX) {
+            census.reserve();
+        }
     }
+}
+
+/// Counts the consensus of models, or of those that may beat the best. What a census bounds from above by the best count has any
+/// count up to that: it would not be taken, however many there are.
+fn count_hopeful<P: Problem>(
+    problem: &P,
+    census: Option<&Census>,
+    models: &[Option<P::Model>],
+    (threshold, to_beat): (f64, usize),
+    counts: &mut [usize],
+) {
+    let Some(census) = census else { return problem.consensus_of_each(models, threshold, to_beat, counts) };
+    let mut hopeful = [const { None }; BOUNDED_AT_ONCE];
+    for (hopeful, model) in hopeful.iter_mut().zip(models) {
+        *hopeful = model.clone().filter(|model| problem.consensus_at_most(census, model) > to_beat);
+    }
+    problem.consensus_of_each(&hopeful[..models.len()], threshold, to_beat, counts);
 }
 
 /// Draws minimal samples, keeps the model with the best score, and refits it to its consensus set.
@@ -97,7 +122,7 @@ pub fn ransac<P: Problem>(
     if len < P::SAMPLE_SIZE {
         return FitReport::failed(Stop::TooFew { have: len, need: P::SAMPLE_SIZE }, 0);
     }
-    let RansacScratch { keys, order, probes } = scratch;
+    let RansacScratch { keys, order, probes, census } = scratch;
     let mut sampler = match sampling.order {
         SampleOrder::Uniform => Sampler::uniform(options.seed, len),
         SampleOrder::Progressive { uniform_after, .. } => {
@@ -116,18 +141,28 @@ pub fn ransac<P: Problem>(
     let mut needed = options.max_trials;
     let mut trials = 0;
     // Samples drawn ahead of what is known of them; they are looked at in turn, so that all is as if they had not been.
-    let ahead = if *sampling == Sampling::default() { AT_ONCE } else { 1 };
-    let (mut models, mut counts, mut drawn) = ([const { None }; AT_ONCE], [0; AT_ONCE], 0..0);
+    let plain = *sampling == Sampling::default();
+    let (mut models, mut counts, mut drawn) = ([const { None }; BOUNDED_AT_ONCE], [0; BOUNDED_AT_ONCE], 0..0);
+    let mut bounded = false;
     while trials < needed.min(options.max_trials) {
         if drawn.is_empty() {
-            drawn = 0..ahead.min((needed.min(options.max_trials) - trials) as usize);
+            let left = needed.min(options.max_trials) - trials;
+            if plain && !bounded && best.is_some() && Census::pays(len, left) {
+                bounded = problem.take_census(threshold, census);
+            }
+            let ahead = match (plain, bounded) {
+                (false, _) => 1,
+                (true, false) => AT_ONCE,
+                (true, true) => BOUNDED_AT_ONCE,
+            };
+            drawn = 0..ahead.min(left as usize);
             for model in &mut models[drawn.clone()] {
                 sampler.draw(sample);
                 *model = problem.fit_minimal(sample);
             }
-            if ahead > 1 {
-                let most = best.as_ref().map_or(0.0, |(most, _)| *most) as usize;
-                problem.consensus_of_each(&models[drawn.clone()], threshold, most, &mut counts[drawn.clone()]);
+            if plain {
+                let (census, most) = (bounded.then_some(&*census), best.as_ref().map_or(0, |(most, _)| *most as usize));
+                count_hopeful(problem, census, &models[drawn.clone()], (threshold, most), &mut counts[drawn.clone()]);
             }
         }
         trials += 1;
@@ -139,7 +174,7 @@ pub fn ransac<P: Problem>(
         }
         let most = best.as_ref().map_or(0.0, |(most, _)| *most);
         // Counts are exact in double precision.
-        let score = if ahead > 1 { counts[next] as f64 } else { sampling.score.of(problem, &model, threshold, most) };
+        let score = if plain { counts[next] as f64 } else { sampling.score.of(problem, &model, threshold, most) };
         if best.is_some() && score <= most {
             continue;
         }

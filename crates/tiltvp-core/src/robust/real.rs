@@ -3,9 +3,9 @@
 use multiversion::multiversion;
 
 use super::aligned::Dense;
-use super::lanes::{self, HARD, REJECTED, SOFT, WITHIN};
+use super::lanes::{self, HARD, ONES, OPEN, REJECTED, SOFT, WITHIN};
 use super::loss::Shape;
-use super::score::{DEGREE, MARGINAL, cell, marginal_gain};
+use super::marginal::{DEGREE, MARGINAL, cell, marginal_gain};
 use super::total::Total;
 use super::vectors::LANES;
 
@@ -34,8 +34,13 @@ pub trait Real:
     fn to_f64(self) -> f64;
     /// Rounds to single precision.
     fn to_f32(self) -> f32;
+    /// Without its sign.
+    #[must_use]
+    fn magnitude(self) -> Self;
+    /// The largest number whose square, rounded, is at most the square of a threshold.
+    fn reach(threshold: f64) -> Self;
     #[doc(hidden)]
-    fn count(rows: [&[Self]; 3], model: [Self; 3], limit: Self) -> usize;
+    fn count(rows: [&[Self]; 3], model: [Self; 3], reach: Self) -> usize;
     #[doc(hidden)]
     fn gather(
         rows: [&[Self]; 3],
@@ -43,6 +48,7 @@ pub trait Real:
         model: [Self; 3],
         gains: (Self, Self),
         shape: Shape,
+        ones: bool,
         total: &mut Total,
     );
     #[doc(hidden)]
@@ -55,7 +61,7 @@ fn gather_body<T: Real, const SHAPE: u8>(
     [x, y, z]: [&[T]; 3],
     weights: &mut [f32],
     [h0, h1, h2]: [T; 3],
-    (limit, inverse): (T, T),
+    (reach, inverse): (T, T),
     total: &mut Total,
 ) {
     let (one, zero) = (T::from_f64(1.0), T::default());
@@ -67,11 +73,13 @@ fn gather_body<T: Real, const SHAPE: u8>(
     for i in 0..n {
         d[i] = x[i] * h0 + y[i] * h1 + z[i] * h2;
         let dd = d[i] * d[i];
-        if SHAPE == HARD {
-            weights[i] = if dd <= limit { weights[i] } else { 0.0 };
+        if SHAPE == OPEN {
+            w[i] = T::from_f32(weights[i]);
+        } else if SHAPE == HARD {
+            weights[i] = if d[i].magnitude() <= reach { weights[i] } else { 0.0 };
             w[i] = T::from_f32(weights[i]);
         } else if SHAPE == WITHIN {
-            w[i] = T::from_f32(if dd <= limit { weights[i] } else { 0.0 });
+            w[i] = T::from_f32(if d[i].magnitude() <= reach { weights[i] } else { 0.0 });
         } else if SHAPE == MARGINALS {
             w[i] = T::from_f32(weights[i] * table.weight[cell((dd * inverse).to_f32().sqrt())]);
         } else {
@@ -156,6 +164,7 @@ macro_rules! real {
                 model: [$float; 3],
                 gains: ($float, $float),
                 shape: Shape,
+                _ones: bool,
                 total: &mut Total,
             ) {
                 match shape {
@@ -163,6 +172,7 @@ macro_rules! real {
                     Shape::Within => gather_body::<$float, WITHIN>(rows, weights, model, gains, total),
                     Shape::Marginal => gather_body::<$float, MARGINALS>(rows, weights, model, gains, total),
                     Shape::Soft => gather_body::<$float, SOFT>(rows, weights, model, gains, total),
+                    Shape::Open => gather_body::<$float, OPEN>(rows, weights, model, gains, total),
                 }
             }
 
@@ -193,8 +203,24 @@ macro_rules! real {
             fn to_f64(self) -> f64 {
                 f64::from(self)
             }
-            fn count(rows: [&[Self]; 3], model: [Self; 3], limit: Self) -> usize {
-                $count(rows, model, limit)
+            fn magnitude(self) -> Self {
+                self.abs()
+            }
+            fn reach(threshold: f64) -> Self {
+                let limit = (threshold * threshold) as Self;
+                // Near the root of the number half-way to the next; a few steps mend what is rounded.
+                let mut reach = (0.5 * (f64::from(limit) + f64::from(limit.next_up()))).sqrt() as Self;
+                for _ in 0..4 {
+                    reach = if reach * reach > limit { reach.next_down() } else { reach };
+                }
+                for _ in 0..4 {
+                    let next = reach.next_up();
+                    reach = if next * next <= limit { next } else { reach };
+                }
+                reach
+            }
+            fn count(rows: [&[Self]; 3], model: [Self; 3], reach: Self) -> usize {
+                $count(rows, model, reach)
             }
             fn gather(
                 rows: [&[Self]; 3],
@@ -202,9 +228,10 @@ macro_rules! real {
                 model: [Self; 3],
                 gains: (Self, Self),
                 shape: Shape,
+                ones: bool,
                 total: &mut Total,
             ) {
-                $gather(rows, weights, model, gains, shape, total);
+                $gather(rows, weights, model, gains, shape, ones, total);
             }
             fn gain(rows: [&[Self]; 3], model: [Self; 3], inverse: Self, marginal: Option<&[f32; DEGREE + 1]>) -> f64 {
                 $module::gain(rows, model, inverse, marginal)
@@ -220,10 +247,10 @@ real!(f32, single, LONG, lanes::count, gather_single);
 real!(f64, double, BLOCK, count_double, double::gather);
 
 #[multiversion(targets("x86_64+avx512f+avx512vl", "x86_64+avx2"))]
-fn count_double([x, y, z]: [&[f64]; 3], [h0, h1, h2]: [f64; 3], limit: f64) -> usize {
+fn count_double([x, y, z]: [&[f64]; 3], [h0, h1, h2]: [f64; 3], reach: f64) -> usize {
     let within = |((x, y), z): ((&f64, &f64), &f64)| {
         let d = x * h0 + y * h1 + z * h2;
-        u32::from(d * d <= limit)
+        u32::from(d.abs() <= reach)
     };
     x.iter().zip(y).zip(z).map(within).sum::<u32>() as usize
 }
@@ -238,6 +265,7 @@ fn gather_single(
     model: [f32; 3],
     gains: (f32, f32),
     shape: Shape,
+    ones: bool,
     total: &mut Total,
 ) {
     let gate = match shape {
@@ -245,7 +273,9 @@ fn gather_single(
         Shape::Within => WITHIN,
         Shape::Soft => SOFT,
         Shape::Rejected => REJECTED,
-        Shape::Marginal => return single::gather(rows, weights, model, gains, shape, total),
+        Shape::Open => OPEN,
+        Shape::Marginal => return single::gather(rows, weights, model, gains, shape, ones, total),
     };
+    let gate = if ones && matches!(gate, HARD | REJECTED | OPEN) { ONES + gate } else { gate };
     lanes::gather(rows, weights, model, [gains.0, gains.1], gate, total);
 }

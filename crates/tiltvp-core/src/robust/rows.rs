@@ -4,9 +4,9 @@ use nalgebra::{Matrix2, Matrix3, Vector2, Vector3};
 
 use super::aligned::Aligned;
 use super::loss::{Gate, Shape};
+use super::marginal::MARGINAL;
 use super::real::{BLOCK, Real};
 use super::sampling::Score;
-use super::score::MARGINAL;
 use super::total::Total;
 
 /// Rows in structure-of-arrays form, in single precision for pixels or double for the user's own numbers.
@@ -107,11 +107,11 @@ impl<T: Real> Rows<T> {
 
     /// [`count_within`](Self::count_within) that stops as soon as it cannot exceed `to_beat`, with some count up to that.
     pub fn count_to_beat(&self, model: [f64; 3], threshold: f64, to_beat: usize) -> usize {
-        let (model, limit) = (model.map(T::from_f64), T::from_f64(threshold * threshold));
+        let (model, reach) = (model.map(T::from_f64), T::reach(threshold));
         let mut count = 0;
         for start in (0..self.len).step_by(COUNTED) {
             let end = (start + COUNTED).min(self.len);
-            count += T::count(self.columns().map(|column| &column[start..end]), model, limit);
+            count += T::count(self.columns().map(|column| &column[start..end]), model, reach);
             if count + (self.len - end) <= to_beat {
                 break;
             }
@@ -128,14 +128,14 @@ impl<T: Real> Rows<T> {
         to_beat: usize,
         counts: &mut [usize],
     ) {
-        let limit = T::from_f64(threshold * threshold);
+        let reach = T::reach(threshold);
         counts.fill(0);
         for start in (0..self.len).step_by(COUNTED) {
             let end = (start + COUNTED).min(self.len);
             let rows = self.columns().map(|column| &column[start..end]);
             for (model, count) in models.clone().zip(&mut *counts) {
                 if let Some(model) = model.filter(|_| *count + (self.len - start) > to_beat) {
-                    *count += T::count(rows, model.map(T::from_f64), limit);
+                    *count += T::count(rows, model.map(T::from_f64), reach);
                 }
             }
         }
@@ -143,13 +143,13 @@ impl<T: Real> Rows<T> {
 
     /// How many of the listed rows have a residual of at most `threshold`.
     pub fn count_among(&self, rows: &[u32], model: [f64; 3], threshold: f64) -> usize {
-        let ([h0, h1, h2], limit) = (model.map(T::from_f64), T::from_f64(threshold * threshold));
+        let ([h0, h1, h2], reach) = (model.map(T::from_f64), T::reach(threshold));
         let [x, y, z] = self.columns();
         let within = |row: &u32| {
             let place = *row as usize;
             let (Some(x), Some(y), Some(z)) = (x.get(place), y.get(place), z.get(place)) else { return 0 };
             let d = *x * h0 + *y * h1 + *z * h2;
-            usize::from(d * d <= limit)
+            usize::from(d.magnitude() <= reach)
         };
         rows.iter().map(within).sum()
     }
@@ -176,12 +176,21 @@ impl<T: Real> Rows<T> {
     /// Whether row `index` has a residual of at most `threshold`, in the arithmetic of [`count_within`](Self::count_within).
     pub fn is_within(&self, index: usize, model: [f64; 3], threshold: f64) -> bool {
         let row = self.columns().map(|column| column.get(index..=index).unwrap_or(&[]));
-        T::count(row, model.map(T::from_f64), T::from_f64(threshold * threshold)) == 1
+        T::count(row, model.map(T::from_f64), T::reach(threshold)) == 1
     }
 
     /// Applies a gate about a model to the weights and takes the moments of what is left.
     pub fn moments(&self, model: [f64; 3], gate: Gate, weights: &mut [f32]) -> Moments {
-        let total = self.total(model, gate, gate.shape(), weights);
+        self.moments_of(model, gate, false, weights)
+    }
+
+    /// [`moments`](Self::moments) where all weights are ones and zeros, which takes less time.
+    pub fn moments_of_ones(&self, model: [f64; 3], gate: Gate, weights: &mut [f32]) -> Moments {
+        self.moments_of(model, gate, true, weights)
+    }
+
+    fn moments_of(&self, model: [f64; 3], gate: Gate, ones: bool, weights: &mut [f32]) -> Moments {
+        let total = self.total(model, gate, (gate.shape(), ones), weights);
         Moments {
             count: total.count,
             weight: total.sums[0],
@@ -191,16 +200,16 @@ impl<T: Real> Rows<T> {
         }
     }
 
-    fn total(&self, model: [f64; 3], gate: Gate, shape: Shape, weights: &mut [f32]) -> Total {
+    fn total(&self, model: [f64; 3], gate: Gate, (shape, ones): (Shape, bool), weights: &mut [f32]) -> Total {
         let (limit, inverse) = gate.coefficients();
-        let gains = (T::from_f64(limit), T::from_f64(inverse));
+        let gains = (T::reach(limit), T::from_f64(inverse));
         let mut total = Total::default();
         let n = self.len().min(weights.len());
         let block = if shape == Shape::Marginal { BLOCK } else { T::BLOCK };
         for start in (0..n).step_by(block) {
             let part = start..(start + block).min(n);
             let rows = self.columns().map(|column| &column[part.clone()]);
-            T::gather(rows, &mut weights[part], model.map(T::from_f64), gains, shape, &mut total);
+            T::gather(rows, &mut weights[part], model.map(T::from_f64), gains, shape, ones, &mut total);
         }
         total
     }
@@ -210,18 +219,33 @@ impl<T: Real> Rows<T> {
     /// The moments after a hard gate about a model, given those before it: of the rows whose weights it sets to zero, their
     /// moments are taken away. That takes less time than to add up the others, which happens where little would be left.
     pub fn trim(&self, before: &Moments, model: [f64; 3], threshold: f64, weights: &mut [f32]) -> Moments {
+        self.trim_of(before, (model, threshold), false, weights)
+    }
+
+    /// [`trim`](Self::trim) where all weights are ones and zeros, which takes less time.
+    pub fn trim_ones(&self, before: &Moments, model: [f64; 3], threshold: f64, weights: &mut [f32]) -> Moments {
+        self.trim_of(before, (model, threshold), true, weights)
+    }
+
+    fn trim_of(
+        &self,
+        before: &Moments,
+        (model, threshold): ([f64; 3], f64),
+        ones: bool,
+        weights: &mut [f32],
+    ) -> Moments {
         let gate = Gate::Hard { threshold };
         let Some(mut moments) = before.about(model).filter(|_| T::TRIMS) else {
-            return self.moments(model, gate, weights);
+            return self.moments_of(model, gate, ones, weights);
         };
-        let gone = self.total(model, gate, Shape::Rejected, weights);
+        let gone = self.total(model, gate, (Shape::Rejected, ones), weights);
         moments.count -= gone.count.min(moments.count);
         moments.weight -= gone.sums[0];
         for (sum, gone) in moments.sums.iter_mut().zip(&gone.sums[1..]) {
             *sum -= gone;
         }
         if moments.weight < LEFT * moments.whole {
-            return self.moments(model, gate, weights);
+            return self.moments_of(model, gate, ones, weights);
         }
         moments
     }

@@ -1,5 +1,7 @@
 //! Sixteen numbers of single precision at a time, in vectors of any width: the operations that the kernels are written in.
 
+use std::cmp::Ordering;
+
 /// Numbers that are worked on together.
 pub(super) const LANES: usize = 16;
 
@@ -28,6 +30,14 @@ pub(super) trait Lanes: Copy {
     /// The numbers of the mask, and zeros.
     unsafe fn keep(a: Self, mask: Self::Mask) -> Self;
     unsafe fn count(mask: Self::Mask) -> u32;
+    /// Without its sign.
+    unsafe fn abs(a: Self) -> Self;
+    /// Numbers of the mask that are at most the others.
+    unsafe fn at_most_of(mask: Self::Mask, a: Self, b: Self) -> Self::Mask;
+    /// Numbers of the mask that are not.
+    unsafe fn beyond_of(mask: Self::Mask, a: Self, b: Self) -> Self::Mask;
+    /// Zeros for the numbers of the mask, as they are for the others.
+    unsafe fn clear(to: &mut [f32; LANES], mask: Self::Mask);
     /// Four numbers of every row together, see [`Terms::fours`].
     unsafe fn store_fours(columns: [Self; 4], to: &mut [[[f32; 4]; TURNS]; TURNS]);
 }
@@ -91,6 +101,22 @@ impl Lanes for Plain {
         mask.iter().map(|held| u32::from(*held)).sum()
     }
     #[inline(always)]
+    unsafe fn abs(a: Self) -> Self {
+        Self(a.0.map(f32::abs))
+    }
+    #[inline(always)]
+    unsafe fn at_most_of(mask: Self::Mask, a: Self, b: Self) -> Self::Mask {
+        std::array::from_fn(|i| mask[i] && a.0[i] <= b.0[i])
+    }
+    #[inline(always)]
+    unsafe fn beyond_of(mask: Self::Mask, a: Self, b: Self) -> Self::Mask {
+        std::array::from_fn(|i| mask[i] && a.0[i].partial_cmp(&b.0[i]).is_none_or(Ordering::is_gt))
+    }
+    #[inline(always)]
+    unsafe fn clear(to: &mut [f32; LANES], mask: Self::Mask) {
+        to.iter_mut().zip(mask).for_each(|(to, masked)| *to = if masked { 0.0 } else { *to });
+    }
+    #[inline(always)]
     unsafe fn store_fours(columns: [Self; 4], to: &mut [[[f32; 4]; TURNS]; TURNS]) {
         for row in 0..LANES {
             for (column, to) in columns.iter().zip(&mut to[row % TURNS][row / TURNS]) {
@@ -103,13 +129,13 @@ impl Lanes for Plain {
 #[cfg(target_arch = "x86_64")]
 pub(super) mod x86 {
     use std::arch::x86_64::{
-        __m256, __m512, __mmask16, _CMP_LE_OQ, _CMP_LT_OQ, _mm256_add_ps, _mm256_and_ps, _mm256_castps_pd,
-        _mm256_cmp_ps, _mm256_loadu_ps, _mm256_max_ps, _mm256_movemask_ps, _mm256_mul_ps, _mm256_set1_ps,
-        _mm256_setzero_ps, _mm256_storeu_pd, _mm256_storeu_ps, _mm256_sub_ps, _mm256_unpackhi_pd, _mm256_unpackhi_ps,
-        _mm256_unpacklo_pd, _mm256_unpacklo_ps, _mm512_add_ps, _mm512_castps_pd, _mm512_cmp_ps_mask, _mm512_loadu_ps,
-        _mm512_maskz_mov_ps, _mm512_max_ps, _mm512_mul_ps, _mm512_set1_ps, _mm512_setzero_ps, _mm512_storeu_pd,
-        _mm512_storeu_ps, _mm512_sub_ps, _mm512_unpackhi_pd, _mm512_unpackhi_ps, _mm512_unpacklo_pd,
-        _mm512_unpacklo_ps,
+        __m256, __m512, __mmask16, _CMP_LE_OQ, _CMP_LT_OQ, _CMP_NLE_UQ, _mm256_add_ps, _mm256_and_ps, _mm256_andnot_ps,
+        _mm256_castps_pd, _mm256_cmp_ps, _mm256_loadu_ps, _mm256_max_ps, _mm256_movemask_ps, _mm256_mul_ps,
+        _mm256_set1_ps, _mm256_setzero_ps, _mm256_storeu_pd, _mm256_storeu_ps, _mm256_sub_ps, _mm256_unpackhi_pd,
+        _mm256_unpackhi_ps, _mm256_unpacklo_pd, _mm256_unpacklo_ps, _mm512_abs_ps, _mm512_add_ps, _mm512_castps_pd,
+        _mm512_cmp_ps_mask, _mm512_loadu_ps, _mm512_mask_cmp_ps_mask, _mm512_mask_storeu_ps, _mm512_maskz_mov_ps,
+        _mm512_max_ps, _mm512_mul_ps, _mm512_set1_ps, _mm512_setzero_ps, _mm512_storeu_pd, _mm512_storeu_ps,
+        _mm512_sub_ps, _mm512_unpackhi_pd, _mm512_unpackhi_ps, _mm512_unpacklo_pd, _mm512_unpacklo_ps,
     };
 
     use super::{LANES, Lanes, TURNS};
@@ -144,11 +170,23 @@ pub(super) mod x86 {
             at_most(a: Self, b: Self) -> __mmask16 { _mm512_cmp_ps_mask::<_CMP_LE_OQ>(a.0, b.0) }
             below(a: Self, b: Self) -> __mmask16 { _mm512_cmp_ps_mask::<_CMP_LT_OQ>(a.0, b.0) }
             keep(a: Self, mask: __mmask16) -> Self { Self(_mm512_maskz_mov_ps(mask, a.0)) }
+            abs(a: Self) -> Self { Self(_mm512_abs_ps(a.0)) }
+            at_most_of(mask: __mmask16, a: Self, b: Self) -> __mmask16 {
+                _mm512_mask_cmp_ps_mask::<_CMP_LE_OQ>(mask, a.0, b.0)
+            }
+            beyond_of(mask: __mmask16, a: Self, b: Self) -> __mmask16 {
+                _mm512_mask_cmp_ps_mask::<_CMP_NLE_UQ>(mask, a.0, b.0)
+            }
         }
 
         #[inline(always)]
         unsafe fn count(mask: __mmask16) -> u32 {
             mask.count_ones()
+        }
+        #[inline(always)]
+        unsafe fn clear(to: &mut [f32; LANES], mask: __mmask16) {
+            // SAFETY: the caller vouches for the machine, the reference holds 16 numbers.
+            unsafe { _mm512_mask_storeu_ps(to.as_mut_ptr(), mask, _mm512_setzero_ps()) }
         }
 
         #[inline(always)]
@@ -215,6 +253,22 @@ pub(super) mod x86 {
                 (_mm256_cmp_ps::<_CMP_LT_OQ>(a.0, b.0), _mm256_cmp_ps::<_CMP_LT_OQ>(a.1, b.1))
             }
             keep(a: Self, mask: Self::Mask) -> Self { Self(_mm256_and_ps(a.0, mask.0), _mm256_and_ps(a.1, mask.1)) }
+            abs(a: Self) -> Self {
+                let sign = _mm256_set1_ps(-0.0);
+                Self(_mm256_andnot_ps(sign, a.0), _mm256_andnot_ps(sign, a.1))
+            }
+            at_most_of(mask: Self::Mask, a: Self, b: Self) -> Self::Mask {
+                let near = Self::at_most(a, b);
+                (_mm256_and_ps(mask.0, near.0), _mm256_and_ps(mask.1, near.1))
+            }
+            beyond_of(mask: Self::Mask, a: Self, b: Self) -> Self::Mask {
+                let near = Self::at_most(a, b);
+                (_mm256_andnot_ps(near.0, mask.0), _mm256_andnot_ps(near.1, mask.1))
+            }
+            clear(to: &mut [f32; LANES], mask: Self::Mask) -> () {
+                let own = Self::load(to);
+                Self(_mm256_andnot_ps(mask.0, own.0), _mm256_andnot_ps(mask.1, own.1)).store(to);
+            }
             count(mask: Self::Mask) -> u32 {
                 _mm256_movemask_ps(mask.0).count_ones() + _mm256_movemask_ps(mask.1).count_ones()
             }

@@ -2,7 +2,7 @@
 
 use std::collections::VecDeque;
 
-use super::recursive::Outcome;
+use super::outcome::Outcome;
 use crate::filter::chi_square_quantile;
 
 /// Steps with bearings that the test looks back on.
@@ -25,6 +25,7 @@ const STRAY: f64 = 0.1;
 
 /// The innovations of the last steps.
 #[derive(Debug, Clone, PartialEq, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct Alarm {
     /// Normalised innovations squared of the bearings that were used, how many, and how many were rejected.
     steps: VecDeque<(f64, usize, usize)>,

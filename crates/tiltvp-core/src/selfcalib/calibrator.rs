@@ -8,8 +8,9 @@ use super::mounting::Mounting;
 use super::observability::Observability;
 use super::odometry::WheelMotion;
 use super::options::{CalibrationMethod, SelfCalibratorOptions};
+use super::outcome::Outcome;
 use super::paper::PaperFilter;
-use super::recursive::{Outcome, Recursive};
+use super::recursive::Recursive;
 use crate::error::{Error, Result};
 
 /// A mounting as it is believed to be.
@@ -58,11 +59,14 @@ impl MountingEstimate {
     }
 }
 
-/// What is determined and whether there was an alarm, in a sentence.
+/// Whether it can be relied upon, what is determined and whether there was an alarm, in a sentence.
 impl fmt::Display for MountingEstimate {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         if !self.mounting.vector().iter().all(|x| x.is_finite()) {
             return write!(f, "the filter has diverged");
+        }
+        if !self.reliable() {
+            write!(f, "not to be relied upon; ")?;
         }
         write!(f, "{}", self.observability)?;
         if self.alarm {
@@ -85,14 +89,16 @@ pub struct CalibrationStep {
     pub started: usize,
 }
 
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 enum Filter {
     Default(Box<Recursive>),
     Paper(Box<PaperFilter>),
 }
 
 /// Estimates where the camera sits on the robot from wheel displacements and bearings of identified landmarks.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct SelfCalibrator {
     options: SelfCalibratorOptions,
     filter: Filter,
@@ -116,6 +122,16 @@ impl SelfCalibrator {
     /// The options in force.
     pub fn options(&self) -> &SelfCalibratorOptions {
         &self.options
+    }
+
+    /// Whether everything that it remembers fits together, as it does unless it was put together from bytes that were tampered
+    /// with.
+    pub fn is_consistent(&self) -> bool {
+        self.options.validate().is_ok()
+            && match &self.filter {
+                Filter::Default(filter) => filter.is_consistent(),
+                Filter::Paper(filter) => filter.is_consistent(),
+            }
     }
 
     /// Forgets everything but the options.

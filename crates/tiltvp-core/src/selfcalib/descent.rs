@@ -1,10 +1,10 @@
 //! Descents of a graph's cost: Levenberg and Marquardt's, and Gauss and Newton's for a graph that is nearly at rest.
 
-use nalgebra::{DMatrix, DVector, Vector3};
+use nalgebra::{DVector, Vector3};
 
 use super::dense::Factor;
 use super::graph::Graph;
-use super::rows::Fit;
+use super::loss::Fit;
 use super::schur::Eliminated;
 
 /// How an optimisation ended.
@@ -17,8 +17,8 @@ pub(super) struct Descent {
 
 /// A graph at rest.
 pub(super) struct Settled {
-    /// Information about (last pose, dense block).
-    pub(super) information: DMatrix<f64>,
+    /// The normal equations of (last pose, dense block).
+    pub(super) equations: Eliminated,
     pub(super) fit: Fit,
 }
 
@@ -43,7 +43,7 @@ impl Graph {
     /// Moves every unknown by the solution of normal equations, of which the last pose may be part. `None`, and nothing
     /// moves, where they are singular or something is not finite. By how much the cost falls, were it quadratic, due to what
     /// was not eliminated.
-    fn step(&mut self, eliminated: &Eliminated) -> Option<f64> {
+    pub(super) fn step(&mut self, eliminated: &Eliminated) -> Option<f64> {
         let step = Factor::touched(eliminated.information.clone())?.solve(&eliminated.rhs)?;
         let fall = 0.5 * step.dot(&eliminated.rhs);
         let width = self.width();
@@ -110,7 +110,7 @@ impl Graph {
             }
             let fit = self.fit();
             if (fit.cost - (here.fit.cost - here.fall - fall)).abs() < tolerance {
-                return Some(Settled { information: here.information, fit });
+                return Some(Settled { equations: here, fit });
             }
             if fit.cost.is_nan() || fit.cost > reached * (1.0 + 1e-9) {
                 self.restore(&before);
@@ -131,6 +131,7 @@ impl Graph {
     /// The normal equations and the fit where it is.
     pub(super) fn settled(&self) -> Option<Settled> {
         let here = self.eliminate(self.nodes.len() - 1, true, 0.0)?;
-        Some(Settled { information: here.information, fit: here.fit })
+        let fit = here.fit;
+        Some(Settled { equations: here, fit })
     }
 }

@@ -2,14 +2,14 @@
 
 use nalgebra::{DMatrix, DVector, Matrix3, Vector2, Vector3};
 
-use super::loss::{Loss, Slip};
+use super::loss::{Fit, Loss, Slip};
 use super::measurement::{Landmark, Viewpoint, camera, predict, seen_at};
 use super::odometry::{Leg, MotionNoise, WheelMotion, Wheels, between, compose, compose_jacobians};
-use super::rows::Fit;
 use crate::geometry::wrap_angle;
 
 /// A bearing of a landmark.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct Sight {
     pub(super) landmark: usize,
     pub(super) bearing: f64,
@@ -26,6 +26,7 @@ impl Sight {
 
 /// A pose of the robot, the motion that led to it from the one before, and what was seen there.
 #[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct Node {
     pub(super) pose: Vector3<f64>,
     pub(super) leg: Leg,
@@ -60,6 +61,7 @@ pub(super) fn information(covariance: &Matrix3<f64>) -> Matrix3<f64> {
 
 /// What is estimated beside the mounting and the landmarks.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct Free {
     pub(super) wheels: bool,
     pub(super) offset: bool,
@@ -80,6 +82,7 @@ impl Free {
 ///
 /// Minimises half the sum of the squared, whitened residuals of motions, bearings (with a robust loss) and the prior.
 #[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct Graph {
     pub(super) mounting: Vector3<f64>,
     pub(super) wheels: Wheels,
@@ -207,6 +210,13 @@ impl Graph {
             fit.note(residual, self.loss);
         }
         fit
+    }
+
+    /// Whether the motion to a node is farther from what the wheels tell than they explain without slipping.
+    pub(super) fn slipped(&self, to: usize) -> bool {
+        let (before, node) = (&self.nodes[to - 1], &self.nodes[to]);
+        let r = between(&before.pose, &node.pose) - node.leg.motion;
+        self.slip.weight(r.dot(&(node.information * r))) < 1.0
     }
 
     /// The whitened residuals of all bearings, in the order of nodes and sights.

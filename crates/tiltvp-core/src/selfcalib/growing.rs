@@ -5,10 +5,10 @@ use std::collections::BTreeMap;
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 
 use super::graph::{Free, Graph, Node, Sight, information};
+use super::log::{LogBearing, LogOptions};
 use super::loss::{Loss, Slip};
 use super::measurement::{Landmark, camera, predict, seen_at};
 use super::odometry::{Leg, WheelMotion, Wheels, compose};
-use super::offline::{LogBearing, LogOptions};
 use crate::geometry::wrap_angle;
 
 /// Poses with bearings after which the log so far is solved: a share of those that there are, within bounds.

@@ -1,7 +1,8 @@
-//! How much residuals count that are larger than noise explains: of bearings, and of motions.
+//! How much residuals count that are larger than noise explains, of bearings and of motions, and how well all of them fit.
 
 /// How bearings far from their prediction count; thresholds are standard deviations.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(super) enum Loss {
     /// Beyond it linearly (Huber).
     Linear(f64),
@@ -35,6 +36,7 @@ pub(super) const LIMIT: f64 = 4.5;
 
 /// How motions far from what the wheels tell count: beyond so many standard deviations logarithmically, since wheels slip.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct Slip(pub(super) f64);
 
 impl Slip {
@@ -51,6 +53,34 @@ impl Slip {
     pub(super) fn weight(self, squared: f64) -> f64 {
         let limit = self.0 * self.0;
         if squared > limit { limit / squared } else { 1.0 }
+    }
+}
+
+/// How well a problem fits where it was linearised.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub(super) struct Fit {
+    /// Half the sum of the squared, whitened residuals.
+    pub(super) cost: f64,
+    /// Bearings.
+    pub(super) bearings: usize,
+    /// Those of them with whitened residuals beyond [`LIMIT`].
+    pub(super) beyond: usize,
+}
+
+impl Fit {
+    /// Counts a bearing's residual.
+    pub(super) fn note(&mut self, residual: f64, loss: Loss) {
+        self.cost += loss.cost(residual);
+        self.bearings += 1;
+        self.beyond += usize::from(residual.abs() > LIMIT);
+    }
+}
+
+impl std::ops::AddAssign for Fit {
+    fn add_assign(&mut self, other: Self) {
+        self.cost += other.cost;
+        self.bearings += other.bearings;
+        self.beyond += other.beyond;
     }
 }
 

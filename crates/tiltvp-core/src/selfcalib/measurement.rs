@@ -9,6 +9,7 @@ const SMALL: f64 = 0.1;
 ///
 /// The anchor is a number, not an unknown: the place at which the camera was thought to be when it first saw the landmark.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct Landmark {
     pub(super) anchor: Vector2<f64>,
     pub(super) direction: f64,

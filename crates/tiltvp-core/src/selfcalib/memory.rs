@@ -5,27 +5,27 @@ use nalgebra::{DMatrix, DVector, Matrix2, RowVector2, SMatrix, Vector2, Vector3}
 use super::dense::Factor;
 use super::descent::Settled;
 use super::graph::Node;
-use super::loss::{LIMIT, Loss};
+use super::loss::{Fit, LIMIT, Loss};
 use super::measurement::Landmark;
 use super::odometry::between;
-use super::recursive::{MOUNTING, Recursive, YOUNG};
+use super::recursive::{FIRST, MOUNTING, Recursive, YOUNG};
 
 /// Poses up to which other starts are tried where bearings do not fit.
 const SETTLED: usize = 160;
 
-/// How bearings count in the memory: first those far off linearly, then not at all, if these are few.
-pub(super) const FIRST: Loss = Loss::Linear(3.0);
+/// Share of the bearings that may be far off: then they count not at all.
 const FEW: f64 = 0.03;
 
 /// How far the cost may be from what the linear problem foretells where the memory is at rest.
 const TOLERANCE: f64 = 0.05;
 
 impl Recursive {
-    /// Linearises the memory about its own solution, and takes that for mean and covariance.
-    pub(super) fn linearise(&mut self, iterations: u32) {
+    /// Linearises the memory about its own solution, and takes that for mean and covariance; the search for it starts where
+    /// the filter is, if that is `trusted`.
+    pub(super) fn linearise(&mut self, iterations: u32, trusted: bool) {
         let before = self.graph.landmarks.clone();
         self.graph.loss = FIRST;
-        let old = self.graph.nodes.len() >= YOUNG && !self.alarm.uneasy();
+        let old = trusted && self.graph.nodes.len() >= YOUNG && !self.alarm.uneasy();
         if old {
             self.take_filtered();
         }
@@ -51,10 +51,13 @@ impl Recursive {
             }
         }
         let fit = solved.as_ref().map(|solved| solved.fit);
-        if fit.is_some_and(|fit| fit.beyond > 0 && (fit.beyond as f64) < FEW * fit.bearings as f64) {
+        let few = |fit: Fit| (fit.beyond as f64) < FEW * fit.bearings as f64;
+        if fit.is_some_and(|fit| fit.beyond > 0 && few(fit)) {
             solved = self.leave_out(iterations);
+        } else if self.graph.nodes.len() >= YOUNG && fit.is_some_and(few) && self.graph.weigh_landmarks() {
+            solved = self.graph.settle(iterations, TOLERANCE, false);
         }
-        if !solved.is_some_and(|solved| self.adopt(solved.information)) {
+        if !solved.is_some_and(|solved| self.adopt(&solved)) {
             // The filter's mean and covariance are about these.
             self.graph.landmarks = before;
         }
@@ -84,10 +87,11 @@ impl Recursive {
         }
     }
 
-    /// Takes the memory's solution for mean and covariance, whose inverse is given, unless it has none.
-    fn adopt(&mut self, information: DMatrix<f64>) -> bool {
-        let Some(factor) = Factor::touched(information) else { return false };
+    /// Takes the memory's solution for mean and covariance, unless it has none.
+    fn adopt(&mut self, solved: &Settled) -> bool {
+        let Some(factor) = Factor::touched(solved.equations.information.clone()) else { return false };
         self.covariance = factor.inverse();
+        self.widening = self.graph.widening(&solved.equations, &self.covariance);
         self.mean = self.graph.dense().insert_rows(0, 3, 0.0);
         if let Some(node) = self.graph.nodes.last() {
             self.mean.fixed_rows_mut::<3>(0).copy_from(&node.pose);
@@ -149,7 +153,7 @@ impl Recursive {
         }
         let Some(solved) = next.settled() else { return };
         let before = std::mem::replace(&mut self.graph, next);
-        if self.adopt(solved.information) {
+        if self.adopt(&solved) {
             self.names = kept.iter().map(|slot| self.names[*slot]).collect();
             self.misses = kept.iter().map(|slot| self.misses[*slot]).collect();
         } else {

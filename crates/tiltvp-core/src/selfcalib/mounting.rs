@@ -6,6 +6,7 @@ use crate::geometry::wrap_angle;
 
 /// The pose of the camera in the robot's frame: x forward, y left, yaw counter-clockwise.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Mounting {
     /// Forward of the middle of the wheel axle, metres.
     pub x_m: f64,

@@ -4,6 +4,7 @@ use nalgebra::{Matrix2, Matrix3, Matrix3x2, Vector2, Vector3};
 
 /// The displacements of the wheels in one step, metres, forward positive.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct WheelMotion {
     /// Of the left wheel.
     pub left_m: f64,
@@ -36,6 +37,7 @@ impl WheelMotion {
 
 /// Two numbers that wheels may have wrong: which of them runs farther, and how far apart they are.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Wheels {
     /// Half the logarithm of the ratio of the right wheel's true displacement to the left's, given equal readings.
     pub imbalance: f64,
@@ -58,6 +60,7 @@ impl Wheels {
 
 /// How far the motion of a step may be from what the wheels tell.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct MotionNoise {
     /// Variance of a wheel's displacement for each metre of it (eq. 31), metres.
     pub k_m: f64,
@@ -79,6 +82,7 @@ const SIDEWAYS_SHARE: f64 = 0.01;
 
 /// A motion of the robot in its frame at the start of it, its covariance, and its Jacobian by the wheels.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Leg {
     /// Where the robot ends: (x, y, heading), metres and radians.
     pub motion: Vector3<f64>,

@@ -2,53 +2,20 @@
 
 use std::collections::BTreeMap;
 
+use nalgebra::Matrix3;
+
 use super::calibrator::MountingEstimate;
 use super::dense::Factor;
 use super::descent::Descent;
 use super::graph::{Free, Graph};
 use super::growing::{FIRST, along, grown};
+use super::log::{LogBearing, LogOptions, check};
 use super::loss::{LIMIT, Loss};
 use super::mounting::Mounting;
 use super::odometry::{WheelMotion, Wheels};
 use super::options::{CalibrationMethod, SelfCalibratorOptions};
 use super::recursive::Recursive;
 use crate::error::{Error, Result};
-
-/// A bearing of a log.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct LogBearing {
-    /// The step after whose motion it was taken: a place in the list of readings.
-    pub step: usize,
-    /// The number that its landmark always has.
-    pub landmark: u64,
-    /// Radians in the camera's frame, counter-clockwise.
-    pub bearing_rad: f64,
-}
-
-/// What else than the mounting is estimated from a log.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct LogOptions {
-    /// Start, noise and wheel base; the method is that of the filter that gives the first guess.
-    pub filter: SelfCalibratorOptions,
-    /// Whether the wheel base, and which wheel runs farther, are estimated too. Bearings have no scale: the mean displacement
-    /// of both wheels stays as reported. Default false.
-    pub estimate_odometry: bool,
-    /// Whether the time by which bearings are later than the odometry is estimated; needs times. Default false.
-    pub estimate_time_offset: bool,
-    /// Most linearisations of each of the two descents (robust, then without outliers). Default 60.
-    pub max_iterations: u32,
-}
-
-impl Default for LogOptions {
-    fn default() -> Self {
-        Self {
-            filter: SelfCalibratorOptions::default(),
-            estimate_odometry: false,
-            estimate_time_offset: false,
-            max_iterations: 60,
-        }
-    }
-}
 
 /// The mounting, and what else was estimated, from a whole log.
 #[derive(Debug, Clone, PartialEq)]
@@ -167,51 +134,6 @@ pub fn calibrate_log(
     report(options, &graph, &descent)
 }
 
-fn check(
-    options: &LogOptions,
-    readings: &[WheelMotion],
-    times_s: Option<&[f64]>,
-    bearings: &[LogBearing],
-) -> Result<()> {
-    for (i, r) in readings.iter().enumerate() {
-        if !(r.left_m.is_finite() && r.right_m.is_finite()) {
-            let got = format!("({}, {}) at step {i}", r.left_m, r.right_m);
-            return Err(Error::argument("odometry", got, "finite numbers of metres"));
-        }
-    }
-    for (i, b) in bearings.iter().enumerate() {
-        if b.step >= readings.len() {
-            let expected = format!("steps below {}, the length of the odometry", readings.len());
-            return Err(Error::argument("bearings", format!("step {} in row {i}", b.step), expected));
-        }
-        if !b.bearing_rad.is_finite() {
-            return Err(Error::argument(
-                "bearings",
-                format!("{} in row {i}", b.bearing_rad),
-                "finite angles in radians",
-            ));
-        }
-    }
-    let mut first: BTreeMap<u64, usize> = BTreeMap::new();
-    if !bearings.iter().any(|b| *first.entry(b.landmark).or_insert(b.step) != b.step) {
-        return Err(Error::argument("bearings", "no landmark seen twice", "landmarks seen from several poses"));
-    }
-    match times_s {
-        None if options.estimate_time_offset => {
-            Err(Error::argument("times_s", "none", "the time of each step, to estimate a time offset"))
-        }
-        Some(times) if times.len() != readings.len() => {
-            let expected = format!("one for each of {} steps", readings.len());
-            Err(Error::argument("times_s", format!("{} times", times.len()), expected))
-        }
-        Some(times) => match times.windows(2).position(|t| !(t[1] >= t[0] && t[1].is_finite())) {
-            Some(i) => Err(Error::argument("times_s", format!("{} after {}", times[i + 1], times[i]), "growing times")),
-            None => Ok(()),
-        },
-        None => Ok(()),
-    }
-}
-
 /// What the default filter makes of the log if it forgets nothing: its poses and the mounting.
 fn filtered(options: &LogOptions, readings: &[WheelMotion], order: &[LogBearing]) -> Result<Graph> {
     let method = CalibrationMethod::Default;
@@ -240,13 +162,16 @@ fn report(options: &LogOptions, graph: &Graph, descent: &Descent) -> Result<LogC
     let nothing =
         || Error::argument("bearings", "a drive that determines nothing", "landmarks seen from several poses");
     let eliminated = graph.eliminate(graph.nodes.len() - 1, false, 0.0).ok_or_else(nothing)?;
-    let covariance = Factor::touched(eliminated.information).ok_or_else(nothing)?.inverse() * scale;
+    let covariance = Factor::touched(eliminated.information.clone()).ok_or_else(nothing)?.inverse();
+    let widening = graph.widening(&eliminated, &covariance);
+    let covariance = covariance * scale;
+    let mounting: Matrix3<f64> = covariance.fixed_view::<3, 3>(0, 0).into();
     let sigma = |at: usize| covariance[(at, at)].sqrt();
     let (wheels, offset) = (options.estimate_odometry, options.estimate_time_offset);
     Ok(LogCalibration {
         estimate: MountingEstimate::new(
             Mounting::from_vector(&graph.mounting),
-            covariance.fixed_view::<3, 3>(0, 0).into(),
+            widening * mounting * widening.transpose(),
             &(o.start_covariance * scale),
             Some(sum / kept.len().max(1) as f64),
             false,

@@ -9,6 +9,7 @@ use crate::filter::positive_semidefinite;
 
 /// Which filter calibrates.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum CalibrationMethod {
     /// Landmarks by direction and the logarithm of inverse distance, iterated and gated updates, and a memory that is linearised anew.
     Default,
@@ -43,6 +44,7 @@ impl CalibrationMethod {
 
 /// Everything that can be chosen about a [`SelfCalibrator`](super::SelfCalibrator).
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct SelfCalibratorOptions {
     /// Which filter. Default [`CalibrationMethod::Default`].
     pub method: CalibrationMethod,

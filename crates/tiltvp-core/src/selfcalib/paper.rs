@@ -5,12 +5,13 @@ use nalgebra::{Cholesky, DMatrix, DVector, Matrix2, Matrix3, RowVector2, RowVect
 use super::mounting::Mounting;
 use super::odometry::WheelMotion;
 use super::options::SelfCalibratorOptions;
-use super::recursive::Outcome;
+use super::outcome::Outcome;
 use crate::geometry::wrap_angle;
 
 /// A feature in polar coordinates: `D`, the distance of the robot from it, and `theta`, the robot's heading against the
 /// direction from the feature to the robot (eq. 19).
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Feature {
     /// `D`, metres.
     pub distance_m: f64,
@@ -63,7 +64,8 @@ fn theta_of(distance: f64, bearing: f64, mounting: &Vector3<f64>) -> f64 {
 }
 
 /// The extended Kalman filter of section 8.2, the state ordered as eq. 28 has it.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct PaperFilter {
     options: SelfCalibratorOptions,
     names: Vec<u64>,
@@ -93,6 +95,12 @@ impl PaperFilter {
         let covariance: Matrix3<f64> = self.covariance.fixed_view::<3, 3>(at, at).into();
         let finite = self.mounting.iter().chain(covariance.iter()).all(|x| x.is_finite());
         (finite && covariance.diagonal().min() >= 0.0).then_some((self.mounting, covariance))
+    }
+
+    /// Whether there are as many of everything as there are features.
+    pub(super) fn is_consistent(&self) -> bool {
+        let width = 2 * self.features.len() + 3;
+        self.names.len() == self.features.len() && self.covariance.shape() == (width, width)
     }
 
     pub(super) fn landmarks(&self) -> usize {

@@ -3,7 +3,7 @@
 use multiversion::multiversion;
 use nalgebra::{Cholesky, DMatrix, DVector, Matrix3, Matrix3x2, Vector3};
 
-use super::rows::Row;
+use super::rows::{LegBlocks, Row};
 
 /// What couples the three numbers of a pose to the columns of a dense block: three rows, one after the other.
 pub(super) struct Coupling {
@@ -175,4 +175,15 @@ pub(super) fn joined(pose: &Gathered, dense: &DMatrix<f64>, rhs: &DVector<f64>) 
     whole_rhs.rows_mut(3, width).copy_from(rhs);
     whole_rhs.fixed_rows_mut::<3>(0).copy_from(&pose.side);
     (whole, whole_rhs)
+}
+
+/// What a motion says of the pose that it leads to.
+pub(super) fn after_leg(leg: &LegBlocks, width: usize, wheels: bool) -> Gathered {
+    let mut at = Gathered::new(width);
+    at.own = leg.after;
+    at.side = leg.after_side;
+    if wheels {
+        at.add_wheels(&leg.after_wheels);
+    }
+    at
 }

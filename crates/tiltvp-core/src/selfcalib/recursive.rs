@@ -1,18 +1,15 @@
-//! The default filter: landmarks by the logarithm of inverse distance, gated and iterated updates, and a memory that is linearised anew.
+//! The default filter's state: landmarks by the logarithm of inverse distance, and the memory that it came from.
 
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 
 use super::alarm::Alarm;
 use super::graph::{Free, Graph, Node, Sight, information};
-use super::loss::{LIMIT, Slip};
+use super::loss::{Loss, Slip};
 use super::measurement::{Landmark, Prediction, Viewpoint, camera, predict};
-use super::memory::FIRST;
 use super::odometry::{Leg, WheelMotion, Wheels, compose, compose_jacobians};
 use super::options::SelfCalibratorOptions;
-use super::update::Row;
 use crate::error::Result;
 use crate::filter::Gate;
-use crate::geometry::wrap_angle;
 
 /// Where the mounting and the first landmark are in the state (pose, mounting, landmarks).
 pub(super) const MOUNTING: usize = 3;
@@ -21,40 +18,15 @@ pub(super) const LANDMARKS: usize = 6;
 /// Poses up to which the memory is solved anew at every step.
 pub(super) const YOUNG: usize = 40;
 
-/// Growth of the memory after which it is linearised anew where innovations are as they should be, and where they are not.
-const GROWTH: f64 = 2.0;
-const GROWTH_UNEASY: f64 = 1.15;
-
-/// Standard deviations that the mounting may move before the memory is linearised anew, likewise.
-const MOVED: f64 = 1.0;
-const MOVED_UNEASY: f64 = 0.5;
-
-/// Rejections in a row after which a landmark is taken to be another one.
-const MAX_MISSES: u32 = 5;
-
-/// Rejections in a row after which the memory is asked what is right.
-const DISPUTED: u32 = 3;
-
-/// Poses after which a landmark that is seen again, and not where it should be, closes a loop: the memory is solved anew.
-const AWAY: usize = 10;
+/// How bearings count while the memory is solved: those far off linearly.
+pub(super) const FIRST: Loss = Loss::Linear(3.0);
 
 /// How far a motion may be from what the wheels tell before it counts less.
 const SLIP: Slip = Slip(5.0);
 
-/// What a step found.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub(super) struct Outcome {
-    /// Normalised innovation squared of the bearings that were fused.
-    pub(super) nis: f64,
-    pub(super) used: usize,
-    pub(super) rejected: usize,
-    pub(super) started: usize,
-    /// Whether most landmarks were not where they should be, so that the motion was taken to be nearly unknown.
-    pub(super) slipped: bool,
-}
-
 /// The filter's state: (pose, mounting, landmarks) with its covariance, and the memory that it came from.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct Recursive {
     pub(super) options: SelfCalibratorOptions,
     pub(super) gate: Gate,
@@ -66,11 +38,14 @@ pub(super) struct Recursive {
     /// Names of the landmarks; `None` once a name means another one.
     pub(super) names: Vec<Option<u64>>,
     pub(super) misses: Vec<u32>,
-    next_linearisation: usize,
+    /// Poses from which on it is solved anew in any case.
+    pub(super) next_linearisation: usize,
     /// Poses that there were when the memory was last solved.
     pub(super) solved: usize,
     /// Standard deviations of the mounting then.
     pub(super) solved_sigma: Vector3<f64>,
+    /// By which factor errors that the bearings of a landmark have in common widen what is said of the mounting.
+    pub(super) widening: Matrix3<f64>,
     /// Covariance that the last motion added to the pose.
     pub(super) motion_noise: Matrix3<f64>,
     pub(super) alarm: Alarm,
@@ -109,13 +84,30 @@ impl Recursive {
             next_linearisation: 3,
             solved: 1,
             solved_sigma: options.start_covariance.diagonal().map(f64::sqrt),
+            widening: Matrix3::identity(),
             motion_noise: Matrix3::zeros(),
             alarm: Alarm::default(),
         })
     }
 
+    /// Whether there are as many of everything as there are landmarks, and none else is seen.
+    pub(super) fn is_consistent(&self) -> bool {
+        let (graph, count) = (&self.graph, self.names.len());
+        let width = graph.free.width() + 2 * count;
+        let sights = || graph.nodes.iter().flat_map(|node| &node.sights);
+        [self.misses.len(), graph.landmarks.len(), graph.spreads.len()].iter().all(|len| *len == count)
+            && self.mean.len() == 3 + width
+            && self.covariance.shape() == (3 + width, 3 + width)
+            && graph.prior_mean.len() == width
+            && graph.prior_information.shape() == (width, width)
+            && graph.free == Free::default()
+            && !graph.nodes.is_empty()
+            && sights().all(|sight| sight.landmark < count)
+    }
+
     pub(super) fn mounting(&self) -> (Vector3<f64>, Matrix3<f64>) {
-        (self.mean.fixed_rows::<3>(MOUNTING).into(), self.covariance.fixed_view::<3, 3>(MOUNTING, MOUNTING).into())
+        let own: Matrix3<f64> = self.covariance.fixed_view::<3, 3>(MOUNTING, MOUNTING).into();
+        (self.mean.fixed_rows::<3>(MOUNTING).into(), self.widening * own * self.widening.transpose())
     }
 
     /// The least-squares problem of what has been seen.
@@ -127,61 +119,8 @@ impl Recursive {
         self.names.iter().flatten().count()
     }
 
-    /// Moves, then looks.
-    pub(super) fn step(&mut self, motion: &WheelMotion, seen: &[(u64, f64)]) -> Outcome {
-        self.predict(motion);
-        let mut outcome = Outcome::default();
-        let rejected = self.update(seen, &mut outcome);
-        let nodes = self.graph.nodes.len();
-        let moved = self.mean.fixed_rows::<3>(MOUNTING) - self.graph.mounting;
-        let limit = if self.alarm.uneasy() { MOVED_UNEASY } else { MOVED };
-        let far = moved.iter().zip(&self.solved_sigma).any(|(moved, sigma)| moved.abs() > limit * sigma);
-        let disputed = rejected.iter().any(|slot| self.misses[*slot] >= DISPUTED || self.was_away(*slot));
-        let due = nodes >= self.next_linearisation || far || disputed || outcome.slipped;
-        let mut judged = outcome;
-        if due && nodes > 2 && self.graph.nodes.last().is_some_and(|node| !node.sights.is_empty()) {
-            self.linearise(if nodes < YOUNG { 12 } else { 4 });
-            self.judge(&rejected, &mut judged);
-            if nodes > self.options.memory as usize {
-                self.fold(nodes / 2);
-            }
-            let nodes = self.graph.nodes.len();
-            let growth = if self.alarm.uneasy() { GROWTH_UNEASY } else { GROWTH };
-            let grown = if nodes < YOUNG { nodes + 1 } else { (nodes as f64 * growth) as usize };
-            self.next_linearisation = grown.max(nodes + 1);
-        }
-        for (name, misses) in self.names.iter_mut().zip(&self.misses) {
-            if *misses >= MAX_MISSES {
-                *name = None;
-            }
-        }
-        self.alarm.note(&judged, self.gate.limit());
-        outcome
-    }
-
-    /// Whether a landmark that is seen now was not seen from the poses before.
-    fn was_away(&self, slot: usize) -> bool {
-        let before = self.graph.nodes.iter().rev().skip(1).take(AWAY);
-        !before.flat_map(|node| &node.sights).any(|sight| sight.landmark == slot)
-    }
-
-    /// Counts bearings that did not pass the gate as fused where the memory, solved anew, agrees with them.
-    fn judge(&mut self, rejected: &[usize], outcome: &mut Outcome) {
-        let Some(node) = self.graph.nodes.last() else { return };
-        let (pose, _) = self.graph.pose_of_sights(node);
-        for sight in node.sights.iter().filter(|sight| rejected.contains(&sight.landmark)) {
-            let p = predict(&pose, &self.graph.mounting, &self.graph.landmarks[sight.landmark]);
-            let r = wrap_angle(p.bearing - sight.bearing) / self.graph.bearing_sigma;
-            if r.abs() <= LIMIT {
-                self.misses[sight.landmark] = 0;
-                outcome.rejected -= 1;
-                outcome.used += 1;
-                outcome.nis += r * r;
-            }
-        }
-    }
-
-    fn predict(&mut self, motion: &WheelMotion) {
+    /// Moves by what the wheels tell.
+    pub(super) fn predict(&mut self, motion: &WheelMotion) {
         self.motion_noise = Matrix3::zeros();
         if motion.left_m == 0.0 && motion.right_m == 0.0 {
             return;
@@ -236,35 +175,8 @@ impl Recursive {
         view.see(&landmark.ray())
     }
 
-    fn update(&mut self, seen: &[(u64, f64)], outcome: &mut Outcome) -> Vec<usize> {
-        let mut rows = Vec::with_capacity(seen.len());
-        let mut fresh = Vec::new();
-        let view = self.view();
-        for &(name, bearing) in seen {
-            match self.names.iter().position(|known| *known == Some(name)) {
-                Some(slot) => {
-                    // The robot has not moved since it was seen: nothing new.
-                    let again = self.graph.nodes.last().is_some_and(|n| n.sights.iter().any(|s| s.landmark == slot));
-                    if !again {
-                        rows.push(Row { slot, bearing, p: self.expect(slot, &view) });
-                    }
-                }
-                None => fresh.push((name, bearing)),
-            }
-        }
-        if let Some(node) = self.graph.nodes.last_mut() {
-            node.sights.extend(rows.iter().map(|row| Sight::new(row.slot, row.bearing)));
-        }
-        let rejected = self.fuse(rows, outcome);
-        for (name, bearing) in fresh {
-            self.start(name, bearing);
-            outcome.started += 1;
-        }
-        rejected
-    }
-
     /// Takes up a landmark in the direction in which it is seen, at the distance of the options.
-    fn start(&mut self, name: u64, bearing: f64) {
+    pub(super) fn start(&mut self, name: u64, bearing: f64) {
         let (pose, mounting): (_, Vector3<f64>) = (self.pose(), self.mean.fixed_rows::<3>(MOUNTING).into());
         let closeness = -self.options.start_distance_m.ln();
         let sigma = self.options.start_distance_log_sigma;

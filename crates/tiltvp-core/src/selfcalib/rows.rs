@@ -1,40 +1,10 @@
-//! What motions and bearings say of the unknowns: their rows, linearised and whitened, and how well they fit.
+//! What motions and bearings say of the unknowns: their rows, linearised and whitened.
 
 use nalgebra::{DMatrix, DVector, Matrix3, Matrix3x2, Vector3};
 
 use super::graph::{Graph, Node};
-use super::loss::{LIMIT, Loss};
 use super::measurement::{Landmark, Ray, Viewpoint};
 use super::odometry::between;
-use super::pose_block::Gathered;
-
-/// How well a problem fits where it was linearised.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub(super) struct Fit {
-    /// Half the sum of the squared, whitened residuals.
-    pub(super) cost: f64,
-    /// Bearings.
-    pub(super) bearings: usize,
-    /// Those of them with whitened residuals beyond [`LIMIT`].
-    pub(super) beyond: usize,
-}
-
-impl Fit {
-    /// Counts a bearing's residual.
-    pub(super) fn note(&mut self, residual: f64, loss: Loss) {
-        self.cost += loss.cost(residual);
-        self.bearings += 1;
-        self.beyond += usize::from(residual.abs() > LIMIT);
-    }
-}
-
-impl std::ops::AddAssign for Fit {
-    fn add_assign(&mut self, other: Self) {
-        self.cost += other.cost;
-        self.bearings += other.bearings;
-        self.beyond += other.beyond;
-    }
-}
 
 /// The part of a motion in the normal equations.
 pub(super) struct LegBlocks {
@@ -155,15 +125,4 @@ impl Graph {
             });
         }
     }
-}
-
-/// What a motion says of the pose that it leads to.
-pub(super) fn after_leg(leg: &LegBlocks, width: usize, wheels: bool) -> Gathered {
-    let mut at = Gathered::new(width);
-    at.own = leg.after;
-    at.side = leg.after_side;
-    if wheels {
-        at.add_wheels(&leg.after_wheels);
-    }
-    at
 }

@@ -7,9 +7,9 @@
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 
 use super::graph::Graph;
+use super::loss::Fit;
 use super::measurement::Ray;
-use super::pose_block::{Gathered, Link, eliminate_pose, joined};
-use super::rows::{Fit, after_leg};
+use super::pose_block::{Gathered, Link, after_leg, eliminate_pose, joined};
 
 /// Poses of a run.
 const RUN: usize = 20;
@@ -43,6 +43,22 @@ pub(super) struct Eliminated {
 impl Eliminated {
     /// The steps of all of so many poses for a step of the dense block, and of the last pose if it was kept.
     pub(super) fn poses(&self, step: &DVector<f64>, kept: Option<Vector3<f64>>, nodes: usize) -> Vec<Vector3<f64>> {
+        self.substituted(step, kept, nodes, 1.0)
+    }
+
+    /// How all poses follow where the dense block, and the last pose if it was kept, are moved so.
+    pub(super) fn follow(&self, step: &DVector<f64>, kept: Option<Vector3<f64>>, nodes: usize) -> Vec<Vector3<f64>> {
+        self.substituted(step, kept, nodes, 0.0)
+    }
+
+    /// The steps of the poses, their own right-hand sides taken so many times.
+    fn substituted(
+        &self,
+        step: &DVector<f64>,
+        kept: Option<Vector3<f64>>,
+        nodes: usize,
+        own: f64,
+    ) -> Vec<Vector3<f64>> {
         let mut steps = vec![Vector3::zeros(); nodes + 1];
         let mut after = nodes;
         if let Some(kept) = kept {
@@ -50,7 +66,7 @@ impl Eliminated {
             steps[after] = kept;
         }
         for (at, link) in self.between.iter().rev() {
-            let mut side = link.rhs - link.next * steps[after];
+            let mut side = link.rhs * own - link.next * steps[after];
             for (k, values) in link.coupling.rows().into_iter().enumerate() {
                 side[k] -= values.iter().zip(step.iter()).map(|(a, b)| a * b).sum::<f64>();
             }
@@ -61,7 +77,7 @@ impl Eliminated {
             let left = steps[run.left];
             for (i, link) in run.links.iter().enumerate().rev() {
                 let at = run.left + 1 + i;
-                let mut side = link.rhs - link.next * steps[at + 1] - link.before * left;
+                let mut side = link.rhs * own - link.next * steps[at + 1] - link.before * left;
                 for (k, values) in link.coupling.rows().into_iter().enumerate() {
                     side[k] -= values.iter().zip(&run.columns).map(|(a, c)| a * step[*c]).sum::<f64>();
                 }

@@ -4,7 +4,8 @@ use nalgebra::{DMatrix, DVector};
 
 use super::dense::{Factor, combine, subtract_square};
 use super::measurement::Prediction;
-use super::recursive::{LANDMARKS, Outcome, Recursive};
+use super::outcome::Outcome;
+use super::recursive::{LANDMARKS, Recursive};
 use crate::geometry::wrap_angle;
 
 /// Most linearisations of one update.
@@ -36,9 +37,9 @@ impl Recursive {
         spread
     }
 
-    /// The variance of a row's bearing.
+    /// The variance of a row's bearing: that which is assumed, or more, so that innovations are judged by what was assumed.
     fn noise(&self, row: &Row) -> f64 {
-        (self.graph.bearing_sigma * self.graph.spreads[row.slot]).powi(2)
+        (self.graph.bearing_sigma * self.graph.spreads[row.slot].max(1.0)).powi(2)
     }
 
     /// Which rows pass the gate.
@@ -105,6 +106,13 @@ impl Recursive {
             let Some(y) = factor.whitened(&innovation) else { return rejected };
             if iteration == 0 {
                 outcome.nis = y.norm_squared();
+                // Each for itself may be where it could be, but not all of them together.
+                if outcome.nis > self.gate.limit() * rows.len() as f64 {
+                    rejected.extend(rows.iter().map(|row| row.slot));
+                    outcome.contradiction = outcome.nis;
+                    (outcome.nis, outcome.used, outcome.rejected) = (0.0, 0, rejected.len());
+                    return rejected;
+                }
             }
             let step = &whitened * y;
             let now = &before + &step;

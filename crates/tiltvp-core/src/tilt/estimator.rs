@@ -40,7 +40,7 @@ impl TiltEstimator {
         options.validate()?;
         validate_rotation(&robot_from_camera)?;
         let (edges, mask) = (options.edges, options.mask.clone());
-        let origin = EdgeOrigin { camera, robot_from_camera, options: edges, mask };
+        let origin = EdgeOrigin { camera, robot_from_camera, options: edges, mask, row_stride: options.row_stride };
         let sight = Sight::new(&origin)?;
         let (tables, screen) = Tables::new(&origin, &options, &sight, None)?;
         Ok(Self { origin: Arc::new(origin), options, sight: Arc::new(sight), tables, screen })
@@ -54,14 +54,14 @@ impl TiltEstimator {
     pub fn with_options(&self, options: TiltOptions) -> Result<Self> {
         options.validate()?;
         let all_strengths = |edges: EdgeOptions| EdgeOptions { gradient_min: 1.0, ..edges };
-        let same_mask = self.options.mask == options.mask;
-        let origin = if same_mask && self.options.edges == options.edges {
+        let same_pixels = self.options.mask == options.mask && self.options.row_stride == options.row_stride;
+        let origin = if same_pixels && self.options.edges == options.edges {
             Arc::clone(&self.origin)
         } else {
-            let (edges, mask) = (options.edges, options.mask.clone());
-            Arc::new(EdgeOrigin { options: edges, mask, ..(*self.origin).clone() })
+            let (edges, mask, row_stride) = (options.edges, options.mask.clone(), options.row_stride);
+            Arc::new(EdgeOrigin { options: edges, mask, row_stride, ..(*self.origin).clone() })
         };
-        if same_mask && all_strengths(self.options.edges) == all_strengths(options.edges) {
+        if same_pixels && all_strengths(self.options.edges) == all_strengths(options.edges) {
             let sight = Arc::clone(&self.sight);
             let like = (&self.options.method, &self.tables, &self.screen);
             let (tables, screen) = Tables::new(&origin, &options, &sight, Some(like))?;

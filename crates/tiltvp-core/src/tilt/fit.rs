@@ -110,7 +110,7 @@ impl TiltEstimator {
         let Some(centre) = &self.sight.centre else { return Fit::none() };
         offsets(edges, centre, gains, offset_max_px, work);
         let sampling = self.options.sampling();
-        work.prepare(&sampling, edges);
+        work.prepare(sampling.as_ref(), edges);
         let Work { rows, weights, quality, ransac: scratch, .. } = &mut *work;
         let problem = Offsets::new(rows, quality);
         let upright = Vector2::zeros();
@@ -126,6 +126,7 @@ impl TiltEstimator {
             }
             Method::ImageSpaceRansac { threshold_px, .. } => {
                 let seed = self.options.seed;
+                let sampling = sampling.unwrap_or_default();
                 let options = RansacOptions { seed, sampling, ..RansacOptions::with_threshold(*threshold_px) };
                 ransac(&problem, &options, &upright, weights, scratch)
             }
@@ -159,13 +160,14 @@ impl TiltEstimator {
         let Work { rows, weights, slots, places, .. } = &mut *work;
         table.lift(edges, self.options.normal_tilt_max_rad().sin(), rows, weights, slots, places);
         let sampling = self.options.sampling();
-        work.prepare(&sampling, edges);
+        work.prepare(sampling.as_ref(), edges);
         let Work { rows, weights, sparse, quality, ransac: scratch, inliers, .. } = &mut *work;
         *inliers = Inliers::None;
         let (report, gate, correction) = match &self.options.method {
             Method::VectorConsensus { threshold_rad, correction, .. } => {
                 weights.fill(1.0);
                 let seed = self.options.seed;
+                let sampling = sampling.unwrap_or_default();
                 let options = RansacOptions { seed, sampling, ..RansacOptions::with_threshold(threshold_rad.sin()) };
                 let rotation = &self.origin.robot_from_camera;
                 let report = vector_consensus(rows, quality, rotation, &options, weights, scratch);

@@ -19,6 +19,8 @@ pub struct EdgeOrigin {
     pub options: EdgeOptions,
     /// The pixels that may be used.
     pub mask: Option<Mask>,
+    /// Every so-manieth row is looked at.
+    pub row_stride: u32,
 }
 
 impl EdgeOrigin {
@@ -37,6 +39,7 @@ impl EdgeOrigin {
             ("elevation_min_rad", a.elevation_min_rad, b.elevation_min_rad),
             ("elevation_max_rad", a.elevation_max_rad, b.elevation_max_rad),
             ("margin_px", a.margin_px, b.margin_px),
+            ("row_stride", f64::from(self.row_stride), f64::from(other.row_stride)),
         ];
         let different = numbers.into_iter().find(|(_, own, other)| own != other);
         let different = different.map(|(name, own, other)| (name, own.to_string(), other.to_string()));

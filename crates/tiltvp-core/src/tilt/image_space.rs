@@ -6,10 +6,10 @@ use nalgebra::Vector2;
 use super::correction::VanishingPoint;
 use super::scratch::Work;
 use crate::edges::EdgePixels;
-use crate::robust::{Block as Rest, Gate, Kept, Moments, Problem, ROOM, Rows, Score, compact};
+use crate::robust::{Block as Rest, Census, Gate, Kept, Moments, Problem, ROOM, Rows, Score, compact};
 
 /// Edge offsets `s = A cos phi + B sin phi` (eq. 19): rows `(g cos phi, g sin phi, -s)`, model `(A, B)`, residuals in pixels
-/// (eq. 33). `g` is the relative closed-form gain of the pixel, or 1.
+/// (eq. 33), weights one or zero. `g` is the relative closed-form gain of the pixel, or 1.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Offsets<'a> {
     rows: &'a Rows<f32>,
@@ -50,6 +50,15 @@ impl Problem for Offsets<'_> {
         self.rows.count_each_to_beat(&models, threshold, to_beat, counts);
     }
 
+    fn take_census(&self, threshold: f64, census: &mut Census) -> bool {
+        census.take(self.rows, threshold, 1.0);
+        true
+    }
+
+    fn consensus_at_most(&self, census: &Census, model: &Vector2<f64>) -> usize {
+        census.at_most([model.x, model.y, 1.0])
+    }
+
     fn consensus_among(&self, observations: &[u32], model: &Vector2<f64>, threshold: f64) -> usize {
         self.rows.count_among(observations, [model.x, model.y, 1.0], threshold)
     }
@@ -63,11 +72,11 @@ impl Problem for Offsets<'_> {
     }
 
     fn summarise(&self, model: &Vector2<f64>, gate: Gate, weights: &mut [f32]) -> Moments {
-        self.rows.moments([model.x, model.y, 1.0], gate, weights)
+        self.rows.moments_of_ones([model.x, model.y, 1.0], gate, weights)
     }
 
     fn trim(&self, before: &Moments, model: &Vector2<f64>, threshold: f64, weights: &mut [f32]) -> Moments {
-        self.rows.trim(before, [model.x, model.y, 1.0], threshold, weights)
+        self.rows.trim_ones(before, [model.x, model.y, 1.0], threshold, weights)
     }
 
     fn fit(&self, summary: &Moments, _near: &Vector2<f64>) -> Option<Vector2<f64>> {

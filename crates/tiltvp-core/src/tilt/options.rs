@@ -110,6 +110,8 @@ pub struct TiltOptions {
     pub tilt_max_rad: Option<f64>,
     /// Pixels that show the world and not the robot. Default all.
     pub mask: Option<Mask>,
+    /// Every so-manieth row of the image is looked at: less time, and less sure an answer. Default 1.
+    pub row_stride: u32,
     /// Seed of the random samples. Default 0.
     pub seed: u64,
 }
@@ -158,6 +160,7 @@ impl TiltOptions {
             edges: EdgeOptions { gradient_min, smoothing_px, ..EdgeOptions::default() },
             tilt_max_rad: None,
             mask: None,
+            row_stride: 1,
             seed: 0,
         })
     }
@@ -171,6 +174,9 @@ impl TiltOptions {
             if value > 0.0 && value.is_finite() { Ok(()) } else { Err(Error::option(name, value, expected)) }
         };
         self.edges.validate()?;
+        if self.row_stride == 0 {
+            return Err(Error::option("row_stride", self.row_stride, "a number of rows, at least 1"));
+        }
         if let Some(tilt_max) = self.tilt_max_rad
             && !(tilt_max > 0.0 && tilt_max < std::f64::consts::FRAC_PI_2)
         {
@@ -202,10 +208,10 @@ impl TiltOptions {
     }
 
     /// How the sampling methods sample; the others do not.
-    pub(super) fn sampling(&self) -> Sampling {
+    pub(super) fn sampling(&self) -> Option<Sampling> {
         match &self.method {
-            Method::ImageSpaceRansac { sampling, .. } | Method::VectorConsensus { sampling, .. } => *sampling,
-            Method::ImageSpaceRejectRefit { .. } | Method::Refined(_) => Sampling::default(),
+            Method::ImageSpaceRansac { sampling, .. } | Method::VectorConsensus { sampling, .. } => Some(*sampling),
+            Method::ImageSpaceRejectRefit { .. } | Method::Refined(_) => None,
         }
     }
 

@@ -45,11 +45,15 @@ struct Extent {
     pixels: usize,
     columns: std::ops::Range<usize>,
     smoothing_px: f64,
+    first: (u16, u16),
+    last: (u16, u16),
 }
 
 impl Extent {
     fn new(region: &Region, options: &EdgeOptions) -> Self {
-        Self { pixels: region.len(), columns: region.columns(), smoothing_px: options.smoothing_px }
+        let (pixels, last) = (region.len(), region.len().saturating_sub(1));
+        let (first, last) = (region.place(0), region.place(last));
+        Self { pixels, columns: region.columns(), smoothing_px: options.smoothing_px, first, last }
     }
 }
 
@@ -98,12 +102,13 @@ impl Scratch {
 }
 
 impl Work {
-    /// Makes room for the way of sampling, and sets the quality of the rows, their squared gradients, if samples
-    /// are drawn in that order.
-    pub(super) fn prepare(&mut self, sampling: &Sampling, edges: &EdgePixels) {
+    /// Makes room for the way of sampling, if samples are drawn at all, and sets the quality of the rows, their squared
+    /// gradients, if they are drawn in that order.
+    pub(super) fn prepare(&mut self, sampling: Option<&Sampling>, edges: &EdgePixels) {
+        self.quality.clear();
+        let Some(sampling) = sampling else { return };
         let room = self.weights.capacity();
         self.ransac.reserve(sampling, room);
-        self.quality.clear();
         if sampling.order != SampleOrder::Uniform {
             self.quality.reserve(room);
             let (slots, gx, gy) = (edges.slot(), edges.gx(), edges.gy());

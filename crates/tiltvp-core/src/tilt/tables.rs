@@ -28,8 +28,8 @@ pub(super) struct Sight {
 
 impl Sight {
     pub(super) fn new(origin: &EdgeOrigin) -> Result<Self> {
-        let EdgeOrigin { camera, robot_from_camera, options, mask } = origin;
-        let region = Region::new(camera, robot_from_camera, options, mask.as_ref())?;
+        let EdgeOrigin { camera, robot_from_camera, options, mask, row_stride } = origin;
+        let region = Region::new(camera, robot_from_camera, options, mask.as_ref())?.every_row(*row_stride)?;
         let sector = |bearing: Vector3<f64>| -> u8 {
             let turn = bearing.y.atan2(bearing.x) / std::f64::consts::TAU + 0.5;
             ((turn * SECTORS as f64) as usize).min(SECTORS - 1) as u8

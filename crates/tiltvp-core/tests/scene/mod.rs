@@ -2,6 +2,9 @@
 
 #![allow(dead_code)]
 
+pub(crate) mod cube;
+pub(crate) mod round;
+
 use nalgebra::{Matrix3, Vector2, Vector3};
 use tiltvp_core::camera::{Camera, Equidistant, Model, Parameter};
 use tiltvp_core::geometry::Tilt;

@@ -7,7 +7,7 @@ use tiltvp_core::Error;
 use tiltvp_core::selfcalib::{self as core, Mounting, SelfCalibratorOptions};
 use tiltvp_synth::{BearingDrive, BearingDriveKind, BearingDriveOptions};
 
-use super::estimate::matrix3;
+use super::matrices::matrix3;
 use crate::call::{call, invalid};
 use crate::convert;
 

@@ -56,12 +56,12 @@ impl ImageEdges {
         _cls: &Bound<'_, PyType>,
         camera: Py<Camera>,
         robot_from_camera: &Bound<'_, PyAny>,
-        options: [f64; 5],
+        options: ([f64; 5], u32),
         mask: Option<&Bound<'_, PyAny>>,
         slots: PyReadonlyArray1<'_, u32>,
         gradients: [PyReadonlyArray1<'_, f32>; 2],
     ) -> PyResult<Self> {
-        let [gradient_min, smoothing_px, elevation_min_rad, elevation_max_rad, margin_px] = options;
+        let ([gradient_min, smoothing_px, elevation_min_rad, elevation_max_rad, margin_px], row_stride) = options;
         let options = EdgeOptions { gradient_min, smoothing_px, elevation_min_rad, elevation_max_rad, margin_px };
         let mask = mask.map(|mask| {
             let (height, width, usable) = convert::mask(mask, "mask")?;
@@ -72,6 +72,7 @@ impl ImageEdges {
             robot_from_camera: convert::matrix3(robot_from_camera, "robot_from_camera")?,
             options,
             mask: mask.transpose()?,
+            row_stride,
         };
         let [gx, gy] = gradients.each_ref().map(|g| g.to_vec());
         let inner = core::ImageEdges::new(Arc::new(origin), &slots.to_vec()?, &gx?, &gy?);
@@ -80,9 +81,10 @@ impl ImageEdges {
 
     fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyTuple>> {
         let (py, this) = (slf.py(), slf.get());
-        let EdgeOrigin { robot_from_camera, options: o, mask, .. } = &**this.inner.origin();
+        let EdgeOrigin { robot_from_camera, options: o, mask, row_stride, .. } = &**this.inner.origin();
         let rotation = PyArray1::from_slice(py, robot_from_camera.transpose().as_slice()).reshape([3, 3])?;
         let options = [o.gradient_min, o.smoothing_px, o.elevation_min_rad, o.elevation_max_rad, o.margin_px];
+        let options = (options, *row_stride);
         let mask = mask.as_ref().map(|mask| convert::to_mask(py, mask)).transpose()?;
         let slots = PyArray1::from_slice(py, this.inner.slots());
         let gradients = [this.inner.gx(), this.inner.gy()].map(|g| PyArray1::from_slice(py, g));

@@ -10,7 +10,7 @@ use crate::call::{exception, invalid};
 use crate::convert;
 
 /// Options of every method.
-const COMMON: [&str; 8] = [
+const COMMON: [&str; 9] = [
     "gradient_min",
     "smoothing_px",
     "elevation_min_rad",
@@ -18,6 +18,7 @@ const COMMON: [&str; 8] = [
     "margin_px",
     "tilt_max_rad",
     "mask",
+    "row_stride",
     "seed",
 ];
 
@@ -75,6 +76,7 @@ fn set(options: &mut TiltOptions, key: &str, value: &Bound<'_, PyAny>) -> PyResu
                 Some(Mask::new(width, height, usable).map_err(|error| exception(&error))?)
             };
         }
+        ("row_stride", _) => options.row_stride = whole(key, value, 1)?,
         ("seed", _) => {
             options.seed = value
                 .extract()
@@ -159,6 +161,7 @@ pub(super) fn in_force<'py>(py: Python<'py>, options: &TiltOptions) -> PyResult<
     dict.set_item("tilt_max_rad", options.tilt_max_rad)?;
     let mask = options.mask.as_ref().map(|mask| convert::to_mask(py, mask));
     dict.set_item("mask", mask.transpose()?)?;
+    dict.set_item("row_stride", options.row_stride)?;
     dict.set_item("seed", options.seed)?;
     let word = |correction: &Correction| -> PyResult<Py<PyAny>> {
         Ok(match correction {
