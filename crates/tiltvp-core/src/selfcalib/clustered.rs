@@ -69,7 +69,7 @@ impl Graph {
 }
 
 /// `F` such that `F C F^T` is `wide`, but in no direction narrower than `C`.
-fn widened(own: &Matrix3<f64>, wide: &Matrix3<f64>) -> Matrix3<f64> {
+pub(super) fn widened(own: &Matrix3<f64>, wide: &Matrix3<f64>) -> Matrix3<f64> {
     let Some(factor) = own.cholesky() else { return Matrix3::identity() };
     let lower = factor.l();
     let Some(inverse) = lower.try_inverse() else { return Matrix3::identity() };

@@ -97,7 +97,7 @@ impl Recursive {
             self.mean.fixed_rows_mut::<3>(0).copy_from(&node.pose);
         }
         self.solved = self.graph.nodes.len();
-        self.solved_sigma = Vector3::from_fn(|i, _| self.covariance[(MOUNTING + i, MOUNTING + i)].sqrt());
+        self.solved_covariance = self.covariance.fixed_view::<3, 3>(MOUNTING, MOUNTING).into();
         true
     }
 

@@ -3,6 +3,7 @@
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 
 use super::alarm::Alarm;
+use super::clustered::widened;
 use super::graph::{Free, Graph, Node, Sight, information};
 use super::loss::{Loss, Slip};
 use super::measurement::{Landmark, Prediction, Viewpoint, camera, predict};
@@ -42,8 +43,10 @@ pub(super) struct Recursive {
     pub(super) next_linearisation: usize,
     /// Poses that there were when the memory was last solved.
     pub(super) solved: usize,
-    /// Standard deviations of the mounting then.
-    pub(super) solved_sigma: Vector3<f64>,
+    /// Covariance of the mounting then.
+    pub(super) solved_covariance: Matrix3<f64>,
+    /// Poses up to which a covariance below that is taken for an illusion, as it was at the last solution.
+    pub(super) illusory_until: usize,
     /// By which factor errors that the bearings of a landmark have in common widen what is said of the mounting.
     pub(super) widening: Matrix3<f64>,
     /// Covariance that the last motion added to the pose.
@@ -83,7 +86,8 @@ impl Recursive {
             misses: Vec::new(),
             next_linearisation: 3,
             solved: 1,
-            solved_sigma: options.start_covariance.diagonal().map(f64::sqrt),
+            solved_covariance: options.start_covariance,
+            illusory_until: 0,
             widening: Matrix3::identity(),
             motion_noise: Matrix3::zeros(),
             alarm: Alarm::default(),
@@ -105,9 +109,14 @@ impl Recursive {
             && sights().all(|sight| sight.landmark < count)
     }
 
+    /// The mounting with its covariance.
     pub(super) fn mounting(&self) -> (Vector3<f64>, Matrix3<f64>) {
-        let own: Matrix3<f64> = self.covariance.fixed_view::<3, 3>(MOUNTING, MOUNTING).into();
-        (self.mean.fixed_rows::<3>(MOUNTING).into(), self.widening * own * self.widening.transpose())
+        let mut covariance: Matrix3<f64> = self.covariance.fixed_view::<3, 3>(MOUNTING, MOUNTING).into();
+        if self.graph.nodes.len() < self.illusory_until {
+            let factor = widened(&covariance, &self.solved_covariance);
+            covariance = factor * covariance * factor.transpose();
+        }
+        (self.mean.fixed_rows::<3>(MOUNTING).into(), self.widening * covariance * self.widening.transpose())
     }
 
     /// The least-squares problem of what has been seen.

@@ -1,5 +1,7 @@
 //! A step of the default filter: it moves, looks, and solves its memory anew where it should.
 
+use nalgebra::Vector3;
+
 use super::graph::Sight;
 use super::loss::LIMIT;
 use super::measurement::predict;
@@ -18,7 +20,8 @@ const MOVED: f64 = 1.0;
 const MOVED_UNEASY: f64 = 0.5;
 
 /// Share of the mounting's standard deviations at the last solution from which on it is solved anew: where so much is learned
-/// at once the Jacobians that it was learned with are not those of the answer.
+/// at once the Jacobians that it was learned with are not those of the answer. If the solution knows nothing of it, as on an arc
+/// that tells the mounting in part, it was an illusion, and is not asked about again soon.
 const SHRUNK: f64 = 0.6;
 
 /// Standard deviations beyond which the filter is not believed to have moved the mounting: the memory is solved from where it
@@ -43,9 +46,9 @@ impl Recursive {
         let nodes = self.graph.nodes.len();
         let moved = self.mean.fixed_rows::<3>(MOUNTING) - self.graph.mounting;
         let limit = if self.alarm.uneasy() { MOVED_UNEASY } else { MOVED };
-        let sigmas = moved.iter().zip(&self.solved_sigma).map(|(moved, sigma)| moved.abs() / sigma).fold(0.0, f64::max);
-        let now = |i| self.covariance[(MOUNTING + i, MOUNTING + i)].sqrt();
-        let shrunk = (0..3).any(|i| now(i) < SHRUNK * self.solved_sigma[i]);
+        let solved: Vector3<f64> = self.solved_covariance.diagonal().map(f64::sqrt);
+        let sigmas = moved.component_div(&solved).amax();
+        let shrunk = nodes >= self.illusory_until && self.is_below(&(solved * SHRUNK));
         let disputed = outcome.contradiction > 0.0
             || rejected.iter().any(|slot| self.misses[*slot] >= DISPUTED || self.was_away(*slot));
         let due = nodes >= self.next_linearisation || sigmas > limit || shrunk || disputed || outcome.slipped;
@@ -61,6 +64,9 @@ impl Recursive {
             let growth = if self.alarm.uneasy() { GROWTH_UNEASY } else { GROWTH };
             let grown = if nodes < YOUNG { nodes + 1 } else { (nodes as f64 * growth) as usize };
             self.next_linearisation = grown.max(nodes + 1);
+            let soon = (nodes as f64 * GROWTH_UNEASY) as usize;
+            let illusory = shrunk && !self.is_below(&(solved * SHRUNK));
+            self.illusory_until = if illusory { soon } else { self.illusory_until.min(soon) };
         }
         for (name, misses) in self.names.iter_mut().zip(&self.misses) {
             if *misses >= MAX_MISSES {
@@ -69,6 +75,11 @@ impl Recursive {
         }
         self.alarm.note(&judged, self.gate.limit());
         outcome
+    }
+
+    /// Whether a standard deviation of the mounting is below one of these.
+    fn is_below(&self, sigmas: &Vector3<f64>) -> bool {
+        (0..3).any(|i| self.covariance[(MOUNTING + i, MOUNTING + i)].sqrt() < sigmas[i])
     }
 
     /// Whether a landmark that is seen now was not seen from the poses before.
@@ -123,5 +134,50 @@ impl Recursive {
             outcome.started += 1;
         }
         rejected
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::f64::consts::TAU;
+
+    use nalgebra::Vector2;
+
+    use super::*;
+    use crate::selfcalib::SelfCalibratorOptions;
+
+    /// On a circle, which tells nothing of how far the camera is from the axle, the filter takes that for learned step by step:
+    /// the memory is not asked each time, and what is said of the mounting remains as wide as it is.
+    #[test]
+    fn illusions_of_a_circle_cost_little_and_are_not_told() {
+        let (posts, radius, turn) = (20, 1.0, 0.04);
+        let scattered = |k: usize| ((k as f64 * 12.9898).sin() * 43_758.545_3).rem_euclid(1.0);
+        let options = SelfCalibratorOptions { wheel_base_m: 0.4, ..SelfCalibratorOptions::default() };
+        let (x, mut filter) = (options.start.x_m + 0.05, Recursive::new(&options).unwrap());
+        let known = options.start_covariance[(0, 0)].sqrt();
+        let (mut solutions, mut solved, mut steps) = (0, 0, 0);
+        for step in 0..200 {
+            let heading = turn * (step + 1) as f64;
+            let robot = Vector2::new(heading.sin(), 1.0 - heading.cos()) * radius;
+            let camera = robot + Vector2::new(heading.cos(), heading.sin()) * x;
+            let seen: Vec<(u64, f64)> = (0..posts)
+                .map(|k| {
+                    let (far, around) = (2.0 + 3.0 * scattered(k), TAU * scattered(posts + k));
+                    let ray = Vector2::new(around.cos(), around.sin()) * far - camera;
+                    let noise = 0.03 * (scattered(posts * (step + 2) + k) - 0.5);
+                    (k as u64, wrap_angle(ray.y.atan2(ray.x) - heading + noise))
+                })
+                .collect();
+            filter.step(&WheelMotion::from_motion(radius * turn, turn, 0.4), &seen);
+            if step >= YOUNG {
+                steps += 1;
+                solutions += usize::from(filter.solved != solved);
+                let (_, covariance) = filter.mounting();
+                let widest = covariance.symmetric_eigenvalues().max().sqrt();
+                assert!(widest > 0.5 * known, "{widest} m at step {step}");
+            }
+            solved = filter.solved;
+        }
+        assert!(solutions < steps / 4, "{solutions} solutions in {steps} steps");
     }
 }
