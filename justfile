@@ -111,6 +111,10 @@ measure-planar-pose *arguments: setup
 measure-sampling *arguments: setup
     {{bin}}/tiltvp measure sampling "$TILTVP_DATA/panos" {{arguments}}
 
+# Each method on every row, every second, third and fourth row of views of panoramas and rendered rooms.
+measure-striding *arguments: setup
+    {{bin}}/tiltvp measure striding "$TILTVP_DATA/panos" {{arguments}}
+
 # Vertical lines found and followed on rendered drives, upright and leaning, against the paper's recognition rates.
 measure-lines *arguments: setup
     {{bin}}/tiltvp measure lines {{arguments}}

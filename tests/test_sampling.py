@@ -12,7 +12,8 @@ import pytest
 
 import tiltvp
 from tiltvp.errors import InvalidInputError
-from tiltvp.evaluation.sampling import SAMPLERS, WAYS, room_views, sample_views, summarise_sampling
+from tiltvp.evaluation.sampling import SAMPLERS, WAYS, sample_views, summarise_sampling
+from tiltvp.evaluation.views import room_views
 from tiltvp.synth import render_room
 
 CAMERA = tiltvp.Camera.equidistant(width=320, height=240, focal_px=69.8, cx=159.5, cy=119.5, max_theta_rad=1.61)

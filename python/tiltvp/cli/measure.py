@@ -15,6 +15,7 @@ from tiltvp.cli.descriptors import descriptors
 from tiltvp.cli.line_measures import lines
 from tiltvp.cli.planar_pose import planar_pose
 from tiltvp.cli.results import check_ending, show_frame, write_frame
+from tiltvp.cli.striding import striding
 from tiltvp.cli.terminal import progress_bar, say
 from tiltvp.errors import InvalidInputError
 
@@ -26,6 +27,7 @@ app.command(corners_real)
 app.command(descriptors)
 app.command(lines)
 app.command(planar_pose)
+app.command(striding)
 
 
 @app.command
@@ -211,7 +213,8 @@ def sampling(
     import polars as pl
 
     from tiltvp.datasets.panoramas import TABLE_1_TILTS_DEG, paper_camera, read_panorama_index
-    from tiltvp.evaluation.sampling import panorama_views, room_views, sample_views, summarise_sampling
+    from tiltvp.evaluation.sampling import sample_views, summarise_sampling
+    from tiltvp.evaluation.views import panorama_views, room_views
     from tiltvp.synth import ROOM_KINDS
 
     if directory is None and rooms <= 0:

@@ -3,34 +3,21 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import polars as pl
 
-from tiltvp.datasets.panoramas import TABLE_1_TILTS_DEG, Panorama, PanoramaViews
 from tiltvp.evaluation.metrics import offset_rad, relative_errors_rad
-from tiltvp.synth import ROOM_KINDS, Room
+from tiltvp.evaluation.views import View
 from tiltvp.tilt import TiltEstimator, normal_from_alpha_beta
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
     from tiltvp.cameras import Camera
 
-__all__ = [
-    "PLAIN",
-    "SAMPLERS",
-    "WAYS",
-    "Sampler",
-    "View",
-    "panorama_views",
-    "room_views",
-    "sample_views",
-    "summarise_sampling",
-]
+__all__ = ["PLAIN", "SAMPLERS", "WAYS", "Sampler", "sample_views", "summarise_sampling"]
 
 
 @dataclass(frozen=True)
@@ -40,16 +27,6 @@ class Sampler:
     label: str
     method: str
     options: dict[str, Any]
-
-
-@dataclass(frozen=True)
-class View:
-    """An image (H, W) uint8, the place it shows, and the true lean."""
-
-    image: NDArray[np.uint8]
-    location: str
-    alpha_rad: float
-    beta_rad: float
 
 
 SAMPLERS: tuple[Sampler, ...] = (
@@ -87,36 +64,6 @@ WAYS: dict[str, dict[str, Any]] = {
     "progressive, LO, MAGSAC++, SPRT": _ORDERED | _LOCAL | _MAGSAC | _TESTED,
 }
 """The ways of sampling by name: the paper's, each option alone, and combinations."""
-
-
-def panorama_views(
-    panoramas: Iterable[Panorama], camera: Camera, *, samples: int = 2, noise_sigma: float = 2.0
-) -> Iterator[View]:
-    """Upright panoramas at the seven leans of the paper's table 1."""
-    for number, panorama in enumerate(panoramas):
-        views = PanoramaViews(panorama, camera, samples=samples)
-        for place, (alpha_deg, beta_deg) in enumerate(TABLE_1_TILTS_DEG):
-            alpha, beta = float(np.deg2rad(alpha_deg)), float(np.deg2rad(beta_deg))
-            normal = normal_from_alpha_beta(alpha, beta)
-            image = views.render(normal, noise_sigma=noise_sigma, seed=1000 * number + place)
-            yield View(image, panorama.name, alpha, beta)
-
-
-def room_views(
-    rooms: int, camera: Camera, *, samples: int = 2, noise_sigma: float = 2.0, kinds: Sequence[str] = ROOM_KINDS
-) -> Iterator[View]:
-    """Rendered rooms, so many of each kind, at the same leans."""
-    for kind in kinds:
-        for seed in range(rooms):
-            room = Room(kind, seed)
-            pose = room.free_poses(1, seed)[0]
-            for alpha_deg, beta_deg in TABLE_1_TILTS_DEG:
-                alpha, beta = float(np.deg2rad(alpha_deg)), float(np.deg2rad(beta_deg))
-                image = room.render(
-                    camera, pose=pose, alpha_rad=alpha, beta_rad=beta, noise_sigma=noise_sigma, samples=samples,
-                    seed=seed,
-                )  # fmt: skip
-                yield View(image.gray, f"{kind} {seed}", alpha, beta)
 
 
 def sample_views(
