@@ -21,6 +21,7 @@ VARIANTS = [(method, {}) for method in METHODS] + [
     ("vector-consensus", {"gradient_min": 300.0, "threshold_rad": float(np.deg2rad(2.0))}),
     ("vector-consensus", {"gradient_min": 300.0, "threshold_rad": float(np.deg2rad(2.0)), "normal": "tangent"}),
     ("refined", {"smoothing_px": 0.0}),
+    *((method, {"row_stride": 2}) for method in METHODS),
 ]
 
 
