@@ -135,6 +135,13 @@ measure-line-peers *arguments: drives
         "opencv-contrib-python-headless==$({{bin}}/python -c 'from importlib.metadata import version; print(version("opencv-python-headless"))')"
     PYTHONPATH="$PWD/out/peers/opencv-contrib" {{bin}}/python benches/peers/line_segments.py out/drives/corridor out/drives/hall {{arguments}}
 
+# cv2 is that with contrib, as above; lu-vp-detect wants it too.
+# The vertical of an image by us, by the paper's methods on OpenCV and NumPy, by LSD and FLD, and by lu-vp-detect.
+measure-vertical-peers *arguments: setup
+    test -d out/peers/vertical || {{bin}}/pip install --quiet --no-deps --target out/peers/vertical lu-vp-detect==1.0.4 \
+        "opencv-contrib-python-headless==$({{bin}}/python -c 'from importlib.metadata import version; print(version("opencv-python-headless"))')"
+    PYTHONPATH="$PWD/out/peers/vertical" {{bin}}/python benches/peers/vertical.py {{arguments}}
+
 # Corners of a real cabinet and a real box: attitude against motion capture, sizes, smoothness.
 measure-corners-real folder *arguments: setup
     {{bin}}/tiltvp measure corners-real {{folder}} --overlay out/corners-real {{arguments}}
