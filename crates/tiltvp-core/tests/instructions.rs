@@ -34,8 +34,8 @@ const LIMITS: [(&str, u64); 9] = [
     // Two images of 320 x 180 pixels to the corner of the coloured cube in each.
     ("segmented_pair", 6000),
     // Ten steps of the self-calibration amid a drive, with 10 and with 100 landmarks.
-    ("steps_among_10", 9650),
-    ("steps_among_100", 277_000),
+    ("steps_among_10", 17_900),
+    ("steps_among_100", 345_000),
 ];
 
 type Measured = fn(&TiltEstimator, &ImageView<'_>, &mut Scratch) -> Option<TiltEstimate>;

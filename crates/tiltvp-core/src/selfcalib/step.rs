@@ -24,6 +24,10 @@ const MOVED_UNEASY: f64 = 0.5;
 /// that tells the mounting in part, it was an illusion, and is not asked about again soon.
 const SHRUNK: f64 = 0.6;
 
+/// Poses before that is asked again: at least so many, and one for so many that there are.
+const DOUBTED: usize = 5;
+const DOUBTED_SHARE: usize = 20;
+
 /// Standard deviations beyond which the filter is not believed to have moved the mounting: the memory is solved from where it
 /// was.
 const WILD: f64 = 3.0;
@@ -64,7 +68,7 @@ impl Recursive {
             let growth = if self.alarm.uneasy() { GROWTH_UNEASY } else { GROWTH };
             let grown = if nodes < YOUNG { nodes + 1 } else { (nodes as f64 * growth) as usize };
             self.next_linearisation = grown.max(nodes + 1);
-            let soon = (nodes as f64 * GROWTH_UNEASY) as usize;
+            let soon = nodes + (nodes / DOUBTED_SHARE).max(DOUBTED);
             let illusory = shrunk && !self.is_below(&(solved * SHRUNK));
             self.illusory_until = if illusory { soon } else { self.illusory_until.min(soon) };
         }
