@@ -19,40 +19,47 @@ setup:
 demo *arguments: setup
     {{bin}}/tiltvp demo {{arguments}}
 
-# Debian's chromium, in which the tests open the page of a report.
-browser:
+# Lints, the unit tests of the crates and the fast Python tests: for every round of change. It builds by the profile `quick`.
+quick: quick-extension check
+    PROPTEST_RNG_SEED=20171028 cargo test --locked --workspace --lib --quiet
+    {{bin}}/pytest --quiet --numprocesses 2 --dist worksteal -m 'not slow'
+
+# The extension as the profile `quick` builds it, in place of that of `setup`.
+quick-extension:
+    test -x {{bin}}/pytest || just setup
+    cargo build --locked --quiet --profile quick --package tiltvp-py
+    cmp --quiet target/quick/lib_core.so python/tiltvp/_core.abi3.so || cp target/quick/lib_core.so python/tiltvp/_core.abi3.so
+
+# Sets up; checks and tests everything that needs neither data nor programs of the system.
+test: setup check test-rust test-python
+
+# Debian's chromium and valgrind, by apt-get, if they are not there. (The only recipe that installs into the system.)
+system-programs:
     #!/usr/bin/env bash
     set -euo pipefail
-    command -v chromium > /dev/null && exit
+    missing=""
+    for name in chromium valgrind; do command -v $name > /dev/null || missing="$missing $name"; done
+    [ -n "$missing" ] || exit 0
     root=""
     [ "$(id -u)" = 0 ] || root=sudo
+    echo "installing$missing"
     $root apt-get update --quiet --quiet
-    DEBIAN_FRONTEND=noninteractive $root apt-get install --quiet --quiet --yes --no-install-recommends chromium > /dev/null
-    command -v chromium > /dev/null
+    DEBIAN_FRONTEND=noninteractive $root apt-get install --quiet --quiet --yes --no-install-recommends $missing > /dev/null
 
-# Debian's valgrind, with which a test counts the instructions of an image.
-valgrind:
-    #!/usr/bin/env bash
-    set -euo pipefail
-    command -v valgrind > /dev/null && exit
-    root=""
-    [ "$(id -u)" = 0 ] || root=sudo
-    $root apt-get update --quiet --quiet
-    DEBIAN_FRONTEND=noninteractive $root apt-get install --quiet --quiet --yes --no-install-recommends valgrind > /dev/null
-    command -v valgrind > /dev/null
-
-# Sets up; checks and tests everything that needs no data.
-test: setup browser valgrind check test-rust test-python
+# The tests that want a browser and valgrind: the page of a report, and what an image costs in instructions.
+test-system *arguments: setup system-programs
+    {{bin}}/pytest --quiet tests/system {{arguments}}
+    cargo test --locked --package tiltvp-core --features valgrind --test instructions --quiet
 
 # The core for 64-bit ARM, by the compiler alone. (Not among the tests: it needs the target's standard library, `rustup target add
 # aarch64-unknown-linux-gnu`.)
 check-aarch64:
     cargo check --locked --package tiltvp-core --target aarch64-unknown-linux-gnu
 
-# Which functions of the core are vector code on 64-bit ARM: instructions, those of them on vectors, and the name.
+# Which kernels are vector code on 64-bit ARM: instructions, those of them on vectors, and the name.
 vectors-aarch64:
     mkdir -p target
-    cargo rustc --locked --release --package tiltvp-core --lib --target aarch64-unknown-linux-gnu -- --emit asm=target/aarch64.s -C codegen-units=1 -C debuginfo=0
+    cargo rustc --locked --release --package tiltvp-kernels --lib --target aarch64-unknown-linux-gnu -- --emit asm=target/aarch64.s -C codegen-units=1 -C debuginfo=0
     awk '/^_[A-Za-z0-9_$.]*:/ { name = $1 } /^\t[a-z]/ { all[name]++ } /[ ,]v[0-9]+\.(16b|8h|4s|2d|8b|4h|2s)/ { vector[name]++ } \
         END { for (name in vector) if (vector[name] >= 25) printf "%6d %6d  %s\n", all[name], vector[name], name }' target/aarch64.s | sort --key=2 --reverse --numeric-sort
 
@@ -70,6 +77,32 @@ test-rust:
 # The tests of the Python package, without real data.
 test-python *arguments:
     {{bin}}/pytest --quiet {{arguments}}
+
+# Keeps today's answers as those that tests/test_golden.py holds every later build to; read the change as a diff.
+golden *groups: setup
+    PYTHONPATH=tests {{bin}}/python -m golden {{groups}}
+
+# Runs a measurement and keeps what it prints in docs/measured, which docs/measured.md is held to.
+record recipe *arguments: setup
+    {{bin}}/python tests/measured.py {{recipe}} {{arguments}}
+
+# Writes docs/options.md from what the core declares.
+options: setup
+    {{bin}}/python tests/options_page.py
+
+# Writes the stubs: that of the extension, from what Rust declares, and that of the cameras' constructors, from the core's lenses.
+stub: setup
+    #!/usr/bin/env bash
+    set -euo pipefail
+    introspection=target/tools/bin/pyo3-introspection
+    test -x $introspection || cargo install --quiet --locked --root target/tools pyo3-introspection@0.30.1
+    cargo build --locked --quiet --profile quick --package tiltvp-py --features stub
+    cp target/quick/lib_core.so python/tiltvp/_core.abi3.so
+    $introspection target/quick/lib_core.so _core target/stub
+    {{bin}}/python crates/tiltvp-py/stub.py target/stub/__init__.pyi python/tiltvp/_core.pyi
+    {{bin}}/python -m tiltvp.lenses
+    {{bin}}/ruff check --fix --quiet --select I python/tiltvp/_core.pyi
+    {{bin}}/ruff format --quiet python/tiltvp/_core.pyi python/tiltvp/lenses.pyi
 
 # The tests on real data, in the folder that TILTVP_DATA names.
 test-real *arguments: setup
@@ -124,7 +157,7 @@ drives: setup
     test -d out/drives/corridor || {{bin}}/tiltvp dataset drive --kind corridor --frames 425 --samples 2 --seed 7101 --out out/drives/corridor
     test -d out/drives/hall || {{bin}}/tiltvp dataset drive --kind hall --frames 425 --samples 2 --seed 7102 --out out/drives/hall
 
-# The descriptor of vertical lines: figures 9 to 18 and 22 of paper 001, tables beside them, in out/descriptors.
+# The descriptor of vertical lines: figures 9 to 18 and 22 of Scaramuzza, Siegwart and Martinelli 2009, tables beside them, in out/descriptors.
 measure-descriptors *arguments: drives
     {{bin}}/tiltvp measure descriptors out/drives/corridor out/drives/hall --out out/descriptors {{arguments}}
 
@@ -178,12 +211,33 @@ measure-markers *arguments: setup
 measure-calibration-time *arguments: setup
     OPENBLAS_NUM_THREADS=1 {{bin}}/python benches/peers/calibration_filter.py {{arguments}}
 
+# What each constant of the core does when it is halved and doubled; paths of files or folders choose some of them.
+measure-constants *arguments: setup
+    {{bin}}/python benches/constants.py {{arguments}}
+
+# The wheel is built if sources are newer than the last one.
+# The size of `pip install tiltvp` without extras, in an environment of its own, and the time of `import tiltvp`.
+measure-install:
+    #!/usr/bin/env bash
+    set -euo pipefail
+    mkdir -p target/wheels
+    newest() { find target/wheels -name 'tiltvp-*.whl' -printf '%T@ %p\n' | sort --numeric-sort | tail --lines=1 | cut --delimiter=' ' --fields=2; }
+    wheel=$(newest)
+    if [ -z "$wheel" ] || [ -n "$(find Cargo.toml Cargo.lock pyproject.toml crates python -name '*.*' -newer "$wheel" \
+            ! -name '*.pyc' ! -name '*.so' -type f -print -quit)" ]; then
+        {{bin}}/maturin build --release --locked --quiet --out target/wheels
+        wheel=$(newest)
+    fi
+    python3 -m venv --clear --without-pip out/install
+    {{bin}}/pip --quiet --python out/install/bin/python install "$wheel"
+    python3 benches/install.py out/install
+
 # The benches of the core.
 bench *arguments:
     cargo bench --locked --package tiltvp-benches {{arguments}}
 
 # What every submission must pass.
-ci: test
+ci: test test-system
 
 # Writes formatted sources.
 format:

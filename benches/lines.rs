@@ -9,8 +9,7 @@ use nalgebra::Matrix3;
 use tiltvp_benches::{fisheye, picture, view};
 use tiltvp_core::geometry::Tilt;
 use tiltvp_core::lines::{
-    GreatCircleOptions, LINE_METHODS, LineExtractor, LineMethod, LineOptions, Lines, MatchOptions, MatchScratch,
-    match_descriptors,
+    GreatCircleOptions, LineExtractor, LineMethod, LineOptions, Lines, MatchOptions, MatchScratch, match_descriptors,
 };
 
 static PICTURE: LazyLock<Vec<u8>> = LazyLock::new(|| picture().unwrap());
@@ -56,7 +55,7 @@ fn whole(bencher: Bencher) {
 }
 
 /// From the image to its lines.
-#[divan::bench(args = LINE_METHODS)]
+#[divan::bench(args = LineMethod::NAMES)]
 fn extract(bencher: Bencher, method: &str) {
     let (extractor, mut lines, _) = found(method, Some(10));
     let (mut scratch, picture, tilt) = (extractor.scratch(), view(&PICTURE).unwrap(), tilt());

@@ -11,12 +11,20 @@ import pytest
 
 import tiltvp
 from evaluations import evaluated
-from tiltvp.datasets.folder import TiltDataset, read_dataset
-from tiltvp.datasets.new import new_dataset
-from tiltvp.evaluation.runs import Run
+from tiltvp.lab.datasets.folder import TiltDataset, read_dataset
+from tiltvp.lab.datasets.new import new_dataset
+from tiltvp.lab.evaluation.runs import Run
 from tiltvp.synth import Room, RoomImage, render_room
 
 SIDE = 256
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Marks as slow what needs the dataset, also by way of its run and its report."""
+    for item in items:
+        if "dataset" in getattr(item, "fixturenames", ()):
+            item.add_marker(pytest.mark.slow)
 
 
 @pytest.fixture(scope="session", autouse=True)

@@ -6,11 +6,11 @@ from pathlib import Path
 
 import polars as pl
 
-from tiltvp.datasets.folder import TiltDataset
-from tiltvp.evaluation.combinations import choose
-from tiltvp.evaluation.experiment import open_experiment
-from tiltvp.evaluation.runs import Run
-from tiltvp.evaluation.schema import without_times
+from tiltvp.lab.datasets.folder import TiltDataset
+from tiltvp.lab.evaluation.combinations import choose
+from tiltvp.lab.evaluation.experiment import open_experiment
+from tiltvp.lab.evaluation.runs import Run
+from tiltvp.lab.evaluation.schema import without_times
 
 
 def evaluated(dataset: TiltDataset, directory: Path, threads: int = 1, cluster: str | None = None) -> Run:

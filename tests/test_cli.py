@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import math
-import os
 import subprocess
 import sys
 from collections.abc import Callable
@@ -18,12 +17,8 @@ import pytest
 
 import tiltvp
 from tiltvp.cli import main
-from tiltvp.cli.inputs import distinct_names, find_images
-from tiltvp.errors import CalibrationError, TiltvpError
-from tiltvp.rotations import read_rotation
 from tiltvp.synth import render_room
 
-FORWARD = [[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]]
 ALPHA_RAD, BETA_RAD = math.radians(4.0), math.radians(30.0)
 
 
@@ -84,6 +79,7 @@ def one_line(text: str) -> str:
 # --- the program -------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_help_is_quick_and_names_the_commands(run: Run) -> None:
     said = run("--help")
     assert said.code == 0
@@ -95,6 +91,7 @@ def test_help_is_quick_and_names_the_commands(run: Run) -> None:
         assert f"'{heavy}'" not in done.stdout
 
 
+@pytest.mark.slow
 def test_installed_program(world: Path) -> None:
     program = Path(sys.executable).with_name("tiltvp")
     for command in ([program], [sys.executable, "-m", "tiltvp"]):
@@ -188,6 +185,7 @@ def test_out_formats_hold_the_same(run: Run, world: Path, tmp_path: Path) -> Non
     assert frames[0] == frames[1] == frames[2]
 
 
+@pytest.mark.slow
 def test_options_reach_the_core(run: Run, world: Path, tmp_path: Path) -> None:
     common = ("tilt", world / "images/a.png", "--camera", world / "camera.toml", "--out", tmp_path / "r.json")
     mask = np.zeros((180, 240), dtype=np.uint8)
@@ -313,81 +311,6 @@ def test_results_that_cannot_be_written(run: Run, world: Path, tmp_path: Path) -
     assert str(out) in one_line(said.err)
 
 
-def test_images_are_found_once_and_named_apart(tmp_path: Path) -> None:
-    for name in ("x/a.png", "x/a.jpg", "y/a.png", "y/B.png", "y/notes.txt", "y/b.PNG.txt"):
-        path = tmp_path / name
-        path.parent.mkdir(exist_ok=True)
-        path.write_bytes(b"")
-    os.symlink(tmp_path / "x" / "a.png", tmp_path / "x" / "link.png")
-    files, problems = find_images([str(tmp_path / "x/a.png"), str(tmp_path / "x"), f"{tmp_path}/*/[aB].png"])
-    assert not problems
-    assert [str(file.relative_to(tmp_path)) for file in files] == ["x/a.png", "x/a.jpg", "y/B.png", "y/a.png"]
-    names = distinct_names(files)
-    assert names == ["x_a_png", "x_a_jpg", "B", "y_a_png"]
-    assert distinct_names([Path("p/a.png"), Path("P/A.png"), Path("p_a.png")]) == ["p_a", "P_A_2", "p_a_3"]
-
-
-# --- the rotation of the camera on the robot -----------------------------------------------------------------------
-
-
-@pytest.mark.parametrize(
-    ("name", "text"),
-    [
-        ("r.txt", "# rows\n0 0 1\n-1 0 0\n0 -1 0\n"),
-        ("r.csv", "0,0,1\n-1,0,0\n0,-1,0\n"),
-        ("r.json", '{"robot_from_camera": [[0, 0, 1], [-1, 0, 0], [0, -1, 0]]}'),
-        ("r.json", '{"quaternion": [-0.5, 0.5, -0.5, 0.5]}'),
-        ("r.toml", "robot_from_camera = [[0, 0, 1], [-1, 0, 0], [0, -1, 0]]"),
-        ("r.toml", "robot_from_camera = [-0.5, 0.5, -0.5, 0.5]"),
-        ("r.yaml", "robot_from_camera:\n- [0, 0, 1]\n- [-1, 0, 0]\n- [0, -1, 0]\n"),
-        (
-            "r.yaml",
-            "%YAML:1.0\nrobot_from_camera: !!opencv-matrix\n   rows: 3\n   data: [0, 0, 1, -1, 0, 0, 0, -1, 0]\n",
-        ),
-        ("r.txt", "0 0.0001 1\n-1 0 0.0001\n0 -1 0\n"),
-    ],
-)
-def test_rotation_files(tmp_path: Path, name: str, text: str) -> None:
-    (tmp_path / name).write_text(text)
-    rotation = read_rotation(tmp_path / name)
-    assert np.abs(rotation - FORWARD).max() < 2e-4
-    assert np.abs(rotation.T @ rotation - np.eye(3)).max() < 1e-14
-    assert np.array_equal(read_rotation("forward"), FORWARD)
-    assert np.array_equal(read_rotation("up"), np.eye(3))
-
-
-@pytest.mark.parametrize(
-    ("name", "text", "problem"),
-    [
-        ("r.txt", "1 0 0\n0 1 0\n0 0 -1\n", "reflection"),
-        ("r.txt", "2 0 0\n0 1 0\n0 0 1\n", "no rotation"),
-        ("r.txt", "1 0 0 0 1 0 0 0\n", "8 numbers"),
-        ("r.txt", "1 0 0\n0 nan 0\n0 0 1\n", "not finite"),
-        ("r.txt", "\n", "empty"),
-        ("r.json", '{"quaternion": [0, 0, 0, 2]}', "length 2"),
-        ("r.json", '{"quaternion": [[1, 0, 0], [0, 1, 0], [0, 0, 1]]}', "shape (3, 3)"),
-        ("r.json", '{"rotation": [0, 0, 0, 1]}', "rotation"),
-        ("r.json", '{"quaternion": [0, 0, 0, 1], "robot_from_camera": [0, 0, 0, 1]}', "both keys"),
-        ("r.yaml", "robot_from_camera: up\n", "a list of numbers"),
-        ("r.yaml", "robot_from_camera: [[1, 0], [0]]\n", "a list of numbers"),
-        ("r.toml", "robot_from_camera = [", "not TOML"),
-        ("r.yaml", "[", "no rotation"),
-    ],
-)
-def test_rotation_files_that_are_refused(tmp_path: Path, name: str, text: str, problem: str) -> None:
-    (tmp_path / name).write_text(text)
-    with pytest.raises(CalibrationError) as refusal:
-        read_rotation(tmp_path / name)
-    assert problem in str(refusal.value)
-    assert name in str(refusal.value)
-
-
-def test_rotation_that_is_not_there(tmp_path: Path) -> None:
-    for source in (tmp_path, tmp_path / "none.txt", "fwd"):
-        with pytest.raises(TiltvpError):
-            read_rotation(source)
-
-
 # --- camera ------------------------------------------------------------------------------------------------------
 
 
@@ -444,6 +367,7 @@ def test_a_size_that_a_file_lacks_is_asked_for_by_its_option(run: Run, tmp_path:
 # --- demo --------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_demo(run: Run, tmp_path: Path) -> None:
     out = tmp_path / "demo"
     said = run("demo", "--out", out, "--width", 240, "--height", 180, "--alpha-deg", 3, "--beta-deg", -60)
@@ -464,6 +388,7 @@ def test_demo(run: Run, tmp_path: Path) -> None:
     assert error < 2.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("alpha_deg", "kind"), [(0, "corridor"), (60, "under-table")])
 def test_demo_where_methods_find_little(run: Run, tmp_path: Path, alpha_deg: float, kind: str) -> None:
     said = run("demo", "--out", tmp_path, "--width", 120, "--height", 90, "--alpha-deg", alpha_deg, "--kind", kind)

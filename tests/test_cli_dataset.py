@@ -12,7 +12,7 @@ import pytest
 
 import tiltvp
 from tiltvp.cli import main
-from tiltvp.datasets.folder import read_dataset
+from tiltvp.lab.datasets.folder import read_dataset
 
 Run = Callable[..., tuple[int, str, str]]
 
@@ -86,6 +86,7 @@ def test_tilts_of_a_file(run: Run, world: Path, tmp_path: Path) -> None:
     assert not (tmp_path / "bad").exists()
 
 
+@pytest.mark.slow
 def test_synth(run: Run, world: Path, tmp_path: Path) -> None:
     out = tmp_path / "rooms"
     code, said, complaints = run(

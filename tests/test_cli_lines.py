@@ -15,9 +15,11 @@ from tiltvp.cli import main
 from tiltvp.cli.line_options import LineOptions
 from tiltvp.errors import ImageFileError, InvalidInputError
 from tiltvp.images import read_image, write_image
-from tiltvp.plots.tracks import track_plot
+from tiltvp.lab.plots.tracks import track_plot
 from tiltvp.synth import MIRROR_BLIND_RAD, Drive, Room, RoomImage, mirror_camera
 from tiltvp.videos import VideoReader, video_writer
+
+pytestmark = pytest.mark.slow
 
 FRAMES = 6
 Run = Callable[..., tuple[int, str, str]]

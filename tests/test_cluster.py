@@ -14,12 +14,14 @@ from dask.distributed import LocalCluster
 
 from evaluations import evaluated, same_bytes
 from tiltvp.cli import main
-from tiltvp.datasets.folder import TiltDataset
 from tiltvp.errors import RunError
-from tiltvp.evaluation import cluster as module
-from tiltvp.evaluation.combinations import choose
-from tiltvp.evaluation.experiment import open_experiment
-from tiltvp.evaluation.runs import Run
+from tiltvp.lab.datasets.folder import TiltDataset
+from tiltvp.lab.evaluation import cluster as module
+from tiltvp.lab.evaluation.combinations import choose
+from tiltvp.lab.evaluation.experiment import open_experiment
+from tiltvp.lab.evaluation.runs import Run
+
+pytestmark = pytest.mark.slow
 
 NOBODY = "tcp://127.0.0.1:9"
 

@@ -19,6 +19,8 @@ from tiltvp.corner import CornerDetector, CornerPoseEstimator
 from tiltvp.errors import CalibrationError, InvalidInputError
 from tiltvp.stereo_rigs import StereoRig
 
+pytestmark = pytest.mark.slow
+
 CAMERA = tiltvp.Camera.pinhole(width=480, height=360, fx=400.0, fy=400.0, cx=240.0, cy=180.0)
 COLOURS = {"top": (30, 40, 220), "left": (50, 190, 40), "right": (210, 60, 30)}
 LIT_FROM_ABOVE = {"top": (45, 55, 255), "left": (35, 120, 28), "right": (130, 38, 20)}

@@ -12,12 +12,20 @@ import pytest
 from tiltvp.cli import main
 from tiltvp.corner import CornerHypothesis
 from tiltvp.errors import InvalidInputError
-from tiltvp.evaluation.corner_closed_form import exact_poses, noisy_poses, summarise_exact, summarise_noisy
-from tiltvp.evaluation.corner_rooms import truth_near
-from tiltvp.evaluation.corners import CORNER_SCENES, CornerExperiment, CornerScene, measure_corners, summarise_corners
-from tiltvp.plots.corners import corner_errors, inertial_errors
-from tiltvp.plots.picture import figure_picture
+from tiltvp.lab.evaluation.corner_closed_form import exact_poses, noisy_poses, summarise_exact, summarise_noisy
+from tiltvp.lab.evaluation.corner_rooms import truth_near
+from tiltvp.lab.evaluation.corners import (
+    CORNER_SCENES,
+    CornerExperiment,
+    CornerScene,
+    measure_corners,
+    summarise_corners,
+)
+from tiltvp.lab.plots.corners import corner_errors, inertial_errors
+from tiltvp.lab.plots.picture import figure_picture
 from tiltvp.stereo_scenes import SceneCorner
+
+pytestmark = pytest.mark.slow
 
 
 def test_the_truth_is_among_the_hypotheses() -> None:

@@ -13,12 +13,12 @@ import pytest
 
 import tiltvp
 from tiltvp import tilt_from_wheel_heights
-from tiltvp.datasets.check import check_dataset
-from tiltvp.datasets.degrading import HARDSHIPS, degrade_dataset, degrade_image
-from tiltvp.datasets.folder import read_dataset
-from tiltvp.datasets.new import new_dataset
-from tiltvp.datasets.rendering import find_panoramas, render_panoramas, render_rooms
 from tiltvp.errors import InvalidInputError
+from tiltvp.lab.datasets.check import check_dataset
+from tiltvp.lab.datasets.degrading import HARDSHIPS, degrade_dataset, degrade_image
+from tiltvp.lab.datasets.folder import read_dataset
+from tiltvp.lab.datasets.new import new_dataset
+from tiltvp.lab.datasets.rendering import find_panoramas, render_panoramas, render_rooms
 
 PAPER_WHEELS = {"half_track_m": 0.1545, "caster_behind_m": 0.1394}
 """To a tenth of a millimetre the only lengths that give every angle of table 1 as printed."""
@@ -291,6 +291,7 @@ def test_rendered_panoramas(panoramas: Path, small: tiltvp.Camera, tmp_path: Pat
     assert sorted(path.name for path in tmp_path.iterdir()) == ["four", "one", "other", "part"]
 
 
+@pytest.mark.slow
 def test_rendered_rooms(small: tiltvp.Camera, tmp_path: Path) -> None:
     def render(name: str, **keywords: object) -> dict[str, bytes]:
         options = {"kinds": ["narrow", "under-table"], "rooms": 2, "locations_per_room": 2, "samples": 1} | keywords
@@ -359,6 +360,7 @@ def test_no_panoramas(tmp_path: Path) -> None:
         find_panoramas(tmp_path, 0)
 
 
+@pytest.mark.slow
 def test_a_degraded_dataset_is_harder_and_its_truth_the_same(tmp_path: Path) -> None:
     camera = tiltvp.Camera.equidistant(width=96, height=72, focal_px=21.0, cx=47.5, cy=35.5, max_theta_rad=1.6)
     render_rooms(camera, tmp_path / "plain", kinds=["office"], rooms=1, locations_per_room=2, samples=1, seed=4)

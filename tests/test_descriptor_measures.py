@@ -12,15 +12,17 @@ import polars as pl
 import pytest
 
 from tiltvp.cli import main
-from tiltvp.datasets.driven import DrivenFrames, read_drive
-from tiltvp.datasets.driving import write_drive
 from tiltvp.errors import InvalidInputError
-from tiltvp.evaluation.descriptor_summary import RULES, alike, rules
-from tiltvp.evaluation.descriptors import DescriptorExperiment, follow, measure_descriptors, similarity
-from tiltvp.evaluation.line_pairs import FALSE, OPEN, RIGHT, frame_pairs, pair_verdicts
 from tiltvp.images import read_image
-from tiltvp.plots.descriptors import correct_matches, rule_densities, similarity_matrices
+from tiltvp.lab.datasets.driven import DrivenFrames, read_drive
+from tiltvp.lab.datasets.driving import write_drive
+from tiltvp.lab.evaluation.descriptor_summary import RULES, alike, rules
+from tiltvp.lab.evaluation.descriptors import DescriptorExperiment, follow, measure_descriptors, similarity
+from tiltvp.lab.evaluation.line_pairs import FALSE, OPEN, RIGHT, frame_pairs, pair_verdicts
+from tiltvp.lab.plots.descriptors import correct_matches, rule_densities, similarity_matrices
 from tiltvp.synth import MIRROR_BLIND_RAD, Drive, DriveTruth, Room, mirror_camera
+
+pytestmark = pytest.mark.slow
 
 FRAMES = 6
 SMALL = DescriptorExperiment(frames_apart=(1, 3), every=1, clips=(0.1, 1.0), noises_percent=(0.0, 10.0), bins=(8, 32))

@@ -45,6 +45,7 @@ def test_another_process(tmp_path: Path, camera: tiltvp.Camera, room: RoomImage)
     assert pickle.loads(answer.read_bytes()) == [estimator(room.gray) for estimator in estimators]
 
 
+@pytest.mark.slow
 def test_rooms() -> None:
     small = tiltvp.Camera.equidistant(width=60, height=50, focal_px=17.0, cx=29.5, cy=24.5)
     one, same = (render_room(small, kind="office", seed=4, alpha_rad=0.05, samples=1) for _ in range(2))

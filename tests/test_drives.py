@@ -11,11 +11,13 @@ import pytest
 
 from tiltvp._core import leaning_from_upright, normal_from_alpha_beta
 from tiltvp.cli import main
-from tiltvp.datasets.driving import DRIVE_KINDS, drive_room, write_drive
-from tiltvp.datasets.folder import read_dataset
 from tiltvp.errors import InvalidInputError
+from tiltvp.lab.datasets.driving import DRIVE_KINDS, drive_room, write_drive
+from tiltvp.lab.datasets.folder import read_dataset
 from tiltvp.odometry import read_odometry
 from tiltvp.synth import MIRROR_BLIND_RAD, WALL_PATTERNS, Drive, Room, mirror_camera
+
+pytestmark = pytest.mark.slow
 
 FRAMES = 12
 
@@ -102,11 +104,11 @@ def test_wrong_arguments_are_refused(drive: Drive, room: Room) -> None:
         drive.render(FRAMES)
     with pytest.raises(InvalidInputError, match="mount"):
         Drive(room, camera=camera, mount=(0.0, 0.0))
-    with pytest.raises(InvalidInputError, match=r"drive\.lighting"):
+    with pytest.raises(InvalidInputError, match="lighting"):
         Drive(room, camera=camera, lighting=2.0)
     with pytest.raises(InvalidInputError, match="wall_pattern"):
         Room("corridor", 0, wall_pattern="plaid")
-    with pytest.raises(InvalidInputError, match=r"room\.extent"):
+    with pytest.raises(InvalidInputError, match="extent"):
         Room("corridor", 0, extent=9.0)
     with pytest.raises(InvalidInputError, match="kind"):
         drive_room("street")

@@ -15,21 +15,21 @@ import pytest
 
 import tiltvp
 from evaluations import evaluated, same_bytes
-from tiltvp.datasets.folder import TiltDataset, read_dataset
-from tiltvp.datasets.new import new_dataset
-from tiltvp.datasets.panoramas import Panorama
 from tiltvp.errors import InvalidInputError, RunError
-from tiltvp.evaluation import runs
-from tiltvp.evaluation.combinations import SWEEPS, TABLE_3, Combination, choose, paper_sweep
-from tiltvp.evaluation.crossval import cross_validated
-from tiltvp.evaluation.experiment import open_experiment
-from tiltvp.evaluation.metrics import offset_rad, relative_errors_rad, turned
-from tiltvp.evaluation.panoramas import evaluate_views
-from tiltvp.evaluation.runner import ImageRunner, View
-from tiltvp.evaluation.runs import Run, read_run
-from tiltvp.evaluation.scaling import exponents, measure_scaling
-from tiltvp.evaluation.schema import COLUMNS
-from tiltvp.evaluation.summary import advantage, errors, reading_of_q, table_3, table_4, variants
+from tiltvp.lab.datasets.folder import TiltDataset, read_dataset
+from tiltvp.lab.datasets.new import new_dataset
+from tiltvp.lab.datasets.panoramas import Panorama
+from tiltvp.lab.evaluation import runs
+from tiltvp.lab.evaluation.combinations import SWEEPS, TABLE_3, Combination, choose, paper_sweep
+from tiltvp.lab.evaluation.crossval import cross_validated
+from tiltvp.lab.evaluation.experiment import open_experiment
+from tiltvp.lab.evaluation.metrics import offset_rad, relative_errors_rad, turned
+from tiltvp.lab.evaluation.panoramas import evaluate_views
+from tiltvp.lab.evaluation.runner import ImageRunner, View
+from tiltvp.lab.evaluation.runs import Run, read_run
+from tiltvp.lab.evaluation.scaling import exponents, measure_scaling
+from tiltvp.lab.evaluation.schema import COLUMNS
+from tiltvp.lab.evaluation.summary import advantage, errors, reading_of_q, table_3, table_4, variants
 from tiltvp.synth import Room, RoomImage
 
 VIEW = View(7, "images/a.png", "a", "flat", 0.06, 0.8, 0.5)
@@ -198,9 +198,9 @@ def test_half_a_run_is_continued(
 PROGRAM = """
 import sys, time
 from pathlib import Path
-from tiltvp.datasets.folder import read_dataset
-from tiltvp.evaluation.combinations import choose
-from tiltvp.evaluation.experiment import open_experiment
+from tiltvp.lab.datasets.folder import read_dataset
+from tiltvp.lab.evaluation.combinations import choose
+from tiltvp.lab.evaluation.experiment import open_experiment
 
 with open_experiment(read_dataset(sys.argv[1]), choose("table3"), Path(sys.argv[2]), sweep="table3") as experiment:
     def advance():
@@ -347,6 +347,7 @@ def test_the_command(tmp_path: Path, dataset: TiltDataset, whole: Run, capfd: py
     assert "did you mean table3" in capfd.readouterr().err
 
 
+@pytest.mark.slow
 def test_cost_over_images_and_pixels(camera: tiltvp.Camera) -> None:
     small = camera.scaled(0.5)
     table = measure_scaling(small, choose("table3", ["refined"]), images=(1, 2), scales=(1.0, 4.0))
@@ -362,6 +363,7 @@ def test_cost_over_images_and_pixels(camera: tiltvp.Camera) -> None:
     assert fitted["edge_pixels"].to_list() == pytest.approx([0.0, 0.0], abs=1e-12)
 
 
+@pytest.mark.slow
 def test_views_of_panoramas_without_files(tmp_path: Path, camera: tiltvp.Camera) -> None:
     scene = Room("corridor", 3)
     tiltvp.write_image(tmp_path / "hall.png", scene.render_panorama(pose=scene.free_poses(1, 0)[0], height=200).gray)

@@ -15,9 +15,9 @@ import pytest
 import tiltvp
 from tiltvp.cli import main
 from tiltvp.errors import InvalidInputError
+from tiltvp.lab.plots.filtering import filtered_tilt
+from tiltvp.lab.plots.picture import figure_picture
 from tiltvp.odometry import Motion, read_odometry
-from tiltvp.plots.filtering import filtered_tilt
-from tiltvp.plots.picture import figure_picture
 from tiltvp.synth import RoomImage
 
 Array = np.ndarray

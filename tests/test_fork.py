@@ -60,6 +60,7 @@ def test_fork_after_a_batch(camera: tiltvp.Camera, images: list[np.ndarray]) -> 
     assert estimator.estimate_many(images, threads=4) == expected
 
 
+@pytest.mark.slow
 def test_fork_after_a_room(camera: tiltvp.Camera) -> None:
     room = Room("narrow", 1)
     pose = room.free_poses(1, 0)[0]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 import cv2
@@ -9,6 +10,7 @@ import numpy as np
 import pytest
 
 import tiltvp
+from tiltvp.cli.inputs import distinct_names, find_images
 from tiltvp.errors import ImageFileError, InvalidInputError
 from tiltvp.images import gray_from
 
@@ -117,3 +119,17 @@ def test_unwritable_files_are_named(tmp_path: Path) -> None:
             tiltvp.write_image(path, LEVELS)
         assert str(path) in str(refusal.value)
     assert [file.name for file in tmp_path.iterdir()] == ["file"]
+
+
+def test_images_are_found_once_and_named_apart(tmp_path: Path) -> None:
+    for name in ("x/a.png", "x/a.jpg", "y/a.png", "y/B.png", "y/notes.txt", "y/b.PNG.txt"):
+        path = tmp_path / name
+        path.parent.mkdir(exist_ok=True)
+        path.write_bytes(b"")
+    os.symlink(tmp_path / "x" / "a.png", tmp_path / "x" / "link.png")
+    files, problems = find_images([str(tmp_path / "x/a.png"), str(tmp_path / "x"), f"{tmp_path}/*/[aB].png"])
+    assert not problems
+    assert [str(file.relative_to(tmp_path)) for file in files] == ["x/a.png", "x/a.jpg", "y/B.png", "y/a.png"]
+    names = distinct_names(files)
+    assert names == ["x_a_png", "x_a_jpg", "B", "y_a_png"]
+    assert distinct_names([Path("p/a.png"), Path("P/A.png"), Path("p_a.png")]) == ["p_a", "P_A_2", "p_a_3"]

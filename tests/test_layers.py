@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -34,12 +35,44 @@ def test_only_the_extension_is_taken_from_the_root() -> None:
                 assert [alias.name for alias in node.names] == ["_core"], f"{path.name}, line {node.lineno}"
 
 
-@pytest.mark.parametrize("module", ["tiltvp", "tiltvp.synth", "tiltvp.formats"])
-def test_importing_is_light(module: str) -> None:
-    heavy = ["matplotlib", "polars", "rich", "cyclopts", "hypothesis", "scipy"]
-    script = f"import sys, {module}; print([name for name in {heavy} if name in sys.modules])"
+def blocked(*packages: str) -> str:
+    """The beginning of a program in which these packages are as if they were not installed."""
+    return f"""
+import sys
+class Blocked:
+    def find_spec(self, name, path=None, target=None):
+        if name.split(".")[0] in {packages}:
+            raise ModuleNotFoundError(f"No module named {{name!r}}", name=name)
+sys.meta_path.insert(0, Blocked())
+"""
+
+
+@pytest.mark.parametrize("topic", ["", "cameras", "formats", "synth", "lines", "corner", "selfcalib"])
+def test_importing_needs_numpy_alone(topic: str) -> None:
+    others = ("cv2", "yaml", "tomli_w", "rich", "cyclopts", "polars", "matplotlib", "plotly", "jinja2", "scipy", "dask")
+    script = blocked(*others) + f"import tiltvp{topic and '.' + topic}; print('lab' in dir(tiltvp))"
     done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, timeout=60, check=True)
-    assert done.stdout.strip() == "[]"
+    assert done.stdout.strip() == "False"
+
+
+@pytest.mark.slow
+def test_importing_is_quick() -> None:
+    """The limit is for the processor's time: other programs of a busy machine do not count."""
+    script = """
+import os, subprocess, sys
+def seconds(program):
+    before = os.times()
+    subprocess.run([sys.executable, "-c", program], check=True)
+    after = os.times()
+    return after.children_user + after.children_system - before.children_user - before.children_system
+both = [min(seconds(program) for _ in range(5)) for program in ("import numpy", "import tiltvp")]
+print(both[1] - both[0])
+"""
+    environment = os.environ | {"OPENBLAS_NUM_THREADS": "1"}
+    done = subprocess.run(
+        [sys.executable, "-c", script], capture_output=True, text=True, timeout=60, check=True, env=environment
+    )
+    assert float(done.stdout) < 0.1
 
 
 def test_one_import_brings_the_topics() -> None:

@@ -21,6 +21,7 @@ def inner_disc(camera: tiltvp.Camera, theta_deg: float = 80.0) -> np.ndarray:
     return (bearings[:, 2] > math.cos(math.radians(theta_deg))).reshape(camera.height, camera.width)
 
 
+@pytest.mark.slow
 def test_a_levelled_room_is_the_room_seen_upright(
     camera: tiltvp.Camera, render: Callable[..., RoomImage], upright_room: RoomImage
 ) -> None:

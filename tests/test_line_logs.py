@@ -10,8 +10,8 @@ import polars as pl
 import pytest
 
 from tiltvp.cli import main
-from tiltvp.datasets.driving import write_drive
 from tiltvp.errors import ImageFileError, InvalidInputError
+from tiltvp.lab.datasets.driving import write_drive
 from tiltvp.line_logs import FollowedFrame, bearing_log, displacements, follow_lines
 from tiltvp.lines import LineExtractor, LineTracker
 from tiltvp.odometry import Motion, read_odometry

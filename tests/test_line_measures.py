@@ -11,8 +11,8 @@ import polars as pl
 import pytest
 
 from tiltvp.cli import main
-from tiltvp.evaluation.line_truth import Identities, Judge, Verdicts, edge_bearings, identities
-from tiltvp.evaluation.lines import LINE_VARIANTS, LineExperiment, line_intervals, measure_lines, summarise_lines
+from tiltvp.lab.evaluation.line_truth import Identities, Judge, Verdicts, edge_bearings, identities
+from tiltvp.lab.evaluation.lines import LINE_VARIANTS, LineExperiment, line_intervals, measure_lines, summarise_lines
 from tiltvp.synth import Drive, DriveTruth, Room, mirror_camera
 
 WORLD_RAD = np.radians([0.0, 10.0, 20.0, 20.2])
@@ -88,8 +88,9 @@ def test_edge_bearings_are_those_of_the_truth(room: Room) -> None:
     assert np.allclose(edge_bearings(drive, 2)[truth.edges], truth.bearings_rad, atol=1e-9)
 
 
+@pytest.mark.slow
 def test_a_small_experiment(room: Room, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("tiltvp.evaluation.lines.drive_room", lambda *_, **__: room)
+    monkeypatch.setattr("tiltvp.lab.evaluation.lines.drive_room", lambda *_, **__: room)
     experiment = LineExperiment(frames=4, kinds=("corridor",), seed=11, samples=1, resolution_scale=0.6)
     done: list[None] = []
     table = measure_lines(experiment, threads=2, advance=lambda: done.append(None))

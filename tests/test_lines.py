@@ -14,7 +14,7 @@ import pytest
 import tiltvp
 from tiltvp import lines as tl
 from tiltvp.errors import InvalidInputError
-from tiltvp.plots.lines import draw_lines, line_pixels
+from tiltvp.overlays.lines import draw_lines, line_pixels
 from tiltvp.synth import Room, RoomImage
 
 
@@ -42,6 +42,7 @@ def errors_deg(lines: tl.Lines, room: Room, pose: np.ndarray) -> np.ndarray:
     return np.degrees(np.abs(turn).min(axis=1))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("alpha_deg", [0.0, 5.0])
 def test_bearings_in_rooms_are_true_to_a_tenth_of_a_degree(
     mirror: tiltvp.Camera, office: Room, alpha_deg: float
@@ -182,6 +183,7 @@ def test_wrong_arguments_are_refused(room: RoomImage, camera: tiltvp.Camera) -> 
         tl.LineTracker().update(lines, np.zeros((len(lines) + 1, 192), np.float32))
 
 
+@pytest.mark.slow
 def test_a_drive_keeps_its_tracks(mirror: tiltvp.Camera, office: Room) -> None:
     """A robot turns on the spot and leans: lines stay the same tracks, with and without knowledge of the turn."""
     extractor = tl.LineExtractor(mirror, length_min_rad=math.radians(20))
@@ -213,6 +215,7 @@ def test_a_drive_keeps_its_tracks(mirror: tiltvp.Camera, office: Room) -> None:
     assert trackers[0] == copy.copy(trackers[0]) != trackers[1]
 
 
+@pytest.mark.slow
 def test_similarity_matrices_are_darkest_on_the_diagonal(mirror: tiltvp.Camera, office: Room) -> None:
     image = office.render(mirror, pose=office.free_poses(1, 4)[0], samples=3)
     extractor = tl.LineExtractor(mirror)

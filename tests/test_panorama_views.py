@@ -11,8 +11,8 @@ import pytest
 
 import tiltvp
 from tiltvp._core import PixelRays, leaning_from_upright
-from tiltvp.datasets.panoramas import Panorama, PanoramaViews
 from tiltvp.errors import InvalidInputError
+from tiltvp.lab.datasets.panoramas import Panorama, PanoramaViews
 
 QUARTER = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
 

@@ -15,12 +15,12 @@ import tiltvp
 from tiltvp._core import leaning_from_upright
 from tiltvp.cli import main
 from tiltvp.errors import InvalidInputError
-from tiltvp.evaluation.planar.panorama import PanoramaGrid, Unwrapper
-from tiltvp.evaluation.planar.warping import MinWarping, bearing_and_orientation
-from tiltvp.evaluation.planar_pose import CORRECTIONS, PlanarPoseExperiment, measure_planar_pose
-from tiltvp.evaluation.planar_summary import crossings, summarise_planar_pose
-from tiltvp.plots.picture import figure_picture
-from tiltvp.plots.planar_pose import planar_pose
+from tiltvp.lab.evaluation.planar.panorama import PanoramaGrid, Unwrapper
+from tiltvp.lab.evaluation.planar.warping import MinWarping, bearing_and_orientation
+from tiltvp.lab.evaluation.planar_pose import CORRECTIONS, PlanarPoseExperiment, measure_planar_pose
+from tiltvp.lab.evaluation.planar_summary import crossings, summarise_planar_pose
+from tiltvp.lab.plots.picture import figure_picture
+from tiltvp.lab.plots.planar_pose import planar_pose
 
 GRID = PanoramaGrid()
 WARPING = MinWarping(GRID)
@@ -170,6 +170,7 @@ def table(small: PlanarPoseExperiment) -> pl.DataFrame:
     return measure_planar_pose(small, threads=1)
 
 
+@pytest.mark.slow
 def test_experiment_is_the_same_for_any_threads(small: PlanarPoseExperiment, table: pl.DataFrame) -> None:
     steps = []
     again = measure_planar_pose(small, threads=2, advance=lambda: steps.append(1))
@@ -178,6 +179,7 @@ def test_experiment_is_the_same_for_any_threads(small: PlanarPoseExperiment, tab
     assert len(table) == small.pairs * len(small.tilts_deg) * len(CORRECTIONS)
 
 
+@pytest.mark.slow
 def test_table_holds_together(small: PlanarPoseExperiment, table: pl.DataFrame) -> None:
     assert table.null_count().sum_horizontal().item() == 0
     near, far = small.distances_m
@@ -192,6 +194,7 @@ def test_table_holds_together(small: PlanarPoseExperiment, table: pl.DataFrame) 
     assert upright.n_unique(["kind", "first", "second", "bearing_rad"]) == small.pairs
 
 
+@pytest.mark.slow
 def test_summary_and_figure(table: pl.DataFrame) -> None:
     summary = summarise_planar_pose(table)
     assert len(summary) == 2 * len(CORRECTIONS) * 2
@@ -225,6 +228,7 @@ def test_command_refuses_before_it_works(tmp_path: Path, capsys: pytest.CaptureF
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.slow
 def test_command_prints_writes_and_draws(
     small: PlanarPoseExperiment,
     table: pl.DataFrame,
@@ -232,7 +236,7 @@ def test_command_prints_writes_and_draws(
     monkeypatch: pytest.MonkeyPatch,
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    from tiltvp.evaluation import planar_pose as module
+    from tiltvp.lab.evaluation import planar_pose as module
 
     asked = []
 

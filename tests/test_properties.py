@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
 import tiltvp
+from tiltvp import _core
 from tiltvp.errors import TiltvpError
 from tiltvp.images import gray_from
 from tiltvp.synth import RoomImage
@@ -70,25 +71,14 @@ def test_any_pixels_have_an_estimate(image: np.ndarray, method: str) -> None:
     assert tiltvp.TiltEstimate.from_dict(estimate.to_dict()) == estimate
 
 
-CONSTRUCTORS: dict[str, tuple[str, ...]] = {
-    "pinhole": ("fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6"),
-    "kannala_brandt": ("fx", "fy", "cx", "cy", "k1", "k2", "k3", "k4"),
-    "unified": ("xi", "fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2", "k3", "skew"),
-    "extended_unified": ("alpha", "beta", "fx", "fy", "cx", "cy"),
-    "double_sphere": ("xi", "alpha", "fx", "fy", "cx", "cy"),
-    "equidistant": ("focal_px", "cx", "cy"),
-    "radial_polynomial": ("k1", "k2", "k3", "k4", "cx", "cy", "aspect_ratio"),
-}
-
-
 @MANY
 @given(st.data())
-@pytest.mark.parametrize("model", [*CONSTRUCTORS, "ocam"])
+@pytest.mark.parametrize("model", _core.CAMERA_MODELS)
 def test_any_numbers_make_a_camera_or_are_refused(model: str, data: st.DataObject) -> None:
-    names = CONSTRUCTORS.get(model, ("cx", "cy", "c", "d", "e"))
-    parameters: dict[str, Any] = {name: data.draw(numbers, name) for name in names}
-    if model == "ocam":
-        parameters["polynomial"] = data.draw(st.lists(numbers, max_size=6))
+    parameters: dict[str, Any] = {
+        one["name"]: data.draw(st.lists(numbers, max_size=6) if one["is_list"] else numbers, one["name"])
+        for one in _core.lens_schema(model)["parameters"]
+    }
     width, height = data.draw(st.tuples(*[st.integers(-1, 60)] * 2))
     mirror, limit = data.draw(st.booleans()), data.draw(st.none() | numbers)
     try:

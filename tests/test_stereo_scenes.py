@@ -13,9 +13,11 @@ import yaml
 
 import tiltvp
 from tiltvp.cli import main
-from tiltvp.datasets.stereo import write_stereo
 from tiltvp.errors import InvalidInputError
+from tiltvp.lab.datasets.stereo import write_stereo
 from tiltvp.synth import Laboratory, Room, StereoSequence, zed_cameras
+
+pytestmark = pytest.mark.slow
 
 FRAMES = 8
 
@@ -105,7 +107,7 @@ def test_the_truth_is_where_the_images_have_it(sequence: StereoSequence) -> None
 
 
 def test_an_image_attitude_fuses_with_the_gyroscope(laboratory: Laboratory) -> None:
-    from tiltvp.evaluation.corner_inertial import compare_inertial, summarise_inertial_comparison
+    from tiltvp.lab.evaluation.corner_inertial import compare_inertial, summarise_inertial_comparison
 
     left, right = small_cameras()
     sequence = StereoSequence(laboratory, left=left, right=right, frames=300, seed=2)

@@ -8,12 +8,13 @@ import pytest
 
 import tiltvp
 from tiltvp.cli.app import main
-from tiltvp.evaluation.striding import stride_views, summarise_strides
-from tiltvp.evaluation.views import room_views
+from tiltvp.lab.evaluation.striding import stride_views, summarise_strides
+from tiltvp.lab.evaluation.views import room_views
 
 CAMERA = tiltvp.Camera.equidistant(width=320, height=240, focal_px=69.8, cx=159.5, cy=119.5, max_theta_rad=1.61)
 
 
+@pytest.mark.slow
 def test_the_table_has_a_row_for_each_method_and_stride() -> None:
     views = list(room_views(1, CAMERA, kinds=("office",)))
     table = stride_views(views, CAMERA, strides=(1, 3), repeats=1)

@@ -10,8 +10,8 @@ import pytest
 
 from evaluations import evaluated
 from tiltvp.cli import main
-from tiltvp.datasets.folder import TiltDataset
-from tiltvp.evaluation.trust import TOGETHER, trust, was_set_on
+from tiltvp.lab.datasets.folder import TiltDataset
+from tiltvp.lab.evaluation.trust import TOGETHER, trust, was_set_on
 
 
 def draws(seed: int, promised: float = 1.0) -> pl.DataFrame:

@@ -17,9 +17,9 @@ from dataclasses import dataclass, field
 import cv2
 import numpy as np
 
-from tiltvp.datasets.driven import DrivenFrames, read_drive
-from tiltvp.evaluation.line_pairs import FALSE, RIGHT, pair_verdicts
-from tiltvp.evaluation.line_truth import identities
+from tiltvp.lab.datasets.driven import DrivenFrames, read_drive
+from tiltvp.lab.evaluation.line_pairs import FALSE, RIGHT, pair_verdicts
+from tiltvp.lab.evaluation.line_truth import identities
 from tiltvp.lines import LineExtractor, match
 
 FRAMES_APART = (1, 4, 20)
@@ -234,7 +234,7 @@ def main() -> None:
     """Prints the tables."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("drives", nargs="+", help="folders that `tiltvp dataset drive` has written")
-    parser.add_argument("--every", type=int, default=10, help="pairs begin at every so-manieth frame")
+    parser.add_argument("--every", type=int, default=10, help="frames from the beginning of a pair to that of the next")
     arguments = parser.parse_args()
     cv2.setNumThreads(1)
     peers: dict[str, Peer] = {}

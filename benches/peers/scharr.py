@@ -14,7 +14,7 @@ import cv2
 import numpy as np
 
 from tiltvp import METHODS, TiltEstimator, normal_from_alpha_beta
-from tiltvp.datasets.panoramas import TABLE_1_TILTS_DEG, PanoramaViews, paper_camera, read_panorama_index
+from tiltvp.lab.datasets.panoramas import TABLE_1_TILTS_DEG, PanoramaViews, paper_camera, read_panorama_index
 from tiltvp.synth import ROOM_KINDS, render_room
 
 VARIANTS = [(method, {}) for method in METHODS] + [

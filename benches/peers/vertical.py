@@ -22,7 +22,7 @@ from paper_numpy import PaperNumpy
 from scharr import images
 
 from tiltvp import Camera, TiltEstimator, common_direction, normal_from_alpha_beta, tilt_error_rad
-from tiltvp.datasets.panoramas import TABLE_1_TILTS_DEG, paper_camera
+from tiltvp.lab.datasets.panoramas import TABLE_1_TILTS_DEG, paper_camera
 from tiltvp.rotations import read_rotation
 from tiltvp.synth import ROOM_KINDS, render_room
 

@@ -18,7 +18,7 @@ from tiltvp.corrections import (
     train_posterior,
 )
 from tiltvp.images import read_image, write_image
-from tiltvp.plots.overlay import draw_edges
+from tiltvp.overlays.edges import draw_edges
 from tiltvp.selfcalib import (
     CALIBRATION_METHODS,
     CalibrationStep,

@@ -25,10 +25,7 @@ __all__ = [
     "CornerPoseEstimator",
 ]
 
-_OF_ESTIMATOR = (
-    "gamma_rad", "gamma_sigma_rad", "right_handed", "down", "down_sigma_rad", "turn_sigma_rad", "forget_after",
-    "agree_max_rad", "parallel_max_rad", "misfit_max", "distance_min_m", "distance_max_m", "probability_min",
-)  # fmt: skip
+_OF_ESTIMATOR = tuple(field["name"] for field in _core.option_fields("CornerPoseEstimator"))
 
 
 class CornerDetector(_core.CornerDetector):

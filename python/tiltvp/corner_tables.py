@@ -1,11 +1,11 @@
-"""Poses before a corner as tables and trajectories."""
+"""Poses before a corner as rows of a table and as a trajectory."""
 
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
@@ -13,12 +13,11 @@ from tiltvp.errors import InvalidInputError
 from tiltvp.rotations import quaternion
 
 if TYPE_CHECKING:
-    import polars as pl
     from numpy.typing import NDArray
 
     from tiltvp._core import CornerEstimate
 
-__all__ = ["pose_table", "roll_pitch_yaw", "write_trajectory"]
+__all__ = ["POSE_COLUMNS", "pose_rows", "roll_pitch_yaw", "write_trajectory"]
 
 _QUATERNION = ("qx", "qy", "qz", "qw")
 _POSITION = ("x_m", "y_m", "z_m")
@@ -26,23 +25,26 @@ _ANGLES = ("roll_deg", "pitch_deg", "yaw_deg")
 _SIGMAS = ("sigma_rx_rad", "sigma_ry_rad", "sigma_rz_rad", "sigma_x_m", "sigma_y_m", "sigma_z_m")
 
 
-def pose_table(estimates: Sequence[tuple[float, str, CornerEstimate]]) -> pl.DataFrame:
+POSE_COLUMNS: Final[dict[str, str]] = (
+    {"time_s": "Float64", "file": "String", "found": "Boolean"}
+    | dict.fromkeys((*_ANGLES, *_QUATERNION, *_POSITION, *_SIGMAS), "Float64")
+    | {"confidence": "Float64", "hypotheses": "Int64", "misfit": "Float64", "object": "Int64"}
+    | {"corners_left": "Int64", "corners_right": "Int64", "reason": "String"}
+)
+"""The keys of the rows in their order, each with the name of its type in Polars."""
+
+
+def pose_rows(estimates: Sequence[tuple[float, str, CornerEstimate]]) -> list[dict[str, Any]]:
     """One row for each frame: time_s, file, found, the camera in the object's frame, and how sure it is.
 
     qx..qw and x_m..z_m are `object_from_camera`; the object's frame has y along the vertical edge away from the vertex.
     roll, pitch and yaw are those of `object_from_camera` about the camera's z, x and y axis. The standard deviations
-    are of the rotation vector and of the vertex in the camera's frame. Null where there is no pose, from one camera no
+    are of the rotation vector and of the vertex in the camera's frame. None where there is no pose, from one camera no
     position.
     """
-    import polars as pl
-
-    schema: dict[str, pl.DataType] = {"time_s": pl.Float64(), "file": pl.String(), "found": pl.Boolean()}
-    schema |= dict.fromkeys((*_ANGLES, *_QUATERNION, *_POSITION, *_SIGMAS), pl.Float64())
-    schema |= {"confidence": pl.Float64(), "hypotheses": pl.Int64(), "misfit": pl.Float64(), "object": pl.Int64()}
-    schema |= {"corners_left": pl.Int64(), "corners_right": pl.Int64(), "reason": pl.String()}
     rows = []
     for time_s, file, estimate in estimates:
-        row: dict[str, object] = dict.fromkeys(schema)
+        row: dict[str, Any] = dict.fromkeys(POSE_COLUMNS)
         row |= {"time_s": time_s, "file": file, "found": bool(estimate), "confidence": estimate.confidence}
         row |= {"hypotheses": len(estimate.hypotheses), "reason": estimate.reason, "object": estimate.object}
         row |= {"corners_left": len(estimate.features_left), "corners_right": len(estimate.features_right)}
@@ -60,20 +62,20 @@ def pose_table(estimates: Sequence[tuple[float, str, CornerEstimate]]) -> pl.Dat
                 row |= dict(zip(_POSITION, place.tolist(), strict=True))
             row["misfit"] = pose.misfit
         rows.append(row)
-    return pl.DataFrame(rows, schema=schema)
+    return rows
 
 
-def write_trajectory(table: pl.DataFrame, path: str | os.PathLike[str]) -> None:
-    """The poses of a table in TUM's format: time x y z qx qy qz qw, a line for each; whole or not at all.
+def write_trajectory(rows: Sequence[Mapping[str, Any]], path: str | os.PathLike[str]) -> None:
+    """The poses of `pose_rows` in TUM's format: time x y z qx qy qz qw, a line for each; whole or not at all.
 
     Raises `InvalidInputError` where no row has a position, and where the file cannot be written.
     """
-    columns = ["time_s", *_POSITION, *_QUATERNION]
-    rows = table.select(columns).drop_nulls()
-    if rows.height == 0:
+    poses = [[row[name] for name in ("time_s", *_POSITION, *_QUATERNION)] for row in rows]
+    placed = [pose for pose in poses if None not in pose]
+    if not placed:
         raise InvalidInputError(f"{path}: no pose has a position, expected the images of two cameras")
     lines = ["# time_s x_m y_m z_m qx qy qz qw of object_from_camera"]
-    lines += [" ".join(f"{value:.9f}" for value in row) for row in rows.iter_rows()]
+    lines += [" ".join(f"{value:.9f}" for value in pose) for pose in placed]
     file = Path(path)
     part = file.with_name(f".{file.name}.part")
     try:

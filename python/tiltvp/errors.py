@@ -30,7 +30,7 @@ class RunError(TiltvpError, RuntimeError):
 
 
 class MissingExtraError(TiltvpError, ImportError):
-    """Something needs packages that are installed with an extra, such as `tiltvp[report]`."""
+    """Something needs packages that are installed with an extra, such as `tiltvp[lab]`."""
 
 
 class InternalError(TiltvpError, RuntimeError):

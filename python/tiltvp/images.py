@@ -7,7 +7,6 @@ from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import cv2
 import numpy as np
 
 from tiltvp.errors import ImageFileError, InvalidInputError
@@ -39,6 +38,8 @@ def gray_from(image: ArrayLike, name: str = "image") -> NDArray[np.uint8]:
         if levels.shape[2] == 1:
             levels = levels[:, :, 0]
         else:
+            import cv2
+
             code = cv2.COLOR_BGR2GRAY if levels.shape[2] == 3 else cv2.COLOR_BGRA2GRAY
             levels = np.asarray(cv2.cvtColor(np.ascontiguousarray(levels), code), dtype=np.uint8)
     return np.ascontiguousarray(levels)
@@ -92,6 +93,8 @@ def read_image(path: str | os.PathLike[str]) -> NDArray[np.uint8]:
 
 
 def _decode(data: NDArray[np.uint8]) -> NDArray[np.uint8] | None:
+    import cv2
+
     if data.size == 0:
         return None
     try:
@@ -103,6 +106,8 @@ def _decode(data: NDArray[np.uint8]) -> NDArray[np.uint8] | None:
 
 def write_image(path: str | os.PathLike[str], image: NDArray[np.uint8]) -> None:
     """Writes an image file whole or not at all; the ending says the format. Raises `ImageFileError` with the path."""
+    import cv2
+
     file = Path(path)
     try:
         done, data = cv2.imencode(file.suffix or ".png", image)

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
 
 from tiltvp._core import (
     CALIBRATION_METHODS,
@@ -20,7 +22,7 @@ from tiltvp.errors import InvalidInputError
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    import polars as pl
+    from numpy.typing import NDArray
 
 __all__ = [
     "CALIBRATION_METHODS",
@@ -37,21 +39,14 @@ __all__ = [
 ]
 
 
-def convergence_table(estimates: Sequence[MountingEstimate]) -> pl.DataFrame:
-    """A row for each step: phi_rad, rho_m, psi_rad, x_m, y_m, yaw_rad, a column `variance_...` of each, and alarm."""
-    import polars as pl
-
-    rows = []
-    for e in estimates:
-        row: dict[str, float | bool] = {
-            "phi_rad": e.phi_rad, "rho_m": e.rho_m, "psi_rad": e.psi_rad,
-            "x_m": e.x_m, "y_m": e.y_m, "yaw_rad": e.yaw_rad,
-        }  # fmt: skip
-        polar, plane = e.covariance_phi_rho_psi, e.covariance_xy_yaw
-        row |= {f"variance_{name}": float(polar[i, i]) for i, name in enumerate(("phi", "rho", "psi"))}
-        row |= {f"variance_{name}": float(plane[i, i]) for i, name in enumerate(("x", "y", "yaw"))}
-        rows.append(row | {"alarm": e.alarm})
-    return pl.DataFrame(rows)
+def convergence_table(estimates: Sequence[MountingEstimate]) -> dict[str, NDArray[Any]]:
+    """Columns with a value for each step: phi_rad, rho_m, psi_rad, x_m, y_m, yaw_rad, `variance_...` of each, alarm."""
+    names = ("phi_rad", "rho_m", "psi_rad", "x_m", "y_m", "yaw_rad")
+    columns = {name: np.array([getattr(e, name) for e in estimates], dtype=np.float64) for name in names}
+    for matrix, of in (("covariance_phi_rho_psi", ("phi", "rho", "psi")), ("covariance_xy_yaw", ("x", "y", "yaw"))):
+        variances = np.array([np.diag(getattr(e, matrix)) for e in estimates], dtype=np.float64).reshape(-1, 3)
+        columns |= {f"variance_{name}": variances[:, i] for i, name in enumerate(of)}
+    return columns | {"alarm": np.array([e.alarm for e in estimates], dtype=bool)}
 
 
 def ros_static_transform(

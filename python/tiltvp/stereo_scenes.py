@@ -4,19 +4,22 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tiltvp import _core
 from tiltvp.cameras import Camera
 from tiltvp.errors import InvalidInputError
 
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
 __all__ = ["ImuLog", "Laboratory", "SceneCorner", "StereoSequence", "StereoTruth", "zed_cameras"]
 
 
 def zed_cameras(width: int = 1280) -> tuple[Camera, Camera]:
-    """Left and right camera of a pair like the ZED of paper 004, before rectification: Brown-Conrady distortion.
+    """Left and right camera of a pair like the ZED of Liu et al. 2018, before rectification: Brown-Conrady distortion.
 
     The focal length is about 702 pixels for a `width` of 1280 (x 720), 1049 for 1920 (x 1080); other widths are refused
     by `tiltvp.errors.InvalidInputError`.

@@ -45,7 +45,7 @@ MIRROR_BLIND_RAD: float = math.radians(40.0)
 
 
 def mirror_camera() -> Camera:
-    """A camera below a hyperbolic mirror like that of paper 001: 640 x 480, from 50 degrees down to 25 degrees up.
+    """A camera below a hyperbolic mirror like that of Scaramuzza et al. 2009: 640 x 480, from 50 degrees down to 25 up.
 
     The middle, below 50 degrees, is where it sees itself: give drives `blind_rad=MIRROR_BLIND_RAD`.
     """
@@ -137,8 +137,8 @@ class Room(_core.Room):
         """
         gray, rgb = self._render_panorama(
             pose=pose,
-            camera_height_m=camera_height_m,
             height=height,
+            camera_height_m=camera_height_m,
             noise_sigma=noise_sigma,
             samples=samples,
             seed=seed,

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any, Self
 
-import cv2
 import numpy as np
 
 from tiltvp import _core
@@ -67,7 +66,7 @@ class TiltEstimator(_core.TiltEstimator):
     robot_from_camera : (3, 3) rotation R, v_robot = R v_camera; default identity: an upward camera, columns to
         the front.
     gradient_min, smoothing_px, elevation_min_rad, elevation_max_rad, margin_px, tilt_max_rad, mask, row_stride, seed
-        Options of every method: see the README. `mask` is (H, W) bool, True where the image shows the world.
+        Options of every method: see docs/options.md. `mask` is (H, W) bool, True where the image shows the world.
     keep_fraction, scale_rad, tolerance_rad, max_iterations
         Of "refined"; `keep_fraction` and `max_iterations` also of "image-space-reject-refit".
     threshold_px, offset_max_px, correction
@@ -76,9 +75,9 @@ class TiltEstimator(_core.TiltEstimator):
     threshold_rad, normal, correction
         Of "vector-consensus"; `normal` is "gradient" (the paper's) or "tangent", `correction` a factor without unit
         or one of those trained on raw angles.
-    sampling, local_optimization, score, verification
-        Of "image-space-ransac" and "vector-consensus": "uniform" (default), "progressive" or "prosac"; a bool; "count"
-        (default), "msac" or "magsac"; "full" (default) or "sprt".
+    sampling, local_optimization, score
+        Of "image-space-ransac" and "vector-consensus": "uniform" (default) or "progressive"; a bool; "count" (default)
+        or "msac".
     """
 
     __slots__ = ()
@@ -120,6 +119,8 @@ def level(
     `tilt` is an estimate, a filter's or an image's, or (alpha_rad, beta_rad). Raises
     `InvalidInputError` if the image has another size than the camera's or the estimate has no tilt.
     """
+    import cv2
+
     array = np.asarray(image)
     if array.ndim not in (2, 3) or array.shape[:2] != (camera.height, camera.width):
         expected = f"({camera.height}, {camera.width}) or ({camera.height}, {camera.width}, channels)"

@@ -9,12 +9,12 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import cv2
 import numpy as np
 
 from tiltvp.errors import ImageFileError, InvalidInputError
 
 if TYPE_CHECKING:
+    import cv2
     from numpy.typing import NDArray
 
 __all__ = ["VIDEO_ENDINGS", "VideoReader", "VideoWriter", "video_writer"]
@@ -28,6 +28,8 @@ class VideoReader:
 
     def __init__(self, path: str | os.PathLike[str]) -> None:
         """Opens the file. Raises `ImageFileError` with the path."""
+        import cv2
+
         self._path = Path(path)
         if not self._path.is_file():
             raise ImageFileError(f"{self._path}: no such file, expected a video")
@@ -63,6 +65,8 @@ class VideoWriter:
 
     def add(self, image: NDArray[np.uint8]) -> None:
         """The next frame, (H, W, 3) BGR uint8."""
+        import cv2
+
         if self._writer is None:
             self._shape = image.shape
             code = cv2.VideoWriter.fourcc(*_CODECS[self._path.suffix.lower()])

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from tiltvp.evaluation.calibration import real_logs
+from tiltvp.lab.evaluation.calibration import real_logs
 
 
 @pytest.fixture(scope="module")

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from tiltvp.evaluation import corners_real as real
+from tiltvp.lab.evaluation import corners_real as real
 
 
 def test_the_cabinet_against_motion_capture(data: Path) -> None:

@@ -9,10 +9,10 @@ from pathlib import Path
 import numpy as np
 
 import tiltvp
-from tiltvp.datasets.check import check_dataset
-from tiltvp.datasets.folder import read_dataset
-from tiltvp.datasets.panoramas import PanoramaViews, paper_camera
-from tiltvp.datasets.rendering import find_panoramas, render_panoramas
+from tiltvp.lab.datasets.check import check_dataset
+from tiltvp.lab.datasets.folder import read_dataset
+from tiltvp.lab.datasets.panoramas import PanoramaViews, paper_camera
+from tiltvp.lab.datasets.rendering import find_panoramas, render_panoramas
 
 LONGEST_S = 0.12
 """Seconds of one core for a view, twice what it takes on an idle one."""

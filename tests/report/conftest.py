@@ -1,32 +1,5 @@
-"""The run of the paper's sweep over a small dataset of rendered rooms, and its report."""
+"""The report of a small run, for the tests of this folder."""
 
-from __future__ import annotations
+from reports import report, run
 
-from pathlib import Path
-
-import pytest
-
-from tiltvp.datasets.folder import TiltDataset
-from tiltvp.evaluation.combinations import choose
-from tiltvp.evaluation.experiment import open_experiment
-from tiltvp.evaluation.runs import read_run
-from tiltvp.report.contents import contents_of
-from tiltvp.report.files import write_report
-
-
-@pytest.fixture(scope="session")
-def run(dataset: TiltDataset, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The folder of the run."""
-    directory = tmp_path_factory.mktemp("report") / "run"
-    with open_experiment(dataset, choose("paper"), directory, sweep="paper") as experiment:
-        experiment.estimate()
-        experiment.conclude()
-    return directory
-
-
-@pytest.fixture(scope="session")
-def report(run: Path) -> Path:
-    """The folder of its report; small pictures are quicker to draw."""
-    out = run.parent / "out"
-    write_report(contents_of(read_run(run)), out, dpi=72.0)
-    return out
+__all__ = ["report", "run"]

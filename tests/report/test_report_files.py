@@ -14,15 +14,15 @@ import pytest
 
 from tiltvp.cli import main
 from tiltvp.errors import RunError
-from tiltvp.evaluation import curves
-from tiltvp.evaluation.runs import Run, read_run
-from tiltvp.evaluation.summary import errors
-from tiltvp.evaluation.variants import VARIANTS, best_of, best_rows, variant_points
-from tiltvp.plots.report import style
-from tiltvp.plots.report.errors import errors_by_environment
-from tiltvp.report.choice import choose_examples
-from tiltvp.report.contents import OtherRun, contents_of, scaling_of
-from tiltvp.report.files import PAGE, write_report
+from tiltvp.lab.evaluation import curves
+from tiltvp.lab.evaluation.runs import Run, read_run
+from tiltvp.lab.evaluation.summary import errors
+from tiltvp.lab.evaluation.variants import VARIANTS, best_of, best_rows, variant_points
+from tiltvp.lab.plots.report import style
+from tiltvp.lab.plots.report.errors import errors_by_environment
+from tiltvp.lab.report.choice import choose_examples
+from tiltvp.lab.report.contents import OtherRun, contents_of, scaling_of
+from tiltvp.lab.report.files import PAGE, write_report
 
 DPI = 72.0
 PICTURES = {f"figure-{number}" for number in (10, 11, 12, 13, 14, 17, 18, 27)}
@@ -151,7 +151,7 @@ def test_failing_leaves_the_earlier_report(run: Path, tmp_path: Path, monkeypatc
     def fail(*_: object) -> str:
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr("tiltvp.report.files.page_of", fail)
+    monkeypatch.setattr("tiltvp.lab.report.files.page_of", fail)
     contents = contents_of(read_run(run))
     contents = replace(contents, sections=contents.sections[:1])
     with pytest.raises(RunError, match="No space"):
@@ -162,7 +162,7 @@ def test_failing_leaves_the_earlier_report(run: Path, tmp_path: Path, monkeypatc
 
 def test_page_is_safe_from_names(run: Path) -> None:
     """Names of files and places come from others."""
-    from tiltvp.report.page import page_of
+    from tiltvp.lab.report.page import page_of
 
     whole = read_run(run)
     evil = "</script><script>alert(1)</script>"

@@ -25,11 +25,21 @@ pub enum Error {
     #[error("option {name} = {value}, expected {expected}")]
     InvalidOption {
         /// Name of the option as the user writes it.
-        name: &'static str,
+        name: Cow<'static, str>,
         /// The value that was given, as text.
         value: String,
         /// What would have been accepted.
-        expected: &'static str,
+        expected: Cow<'static, str>,
+    },
+    /// A name that no option has.
+    #[error("option {name}: {why}, expected one of {}", known.join(", "))]
+    UnknownOption {
+        /// The name that was given.
+        name: String,
+        /// That it is unknown, to what, and what was meant perhaps.
+        why: String,
+        /// The names that there are.
+        known: Vec<String>,
     },
     /// An argument (array, image, rotation) of the wrong shape or content.
     #[error("{name}: got {got}, expected {expected}")]
@@ -45,8 +55,23 @@ pub enum Error {
 
 impl Error {
     /// An [`Error::InvalidOption`] from any printable value.
-    pub fn option(name: &'static str, value: impl std::fmt::Display, expected: &'static str) -> Self {
-        Self::InvalidOption { name, value: value.to_string(), expected }
+    pub fn option(
+        name: impl Into<Cow<'static, str>>,
+        value: impl std::fmt::Display,
+        expected: impl Into<Cow<'static, str>>,
+    ) -> Self {
+        Self::InvalidOption { name: name.into(), value: value.to_string(), expected: expected.into() }
+    }
+
+    /// The same error where the option is part of others and its name begins with a prefix there.
+    #[must_use]
+    pub fn of_option(self, prefix: &str) -> Self {
+        match self {
+            Self::InvalidOption { name, value, expected } if !prefix.is_empty() => {
+                Self::InvalidOption { name: format!("{prefix}{name}").into(), value, expected }
+            }
+            other => other,
+        }
     }
 
     /// An [`Error::InvalidArgument`] from any printable values.

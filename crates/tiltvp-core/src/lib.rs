@@ -1,8 +1,9 @@
 //! Orientation and calibration from the straight lines of man-made places.
 //!
-//! The floors of the house, from the ground up; a module imports only from floors below its own:
+//! The floors of the house, from the ground up; a module imports only from floors below its own, and any of them from
+//! [`tiltvp_kernels`], which holds all vector code and all `unsafe`:
 //!
-//! 1. [`error`], [`geometry`]
+//! 1. [`error`], [`geometry`], [`options`]
 //! 2. [`camera`], [`image`], [`robust`], [`filter`]
 //! 3. [`edges`]
 //! 4. [`tilt`], [`corner`], [`lines`]
@@ -10,6 +11,8 @@
 //!
 //! Angles are radians, lengths metres, pixel centres integers, rays unit bearings. The camera frame has `z` along the
 //! optical axis, `x` to the right (columns) and `y` down (rows); the robot frame has `x` forward, `y` left, `z` up.
+
+#![forbid(unsafe_code)]
 
 pub mod camera;
 pub mod corner;
@@ -19,6 +22,7 @@ pub mod filter;
 pub mod geometry;
 pub mod image;
 pub mod lines;
+pub mod options;
 pub mod robust;
 pub mod selfcalib;
 #[cfg(feature = "testing")]

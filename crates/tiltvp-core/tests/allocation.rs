@@ -12,7 +12,7 @@ use scene::{constant, fisheye, noise, stripes};
 use tiltvp_core::camera::Camera;
 use tiltvp_core::edges::NormalKind;
 use tiltvp_core::geometry::Tilt;
-use tiltvp_core::robust::{LocalOptimization, SampleOrder, Sampling, Score, Verification};
+use tiltvp_core::robust::{LocalOptimization, SampleOrder, Sampling, Score};
 use tiltvp_core::tilt::{Correction, METHODS, Method, TiltEstimator, TiltOptions, TrainedCorrection};
 
 thread_local! {
@@ -66,14 +66,16 @@ fn allocations(work: impl FnOnce()) -> usize {
 fn choices() -> Vec<TiltOptions> {
     let mut all: Vec<_> = METHODS.map(|name| TiltOptions::for_method(name).unwrap()).into();
     for mut options in all.clone() {
-        if let Method::ImageSpaceRansac { sampling, .. } | Method::VectorConsensus { sampling, .. } =
-            &mut options.method
-        {
+        let sampling = match &mut options.method {
+            Method::ImageSpaceRansac(own) => Some(&mut own.sampling),
+            Method::VectorConsensus(own) => Some(&mut own.sampling),
+            Method::ImageSpaceRejectRefit(_) | Method::Refined(_) => None,
+        };
+        if let Some(sampling) = sampling {
             *sampling = Sampling {
                 order: SampleOrder::progressive(),
                 local_optimization: Some(LocalOptimization::default()),
-                score: Score::magsac(),
-                verification: Verification::sprt(),
+                score: Score::Msac,
             };
             all.push(options);
         }
@@ -81,11 +83,10 @@ fn choices() -> Vec<TiltOptions> {
     for options in all.clone() {
         let mut other = options;
         match &mut other.method {
-            Method::ImageSpaceRansac { correction, .. } | Method::ImageSpaceRejectRefit { correction, .. } => {
-                *correction = Correction::None;
-            }
-            Method::VectorConsensus { normal, correction, .. } => {
-                (*normal, *correction) = (NormalKind::Tangent, TrainedCorrection::Factor(1.7));
+            Method::ImageSpaceRansac(own) => own.correction = Correction::None,
+            Method::ImageSpaceRejectRefit(own) => own.correction = Correction::None,
+            Method::VectorConsensus(own) => {
+                (own.normal, own.correction) = (NormalKind::Tangent, TrainedCorrection::Factor(1.7));
             }
             Method::Refined(_) => other.edges.smoothing_px = 2.0,
         }

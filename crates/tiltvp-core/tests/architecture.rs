@@ -8,18 +8,25 @@ use std::path::{Path, PathBuf};
 /// The floors of the house, the ground first. Modules of one floor are sisters, which never import each other; only the
 /// ground floor is one.
 const FLOORS: [&[&str]; 5] = [
-    &["geometry", "error"],
+    &["geometry", "error", "options"],
     &["robust", "camera", "image", "filter"],
     &["edges"],
     &["tilt", "corner", "lines"],
     &["selfcalib"],
 ];
 
+/// The crates, the ground first: the kernels are floor 0, below all modules of the core.
+const CRATES: [&str; 4] = ["tiltvp_kernels", "tiltvp_core", "tiltvp_synth", "tiltvp_py"];
+
+/// The first part of the path of a file of the kernels; the others are files of the core.
+const KERNELS: &str = CRATES[0];
+
 /// Modules that may import anything: the public list, and what tests share.
 const ABOVE_ALL: [&str; 2] = ["lib", "testing"];
 
-/// What the crate's root re-exports from the ground floor, so that `crate::Error` is not an arrow to the roof.
-const GROUND_NAMES: [&str; 2] = ["Error", "Result"];
+/// What the crate's root has of the ground floor, so that `crate::Error` is not an arrow to the roof: re-exports of `error`, and
+/// the macros of `options`, which Rust puts at the root.
+const GROUND_NAMES: [&str; 6] = ["Error", "Result", "methods", "option_choice", "option_part", "words"];
 
 /// Parts of the standard library that the core does without.
 const FORBIDDEN_STD: [&str; 5] = ["fs", "time", "env", "process", "net"];
@@ -161,6 +168,11 @@ fn complaints(module: &[&str], source: &str) -> Vec<(usize, String)> {
             word if FORBIDDEN_MACROS.contains(&word) && after(1) == "!" => {
                 found.push((*line, format!("{word}! prints")));
             }
+            word if first_of_path && after(1) == "::" && CRATES.contains(&word) => {
+                let complaint = forbidden_crate(if top == KERNELS { CRATES[0] } else { CRATES[1] }, word);
+                found.extend(complaint.map(|complaint| (*line, complaint)));
+            }
+            "unsafe" if top != KERNELS => found.push((*line, "unsafe is for the kernels".to_owned())),
             "crate" | "super" | "self" | "std" if first_of_path && after(1) == "::" => {
                 let mut leaves = Vec::new();
                 let end = paths(&tokens, at, &[], &mut leaves);
@@ -203,10 +215,15 @@ fn resolve(here: &[&str], path: &[String]) -> Vec<String> {
     absolute
 }
 
+fn forbidden_crate(from: &str, to: &str) -> Option<String> {
+    let place = |name: &str| CRATES.iter().position(|other| *other == name);
+    (place(to) > place(from)).then(|| format!("{from} points up to {to}"))
+}
+
 fn forbidden_arrow(from: &str, target: &[String]) -> Option<String> {
     // `pub(in crate)` and the like have no target.
     let to = target.first()?.as_str();
-    if ABOVE_ALL.contains(&from) || to == from || GROUND_NAMES.contains(&to) {
+    if from == KERNELS || ABOVE_ALL.contains(&from) || to == from || GROUND_NAMES.contains(&to) {
         return None;
     }
     match (floor(from), floor(to)) {
@@ -230,6 +247,21 @@ fn sources(folder: &Path, out: &mut Vec<PathBuf>) {
     }
 }
 
+/// What the sources of the kernels say that they may not.
+fn complaints_about_kernels() -> Vec<String> {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap().join("tiltvp-kernels/src");
+    let mut files = Vec::new();
+    sources(&root, &mut files);
+    assert!(files.len() > 15, "only {} files of kernels seen", files.len());
+    files.sort();
+    let about = |file: &PathBuf| {
+        let place = file.strip_prefix(root.parent().unwrap().parent().unwrap()).unwrap().display().to_string();
+        let found = complaints(&[KERNELS, "any"], &std::fs::read_to_string(file).unwrap());
+        found.into_iter().map(move |(line, text)| format!("{place}:{line}: {text}")).collect::<Vec<_>>()
+    };
+    files.iter().flat_map(about).collect()
+}
+
 #[test]
 fn imports_point_down_and_the_core_knows_no_outside_world() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
@@ -247,6 +279,7 @@ fn imports_point_down_and_the_core_knows_no_outside_world() {
         let source = std::fs::read_to_string(file).unwrap();
         lines.extend(complaints(&module, &source).into_iter().map(|(line, text)| format!("{place}:{line}: {text}")));
     }
+    lines.extend(complaints_about_kernels());
     assert!(lines.is_empty(), "{}", lines.join("\n"));
     for module in seen.keys() {
         assert!(floor(module).is_some() || ABOVE_ALL.contains(&module.as_str()), "src/{module} has no floor");
@@ -256,7 +289,12 @@ fn imports_point_down_and_the_core_knows_no_outside_world() {
 
 #[test]
 fn the_checker_sees_invented_bad_lines() {
-    let bad: [(&[&str], &str, &str); 12] = [
+    let bad: [(&[&str], &str, &str); 17] = [
+        (&[KERNELS, "rows"], "use tiltvp_core::geometry::Tilt;", "tiltvp_kernels points up to tiltvp_core"),
+        (&[KERNELS, "rows"], "use {std::fs::File, std::fmt};", "the core knows no std::fs"),
+        (&[KERNELS, "rows"], "fn f() { println!(); }", "println! prints"),
+        (&["robust", "rows"], "use tiltvp_synth::Room;", "tiltvp_core points up to tiltvp_synth"),
+        (&["robust", "rows"], "fn f() { unsafe { g() } }", "unsafe is for the kernels"),
         (&["camera", "rim"], "use crate::tilt::Method;", "camera points up to tilt"),
         (&["camera", "rim"], "use crate::robust::Rows;", "camera points sideways to its sister robust"),
         (&["robust"], "use super::image::Smoother;", "robust points sideways"),
@@ -282,7 +320,9 @@ fn the_checker_sees_invented_bad_lines() {
 
 #[test]
 fn the_checker_lets_good_lines_pass() {
-    let good: [(&[&str], &str); 9] = [
+    let good: [(&[&str], &str); 11] = [
+        (&["geometry", "tilt"], "use tiltvp_kernels::rows::Sums;"),
+        (&[KERNELS, "rows", "real"], "use super::single; use crate::aligned::Dense; fn f() { unsafe { g() } }"),
         (&["tilt", "refine"], "use crate::{edges::Region, geometry::Tilt as Lean, robust::{Rows, Stop}};"),
         (&["tilt", "refine"], "use super::options::Method; use super::super::camera::Camera;"),
         (&["robust", "rows"], "mod single { use super::*; } mod tests { use super::super::Stop; }"),

@@ -7,8 +7,8 @@ use std::f64::consts::{FRAC_PI_2, PI};
 use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3, Vector4};
 use proptest::prelude::*;
 use tiltvp_core::corner::{
-    CornerAttitude, CornerCase, CornerFeature, Edge, IncludedAngle, Screening, StandardType, corner_attitudes,
-    included_angle,
+    Alignment, AttitudePrior, CornerAttitude, CornerCase, CornerFeature, Edge, IncludedAngle, Screening, StandardType,
+    VerticalSense, corner_attitudes, included_angle, resolve,
 };
 use tiltvp_core::geometry::angle_between;
 
@@ -281,4 +281,22 @@ fn wrong_questions_are_errors() {
         assert!(CornerFeature::from_bearings(&vertex, &[good[0], bad, good[2]]).is_none(), "{bad:?}");
     }
     assert!(CornerFeature::from_bearings(&Vector3::zeros(), &good).is_none());
+}
+
+#[test]
+fn wrong_priors_are_errors() {
+    let down = Vector3::y();
+    let sense = VerticalSense::Either;
+    let zero = Matrix3::zeros();
+    let wrong = [
+        AttitudePrior::Gravity { down: down * 2.0, sigma_rad: 0.1, sense },
+        AttitudePrior::Gravity { down, sigma_rad: 0.0, sense },
+        AttitudePrior::Elevation { elevation_rad: 2.0, sigma_rad: 0.1, sense },
+        AttitudePrior::Elevation { elevation_rad: 0.0, sigma_rad: f64::NAN, sense },
+        AttitudePrior::Attitude { camera_from_object: Matrix3::identity() * 1.1, covariance: Matrix3::identity() },
+        AttitudePrior::Attitude { camera_from_object: Matrix3::identity(), covariance: zero },
+    ];
+    for prior in wrong {
+        assert!(resolve(&[], Alignment::Same, None, &[prior]).is_err(), "{prior:?}");
+    }
 }

@@ -63,8 +63,13 @@ fn measured_once() {
     let camera = fisheye(240);
     let tilt = Tilt::from_alpha_beta(0.05, 0.7);
     let image: Image = stripes(&camera, &Matrix3::identity(), &tilt, 23, 2.0, 1);
-    let functions: [Measured; 4] = [refined_image, sampled_image, trimmed_image, consensus_image];
-    for (method, function) in METHODS.into_iter().zip(functions) {
+    let functions: [(&str, Measured); METHODS.len()] = [
+        ("refined", refined_image),
+        ("image-space-ransac", sampled_image),
+        ("image-space-reject-refit", trimmed_image),
+        ("vector-consensus", consensus_image),
+    ];
+    for (method, function) in functions {
         let options = TiltOptions::for_method(method).unwrap();
         let estimator = TiltEstimator::new(camera.clone(), Matrix3::identity(), options).unwrap();
         let mut scratch = estimator.scratch();

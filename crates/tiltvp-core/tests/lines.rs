@@ -7,7 +7,7 @@ mod scene;
 use std::f64::consts::{PI, TAU};
 
 use nalgebra::{Matrix3, Rotation3};
-use scene::{Image, constant, dice, fisheye, noise, stripes};
+use scene::{Image, constant, fisheye, noise, random, stripes};
 use tiltvp_core::camera::{Camera, Model, Unified};
 use tiltvp_core::geometry::Tilt;
 use tiltvp_core::lines::{
@@ -26,7 +26,7 @@ fn mirror() -> Camera {
 
 /// The azimuths of the edges of the world of [`stripes`].
 fn edges(count: usize, seed: u64) -> Vec<f64> {
-    (0..count).map(|i| (i as f64 + 0.8 * dice(seed + 1, i as u64)) / count as f64 * TAU).collect()
+    (0..count).map(|i| (i as f64 + 0.8 * random(seed + 1, i as u64)) / count as f64 * TAU).collect()
 }
 
 fn apart(a: f64, b: f64) -> f64 {
@@ -54,7 +54,7 @@ fn default_extractor(camera: Camera, turn: Matrix3<f64>) -> LineExtractor {
 fn errors(lines: &Lines, count: usize, seed: u64) -> Vec<(f64, f64)> {
     let truth = edges(count, seed);
     for (i, edge) in truth.iter().enumerate() {
-        let level = |stripe: usize| 60.0 + 140.0 * dice(seed, stripe as u64);
+        let level = |stripe: usize| 60.0 + 140.0 * random(seed, stripe as u64);
         let contrast = (level(i) - level((i + count - 1) % count)).abs();
         let found = lines.lines.iter().any(|line| apart(line.bearing_rad, *edge) < 0.01);
         assert!(found || contrast < 30.0, "the edge at {edge} of contrast {contrast} was not found");
@@ -253,7 +253,7 @@ fn a_known_motion_keeps_near_edges_and_edges_that_look_alike_on_their_tracks() {
             let at = [x + c * camera_m[0] - s * camera_m[1], y + s * camera_m[0] + c * camera_m[1]];
             let bearing = |name: usize| {
                 let angle = (edges[name][1] - at[1]).atan2(edges[name][0] - at[0]) - yaw;
-                angle.sin().atan2(angle.cos()) + 2e-3 * (dice(seed, 100 * k + name as u64) - 0.5)
+                angle.sin().atan2(angle.cos()) + 2e-3 * (random(seed, 100 * k + name as u64) - 0.5)
             };
             // Edge 6 blinks, edges 2 to 4 have one descriptor.
             let names: Vec<usize> = (0..edges.len()).filter(|name| *name != 6 || k % 4 == 0).collect();
@@ -264,7 +264,7 @@ fn a_known_motion_keeps_near_edges_and_edges_that_look_alike_on_their_tracks() {
             }
             // Encoders err.
             let told = Motion {
-                turn_rad: if k > 0 { turn + 0.01 * (dice(seed + 9, k) - 0.5) } else { 0.0 },
+                turn_rad: if k > 0 { turn + 0.01 * (random(seed + 9, k) - 0.5) } else { 0.0 },
                 distance_m: Some(if k > 0 { distance } else { 0.0 }),
             };
             tracker.update(&lines, &descriptors, Some(&told), &mut out).unwrap();

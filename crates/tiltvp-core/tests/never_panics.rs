@@ -10,16 +10,16 @@ use std::sync::LazyLock;
 
 use nalgebra::{Matrix3, Rotation3, Vector3};
 use proptest::prelude::*;
-use scene::{Image, constant, dice, fisheye, noise, shrunk, stripes};
+use scene::{Image, constant, fisheye, noise, random, shrunk, stripes};
 use tiltvp_core::camera::{Camera, Equidistant, Model};
 use tiltvp_core::edges::{EdgeOptions, Mask, NormalKind};
 use tiltvp_core::geometry::Tilt;
 use tiltvp_core::image::ImageView;
-use tiltvp_core::robust::{LocalOptimization, SampleOrder, Sampling, Score, Verification};
+use tiltvp_core::robust::{LocalOptimization, SampleOrder, Sampling, Score};
 use tiltvp_core::testing::zoo;
 use tiltvp_core::tilt::{
-    CommonDirectionOptions, Correction, Method, RefineOptions, TiltEstimator, TiltOptions, TrainedCorrection,
-    common_direction,
+    CommonDirectionOptions, Correction, ImageSpaceRansacOptions, ImageSpaceRejectRefitOptions, Method, RefineOptions,
+    TiltEstimator, TiltOptions, TrainedCorrection, VectorConsensusOptions, common_direction,
 };
 
 /// The lenses of the zoo over images of a few thousand pixels: what is in pixels shrinks with them.
@@ -78,13 +78,13 @@ fn draw(kind: Kind, camera: &Camera, mount: &Matrix3<f64>, seed: u64) -> Image {
         Kind::Constant(level) => constant(camera, f64::from(level)),
         Kind::Gradient(a, b) => Image::of(camera, |u, v| 128.0 + a * u as f64 + b * v as f64),
         Kind::Stripes { count, sigma } => {
-            let tilt = Tilt::from_alpha_beta(0.3 * dice(seed, 0), 6.0 * dice(seed, 1));
+            let tilt = Tilt::from_alpha_beta(0.3 * random(seed, 0), 6.0 * random(seed, 1));
             stripes(camera, mount, &tilt, count, sigma, seed)
         }
         Kind::PixelStripes { period, slope } => {
             Image::of(camera, |u, v| if (u + slope * v) / period % 2 == 0 { 0.0 } else { 255.0 })
         }
-        Kind::Dots => Image::of(camera, |u, v| if dice(seed, (v * 1000 + u) as u64) < 0.003 { 255.0 } else { 0.0 }),
+        Kind::Dots => Image::of(camera, |u, v| if random(seed, (v * 1000 + u) as u64) < 0.003 { 255.0 } else { 0.0 }),
     }
 }
 
@@ -106,22 +106,16 @@ fn number(low: f64, high: f64) -> impl Strategy<Value = f64> {
 fn sampling() -> impl Strategy<Value = Sampling> {
     let order = prop_oneof![
         Just(SampleOrder::Uniform),
-        (0..100_000u32, proptest::option::of(number(0.01, 0.99)))
-            .prop_map(|(uniform_after, chance_share)| SampleOrder::Progressive { uniform_after, chance_share }),
+        (0..100_000u32).prop_map(|uniform_after| SampleOrder::Progressive { uniform_after }),
     ];
     let local_optimization = proptest::option::of(
         (0..6u32, number(1.0, 4.0)).prop_map(|(iterations, widening)| LocalOptimization { iterations, widening }),
     );
-    let score =
-        prop_oneof![Just(Score::Count), Just(Score::Msac), (0..12u32).prop_map(|refits| Score::Magsac { refits })];
-    let verification = prop_oneof![
-        Just(Verification::Full),
-        (number(0.05, 0.95), number(0.01, 0.5), number(1.0, 1000.0)).prop_map(
-            |(inlier_share, chance_share, model_cost)| Verification::Sprt { inlier_share, chance_share, model_cost }
-        ),
-    ];
-    (order, local_optimization, score, verification).prop_map(|(order, local_optimization, score, verification)| {
-        Sampling { order, local_optimization, score, verification }
+    let score = prop_oneof![Just(Score::Count), Just(Score::Msac)];
+    (order, local_optimization, score).prop_map(|(order, local_optimization, score)| Sampling {
+        order,
+        local_optimization,
+        score,
     })
 }
 
@@ -137,18 +131,24 @@ fn methods() -> impl Strategy<Value = Method> {
     prop_oneof![
         (number(0.1, 30.0), prop::option::of(number(1.0, 80.0)), correction(), sampling()).prop_map(
             |(threshold_px, offset_max_px, correction, sampling)| {
-                Method::ImageSpaceRansac { threshold_px, offset_max_px, correction, sampling }
+                Method::ImageSpaceRansac(ImageSpaceRansacOptions { threshold_px, offset_max_px, correction, sampling })
             }
         ),
         (number(0.01, 0.99), prop::option::of(number(1.0, 80.0)), correction()).prop_map(
             |(keep_fraction, offset_max_px, correction)| {
-                Method::ImageSpaceRejectRefit { keep_fraction, max_iterations: 15, offset_max_px, correction }
+                let own = ImageSpaceRejectRefitOptions::default();
+                Method::ImageSpaceRejectRefit(ImageSpaceRejectRefitOptions {
+                    keep_fraction,
+                    offset_max_px,
+                    correction,
+                    ..own
+                })
             }
         ),
         (number(0.001, 1.0), normal, number(0.3, 3.0), sampling()).prop_map(
             |(threshold_rad, normal, factor, sampling)| {
                 let correction = TrainedCorrection::Factor(factor);
-                Method::VectorConsensus { threshold_rad, normal, correction, sampling }
+                Method::VectorConsensus(VectorConsensusOptions { threshold_rad, normal, correction, sampling })
             }
         ),
         (number(0.01, 0.99), number(0.001, 0.9)).prop_map(|(keep_fraction, scale_rad)| Method::Refined(
@@ -185,7 +185,7 @@ fn options() -> impl Strategy<Value = TiltOptions> {
 /// No mask, one of the right size with holes, or one of another size.
 fn masked(camera: &Camera, choice: u8, seed: u64) -> Option<Mask> {
     let (width, height) = (camera.width() as usize, camera.height() as usize);
-    let holes = |n: usize| (0..n).map(|i| dice(seed, i as u64 / 40) < 0.9).collect();
+    let holes = |n: usize| (0..n).map(|i| random(seed, i as u64 / 40) < 0.9).collect();
     match choice {
         0 => Some(Mask::new(width, height, holes(width * height)).unwrap()),
         1 => Some(Mask::new(width + 1, height, holes((width + 1) * height)).unwrap()),

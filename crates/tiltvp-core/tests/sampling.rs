@@ -4,15 +4,15 @@
 
 use nalgebra::{Matrix3, Vector3};
 use tiltvp_core::robust::{
-    Direction, FitReport, LocalOptimization, Problem, RansacOptions, RansacScratch, Rows, SampleOrder, Sampling, Score,
-    Stop, Verification, ransac,
+    Direction, FitReport, LocalOptimization, RansacOptions, RansacScratch, Rows, SampleOrder, Sampling, Score, Stop,
+    ransac,
 };
 
 const NOISE: f64 = 0.004;
 const THRESHOLD: f64 = 0.01;
 
 /// A number in (0, 1) for each argument, alike on every machine.
-fn dice(seed: u64, i: u64) -> f64 {
+fn random(seed: u64, i: u64) -> f64 {
     let mut x = seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) ^ i.wrapping_mul(0xd1b5_4a32_d192_ed03);
     for _ in 0..3 {
         x = (x ^ (x >> 31)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
@@ -28,12 +28,12 @@ struct Scene {
 }
 
 fn scene(seed: u64, len: u64, outliers: f64) -> Scene {
-    let truth = Vector3::new(0.1 * dice(seed, 1) - 0.05, 0.1 * dice(seed, 2) - 0.05, 1.0).normalize();
+    let truth = Vector3::new(0.1 * random(seed, 1) - 0.05, 0.1 * random(seed, 2) - 0.05, 1.0).normalize();
     let basis = Matrix3::from_columns(&[truth.cross(&Vector3::y()).normalize(), Vector3::zeros(), truth]);
     let across = truth.cross(&basis.column(0).into_owned());
     let (mut rows, mut quality) = (Rows::with_capacity(len as usize), Vec::new());
     for i in 0..len {
-        let at = |k| dice(seed, 16 * i + k);
+        let at = |k| random(seed, 16 * i + k);
         let outlier = at(3) < outliers;
         let gauss = (-2.0 * at(4).ln()).sqrt() * (std::f64::consts::TAU * at(5)).cos();
         let lean = if outlier { 0.6 * (at(6) - 0.5) } else { NOISE * gauss };
@@ -55,7 +55,7 @@ impl Scene {
         let options = RansacOptions { seed, sampling, ..RansacOptions::with_threshold(THRESHOLD) };
         options.validate().unwrap();
         let mut weights = vec![1.0; self.rows.len()];
-        ransac(&self.problem(), &options, &Vector3::z(), &mut weights, &mut RansacScratch::default())
+        ransac(&self.problem(), &options, &mut weights, &mut RansacScratch::default())
     }
 
     fn error(&self, report: &FitReport<Vector3<f64>>) -> f64 {
@@ -68,16 +68,12 @@ fn ways() -> Vec<(&'static str, Sampling)> {
     let plain = Sampling::default();
     let order = SampleOrder::progressive();
     let local_optimization = Some(LocalOptimization::default());
-    let verification = Verification::sprt();
     vec![
         ("plain", plain),
         ("progressive", Sampling { order, ..plain }),
-        ("prosac", Sampling { order: SampleOrder::prosac(), ..plain }),
         ("local", Sampling { local_optimization, ..plain }),
         ("msac", Sampling { score: Score::Msac, ..plain }),
-        ("magsac", Sampling { score: Score::magsac(), ..plain }),
-        ("sprt", Sampling { verification, ..plain }),
-        ("all", Sampling { order: SampleOrder::prosac(), local_optimization, score: Score::magsac(), verification }),
+        ("all", Sampling { order, local_optimization, score: Score::Msac }),
     ]
 }
 
@@ -106,7 +102,7 @@ fn same_seed_same_answer_whatever_the_scratch_has_seen() {
         let options = RansacOptions { seed: 9, sampling, ..RansacOptions::with_threshold(THRESHOLD) };
         let mut fit = |scene: &Scene| {
             let mut weights = vec![1.0; scene.rows.len()];
-            (ransac(&scene.problem(), &options, &Vector3::z(), &mut weights, &mut scratch), weights)
+            (ransac(&scene.problem(), &options, &mut weights, &mut scratch), weights)
         };
         let before = fit(&first);
         fit(&other);
@@ -127,17 +123,13 @@ fn totals(sampling: Sampling) -> (f64, f64) {
 #[test]
 fn every_way_does_what_it_is_for() {
     let total: Vec<(f64, f64)> = ways().iter().map(|(_, sampling)| totals(*sampling)).collect();
-    let [plain, progressive, prosac, local, msac, magsac, sprt, all] = total[..] else { unreachable!() };
-    // The best-looking observations are mostly inliers: a good model early, and with the own stop an early end.
+    let [plain, progressive, local, msac, all] = total[..] else { unreachable!() };
+    // The best-looking observations are mostly inliers: a good model early.
     assert!(progressive != plain && progressive.1 <= 1.02 * plain.1, "{progressive:?} {plain:?}");
-    assert!(prosac.1 < 0.5 * plain.1, "{prosac:?} {plain:?}");
     // A larger consensus set earlier: fewer trials, and a better model.
     assert!(local.1 < plain.1 && local.0 < plain.0, "{local:?} {plain:?}");
     // A better choice among models of like counts.
     assert!(msac.0 < plain.0, "{msac:?} {plain:?}");
-    assert!(magsac.0 < plain.0, "{magsac:?} {plain:?}");
-    // A few good models are lost, so that more trials are needed, but not many.
-    assert!(sprt.1 >= plain.1 && sprt.1 < 1.5 * plain.1, "{sprt:?} {plain:?}");
     assert!(all.0 < plain.0 && all.1 < plain.1, "{all:?} {plain:?}");
 }
 
@@ -145,13 +137,13 @@ fn every_way_does_what_it_is_for() {
 #[test]
 fn support_is_the_sum_of_gains() {
     let scene = scene(7, 1500, 0.5);
-    for score in [Score::Count, Score::Msac, Score::magsac()] {
+    for score in [Score::Count, Score::Msac] {
         for model in [scene.truth, Vector3::z()] {
-            let whole = scene.problem().support(&model, THRESHOLD, score, 0.0);
+            let whole = scene.rows.support(model.into(), THRESHOLD, score, 0.0);
             let sum: f64 = scene.rows.iter().map(|row| score.gain(row.dot(&model), THRESHOLD)).sum();
             assert!((whole - sum).abs() < 1e-3 * sum + 1.0, "{score:?}: {whole} {sum}");
             for share in [0.3, 0.9, 0.999, 1.001, 2.0] {
-                let found = scene.problem().support(&model, THRESHOLD, score, share * whole);
+                let found = scene.rows.support(model.into(), THRESHOLD, score, share * whole);
                 if share < 1.0 {
                     assert_eq!(found, whole);
                 } else {
@@ -160,10 +152,6 @@ fn support_is_the_sum_of_gains() {
             }
         }
     }
-    let all: Vec<u32> = (0..1500).collect();
-    let (problem, model) = (scene.problem(), scene.truth);
-    assert_eq!(problem.consensus_among(&all, &model, THRESHOLD), problem.consensus(&model, THRESHOLD, 0));
-    assert_eq!(problem.consensus_among(&[4_000_000], &model, THRESHOLD), 0);
 }
 
 /// Few and degenerate observations end as they do without options.
@@ -176,7 +164,7 @@ fn every_way_says_why_it_has_no_model() {
             let quality = vec![1.0; n];
             let problem = Direction::new(&rows).with_quality(&quality);
             let mut weights = vec![1.0; n];
-            let report = ransac(&problem, &options, &Vector3::z(), &mut weights, &mut RansacScratch::default());
+            let report = ransac(&problem, &options, &mut weights, &mut RansacScratch::default());
             match n {
                 0 | 1 => assert_eq!(report.stop, Stop::TooFew { have: n, need: 2 }, "{name}"),
                 _ => assert!(matches!(report.stop, Stop::NoModel { .. }), "{name}: {}", report.stop),

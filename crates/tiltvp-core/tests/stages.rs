@@ -105,13 +105,12 @@ fn every_kind_of_change_is_taken_up() {
         |o| o.row_stride = 3,
         |o| o.mask = Some(Mask::new(160, 160, (0..160 * 160).map(|i| i % 160 > 50).collect()).unwrap()),
         |o| match &mut o.method {
-            Method::ImageSpaceRansac { correction, .. } | Method::ImageSpaceRejectRefit { correction, .. } => {
-                *correction = Correction::None;
-            }
-            Method::VectorConsensus { normal, .. } => *normal = NormalKind::Tangent,
-            Method::Refined(refine) => refine.scale_rad = 0.01,
+            Method::ImageSpaceRansac(own) => own.correction = Correction::None,
+            Method::ImageSpaceRejectRefit(own) => own.correction = Correction::None,
+            Method::VectorConsensus(own) => own.normal = NormalKind::Tangent,
+            Method::Refined(own) => own.scale_rad = 0.01,
         },
-        |o| o.method = TiltOptions::for_method(METHODS[3]).unwrap().method,
+        |o| o.method = Method::from_name("vector-consensus").unwrap(),
     ];
     assert_eq!(image.width, n);
     for name in METHODS {

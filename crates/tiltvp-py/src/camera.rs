@@ -1,15 +1,26 @@
 //! `Camera`: the core's camera over arrays, by name and keyword.
 
 use nalgebra::{Matrix2x3, Matrix3x2, Vector2};
-use numpy::{PyArray1, PyArray2, PyArrayMethods};
+use numpy::{PyArray1, PyArrayMethods};
 use pyo3::prelude::*;
-use pyo3::types::{PyDict, PyTuple, PyType};
-use tiltvp_core::camera::{self as core, Model, Parameter};
+use pyo3::types::{PyBool, PyDict, PyList, PyTuple, PyType};
+use tiltvp_core::camera::{self as core, Kind, Model, Parameter};
 
+use crate::array::Array;
 use crate::call::{call, exception, invalid};
 use crate::convert;
 
-/// A calibrated central camera. The face class in `tiltvp.cameras` adds a constructor for each model, and files.
+/// Points and their Jacobians.
+type Jacobians<'py> = (Array<'py, f64>, Array<'py, f64>);
+
+/// A calibrated central camera: pixels to unit bearings and back. `Camera(model, width=..., height=..., ...)`.
+///
+/// Camera frame: z along the optical axis, x right (columns u), y down (rows v). Pixel centres are at integers. Frozen,
+/// comparable, hashable, and to be pickled. `tiltvp.Camera` adds a constructor for each model, and calibration files.
+///
+/// `model` is one of `CAMERA_MODELS`; the model's parameters are keywords by name, None leaves one at its default.
+/// `max_theta_rad` in (0, pi] limits the angle from the ray through the centre; by default the lens' own limit holds.
+/// Raises `tiltvp.errors.CalibrationError` for a model, a parameter or a value that no such lens has.
 #[pyclass(frozen, subclass, module = "tiltvp._core")]
 pub(crate) struct Camera {
     pub(crate) inner: core::Camera,
@@ -18,7 +29,9 @@ pub(crate) struct Camera {
 #[pymethods]
 impl Camera {
     #[new]
-    #[pyo3(signature = (model, *, width, height, max_theta_rad=None, mirror=false, **parameters))]
+    #[pyo3(signature = (
+        model, *, width: "int", height: "int", max_theta_rad=None, mirror=false, **parameters: "ArrayLike | None"
+    ))]
     fn new(
         model: &str,
         width: &Bound<'_, PyAny>,
@@ -27,7 +40,7 @@ impl Camera {
         mirror: bool,
         parameters: Option<&Bound<'_, PyDict>>,
     ) -> PyResult<Self> {
-        let pixels = format!("a whole number of pixels from 1 to {}", u32::MAX);
+        let pixels = format!("1 to {} pixels", core::LARGEST_SIDE_PX);
         let (width, height) = (convert::whole(width, "width", &pixels)?, convert::whole(height, "height", &pixels)?);
         let mut named = Vec::new();
         for (key, value) in parameters.into_iter().flat_map(PyDictMethods::iter) {
@@ -35,11 +48,7 @@ impl Camera {
             if value.is_none() {
                 continue;
             }
-            let parameter = if let Ok(scalar) = value.extract::<f64>() {
-                Parameter::Scalar(scalar)
-            } else {
-                Parameter::List(convert::vector(&value, &key)?)
-            };
+            let parameter = parameter(&value, &key)?;
             named.push((key, parameter));
         }
         let build = || {
@@ -97,67 +106,85 @@ impl Camera {
         Ok(dict)
     }
 
-    /// Bearings (N, 3) or (3,) of any length to pixels (N, 2) or (2,); NaN where the lens does not see.
-    fn project<'py>(&self, py: Python<'py>, bearings: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
+    /// Bearings (N, 3) or (3,) of any length but zero to pixels (u, v), (N, 2) or (2,) float64.
+    ///
+    /// Rows without an answer (behind the lens' reach, zero, not finite) are NaN. Pixels may lie outside the image.
+    /// Raises `tiltvp.errors.InvalidInputError` for other shapes and dtypes.
+    #[pyo3(signature = (bearings: "ArrayLike"))]
+    fn project<'py>(&self, py: Python<'py>, bearings: &Bound<'py, PyAny>) -> PyResult<Array<'py, f64>> {
         let (bearings, single) = convert::rows::<3>(bearings, "bearings")?;
         let mut pixels = vec![[0.0; 2]; bearings.len()];
         call(py, || self.inner.project_all(&bearings, &mut pixels))?;
         convert::to_rows(py, &pixels, single)
     }
 
-    /// Pixels (N, 2) or (2,) to unit bearings (N, 3) or (3,); NaN outside the valid set.
-    fn unproject<'py>(&self, py: Python<'py>, pixels: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
+    /// Pixels (u, v), (N, 2) or (2,), to unit bearings, (N, 3) or (3,) float64; NaN rows outside the valid set.
+    ///
+    /// Raises `tiltvp.errors.InvalidInputError` for other shapes and dtypes.
+    #[pyo3(signature = (pixels: "ArrayLike"))]
+    fn unproject<'py>(&self, py: Python<'py>, pixels: &Bound<'py, PyAny>) -> PyResult<Array<'py, f64>> {
         let (pixels, single) = convert::rows::<2>(pixels, "pixels")?;
         let mut bearings = vec![[0.0; 3]; pixels.len()];
         call(py, || self.inner.unproject_all(&pixels, &mut bearings))?;
         convert::to_rows(py, &bearings, single)
     }
 
-    /// Pixels and the Jacobians (N, 2, 3) or (2, 3), pixels per unit of the bearing.
-    fn project_jacobian<'py>(&self, py: Python<'py>, bearings: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyTuple>> {
+    /// Pixels as `project` gives them, and d pixel / d bearing at the given bearings: (N, 2, 3), (2, 3).
+    #[pyo3(signature = (bearings: "ArrayLike"))]
+    fn project_jacobian<'py>(&self, py: Python<'py>, bearings: &Bound<'py, PyAny>) -> PyResult<Jacobians<'py>> {
         let (bearings, single) = convert::rows::<3>(bearings, "bearings")?;
         let mut pixels = vec![[0.0; 2]; bearings.len()];
         let mut jacobians = vec![Matrix2x3::zeros(); bearings.len()];
         call(py, || self.inner.project_jacobian_all(&bearings, &mut pixels, &mut jacobians))?;
         let flat: Vec<f64> = jacobians.iter().flat_map(|j| j.transpose().as_slice().to_vec()).collect();
-        (convert::to_rows(py, &pixels, single)?, convert::to_matrices(py, &flat, [2, 3], single)?).into_pyobject(py)
+        Ok((convert::to_rows(py, &pixels, single)?, convert::to_matrices(py, &flat, [2, 3], single)?))
     }
 
-    /// Unit bearings and the Jacobians (N, 3, 2) or (3, 2), per pixel.
-    fn unproject_jacobian<'py>(&self, py: Python<'py>, pixels: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyTuple>> {
+    /// Bearings as `unproject` gives them, and d bearing / d pixel: (N, 3, 2) or (3, 2).
+    #[pyo3(signature = (pixels: "ArrayLike"))]
+    fn unproject_jacobian<'py>(&self, py: Python<'py>, pixels: &Bound<'py, PyAny>) -> PyResult<Jacobians<'py>> {
         let (pixels, single) = convert::rows::<2>(pixels, "pixels")?;
         let mut bearings = vec![[0.0; 3]; pixels.len()];
         let mut jacobians = vec![Matrix3x2::zeros(); pixels.len()];
         call(py, || self.inner.unproject_jacobian_all(&pixels, &mut bearings, &mut jacobians))?;
         let flat: Vec<f64> = jacobians.iter().flat_map(|j| j.transpose().as_slice().to_vec()).collect();
-        (convert::to_rows(py, &bearings, single)?, convert::to_matrices(py, &flat, [3, 2], single)?).into_pyobject(py)
+        Ok((convert::to_rows(py, &bearings, single)?, convert::to_matrices(py, &flat, [3, 2], single)?))
     }
 
     /// Fresh (H, W) bool: the pixels that have a bearing.
-    fn valid_mask<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<bool>>> {
+    fn valid_mask<'py>(&self, py: Python<'py>) -> PyResult<Array<'py, bool>> {
         let (width, height) = (self.inner.width() as usize, self.inner.height() as usize);
         let mask = call(py, || {
             let seen = |i: usize| self.inner.unproject(&Vector2::new((i % width) as f64, (i / width) as f64)).is_some();
             Ok((0..width * height).map(seen).collect::<Vec<bool>>())
         })?;
-        PyArray1::from_vec(py, mask).reshape([height, width])
+        Ok(Array::new(PyArray1::from_vec(py, mask).reshape([height, width])?))
     }
 
     /// The same camera with `mirror` turned over.
+    #[pyo3(signature = () -> "Self")]
     fn mirrored<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
         let dict = Self::to_dict(slf)?;
         dict.set_item("mirror", !slf.get().inner.is_mirrored())?;
         slf.get_type().call((), Some(&dict))
     }
 
-    /// The camera of the image resized by a factor.
+    /// The camera of the image resized by `factor`: what was at u is at factor (u + 1/2) - 1/2.
+    ///
+    /// The size is rounded to whole pixels. Raises `tiltvp.errors.InvalidInputError` for a factor that is not positive.
+    #[pyo3(signature = (factor) -> "Self")]
     fn scaled<'py>(slf: &Bound<'py, Self>, factor: f64) -> PyResult<Bound<'py, PyAny>> {
         let inner = slf.get().inner.scaled(factor).map_err(|error| exception(&error))?;
         let dict = Self::to_dict(&Bound::new(slf.py(), Self { inner })?)?;
         slf.get_type().call((), Some(&dict))
     }
 
-    /// Round trips and errors of the Jacobians, measured from the axis to the rim.
+    /// Round trips and errors of the analytic Jacobians, measured from the axis to the rim.
+    ///
+    /// Counts `pixels_tested`, `pixels_outside`, `pixels_lost` (0 for a camera that is right); the largest errors
+    /// `max_round_trip_px`, `max_round_trip_rad`, `max_jacobian_error_relative` (against central differences); and
+    /// `rim_theta_rad`, the largest angle that was tested.
+    #[pyo3(signature = () -> "dict[str, float]")]
     fn conformance<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let found = call(py, || Ok(core::conformance(&self.inner)))?;
         let dict = PyDict::new(py);
@@ -186,6 +213,7 @@ impl Camera {
 
     /// The camera of a dict as `to_dict` makes it.
     #[classmethod]
+    #[pyo3(signature = (values: "dict[str, Any]") -> "Self")]
     fn from_dict<'py>(cls: &Bound<'py, PyType>, values: &Bound<'py, PyDict>) -> PyResult<Bound<'py, PyAny>> {
         for key in ["model", "width", "height"] {
             if !values.contains(key)? {
@@ -224,4 +252,54 @@ impl Camera {
     fn __deepcopy__<'py>(slf: &Bound<'py, Self>, _memo: &Bound<'py, PyAny>) -> Bound<'py, Self> {
         slf.clone()
     }
+}
+
+/// A number, or numbers in order. A truth value is neither.
+fn parameter(value: &Bound<'_, PyAny>, name: &str) -> PyResult<Parameter> {
+    if value.is_instance_of::<PyBool>() {
+        return Err(invalid(format!("{name}: {value}, expected one number or an array (N,)")));
+    }
+    match value.extract::<f64>() {
+        Ok(scalar) => Ok(Parameter::Scalar(scalar)),
+        Err(_) => convert::vector(value, name).map(Parameter::List),
+    }
+}
+
+/// Raises what `Camera` raises for these numbers. `parameters` has the names of the lens' parameters alone.
+#[pyfunction]
+#[pyo3(signature = (model, width: "int", height: "int", parameters: "Mapping[str, ArrayLike]", max_theta_rad=None))]
+pub(crate) fn check_camera(
+    model: &str,
+    width: &Bound<'_, PyAny>,
+    height: &Bound<'_, PyAny>,
+    parameters: &Bound<'_, PyDict>,
+    max_theta_rad: Option<f64>,
+) -> PyResult<()> {
+    Camera::new(model, width, height, max_theta_rad, false, Some(parameters)).map(|_| ())
+}
+
+/// What the lens model of a name declares: `name`, `doc`, and its `parameters` in order, each with `name`, `required`,
+/// `default`, `is_list` and `doc`.
+#[pyfunction]
+pub(crate) fn lens_schema<'py>(py: Python<'py>, model: &str) -> PyResult<Bound<'py, PyDict>> {
+    let schema = Model::schema_of(model).map_err(|error| exception(&error))?;
+    let mut parameters = Vec::new();
+    for one in schema.parameters {
+        let dict = PyDict::new(py);
+        dict.set_item("name", one.name)?;
+        dict.set_item("required", one.kind.is_required())?;
+        match one.kind {
+            Kind::Optional(default) => dict.set_item("default", default)?,
+            Kind::OptionalList => dict.set_item("default", PyList::empty(py))?,
+            Kind::Required | Kind::RequiredList => dict.set_item("default", py.None())?,
+        }
+        dict.set_item("is_list", one.kind.is_list())?;
+        dict.set_item("doc", one.doc)?;
+        parameters.push(dict);
+    }
+    let dict = PyDict::new(py);
+    dict.set_item("name", schema.name)?;
+    dict.set_item("doc", schema.doc)?;
+    dict.set_item("parameters", parameters)?;
+    Ok(dict)
 }

@@ -3,12 +3,19 @@
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use pyo3::prelude::*;
+use pyo3::types::PyDict;
 use tiltvp_core::filter::{ComplementaryFilter as Filter, ComplementaryOptions};
 
+use crate::array::Array;
 use crate::call::exception;
 use crate::convert;
+use crate::options;
 
-/// A filter and its state.
+/// Rates of turn in the short run, a reference attitude in the long run: `ComplementaryFilter(reference_from_body)`.
+///
+/// The explicit complementary filter on rotations with corrections that arrive now and then: an attitude seen in an
+/// image, say, among the readings of a gyroscope. It starts at an attitude (3, 3), with no bias. Raises
+/// `tiltvp.errors.InvalidInputError`.
 #[pyclass(frozen, module = "tiltvp._core")]
 pub(crate) struct ComplementaryFilter {
     inner: Mutex<Filter>,
@@ -23,19 +30,12 @@ impl ComplementaryFilter {
 #[pymethods]
 impl ComplementaryFilter {
     #[new]
-    #[pyo3(signature = (reference_from_body, *, time_constant_s=None, bias_time_constant_s=None))]
-    fn new(
-        reference_from_body: &Bound<'_, PyAny>,
-        time_constant_s: Option<f64>,
-        bias_time_constant_s: Option<f64>,
-    ) -> PyResult<Self> {
-        let own = ComplementaryOptions::default();
-        let options = ComplementaryOptions {
-            time_constant_s: time_constant_s.unwrap_or(own.time_constant_s),
-            bias_time_constant_s: bias_time_constant_s.unwrap_or(own.bias_time_constant_s),
-        };
+    #[pyo3(signature = (reference_from_body: "ArrayLike", **options: "Option | None"))]
+    fn new(reference_from_body: &Bound<'_, PyAny>, options: Option<&Bound<'_, PyDict>>) -> PyResult<Self> {
+        let mut parsed = ComplementaryOptions::default();
+        options::set_given(&mut parsed, options)?;
         let start = convert::matrix3(reference_from_body, "reference_from_body")?;
-        let inner = Filter::new(options, &start).map_err(|error| exception(&error))?;
+        let inner = Filter::new(parsed, &start).map_err(|error| exception(&error))?;
         Ok(Self { inner: Mutex::new(inner) })
     }
 
@@ -51,36 +51,36 @@ impl ComplementaryFilter {
         self.lock().options().bias_time_constant_s
     }
 
-    /// (3, 3): takes vectors of the body to the frame of the reference.
+    /// (3, 3): the attitude now, which takes vectors of the body to the frame of the reference.
     #[getter]
-    fn reference_from_body<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+    fn reference_from_body<'py>(&self, py: Python<'py>) -> PyResult<Array<'py, f64>> {
         convert::to_matrices(py, self.lock().attitude().transpose().as_slice(), [3, 3], true)
     }
 
-    /// (3,): the bias of the rates, rad/s.
+    /// (3,): the bias of the rates, in the body's axes.
     #[getter]
-    fn bias_rad_s<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+    fn bias_rad_s<'py>(&self, py: Python<'py>) -> PyResult<Array<'py, f64>> {
         convert::to_rows(py, &[self.lock().bias_rad_s().into()], true)
     }
 
-    /// Turns on by a rate that holds for some time.
+    /// Turns on by a rate (3,), in the body's axes, that holds for so long.
+    #[pyo3(signature = (rate_rad_s: "ArrayLike", duration_s))]
     fn predict(&self, rate_rad_s: &Bound<'_, PyAny>, duration_s: f64) -> PyResult<()> {
         let rate = convert::vector3(rate_rad_s, "rate_rad_s")?;
         self.lock().predict(&rate, duration_s).map_err(|error| exception(&error))
     }
 
-    /// Moves towards a reference; returns the difference found, (3,).
-    fn correct<'py>(&self, reference_from_body: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
+    /// Moves towards a reference (3, 3) by the share 1 - exp(-t / time_constant_s), t the time since the last one.
+    ///
+    /// Returns (3,): the difference that it found, as a rotation vector in the body's axes.
+    #[pyo3(signature = (reference_from_body: "ArrayLike"))]
+    fn correct<'py>(&self, reference_from_body: &Bound<'py, PyAny>) -> PyResult<Array<'py, f64>> {
         let reference = convert::matrix3(reference_from_body, "reference_from_body")?;
         let found = self.lock().correct(&reference).map_err(|error| exception(&error))?;
         convert::to_rows(reference_from_body.py(), &[found.into()], true)
     }
 
-    fn __repr__(&self) -> String {
-        let options = *self.lock().options();
-        format!(
-            "ComplementaryFilter(time_constant_s={:?}, bias_time_constant_s={:?})",
-            options.time_constant_s, options.bias_time_constant_s
-        )
+    fn __repr__(&self, py: Python<'_>) -> PyResult<String> {
+        Ok(format!("ComplementaryFilter({})", options::shown(py, self.lock().options())?))
     }
 }

@@ -1,6 +1,6 @@
 //! The one door for arrays: what comes in is checked for type, shape and content, what goes out is fresh.
 
-use nalgebra::{Matrix2, Matrix3, Vector3};
+use nalgebra::{Matrix3, SMatrix, Vector3};
 use numpy::{
     PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray2, PyReadonlyArray3, PyUntypedArray,
     PyUntypedArrayMethods,
@@ -8,8 +8,10 @@ use numpy::{
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use tiltvp_core::edges::Mask;
+use tiltvp_core::geometry::RigidMotion;
 use tiltvp_core::image::{ColorView, ImageView};
 
+use crate::array::Array;
 use crate::call::{exception, invalid};
 
 /// `numpy.asarray(value)`, refused unless it holds plain numbers.
@@ -63,21 +65,33 @@ pub(crate) fn vector(value: &Bound<'_, PyAny>, name: &str) -> PyResult<Vec<f64>>
     values(&array)
 }
 
+/// A matrix `(R, C)`, or a vector `(R,)` where it has one column. NaN is allowed.
+pub(crate) fn matrix<const R: usize, const C: usize>(
+    value: &Bound<'_, PyAny>,
+    name: &str,
+) -> PyResult<SMatrix<f64, R, C>> {
+    let shape: &[usize] = if C == 1 { &[R] } else { &[R, C] };
+    let expected = if C == 1 { format!("an array ({R},)") } else { format!("an array ({R}, {C})") };
+    let array = numbers(value, name, &expected)?;
+    if array.shape() != shape {
+        return Err(invalid(format!("{name}: shape {:?}, expected {expected}", array.shape())));
+    }
+    Ok(SMatrix::from_row_slice(&values(&array)?))
+}
+
 /// A `(3, 3)` matrix.
 pub(crate) fn matrix3(value: &Bound<'_, PyAny>, name: &str) -> PyResult<Matrix3<f64>> {
-    let array = numbers(value, name, "an array (3, 3)")?;
-    if array.shape() != [3, 3] {
-        return Err(invalid(format!("{name}: shape {:?}, expected an array (3, 3)", array.shape())));
-    }
-    Ok(Matrix3::from_row_slice(&values(&array)?))
+    matrix(value, name)
 }
 
 /// A `(3,)` vector.
 pub(crate) fn vector3(value: &Bound<'_, PyAny>, name: &str) -> PyResult<Vector3<f64>> {
-    match rows::<3>(value, name)? {
-        (rows, true) => Ok(rows.first().copied().unwrap_or_default().into()),
-        _ => Err(invalid(format!("{name}: shape (N, 3), expected an array (3,)"))),
-    }
+    matrix(value, name)
+}
+
+/// A rigid motion from a `(4, 4)` matrix.
+pub(crate) fn rigid_motion(value: &Bound<'_, PyAny>, name: &'static str) -> PyResult<RigidMotion> {
+    RigidMotion::from_matrix(name, &matrix(value, name)?).map_err(|error| exception(&error))
 }
 
 /// A C-contiguous `(H, W)` array of bytes.
@@ -185,9 +199,9 @@ pub(crate) fn to_rows<'py, const K: usize>(
     py: Python<'py>,
     rows: &[[f64; K]],
     single: bool,
-) -> PyResult<Bound<'py, PyAny>> {
+) -> PyResult<Array<'py, f64>> {
     let flat = PyArray1::from_slice(py, rows.as_flattened());
-    Ok(if single { flat.into_any() } else { flat.reshape([rows.len(), K])?.into_any() })
+    Ok(if single { Array::new(flat) } else { Array::new(flat.reshape([rows.len(), K])?) })
 }
 
 /// Fresh `(N, R, C)` array, or `(R, C)` for a single matrix, from matrices in row order.
@@ -196,13 +210,26 @@ pub(crate) fn to_matrices<'py>(
     flat: &[f64],
     shape: [usize; 2],
     single: bool,
-) -> PyResult<Bound<'py, PyAny>> {
+) -> PyResult<Array<'py, f64>> {
     let array = PyArray1::from_slice(py, flat);
     let [r, c] = shape;
-    Ok(if single { array.reshape([r, c])?.into_any() } else { array.reshape([flat.len() / (r * c), r, c])?.into_any() })
+    Ok(if single {
+        Array::new(array.reshape([r, c])?)
+    } else {
+        Array::new(array.reshape([flat.len() / (r * c), r, c])?)
+    })
 }
 
-/// Fresh `(2, 2)` array.
-pub(crate) fn to_matrix2<'py>(py: Python<'py>, m: &Matrix2<f64>) -> PyResult<Bound<'py, PyArray2<f64>>> {
-    PyArray1::from_slice(py, &[m[(0, 0)], m[(0, 1)], m[(1, 0)], m[(1, 1)]]).reshape([2, 2])
+/// Fresh `(R, C)` array, or `(R,)` of one column.
+pub(crate) fn to_matrix<'py, const R: usize, const C: usize>(
+    py: Python<'py>,
+    m: &SMatrix<f64, R, C>,
+) -> PyResult<Array<'py, f64>> {
+    let flat = PyArray1::from_vec(py, row_major(m).collect());
+    Ok(if C == 1 { Array::new(flat) } else { Array::new(flat.reshape([R, C])?) })
+}
+
+/// The entries, row by row.
+pub(crate) fn row_major<const R: usize, const C: usize>(m: &SMatrix<f64, R, C>) -> impl Iterator<Item = f64> + '_ {
+    (0..R * C).map(|i| m[(i / C, i % C)])
 }

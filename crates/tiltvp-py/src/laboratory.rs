@@ -7,42 +7,33 @@ use pyo3::types::PyDict;
 use tiltvp_synth::{LaboratoryOptions, World, on_threads};
 
 use crate::call::call;
-use crate::convert;
+use crate::options;
 use crate::synth::{seed_from, threads_from};
+use crate::value::frozen;
 
-/// A plain room with a coloured cuboid on its floor.
+/// A plain room with a coloured cuboid, to be looked at by `tiltvp.synth.StereoSequence`.
+///
+/// Frozen, comparable, hashable, and to be pickled. It is built and lit on `threads` threads (None: one per core), on
+/// which it does not depend.
 #[pyclass(frozen, subclass, module = "tiltvp._core")]
 pub(crate) struct Laboratory {
-    options: LaboratoryOptions,
+    pub(crate) options: LaboratoryOptions,
     pub(crate) world: Arc<World>,
 }
 
 #[pymethods]
 impl Laboratory {
     #[new]
-    #[pyo3(signature = (
-        seed, *, size_m=None, gamma_rad=None, clutter=None, side_light=None, light_spacing_m=None, threads=None
-    ))]
-    #[expect(clippy::too_many_arguments, reason = "keyword-only on the Python side")]
+    #[pyo3(signature = (seed: "SupportsIndex", *, threads: "SupportsIndex | None" = None, **options: "Option | None"))]
     fn new(
         py: Python<'_>,
         seed: &Bound<'_, PyAny>,
-        size_m: Option<&Bound<'_, PyAny>>,
-        gamma_rad: Option<f64>,
-        clutter: Option<f64>,
-        side_light: Option<f64>,
-        light_spacing_m: Option<f64>,
         threads: Option<&Bound<'_, PyAny>>,
+        options: Option<&Bound<'_, PyDict>>,
     ) -> PyResult<Self> {
-        let own = LaboratoryOptions::default();
-        let options = LaboratoryOptions {
-            seed: seed_from(seed)?,
-            size_m: size_m.map_or(Ok(own.size_m), |size| Ok::<_, PyErr>(convert::vector3(size, "size_m")?.into()))?,
-            gamma_rad: gamma_rad.unwrap_or(own.gamma_rad),
-            clutter: clutter.unwrap_or(own.clutter),
-            side_light: side_light.unwrap_or(own.side_light),
-            light_spacing_m: light_spacing_m.unwrap_or(own.light_spacing_m),
-        };
+        let mut parsed = LaboratoryOptions { seed: seed_from(seed)?, ..LaboratoryOptions::default() };
+        options::set_given(&mut parsed, options)?;
+        let options = parsed;
         let threads = threads_from(threads)?;
         let world = call(py, || on_threads(threads, || World::laboratory(&options))?)?;
         Ok(Self { options, world: Arc::new(world) })
@@ -84,39 +75,16 @@ impl Laboratory {
         self.options.light_spacing_m
     }
 
-    fn __repr__(&self) -> String {
-        let (own, plain, mut text) =
-            (&self.options, LaboratoryOptions::default(), format!("Laboratory({}", self.options.seed));
-        if own.size_m != plain.size_m {
-            text = format!("{text}, size_m={:?}", self.size_m());
-        }
-        let numbers = [
-            ("gamma_rad", own.gamma_rad, plain.gamma_rad),
-            ("clutter", own.clutter, plain.clutter),
-            ("side_light", own.side_light, plain.side_light),
-            ("light_spacing_m", own.light_spacing_m, plain.light_spacing_m),
-        ];
-        for (name, value, _) in numbers.into_iter().filter(|(_, value, usual)| value != usual) {
-            text = format!("{text}, {name}={value:?}");
-        }
-        text + ")"
-    }
-
-    fn __eq__(&self, other: &Bound<'_, PyAny>) -> bool {
-        other.cast::<Self>().is_ok_and(|other| self.options == other.get().options)
-    }
-
-    fn __hash__(&self) -> u64 {
-        self.options.seed.wrapping_mul(31).wrapping_add(7)
+    fn __repr__(&self, py: Python<'_>) -> PyResult<String> {
+        let usual = LaboratoryOptions { seed: self.options.seed, ..LaboratoryOptions::default() };
+        let others = options::shown_beside(py, &self.options, &usual)?;
+        Ok(format!("Laboratory({}{others})", self.options.seed))
     }
 
     fn __getnewargs_ex__<'py>(&self, py: Python<'py>) -> PyResult<((u64,), Bound<'py, PyDict>)> {
-        let keywords = PyDict::new(py);
-        keywords.set_item("size_m", self.size_m())?;
-        keywords.set_item("gamma_rad", self.options.gamma_rad)?;
-        keywords.set_item("clutter", self.options.clutter)?;
-        keywords.set_item("side_light", self.options.side_light)?;
-        keywords.set_item("light_spacing_m", self.options.light_spacing_m)?;
+        let keywords = options::in_force_without(py, &self.options, &["seed"])?;
         Ok(((self.options.seed,), keywords))
     }
 }
+
+frozen!(Laboratory, |own| &own.options, |own| own.options.seed);

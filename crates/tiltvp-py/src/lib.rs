@@ -1,28 +1,41 @@
 //! The Python extension `tiltvp._core`: checks, converts, releases the interpreter, calls the core, wraps.
 
+mod array;
 mod call;
 mod camera;
 mod complementary;
 mod convert;
 mod corner;
 mod drive;
+mod field;
 mod laboratory;
 mod lines;
+mod options;
 mod rays;
+mod scratch;
 mod selfcalib;
 mod stereo;
 mod synth;
 mod tilt;
+mod value;
 
 use pyo3::prelude::*;
 
-/// What Rust computes for the Python package.
+/// What Rust computes for the package: cameras, the tilt of images, common directions, vertical lines, rooms.
+///
+/// Arrays that come in may have any strides and any real dtype unless a shape and dtype is asked for; they are never
+/// altered. Arrays that go out are fresh. Angles are radians. Equation numbers are those of Fleer 2017 (see the README)
+/// where nothing else is said.
+///
+/// `METHODS` are the methods of `TiltEstimator`, `LINE_METHODS` those of `LineExtractor`, `CORNER_METHODS` those of
+/// `CornerDetector`, `CALIBRATION_METHODS` those of `SelfCalibrator`, the default first. `CAMERA_MODELS` are the models of
+/// `Camera`, `ROOM_KINDS` the kinds of `Room`, and `WALL_PATTERNS` what its walls may have in common.
 #[pymodule]
 mod _core {
     use pyo3::prelude::*;
 
     #[pymodule_export]
-    use crate::camera::Camera;
+    use crate::camera::{Camera, check_camera, lens_schema};
     #[pymodule_export]
     use crate::complementary::ComplementaryFilter;
     #[pymodule_export]
@@ -40,6 +53,8 @@ mod _core {
         LineExtractor, LineTracker, Lines, TrackedLines, descriptor_distances, match_descriptors, ssd_matrix,
         zncc_matrix,
     };
+    #[pymodule_export]
+    use crate::options::option_fields;
     #[pymodule_export]
     use crate::rays::PixelRays;
     #[pymodule_export]
@@ -62,11 +77,11 @@ mod _core {
     #[pymodule_init]
     fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {
         module.add("METHODS", tiltvp_core::tilt::METHODS.to_vec())?;
-        module.add("CALIBRATION_METHODS", tiltvp_core::selfcalib::CALIBRATION_METHODS.to_vec())?;
-        module.add("CORNER_METHODS", tiltvp_core::corner::CORNER_METHODS.to_vec())?;
-        module.add("LINE_METHODS", tiltvp_core::lines::LINE_METHODS.to_vec())?;
+        module.add("CALIBRATION_METHODS", tiltvp_core::selfcalib::CalibrationMethod::NAMES.to_vec())?;
+        module.add("CORNER_METHODS", tiltvp_core::corner::CornerMethod::NAMES.to_vec())?;
+        module.add("LINE_METHODS", tiltvp_core::lines::LineMethod::NAMES.to_vec())?;
         module.add("CAMERA_MODELS", tiltvp_core::camera::Model::names().collect::<Vec<_>>())?;
-        module.add("ROOM_KINDS", tiltvp_synth::RoomKind::ALL.map(tiltvp_synth::RoomKind::name).to_vec())?;
-        module.add("WALL_PATTERNS", tiltvp_synth::WallPattern::ALL.map(tiltvp_synth::WallPattern::name).to_vec())
+        module.add("ROOM_KINDS", tiltvp_synth::RoomKind::NAMES.to_vec())?;
+        module.add("WALL_PATTERNS", tiltvp_synth::WallPattern::NAMES.to_vec())
     }
 }

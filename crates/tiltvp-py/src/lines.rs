@@ -1,11 +1,8 @@
 //! `LineExtractor`, `Lines`, `match_descriptors`, `LineTracker`: the core's vertical lines over arrays.
 
 mod matching;
-mod options;
 mod tracker;
 mod values;
-
-use std::sync::{Mutex, PoisonError};
 
 use nalgebra::Matrix3;
 use numpy::{PyArray1, PyArray2, PyArray3, PyArrayMethods};
@@ -17,22 +14,40 @@ use tiltvp_core::lines::{self as core, LineScratch};
 pub(crate) use self::matching::{descriptor_distances, match_descriptors, ssd_matrix, zncc_matrix};
 pub(crate) use self::tracker::{LineTracker, TrackedLines};
 pub(crate) use self::values::Lines;
+use crate::array::Array;
 use crate::call::{call, exception, invalid};
 use crate::camera::Camera;
 use crate::convert;
+use crate::options;
+use crate::scratch::ScratchPool;
+use crate::value::frozen;
 
-/// The tables of one camera and method, and the scratch of as many threads as have called at once.
+/// Finds and describes the vertical lines of single images of one camera.
+///
+/// The tables of the camera are made once. `tiltvp.lines.LineExtractor` takes images of any usual kind.
+///
+/// `camera` is the camera whose images will come. `method` is "great-circle", for great circles through the vertical by
+/// the camera model, or "radial", for lines through the rim's centre, as in Scaramuzza 2009. `robot_from_camera` is the
+/// (3, 3) rotation R with v_robot = R v_camera, by default the identity: an upward camera, columns to the front.
+/// `options` tells the options in force.
+///
+/// Raises `tiltvp.errors.InvalidInputError` for an option that the method does not have (it names the near ones) or
+/// that is out of its domain, for an R that is no rotation, for a mask of another size than the camera's images, and
+/// where no pixel sees the band.
 #[pyclass(frozen, subclass, module = "tiltvp._core")]
 pub(crate) struct LineExtractor {
     inner: core::LineExtractor,
     camera: Py<Camera>,
-    scratch: Mutex<Vec<LineScratch>>,
+    scratch: ScratchPool<LineScratch>,
 }
 
 #[pymethods]
 impl LineExtractor {
     #[new]
-    #[pyo3(signature = (camera, *, method=core::LINE_METHODS[0], robot_from_camera=None, **options))]
+    #[pyo3(signature = (
+        camera: "Camera", *, method=core::LineMethod::NAMES[0], robot_from_camera: "ArrayLike | None" = None,
+        **options: "Option"
+    ))]
     fn new(
         py: Python<'_>,
         camera: &Bound<'_, PyAny>,
@@ -45,10 +60,11 @@ impl LineExtractor {
         };
         let rotation =
             robot_from_camera.map_or(Ok(Matrix3::identity()), |r| convert::matrix3(r, "robot_from_camera"))?;
-        let parsed = options::parse(method, options)?;
+        let mut parsed = core::LineOptions::for_method(method).map_err(|error| exception(&error))?;
+        options::set(&mut parsed, options)?;
         let lens = camera.get().inner.clone();
         let inner = call(py, move || core::LineExtractor::new(lens, rotation, parsed))?;
-        Ok(Self { inner, camera: camera.clone().unbind(), scratch: Mutex::default() })
+        Ok(Self { inner, camera: camera.clone().unbind(), scratch: ScratchPool::default() })
     }
 
     /// The camera whose images are read.
@@ -65,33 +81,37 @@ impl LineExtractor {
 
     /// Fresh (3, 3) float64: the rotation R in v_robot = R v_camera.
     #[getter]
-    fn robot_from_camera<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        PyArray1::from_slice(py, self.inner.robot_from_camera().transpose().as_slice()).reshape([3, 3])
+    fn robot_from_camera<'py>(&self, py: Python<'py>) -> PyResult<Array<'py, f64>> {
+        convert::to_matrix(py, self.inner.robot_from_camera())
     }
 
-    /// The options that are in force, by name, defaults included.
+    /// The options that are in force, by name, defaults included; a fresh dict, good as keywords.
     #[getter]
     fn options<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         options::in_force(py, self.inner.options())
     }
 
-    /// Lowest and highest elevation that descriptors cover, radians.
+    /// Lowest and highest elevation that descriptors cover: what most directions see of the band.
     #[getter]
     fn band_rad(&self) -> (f64, f64) {
         self.inner.band_rad()
     }
 
-    /// The lines of a C-contiguous `(H, W)` image of uint8.
+    /// The lines of a C-contiguous (H, W) image of uint8.
+    #[pyo3(signature = (image: "NDArray[np.uint8]", normal: "ArrayLike | None"))]
     fn _extract(&self, py: Python<'_>, image: &Bound<'_, PyAny>, normal: Option<&Bound<'_, PyAny>>) -> PyResult<Lines> {
         let image = convert::gray(image, "image")?;
         let (view, inner) = (convert::view(&image)?, &self.inner);
         let tilt = normal.map(tilt_from).transpose()?;
-        let mut lines = core::Lines::default();
-        self.with_scratch(py, |scratch| inner.extract(&view, tilt.as_ref(), scratch, &mut lines))?;
-        Ok(Lines::new(lines))
+        let lines = self.with_scratch(py, |scratch| {
+            let mut lines = core::Lines::default();
+            inner.extract(&view, tilt.as_ref(), scratch, &mut lines).map(|()| lines)
+        })?;
+        Ok(Lines::from(lines))
     }
 
-    /// `(N, K)` float32 of such an image.
+    /// (N, K): descriptors of the lines of such an image.
+    #[pyo3(signature = (image: "NDArray[np.uint8]", lines) -> "NDArray[np.float32]")]
     fn _describe<'py>(
         &self,
         py: Python<'py>,
@@ -99,13 +119,14 @@ impl LineExtractor {
         lines: &Bound<'py, Lines>,
     ) -> PyResult<Bound<'py, PyArray2<f32>>> {
         let image = convert::gray(image, "image")?;
-        let (view, inner, lines) = (convert::view(&image)?, &self.inner, lines.get().inner());
+        let (view, inner, lines) = (convert::view(&image)?, &self.inner, &lines.get().inner);
         let mut values = Vec::new();
         self.with_scratch(py, |scratch| inner.describe(&view, lines, scratch, &mut values))?;
         PyArray1::from_vec(py, values).reshape([lines.lines.len(), inner.options().descriptor.values()])
     }
 
-    /// `(N, rows, columns)` float32 of such an image.
+    /// (N, rows, columns): grey levels about the lines of such an image.
+    #[pyo3(signature = (image: "NDArray[np.uint8]", lines) -> "NDArray[np.float32]")]
     fn _patches<'py>(
         &self,
         py: Python<'py>,
@@ -113,7 +134,7 @@ impl LineExtractor {
         lines: &Bound<'py, Lines>,
     ) -> PyResult<Bound<'py, PyArray3<f32>>> {
         let image = convert::gray(image, "image")?;
-        let (view, inner, lines) = (convert::view(&image)?, &self.inner, lines.get().inner());
+        let (view, inner, lines) = (convert::view(&image)?, &self.inner, &lines.get().inner);
         let (mut levels, mut size) = (Vec::new(), (0, 0));
         self.with_scratch(py, |scratch| {
             size = inner.patches(&view, lines, scratch, &mut levels)?;
@@ -123,29 +144,18 @@ impl LineExtractor {
     }
 
     /// Lines at any bearings, without support.
+    #[pyo3(signature = (bearing_rad: "ArrayLike", normal: "ArrayLike | None"))]
     fn _lines_at(&self, bearing_rad: &Bound<'_, PyAny>, normal: Option<&Bound<'_, PyAny>>) -> PyResult<Lines> {
         let bearings = convert::vector(bearing_rad, "bearing_rad")?;
         if bearings.iter().any(|bearing| !bearing.is_finite()) {
             return Err(invalid("bearing_rad: not finite, expected angles".to_owned()));
         }
         let tilt = normal.map(tilt_from).transpose()?;
-        Ok(Lines::new(self.inner.lines_at(&bearings, tilt.as_ref())))
+        Ok(Lines::from(self.inner.lines_at(&bearings, tilt.as_ref())))
     }
 
     fn __repr__(&self, py: Python<'_>) -> PyResult<String> {
         Ok(format!("LineExtractor({}, method=\"{}\")", self.camera.bind(py).repr()?, self.method()))
-    }
-
-    fn __eq__(&self, other: &Bound<'_, PyAny>) -> bool {
-        other.cast::<Self>().is_ok_and(|other| {
-            let other = &other.get().inner;
-            (self.inner.camera(), self.inner.robot_from_camera(), self.inner.options())
-                == (other.camera(), other.robot_from_camera(), other.options())
-        })
-    }
-
-    fn __hash__(&self, py: Python<'_>) -> PyResult<isize> {
-        (self.camera.bind(py).hash()?, self.method()).into_pyobject(py)?.hash()
     }
 
     fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyTuple>> {
@@ -158,18 +168,19 @@ impl LineExtractor {
     }
 }
 
+frozen!(LineExtractor, |own| (own.inner.camera(), own.inner.robot_from_camera(), own.inner.options()), |own| (
+    own.method(),
+    own.inner.camera().width(),
+    own.inner.camera().height()
+));
+
 impl LineExtractor {
-    /// Runs `work` without the interpreter, with a scratch that no other thread has.
-    fn with_scratch(
+    fn with_scratch<R: Send>(
         &self,
         py: Python<'_>,
-        work: impl FnOnce(&mut LineScratch) -> Result<(), tiltvp_core::Error> + Send,
-    ) -> PyResult<()> {
-        let free = self.scratch.lock().unwrap_or_else(PoisonError::into_inner).pop();
-        let mut scratch = free.unwrap_or_else(|| self.inner.scratch());
-        let outcome = call(py, || work(&mut scratch));
-        self.scratch.lock().unwrap_or_else(PoisonError::into_inner).push(scratch);
-        outcome
+        work: impl FnOnce(&mut LineScratch) -> Result<R, tiltvp_core::Error> + Send,
+    ) -> PyResult<R> {
+        self.scratch.with(py, || self.inner.scratch(), work)
     }
 }
 

@@ -2,72 +2,37 @@
 
 mod drive;
 mod log;
-mod matrices;
 mod mounting;
 mod step;
 
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
-use nalgebra::{Matrix3, Vector3};
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict, PyTuple};
 use tiltvp_core::Error;
 use tiltvp_core::filter::ConsistencyBand;
-use tiltvp_core::selfcalib::{
-    self as core, CalibrationMethod, LogBearing, LogOptions, Mounting, SelfCalibratorOptions, WheelMotion,
-};
+use tiltvp_core::selfcalib::{self as core, LogBearing, LogOptions, SelfCalibratorOptions, WheelMotion};
 
 pub(crate) use self::drive::{SimulatedDrive, drive_legs, simulate_drive};
 pub(crate) use self::log::LogCalibration;
 pub(crate) use self::mounting::MountingEstimate;
 pub(crate) use self::step::CalibrationStep;
+use crate::array::Array;
 use crate::call::{call, exception, invalid};
 use crate::convert;
+use crate::options;
 
-/// Estimates where a camera sits on a robot while it drives.
+/// Estimates where a camera sits on a robot, step by step while it drives past landmarks. Changes as it goes.
+///
+/// `method` is "default", which does not diverge, or "paper", the filter of Scaramuzza 2009 exactly. `start` and
+/// `start_sigma` are (x_m, y_m, yaw_rad) of the mounting as it is thought to be, and standard deviations (3,) or
+/// covariance (3, 3) of them. Landmarks that are not seen from the poses kept are forgotten: let `memory` keep a whole
+/// drive's for loops to close.
+///
+/// Raises `tiltvp.errors.InvalidInputError` for options out of their domain or of the other method.
 #[pyclass(frozen, module = "tiltvp._core")]
 pub(crate) struct SelfCalibrator {
     inner: Mutex<core::SelfCalibrator>,
-}
-
-/// The keywords that a user may leave out.
-#[derive(Default)]
-struct Given<'a, 'py> {
-    bearing_sigma_rad: Option<f64>,
-    odometry_k_m: Option<f64>,
-    step_sigma_m: Option<f64>,
-    step_sigma_rad: Option<f64>,
-    start: Option<&'a Bound<'py, PyAny>>,
-    start_sigma: Option<&'a Bound<'py, PyAny>>,
-    start_distance_m: Option<f64>,
-    start_distance_log_sigma: Option<f64>,
-}
-
-fn options(wheel_base_m: f64, given: &Given<'_, '_>) -> PyResult<SelfCalibratorOptions> {
-    let mut options = SelfCalibratorOptions { wheel_base_m, ..SelfCalibratorOptions::default() };
-    for (value, field) in [
-        (given.bearing_sigma_rad, &mut options.bearing_sigma_rad),
-        (given.odometry_k_m, &mut options.odometry_k_m),
-        (given.step_sigma_m, &mut options.step_sigma_m),
-        (given.step_sigma_rad, &mut options.step_sigma_rad),
-        (given.start_distance_m, &mut options.start_distance_m),
-        (given.start_distance_log_sigma, &mut options.start_distance_log_sigma),
-    ] {
-        *field = value.unwrap_or(*field);
-    }
-    if let Some(start) = given.start {
-        let v = convert::vector3(start, "start")?;
-        options.start = Mounting { x_m: v.x, y_m: v.y, yaw_rad: v.z };
-    }
-    if let Some(sigma) = given.start_sigma {
-        let (rows, single) = convert::rows::<3>(sigma, "start_sigma")?;
-        options.start_covariance = match (rows.as_slice(), single) {
-            ([s], true) => Matrix3::from_diagonal(&Vector3::from(*s).map(|s| if s > 0.0 { s * s } else { f64::NAN })),
-            ([a, b, c], false) => Matrix3::from_rows(&[*a, *b, *c].map(|row| Vector3::from(row).transpose())),
-            _ => return Err(invalid(format!("start_sigma: {} rows, expected (3,) or (3, 3)", rows.len()))),
-        };
-    }
-    Ok(options)
 }
 
 impl SelfCalibrator {
@@ -79,94 +44,26 @@ impl SelfCalibrator {
 #[pymethods]
 impl SelfCalibrator {
     #[new]
-    #[pyo3(signature = (
-        *, wheel_base_m, bearing_sigma_rad=None, odometry_k_m=None, start=None, start_sigma=None, method="default",
-        start_distance_m=None, start_distance_log_sigma=None, start_distance_sigma_m=None, gate_probability=None,
-        memory=None, odometry_inflation=None, step_sigma_m=None, step_sigma_rad=None
-    ))]
-    #[expect(clippy::too_many_arguments, reason = "keywords of the user")]
-    fn new(
-        wheel_base_m: f64,
-        bearing_sigma_rad: Option<f64>,
-        odometry_k_m: Option<f64>,
-        start: Option<&Bound<'_, PyAny>>,
-        start_sigma: Option<&Bound<'_, PyAny>>,
-        method: &str,
-        start_distance_m: Option<f64>,
-        start_distance_log_sigma: Option<f64>,
-        start_distance_sigma_m: Option<f64>,
-        gate_probability: Option<f64>,
-        memory: Option<&Bound<'_, PyAny>>,
-        odometry_inflation: Option<f64>,
-        step_sigma_m: Option<f64>,
-        step_sigma_rad: Option<f64>,
-    ) -> PyResult<Self> {
-        let given = Given {
-            bearing_sigma_rad,
-            odometry_k_m,
-            step_sigma_m,
-            step_sigma_rad,
-            start,
-            start_sigma,
-            start_distance_m,
-            start_distance_log_sigma,
-        };
-        let mut options = options(wheel_base_m, &given)?;
-        options.method = CalibrationMethod::from_name(method).map_err(|error| exception(&error))?;
-        let paper = options.method == CalibrationMethod::Paper;
-        for (name, given, of_paper) in [
-            ("start_distance_sigma_m", start_distance_sigma_m.is_some(), true),
-            ("odometry_inflation", odometry_inflation.is_some(), true),
-            ("gate_probability", gate_probability.is_some(), false),
-            ("memory", memory.is_some(), false),
-            ("step_sigma_m", step_sigma_m.is_some(), false),
-            ("step_sigma_rad", step_sigma_rad.is_some(), false),
-            ("start_distance_log_sigma", start_distance_log_sigma.is_some(), false),
-        ] {
-            if given && paper != of_paper {
-                let other = if of_paper { "paper" } else { "default" };
-                return Err(invalid(format!("option {name}: not one of method {method:?}, but of {other:?}")));
-            }
-        }
-        options.start_distance_sigma_m = start_distance_sigma_m.unwrap_or(options.start_distance_sigma_m);
-        options.odometry_inflation = odometry_inflation.unwrap_or(options.odometry_inflation);
-        options.gate_probability = gate_probability.unwrap_or(options.gate_probability);
-        if let Some(memory) = memory {
-            options.memory = convert::whole(memory, "option memory", "a whole number from 8 to 100000")?;
-        }
-        let inner = core::SelfCalibrator::new(options).map_err(|error| exception(&error))?;
+    #[pyo3(signature = (*, wheel_base_m, **options: "Option | None"))]
+    fn new(wheel_base_m: f64, options: Option<&Bound<'_, PyDict>>) -> PyResult<Self> {
+        let mut parsed = SelfCalibratorOptions { wheel_base_m, ..SelfCalibratorOptions::default() };
+        options::set_given(&mut parsed, options)?;
+        let inner = core::SelfCalibrator::new(parsed).map_err(|error| exception(&error))?;
         Ok(Self { inner: Mutex::new(inner) })
     }
 
     /// The options in force that the method reads, by name, defaults included; a fresh dict, good as keywords.
     #[getter]
     fn options<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        let o = *self.lock().options();
-        let dict = PyDict::new(py);
-        dict.set_item("wheel_base_m", o.wheel_base_m)?;
-        dict.set_item("bearing_sigma_rad", o.bearing_sigma_rad)?;
-        dict.set_item("odometry_k_m", o.odometry_k_m)?;
-        dict.set_item("start", (o.start.x_m, o.start.y_m, o.start.yaw_rad))?;
-        dict.set_item("start_sigma", matrices::matrix3(py, &o.start_covariance)?)?;
-        dict.set_item("method", o.method.name())?;
-        dict.set_item("start_distance_m", o.start_distance_m)?;
-        match o.method {
-            CalibrationMethod::Default => {
-                dict.set_item("start_distance_log_sigma", o.start_distance_log_sigma)?;
-                dict.set_item("gate_probability", o.gate_probability)?;
-                dict.set_item("memory", o.memory)?;
-                dict.set_item("step_sigma_m", o.step_sigma_m)?;
-                dict.set_item("step_sigma_rad", o.step_sigma_rad)?;
-            }
-            CalibrationMethod::Paper => {
-                dict.set_item("start_distance_sigma_m", o.start_distance_sigma_m)?;
-                dict.set_item("odometry_inflation", o.odometry_inflation)?;
-            }
-        }
-        Ok(dict)
+        options::in_force(py, self.lock().options())
     }
 
-    /// Moves by the wheels' displacements, then looks.
+    /// Moves by the wheels' displacements, then looks: bearings (N,) of the landmarks of those whole numbers (N,).
+    ///
+    /// Bearings are in the camera's frame, counter-clockwise; of those taken while the robot stands only the first of
+    /// each landmark counts. Raises `tiltvp.errors.InvalidInputError` for numbers that make no sense; the filter is
+    /// then as before.
+    #[pyo3(signature = (delta_left_m, delta_right_m, landmark_ids: "ArrayLike", bearings_rad: "ArrayLike"))]
     fn step(
         &self,
         py: Python<'_>,
@@ -184,7 +81,8 @@ impl SelfCalibrator {
         call(py, || self.lock().step(&motion, &names, &bearings)).map(CalibrationStep::from)
     }
 
-    /// Steps through a whole log: the (N,) estimates after each step.
+    /// Steps through a log, (N, 2) left and right, (M, 3) step, landmark, bearing: the estimate after each step.
+    #[pyo3(signature = (odometry: "ArrayLike", bearings: "ArrayLike"))]
     fn follow(
         &self,
         py: Python<'_>,
@@ -246,7 +144,8 @@ impl SelfCalibrator {
 
     /// Sets what pickle has kept.
     fn __setstate__(&self, state: &[u8]) -> PyResult<()> {
-        let kept = postcard::from_bytes::<core::SelfCalibrator>(state).ok().filter(core::SelfCalibrator::is_consistent);
+        let kept =
+            postcard::from_bytes::<core::SelfCalibrator>(state).ok().filter(core::SelfCalibrator::is_well_formed);
         *self.lock() = kept.ok_or_else(|| invalid("state: expected the bytes that pickle keeps".to_owned()))?;
         Ok(())
     }
@@ -290,64 +189,45 @@ fn log(odometry: &Bound<'_, PyAny>, bearings: &Bound<'_, PyAny>) -> PyResult<(Ve
     Ok((readings, bearings.into_iter().map(bearing).collect::<PyResult<_>>()?))
 }
 
-/// The mounting from a whole log at once.
+/// The mounting from a whole log at once, by robust sparse least squares.
+///
+/// `odometry` (N, 2) are the displacements of left and right wheel, `bearings` (M, 3) rows of step (a row of the
+/// odometry, after whose motion it was taken), landmark, bearing. `times_s` (N,) are the times of the steps, for
+/// `estimate_time_offset`. Bearings have no scale: with `estimate_odometry` the mean displacement of both wheels stays
+/// as reported. Other options are those of `SelfCalibrator`.
+///
+/// Raises `tiltvp.errors.InvalidInputError` for numbers that make no sense and logs that determine nothing.
 #[pyfunction]
 #[pyo3(signature = (
-    odometry, bearings, *, wheel_base_m, bearing_sigma_rad=None, odometry_k_m=None, start=None, start_sigma=None,
-    start_distance_m=None, start_distance_log_sigma=None, estimate_odometry=false, estimate_time_offset=false,
-    times_s=None, max_iterations=None, step_sigma_m=None, step_sigma_rad=None
+    odometry: "ArrayLike", bearings: "ArrayLike", *, wheel_base_m, times_s: "ArrayLike | None" = None,
+    **options: "Option | None"
 ))]
-#[expect(clippy::too_many_arguments, reason = "keywords of the user")]
 pub(crate) fn calibrate(
     py: Python<'_>,
     odometry: &Bound<'_, PyAny>,
     bearings: &Bound<'_, PyAny>,
     wheel_base_m: f64,
-    bearing_sigma_rad: Option<f64>,
-    odometry_k_m: Option<f64>,
-    start: Option<&Bound<'_, PyAny>>,
-    start_sigma: Option<&Bound<'_, PyAny>>,
-    start_distance_m: Option<f64>,
-    start_distance_log_sigma: Option<f64>,
-    estimate_odometry: bool,
-    estimate_time_offset: bool,
     times_s: Option<&Bound<'_, PyAny>>,
-    max_iterations: Option<u32>,
-    step_sigma_m: Option<f64>,
-    step_sigma_rad: Option<f64>,
+    options: Option<&Bound<'_, PyDict>>,
 ) -> PyResult<LogCalibration> {
-    let given = Given {
-        bearing_sigma_rad,
-        odometry_k_m,
-        step_sigma_m,
-        step_sigma_rad,
-        start,
-        start_sigma,
-        start_distance_m,
-        start_distance_log_sigma,
-    };
-    let defaults = LogOptions::default();
-    let options = LogOptions {
-        filter: options(wheel_base_m, &given)?,
-        estimate_odometry,
-        estimate_time_offset,
-        max_iterations: max_iterations.unwrap_or(defaults.max_iterations),
-    };
+    let mut parsed = LogOptions::default();
+    parsed.filter.wheel_base_m = wheel_base_m;
+    options::set_given(&mut parsed, options)?;
     let (readings, seen) = log(odometry, bearings)?;
     let times = times_s.map(|times| convert::vector(times, "times_s")).transpose()?;
-    let found = call(py, || core::calibrate_log(&options, &readings, times.as_deref(), &seen))?;
+    let found = call(py, || core::calibrate_log(&parsed, &readings, times.as_deref(), &seen))?;
     Ok(LogCalibration::from(found))
 }
 
 /// (N, 2) displacements (left, right) of wheels that drive distances (N,) and turn (N,) to the left (eq. 15).
 #[pyfunction]
-#[pyo3(signature = (distance_m, heading_change_rad, *, wheel_base_m))]
+#[pyo3(signature = (distance_m: "ArrayLike", heading_change_rad: "ArrayLike", *, wheel_base_m))]
 pub(crate) fn wheel_displacements<'py>(
     py: Python<'py>,
     distance_m: &Bound<'py, PyAny>,
     heading_change_rad: &Bound<'py, PyAny>,
     wheel_base_m: f64,
-) -> PyResult<Bound<'py, PyAny>> {
+) -> PyResult<Array<'py, f64>> {
     let distances = convert::vector(distance_m, "distance_m")?;
     let turns = convert::vector(heading_change_rad, "heading_change_rad")?;
     if distances.len() != turns.len() {
@@ -365,7 +245,9 @@ pub(crate) fn wheel_displacements<'py>(
     convert::to_rows(py, &rows, false)
 }
 
-/// (low, high): where the mean of `samples` chi-square values of `dof` degrees of freedom falls with that probability.
+/// (low, high): the mean of `samples` chi-square values of `dof` degrees of freedom is there with that probability.
+///
+/// The mean NEES of so many runs of a consistent filter falls there.
 #[pyfunction]
 pub(crate) fn consistency_band(probability: f64, dof: u32, samples: u32) -> PyResult<(f64, f64)> {
     ConsistencyBand::of_mean(probability, dof, samples).map(|band| (band.low, band.high)).ok_or_else(|| {

@@ -2,28 +2,41 @@
 
 use std::sync::Arc;
 
-use nalgebra::{Isometry3, Matrix4, Rotation3, Translation3, UnitQuaternion, Vector3};
-use numpy::{PyArray1, PyArray3, PyArrayMethods};
+use nalgebra::{Isometry3, Vector3};
+use numpy::{PyArray1, PyArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use tiltvp_core::geometry::RigidMotion;
 use tiltvp_synth::{
-    ColorImage, CornerSighting, ImuChannel, ImuOptions, StereoOptions, World, imu_readings, on_threads,
+    ColorImage, CornerSighting, ImuChannel, ImuOptions, LaboratoryOptions, RoomOptions, StereoOptions, World,
+    imu_readings, on_threads,
 };
 
-use crate::call::{call, exception, invalid};
+use crate::array::Array;
+use crate::call::{call, invalid};
 use crate::camera::Camera;
 use crate::convert;
 use crate::laboratory::Laboratory;
+use crate::options;
 use crate::synth::{Room, seed_from, threads_from};
+use crate::value::{frozen, of_class};
 
 /// Position, directions of the edges x, y, z in rows, their lengths, and the kind, of a corner.
 type CornerParts = ([f64; 3], [[f64; 3]; 3], [f64; 3], &'static str);
-type Sightings<'py> = (Bound<'py, PyArray1<i64>>, Bound<'py, PyAny>, Bound<'py, PyAny>);
-type Readings<'py> = (Bound<'py, PyArray1<f64>>, Bound<'py, PyAny>, Bound<'py, PyAny>, Bound<'py, PyAny>);
-type Picture<'py> = Bound<'py, PyArray3<u8>>;
+type Sightings<'py> = (Array<'py, i64>, Array<'py, f64>, Array<'py, f64>);
+type Readings<'py> = (Array<'py, f64>, Array<'py, f64>, Array<'py, f64>, Array<'py, f64>);
+type Picture<'py> = Array<'py, u8>;
 
-/// A moving pair of cameras. The face class in `tiltvp.synth` says what its images and truth are.
+/// What a sequence looks at.
+#[derive(IntoPyObject)]
+enum Scene<'py> {
+    Laboratory(Bound<'py, Laboratory>),
+    Room(Bound<'py, Room>),
+}
+
+/// A moving pair of cameras, any frame of which can be rendered by `tiltvp.synth.StereoSequence`.
+///
+/// Frozen, comparable, hashable, and to be pickled. N is the number of frames. A motion in the scene is found and rays
+/// are made on `threads` threads (None: one per core), on which nothing depends.
 #[pyclass(frozen, subclass, module = "tiltvp._core")]
 pub(crate) struct StereoSequence {
     scene: Py<PyAny>,
@@ -36,59 +49,34 @@ pub(crate) struct StereoSequence {
 impl StereoSequence {
     #[new]
     #[pyo3(signature = (
-        scene, *, left, right, left_from_right=None, frames=None, frame_rate_hz=None, seed=None, corner=None,
-        distance_m=None, roll_max_rad=None, period_s=None, samples=None, noise_sigma=None, blur_sigma_px=None,
-        exposure_s=None, gain=None, threads=None
+        scene: "Laboratory | Room", *, left, right, threads: "SupportsIndex | None" = None,
+        **options: "Option | None"
     ))]
-    #[expect(clippy::too_many_arguments, reason = "keyword-only on the Python side")]
     fn new(
         py: Python<'_>,
         scene: &Bound<'_, PyAny>,
         left: &Bound<'_, Camera>,
         right: &Bound<'_, Camera>,
-        left_from_right: Option<&Bound<'_, PyAny>>,
-        frames: Option<&Bound<'_, PyAny>>,
-        frame_rate_hz: Option<f64>,
-        seed: Option<&Bound<'_, PyAny>>,
-        corner: Option<&Bound<'_, PyAny>>,
-        distance_m: Option<&Bound<'_, PyAny>>,
-        roll_max_rad: Option<f64>,
-        period_s: Option<f64>,
-        samples: Option<&Bound<'_, PyAny>>,
-        noise_sigma: Option<f64>,
-        blur_sigma_px: Option<f64>,
-        exposure_s: Option<f64>,
-        gain: Option<f64>,
         threads: Option<&Bound<'_, PyAny>>,
+        options: Option<&Bound<'_, PyDict>>,
     ) -> PyResult<Self> {
-        let own = StereoOptions::default();
-        let options = StereoOptions {
-            frames: frames.map_or(Ok(own.frames), |n| convert::whole(n, "frames", "a whole number from 1"))?,
-            frame_rate_hz: frame_rate_hz.unwrap_or(own.frame_rate_hz),
-            seed: seed.map_or(Ok(own.seed), seed_from)?,
-            corner: corner.map(|k| convert::whole(k, "corner", "the number of a corner")).transpose()?,
-            distance_m: distance_m.map_or(Ok(own.distance_m), range_from)?,
-            roll_max_rad: roll_max_rad.unwrap_or(own.roll_max_rad),
-            period_s: period_s.unwrap_or(own.period_s),
-            left_from_right: left_from_right
-                .map_or(Ok(own.left_from_right), |pose| pose_from(pose, "left_from_right"))?,
-            samples: samples.map_or(Ok(own.samples), |n| convert::whole(n, "samples", "a whole number from 1"))?,
-            noise_sigma: noise_sigma.unwrap_or(own.noise_sigma),
-            blur_sigma_px: blur_sigma_px.unwrap_or(own.blur_sigma_px),
-            exposure_s: exposure_s.unwrap_or(own.exposure_s),
-            gain: gain.unwrap_or(own.gain),
-        };
+        let mut parsed = StereoOptions::default();
+        options::set_given(&mut parsed, options)?;
         let world = world_of(scene)?;
         let cameras = [left.get().inner.clone(), right.get().inner.clone()];
         let threads = threads_from(threads)?;
-        let inner = call(py, || on_threads(threads, || tiltvp_synth::StereoSequence::new(world, cameras, options))?)?;
+        let inner = call(py, || on_threads(threads, || tiltvp_synth::StereoSequence::new(world, cameras, parsed))?)?;
         Ok(Self { scene: scene.clone().unbind(), left: left.clone().unbind(), right: right.clone().unbind(), inner })
     }
 
     /// The laboratory or room.
     #[getter]
-    fn scene(&self, py: Python<'_>) -> Py<PyAny> {
-        self.scene.clone_ref(py)
+    fn scene<'py>(&self, py: Python<'py>) -> PyResult<Scene<'py>> {
+        let scene = self.scene.bind(py);
+        Ok(match scene.cast() {
+            Ok(laboratory) => Scene::Laboratory(laboratory.clone()),
+            Err(_) => Scene::Room(scene.cast()?.clone()),
+        })
     }
 
     /// The left and the right camera.
@@ -103,7 +91,7 @@ impl StereoSequence {
         self.inner.options().seed
     }
 
-    /// Number of the corner that is looked at.
+    /// Which of the scene's corners is looked at.
     #[getter]
     fn corner(&self) -> usize {
         self.inner.corner()
@@ -123,26 +111,27 @@ impl StereoSequence {
 
     /// (4, 4): the right camera's pose in the left one's frame.
     #[getter]
-    fn left_from_right<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+    fn left_from_right<'py>(&self, py: Python<'py>) -> PyResult<Array<'py, f64>> {
         to_poses(py, &[self.inner.options().left_from_right], true)
     }
 
     /// (N,): when each frame is taken, seconds.
     #[getter]
-    fn times_s<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
-        PyArray1::from_vec(py, (0..self.__len__()).map(|frame| self.inner.time_s(frame)).collect())
+    fn times_s<'py>(&self, py: Python<'py>) -> Array<'py, f64> {
+        Array::new(PyArray1::from_vec(py, (0..self.__len__()).map(|frame| self.inner.time_s(frame)).collect()))
     }
 
     /// (N, 4, 4): the left camera's pose in the world at each frame.
     #[getter]
-    fn poses<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+    fn poses<'py>(&self, py: Python<'py>) -> PyResult<Array<'py, f64>> {
         let motion = self.inner.motion();
         let poses: Vec<_> = (0..self.__len__()).map(|frame| motion.pose(self.inner.time_s(frame))).collect();
         to_poses(py, &poses, false)
     }
 
     /// (T, 4, 4): the left camera's pose in the world at any times, seconds.
-    fn poses_at<'py>(&self, py: Python<'py>, times_s: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
+    #[pyo3(signature = (times_s: "ArrayLike"))]
+    fn poses_at<'py>(&self, py: Python<'py>, times_s: &Bound<'py, PyAny>) -> PyResult<Array<'py, f64>> {
         let times = convert::vector(times_s, "times_s")?;
         if !times.iter().all(|time| time.is_finite()) {
             return Err(invalid("times_s: not finite, expected seconds".to_owned()));
@@ -161,7 +150,7 @@ impl StereoSequence {
     }
 
     /// The left and the right image of a frame, (H, W, 3).
-    #[pyo3(signature = (frame, *, threads=None))]
+    #[pyo3(signature = (frame: "SupportsIndex", *, threads: "SupportsIndex | None" = None))]
     fn _render<'py>(
         &self,
         py: Python<'py>,
@@ -174,7 +163,7 @@ impl StereoSequence {
     }
 
     /// Corners in sight at a frame: numbers, vertices (M, 2, 2), visible lengths of edges (M, 2, 3).
-    #[pyo3(signature = (frame, *, threads=None))]
+    #[pyo3(signature = (frame: "SupportsIndex", *, threads: "SupportsIndex | None" = None))]
     fn _truth<'py>(
         &self,
         py: Python<'py>,
@@ -186,14 +175,17 @@ impl StereoSequence {
         let vertices = seen.iter().flat_map(|s: &CornerSighting| s.vertex_px.iter().flat_map(|p| [p.x, p.y]));
         let lengths = seen.iter().flat_map(|s| s.edges_px.as_flattened().iter().copied());
         Ok((
-            PyArray1::from_vec(py, seen.iter().map(|s| s.corner as i64).collect()),
+            Array::new(PyArray1::from_vec(py, seen.iter().map(|s| s.corner as i64).collect())),
             convert::to_matrices(py, &vertices.collect::<Vec<f64>>(), [2, 2], false)?,
             convert::to_matrices(py, &lengths.collect::<Vec<f64>>(), [2, 3], false)?,
         ))
     }
 
     /// Readings of an inertial sensor: times, rates (M, 3), forces (M, 3), the rates' true biases (M, 3).
-    #[pyo3(signature = (*, rate_hz=None, seed=None, gyroscope=None, accelerometer=None))]
+    #[pyo3(signature = (
+        *, rate_hz=None, seed: "SupportsIndex | None" = None, gyroscope: "ArrayLike | None" = None,
+        accelerometer: "ArrayLike | None" = None,
+    ))]
     fn _imu<'py>(
         &self,
         py: Python<'py>,
@@ -217,7 +209,7 @@ impl StereoSequence {
             convert::to_rows(py, &rows, false)
         };
         Ok((
-            PyArray1::from_vec(py, readings.iter().map(|reading| reading.time_s).collect()),
+            Array::new(PyArray1::from_vec(py, readings.iter().map(|reading| reading.time_s).collect())),
             rows(|reading| reading.rate_rad_s)?,
             rows(|reading| reading.force_m_s2)?,
             rows(|reading| reading.rate_bias_rad_s)?,
@@ -234,40 +226,28 @@ impl StereoSequence {
         Ok(format!("StereoSequence({scene}, frames={}, seed={})", options.frames, options.seed))
     }
 
-    fn __eq__(&self, py: Python<'_>, other: &Bound<'_, PyAny>) -> PyResult<bool> {
-        let Ok(other) = other.cast::<Self>() else { return Ok(false) };
-        let other = other.get();
-        let same = self.inner.options() == other.inner.options() && self.inner.cameras() == other.inner.cameras();
-        Ok(same && self.scene.bind(py).eq(other.scene.bind(py))?)
-    }
-
-    fn __hash__(&self) -> u64 {
-        self.inner.options().seed.wrapping_mul(31).wrapping_add(self.inner.options().frames as u64)
-    }
-
     fn __getnewargs_ex__<'py>(&self, py: Python<'py>) -> PyResult<((Py<PyAny>,), Bound<'py, PyDict>)> {
-        let options = self.inner.options();
-        let keywords = PyDict::new(py);
+        let keywords = options::in_force(py, self.inner.options())?;
         keywords.set_item("left", &self.left)?;
         keywords.set_item("right", &self.right)?;
-        keywords.set_item("left_from_right", self.left_from_right(py)?)?;
-        keywords.set_item("frames", options.frames)?;
-        keywords.set_item("frame_rate_hz", options.frame_rate_hz)?;
-        keywords.set_item("seed", options.seed)?;
-        keywords.set_item("corner", options.corner)?;
-        keywords.set_item("distance_m", options.distance_m.to_vec())?;
-        keywords.set_item("roll_max_rad", options.roll_max_rad)?;
-        keywords.set_item("period_s", options.period_s)?;
-        keywords.set_item("samples", options.samples)?;
-        keywords.set_item("noise_sigma", options.noise_sigma)?;
-        keywords.set_item("blur_sigma_px", options.blur_sigma_px)?;
-        keywords.set_item("exposure_s", options.exposure_s)?;
-        keywords.set_item("gain", options.gain)?;
         Ok(((self.scene.clone_ref(py),), keywords))
     }
 }
 
+frozen!(StereoSequence, |own| (own.options_of_scene(), own.inner.cameras(), own.inner.options()), |own| (
+    own.__len__(),
+    own.inner.options().seed
+));
+
 impl StereoSequence {
+    fn options_of_scene(&self) -> (Option<RoomOptions>, Option<LaboratoryOptions>) {
+        Python::attach(|py| {
+            let scene = self.scene.bind(py);
+            let room = of_class::<Room>(scene).map(|room| room.options.clone());
+            (room, of_class::<Laboratory>(scene).map(|laboratory| laboratory.options.clone()))
+        })
+    }
+
     fn frame(&self, frame: &Bound<'_, PyAny>) -> PyResult<usize> {
         convert::whole(frame, "frame", &format!("a whole number below {}", self.inner.options().frames))
     }
@@ -283,13 +263,6 @@ fn world_of(scene: &Bound<'_, PyAny>) -> PyResult<Arc<World>> {
     Err(invalid(format!("scene: a {}, expected a Laboratory or a Room", scene.get_type().name()?)))
 }
 
-fn range_from(range: &Bound<'_, PyAny>) -> PyResult<[f64; 2]> {
-    match convert::vector(range, "distance_m")?.as_slice() {
-        [low, high] => Ok([*low, *high]),
-        other => Err(invalid(format!("distance_m: {} numbers, expected the least and the greatest", other.len()))),
-    }
-}
-
 fn channel_from(channel: &Bound<'_, PyAny>, name: &str) -> PyResult<ImuChannel> {
     match convert::vector(channel, name)?.as_slice() {
         &[noise_density, bias_sigma, bias_walk, scale_sigma, range] => {
@@ -302,23 +275,11 @@ fn channel_from(channel: &Bound<'_, PyAny>, name: &str) -> PyResult<ImuChannel> 
     }
 }
 
-/// A rigid motion from a (4, 4) matrix.
-fn pose_from(value: &Bound<'_, PyAny>, name: &'static str) -> PyResult<Isometry3<f64>> {
-    let (rows, _) = convert::rows::<4>(value, name)?;
-    let flat: Vec<f64> = rows.into_iter().flatten().collect();
-    if flat.len() != 16 {
-        return Err(invalid(format!("{name}: {} rows of 4, expected an array (4, 4)", flat.len() / 4)));
-    }
-    let motion = RigidMotion::from_matrix(name, &Matrix4::from_row_slice(&flat)).map_err(|error| exception(&error))?;
-    let turn = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(motion.rotation));
-    Ok(Isometry3::from_parts(Translation3::from(motion.translation_m), turn))
-}
-
-fn to_poses<'py>(py: Python<'py>, poses: &[Isometry3<f64>], single: bool) -> PyResult<Bound<'py, PyAny>> {
+fn to_poses<'py>(py: Python<'py>, poses: &[Isometry3<f64>], single: bool) -> PyResult<Array<'py, f64>> {
     let flat: Vec<f64> = poses.iter().flat_map(|pose| pose.to_homogeneous().transpose().as_slice().to_vec()).collect();
     convert::to_matrices(py, &flat, [4, 4], single)
 }
 
 fn picture(py: Python<'_>, image: ColorImage) -> PyResult<Picture<'_>> {
-    PyArray1::from_vec(py, image.bgr).reshape([image.height_px, image.width_px, 3])
+    Ok(Array::new(PyArray1::from_vec(py, image.bgr).reshape([image.height_px, image.width_px, 3])?))
 }

@@ -1,20 +1,18 @@
 //! `TiltEstimator`, `TiltEstimate`, `common_direction`: the core's tilt over arrays.
 
-mod correction;
+pub(crate) mod correction;
 mod direction;
 mod estimate;
 mod filter;
 mod filtered;
 mod image_edges;
-mod options;
 mod report;
-mod sampling;
 mod values;
 
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::Arc;
 
 use nalgebra::Matrix3;
-use numpy::{PyArray1, PyArray2, PyArrayMethods};
+use numpy::{PyArray1, PyArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyTuple};
 use tiltvp_core::geometry::{Tilt, WheelLayout};
@@ -29,11 +27,25 @@ pub(crate) use self::filter::TiltFilter;
 pub(crate) use self::filtered::{FilterStep, FilteredTilt};
 pub(crate) use self::image_edges::ImageEdges;
 pub(crate) use self::report::FitReport;
+use crate::array::Array;
 use crate::call::{call, exception, invalid};
 use crate::camera::Camera;
 use crate::convert;
+use crate::options;
+use crate::scratch::ScratchPool;
+use crate::value::frozen;
 
-/// The tables of one camera and method, and the scratch of as many threads as have called at once.
+/// Estimates how far and in which direction a robot leans from single images of one camera.
+///
+/// The tables of the camera are made once. `tiltvp.TiltEstimator` takes images of any usual kind.
+///
+/// `camera` is the camera whose images will come, `method` one of `METHODS`, `robot_from_camera` the (3, 3) rotation R
+/// with v_robot = R v_camera, by default the identity: an upward camera, columns to the front. Options and their
+/// defaults depend on the method; `options` tells those in force.
+///
+/// Raises `tiltvp.errors.InvalidInputError` for an option that the method does not have (it names the near ones) or
+/// that is out of its domain, for an R that is no rotation, for a mask of another size than the camera's images, and
+/// where no pixel sees the band.
 #[pyclass(frozen, subclass, module = "tiltvp._core")]
 pub(crate) struct TiltEstimator {
     inner: core::TiltEstimator,
@@ -41,13 +53,16 @@ pub(crate) struct TiltEstimator {
     /// The options that the user has named.
     given: Vec<String>,
     /// Shared by the estimators that look at the same pixels.
-    scratch: Arc<Mutex<Vec<Scratch>>>,
+    scratch: Arc<ScratchPool<Scratch>>,
 }
 
 #[pymethods]
 impl TiltEstimator {
     #[new]
-    #[pyo3(signature = (camera, *, method=core::METHODS[0], robot_from_camera=None, _like=None, **options))]
+    #[pyo3(signature = (
+        camera: "Camera", *, method=core::METHODS[0], robot_from_camera: "ArrayLike | None" = None, _like=None,
+        **options: "Option"
+    ))]
     #[expect(clippy::used_underscore_binding, reason = "a keyword of the package's own")]
     fn new(
         py: Python<'_>,
@@ -65,7 +80,8 @@ impl TiltEstimator {
         };
         let rotation =
             robot_from_camera.map_or(Ok(Matrix3::identity()), |r| convert::matrix3(r, "robot_from_camera"))?;
-        let parsed = options::parse(method, options)?;
+        let mut parsed = core::TiltOptions::for_method(method).map_err(|error| exception(&error))?;
+        options::set(&mut parsed, options)?;
         let lens = camera.get().inner.clone();
         let inner = call(py, move || core::TiltEstimator::new(lens, rotation, parsed))?;
         let given = options.map_or(Ok(Vec::new()), |options| options.keys().extract())?;
@@ -86,11 +102,11 @@ impl TiltEstimator {
 
     /// Fresh (3, 3) float64: the rotation R in v_robot = R v_camera.
     #[getter]
-    fn robot_from_camera<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        PyArray1::from_slice(py, self.inner.robot_from_camera().transpose().as_slice()).reshape([3, 3])
+    fn robot_from_camera<'py>(&self, py: Python<'py>) -> PyResult<Array<'py, f64>> {
+        convert::to_matrix(py, self.inner.robot_from_camera())
     }
 
-    /// The options that are in force, by name, defaults included.
+    /// The options that are in force, by name, defaults included; a fresh dict, good as keywords.
     #[getter]
     fn options<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         options::in_force(py, self.inner.options())
@@ -102,52 +118,49 @@ impl TiltEstimator {
         self.inner.region_pixels()
     }
 
-    /// The tilt of a C-contiguous `(H, W)` image of uint8.
+    /// The tilt of a C-contiguous (H, W) image of uint8.
+    #[pyo3(signature = (image: "NDArray[np.uint8]"))]
     fn _estimate(&self, py: Python<'_>, image: &Bound<'_, PyAny>) -> PyResult<TiltEstimate> {
         let image = convert::gray(image, "image")?;
         let (view, inner) = (convert::view(&image)?, &self.inner);
-        let mut scratch = self.borrow_scratch();
-        let estimate = call(py, || inner.estimate(&view, &mut scratch));
-        self.return_scratch(scratch);
-        Ok(TiltEstimate::from(estimate?))
+        Ok(self.with_scratch(py, |scratch| inner.estimate(&view, scratch))?.into())
     }
 
     /// The edge pixels of a C-contiguous `(H, W)` image of uint8.
+    #[pyo3(signature = (image: "NDArray[np.uint8]"))]
     fn _detect(&self, py: Python<'_>, image: &Bound<'_, PyAny>) -> PyResult<ImageEdges> {
         let image = convert::gray(image, "image")?;
         let (view, inner) = (convert::view(&image)?, &self.inner);
-        let mut scratch = self.borrow_scratch();
-        let edges = call(py, || inner.detect(&view, &mut scratch));
-        self.return_scratch(scratch);
-        Ok(ImageEdges::new(edges?, self.camera.clone_ref(py)))
+        let edges = self.with_scratch(py, |scratch| inner.detect(&view, scratch))?;
+        Ok(ImageEdges::new(edges, self.camera.clone_ref(py)))
     }
 
-    /// The tilt of the image that the edges are of.
+    /// The tilt of the image that the edges are of, the same to the last bit as the image itself gives.
+    ///
+    /// `edges` may be those of any estimator with equal camera, robot_from_camera, mask and edge options (gradient_min,
+    /// smoothing_px, elevations, margin_px, row_stride); else `tiltvp.errors.InvalidInputError` says what differs.
+    /// Other threads run meanwhile.
+    #[pyo3(signature = (edges: "ImageEdges"))]
     fn estimate_edges(&self, py: Python<'_>, edges: &Bound<'_, PyAny>) -> PyResult<TiltEstimate> {
         let Ok(edges) = edges.cast::<ImageEdges>() else {
             return Err(invalid(format!("edges: {}, expected a tiltvp.ImageEdges", edges.get_type().name()?)));
         };
         let (edges, inner) = (edges.get().inner(), &self.inner);
-        let mut scratch = self.borrow_scratch();
-        let estimate = call(py, || inner.estimate_edges(edges, &mut scratch));
-        self.return_scratch(scratch);
-        Ok(TiltEstimate::from(estimate?))
+        Ok(self.with_scratch(py, |scratch| inner.estimate_edges(edges, scratch))?.into())
     }
 
-    /// The tilt of an image and its edge pixels.
+    /// The tilt of such an image, and its edge pixels.
+    #[pyo3(signature = (image: "NDArray[np.uint8]"))]
     fn _estimate_with_edges(&self, py: Python<'_>, image: &Bound<'_, PyAny>) -> PyResult<(TiltEstimate, EdgeElements)> {
         let image = convert::gray(image, "image")?;
         let (view, inner) = (convert::view(&image)?, &self.inner);
-        let mut scratch = self.borrow_scratch();
-        let outcome = call(py, || inner.estimate_with_elements(&view, &mut scratch));
-        self.return_scratch(scratch);
-        let (estimate, elements) = outcome?;
+        let (estimate, elements) = self.with_scratch(py, |scratch| inner.estimate_with_elements(&view, scratch))?;
         let size = (inner.camera().width() as usize, inner.camera().height() as usize);
-        Ok((TiltEstimate::from(estimate), EdgeElements::new(elements, size)))
+        Ok((TiltEstimate::from(estimate), EdgeElements::new(&elements, size)))
     }
 
-    /// The tilts of many C-contiguous `(H, W)` images of uint8.
-    #[pyo3(signature = (images, *, threads=None))]
+    /// The tilts of many such images, in their order, the same for any number of threads.
+    #[pyo3(signature = (images: "list[NDArray[np.uint8]]", *, threads: "int | None" = None))]
     #[expect(clippy::needless_pass_by_value, reason = "what the interpreter hands over is owned")]
     fn _estimate_many(
         &self,
@@ -175,18 +188,6 @@ impl TiltEstimator {
         Ok(text + ")")
     }
 
-    fn __eq__(&self, other: &Bound<'_, PyAny>) -> bool {
-        other.cast::<Self>().is_ok_and(|other| {
-            let other = &other.get().inner;
-            (self.inner.camera(), self.inner.robot_from_camera(), self.inner.options())
-                == (other.camera(), other.robot_from_camera(), other.options())
-        })
-    }
-
-    fn __hash__(&self, py: Python<'_>) -> PyResult<isize> {
-        (self.camera.bind(py).hash()?, self.method()).into_pyobject(py)?.hash()
-    }
-
     fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyTuple>> {
         let (py, this) = (slf.py(), slf.get());
         let keywords = this.options(py)?;
@@ -197,11 +198,17 @@ impl TiltEstimator {
     }
 }
 
+frozen!(TiltEstimator, |own| (own.inner.camera(), own.inner.robot_from_camera(), own.inner.options()), |own| (
+    own.method(),
+    own.inner.camera().width(),
+    own.inner.camera().height()
+));
+
 impl TiltEstimator {
     /// An estimator of the same camera with some options changed, which shares tables and scratch where they are the same.
     fn with_options(&self, py: Python<'_>, changes: Option<&Bound<'_, PyDict>>) -> PyResult<Self> {
         let mut options = self.inner.options().clone();
-        options::change(&mut options, changes)?;
+        options::set(&mut options, changes)?;
         let inner = call(py, || self.inner.with_options(options))?;
         let mut given = self.given.clone();
         for key in changes.into_iter().flat_map(PyDictMethods::keys) {
@@ -215,13 +222,12 @@ impl TiltEstimator {
         Ok(Self { inner, camera: self.camera.clone_ref(py), given, scratch })
     }
 
-    fn borrow_scratch(&self) -> Scratch {
-        let free = self.scratch.lock().unwrap_or_else(PoisonError::into_inner).pop();
-        free.unwrap_or_else(|| self.inner.scratch())
-    }
-
-    fn return_scratch(&self, scratch: Scratch) {
-        self.scratch.lock().unwrap_or_else(PoisonError::into_inner).push(scratch);
+    fn with_scratch<R: Send>(
+        &self,
+        py: Python<'_>,
+        work: impl FnOnce(&mut Scratch) -> Result<R, tiltvp_core::Error> + Send,
+    ) -> PyResult<R> {
+        self.scratch.with(py, || self.inner.scratch(), work)
     }
 }
 
@@ -232,9 +238,13 @@ fn tilt_from(normal: &Bound<'_, PyAny>, name: &str) -> PyResult<Tilt> {
         .ok_or_else(|| invalid(format!("{name}: {:?}, expected a finite vector that is not zero", vector.as_slice())))
 }
 
-/// `(H, W, 2)` float32: where each pixel of the upright image is found in the leaning one.
+/// (H, W, 2): where each pixel (u, v) of the upright image is found in the leaning one; NaN where it was not seen.
+///
+/// `normal` is the ground normal (3,) in the robot frame, of any length but zero.
 #[pyfunction]
-#[pyo3(signature = (camera, normal, *, robot_from_camera=None))]
+#[pyo3(signature = (
+    camera, normal: "ArrayLike", *, robot_from_camera: "ArrayLike | None" = None,
+) -> "NDArray[np.float32]")]
 pub(crate) fn level_map<'py>(
     py: Python<'py>,
     camera: &Bound<'py, Camera>,
@@ -249,26 +259,28 @@ pub(crate) fn level_map<'py>(
     Ok(PyArray1::from_slice(py, map.as_flattened()).reshape(shape)?.into_any())
 }
 
-/// The angle in radians between two ground normals, eq. 44.
+/// The angle in [0, pi] radians between two ground normals (3,), of any length but zero (eq. 44).
 #[pyfunction]
+#[pyo3(signature = (a: "ArrayLike", b: "ArrayLike"))]
 pub(crate) fn tilt_error_rad(a: &Bound<'_, PyAny>, b: &Bound<'_, PyAny>) -> PyResult<f64> {
     Ok(tilt_from(a, "a")?.angle_to(&tilt_from(b, "b")?))
 }
 
-/// `(3,)` ground normal of a lean, eq. 1.
+/// (3,): the ground normal of a lean, (-sin a cos b, -sin a sin b, cos a) (eq. 1).
 #[pyfunction]
-pub(crate) fn normal_from_alpha_beta(
-    py: Python<'_>,
-    alpha_rad: f64,
-    beta_rad: f64,
-) -> PyResult<Bound<'_, PyArray1<f64>>> {
+pub(crate) fn normal_from_alpha_beta(py: Python<'_>, alpha_rad: f64, beta_rad: f64) -> PyResult<Array<'_, f64>> {
     if !(alpha_rad.is_finite() && beta_rad.is_finite()) {
         return Err(invalid(format!("alpha_rad, beta_rad = {alpha_rad}, {beta_rad}, expected finite angles")));
     }
-    Ok(PyArray1::from_slice(py, Tilt::from_alpha_beta(alpha_rad, beta_rad).normal().as_slice()))
+    convert::to_matrix(py, &Tilt::from_alpha_beta(alpha_rad, beta_rad).normal())
 }
 
-/// `(alpha_rad, beta_rad)` of a robot whose wheels stand at these heights, eqs. 42 and 43.
+/// (alpha_rad, beta_rad) of a robot whose wheels stand at these heights above a common level (eqs. 42 and 43).
+///
+/// The main wheels are at (0, +-half_track_m) in the robot's frame, the caster at (-caster_behind_m, 0): r_w and r_c of
+/// fig. 20. With h_r = right - left and h_c = caster - left the ground normal is (-(2 h_c - h_r) / (2 r_c), -h_r / (2
+/// r_w), cos alpha). Raises `tiltvp.errors.InvalidInputError` for lengths that are not positive, heights that are not
+/// finite, and heights that no robot of this layout can stand at.
 #[pyfunction]
 #[pyo3(signature = (*, left_m, right_m, caster_m, half_track_m, caster_behind_m))]
 pub(crate) fn tilt_from_wheel_heights(
@@ -283,12 +295,11 @@ pub(crate) fn tilt_from_wheel_heights(
     Ok((tilt.alpha_rad(), tilt.beta_rad()))
 }
 
-/// `(3, 3)` rotation from the upright robot's frame to the leaning one's, without a turn about the vertical.
+/// (3, 3): the rotation from the upright robot's frame to the leaning one's, without a turn about the vertical.
+///
+/// `normal` is the ground normal (3,) in the robot frame, of any length but zero.
 #[pyfunction]
-pub(crate) fn leaning_from_upright<'py>(
-    py: Python<'py>,
-    normal: &Bound<'py, PyAny>,
-) -> PyResult<Bound<'py, PyArray2<f64>>> {
-    let rotation = tilt_from(normal, "normal")?.leaning_from_upright();
-    PyArray1::from_slice(py, rotation.transpose().as_slice()).reshape([3, 3])
+#[pyo3(signature = (normal: "ArrayLike"))]
+pub(crate) fn leaning_from_upright<'py>(py: Python<'py>, normal: &Bound<'py, PyAny>) -> PyResult<Array<'py, f64>> {
+    convert::to_matrix(py, &tilt_from(normal, "normal")?.leaning_from_upright())
 }

@@ -2,34 +2,26 @@
 
 use nalgebra::{Vector2, Vector3};
 use tiltvp_core::geometry::wrap_angle;
-use tiltvp_core::selfcalib::{Leg, MotionNoise, Mounting, WheelMotion, Wheels};
+use tiltvp_core::options::{NOT_NEGATIVE, POSITIVE};
+use tiltvp_core::selfcalib::{MotionNoise, Mounting, RelativeMotion, WheelMotion, Wheels};
+use tiltvp_core::{options, words};
 
-use crate::dice::Dice;
+use crate::rng::Rng;
 
-/// A trajectory.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum BearingDriveKind {
-    /// That of the paper's section 9.2: 2.3 m straight on in steps of 3.8 cm, then half a turn in place.
-    Paper,
-    /// Four times 1 m straight on and a quarter of a turn in place.
-    Alternating,
-    /// 4 m straight on, nothing else.
-    Straight,
+words! {
+    /// A trajectory.
+    pub enum BearingDriveKind {
+        /// That of Scaramuzza, Siegwart and Martinelli 2009, section 9.2: 2.3 m straight on in steps of 3.8 cm, then half a turn
+        /// in place.
+        Paper = "paper",
+        /// Four times 1 m straight on and a quarter of a turn in place.
+        Alternating = "alternating",
+        /// 4 m straight on, nothing else.
+        Straight = "straight",
+    }
 }
 
 impl BearingDriveKind {
-    /// Every trajectory.
-    pub const ALL: [Self; 3] = [Self::Paper, Self::Alternating, Self::Straight];
-
-    /// The name of the trajectory.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Paper => "paper",
-            Self::Alternating => "alternating",
-            Self::Straight => "straight",
-        }
-    }
-
     /// Distance in metres and turn in radians of each leg.
     pub fn legs(self) -> Vec<(f64, f64)> {
         let (straight, turn) = (|metres| (metres, 0.0), |degrees: f64| (0.0, degrees.to_radians()));
@@ -50,40 +42,26 @@ impl BearingDriveKind {
     }
 }
 
-/// What is drawn.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct BearingDriveOptions {
-    /// The trajectory.
-    pub kind: BearingDriveKind,
-    /// Seed of everything random.
-    pub seed: u64,
-    /// Where the camera is.
-    pub mounting: Mounting,
-    /// How many vertical lines there are.
-    pub landmarks: usize,
-    /// Standard deviation of a bearing, radians.
-    pub bearing_sigma_rad: f64,
-    /// Variance of a wheel's displacement per metre (eq. 31), metres.
-    pub odometry_k_m: f64,
-    /// Distance between the wheels, metres.
-    pub wheel_base_m: f64,
-    /// Probability that a bearing is that of nothing: anywhere on the circle.
-    pub outliers: f64,
-}
-
-impl Default for BearingDriveOptions {
-    /// The paper's mounting, 10 lines, bearings of 0.5 degrees, K = 1e-5 m, wheels 0.4 m apart, no outliers.
-    fn default() -> Self {
-        Self {
-            kind: BearingDriveKind::Paper,
-            seed: 0,
-            mounting: Mounting::from_polar(-0.34, 0.23, 0.33),
-            landmarks: 10,
-            bearing_sigma_rad: 0.5f64.to_radians(),
-            odometry_k_m: 1e-5,
-            wheel_base_m: 0.4,
-            outliers: 0.0,
-        }
+options! {
+    /// What is drawn: by default the paper's mounting, lines and noise.
+    #[derive(Copy)]
+    pub struct BearingDriveOptions {
+        /// The trajectory.
+        kind: BearingDriveKind = BearingDriveKind::Paper;
+        /// Seed of everything random.
+        seed: u64 = 0;
+        /// Where the camera is: (x_m, y_m, yaw_rad).
+        mounting: Mounting = Mounting::from_polar(-0.34, 0.23, 0.33);
+        /// How many vertical lines there are.
+        landmarks: usize = 10 => 0.0..=1000.0, "a whole number from 0 to 1000";
+        /// Standard deviation of a bearing, radians.
+        bearing_sigma_rad: f64 = 0.5f64.to_radians() => NOT_NEGATIVE, "a finite number of zero or more";
+        /// Variance of a wheel's displacement per metre (Scaramuzza, Siegwart and Martinelli 2009, eq. 31), metres.
+        odometry_k_m: f64 = 1e-5 => NOT_NEGATIVE, "a finite number of zero or more";
+        /// Distance between the wheels, metres.
+        wheel_base_m: f64 = 0.4 => POSITIVE, "a positive number of metres";
+        /// Probability that a bearing is that of nothing: anywhere on the circle.
+        outliers: f64 = 0.0 => NOT_NEGATIVE, "a finite number of zero or more";
     }
 }
 
@@ -103,15 +81,15 @@ pub struct BearingDrive {
 impl BearingDrive {
     /// Draws a drive. Lines are 1 to 5 m from the middle of the path, and never nearer than 0.6 m to the robot.
     pub fn new(options: &BearingDriveOptions) -> Self {
-        let mut dice = Dice::new(options.seed, 0);
+        let mut rng = Rng::new(options.seed, 0);
         let wheels = Wheels::new(options.wheel_base_m);
         let (mut readings, mut poses) = (Vec::new(), Vec::new());
         let mut pose = Vector3::zeros();
         for (distance, turn) in options.kind.steps() {
             let reading = WheelMotion::from_motion(distance, turn, options.wheel_base_m);
-            let mut noisy = |metres: f64| metres + (options.odometry_k_m * metres.abs()).sqrt() * dice.normal();
+            let mut noisy = |metres: f64| metres + (options.odometry_k_m * metres.abs()).sqrt() * rng.normal();
             let driven = WheelMotion { left_m: noisy(reading.left_m), right_m: noisy(reading.right_m) };
-            let step = Leg::from_wheels(&driven, &wheels, &MotionNoise::new(0.0)).motion;
+            let step = RelativeMotion::from_wheels(&driven, &wheels, &MotionNoise::new(0.0)).motion;
             let (sin, cos) = f64::sin_cos(pose.z);
             pose += Vector3::new(cos * step.x - sin * step.y, sin * step.x + cos * step.y, step.z);
             readings.push(reading);
@@ -121,7 +99,7 @@ impl BearingDrive {
         let middle = poses.iter().fold(Vector2::zeros(), |sum, pose| sum + pose.xy()) / count;
         let mut landmarks_m = Vec::with_capacity(options.landmarks);
         while landmarks_m.len() < options.landmarks {
-            let (distance, angle) = (dice.within(1.0, 5.0), dice.within(0.0, std::f64::consts::TAU));
+            let (distance, angle) = (rng.within(1.0, 5.0), rng.within(0.0, std::f64::consts::TAU));
             let place = middle + Vector2::new(angle.cos(), angle.sin()) * distance;
             if poses.iter().all(|pose| (pose.xy() - place).norm() > 0.6) {
                 landmarks_m.push(place);
@@ -132,8 +110,8 @@ impl BearingDrive {
             let (sin, cos) = pose.z.sin_cos();
             let camera = pose.xy() + Vector2::new(cos * m.x_m - sin * m.y_m, sin * m.x_m + cos * m.y_m);
             let ray = place - camera;
-            let noise = options.bearing_sigma_rad * dice.normal();
-            let astray = dice.chance(options.outliers).then(|| dice.within(-3.1, 3.1));
+            let noise = options.bearing_sigma_rad * rng.normal();
+            let astray = rng.chance(options.outliers).then(|| rng.within(-3.1, 3.1));
             astray.unwrap_or_else(|| wrap_angle(ray.y.atan2(ray.x) - pose.z - m.yaw_rad + noise))
         };
         let bearings_rad =

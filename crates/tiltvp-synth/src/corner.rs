@@ -4,7 +4,7 @@ use nalgebra::{Matrix3, Vector3};
 
 use crate::plan::Plan;
 
-/// Least length of every edge of a corner that is worth remembering, metres.
+/// Least length of every edge of a corner that is kept, metres: shorter ones are a few pixels long from where hands hold cameras.
 const LEAST_EDGE_M: f64 = 0.15;
 
 /// What a corner looks like from where it is seen.

@@ -6,6 +6,7 @@ use nalgebra::{Matrix3, Vector3};
 use rayon::prelude::*;
 use tiltvp_core::camera::Camera;
 use tiltvp_core::geometry::Tilt;
+use tiltvp_core::options::OptionValue;
 use tiltvp_core::{Error, Result};
 
 use crate::drive_options::{DriveOptions, Mount, about_z};
@@ -38,7 +39,7 @@ impl Drive {
     pub fn new(world: Arc<World>, camera: Camera, options: DriveOptions) -> Result<Self> {
         options.validate()?;
         if options.mount.height_m >= world.height_m() {
-            return Err(Error::option("drive.mount.height_m", options.mount.height_m, "a height below the ceiling"));
+            return Err(Error::option("mount", options.mount.to_value(), "a height_m below the ceiling"));
         }
         let trajectory = Trajectory::draw(&world, &options)?;
         let daylight = (options.lighting > 0.0).then(|| world.daylight());

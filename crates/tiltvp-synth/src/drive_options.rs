@@ -1,7 +1,8 @@
 //! How a drive goes and what its camera is like, and which of that is possible.
 
 use nalgebra::Matrix3;
-use tiltvp_core::{Error, Result};
+use tiltvp_core::options::{Field, Kind, OptionValue, Options, Value, assign};
+use tiltvp_core::{Error, Result, options};
 
 use crate::encoders::Wheels;
 use crate::tone::{Exposure, RenderOptions};
@@ -25,6 +26,20 @@ impl Default for Mount {
     }
 }
 
+/// As (x_m, y_m, yaw_rad, height_m).
+impl OptionValue for Mount {
+    const KIND: Kind = Kind::Array(&[4]);
+
+    fn to_value(&self) -> Value {
+        [self.x_m, self.y_m, self.yaw_rad, self.height_m].to_value()
+    }
+
+    fn from_value(value: &Value) -> Option<Self> {
+        let [x_m, y_m, yaw_rad, height_m] = OptionValue::from_value(value)?;
+        Some(Self { x_m, y_m, yaw_rad, height_m })
+    }
+}
+
 /// Where a robot goes.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Way {
@@ -38,111 +53,113 @@ pub enum Way {
     Legs(Vec<(f64, f64)>),
 }
 
-/// How a drive goes and what its camera is like: equal options give equal drives.
-#[derive(Debug, Clone, PartialEq)]
-pub struct DriveOptions {
-    /// Where the robot goes; it wanders for 1500 frames by default.
-    pub way: Way,
-    /// Seed of way, encoders, bumps, light and noise; 0 by default.
-    pub seed: u64,
-    /// Greatest way from frame to frame, metres; 0.05 by default.
-    pub step_m: f64,
-    /// Greatest turn from frame to frame, radians; 0.08 by default.
-    pub turn_max_rad: f64,
-    /// Where the camera is.
-    pub mount: Mount,
-    /// How the camera sits in its mounting, which the mount's yaw turns; identity for a camera that looks up.
-    pub robot_from_camera: Matrix3<f64>,
-    /// Half angle of the cone around the camera's `z` axis in which it sees only itself, as under a mirror: black, radians
-    /// within `[0, 1.5]`; 0 by default.
-    pub blind_rad: f64,
-    /// Wheels and encoders.
-    pub wheels: Wheels,
-    /// Greatest lean from bumps, radians within `[0, 0.5]`; the robot leans about the camera's centre; 0 by default.
-    pub bumps_max_rad: f64,
-    /// How much lamps, daylight, their colours and the exposure change along the way, in `[0, 1]`; 0.5 by default.
-    pub lighting: f64,
-    /// Rays per pixel side where surfaces meet, within `[1, 8]`; elsewhere one ray per pixel will do; 3 by default.
-    pub samples: usize,
-    /// Standard deviation of Gaussian noise, grey levels; 2 by default.
-    pub noise_sigma: f64,
-    /// Standard deviation of a Gaussian blur, pixels; 0 by default, for none.
-    pub blur_sigma_px: f64,
-}
-
-impl Default for DriveOptions {
-    fn default() -> Self {
-        Self {
-            way: Way::Wander { frames: 1500 },
-            seed: 0,
-            step_m: 0.05,
-            turn_max_rad: 0.08,
-            mount: Mount::default(),
-            robot_from_camera: Matrix3::identity(),
-            blind_rad: 0.0,
-            wheels: Wheels::default(),
-            bumps_max_rad: 0.0,
-            lighting: 0.5,
-            samples: 3,
-            noise_sigma: 2.0,
-            blur_sigma_px: 0.0,
-        }
-    }
-}
-
-impl DriveOptions {
-    /// Checks every field's domain.
-    ///
-    /// # Errors
-    /// [`Error::InvalidOption`] or [`Error::InvalidArgument`] for the first field outside its domain.
-    pub fn validate(&self) -> Result<()> {
-        self.validate_way()?;
-        let Mount { x_m, y_m, yaw_rad, height_m } = self.mount;
-        let ranges = [
-            ("drive.step_m", self.step_m, 1e-4, 0.2, "metres in [1e-4, 0.2]"),
-            ("drive.turn_max_rad", self.turn_max_rad, 1e-3, 0.5, "radians in [1e-3, 0.5]"),
-            ("drive.mount.x_m", x_m, -1.0, 1.0, "metres in [-1, 1]"),
-            ("drive.mount.y_m", y_m, -1.0, 1.0, "metres in [-1, 1]"),
-            ("drive.mount.yaw_rad", yaw_rad, -7.0, 7.0, "radians in [-7, 7]"),
-            ("drive.mount.height_m", height_m, 0.05, 2.2, "metres in [0.05, 2.2]"),
-            ("drive.blind_rad", self.blind_rad, 0.0, 1.5, "radians in [0, 1.5]"),
-            ("drive.bumps_max_rad", self.bumps_max_rad, 0.0, 0.5, "radians in [0, 0.5]"),
-            ("drive.lighting", self.lighting, 0.0, 1.0, "a number in [0, 1]"),
-        ];
-        for (name, value, low, high, expected) in ranges {
-            if !(low..=high).contains(&value) {
-                return Err(Error::option(name, value, expected));
+/// Either `frames` or `legs`: the one that is set last.
+impl Options for Way {
+    fn fields(&self) -> Vec<Field> {
+        let (name, doc, kind, value) = match self {
+            Self::Wander { frames } => {
+                let doc = "How many frames the robot wanders, from one far place to another.";
+                ("frames", doc, Kind::Int(u64::MAX), frames.to_value())
             }
-        }
-        let rotation = &self.robot_from_camera;
-        let off = (rotation * rotation.transpose() - Matrix3::identity()).norm();
-        if !(off < 1e-6 && rotation.determinant() > 0.0) {
-            return Err(Error::argument("drive.robot_from_camera", rotation, "a rotation matrix"));
-        }
-        self.wheels.validate()?;
-        self.exposed(0.45, 0).validate()
+            Self::Legs(legs) => {
+                let doc = "Arcs along which the robot goes, one after the other: distance in metres and turn in radians of each.";
+                let rows = legs.iter().flat_map(|(distance, turn)| [*distance, *turn]).collect();
+                ("legs", doc, Kind::Array(&[0, 2]), Value::Array(vec![legs.len(), 2], rows))
+            }
+        };
+        vec![Field { name: name.into(), doc: doc.into(), kind, value, expected: kind.to_string().into() }]
     }
 
-    fn validate_way(&self) -> Result<()> {
-        match &self.way {
-            Way::Wander { frames } if !(1..=100_000).contains(frames) => {
-                Err(Error::option("drive.frames", frames, "a number in [1, 100000]"))
+    fn try_set(&mut self, name: &str, value: &Value) -> Result<bool> {
+        match (name, value) {
+            ("frames", _) => {
+                let mut frames = 0;
+                assign(&mut frames, "frames", value)?;
+                *self = Self::Wander { frames };
             }
-            Way::Legs(legs) => {
+            ("legs", Value::Array(shape, values)) if shape.last() == Some(&2) && shape.len() <= 2 => {
+                *self = Self::Legs(values.as_chunks::<2>().0.iter().map(|leg| (*leg).into()).collect());
+            }
+            ("legs", Value::Array(_, values)) if values.is_empty() => *self = Self::Legs(Vec::new()),
+            ("legs", _) => return Err(Error::option("legs", value, "an array (N, 2) of distances and turns")),
+            _ => return Ok(false),
+        }
+        Ok(true)
+    }
+
+    fn validate(&self) -> Result<()> {
+        match self {
+            Self::Wander { frames } if !(1..=100_000).contains(frames) => {
+                Err(Error::option("frames", frames, "a number in [1, 100000]"))
+            }
+            Self::Legs(legs) => {
                 let known = |(distance, turn): &(f64, f64)| (-100.0..=100.0).contains(distance) && turn.abs() <= 100.0;
                 let moves = legs.iter().any(|(distance, turn)| *distance != 0.0 || *turn != 0.0);
                 match legs.iter().find(|leg| !known(leg)) {
-                    Some(leg) => Err(Error::option("drive.legs", format!("{leg:?}"), "numbers in [-100, 100]")),
-                    None if !moves => {
-                        Err(Error::option("drive.legs", format!("{legs:?}"), "a leg that moves the robot"))
-                    }
+                    Some(leg) => Err(Error::option("legs", format!("{leg:?}"), "numbers in [-100, 100]")),
+                    None if !moves => Err(Error::option("legs", format!("{legs:?}"), "a leg that moves the robot")),
                     None => Ok(()),
                 }
             }
-            Way::Wander { .. } => Ok(()),
+            Self::Wander { .. } => Ok(()),
         }
     }
+}
 
+options! {
+    /// How a drive goes and what its camera is like: equal options give equal drives.
+    pub struct DriveOptions {
+        /// Where the robot goes.
+        [flat] way: Way = Way::Wander { frames: 1500 };
+        /// Seed of way, encoders, bumps, light and noise.
+        seed: u64 = 0;
+        /// Greatest way from frame to frame, metres.
+        step_m: f64 = 0.05 => 1e-4..=0.2, "metres in [1e-4, 0.2]";
+        /// Greatest turn from frame to frame, radians.
+        turn_max_rad: f64 = 0.08 => 1e-3..=0.5, "radians in [1e-3, 0.5]";
+        /// Where the camera is on the robot: x_m, y_m, yaw_rad and height_m.
+        mount: Mount = Mount::default();
+        /// How the camera sits in its mounting, which the mount's yaw turns; identity for a camera that looks up.
+        robot_from_camera: Matrix3<f64> = Matrix3::identity();
+        /// Half angle of the cone around the camera's `z` axis in which it sees only itself, as under a mirror: black, radians.
+        blind_rad: f64 = 0.0 => 0.0..=1.5, "radians in [0, 1.5]";
+        /// Wheels and encoders.
+        [flat] wheels: Wheels = Wheels::default();
+        /// Greatest lean from bumps, radians; the robot leans about the camera's centre.
+        bumps_max_rad: f64 = 0.0 => 0.0..=0.5, "radians in [0, 0.5]";
+        /// How much lamps, daylight, their colours and the exposure change along the way.
+        lighting: f64 = 0.5 => 0.0..=1.0, "a number in [0, 1]";
+        /// Rays per pixel side where surfaces meet; elsewhere one ray per pixel will do.
+        samples: usize = 3 => 1.0..=8.0, "rays per pixel side in [1, 8]";
+        /// Standard deviation of Gaussian noise, grey levels.
+        noise_sigma: f64 = 2.0 => 0.0..=255.0, "grey levels in [0, 255]";
+        /// Standard deviation of a Gaussian blur, pixels, 0 for none.
+        blur_sigma_px: f64 = 0.0 => 0.0..=50.0, "pixels in [0, 50]";
+    }
+    check mount_is_possible
+}
+
+fn mount_is_possible(options: &DriveOptions) -> Result<()> {
+    let Mount { x_m, y_m, yaw_rad, height_m } = options.mount;
+    for (name, value, low, high, expected) in [
+        ("x_m", x_m, -1.0, 1.0, "metres in [-1, 1]"),
+        ("y_m", y_m, -1.0, 1.0, "metres in [-1, 1]"),
+        ("yaw_rad", yaw_rad, -7.0, 7.0, "radians in [-7, 7]"),
+        ("height_m", height_m, 0.05, 2.2, "metres in [0.05, 2.2]"),
+    ] {
+        if !(low..=high).contains(&value) {
+            return Err(Error::option("mount", options.mount.to_value(), format!("a {name} of {expected}")));
+        }
+    }
+    let rotation = &options.robot_from_camera;
+    let off = (rotation * rotation.transpose() - Matrix3::identity()).norm();
+    if !(off < 1e-6 && rotation.determinant() > 0.0) {
+        return Err(Error::argument("robot_from_camera", rotation, "a rotation matrix"));
+    }
+    Ok(())
+}
+
+impl DriveOptions {
     /// Rotation from camera to robot coordinates, with the mount's yaw.
     pub fn robot_from_mounted_camera(&self) -> Matrix3<f64> {
         about_z(self.mount.yaw_rad) * self.robot_from_camera

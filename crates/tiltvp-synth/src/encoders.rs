@@ -1,47 +1,24 @@
 //! Wheel encoders of a differential drive, and the poses that their readings add up to.
 
-use tiltvp_core::{Error, Result};
+use tiltvp_core::options;
 
-use crate::dice::Dice;
+use crate::rng::Rng;
 use crate::view::RobotPose;
 
-/// The wheels and what their encoders get wrong.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Wheels {
-    /// Distance between the wheels' contact points, metres; 0.35 by default.
-    pub base_m: f64,
-    /// Variance of a reading per metre that a wheel rolls, metres (Chong and Kleeman 1997); 1e-5 by default.
-    pub encoder_k_m: f64,
-    /// How much larger the left and the right wheel are than the odometry takes them for, relative; 0 by default.
-    pub radius_errors: [f64; 2],
-}
-
-impl Default for Wheels {
-    fn default() -> Self {
-        Self { base_m: 0.35, encoder_k_m: 1e-5, radius_errors: [0.0; 2] }
+options! {
+    /// The wheels and what their encoders get wrong.
+    #[derive(Copy)]
+    pub struct Wheels {
+        /// Distance between the wheels' contact points, metres.
+        [as "wheel_base_m"] base_m: f64 = 0.35 => 0.02..=5.0, "metres in [0.02, 5]";
+        /// Variance of a reading per metre that a wheel rolls, metres (Chong and Kleeman 1997).
+        encoder_k_m: f64 = 1e-5 => 0.0..=0.1, "metres in [0, 0.1]";
+        /// How much larger the left and the right wheel are than the odometry takes them for, relative.
+        [as "wheel_radius_errors"] radius_errors: [f64; 2] = [0.0; 2] => -0.5..=0.5, "a share in [-0.5, 0.5]";
     }
 }
 
 impl Wheels {
-    /// Checks every field's domain.
-    ///
-    /// # Errors
-    /// [`Error::InvalidOption`] for the first field outside its domain.
-    pub fn validate(&self) -> Result<()> {
-        if !(0.02..=5.0).contains(&self.base_m) {
-            return Err(Error::option("drive.wheels.base_m", self.base_m, "metres in [0.02, 5]"));
-        }
-        if !(0.0..=0.1).contains(&self.encoder_k_m) {
-            return Err(Error::option("drive.wheels.encoder_k_m", self.encoder_k_m, "metres in [0, 0.1]"));
-        }
-        for error in self.radius_errors {
-            if !(-0.5..=0.5).contains(&error) {
-                return Err(Error::option("drive.wheels.radius_errors", error, "a share in [-0.5, 0.5]"));
-            }
-        }
-        Ok(())
-    }
-
     /// How far the left and the right wheel roll, metres, when the middle between them moves `distance_m` along an arc that
     /// turns by `turn_rad`.
     pub fn displacements(&self, distance_m: f64, turn_rad: f64) -> [f64; 2] {
@@ -64,10 +41,10 @@ impl Wheels {
     }
 
     /// What the encoders say when the wheels rolled so far: by the nominal radii, with noise of variance `K |d|`.
-    pub(crate) fn read(&self, displacements_m: [f64; 2], dice: &mut Dice) -> [f64; 2] {
+    pub(crate) fn read(&self, displacements_m: [f64; 2], rng: &mut Rng) -> [f64; 2] {
         [0, 1].map(|wheel| {
             let nominal = displacements_m[wheel] / (1.0 + self.radius_errors[wheel]);
-            nominal + (self.encoder_k_m * nominal.abs()).sqrt() * dice.normal()
+            nominal + (self.encoder_k_m * nominal.abs()).sqrt() * rng.normal()
         })
     }
 }

@@ -3,18 +3,20 @@
 use nalgebra::{Isometry3, Matrix3, Rotation3, Translation3, UnitQuaternion, Vector3};
 
 use crate::corner::{Corner, CornerKind};
-use crate::dice::Dice;
+use crate::rng::Rng;
 use crate::stereo_options::StereoOptions;
 
-/// How far from the planes of the corner's faces the cameras stay, radians.
+/// How far from the planes of the corner's faces the cameras stay, radians: at 10 degrees a face is still seen.
 const MARGIN_RAD: f64 = 0.17;
-/// Least and greatest slope of the line of sight, radians.
+/// Least and greatest slope of the line of sight, radians: 12 to 52 degrees, at which the top face and the upright edge are both
+/// seen.
 const SLOPE_RAD: [f64; 2] = [0.21, 0.90];
-/// Least and greatest height of the cameras, metres.
+/// Least and greatest height of the cameras, metres: hands neither on the floor nor overhead.
 const HEIGHT_M: [f64; 2] = [0.4, 2.0];
-/// How far off the corner the optical axis points, to the side and up or down, radians.
+/// How far off the corner the optical axis points, to the side and up or down, radians: the corner wanders
+/// over a fifth of a field of view of 1 radian.
 const AIM_RAD: [f64; 2] = [0.10, 0.06];
-/// Tremor of hands: metres, radians and hertz.
+/// Tremor of hands: metres, radians and hertz, within the 4 to 12 Hz of physiological tremor.
 const TREMOR: (f64, f64, f64) = (1e-4, 5e-4, 6.0);
 
 /// A motion in time.
@@ -35,13 +37,13 @@ pub struct Handheld {
 
 impl Handheld {
     /// Draws a motion around a corner; `reach` in `[0, 1]` is how much of the range of distances it uses, from near on.
-    pub(crate) fn draw(corner: &Corner, options: &StereoOptions, reach: f64, dice: &mut Dice) -> Self {
+    pub(crate) fn draw(corner: &Corner, options: &StereoOptions, reach: f64, rng: &mut Rng) -> Self {
         let [near, far] = options.distance_m;
         // The faces of a corner of which the level edges enclose gamma are all seen from within a sector of gamma.
         let azimuth_rad = (0.5 * corner.gamma_rad() - MARGIN_RAD).clamp(0.02, 0.65);
-        let mut slow = || Wave::draw(1.0 / options.period_s, dice);
+        let mut slow = || Wave::draw(1.0 / options.period_s, rng);
         let (distance, azimuth, slope, roll) = (slow(), slow(), slow(), slow());
-        let mut quicker = || Wave::draw(2.0 / options.period_s, dice);
+        let mut quicker = || Wave::draw(2.0 / options.period_s, rng);
         let aim = [quicker(), quicker()];
         Self {
             corner: *corner,
@@ -54,7 +56,7 @@ impl Handheld {
             slope,
             aim,
             roll,
-            tremor: std::array::from_fn(|_| Wave::pure(TREMOR.2, dice)),
+            tremor: std::array::from_fn(|_| Wave::pure(TREMOR.2, rng)),
         }
     }
 
@@ -116,19 +118,19 @@ struct Wave {
 
 impl Wave {
     /// A wave with overtones.
-    fn draw(frequency_hz: f64, dice: &mut Dice) -> Self {
-        Self::mixed(frequency_hz, [(1.0, 0.55), (1.83, 0.27), (3.1, 0.13), (5.3, 0.05)], dice)
+    fn draw(frequency_hz: f64, rng: &mut Rng) -> Self {
+        Self::mixed(frequency_hz, [(1.0, 0.55), (1.83, 0.27), (3.1, 0.13), (5.3, 0.05)], rng)
     }
 
     /// A wave of about one frequency.
-    fn pure(frequency_hz: f64, dice: &mut Dice) -> Self {
-        Self::mixed(frequency_hz, [(1.0, 0.4), (1.1, 0.3), (0.9, 0.2), (1.3, 0.1)], dice)
+    fn pure(frequency_hz: f64, rng: &mut Rng) -> Self {
+        Self::mixed(frequency_hz, [(1.0, 0.4), (1.1, 0.3), (0.9, 0.2), (1.3, 0.1)], rng)
     }
 
-    fn mixed(frequency_hz: f64, shares: [(f64, f64); 4], dice: &mut Dice) -> Self {
+    fn mixed(frequency_hz: f64, shares: [(f64, f64); 4], rng: &mut Rng) -> Self {
         let term = |(ratio, share): (f64, f64)| {
-            let turns = std::f64::consts::TAU * frequency_hz * ratio * dice.within(0.8, 1.25);
-            [turns, dice.within(0.0, std::f64::consts::TAU), share]
+            let turns = std::f64::consts::TAU * frequency_hz * ratio * rng.within(0.8, 1.25);
+            [turns, rng.within(0.0, std::f64::consts::TAU), share]
         };
         Self { terms: shares.map(term) }
     }

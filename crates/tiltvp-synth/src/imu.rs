@@ -4,13 +4,14 @@
 use nalgebra::{Matrix3, Vector3};
 use tiltvp_core::{Error, Result};
 
-use crate::dice::Dice;
 use crate::handheld::Handheld;
+use crate::rng::Rng;
 
-/// Acceleration of free fall, metres per square second.
+/// Standard acceleration of free fall, metres per square second.
 pub const GRAVITY_M_S2: f64 = 9.806_65;
 
-/// Step of the central differences that make rates and accelerations of poses, seconds.
+/// Step of the central differences that make rates and accelerations of poses, seconds: a
+/// hundredth of a period of the tremor or less.
 const STEP_S: f64 = 1e-3;
 
 /// One kind of sensor, alike in its three axes. The unit is rad/s or m/s^2.
@@ -132,17 +133,17 @@ fn truth(motion: &Handheld, time_s: f64) -> (Vector3<f64>, Vector3<f64>) {
 struct Sensor {
     channel: ImuChannel,
     rate_hz: f64,
-    dice: Dice,
+    rng: Rng,
     gain: Matrix3<f64>,
     bias: Vector3<f64>,
 }
 
 impl Sensor {
     fn new(channel: ImuChannel, rate_hz: f64, seed: u64, stream: u64) -> Self {
-        let mut dice = Dice::new(seed, stream);
-        let gain = Matrix3::identity() + Matrix3::from_fn(|_, _| channel.scale_sigma * dice.normal());
-        let bias = Vector3::from_fn(|_, _| channel.bias_sigma * dice.normal());
-        Self { channel, rate_hz, dice, gain, bias }
+        let mut rng = Rng::new(seed, stream);
+        let gain = Matrix3::identity() + Matrix3::from_fn(|_, _| channel.scale_sigma * rng.normal());
+        let bias = Vector3::from_fn(|_, _| channel.bias_sigma * rng.normal());
+        Self { channel, rate_hz, rng, gain, bias }
     }
 
     fn read(&mut self, truth: &Vector3<f64>) -> Vector3<f64> {
@@ -151,7 +152,7 @@ impl Sensor {
         let sigma = self.channel.noise_density * (0.5 * self.rate_hz).sqrt();
         let walk = self.channel.bias_walk / self.rate_hz.sqrt();
         let (noise, wander) =
-            (Vector3::from_fn(|_, _| sigma * self.dice.normal()), Vector3::from_fn(|_, _| walk * self.dice.normal()));
+            (Vector3::from_fn(|_, _| sigma * self.rng.normal()), Vector3::from_fn(|_, _| walk * self.rng.normal()));
         let reading = self.gain * truth + self.bias + noise;
         self.bias += wander;
         reading.map(|value| (value.clamp(-range, range - step) / step).round() * step)

@@ -1,93 +1,57 @@
 //! A plain laboratory with a coloured cuboid on its floor and a lamp beside it.
 
+use std::f64::consts::FRAC_PI_2;
+
 use nalgebra::{Vector2, Vector3};
-use tiltvp_core::{Error, Result};
+use tiltvp_core::options;
 
 use crate::builder::{Builder, Column, Footprint, Material, Patch};
 use crate::corner::{Corner, CornerKind, of_box};
-use crate::dice::Dice;
 use crate::frame::Frame;
 use crate::options::{RoomKind, WallPattern};
 use crate::outdoors::Outdoors;
 use crate::plan::{Filling, Opening, Plan, Wall};
+use crate::rng::Rng;
 use crate::{furniture, shell};
 
-/// Width, depth and height of the room, metres.
+/// Width, depth and height of the room, metres: walls stay in the background at every distance that can be asked for.
 const ROOM_M: [f64; 3] = [9.0, 8.0, 2.9];
 
 /// How far behind the middle of the room the cuboid is, seen from where it is looked at, metres.
 const BEHIND_M: f64 = 0.8;
 
-/// Radiance of the lamp beside the cuboid at full power.
+/// Radiance of the lamp beside the cuboid at full power: a choice of look, one side bright and the other dark.
 const LAMP: f64 = 60.0;
 
-/// How a laboratory is drawn: equal options give equal worlds.
-#[derive(Debug, Clone, PartialEq)]
-pub struct LaboratoryOptions {
-    /// Seed of furniture, of the cuboid's turn and of its place; 0 by default.
-    pub seed: u64,
-    /// Lengths of the cuboid's edges `x` (at the foot of the blue face's upper edge), `y` (its height) and `z`, metres within
-    /// `[0.1, 1]`; 0.40, 0.36, 0.34 by default.
-    pub size_m: [f64; 3],
-    /// The angle between the level edges `x` and `z`, radians within `[0.5, 2.6]`; a right angle by default.
-    pub gamma_rad: f64,
-    /// How full the walls are with furniture, in `[0, 1]`; 0.3 by default.
-    pub clutter: f64,
-    /// Power of the lamp beside the cuboid, in `[0, 1]`; 1 by default.
-    pub side_light: f64,
-    /// Spacing of the points where light is gathered, metres within `[0.02, 1]`; 0.15 by default.
-    pub light_spacing_m: f64,
-}
-
-impl Default for LaboratoryOptions {
-    fn default() -> Self {
-        Self {
-            seed: 0,
-            size_m: [0.40, 0.36, 0.34],
-            gamma_rad: std::f64::consts::FRAC_PI_2,
-            clutter: 0.3,
-            side_light: 1.0,
-            light_spacing_m: 0.15,
-        }
-    }
-}
-
-impl LaboratoryOptions {
-    /// Checks every field's domain.
-    ///
-    /// # Errors
-    /// [`Error::InvalidOption`] for the first field outside its domain.
-    pub fn validate(&self) -> Result<()> {
-        let [x, y, z] = self.size_m;
-        let ranges = [
-            ("laboratory.size_m", x, 0.1, 1.0, "edges x, y, z of metres in [0.1, 1]"),
-            ("laboratory.size_m", y, 0.1, 1.0, "edges x, y, z of metres in [0.1, 1]"),
-            ("laboratory.size_m", z, 0.1, 1.0, "edges x, y, z of metres in [0.1, 1]"),
-            ("laboratory.gamma_rad", self.gamma_rad, 0.5, 2.6, "radians in [0.5, 2.6]"),
-            ("laboratory.clutter", self.clutter, 0.0, 1.0, "a number in [0, 1]"),
-            ("laboratory.side_light", self.side_light, 0.0, 1.0, "a number in [0, 1]"),
-            ("laboratory.light_spacing_m", self.light_spacing_m, 0.02, 1.0, "metres in [0.02, 1]"),
-        ];
-        for (name, value, low, high, expected) in ranges {
-            if !(low..=high).contains(&value) {
-                return Err(Error::option(name, value, expected));
-            }
-        }
-        Ok(())
+options! {
+    /// How a laboratory is drawn: equal options give equal worlds.
+    pub struct LaboratoryOptions {
+        /// Seed of furniture, of the cuboid's turn and of its place.
+        seed: u64 = 0;
+        /// Lengths of the cuboid's edges `x` (at the foot of the blue face's upper edge), `y` (its height) and `z`, metres.
+        size_m: [f64; 3] = [0.40, 0.36, 0.34] => 0.1..=1.0, "edges x, y, z of metres in [0.1, 1]";
+        /// The angle between the level edges `x` and `z`, radians.
+        gamma_rad: f64 = FRAC_PI_2 => 0.5..=2.6, "radians in [0.5, 2.6]";
+        /// How full the walls are with furniture.
+        clutter: f64 = 0.3 => 0.0..=1.0, "a number in [0, 1]";
+        /// Power of the lamp beside the cuboid.
+        side_light: f64 = 1.0 => 0.0..=1.0, "a number in [0, 1]";
+        /// Spacing of the points where light is gathered, metres.
+        light_spacing_m: f64 = 0.15 => 0.02..=1.0, "metres in [0.02, 1]";
     }
 }
 
 /// Builds the room; returns its plan. The first of the builder's corners is the cuboid's coloured one.
 pub(crate) fn build(options: &LaboratoryOptions, builder: &mut Builder) -> Plan {
-    let mut dice = Dice::new(options.seed, 1 << 33);
-    let plan = plan(dice.seed());
+    let mut rng = Rng::new(options.seed, 1 << 33);
+    let plan = plan(rng.seed());
     shell::build_plain(&plan, builder);
-    let towards = dice.within(-std::f64::consts::PI, std::f64::consts::PI);
+    let towards = rng.within(-std::f64::consts::PI, std::f64::consts::PI);
     let middle = Vector2::new(0.5 * ROOM_M[0], 0.5 * ROOM_M[1]);
     let place = middle - Vector2::new(towards.cos(), towards.sin()) * BEHIND_M;
     let corner = cuboid(options, place, towards, builder);
     lamp(options, &corner, towards, builder);
-    furniture::furnish_walls(&plan, options.clutter, builder, &mut dice);
+    furniture::furnish_walls(&plan, options.clutter, builder, &mut rng);
     // The cuboid's corner is the one that is looked at.
     builder.corners.insert(0, corner);
     plan

@@ -7,10 +7,11 @@
 //! Lengths are metres, angles radians. The world frame has `z` up with the floor at `z = 0`; the robot frame has `x` forward,
 //! `y` left, `z` up; the camera frame has `z` along the optical axis, `x` to the right (columns), `y` down (rows).
 
+#![forbid(unsafe_code)]
+
 mod bearing_drive;
 mod builder;
 mod corner;
-mod dice;
 mod drive;
 mod drive_options;
 mod encoders;
@@ -22,10 +23,12 @@ mod laboratory;
 mod light;
 mod lights;
 mod noise;
+mod openings;
 mod options;
 mod outdoors;
 mod plan;
 mod render;
+mod rng;
 mod route;
 mod scene;
 mod segment;

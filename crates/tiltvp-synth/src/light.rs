@@ -9,15 +9,16 @@ use crate::outdoors::Outdoors;
 use crate::scene::{Contact, Scene};
 use crate::texture::{Color, Texture, add, luminance, scale};
 
-/// How far points are lifted off their surface before rays start there, in metres.
+/// How far points are lifted off their surface before rays start there, in metres: below what a texture shows, far above
+/// rounding.
 const LIFT_M: f64 = 2e-3;
-/// Directions of the hemisphere in which bounced light is gathered, per bounce.
+/// Directions of the hemisphere in which bounced light is gathered, per bounce: the cost of a room goes with this number.
 const GATHER: usize = 18;
-/// Bounces that are followed.
+/// Bounces that are followed: the light of lamps reaches the shadows by the first, the second fills corners.
 const BOUNCES: usize = 2;
-/// Sunlit spots that a point gathers light from.
+/// Sunlit spots that a point gathers light from, the same for all points of a room.
 const SUN_SPOTS: usize = 10;
-/// Points of a lamp or window, per side, from which light is gathered.
+/// Points of a lamp or window, per side, from which light is gathered: nine make a soft shadow.
 const LAMP_SIDE: usize = 3;
 
 /// A lamp or window: a patch that shines.

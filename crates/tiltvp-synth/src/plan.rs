@@ -2,10 +2,10 @@
 
 use nalgebra::{Vector2, Vector3};
 
-use crate::dice::Dice;
 use crate::frame::Frame;
 use crate::options::{RoomKind, RoomOptions, WallPattern};
 use crate::outdoors::Outdoors;
+use crate::rng::Rng;
 
 /// What fills a hole in a wall.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -57,22 +57,22 @@ pub(crate) struct Plan {
 
 impl Plan {
     /// Draws a plan.
-    pub(crate) fn draw(options: &RoomOptions, dice: &mut Dice) -> Self {
+    pub(crate) fn draw(options: &RoomOptions, rng: &mut Rng) -> Self {
         let kind = options.kind;
         let (width, depth) = match kind {
-            RoomKind::Office => (dice.within(5.0, 7.5), dice.within(4.0, 6.0)),
-            RoomKind::LivingRoom => (dice.within(4.5, 6.5), dice.within(3.8, 5.2)),
-            RoomKind::Corridor => (dice.within(8.0, 14.0), dice.within(1.7, 2.4)),
-            RoomKind::LShaped => (dice.within(6.0, 8.0), dice.within(5.0, 6.5)),
-            RoomKind::Narrow => (dice.within(3.5, 6.0), dice.within(1.9, 2.3)),
-            RoomKind::UnderTable => (dice.within(4.2, 5.5), dice.within(3.7, 4.6)),
+            RoomKind::Office => (rng.within(5.0, 7.5), rng.within(4.0, 6.0)),
+            RoomKind::LivingRoom => (rng.within(4.5, 6.5), rng.within(3.8, 5.2)),
+            RoomKind::Corridor => (rng.within(8.0, 14.0), rng.within(1.7, 2.4)),
+            RoomKind::LShaped => (rng.within(6.0, 8.0), rng.within(5.0, 6.5)),
+            RoomKind::Narrow => (rng.within(3.5, 6.0), rng.within(1.9, 2.3)),
+            RoomKind::UnderTable => (rng.within(4.2, 5.5), rng.within(3.7, 4.6)),
         };
         let (width, depth) =
             (width * options.extent, depth * if kind == RoomKind::Corridor { 1.0 } else { options.extent });
-        let height = dice.within(2.45, if kind == RoomKind::Narrow { 2.7 } else { 3.0 });
+        let height = rng.within(2.45, if kind == RoomKind::Narrow { 2.7 } else { 3.0 });
         let corner = Vector2::new;
         let (outline, floors) = if kind == RoomKind::LShaped {
-            let (a, b) = (width * dice.within(0.4, 0.6), depth * dice.within(0.4, 0.55));
+            let (a, b) = (width * rng.within(0.4, 0.6), depth * rng.within(0.4, 0.55));
             (
                 vec![
                     corner(0.0, 0.0),
@@ -98,9 +98,9 @@ impl Plan {
                 Wall { frame, length, openings: Vec::new() }
             })
             .collect();
-        pierce(kind, height, &mut walls, dice);
-        let outdoors = day(options, &walls, dice);
-        let lamps = if options.daylight < 0.3 || dice.chance(0.6) { dice.within(9.0, 16.0) } else { 1.5 };
+        pierce(kind, height, &mut walls, rng);
+        let outdoors = day(options, &walls, rng);
+        let lamps = if options.daylight < 0.3 || rng.chance(0.6) { rng.within(9.0, 16.0) } else { 1.5 };
         let (floor_gloss, wall_pattern) = (options.floor_gloss, options.wall_pattern);
         Self { kind, outline, floors, height, walls, outdoors, lamps, floor_gloss, wall_pattern }
     }
@@ -130,7 +130,7 @@ impl Plan {
 }
 
 /// How many doors and windows each wall gets, by kind of room.
-fn counts(kind: RoomKind, walls: &[Wall], dice: &mut Dice) -> Vec<[usize; 2]> {
+fn counts(kind: RoomKind, walls: &[Wall], rng: &mut Rng) -> Vec<[usize; 2]> {
     let along = |k: usize, width: f64| ((walls[k].length / width) as usize).max(1);
     match kind {
         RoomKind::Corridor => {
@@ -138,32 +138,32 @@ fn counts(kind: RoomKind, walls: &[Wall], dice: &mut Dice) -> Vec<[usize; 2]> {
         }
         RoomKind::Narrow => vec![[0, 0], [0, 1], [0, 0], [1, 0]],
         RoomKind::LShaped => vec![[0, along(0, 2.8)], [0, 1], [1, 0], [0, 0], [0, 1], [1, 0]],
-        RoomKind::Office => vec![[0, along(0, 2.2)], [1, 0], [0, 0], [0, dice.below(2)]],
+        RoomKind::Office => vec![[0, along(0, 2.2)], [1, 0], [0, 0], [0, rng.below(2)]],
         RoomKind::LivingRoom | RoomKind::UnderTable => {
-            vec![[0, along(0, 2.6)], [0, 1], [1, 0], [dice.below(2), 0]]
+            vec![[0, along(0, 2.6)], [0, 1], [1, 0], [rng.below(2), 0]]
         }
     }
 }
 
-fn pierce(kind: RoomKind, height: f64, walls: &mut [Wall], dice: &mut Dice) {
-    let counts = counts(kind, walls, dice);
-    let sill = if kind == RoomKind::LivingRoom && dice.chance(0.4) { 0.25 } else { dice.within(0.8, 1.0) };
-    let head = (height - dice.within(0.2, 0.4)).min(2.35);
-    let wish = dice.within(1.1, 1.9);
+fn pierce(kind: RoomKind, height: f64, walls: &mut [Wall], rng: &mut Rng) {
+    let counts = counts(kind, walls, rng);
+    let sill = if kind == RoomKind::LivingRoom && rng.chance(0.4) { 0.25 } else { rng.within(0.8, 1.0) };
+    let head = (height - rng.within(0.2, 0.4)).min(2.35);
+    let wish = rng.within(1.1, 1.9);
     for (wall, [doors, windows]) in walls.iter_mut().zip(counts) {
         let total = doors + windows;
         for k in 0..total {
             let filling = if k < doors { Filling::Door } else { Filling::Window };
             let slot = wall.length / total as f64;
             let (width, z) = match filling {
-                Filling::Door => (dice.pick([0.8, 0.86, 0.94]), [0.0, dice.pick([2.0, 2.03, 2.1])]),
+                Filling::Door => (rng.pick([0.8, 0.86, 0.94]), [0.0, rng.pick([2.0, 2.03, 2.1])]),
                 Filling::Window => (wish, [sill, head]),
             };
             let width = width.min(slot - 0.4);
             if width > 0.5 {
                 let middle = (k as f64 + 0.5) * slot;
                 let play = 0.5 * (slot - width) - 0.2;
-                let start = middle - 0.5 * width + play * dice.within(-0.7, 0.7);
+                let start = middle - 0.5 * width + play * rng.within(-0.7, 0.7);
                 wall.openings.push(Opening { filling, along: [start, start + width], z });
             }
         }
@@ -171,12 +171,12 @@ fn pierce(kind: RoomKind, height: f64, walls: &mut [Wall], dice: &mut Dice) {
 }
 
 /// The day outside: if the sun shines, it shines through one of the windows.
-fn day(options: &RoomOptions, walls: &[Wall], dice: &mut Dice) -> Outdoors {
+fn day(options: &RoomOptions, walls: &[Wall], rng: &mut Rng) -> Outdoors {
     let windowed: Vec<&Wall> =
         walls.iter().filter(|wall| wall.openings.iter().any(|o| o.filling == Filling::Window)).collect();
-    let pick = dice.below(windowed.len());
-    let (elevation, aside) = (dice.within(0.35, 0.85), dice.within(-0.8, 0.8));
-    let sunny = dice.chance(0.5);
+    let pick = rng.below(windowed.len());
+    let (elevation, aside) = (rng.within(0.35, 0.85), rng.within(-0.8, 0.8));
+    let sunny = rng.chance(0.5);
     let outward = windowed.get(pick).map_or_else(Vector2::x, |wall| Vector2::new(wall.frame.x.y, -wall.frame.x.x));
     let azimuth = outward.y.atan2(outward.x) + aside;
     let (s, c) = elevation.sin_cos();
@@ -184,6 +184,6 @@ fn day(options: &RoomOptions, walls: &[Wall], dice: &mut Dice) -> Outdoors {
         brightness: 6.0 * options.daylight,
         towards_sun: Vector3::new(c * azimuth.cos(), c * azimuth.sin(), s),
         sun: if sunny && options.daylight > 0.2 { 5.0 * options.daylight } else { 0.0 },
-        seed: dice.seed(),
+        seed: rng.seed(),
     }
 }

@@ -5,16 +5,17 @@ use std::collections::BinaryHeap;
 
 use nalgebra::{Vector2, Vector3};
 
-use crate::dice::Dice;
 use crate::encoders::wrapped;
 use crate::options::RoomKind;
+use crate::rng::Rng;
 use crate::world::World;
 
-/// Size of a cell, metres.
+/// Size of a cell, metres: a third of the robot's radius.
 const CELL_M: f64 = 0.08;
 
-/// Radius of the robot, metres.
-const RADIUS_M: f64 = 0.22;
+/// Radius of the free circle that a robot needs to stand, metres: a cleaning robot of 0.35 m across with room to turn
+/// (`ways_are_free_smooth_and_lead_far` holds the ways to it).
+pub(crate) const ROBOT_RADIUS_M: f64 = 0.22;
 
 /// The places where a robot can drive, as cells of a grid.
 pub(crate) struct Grid {
@@ -39,7 +40,7 @@ impl Grid {
         for k in 0..nx * ny {
             let at = grid.center(k);
             grid.clearance[k] = world.clearance(at.x, at.y);
-            let is_wide = grid.clearance[k] > RADIUS_M.max(reach + 0.05) + CELL_M;
+            let is_wide = grid.clearance[k] > ROBOT_RADIUS_M.max(reach + 0.05) + CELL_M;
             grid.open[k] = is_wide && is_clear_above(world, &at, reach + 0.08, height);
         }
         grid.keep_largest_part();
@@ -95,10 +96,10 @@ impl Grid {
         from: &Vector2<f64>,
         cells: &[usize],
         smooth: bool,
-        dice: &mut Dice,
+        rng: &mut Rng,
     ) -> Vec<Vector2<f64>> {
         let target = (0..12)
-            .map(|_| cells[dice.below(cells.len())])
+            .map(|_| cells[rng.below(cells.len())])
             .max_by(|a, b| (self.center(*a) - from).norm().total_cmp(&(self.center(*b) - from).norm()));
         let away = |k: usize| (self.center(k) - from).norm();
         let start = cells.iter().copied().min_by(|a, b| away(*a).total_cmp(&away(*b)));
@@ -126,7 +127,7 @@ impl Grid {
                 continue;
             }
             for (next, length) in self.neighbours(k) {
-                let dear = 1.0 + 0.25 / (self.clearance[next] - RADIUS_M + 0.05).max(0.05);
+                let dear = 1.0 + 0.25 / (self.clearance[next] - ROBOT_RADIUS_M + 0.05).max(0.05);
                 let sum = cost[k] + length * dear;
                 if sum < cost[next] {
                     cost[next] = sum;

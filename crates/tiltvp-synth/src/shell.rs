@@ -1,39 +1,40 @@
-//! The shell of a room: floor, ceiling with its lights, walls, skirting, doors, windows and radiators.
+//! The shell of a room: floor, ceiling with its lights, walls with their openings, skirting.
 
 use nalgebra::Vector3;
 
 use crate::builder::{Builder, Column, Material, MaterialId, Patch};
-use crate::dice::Dice;
 use crate::frame::Frame;
+use crate::openings::{Trims, curtain, door, door_leaf, window};
 use crate::options::{RoomKind, WallPattern};
-use crate::plan::{Filling, Opening, Plan, Wall};
+use crate::plan::{Filling, Plan, Wall};
+use crate::rng::Rng;
 use crate::segment::Segment;
 use crate::texture::{Motif, Texture, rgb, scale};
 
 /// Builds the shell of a plan.
-pub(crate) fn build(plan: &Plan, builder: &mut Builder, dice: &mut Dice) {
-    floor(plan, builder, dice);
-    ceiling(plan, builder, dice);
-    let tone = dice.within(0.85, 1.0);
-    let plain = wall_texture(plan.kind, false, tone, dice);
-    let accent = wall_texture(plan.kind, true, tone, dice);
+pub(crate) fn build(plan: &Plan, builder: &mut Builder, rng: &mut Rng) {
+    floor(plan, builder, rng);
+    ceiling(plan, builder, rng);
+    let tone = rng.within(0.85, 1.0);
+    let plain = wall_texture(plan.kind, false, tone, rng);
+    let accent = wall_texture(plan.kind, true, tone, rng);
     let (plain, accent) = repeated_texture(plan.wall_pattern).map_or((plain, accent), |same| (same, same));
     let textures = [plain, accent];
     let (plain, accent) = (builder.matt(plain), builder.matt(accent));
-    let chosen = dice.below(plan.walls.len());
+    let chosen = rng.below(plan.walls.len());
     let trims = Trims {
-        trim: match dice.below(3) {
+        trim: match rng.below(3) {
             0 => builder.paint(110, 72, 46),
             1 => builder.paint(150, 150, 154),
             _ => builder.paint(238, 236, 230),
         },
-        door: door_leaf(builder, dice),
+        door: door_leaf(builder, rng),
         metal: builder.paint(70, 72, 76),
         radiator: builder.paint(228, 226, 220),
         glass: builder.material(Material::Glass),
-        curtain: (plan.kind == RoomKind::LivingRoom || (plan.kind == RoomKind::UnderTable && dice.chance(0.6)))
-            .then(|| curtain(builder, dice)),
-        bars: [1 + dice.below(3), dice.below(3)],
+        curtain: (plan.kind == RoomKind::LivingRoom || (plan.kind == RoomKind::UnderTable && rng.chance(0.6)))
+            .then(|| curtain(builder, rng)),
+        bars: [1 + rng.below(3), rng.below(3)],
     };
     for (k, wall) in plan.walls.iter().enumerate() {
         let own = if k == chosen { accent } else { plain };
@@ -56,7 +57,7 @@ pub(crate) fn build(plan: &Plan, builder: &mut Builder, dice: &mut Dice) {
 /// Builds a shell without colours: grey floor, white walls, grey doors, tiled ceiling.
 pub(crate) fn build_plain(plan: &Plan, builder: &mut Builder) {
     lay(Texture::Paint { color: rgb(128, 128, 126), mottle: 0.12, seed: 1 }, plan, builder);
-    ceiling(plan, builder, &mut Dice::new(0, 0));
+    ceiling(plan, builder, &mut Rng::new(0, 0));
     let wall = builder.matt(Texture::Paint { color: rgb(216, 216, 212), mottle: 0.05, seed: 2 });
     let trims = Trims {
         trim: builder.paint(150, 150, 154),
@@ -122,57 +123,24 @@ fn battens(wall: &Wall, height: f64, material: MaterialId, builder: &mut Builder
     }
 }
 
-/// The materials of everything fixed to the walls.
-struct Trims {
-    trim: MaterialId,
-    door: MaterialId,
-    metal: MaterialId,
-    radiator: MaterialId,
-    glass: MaterialId,
-    curtain: Option<MaterialId>,
-    /// Upright and level bars per window.
-    bars: [usize; 2],
-}
-
-fn door_leaf(builder: &mut Builder, dice: &mut Dice) -> MaterialId {
-    if dice.chance(0.6) {
-        let seed = dice.seed();
-        let (light, dark) = dice.pick([
-            (rgb(190, 140, 90), rgb(130, 86, 50)),
-            (rgb(120, 78, 50), rgb(70, 42, 26)),
-            (rgb(214, 180, 136), rgb(172, 130, 88)),
-        ]);
-        builder.matt(Texture::Wood { light, dark, along_v: true, seed })
-    } else {
-        let (r, g, b) = dice.pick([(70, 96, 120), (226, 224, 216), (140, 60, 52), (92, 110, 92)]);
-        builder.paint(r, g, b)
-    }
-}
-
-fn curtain(builder: &mut Builder, dice: &mut Dice) -> MaterialId {
-    let color = dice.pick([rgb(170, 60, 50), rgb(205, 190, 160), rgb(70, 90, 120), rgb(110, 120, 80)]);
-    let seed = dice.seed();
-    builder.matt(Texture::Cloth { color, fold: 0.25, seed })
-}
-
-fn floor(plan: &Plan, builder: &mut Builder, dice: &mut Dice) {
-    let seed = dice.seed();
+fn floor(plan: &Plan, builder: &mut Builder, rng: &mut Rng) {
+    let seed = rng.seed();
     let planks = |light, dark| Texture::Planks { light, dark, width: 0.14, length: 1.3, seed };
     let carpet = |color, speckle| Texture::Carpet { color, speckle, seed };
     let tiles =
         |color, joint, size| Texture::Tiles { color, joint, size: [size, size], gap: 0.008, variation: 0.12, seed };
     let texture = match plan.kind {
-        RoomKind::Office => dice.pick([
+        RoomKind::Office => rng.pick([
             carpet(rgb(84, 92, 104), rgb(40, 46, 56)),
             carpet(rgb(120, 108, 96), rgb(66, 58, 52)),
             planks(rgb(190, 160, 124), rgb(150, 116, 80)),
         ]),
-        RoomKind::Corridor | RoomKind::Narrow => dice.pick([
+        RoomKind::Corridor | RoomKind::Narrow => rng.pick([
             tiles(rgb(176, 170, 160), rgb(110, 106, 100), 0.4),
             tiles(rgb(140, 84, 64), rgb(180, 170, 160), 0.3),
             carpet(rgb(70, 78, 92), rgb(36, 40, 50)),
         ]),
-        _ => dice.pick([
+        _ => rng.pick([
             planks(rgb(184, 134, 84), rgb(124, 80, 46)),
             planks(rgb(120, 84, 56), rgb(76, 48, 30)),
             tiles(rgb(206, 196, 178), rgb(140, 132, 120), 0.45),
@@ -202,8 +170,8 @@ fn lay(texture: Texture, plan: &Plan, builder: &mut Builder) {
     builder.perforated(patch, &rectangles);
 }
 
-fn ceiling(plan: &Plan, builder: &mut Builder, dice: &mut Dice) {
-    let seed = dice.seed();
+fn ceiling(plan: &Plan, builder: &mut Builder, rng: &mut Rng) {
+    let seed = rng.seed();
     let tiled = matches!(plan.kind, RoomKind::Office | RoomKind::Corridor);
     let material = builder.matt(if tiled {
         Texture::CeilingTiles { color: rgb(232, 230, 222), size: 0.6, seed }
@@ -212,7 +180,7 @@ fn ceiling(plan: &Plan, builder: &mut Builder, dice: &mut Dice) {
     });
     let lamp = builder.material(Material::Lamp(scale([1.0, 0.95, 0.85], plan.lamps)));
     let rim = builder.paint(120, 120, 124);
-    let (beam_wood, pitch, beams) = (dice.chance(0.5), dice.within(0.7, 1.1), dice.chance(0.6) && !tiled);
+    let (beam_wood, pitch, beams) = (rng.chance(0.5), rng.within(0.7, 1.1), rng.chance(0.6) && !tiled);
     let beam = if beam_wood { builder.paint(96, 64, 40) } else { builder.paint(216, 208, 194) };
     let world = Frame::new(0.0, 0.0, 0.0);
     let h = plan.height;
@@ -272,30 +240,30 @@ fn pendant(frame: &Frame, lamp: MaterialId, rim: MaterialId, builder: &mut Build
     builder.column(frame, &Column { at: [0.0, 0.0], z: [-0.64, -0.50], radius: [0.15, 0.14], sides: 8 }, lamp);
 }
 
-fn wall_texture(kind: RoomKind, accent: bool, tone: f64, dice: &mut Dice) -> Texture {
-    let seed = dice.seed();
+fn wall_texture(kind: RoomKind, accent: bool, tone: f64, rng: &mut Rng) -> Texture {
+    let seed = rng.seed();
     let paint = |color| Texture::Paint { color: scale(color, tone), mottle: 0.10, seed };
     let home = matches!(kind, RoomKind::LivingRoom | RoomKind::UnderTable | RoomKind::LShaped);
-    let motif = dice.pick([Motif::Stripes, Motif::Diamonds, Motif::Flowers]);
-    let (base, ink) = dice.pick([
+    let motif = rng.pick([Motif::Stripes, Motif::Diamonds, Motif::Flowers]);
+    let (base, ink) = rng.pick([
         (rgb(226, 214, 188), rgb(178, 150, 110)),
         (rgb(196, 208, 200), rgb(130, 156, 146)),
         (rgb(214, 196, 190), rgb(170, 120, 112)),
         (rgb(150, 160, 176), rgb(196, 204, 214)),
     ]);
-    if home && dice.chance(if accent { 0.8 } else { 0.45 }) {
-        let period = dice.within(0.16, 0.34);
+    if home && rng.chance(if accent { 0.8 } else { 0.45 }) {
+        let period = rng.within(0.16, 0.34);
         return Texture::Wallpaper { base, ink, motif, period, seed };
     }
     if accent {
-        return dice.pick([
+        return rng.pick([
             Texture::Brick { color: rgb(164, 84, 62), joint: rgb(190, 182, 170), seed },
             paint(rgb(120, 140, 160)),
             paint(rgb(176, 120, 84)),
             paint(rgb(130, 150, 124)),
         ]);
     }
-    dice.pick([
+    rng.pick([
         paint(rgb(232, 228, 218)),
         paint(rgb(222, 214, 196)),
         paint(rgb(208, 216, 218)),
@@ -345,98 +313,4 @@ fn skirting(wall: &Wall, material: MaterialId, builder: &mut Builder) {
         }
         from = end + 0.07;
     }
-}
-
-/// The four inner sides of an opening, down to `depth` behind the wall.
-fn reveal(frame: &Frame, opening: &Opening, depth: f64, material: MaterialId, sill: MaterialId, builder: &mut Builder) {
-    let ([x0, x1], [z0, z1], d) = (opening.along, opening.z, -depth);
-    builder.pane(frame, [[x0, d, z0], [x0, 0.0, z0], [x0, d, z1]], [0.0; 2], material);
-    builder.pane(frame, [[x1, 0.0, z0], [x1, d, z0], [x1, 0.0, z1]], [0.0; 2], material);
-    builder.pane(frame, [[x0, d, z1], [x0, 0.0, z1], [x1, d, z1]], [0.0; 2], material);
-    builder.pane(frame, [[x0, d, z0], [x1, d, z0], [x0, 0.0, z0]], [0.0; 2], sill);
-    for x in opening.along {
-        builder.edge(frame.point(x, 0.0, z0), z1 - z0);
-    }
-}
-
-fn door(frame: &Frame, opening: &Opening, wall: MaterialId, trims: &Trims, builder: &mut Builder) {
-    let ([x0, x1], z1) = (opening.along, opening.z[1]);
-    reveal(frame, opening, 0.1, wall, trims.metal, builder);
-    builder.pane(frame, [[x1, -0.09, 0.0], [x0, -0.09, 0.0], [x1, -0.09, z1]], [x0 + z1; 2], trims.door);
-    // Where the leaf meets the reveal.
-    for x in opening.along {
-        builder.edge(frame.point(x, -0.09, 0.0), z1);
-    }
-    // Two raised fields, casing, handle.
-    for [low, high] in [[0.15, 0.85], [1.0, z1 - 0.15]] {
-        builder.cuboid(frame, [x0 + 0.13, -0.09, low], [x1 - 0.13, -0.075, high], trims.door);
-    }
-    builder.cuboid(frame, [x0 - 0.07, 0.0, 0.0], [x0, 0.025, z1 + 0.07], trims.trim);
-    builder.cuboid(frame, [x1, 0.0, 0.0], [x1 + 0.07, 0.025, z1 + 0.07], trims.trim);
-    builder.cuboid(frame, [x0, 0.0, z1], [x1, 0.025, z1 + 0.07], trims.trim);
-    builder.cuboid(frame, [x0 + 0.05, -0.075, 0.98], [x0 + 0.09, -0.065, 1.14], trims.metal);
-    builder.cuboid(frame, [x0 + 0.05, -0.03, 1.05], [x0 + 0.18, -0.015, 1.07], trims.metal);
-    // Light switch.
-    builder.cuboid(frame, [x0 - 0.24, 0.0, 1.05], [x0 - 0.16, 0.012, 1.13], trims.radiator);
-}
-
-fn window(frame: &Frame, opening: &Opening, wall: MaterialId, trims: &Trims, builder: &mut Builder) {
-    let ([x0, x1], [z0, z1]) = (opening.along, opening.z);
-    reveal(frame, opening, 0.2, wall, trims.trim, builder);
-    builder.pane(frame, [[x1, -0.16, z0], [x0, -0.16, z0], [x1, -0.16, z1]], [0.0; 2], trims.glass);
-    let mut bar = |low: [f64; 2], high: [f64; 2]| {
-        builder.cuboid(frame, [low[0], -0.155, low[1]], [high[0], -0.10, high[1]], trims.trim);
-    };
-    bar([x0, z0], [x0 + 0.06, z1]);
-    bar([x1 - 0.06, z0], [x1, z1]);
-    bar([x0 + 0.06, z0], [x1 - 0.06, z0 + 0.06]);
-    bar([x0 + 0.06, z1 - 0.06], [x1 - 0.06, z1]);
-    let [uprights, levels] = trims.bars;
-    for k in 1..=uprights {
-        let x = x0 + (x1 - x0) * k as f64 / (uprights + 1) as f64;
-        bar([x - 0.025, z0 + 0.06], [x + 0.025, z1 - 0.06]);
-    }
-    for k in 1..=levels {
-        let z = z0 + (z1 - z0) * k as f64 / (levels + 1) as f64;
-        bar([x0 + 0.06, z - 0.018], [x1 - 0.06, z + 0.018]);
-    }
-    if z0 > 0.5 {
-        builder.cuboid(frame, [x0 - 0.06, -0.1, z0 - 0.03], [x1 + 0.06, 0.1, z0], trims.trim);
-        radiator(&frame.then(0.5 * (x0 + x1), 0.03, 0.0, 0.0), 0.8 * (x1 - x0), z0 - 0.15, trims, builder);
-    }
-    if let Some(curtain) = trims.curtain {
-        builder.cuboid(frame, [x0 - 0.35, 0.06, z1 + 0.1], [x1 + 0.35, 0.085, z1 + 0.125], trims.metal);
-        for (from, to) in [(x0 - 0.3, x0 + 0.12), (x1 - 0.12, x1 + 0.3)] {
-            drape(frame, [from, to], [0.03, z1 + 0.11], curtain, builder);
-        }
-    }
-}
-
-/// A pleated curtain.
-fn drape(frame: &Frame, along: [f64; 2], z: [f64; 2], material: MaterialId, builder: &mut Builder) {
-    let pleats = (2.0 * (along[1] - along[0]) / 0.07).round() as usize;
-    let at = |k: usize| {
-        let x = along[1] + (along[0] - along[1]) * k as f64 / pleats as f64;
-        (x, if k.is_multiple_of(2) { 0.11 } else { 0.165 })
-    };
-    for k in 0..pleats {
-        let ((xa, ya), (xb, yb)) = (at(k), at(k + 1));
-        builder.pane(frame, [[xa, ya, z[0]], [xb, yb, z[0]], [xa, ya, z[1]]], [k as f64 * 0.05, 0.0], material);
-        builder.edge(frame.point(xa, ya, z[0]), z[1] - z[0]);
-    }
-    let (x, y) = at(pleats);
-    builder.edge(frame.point(x, y, z[0]), z[1] - z[0]);
-}
-
-/// A panel radiator with upright fins.
-fn radiator(frame: &Frame, width: f64, height: f64, trims: &Trims, builder: &mut Builder) {
-    let (half, low) = (0.5 * width, 0.12);
-    builder.cuboid(frame, [-half, 0.02, low], [half, 0.05, height], trims.radiator);
-    let fins = (width / 0.07) as usize;
-    for k in 0..fins {
-        let x = -half + width * (k as f64 + 0.5) / fins as f64;
-        builder.cuboid(frame, [x - 0.014, 0.05, low + 0.02], [x + 0.014, 0.075, height - 0.02], trims.radiator);
-    }
-    builder.post(frame, [half - 0.05, 0.035, 0.0], [half - 0.05, 0.035, low], 0.02, trims.metal);
-    builder.solid(frame, [-half, 0.0], [half, 0.08]);
 }

@@ -9,13 +9,14 @@ use crate::texture::luminance;
 use crate::view::RobotPose;
 use crate::world::{Ray, World};
 
-/// Upright segments that stand closer than this are one edge, metres.
+/// Upright segments that stand closer than this are one edge, metres: from 1 m away half a pixel of a fisheye of 140 pixels per
+/// radian.
 const SAME_M: f64 = 3e-3;
 
-/// Spacing of the points at which an edge is looked for, metres.
+/// Spacing of the points at which an edge is looked for, metres: seven on the leg of a table.
 const SPACING_M: f64 = 0.1;
 
-/// How far beside an edge its contrast is measured, radians.
+/// How far beside an edge its contrast is measured, radians: a pixel of a fisheye of 140 pixels per radian.
 const ASIDE_RAD: f64 = 6e-3;
 
 /// An upright edge of a world, of a wall, an opening, a piece of furniture or a painted pattern; all that stands on one

@@ -8,25 +8,26 @@ use tiltvp_core::camera::Camera;
 use tiltvp_core::{Error, Result};
 
 use crate::corner::Corner;
-use crate::dice::Dice;
 use crate::handheld::Handheld;
 use crate::lights::Lights;
+use crate::rng::Rng;
 use crate::stereo_options::StereoOptions;
 use crate::sweep::{Rays, Sweep};
 use crate::tone::{ColorImage, Film};
 use crate::world::World;
 
-/// How many motions are tried, per corner.
+/// How many motions are tried, per corner: the second half of them nearer to it, before the next corner has its turn.
 const TRIALS: usize = 30;
-/// How far from walls and furniture the cameras stay, metres.
+/// How far from walls and furniture the cameras stay, metres: half of a pair of cameras with its hands.
 const CLEAR_M: f64 = 0.12;
-/// Most pictures that a blurred one is averaged from.
+/// Most sharp pictures that a blurred one is averaged from: an eighth of the time of exposure each.
 const SHARPS: usize = 8;
-/// Edges of corners that are looked at first, metres.
+/// Edges of corners that are looked at first, metres: those of furniture, before boxes and books.
 const LARGE_M: f64 = 0.35;
-/// Least length of its edges in the images, all along, of a corner that is looked at, in widths of an image.
-const IN_SIGHT: f64 = 0.012;
-/// Points at which an edge is looked for.
+/// Least length of its edges in the images, all along, of a corner that is looked at, in widths of an image:
+/// 8 pixels of 640, the least that a detector of edges can place.
+const LEAST_EDGE_WIDTHS: f64 = 0.012;
+/// Points at which an edge is looked for: the length in sight is told to a 64th.
 const EDGE_POINTS: usize = 64;
 
 /// A corner in sight at one frame.
@@ -61,7 +62,7 @@ impl StereoSequence {
         if let Some(corner) = options.corner.filter(|&corner| corner >= corners.len()) {
             return Err(Error::option("stereo.corner", corner, "the number of one of the world's corners"));
         }
-        let mut dice = Dice::new(options.seed, 1 << 34);
+        let mut rng = Rng::new(options.seed, 1 << 34);
         let is_large = |k: &usize| corners[*k].lengths_m.iter().all(|length| *length >= LARGE_M);
         let (mut order, mut small): (Vec<usize>, Vec<usize>) = match options.corner {
             Some(corner) => (vec![corner], Vec::new()),
@@ -70,14 +71,14 @@ impl StereoSequence {
         };
         for order in [&mut order, &mut small] {
             for k in (1..order.len()).rev() {
-                order.swap(k, dice.below(k + 1));
+                order.swap(k, rng.below(k + 1));
             }
         }
         order.append(&mut small);
         for &corner in &order {
             for trial in 0..TRIALS {
                 let reach = if 2 * trial < TRIALS { 1.0 } else { 0.4 };
-                let motion = Handheld::draw(&corners[corner], &options, reach, &mut dice);
+                let motion = Handheld::draw(&corners[corner], &options, reach, &mut rng);
                 if is_good(&world, &cameras, &options, &motion, &corners[corner]) {
                     let rays = cameras.each_ref().map(|camera| Rays::new(camera, 0.0));
                     return Ok(Self { world, cameras, options, corner, motion, rays });
@@ -217,7 +218,7 @@ fn is_good(world: &World, cameras: &[Camera; 2], options: &StereoOptions, motion
     // Five looks a second tell; no hand moves the cameras far in between.
     let duration = options.frames as f64 / options.frame_rate_hz;
     let looks = (5.0 * duration).ceil() as usize + 1;
-    let least = cameras.each_ref().map(|camera| IN_SIGHT * f64::from(camera.width()));
+    let least = cameras.each_ref().map(|camera| LEAST_EDGE_WIDTHS * f64::from(camera.width()));
     (0..looks).all(|k| {
         let left = motion.pose(k as f64 * duration / looks as f64);
         let poses = [left, left * options.left_from_right];

@@ -7,7 +7,7 @@ use tiltvp_core::camera::Camera;
 use crate::builder::Material;
 use crate::lights::Lights;
 use crate::scene::Contact;
-use crate::tiles::{Candidate, Cone, SIDES, Sight};
+use crate::tiles::{Candidate, Cone, SIDES, VisibleFacets};
 use crate::tone::{Film, RenderOptions};
 use crate::world::{Ray, World, mirrored};
 
@@ -111,9 +111,9 @@ pub(crate) struct Sweep<'a> {
     rays: &'a Rays,
     center: Vector3<f64>,
     world_from_camera: Matrix3<f64>,
-    direct: Sight,
+    direct: VisibleFacets,
     /// Only where the floor shines.
-    mirrored: Option<Sight>,
+    mirrored: Option<VisibleFacets>,
 }
 
 impl<'a> Sweep<'a> {
@@ -121,8 +121,8 @@ impl<'a> Sweep<'a> {
     pub(crate) fn new(world: &'a World, rays: &'a Rays, center: Vector3<f64>, world_from_camera: Matrix3<f64>) -> Self {
         let scene = world.scene();
         let shines = scene.materials.iter().any(|material| matches!(material, Material::Polished(..)));
-        let mirrored = shines.then(|| Sight::mirrored(scene, &center));
-        Self { world, rays, center, world_from_camera, direct: Sight::new(scene, &center), mirrored }
+        let mirrored = shines.then(|| VisibleFacets::mirrored(scene, &center));
+        Self { world, rays, center, world_from_camera, direct: VisibleFacets::new(scene, &center), mirrored }
     }
 
     /// The light on every pixel.
@@ -130,7 +130,7 @@ impl<'a> Sweep<'a> {
         let (width, height) = (self.rays.width, self.rays.height);
         let side = SIDES[0];
         let all = self.direct.all();
-        let all_mirrored = self.mirrored.as_ref().map(Sight::all).unwrap_or_default();
+        let all_mirrored = self.mirrored.as_ref().map(VisibleFacets::all).unwrap_or_default();
         let bands: Vec<(Vec<Tile>, Vec<Option<Meeting>>)> = (0..height.div_ceil(side))
             .into_par_iter()
             .map(|band| {
@@ -176,10 +176,10 @@ impl<'a> Sweep<'a> {
         let cone = cone.turned(&self.world_from_camera);
         let mut tile = Tile { at, direct: Vec::new(), mirrored: Vec::new() };
         self.direct.candidates(direct, &cone, &mut tile.direct);
-        if let Some(sight) = &self.mirrored
+        if let Some(facets) = &self.mirrored
             && self.direct.meets_polish(&tile.direct, self.world.scene())
         {
-            sight.candidates(mirror, &cone.mirrored(), &mut tile.mirrored);
+            facets.candidates(mirror, &cone.mirrored(), &mut tile.mirrored);
         }
         if level + 1 == SIDES.len() {
             tiles.push(tile);

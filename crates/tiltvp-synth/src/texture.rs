@@ -39,7 +39,7 @@ pub(crate) enum Motif {
     Flowers,
 }
 
-/// The edges of the upright stripes of a wallpaper, in periods.
+/// The edges of the upright stripes of a wallpaper, in periods: one broad stripe and two narrow ones.
 const STRIPE_EDGES: [f64; 6] = [0.07, 0.13, 0.28, 0.72, 0.87, 0.93];
 
 /// A reflectance over surface coordinates `(u, v)` in metres: `u` to the right, `v` up, seen from the front.

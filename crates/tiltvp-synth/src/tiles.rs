@@ -5,7 +5,8 @@ use nalgebra::{Matrix3, Vector3};
 use crate::builder::{Material, Piece};
 use crate::scene::{Contact, Scene};
 
-/// Sides of the nested tiles, pixels, from large to small.
+/// Sides of the nested tiles, pixels, from large to small: each halves the one before, and chooses among its candidates
+/// (`tiles_lose_nothing`).
 pub(crate) const SIDES: [usize; 4] = [64, 32, 16, 8];
 
 /// A cone of directions around a unit axis.
@@ -68,12 +69,12 @@ pub(crate) struct Candidate {
     nearest: f64,
 }
 
-/// Everything as seen from one point.
-pub(crate) struct Sight {
+/// The facets of a room as seen from one point.
+pub(crate) struct VisibleFacets {
     facets: Vec<Facet>,
 }
 
-impl Sight {
+impl VisibleFacets {
     /// Everything as seen from a point of a room.
     pub(crate) fn new(scene: &Scene, center: &Vector3<f64>) -> Self {
         Self { facets: scene.pieces.iter().filter_map(|piece| facet(scene, piece, center)).collect() }
@@ -126,6 +127,8 @@ impl Sight {
 
     /// The first of the candidates that a ray in a unit direction meets.
     pub(crate) fn cast(&self, candidates: &[Candidate], direction: &Vector3<f64>) -> Option<Contact> {
+        // How far beside a facet a ray still meets it, in parts of its sides: more than the rounding of `f64`, so that there is
+        // no gap between neighbours, and less than a hundredth of a pixel.
         const SEAM: f64 = 1e-9;
         let mut best = 1e-3;
         let mut contact = None;
@@ -187,8 +190,8 @@ fn facet(scene: &Scene, piece: &Piece, center: &Vector3<f64>) -> Option<Facet> {
 #[allow(clippy::unwrap_used)]
 mod tests {
     use super::*;
-    use crate::dice::Dice;
     use crate::options::{RoomKind, RoomOptions};
+    use crate::rng::Rng;
     use crate::world::World;
 
     /// Tile by tile, rays meet what they meet one by one.
@@ -199,21 +202,21 @@ mod tests {
         let scene = world.scene();
         let pose = world.free_poses(1, 3).unwrap()[0];
         let center = Vector3::new(pose.x_m, pose.y_m, 0.37);
-        let (sight, below) = (Sight::new(scene, &center), Sight::mirrored(scene, &center));
-        let mut dice = Dice::new(1, 1);
+        let (facets, below) = (VisibleFacets::new(scene, &center), VisibleFacets::mirrored(scene, &center));
+        let mut rng = Rng::new(1, 1);
         let mut other = 0;
         for _ in 0..400 {
-            let mut draw = |spread: f64| Vector3::from_fn(|_, _| spread * dice.normal());
+            let mut draw = |spread: f64| Vector3::from_fn(|_, _| spread * rng.normal());
             let axis = draw(1.0).normalize();
             let directions: Vec<Vector3<f64>> = (0..24).map(|_| (axis + draw(0.05)).normalize()).collect();
             let cone = Cone::around(&directions, 0.0).unwrap();
             let (mut wide, mut near, mut under) = (Vec::new(), Vec::new(), Vec::new());
             let wider = Cone::around(&directions, 0.3).unwrap();
-            sight.candidates(&sight.all(), &wider, &mut wide);
-            sight.candidates(&wide, &cone, &mut near);
+            facets.candidates(&facets.all(), &wider, &mut wide);
+            facets.candidates(&wide, &cone, &mut near);
             below.candidates(&below.all(), &cone.mirrored(), &mut under);
             for direction in &directions {
-                let (one, tiled) = (scene.cast(&center, direction, 1e3), sight.cast(&near, direction));
+                let (one, tiled) = (scene.cast(&center, direction, 1e3), facets.cast(&near, direction));
                 let apart = match (one, tiled) {
                     (Some(a), Some(b)) => (a.distance - b.distance).abs(),
                     (None, None) => 0.0,

@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 use tiltvp_core::{Error, Result};
 
-use crate::dice::Dice;
+use crate::rng::Rng;
 use crate::texture::luminance;
 
 /// How light becomes brightness.
@@ -136,9 +136,9 @@ impl Film {
         gray.par_chunks_mut(width).zip(rgb.par_chunks_mut(3 * width)).enumerate().for_each(
             |(y, (gray_row, rgb_row))| {
                 // One stream of noise per row: the same bytes for any number of threads.
-                let mut dice = Dice::new(options.seed, 1 + y as u64);
+                let mut rng = Rng::new(options.seed, 1 + y as u64);
                 let mut quantise = |light: f64| {
-                    let noise = if options.noise_sigma > 0.0 { options.noise_sigma * dice.normal() } else { 0.0 };
+                    let noise = if options.noise_sigma > 0.0 { options.noise_sigma * rng.normal() } else { 0.0 };
                     (255.0 * display(gain * light, options.gamma) + noise).round().clamp(0.0, 255.0) as u8
                 };
                 for x in 0..width {
@@ -170,10 +170,10 @@ impl Film {
         let mut bgr = vec![0u8; 3 * width * height];
         bgr.par_chunks_mut(3 * width).enumerate().for_each(|(y, row)| {
             // One stream of noise per row: the same bytes for any number of threads.
-            let mut dice = Dice::new(options.seed, 1 + y as u64);
+            let mut rng = Rng::new(options.seed, 1 + y as u64);
             for (x, pixel) in row.chunks_exact_mut(3).enumerate() {
                 let k = y * width + x;
-                let bits = dice.bits();
+                let bits = rng.bits();
                 if self.valid[k] {
                     for (c, level) in pixel.iter_mut().enumerate() {
                         let noise = noise[(bits >> (16 * c)) as usize & 0xFFFF];
@@ -256,6 +256,7 @@ struct Curve {
 }
 
 impl Curve {
+    /// Entries of the table: a quarter of a grey level or less apart up to the shoulder, for any gamma from 1 on.
     const STEPS: usize = 4096;
     /// The greatest light of the table; what is brighter is white to a hundredth of a level.
     const REACH: f32 = 4.0;
@@ -289,7 +290,7 @@ fn normal_quantiles(sigma: f64) -> Vec<f32> {
     half.iter().rev().map(|z| -z).chain(half.iter().copied()).collect()
 }
 
-/// Share of full light up to which the display curve has no shoulder.
+/// Share of full light up to which the display curve has no shoulder: the look of a camera whose whites roll off gently.
 const SHOULDER: f64 = 0.7;
 
 /// The display level in `[0, 1]`: straight up to the shoulder, which never quite clips.

@@ -6,18 +6,19 @@ use nalgebra::Vector2;
 use tiltvp_core::geometry::Tilt;
 use tiltvp_core::{Error, Result};
 
-use crate::dice::Dice;
 use crate::drive_options::{DriveOptions, Way};
 use crate::noise::fractal_noise;
+use crate::rng::Rng;
 use crate::route::{Follower, Grid};
 use crate::view::RobotPose;
 use crate::world::World;
 
-/// Streams of the drive's seed.
+/// Streams of the drive's seed, told apart from each other and from those of the frames.
 const WAY: u64 = 0x0D01;
 const ENCODERS: u64 = 0x0D02;
 
-/// Places and headings that are tried for a way that is prescribed.
+/// Places and headings that are tried for a way that is prescribed: enough that a free one is found in a narrow room
+/// (`legs_are_driven_where_there_is_room`).
 const START_TRIALS: usize = 20_000;
 
 /// What a drive went through, one entry per frame.
@@ -45,10 +46,10 @@ impl Trajectory {
         if cells.len() < 12 {
             return Err(Error::argument("room", world.kind().name(), "a room with space for a robot to drive in"));
         }
-        let mut dice = Dice::new(options.seed, WAY);
+        let mut rng = Rng::new(options.seed, WAY);
         let (start, displacements_m) = match &options.way {
-            Way::Wander { frames } => wander(&grid, &cells, *frames, options, &mut dice),
-            Way::Legs(legs) => along(&grid, &cells, legs, options, &mut dice).ok_or_else(|| {
+            Way::Wander { frames } => wander(&grid, &cells, *frames, options, &mut rng),
+            Way::Legs(legs) => along(&grid, &cells, legs, options, &mut rng).ok_or_else(|| {
                 Error::argument("legs", format!("{legs:?}"), "legs that a robot has room for in this room")
             })?,
         };
@@ -60,8 +61,8 @@ impl Trajectory {
                 pose
             })
             .collect();
-        let mut dice = Dice::new(options.seed, ENCODERS);
-        let odometry_m = displacements_m.iter().map(|rolled| options.wheels.read(*rolled, &mut dice)).collect();
+        let mut rng = Rng::new(options.seed, ENCODERS);
+        let odometry_m = displacements_m.iter().map(|rolled| options.wheels.read(*rolled, &mut rng)).collect();
         let tilts = (0..poses.len()).map(|frame| bump(frame, options)).collect();
         Ok(Self { poses, tilts, displacements_m, odometry_m })
     }
@@ -71,17 +72,17 @@ impl Trajectory {
 type Plan = (RobotPose, Vec<[f64; 2]>);
 
 /// Wanders through a room from one far place to another.
-fn wander(grid: &Grid, cells: &[usize], frames: usize, options: &DriveOptions, dice: &mut Dice) -> Plan {
+fn wander(grid: &Grid, cells: &[usize], frames: usize, options: &DriveOptions, rng: &mut Rng) -> Plan {
     let wheels = options.wheels;
-    let start = grid.center(cells[dice.below(cells.len())]);
-    let mut follower = Follower::new(grid.way_from(&start, cells, true, dice));
-    let start = RobotPose { x_m: start.x, y_m: start.y, yaw_rad: dice.within(-PI, PI) };
+    let start = grid.center(cells[rng.below(cells.len())]);
+    let mut follower = Follower::new(grid.way_from(&start, cells, true, rng));
+    let start = RobotPose { x_m: start.x, y_m: start.y, yaw_rad: rng.within(-PI, PI) };
     let mut displacements_m = vec![[0.0; 2]];
     let mut pose = start;
     while displacements_m.len() < frames {
         let at = Vector2::new(pose.x_m, pose.y_m);
         if follower.is_done() || follower.is_stuck() {
-            follower.follow(grid.way_from(&at, cells, !follower.is_stuck(), dice));
+            follower.follow(grid.way_from(&at, cells, !follower.is_stuck(), rng));
         }
         let is_open = |distance: f64, turn: f64| {
             [0.5, 1.0].iter().all(|part| {
@@ -98,7 +99,7 @@ fn wander(grid: &Grid, cells: &[usize], frames: usize, options: &DriveOptions, d
 }
 
 /// Drives legs in equal steps; none if no place was found from which there is room for all.
-fn along(grid: &Grid, cells: &[usize], legs: &[(f64, f64)], options: &DriveOptions, dice: &mut Dice) -> Option<Plan> {
+fn along(grid: &Grid, cells: &[usize], legs: &[(f64, f64)], options: &DriveOptions, rng: &mut Rng) -> Option<Plan> {
     let steps = |(distance, turn): &(f64, f64)| {
         let count = (distance.abs() / options.step_m).max(turn.abs() / options.turn_max_rad).ceil();
         vec![options.wheels.displacements(distance / count, turn / count); count as usize]
@@ -112,8 +113,8 @@ fn along(grid: &Grid, cells: &[usize], legs: &[(f64, f64)], options: &DriveOptio
         })
     };
     (0..START_TRIALS).find_map(|_| {
-        let at = grid.center(cells[dice.below(cells.len())]);
-        let start = RobotPose { x_m: at.x, y_m: at.y, yaw_rad: dice.within(-PI, PI) };
+        let at = grid.center(cells[rng.below(cells.len())]);
+        let start = RobotPose { x_m: at.x, y_m: at.y, yaw_rad: rng.within(-PI, PI) };
         has_room(start).then(|| (start, displacements_m.clone()))
     })
 }

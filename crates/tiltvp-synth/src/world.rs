@@ -5,7 +5,6 @@ use tiltvp_core::{Error, Result};
 
 use crate::builder::{Builder, Footprint, Material};
 use crate::corner::{self, Corner};
-use crate::dice::Dice;
 use crate::laboratory::LaboratoryOptions;
 use crate::light::{LightMap, sun_reaches};
 use crate::lights::Lights;
@@ -13,6 +12,8 @@ use crate::options::RoomKind;
 use crate::options::RoomOptions;
 use crate::outdoors::Outdoors;
 use crate::plan::Plan;
+use crate::rng::Rng;
+use crate::route::ROBOT_RADIUS_M;
 use crate::scene::{Contact, Scene};
 use crate::segment::Segment;
 use crate::texture::{Color, mix};
@@ -22,9 +23,6 @@ use crate::{furniture, laboratory, shell};
 /// Greatest radiance that the camera sees, in units of white in the room's light: what is brighter is burnt out anyway, and
 /// would fray the edges of windows and lamps.
 const GLARE: f64 = 3.0;
-
-/// Radius of the circle a robot needs to stand, metres.
-const ROBOT_RADIUS_M: f64 = 0.22;
 
 /// Where a ray meets the world first.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -72,11 +70,11 @@ impl World {
     /// If the options are outside their domains.
     pub fn new(options: &RoomOptions) -> Result<Self> {
         options.validate()?;
-        let mut dice = Dice::new(options.seed, options.kind as u64);
-        let plan = Plan::draw(options, &mut dice);
+        let mut rng = Rng::new(options.seed, options.kind as u64);
+        let plan = Plan::draw(options, &mut rng);
         let mut builder = Builder::default();
-        shell::build(&plan, &mut builder, &mut dice);
-        let places = furniture::furnish(&plan, options, &mut builder, &mut dice);
+        shell::build(&plan, &mut builder, &mut rng);
+        let places = furniture::furnish(&plan, options, &mut builder, &mut rng);
         let mut corners = corner::of_room(&plan);
         corners.append(&mut builder.corners);
         Self::lit(plan, builder, corners, places, options.light_spacing_m)
@@ -165,17 +163,17 @@ impl World {
     /// # Errors
     /// If the room is too full to find them.
     pub fn free_poses(&self, count: usize, seed: u64) -> Result<Vec<RobotPose>> {
-        let mut dice = Dice::new(seed, 1 << 32);
+        let mut rng = Rng::new(seed, 1 << 32);
         let (low, high) = self.plan.bounds();
         let mut poses = Vec::with_capacity(count);
         for _ in 0..20_000 + 2_000 * count {
             if poses.len() == count {
                 break;
             }
-            let point = Vector2::new(dice.within(low.x, high.x), dice.within(low.y, high.y));
+            let point = Vector2::new(rng.within(low.x, high.x), rng.within(low.y, high.y));
             let meant = self.places.is_empty() || self.places.iter().any(|place| place.distance(&point) <= 0.0);
             if meant && self.is_free(point.x, point.y) {
-                let yaw_rad = dice.within(-std::f64::consts::PI, std::f64::consts::PI);
+                let yaw_rad = rng.within(-std::f64::consts::PI, std::f64::consts::PI);
                 poses.push(RobotPose { x_m: point.x, y_m: point.y, yaw_rad });
             }
         }

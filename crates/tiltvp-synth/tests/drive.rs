@@ -288,21 +288,21 @@ fn wrong_options_are_refused_by_name() {
         other => panic!("{expected}: {other:?}"),
     };
     let base = DriveOptions::default();
-    refused(DriveOptions { way: Way::Wander { frames: 0 }, ..base.clone() }, "drive.frames");
-    refused(DriveOptions { step_m: f64::NAN, ..base.clone() }, "drive.step_m");
-    refused(DriveOptions { turn_max_rad: 0.0, ..base.clone() }, "drive.turn_max_rad");
-    refused(DriveOptions { mount: Mount { x_m: 2.0, ..base.mount }, ..base.clone() }, "drive.mount.x_m");
-    refused(DriveOptions { mount: Mount { height_m: 0.0, ..base.mount }, ..base.clone() }, "drive.mount.height_m");
-    refused(DriveOptions { bumps_max_rad: -0.1, ..base.clone() }, "drive.bumps_max_rad");
-    refused(DriveOptions { blind_rad: 2.0, ..base.clone() }, "drive.blind_rad");
-    refused(DriveOptions { lighting: 1.5, ..base.clone() }, "drive.lighting");
-    refused(DriveOptions { samples: 0, ..base.clone() }, "render.samples");
+    refused(DriveOptions { way: Way::Wander { frames: 0 }, ..base.clone() }, "frames");
+    refused(DriveOptions { step_m: f64::NAN, ..base.clone() }, "step_m");
+    refused(DriveOptions { turn_max_rad: 0.0, ..base.clone() }, "turn_max_rad");
+    refused(DriveOptions { mount: Mount { x_m: 2.0, ..base.mount }, ..base.clone() }, "mount");
+    refused(DriveOptions { mount: Mount { height_m: 0.0, ..base.mount }, ..base.clone() }, "mount");
+    refused(DriveOptions { bumps_max_rad: -0.1, ..base.clone() }, "bumps_max_rad");
+    refused(DriveOptions { blind_rad: 2.0, ..base.clone() }, "blind_rad");
+    refused(DriveOptions { lighting: 1.5, ..base.clone() }, "lighting");
+    refused(DriveOptions { samples: 0, ..base.clone() }, "samples");
     let wheels = Wheels { base_m: 0.0, ..Wheels::default() };
-    refused(DriveOptions { wheels, ..base.clone() }, "drive.wheels.base_m");
+    refused(DriveOptions { wheels, ..base.clone() }, "wheel_base_m");
     let wheels = Wheels { encoder_k_m: -1.0, ..Wheels::default() };
-    refused(DriveOptions { wheels, ..base.clone() }, "drive.wheels.encoder_k_m");
+    refused(DriveOptions { wheels, ..base.clone() }, "encoder_k_m");
     let wheels = Wheels { radius_errors: [0.0, f64::NAN], ..Wheels::default() };
-    refused(DriveOptions { wheels, ..base.clone() }, "drive.wheels.radius_errors");
+    refused(DriveOptions { wheels, ..base.clone() }, "wheel_radius_errors");
     assert!(DriveOptions { robot_from_camera: Matrix3::zeros(), ..base.clone() }.validate().is_err());
     let drive =
         drive(&world(RoomKind::Narrow, 0), DriveOptions { way: Way::Wander { frames: 3 }, lighting: 0.0, ..base });

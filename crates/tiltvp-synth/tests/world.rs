@@ -212,12 +212,12 @@ fn wrong_options_are_refused_by_name() {
         other => panic!("{expected}: {other:?}"),
     };
     let room = RoomOptions::default();
-    refused(RoomOptions { clutter: 1.5, ..room.clone() }.validate(), "room.clutter");
-    refused(RoomOptions { daylight: f64::NAN, ..room.clone() }.validate(), "room.daylight");
-    refused(RoomOptions { extent: 0.5, ..room.clone() }.validate(), "room.extent");
-    refused(RoomOptions { floor_gloss: -0.5, ..room.clone() }.validate(), "room.floor_gloss");
-    refused("plaid".parse::<WallPattern>().map(|_| ()), "room.wall_pattern");
-    refused(RoomOptions { light_spacing_m: 0.0, ..room }.validate(), "room.light_spacing_m");
+    refused(RoomOptions { clutter: 1.5, ..room.clone() }.validate(), "clutter");
+    refused(RoomOptions { daylight: f64::NAN, ..room.clone() }.validate(), "daylight");
+    refused(RoomOptions { extent: 0.5, ..room.clone() }.validate(), "extent");
+    refused(RoomOptions { floor_gloss: -0.5, ..room.clone() }.validate(), "floor_gloss");
+    refused("plaid".parse::<WallPattern>().map(|_| ()), "wall_pattern");
+    refused(RoomOptions { light_spacing_m: 0.0, ..room }.validate(), "light_spacing_m");
     let base = RenderOptions::default();
     refused(RenderOptions { samples: 0, ..base.clone() }.validate(), "render.samples");
     refused(RenderOptions { blur_sigma_px: -1.0, ..base.clone() }.validate(), "render.blur_sigma_px");
@@ -226,7 +226,7 @@ fn wrong_options_are_refused_by_name() {
     refused(RenderOptions { vignetting: 2.0, ..base.clone() }.validate(), "render.vignetting");
     let exposure = Exposure::Fixed { gain: 0.0 };
     refused(RenderOptions { exposure, ..base }.validate(), "render.exposure.gain");
-    refused("kitchen".parse::<RoomKind>().map(|_| ()), "room.kind");
+    refused("kitchen".parse::<RoomKind>().map(|_| ()), "kind");
     for kind in RoomKind::ALL {
         assert_eq!(kind.name().parse::<RoomKind>(), Ok(kind));
     }

@@ -9,9 +9,10 @@ from collections.abc import Sequence
 from cyclopts import App, CycloptsError, Parameter
 
 from tiltvp import __version__
-from tiltvp.cli import calibrate, camera, corner, dataset, demo, evaluate, lines, measure, report, tilt, track
+from tiltvp.cli import calibrate, camera, corner, demo, lines, tilt, track
+from tiltvp.cli.lab import dataset, evaluate, measure, report
 from tiltvp.cli.terminal import complain
-from tiltvp.errors import TiltvpError
+from tiltvp.errors import MissingExtraError, TiltvpError
 
 DONE, SOME_FAILED, WRONG_USE, INTERRUPTED = 0, 1, 2, 130
 
@@ -37,7 +38,7 @@ app.command(report.report)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Runs the command line and gives the exit code: 0 done, 1 a file failed and the others are done, 2 wrong use."""
+    """Runs the command line and gives the exit code: 0 done, 1 some failed or an extra is missing, 2 wrong use."""
     try:
         code = app(arguments, exit_on_error=False, print_error=False, result_action="return_value")
         sys.stdout.flush()
@@ -45,6 +46,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except CycloptsError as error:
         complain(f"{error} Try `tiltvp --help`.")
         return WRONG_USE
+    except MissingExtraError as error:
+        complain(str(error))
+        return SOME_FAILED
     except TiltvpError as error:
         complain(str(error))
         return WRONG_USE

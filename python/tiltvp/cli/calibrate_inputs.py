@@ -2,24 +2,83 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated, Any
 
+import numpy as np
+from cyclopts import Group, Parameter, validators
+
+from tiltvp._core import CALIBRATION_METHODS, option_fields
 from tiltvp.cli.frames import open_frames
+from tiltvp.cli.library_options import LibraryOptions, from_library
 from tiltvp.cli.line_options import LineOptions
 from tiltvp.cli.options import CameraOptions
-from tiltvp.cli.terminal import progress_bar
+from tiltvp.cli.tables import check_ending, write_table
+from tiltvp.cli.terminal import progress_bar, say
 from tiltvp.cli.track import followed, track_table
 from tiltvp.errors import InvalidInputError
 
 if TYPE_CHECKING:
-    import polars as pl
-
     from tiltvp.drive_logs import DriveLog
 
-__all__ = ["log_of_images", "log_of_tables"]
+__all__ = ["DriveOptions", "PictureOptions", "log_of_images", "log_of_tables"]
 
 _FORMS = "ODOMETRY.csv BEARINGS.csv, or --images FOLDER --camera FILE --odometry ODOMETRY.csv"
+
+
+@Parameter(name="*", group=Group("Drive"))
+@dataclass(frozen=True, kw_only=True)
+@from_library(
+    {"SelfCalibrator": CALIBRATION_METHODS, "calibrate": ()},
+    words={"odometry_k_m": "--odometry-k", "step_sigma_m": "--step-sigma", "start_distance_m": "--start-distance"},
+    but=("wheel_base_m", "method", "estimate_odometry", "estimate_time_offset"),
+)
+class DriveOptions(LibraryOptions):
+    """The robot, the mounting as it is thought to be, and how sure measurements are."""
+
+    wheel_base: float
+    """Distance between the wheels, metres."""
+    start: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    """x and y in metres and yaw in radians of the mounting as it is thought to be."""
+    start_sigma: tuple[float, float, float] | None = None
+    """Their standard deviations."""
+    bearing_sigma_deg: float | None = None
+    """Standard deviation of a bearing; for images by default the median of what the lines' own are."""
+
+    def of_filter(self) -> dict[str, Any]:
+        """What `SelfCalibrator` takes."""
+        return {name: value for name, value in self.given().items() if name != "max_iterations"} | self._wheels()
+
+    def of_whole_log(self) -> dict[str, Any]:
+        """What `calibrate` takes."""
+        known = {field["name"] for field in option_fields("calibrate")}
+        return {name: value for name, value in self.given().items() if name in known} | self._wheels()
+
+    def _wheels(self) -> dict[str, float]:
+        return {"wheel_base_m": self.wheel_base}
+
+
+@Parameter(name="*", group=Group("From pictures"))
+@dataclass(frozen=True, kw_only=True)
+class PictureOptions:
+    """The images of a drive, in place of a log of bearings."""
+
+    images: str | None = None
+    """Folder of images in the order of their names, glob pattern, or video."""
+    odometry: Path | None = None
+    """CSV of the motion that led to each image: yaw_rad or yaw_deg, and distance_m; file, or one row for each image;
+    left_m and right_m, what the wheels rolled, where that is recorded."""
+    track_frames_min: Annotated[int, Parameter(validator=validators.Number(gte=2))] = 3
+    """A line counts if it is seen in so many images."""
+    tracks: Path | None = None
+    """Also write the lines of all images, as `tiltvp track` does: .csv, .json or .parquet."""
+
+    def refuse(self, camera: CameraOptions | None) -> None:
+        """Refuses what belongs to images where there are none."""
+        for name, value in (("--odometry", self.odometry), ("--camera", camera), ("--tracks", self.tracks)):
+            if value is not None:
+                raise InvalidInputError(f"{name} without --images, which it is for")
 
 
 def log_of_tables(odometry: Path | None, bearings: Path | None, *, with_times: bool) -> DriveLog:
@@ -35,40 +94,41 @@ def log_of_tables(odometry: Path | None, bearings: Path | None, *, with_times: b
 
 
 def log_of_images(
-    source: str,
-    camera: CameraOptions | None,
-    options: LineOptions,
-    odometry: Path | None,
-    *,
-    wheel_base_m: float,
-    start: tuple[float, float, float],
-    track_frames_min: int,
-) -> tuple[DriveLog, pl.DataFrame, int]:
-    """The log of a drive's images: the lean of each, its lines, and whose they are; the tracks; how many were bad.
+    pictures: PictureOptions, camera: CameraOptions | None, options: LineOptions, drive: DriveOptions
+) -> tuple[DriveLog, float, int]:
+    """The log of a drive's images: the lean of each, its lines, and whose they are.
 
-    Tracks are predicted with the mounting (x_m, y_m, yaw_rad) as it is thought to be.
+    Also the median standard deviation of a bearing, radians, and how many images were bad. Writes the tracks where they
+    are asked for. Tracks are predicted with the mounting as it is thought to be.
     """
     from tiltvp.drive_logs import DriveLog
     from tiltvp.line_logs import bearing_log, displacements
     from tiltvp.lines import LineTracker
     from tiltvp.odometry import read_odometry
 
-    if camera is None or odometry is None:
+    source = str(pictures.images)
+    if pictures.tracks is not None:
+        check_ending(pictures.tracks)
+    if camera is None or pictures.odometry is None:
         missing = "--camera" if camera is None else "--odometry"
         raise InvalidInputError(f"--images {source} without {missing}, expected {_FORMS}")
     lens = camera.load()
-    x_m, y_m, yaw_rad = start
+    x_m, y_m, yaw_rad = drive.start
     extractor, tilt = options.extractor(lens, yaw_rad=yaw_rad), options.tilts(lens, yaw_rad=yaw_rad)
     tracker = LineTracker(camera_m=(x_m, y_m))
     frames = open_frames(source)
-    motions = read_odometry(odometry, frames.files)
+    motions = read_odometry(pictures.odometry, frames.files)
     with progress_bar(len(frames.files), "frames") as bar:
         seen = list(followed(frames, extractor, tracker, tilt, motions, bar))
-    bearings = bearing_log(seen, frames_min=track_frames_min)
+    bearings = bearing_log(seen, frames_min=pictures.track_frames_min)
     if not len(bearings):
-        raise InvalidInputError(f"{source}: no line is seen in {track_frames_min} of {len(frames.files)} frames")
+        least = pictures.track_frames_min
+        raise InvalidInputError(f"{source}: no line is seen in {least} of {len(frames.files)} frames")
     # From the robot's frame back to the camera's.
     bearings[:, 2] -= yaw_rad
-    log = DriveLog(displacements(motions, wheel_base_m=wheel_base_m), bearings, None)
-    tracks = track_table([(frame.number, str(frames.files[frame.number]), frame.tracked) for frame in seen])
-    return log, tracks, len(frames.files) - len(seen)
+    table = track_table([(frame.number, str(frames.files[frame.number]), frame.tracked) for frame in seen])
+    if pictures.tracks is not None:
+        write_table(table, pictures.tracks)
+    say(f"{source}: {len(bearings)} bearings of {len(set(bearings[:, 1].tolist()))} lines")
+    log = DriveLog(displacements(motions, wheel_base_m=drive.wheel_base), bearings, None)
+    return log, float(np.median([row["sigma_rad"] for row in table.rows])), len(frames.files) - len(seen)

@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-from cyclopts import Parameter, validators
+from cyclopts import Group, Parameter, validators
 
+from tiltvp._core import CORNER_METHODS
 from tiltvp.cli.frames import Frames, open_frames
+from tiltvp.cli.library_options import LibraryOptions, from_library
 from tiltvp.cli.options import image_size_from
-from tiltvp.cli.results import check_ending, write_frame
+from tiltvp.cli.tables import Table, check_ending, check_plot, write_table
 from tiltvp.cli.terminal import named, progress_bar, say
 from tiltvp.errors import InvalidInputError, TiltvpError
 
@@ -22,6 +26,16 @@ if TYPE_CHECKING:
     from tiltvp.corner import CornerEstimate, CornerPoseEstimator
 
 _ANGLE = Parameter(validator=validators.Number(gt=0, lt=180))
+
+
+@Parameter(name="*", group=Group("Corners", help="An option that is not given has the default of its method."))
+@dataclass(frozen=True, kw_only=True)
+@from_library({"CornerDetector": CORNER_METHODS, "CornerPoseEstimator": ()}, but=("gamma_rad", "down"))
+class CornerOptions(LibraryOptions):
+    """How corners are found and told apart."""
+
+
+_OPTIONS = CornerOptions()
 _POSE = ("roll_deg", "pitch_deg", "yaw_deg", "x_m", "y_m", "z_m")
 
 
@@ -32,6 +46,7 @@ def corner(
     *,
     calibration: Path,
     method: str = "coloured",
+    options: CornerOptions = _OPTIONS,
     gamma: Annotated[float, _ANGLE] = 90.0,
     pitch: Annotated[float | None, Parameter(validator=validators.Number(gte=-90, lte=90))] = None,
     out: Path | None = None,
@@ -78,64 +93,93 @@ def corner(
     independent
         Look at every frame anew.
     """
-    from tiltvp.corner_tables import pose_table, write_trajectory
-    from tiltvp.images import write_image
+    from tiltvp.corner_tables import POSE_COLUMNS, pose_rows
 
     if out is not None:
         check_ending(out)
-    if plot is not None and plot.suffix.lower() != ".png":
-        raise InvalidInputError(f"--plot {plot}: ends in {plot.suffix!r}, expected .png")
+    check_plot("--plot", plot)
     camera, estimator = _estimator(
-        calibration, right is not None, method, math.radians(gamma), pitch, image_size_from(image_size)
+        calibration, right is not None, method, options, math.radians(gamma), pitch, image_size_from(image_size)
     )
     frames = open_frames(left)
     others = None if right is None else open_frames(right)
     if others is not None and len(others.files) != len(frames.files):
         raise InvalidInputError(f"{right}: {len(others.files)} frames, expected {len(frames.files)} as in {left}")
+    look = Look(camera, estimator, independent, overlay)
     rate_hz = frame_rate or frames.rate_hz
-    estimates: list[tuple[float, str, CornerEstimate]] = []
-    bad = 0
-    with progress_bar(len(frames.files), "frames") as bar:
-        for number, images in enumerate(_pairs(frames, others)):
-            file = frames.files[number]
-            try:
-                for image in images:
-                    if isinstance(image, TiltvpError):
-                        raise image
-                if independent:
-                    estimator.reset()
-                estimate = estimator(*images)
-            except TiltvpError as error:
-                bar.complain(named(file, str(error)))
-                bad += 1
-            else:
-                estimates.append((number / rate_hz, str(file), estimate))
-                if overlay is not None:
-                    name = f"{Path(file).stem}_{number:06d}.png" if "#" in file.name else f"{Path(file).stem}.png"
-                    write_image(overlay / name, drawn(images[0], camera, estimate))
-            bar.advance()
+    estimates = [(number / rate_hz, file, estimate) for number, file, estimate in look.each(frames, others)]
+    bad = len(frames.files) - len(estimates)
     if not estimates:
         raise InvalidInputError(f"{left}: {bad} frames, none of which can be used")
-    table = pose_table(estimates)
-    if out is not None:
-        write_frame(table, out)
-    if trajectory is not None:
-        write_trajectory(table, trajectory)
-    if plot is not None:
-        from tiltvp.plots.corner_overlay import pose_plot
-        from tiltvp.plots.picture import figure_picture
-
-        write_image(plot, figure_picture(pose_plot(table)))
+    table = Table(POSE_COLUMNS, pose_rows(estimates))
+    _write(table, out, trajectory, plot)
     found = sum(bool(estimate) for _, _, estimate in estimates)
     skipped = f", {bad} skipped" if bad else ""
     say(f"{left}: {len(estimates)} frames{skipped}, {found} with a pose")
     return 1 if bad else 0
 
 
+@dataclass(frozen=True)
+class Look:
+    """What is done with each frame."""
+
+    camera: Camera
+    estimator: CornerPoseEstimator
+    independent: bool
+    overlay: Path | None
+
+    def each(self, frames: Frames, others: Frames | None) -> Iterator[tuple[int, str, CornerEstimate]]:
+        """Number, file and estimate of the frames that can be used; the others are complained about."""
+        with progress_bar(len(frames.files), "frames") as bar:
+            for number, images in enumerate(_pairs(frames, others)):
+                file = frames.files[number]
+                try:
+                    estimate = self._estimate(images)
+                except TiltvpError as error:
+                    bar.complain(named(file, str(error)))
+                else:
+                    self._draw(number, file, images[0], estimate)
+                    yield number, str(file), estimate
+                bar.advance()
+
+    def _estimate(self, images: Sequence[NDArray[np.uint8] | TiltvpError]) -> CornerEstimate:
+        usable = []
+        for image in images:
+            if isinstance(image, TiltvpError):
+                raise image
+            usable.append(image)
+        if self.independent:
+            self.estimator.reset()
+        return self.estimator(*usable)
+
+    def _draw(self, number: int, file: Path, image: NDArray[np.uint8], estimate: CornerEstimate) -> None:
+        from tiltvp.images import write_image
+
+        if self.overlay is not None:
+            name = f"{file.stem}_{number:06d}.png" if "#" in file.name else f"{file.stem}.png"
+            write_image(self.overlay / name, drawn(image, self.camera, estimate))
+
+
+def _write(table: Table, out: Path | None, trajectory: Path | None, plot: Path | None) -> None:
+    if out is not None:
+        write_table(table, out)
+    if trajectory is not None:
+        from tiltvp.corner_tables import write_trajectory
+
+        write_trajectory(table.rows, trajectory)
+    if plot is not None:
+        from tiltvp.images import write_image
+        from tiltvp.lab.plots.corner_poses import pose_plot
+        from tiltvp.lab.plots.picture import figure_picture
+
+        write_image(plot, figure_picture(pose_plot(table.frame())))
+
+
 def _estimator(
     calibration: Path,
     is_pair: bool,
     method: str,
+    given: CornerOptions,
     gamma_rad: float,
     pitch_deg: float | None,
     image_size: tuple[int, int] | None,
@@ -144,7 +188,7 @@ def _estimator(
     from tiltvp.corner import CornerPoseEstimator
     from tiltvp.stereo_rigs import StereoRig
 
-    options: dict[str, Any] = {"method": method, "gamma_rad": gamma_rad}
+    options: dict[str, Any] = {"method": method, "gamma_rad": gamma_rad} | given.given()
     if pitch_deg is not None:
         pitch_rad = math.radians(pitch_deg)
         options["down"] = (0.0, math.cos(pitch_rad), -math.sin(pitch_rad))
@@ -163,7 +207,7 @@ def _pairs(frames: Frames, others: Frames | None) -> Any:
 
 def drawn(image: NDArray[np.uint8], camera: Camera, estimate: CornerEstimate) -> NDArray[np.uint8]:
     """The image with its corners and the imaginary box."""
-    from tiltvp.plots.corner_overlay import draw_box, draw_corners
+    from tiltvp.overlays.corners import draw_box, draw_corners
 
     canvas = draw_corners(image, camera, estimate.features_left, estimate.chosen_left)
     pose = estimate.pose

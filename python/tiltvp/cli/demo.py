@@ -4,31 +4,28 @@ from __future__ import annotations
 
 import math
 import statistics
-import sys
 import time
 from collections.abc import Sequence
-from contextlib import AbstractContextManager, nullcontext
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Final
 
 from cyclopts import Parameter
 
 from tiltvp.cli.results import degrees
-from tiltvp.cli.terminal import new_table, say, show
+from tiltvp.cli.terminal import new_table, say, show, status
 from tiltvp.cli.tilt import words_of
 
 if TYPE_CHECKING:
     import numpy as np
-    import polars as pl
     from numpy.typing import NDArray
 
     from tiltvp import Camera, EdgeElements, TiltEstimate
-    from tiltvp.plots.demo import DemoData
-    from tiltvp.plots.offsets import Cosine
+    from tiltvp.overlays.offsets import Cosine
     from tiltvp.synth import RoomImage
 
 _RUNS: Final = 21
+_PANEL_PX: Final = 420
 _FIELD_OF_VIEW_DEG: Final = 185.0
 _FOCAL_PER_HEIGHT: Final = 139.7 / 480.0
 
@@ -88,11 +85,11 @@ def demo(
     from tiltvp.synth import render_room
 
     camera = _camera(width, height)
-    with _status(f"rendering a room ({kind}, seed {seed})"):
+    with status(f"rendering a room ({kind}, seed {seed})"):
         room = render_room(
             camera, kind=kind, seed=seed, alpha_rad=math.radians(alpha_deg), beta_rad=math.radians(beta_deg)
         )
-    with _status("estimating and drawing"):
+    with status("estimating and drawing"):
         trials = [_trial(camera, room, method, options) for method, options in METHODS]
         pictures = _pictures(camera, room, trials)
         for name, picture in pictures.items():
@@ -150,22 +147,33 @@ def _print_table(room: RoomImage, trials: Sequence[Trial]) -> None:
 
 
 def _pictures(camera: Camera, room: RoomImage, trials: Sequence[Trial]) -> dict[str, NDArray[np.uint8]]:
+    """The first trial is drawn and levels the image."""
     import numpy as np
 
-    from tiltvp.plots.demo import demo_plot, demo_summary
-    from tiltvp.plots.marks import draw_words
-    from tiltvp.plots.picture import figure_picture
+    from tiltvp import level
+    from tiltvp.overlays.chart import titled
+    from tiltvp.overlays.offsets import error_chart, lean_chart, offset_chart
+    from tiltvp.overlays.tilt import draw_words, tilt_overlay
 
-    data, best = _demo_data(camera, room, trials), trials[0]
-    pair = [draw_words(data.leaning, "leaning"), draw_words(data.levelled, "made level by the estimate")]
+    best, size = trials[0], (_PANEL_PX, _PANEL_PX)
+    overlay = tilt_overlay(room.bgr, camera, best.estimate, best.edges)
+    levelled = level(room.bgr, camera, best.estimate) if best.estimate else room.bgr
     seen = _seen_square(camera)
-    cut = replace(data, **{name: getattr(data, name)[seen] for name in ("overlay", "leaning", "levelled")})
+    offsets = offset_chart(size, best.edges.phi_rad, best.edges.offset_px, _cosines(camera, room, trials))
+    errors = [(trial.label, math.degrees(trial.error_rad)) for trial in trials]
+    leans = [(trial.label, trial.estimate.alpha_rad, trial.estimate.beta_rad) for trial in trials]
+    pair = [draw_words(room.bgr, "leaning"), draw_words(levelled, "made level by the estimate")]
+    edges = titled(overlay[seen], size, "vertical edges of a leaning robot's view")
+    plot = [
+        [edges, offsets],
+        [error_chart(size, errors), lean_chart(size, (room.alpha_rad, room.beta_rad), leans)],
+    ]
     return {
         "input.png": room.bgr,
-        "overlay.png": draw_words(data.overlay, words_of(best.estimate, best.label)),
+        "overlay.png": draw_words(overlay, words_of(best.estimate, best.label)),
         "levelled.png": np.hstack(pair),
-        "plot.png": figure_picture(demo_plot(cut), dpi=110.0),
-        "summary.png": figure_picture(demo_summary(cut), dpi=75.0),
+        "plot.png": np.vstack([np.hstack(row) for row in plot]),
+        "summary.png": np.hstack([edges, titled(levelled[seen], size, "made level by the estimate"), offsets]),
     }
 
 
@@ -178,70 +186,19 @@ def _seen_square(camera: Camera) -> tuple[slice, slice]:
     return slice(int(rows[0]), int(rows[-1]) + 1), slice(int(columns[0]), int(columns[-1]) + 1)
 
 
-def _demo_data(camera: Camera, room: RoomImage, trials: Sequence[Trial]) -> DemoData:
-    """The first trial is drawn and levels the image; the first with a shift tells the pixels per radian."""
-    from tiltvp import level, normal_from_alpha_beta
-    from tiltvp.plots.demo import DemoData
-    from tiltvp.plots.marks import tilt_overlay
-    from tiltvp.plots.offsets import cosine_of_tilt
+def _cosines(camera: Camera, room: RoomImage, trials: Sequence[Trial]) -> list[Cosine]:
+    """Those of the truth, of the first trial, and of the first with a shift, which tells the pixels per radian."""
+    from tiltvp import normal_from_alpha_beta
+    from tiltvp.overlays.offsets import BLUE, ORANGE, RED, cosine_of_tilt
 
-    best = trials[0]
     true = normal_from_alpha_beta(room.alpha_rad, room.beta_rad)
-    cosines: tuple[Cosine, ...] = ()
-    for shifted in trials:
-        estimate = shifted.estimate
-        if estimate and estimate.shift_px is not None and estimate.alpha_rad > 0.0:
-            factor = estimate.shift_px / estimate.alpha_rad
-            cosines = (
-                cosine_of_tilt("true tilt", camera, true, factor * room.alpha_rad, colour="red", dashed=True),
-                _cosine(camera, best, factor, "tab:blue"),
-                _cosine(camera, shifted, factor, "tab:orange"),
-            )
-            break
-    levelled = level(room.bgr, camera, best.estimate) if best.estimate else room.bgr
-    return DemoData(
-        overlay=tilt_overlay(room.bgr, camera, best.estimate, best.edges),
-        leaning=room.bgr,
-        levelled=levelled,
-        phi_rad=best.edges.phi_rad,
-        offset_px=best.edges.offset_px,
-        cosines=cosines,
-        table=_frame(trials),
-        alpha_rad=room.alpha_rad,
-        beta_rad=room.beta_rad,
-    )
-
-
-def _cosine(camera: Camera, trial: Trial, factor: float, colour: str) -> Cosine:
-    from tiltvp.plots.offsets import cosine_of_tilt
-
-    estimate = trial.estimate
-    return cosine_of_tilt(trial.label, camera, estimate.normal, factor * estimate.alpha_rad, colour=colour)
-
-
-def _frame(trials: Sequence[Trial]) -> pl.DataFrame:
-    import polars as pl
-
-    def finite(value: float) -> float | None:
-        return value if math.isfinite(value) else None
-
-    rows = [
-        {
-            "method": trial.label,
-            "alpha_rad": finite(trial.estimate.alpha_rad),
-            "beta_rad": finite(trial.estimate.beta_rad),
-            "error_rad": finite(trial.error_rad),
-        }
-        for trial in trials
-    ]
-    angles = dict.fromkeys(("alpha_rad", "beta_rad", "error_rad"), pl.Float64)
-    return pl.DataFrame(rows, schema={"method": pl.String, **angles})
-
-
-def _status(words: str) -> AbstractContextManager[object]:
-    """A moving sign on stderr while something takes long, on a terminal."""
-    if not sys.stderr.isatty():
-        return nullcontext()
-    from rich.console import Console
-
-    return Console(stderr=True).status(words)
+    for trial in trials:
+        shifted = trial.estimate
+        if shifted and shifted.shift_px is not None and shifted.alpha_rad > 0.0:
+            factor, best = shifted.shift_px / shifted.alpha_rad, trials[0].estimate
+            return [
+                cosine_of_tilt("true tilt", camera, true, factor * room.alpha_rad, colour=RED, dashed=True),
+                cosine_of_tilt(trials[0].label, camera, best.normal, factor * best.alpha_rad, colour=BLUE),
+                cosine_of_tilt(trial.label, camera, shifted.normal, shifted.shift_px, colour=ORANGE),
+            ]
+    return []

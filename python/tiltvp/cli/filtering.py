@@ -9,8 +9,10 @@ from typing import TYPE_CHECKING
 
 from cyclopts import Group, Parameter
 
+from tiltvp.cli.library_options import LibraryOptions, from_library
 from tiltvp.cli.options import Switch
 from tiltvp.cli.results import Outcome
+from tiltvp.cli.tables import check_plot
 from tiltvp.errors import InvalidInputError
 
 if TYPE_CHECKING:
@@ -22,7 +24,8 @@ _FILTER = Group("Abstaining and filtering")
 
 @Parameter(name="*", group=_FILTER)
 @dataclass(frozen=True, kw_only=True)
-class FilterOptions:
+@from_library({"TiltFilter": ()})
+class FilterOptions(LibraryOptions):
     """What is made of the estimates together."""
 
     confidence_min: float | None = None
@@ -38,17 +41,11 @@ class FilterOptions:
 
     def check(self) -> None:
         """Refuses what cannot be, before any work is done."""
-        for name, given in (
-            ("--odometry", self.odometry is not None),
-            ("--estimate-mounting", self.estimate_mounting),
-            ("--filter-plot", self.filter_plot is not None),
-        ):
-            if given and not self.filter:
-                raise InvalidInputError(f"{name} without --filter, expected both")
-        if self.filter_plot is not None and self.filter_plot.suffix.lower() != ".png":
-            raise InvalidInputError(
-                f"--filter-plot {self.filter_plot}: ends in {self.filter_plot.suffix!r}, expected .png"
-            )
+        for name in ("odometry", "filter_plot", *self._keywords):
+            given = getattr(self, name) not in (None, False)
+            if given and name != "confidence_min" and not self.filter:
+                raise InvalidInputError(f"--{name.replace('_', '-')} without --filter, expected both")
+        check_plot("--filter-plot", self.filter_plot)
         if self.filter or self.confidence_min is not None:
             self.make()
 
@@ -56,7 +53,7 @@ class FilterOptions:
         """The filter with the options that were given."""
         from tiltvp import TiltFilter
 
-        return TiltFilter(confidence_min=self.confidence_min, estimate_mounting=self.estimate_mounting)
+        return TiltFilter(**self.given())
 
     def motions(self, files: Sequence[Path]) -> list[Motion]:
         """What the robot did between the images; nothing that is known without odometry."""

@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 from tiltvp.cli.inputs import distinct_names, find_images
 from tiltvp.cli.line_options import LineOptions
 from tiltvp.cli.options import CameraOptions
-from tiltvp.cli.results import check_ending, degrees, write_frame
+from tiltvp.cli.results import degrees
+from tiltvp.cli.tables import Table, check_ending, write_table
 from tiltvp.cli.terminal import complain, named, new_table, progress_bar, show
 from tiltvp.errors import TiltvpError
 
 if TYPE_CHECKING:
-    import polars as pl
-
     from tiltvp.lines import Lines
 
 _DEFAULTS = LineOptions()
@@ -43,7 +42,7 @@ def lines(
         Folder for the images with their lines in colour.
     """
     from tiltvp.images import gray_from, read_image, write_image
-    from tiltvp.plots.lines import draw_lines
+    from tiltvp.overlays.lines import draw_lines
 
     if out is not None:
         check_ending(out)
@@ -66,48 +65,34 @@ def lines(
                 bar.complain(named(file, str(error)))
                 failed = True
             bar.advance()
-    table = new_table(
+    table = line_table(found)
+    printed = new_table(
         None, ("file", "line", "bearing deg", "1-sigma deg", "from deg", "to deg", "support px"), ["file"]
     )
-    for row in line_table(found).iter_rows(named=True):
+    for row in table.rows:
         low, high = degrees(row["elevation_min_rad"], 1), degrees(row["elevation_max_rad"], 1)
         bearing, sigma = degrees(row["bearing_rad"]), degrees(row["sigma_rad"], 3)
-        table.add_row(row["file"], str(row["line"]), bearing, sigma, low, high, str(row["support_px"]))
-    show(table)
+        printed.add_row(row["file"], str(row["line"]), bearing, sigma, low, high, str(row["support_px"]))
+    show(printed)
     if out is not None:
-        write_frame(line_table(found), out)
+        write_table(table, out)
     return 1 if failed else 0
 
 
-def line_columns(found: Lines) -> dict[str, Any]:
-    """The columns of a table that lines have by themselves."""
-    return {
-        "bearing_rad": found.bearing_rad,
-        "sigma_rad": found.sigma_rad,
-        "support_px": found.support_px,
-        "elevation_min_rad": found.elevation_min_rad,
-        "elevation_max_rad": found.elevation_max_rad,
-        "polarity": found.polarity,
-    }
+LINE_TYPES: Final = {"bearing_rad": "Float64", "sigma_rad": "Float64", "support_px": "UInt32"} | dict.fromkeys(
+    ("elevation_min_rad", "elevation_max_rad", "polarity"), "Float64"
+)
+"""The columns of a table that lines have by themselves."""
 
 
-def line_table(found: list[tuple[str, Lines]]) -> pl.DataFrame:
+def line_columns(found: Lines) -> dict[str, list[Any]]:
+    """The columns of `LINE_TYPES`."""
+    return {name: getattr(found, name).tolist() for name in LINE_TYPES}
+
+
+def line_table(found: list[tuple[str, Lines]]) -> Table:
     """One row for each line of each image: file, line, bearing_rad, sigma_rad, support_px, elevations, polarity."""
-    import polars as pl
-
-    schema = {"file": pl.String, "line": pl.UInt32} | line_schema()
-    parts = [
-        pl.DataFrame({"file": [file] * len(seen), "line": range(len(seen)), **line_columns(seen)}, schema=schema)
-        for file, seen in found
-    ]
-    return pl.concat([pl.DataFrame(schema=schema), *parts])
-
-
-def line_schema() -> dict[str, Any]:
-    """Names and types of the columns that lines have by themselves."""
-    import polars as pl
-
-    angles = ("elevation_min_rad", "elevation_max_rad", "polarity")
-    return {"bearing_rad": pl.Float64, "sigma_rad": pl.Float64, "support_px": pl.UInt32} | dict.fromkeys(
-        angles, pl.Float64
-    )
+    table = Table({"file": "String", "line": "UInt32"} | LINE_TYPES)
+    for file, seen in found:
+        table.add({"file": [file] * len(seen), "line": range(len(seen)), **line_columns(seen)})
+    return table

@@ -3,14 +3,16 @@
 # Annotations are evaluated: other files inherit these options, and there cyclopts would not find the names of types.
 
 import difflib
-import math
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Group, Parameter
 
+from tiltvp._core import METHODS
+from tiltvp.cli.library_options import LibraryOptions, from_library
 from tiltvp.errors import InvalidInputError
 
 if TYPE_CHECKING:
@@ -18,11 +20,6 @@ if TYPE_CHECKING:
 
 _CAMERA = Group("Camera")
 _METHOD = Group("Method", help="An option that is not given has the default of its method.")
-_AS_THEY_ARE = (
-    "method", "margin_px", "row_stride", "gradient_min", "smoothing_px", "keep_fraction", "max_iterations",
-    "threshold_px", "offset_max_px", "normal", "sampling", "local_optimization", "score", "verification", "seed",
-)  # fmt: skip
-_ANGLES = ("elevation_min", "elevation_max", "tilt_max", "scale", "tolerance", "threshold")
 Switch = Annotated[bool, Parameter(negative="", show_default=False)]
 
 
@@ -67,107 +64,43 @@ class CameraOptions:
 
 
 @dataclass(frozen=True, kw_only=True)
-class EdgeOptions:
-    """Where edges are looked for, and what is one."""
+class MountedOptions(LibraryOptions):
+    """How the camera sits on the robot, and where the robot sees itself."""
 
-    method: str | None = None
-    """Name of the method."""
     robot_from_camera: str | None = None
     """How the camera sits on the robot: up (the default), forward, or a file with a rotation."""
-    elevation_min_deg: float | None = None
-    """Lowest elevation that is looked at, above the robot's horizon."""
-    elevation_max_deg: float | None = None
-    """Highest elevation that is looked at."""
-    margin_px: float | None = None
-    """Pixels kept clear of the lens' rim, the image border and the mask."""
     mask: Path | None = None
     """Image of the camera's size, white where the world is seen and black where the robot is."""
-    row_stride: int | None = None
-    """Look at every so-manieth row of the image only: less time, and less sure an answer."""
-    gradient_min: float | None = None
-    """Least gradient magnitude of an edge pixel (3x3 Scharr kernel, 8 bit)."""
-    smoothing_px: float | None = None
-    """Standard deviation of the Gaussian before the kernel."""
 
 
 @Parameter(name="*", group=_METHOD)
 @dataclass(frozen=True, kw_only=True)
-class MethodOptions(EdgeOptions):
+@from_library({"TiltEstimator": METHODS})
+class MethodOptions(MountedOptions):
     """How the tilt is estimated."""
 
     method: str | None = None
     """refined, image-space-ransac, image-space-reject-refit or vector-consensus."""
-    tilt_max_deg: float | None = None
-    """Largest tilt expected: edges that would need a larger one are rejected first."""
-    keep_fraction: float | None = None
-    """Share of residuals kept in each round of trimming."""
-    scale_deg: float | None = None
-    """Standard deviation of the soft gate of the refined method."""
-    tolerance_deg: float | None = None
-    """Change of the direction below which the refined method has converged."""
-    max_iterations: int | None = None
-    """Most refits of the refined method with the gate at its final scale."""
-    threshold_px: float | None = None
-    """Largest residual of an inlier of image-space-ransac."""
-    threshold_deg: float | None = None
-    """Largest residual of an inlier of vector-consensus."""
-    offset_max_px: float | None = None
-    """Largest edge offset of the image-space methods."""
-    normal: str | None = None
-    """gradient or tangent: the normals of vector-consensus."""
     correction: str | None = None
     """closed-form, none or a number: the factor from shift (or raw angle) to angle."""
-    sampling: str | None = None
-    """uniform, progressive or prosac: which samples image-space-ransac and vector-consensus draw."""
-    local_optimization: Annotated[bool | None, Parameter(negative="")] = None
-    """Refine each new best model by least squares before the next sample."""
-    score: str | None = None
-    """count, msac or magsac: what makes one model better than another."""
-    verification: str | None = None
-    """full or sprt: score every model, or give up those that fail a test."""
-    seed: int | None = None
-    """Seed of the random samples."""
 
     def estimator(self, camera: "Camera") -> "TiltEstimator":
         """The estimator with the options that were given."""
-        from tiltvp import METHODS, TiltEstimator
+        from tiltvp import TiltEstimator
         from tiltvp.rotations import read_rotation
 
-        options = self._given()
+        options = self.given()
         if self.robot_from_camera is not None:
             options["robot_from_camera"] = read_rotation(self.robot_from_camera)
-        if self.method is not None and self.method not in METHODS:
-            near = difflib.get_close_matches(self.method, METHODS, 1, 0.3)
-            meant = f" (did you mean {near[0]}?)" if near else ""
-            raise InvalidInputError(f"--method {self.method!r}{meant}, expected one of {', '.join(METHODS)}")
+        if self.method is not None:
+            check_word("--method", self.method, METHODS)
+            options["method"] = self.method
         return TiltEstimator(camera, **options)
 
-    def _given(self) -> dict[str, Any]:
-        """The keywords of `TiltEstimator`: what was not given is left to the library."""
-        options: dict[str, Any] = {name: getattr(self, name) for name in _AS_THEY_ARE}
-        for name in _ANGLES:
-            degrees = getattr(self, f"{name}_deg")
-            options[f"{name}_rad"] = None if degrees is None else math.radians(degrees)
-        options = {name: value for name, value in options.items() if value is not None}
-        if self.mask is not None:
-            options["mask"] = mask_from(self.mask)
-        if self.correction is not None:
-            options["correction"] = _correction_from(self.correction)
-        return options
 
-
-def mask_from(path: Path) -> object:
-    """Where an image is bright."""
-    from tiltvp import read_image
-    from tiltvp.images import gray_from
-
-    return gray_from(read_image(path), str(path)) > 127
-
-
-def _correction_from(word: str) -> str | float | None:
-    if word == "none":
-        return None
-    try:
-        return float(word)
-    except ValueError:
-        return word
+def check_word(option: str, word: str, known: Sequence[str]) -> None:
+    """Refuses a word that is not known, and names the near ones."""
+    if word not in known:
+        near = difflib.get_close_matches(word, known, 1, 0.3)
+        meant = f" (did you mean {near[0]}?)" if near else ""
+        raise InvalidInputError(f"{option} {word!r}{meant}, expected one of {', '.join(known)}")

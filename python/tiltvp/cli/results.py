@@ -3,20 +3,16 @@
 from __future__ import annotations
 
 import math
-import os
-import secrets
 from collections.abc import Sequence
-from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Final
 
-from tiltvp.cli.terminal import new_table, show
-from tiltvp.errors import ImageFileError, InvalidInputError
+from tiltvp.cli.tables import Table, finite
+from tiltvp.cli.terminal import new_table
 
 if TYPE_CHECKING:
-    import polars as pl
-    from rich.table import Table
+    from rich.table import Table as PrintedTable
 
     from tiltvp import FilteredTilt, TiltEstimate
 
@@ -29,7 +25,6 @@ _JUDGED: Final = ("verdict",)
 _FILTERED: Final = ("filtered alpha deg", "filtered beta deg", "filtered 1-sigma deg")
 _NUMBERS_WIDTH, _FILE_WIDTH = 135, 40
 """Columns of text that all but the file and a folded reason take, and those that a long file name is granted."""
-ENDINGS: Final = (".csv", ".json", ".parquet")
 _NUMBERS: Final = (
     "alpha_rad", "beta_rad", "roll_rad", "pitch_rad", "normal_x", "normal_y", "normal_z",
     "covariance_xx_rad2", "covariance_xy_rad2", "covariance_yy_rad2", "sigma_rad", "confidence",
@@ -67,7 +62,7 @@ def degrees(value_rad: float, digits: int = 2) -> str:
     return f"{math.degrees(value_rad):.{digits}f}" if math.isfinite(value_rad) else "-"
 
 
-def people_table(outcomes: Sequence[Outcome], width: int) -> Table:
+def people_table(outcomes: Sequence[Outcome], width: int) -> PrintedTable:
     """One row for each image, angles in degrees; only the columns that matter most where `width` holds no more."""
     rows = [_people_row(outcome) for outcome in outcomes]
     longest = max((len(row["file"]) for row in rows), default=0)
@@ -108,23 +103,21 @@ def _people_row(outcome: Outcome) -> dict[str, str]:
     }
 
 
-def data_frame(outcomes: Sequence[Outcome], method: str) -> pl.DataFrame:
-    """One row for each image in SI units; null where there is no value, `error` where the image could not be used.
+def outcome_table(outcomes: Sequence[Outcome], method: str) -> Table:
+    """One row for each image in SI units; None where there is no value, `error` where the image could not be used.
 
     Judged outcomes have `accepted`, `verdict` and `verdict_reason`; those of a filter also `nis`, and the filtered tilt
-    in columns `filtered_...`, null where the filter abstains but for covariance, sigma and confidence.
+    in columns `filtered_...`, None where the filter abstains but for covariance, sigma and confidence.
     """
-    import polars as pl
-
-    schema: dict[str, Any] = {"file": pl.String, "method": pl.String}
-    schema |= dict.fromkeys(_NUMBERS, pl.Float64) | dict.fromkeys(_COUNTS, pl.Int64)
-    schema |= dict.fromkeys(_MORE_NUMBERS, pl.Float64) | dict.fromkeys(_WORDS, pl.String)
+    types = {"file": "String", "method": "String"}
+    types |= dict.fromkeys(_NUMBERS, "Float64") | dict.fromkeys(_COUNTS, "Int64")
+    types |= dict.fromkeys(_MORE_NUMBERS, "Float64") | dict.fromkeys(_WORDS, "String")
     if any(outcome.accepted is not None for outcome in outcomes):
-        schema |= {"accepted": pl.Boolean, "verdict": pl.String, "verdict_reason": pl.String}
+        types |= {"accepted": "Boolean", "verdict": "String", "verdict_reason": "String"}
     if any(outcome.filtered is not None for outcome in outcomes):
-        schema |= {"nis": pl.Float64} | {f"filtered_{name}": pl.Float64 for name in _NUMBERS}
+        types |= {"nis": "Float64"} | {f"filtered_{name}": "Float64" for name in _NUMBERS}
     rows = [{"file": str(outcome.file), "method": method} | _row(outcome) | _judged(outcome) for outcome in outcomes]
-    return pl.DataFrame([{name: _plain(row.get(name)) for name in schema} for row in rows], schema=schema)
+    return Table(types, [{name: finite(row.get(name)) for name in types} for row in rows])
 
 
 def _row(outcome: Outcome) -> dict[str, object]:
@@ -154,59 +147,3 @@ def _numbers(e: TiltEstimate | FilteredTilt) -> dict[str, object]:
     places = {"xx": (0, 0), "xy": (0, 1), "yy": (1, 1)}
     row |= {f"covariance_{name}_rad2": float(covariance[place]) for name, place in places.items()}
     return row | {"sigma_rad": sigma_rad(e)}
-
-
-def _plain(value: object) -> object:
-    return None if isinstance(value, float) and not math.isfinite(value) else value
-
-
-def show_frame(title: str, frame: pl.DataFrame, words: Sequence[str], hidden: Sequence[str] = ()) -> None:
-    """A table of numbers on stdout; the columns in `words` hold words, those in `hidden` are left out.
-
-    The title has the unit of the columns that end in one.
-    """
-    shown = frame.select(name for name in frame.columns if name not in hidden)
-    table = new_table(title, (_heading(name) for name in shown.columns), left=words)
-    for row in shown.iter_rows():
-        table.add_row(*(_cell(cell) for cell in row))
-    show(table)
-
-
-def _heading(column: str) -> str:
-    """The name of a column without its unit, which the title of the table has."""
-    return column.removesuffix("_deg").removesuffix("_ms").replace("_", " ")
-
-
-def _cell(value: object) -> str:
-    if value is None:
-        return ""
-    if not isinstance(value, float):
-        return str(value)
-    return f"{value:.3f}" if abs(value) < 100.0 else f"{value:.1f}"
-
-
-def check_ending(path: Path) -> None:
-    """Refuses a file of results in a format that cannot be written, before any work is done."""
-    if path.suffix.lower() not in ENDINGS:
-        raise InvalidInputError(f"--out {path}: ends in {path.suffix!r}, expected one of {', '.join(ENDINGS)}")
-
-
-def write_frame(frame: pl.DataFrame, path: Path) -> None:
-    """Writes the table whole or not at all; the ending says the format."""
-    check_ending(path)
-    part = path.with_name(f".{path.name}.{secrets.token_hex(8)}.part")
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        match path.suffix.lower():
-            case ".csv":
-                frame.write_csv(part)
-            case ".json":
-                frame.write_json(part)
-            case _:
-                frame.write_parquet(part)
-        os.replace(part, path)
-    except OSError as error:
-        raise ImageFileError(f"{path}: cannot be written ({error.strerror or error})") from error
-    finally:
-        with suppress(OSError):
-            part.unlink()

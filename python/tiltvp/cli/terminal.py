@@ -77,7 +77,7 @@ def new_table(title: str | None, columns: Iterable[str], left: Iterable[str] = (
 
 @contextmanager
 def status(words: str) -> Iterator[Callable[[str], None]]:
-    """A moving sign on stderr while something takes long, on a terminal; what it gives changes the words."""
+    """A moving sign on stderr while something takes long, on a terminal; call what it yields to change the words."""
     if not sys.stderr.isatty():
         yield lambda _: None
         return

@@ -15,7 +15,8 @@ from cyclopts import Parameter, validators
 from tiltvp.cli.filtering import FilterOptions
 from tiltvp.cli.inputs import distinct_names, find_images
 from tiltvp.cli.options import CameraOptions, MethodOptions
-from tiltvp.cli.results import Outcome, check_ending, data_frame, degrees, people_table, write_frame
+from tiltvp.cli.results import Outcome, degrees, outcome_table, people_table
+from tiltvp.cli.tables import check_ending, write_table
 from tiltvp.cli.terminal import ProgressBar, complain, named, progress_bar, show, width
 from tiltvp.errors import InvalidInputError, TiltvpError
 
@@ -73,7 +74,7 @@ def tilt(
     outcomes = filtering.judged(_done(work, files, distinct_names(files), threads), motions)
     show(people_table(outcomes, width()))
     if out is not None:
-        write_frame(data_frame(outcomes, estimator.method), out)
+        write_table(outcome_table(outcomes, estimator.method), out)
     if filtering.filter_plot is not None:
         _write_plot(outcomes, estimator.method, filtering.filter_plot)
     return 1 if problems or any(outcome.error for outcome in outcomes) else 0
@@ -81,10 +82,10 @@ def tilt(
 
 def _write_plot(outcomes: Sequence[Outcome], method: str, path: Path) -> None:
     from tiltvp import write_image
-    from tiltvp.plots.filtering import filtered_tilt
-    from tiltvp.plots.picture import figure_picture
+    from tiltvp.lab.plots.filtering import filtered_tilt
+    from tiltvp.lab.plots.picture import figure_picture
 
-    write_image(path, figure_picture(filtered_tilt(data_frame(outcomes, method))))
+    write_image(path, figure_picture(filtered_tilt(outcome_table(outcomes, method).frame())))
 
 
 def _done(work: Work, files: Sequence[Path], names: Sequence[str], threads: int) -> list[Outcome]:
@@ -145,7 +146,7 @@ class Work:
     def _overlay(
         self, gray: NDArray[np.uint8], estimate: TiltEstimate, edges: EdgeElements, title: str
     ) -> NDArray[np.uint8]:
-        from tiltvp.plots.marks import tilt_overlay
+        from tiltvp.overlays.tilt import tilt_overlay
 
         return tilt_overlay(
             gray, self.estimator.camera, estimate, edges, self.estimator.robot_from_camera, words_of(estimate, title)

@@ -4,22 +4,23 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import nullcontext
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
-from cyclopts import Parameter, validators
+from cyclopts import Group, Parameter, validators
 
 from tiltvp.cli.frames import Frames, open_frames
+from tiltvp.cli.library_options import LibraryOptions, from_library
 from tiltvp.cli.line_options import LineOptions
-from tiltvp.cli.lines import line_columns, line_schema
+from tiltvp.cli.lines import LINE_TYPES, line_columns
 from tiltvp.cli.options import CameraOptions
-from tiltvp.cli.results import check_ending, write_frame
+from tiltvp.cli.tables import Table, check_ending, check_plot, write_table
 from tiltvp.cli.terminal import ProgressBar, named, progress_bar, say
 from tiltvp.errors import InvalidInputError, TiltvpError
 
 if TYPE_CHECKING:
     import numpy as np
-    import polars as pl
     from numpy.typing import NDArray
 
     from tiltvp import TiltEstimate
@@ -27,7 +28,15 @@ if TYPE_CHECKING:
     from tiltvp.lines import LineExtractor, LineTracker, TrackedLines
     from tiltvp.odometry import Motion
 
-_DEFAULTS = LineOptions()
+
+@Parameter(name="*", group=Group("Tracking"))
+@dataclass(frozen=True, kw_only=True)
+@from_library({"LineTracker": ()}, words={"camera_m": "--camera-at"})
+class TrackerOptions(LibraryOptions):
+    """How lines are followed."""
+
+
+_DEFAULTS, _TRACKER = LineOptions(), TrackerOptions()
 
 
 def track(
@@ -41,8 +50,7 @@ def track(
     plot: Path | None = None,
     video: Path | None = None,
     frame_rate: Annotated[float | None, Parameter(validator=validators.Number(gt=0))] = None,
-    look_back: Annotated[int | None, Parameter(validator=validators.Number(gte=1))] = None,
-    camera_at: tuple[float, float] | None = None,
+    tracking: TrackerOptions = _TRACKER,
 ) -> int:
     """Follow vertical lines through the images of a folder, in the order of their names, or through a video.
 
@@ -62,25 +70,18 @@ def track(
         The frames with their lines in the colours of their tracks: .mp4 or .avi.
     frame_rate
         Frames per second of that video: those of the source by default, 25 for images.
-    look_back
-        How many frames back a line is looked for before it counts as new.
-    camera_at
-        Where the camera is on the robot, for what distances of the odometry do to bearings: metres to the front and to
-        the left of the middle between the wheels; default 0 0.
     """
     from tiltvp.images import write_image
     from tiltvp.lines import LineTracker
     from tiltvp.odometry import read_odometry
-    from tiltvp.plots.lines import draw_lines
+    from tiltvp.overlays.lines import draw_lines
     from tiltvp.videos import video_writer
 
     check_ending(out)
-    if plot is not None and plot.suffix.lower() != ".png":
-        raise InvalidInputError(f"--plot {plot}: ends in {plot.suffix!r}, expected .png")
+    check_plot("--plot", plot)
     lens = camera.load()
     extractor, tilt = options.extractor(lens), options.tilts(lens)
-    given: dict[str, Any] = {"look_back": look_back, "camera_m": camera_at}
-    tracker = LineTracker(**{name: value for name, value in given.items() if value is not None})
+    tracker = LineTracker(**tracking.given())
     frames = open_frames(source)
     motions = None if odometry is None else read_odometry(odometry, frames.files)
     tracked: list[tuple[int, str, TrackedLines]] = []
@@ -96,14 +97,14 @@ def track(
     if not tracked:
         raise InvalidInputError(f"{source}: {bad} frames, none of which can be read")
     table = track_table(tracked)
-    write_frame(table, out)
+    write_table(table, out)
     if plot is not None:
-        from tiltvp.plots.picture import figure_picture
-        from tiltvp.plots.tracks import track_plot
+        from tiltvp.lab.plots.picture import figure_picture
+        from tiltvp.lab.plots.tracks import track_plot
 
-        write_image(plot, figure_picture(track_plot(table)))
+        write_image(plot, figure_picture(track_plot(table.frame())))
     skipped = f", {bad} skipped" if bad else ""
-    say(f"{out}: {len(tracked)} frames{skipped}, {table.height} lines, {tracker.track_count} tracks")
+    say(f"{out}: {len(tracked)} frames{skipped}, {len(table.rows)} lines, {tracker.track_count} tracks")
     return 1 if bad else 0
 
 
@@ -128,15 +129,11 @@ def followed(
         bar.advance()
 
 
-def track_table(tracked: Sequence[tuple[int, str, TrackedLines]]) -> pl.DataFrame:
+def track_table(tracked: Sequence[tuple[int, str, TrackedLines]]) -> Table:
     """One row for each line of each frame: frame, file, track, frames_back (0: a new track), and the line's columns."""
-    import polars as pl
-
-    schema: dict[str, Any] = {"frame": pl.UInt32, "file": pl.String, "track": pl.Int64} | line_schema()
-    schema |= {"frames_back": pl.Int64}
-    parts = []
+    table = Table({"frame": "UInt32", "file": "String", "track": "Int64"} | LINE_TYPES | {"frames_back": "Int64"})
     for frame, file, found in tracked:
         n = len(found)
-        columns = {"frame": [frame] * n, "file": [file] * n, "track": found.track, **line_columns(found.lines)}
-        parts.append(pl.DataFrame(columns | {"frames_back": found.frames_back}, schema=schema))
-    return pl.concat([pl.DataFrame(schema=schema), *parts])
+        columns = {"frame": [frame] * n, "file": [file] * n, "track": found.track.tolist()}
+        table.add(columns | line_columns(found.lines) | {"frames_back": found.frames_back.tolist()})
+    return table

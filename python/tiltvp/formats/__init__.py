@@ -31,9 +31,9 @@ from tiltvp.formats import (
 )
 from tiltvp.formats.document import Document
 from tiltvp.formats.own import write_toml
-from tiltvp.formats.spec import MODELS, CameraSpec, ImageSize, ModelParameters
+from tiltvp.formats.spec import CameraSpec, ImageSize
 
-__all__ = ["FORMATS", "MODELS", "CameraSpec", "Format", "ModelParameters", "read_cameras", "write_toml"]
+__all__ = ["FORMATS", "CameraSpec", "Format", "read_cameras", "write_toml"]
 
 
 @dataclass(frozen=True)

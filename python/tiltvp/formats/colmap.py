@@ -71,6 +71,4 @@ def _camera(document: Document, number: int, words: list[str], given: ImageSize 
         values["fx"] = values["fy"] = values.pop("f")
     values["cx"] -= 0.5
     values["cy"] -= 0.5
-    if model == "kannala_brandt":
-        values = dict.fromkeys(("k1", "k2", "k3", "k4"), 0.0) | values
     return line.spec(model, size, dict(values), f"cam{camera_id}")

@@ -4,22 +4,17 @@ from __future__ import annotations
 
 import json
 import os
-import re
 import xml.etree.ElementTree as ElementTree
-from collections.abc import Hashable
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import Final, NoReturn
-
-import yaml  # type: ignore[import-untyped, unused-ignore]
 
 from tiltvp.errors import CalibrationError, CalibrationNotFoundError
 
 Tree = dict[str, object]
 
 _LARGEST_BYTES: Final = 4 << 20
-_OPENCV_DIRECTIVE: Final = re.compile(r"\A%YAML[: ]*[\d.]*[^\n]*")
 
 
 @dataclass(frozen=True)
@@ -90,43 +85,15 @@ class Document:
             elif start in "{[":
                 tree = json.loads(self.text, object_pairs_hook=_from_pairs)
             else:
-                tree = yaml.load(_plain_yaml(self.text), Loader=_Loader)
-        except (yaml.YAMLError, ElementTree.ParseError, ValueError, LookupError, RecursionError) as error:
+                # Here, so that `import tiltvp` does without PyYAML.
+                from tiltvp.formats.yaml_text import tree_of
+
+                tree = tree_of(self.text)
+        except (ElementTree.ParseError, ValueError, LookupError, RecursionError) as error:
             return {}, " ".join(str(error).split()) or type(error).__name__
         if not isinstance(tree, dict):
             return {}, f"a {type(tree).__name__} at the top"
         return {str(key): value for key, value in tree.items()}, ""
-
-
-def _plain_yaml(text: str) -> str:
-    """OpenCV's `%YAML:1.0` line is no YAML directive, and tabs are no YAML white space: both are made harmless."""
-    return _OPENCV_DIRECTIVE.sub("#", text.replace("\t", "    "))
-
-
-class _Loader(yaml.BaseLoader):  # type: ignore[misc, unused-ignore]
-    """Reads every scalar as its text and ignores tags (`!!opencv-matrix`), so that 1e-5 is not a matter of dialect."""
-
-    def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Hashable, object]:
-        if not isinstance(node, yaml.MappingNode):
-            raise yaml.constructor.ConstructorError(None, None, "expected a mapping", node.start_mark)
-        pairs: dict[Hashable, object] = {}
-        for key_node, value_node in node.value:
-            if not isinstance(key_node, yaml.ScalarNode):
-                raise yaml.constructor.ConstructorError(None, None, "found a key that is no word", key_node.start_mark)
-            key, value = key_node.value, self.construct_object(value_node, deep=True)
-            if key in pairs and not _same(pairs[key], value):
-                raise yaml.constructor.ConstructorError(
-                    None, None, f"found the key {key!r} twice with different values", key_node.start_mark
-                )
-            pairs[key] = value
-        return pairs
-
-
-def _same(one: object, other: object) -> bool:
-    try:
-        return one == other
-    except RecursionError:
-        return False
 
 
 def _from_pairs(pairs: list[tuple[str, object]]) -> Tree:

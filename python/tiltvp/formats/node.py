@@ -9,9 +9,10 @@ import re
 from collections.abc import Iterable
 from typing import Final, NoReturn
 
-from tiltvp.errors import UnsupportedFormatError
+from tiltvp import _core
+from tiltvp.errors import CalibrationError, TiltvpError, UnsupportedFormatError
 from tiltvp.formats.document import Document
-from tiltvp.formats.spec import CameraSpec, ImageSize, Parameters, first_fault
+from tiltvp.formats.spec import CameraSpec, ImageSize, Parameters
 
 _NUMBER: Final = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 _DEEPEST: Final = 4
@@ -182,11 +183,16 @@ class Node:
         return stated
 
     def spec(self, model: str, size: ImageSize, parameters: Parameters, name: str, *notes: str) -> CameraSpec:
-        """The camera, once its numbers have been found to make sense."""
-        spec = CameraSpec(model, size[0], size[1], parameters, name=name, notes=notes)
-        fault = first_fault(spec)
-        if fault is not None:
-            self.document.fail(fault[0], fault[1], f"{self.at}.{fault[2]}" if self.at else fault[2])
+        """The camera of these numbers, which the core has checked."""
+        return self.checked(CameraSpec(model, size[0], size[1], parameters, name=name, notes=notes))
+
+    def checked(self, spec: CameraSpec) -> CameraSpec:
+        """The same camera; what the core says against it is raised with the file and this place."""
+        try:
+            spec.check()
+        except TiltvpError as error:
+            kind = CalibrationError if spec.model in _core.CAMERA_MODELS else UnsupportedFormatError
+            raise kind(f"{self.document.path}: {error}, at {self.place}") from None
         return spec
 
 

@@ -24,12 +24,10 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Final
 
-import tomli_w
-
-from tiltvp.errors import CalibrationError
+from tiltvp.errors import CalibrationError, TiltvpError
 from tiltvp.formats.document import Document
 from tiltvp.formats.node import Node
-from tiltvp.formats.spec import MODELS, CameraSpec, ImageSize, Parameters, first_fault
+from tiltvp.formats.spec import CameraSpec, ImageSize, Parameters
 
 _FORMAT: Final = "tiltvp-camera"
 _VERSION: Final = 1
@@ -67,41 +65,36 @@ def write_toml(spec: CameraSpec | Sequence[CameraSpec], path: str | os.PathLike[
     if not specs:
         raise CalibrationError(f"{path}: there is no camera to write, expected one or more, at spec")
     for one in specs:
-        fault = first_fault(as_floats(one))
-        if fault is not None:
-            raise CalibrationError(f"{path}: {fault[0]}, expected {fault[1]}, at {fault[2]}")
+        try:
+            one.check()
+        except TiltvpError as error:
+            raise CalibrationError(f"{path}: {error}, at {one.name}") from None
     tree = {"format": _FORMAT, "version": _VERSION, "camera": [camera_table(as_floats(one)) for one in specs]}
+    import tomli_w
+
     write_whole(Path(path), tomli_w.dumps(tree).encode("utf-8"))
 
 
 def camera_from(camera: Node, given: ImageSize | None) -> CameraSpec:
     """The camera of one table."""
     camera.only(*_KEYS)
-    model = camera.need("model")
-    known = MODELS.get(model.text())
-    if known is None:
-        model.refuse(f"the model {model.text()!r} is not supported", "one of " + ", ".join(MODELS))
     size = camera.image_size(given, camera.need("width"), camera.need("height"), "the file")
-    group = camera.need("parameters")
-    group.only(*known.names)
-    parameters: Parameters = {}
-    for key in group.tree:
-        value = group.need(key)
-        parameters[key] = value.numbers() if key in known.lists else value.number()
     name, mirror = camera.get("name"), camera.get("mirror")
     limit, notes = camera.get("max_theta_rad"), camera.get("notes")
     if name is not None and not isinstance(name.value, str):
         name.text()
-    spec = replace(
-        group.spec(model.text(), size, parameters, str(name.value) if name else "cam0"),
+    parameters = camera.need("parameters")
+    spec = CameraSpec(
+        camera.need("model").text(),
+        size[0],
+        size[1],
+        dict(parameters.tree),  # type: ignore[arg-type]  # The core says what is no number.
         mirror=mirror.flag() if mirror else False,
+        name=str(name.value) if name else "cam0",
         max_theta_rad=limit.number() if limit else None,
         notes=tuple(str(note.value) for note in notes.items()) if notes else (),
     )
-    fault = first_fault(spec)
-    if fault is not None:
-        camera.document.fail(fault[0], fault[1], f"{camera.at}.{fault[2]}")
-    return spec
+    return as_floats(parameters.checked(spec))
 
 
 def as_floats(spec: CameraSpec) -> CameraSpec:

@@ -24,7 +24,6 @@ from pathlib import Path
 from typing import Final
 
 import numpy as np
-import tomli_w
 from numpy.typing import NDArray
 
 from tiltvp.errors import CalibrationError
@@ -68,6 +67,8 @@ def write_stereo_toml(spec: StereoSpec, path: str | os.PathLike[str]) -> None:
     """Writes a pair to `path`; the file appears whole or not at all."""
     tree = {"format": _FORMAT, "version": _VERSION, "left_from_right": np.asarray(spec.left_from_right).tolist()}
     tree |= {"left": camera_table(as_floats(spec.left)), "right": camera_table(as_floats(spec.right))}
+    import tomli_w
+
     write_whole(Path(path), tomli_w.dumps(tree).encode("utf-8"))
 
 

@@ -2,8 +2,8 @@
 
 use nalgebra::{Matrix2x3, Matrix3x2, Vector2, Vector3};
 
-use super::any::with_model;
 use super::calibrated::Camera;
+use super::with_model;
 use crate::error::{Error, Result};
 
 impl Camera {

@@ -4,8 +4,15 @@ use nalgebra::{Matrix2, Vector2};
 
 use super::polynomial::{derivative, first_fall, product, sum};
 use super::rim::{FARTHEST, FOLD};
+use super::schema::ParameterSchema;
 use super::solve;
 use crate::error::{Error, Result};
+
+pub(super) const K1: ParameterSchema = ParameterSchema::coefficient("k1", "radial distortion, of r^2");
+pub(super) const K2: ParameterSchema = ParameterSchema::coefficient("k2", "radial distortion, of r^4");
+pub(super) const K3: ParameterSchema = ParameterSchema::coefficient("k3", "radial distortion, of r^6");
+pub(super) const P1: ParameterSchema = ParameterSchema::coefficient("p1", "tangential distortion");
+pub(super) const P2: ParameterSchema = ParameterSchema::coefficient("p2", "tangential distortion");
 
 /// The distortion, with `s = x^2 + y^2` and `f = (1 + k1 s + k2 s^2 + k3 s^3) / (1 + k4 s + k5 s^2 + k6 s^3)`:
 /// `x' = x f + 2 p1 x y + p2 (s + 2 x^2)`, `y' = y f + p1 (s + 2 y^2) + 2 p2 x y`.

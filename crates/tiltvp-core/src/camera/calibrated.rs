@@ -2,10 +2,14 @@
 
 use nalgebra::{Matrix2x3, Matrix3x2, Vector2, Vector3};
 
-use super::any::{Model, with_model};
 use super::model::CameraModel;
 use super::rim::Rim;
+use super::{Model, with_model};
 use crate::error::{Error, Result};
+
+/// The longest side of an image. No camera and no panorama has so many pixels a side: a longer one is a slip in a file, and
+/// tables of its pixels would not fit into memory (`every_model_refuses_an_impossible_size`).
+pub const LARGEST_SIDE_PX: u32 = 100_000;
 
 /// A calibrated central camera.
 ///
@@ -28,17 +32,17 @@ impl Camera {
     /// A camera with images of `width` x `height` pixels that answers wherever its model does.
     ///
     /// # Errors
-    /// [`Error::InvalidCamera`] if a side of the image is zero, or is not that of an equirectangular model.
+    /// [`Error::InvalidCamera`] unless the sides of the image are from 1 to [`LARGEST_SIDE_PX`], and those of the model if
+    /// it is made for one size.
     pub fn new(width: u32, height: u32, model: Model) -> Result<Self> {
-        if width == 0 || height == 0 {
-            return Err(Error::camera("camera", "width, height", format!("{width} x {height}"), "at least one pixel"));
+        for (name, side) in [("width", width), ("height", height)] {
+            if !(1..=LARGEST_SIDE_PX).contains(&side) {
+                return Err(Error::camera(model.name(), name, side, format!("1 to {LARGEST_SIDE_PX} pixels")));
+            }
         }
-        if let Model::Equirectangular(panorama) = &model
-            && panorama.size() != (width, height)
-        {
-            let (w, h) = panorama.size();
-            let expected = format!("{w} x {h}, the size of its equirectangular model");
-            return Err(Error::camera("camera", "width, height", format!("{width} x {height}"), expected));
+        if let Some([w, h]) = model.as_dyn().image_size().filter(|size| *size != [width, height]) {
+            let expected = format!("{w} x {h}, the size that the model is made for");
+            return Err(Error::camera(model.name(), "width, height", format!("{width} x {height}"), expected));
         }
         let (max_theta_rad, axis_z) = (model.as_dyn().max_theta_rad(), model.as_dyn().axis_z());
         Ok(Self { width, height, model, mirror: false, max_theta_rad, limit: None, axis_z })
@@ -50,7 +54,7 @@ impl Camera {
     /// [`Error::InvalidCamera`] unless `0 < max_theta_rad <= pi`.
     pub fn with_max_theta_rad(mut self, max_theta_rad: f64) -> Result<Self> {
         if !(max_theta_rad > 0.0 && max_theta_rad <= std::f64::consts::PI) {
-            return Err(Error::camera("camera", "max_theta_rad", max_theta_rad, "an angle in (0, pi]"));
+            return Err(Error::camera(self.model.name(), "max_theta_rad", max_theta_rad, "an angle in (0, pi]"));
         }
         let own = self.model.as_dyn().max_theta_rad();
         self.max_theta_rad = max_theta_rad.min(own);

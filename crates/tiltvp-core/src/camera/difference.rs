@@ -11,11 +11,12 @@ pub struct Derivative<const N: usize> {
     pub error: f64,
 }
 
-/// Steps tried, each half of the one before.
+/// Steps tried, each half of the one before: the last is 2^-15 of the first, where rounding outweighs the curvature.
 const STEPS: usize = 16;
-/// Halvings allowed until the function has a value on both sides.
+/// Halvings allowed until the function has a value on both sides: 2^-40 of the largest step is a millionth of a millionth of it.
 const APPROACH: usize = 40;
-/// Extrapolations per step: the error goes with the step to the power of twice this.
+/// Extrapolations per step: the error goes with the step to the power of twice this, so that from the
+/// fifth on the rounding of the values is all that is left.
 const ORDER: usize = 5;
 
 /// The derivative at 0 of a function that may have no value further away, by the method of Ridders (1982).

@@ -4,7 +4,9 @@ use nalgebra::{Matrix2x3, RowVector3, Vector2, Vector3};
 
 use super::grid::PixelGrid;
 use super::lens::Lens;
-use super::rim::Rim;
+use super::parameters::Values;
+use super::rim::{NARROWEST_RAD, Rim};
+use super::schema::{CX, CY, FX, FY, LensSchema, Parameter, ParameterSchema, Parametric, Resize, scalars};
 use crate::error::{Error, Result};
 
 const NAME: &str = "double_sphere";
@@ -20,6 +22,34 @@ pub struct DoubleSphere {
     xi: f64,
     alpha: f64,
     rim: Rim,
+}
+
+impl Parametric for DoubleSphere {
+    const SCHEMA: LensSchema = LensSchema {
+        name: NAME,
+        doc: "The double sphere model of Usenko et al. 2018.",
+        parameters: &[
+            ParameterSchema::required("xi", Resize::Fixed, "shift between the spheres in radii, above -1 to 1"),
+            ParameterSchema::required(
+                "alpha",
+                Resize::Fixed,
+                "part of the distance, against the depth, in the denominator, 0 to 1",
+            ),
+            FX,
+            FY,
+            CX,
+            CY,
+        ],
+    };
+
+    fn build(given: &Values<'_>) -> Result<Self> {
+        let [xi, alpha, fx, fy, cx, cy] = given.numbers();
+        Self::new(xi, alpha, [fx, fy], [cx, cy])
+    }
+
+    fn values(&self) -> Vec<Parameter> {
+        scalars(&[&[self.xi, self.alpha], &self.grid.focal_and_centre()])
+    }
 }
 
 impl DoubleSphere {
@@ -45,7 +75,7 @@ impl DoubleSphere {
             let (m, j) = open.raw_jacobian(&Vector3::new(sin, 0.0, cos));
             (m.x, j[(0, 0)] * cos - j[(0, 2)] * sin)
         });
-        if rim.theta <= 1e-6 {
+        if rim.theta <= NARROWEST_RAD {
             return Err(Error::camera(
                 NAME,
                 "xi, alpha",

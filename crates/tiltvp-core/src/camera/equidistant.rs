@@ -4,8 +4,12 @@ use nalgebra::{Matrix2x3, Matrix3x2, Vector2, Vector3};
 
 use super::lens::{sane, seen};
 use super::model::CameraModel;
+use super::parameters::Values;
 use super::radial::{self, Radial};
+use super::schema::{CX, CY, LensSchema, Parameter, ParameterSchema, Parametric, Resize, scalars};
 use crate::error::{Error, Result};
+
+const NAME: &str = "equidistant";
 
 /// Equidistant fisheye: `(u, v) = (cx, cy) + f theta (cos phi, sin phi)`, valid over the whole sphere but the backward axis.
 #[derive(Debug, Clone, PartialEq)]
@@ -18,6 +22,23 @@ pub struct Equidistant {
     pub cy: f64,
 }
 
+impl Parametric for Equidistant {
+    const SCHEMA: LensSchema = LensSchema {
+        name: NAME,
+        doc: "r = focal_px theta.",
+        parameters: &[ParameterSchema::required("focal_px", Resize::Length, "focal length, pixels per radian"), CX, CY],
+    };
+
+    fn build(given: &Values<'_>) -> Result<Self> {
+        let [focal_px, cx, cy] = given.numbers();
+        Self::new(focal_px, cx, cy)
+    }
+
+    fn values(&self) -> Vec<Parameter> {
+        scalars(&[&[self.focal_px, self.cx, self.cy]])
+    }
+}
+
 impl Equidistant {
     /// Checks the parameters.
     ///
@@ -26,11 +47,11 @@ impl Equidistant {
     /// not finite.
     pub fn new(focal_px: f64, cx: f64, cy: f64) -> Result<Self> {
         if !(focal_px.is_finite() && focal_px >= 1e-100) {
-            return Err(Error::camera("equidistant", "focal_px", focal_px, "a positive number of pixels per radian"));
+            return Err(Error::camera(NAME, "focal_px", focal_px, "a positive number of pixels per radian"));
         }
         for (name, value) in [("cx", cx), ("cy", cy)] {
             if !value.is_finite() {
-                return Err(Error::camera("equidistant", name, value, "a finite number of pixels"));
+                return Err(Error::camera(NAME, name, value, "a finite number of pixels"));
             }
         }
         Ok(Self { focal_px, cx, cy })

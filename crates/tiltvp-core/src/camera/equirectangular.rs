@@ -6,6 +6,8 @@ use nalgebra::{Matrix2x3, Matrix3x2, RowVector3, Vector2, Vector3};
 
 use super::lens::{sane, seen};
 use super::model::CameraModel;
+use super::parameters::Values;
+use super::schema::{LensSchema, Parameter, Parametric};
 use crate::error::{Error, Result};
 
 const NAME: &str = "equirectangular";
@@ -21,6 +23,23 @@ pub struct Equirectangular {
     height: u32,
 }
 
+impl Parametric for Equirectangular {
+    const SCHEMA: LensSchema = LensSchema {
+        name: NAME,
+        doc: "A whole-sphere panorama: longitude ((u + 0.5) / width - 0.5) 2 pi, latitude (0.5 - (v + 0.5) / height) pi.",
+        parameters: &[],
+    };
+
+    fn build(given: &Values<'_>) -> Result<Self> {
+        let [width, height] = given.size();
+        Self::new(width, height)
+    }
+
+    fn values(&self) -> Vec<Parameter> {
+        Vec::new()
+    }
+}
+
 impl Equirectangular {
     /// The panorama that fills an image of `width` x `height` pixels.
     ///
@@ -31,11 +50,6 @@ impl Equirectangular {
             return Err(Error::camera(NAME, "width, height", format!("{width} x {height}"), "at least one pixel"));
         }
         Ok(Self { width, height })
-    }
-
-    /// Columns and rows of the panorama.
-    pub fn size(&self) -> (u32, u32) {
-        (self.width, self.height)
     }
 
     /// Pixels per radian of longitude and of latitude.
@@ -98,5 +112,9 @@ impl CameraModel for Equirectangular {
 
     fn max_theta_rad(&self) -> f64 {
         PI
+    }
+
+    fn image_size(&self) -> Option<[u32; 2]> {
+        Some([self.width, self.height])
     }
 }

@@ -4,6 +4,8 @@ use nalgebra::{Matrix2x3, Vector2, Vector3};
 
 use super::grid::{self, PixelGrid};
 use super::lens::Lens;
+use super::parameters::Values;
+use super::schema::{CX, CY, FX, FY, LensSchema, Parameter, ParameterSchema, Parametric, Resize, scalars};
 use super::sphere::ShiftedSphere;
 use crate::error::{Error, Result};
 
@@ -18,6 +20,34 @@ const NAME: &str = "extended_unified";
 pub struct ExtendedUnified {
     grid: PixelGrid,
     sphere: ShiftedSphere,
+}
+
+impl Parametric for ExtendedUnified {
+    const SCHEMA: LensSchema = LensSchema {
+        name: NAME,
+        doc: "The extended unified model of Khomutenko et al. 2016.",
+        parameters: &[
+            ParameterSchema::required(
+                "alpha",
+                Resize::Fixed,
+                "part of the distance, against the depth, in the denominator, 0 to 1",
+            ),
+            ParameterSchema::required("beta", Resize::Fixed, "stretch of the ellipsoid, above 0"),
+            FX,
+            FY,
+            CX,
+            CY,
+        ],
+    };
+
+    fn build(given: &Values<'_>) -> Result<Self> {
+        let [alpha, beta, fx, fy, cx, cy] = given.numbers();
+        Self::new(alpha, beta, [fx, fy], [cx, cy])
+    }
+
+    fn values(&self) -> Vec<Parameter> {
+        scalars(&[&[self.alpha(), self.beta()], &self.grid.focal_and_centre()])
+    }
 }
 
 impl ExtendedUnified {

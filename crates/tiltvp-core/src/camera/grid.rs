@@ -39,12 +39,14 @@ impl PixelGrid {
         }
     }
 
-    pub(super) fn matrix(&self) -> &Matrix2<f64> {
-        &self.pixel_from_point
+    /// `[fx, fy, cx, cy]`.
+    pub(super) fn focal_and_centre(&self) -> [f64; 4] {
+        let (matrix, centre) = (&self.pixel_from_point, &self.centre);
+        [matrix.m11, matrix.m22, centre.x, centre.y]
     }
 
-    pub(super) fn centre(&self) -> &Vector2<f64> {
-        &self.centre
+    pub(super) fn matrix(&self) -> &Matrix2<f64> {
+        &self.pixel_from_point
     }
 
     #[inline]

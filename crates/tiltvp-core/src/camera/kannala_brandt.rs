@@ -1,9 +1,11 @@
 //! The fisheye of Kannala and Brandt, OpenCV's `fisheye` and Kalibr's `equidistant`, followed to where its image folds.
 
 use super::grid::{self, PixelGrid};
+use super::parameters::Values;
 use super::polynomial::evaluate;
 use super::profile::{Inverse, Profile};
 use super::rim::FOLD;
+use super::schema::{CX, CY, FX, FY, LensSchema, Parameter, ParameterSchema, Parametric, scalars};
 use crate::error::Result;
 
 const NAME: &str = "kannala_brandt";
@@ -18,6 +20,32 @@ pub struct KannalaBrandt {
     /// `r / theta` in powers of `theta^2`.
     factor: [f64; 5],
     inverse: Inverse,
+}
+
+impl Parametric for KannalaBrandt {
+    const SCHEMA: LensSchema = LensSchema {
+        name: NAME,
+        doc: "r = theta + k1 theta^3 + k2 theta^5 + k3 theta^7 + k4 theta^9: OpenCV's fisheye, Kalibr's equidistant.",
+        parameters: &[
+            FX,
+            FY,
+            CX,
+            CY,
+            ParameterSchema::coefficient("k1", "of theta^3"),
+            ParameterSchema::coefficient("k2", "of theta^5"),
+            ParameterSchema::coefficient("k3", "of theta^7"),
+            ParameterSchema::coefficient("k4", "of theta^9"),
+        ],
+    };
+
+    fn build(given: &Values<'_>) -> Result<Self> {
+        let [fx, fy, cx, cy, coefficients @ ..]: [f64; 8] = given.numbers();
+        Self::new([fx, fy], [cx, cy], coefficients)
+    }
+
+    fn values(&self) -> Vec<Parameter> {
+        scalars(&[&self.grid.focal_and_centre(), &self.coefficients()])
+    }
 }
 
 impl KannalaBrandt {

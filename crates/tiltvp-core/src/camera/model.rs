@@ -22,6 +22,11 @@ pub trait CameraModel {
     /// The largest angle that the model answers for, from the ray through the centre of the image, in radians.
     fn max_theta_rad(&self) -> f64;
 
+    /// Columns and rows of the image, for a model that is made for one size of it.
+    fn image_size(&self) -> Option<[u32; 2]> {
+        None
+    }
+
     /// The `z` of the unit ray through the centre of the image: 1, or -1 for a mirror given in its physical frame.
     fn axis_z(&self) -> f64 {
         1.0

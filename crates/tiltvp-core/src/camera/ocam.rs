@@ -4,8 +4,10 @@ use nalgebra::{Matrix2, Matrix2x3, Matrix3x2, Vector2, Vector3};
 
 use super::grid::{self, PixelGrid};
 use super::lens::Lens;
+use super::parameters::Values;
 use super::polynomial::{evaluate, first_fall, product, root_bound, sum};
 use super::rim::FOLD;
+use super::schema::{CX, CY, Kind, LensSchema, Parameter, ParameterSchema, Parametric, Resize, scalars};
 use super::solve;
 use super::table::Table;
 use crate::error::{Error, Result};
@@ -34,6 +36,45 @@ pub struct Ocam {
     max_theta: f64,
     /// `rho` over the angle from the central ray, up to the radius of the valid disc.
     table: Table,
+}
+
+impl Parametric for Ocam {
+    const SCHEMA: LensSchema = LensSchema {
+        name: NAME,
+        doc: "Scaramuzza's OCam: row = c x + d y + cy, column = e x + y + cx, bearing (y, x, -f(rho)), in OCamCalib's sign.",
+        parameters: &[
+            ParameterSchema {
+                name: "polynomial",
+                kind: Kind::RequiredList,
+                resize: Resize::Polynomial,
+                doc: "f in powers of rho in pixels, lowest first",
+            },
+            CX,
+            CY,
+            ParameterSchema::optional("c", 1.0, Resize::Fixed, "rows per x"),
+            ParameterSchema::coefficient("d", "rows per y"),
+            ParameterSchema::coefficient("e", "columns per x"),
+            ParameterSchema {
+                name: "inverse_polynomial",
+                kind: Kind::OptionalList,
+                resize: Resize::Length,
+                doc: "rho in powers of atan(f / rho), lowest first; kept for files, not used",
+            },
+        ],
+    };
+
+    fn build(given: &Values<'_>) -> Result<Self> {
+        let ([cx, cy, c, d, e], [polynomial, inverse]) = (given.numbers(), given.lists());
+        Self::new(polynomial, [c, d, e], [cx, cy], inverse)
+    }
+
+    fn values(&self) -> Vec<Parameter> {
+        let ([c, d, e], [_, _, cx, cy]) = (self.affine(), self.grid.focal_and_centre());
+        let mut values = vec![Parameter::List(self.polynomial())];
+        values.extend(scalars(&[&[cx, cy, c, d, e]]));
+        values.push(Parameter::List(self.inverse_polynomial.clone()));
+        values
+    }
 }
 
 impl Ocam {

@@ -2,10 +2,12 @@
 
 use nalgebra::{Matrix2x3, Vector2, Vector3};
 
-use super::brown::Brown;
+use super::brown::{Brown, K1, K2, K3, P1, P2};
 use super::grid::PixelGrid;
 use super::lens::Lens;
-use super::rim::Rim;
+use super::parameters::Values;
+use super::rim::{NARROWEST_RAD, Rim};
+use super::schema::{CX, CY, FX, FY, LensSchema, Parameter, ParameterSchema, Parametric, scalars};
 use crate::error::{Error, Result};
 
 const NAME: &str = "pinhole";
@@ -19,6 +21,36 @@ pub struct Pinhole {
     grid: PixelGrid,
     brown: Brown,
     rim: Rim,
+}
+
+impl Parametric for Pinhole {
+    const SCHEMA: LensSchema = LensSchema {
+        name: NAME,
+        doc: "Pinhole with Brown-Conrady distortion of 4, 5 or 8 coefficients, in OpenCV's meaning.",
+        parameters: &[
+            FX,
+            FY,
+            CX,
+            CY,
+            K1,
+            K2,
+            P1,
+            P2,
+            K3,
+            ParameterSchema::coefficient("k4", "denominator of the radial distortion, of r^2"),
+            ParameterSchema::coefficient("k5", "denominator of the radial distortion, of r^4"),
+            ParameterSchema::coefficient("k6", "denominator of the radial distortion, of r^6"),
+        ],
+    };
+
+    fn build(given: &Values<'_>) -> Result<Self> {
+        let [fx, fy, cx, cy, distortion @ ..]: [f64; 12] = given.numbers();
+        Self::new([fx, fy], [cx, cy], &distortion)
+    }
+
+    fn values(&self) -> Vec<Parameter> {
+        scalars(&[&self.grid.focal_and_centre(), &self.brown.coefficients()])
+    }
 }
 
 impl Pinhole {
@@ -38,7 +70,7 @@ impl Pinhole {
         slots.copy_from_slice(distortion);
         let brown = Brown::new(NAME, coefficients)?;
         let rim = Rim::new(brown.limit().atan(), brown.limit());
-        if rim.theta <= 1e-6 {
+        if rim.theta <= NARROWEST_RAD {
             return Err(Error::camera(
                 NAME,
                 "distortion",

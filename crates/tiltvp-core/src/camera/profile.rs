@@ -8,6 +8,7 @@ use super::grid::PixelGrid;
 use super::lens::Lens;
 use super::polynomial::first_fall;
 use super::radial::{self, Radial};
+use super::rim::NARROWEST_RAD;
 use super::solve;
 use super::table::Table;
 use crate::error::{Error, Result};
@@ -44,7 +45,7 @@ impl Inverse {
     ) -> Result<Self> {
         let max_theta = first_fall(slope, PI).unwrap_or(PI);
         let max_radius = profile(max_theta).0;
-        if max_theta <= 1e-6 || !max_radius.is_finite() {
+        if max_theta <= NARROWEST_RAD || !max_radius.is_finite() {
             let expected = "coefficients under which the radius grows with the angle at first";
             return Err(Error::camera(model, "k1 .. k4", format!("{coefficients:?}"), expected));
         }

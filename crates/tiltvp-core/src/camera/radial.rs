@@ -11,7 +11,8 @@ pub(super) trait Radial {
     fn theta(&self, radius: f64) -> Option<(f64, f64)>;
 }
 
-/// Below this sine of the angle from the axis the direction in the image plane is taken from the limit on the axis.
+/// Below this sine of the angle from the axis the direction in the image plane is taken from the limit on the axis,
+/// whose relative error is the square of this.
 const ON_AXIS: f64 = 1e-12;
 
 /// The point `r(theta) (cos phi, sin phi)` that sees a bearing, and its derivative by the bearing.

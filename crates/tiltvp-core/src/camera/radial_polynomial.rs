@@ -3,9 +3,11 @@
 use nalgebra::Matrix2;
 
 use super::grid::{self, PixelGrid};
+use super::parameters::Values;
 use super::polynomial::evaluate;
 use super::profile::{Inverse, Profile};
 use super::rim::FOLD;
+use super::schema::{CX, CY, LensSchema, Parameter, ParameterSchema, Parametric, Resize, scalars};
 use crate::error::Result;
 
 const NAME: &str = "radial_polynomial";
@@ -20,6 +22,32 @@ pub struct RadialPolynomial {
     /// `rho` in powers of `theta`.
     rho: [f64; 5],
     inverse: Inverse,
+}
+
+impl Parametric for RadialPolynomial {
+    const SCHEMA: LensSchema = LensSchema {
+        name: NAME,
+        doc: "WoodScape's r = k1 theta + k2 theta^2 + k3 theta^3 + k4 theta^4, in pixels.",
+        parameters: &[
+            ParameterSchema::required("k1", Resize::Length, "of theta, pixels"),
+            ParameterSchema::optional("k2", 0.0, Resize::Length, "of theta^2, pixels"),
+            ParameterSchema::optional("k3", 0.0, Resize::Length, "of theta^3, pixels"),
+            ParameterSchema::optional("k4", 0.0, Resize::Length, "of theta^4, pixels"),
+            CX,
+            CY,
+            ParameterSchema::optional("aspect_ratio", 1.0, Resize::Fixed, "stretch of the rows"),
+        ],
+    };
+
+    fn build(given: &Values<'_>) -> Result<Self> {
+        let [k1, k2, k3, k4, cx, cy, aspect_ratio] = given.numbers();
+        Self::new([k1, k2, k3, k4], [cx, cy], aspect_ratio)
+    }
+
+    fn values(&self) -> Vec<Parameter> {
+        let [_, aspect_ratio, cx, cy] = self.grid.focal_and_centre();
+        scalars(&[&self.coefficients(), &[cx, cy, aspect_ratio]])
+    }
 }
 
 impl RadialPolynomial {

@@ -6,8 +6,13 @@
 /// no longer determine each other to the accuracy of `f64`; this keeps the loss below three of its sixteen digits.
 pub(super) const FOLD: f64 = 1e-3;
 
-/// The largest distance from the axis in the image plane, in units of the focal length, where planes are unbounded.
+/// The largest distance from the axis in the image plane, in units of the focal length, where planes are unbounded: a
+/// millionth of a radian short of 90 degrees.
 pub(super) const FARTHEST: f64 = 1e6;
+
+/// No lens sees less than this angle from its axis, radians: a narrower one is a slip, a millionth of a radian being a pixel of a
+/// telescope.
+pub(super) const NARROWEST_RAD: f64 = 1e-6;
 
 /// The rim of a lens that is round about its axis: an angle from the axis, and the radius at which it is seen.
 #[derive(Debug, Clone, Copy, PartialEq)]

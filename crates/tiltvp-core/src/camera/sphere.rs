@@ -2,7 +2,7 @@
 
 use nalgebra::{Matrix2x3, RowVector3, Vector2, Vector3};
 
-use super::rim::Rim;
+use super::rim::{NARROWEST_RAD, Rim};
 use crate::error::{Error, Result};
 
 /// `m = (x, y) / (a d + b z)` with `d = sqrt(beta (x^2 + y^2) + z^2)`.
@@ -43,7 +43,7 @@ impl ShiftedSphere {
     }
 
     fn checked(self, model: &'static str) -> Result<Self> {
-        if self.rim.theta > 1e-6 {
+        if self.rim.theta > NARROWEST_RAD {
             return Ok(self);
         }
         Err(Error::camera(model, "field of view", self.rim.theta, "parameters under which more than the axis is seen"))

@@ -2,9 +2,11 @@
 
 use nalgebra::{Matrix2x3, Vector2, Vector3};
 
-use super::brown::Brown;
+use super::brown::{Brown, K1, K2, K3, P1, P2};
 use super::grid::PixelGrid;
 use super::lens::Lens;
+use super::parameters::Values;
+use super::schema::{CX, CY, FX, FY, LensSchema, Parameter, ParameterSchema, Parametric, Resize, scalars};
 use super::sphere::ShiftedSphere;
 use crate::error::{Error, Result};
 
@@ -19,6 +21,40 @@ pub struct Unified {
     grid: PixelGrid,
     brown: Brown,
     sphere: ShiftedSphere,
+}
+
+impl Parametric for Unified {
+    const SCHEMA: LensSchema = LensSchema {
+        name: NAME,
+        doc: "Mei's unified model: Kalibr's `omni`, OpenCV's `omnidir`; `skew` is the entry (0, 1) of K.",
+        parameters: &[
+            ParameterSchema::required(
+                "xi",
+                Resize::Fixed,
+                "shift of the centre of projection in radii of the sphere, at least 0",
+            ),
+            FX,
+            FY,
+            CX,
+            CY,
+            K1,
+            K2,
+            P1,
+            P2,
+            K3,
+            ParameterSchema::optional("skew", 0.0, Resize::Length, "columns per row of the image plane, pixels"),
+        ],
+    };
+
+    fn build(given: &Values<'_>) -> Result<Self> {
+        let [xi, fx, fy, cx, cy, k1, k2, p1, p2, k3, skew] = given.numbers();
+        Self::new(xi, [fx, fy], [cx, cy], [k1, k2, p1, p2, k3], skew)
+    }
+
+    fn values(&self) -> Vec<Parameter> {
+        let (focal_and_centre, skew) = (self.grid.focal_and_centre(), self.grid.matrix().m12);
+        scalars(&[&[self.xi()], &focal_and_centre, &self.distortion(), &[skew]])
+    }
 }
 
 impl Unified {

@@ -2,16 +2,16 @@
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::attitude::{IncludedAngle, corner_attitudes};
+use super::closed_form::attitude::{IncludedAngle, corner_attitudes};
 use super::coloured::{self, ColouredScratch, Window};
-use super::completion::complete;
-use super::ends::{Seen, SeenEnd, seen_ends};
 use super::estimate::Hypothesis;
+use super::feature::CornerFeature;
+use super::general::completion::CornerCompletion;
+use super::general::edge_ends::{ObservedCorner, ObservedEnd, seen_ends};
+use super::general::guided::{ExpectedCorner, find_near};
+use super::general::segments::{Segment, SegmentFinder};
 use super::general::{self, GeneralScratch};
-use super::guided::{Expected, find_near};
 use super::options::{CornerMethod, DetectorOptions};
-use super::segments::{Segment, SegmentFinder};
-use super::vertex::CornerFeature;
 use crate::camera::Camera;
 use crate::edges::Mask;
 use crate::error::{Error, Result};
@@ -61,7 +61,7 @@ impl CornerDetector {
         &self.options
     }
 
-    /// Which pixels may be used; none for all. The coloured front end knows no mask.
+    /// Which pixels may be used; none for all. The coloured front end takes no mask.
     pub fn mask(&self) -> Option<&Mask> {
         self.mask.as_ref()
     }
@@ -151,7 +151,7 @@ impl CornerDetector {
     pub(super) fn find_near(
         &self,
         image: &ImageView<'_>,
-        expected: &Expected,
+        expected: &ExpectedCorner,
         search_px: Option<f64>,
         scratch: &mut CornerScratch,
     ) -> Option<CornerFeature> {
@@ -174,7 +174,8 @@ impl CornerDetector {
         if let (CornerMethod::General(options), Some(memory)) = (&self.options.method, &mut scratch.general)
             && options.gamma_rad == std::f64::consts::FRAC_PI_2
         {
-            complete(&self.camera, image, camera_from_object, options, &self.light, memory, out);
+            let Self { camera, light, .. } = self;
+            CornerCompletion { camera, image, options, light, camera_from_object }.run(memory, out);
         }
     }
 
@@ -187,13 +188,13 @@ impl CornerDetector {
         pose: &Hypothesis,
         camera_from_left: &RigidMotion,
         scratch: &mut CornerScratch,
-    ) -> [Option<SeenEnd>; 3] {
+    ) -> [Option<ObservedEnd>; 3] {
         let (CornerMethod::General(options), Some(memory), Some(vertex_m)) =
             (&self.options.method, &mut scratch.general, &pose.vertex_m)
         else {
             return [None; 3];
         };
-        let seen = Seen {
+        let seen = ObservedCorner {
             camera: &self.camera,
             image,
             options,

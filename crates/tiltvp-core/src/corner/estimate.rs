@@ -1,13 +1,13 @@
-//! What one frame tells of a corner: hypotheses with probabilities, and why there is a pose or none.
+//! The estimate of a corner from one frame: hypotheses with probabilities, and why there is a pose or none.
 
 use nalgebra::{Matrix3, Matrix6, Vector3};
 
-use super::ends::EdgeEnd;
-use super::vertex::CornerFeature;
+use super::feature::CornerFeature;
+use super::general::edge_ends::EdgeEnd;
 
 /// Why there is a pose, or none.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Verdict {
+pub enum CornerVerdict {
     /// One hypothesis stands out.
     Found,
     /// No corner in the left image.
@@ -20,7 +20,7 @@ pub enum Verdict {
     Ambiguous,
 }
 
-impl Verdict {
+impl CornerVerdict {
     /// All of them.
     pub const ALL: [Self; 5] = [Self::Found, Self::NoneLeft, Self::NoneRight, Self::NoneFits, Self::Ambiguous];
 
@@ -63,13 +63,13 @@ impl Hypothesis {
     }
 }
 
-/// What one frame tells.
+/// The estimate from one frame.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CornerEstimate {
     /// All hypotheses, the likeliest first.
     pub hypotheses: Vec<Hypothesis>,
     /// Why there is a pose, or none.
-    pub verdict: Verdict,
+    pub verdict: CornerVerdict,
     /// The corners of the left and of the right image.
     pub features: [Vec<CornerFeature>; 2],
     /// Which features of the left image the pose is from, the one that stands for the object first.
@@ -88,6 +88,6 @@ pub struct CornerEstimate {
 impl CornerEstimate {
     /// The pose, if one stands out.
     pub fn pose(&self) -> Option<&Hypothesis> {
-        self.hypotheses.first().filter(|_| self.verdict == Verdict::Found)
+        self.hypotheses.first().filter(|_| self.verdict == CornerVerdict::Found)
     }
 }

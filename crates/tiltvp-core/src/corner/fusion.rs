@@ -2,10 +2,10 @@
 
 use nalgebra::{Cholesky, Matrix2, Matrix3, Matrix6, Rotation3, SMatrix, Vector3, Vector6};
 
-use super::attitude::IncludedAngle;
-use super::parallels::CommonAttitude;
-use super::prior::rotation_vector;
-use super::vertex::CornerFeature;
+use super::closed_form::attitude::IncludedAngle;
+use super::closed_form::prior::rotation_vector;
+use super::feature::CornerFeature;
+use super::ray::FittedRay;
 use crate::geometry::{RigidMotion, tangent_basis};
 
 /// A corner in space: attitude and vertex, with covariance.
@@ -26,13 +26,15 @@ pub struct FusedPose {
     pub steps: usize,
 }
 
-/// The most Gauss-Newton steps.
+/// The most Gauss-Newton steps. Convergence is quadratic from the closed form; a hypothesis that needs more does not
+/// fit.
 const STEPS_MAX: usize = 8;
 
-/// The step, in radians and in shares of the distance, below which it has converged.
+/// The step, in radians and in shares of the distance, below which it has converged: a thousandth of what a perfect
+/// image resolves (1e-7).
 const CONVERGED: f64 = 1e-10;
 
-/// Variance below which rounding is what is left, square radians.
+/// Variance below which rounding is what is left, square radians: (1e-15 rad)^2.
 const VARIANCE_MIN: f64 = 1e-30;
 
 /// Moves a pose to the least squares of the rays of all cameras, each by its covariance, and of the included angle if it has
@@ -53,14 +55,22 @@ pub fn fuse_rays(
     fuse_rays_with(cameras, angle, side, rig_from_object, vertex_m, None)
 }
 
-/// The same with an attitude that is known from elsewhere, which counts three more degrees of freedom.
+/// An attitude that is known from elsewhere, in the rig's frame.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct KnownAttitude {
+    pub(super) rig_from_object: Matrix3<f64>,
+    /// Covariance of the rotation vector of its error, square radians.
+    pub(super) covariance: Matrix3<f64>,
+}
+
+/// The same with a known attitude, which adds three degrees of freedom.
 pub(super) fn fuse_rays_with(
     cameras: &[(&CornerFeature, RigidMotion)],
     angle: &IncludedAngle,
     side: f64,
     rig_from_object: &Matrix3<f64>,
     vertex_m: &Vector3<f64>,
-    known_attitude: Option<&CommonAttitude>,
+    known_attitude: Option<&KnownAttitude>,
 ) -> Option<FusedPose> {
     if cameras.len() < 2 {
         return None;
@@ -71,47 +81,21 @@ pub(super) fn fuse_rays_with(
     for steps in 0..=STEPS_MAX {
         let (sin_gamma, cos_gamma) = gamma.sin_cos();
         let edges = [Vector3::x(), Vector3::y(), Vector3::new(cos_gamma, 0.0, side * sin_gamma)];
-        let (mut information, mut pull, mut chi_square) = (Matrix6::zeros(), Vector6::zeros(), 0.0);
-        let mut opening = Opening::default();
+        let mut system = LinearSystem::default();
         if let Some(known) = known_attitude {
-            let weight = known.covariance.try_inverse()?;
-            let off = rotation_vector(&(rotation * known.camera_from_object.transpose()));
-            let mut own = information.fixed_view_mut::<3, 3>(0, 0);
-            own += weight;
-            let mut own = pull.fixed_rows_mut::<3>(0);
-            own += weight * off;
-            chi_square += off.dot(&(weight * off));
+            system.add_attitude(known, &rotation)?;
         }
+        // How the third edge turns when gamma opens.
+        let opens = known.is_none().then(|| rotation * Vector3::new(-sin_gamma, 0.0, side * cos_gamma));
         for ((feature, camera_from_rig), weights) in cameras.iter().zip(&weights) {
             let point = camera_from_rig.point(&vertex);
             for (index, ((ray, weight), edge)) in feature.rays().iter().zip(weights).zip(&edges).enumerate() {
                 let edge = camera_from_rig.rotation * (rotation * edge);
-                let plane = point.cross(&edge);
-                let length = plane.norm();
-                let normal = plane / length;
-                // Against the plane measured: 2 x 3 of a small change of `plane`.
-                let basis = tangent_basis(&ray.normal).transpose() / length;
-                let by_plane: SMatrix<f64, 2, 3> = basis - basis * normal * normal.transpose();
-                let turned = by_plane * (Matrix3::from_diagonal_element(point.dot(&edge)) - edge * point.transpose());
-                let moved = by_plane * -edge.cross_matrix();
-                let mut by_pose = SMatrix::<f64, 2, 6>::zeros();
-                by_pose.fixed_view_mut::<2, 3>(0, 0).copy_from(&(turned * camera_from_rig.rotation));
-                by_pose.fixed_view_mut::<2, 3>(0, 3).copy_from(&(moved * camera_from_rig.rotation));
-                let miss = tangent_basis(&ray.normal).transpose() * normal;
-                let weighted = by_pose.transpose() * weight;
-                information += weighted * by_pose;
-                pull += weighted * miss;
-                if known.is_none() && index == 2 {
-                    let wider = rotation * Vector3::new(-sin_gamma, 0.0, side * cos_gamma);
-                    let by_gamma = by_plane * point.cross(&(camera_from_rig.rotation * wider));
-                    opening.shared += weighted * by_gamma;
-                    opening.information += by_gamma.dot(&(weight * by_gamma));
-                    opening.pull += by_gamma.dot(&(weight * miss));
-                }
-                // The other side of the circle is as far as can be.
-                chi_square += if normal.dot(&ray.normal) > 0.0 { miss.dot(&(weight * miss)) } else { f64::INFINITY };
+                let opens = opens.filter(|_| index == 2);
+                system.add_ray(ray, weight, &point, &edge, &camera_from_rig.rotation, opens);
             }
         }
+        let LinearSystem { mut information, mut pull, mut chi_square, angle: mut opening } = system;
         let mut variance = 0.0;
         if known.is_none() {
             let (off, prior) = (gamma - angle.gamma_rad, angle.sigma_rad.powi(-2));
@@ -152,12 +136,78 @@ pub(super) fn fuse_rays_with(
     None
 }
 
-/// What the rays say of the included angle: its own information, that shared with the pose, and where it is pulled to.
+/// The normal equations of one Gauss-Newton step.
+#[derive(Debug, Clone, Copy)]
+struct LinearSystem {
+    information: Matrix6<f64>,
+    pull: Vector6<f64>,
+    chi_square: f64,
+    angle: AngleInformation,
+}
+
+impl Default for LinearSystem {
+    fn default() -> Self {
+        let angle = AngleInformation::default();
+        Self { information: Matrix6::zeros(), pull: Vector6::zeros(), chi_square: 0.0, angle }
+    }
+}
+
+/// The normal equations' part of the included angle: its own information, that shared with the pose, and its right-hand side.
 #[derive(Debug, Clone, Copy, Default)]
-struct Opening {
+struct AngleInformation {
     information: f64,
     shared: Vector6<f64>,
     pull: f64,
+}
+
+impl LinearSystem {
+    /// Adds a known attitude; none if its covariance has no inverse.
+    fn add_attitude(&mut self, known: &KnownAttitude, rotation: &Matrix3<f64>) -> Option<()> {
+        let weight = known.covariance.try_inverse()?;
+        let off = rotation_vector(&(rotation * known.rig_from_object.transpose()));
+        let mut own = self.information.fixed_view_mut::<3, 3>(0, 0);
+        own += weight;
+        let mut own = self.pull.fixed_rows_mut::<3>(0);
+        own += weight * off;
+        self.chi_square += off.dot(&(weight * off));
+        Some(())
+    }
+
+    /// Adds a ray of a camera that has the vertex at `point` and the ray's edge along `edge`, both in its own frame; `opens` is
+    /// how the edge turns with the included angle (rig frame), if that is to be estimated.
+    fn add_ray(
+        &mut self,
+        ray: &FittedRay,
+        weight: &Matrix2<f64>,
+        point: &Vector3<f64>,
+        edge: &Vector3<f64>,
+        camera_from_rig: &Matrix3<f64>,
+        opens: Option<Vector3<f64>>,
+    ) {
+        let plane = point.cross(edge);
+        let length = plane.norm();
+        let normal = plane / length;
+        // Against the plane measured: 2 x 3 of a small change of `plane`.
+        let basis = tangent_basis(&ray.normal).transpose() / length;
+        let by_plane: SMatrix<f64, 2, 3> = basis - basis * normal * normal.transpose();
+        let turned = by_plane * (Matrix3::from_diagonal_element(point.dot(edge)) - edge * point.transpose());
+        let moved = by_plane * -edge.cross_matrix();
+        let mut by_pose = SMatrix::<f64, 2, 6>::zeros();
+        by_pose.fixed_view_mut::<2, 3>(0, 0).copy_from(&(turned * camera_from_rig));
+        by_pose.fixed_view_mut::<2, 3>(0, 3).copy_from(&(moved * camera_from_rig));
+        let miss = tangent_basis(&ray.normal).transpose() * normal;
+        let weighted = by_pose.transpose() * weight;
+        self.information += weighted * by_pose;
+        self.pull += weighted * miss;
+        if let Some(opens) = opens {
+            let by_gamma = by_plane * point.cross(&(camera_from_rig * opens));
+            self.angle.shared += weighted * by_gamma;
+            self.angle.information += by_gamma.dot(&(weight * by_gamma));
+            self.angle.pull += by_gamma.dot(&(weight * miss));
+        }
+        // On the other half of its circle a ray misses by as much as can be.
+        self.chi_square += if normal.dot(&ray.normal) > 0.0 { miss.dot(&(weight * miss)) } else { f64::INFINITY };
+    }
 }
 
 /// The inverse covariances of the rays of each camera.

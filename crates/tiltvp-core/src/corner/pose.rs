@@ -2,13 +2,13 @@
 
 use nalgebra::{Matrix3, Matrix6, SMatrix, Vector3};
 
-use super::attitude::{CornerAttitude, IncludedAngle, corner_attitudes};
+use super::closed_form::attitude::{CornerAttitude, IncludedAngle, corner_attitudes};
+use super::closed_form::prior::AttitudePrior;
+use super::closed_form::resolve::{Alignment, View, resolve};
+use super::closed_form::standard_model::CornerCase;
+use super::feature::CornerFeature;
 use super::fusion::fuse_rays;
-use super::position::{Sighting, triangulate};
-use super::prior::AttitudePrior;
-use super::resolve::{Alignment, View, resolve};
-use super::standard::CornerCase;
-use super::vertex::CornerFeature;
+use super::triangulation::{BearingObservation, triangulate};
 use crate::error::Result;
 use crate::geometry::RigidMotion;
 
@@ -17,7 +17,7 @@ use crate::geometry::RigidMotion;
 pub struct CornerOptions {
     /// The angle between the horizontal edges.
     pub angle: IncludedAngle,
-    /// Whether the edges x, y, z are a right-handed triple, where the object is known; that tells the interpretations apart.
+    /// Whether the edges x, y, z are a right-handed triple, where the object is known, which separates the interpretations.
     pub right_handed: Option<bool>,
     /// Knowledge of the attitude, in the left camera's frame.
     pub priors: Vec<AttitudePrior>,
@@ -91,12 +91,12 @@ pub fn corner_poses(
         View { attitudes: &of_right, common_from_camera: left_from_right.rotation },
     ];
     let resolved = resolve(&views, Alignment::Same, options.right_handed, &options.priors)?;
-    let sighting = |feature: &CornerFeature, rig_from_camera| Sighting {
+    let observation = |feature: &CornerFeature, rig_from_camera| BearingObservation {
         bearing: feature.vertex(),
         covariance: feature.vertex_covariance(),
         rig_from_camera,
     };
-    let Some(vertex) = triangulate(&[sighting(left, RigidMotion::identity()), sighting(right, *left_from_right)])
+    let Some(vertex) = triangulate(&[observation(left, RigidMotion::identity()), observation(right, *left_from_right)])
     else {
         return Ok(Vec::new());
     };

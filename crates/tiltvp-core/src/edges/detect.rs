@@ -1,10 +1,14 @@
 //! Edge pixels: the Scharr gradient of the band's rows, and the pixels where it is strong.
 
-use super::block::{BLOCK as ROOM, Block, Kept, Level, Levels, REACH, Test, Vectors, place};
+use tiltvp_kernels::gradient::{
+    BLOCK, Directions, GradientKernel, GradientLevel, KeptPixels, Level, Levels, PixelBlock, REACH, Threshold, place,
+    widen_gradients,
+};
+use tiltvp_kernels::prefetch::prefetch_bytes;
+
 use super::options::EdgeOptions;
 use super::region::{Region, Span};
 use super::screen::Screen;
-use super::sieve::{Sieve, expect, widen};
 use crate::image::{ImageView, Smoother};
 
 /// Edge pixels in structure-of-arrays form, in slot order.
@@ -105,7 +109,7 @@ impl EdgePixels {
     }
 
     fn make_room(&mut self, pixels: usize) {
-        let capacity = pixels + 2 * ROOM;
+        let capacity = pixels + 2 * BLOCK;
         if self.slot.len() < capacity {
             self.slot.resize(capacity, 0);
             self.place.resize(capacity, 0);
@@ -130,8 +134,8 @@ pub struct Detector {
     /// The parts of rows that the spans' kernels reach, row by row.
     parts: Vec<Part>,
     /// The spans.
-    blocks: Vec<Block>,
-    sieve: Sieve,
+    blocks: Vec<PixelBlock>,
+    kernel: GradientKernel,
 }
 
 /// Columns `first..end` of row `v`.
@@ -142,14 +146,28 @@ struct Part {
     end: usize,
 }
 
-/// Rows whose pixels are tested together.
+/// Rows whose pixels are tested together. Only time depends on it.
 const TOGETHER: usize = 8;
 
-/// Smoothed rows that are kept: those and their neighbours, and a power of two.
+/// Smoothed rows that are kept: at least [`TOGETHER`] and their two neighbours, and a power of two, so that places are found by a
+/// mask.
 const ROWS: usize = 16;
 
-/// Parts of a row that are closer than this are smoothed as one.
+/// Parts of a row that are closer than this, in pixels, are smoothed as one: about what beginning anew costs. Only time depends on it.
 const GAP: usize = 32;
+
+/// The spans of a region in blocks, in slot order.
+fn blocks_of<L: GradientLevel>(region: &Region, kernel: &GradientKernel) -> Vec<PixelBlock> {
+    let mut blocks = Vec::new();
+    for span in region.spans() {
+        for first in (span.first..span.end).step_by(BLOCK) {
+            let own = kernel.mask::<L>(u64::MAX >> (first + BLOCK).saturating_sub(span.end));
+            let slot = (span.slot + first - span.first) as u32;
+            blocks.push(PixelBlock { own, slot, place: place(span.v, first) });
+        }
+    }
+    blocks
+}
 
 /// What the kernels of a region's spans reach.
 fn reached(region: &Region) -> Vec<Part> {
@@ -173,13 +191,13 @@ impl Detector {
     /// Scratch for a region.
     pub fn new(region: &Region, options: &EdgeOptions) -> Self {
         let width = region.columns().len() + 2;
-        let (smoother, sieve) = (Smoother::new(options.smoothing_px, width), Sieve::new());
+        let (smoother, kernel) = (Smoother::new(options.smoothing_px, width), GradientKernel::default());
         if smoother.copies() {
-            let blocks = sieve.blocks::<u8>(region);
-            return Self { smoother, levels: Vec::new(), parts: Vec::new(), blocks, sieve };
+            let blocks = blocks_of::<u8>(region, &kernel);
+            return Self { smoother, levels: Vec::new(), parts: Vec::new(), blocks, kernel };
         }
-        let blocks = sieve.blocks::<i16>(region);
-        Self { smoother, levels: vec![0; ROWS * width + REACH], parts: reached(region), blocks, sieve }
+        let blocks = blocks_of::<i16>(region, &kernel);
+        Self { smoother, levels: vec![0; ROWS * width + REACH], parts: reached(region), blocks, kernel }
     }
 
     /// Writes the pixels of the region with a gradient magnitude of at least `gradient_min` that pass the screen, in slot
@@ -197,40 +215,40 @@ impl Detector {
     ) {
         out.make_room(region.len());
         out.clear();
-        let (vectors, limit) = screen.map_or((Vectors::None, 0.0), Screen::vectors);
+        let (directions, limit) = screen.map_or((Directions::None, 0.0), Screen::vectors);
         let [gx, gy] = &mut out.raw;
-        let mut kept = Kept { slots: &mut out.slot, places: &mut out.place, gx, gy, len: 0, strong: 0 };
+        let mut kept = KeptPixels { slots: &mut out.slot, places: &mut out.place, gx, gy, len: 0, strong: 0 };
         let unit = if self.smoother.copies() {
-            let test = Test { at_least: least_squared::<u8>(gradient_min), vectors, limit };
+            let threshold = Threshold { at_least: least_squared::<u8>(gradient_min), directions, limit };
             let levels = Levels { data: image.data(), stride: image.stride(), places: usize::MAX, left: 0 };
-            self.sieve.sift(&levels, &self.blocks, &test, &mut kept);
-            self.sieve.finish::<u8>(&mut kept);
+            self.kernel.run(&levels, &self.blocks, &threshold, &mut kept);
+            self.kernel.flush::<u8>(&mut kept);
             u8::PARTS
         } else {
-            let test = Test { at_least: least_squared::<i16>(gradient_min), vectors, limit };
+            let threshold = Threshold { at_least: least_squared::<i16>(gradient_min), directions, limit };
             let (left, width) = (region.columns().start - 1, region.columns().len() + 2);
             let mut parts = self.parts.iter().peekable();
             for blocks in self.blocks.chunk_by(|a, b| a.v() / TOGETHER == b.v() / TOGETHER) {
                 let last = blocks[blocks.len() - 1].v();
                 while let Some(Part { v, first, end }) = parts.next_if(|part| part.v <= last + 1) {
-                    expect(image.row(v + AHEAD).get(*first..*end).unwrap_or(&[]));
+                    prefetch_bytes(image.row(v + AHEAD).get(*first..*end).unwrap_or(&[]));
                     let row = &mut self.levels[v % ROWS * width..][first - left..end - left];
                     self.smoother.fixed_row(image, *v, *first, row);
                 }
                 let levels = Levels { data: &self.levels[..], stride: width, places: ROWS - 1, left };
-                self.sieve.sift(&levels, blocks, &test, &mut kept);
+                self.kernel.run(&levels, blocks, &threshold, &mut kept);
             }
-            self.sieve.finish::<i16>(&mut kept);
+            self.kernel.flush::<i16>(&mut kept);
             i16::PARTS
         };
         (out.len, out.strong) = (kept.len, kept.strong);
         let (n, unit) = (out.len, 1.0 / unit as f32);
-        widen(&gx[..n], unit, &mut out.gx[..n]);
-        widen(&gy[..n], unit, &mut out.gy[..n]);
+        widen_gradients(&gx[..n], unit, &mut out.gx[..n]);
+        widen_gradients(&gy[..n], unit, &mut out.gy[..n]);
     }
 }
 
-/// Rows that are asked for before they are needed: an image is rarely in the nearest cache.
+/// Rows that are asked for before they are needed: an image is rarely in the nearest cache. Only time depends on it.
 const AHEAD: usize = 6;
 
 /// The least squared gradient in the kernels' units. Casts of numbers that are too large give the largest, which no gradient

@@ -1,21 +1,22 @@
 //! From an edge pixel's gradient to the great circle that the edge lies on.
 
-use multiversion::multiversion;
 use nalgebra::{Matrix3, Matrix3x2, Vector2};
+use tiltvp_kernels::compaction::{KeptRows, ROOM, RowBlock, compact_rows};
+use tiltvp_kernels::normals::{self, BLOCK, Normals};
+use tiltvp_kernels::prefetch::prefetch;
 
 use super::detect::EdgePixels;
 use super::region::Region;
 use super::screen::Screen;
 use crate::camera::Camera;
-use crate::image::expect;
-use crate::robust::{Block as Rest, Kept, ROOM, Rows, compact};
+use crate::robust::Rows;
 
 /// How the normal of an edge's great circle is made from the gradient.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum NormalKind {
     /// The gradient is a covector and is pulled back by the projection, `m ~ (d pixel / d bearing)^T g`: exact for every lens.
     Tangent,
-    /// The gradient is pushed forward like a vector, `m ~ (d bearing / d pixel) g` (paper 000 eq. 37, `v x (u x v)` in the
+    /// The gradient is pushed forward like a vector, `m ~ (d bearing / d pixel) g` (Fleer 2017, eq. 37, `v x (u x v)` in the
     /// limit of a small step): exact only where the lens is conformal.
     Gradient,
 }
@@ -90,13 +91,13 @@ impl LiftTable {
         places.resize(n + ROOM, 0);
         let limit = (sin_max * sin_max) as f32;
         rows.refill(n + ROOM, |[x, y, z]| {
-            let mut block = Block::default();
-            let mut kept = Kept { columns: [x, y, z, weights], numbers: slots, places, len: 0 };
+            let mut block = Normals::default();
+            let mut kept = KeptRows { columns: [x, y, z, weights], numbers: slots, places, len: 0 };
             for start in (0..n).step_by(BLOCK) {
                 let part = start..(start + BLOCK).min(n);
                 let numbers = &edges.slot()[part.clone()];
                 for slot in edges.slot()[part.end..].iter().take(BLOCK) {
-                    expect(&self.maps, *slot as usize);
+                    prefetch(&self.maps, *slot as usize);
                 }
                 let [ab, cd, ef] = &mut block.maps;
                 for (((slot, ab), cd), ef) in numbers.iter().zip(ab).zip(cd).zip(ef) {
@@ -104,10 +105,10 @@ impl LiftTable {
                     [*ab, *cd, *ef] = self.maps[(*slot as usize).min(last)];
                 }
                 let count = numbers.len();
-                fill(&mut block, &edges.gx()[part.clone()], &edges.gy()[part], limit, self.unit);
+                normals::lift(&mut block, &edges.gx()[part.clone()], &edges.gy()[part], limit, self.unit);
                 let [x, y, z] = block.rows.each_ref().map(|row| &row[..count]);
                 let columns = [x, y, z, &block.weights[..count]];
-                compact(&Rest { columns, numbers, first: start }, &mut kept);
+                compact_rows(&RowBlock { columns, numbers, first: start }, &mut kept);
             }
             kept.len
         });
@@ -120,44 +121,6 @@ impl LiftTable {
 /// The entries of a word, the lower first.
 fn entries(pair: u32) -> [f32; 2] {
     [f32::from(pair as u16 as i16), f32::from((pair >> 16) as u16 as i16)]
-}
-
-/// Edge pixels that are lifted together.
-const BLOCK: usize = 128;
-
-/// The rows of the maps of some pixels, two entries in a word, the normals made by them, and weights that are zero where the
-/// prefilter rejects.
-struct Block {
-    maps: [[u32; BLOCK]; 3],
-    rows: [[f32; BLOCK]; 3],
-    weights: [f32; BLOCK],
-}
-
-impl Default for Block {
-    fn default() -> Self {
-        Self { maps: [[0; BLOCK]; 3], rows: [[0.0; BLOCK]; 3], weights: [0.0; BLOCK] }
-    }
-}
-
-/// Lifts gradients; lengths are in a unit.
-#[multiversion(targets("x86_64+avx512f+avx512vl", "x86_64+avx2"))]
-fn fill(block: &mut Block, gx: &[f32], gy: &[f32], limit: f32, unit: f32) {
-    let n = gx.len();
-    let [ab, cd, ef] = &block.maps;
-    let [x, y, z] = &mut block.rows;
-    let (ab, cd, ef) = (&ab[..n], &cd[..n], &ef[..n]);
-    let (x, y, z, weights) = (&mut x[..n], &mut y[..n], &mut z[..n], &mut block.weights[..n]);
-    let gy = &gy[..n];
-    for i in 0..n {
-        let along = |pair: u32| ((pair << 16) as i32 >> 16) as f32 * gx[i] + (pair as i32 >> 16) as f32 * gy[i];
-        let row = [along(ab[i]), along(cd[i]), along(ef[i])];
-        let squared = row[0] * row[0] + row[1] * row[1] + row[2] * row[2];
-        let root = squared.sqrt();
-        let scale = 1.0 / root;
-        (x[i], y[i], z[i]) = (row[0] * scale, row[1] * scale, row[2] * scale);
-        // The length is zero where the gradient is.
-        weights[i] = if row[2] * row[2] <= limit * squared { root * unit } else { 0.0 };
-    }
 }
 
 #[cfg(test)]

@@ -1,11 +1,11 @@
 //! The pixels of the elevation band, as spans of rows, computed once per camera.
 
 use nalgebra::{Matrix3, Vector2, Vector3};
+use tiltvp_kernels::prefetch::prefetch;
 
 use super::options::{EdgeOptions, Mask};
 use crate::camera::Camera;
 use crate::error::{Error, Result};
-use crate::image::expect;
 
 /// A run of pixels `first..end` of row `v`; `slot` numbers its first pixel among all pixels of the region.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -192,8 +192,8 @@ impl Region {
 
     /// Asks for the bearing of a pixel that will be read soon.
     #[inline]
-    pub(crate) fn expect(&self, slot: usize) {
-        expect(&self.bearings, slot);
+    pub(crate) fn prefetch(&self, slot: usize) {
+        prefetch(&self.bearings, slot);
     }
 
     /// Each pixel `(u, v)` of the region with its bearing in the robot frame, in slot order.

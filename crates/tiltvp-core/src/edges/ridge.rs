@@ -1,11 +1,12 @@
 //! Ridge pixels: edge pixels thinned to one pixel across the edge, with the place of the edge between pixels.
 
-use super::block::place;
+use tiltvp_kernels::gradient::place;
+use tiltvp_kernels::ridge::{Around, MARKED, each_mark, mark, mark_directed, scharr, tops};
+
 use super::detect::EdgePixels;
 use super::options::EdgeOptions;
 use super::region::Region;
 use super::screen::Screen;
-use super::thinning::{Around, MARKED, each_mark, mark, mark_screened, scharr, tops};
 use crate::image::{ImageView, Smoother};
 
 /// Edge pixels of greatest gradient magnitude across their edge, in slot order.
@@ -112,7 +113,7 @@ impl RidgeDetector {
             match screen {
                 Some(screen) => {
                     let (vectors, limit) = screen.of_span(span, wide, &mut self.vectors);
-                    mark_screened(&around, least, vectors, limit, marks);
+                    mark_directed(&around, least, vectors, limit, marks);
                 }
                 None => mark(&around, least, marks),
             }

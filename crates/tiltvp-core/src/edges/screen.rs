@@ -2,7 +2,8 @@
 
 use std::sync::Arc;
 
-use super::block::Vectors;
+use tiltvp_kernels::gradient::Directions;
+
 use super::region::{Region, Span};
 
 /// For each pixel of a region a vector `q`; a gradient `g` may belong to a vertical edge only if
@@ -32,10 +33,11 @@ enum Shape {
     From { centre: [i32; 2], parts: i16 },
 }
 
-/// How much wider than the exact test a screen is, for the rounding of single precision.
+/// How much wider than the exact test a screen is: a hundred times the rounding of its few operations in single precision, each 6e-8.
 const HAIR: f64 = 1.0 + 5e-5;
 
-/// What rounding both components of a vector adds at most to `|q . g| / |g|`, in units of the vectors.
+/// What rounding both components of a vector adds at most to `|q . g| / |g|`, in units of the vectors: the length of half a unit in
+/// each, and a little for the rounding of the product.
 const ROUNDED: f64 = std::f64::consts::FRAC_1_SQRT_2 + 1e-3;
 
 impl Screen {
@@ -71,10 +73,10 @@ impl Screen {
     }
 
     /// What the kernels need of it: vectors and limit.
-    pub(super) fn vectors(&self) -> (Vectors<'_>, f32) {
+    pub(super) fn vectors(&self) -> (Directions<'_>, f32) {
         let vectors = match &self.vectors.shape {
-            Shape::Each(vectors) => Vectors::Each(vectors),
-            Shape::From { centre, parts } => Vectors::From { centre: *centre, parts: *parts },
+            Shape::Each(vectors) => Directions::Each(vectors),
+            Shape::From { centre, parts } => Directions::From { centre: *centre, parts: *parts },
         };
         (vectors, self.limit)
     }
@@ -85,12 +87,12 @@ impl Screen {
         let (vectors, limit) = self.vectors();
         room.clear();
         match vectors {
-            Vectors::None => {}
-            Vectors::Each(each) => match each.get(span.slot..span.slot + n) {
+            Directions::None => {}
+            Directions::Each(each) => match each.get(span.slot..span.slot + n) {
                 Some(own) => return (own, limit),
                 None => room.extend_from_slice(each.get(span.slot..).unwrap_or(&[])),
             },
-            Vectors::From { centre: [u, v], parts } => {
+            Directions::From { centre: [u, v], parts } => {
                 let away = |x: usize, centre: i32| (x as i32 * i32::from(parts)).wrapping_sub(centre) as i16;
                 room.extend((span.first..span.end).map(|x| [away(x, u), away(span.v, v)]));
             }

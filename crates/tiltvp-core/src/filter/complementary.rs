@@ -7,37 +7,17 @@ use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
 
 use crate::error::{Error, Result};
 use crate::geometry::check_rotation;
+use crate::options;
 
-/// How quickly the filter follows its reference.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct ComplementaryOptions {
-    /// Time after which a difference from the reference has shrunk to 1/e, seconds within `[1e-3, 1e4]`; 0.15 by default.
-    /// What is quicker is taken from the rates, what is slower from the reference.
-    pub time_constant_s: f64,
-    /// Time over which a lasting difference becomes a bias of the rates, seconds within `[1e-3, 1e9]`; 4 by default.
-    pub bias_time_constant_s: f64,
-}
-
-impl Default for ComplementaryOptions {
-    fn default() -> Self {
-        Self { time_constant_s: 0.15, bias_time_constant_s: 4.0 }
-    }
-}
-
-impl ComplementaryOptions {
-    /// Checks every field's domain.
-    ///
-    /// # Errors
-    /// [`Error::InvalidOption`] for the first field outside its domain.
-    pub fn validate(&self) -> Result<()> {
-        if !(1e-3..=1e4).contains(&self.time_constant_s) {
-            return Err(Error::option("complementary.time_constant_s", self.time_constant_s, "seconds in [1e-3, 1e4]"));
-        }
-        if !(1e-3..=1e9).contains(&self.bias_time_constant_s) {
-            let value = self.bias_time_constant_s;
-            return Err(Error::option("complementary.bias_time_constant_s", value, "seconds in [1e-3, 1e9]"));
-        }
-        Ok(())
+options! {
+    /// How quickly the filter follows its reference.
+    #[derive(Copy)]
+    pub struct ComplementaryOptions {
+        /// Time after which a difference from the reference has shrunk to 1/e, seconds. What is quicker is taken from the rates,
+        /// what is slower from the reference.
+        time_constant_s: f64 = 0.15 => 1e-3..=1e4, "seconds in [1e-3, 1e4]";
+        /// Time over which a lasting difference becomes a bias of the rates, seconds.
+        bias_time_constant_s: f64 = 4.0 => 1e-3..=1e9, "seconds in [1e-3, 1e9]";
     }
 }
 

@@ -1,4 +1,4 @@
-//! Whether a filter's errors are as large as it says: NEES, NIS, and the bands in which their means should lie.
+//! The consistency of a filter: NEES, NIS, and the bands in which their means should lie.
 
 use nalgebra::{Cholesky, SMatrix, SVector};
 

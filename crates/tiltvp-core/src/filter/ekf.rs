@@ -2,7 +2,7 @@
 
 use nalgebra::{Cholesky, Const, SMatrix, SVector, SymmetricEigen};
 
-/// A measurement beside its prediction: what it says that was not known, and how uncertain that is.
+/// An innovation, measured minus predicted, with its covariance.
 #[derive(Debug, Clone)]
 pub struct Innovation<const N: usize, const M: usize> {
     covariance: SMatrix<f64, N, N>,
@@ -22,8 +22,8 @@ impl<const N: usize, const M: usize> Innovation<N, M> {
         noise: SMatrix<f64, M, M>,
         innovation: SVector<f64, M>,
     ) -> Option<Self> {
-        let spread = symmetric(&(jacobian * covariance * jacobian.transpose() + noise));
-        let factor = Cholesky::new(spread)?;
+        let innovation_covariance = symmetric(&(jacobian * covariance * jacobian.transpose() + noise));
+        let factor = Cholesky::new(innovation_covariance)?;
         Some(Self { covariance, jacobian, noise, innovation, factor })
     }
 

@@ -11,4 +11,4 @@ pub use chi_square::{chi_square_cdf, chi_square_quantile};
 pub use complementary::{ComplementaryFilter, ComplementaryOptions};
 pub use consistency::{ConsistencyBand, squared_mahalanobis};
 pub use ekf::{Innovation, positive_semidefinite, symmetric};
-pub use gate::{Gate, probability_within};
+pub use gate::{ChiSquareGate, probability_within};

@@ -18,13 +18,13 @@ mod tests {
 
     proptest! {
         #[test]
-        fn whole_turns_go(angle in -3.1..3.1f64, turns in -5..5i32) {
+        fn whole_turns_are_removed(angle in -3.1..3.1f64, turns in -5..5i32) {
             prop_assert!((wrap_angle(angle + TAU * f64::from(turns)) - angle).abs() < 1e-12);
         }
     }
 
     #[test]
-    fn the_end_belongs_to_it() {
+    fn pi_is_in_the_interval() {
         assert_eq!(wrap_angle(PI), PI);
         assert_eq!(wrap_angle(-PI), PI);
         assert!(wrap_angle(f64::NAN).is_nan());

@@ -23,8 +23,8 @@ pub fn tangent_basis(n: &Vector3<f64>) -> Matrix3x2<f64> {
     Matrix3x2::new(1.0 - n.x * n.x * a, b, b, 1.0 - n.y * n.y * a, -n.x, -n.y)
 }
 
-/// The unit bearing that a walk of `|step|` radians along the great circle from the unit bearing `n` ends at; `step` is in
-/// the basis of [`tangent_basis`].
+/// The exponential map: the unit bearing at the end of a great-circle arc of `|step|` radians from the unit bearing `n`; `step` is
+/// in the basis of [`tangent_basis`].
 pub fn tangent_exp(n: &Vector3<f64>, step: &Vector2<f64>) -> Vector3<f64> {
     let length = step.norm();
     if length == 0.0 {
@@ -34,9 +34,9 @@ pub fn tangent_exp(n: &Vector3<f64>, step: &Vector2<f64>) -> Vector3<f64> {
     (n * length.cos() + along * length.sin()).normalize()
 }
 
-/// The walk from the unit bearing `n` to the unit bearing `to`, in the basis of [`tangent_basis`] at `n`: the inverse of
-/// [`tangent_exp`] up to a length of pi. Where `to` is opposite to `n`, and every direction leads there, the first of the
-/// basis is taken.
+/// The logarithm map: the step from the unit bearing `n` to the unit bearing `to`, in the basis of [`tangent_basis`] at `n`. It is
+/// the inverse of [`tangent_exp`] up to a length of pi. To the opposite bearing every direction leads; the first of the basis
+/// is taken.
 pub fn tangent_log(n: &Vector3<f64>, to: &Vector3<f64>) -> Vector2<f64> {
     let angle = angle_between(n, to);
     match (tangent_basis(n).transpose() * to).try_normalize(f64::MIN_POSITIVE) {
@@ -51,7 +51,7 @@ pub fn tangent_log(n: &Vector3<f64>, to: &Vector3<f64>) -> Vector2<f64> {
 pub fn tangent_transport(from: &Vector3<f64>, to: &Vector3<f64>) -> Matrix2<f64> {
     let rotation = Rotation3::rotation_between(from, to).unwrap_or_else(Rotation3::identity);
     let turned = tangent_basis(to).transpose() * rotation.matrix() * tangent_basis(from);
-    // Opposite bearings have no shortest way; whatever is taken there stays a rotation.
+    // Opposite bearings have no shortest arc; the identity is as good a rotation as any.
     if turned.determinant() > 0.5 { turned } else { Matrix2::identity() }
 }
 
@@ -84,11 +84,11 @@ mod tests {
         }
 
         #[test]
-        fn transport_is_a_rotation_that_keeps_the_way(n in unit(), to in unit()) {
+        fn transport_is_a_rotation_that_keeps_the_arc(n in unit(), to in unit()) {
             prop_assume!(n.dot(&to) > -0.99);
             let transport = tangent_transport(&n, &to);
             prop_assert!((transport * transport.transpose() - Matrix2::identity()).norm() < 1e-9);
-            // The way on at the end is the way out, carried along.
+            // The direction of the arc at its end is the transported direction at its start.
             prop_assert!((transport * tangent_log(&n, &to) + tangent_log(&to, &n)).norm() < 1e-7);
         }
 

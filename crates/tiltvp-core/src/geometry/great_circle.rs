@@ -4,6 +4,10 @@ use nalgebra::{Matrix2, Matrix3, Vector3};
 
 use super::bearing::tangent_basis;
 
+/// The least mean square of the bearings' distances from their own mean along the circle, square radians: 1e-7 rad, some hundred
+/// times the rounding of the square root of a moment (`no_circle_through_one_point`).
+const LEAST_SPREAD: f64 = 1e-14;
+
 /// A great circle fitted to bearings.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct GreatCircleFit {
@@ -40,7 +44,7 @@ pub fn fit_great_circle(weighted: impl IntoIterator<Item = (Vector3<f64>, f64)>)
     let normal = eigen.eigenvectors.column(least).normalize();
     let basis = tangent_basis(&normal);
     let information: Matrix2<f64> = basis.transpose() * moments * basis;
-    // A normal that could as well be any of a whole circle of normals is no fit.
+    // Bearings that coincide leave a whole circle of normals.
     let spread = information.symmetric_eigenvalues().min() / total;
     if spread <= LEAST_SPREAD || spread.is_nan() {
         return None;
@@ -49,9 +53,6 @@ pub fn fit_great_circle(weighted: impl IntoIterator<Item = (Vector3<f64>, f64)>)
     let chi_square = normal.dot(&(moments * normal)).max(0.0);
     Some(GreatCircleFit { normal, covariance, rms_rad: (chi_square / total).sqrt(), chi_square })
 }
-
-/// The least mean square of the bearings' distances from their own mean along the circle, square radians.
-const LEAST_SPREAD: f64 = 1e-14;
 
 #[cfg(test)]
 mod tests {

@@ -8,9 +8,9 @@ use crate::error::{Error, Result};
 /// `p_to = rotation p_from + translation`: `to_from`, as `left_from_right`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RigidMotion {
-    /// Takes directions of the one frame to the other.
+    /// Takes directions of the source frame to the destination frame.
     pub rotation: Matrix3<f64>,
-    /// The origin of the frame that is come from, in the other, metres.
+    /// The origin of the source frame in the destination frame, metres.
     pub translation_m: Vector3<f64>,
 }
 
@@ -20,7 +20,7 @@ impl RigidMotion {
         Self { rotation: Matrix3::identity(), translation_m: Vector3::zeros() }
     }
 
-    /// From a rotation and a translation; `name` is what the caller calls the motion.
+    /// From a rotation and a translation; `name` is the caller's name of the motion, for the error.
     ///
     /// # Errors
     /// [`Error::InvalidArgument`] unless the rotation is one to about 1e-6 and the translation finite.
@@ -46,14 +46,14 @@ impl RigidMotion {
         Self::new(name, matrix.fixed_view::<3, 3>(0, 0).into_owned(), matrix.fixed_view::<3, 1>(0, 3).into_owned())
     }
 
-    /// The motion back.
+    /// The inverse motion.
     #[must_use]
     pub fn inverse(&self) -> Self {
         let rotation = self.rotation.transpose();
         Self { rotation, translation_m: -(rotation * self.translation_m) }
     }
 
-    /// Where a point ends.
+    /// The point in the destination frame.
     pub fn point(&self, point_m: &Vector3<f64>) -> Vector3<f64> {
         self.rotation * point_m + self.translation_m
     }

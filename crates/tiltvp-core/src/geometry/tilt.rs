@@ -2,7 +2,7 @@
 
 use nalgebra::{Matrix3, Vector3};
 
-/// A lean of the robot against the ground plane, paper 000 eq. 1.
+/// A lean of the robot against the ground plane (Fleer 2017, eq. 1).
 ///
 /// `normal` is the ground plane's normal seen from the leaning robot,
 /// `n_robot = (-sin a cos b, -sin a sin b, cos a)`: `beta = 0` is a forward lean, `beta = +pi/2` a lean to the left.
@@ -77,7 +77,7 @@ impl Tilt {
         Matrix3::from_columns(&[basis.column(0).into_owned(), basis.column(1).into_owned(), self.normal])
     }
 
-    /// The angle between the two ground normals in radians: the error measure of paper 000 eq. 44.
+    /// The angle between the two ground normals in radians: the error measure of Fleer (2017), eq. 44.
     pub fn angle_to(&self, other: &Self) -> f64 {
         super::angle_between(&self.normal, &other.normal)
     }

@@ -1,11 +1,11 @@
-//! The tilt of a robot whose wheels stand at different heights, paper 000 section 2.3.
+//! The tilt of a robot whose wheels stand at different heights (Fleer 2017, section 2.3).
 
 use nalgebra::Vector3;
 
 use super::tilt::Tilt;
 use crate::error::{Error, Result};
 
-/// Where the three wheels of a robot touch the ground, in its own frame (paper 000 fig. 20): the left and the right wheel
+/// Where the three wheels of a robot touch the ground, in its own frame (Fleer 2017, fig. 20): the left and the right wheel
 /// at `(0, +-half_track_m)`, the caster at `(-caster_behind_m, 0)`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct WheelLayout {
@@ -18,7 +18,7 @@ pub struct WheelLayout {
 impl WheelLayout {
     /// The tilt of the robot when its wheels stand `left_m`, `right_m` and `caster_m` above a common level, metres.
     ///
-    /// With `h_r = right - left` and `h_c = caster - left` (paper 000 eqs. 42 and 43),
+    /// With `h_r = right - left` and `h_c = caster - left` (Fleer 2017, eqs. 42 and 43),
     ///
     /// ```text
     /// sin alpha = 1/2 sqrt(((2 h_c - h_r) / r_c)^2 + (h_r / r_w)^2)
@@ -64,8 +64,8 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    /// The paper prints no lengths: these are, to a tenth of a millimetre, the only ones that give every angle of its table 1
-    /// as printed.
+    /// Fleer (2017) prints no lengths. To a tenth of a millimetre these are the only ones that give every angle of table 1 as
+    /// printed.
     const PAPER: WheelLayout = WheelLayout { half_track_m: 0.1545, caster_behind_m: 0.1394 };
 
     fn degrees(tilt: Tilt) -> (f64, f64) {

@@ -1,14 +1,11 @@
 //! Images as the core sees them: borrowed rows of grey levels or colours, and rows and places made from them.
 
 mod color;
-mod expect;
-mod fixed;
 mod linear;
 mod smooth;
 mod view;
 
 pub use color::ColorView;
-pub(crate) use expect::expect;
 pub use linear::LightTable;
 pub use smooth::Smoother;
 pub use view::ImageView;

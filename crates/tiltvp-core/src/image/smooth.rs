@@ -1,11 +1,16 @@
 //! Separable Gaussian smoothing, one row at a time.
 
-use multiversion::multiversion;
+use tiltvp_kernels::smoothing::{
+    TAP_UNITS, add_scaled, add_scaled_one, convolve, fixed_columns, fixed_rows, quantise, scale, three_rows, widen,
+};
 
-use super::fixed::{fixed_columns, fixed_rows};
 use super::view::ImageView;
 
-/// The part of the Gaussian's weight that may be cut off at both ends.
+/// [`TAP_UNITS`] as a number.
+const UNITS: f32 = TAP_UNITS as f32;
+
+/// The part of the Gaussian's weight that may be cut off at both ends. The taps are normalised again, and their standard deviation
+/// is at most 4 % below that asked for (of 0.4 to 4 pixels).
 const TAIL: f64 = 0.01;
 
 /// A sampled Gaussian and one row of scratch; `sigma = 0` copies rows.
@@ -17,12 +22,6 @@ pub struct Smoother {
     fixed_sums: Vec<i16>,
     plain: Vec<f32>,
 }
-
-/// Steps in which such rows are rounded.
-const EIGHTHS: f32 = 8.0;
-
-/// Units of the taps of narrow kernels.
-const TAP_UNITS: f32 = 256.0;
 
 impl Smoother {
     /// A Gaussian of `sigma_px` pixels for rows of at most `max_width` pixels.
@@ -50,7 +49,7 @@ impl Smoother {
         let n = out.len();
         let inside = first >= 1 && first + n < image.width() && v >= 1 && v + 1 < image.height();
         if let ([centre, side], true) = (&self.taps[..], inside && self.fixed_sums.len() >= n + 2) {
-            let taps = [*centre, *side].map(|tap| (tap * TAP_UNITS) as i16);
+            let taps = [*centre, *side].map(|tap| (tap * UNITS) as i16);
             let part = |v: usize| image.row(v).get(first - 1..=first + n).unwrap_or(&[]);
             fixed_columns([part(v - 1), part(v), part(v + 1)], taps, &mut self.fixed_sums[..n + 2]);
             fixed_rows(&self.fixed_sums[..n + 2], taps, out);
@@ -129,68 +128,10 @@ fn gaussian_taps(sigma_px: f64) -> Vec<f32> {
     let kept = 1.0 + 2.0 * (1..=radius).map(weight).sum::<f64>();
     if radius == 1 {
         // So that sums of three by three pixels are exact in whole numbers.
-        let side = (f64::from(TAP_UNITS) * weight(1) / kept).round() as f32 / TAP_UNITS;
+        let side = (f64::from(UNITS) * weight(1) / kept).round() as f32 / UNITS;
         return vec![1.0 - 2.0 * side, side];
     }
     (0..=radius).map(|i| (weight(i) / kept) as f32).collect()
-}
-
-#[multiversion(targets("x86_64+avx512f+avx512bw+avx512vl", "x86_64+avx2+fma"))]
-fn widen(row: &[u8], out: &mut [f32]) {
-    for (o, i) in out.iter_mut().zip(row) {
-        *o = f32::from(*i);
-    }
-}
-
-#[multiversion(targets("x86_64+avx512f+avx512bw+avx512vl", "x86_64+avx2+fma"))]
-fn scale(row: &[u8], tap: f32, out: &mut [f32]) {
-    for (o, i) in out.iter_mut().zip(row) {
-        *o = f32::from(*i) * tap;
-    }
-}
-
-/// The middle row and its neighbours at once, which is all that narrow Gaussians take.
-#[multiversion(targets("x86_64+avx512f+avx512bw+avx512vl", "x86_64+avx2+fma"))]
-fn three_rows([above, middle, below]: [&[u8]; 3], [centre, side]: [f32; 2], out: &mut [f32]) {
-    for (((o, a), m), b) in out.iter_mut().zip(above).zip(middle).zip(below) {
-        *o = f32::from(*m) * centre + (f32::from(*a) + f32::from(*b)) * side;
-    }
-}
-
-#[multiversion(targets("x86_64+avx512f+avx512bw+avx512vl", "x86_64+avx2+fma"))]
-fn add_scaled(above: &[u8], below: &[u8], tap: f32, out: &mut [f32]) {
-    for ((o, a), b) in out.iter_mut().zip(above).zip(below) {
-        *o += (f32::from(*a) + f32::from(*b)) * tap;
-    }
-}
-
-#[multiversion(targets("x86_64+avx512f+avx512bw+avx512vl", "x86_64+avx2"))]
-fn quantise(row: &[f32], out: &mut [i16]) {
-    for (o, i) in out.iter_mut().zip(row) {
-        *o = (i * EIGHTHS).round_ties_even() as i16;
-    }
-}
-
-/// For a row whose mirror image is outside.
-fn add_scaled_one(row: &[u8], tap: f32, out: &mut [f32]) {
-    for (o, i) in out.iter_mut().zip(row) {
-        *o += f32::from(*i) * tap;
-    }
-}
-
-/// `sums` reach as far beyond `out` on both sides as the taps do, of which there are at least two.
-#[multiversion(targets("x86_64+avx512f+avx512bw+avx512vl", "x86_64+avx2+fma"))]
-fn convolve(sums: &[f32], taps: &[f32], out: &mut [f32]) {
-    let (radius, length) = (taps.len() - 1, out.len());
-    let window = |shift: usize| &sums[shift..shift + length];
-    for (((o, l), c), r) in out.iter_mut().zip(window(radius - 1)).zip(window(radius)).zip(window(radius + 1)) {
-        *o = c * taps[0] + (l + r) * taps[1];
-    }
-    for (offset, tap) in taps.iter().enumerate().skip(2) {
-        for ((o, l), r) in out.iter_mut().zip(window(radius - offset)).zip(window(radius + offset)) {
-            *o += (l + r) * tap;
-        }
-    }
 }
 
 #[cfg(test)]

@@ -2,20 +2,21 @@
 
 use nalgebra::Matrix3;
 
-use super::descriptor::{Course, DescriptorScratch, describe};
-use super::great_circle::{self, GreatCircleScratch};
+use super::description::descriptor::{DescriptorScratch, DescriptorSpan, describe};
+use super::description::patch::{Chart, Patch, Raster};
+use super::extraction::great_circle::{self, GreatCircleScratch};
+use super::extraction::radial::{self, RadialScratch, Radii};
 use super::line::{Line, LineFrame, Lines};
 use super::options::{LineMethod, LineOptions};
-use super::patch::{Chart, Patch, Raster};
-use super::radial::{self, RadialScratch, Radii};
-use super::sight::Sight;
+use super::tables::LineTables;
 use crate::camera::Camera;
 use crate::edges::{RidgeDetector, RidgePixels};
 use crate::error::{Error, Result};
 use crate::geometry::Tilt;
 use crate::image::ImageView;
 
-/// Samples of a descriptor from the middle of an area to its rim, along great circles.
+/// Samples of a descriptor from the middle of an area to its rim, along great circles: about one a pixel where 90
+/// degrees of elevation cover 110 pixels.
 const SAMPLES: usize = 18;
 
 /// Finds and describes the vertical lines of single images of one camera.
@@ -24,7 +25,7 @@ pub struct LineExtractor {
     camera: Camera,
     robot_from_camera: Matrix3<f64>,
     options: LineOptions,
-    sight: Sight,
+    tables: LineTables,
     radii: Option<Radii>,
 }
 
@@ -48,10 +49,10 @@ impl LineExtractor {
     pub fn new(camera: Camera, robot_from_camera: Matrix3<f64>, options: LineOptions) -> Result<Self> {
         options.validate()?;
         crate::geometry::validate_rotation(&robot_from_camera)?;
-        let sight = Sight::new(&camera, &robot_from_camera, &options)?;
+        let tables = LineTables::new(&camera, &robot_from_camera, &options)?;
         let radii = match &options.method {
             LineMethod::GreatCircle(_) => None,
-            LineMethod::Radial(radial) => Some(Radii::new(&camera, &robot_from_camera, &sight, radial)),
+            LineMethod::Radial(radial) => Some(Radii::new(&camera, &robot_from_camera, &tables, radial)),
         };
         if let Some(radii) = radii
             && radii.outer - radii.inner < 6.0
@@ -59,7 +60,7 @@ impl LineExtractor {
             let got = format!("[{:.1}, {:.1}]", radii.inner, radii.outer);
             return Err(Error::option("radius_min_px, radius_max_px", got, "radii at least 6 pixels apart"));
         }
-        Ok(Self { camera, robot_from_camera, options, sight, radii })
+        Ok(Self { camera, robot_from_camera, options, tables, radii })
     }
 
     /// The camera.
@@ -79,26 +80,26 @@ impl LineExtractor {
 
     /// Lowest and highest elevation that descriptors cover, in radians.
     pub fn band_rad(&self) -> (f64, f64) {
-        self.sight.band
+        self.tables.band
     }
 
     /// Memory for one thread.
     pub fn scratch(&self) -> LineScratch {
         LineScratch {
-            detector: RidgeDetector::new(&self.sight.region, &self.options.edges),
+            detector: RidgeDetector::new(&self.tables.region, &self.options.edges),
             ridge: RidgePixels::default(),
             great_circle: GreatCircleScratch::default(),
             radial: RadialScratch::default(),
             descriptor: DescriptorScratch::default(),
-            region_pixels: self.sight.region.len(),
+            region_pixels: self.tables.region.len(),
         }
     }
 
     fn check(&self, image: &ImageView<'_>, scratch: &LineScratch) -> Result<()> {
-        if scratch.region_pixels != self.sight.region.len() {
+        if scratch.region_pixels != self.tables.region.len() {
             return Err(Error::argument("scratch", "that of another extractor", "one made by this extractor"));
         }
-        let (width, height) = (self.sight.width, self.sight.height);
+        let (width, height) = (self.tables.width, self.tables.height);
         if (image.width(), image.height()) == (width, height) {
             return Ok(());
         }
@@ -107,7 +108,7 @@ impl LineExtractor {
     }
 
     /// The vertical lines of an image, by rising bearing. `tilt` is the lean of the frame where it is known; the radial
-    /// variant knows none.
+    /// variant has none.
     ///
     /// # Errors
     /// [`Error::InvalidArgument`] if the image has another size than the camera's, or the scratch is another extractor's.
@@ -122,16 +123,16 @@ impl LineExtractor {
         let edges = &self.options.edges;
         match (&self.options.method, &self.radii) {
             (LineMethod::Radial(options), Some(radii)) => {
-                radial::find(image, &self.sight, radii, edges.gradient_min, options, &mut scratch.radial, out);
+                radial::find(image, &self.tables, radii, edges.gradient_min, options, &mut scratch.radial, out);
             }
             (LineMethod::GreatCircle(options), _) => {
                 let tilt = tilt.copied().unwrap_or(Tilt::UPRIGHT);
                 let reach = (options.plane_max_rad + tilt.alpha_rad()).min(std::f64::consts::FRAC_PI_2);
-                let screen = self.sight.screen.with_limit(reach.sin());
+                let screen = self.tables.screen.with_limit(reach.sin());
                 let LineScratch { detector, ridge, great_circle, .. } = scratch;
-                detector.detect(image, &self.sight.region, edges.gradient_min, Some(&screen), ridge);
+                detector.detect(image, &self.tables.region, edges.gradient_min, Some(&screen), ridge);
                 let frame = LineFrame { normal: tilt.normal(), center_px: None };
-                great_circle::find(&self.sight, ridge, frame, options, great_circle, out);
+                great_circle::find(&self.tables, ridge, frame, options, great_circle, out);
             }
             (LineMethod::Radial(_), None) => {}
         }
@@ -140,7 +141,7 @@ impl LineExtractor {
 
     /// Lines at any bearings in the frame of an image, without support: to describe places where there may be no line.
     pub fn lines_at(&self, bearings_rad: &[f64], tilt: Option<&Tilt>) -> Lines {
-        let (elevation_min_rad, elevation_max_rad) = self.sight.band;
+        let (elevation_min_rad, elevation_max_rad) = self.tables.band;
         let line = |bearing_rad: &f64| Line {
             bearing_rad: *bearing_rad,
             sigma_rad: 0.0,
@@ -158,7 +159,7 @@ impl LineExtractor {
     fn range(&self, frame: &LineFrame) -> (f64, f64) {
         match (frame.center_px, &self.radii) {
             (Some(_), Some(radii)) => (radii.inner, radii.outer),
-            _ => self.sight.band,
+            _ => self.tables.band,
         }
     }
 
@@ -169,7 +170,7 @@ impl LineExtractor {
         Err(Error::argument("lines", "lines of the other method", "lines that this extractor's method found"))
     }
 
-    /// The descriptors of the lines of an image, one after the other: paper 001 section 3 along the lines' great circles, or
+    /// The descriptors of the lines of an image, one after the other (Scaramuzza, Siegwart and Martinelli 2009, section 3): along the lines' great circles, or
     /// along radii for lines of the radial variant.
     ///
     /// # Errors
@@ -187,12 +188,12 @@ impl LineExtractor {
         let chart = Chart::new(&self.camera, &self.robot_from_camera, &lines.frame);
         let samples = lines.frame.center_px.is_none().then_some(SAMPLES);
         let (low, high) = self.range(&lines.frame);
-        let course = Course { chart, low, high, samples };
-        describe(image, &self.sight, &course, lines, &self.options.descriptor, &mut scratch.descriptor, out);
+        let course = DescriptorSpan { chart, low, high, samples };
+        describe(image, &self.tables, &course, lines, &self.options.descriptor, &mut scratch.descriptor, out);
         Ok(())
     }
 
-    /// The grey levels of the rectangle about each line (paper 001 section 5): as wide as an area of the descriptor, as long
+    /// The grey levels of the rectangle about each line (Scaramuzza, Siegwart and Martinelli 2009, section 5): as wide as an area of the descriptor, as long
     /// as the line's range; NaN where the world is not seen. Returns rows, which run along the line, and columns.
     ///
     /// # Errors
@@ -213,7 +214,7 @@ impl LineExtractor {
         let mut patch = Patch::default();
         out.clear();
         for line in &lines.lines {
-            patch.sample(image, &self.sight, &chart, (line.bearing_rad, 0.5 * (low + high)), &raster);
+            patch.sample(image, &self.tables, &chart, (line.bearing_rad, 0.5 * (low + high)), &raster);
             out.extend_from_slice(&patch.levels);
         }
         Ok((rows, columns))

@@ -24,7 +24,7 @@ pub struct Line {
 pub struct LineFrame {
     /// The ground normal in the robot frame that was taken for the vertical, a unit vector.
     pub normal: Vector3<f64>,
-    /// Where the radial lines of the paper's variant meet, in pixels; none for great circles.
+    /// Where the lines of the radial variant meet, in pixels; none for great circles.
     pub center_px: Option<Vector2<f64>>,
 }
 

@@ -1,46 +1,26 @@
-//! Which lines of two images are the same: the nearest descriptor, if three tests agree (paper 001 section 4).
+//! Which lines of two images are the same: the nearest descriptor, if three tests agree (Scaramuzza, Siegwart and Martinelli 2009, section 4).
 
-use super::candidates::wrap;
-use super::dissimilarity::descriptor_distances;
+use super::angles::wrap;
+use super::description::dissimilarity::descriptor_distances;
 use super::order::{Match, keep_cyclic_order};
 use crate::error::{Error, Result};
+use crate::options;
+use crate::options::{Above, POSITIVE};
 
-/// Options of the matcher.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct MatchOptions {
-    /// `F1`: the greatest distance of a match, eq. 8. Default 1.05.
-    pub distance_max: f64,
-    /// `F2`: the greatest share of the mean distance to all lines of the other image, eq. 9. Default 0.75.
-    pub mean_ratio_max: f64,
-    /// `F3`: the greatest share of the second smallest distance, eq. 10. Default 0.8.
-    pub second_ratio_max: f64,
-    /// Whether both lines must be nearest to each other, so that no line is matched twice. Default true.
-    pub mutual: bool,
-    /// Whether matches must keep the cyclic order of the lines. Default false.
-    pub ordered: bool,
-}
-
-impl Default for MatchOptions {
-    fn default() -> Self {
-        Self { distance_max: 1.05, mean_ratio_max: 0.75, second_ratio_max: 0.8, mutual: true, ordered: false }
-    }
-}
-
-impl MatchOptions {
-    /// Checks every field.
-    ///
-    /// # Errors
-    /// [`Error::InvalidOption`] with the name of the field.
-    pub fn validate(&self) -> Result<()> {
-        if !(self.distance_max > 0.0 && self.distance_max.is_finite()) {
-            return Err(Error::option("f1", self.distance_max, "a positive distance"));
-        }
-        for (name, ratio) in [("f2", self.mean_ratio_max), ("f3", self.second_ratio_max)] {
-            if !(ratio > 0.0 && ratio <= 1.0) {
-                return Err(Error::option(name, ratio, "a share above 0 and at most 1"));
-            }
-        }
-        Ok(())
+options! {
+    /// Options of the matcher.
+    #[derive(Copy)]
+    pub struct MatchOptions {
+        /// `F1`: the greatest distance of a match, eq. 8.
+        [as "f1"] distance_max: f64 = 1.05 => POSITIVE, "a positive distance";
+        /// `F2`: the greatest share of the mean distance to all lines of the other image, eq. 9.
+        [as "f2"] mean_ratio_max: f64 = 0.75 => Above(0.0, 1.0), "a share above 0 and at most 1";
+        /// `F3`: the greatest share of the second smallest distance, eq. 10.
+        [as "f3"] second_ratio_max: f64 = 0.8 => Above(0.0, 1.0), "a share above 0 and at most 1";
+        /// Whether both lines must be nearest to each other, so that no line is matched twice.
+        mutual: bool = true;
+        /// Whether matches must keep the cyclic order of the lines.
+        ordered: bool = false;
     }
 }
 

@@ -1,36 +1,28 @@
-//! Vertical lines of single images: found, described, matched and followed (paper 001, sections 2 to 4 and 9.1).
+//! Vertical lines of single images: found, described, matched and tracked.
+//!
+//! Equation and section numbers are those of Scaramuzza, Siegwart and Martinelli 2009.
 
-mod arctan;
-mod assignment;
-mod candidates;
-mod center;
-mod descriptor;
+mod angles;
+mod description;
 mod descriptor_options;
-mod dissimilarity;
+mod extraction;
 mod extractor;
-mod fit;
-mod great_circle;
-mod histogram;
 mod line;
 mod matcher;
 mod options;
 mod order;
-mod parallax;
-mod patch;
-mod radial;
-mod sight;
-mod tracker;
+mod tables;
 mod tracker_options;
-mod tracker_state;
+mod tracking;
 
-pub use descriptor_options::{DescriptorOptions, Normalisation};
-pub use dissimilarity::{descriptor_distances, ssd_matrix, zncc_matrix};
-pub use extractor::{LineExtractor, LineScratch};
-pub use line::{Line, LineFrame, Lines};
-pub use matcher::{BearingGate, MatchOptions, MatchScratch, match_descriptors};
-pub use options::{GreatCircleOptions, LINE_METHODS, LineMethod, LineOptions, RadialOptions};
-pub use order::Match;
-pub use parallax::{Motion, Parallax};
-pub use tracker::LineTracker;
-pub use tracker_options::TrackerOptions;
-pub use tracker_state::{Followed, FrameMemory, TrackedLine, TrackerState};
+pub use self::description::dissimilarity::{descriptor_distances, ssd_matrix, zncc_matrix};
+pub use self::descriptor_options::{DescriptorOptions, Normalisation};
+pub use self::extractor::{LineExtractor, LineScratch};
+pub use self::line::{Line, LineFrame, Lines};
+pub use self::matcher::{BearingGate, MatchOptions, MatchScratch, match_descriptors};
+pub use self::options::{GreatCircleOptions, LineMethod, LineOptions, RadialOptions};
+pub use self::order::Match;
+pub use self::tracker_options::TrackerOptions;
+pub use self::tracking::parallax::{Motion, Parallax};
+pub use self::tracking::tracker::LineTracker;
+pub use self::tracking::tracker_state::{Followed, FrameMemory, TrackedLine, TrackerState};

@@ -1,4 +1,4 @@
-//! Matches, and the ordering constraint: lines keep their cyclic order about the robot.
+//! Matches of two images, and the ordering constraint: lines keep their cyclic order about the robot.
 
 /// Line `a` of the first image is line `b` of the second.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -1,7 +1,7 @@
 //! Local optimisation of a new best model: iterated least squares with a falling threshold (LO-RANSAC).
 
 use super::loss::Gate;
-use super::problem::Problem;
+use super::problem::{Problem, gated};
 use super::sampling::{LocalOptimization, Score};
 
 /// The best of a model and its refits, with its score; `found` is the model and its own score.
@@ -17,9 +17,9 @@ pub(super) fn improve<P: Problem>(
     for round in 0..options.iterations {
         let progress = f64::from(round) / f64::from(options.iterations.saturating_sub(1).max(1));
         let factor = options.widening + (1.0 - options.widening) * progress;
-        let summary = problem.summarise(&model, Gate::Within { threshold: factor * threshold }, weights);
-        let Some(next) = problem.fit(&summary, &model) else { break };
-        let gained = score.of(problem, &next, threshold, most);
+        let moments = gated(problem, &model, Gate::Within { threshold: factor * threshold }, weights);
+        let Some(next) = problem.fit_weighted(&moments) else { break };
+        let gained = problem.rows().support(problem.coefficients(&next), threshold, score, most);
         model = next;
         if gained > most {
             (best, most) = (model.clone(), gained);

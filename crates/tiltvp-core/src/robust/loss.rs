@@ -1,6 +1,6 @@
 //! How much an observation counts, given its residual.
 
-use super::marginal::{CELLS, MARGINAL, cell, slope_at, weight_most};
+use tiltvp_kernels::rows::{self, Real};
 
 /// The gate that a residual must pass.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -17,12 +17,6 @@ pub enum Gate {
         /// The largest residual that counts.
         threshold: f64,
     },
-    /// Weights are multiplied by those of MAGSAC++ for one degree of freedom (Barath et al. 2020): the density of residuals
-    /// marginalised over noise of any scale, zero beyond the threshold.
-    Marginal {
-        /// The residual within which 99 % of the inliers of the largest scale lie.
-        threshold: f64,
-    },
     /// Weights are multiplied by a Gaussian of compact support, `max(0, 1 - r^2 / (16 scale^2))^8`, which follows
     /// `exp(-r^2 / (2 scale^2))` and vanishes beyond four scales.
     Soft {
@@ -31,69 +25,52 @@ pub enum Gate {
     },
 }
 
-/// How the kernels evaluate a gate.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Shape {
-    /// A threshold whose rejections last.
-    Hard,
-    /// The other side of [`Hard`](Self::Hard): what it newly rejects.
-    Rejected,
-    /// A threshold.
-    Within,
-    /// The weights of a table.
-    Marginal,
-    /// A power of a parabola.
-    Soft,
-    /// None.
-    Open,
-}
-
 impl Gate {
-    /// The limit, and `1 / reach^2`, in which the kernels evaluate the gate.
-    pub(super) fn coefficients(self) -> (f64, f64) {
+    /// The gate as the kernels have it.
+    pub(super) fn of_rows<T: Real>(self) -> rows::Gate<T> {
         match self {
-            Self::Open => (f64::INFINITY, 0.0),
-            Self::Hard { threshold } | Self::Within { threshold } => (threshold, 0.0),
-            Self::Marginal { threshold } => (threshold, 1.0 / (threshold * threshold)),
-            Self::Soft { scale } => (f64::INFINITY, 1.0 / (16.0 * scale * scale)),
+            Self::Open => rows::Gate::Open,
+            Self::Hard { threshold } => rows::Gate::Hard { reach: T::reach(threshold) },
+            Self::Within { threshold } => rows::Gate::Within { reach: T::reach(threshold) },
+            Self::Soft { scale } => rows::Gate::Soft { inverse: T::from_f64(inverse_square(scale)) },
         }
     }
 
-    /// The kernel that evaluates the gate.
-    pub(super) fn shape(self) -> Shape {
-        match self {
-            Self::Hard { .. } => Shape::Hard,
-            Self::Within { .. } => Shape::Within,
-            Self::Marginal { .. } => Shape::Marginal,
-            Self::Soft { .. } => Shape::Soft,
-            Self::Open => Shape::Open,
-        }
-    }
-}
-
-impl Gate {
     /// The factor by which the gate multiplies the weight of a residual.
     pub fn weight(self, residual: f64) -> f64 {
-        let (limit, inverse) = self.coefficients();
-        let squared = residual * residual;
-        if matches!(self, Self::Marginal { .. }) {
-            return f64::from(MARGINAL.weight[cell(((squared * inverse) as f32).sqrt())]);
+        match self {
+            Self::Open => 1.0,
+            Self::Hard { threshold } | Self::Within { threshold } => {
+                f64::from(u8::from(is_within(residual, threshold)))
+            }
+            Self::Soft { scale } => (1.0 - residual * residual * inverse_square(scale)).max(0.0).powi(8),
         }
-        if squared > limit * limit { 0.0 } else { (1.0 - squared * inverse).max(0.0).powi(8) }
     }
 
     /// The derivative of `residual * weight(residual)`, which is what a fit feels of a small change of its model: negative in
     /// the flanks of the soft gate, so that clutter spread evenly over the gate adds up to nothing.
     pub fn slope(self, residual: f64) -> f64 {
-        let (limit, inverse) = self.coefficients();
-        let squared = residual * residual;
-        if matches!(self, Self::Marginal { .. }) {
-            let part = (residual.abs() * inverse.sqrt()).max(0.5 / CELLS as f64);
-            return if part < 1.0 { slope_at(part) / weight_most() } else { 0.0 };
+        match self {
+            Self::Open => 1.0,
+            Self::Hard { threshold } | Self::Within { threshold } => {
+                f64::from(u8::from(is_within(residual, threshold)))
+            }
+            Self::Soft { scale } => {
+                let t = (1.0 - residual * residual * inverse_square(scale)).max(0.0);
+                t.powi(7) * (17.0 * t - 16.0)
+            }
         }
-        let t = (1.0 - squared * inverse).max(0.0);
-        if squared > limit * limit { 0.0 } else { t.powi(7) * (17.0 * t - 16.0) }
     }
+}
+
+/// Whether a residual is at most the threshold, by their squares, as the kernels have it.
+fn is_within(residual: f64, threshold: f64) -> bool {
+    residual * residual <= threshold * threshold
+}
+
+/// One over the square of the residual from which on a soft gate leaves nothing.
+pub(super) fn inverse_square(scale: f64) -> f64 {
+    1.0 / (16.0 * scale * scale)
 }
 
 #[cfg(test)]

@@ -1,7 +1,7 @@
-//! Repeated least squares: the trimming loop of paper 000 (eqs. 33-35), and a reweighting loop with a fading gate.
+//! Repeated least squares: the trimming loop of Fleer 2017 (eqs. 33 to 35), and a reweighting loop with a fading gate.
 
 use super::loss::Gate;
-use super::problem::Problem;
+use super::problem::{Problem, gated};
 use super::report::{FitReport, Stop};
 use crate::error::{Error, Result};
 
@@ -10,7 +10,7 @@ use crate::error::{Error, Result};
 pub struct RejectRefitOptions {
     /// Share of normally distributed residuals that each round keeps, in (0, 1).
     pub keep_fraction: f64,
-    /// Most rounds, `N_E` in the paper; 0 is plain least squares. Default 15.
+    /// Most rounds, `N_E` of Fleer 2017; 0 is plain least squares. Default 15.
     pub max_iterations: u32,
     /// Change of the model below which it has converged, in the problem's unit of distance.
     pub tolerance: f64,
@@ -44,36 +44,38 @@ pub fn reject_refit<P: Problem>(
     near: &P::Model,
     weights: &mut [f32],
 ) -> FitReport<P::Model> {
-    if problem.len() < P::SAMPLE_SIZE {
-        return FitReport::failed(Stop::TooFew { have: problem.len(), need: P::SAMPLE_SIZE }, 0);
+    if problem.rows().len() < P::SAMPLE_SIZE {
+        return FitReport::failed(Stop::TooFew { have: problem.rows().len(), need: P::SAMPLE_SIZE }, 0);
     }
     let quantile = normal_quantile(0.5 * (1.0 + options.keep_fraction));
-    let mut summary = problem.summarise(near, Gate::Open, weights);
-    let Some(mut model) = problem.fit(&summary, near) else {
+    let mut moments = gated(problem, near, Gate::Open, weights);
+    let Some(mut model) = problem.fit_weighted(&moments) else {
         return FitReport::failed(Stop::NoModel { trials: 1 }, 1);
     };
     let mut iterations = 1;
     let stop = loop {
-        let rms = problem.rms(&summary, &model);
+        let rms = moments.rms(problem.coefficients(&model));
         if rms <= options.rms_min {
             break Stop::Settled { rms, limit: options.rms_min };
         }
         if iterations > options.max_iterations {
             break Stop::IterationLimit { limit: options.max_iterations };
         }
-        let trimmed = problem.trim(&summary, &model, quantile * rms, weights);
-        let Some(next) = problem.fit(&trimmed, &model) else {
+        let coefficients = problem.coefficients(&model);
+        let trimmed = problem.rows().trim(&moments, coefficients, quantile * rms, (&mut *weights, P::WEIGHTS));
+        let Some(next) = problem.fit_weighted(&trimmed) else {
             return FitReport::failed(Stop::NoModel { trials: iterations }, iterations);
         };
         let change = problem.distance(&model, &next);
         model = next;
-        summary = trimmed;
+        moments = trimmed;
         iterations += 1;
         if change < options.tolerance {
             break Stop::Converged { iterations, change, tolerance: options.tolerance };
         }
     };
-    FitReport { rms: problem.rms(&summary, &model), model: Some(model), inliers: P::count(&summary), iterations, stop }
+    let rms = moments.rms(problem.coefficients(&model));
+    FitReport { rms, model: Some(model), inliers: moments.count, iterations, stop }
 }
 
 /// Options of [`reweight`].
@@ -105,12 +107,12 @@ pub fn reweight<P: Problem>(
     loop {
         let progress = f64::from(iterations.min(options.shrinking)) / f64::from(options.shrinking.max(1));
         let scale = options.first_scale + (options.last_scale - options.first_scale) * progress;
-        let summary = problem.summarise(&model, Gate::Soft { scale }, weights);
+        let moments = gated(problem, &model, Gate::Soft { scale }, weights);
         iterations += 1;
-        if P::count(&summary) < P::SAMPLE_SIZE {
-            return FitReport::failed(Stop::TooFew { have: P::count(&summary), need: P::SAMPLE_SIZE }, iterations);
+        if moments.count < P::SAMPLE_SIZE {
+            return FitReport::failed(Stop::TooFew { have: moments.count, need: P::SAMPLE_SIZE }, iterations);
         }
-        let Some(next) = problem.fit(&summary, &model) else {
+        let Some(next) = problem.fit_weighted(&moments) else {
             return FitReport::failed(Stop::NoModel { trials: iterations }, iterations);
         };
         let change = problem.distance(&model, &next);
@@ -123,7 +125,7 @@ pub fn reweight<P: Problem>(
             } else {
                 Stop::IterationLimit { limit }
             };
-            let (rms, inliers) = (problem.rms(&summary, &model), P::count(&summary));
+            let (rms, inliers) = (moments.rms(problem.coefficients(&model)), moments.count);
             return FitReport { rms, model: Some(model), inliers, iterations, stop };
         }
     }

@@ -1,13 +1,12 @@
-//! Observations that are linear in the model: rows `(x, y, z)` with residual `x h0 + y h1 + z h2`, and their one-pass kernels.
+//! Observations that are linear in the model: rows `(x, y, z)` with residual `x h0 + y h1 + z h2`, counted and added up.
 
-use nalgebra::{Matrix2, Matrix3, Vector2, Vector3};
+use nalgebra::Vector3;
+use tiltvp_kernels::aligned::Aligned;
+use tiltvp_kernels::rows::{self, ConsensusBound, GAINS, GroupSums, Real, Sums, Weights, sums_by_group};
 
-use super::aligned::Aligned;
-use super::loss::{Gate, Shape};
-use super::marginal::MARGINAL;
-use super::real::{BLOCK, Real};
+use super::loss::{Gate, inverse_square};
+use super::moments::Moments;
 use super::sampling::Score;
-use super::total::Total;
 
 /// Rows in structure-of-arrays form, in single precision for pixels or double for the user's own numbers.
 #[derive(Debug, Clone, Default)]
@@ -15,22 +14,6 @@ pub struct Rows<T> {
     /// Columns `x`, `y`, `z`, each longer than the number of rows in use.
     columns: [Aligned<T>; 3],
     len: usize,
-}
-
-/// Weighted moments of `(x, y, d)`, where `d` is the residual of the model at which they were taken.
-///
-/// Because `d` is small, nothing cancels when a nearby model is fitted or its residuals are summed, even in single precision.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub struct Moments {
-    /// Rows with a weight above zero.
-    pub count: usize,
-    /// Sum of the weights.
-    pub weight: f64,
-    /// The weight when they were last added up row by row.
-    whole: f64,
-    sums: [f64; 6],
-    /// The model `(h0, h1, h2)` at which the moments were taken.
-    at: [f64; 3],
 }
 
 impl<T: Real> Rows<T> {
@@ -141,17 +124,9 @@ impl<T: Real> Rows<T> {
         }
     }
 
-    /// How many of the listed rows have a residual of at most `threshold`.
-    pub fn count_among(&self, rows: &[u32], model: [f64; 3], threshold: f64) -> usize {
-        let ([h0, h1, h2], reach) = (model.map(T::from_f64), T::reach(threshold));
-        let [x, y, z] = self.columns();
-        let within = |row: &u32| {
-            let place = *row as usize;
-            let (Some(x), Some(y), Some(z)) = (x.get(place), y.get(place), z.get(place)) else { return 0 };
-            let d = *x * h0 + *y * h1 + *z * h2;
-            usize::from(d.magnitude() <= reach)
-        };
-        rows.iter().map(within).sum()
+    /// Fills the tables that bound the consensus of models for a threshold and an `h2` of at least some number above zero.
+    pub(super) fn tabulate(&self, bound: &mut ConsensusBound, threshold: f64, h2_min: f64) {
+        bound.tabulate(self.columns(), threshold, h2_min);
     }
 
     /// The sum of [`Score::gain`] over all rows, or some number up to `to_beat` where it cannot exceed that.
@@ -159,12 +134,11 @@ impl<T: Real> Rows<T> {
         if score == Score::Count {
             return self.count_to_beat(model, threshold, to_beat as usize) as f64;
         }
-        let marginal = matches!(score, Score::Magsac { .. }).then(|| &MARGINAL.gain);
         let (model, inverse) = (model.map(T::from_f64), T::from_f64(1.0 / threshold));
         let mut total = 0.0;
-        for start in (0..self.len).step_by(BLOCK) {
-            let end = (start + BLOCK).min(self.len);
-            total += T::gain(self.columns().map(|column| &column[start..end]), model, inverse, marginal);
+        for start in (0..self.len).step_by(GAINS) {
+            let end = (start + GAINS).min(self.len);
+            total += T::gains(self.columns().map(|column| &column[start..end]), model, inverse);
             // No row gains more than one.
             if total + (self.len - end) as f64 <= to_beat {
                 break;
@@ -181,141 +155,82 @@ impl<T: Real> Rows<T> {
 
     /// Applies a gate about a model to the weights and takes the moments of what is left.
     pub fn moments(&self, model: [f64; 3], gate: Gate, weights: &mut [f32]) -> Moments {
-        self.moments_of(model, gate, false, weights)
+        self.moments_of(model, gate, (weights, Weights::Any))
     }
 
-    /// [`moments`](Self::moments) where all weights are ones and zeros, which takes less time.
-    pub fn moments_of_ones(&self, model: [f64; 3], gate: Gate, weights: &mut [f32]) -> Moments {
-        self.moments_of(model, gate, true, weights)
+    /// [`moments`](Self::moments) with weights of a kind.
+    pub fn moments_of(&self, model: [f64; 3], gate: Gate, weights: (&mut [f32], Weights)) -> Moments {
+        let Sums { count, sums: [weight, sums @ ..] } = self.sums(model, gate.of_rows(), weights);
+        Moments { count, weight, whole: weight, sums, at: model }
     }
 
-    fn moments_of(&self, model: [f64; 3], gate: Gate, ones: bool, weights: &mut [f32]) -> Moments {
-        let total = self.total(model, gate, (gate.shape(), ones), weights);
-        Moments {
-            count: total.count,
-            weight: total.sums[0],
-            whole: total.sums[0],
-            sums: std::array::from_fn(|i| total.sums[i + 1]),
-            at: model,
-        }
-    }
-
-    fn total(&self, model: [f64; 3], gate: Gate, (shape, ones): (Shape, bool), weights: &mut [f32]) -> Total {
-        let (limit, inverse) = gate.coefficients();
-        let gains = (T::reach(limit), T::from_f64(inverse));
-        let mut total = Total::default();
+    fn sums(&self, model: [f64; 3], gate: rows::Gate<T>, (weights, kind): (&mut [f32], Weights)) -> Sums {
+        let (mut sums, model) = (Sums::default(), model.map(T::from_f64));
         let n = self.len().min(weights.len());
-        let block = if shape == Shape::Marginal { BLOCK } else { T::BLOCK };
-        for start in (0..n).step_by(block) {
-            let part = start..(start + block).min(n);
+        for start in (0..n).step_by(T::BLOCK) {
+            let part = start..(start + T::BLOCK).min(n);
             let rows = self.columns().map(|column| &column[part.clone()]);
-            T::gather(rows, &mut weights[part], model.map(T::from_f64), gains, shape, ones, &mut total);
+            T::accumulate(rows, (&mut weights[part], kind), model, gate, &mut sums);
         }
-        total
+        sums
     }
-}
 
-impl<T: Real> Rows<T> {
     /// The moments after a hard gate about a model, given those before it: of the rows whose weights it sets to zero, their
     /// moments are taken away. That takes less time than to add up the others, which happens where little would be left.
-    pub fn trim(&self, before: &Moments, model: [f64; 3], threshold: f64, weights: &mut [f32]) -> Moments {
-        self.trim_of(before, (model, threshold), false, weights)
-    }
-
-    /// [`trim`](Self::trim) where all weights are ones and zeros, which takes less time.
-    pub fn trim_ones(&self, before: &Moments, model: [f64; 3], threshold: f64, weights: &mut [f32]) -> Moments {
-        self.trim_of(before, (model, threshold), true, weights)
-    }
-
-    fn trim_of(
+    pub fn trim(
         &self,
         before: &Moments,
-        (model, threshold): ([f64; 3], f64),
-        ones: bool,
-        weights: &mut [f32],
+        model: [f64; 3],
+        threshold: f64,
+        (weights, kind): (&mut [f32], Weights),
     ) -> Moments {
         let gate = Gate::Hard { threshold };
         let Some(mut moments) = before.about(model).filter(|_| T::TRIMS) else {
-            return self.moments_of(model, gate, ones, weights);
+            return self.moments_of(model, gate, (weights, kind));
         };
-        let gone = self.total(model, gate, (Shape::Rejected, ones), weights);
-        moments.count -= gone.count.min(moments.count);
-        moments.weight -= gone.sums[0];
-        for (sum, gone) in moments.sums.iter_mut().zip(&gone.sums[1..]) {
+        let rejected = rows::Gate::Rejected { reach: T::reach(threshold) };
+        let Sums { count, sums: [weight, sums @ ..] } = self.sums(model, rejected, (&mut *weights, kind));
+        moments.count -= count.min(moments.count);
+        moments.weight -= weight;
+        for (sum, gone) in moments.sums.iter_mut().zip(sums) {
             *sum -= gone;
         }
         if moments.weight < LEFT * moments.whole {
-            return self.moments_of(model, gate, ones, weights);
+            return self.moments_of(model, gate, (weights, kind));
         }
         moments
     }
 }
 
-/// Share of the weight below which moments are added up anew, so that what was rounded off the others does not show.
-const LEFT: f64 = 0.2;
-
-impl Moments {
-    /// The same moments with the residuals of another model; `None` if `h2` is zero.
-    fn about(&self, model: [f64; 3]) -> Option<Self> {
-        let ([xx, xy, yy, xd, yd, dd], [h0, h1, h2]) = (self.sums, self.at);
-        // d' = a x + b y + k d.
-        let k = model[2] / h2;
-        let (a, b) = (model[0] - k * h0, model[1] - k * h1);
-        let sums = [
-            xx,
-            xy,
-            yy,
-            a * xx + b * xy + k * xd,
-            a * xy + b * yy + k * yd,
-            a * (a * xx + 2.0 * (b * xy + k * xd)) + b * (b * yy + 2.0 * k * yd) + k * k * dd,
-        ];
-        k.is_finite().then_some(Self { sums, at: model, ..*self })
-    }
-
-    /// The change `(dh0, dh1)` of the model that minimises the weighted sum of squares, `h2` held; `None` if undetermined.
-    pub fn step(&self) -> Option<Vector2<f64>> {
-        let [xx, xy, yy, xd, yd, _] = self.sums;
-        let (determinant, trace) = (xx * yy - xy * xy, xx + yy);
-        let determined = determinant > 1e-12 * trace * trace;
-        determined.then(|| Vector2::new(xy * yd - yy * xd, xy * xd - xx * yd) / determinant)
-    }
-
-    /// The model at which the moments were taken.
-    pub fn model(&self) -> [f64; 3] {
-        self.at
-    }
-
-    /// Sum of the weighted squared residuals of the model `(h0 + dh0, h1 + dh1, h2)`.
-    pub fn sum_of_squares(&self, step: &Vector2<f64>) -> f64 {
-        let [xx, xy, yy, xd, yd, dd] = self.sums;
-        let (a, b) = (step.x, step.y);
-        (dd + 2.0 * (a * xd + b * yd) + a * a * xx + 2.0 * a * b * xy + b * b * yy).max(0.0)
-    }
-
-    /// The information `sum w (x, y)^T (x, y)` about `(h0, h1)`.
-    pub fn information(&self) -> Matrix2<f64> {
-        let [xx, xy, yy, ..] = self.sums;
-        Matrix2::new(xx, xy, xy, yy)
-    }
-
-    /// The moments of the rows themselves, `sum w (x, y, z)^T (x, y, z)`; needs `h2 != 0`.
-    pub fn second_moments(&self) -> Matrix3<f64> {
-        // z = (d - h0 x - h1 y) / h2, a linear map of (x, y, d).
-        let [xx, xy, yy, xd, yd, dd] = self.sums;
-        let [h0, h1, h2] = self.at;
-        let map = Matrix3::new(1.0, 0.0, 0.0, 0.0, 1.0, 0.0, -h0 / h2, -h1 / h2, 1.0 / h2);
-        map * Matrix3::new(xx, xy, xd, xy, yy, yd, xd, yd, dd) * map.transpose()
+impl Rows<f32> {
+    /// Sums over every `stride`-th row, with a soft gate of this scale about a model. Weights are one where none are given. Row `i`
+    /// is of the group `group_of[members[i]]`, the last one where there is none.
+    pub fn sums_by_group(
+        &self,
+        model: [f64; 3],
+        scale: f64,
+        weights: Option<&[f32]>,
+        stride: usize,
+        groups: (&[u32], &[u8]),
+    ) -> GroupSums {
+        let inverse = inverse_square(scale) as f32;
+        sums_by_group(self.columns(), (model.map(|h| h as f32), inverse), weights, stride, groups)
     }
 }
 
-/// Rows that are counted before looking whether the count can still matter.
+/// Share of the weight below which moments are added up anew: sums of single precision are good to about 1e-6 of the whole, which is
+/// 5e-6 of this share. `trimmed_moments_are_those_of_what_is_left` shows what is lost.
+const LEFT: f64 = 0.2;
+
+/// Rows that are counted before looking whether the count can still matter: 12 KB, which stay in the nearest cache for all models.
+/// Only time depends on it.
 const COUNTED: usize = 1024;
 
 #[cfg(test)]
 mod tests {
-    use super::super::vectors::LANES;
     use super::*;
     use approx::assert_relative_eq;
+    use nalgebra::{Matrix3, Vector2};
 
     fn rows() -> Rows<f64> {
         let mut rows = Rows::with_capacity(100);
@@ -343,12 +258,10 @@ mod tests {
         assert!(at(step) < at(step + Vector2::new(1e-4, 0.0)) && at(step) < at(step - Vector2::new(0.0, 1e-4)));
     }
 
-    /// Numbers of rows about multiples of the lanes and of the blocks, in both precisions, through every gate.
+    /// Numbers of rows about multiples of sixteen and of the blocks, in both precisions, through every gate.
     #[test]
     fn any_number_of_rows_is_summed_once() {
         fn check<T: Real>(len: usize, gate: Gate, tolerance: f64) {
-            // The weights of a table jump, by less than this from its second cell on.
-            let tolerance = if matches!(gate, Gate::Marginal { .. }) { tolerance.max(2e-3) } else { tolerance };
             let mut rows = Rows::<T>::default();
             for i in 0..len {
                 let t = 0.37 * i as f64;
@@ -391,12 +304,11 @@ mod tests {
                 assert_eq!((0..len + 3).filter(|i| rows.is_within(*i, model, threshold)).count(), within);
             }
         }
-        for len in (0..=35).chain(500..530).chain([1023, 1024, 1025, 2 * BLOCK + LANES + 1]) {
+        for len in (0..=35).chain(500..530).chain([1023, 1024, 1025, 4096, 4113]) {
             for gate in [
                 Gate::Open,
                 Gate::Hard { threshold: 0.05 },
                 Gate::Within { threshold: 0.05 },
-                Gate::Marginal { threshold: 0.1 },
                 Gate::Soft { scale: 0.02 },
             ] {
                 check::<f64>(len, gate, 1e-12);
@@ -418,7 +330,7 @@ mod tests {
         let mut trimmed = rows.moments([0.0, 0.0, 1.0], Gate::Open, &mut weights);
         for (i, threshold) in [30.0, 15.0, 14.0, 9.0, 3.0, 0.5, 0.4].into_iter().enumerate() {
             let model = [0.1 * i as f64, -0.2 * i as f64, 1.0];
-            trimmed = rows.trim(&trimmed, model, threshold, &mut weights);
+            trimmed = rows.trim(&trimmed, model, threshold, (&mut weights, Weights::Any));
             let mut left = weights.clone();
             let whole = rows.moments(model, Gate::Hard { threshold }, &mut left);
             assert_eq!((trimmed.count, &left), (whole.count, &weights));

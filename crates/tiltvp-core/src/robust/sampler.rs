@@ -8,12 +8,12 @@ use super::problem::Problem;
 
 /// Draws distinct indices; the same seed gives the same samples on every machine.
 pub(super) struct Sampler<'a> {
-    generator: ChaCha8Rng,
+    rng: ChaCha8Rng,
     len: usize,
     progress: Option<Progress<'a>>,
 }
 
-/// Where PROSAC (Chum and Matas 2005, algorithm 1) has got to.
+/// Where progressive sampling has got to: the growth of PROSAC's pool (Chum and Matas 2005, algorithm 1).
 struct Progress<'a> {
     /// The best observations, the best first.
     order: &'a [u32],
@@ -21,8 +21,8 @@ struct Progress<'a> {
     drawn: u32,
     /// Size of the pool, `n`.
     pool: usize,
-    /// Size at which the pool stops growing, `n*`.
-    limit: usize,
+    /// How many observations there are, `N`.
+    len: usize,
     /// `T_n` and its rounded sum `T'_n`.
     expected: f64,
     due: u64,
@@ -31,7 +31,7 @@ struct Progress<'a> {
 impl<'a> Sampler<'a> {
     /// Draws from all `len` observations alike.
     pub(super) fn uniform(seed: u64, len: usize) -> Self {
-        Self { generator: ChaCha8Rng::seed_from_u64(seed), len, progress: None }
+        Self { rng: ChaCha8Rng::seed_from_u64(seed), len, progress: None }
     }
 
     /// Draws from a pool that grows along `order`, which holds the best of `len` observations.
@@ -39,35 +39,28 @@ impl<'a> Sampler<'a> {
         // T_m = T_N prod (m - i) / (N - i), eq. 3.
         let share: f64 = (0..size).map(|i| (size - i) as f64 / (len - i) as f64).product();
         let expected = f64::from(uniform_after) * share;
-        let progress = Progress { order, drawn: 0, pool: size, limit: len, expected, due: 1 };
+        let progress = Progress { order, drawn: 0, pool: size, len, expected, due: 1 };
         Self { progress: Some(progress), ..Self::uniform(seed, len) }
     }
 
     /// Fills `sample` with distinct indices; `len` must not be smaller than the sample.
     pub(super) fn draw(&mut self, sample: &mut [usize]) {
         let Some(progress) = &mut self.progress else {
-            return draw_below(&mut self.generator, self.len, sample);
+            return draw_below(&mut self.rng, self.len, sample);
         };
         let newest = progress.step(sample.len());
         if progress.pool > progress.order.len() {
-            return draw_below(&mut self.generator, self.len, sample);
+            return draw_below(&mut self.rng, self.len, sample);
         }
         if newest {
             let [others @ .., last] = &mut *sample else { return };
-            draw_below(&mut self.generator, progress.pool - 1, others);
+            draw_below(&mut self.rng, progress.pool - 1, others);
             *last = progress.pool - 1;
         } else {
-            draw_below(&mut self.generator, progress.pool, sample);
+            draw_below(&mut self.rng, progress.pool, sample);
         }
         for place in sample {
             *place = progress.order[*place] as usize;
-        }
-    }
-
-    /// Sets the size at which the pool stops growing.
-    pub(super) fn limit_pool(&mut self, limit: usize) {
-        if let Some(progress) = &mut self.progress {
-            progress.limit = limit;
         }
     }
 }
@@ -76,7 +69,7 @@ impl Progress<'_> {
     /// Counts a sample of `size` and grows the pool; whether the sample must hold the pool's last observation.
     fn step(&mut self, size: usize) -> bool {
         self.drawn += 1;
-        if u64::from(self.drawn) == self.due && self.pool < self.limit {
+        if u64::from(self.drawn) == self.due && self.pool < self.len {
             // T_(n+1) = T_n (n + 1) / (n + 1 - m), eq. 4; T'_(n+1) = T'_n + ceil(T_(n+1) - T_n), eq. 5.
             let next = (self.pool + 1) as f64;
             let expected = self.expected * next / (next - size as f64);
@@ -89,10 +82,10 @@ impl Progress<'_> {
 }
 
 /// Fills `sample` with distinct indices below `len`.
-fn draw_below(generator: &mut ChaCha8Rng, len: usize, sample: &mut [usize]) {
+fn draw_below(rng: &mut ChaCha8Rng, len: usize, sample: &mut [usize]) {
     for i in 0..sample.len() {
         loop {
-            let index = ((u64::from(generator.next_u32()) * len as u64) >> 32) as usize;
+            let index = ((u64::from(rng.next_u32()) * len as u64) >> 32) as usize;
             if !sample[..i].contains(&index) {
                 sample[i] = index;
                 break;
@@ -106,7 +99,7 @@ pub(super) fn best_first<P: Problem>(problem: &P, most: usize, keys: &mut Vec<u6
     keys.clear();
     // The bits of numbers that are not negative grow with them.
     let descending = |quality: f32| u64::from(!quality.max(0.0).to_bits());
-    keys.extend((0..problem.len()).map(|index| (descending(problem.quality(index)) << 32) | index as u64));
+    keys.extend((0..problem.rows().len()).map(|index| (descending(problem.quality(index)) << 32) | index as u64));
     let most = most.min(keys.len());
     if most < keys.len() {
         keys.select_nth_unstable(most);
@@ -114,19 +107,6 @@ pub(super) fn best_first<P: Problem>(problem: &P, most: usize, keys: &mut Vec<u6
     keys[..most].sort_unstable();
     order.clear();
     order.extend(keys[..most].iter().map(|key| *key as u32));
-}
-
-/// Writes the first `most` of a random permutation of the numbers below `len`, in a stream apart from the samples'.
-pub(super) fn shuffled(seed: u64, len: usize, most: usize, order: &mut Vec<u32>) {
-    let mut generator = ChaCha8Rng::seed_from_u64(seed);
-    generator.set_stream(1);
-    order.clear();
-    order.extend(0..len as u32);
-    for i in 0..most.min(len) {
-        let other = ((u64::from(generator.next_u32()) * (len - i) as u64) >> 32) as usize;
-        order.swap(i, i + other);
-    }
-    order.truncate(most);
 }
 
 #[cfg(test)]
@@ -168,18 +148,5 @@ mod tests {
             let pool = pools.iter().find(|(n, due)| *due > t || *n == len).unwrap().0;
             assert!(last + 1 == pool || (pool == len && t >= due), "trial {t}: {rank:?}, pool {pool}");
         }
-    }
-
-    #[test]
-    fn permutations_hold_each_number_once() {
-        let mut order = Vec::new();
-        shuffled(1, 100, 100, &mut order);
-        let first: Vec<u32> = order[..10].to_vec();
-        shuffled(1, 100, 10, &mut order);
-        assert_eq!(order, first);
-        shuffled(1, 100, 200, &mut order);
-        assert_ne!(order, (0..100).collect::<Vec<_>>());
-        order.sort_unstable();
-        assert_eq!(order, (0..100).collect::<Vec<_>>());
     }
 }

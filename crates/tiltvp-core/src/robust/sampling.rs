@@ -1,8 +1,8 @@
-//! Options of the sampling loop beyond the paper's: the order of samples, local optimisation, score and verification.
+//! Options of the sampling loop: the order of samples, local optimisation and score.
 
 use crate::error::{Error, Result};
 
-/// How samples are drawn, improved, scored and verified. The default is plain RANSAC, as paper 000 uses it.
+/// How samples are drawn, improved and scored. The default is plain RANSAC, as Fleer 2017 uses it.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Sampling {
     /// From which observations samples are drawn. Default uniformly from all.
@@ -11,8 +11,6 @@ pub struct Sampling {
     pub local_optimization: Option<LocalOptimization>,
     /// What makes one model better than another. Default its number of inliers.
     pub score: Score,
-    /// Whether a model is scored at once or has to pass a test first. Default at once.
-    pub verification: Verification,
 }
 
 /// From which observations samples are drawn.
@@ -22,14 +20,11 @@ pub enum SampleOrder {
     #[default]
     Uniform,
     /// From a pool of the best observations by [`Problem::quality`](super::Problem::quality) that grows with the trials, as
-    /// PROSAC draws them (Chum and Matas 2005).
+    /// PROSAC draws them (Chum and Matas 2005), but stopped as uniform sampling is: edge pixels repeat one another, and the few
+    /// best may all lie on one wrong structure.
     Progressive {
         /// Trials after which the samples are those of uniform sampling, `T_N`. Default 200 000.
         uniform_after: u32,
-        /// PROSAC's own stop, for observations whose errors are independent: sampling also ends when any beginning of the
-        /// order holds enough inliers, more than this share, `beta` in (0, 1), of chance agreement explains. Default none:
-        /// edge pixels repeat one another, and the few best may all lie on one wrong structure.
-        chance_share: Option<f64>,
     },
 }
 
@@ -51,42 +46,12 @@ pub enum Score {
     Count,
     /// MSAC (Torr and Zisserman 2000), the truncated quadratic: inliers gain `1 - r^2 / threshold^2`.
     Msac,
-    /// MAGSAC++ (Barath et al. 2020) for residuals of one degree of freedom: the gain is marginalised over noise of any
-    /// scale from zero to the one of which 99 % lies within the threshold.
-    Magsac {
-        /// Most rounds of sigma-consensus++, which refits the best model with the marginal weights; with 0 it is refitted
-        /// to its consensus set, as with the other scores. Default 10.
-        refits: u32,
-    },
-}
-
-/// Whether a model is scored at once or has to pass a test first.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub enum Verification {
-    /// Every model is scored.
-    #[default]
-    Full,
-    /// Wald's sequential probability ratio test on observations in random order (Matas and Chum 2005): a model is given up
-    /// as soon as it is likely to be a bad one. The shares are first guesses: the loop raises the one and learns the other.
-    Sprt {
-        /// Least share of observations that agree with a good model, `epsilon`, in (0, 1). Default 0.1.
-        inlier_share: f64,
-        /// Share that agrees with a bad one, `delta`, in (0, 1) and below `inlier_share`. Default 0.05.
-        chance_share: f64,
-        /// Time of drawing and fitting a sample, in verifications of one observation, `t_M`. Default 100.
-        model_cost: f64,
-    },
 }
 
 impl SampleOrder {
-    /// The samples of PROSAC, stopped as uniform ones are.
+    /// Progressive samples with the growth of PROSAC's authors.
     pub fn progressive() -> Self {
-        Self::Progressive { uniform_after: 200_000, chance_share: None }
-    }
-
-    /// PROSAC with its own stop and the constants of its authors.
-    pub fn prosac() -> Self {
-        Self::Progressive { uniform_after: 200_000, chance_share: Some(0.05) }
+        Self::Progressive { uniform_after: 200_000 }
     }
 }
 
@@ -97,16 +62,13 @@ impl Default for LocalOptimization {
 }
 
 impl Score {
-    /// MAGSAC++ with its final refits.
-    pub fn magsac() -> Self {
-        Self::Magsac { refits: 10 }
-    }
-}
-
-impl Verification {
-    /// The sequential test with its usual first guesses.
-    pub fn sprt() -> Self {
-        Self::Sprt { inlier_share: 0.1, chance_share: 0.05, model_cost: 100.0 }
+    /// The gain of one residual.
+    pub fn gain(self, residual: f64, threshold: f64) -> f64 {
+        let part = residual.abs() / threshold;
+        match self {
+            Self::Count => f64::from(u8::from(part <= 1.0)),
+            Self::Msac => (1.0 - part * part).max(0.0),
+        }
     }
 }
 
@@ -116,15 +78,8 @@ impl Sampling {
     /// # Errors
     /// [`Error::InvalidOption`] with the name of the field.
     pub fn validate(&self) -> Result<()> {
-        let share = |name, value: f64| {
-            let valid = value > 0.0 && value < 1.0;
-            if valid { Ok(()) } else { Err(Error::option(name, value, "a share strictly between 0 and 1")) }
-        };
-        if let SampleOrder::Progressive { uniform_after, chance_share } = self.order {
-            if uniform_after == 0 {
-                return Err(Error::option("uniform_after", uniform_after, "at least 1"));
-            }
-            chance_share.map_or(Ok(()), |value| share("chance_share", value))?;
+        if let SampleOrder::Progressive { uniform_after: 0 } = self.order {
+            return Err(Error::option("uniform_after", 0, "at least 1"));
         }
         if let Some(LocalOptimization { iterations, widening }) = self.local_optimization {
             if !(1..=1000).contains(&iterations) {
@@ -132,21 +87,6 @@ impl Sampling {
             }
             if !(widening >= 1.0 && widening.is_finite()) {
                 return Err(Error::option("widening", widening, "a factor of at least 1"));
-            }
-        }
-        if let Score::Magsac { refits } = self.score
-            && refits > 1000
-        {
-            return Err(Error::option("refits", refits, "at most 1000"));
-        }
-        if let Verification::Sprt { inlier_share, chance_share, model_cost } = self.verification {
-            share("inlier_share", inlier_share)?;
-            share("chance_share", chance_share)?;
-            if chance_share >= inlier_share {
-                return Err(Error::option("chance_share", chance_share, "a share below inlier_share"));
-            }
-            if !(model_cost > 0.0 && model_cost.is_finite()) {
-                return Err(Error::option("model_cost", model_cost, "a positive number of verifications"));
             }
         }
         Ok(())
@@ -159,40 +99,35 @@ mod tests {
 
     #[test]
     fn wrong_values_are_refused_by_name() {
-        let order = |uniform_after, chance_share| Sampling {
-            order: SampleOrder::Progressive { uniform_after, chance_share: Some(chance_share) },
-            ..Sampling::default()
-        };
+        let order = Sampling { order: SampleOrder::Progressive { uniform_after: 0 }, ..Sampling::default() };
         let local = |iterations, widening| Sampling {
             local_optimization: Some(LocalOptimization { iterations, widening }),
             ..Sampling::default()
         };
-        let sprt = |inlier_share, chance_share, model_cost| Sampling {
-            verification: Verification::Sprt { inlier_share, chance_share, model_cost },
-            ..Sampling::default()
-        };
         for (name, sampling) in [
-            ("uniform_after", order(0, 0.05)),
-            ("chance_share", order(10, 0.0)),
+            ("uniform_after", order),
             ("iterations", local(0, 2.0)),
             ("widening", local(4, 0.9)),
             ("widening", local(4, f64::NAN)),
-            ("refits", Sampling { score: Score::Magsac { refits: 1001 }, ..Sampling::default() }),
-            ("inlier_share", sprt(1.0, 0.05, 100.0)),
-            ("chance_share", sprt(0.1, f64::NAN, 100.0)),
-            ("chance_share", sprt(0.1, 0.1, 100.0)),
-            ("model_cost", sprt(0.1, 0.05, 0.0)),
         ] {
             let error = sampling.validate().unwrap_err().to_string();
             assert!(error.contains(name), "{name}: {error}");
         }
         let all = Sampling {
-            order: SampleOrder::prosac(),
+            order: SampleOrder::progressive(),
             local_optimization: Some(LocalOptimization::default()),
-            score: Score::magsac(),
-            verification: Verification::sprt(),
+            score: Score::Msac,
         };
         all.validate().unwrap();
         Sampling::default().validate().unwrap();
+    }
+
+    #[test]
+    fn gains_fall_from_one_to_nothing() {
+        for score in [Score::Count, Score::Msac] {
+            let gains: Vec<f64> = (0..300).map(|i| score.gain(-0.01 * f64::from(i), 2.0)).collect();
+            assert!(gains[0] > 0.99 && gains.windows(2).all(|pair| pair[0] >= pair[1]), "{score:?}");
+            assert!(gains[201..].iter().all(|gain| *gain == 0.0), "{score:?}");
+        }
     }
 }

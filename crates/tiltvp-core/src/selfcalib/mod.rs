@@ -4,39 +4,24 @@
 //!
 //! [Scaramuzza, Siegwart and Martinelli 2009]: https://doi.org/10.1177/0278364908099858
 
-mod alarm;
-mod bound;
+mod bundle;
 mod calibrator;
-mod clustered;
-mod dense;
-mod descent;
-mod graph;
-mod growing;
-mod log;
-mod loss;
-mod measurement;
-mod memory;
-mod mounting;
+mod estimate;
+mod model;
 mod observability;
-mod odometry;
 mod offline;
 mod options;
-mod outcome;
 mod paper;
-mod pose_block;
-mod recursive;
-mod rows;
-mod schur;
-mod spread;
-mod step;
-mod update;
+mod step_outcome;
+mod window;
 
-pub use self::bound::cramer_rao_bound;
-pub use self::calibrator::{CalibrationStep, MountingEstimate, SelfCalibrator};
-pub use self::log::{LogBearing, LogOptions};
-pub use self::mounting::Mounting;
-pub use self::observability::{FeatureRange, Observability, PureMotion, observable_dimension};
-pub use self::odometry::{Leg, MotionNoise, WheelMotion, Wheels};
-pub use self::offline::{LogCalibration, calibrate_log};
-pub use self::options::{CALIBRATION_METHODS, CalibrationMethod, SelfCalibratorOptions};
+pub use self::calibrator::{CalibrationStep, SelfCalibrator};
+pub use self::estimate::MountingEstimate;
+pub use self::model::{MotionNoise, Mounting, RelativeMotion, WheelMotion, Wheels};
+pub use self::observability::{FeatureRange, Observability, PureMotion, cramer_rao_bound, observable_dimension};
+pub use self::offline::{LogBearing, LogCalibration, LogOptions, calibrate_log};
+pub use self::options::{CalibrationMethod, SelfCalibratorOptions, StartSigma};
 pub use self::paper::{Feature, dynamics, dynamics_jacobians, observation, observation_jacobians};
+
+// Paths of `options.rs`.
+use self::model::{mounting, odometry};

@@ -1,27 +1,27 @@
 //! The common direction of great circles that a user brings: the same robust core on normals of any origin.
 
+use std::f64::consts::{FRAC_PI_2, PI};
+
 use nalgebra::{Matrix2, Rotation3, Unit, Vector3};
 
 use super::confidence::inverse_of_positive;
-use super::refine::{RefineOptions, Sparse, refine};
+use super::methods::{RefineOptions, Subsample, refine};
 use crate::error::{Error, Result};
 use crate::geometry::tangent_basis;
+use crate::options;
+use crate::options::Between;
 use crate::robust::{Gate, Rows, Stop};
 
-/// Options of [`common_direction`].
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct CommonDirectionOptions {
-    /// How far in radians the great circles of inliers stray from the direction. Default 1 degree.
-    pub sigma_rad: f64,
-    /// A direction near which the answer lies. Default `(0, 0, 1)`.
-    pub prior: Vector3<f64>,
-    /// Largest angle in radians between the prior and the answer. Default 0.35 (20 degrees).
-    pub max_angle_rad: f64,
-}
-
-impl Default for CommonDirectionOptions {
-    fn default() -> Self {
-        Self { sigma_rad: 1f64.to_radians(), prior: Vector3::z(), max_angle_rad: 20f64.to_radians() }
+options! {
+    /// Options of [`common_direction`].
+    #[derive(Copy)]
+    pub struct CommonDirectionOptions {
+        /// How far in radians the great circles of inliers stray from the direction.
+        sigma_rad: f64 = 1f64.to_radians() => Between(0.0, 1.0), "an angle strictly between 0 and 1 radian";
+        /// A direction near which the answer lies.
+        prior: Vector3<f64> = Vector3::z();
+        /// Largest angle in radians between the prior and the answer.
+        max_angle_rad: f64 = 20f64.to_radians() => Between(0.0, FRAC_PI_2), "an angle strictly between 0 and pi/2";
     }
 }
 
@@ -57,7 +57,7 @@ pub fn common_direction(
 ) -> Result<CommonDirection> {
     let prior = validate(normals, weights, options)?;
     let upright_from_user = Rotation3::rotation_between(&prior, &Vector3::z())
-        .unwrap_or_else(|| Rotation3::from_axis_angle(&Unit::new_unchecked(Vector3::x()), std::f64::consts::PI));
+        .unwrap_or_else(|| Rotation3::from_axis_angle(&Unit::new_unchecked(Vector3::x()), PI));
     let limit = options.max_angle_rad.sin();
     let mut rows = Rows::<f64>::with_capacity(normals.len());
     let mut kept = Vec::with_capacity(normals.len());
@@ -77,7 +77,7 @@ pub fn common_direction(
         max_iterations: 50,
         ..RefineOptions::default()
     };
-    let report = refine(&rows, &refining, &mut row_weights, &mut Sparse::default());
+    let report = refine(&rows, &refining, &mut row_weights, &mut Subsample::default());
     let found = report.model.filter(|o| o.z >= options.max_angle_rad.cos());
     let stop = match (report.model, found) {
         (Some(o), None) => Stop::OutOfReach { angle_rad: o.xy().norm().atan2(o.z), limit_rad: options.max_angle_rad },
@@ -94,35 +94,44 @@ pub fn common_direction(
         });
     };
     let direction = upright_from_user.inverse() * upright;
-    let reach = (3.0 * options.sigma_rad).min(std::f64::consts::FRAC_PI_2).sin();
-    // Each normal is its own cluster: the user's normals are whole edges, not pixels.
-    let gate = Gate::Soft { scale: options.sigma_rad };
-    let held = kept.iter().filter(|row| gate.weight(row.dot(&upright)) > 0.0).count();
-    let (mut information, mut spread) = (Matrix2::zeros(), Matrix2::zeros());
-    let basis = tangent_basis(&direction);
-    for (row, weight) in kept.iter().zip(&row_weights) {
-        let d = row.dot(&upright);
-        let own = f64::from(*weight);
-        let weight = own * gate.weight(d);
-        let xy = basis.transpose() * (upright_from_user.inverse() * row);
-        information += xy * xy.transpose() * (own * gate.slope(d));
-        // Two great circles always meet: their residuals are zero and tell nothing, so the stated sigma stands in.
-        let residual = if held > 2 { d } else { options.sigma_rad };
-        spread += xy * xy.transpose() * (weight * residual).powi(2);
-    }
-    if held > 2 {
-        spread *= held as f64 / (held as f64 - 2.0);
-    }
-    let covariance =
-        inverse_of_positive(&information).map_or(Matrix2::repeat(f64::INFINITY), |inverse| inverse * spread * inverse);
+    let reach = (3.0 * options.sigma_rad).min(FRAC_PI_2).sin();
     Ok(CommonDirection {
         direction: Some(direction),
-        covariance_rad2: covariance,
+        covariance_rad2: covariance(&kept, &row_weights, &upright, &upright_from_user, options.sigma_rad),
         inliers: normals.iter().map(|n| unit(n).unwrap_or_default().dot(&direction).abs() <= reach).collect(),
         residual_rms_rad: report.rms,
         iterations: report.iterations,
         stop,
     })
+}
+
+/// The covariance of a direction in its tangent plane, from rows about the vertical. Each row errs on its own: the user's normals
+/// are whole edges, not pixels.
+fn covariance(
+    rows: &[Vector3<f64>],
+    weights: &[f32],
+    upright: &Vector3<f64>,
+    upright_from_user: &Rotation3<f64>,
+    sigma_rad: f64,
+) -> Matrix2<f64> {
+    let gate = Gate::Soft { scale: sigma_rad };
+    let held = rows.iter().filter(|row| gate.weight(row.dot(upright)) > 0.0).count();
+    let (mut information, mut spread) = (Matrix2::zeros(), Matrix2::zeros());
+    let basis = tangent_basis(&(upright_from_user.inverse() * upright));
+    for (row, weight) in rows.iter().zip(weights) {
+        let d = row.dot(upright);
+        let own = f64::from(*weight);
+        let weight = own * gate.weight(d);
+        let xy = basis.transpose() * (upright_from_user.inverse() * row);
+        information += xy * xy.transpose() * (own * gate.slope(d));
+        // Two great circles always meet: their residuals are zero and tell nothing, so the stated sigma stands in.
+        let residual = if held > 2 { d } else { sigma_rad };
+        spread += xy * xy.transpose() * (weight * residual).powi(2);
+    }
+    if held > 2 {
+        spread *= held as f64 / (held as f64 - 2.0);
+    }
+    inverse_of_positive(&information).map_or(Matrix2::repeat(f64::INFINITY), |inverse| inverse * spread * inverse)
 }
 
 /// Checks all inputs and returns the unit prior.
@@ -156,12 +165,7 @@ fn validate(
             ));
         }
     }
-    if !(options.sigma_rad > 0.0 && options.sigma_rad < 1.0) {
-        return Err(Error::option("sigma_rad", options.sigma_rad, "an angle strictly between 0 and 1 radian"));
-    }
-    if !(options.max_angle_rad > 0.0 && options.max_angle_rad < std::f64::consts::FRAC_PI_2) {
-        return Err(Error::option("max_angle_rad", options.max_angle_rad, "an angle strictly between 0 and pi/2"));
-    }
+    options.validate()?;
     unit(&options.prior)
         .ok_or_else(|| Error::argument("prior", format!("{:?}", options.prior), "a finite vector that is not zero"))
 }

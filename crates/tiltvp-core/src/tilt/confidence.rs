@@ -4,24 +4,25 @@ use nalgebra::{Matrix2, Vector2};
 
 use crate::filter::probability_within;
 use crate::geometry::Tilt;
-use crate::robust::{GROUPS, Gate, GroupSums, Rows};
+use crate::robust::{GROUPS, GroupSums, Rows};
 
 /// Sectors of azimuth within which residuals are taken as one: an edge of a room rarely spans more.
 pub(super) const SECTORS: usize = GROUPS;
 
-/// Rows that are enough for a covariance.
+/// Rows that are enough for a covariance: some 60 for each of the 64 sectors, whose pooled variance is then good to a fifth.
 const ENOUGH: usize = 4000;
 
-/// An error below this many radians counts as a good estimate.
+/// An error below two degrees counts as a good estimate: Fleer 2017 finds mean errors of one to two, and leans of up to four.
 const GOOD_RAD: f64 = 2.0 * std::f64::consts::PI / 180.0;
 
-/// Standard deviation in radians of what no image tells: bent lenses, walls out of plumb, blur.
+/// Standard deviation in radians of what no image tells: bent lenses, walls out of plumb, blur. Set on images of known tilt, see
+/// [`clustered_covariance`].
 const FLOOR_RAD: f64 = 0.17 * std::f64::consts::PI / 180.0;
 
-/// Share of the pooled variance of the sectors' residuals that each sector brings into the estimate.
+/// Share of the pooled variance of the sectors' residuals that each sector brings into the estimate, set likewise.
 const SECTOR_SHARE: f64 = 0.55;
 
-/// Length in radians of a stretch of clutter that may lie unnoticed at the most misleading residual.
+/// Length in radians of a stretch of clutter that may lie unnoticed at the most misleading residual, set likewise.
 const CLUTTER_RAD: f64 = 0.056;
 
 /// The covariance of a gated linear fit whose errors are those of whole edges and not of pixels.
@@ -34,22 +35,22 @@ const CLUTTER_RAD: f64 = 0.056;
 /// weights themselves, clutter that fills the gate would count as evidence. To it is added the square of `H^-1 sum_c g_c`, the
 /// way from the model to where the gated rows would have it: none for the fit they made, but telling for a model that was
 /// chosen otherwise. Weights are one where none are given; `sector_of` has the pixel of each row and the sector of each pixel. The share, the clutter and the floor were set on every second
-/// location of 108 panoramas and 72 rendered rooms, as they are and darkened, blurred or half hidden, and checked on the others.
+/// location of 108 panoramas and 72 rendered rooms, as they are and darkened, blurred or half hidden, and checked on the others
+/// (`tiltvp measure confidence`).
 ///
 /// `None` if fewer than three sectors hold anything or the model is near no minimum.
 pub(super) fn clustered_covariance(
     rows: &Rows<f32>,
     model: [f64; 3],
-    gate: Gate,
+    scale: f64,
     weights: Option<&[f32]>,
     pixels_per_rad: f64,
     sector_of: (&[u32], &[u8]),
 ) -> Option<Matrix2<f64>> {
-    let Gate::Soft { scale } = gate else { return None };
     // A sample of the rows is enough to tell how the sectors err: sums over it are proportional to sums over all.
     let stride = (rows.len() / ENOUGH).max(1);
     let GroupSums { groups: sectors, slopes: [xx, xy, yy] } =
-        rows.sums_by_group(model, gate, weights, stride, sector_of);
+        rows.sums_by_group(model, scale, weights, stride, sector_of);
     let inverse = inverse_of_positive(&Matrix2::new(xx, xy, xy, yy))?;
     let held = || sectors.iter().filter(|[a, _, c, ..]| a + c > 0.0);
     if held().count() < 3 {

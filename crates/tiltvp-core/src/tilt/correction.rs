@@ -6,8 +6,9 @@ use super::trained::TrainedCorrection;
 use crate::camera::Camera;
 use crate::edges::Region;
 use crate::error::Result;
+use crate::options::{Kind, OptionValue, Value};
 
-/// How the image-space methods turn a shift in pixels into a lean (paper 000 eqs. 26 and 30).
+/// How the image-space methods turn a shift in pixels into a lean (Fleer 2017, eqs. 26 and 30).
 #[derive(Debug, Clone, PartialEq, Default)]
 pub enum Correction {
     /// `alpha = l / a0` with the lens' own scale at the vanishing point, eq. 26: overestimates by about a half.
@@ -38,6 +39,30 @@ impl Correction {
         match self {
             Self::Trained(trained) => trained.validate(),
             Self::None | Self::ClosedForm => Ok(()),
+        }
+    }
+}
+
+/// The word of [`Correction::ClosedForm`].
+const CLOSED_FORM: &str = "closed-form";
+
+impl OptionValue for Correction {
+    const KIND: Kind =
+        Kind::Object("\"closed-form\", None, a number (a factor), an AffineCorrection or a PosteriorCorrection");
+
+    fn to_value(&self) -> Value {
+        match self {
+            Self::None => Value::None,
+            Self::ClosedForm => Value::Text(CLOSED_FORM.to_owned()),
+            Self::Trained(trained) => trained.to_value(),
+        }
+    }
+
+    fn from_value(value: &Value) -> Option<Self> {
+        match value {
+            Value::None => Some(Self::None),
+            Value::Text(word) if word == CLOSED_FORM => Some(Self::ClosedForm),
+            _ => TrainedCorrection::from_value(value).map(Self::Trained),
         }
     }
 }

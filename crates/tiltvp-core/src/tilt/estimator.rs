@@ -6,12 +6,12 @@ use nalgebra::Matrix3;
 
 use super::estimate::{EdgeElement, TiltEstimate};
 use super::image_edges::{EdgeOrigin, ImageEdges};
-use super::image_space::edge_offset;
+use super::methods::{Fitter, Setting, edge_offset};
 use super::options::TiltOptions;
-use super::scratch::Scratch;
-use super::tables::{Sight, Tables};
+use super::scratch::{Scratch, Work};
+use super::tables::PixelTables;
 use crate::camera::Camera;
-use crate::edges::{EdgeOptions, EdgePixels, Screen};
+use crate::edges::{EdgeOptions, EdgePixels};
 use crate::error::{Error, Result};
 use crate::geometry::validate_rotation;
 use crate::image::ImageView;
@@ -25,9 +25,8 @@ use crate::image::ImageView;
 pub struct TiltEstimator {
     pub(super) origin: Arc<EdgeOrigin>,
     pub(super) options: TiltOptions,
-    pub(super) sight: Arc<Sight>,
-    pub(super) tables: Tables,
-    screen: Screen,
+    pub(super) pixels: Arc<PixelTables>,
+    method: Arc<dyn Fitter>,
 }
 
 impl TiltEstimator {
@@ -41,9 +40,15 @@ impl TiltEstimator {
         validate_rotation(&robot_from_camera)?;
         let (edges, mask) = (options.edges, options.mask.clone());
         let origin = EdgeOrigin { camera, robot_from_camera, options: edges, mask, row_stride: options.row_stride };
-        let sight = Sight::new(&origin)?;
-        let (tables, screen) = Tables::new(&origin, &options, &sight, None)?;
-        Ok(Self { origin: Arc::new(origin), options, sight: Arc::new(sight), tables, screen })
+        let pixels = Arc::new(PixelTables::new(&origin)?);
+        Self::prepared(Arc::new(origin), options, pixels)
+    }
+
+    /// The estimator of checked options.
+    fn prepared(origin: Arc<EdgeOrigin>, options: TiltOptions, pixels: Arc<PixelTables>) -> Result<Self> {
+        let setting = Setting { origin: &origin, options: &options, pixels: &pixels };
+        let method = options.method.chosen().prepare(&setting)?;
+        Ok(Self { origin, options, pixels, method })
     }
 
     /// An estimator of the same camera with other options. It shares every table that the change leaves alone, so that one
@@ -61,18 +66,12 @@ impl TiltEstimator {
             let (edges, mask, row_stride) = (options.edges, options.mask.clone(), options.row_stride);
             Arc::new(EdgeOrigin { options: edges, mask, row_stride, ..(*self.origin).clone() })
         };
-        if same_pixels && all_strengths(self.options.edges) == all_strengths(options.edges) {
-            let sight = Arc::clone(&self.sight);
-            let like = (&self.options.method, &self.tables, &self.screen);
-            let (tables, screen) = Tables::new(&origin, &options, &sight, Some(like))?;
-            return Ok(Self { origin, options, sight, tables, screen });
-        }
-        let sight = Sight::new(&origin)?;
-        let (tables, screen) = Tables::new(&origin, &options, &sight, None)?;
-        Ok(Self { origin, options, sight: Arc::new(sight), tables, screen })
+        let same_tables = same_pixels && all_strengths(self.options.edges) == all_strengths(options.edges);
+        let pixels = if same_tables { Arc::clone(&self.pixels) } else { Arc::new(PixelTables::new(&origin)?) };
+        Self::prepared(origin, options, pixels)
     }
 
-    /// The camera.
+    /// The camera whose images are read.
     pub fn camera(&self) -> &Camera {
         &self.origin.camera
     }
@@ -89,21 +88,21 @@ impl TiltEstimator {
 
     /// How many pixels are looked at.
     pub fn region_pixels(&self) -> usize {
-        self.sight.region.len()
+        self.pixels.region.len()
     }
 
     /// Memory for one thread, with room for an image in which every pixel is an edge.
     pub fn scratch(&self) -> Scratch {
-        Scratch::new(&self.sight.region, &self.options.edges)
+        Scratch::new(&self.pixels.region, &self.options.edges)
     }
 
     /// Whether the other estimator works with the same scratch.
     pub fn shares_scratch_with(&self, other: &Self) -> bool {
-        Arc::ptr_eq(&self.sight, &other.sight)
+        Arc::ptr_eq(&self.pixels, &other.pixels)
     }
 
     fn check_scratch(&self, scratch: &Scratch) -> Result<()> {
-        if scratch.serves(&self.sight.region, &self.options.edges) {
+        if scratch.serves(&self.pixels.region, &self.options.edges) {
             return Ok(());
         }
         Err(Error::argument("scratch", "that of another estimator", "one made by this estimator"))
@@ -130,7 +129,7 @@ impl TiltEstimator {
         self.check_image(image)?;
         self.check_scratch(scratch)?;
         let Scratch { detector, edges, work, .. } = scratch;
-        detector.detect(image, &self.sight.region, self.options.edges.gradient_min, Some(&self.screen), edges);
+        detector.detect(image, &self.pixels.region, self.options.edges.gradient_min, self.method.screen(), edges);
         Ok(self.fit(edges, work))
     }
 
@@ -143,7 +142,7 @@ impl TiltEstimator {
         self.check_image(image)?;
         self.check_scratch(scratch)?;
         let Scratch { detector, edges, .. } = scratch;
-        detector.detect(image, &self.sight.region, self.options.edges.gradient_min, None, edges);
+        detector.detect(image, &self.pixels.region, self.options.edges.gradient_min, None, edges);
         ImageEdges::new(Arc::clone(&self.origin), edges.slot(), edges.gx(), edges.gy())
     }
 
@@ -155,8 +154,15 @@ impl TiltEstimator {
     pub fn estimate_edges(&self, image_edges: &ImageEdges, scratch: &mut Scratch) -> Result<TiltEstimate> {
         self.check_scratch(scratch)?;
         let Scratch { edges, work, .. } = scratch;
-        image_edges.copy_to(&self.origin, &self.sight.region, edges)?;
+        image_edges.copy_to(&self.origin, &self.pixels.region, edges)?;
         Ok(self.fit(edges, work))
+    }
+
+    /// The estimate of the edge pixels of an image. What passed a screen and what passed none give the same one: screens
+    /// keep out only what the prefilters reject.
+    fn fit(&self, edges: &EdgePixels, work: &mut Work) -> TiltEstimate {
+        let fit = self.method.fit(edges, &self.pixels, work);
+        fit.into_estimate(edges.strong(), work.rows.len())
     }
 
     /// The tilts of many images on `threads` threads, in the order of the images, the same whatever the number of threads.
@@ -204,18 +210,16 @@ impl TiltEstimator {
         let Scratch { detector, work, .. } = scratch;
         let rows: Vec<(u32, bool)> =
             work.slots.iter().enumerate().map(|(row, slot)| (*slot, work.is_inlier(row))).collect();
-        let mut all = EdgePixels::with_capacity(self.sight.region.len());
-        detector.detect(image, &self.sight.region, self.options.edges.gradient_min, None, &mut all);
-        let centre = self.sight.centre.as_ref().map_or((f32::NAN, f32::NAN), |c| (c.pixel.x as f32, c.pixel.y as f32));
+        let mut all = EdgePixels::with_capacity(self.pixels.region.len());
+        detector.detect(image, &self.pixels.region, self.options.edges.gradient_min, None, &mut all);
+        let centre =
+            self.pixels.vertical.as_ref().map_or((f32::NAN, f32::NAN), |c| (c.pixel.x as f32, c.pixel.y as f32));
         let mut rows = rows.into_iter().peekable();
         let elements = all.slot().iter().zip(all.gx()).zip(all.gy()).map(|((slot, gx), gy)| {
-            let (u, v) = self.sight.region.place(*slot as usize);
+            let (u, v) = self.pixels.region.place(*slot as usize);
             let [cos, sin, s] = edge_offset(f32::from(u) - centre.0, f32::from(v) - centre.1, *gx, *gy);
             let row = rows.next_if(|(place, _)| place == slot);
-            let normal = match &self.tables {
-                Tables::Normals(table) => table.normal(*slot as usize, *gx, *gy),
-                Tables::Offsets { .. } => None,
-            };
+            let normal = self.method.normal(*slot as usize, *gx, *gy);
             EdgeElement {
                 u,
                 v,

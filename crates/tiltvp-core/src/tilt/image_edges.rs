@@ -19,7 +19,7 @@ pub struct EdgeOrigin {
     pub options: EdgeOptions,
     /// The pixels that may be used.
     pub mask: Option<Mask>,
-    /// Every so-manieth row is looked at.
+    /// Only one row in so many is looked at.
     pub row_stride: u32,
 }
 

@@ -1,4 +1,4 @@
-//! The tilt of one image, from the vanishing point of its vertical edges (paper 000), and of successive images fused.
+//! The tilt of one image, from the vanishing point of its vertical edges (Fleer 2017), and of successive images fused.
 
 mod common_direction;
 mod confidence;
@@ -9,18 +9,16 @@ mod estimator;
 mod filter;
 mod fit;
 mod image_edges;
-mod image_space;
 mod level;
+mod methods;
 mod options;
 mod posterior;
-mod refine;
 mod scratch;
 mod shift_model;
 mod simplex;
 mod tables;
 mod trained;
 mod training_set;
-mod vector_consensus;
 
 pub use common_direction::{CommonDirection, CommonDirectionOptions, common_direction};
 pub use correction::Correction;
@@ -29,9 +27,9 @@ pub use estimator::TiltEstimator;
 pub use filter::{FilteredTilt, MountingOptions, TiltFilter, TiltFilterOptions, TiltFilterState, Verdict};
 pub use image_edges::{EdgeOrigin, ImageEdges};
 pub use level::level_map;
-pub use options::{METHODS, Method, TiltOptions};
+pub use methods::*;
+pub use options::TiltOptions;
 pub use posterior::{PosteriorCorrection, PriorOfTilt, train_posterior};
-pub use refine::RefineOptions;
 pub use scratch::Scratch;
 pub use shift_model::ShiftModel;
 pub use trained::{AffineCorrection, TrainedCorrection, train_affine, train_factor};

@@ -42,7 +42,7 @@ impl PriorOfTilt {
         }
     }
 
-    /// The largest lean that has a probability worth mentioning, and the density up to a factor.
+    /// The largest lean that is tabulated, and the density up to a factor.
     fn density(self, alpha_rad: &[f64]) -> (f64, Box<dyn Fn(f64) -> f64>) {
         match self {
             Self::Uniform { max_rad } => (max_rad, Box::new(|_| 1.0)),
@@ -65,10 +65,11 @@ impl PriorOfTilt {
     }
 }
 
-/// Standard deviations of a Rayleigh distribution that are taken into account.
+/// Standard deviations of a Rayleigh distribution that are taken into account: all but `exp(-12.5)`, four in a million.
 const REACH: f64 = 5.0;
 
-/// Least standard deviation in radians of the kernel that smooths a training set's leans.
+/// Least standard deviation in radians of the kernel that smooths a training set's leans, a tenth of a degree: leans of a
+/// training set may all be alike, and are not known better.
 const BANDWIDTH_MIN_RAD: f64 = 0.002;
 
 /// Silverman's rule of thumb.
@@ -153,7 +154,7 @@ impl PosteriorCorrection {
     }
 }
 
-/// Least number of images from which a posterior is learned.
+/// Least number of images from which a posterior is learned: two for each of the five numbers of a [`ShiftModel`].
 const IMAGES_MIN: usize = 10;
 
 /// Learns a [`ShiftModel`] by maximum likelihood from images of known leans, and tabulates the posterior under a prior.

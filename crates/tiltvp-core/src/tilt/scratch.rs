@@ -1,8 +1,10 @@
 //! The memory that one thread works in, grown once.
 
-use super::refine::Sparse;
+use tiltvp_kernels::compaction::ROOM;
+
+use super::methods::{SamplingScratch, Subsample};
 use crate::edges::{Detector, EdgeOptions, EdgePixels, Region};
-use crate::robust::{ROOM, RansacScratch, Rows, SampleOrder, Sampling};
+use crate::robust::Rows;
 
 /// The memory that one thread works in; estimates after the first allocate nothing.
 ///
@@ -22,22 +24,16 @@ pub struct Scratch {
 pub(super) struct Work {
     pub rows: Rows<f32>,
     pub weights: Vec<f32>,
-    pub sparse: Sparse<f32>,
     /// Pixel of each row within the region.
     pub slots: Vec<u32>,
     /// Place of each row among the edge pixels.
     pub places: Vec<u32>,
-    /// How promising each row is, where samples are drawn in its order.
-    pub quality: Vec<f32>,
-    pub ransac: RansacScratch,
     pub inliers: Inliers,
+    /// Of the refined method.
+    pub subsample: Subsample<f32>,
+    /// Of the sampling methods.
+    pub sampling: SamplingScratch,
 }
-
-/// Pixels of one edge repeat one another: one in two to the power of this, scattered over the image, comes before the rest.
-const SPREAD_BITS: u32 = 4;
-
-/// A factor that is below the ratio of any two squared gradients.
-const LATER: f32 = 1e-18;
 
 /// What an estimator's scratch depends on.
 #[derive(Debug, Clone, PartialEq)]
@@ -85,12 +81,11 @@ impl Scratch {
             work: Work {
                 rows: Rows::with_capacity(n + ROOM),
                 weights: Vec::with_capacity(n + ROOM),
-                sparse: Sparse::with_capacity(n),
                 slots: Vec::with_capacity(n + ROOM),
                 places: Vec::with_capacity(n + ROOM),
-                quality: Vec::new(),
-                ransac: RansacScratch::default(),
                 inliers: Inliers::None,
+                subsample: Subsample::with_capacity(n),
+                sampling: SamplingScratch::default(),
             },
         }
     }
@@ -102,25 +97,6 @@ impl Scratch {
 }
 
 impl Work {
-    /// Makes room for the way of sampling, if samples are drawn at all, and sets the quality of the rows, their squared
-    /// gradients, if they are drawn in that order.
-    pub(super) fn prepare(&mut self, sampling: Option<&Sampling>, edges: &EdgePixels) {
-        self.quality.clear();
-        let Some(sampling) = sampling else { return };
-        let room = self.weights.capacity();
-        self.ransac.reserve(sampling, room);
-        if sampling.order != SampleOrder::Uniform {
-            self.quality.reserve(room);
-            let (slots, gx, gy) = (edges.slot(), edges.gx(), edges.gy());
-            let quality = |place: &u32| {
-                let place = *place as usize;
-                let first = slots[place].wrapping_mul(0x9e37_79b1) >> (32 - SPREAD_BITS) == 0;
-                (gx[place].powi(2) + gy[place].powi(2)) * if first { 1.0 } else { LATER }
-            };
-            self.quality.extend(self.places.iter().map(quality));
-        }
-    }
-
     /// Whether a row agreed with the last estimate.
     pub(super) fn is_inlier(&self, row: usize) -> bool {
         match self.inliers {

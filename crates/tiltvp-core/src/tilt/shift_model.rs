@@ -20,13 +20,16 @@ pub struct ShiftModel {
     pub stray_max: f64,
 }
 
-/// Radius of the disc of strays over the largest shift of the training set.
+/// Radius of the disc of strays over the largest shift of the training set: the largest of a few hundred shifts is at least half
+/// of any that is to come.
 const STRAY_REACH: f64 = 2.0;
 
-/// Least and largest share of strays: some are always thought possible, and most shifts are none.
+/// Least and largest share of strays: below one in a thousand a training set of a few hundred images cannot tell, and above a
+/// half the strays would be the rule.
 const STRAY_SHARES: [f64; 2] = [1e-3, 0.5];
 
-/// Least spread over the shift of a lean of one radian, so that no training set is too good.
+/// Least spread over the shift of a lean of one radian: 0.006 degrees, far below the noise of any image. Without it the likelihood
+/// of a training set without noise has no maximum.
 const SPREAD_MIN: f64 = 1e-4;
 
 impl ShiftModel {
@@ -106,7 +109,7 @@ impl ShiftModel {
         };
         let cost = |x: &[f64; 4]| -> f64 {
             let model = model(x);
-            // A whisper of a prior keeps what the images do not tell from drifting away.
+            // A weak prior bounds the parameters that the images do not determine.
             let drift = 1e-3 * x.iter().map(|x| x * x).sum::<f64>();
             drift - shift.iter().zip(alpha_rad).map(|(l, alpha)| model.plane_density(*l, *alpha).ln()).sum::<f64>()
         };

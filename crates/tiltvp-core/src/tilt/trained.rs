@@ -1,9 +1,12 @@
-//! Corrections of the angle that are trained on images of known tilt: a factor, a line, or a posterior (paper 000 section 5.1).
+//! Corrections of the angle that are trained on images of known tilt: a factor, a line, or a posterior (Fleer 2017, section 5.1).
+
+use std::sync::Arc;
 
 use super::corrected::Corrected;
 use super::posterior::PosteriorCorrection;
 use super::training_set::check_training;
 use crate::error::{Error, Result};
+use crate::options::{Kind, OptionValue, Value};
 
 /// From what a method measures, a shift in pixels or a raw angle in radians, to the lean.
 #[derive(Debug, Clone, PartialEq)]
@@ -47,6 +50,14 @@ fn positive_factor(factor: f64) -> Result<()> {
 }
 
 impl TrainedCorrection {
+    /// The angle as it is measured.
+    pub(super) const IDENTITY: Self = Self::Factor(1.0);
+
+    /// Whether it knows how far its angles scatter.
+    pub(super) fn tells_its_error(&self) -> bool {
+        matches!(self, Self::Posterior(_))
+    }
+
     /// Checks its numbers.
     ///
     /// # Errors
@@ -97,6 +108,26 @@ impl TrainedCorrection {
     }
 }
 
+/// A factor is a number, the others are objects that hold a [`TrainedCorrection`]; no value is the factor 1.
+impl OptionValue for TrainedCorrection {
+    const KIND: Kind = Kind::Object("None, a number (a factor), an AffineCorrection or a PosteriorCorrection");
+
+    fn to_value(&self) -> Value {
+        match self {
+            Self::Factor(factor) => Value::Float(*factor),
+            Self::Affine(_) | Self::Posterior(_) => Value::Object(Arc::new(self.clone())),
+        }
+    }
+
+    fn from_value(value: &Value) -> Option<Self> {
+        match value {
+            Value::None => Some(Self::IDENTITY),
+            Value::Object(object) => object.downcast_ref::<Self>().cloned(),
+            _ => f64::from_value(value).map(Self::Factor),
+        }
+    }
+}
+
 /// The factor `a` of eq. 31: the mean of `l / alpha` over images of known leans above zero.
 ///
 /// # Errors
@@ -122,8 +153,8 @@ pub fn train_factor(shift: &[f64], alpha_rad: &[f64]) -> Result<f64> {
 /// The truth is known well and the shift is what errs, which is what least squares of `l` suppose; and the line then
 /// depends on how shifts answer to leans and not on how many images there are of each lean: at every lean the mean
 /// corrected angle is the true one (as far as it is a line at all). Regressing `alpha` on `l` instead would draw all
-/// answers towards the training set's mean lean; whoever wants to make use of how leans are distributed has
-/// [`train_posterior`](super::train_posterior).
+/// answers towards the training set's mean lean; [`train_posterior`](super::train_posterior) makes use of how leans are
+/// distributed.
 ///
 /// # Errors
 /// [`Error::InvalidArgument`] for fewer than two different leans, numbers that are not finite, or shifts that do not grow

@@ -40,7 +40,7 @@ pub(crate) fn mix(seed: u64) -> u64 {
 }
 
 /// A number in [0, 1) for each seed and index.
-pub(crate) fn dice(seed: u64, index: u64) -> f64 {
+pub(crate) fn random(seed: u64, index: u64) -> f64 {
     (mix(mix(seed) ^ index) >> 11) as f64 / (1u64 << 53) as f64
 }
 
@@ -54,7 +54,7 @@ pub(crate) fn fisheye(side: u32) -> Camera {
 /// White noise over all grey levels.
 pub(crate) fn noise(camera: &Camera, seed: u64) -> Image {
     let width = u64::from(camera.width());
-    Image::of(camera, |u, v| 256.0 * dice(seed, v as u64 * width + u as u64) - 0.5)
+    Image::of(camera, |u, v| 256.0 * random(seed, v as u64 * width + u as u64) - 0.5)
 }
 
 /// One grey level.
@@ -73,9 +73,9 @@ pub(crate) fn stripes(
     seed: u64,
 ) -> Image {
     let world_from_camera = tilt.leaning_from_upright().transpose() * robot_from_camera;
-    let level = |stripe: usize| 60.0 + 140.0 * dice(seed, stripe as u64);
+    let level = |stripe: usize| 60.0 + 140.0 * random(seed, stripe as u64);
     let edges: Vec<f64> = (0..count)
-        .map(|i| (i as f64 + 0.8 * dice(seed + 1, i as u64)) / count as f64 * std::f64::consts::TAU)
+        .map(|i| (i as f64 + 0.8 * random(seed + 1, i as u64)) / count as f64 * std::f64::consts::TAU)
         .collect();
     let radiance = |bearing: &Vector3<f64>, blur_rad: f64| {
         let azimuth = bearing.y.atan2(bearing.x).rem_euclid(std::f64::consts::TAU);
@@ -94,7 +94,7 @@ pub(crate) fn stripes(
         let pixel = Vector2::new(u as f64, v as f64);
         let Some((bearing, jacobian)) = camera.unproject_jacobian(&pixel) else { return 0.0 };
         let place = (v * camera.width() as usize + u) as u64;
-        let gauss = (0..4).map(|k| dice(seed + 2 + k, place) - 0.5).sum::<f64>() * 3f64.sqrt();
+        let gauss = (0..4).map(|k| random(seed + 2 + k, place) - 0.5).sum::<f64>() * 3f64.sqrt();
         radiance(&(world_from_camera * bearing), jacobian.norm()) + sigma * gauss
     })
 }

@@ -1,9 +1,9 @@
-//! A drive in a circle among posts, without noise but for what a table of dice adds.
+//! A drive in a circle among posts, without noise but for what a table of random adds.
 
 use nalgebra::Vector2;
 use tiltvp_core::selfcalib::WheelMotion;
 
-use super::dice;
+use super::random;
 
 /// Metres between the wheels.
 pub(crate) const WHEEL_BASE_M: f64 = 0.4;
@@ -11,7 +11,7 @@ pub(crate) const WHEEL_BASE_M: f64 = 0.4;
 /// For each step what the wheels report, and the bearing of each of `posts` posts, radians.
 pub(crate) fn drive(posts: usize, steps: usize) -> Vec<(WheelMotion, Vec<f64>)> {
     let place = |post: usize| {
-        let (distance, angle) = (2.0 + 3.0 * dice(1, post as u64), std::f64::consts::TAU * dice(2, post as u64));
+        let (distance, angle) = (2.0 + 3.0 * random(1, post as u64), std::f64::consts::TAU * random(2, post as u64));
         Vector2::new(angle.cos(), angle.sin()) * distance
     };
     let (distance, turn) = (0.04, 0.04);
@@ -21,7 +21,7 @@ pub(crate) fn drive(posts: usize, steps: usize) -> Vec<(WheelMotion, Vec<f64>)> 
         let camera = robot + Vector2::new(heading.cos(), heading.sin()) * 0.25;
         let bearings = (0..posts).map(|post| {
             let ray = place(post) - camera;
-            let noise = 0.01 * (dice(3, (step * posts + post) as u64) - 0.5);
+            let noise = 0.01 * (random(3, (step * posts + post) as u64) - 0.5);
             tiltvp_core::geometry::wrap_angle(ray.y.atan2(ray.x) - heading + noise)
         });
         (WheelMotion::from_motion(distance, turn, WHEEL_BASE_M), bearings.collect())

@@ -1,30 +1,37 @@
 //! `CornerDetector`: corners of single images of one camera.
 
-use std::sync::{Mutex, PoisonError};
-
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyTuple};
 use tiltvp_core::corner::{self as core, CornerScratch};
 use tiltvp_core::edges::Mask;
 
 use super::feature::CornerFeature;
-use super::options;
+use crate::array::Array;
 use crate::call::{call, exception, invalid};
 use crate::camera::Camera;
 use crate::convert;
+use crate::options;
+use crate::scratch::ScratchPool;
+use crate::value::frozen;
 
-/// The tables of one camera and front end, and the scratch of as many threads as have called at once.
+/// Finds corners in single images of one camera; `tiltvp.corner.CornerDetector` takes images of any usual kind.
+///
+/// The tables of the camera are made once. `options` tells the options in force; docs/corner_images.md says what they
+/// mean.
 #[pyclass(frozen, subclass, module = "tiltvp._core")]
 pub(crate) struct CornerDetector {
     inner: core::CornerDetector,
     camera: Py<Camera>,
-    scratch: Mutex<Vec<CornerScratch>>,
+    scratch: ScratchPool<CornerScratch>,
 }
 
 #[pymethods]
 impl CornerDetector {
     #[new]
-    #[pyo3(signature = (camera, *, method=core::CORNER_METHODS[0], mask=None, **options))]
+    #[pyo3(signature = (
+        camera: "Camera", *, method=core::CornerMethod::NAMES[0], mask: "NDArray[np.bool_] | None" = None,
+        **options: "Option"
+    ))]
     fn new(
         py: Python<'_>,
         camera: &Bound<'_, PyAny>,
@@ -35,7 +42,8 @@ impl CornerDetector {
         let Ok(camera) = camera.cast::<Camera>() else {
             return Err(invalid(format!("camera: {}, expected a tiltvp.Camera", camera.get_type().name()?)));
         };
-        let parsed = options::parse(method, options)?;
+        let mut parsed = core::DetectorOptions::for_method(method).map_err(|error| exception(&error))?;
+        options::set(&mut parsed, options)?;
         let mask = mask.map(|mask| -> PyResult<Mask> {
             let (height, width, usable) = convert::mask(mask, "mask")?;
             Mask::new(width, height, usable).map_err(|error| exception(&error))
@@ -43,7 +51,7 @@ impl CornerDetector {
         let mask = mask.transpose()?;
         let lens = camera.get().inner.clone();
         let inner = call(py, move || core::CornerDetector::new(lens, parsed, mask))?;
-        Ok(Self { inner, camera: camera.clone().unbind(), scratch: Mutex::default() })
+        Ok(Self { inner, camera: camera.clone().unbind(), scratch: ScratchPool::default() })
     }
 
     /// The camera whose images are read.
@@ -60,8 +68,8 @@ impl CornerDetector {
 
     /// Fresh (H, W) bool, or None: which pixels may be used.
     #[getter]
-    fn mask<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyAny>>> {
-        self.inner.mask().map(|mask| Ok(convert::to_mask(py, mask)?.into_any())).transpose()
+    fn mask<'py>(&self, py: Python<'py>) -> PyResult<Option<Array<'py, bool>>> {
+        self.inner.mask().map(|mask| Ok(Array::new(convert::to_mask(py, mask)?))).transpose()
     }
 
     /// The options that are in force, by name, defaults included.
@@ -71,6 +79,7 @@ impl CornerDetector {
     }
 
     /// The corners of a C-contiguous `(H, W)` image of uint8; `vertical` is a direction of the camera frame.
+    #[pyo3(signature = (image: "NDArray[np.uint8]", vertical: "ArrayLike | None"))]
     fn _detect_gray(
         &self,
         py: Python<'_>,
@@ -87,10 +96,11 @@ impl CornerDetector {
         };
         let mut found = Vec::new();
         self.with_scratch(py, |scratch| inner.detect_general(&view, prior.as_ref(), scratch, &mut found))?;
-        Ok(found.iter().map(CornerFeature::new).collect())
+        Ok(found.into_iter().map(CornerFeature::from).collect())
     }
 
     /// The corner of a C-contiguous `(H, W, 3)` image of uint8, blue first; at most one.
+    #[pyo3(signature = (image: "NDArray[np.uint8]"))]
     fn _detect_color(&self, py: Python<'_>, image: &Bound<'_, PyAny>) -> PyResult<Vec<CornerFeature>> {
         let image = convert::color(image, "image")?;
         let (view, inner) = (convert::color_view(&image)?, &self.inner);
@@ -99,11 +109,12 @@ impl CornerDetector {
             found = inner.detect_coloured(&view, None, scratch)?;
             Ok(())
         })?;
-        Ok(found.iter().map(CornerFeature::new).collect())
+        Ok(found.into_iter().map(CornerFeature::from).collect())
     }
 
     /// `(N, 4)` float64: the ends `(u, v, u, v)` of the line segments of a C-contiguous `(H, W)` image of uint8.
-    fn _segments<'py>(&self, py: Python<'py>, image: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
+    #[pyo3(signature = (image: "NDArray[np.uint8]"))]
+    fn _segments<'py>(&self, py: Python<'py>, image: &Bound<'py, PyAny>) -> PyResult<Array<'py, f64>> {
         let image = convert::gray(image, "image")?;
         let (view, inner) = (convert::view(&image)?, &self.inner);
         let (mut found, mut rows) = (Vec::new(), Vec::new());
@@ -123,18 +134,6 @@ impl CornerDetector {
         Ok(format!("CornerDetector({}, method=\"{}\")", self.camera.bind(py).repr()?, self.method()))
     }
 
-    fn __eq__(&self, other: &Bound<'_, PyAny>) -> bool {
-        other.cast::<Self>().is_ok_and(|other| {
-            let other = &other.get().inner;
-            (self.inner.camera(), self.inner.options(), self.inner.mask())
-                == (other.camera(), other.options(), other.mask())
-        })
-    }
-
-    fn __hash__(&self, py: Python<'_>) -> PyResult<isize> {
-        (self.camera.bind(py).hash()?, self.method()).into_pyobject(py)?.hash()
-    }
-
     fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyTuple>> {
         let (py, this) = (slf.py(), slf.get());
         let keywords = this.options(py)?;
@@ -145,21 +144,22 @@ impl CornerDetector {
     }
 }
 
+frozen!(CornerDetector, |own| (own.inner.camera(), own.inner.mask(), own.inner.options()), |own| (
+    own.method(),
+    own.inner.camera().width(),
+    own.inner.camera().height()
+));
+
 impl CornerDetector {
     pub(super) fn inner(&self) -> &core::CornerDetector {
         &self.inner
     }
 
-    /// Runs `work` without the interpreter, with a scratch that no other thread has.
-    fn with_scratch(
+    fn with_scratch<R: Send>(
         &self,
         py: Python<'_>,
-        work: impl FnOnce(&mut CornerScratch) -> Result<(), tiltvp_core::Error> + Send,
-    ) -> PyResult<()> {
-        let free = self.scratch.lock().unwrap_or_else(PoisonError::into_inner).pop();
-        let mut scratch = free.unwrap_or_else(|| self.inner.scratch());
-        let outcome = call(py, || work(&mut scratch));
-        self.scratch.lock().unwrap_or_else(PoisonError::into_inner).push(scratch);
-        outcome
+        work: impl FnOnce(&mut CornerScratch) -> Result<R, tiltvp_core::Error> + Send,
+    ) -> PyResult<R> {
+        self.scratch.with(py, || self.inner.scratch(), work)
     }
 }

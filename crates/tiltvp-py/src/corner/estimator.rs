@@ -3,36 +3,24 @@
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use nalgebra::Matrix4;
-use numpy::{PyArray1, PyArray2, PyArrayMethods};
+use numpy::{PyArray1, PyArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyTuple};
-use tiltvp_core::corner::{self as core, CornerMethod, EstimatorOptions, Frame, IncludedAngle};
+use tiltvp_core::corner::{self as core, CornerMethod, EstimatorOptions, Frame};
 use tiltvp_core::geometry::RigidMotion;
 
 use super::detector::CornerDetector;
 use super::estimate::CornerEstimate;
 use super::memory;
-use crate::call::{call, exception, invalid};
+use crate::array::Array;
+use crate::call::{call, invalid};
 use crate::convert;
+use crate::options;
 
-/// Names of the options.
-const OPTIONS: [&str; 13] = [
-    "gamma_rad",
-    "gamma_sigma_rad",
-    "right_handed",
-    "down",
-    "down_sigma_rad",
-    "turn_sigma_rad",
-    "forget_after",
-    "agree_max_rad",
-    "parallel_max_rad",
-    "misfit_max",
-    "distance_min_m",
-    "distance_max_m",
-    "probability_min",
-];
-
-/// The detectors of one camera or a pair, and the last pose. Comparable, and to be copied and pickled with what was seen.
+/// Poses from the images of one camera or a pair; `tiltvp.corner.CornerPoseEstimator` takes cameras and any images.
+///
+/// It holds the detectors of one camera or a pair, and the last pose. Comparable, and to be copied and pickled with
+/// what was seen.
 #[pyclass(frozen, subclass, module = "tiltvp._core")]
 pub(crate) struct CornerPoseEstimator {
     inner: Mutex<core::CornerPoseEstimator>,
@@ -46,7 +34,7 @@ pub(crate) struct CornerPoseEstimator {
 #[pymethods]
 impl CornerPoseEstimator {
     #[new]
-    #[pyo3(signature = (left, right=None, left_from_right=None, **options))]
+    #[pyo3(signature = (left, right=None, left_from_right: "ArrayLike | None" = None, **options: "Option"))]
     fn new(
         py: Python<'_>,
         left: &Bound<'_, CornerDetector>,
@@ -54,8 +42,14 @@ impl CornerPoseEstimator {
         left_from_right: Option<&Bound<'_, PyAny>>,
         options: Option<&Bound<'_, PyDict>>,
     ) -> PyResult<Self> {
-        let options = parse(options)?;
-        let motion = left_from_right.map(|matrix| motion_from(matrix)).transpose()?;
+        let mut parsed = EstimatorOptions::default();
+        options::set(&mut parsed, options)?;
+        if let Some(down) = &mut parsed.down {
+            let unit = down.try_normalize(1e-12);
+            *down = unit.ok_or_else(|| invalid("down: no direction, expected a vector".to_owned()))?;
+        }
+        let options = parsed;
+        let motion = left_from_right.map(|matrix| convert::rigid_motion(matrix, "left_from_right")).transpose()?;
         if right.is_some() != motion.is_some() {
             return Err(invalid("right, left_from_right: one without the other, expected both or none".to_owned()));
         }
@@ -87,18 +81,18 @@ impl CornerPoseEstimator {
 
     /// Fresh (4, 4) float64, or None: the right camera's pose in the left one's frame.
     #[getter]
-    fn left_from_right<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyArray2<f64>>>> {
+    fn left_from_right<'py>(&self, py: Python<'py>) -> PyResult<Option<Array<'py, f64>>> {
         let Some(motion) = &self.left_from_right else { return Ok(None) };
         let mut matrix = Matrix4::identity();
         matrix.fixed_view_mut::<3, 3>(0, 0).copy_from(&motion.rotation);
         matrix.fixed_view_mut::<3, 1>(0, 3).copy_from(&motion.translation_m);
-        PyArray1::from_slice(py, matrix.transpose().as_slice()).reshape([4, 4]).map(Some)
+        PyArray1::from_slice(py, matrix.transpose().as_slice()).reshape([4, 4]).map(|array| Some(Array::new(array)))
     }
 
     /// The options that are in force, by name, defaults included.
     #[getter]
     fn options<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        in_force(py, &self.options)
+        options::in_force(py, &self.options)
     }
 
     /// Whether images in colour are wanted.
@@ -113,6 +107,7 @@ impl CornerPoseEstimator {
     }
 
     /// What one frame tells: C-contiguous images of uint8, (H, W, 3) or (H, W) as `_coloured` says.
+    #[pyo3(signature = (left: "NDArray[np.uint8]", right: "NDArray[np.uint8] | None"))]
     fn _observe(
         &self,
         py: Python<'_>,
@@ -122,7 +117,7 @@ impl CornerPoseEstimator {
         let inner = &self.inner;
         let observe = |left: Frame<'_>, right: Option<Frame<'_>>| {
             let work = || inner.lock().unwrap_or_else(PoisonError::into_inner).observe(&left, right.as_ref());
-            call(py, work).map(CornerEstimate::new)
+            call(py, work).map(CornerEstimate::from)
         };
         if self.coloured {
             let left = convert::color(left, "left")?;
@@ -165,7 +160,7 @@ impl CornerPoseEstimator {
     /// Sets what pickle has kept.
     fn __setstate__(slf: &Bound<'_, Self>, state: (u32, Option<Bound<'_, PyDict>>)) -> PyResult<()> {
         let (objects, track) = state;
-        let track = track.map(|values| memory::from_dict(&slf.get_type(), &values)).transpose()?;
+        let track = track.map(|values| memory::from_dict(&values)).transpose()?;
         let mut inner = slf.get().lock();
         *inner = inner.clone().with_state(objects, track);
         Ok(())
@@ -186,61 +181,4 @@ impl CornerPoseEstimator {
     fn lock(&self) -> MutexGuard<'_, core::CornerPoseEstimator> {
         self.inner.lock().unwrap_or_else(PoisonError::into_inner)
     }
-}
-
-fn motion_from(value: &Bound<'_, PyAny>) -> PyResult<RigidMotion> {
-    let (rows, _) = convert::rows::<4>(value, "left_from_right")?;
-    let flat: Vec<f64> = rows.into_iter().flatten().collect();
-    if flat.len() != 16 {
-        return Err(invalid(format!("left_from_right: {} rows of 4, expected an array (4, 4)", flat.len() / 4)));
-    }
-    RigidMotion::from_matrix("left_from_right", &Matrix4::from_row_slice(&flat)).map_err(|error| exception(&error))
-}
-
-fn parse(given: Option<&Bound<'_, PyDict>>) -> PyResult<EstimatorOptions> {
-    let mut options = EstimatorOptions::default();
-    for (key, value) in given.into_iter().flat_map(PyDictMethods::iter) {
-        let key: String = key.extract()?;
-        let name = format!("option {key}");
-        let number = || convert::whole::<f64>(&value, &name, "a number");
-        match key.as_str() {
-            "gamma_rad" => options.angle = IncludedAngle { gamma_rad: number()?, ..options.angle },
-            "gamma_sigma_rad" => options.angle = IncludedAngle { sigma_rad: number()?, ..options.angle },
-            "right_handed" => options.right_handed = convert::whole(&value, &name, "True, False or None")?,
-            "down" if value.is_none() => options.down = None,
-            "down" => {
-                let down = convert::vector3(&value, "down")?.try_normalize(1e-12);
-                options.down = Some(down.ok_or_else(|| invalid("down: no direction, expected a vector".to_owned()))?);
-            }
-            "down_sigma_rad" => options.down_sigma_rad = number()?,
-            "turn_sigma_rad" => options.turn_sigma_rad = number()?,
-            "forget_after" => options.forget_after = convert::whole(&value, &name, "a whole number of frames")?,
-            "agree_max_rad" => options.agree_max_rad = number()?,
-            "parallel_max_rad" => options.parallel_max_rad = number()?,
-            "misfit_max" => options.misfit_max = number()?,
-            "distance_min_m" => options.distance_m[0] = number()?,
-            "distance_max_m" => options.distance_m[1] = number()?,
-            "probability_min" => options.probability_min = number()?,
-            _ => return Err(invalid(format!("option {key}: unknown, expected one of {}", OPTIONS.join(", ")))),
-        }
-    }
-    Ok(options)
-}
-
-fn in_force<'py>(py: Python<'py>, options: &EstimatorOptions) -> PyResult<Bound<'py, PyDict>> {
-    let dict = PyDict::new(py);
-    dict.set_item("gamma_rad", options.angle.gamma_rad)?;
-    dict.set_item("gamma_sigma_rad", options.angle.sigma_rad)?;
-    dict.set_item("right_handed", options.right_handed)?;
-    dict.set_item("down", options.down.map(|down| PyArray1::from_slice(py, down.as_slice())))?;
-    dict.set_item("down_sigma_rad", options.down_sigma_rad)?;
-    dict.set_item("turn_sigma_rad", options.turn_sigma_rad)?;
-    dict.set_item("forget_after", options.forget_after)?;
-    dict.set_item("agree_max_rad", options.agree_max_rad)?;
-    dict.set_item("parallel_max_rad", options.parallel_max_rad)?;
-    dict.set_item("misfit_max", options.misfit_max)?;
-    dict.set_item("distance_min_m", options.distance_m[0])?;
-    dict.set_item("distance_max_m", options.distance_m[1])?;
-    dict.set_item("probability_min", options.probability_min)?;
-    Ok(dict)
 }

@@ -4,9 +4,9 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use tiltvp_core::corner::{AttitudePrior, VerticalSense};
 
-use super::matrix;
 use crate::call::invalid;
 use crate::convert;
+use crate::field::Field;
 
 /// The priors of an iterable of dicts, or of values with `to_dict`.
 pub(super) fn parse(values: &Bound<'_, PyAny>) -> PyResult<Vec<AttitudePrior>> {
@@ -31,8 +31,8 @@ fn one(values: &Bound<'_, PyDict>) -> PyResult<AttitudePrior> {
         AttitudePrior::Elevation { elevation_rad, sigma_rad: number("sigma_rad")?, sense: sense(values)? }
     } else {
         AttitudePrior::Attitude {
-            camera_from_object: matrix::item(values, "camera_from_object")?,
-            covariance: matrix::item(values, "covariance_rad2")?,
+            camera_from_object: Field::take(values, "camera_from_object")?,
+            covariance: Field::take(values, "covariance_rad2")?,
         }
     })
 }

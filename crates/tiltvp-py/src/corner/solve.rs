@@ -1,18 +1,17 @@
 //! The functions of `tiltvp.corner`: closed form, screening, resolution, triangulation and poses.
 
-use nalgebra::{Matrix2, Matrix3, Matrix4, Vector3};
-use numpy::{PyArray1, PyArray2};
+use nalgebra::{Matrix2, Matrix3, Vector3};
 use pyo3::prelude::*;
 use tiltvp_core::corner::{
-    self as core, Alignment, CornerOptions, FittedRay, IncludedAngle, Screening, Sighting, View,
+    self as core, Alignment, BearingObservation, CornerOptions, FittedRay, IncludedAngle, Screening, View,
 };
-use tiltvp_core::geometry::RigidMotion;
 
 use super::attitude::{CornerAttitude, CornerAttitudes};
 use super::feature::CornerFeature;
 use super::pose::CornerPose;
+use super::prior;
 use super::resolved::ResolvedAttitude;
-use super::{matrix, prior};
+use crate::array::Array;
 use crate::call::{call, exception, invalid};
 use crate::convert;
 
@@ -30,8 +29,9 @@ fn is_unit(vector: &Vector3<f64>) -> bool {
     (vector.norm_squared() - 1.0).abs() < 1e-6
 }
 
-/// Every attitude that a corner seen at exact bearings may have.
+/// Every attitude that a corner seen at exact bearings may have; see `tiltvp.corner.solve`.
 #[pyfunction]
+#[pyo3(signature = (vertex: "ArrayLike", x_ray: "ArrayLike", y_ray: "ArrayLike", z_ray: "ArrayLike", gamma_rad))]
 pub(crate) fn solve_corner(
     py: Python<'_>,
     vertex: &Bound<'_, PyAny>,
@@ -49,6 +49,9 @@ pub(crate) fn solve_corner(
 
 /// The same for many corners at once: (N, 3) arrays, and one included angle or one for each.
 #[pyfunction]
+#[pyo3(signature = (
+    vertex: "ArrayLike", x_ray: "ArrayLike", y_ray: "ArrayLike", z_ray: "ArrayLike", gamma_rad: "ArrayLike",
+))]
 pub(crate) fn solve_corners(
     py: Python<'_>,
     vertex: &Bound<'_, PyAny>,
@@ -91,6 +94,7 @@ pub(crate) fn solve_corners(
 ///
 /// `x`, `y`, `z` are (N, 3) arrays, from the vertex outwards; `sigma_rad` is the standard deviation of each across its ray.
 #[pyfunction]
+#[pyo3(signature = (x: "ArrayLike", y: "ArrayLike", z: "ArrayLike", sigma_rad))]
 pub(crate) fn fit_corner(
     py: Python<'_>,
     x: &Bound<'_, PyAny>,
@@ -118,12 +122,12 @@ pub(crate) fn fit_corner(
     };
     let rays = call(py, || Ok(given.iter().map(fit).collect::<Option<Vec<_>>>()))?;
     let feature = rays.and_then(|rays| core::CornerFeature::from_rays(rays.try_into().ok()?));
-    feature.as_ref().map(CornerFeature::new).ok_or_else(|| {
+    feature.map(CornerFeature::from).ok_or_else(|| {
         invalid("x, y, z: rays that are no great circles or do not meet, expected three that do".to_owned())
     })
 }
 
-/// Every attitude that a feature admits, with covariance.
+/// Every attitude that a feature admits, with covariance; see `tiltvp.corner.attitudes`.
 #[pyfunction]
 pub(crate) fn corner_attitudes(
     py: Python<'_>,
@@ -131,7 +135,7 @@ pub(crate) fn corner_attitudes(
     gamma_rad: f64,
     gamma_sigma_rad: f64,
 ) -> PyResult<Vec<CornerAttitude>> {
-    let feature = feature.get().inner();
+    let feature = &feature.get().inner;
     let found = call(py, || core::corner_attitudes(feature, &IncludedAngle { gamma_rad, sigma_rad: gamma_sigma_rad }))?;
     Ok(found.iter().map(|attitude| CornerAttitude::from(*attitude)).collect())
 }
@@ -139,8 +143,7 @@ pub(crate) fn corner_attitudes(
 /// Why a feature is no corner of that angle, in a sentence; None if it is one.
 #[pyfunction]
 pub(crate) fn screen_corner(feature: &Bound<'_, CornerFeature>, gamma_rad: f64) -> PyResult<Option<String>> {
-    let screening =
-        Screening::of(feature.get().inner(), &IncludedAngle::exact(gamma_rad)).map_err(|e| exception(&e))?;
+    let screening = Screening::of(&feature.get().inner, &IncludedAngle::exact(gamma_rad)).map_err(|e| exception(&e))?;
     let degrees = f64::to_degrees;
     Ok(match screening {
         Screening::Passes => None,
@@ -163,6 +166,7 @@ pub(crate) fn screen_corner(feature: &Bound<'_, CornerFeature>, gamma_rad: f64) 
 
 /// The included angle of the horizontal edges and its standard deviation; None where the vertex is seen horizontally.
 #[pyfunction]
+#[pyo3(signature = (feature, vertical: "ArrayLike", vertical_covariance_rad2: "ArrayLike"))]
 pub(crate) fn included_angle(
     feature: &Bound<'_, CornerFeature>,
     vertical: &Bound<'_, PyAny>,
@@ -173,13 +177,16 @@ pub(crate) fn included_angle(
         return Err(invalid(format!("vertical: of length {}, expected a unit vector", vertical.norm())));
     }
     let covariance = convert::matrix3(vertical_covariance_rad2, "vertical_covariance_rad2")?;
-    let found = core::included_angle(feature.get().inner(), &vertical, &covariance);
+    let found = core::included_angle(&feature.get().inner, &vertical, &covariance);
     Ok(found.map(|angle| (angle.gamma_rad, angle.sigma_rad)))
 }
 
-/// The attitudes that several features agree on, the likeliest first.
+/// The attitudes that several features agree on, the likeliest first; see `tiltvp.corner.resolve`.
 #[pyfunction]
-#[pyo3(signature = (features, common_from_camera, gamma_rad, gamma_sigma_rad, alignment, right_handed, priors))]
+#[pyo3(signature = (
+    features: "Sequence[CornerFeature]", common_from_camera: "Sequence[ArrayLike]", gamma_rad, gamma_sigma_rad,
+    alignment, right_handed, priors: "Iterable[Any]",
+))]
 #[expect(clippy::too_many_arguments, clippy::needless_pass_by_value, reason = "named in Python; lists are extracted")]
 pub(crate) fn resolve_corners(
     py: Python<'_>,
@@ -205,7 +212,7 @@ pub(crate) fn resolve_corners(
     for rotation in &common_from_camera {
         rotations.push(convert::matrix3(rotation, "common_from_camera")?);
     }
-    let features: Vec<_> = features.iter().map(|feature| *feature.get().inner()).collect();
+    let features: Vec<_> = features.iter().map(|feature| feature.get().inner).collect();
     let resolved = call(py, || {
         let found: Vec<_> = features.iter().map(|f| core::corner_attitudes(f, &angle)).collect::<Result<_, _>>()?;
         let views: Vec<_> = found
@@ -218,9 +225,12 @@ pub(crate) fn resolve_corners(
     Ok(resolved.into_iter().map(ResolvedAttitude::from).collect())
 }
 
-/// The poses that explain the features of a pair of cameras, the likeliest first.
+/// The poses that explain the features of a pair of cameras, the likeliest first; see `tiltvp.corner.poses`.
 #[pyfunction]
-#[pyo3(signature = (left, right, left_from_right, gamma_rad, gamma_sigma_rad, right_handed, priors, fuse))]
+#[pyo3(signature = (
+    left, right, left_from_right: "ArrayLike", gamma_rad, gamma_sigma_rad, right_handed, priors: "Iterable[Any]",
+    fuse,
+))]
 #[expect(clippy::too_many_arguments, reason = "named on the Python side")]
 pub(crate) fn corner_poses(
     py: Python<'_>,
@@ -235,35 +245,25 @@ pub(crate) fn corner_poses(
 ) -> PyResult<Vec<CornerPose>> {
     let angle = IncludedAngle { gamma_rad, sigma_rad: gamma_sigma_rad };
     let options = CornerOptions { angle, right_handed, priors: prior::parse(priors)?, fuse };
-    let motion = motion(left_from_right, "left_from_right")?;
-    let (left, right) = (left.get().inner(), right.get().inner());
+    let motion = convert::rigid_motion(left_from_right, "left_from_right")?;
+    let (left, right) = (&left.get().inner, &right.get().inner);
     let poses = call(py, || core::corner_poses(left, right, &motion, &options))?;
     Ok(poses.into_iter().map(CornerPose::from).collect())
-}
-
-/// A rigid motion from a (4, 4) matrix.
-fn motion(value: &Bound<'_, PyAny>, name: &'static str) -> PyResult<RigidMotion> {
-    let (rows, single) = convert::rows::<4>(value, name)?;
-    let [a, b, c, d] = rows[..] else {
-        return Err(invalid(format!("{name}: {} rows, expected an array (4, 4)", rows.len())));
-    };
-    if single {
-        return Err(invalid(format!("{name}: shape [4], expected an array (4, 4)")));
-    }
-    let matrix = Matrix4::from_row_slice([a, b, c, d].as_flattened());
-    RigidMotion::from_matrix(name, &matrix).map_err(|error| exception(&error))
 }
 
 /// The point that bearings of two or more cameras meet in: (3,) metres, (3, 3) square metres, and chi-square; None where
 /// they are parallel or the point would be behind a camera.
 #[pyfunction]
 #[expect(clippy::type_complexity, clippy::needless_pass_by_value, reason = "a tuple of arrays; lists are extracted")]
+#[pyo3(signature = (
+    bearings: "ArrayLike", covariances_rad2: "Sequence[ArrayLike]", rig_from_camera: "Sequence[ArrayLike]",
+))]
 pub(crate) fn triangulate<'py>(
     py: Python<'py>,
     bearings: &Bound<'py, PyAny>,
     covariances_rad2: Vec<Bound<'py, PyAny>>,
     rig_from_camera: Vec<Bound<'py, PyAny>>,
-) -> PyResult<Option<(Bound<'py, PyArray1<f64>>, Bound<'py, PyArray2<f64>>, f64)>> {
+) -> PyResult<Option<(Array<'py, f64>, Array<'py, f64>, f64)>> {
     let (rows, single) = convert::rows::<3>(bearings, "bearings")?;
     if single || rows.len() != covariances_rad2.len() || rows.len() != rig_from_camera.len() {
         return Err(invalid(format!(
@@ -279,19 +279,19 @@ pub(crate) fn triangulate<'py>(
         if !is_unit(&bearing) {
             return Err(invalid(format!("bearings: {row:?}, expected unit vectors")));
         }
-        let (entries, _) = convert::rows::<2>(covariance, "covariances_rad2")?;
-        let [[a, b], [c, d]] = entries[..] else {
-            return Err(invalid(format!("covariances_rad2: {} rows, expected arrays (2, 2)", entries.len())));
-        };
-        let covariance = Matrix2::new(a, b, c, d);
+        let covariance: Matrix2<f64> = convert::matrix(covariance, "covariances_rad2")?;
         if !(tiltvp_core::filter::positive_semidefinite(&covariance)) {
             return Err(invalid("covariances_rad2: a matrix that is no covariance".to_owned()));
         }
-        sightings.push(Sighting { bearing, covariance, rig_from_camera: motion(camera, "rig_from_camera")? });
+        sightings.push(BearingObservation {
+            bearing,
+            covariance,
+            rig_from_camera: convert::rigid_motion(camera, "rig_from_camera")?,
+        });
     }
     let found = call(py, || Ok(core::triangulate(&sightings)))?;
     let Some(found) = found else { return Ok(None) };
     let covariance: Matrix3<f64> = found.covariance_m2;
-    let point = PyArray1::from_slice(py, found.point_m.as_slice());
-    Ok(Some((point, matrix::to_array(py, &covariance)?, found.chi_square)))
+    let point = convert::to_matrix(py, &found.point_m)?;
+    Ok(Some((point, convert::to_matrix(py, &covariance)?, found.chi_square)))
 }

@@ -7,6 +7,7 @@ use tiltvp_core::lines::{self as core, BearingGate, MatchOptions};
 
 use crate::call::{call, invalid};
 use crate::convert;
+use crate::options;
 
 /// `(N, K)` numbers as `f32` in row order, and K.
 pub(super) fn descriptors(value: &Bound<'_, PyAny>, name: &str) -> PyResult<(Vec<f32>, usize, usize)> {
@@ -35,34 +36,17 @@ fn pair(a: &Bound<'_, PyAny>, b: &Bound<'_, PyAny>) -> PyResult<Pair> {
     Ok(Pair { a, b, rows: [n, m], width })
 }
 
-/// Sets the options of a matcher that are named, and returns whether the name is one.
-pub(super) fn set(options: &mut MatchOptions, key: &str, value: &Bound<'_, PyAny>) -> PyResult<bool> {
-    let name = format!("option {key}");
-    let number = || convert::whole::<f64>(value, &name, "a number");
-    let switch = || convert::whole::<bool>(value, &name, "True or False");
-    match key {
-        "f1" => options.distance_max = number()?,
-        "f2" => options.mean_ratio_max = number()?,
-        "f3" => options.second_ratio_max = number()?,
-        "mutual" => options.mutual = switch()?,
-        "ordered" => options.ordered = switch()?,
-        _ => return Ok(false),
-    }
-    Ok(true)
-}
-
-/// Adds the options of a matcher to a dict.
-pub(super) fn in_force(dict: &Bound<'_, PyDict>, options: &MatchOptions) -> PyResult<()> {
-    dict.set_item("f1", options.distance_max)?;
-    dict.set_item("f2", options.mean_ratio_max)?;
-    dict.set_item("f3", options.second_ratio_max)?;
-    dict.set_item("mutual", options.mutual)?;
-    dict.set_item("ordered", options.ordered)
-}
-
-/// The matches of two sets of descriptors.
+/// (M, 2): rows of `a` (N_A, K) and the rows of `b` (N_B, K) that are the same lines, by rising row of `a`.
+///
+/// The nearest descriptor, if its distance is at most `f1` (eq. 8 of Scaramuzza 2009), `f2` times the mean distance
+/// (eq. 9), and `f3` times the second smallest (eq. 10). `mutual` asks for the nearest both ways, `ordered` for matches
+/// in cyclic order, for rows by rising bearing. With bearings of `a` as expected in `b`, bearings of `b` and a greatest
+/// difference, far lines are no candidates. Raises `tiltvp.errors.InvalidInputError`.
 #[pyfunction]
-#[pyo3(signature = (a, b, *, expected_rad=None, seen_rad=None, gate_rad=None, **options))]
+#[pyo3(signature = (
+    a: "NDArray[np.float32]", b: "NDArray[np.float32]", *, expected_rad: "ArrayLike | None" = None,
+    seen_rad: "ArrayLike | None" = None, gate_rad=None, **options: "Option"
+) -> "NDArray[np.int64]")]
 pub(crate) fn match_descriptors<'py>(
     py: Python<'py>,
     a: &Bound<'py, PyAny>,
@@ -74,12 +58,7 @@ pub(crate) fn match_descriptors<'py>(
 ) -> PyResult<Bound<'py, PyArray2<i64>>> {
     let Pair { a, b, width, .. } = pair(a, b)?;
     let mut parsed = MatchOptions::default();
-    for (key, value) in options.into_iter().flat_map(PyDictMethods::iter) {
-        let key: String = key.extract()?;
-        if !set(&mut parsed, &key, &value)? {
-            return Err(invalid(format!("option {key}: unknown, expected one of f1, f2, f3, mutual, ordered")));
-        }
-    }
+    options::set(&mut parsed, options)?;
     let bearings = match (expected_rad, seen_rad, gate_rad) {
         (Some(expected), Some(seen), Some(gate)) => {
             Some((convert::vector(expected, "expected_rad")?, convert::vector(seen, "seen_rad")?, gate))
@@ -112,8 +91,9 @@ fn matrix<'py>(
     PyArray1::from_vec(py, values).reshape(rows)
 }
 
-/// `(N_A, N_B)` Euclidean distances of descriptors, eq. 6.
+/// (N_A, N_B): Euclidean distances of descriptors, eq. 6 (Scaramuzza 2009).
 #[pyfunction]
+#[pyo3(signature = (a: "NDArray[np.float32]", b: "NDArray[np.float32]") -> "NDArray[np.float64]")]
 pub(crate) fn descriptor_distances<'py>(
     py: Python<'py>,
     a: &Bound<'py, PyAny>,
@@ -126,8 +106,9 @@ pub(crate) fn descriptor_distances<'py>(
     })
 }
 
-/// `(N_A, N_B)` means of squared differences of patches, eq. 12.
+/// (N_A, N_B): means of squared differences of patches (N, K), eq. 12 over the samples that both have.
 #[pyfunction]
+#[pyo3(signature = (a: "NDArray[np.float32]", b: "NDArray[np.float32]") -> "NDArray[np.float64]")]
 pub(crate) fn ssd_matrix<'py>(
     py: Python<'py>,
     a: &Bound<'py, PyAny>,
@@ -136,8 +117,9 @@ pub(crate) fn ssd_matrix<'py>(
     matrix(py, a, b, core::ssd_matrix)
 }
 
-/// `(N_A, N_B)` zero-mean normalised cross-correlations of patches, eq. 13.
+/// (N_A, N_B): zero-mean normalised cross-correlations of patches (N, K), eq. 13; 1 for equal ones.
 #[pyfunction]
+#[pyo3(signature = (a: "NDArray[np.float32]", b: "NDArray[np.float32]") -> "NDArray[np.float64]")]
 pub(crate) fn zncc_matrix<'py>(
     py: Python<'py>,
     a: &Bound<'py, PyAny>,

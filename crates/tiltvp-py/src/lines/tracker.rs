@@ -2,7 +2,6 @@
 
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
-use numpy::PyArray1;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyTuple};
 use tiltvp_core::lines::{self as core, Followed, FrameMemory, Motion, Parallax, TrackerOptions, TrackerState};
@@ -10,53 +9,46 @@ use tiltvp_core::lines::{self as core, Followed, FrameMemory, Motion, Parallax, 
 use super::matching;
 use super::values::Lines;
 use crate::call::{call, exception, invalid};
-use crate::convert;
+use crate::options;
+use crate::value::value;
 
-/// The lines of one frame and whose they are.
-#[pyclass(frozen, module = "tiltvp._core")]
-pub(crate) struct TrackedLines {
-    frame: u64,
-    tracked: Vec<core::TrackedLine>,
-    lines: Py<Lines>,
+value! {
+    /// The lines of one frame and whose they are. Frozen.
+    TrackedLines as own {
+        /// Number of the frame, from 0.
+        frame: u64,
+        /// (N,): identity of each line, from 0, never given twice.
+        track: Vec<i64>,
+        /// (N,) int64: how many frames ago each line was last seen, 0 for a new one.
+        frames_back: Vec<i64>,
+        /// The lines.
+        lines: Lines,
+    }
+    check if [track.len(), frames_back.len()] != [lines.inner.lines.len(); 2] {
+        let n = lines.inner.lines.len();
+        return Err(invalid(format!("values: lists of different lengths, expected {n} of each")));
+    };
+    repr {
+        let tracks: Vec<String> = own.track.iter().map(ToString::to_string).collect();
+        format!("TrackedLines(frame {}, tracks {})", own.frame, tracks.join(", "))
+    };
 }
 
 #[pymethods]
 impl TrackedLines {
-    /// Number of the frame, from 0.
-    #[getter]
-    fn frame(&self) -> u64 {
-        self.frame
-    }
-
-    /// (N,) int64: identity of each line, never given twice.
-    #[getter]
-    fn track<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<i64>> {
-        PyArray1::from_iter(py, self.tracked.iter().map(|line| line.track as i64))
-    }
-
-    /// (N,) int64: how many frames ago each line was last seen, 0 for a new one.
-    #[getter]
-    fn frames_back<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<i64>> {
-        PyArray1::from_iter(py, self.tracked.iter().map(|line| i64::from(line.frames_back)))
-    }
-
-    /// The lines.
-    #[getter]
-    fn lines(&self, py: Python<'_>) -> Py<Lines> {
-        self.lines.clone_ref(py)
-    }
-
     fn __len__(&self) -> usize {
-        self.tracked.len()
-    }
-
-    fn __repr__(&self) -> String {
-        let tracks: Vec<String> = self.tracked.iter().map(|line| line.track.to_string()).collect();
-        format!("TrackedLines(frame {}, tracks {})", self.frame, tracks.join(", "))
+        self.track.len()
     }
 }
 
-/// Follows lines through successive frames.
+/// Follows lines through successive frames: each gets the identity of the line it is, or a new one.
+///
+/// Where the robot's motion is known, each track's bearing is predicted from the last one and from how near the edge
+/// is, as far as bearings have told, and all lines find their tracks together: by bearings, descriptors and sides, at
+/// the least cost in all. Where it is not, a line is looked for in the last frame, then in the one before, up to
+/// `look_back` frames. The same calls give the same answers. Comparable, copied and pickled with all that it remembers.
+///
+/// Raises `tiltvp.errors.InvalidInputError` for an option that is unknown or out of its domain.
 #[pyclass(frozen, module = "tiltvp._core")]
 pub(crate) struct LineTracker {
     inner: Mutex<core::LineTracker>,
@@ -75,33 +67,10 @@ impl LineTracker {
 #[pymethods]
 impl LineTracker {
     #[new]
-    #[pyo3(signature = (**options))]
+    #[pyo3(signature = (**options: "Option"))]
     fn new(options: Option<&Bound<'_, PyDict>>) -> PyResult<Self> {
         let mut parsed = TrackerOptions::default();
-        for (key, value) in options.into_iter().flat_map(PyDictMethods::iter) {
-            let key: String = key.extract()?;
-            let name = format!("option {key}");
-            match key.as_str() {
-                "look_back" => parsed.look_back = convert::whole(&value, &name, "a whole number from 1")?,
-                "nearest_m" => parsed.nearest_m = convert::whole(&value, &name, "a distance")?,
-                "camera_m" => parsed.camera_m = convert::whole(&value, &name, "x and y")?,
-                "turn_sigma_rad" => parsed.turn_sigma_rad = convert::whole(&value, &name, "an angle")?,
-                "distance_sigma" => parsed.distance_sigma = convert::whole(&value, &name, "a share")?,
-                "rate_sigma_rad" => parsed.rate_sigma_rad = convert::whole(&value, &name, "an angle")?,
-                "bearing_sigma_rad" => parsed.bearing_sigma_rad = convert::whole(&value, &name, "an angle")?,
-                "gate_sigmas" => parsed.gate_sigmas = convert::whole(&value, &name, "a number")?,
-                "descriptor_sigma" => parsed.descriptor_sigma = convert::whole(&value, &name, "a distance")?,
-                "descriptor_max" => parsed.descriptor_max = convert::whole(&value, &name, "a distance")?,
-                "new_cost" => parsed.new_cost = convert::whole(&value, &name, "a number")?,
-                _ if matching::set(&mut parsed.matching, &key, &value)? => {}
-                _ => {
-                    let expected = "look_back, nearest_m, camera_m, turn_sigma_rad, distance_sigma, rate_sigma_rad, \
-                         bearing_sigma_rad, gate_sigmas, descriptor_sigma, descriptor_max, new_cost, f1, f2, f3, mutual, \
-                         ordered";
-                    return Err(invalid(format!("{name}: unknown, expected one of {expected}")));
-                }
-            }
-        }
+        options::set(&mut parsed, options)?;
         let inner = core::LineTracker::new(parsed).map_err(|error| exception(&error))?;
         Ok(Self { inner: Mutex::new(inner) })
     }
@@ -109,21 +78,7 @@ impl LineTracker {
     /// The options in force, by name, defaults included; a fresh dict, good as keywords.
     #[getter]
     fn options<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        let options = *self.lock().options();
-        let dict = PyDict::new(py);
-        dict.set_item("look_back", options.look_back)?;
-        dict.set_item("nearest_m", options.nearest_m)?;
-        dict.set_item("camera_m", PyTuple::new(py, options.camera_m)?)?;
-        dict.set_item("turn_sigma_rad", options.turn_sigma_rad)?;
-        dict.set_item("distance_sigma", options.distance_sigma)?;
-        dict.set_item("rate_sigma_rad", options.rate_sigma_rad)?;
-        dict.set_item("bearing_sigma_rad", options.bearing_sigma_rad)?;
-        dict.set_item("gate_sigmas", options.gate_sigmas)?;
-        dict.set_item("descriptor_sigma", options.descriptor_sigma)?;
-        dict.set_item("descriptor_max", options.descriptor_max)?;
-        dict.set_item("new_cost", options.new_cost)?;
-        matching::in_force(&dict, &options.matching)?;
-        Ok(dict)
+        options::in_force(py, self.lock().options())
     }
 
     /// Number of the next frame.
@@ -138,8 +93,12 @@ impl LineTracker {
         self.lock().state().next_track
     }
 
-    /// The next frame.
-    #[pyo3(signature = (lines, descriptors, *, yaw_change_rad=None, distance_m=None))]
+    /// The next frame: its lines, their descriptors (N, K), and the robot's motion since the last one.
+    ///
+    /// `yaw_change_rad` is its turn, positive to the left, `distance_m` how far the middle between its wheels went
+    /// along the arc, negative backwards. Raises `tiltvp.errors.InvalidInputError` for descriptors of another number or
+    /// width, motions that are not finite, and a distance without a turn; the tracker is as before then.
+    #[pyo3(signature = (lines, descriptors: "NDArray[np.float32]", *, yaw_change_rad=None, distance_m=None))]
     fn update(
         &self,
         py: Python<'_>,
@@ -153,7 +112,7 @@ impl LineTracker {
         }
         let motion = yaw_change_rad.map(|turn_rad| Motion { turn_rad, distance_m });
         let (values, n, _) = matching::descriptors(descriptors, "descriptors")?;
-        let inner = lines.get().inner();
+        let inner = &lines.get().inner;
         if n != inner.lines.len() {
             return Err(invalid(format!("descriptors: {n} rows, expected {}, one for each line", inner.lines.len())));
         }
@@ -163,14 +122,13 @@ impl LineTracker {
             tracker.update(inner, &values, motion.as_ref(), &mut out)?;
             Ok((frame, out))
         })?;
-        Ok(TrackedLines { frame, tracked, lines: lines.clone().unbind() })
+        let track = tracked.iter().map(|line| line.track as i64).collect();
+        let frames_back = tracked.iter().map(|line| i64::from(line.frames_back)).collect();
+        Ok(TrackedLines { frame, track, frames_back, lines: lines.get().clone() })
     }
 
     fn __repr__(&self, py: Python<'_>) -> PyResult<String> {
-        let options = self.options(py)?;
-        let words: Vec<String> =
-            options.iter().map(|(key, value)| Ok(format!("{key}={}", value.repr()?))).collect::<PyResult<_>>()?;
-        Ok(format!("LineTracker({})", words.join(", ")))
+        Ok(format!("LineTracker({})", options::shown(py, self.lock().options())?))
     }
 
     fn __eq__(&self, other: &Bound<'_, PyAny>) -> bool {

@@ -1,17 +1,19 @@
 //! `simulate_drive`: drives past vertical lines with known truth, and the bound that no estimator can beat on them.
 
 use nalgebra::{Matrix3, Vector3};
-use numpy::PyArray2;
 use pyo3::prelude::*;
+use pyo3::types::PyDict;
 use tiltvp_core::Error;
-use tiltvp_core::selfcalib::{self as core, Mounting, SelfCalibratorOptions};
+use tiltvp_core::selfcalib::{self as core, SelfCalibratorOptions};
 use tiltvp_synth::{BearingDrive, BearingDriveKind, BearingDriveOptions};
 
-use super::matrices::matrix3;
-use crate::call::{call, invalid};
+use crate::array::Array;
+use crate::call::{call, exception, invalid};
 use crate::convert;
+use crate::options;
+use crate::value::frozen;
 
-/// A simulated drive, and the truth behind it.
+/// A simulated drive past vertical lines, and the truth behind it.
 #[pyclass(frozen, module = "tiltvp._core")]
 pub(crate) struct SimulatedDrive {
     options: BearingDriveOptions,
@@ -22,14 +24,14 @@ pub(crate) struct SimulatedDrive {
 impl SimulatedDrive {
     /// Fresh (N, 2) float64: displacements of the left and the right wheel in each step, metres.
     #[getter]
-    fn odometry<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+    fn odometry<'py>(&self, py: Python<'py>) -> PyResult<Array<'py, f64>> {
         let rows: Vec<[f64; 2]> = self.drive.readings.iter().map(|m| [m.left_m, m.right_m]).collect();
         convert::to_rows(py, &rows, false)
     }
 
     /// Fresh (M, 3) float64: step, landmark and bearing in radians of every bearing.
     #[getter]
-    fn bearings<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+    fn bearings<'py>(&self, py: Python<'py>) -> PyResult<Array<'py, f64>> {
         let mut rows = Vec::new();
         for (step, seen) in self.drive.bearings_rad.iter().enumerate() {
             rows.extend(seen.iter().enumerate().map(|(landmark, bearing)| [step as f64, landmark as f64, *bearing]));
@@ -39,25 +41,39 @@ impl SimulatedDrive {
 
     /// Fresh (N, 3) float64: the true pose (x_m, y_m, heading_rad) after each step, from (0, 0, 0).
     #[getter]
-    fn poses<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+    fn poses<'py>(&self, py: Python<'py>) -> PyResult<Array<'py, f64>> {
         let rows: Vec<[f64; 3]> = self.drive.poses.iter().map(|pose| (*pose).into()).collect();
         convert::to_rows(py, &rows, false)
     }
 
     /// Fresh (L, 2) float64: where the lines are, metres.
     #[getter]
-    fn landmarks_m<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+    fn landmarks_m<'py>(&self, py: Python<'py>) -> PyResult<Array<'py, f64>> {
         let rows: Vec<[f64; 2]> = self.drive.landmarks_m.iter().map(|place| (*place).into()).collect();
         convert::to_rows(py, &rows, false)
     }
 
+    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, (&'static str,))> {
+        let (o, keywords) = (&self.options, PyDict::new(py));
+        keywords.set_item("seed", o.seed)?;
+        keywords.set_item("mounting", [o.mounting.x_m, o.mounting.y_m, o.mounting.yaw_rad])?;
+        keywords.set_item("landmarks", o.landmarks)?;
+        keywords.set_item("bearing_sigma_rad", o.bearing_sigma_rad)?;
+        keywords.set_item("odometry_k_m", o.odometry_k_m)?;
+        keywords.set_item("wheel_base_m", o.wheel_base_m)?;
+        keywords.set_item("outliers", o.outliers)?;
+        let make = py.import("tiltvp._core")?.getattr("simulate_drive")?;
+        Ok((py.import("functools")?.getattr("partial")?.call((make,), Some(&keywords))?, (o.kind.name(),)))
+    }
+
+    fn __repr__(&self) -> String {
+        let (o, steps) = (&self.options, self.drive.readings.len());
+        format!("SimulatedDrive({:?}, seed={}, {steps} steps, {} landmarks)", o.kind.name(), o.seed, o.landmarks)
+    }
+
     /// (3, 3): the smallest covariance of (x, y, yaw) that an unbiased estimator can have on this drive.
-    #[pyo3(signature = (*, start_sigma))]
-    fn cramer_rao_bound<'py>(
-        &self,
-        py: Python<'py>,
-        start_sigma: &Bound<'_, PyAny>,
-    ) -> PyResult<Bound<'py, PyArray2<f64>>> {
+    #[pyo3(signature = (*, start_sigma: "ArrayLike"))]
+    fn cramer_rao_bound<'py>(&self, py: Python<'py>, start_sigma: &Bound<'_, PyAny>) -> PyResult<Array<'py, f64>> {
         let sigma: Vector3<f64> = convert::vector3(start_sigma, "start_sigma")?;
         let o = self.options;
         let options = SelfCalibratorOptions {
@@ -73,66 +89,40 @@ impl SimulatedDrive {
             let drive = &self.drive;
             core::cramer_rao_bound(&options, &o.mounting, &drive.readings, &drive.poses, &drive.landmarks_m, &sights)
         })?;
-        matrix3(py, &bound)
+        convert::to_matrix(py, &bound)
     }
 }
 
-/// Draws a drive past vertical lines.
+frozen!(SimulatedDrive, |own| own.options, |own| (own.options.kind.name(), own.options.seed));
+
+/// A drive past 10 vertical lines: "paper" (2.3 m straight on, half a turn), "alternating" or "straight".
+///
+/// `mounting` is (x_m, y_m, yaw_rad), None: the paper's phi = -0.34, rho = 0.23, psi = 0.33. The noise is that of the
+/// defaults of `SelfCalibrator`, wheels are 0.4 m apart, `outliers` is the share of bearings that are of nothing.
 #[pyfunction]
-#[pyo3(signature = (
-    kind="paper", *, seed=0, mounting=None, landmarks=None, bearing_sigma_rad=None, odometry_k_m=None,
-    wheel_base_m=None, outliers=None
-))]
-#[expect(clippy::too_many_arguments, reason = "keywords of the user")]
+#[pyo3(signature = (kind="paper", **options: "Option | None"))]
 pub(crate) fn simulate_drive(
     py: Python<'_>,
     kind: &str,
-    seed: u64,
-    mounting: Option<&Bound<'_, PyAny>>,
-    landmarks: Option<usize>,
-    bearing_sigma_rad: Option<f64>,
-    odometry_k_m: Option<f64>,
-    wheel_base_m: Option<f64>,
-    outliers: Option<f64>,
+    options: Option<&Bound<'_, PyDict>>,
 ) -> PyResult<SimulatedDrive> {
-    let kind = kind_from(kind)?;
-    let mut options = BearingDriveOptions { kind, seed, ..BearingDriveOptions::default() };
-    if let Some(mounting) = mounting {
-        let v = convert::vector3(mounting, "mounting")?;
-        options.mounting = Mounting { x_m: v.x, y_m: v.y, yaw_rad: v.z };
-    }
-    options.landmarks = landmarks.unwrap_or(options.landmarks).min(1000);
-    for (name, value, field) in [
-        ("bearing_sigma_rad", bearing_sigma_rad, &mut options.bearing_sigma_rad),
-        ("odometry_k_m", odometry_k_m, &mut options.odometry_k_m),
-        ("wheel_base_m", wheel_base_m, &mut options.wheel_base_m),
-        ("outliers", outliers, &mut options.outliers),
-    ] {
-        if let Some(value) = value {
-            if !(value >= 0.0 && value.is_finite()) {
-                return Err(invalid(format!("{name} = {value}, expected a finite number of zero or more")));
-            }
-            *field = value;
-        }
-    }
-    if options.wheel_base_m == 0.0 {
-        return Err(invalid("wheel_base_m = 0, expected a positive number of metres".to_owned()));
-    }
+    let mut parsed = BearingDriveOptions { kind: kind_from(kind)?, ..BearingDriveOptions::default() };
+    options::set_given(&mut parsed, options)?;
+    parsed.validate().map_err(|error| exception(&error))?;
+    let options = parsed;
     let drive = call(py, || Ok::<_, Error>(BearingDrive::new(&options)))?;
     Ok(SimulatedDrive { options, drive })
 }
 
-/// (L, 2): distance in metres and turn in radians of the legs of a trajectory.
+/// (L, 2): distance in metres and turn in radians of the legs of a trajectory of `simulate_drive`.
 #[pyfunction]
 #[pyo3(signature = (kind="paper"))]
-pub(crate) fn drive_legs<'py>(py: Python<'py>, kind: &str) -> PyResult<Bound<'py, PyAny>> {
+pub(crate) fn drive_legs<'py>(py: Python<'py>, kind: &str) -> PyResult<Array<'py, f64>> {
     let rows: Vec<[f64; 2]> = kind_from(kind)?.legs().into_iter().map(Into::into).collect();
     convert::to_rows(py, &rows, false)
 }
 
 fn kind_from(name: &str) -> PyResult<BearingDriveKind> {
-    BearingDriveKind::ALL.into_iter().find(|known| known.name() == name).ok_or_else(|| {
-        let known = BearingDriveKind::ALL.map(BearingDriveKind::name).join(", ");
-        invalid(format!("kind = {name:?}, expected one of {known}"))
-    })
+    BearingDriveKind::from_name(name)
+        .ok_or_else(|| invalid(format!("kind = {name:?}, expected one of {}", BearingDriveKind::NAMES.join(", "))))
 }

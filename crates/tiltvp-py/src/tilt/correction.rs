@@ -2,32 +2,36 @@
 
 use numpy::PyArray1;
 use pyo3::prelude::*;
-use pyo3::types::{PyDict, PyTuple, PyType};
+use pyo3::types::PyTuple;
 use tiltvp_core::tilt::{self as core, ShiftModel, TrainedCorrection};
 
-use super::values;
 use crate::call::{call, exception, invalid};
 use crate::convert;
+use crate::value::{frozen, value};
 
-/// A correction from a number or one of the classes here; `words` are what else the place takes.
-pub(super) fn parse(value: &Bound<'_, PyAny>, name: &str, words: &str) -> PyResult<TrainedCorrection> {
+/// A correction from a number or one of the classes here.
+pub(super) fn parse(value: &Bound<'_, PyAny>, name: &str) -> PyResult<TrainedCorrection> {
+    if let Some(trained) = object(value) {
+        return Ok(trained);
+    }
+    let shown = || value.repr().map_or_else(|_| String::new(), |r| r.to_string());
+    value.extract::<f64>().map(TrainedCorrection::Factor).map_err(|_| {
+        let expected = "a number (a factor), an AffineCorrection or a PosteriorCorrection";
+        invalid(format!("{name} = {}, expected {expected}", shown()))
+    })
+}
+
+/// A correction from one of the classes here.
+pub(crate) fn object(value: &Bound<'_, PyAny>) -> Option<TrainedCorrection> {
     if let Ok(affine) = value.cast::<AffineCorrection>() {
-        return Ok(TrainedCorrection::Affine(affine.get().inner));
+        return Some(TrainedCorrection::Affine(affine.get().inner));
     }
-    if let Ok(posterior) = value.cast::<PosteriorCorrection>() {
-        return Ok(TrainedCorrection::Posterior(posterior.get().inner.clone()));
-    }
-    if let Ok(factor) = value.extract::<f64>() {
-        return Ok(TrainedCorrection::Factor(factor));
-    }
-    let shown = value.repr().map_or_else(|_| String::new(), |r| r.to_string());
-    Err(invalid(format!(
-        "{name} = {shown}, expected {words}a number (a factor), an AffineCorrection or a PosteriorCorrection"
-    )))
+    let posterior = value.cast::<PosteriorCorrection>().ok()?;
+    Some(TrainedCorrection::Posterior(posterior.get().inner.clone()))
 }
 
 /// What [`parse`] makes a correction from.
-pub(super) fn show(py: Python<'_>, correction: &TrainedCorrection) -> PyResult<Py<PyAny>> {
+pub(crate) fn show(py: Python<'_>, correction: &TrainedCorrection) -> PyResult<Py<PyAny>> {
     Ok(match correction {
         TrainedCorrection::Factor(factor) => factor.into_pyobject(py)?.into_any().unbind(),
         TrainedCorrection::Affine(affine) => Py::new(py, AffineCorrection { inner: *affine })?.into_any(),
@@ -37,11 +41,18 @@ pub(super) fn show(py: Python<'_>, correction: &TrainedCorrection) -> PyResult<P
     })
 }
 
-/// alpha = shift / factor + offset_rad, but not below zero.
-#[pyclass(frozen, module = "tiltvp._core")]
-#[derive(Clone)]
-pub(crate) struct AffineCorrection {
-    inner: core::AffineCorrection,
+value! {
+    /// alpha = shift / factor + offset_rad, but not below zero. Frozen, comparable, hashable, pickled.
+    ///
+    /// Raises `tiltvp.errors.InvalidInputError` unless the factor is positive and both are finite.
+    AffineCorrection(core::AffineCorrection as own) {
+        /// Units of the shift per radian: pixels per radian, or none for raw angles.
+        factor: f64,
+        /// What is added, in radians.
+        offset_rad: f64,
+    }
+    make Self::new(factor, offset_rad)?.inner;
+    repr format!("AffineCorrection({:?}, {:?})", own.factor, own.offset_rad);
 }
 
 #[pymethods]
@@ -52,83 +63,43 @@ impl AffineCorrection {
         inner.validate().map_err(|error| exception(&error))?;
         Ok(Self { inner })
     }
-
-    /// Units of the shift per radian: pixels per radian, or none for raw angles.
-    #[getter]
-    fn factor(&self) -> f64 {
-        self.inner.factor
-    }
-
-    /// What is added, in radians.
-    #[getter]
-    fn offset_rad(&self) -> f64 {
-        self.inner.offset_rad
-    }
-
-    /// The attributes by name.
-    fn to_dict<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        let dict = PyDict::new(py);
-        dict.set_item("factor", self.inner.factor)?;
-        dict.set_item("offset_rad", self.inner.offset_rad)?;
-        Ok(dict)
-    }
-
-    /// The correction of a dict as `to_dict` makes it.
-    #[classmethod]
-    fn from_dict(_cls: &Bound<'_, PyType>, values: &Bound<'_, PyAny>) -> PyResult<Self> {
-        let values = values::dict(values, &["factor", "offset_rad"])?;
-        Self::new(convert::item(values, "factor", "a number")?, convert::item(values, "offset_rad", "a number")?)
-    }
-
-    fn __repr__(&self) -> String {
-        format!("AffineCorrection({:?}, {:?})", self.inner.factor, self.inner.offset_rad)
-    }
-
-    fn __eq__(&self, other: &Bound<'_, PyAny>) -> bool {
-        other.cast::<Self>().is_ok_and(|other| self.inner == other.get().inner)
-    }
-
-    fn __hash__(&self, py: Python<'_>) -> PyResult<isize> {
-        (self.inner.factor, self.inner.offset_rad).into_pyobject(py)?.hash()
-    }
-
-    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyTuple>> {
-        let inner = slf.get().inner;
-        (slf.get_type(), (inner.factor, inner.offset_rad)).into_pyobject(slf.py())
-    }
-
-    fn __copy__<'py>(slf: &Bound<'py, Self>) -> Bound<'py, Self> {
-        slf.clone()
-    }
-
-    fn __deepcopy__<'py>(slf: &Bound<'py, Self>, _memo: &Bound<'py, PyAny>) -> Bound<'py, Self> {
-        slf.clone()
-    }
 }
 
-/// Keys of the dict of a `PosteriorCorrection`.
-const KEYS: [&str; 8] =
-    ["factor", "spread", "spread_per_rad", "stray_share", "stray_max", "step", "mean_rad", "std_rad"];
-
-/// The mean and deviation of the lean over a grid of shifts, and the model of shifts that they were made with.
-#[pyclass(frozen, module = "tiltvp._core")]
-#[derive(Clone)]
-pub(crate) struct PosteriorCorrection {
-    inner: core::PosteriorCorrection,
-}
-
-impl PosteriorCorrection {
-    fn numbers(&self) -> [(&'static str, f64); 6] {
-        let ShiftModel { factor, spread, spread_per_rad, stray_share, stray_max } = *self.inner.model();
-        let [a, b, c, d, e, f, ..] = KEYS;
-        [(a, factor), (b, spread), (c, spread_per_rad), (d, stray_share), (e, stray_max), (f, self.inner.step())]
+value! {
+    /// The mean and deviation of P(alpha | l) over a grid of shifts from zero, and the model of shifts behind it.
+    ///
+    /// `train_posterior` makes them. Applying one is one interpolation; shifts beyond the grid have the answer of its
+    /// end. Frozen, comparable, hashable, pickled.
+    PosteriorCorrection(core::PosteriorCorrection as own) {
+        /// Units of the shift per radian, by and large.
+        factor: f64 = own.model().factor,
+        /// Standard deviation of the error of the upright robot's shift in each direction, in units of the shift.
+        spread: f64 = own.model().spread,
+        /// How it grows with the lean, in units of the shift per radian.
+        spread_per_rad: f64 = own.model().spread_per_rad,
+        /// Share of shifts that have nothing to do with the lean.
+        stray_share: f64 = own.model().stray_share,
+        /// Largest of these, in units of the shift.
+        stray_max: f64 = own.model().stray_max,
+        /// Distance between the shifts of the table, which begins at zero.
+        step: f64 = own.step(),
+        /// Fresh (N,) float64: the mean lean in radians at each shift of the table.
+        mean_rad: Vec<f64> = own.mean_rad().to_vec(),
+        /// Fresh (N,) float64: the standard deviation of the lean in radians at each shift of the table.
+        std_rad: Vec<f64> = own.std_rad().to_vec(),
     }
+    make {
+        let model = ShiftModel { factor, spread, spread_per_rad, stray_share, stray_max };
+        core::PosteriorCorrection::new(model, step, &mean_rad, &std_rad).map_err(|error| exception(&error))?
+    };
 }
 
 #[pymethods]
 impl PosteriorCorrection {
     #[new]
-    #[pyo3(signature = (*, factor, spread, spread_per_rad, stray_share, stray_max, step, mean_rad, std_rad))]
+    #[pyo3(signature = (
+        *, factor, spread, spread_per_rad, stray_share, stray_max, step, mean_rad: "ArrayLike", std_rad: "ArrayLike",
+    ))]
     #[expect(clippy::too_many_arguments, reason = "keywords of a value's parts")]
     fn new(
         factor: f64,
@@ -145,115 +116,10 @@ impl PosteriorCorrection {
         let inner = core::PosteriorCorrection::new(model, step, &mean, &std).map_err(|error| exception(&error))?;
         Ok(Self { inner })
     }
-
-    /// Units of the shift per radian, by and large.
-    #[getter]
-    fn factor(&self) -> f64 {
-        self.inner.model().factor
-    }
-
-    /// Standard deviation of the error of the upright robot's shift in each direction, in units of the shift.
-    #[getter]
-    fn spread(&self) -> f64 {
-        self.inner.model().spread
-    }
-
-    /// How it grows with the lean, in units of the shift per radian.
-    #[getter]
-    fn spread_per_rad(&self) -> f64 {
-        self.inner.model().spread_per_rad
-    }
-
-    /// Share of shifts that have nothing to do with the lean.
-    #[getter]
-    fn stray_share(&self) -> f64 {
-        self.inner.model().stray_share
-    }
-
-    /// Largest of these, in units of the shift.
-    #[getter]
-    fn stray_max(&self) -> f64 {
-        self.inner.model().stray_max
-    }
-
-    /// Distance between the shifts of the table, which begins at zero.
-    #[getter]
-    fn step(&self) -> f64 {
-        self.inner.step()
-    }
-
-    /// Fresh (N,) float64: the mean lean in radians at each shift of the table.
-    #[getter]
-    fn mean_rad<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
-        PyArray1::from_slice(py, self.inner.mean_rad())
-    }
-
-    /// Fresh (N,) float64: the standard deviation of the lean in radians at each shift of the table.
-    #[getter]
-    fn std_rad<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
-        PyArray1::from_slice(py, self.inner.std_rad())
-    }
-
-    /// The attributes by name, arrays as lists.
-    fn to_dict<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        let dict = PyDict::new(py);
-        for (key, number) in self.numbers() {
-            dict.set_item(key, number)?;
-        }
-        dict.set_item("mean_rad", self.inner.mean_rad())?;
-        dict.set_item("std_rad", self.inner.std_rad())?;
-        Ok(dict)
-    }
-
-    /// The correction of a dict as `to_dict` makes it.
-    #[classmethod]
-    fn from_dict(_cls: &Bound<'_, PyType>, values: &Bound<'_, PyAny>) -> PyResult<Self> {
-        let values = values::dict(values, &KEYS)?;
-        let number = |key| convert::item(values, key, "a number");
-        Self::new(
-            number("factor")?,
-            number("spread")?,
-            number("spread_per_rad")?,
-            number("stray_share")?,
-            number("stray_max")?,
-            number("step")?,
-            &convert::raw_item(values, "mean_rad")?,
-            &convert::raw_item(values, "std_rad")?,
-        )
-    }
-
-    fn __repr__(&self) -> String {
-        let ShiftModel { factor, spread, spread_per_rad, stray_share, .. } = *self.inner.model();
-        format!(
-            "PosteriorCorrection(factor={factor:.4}, spread={spread:.4}, spread_per_rad={spread_per_rad:.4}, \
-             stray_share={stray_share:.4}, {} shifts in steps of {:.4})",
-            self.inner.mean_rad().len(),
-            self.inner.step()
-        )
-    }
-
-    fn __eq__(&self, other: &Bound<'_, PyAny>) -> bool {
-        other.cast::<Self>().is_ok_and(|other| self.inner == other.get().inner)
-    }
-
-    fn __hash__(&self, py: Python<'_>) -> PyResult<isize> {
-        self.numbers().map(|(_, number)| number).to_vec().into_pyobject(py)?.repr()?.hash()
-    }
-
-    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyTuple>> {
-        (slf.get_type().getattr("from_dict")?, (slf.get().to_dict(slf.py())?,)).into_pyobject(slf.py())
-    }
-
-    fn __copy__<'py>(slf: &Bound<'py, Self>) -> Bound<'py, Self> {
-        slf.clone()
-    }
-
-    fn __deepcopy__<'py>(slf: &Bound<'py, Self>, _memo: &Bound<'py, PyAny>) -> Bound<'py, Self> {
-        slf.clone()
-    }
 }
 
 /// How leans are distributed where the robot goes: one of `empirical()`, `uniform(max_rad)`, `rayleigh(sigma_rad)`.
+/// Frozen, comparable, hashable, pickled.
 #[pyclass(frozen, module = "tiltvp._core")]
 #[derive(Clone)]
 pub(crate) struct PriorOfTilt {
@@ -284,7 +150,7 @@ impl PriorOfTilt {
         Self { inner: core::PriorOfTilt::Empirical }
     }
 
-    /// Every lean up to `max_rad` is as likely.
+    /// Every lean up to `max_rad`, in (0, pi/2), is as likely.
     #[staticmethod]
     fn uniform(max_rad: f64) -> PyResult<Self> {
         Self::checked(core::PriorOfTilt::Uniform { max_rad })
@@ -302,42 +168,36 @@ impl PriorOfTilt {
         format!("PriorOfTilt.{name}({})", shown.join(", "))
     }
 
-    fn __eq__(&self, other: &Bound<'_, PyAny>) -> bool {
-        other.cast::<Self>().is_ok_and(|other| self.inner == other.get().inner)
-    }
-
-    fn __hash__(&self, py: Python<'_>) -> PyResult<isize> {
-        self.__repr__().into_pyobject(py)?.hash()
-    }
-
-    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyTuple>> {
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyTuple>)> {
         let (name, arguments) = slf.get().parts();
-        (slf.get_type().getattr(name)?, PyTuple::new(slf.py(), arguments)?).into_pyobject(slf.py())
-    }
-
-    fn __copy__<'py>(slf: &Bound<'py, Self>) -> Bound<'py, Self> {
-        slf.clone()
-    }
-
-    fn __deepcopy__<'py>(slf: &Bound<'py, Self>, _memo: &Bound<'py, PyAny>) -> Bound<'py, Self> {
-        slf.clone()
+        Ok((slf.get_type().getattr(name)?, PyTuple::new(slf.py(), arguments)?))
     }
 }
+
+frozen!(PriorOfTilt, |own| own.parts(), |own| own.__repr__());
 
 /// A training set from two arrays.
 fn training(shift: &Bound<'_, PyAny>, alpha_rad: &Bound<'_, PyAny>) -> PyResult<(Vec<f64>, Vec<f64>)> {
     Ok((convert::vector(shift, "shift")?, convert::vector(alpha_rad, "alpha_rad")?))
 }
 
-/// The factor of eq. 31, the mean of shift / alpha.
+/// The factor of eq. 31: the mean of shift / alpha over images of known leans (N,) above zero.
+///
+/// `shift` (N,) is `shift_px` of an image-space method, or `alpha_rad` of an uncorrected "vector-consensus". Leave out
+/// images without an estimate. Raises `tiltvp.errors.InvalidInputError` for numbers that make no sense.
 #[pyfunction]
+#[pyo3(signature = (shift: "ArrayLike", alpha_rad: "ArrayLike"))]
 pub(crate) fn train_factor(py: Python<'_>, shift: &Bound<'_, PyAny>, alpha_rad: &Bound<'_, PyAny>) -> PyResult<f64> {
     let (shift, alpha) = training(shift, alpha_rad)?;
     call(py, || core::train_factor(&shift, &alpha))
 }
 
-/// The line alpha = shift / factor + offset by least squares of the shift.
+/// The line alpha = shift / factor + offset through images of known leans (N,), by least squares of the shift.
+///
+/// The truth is known and the shift errs, and the line does not depend on how many images there are of each lean.
+/// Raises `tiltvp.errors.InvalidInputError` for fewer than two different leans or shifts that do not grow with them.
 #[pyfunction]
+#[pyo3(signature = (shift: "ArrayLike", alpha_rad: "ArrayLike"))]
 pub(crate) fn train_affine(
     py: Python<'_>,
     shift: &Bound<'_, PyAny>,
@@ -347,9 +207,13 @@ pub(crate) fn train_affine(
     Ok(AffineCorrection { inner: call(py, || core::train_affine(&shift, &alpha))? })
 }
 
-/// The posterior of the lean given the shift.
+/// P(alpha | l) from images of known leans (N,), at least ten, under a prior; None: `PriorOfTilt.empirical()`.
+///
+/// The shift is modelled as the length of a plane vector of mean length factor * alpha with normal errors that grow
+/// with the lean (a Rice distribution), a share of which strays; the model is fitted by maximum likelihood. Raises
+/// `tiltvp.errors.InvalidInputError` for numbers that make no sense or shifts that do not grow with the lean.
 #[pyfunction]
-#[pyo3(signature = (shift, alpha_rad, *, prior=None))]
+#[pyo3(signature = (shift: "ArrayLike", alpha_rad: "ArrayLike", *, prior: "PriorOfTilt | None" = None))]
 pub(crate) fn train_posterior(
     py: Python<'_>,
     shift: &Bound<'_, PyAny>,
@@ -367,14 +231,19 @@ pub(crate) fn train_posterior(
     Ok(PosteriorCorrection { inner: call(py, || core::train_posterior(&shift, &alpha, prior))? })
 }
 
-/// Fresh (N,) float64: the leans of shifts (or raw angles) of zero or more; NaN for NaN.
+/// (N,): the leans in radians of shifts or raw angles (N,) of zero or more, as an estimator so corrected has them.
+///
+/// NaN stays NaN. A number is a factor by which the shift is divided.
 #[pyfunction]
+#[pyo3(signature = (
+    correction: "float | AffineCorrection | PosteriorCorrection", shift: "ArrayLike",
+) -> "NDArray[np.float64]")]
 pub(crate) fn apply_correction<'py>(
     py: Python<'py>,
     correction: &Bound<'py, PyAny>,
     shift: &Bound<'py, PyAny>,
 ) -> PyResult<Bound<'py, PyArray1<f64>>> {
-    let correction = parse(correction, "correction", "")?;
+    let correction = parse(correction, "correction")?;
     correction.validate().map_err(|error| exception(&error))?;
     let mut values = convert::vector(shift, "shift")?;
     if let Some(i) = values.iter().position(|l| *l < 0.0) {

@@ -6,18 +6,25 @@ use nalgebra::{Matrix2, Matrix6, Vector2, Vector3};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyTuple};
 use tiltvp_core::geometry::Tilt;
-use tiltvp_core::tilt::{self as core, MountingOptions, TiltFilterOptions, TiltFilterState, Verdict};
+use tiltvp_core::tilt::{self as core, TiltFilterOptions, TiltFilterState, Verdict};
 
 use super::estimate::TiltEstimate;
-use super::filtered::{FilterStep, FilteredTilt, matrix2, nested};
+use super::filtered::{FilterStep, FilteredTilt};
 use crate::call::{call, exception, invalid};
 use crate::convert;
+use crate::options;
 
 /// Keys of the dict of a state, by the way of pickle.
 const STATE_KEYS: [&str; 9] =
     ["floor", "mounting", "scene", "covariance", "common", "driven_m", "pending", "agreeing", "rejected"];
 
-/// Fuses the tilts of successive images.
+/// Fuses the tilts of successive images: a Kalman filter of the ground normal on the sphere.
+///
+/// The floor's tilt turns with the robot's heading and walks slowly; errors that images of one place share are not
+/// averaged away; estimates that say nothing or do not fit are left out, steps are followed. Changes as it goes; may be
+/// pickled, copied and compared, state included, and used from several threads. See docs/tilt.md for the model.
+///
+/// Raises `tiltvp.errors.InvalidInputError` for options out of their domain.
 #[pyclass(frozen, module = "tiltvp._core")]
 pub(crate) struct TiltFilter {
     inner: Mutex<core::TiltFilter>,
@@ -36,88 +43,22 @@ impl TiltFilter {
 #[pymethods]
 impl TiltFilter {
     #[new]
-    #[pyo3(signature = (
-        *, walk_rad_per_sqrt_m=None, walk_rad_per_sqrt_step=None, gate_probability=None, confidence_min=None,
-        jump_after=None, lost_after=None, correlated_share=None, correlation_m=None, noise_floor_rad=None, prior_rad=None,
-        sigma_max_rad=None, estimate_mounting=false, mounting_prior_rad=None, mounting_walk_rad_per_sqrt_m=None
-    ))]
-    #[expect(clippy::too_many_arguments, reason = "keywords of the user")]
-    fn new(
-        walk_rad_per_sqrt_m: Option<&Bound<'_, PyAny>>,
-        walk_rad_per_sqrt_step: Option<&Bound<'_, PyAny>>,
-        gate_probability: Option<&Bound<'_, PyAny>>,
-        confidence_min: Option<&Bound<'_, PyAny>>,
-        jump_after: Option<&Bound<'_, PyAny>>,
-        lost_after: Option<&Bound<'_, PyAny>>,
-        correlated_share: Option<&Bound<'_, PyAny>>,
-        correlation_m: Option<&Bound<'_, PyAny>>,
-        noise_floor_rad: Option<&Bound<'_, PyAny>>,
-        prior_rad: Option<&Bound<'_, PyAny>>,
-        sigma_max_rad: Option<&Bound<'_, PyAny>>,
-        estimate_mounting: bool,
-        mounting_prior_rad: Option<&Bound<'_, PyAny>>,
-        mounting_walk_rad_per_sqrt_m: Option<&Bound<'_, PyAny>>,
-    ) -> PyResult<Self> {
-        let mut options = TiltFilterOptions::default();
-        let mut mounting = MountingOptions::default();
-        for (name, given, field) in [
-            ("walk_rad_per_sqrt_m", walk_rad_per_sqrt_m, &mut options.walk_rad_per_sqrt_m),
-            ("walk_rad_per_sqrt_step", walk_rad_per_sqrt_step, &mut options.walk_rad_per_sqrt_step),
-            ("gate_probability", gate_probability, &mut options.gate_probability),
-            ("confidence_min", confidence_min, &mut options.confidence_min),
-            ("correlated_share", correlated_share, &mut options.correlated_share),
-            ("correlation_m", correlation_m, &mut options.correlation_m),
-            ("noise_floor_rad", noise_floor_rad, &mut options.noise_floor_rad),
-            ("prior_rad", prior_rad, &mut options.prior_rad),
-            ("sigma_max_rad", sigma_max_rad, &mut options.sigma_max_rad),
-            ("mounting_prior_rad", mounting_prior_rad, &mut mounting.prior_rad),
-            ("mounting_walk_rad_per_sqrt_m", mounting_walk_rad_per_sqrt_m, &mut mounting.walk_rad_per_sqrt_m),
-        ] {
-            if let Some(value) = given {
-                if name.starts_with("mounting") && !estimate_mounting {
-                    return Err(invalid(format!("option {name}: given without estimate_mounting=True, expected both")));
-                }
-                *field = number(value, name)?;
-            }
-        }
-        for (name, given, field) in
-            [("jump_after", jump_after, &mut options.jump_after), ("lost_after", lost_after, &mut options.lost_after)]
-        {
-            if let Some(value) = given {
-                *field = convert::whole(value, &format!("option {name}"), "a whole number from 1")?;
-            }
-        }
-        options.mounting = estimate_mounting.then_some(mounting);
-        let inner = core::TiltFilter::new(options).map_err(|error| exception(&error))?;
+    #[pyo3(signature = (**options: "Option | None"))]
+    fn new(options: Option<&Bound<'_, PyDict>>) -> PyResult<Self> {
+        let mut parsed = TiltFilterOptions::default();
+        options::set_given(&mut parsed, options)?;
+        let inner = core::TiltFilter::new(parsed).map_err(|error| exception(&error))?;
         Ok(Self { inner: Mutex::new(inner) })
     }
 
     /// The options in force, by name, defaults included; a fresh dict, good as keywords.
     #[getter]
     fn options<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        let o = *self.lock().options();
-        let dict = PyDict::new(py);
-        dict.set_item("walk_rad_per_sqrt_m", o.walk_rad_per_sqrt_m)?;
-        dict.set_item("walk_rad_per_sqrt_step", o.walk_rad_per_sqrt_step)?;
-        dict.set_item("gate_probability", o.gate_probability)?;
-        dict.set_item("confidence_min", o.confidence_min)?;
-        dict.set_item("jump_after", o.jump_after)?;
-        dict.set_item("lost_after", o.lost_after)?;
-        dict.set_item("correlated_share", o.correlated_share)?;
-        dict.set_item("correlation_m", o.correlation_m)?;
-        dict.set_item("noise_floor_rad", o.noise_floor_rad)?;
-        dict.set_item("prior_rad", o.prior_rad)?;
-        dict.set_item("sigma_max_rad", o.sigma_max_rad)?;
-        dict.set_item("estimate_mounting", o.mounting.is_some())?;
-        if let Some(mounting) = o.mounting {
-            dict.set_item("mounting_prior_rad", mounting.prior_rad)?;
-            dict.set_item("mounting_walk_rad_per_sqrt_m", mounting.walk_rad_per_sqrt_m)?;
-        }
-        Ok(dict)
+        options::in_force(py, self.lock().options())
     }
 
-    /// The robot has turned and driven since the last call.
-    #[pyo3(signature = (yaw_rad=None, distance_m=None))]
+    /// The robot has turned (left positive) and driven (either way) since the last call; None: it has not.
+    #[pyo3(signature = (yaw_rad: "float | None" = None, distance_m: "float | None" = None))]
     fn predict(
         &self,
         py: Python<'_>,
@@ -129,14 +70,20 @@ impl TiltFilter {
     }
 
     /// Fuses an estimate, or says why not.
-    #[pyo3(signature = (estimate, /))]
+    ///
+    /// In its place a pair may stand: a ground normal (3,) of any length, and its covariance (2, 2) in squared radians
+    /// in the tangent plane. Its confidence is the probability of an error below two degrees under that covariance.
+    #[pyo3(signature = (estimate: "TiltEstimate | tuple[ArrayLike, ArrayLike]", /))]
     fn update(&self, py: Python<'_>, estimate: &Bound<'_, PyAny>) -> PyResult<FilterStep> {
         let measured = measurement(estimate)?;
         call(py, || fuse(&mut self.lock(), &measured)).map(FilterStep::from)
     }
 
-    /// `predict`, then `update`; the filter is as before if either is refused.
-    #[pyo3(signature = (estimate, /, yaw_rad=None, distance_m=None))]
+    /// `predict`, then `update`; where either is refused, the filter is as before.
+    #[pyo3(signature = (
+        estimate: "TiltEstimate | tuple[ArrayLike, ArrayLike]", /, yaw_rad: "float | None" = None,
+        distance_m: "float | None" = None,
+    ))]
     fn step(
         &self,
         py: Python<'_>,
@@ -181,7 +128,7 @@ impl TiltFilter {
         self.lock().nis_limit()
     }
 
-    /// How many estimates in a row the gate has rejected.
+    /// How many estimates in a row the gate has rejected: above 0, the estimate may be about to jump.
     #[getter]
     fn rejected(&self) -> u32 {
         self.lock().state().rejected
@@ -193,12 +140,7 @@ impl TiltFilter {
     }
 
     fn __repr__(&self, py: Python<'_>) -> PyResult<String> {
-        let words: Vec<String> = self
-            .options(py)?
-            .iter()
-            .map(|(key, value)| Ok(format!("{key}={}", value.repr()?)))
-            .collect::<PyResult<_>>()?;
-        Ok(format!("TiltFilter({})", words.join(", ")))
+        Ok(format!("TiltFilter({})", options::shown(py, self.lock().options())?))
     }
 
     fn __eq__(&self, other: &Bound<'_, PyAny>) -> bool {
@@ -251,7 +193,7 @@ fn measurement(value: &Bound<'_, PyAny>) -> PyResult<Measurement> {
     };
     Ok(Measurement::Normal(
         convert::vector3(&pair.get_item(0)?, "normal")?,
-        matrix2(&pair.get_item(1)?, "covariance_rad2")?,
+        convert::matrix(&pair.get_item(1)?, "covariance_rad2")?,
     ))
 }
 
@@ -306,4 +248,9 @@ fn read_state(values: &Bound<'_, PyDict>) -> PyResult<TiltFilterState> {
         agreeing: convert::item(values, "agreeing", "a count")?,
         rejected: convert::item(values, "rejected", "a count")?,
     })
+}
+
+/// A matrix as nested rows.
+fn nested(m: &Matrix2<f64>) -> [[f64; 2]; 2] {
+    [[m[(0, 0)], m[(0, 1)]], [m[(1, 0)], m[(1, 1)]]]
 }

@@ -11,8 +11,11 @@ use tiltvp_core::tilt::{self as core, EdgeOrigin};
 use crate::call::exception;
 use crate::camera::Camera;
 use crate::convert;
+use crate::value::frozen;
 
-/// The edge pixels of one image and their gradients: every pixel of the band with a gradient of at least `gradient_min`.
+/// The edge pixels of one image and their gradients: every pixel of the band of at least `gradient_min`.
+///
+/// `TiltEstimator.detect` makes them, `TiltEstimator.estimate_edges` takes them. Frozen, comparable, to be pickled.
 #[pyclass(frozen, module = "tiltvp._core")]
 pub(crate) struct ImageEdges {
     inner: core::ImageEdges,
@@ -43,10 +46,6 @@ impl ImageEdges {
 
     fn __repr__(&self) -> String {
         format!("ImageEdges({} edge pixels, gradient_min={})", self.inner.len(), self.gradient_min())
-    }
-
-    fn __eq__(&self, other: &Bound<'_, PyAny>) -> bool {
-        other.cast::<Self>().is_ok_and(|other| self.inner == other.get().inner)
     }
 
     /// The value of its parts, for pickle.
@@ -91,12 +90,6 @@ impl ImageEdges {
         let parts = (this.camera.clone_ref(py), rotation, options, mask, slots, gradients);
         (slf.get_type().getattr("_from_parts")?, parts).into_pyobject(py)
     }
-
-    fn __copy__<'py>(slf: &Bound<'py, Self>) -> Bound<'py, Self> {
-        slf.clone()
-    }
-
-    fn __deepcopy__<'py>(slf: &Bound<'py, Self>, _memo: &Bound<'py, PyAny>) -> Bound<'py, Self> {
-        slf.clone()
-    }
 }
+
+frozen!(ImageEdges, |own| &own.inner, |own| own.inner.slots());

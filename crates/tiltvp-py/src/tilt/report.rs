@@ -1,28 +1,27 @@
 //! `FitReport`: how a robust fit went and why it stopped, as a frozen Python value.
 
-use pyo3::prelude::*;
-use pyo3::types::{PyDict, PyTuple, PyType};
 use tiltvp_core::robust::Stop;
 
-use super::values;
-use crate::convert;
+use crate::field::StopWord;
+use crate::value::value;
 
-/// How a robust fit went: the word and the sentence for why it stopped, its iterations and its residual.
-#[pyclass(frozen, module = "tiltvp._core")]
-#[derive(Clone)]
-pub(crate) struct FitReport {
-    /// Why the fit stopped, in a word.
-    #[pyo3(get)]
-    stop: String,
-    /// Why the fit stopped, in a sentence with the measured number and the limit.
-    #[pyo3(get)]
-    pub(super) reason: String,
-    /// Random samples drawn or refits done.
-    #[pyo3(get)]
-    iterations: u32,
-    /// Root mean square residual of the inliers: radians, or pixels of the image-space methods; NaN without a model.
-    #[pyo3(get)]
-    residual_rms: f64,
+value! {
+    /// How a robust fit went, and why it stopped. Frozen, comparable, hashable, and to be pickled.
+    FitReport as own {
+        /// Why the fit stopped, in a word.
+        ///
+        /// "confident": random sampling has drawn as many samples as its confidence needs; "trial-limit": it has drawn all
+        /// it may. "converged": the model has stopped changing; "settled": the residuals are small enough;
+        /// "iteration-limit": refitting has been repeated as often as it may. No answer comes of "too-few" observations,
+        /// "no-model" (they are all alike) and "out-of-reach" (an angle that the method cannot mean).
+        stop: StopWord,
+        /// The same in a sentence, with the measured number and the limit.
+        reason: String,
+        /// Random samples drawn or refits done.
+        iterations: u32,
+        /// Root mean square residual: radians, or pixels of the image-space methods; NaN without a model.
+        residual_rms: f64,
+    }
 }
 
 impl FitReport {
@@ -37,67 +36,6 @@ impl FitReport {
             Stop::NoModel { .. } => "no-model",
             Stop::OutOfReach { .. } => "out-of-reach",
         };
-        Self { stop: word.to_owned(), reason: stop.to_string(), iterations, residual_rms }
-    }
-
-    /// Reads what [`to_dict`](Self::to_dict) wrote; other keys are left alone.
-    pub(super) fn read(values: &Bound<'_, PyDict>) -> PyResult<Self> {
-        Ok(Self {
-            stop: convert::item(values, "stop", "text")?,
-            reason: convert::item(values, "reason", "text")?,
-            iterations: convert::item(values, "iterations", "a count")?,
-            residual_rms: convert::item(values, "residual_rms", "a number")?,
-        })
-    }
-
-    /// Everything as bits, so that equal means the same bytes and NaN equals itself.
-    pub(super) fn bits(&self) -> (&str, &str, u32, u64) {
-        (&self.stop, &self.reason, self.iterations, self.residual_rms.to_bits())
-    }
-}
-
-#[pymethods]
-impl FitReport {
-    /// The attributes by name.
-    pub(super) fn to_dict<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        let dict = PyDict::new(py);
-        dict.set_item("stop", &self.stop)?;
-        dict.set_item("reason", &self.reason)?;
-        dict.set_item("iterations", self.iterations)?;
-        dict.set_item("residual_rms", self.residual_rms)?;
-        Ok(dict)
-    }
-
-    /// The report of a dict as `to_dict` makes it.
-    #[classmethod]
-    fn from_dict(_cls: &Bound<'_, PyType>, values: &Bound<'_, PyAny>) -> PyResult<Self> {
-        Self::read(values::dict(values, &["stop", "reason", "iterations", "residual_rms"])?)
-    }
-
-    fn __repr__(&self) -> String {
-        format!(
-            "FitReport(stop=\"{}\", reason=\"{}\", iterations={}, residual_rms={:.3e})",
-            self.stop, self.reason, self.iterations, self.residual_rms
-        )
-    }
-
-    fn __eq__(&self, other: &Bound<'_, PyAny>) -> bool {
-        other.cast::<Self>().is_ok_and(|other| self.bits() == other.get().bits())
-    }
-
-    fn __hash__(&self, py: Python<'_>) -> PyResult<isize> {
-        self.bits().into_pyobject(py)?.hash()
-    }
-
-    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyTuple>> {
-        (slf.get_type().getattr("from_dict")?, (slf.get().to_dict(slf.py())?,)).into_pyobject(slf.py())
-    }
-
-    fn __copy__<'py>(slf: &Bound<'py, Self>) -> Bound<'py, Self> {
-        slf.clone()
-    }
-
-    fn __deepcopy__<'py>(slf: &Bound<'py, Self>, _memo: &Bound<'py, PyAny>) -> Bound<'py, Self> {
-        slf.clone()
+        Self { stop: StopWord(word.to_owned()), reason: stop.to_string(), iterations, residual_rms }
     }
 }

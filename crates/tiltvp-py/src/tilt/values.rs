@@ -1,34 +1,29 @@
-//! What the frozen values share: how numbers and matrices look in their dicts.
+//! The lean in values: the ground normal and the angles that follow from it.
 
-use nalgebra::Matrix2;
-use pyo3::prelude::*;
-use pyo3::types::PyDict;
+use nalgebra::Vector3;
+use pyo3::PyResult;
+use tiltvp_core::geometry::Tilt;
 
 use crate::call::invalid;
-use crate::convert;
 
-/// A dict as `to_dict` makes it, with no other keys than these.
-pub(super) fn dict<'a, 'py>(values: &'a Bound<'py, PyAny>, keys: &[&str]) -> PyResult<&'a Bound<'py, PyDict>> {
-    let values = values.cast::<PyDict>().map_err(|_| invalid("values: expected a dict".to_owned()))?;
-    convert::known_keys(values, keys)?;
-    Ok(values)
+/// The ground normal; NaN without a lean.
+pub(super) fn normal(tilt: Option<&Tilt>) -> Vector3<f64> {
+    tilt.map_or(Vector3::repeat(f64::NAN), Tilt::normal)
 }
 
-/// Sets the item of a covariance as nested lists.
-pub(super) fn set_covariance(dict: &Bound<'_, PyDict>, c: &Matrix2<f64>) -> PyResult<()> {
-    dict.set_item("covariance_rad2", [[c[(0, 0)], c[(0, 1)]], [c[(1, 0)], c[(1, 1)]]])
+/// Alpha, beta, roll and pitch in radians; NaN without a lean.
+pub(super) fn angles(tilt: Option<&Tilt>) -> [f64; 4] {
+    tilt.map_or([f64::NAN; 4], |tilt| [tilt.alpha_rad(), tilt.beta_rad(), tilt.roll_rad(), tilt.pitch_rad()])
 }
 
-/// Reads what [`set_covariance`] wrote.
-pub(super) fn covariance(values: &Bound<'_, PyDict>) -> PyResult<Matrix2<f64>> {
-    let (rows, _) = convert::rows::<2>(&convert::raw_item(values, "covariance_rad2")?, "values[\"covariance_rad2\"]")?;
-    let [[a, b], [c, d]] = rows[..] else {
-        return Err(invalid("values[\"covariance_rad2\"]: expected shape (2, 2)".to_owned()));
-    };
-    Ok(Matrix2::new(a, b, c, d))
-}
-
-/// The entries of a covariance as bits, so that equal means the same bytes and infinity is nothing special.
-pub(super) fn covariance_bits(c: &Matrix2<f64>) -> [u64; 4] {
-    [c[(0, 0)], c[(0, 1)], c[(1, 0)], c[(1, 1)]].map(f64::to_bits)
+/// The lean of a normal that a dict holds beside the angles, alpha, beta, roll and pitch. Refuses angles of another one.
+pub(super) fn lean(normal: &Vector3<f64>, given: [f64; 4]) -> PyResult<Option<Tilt>> {
+    let tilt = Tilt::from_normal(normal);
+    let names = ["alpha_rad", "beta_rad", "roll_rad", "pitch_rad"];
+    for ((name, given), angle) in names.iter().zip(given).zip(angles(tilt.as_ref())) {
+        if (given - angle).abs() > 1e-9 || given.is_nan() != angle.is_nan() {
+            return Err(invalid(format!("values[\"{name}\"] = {given}, expected {angle}, as the normal has it")));
+        }
+    }
+    Ok(tilt)
 }

@@ -4,10 +4,10 @@ use nalgebra::Vector3;
 
 use super::palette::Palette;
 use crate::builder::{Builder, Column, MaterialId, Patch};
-use crate::dice::Dice;
 use crate::frame::Frame;
 use crate::options::RoomKind;
 use crate::plan::{Filling, Plan, Wall};
+use crate::rng::Rng;
 use crate::texture::{Texture, rgb};
 
 /// Hangs pictures and boards where a wall shows above its furniture: `taken` are intervals and heights.
@@ -18,18 +18,18 @@ pub(crate) fn hang(
     palette: &Palette,
     clutter: f64,
     builder: &mut Builder,
-    dice: &mut Dice,
+    rng: &mut Rng,
 ) {
-    let mut x = dice.within(0.2, 0.7);
+    let mut x = rng.within(0.2, 0.7);
     while x < wall.length - 0.5 {
         let office = matches!(plan.kind, RoomKind::Office | RoomKind::Corridor | RoomKind::Narrow);
-        let board = office && dice.chance(0.35);
+        let board = office && rng.chance(0.35);
         let size = if board {
-            [dice.within(0.9, 1.8), dice.within(0.8, 1.1)]
+            [rng.within(0.9, 1.8), rng.within(0.8, 1.1)]
         } else {
-            [dice.within(0.3, 0.9), dice.within(0.3, 0.7)]
+            [rng.within(0.3, 0.9), rng.within(0.3, 0.7)]
         };
-        let low = if board { 0.95 } else { dice.within(1.25, 1.5) };
+        let low = if board { 0.95 } else { rng.within(1.25, 1.5) };
         let (from, to) = (x - 0.06, x + size[0] + 0.06);
         let fits = to < wall.length - 0.1
             && low + size[1] < plan.height - 0.15
@@ -40,39 +40,39 @@ pub(crate) fn hang(
             x += 0.25;
             continue;
         }
-        if dice.chance(0.25 + 0.7 * clutter) {
+        if rng.chance(0.25 + 0.7 * clutter) {
             let place = wall.frame.then(x + size[0], 0.0, low, 0.0);
             if board {
-                self::board(&place, size, palette, builder, dice);
+                self::board(&place, size, palette, builder, rng);
             } else {
-                picture(&place, size, palette, builder, dice);
+                picture(&place, size, palette, builder, rng);
             }
         }
-        x = to + dice.within(0.15, 0.9);
+        x = to + rng.within(0.15, 0.9);
     }
 }
 
 /// A framed picture; the frame's origin is its lower left corner seen from the front, its width runs along `-x`.
 /// Some hang a little askew.
-fn picture(frame: &Frame, size: [f64; 2], palette: &Palette, builder: &mut Builder, dice: &mut Dice) {
-    let (sky, land) = dice.pick([
+fn picture(frame: &Frame, size: [f64; 2], palette: &Palette, builder: &mut Builder, rng: &mut Rng) {
+    let (sky, land) = rng.pick([
         (rgb(150, 190, 220), rgb(90, 120, 60)),
         (rgb(230, 190, 140), rgb(120, 80, 60)),
         (rgb(220, 224, 228), rgb(70, 90, 110)),
         (rgb(70, 80, 110), rgb(40, 50, 50)),
     ]);
-    let accent = dice.pick([rgb(240, 210, 90), rgb(200, 60, 50), rgb(245, 240, 230)]);
-    let rim = dice.pick([palette.dark, palette.wood_v, palette.white, palette.metal]);
-    let askew = if dice.chance(0.4) { dice.within(-0.04, 0.04) } else { 0.0 };
+    let accent = rng.pick([rgb(240, 210, 90), rgb(200, 60, 50), rgb(245, 240, 230)]);
+    let rim = rng.pick([palette.dark, palette.wood_v, palette.white, palette.metal]);
+    let askew = if rng.chance(0.4) { rng.within(-0.04, 0.04) } else { 0.0 };
     let inner = [size[0] - 0.05, size[1] - 0.05];
-    let texture = Texture::Picture { size: inner, sky, land, accent, seed: dice.seed() };
+    let texture = Texture::Picture { size: inner, sky, land, accent, seed: rng.seed() };
     framed(frame, size, askew, texture, rim, builder);
 }
 
 /// A whiteboard or a pinboard.
-fn board(frame: &Frame, size: [f64; 2], palette: &Palette, builder: &mut Builder, dice: &mut Dice) {
-    let (seed, inner) = (dice.seed(), [size[0] - 0.05, size[1] - 0.05]);
-    if dice.chance(0.6) {
+fn board(frame: &Frame, size: [f64; 2], palette: &Palette, builder: &mut Builder, rng: &mut Rng) {
+    let (seed, inner) = (rng.seed(), [size[0] - 0.05, size[1] - 0.05]);
+    if rng.chance(0.6) {
         framed(frame, size, 0.0, Texture::Whiteboard { size: inner, seed }, palette.metal, builder);
         builder.cuboid(frame, [-size[0] + 0.2, 0.0, -0.02], [-0.2, 0.07, -0.005], palette.metal);
     } else {
@@ -106,27 +106,27 @@ fn framed(frame: &Frame, size: [f64; 2], askew: f64, texture: Texture, rim: Mate
 }
 
 /// A potted plant of the given height around the frame's origin.
-pub(crate) fn plant(frame: &Frame, height: f64, palette: &Palette, builder: &mut Builder, dice: &mut Dice) {
+pub(crate) fn plant(frame: &Frame, height: f64, palette: &Palette, builder: &mut Builder, rng: &mut Rng) {
     let pot = 0.28;
     builder.column(frame, &Column { at: [0.0, 0.0], z: [0.0, pot], radius: [0.12, 0.17], sides: 14 }, palette.pot);
-    let bushy = dice.chance(0.5);
+    let bushy = rng.chance(0.5);
     let stems = if bushy { 9 } else { 3 };
     for _ in 0..stems {
-        let (sway_x, sway_y) = (dice.within(-0.14, 0.14), dice.within(-0.14, 0.14));
-        let top = pot + (height - pot) * dice.within(0.6, 1.0);
+        let (sway_x, sway_y) = (rng.within(-0.14, 0.14), rng.within(-0.14, 0.14));
+        let top = pot + (height - pot) * rng.within(0.6, 1.0);
         builder.post(frame, [0.0, 0.0, pot - 0.02], [sway_x, sway_y, top], 0.012, palette.leaves[2]);
         for k in 0..if bushy { 7 } else { 16 } {
-            let t = if bushy { dice.within(0.2, 1.0) } else { dice.within(0.45, 1.0) };
+            let t = if bushy { rng.within(0.2, 1.0) } else { rng.within(0.45, 1.0) };
             let at = [sway_x * t, sway_y * t, pot + (top - pot) * t];
-            leaf(frame, at, dice.within(0.12, 0.28), palette.leaves[k % 3], builder, dice);
+            leaf(frame, at, rng.within(0.12, 0.28), palette.leaves[k % 3], builder, rng);
         }
     }
     builder.solid(frame, [-0.17, -0.17], [0.17, 0.17]);
 }
 
 /// A leaf of two bent triangles that grows from a point in any direction.
-fn leaf(frame: &Frame, at: [f64; 3], length: f64, material: MaterialId, builder: &mut Builder, dice: &mut Dice) {
-    let (azimuth, rise) = (dice.within(0.0, std::f64::consts::TAU), dice.within(-0.2, 0.9));
+fn leaf(frame: &Frame, at: [f64; 3], length: f64, material: MaterialId, builder: &mut Builder, rng: &mut Rng) {
+    let (azimuth, rise) = (rng.within(0.0, std::f64::consts::TAU), rng.within(-0.2, 0.9));
     let (s, c) = azimuth.sin_cos();
     let base = frame.point(at[0], at[1], at[2]);
     let tip = base + frame.vector(length * c, length * s, length * rise);
@@ -153,24 +153,24 @@ pub(crate) fn bin(frame: &Frame, palette: &Palette, builder: &mut Builder) {
 }
 
 /// A vase or cup, some with a few twigs.
-pub(crate) fn vase(frame: &Frame, height: f64, palette: &Palette, builder: &mut Builder, dice: &mut Dice) {
-    let material = dice.pick([palette.pot, palette.white, palette.cushion]);
+pub(crate) fn vase(frame: &Frame, height: f64, palette: &Palette, builder: &mut Builder, rng: &mut Rng) {
+    let material = rng.pick([palette.pot, palette.white, palette.cushion]);
     let body = 0.7 * height;
     let radius = 0.3 * height;
     let column = |z: [f64; 2], radius: [f64; 2]| Column { at: [0.0, 0.0], z, radius, sides: 12 };
     builder.column(frame, &column([0.0, 0.5 * body], [0.6 * radius, radius]), material);
     builder.column(frame, &column([0.5 * body, body], [radius, 0.5 * radius]), material);
-    if height > 0.15 && dice.chance(0.6) {
+    if height > 0.15 && rng.chance(0.6) {
         for k in 0..5 {
-            let (x, y) = (dice.within(-0.1, 0.1), dice.within(-0.1, 0.1));
+            let (x, y) = (rng.within(-0.1, 0.1), rng.within(-0.1, 0.1));
             builder.post(frame, [0.0, 0.0, body], [x, y, height * 1.6], 0.006, palette.leaves[2]);
-            leaf(frame, [x, y, height * 1.5], 0.08, palette.leaves[k % 3], builder, dice);
+            leaf(frame, [x, y, height * 1.5], 0.08, palette.leaves[k % 3], builder, rng);
         }
     }
 }
 
 /// A television on a foot, facing `+y`.
-pub(crate) fn television(frame: &Frame, width: f64, palette: &Palette, builder: &mut Builder, dice: &mut Dice) {
+pub(crate) fn television(frame: &Frame, width: f64, palette: &Palette, builder: &mut Builder, rng: &mut Rng) {
     let (half, high) = (0.5 * width, 0.06 + 0.57 * width);
     builder.cuboid(frame, [-0.2, -0.1, 0.0], [0.2, 0.1, 0.015], palette.dark);
     builder.cuboid(frame, [-0.04, -0.03, 0.015], [0.04, 0.0, 0.1], palette.dark);
@@ -181,7 +181,7 @@ pub(crate) fn television(frame: &Frame, width: f64, palette: &Palette, builder: 
         sky: rgb(60, 70, 90),
         land: rgb(40, 46, 50),
         accent: rgb(200, 180, 120),
-        seed: dice.seed(),
+        seed: rng.seed(),
     };
     let material = builder.matt(picture);
     let (x, z) = (half - 0.015, 0.075);

@@ -7,10 +7,10 @@ mod storage;
 mod tables;
 
 use crate::builder::{Builder, Footprint};
-use crate::dice::Dice;
 use crate::frame::Frame;
 use crate::options::{RoomKind, RoomOptions};
 use crate::plan::{Filling, Plan, Wall};
+use crate::rng::Rng;
 use palette::Palette;
 
 /// The floor as it fills up.
@@ -53,16 +53,16 @@ enum Piece {
 
 impl Piece {
     /// Width, depth with the room in front that it needs, and height, metres.
-    fn size(self, dice: &mut Dice) -> [f64; 3] {
+    fn size(self, rng: &mut Rng) -> [f64; 3] {
         match self {
-            Self::Bookshelf => [dice.within(0.75, 1.3), 0.32, dice.within(1.6, 2.2)],
-            Self::Cupboard => [dice.within(0.8, 1.3), 0.45, dice.within(1.0, 2.1)],
-            Self::Sideboard => [dice.within(1.1, 1.8), 0.45, dice.within(0.6, 0.85)],
-            Self::Desk => [dice.within(1.3, 1.7), 1.35, 0.74],
-            Self::Sofa => [dice.within(1.6, 2.2), 0.9, 0.85],
-            Self::Rack => [dice.within(0.9, 1.2), 0.42, dice.within(1.8, 2.2)],
-            Self::Plant => [0.6, 0.6, dice.within(0.8, 1.7)],
-            Self::FloorLamp => [0.45, 0.45, dice.within(1.4, 1.7)],
+            Self::Bookshelf => [rng.within(0.75, 1.3), 0.32, rng.within(1.6, 2.2)],
+            Self::Cupboard => [rng.within(0.8, 1.3), 0.45, rng.within(1.0, 2.1)],
+            Self::Sideboard => [rng.within(1.1, 1.8), 0.45, rng.within(0.6, 0.85)],
+            Self::Desk => [rng.within(1.3, 1.7), 1.35, 0.74],
+            Self::Sofa => [rng.within(1.6, 2.2), 0.9, 0.85],
+            Self::Rack => [rng.within(0.9, 1.2), 0.42, rng.within(1.8, 2.2)],
+            Self::Plant => [0.6, 0.6, rng.within(0.8, 1.7)],
+            Self::FloorLamp => [0.45, 0.45, rng.within(1.4, 1.7)],
             Self::Bin => [0.3, 0.3, 0.35],
             Self::Chair => [0.6, 0.65, 0.9],
         }
@@ -70,8 +70,8 @@ impl Piece {
 }
 
 /// Furnishes a room; returns the places the robot is meant for, none for anywhere.
-pub(crate) fn furnish(plan: &Plan, options: &RoomOptions, builder: &mut Builder, dice: &mut Dice) -> Vec<Footprint> {
-    let palette = Palette::draw(builder, dice);
+pub(crate) fn furnish(plan: &Plan, options: &RoomOptions, builder: &mut Builder, rng: &mut Rng) -> Vec<Footprint> {
+    let palette = Palette::draw(builder, rng);
     let mut layout = Layout { plan, claims: Vec::new() };
     for wall in &plan.walls {
         for door in wall.openings.iter().filter(|o| o.filling == Filling::Door) {
@@ -81,21 +81,21 @@ pub(crate) fn furnish(plan: &Plan, options: &RoomOptions, builder: &mut Builder,
     if options.extent >= 1.5 && plan.kind != RoomKind::Corridor {
         pillars(&mut layout, builder);
     }
-    let places = tables::freestanding(&mut layout, &palette, builder, dice);
+    let places = tables::freestanding(&mut layout, &palette, builder, rng);
     let mut order: Vec<usize> = (0..plan.walls.len()).collect();
     for k in (1..order.len()).rev() {
-        order.swap(k, dice.below(k + 1));
+        order.swap(k, rng.below(k + 1));
     }
     for k in order {
-        let tall = along_wall(&plan.walls[k], &mut layout, &palette, options.clutter, builder, dice);
-        decor::hang(&plan.walls[k], &tall, plan, &palette, options.clutter, builder, dice);
+        let tall = along_wall(&plan.walls[k], &mut layout, &palette, options.clutter, builder, rng);
+        decor::hang(&plan.walls[k], &tall, plan, &palette, options.clutter, builder, rng);
     }
     places
 }
 
 /// Lines the walls of a room with furniture, and leaves its middle free.
-pub(crate) fn furnish_walls(plan: &Plan, clutter: f64, builder: &mut Builder, dice: &mut Dice) {
-    let palette = Palette::draw(builder, dice);
+pub(crate) fn furnish_walls(plan: &Plan, clutter: f64, builder: &mut Builder, rng: &mut Rng) {
+    let palette = Palette::draw(builder, rng);
     let mut layout = Layout { plan, claims: Vec::new() };
     for wall in &plan.walls {
         for door in &wall.openings {
@@ -103,8 +103,8 @@ pub(crate) fn furnish_walls(plan: &Plan, clutter: f64, builder: &mut Builder, di
         }
     }
     for wall in &plan.walls {
-        let tall = along_wall(wall, &mut layout, &palette, clutter, builder, dice);
-        decor::hang(wall, &tall, plan, &palette, clutter, builder, dice);
+        let tall = along_wall(wall, &mut layout, &palette, clutter, builder, rng);
+        decor::hang(wall, &tall, plan, &palette, clutter, builder, rng);
     }
 }
 
@@ -132,18 +132,18 @@ fn along_wall(
     palette: &Palette,
     clutter: f64,
     builder: &mut Builder,
-    dice: &mut Dice,
+    rng: &mut Rng,
 ) -> Vec<[f64; 3]> {
     let mut taken = Vec::new();
     let mut x = 0.05;
     let kind = layout.plan.kind;
     while x < wall.length - 0.3 {
-        if !dice.chance(0.25 + 0.75 * clutter) {
-            x += dice.within(0.4, 0.9);
+        if !rng.chance(0.25 + 0.75 * clutter) {
+            x += rng.within(0.4, 0.9);
             continue;
         }
-        let piece = choose(kind, dice);
-        let [width, depth, height] = piece.size(dice);
+        let piece = choose(kind, rng);
+        let [width, depth, height] = piece.size(rng);
         let blocks_light = height > 0.9 && !wall.is_free_of(Filling::Window, x, x + width, 0.1);
         let frame = wall.frame.then(x, 0.012, 0.0, 0.0);
         // A radiator keeps furniture a little off the wall under a window.
@@ -153,46 +153,46 @@ fn along_wall(
             x += 0.12;
             continue;
         }
-        build(piece, &frame, [width, height], palette, builder, dice);
+        build(piece, &frame, [width, height], palette, builder, rng);
         taken.push([x, x + width, if piece == Piece::Sofa { 1.0 } else { height }]);
-        x += width + if dice.chance(0.5) { 0.03 } else { dice.within(0.1, 0.6) };
+        x += width + if rng.chance(0.5) { 0.03 } else { rng.within(0.1, 0.6) };
     }
     taken
 }
 
-fn choose(kind: RoomKind, dice: &mut Dice) -> Piece {
+fn choose(kind: RoomKind, rng: &mut Rng) -> Piece {
     use Piece::{Bin, Bookshelf, Chair, Cupboard, Desk, FloorLamp, Plant, Rack, Sideboard, Sofa};
     match kind {
-        RoomKind::Office => dice.pick([Bookshelf, Bookshelf, Cupboard, Desk, Desk, Desk, Plant, Bin, Sideboard, Chair]),
+        RoomKind::Office => rng.pick([Bookshelf, Bookshelf, Cupboard, Desk, Desk, Desk, Plant, Bin, Sideboard, Chair]),
         RoomKind::LivingRoom => {
-            dice.pick([Bookshelf, Bookshelf, Cupboard, Sideboard, Sideboard, Sofa, Sofa, Plant, FloorLamp, Chair])
+            rng.pick([Bookshelf, Bookshelf, Cupboard, Sideboard, Sideboard, Sofa, Sofa, Plant, FloorLamp, Chair])
         }
-        RoomKind::Corridor => dice.pick([Bin, Plant, Cupboard, Chair, Bookshelf, Cupboard]),
+        RoomKind::Corridor => rng.pick([Bin, Plant, Cupboard, Chair, Bookshelf, Cupboard]),
         RoomKind::LShaped => {
-            dice.pick([Bookshelf, Cupboard, Sideboard, Desk, Sofa, Plant, FloorLamp, Chair, Bookshelf, Rack])
+            rng.pick([Bookshelf, Cupboard, Sideboard, Desk, Sofa, Plant, FloorLamp, Chair, Bookshelf, Rack])
         }
-        RoomKind::Narrow => dice.pick([Rack, Rack, Rack, Cupboard, Bookshelf, Bin]),
-        RoomKind::UnderTable => dice.pick([Bookshelf, Cupboard, Sideboard, Sideboard, Plant, FloorLamp, Chair]),
+        RoomKind::Narrow => rng.pick([Rack, Rack, Rack, Cupboard, Bookshelf, Bin]),
+        RoomKind::UnderTable => rng.pick([Bookshelf, Cupboard, Sideboard, Sideboard, Plant, FloorLamp, Chair]),
     }
 }
 
-fn build(piece: Piece, frame: &Frame, size: [f64; 2], palette: &Palette, builder: &mut Builder, dice: &mut Dice) {
+fn build(piece: Piece, frame: &Frame, size: [f64; 2], palette: &Palette, builder: &mut Builder, rng: &mut Rng) {
     let [width, height] = size;
     match piece {
-        Piece::Bookshelf => storage::bookshelf(frame, width, height, palette, builder, dice),
-        Piece::Cupboard => storage::cupboard(frame, width, height, palette, builder, dice),
-        Piece::Sideboard => storage::sideboard(frame, width, height, palette, builder, dice),
-        Piece::Rack => storage::rack(frame, width, height, palette, builder, dice),
+        Piece::Bookshelf => storage::bookshelf(frame, width, height, palette, builder, rng),
+        Piece::Cupboard => storage::cupboard(frame, width, height, palette, builder, rng),
+        Piece::Sideboard => storage::sideboard(frame, width, height, palette, builder, rng),
+        Piece::Rack => storage::rack(frame, width, height, palette, builder, rng),
         Piece::Desk => {
-            tables::desk(frame, width, palette, builder, dice);
-            seating::office_chair(&frame.then(0.5 * width, 1.0, 0.0, dice.within(2.2, 4.0)), palette, builder, dice);
+            tables::desk(frame, width, palette, builder, rng);
+            seating::office_chair(&frame.then(0.5 * width, 1.0, 0.0, rng.within(2.2, 4.0)), palette, builder, rng);
         }
-        Piece::Sofa => seating::sofa(frame, width, palette, builder, dice),
-        Piece::Plant => decor::plant(&frame.then(0.3, 0.3, 0.0, 0.0), height, palette, builder, dice),
+        Piece::Sofa => seating::sofa(frame, width, palette, builder, rng),
+        Piece::Plant => decor::plant(&frame.then(0.3, 0.3, 0.0, 0.0), height, palette, builder, rng),
         Piece::FloorLamp => decor::floor_lamp(&frame.then(0.22, 0.22, 0.0, 0.0), height, palette, builder),
         Piece::Bin => decor::bin(&frame.then(0.15, 0.15, 0.0, 0.0), palette, builder),
         Piece::Chair => {
-            seating::chair(&frame.then(0.3, 0.35, 0.0, dice.within(-0.3, 0.3)), palette.chair, palette, builder, dice);
+            seating::chair(&frame.then(0.3, 0.35, 0.0, rng.within(-0.3, 0.3)), palette.chair, palette, builder, rng);
         }
     }
 }

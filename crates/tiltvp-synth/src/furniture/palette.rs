@@ -1,7 +1,7 @@
 //! The materials that the pieces of one room share.
 
 use crate::builder::{Builder, Material, MaterialId};
-use crate::dice::Dice;
+use crate::rng::Rng;
 use crate::texture::{Color, Texture, rgb};
 
 /// Materials of one room.
@@ -44,45 +44,41 @@ pub(crate) struct ChairStyle {
 
 impl Palette {
     /// Draws a palette.
-    pub(crate) fn draw(builder: &mut Builder, dice: &mut Dice) -> Self {
+    pub(crate) fn draw(builder: &mut Builder, rng: &mut Rng) -> Self {
         let woods = [
             (rgb(214, 178, 130), rgb(168, 124, 80)),
             (rgb(170, 116, 70), rgb(112, 70, 40)),
             (rgb(112, 74, 48), rgb(66, 40, 24)),
             (rgb(232, 222, 204), rgb(206, 190, 164)),
         ];
-        let (light, dark) = dice.pick(woods);
-        let (other_light, other_dark) = dice.pick(woods);
-        let seed = dice.seed();
+        let (light, dark) = rng.pick(woods);
+        let (other_light, other_dark) = rng.pick(woods);
+        let seed = rng.seed();
         let wood = builder.matt(Texture::Wood { light, dark, along_v: false, seed });
         let wood_v = builder.matt(Texture::Wood { light, dark, along_v: true, seed });
         let other_wood =
             builder.matt(Texture::Wood { light: other_light, dark: other_dark, along_v: true, seed: seed ^ 1 });
-        let front = match dice.below(4) {
+        let front = match rng.below(4) {
             0 => builder.paint(236, 234, 228),
             1 => builder.paint(120, 140, 150),
             2 => builder.paint(176, 70, 56),
             _ => wood_v,
         };
         let cloth = |color| Texture::Cloth { color, fold: 0.08, seed };
-        let fabric = builder.matt(cloth(dice.pick([
+        let fabric = builder.matt(cloth(rng.pick([
             rgb(96, 110, 130),
             rgb(150, 140, 124),
             rgb(140, 60, 54),
             rgb(84, 100, 80),
             rgb(190, 170, 140),
         ])));
-        let cushion = builder.matt(cloth(dice.pick([
-            rgb(220, 170, 60),
-            rgb(200, 90, 70),
-            rgb(230, 224, 210),
-            rgb(60, 100, 120),
-        ])));
-        let (pot_r, pot_g, pot_b) = dice.pick([(176, 96, 66), (226, 222, 214), (70, 74, 80)]);
+        let cushion =
+            builder.matt(cloth(rng.pick([rgb(220, 170, 60), rgb(200, 90, 70), rgb(230, 224, 210), rgb(60, 100, 120)])));
+        let (pot_r, pot_g, pot_b) = rng.pick([(176, 96, 66), (226, 222, 214), (70, 74, 80)]);
         let inks = [rgb(230, 210, 150), rgb(240, 240, 236), rgb(30, 30, 34)];
         let books = (0..24)
             .map(|_| {
-                let color = dice.pick([
+                let color = rng.pick([
                     rgb(120, 34, 36),
                     rgb(34, 48, 88),
                     rgb(40, 78, 56),
@@ -96,8 +92,8 @@ impl Palette {
                     rgb(96, 66, 46),
                     rgb(150, 172, 196),
                 ]);
-                let color = color.map(|c| c * dice.within(0.7, 1.15));
-                Book { color, ink: dice.pick(inks) }
+                let color = color.map(|c| c * rng.within(0.7, 1.15));
+                Book { color, ink: rng.pick(inks) }
             })
             .collect();
         Self {
@@ -116,9 +112,9 @@ impl Palette {
             lampshade: builder.material(Material::Lamp([2.6, 2.2, 1.6])),
             books,
             chair: ChairStyle {
-                splay: dice.within(0.015, 0.09),
-                lean: dice.within(0.04, 0.12),
-                slats: dice.pick([0, 3, 4, 5]),
+                splay: rng.within(0.015, 0.09),
+                lean: rng.within(0.04, 0.12),
+                slats: rng.pick([0, 3, 4, 5]),
             },
         }
     }

@@ -2,15 +2,15 @@
 
 use super::palette::{ChairStyle, Palette};
 use crate::builder::{Builder, Column};
-use crate::dice::Dice;
 use crate::frame::Frame;
+use crate::rng::Rng;
 
 /// A four-legged chair around the frame's origin, its back at `-y`.
-pub(crate) fn chair(frame: &Frame, style: ChairStyle, palette: &Palette, builder: &mut Builder, dice: &mut Dice) {
+pub(crate) fn chair(frame: &Frame, style: ChairStyle, palette: &Palette, builder: &mut Builder, rng: &mut Rng) {
     let seat = 0.45;
     let (half, wood) = (0.2, palette.other_wood);
     builder.cuboid(frame, [-half, -half, seat - 0.035], [half, half, seat], wood);
-    if dice.chance(0.4) {
+    if rng.chance(0.4) {
         builder.cuboid(frame, [-0.18, -0.17, seat], [0.18, 0.18, seat + 0.03], palette.cushion);
     }
     for (x, y) in [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)] {
@@ -43,7 +43,7 @@ pub(crate) fn chair(frame: &Frame, style: ChairStyle, palette: &Palette, builder
 }
 
 /// A swivel chair on a star of five feet, its back at `-y`.
-pub(crate) fn office_chair(frame: &Frame, palette: &Palette, builder: &mut Builder, dice: &mut Dice) {
+pub(crate) fn office_chair(frame: &Frame, palette: &Palette, builder: &mut Builder, rng: &mut Rng) {
     for k in 0..5 {
         let (s, c) = (std::f64::consts::TAU * f64::from(k) / 5.0 + 0.3).sin_cos();
         builder.post(frame, [0.3 * c, 0.3 * s, 0.055], [0.02 * c, 0.02 * s, 0.12], 0.035, palette.dark);
@@ -54,9 +54,9 @@ pub(crate) fn office_chair(frame: &Frame, palette: &Palette, builder: &mut Build
         );
     }
     builder.column(frame, &Column { at: [0.0, 0.0], z: [0.1, 0.42], radius: [0.028, 0.022], sides: 10 }, palette.metal);
-    let seat = dice.within(0.44, 0.5);
+    let seat = rng.within(0.44, 0.5);
     builder.cuboid(frame, [-0.24, -0.23, seat - 0.05], [0.24, 0.25, seat + 0.03], palette.fabric);
-    let lean = dice.within(0.03, 0.1);
+    let lean = rng.within(0.03, 0.1);
     builder.post(frame, [0.0, -0.2, seat - 0.04], [0.0, -0.27, seat + 0.2], 0.04, palette.dark);
     let (low, up) = (frame.point(-0.22, -0.28, seat + 0.12), frame.vector(0.0, -lean, 0.48));
     builder.sheared(low, [frame.vector(0.44, 0.0, 0.0), frame.vector(0.0, 0.05, 0.0), up], palette.fabric);
@@ -68,7 +68,7 @@ pub(crate) fn office_chair(frame: &Frame, palette: &Palette, builder: &mut Build
 }
 
 /// A sofa of the given width, its back against `y = 0`.
-pub(crate) fn sofa(frame: &Frame, width: f64, palette: &Palette, builder: &mut Builder, dice: &mut Dice) {
+pub(crate) fn sofa(frame: &Frame, width: f64, palette: &Palette, builder: &mut Builder, rng: &mut Rng) {
     let (fabric, depth) = (palette.fabric, 0.86);
     builder.cuboid(frame, [0.0, 0.06, 0.12], [width, depth - 0.02, 0.32], fabric);
     for x in [0.0, width - 0.17] {
@@ -81,8 +81,8 @@ pub(crate) fn sofa(frame: &Frame, width: f64, palette: &Palette, builder: &mut B
     for k in 0..seats {
         let x = 0.175 + each * f64::from(k);
         builder.cuboid(frame, [x + 0.01, 0.22, 0.32], [x + each - 0.01, depth - 0.02, 0.46], fabric);
-        if dice.chance(0.6) {
-            let pillow = frame.then(x + 0.5 * each, 0.36, 0.46, dice.within(-0.4, 0.4));
+        if rng.chance(0.6) {
+            let pillow = frame.then(x + 0.5 * each, 0.36, 0.46, rng.within(-0.4, 0.4));
             let (base, up) = (pillow.point(-0.2, -0.07, 0.0), pillow.vector(0.02, -0.1, 0.36));
             builder.sheared(base, [pillow.vector(0.4, 0.0, 0.0), pillow.vector(0.0, 0.12, 0.0), up], palette.cushion);
         }

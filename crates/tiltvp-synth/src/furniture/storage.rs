@@ -3,8 +3,8 @@
 use super::decor;
 use super::palette::Palette;
 use crate::builder::{Builder, Column};
-use crate::dice::Dice;
 use crate::frame::Frame;
+use crate::rng::Rng;
 use crate::texture::Texture;
 
 /// An open shelf full of books, its back against `y = 0`.
@@ -14,7 +14,7 @@ pub(crate) fn bookshelf(
     height: f64,
     palette: &Palette,
     builder: &mut Builder,
-    dice: &mut Dice,
+    rng: &mut Rng,
 ) {
     let (depth, board) = (0.3, 0.022);
     for x in [0.0, width - board] {
@@ -29,39 +29,39 @@ pub(crate) fn bookshelf(
         let z = 0.07 + row as f64 * pitch;
         builder.cuboid(frame, [board, 0.0, z], [width - board, depth - 0.005, z + board], palette.wood);
         let shelf = frame.then(board, 0.0, z + board, 0.0);
-        match dice.below(8) {
-            0 => decor::vase(&shelf.then(dice.within(0.15, width - 0.2), 0.15, 0.0, 0.0), 0.22, palette, builder, dice),
-            1 => boxes(&shelf, width - 2.0 * board, depth - 0.05, pitch - 0.05, palette, builder, dice),
-            _ => books(&shelf, width - 2.0 * board, pitch - board - 0.02, palette, builder, dice),
+        match rng.below(8) {
+            0 => decor::vase(&shelf.then(rng.within(0.15, width - 0.2), 0.15, 0.0, 0.0), 0.22, palette, builder, rng),
+            1 => boxes(&shelf, width - 2.0 * board, depth - 0.05, pitch - 0.05, palette, builder, rng),
+            _ => books(&shelf, width - 2.0 * board, pitch - board - 0.02, palette, builder, rng),
         }
     }
     builder.solid(frame, [0.0, 0.0], [width, depth]);
 }
 
 /// A row of books, some of them leaning, with gaps.
-fn books(frame: &Frame, width: f64, room: f64, palette: &Palette, builder: &mut Builder, dice: &mut Dice) {
-    let mut x = dice.within(0.0, 0.04);
+fn books(frame: &Frame, width: f64, room: f64, palette: &Palette, builder: &mut Builder, rng: &mut Rng) {
+    let mut x = rng.within(0.0, 0.04);
     // A series of equal books now and then.
     let mut series = 0usize;
     let (mut thick, mut height, mut kind) = (0.03, 0.24, 0);
     while x < width - 0.06 {
         if series == 0 {
-            thick = dice.within(0.015, 0.05);
-            height = room * dice.within(0.62, 0.97);
-            kind = dice.below(palette.books.len());
-            series = if dice.chance(0.25) { 3 + dice.below(5) } else { 1 };
+            thick = rng.within(0.015, 0.05);
+            height = room * rng.within(0.62, 0.97);
+            kind = rng.below(palette.books.len());
+            series = if rng.chance(0.25) { 3 + rng.below(5) } else { 1 };
         }
         series -= 1;
-        if dice.chance(0.035) {
-            x += dice.within(0.05, 0.2);
+        if rng.chance(0.035) {
+            x += rng.within(0.05, 0.2);
         }
-        let lean = if dice.chance(0.12) { dice.within(0.02, 0.28) } else { 0.0 };
-        let depth = dice.within(0.18, 0.24);
+        let lean = if rng.chance(0.12) { rng.within(0.02, 0.28) } else { 0.0 };
+        let depth = rng.within(0.18, 0.24);
         if x + thick + lean * height > width {
             break;
         }
         let book = palette.books[kind];
-        let seed = dice.seed();
+        let seed = rng.seed();
         let material = builder.matt(Texture::Spine { color: book.color, ink: book.ink, height, seed });
         builder.sheared(
             frame.point(x, 0.02, 0.0),
@@ -77,17 +77,17 @@ fn books(frame: &Frame, width: f64, room: f64, palette: &Palette, builder: &mut 
 }
 
 /// Boxes of cardboard and plastic, side by side.
-fn boxes(frame: &Frame, width: f64, depth: f64, room: f64, palette: &Palette, builder: &mut Builder, dice: &mut Dice) {
-    let mut x = dice.within(0.01, 0.1);
+fn boxes(frame: &Frame, width: f64, depth: f64, room: f64, palette: &Palette, builder: &mut Builder, rng: &mut Rng) {
+    let mut x = rng.within(0.01, 0.1);
     loop {
-        let (wide, high) = (dice.within(0.16, 0.42), room * dice.within(0.45, 0.95));
+        let (wide, high) = (rng.within(0.16, 0.42), room * rng.within(0.45, 0.95));
         if x + wide > width - 0.01 {
             return;
         }
-        let material = dice.pick([palette.cardboard, palette.cardboard, palette.white, palette.dark, palette.cushion]);
+        let material = rng.pick([palette.cardboard, palette.cardboard, palette.white, palette.dark, palette.cushion]);
         let turned = frame.then(x, 0.02, 0.0, 0.0);
-        builder.cuboid(&turned, [0.0, 0.0, 0.0], [wide, depth * dice.within(0.7, 0.98), high], material);
-        x += wide + dice.within(0.01, 0.12);
+        builder.cuboid(&turned, [0.0, 0.0, 0.0], [wide, depth * rng.within(0.7, 0.98), high], material);
+        x += wide + rng.within(0.01, 0.12);
     }
 }
 
@@ -98,12 +98,12 @@ pub(crate) fn cupboard(
     height: f64,
     palette: &Palette,
     builder: &mut Builder,
-    dice: &mut Dice,
+    rng: &mut Rng,
 ) {
     let depth = 0.42;
     builder.cuboid(frame, [0.0, 0.0, 0.06], [width, depth - 0.02, height], palette.wood_v);
     builder.cuboid(frame, [0.02, 0.02, 0.0], [width - 0.02, depth - 0.06, 0.06], palette.dark);
-    let rows: &[[f64; 2]] = if height > 1.5 && dice.chance(0.5) { &[[0.0, 0.4], [0.4, 1.0]] } else { &[[0.0, 1.0]] };
+    let rows: &[[f64; 2]] = if height > 1.5 && rng.chance(0.5) { &[[0.0, 0.4], [0.4, 1.0]] } else { &[[0.0, 1.0]] };
     for [low, high] in rows {
         let (z0, z1) = (0.07 + (height - 0.08) * low, 0.07 + (height - 0.08) * high - 0.01);
         for (x0, x1, knob) in
@@ -119,8 +119,8 @@ pub(crate) fn cupboard(
             );
         }
     }
-    if height < 2.0 && dice.chance(0.6) {
-        boxes(&frame.then(0.0, 0.03, height, 0.0), width, depth - 0.1, 0.3, palette, builder, dice);
+    if height < 2.0 && rng.chance(0.6) {
+        boxes(&frame.then(0.0, 0.03, height, 0.0), width, depth - 0.1, 0.3, palette, builder, rng);
     }
     builder.solid(frame, [0.0, 0.0], [width, depth + 0.02]);
 }
@@ -132,7 +132,7 @@ pub(crate) fn sideboard(
     height: f64,
     palette: &Palette,
     builder: &mut Builder,
-    dice: &mut Dice,
+    rng: &mut Rng,
 ) {
     let (depth, foot) = (0.43, 0.14);
     builder.cuboid(frame, [0.0, 0.0, foot], [width, depth - 0.02, height], palette.wood);
@@ -152,17 +152,17 @@ pub(crate) fn sideboard(
         }
     }
     let top = frame.then(0.0, 0.0, height, 0.0);
-    if width > 1.2 && dice.chance(0.5) {
-        decor::television(&top.then(0.5 * width, 0.2, 0.0, 0.0), (width - 0.1).min(1.2), palette, builder, dice);
+    if width > 1.2 && rng.chance(0.5) {
+        decor::television(&top.then(0.5 * width, 0.2, 0.0, 0.0), (width - 0.1).min(1.2), palette, builder, rng);
     } else {
-        decor::vase(&top.then(dice.within(0.2, 0.4), 0.2, 0.0, 0.0), dice.within(0.2, 0.35), palette, builder, dice);
-        books(&top.then(0.55 * width, 0.0, 0.0, 0.0), 0.35 * width, 0.27, palette, builder, dice);
+        decor::vase(&top.then(rng.within(0.2, 0.4), 0.2, 0.0, 0.0), rng.within(0.2, 0.35), palette, builder, rng);
+        books(&top.then(0.55 * width, 0.0, 0.0, 0.0), 0.35 * width, 0.27, palette, builder, rng);
     }
     builder.solid(frame, [0.0, 0.0], [width, depth + 0.02]);
 }
 
 /// A metal rack with boxes and cans.
-pub(crate) fn rack(frame: &Frame, width: f64, height: f64, palette: &Palette, builder: &mut Builder, dice: &mut Dice) {
+pub(crate) fn rack(frame: &Frame, width: f64, height: f64, palette: &Palette, builder: &mut Builder, rng: &mut Rng) {
     let depth = 0.4;
     for (x, y) in [(0.0, 0.0), (width - 0.03, 0.0), (0.0, depth - 0.03), (width - 0.03, depth - 0.03)] {
         builder.cuboid(frame, [x, y, 0.0], [x + 0.03, y + 0.03, height], palette.metal);
@@ -172,13 +172,13 @@ pub(crate) fn rack(frame: &Frame, width: f64, height: f64, palette: &Palette, bu
         let z = 0.1 + (height - 0.12) * row as f64 / (rows - 1).max(1) as f64;
         builder.cuboid(frame, [0.0, 0.0, z - 0.02], [width, depth, z], palette.metal);
         let shelf = frame.then(0.03, 0.0, z, 0.0);
-        if dice.chance(0.75) {
-            boxes(&shelf, width - 0.06, depth - 0.05, 0.36, palette, builder, dice);
+        if rng.chance(0.75) {
+            boxes(&shelf, width - 0.06, depth - 0.05, 0.36, palette, builder, rng);
         } else {
             for k in 0..(width / 0.16) as usize {
-                let material = dice.pick([palette.white, palette.metal, palette.cushion, palette.pot]);
-                let (radius, tall) = (dice.within(0.04, 0.07), dice.within(0.12, 0.28));
-                let at = [0.08 + 0.16 * k as f64, dice.within(0.1, 0.3)];
+                let material = rng.pick([palette.white, palette.metal, palette.cushion, palette.pot]);
+                let (radius, tall) = (rng.within(0.04, 0.07), rng.within(0.12, 0.28));
+                let at = [0.08 + 0.16 * k as f64, rng.within(0.1, 0.3)];
                 builder.column(&shelf, &Column { at, z: [0.0, tall], radius: [radius, radius], sides: 12 }, material);
             }
         }

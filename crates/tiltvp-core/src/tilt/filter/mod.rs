@@ -3,43 +3,19 @@
 mod model;
 mod options;
 mod report;
+mod state;
 
-use nalgebra::{Matrix2, Matrix2x6, Matrix6, Rotation2, Rotation3, Vector2, Vector3};
+use nalgebra::{Matrix2, Matrix2x6, Matrix6, Rotation2, Rotation3, Vector3};
 
 pub use self::options::{MountingOptions, TiltFilterOptions};
 pub use self::report::{FilteredTilt, Verdict};
+pub use self::state::TiltFilterState;
+use self::state::{FLOOR, MOUNTING, SCENE, add, no_covariance};
 use super::confidence;
 use super::estimate::TiltEstimate;
 use crate::error::{Error, Result};
-use crate::filter::{Gate, Innovation, positive_semidefinite, symmetric};
+use crate::filter::{ChiSquareGate, Innovation, positive_semidefinite, symmetric};
 use crate::geometry::{Tilt, tangent_basis, tangent_exp, tangent_log, tangent_transport};
-
-/// What a [`TiltFilter`] knows, but for its options: everything the next answer depends on.
-///
-/// The covariance is that of the error state (floor, mounting, scene), two numbers each: walks from the floor's and the
-/// mounting's normal in the basis of [`tangent_basis`] there, and the error that successive images share, in radians along
-/// the robot's `x` and `y`.
-#[derive(Debug, Clone, PartialEq)]
-pub struct TiltFilterState {
-    /// The ground normal in the frame of the wheels, `f`.
-    pub floor: Vector3<f64>,
-    /// The ground normal that the robot would see on level ground, `m`.
-    pub mounting: Vector3<f64>,
-    /// The error of the last estimate that the next image of the same place will share, `c`.
-    pub scene: Vector2<f64>,
-    /// Covariance of the error state, in squared radians.
-    pub covariance: Matrix6<f64>,
-    /// The covariance of the best estimate of this place, `C`, of which `c` is a share; `None` before the first.
-    pub common: Option<Matrix2<f64>>,
-    /// Metres driven since the last estimate fused.
-    pub driven_m: f64,
-    /// The last estimate rejected by the gate, with its covariance, if nothing has been fused since.
-    pub pending: Option<(Vector3<f64>, Matrix2<f64>)>,
-    /// How many rejected estimates in a row agree, that one included.
-    pub agreeing: u32,
-    /// How many estimates in a row the gate has rejected.
-    pub rejected: u32,
-}
 
 /// A recursive filter of the robot's ground normal.
 ///
@@ -68,14 +44,9 @@ pub struct TiltFilterState {
 #[derive(Debug, Clone, PartialEq)]
 pub struct TiltFilter {
     options: TiltFilterOptions,
-    gate: Gate,
+    gate: ChiSquareGate,
     state: TiltFilterState,
 }
-
-/// The floor's, the mounting's and the scene's place in the error state.
-const FLOOR: usize = 0;
-const MOUNTING: usize = 2;
-const SCENE: usize = 4;
 
 /// A checked measurement: the normal and its covariance, noise floor included, in the tangent basis at the normal.
 #[derive(Clone, Copy)]
@@ -91,7 +62,7 @@ impl TiltFilter {
     /// [`Error::InvalidOption`] of [`TiltFilterOptions::validate`].
     pub fn new(options: TiltFilterOptions) -> Result<Self> {
         options.validate()?;
-        let gate = Gate::new(options.gate_probability, 2)?;
+        let gate = ChiSquareGate::new(options.gate_probability, 2)?;
         Ok(Self { options, gate, state: TiltFilterState::unknown(&options) })
     }
 
@@ -344,70 +315,4 @@ impl TiltFilter {
         self.state.mounting = mounting;
         self.state.covariance.fixed_view_mut::<2, 2>(MOUNTING, MOUNTING).copy_from(&covariance);
     }
-}
-
-impl TiltFilterState {
-    fn unknown(options: &TiltFilterOptions) -> Self {
-        let mut covariance = Matrix6::zeros();
-        add(&mut covariance, FLOOR, &(Matrix2::identity() * options.prior_rad.powi(2)));
-        if let Some(mounting) = &options.mounting {
-            add(&mut covariance, MOUNTING, &(Matrix2::identity() * mounting.prior_rad.powi(2)));
-        }
-        Self {
-            floor: Vector3::z(),
-            mounting: Vector3::z(),
-            scene: Vector2::zeros(),
-            covariance,
-            common: None,
-            driven_m: 0.0,
-            pending: None,
-            agreeing: 0,
-            rejected: 0,
-        }
-    }
-
-    fn validate(&self) -> Result<()> {
-        let unit = |name, v: &Vector3<f64>| {
-            let good = (v.norm_squared() - 1.0).abs() < 1e-9;
-            let got = || format!("[{}, {}, {}]", v.x, v.y, v.z);
-            if good { Ok(()) } else { Err(Error::argument(name, got(), "a vector of length 1")) }
-        };
-        unit("floor", &self.floor)?;
-        unit("mounting", &self.mounting)?;
-        if !self.scene.iter().all(|x| x.is_finite()) {
-            return Err(Error::argument("scene", format!("[{}, {}]", self.scene.x, self.scene.y), "finite angles"));
-        }
-        if !positive_semidefinite(&self.covariance) {
-            return Err(Error::argument("covariance", "another matrix", "a covariance, symmetric and positive"));
-        }
-        let spread = |name, matrix: &Matrix2<f64>| {
-            if matrix.cholesky().is_some() && positive_semidefinite(matrix) {
-                Ok(())
-            } else {
-                Err(no_covariance(name, matrix))
-            }
-        };
-        if let Some(common) = &self.common {
-            spread("common", common)?;
-        }
-        if let Some((normal, covariance)) = &self.pending {
-            unit("pending", normal)?;
-            spread("pending", covariance)?;
-        }
-        // Infinity is what a sum of very long ways comes to.
-        if self.driven_m.is_nan() || self.driven_m < 0.0 {
-            return Err(Error::argument("driven_m", self.driven_m, "a number of metres"));
-        }
-        Ok(())
-    }
-}
-
-fn add(covariance: &mut Matrix6<f64>, at: usize, block: &Matrix2<f64>) {
-    let mut view = covariance.fixed_view_mut::<2, 2>(at, at);
-    view += block;
-}
-
-fn no_covariance(name: &'static str, m: &Matrix2<f64>) -> Error {
-    let got = format!("[[{}, {}], [{}, {}]]", m[(0, 0)], m[(0, 1)], m[(1, 0)], m[(1, 1)]);
-    Error::argument(name, got, "a covariance in squared radians, symmetric and positive")
 }

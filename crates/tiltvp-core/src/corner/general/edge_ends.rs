@@ -1,0 +1,171 @@
+//! Where the edges of a corner end: at lines along the other axes that meet them there, as one image shows it or both.
+
+use nalgebra::{Matrix2, Matrix3, Vector3};
+
+use super::segments::Segment;
+use crate::camera::Camera;
+use crate::corner::feature::CornerFeature;
+use crate::corner::general::{AXIS_SINE, CLEAR_OF_VERTEX_PX, GeneralScratch, gray_search};
+use crate::corner::options::GeneralOptions;
+use crate::corner::trace::trace;
+use crate::corner::triangulation::{BearingObservation, triangulate};
+use crate::geometry::RigidMotion;
+use crate::image::{ImageView, LightTable};
+
+/// The far end of an edge.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct EdgeEnd {
+    /// How far it is from the vertex, metres: along the edge where one camera sees it, else the distance of the two points.
+    pub length_m: f64,
+    /// Where it is in the left camera's frame, metres, from its bearings in both images alone; none where one image shows it.
+    pub place_m: Option<Vector3<f64>>,
+}
+
+/// The end of an edge in one image.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct ObservedEnd {
+    bearing: Vector3<f64>,
+    sigma_rad: f64,
+    length_m: f64,
+}
+
+/// What one camera sees of a corner.
+pub(crate) struct ObservedCorner<'a> {
+    pub(crate) camera: &'a Camera,
+    pub(crate) image: &'a ImageView<'a>,
+    pub(crate) options: &'a GeneralOptions,
+    pub(crate) light: &'a LightTable,
+    pub(crate) corner: &'a CornerFeature,
+    /// The axes of the object, camera frame.
+    pub(crate) camera_from_object: Matrix3<f64>,
+    /// The directions of the edges x, y, z, camera frame.
+    pub(crate) edges: [Vector3<f64>; 3],
+    /// The vertex in the camera's frame, metres.
+    pub(crate) vertex_m: Vector3<f64>,
+}
+
+/// Least length of an edge, in pixels: that of a segment.
+const EDGE_MIN_PX: f64 = 20.0;
+
+/// How far from the edge a line along another axis may begin, in pixels: vertices of real things are rounded and worn.
+const GAP_PX: f64 = 15.0;
+
+/// Ends that are closer than this are one, in pixels: both sides of a bevelled edge.
+const SAME_END_PX: f64 = 8.0;
+
+/// The last pixels of an edge. They separate its end from what happens to lie beyond it.
+const LAST_PX: f64 = 20.0;
+
+/// Least share of the last pixels that show the edge. An edge that has ended shows background instead.
+const LAST_SHARE: f64 = 0.8;
+
+/// Least number of places of an edge: half of the last pixels.
+const PLACES_MIN: usize = 10;
+
+/// How far apart the lengths from the two images may be, as a share of them: larger ones are ends of different edges.
+const LENGTHS_APART: f64 = 0.06;
+
+/// Places where lines along another axis meet a ray: the angle from the vertex, and the line.
+fn meetings<'a>(
+    seen: &ObservedCorner<'_>,
+    segments: &'a [Segment],
+    axis: usize,
+    px_per_rad: f64,
+) -> Vec<(f64, &'a Segment)> {
+    let (vertex, normal) = (seen.corner.vertex(), seen.corner.rays()[axis].normal);
+    let along = normal.cross(&vertex);
+    let mut out = Vec::new();
+    for segment in segments {
+        let sines = seen.camera_from_object.tr_mul(&segment.normal).abs();
+        let nearest = sines.imin();
+        // The axis of an edge is the column that is nearest to it.
+        let own = seen.camera_from_object.tr_mul(&seen.edges[axis]).abs().imax();
+        if nearest == own || sines[nearest] > AXIS_SINE {
+            continue;
+        }
+        let Some(crossing) = normal.cross(&segment.normal).try_normalize(0.05) else { continue };
+        let crossing = if crossing.dot(&vertex) < 0.0 { -crossing } else { crossing };
+        let angle = crossing.dot(&along).atan2(crossing.dot(&vertex));
+        let own_px = segment.px_per_rad;
+        let aside = segment.ends.map(|end| end.angle(&crossing) * own_px);
+        let inside = aside[0].max(aside[1]) < segment.length_px;
+        let off_px = aside[0].min(aside[1]);
+        let widest = if inside { seen.options.overshoot_max_px } else { GAP_PX };
+        if angle * px_per_rad >= EDGE_MIN_PX && off_px <= widest {
+            out.push((angle, segment));
+        }
+    }
+    out.sort_by(|a, b| b.0.total_cmp(&a.0));
+    out
+}
+
+/// The ends of the edges x, y, z in one image, among the segments that were found in it last; the farthest up to which the
+/// image shows the edge.
+pub(crate) fn seen_ends(seen: &ObservedCorner<'_>, scratch: &mut GeneralScratch) -> [Option<ObservedEnd>; 3] {
+    let mut out = [None; 3];
+    let Some((_, jacobian)) = seen.camera.project_jacobian(&seen.corner.vertex()) else { return out };
+    let px_per_rad = jacobian.norm() / 2f64.sqrt();
+    let GeneralScratch { segments, trace: memory, .. } = scratch;
+    for (axis, out) in out.iter_mut().enumerate() {
+        let found = meetings(seen, &segments.segments, axis, px_per_rad);
+        let normal = seen.corner.rays()[axis].normal;
+        let mut follow = |from_rad: f64, to_rad: f64, least_share: f64| {
+            let search = gray_search(seen.options, normal, seen.corner.vertex(), [from_rad, to_rad]);
+            trace(seen.camera, &search, PLACES_MIN, |u, v| seen.light.gray(seen.image, u, v), memory)
+                .filter(|traced| traced.share >= least_share)
+        };
+        let clear_rad = CLEAR_OF_VERTEX_PX / px_per_rad;
+        for (place, (angle, _)) in found.iter().enumerate() {
+            let last_rad = (angle - LAST_PX / px_per_rad).max(clear_rad);
+            let whole = follow(clear_rad, angle - clear_rad, seen.options.guided_min_share);
+            let (Some(whole), Some(_)) = (whole, follow(last_rad, angle - clear_rad, LAST_SHARE)) else { continue };
+            // Of lines that meet the edge next to each other the longest.
+            let together = found[place..].iter().take_while(|(other, _)| (angle - other) * px_per_rad < SAME_END_PX);
+            let Some((_, line)) = together.max_by(|a, b| a.1.length_px.total_cmp(&b.1.length_px)) else { continue };
+            let Some(crossing) = whole.ray.normal.cross(&line.normal).try_normalize(0.05) else { continue };
+            let bearing = if crossing.dot(&seen.corner.vertex()) < 0.0 { -crossing } else { crossing };
+            if let Some(length_m) = along(&seen.vertex_m, &seen.edges[axis], &bearing) {
+                *out = Some(ObservedEnd { bearing, sigma_rad: seen.options.ray_sigma_px / px_per_rad, length_m });
+                break;
+            }
+        }
+    }
+    out
+}
+
+/// How far from a point along an edge the place is that is nearest to a line of sight; none where that is behind the camera or
+/// on the other side of the point.
+fn along(point: &Vector3<f64>, edge: &Vector3<f64>, bearing: &Vector3<f64>) -> Option<f64> {
+    let across = |vector: &Vector3<f64>| vector - bearing * bearing.dot(vector);
+    let length_m = -across(point).dot(&across(edge)) / across(edge).norm_squared();
+    let ahead = (point + edge * length_m).dot(bearing) > 0.0;
+    (ahead && length_m > 0.0 && length_m.is_finite()).then_some(length_m)
+}
+
+/// The ends of the edges of a corner with the vertex `vertex_m`, from what both cameras see of them.
+pub(crate) fn edge_ends(
+    [left, right]: [[Option<ObservedEnd>; 3]; 2],
+    left_from_right: &RigidMotion,
+    vertex_m: &Vector3<f64>,
+) -> [Option<EdgeEnd>; 3] {
+    let observation = |end: &ObservedEnd, rig_from_camera| BearingObservation {
+        bearing: end.bearing,
+        covariance: Matrix2::from_diagonal_element(end.sigma_rad * end.sigma_rad),
+        rig_from_camera,
+    };
+    let mut out = [None; 3];
+    for (out, ends) in out.iter_mut().zip(left.iter().zip(&right)) {
+        *out = match ends {
+            (Some(left), Some(right)) => {
+                let apart = (left.length_m - right.length_m).abs();
+                let both = [observation(left, RigidMotion::identity()), observation(right, *left_from_right)];
+                triangulate(&both)
+                    .filter(|_| apart <= LENGTHS_APART * left.length_m.max(right.length_m))
+                    .map(|point| EdgeEnd { length_m: (point.point_m - vertex_m).norm(), place_m: Some(point.point_m) })
+            }
+            (Some(one), None) | (None, Some(one)) => Some(EdgeEnd { length_m: one.length_m, place_m: None }),
+            (None, None) => None,
+        };
+    }
+    out
+}

@@ -1,0 +1,108 @@
+//! A corner looked for where it is expected: where it was in the frame before, or where another camera places it.
+
+use nalgebra::Vector3;
+
+use crate::camera::Camera;
+use crate::corner::feature::CornerFeature;
+use crate::corner::general::{CLEAR_OF_VERTEX_PX, gray_search};
+use crate::corner::options::GeneralOptions;
+use crate::corner::trace::{RaySearch, TraceScratch, trace_every};
+use crate::geometry::RigidMotion;
+use crate::image::{ImageView, LightTable};
+
+/// How far beyond its end a ray is looked for, in pixels: what follows a ray must not shorten it from frame to frame,
+/// and each fit loses up to a pixel.
+const BEYOND_END_PX: f64 = 1.0;
+
+/// Where a corner is expected: its vertex, and a bearing at the far end of each of the rays x, y, z.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct ExpectedCorner {
+    pub(crate) vertex: Vector3<f64>,
+    pub(crate) far: [Vector3<f64>; 3],
+}
+
+impl ExpectedCorner {
+    /// Where a corner was.
+    pub(crate) fn of(corner: &CornerFeature) -> Self {
+        Self { vertex: corner.vertex(), far: corner.rays().map(|ray| ray.toward) }
+    }
+
+    /// Where a corner of one camera is seen by another if its vertex is `distance_m` away and its edges have these
+    /// directions in the first camera's frame; none behind the other camera.
+    pub(crate) fn transferred(
+        corner: &CornerFeature,
+        edges: &[Vector3<f64>; 3],
+        distance_m: f64,
+        other_from_own: &RigidMotion,
+    ) -> Option<Self> {
+        let vertex = corner.vertex() * distance_m;
+        let mut far = [Vector3::zeros(); 3];
+        for ((far, ray), edge) in far.iter_mut().zip(corner.rays()).zip(edges) {
+            // The point of the edge that is seen at the far end: vertex + s edge, along `toward`.
+            let across = (
+                Vector3::from(vertex) - ray.toward * ray.toward.dot(&vertex),
+                edge - ray.toward * ray.toward.dot(edge),
+            );
+            let length_m = -across.0.dot(&across.1) / across.1.norm_squared();
+            if !(length_m > 0.0 && length_m.is_finite()) {
+                return None;
+            }
+            let point = vertex + edge * length_m;
+            if point.dot(&ray.toward) <= 0.0 {
+                return None;
+            }
+            *far = other_from_own.point(&point).try_normalize(1e-9)?;
+        }
+        Some(Self { vertex: other_from_own.point(&vertex).try_normalize(1e-9)?, far })
+    }
+}
+
+/// The corner near where it is expected, at most `search_px` from there; none if its rays are not all seen.
+pub(crate) fn find_near(
+    camera: &Camera,
+    image: &ImageView<'_>,
+    expected: &ExpectedCorner,
+    search_px: f64,
+    options: &GeneralOptions,
+    light: &LightTable,
+    scratch: &mut TraceScratch,
+) -> Option<CornerFeature> {
+    let mut vertex = expected.vertex;
+    let mut normals = expected.far.map(|far| vertex.cross(&far).try_normalize(1e-6));
+    let mut found = None;
+    // So far about a long ray there are other edges too: the first pass, along every third pixel, only has to lead to the
+    // second.
+    for (search_px, stride_px, least_share) in
+        [(search_px, 3.0, 0.5 * options.guided_min_share), (options.search_px, 1.0, options.guided_min_share)]
+    {
+        let pixel = camera.project_jacobian(&vertex)?;
+        if !camera.contains(&pixel.0) {
+            return None;
+        }
+        let px_per_rad = pixel.1.norm() / 2f64.sqrt();
+        let mut rays = [None; 3];
+        for ((ray, normal), far) in rays.iter_mut().zip(normals).zip(&expected.far) {
+            let normal = normal?;
+            let on_circle = (vertex - normal * normal.dot(&vertex)).try_normalize(0.5)?;
+            let angles = [CLEAR_OF_VERTEX_PX / px_per_rad, vertex.angle(far) + BEYOND_END_PX / px_per_rad];
+            let search = RaySearch { search_px, ..gray_search(options, normal, on_circle, angles) };
+            let signal = |u, v| light.gray(image, u, v);
+            let support_min = (f64::from(options.support_min_px) / stride_px) as usize;
+            let traced = trace_every(stride_px, camera, &search, support_min, signal, scratch)?;
+            if traced.share < least_share {
+                return None;
+            }
+            *ray = Some(traced.ray);
+        }
+        let [Some(x), Some(y), Some(z)] = rays else { return None };
+        let corner = CornerFeature::from_rays([x, y, z])?;
+        let good = corner.residual_rad() * px_per_rad <= options.residual_max_px;
+        if !good || !corner.rays_apart(options.ray_angle_min_rad) {
+            return None;
+        }
+        vertex = corner.vertex();
+        normals = corner.rays().map(|ray| Some(ray.normal));
+        found = Some(corner);
+    }
+    found
+}

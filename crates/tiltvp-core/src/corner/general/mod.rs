@@ -1,0 +1,186 @@
+//! The general front end: line segments joined at vertices, each ray then fitted between pixels.
+
+pub(super) mod common_attitude;
+pub(super) mod completion;
+pub(super) mod edge_ends;
+pub(super) mod guided;
+mod junctions;
+pub(super) mod segments;
+
+use nalgebra::Vector3;
+
+use self::junctions::{Junction, RayEnd};
+use self::segments::{Segment, SegmentFinder, SegmentScratch};
+use super::feature::CornerFeature;
+use super::options::GeneralOptions;
+use super::trace::{RaySearch, TraceScratch, TracedRay, trace};
+use crate::camera::Camera;
+use crate::image::{ImageView, LightTable};
+
+/// How far from the direction of its axis a segment's great circle may pass: the sine of 2.5 degrees, 0.9 pixels at one
+/// end of a segment of 20 pixels.
+const AXIS_SINE: f64 = 0.0436;
+
+/// Profiles along a ray that err together: a profile shares pixels with about two on either side, as bilinear samples
+/// of a smoothed image do. It divides the information of the fit.
+const ERRING_TOGETHER: f64 = 4.0;
+
+/// Pixels about the vertex where the edges' gradients mix: the reach of a profile's edge and one pixel of blur.
+const CLEAR_OF_VERTEX_PX: f64 = 4.0;
+
+/// Pixels at the far end of a ray that are left out: half of the gradient kernel and one pixel of blur.
+const CLEAR_OF_END_PX: f64 = 2.0;
+
+/// How far from a ray's great circle a further segment of the same edge may be, in pixels: a little more than
+/// `segment_threshold_px`.
+const SAME_LINE_PX: f64 = 1.5;
+
+/// Corners whose vertices are closer than this are one, in pixels: twice the distance at which three lines still count
+/// as meeting.
+const SAME_VERTEX_PX: f64 = 8.0;
+
+/// Memory of the front end.
+#[derive(Debug, Clone)]
+pub(crate) struct GeneralScratch {
+    pub(crate) segments: SegmentScratch,
+    meetings: Vec<Vec<(usize, Vector3<f64>, f64)>>,
+    junctions: Vec<Junction>,
+    /// For each end of a segment, the vertices from which its ray was followed, and what came of it.
+    traced: Vec<Vec<(Vector3<f64>, Option<TracedRay>)>>,
+    pub(crate) trace: TraceScratch,
+}
+
+impl GeneralScratch {
+    pub(crate) fn new(segments: SegmentScratch) -> Self {
+        Self {
+            segments,
+            meetings: Vec::new(),
+            junctions: Vec::new(),
+            traced: Vec::new(),
+            trace: TraceScratch::default(),
+        }
+    }
+}
+
+/// What corners are looked for with.
+pub(crate) struct Search<'a> {
+    pub(crate) camera: &'a Camera,
+    pub(crate) finder: &'a SegmentFinder,
+    pub(crate) options: &'a GeneralOptions,
+    pub(crate) light: &'a LightTable,
+    /// A direction along the vertical, where it is known.
+    pub(crate) vertical: Option<&'a Vector3<f64>>,
+}
+
+/// The corners of an image, the best first. `closeness` is a factor on how good a corner is, none where it is none at all.
+pub(crate) fn find(
+    search: &Search<'_>,
+    image: &ImageView<'_>,
+    closeness: impl Fn(&CornerFeature) -> Option<f64>,
+    scratch: &mut GeneralScratch,
+    out: &mut Vec<CornerFeature>,
+) {
+    let Search { camera, finder, options, light, vertical } = *search;
+    out.clear();
+    let GeneralScratch { segments, meetings, junctions, traced, trace: memory } = scratch;
+    finder.find(camera, image, options, segments);
+    let segments = &segments.segments;
+    junctions::find(camera, segments, vertical, options, meetings, junctions);
+    traced.iter_mut().for_each(Vec::clear);
+    traced.resize(2 * segments.len(), Vec::new());
+    let mut scored: Vec<(f64, CornerFeature)> = Vec::new();
+    for junction in junctions.iter() {
+        let mut rays = [None; 3];
+        for (ray, end) in rays.iter_mut().zip(junction.rays) {
+            let segment = &segments[end.segment];
+            let near_rad = SAME_VERTEX_PX * segment.ends[0].angle(&segment.ends[1]) / segment.length_px;
+            let known = &mut traced[2 * end.segment + end.end];
+            *ray = if let Some((_, found)) = known.iter().find(|(at, _)| at.angle(&junction.vertex) < near_rad) {
+                *found
+            } else {
+                let search = search_of(segments, end, &junction.vertex, options);
+                let support_min = options.support_min_px as usize;
+                let found = search
+                    .and_then(|search| trace(camera, &search, support_min, |u, v| light.gray(image, u, v), memory));
+                known.push((junction.vertex, found));
+                found
+            };
+            if ray.is_none_or(|traced| traced.share < options.support_min_share) {
+                *ray = None;
+                break;
+            }
+        }
+        let [Some(x), Some(y), Some(z)] = rays else { continue };
+        let rays = [x, y, z];
+        let Some(corner) = CornerFeature::from_rays(rays.map(|traced| traced.ray)) else { continue };
+        let good = corner.residual_rad() * y.px_per_rad <= options.residual_max_px;
+        if !good || !corner.rays_apart(options.ray_angle_min_rad) {
+            continue;
+        }
+        let Some(closeness) = closeness(&corner) else { continue };
+        let off = corner.residual_rad() * y.px_per_rad / options.residual_max_px;
+        scored.push((closeness * corner.support_score() / (1.0 + off), corner));
+    }
+    scored.sort_by(|a, b| b.0.total_cmp(&a.0));
+    for (_, corner) in scored {
+        if out.len() >= options.corners_max as usize {
+            break;
+        }
+        let pixel = |corner: &CornerFeature| camera.project(&corner.vertex());
+        let Some(here) = pixel(&corner) else { continue };
+        if out.iter().all(|other| pixel(other).is_none_or(|there| (there - here).norm() > SAME_VERTEX_PX)) {
+            out.push(corner);
+        }
+    }
+}
+
+/// Where the ray that begins at an end of a segment runs: to the segment's far end, and on where other segments go on.
+fn search_of(segments: &[Segment], ray: RayEnd, vertex: &Vector3<f64>, options: &GeneralOptions) -> Option<RaySearch> {
+    let segment = &segments[ray.segment];
+    let on_line = (vertex - segment.normal * segment.normal.dot(vertex)).try_normalize(1e-6)?;
+    let normal = if ray.end == 0 { segment.normal } else { -segment.normal };
+    let along = normal.cross(&on_line);
+    let angle_of = |bearing: &Vector3<f64>| bearing.dot(&along).atan2(bearing.dot(&on_line));
+    let px_per_rad = segment.px_per_rad;
+    let mut to_rad = angle_of(ray.far(segments));
+    let gap_rad = options.gap_max_px.max(options.gap_max_share * segment.length_px) / px_per_rad;
+    for _ in 0..3 {
+        let before = to_rad;
+        for other in segments {
+            let off_px = other.ends.iter().map(|end| normal.dot(end).abs()).fold(0.0, f64::max) * px_per_rad;
+            if off_px < SAME_LINE_PX {
+                let angles = other.ends.map(|end| angle_of(&end));
+                let (near, far) = (angles[0].min(angles[1]), angles[0].max(angles[1]));
+                if near > 0.0 && near - to_rad < gap_rad && far > to_rad && far < 1.4 {
+                    to_rad = far;
+                }
+            }
+        }
+        if to_rad == before {
+            break;
+        }
+    }
+    let angles = [CLEAR_OF_VERTEX_PX / px_per_rad, to_rad - CLEAR_OF_END_PX / px_per_rad];
+    Some(gray_search(options, normal, on_line, angles))
+}
+
+/// The search for a ray of a grey image near a great circle, between two angles from the vertex.
+fn gray_search(
+    options: &GeneralOptions,
+    normal: Vector3<f64>,
+    vertex: Vector3<f64>,
+    [from_rad, to_rad]: [f64; 2],
+) -> RaySearch {
+    RaySearch {
+        normal,
+        vertex,
+        from_rad,
+        to_rad,
+        search_px: options.search_px,
+        step_min: options.step_min,
+        step_share_min: 0.0,
+        threshold_px: options.threshold_px,
+        erring_together: ERRING_TOGETHER,
+        ray_sigma_px: options.ray_sigma_px,
+    }
+}

@@ -1,0 +1,96 @@
+//! One ray of a corner: the great circle of an edge's image, fitted, and the side of the vertex on which it lies.
+
+use nalgebra::{Matrix2, Matrix3, Vector2, Vector3};
+
+use crate::camera::Camera;
+use crate::geometry::{GreatCircleFit, fit_great_circle, tangent_basis};
+
+/// The image of one edge of a corner.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FittedRay {
+    /// Unit normal of the great circle that the ray lies on, camera frame. A feature turns it so that the walk from the
+    /// vertex to `toward` is a positive turn about it; before that its sign has no meaning.
+    pub normal: Vector3<f64>,
+    /// Covariance of the normal in square radians, in the plane of [`tangent_basis`] at it.
+    pub covariance: Matrix2<f64>,
+    /// Unit bearing of a further point on the ray, away from the vertex.
+    pub toward: Vector3<f64>,
+    /// How many pixels the ray was fitted to.
+    pub support: usize,
+    /// Root mean square of the pixels' distances from the great circle, radians.
+    pub residual_rms_rad: f64,
+}
+
+impl FittedRay {
+    /// The weighted fit to unit bearings with the standard deviation of each across the ray, radians; `toward` is a bearing
+    /// near the far end, which is moved onto the circle.
+    ///
+    /// `None` where no great circle fits (see [`fit_great_circle`]) or `toward` is its pole.
+    pub fn fit(bearings: &[Vector3<f64>], sigma_rad: &[f64], toward: &Vector3<f64>) -> Option<Self> {
+        let weighted = bearings.iter().zip(sigma_rad).map(|(bearing, sigma)| (*bearing, sigma.powi(-2)));
+        Self::from_fit(&fit_great_circle(weighted)?, toward, bearings.len().min(sigma_rad.len()))
+    }
+
+    /// The fit to pixels whose places have the standard deviation `sigma_px` in every direction, through a camera; pixels
+    /// that the camera has no bearing for are left out. `toward_px` is a pixel near the far end.
+    ///
+    /// What a pixel's noise does to the distance from the circle depends on the lens' Jacobian there and on the circle's
+    /// normal, so it is fitted twice.
+    pub fn fit_pixels(
+        camera: &Camera,
+        pixels: &[Vector2<f64>],
+        sigma_px: f64,
+        toward_px: &Vector2<f64>,
+    ) -> Option<Self> {
+        let toward = camera.unproject(toward_px)?;
+        let seen: Vec<_> = pixels.iter().filter_map(|pixel| camera.unproject_jacobian(pixel)).collect();
+        let first = fit_great_circle(seen.iter().map(|(bearing, _)| (*bearing, 1.0)))?;
+        let weight = |jacobian: &nalgebra::Matrix3x2<f64>| {
+            (sigma_px * sigma_px * (jacobian.transpose() * first.normal).norm_squared()).recip()
+        };
+        let second = fit_great_circle(seen.iter().map(|(bearing, jacobian)| (*bearing, weight(jacobian))))?;
+        Self::from_fit(&second, &toward, seen.len())
+    }
+
+    /// From a fitted great circle and a bearing near the far end.
+    pub fn from_fit(fit: &GreatCircleFit, toward: &Vector3<f64>, support: usize) -> Option<Self> {
+        let toward = (toward - fit.normal * fit.normal.dot(toward)).try_normalize(1e-9)?;
+        Some(Self { normal: fit.normal, covariance: fit.covariance, toward, support, residual_rms_rad: fit.rms_rad })
+    }
+
+    /// The same ray with a covariance `factor` times as large, for errors that neighbouring pixels share.
+    #[must_use]
+    pub fn with_covariance_scaled(mut self, factor: f64) -> Self {
+        self.covariance *= factor;
+        self
+    }
+
+    /// The same ray with the normal reversed.
+    #[must_use]
+    pub fn reversed(mut self) -> Self {
+        let turn = tangent_basis(&-self.normal).transpose() * tangent_basis(&self.normal);
+        self.normal = -self.normal;
+        self.covariance = turn * self.covariance * turn.transpose();
+        self
+    }
+
+    /// The covariance of the normal as a 3 x 3 matrix of the camera frame, square radians; its null space is the normal.
+    pub fn covariance_3d(&self) -> Matrix3<f64> {
+        let basis = tangent_basis(&self.normal);
+        basis * self.covariance * basis.transpose()
+    }
+
+    /// Whether every number is finite, the bearings of unit length and the variances not negative.
+    pub fn is_valid(&self) -> bool {
+        let unit = |v: &Vector3<f64>| (v.norm_squared() - 1.0).abs() < 1e-6;
+        let (c, scale) = (&self.covariance, self.covariance.amax());
+        scale.is_finite()
+            && c.iter().all(|x| x.is_finite())
+            && (c[(0, 1)] - c[(1, 0)]).abs() <= 1e-9 * scale
+            && c[(0, 0)] >= 0.0
+            && c[(1, 1)] >= 0.0
+            && c.determinant() >= -1e-9 * scale * scale
+            && unit(&self.normal)
+            && unit(&self.toward)
+    }
+}

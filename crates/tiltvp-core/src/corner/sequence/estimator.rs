@@ -1,0 +1,309 @@
+//! From images to poses: corners found in one image or a pair, resolved, and followed from frame to frame.
+
+use nalgebra::{Matrix3, Matrix6, Vector3};
+
+use super::agreement::{SAME_VERTEX_RAD, agreement, fits, renamed};
+use super::track::Track;
+use crate::corner::closed_form::attitude::IncludedAngle;
+use crate::corner::closed_form::prior::{AttitudePrior, VerticalSense};
+use crate::corner::closed_form::resolve::{Alignment, View, resolve};
+use crate::corner::detector::{CornerDetector, CornerScratch};
+use crate::corner::estimate::{CornerEstimate, CornerVerdict, Hypothesis};
+use crate::corner::estimator_options::EstimatorOptions;
+use crate::corner::feature::CornerFeature;
+use crate::corner::general::edge_ends::{EdgeEnd, edge_ends};
+use crate::corner::general::guided::ExpectedCorner;
+use crate::corner::options::CornerMethod;
+use crate::error::{Error, Result};
+use crate::geometry::RigidMotion;
+use crate::image::{ColorView, ImageView};
+
+/// An image of the kind that the detector wants.
+#[derive(Debug, Clone, Copy)]
+pub enum Frame<'a> {
+    /// For the general front end.
+    Gray(ImageView<'a>),
+    /// For the coloured cuboid.
+    Color(ColorView<'a>),
+}
+
+/// Finds the pose of a corner in the frames of a sequence, by one camera (attitude alone) or by two.
+#[derive(Debug, Clone)]
+pub struct CornerPoseEstimator {
+    pub(super) left: CornerDetector,
+    pub(super) right: Option<(CornerDetector, RigidMotion)>,
+    pub(super) options: EstimatorOptions,
+    pub(super) track: Option<Track>,
+    objects: u32,
+    pub(super) scratch: [CornerScratch; 2],
+}
+
+impl CornerPoseEstimator {
+    /// With one camera or two; `left_from_right` is the right camera's pose in the left one's frame.
+    ///
+    /// # Errors
+    /// [`Error::InvalidOption`] or [`Error::InvalidArgument`] for options out of their domain and for two detectors of
+    /// different front ends.
+    pub fn new(
+        left: CornerDetector,
+        right: Option<(CornerDetector, RigidMotion)>,
+        options: EstimatorOptions,
+    ) -> Result<Self> {
+        options.validate()?;
+        if let Some((right, left_from_right)) = &right {
+            let names = [left.options().method.name(), right.options().method.name()];
+            if names[0] != names[1] {
+                return Err(Error::argument("right", names[1], format!("the method of left, {}", names[0])));
+            }
+            if left_from_right.translation_m.norm() <= 0.0 {
+                return Err(Error::argument("left_from_right", "no baseline", "two cameras at different places"));
+            }
+        }
+        let scratch = [left.scratch(), right.as_ref().map_or(left.scratch(), |(right, _)| right.scratch())];
+        Ok(Self { left, right, options, track: None, objects: 0, scratch })
+    }
+
+    /// The left or only camera's detector.
+    pub fn left(&self) -> &CornerDetector {
+        &self.left
+    }
+
+    /// The right camera's detector and its pose in the left one's frame.
+    pub fn right(&self) -> Option<&(CornerDetector, RigidMotion)> {
+        self.right.as_ref()
+    }
+
+    /// The options.
+    pub fn options(&self) -> &EstimatorOptions {
+        &self.options
+    }
+
+    /// The number of objects so far, and the track of the last one, if there is one.
+    pub fn state(&self) -> (u32, Option<&Track>) {
+        (self.objects, self.track.as_ref())
+    }
+
+    /// The same estimator that goes on from a state.
+    #[must_use]
+    pub fn with_state(mut self, objects: u32, track: Option<Track>) -> Self {
+        (self.objects, self.track) = (objects, track);
+        self
+    }
+
+    /// Forgets what was seen.
+    pub fn reset(&mut self) {
+        self.track = None;
+    }
+
+    /// The direction of the vertical in the left camera's frame, from the last pose or from before.
+    pub(super) fn vertical(&self) -> Option<Vector3<f64>> {
+        let last = self.track.as_ref().map(|track| track.pose.camera_from_object.column(1).into_owned());
+        last.or(self.options.down)
+    }
+
+    pub(super) fn priors(&self, same_object: bool) -> Vec<AttitudePrior> {
+        let Some(track) = &self.track else {
+            let gravity = |down| AttitudePrior::Gravity {
+                down,
+                sigma_rad: self.options.down_sigma_rad,
+                sense: VerticalSense::Either,
+            };
+            return self.options.down.map(gravity).into_iter().collect();
+        };
+        let sigma_rad = self.options.turn_sigma_rad * f64::from(track.age).sqrt();
+        let rotation = track.pose.camera_from_object;
+        if same_object {
+            let covariance = Matrix3::from_diagonal_element(sigma_rad * sigma_rad);
+            return vec![AttitudePrior::Attitude { camera_from_object: rotation, covariance }];
+        }
+        vec![AttitudePrior::Gravity { down: rotation.column(1).into_owned(), sigma_rad, sense: VerticalSense::Either }]
+    }
+
+    /// The estimate from a frame: the image of the left or only camera, and that of the right one where there are two.
+    ///
+    /// # Errors
+    /// [`Error::InvalidArgument`] for images of another size or kind than the detectors', and for one image too many or few.
+    pub fn observe(&mut self, left: &Frame<'_>, right: Option<&Frame<'_>>) -> Result<CornerEstimate> {
+        if right.is_some() != self.right.is_some() {
+            let (got, expected) = if right.is_some() { ("an image", "none") } else { ("none", "an image") };
+            return Err(Error::argument("right image", got, format!("{expected}, as there are cameras")));
+        }
+        if let Some(track) = &mut self.track {
+            track.age += 1;
+        }
+        if self.track.as_ref().is_some_and(|track| track.age > self.options.forget_after) {
+            self.track = None;
+        }
+        let vertical = self.vertical();
+        let mut features = [Vec::new(), Vec::new()];
+        let followed = self.track.as_ref().map_or(&[][..], |track| &track.corners[..]);
+        let [of_left, of_right] = [0, 1].map(|side| followed.get(side).map_or(&[][..], Vec::as_slice));
+        detect(&self.left, left, vertical.as_ref(), of_left, &mut self.scratch[0], &mut features[0])?;
+        if let (Some((detector, left_from_right)), Some(right)) = (&self.right, right) {
+            let vertical = vertical.map(|vertical| left_from_right.rotation.transpose() * vertical);
+            detect(detector, right, vertical.as_ref(), of_right, &mut self.scratch[1], &mut features[1])?;
+        }
+        let mut estimate = CornerEstimate {
+            hypotheses: Vec::new(),
+            verdict: CornerVerdict::NoneFits,
+            features,
+            chosen_left: Vec::new(),
+            chosen_right: None,
+            ends: [None; 3],
+            followed: self.track.is_some(),
+            object: self.objects,
+        };
+        let starts = if self.right.is_some() { self.attitudes(&estimate.features)? } else { Vec::new() };
+        let common = self.common(&starts);
+        let attitude = common.map(|common| common.camera_from_object).or(starts.first().copied());
+        if let Some(attitude) = &attitude {
+            self.add_completed(left, right, attitude, &mut estimate.features);
+            self.add_transferred([left, right.unwrap_or(left)], attitude, &mut estimate.features)?;
+        }
+        let mut seen = Vec::new();
+        if estimate.features[0].is_empty() {
+            estimate.verdict = CornerVerdict::NoneLeft;
+        } else if right.is_some() && estimate.features[1].is_empty() {
+            estimate.verdict = CornerVerdict::NoneRight;
+        } else if self.right.is_some() {
+            seen = self.by_pair(attitude.as_ref(), common.as_ref(), &mut estimate)?;
+        } else {
+            self.by_one(&mut estimate)?;
+        }
+        if let Some(best) = estimate.hypotheses.first() {
+            let decided = best.probability >= self.options.probability_min;
+            estimate.verdict = if decided { CornerVerdict::Found } else { CornerVerdict::Ambiguous };
+        }
+        if let Some(right) = right {
+            estimate.ends = self.ends([left, right], &estimate);
+        }
+        if let Some(pose) = estimate.hypotheses.first().filter(|_| estimate.verdict == CornerVerdict::Found) {
+            if !self.track.as_ref().is_some_and(|track| track.is_of(pose)) {
+                self.objects += 1;
+                estimate.object = self.objects;
+            }
+            let turned = self.right.as_ref().map_or(Matrix3::identity(), |(_, motion)| motion.rotation.transpose());
+            let parallel = |side: usize, attitude: Matrix3<f64>| -> Vec<CornerFeature> {
+                let fits = |corner: &&CornerFeature| fits(corner, &attitude, self.options.agree_max_rad);
+                let mut out: Vec<CornerFeature> = Vec::new();
+                for corner in estimate.features[side].iter().filter(fits) {
+                    // The longest rays of each vertex.
+                    let apart_rad = |other: &CornerFeature| other.vertex().angle(&corner.vertex());
+                    match out.iter_mut().find(|other| apart_rad(other) < SAME_VERTEX_RAD) {
+                        Some(other) if other.support_score() < corner.support_score() => *other = *corner,
+                        Some(_) => {}
+                        None => out.push(*corner),
+                    }
+                }
+                out
+            };
+            let corners = [parallel(0, pose.camera_from_object), parallel(1, turned * pose.camera_from_object)];
+            self.track = Some(Track::next(self.track.take(), pose, corners, estimate.object, &seen));
+        }
+        Ok(estimate)
+    }
+
+    /// Where the edges of the pose end.
+    fn ends(&mut self, frames: [&Frame<'_>; 2], estimate: &CornerEstimate) -> [Option<EdgeEnd>; 3] {
+        let (Some((detector, left_from_right)), Some(pose), Some(chosen)) =
+            (&self.right, estimate.pose(), estimate.chosen_right)
+        else {
+            return [None; 3];
+        };
+        let (Some(vertex_m), [Frame::Gray(left), Frame::Gray(right)]) = (pose.vertex_m, frames) else {
+            return [None; 3];
+        };
+        if self.options.angle != IncludedAngle::RIGHT {
+            return [None; 3];
+        }
+        let corners = [&estimate.features[0][estimate.chosen_left[0]], &estimate.features[1][chosen]];
+        let [first, second] = &mut self.scratch;
+        let seen = [
+            self.left.ends(left, corners[0], pose, &RigidMotion::identity(), first),
+            detector.ends(right, corners[1], pose, &left_from_right.inverse(), second),
+        ];
+        edge_ends(seen, left_from_right, &vertex_m)
+    }
+
+    /// Whether edges and object are the same from frame to frame, as those of the coloured cuboid are.
+    pub(super) fn is_one_object(&self) -> bool {
+        matches!(self.left.options().method, CornerMethod::Coloured(_))
+    }
+
+    pub(super) fn right_handed(&self) -> Option<bool> {
+        self.options.right_handed.or(self.is_one_object().then_some(true))
+    }
+
+    /// Attitudes from one image: of all features that agree with one another.
+    fn by_one(&self, estimate: &mut CornerEstimate) -> Result<()> {
+        let features = &estimate.features[0];
+        let priors = self.priors(self.is_one_object());
+        let Some(agreed) = agreement(features, &self.options.angle, self.options.agree_max_rad, &priors)? else {
+            return Ok(());
+        };
+        let view = |attitudes| View { attitudes, common_from_camera: Matrix3::identity() };
+        let views: Vec<View<'_>> = agreed.attitudes.iter().map(view).collect();
+        let alignment = if views.len() > 1 { Alignment::Manhattan } else { Alignment::Same };
+        let resolved = resolve(&views, alignment, self.right_handed(), &priors)?;
+        estimate.hypotheses = resolved
+            .iter()
+            .filter_map(|resolved| {
+                let chosen = agreed.attitudes.first()?.get(*resolved.choice.first()?)?;
+                let mut covariance = Matrix6::zeros();
+                covariance.fixed_view_mut::<3, 3>(0, 0).copy_from(&resolved.covariance);
+                Some(Hypothesis {
+                    camera_from_object: self.named(resolved.common_from_object),
+                    edges: chosen.edges,
+                    vertex_m: None,
+                    covariance,
+                    probability: resolved.probability,
+                    right_handed: chosen.is_right_handed(),
+                    misfit: (resolved.chi_square / (3 * (views.len() - 1)).max(1) as f64).sqrt(),
+                })
+            })
+            .collect();
+        estimate.chosen_left = agreed.members;
+        Ok(())
+    }
+
+    /// The attitude with its edges named as they were in the frame before.
+    pub(super) fn named(&self, attitude: Matrix3<f64>) -> Matrix3<f64> {
+        match &self.track {
+            Some(track) if !self.is_one_object() && self.options.angle == IncludedAngle::RIGHT => {
+                renamed(&attitude, &track.pose.camera_from_object)
+            }
+            _ => attitude,
+        }
+    }
+}
+
+/// How far from where it was a corner is looked for first, in pixels: the fewer other edges are within reach the
+/// better. What is not found so is looked for at `follow_px`.
+const HARDLY_MOVED_PX: f64 = 3.0;
+
+/// The corners of an image: those that are near where they were, and those that are found anew.
+fn detect(
+    detector: &CornerDetector,
+    frame: &Frame<'_>,
+    vertical: Option<&Vector3<f64>>,
+    followed: &[CornerFeature],
+    scratch: &mut CornerScratch,
+    out: &mut Vec<CornerFeature>,
+) -> Result<()> {
+    match frame {
+        Frame::Gray(image) => {
+            detector.detect_general(image, vertical, scratch, out)?;
+            // Most hardly move, and the less is looked at the fewer other edges there are.
+            let again = followed.iter().map(ExpectedCorner::of).filter_map(|last| {
+                let near = detector.find_near(image, &last, Some(HARDLY_MOVED_PX), scratch);
+                near.or_else(|| detector.find_near(image, &last, None, scratch))
+            });
+            out.extend(again);
+            Ok(())
+        }
+        Frame::Color(image) => {
+            out.extend(detector.detect_coloured(image, None, scratch)?);
+            Ok(())
+        }
+    }
+}

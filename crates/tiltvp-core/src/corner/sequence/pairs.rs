@@ -1,0 +1,204 @@
+//! Poses from pairs of corners, one of each image.
+
+use nalgebra::{Matrix3, Vector3};
+
+use super::agreement::{apart, renamed};
+use super::estimator::CornerPoseEstimator;
+use super::support::CornerSupport;
+use super::transfer::upright;
+use crate::corner::closed_form::attitude::{IncludedAngle, corner_attitudes};
+use crate::corner::closed_form::prior::AttitudePrior;
+use crate::corner::estimate::{CornerEstimate, Hypothesis};
+use crate::corner::feature::CornerFeature;
+use crate::corner::fusion::{FusedPose, KnownAttitude, fuse_rays, fuse_rays_with};
+use crate::corner::general::common_attitude::CommonAttitude;
+use crate::corner::triangulation::{BearingObservation, triangulate};
+use crate::error::Result;
+use crate::geometry::RigidMotion;
+
+/// How far apart attitudes of different hypotheses are, radians: 2 degrees. Fits from two starts end far closer,
+/// different interpretations far apart.
+const SAME_POSE_RAD: f64 = 0.035;
+
+/// The share of the largest misfit up to which a corner that was not seen before can replace the tracked one.
+const WELL: f64 = 0.4;
+
+/// The least probability of a hypothesis that is returned.
+const PROBABILITY_MIN: f64 = 1e-9;
+
+impl CornerPoseEstimator {
+    /// Every pose that the rays of one corner in both images admit, the likeliest first. The attitudes of either image start the
+    /// fit to all six rays, so that a view that alone is weak (two rays in line) does no harm.
+    fn pair_poses(
+        &self,
+        [left, right]: [&CornerFeature; 2],
+        left_from_right: &RigidMotion,
+        priors: &[AttitudePrior],
+        common: Option<&CommonAttitude>,
+    ) -> Result<Vec<Hypothesis>> {
+        let cameras = [(left, RigidMotion::identity()), (right, left_from_right.inverse())];
+        let observation = |corner: &CornerFeature, rig_from_camera| BearingObservation {
+            bearing: corner.vertex(),
+            covariance: corner.vertex_covariance(),
+            rig_from_camera,
+        };
+        let seen = [observation(left, RigidMotion::identity()), observation(right, *left_from_right)];
+        let Some(vertex) = triangulate(&seen) else { return Ok(Vec::new()) };
+        let mut found: Vec<(f64, Hypothesis)> = Vec::new();
+        for (corner, rotation) in [(left, Matrix3::identity()), (right, left_from_right.rotation)] {
+            for own in corner_attitudes(corner, &self.options.angle)?.iter() {
+                let right_handed = own.is_right_handed();
+                if self.right_handed().is_some_and(|wanted| wanted != right_handed) {
+                    continue;
+                }
+                let (start, side) = (rotation * own.camera_from_object, if right_handed { 1.0 } else { -1.0 });
+                let Some(mut fused) = fuse_rays(&cameras, &self.options.angle, side, &start, &vertex.point_m) else {
+                    continue;
+                };
+                let mut misfit = (fused.chi_square / 6.0).sqrt();
+                // Covariances do not include edges that do not quite meet, or belong to more than one object.
+                let mut inflation = if self.is_one_object() { 1.0 } else { (misfit * misfit).max(1.0) };
+                if let Some(common) = common.and_then(|common| self.parallel(common, &fused)) {
+                    let Some(with) = fuse_with(&cameras, &self.options.angle, side, &fused, &common) else { continue };
+                    (fused, misfit, inflation) = with;
+                }
+                let as_seen = fused.rig_from_object;
+                let fused = FusedPose { rig_from_object: self.upright(fused.rig_from_object), ..fused };
+                let known = |(_, other): &(f64, Hypothesis)| {
+                    apart(&other.camera_from_object, &fused.rig_from_object) < SAME_POSE_RAD
+                };
+                if found.iter().any(known) {
+                    continue;
+                }
+                let spread = fused.covariance.fixed_view::<3, 3>(0, 0).into_owned();
+                let prior: f64 = priors.iter().map(|p| p.ln_likelihood(&fused.rig_from_object, &spread)).sum();
+                // Real edges miss by more than their covariances; the likelihoods allow for as much as the limit.
+                let scale = (0.25 * self.options.misfit_max).max(1.0).powi(2);
+                let (sin, cos) = self.options.angle.gamma_rad.sin_cos();
+                let edges = [Vector3::x(), Vector3::y(), Vector3::new(cos, 0.0, side * sin)];
+                let pose = Hypothesis {
+                    camera_from_object: fused.rig_from_object,
+                    edges: edges.map(|edge| as_seen * edge),
+                    vertex_m: Some(fused.vertex_m),
+                    covariance: fused.covariance * inflation,
+                    probability: 0.0,
+                    right_handed,
+                    misfit,
+                };
+                found.push((prior - 3.0 * misfit * misfit / scale, pose));
+            }
+        }
+        found.sort_by(|a, b| b.0.total_cmp(&a.0));
+        let best = found.first().map_or(0.0, |(most, _)| *most);
+        let total: f64 = found.iter().map(|(ln, _)| (ln - best).exp()).sum();
+        let named = |(ln, pose): (f64, Hypothesis)| Hypothesis {
+            camera_from_object: self.named(pose.camera_from_object),
+            probability: (ln - best).exp() / total,
+            ..pose
+        };
+        Ok(found.into_iter().map(named).filter(|pose| pose.probability >= PROBABILITY_MIN).collect())
+    }
+
+    /// The attitude that all edges of the frame have in common, named as a corner's own one that is near to it.
+    fn parallel(&self, common: &CommonAttitude, own: &FusedPose) -> Option<CommonAttitude> {
+        let named = renamed(&common.camera_from_object, &own.rig_from_object);
+        let near = apart(&named, &own.rig_from_object) <= self.options.parallel_max_rad;
+        near.then_some(CommonAttitude { camera_from_object: named, ..*common })
+    }
+
+    /// The same attitude with its axes in another order if another one than the second is nearest to the vertical: with right
+    /// angles any edge of a corner may be the upright one.
+    pub(crate) fn upright(&self, attitude: Matrix3<f64>) -> Matrix3<f64> {
+        match self.vertical() {
+            Some(vertical) if !self.is_one_object() && self.options.angle == IncludedAngle::RIGHT => {
+                upright(&attitude, &vertical)
+            }
+            _ => attitude,
+        }
+    }
+
+    /// The poses of the pair of features, one of each image, that fits best; of the corner that is followed or one that is known
+    /// beside it, where there is one. Where an `attitude` is known on which several corners agree, pairs that do not are left
+    /// out. Returns the poses of all pairs that fit well, chosen or not.
+    pub(crate) fn by_pair(
+        &self,
+        attitude: Option<&Matrix3<f64>>,
+        common: Option<&CommonAttitude>,
+        estimate: &mut CornerEstimate,
+    ) -> Result<Vec<Hypothesis>> {
+        let mut seen = Vec::new();
+        let Some((_, left_from_right)) = &self.right else { return Ok(seen) };
+        let priors = self.priors(self.is_one_object());
+        let (nearest, farthest) = (self.options.distance_min_m, self.options.distance_max_m);
+        let mut best: Option<(f64, Vec<Hypothesis>, usize, usize)> = None;
+        let support = CornerSupport::new(&estimate.features, left_from_right);
+        for (i, left) in estimate.features[0].iter().enumerate() {
+            for (j, right) in estimate.features[1].iter().enumerate() {
+                let poses = self.pair_poses([left, right], left_from_right, &priors, common)?;
+                let Some((pose, vertex)) = poses.first().and_then(|pose| Some((pose, pose.vertex_m?))) else {
+                    continue;
+                };
+                let misfit = pose.misfit;
+                let agrees = |attitude: &Matrix3<f64>| {
+                    let own = renamed(&pose.camera_from_object, attitude);
+                    apart(&own, attitude) <= self.options.agree_max_rad
+                };
+                if attitude.is_some_and(|attitude| !agrees(attitude)) {
+                    continue;
+                }
+                if misfit > self.options.misfit_max || !(nearest..=farthest).contains(&vertex.norm()) {
+                    continue;
+                }
+                let fits_well = misfit <= WELL * self.options.misfit_max;
+                if fits_well {
+                    seen.push(*pose);
+                }
+                let likely = match &self.track {
+                    Some(track) if !self.is_one_object() => track.likelihood(pose, fits_well),
+                    _ => Some(1.0),
+                };
+                let Some(likely) = likely else { continue };
+                let agreeing = support.of(pose);
+                let mut score =
+                    likely * agreeing * left.support_score().min(right.support_score()) / (1.0 + misfit * misfit);
+                if let Some(track) = &self.track {
+                    let turned = apart(&pose.camera_from_object, &track.pose.camera_from_object);
+                    score /= 1.0 + (turned / self.options.turn_sigma_rad).powi(2);
+                }
+                if best.as_ref().is_none_or(|(most, ..)| score > *most) {
+                    best = Some((score, poses, i, j));
+                }
+            }
+        }
+        if let Some((_, poses, i, j)) = best {
+            estimate.hypotheses = poses;
+            (estimate.chosen_left, estimate.chosen_right) = (vec![i], Some(j));
+        }
+        Ok(seen)
+    }
+}
+
+/// A corner's pose with the attitude that is known from other edges; its misfit in standard deviations of the rays, which
+/// scatter as the other edges do; and the factor by which the covariance is larger than it seems.
+fn fuse_with(
+    cameras: &[(&CornerFeature, RigidMotion)],
+    angle: &IncludedAngle,
+    side: f64,
+    own: &FusedPose,
+    common: &CommonAttitude,
+) -> Option<(FusedPose, f64, f64)> {
+    let start = &common.camera_from_object;
+    let variance = common.scatter * common.scatter;
+    let fuse = |inflation: f64| {
+        let known = KnownAttitude { rig_from_object: *start, covariance: common.covariance / inflation };
+        fuse_rays_with(cameras, angle, side, start, &own.vertex_m, Some(&known))
+    };
+    // Rays that miss by more than their covariances count less.
+    let inflation = |fused: &FusedPose| (fused.chi_square / FREEDOM).max(variance);
+    let first = inflation(&fuse(variance)?);
+    let fused = fuse(first)?;
+    Some((fused, (fused.chi_square / FREEDOM / variance).sqrt(), inflation(&fused)))
+}
+
+/// Degrees of freedom of twelve numbers of the rays and three of the attitude less six of the pose.
+const FREEDOM: f64 = 9.0;

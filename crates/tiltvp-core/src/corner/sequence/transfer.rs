@@ -1,0 +1,128 @@
+//! Corners of which one image shows two edges, and corners of one image looked for in the other one.
+
+use nalgebra::{Matrix3, Vector3};
+
+use super::agreement::{apart, fits, renamed};
+use super::estimator::{CornerPoseEstimator, Frame};
+use crate::corner::closed_form::attitude::corner_attitudes;
+use crate::corner::detector::CornerDetector;
+use crate::corner::feature::CornerFeature;
+use crate::corner::general::guided::ExpectedCorner;
+use crate::error::Result;
+use crate::geometry::RigidMotion;
+
+/// Most corners of one image that are looked for in the other, those with the longest rays, which bounds the time.
+const TRANSFERRED_MAX: usize = 8;
+
+/// Distances that are tried before those are dropped that are less than a step apart: the disparity of a full-HD pair
+/// in steps of [`EPIPOLAR_STEP_PX`], twice over.
+const DISTANCES: u32 = 1000;
+
+/// How far from the last vertex' distance other corners may be, as a share of it: a room's furniture about the tracked
+/// corner.
+const NEAR_LAST: f64 = 0.35;
+
+/// How far apart the places are at which a corner is looked for along its epipolar line, in pixels. The search reaches
+/// as far, so neighbours overlap by half.
+const EPIPOLAR_STEP_PX: f64 = 4.0;
+
+impl CornerPoseEstimator {
+    /// Adds the corners of which two edges were found and the third is known from an attitude in the left camera's frame.
+    pub(crate) fn add_completed(
+        &mut self,
+        left: &Frame<'_>,
+        right: Option<&Frame<'_>>,
+        attitude: &Matrix3<f64>,
+        features: &mut [Vec<CornerFeature>; 2],
+    ) {
+        // The vertical is the axis nearest to what is known of it, so that edges are named as those found before.
+        let attitude = self.vertical().map_or(*attitude, |vertical| upright(attitude, &vertical));
+        let most_rad = self.options.agree_max_rad;
+        let mut found = Vec::new();
+        let mut add =
+            |detector: &CornerDetector, frame: &Frame<'_>, own: Matrix3<f64>, scratch: &mut _, side: usize| {
+                if let Frame::Gray(image) = frame {
+                    found.clear();
+                    detector.complete(image, &own, scratch, &mut found);
+                    features[side].extend(found.iter().filter(|corner| fits(corner, &own, most_rad)));
+                }
+            };
+        add(&self.left, left, attitude, &mut self.scratch[0], 0);
+        if let (Some((detector, motion)), Some(right)) = (&self.right, right) {
+            add(detector, right, motion.rotation.transpose() * attitude, &mut self.scratch[1], 1);
+        }
+    }
+
+    /// Adds the corners of either image to those of the other one where they are seen there: each is looked for along its
+    /// epipolar line, near the distance of the last pose where there is one.
+    pub(crate) fn add_transferred(
+        &mut self,
+        frames: [&Frame<'_>; 2],
+        attitude: &Matrix3<f64>,
+        features: &mut [Vec<CornerFeature>; 2],
+    ) -> Result<()> {
+        let Some((detector, left_from_right)) = &self.right else { return Ok(()) };
+        let right_from_left = left_from_right.inverse();
+        let detectors = [&self.left, detector];
+        let attitudes = [*attitude, right_from_left.rotation * attitude];
+        let (angle, most_rad) = (self.options.angle, self.options.agree_max_rad);
+        let mut found: [Vec<CornerFeature>; 2] = [Vec::new(), Vec::new()];
+        for (own, other, other_from_own) in [(0, 1, &right_from_left), (1, 0, left_from_right)] {
+            let Frame::Gray(image) = frames[other] else { continue };
+            let mut order: Vec<&CornerFeature> = features[own].iter().collect();
+            order.sort_by(|a, b| b.support_score().total_cmp(&a.support_score()));
+            for corner in order.into_iter().take(TRANSFERRED_MAX) {
+                let admitted = corner_attitudes(corner, &angle)?;
+                let near = admitted.iter().find(|admitted| {
+                    let renamed = renamed(&admitted.camera_from_object, &attitudes[own]);
+                    apart(&renamed, &attitudes[own]) <= most_rad
+                });
+                let Some(near) = near else { continue };
+                let mut best: Option<CornerFeature> = None;
+                for distance_m in self.distances(detectors[other], &corner.vertex(), other_from_own) {
+                    let expected = ExpectedCorner::transferred(corner, &near.edges, distance_m, other_from_own);
+                    let seen = expected.and_then(|expected| {
+                        detectors[other].find_near(image, &expected, Some(EPIPOLAR_STEP_PX), &mut self.scratch[other])
+                    });
+                    let Some(seen) = seen.filter(|seen| fits(seen, &attitudes[other], most_rad)) else { continue };
+                    if best.as_ref().is_none_or(|best| seen.support_score() > best.support_score()) {
+                        best = Some(seen);
+                    }
+                }
+                found[other].extend(best);
+            }
+        }
+        for (features, found) in features.iter_mut().zip(found) {
+            features.extend(found);
+        }
+        Ok(())
+    }
+
+    /// Distances of a point along a bearing of one camera, so that the other one sees them a step apart; only those near that of
+    /// the last pose, where there is one.
+    fn distances(&self, other: &CornerDetector, bearing: &Vector3<f64>, other_from_own: &RigidMotion) -> Vec<f64> {
+        let (nearest, farthest) = (self.options.distance_min_m, self.options.distance_max_m);
+        let last = self.track.as_ref().and_then(|track| track.pose.vertex_m).map(|vertex| vertex.norm());
+        let (near, far) = last.map_or((nearest, farthest), |last| (last * (1.0 - NEAR_LAST), last * (1.0 + NEAR_LAST)));
+        let mut out = Vec::new();
+        let mut before: Option<nalgebra::Vector2<f64>> = None;
+        for step in 0..=DISTANCES {
+            let share = f64::from(step) / f64::from(DISTANCES);
+            let distance_m = 1.0 / (1.0 / far + share * (1.0 / near - 1.0 / far));
+            let Some(pixel) = other.camera().project(&other_from_own.point(&(bearing * distance_m))) else { continue };
+            let moved = before.is_none_or(|before| (pixel - before).norm() >= EPIPOLAR_STEP_PX);
+            if moved && other.camera().contains(&pixel) {
+                out.push(distance_m);
+                before = Some(pixel);
+            }
+        }
+        out
+    }
+}
+
+/// The same axes with the one that is nearest to a vertical as the second.
+pub(crate) fn upright(attitude: &Matrix3<f64>, vertical: &Vector3<f64>) -> Matrix3<f64> {
+    let nearest = attitude.tr_mul(vertical).abs().imax();
+    let axis = |k: usize| attitude.column((nearest + k) % 3).into_owned();
+    Matrix3::from_columns(&[axis(2), axis(0), axis(1)])
+}

@@ -1,0 +1,90 @@
+//! The vertex in space, from its bearings in two or more cameras of any kind (section III-F).
+
+use nalgebra::{Matrix2, Matrix3, Vector3};
+
+use crate::geometry::{RigidMotion, tangent_basis};
+
+/// A bearing of a point, from a camera of a rig.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct BearingObservation {
+    /// Unit bearing, camera frame.
+    pub bearing: Vector3<f64>,
+    /// Its covariance in square radians, in the plane of [`tangent_basis`] at it.
+    pub covariance: Matrix2<f64>,
+    /// Where the camera is in the rig.
+    pub rig_from_camera: RigidMotion,
+}
+
+/// A point in space.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TriangulatedPoint {
+    /// The point in the rig's frame, metres.
+    pub point_m: Vector3<f64>,
+    /// Its covariance, square metres.
+    pub covariance_m2: Matrix3<f64>,
+    /// Sum of the squared misses of the bearings, each by its variance: chi-square of two degrees of freedom per bearing
+    /// less three.
+    pub chi_square: f64,
+}
+
+/// Gauss-Newton steps from the point nearest to the lines of sight. Convergence is quadratic from a start that is a few
+/// standard deviations off; a step below rounding ends it earlier.
+const STEPS: usize = 6;
+
+/// Variance of a bearing below which rounding is what is left, square radians: (1e-15 rad)^2.
+const VARIANCE_MIN: f64 = 1e-30;
+
+/// The point with the least sum of squared misses of the bearings, each by its covariance.
+///
+/// `None` for fewer than two observations, for lines of sight that are parallel to rounding, and where a camera would have the
+/// point behind it.
+pub fn triangulate(observations: &[BearingObservation]) -> Option<TriangulatedPoint> {
+    if observations.len() < 2 {
+        return None;
+    }
+    let (mut matrix, mut right) = (Matrix3::zeros(), Vector3::zeros());
+    for observation in observations {
+        let along = observation.rig_from_camera.rotation * observation.bearing;
+        let across = Matrix3::identity() - along * along.transpose();
+        matrix += across;
+        right += across * observation.rig_from_camera.translation_m;
+    }
+    // The least eigenvalue is about half of the squared angle between the lines of sight.
+    let apart = matrix.symmetric_eigenvalues().min();
+    if apart <= PARALLEL || apart.is_nan() {
+        return None;
+    }
+    let mut point = matrix.try_inverse()? * right;
+    for step in 0..=STEPS {
+        let (mut information, mut pull, mut chi_square) = (Matrix3::zeros(), Vector3::zeros(), 0.0);
+        for observation in observations {
+            let rotation = observation.rig_from_camera.rotation;
+            let to = rotation.transpose() * (point - observation.rig_from_camera.translation_m);
+            let distance = to.norm();
+            let seen = to / distance;
+            let ahead = seen.dot(&observation.bearing);
+            if ahead <= 0.0 || ahead.is_nan() {
+                return None;
+            }
+            let basis = tangent_basis(&observation.bearing).transpose();
+            let weight = (observation.covariance + Matrix2::from_diagonal_element(VARIANCE_MIN)).try_inverse()?;
+            let miss = basis * seen;
+            let by_point = basis * (Matrix3::identity() - seen * seen.transpose()) * rotation.transpose() / distance;
+            information += by_point.transpose() * weight * by_point;
+            pull += by_point.transpose() * (weight * miss);
+            chi_square += miss.dot(&(weight * miss));
+        }
+        let covariance_m2 = information.try_inverse()?;
+        let move_m = covariance_m2 * pull;
+        if step == STEPS || move_m.norm() <= 1e-14 * point.norm() {
+            let finite = point.iter().chain(covariance_m2.iter()).all(|x| x.is_finite());
+            return finite.then_some(TriangulatedPoint { point_m: point, covariance_m2, chi_square });
+        }
+        point -= move_m;
+    }
+    None
+}
+
+/// Least eigenvalue of the sum of projections across the lines of sight, about half of their squared angle: 1e-8 rad,
+/// at which the distance is rounding. The test of parallel lines of sight meets it.
+const PARALLEL: f64 = 1e-16;

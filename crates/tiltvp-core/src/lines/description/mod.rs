@@ -1,0 +1,6 @@
+//! Descriptors of lines: image patches along a line, histograms of gradient orientation, and distances between descriptors.
+
+pub(super) mod descriptor;
+pub(super) mod dissimilarity;
+mod histogram;
+pub(super) mod patch;

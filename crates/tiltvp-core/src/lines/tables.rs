@@ -1,0 +1,144 @@
+//! Tables that a line extractor computes once for a camera: the pixels it looks at, their rays, and the elevations it sees.
+
+use nalgebra::{Matrix3, Vector2};
+use tiltvp_kernels::prefetch::prefetch;
+
+use super::options::LineOptions;
+use crate::camera::Camera;
+use crate::edges::{EdgeOptions, LiftTable, NormalKind, Region, Screen};
+use crate::error::Result;
+
+/// The unit of a table of bearings: the largest that 16 bits hold for components from -1 to 1.
+const UNIT: f32 = 1.0 / 32767.0;
+
+/// First component of what is no bearing.
+const NO_RAY: i16 = i16::MIN;
+
+/// Tables of one camera.
+#[derive(Debug, Clone)]
+pub(super) struct LineTables {
+    pub(super) region: Region,
+    pub(super) lift: LiftTable,
+    pub(super) screen: Screen,
+    /// Bearing of every pixel in the robot frame, in row order and units of [`UNIT`]: half the memory of single precision, to
+    /// a thousandth of a degree. [`NO_RAY`] where there is none.
+    rays: Vec<[i16; 3]>,
+    /// How many pixels away, along rows, columns or both, the nearest is at or around which the world is not seen, at most 255;
+    /// in row order.
+    pub(super) clearance: Vec<u8>,
+    pub(super) width: usize,
+    pub(super) height: usize,
+    /// Lowest and highest elevation, in radians, that are seen in most directions.
+    pub(super) band: (f64, f64),
+}
+
+impl LineTables {
+    pub(super) fn new(camera: &Camera, robot_from_camera: &Matrix3<f64>, options: &LineOptions) -> Result<Self> {
+        // Ridges look at the neighbours' gradients.
+        let edges = EdgeOptions { margin_px: options.edges.margin_px + 1.0, ..options.edges };
+        let region = Region::new(camera, robot_from_camera, &edges, options.mask.as_ref())?;
+        let lift = LiftTable::new(camera, robot_from_camera, &region, NormalKind::Tangent);
+        let screen = lift.screen(1.0);
+        let (width, height) = (camera.width() as usize, camera.height() as usize);
+        let rays = (0..width * height).map(|i| {
+            let pixel = Vector2::new((i % width) as f64, (i / width) as f64);
+            camera.unproject(&pixel).map_or([NO_RAY; 3], |ray| {
+                let ray = (robot_from_camera * ray) / f64::from(UNIT);
+                [ray.x, ray.y, ray.z].map(|x| x.round().clamp(-32767.0, 32767.0) as i16)
+            })
+        });
+        let rays: Vec<[i16; 3]> = rays.collect();
+        let usable = |u: usize, v: usize| {
+            rays[v * width + u][0] != NO_RAY && options.mask.as_ref().is_none_or(|mask| mask.usable(u, v))
+        };
+        let mut clear = vec![0; width * height];
+        for v in 1..height.saturating_sub(1) {
+            for u in 1..width.saturating_sub(1) {
+                let sees = (v - 1..=v + 1).all(|y| (u - 1..=u + 1).all(|x| usable(x, y)));
+                clear[v * width + u] = u8::MAX * u8::from(sees);
+            }
+        }
+        let clearance = distances(clear, width);
+        let band = band_of(&region);
+        Ok(Self { region, lift, screen, rays, clearance, width, height, band })
+    }
+
+    /// Whether the world is seen at every pixel up to `reach` away from `(u, v)`, along rows, columns or both, and around it.
+    #[inline]
+    pub(super) fn is_clear_around(&self, u: i32, v: i32, reach: u32) -> bool {
+        let (Ok(u), Ok(v)) = (usize::try_from(u), usize::try_from(v)) else { return false };
+        u < self.width && self.clearance.get(v * self.width + u).is_some_and(|clear| u32::from(*clear) > reach)
+    }
+
+    /// Asks for the rays of a pixel and one above or below it, which will be read soon.
+    #[inline]
+    pub(super) fn expect(&self, u: usize, v: usize, beside: usize) {
+        prefetch(&self.rays, v * self.width + u);
+        prefetch(&self.rays, beside * self.width + u);
+    }
+
+    /// The ray of a pixel, and whether it has one.
+    #[inline]
+    pub(super) fn ray(&self, u: usize, v: usize) -> Option<[f32; 3]> {
+        match self.rays.get(v * self.width + u) {
+            Some([x, y, z]) if *x != NO_RAY => Some([f32::from(*x) * UNIT, f32::from(*y) * UNIT, f32::from(*z) * UNIT]),
+            _ => None,
+        }
+    }
+}
+
+/// From 255 and 0 the distances to the nearest 0, along rows, columns or both, of an image whose border is 0.
+fn distances(mut values: Vec<u8>, width: usize) -> Vec<u8> {
+    let relax = |values: &mut [u8], at: usize, before: [usize; 4]| {
+        let nearest = before.into_iter().map(|k| values[k]).min().unwrap_or(0);
+        values[at] = values[at].min(nearest.saturating_add(1));
+    };
+    let inner = |at: &usize| (1..width.saturating_sub(1)).contains(&(at % width));
+    let rows = width..values.len().saturating_sub(width);
+    for at in rows.clone().filter(inner) {
+        relax(&mut values, at, [at - 1, at - width - 1, at - width, at - width + 1]);
+    }
+    for at in rows.rev().filter(inner) {
+        relax(&mut values, at, [at + 1, at + width - 1, at + width, at + width + 1]);
+    }
+    values
+}
+
+/// The elevations that three quarters of the directions see, of those that see any.
+fn band_of(region: &Region) -> (f64, f64) {
+    const SECTORS: usize = 90;
+    let mut seen = [(f64::INFINITY, f64::NEG_INFINITY); SECTORS];
+    for (_, _, ray) in region.pixels() {
+        let turn = ray.y.atan2(ray.x) / std::f64::consts::TAU + 0.5;
+        let sector = &mut seen[((turn * SECTORS as f64) as usize).min(SECTORS - 1)];
+        let elevation = ray.z.atan2(ray.xy().norm());
+        *sector = (sector.0.min(elevation), sector.1.max(elevation));
+    }
+    let sorted = |pick: fn(&(f64, f64)) -> f64| {
+        let mut values: Vec<f64> = seen.iter().filter(|sector| sector.0 <= sector.1).map(pick).collect();
+        values.sort_by(f64::total_cmp);
+        values
+    };
+    let (lows, highs) = (sorted(|sector| sector.0), sorted(|sector| sector.1));
+    let (low, high) = (lows[3 * (lows.len() - 1) / 4], highs[(highs.len() - 1) / 4]);
+    // A camera that sees no elevation in most directions: what it sees in any.
+    if high - low > 0.05 { (low, high) } else { (lows[0], highs[highs.len() - 1].max(lows[0] + 0.05)) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn distances_are_those_to_the_nearest_zero() {
+        let (width, height) = (23, 17);
+        let edge = |at: usize, n: usize| at == 0 || at + 1 == n;
+        let zero = |i: usize| edge(i % width, width) || edge(i / width, height) || (i * 7919).is_multiple_of(83);
+        let values: Vec<u8> = (0..width * height).map(|i| if zero(i) { 0 } else { 255 }).collect();
+        for (at, found) in distances(values, width).into_iter().enumerate() {
+            let away = |i: usize| (i % width).abs_diff(at % width).max((i / width).abs_diff(at / width));
+            let nearest = (0..width * height).filter(|i| zero(*i)).map(away).min().unwrap();
+            assert_eq!(usize::from(found), nearest);
+        }
+    }
+}

@@ -1,0 +1,103 @@
+//! The cluster-robust covariance of the mounting (Liang and Zeger 1986), for errors that a landmark's bearings share.
+
+use nalgebra::{DMatrix, Matrix3, RowVector3, SymmetricEigen, Vector3};
+
+use super::problem::BundleProblem;
+use super::schur::ReducedSystem;
+use crate::selfcalib::model::OUTLIER_SIGMAS;
+
+/// Standard deviations beyond which the sum of the products of successive residuals is not due to chance: 3 in 100,000 drives
+/// with white noise, so that their covariances stay as they are.
+const CORRELATED_SIGMAS: f64 = 4.0;
+
+/// The number of parameters of the mounting, the first of the shared ones.
+const MOUNTING_WIDTH: usize = 3;
+
+impl BundleProblem {
+    /// The factor `F` that widens the covariance `C` of the mounting to the cluster-robust `F C F^T`, which is in no direction
+    /// narrower. The identity where successive residuals of the landmarks are independent.
+    ///
+    /// A bearing with residual `r`, Jacobian `J` and weight `w` moves the solution by `u = C J^T w r`. The part of `C` that comes
+    /// from bearings is replaced by the sum over landmarks of `(sum u) (sum u)^T`, the sum being over the bearings of one
+    /// landmark. `covariance` is the inverse of the normal equations, with or without the last pose.
+    pub(crate) fn covariance_widening(&self, system: &ReducedSystem, covariance: &DMatrix<f64>) -> Matrix3<f64> {
+        if !self.residuals_are_correlated() {
+            return Matrix3::identity();
+        }
+        let (width, calibration_width) = (self.width(), self.free.width());
+        let kept = covariance.nrows() - width;
+        let columns: [_; MOUNTING_WIDTH] = std::array::from_fn(|k| {
+            let column = covariance.column(kept + k);
+            let shared = column.rows(kept, width).into_owned();
+            let last = (kept > 0).then(|| column.fixed_rows::<3>(0).into_owned());
+            let poses = system.pose_derivatives(&shared, last, self.keyframes.len());
+            (shared, poses)
+        });
+        let own: Matrix3<f64> = covariance.fixed_view::<3, 3>(kept, kept).into();
+        let points = self.homogeneous_landmarks();
+        let (mut together, mut alone) = (vec![Vector3::zeros(); self.landmarks.len()], Matrix3::zeros());
+        for (i, keyframe) in self.keyframes.iter().enumerate() {
+            self.for_each_bearing_row(keyframe, &points, |row| {
+                let along = RowVector3::from_fn(|_, k| {
+                    let (shared, poses) = &columns[k];
+                    let by_calibration: f64 = (0..calibration_width).map(|c| row.by_calibration[c] * shared[c]).sum();
+                    let by_landmark = row.by_landmark[0] * shared[row.at] + row.by_landmark[1] * shared[row.at + 1];
+                    row.by_pose.dot(&poses[i]) + by_calibration + by_landmark
+                });
+                alone += along.transpose() * along * row.weight;
+                together[(row.at - calibration_width) / 2] += along.transpose() * (row.weight * row.residual);
+            });
+        }
+        let seen = together.iter().filter(|u| **u != Vector3::zeros()).count() as f64;
+        let square = |u: &Vector3<f64>| u * u.transpose();
+        let together = together.iter().map(square).sum::<Matrix3<f64>>() * (seen / (seen - 1.0).max(1.0));
+        widening_factor(&own, &(own - alone + together))
+    }
+
+    /// Whether successive residuals of the landmarks are positively correlated.
+    fn residuals_are_correlated(&self) -> bool {
+        let mut before: Vec<Option<f64>> = vec![None; self.landmarks.len()];
+        let (mut sum, mut squares) = (0.0, 0.0);
+        for (observation, residual) in
+            self.keyframes.iter().flat_map(|keyframe| &keyframe.observations).zip(self.residuals())
+        {
+            let now = Some(residual).filter(|r| r.abs() < OUTLIER_SIGMAS);
+            if let (Some(last), Some(now)) = (std::mem::replace(&mut before[observation.landmark], now), now) {
+                sum += last * now;
+                squares += (last * now).powi(2);
+            }
+        }
+        sum > CORRELATED_SIGMAS * squares.sqrt()
+    }
+}
+
+/// `F` such that `F C F^T` is `wide`, but in no direction narrower than `C`.
+pub(crate) fn widening_factor(own: &Matrix3<f64>, wide: &Matrix3<f64>) -> Matrix3<f64> {
+    let Some(factor) = own.cholesky() else { return Matrix3::identity() };
+    let lower = factor.l();
+    let Some(inverse) = lower.try_inverse() else { return Matrix3::identity() };
+    let ratio = inverse * wide * inverse.transpose();
+    let eigen = SymmetricEigen::new(0.5 * (ratio + ratio.transpose()));
+    if !eigen.eigenvalues.iter().all(|value| value.is_finite()) {
+        return Matrix3::identity();
+    }
+    let root = Matrix3::from_diagonal(&eigen.eigenvalues.map(|value| value.max(1.0).sqrt()));
+    lower * eigen.eigenvectors * root * eigen.eigenvectors.transpose() * inverse
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn widens_where_it_should_and_never_narrows() {
+        let own = Matrix3::new(4.0, 1.0, 0.5, 1.0, 2.0, 0.3, 0.5, 0.3, 1.0);
+        let f = widening_factor(&own, &(own * 4.0));
+        assert!((f * own * f.transpose() - own * 4.0).amax() < 1e-12);
+        let f = widening_factor(&own, &(own * 0.25));
+        assert!((f * own * f.transpose() - own).amax() < 1e-12);
+        let more = own + Matrix3::from_diagonal(&Vector3::new(0.0, 3.0, 0.0));
+        let f = widening_factor(&own, &more);
+        assert!((f * own * f.transpose() - more).amax() < 1e-12);
+    }
+}

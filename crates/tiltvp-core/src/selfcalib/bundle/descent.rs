@@ -1,0 +1,164 @@
+//! The solution of a bundle problem: Gauss-Newton where it is nearly solved, Levenberg-Marquardt elsewhere.
+
+use nalgebra::{DVector, Vector3};
+
+use super::cholesky::CholeskyFactor;
+use super::problem::BundleProblem;
+use super::schur::ReducedSystem;
+use crate::selfcalib::model::FitSummary;
+
+/// Damping, as a share of the normal equations' diagonal, with which Levenberg-Marquardt starts where little is known: small
+/// against every parameter that the drive determines, large against those that it does not.
+pub(crate) const FIRST_DAMPING: f64 = 1e-3;
+
+/// Damping with which it starts, or goes on, after a Gauss-Newton step that led up.
+const SMALL_DAMPING: f64 = 1e-4;
+
+/// Damping below which it is set to zero: there a step is that of Gauss-Newton to rounding.
+const LEAST_DAMPING: f64 = 1e-9;
+
+/// Damping above which there is no way down: a step is then below rounding.
+const MOST_DAMPING: f64 = 1e9;
+
+/// Damping from which on a small gain does not mean convergence: the step is short because of the damping.
+const CONVERGED_DAMPING: f64 = 1e-2;
+
+/// Relative difference of two costs that may be rounding of sums over some ten thousand residuals.
+const ROUNDING: f64 = 1e-9;
+
+/// How an optimisation ended.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct DescentReport {
+    pub(crate) iterations: u32,
+    pub(crate) converged: bool,
+    pub(crate) cost: f64,
+}
+
+/// The normal equations of (last pose, shared parameters) at a solution, and how well it fits.
+pub(crate) struct Solution {
+    pub(crate) system: ReducedSystem,
+    pub(crate) fit: FitSummary,
+}
+
+/// The values of all unknowns.
+struct SavedValues {
+    poses: Vec<Vector3<f64>>,
+    shared: DVector<f64>,
+}
+
+impl BundleProblem {
+    fn save(&self) -> SavedValues {
+        SavedValues { poses: self.keyframes.iter().map(|keyframe| keyframe.pose).collect(), shared: self.shared() }
+    }
+
+    fn restore(&mut self, saved: &SavedValues) {
+        for (keyframe, pose) in self.keyframes.iter_mut().zip(&saved.poses) {
+            keyframe.pose = *pose;
+        }
+        self.set_shared(&saved.shared);
+    }
+
+    /// Moves all unknowns by the solution of normal equations. Returns the predicted reduction of the cost by the step of the
+    /// parameters that were not eliminated. `None`, without a move, where the equations are singular or the step is not finite.
+    pub(crate) fn take_step(&mut self, system: &ReducedSystem) -> Option<f64> {
+        let step = CholeskyFactor::regularised(system.equations.information.clone())?.solve(&system.equations.rhs)?;
+        let predicted_reduction = 0.5 * step.dot(&system.equations.rhs);
+        let width = self.width();
+        let kept = (step.len() > width).then(|| step.fixed_rows::<3>(0).into());
+        let step = step.rows(step.len() - width, width).into_owned();
+        let shared = self.shared() + &step;
+        if !shared.iter().all(|x| x.is_finite()) {
+            return None;
+        }
+        let steps = system.pose_steps(&step, kept, self.keyframes.len());
+        for (keyframe, step) in self.keyframes.iter_mut().zip(steps) {
+            keyframe.pose += step;
+        }
+        self.set_shared(&shared);
+        Some(predicted_reduction)
+    }
+
+    /// Levenberg-Marquardt until the cost falls by less than `tolerance`.
+    pub(crate) fn levenberg_marquardt(
+        &mut self,
+        max_iterations: u32,
+        tolerance: f64,
+        mut damping: f64,
+    ) -> DescentReport {
+        let mut cost = self.cost();
+        let mut iterations = 0;
+        while iterations < max_iterations {
+            iterations += 1;
+            let before = self.save();
+            let last = self.keyframes.len() - 1;
+            let moved = self.eliminate_poses(last, false, damping).and_then(|system| self.take_step(&system));
+            let lower = moved.map(|_| self.cost()).filter(|next| next.is_finite() && *next <= cost + ROUNDING * cost);
+            if let Some(next) = lower {
+                let gain = cost - next;
+                cost = next;
+                let was = damping;
+                damping = if damping < LEAST_DAMPING { 0.0 } else { 0.1 * damping };
+                if gain < tolerance && was < CONVERGED_DAMPING {
+                    return DescentReport { iterations, converged: true, cost };
+                }
+            } else {
+                if moved.is_some() {
+                    self.restore(&before);
+                }
+                damping = if damping == 0.0 { SMALL_DAMPING } else { 10.0 * damping };
+                if damping > MOST_DAMPING {
+                    break;
+                }
+            }
+        }
+        DescentReport { iterations, converged: false, cost }
+    }
+
+    /// Gauss-Newton until the linear problem predicts the cost to within `tolerance`, or [`Self::levenberg_marquardt`] where a
+    /// step leads up. After a `rough` start the first prediction is not compared. Returns the normal equations at the solution;
+    /// `None` where they are singular.
+    pub(crate) fn gauss_newton(&mut self, max_iterations: u32, tolerance: f64, rough: bool) -> Option<Solution> {
+        let last = self.keyframes.len() - 1;
+        let mut reached = f64::INFINITY;
+        let mut before = self.save();
+        for iteration in 0..max_iterations {
+            let here = self.eliminate_poses(last, true, 0.0).filter(|here| !rises(here.fit.cost, reached));
+            let Some(here) = here else { break };
+            before = self.save();
+            reached = here.fit.cost;
+            let Some(predicted_reduction) = self.take_step(&here) else { break };
+            if rough && iteration == 0 {
+                continue;
+            }
+            let fit = self.fit();
+            if (fit.cost - (here.fit.cost - here.predicted_reduction - predicted_reduction)).abs() < tolerance {
+                return Some(Solution { system: here, fit });
+            }
+            if rises(fit.cost, reached) {
+                self.restore(&before);
+                self.levenberg_marquardt(max_iterations - iteration, tolerance, SMALL_DAMPING);
+                return self.solution();
+            }
+            reached = fit.cost;
+        }
+        let solution = self.solution().filter(|solution| !rises(solution.fit.cost, reached));
+        if solution.is_some() {
+            return solution;
+        }
+        self.restore(&before);
+        self.levenberg_marquardt(max_iterations, tolerance, SMALL_DAMPING);
+        self.solution()
+    }
+
+    /// The normal equations and the fit at the current values.
+    pub(crate) fn solution(&self) -> Option<Solution> {
+        let here = self.eliminate_poses(self.keyframes.len() - 1, true, 0.0)?;
+        let fit = here.fit;
+        Some(Solution { system: here, fit })
+    }
+}
+
+/// Whether a cost is above another one beyond rounding, or NaN.
+fn rises(cost: f64, reached: f64) -> bool {
+    cost.is_nan() || cost > reached * (1.0 + ROUNDING)
+}

@@ -1,0 +1,21 @@
+//! Bundle adjustment: keyframes, landmarks and mounting as one sparse least-squares problem. The sliding window and the whole
+//! log both solve it.
+
+mod cholesky;
+mod cluster_robust;
+mod descent;
+mod keyframe;
+mod landmark_distance;
+mod linearisation;
+mod pose_elimination;
+mod problem;
+mod scatter;
+mod schur;
+
+pub(super) use self::cholesky::{CholeskyFactor, combine, subtract_square};
+pub(super) use self::cluster_robust::widening_factor;
+pub(super) use self::descent::{DescentReport, FIRST_DAMPING, Solution};
+pub(super) use self::keyframe::{Keyframe, Observation};
+pub(super) use self::landmark_distance::{DISTANCE_STEP, DISTANCE_STEPS};
+pub(super) use self::problem::{BundleProblem, FreeParameters};
+pub(super) use self::schur::ReducedSystem;

@@ -1,0 +1,242 @@
+//! The bundle-adjustment problem: its unknowns, its prior and its cost.
+
+use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
+
+use super::keyframe::{Keyframe, Observation};
+use crate::selfcalib::model::{
+    BearingLoss, FitSummary, InverseDistanceLandmark, MotionLoss, MotionNoise, Viewpoint, Wheels, between, compose,
+    compose_jacobians, preintegrate,
+};
+use crate::selfcalib::options::SelfCalibratorOptions;
+
+/// Which calibration parameters are estimated beside the mounting.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub(crate) struct FreeParameters {
+    pub(crate) wheels: bool,
+    pub(crate) offset: bool,
+}
+
+impl FreeParameters {
+    /// The number of calibration parameters; those of the landmarks follow.
+    pub(crate) fn width(self) -> usize {
+        3 + 2 * usize::from(self.wheels) + usize::from(self.offset)
+    }
+
+    /// The place of the time offset among them.
+    pub(crate) fn offset_at(self) -> usize {
+        3 + 2 * usize::from(self.wheels)
+    }
+}
+
+/// A chain of keyframes from a fixed first one, and the parameters that they share: mounting, wheels and time offset if free,
+/// then landmarks.
+///
+/// The cost is half the sum of the squared, whitened residuals of odometry and bearings (with robust losses) and of the prior.
+#[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub(crate) struct BundleProblem {
+    pub(crate) mounting: Vector3<f64>,
+    pub(crate) wheels: Wheels,
+    pub(crate) offset_s: f64,
+    pub(crate) free: FreeParameters,
+    pub(crate) noise: MotionNoise,
+    pub(crate) landmarks: Vec<InverseDistanceLandmark>,
+    pub(crate) keyframes: Vec<Keyframe>,
+    /// Mean of the shared parameters without the bearings of the keyframes.
+    pub(crate) prior_mean: DVector<f64>,
+    /// Information about them.
+    pub(crate) prior_information: DMatrix<f64>,
+    pub(crate) bearing_sigma: f64,
+    /// The scatter of each landmark's bearings, in units of `bearing_sigma`.
+    pub(crate) scatters: Vec<f64>,
+    pub(crate) loss: BearingLoss,
+    pub(crate) slip: MotionLoss,
+}
+
+/// Standard deviations of the weak priors on (imbalance, logarithm of the wheel base) and on the time offset, seconds. Wheels
+/// are known to 20 % and clocks to a second at worst. A drive determines both a hundred times better, so that the priors only
+/// keep the equations regular.
+const WHEELS_SIGMA: [f64; 2] = [0.2, 0.2];
+const OFFSET_SIGMA_S: f64 = 1.0;
+
+/// Standard deviations by which a motion may differ from its odometry before the wheels are taken to have slipped. In three
+/// dimensions normal noise exceeds it 15 times in a million.
+const SLIP_SIGMAS: f64 = 5.0;
+
+/// Jacobians of the pose of an observation by the keyframe's pose and by the time offset.
+type ObservationPoseJacobians = (Matrix3<f64>, Vector3<f64>);
+
+impl BundleProblem {
+    /// A problem without motions and landmarks, with the prior of the options, at a guess of the mounting.
+    pub(crate) fn new(
+        options: &SelfCalibratorOptions,
+        mounting: &Vector3<f64>,
+        free: FreeParameters,
+        loss: BearingLoss,
+    ) -> Self {
+        let width = free.width();
+        let mut prior_mean = DVector::zeros(width);
+        let mut prior_information = DMatrix::zeros(width, width);
+        prior_mean.fixed_rows_mut::<3>(0).copy_from(&options.start.vector());
+        let start = options.start_covariance.try_inverse().unwrap_or_else(Matrix3::zeros);
+        prior_information.fixed_view_mut::<3, 3>(0, 0).copy_from(&start);
+        if free.wheels {
+            prior_mean[4] = options.wheel_base_m.ln();
+            for (k, sigma) in WHEELS_SIGMA.iter().enumerate() {
+                prior_information[(3 + k, 3 + k)] = 1.0 / (sigma * sigma);
+            }
+        }
+        if free.offset {
+            let at = free.offset_at();
+            prior_information[(at, at)] = 1.0 / (OFFSET_SIGMA_S * OFFSET_SIGMA_S);
+        }
+        Self {
+            mounting: *mounting,
+            wheels: Wheels::new(options.wheel_base_m),
+            offset_s: 0.0,
+            free,
+            noise: options.motion_noise(),
+            landmarks: Vec::new(),
+            keyframes: vec![Keyframe::anchor()],
+            prior_mean,
+            prior_information,
+            bearing_sigma: options.bearing_sigma_rad,
+            scatters: Vec::new(),
+            loss,
+            slip: MotionLoss(SLIP_SIGMAS),
+        }
+    }
+
+    /// The number of shared parameters.
+    pub(crate) fn width(&self) -> usize {
+        self.free.width() + 2 * self.landmarks.len()
+    }
+
+    /// The shared parameters as a vector.
+    pub(crate) fn shared(&self) -> DVector<f64> {
+        let mut g = DVector::zeros(self.width());
+        g.fixed_rows_mut::<3>(0).copy_from(&self.mounting);
+        if self.free.wheels {
+            g[3] = self.wheels.imbalance;
+            g[4] = self.wheels.base_m.ln();
+        }
+        if self.free.offset {
+            g[self.free.offset_at()] = self.offset_s;
+        }
+        for (i, landmark) in self.landmarks.iter().enumerate() {
+            let at = self.free.width() + 2 * i;
+            g[at] = landmark.direction;
+            g[at + 1] = landmark.log_inverse_distance;
+        }
+        g
+    }
+
+    /// This problem with fixed wheels.
+    pub(crate) fn with_fixed_wheels(mut self, wheels: Wheels) -> Self {
+        if self.free.wheels {
+            self.prior_mean = self.prior_mean.remove_rows(3, 2);
+            self.prior_information = self.prior_information.remove_rows(3, 2).remove_columns(3, 2);
+            self.free.wheels = false;
+            self.wheels = wheels;
+            for keyframe in self.keyframes.iter_mut().skip(1) {
+                keyframe.odometry = preintegrate(&keyframe.readings, &wheels, &self.noise);
+            }
+        }
+        self
+    }
+
+    /// Sets the shared parameters from a vector.
+    pub(crate) fn set_shared(&mut self, g: &DVector<f64>) {
+        self.mounting = g.fixed_rows::<3>(0).into();
+        if self.free.wheels {
+            self.wheels = Wheels { imbalance: g[3], base_m: g[4].exp() };
+            for keyframe in self.keyframes.iter_mut().skip(1) {
+                keyframe.odometry = preintegrate(&keyframe.readings, &self.wheels, &self.noise);
+            }
+        }
+        if self.free.offset {
+            self.offset_s = g[self.free.offset_at()];
+        }
+        for (i, landmark) in self.landmarks.iter_mut().enumerate() {
+            let at = self.free.width() + 2 * i;
+            landmark.direction = g[at];
+            landmark.log_inverse_distance = g[at + 1];
+        }
+    }
+
+    /// Adds a landmark whose direction is unknown and whose distance is known by `log_inverse_distance +- sigma`.
+    pub(crate) fn add_landmark(
+        &mut self,
+        landmark: InverseDistanceLandmark,
+        log_inverse_distance: f64,
+        sigma: f64,
+    ) -> usize {
+        let n = self.prior_mean.len();
+        let mean = std::mem::replace(&mut self.prior_mean, DVector::zeros(0));
+        self.prior_mean = mean.insert_rows(n, 2, 0.0);
+        self.prior_mean[n] = landmark.direction;
+        self.prior_mean[n + 1] = log_inverse_distance;
+        let information = std::mem::replace(&mut self.prior_information, DMatrix::zeros(0, 0));
+        self.prior_information = information.insert_rows(n, 2, 0.0).insert_columns(n, 2, 0.0);
+        self.prior_information[(n + 1, n + 1)] = 1.0 / (sigma * sigma);
+        self.landmarks.push(landmark);
+        self.scatters.push(1.0);
+        self.landmarks.len() - 1
+    }
+
+    /// The pose at which the bearings of a keyframe were taken, with its Jacobians unless the time offset is zero and fixed.
+    pub(crate) fn observation_pose(&self, keyframe: &Keyframe) -> (Vector3<f64>, Option<ObservationPoseJacobians>) {
+        if !self.free.offset && self.offset_s == 0.0 {
+            return (keyframe.pose, None);
+        }
+        let (tau, v) = (self.offset_s, keyframe.velocity);
+        let (sin, cos) = (0.5 * tau * v.z).sin_cos();
+        let turned = Vector3::new(cos * v.x - sin * v.y, sin * v.x + cos * v.y, v.z);
+        let moved = turned * tau;
+        let (first, second) = compose_jacobians(&keyframe.pose, &moved);
+        let slope = turned + Vector3::new(-turned.y, turned.x, 0.0) * (0.5 * tau * v.z);
+        (compose(&keyframe.pose, &moved), Some((first, second * slope)))
+    }
+
+    /// Half the sum of the squared, whitened residuals.
+    pub(crate) fn cost(&self) -> f64 {
+        self.fit().cost
+    }
+
+    /// How well the problem fits.
+    pub(crate) fn fit(&self) -> FitSummary {
+        let away = self.shared() - &self.prior_mean;
+        let cost = 0.5 * away.dot(&(&self.prior_information * &away)) + self.scatter_cost();
+        let mut fit = FitSummary { cost, ..FitSummary::default() };
+        for pair in self.keyframes.windows(2) {
+            let [before, keyframe] = pair else { continue };
+            let r = between(&before.pose, &keyframe.pose) - keyframe.odometry.motion;
+            fit.cost += self.slip.cost(r.dot(&(keyframe.information * r)));
+        }
+        for residual in self.residuals() {
+            fit.add(residual, self.loss);
+        }
+        fit
+    }
+
+    /// Whether the motion to a keyframe differs so much from its odometry that the wheels must have slipped.
+    pub(crate) fn slipped(&self, to: usize) -> bool {
+        let (before, keyframe) = (&self.keyframes[to - 1], &self.keyframes[to]);
+        let r = between(&before.pose, &keyframe.pose) - keyframe.odometry.motion;
+        self.slip.weight(r.dot(&(keyframe.information * r))) < 1.0
+    }
+
+    /// The whitened residuals of all bearings, in the order of keyframes and observations.
+    pub(crate) fn residuals(&self) -> Vec<f64> {
+        let (points, mut all) = (self.homogeneous_landmarks(), Vec::new());
+        for keyframe in &self.keyframes {
+            let view = Viewpoint::new(&self.observation_pose(keyframe).0, &self.mounting);
+            let residual = |observation: &Observation| view.residual(&points[observation.landmark], &observation.along);
+            all.extend(
+                keyframe.observations.iter().map(|s| residual(s) / (self.bearing_sigma * self.scatters[s.landmark])),
+            );
+        }
+        all
+    }
+}

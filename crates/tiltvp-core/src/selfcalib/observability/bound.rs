@@ -1,0 +1,77 @@
+//! The Cramer-Rao bound of a simulated drive: the least covariance of any unbiased estimate of the mounting.
+
+use nalgebra::{Matrix3, Vector2, Vector3};
+
+use crate::error::{Error, Result};
+use crate::selfcalib::bundle::{BundleProblem, CholeskyFactor, FreeParameters, Keyframe, Observation};
+use crate::selfcalib::model::{
+    BearingLoss, InverseDistanceLandmark, MotionLoss, Mounting, RelativeMotion, WheelMotion, camera_position,
+};
+use crate::selfcalib::options::SelfCalibratorOptions;
+
+/// Standard deviation of the logarithm of a landmark's distance: so large that the bound does not know the distance.
+const UNKNOWN_LOG_SIGMA: f64 = 100.0;
+
+/// The smallest covariance of (x, y, yaw) that an unbiased estimator can have if the places of the landmarks are unknown. The
+/// information at the start is included.
+///
+/// `readings` are the wheels' displacements of each step, `poses` the true poses of the robot after each step (from a true
+/// pose at the start of (0, 0, 0)), `landmarks_m` the true places, and `observations` the landmarks (as places in `landmarks_m`)
+/// seen after each step. The noise is that of the options; the linearisation is at the truth.
+///
+/// # Errors
+/// [`Error::InvalidOption`] for options that make no sense, [`Error::InvalidArgument`] for lengths that differ, landmarks
+/// that do not exist, or a drive that leaves the information singular.
+pub fn cramer_rao_bound(
+    options: &SelfCalibratorOptions,
+    mounting: &Mounting,
+    readings: &[WheelMotion],
+    poses: &[Vector3<f64>],
+    landmarks_m: &[Vector2<f64>],
+    observations: &[Vec<usize>],
+) -> Result<Matrix3<f64>> {
+    options.validate()?;
+    if poses.len() != readings.len() || observations.len() != readings.len() {
+        let got = format!("{} poses and {} lists of observations", poses.len(), observations.len());
+        return Err(Error::argument("poses", got, format!("one of each for {} steps", readings.len())));
+    }
+    let truth = mounting.vector();
+    // The information of a bearing depends on its residual only by the weight of a robust loss.
+    let without_loss = BearingLoss::Huber(f64::INFINITY);
+    let mut problem = BundleProblem::new(options, &truth, FreeParameters::default(), without_loss);
+    problem.slip = MotionLoss::NEVER;
+    let mut slots = vec![None; landmarks_m.len()];
+    for ((reading, pose), seen) in readings.iter().zip(poses).zip(observations) {
+        let odometry = RelativeMotion::from_wheels(reading, &problem.wheels, &problem.noise);
+        if reading.left_m != 0.0 || reading.right_m != 0.0 {
+            let alone = problem.keyframes.len() == 1;
+            match problem.keyframes.last_mut() {
+                Some(last) if last.observations.is_empty() && !alone => last.extend(&odometry, *pose),
+                _ => problem.keyframes.push(Keyframe::after(odometry, *pose)),
+            }
+        }
+        for &landmark in seen {
+            let Some(place) = landmarks_m.get(landmark) else {
+                return Err(Error::argument("observations", landmark, format!("a place among {}", landmarks_m.len())));
+            };
+            let slot = slots[landmark].unwrap_or_else(|| {
+                let anchor = camera_position(pose, &truth);
+                let ray = place - anchor;
+                let (direction, log_inverse_distance) = (ray.y.atan2(ray.x), -ray.norm().ln());
+                let landmark = InverseDistanceLandmark { anchor, direction, log_inverse_distance };
+                problem.add_landmark(landmark, log_inverse_distance, UNKNOWN_LOG_SIGMA)
+            });
+            slots[landmark] = Some(slot);
+            if let Some(keyframe) = problem.keyframes.last_mut()
+                && !keyframe.observations.iter().any(|seen| seen.landmark == slot)
+            {
+                keyframe.observations.push(Observation::new(slot, 0.0));
+            }
+        }
+    }
+    let last = problem.keyframes.len() - 1;
+    let singular = || Error::argument("observations", "a drive that determines nothing", "bearings of landmarks");
+    let system = problem.eliminate_poses(last, false, 0.0).ok_or_else(singular)?;
+    let covariance = CholeskyFactor::regularised(system.equations.information).ok_or_else(singular)?.inverse();
+    Ok(covariance.fixed_view::<3, 3>(0, 0).into())
+}

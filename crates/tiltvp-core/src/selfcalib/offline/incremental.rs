@@ -1,0 +1,236 @@
+//! A log as a bundle problem that is solved as it grows, so that loops close while the map is still nearly right.
+
+use std::collections::BTreeMap;
+
+use nalgebra::Vector3;
+
+use super::log::{LogBearing, LogOptions, LogStep, SortedLog};
+use crate::geometry::wrap_angle;
+use crate::selfcalib::bundle::{
+    BundleProblem, DISTANCE_STEP, DISTANCE_STEPS, FIRST_DAMPING, FreeParameters, Keyframe, Observation,
+};
+use crate::selfcalib::model::{
+    BearingLoss, InverseDistanceLandmark, RelativeMotion, camera_position, compose, landmark_from_bearing, predict,
+};
+
+/// Keyframes after which the log so far is solved: a fifth of those that there are, at least 5, at most 50. A fifth makes the work
+/// of all stages six times that of the last. At most 50 keep the drift between stages below what a loop closure can mend.
+const STAGE_SHARE: usize = 5;
+const LEAST_STAGE: usize = 5;
+const MOST_STAGE: usize = 50;
+
+/// Keyframes after which a landmark that is seen again counts as another one where loops are not closed: 2 m at 4 cm a step, in
+/// which odometry drifts little.
+const LOOP_GAP: usize = 60;
+
+/// Observations, and the angle between their directions, from which on a landmark is initialised, radians. At the default noise of
+/// half a degree, 0.15 rad tell the distance to 8 %.
+const LEAST_OBSERVATIONS: usize = 3;
+const PARALLAX_RAD: f64 = 0.15;
+
+/// Observations from which on a landmark is initialised whatever its parallax: distant ones tell the heading.
+const MOST_OBSERVATIONS: usize = 12;
+
+/// Mean disagreement of the bearings of a landmark up to which it is initialised: a share of the parallax, which the wrong mounting
+/// of an early stage explains, and standard deviations, which only two landmarks with one identifier exceed.
+const DISAGREEMENT_SHARE: f64 = 0.1;
+const DISAGREEMENT_SIGMAS: f64 = 6.0;
+
+/// Step of the second line search over the distance, which covers one step of the first to either side.
+const FINE_DISTANCE_STEP: f64 = 0.05;
+
+/// Iterations and tolerance of the cost with which the problem is solved while it grows: the next stage goes on from there.
+const STAGE_ITERATIONS: u32 = 6;
+const STAGE_TOLERANCE: f64 = 1.0;
+
+/// The loss of bearings while the log grows. Its threshold is below that of the window, since a whole log has no gate before it:
+/// 5 % of right bearings have less weight.
+pub(super) const ROBUST_LOSS: BearingLoss = BearingLoss::Huber(2.0);
+
+/// Bearings of landmarks that are not initialised: keyframes and angles.
+type Candidates = BTreeMap<u64, Vec<(usize, f64)>>;
+
+/// A problem that grows step by step.
+struct IncrementalProblem<'a> {
+    options: &'a LogOptions,
+    problem: BundleProblem,
+    /// Slot and last keyframe of the landmarks that have been initialised.
+    initialised: BTreeMap<u64, (usize, usize)>,
+    candidates: Candidates,
+    /// Keyframes after which a landmark counts as another one.
+    gap: usize,
+    /// Whether bearings were taken at the last keyframe.
+    has_bearings: bool,
+}
+
+/// The problem of the whole log, solved roughly as it grows. `free` is what is estimated meanwhile.
+///
+/// Where `loops` are closed a landmark keeps its place when it is seen again; otherwise it counts as another one after some
+/// keyframes.
+pub(super) fn incremental_problem(
+    log: &SortedLog<'_>,
+    guess: &Vector3<f64>,
+    free: FreeParameters,
+    loops: bool,
+) -> BundleProblem {
+    let mut growing = IncrementalProblem::new(log.options, guess, free, if loops { usize::MAX } else { LOOP_GAP });
+    growing.add_log(log, true);
+    growing.initialise_landmarks(LEAST_OBSERVATIONS, PARALLAX_RAD);
+    growing.solve();
+    growing.problem.reanchor();
+    growing.initialise_landmarks(1, 0.0);
+    growing.problem
+}
+
+/// The problem of the whole log with the mounting and the poses of another problem, as far as that goes.
+pub(super) fn problem_along(log: &SortedLog<'_>, other: &BundleProblem, free: FreeParameters) -> BundleProblem {
+    let mut growing = IncrementalProblem::new(log.options, &other.mounting, free, usize::MAX);
+    growing.add_log(log, false);
+    for (keyframe, other) in growing.problem.keyframes.iter_mut().zip(&other.keyframes) {
+        keyframe.pose = other.pose;
+    }
+    growing.initialise_landmarks(1, 0.0);
+    growing.problem
+}
+
+impl<'a> IncrementalProblem<'a> {
+    fn new(options: &'a LogOptions, guess: &Vector3<f64>, free: FreeParameters, gap: usize) -> Self {
+        let problem = BundleProblem::new(&options.filter, guess, free, ROBUST_LOSS);
+        Self { options, problem, initialised: BTreeMap::new(), candidates: Candidates::new(), gap, has_bearings: true }
+    }
+
+    /// Adds a log. If `solve`, landmarks are initialised and the problem is solved in stages.
+    fn add_log(&mut self, log: &SortedLog<'_>, solve: bool) {
+        let mut solved = 1;
+        for step in log.steps() {
+            let stage = (solved / STAGE_SHARE).clamp(LEAST_STAGE, MOST_STAGE);
+            if solve && self.has_bearings && self.problem.keyframes.len() >= solved + stage {
+                self.initialise_landmarks(LEAST_OBSERVATIONS, PARALLAX_RAD);
+                self.solve();
+                solved = self.problem.keyframes.len();
+            }
+            self.add_motion(&step);
+            for bearing in step.bearings {
+                self.add_bearing(bearing);
+            }
+        }
+        if !self.has_bearings && self.problem.keyframes.len() > 1 {
+            self.problem.keyframes.pop();
+        }
+    }
+
+    fn solve(&mut self) {
+        self.problem.reanchor();
+        self.problem.levenberg_marquardt(STAGE_ITERATIONS, STAGE_TOLERANCE, FIRST_DAMPING);
+    }
+
+    /// Adds the motion of a step.
+    fn add_motion(&mut self, step: &LogStep<'_>) {
+        let LogStep { reading, seconds, .. } = *step;
+        if reading.left_m == 0.0 && reading.right_m == 0.0 {
+            return;
+        }
+        let problem = &mut self.problem;
+        let odometry = RelativeMotion::from_wheels(reading, &problem.wheels, &problem.noise);
+        let velocity = if seconds > 0.0 { odometry.motion / seconds } else { Vector3::zeros() };
+        let Some(last) = problem.keyframes.last_mut() else { return };
+        let pose = compose(&last.pose, &odometry.motion);
+        if self.has_bearings {
+            let keyframe = Keyframe::after(odometry, pose);
+            problem.keyframes.push(Keyframe { readings: vec![*reading], velocity, ..keyframe });
+            self.has_bearings = false;
+        } else {
+            last.extend(&odometry, pose);
+            last.readings.push(*reading);
+            last.velocity = velocity;
+        }
+    }
+
+    /// Adds a bearing, unless its landmark has one at this keyframe already.
+    fn add_bearing(&mut self, seen: &LogBearing) {
+        let here = self.problem.keyframes.len() - 1;
+        self.has_bearings = true;
+        let gap = self.gap;
+        if let Some((slot, last)) = self.initialised.get_mut(&seen.landmark).filter(|(_, last)| here - last <= gap) {
+            if *last < here {
+                self.problem.keyframes[here].observations.push(Observation::new(*slot, seen.bearing_rad));
+                *last = here;
+            }
+            return;
+        }
+        let candidate = self.candidates.entry(seen.landmark).or_default();
+        if candidate.last().is_some_and(|(last, _)| here - last > gap) {
+            candidate.clear();
+        }
+        if candidate.last().is_none_or(|(keyframe, _)| *keyframe != here) {
+            candidate.push((here, seen.bearing_rad));
+        }
+    }
+
+    /// Initialises the candidates with so many observations that have enough parallax and agree, or that are seen for long.
+    fn initialise_landmarks(&mut self, observations: usize, parallax: f64) {
+        let ids: Vec<u64> = self.candidates.keys().copied().collect();
+        for id in ids {
+            let Some(seen) = self.candidates.get(&id).filter(|seen| seen.len() >= observations) else { continue };
+            let angle = self.parallax(seen);
+            let (landmark, off) = self.triangulated(seen);
+            let agree = off <= DISAGREEMENT_SHARE * angle + DISAGREEMENT_SIGMAS * self.problem.bearing_sigma;
+            if !(observations == 1 || angle >= parallax && agree || seen.len() >= MOST_OBSERVATIONS) {
+                continue;
+            }
+            let o = &self.options.filter;
+            let slot = self.problem.add_landmark(landmark, -o.start_distance_m.ln(), o.start_distance_log_sigma);
+            let mut last = 0;
+            for (keyframe, bearing) in self.candidates.remove(&id).into_iter().flatten() {
+                self.problem.keyframes[keyframe].observations.push(Observation::new(slot, bearing));
+                last = keyframe;
+            }
+            self.initialised.insert(id, (slot, last));
+        }
+    }
+
+    /// The largest angle between the directions in which a landmark was seen.
+    fn parallax(&self, seen: &[(usize, f64)]) -> f64 {
+        let direction = |(keyframe, bearing): &(usize, f64)| bearing + self.problem.keyframes[*keyframe].pose.z;
+        let first = seen.first().map_or(0.0, direction);
+        let (low, high) = seen.iter().fold((0.0f64, 0.0f64), |(low, high), seen| {
+            let d = wrap_angle(direction(seen) - first);
+            (low.min(d), high.max(d))
+        });
+        high - low
+    }
+
+    /// The landmark in the direction of its first bearing, at the distance of the least mean disagreement of all bearings, and that
+    /// disagreement in radians.
+    fn triangulated(&self, seen: &[(usize, f64)]) -> (InverseDistanceLandmark, f64) {
+        let problem = &self.problem;
+        let pose = |keyframe: usize| problem.observation_pose(&problem.keyframes[keyframe]).0;
+        let (first, bearing) = seen[0];
+        let first = pose(first);
+        let anchor = camera_position(&first, &problem.mounting);
+        let off = |landmark: &InverseDistanceLandmark| {
+            let one = |(keyframe, bearing): &(usize, f64)| {
+                wrap_angle(predict(&pose(*keyframe), &problem.mounting, landmark).bearing - bearing).abs()
+            };
+            seen.iter().map(one).sum::<f64>() / seen.len() as f64
+        };
+        let at = |inverse: f64| landmark_from_bearing(anchor, inverse, &first, &problem.mounting, bearing);
+        let direction = bearing + first.z + problem.mounting.z;
+        let prior = -self.options.filter.start_distance_m.ln();
+        let unlikely = |inverse: f64| {
+            let sigmas = (inverse - prior) / self.options.filter.start_distance_log_sigma;
+            0.5 * sigmas * sigmas * problem.bearing_sigma / seen.len() as f64
+        };
+        let mut best = prior;
+        for step in [DISTANCE_STEP, FINE_DISTANCE_STEP] {
+            let near = best;
+            best = (-DISTANCE_STEPS..=DISTANCE_STEPS)
+                .map(|k| near + step * f64::from(k))
+                .filter_map(|inverse| Some((inverse, off(&at(inverse)?) + unlikely(inverse))))
+                .min_by(|a, b| a.1.total_cmp(&b.1))
+                .map_or(near, |(inverse, _)| inverse);
+        }
+        let landmark = InverseDistanceLandmark { anchor, direction, log_inverse_distance: best };
+        (landmark, off(&landmark))
+    }
+}

@@ -1,0 +1,124 @@
+//! The log of a drive and the options of its calibration.
+
+use std::collections::BTreeMap;
+
+use crate::error::{Error, Result};
+use crate::options;
+use crate::selfcalib::model::WheelMotion;
+use crate::selfcalib::options::SelfCalibratorOptions;
+
+/// A bearing of a log.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LogBearing {
+    /// The step after whose motion it was taken: an index into the readings.
+    pub step: usize,
+    /// The identifier of its landmark.
+    pub landmark: u64,
+    /// Radians in the camera's frame, counter-clockwise.
+    pub bearing_rad: f64,
+}
+
+options! {
+    /// What else than the mounting is estimated from a log.
+    #[derive(Copy)]
+    pub struct LogOptions {
+        /// Start, noise and wheel base; the method is that of the filter that gives the first guess.
+        [flat except "method" "gate_probability" "memory"] filter: SelfCalibratorOptions = SelfCalibratorOptions::default();
+        /// Whether the wheel base, and which wheel runs farther, are estimated too. Bearings have no scale: the mean displacement
+        /// of both wheels stays as reported.
+        estimate_odometry: bool = false;
+        /// Whether the time by which bearings are later than the odometry is estimated; needs times.
+        estimate_time_offset: bool = false;
+        /// Most linearisations of each of the two descents (robust, then without outliers).
+        max_iterations: u32 = 60;
+    }
+}
+
+/// A log that has been checked, with the bearings in the order of steps.
+pub(super) struct SortedLog<'a> {
+    pub(super) options: &'a LogOptions,
+    readings: &'a [WheelMotion],
+    times_s: Option<&'a [f64]>,
+    bearings: Vec<LogBearing>,
+}
+
+/// A step of a log.
+pub(super) struct LogStep<'a> {
+    pub(super) reading: &'a WheelMotion,
+    /// Time since the step before; 0 at the first step and without times.
+    pub(super) seconds: f64,
+    pub(super) bearings: &'a [LogBearing],
+}
+
+impl<'a> SortedLog<'a> {
+    /// # Errors
+    /// Those of [`calibrate_log`](super::calibrate_log).
+    pub(super) fn new(
+        options: &'a LogOptions,
+        readings: &'a [WheelMotion],
+        times_s: Option<&'a [f64]>,
+        bearings: &[LogBearing],
+    ) -> Result<Self> {
+        options.filter.validate()?;
+        check(options, readings, times_s, bearings)?;
+        let mut bearings = bearings.to_vec();
+        bearings.sort_by_key(|b| b.step);
+        Ok(Self { options, readings, times_s, bearings })
+    }
+
+    pub(super) fn steps(&self) -> impl Iterator<Item = LogStep<'_>> {
+        let mut rest = self.bearings.as_slice();
+        self.readings.iter().enumerate().map(move |(step, reading)| {
+            let seconds = self.times_s.map_or(0.0, |t| if step == 0 { 0.0 } else { t[step] - t[step - 1] });
+            let (bearings, later) = rest.split_at(rest.partition_point(|b| b.step <= step));
+            rest = later;
+            LogStep { reading, seconds, bearings }
+        })
+    }
+}
+
+/// Refuses a log that makes no sense.
+fn check(
+    options: &LogOptions,
+    readings: &[WheelMotion],
+    times_s: Option<&[f64]>,
+    bearings: &[LogBearing],
+) -> Result<()> {
+    for (i, r) in readings.iter().enumerate() {
+        if !(r.left_m.is_finite() && r.right_m.is_finite()) {
+            let got = format!("({}, {}) at step {i}", r.left_m, r.right_m);
+            return Err(Error::argument("odometry", got, "finite numbers of metres"));
+        }
+    }
+    for (i, b) in bearings.iter().enumerate() {
+        if b.step >= readings.len() {
+            let expected = format!("steps below {}, the length of the odometry", readings.len());
+            return Err(Error::argument("bearings", format!("step {} in row {i}", b.step), expected));
+        }
+        if !b.bearing_rad.is_finite() {
+            return Err(Error::argument(
+                "bearings",
+                format!("{} in row {i}", b.bearing_rad),
+                "finite angles in radians",
+            ));
+        }
+    }
+    let mut first: BTreeMap<u64, usize> = BTreeMap::new();
+    if !bearings.iter().any(|b| *first.entry(b.landmark).or_insert(b.step) != b.step) {
+        return Err(Error::argument("bearings", "no landmark seen twice", "landmarks seen from several poses"));
+    }
+    match times_s {
+        None if options.estimate_time_offset => {
+            Err(Error::argument("times_s", "none", "the time of each step, to estimate a time offset"))
+        }
+        Some(times) if times.len() != readings.len() => {
+            let expected = format!("one for each of {} steps", readings.len());
+            Err(Error::argument("times_s", format!("{} times", times.len()), expected))
+        }
+        Some(times) => match times.windows(2).position(|t| !(t[1] >= t[0] && t[1].is_finite())) {
+            Some(i) => Err(Error::argument("times_s", format!("{} after {}", times[i + 1], times[i]), "growing times")),
+            None => Ok(()),
+        },
+        None => Ok(()),
+    }
+}

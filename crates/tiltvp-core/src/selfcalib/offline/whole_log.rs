@@ -1,0 +1,195 @@
+//! The mounting from a whole log: robust bundle adjustment from several starts, optionally with the wheels and a time offset.
+
+use std::collections::BTreeMap;
+
+use nalgebra::Matrix3;
+
+use super::incremental::{ROBUST_LOSS, incremental_problem, problem_along};
+use super::log::{LogBearing, LogOptions, SortedLog};
+use crate::error::{Error, Result};
+use crate::selfcalib::bundle::{BundleProblem, CholeskyFactor, DescentReport, FIRST_DAMPING, FreeParameters};
+use crate::selfcalib::estimate::MountingEstimate;
+use crate::selfcalib::model::{BearingLoss, Mounting, OUTLIER_SIGMAS, WheelMotion, Wheels};
+use crate::selfcalib::options::{CalibrationMethod, SelfCalibratorOptions};
+use crate::selfcalib::window::SlidingWindow;
+
+/// The answer of [`calibrate_log`].
+#[derive(Debug, Clone, PartialEq)]
+pub struct LogCalibration {
+    /// The mounting. Covariances are scaled by the residuals where these are larger than assumed.
+    pub estimate: MountingEstimate,
+    /// The wheels, as given or as estimated.
+    pub wheels: Wheels,
+    /// Standard deviations of the wheels' imbalance and of the wheel base in metres; 0 where not estimated.
+    pub wheels_sigma: [f64; 2],
+    /// The time by which bearings are later than the odometry, seconds; 0 where not estimated.
+    pub time_offset_s: f64,
+    /// Its standard deviation.
+    pub time_offset_sigma_s: f64,
+    /// Bearings that were used. Of those of one landmark at a standstill only the first is.
+    pub bearings: usize,
+    /// Bearings farther from their prediction than 4.5 standard deviations, which have no weight.
+    pub outliers: usize,
+    /// Root of the mean squared residual of the others, in standard deviations of a bearing.
+    pub residual_rms: f64,
+    /// Linearisations of the last descents.
+    pub iterations: u32,
+    /// Whether the last descent converged.
+    pub converged: bool,
+}
+
+/// Fall of the cost below which a descent has converged: far below the 1/2 by which the cost rises at one standard deviation.
+const TOLERANCE: f64 = 1e-3;
+
+/// Most estimates of the landmarks' scatters, each followed by two descents. They stop by themselves once none changes by 20 %;
+/// the limit bounds the time where two solutions alternate.
+const SCATTER_ROUNDS: usize = 4;
+
+/// Share of outliers of a converged solution up to which no other start is tried: as many as single wrong bearings make. A solution
+/// with a loop that did not close has more.
+const OUTLIER_SHARE: f64 = 0.03;
+
+/// Where an attempt starts, and what is free until the loops are closed.
+#[derive(Clone, Copy)]
+enum Attempt {
+    /// The start of the options. Wheels that may give a little let loops close.
+    FreeWheels,
+    /// The mounting and the poses of the sliding window.
+    Window,
+    /// The start of the options.
+    Start,
+    /// The mounting of the log without loops, for a start that is far off. Wheels as in the first attempt.
+    WithoutLoops,
+}
+
+/// The mounting from a whole log.
+///
+/// # Errors
+/// [`Error::InvalidOption`] for options that make no sense, [`Error::InvalidArgument`] for numbers that are not finite, steps
+/// that do not exist, times that do not grow or are missing, and logs without a landmark that is seen twice.
+pub fn calibrate_log(
+    options: &LogOptions,
+    readings: &[WheelMotion],
+    times_s: Option<&[f64]>,
+    bearings: &[LogBearing],
+) -> Result<LogCalibration> {
+    let log = SortedLog::new(options, readings, times_s, bearings)?;
+    let mut best: Option<(BundleProblem, DescentReport)> = None;
+    for attempt in [Attempt::FreeWheels, Attempt::Window, Attempt::Start, Attempt::WithoutLoops] {
+        if matches!(attempt, Attempt::Start) && options.estimate_odometry {
+            // The wheels were free in the first attempt and would be again.
+            continue;
+        }
+        let mut problem = started(&log, attempt)?;
+        let descent = solve(&mut problem, options.max_iterations);
+        let residuals = problem.residuals();
+        let outliers = residuals.iter().filter(|r| r.abs() > OUTLIER_SIGMAS).count();
+        let good = descent.converged && (outliers as f64) < OUTLIER_SHARE * residuals.len() as f64;
+        if descent.cost.is_finite() && best.as_ref().is_none_or(|(_, best)| descent.cost < best.cost) {
+            best = Some((problem, descent));
+        }
+        if good {
+            break;
+        }
+    }
+    let Some((problem, descent)) = best else {
+        return Err(Error::argument("bearings", "a problem without a solution", "a drive past landmarks"));
+    };
+    report(options, &problem, &descent)
+}
+
+/// The problem that an attempt starts from, with the parameters free that the options ask for.
+fn started(log: &SortedLog<'_>, attempt: Attempt) -> Result<BundleProblem> {
+    let options = log.options;
+    let asked = FreeParameters { wheels: options.estimate_odometry, offset: options.estimate_time_offset };
+    let with_wheels = FreeParameters { wheels: true, ..asked };
+    let start = options.filter.start.vector();
+    let mut problem = match attempt {
+        Attempt::FreeWheels => incremental_problem(log, &start, with_wheels, true),
+        Attempt::Window => return Ok(problem_along(log, &whole_window(log)?, asked)),
+        Attempt::Start => return Ok(incremental_problem(log, &start, asked, true)),
+        Attempt::WithoutLoops => {
+            let mounting = incremental_problem(log, &start, with_wheels, false).mounting;
+            incremental_problem(log, &mounting, with_wheels, true)
+        }
+    };
+    if asked != with_wheels {
+        problem.levenberg_marquardt(options.max_iterations, TOLERANCE, FIRST_DAMPING);
+        problem = problem.with_fixed_wheels(Wheels::new(options.filter.wheel_base_m));
+    }
+    Ok(problem)
+}
+
+/// Solves a problem with a robust loss, then without outliers, then with the scatters of the landmarks.
+fn solve(problem: &mut BundleProblem, max_iterations: u32) -> DescentReport {
+    let descend = |problem: &mut BundleProblem, loss: BearingLoss| {
+        problem.loss = loss;
+        problem.levenberg_marquardt(max_iterations, TOLERANCE, FIRST_DAMPING)
+    };
+    let losses = [ROBUST_LOSS, BearingLoss::Truncated(OUTLIER_SIGMAS)];
+    let [robust, mut last] = losses.map(|loss| descend(problem, loss));
+    let mut iterations = robust.iterations + last.iterations;
+    for _ in 0..SCATTER_ROUNDS {
+        if !problem.estimate_scatters() {
+            break;
+        }
+        for loss in losses {
+            last = descend(problem, loss);
+            iterations += last.iterations;
+        }
+    }
+    DescentReport { iterations, ..last }
+}
+
+/// The problem of a sliding window that is never marginalised.
+fn whole_window(log: &SortedLog<'_>) -> Result<BundleProblem> {
+    let method = CalibrationMethod::Default;
+    let mut window = SlidingWindow::new(&SelfCalibratorOptions { method, memory: u32::MAX, ..log.options.filter })?;
+    for step in log.steps() {
+        let mut seen: BTreeMap<u64, f64> = BTreeMap::new();
+        for b in step.bearings {
+            seen.entry(b.landmark).or_insert(b.bearing_rad);
+        }
+        let seen: Vec<(u64, f64)> = seen.into_iter().collect();
+        window.step(step.reading, &seen);
+    }
+    Ok(window.into_problem())
+}
+
+/// The answer: the solution with its covariance, scaled by the residuals where these are larger than assumed.
+fn report(options: &LogOptions, problem: &BundleProblem, descent: &DescentReport) -> Result<LogCalibration> {
+    let o = &options.filter;
+    let residuals = problem.residuals();
+    let kept: Vec<f64> = residuals.iter().copied().filter(|r| r.abs() <= OUTLIER_SIGMAS).collect();
+    let free = kept.len().saturating_sub(problem.width()).max(1) as f64;
+    let sum: f64 = kept.iter().map(|r| r * r).sum();
+    let scale = (sum / free).max(1.0);
+    let nothing =
+        || Error::argument("bearings", "a drive that determines nothing", "landmarks seen from several poses");
+    let system = problem.eliminate_poses(problem.keyframes.len() - 1, false, 0.0).ok_or_else(nothing)?;
+    let covariance = CholeskyFactor::regularised(system.equations.information.clone()).ok_or_else(nothing)?;
+    let covariance = covariance.inverse();
+    let widening = problem.covariance_widening(&system, &covariance);
+    let covariance = covariance * scale;
+    let mounting: Matrix3<f64> = covariance.fixed_view::<3, 3>(0, 0).into();
+    let sigma = |at: usize| covariance[(at, at)].sqrt();
+    let (wheels, offset) = (options.estimate_odometry, options.estimate_time_offset);
+    Ok(LogCalibration {
+        estimate: MountingEstimate::new(
+            Mounting::from_vector(&problem.mounting),
+            widening * mounting * widening.transpose(),
+            &(o.start_covariance * scale),
+            Some(sum / kept.len().max(1) as f64),
+            false,
+        ),
+        wheels: problem.wheels,
+        wheels_sigma: if wheels { [sigma(3), sigma(4) * problem.wheels.base_m] } else { [0.0; 2] },
+        time_offset_s: problem.offset_s,
+        time_offset_sigma_s: if offset { sigma(if wheels { 5 } else { 3 }) } else { 0.0 },
+        bearings: residuals.len(),
+        outliers: residuals.len() - kept.len(),
+        residual_rms: (sum / kept.len().max(1) as f64).sqrt(),
+        iterations: descent.iterations,
+        converged: descent.converged,
+    })
+}

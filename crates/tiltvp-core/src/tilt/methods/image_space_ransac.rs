@@ -1,0 +1,81 @@
+//! A cosine fitted to the edge offsets by random sampling (Fleer 2017, section 2.1).
+
+use std::sync::Arc;
+
+use super::image_space::ImageSpace;
+use super::offsets::Offsets;
+use super::{Fitter, Setting, TiltMethod};
+use crate::edges::{EdgeOptions, EdgePixels, Screen};
+use crate::error::Result;
+use crate::options;
+use crate::options::POSITIVE;
+use crate::robust::{RansacOptions, Sampling, ransac};
+use crate::tilt::correction::Correction;
+use crate::tilt::fit::Fit;
+use crate::tilt::scratch::Work;
+use crate::tilt::tables::PixelTables;
+
+options! {
+    /// Options of the image-space method by random sampling; defaults are those of Fleer 2017, table 3.
+    pub struct ImageSpaceRansacOptions {
+        /// Largest residual of an inlier in pixels, `delta_s,max` of eq. 32.
+        threshold_px: f64 = 10.0 => POSITIVE, "a positive number of pixels";
+        /// Largest edge offset in pixels that passes the prefilter, `s_max`; none for 40 pixels of a lens of 139.7 pixels per
+        /// radian about the vertical, and in proportion for others.
+        offset_max_px: Option<f64> = None => POSITIVE, "a positive number of pixels";
+        /// From the shift to the angle: `"closed-form"` by the gain of each pixel, None by the lens' scale at the vanishing
+        /// point, a factor in pixels per radian, a line, or a posterior.
+        correction: Correction = Correction::ClosedForm
+            => POSITIVE, "\"closed-form\", None, a positive factor, an AffineCorrection or a PosteriorCorrection";
+        /// How samples are drawn, improved and scored.
+        [flat] sampling: Sampling = Sampling::default();
+    }
+    check correction_is_valid
+}
+
+fn correction_is_valid(options: &ImageSpaceRansacOptions) -> Result<()> {
+    options.correction.validate()
+}
+
+impl TiltMethod for ImageSpaceRansacOptions {
+    fn edges(&self) -> EdgeOptions {
+        EdgeOptions { gradient_min: 150.0, ..EdgeOptions::default() }
+    }
+
+    fn prepare(&self, setting: &Setting<'_>) -> Result<Arc<dyn Fitter>> {
+        Ok(Arc::new(ImageSpaceRansac {
+            space: ImageSpace::new(setting, &self.correction, self.offset_max_px)?,
+            ransac: RansacOptions {
+                seed: setting.options.seed,
+                sampling: self.sampling,
+                ..RansacOptions::with_threshold(self.threshold_px)
+            },
+        }))
+    }
+}
+
+/// The method ready for images.
+#[derive(Debug)]
+struct ImageSpaceRansac {
+    space: ImageSpace,
+    ransac: RansacOptions,
+}
+
+impl Fitter for ImageSpaceRansac {
+    fn screen(&self) -> Option<&Screen> {
+        Some(self.space.screen())
+    }
+
+    fn normal(&self, _slot: usize, _gx: f32, _gy: f32) -> Option<[f32; 3]> {
+        None
+    }
+
+    fn fit(&self, edges: &EdgePixels, pixels: &PixelTables, work: &mut Work) -> Fit {
+        self.space.rows(edges, work);
+        let Work { rows, weights, places, sampling, .. } = &mut *work;
+        sampling.prepare(&self.ransac.sampling, edges, places, weights.capacity());
+        let problem = Offsets::new(rows, &sampling.quality);
+        let report = ransac(&problem, &self.ransac, weights, &mut sampling.ransac);
+        self.space.conclude(&report, pixels, work)
+    }
+}

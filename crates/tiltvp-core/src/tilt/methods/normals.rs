@@ -1,0 +1,125 @@
+//! What the methods on normals share: great circles of edge pixels, their prefilter, and the tilt of a common direction.
+
+use std::f64::consts::FRAC_PI_2;
+use std::sync::{Arc, OnceLock};
+
+use nalgebra::{Matrix2, Vector2, Vector3};
+
+use super::Setting;
+use crate::edges::{EdgePixels, LiftTable, NormalKind, Screen};
+use crate::geometry::Tilt;
+use crate::robust::FitReport;
+use crate::tilt::fit::{Evidence, Fit, Lean};
+use crate::tilt::scratch::{Inliers, Work};
+use crate::tilt::tables::PixelTables;
+use crate::tilt::trained::TrainedCorrection;
+
+/// The maps from gradients to normals and their screens, by the kind of normal.
+#[derive(Debug, Default)]
+pub(super) struct Shared {
+    tangent: OnceLock<(Arc<LiftTable>, Screen)>,
+    gradient: OnceLock<(Arc<LiftTable>, Screen)>,
+}
+
+/// Normals of edge pixels whose great circles pass near the robot's vertical.
+#[derive(Debug)]
+pub(super) struct Normals {
+    table: Arc<LiftTable>,
+    screen: Screen,
+    sin_max: f64,
+}
+
+impl Normals {
+    /// The normals of a kind for leans of up to `tilt_max_rad` of the options, or `default_max_rad` where there is none.
+    pub(super) fn new(setting: &Setting<'_>, kind: NormalKind, default_max_rad: f64) -> Self {
+        let sin_max = setting.options.tilt_max_rad.unwrap_or(default_max_rad).sin();
+        let shared = &setting.pixels.shared.normals;
+        let made = match kind {
+            NormalKind::Tangent => &shared.tangent,
+            NormalKind::Gradient => &shared.gradient,
+        };
+        let (table, screen) = made.get_or_init(|| {
+            let (camera, rotation) = (&setting.origin.camera, &setting.origin.robot_from_camera);
+            let table = LiftTable::new(camera, rotation, &setting.pixels.region, kind);
+            let screen = table.screen(sin_max);
+            (Arc::new(table), screen)
+        });
+        Self { table: Arc::clone(table), screen: screen.with_limit(sin_max), sin_max }
+    }
+
+    pub(super) fn screen(&self) -> &Screen {
+        &self.screen
+    }
+
+    /// The unit normal of one edge pixel.
+    pub(super) fn normal(&self, slot: usize, gx: f32, gy: f32) -> Option<[f32; 3]> {
+        self.table.normal(slot, gx, gy)
+    }
+
+    /// Writes the rows of the edge pixels that pass the prefilter, with their gradients as weights.
+    pub(super) fn lift(&self, edges: &EdgePixels, work: &mut Work) {
+        let Work { rows, weights, slots, places, .. } = work;
+        self.table.lift(edges, self.sin_max, rows, weights, slots, places);
+    }
+}
+
+/// The tilt of the direction that a fit has found among the rows, with what is known of its error.
+pub(super) fn conclude(
+    report: &FitReport<Vector3<f64>>,
+    correction: &TrainedCorrection,
+    evidence: &Evidence,
+    pixels: &PixelTables,
+    work: &mut Work,
+) -> Fit {
+    let raw = report.model.and_then(|normal| Tilt::from_normal(&normal));
+    let corrected = correction.at(raw.map_or(0.0, |tilt| tilt.alpha_rad()));
+    if raw.is_some() && corrected.alpha_rad >= FRAC_PI_2 {
+        work.inliers = Inliers::None;
+        return Fit::out_of_reach(corrected.alpha_rad, report);
+    }
+    let horizontal = raw.map_or(Vector2::zeros(), |tilt| tilt.normal().xy());
+    let tilt = raw.map(|tilt| {
+        if *correction == TrainedCorrection::IDENTITY {
+            tilt
+        } else {
+            Tilt::from_alpha_beta(corrected.alpha_rad, tilt.beta_rad())
+        }
+    });
+    let lean = Lean::new(correction, corrected, horizontal, Matrix2::identity());
+    let model = report.model.unwrap_or_default().into();
+    Fit {
+        tilt,
+        covariance: tilt.and_then(|tilt| evidence.covariance(model, &lean, &tilt, pixels, work)),
+        inliers: match work.inliers {
+            Inliers::Within { model, threshold } => work.rows.count_within(model, threshold),
+            Inliers::None | Inliers::Weighted => report.inliers,
+        },
+        ..Fit::without_tilt(report)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::camera::{Camera, Equidistant};
+    use crate::tilt::{TiltEstimator, TiltOptions};
+
+    #[test]
+    fn estimators_of_the_same_pixels_share_their_maps() {
+        let lens = Equidistant::new(40.0, 79.5, 79.5).unwrap();
+        let camera = Camera::new(160, 160, lens.into()).unwrap();
+        let refined = TiltOptions::for_method("refined").unwrap();
+        let first = TiltEstimator::new(camera, nalgebra::Matrix3::identity(), refined.clone()).unwrap();
+        let normals = |estimator: &TiltEstimator, kind| {
+            let setting =
+                Setting { origin: &estimator.origin, options: estimator.options(), pixels: &estimator.pixels };
+            Normals::new(&setting, kind, 0.2)
+        };
+        let mut other = TiltOptions::for_method("vector-consensus").unwrap();
+        other.edges.smoothing_px = refined.edges.smoothing_px;
+        let other = first.with_options(other).unwrap();
+        for kind in [NormalKind::Tangent, NormalKind::Gradient] {
+            assert!(Arc::ptr_eq(&normals(&first, kind).table, &normals(&other, kind).table));
+        }
+    }
+}

@@ -1,0 +1,106 @@
+//! Parameters of cameras: every lens declares them once, and refuses what does not fit its declaration.
+
+#![allow(clippy::unwrap_used)]
+
+use std::collections::BTreeSet;
+use tiltvp_core::camera::{Camera, Kind, LARGEST_SIDE_PX, Model, Parameter};
+use tiltvp_core::testing::zoo;
+
+type Named = Vec<(String, Parameter)>;
+
+/// A camera of the zoo for each model, as named parameters.
+fn examples() -> Vec<(&'static str, Named)> {
+    let zoo = zoo();
+    let example = |name| {
+        let (_, camera) = zoo.iter().find(|(_, camera)| camera.model().name() == name).unwrap();
+        camera.model().parameters().into_iter().map(|(key, value)| (key.to_owned(), value)).collect()
+    };
+    Model::names().map(|name| (name, example(name))).collect()
+}
+
+fn message(model: &str, parameters: &Named) -> String {
+    Model::from_parameters(model, 1024, 512, parameters).map_or_else(|error| error.to_string(), |_| String::new())
+}
+
+fn named(parameters: &[(&str, f64)]) -> Named {
+    parameters.iter().map(|&(name, value)| (name.to_owned(), Parameter::Scalar(value))).collect()
+}
+
+#[test]
+fn the_zoo_has_every_model() {
+    let kept: BTreeSet<_> = zoo().iter().map(|(_, camera)| camera.model().name()).collect();
+    assert_eq!(kept, Model::names().collect());
+}
+
+#[test]
+fn every_model_fills_in_what_may_be_left_away() {
+    for (model, given) in examples() {
+        let schema = Model::schema_of(model).unwrap();
+        let needed: Named = given
+            .iter()
+            .zip(schema.parameters)
+            .filter(|(_, one)| one.kind.is_required())
+            .map(|(x, _)| x.clone())
+            .collect();
+        let made = Model::from_parameters(model, 1024, 512, &needed).unwrap();
+        for (one, (name, value)) in schema.parameters.iter().zip(made.parameters()) {
+            assert_eq!(name, one.name);
+            match one.kind {
+                Kind::Optional(default) => assert_eq!(value, Parameter::Scalar(default), "{model} {name}"),
+                Kind::OptionalList => assert_eq!(value, Parameter::List(Vec::new()), "{model} {name}"),
+                Kind::Required | Kind::RequiredList => assert!(needed.contains(&(name.to_owned(), value))),
+            }
+        }
+    }
+}
+
+#[test]
+fn every_parameter_is_refused_where_it_is_missing_double_of_the_other_kind_or_no_number() {
+    for (model, given) in examples() {
+        for (i, one) in Model::schema_of(model).unwrap().parameters.iter().enumerate() {
+            let with = |value: Parameter| {
+                let mut changed = given.clone();
+                changed[i].1 = value;
+                message(model, &changed)
+            };
+            let start = format!("camera model {model}: {} = ", one.name);
+            let mut without = given.clone();
+            let twice = [&given[..], &given[i..=i]].concat();
+            without.remove(i);
+            let sentence = message(model, &without);
+            assert_eq!(sentence.starts_with(&format!("{start}missing")), one.kind.is_required(), "{sentence}");
+            assert!(message(model, &twice).starts_with(&format!("{start}given twice")));
+            let in_kind = |x: f64| if one.kind.is_list() { Parameter::List(vec![x]) } else { Parameter::Scalar(x) };
+            let other = if one.kind.is_list() { Parameter::Scalar(1.0) } else { Parameter::List(vec![1.0]) };
+            for wrong in [other, in_kind(f64::NAN), in_kind(f64::INFINITY), in_kind(1e16)] {
+                let sentence = with(wrong);
+                assert!(sentence.starts_with(&start) && sentence.contains("expected"), "{start} {sentence}");
+            }
+        }
+        let stranger = [&given[..], &named(&[("strange", 1.0)])].concat();
+        assert!(message(model, &stranger).contains("parameter = \"strange\", expected one of: "));
+    }
+}
+
+#[test]
+fn every_model_refuses_an_impossible_size() {
+    for (model, given) in examples() {
+        let made = |width, height| {
+            Model::from_parameters(model, width, height, &given).and_then(|lens| Camera::new(width, height, lens))
+        };
+        assert!(made(LARGEST_SIDE_PX, 1).is_ok());
+        for (width, height) in [(0, 480), (640, 0), (LARGEST_SIDE_PX + 1, 480), (640, LARGEST_SIDE_PX + 1)] {
+            assert!(made(width, height).is_err(), "{model} {width} {height}");
+        }
+    }
+}
+
+#[test]
+fn unknown_names_are_answered_with_near_ones() {
+    let text = message("kanala-brandt", &Vec::new());
+    assert!(text.contains("did you mean kannala_brandt?") && text.contains("equirectangular"), "{text}");
+    let text = message("pinhole", &named(&[("fx", 1.0), ("fy", 1.0), ("cx", 1.0), ("cy", 1.0), ("kk1", 0.1)]));
+    assert!(text.contains("did you mean k1?") && text.contains("fx, fy, cx, cy"), "{text}");
+    let text = message("pinhole", &named(&[("fx", -1.0), ("fy", 1.0), ("cx", 1.0), ("cy", 1.0)]));
+    assert!(text.contains("fx = -1, expected a positive finite number"), "{text}");
+}

@@ -1,0 +1,69 @@
+//! Triangulation of a vertex by two cameras: covariances that are true, and what has no intersection.
+
+#![allow(clippy::unwrap_used)]
+
+use nalgebra::{Matrix2, Rotation3, Vector2, Vector3};
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use tiltvp_core::corner::{BearingObservation, triangulate};
+use tiltvp_core::filter::{ConsistencyBand, squared_mahalanobis};
+use tiltvp_core::geometry::{RigidMotion, tangent_basis};
+
+fn normal(rng: &mut ChaCha8Rng) -> f64 {
+    let (a, b): (f64, f64) = (1.0 - rng.random::<f64>(), rng.random());
+    (-2.0 * a.ln()).sqrt() * (std::f64::consts::TAU * b).cos()
+}
+
+fn right_camera() -> (RigidMotion, RigidMotion) {
+    let left_from_right = RigidMotion::new(
+        "left_from_right",
+        *Rotation3::from_euler_angles(0.01, -0.02, 0.015).matrix(),
+        Vector3::new(0.12, 0.001, -0.002),
+    )
+    .unwrap();
+    (left_from_right, left_from_right.inverse())
+}
+
+#[test]
+fn points_are_triangulated_with_covariance() {
+    let mut rng = ChaCha8Rng::seed_from_u64(6);
+    let (left_from_right, right_from_left) = right_camera();
+    let (mut nees, mut chi) = (Vec::new(), Vec::new());
+    let covariance = Matrix2::from_diagonal(&Vector2::new(1e-8, 4e-8));
+    for _ in 0..1000 {
+        let (x, y) = (rng.random::<f64>() - 0.5, 0.6 * (rng.random::<f64>() - 0.5));
+        let point = Vector3::new(x, y, 1.0).normalize() * (1.0 + 2.0 * rng.random::<f64>());
+        let mut observe = |camera: &RigidMotion, rig_from_camera: RigidMotion| {
+            let clean = camera.point(&point).normalize();
+            let noise = Vector2::new(1e-4 * normal(&mut rng), 2e-4 * normal(&mut rng));
+            let bearing = (clean + tangent_basis(&clean) * noise).normalize();
+            BearingObservation { bearing, covariance, rig_from_camera }
+        };
+        let observations =
+            [observe(&RigidMotion::identity(), RigidMotion::identity()), observe(&right_from_left, left_from_right)];
+        let found = triangulate(&observations).unwrap();
+        nees.push(squared_mahalanobis(&(found.point_m - point), &found.covariance_m2).unwrap());
+        chi.push(found.chi_square);
+    }
+    let mean = |values: &[f64]| values.iter().sum::<f64>() / 1000.0;
+    let band = ConsistencyBand::of_mean(0.9999, 3, 1000).unwrap();
+    assert!(band.holds(mean(&nees)), "{} {band:?}", mean(&nees));
+    let band = ConsistencyBand::of_mean(0.9999, 1, 1000).unwrap();
+    assert!(band.holds(mean(&chi)), "{} {band:?}", mean(&chi));
+}
+
+#[test]
+fn nothing_is_triangulated_from_parallel_or_parting_lines_of_sight() {
+    let (left_from_right, _) = right_camera();
+    let observe = |bearing: Vector3<f64>, rig_from_camera| BearingObservation {
+        bearing: bearing.normalize(),
+        covariance: Matrix2::identity() * 1e-8,
+        rig_from_camera,
+    };
+    let ahead = observe(Vector3::new(0.1, 0.0, 1.0), RigidMotion::identity());
+    assert!(triangulate(&[ahead]).is_none());
+    let parallel = observe(left_from_right.rotation.transpose() * ahead.bearing, left_from_right);
+    assert!(triangulate(&[ahead, parallel]).is_none());
+    let parting = observe(left_from_right.rotation.transpose() * Vector3::new(0.3, 0.0, 1.0), left_from_right);
+    assert!(triangulate(&[ahead, parting]).is_none());
+}

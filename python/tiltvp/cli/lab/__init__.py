@@ -1,0 +1,1 @@
+"""The verbs of the laboratory: `dataset`, `evaluate`, `measure` and `report`."""

@@ -1,0 +1,105 @@
+"""`tiltvp measure calibration` and `calibration-images`: self-calibration against what is known."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import Annotated
+
+from cyclopts import Parameter, validators
+
+from tiltvp.cli.lab.tables import show_frame
+from tiltvp.cli.tables import check_ending, write_frame
+from tiltvp.cli.terminal import progress_bar
+from tiltvp.errors import InvalidInputError
+
+
+def calibration(odometry: Path | None = None, /, *, runs: int = 1000, only: str = "", out: Path | None = None) -> None:
+    """Self-calibration on simulated drives, both filters, against the Cramer-Rao bound; and on real logs.
+
+    Parameters
+    ----------
+    odometry
+        Folder with victoria_park, brenner_lego and censi_khepera; without it only the simulated drives.
+    runs
+        Simulated drives of each trajectory.
+    only
+        Only the parts whose names hold this: "simulated paper default", "simulated paper paper", "simulated alternating
+        default", "simulated alternating paper" (trajectory and method), "victoria_park", "brenner_lego",
+        "censi lstraight", "censi l90", "censi lmov".
+    out
+        Also write the table of all simulated runs as Parquet.
+    """
+    import polars as pl
+
+    from tiltvp.lab.evaluation.calibration import LOG_PARTS, LOGS, real_logs, simulated_drives, summarise_drives
+    from tiltvp.selfcalib import consistency_band
+
+    drives = [
+        (kind, method)
+        for kind in ("paper", "alternating")
+        for method in ("default", "paper")
+        if only in f"simulated {kind} {method}"
+    ]
+    logs = [name for name in LOGS if only in name] if odometry is not None else []
+    if not drives and not logs:
+        raise InvalidInputError(f'--only {only}: no part of that name, expected for example "simulated" or "victoria"')
+    parts, summaries = [], []
+    if drives:
+        with progress_bar(len(drives) * runs, "drives") as bar:
+            for kind, method in drives:
+                table = simulated_drives(kind, method, runs, advance=bar.advance)
+                parts.append(table.with_columns(trajectory=pl.lit(kind), method=pl.lit(method)))
+                summaries.append({"trajectory": kind, "method": method, **summarise_drives(table)})
+        if out is not None:
+            pl.concat(parts).write_parquet(out)
+        low, high = consistency_band(0.95, 3, runs)
+        title = f"Simulated drives; NEES of a consistent filter: {low:.3f} to {high:.3f}"
+        show_frame(title, pl.DataFrame(summaries), ["method"])
+    if odometry is not None and logs:
+        with progress_bar(LOG_PARTS * len(logs), "logs") as bar:
+            table = real_logs(odometry, only=only, advance=bar.advance)
+        show_frame("Real logs: error against the nominal mounting", table, ["log"])
+
+
+def calibration_images(
+    *,
+    drives: Annotated[int, Parameter(validator=validators.Number(gte=1))] = 2,
+    kinds: Annotated[tuple[str, ...], Parameter(consume_multiple=True)] = ("hall", "corridor"),
+    leans_deg: Annotated[tuple[float, ...], Parameter(consume_multiple=True)] = (0.0, 3.0),
+    trajectory: str = "paper",
+    seed: Annotated[int, Parameter(validator=validators.Number(gte=0))] = 9101,
+    threads: Annotated[int | None, Parameter(validator=validators.Number(gte=1))] = None,
+    out: Path | None = None,
+) -> None:
+    """Self-calibration from the pictures of rendered drives: tilt, lines, tracks, mounting; errors in degrees and mm.
+
+    Parameters
+    ----------
+    drives
+        Drives of each kind and lean.
+    kinds
+        Where to drive: corridor, hall, office, living-room, l-shaped, narrow or under-table.
+    leans_deg
+        Greatest leans from bumps.
+    trajectory
+        paper or alternating.
+    seed
+        Seed of the first room and drive.
+    threads
+        Frames rendered at the same time; all cores by default.
+    out
+        Also write the table: .csv, .json or .parquet.
+    """
+    from tiltvp.lab.evaluation.calibration_images import PictureExperiment, picture_drives
+
+    if out is not None:
+        check_ending(out)
+    experiment = PictureExperiment(
+        kinds=kinds, leans_max_deg=leans_deg, drives=drives, seed=seed, trajectory=trajectory
+    )
+    with progress_bar(len(experiment.cases), "drives") as bar:
+        table = picture_drives(experiment, threads=threads or os.cpu_count() or 1, advance=bar.advance)
+    if out is not None:
+        write_frame(table, out)
+    show_frame(f"From pictures, errors along the {trajectory} trajectory, degrees and mm", table, ["kind", "by"])

@@ -1,0 +1,96 @@
+"""`tiltvp measure corners`: poses of corners against the truth, in closed form and in rendered sequences."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import Annotated
+
+from cyclopts import Parameter, validators
+
+from tiltvp.cli.lab.tables import show_frame
+from tiltvp.cli.terminal import progress_bar, say
+from tiltvp.errors import InvalidInputError
+
+
+def corners(
+    *,
+    poses: Annotated[int, Parameter(validator=validators.Number(gte=0))] = 100_000,
+    noisy_poses: Annotated[int, Parameter(validator=validators.Number(gte=0))] = 2000,
+    frames: Annotated[int, Parameter(validator=validators.Number(gte=0))] = 1000,
+    scenes: Annotated[tuple[str, ...], Parameter(consume_multiple=True)] = (),
+    seed: Annotated[int, Parameter(validator=validators.Number(gte=0))] = 7001,
+    threads: Annotated[int | None, Parameter(validator=validators.Number(gte=1))] = None,
+    out: Path | None = None,
+) -> None:
+    """Poses of corners: the closed form on random poses, and rendered sequences of a hand-held stereo pair.
+
+    Tables have the closed form's error, errors with noise against the Cramer-Rao bound, errors of attitude and position
+    with flips in the sequences, and what an inertial sensor makes of the attitudes.
+
+    Parameters
+    ----------
+    poses
+        Random poses with exact rays; 0 for none.
+    noisy_poses
+        Poses with noise of 0.3 pixels on rays of 200 pixels; 0 for none.
+    frames
+        Frames of the first sequence, the cuboid at 1280 x 720; the others have a tenth. 0 for none.
+    scenes
+        Only these sequences.
+    seed
+        Seed of the first scene and motion.
+    threads
+        Frames rendered at the same time; all cores by default.
+    out
+        Folder for the tables (Parquet) and the plots of errors over time (PNG).
+    """
+    from tiltvp.lab.evaluation import corner_closed_form as closed
+
+    if poses:
+        with progress_bar(-(-poses // closed.BATCH), "batches of poses") as bar:
+            exact = closed.exact_poses(poses, advance=bar.advance)
+        show_frame("Closed form, exact rays: radians to the nearest hypothesis", closed.summarise_exact(exact), [])
+    if noisy_poses:
+        with progress_bar(noisy_poses, "noisy poses") as bar:
+            noisy = closed.noisy_poses(noisy_poses, advance=bar.advance)
+        title = "Closed form, 0.3 px of noise on rays of 200 px, against the Cramer-Rao bound"
+        show_frame(title, closed.summarise_noisy(noisy), [])
+    if frames:
+        _sequences(frames, scenes, seed, threads or os.cpu_count() or 1, out)
+
+
+def _sequences(frames: int, names: tuple[str, ...], seed: int, threads: int, out: Path | None) -> None:
+    from tiltvp.images import write_image
+    from tiltvp.lab.evaluation.corner_inertial import summarise_inertial_comparison
+    from tiltvp.lab.evaluation.corners import CORNER_SCENES, CornerExperiment, measure_corners, summarise_corners
+    from tiltvp.lab.plots.corners import corner_errors, inertial_errors
+    from tiltvp.lab.plots.picture import figure_picture
+
+    known = {scene.name: scene for scene in CORNER_SCENES}
+    for name in names:
+        if name not in known:
+            raise InvalidInputError(f"--scenes {name!r}, expected some of {', '.join(known)}")
+    experiment = CornerExperiment(
+        frames=frames, scenes=tuple(known[name] for name in names) or CORNER_SCENES, seed=seed
+    )
+    if out is not None:
+        try:
+            out.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise InvalidInputError(f"--out {out}: {error.strerror or error}, expected a folder") from error
+    with progress_bar(sum(experiment.lengths()), "frames") as bar:
+        table, inertial = measure_corners(experiment, threads=threads, advance=bar.advance)
+    show_frame("Rendered sequences, errors of poses", summarise_corners(table), ["scene"])
+    if inertial.height:
+        summary = summarise_inertial_comparison(inertial)
+        show_frame("With an inertial sensor, errors in degrees", summary, ["method"])
+    if out is not None:
+        table.write_parquet(out / "corners.parquet")
+        for (name,), part in table.partition_by("scene", as_dict=True, maintain_order=True).items():
+            file = out / f"{str(name).replace(', ', '-').replace(' ', '-')}.png"
+            write_image(file, figure_picture(corner_errors(part, str(name))))
+        if inertial.height:
+            inertial.write_parquet(out / "inertial.parquet")
+            write_image(out / "inertial.png", figure_picture(inertial_errors(inertial)))
+        say(f"{out}: tables and plots")

@@ -1,0 +1,164 @@
+"""`tiltvp dataset drive` and `stereo`: datasets of something that moves through a rendered room."""
+
+from __future__ import annotations
+
+import math
+
+from tiltvp.cli.lab.dataset_options import DriveLensOptions, MakingOptions, Words, legs_from, made_by
+from tiltvp.cli.terminal import progress_bar, say
+from tiltvp.errors import InvalidInputError
+
+Mount = tuple[float, float, float, float]
+_LENS = DriveLensOptions()
+
+
+def drive(
+    making: MakingOptions,
+    lens: DriveLensOptions = _LENS,
+    *,
+    kind: str = "corridor",
+    frames: int | None = None,
+    legs: Words = None,
+    mount: Mount | None = None,
+    bumps_deg: float = 0.0,
+    lighting: float | None = None,
+    floor_gloss: float | None = None,
+    wall_pattern: str | None = None,
+    extent: float | None = None,
+    noise_sigma: float | None = None,
+    samples: int | None = None,
+    encoder_k_m: float | None = None,
+) -> None:
+    """Make a dataset of a robot's drive through a room: frames, odometry, and the identity of every upright edge.
+
+    Parameters
+    ----------
+    kind
+        Where to drive: corridor, hall, office, living-room, l-shaped, narrow or under-table.
+    frames
+        How many frames of wandering; default 1500.
+    legs
+        Instead of wandering, the legs of a way, METRES,DEGREES each (2.3,0 0,180); or paper, alternating or straight.
+    mount
+        Where the camera is on the robot: metres to the front and to the left, degrees turned to the left, metres up;
+        default 0 0 0 0.4.
+    bumps_deg
+        Greatest lean from bumps.
+    lighting
+        How much the light changes along the way, from 0 to 1; default 0.5.
+    floor_gloss
+        How much the floor shines, from 0 to 1; default 0.4.
+    wall_pattern
+        What all walls have in common: drawn (nothing, the default), stripes, panels or tiles.
+    extent
+        How many times larger than usual the floor is, from 1 to 4; default is 2 for corridor and hall, 1 otherwise.
+    noise_sigma
+        Gaussian noise in grey levels; default 2.
+    samples
+        Rays per pixel and side where surfaces meet; default 3.
+    encoder_k_m
+        Variance of an encoder's reading per metre; default 1e-5.
+    """
+    from tiltvp.lab.datasets.driving import drive_room, write_drive
+    from tiltvp.synth import Drive
+
+    count = making.thread_count
+    room = drive_room(
+        kind, making.seed, extent=extent, floor_gloss=floor_gloss, wall_pattern=wall_pattern, threads=count
+    )
+    made = Drive(
+        room,
+        camera=lens.load(),
+        robot_from_camera=lens.rotation(),
+        mount=None if mount is None else (mount[0], mount[1], math.radians(mount[2]), mount[3]),
+        blind_rad=lens.blind_rad,
+        frames=frames,
+        legs=None if legs is None else legs_from(legs),
+        seed=making.seed,
+        encoder_k_m=encoder_k_m,
+        bumps_max_rad=math.radians(bumps_deg),
+        lighting=lighting,
+        samples=samples,
+        noise_sigma=noise_sigma,
+        threads=count,
+    )
+    with progress_bar(len(made), "frames") as bar:
+        source = made_by("drive") | lens.source
+        write_drive(made, making.out, threads=count, source=source, force=making.force, advance=bar.advance)
+    say(f"{making.out}: {len(made)} frames of a drive of {made.motions[:, 0].sum():.1f} m")
+
+
+def stereo(
+    making: MakingOptions,
+    *,
+    kind: str = "laboratory",
+    frames: int | None = None,
+    width: int = 1280,
+    distance: tuple[float, float] | None = None,
+    gamma_deg: float = 90.0,
+    corner: int | None = None,
+    clutter: float | None = None,
+    exposure_ms: float = 0.0,
+    blur_sigma: float | None = None,
+    noise_sigma: float | None = None,
+    samples: int | None = None,
+) -> None:
+    """Make a sequence of a hand-held stereo pair that looks at a corner: images, calibration, poses, inertial data.
+
+    Parameters
+    ----------
+    kind
+        What is looked at: laboratory (a coloured cuboid), or a room: office, living-room, corridor, l-shaped, narrow or
+        under-table.
+    frames
+        How many frames, 30 a second; default 1000.
+    width
+        Width of the images: 1280 (x 720) or 1920 (x 1080).
+    distance
+        Least and greatest distance from the corner in metres; default 1 3.
+    gamma_deg
+        Angle between the level edges of the cuboid.
+    corner
+        Number of the corner that is looked at; default is the cuboid's, or one of a room that can be approached.
+    clutter
+        How much furniture there is, from 0 to 1.
+    exposure_ms
+        How long the shutter is open, for motion blur.
+    blur_sigma
+        What lens and sensor do to a point, in pixels; default 0.6.
+    noise_sigma
+        Gaussian noise in grey levels; default 2.
+    samples
+        Rays per pixel and side where surfaces meet; default 3.
+    """
+    from tiltvp.lab.datasets.stereo import write_stereo
+    from tiltvp.synth import Laboratory, Room, StereoSequence, zed_cameras
+
+    count = making.thread_count
+    left, right = zed_cameras(width)
+    if kind != "laboratory" and gamma_deg != 90.0:
+        raise InvalidInputError(f"--gamma-deg {gamma_deg}, expected it with --kind laboratory alone")
+    scene = (
+        Laboratory(making.seed, gamma_rad=math.radians(gamma_deg), clutter=clutter, threads=count)
+        if kind == "laboratory"
+        else Room(kind, making.seed, clutter=clutter, threads=count)
+    )
+    sequence = StereoSequence(
+        scene,
+        left=left,
+        right=right,
+        frames=frames,
+        seed=making.seed,
+        corner=corner,
+        distance_m=distance,
+        samples=samples,
+        noise_sigma=noise_sigma,
+        blur_sigma_px=blur_sigma,
+        exposure_s=exposure_ms / 1000.0,
+        threads=count,
+    )
+    with progress_bar(len(sequence), "frames") as bar:
+        write_stereo(
+            sequence, making.out, threads=count, source=made_by("stereo"), force=making.force, advance=bar.advance
+        )
+    say(f"{making.out}: {len(sequence)} pairs of images")

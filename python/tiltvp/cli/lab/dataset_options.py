@@ -1,0 +1,169 @@
+"""The options that the commands which make datasets share, and their way from words to what the library takes."""
+
+from __future__ import annotations
+
+import csv
+import os
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import numpy as np
+from cyclopts import Parameter
+
+from tiltvp.cli.options import Switch
+from tiltvp.errors import InvalidInputError
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    from tiltvp import Camera
+
+
+def _not_negative(_: object, number: int) -> None:
+    if number < 0:
+        raise ValueError("expected 0 or more")
+
+
+Words = Annotated[list[str] | None, Parameter(consume_multiple=True, negative="")]
+
+
+@Parameter(name="*")
+@dataclass(frozen=True, kw_only=True)
+class MakingOptions:
+    """Where a dataset goes, and how it is made."""
+
+    out: Path
+    """Folder to make. It appears when it is whole."""
+    seed: Annotated[int, Parameter(validator=_not_negative)] = 0
+    """Seed of whatever is random."""
+    threads: int | None = None
+    """How many threads; default is one per core."""
+    force: Switch = False
+    """Replace a dataset that is there."""
+
+    @property
+    def thread_count(self) -> int:
+        """Threads to use."""
+        return (os.cpu_count() or 1) if self.threads is None else self.threads
+
+
+@Parameter(name="*")
+@dataclass(frozen=True, kw_only=True)
+class LensOptions:
+    """Which camera looks, and how it is held."""
+
+    camera: Path | None = None
+    """Calibration file; default is a 640 x 480 upward fisheye of 185 degrees like the paper's."""
+    camera_name: str | None = None
+    """Name or number of the camera in a file of several; the first is 0."""
+    resolution_scale: float = 1.0
+    """Take a camera with so many times the pixels per side; 0.75 makes 480 x 360."""
+    robot_from_camera: str | None = None
+    """How the camera sits in its mounting: up (the default), forward, or a file with a rotation."""
+
+    def load(self) -> Camera:
+        """The camera."""
+        lens = self._lens()
+        return lens if self.resolution_scale == 1.0 else lens.scaled(self.resolution_scale)
+
+    def rotation(self) -> NDArray[np.float64] | None:
+        """(3, 3) `robot_from_camera`, where it was given."""
+        from tiltvp.rotations import read_rotation
+
+        return None if self.robot_from_camera is None else read_rotation(self.robot_from_camera)
+
+    @property
+    def source(self) -> dict[str, str]:
+        """What a dataset's description says of its camera."""
+        return {"camera": "like the paper's" if self.camera is None else self.camera.name}
+
+    def _lens(self) -> Camera:
+        from tiltvp import Camera
+        from tiltvp.lab.datasets.panoramas import paper_camera
+
+        if self.camera is None:
+            return paper_camera()
+        name = self.camera_name or "0"
+        return Camera.load(self.camera, camera=int(name) if name.isdecimal() else name)
+
+
+@Parameter(name="*")
+@dataclass(frozen=True, kw_only=True)
+class DriveLensOptions(LensOptions):
+    """Which camera a robot drives with."""
+
+    camera: Path = Path("mirror")
+    """mirror (a camera below a hyperbolic mirror), fisheye (like the tilt paper's), or a calibration file."""
+
+    def _lens(self) -> Camera:
+        from tiltvp.lab.datasets.panoramas import paper_camera
+        from tiltvp.synth import mirror_camera
+
+        known = {"mirror": mirror_camera, "fisheye": paper_camera}
+        word = str(self.camera)
+        return known[word]() if word in known else super()._lens()
+
+    @property
+    def blind_rad(self) -> float | None:
+        """How far from the axis the camera sees itself."""
+        from tiltvp.synth import MIRROR_BLIND_RAD
+
+        return MIRROR_BLIND_RAD if str(self.camera) == "mirror" else None
+
+
+def tilts_from(words: list[str] | None) -> list[tuple[float, float]]:
+    """(alpha, beta) in degrees, from pairs or a CSV file."""
+    from tiltvp.lab.datasets.panoramas import TABLE_1_TILTS_DEG
+
+    if not words:
+        return list(TABLE_1_TILTS_DEG)
+    if len(words) == 1 and "," not in words[0]:
+        return _tilts_of_file(Path(words[0]))
+    return [_pair(word.split(","), f"--tilts-deg {word!r}") for word in words]
+
+
+def legs_from(words: Sequence[str]) -> NDArray[np.float64]:
+    """(L, 2) metres and radians, from pairs or the name of a trajectory."""
+    from tiltvp.synth import drive_legs
+
+    if len(words) == 1 and "," not in words[0]:
+        return drive_legs(words[0])
+    return np.array([_pair(word.split(","), f"--legs {word!r}", "METRES,DEGREES") for word in words]) * (
+        1.0,
+        np.pi / 180.0,
+    )
+
+
+def made_by(command: str) -> dict[str, str]:
+    """What a dataset's description says of its making."""
+    from tiltvp import __version__
+
+    return {"made_by": f"tiltvp dataset {command}", "version": __version__}
+
+
+def _tilts_of_file(file: Path) -> list[tuple[float, float]]:
+    columns = ["alpha_deg", "beta_deg"]
+    try:
+        lines = list(csv.reader(file.read_text(encoding="utf-8-sig").splitlines()))
+    except OSError as error:
+        problem = error.strerror or error
+        raise InvalidInputError(f"{file}: {problem}, expected ALPHA,BETA in degrees, or a CSV file") from error
+    except (UnicodeDecodeError, csv.Error) as error:
+        raise InvalidInputError(
+            f"{file}: is not CSV in UTF-8 ({error}), expected the columns alpha_deg, beta_deg"
+        ) from error
+    rows = [(number, [cell.strip() for cell in row]) for number, row in enumerate(lines, 1) if row]
+    if not rows or rows[0][1] != columns:
+        raise InvalidInputError(f"{file}: expected the columns {', '.join(columns)}")
+    return [_pair(row, f"{file}, line {number}: {','.join(row)!r}") for number, row in rows[1:]]
+
+
+def _pair(cells: list[str], where: str, expected: str = "ALPHA,BETA in degrees") -> tuple[float, float]:
+    try:
+        first, second = (float(cell) for cell in cells)
+    except ValueError:
+        raise InvalidInputError(f"{where}, expected {expected}") from None
+    return first, second

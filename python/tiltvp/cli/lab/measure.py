@@ -1,0 +1,236 @@
+"""`tiltvp measure`: the tilt methods on panoramas and rooms, and what they cost; other measures join here."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import Annotated
+
+from cyclopts import App, Parameter, validators
+
+from tiltvp.cli.lab.calibration_measures import calibration, calibration_images
+from tiltvp.cli.lab.corner_measures import corners
+from tiltvp.cli.lab.corner_real import corners_real
+from tiltvp.cli.lab.descriptors import descriptors
+from tiltvp.cli.lab.line_measures import lines
+from tiltvp.cli.lab.planar_pose import planar_pose
+from tiltvp.cli.lab.striding import striding
+from tiltvp.cli.lab.tables import show_frame
+from tiltvp.cli.tables import check_ending, write_frame
+from tiltvp.cli.terminal import progress_bar, say
+from tiltvp.errors import InvalidInputError
+
+app = App(name="measure", help="Measure how well all this works, where the truth is known.")
+app.command(calibration)
+app.command(calibration_images)
+app.command(corners)
+app.command(corners_real)
+app.command(descriptors)
+app.command(lines)
+app.command(planar_pose)
+app.command(striding)
+
+
+@app.command
+def panoramas(
+    directory: Path,
+    /,
+    *,
+    every: int = 1,
+    samples: int = 2,
+    noise_sigma: float = 2.0,
+    turn: Annotated[bool, Parameter(negative="")] = False,
+    out: Path | None = None,
+) -> None:
+    """Every method on views of upright panoramas through an upward fisheye, at the seven leans of the paper's table 1.
+
+    Parameters
+    ----------
+    directory
+        Folder with the panoramas and an INDEX.csv of columns name, environment, tilt_x_deg, tilt_z_deg.
+    every
+        Take one panorama in so many.
+    samples
+        Rays per pixel and side.
+    noise_sigma
+        Gaussian noise in grey levels.
+    turn
+        Give each view a heading of its own.
+    out
+        Also write the long table, one row for each image, combination and correction: .csv, .json or .parquet.
+    """
+    from tiltvp.lab.datasets.panoramas import paper_camera, read_panorama_index
+    from tiltvp.lab.evaluation.combinations import choose
+    from tiltvp.lab.evaluation.panoramas import evaluate_views
+    from tiltvp.lab.evaluation.summary import errors, variants
+
+    if out is not None:
+        check_ending(out)
+    chosen = read_panorama_index(directory)[::every]
+    with progress_bar(len(chosen), "panoramas") as bar:
+        table = evaluate_views(
+            chosen, paper_camera(), choose("table3"), samples=samples, noise_sigma=noise_sigma, turn=turn,
+            advance=bar.advance,
+        )  # fmt: skip
+    if out is not None:
+        write_frame(table, out)
+    show_frame(f"Errors in degrees (eq. 44), {len(chosen)} panoramas", variants(errors(table)), ["variant"])
+
+
+@app.command
+def inertial(directory: Path, /, *, samples: int = 2) -> None:
+    """The refined method on panoramas as they were taken, against the camera's own inertial sensor.
+
+    Parameters
+    ----------
+    directory
+        Folder with the panoramas and an INDEX.csv of columns name, environment, imu_pitch_deg, imu_roll_deg.
+    samples
+        Rays per pixel and side.
+    """
+    from tiltvp.lab.datasets.panoramas import paper_camera
+    from tiltvp.lab.evaluation.imu import estimate_leaning, read_inertial_index, summarise_inertial
+
+    chosen = read_inertial_index(directory)
+    with progress_bar(len(chosen), "panoramas") as bar:
+        table = estimate_leaning(chosen, paper_camera(), samples=samples, advance=bar.advance)
+    show_frame("Refined lean minus sensor, degrees, constant offset removed", summarise_inertial(table), ["panoramas"])
+
+
+@app.command
+def scaling(
+    *,
+    images: Annotated[tuple[int, ...], Parameter(consume_multiple=True)] = (21, 42, 84, 168),
+    scales: Annotated[tuple[float, ...], Parameter(consume_multiple=True)] = (0.25, 0.5, 1.0, 2.0, 4.0),
+    sweep: str = "paper",
+    threads: Annotated[int | None, Parameter(validator=validators.Number(gte=1))] = None,
+    out: Path | None = None,
+) -> None:
+    """The time that an evaluation of rendered rooms takes, over the number of images and over their pixels.
+
+    Parameters
+    ----------
+    images
+        Numbers of images of 640 x 480.
+    scales
+        Pixels of an image, in multiples of 640 x 480.
+    sweep
+        What is tried: paper or table3.
+    threads
+        Images at the same time; all cores by default.
+    out
+        Also write the table: .csv, .json or .parquet.
+    """
+    from tiltvp.lab.datasets.panoramas import paper_camera
+    from tiltvp.lab.evaluation.combinations import choose
+    from tiltvp.lab.evaluation.scaling import exponents, measure_scaling
+
+    if out is not None:
+        check_ending(out)
+    combinations = choose(sweep)
+    with progress_bar(len(images) + len(scales), "evaluations") as bar:
+        table = measure_scaling(
+            paper_camera(), combinations, images=images, scales=scales, threads=threads or os.cpu_count() or 1,
+            advance=bar.advance,
+        )  # fmt: skip
+    if out is not None:
+        write_frame(table, out)
+    show_frame(f"Seconds of an evaluation of {len(combinations)} combinations", table, ["over"])
+    show_frame("Exponents of growth: 1 is linear", exponents(table), ["over"])
+
+
+@app.command
+def confidence(
+    runs: Annotated[list[Path], Parameter(consume_multiple=True)],
+    /,
+    *,
+    out: Path | None = None,
+) -> None:
+    """How far covariance and confidence can be trusted: the truths that regions hold, and failures that were foreseen.
+
+    Parameters
+    ----------
+    runs
+        Folders that `tiltvp evaluate` has written.
+    out
+        Also write the table: .csv, .json or .parquet.
+    """
+    from tiltvp.lab.evaluation.runs import read_run
+    from tiltvp.lab.evaluation.summary import errors
+    from tiltvp.lab.evaluation.trust import trust
+    from tiltvp.lab.evaluation.variants import best_rows
+
+    if out is not None:
+        check_ending(out)
+    tables = {}
+    for directory in runs:
+        table = read_run(directory).table
+        tables[directory.name] = best_rows(table, errors(table))
+    if len(tables) < len(runs):
+        raise InvalidInputError(f"{', '.join(map(str, runs))}: expected runs with names of their own")
+    table = trust(tables)
+    if out is not None:
+        write_frame(table, out)
+    show_frame(
+        "Failures (above 2 degrees) foreseen, and truths inside the covariance's regions", table, ["run", "variant"]
+    )
+
+
+@app.command
+def sampling(
+    directory: Path | None = None,
+    /,
+    *,
+    every: int = 4,
+    rooms: int = 4,
+    kind: str | None = None,
+    seeds: int = 5,
+    samples: int = 2,
+    noise_sigma: float = 2.0,
+    out: Path | None = None,
+) -> None:
+    """Each option of the sampling loop, alone and together, against plain RANSAC: errors, trials, times, what pays.
+
+    Parameters
+    ----------
+    directory
+        Folder with the panoramas and an INDEX.csv of columns name, environment, tilt_x_deg, tilt_z_deg; without one,
+        rendered rooms alone are measured.
+    every
+        Take one panorama in so many.
+    rooms
+        Rendered rooms of each kind; 0 for none.
+    kind
+        Rooms of this kind alone.
+    seeds
+        Seeds for each image.
+    samples
+        Rays per pixel and side.
+    noise_sigma
+        Gaussian noise in grey levels.
+    out
+        Also write the long table, one row for each image, method, way and seed, as Parquet.
+    """
+    import polars as pl
+
+    from tiltvp.lab.datasets.panoramas import paper_camera
+    from tiltvp.lab.evaluation.sampling import sample_views, summarise_sampling
+    from tiltvp.lab.evaluation.views import view_sources
+    from tiltvp.synth import ROOM_KINDS
+
+    camera, kinds = paper_camera(), ROOM_KINDS if kind is None else (kind,)
+    tables = []
+    for source in view_sources(
+        directory, camera, every=every, rooms=rooms, kinds=kinds, samples=samples, noise_sigma=noise_sigma
+    ):
+        with progress_bar(source.count, source.title) as bar:
+            table = sample_views(source.views, camera, seeds=seeds, advance=bar.advance)
+        tables.append(table.with_columns(source=pl.lit(source.title)))
+        summary = summarise_sampling(table)
+        for (method,), part in summary.group_by("method", maintain_order=True):
+            show_frame(f"{source.title}, {method}: degrees (eq. 44)", part.drop("method"), ["way"])
+            paying = part.filter(~pl.col("pays").is_in(["", "no"])).select("way", "pays", "image").iter_rows()
+            words = [f"{way} (in {what}, at {image:.2f} of an image's time)" for way, what, image in paying]
+            say(f"Pays: {'; '.join(words) or 'none'}.")
+    if out is not None:
+        pl.concat(tables).write_parquet(out)

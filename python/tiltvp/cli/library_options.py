@@ -1,0 +1,147 @@
+"""Options of the command line made from those that the library declares: names, types, help and defaults.
+
+Angles are degrees here: `elevation_min_rad` of the library is `--elevation-min-deg`. What is not given is left to the
+library.
+"""
+
+import inspect
+import math
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Annotated, Any, ClassVar, TypeVar
+
+from cyclopts import Parameter
+
+from tiltvp._core import option_fields
+
+T = TypeVar("T")
+
+_TYPES: dict[str, Any] = {
+    "bool": bool, "int": int, "float": float, "str": str,
+    "tuple[float, float]": tuple[float, float],
+    "tuple[float, float, float]": tuple[float, float, float],
+    "npt.NDArray[np.bool_]": Path,
+}  # fmt: skip
+
+
+class LibraryOptions:
+    """What was given of the options that `from_library` adds to a class."""
+
+    _keywords: ClassVar[Mapping[str, str]] = {}
+
+    def given(self) -> dict[str, Any]:
+        """The keywords of the library."""
+        options: dict[str, Any] = {}
+        for name, keyword in self._keywords.items():
+            value = getattr(self, name)
+            if value is not None:
+                options[keyword] = _to_library(keyword, value)
+        return options
+
+
+def from_library(
+    owners: Mapping[str, Sequence[str]], *, words: Mapping[str, str] | None = None, but: Sequence[str] = ()
+) -> Callable[[type[T]], type[T]]:
+    """Adds the options of owners and their methods, but for some, as fields to a class that is made a dataclass above.
+
+    An option that the class already has is left as it is there; `words` are further words for some options.
+    """
+
+    def make(cls: type[T]) -> type[T]:
+        keywords: dict[str, str] = dict(getattr(cls, "_keywords", {}))
+        own = {name for base in cls.__mro__ for name in inspect.get_annotations(base)}
+        for owner, methods in owners.items():
+            for keyword, (field, helps) in _fields(owner, methods or (None,)).items():
+                name = _name(keyword)
+                if keyword in but or name in keywords:
+                    continue
+                keywords[name] = keyword
+                if name not in own:
+                    further = (words or {}).get(keyword)
+                    cls.__annotations__[name] = _annotation(name, field, helps, further, several=len(methods) > 1)
+                    setattr(cls, name, None)
+        cls._keywords = keywords  # type: ignore[attr-defined]
+        return cls
+
+    return make
+
+
+def _fields(owner: str, methods: Sequence[str | None]) -> dict[str, tuple[dict[str, Any], dict[str | None, str]]]:
+    """Each option by its keyword: how it is declared first, and its default for each method that has it."""
+    found: dict[str, tuple[dict[str, Any], dict[str | None, str]]] = {}
+    for method in methods:
+        for field in option_fields(owner, method):
+            _, defaults = found.setdefault(field["name"], (field, {}))
+            defaults[method] = _shown(field)
+    return found
+
+
+def _annotation(
+    name: str, field: Mapping[str, Any], defaults: Mapping[str | None, str], further: str | None, *, several: bool
+) -> Any:
+    plain = field["type"].removesuffix(" | None")
+    kind = _TYPES.get(plain, str)
+    flag = f"--{name.replace('_', '-')}"
+    names = [flag] if further is None else [further, flag]
+    off = "" if plain == "bool" and not field["default"] else None
+    shown = Parameter(name=names, help=_help(field, defaults, several=several), negative=off, show_default=False)
+    return Annotated[kind | None, shown]
+
+
+def _help(field: Mapping[str, Any], defaults: Mapping[str | None, str], *, several: bool) -> str:
+    doc = (
+        " ".join(field["doc"].replace("`", "").split())
+        .replace("in radians", "in degrees")
+        .replace("radians", "degrees")
+    )
+    if len(set(defaults.values())) == 1:
+        only = "" if not several or len(defaults) > 1 else f"{next(iter(defaults))}: "
+        return f"{only}{doc} Default {next(iter(defaults.values()))}."
+    each = ", ".join(f"{default} for {method}" for method, default in defaults.items())
+    return f"{doc} Default {each}."
+
+
+def _shown(field: Mapping[str, Any]) -> str:
+    value, name = field["default"], field["name"]
+    if value is None:
+        return "none"
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if isinstance(value, float):
+        return f"{math.degrees(value) if _is_angle(name) else value:.4g}"
+    if isinstance(value, str | int):
+        return str(value)
+    return " ".join(f"{x:.4g}" for x in value) if isinstance(value, tuple) else "as said"
+
+
+def _is_angle(keyword: str) -> bool:
+    return "rad" in keyword.split("_")
+
+
+def _name(keyword: str) -> str:
+    return "_".join("deg" if part == "rad" else part for part in keyword.split("_"))
+
+
+def _to_library(keyword: str, value: Any) -> Any:
+    if keyword == "mask":
+        return mask_from(value)
+    if keyword == "correction":
+        return _correction_from(value)
+    return math.radians(value) if _is_angle(keyword) and isinstance(value, float) else value
+
+
+def mask_from(path: Path) -> object:
+    """Where an image is bright."""
+    from tiltvp import read_image
+    from tiltvp.images import gray_from
+
+    return gray_from(read_image(path), str(path)) > 127
+
+
+def _correction_from(word: str) -> str | float | None:
+    if word == "none":
+        return None
+    try:
+        return float(word)
+    except ValueError:
+        return word

@@ -1,0 +1,131 @@
+"""The tables that verbs write: typed columns, as CSV and JSON by the standard library, as Parquet by Polars."""
+
+from __future__ import annotations
+
+import csv
+import json
+import math
+import os
+import secrets
+from collections.abc import Callable, Iterable, Mapping
+from contextlib import suppress
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+from tiltvp.errors import ImageFileError, InvalidInputError, MissingExtraError
+
+if TYPE_CHECKING:
+    import polars as pl
+
+ENDINGS: Final = (".csv", ".json", ".parquet")
+
+
+@dataclass(frozen=True)
+class Table:
+    """Rows of named cells; None where there is no value."""
+
+    types: Mapping[str, str]
+    """The columns in their order, each with the name of its Polars type: Float64, Int64, UInt32, Boolean or String."""
+    rows: list[dict[str, Any]] = field(default_factory=list)
+
+    def add(self, columns: Mapping[str, Iterable[Any]]) -> None:
+        """Appends rows that are given by their columns."""
+        for cells in zip(*(columns[name] for name in self.types), strict=True):
+            self.rows.append(dict(zip(self.types, cells, strict=True)))
+
+    def frame(self) -> pl.DataFrame:
+        """The same as a data frame, for Parquet and plots."""
+        import polars as pl
+
+        return pl.DataFrame(self.rows, schema={name: getattr(pl, word) for name, word in self.types.items()})
+
+
+def check_ending(path: Path) -> None:
+    """Refuses a file of results that cannot be written in its format, before any work is done."""
+    if path.suffix.lower() not in ENDINGS:
+        raise InvalidInputError(f"--out {path}: ends in {path.suffix!r}, expected one of {', '.join(ENDINGS)}")
+    if path.suffix.lower() == ".parquet":
+        need_lab(f"--out {path}")
+
+
+def check_plot(option: str, path: Path | None) -> None:
+    """Refuses a plot that cannot be drawn, before any work is done."""
+    if path is None:
+        return
+    if path.suffix.lower() != ".png":
+        raise InvalidInputError(f"{option} {path}: ends in {path.suffix!r}, expected .png")
+    need_lab(f"{option} {path}")
+
+
+def need_lab(what: str) -> None:
+    """Refuses what only the laboratory's packages can do where these are not installed."""
+    try:
+        import tiltvp.lab  # noqa: F401
+    except MissingExtraError as error:
+        raise MissingExtraError(f"{what}: {error}") from None
+
+
+def write_table(table: Table, path: Path) -> None:
+    """Writes the table whole or not at all; the ending says the format."""
+    match path.suffix.lower():
+        case ".csv":
+            write_whole(path, lambda part: _write_csv(table, part))
+        case ".json":
+            write_whole(path, lambda part: _write_json(table, part))
+        case _:
+            write_frame(table.frame(), path)
+
+
+def write_frame(frame: pl.DataFrame, path: Path) -> None:
+    """Writes a data frame whole or not at all; the ending says the format."""
+    check_ending(path)
+    match path.suffix.lower():
+        case ".csv":
+            write_whole(path, frame.write_csv)
+        case ".json":
+            write_whole(path, frame.write_json)
+        case _:
+            write_whole(path, frame.write_parquet)
+
+
+def write_whole(path: Path, write: Callable[[Path], Any]) -> None:
+    """Lets `write` make a file that appears at `path` when it is complete."""
+    part = path.with_name(f".{path.stem}.{secrets.token_hex(8)}.part{path.suffix}")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        write(part)
+        os.replace(part, path)
+    except OSError as error:
+        raise ImageFileError(f"{path}: cannot be written ({error.strerror or error})") from error
+    finally:
+        with suppress(OSError):
+            part.unlink()
+
+
+def _write_csv(table: Table, path: Path) -> None:
+    with path.open("w", encoding="utf-8", newline="") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(table.types)
+        writer.writerows([_word(row[name]) for name in table.types] for row in table.rows)
+
+
+def _word(cell: object) -> object:
+    """Booleans and NaN as Polars and most programs spell them."""
+    if isinstance(cell, bool):
+        return "true" if cell else "false"
+    return "NaN" if isinstance(cell, float) and math.isnan(cell) else cell
+
+
+def _write_json(table: Table, path: Path) -> None:
+    rows = [{name: finite(row[name]) for name in table.types} for row in table.rows]
+    path.write_text(json.dumps(rows, allow_nan=False, ensure_ascii=False, separators=(",", ":")), encoding="utf-8")
+
+
+def finite(value: Any) -> Any:
+    """The value with null for numbers that are not finite, which JSON does not know."""
+    if isinstance(value, dict):
+        return {key: finite(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [finite(item) for item in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value

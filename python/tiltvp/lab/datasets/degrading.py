@@ -1,0 +1,109 @@
+"""A dataset made harder: each image half hidden, blurred or darkened, so that a confidence has failures to foresee."""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Callable
+from contextlib import closing
+from threading import Event
+from typing import TYPE_CHECKING, Any, Final
+
+import cv2
+import numpy as np
+
+from tiltvp.errors import InvalidInputError
+from tiltvp.lab.datasets.folder import TiltDataset
+from tiltvp.lab.datasets.new import in_order, new_dataset
+from tiltvp.lab.datasets.rows import TiltImage
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from tiltvp.cameras import Camera
+
+__all__ = ["HARDSHIPS", "degrade_dataset", "degrade_image"]
+
+HARDSHIPS: Final = ("hidden", "blurred", "dark")
+"""What may befall an image: all but 20 to 160 degrees of azimuth hidden; out of focus by 1.5 to 8 pixels; 4 to 40 % of
+the light with noise of 2 to 6 grey levels."""
+
+_NOISE: Final = 2.0
+_HIDDEN_LEVEL: Final = 40.0
+_SHADE_RAD: Final = math.radians(20.0)
+
+
+def degrade_image(
+    gray: NDArray[np.uint8], hardship: str, camera: Camera, rng: np.random.Generator
+) -> NDArray[np.uint8]:
+    """(H, W) uint8: the image with one of `HARDSHIPS`, as strong as `rng` draws it."""
+    image: NDArray[np.float64] = gray.astype(np.float64)
+    if hardship == "hidden":
+        seen = _window(camera, rng)
+        hidden = _HIDDEN_LEVEL + rng.normal(0.0, _NOISE, image.shape)
+        image = seen * image + (1.0 - seen) * hidden
+    elif hardship == "blurred":
+        blurred = cv2.GaussianBlur(image, (0, 0), rng.uniform(1.5, 8.0)).astype(np.float64)
+        image = blurred + rng.normal(0.0, _NOISE, image.shape)
+    elif hardship == "dark":
+        image = rng.uniform(0.04, 0.4) * image + rng.normal(0.0, rng.uniform(2.0, 6.0), image.shape)
+    else:
+        raise InvalidInputError(f"hardship = {hardship!r}, expected one of {', '.join(HARDSHIPS)}")
+    return np.asarray(np.clip(np.rint(image), 0, 255), dtype=np.uint8)
+
+
+def _window(camera: Camera, rng: np.random.Generator) -> NDArray[np.float64]:
+    """(H, W) in [0, 1]: one within an azimuth about the optical axis, fading so gently that no edge appears."""
+    u, v = np.meshgrid(np.arange(camera.width), np.arange(camera.height))
+    bearings = camera.unproject(np.stack([u.ravel(), v.ravel()], axis=1).astype(np.float64))
+    azimuth = np.nan_to_num(np.arctan2(bearings[:, 1], bearings[:, 0])).reshape(u.shape)
+    half, middle = 0.5 * math.radians(rng.uniform(20.0, 160.0)), rng.uniform(-math.pi, math.pi)
+    away = np.abs((azimuth - middle + math.pi) % (2.0 * math.pi) - math.pi)
+    return np.asarray(np.clip((half + _SHADE_RAD - away) / _SHADE_RAD, 0.0, 1.0), dtype=np.float64)
+
+
+def degrade_dataset(
+    dataset: TiltDataset,
+    out: str | os.PathLike[str],
+    *,
+    seed: int = 0,
+    threads: int = 1,
+    source: dict[str, Any] | None = None,
+    force: bool = False,
+    advance: Callable[[], None] = lambda: None,
+) -> None:
+    """Writes the dataset again with a hardship for each image, drawn by `seed` and the image's place in the table.
+
+    Locations, environments and truth stay. `advance` is called after each image. Raises `InvalidInputError`.
+    """
+    if dataset.mask is not None:
+        raise InvalidInputError(f"{dataset.directory}: has a mask, expected a dataset without one")
+    stop = Event()
+    about = {"kind": "degraded", "hardships": list(HARDSHIPS), "seed": seed, "of": dict(dataset.source)}
+    with new_dataset(
+        out,
+        dataset.camera,
+        robot_from_camera=dataset.robot_from_camera,
+        source=about | (source or {}),
+        force=force,
+    ) as new:
+
+        def work(numbered: tuple[int, TiltImage]) -> TiltImage:
+            number, image = numbered
+            rng = np.random.default_rng((seed, number))
+            hardship = HARDSHIPS[int(rng.integers(len(HARDSHIPS)))]
+            gray = degrade_image(dataset.read(image), hardship, dataset.camera, rng)
+            return new.write(
+                f"{number:05d}_{hardship}",
+                gray,
+                location=image.location,
+                environment=image.environment,
+                alpha_rad=image.alpha_rad,
+                beta_rad=image.beta_rad,
+                yaw_rad=image.yaw_rad,
+            )
+
+        with closing(in_order(work, list(enumerate(dataset.images)), threads, stop)) as images:
+            for image in images:
+                new.images.append(image)
+                advance()

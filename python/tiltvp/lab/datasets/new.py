@@ -1,0 +1,183 @@
+"""Making a dataset: everything is written beside its place, and moved there when it is whole."""
+
+from __future__ import annotations
+
+import csv
+import io
+import math
+import os
+import shutil
+from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
+from pathlib import Path
+from threading import Event
+from typing import TYPE_CHECKING, Any, Final, TypeVar
+
+import numpy as np
+import tomli_w
+
+from tiltvp.errors import CalibrationError, InvalidInputError
+from tiltvp.images import write_image
+from tiltvp.lab.datasets.description import DESCRIPTION
+from tiltvp.lab.datasets.rows import ROWS, TiltImage
+from tiltvp.rotations import rotation_from
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike, NDArray
+
+    from tiltvp.cameras import Camera
+
+__all__ = ["NewDataset", "in_order", "new_dataset", "new_folder"]
+
+_CAMERA: Final = "camera.toml"
+_IMAGES: Final = "images"
+
+Job = TypeVar("Job")
+Result = TypeVar("Result")
+
+
+class NewDataset:
+    """A dataset that is being made. Images may be written by several threads at once."""
+
+    def __init__(self, directory: Path) -> None:
+        """In a folder that nobody else uses."""
+        self.directory = directory
+        """Where it is until it is whole."""
+        self.images: list[TiltImage] = []
+        """The rows of the table, to be put in order by who makes them."""
+
+    def write(
+        self,
+        name: str,
+        gray: NDArray[np.uint8],
+        *,
+        location: str,
+        environment: str,
+        alpha_rad: float,
+        beta_rad: float,
+        yaw_rad: float = 0.0,
+    ) -> TiltImage:
+        """Writes one image, (H, W) uint8 or (H, W, 3) in BGR order, as a PNG of that name; its row is the caller's."""
+        file = f"{_IMAGES}/{name}.png"
+        path = self.directory / file
+        write_image(path, gray)
+        return TiltImage(file, path, location, environment, alpha_rad, beta_rad, yaw_rad)
+
+    def write_table(self, name: str, header: Sequence[str], rows: Iterable[Sequence[object]]) -> None:
+        """Writes a CSV file of that name beside the images."""
+        text = io.StringIO()
+        table = csv.writer(text, lineterminator="\n")
+        table.writerow(header)
+        table.writerows(rows)
+        (self.directory / name).write_text(text.getvalue(), encoding="utf-8")
+
+    def write_toml(self, name: str, values: dict[str, Any]) -> None:
+        """Writes a TOML file of that name beside the images."""
+        (self.directory / name).write_text(tomli_w.dumps(values), encoding="utf-8")
+
+
+@contextmanager
+def new_dataset(
+    directory: str | os.PathLike[str],
+    camera: Camera,
+    *,
+    robot_from_camera: ArrayLike | None = None,
+    source: dict[str, Any] | None = None,
+    force: bool = False,
+) -> Iterator[NewDataset]:
+    """A dataset to be filled in a `with` block. It appears at its end, whole, or not at all if the block fails.
+
+    An existing folder is refused unless `force`, which replaces an empty folder or a dataset, and nothing else. Raises
+    `InvalidInputError`.
+    """
+    rotation = None if robot_from_camera is None else _rotation(robot_from_camera)
+    with new_folder(directory, force=force) as new:
+        yield new
+        camera.save(new.directory / _CAMERA)
+        _write_description(new.directory, rotation, source or {})
+        _write_rows(new.directory, new.images)
+
+
+@contextmanager
+def new_folder(directory: str | os.PathLike[str], *, force: bool = False) -> Iterator[NewDataset]:
+    """A folder to be filled in a `with` block, dataset.toml included; else as `new_dataset`."""
+    target = Path(directory)
+    _refuse_taken(target, force)
+    part = target.absolute().parent / f".{target.absolute().name}.{os.getpid()}.part"
+    try:
+        part.mkdir(parents=True)
+    except OSError as error:
+        raise InvalidInputError(f"{target}: {error.strerror or error}, expected a place for a new folder") from error
+    try:
+        yield NewDataset(part)
+        _refuse_taken(target, force)
+        if target.exists():
+            old = part.with_suffix(".old")
+            target.rename(old)
+            part.rename(target)
+            shutil.rmtree(old)
+        else:
+            part.rename(target)
+    finally:
+        shutil.rmtree(part, ignore_errors=True)
+
+
+def in_order(
+    work: Callable[[Job], Result], jobs: Sequence[Job], threads: int, stop: Event
+) -> Generator[Result, None, None]:
+    """`work(job)` of each job, in their order, on several threads.
+
+    When one fails, or the caller goes away, what has not begun never does, and `stop` is set for what has.
+    """
+    if threads < 1:
+        raise InvalidInputError(f"threads = {threads}, expected 1 or more")
+    pool = ThreadPoolExecutor(min(threads, max(1, len(jobs))))
+    try:
+        yield from pool.map(work, jobs)
+    finally:
+        stop.set()
+        pool.shutdown(wait=True, cancel_futures=True)
+
+
+def _refuse_taken(target: Path, force: bool) -> None:
+    if not target.exists() and not target.is_symlink():
+        return
+    is_ours = target.is_dir() and ((target / DESCRIPTION).is_file() or not any(target.iterdir()))
+    if not force:
+        raise InvalidInputError(f"{target}: exists, expected a new folder, or --force to replace a dataset")
+    if not is_ours:
+        raise InvalidInputError(f"{target}: is no dataset, expected a folder with {DESCRIPTION}, or an empty one")
+
+
+def _rotation(robot_from_camera: ArrayLike) -> list[list[float]]:
+    rows: list[list[float]] = np.asarray(robot_from_camera, dtype=np.float64).tolist()
+    try:
+        rotation_from(rows, "robot_from_camera")
+    except CalibrationError as error:
+        raise InvalidInputError(str(error)) from None
+    return rows
+
+
+def _write_description(directory: Path, rotation: list[list[float]] | None, source: dict[str, Any]) -> None:
+    table: dict[str, Any] = {"camera": _CAMERA}
+    if rotation is not None:
+        table["robot_from_camera"] = rotation
+    if source:
+        table["source"] = source
+    (directory / DESCRIPTION).write_text(tomli_w.dumps(table), encoding="utf-8")
+
+
+def _write_rows(directory: Path, images: Iterable[TiltImage]) -> None:
+    text = io.StringIO()
+    table = csv.writer(text, lineterminator="\n")
+    table.writerow(("file", "location", "environment", "alpha_deg", "beta_deg", "yaw_deg"))
+    for image in images:
+        angles = (_degrees(angle) for angle in (image.alpha_rad, image.beta_rad, image.yaw_rad))
+        table.writerow((image.file, image.location, image.environment, *angles))
+    (directory / ROWS).write_text(text.getvalue(), encoding="utf-8")
+
+
+def _degrees(angle_rad: float) -> str:
+    """As short as it can be with the angle to 1e-12 degrees."""
+    return f"{math.degrees(angle_rad):.12f}".rstrip("0").rstrip(".")

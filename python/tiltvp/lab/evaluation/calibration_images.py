@@ -1,0 +1,142 @@
+"""How good self-calibration from pictures is: rendered drives along the paper's trajectory, tilt to mounting."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+from contextlib import closing
+from dataclasses import dataclass
+from threading import Event
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import polars as pl
+
+from tiltvp.lab.datasets.driving import drive_room
+from tiltvp.lab.datasets.new import in_order
+from tiltvp.line_logs import FollowedFrame, bearing_log, follow_lines
+from tiltvp.lines import LineExtractor, LineTracker
+from tiltvp.odometry import Motion
+from tiltvp.rotations import about_vertical
+from tiltvp.selfcalib import MountingEstimate, SelfCalibrator, calibrate
+from tiltvp.synth import MIRROR_BLIND_RAD, Drive, drive_legs, mirror_camera
+from tiltvp.tilt import TiltEstimator
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+__all__ = ["PictureExperiment", "picture_drives"]
+
+_PHI_RAD, _RHO_M, _PSI_RAD = -0.34, 0.23, 0.33
+"""The paper's mounting."""
+_START_ERRORS = (0.34, 0.03, 0.33)
+"""Standard deviations of the errors of phi, rho, psi at the start, as in the simulated drives."""
+_START_SIGMA = (0.2, 0.2, 0.6)
+
+
+@dataclass(frozen=True, kw_only=True)
+class PictureExperiment:
+    """Which drives are rendered: one for each kind, lean and seed."""
+
+    kinds: tuple[str, ...] = ("hall", "corridor")
+    leans_max_deg: tuple[float, ...] = (0.0, 3.0)
+    drives: int = 2
+    seed: int = 9101
+    trajectory: str = "paper"
+    samples: int = 2
+    step_m: float = 0.038
+    turn_max_rad: float = math.radians(3.0)
+
+    @property
+    def cases(self) -> list[tuple[str, float, int]]:
+        """Kind, greatest lean in degrees, and seed of each drive."""
+        seeds = range(self.seed, self.seed + self.drives)
+        return [(kind, lean, seed) for kind in self.kinds for lean in self.leans_max_deg for seed in seeds]
+
+
+def picture_drives(
+    experiment: PictureExperiment, *, threads: int = 1, advance: Callable[[], None] = lambda: None
+) -> pl.DataFrame:
+    """Two rows for each drive, of the filter and the whole log: errors of phi, rho, psi, x, y, yaw, and their sigmas.
+
+    Angles in degrees, lengths in mm. The mounting is the paper's with a start as far off as in the simulated drives;
+    the tilt of each frame is estimated by `refined`. `advance` is called after each drive.
+    """
+    rows = []
+    for kind, lean_deg, seed in experiment.cases:
+        room = drive_room(kind, seed, threads=threads)
+        drive = Drive(
+            room,
+            camera=mirror_camera(),
+            mount=(_RHO_M * math.cos(_PHI_RAD), _RHO_M * math.sin(_PHI_RAD), _PHI_RAD + _PSI_RAD, 0.4),
+            blind_rad=MIRROR_BLIND_RAD,
+            legs=drive_legs(experiment.trajectory),
+            step_m=experiment.step_m,
+            turn_max_rad=experiment.turn_max_rad,
+            bumps_max_rad=math.radians(lean_deg),
+            samples=experiment.samples,
+            seed=seed,
+            threads=threads,
+        )
+        start = _start(seed)
+        frames = list(_followed(drive, start, threads))
+        sigma_rad = float(np.median(np.concatenate([frame.tracked.lines.sigma_rad for frame in frames])))
+        bearings = bearing_log(frames, frames_min=3)
+        bearings[:, 2] -= start[2]
+        options: dict[str, Any] = {
+            "wheel_base_m": drive.wheel_base_m, "bearing_sigma_rad": sigma_rad,
+            "start": start, "start_sigma": _START_SIGMA,
+        }  # fmt: skip
+        calibrator = SelfCalibrator(**options)
+        calibrator.follow(drive.odometry, bearings)
+        whole = calibrate(drive.odometry, bearings, **options)
+        case = {"kind": kind, "lean max": lean_deg, "seed": seed, "frames": len(drive), "bearings": len(bearings)}
+        for name, estimate in (("filter", calibrator.estimate), ("whole log", whole.mounting)):
+            rows.append(case | {"by": name} | _errors(estimate))
+        advance()
+    return pl.DataFrame(rows)
+
+
+def _start(seed: int) -> tuple[float, float, float]:
+    phi, rho, psi = np.random.default_rng(seed).normal((_PHI_RAD, _RHO_M, _PSI_RAD), _START_ERRORS)
+    return max(rho, 0.05) * math.cos(phi), max(rho, 0.05) * math.sin(phi), phi + psi
+
+
+def _followed(drive: Drive, start: tuple[float, float, float], threads: int) -> Iterator[FollowedFrame]:
+    """The frames of a drive, rendered on so many threads, with their lines as seen from the mounting at the start."""
+    camera, (x_m, y_m, yaw_rad) = drive.camera, start
+    rotation = about_vertical(yaw_rad)
+    estimator = TiltEstimator(camera, robot_from_camera=rotation)
+    extractor, tracker = LineExtractor(camera, robot_from_camera=rotation), LineTracker(camera_m=(x_m, y_m))
+    motions = [
+        Motion(yaw, distance, (left, right))
+        for (distance, yaw), (left, right) in zip(drive.motions.tolist(), drive.odometry.tolist(), strict=True)
+    ]
+
+    def tilt(gray: NDArray[np.uint8]) -> Any:
+        estimate = estimator(gray)
+        return estimate if estimate else None
+
+    with closing(in_order(lambda k: drive.render(k, threads=1), range(len(drive)), threads, Event())) as views:
+        images = (view.gray for view in views)
+        for frame in follow_lines(images, extractor, tracker, tilt=tilt, motions=motions):
+            if isinstance(frame, Exception):
+                raise frame
+            yield frame
+
+
+def _errors(e: MountingEstimate) -> dict[str, float | str]:
+    x, y, yaw = _RHO_M * math.cos(_PHI_RAD), _RHO_M * math.sin(_PHI_RAD), _PHI_RAD + _PSI_RAD
+    plane = np.sqrt(np.diag(e.covariance_xy_yaw))
+    return {
+        "phi": math.degrees(math.remainder(e.phi_rad - _PHI_RAD, math.tau)),
+        "rho": 1e3 * (e.rho_m - _RHO_M),
+        "psi": math.degrees(math.remainder(e.psi_rad - _PSI_RAD, math.tau)),
+        "x": 1e3 * (e.x_m - x),
+        "y": 1e3 * (e.y_m - y),
+        "yaw": math.degrees(math.remainder(e.yaw_rad - yaw, math.tau)),
+        "sigma x": 1e3 * float(plane[0]),
+        "sigma y": 1e3 * float(plane[1]),
+        "sigma yaw": math.degrees(float(plane[2])),
+        "alarm": "yes" if e.alarm else "",
+    }

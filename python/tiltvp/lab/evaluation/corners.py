@@ -1,0 +1,235 @@
+"""How well corners are found in rendered sequences of a hand-held stereo pair (section IV of Liu et al. 2018)."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable, Iterator
+from concurrent.futures import CancelledError
+from contextlib import closing
+from dataclasses import dataclass, field
+from threading import Event
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+import polars as pl
+
+from tiltvp.corner_images import CornerEstimate, CornerPoseEstimator
+from tiltvp.errors import InvalidInputError
+from tiltvp.lab.datasets.new import in_order
+from tiltvp.lab.evaluation.corner_inertial import compare_inertial
+from tiltvp.lab.evaluation.corner_rooms import own_places, truth_near
+from tiltvp.synth import Laboratory, Room, StereoSequence, zed_cameras
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    Pair = tuple[NDArray[np.uint8], NDArray[np.uint8]]
+
+__all__ = ["CORNER_SCENES", "CornerExperiment", "CornerScene", "measure_corners", "summarise_corners"]
+
+_FLIP_DEG: Final = 20.0
+"""An attitude that is farther off is another interpretation, not a noisy one."""
+
+_SCHEMA: Final[dict[str, Any]] = (
+    {"scene": pl.String, "frame": pl.UInt32, "time_s": pl.Float64, "distance_m": pl.Float64, "found": pl.Boolean}
+    | {"corner": pl.Int64}
+    | dict.fromkeys(("attitude_deg", "roll_deg", "pitch_deg", "yaw_deg"), pl.Float64)
+    | dict.fromkeys(("position_m", "x_m", "y_m", "z_m", "probability", "nees", "ms"), pl.Float64)
+    | {"hypotheses": pl.UInt32, "reason": pl.String}
+)
+
+
+@dataclass(frozen=True)
+class CornerScene:
+    """A sequence, and the front end that looks at it."""
+
+    name: str
+    kind: str = "laboratory"
+    """`laboratory` for the coloured cuboid, or one of `ROOM_KINDS`."""
+    share: float = 1.0
+    """Its frames, as a share of the experiment's."""
+    width: int = 1280
+    gamma_deg: float = 90.0
+    """Angle between the cuboid's level edges."""
+    options: dict[str, Any] = field(default_factory=dict)
+    """Of `StereoSequence`."""
+    known: dict[str, Any] = field(default_factory=dict)
+    """Options of `CornerPoseEstimator`: what is known beforehand, but for gamma, and which way is down in a room."""
+
+    @property
+    def method(self) -> str:
+        """The front end of `CornerDetector`."""
+        return "coloured" if self.kind == "laboratory" else "general"
+
+    def sequence(self, frames: int, seed: int, threads: int | None) -> StereoSequence:
+        """The sequence."""
+        scene: Laboratory | Room
+        if self.kind == "laboratory":
+            scene = Laboratory(seed, gamma_rad=math.radians(self.gamma_deg), threads=threads)
+        else:
+            scene = Room(self.kind, seed, threads=threads)
+        left, right = zed_cameras(self.width)
+        return StereoSequence(scene, left=left, right=right, frames=frames, seed=seed, threads=threads, **self.options)
+
+
+_OUTER: Final[dict[str, Any]] = {"right_handed": True}
+"""The colours name the edges, and whose corner it is is known: an outer one."""
+
+CORNER_SCENES: tuple[CornerScene, ...] = (
+    CornerScene("cuboid", known=_OUTER),
+    CornerScene("cuboid, inner or outer", share=0.1),
+    CornerScene("cuboid, 1080p", share=0.1, width=1920, known=_OUTER),
+    CornerScene("cuboid, shutter 8 ms", share=0.1, options={"exposure_s": 0.008, "blur_sigma_px": 1.0}, known=_OUTER),
+    CornerScene("cuboid, gamma 70 deg", share=0.1, gamma_deg=70.0, known=_OUTER),
+    CornerScene("cuboid, gamma 115 deg", share=0.1, gamma_deg=115.0, known=_OUTER),
+    CornerScene("office", kind="office", share=0.1),
+    CornerScene("living-room", kind="living-room", share=0.1),
+    CornerScene("l-shaped", kind="l-shaped", share=0.1),
+)
+"""The paper's cuboid: with and without a word on its side, in full HD, blurred, of other angles; corners of rooms."""
+
+
+@dataclass(frozen=True)
+class CornerExperiment:
+    """`frames` of the first scene, and their shares of the others; equal experiments give equal tables, times aside."""
+
+    frames: int = 1000
+    scenes: tuple[CornerScene, ...] = CORNER_SCENES
+    seed: int = 7001
+    """Of scene, motion and noise; one more for each further scene."""
+
+    def __post_init__(self) -> None:
+        if self.frames < 10:
+            raise InvalidInputError(f"frames = {self.frames}, expected 10 or more")
+
+    def lengths(self) -> list[int]:
+        """Frames of each scene."""
+        return [max(10, round(self.frames * scene.share)) for scene in self.scenes]
+
+
+def measure_corners(
+    experiment: CornerExperiment, *, threads: int = 1, advance: Callable[[], None] = lambda: None
+) -> tuple[pl.DataFrame, pl.DataFrame]:
+    """One row for each frame, and the comparison of `compare_inertial` on the first scene with a cuboid.
+
+    Angles are components of the error's rotation vector in the left camera: pitch about x, yaw about y, roll about z.
+    x_m, y_m, z_m are errors of the left camera's place in the corner's frame. `nees` is the squared error of attitude
+    and vertex by its covariance, 6 on average at best. In rooms the truth is that of the listed corner near the
+    estimate, in whichever of eight ways its axes are named. Where none is near, as the list has no corners with an
+    edge below 0.15 m and none of furniture made of boards, `corner` is -1, the attitude is compared with that of the
+    walls and of corners beside it, and the place, without `nees`, with the object's own median in the world. `ms` is
+    the processor time of one pair. `advance` is called after each frame.
+    """
+    rows: list[dict[str, Any]] = []
+    inertial: list[pl.DataFrame] = []
+    for k, (scene, frames) in enumerate(zip(experiment.scenes, experiment.lengths(), strict=True)):
+        sequence = scene.sequence(frames, experiment.seed + k, threads)
+        estimates: list[CornerEstimate] = []
+        times_ms: list[float] = []
+        for estimate, ms in _estimates(scene, sequence, threads):
+            estimates.append(estimate)
+            times_ms.append(ms)
+            advance()
+        places = own_places(sequence, estimates)
+        for frame, (estimate, ms) in enumerate(zip(estimates, times_ms, strict=True)):
+            rows.append({"scene": scene.name, "ms": ms} | _judged(scene, sequence, frame, estimate, places))
+        attitudes = [None if estimate.pose is None else estimate.pose.camera_from_object for estimate in estimates]
+        if scene.kind == "laboratory" and not inertial and any(a is not None for a in attitudes):
+            inertial.append(compare_inertial(sequence, attitudes, seed=experiment.seed))
+    return pl.DataFrame(rows, schema=_SCHEMA), pl.concat(inertial) if inertial else pl.DataFrame()
+
+
+def summarise_corners(table: pl.DataFrame) -> pl.DataFrame:
+    """Found rate, root mean square errors and flips of each scene."""
+    attitude, position = pl.col("attitude_deg"), pl.col("position_m")
+    flipped = attitude > _FLIP_DEG
+    kept = ~flipped
+    return table.group_by("scene", maintain_order=True).agg(
+        pl.len().alias("frames"),
+        pl.col("found").mean().alias("found"),
+        pl.col("corner").filter(pl.col("found")).ge(0).mean().alias("listed corner"),
+        (attitude**2).mean().sqrt().alias("attitude rms deg"),
+        attitude.quantile(0.99).alias("99 % deg"),
+        (position**2).filter(kept).mean().sqrt().mul(1000).alias("position rms mm"),
+        position.quantile(0.99).mul(1000).alias("99 % mm"),
+        flipped.sum().alias("flips"),
+        pl.col("nees").filter(kept).mean().alias("NEES of 6"),
+        pl.col("distance_m").min().alias("from m"),
+        pl.col("distance_m").max().alias("to m"),
+        pl.col("ms").median().alias("ms"),
+    )
+
+
+def _estimates(scene: CornerScene, sequence: StereoSequence, threads: int) -> Iterator[tuple[CornerEstimate, float]]:
+    """What the estimator says of each frame in turn, and the processor time it took, milliseconds."""
+    known: dict[str, Any] = {"gamma_rad": math.radians(scene.gamma_deg)} | scene.known
+    if scene.kind != "laboratory":
+        # What tells upright edges from level ones is how the board is held, as its accelerometer has it on average.
+        known["down"] = -sequence.imu(seed=sequence.seed).forces_m_s2.mean(axis=0)
+    left, right = sequence.cameras
+    estimator = CornerPoseEstimator(left, right, sequence.left_from_right, method=scene.method, **known)
+    stop = Event()
+
+    def render(frame: int) -> Pair:
+        if stop.is_set():
+            raise CancelledError
+        return sequence.render(frame, threads=1)
+
+    with closing(in_order(render, range(len(sequence)), threads, stop)) as pairs:
+        for pair in pairs:
+            start = time.thread_time()
+            estimate = estimator(*pair)
+            yield estimate, 1000.0 * (time.thread_time() - start)
+
+
+def _judged(
+    scene: CornerScene,
+    sequence: StereoSequence,
+    frame: int,
+    estimate: CornerEstimate,
+    places: dict[int, NDArray[np.float64]],
+) -> dict[str, Any]:
+    target = sequence.left_from_object(frame)
+    row: dict[str, Any] = {
+        "frame": frame,
+        "time_s": float(sequence.times_s[frame]),
+        "distance_m": float(np.linalg.norm(target[:3, 3])),
+        "found": estimate.pose is not None,
+        "corner": -1,
+        "hypotheses": len(estimate.hypotheses),
+        "reason": estimate.reason,
+    }
+    pose = estimate.pose
+    if pose is None or pose.vertex_m is None:
+        return row
+    row["probability"] = pose.probability
+    if scene.kind == "laboratory":
+        number, truth = sequence.corner, target
+    else:
+        number, truth = truth_near(sequence, frame, pose, places[estimate.object])
+    row["corner"] = number
+    turn = _rotation_vector(truth[:3, :3] @ pose.camera_from_object.T)
+    shift = truth[:3, 3] - pose.vertex_m
+    error = np.concatenate([turn, shift])
+    place = truth[:3, :3].T @ truth[:3, 3] - pose.camera_from_object.T @ pose.vertex_m
+    pitch, yaw, roll = np.degrees(turn).tolist()
+    x, y, z = place.tolist()
+    return row | {
+        "attitude_deg": float(np.degrees(np.linalg.norm(turn))),
+        "roll_deg": roll,
+        "pitch_deg": pitch,
+        "yaw_deg": yaw,
+        "position_m": float(np.linalg.norm(place)),
+        "x_m": x,
+        "y_m": y,
+        "z_m": z,
+        "nees": float(error @ np.linalg.solve(pose.covariance, error)) if number >= 0 else None,
+    }
+
+
+def _rotation_vector(rotation: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(3,): from the rotation's quaternion, for any angle."""
+    import cv2
+
+    return np.asarray(cv2.Rodrigues(rotation)[0], dtype=np.float64).ravel()

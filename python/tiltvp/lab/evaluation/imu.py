@@ -1,0 +1,96 @@
+"""The refined method against the inertial sensor of a panoramic camera: the one truth that does not come from edges."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterable
+from pathlib import Path
+
+import numpy as np
+import polars as pl
+
+from tiltvp.cameras import Camera
+from tiltvp.lab.datasets.panoramas import Panorama, PanoramaViews, read_index
+from tiltvp.tilt import TiltEstimator
+
+__all__ = ["InertialPanorama", "estimate_leaning", "read_inertial_index", "summarise_inertial"]
+
+_TILT_MAX_RAD = float(np.deg2rad(25.0))
+"""Hand-held panoramic cameras lean further than robots."""
+
+
+class InertialPanorama:
+    """A panorama as it was taken, with the pitch and roll of the camera's own sensor, in degrees."""
+
+    def __init__(self, panorama: Panorama, pitch_deg: float, roll_deg: float) -> None:
+        """The panorama's own zenith is not used."""
+        self.panorama, self.pitch_deg, self.roll_deg = panorama, pitch_deg, roll_deg
+
+
+def read_inertial_index(directory: str | os.PathLike[str]) -> list[InertialPanorama]:
+    """The panoramas of a folder with an `INDEX.csv` of columns name, environment, imu_pitch_deg, imu_roll_deg."""
+
+    def item(row: dict[str, str], folder: Path) -> InertialPanorama:
+        panorama = Panorama(row["name"], folder / f"{row['name']}.jpg", row["environment"], None)
+        return InertialPanorama(panorama, float(row["imu_pitch_deg"]), float(row["imu_roll_deg"]))
+
+    return read_index(directory, ("name", "environment", "imu_pitch_deg", "imu_roll_deg"), item)
+
+
+def estimate_leaning(
+    panoramas: Iterable[InertialPanorama],
+    camera: Camera,
+    *,
+    samples: int = 2,
+    noise_sigma: float = 2.0,
+    advance: Callable[[], None] = lambda: None,
+) -> pl.DataFrame:
+    """One row for each panorama: the refined lean and the sensor's, as forward and leftward components in degrees."""
+    estimator = TiltEstimator(camera, method="refined", tilt_max_rad=_TILT_MAX_RAD)
+    rows = []
+    for number, item in enumerate(panoramas):
+        views = PanoramaViews(item.panorama, camera, samples=samples, upright=False)
+        estimate = estimator(views.render((0.0, 0.0, 1.0), noise_sigma=noise_sigma, seed=number))
+        x, y, z = estimate.normal
+        rows.append(
+            {
+                "name": item.panorama.name,
+                "location": item.panorama.location,
+                "forward": float(np.rad2deg(np.arctan2(x, z))),
+                "left": float(np.rad2deg(np.arctan2(y, z))),
+                "imu_forward": item.pitch_deg,
+                "imu_left": item.roll_deg,
+                "confidence": estimate.confidence,
+            }
+        )
+        advance()
+    return pl.DataFrame(rows)
+
+
+def summarise_inertial(table: pl.DataFrame) -> pl.DataFrame:
+    """The differences in degrees without their median, the constant offset between lens and sensor."""
+    found = table.filter(pl.col("forward").is_finite())
+    rows = []
+    for label, part in (
+        ("all", found),
+        ("lean below 5 degrees", found.filter((pl.col("imu_forward") ** 2 + pl.col("imu_left") ** 2).sqrt() < 5.0)),
+    ):
+        differences = np.stack(
+            [(part["forward"] - part["imu_forward"]).to_numpy(), (part["left"] - part["imu_left"]).to_numpy()], axis=1
+        )
+        offset = np.median(differences, axis=0)
+        lengths = np.linalg.norm(differences - offset, axis=1)
+        rows.append(
+            {
+                "panoramas": label,
+                "count": len(part),
+                "offset forward": float(offset[0]),
+                "offset left": float(offset[1]),
+                "sd forward": float(1.4826 * np.median(np.abs(differences[:, 0] - offset[0]))),
+                "sd left": float(1.4826 * np.median(np.abs(differences[:, 1] - offset[1]))),
+                "mean": float(lengths.mean()),
+                "median": float(np.median(lengths)),
+                "p95": float(np.percentile(lengths, 95)),
+            }
+        )
+    return pl.DataFrame(rows)
