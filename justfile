@@ -74,9 +74,14 @@ check:
 test-rust:
     PROPTEST_RNG_SEED=20171028 cargo test --locked --workspace --quiet
 
-# The tests of the Python package, without real data.
+# The tests of the Python package, without real data, with the same random cases every time.
 test-python *arguments:
-    {{bin}}/pytest --quiet {{arguments}}
+    {{bin}}/pytest --quiet --hypothesis-seed=20171028 {{arguments}}
+
+# The tests of properties, of both languages, with random cases of their own: run it now and then, mend what it finds.
+test-random: setup
+    cargo test --locked --workspace --quiet
+    {{bin}}/pytest --quiet --hypothesis-seed=random tests/test_properties.py tests/test_common_direction.py tests/formats
 
 # Keeps today's answers as those that tests/test_golden.py holds every later build to; read the change as a diff.
 golden *groups: setup
