@@ -14,6 +14,7 @@ mod options;
 mod rays;
 mod scratch;
 mod selfcalib;
+mod shared;
 mod stereo;
 mod synth;
 mod tilt;

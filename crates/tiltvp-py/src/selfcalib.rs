@@ -5,12 +5,11 @@ mod log;
 mod mounting;
 mod step;
 
-use std::sync::{Mutex, MutexGuard, PoisonError};
-
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict, PyTuple};
 use tiltvp_core::Error;
 use tiltvp_core::filter::ConsistencyBand;
+use tiltvp_core::interrupt::check;
 use tiltvp_core::selfcalib::{self as core, LogBearing, LogOptions, SelfCalibratorOptions, WheelMotion};
 
 pub(crate) use self::drive::{SimulatedDrive, drive_legs, simulate_drive};
@@ -18,9 +17,10 @@ pub(crate) use self::log::LogCalibration;
 pub(crate) use self::mounting::MountingEstimate;
 pub(crate) use self::step::CalibrationStep;
 use crate::array::Array;
-use crate::call::{call, exception, invalid};
+use crate::call::{call_long, exception, invalid};
 use crate::convert;
 use crate::options;
+use crate::shared::Shared;
 
 /// Estimates where a camera sits on a robot, step by step while it drives past landmarks. Changes as it goes.
 ///
@@ -32,12 +32,12 @@ use crate::options;
 /// Raises `tiltvp.errors.InvalidInputError` for options out of their domain or of the other method.
 #[pyclass(frozen, module = "tiltvp._core")]
 pub(crate) struct SelfCalibrator {
-    inner: Mutex<core::SelfCalibrator>,
+    inner: Shared<core::SelfCalibrator>,
 }
 
 impl SelfCalibrator {
-    fn lock(&self) -> MutexGuard<'_, core::SelfCalibrator> {
-        self.inner.lock().unwrap_or_else(PoisonError::into_inner)
+    fn used_options(&self, py: Python<'_>) -> SelfCalibratorOptions {
+        self.inner.look(py, |calibrator| *calibrator.options())
     }
 }
 
@@ -49,13 +49,13 @@ impl SelfCalibrator {
         let mut parsed = SelfCalibratorOptions { wheel_base_m, ..SelfCalibratorOptions::default() };
         options::set_given(&mut parsed, options)?;
         let inner = core::SelfCalibrator::new(parsed).map_err(|error| exception(&error))?;
-        Ok(Self { inner: Mutex::new(inner) })
+        Ok(Self { inner: Shared::new(inner) })
     }
 
     /// The options in force that the method reads, by name, defaults included; a fresh dict, good as keywords.
     #[getter]
     fn options<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        options::in_force(py, self.lock().options())
+        options::in_force(py, &self.used_options(py))
     }
 
     /// Moves by the wheels' displacements, then looks: bearings (N,) of the landmarks of those whole numbers (N,).
@@ -78,7 +78,7 @@ impl SelfCalibrator {
             .map(|name| landmark(name, "landmark_ids"))
             .collect::<PyResult<Vec<u64>>>()?;
         let bearings = convert::vector(bearings_rad, "bearings_rad")?;
-        call(py, || self.lock().step(&motion, &names, &bearings)).map(CalibrationStep::from)
+        self.inner.change(py, |calibrator| calibrator.step(&motion, &names, &bearings)).map(CalibrationStep::from)
     }
 
     /// Steps through a log, (N, 2) left and right, (M, 3) step, landmark, bearing: the estimate after each step.
@@ -91,9 +91,7 @@ impl SelfCalibrator {
     ) -> PyResult<Vec<MountingEstimate>> {
         let (readings, mut seen) = log(odometry, bearings)?;
         seen.sort_by_key(|b| b.step);
-        let found = call(py, || {
-            let mut inner = self.lock();
-            let mut filter = inner.clone();
+        let found = self.inner.change_long(py, |filter| {
             let mut rest = seen.as_slice();
             let mut all = Vec::with_capacity(readings.len());
             for (step, motion) in readings.iter().enumerate() {
@@ -101,6 +99,7 @@ impl SelfCalibrator {
                 rest = later;
                 let names: Vec<u64> = now.iter().map(|b| b.landmark).collect();
                 let angles: Vec<f64> = now.iter().map(|b| b.bearing_rad).collect();
+                check();
                 filter.step(motion, &names, &angles)?;
                 all.push(filter.estimate());
             }
@@ -108,7 +107,6 @@ impl SelfCalibrator {
                 let expected = format!("steps below {}, the length of the odometry", readings.len());
                 return Err(Error::argument("bearings", format!("step {}", beyond.step), expected));
             }
-            *inner = filter;
             Ok(all)
         })?;
         Ok(found.into_iter().map(MountingEstimate::from).collect())
@@ -116,55 +114,57 @@ impl SelfCalibrator {
 
     /// The mounting as it is believed to be now.
     #[getter]
-    fn estimate(&self) -> MountingEstimate {
-        self.lock().estimate().into()
+    fn estimate(&self, py: Python<'_>) -> MountingEstimate {
+        self.inner.look(py, core::SelfCalibrator::estimate).into()
     }
 
     /// Landmarks that are being followed.
     #[getter]
-    fn landmarks(&self) -> usize {
-        self.lock().landmarks()
+    fn landmarks(&self, py: Python<'_>) -> usize {
+        self.inner.look(py, core::SelfCalibrator::landmarks)
     }
 
     /// Forgets everything but the options.
-    fn reset(&self) -> PyResult<()> {
-        self.lock().reset().map_err(|error| exception(&error))
+    fn reset(&self, py: Python<'_>) -> PyResult<()> {
+        self.inner.change(py, core::SelfCalibrator::reset)
     }
 
-    fn __eq__(&self, other: &Bound<'_, PyAny>) -> bool {
+    fn __eq__(&self, py: Python<'_>, other: &Bound<'_, PyAny>) -> bool {
         let Ok(other) = other.cast::<Self>() else { return false };
         // One at a time: a calibrator may be compared with itself.
-        let mine = self.lock().clone();
-        mine == *other.get().lock()
+        let mine = self.inner.copied(py);
+        other.get().inner.look(py, |other| mine == *other)
     }
 
-    fn __copy__(&self) -> Self {
-        Self { inner: Mutex::new(self.lock().clone()) }
+    fn __copy__(&self, py: Python<'_>) -> Self {
+        Self { inner: Shared::new(self.inner.copied(py)) }
     }
 
     /// Sets what pickle has kept.
-    fn __setstate__(&self, state: &[u8]) -> PyResult<()> {
+    fn __setstate__(&self, py: Python<'_>, state: &[u8]) -> PyResult<()> {
         let kept =
             postcard::from_bytes::<core::SelfCalibrator>(state).ok().filter(core::SelfCalibrator::is_well_formed);
-        *self.lock() = kept.ok_or_else(|| invalid("state: expected the bytes that pickle keeps".to_owned()))?;
-        Ok(())
+        let kept = kept.ok_or_else(|| invalid("state: expected the bytes that pickle keeps".to_owned()))?;
+        self.inner.change(py, |calibrator| {
+            *calibrator = kept;
+            Ok(())
+        })
     }
 
     fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyTuple>> {
         let (py, this) = (slf.py(), slf.get());
         let make = py.import("functools")?.getattr("partial")?.call((slf.get_type(),), Some(&this.options(py)?))?;
-        let state = postcard::to_stdvec(&*this.lock()).map_err(|error| invalid(format!("state: {error}")))?;
+        let state = postcard::to_stdvec(&this.inner.copied(py)).map_err(|error| invalid(format!("state: {error}")))?;
         (make, PyTuple::empty(py), PyBytes::new(py, &state)).into_pyobject(py)
     }
 
-    fn __deepcopy__(&self, _memo: &Bound<'_, PyAny>) -> Self {
-        self.__copy__()
+    fn __deepcopy__(&self, py: Python<'_>, _memo: &Bound<'_, PyAny>) -> Self {
+        self.__copy__(py)
     }
 
-    fn __repr__(&self) -> String {
-        let inner = self.lock();
-        let o = inner.options();
-        format!("SelfCalibrator(method={:?}, wheel_base_m={}): {}", o.method.name(), o.wheel_base_m, inner.estimate())
+    fn __repr__(&self, py: Python<'_>) -> String {
+        let (o, estimate) = self.inner.look(py, |inner| (*inner.options(), inner.estimate()));
+        format!("SelfCalibrator(method={:?}, wheel_base_m={}): {estimate}", o.method.name(), o.wheel_base_m)
     }
 }
 
@@ -215,7 +215,7 @@ pub(crate) fn calibrate(
     options::set_given(&mut parsed, options)?;
     let (readings, seen) = log(odometry, bearings)?;
     let times = times_s.map(|times| convert::vector(times, "times_s")).transpose()?;
-    let found = call(py, || core::calibrate_log(&parsed, &readings, times.as_deref(), &seen))?;
+    let found = call_long(py, || core::calibrate_log(&parsed, &readings, times.as_deref(), &seen))?;
     Ok(LogCalibration::from(found))
 }
 

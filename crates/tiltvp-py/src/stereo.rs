@@ -12,7 +12,7 @@ use tiltvp_synth::{
 };
 
 use crate::array::Array;
-use crate::call::{call, invalid};
+use crate::call::{call_long, invalid};
 use crate::camera::Camera;
 use crate::convert;
 use crate::laboratory::Laboratory;
@@ -65,7 +65,7 @@ impl StereoSequence {
         let world = world_of(scene)?;
         let cameras = [left.get().inner.clone(), right.get().inner.clone()];
         let threads = threads_from(threads)?;
-        let inner = call(py, || on_threads(threads, || tiltvp_synth::StereoSequence::new(world, cameras, parsed))?)?;
+        let inner = call_long(py, || on_threads(threads, || tiltvp_synth::StereoSequence::new(world, cameras, parsed))?)?;
         Ok(Self { scene: scene.clone().unbind(), left: left.clone().unbind(), right: right.clone().unbind(), inner })
     }
 
@@ -158,7 +158,7 @@ impl StereoSequence {
         threads: Option<&Bound<'py, PyAny>>,
     ) -> PyResult<(Picture<'py>, Picture<'py>)> {
         let (frame, threads) = (self.frame(frame)?, threads_from(threads)?);
-        let [left, right] = call(py, || on_threads(threads, || self.inner.render(frame))?)?;
+        let [left, right] = call_long(py, || on_threads(threads, || self.inner.render(frame))?)?;
         Ok((picture(py, left)?, picture(py, right)?))
     }
 
@@ -171,7 +171,7 @@ impl StereoSequence {
         threads: Option<&Bound<'py, PyAny>>,
     ) -> PyResult<Sightings<'py>> {
         let (frame, threads) = (self.frame(frame)?, threads_from(threads)?);
-        let seen = call(py, || on_threads(threads, || self.inner.sightings(frame))?)?;
+        let seen = call_long(py, || on_threads(threads, || self.inner.sightings(frame))?)?;
         let vertices = seen.iter().flat_map(|s: &CornerSighting| s.vertex_px.iter().flat_map(|p| [p.x, p.y]));
         let lengths = seen.iter().flat_map(|s| s.edges_px.as_flattened().iter().copied());
         Ok((
@@ -203,7 +203,7 @@ impl StereoSequence {
                 .map_or(Ok(own.accelerometer), |channel| channel_from(channel, "accelerometer"))?,
         };
         let duration_s = self.inner.time_s(self.__len__() - 1);
-        let readings = call(py, || imu_readings(self.inner.motion(), duration_s, &options))?;
+        let readings = call_long(py, || imu_readings(self.inner.motion(), duration_s, &options))?;
         let rows = |value: fn(&tiltvp_synth::ImuReading) -> Vector3<f64>| {
             let rows: Vec<[f64; 3]> = readings.iter().map(|reading| value(reading).into()).collect();
             convert::to_rows(py, &rows, false)

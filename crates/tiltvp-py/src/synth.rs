@@ -10,7 +10,7 @@ use tiltvp_core::geometry::Tilt;
 use tiltvp_synth::{Image, RenderOptions, RobotPose, RoomKind, RoomOptions, View, World, on_threads};
 
 use crate::array::Array;
-use crate::call::{call, exception, invalid};
+use crate::call::{call_long, exception, invalid};
 use crate::camera::Camera;
 use crate::convert;
 use crate::options;
@@ -47,7 +47,7 @@ impl Room {
         let mut parsed = RoomOptions::new(kind, seed);
         options::set_given(&mut parsed, options)?;
         let options = parsed;
-        let world = call(py, || on_threads(threads, || World::new(&options))?)?;
+        let world = call_long(py, || on_threads(threads, || World::new(&options))?)?;
         Ok(Self { options, world: Arc::new(world) })
     }
 
@@ -137,7 +137,7 @@ impl Room {
     ) -> PyResult<Array<'py, f64>> {
         let count = convert::whole(count, "count", "a whole number")?;
         let seed = seed_from(seed)?;
-        let poses = call(py, || self.world.free_poses(count, seed))?;
+        let poses = call_long(py, || self.world.free_poses(count, seed))?;
         let rows: Vec<[f64; 3]> = poses.iter().map(|pose| [pose.x_m, pose.y_m, pose.yaw_rad]).collect();
         convert::to_rows(py, &rows, false)
     }
@@ -161,7 +161,7 @@ impl Room {
         let threads = threads_from(threads)?;
         let camera = &camera.get().inner;
         let (width, height) = (camera.width() as usize, camera.height() as usize);
-        let image = call(py, || {
+        let image = call_long(py, || {
             let lens = |x: f64, y: f64| camera.unproject(&Vector2::new(x, y));
             let mut view = View::new(&lens, width, height, pose);
             view.robot_from_camera = shot.robot_from_camera;
@@ -186,7 +186,7 @@ impl Room {
         let (pose, options) = (shot.pose(), shot.rendering());
         let height: u16 = convert::whole(height, "height", "a whole number of pixels")?;
         let threads = threads_from(threads)?;
-        let image = call(py, || {
+        let image = call_long(py, || {
             let up = shot.camera_height_m.unwrap_or_else(|| View::new(&|_, _| None, 1, 1, pose).camera_height_m);
             let work = || tiltvp_synth::render_panorama(&self.world, pose, up, usize::from(height), &options);
             Ok(on_threads(threads, work)??.image)

@@ -1,15 +1,14 @@
 //! `LineTracker`: identities of lines through successive frames.
 
-use std::sync::{Mutex, MutexGuard, PoisonError};
-
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyTuple};
 use tiltvp_core::lines::{self as core, Followed, FrameMemory, Motion, Parallax, TrackerOptions, TrackerState};
 
 use super::matching;
 use super::values::Lines;
-use crate::call::{call, exception, invalid};
+use crate::call::{exception, invalid};
 use crate::options;
+use crate::shared::Shared;
 use crate::value::value;
 
 value! {
@@ -51,16 +50,12 @@ impl TrackedLines {
 /// Raises `tiltvp.errors.InvalidInputError` for an option that is unknown or out of its domain.
 #[pyclass(frozen, module = "tiltvp._core")]
 pub(crate) struct LineTracker {
-    inner: Mutex<core::LineTracker>,
+    inner: Shared<core::LineTracker>,
 }
 
 impl LineTracker {
-    fn lock(&self) -> MutexGuard<'_, core::LineTracker> {
-        self.inner.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-
-    fn copied(&self) -> Self {
-        Self { inner: Mutex::new(self.lock().clone()) }
+    fn used_options(&self, py: Python<'_>) -> TrackerOptions {
+        self.inner.look(py, |tracker| *tracker.options())
     }
 }
 
@@ -72,25 +67,25 @@ impl LineTracker {
         let mut parsed = TrackerOptions::default();
         options::set(&mut parsed, options)?;
         let inner = core::LineTracker::new(parsed).map_err(|error| exception(&error))?;
-        Ok(Self { inner: Mutex::new(inner) })
+        Ok(Self { inner: Shared::new(inner) })
     }
 
     /// The options in force, by name, defaults included; a fresh dict, good as keywords.
     #[getter]
     fn options<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        options::in_force(py, self.lock().options())
+        options::in_force(py, &self.used_options(py))
     }
 
     /// Number of the next frame.
     #[getter]
-    fn next_frame(&self) -> u64 {
-        self.lock().state().next_frame
+    fn next_frame(&self, py: Python<'_>) -> u64 {
+        self.inner.look(py, |tracker| tracker.state().next_frame)
     }
 
     /// How many identities have been given.
     #[getter]
-    fn track_count(&self) -> u64 {
-        self.lock().state().next_track
+    fn track_count(&self, py: Python<'_>) -> u64 {
+        self.inner.look(py, |tracker| tracker.state().next_track)
     }
 
     /// The next frame: its lines, their descriptors (N, K), and the robot's motion since the last one.
@@ -116,8 +111,7 @@ impl LineTracker {
         if n != inner.lines.len() {
             return Err(invalid(format!("descriptors: {n} rows, expected {}, one for each line", inner.lines.len())));
         }
-        let (frame, tracked) = call(py, || {
-            let mut tracker = self.lock();
+        let (frame, tracked) = self.inner.change(py, |tracker| {
             let (frame, mut out) = (tracker.state().next_frame, Vec::new());
             tracker.update(inner, &values, motion.as_ref(), &mut out)?;
             Ok((frame, out))
@@ -128,27 +122,26 @@ impl LineTracker {
     }
 
     fn __repr__(&self, py: Python<'_>) -> PyResult<String> {
-        Ok(format!("LineTracker({})", options::shown(py, self.lock().options())?))
+        Ok(format!("LineTracker({})", options::shown(py, &self.used_options(py))?))
     }
 
-    fn __eq__(&self, other: &Bound<'_, PyAny>) -> bool {
+    fn __eq__(&self, py: Python<'_>, other: &Bound<'_, PyAny>) -> bool {
         let Ok(other) = other.cast::<Self>() else { return false };
         // One at a time: a tracker may be compared with itself.
-        let mine = self.lock().clone();
-        let other = other.get().lock();
-        (mine.options(), mine.state()) == (other.options(), other.state())
+        let mine = self.inner.copied(py);
+        other.get().inner.look(py, |other| (mine.options(), mine.state()) == (other.options(), other.state()))
     }
 
-    fn __copy__(&self) -> Self {
-        self.copied()
+    fn __copy__(&self, py: Python<'_>) -> Self {
+        Self { inner: Shared::new(self.inner.copied(py)) }
     }
 
-    fn __deepcopy__(&self, _memo: &Bound<'_, PyAny>) -> Self {
-        self.copied()
+    fn __deepcopy__(&self, py: Python<'_>, _memo: &Bound<'_, PyAny>) -> Self {
+        self.__copy__(py)
     }
 
     /// Sets what pickle has kept.
-    fn __setstate__(&self, state: (u64, u64, Vec<Memory>, Vec<Edge>)) -> PyResult<()> {
+    fn __setstate__(&self, py: Python<'_>, state: (u64, u64, Vec<Memory>, Vec<Edge>)) -> PyResult<()> {
         let (next_frame, next_track, frames, followed) = state;
         let frames = frames.into_iter().map(|(tracks, descriptors)| FrameMemory { tracks, descriptors }).collect();
         let edge = |((track, seen), (bearing_rad, nearness, covariance, is_metric), polarity, descriptor): Edge| {
@@ -156,16 +149,17 @@ impl LineTracker {
             Followed { track, seen, parallax, polarity, descriptor }
         };
         let followed = followed.into_iter().map(edge).collect();
-        let mut inner = self.lock();
         let state = TrackerState { next_frame, next_track, frames, followed };
-        *inner = core::LineTracker::with_state(*inner.options(), state).map_err(|error| exception(&error))?;
-        Ok(())
+        self.inner.change(py, |tracker| {
+            *tracker = core::LineTracker::with_state(*tracker.options(), state)?;
+            Ok(())
+        })
     }
 
     fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyTuple>> {
         let (py, this) = (slf.py(), slf.get());
         let make = py.import("functools")?.getattr("partial")?.call((slf.get_type(),), Some(&this.options(py)?))?;
-        let tracker = this.lock();
+        let tracker = this.inner.copied(py);
         let edge = |edge: &Followed| -> Edge {
             let Parallax { bearing_rad, nearness, covariance, is_metric } = edge.parallax;
             let place = (bearing_rad, nearness, covariance, is_metric);

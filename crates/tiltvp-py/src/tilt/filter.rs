@@ -1,7 +1,5 @@
 //! `TiltFilter`: successive tilts fused.
 
-use std::sync::{Mutex, MutexGuard, PoisonError};
-
 use nalgebra::{Matrix2, Matrix6, Vector2, Vector3};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyTuple};
@@ -10,9 +8,10 @@ use tiltvp_core::tilt::{self as core, TiltFilterOptions, TiltFilterState, Verdic
 
 use super::estimate::TiltEstimate;
 use super::filtered::{FilterStep, FilteredTilt};
-use crate::call::{call, exception, invalid};
+use crate::call::{exception, invalid};
 use crate::convert;
 use crate::options;
+use crate::shared::Shared;
 
 /// Keys of the dict of a state, by the way of pickle.
 const STATE_KEYS: [&str; 9] =
@@ -27,16 +26,12 @@ const STATE_KEYS: [&str; 9] =
 /// Raises `tiltvp.errors.InvalidInputError` for options out of their domain.
 #[pyclass(frozen, module = "tiltvp._core")]
 pub(crate) struct TiltFilter {
-    inner: Mutex<core::TiltFilter>,
+    inner: Shared<core::TiltFilter>,
 }
 
 impl TiltFilter {
-    fn lock(&self) -> MutexGuard<'_, core::TiltFilter> {
-        self.inner.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-
-    fn copied(&self) -> Self {
-        Self { inner: Mutex::new(self.lock().clone()) }
+    fn used_options(&self, py: Python<'_>) -> TiltFilterOptions {
+        self.inner.look(py, |filter| *filter.options())
     }
 }
 
@@ -48,13 +43,13 @@ impl TiltFilter {
         let mut parsed = TiltFilterOptions::default();
         options::set_given(&mut parsed, options)?;
         let inner = core::TiltFilter::new(parsed).map_err(|error| exception(&error))?;
-        Ok(Self { inner: Mutex::new(inner) })
+        Ok(Self { inner: Shared::new(inner) })
     }
 
     /// The options in force, by name, defaults included; a fresh dict, good as keywords.
     #[getter]
     fn options<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        options::in_force(py, self.lock().options())
+        options::in_force(py, &self.used_options(py))
     }
 
     /// The robot has turned (left positive) and driven (either way) since the last call; None: it has not.
@@ -66,7 +61,7 @@ impl TiltFilter {
         distance_m: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<()> {
         let [yaw_rad, distance_m] = motion(yaw_rad, distance_m)?;
-        call(py, || self.lock().predict(yaw_rad, distance_m))
+        self.inner.change(py, |filter| filter.predict(yaw_rad, distance_m))
     }
 
     /// Fuses an estimate, or says why not.
@@ -76,7 +71,7 @@ impl TiltFilter {
     #[pyo3(signature = (estimate: "TiltEstimate | tuple[ArrayLike, ArrayLike]", /))]
     fn update(&self, py: Python<'_>, estimate: &Bound<'_, PyAny>) -> PyResult<FilterStep> {
         let measured = measurement(estimate)?;
-        call(py, || fuse(&mut self.lock(), &measured)).map(FilterStep::from)
+        self.inner.change(py, |filter| fuse(filter, &measured)).map(FilterStep::from)
     }
 
     /// `predict`, then `update`; where either is refused, the filter is as before.
@@ -93,12 +88,11 @@ impl TiltFilter {
     ) -> PyResult<FilterStep> {
         let measured = measurement(estimate)?;
         let [yaw_rad, distance_m] = motion(yaw_rad, distance_m)?;
-        let fused = call(py, || {
-            let mut inner = self.lock();
-            let mut next = inner.clone();
+        let fused = self.inner.change(py, |filter| {
+            let mut next = filter.clone();
             next.predict(yaw_rad, distance_m)?;
             let verdict = fuse(&mut next, &measured)?;
-            *inner = next;
+            *filter = next;
             Ok(verdict)
         });
         fused.map(FilterStep::from)
@@ -106,71 +100,75 @@ impl TiltFilter {
 
     /// The ground normal in the robot's frame, as the filter holds it to be now.
     #[getter]
-    fn estimate(&self) -> FilteredTilt {
-        self.lock().estimate().into()
+    fn estimate(&self, py: Python<'_>) -> FilteredTilt {
+        self.inner.look(py, core::TiltFilter::estimate).into()
     }
 
     /// The floor's part of it alone, in the frame of the wheels.
     #[getter]
-    fn floor(&self) -> FilteredTilt {
-        self.lock().floor().into()
+    fn floor(&self, py: Python<'_>) -> FilteredTilt {
+        self.inner.look(py, core::TiltFilter::floor).into()
     }
 
     /// The robot's own part alone, what it would see on level ground; None unless `estimate_mounting`.
     #[getter]
-    fn mounting(&self) -> Option<FilteredTilt> {
-        self.lock().mounting().map(FilteredTilt::from)
+    fn mounting(&self, py: Python<'_>) -> Option<FilteredTilt> {
+        self.inner.look(py, core::TiltFilter::mounting).map(FilteredTilt::from)
     }
 
     /// The largest normalised innovation squared that passes the gate.
     #[getter]
-    fn nis_limit(&self) -> f64 {
-        self.lock().nis_limit()
+    fn nis_limit(&self, py: Python<'_>) -> f64 {
+        self.inner.look(py, core::TiltFilter::nis_limit)
     }
 
     /// How many estimates in a row the gate has rejected: above 0, the estimate may be about to jump.
     #[getter]
-    fn rejected(&self) -> u32 {
-        self.lock().state().rejected
+    fn rejected(&self, py: Python<'_>) -> u32 {
+        self.inner.look(py, |filter| filter.state().rejected)
     }
 
     /// Forgets everything but the options.
-    fn reset(&self) {
-        self.lock().reset();
+    fn reset(&self, py: Python<'_>) -> PyResult<()> {
+        self.inner.change(py, |filter| {
+            filter.reset();
+            Ok(())
+        })
     }
 
     fn __repr__(&self, py: Python<'_>) -> PyResult<String> {
-        Ok(format!("TiltFilter({})", options::shown(py, self.lock().options())?))
+        Ok(format!("TiltFilter({})", options::shown(py, &self.used_options(py))?))
     }
 
-    fn __eq__(&self, other: &Bound<'_, PyAny>) -> bool {
+    fn __eq__(&self, py: Python<'_>, other: &Bound<'_, PyAny>) -> bool {
         let Ok(other) = other.cast::<Self>() else { return false };
         // One at a time: a filter may be compared with itself.
-        let mine = self.lock().clone();
-        mine == *other.get().lock()
+        let mine = self.inner.copied(py);
+        other.get().inner.look(py, |other| mine == *other)
     }
 
-    fn __copy__(&self) -> Self {
-        self.copied()
+    fn __copy__(&self, py: Python<'_>) -> Self {
+        Self { inner: Shared::new(self.inner.copied(py)) }
     }
 
-    fn __deepcopy__(&self, _memo: &Bound<'_, PyAny>) -> Self {
-        self.copied()
+    fn __deepcopy__(&self, py: Python<'_>, _memo: &Bound<'_, PyAny>) -> Self {
+        self.__copy__(py)
     }
 
     /// Sets what pickle has kept.
-    fn __setstate__(&self, state: &Bound<'_, PyAny>) -> PyResult<()> {
+    fn __setstate__(&self, py: Python<'_>, state: &Bound<'_, PyAny>) -> PyResult<()> {
         let values = state.cast::<PyDict>().map_err(|_| invalid("state: expected a dict".to_owned()))?;
         let state = read_state(values)?;
-        let mut inner = self.lock();
-        *inner = core::TiltFilter::with_state(*inner.options(), state).map_err(|error| exception(&error))?;
-        Ok(())
+        self.inner.change(py, |filter| {
+            *filter = core::TiltFilter::with_state(*filter.options(), state)?;
+            Ok(())
+        })
     }
 
     fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyTuple>> {
         let (py, this) = (slf.py(), slf.get());
         let make = py.import("functools")?.getattr("partial")?.call((slf.get_type(),), Some(&this.options(py)?))?;
-        let state = written_state(py, this.lock().state())?;
+        let state = written_state(py, this.inner.copied(py).state())?;
         (make, PyTuple::empty(py), state).into_pyobject(py)
     }
 }
