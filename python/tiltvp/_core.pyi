@@ -21,8 +21,12 @@ __all__ = [
     "CALIBRATION_METHODS",
     "CAMERA_MODELS",
     "CORNER_METHODS",
+    "LARGEST_SIDE_PX",
     "LINE_METHODS",
     "METHODS",
+    "MOST_COEFFICIENTS",
+    "MOST_LANDMARKS",
+    "MOST_PIXELS",
     "ROOM_KINDS",
     "WALL_PATTERNS",
     "AffineCorrection",
@@ -97,8 +101,12 @@ __all__ = [
 CALIBRATION_METHODS: Final[list[str]]
 CAMERA_MODELS: Final[list[str]]
 CORNER_METHODS: Final[list[str]]
+LARGEST_SIDE_PX: Final[list[str]]
 LINE_METHODS: Final[list[str]]
 METHODS: Final[list[str]]
+MOST_COEFFICIENTS: Final[list[str]]
+MOST_LANDMARKS: Final[list[str]]
+MOST_PIXELS: Final[list[str]]
 ROOM_KINDS: Final[list[str]]
 WALL_PATTERNS: Final[list[str]]
 

@@ -170,8 +170,9 @@ impl SelfCalibrator {
 
 /// A landmark's number: any whole number.
 fn landmark(name: f64, what: &str) -> PyResult<u64> {
-    if name.fract() != 0.0 || name.abs() > 2f64.powi(53) {
-        return Err(invalid(format!("{what}: {name}, expected whole numbers")));
+    // From 2^53 on two whole numbers may be the same float.
+    if name.fract() != 0.0 || name.abs() >= 2f64.powi(53) {
+        return Err(invalid(format!("{what}: {name}, expected whole numbers below 2^53")));
     }
     Ok((name as i64) as u64)
 }
@@ -249,7 +250,14 @@ pub(crate) fn wheel_displacements<'py>(
 ///
 /// The mean NEES of so many runs of a consistent filter falls there.
 #[pyfunction]
-pub(crate) fn consistency_band(probability: f64, dof: u32, samples: u32) -> PyResult<(f64, f64)> {
+#[pyo3(signature = (probability, dof: "int", samples: "int"))]
+pub(crate) fn consistency_band(
+    probability: f64,
+    dof: &Bound<'_, PyAny>,
+    samples: &Bound<'_, PyAny>,
+) -> PyResult<(f64, f64)> {
+    let count = |value, name| convert::whole::<u32>(value, name, "a whole number from 1 to 2^32 - 1");
+    let (dof, samples) = (count(dof, "dof")?, count(samples, "samples")?);
     ConsistencyBand::of_mean(probability, dof, samples).map(|band| (band.low, band.high)).ok_or_else(|| {
         invalid(format!(
             "probability = {probability}, dof = {dof}, samples = {samples}, expected (0, 1) and counts from 1"

@@ -45,10 +45,11 @@ def parse(document: Document, image_size: ImageSize | None) -> list[CameraSpec]:
     stated = _COUNT.search(document.text)
     if stated is not None and int(stated[1]) != len(cameras):
         document.fail(f"{len(cameras)} cameras", f"the {stated[1]} of the header", "the end of the file")
-    names = [camera.name for camera in cameras]
-    for (number, _), name in zip(document.content_lines, names, strict=True):
-        if names.count(name) > 1:
-            document.fail(f"the camera id {name[3:]} occurs twice", "one line for each camera", f"line {number}")
+    names: set[str] = set()
+    for (number, _), camera in zip(document.content_lines, cameras, strict=True):
+        if camera.name in names:
+            document.fail(f"the camera id {camera.name[3:]} occurs twice", "one line for each camera", f"line {number}")
+        names.add(camera.name)
     return cameras
 
 
