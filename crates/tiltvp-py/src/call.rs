@@ -55,7 +55,10 @@ pub(crate) fn call_long<T: Send>(py: Python<'_>, work: impl FnOnce() -> Result<T
             signal.map_or(Ok(outcome), Err)
         })
     })?;
-    answer(outcome.map(|answer| answer.unwrap_or_else(|| Err(Error::argument("call", "interrupted", "to run to its end")))))
+    answer(
+        outcome
+            .map(|answer| answer.unwrap_or_else(|| Err(Error::argument("call", "interrupted", "to run to its end")))),
+    )
 }
 
 /// The answer, or the exception for an error or a panic.

@@ -65,7 +65,8 @@ impl StereoSequence {
         let world = world_of(scene)?;
         let cameras = [left.get().inner.clone(), right.get().inner.clone()];
         let threads = threads_from(threads)?;
-        let inner = call_long(py, || on_threads(threads, || tiltvp_synth::StereoSequence::new(world, cameras, parsed))?)?;
+        let inner =
+            call_long(py, || on_threads(threads, || tiltvp_synth::StereoSequence::new(world, cameras, parsed))?)?;
         Ok(Self { scene: scene.clone().unbind(), left: left.clone().unbind(), right: right.clone().unbind(), inner })
     }
 

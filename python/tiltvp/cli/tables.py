@@ -82,7 +82,13 @@ def write_frame(frame: pl.DataFrame, path: Path) -> None:
     """Writes a data frame whole or not at all; the ending says the format."""
     check_ending(path)
     memory = io.BytesIO()
-    {".csv": frame.write_csv, ".json": frame.write_json, ".parquet": frame.write_parquet}[path.suffix.lower()](memory)
+    match path.suffix.lower():
+        case ".csv":
+            frame.write_csv(memory)
+        case ".json":
+            frame.write_json(memory)
+        case _:
+            frame.write_parquet(memory)
     write_whole(path, memory.getvalue())
 
 

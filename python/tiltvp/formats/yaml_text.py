@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Hashable
-from typing import Final
+from typing import Any, Final
 
 import yaml  # type: ignore[import-untyped, unused-ignore]
 
@@ -44,10 +44,11 @@ class _Loader(yaml.BaseLoader):  # type: ignore[misc, unused-ignore]
         self._sizes: dict[int, int] = {}
         """The values that each complete node with an anchor stands for, itself included."""
 
-    def compose_node(self, parent: yaml.Node | None, index: object) -> yaml.Node:
+    def compose_node(self, parent: Any, index: Any) -> Any:
         """Counts what it composes: an alias stands for as many values as it repeats."""
         before, is_alias = self._values, self.check_event(yaml.AliasEvent)
-        mark, anchor = self.peek_event().start_mark, self.peek_event().anchor
+        event: Any = self.peek_event()  # type: ignore[no-untyped-call, unused-ignore]
+        mark, anchor = event.start_mark, event.anchor
         self._depth += 1
         if self._depth > DEEPEST_YAML:
             raise yaml.composer.ComposerError(None, None, f"nested deeper than {DEEPEST_YAML} levels", mark)
