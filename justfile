@@ -109,6 +109,10 @@ stub: setup
     {{bin}}/ruff check --fix --quiet --select I python/tiltvp/_core.pyi
     {{bin}}/ruff format --quiet python/tiltvp/_core.pyi python/tiltvp/lenses.pyi
 
+# Hostile files, damaged files and states, full disks, kills: what SECURITY.md promises, in about three minutes.
+survive *arguments: setup
+    {{bin}}/pytest --quiet --numprocesses 2 --dist worksteal tests/survive {{arguments}}
+
 # The tests on real data, in the folder that TILTVP_DATA names.
 test-real *arguments: setup
     {{bin}}/pytest --quiet tests/real_data {{arguments}}

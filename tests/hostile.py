@@ -72,8 +72,8 @@ def calibrations() -> Iterator[tuple[str, bytes]]:
     yield "long-key", own(640, 480).replace(b"focal_px", b"k" * 150_000)
     yield "long-model", own(640, 480).replace(b"equidistant", b"m" * 150_000)
     for name, unit in {
-        "newlines": b"\n", "blanks": b" ", "tabs": b"\t", "zeros": b"\0", "brackets": b"[", "braces": b"{", "tags": b"<a>",
-        "dashes": b"- ", "words": b"a b ", "pairs": b"a: b\n", "flow": b"[1],", "quotes": b"'a',", "commas": b"1, ",
+        "newlines": b"\n", "blanks": b" ", "tabs": b"\t", "zeros": b"\0", "brackets": b"[", "braces": b"{",
+        "tags": b"<a>", "dashes": b"- ", "words": b"a b ", "pairs": b"a: b\n", "flow": b"[1],", "quotes": b"'a',", "commas": b"1, ",
         "anchors": b"- &a b\n", "empty-tags": b"<a/>", "objects": b'{"a":1},', "lists": b"[],", "dots": b"a.",
         "rows": b"1 2 3\n", "questions": b"? a\n", "comments": b"# \n", "numbers": b"1.5e-3 ", "escapes": b'"\\x41",',
     }.items():  # fmt: skip
@@ -93,8 +93,9 @@ def images() -> Iterator[tuple[str, bytes]]:
     yield "lying.pam", b"P7\nWIDTH 100000\nHEIGHT 100000\nDEPTH 3\nMAXVAL 255\nTUPLTYPE RGB\nENDHDR\n"
     yield "lying.jpg", b"\xff\xd8\xff\xc0\x00\x0b\x08\xff\xff\xff\xff\x01\x01\x11\x00\xff\xd9"
     yield "lying.webp", b"RIFF\x1e\0\0\0WEBPVP8X\n\0\0\0\0\0\0\0\xff\xff\xff\xff\xff\xff"
-    yield "lying.tif", b"II*\0\x08\0\0\0\x02\0" + struct.pack("<HHII", 256, 4, 1, 90_000) + struct.pack(
-        "<HHII", 257, 4, 1, 90_000
+    yield (
+        "lying.tif",
+        b"II*\0\x08\0\0\0\x02\0" + struct.pack("<HHII", 256, 4, 1, 90_000) + struct.pack("<HHII", 257, 4, 1, 90_000),
     )
     yield "radiance.hdr", b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 100000 +X 100000\n"
     yield "zeros.png", bytes(4 * MIB)

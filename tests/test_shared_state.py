@@ -154,9 +154,16 @@ LONG = {
 }
 
 
+def processor_time(process: int) -> float:
+    """Seconds that all threads of a process have used."""
+    with open(f"/proc/{process}/stat") as file:
+        words = file.read().rpartition(")")[2].split()
+    return (int(words[11]) + int(words[12])) / os.sysconf("SC_CLK_TCK")
+
+
 @pytest.mark.timeout(120)
 @pytest.mark.slow
-@pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
+@pytest.mark.skipif(sys.platform != "linux", reason="/proc")
 @pytest.mark.parametrize("name", LONG)
 def test_an_interrupt_ends_a_long_call(name: str) -> None:
     script = (
@@ -165,19 +172,18 @@ def test_an_interrupt_ends_a_long_call(name: str) -> None:
         "    rng = np.random.default_rng(3)\n"
         "    odometry = np.column_stack([np.full(steps, 0.04), np.full(steps, 0.05)])\n"
         "    return odometry, np.array([[k, j, rng.uniform(-3, 3)] for k in range(steps) for j in range(12)])\n"
-        "check = lambda: True\n"
-        + textwrap.dedent(LONG[name])
-        + "print('ready', flush=True)\n"
+        "check = lambda: True\n" + textwrap.dedent(LONG[name]) + "print('ready', flush=True)\n"
         "try:\n    call()\n    print('done')\n"
-        "except KeyboardInterrupt:\n    print('interrupted', time.time(), check())\n"
+        "except KeyboardInterrupt:\n    print('interrupted', time.process_time(), check())\n"
     )
     process = subprocess.Popen([sys.executable, "-c", script], stdout=subprocess.PIPE, text=True)
     assert process.stdout is not None
     assert process.stdout.readline() == "ready\n"
     time.sleep(0.6)
-    asked = time.time()
+    asked = processor_time(process.pid)
     os.kill(process.pid, signal.SIGINT)
     said = process.communicate(timeout=60)[0].split()
     assert said[0] == "interrupted", said
-    assert float(said[1]) - asked < 0.5
+    # Of the processor, so that a busy machine changes nothing; a batch has two threads.
+    assert float(said[1]) - asked < (1.0 if name in ("batch", "room") else 0.5)
     assert said[2] == "True"

@@ -26,7 +26,7 @@ def address_space() -> int:
 
 
 def survived(action: Callable[[], object]) -> str:
-    """What is wrong with the way in which a fork of this process does something within its limits; nothing if all is well.
+    """What is wrong with the way in which a fork of this process does something within its limits; empty if nothing is.
 
     It may end, or raise an exception of ours.
     """
