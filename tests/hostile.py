@@ -73,9 +73,10 @@ def calibrations() -> Iterator[tuple[str, bytes]]:
     yield "long-model", own(640, 480).replace(b"equidistant", b"m" * 150_000)
     for name, unit in {
         "newlines": b"\n", "blanks": b" ", "tabs": b"\t", "zeros": b"\0", "brackets": b"[", "braces": b"{",
-        "tags": b"<a>", "dashes": b"- ", "words": b"a b ", "pairs": b"a: b\n", "flow": b"[1],", "quotes": b"'a',", "commas": b"1, ",
-        "anchors": b"- &a b\n", "empty-tags": b"<a/>", "objects": b'{"a":1},', "lists": b"[],", "dots": b"a.",
-        "rows": b"1 2 3\n", "questions": b"? a\n", "comments": b"# \n", "numbers": b"1.5e-3 ", "escapes": b'"\\x41",',
+        "tags": b"<a>", "dashes": b"- ", "words": b"a b ", "pairs": b"a: b\n", "flow": b"[1],", "quotes": b"'a',",
+        "commas": b"1, ", "anchors": b"- &a b\n", "empty-tags": b"<a/>", "objects": b'{"a":1},', "lists": b"[],",
+        "dots": b"a.", "rows": b"1 2 3\n", "questions": b"? a\n", "comments": b"# \n", "numbers": b"1.5e-3 ",
+        "escapes": b'"\\x41",',
     }.items():  # fmt: skip
         for begin, end in ((b"", b""), (b"a: [", b"]"), (b'format = "tiltvp-camera"\nx = [', b"]"), (b"[", b"0]")):
             for size in (140_000, 4 * MIB - 100):

@@ -217,7 +217,7 @@ def test_options_reach_the_core(run: Run, world: Path, tmp_path: Path) -> None:
     ]
     seen: dict[tuple[object, ...], tuple[object, ...]] = {}
     for change in changes:
-        said = run(*common, *change)
+        said = run(*common, *change, "--overwrite")
         assert said.code == 0, said.err
         row = json.loads((tmp_path / "r.json").read_text())[0]
         answer = (row["alpha_rad"], row["beta_rad"], row["confidence"], row["edge_pixels"], row["inlier_pixels"])

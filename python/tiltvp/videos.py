@@ -57,9 +57,9 @@ class VideoReader:
 class VideoWriter:
     """Takes the frames of a video that is being written, all of the size of the first."""
 
-    def __init__(self, path: Path, rate_hz: float) -> None:
-        """Nothing is written before the first frame."""
-        self._path, self._rate_hz = path, rate_hz
+    def __init__(self, path: Path, rate_hz: float, name: Path) -> None:
+        """Nothing is written before the first frame. `name` is what messages call it."""
+        self._path, self._rate_hz, self._name = path, rate_hz, name
         self._writer: cv2.VideoWriter | None = None
         self._shape: tuple[int, ...] = ()
         self.count = 0
@@ -74,7 +74,7 @@ class VideoWriter:
             code = cv2.VideoWriter.fourcc(*_CODECS[self._path.suffix.lower()])
             self._writer = cv2.VideoWriter(str(self._path), code, self._rate_hz, (image.shape[1], image.shape[0]))
             if not self._writer.isOpened():
-                raise ImageFileError(f"{self._path}: this OpenCV cannot write such a video")
+                raise OutputError(f"{self._name}: cannot be written (OpenCV opens no such video there)")
         if image.shape != self._shape:
             raise InvalidInputError(f"video frame: shape {image.shape}, expected {self._shape}")
         self._writer.write(image)
@@ -96,7 +96,7 @@ def video_writer(path: str | os.PathLike[str], rate_hz: float = 25.0) -> Iterato
     if file.suffix.lower() not in _CODECS:
         raise InvalidInputError(f"{file}: ends in {file.suffix!r}, expected {' or '.join(_CODECS)}")
     with whole_file(file) as part:
-        writer = VideoWriter(part, rate_hz)
+        writer = VideoWriter(part, rate_hz, file)
         try:
             yield writer
         finally:

@@ -21,7 +21,7 @@ import numpy as np
 import polars as pl
 
 from tiltvp import _core
-from tiltvp.errors import RunError
+from tiltvp.errors import OutputError, RunError
 from tiltvp.files import write_whole
 
 __all__ = ["Run", "RunFolder", "new_manifest", "open_run", "read_run", "versions"]
@@ -204,7 +204,8 @@ def _make(directory: Path) -> None:
     try:
         directory.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise RunError(f"{directory}: {error.strerror or error}, expected a folder that can be written") from error
+        why = error.strerror or error
+        raise OutputError(f"{directory}: cannot be written ({why}), expected a folder that can") from error
 
 
 def _parquet(table: pl.DataFrame) -> bytes:
