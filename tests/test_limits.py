@@ -40,6 +40,12 @@ def test_a_camera_of_too_many_pixels_is_refused(width: int, height: int, tmp_pat
         tiltvp.Camera.load(tmp_path / "camera.toml")
 
 
+def test_a_focal_length_of_nothing_is_refused() -> None:
+    for fx in (1e-308, 5e-324, 0.0, -1.0):
+        with pytest.raises(CalibrationError, match="fx = "):
+            tiltvp.Camera.pinhole(width=640, height=480, fx=fx, fy=500.0, cx=320.0, cy=240.0)
+
+
 @pytest.mark.parametrize("count", [201, 2_000, 9_999])
 def test_a_polynomial_of_too_many_numbers_is_refused(count: int) -> None:
     for name in ("polynomial", "inverse_polynomial"):

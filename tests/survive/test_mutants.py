@@ -117,7 +117,7 @@ def test_logs(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("ending", [".png", ".jpg", ".bmp", ".tif", ".webp", ".pgm", ".jp2"])
 def test_images(ending: str, tmp_path: Path) -> None:
-    done, encoded = cv2.imencode(ending, cv2.GaussianBlur(noise(1, (24, 32)), (0, 0), 2.0))
+    done, encoded = cv2.imencode(ending, cv2.GaussianBlur(noise(1, (64, 96)), (0, 0), 2.0))
     assert done
     raw, path = encoded.tobytes(), tmp_path / f"image{ending}"
 
