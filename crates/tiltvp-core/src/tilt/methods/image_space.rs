@@ -7,7 +7,7 @@ use nalgebra::{Vector2, Vector3};
 
 use super::Setting;
 use super::offsets::offsets;
-use crate::edges::{EdgePixels, Screen};
+use crate::edges::{EdgePixels, Prefilter};
 use crate::error::{Error, Result};
 use crate::geometry::Tilt;
 use crate::robust::FitReport;
@@ -33,11 +33,11 @@ fn offset_max_px_of(scale_px: f64) -> f64 {
     (PAPER_OFFSET_MAX_PX * scale_px / PAPER_SCALE_PX * 1e6).round() / 1e6
 }
 
-/// The closed-form gains, and the screen of edge offsets.
+/// The closed-form gains, and the prefilter of edge offsets.
 #[derive(Debug, Default)]
 pub(super) struct Shared {
     gains: OnceLock<Arc<Gains>>,
-    screen: OnceLock<Screen>,
+    prefilter: OnceLock<Prefilter>,
 }
 
 /// Edge offsets from the upright vanishing point, and the way from a shift to a tilt.
@@ -47,7 +47,7 @@ pub(super) struct ImageSpace {
     gains: Arc<Gains>,
     correction: TrainedCorrection,
     offset_max_px: f64,
-    screen: Screen,
+    prefilter: Prefilter,
     evidence: Evidence,
 }
 
@@ -74,12 +74,12 @@ impl ImageSpace {
             return Err(lean_out_of_reach(&correction, largest_px, offset_max_px.is_some()));
         }
         let at = (vertical.pixel.x, vertical.pixel.y);
-        let screen = shared.screen.get_or_init(|| Screen::of_offsets(&pixels.region, at, largest_px));
+        let prefilter = shared.prefilter.get_or_init(|| Prefilter::of_offsets(&pixels.region, at, largest_px));
         Ok(Self {
             vertical: vertical.clone(),
             gains,
             offset_max_px: largest_px,
-            screen: screen.with_limit(largest_px),
+            prefilter: prefilter.with_limit(largest_px),
             evidence: Evidence {
                 scale: STRAY_RAD * correction.factor(),
                 weighted: false,
@@ -89,8 +89,8 @@ impl ImageSpace {
         })
     }
 
-    pub(super) fn screen(&self) -> &Screen {
-        &self.screen
+    pub(super) fn prefilter(&self) -> &Prefilter {
+        &self.prefilter
     }
 
     /// Writes the rows of the edge pixels that pass the prefilter, with unit weights.

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use super::image_space::ImageSpace;
 use super::offsets::Offsets;
 use super::{Fitter, Setting, TiltMethod};
-use crate::edges::{EdgeOptions, EdgePixels, Screen};
+use crate::edges::{EdgeOptions, EdgePixels, Prefilter};
 use crate::error::Result;
 use crate::options;
 use crate::options::POSITIVE;
@@ -62,8 +62,8 @@ struct ImageSpaceRansac {
 }
 
 impl Fitter for ImageSpaceRansac {
-    fn screen(&self) -> Option<&Screen> {
-        Some(self.space.screen())
+    fn prefilter(&self) -> Option<&Prefilter> {
+        Some(self.space.prefilter())
     }
 
     fn normal(&self, _slot: usize, _gx: f32, _gy: f32) -> Option<[f32; 3]> {

@@ -7,7 +7,7 @@ use nalgebra::Vector2;
 use super::image_space::ImageSpace;
 use super::offsets::Offsets;
 use super::{Fitter, Setting, TiltMethod};
-use crate::edges::{EdgeOptions, EdgePixels, Screen};
+use crate::edges::{EdgeOptions, EdgePixels, Prefilter};
 use crate::error::Result;
 use crate::options;
 use crate::options::{Between, POSITIVE};
@@ -68,8 +68,8 @@ struct ImageSpaceRejectRefit {
 }
 
 impl Fitter for ImageSpaceRejectRefit {
-    fn screen(&self) -> Option<&Screen> {
-        Some(self.space.screen())
+    fn prefilter(&self) -> Option<&Prefilter> {
+        Some(self.space.prefilter())
     }
 
     fn normal(&self, _slot: usize, _gx: f32, _gy: f32) -> Option<[f32; 3]> {
