@@ -2147,7 +2147,7 @@ class SelfCalibrator:
 
     `method` is "default", which does not diverge, or "paper", the filter of Scaramuzza 2009 exactly. `start` and
     `start_sigma` are (x_m, y_m, yaw_rad) of the mounting as it is thought to be, and standard deviations (3,) or
-    covariance (3, 3) of them. Landmarks that are not seen from the poses kept are forgotten: let `memory` keep a whole
+    covariance (3, 3) of them. Landmarks that are not seen from the poses kept are forgotten: let `keyframes_max` keep a whole
     drive's for loops to close.
 
     Raises `tiltvp.errors.InvalidInputError` for options out of their domain or of the other method.
@@ -2168,7 +2168,7 @@ class SelfCalibrator:
         start_distance_m: float | None = None,
         start_distance_log_sigma: float | None = None,
         gate_probability: float | None = None,
-        memory: SupportsIndex | None = None,
+        keyframes_max: SupportsIndex | None = None,
         step_sigma_m: float | None = None,
         step_sigma_rad: float | None = None,
         start_distance_sigma_m: float | None = None,
@@ -2198,7 +2198,7 @@ class SelfCalibrator:
             "default": Standard deviation of the logarithm of that distance: a factor of so many e. Default: 1.5.
         gate_probability
             "default": Probability with which a bearing passes the gate if its covariance is right. Default: 0.9999.
-        memory
+        keyframes_max
             "default": Size of the sliding window: keyframes that are kept and relinearised. The older half is
             marginalised when there are more. Default: 400.
         step_sigma_m
