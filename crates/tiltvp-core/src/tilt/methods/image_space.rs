@@ -10,6 +10,8 @@ use super::offsets::offsets;
 use crate::edges::{EdgePixels, Prefilter};
 use crate::error::{Error, Result};
 use crate::geometry::Tilt;
+use crate::options;
+use crate::options::POSITIVE;
 use crate::robust::FitReport;
 use crate::tilt::correction::{Correction, Gains, VanishingPoint, closed_form_gains};
 use crate::tilt::fit::{Evidence, Fit, Lean, STRAY_RAD};
@@ -40,6 +42,24 @@ pub(super) struct Shared {
     prefilter: OnceLock<Prefilter>,
 }
 
+options! {
+    /// Which edge offsets the image-space methods take, and how their shift becomes an angle.
+    pub struct ImageSpaceOptions {
+        /// Largest edge offset in pixels that passes the prefilter, `s_max`; none for 40 pixels of a lens of 139.7 pixels per
+        /// radian about the vertical, and in proportion for others.
+        offset_max_px: Option<f64> = None => POSITIVE, "a positive number of pixels";
+        /// From the shift to the angle: `"closed-form"` by the gain of each pixel, None by the lens' scale at the vanishing
+        /// point, a factor in pixels per radian, a line, or a posterior.
+        correction: Correction = Correction::ClosedForm
+            => POSITIVE, "\"closed-form\", None, a positive factor, an AffineCorrection or a PosteriorCorrection";
+    }
+    check correction_is_valid
+}
+
+fn correction_is_valid(options: &ImageSpaceOptions) -> Result<()> {
+    options.correction.validate()
+}
+
 /// Edge offsets from the upright vanishing point, and the way from a shift to a tilt.
 #[derive(Debug)]
 pub(super) struct ImageSpace {
@@ -53,7 +73,8 @@ pub(super) struct ImageSpace {
 
 impl ImageSpace {
     /// The tables for a correction and a largest offset, where one is given.
-    pub(super) fn new(setting: &Setting<'_>, correction: &Correction, offset_max_px: Option<f64>) -> Result<Self> {
+    pub(super) fn new(setting: &Setting<'_>, options: &ImageSpaceOptions) -> Result<Self> {
+        let ImageSpaceOptions { correction, offset_max_px } = options;
         let vertical = vertical_of(setting)?;
         let (origin, pixels) = (setting.origin, setting.pixels);
         let shared = &pixels.shared.image_space;

@@ -24,6 +24,7 @@ mod vector_consensus;
 use std::fmt::Debug;
 use std::sync::Arc;
 
+pub use self::image_space::ImageSpaceOptions;
 pub use self::image_space_ransac::ImageSpaceRansacOptions;
 pub use self::image_space_reject_refit::ImageSpaceRejectRefitOptions;
 pub(super) use self::offsets::edge_offset;
@@ -98,7 +99,9 @@ pub(super) trait Fitter: Debug + Send + Sync {
 
     /// Unit normal in the robot frame of the great circle of an edge pixel, by its place in the region and its gradient, if the
     /// method makes normals.
-    fn normal(&self, slot: usize, gx: f32, gy: f32) -> Option<[f32; 3]>;
+    fn normal(&self, _slot: usize, _gx: f32, _gy: f32) -> Option<[f32; 3]> {
+        None
+    }
 
     /// The fit to the edge pixels of an image, with or without those that the prefilter rejects. Allocates nothing in a scratch
     /// that has served before.
