@@ -9,6 +9,7 @@ use crate::call::exception;
 use crate::convert;
 use crate::options;
 use crate::shared::Shared;
+use crate::value::changing;
 
 /// Rates of turn in the short run, a reference attitude in the long run: `ComplementaryFilter(reference_from_body)`.
 ///
@@ -20,34 +21,28 @@ pub(crate) struct ComplementaryFilter {
     inner: Shared<Filter>,
 }
 
+changing!(ComplementaryFilter(Filter), |own| own, {
+    /// Time after which a difference from the reference has shrunk to 1/e, seconds.
+    time_constant_s: f64 = own.options().time_constant_s,
+    /// Time over which a lasting difference becomes a bias of the rates, seconds.
+    bias_time_constant_s: f64 = own.options().bias_time_constant_s,
+});
+
 #[pymethods]
 impl ComplementaryFilter {
     #[new]
     #[pyo3(signature = (reference_from_body: "ArrayLike", **options: "Option | None"))]
     fn new(reference_from_body: &Bound<'_, PyAny>, options: Option<&Bound<'_, PyDict>>) -> PyResult<Self> {
-        let mut parsed = ComplementaryOptions::default();
-        options::set_given(&mut parsed, options)?;
+        let parsed = options::given(ComplementaryOptions::default(), options)?;
         let start = convert::matrix3(reference_from_body, "reference_from_body")?;
         let inner = Filter::new(parsed, &start).map_err(|error| exception(&error))?;
-        Ok(Self { inner: Shared::new(inner) })
-    }
-
-    /// Time after which a difference from the reference has shrunk to 1/e, seconds.
-    #[getter]
-    fn time_constant_s(&self, py: Python<'_>) -> f64 {
-        self.inner.look(py, |filter| filter.options().time_constant_s)
-    }
-
-    /// Time over which a lasting difference becomes a bias of the rates, seconds.
-    #[getter]
-    fn bias_time_constant_s(&self, py: Python<'_>) -> f64 {
-        self.inner.look(py, |filter| filter.options().bias_time_constant_s)
+        Ok(inner.into())
     }
 
     /// (3, 3): the attitude now, which takes vectors of the body to the frame of the reference.
     #[getter]
     fn reference_from_body<'py>(&self, py: Python<'py>) -> PyResult<Array<'py, f64>> {
-        convert::to_matrices(py, self.inner.look(py, |filter| filter.attitude().transpose()).as_slice(), [3, 3], true)
+        convert::to_matrix(py, &self.inner.look(py, Filter::attitude))
     }
 
     /// (3,): the bias of the rates, in the body's axes.

@@ -21,12 +21,13 @@ use crate::call::{call_long, exception, invalid};
 use crate::convert;
 use crate::options;
 use crate::shared::Shared;
+use crate::value::changing;
 
 /// Estimates where a camera sits on a robot, step by step while it drives past landmarks. Changes as it goes.
 ///
 /// `method` is "default", which does not diverge, or "paper", the filter of Scaramuzza 2009 exactly. `start` and
 /// `start_sigma` are (x_m, y_m, yaw_rad) of the mounting as it is thought to be, and standard deviations (3,) or
-/// covariance (3, 3) of them. Landmarks that are not seen from the poses kept are forgotten: let `memory` keep a whole
+/// covariance (3, 3) of them. Landmarks that are not seen from the poses kept are forgotten: let `keyframes_max` keep a whole
 /// drive's for loops to close.
 ///
 /// Raises `tiltvp.errors.InvalidInputError` for options out of their domain or of the other method.
@@ -35,27 +36,17 @@ pub(crate) struct SelfCalibrator {
     inner: Shared<core::SelfCalibrator>,
 }
 
-impl SelfCalibrator {
-    fn used_options(&self, py: Python<'_>) -> SelfCalibratorOptions {
-        self.inner.look(py, |calibrator| *calibrator.options())
-    }
-}
+changing!(SelfCalibrator(core::SelfCalibrator), |own| own);
 
 #[pymethods]
 impl SelfCalibrator {
     #[new]
     #[pyo3(signature = (*, wheel_base_m, **options: "Option | None"))]
     fn new(wheel_base_m: f64, options: Option<&Bound<'_, PyDict>>) -> PyResult<Self> {
-        let mut parsed = SelfCalibratorOptions { wheel_base_m, ..SelfCalibratorOptions::default() };
-        options::set_given(&mut parsed, options)?;
+        let parsed =
+            options::given(SelfCalibratorOptions { wheel_base_m, ..SelfCalibratorOptions::default() }, options)?;
         let inner = core::SelfCalibrator::new(parsed).map_err(|error| exception(&error))?;
-        Ok(Self { inner: Shared::new(inner) })
-    }
-
-    /// The options in force that the method reads, by name, defaults included; a fresh dict, good as keywords.
-    #[getter]
-    fn options<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        options::in_force(py, &self.used_options(py))
+        Ok(inner.into())
     }
 
     /// Moves by the wheels' displacements, then looks: bearings (N,) of the landmarks of those whole numbers (N,).
@@ -129,17 +120,6 @@ impl SelfCalibrator {
         self.inner.change(py, core::SelfCalibrator::reset)
     }
 
-    fn __eq__(&self, py: Python<'_>, other: &Bound<'_, PyAny>) -> bool {
-        let Ok(other) = other.cast::<Self>() else { return false };
-        // One at a time: a calibrator may be compared with itself.
-        let mine = self.inner.copied(py);
-        other.get().inner.look(py, |other| mine == *other)
-    }
-
-    fn __copy__(&self, py: Python<'_>) -> Self {
-        Self { inner: Shared::new(self.inner.copied(py)) }
-    }
-
     /// Sets what pickle has kept.
     fn __setstate__(&self, py: Python<'_>, state: &[u8]) -> PyResult<()> {
         let kept =
@@ -156,10 +136,6 @@ impl SelfCalibrator {
         let make = py.import("functools")?.getattr("partial")?.call((slf.get_type(),), Some(&this.options(py)?))?;
         let state = postcard::to_stdvec(&this.inner.copied(py)).map_err(|error| invalid(format!("state: {error}")))?;
         (make, PyTuple::empty(py), PyBytes::new(py, &state)).into_pyobject(py)
-    }
-
-    fn __deepcopy__(&self, py: Python<'_>, _memo: &Bound<'_, PyAny>) -> Self {
-        self.__copy__(py)
     }
 
     fn __repr__(&self, py: Python<'_>) -> String {
@@ -211,9 +187,9 @@ pub(crate) fn calibrate(
     times_s: Option<&Bound<'_, PyAny>>,
     options: Option<&Bound<'_, PyDict>>,
 ) -> PyResult<LogCalibration> {
-    let mut parsed = LogOptions::default();
-    parsed.filter.wheel_base_m = wheel_base_m;
-    options::set_given(&mut parsed, options)?;
+    let mut usual = LogOptions::default();
+    usual.filter.wheel_base_m = wheel_base_m;
+    let parsed = options::given(usual, options)?;
     let (readings, seen) = log(odometry, bearings)?;
     let times = times_s.map(|times| convert::vector(times, "times_s")).transpose()?;
     let found = call_long(py, || core::calibrate_log(&parsed, &readings, times.as_deref(), &seen))?;

@@ -130,7 +130,7 @@ impl TiltEstimator {
         self.check_image(image)?;
         self.check_scratch(scratch)?;
         let Scratch { detector, edges, work, .. } = scratch;
-        detector.detect(image, &self.pixels.region, self.options.edges.gradient_min, self.method.screen(), edges);
+        detector.detect(image, &self.pixels.region, self.options.edges.gradient_min, self.method.prefilter(), edges);
         Ok(self.fit(edges, work))
     }
 
@@ -159,7 +159,7 @@ impl TiltEstimator {
         Ok(self.fit(edges, work))
     }
 
-    /// The estimate of the edge pixels of an image. What passed a screen and what passed none give the same one: screens
+    /// The estimate of the edge pixels of an image. What passed a prefilter and what passed none give the same one: prefilters
     /// keep out only what the prefilters reject.
     fn fit(&self, edges: &EdgePixels, work: &mut Work) -> TiltEstimate {
         let fit = self.method.fit(edges, &self.pixels, work);

@@ -9,7 +9,7 @@ use super::values::Lines;
 use crate::call::{exception, invalid};
 use crate::options;
 use crate::shared::Shared;
-use crate::value::value;
+use crate::value::{changing, value};
 
 value! {
     /// The lines of one frame and whose they are. Frozen.
@@ -53,11 +53,12 @@ pub(crate) struct LineTracker {
     inner: Shared<core::LineTracker>,
 }
 
-impl LineTracker {
-    fn used_options(&self, py: Python<'_>) -> TrackerOptions {
-        self.inner.look(py, |tracker| *tracker.options())
-    }
-}
+changing!(LineTracker(core::LineTracker), |own| (own.options(), own.state()), {
+    /// Number of the next frame.
+    next_frame: u64 = own.state().next_frame,
+    /// How many identities have been given.
+    track_count: u64 = own.state().next_track,
+});
 
 #[pymethods]
 impl LineTracker {
@@ -67,25 +68,7 @@ impl LineTracker {
         let mut parsed = TrackerOptions::default();
         options::set(&mut parsed, options)?;
         let inner = core::LineTracker::new(parsed).map_err(|error| exception(&error))?;
-        Ok(Self { inner: Shared::new(inner) })
-    }
-
-    /// The options in force, by name, defaults included; a fresh dict, good as keywords.
-    #[getter]
-    fn options<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        options::in_force(py, &self.used_options(py))
-    }
-
-    /// Number of the next frame.
-    #[getter]
-    fn next_frame(&self, py: Python<'_>) -> u64 {
-        self.inner.look(py, |tracker| tracker.state().next_frame)
-    }
-
-    /// How many identities have been given.
-    #[getter]
-    fn track_count(&self, py: Python<'_>) -> u64 {
-        self.inner.look(py, |tracker| tracker.state().next_track)
+        Ok(inner.into())
     }
 
     /// The next frame: its lines, their descriptors (N, K), and the robot's motion since the last one.
@@ -122,32 +105,18 @@ impl LineTracker {
     }
 
     fn __repr__(&self, py: Python<'_>) -> PyResult<String> {
-        Ok(format!("LineTracker({})", options::shown(py, &self.used_options(py))?))
-    }
-
-    fn __eq__(&self, py: Python<'_>, other: &Bound<'_, PyAny>) -> bool {
-        let Ok(other) = other.cast::<Self>() else { return false };
-        // One at a time: a tracker may be compared with itself.
-        let mine = self.inner.copied(py);
-        other.get().inner.look(py, |other| (mine.options(), mine.state()) == (other.options(), other.state()))
-    }
-
-    fn __copy__(&self, py: Python<'_>) -> Self {
-        Self { inner: Shared::new(self.inner.copied(py)) }
-    }
-
-    fn __deepcopy__(&self, py: Python<'_>, _memo: &Bound<'_, PyAny>) -> Self {
-        self.__copy__(py)
+        Ok(format!("LineTracker({})", options::shown(py, &self.inner.look(py, |tracker| *tracker.options()))?))
     }
 
     /// Sets what pickle has kept.
     fn __setstate__(&self, py: Python<'_>, state: (u64, u64, Vec<Memory>, Vec<Edge>)) -> PyResult<()> {
         let (next_frame, next_track, frames, followed) = state;
         let frames = frames.into_iter().map(|(tracks, descriptors)| FrameMemory { tracks, descriptors }).collect();
-        let edge = |((track, seen), (bearing_rad, nearness, covariance, is_metric), polarity, descriptor): Edge| {
-            let parallax = Parallax { bearing_rad, nearness, covariance, is_metric };
-            Followed { track, seen, parallax, polarity, descriptor }
-        };
+        let edge =
+            |((track, seen), (bearing_rad, inverse_distance, covariance, is_metric), polarity, descriptor): Edge| {
+                let parallax = Parallax { bearing_rad, inverse_distance, covariance, is_metric };
+                Followed { track, seen, parallax, polarity, descriptor }
+            };
         let followed = followed.into_iter().map(edge).collect();
         let state = TrackerState { next_frame, next_track, frames, followed };
         self.inner.change(py, |tracker| {
@@ -161,8 +130,8 @@ impl LineTracker {
         let make = py.import("functools")?.getattr("partial")?.call((slf.get_type(),), Some(&this.options(py)?))?;
         let tracker = this.inner.copied(py);
         let edge = |edge: &Followed| -> Edge {
-            let Parallax { bearing_rad, nearness, covariance, is_metric } = edge.parallax;
-            let place = (bearing_rad, nearness, covariance, is_metric);
+            let Parallax { bearing_rad, inverse_distance, covariance, is_metric } = edge.parallax;
+            let place = (bearing_rad, inverse_distance, covariance, is_metric);
             ((edge.track, edge.seen), place, edge.polarity, edge.descriptor.clone())
         };
         let state = tracker.state();

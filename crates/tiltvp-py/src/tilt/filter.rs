@@ -12,6 +12,7 @@ use crate::call::{exception, invalid};
 use crate::convert;
 use crate::options;
 use crate::shared::Shared;
+use crate::value::changing;
 
 /// Keys of the dict of a state, by the way of pickle.
 const STATE_KEYS: [&str; 9] =
@@ -29,27 +30,27 @@ pub(crate) struct TiltFilter {
     inner: Shared<core::TiltFilter>,
 }
 
-impl TiltFilter {
-    fn used_options(&self, py: Python<'_>) -> TiltFilterOptions {
-        self.inner.look(py, |filter| *filter.options())
-    }
-}
+changing!(TiltFilter(core::TiltFilter), |own| own, {
+    /// The ground normal in the robot's frame, as the filter holds it to be now.
+    estimate: FilteredTilt = own.estimate().into(),
+    /// The floor's part of it alone, in the frame of the wheels.
+    floor: FilteredTilt = own.floor().into(),
+    /// The robot's own part alone, what it would see on level ground; None unless `estimate_mounting`.
+    mounting: Option<FilteredTilt> = own.mounting().map(FilteredTilt::from),
+    /// The largest normalised innovation squared that passes the gate.
+    nis_limit: f64 = own.nis_limit(),
+    /// How many estimates in a row the gate has rejected: above 0, the estimate may be about to jump.
+    rejected: u32 = own.state().rejected,
+});
 
 #[pymethods]
 impl TiltFilter {
     #[new]
     #[pyo3(signature = (**options: "Option | None"))]
     fn new(options: Option<&Bound<'_, PyDict>>) -> PyResult<Self> {
-        let mut parsed = TiltFilterOptions::default();
-        options::set_given(&mut parsed, options)?;
+        let parsed = options::given(TiltFilterOptions::default(), options)?;
         let inner = core::TiltFilter::new(parsed).map_err(|error| exception(&error))?;
-        Ok(Self { inner: Shared::new(inner) })
-    }
-
-    /// The options in force, by name, defaults included; a fresh dict, good as keywords.
-    #[getter]
-    fn options<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        options::in_force(py, &self.used_options(py))
+        Ok(inner.into())
     }
 
     /// The robot has turned (left positive) and driven (either way) since the last call; None: it has not.
@@ -98,36 +99,6 @@ impl TiltFilter {
         fused.map(FilterStep::from)
     }
 
-    /// The ground normal in the robot's frame, as the filter holds it to be now.
-    #[getter]
-    fn estimate(&self, py: Python<'_>) -> FilteredTilt {
-        self.inner.look(py, core::TiltFilter::estimate).into()
-    }
-
-    /// The floor's part of it alone, in the frame of the wheels.
-    #[getter]
-    fn floor(&self, py: Python<'_>) -> FilteredTilt {
-        self.inner.look(py, core::TiltFilter::floor).into()
-    }
-
-    /// The robot's own part alone, what it would see on level ground; None unless `estimate_mounting`.
-    #[getter]
-    fn mounting(&self, py: Python<'_>) -> Option<FilteredTilt> {
-        self.inner.look(py, core::TiltFilter::mounting).map(FilteredTilt::from)
-    }
-
-    /// The largest normalised innovation squared that passes the gate.
-    #[getter]
-    fn nis_limit(&self, py: Python<'_>) -> f64 {
-        self.inner.look(py, core::TiltFilter::nis_limit)
-    }
-
-    /// How many estimates in a row the gate has rejected: above 0, the estimate may be about to jump.
-    #[getter]
-    fn rejected(&self, py: Python<'_>) -> u32 {
-        self.inner.look(py, |filter| filter.state().rejected)
-    }
-
     /// Forgets everything but the options.
     fn reset(&self, py: Python<'_>) -> PyResult<()> {
         self.inner.change(py, |filter| {
@@ -137,22 +108,7 @@ impl TiltFilter {
     }
 
     fn __repr__(&self, py: Python<'_>) -> PyResult<String> {
-        Ok(format!("TiltFilter({})", options::shown(py, &self.used_options(py))?))
-    }
-
-    fn __eq__(&self, py: Python<'_>, other: &Bound<'_, PyAny>) -> bool {
-        let Ok(other) = other.cast::<Self>() else { return false };
-        // One at a time: a filter may be compared with itself.
-        let mine = self.inner.copied(py);
-        other.get().inner.look(py, |other| mine == *other)
-    }
-
-    fn __copy__(&self, py: Python<'_>) -> Self {
-        Self { inner: Shared::new(self.inner.copied(py)) }
-    }
-
-    fn __deepcopy__(&self, py: Python<'_>, _memo: &Bound<'_, PyAny>) -> Self {
-        self.__copy__(py)
+        Ok(format!("TiltFilter({})", options::shown(py, &self.inner.look(py, |filter| *filter.options()))?))
     }
 
     /// Sets what pickle has kept.
