@@ -226,7 +226,7 @@ pub(crate) fn wheel_displacements<'py>(
 ///
 /// The mean NEES of so many runs of a consistent filter falls there.
 #[pyfunction]
-#[pyo3(signature = (probability, dof: "int", samples: "int"))]
+#[pyo3(signature = (probability, dof: "SupportsIndex", samples: "SupportsIndex"))]
 pub(crate) fn consistency_band(
     probability: f64,
     dof: &Bound<'_, PyAny>,
