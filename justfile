@@ -109,7 +109,7 @@ stub: setup
     {{bin}}/ruff check --fix --quiet --select I python/tiltvp/_core.pyi
     {{bin}}/ruff format --quiet python/tiltvp/_core.pyi python/tiltvp/lenses.pyi
 
-# Hostile files, damaged files and states, full disks, kills: what SECURITY.md promises, in about three minutes.
+# Hostile files, damaged files and states, full disks, kills: what SECURITY.md promises, in about five minutes of the processor.
 survive *arguments: setup
     {{bin}}/pytest --quiet --numprocesses 2 --dist worksteal tests/survive {{arguments}}
 

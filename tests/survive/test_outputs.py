@@ -80,6 +80,8 @@ def world(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def run(world: Path, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> Callable[..., object]:
     """Runs a command of the table: its exit code and what it complains about."""
     monkeypatch.chdir(world)
+    # What `track video` writes beside its video, in a test before.
+    (world.parent / "tracks.csv").unlink(missing_ok=True)
 
     def run_main(command: str, out: Path, *more: str) -> tuple[int, str]:
         code = main([word.replace("OUT", str(out)) for word in COMMANDS[command]] + list(more))
