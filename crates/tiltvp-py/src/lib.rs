@@ -13,6 +13,7 @@ mod lines;
 mod options;
 mod rays;
 mod scratch;
+mod segments;
 mod selfcalib;
 mod stereo;
 mod synth;
@@ -57,6 +58,8 @@ mod _core {
     use crate::options::option_fields;
     #[pymodule_export]
     use crate::rays::PixelRays;
+    #[pymodule_export]
+    use crate::segments::{SegmentDetector, Segments};
     #[pymodule_export]
     use crate::selfcalib::{
         CalibrationStep, LogCalibration, MountingEstimate, SelfCalibrator, SimulatedDrive, calibrate, consistency_band,

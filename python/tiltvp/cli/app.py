@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from cyclopts import App, CycloptsError, Parameter
 
 from tiltvp import __version__
-from tiltvp.cli import calibrate, camera, corner, demo, lines, tilt, track
+from tiltvp.cli import calibrate, camera, corner, demo, lines, segments, tilt, track
 from tiltvp.cli.lab import dataset, evaluate, measure, report
 from tiltvp.cli.terminal import complain
 from tiltvp.errors import MissingExtraError, TiltvpError
@@ -25,6 +25,7 @@ app = App(
     suppress_keyboard_interrupt=False,
 )
 app.command(tilt.tilt)
+app.command(segments.segments)
 app.command(lines.lines)
 app.command(track.track)
 app.command(corner.corner)
