@@ -1,4 +1,4 @@
-"""Straight edges of any central image as arcs of great circles: fisheye beyond 180 degrees, mirror, pinhole, panorama."""
+"""Straight edges of any central image as arcs of great circles: fisheye, mirror, pinhole, panorama."""
 
 from __future__ import annotations
 

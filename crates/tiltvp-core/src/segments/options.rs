@@ -28,7 +28,7 @@ options! {
     /// Options of a detector of straight edges.
     pub struct SegmentDetectorOptions {
         /// Which pixels are looked at: by default all of the image, down to weak gradients, after smoothing by 0.7 pixels.
-        [flat] edges: EdgeOptions = EdgeOptions {
+        [flat except "elevation_min_rad" "elevation_max_rad"] edges: EdgeOptions = EdgeOptions {
             gradient_min: 64.0,
             smoothing_px: 0.7,
             elevation_min_rad: -FRAC_PI_2,
