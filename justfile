@@ -117,6 +117,10 @@ test-real *arguments: setup
 measure-panoramas *arguments: setup
     {{bin}}/tiltvp measure panoramas "$TILTVP_DATA/panos" {{arguments}}
 
+# The vertical of views that look anywhere: pinhole and fisheye views of the panoramas, rolled and pitched.
+measure-views *arguments: setup
+    {{bin}}/tiltvp measure views "$TILTVP_DATA/panos" {{arguments}}
+
 # The paper's sweep on views of all panoramas of TILTVP_DATA and on rendered rooms, as they are and made harder: the tables,
 # how far covariance and confidence can be trusted, and the report. Remove out/database to begin anew.
 measure-database *arguments: setup

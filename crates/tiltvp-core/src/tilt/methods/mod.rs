@@ -22,6 +22,7 @@ mod sampling;
 mod segments;
 mod vector_consensus;
 
+use std::f64::consts::FRAC_PI_2;
 use std::fmt::Debug;
 use std::sync::Arc;
 
@@ -83,6 +84,11 @@ tilt_methods! {
 pub(super) trait TiltMethod {
     /// Which pixels are edges by default.
     fn edges(&self) -> EdgeOptions;
+
+    /// `tilt_max_rad` must be below this, or for pi may be equal to it.
+    fn tilt_limit_rad(&self) -> f64 {
+        FRAC_PI_2
+    }
 
     /// Makes the tables for one camera.
     fn prepare(&self, setting: &Setting<'_>) -> Result<Prepared>;
