@@ -224,17 +224,18 @@ measure-calibration-time *arguments: setup
 measure-constants *arguments: setup
     {{bin}}/python benches/constants.py {{arguments}}
 
-# The wheel is built if sources are newer than the last one.
+# The wheel is built if sources are newer than the last one. (It has a folder of its own: target/wheels has what `setup` makes, which
+# only points to the sources.)
 # The size of `pip install tiltvp` without extras, in an environment of its own, and the time of `import tiltvp`.
 measure-install:
     #!/usr/bin/env bash
     set -euo pipefail
-    mkdir -p target/wheels
-    newest() { find target/wheels -name 'tiltvp-*.whl' -printf '%T@ %p\n' | sort --numeric-sort | tail --lines=1 | cut --delimiter=' ' --fields=2; }
+    mkdir -p target/install
+    newest() { find target/install -name 'tiltvp-*.whl' -printf '%T@ %p\n' | sort --numeric-sort | tail --lines=1 | cut --delimiter=' ' --fields=2; }
     wheel=$(newest)
     if [ -z "$wheel" ] || [ -n "$(find Cargo.toml Cargo.lock pyproject.toml crates python -name '*.*' -newer "$wheel" \
             ! -name '*.pyc' ! -name '*.so' -type f -print -quit)" ]; then
-        {{bin}}/maturin build --release --locked --quiet --out target/wheels
+        {{bin}}/maturin build --release --locked --quiet --out target/install
         wheel=$(newest)
     fi
     python3 -m venv --clear --without-pip out/install

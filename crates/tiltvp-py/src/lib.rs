@@ -12,6 +12,7 @@ mod laboratory;
 mod lines;
 mod options;
 mod rays;
+mod reader;
 mod scratch;
 mod segments;
 mod selfcalib;

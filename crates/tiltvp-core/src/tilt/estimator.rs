@@ -139,7 +139,7 @@ impl TiltEstimator {
         match &self.method {
             Prepared::Pixels(method) => {
                 let Scratch { detector, edges, work, .. } = scratch;
-                detector.detect(image, &self.pixels.region, gradient_min, method.screen(), edges);
+                detector.detect(image, &self.pixels.region, gradient_min, method.prefilter(), edges);
                 Ok(self.fit(&**method, edges, work))
             }
             Prepared::Segments(method) => Ok(method.estimate(image, &self.pixels, scratch)),
@@ -184,7 +184,7 @@ impl TiltEstimator {
         }
     }
 
-    /// The estimate of the edge pixels of an image. What passed a screen and what passed none give the same one: screens
+    /// The estimate of the edge pixels of an image. What passed a prefilter and what passed none give the same one: prefilters
     /// keep out only what the prefilters reject.
     fn fit(&self, method: &dyn Fitter, edges: &EdgePixels, work: &mut Work) -> TiltEstimate {
         let fit = method.fit(edges, &self.pixels, work);
