@@ -146,11 +146,6 @@ impl Chains {
     pub(super) fn unit(&self, ridge_pixel: u32) -> [f32; 2] {
         self.units[ridge_pixel as usize]
     }
-
-    /// The window of the region.
-    pub(super) fn window(&self) -> &Window {
-        &self.window
-    }
 }
 
 /// Number of the step nearest to a direction.
