@@ -94,8 +94,11 @@ impl Chains {
         starts.clear();
         starts.push(0);
         for (seed, place) in places.iter().enumerate() {
+            if gx[seed] * gx[seed] + gy[seed] * gy[seed] < start {
+                continue;
+            }
             let at = window.place(*place);
-            if free[at] == 0 || gx[seed] * gx[seed] + gy[seed] * gy[seed] < start {
+            if free[at] == 0 {
                 continue;
             }
             free[at] = 0;
