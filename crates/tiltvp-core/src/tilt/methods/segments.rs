@@ -183,7 +183,7 @@ struct Sector {
 /// grows with the square of it (Birge 1932). The vote alone where the segments tell nothing.
 fn fused(fit: Fit, vote: Fit) -> Fit {
     let (Some(tilt), Some(covariance)) = (fit.tilt, fit.covariance) else {
-        return if vote.covariance.is_some() { vote } else { fit };
+        return if vote.covariance.is_some() { Fit { inliers: fit.inliers, ..vote } } else { fit };
     };
     let (Some(other), Some(other_covariance)) = (vote.tilt, vote.covariance) else { return fit };
     let basis = tangent_basis(&tilt.normal());
@@ -235,8 +235,11 @@ impl SegmentFit {
         self.weigh(work);
         let considered = work.near.iter().map(|i| work.segments.list[*i as usize].support()).sum();
         let fit = self.fit(work);
+        if fit.tilt.is_none() {
+            work.rows.iter_mut().for_each(|row| row.vertical = 0.0);
+        }
         let vote = self.vote(&work.finder.ridge, tables, &mut work.strong, pixel_work);
-        fused(fit, vote).into_estimate(work.finder.ridge.edges.len(), considered)
+        fused(fit, vote).into_estimate(work.segments.points.len(), considered)
     }
 
     /// What the strong ridge pixels near the horizon say by their gradients.
