@@ -15,7 +15,6 @@ import pytest
 
 import tiltvp
 from tiltvp.cli.app import main
-from tiltvp.cli.segments import segment_table
 from tiltvp.errors import InvalidInputError
 from tiltvp.overlays.segments import draw_segments, segment_pixels
 from tiltvp.synth import RoomImage, mirror_camera
@@ -37,7 +36,6 @@ CENTRES = {
     # The last two lie on the seam.
     "panorama": [(0.0, 0.0, 1.0), (0.9, 0.3, 0.1), (0.1, 0.2, -1.0), (0.0, -0.3, -1.0)],
 }
-SIGMA = 2.0
 CASES = [(name, centre) for name in CAMERAS for centre in range(len(CENTRES[name]))]
 
 
@@ -53,18 +51,24 @@ def sides(name: str, centre: int) -> np.ndarray:
     return normals / np.linalg.norm(normals, axis=1, keepdims=True)
 
 
-def picture(camera: tiltvp.Camera, normals: np.ndarray, levels: tuple[float, float], seed: int) -> np.ndarray:
-    """The polygon, of the second level on a ground of the first, with noise; 5 x 5 rays a pixel."""
-    v, u = np.mgrid[0 : camera.height, 0 : camera.width]
-    share = np.zeros((camera.height, camera.width))
+def picture(
+    camera: tiltvp.Camera, normals: np.ndarray, levels: tuple[float, float], seed: int, sigma: float = 2.0
+) -> np.ndarray:
+    """The polygon, of the second level on a ground of the first, with noise; 25 rays a pixel beside its sides."""
+    v, u = np.mgrid[0 : camera.height, 0 : camera.width].reshape(2, -1).astype(float)
+
+    def within(du: float, dv: float, chosen: np.ndarray) -> np.ndarray:
+        bearings = np.nan_to_num(camera.unproject(np.column_stack([u[chosen] + du, v[chosen] + dv])))
+        return np.asarray((bearings @ normals.T).min(axis=1))
+
+    distance = within(0.0, 0.0, np.ones(len(u), bool))
+    # Two pixels of the coarsest camera.
+    near = np.abs(distance) < 0.025
     places = (np.arange(5) - 2.0) / 5.0
-    for dv in places:
-        for du in places:
-            bearings = camera.unproject(np.column_stack([(u + du).ravel(), (v + dv).ravel()]))
-            with np.errstate(invalid="ignore"):
-                share += (bearings @ normals.T > 0.0).all(axis=1).reshape(share.shape) / 25.0
-    grey = levels[0] + (levels[1] - levels[0]) * share
-    return np.rint(grey + np.random.default_rng(seed).normal(0.0, SIGMA, grey.shape)).clip(0, 255).astype(np.uint8)
+    share = (distance > 0.0).astype(float)
+    share[near] = np.mean([within(du, dv, near) > 0.0 for dv in places for du in places], axis=0)
+    grey = levels[0] + (levels[1] - levels[0]) * share + np.random.default_rng(seed).normal(0.0, sigma, len(u))
+    return np.rint(grey).clip(0, 255).astype(np.uint8).reshape(camera.height, camera.width)
 
 
 def corners_of(normals: np.ndarray) -> np.ndarray:
@@ -90,36 +94,39 @@ def seen_sides(camera: tiltvp.Camera, normals: np.ndarray) -> np.ndarray:
     return np.array(seen)
 
 
+@pytest.mark.parametrize(("sigma", "levels"), [(2.0, (80.0, 180.0)), (12.0, (160.0, 90.0))])
 @pytest.mark.parametrize(("name", "centre"), CASES)
-def test_sides_are_found_as_well_as_they_say(name: str, centre: int) -> None:
-    camera, normals = CAMERAS[name], sides(name, centre)
-    due = seen_sides(camera, normals)
+def test_sides_are_found_as_well_as_they_say(name: str, centre: int, sigma: float, levels: tuple[float, float]) -> None:
+    camera, all_normals = CAMERAS[name], sides(name, centre)
+    due = seen_sides(camera, all_normals)
     assert due.sum() >= 2
-    squares, ends_px = [], []
+    # Normals look to the brighter side.
+    sign = np.sign(levels[1] - levels[0])
+    normals, corners = sign * all_normals[due], corners_of(all_normals)[due]
+    squares, aside_px, ends_px = [], [], []
     detector = tiltvp.SegmentDetector(camera)
     for seed in range(3):
-        for levels, sign in (((80.0, 180.0), 1.0), ((180.0, 80.0), -1.0)):
-            found = detector(picture(camera, normals, levels, seed))
-            assert (np.diff(found.length_rad) <= 0.0).all()
-            near = sign * found.normal @ normals[due].T > math.cos(math.radians(2.0))
-            # Each side is one edge, whose normal looks to the brighter side; also across the seam.
-            assert near.sum(axis=0).tolist() == [1] * due.sum()
-            for row, (normal, ends) in enumerate(zip(sign * normals[due], corners_of(normals)[due], strict=True)):
-                i = int(np.flatnonzero(near[:, row])[0])
-                error = normal - found.normal[i]
-                away = np.array([error @ found.middle[i], error @ np.cross(found.normal[i], found.middle[i])])
-                squares.append(float((away**2 / found.variances_rad2[i]).sum()))
-                turned = ends if sign > 0 else ends[::-1]
-                order = 1.0 if normal @ np.cross(*turned) > 0.0 else -1.0
-                turned = turned if order > 0 else turned[::-1]
-                off = np.linalg.norm(found.ends[i] - turned, axis=1)
-                ends_px += list(off / np.linalg.norm(np.subtract(*turned)) * found.support[i])
-                assert found.contrast[i] > 10.0
-                assert found.rms_px[i] < 0.5
-    # Two degrees of freedom. Covariances also hold what moves a whole edge of a real lens, so that these errors are smaller.
-    assert 0.02 < np.mean(squares) < 2.0
+        found = detector(picture(camera, all_normals, levels, seed, sigma))
+        assert (np.diff(found.length_rad) <= 0.0).all()
+        near = found.normal @ normals.T > math.cos(math.radians(2.0))
+        # Each side is one edge, also across the seam; strong noise may part it.
+        assert near.any(axis=0).all()
+        assert sigma > 5.0 or near.sum(axis=0).tolist() == [1] * due.sum()
+        for normal, ends, i in zip(normals, corners, near.argmax(axis=0), strict=True):
+            px_per_rad = found.support[i] / found.length_rad[i]
+            error = normal - found.normal[i]
+            away = np.array([error @ found.middle[i], error @ np.cross(found.normal[i], found.middle[i])])
+            squares.append(float((away**2 / found.variances_rad2[i]).sum()))
+            aside_px.append(away[0] * px_per_rad)
+            in_turn = ends if normal @ np.cross(*ends) > 0.0 else ends[::-1]
+            ends_px += list(np.linalg.norm(found.ends[i] - in_turn, axis=1) * px_per_rad)
+            assert found.contrast[i] > 10.0
+            assert found.rms_px[i] < 0.6
+    # Two degrees of freedom, and their quantile of 99.9 %. What moves whole edges of real lenses is not in here.
+    assert np.mean(squares) < 2.0
     assert max(squares) < 13.8
-    assert np.median(ends_px) < 4.0
+    assert np.sqrt(np.mean(np.square(aside_px))) < (0.03 if sigma < 5.0 else 0.15)
+    assert np.median(ends_px) < 3.0
 
 
 @pytest.mark.parametrize("name", CAMERAS)
@@ -154,8 +161,10 @@ def test_negatives_have_opposite_normals(name: str) -> None:
     image = picture(camera, sides(name, 0), (60.0, 200.0), 6)
     detector = tiltvp.SegmentDetector(camera)
     plain, other = detector(image), detector(255 - image)
-    assert other.normal == pytest.approx(-plain.normal, abs=1e-9)
-    assert other.length_rad == pytest.approx(plain.length_rad, abs=1e-9)
+    # Ties of equal gradients, and their order, are broken the same way in both.
+    cosines = plain.normal @ other.normal.T
+    assert len(plain) == len(other)
+    assert (cosines.min(axis=1) < -math.cos(2e-3)).all()
 
 
 def test_empty_images_have_no_edges(camera: tiltvp.Camera) -> None:
@@ -286,7 +295,6 @@ def test_the_command_writes_rows_and_pictures(tmp_path: Path, capsys: pytest.Cap
     rows = out.read_text().splitlines()
     assert len(rows) == 1 + len(found)
     assert rows[0].startswith("file,edge,normal_x")
-    assert len(segment_table([("view.png", found)])) == len(found)
     assert main([*arguments, "--support-min-px", "2"]) == 2
     assert "support_min_px" in capsys.readouterr().err
 

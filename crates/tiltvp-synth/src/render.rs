@@ -2,8 +2,8 @@
 
 use nalgebra::{Matrix3, Vector3};
 use rayon::prelude::*;
-use tiltvp_core::geometry::{Tilt, angle_between};
 use tiltvp_core::Result;
+use tiltvp_core::geometry::{Tilt, angle_between};
 
 use crate::noise::hash_unit;
 use crate::segment::Segment;

@@ -35,9 +35,10 @@ def stride_views(
     repeats: int = 5,
     advance: Callable[[], None] = lambda: None,
 ) -> pl.DataFrame:
-    """One row for each view, method of edge pixels (straight edges want every row) and stride: the error (eq. 44) as a vector, the covariance, and the time.
+    """One row for each view, method and stride: the error (eq. 44) as a vector, the covariance, and the time.
 
-    Strides take turns on a view; `time_s` is the fastest of `repeats`.
+    Methods are those of edge pixels: straight edges want every row. Strides take turns on a view; `time_s` is the
+    fastest of `repeats`.
     """
     made = [
         (method, stride, TiltEstimator(camera, method=method, row_stride=stride))
