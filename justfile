@@ -117,6 +117,10 @@ test-real *arguments: setup
 measure-panoramas *arguments: setup
     {{bin}}/tiltvp measure panoramas "$TILTVP_DATA/panos" {{arguments}}
 
+# The vertical of views that look anywhere: pinhole and fisheye views of the panoramas, rolled and pitched.
+measure-views *arguments: setup
+    {{bin}}/tiltvp measure views "$TILTVP_DATA/panos" {{arguments}}
+
 # The paper's sweep on views of all panoramas of TILTVP_DATA and on rendered rooms, as they are and made harder: the tables,
 # how far covariance and confidence can be trusted, and the report. Remove out/database to begin anew.
 measure-database *arguments: setup
@@ -224,17 +228,18 @@ measure-calibration-time *arguments: setup
 measure-constants *arguments: setup
     {{bin}}/python benches/constants.py {{arguments}}
 
-# The wheel is built if sources are newer than the last one.
+# The wheel is built if sources are newer than the last one. (It has a folder of its own: target/wheels has what `setup` makes, which
+# only points to the sources.)
 # The size of `pip install tiltvp` without extras, in an environment of its own, and the time of `import tiltvp`.
 measure-install:
     #!/usr/bin/env bash
     set -euo pipefail
-    mkdir -p target/wheels
-    newest() { find target/wheels -name 'tiltvp-*.whl' -printf '%T@ %p\n' | sort --numeric-sort | tail --lines=1 | cut --delimiter=' ' --fields=2; }
+    mkdir -p target/install
+    newest() { find target/install -name 'tiltvp-*.whl' -printf '%T@ %p\n' | sort --numeric-sort | tail --lines=1 | cut --delimiter=' ' --fields=2; }
     wheel=$(newest)
     if [ -z "$wheel" ] || [ -n "$(find Cargo.toml Cargo.lock pyproject.toml crates python -name '*.*' -newer "$wheel" \
             ! -name '*.pyc' ! -name '*.so' -type f -print -quit)" ]; then
-        {{bin}}/maturin build --release --locked --quiet --out target/wheels
+        {{bin}}/maturin build --release --locked --quiet --out target/install
         wheel=$(newest)
     fi
     python3 -m venv --clear --without-pip out/install

@@ -159,9 +159,9 @@ def test_motion_from_anything_else() -> None:
         ({"start": (0.0, np.nan, 0.0)}, "start"),
         ({"method": "papers"}, "method"),
         ({"method": "paper", "start": (0.0, 0.0, 0.0)}, "start"),
-        ({"method": "paper", "memory": 20}, "memory"),
+        ({"method": "paper", "keyframes_max": 20}, "keyframes_max"),
         ({"odometry_inflation": 2.0}, "odometry_inflation"),
-        ({"memory": 2}, "memory"),
+        ({"keyframes_max": 2}, "keyframes_max"),
         ({"gate_probability": 1.0}, "gate_probability"),
     ],
 )
@@ -190,7 +190,7 @@ def test_bad_steps_are_refused_and_change_nothing() -> None:
 def test_options_are_good_as_keywords_and_each_matters() -> None:
     drive = simulate_drive("paper", seed=11)
     for method, others in [
-        ("default", {"start_distance_log_sigma": 0.3, "gate_probability": 0.3, "memory": 30}),
+        ("default", {"start_distance_log_sigma": 0.3, "gate_probability": 0.3, "keyframes_max": 30}),
         ("paper", {"start_distance_sigma_m": 0.5, "odometry_inflation": 1.0}),
     ]:
         one = followed(drive, method=method, start_sigma=(0.05, 0.08, 0.5))
@@ -291,9 +291,9 @@ def test_answers_come_back_from_dicts_pickles_and_copies() -> None:
 
 @pytest.mark.parametrize("method", ["default", "paper"])
 def test_a_pickled_calibrator_goes_on_as_if_nothing_had_been(method: str) -> None:
-    """With a memory so short that it was summed up, and in the middle of a drive."""
+    """With a window so short that it was marginalised, and in the middle of a drive."""
     drive = simulate_drive("alternating", seed=3)
-    options = {"memory": 40} if method == "default" else {}
+    options = {"keyframes_max": 40} if method == "default" else {}
     whole = tiltvp.SelfCalibrator(**START, method=method, **options)
     half = len(drive.odometry) // 2
     first = drive.bearings[:, 0] < half

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 import tiltvp
-from test_corner_images import CAMERA, COLOURS, LEFT_FROM_RIGHT, pair
+from test_corner_images import CAMERA, COLOURS, GREYS, LEFT_FROM_RIGHT, pair
 from tiltvp.stereo_rigs import StereoRig
 from tiltvp.synth import render_room, simulate_drive
 
@@ -54,7 +54,7 @@ def world(tmp_path_factory: pytest.TempPathFactory) -> Path:
     ):
         (folder / name).write_text("\n".join([header, *(",".join(map(str, row)) for row in rows)]) + "\n")
     StereoRig(CAMERA, CAMERA, LEFT_FROM_RIGHT).save(folder / "rig.toml")
-    for side, image in zip(("left", "right"), pair(COLOURS), strict=True):
+    for side, image in zip(("left", "right", "grey-left", "grey-right"), pair(COLOURS) + pair(GREYS), strict=True):
         tiltvp.write_image(folder / side / "a.png", image)
     return folder
 
@@ -115,6 +115,20 @@ def test_corner(run: Run, world: Path) -> None:
     [row] = rows_of(world / "poses.csv")
     assert row["found"] == "true"
     assert len((world / "poses.txt").read_text().splitlines()) == 2
+
+
+@pytest.mark.parametrize(("level", "found"), [(255, "true"), (0, "false")])
+def test_corner_in_a_mask(run: Run, world: Path, level: int, found: str) -> None:
+    mask = np.full((CAMERA.height, CAMERA.width), 255, dtype=np.uint8)
+    mask[CAMERA.height // 8 :] = level
+    tiltvp.write_image(world / "mask.png", mask)
+    words = ("--calibration", "rig.toml", "--mask", "mask.png", "--out", "masked.csv")
+    done = run("corner", "grey-left", "grey-right", "--method", "general", *words)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert [row["found"] for row in rows_of(world / "masked.csv")] == [found]
+    refused = run("corner", "left", "right", *words)
+    assert refused.returncode == 2
+    assert "mask" in refused.stderr
 
 
 def test_camera(run: Run) -> None:

@@ -3,7 +3,7 @@
 The peer is what one writes from the textbook with NumPy alone: the paper's state, dynamics, observation and Jacobians
 (eqs. 28 to 31, appendix A.4), whole matrices F P F^T + G Q G^T, S, K. As a check, after ten steps it must be where
 `method="paper"` is. Prints the time of a step over the last steps of a drive: median, mean, 99th percentile and worst
-(of the default filter some steps linearise its memory anew), the mean over the whole drive, and the ratio of the peer's
+(of the default filter some steps relinearise its keyframes), the mean over the whole drive, and the ratio of the peer's
 median and mean to ours. Run it with OPENBLAS_NUM_THREADS=1.
 """
 

@@ -128,10 +128,15 @@ def steps(clean: np.ndarray, camera: Camera, found: Arcs) -> np.ndarray:
     levels = []
     for side in (-2.0, -1.0, 1.0, 2.0):
         places = camera.project(found.bearing + side * across).astype(np.float32)
-        levels.append(cv2.remap(clean, places[:, 0], places[:, 1], cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE))
+        # OpenCV looks up fewer than 2^15 places at once.
+        parts = [
+            cv2.remap(clean, *part.T, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE).ravel()
+            for part in np.array_split(places, 1 + len(places) // 30_000)
+        ]
+        levels.append(np.concatenate(parts).astype(float))
     below, above = np.minimum(levels[0], levels[1]), np.minimum(levels[2], levels[3])
     top_below, top_above = np.maximum(levels[0], levels[1]), np.maximum(levels[2], levels[3])
-    return np.maximum(top_above - below, top_below - above).ravel()
+    return np.maximum(top_above - below, top_below - above)
 
 
 def judge(

@@ -10,7 +10,7 @@ where nothing else is said.
 """
 
 import builtins
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, Final, Literal, Self, SupportsIndex, final
 
 import numpy as np
@@ -300,6 +300,9 @@ class ComplementaryFilter:
     `tiltvp.errors.InvalidInputError`.
     """
 
+    def __copy__(self) -> Self: ...
+    def __deepcopy__(self, _memo: Any) -> Self: ...
+    def __eq__(self, other: object, /) -> bool: ...
     def __new__(
         cls,
         reference_from_body: ArrayLike,
@@ -331,6 +334,10 @@ class ComplementaryFilter:
 
         Returns (3,): the difference that it found, as a rotation vector in the body's axes.
         """
+
+    @property
+    def options(self) -> dict[str, Any]:
+        """The options in force, by name, defaults included; a fresh dict, good as keywords."""
 
     def predict(self, rate_rad_s: ArrayLike, duration_s: float) -> None:
         """Turns on by a rate (3,), in the body's axes, that holds for so long."""
@@ -609,11 +616,11 @@ class CornerDetector:
 
     @property
     def method(self) -> str:
-        """The name of the front end."""
+        """The name of the method."""
 
     @property
     def options(self) -> dict[str, Any]:
-        """The options that are in force, by name, defaults included."""
+        """The options that are in force, by name, defaults included; a fresh dict, good as keywords."""
 
 @final
 class CornerEstimate:
@@ -1907,26 +1914,14 @@ class PixelRays:
 class PosteriorCorrection:
     """The mean and deviation of P(alpha | l) over a grid of shifts from zero, and the model of shifts behind it.
 
-    `train_posterior` makes them. Applying one is one interpolation; shifts beyond the grid have the answer of its end.
-    Frozen, comparable, hashable, pickled.
+    `train_posterior` makes them, `from_dict` from their parts. Applying one is one interpolation; shifts beyond the
+    grid have the answer of its end. Frozen, comparable, hashable, pickled.
     """
 
     def __copy__(self) -> Self: ...
     def __deepcopy__(self, _memo: Any) -> Self: ...
     def __eq__(self, other: object, /) -> bool: ...
     def __hash__(self) -> int: ...
-    def __new__(
-        cls,
-        *,
-        factor: float,
-        spread: float,
-        spread_per_rad: float,
-        stray_share: float,
-        stray_max: float,
-        step: float,
-        mean_rad: ArrayLike,
-        std_rad: ArrayLike,
-    ) -> Self: ...
     @property
     def factor(self) -> float:
         """Units of the shift per radian, by and large."""
@@ -2147,8 +2142,8 @@ class SelfCalibrator:
 
     `method` is "default", which does not diverge, or "paper", the filter of Scaramuzza 2009 exactly. `start` and
     `start_sigma` are (x_m, y_m, yaw_rad) of the mounting as it is thought to be, and standard deviations (3,) or
-    covariance (3, 3) of them. Landmarks that are not seen from the poses kept are forgotten: let `memory` keep a whole
-    drive's for loops to close.
+    covariance (3, 3) of them. Landmarks that are not seen from the poses kept are forgotten: let `keyframes_max` keep a
+    whole drive's for loops to close.
 
     Raises `tiltvp.errors.InvalidInputError` for options out of their domain or of the other method.
     """
@@ -2168,7 +2163,7 @@ class SelfCalibrator:
         start_distance_m: float | None = None,
         start_distance_log_sigma: float | None = None,
         gate_probability: float | None = None,
-        memory: SupportsIndex | None = None,
+        keyframes_max: SupportsIndex | None = None,
         step_sigma_m: float | None = None,
         step_sigma_rad: float | None = None,
         start_distance_sigma_m: float | None = None,
@@ -2198,7 +2193,7 @@ class SelfCalibrator:
             "default": Standard deviation of the logarithm of that distance: a factor of so many e. Default: 1.5.
         gate_probability
             "default": Probability with which a bearing passes the gate if its covariance is right. Default: 0.9999.
-        memory
+        keyframes_max
             "default": Size of the sliding window: keyframes that are kept and relinearised. The older half is
             marginalised when there are more. Default: 400.
         step_sigma_m
@@ -2224,7 +2219,7 @@ class SelfCalibrator:
 
     @property
     def options(self) -> dict[str, Any]:
-        """The options in force that the method reads, by name, defaults included; a fresh dict, good as keywords."""
+        """The options in force, by name, defaults included; a fresh dict, good as keywords."""
 
     def reset(self) -> None:
         """Forgets everything but the options."""
@@ -2344,12 +2339,7 @@ class StereoSequence:
         """
 
     def _imu(
-        self,
-        *,
-        rate_hz: float | None = None,
-        seed: SupportsIndex | None = None,
-        gyroscope: ArrayLike | None = None,
-        accelerometer: ArrayLike | None = None,
+        self, **options: Any
     ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
         """Readings of an inertial sensor: times, rates (M, 3), forces (M, 3), the rates' true biases (M, 3)."""
 
@@ -2585,8 +2575,9 @@ class TiltEstimator:
             "vector-consensus": From the raw angle to the angle: the factor `a'` of eq. 45, a line, a posterior, or
             none. Default: 1.
         sampling
-            "image-space-ransac", "vector-consensus": From which edge pixels samples are drawn: "uniform" from all
-            alike, "progressive" from a growing pool of the strongest (PROSAC, Chum and Matas 2005). Default: "uniform".
+            "image-space-ransac", "vector-consensus": From which observations samples are drawn: "uniform" from all
+            alike, "progressive" from a growing pool of the best, the strongest edge pixels (PROSAC, Chum and Matas
+            2005). Default: "uniform".
         local_optimization
             "image-space-ransac", "vector-consensus": Whether each new best model is improved by least squares before
             the next sample (LO-RANSAC, Chum, Matas and Kittler 2003). Default: False.
@@ -2899,14 +2890,7 @@ def corner_attitudes(feature: CornerFeature, gamma_rad: float, gamma_sigma_rad: 
     """Every attitude that a feature admits, with covariance; see `tiltvp.corner.attitudes`."""
 
 def corner_poses(
-    left: CornerFeature,
-    right: CornerFeature,
-    left_from_right: ArrayLike,
-    gamma_rad: float,
-    gamma_sigma_rad: float,
-    right_handed: bool | None,
-    priors: Iterable[Any],
-    fuse: bool,
+    left: CornerFeature, right: CornerFeature, left_from_right: ArrayLike, known: Mapping[str, Any], fuse: bool
 ) -> list[CornerPose]:
     """The poses that explain the features of a pair of cameras, the likeliest first; see `tiltvp.corner.poses`."""
 
@@ -2993,13 +2977,7 @@ def option_fields(owner: str, method: str | None = None) -> list[dict[str, Any]]
     """
 
 def resolve_corners(
-    features: Sequence[CornerFeature],
-    common_from_camera: Sequence[ArrayLike],
-    gamma_rad: float,
-    gamma_sigma_rad: float,
-    alignment: str,
-    right_handed: bool | None,
-    priors: Iterable[Any],
+    features: Sequence[CornerFeature], common_from_camera: Sequence[ArrayLike], known: Mapping[str, Any], alignment: str
 ) -> list[ResolvedAttitude]:
     """The attitudes that several features agree on, the likeliest first; see `tiltvp.corner.resolve`."""
 

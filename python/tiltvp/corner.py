@@ -194,7 +194,8 @@ def resolve(
     is no corner of that angle.
     """
     cameras = [np.eye(3)] * len(features) if common_from_camera is None else list(common_from_camera)
-    return _core.resolve_corners(list(features), cameras, gamma_rad, gamma_sigma_rad, alignment, right_handed, priors)
+    known = _known_beforehand(gamma_rad, gamma_sigma_rad, right_handed, priors)
+    return _core.resolve_corners(list(features), cameras, known, alignment)
 
 
 def poses(
@@ -215,7 +216,16 @@ def poses(
     `right_handed` and by `priors` (left camera's frame). With `fuse` the six rays are fused by least squares from
     there. Empty where either feature is no corner of that angle, and where the vertex is before neither camera.
     """
-    return _core.corner_poses(left, right, left_from_right, gamma_rad, gamma_sigma_rad, right_handed, priors, fuse)
+    known = _known_beforehand(gamma_rad, gamma_sigma_rad, right_handed, priors)
+    return _core.corner_poses(left, right, left_from_right, known, fuse)
+
+
+def _known_beforehand(
+    gamma_rad: float, gamma_sigma_rad: float, right_handed: bool | None, priors: Sequence[Prior]
+) -> dict[str, object]:
+    return {
+        "gamma_rad": gamma_rad, "gamma_sigma_rad": gamma_sigma_rad, "right_handed": right_handed, "priors": priors,
+    }  # fmt: skip
 
 
 def triangulate(

@@ -33,7 +33,8 @@ class CornerDetector(_core.CornerDetector):
 
     "coloured" finds the corner of a cuboid whose upper, left and right face are red, green and blue (`faces="rgb"`),
     "general" those of rooms, boxes and buildings, by line segments. Tables and scratch are made once; one detector
-    may be called from many threads at once; frozen, comparable, and to be pickled. `options` lists all options,
+    may be called from many threads at once; frozen, comparable, and to be pickled. `mask` (H, W) bool, for "general",
+    says which pixels may be used. `options` lists all options,
     docs/corner_images.md says what they mean.
     """
 

@@ -83,8 +83,8 @@ fn choices() -> Vec<TiltOptions> {
     for options in all.clone() {
         let mut other = options;
         match &mut other.method {
-            Method::ImageSpaceRansac(own) => own.correction = Correction::None,
-            Method::ImageSpaceRejectRefit(own) => own.correction = Correction::None,
+            Method::ImageSpaceRansac(own) => own.space.correction = Correction::None,
+            Method::ImageSpaceRejectRefit(own) => own.space.correction = Correction::None,
             Method::VectorConsensus(own) => {
                 (own.normal, own.correction) = (NormalKind::Tangent, TrainedCorrection::Factor(1.7));
             }

@@ -196,9 +196,9 @@ fn estimate(method: &str, correction: TrainedCorrection, alpha_rad: f64) -> Tilt
         Method::ImageSpaceRansac(own) => {
             // Ten pixels are for larger images: of this lens they would be more than the lean.
             own.threshold_px = 2.0;
-            own.correction = Correction::Trained(correction);
+            own.space.correction = Correction::Trained(correction);
         }
-        Method::ImageSpaceRejectRefit(own) => own.correction = Correction::Trained(correction),
+        Method::ImageSpaceRejectRefit(own) => own.space.correction = Correction::Trained(correction),
         Method::VectorConsensus(own) => own.correction = correction,
         Method::Refined(_) | Method::Segments(_) => panic!("{method} takes no correction"),
     }

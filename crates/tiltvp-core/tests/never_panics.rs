@@ -19,8 +19,9 @@ use tiltvp_core::robust::{LocalOptimization, SampleOrder, Sampling, Score};
 use tiltvp_core::segments::SegmentOptions;
 use tiltvp_core::testing::zoo;
 use tiltvp_core::tilt::{
-    CommonDirectionOptions, Correction, ImageSpaceRansacOptions, ImageSpaceRejectRefitOptions, Method, RefineOptions,
-    SegmentsOptions, TiltEstimator, TiltOptions, TrainedCorrection, VectorConsensusOptions, common_direction,
+    CommonDirectionOptions, Correction, ImageSpaceOptions, ImageSpaceRansacOptions, ImageSpaceRejectRefitOptions,
+    Method, RefineOptions, SegmentsOptions, TiltEstimator, TiltOptions, TrainedCorrection, VectorConsensusOptions,
+    common_direction,
 };
 
 /// The lenses of the zoo over images of a few thousand pixels: what is in pixels shrinks with them.
@@ -144,7 +145,8 @@ fn methods() -> impl Strategy<Value = Method> {
     prop_oneof![
         (number(0.1, 30.0), prop::option::of(number(1.0, 80.0)), correction(), sampling()).prop_map(
             |(threshold_px, offset_max_px, correction, sampling)| {
-                Method::ImageSpaceRansac(ImageSpaceRansacOptions { threshold_px, offset_max_px, correction, sampling })
+                let space = ImageSpaceOptions { offset_max_px, correction };
+                Method::ImageSpaceRansac(ImageSpaceRansacOptions { threshold_px, space, sampling })
             }
         ),
         (number(0.01, 0.99), prop::option::of(number(1.0, 80.0)), correction()).prop_map(
@@ -152,8 +154,7 @@ fn methods() -> impl Strategy<Value = Method> {
                 let own = ImageSpaceRejectRefitOptions::default();
                 Method::ImageSpaceRejectRefit(ImageSpaceRejectRefitOptions {
                     keep_fraction,
-                    offset_max_px,
-                    correction,
+                    space: ImageSpaceOptions { offset_max_px, correction },
                     ..own
                 })
             }

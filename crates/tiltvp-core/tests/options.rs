@@ -12,9 +12,9 @@ use tiltvp_core::geometry::Tilt;
 use tiltvp_core::options::{Field, Options, Value};
 use tiltvp_core::robust::{LocalOptimization, SampleOrder, Sampling, Score};
 use tiltvp_core::tilt::{
-    CommonDirectionOptions, Correction, ImageSpaceRansacOptions, ImageSpaceRejectRefitOptions, METHODS, Method,
-    RefineOptions, TiltEstimate, TiltEstimator, TiltOptions, TrainedCorrection, VectorConsensusOptions,
-    common_direction,
+    CommonDirectionOptions, Correction, ImageSpaceOptions, ImageSpaceRansacOptions, ImageSpaceRejectRefitOptions,
+    METHODS, Method, RefineOptions, TiltEstimate, TiltEstimator, TiltOptions, TrainedCorrection,
+    VectorConsensusOptions, common_direction,
 };
 
 const SIDE: u32 = 200;
@@ -179,13 +179,16 @@ fn every_number_of_the_sampling_is_read() {
     assert_ne!(with(&|s| s.score = Score::Msac), with(&|_| {}));
 }
 
+fn space(offset_max_px: f64, factor: f64) -> ImageSpaceOptions {
+    ImageSpaceOptions { offset_max_px: Some(offset_max_px), correction: Correction::factor(factor) }
+}
+
 /// A factor divides the lean and nothing else.
 #[test]
 fn factors_divide_the_lean() {
     let with = |factor| {
         let method = Method::ImageSpaceRejectRefit(ImageSpaceRejectRefitOptions {
-            offset_max_px: Some(40.0),
-            correction: Correction::factor(factor),
+            space: space(40.0, factor),
             ..ImageSpaceRejectRefitOptions::default()
         });
         estimate(TiltOptions { method, ..defaults("image-space-reject-refit") })
@@ -235,16 +238,14 @@ fn wrong_values_of_a_method_are_refused_by_name() {
         let ransac = |threshold_px, offset_max_px, factor| {
             Method::ImageSpaceRansac(ImageSpaceRansacOptions {
                 threshold_px,
-                offset_max_px: Some(offset_max_px),
-                correction: Correction::factor(factor),
+                space: space(offset_max_px, factor),
                 ..ImageSpaceRansacOptions::default()
             })
         };
         let trimming = |keep_fraction, offset_max_px, factor| {
             Method::ImageSpaceRejectRefit(ImageSpaceRejectRefitOptions {
                 keep_fraction,
-                offset_max_px: Some(offset_max_px),
-                correction: Correction::factor(factor),
+                space: space(offset_max_px, factor),
                 ..ImageSpaceRejectRefitOptions::default()
             })
         };
@@ -373,8 +374,8 @@ fn the_largest_offset_follows_the_lens() {
         let with = |offset: Option<f64>| {
             let mut options = defaults(method);
             match &mut options.method {
-                Method::ImageSpaceRansac(own) => own.offset_max_px = offset,
-                Method::ImageSpaceRejectRefit(own) => own.offset_max_px = offset,
+                Method::ImageSpaceRansac(own) => own.space.offset_max_px = offset,
+                Method::ImageSpaceRejectRefit(own) => own.space.offset_max_px = offset,
                 other => panic!("{other:?} has no offsets"),
             }
             options

@@ -110,8 +110,8 @@ fn every_kind_of_change_is_taken_up() {
         |o| o.row_stride = 3,
         |o| o.mask = Some(Mask::new(160, 160, (0..160 * 160).map(|i| i % 160 > 50).collect()).unwrap()),
         |o| match &mut o.method {
-            Method::ImageSpaceRansac(own) => own.correction = Correction::None,
-            Method::ImageSpaceRejectRefit(own) => own.correction = Correction::None,
+            Method::ImageSpaceRansac(own) => own.space.correction = Correction::None,
+            Method::ImageSpaceRejectRefit(own) => own.space.correction = Correction::None,
             Method::VectorConsensus(own) => own.normal = NormalKind::Tangent,
             Method::Refined(own) => own.scale_rad = 0.01,
             Method::Segments(own) => own.scatter_rad = 0.1,

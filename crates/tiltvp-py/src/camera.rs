@@ -9,6 +9,7 @@ use tiltvp_core::camera::{self as core, Kind, Model, Parameter};
 use crate::array::Array;
 use crate::call::{call, exception, invalid};
 use crate::convert;
+use crate::value::{frozen, getters};
 
 /// Points and their Jacobians.
 type Jacobians<'py> = (Array<'py, f64>, Array<'py, f64>);
@@ -63,36 +64,6 @@ impl Camera {
         Ok(Self { inner: build().map_err(|error| exception(&error))? })
     }
 
-    /// The name of the lens model.
-    #[getter]
-    fn model(&self) -> &'static str {
-        self.inner.model().name()
-    }
-
-    /// Columns of its images.
-    #[getter]
-    fn width(&self) -> u32 {
-        self.inner.width()
-    }
-
-    /// Rows of its images.
-    #[getter]
-    fn height(&self) -> u32 {
-        self.inner.height()
-    }
-
-    /// Largest angle in radians from the ray through the centre that has a pixel.
-    #[getter]
-    fn max_theta_rad(&self) -> f64 {
-        self.inner.max_theta_rad()
-    }
-
-    /// Whether the image is seen in a mirror: the z component of bearings is negated.
-    #[getter]
-    fn mirror(&self) -> bool {
-        self.inner.is_mirrored()
-    }
-
     /// The model's parameters by name, defaults included: numbers and lists of numbers.
     #[getter]
     fn parameters<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
@@ -136,8 +107,7 @@ impl Camera {
         let mut pixels = vec![[0.0; 2]; bearings.len()];
         let mut jacobians = vec![Matrix2x3::zeros(); bearings.len()];
         call(py, || self.inner.project_jacobian_all(&bearings, &mut pixels, &mut jacobians))?;
-        let flat: Vec<f64> = jacobians.iter().flat_map(|j| j.transpose().as_slice().to_vec()).collect();
-        Ok((convert::to_rows(py, &pixels, single)?, convert::to_matrices(py, &flat, [2, 3], single)?))
+        Ok((convert::to_rows(py, &pixels, single)?, convert::to_matrices(py, &jacobians, single)?))
     }
 
     /// Bearings as `unproject` gives them, and d bearing / d pixel: (N, 3, 2) or (3, 2).
@@ -147,8 +117,7 @@ impl Camera {
         let mut bearings = vec![[0.0; 3]; pixels.len()];
         let mut jacobians = vec![Matrix3x2::zeros(); pixels.len()];
         call(py, || self.inner.unproject_jacobian_all(&pixels, &mut bearings, &mut jacobians))?;
-        let flat: Vec<f64> = jacobians.iter().flat_map(|j| j.transpose().as_slice().to_vec()).collect();
-        Ok((convert::to_rows(py, &bearings, single)?, convert::to_matrices(py, &flat, [3, 2], single)?))
+        Ok((convert::to_rows(py, &bearings, single)?, convert::to_matrices(py, &jacobians, single)?))
     }
 
     /// Fresh (H, W) bool: the pixels that have a bearing.
@@ -233,26 +202,27 @@ impl Camera {
         Ok(format!("Camera(\"{}\", {})", slf.get().model(), items.join(", ")))
     }
 
-    fn __eq__(&self, other: &Bound<'_, PyAny>) -> bool {
-        other.cast::<Self>().is_ok_and(|other| self.inner == other.get().inner)
-    }
-
-    fn __hash__(slf: &Bound<'_, Self>) -> PyResult<isize> {
-        Self::__repr__(slf)?.into_pyobject(slf.py())?.hash()
-    }
-
     fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyTuple>> {
         (slf.get_type().getattr("from_dict")?, (Self::to_dict(slf)?,)).into_pyobject(slf.py())
     }
+}
 
-    fn __copy__<'py>(slf: &Bound<'py, Self>) -> Bound<'py, Self> {
-        slf.clone()
-    }
-
-    fn __deepcopy__<'py>(slf: &Bound<'py, Self>, _memo: &Bound<'py, PyAny>) -> Bound<'py, Self> {
-        slf.clone()
+getters! {
+    Camera as own {
+        /// The name of the lens model.
+        model: &'static str = own.inner.model().name(),
+        /// Columns of its images.
+        width: u32 = own.inner.width(),
+        /// Rows of its images.
+        height: u32 = own.inner.height(),
+        /// Largest angle in radians from the ray through the centre that has a pixel.
+        max_theta_rad: f64 = own.inner.max_theta_rad(),
+        /// Whether the image is seen in a mirror: the z component of bearings is negated.
+        mirror: bool = own.inner.is_mirrored(),
     }
 }
+
+frozen!(Camera, |own| &own.inner, |own| (own.model(), own.width(), own.height()));
 
 /// A number, or numbers in order. A truth value is neither.
 fn parameter(value: &Bound<'_, PyAny>, name: &str) -> PyResult<Parameter> {

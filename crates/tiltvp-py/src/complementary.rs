@@ -1,6 +1,6 @@
 //! `ComplementaryFilter`: rates of turn and a reference attitude, fused.
 
-use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::sync::Mutex;
 
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -10,6 +10,7 @@ use crate::array::Array;
 use crate::call::exception;
 use crate::convert;
 use crate::options;
+use crate::value::{changing, getters};
 
 /// Rates of turn in the short run, a reference attitude in the long run: `ComplementaryFilter(reference_from_body)`.
 ///
@@ -21,40 +22,23 @@ pub(crate) struct ComplementaryFilter {
     inner: Mutex<Filter>,
 }
 
-impl ComplementaryFilter {
-    fn lock(&self) -> MutexGuard<'_, Filter> {
-        self.inner.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-}
+changing!(ComplementaryFilter(Filter), |own| own);
 
 #[pymethods]
 impl ComplementaryFilter {
     #[new]
     #[pyo3(signature = (reference_from_body: "ArrayLike", **options: "Option | None"))]
     fn new(reference_from_body: &Bound<'_, PyAny>, options: Option<&Bound<'_, PyDict>>) -> PyResult<Self> {
-        let mut parsed = ComplementaryOptions::default();
-        options::set_given(&mut parsed, options)?;
+        let parsed = options::given(ComplementaryOptions::default(), options)?;
         let start = convert::matrix3(reference_from_body, "reference_from_body")?;
         let inner = Filter::new(parsed, &start).map_err(|error| exception(&error))?;
-        Ok(Self { inner: Mutex::new(inner) })
-    }
-
-    /// Time after which a difference from the reference has shrunk to 1/e, seconds.
-    #[getter]
-    fn time_constant_s(&self) -> f64 {
-        self.lock().options().time_constant_s
-    }
-
-    /// Time over which a lasting difference becomes a bias of the rates, seconds.
-    #[getter]
-    fn bias_time_constant_s(&self) -> f64 {
-        self.lock().options().bias_time_constant_s
+        Ok(inner.into())
     }
 
     /// (3, 3): the attitude now, which takes vectors of the body to the frame of the reference.
     #[getter]
     fn reference_from_body<'py>(&self, py: Python<'py>) -> PyResult<Array<'py, f64>> {
-        convert::to_matrices(py, self.lock().attitude().transpose().as_slice(), [3, 3], true)
+        convert::to_matrix(py, &self.lock().attitude())
     }
 
     /// (3,): the bias of the rates, in the body's axes.
@@ -82,5 +66,14 @@ impl ComplementaryFilter {
 
     fn __repr__(&self, py: Python<'_>) -> PyResult<String> {
         Ok(format!("ComplementaryFilter({})", options::shown(py, self.lock().options())?))
+    }
+}
+
+getters! {
+    ComplementaryFilter as own {
+        /// Time after which a difference from the reference has shrunk to 1/e, seconds.
+        time_constant_s: f64 = own.lock().options().time_constant_s,
+        /// Time over which a lasting difference becomes a bias of the rates, seconds.
+        bias_time_constant_s: f64 = own.lock().options().bias_time_constant_s,
     }
 }

@@ -8,7 +8,7 @@ use numpy::{
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use tiltvp_core::edges::Mask;
-use tiltvp_core::geometry::RigidMotion;
+use tiltvp_core::geometry::{RigidMotion, Tilt};
 use tiltvp_core::image::{ColorView, ImageView};
 
 use crate::array::Array;
@@ -87,6 +87,13 @@ pub(crate) fn matrix3(value: &Bound<'_, PyAny>, name: &str) -> PyResult<Matrix3<
 /// A `(3,)` vector.
 pub(crate) fn vector3(value: &Bound<'_, PyAny>, name: &str) -> PyResult<Vector3<f64>> {
     matrix(value, name)
+}
+
+/// A lean from the ground normal in the robot frame, `(3,)` of any length but zero.
+pub(crate) fn tilt(normal: &Bound<'_, PyAny>, name: &str) -> PyResult<Tilt> {
+    let vector = vector3(normal, name)?;
+    Tilt::from_normal(&vector)
+        .ok_or_else(|| invalid(format!("{name}: {:?}, expected a finite vector that is not zero", vector.as_slice())))
 }
 
 /// A rigid motion from a `(4, 4)` matrix.
@@ -204,20 +211,14 @@ pub(crate) fn to_rows<'py, const K: usize>(
     Ok(if single { Array::new(flat) } else { Array::new(flat.reshape([rows.len(), K])?) })
 }
 
-/// Fresh `(N, R, C)` array, or `(R, C)` for a single matrix, from matrices in row order.
-pub(crate) fn to_matrices<'py>(
+/// Fresh `(N, R, C)` array, or `(R, C)` for a single matrix.
+pub(crate) fn to_matrices<'py, const R: usize, const C: usize>(
     py: Python<'py>,
-    flat: &[f64],
-    shape: [usize; 2],
+    matrices: &[SMatrix<f64, R, C>],
     single: bool,
 ) -> PyResult<Array<'py, f64>> {
-    let array = PyArray1::from_slice(py, flat);
-    let [r, c] = shape;
-    Ok(if single {
-        Array::new(array.reshape([r, c])?)
-    } else {
-        Array::new(array.reshape([flat.len() / (r * c), r, c])?)
-    })
+    let array = PyArray1::from_vec(py, matrices.iter().flat_map(row_major).collect());
+    Ok(if single { Array::new(array.reshape([R, C])?) } else { Array::new(array.reshape([matrices.len(), R, C])?) })
 }
 
 /// Fresh `(R, C)` array, or `(R,)` of one column.

@@ -1,6 +1,5 @@
 //! `Drive`: a robot's way through a room, any frame of which can be rendered.
 
-use nalgebra::Matrix3;
 use numpy::PyArray1;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -12,7 +11,7 @@ use crate::camera::Camera;
 use crate::convert;
 use crate::options;
 use crate::synth::{Pictures, Room, pictures, threads_from};
-use crate::value::frozen;
+use crate::value::{frozen, getters};
 
 type Rows<'py> = Array<'py, f64>;
 type Sightings<'py> = (Array<'py, i64>, Rows<'py>, Rows<'py>, Rows<'py>, Rows<'py>);
@@ -43,8 +42,7 @@ impl Drive {
         if has("frames") && has("legs") {
             return Err(invalid("frames and legs, expected one of them: legs have as many frames as they need".into()));
         }
-        let mut parsed = DriveOptions::default();
-        options::set_given(&mut parsed, options)?;
+        let parsed = options::given(DriveOptions::default(), options)?;
         let threads = threads_from(threads)?;
         let (world, lens) = (room.get().world.clone(), camera.get().inner.clone());
         let inner = call(room.py(), || on_threads(threads, || tiltvp_synth::Drive::new(world, lens, parsed))?)?;
@@ -63,48 +61,6 @@ impl Drive {
         self.camera.clone_ref(py)
     }
 
-    /// N, how many frames it has; also its `len`.
-    #[getter]
-    fn frames(&self) -> usize {
-        self.inner.trajectory().poses.len()
-    }
-
-    /// The seed of everything but the room.
-    #[getter]
-    fn seed(&self) -> u64 {
-        self.inner.options().seed
-    }
-
-    /// Distance between the wheels, metres.
-    #[getter]
-    fn wheel_base_m(&self) -> f64 {
-        self.inner.options().wheels.base_m
-    }
-
-    /// Variance of a reading per metre that a wheel rolls, metres.
-    #[getter]
-    fn encoder_k_m(&self) -> f64 {
-        self.inner.options().wheels.encoder_k_m
-    }
-
-    /// How much larger the left and the right wheel are than the readings assume, relative.
-    #[getter]
-    fn wheel_radius_errors(&self) -> (f64, f64) {
-        self.inner.options().wheels.radius_errors.into()
-    }
-
-    /// Greatest lean from bumps, radians.
-    #[getter]
-    fn bumps_max_rad(&self) -> f64 {
-        self.inner.options().bumps_max_rad
-    }
-
-    /// How much the light changes along the way, from 0 to 1.
-    #[getter]
-    fn lighting(&self) -> f64 {
-        self.inner.options().lighting
-    }
-
     /// x_m, y_m, yaw_rad, height_m of the camera's centre on the robot.
     #[getter]
     fn mount(&self) -> (f64, f64, f64, f64) {
@@ -115,7 +71,7 @@ impl Drive {
     /// (3, 3): rotation from camera to robot coordinates, the mount's yaw included.
     #[getter]
     fn robot_from_camera<'py>(&self, py: Python<'py>) -> PyResult<Array<'py, f64>> {
-        matrix(py, &self.inner.options().robot_from_mounted_camera())
+        convert::to_matrix(py, &self.inner.options().robot_from_mounted_camera())
     }
 
     /// (N, 3): true x_m, y_m, yaw_rad of the robot. Integrating `true_odometry` along arcs gives them exactly.
@@ -226,6 +182,25 @@ impl Drive {
     }
 }
 
+getters! {
+    Drive as own {
+        /// N, how many frames it has; also its `len`.
+        frames: usize = own.inner.trajectory().poses.len(),
+        /// The seed of everything but the room.
+        seed: u64 = own.inner.options().seed,
+        /// Distance between the wheels, metres.
+        wheel_base_m: f64 = own.inner.options().wheels.base_m,
+        /// Variance of a reading per metre that a wheel rolls, metres.
+        encoder_k_m: f64 = own.inner.options().wheels.encoder_k_m,
+        /// How much larger the left and the right wheel are than the readings assume, relative.
+        wheel_radius_errors: (f64, f64) = own.inner.options().wheels.radius_errors.into(),
+        /// Greatest lean from bumps, radians.
+        bumps_max_rad: f64 = own.inner.options().bumps_max_rad,
+        /// How much the light changes along the way, from 0 to 1.
+        lighting: f64 = own.inner.options().lighting,
+    }
+}
+
 frozen!(Drive, |own| (&own.room.get().options, own.inner.camera(), own.inner.options()), |own| (
     own.frames(),
     own.inner.options().seed
@@ -235,8 +210,4 @@ impl Drive {
     fn frame(&self, frame: &Bound<'_, PyAny>) -> PyResult<usize> {
         convert::whole(frame, "frame", &format!("a whole number below {}", self.inner.trajectory().poses.len()))
     }
-}
-
-fn matrix<'py>(py: Python<'py>, matrix: &Matrix3<f64>) -> PyResult<Array<'py, f64>> {
-    convert::to_matrices(py, matrix.transpose().as_slice(), [3, 3], true)
 }

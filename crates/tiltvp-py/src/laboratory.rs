@@ -9,7 +9,7 @@ use tiltvp_synth::{LaboratoryOptions, World, on_threads};
 use crate::call::call;
 use crate::options;
 use crate::synth::{seed_from, threads_from};
-use crate::value::frozen;
+use crate::value::{frozen, getters};
 
 /// A plain room with a coloured cuboid, to be looked at by `tiltvp.synth.StereoSequence`.
 ///
@@ -31,48 +31,11 @@ impl Laboratory {
         threads: Option<&Bound<'_, PyAny>>,
         options: Option<&Bound<'_, PyDict>>,
     ) -> PyResult<Self> {
-        let mut parsed = LaboratoryOptions { seed: seed_from(seed)?, ..LaboratoryOptions::default() };
-        options::set_given(&mut parsed, options)?;
-        let options = parsed;
+        let options =
+            options::given(LaboratoryOptions { seed: seed_from(seed)?, ..LaboratoryOptions::default() }, options)?;
         let threads = threads_from(threads)?;
         let world = call(py, || on_threads(threads, || World::laboratory(&options))?)?;
         Ok(Self { options, world: Arc::new(world) })
-    }
-
-    /// The seed of everything in it.
-    #[getter]
-    fn seed(&self) -> u64 {
-        self.options.seed
-    }
-
-    /// Lengths of the cuboid's edges x, y, z, metres.
-    #[getter]
-    fn size_m(&self) -> (f64, f64, f64) {
-        self.options.size_m.into()
-    }
-
-    /// The angle between the cuboid's level edges, radians.
-    #[getter]
-    fn gamma_rad(&self) -> f64 {
-        self.options.gamma_rad
-    }
-
-    /// How full the walls are, from 0 to 1.
-    #[getter]
-    fn clutter(&self) -> f64 {
-        self.options.clutter
-    }
-
-    /// Power of the lamp beside the cuboid, from 0 to 1.
-    #[getter]
-    fn side_light(&self) -> f64 {
-        self.options.side_light
-    }
-
-    /// Spacing of the points where light was gathered, metres.
-    #[getter]
-    fn light_spacing_m(&self) -> f64 {
-        self.options.light_spacing_m
     }
 
     fn __repr__(&self, py: Python<'_>) -> PyResult<String> {
@@ -84,6 +47,23 @@ impl Laboratory {
     fn __getnewargs_ex__<'py>(&self, py: Python<'py>) -> PyResult<((u64,), Bound<'py, PyDict>)> {
         let keywords = options::in_force_without(py, &self.options, &["seed"])?;
         Ok(((self.options.seed,), keywords))
+    }
+}
+
+getters! {
+    Laboratory as own {
+        /// The seed of everything in it.
+        seed: u64 = own.options.seed,
+        /// Lengths of the cuboid's edges x, y, z, metres.
+        size_m: (f64, f64, f64) = own.options.size_m.into(),
+        /// The angle between the cuboid's level edges, radians.
+        gamma_rad: f64 = own.options.gamma_rad,
+        /// How full the walls are, from 0 to 1.
+        clutter: f64 = own.options.clutter,
+        /// Power of the lamp beside the cuboid, from 0 to 1.
+        side_light: f64 = own.options.side_light,
+        /// Spacing of the points where light was gathered, metres.
+        light_spacing_m: f64 = own.options.light_spacing_m,
     }
 }
 

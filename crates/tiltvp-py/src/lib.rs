@@ -12,6 +12,7 @@ mod laboratory;
 mod lines;
 mod options;
 mod rays;
+mod reader;
 mod scratch;
 mod segments;
 mod selfcalib;
@@ -72,9 +73,9 @@ mod _core {
     #[pymodule_export]
     use crate::tilt::{
         AffineCorrection, CommonDirection, EdgeElements, FilterStep, FilteredTilt, FitReport, ImageEdges,
-        PosteriorCorrection, PriorOfTilt, TiltEstimate, TiltEstimator, TiltFilter, apply_correction, common_direction,
-        leaning_from_upright, level_map, normal_from_alpha_beta, tilt_error_rad, tilt_from_wheel_heights, train_affine,
-        train_factor, train_posterior,
+        PosteriorCorrection, PriorOfTilt, TiltAlternative, TiltEstimate, TiltEstimator, TiltFilter, apply_correction,
+        common_direction, leaning_from_upright, level_map, normal_from_alpha_beta, tilt_error_rad,
+        tilt_from_wheel_heights, train_affine, train_factor, train_posterior,
     };
 
     #[pymodule_init]

@@ -4,11 +4,9 @@ mod matching;
 mod tracker;
 mod values;
 
-use nalgebra::Matrix3;
 use numpy::{PyArray1, PyArray2, PyArray3, PyArrayMethods};
 use pyo3::prelude::*;
-use pyo3::types::{PyDict, PyTuple};
-use tiltvp_core::geometry::Tilt;
+use pyo3::types::PyDict;
 use tiltvp_core::lines::{self as core, LineScratch};
 
 pub(crate) use self::matching::{descriptor_distances, match_descriptors, ssd_matrix, zncc_matrix};
@@ -19,8 +17,8 @@ use crate::call::{call, exception, invalid};
 use crate::camera::Camera;
 use crate::convert;
 use crate::options;
+use crate::reader::{self, image_reader};
 use crate::scratch::ScratchPool;
-use crate::value::frozen;
 
 /// Finds and describes the vertical lines of single images of one camera.
 ///
@@ -55,11 +53,8 @@ impl LineExtractor {
         robot_from_camera: Option<&Bound<'_, PyAny>>,
         options: Option<&Bound<'_, PyDict>>,
     ) -> PyResult<Self> {
-        let Ok(camera) = camera.cast::<Camera>() else {
-            return Err(invalid(format!("camera: {}, expected a tiltvp.Camera", camera.get_type().name()?)));
-        };
-        let rotation =
-            robot_from_camera.map_or(Ok(Matrix3::identity()), |r| convert::matrix3(r, "robot_from_camera"))?;
+        let camera = reader::camera(camera)?;
+        let rotation = reader::robot_from_camera(robot_from_camera)?;
         let mut parsed = core::LineOptions::for_method(method).map_err(|error| exception(&error))?;
         options::set(&mut parsed, options)?;
         let lens = camera.get().inner.clone();
@@ -67,28 +62,10 @@ impl LineExtractor {
         Ok(Self { inner, camera: camera.clone().unbind(), scratch: ScratchPool::default() })
     }
 
-    /// The camera whose images are read.
-    #[getter]
-    fn camera(&self, py: Python<'_>) -> Py<Camera> {
-        self.camera.clone_ref(py)
-    }
-
-    /// The name of the method.
-    #[getter]
-    fn method(&self) -> &'static str {
-        self.inner.options().method.name()
-    }
-
     /// Fresh (3, 3) float64: the rotation R in v_robot = R v_camera.
     #[getter]
     fn robot_from_camera<'py>(&self, py: Python<'py>) -> PyResult<Array<'py, f64>> {
         convert::to_matrix(py, self.inner.robot_from_camera())
-    }
-
-    /// The options that are in force, by name, defaults included; a fresh dict, good as keywords.
-    #[getter]
-    fn options<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        options::in_force(py, self.inner.options())
     }
 
     /// Lowest and highest elevation that descriptors cover: what most directions see of the band.
@@ -102,7 +79,7 @@ impl LineExtractor {
     fn _extract(&self, py: Python<'_>, image: &Bound<'_, PyAny>, normal: Option<&Bound<'_, PyAny>>) -> PyResult<Lines> {
         let image = convert::gray(image, "image")?;
         let (view, inner) = (convert::view(&image)?, &self.inner);
-        let tilt = normal.map(tilt_from).transpose()?;
+        let tilt = normal.map(|normal| convert::tilt(normal, "normal")).transpose()?;
         let lines = self.with_scratch(py, |scratch| {
             let mut lines = core::Lines::default();
             inner.extract(&view, tilt.as_ref(), scratch, &mut lines).map(|()| lines)
@@ -150,44 +127,13 @@ impl LineExtractor {
         if bearings.iter().any(|bearing| !bearing.is_finite()) {
             return Err(invalid("bearing_rad: not finite, expected angles".to_owned()));
         }
-        let tilt = normal.map(tilt_from).transpose()?;
+        let tilt = normal.map(|normal| convert::tilt(normal, "normal")).transpose()?;
         Ok(Lines::from(self.inner.lines_at(&bearings, tilt.as_ref())))
     }
 
     fn __repr__(&self, py: Python<'_>) -> PyResult<String> {
         Ok(format!("LineExtractor({}, method=\"{}\")", self.camera.bind(py).repr()?, self.method()))
     }
-
-    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyTuple>> {
-        let (py, this) = (slf.py(), slf.get());
-        let keywords = this.options(py)?;
-        keywords.set_item("method", this.method())?;
-        keywords.set_item("robot_from_camera", this.robot_from_camera(py)?)?;
-        let partial = py.import("functools")?.getattr("partial")?;
-        (partial.call((slf.get_type(), this.camera(py)), Some(&keywords))?, PyTuple::empty(py)).into_pyobject(py)
-    }
 }
 
-frozen!(LineExtractor, |own| (own.inner.camera(), own.inner.robot_from_camera(), own.inner.options()), |own| (
-    own.method(),
-    own.inner.camera().width(),
-    own.inner.camera().height()
-));
-
-impl LineExtractor {
-    fn with_scratch<R: Send>(
-        &self,
-        py: Python<'_>,
-        work: impl FnOnce(&mut LineScratch) -> Result<R, tiltvp_core::Error> + Send,
-    ) -> PyResult<R> {
-        self.scratch.with(py, || self.inner.scratch(), work)
-    }
-}
-
-/// The lean of a frame from its ground normal.
-fn tilt_from(normal: &Bound<'_, PyAny>) -> PyResult<Tilt> {
-    let normal = convert::vector3(normal, "normal")?;
-    Tilt::from_normal(&normal).ok_or_else(|| {
-        exception(&tiltvp_core::Error::argument("normal", format!("{normal:?}"), "a finite vector, not zero"))
-    })
-}
+image_reader!(LineExtractor, LineScratch, robot_from_camera);

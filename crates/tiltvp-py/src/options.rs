@@ -24,11 +24,12 @@ pub(crate) fn set(options: &mut dyn Options, given: Option<&Bound<'_, PyDict>>) 
     options.set_all(values).map_err(|error| exception(&error))
 }
 
-/// Sets the user's values, of which `None` stands for the default.
-pub(crate) fn set_given(options: &mut dyn Options, given: Option<&Bound<'_, PyDict>>) -> PyResult<()> {
+/// Options with the user's values, of which `None` stands for the default.
+pub(crate) fn given<T: Options>(mut options: T, given: Option<&Bound<'_, PyDict>>) -> PyResult<T> {
     let pairs = given.into_iter().flat_map(PyDictMethods::iter).filter(|(_, value)| !value.is_none());
     let values = pairs.map(|(key, value)| Ok((key.extract()?, to_value(&value)?))).collect::<PyResult<_>>()?;
-    options.set_all(values).map_err(|error| exception(&error))
+    options.set_all(values).map_err(|error| exception(&error))?;
+    Ok(options)
 }
 
 /// The options in force by name, in a fresh dict that is good as keywords.

@@ -5,7 +5,7 @@ mod log;
 mod mounting;
 mod step;
 
-use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::sync::Mutex;
 
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict, PyTuple};
@@ -21,12 +21,13 @@ use crate::array::Array;
 use crate::call::{call, exception, invalid};
 use crate::convert;
 use crate::options;
+use crate::value::changing;
 
 /// Estimates where a camera sits on a robot, step by step while it drives past landmarks. Changes as it goes.
 ///
 /// `method` is "default", which does not diverge, or "paper", the filter of Scaramuzza 2009 exactly. `start` and
 /// `start_sigma` are (x_m, y_m, yaw_rad) of the mounting as it is thought to be, and standard deviations (3,) or
-/// covariance (3, 3) of them. Landmarks that are not seen from the poses kept are forgotten: let `memory` keep a whole
+/// covariance (3, 3) of them. Landmarks that are not seen from the poses kept are forgotten: let `keyframes_max` keep a whole
 /// drive's for loops to close.
 ///
 /// Raises `tiltvp.errors.InvalidInputError` for options out of their domain or of the other method.
@@ -35,27 +36,17 @@ pub(crate) struct SelfCalibrator {
     inner: Mutex<core::SelfCalibrator>,
 }
 
-impl SelfCalibrator {
-    fn lock(&self) -> MutexGuard<'_, core::SelfCalibrator> {
-        self.inner.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-}
+changing!(SelfCalibrator(core::SelfCalibrator), |own| own);
 
 #[pymethods]
 impl SelfCalibrator {
     #[new]
     #[pyo3(signature = (*, wheel_base_m, **options: "Option | None"))]
     fn new(wheel_base_m: f64, options: Option<&Bound<'_, PyDict>>) -> PyResult<Self> {
-        let mut parsed = SelfCalibratorOptions { wheel_base_m, ..SelfCalibratorOptions::default() };
-        options::set_given(&mut parsed, options)?;
+        let parsed =
+            options::given(SelfCalibratorOptions { wheel_base_m, ..SelfCalibratorOptions::default() }, options)?;
         let inner = core::SelfCalibrator::new(parsed).map_err(|error| exception(&error))?;
-        Ok(Self { inner: Mutex::new(inner) })
-    }
-
-    /// The options in force that the method reads, by name, defaults included; a fresh dict, good as keywords.
-    #[getter]
-    fn options<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        options::in_force(py, self.lock().options())
+        Ok(inner.into())
     }
 
     /// Moves by the wheels' displacements, then looks: bearings (N,) of the landmarks of those whole numbers (N,).
@@ -131,17 +122,6 @@ impl SelfCalibrator {
         self.lock().reset().map_err(|error| exception(&error))
     }
 
-    fn __eq__(&self, other: &Bound<'_, PyAny>) -> bool {
-        let Ok(other) = other.cast::<Self>() else { return false };
-        // One at a time: a calibrator may be compared with itself.
-        let mine = self.lock().clone();
-        mine == *other.get().lock()
-    }
-
-    fn __copy__(&self) -> Self {
-        Self { inner: Mutex::new(self.lock().clone()) }
-    }
-
     /// Sets what pickle has kept.
     fn __setstate__(&self, state: &[u8]) -> PyResult<()> {
         let kept =
@@ -155,10 +135,6 @@ impl SelfCalibrator {
         let make = py.import("functools")?.getattr("partial")?.call((slf.get_type(),), Some(&this.options(py)?))?;
         let state = postcard::to_stdvec(&*this.lock()).map_err(|error| invalid(format!("state: {error}")))?;
         (make, PyTuple::empty(py), PyBytes::new(py, &state)).into_pyobject(py)
-    }
-
-    fn __deepcopy__(&self, _memo: &Bound<'_, PyAny>) -> Self {
-        self.__copy__()
     }
 
     fn __repr__(&self) -> String {
@@ -210,9 +186,9 @@ pub(crate) fn calibrate(
     times_s: Option<&Bound<'_, PyAny>>,
     options: Option<&Bound<'_, PyDict>>,
 ) -> PyResult<LogCalibration> {
-    let mut parsed = LogOptions::default();
-    parsed.filter.wheel_base_m = wheel_base_m;
-    options::set_given(&mut parsed, options)?;
+    let mut usual = LogOptions::default();
+    usual.filter.wheel_base_m = wheel_base_m;
+    let parsed = options::given(usual, options)?;
     let (readings, seen) = log(odometry, bearings)?;
     let times = times_s.map(|times| convert::vector(times, "times_s")).transpose()?;
     let found = call(py, || core::calibrate_log(&parsed, &readings, times.as_deref(), &seen))?;

@@ -2,13 +2,13 @@
 
 use std::sync::Arc;
 
-use nalgebra::{Isometry3, Vector3};
+use nalgebra::{Isometry3, Matrix2, Matrix2x3, Vector3};
 use numpy::{PyArray1, PyArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use tiltvp_synth::{
-    ColorImage, CornerSighting, ImuChannel, ImuOptions, LaboratoryOptions, RoomOptions, StereoOptions, World,
-    imu_readings, on_threads,
+    ColorImage, CornerSighting, ImuOptions, LaboratoryOptions, RoomOptions, StereoOptions, World, imu_readings,
+    on_threads,
 };
 
 use crate::array::Array;
@@ -17,8 +17,8 @@ use crate::camera::Camera;
 use crate::convert;
 use crate::laboratory::Laboratory;
 use crate::options;
-use crate::synth::{Room, seed_from, threads_from};
-use crate::value::{frozen, of_class};
+use crate::synth::{Room, threads_from};
+use crate::value::{frozen, getters, of_class};
 
 /// Position, directions of the edges x, y, z in rows, their lengths, and the kind, of a corner.
 type CornerParts = ([f64; 3], [[f64; 3]; 3], [f64; 3], &'static str);
@@ -60,8 +60,7 @@ impl StereoSequence {
         threads: Option<&Bound<'_, PyAny>>,
         options: Option<&Bound<'_, PyDict>>,
     ) -> PyResult<Self> {
-        let mut parsed = StereoOptions::default();
-        options::set_given(&mut parsed, options)?;
+        let parsed = options::given(StereoOptions::default(), options)?;
         let world = world_of(scene)?;
         let cameras = [left.get().inner.clone(), right.get().inner.clone()];
         let threads = threads_from(threads)?;
@@ -83,30 +82,6 @@ impl StereoSequence {
     #[getter]
     fn cameras(&self, py: Python<'_>) -> (Py<Camera>, Py<Camera>) {
         (self.left.clone_ref(py), self.right.clone_ref(py))
-    }
-
-    /// The seed of motion and noise.
-    #[getter]
-    fn seed(&self) -> u64 {
-        self.inner.options().seed
-    }
-
-    /// Which of the scene's corners is looked at.
-    #[getter]
-    fn corner(&self) -> usize {
-        self.inner.corner()
-    }
-
-    /// Frames per second.
-    #[getter]
-    fn frame_rate_hz(&self) -> f64 {
-        self.inner.options().frame_rate_hz
-    }
-
-    /// How long the shutter is open, seconds.
-    #[getter]
-    fn exposure_s(&self) -> f64 {
-        self.inner.options().exposure_s
     }
 
     /// (4, 4): the right camera's pose in the left one's frame.
@@ -172,36 +147,19 @@ impl StereoSequence {
     ) -> PyResult<Sightings<'py>> {
         let (frame, threads) = (self.frame(frame)?, threads_from(threads)?);
         let seen = call(py, || on_threads(threads, || self.inner.sightings(frame))?)?;
-        let vertices = seen.iter().flat_map(|s: &CornerSighting| s.vertex_px.iter().flat_map(|p| [p.x, p.y]));
-        let lengths = seen.iter().flat_map(|s| s.edges_px.as_flattened().iter().copied());
+        let vertices = |s: &CornerSighting| Matrix2::from_columns(&s.vertex_px).transpose();
+        let lengths = |s: &CornerSighting| Matrix2x3::from_row_slice(s.edges_px.as_flattened());
         Ok((
             Array::new(PyArray1::from_vec(py, seen.iter().map(|s| s.corner as i64).collect())),
-            convert::to_matrices(py, &vertices.collect::<Vec<f64>>(), [2, 2], false)?,
-            convert::to_matrices(py, &lengths.collect::<Vec<f64>>(), [2, 3], false)?,
+            convert::to_matrices(py, &seen.iter().map(vertices).collect::<Vec<_>>(), false)?,
+            convert::to_matrices(py, &seen.iter().map(lengths).collect::<Vec<_>>(), false)?,
         ))
     }
 
     /// Readings of an inertial sensor: times, rates (M, 3), forces (M, 3), the rates' true biases (M, 3).
-    #[pyo3(signature = (
-        *, rate_hz=None, seed: "SupportsIndex | None" = None, gyroscope: "ArrayLike | None" = None,
-        accelerometer: "ArrayLike | None" = None,
-    ))]
-    fn _imu<'py>(
-        &self,
-        py: Python<'py>,
-        rate_hz: Option<f64>,
-        seed: Option<&Bound<'py, PyAny>>,
-        gyroscope: Option<&Bound<'py, PyAny>>,
-        accelerometer: Option<&Bound<'py, PyAny>>,
-    ) -> PyResult<Readings<'py>> {
-        let own = ImuOptions::default();
-        let options = ImuOptions {
-            rate_hz: rate_hz.unwrap_or(own.rate_hz),
-            seed: seed.map_or(Ok(own.seed), seed_from)?,
-            gyroscope: gyroscope.map_or(Ok(own.gyroscope), |channel| channel_from(channel, "gyroscope"))?,
-            accelerometer: accelerometer
-                .map_or(Ok(own.accelerometer), |channel| channel_from(channel, "accelerometer"))?,
-        };
+    #[pyo3(signature = (**options: "Any"))]
+    fn _imu<'py>(&self, py: Python<'py>, options: Option<&Bound<'py, PyDict>>) -> PyResult<Readings<'py>> {
+        let options = options::given(ImuOptions::default(), options)?;
         let duration_s = self.inner.time_s(self.__len__() - 1);
         let readings = call(py, || imu_readings(self.inner.motion(), duration_s, &options))?;
         let rows = |value: fn(&tiltvp_synth::ImuReading) -> Vector3<f64>| {
@@ -234,6 +192,19 @@ impl StereoSequence {
     }
 }
 
+getters! {
+    StereoSequence as own {
+        /// The seed of motion and noise.
+        seed: u64 = own.inner.options().seed,
+        /// Which of the scene's corners is looked at.
+        corner: usize = own.inner.corner(),
+        /// Frames per second.
+        frame_rate_hz: f64 = own.inner.options().frame_rate_hz,
+        /// How long the shutter is open, seconds.
+        exposure_s: f64 = own.inner.options().exposure_s,
+    }
+}
+
 frozen!(StereoSequence, |own| (own.options_of_scene(), own.inner.cameras(), own.inner.options()), |own| (
     own.__len__(),
     own.inner.options().seed
@@ -263,21 +234,9 @@ fn world_of(scene: &Bound<'_, PyAny>) -> PyResult<Arc<World>> {
     Err(invalid(format!("scene: a {}, expected a Laboratory or a Room", scene.get_type().name()?)))
 }
 
-fn channel_from(channel: &Bound<'_, PyAny>, name: &str) -> PyResult<ImuChannel> {
-    match convert::vector(channel, name)?.as_slice() {
-        &[noise_density, bias_sigma, bias_walk, scale_sigma, range] => {
-            Ok(ImuChannel { noise_density, bias_sigma, bias_walk, scale_sigma, range })
-        }
-        other => Err(invalid(format!(
-            "{name}: {} numbers, expected noise density, bias, bias walk, scale error and range",
-            other.len()
-        ))),
-    }
-}
-
 fn to_poses<'py>(py: Python<'py>, poses: &[Isometry3<f64>], single: bool) -> PyResult<Array<'py, f64>> {
-    let flat: Vec<f64> = poses.iter().flat_map(|pose| pose.to_homogeneous().transpose().as_slice().to_vec()).collect();
-    convert::to_matrices(py, &flat, [4, 4], single)
+    let matrices: Vec<_> = poses.iter().map(Isometry3::to_homogeneous).collect();
+    convert::to_matrices(py, &matrices, single)
 }
 
 fn picture(py: Python<'_>, image: ColorImage) -> PyResult<Picture<'_>> {

@@ -2,20 +2,20 @@
 
 use std::sync::Arc;
 
-use nalgebra::{Matrix3, Vector2};
+use nalgebra::{Matrix3, Matrix3x2, Vector2};
 use numpy::{PyArray1, PyArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use tiltvp_core::camera::Camera as CoreCamera;
 use tiltvp_core::geometry::Tilt;
-use tiltvp_synth::{Image, Lens, RenderOptions, RobotPose, RoomKind, RoomOptions, View, World, on_threads};
+use tiltvp_synth::{Image, Lens, RenderOptions, RobotPose, RoomKind, RoomOptions, Segment, View, World, on_threads};
 
 use crate::array::Array;
 use crate::call::{call, exception, invalid};
 use crate::camera::Camera;
 use crate::convert;
 use crate::options;
-use crate::value::frozen;
+use crate::value::{frozen, getters};
 
 pub(crate) type Pictures<'py> = (Array<'py, u8>, Array<'py, u8>);
 
@@ -45,65 +45,9 @@ impl Room {
     ) -> PyResult<Self> {
         let kind: RoomKind = kind.parse().map_err(|error| exception(&error))?;
         let (seed, threads) = (seed_from(seed)?, threads_from(threads)?);
-        let mut parsed = RoomOptions::new(kind, seed);
-        options::set_given(&mut parsed, options)?;
-        let options = parsed;
+        let options = options::given(RoomOptions::new(kind, seed), options)?;
         let world = call(py, || on_threads(threads, || World::new(&options))?)?;
         Ok(Self { options, world: Arc::new(world) })
-    }
-
-    /// Which of `ROOM_KINDS` it is.
-    #[getter]
-    fn kind(&self) -> &'static str {
-        self.options.kind.name()
-    }
-
-    /// The seed of everything in it.
-    #[getter]
-    fn seed(&self) -> u64 {
-        self.options.seed
-    }
-
-    /// How full it is, from 0 to 1.
-    #[getter]
-    fn clutter(&self) -> f64 {
-        self.options.clutter
-    }
-
-    /// Brightness of the day outside, from 0 to 1.
-    #[getter]
-    fn daylight(&self) -> f64 {
-        self.options.daylight
-    }
-
-    /// Spacing of the points where light was gathered, metres.
-    #[getter]
-    fn light_spacing_m(&self) -> f64 {
-        self.options.light_spacing_m
-    }
-
-    /// How many times larger the floor is than the kind's own.
-    #[getter]
-    fn extent(&self) -> f64 {
-        self.options.extent
-    }
-
-    /// How much the floor shines, from 0 to 1.
-    #[getter]
-    fn floor_gloss(&self) -> f64 {
-        self.options.floor_gloss
-    }
-
-    /// Which of `WALL_PATTERNS` its walls have in common.
-    #[getter]
-    fn wall_pattern(&self) -> &'static str {
-        self.options.wall_pattern.name()
-    }
-
-    /// Height of the ceiling, metres.
-    #[getter]
-    fn height_m(&self) -> f64 {
-        self.world.height_m()
     }
 
     /// (N, 2): the corners of the floor, counter-clockwise, metres.
@@ -116,9 +60,9 @@ impl Room {
     /// (N, 2, 3): lower and upper ends of the vertical edges of walls and furniture, visible or not, metres.
     #[getter]
     fn vertical_edges_m<'py>(&self, py: Python<'py>) -> PyResult<Array<'py, f64>> {
-        let ends = self.world.vertical_edges().iter().flat_map(|edge| [edge.bottom, edge.top]);
-        let flat: Vec<f64> = ends.flat_map(<[f64; 3]>::from).collect();
-        convert::to_matrices(py, &flat, [2, 3], false)
+        let ends = |edge: &Segment| Matrix3x2::from_columns(&[edge.bottom, edge.top]).transpose();
+        let edges: Vec<_> = self.world.vertical_edges().iter().map(ends).collect();
+        convert::to_matrices(py, &edges, false)
     }
 
     /// Whether a round robot of 0.22 m radius and less than 0.4 m height can stand with its centre there.
@@ -152,10 +96,9 @@ impl Room {
         threads: Option<&Bound<'py, PyAny>>,
         options: Option<&Bound<'py, PyDict>>,
     ) -> PyResult<Pictures<'py>> {
-        let mut shot = Shot::default();
-        options::set_given(&mut shot, options)?;
+        let shot = options::given(Shot::default(), options)?;
         shot.check()?;
-        let (options, threads) = (shot.rendering(), threads_from(threads)?);
+        let (options, threads) = (shot.rendering.clone(), threads_from(threads)?);
         let camera = &camera.get().inner;
         let image = call(py, || {
             let lens = |x: f64, y: f64| camera.unproject(&Vector2::new(x, y));
@@ -174,9 +117,8 @@ impl Room {
         threads: Option<&Bound<'py, PyAny>>,
         options: Option<&Bound<'py, PyDict>>,
     ) -> PyResult<Pictures<'py>> {
-        let mut shot = Shot::default();
-        options::set_given(&mut shot, options)?;
-        let (pose, options) = (shot.pose(), shot.rendering());
+        let shot = options::given(Shot::default(), options)?;
+        let (pose, options) = (shot.pose(), shot.rendering.clone());
         let height: u16 = convert::whole(height, "height", "a whole number of pixels")?;
         let threads = threads_from(threads)?;
         let image = call(py, || {
@@ -196,17 +138,16 @@ impl Room {
         contrast_min: f64,
         options: Option<&Bound<'py, PyDict>>,
     ) -> PyResult<(Array<'py, f64>, Array<'py, f64>)> {
-        let mut shot = Shot::default();
-        options::set_given(&mut shot, options)?;
+        let shot = options::given(Shot::default(), options)?;
         shot.check()?;
         let camera = &camera.get().inner;
         let edges = call(py, || {
             let view = shot.view(&|_, _| None, camera);
             self.world.straight_edges(camera, &view, contrast_min)
         })?;
-        let flat: Vec<f64> = edges.iter().flat_map(|edge| edge.ends).flat_map(<[f64; 3]>::from).collect();
+        let ends: Vec<_> = edges.iter().map(|edge| Matrix3x2::from_columns(&edge.ends).transpose()).collect();
         let contrasts = edges.iter().map(|edge| edge.contrast).collect();
-        Ok((convert::to_matrices(py, &flat, [2, 3], false)?, Array::new(PyArray1::from_vec(py, contrasts))))
+        Ok((convert::to_matrices(py, &ends, false)?, Array::new(PyArray1::from_vec(py, contrasts))))
     }
 
     fn __repr__(&self, py: Python<'_>) -> PyResult<String> {
@@ -218,6 +159,29 @@ impl Room {
     fn __getnewargs_ex__<'py>(&self, py: Python<'py>) -> PyResult<((&'static str, u64), Bound<'py, PyDict>)> {
         let keywords = options::in_force_without(py, &self.options, &["kind", "seed"])?;
         Ok(((self.options.kind.name(), self.options.seed), keywords))
+    }
+}
+
+getters! {
+    Room as own {
+        /// Which of `ROOM_KINDS` it is.
+        kind: &'static str = own.options.kind.name(),
+        /// The seed of everything in it.
+        seed: u64 = own.options.seed,
+        /// How full it is, from 0 to 1.
+        clutter: f64 = own.options.clutter,
+        /// Brightness of the day outside, from 0 to 1.
+        daylight: f64 = own.options.daylight,
+        /// Spacing of the points where light was gathered, metres.
+        light_spacing_m: f64 = own.options.light_spacing_m,
+        /// How many times larger the floor is than the kind's own.
+        extent: f64 = own.options.extent,
+        /// How much the floor shines, from 0 to 1.
+        floor_gloss: f64 = own.options.floor_gloss,
+        /// Which of `WALL_PATTERNS` its walls have in common.
+        wall_pattern: &'static str = own.options.wall_pattern.name(),
+        /// Height of the ceiling, metres.
+        height_m: f64 = own.world.height_m(),
     }
 }
 
@@ -249,12 +213,8 @@ tiltvp_core::options! {
         robot_from_camera: Matrix3<f64> = Matrix3::identity();
         /// Height of the camera's centre, metres; none for the usual one.
         camera_height_m: Option<f64> = None;
-        /// Standard deviation of Gaussian noise, grey levels.
-        noise_sigma: f64 = 0.0;
-        /// Rays per pixel side.
-        samples: usize = RenderOptions::default().samples;
-        /// Seed of the noise.
-        seed: u64 = 0;
+        /// How it becomes an image.
+        [flat] rendering: RenderOptions = RenderOptions::default();
     }
 }
 
@@ -279,11 +239,6 @@ impl Shot {
         view.tilt = Tilt::from_alpha_beta(self.alpha_rad, self.beta_rad);
         view.camera_height_m = self.camera_height_m.unwrap_or(view.camera_height_m);
         view
-    }
-
-    fn rendering(&self) -> RenderOptions {
-        let Self { noise_sigma, samples, seed, .. } = *self;
-        RenderOptions { noise_sigma, samples, seed, ..RenderOptions::default() }
     }
 }
 

@@ -11,10 +11,9 @@ mod values;
 
 use std::sync::Arc;
 
-use nalgebra::Matrix3;
 use numpy::{PyArray1, PyArrayMethods};
 use pyo3::prelude::*;
-use pyo3::types::{PyDict, PyTuple};
+use pyo3::types::PyDict;
 use tiltvp_core::geometry::{Tilt, WheelLayout};
 use tiltvp_core::tilt::{self as core, Scratch};
 
@@ -22,7 +21,7 @@ pub(crate) use self::correction::{
     AffineCorrection, PosteriorCorrection, PriorOfTilt, apply_correction, train_affine, train_factor, train_posterior,
 };
 pub(crate) use self::direction::{CommonDirection, common_direction};
-pub(crate) use self::estimate::{EdgeElements, TiltEstimate};
+pub(crate) use self::estimate::{EdgeElements, TiltAlternative, TiltEstimate};
 pub(crate) use self::filter::TiltFilter;
 pub(crate) use self::filtered::{FilterStep, FilteredTilt};
 pub(crate) use self::image_edges::ImageEdges;
@@ -32,8 +31,8 @@ use crate::call::{call, exception, invalid};
 use crate::camera::Camera;
 use crate::convert;
 use crate::options;
+use crate::reader::{self, image_reader};
 use crate::scratch::ScratchPool;
-use crate::value::frozen;
 
 /// Estimates how far and in which direction a robot leans from single images of one camera.
 ///
@@ -75,11 +74,8 @@ impl TiltEstimator {
         if let Some(like) = _like {
             return like.get().with_options(py, options);
         }
-        let Ok(camera) = camera.cast::<Camera>() else {
-            return Err(invalid(format!("camera: {}, expected a tiltvp.Camera", camera.get_type().name()?)));
-        };
-        let rotation =
-            robot_from_camera.map_or(Ok(Matrix3::identity()), |r| convert::matrix3(r, "robot_from_camera"))?;
+        let camera = reader::camera(camera)?;
+        let rotation = reader::robot_from_camera(robot_from_camera)?;
         let mut parsed = core::TiltOptions::for_method(method).map_err(|error| exception(&error))?;
         options::set(&mut parsed, options)?;
         let lens = camera.get().inner.clone();
@@ -88,28 +84,10 @@ impl TiltEstimator {
         Ok(Self { inner, camera: camera.clone().unbind(), given, scratch: Arc::default() })
     }
 
-    /// The camera whose images are read.
-    #[getter]
-    fn camera(&self, py: Python<'_>) -> Py<Camera> {
-        self.camera.clone_ref(py)
-    }
-
-    /// The name of the method.
-    #[getter]
-    fn method(&self) -> &'static str {
-        self.inner.options().method.name()
-    }
-
     /// Fresh (3, 3) float64: the rotation R in v_robot = R v_camera.
     #[getter]
     fn robot_from_camera<'py>(&self, py: Python<'py>) -> PyResult<Array<'py, f64>> {
         convert::to_matrix(py, self.inner.robot_from_camera())
-    }
-
-    /// The options that are in force, by name, defaults included; a fresh dict, good as keywords.
-    #[getter]
-    fn options<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        options::in_force(py, self.inner.options())
     }
 
     /// How many pixels are looked at: those of the elevation band, clear of the rim, the border and the mask.
@@ -159,6 +137,25 @@ impl TiltEstimator {
         Ok((TiltEstimate::from(estimate), EdgeElements::new(&elements, size)))
     }
 
+    /// (K, 3), (K, F): directions that may be up in such an image and what tells which is, for training.
+    #[pyo3(signature = (image: "NDArray[np.uint8]") -> "tuple[NDArray[np.float64], NDArray[np.float64]]")]
+    fn _hypotheses<'py>(
+        &self,
+        py: Python<'py>,
+        image: &Bound<'_, PyAny>,
+    ) -> PyResult<(Array<'py, f64>, Array<'py, f64>)> {
+        let image = convert::gray(image, "image")?;
+        let (view, inner) = (convert::view(&image)?, &self.inner);
+        let found = self.with_scratch(py, |scratch| inner.hypotheses(&view, scratch))?;
+        let (n, width) = (found.len(), found.first().map_or(0, |(_, features)| features.len()));
+        let ups = found.iter().flat_map(|(up, _)| up.iter().copied());
+        let features = found.iter().flat_map(|(_, features)| features.iter().copied());
+        Ok((
+            Array::new(PyArray1::from_iter(py, ups).reshape([n, 3])?),
+            Array::new(PyArray1::from_iter(py, features).reshape([n, width])?),
+        ))
+    }
+
     /// The tilts of many such images, in their order, the same for any number of threads.
     #[pyo3(signature = (images: "list[NDArray[np.uint8]]", *, threads: "int | None" = None))]
     #[expect(clippy::needless_pass_by_value, reason = "what the interpreter hands over is owned")]
@@ -187,22 +184,9 @@ impl TiltEstimator {
         }
         Ok(text + ")")
     }
-
-    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyTuple>> {
-        let (py, this) = (slf.py(), slf.get());
-        let keywords = this.options(py)?;
-        keywords.set_item("method", this.method())?;
-        keywords.set_item("robot_from_camera", this.robot_from_camera(py)?)?;
-        let partial = py.import("functools")?.getattr("partial")?;
-        (partial.call((slf.get_type(), this.camera(py)), Some(&keywords))?, PyTuple::empty(py)).into_pyobject(py)
-    }
 }
 
-frozen!(TiltEstimator, |own| (own.inner.camera(), own.inner.robot_from_camera(), own.inner.options()), |own| (
-    own.method(),
-    own.inner.camera().width(),
-    own.inner.camera().height()
-));
+image_reader!(TiltEstimator, Scratch, robot_from_camera);
 
 impl TiltEstimator {
     /// An estimator of the same camera with some options changed, which shares tables and scratch where they are the same.
@@ -221,21 +205,6 @@ impl TiltEstimator {
         let scratch = if shares { Arc::clone(&self.scratch) } else { Arc::default() };
         Ok(Self { inner, camera: self.camera.clone_ref(py), given, scratch })
     }
-
-    fn with_scratch<R: Send>(
-        &self,
-        py: Python<'_>,
-        work: impl FnOnce(&mut Scratch) -> Result<R, tiltvp_core::Error> + Send,
-    ) -> PyResult<R> {
-        self.scratch.with(py, || self.inner.scratch(), work)
-    }
-}
-
-/// A tilt from the ground normal in the robot frame.
-fn tilt_from(normal: &Bound<'_, PyAny>, name: &str) -> PyResult<Tilt> {
-    let vector = convert::vector3(normal, name)?;
-    Tilt::from_normal(&vector)
-        .ok_or_else(|| invalid(format!("{name}: {:?}, expected a finite vector that is not zero", vector.as_slice())))
 }
 
 /// (H, W, 2): where each pixel (u, v) of the upright image is found in the leaning one; NaN where it was not seen.
@@ -251,8 +220,8 @@ pub(crate) fn level_map<'py>(
     normal: &Bound<'py, PyAny>,
     robot_from_camera: Option<&Bound<'py, PyAny>>,
 ) -> PyResult<Bound<'py, PyAny>> {
-    let tilt = tilt_from(normal, "normal")?;
-    let rotation = robot_from_camera.map_or(Ok(Matrix3::identity()), |r| convert::matrix3(r, "robot_from_camera"))?;
+    let tilt = convert::tilt(normal, "normal")?;
+    let rotation = reader::robot_from_camera(robot_from_camera)?;
     let camera = &camera.get().inner;
     let map = call(py, || core::level_map(camera, &rotation, &tilt))?;
     let shape = [camera.height() as usize, camera.width() as usize, 2];
@@ -263,7 +232,7 @@ pub(crate) fn level_map<'py>(
 #[pyfunction]
 #[pyo3(signature = (a: "ArrayLike", b: "ArrayLike"))]
 pub(crate) fn tilt_error_rad(a: &Bound<'_, PyAny>, b: &Bound<'_, PyAny>) -> PyResult<f64> {
-    Ok(tilt_from(a, "a")?.angle_to(&tilt_from(b, "b")?))
+    Ok(convert::tilt(a, "a")?.angle_to(&convert::tilt(b, "b")?))
 }
 
 /// (3,): the ground normal of a lean, (-sin a cos b, -sin a sin b, cos a) (eq. 1).
@@ -301,5 +270,5 @@ pub(crate) fn tilt_from_wheel_heights(
 #[pyfunction]
 #[pyo3(signature = (normal: "ArrayLike"))]
 pub(crate) fn leaning_from_upright<'py>(py: Python<'py>, normal: &Bound<'py, PyAny>) -> PyResult<Array<'py, f64>> {
-    convert::to_matrix(py, &tilt_from(normal, "normal")?.leaning_from_upright())
+    convert::to_matrix(py, &convert::tilt(normal, "normal")?.leaning_from_upright())
 }

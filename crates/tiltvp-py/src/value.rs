@@ -202,6 +202,72 @@ macro_rules! frozen {
 }
 pub(crate) use frozen;
 
+/// Attributes of plain numbers, words and tuples, `name: type = expression,` each.
+macro_rules! getters {
+    ($class:ident as $own:ident { $($(#[$doc:meta])* $name:ident: $type:ty = $get:expr,)* }) => {
+        #[pyo3::pymethods]
+        impl $class {
+            $(
+                $(#[$doc])*
+                #[getter]
+                fn $name(&self) -> $type {
+                    let $own = self;
+                    $get
+                }
+            )*
+        }
+    };
+}
+pub(crate) use getters;
+
+/// What classes that change as they go have: one core object behind a lock, its options, copies, and equality by what tells two
+/// of them apart.
+macro_rules! changing {
+    ($class:ident($($inner:ident)::+), |$own:ident| $same:expr) => {
+        impl $class {
+            fn lock(&self) -> std::sync::MutexGuard<'_, $($inner)::+> {
+                self.inner.lock().unwrap_or_else(std::sync::PoisonError::into_inner)
+            }
+        }
+
+        impl From<$($inner)::+> for $class {
+            fn from(inner: $($inner)::+) -> Self {
+                Self { inner: std::sync::Mutex::new(inner) }
+            }
+        }
+
+        #[pyo3::pymethods]
+        impl $class {
+            /// The options in force, by name, defaults included; a fresh dict, good as keywords.
+            #[getter]
+            fn options<'py>(&self, py: pyo3::Python<'py>) -> pyo3::PyResult<pyo3::Bound<'py, pyo3::types::PyDict>> {
+                $crate::options::in_force(py, self.lock().options())
+            }
+
+            fn __eq__(&self, other: &pyo3::Bound<'_, pyo3::PyAny>) -> bool {
+                fn same($own: &$($inner)::+) -> impl PartialEq + use<'_> {
+                    $same
+                }
+                let Some(other) = $crate::value::of_class::<Self>(other) else { return false };
+                // One at a time: it may be compared with itself.
+                let own = self.lock().clone();
+                let other = other.lock();
+                let equal = same(&own) == same(&other);
+                equal
+            }
+
+            fn __copy__(&self) -> Self {
+                Self::from(self.lock().clone())
+            }
+
+            fn __deepcopy__(&self, _memo: &pyo3::Bound<'_, pyo3::PyAny>) -> Self {
+                self.__copy__()
+            }
+        }
+    };
+}
+pub(crate) use changing;
+
 /// `Class(field=value, ...)` of the fields that can be read.
 pub(crate) fn text(class: &str, fields: &[(&str, Option<String>)]) -> String {
     let shown = fields.iter().filter_map(|(name, value)| Some(format!("{name}={}", value.as_ref()?)));

@@ -170,7 +170,7 @@ impl DriveOptions {
             samples: self.samples,
             blur_sigma_px: self.blur_sigma_px,
             noise_sigma: self.noise_sigma,
-            exposure: Exposure::Auto { mean_level },
+            exposure: Exposure::auto(mean_level),
             seed: self.seed ^ (frame as u64 + 1).rotate_left(40),
             ..RenderOptions::default()
         }

@@ -2,7 +2,8 @@
 //! noise, wrong scales, a limited range and 16 bits.
 
 use nalgebra::{Matrix3, Vector3};
-use tiltvp_core::{Error, Result};
+use tiltvp_core::options::{Kind, OptionValue, Value};
+use tiltvp_core::{Error, Result, options};
 
 use crate::handheld::Handheld;
 use crate::rng::Rng;
@@ -41,50 +42,49 @@ impl ImuChannel {
         scale_sigma: 0.005,
         range: 2.0 * GRAVITY_M_S2,
     };
+}
 
-    fn validate(&self, names: [&'static str; 2]) -> Result<()> {
-        let small = [self.noise_density, self.bias_sigma, self.bias_walk, self.scale_sigma];
+/// As (noise_density, bias_sigma, bias_walk, scale_sigma, range).
+impl OptionValue for ImuChannel {
+    const KIND: Kind = Kind::Array(&[5]);
+
+    fn to_value(&self) -> Value {
+        [self.noise_density, self.bias_sigma, self.bias_walk, self.scale_sigma, self.range].to_value()
+    }
+
+    fn from_value(value: &Value) -> Option<Self> {
+        let [noise_density, bias_sigma, bias_walk, scale_sigma, range] = OptionValue::from_value(value)?;
+        Some(Self { noise_density, bias_sigma, bias_walk, scale_sigma, range })
+    }
+}
+
+options! {
+    /// How the sensor is: equal options give equal readings of the same motion.
+    #[derive(Copy)]
+    pub struct ImuOptions {
+        /// Readings per second.
+        rate_hz: f64 = 200.0 => 10.0..=8000.0, "hertz in [10, 8000]";
+        /// Seed of biases and noise.
+        seed: u64 = 0;
+        /// Rates of turn, rad/s: noise density, bias, bias walk, scale error and range.
+        gyroscope: ImuChannel = ImuChannel::GYROSCOPE;
+        /// Specific forces, m/s^2: the same.
+        accelerometer: ImuChannel = ImuChannel::ACCELEROMETER;
+    }
+    check channels_are_possible
+}
+
+fn channels_are_possible(options: &ImuOptions) -> Result<()> {
+    for (name, channel) in [("gyroscope", &options.gyroscope), ("accelerometer", &options.accelerometer)] {
+        let small = [channel.noise_density, channel.bias_sigma, channel.bias_walk, channel.scale_sigma];
         if let Some(value) = small.iter().find(|value| !(0.0..=10.0).contains(*value)) {
-            return Err(Error::option(names[0], value, "noise, bias, walk and scale errors in [0, 10]"));
+            return Err(Error::option(name, value, "noise, bias, walk and scale errors in [0, 10]"));
         }
-        if !(1e-3..=1e4).contains(&self.range) {
-            return Err(Error::option(names[1], self.range, "a range in [0.001, 10000]"));
+        if !(1e-3..=1e4).contains(&channel.range) {
+            return Err(Error::option(name, channel.range, "a range in [0.001, 10000]"));
         }
-        Ok(())
     }
-}
-
-/// How the sensor is: equal options give equal readings of the same motion.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct ImuOptions {
-    /// Readings per second, within `[10, 8000]`; 200 by default.
-    pub rate_hz: f64,
-    /// Seed of biases and noise; 0 by default.
-    pub seed: u64,
-    /// Rates of turn, rad/s.
-    pub gyroscope: ImuChannel,
-    /// Specific forces, m/s^2.
-    pub accelerometer: ImuChannel,
-}
-
-impl Default for ImuOptions {
-    fn default() -> Self {
-        Self { rate_hz: 200.0, seed: 0, gyroscope: ImuChannel::GYROSCOPE, accelerometer: ImuChannel::ACCELEROMETER }
-    }
-}
-
-impl ImuOptions {
-    /// Checks every field's domain.
-    ///
-    /// # Errors
-    /// [`Error::InvalidOption`] for the first field outside its domain.
-    pub fn validate(&self) -> Result<()> {
-        if !(10.0..=8000.0).contains(&self.rate_hz) {
-            return Err(Error::option("imu.rate_hz", self.rate_hz, "hertz in [10, 8000]"));
-        }
-        self.gyroscope.validate(["imu.gyroscope", "imu.gyroscope.range"])?;
-        self.accelerometer.validate(["imu.accelerometer", "imu.accelerometer.range"])
-    }
+    Ok(())
 }
 
 /// One reading, in the axes of the left camera and at its centre.

@@ -62,7 +62,7 @@ pub use stereo::{CornerSighting, StereoSequence};
 pub use stereo_options::StereoOptions;
 pub use straight::StraightEdge;
 pub use threads::on_threads;
-pub use tone::{ColorImage, Exposure, Image, RenderOptions};
+pub use tone::{AutoExposure, ColorImage, Exposure, FixedExposure, Image, RenderOptions};
 pub use trajectory::Trajectory;
 pub use view::{Lens, RobotPose, View};
 pub use world::{Hit, World};

@@ -60,7 +60,7 @@ impl StereoOptions {
             samples: self.samples,
             blur_sigma_px: self.blur_sigma_px,
             noise_sigma: self.noise_sigma,
-            exposure: Exposure::Fixed { gain: self.gain },
+            exposure: Exposure::fixed(self.gain),
             seed: self.seed ^ (2 * frame as u64 + 1 + eye).rotate_left(40),
             ..RenderOptions::default()
         }

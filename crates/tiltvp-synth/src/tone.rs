@@ -1,92 +1,71 @@
 //! From light to grey levels: exposure, blur, gamma, noise.
 
 use rayon::prelude::*;
-use tiltvp_core::{Error, Result};
+use tiltvp_core::options::{Between, POSITIVE};
+use tiltvp_core::{methods, options};
 
 use crate::rng::Rng;
 use crate::texture::luminance;
 
-/// How light becomes brightness.
-#[derive(Debug, Clone, Copy, PartialEq)]
-#[non_exhaustive]
-pub enum Exposure {
-    /// Like a camera's automatic: the mean level of the valid pixels becomes `mean_level`, in `(0, 1)` of full scale,
-    /// unless that would wash out more than a tenth of them.
-    Auto {
-        /// The mean level in `(0, 1)` of full scale.
-        mean_level: f64,
-    },
-    /// Radiance times `gain`; white in the room's light has a radiance of 1, display white is 1.
-    Fixed {
-        /// The factor, positive.
-        gain: f64,
-    },
-}
-
-/// How a view becomes an image.
-#[derive(Debug, Clone, PartialEq)]
-pub struct RenderOptions {
-    /// Rays per pixel side, within `[1, 8]`: 3 casts 9 rays per pixel, each at a random place of its own ninth; 3 by default.
-    pub samples: usize,
-    /// Standard deviation of a Gaussian blur, pixels; 0 by default, for none.
-    pub blur_sigma_px: f64,
-    /// Standard deviation of Gaussian noise, grey levels of 255, independent in the grey image and each colour; 0 by default.
-    pub noise_sigma: f64,
-    /// Exposure; automatic to a mean level of 0.45 by default.
-    pub exposure: Exposure,
-    /// Exponent of the display curve, `level = light^(1/gamma)`, within `[0.5, 4]`; 2.2 by default.
-    pub gamma: f64,
-    /// Loss of light at 90 degrees off the axis, in `[0, 1]`, growing with the square of the angle; 0.25 by default.
-    pub vignetting: f64,
-    /// Seed of ray places and noise; 0 by default.
-    pub seed: u64,
-}
-
-impl Default for RenderOptions {
-    fn default() -> Self {
-        Self {
-            samples: 3,
-            blur_sigma_px: 0.0,
-            noise_sigma: 0.0,
-            exposure: Exposure::Auto { mean_level: 0.45 },
-            gamma: 2.2,
-            vignetting: 0.25,
-            seed: 0,
-        }
+options! {
+    /// Like a camera's automatic: no more than a tenth of the valid pixels are washed out.
+    #[derive(Copy)]
+    pub struct AutoExposure {
+        /// What the mean level of the valid pixels becomes, of full scale.
+        mean_level: f64 = 0.45 => Between(0.0, 1.0), "a level within (0, 1)";
     }
 }
 
-impl RenderOptions {
-    /// Checks every field's domain.
-    ///
-    /// # Errors
-    /// [`Error::InvalidOption`] for the first field outside its domain.
-    pub fn validate(&self) -> Result<()> {
-        if !(1..=8).contains(&self.samples) {
-            return Err(Error::option("render.samples", self.samples, "rays per pixel side in [1, 8]"));
-        }
-        if !(0.0..=50.0).contains(&self.blur_sigma_px) {
-            return Err(Error::option("render.blur_sigma_px", self.blur_sigma_px, "pixels in [0, 50]"));
-        }
-        if !(0.0..=255.0).contains(&self.noise_sigma) {
-            return Err(Error::option("render.noise_sigma", self.noise_sigma, "grey levels in [0, 255]"));
-        }
-        match self.exposure {
-            Exposure::Auto { mean_level } if !(mean_level > 0.0 && mean_level < 1.0) => {
-                return Err(Error::option("render.exposure.mean_level", mean_level, "a level within (0, 1)"));
-            }
-            Exposure::Fixed { gain } if !(gain > 0.0 && gain.is_finite()) => {
-                return Err(Error::option("render.exposure.gain", gain, "a positive number"));
-            }
-            _ => {}
-        }
-        if !(0.5..=4.0).contains(&self.gamma) {
-            return Err(Error::option("render.gamma", self.gamma, "an exponent in [0.5, 4]"));
-        }
-        if !(0.0..=1.0).contains(&self.vignetting) {
-            return Err(Error::option("render.vignetting", self.vignetting, "a share in [0, 1]"));
-        }
-        Ok(())
+options! {
+    /// The same for every view.
+    #[derive(Copy)]
+    pub struct FixedExposure {
+        /// Factor on radiance; white in the room's light has a radiance of 1, display white is 1.
+        gain: f64 = 1.0 => POSITIVE, "a positive number";
+    }
+}
+
+methods! {
+    /// How light becomes brightness.
+    #[derive(Copy)]
+    #[non_exhaustive]
+    pub enum Exposure {
+        /// By the light in the view.
+        Auto(AutoExposure) = "auto",
+        /// By a factor.
+        Fixed(FixedExposure) = "fixed",
+    }
+}
+
+impl Exposure {
+    /// So that the mean level of the valid pixels becomes `mean_level`, in `(0, 1)` of full scale.
+    pub const fn auto(mean_level: f64) -> Self {
+        Self::Auto(AutoExposure { mean_level })
+    }
+
+    /// Radiance times `gain`.
+    pub const fn fixed(gain: f64) -> Self {
+        Self::Fixed(FixedExposure { gain })
+    }
+}
+
+options! {
+    /// How a view becomes an image.
+    pub struct RenderOptions {
+        /// Rays per pixel side: 3 casts 9 rays per pixel, each at a random place of its own ninth.
+        samples: usize = 3 => 1.0..=8.0, "rays per pixel side in [1, 8]";
+        /// Standard deviation of a Gaussian blur, pixels; 0 for none.
+        blur_sigma_px: f64 = 0.0 => 0.0..=50.0, "pixels in [0, 50]";
+        /// Standard deviation of Gaussian noise, grey levels of 255, independent in the grey image and each colour.
+        noise_sigma: f64 = 0.0 => 0.0..=255.0, "grey levels in [0, 255]";
+        /// How light becomes brightness.
+        [flat] exposure: Exposure = Exposure::auto(0.45);
+        /// Exponent of the display curve, `level = light^(1/gamma)`.
+        gamma: f64 = 2.2 => 0.5..=4.0, "an exponent in [0.5, 4]";
+        /// Loss of light at 90 degrees off the axis, growing with the square of the angle.
+        vignetting: f64 = 0.25 => 0.0..=1.0, "a share in [0, 1]";
+        /// Seed of ray places and noise.
+        seed: u64 = 0;
     }
 }
 
@@ -122,15 +101,20 @@ pub(crate) struct Film {
 }
 
 impl Film {
-    /// Blurs, exposes and quantises. Pixels that the lens does not reach are 0, without noise.
-    pub(crate) fn develop(mut self, options: &RenderOptions) -> Image {
+    /// Blurs, and returns the factor from light to brightness.
+    fn blurred_and_exposed(&mut self, options: &RenderOptions) -> f64 {
         if options.blur_sigma_px > 0.0 {
             self.blur(options.blur_sigma_px);
         }
-        let gain = match options.exposure {
-            Exposure::Fixed { gain } => gain,
-            Exposure::Auto { mean_level } => self.automatic_gain(mean_level, options.gamma),
-        };
+        match options.exposure {
+            Exposure::Fixed(FixedExposure { gain }) => gain,
+            Exposure::Auto(AutoExposure { mean_level }) => self.automatic_gain(mean_level, options.gamma),
+        }
+    }
+
+    /// Blurs, exposes and quantises. Pixels that the lens does not reach are 0, without noise.
+    pub(crate) fn develop(mut self, options: &RenderOptions) -> Image {
+        let gain = self.blurred_and_exposed(options);
         let (width, height) = (self.width, self.light.len() / self.width);
         let (mut gray, mut rgb) = (vec![0u8; width * height], vec![0u8; 3 * width * height]);
         gray.par_chunks_mut(width).zip(rgb.par_chunks_mut(3 * width)).enumerate().for_each(
@@ -158,13 +142,7 @@ impl Film {
     /// [`develop`](Self::develop) for colours alone and a fixed exposure, from tables: quicker by an order of magnitude, at
     /// 1/50 of a level.
     pub(crate) fn develop_color(mut self, options: &RenderOptions) -> ColorImage {
-        if options.blur_sigma_px > 0.0 {
-            self.blur(options.blur_sigma_px);
-        }
-        let gain = match options.exposure {
-            Exposure::Fixed { gain } => gain,
-            Exposure::Auto { mean_level } => self.automatic_gain(mean_level, options.gamma),
-        };
+        let gain = self.blurred_and_exposed(options);
         let (curve, noise) = (Curve::new(options.gamma), normal_quantiles(options.noise_sigma));
         let (width, height) = (self.width, self.light.len() / self.width);
         let mut bgr = vec![0u8; 3 * width * height];

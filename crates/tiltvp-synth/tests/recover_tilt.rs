@@ -166,57 +166,41 @@ const ALL: [Bound; METHODS.len()] = [
     Bound { method: "vector-consensus", each: 5.0, mean: 2.2 },
 ];
 
-#[test]
-fn looking_up() {
-    let setup = Setup {
+/// A camera near the floor that looks up.
+fn upward() -> Setup {
+    Setup {
         name: "upward",
         camera: fisheye(),
         robot_from_camera: Matrix3::identity(),
         height_m: 0.3,
         band_deg: (0.0, 45.0),
         confidence: 0.4,
-    };
-    check(&setup, &ALL);
+    }
+}
+
+#[test]
+fn looking_up() {
+    check(&upward(), &ALL);
 }
 
 #[test]
 fn looking_up_and_turned() {
-    let setup = Setup {
-        name: "turned by 30 degrees",
-        camera: fisheye(),
-        robot_from_camera: about_vertical(30.0),
-        height_m: 0.3,
-        band_deg: (0.0, 45.0),
-        confidence: 0.4,
-    };
+    let setup = Setup { name: "turned by 30 degrees", robot_from_camera: about_vertical(30.0), ..upward() };
     check(&setup, &ALL);
 }
 
 /// An upward camera under a convex mirror: its centre looks down, the band is below the horizon, the picture is a mirror image.
 #[test]
 fn under_a_convex_mirror() {
-    let setup = Setup {
-        name: "mirrored",
-        camera: fisheye().mirrored(),
-        robot_from_camera: Matrix3::identity(),
-        height_m: 1.3,
-        band_deg: (-45.0, 0.0),
-        confidence: 0.4,
-    };
+    let setup =
+        Setup { name: "mirrored", camera: fisheye().mirrored(), height_m: 1.3, band_deg: (-45.0, 0.0), ..upward() };
     check(&setup, &ALL);
 }
 
 /// The image-space methods need a lens about the vertical. Only half of the horizon is seen, so the edges tell less of the lean.
 #[test]
 fn looking_forward() {
-    let setup = Setup {
-        name: "forward",
-        camera: fisheye(),
-        robot_from_camera: forward(),
-        height_m: 1.0,
-        band_deg: (0.0, 45.0),
-        confidence: 0.1,
-    };
+    let setup = Setup { name: "forward", robot_from_camera: forward(), height_m: 1.0, confidence: 0.1, ..upward() };
     check(
         &setup,
         &[
@@ -228,14 +212,7 @@ fn looking_forward() {
 
 #[test]
 fn a_blank_image_has_no_tilt_and_says_why() {
-    let setup = Setup {
-        name: "blank",
-        camera: fisheye(),
-        robot_from_camera: Matrix3::identity(),
-        height_m: 0.3,
-        band_deg: (0.0, 45.0),
-        confidence: 0.4,
-    };
+    let setup = upward();
     for method in METHODS {
         let found = estimate(&setup.estimator(method), &vec![127; SIZE.0 * SIZE.1]);
         assert_eq!((found.tilt, found.confidence, found.edge_pixels), (None, 0.0, 0), "{method}");

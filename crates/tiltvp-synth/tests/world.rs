@@ -166,8 +166,8 @@ fn every_render_option_changes_the_picture() {
         RenderOptions { samples: 2, ..base.clone() },
         RenderOptions { blur_sigma_px: 1.0, ..base.clone() },
         RenderOptions { noise_sigma: 2.0, ..base.clone() },
-        RenderOptions { exposure: Exposure::Fixed { gain: 0.2 }, ..base.clone() },
-        RenderOptions { exposure: Exposure::Auto { mean_level: 0.2 }, ..base.clone() },
+        RenderOptions { exposure: Exposure::fixed(0.2), ..base.clone() },
+        RenderOptions { exposure: Exposure::auto(0.2), ..base.clone() },
         RenderOptions { gamma: 1.0, ..base.clone() },
         RenderOptions { vignetting: 0.8, ..base.clone() },
         RenderOptions { seed: 1, ..base.clone() },
@@ -181,7 +181,7 @@ fn every_render_option_changes_the_picture() {
 #[test]
 fn every_room_option_changes_the_world() {
     let base = RoomOptions { light_spacing_m: 0.6, ..RoomOptions::new(RoomKind::LivingRoom, 4) };
-    let options = RenderOptions { samples: 1, exposure: Exposure::Fixed { gain: 0.7 }, ..RenderOptions::default() };
+    let options = RenderOptions { samples: 1, exposure: Exposure::fixed(0.7), ..RenderOptions::default() };
     let picture = |room: &RoomOptions| {
         let world = World::new(room).unwrap();
         let (x_m, y_m) = (1.6, 1.2);
@@ -219,13 +219,13 @@ fn wrong_options_are_refused_by_name() {
     refused("plaid".parse::<WallPattern>().map(|_| ()), "wall_pattern");
     refused(RoomOptions { light_spacing_m: 0.0, ..room }.validate(), "light_spacing_m");
     let base = RenderOptions::default();
-    refused(RenderOptions { samples: 0, ..base.clone() }.validate(), "render.samples");
-    refused(RenderOptions { blur_sigma_px: -1.0, ..base.clone() }.validate(), "render.blur_sigma_px");
-    refused(RenderOptions { noise_sigma: f64::INFINITY, ..base.clone() }.validate(), "render.noise_sigma");
-    refused(RenderOptions { gamma: 0.0, ..base.clone() }.validate(), "render.gamma");
-    refused(RenderOptions { vignetting: 2.0, ..base.clone() }.validate(), "render.vignetting");
-    let exposure = Exposure::Fixed { gain: 0.0 };
-    refused(RenderOptions { exposure, ..base }.validate(), "render.exposure.gain");
+    refused(RenderOptions { samples: 0, ..base.clone() }.validate(), "samples");
+    refused(RenderOptions { blur_sigma_px: -1.0, ..base.clone() }.validate(), "blur_sigma_px");
+    refused(RenderOptions { noise_sigma: f64::INFINITY, ..base.clone() }.validate(), "noise_sigma");
+    refused(RenderOptions { gamma: 0.0, ..base.clone() }.validate(), "gamma");
+    refused(RenderOptions { vignetting: 2.0, ..base.clone() }.validate(), "vignetting");
+    let exposure = Exposure::fixed(0.0);
+    refused(RenderOptions { exposure, ..base }.validate(), "gain");
     refused("kitchen".parse::<RoomKind>().map(|_| ()), "kind");
     for kind in RoomKind::ALL {
         assert_eq!(kind.name().parse::<RoomKind>(), Ok(kind));
@@ -254,7 +254,7 @@ fn floors_shine_as_asked() {
         let base = RoomOptions { light_spacing_m: 0.6, daylight: 0.0, ..RoomOptions::new(RoomKind::Office, 4) };
         World::new(&RoomOptions { floor_gloss, ..base }).unwrap()
     };
-    let options = RenderOptions { samples: 1, exposure: Exposure::Fixed { gain: 0.3 }, ..RenderOptions::default() };
+    let options = RenderOptions { samples: 1, exposure: Exposure::fixed(0.3), ..RenderOptions::default() };
     let (matt, glossy) = (room(0.0), room(1.0));
     let pose = matt.free_poses(1, 0).unwrap()[0];
     let floor =

@@ -12,7 +12,7 @@ from cyclopts import Group, Parameter, validators
 
 from tiltvp._core import CORNER_METHODS
 from tiltvp.cli.frames import Frames, open_frames
-from tiltvp.cli.library_options import LibraryOptions, from_library
+from tiltvp.cli.library_options import LibraryOptions, from_library, mask_from
 from tiltvp.cli.options import image_size_from
 from tiltvp.cli.tables import Table, check_ending, check_plot, write_table
 from tiltvp.cli.terminal import named, progress_bar, say
@@ -33,6 +33,14 @@ _ANGLE = Parameter(validator=validators.Number(gt=0, lt=180))
 @from_library({"CornerDetector": CORNER_METHODS, "CornerPoseEstimator": ()}, but=("gamma_rad", "down"))
 class CornerOptions(LibraryOptions):
     """How corners are found and told apart."""
+
+    mask: Path | None = None
+    """For general: image of the cameras' size, white where the world is seen and black where it is not; of a pair, for
+    both images."""
+
+    def given(self) -> dict[str, Any]:
+        """The keywords of the library."""
+        return super().given() | ({} if self.mask is None else {"mask": mask_from(self.mask)})
 
 
 _OPTIONS = CornerOptions()

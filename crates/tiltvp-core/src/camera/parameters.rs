@@ -3,6 +3,7 @@
 use super::schema::{Kind, LensSchema, Parameter, Parametric, Resize};
 use super::{Entry, LENSES, Model, with_model};
 use crate::error::{Error, Result};
+use crate::options::edit_distance;
 
 impl Model {
     /// The names of all models.
@@ -153,31 +154,4 @@ fn unknown(model: &'static str, what: &str, name: &str, known: impl Iterator<Ite
         .collect();
     let hint = if near.is_empty() { String::new() } else { format!(" (did you mean {}?)", near.join(" or ")) };
     Error::camera(model, what.to_owned(), format!("\"{name}\"{hint}"), format!("one of: {}", list(known)))
-}
-
-/// Levenshtein's number of insertions, deletions and replacements of a character.
-fn edit_distance(a: &str, b: &str) -> usize {
-    let b: Vec<char> = b.chars().collect();
-    let mut row: Vec<usize> = (0..=b.len()).collect();
-    for (i, x) in a.chars().enumerate() {
-        let mut diagonal = row[0];
-        row[0] = i + 1;
-        for (j, y) in b.iter().enumerate() {
-            let replaced = diagonal + usize::from(x != *y);
-            diagonal = row[j + 1];
-            row[j + 1] = replaced.min(row[j] + 1).min(diagonal + 1);
-        }
-    }
-    row[b.len()]
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn edit_distances() {
-        assert_eq!(edit_distance("kitten", "sitting"), 3);
-        assert_eq!(edit_distance("", "abc"), 3);
-    }
 }

@@ -40,11 +40,18 @@ impl CornerDetector {
     ///
     /// # Errors
     /// [`Error::InvalidOption`] or [`Error::InvalidArgument`] if an option is out of its domain, or the mask does not fit the
-    /// camera or leaves nothing.
+    /// camera, leaves nothing, or is given to the coloured front end, which takes none.
     pub fn new(camera: Camera, options: DetectorOptions, mask: Option<Mask>) -> Result<Self> {
         options.validate()?;
         let light = LightTable::new(options.display_gamma)?;
         let finder = match &options.method {
+            CornerMethod::Coloured(_) if mask.is_some() => {
+                return Err(Error::argument(
+                    "mask",
+                    "one for method \"coloured\"",
+                    "a mask for method \"general\" alone",
+                ));
+            }
             CornerMethod::Coloured(_) => None,
             CornerMethod::General(general) => Some(SegmentFinder::new(&camera, general, mask.as_ref())?),
         };
@@ -61,7 +68,7 @@ impl CornerDetector {
         &self.options
     }
 
-    /// Which pixels may be used; none for all. The coloured front end takes no mask.
+    /// Which pixels may be used; none for all.
     pub fn mask(&self) -> Option<&Mask> {
         self.mask.as_ref()
     }

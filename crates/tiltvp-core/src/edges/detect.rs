@@ -7,8 +7,8 @@ use tiltvp_kernels::gradient::{
 use tiltvp_kernels::prefetch::prefetch_bytes;
 
 use super::options::EdgeOptions;
+use super::prefilter::Prefilter;
 use super::region::{Region, Span};
-use super::screen::Screen;
 use crate::image::{ImageView, Smoother};
 
 /// Edge pixels in structure-of-arrays form, in slot order.
@@ -43,7 +43,7 @@ impl EdgePixels {
         self.len == 0
     }
 
-    /// How many pixels had a strong gradient, those included that a screen has kept out.
+    /// How many pixels had a strong gradient, those included that a prefilter has kept out.
     pub fn strong(&self) -> usize {
         self.strong
     }
@@ -200,7 +200,7 @@ impl Detector {
         Self { smoother, levels: vec![0; ROWS * width + REACH], parts: reached(region), blocks, kernel }
     }
 
-    /// Writes the pixels of the region with a gradient magnitude of at least `gradient_min` that pass the screen, in slot
+    /// Writes the pixels of the region with a gradient magnitude of at least `gradient_min` that pass the prefilter, in slot
     /// order.
     ///
     /// The region must be that which the detector was made for, and the image must have the size of its camera. Grows no
@@ -210,12 +210,12 @@ impl Detector {
         image: &ImageView<'_>,
         region: &Region,
         gradient_min: f64,
-        screen: Option<&Screen>,
+        prefilter: Option<&Prefilter>,
         out: &mut EdgePixels,
     ) {
         out.make_room(region.len());
         out.clear();
-        let (directions, limit) = screen.map_or((Directions::None, 0.0), Screen::vectors);
+        let (directions, limit) = prefilter.map_or((Directions::None, 0.0), Prefilter::vectors);
         let [gx, gy] = &mut out.raw;
         let mut kept = KeptPixels { slots: &mut out.slot, places: &mut out.place, gx, gy, len: 0, strong: 0 };
         let unit = if self.smoother.copies() {

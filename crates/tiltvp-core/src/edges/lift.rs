@@ -6,8 +6,8 @@ use tiltvp_kernels::normals::{self, BLOCK, Normals};
 use tiltvp_kernels::prefetch::prefetch;
 
 use super::detect::EdgePixels;
+use super::prefilter::Prefilter;
 use super::region::Region;
-use super::screen::Screen;
 use crate::camera::Camera;
 use crate::robust::Rows;
 
@@ -53,16 +53,16 @@ impl LiftTable {
         Self { maps: matrices.iter().map(words).collect(), unit: (unit * scale) as f32 }
     }
 
-    /// The screen of the test that [`lift`](Self::lift) makes: `|m_z| <= sin_max |m|` with `|m|` no more than the largest
+    /// The prefilter of the test that [`lift`](Self::lift) makes: `|m_z| <= sin_max |m|` with `|m|` no more than the largest
     /// stretch of the pixel's matrix.
-    pub fn screen(&self, sin_max: f64) -> Screen {
+    pub fn prefilter(&self, sin_max: f64) -> Prefilter {
         let vector = |map: &[u32; 3]| {
             let [[a, b], [c, d], [e, f]] = map.map(entries);
             let (xx, xy, yy) = (a * a + c * c + e * e, a * b + c * d + e * f, b * b + d * d + f * f);
             let largest = 0.5 * (xx + yy) + (0.25 * (xx - yy) * (xx - yy) + xy * xy).sqrt();
             if largest > 0.0 { [e / largest.sqrt(), f / largest.sqrt()] } else { [0.0; 2] }
         };
-        Screen::new(&self.maps.iter().map(vector).collect::<Vec<_>>(), sin_max)
+        Prefilter::new(&self.maps.iter().map(vector).collect::<Vec<_>>(), sin_max)
     }
 
     /// The unit normal that [`lift`](Self::lift) makes of one edge pixel: its place in the region and its gradient. None for

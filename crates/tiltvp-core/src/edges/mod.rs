@@ -3,13 +3,13 @@
 mod detect;
 mod lift;
 mod options;
+mod prefilter;
 mod region;
 mod ridge;
-mod screen;
 
 pub use detect::{Detector, EdgePixels};
 pub use lift::{LiftTable, NormalKind};
 pub use options::{EdgeOptions, Mask};
+pub use prefilter::Prefilter;
 pub use region::{Region, Span};
 pub use ridge::{RidgeDetector, RidgePixels};
-pub use screen::Screen;

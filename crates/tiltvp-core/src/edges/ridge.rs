@@ -5,8 +5,8 @@ use tiltvp_kernels::ridge::{Around, MARKED, each_mark, mark, mark_directed, scha
 
 use super::detect::EdgePixels;
 use super::options::EdgeOptions;
+use super::prefilter::Prefilter;
 use super::region::Region;
-use super::screen::Screen;
 use crate::image::{ImageView, Smoother};
 
 /// Edge pixels of greatest gradient magnitude across their edge, in slot order.
@@ -46,7 +46,7 @@ pub struct RidgeDetector {
     /// Three rows of gradients, row `v` in place `v % 3`, each at least one pixel wider than the region's columns on both sides.
     gradients: [Gradients; 3],
     marks: Vec<u8>,
-    /// The screen's vectors of a span, where they are not stored.
+    /// The prefilter's vectors of a span, where they are not stored.
     vectors: Vec<[i16; 2]>,
 }
 
@@ -65,7 +65,7 @@ impl RidgeDetector {
         }
     }
 
-    /// Writes the ridge pixels of the region with a gradient magnitude of at least `gradient_min` that pass the screen.
+    /// Writes the ridge pixels of the region with a gradient magnitude of at least `gradient_min` that pass the prefilter.
     ///
     /// The image must have the size of the camera that the region was made for.
     pub fn detect(
@@ -73,7 +73,7 @@ impl RidgeDetector {
         image: &ImageView<'_>,
         region: &Region,
         gradient_min: f64,
-        screen: Option<&Screen>,
+        prefilter: Option<&Prefilter>,
         out: &mut RidgePixels,
     ) {
         let least = (gradient_min * gradient_min) as f32;
@@ -110,9 +110,9 @@ impl RidgeDetector {
                 below: &below.strength[first..first + wide],
             };
             let marks = &mut self.marks[..wide];
-            match screen {
-                Some(screen) => {
-                    let (vectors, limit) = screen.of_span(span, wide, &mut self.vectors);
+            match prefilter {
+                Some(prefilter) => {
+                    let (vectors, limit) = prefilter.of_span(span, wide, &mut self.vectors);
                     mark_directed(&around, least, vectors, limit, marks);
                 }
                 None => mark(&around, least, marks),

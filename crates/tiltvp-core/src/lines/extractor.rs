@@ -128,9 +128,9 @@ impl LineExtractor {
             (LineMethod::GreatCircle(options), _) => {
                 let tilt = tilt.copied().unwrap_or(Tilt::UPRIGHT);
                 let reach = (options.plane_max_rad + tilt.alpha_rad()).min(std::f64::consts::FRAC_PI_2);
-                let screen = self.tables.screen.with_limit(reach.sin());
+                let prefilter = self.tables.prefilter.with_limit(reach.sin());
                 let LineScratch { detector, ridge, great_circle, .. } = scratch;
-                detector.detect(image, &self.tables.region, edges.gradient_min, Some(&screen), ridge);
+                detector.detect(image, &self.tables.region, edges.gradient_min, Some(&prefilter), ridge);
                 let frame = LineFrame { normal: tilt.normal(), center_px: None };
                 great_circle::find(&self.tables, ridge, frame, options, great_circle, out);
             }

@@ -5,7 +5,7 @@ use tiltvp_kernels::prefetch::prefetch;
 
 use super::options::LineOptions;
 use crate::camera::Camera;
-use crate::edges::{EdgeOptions, LiftTable, NormalKind, Region, Screen};
+use crate::edges::{EdgeOptions, LiftTable, NormalKind, Prefilter, Region};
 use crate::error::Result;
 
 /// The unit of a table of bearings: the largest that 16 bits hold for components from -1 to 1.
@@ -19,7 +19,7 @@ const NO_RAY: i16 = i16::MIN;
 pub(super) struct LineTables {
     pub(super) region: Region,
     pub(super) lift: LiftTable,
-    pub(super) screen: Screen,
+    pub(super) prefilter: Prefilter,
     /// Bearing of every pixel in the robot frame, in row order and units of [`UNIT`]: half the memory of single precision, to
     /// a thousandth of a degree. [`NO_RAY`] where there is none.
     rays: Vec<[i16; 3]>,
@@ -38,7 +38,7 @@ impl LineTables {
         let edges = EdgeOptions { margin_px: options.edges.margin_px + 1.0, ..options.edges };
         let region = Region::new(camera, robot_from_camera, &edges, options.mask.as_ref())?;
         let lift = LiftTable::new(camera, robot_from_camera, &region, NormalKind::Tangent);
-        let screen = lift.screen(1.0);
+        let prefilter = lift.prefilter(1.0);
         let (width, height) = (camera.width() as usize, camera.height() as usize);
         let rays = (0..width * height).map(|i| {
             let pixel = Vector2::new((i % width) as f64, (i / width) as f64);
@@ -60,7 +60,7 @@ impl LineTables {
         }
         let clearance = distances(clear, width);
         let band = band_of(&region);
-        Ok(Self { region, lift, screen, rays, clearance, width, height, band })
+        Ok(Self { region, lift, prefilter, rays, clearance, width, height, band })
     }
 
     /// Whether the world is seen at every pixel up to `reach` away from `(u, v)`, along rows, columns or both, and around it.

@@ -14,6 +14,7 @@ use std::borrow::Cow;
 
 pub use domain::{Above, Between, Domain, NOT_NEGATIVE, POSITIVE, check};
 pub use leaf::{OptionValue, assign, assign_by, value_by};
+pub(crate) use near::edit_distance;
 pub use near::near;
 pub use value::{Kind, Value};
 

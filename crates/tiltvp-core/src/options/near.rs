@@ -9,7 +9,7 @@ pub fn near<'a>(name: &str, names: impl IntoIterator<Item = &'a str>) -> Vec<&'a
     let mut found: Vec<(usize, &str)> = names
         .into_iter()
         .filter_map(|known| {
-            let (distance, longer) = (edits(name, known), name.len().max(known.len()));
+            let (distance, longer) = (edit_distance(name, known), name.len().max(known.len()));
             let begins = known.starts_with(name) || name.starts_with(known);
             (3 * distance <= longer || (begins && 2 * distance <= longer)).then_some((distance, known))
         })
@@ -18,8 +18,8 @@ pub fn near<'a>(name: &str, names: impl IntoIterator<Item = &'a str>) -> Vec<&'a
     found.into_iter().take(MOST).map(|(_, known)| known).collect()
 }
 
-/// How many letters have to be changed, added or removed, Levenshtein's distance.
-fn edits(a: &str, b: &str) -> usize {
+/// How many letters have to be changed, added or removed: Levenshtein's distance.
+pub(crate) fn edit_distance(a: &str, b: &str) -> usize {
     let b: Vec<char> = b.chars().collect();
     let mut row: Vec<usize> = (0..=b.len()).collect();
     for (i, letter) in a.chars().enumerate() {
@@ -36,7 +36,13 @@ fn edits(a: &str, b: &str) -> usize {
 
 #[cfg(test)]
 mod tests {
-    use super::near;
+    use super::{edit_distance, near};
+
+    #[test]
+    fn edit_distances() {
+        assert_eq!(edit_distance("kitten", "sitting"), 3);
+        assert_eq!(edit_distance("", "abc"), 3);
+    }
 
     #[test]
     fn slips_are_near_and_other_words_are_not() {

@@ -1,16 +1,24 @@
 //! Options of the sampling loop: the order of samples, local optimisation and score.
 
 use crate::error::{Error, Result};
+use crate::options::{Kind, OptionValue, Value};
+use crate::{options, words};
 
-/// How samples are drawn, improved and scored. The default is plain RANSAC, as Fleer 2017 uses it.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Sampling {
-    /// From which observations samples are drawn. Default uniformly from all.
-    pub order: SampleOrder,
-    /// Whether each new best model is improved before the next sample. Default no.
-    pub local_optimization: Option<LocalOptimization>,
-    /// What makes one model better than another. Default its number of inliers.
-    pub score: Score,
+options! {
+    /// How samples are drawn, improved and scored. The default is plain RANSAC, as Fleer 2017 uses it.
+    #[derive(Copy)]
+    pub struct Sampling {
+        /// From which observations samples are drawn: "uniform" from all alike, "progressive" from a growing pool of the best,
+        /// the strongest edge pixels (PROSAC, Chum and Matas 2005).
+        [as "sampling"] order: SampleOrder = SampleOrder::Uniform;
+        /// Whether each new best model is improved by least squares before the next sample (LO-RANSAC, Chum, Matas and Kittler
+        /// 2003).
+        local_optimization: Option<LocalOptimization> = None;
+        /// What makes one model better than another: the "count" of inliers, or the truncated squares of "msac" (Torr and
+        /// Zisserman 2000).
+        score: Score = Score::Count;
+    }
+    check numbers_are_possible
 }
 
 /// From which observations samples are drawn.
@@ -38,14 +46,46 @@ pub struct LocalOptimization {
     pub widening: f64,
 }
 
-/// What makes one model better than another. Every score is a sum over observations of a gain between 0 and 1.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub enum Score {
-    /// The number of inliers.
-    #[default]
-    Count,
-    /// MSAC (Torr and Zisserman 2000), the truncated quadratic: inliers gain `1 - r^2 / threshold^2`.
-    Msac,
+words! {
+    /// What makes one model better than another. Every score is a sum over observations of a gain between 0 and 1.
+    #[derive(Default)]
+    pub enum Score {
+        /// The number of inliers.
+        #[default]
+        Count = "count",
+        /// MSAC (Torr and Zisserman 2000), the truncated quadratic: inliers gain `1 - r^2 / threshold^2`.
+        Msac = "msac",
+    }
+}
+
+/// By name; the growth is that of PROSAC's authors.
+impl OptionValue for SampleOrder {
+    const KIND: Kind = Kind::Word(&["uniform", "progressive"]);
+
+    fn to_value(&self) -> Value {
+        Value::Text(if *self == Self::Uniform { "uniform" } else { "progressive" }.to_owned())
+    }
+
+    fn from_value(value: &Value) -> Option<Self> {
+        match value {
+            Value::Text(word) if word == "uniform" => Some(Self::Uniform),
+            Value::Text(word) if word == "progressive" => Some(Self::progressive()),
+            _ => None,
+        }
+    }
+}
+
+/// On or off; the numbers are the defaults.
+impl OptionValue for Option<LocalOptimization> {
+    const KIND: Kind = bool::KIND;
+
+    fn to_value(&self) -> Value {
+        Value::Bool(self.is_some())
+    }
+
+    fn from_value(value: &Value) -> Option<Self> {
+        bool::from_value(value).map(|on| on.then(LocalOptimization::default))
+    }
 }
 
 impl SampleOrder {
@@ -72,25 +112,19 @@ impl Score {
     }
 }
 
-impl Sampling {
-    /// Checks every field.
-    ///
-    /// # Errors
-    /// [`Error::InvalidOption`] with the name of the field.
-    pub fn validate(&self) -> Result<()> {
-        if let SampleOrder::Progressive { uniform_after: 0 } = self.order {
-            return Err(Error::option("uniform_after", 0, "at least 1"));
-        }
-        if let Some(LocalOptimization { iterations, widening }) = self.local_optimization {
-            if !(1..=1000).contains(&iterations) {
-                return Err(Error::option("iterations", iterations, "from 1 to 1000"));
-            }
-            if !(widening >= 1.0 && widening.is_finite()) {
-                return Err(Error::option("widening", widening, "a factor of at least 1"));
-            }
-        }
-        Ok(())
+fn numbers_are_possible(sampling: &Sampling) -> Result<()> {
+    if let SampleOrder::Progressive { uniform_after: 0 } = sampling.order {
+        return Err(Error::option("uniform_after", 0, "at least 1"));
     }
+    if let Some(LocalOptimization { iterations, widening }) = sampling.local_optimization {
+        if !(1..=1000).contains(&iterations) {
+            return Err(Error::option("iterations", iterations, "from 1 to 1000"));
+        }
+        if !(widening >= 1.0 && widening.is_finite()) {
+            return Err(Error::option("widening", widening, "a factor of at least 1"));
+        }
+    }
+    Ok(())
 }
 
 #[cfg(test)]

@@ -1,8 +1,9 @@
 //! From an image to a tilt, at once or by way of its edge pixels: the tables of a camera, made once.
 
+use std::f64::consts::PI;
 use std::sync::Arc;
 
-use nalgebra::Matrix3;
+use nalgebra::{Matrix3, Vector3};
 
 use super::estimate::{EdgeElement, TiltEstimate};
 use super::image_edges::{EdgeOrigin, ImageEdges};
@@ -47,7 +48,13 @@ impl TiltEstimator {
     /// The estimator of checked options.
     fn prepared(origin: Arc<EdgeOrigin>, options: TiltOptions, pixels: Arc<PixelTables>) -> Result<Self> {
         let setting = Setting { origin: &origin, options: &options, pixels: &pixels };
-        let method = options.method.chosen().prepare(&setting)?;
+        let chosen = options.method.chosen();
+        let limit = chosen.tilt_limit_rad();
+        if let Some(tilt_max) = options.tilt_max_rad.filter(|tilt_max| *tilt_max >= limit && limit < PI) {
+            let expected = "an angle below pi/2: the method segments alone takes more";
+            return Err(Error::option("tilt_max_rad", tilt_max, expected));
+        }
+        let method = chosen.prepare(&setting)?;
         Ok(Self { origin, options, pixels, method })
     }
 
@@ -132,7 +139,7 @@ impl TiltEstimator {
         match &self.method {
             Prepared::Pixels(method) => {
                 let Scratch { detector, edges, work, .. } = scratch;
-                detector.detect(image, &self.pixels.region, gradient_min, method.screen(), edges);
+                detector.detect(image, &self.pixels.region, gradient_min, method.prefilter(), edges);
                 Ok(self.fit(&**method, edges, work))
             }
             Prepared::Segments(method) => Ok(method.estimate(image, &self.pixels, scratch)),
@@ -177,11 +184,21 @@ impl TiltEstimator {
         }
     }
 
-    /// The estimate of the edge pixels of an image. What passed a screen and what passed none give the same one: screens
+    /// The estimate of the edge pixels of an image. What passed a prefilter and what passed none give the same one: prefilters
     /// keep out only what the prefilters reject.
     fn fit(&self, method: &dyn Fitter, edges: &EdgePixels, work: &mut Work) -> TiltEstimate {
         let fit = method.fit(edges, &self.pixels, work);
         fit.into_estimate(edges.strong(), work.rows.len())
+    }
+
+    /// The directions that may be up and what tells which one is, [`estimate`](Self::estimate)'s way where it looks anywhere: for
+    /// training. Empty of other methods and smaller leans. Allocates.
+    ///
+    /// # Errors
+    /// Those of [`estimate`](Self::estimate).
+    pub fn hypotheses(&self, image: &ImageView<'_>, scratch: &mut Scratch) -> Result<Vec<(Vector3<f64>, Vec<f64>)>> {
+        self.estimate(image, scratch)?;
+        Ok(scratch.segments.as_ref().map_or_else(Vec::new, |work| work.hypotheses()))
     }
 
     /// The tilts of many images on `threads` threads, in the order of the images, the same whatever the number of threads.

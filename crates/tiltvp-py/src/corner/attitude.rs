@@ -1,7 +1,7 @@
 //! What the closed form answers, as frozen Python values: `CornerAttitude` and `CornerAttitudes`.
 
 use nalgebra::{Matrix3, Vector3};
-use numpy::{PyArray1, PyArrayMethods};
+use numpy::PyArray1;
 use pyo3::IntoPyObjectExt;
 use pyo3::prelude::*;
 use tiltvp_core::corner::{self as core, CornerCase};
@@ -122,8 +122,8 @@ impl CornerAttitudes {
         py: Python<'py>,
         pick: fn(&core::CornerAttitude) -> Matrix3<f64>,
     ) -> PyResult<Array<'py, f64>> {
-        let entries = self.attitudes.iter().flat_map(|row| pick(&row.inner).transpose().as_slice().to_vec());
-        Ok(Array::new(PyArray1::from_iter(py, entries).reshape([self.attitudes.len(), 3, 3])?))
+        let matrices: Vec<_> = self.attitudes.iter().map(|row| pick(&row.inner)).collect();
+        convert::to_matrices(py, &matrices, false)
     }
 
     fn column<'py, T: numpy::Element + crate::array::Dtype>(

@@ -1,7 +1,7 @@
 //! `CornerDetector`: corners of single images of one camera.
 
 use pyo3::prelude::*;
-use pyo3::types::{PyDict, PyTuple};
+use pyo3::types::PyDict;
 use tiltvp_core::corner::{self as core, CornerScratch};
 use tiltvp_core::edges::Mask;
 
@@ -11,8 +11,8 @@ use crate::call::{call, exception, invalid};
 use crate::camera::Camera;
 use crate::convert;
 use crate::options;
+use crate::reader::{self, image_reader};
 use crate::scratch::ScratchPool;
-use crate::value::frozen;
 
 /// Finds corners in single images of one camera; `tiltvp.corner.CornerDetector` takes images of any usual kind.
 ///
@@ -39,9 +39,7 @@ impl CornerDetector {
         mask: Option<&Bound<'_, PyAny>>,
         options: Option<&Bound<'_, PyDict>>,
     ) -> PyResult<Self> {
-        let Ok(camera) = camera.cast::<Camera>() else {
-            return Err(invalid(format!("camera: {}, expected a tiltvp.Camera", camera.get_type().name()?)));
-        };
+        let camera = reader::camera(camera)?;
         let mut parsed = core::DetectorOptions::for_method(method).map_err(|error| exception(&error))?;
         options::set(&mut parsed, options)?;
         let mask = mask.map(|mask| -> PyResult<Mask> {
@@ -54,28 +52,10 @@ impl CornerDetector {
         Ok(Self { inner, camera: camera.clone().unbind(), scratch: ScratchPool::default() })
     }
 
-    /// The camera whose images are read.
-    #[getter]
-    fn camera(&self, py: Python<'_>) -> Py<Camera> {
-        self.camera.clone_ref(py)
-    }
-
-    /// The name of the front end.
-    #[getter]
-    fn method(&self) -> &'static str {
-        self.inner.options().method.name()
-    }
-
     /// Fresh (H, W) bool, or None: which pixels may be used.
     #[getter]
     fn mask<'py>(&self, py: Python<'py>) -> PyResult<Option<Array<'py, bool>>> {
         self.inner.mask().map(|mask| Ok(Array::new(convert::to_mask(py, mask)?))).transpose()
-    }
-
-    /// The options that are in force, by name, defaults included.
-    #[getter]
-    fn options<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        options::in_force(py, self.inner.options())
     }
 
     /// The corners of a C-contiguous `(H, W)` image of uint8; `vertical` is a direction of the camera frame.
@@ -133,33 +113,12 @@ impl CornerDetector {
     fn __repr__(&self, py: Python<'_>) -> PyResult<String> {
         Ok(format!("CornerDetector({}, method=\"{}\")", self.camera.bind(py).repr()?, self.method()))
     }
-
-    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyTuple>> {
-        let (py, this) = (slf.py(), slf.get());
-        let keywords = this.options(py)?;
-        keywords.set_item("method", this.method())?;
-        keywords.set_item("mask", this.mask(py)?)?;
-        let partial = py.import("functools")?.getattr("partial")?;
-        (partial.call((slf.get_type(), this.camera(py)), Some(&keywords))?, PyTuple::empty(py)).into_pyobject(py)
-    }
 }
 
-frozen!(CornerDetector, |own| (own.inner.camera(), own.inner.mask(), own.inner.options()), |own| (
-    own.method(),
-    own.inner.camera().width(),
-    own.inner.camera().height()
-));
+image_reader!(CornerDetector, CornerScratch, mask);
 
 impl CornerDetector {
     pub(super) fn inner(&self) -> &core::CornerDetector {
         &self.inner
-    }
-
-    fn with_scratch<R: Send>(
-        &self,
-        py: Python<'_>,
-        work: impl FnOnce(&mut CornerScratch) -> Result<R, tiltvp_core::Error> + Send,
-    ) -> PyResult<R> {
-        self.scratch.with(py, || self.inner.scratch(), work)
     }
 }

@@ -3,7 +3,6 @@
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use nalgebra::Matrix4;
-use numpy::{PyArray1, PyArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyTuple};
 use tiltvp_core::corner::{self as core, CornerMethod, EstimatorOptions, Frame};
@@ -86,7 +85,7 @@ impl CornerPoseEstimator {
         let mut matrix = Matrix4::identity();
         matrix.fixed_view_mut::<3, 3>(0, 0).copy_from(&motion.rotation);
         matrix.fixed_view_mut::<3, 1>(0, 3).copy_from(&motion.translation_m);
-        PyArray1::from_slice(py, matrix.transpose().as_slice()).reshape([4, 4]).map(|array| Some(Array::new(array)))
+        convert::to_matrix(py, &matrix).map(Some)
     }
 
     /// The options that are in force, by name, defaults included.

@@ -181,22 +181,40 @@ pub(crate) fn included_angle(
     Ok(found.map(|angle| (angle.gamma_rad, angle.sigma_rad)))
 }
 
+/// What is known of an object and its attitude before its corners are looked at, by name.
+#[derive(FromPyObject)]
+#[pyo3(from_item_all)]
+pub(crate) struct KnownBeforehand<'py> {
+    gamma_rad: f64,
+    gamma_sigma_rad: f64,
+    right_handed: Option<bool>,
+    priors: Bound<'py, PyAny>,
+}
+
+impl KnownBeforehand<'_> {
+    fn options(&self) -> PyResult<CornerOptions> {
+        Ok(CornerOptions {
+            angle: IncludedAngle { gamma_rad: self.gamma_rad, sigma_rad: self.gamma_sigma_rad },
+            right_handed: self.right_handed,
+            priors: prior::parse(&self.priors)?,
+            ..CornerOptions::default()
+        })
+    }
+}
+
 /// The attitudes that several features agree on, the likeliest first; see `tiltvp.corner.resolve`.
 #[pyfunction]
 #[pyo3(signature = (
-    features: "Sequence[CornerFeature]", common_from_camera: "Sequence[ArrayLike]", gamma_rad, gamma_sigma_rad,
-    alignment, right_handed, priors: "Iterable[Any]",
+    features: "Sequence[CornerFeature]", common_from_camera: "Sequence[ArrayLike]", known: "Mapping[str, Any]",
+    alignment,
 ))]
-#[expect(clippy::too_many_arguments, clippy::needless_pass_by_value, reason = "named in Python; lists are extracted")]
+#[expect(clippy::needless_pass_by_value, reason = "lists are extracted")]
 pub(crate) fn resolve_corners(
     py: Python<'_>,
     features: Vec<Bound<'_, CornerFeature>>,
     common_from_camera: Vec<Bound<'_, PyAny>>,
-    gamma_rad: f64,
-    gamma_sigma_rad: f64,
+    known: KnownBeforehand<'_>,
     alignment: &str,
-    right_handed: Option<bool>,
-    priors: &Bound<'_, PyAny>,
 ) -> PyResult<Vec<ResolvedAttitude>> {
     let names = Alignment::ALL.map(Alignment::name).join(", ");
     let Some(alignment) = Alignment::ALL.into_iter().find(|known| known.name() == alignment) else {
@@ -206,8 +224,7 @@ pub(crate) fn resolve_corners(
         let (a, b) = (features.len(), common_from_camera.len());
         return Err(invalid(format!("common_from_camera: {b} rotations, expected {a}, one of each feature")));
     }
-    let priors = prior::parse(priors)?;
-    let angle = IncludedAngle { gamma_rad, sigma_rad: gamma_sigma_rad };
+    let CornerOptions { angle, right_handed, priors, .. } = known.options()?;
     let mut rotations = Vec::new();
     for rotation in &common_from_camera {
         rotations.push(convert::matrix3(rotation, "common_from_camera")?);
@@ -227,24 +244,17 @@ pub(crate) fn resolve_corners(
 
 /// The poses that explain the features of a pair of cameras, the likeliest first; see `tiltvp.corner.poses`.
 #[pyfunction]
-#[pyo3(signature = (
-    left, right, left_from_right: "ArrayLike", gamma_rad, gamma_sigma_rad, right_handed, priors: "Iterable[Any]",
-    fuse,
-))]
-#[expect(clippy::too_many_arguments, reason = "named on the Python side")]
+#[pyo3(signature = (left, right, left_from_right: "ArrayLike", known: "Mapping[str, Any]", fuse))]
+#[expect(clippy::needless_pass_by_value, reason = "it is extracted")]
 pub(crate) fn corner_poses(
     py: Python<'_>,
     left: &Bound<'_, CornerFeature>,
     right: &Bound<'_, CornerFeature>,
     left_from_right: &Bound<'_, PyAny>,
-    gamma_rad: f64,
-    gamma_sigma_rad: f64,
-    right_handed: Option<bool>,
-    priors: &Bound<'_, PyAny>,
+    known: KnownBeforehand<'_>,
     fuse: bool,
 ) -> PyResult<Vec<CornerPose>> {
-    let angle = IncludedAngle { gamma_rad, sigma_rad: gamma_sigma_rad };
-    let options = CornerOptions { angle, right_handed, priors: prior::parse(priors)?, fuse };
+    let options = CornerOptions { fuse, ..known.options()? };
     let motion = convert::rigid_motion(left_from_right, "left_from_right")?;
     let (left, right) = (&left.get().inner, &right.get().inner);
     let poses = call(py, || core::corner_poses(left, right, &motion, &options))?;

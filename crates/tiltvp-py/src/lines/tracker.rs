@@ -1,6 +1,6 @@
 //! `LineTracker`: identities of lines through successive frames.
 
-use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::sync::Mutex;
 
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyTuple};
@@ -10,7 +10,7 @@ use super::matching;
 use super::values::Lines;
 use crate::call::{call, exception, invalid};
 use crate::options;
-use crate::value::value;
+use crate::value::{changing, getters, value};
 
 value! {
     /// The lines of one frame and whose they are. Frozen.
@@ -54,15 +54,7 @@ pub(crate) struct LineTracker {
     inner: Mutex<core::LineTracker>,
 }
 
-impl LineTracker {
-    fn lock(&self) -> MutexGuard<'_, core::LineTracker> {
-        self.inner.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-
-    fn copied(&self) -> Self {
-        Self { inner: Mutex::new(self.lock().clone()) }
-    }
-}
+changing!(LineTracker(core::LineTracker), |own| (own.options(), own.state()));
 
 #[pymethods]
 impl LineTracker {
@@ -72,25 +64,7 @@ impl LineTracker {
         let mut parsed = TrackerOptions::default();
         options::set(&mut parsed, options)?;
         let inner = core::LineTracker::new(parsed).map_err(|error| exception(&error))?;
-        Ok(Self { inner: Mutex::new(inner) })
-    }
-
-    /// The options in force, by name, defaults included; a fresh dict, good as keywords.
-    #[getter]
-    fn options<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        options::in_force(py, self.lock().options())
-    }
-
-    /// Number of the next frame.
-    #[getter]
-    fn next_frame(&self) -> u64 {
-        self.lock().state().next_frame
-    }
-
-    /// How many identities have been given.
-    #[getter]
-    fn track_count(&self) -> u64 {
-        self.lock().state().next_track
+        Ok(inner.into())
     }
 
     /// The next frame: its lines, their descriptors (N, K), and the robot's motion since the last one.
@@ -131,30 +105,15 @@ impl LineTracker {
         Ok(format!("LineTracker({})", options::shown(py, self.lock().options())?))
     }
 
-    fn __eq__(&self, other: &Bound<'_, PyAny>) -> bool {
-        let Ok(other) = other.cast::<Self>() else { return false };
-        // One at a time: a tracker may be compared with itself.
-        let mine = self.lock().clone();
-        let other = other.get().lock();
-        (mine.options(), mine.state()) == (other.options(), other.state())
-    }
-
-    fn __copy__(&self) -> Self {
-        self.copied()
-    }
-
-    fn __deepcopy__(&self, _memo: &Bound<'_, PyAny>) -> Self {
-        self.copied()
-    }
-
     /// Sets what pickle has kept.
     fn __setstate__(&self, state: (u64, u64, Vec<Memory>, Vec<Edge>)) -> PyResult<()> {
         let (next_frame, next_track, frames, followed) = state;
         let frames = frames.into_iter().map(|(tracks, descriptors)| FrameMemory { tracks, descriptors }).collect();
-        let edge = |((track, seen), (bearing_rad, nearness, covariance, is_metric), polarity, descriptor): Edge| {
-            let parallax = Parallax { bearing_rad, nearness, covariance, is_metric };
-            Followed { track, seen, parallax, polarity, descriptor }
-        };
+        let edge =
+            |((track, seen), (bearing_rad, inverse_distance, covariance, is_metric), polarity, descriptor): Edge| {
+                let parallax = Parallax { bearing_rad, inverse_distance, covariance, is_metric };
+                Followed { track, seen, parallax, polarity, descriptor }
+            };
         let followed = followed.into_iter().map(edge).collect();
         let mut inner = self.lock();
         let state = TrackerState { next_frame, next_track, frames, followed };
@@ -167,14 +126,23 @@ impl LineTracker {
         let make = py.import("functools")?.getattr("partial")?.call((slf.get_type(),), Some(&this.options(py)?))?;
         let tracker = this.lock();
         let edge = |edge: &Followed| -> Edge {
-            let Parallax { bearing_rad, nearness, covariance, is_metric } = edge.parallax;
-            let place = (bearing_rad, nearness, covariance, is_metric);
+            let Parallax { bearing_rad, inverse_distance, covariance, is_metric } = edge.parallax;
+            let place = (bearing_rad, inverse_distance, covariance, is_metric);
             ((edge.track, edge.seen), place, edge.polarity, edge.descriptor.clone())
         };
         let state = tracker.state();
         let frames: Vec<Memory> = state.frames.iter().map(|f| (f.tracks.clone(), f.descriptors.clone())).collect();
         let followed: Vec<Edge> = state.followed.iter().map(edge).collect();
         (make, PyTuple::empty(py), (state.next_frame, state.next_track, frames, followed)).into_pyobject(py)
+    }
+}
+
+getters! {
+    LineTracker as own {
+        /// Number of the next frame.
+        next_frame: u64 = own.lock().state().next_frame,
+        /// How many identities have been given.
+        track_count: u64 = own.lock().state().next_track,
     }
 }
 

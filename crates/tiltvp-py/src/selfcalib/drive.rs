@@ -106,10 +106,9 @@ pub(crate) fn simulate_drive(
     kind: &str,
     options: Option<&Bound<'_, PyDict>>,
 ) -> PyResult<SimulatedDrive> {
-    let mut parsed = BearingDriveOptions { kind: kind_from(kind)?, ..BearingDriveOptions::default() };
-    options::set_given(&mut parsed, options)?;
-    parsed.validate().map_err(|error| exception(&error))?;
-    let options = parsed;
+    let options =
+        options::given(BearingDriveOptions { kind: kind_from(kind)?, ..BearingDriveOptions::default() }, options)?;
+    options.validate().map_err(|error| exception(&error))?;
     let drive = call(py, || Ok::<_, Error>(BearingDrive::new(&options)))?;
     Ok(SimulatedDrive { options, drive })
 }

@@ -68,7 +68,7 @@ impl AffineCorrection {
 value! {
     /// The mean and deviation of P(alpha | l) over a grid of shifts from zero, and the model of shifts behind it.
     ///
-    /// `train_posterior` makes them. Applying one is one interpolation; shifts beyond the grid have the answer of its
+    /// `train_posterior` makes them, `from_dict` from their parts. Applying one is one interpolation; shifts beyond the grid have the answer of its
     /// end. Frozen, comparable, hashable, pickled.
     PosteriorCorrection(core::PosteriorCorrection as own) {
         /// Units of the shift per radian, by and large.
@@ -92,30 +92,6 @@ value! {
         let model = ShiftModel { factor, spread, spread_per_rad, stray_share, stray_max };
         core::PosteriorCorrection::new(model, step, &mean_rad, &std_rad).map_err(|error| exception(&error))?
     };
-}
-
-#[pymethods]
-impl PosteriorCorrection {
-    #[new]
-    #[pyo3(signature = (
-        *, factor, spread, spread_per_rad, stray_share, stray_max, step, mean_rad: "ArrayLike", std_rad: "ArrayLike",
-    ))]
-    #[expect(clippy::too_many_arguments, reason = "keywords of a value's parts")]
-    fn new(
-        factor: f64,
-        spread: f64,
-        spread_per_rad: f64,
-        stray_share: f64,
-        stray_max: f64,
-        step: f64,
-        mean_rad: &Bound<'_, PyAny>,
-        std_rad: &Bound<'_, PyAny>,
-    ) -> PyResult<Self> {
-        let model = ShiftModel { factor, spread, spread_per_rad, stray_share, stray_max };
-        let (mean, std) = (convert::vector(mean_rad, "mean_rad")?, convert::vector(std_rad, "std_rad")?);
-        let inner = core::PosteriorCorrection::new(model, step, &mean, &std).map_err(|error| exception(&error))?;
-        Ok(Self { inner })
-    }
 }
 
 /// How leans are distributed where the robot goes: one of `empirical()`, `uniform(max_rad)`, `rayleigh(sigma_rad)`.

@@ -62,8 +62,7 @@ pub(crate) fn common_direction(
 ) -> PyResult<CommonDirection> {
     let normals: Vec<_> = convert::rows::<3>(normals, "normals")?.0.into_iter().map(Into::into).collect();
     let weights = weights.map(|w| convert::vector(w, "weights")).transpose()?;
-    let mut parsed = CommonDirectionOptions::default();
-    options::set_given(&mut parsed, options)?;
+    let parsed = options::given(CommonDirectionOptions::default(), options)?;
     let found = call(py, || core::common_direction(&normals, weights.as_deref(), &parsed))?;
     Ok(CommonDirection {
         direction: found.direction.unwrap_or(Vector3::repeat(f64::NAN)),

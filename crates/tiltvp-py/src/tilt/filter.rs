@@ -1,6 +1,6 @@
 //! `TiltFilter`: successive tilts fused.
 
-use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::sync::Mutex;
 
 use nalgebra::{Matrix2, Matrix6, Vector2, Vector3};
 use pyo3::prelude::*;
@@ -13,6 +13,7 @@ use super::filtered::{FilterStep, FilteredTilt};
 use crate::call::{call, exception, invalid};
 use crate::convert;
 use crate::options;
+use crate::value::{changing, getters};
 
 /// Keys of the dict of a state, by the way of pickle.
 const STATE_KEYS: [&str; 9] =
@@ -30,31 +31,16 @@ pub(crate) struct TiltFilter {
     inner: Mutex<core::TiltFilter>,
 }
 
-impl TiltFilter {
-    fn lock(&self) -> MutexGuard<'_, core::TiltFilter> {
-        self.inner.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-
-    fn copied(&self) -> Self {
-        Self { inner: Mutex::new(self.lock().clone()) }
-    }
-}
+changing!(TiltFilter(core::TiltFilter), |own| own);
 
 #[pymethods]
 impl TiltFilter {
     #[new]
     #[pyo3(signature = (**options: "Option | None"))]
     fn new(options: Option<&Bound<'_, PyDict>>) -> PyResult<Self> {
-        let mut parsed = TiltFilterOptions::default();
-        options::set_given(&mut parsed, options)?;
+        let parsed = options::given(TiltFilterOptions::default(), options)?;
         let inner = core::TiltFilter::new(parsed).map_err(|error| exception(&error))?;
-        Ok(Self { inner: Mutex::new(inner) })
-    }
-
-    /// The options in force, by name, defaults included; a fresh dict, good as keywords.
-    #[getter]
-    fn options<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        options::in_force(py, self.lock().options())
+        Ok(inner.into())
     }
 
     /// The robot has turned (left positive) and driven (either way) since the last call; None: it has not.
@@ -104,36 +90,6 @@ impl TiltFilter {
         fused.map(FilterStep::from)
     }
 
-    /// The ground normal in the robot's frame, as the filter holds it to be now.
-    #[getter]
-    fn estimate(&self) -> FilteredTilt {
-        self.lock().estimate().into()
-    }
-
-    /// The floor's part of it alone, in the frame of the wheels.
-    #[getter]
-    fn floor(&self) -> FilteredTilt {
-        self.lock().floor().into()
-    }
-
-    /// The robot's own part alone, what it would see on level ground; None unless `estimate_mounting`.
-    #[getter]
-    fn mounting(&self) -> Option<FilteredTilt> {
-        self.lock().mounting().map(FilteredTilt::from)
-    }
-
-    /// The largest normalised innovation squared that passes the gate.
-    #[getter]
-    fn nis_limit(&self) -> f64 {
-        self.lock().nis_limit()
-    }
-
-    /// How many estimates in a row the gate has rejected: above 0, the estimate may be about to jump.
-    #[getter]
-    fn rejected(&self) -> u32 {
-        self.lock().state().rejected
-    }
-
     /// Forgets everything but the options.
     fn reset(&self) {
         self.lock().reset();
@@ -141,21 +97,6 @@ impl TiltFilter {
 
     fn __repr__(&self, py: Python<'_>) -> PyResult<String> {
         Ok(format!("TiltFilter({})", options::shown(py, self.lock().options())?))
-    }
-
-    fn __eq__(&self, other: &Bound<'_, PyAny>) -> bool {
-        let Ok(other) = other.cast::<Self>() else { return false };
-        // One at a time: a filter may be compared with itself.
-        let mine = self.lock().clone();
-        mine == *other.get().lock()
-    }
-
-    fn __copy__(&self) -> Self {
-        self.copied()
-    }
-
-    fn __deepcopy__(&self, _memo: &Bound<'_, PyAny>) -> Self {
-        self.copied()
     }
 
     /// Sets what pickle has kept.
@@ -172,6 +113,21 @@ impl TiltFilter {
         let make = py.import("functools")?.getattr("partial")?.call((slf.get_type(),), Some(&this.options(py)?))?;
         let state = written_state(py, this.lock().state())?;
         (make, PyTuple::empty(py), state).into_pyobject(py)
+    }
+}
+
+getters! {
+    TiltFilter as own {
+        /// The ground normal in the robot's frame, as the filter holds it to be now.
+        estimate: FilteredTilt = own.lock().estimate().into(),
+        /// The floor's part of it alone, in the frame of the wheels.
+        floor: FilteredTilt = own.lock().floor().into(),
+        /// The robot's own part alone, what it would see on level ground; None unless `estimate_mounting`.
+        mounting: Option<FilteredTilt> = own.lock().mounting().map(FilteredTilt::from),
+        /// The largest normalised innovation squared that passes the gate.
+        nis_limit: f64 = own.lock().nis_limit(),
+        /// How many estimates in a row the gate has rejected: above 0, the estimate may be about to jump.
+        rejected: u32 = own.lock().state().rejected,
     }
 }
 

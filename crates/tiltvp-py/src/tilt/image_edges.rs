@@ -81,7 +81,7 @@ impl ImageEdges {
     fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyTuple>> {
         let (py, this) = (slf.py(), slf.get());
         let EdgeOrigin { robot_from_camera, options: o, mask, row_stride, .. } = &**this.inner.origin();
-        let rotation = PyArray1::from_slice(py, robot_from_camera.transpose().as_slice()).reshape([3, 3])?;
+        let rotation = convert::to_matrix(py, robot_from_camera)?;
         let options = [o.gradient_min, o.smoothing_px, o.elevation_min_rad, o.elevation_max_rad, o.margin_px];
         let options = (options, *row_stride);
         let mask = mask.as_ref().map(|mask| convert::to_mask(py, mask)).transpose()?;

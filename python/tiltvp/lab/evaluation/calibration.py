@@ -126,7 +126,7 @@ def real_logs(folder: Path, *, only: str = "", advance: Callable[[], None] = lam
     """
     rows = []
     for name, start, odometry, bearings, truth, options in _logs(folder, only):
-        calibrator = SelfCalibrator(**options, start=start, memory=_WHOLE_DRIVE)
+        calibrator = SelfCalibrator(**options, start=start, keyframes_max=_WHOLE_DRIVE)
         calibrator.follow(odometry, bearings)
         rows.append(_row(name, "filter", calibrator.estimate, truth))
         advance()

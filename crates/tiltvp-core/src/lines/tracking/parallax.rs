@@ -19,10 +19,10 @@ pub struct Parallax {
     pub bearing_rad: f64,
     /// One over the distance from the camera, per metre; where distances driven are unknown, the change of the bearing from
     /// frame to frame beside the robot's turn, radians.
-    pub nearness: f64,
-    /// Variance of the bearing, covariance, variance of the nearness.
+    pub inverse_distance: f64,
+    /// Variance of the bearing, covariance, variance of the inverse distance.
     pub covariance: [f64; 3],
-    /// Whether the nearness is per metre.
+    /// Whether the inverse distance is per metre.
     pub is_metric: bool,
 }
 
@@ -40,15 +40,15 @@ const RATE_DRIFT_RAD: f64 = 0.01;
 impl Parallax {
     /// Of an edge that is seen for the first time.
     pub(crate) fn new(bearing_rad: f64, variance: f64, is_metric: bool, options: &TrackerOptions) -> Self {
-        let (nearness, sigma) = if is_metric {
+        let (inverse_distance, sigma) = if is_metric {
             (0.25 / options.nearest_m, 0.25 / options.nearest_m)
         } else {
             (0.0, options.rate_sigma_rad)
         };
-        Self { bearing_rad, nearness, covariance: [variance, 0.0, sigma * sigma], is_metric }
+        Self { bearing_rad, inverse_distance, covariance: [variance, 0.0, sigma * sigma], is_metric }
     }
 
-    /// Where the edge is after a motion. What is known of its nearness is lost if the motion's distance is known and those
+    /// Where the edge is after a motion. What is known of its inverse distance is lost if the motion's distance is known and those
     /// before were not, or the other way round.
     pub(crate) fn predict(&mut self, motion: &Motion, options: &TrackerOptions) {
         if self.is_metric != motion.distance_m.is_some() {
@@ -56,13 +56,13 @@ impl Parallax {
         }
         let [bb, bn, nn] = self.covariance;
         let Some(distance) = motion.distance_m else {
-            self.bearing_rad = wrap(self.bearing_rad - motion.turn_rad + self.nearness);
+            self.bearing_rad = wrap(self.bearing_rad - motion.turn_rad + self.inverse_distance);
             self.covariance =
                 [bb + 2.0 * bn + nn + DRIFT_RAD * DRIFT_RAD, bn + nn, nn + RATE_DRIFT_RAD * RATE_DRIFT_RAD];
             return;
         };
         let [tx, ty] = shift_of(distance, motion.turn_rad, options.camera_m);
-        let n = self.nearness;
+        let n = self.inverse_distance;
         let (sin, cos) = self.bearing_rad.sin_cos();
         // The edge in units of its distance, seen from the new place.
         let (x, y) = (cos - n * tx, sin - n * ty);
@@ -74,7 +74,7 @@ impl Parallax {
         let grows = 1.0 / length + n * (x * tx + y * ty) / (squared * length);
         let slip = n * sin.abs() * (options.distance_sigma * distance.abs() + SLIP_M);
         self.bearing_rad = wrap(y.atan2(x) - motion.turn_rad);
-        self.nearness = (n / length).clamp(0.0, 1.0 / options.nearest_m);
+        self.inverse_distance = (n / length).clamp(0.0, 1.0 / options.nearest_m);
         self.covariance = [
             along * along * bb + 2.0 * along * across * bn + across * across * nn + slip * slip + DRIFT_RAD * DRIFT_RAD,
             along * nearer * bb + (along * grows + across * nearer) * bn + across * grows * nn,
@@ -88,9 +88,9 @@ impl Parallax {
         let spread = bb + variance;
         let off = wrap(bearing_rad - self.bearing_rad);
         self.bearing_rad = wrap(self.bearing_rad + bb / spread * off);
-        self.nearness += bn / spread * off;
+        self.inverse_distance += bn / spread * off;
         if self.is_metric {
-            self.nearness = self.nearness.clamp(0.0, 1.0 / options.nearest_m);
+            self.inverse_distance = self.inverse_distance.clamp(0.0, 1.0 / options.nearest_m);
         }
         self.covariance = [bb - bb * bb / spread, bn - bb * bn / spread, nn - bn * bn / spread];
     }
@@ -113,13 +113,14 @@ mod tests {
     fn a_motion_moves_an_edge_as_in_the_plane() {
         let options = TrackerOptions { camera_m: [0.1, -0.05], ..TrackerOptions::default() };
         let motion = Motion { turn_rad: 0.3, distance_m: Some(0.2) };
-        let seen = |bearing: f64, nearness: f64| {
-            let mut edge = Parallax { bearing_rad: bearing, nearness, covariance: [1.0, 0.0, 0.0], is_metric: true };
+        let seen = |bearing: f64, inverse_distance: f64| {
+            let mut edge =
+                Parallax { bearing_rad: bearing, inverse_distance, covariance: [1.0, 0.0, 0.0], is_metric: true };
             edge.predict(&motion, &options);
             edge
         };
-        let (bearing, nearness) = (0.8f64, 0.5f64);
-        let edge = seen(bearing, nearness);
+        let (bearing, inverse_distance) = (0.8f64, 0.5f64);
+        let edge = seen(bearing, inverse_distance);
         // World frame: the robot starts at the origin. The arc has the radius 0.2 / 0.3.
         let place = [0.1 + 2.0 * bearing.cos(), -0.05 + 2.0 * bearing.sin()];
         let (radius, yaw) = (0.2 / 0.3, 0.3f64);
@@ -127,10 +128,12 @@ mod tests {
         let camera = [robot[0] + 0.1 * yaw.cos() + 0.05 * yaw.sin(), robot[1] + 0.1 * yaw.sin() - 0.05 * yaw.cos()];
         let (dx, dy) = (place[0] - camera[0], place[1] - camera[1]);
         assert!((edge.bearing_rad - (dy.atan2(dx) - yaw)).abs() < 1e-12);
-        assert!((edge.nearness - 1.0 / dx.hypot(dy)).abs() < 1e-12);
+        assert!((edge.inverse_distance - 1.0 / dx.hypot(dy)).abs() < 1e-12);
         let step = 1e-6;
-        let (more, nearer) = (seen(bearing + step, nearness), seen(bearing, nearness + step));
-        let slope = |a: &Parallax| [(a.bearing_rad - edge.bearing_rad) / step, (a.nearness - edge.nearness) / step];
+        let (more, nearer) = (seen(bearing + step, inverse_distance), seen(bearing, inverse_distance + step));
+        let slope = |a: &Parallax| {
+            [(a.bearing_rad - edge.bearing_rad) / step, (a.inverse_distance - edge.inverse_distance) / step]
+        };
         let ([bb, nb], [bn, _]) = (slope(&more), slope(&nearer));
         assert!((edge.covariance[1] - bb * nb).abs() < 1e-5 && (edge.covariance[2] - nb * nb).abs() < 1e-5);
         assert!((edge.covariance[0] - bb * bb).abs() < 1e-5 && bn > 0.0);
@@ -147,7 +150,7 @@ mod tests {
             edge.correct(place(f64::from(k)), 1e-6, &options);
         }
         let truth = 1.0 / 0.8f64.hypot(0.05);
-        assert!((edge.nearness - truth).abs() < 0.05 * truth, "{} {truth}", edge.nearness);
-        assert!((edge.nearness - truth).abs() < 4.0 * edge.covariance[2].sqrt());
+        assert!((edge.inverse_distance - truth).abs() < 0.05 * truth, "{} {truth}", edge.inverse_distance);
+        assert!((edge.inverse_distance - truth).abs() < 4.0 * edge.covariance[2].sqrt());
     }
 }

@@ -167,7 +167,7 @@ impl LineTracker {
         }
         let frame = state.next_frame;
         let mut continued = vec![None; n];
-        // The turn that tracks agree on is theirs already: a track that took its nearness from it would pull it along, frame
+        // The turn that tracks agree on is theirs already: a track that took its inverse distance from it would pull it along, frame
         // after frame. Each takes in its bearing by the turn as it was given.
         for (i, line) in lines.iter().enumerate() {
             let Some(j) = pairs[i] else { continue };

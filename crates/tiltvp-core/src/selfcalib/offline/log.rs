@@ -23,7 +23,7 @@ options! {
     #[derive(Copy)]
     pub struct LogOptions {
         /// Start, noise and wheel base; the method is that of the filter that gives the first guess.
-        [flat except "method" "gate_probability" "memory"] filter: SelfCalibratorOptions = SelfCalibratorOptions::default();
+        [flat except "method" "gate_probability" "keyframes_max"] filter: SelfCalibratorOptions = SelfCalibratorOptions::default();
         /// Whether the wheel base, and which wheel runs farther, are estimated too. Bearings have no scale: the mean displacement
         /// of both wheels stays as reported.
         estimate_odometry: bool = false;

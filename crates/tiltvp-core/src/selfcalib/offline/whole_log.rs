@@ -144,7 +144,8 @@ fn solve(problem: &mut BundleProblem, max_iterations: u32) -> DescentReport {
 /// The problem of a sliding window that is never marginalised.
 fn whole_window(log: &SortedLog<'_>) -> Result<BundleProblem> {
     let method = CalibrationMethod::Default;
-    let mut window = SlidingWindow::new(&SelfCalibratorOptions { method, memory: u32::MAX, ..log.options.filter })?;
+    let mut window =
+        SlidingWindow::new(&SelfCalibratorOptions { method, keyframes_max: u32::MAX, ..log.options.filter })?;
     for step in log.steps() {
         let mut seen: BTreeMap<u64, f64> = BTreeMap::new();
         for b in step.bearings {

@@ -35,7 +35,7 @@ impl SlidingWindow {
             let every_step = keyframes < EVERY_STEP_KEYFRAMES;
             self.relinearise(if every_step || !trusted { UNTRUSTED_ITERATIONS } else { ITERATIONS }, trusted);
             self.recheck_rejected(&rejected, &mut recorded);
-            if keyframes > self.options.memory as usize {
+            if keyframes > self.options.keyframes_max as usize {
                 self.marginalise(keyframes / 2);
             }
             self.schedule(shrunk && !self.any_sigma_below(&(solved * SIGMA_RATIO)));

@@ -7,9 +7,11 @@ use nalgebra::{Vector2, Vector3};
 
 use super::Setting;
 use super::offsets::offsets;
-use crate::edges::{EdgePixels, Screen};
+use crate::edges::{EdgePixels, Prefilter};
 use crate::error::{Error, Result};
 use crate::geometry::Tilt;
+use crate::options;
+use crate::options::POSITIVE;
 use crate::robust::FitReport;
 use crate::tilt::correction::{Correction, Gains, VanishingPoint, closed_form_gains};
 use crate::tilt::fit::{Evidence, Fit, Lean, STRAY_RAD};
@@ -33,11 +35,29 @@ fn offset_max_px_of(scale_px: f64) -> f64 {
     (PAPER_OFFSET_MAX_PX * scale_px / PAPER_SCALE_PX * 1e6).round() / 1e6
 }
 
-/// The closed-form gains, and the screen of edge offsets.
+/// The closed-form gains, and the prefilter of edge offsets.
 #[derive(Debug, Default)]
 pub(super) struct Shared {
     gains: OnceLock<Arc<Gains>>,
-    screen: OnceLock<Screen>,
+    prefilter: OnceLock<Prefilter>,
+}
+
+options! {
+    /// Which edge offsets the image-space methods take, and how their shift becomes an angle.
+    pub struct ImageSpaceOptions {
+        /// Largest edge offset in pixels that passes the prefilter, `s_max`; none for 40 pixels of a lens of 139.7 pixels per
+        /// radian about the vertical, and in proportion for others.
+        offset_max_px: Option<f64> = None => POSITIVE, "a positive number of pixels";
+        /// From the shift to the angle: `"closed-form"` by the gain of each pixel, None by the lens' scale at the vanishing
+        /// point, a factor in pixels per radian, a line, or a posterior.
+        correction: Correction = Correction::ClosedForm
+            => POSITIVE, "\"closed-form\", None, a positive factor, an AffineCorrection or a PosteriorCorrection";
+    }
+    check correction_is_valid
+}
+
+fn correction_is_valid(options: &ImageSpaceOptions) -> Result<()> {
+    options.correction.validate()
 }
 
 /// Edge offsets from the upright vanishing point, and the way from a shift to a tilt.
@@ -47,13 +67,14 @@ pub(super) struct ImageSpace {
     gains: Arc<Gains>,
     correction: TrainedCorrection,
     offset_max_px: f64,
-    screen: Screen,
+    prefilter: Prefilter,
     evidence: Evidence,
 }
 
 impl ImageSpace {
     /// The tables for a correction and a largest offset, where one is given.
-    pub(super) fn new(setting: &Setting<'_>, correction: &Correction, offset_max_px: Option<f64>) -> Result<Self> {
+    pub(super) fn new(setting: &Setting<'_>, options: &ImageSpaceOptions) -> Result<Self> {
+        let ImageSpaceOptions { correction, offset_max_px } = options;
         let vertical = vertical_of(setting)?;
         let (origin, pixels) = (setting.origin, setting.pixels);
         let shared = &pixels.shared.image_space;
@@ -74,12 +95,12 @@ impl ImageSpace {
             return Err(lean_out_of_reach(&correction, largest_px, offset_max_px.is_some()));
         }
         let at = (vertical.pixel.x, vertical.pixel.y);
-        let screen = shared.screen.get_or_init(|| Screen::of_offsets(&pixels.region, at, largest_px));
+        let prefilter = shared.prefilter.get_or_init(|| Prefilter::of_offsets(&pixels.region, at, largest_px));
         Ok(Self {
             vertical: vertical.clone(),
             gains,
             offset_max_px: largest_px,
-            screen: screen.with_limit(largest_px),
+            prefilter: prefilter.with_limit(largest_px),
             evidence: Evidence {
                 scale: STRAY_RAD * correction.factor(),
                 weighted: false,
@@ -89,8 +110,8 @@ impl ImageSpace {
         })
     }
 
-    pub(super) fn screen(&self) -> &Screen {
-        &self.screen
+    pub(super) fn prefilter(&self) -> &Prefilter {
+        &self.prefilter
     }
 
     /// Writes the rows of the edge pixels that pass the prefilter, with unit weights.

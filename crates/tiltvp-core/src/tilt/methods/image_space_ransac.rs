@@ -2,15 +2,14 @@
 
 use std::sync::Arc;
 
-use super::image_space::ImageSpace;
+use super::image_space::{ImageSpace, ImageSpaceOptions};
 use super::offsets::Offsets;
 use super::{Fitter, Prepared, Setting, TiltMethod};
-use crate::edges::{EdgeOptions, EdgePixels, Screen};
+use crate::edges::{EdgeOptions, EdgePixels, Prefilter};
 use crate::error::Result;
 use crate::options;
 use crate::options::POSITIVE;
 use crate::robust::{RansacOptions, Sampling, ransac};
-use crate::tilt::correction::Correction;
 use crate::tilt::fit::Fit;
 use crate::tilt::scratch::Work;
 use crate::tilt::tables::PixelTables;
@@ -20,21 +19,11 @@ options! {
     pub struct ImageSpaceRansacOptions {
         /// Largest residual of an inlier in pixels, `delta_s,max` of eq. 32.
         threshold_px: f64 = 10.0 => POSITIVE, "a positive number of pixels";
-        /// Largest edge offset in pixels that passes the prefilter, `s_max`; none for 40 pixels of a lens of 139.7 pixels per
-        /// radian about the vertical, and in proportion for others.
-        offset_max_px: Option<f64> = None => POSITIVE, "a positive number of pixels";
-        /// From the shift to the angle: `"closed-form"` by the gain of each pixel, None by the lens' scale at the vanishing
-        /// point, a factor in pixels per radian, a line, or a posterior.
-        correction: Correction = Correction::ClosedForm
-            => POSITIVE, "\"closed-form\", None, a positive factor, an AffineCorrection or a PosteriorCorrection";
+        /// Which offsets take part, and what their shift means.
+        [flat] space: ImageSpaceOptions = ImageSpaceOptions::default();
         /// How samples are drawn, improved and scored.
         [flat] sampling: Sampling = Sampling::default();
     }
-    check correction_is_valid
-}
-
-fn correction_is_valid(options: &ImageSpaceRansacOptions) -> Result<()> {
-    options.correction.validate()
 }
 
 impl TiltMethod for ImageSpaceRansacOptions {
@@ -44,7 +33,7 @@ impl TiltMethod for ImageSpaceRansacOptions {
 
     fn prepare(&self, setting: &Setting<'_>) -> Result<Prepared> {
         Ok(Prepared::Pixels(Arc::new(ImageSpaceRansac {
-            space: ImageSpace::new(setting, &self.correction, self.offset_max_px)?,
+            space: ImageSpace::new(setting, &self.space)?,
             ransac: RansacOptions {
                 seed: setting.options.seed,
                 sampling: self.sampling,
@@ -62,12 +51,8 @@ struct ImageSpaceRansac {
 }
 
 impl Fitter for ImageSpaceRansac {
-    fn screen(&self) -> Option<&Screen> {
-        Some(self.space.screen())
-    }
-
-    fn normal(&self, _slot: usize, _gx: f32, _gy: f32) -> Option<[f32; 3]> {
-        None
+    fn prefilter(&self) -> Option<&Prefilter> {
+        Some(self.space.prefilter())
     }
 
     fn fit(&self, edges: &EdgePixels, pixels: &PixelTables, work: &mut Work) -> Fit {

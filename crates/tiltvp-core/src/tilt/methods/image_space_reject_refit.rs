@@ -4,15 +4,14 @@ use std::sync::Arc;
 
 use nalgebra::Vector2;
 
-use super::image_space::ImageSpace;
+use super::image_space::{ImageSpace, ImageSpaceOptions};
 use super::offsets::Offsets;
 use super::{Fitter, Prepared, Setting, TiltMethod};
-use crate::edges::{EdgeOptions, EdgePixels, Screen};
+use crate::edges::{EdgeOptions, EdgePixels, Prefilter};
 use crate::error::Result;
 use crate::options;
-use crate::options::{Between, POSITIVE};
+use crate::options::Between;
 use crate::robust::{RejectRefitOptions, reject_refit};
-use crate::tilt::correction::Correction;
 use crate::tilt::fit::Fit;
 use crate::tilt::scratch::Work;
 use crate::tilt::tables::PixelTables;
@@ -24,19 +23,9 @@ options! {
         keep_fraction: f64 = 0.8 => Between(0.0, 1.0), "a share strictly between 0 and 1";
         /// Most rounds of rejecting and refitting, `N_E`; 0 is plain least squares.
         max_iterations: u32 = 15;
-        /// Largest edge offset in pixels that passes the prefilter, `s_max`; none for 40 pixels of a lens of 139.7 pixels per
-        /// radian about the vertical, and in proportion for others.
-        offset_max_px: Option<f64> = None => POSITIVE, "a positive number of pixels";
-        /// From the shift to the angle: `"closed-form"` by the gain of each pixel, None by the lens' scale at the vanishing
-        /// point, a factor in pixels per radian, a line, or a posterior.
-        correction: Correction = Correction::ClosedForm
-            => POSITIVE, "\"closed-form\", None, a positive factor, an AffineCorrection or a PosteriorCorrection";
+        /// Which offsets take part, and what their shift means.
+        [flat] space: ImageSpaceOptions = ImageSpaceOptions::default();
     }
-    check correction_is_valid
-}
-
-fn correction_is_valid(options: &ImageSpaceRejectRefitOptions) -> Result<()> {
-    options.correction.validate()
 }
 
 /// Change of the shift in pixels below which trimming has converged (Fleer 2017, section 2.1.4).
@@ -49,7 +38,7 @@ impl TiltMethod for ImageSpaceRejectRefitOptions {
 
     fn prepare(&self, setting: &Setting<'_>) -> Result<Prepared> {
         Ok(Prepared::Pixels(Arc::new(ImageSpaceRejectRefit {
-            space: ImageSpace::new(setting, &self.correction, self.offset_max_px)?,
+            space: ImageSpace::new(setting, &self.space)?,
             trimming: RejectRefitOptions {
                 keep_fraction: self.keep_fraction,
                 max_iterations: self.max_iterations,
@@ -68,12 +57,8 @@ struct ImageSpaceRejectRefit {
 }
 
 impl Fitter for ImageSpaceRejectRefit {
-    fn screen(&self) -> Option<&Screen> {
-        Some(self.space.screen())
-    }
-
-    fn normal(&self, _slot: usize, _gx: f32, _gy: f32) -> Option<[f32; 3]> {
-        None
+    fn prefilter(&self) -> Option<&Prefilter> {
+        Some(self.space.prefilter())
     }
 
     fn fit(&self, edges: &EdgePixels, pixels: &PixelTables, work: &mut Work) -> Fit {

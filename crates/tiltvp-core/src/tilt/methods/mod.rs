@@ -22,9 +22,11 @@ mod sampling;
 mod segments;
 mod vector_consensus;
 
+use std::f64::consts::FRAC_PI_2;
 use std::fmt::Debug;
 use std::sync::Arc;
 
+pub use self::image_space::ImageSpaceOptions;
 pub use self::image_space_ransac::ImageSpaceRansacOptions;
 pub use self::image_space_reject_refit::ImageSpaceRejectRefitOptions;
 pub(super) use self::offsets::edge_offset;
@@ -39,7 +41,7 @@ use super::image_edges::EdgeOrigin;
 use super::options::TiltOptions;
 use super::scratch::Work;
 use super::tables::PixelTables;
-use crate::edges::{EdgeOptions, EdgePixels, Screen};
+use crate::edges::{EdgeOptions, EdgePixels, Prefilter};
 use crate::error::Result;
 
 /// The list of methods: for each its doc, its variant with its options, and the name under which users ask for it.
@@ -84,6 +86,11 @@ pub(super) trait TiltMethod {
     /// Which pixels are edges by default.
     fn edges(&self) -> EdgeOptions;
 
+    /// `tilt_max_rad` must be below this, or for pi may be equal to it.
+    fn tilt_limit_rad(&self) -> f64 {
+        FRAC_PI_2
+    }
+
     /// Makes the tables for one camera.
     fn prepare(&self, setting: &Setting<'_>) -> Result<Prepared>;
 }
@@ -108,13 +115,15 @@ pub(super) enum Prepared {
 /// A method of edge pixels with its options and its tables.
 pub(super) trait Fitter: Debug + Send + Sync {
     /// Keeps out edge pixels that the prefilter rejects anyway; none if the method takes every edge pixel.
-    fn screen(&self) -> Option<&Screen>;
+    fn prefilter(&self) -> Option<&Prefilter>;
 
     /// Unit normal in the robot frame of the great circle of an edge pixel, by its place in the region and its gradient, if the
     /// method makes normals.
-    fn normal(&self, slot: usize, gx: f32, gy: f32) -> Option<[f32; 3]>;
+    fn normal(&self, _slot: usize, _gx: f32, _gy: f32) -> Option<[f32; 3]> {
+        None
+    }
 
-    /// The fit to the edge pixels of an image, with or without those that the screen rejects. Allocates nothing in a scratch
+    /// The fit to the edge pixels of an image, with or without those that the prefilter rejects. Allocates nothing in a scratch
     /// that has served before.
     fn fit(&self, edges: &EdgePixels, pixels: &PixelTables, work: &mut Work) -> Fit;
 }

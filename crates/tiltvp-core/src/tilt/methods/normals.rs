@@ -6,7 +6,7 @@ use std::sync::{Arc, OnceLock};
 use nalgebra::{Matrix2, Vector2, Vector3};
 
 use super::Setting;
-use crate::edges::{EdgePixels, LiftTable, NormalKind, Screen};
+use crate::edges::{EdgePixels, LiftTable, NormalKind, Prefilter};
 use crate::geometry::Tilt;
 use crate::robust::FitReport;
 use crate::tilt::fit::{Evidence, Fit, Lean};
@@ -14,18 +14,18 @@ use crate::tilt::scratch::{Inliers, Work};
 use crate::tilt::tables::PixelTables;
 use crate::tilt::trained::TrainedCorrection;
 
-/// The maps from gradients to normals and their screens, by the kind of normal.
+/// The maps from gradients to normals and their prefilters, by the kind of normal.
 #[derive(Debug, Default)]
 pub(super) struct Shared {
-    tangent: OnceLock<(Arc<LiftTable>, Screen)>,
-    gradient: OnceLock<(Arc<LiftTable>, Screen)>,
+    tangent: OnceLock<(Arc<LiftTable>, Prefilter)>,
+    gradient: OnceLock<(Arc<LiftTable>, Prefilter)>,
 }
 
 /// Normals of edge pixels whose great circles pass near the robot's vertical.
 #[derive(Debug)]
 pub(super) struct Normals {
     table: Arc<LiftTable>,
-    screen: Screen,
+    prefilter: Prefilter,
     sin_max: f64,
 }
 
@@ -38,17 +38,17 @@ impl Normals {
             NormalKind::Tangent => &shared.tangent,
             NormalKind::Gradient => &shared.gradient,
         };
-        let (table, screen) = made.get_or_init(|| {
+        let (table, prefilter) = made.get_or_init(|| {
             let (camera, rotation) = (&setting.origin.camera, &setting.origin.robot_from_camera);
             let table = LiftTable::new(camera, rotation, &setting.pixels.region, kind);
-            let screen = table.screen(sin_max);
-            (Arc::new(table), screen)
+            let prefilter = table.prefilter(sin_max);
+            (Arc::new(table), prefilter)
         });
-        Self { table: Arc::clone(table), screen: screen.with_limit(sin_max), sin_max }
+        Self { table: Arc::clone(table), prefilter: prefilter.with_limit(sin_max), sin_max }
     }
 
-    pub(super) fn screen(&self) -> &Screen {
-        &self.screen
+    pub(super) fn prefilter(&self) -> &Prefilter {
+        &self.prefilter
     }
 
     /// The unit normal of one edge pixel.

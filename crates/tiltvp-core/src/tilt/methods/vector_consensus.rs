@@ -7,7 +7,7 @@ use nalgebra::Vector3;
 
 use super::normals::{self, Normals};
 use super::{Fitter, Prepared, Setting, TiltMethod};
-use crate::edges::{EdgeOptions, EdgePixels, NormalKind, Screen};
+use crate::edges::{EdgeOptions, EdgePixels, NormalKind, Prefilter};
 use crate::error::Result;
 use crate::options;
 use crate::options::{Between, Kind, OptionValue, POSITIVE, Value};
@@ -92,8 +92,8 @@ struct VectorConsensus {
 }
 
 impl Fitter for VectorConsensus {
-    fn screen(&self) -> Option<&Screen> {
-        Some(self.normals.screen())
+    fn prefilter(&self) -> Option<&Prefilter> {
+        Some(self.normals.prefilter())
     }
 
     fn normal(&self, slot: usize, gx: f32, gy: f32) -> Option<[f32; 3]> {

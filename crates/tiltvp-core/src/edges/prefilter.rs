@@ -1,4 +1,4 @@
-//! A cheap test of gradients, row by row, that spares most edge pixels of horizontal things the dear ones.
+//! A cheap necessary condition on gradients, row by row, which rejects most edge pixels of horizontal things before the exact test.
 
 use std::sync::Arc;
 
@@ -9,9 +9,9 @@ use super::region::{Region, Span};
 /// For each pixel of a region a vector `q`; a gradient `g` may belong to a vertical edge only if
 /// `(q . g)^2 <= limit |g|^2`.
 ///
-/// Screens are necessary conditions, a hair wider than the exact test that follows, so they change no answer.
+/// Prefilters are necessary conditions, a hair wider than the exact test that follows, so they change no answer.
 #[derive(Debug, Clone)]
-pub struct Screen {
+pub struct Prefilter {
     vectors: Arc<Source>,
     /// Squared, in units of the vectors.
     limit: f32,
@@ -33,14 +33,14 @@ enum Shape {
     From { centre: [i32; 2], parts: i16 },
 }
 
-/// How much wider than the exact test a screen is: a hundred times the rounding of its few operations in single precision, each 6e-8.
+/// How much wider than the exact test a prefilter is: a hundred times the rounding of its few operations in single precision, each 6e-8.
 const HAIR: f64 = 1.0 + 5e-5;
 
 /// What rounding both components of a vector adds at most to `|q . g| / |g|`, in units of the vectors: the length of half a unit in
 /// each, and a little for the rounding of the product.
 const ROUNDED: f64 = std::f64::consts::FRAC_1_SQRT_2 + 1e-3;
 
-impl Screen {
+impl Prefilter {
     /// One vector for each pixel of the region, in slot order, and the limit of `|q . g| / |g|`.
     pub(super) fn new(vectors: &[[f32; 2]], limit: f64) -> Self {
         let largest = vectors.iter().flatten().fold(0.0, |most: f32, x| most.max(x.abs()));

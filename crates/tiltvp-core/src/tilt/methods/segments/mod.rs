@@ -1,11 +1,15 @@
 //! The method of straight edges: the vertical by the odds that each segment of the image passes through it, fused with the vote of
 //! the edge pixels.
 
+mod anywhere;
+mod choice;
+
 use std::f64::consts::{FRAC_PI_2, PI};
 use std::sync::Arc;
 
 use nalgebra::{Matrix2, Matrix3, Vector2, Vector3};
 
+use self::anywhere::{Edge, Prior, Search};
 use super::refined::{Refined, TILT_MAX_RAD};
 use super::{Fitter, Prepared, RefineOptions, Setting, TiltMethod, edge_offset};
 use crate::edges::{EdgeOptions, EdgePixels, RidgePixels};
@@ -17,7 +21,7 @@ use crate::options::Between;
 use crate::robust::Stop;
 use crate::segments::{FinderScratch, SegmentDetectorOptions, SegmentFinder, SegmentOptions, Segments};
 use crate::tilt::confidence::inverse_of_positive;
-use crate::tilt::estimate::{EdgeElement, TiltEstimate};
+use crate::tilt::estimate::{ALTERNATIVES, Alternative, EdgeElement, TiltEstimate};
 use crate::tilt::fit::Fit;
 use crate::tilt::scratch::{Scratch, Work};
 use crate::tilt::tables::PixelTables;
@@ -41,8 +45,15 @@ const BEYOND_RAD: f64 = 3f64.to_radians();
 /// Leans from the upright to the largest one that are tried to begin with: steps of a degree by default.
 const GRID: i32 = 12;
 
-/// Standard deviation in radians of the leans that are expected before the image is seen.
-const LEAN_SIGMA_RAD: f64 = 5f64.to_radians();
+/// Standard deviation of the leans that are expected before the image is seen, in largest leans: 5 degrees by default.
+const LEAN_SIGMA: f64 = 5.0 / 12.0;
+
+/// The largest lean up to which edges near the vertical are looked at alone. Beyond it those of horizontal things may be as near,
+/// and frames of three directions are weighed.
+const NEAR_MAX_RAD: f64 = 20f64.to_radians();
+
+/// Least probability of being the right one of all alternatives, below which there is no answer.
+const PROBABILITY_MIN: f64 = 0.5;
 
 /// The scatter in radians at which a segment that passes through a direction is as likely to be of it as any other.
 const EVEN_RAD: f64 = 3f64.to_radians();
@@ -63,6 +74,9 @@ const FLOOR_RAD: f64 = 0.1f64.to_radians();
 /// are told by the gradients of single pixels: set on the same locations.
 const PIXELS_RAD: f64 = 0.7f64.to_radians();
 
+/// Share of the variance that edges tell of a frame, for edges of one object err together: set on views of panoramas.
+const ANYWHERE_SHARE: f64 = 1.0;
+
 /// Leans of the grid, the best ones, of which the odds are summed exactly.
 const BEST: usize = 6;
 
@@ -73,6 +87,10 @@ const TOLERANCE_RAD: f64 = 1e-4;
 impl TiltMethod for SegmentsOptions {
     fn edges(&self) -> EdgeOptions {
         SegmentDetectorOptions::default().edges
+    }
+
+    fn tilt_limit_rad(&self) -> f64 {
+        PI
     }
 
     fn prepare(&self, setting: &Setting<'_>) -> Result<Prepared> {
@@ -95,7 +113,7 @@ impl TiltMethod for SegmentsOptions {
             let (x, y) = (f64::from(i) * step, f64::from(k) * step);
             let lean = x.hypot(y);
             let sine = if lean > 0.0 { lean.sin() / lean } else { 1.0 };
-            let prior = -0.5 * (lean / LEAN_SIGMA_RAD).powi(2);
+            let prior = -0.5 * (lean / (LEAN_SIGMA * tilt_max_rad)).powi(2);
             Lean { normal: [(x * sine) as f32, (y * sine) as f32, lean.cos() as f32], prior: prior as f32 }
         });
         Ok(Prepared::Segments(Arc::new(SegmentFit {
@@ -143,12 +161,20 @@ pub(in crate::tilt) struct SegmentWork {
     segments: Segments,
     /// The pixels that vote.
     strong: EdgePixels,
-    /// Of the segments that may be vertical: their numbers.
-    near: Vec<u32>,
+    /// Of the segments that are weighed: their numbers, and the probability of being vertical by the last fit.
+    weighed: Vec<(u32, f64)>,
+    search: Search,
     rows: Vec<Row>,
     /// The same for the grid.
     columns: Columns,
     scores: Vec<(f32, u32)>,
+}
+
+impl SegmentWork {
+    /// The directions that may be up in the last image, and what tells which one is.
+    pub(in crate::tilt) fn hypotheses(&self) -> Vec<(Vector3<f64>, Vec<f64>)> {
+        self.search.hypotheses.iter().map(|h| (h.up, h.features.to_vec())).collect()
+    }
 }
 
 /// A segment that may be vertical, in the robot frame.
@@ -225,21 +251,64 @@ impl SegmentFit {
                 finder: self.finder.scratch(region, &self.edges),
                 segments: Segments::default(),
                 strong: EdgePixels::default(),
-                near: Vec::new(),
+                weighed: Vec::new(),
+                search: Search::default(),
                 rows: Vec::new(),
                 columns: Columns::default(),
                 scores: Vec::new(),
             })
         });
         self.finder.find(image, region, self.edges.gradient_min, &mut work.finder, &mut work.segments);
-        self.weigh(work);
-        let considered = work.near.iter().map(|i| work.segments.list[*i as usize].support()).sum();
-        let fit = self.fit(work);
-        if fit.tilt.is_none() {
-            work.rows.iter_mut().for_each(|row| row.vertical = 0.0);
+        let fit = if self.tilt_max_rad > NEAR_MAX_RAD {
+            self.fit_anywhere(work)
+        } else {
+            self.weigh(work);
+            let fit = self.fit(work);
+            fused(fit, self.vote(&work.finder.ridge, tables, &mut work.strong, pixel_work))
+        };
+        let considered = work.weighed.iter().map(|(i, _)| work.segments.list[*i as usize].support()).sum();
+        fit.into_estimate(work.segments.points.len(), considered)
+    }
+
+    /// The most probable of the directions that may be up, unless none is more probable than all others together.
+    fn fit_anywhere(&self, work: &mut SegmentWork) -> Fit {
+        let SegmentWork { segments, weighed, search, .. } = work;
+        let turn = &self.robot_from_camera;
+        search
+            .take(segments.list.iter().map(|s| Edge::new(turn, &s.normal, &s.middle, s.variances_rad2, s.length_rad)));
+        search.run(&Prior { reach_rad: self.tilt_max_rad, robot_from_camera: *turn });
+        weighed.clear();
+        let Some(best) = search.hypotheses.first() else {
+            return Fit::failed(Stop::TooFew { have: search.edges.len(), need: 3 });
+        };
+        let shares = search.edges.iter().map(|edge| best.shares(edge)[2]);
+        weighed.extend(shares.enumerate().map(|(i, share)| (i as u32, share)));
+        let mut alternatives = [None; ALTERNATIVES];
+        for (slot, hypothesis) in alternatives.iter_mut().zip(&search.hypotheses) {
+            *slot = Some(Alternative { normal: hypothesis.up, probability: hypothesis.probability });
         }
-        let vote = self.vote(&work.finder.ridge, tables, &mut work.strong, pixel_work);
-        fused(fit, vote).into_estimate(work.segments.points.len(), considered)
+        let (probability, limit) = (best.probability, PROBABILITY_MIN);
+        if probability < limit {
+            weighed.iter_mut().for_each(|(_, share)| *share = 0.0);
+            let stop = Stop::Ambiguous { probability, limit, of: search.hypotheses.len() };
+            return Fit { alternatives, ..Fit::failed(stop) };
+        }
+        let vertical = || search.edges.iter().zip(weighed.iter()).filter(|(_, (_, share))| *share > 0.5);
+        let (mut squares, mut count) = (0.0, 0.0);
+        for (edge, _) in vertical() {
+            squares += edge.normal.dot(&best.up).powi(2);
+            count += 1.0;
+        }
+        let floor = Matrix2::identity() * (FLOOR_RAD * FLOOR_RAD);
+        Fit {
+            tilt: Tilt::from_normal(&best.up),
+            covariance: best.covariance().map(|covariance| covariance * ANYWHERE_SHARE + floor),
+            inliers: vertical().map(|(_, (i, _))| segments.list[*i as usize].support()).sum(),
+            rms: (squares / count).sqrt(),
+            iterations: search.hypotheses.len() as u32,
+            alternatives,
+            ..Fit::failed(Stop::Chosen { probability, of: search.hypotheses.len() })
+        }
     }
 
     /// What the strong ridge pixels near the horizon say by their gradients.
@@ -259,9 +328,9 @@ impl SegmentFit {
 
     /// Takes the longest segments that may be vertical, with their odds and weights.
     fn weigh(&self, work: &mut SegmentWork) {
-        let SegmentWork { segments, near, rows, .. } = work;
+        let SegmentWork { segments, weighed, rows, .. } = work;
         let limit = (self.tilt_max_rad + BEYOND_RAD).min(FRAC_PI_2).sin();
-        near.clear();
+        weighed.clear();
         rows.clear();
         let up = self.robot_from_camera.transpose() * Vector3::z();
         for (i, segment) in segments.list.iter().enumerate() {
@@ -280,7 +349,7 @@ impl SegmentFit {
                 azimuth: middle.y.atan2(middle.x),
                 vertical: 0.0,
             });
-            near.push(i as u32);
+            weighed.push((i as u32, 0.0));
         }
         // Edges of one object err together: they share the information of the strongest.
         for i in 0..rows.len() {
@@ -298,9 +367,8 @@ impl SegmentFit {
 
     /// The lean with the greatest sum of odds, then reweighted least squares.
     fn fit(&self, work: &mut SegmentWork) -> Fit {
-        let SegmentWork { segments, near, rows, columns, scores, .. } = work;
-        let failed =
-            |stop| Fit { tilt: None, covariance: None, inliers: 0, shift_px: None, rms: f64::NAN, iterations: 0, stop };
+        let SegmentWork { segments, weighed, rows, columns, scores, .. } = work;
+        let failed = Fit::failed;
         if rows.len() < 2 {
             return failed(Stop::TooFew { have: rows.len(), need: 2 });
         }
@@ -379,19 +447,22 @@ impl SegmentFit {
             let plane = tangent_basis(&normal).transpose().fixed_columns::<2>(0) * normal.z;
             plane * (inverse * spread * inverse) * plane.transpose() + Matrix2::identity() * (FLOOR_RAD * FLOOR_RAD)
         });
-        let inliers = rows.iter().zip(near.iter()).filter(|(row, _)| row.vertical > 0.5);
-        let inliers = inliers.map(|(_, i)| segments.list[*i as usize].support()).sum();
+        for (row, (_, vertical)) in rows.iter().zip(weighed.iter_mut()) {
+            *vertical = row.vertical;
+        }
+        let inliers = weighed.iter().filter(|(_, vertical)| *vertical > 0.5);
+        let inliers = inliers.map(|(i, _)| segments.list[*i as usize].support()).sum();
         let rms = (squares / total).sqrt();
-        Fit { tilt: Some(tilt), covariance, inliers, shift_px: None, rms, iterations, stop }
+        Fit { tilt: Some(tilt), covariance, inliers, rms, iterations, ..failed(stop) }
     }
 
     /// The edge pixels of the segments of the last image, in their order.
     pub(in crate::tilt) fn elements(&self, centre: (f32, f32), scratch: &Scratch) -> Vec<EdgeElement> {
         let Some(work) = scratch.segments.as_deref() else { return Vec::new() };
-        let SegmentWork { segments, near, rows, .. } = work;
-        let mut weighed = vec![None; segments.list.len()];
-        for (i, row) in near.iter().zip(rows) {
-            weighed[*i as usize] = Some(row.vertical > 0.5);
+        let SegmentWork { segments, weighed, .. } = work;
+        let mut vertical = vec![None; segments.list.len()];
+        for (i, share) in weighed {
+            vertical[*i as usize] = Some(*share > 0.5);
         }
         let of_segment = |(segment, vertical): (&crate::segments::Segment, Option<bool>)| {
             let normal = (self.robot_from_camera * segment.normal).cast::<f32>().into();
@@ -411,7 +482,7 @@ impl SegmentFit {
             });
             elements.collect::<Vec<_>>()
         };
-        segments.list.iter().zip(weighed).flat_map(of_segment).collect()
+        segments.list.iter().zip(vertical).flat_map(of_segment).collect()
     }
 }
 
