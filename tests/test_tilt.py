@@ -15,6 +15,7 @@ LARGEST_ERROR_DEG = {
     "image-space-ransac": 3.2,
     "image-space-reject-refit": 2.4,
     "vector-consensus": 4.2,
+    "segments": 0.4,
 }
 
 

@@ -13,6 +13,7 @@ use tiltvp_core::camera::Camera;
 use tiltvp_core::edges::NormalKind;
 use tiltvp_core::geometry::Tilt;
 use tiltvp_core::robust::{LocalOptimization, SampleOrder, Sampling, Score};
+use tiltvp_core::segments::{SegmentDetector, SegmentDetectorOptions, Segments};
 use tiltvp_core::tilt::{Correction, METHODS, Method, TiltEstimator, TiltOptions, TrainedCorrection};
 
 thread_local! {
@@ -126,6 +127,25 @@ fn no_estimate_after_the_first_allocates() {
         }
         assert!(most * 10 > estimator.region_pixels() * 4, "{most} of {} pixels", estimator.region_pixels());
     }
+}
+
+#[test]
+fn no_detection_of_straight_edges_allocates_once_lists_have_grown() {
+    let camera = camera();
+    let few = stripes(&camera, &Matrix3::identity(), &Tilt::from_alpha_beta(0.05, 1.0), 5, 0.0, 1);
+    let many = stripes(&camera, &Matrix3::identity(), &Tilt::from_alpha_beta(0.05, 1.0), 40, 3.0, 1);
+    let images = [constant(&camera, 128.0), few, many, noise(&camera, 7)];
+    let detector = SegmentDetector::new(camera, SegmentDetectorOptions::default()).unwrap();
+    let (mut scratch, mut found) = (detector.scratch(), Segments::default());
+    images.iter().for_each(|image| detector.detect(&image.view(), &mut scratch, &mut found).unwrap());
+    let mut most = 0;
+    for (i, image) in images.iter().enumerate() {
+        let taken = allocations(|| detector.detect(&image.view(), &mut scratch, &mut found).unwrap());
+        assert_eq!(taken, 0, "image {i}, {} edges", found.list.len());
+        most = most.max(found.list.len());
+    }
+    // A stable sort allocates from some twenty on.
+    assert!(most > 40, "{most} edges");
 }
 
 #[test]
