@@ -27,7 +27,7 @@ CAMERAS = {
     "pinhole": tiltvp.Camera.pinhole(
         width=320, height=240, fx=220.0, fy=224.0, cx=161.0, cy=118.0, k1=-0.25, k2=0.06, p1=0.001
     ),
-    "panorama": tiltvp.Camera.equirectangular(width=512, height=256),
+    "panorama": tiltvp.Camera.equirectangular(width=1024, height=512),
 }
 CENTRES = {
     "fisheye": [(0.0, 0.0, 1.0), (0.9, 0.3, 0.3), (0.9, -0.1, 0.02)],
