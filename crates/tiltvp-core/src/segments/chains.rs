@@ -94,8 +94,11 @@ impl Chains {
         starts.clear();
         starts.push(0);
         for (seed, place) in places.iter().enumerate() {
+            if gx[seed] * gx[seed] + gy[seed] * gy[seed] < start {
+                continue;
+            }
             let at = window.place(*place);
-            if free[at] == 0 || gx[seed] * gx[seed] + gy[seed] * gy[seed] < start {
+            if free[at] == 0 {
                 continue;
             }
             free[at] = 0;
@@ -145,11 +148,6 @@ impl Chains {
     #[inline(always)]
     pub(super) fn unit(&self, ridge_pixel: u32) -> [f32; 2] {
         self.units[ridge_pixel as usize]
-    }
-
-    /// The window of the region.
-    pub(super) fn window(&self) -> &Window {
-        &self.window
     }
 }
 

@@ -136,15 +136,10 @@ impl SegmentFinder {
         let (packed, along) = (edges.place()[k], ridge.shift_px()[k]);
         let (gx, gy) = (edges.gx()[k], edges.gy()[k]);
         let shift = if gx.abs() >= gy.abs() { [along, 0.0] } else { [0.0, along] };
-        let (bearing, change) = self.bearings.at(chains.window().place(packed), shift, unit);
+        let pixel = [(packed & 0xffff) as f32 + shift[0], (packed >> 16) as f32 + shift[1]];
+        let (bearing, change) = self.bearings.at(pixel, unit);
         let length = super::fit::dot(change, change).sqrt();
-        let point = EdgePoint {
-            bearing,
-            px_per_rad: 1.0 / length,
-            gradient: [gx, gy],
-            pixel: [(packed & 0xffff) as f32 + shift[0], (packed >> 16) as f32 + shift[1]],
-            slot: edges.slot()[k],
-        };
+        let point = EdgePoint { bearing, px_per_rad: 1.0 / length, gradient: [gx, gy], pixel, slot: edges.slot()[k] };
         (point, change)
     }
 

@@ -112,7 +112,8 @@ pub(super) fn fit(points: &[EdgePoint], toward: &Vector3<f64>, start: usize) -> 
         let tangent = along.dot(&b) / x;
         (low, high) = (low.min(tangent), high.max(tangent));
         px_per_rad += f64::from(point.px_per_rad);
-        gradient += f64::from(point.gradient[0].hypot(point.gradient[1]));
+        let [gx, gy] = point.gradient;
+        gradient += f64::from((gx * gx + gy * gy).sqrt());
     }
     let n = points.len() as f64;
     let (px_per_rad, contrast) = (px_per_rad / n, gradient / n / SCHARR);

@@ -22,6 +22,8 @@ pub(super) struct Groups {
     members: Vec<u32>,
     starts: Vec<usize>,
     order: Vec<u32>,
+    /// Normals in that order, side by side.
+    normals: Vec<Vector3<f64>>,
     taken: Vec<bool>,
     /// Segments on the circle of the longest, and the angles of their ends from its middle.
     candidates: Vec<(u32, f64, f64)>,
@@ -30,7 +32,7 @@ pub(super) struct Groups {
 impl Groups {
     /// Groups the pieces greedily, the longest first: those of its circle with a gap of at most `gap_max` lengths.
     pub(super) fn join(&mut self, pieces: &[Segment], gap_max: f64) {
-        let Self { members, starts, order, taken, candidates } = self;
+        let Self { members, starts, order, normals, taken, candidates } = self;
         members.clear();
         starts.clear();
         starts.push(0);
@@ -38,6 +40,8 @@ impl Groups {
         order.extend(0..pieces.len() as u32);
         let length = |i: u32| pieces[i as usize].length_rad;
         order.sort_unstable_by(|a, b| length(*b).total_cmp(&length(*a)).then(a.cmp(b)));
+        normals.clear();
+        normals.extend(order.iter().map(|i| pieces[*i as usize].normal));
         taken.clear();
         taken.resize(pieces.len(), false);
         for (rank, longest) in order.iter().enumerate() {
@@ -48,9 +52,9 @@ impl Groups {
             let base = &pieces[*longest as usize];
             if gap_max > 0.0 {
                 candidates.clear();
-                for i in &order[rank + 1..] {
+                for (i, normal) in order.iter().zip(normals.iter()).skip(rank + 1) {
                     let other = &pieces[*i as usize];
-                    if !taken[*i as usize] && base.normal.dot(&other.normal) > NORMALS_COS && on_circle(base, other) {
+                    if base.normal.dot(normal) > NORMALS_COS && !taken[*i as usize] && on_circle(base, other) {
                         let [a, b] = other.ends.map(|end| angle(base, &end));
                         candidates.push((*i, a.min(b), a.max(b)));
                     }

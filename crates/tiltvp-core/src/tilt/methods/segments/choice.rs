@@ -10,8 +10,8 @@ pub(super) const FEATURES: usize = 19;
 /// Logarithm of the odds for each unit of a feature: a conditional logit on views of panoramas, `tiltvp measure views`, which
 /// prints them and how well others do that have not seen the building.
 const WEIGHTS: [f64; FEATURES] = [
-    0.139, -0.423, -0.478, 0.0732, 0.285, 0.341, 0.496, 0.477, 0.175, -2.45, -1.46, 0.253, 1.29, 0.624, -0.176, 1.16,
-    1.07, 0.614, 6.48,
+    0.01687, -1.397, 0.3973, 1.023, -0.1595, 0.3314, 0.567, 1.309, -0.1152, -2.806, -2.214, -0.265, 1.045, 3.761,
+    -1.297, 0.4098, 1.024, 1.588, 15.48,
 ];
 
 /// The logarithm of the odds of a hypothesis, up to a constant.

@@ -74,8 +74,9 @@ const FLOOR_RAD: f64 = 0.1f64.to_radians();
 /// are told by the gradients of single pixels: set on the same locations.
 const PIXELS_RAD: f64 = 0.7f64.to_radians();
 
-/// Share of the variance that edges tell of a frame, for edges of one object err together: set on views of panoramas.
-const ANYWHERE_SHARE: f64 = 1.0;
+/// By how much the variance of a frame exceeds what its edges tell as if each erred on its own: with it, 87 % of the errors below
+/// five degrees are within the 90 % regions in 648 views of panoramas, the same ones on which it was set.
+const ANYWHERE_GROWTH: f64 = 4.0;
 
 /// Leans of the grid, the best ones, of which the odds are summed exactly.
 const BEST: usize = 6;
@@ -302,7 +303,7 @@ impl SegmentFit {
         let floor = Matrix2::identity() * (FLOOR_RAD * FLOOR_RAD);
         Fit {
             tilt: Tilt::from_normal(&best.up),
-            covariance: best.covariance().map(|covariance| covariance * ANYWHERE_SHARE + floor),
+            covariance: best.covariance().map(|covariance| covariance * ANYWHERE_GROWTH + floor),
             inliers: vertical().map(|(_, (i, _))| segments.list[*i as usize].support()).sum(),
             rms: (squares / count).sqrt(),
             iterations: search.hypotheses.len() as u32,
@@ -356,9 +357,11 @@ impl SegmentFit {
             let Row { azimuth, variance, .. } = rows[i];
             let together: f64 = rows
                 .iter()
-                .map(|row| {
-                    let turn = (row.azimuth - azimuth + PI).rem_euclid(2.0 * PI) - PI;
-                    (-0.5 * (turn / OBJECT_RAD).powi(2)).exp() / row.variance
+                .filter_map(|row| {
+                    let apart = (row.azimuth - azimuth).abs();
+                    let turns = apart.min(2.0 * PI - apart) / OBJECT_RAD;
+                    // Beyond, the share is below a three-thousandth.
+                    (turns < 4.0).then(|| (-0.5 * turns * turns).exp() / row.variance)
                 })
                 .sum();
             rows[i].weight /= (together * variance).sqrt();
