@@ -153,7 +153,7 @@ measure-planar-pose *arguments: setup
 measure-sampling *arguments: setup
     {{bin}}/tiltvp measure sampling "$TILTVP_DATA/panos" {{arguments}}
 
-# Each method on every row, every second, third and fourth row of views of panoramas and rendered rooms.
+# Each method of edge pixels on every row, every second, third and fourth row of views of panoramas and rendered rooms.
 measure-striding *arguments: setup
     {{bin}}/tiltvp measure striding "$TILTVP_DATA/panos" {{arguments}}
 
@@ -176,6 +176,10 @@ measure-line-peers *arguments: drives
     test -d out/peers/opencv-contrib || {{bin}}/pip install --quiet --no-deps --target out/peers/opencv-contrib \
         "opencv-contrib-python-headless==$({{bin}}/python -c 'from importlib.metadata import version; print(version("opencv-python-headless"))')"
     PYTHONPATH="$PWD/out/peers/opencv-contrib" {{bin}}/python benches/peers/line_segments.py out/drives/corridor out/drives/hall {{arguments}}
+
+# Our straight edges against OpenCV's LSD on rendered rooms whose edges are known, and the picture of both, in out/segments.
+measure-segments *arguments: setup
+    {{bin}}/python benches/peers/segments.py --picture out/segments/beside-lsd.png {{arguments}}
 
 # cv2 is that with contrib, as above; lu-vp-detect wants it too.
 # The vertical of an image by us, by the paper's methods on OpenCV and NumPy, by LSD and FLD, and by lu-vp-detect.

@@ -123,7 +123,10 @@ impl SegmentFinder {
                 _ => out.points.truncate(start),
             }
         }
-        out.list.sort_by(|a, b| b.length_rad.total_cmp(&a.length_rad));
+        // A stable sort would allocate.
+        let order =
+            |a: &Segment, b: &Segment| b.length_rad.total_cmp(&a.length_rad).then(a.points.start.cmp(&b.points.start));
+        out.list.sort_unstable_by(order);
     }
 
     /// A ridge pixel's point, and the change of the bearing by one pixel along its gradient.

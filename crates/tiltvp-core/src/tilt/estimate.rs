@@ -27,7 +27,7 @@ pub struct TiltEstimate {
     pub covariance_rad2: Matrix2<f64>,
     /// Probability, in `[0, 1]`, that the error is below two degrees and no alternative is right; 0 without a tilt.
     pub confidence: f64,
-    /// Edge pixels in the elevation band.
+    /// Edge pixels in the elevation band; of the method of straight edges those that are part of one.
     pub edge_pixels: usize,
     /// Edge pixels that passed the prefilter.
     pub prefiltered_pixels: usize,

@@ -41,7 +41,7 @@ value! {
         covariance_rad2: Matrix2<f64>,
         /// Probability, in [0, 1], that the error (eq. 44) is below two degrees, were it normal with that covariance.
         confidence: f64,
-        /// Edge pixels in the elevation band.
+        /// Edge pixels in the elevation band; of the method of straight edges those that are part of one.
         edge_pixels: usize,
         /// Edge pixels that passed the prefilter.
         prefiltered_pixels: usize,

@@ -210,7 +210,7 @@ struct Sector {
 /// grows with the square of it (Birge 1932). The vote alone where the segments tell nothing.
 fn fused(fit: Fit, vote: Fit) -> Fit {
     let (Some(tilt), Some(covariance)) = (fit.tilt, fit.covariance) else {
-        return if vote.covariance.is_some() { vote } else { fit };
+        return if vote.covariance.is_some() { Fit { inliers: fit.inliers, ..vote } } else { fit };
     };
     let (Some(other), Some(other_covariance)) = (vote.tilt, vote.covariance) else { return fit };
     let basis = tangent_basis(&tilt.normal());
@@ -268,7 +268,7 @@ impl SegmentFit {
             fused(fit, self.vote(&work.finder.ridge, tables, &mut work.strong, pixel_work))
         };
         let considered = work.weighed.iter().map(|(i, _)| work.segments.list[*i as usize].support()).sum();
-        fit.into_estimate(work.finder.ridge.edges.len(), considered)
+        fit.into_estimate(work.segments.points.len(), considered)
     }
 
     /// The most probable of the directions that may be up, unless none is more probable than all others together.
@@ -290,6 +290,7 @@ impl SegmentFit {
         }
         let (probability, limit) = (best.probability, PROBABILITY_MIN);
         if probability < limit {
+            weighed.iter_mut().for_each(|(_, share)| *share = 0.0);
             let stop = Stop::Ambiguous { probability, limit, of: search.hypotheses.len() };
             return Fit { alternatives, ..Fit::failed(stop) };
         }
