@@ -269,7 +269,7 @@ def draw(path: Path, seed: int) -> None:
             cv2.polylines(left, [np.rint(16 * line).astype(np.int32)], False, track_colour(i), 1, cv2.LINE_AA, shift=4)
         right = draw_segments(picture, camera, SegmentDetector(camera)(picture))
         both = np.hstack([left, right])
-        rows.append(cv2.resize(both, (1280, round(1280 * both.shape[0] / both.shape[1])), interpolation=cv2.INTER_AREA))
+        rows.append(cv2.resize(both, (960, round(960 * both.shape[0] / both.shape[1])), interpolation=cv2.INTER_AREA))
     write_image(path, np.vstack(rows))
 
 
@@ -284,7 +284,7 @@ def main() -> None:
     for name in CAMERAS:
         run(name, SEEDS[: arguments.rooms], arguments.rounds)
     if arguments.picture is not None:
-        draw(arguments.picture, SEEDS[0])
+        draw(arguments.picture, SEEDS[2])
 
 
 if __name__ == "__main__":
