@@ -16,6 +16,8 @@ ROOT = Path(__file__).parents[1]
 RUNS = ROOT / "docs" / "measured"
 RESTS_ON: dict[str, tuple[str, ...]] = {
     "measure-panoramas": ("cameras", "tilt", "segments"),
+    "measure-views": ("cameras", "segments"),
+    "measure-segments": ("cameras", "segments"),
     "measure-inertial": ("cameras", "tilt"),
     "measure-database": ("cameras", "tilt"),
     "measure-striding": ("cameras", "tilt"),

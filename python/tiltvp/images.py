@@ -24,9 +24,10 @@ _DEPTHS = (10, 12, 14, 16)
 def gray_from(image: ArrayLike, name: str = "image") -> NDArray[np.uint8]:
     """A C-contiguous (H, W) uint8 array from an image of any usual kind; the argument is never altered.
 
-    Colour is taken in OpenCV's order (BGR or BGRA). uint16 is scaled so that the greatest value of 10, 12, 14 or 16 bits
-    becomes 255: of the least of these depths that holds all values of the image, for sensors have fewer bits than their
-    files. Floats in [0, 1] are scaled by 255. All are rounded. Raises `InvalidInputError` for other shapes and types, empty images, NaN, and floats outside [0, 1].
+    Colour is taken in OpenCV's order (BGR or BGRA). uint16 is scaled so that the greatest value of 10, 12, 14 or 16
+    bits becomes 255: of the least of these depths that holds all values of the image, for sensors have fewer bits than
+    their files. Floats in [0, 1] are scaled by 255. All are rounded. Raises `InvalidInputError` for other shapes and
+    types, empty images, NaN, and floats outside [0, 1].
     """
     try:
         array = np.asarray(image)
@@ -88,8 +89,8 @@ def _bits_of(greatest: int) -> int:
 def read_image(path: str | os.PathLike[str]) -> NDArray[np.uint8]:
     """The image file as (H, W) or (H, W, 3) uint8, colour in BGR order. Raises `ImageFileError` with the path.
 
-    Pixels stay where the sensor has them: a calibration knows nothing of the orientation tag of a photograph. Files of 16
-    bits a value are scaled as arrays of uint16 are.
+    Pixels stay where the sensor has them: a calibration knows nothing of the orientation tag of a photograph. Files of
+    16 bits a value are scaled as arrays of uint16 are.
     """
     file = Path(path)
     try:

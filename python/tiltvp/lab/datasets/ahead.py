@@ -51,9 +51,7 @@ class AheadView:
 
 def up_from(roll_rad: float, pitch_rad: float) -> NDArray[np.float64]:
     """(3,): what is up in the frame of a camera rolled clockwise and then pitched upwards; level, it is -y."""
-    return np.array(
-        [-np.cos(pitch_rad) * np.sin(roll_rad), -np.cos(pitch_rad) * np.cos(roll_rad), np.sin(pitch_rad)]
-    )
+    return np.array([-np.cos(pitch_rad) * np.sin(roll_rad), -np.cos(pitch_rad) * np.cos(roll_rad), np.sin(pitch_rad)])
 
 
 def roll_pitch(up: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
