@@ -80,8 +80,8 @@ def segments(
                 failed = True
             bar.advance()
     printed = new_table(None, ("file", "edges", "pixels", "longest deg", "median deg", "median rms px"), ["file"])
-    for file, seen in found:
-        printed.add_row(file, *_summary(seen))
+    for image, seen in found:
+        printed.add_row(image, *_summary(seen))
     show(printed)
     if out is not None:
         write_table(segment_table(found), out)

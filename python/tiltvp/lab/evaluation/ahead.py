@@ -141,7 +141,7 @@ def ahead_table(views: Sequence[LearnedView], *, rng_seed: int = 0) -> pl.DataFr
             roll, pitch = (np.rad2deg(np.abs(a - b)) for a, b in zip(roll_pitch(ups), roll_pitch(truth), strict=True))
             roll = np.minimum(roll, 360.0 - roll)
             error = np.rad2deg(np.arccos(np.clip(np.sum(ups * truth, axis=1), -1.0, 1.0)))
-            row = {"camera": kind, "choice": name, "views": len(own)}
+            row: dict[str, str | int | float | None] = {"camera": kind, "choice": name, "views": len(own)}
             for what, errors in (("roll", roll), ("pitch", pitch)):
                 row |= {f"{what} {limit}": _area(errors, limit) for limit in (1, 5, 10)}
             answered = sum(view.estimate is not None for view in own) / len(own)
