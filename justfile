@@ -121,6 +121,10 @@ test-real *arguments: setup
 measure-panoramas *arguments: setup
     {{bin}}/tiltvp measure panoramas "$TILTVP_DATA/panos" {{arguments}}
 
+# The vertical of views that look anywhere: pinhole and fisheye views of the panoramas, rolled and pitched.
+measure-views *arguments: setup
+    {{bin}}/tiltvp measure views "$TILTVP_DATA/panos" {{arguments}}
+
 # The paper's sweep on views of all panoramas of TILTVP_DATA and on rendered rooms, as they are and made harder: the tables,
 # how far covariance and confidence can be trusted, and the report. Remove out/database to begin anew.
 measure-database *arguments: setup
@@ -153,7 +157,7 @@ measure-planar-pose *arguments: setup
 measure-sampling *arguments: setup
     {{bin}}/tiltvp measure sampling "$TILTVP_DATA/panos" {{arguments}}
 
-# Each method on every row, every second, third and fourth row of views of panoramas and rendered rooms.
+# Each method of edge pixels on every row, every second, third and fourth row of views of panoramas and rendered rooms.
 measure-striding *arguments: setup
     {{bin}}/tiltvp measure striding "$TILTVP_DATA/panos" {{arguments}}
 
@@ -176,6 +180,10 @@ measure-line-peers *arguments: drives
     test -d out/peers/opencv-contrib || {{bin}}/pip install --quiet --no-deps --target out/peers/opencv-contrib \
         "opencv-contrib-python-headless==$({{bin}}/python -c 'from importlib.metadata import version; print(version("opencv-python-headless"))')"
     PYTHONPATH="$PWD/out/peers/opencv-contrib" {{bin}}/python benches/peers/line_segments.py out/drives/corridor out/drives/hall {{arguments}}
+
+# Our straight edges against OpenCV's LSD on rendered rooms whose edges are known, and the picture of both, in out/segments.
+measure-segments *arguments: setup
+    {{bin}}/python benches/peers/segments.py --picture out/segments/beside-lsd.png {{arguments}}
 
 # cv2 is that with contrib, as above; lu-vp-detect wants it too.
 # The vertical of an image by us, by the paper's methods on OpenCV and NumPy, by LSD and FLD, and by lu-vp-detect.

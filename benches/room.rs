@@ -25,12 +25,20 @@ pub fn fisheye() -> Result<Camera> {
 /// # Errors
 /// None, for these numbers.
 pub fn picture() -> Result<Vec<u8>> {
+    seen_by(&fisheye()?, Matrix3::identity())
+}
+
+/// The same office through any camera with any mounting.
+///
+/// # Errors
+/// If the mounting is no rotation.
+pub fn seen_by(camera: &Camera, robot_from_camera: Matrix3<f64>) -> Result<Vec<u8>> {
     let world = World::new(&RoomOptions { light_spacing_m: 0.6, ..RoomOptions::new(RoomKind::Office, 3) })?;
     let pose = world.free_poses(1, 3)?.first().copied().unwrap_or_default();
-    let camera = fisheye()?;
     let lens = |x: f64, y: f64| camera.unproject(&Vector2::new(x, y));
     let tilt = Tilt::from_alpha_beta(4.15f64.to_radians(), 0.5);
-    let view = View { tilt, ..View::new(&lens, SIZE.0, SIZE.1, pose) };
+    let size = (camera.width() as usize, camera.height() as usize);
+    let view = View { tilt, robot_from_camera, ..View::new(&lens, size.0, size.1, pose) };
     Ok(render(&world, &view, &RenderOptions { noise_sigma: 2.0, ..RenderOptions::default() })?.image.gray)
 }
 

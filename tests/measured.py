@@ -15,7 +15,9 @@ from pathlib import Path
 ROOT = Path(__file__).parents[1]
 RUNS = ROOT / "docs" / "measured"
 RESTS_ON: dict[str, tuple[str, ...]] = {
-    "measure-panoramas": ("cameras", "tilt"),
+    "measure-panoramas": ("cameras", "tilt", "segments"),
+    "measure-views": ("cameras", "segments"),
+    "measure-segments": ("cameras", "segments"),
     "measure-inertial": ("cameras", "tilt"),
     "measure-database": ("cameras", "tilt"),
     "measure-striding": ("cameras", "tilt"),

@@ -14,6 +14,7 @@ OWNERS: dict[str, tuple[str, Sequence[str]]] = {
     "TiltEstimator": ("the tilt of one image: [tilt.md](tilt.md)", _core.METHODS),
     "TiltFilter": ("the tilt of successive images: [tilt.md](tilt.md#successive-images)", ()),
     "common_direction": ("great-circle normals of your own", ()),
+    "SegmentDetector": ("straight edges of an image: [segments.md](segments.md)", ()),
     "LineExtractor": ("vertical lines of an image: [lines.md](lines.md)", _core.LINE_METHODS),
     "match_descriptors": ("`tiltvp.lines.match`", ()),
     "LineTracker": ("lines through successive images", ()),

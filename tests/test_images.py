@@ -12,7 +12,7 @@ import pytest
 import tiltvp
 from tiltvp.cli.inputs import distinct_names, find_images
 from tiltvp.errors import ImageFileError, InvalidInputError, OutputError
-from tiltvp.images import gray_from
+from tiltvp.images import gray_from, read_image
 
 LEVELS = np.arange(256, dtype=np.uint8).reshape(16, 16)
 
@@ -134,3 +134,17 @@ def test_images_are_found_once_and_named_apart(tmp_path: Path) -> None:
     names = distinct_names(files)
     assert names == ["x_a_png", "x_a_jpg", "B", "y_a_png"]
     assert distinct_names([Path("p/a.png"), Path("P/A.png"), Path("p_a.png")]) == ["p_a", "P_A_2", "p_a_3"]
+
+
+@pytest.mark.parametrize("bits", [10, 12, 14, 16])
+def test_values_of_sensors_with_fewer_bits_are_not_black(tmp_path: Path, bits: int) -> None:
+    white = 2**bits - 1
+    deep = (LEVELS.astype(np.uint32) * white // 255).astype(np.uint16)
+    deep[0, 0] = white
+    expected = LEVELS.copy()
+    expected[0, 0] = 255
+    path = tmp_path / "deep.png"
+    cv2.imwrite(str(path), deep)
+    for gray in (gray_from(deep), read_image(path)):
+        assert gray.dtype == np.uint8
+        assert np.abs(gray.astype(int) - expected).max() <= 1

@@ -8,6 +8,7 @@ import pytest
 
 import tiltvp
 from tiltvp.cli.app import main
+from tiltvp.lab.evaluation.combinations import PIXEL_METHODS
 from tiltvp.lab.evaluation.striding import stride_views, summarise_strides
 from tiltvp.lab.evaluation.views import room_views
 
@@ -18,7 +19,7 @@ CAMERA = tiltvp.Camera.equidistant(width=320, height=240, focal_px=69.8, cx=159.
 def test_the_table_has_a_row_for_each_method_and_stride() -> None:
     views = list(room_views(1, CAMERA, kinds=("office",)))
     table = stride_views(views, CAMERA, strides=(1, 3), repeats=1)
-    assert len(table) == len(views) * len(tiltvp.METHODS) * 2
+    assert len(table) == len(views) * len(PIXEL_METHODS) * 2
     estimator = tiltvp.TiltEstimator(CAMERA, row_stride=3)
     estimate = estimator(views[2].image)
     truth = tiltvp.normal_from_alpha_beta(views[2].alpha_rad, views[2].beta_rad)
@@ -26,9 +27,9 @@ def test_the_table_has_a_row_for_each_method_and_stride() -> None:
     assert row["error_rad"] == pytest.approx(tiltvp.tilt_error_rad(estimate.normal, truth), abs=1e-12)
     assert row["covariance_xy"] == estimate.covariance_rad2[0, 1]
     summary = summarise_strides(table)
-    assert summary["method"].to_list() == [method for method in tiltvp.METHODS for _ in range(2)]
+    assert summary["method"].to_list() == [method for method in PIXEL_METHODS for _ in range(2)]
     first = summary.filter(row_stride=1)
-    assert first["time"].to_list() == [1.0] * len(tiltvp.METHODS)
+    assert first["time"].to_list() == [1.0] * len(PIXEL_METHODS)
     assert all(0.0 <= held <= 1.0 for held in summary["held"])
     refined = table.filter(method="refined", row_stride=1)["error_rad"].mean()
     assert summary.filter(method="refined", row_stride=1)["mean"].item() == pytest.approx(math.degrees(refined))

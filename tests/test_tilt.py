@@ -15,6 +15,7 @@ LARGEST_ERROR_DEG = {
     "image-space-ransac": 3.2,
     "image-space-reject-refit": 2.4,
     "vector-consensus": 4.2,
+    "segments": 0.4,
 }
 
 
@@ -73,7 +74,9 @@ def test_edges_tell_their_normals(camera: tiltvp.Camera, room: RoomImage, method
         return
     assert np.linalg.norm(normals, axis=1) == pytest.approx(np.ones(len(edges)), abs=1e-6)
     bearings = camera.unproject(np.stack([edges.u, edges.v], axis=1).astype(float))
-    assert np.einsum("ni,ni->n", normals, bearings) == pytest.approx(np.zeros(len(edges)), abs=5e-3)
+    # Straight edges pass between pixel centres, at most one and a half away.
+    beside = 0.02 if method == "segments" else 5e-3
+    assert np.einsum("ni,ni->n", normals, bearings) == pytest.approx(np.zeros(len(edges)), abs=beside)
     away = np.arcsin(np.abs(normals @ estimate.normal))
     # Inliers are within the threshold, of the random sample's direction where there is one.
     assert away[edges.inlier].max() < math.radians(4.1 if method == "refined" else 10.0)

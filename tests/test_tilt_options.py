@@ -58,13 +58,25 @@ CHANGES: dict[str, dict[str, Any]] = {
         "correction": 1.8,
         **SAMPLING,
     },
+    "segments": {
+        **{name: value for name, value in EDGES.items() if name != "row_stride"},
+        "gradient_start": 800.0,
+        "stray_max_px": 0.2,
+        "rms_max_px": 0.2,
+        "support_min_px": 30,
+        "gap_max": 0.0,
+        "scatter_rad": 0.05,
+        "segments_max": 4,
+    },
 }
-DRAWS_NOTHING = {("refined", "seed"), ("image-space-reject-refit", "seed")}
+DRAWS_NOTHING = {("refined", "seed"), ("image-space-reject-refit", "seed"), ("segments", "seed")}
+EVERY_ROW = ("segments", "row_stride")
 
 
 @pytest.mark.parametrize("method", tiltvp.METHODS)
 def test_every_option_is_listed_here(camera: tiltvp.Camera, method: str) -> None:
     listed = set(CHANGES[method]) | {name for owner, name in DRAWS_NOTHING if owner == method}
+    listed |= {EVERY_ROW[1]} if method == EVERY_ROW[0] else set()
     assert set(tiltvp.TiltEstimator(camera, method=method).options) == listed
 
 
@@ -137,6 +149,12 @@ def test_options_in_force_are_keywords(camera: tiltvp.Camera, method: str) -> No
         ({"method": "vector-consensus", "normal": "radial"}, ["gradient", "tangent"]),
         ({"method": "vector-consensus", "threshold_rad": 5.0}, ["threshold_rad"]),
         ({"method": "vector-consensus", "correction": 0.0}, ["correction"]),
+        ({"method": "segments", "row_stride": 2}, ["row_stride = 2", "expected 1", "row to row"]),
+        ({"method": "segments", "margin_px": 0.0}, ["margin_px = 0", "at least 1 pixel"]),
+        ({"method": "segments", "scatter_rad": 0.0}, ["scatter_rad"]),
+        ({"method": "segments", "segments_max": 1}, ["segments_max = 1", "from 2"]),
+        ({"method": "segments", "support_min_px": 3}, ["support_min_px = 3", "from 4"]),
+        ({"method": "segments", "gap_max": -1.0}, ["gap_max"]),
         ({"robot_from_camera": np.zeros((3, 3))}, ["robot_from_camera", "rotation"]),
         ({"robot_from_camera": np.diag([1.0, 1.0, -1.0])}, ["determinant"]),
         ({"robot_from_camera": 1.001 * np.eye(3)}, ["rotation"]),

@@ -65,6 +65,8 @@ def fixture_values(camera: tiltvp.Camera, room: RoomImage) -> dict[str, list[Any
         *(lines, tl.LineTracker().update(lines, extractor.describe(room.gray, lines))),
         *(calibrator.step(0.1, 0.1, [1], [0.3]), calibrator.estimate),
         tiltvp.calibrate(drive.odometry, drive.bearings, wheel_base_m=0.4, start=(0.2, 0.0, 0.0)),
+        *tiltvp.TiltEstimator(camera, method="segments", tilt_max_rad=0.8)(room.gray).alternatives,
+        *(tiltvp.SegmentDetector(camera)(image) for image in (room.gray, np.zeros_like(room.gray))),
         *corners(),
     ]
     values += values[-1].hypotheses or [_core.CornerHypothesis.from_dict(hypothesis())]
@@ -152,6 +154,7 @@ def test_every_item_tells_values_apart(values: dict[str, list[Any]], name: str) 
         "FilterStep",
         "Lines",
         "CommonDirection",
+        "Segments",
     }
 
 

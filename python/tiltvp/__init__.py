@@ -19,6 +19,8 @@ from tiltvp.corrections import (
 )
 from tiltvp.images import read_image, write_image
 from tiltvp.overlays.edges import draw_edges
+from tiltvp.overlays.segments import draw_segments
+from tiltvp.segments import SegmentDetector, Segments
 from tiltvp.selfcalib import (
     CALIBRATION_METHODS,
     CalibrationStep,
@@ -64,6 +66,8 @@ __all__ = [
     "MountingEstimate",
     "PosteriorCorrection",
     "PriorOfTilt",
+    "SegmentDetector",
+    "Segments",
     "SelfCalibrator",
     "TiltEstimate",
     "TiltEstimator",
@@ -73,6 +77,7 @@ __all__ = [
     "common_direction",
     "corner",
     "draw_edges",
+    "draw_segments",
     "level",
     "lines",
     "normal_from_alpha_beta",

@@ -59,9 +59,12 @@ __all__ = [
     "PriorOfTilt",
     "ResolvedAttitude",
     "Room",
+    "SegmentDetector",
+    "Segments",
     "SelfCalibrator",
     "SimulatedDrive",
     "StereoSequence",
+    "TiltAlternative",
     "TiltEstimate",
     "TiltEstimator",
     "TiltFilter",
@@ -1308,14 +1311,26 @@ class FitReport:
     def stop(
         self,
     ) -> Literal[
-        "confident", "trial-limit", "converged", "settled", "iteration-limit", "too-few", "no-model", "out-of-reach"
+        "confident",
+        "trial-limit",
+        "converged",
+        "settled",
+        "iteration-limit",
+        "too-few",
+        "no-model",
+        "out-of-reach",
+        "chosen",
+        "ambiguous",
+        "undetermined",
     ]:
         """Why the fit stopped, in a word.
 
         "confident": random sampling has drawn as many samples as its confidence needs; "trial-limit": it has drawn all
         it may. "converged": the model has stopped changing; "settled": the residuals are small enough;
-        "iteration-limit": refitting has been repeated as often as it may. No answer comes of "too-few" observations,
-        "no-model" (they are all alike) and "out-of-reach" (an angle that the method cannot mean).
+        "iteration-limit": refitting has been repeated as often as it may. "chosen": of several alternatives one is more
+        probable than all others together; "ambiguous": none is. No answer comes of "too-few" observations, "no-model"
+        (they are all alike), "out-of-reach" (an angle that the method cannot mean) and "undetermined" (nothing tells
+        how far it may be off).
         """
 
     def to_dict(self) -> dict[str, Any]:
@@ -2091,6 +2106,11 @@ class Room:
     ) -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:
         """Grey (height, 2 height) and RGB (height, 2 height, 3) images of everything around a place."""
 
+    def _straight_edges(
+        self, camera: Camera, contrast_min: float, **options: Any
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """(N, 2, 3) bearings of the ends in the camera frame and (N,) contrasts of the straight edges in sight."""
+
     @property
     def clutter(self) -> float:
         """How full it is, from 0 to 1."""
@@ -2143,6 +2163,147 @@ class Room:
     @property
     def wall_pattern(self) -> str:
         """Which of `WALL_PATTERNS` its walls have in common."""
+
+@disjoint_base
+class SegmentDetector:
+    """Finds straight edges as arcs of great circles in the images of one camera, whatever its lens.
+
+    The tables of the camera are made once. `tiltvp.SegmentDetector` takes images of any usual kind.
+
+    `camera` is the camera whose images will come. `options` tells the options in force.
+
+    Raises `tiltvp.errors.InvalidInputError` for an option that it does not have (it names the near ones) or that is out
+    of its domain, for a mask of another size than the camera's images, and where no pixel is left.
+    """
+
+    def __copy__(self) -> Self: ...
+    def __deepcopy__(self, _memo: Any) -> Self: ...
+    def __eq__(self, other: object, /) -> bool: ...
+    def __hash__(self) -> int: ...
+    def __new__(
+        cls,
+        camera: Camera,
+        *,
+        gradient_min: float = ...,
+        smoothing_px: float = ...,
+        margin_px: float = ...,
+        mask: NDArray[np.bool_] | None = ...,
+        gradient_start: float = ...,
+        stray_max_px: float = ...,
+        rms_max_px: float = ...,
+        support_min_px: SupportsIndex = ...,
+        gap_max: float = ...,
+    ) -> Self:
+        """The options, by keyword.
+
+        Parameters
+        ----------
+        gradient_min
+            Least gradient magnitude `I_min` of an edge pixel, for the Scharr kernel (3, 10, 3) on 8-bit grey levels.
+            Default: 64.
+        smoothing_px
+            Standard deviation of the Gaussian before the Scharr kernel in pixels, 0 for none. Default: 0.7.
+        margin_px
+            Pixels kept clear of the lens' rim, the image border and the mask, beside those the kernels reach. Default:
+            2.
+        mask
+            Pixels that show the world; none for all. Default: None.
+        gradient_start
+            Gradient magnitude from which a chain may start, for the Scharr kernel on 8-bit grey levels; it goes on down
+            to `gradient_min`. Default: 128.
+        stray_max_px
+            How far in pixels a chain may stray from the great circle through its ends before it is cut. Default: 0.8.
+        rms_max_px
+            Greatest root mean square distance of the pixels of a segment from its great circle, in pixels. Default:
+            0.7.
+        support_min_px
+            Least number of pixels of a segment. Default: 12.
+        gap_max
+            Widest gap between two pieces of one great circle that are joined, in lengths of the longer one; 0 joins
+            none. Default: 1.
+        """
+
+    def _detect(self, image: NDArray[np.uint8]) -> Segments:
+        """The straight edges of a C-contiguous (H, W) image of uint8."""
+
+    @property
+    def camera(self) -> Camera:
+        """The camera whose images are read."""
+
+    @property
+    def options(self) -> dict[str, Any]:
+        """The options that are in force, by name, defaults included; a fresh dict, good as keywords."""
+
+@final
+class Segments:
+    """The straight edges of one image, the longest first. Frozen, comparable, to be pickled.
+
+    `SegmentDetector` makes them. All directions are in the camera frame.
+    """
+
+    def __copy__(self) -> Self: ...
+    def __deepcopy__(self, _memo: Any) -> Self: ...
+    def __eq__(self, other: object, /) -> bool: ...
+    def __hash__(self) -> int: ...
+    def __len__(self) -> int: ...
+    @property
+    def contrast(self) -> NDArray[np.float64]:
+        """(N,) float64: mean gradients, grey levels per pixel."""
+
+    @property
+    def covariance(self) -> NDArray[np.float64]:
+        """(N, 3, 3) float64: covariances of the normals, squared radians; of rank two, in the planes across the
+        normals.
+        """
+
+    @property
+    def ends(self) -> NDArray[np.float64]:
+        """(N, 2, 3) float64: unit bearings of the ends; from the first to the second is a positive turn about the
+        normal.
+        """
+
+    @classmethod
+    def from_dict(cls, values: dict[str, Any]) -> Self:
+        """The value of a dict as `to_dict` makes it, equal to the last bit."""
+
+    @property
+    def length_rad(self) -> NDArray[np.float64]:
+        """(N,) float64: angles between the ends, radians."""
+
+    @property
+    def middle(self) -> NDArray[np.float64]:
+        """(N, 3) float64: unit bearings of the middles of the pixels."""
+
+    @property
+    def normal(self) -> NDArray[np.float64]:
+        """(N, 3) float64: unit normals of the great circles, towards the brighter side."""
+
+    def pixels(self, index: SupportsIndex) -> NDArray[np.float64]:
+        """(K, 2) float64: the places (u, v) of the edge in the pixels of segment `index`.
+
+        Raises `IndexError` for a segment that is not there.
+        """
+
+    @property
+    def points_px(self) -> NDArray[np.float64]:
+        """(P, 2) float64: the places (u, v) of the edges in the supporting pixels, segment by segment."""
+
+    @property
+    def rms_px(self) -> NDArray[np.float64]:
+        """(N,) float64: root mean square distances of the pixels from the circles, pixels."""
+
+    @property
+    def support(self) -> NDArray[np.uint32]:
+        """(N,) uint32: how many pixels support each."""
+
+    def to_dict(self) -> dict[str, Any]:
+        """The attributes by name, arrays as nested lists: plain, good for JSON."""
+
+    @property
+    def variances_rad2(self) -> NDArray[np.float64]:
+        """(N, 2) float64: variances in squared radians of the turns of the normal about `normal` x `middle`, which
+        moves the arc sideways, and about `middle`, which turns it.
+        """
 
 @final
 class SelfCalibrator:
@@ -2401,6 +2562,29 @@ class StereoSequence:
         """(N,): when each frame is taken, seconds."""
 
 @final
+class TiltAlternative:
+    """A direction that may be up. Frozen, comparable, hashable, and to be pickled."""
+
+    def __copy__(self) -> Self: ...
+    def __deepcopy__(self, _memo: Any) -> Self: ...
+    def __eq__(self, other: object, /) -> bool: ...
+    def __hash__(self) -> int: ...
+    @classmethod
+    def from_dict(cls, values: dict[str, Any]) -> Self:
+        """The value of a dict as `to_dict` makes it, equal to the last bit."""
+
+    @property
+    def normal(self) -> NDArray[np.float64]:
+        """(3,): the unit ground normal in the robot frame."""
+
+    @property
+    def probability(self) -> float:
+        """Probability, in [0, 1], of being the right one of all."""
+
+    def to_dict(self) -> dict[str, Any]:
+        """The attributes by name, arrays as nested lists: plain, good for JSON."""
+
+@final
 class TiltEstimate:
     """The tilt of one image. Frozen, comparable (to the last bit), hashable, and to be pickled. True if there is a
     tilt.
@@ -2417,6 +2601,12 @@ class TiltEstimate:
     @property
     def alpha_rad(self) -> float:
         """How far the robot leans, in [0, pi] radians (eq. 1)."""
+
+    @property
+    def alternatives(self) -> list[TiltAlternative]:
+        """Directions that may be up, the most probable first; only of the method "segments" where it looks anywhere
+        (`tilt_max_rad` above 20 degrees). The first is the tilt, where there is one.
+        """
 
     @property
     def beta_rad(self) -> float:
@@ -2438,7 +2628,7 @@ class TiltEstimate:
 
     @property
     def edge_pixels(self) -> int:
-        """Edge pixels in the elevation band."""
+        """Edge pixels in the elevation band; of the method of straight edges those that are part of one."""
 
     @classmethod
     def from_dict(cls, values: dict[str, Any]) -> Self:
@@ -2504,7 +2694,8 @@ class TiltEstimator:
         cls,
         camera: Camera,
         *,
-        method: Literal["refined", "image-space-ransac", "image-space-reject-refit", "vector-consensus"] | str = ...,
+        method: Literal["refined", "image-space-ransac", "image-space-reject-refit", "vector-consensus", "segments"]
+        | str = ...,
         robot_from_camera: ArrayLike | None = None,
         _like: TiltEstimator | None = None,
         gradient_min: float = ...,
@@ -2528,6 +2719,13 @@ class TiltEstimator:
         score: Literal["count", "msac"] = ...,
         threshold_rad: float = ...,
         normal: Literal["gradient", "tangent"] = ...,
+        gradient_start: float = ...,
+        stray_max_px: float = ...,
+        rms_max_px: float = ...,
+        support_min_px: SupportsIndex = ...,
+        gap_max: float = ...,
+        scatter_rad: float = ...,
+        segments_max: SupportsIndex = ...,
     ) -> Self:
         """The options, by keyword.
 
@@ -2540,16 +2738,17 @@ class TiltEstimator:
             Standard deviation of the Gaussian before the Scharr kernel in pixels, 0 for none. The default depends on
             the method.
         elevation_min_rad
-            Lowest elevation above the robot's horizon in radians. Default: 0.
+            Lowest elevation above the robot's horizon in radians. The default depends on the method.
         elevation_max_rad
-            Highest elevation above the robot's horizon in radians. Default: 0.785398.
+            Highest elevation above the robot's horizon in radians. The default depends on the method.
         margin_px
-            Pixels kept clear of the lens' rim, the image border and the mask, beside those the kernels reach. Default:
-            1.
+            Pixels kept clear of the lens' rim, the image border and the mask, beside those the kernels reach. The
+            default depends on the method.
         tilt_max_rad
             Largest lean expected, in radians: edges that would need a larger one are rejected first. None for 12
             degrees of the refined method and 7 of vector consensus; the image-space methods have `offset_max_px`
-            instead, and this, where given, sets it to the shift of that lean. Default: None.
+            instead, and this, where given, sets it to the shift of that lean. From 20 degrees on the method segments
+            looks for the vertical anywhere. Default: None.
         mask
             Pixels that show the world and not the robot; none for all. Default: None.
         row_stride
@@ -2598,6 +2797,25 @@ class TiltEstimator:
         normal
             "vector-consensus": How normals are made: `"gradient"` as Fleer 2017 does, `"tangent"` exactly. Default:
             "gradient".
+        gradient_start
+            "segments": Gradient magnitude from which a chain may start, for the Scharr kernel on 8-bit grey levels; it
+            goes on down to `gradient_min`. Default: 128.
+        stray_max_px
+            "segments": How far in pixels a chain may stray from the great circle through its ends before it is cut.
+            Default: 0.8.
+        rms_max_px
+            "segments": Greatest root mean square distance of the pixels of a segment from its great circle, in pixels.
+            Default: 0.7.
+        support_min_px
+            "segments": Least number of pixels of a segment. Default: 8.
+        gap_max
+            "segments": Widest gap between two pieces of one great circle that are joined, in lengths of the longer one;
+            0 joins none. Default: 1.
+        scatter_rad
+            "segments": Standard deviation in radians by which the edges of vertical things miss the vertical. Default:
+            0.010472.
+        segments_max
+            "segments": The most segments that are weighed, the longest ones. Default: 64.
         """
 
     def _detect(self, image: NDArray[np.uint8]) -> ImageEdges:
@@ -2611,6 +2829,9 @@ class TiltEstimator:
 
     def _estimate_with_edges(self, image: NDArray[np.uint8]) -> tuple[TiltEstimate, EdgeElements]:
         """The tilt of such an image, and its edge pixels."""
+
+    def _hypotheses(self, image: NDArray[np.uint8]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """(K, 3), (K, F): directions that may be up in such an image and what tells which is, for training."""
 
     @property
     def camera(self) -> Camera:

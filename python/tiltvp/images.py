@@ -21,13 +21,17 @@ __all__ = ["bgr_from", "gray_from", "read_image", "write_image"]
 LARGEST_IMAGE_BYTES: Final = 1 << 30
 """Of an image file: as many pixels as a camera may have, in three uncompressed colours, and a half more."""
 _EXPECTED = "(H, W) or (H, W, 3 or 4 in BGR order) of uint8, uint16, or float in [0, 1]"
+_DEPTHS = (10, 12, 14, 16)
+"""Bits that sensors have where files and arrays have 16."""
 
 
 def gray_from(image: ArrayLike, name: str = "image") -> NDArray[np.uint8]:
     """A C-contiguous (H, W) uint8 array from an image of any usual kind; the argument is never altered.
 
-    Colour is taken in OpenCV's order (BGR or BGRA), uint16 is scaled by 1 / 257 and floats in [0, 1] by 255, both
-    rounded. Raises `InvalidInputError` for other shapes and types, empty images, NaN, and floats outside [0, 1].
+    Colour is taken in OpenCV's order (BGR or BGRA). uint16 is scaled so that the greatest value of 10, 12, 14 or 16
+    bits becomes 255: of the least of these depths that holds all values of the image, for sensors have fewer bits than
+    their files. Floats in [0, 1] are scaled by 255. All are rounded. Raises `InvalidInputError` for other shapes and
+    types, empty images, NaN, and floats outside [0, 1].
     """
     try:
         array = np.asarray(image)
@@ -68,7 +72,8 @@ def _bytes_from(array: NDArray[Any], name: str) -> NDArray[np.uint8]:
     if array.dtype == np.uint8:
         return array
     if array.dtype == np.uint16:
-        return np.asarray((array.astype(np.uint32) + 128) // 257, dtype=np.uint8)
+        white = 2 ** _bits_of(int(array.max())) - 1
+        return np.asarray((array.astype(np.uint32) * 255 + white // 2) // white, dtype=np.uint8)
     if array.dtype == np.bool_:
         return array.astype(np.uint8) * np.uint8(255)
     if array.dtype.kind == "f":
@@ -80,10 +85,16 @@ def _bytes_from(array: NDArray[Any], name: str) -> NDArray[np.uint8]:
     raise InvalidInputError(f"{name}: dtype {array.dtype}, expected {_EXPECTED}")
 
 
+def _bits_of(greatest: int) -> int:
+    """The depth of a sensor whose values stand in 16 bits, by the greatest of them."""
+    return next(bits for bits in _DEPTHS if greatest < 2**bits)
+
+
 def read_image(path: str | os.PathLike[str]) -> NDArray[np.uint8]:
     """The image file as (H, W) or (H, W, 3) uint8, colour in BGR order. Raises `ImageFileError` with the path.
 
-    Pixels stay where the sensor has them: a calibration knows nothing of the orientation tag of a photograph.
+    Pixels stay where the sensor has them: a calibration knows nothing of the orientation tag of a photograph. Files of
+    16 bits a value are scaled as arrays of uint16 are.
     """
     file = Path(path)
     try:
@@ -103,10 +114,13 @@ def _decode(data: bytes) -> NDArray[np.uint8] | None:
     import cv2
 
     try:
-        image = cv2.imdecode(np.frombuffer(data, dtype=np.uint8), cv2.IMREAD_ANYCOLOR | cv2.IMREAD_IGNORE_ORIENTATION)
+        depths = cv2.IMREAD_ANYCOLOR | cv2.IMREAD_ANYDEPTH | cv2.IMREAD_IGNORE_ORIENTATION
+        image = cv2.imdecode(np.frombuffer(data, dtype=np.uint8), depths)
     except (cv2.error, MemoryError):
         return None
-    return None if image is None else np.asarray(image, dtype=np.uint8)
+    if image is None or image.dtype not in (np.uint8, np.uint16):
+        return None
+    return _bytes_from(np.asarray(image), "image")
 
 
 def write_image(path: str | os.PathLike[str], image: NDArray[np.uint8]) -> None:

@@ -120,6 +120,34 @@ class Room(_core.Room):
         )
         return RoomImage(gray, np.ascontiguousarray(rgb[:, :, ::-1]), alpha_rad, beta_rad)
 
+    def straight_edges(
+        self,
+        camera: Camera,
+        *,
+        pose: ArrayLike,
+        alpha_rad: float = 0.0,
+        beta_rad: float = 0.0,
+        robot_from_camera: ArrayLike | None = None,
+        camera_height_m: float | None = None,
+        contrast_min: float = 0.05,
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """The straight edges that are in sight in the picture that `render` makes of the same view, the longest first.
+
+        (N, 2, 3) unit bearings of the ends in the camera frame, and (N,) contrasts |a - b| / (a + b) of the luminances
+        beside the edges, at least `contrast_min` all along. Edges are the sides of flat surfaces and the upright
+        edges of patterned walls, whole or the parts that nothing hides; edges of other textures and of shadows are not
+        among them. Raises `tiltvp.errors.InvalidInputError`, also for a place outside the room.
+        """
+        return self._straight_edges(
+            camera,
+            contrast_min,
+            pose=pose,
+            alpha_rad=alpha_rad,
+            beta_rad=beta_rad,
+            robot_from_camera=robot_from_camera,
+            camera_height_m=camera_height_m,
+        )
+
     def render_panorama(
         self,
         *,

@@ -132,6 +132,20 @@ def tilts() -> Iterator[tuple[str, Any]]:
     yield "posterior applied", tiltvp.apply_correction(posterior, shift[:20])
 
 
+def straight_edges() -> Iterator[tuple[str, Any]]:
+    for name, camera, image, mounting in leaning_views():
+        yield f"{name} image", image
+        for title, options in (("", {}), ("apart", {"gap_max": 0.0, "stray_max_px": 0.5, "support_min_px": 20})):
+            yield f"{name} edges {title}".rstrip(), tiltvp.SegmentDetector(camera, **options)(image)
+        estimator = tiltvp.TiltEstimator(camera, method="segments", robot_from_camera=mounting)
+        estimate, edges = estimator.with_edges(image)
+        yield f"{name} tilt", estimate
+        yield f"{name} tilt edges", {part: getattr(edges, part) for part in EDGES}
+    camera = CAMERAS["equirectangular"]
+    image = synth.Room("office", 7).render_panorama(pose=(2.0, 2.0, 0.4), height=128, samples=2).gray
+    yield "panorama", tiltvp.SegmentDetector(camera)(image)
+
+
 def filters() -> Iterator[tuple[str, Any]]:
     rng = np.random.default_rng(2)
     for title, options in (("plain", {}), ("mounting", {"estimate_mounting": True})):
@@ -233,6 +247,7 @@ def corners() -> Iterator[tuple[str, Any]]:
 GROUPS: dict[str, Callable[[], Iterator[tuple[str, Any]]]] = {
     "cameras": lenses,
     "tilt": tilts,
+    "segments": straight_edges,
     "filters": filters,
     "lines": lines_and_tracks,
     "calibration": calibrations,

@@ -6,8 +6,9 @@
 //! 1. [`error`], [`geometry`], [`interrupt`], [`options`]
 //! 2. [`camera`], [`image`], [`robust`], [`filter`]
 //! 3. [`edges`]
-//! 4. [`tilt`], [`corner`], [`lines`]
-//! 5. [`selfcalib`]
+//! 4. [`segments`]
+//! 5. [`tilt`], [`corner`], [`lines`]
+//! 6. [`selfcalib`]
 //!
 //! Angles are radians, lengths metres, pixel centres integers, rays unit bearings. The camera frame has `z` along the
 //! optical axis, `x` to the right (columns) and `y` down (rows); the robot frame has `x` forward, `y` left, `z` up.
@@ -25,6 +26,7 @@ pub mod interrupt;
 pub mod lines;
 pub mod options;
 pub mod robust;
+pub mod segments;
 pub mod selfcalib;
 #[cfg(feature = "testing")]
 pub mod testing;

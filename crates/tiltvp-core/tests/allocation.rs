@@ -13,6 +13,7 @@ use tiltvp_core::camera::Camera;
 use tiltvp_core::edges::NormalKind;
 use tiltvp_core::geometry::Tilt;
 use tiltvp_core::robust::{LocalOptimization, SampleOrder, Sampling, Score};
+use tiltvp_core::segments::{SegmentDetector, SegmentDetectorOptions, Segments};
 use tiltvp_core::tilt::{Correction, METHODS, Method, TiltEstimator, TiltOptions, TrainedCorrection};
 
 thread_local! {
@@ -69,7 +70,7 @@ fn choices() -> Vec<TiltOptions> {
         let sampling = match &mut options.method {
             Method::ImageSpaceRansac(own) => Some(&mut own.sampling),
             Method::VectorConsensus(own) => Some(&mut own.sampling),
-            Method::ImageSpaceRejectRefit(_) | Method::Refined(_) => None,
+            Method::ImageSpaceRejectRefit(_) | Method::Refined(_) | Method::Segments(_) => None,
         };
         if let Some(sampling) = sampling {
             *sampling = Sampling {
@@ -88,7 +89,7 @@ fn choices() -> Vec<TiltOptions> {
             Method::VectorConsensus(own) => {
                 (own.normal, own.correction) = (NormalKind::Tangent, TrainedCorrection::Factor(1.7));
             }
-            Method::Refined(_) => other.edges.smoothing_px = 2.0,
+            Method::Refined(_) | Method::Segments(_) => other.edges.smoothing_px = 2.0,
         }
         // Every pixel of a noisy image is an edge.
         other.edges.gradient_min = 1e-3;
@@ -113,6 +114,10 @@ fn no_estimate_after_the_first_allocates() {
         let mut scratch = estimator.scratch();
         // The first image has no edge at all: nothing can have grown to fit the next.
         estimator.estimate(&images[0].view(), &mut scratch).unwrap();
+        if let Method::Segments(_) = estimator.options().method {
+            // Lists of straight edges grow with what images hold.
+            images.iter().for_each(|image| drop(estimator.estimate(&image.view(), &mut scratch).unwrap()));
+        }
         let mut most = 0;
         for (i, image) in images.iter().enumerate() {
             let mut edges = 0;
@@ -122,6 +127,25 @@ fn no_estimate_after_the_first_allocates() {
         }
         assert!(most * 10 > estimator.region_pixels() * 4, "{most} of {} pixels", estimator.region_pixels());
     }
+}
+
+#[test]
+fn no_detection_of_straight_edges_allocates_once_lists_have_grown() {
+    let camera = camera();
+    let few = stripes(&camera, &Matrix3::identity(), &Tilt::from_alpha_beta(0.05, 1.0), 5, 0.0, 1);
+    let many = stripes(&camera, &Matrix3::identity(), &Tilt::from_alpha_beta(0.05, 1.0), 40, 3.0, 1);
+    let images = [constant(&camera, 128.0), few, many, noise(&camera, 7)];
+    let detector = SegmentDetector::new(camera, SegmentDetectorOptions::default()).unwrap();
+    let (mut scratch, mut found) = (detector.scratch(), Segments::default());
+    images.iter().for_each(|image| detector.detect(&image.view(), &mut scratch, &mut found).unwrap());
+    let mut most = 0;
+    for (i, image) in images.iter().enumerate() {
+        let taken = allocations(|| detector.detect(&image.view(), &mut scratch, &mut found).unwrap());
+        assert_eq!(taken, 0, "image {i}, {} edges", found.list.len());
+        most = most.max(found.list.len());
+    }
+    // A stable sort allocates from some twenty on.
+    assert!(most > 40, "{most} edges");
 }
 
 #[test]

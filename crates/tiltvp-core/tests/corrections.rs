@@ -200,7 +200,7 @@ fn estimate(method: &str, correction: TrainedCorrection, alpha_rad: f64) -> Tilt
         }
         Method::ImageSpaceRejectRefit(own) => own.space.correction = Correction::Trained(correction),
         Method::VectorConsensus(own) => own.correction = correction,
-        Method::Refined(_) => panic!("the refined method takes no correction"),
+        Method::Refined(_) | Method::Segments(_) => panic!("{method} takes no correction"),
     }
     let estimator = TiltEstimator::new(fisheye(200), Matrix3::identity(), options).unwrap();
     let image = stripes(&fisheye(200), &Matrix3::identity(), &Tilt::from_alpha_beta(alpha_rad, 0.8), 25, 3.0, 3);

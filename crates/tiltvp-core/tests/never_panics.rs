@@ -16,10 +16,12 @@ use tiltvp_core::edges::{EdgeOptions, Mask, NormalKind};
 use tiltvp_core::geometry::Tilt;
 use tiltvp_core::image::ImageView;
 use tiltvp_core::robust::{LocalOptimization, SampleOrder, Sampling, Score};
+use tiltvp_core::segments::SegmentOptions;
 use tiltvp_core::testing::zoo;
 use tiltvp_core::tilt::{
     CommonDirectionOptions, Correction, ImageSpaceOptions, ImageSpaceRansacOptions, ImageSpaceRejectRefitOptions,
-    Method, RefineOptions, TiltEstimator, TiltOptions, TrainedCorrection, VectorConsensusOptions, common_direction,
+    Method, RefineOptions, SegmentsOptions, TiltEstimator, TiltOptions, TrainedCorrection, VectorConsensusOptions,
+    common_direction,
 };
 
 /// The lenses of the zoo over images of a few thousand pixels: what is in pixels shrinks with them.
@@ -119,6 +121,18 @@ fn sampling() -> impl Strategy<Value = Sampling> {
     })
 }
 
+fn segments() -> impl Strategy<Value = SegmentOptions> {
+    (number(0.0, 900.0), number(0.05, 9.0), number(0.01, 9.0), 4..60u32, number(0.0, 9.0)).prop_map(
+        |(gradient_start, stray_max_px, rms_max_px, support_min_px, gap_max)| SegmentOptions {
+            gradient_start,
+            stray_max_px,
+            rms_max_px,
+            support_min_px,
+            gap_max,
+        },
+    )
+}
+
 fn methods() -> impl Strategy<Value = Method> {
     let correction = || {
         prop_oneof![
@@ -154,6 +168,9 @@ fn methods() -> impl Strategy<Value = Method> {
         (number(0.01, 0.99), number(0.001, 0.9)).prop_map(|(keep_fraction, scale_rad)| Method::Refined(
             RefineOptions { keep_fraction, scale_rad, ..RefineOptions::default() }
         )),
+        (segments(), number(0.001, 0.9), 2..200usize).prop_map(|(segments, scatter_rad, segments_max)| {
+            Method::Segments(SegmentsOptions { segments, scatter_rad, segments_max })
+        }),
     ]
 }
 

@@ -14,6 +14,7 @@ mod options;
 mod rays;
 mod reader;
 mod scratch;
+mod segments;
 mod selfcalib;
 mod shared;
 mod stereo;
@@ -60,6 +61,8 @@ mod _core {
     #[pymodule_export]
     use crate::rays::PixelRays;
     #[pymodule_export]
+    use crate::segments::{SegmentDetector, Segments};
+    #[pymodule_export]
     use crate::selfcalib::{
         CalibrationStep, LogCalibration, MountingEstimate, SelfCalibrator, SimulatedDrive, calibrate, consistency_band,
         drive_legs, simulate_drive, wheel_displacements,
@@ -71,9 +74,9 @@ mod _core {
     #[pymodule_export]
     use crate::tilt::{
         AffineCorrection, CommonDirection, EdgeElements, FilterStep, FilteredTilt, FitReport, ImageEdges,
-        PosteriorCorrection, PriorOfTilt, TiltEstimate, TiltEstimator, TiltFilter, apply_correction, common_direction,
-        leaning_from_upright, level_map, normal_from_alpha_beta, tilt_error_rad, tilt_from_wheel_heights, train_affine,
-        train_factor, train_posterior,
+        PosteriorCorrection, PriorOfTilt, TiltAlternative, TiltEstimate, TiltEstimator, TiltFilter, apply_correction,
+        common_direction, leaning_from_upright, level_map, normal_from_alpha_beta, tilt_error_rad,
+        tilt_from_wheel_heights, train_affine, train_factor, train_posterior,
     };
 
     #[pymodule_init]

@@ -8,6 +8,7 @@ use pyo3::types::{PyBool, PyDict, PyList, PyTuple};
 use tiltvp_core::filter::ComplementaryOptions;
 use tiltvp_core::lines::{LineMethod, LineOptions, MatchOptions, TrackerOptions};
 use tiltvp_core::options::{Kind, Options, Value};
+use tiltvp_core::segments::SegmentDetectorOptions;
 use tiltvp_core::selfcalib::{CalibrationMethod, LogOptions, SelfCalibratorOptions};
 use tiltvp_core::tilt::{CommonDirectionOptions, Method, TiltFilterOptions, TiltOptions};
 use tiltvp_core::{Error, corner};
@@ -156,6 +157,7 @@ fn defaults(owner: &str, method: Option<&str>) -> Result<Box<dyn Options>, Error
     Ok(match owner {
         "TiltEstimator" => Box::new(TiltOptions::for_method(method.unwrap_or(Method::NAMES[0]))?),
         "LineExtractor" => Box::new(LineOptions::for_method(method.unwrap_or(LineMethod::NAMES[0]))?),
+        "SegmentDetector" => Box::new(SegmentDetectorOptions::default()),
         "CornerDetector" => {
             Box::new(corner::DetectorOptions::for_method(method.unwrap_or(corner::CornerMethod::NAMES[0]))?)
         }

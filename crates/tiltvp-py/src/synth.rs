@@ -6,8 +6,9 @@ use nalgebra::{Matrix3, Matrix3x2, Vector2};
 use numpy::{PyArray1, PyArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
+use tiltvp_core::camera::Camera as CoreCamera;
 use tiltvp_core::geometry::Tilt;
-use tiltvp_synth::{Image, RenderOptions, RobotPose, RoomKind, RoomOptions, Segment, View, World, on_threads};
+use tiltvp_synth::{Image, Lens, RenderOptions, RobotPose, RoomKind, RoomOptions, Segment, View, World, on_threads};
 
 use crate::array::Array;
 use crate::call::{call_long, exception, invalid};
@@ -96,20 +97,12 @@ impl Room {
         options: Option<&Bound<'py, PyDict>>,
     ) -> PyResult<Pictures<'py>> {
         let shot = options::given(Shot::default(), options)?;
-        let Shot { alpha_rad, beta_rad, .. } = shot;
-        if !(alpha_rad.is_finite() && beta_rad.is_finite()) {
-            return Err(invalid(format!("alpha_rad, beta_rad = {alpha_rad}, {beta_rad}, expected finite angles")));
-        }
-        let (pose, options) = (shot.pose(), shot.rendering.clone());
-        let threads = threads_from(threads)?;
+        shot.check()?;
+        let (options, threads) = (shot.rendering.clone(), threads_from(threads)?);
         let camera = &camera.get().inner;
-        let (width, height) = (camera.width() as usize, camera.height() as usize);
         let image = call_long(py, || {
             let lens = |x: f64, y: f64| camera.unproject(&Vector2::new(x, y));
-            let mut view = View::new(&lens, width, height, pose);
-            view.robot_from_camera = shot.robot_from_camera;
-            view.tilt = Tilt::from_alpha_beta(alpha_rad, beta_rad);
-            view.camera_height_m = shot.camera_height_m.unwrap_or(view.camera_height_m);
+            let view = shot.view(&lens, camera);
             Ok(on_threads(threads, || tiltvp_synth::render(&self.world, &view, &options))??.image)
         })?;
         pictures(py, image)
@@ -134,6 +127,27 @@ impl Room {
             Ok(on_threads(threads, work)??.image)
         })?;
         pictures(py, image)
+    }
+
+    /// (N, 2, 3) bearings of the ends in the camera frame and (N,) contrasts of the straight edges in sight.
+    #[pyo3(signature = (camera, contrast_min, **options: "Any"))]
+    fn _straight_edges<'py>(
+        &self,
+        py: Python<'py>,
+        camera: &Bound<'py, Camera>,
+        contrast_min: f64,
+        options: Option<&Bound<'py, PyDict>>,
+    ) -> PyResult<(Array<'py, f64>, Array<'py, f64>)> {
+        let shot = options::given(Shot::default(), options)?;
+        shot.check()?;
+        let camera = &camera.get().inner;
+        let edges = call_long(py, || {
+            let view = shot.view(&|_, _| None, camera);
+            self.world.straight_edges(camera, &view, contrast_min)
+        })?;
+        let ends: Vec<_> = edges.iter().map(|edge| Matrix3x2::from_columns(&edge.ends).transpose()).collect();
+        let contrasts = edges.iter().map(|edge| edge.contrast).collect();
+        Ok((convert::to_matrices(py, &ends, false)?, Array::new(PyArray1::from_vec(py, contrasts))))
     }
 
     fn __repr__(&self, py: Python<'_>) -> PyResult<String> {
@@ -208,6 +222,23 @@ impl Shot {
     fn pose(&self) -> RobotPose {
         let [x_m, y_m, yaw_rad] = self.pose;
         RobotPose { x_m, y_m, yaw_rad }
+    }
+
+    /// Refuses leans that are no angles; the rest is the view's.
+    fn check(&self) -> PyResult<()> {
+        let Self { alpha_rad, beta_rad, .. } = *self;
+        if alpha_rad.is_finite() && beta_rad.is_finite() {
+            return Ok(());
+        }
+        Err(invalid(format!("alpha_rad, beta_rad = {alpha_rad}, {beta_rad}, expected finite angles")))
+    }
+
+    fn view<'a>(&self, lens: &'a dyn Lens, camera: &CoreCamera) -> View<'a> {
+        let mut view = View::new(lens, camera.width() as usize, camera.height() as usize, self.pose());
+        view.robot_from_camera = self.robot_from_camera;
+        view.tilt = Tilt::from_alpha_beta(self.alpha_rad, self.beta_rad);
+        view.camera_height_m = self.camera_height_m.unwrap_or(view.camera_height_m);
+        view
     }
 }
 

@@ -21,7 +21,7 @@ pub(crate) use self::correction::{
     AffineCorrection, PosteriorCorrection, PriorOfTilt, apply_correction, train_affine, train_factor, train_posterior,
 };
 pub(crate) use self::direction::{CommonDirection, common_direction};
-pub(crate) use self::estimate::{EdgeElements, TiltEstimate};
+pub(crate) use self::estimate::{EdgeElements, TiltAlternative, TiltEstimate};
 pub(crate) use self::filter::TiltFilter;
 pub(crate) use self::filtered::{FilterStep, FilteredTilt};
 pub(crate) use self::image_edges::ImageEdges;
@@ -135,6 +135,25 @@ impl TiltEstimator {
         let (estimate, elements) = self.with_scratch(py, |scratch| inner.estimate_with_elements(&view, scratch))?;
         let size = (inner.camera().width() as usize, inner.camera().height() as usize);
         Ok((TiltEstimate::from(estimate), EdgeElements::new(&elements, size)))
+    }
+
+    /// (K, 3), (K, F): directions that may be up in such an image and what tells which is, for training.
+    #[pyo3(signature = (image: "NDArray[np.uint8]") -> "tuple[NDArray[np.float64], NDArray[np.float64]]")]
+    fn _hypotheses<'py>(
+        &self,
+        py: Python<'py>,
+        image: &Bound<'_, PyAny>,
+    ) -> PyResult<(Array<'py, f64>, Array<'py, f64>)> {
+        let image = convert::gray(image, "image")?;
+        let (view, inner) = (convert::view(&image)?, &self.inner);
+        let found = self.with_scratch(py, |scratch| inner.hypotheses(&view, scratch))?;
+        let (n, width) = (found.len(), found.first().map_or(0, |(_, features)| features.len()));
+        let ups = found.iter().flat_map(|(up, _)| up.iter().copied());
+        let features = found.iter().flat_map(|(_, features)| features.iter().copied());
+        Ok((
+            Array::new(PyArray1::from_iter(py, ups).reshape([n, 3])?),
+            Array::new(PyArray1::from_iter(py, features).reshape([n, width])?),
+        ))
     }
 
     /// The tilts of many such images, in their order, the same for any number of threads.

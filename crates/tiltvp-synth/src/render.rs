@@ -2,9 +2,9 @@
 
 use nalgebra::{Matrix3, Vector3};
 use rayon::prelude::*;
+use tiltvp_core::Result;
 use tiltvp_core::geometry::{Tilt, angle_between};
 use tiltvp_core::interrupt::check;
-use tiltvp_core::{Error, Result};
 
 use crate::noise::hash_unit;
 use crate::segment::Segment;
@@ -45,15 +45,7 @@ pub struct Rendering {
 /// If the options or the view are outside their domains, or the camera is outside the room.
 pub fn render(world: &World, view: &View<'_>, options: &RenderOptions) -> Result<Rendering> {
     options.validate()?;
-    view.validate()?;
-    let center = view.center();
-    if !world.contains(&center) {
-        return Err(Error::argument(
-            "view.pose",
-            format!("{:?} at height {} m", view.pose, center.z),
-            "a place in the room",
-        ));
-    }
+    let center = world.center_of(view)?;
     let world_from_camera = view.world_from_camera();
     let (width, height, n) = (view.width_px, view.height_px, options.samples);
     let seed = (options.seed ^ (options.seed >> 32)) as u32;

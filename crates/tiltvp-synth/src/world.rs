@@ -17,7 +17,7 @@ use crate::route::ROBOT_RADIUS_M;
 use crate::scene::{Contact, Scene};
 use crate::segment::Segment;
 use crate::texture::{Color, mix};
-use crate::view::RobotPose;
+use crate::view::{RobotPose, View};
 use crate::{furniture, laboratory, shell};
 
 /// Greatest radiance that the camera sees, in units of white in the room's light: what is brighter is burnt out anyway, and
@@ -148,6 +148,17 @@ impl World {
     /// Whether a point is between the walls, above the floor and below the ceiling.
     pub fn contains(&self, point: &Vector3<f64>) -> bool {
         point.z > 0.0 && point.z < self.plan.height && self.plan.contains(&point.xy())
+    }
+
+    /// The camera's centre, of a view from within.
+    pub(crate) fn center_of(&self, view: &View<'_>) -> Result<Vector3<f64>> {
+        view.validate()?;
+        let center = view.center();
+        if self.contains(&center) {
+            return Ok(center);
+        }
+        let got = format!("{:?} at height {} m", view.pose, center.z);
+        Err(Error::argument("view.pose", got, "a place in the room"))
     }
 
     /// Whether a round robot of 0.22 m radius and less than 0.4 m height can stand with its centre here.

@@ -32,6 +32,7 @@ _FOCAL_PER_HEIGHT: Final = 139.7 / 480.0
 
 METHODS: Final[tuple[tuple[str, dict[str, Any]], ...]] = (
     ("refined", {}),
+    ("segments", {}),
     ("image-space-ransac", {}),
     ("image-space-reject-refit", {}),
     ("vector-consensus", {"normal": "tangent"}),

@@ -80,7 +80,7 @@ class MethodOptions(MountedOptions):
     """How the tilt is estimated."""
 
     method: str | None = None
-    """refined, image-space-ransac, image-space-reject-refit or vector-consensus."""
+    """refined, image-space-ransac, image-space-reject-refit, vector-consensus or segments."""
     correction: str | None = None
     """closed-form, none or a number: the factor from shift (or raw angle) to angle."""
 

@@ -52,6 +52,27 @@ pub enum Stop {
         /// The angle within which an answer means something, in radians.
         limit_rad: f64,
     },
+    /// Of several models that observations agree with, one is more probable than all others together.
+    Chosen {
+        /// Its probability.
+        probability: f64,
+        /// How many there are.
+        of: usize,
+    },
+    /// Of several models that observations agree with, none is probable enough.
+    Ambiguous {
+        /// Probability of the best.
+        probability: f64,
+        /// The probability asked for.
+        limit: f64,
+        /// How many there are.
+        of: usize,
+    },
+    /// The observations that agree do not tell how far the model may be off.
+    Undetermined {
+        /// How many agree.
+        agreeing: usize,
+    },
     /// The observations do not determine a model (they are all alike).
     NoModel {
         /// Samples or refits tried.
@@ -62,7 +83,14 @@ pub enum Stop {
 impl Stop {
     /// Whether the fit has no model to offer.
     pub fn is_failure(self) -> bool {
-        matches!(self, Self::TooFew { .. } | Self::NoModel { .. } | Self::OutOfReach { .. })
+        matches!(
+            self,
+            Self::TooFew { .. }
+                | Self::NoModel { .. }
+                | Self::OutOfReach { .. }
+                | Self::Ambiguous { .. }
+                | Self::Undetermined { .. }
+        )
     }
 }
 
@@ -79,6 +107,15 @@ impl fmt::Display for Stop {
             Self::TooFew { have, need } => write!(f, "too few observations: {have}, at least {need} needed"),
             Self::OutOfReach { angle_rad, limit_rad } => {
                 write!(f, "an angle of {angle_rad:.3} rad was found, beyond the limit of {limit_rad:.3} rad")
+            }
+            Self::Chosen { probability, of } => {
+                write!(f, "the most probable of {of} directions (probability {probability:.2})")
+            }
+            Self::Ambiguous { probability, limit, of } => {
+                write!(f, "which of {of} directions is up is not told: probability {probability:.2}, {limit:.2} needed")
+            }
+            Self::Undetermined { agreeing } => {
+                write!(f, "the {agreeing} observations that agree do not tell how far it may be off")
             }
             Self::NoModel { trials } => write!(f, "no model: the observations are degenerate ({trials} tried)"),
         }

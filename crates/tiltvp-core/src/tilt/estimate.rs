@@ -1,9 +1,21 @@
 //! What an estimator answers.
 
-use nalgebra::Matrix2;
+use nalgebra::{Matrix2, Vector3};
 
 use crate::geometry::Tilt;
 use crate::robust::Stop;
+
+/// How many alternatives an estimate tells at most.
+pub const ALTERNATIVES: usize = 4;
+
+/// A direction that may be up.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Alternative {
+    /// Unit ground normal in the robot frame.
+    pub normal: Vector3<f64>,
+    /// Probability of being the right one of all.
+    pub probability: f64,
+}
 
 /// The tilt of one image, with how sure the estimator is of it.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -13,9 +25,9 @@ pub struct TiltEstimate {
     /// Covariance in squared radians of the ground normal in its tangent plane, in the basis of
     /// [`tangent_basis`](crate::geometry::tangent_basis) (close to the robot's `x` and `y`); infinite without a tilt.
     pub covariance_rad2: Matrix2<f64>,
-    /// Probability, in `[0, 1]`, that the error is below two degrees; 0 without a tilt.
+    /// Probability, in `[0, 1]`, that the error is below two degrees and no alternative is right; 0 without a tilt.
     pub confidence: f64,
-    /// Edge pixels in the elevation band.
+    /// Edge pixels in the elevation band; of the method of straight edges those that are part of one.
     pub edge_pixels: usize,
     /// Edge pixels that passed the prefilter.
     pub prefiltered_pixels: usize,
@@ -23,6 +35,9 @@ pub struct TiltEstimate {
     pub inlier_pixels: usize,
     /// The shift `l` of the vanishing point in pixels (eq. 20) before any factor; only of the image-space methods.
     pub shift_px: Option<f64>,
+    /// Directions that may be up, the most probable first; only of the method of straight edges where it looks anywhere. The first
+    /// is the tilt, where there is one.
+    pub alternatives: [Option<Alternative>; ALTERNATIVES],
     /// Root mean square residual of the inliers: radians, or pixels for the image-space methods; NaN without a tilt.
     pub residual_rms: f64,
     /// Random samples or refits done.

@@ -1,12 +1,13 @@
 //! From an image to a tilt, at once or by way of its edge pixels: the tables of a camera, made once.
 
+use std::f64::consts::PI;
 use std::sync::Arc;
 
-use nalgebra::Matrix3;
+use nalgebra::{Matrix3, Vector3};
 
 use super::estimate::{EdgeElement, TiltEstimate};
 use super::image_edges::{EdgeOrigin, ImageEdges};
-use super::methods::{Fitter, Setting, edge_offset};
+use super::methods::{Fitter, Prepared, Setting, edge_offset};
 use super::options::TiltOptions;
 use super::scratch::{Scratch, Work};
 use super::tables::PixelTables;
@@ -27,7 +28,7 @@ pub struct TiltEstimator {
     pub(super) origin: Arc<EdgeOrigin>,
     pub(super) options: TiltOptions,
     pub(super) pixels: Arc<PixelTables>,
-    method: Arc<dyn Fitter>,
+    method: Prepared,
 }
 
 impl TiltEstimator {
@@ -48,7 +49,13 @@ impl TiltEstimator {
     /// The estimator of checked options.
     fn prepared(origin: Arc<EdgeOrigin>, options: TiltOptions, pixels: Arc<PixelTables>) -> Result<Self> {
         let setting = Setting { origin: &origin, options: &options, pixels: &pixels };
-        let method = options.method.chosen().prepare(&setting)?;
+        let chosen = options.method.chosen();
+        let limit = chosen.tilt_limit_rad();
+        if let Some(tilt_max) = options.tilt_max_rad.filter(|tilt_max| *tilt_max >= limit && limit < PI) {
+            let expected = "an angle below pi/2: the method segments alone takes more";
+            return Err(Error::option("tilt_max_rad", tilt_max, expected));
+        }
+        let method = chosen.prepare(&setting)?;
         Ok(Self { origin, options, pixels, method })
     }
 
@@ -129,17 +136,24 @@ impl TiltEstimator {
     pub fn estimate(&self, image: &ImageView<'_>, scratch: &mut Scratch) -> Result<TiltEstimate> {
         self.check_image(image)?;
         self.check_scratch(scratch)?;
-        let Scratch { detector, edges, work, .. } = scratch;
-        detector.detect(image, &self.pixels.region, self.options.edges.gradient_min, self.method.prefilter(), edges);
-        Ok(self.fit(edges, work))
+        let gradient_min = self.options.edges.gradient_min;
+        match &self.method {
+            Prepared::Pixels(method) => {
+                let Scratch { detector, edges, work, .. } = scratch;
+                detector.detect(image, &self.pixels.region, gradient_min, method.prefilter(), edges);
+                Ok(self.fit(&**method, edges, work))
+            }
+            Prepared::Segments(method) => Ok(method.estimate(image, &self.pixels, scratch)),
+        }
     }
 
     /// The edge pixels of one image, for [`estimate_edges`](Self::estimate_edges) of this estimator and of those with equal
     /// edge options. Allocates what it returns.
     ///
     /// # Errors
-    /// Those of [`estimate`](Self::estimate).
+    /// Those of [`estimate`](Self::estimate); [`Error::InvalidArgument`] for a method that looks at no single pixels.
     pub fn detect(&self, image: &ImageView<'_>, scratch: &mut Scratch) -> Result<ImageEdges> {
+        self.pixel_method()?;
         self.check_image(image)?;
         self.check_scratch(scratch)?;
         let Scratch { detector, edges, .. } = scratch;
@@ -153,17 +167,39 @@ impl TiltEstimator {
     /// [`Error::InvalidArgument`] if the edges are of another camera, mounting, mask or edge options (it says which), or the
     /// scratch is that of an estimator that looks at other pixels.
     pub fn estimate_edges(&self, image_edges: &ImageEdges, scratch: &mut Scratch) -> Result<TiltEstimate> {
+        let method = self.pixel_method()?;
         self.check_scratch(scratch)?;
         let Scratch { edges, work, .. } = scratch;
         image_edges.copy_to(&self.origin, &self.pixels.region, edges)?;
-        Ok(self.fit(edges, work))
+        Ok(self.fit(method, edges, work))
+    }
+
+    /// The method, if it looks at edge pixels.
+    fn pixel_method(&self) -> Result<&dyn Fitter> {
+        match &self.method {
+            Prepared::Pixels(method) => Ok(&**method),
+            Prepared::Segments(_) => {
+                let name = self.options.method.name();
+                Err(Error::argument("method", name, "a method of edge pixels: this one looks at straight edges"))
+            }
+        }
     }
 
     /// The estimate of the edge pixels of an image. What passed a prefilter and what passed none give the same one: prefilters
     /// keep out only what the prefilters reject.
-    fn fit(&self, edges: &EdgePixels, work: &mut Work) -> TiltEstimate {
-        let fit = self.method.fit(edges, &self.pixels, work);
+    fn fit(&self, method: &dyn Fitter, edges: &EdgePixels, work: &mut Work) -> TiltEstimate {
+        let fit = method.fit(edges, &self.pixels, work);
         fit.into_estimate(edges.strong(), work.rows.len())
+    }
+
+    /// The directions that may be up and what tells which one is, [`estimate`](Self::estimate)'s way where it looks anywhere: for
+    /// training. Empty of other methods and smaller leans. Allocates.
+    ///
+    /// # Errors
+    /// Those of [`estimate`](Self::estimate).
+    pub fn hypotheses(&self, image: &ImageView<'_>, scratch: &mut Scratch) -> Result<Vec<(Vector3<f64>, Vec<f64>)>> {
+        self.estimate(image, scratch)?;
+        Ok(scratch.segments.as_ref().map_or_else(Vec::new, |work| work.hypotheses()))
     }
 
     /// The tilts of many images on `threads` threads, in the order of the images, the same whatever the number of threads.
@@ -207,7 +243,8 @@ impl TiltEstimator {
         answers.into_iter().map(|(_, answer)| answer).collect()
     }
 
-    /// The tilt of one image as [`estimate`](Self::estimate) gives it, and all its edge pixels. Allocates.
+    /// The tilt of one image as [`estimate`](Self::estimate) gives it, and all its edge pixels; of the method of straight edges
+    /// those that are part of one. Allocates.
     ///
     /// # Errors
     /// Those of [`estimate`](Self::estimate).
@@ -217,19 +254,23 @@ impl TiltEstimator {
         scratch: &mut Scratch,
     ) -> Result<(TiltEstimate, Vec<EdgeElement>)> {
         let estimate = self.estimate(image, scratch)?;
+        let centre =
+            self.pixels.vertical.as_ref().map_or((f32::NAN, f32::NAN), |c| (c.pixel.x as f32, c.pixel.y as f32));
+        let method = match &self.method {
+            Prepared::Pixels(method) => method,
+            Prepared::Segments(method) => return Ok((estimate, method.elements(centre, scratch))),
+        };
         let Scratch { detector, work, .. } = scratch;
         let rows: Vec<(u32, bool)> =
             work.slots.iter().enumerate().map(|(row, slot)| (*slot, work.is_inlier(row))).collect();
         let mut all = EdgePixels::with_capacity(self.pixels.region.len());
         detector.detect(image, &self.pixels.region, self.options.edges.gradient_min, None, &mut all);
-        let centre =
-            self.pixels.vertical.as_ref().map_or((f32::NAN, f32::NAN), |c| (c.pixel.x as f32, c.pixel.y as f32));
         let mut rows = rows.into_iter().peekable();
         let elements = all.slot().iter().zip(all.gx()).zip(all.gy()).map(|((slot, gx), gy)| {
             let (u, v) = self.pixels.region.place(*slot as usize);
             let [cos, sin, s] = edge_offset(f32::from(u) - centre.0, f32::from(v) - centre.1, *gx, *gy);
             let row = rows.next_if(|(place, _)| place == slot);
-            let normal = self.method.normal(*slot as usize, *gx, *gy);
+            let normal = method.normal(*slot as usize, *gx, *gy);
             EdgeElement {
                 u,
                 v,

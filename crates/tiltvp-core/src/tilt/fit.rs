@@ -6,7 +6,7 @@ use nalgebra::{Matrix2, Vector2};
 
 use super::confidence;
 use super::corrected::Corrected;
-use super::estimate::TiltEstimate;
+use super::estimate::{ALTERNATIVES, Alternative, TiltEstimate};
 use super::scratch::Work;
 use super::tables::PixelTables;
 use super::trained::TrainedCorrection;
@@ -27,20 +27,27 @@ pub(super) struct Fit {
     pub rms: f64,
     pub iterations: u32,
     pub stop: Stop,
+    pub alternatives: [Option<Alternative>; ALTERNATIVES],
 }
 
 impl Fit {
-    /// A fit that went as the report says, without a tilt so far.
-    pub(super) fn without_tilt<M>(report: &FitReport<M>) -> Self {
+    /// No answer, and why.
+    pub(super) fn failed(stop: Stop) -> Self {
         Self {
             tilt: None,
             covariance: None,
             inliers: 0,
             shift_px: None,
-            rms: report.rms,
-            iterations: report.iterations,
-            stop: report.stop,
+            rms: f64::NAN,
+            iterations: 0,
+            stop,
+            alternatives: [None; ALTERNATIVES],
         }
+    }
+
+    /// A fit that went as the report says, without a tilt so far.
+    pub(super) fn without_tilt<M>(report: &FitReport<M>) -> Self {
+        Self { rms: report.rms, iterations: report.iterations, ..Self::failed(report.stop) }
     }
 
     /// A fit with a lean that no image of a band of elevations can show.
@@ -49,19 +56,24 @@ impl Fit {
         Self { stop, rms: f64::NAN, ..Self::without_tilt(report) }
     }
 
-    /// The estimate of an image with so many edge pixels, of which so many passed the prefilter.
+    /// The estimate of an image with so many edge pixels, of which so many passed the prefilter. A tilt of which the error is not
+    /// known is none.
     pub(super) fn into_estimate(self, edge_pixels: usize, prefiltered_pixels: usize) -> TiltEstimate {
+        let chosen = self.alternatives[0].map_or(1.0, |best| best.probability);
+        let undetermined = self.tilt.is_some() && self.covariance.is_none();
+        let undetermined = undetermined.then_some(Stop::Undetermined { agreeing: self.inliers });
         TiltEstimate {
-            tilt: self.tilt,
+            tilt: self.tilt.filter(|_| undetermined.is_none()),
             covariance_rad2: self.covariance.unwrap_or(Matrix2::from_diagonal_element(f64::INFINITY)),
-            confidence: self.covariance.map_or(0.0, |covariance| confidence::confidence(&covariance)),
+            confidence: self.covariance.map_or(0.0, |covariance| chosen * confidence::confidence(&covariance)),
             edge_pixels,
             prefiltered_pixels,
             inlier_pixels: self.inliers,
             shift_px: self.shift_px,
-            residual_rms: self.rms,
+            alternatives: self.alternatives,
+            residual_rms: if undetermined.is_some() { f64::NAN } else { self.rms },
             iterations: self.iterations,
-            stop: self.stop,
+            stop: undetermined.unwrap_or(self.stop),
         }
     }
 }

@@ -22,7 +22,7 @@ mod training_set;
 
 pub use common_direction::{CommonDirection, CommonDirectionOptions, common_direction};
 pub use correction::Correction;
-pub use estimate::{EdgeElement, TiltEstimate};
+pub use estimate::{ALTERNATIVES, Alternative, EdgeElement, TiltEstimate};
 pub use estimator::TiltEstimator;
 pub use filter::{FilteredTilt, MountingOptions, TiltFilter, TiltFilterOptions, TiltFilterState, Verdict};
 pub use image_edges::{EdgeOrigin, ImageEdges};

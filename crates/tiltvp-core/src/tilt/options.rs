@@ -1,12 +1,11 @@
 //! Options of the tilt estimator; the paper's defaults are those of its table 3.
 
-use std::f64::consts::FRAC_PI_2;
+use std::f64::consts::PI;
 
 use super::methods::{Method, RefineOptions};
 use crate::edges::{EdgeOptions, Mask};
 use crate::error::Result;
 use crate::options;
-use crate::options::Between;
 
 options! {
     /// Everything that can be chosen about a [`TiltEstimator`](super::TiltEstimator).
@@ -15,8 +14,8 @@ options! {
         [flat] edges: EdgeOptions = EdgeOptions { smoothing_px: 0.6, ..EdgeOptions::default() };
         /// Largest lean expected, in radians: edges that would need a larger one are rejected first. None for 12 degrees of the
         /// refined method and 7 of vector consensus; the image-space methods have `offset_max_px` instead, and this, where
-        /// given, sets it to the shift of that lean.
-        tilt_max_rad: Option<f64> = None => Between(0.0, FRAC_PI_2), "an angle strictly between 0 and pi/2";
+        /// given, sets it to the shift of that lean. From 20 degrees on the method segments looks for the vertical anywhere.
+        tilt_max_rad: Option<f64> = None => 1e-4..=PI, "an angle from 1e-4 to pi, below pi/2 but for the method segments";
         /// Pixels that show the world and not the robot; none for all.
         mask: Option<Mask> = None;
         /// Only one row in so many is looked at: less time, and less sure an answer.

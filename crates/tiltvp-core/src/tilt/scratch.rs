@@ -2,7 +2,7 @@
 
 use tiltvp_kernels::compaction::ROOM;
 
-use super::methods::{SamplingScratch, Subsample};
+use super::methods::{SamplingScratch, SegmentWork, Subsample};
 use crate::edges::{Detector, EdgeOptions, EdgePixels, Region};
 use crate::robust::Rows;
 
@@ -17,6 +17,8 @@ pub struct Scratch {
     made_for: Extent,
     pub(super) edges: EdgePixels,
     pub(super) work: Work,
+    /// Of the method of straight edges, once it has been used.
+    pub(super) segments: Option<Box<SegmentWork>>,
 }
 
 /// What the fits work in.
@@ -87,6 +89,7 @@ impl Scratch {
                 subsample: Subsample::with_capacity(n),
                 sampling: SamplingScratch::default(),
             },
+            segments: None,
         }
     }
 

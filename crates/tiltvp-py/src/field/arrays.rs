@@ -39,6 +39,37 @@ impl<const R: usize, const C: usize> Field for SMatrix<f64, R, C> {
     }
 }
 
+/// Any number of these are one array with another axis in front.
+impl<const R: usize, const C: usize> Field for Vec<SMatrix<f64, R, C>> {
+    type Attribute<'py> = Array<'py, f64>;
+
+    fn attribute<'py>(&self, py: Python<'py>) -> PyResult<Array<'py, f64>> {
+        let n = self.len();
+        let flat = PyArray1::from_vec(py, self.iter().flat_map(convert::row_major).collect());
+        Ok(if C == 1 { Array::new(flat.reshape([n, R])?) } else { Array::new(flat.reshape([n, R, C])?) })
+    }
+
+    fn plain<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        self.iter().map(|own| own.plain(py)).collect::<PyResult<Vec<_>>>()?.into_bound_py_any(py)
+    }
+
+    fn read(value: &Bound<'_, PyAny>, name: &str) -> PyResult<Self> {
+        let parts: Vec<Bound<'_, PyAny>> = convert::whole(value, name, "lists of numbers")?;
+        parts.iter().map(|part| convert::matrix(part, name)).collect()
+    }
+
+    fn bits(&self, bits: &mut Vec<u64>) {
+        bits.push(self.len() as u64);
+        for own in self {
+            own.bits(bits);
+        }
+    }
+
+    fn show(&self) -> Option<String> {
+        None
+    }
+}
+
 /// Several of these are one array with another axis in front.
 impl<const N: usize, const R: usize, const C: usize> Field for [SMatrix<f64, R, C>; N] {
     type Attribute<'py> = Array<'py, f64>;

@@ -4,6 +4,7 @@ use nalgebra::{Matrix2, Vector3};
 use numpy::{PyArray1, PyArrayMethods};
 use pyo3::IntoPyObjectExt;
 use pyo3::prelude::*;
+use pyo3::types::PyDict;
 use tiltvp_core::geometry::Tilt;
 use tiltvp_core::tilt as core;
 
@@ -40,7 +41,7 @@ value! {
         covariance_rad2: Matrix2<f64>,
         /// Probability, in [0, 1], that the error (eq. 44) is below two degrees, were it normal with that covariance.
         confidence: f64,
-        /// Edge pixels in the elevation band.
+        /// Edge pixels in the elevation band; of the method of straight edges those that are part of one.
         edge_pixels: usize,
         /// Edge pixels that passed the prefilter.
         prefiltered_pixels: usize,
@@ -48,6 +49,9 @@ value! {
         inlier_pixels: usize,
         /// The shift l of the vanishing point in pixels (eq. 20), before any factor; None but for the image-space methods.
         shift_px: Option<f64>,
+        /// Directions that may be up, the most probable first; only of the method "segments" where it looks anywhere
+        /// (`tilt_max_rad` above 20 degrees). The first is the tilt, where there is one.
+        alternatives: Alternatives,
         /// How the fit went.
         report: Flat<FitReport>,
     }
@@ -82,6 +86,7 @@ impl From<core::TiltEstimate> for TiltEstimate {
             prefiltered_pixels: found.prefiltered_pixels,
             inlier_pixels: found.inlier_pixels,
             shift_px: found.shift_px,
+            alternatives: Alternatives(found.alternatives.into_iter().flatten().map(TiltAlternative::from).collect()),
             report: Flat(FitReport::new(found.stop, found.iterations, found.residual_rms)),
         }
     }
@@ -109,6 +114,54 @@ impl TiltEstimate {
     /// Whether there is a tilt.
     fn __bool__(&self) -> bool {
         self.found()
+    }
+}
+
+value! {
+    /// A direction that may be up. Frozen, comparable, hashable, and to be pickled.
+    TiltAlternative(core::Alternative as own) {
+        /// (3,): the unit ground normal in the robot frame.
+        normal: Vector3<f64>,
+        /// Probability, in [0, 1], of being the right one of all.
+        probability: f64,
+    }
+}
+
+/// A list of values that stands in a dict only where there are some: most estimates have none.
+#[derive(Clone)]
+pub(crate) struct Alternatives(Vec<TiltAlternative>);
+
+impl Field for Alternatives {
+    type Attribute<'py> = Vec<TiltAlternative>;
+
+    fn attribute(&self, py: Python<'_>) -> PyResult<Vec<TiltAlternative>> {
+        self.0.attribute(py)
+    }
+
+    fn plain<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        self.0.plain(py)
+    }
+
+    fn read(value: &Bound<'_, PyAny>, name: &str) -> PyResult<Self> {
+        Vec::read(value, name).map(Self)
+    }
+
+    fn bits(&self, bits: &mut Vec<u64>) {
+        self.0.bits(bits);
+    }
+
+    fn show(&self) -> Option<String> {
+        self.0.show()
+    }
+
+    fn write(&self, values: &Bound<'_, PyDict>, key: &str) -> PyResult<()> {
+        if self.0.is_empty() { Ok(()) } else { values.set_item(key, self.plain(values.py())?) }
+    }
+
+    fn take(values: &Bound<'_, PyDict>, key: &str) -> PyResult<Self> {
+        values
+            .get_item(key)?
+            .map_or_else(|| Ok(Self(Vec::new())), |own| Self::read(&own, &format!("values[\"{key}\"]")))
     }
 }
 

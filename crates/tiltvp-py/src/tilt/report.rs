@@ -12,8 +12,10 @@ value! {
         ///
         /// "confident": random sampling has drawn as many samples as its confidence needs; "trial-limit": it has drawn all
         /// it may. "converged": the model has stopped changing; "settled": the residuals are small enough;
-        /// "iteration-limit": refitting has been repeated as often as it may. No answer comes of "too-few" observations,
-        /// "no-model" (they are all alike) and "out-of-reach" (an angle that the method cannot mean).
+        /// "iteration-limit": refitting has been repeated as often as it may. "chosen": of several alternatives one is more
+        /// probable than all others together; "ambiguous": none is. No answer comes of "too-few" observations,
+        /// "no-model" (they are all alike), "out-of-reach" (an angle that the method cannot mean)
+        /// and "undetermined" (nothing tells how far it may be off).
         stop: StopWord,
         /// The same in a sentence, with the measured number and the limit.
         reason: String,
@@ -35,6 +37,9 @@ impl FitReport {
             Stop::TooFew { .. } => "too-few",
             Stop::NoModel { .. } => "no-model",
             Stop::OutOfReach { .. } => "out-of-reach",
+            Stop::Chosen { .. } => "chosen",
+            Stop::Ambiguous { .. } => "ambiguous",
+            Stop::Undetermined { .. } => "undetermined",
         };
         Self { stop: StopWord(word.to_owned()), reason: stop.to_string(), iterations, residual_rms }
     }

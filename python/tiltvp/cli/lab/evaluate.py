@@ -37,7 +37,7 @@ def evaluate(
     out
         Folder of the run: a manifest, and a table with a row for each image, combination and correction.
     sweep
-        What is tried. paper: all combinations of table 2, and the refined method; table3: the best of them.
+        What is tried. paper: all combinations of table 2, and ours; table3: the best of them.
     methods
         Only these methods of the sweep.
     threads

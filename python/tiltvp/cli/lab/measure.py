@@ -78,6 +78,41 @@ def panoramas(
 
 
 @app.command
+def views(directory: Path, /, *, every: int = 1, weights: bool = False, out: Path | None = None) -> None:
+    """The vertical of views that look anywhere, pinhole and fisheye, by the method of straight edges.
+
+    Roll and pitch are within 45 degrees; which direction is up is chosen by weights that have not seen the building.
+
+    Parameters
+    ----------
+    directory
+        Folder with the panoramas and an INDEX.csv of columns name, environment, tilt_x_deg, tilt_z_deg.
+    every
+        Take one panorama in so many.
+    weights
+        Also print the weights that all views train.
+    out
+        Also write the table: .csv, .json or .parquet.
+    """
+    from tiltvp.lab.datasets.panoramas import read_panorama_index
+    from tiltvp.lab.evaluation.ahead import ahead_table, look_ahead, train_choice
+
+    if out is not None:
+        check_ending(out)
+    chosen = read_panorama_index(directory)[::every]
+    with progress_bar(len(chosen), "panoramas") as bar:
+        seen = look_ahead(chosen, advance=bar.advance)
+    table = ahead_table(seen)
+    if out is not None:
+        write_frame(table, out)
+    show_frame(
+        "Area under the recall curve of roll and pitch, per cent, to 1, 5 and 10 degrees", table, ["camera", "choice"]
+    )
+    if weights:
+        say(", ".join(f"{weight:.4g}" for weight in train_choice(seen)))
+
+
+@app.command
 def inertial(directory: Path, /, *, samples: int = 2) -> None:
     """The refined method on panoramas as they were taken, against the camera's own inertial sensor.
 

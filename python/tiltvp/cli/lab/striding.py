@@ -20,7 +20,7 @@ def striding(
     rooms: Annotated[int, Parameter(validator=validators.Number(gte=0))] = 6,
     out: Path | None = None,
 ) -> None:
-    """Each method on every row, every second, third and fourth row of the same views: errors, regions, times.
+    """Methods of edge pixels on every row, every second, third and fourth row of views: errors, regions, times.
 
     Parameters
     ----------

@@ -147,7 +147,7 @@ class PanoramaViews:
         return levels
 
 
-@functools.lru_cache(maxsize=2)
+@functools.lru_cache(maxsize=6)
 def _rays_of(camera: Camera, samples: int) -> PixelRays:
     return PixelRays(camera, samples=samples)
 

@@ -12,13 +12,30 @@ from typing import Any, Final, Literal
 from tiltvp._core import METHODS
 from tiltvp.errors import InvalidInputError
 
-__all__ = ["SWEEPS", "TABLE_2", "TABLE_3", "Combination", "Group", "choose", "paper_sweep", "table_3_sweep"]
+__all__ = [
+    "PAPER_METHODS",
+    "PIXEL_METHODS",
+    "SWEEPS",
+    "TABLE_2",
+    "TABLE_3",
+    "Combination",
+    "Group",
+    "choose",
+    "paper_sweep",
+    "table_3_sweep",
+]
 
 Group = Literal["paper", "literal", "beyond"]
 
-_RANSAC, _REJECT, _CONSENSUS, _REFINED = (
-    "image-space-ransac", "image-space-reject-refit", "vector-consensus", "refined",
+_RANSAC, _REJECT, _CONSENSUS, _REFINED, _SEGMENTS = (
+    "image-space-ransac", "image-space-reject-refit", "vector-consensus", "refined", "segments",
 )  # fmt: skip
+
+PAPER_METHODS: Final = (_RANSAC, _REJECT, _CONSENSUS)
+"""The methods of the paper, whose angles corrections are trained for."""
+
+PIXEL_METHODS: Final = (*PAPER_METHODS, _REFINED)
+"""The methods that take edge pixels, of all rows or of some. Straight edges are followed through the whole image."""
 
 TABLE_2: Final[dict[str, tuple[float, ...]]] = {
     "gradient_min": (100.0, 150.0, 200.0, 250.0, 300.0, 600.0),
@@ -45,7 +62,7 @@ class Combination:
     @property
     def trainable(self) -> bool:
         """Whether its angle is one that a factor is trained for: eq. 26 (image space) and eq. 45 with a' = 1."""
-        return self.method != _REFINED and self.options.get("correction") is None
+        return self.method in PAPER_METHODS and self.options.get("correction") is None
 
 
 def _ransac(gradient_min: float, threshold_px: float) -> Combination:
@@ -85,6 +102,7 @@ TABLE_3: Final[tuple[Combination, ...]] = (
 
 _BEYOND: Final[tuple[Combination, ...]] = (
     Combination(_REFINED, "refined", "beyond"),
+    Combination(_SEGMENTS, "segments", "beyond"),
     *(_varied(each, "closed-form gain", correction="closed-form") for each in TABLE_3[:2]),
     *(_varied(each, "prefilter 10 deg", tilt_max_rad=math.radians(10.0)) for each in TABLE_3[2:]),
     _varied(TABLE_3[3], "tangent normals", normal="tangent"),

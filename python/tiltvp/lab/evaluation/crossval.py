@@ -19,6 +19,7 @@ from tiltvp._core import (
     train_posterior,
 )
 from tiltvp.errors import InvalidInputError
+from tiltvp.lab.evaluation.combinations import PAPER_METHODS
 from tiltvp.lab.evaluation.metrics import offset_rad, turned
 from tiltvp.lab.evaluation.schema import COLUMNS, sorted_rows
 
@@ -50,7 +51,7 @@ def cross_validated(rows: pl.DataFrame, *, threads: int = 1, advance: Callable[[
     """
 
     def corrected(part: pl.DataFrame) -> list[pl.DataFrame]:
-        trainable = part["method"][0] != "refined" and part["correction"][0] == "none"
+        trainable = part["method"][0] in PAPER_METHODS and part["correction"][0] == "none"
         return [_corrected(part, kind) for kind in TRAINED] if trainable else []
 
     tables = [rows]

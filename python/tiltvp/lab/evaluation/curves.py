@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 import polars as pl
 
+from tiltvp.lab.evaluation.combinations import PAPER_METHODS
+
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
@@ -63,8 +65,8 @@ def angles_by_tilt(table: pl.DataFrame, rows: pl.DataFrame) -> pl.DataFrame:
         name = pl.lit(part["variant"][0].removesuffix(", corrected"))
         parts.append(plain.select(*angles, variant=name, corrected=pl.lit(value=False)))
         parts.append(part.select(*angles, variant=name, corrected=pl.lit(value=True)))
-    refined = rows.filter(pl.col("method") == "refined")
-    parts.append(refined.select(*angles, variant="variant", corrected=pl.lit(None, pl.Boolean)))
+    ours = rows.filter(pl.col("method").is_in(PAPER_METHODS).not_())
+    parts.append(ours.select(*angles, variant="variant", corrected=pl.lit(None, pl.Boolean)))
     alpha = pl.col("alpha_rad").degrees()
     return (
         _with_tilt_classes(pl.concat(parts))

@@ -12,7 +12,7 @@ import numpy as np
 import polars as pl
 
 from tiltvp._core import normal_from_alpha_beta
-from tiltvp.lab.evaluation.combinations import Combination
+from tiltvp.lab.evaluation.combinations import PIXEL_METHODS, Combination
 from tiltvp.lab.evaluation.metrics import offset_rad, turned
 from tiltvp.lab.evaluation.schema import COLUMNS
 from tiltvp.tilt import TiltEstimate, TiltEstimator
@@ -70,7 +70,11 @@ class ImageRunner:
         self.options: tuple[dict[str, Any], ...] = tuple(_plain_options(each) for each in estimators)
         """The options in force of each combination, without the mask."""
         self._by_edges: dict[tuple[object, ...], list[tuple[int, TiltEstimator]]] = {}
+        self._whole: list[tuple[int, TiltEstimator]] = []
         for number, (options, estimator) in enumerate(zip(self.options, estimators, strict=True)):
+            if combinations[number].method not in PIXEL_METHODS:
+                self._whole.append((number, estimator))
+                continue
             key = tuple(options[name] for name in _EDGE_OPTIONS)
             self._by_edges.setdefault(key, []).append((number, estimator))
         self._constant = _constant_columns(self.combinations, self.options)
@@ -85,6 +89,9 @@ class ImageRunner:
             for number, estimator in members:
                 estimate, time_fit = _timed(estimator.estimate_edges, edges)
                 estimates[number], times_edges[number], times_fit[number] = estimate, time_edges, time_fit
+        # All the time of a method that is not given edge pixels counts as that of its fit.
+        for number, estimator in self._whole:
+            estimates[number], times_fit[number] = _timed(estimator, image)
         in_order = [estimates[number] for number in range(count)]
         normals = np.stack([each.normal for each in in_order])
         columns: dict[str, Any] = _view_columns(view, count) | self._constant | _estimate_columns(in_order)

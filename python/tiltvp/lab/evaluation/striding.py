@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 import polars as pl
 
-from tiltvp._core import METHODS
+from tiltvp.lab.evaluation.combinations import PIXEL_METHODS
 from tiltvp.lab.evaluation.curves import region_shares
 from tiltvp.lab.evaluation.metrics import offset_rad
 from tiltvp.lab.evaluation.views import View
@@ -37,11 +37,12 @@ def stride_views(
 ) -> pl.DataFrame:
     """One row for each view, method and stride: the error (eq. 44) as a vector, the covariance, and the time.
 
-    Strides take turns on a view; `time_s` is the fastest of `repeats`.
+    Methods are those of edge pixels: straight edges want every row. Strides take turns on a view; `time_s` is the
+    fastest of `repeats`.
     """
     made = [
         (method, stride, TiltEstimator(camera, method=method, row_stride=stride))
-        for method in METHODS
+        for method in PIXEL_METHODS
         for stride in strides
     ]
     rows: list[dict[str, object]] = []

@@ -38,7 +38,7 @@ _PAPER_READING: Final = pl.DataFrame(
 )  # fmt: skip
 """Table 3 and section 2.4, and the iterations that figure 14 shows for one image."""
 
-_METHOD_ORDER: Final = ("image-space-ransac", "image-space-reject-refit", "vector-consensus", "refined")
+_METHOD_ORDER: Final = ("image-space-ransac", "image-space-reject-refit", "vector-consensus", "refined", "segments")
 _CORRECTION_ORDER: Final = ("none", "closed-form", "factor", "affine", "posterior")
 _GROUP_ORDER: Final = ("paper", "literal", "beyond")
 _LEAST_VIEWS: Final = 3

@@ -33,6 +33,7 @@ VARIANTS: Final = (
     Variant("vector consensus", "vector-consensus", "none"),
     Variant("vector consensus, corrected", "vector-consensus", "factor"),
     Variant("refined", "refined", "none", "beyond"),
+    Variant("segments", "segments", "none", "beyond"),
 )
 """The rows of table 3 in its order, and ours."""
 

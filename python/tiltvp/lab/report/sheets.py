@@ -17,6 +17,7 @@ _METHODS: Final = {
     "image-space-reject-refit": ("image space", "reject-refit"),
     "vector-consensus": ("vector consensus", "RANSAC"),
     "refined": ("refined", ""),
+    "segments": ("segments", ""),
 }
 _CORRECTIONS: Final = {
     "none": "none",

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use super::image_space::{ImageSpace, ImageSpaceOptions};
 use super::offsets::Offsets;
-use super::{Fitter, Setting, TiltMethod};
+use super::{Fitter, Prepared, Setting, TiltMethod};
 use crate::edges::{EdgeOptions, EdgePixels, Prefilter};
 use crate::error::Result;
 use crate::options;
@@ -31,15 +31,15 @@ impl TiltMethod for ImageSpaceRansacOptions {
         EdgeOptions { gradient_min: 150.0, ..EdgeOptions::default() }
     }
 
-    fn prepare(&self, setting: &Setting<'_>) -> Result<Arc<dyn Fitter>> {
-        Ok(Arc::new(ImageSpaceRansac {
+    fn prepare(&self, setting: &Setting<'_>) -> Result<Prepared> {
+        Ok(Prepared::Pixels(Arc::new(ImageSpaceRansac {
             space: ImageSpace::new(setting, &self.space)?,
             ransac: RansacOptions {
                 seed: setting.options.seed,
                 sampling: self.sampling,
                 ..RansacOptions::with_threshold(self.threshold_px)
             },
-        }))
+        })))
     }
 }
 

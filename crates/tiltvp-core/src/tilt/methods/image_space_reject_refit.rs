@@ -6,7 +6,7 @@ use nalgebra::Vector2;
 
 use super::image_space::{ImageSpace, ImageSpaceOptions};
 use super::offsets::Offsets;
-use super::{Fitter, Setting, TiltMethod};
+use super::{Fitter, Prepared, Setting, TiltMethod};
 use crate::edges::{EdgeOptions, EdgePixels, Prefilter};
 use crate::error::Result;
 use crate::options;
@@ -36,8 +36,8 @@ impl TiltMethod for ImageSpaceRejectRefitOptions {
         EdgeOptions { gradient_min: 200.0, ..EdgeOptions::default() }
     }
 
-    fn prepare(&self, setting: &Setting<'_>) -> Result<Arc<dyn Fitter>> {
-        Ok(Arc::new(ImageSpaceRejectRefit {
+    fn prepare(&self, setting: &Setting<'_>) -> Result<Prepared> {
+        Ok(Prepared::Pixels(Arc::new(ImageSpaceRejectRefit {
             space: ImageSpace::new(setting, &self.space)?,
             trimming: RejectRefitOptions {
                 keep_fraction: self.keep_fraction,
@@ -45,7 +45,7 @@ impl TiltMethod for ImageSpaceRejectRefitOptions {
                 tolerance: SHIFT_TOLERANCE_PX,
                 rms_min: 0.0,
             },
-        }))
+        })))
     }
 }
 

@@ -3,7 +3,7 @@
 //! # A new method
 //!
 //! 1. `methods/<name>.rs`: its options with docs, defaults and domains, its tables and its fit. Implement [`TiltMethod`] for
-//!    the options and [`Fitter`] for the tables. Take what the others share where it fits: `normals.rs` for great circles,
+//!    the options and [`Fitter`] for the tables of a method of edge pixels. Take what the others share where it fits: `normals.rs` for great circles,
 //!    `image_space.rs` for edge offsets, `sampling.rs` for random samples.
 //! 2. This file: the module, and one entry in the list of `tilt_methods!`.
 //! 3. `tests/options.rs`: a second value for each option.
@@ -19,8 +19,10 @@ mod normals;
 mod offsets;
 mod refined;
 mod sampling;
+mod segments;
 mod vector_consensus;
 
+use std::f64::consts::FRAC_PI_2;
 use std::fmt::Debug;
 use std::sync::Arc;
 
@@ -31,6 +33,8 @@ pub(super) use self::offsets::edge_offset;
 pub use self::refined::RefineOptions;
 pub(super) use self::refined::{Subsample, refine};
 pub(super) use self::sampling::SamplingScratch;
+pub use self::segments::SegmentsOptions;
+pub(super) use self::segments::{SegmentFit, SegmentWork};
 pub use self::vector_consensus::VectorConsensusOptions;
 use super::fit::Fit;
 use super::image_edges::EdgeOrigin;
@@ -73,6 +77,8 @@ tilt_methods! {
     ImageSpaceRejectRefit(ImageSpaceRejectRefitOptions) = "image-space-reject-refit",
     /// Fleer 2017 section 2.2.
     VectorConsensus(VectorConsensusOptions) = "vector-consensus",
+    /// Ours: straight edges of the whole image, by the odds that each is vertical.
+    Segments(SegmentsOptions) = "segments",
 }
 
 /// What a method brings, by its options.
@@ -80,8 +86,13 @@ pub(super) trait TiltMethod {
     /// Which pixels are edges by default.
     fn edges(&self) -> EdgeOptions;
 
+    /// `tilt_max_rad` must be below this, or for pi may be equal to it.
+    fn tilt_limit_rad(&self) -> f64 {
+        FRAC_PI_2
+    }
+
     /// Makes the tables for one camera.
-    fn prepare(&self, setting: &Setting<'_>) -> Result<Arc<dyn Fitter>>;
+    fn prepare(&self, setting: &Setting<'_>) -> Result<Prepared>;
 }
 
 /// What a method is prepared for.
@@ -92,7 +103,16 @@ pub(super) struct Setting<'a> {
     pub pixels: &'a PixelTables,
 }
 
-/// A method with its options and its tables, ready for the images of one camera.
+/// A method ready for the images of one camera, by what it looks at.
+#[derive(Debug, Clone)]
+pub(super) enum Prepared {
+    /// Edge pixels.
+    Pixels(Arc<dyn Fitter>),
+    /// Straight edges.
+    Segments(Arc<SegmentFit>),
+}
+
+/// A method of edge pixels with its options and its tables.
 pub(super) trait Fitter: Debug + Send + Sync {
     /// Keeps out edge pixels that the prefilter rejects anyway; none if the method takes every edge pixel.
     fn prefilter(&self) -> Option<&Prefilter>;

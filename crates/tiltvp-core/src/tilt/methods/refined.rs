@@ -5,7 +5,7 @@ use std::sync::Arc;
 use nalgebra::Vector3;
 
 use super::normals::{self, Normals};
-use super::{Fitter, Setting, TiltMethod};
+use super::{Fitter, Prepared, Setting, TiltMethod};
 use crate::edges::{EdgeOptions, EdgePixels, NormalKind, Prefilter};
 use crate::error::Result;
 use crate::options;
@@ -32,24 +32,29 @@ options! {
 }
 
 /// Largest lean without `tilt_max_rad`: 10 degrees, and a `scale_rad` more for edges that stray.
-const TILT_MAX_RAD: f64 = 12f64.to_radians();
+pub(super) const TILT_MAX_RAD: f64 = 12f64.to_radians();
 
 impl TiltMethod for RefineOptions {
     fn edges(&self) -> EdgeOptions {
         EdgeOptions { gradient_min: 150.0, smoothing_px: 0.6, ..EdgeOptions::default() }
     }
 
-    fn prepare(&self, setting: &Setting<'_>) -> Result<Arc<dyn Fitter>> {
-        let normals = Normals::new(setting, NormalKind::Tangent, TILT_MAX_RAD);
-        Ok(Arc::new(Refined { normals, options: *self }))
+    fn prepare(&self, setting: &Setting<'_>) -> Result<Prepared> {
+        Ok(Prepared::Pixels(Arc::new(Refined::new(setting, *self))))
     }
 }
 
 /// The method ready for images.
 #[derive(Debug)]
-struct Refined {
+pub(super) struct Refined {
     normals: Normals,
     options: RefineOptions,
+}
+
+impl Refined {
+    pub(super) fn new(setting: &Setting<'_>, options: RefineOptions) -> Self {
+        Self { normals: Normals::new(setting, NormalKind::Tangent, TILT_MAX_RAD), options }
+    }
 }
 
 impl Fitter for Refined {

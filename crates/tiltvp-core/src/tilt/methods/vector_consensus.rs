@@ -6,7 +6,7 @@ use std::sync::Arc;
 use nalgebra::Vector3;
 
 use super::normals::{self, Normals};
-use super::{Fitter, Setting, TiltMethod};
+use super::{Fitter, Prepared, Setting, TiltMethod};
 use crate::edges::{EdgeOptions, EdgePixels, NormalKind, Prefilter};
 use crate::error::Result;
 use crate::options;
@@ -61,8 +61,8 @@ impl TiltMethod for VectorConsensusOptions {
         EdgeOptions { gradient_min: 600.0, ..EdgeOptions::default() }
     }
 
-    fn prepare(&self, setting: &Setting<'_>) -> Result<Arc<dyn Fitter>> {
-        Ok(Arc::new(VectorConsensus {
+    fn prepare(&self, setting: &Setting<'_>) -> Result<Prepared> {
+        Ok(Prepared::Pixels(Arc::new(VectorConsensus {
             normals: Normals::new(setting, self.normal, TILT_MAX_RAD),
             plane: setting.origin.robot_from_camera * Vector3::new(1.0, 1.0, 1.0),
             ransac: RansacOptions {
@@ -76,7 +76,7 @@ impl TiltMethod for VectorConsensusOptions {
                 weighted: false,
                 approximate: self.normal == NormalKind::Gradient && !self.correction.tells_its_error(),
             },
-        }))
+        })))
     }
 }
 

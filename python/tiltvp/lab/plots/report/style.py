@@ -57,6 +57,7 @@ _LOOKS: tuple[Look, ...] = (
 
 KNOWN: tuple[str, ...] = (
     "image space, RANSAC", "image space, reject-refit", "vector consensus", "vector consensus, corrected", "refined",
+    "segments",
 )  # fmt: skip
 """The variants that look the same in every figure, whichever of them it shows."""
 

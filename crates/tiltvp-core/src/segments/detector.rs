@@ -1,0 +1,219 @@
+//! From an image to its straight edges: the tables of a camera, made once.
+
+use std::ops::Range;
+
+use nalgebra::{Matrix3, Vector3};
+
+use super::bearings::Bearings;
+use super::chains::{Chains, Window};
+use super::fit::fit;
+use super::joining::Groups;
+use super::options::{SegmentDetectorOptions, SegmentOptions};
+use super::pieces::split;
+use super::segment::{EdgePoint, Segment, Segments};
+use crate::camera::Camera;
+use crate::edges::{EdgeOptions, Region, RidgeDetector, RidgePixels};
+use crate::error::{Error, Result};
+use crate::image::ImageView;
+
+/// Finds the straight edges of the region of a camera's images.
+#[derive(Debug, Clone)]
+pub(crate) struct SegmentFinder {
+    bearings: Bearings,
+    window: Window,
+    options: SegmentOptions,
+}
+
+/// Memory for one thread.
+#[derive(Debug, Clone)]
+pub(crate) struct FinderScratch {
+    detector: RidgeDetector,
+    pub(crate) ridge: RidgePixels,
+    chains: Chains,
+    stack: Vec<Range<usize>>,
+    /// Points of pieces, and the pieces as segments with the directions to their brighter sides.
+    points: Vec<EdgePoint>,
+    pieces: Vec<Segment>,
+    toward: Vec<Vector3<f64>>,
+    groups: Groups,
+    cut: Vec<Range<usize>>,
+}
+
+impl SegmentFinder {
+    /// Tables for a region of a camera that keeps at least two pixels clear of the border.
+    pub(crate) fn new(camera: &Camera, region: &Region, options: SegmentOptions) -> Self {
+        let window = Window::new(region);
+        Self { bearings: Bearings::new(camera, &window), window, options }
+    }
+
+    /// Refuses options whose region does not keep clear of the border as far as the finder looks.
+    pub(crate) fn check_margin(edges: &EdgeOptions) -> Result<()> {
+        if edges.margin_px < 1.0 {
+            return Err(Error::option(
+                "margin_px",
+                edges.margin_px,
+                "at least 1 pixel: edges are told by their neighbours",
+            ));
+        }
+        Ok(())
+    }
+
+    /// Memory for one thread.
+    pub(crate) fn scratch(&self, region: &Region, edges: &EdgeOptions) -> FinderScratch {
+        FinderScratch {
+            detector: RidgeDetector::new(region, edges),
+            ridge: RidgePixels::default(),
+            chains: Chains::new(self.window),
+            stack: Vec::new(),
+            points: Vec::new(),
+            pieces: Vec::new(),
+            toward: Vec::new(),
+            groups: Groups::default(),
+            cut: Vec::new(),
+        }
+    }
+
+    /// Writes the segments of an image, the longest first. Allocates nothing once `scratch` and `out` have grown.
+    pub(crate) fn find(
+        &self,
+        image: &ImageView<'_>,
+        region: &Region,
+        gradient_min: f64,
+        scratch: &mut FinderScratch,
+        out: &mut Segments,
+    ) {
+        let FinderScratch { detector, ridge, chains, stack, points, pieces, toward, groups, cut } = scratch;
+        let SegmentOptions { gradient_start, stray_max_px, rms_max_px, support_min_px, gap_max } = self.options;
+        let least = support_min_px as usize;
+        detector.detect(image, region, gradient_min, None, ridge);
+        chains.link(ridge, (gradient_start * gradient_start) as f32);
+        points.clear();
+        pieces.clear();
+        toward.clear();
+        for chain in chains.of_at_least(least) {
+            let begin = points.len();
+            points.extend(chain.iter().map(|i| self.lift(ridge, chains, *i).0));
+            cut.clear();
+            split(&points[begin..], stray_max_px as f32, least, stack, |piece| cut.push(piece));
+            for piece in cut.iter() {
+                let brighter = self.brighter(ridge, chains, &chain[piece.clone()]);
+                let range = begin + piece.start..begin + piece.end;
+                if let Some(segment) = fit(&points[range.clone()], &brighter, range.start) {
+                    pieces.push(segment);
+                    toward.push(brighter);
+                }
+            }
+        }
+        groups.join(pieces, gap_max);
+        out.list.clear();
+        out.points.clear();
+        for group in groups.iter() {
+            let start = out.points.len();
+            for i in group {
+                out.points.extend_from_slice(&points[pieces[*i as usize].points.clone()]);
+            }
+            let first = group[0] as usize;
+            let segment = if let [_] = group {
+                Some(Segment { points: start..out.points.len(), ..pieces[first].clone() })
+            } else {
+                fit(&out.points[start..], &toward[first], start)
+            };
+            match segment {
+                Some(segment) if segment.rms_px <= rms_max_px => out.list.push(segment),
+                _ => out.points.truncate(start),
+            }
+        }
+        // A stable sort would allocate.
+        let order =
+            |a: &Segment, b: &Segment| b.length_rad.total_cmp(&a.length_rad).then(a.points.start.cmp(&b.points.start));
+        out.list.sort_unstable_by(order);
+    }
+
+    /// A ridge pixel's point, and the change of the bearing by one pixel along its gradient.
+    #[inline(always)]
+    fn lift(&self, ridge: &RidgePixels, chains: &Chains, i: u32) -> (EdgePoint, [f32; 3]) {
+        let (k, edges, unit) = (i as usize, &ridge.edges, chains.unit(i));
+        let (packed, along) = (edges.place()[k], ridge.shift_px()[k]);
+        let (gx, gy) = (edges.gx()[k], edges.gy()[k]);
+        let shift = if gx.abs() >= gy.abs() { [along, 0.0] } else { [0.0, along] };
+        let pixel = [(packed & 0xffff) as f32 + shift[0], (packed >> 16) as f32 + shift[1]];
+        let (bearing, change) = self.bearings.at(pixel, unit);
+        let length = super::fit::dot(change, change).sqrt();
+        let point = EdgePoint { bearing, px_per_rad: 1.0 / length, gradient: [gx, gy], pixel, slot: edges.slot()[k] };
+        (point, change)
+    }
+
+    /// The direction across a piece of a chain to its brighter side: the sum of three points', for one may be noisy.
+    fn brighter(&self, ridge: &RidgePixels, chains: &Chains, piece: &[u32]) -> Vector3<f64> {
+        let n = piece.len();
+        let change = |i: usize| Vector3::from(self.lift(ridge, chains, piece[i]).1.map(f64::from));
+        change(n / 4) + change(n / 2) + change(3 * n / 4)
+    }
+}
+
+/// Finds the straight edges of the images of one camera as arcs of great circles, in any central image.
+#[derive(Debug, Clone)]
+pub struct SegmentDetector {
+    camera: Camera,
+    options: SegmentDetectorOptions,
+    region: Region,
+    finder: SegmentFinder,
+}
+
+/// Memory for one thread.
+#[derive(Debug, Clone)]
+pub struct SegmentScratch {
+    finder: FinderScratch,
+    region_pixels: usize,
+}
+
+impl SegmentDetector {
+    /// Makes the tables.
+    ///
+    /// # Errors
+    /// [`Error::InvalidOption`] or [`Error::InvalidArgument`] if an option is out of its domain, the mask does not fit the
+    /// camera, or no pixel is left.
+    pub fn new(camera: Camera, options: SegmentDetectorOptions) -> Result<Self> {
+        options.validate()?;
+        SegmentFinder::check_margin(&options.edges)?;
+        let region = Region::new(&camera, &Matrix3::identity(), &options.edges, options.mask.as_ref())?;
+        let finder = SegmentFinder::new(&camera, &region, options.segments);
+        Ok(Self { camera, options, region, finder })
+    }
+
+    /// The camera.
+    pub fn camera(&self) -> &Camera {
+        &self.camera
+    }
+
+    /// The options.
+    pub fn options(&self) -> &SegmentDetectorOptions {
+        &self.options
+    }
+
+    /// Memory for one thread.
+    pub fn scratch(&self) -> SegmentScratch {
+        SegmentScratch {
+            finder: self.finder.scratch(&self.region, &self.options.edges),
+            region_pixels: self.region.len(),
+        }
+    }
+
+    /// Writes the straight edges of an image, the longest first. Allocates nothing once `scratch` and `out` have grown.
+    ///
+    /// # Errors
+    /// [`Error::InvalidArgument`] if the image has another size than the camera's, or the scratch is another detector's.
+    pub fn detect(&self, image: &ImageView<'_>, scratch: &mut SegmentScratch, out: &mut Segments) -> Result<()> {
+        if scratch.region_pixels != self.region.len() {
+            return Err(Error::argument("scratch", "that of another detector", "one made by this detector"));
+        }
+        let (width, height) = (self.camera.width() as usize, self.camera.height() as usize);
+        if (image.width(), image.height()) != (width, height) {
+            let got = format!("{} x {} pixels", image.height(), image.width());
+            let expected = format!("{height} x {width} (rows x columns), as the camera's images");
+            return Err(Error::argument("image", got, expected));
+        }
+        self.finder.find(image, &self.region, self.options.edges.gradient_min, &mut scratch.finder, out);
+        Ok(())
+    }
+}

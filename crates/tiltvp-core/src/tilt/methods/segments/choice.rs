@@ -1,0 +1,96 @@
+//! Which of several directions is up: what tells it, and how much each of it says.
+
+use nalgebra::Vector3;
+
+use super::anywhere::{Edge, Hypothesis, Prior};
+
+/// How many numbers tell it.
+pub(super) const FEATURES: usize = 19;
+
+/// Logarithm of the odds for each unit of a feature: a conditional logit on views of panoramas, `tiltvp measure views`, which
+/// prints them and how well others do that have not seen the building.
+const WEIGHTS: [f64; FEATURES] = [
+    0.01687, -1.397, 0.3973, 1.023, -0.1595, 0.3314, 0.567, 1.309, -0.1152, -2.806, -2.214, -0.265, 1.045, 3.761,
+    -1.297, 0.4098, 1.024, 1.588, 15.48,
+];
+
+/// The logarithm of the odds of a hypothesis, up to a constant.
+pub(super) fn log_odds(features: &[f64; FEATURES]) -> f64 {
+    features.iter().zip(WEIGHTS).map(|(feature, weight)| feature * weight).sum()
+}
+
+/// The unit of leans in radians.
+const LEAN_RAD: f64 = 30f64.to_radians();
+
+/// Cosine of 45 degrees: cameras whose axis is nearer to the vertical than that have no roll.
+const AHEAD_SIN: f64 = std::f64::consts::FRAC_1_SQRT_2;
+
+/// What tells whether a hypothesis is the right one: its likelihood; how far it is from what was expected, by roll and pitch of the
+/// camera; how much agrees with each of its axes, how long, how high and of which polarity that is.
+pub(super) fn features(edges: &[Edge], hypothesis: &Hypothesis, prior: &Prior) -> [f64; FEATURES] {
+    let up = &hypothesis.up;
+    let (mut of_axis, mut total) = ([0.0; 3], 0.0);
+    let (mut polarity, mut polarity_of_all, mut rest) = (0.0, 0.0, 0.0);
+    let (mut height_of_verticals, mut height_of_horizontals, mut rise) = (0.0, 0.0, 0.0);
+    let (mut longest_vertical, mut longest_horizontal) = (0.0f64, 0.0f64);
+    let (mut length_of_verticals, mut length_of_horizontals) = (0.0, 0.0);
+    for edge in edges {
+        let [first, second, vertical] = hypothesis.shares(edge);
+        let (weight, horizontal) = (edge.weight(), first + second);
+        for (sum, share) in of_axis.iter_mut().zip([first, second, vertical]) {
+            *sum += weight * share;
+        }
+        total += weight;
+        let (brighter, height) = (edge.normal.dot(up), edge.middle.dot(up));
+        polarity += weight * horizontal * brighter;
+        polarity_of_all += weight * (1.0 - vertical) * brighter;
+        rest += weight * (1.0 - vertical);
+        height_of_verticals += weight * vertical * height.abs();
+        height_of_horizontals += weight * horizontal * height.abs();
+        rise += weight * horizontal * height;
+        longest_vertical = longest_vertical.max(edge.length_rad * vertical);
+        longest_horizontal = longest_horizontal.max(edge.length_rad * horizontal);
+        length_of_verticals += edge.length_rad * vertical;
+        length_of_horizontals += edge.length_rad * horizontal;
+    }
+    let [first, second, vertical] = of_axis;
+    let (more, less, horizontal) = (first.max(second), first.min(second), first + second);
+    let (lean, roll, pitch) = leans(up, prior);
+    [
+        0.1 * hypothesis.log_likelihood,
+        lean * lean,
+        roll * roll,
+        pitch * pitch,
+        0.1 * vertical,
+        0.1 * more,
+        0.1 * less,
+        vertical.ln_1p() - more.ln_1p(),
+        less.ln_1p(),
+        height_of_verticals / (1.0 + vertical),
+        height_of_horizontals / (1.0 + horizontal),
+        rise / (1.0 + horizontal),
+        polarity / (1.0 + horizontal),
+        polarity_of_all / (1.0 + rest),
+        longest_vertical,
+        longest_horizontal,
+        length_of_verticals.ln_1p(),
+        length_of_horizontals.ln_1p(),
+        hypothesis.log_likelihood / (5.0 + total),
+    ]
+}
+
+/// How far a direction is from what was expected to be up, and by which roll and pitch of the camera, in units of 30 degrees. A
+/// camera that looks up or down has no roll: both are the same share of the whole.
+fn leans(up: &Vector3<f64>, prior: &Prior) -> (f64, f64, f64) {
+    let lean = up.z.clamp(-1.0, 1.0).acos();
+    let axis = prior.robot_from_camera * Vector3::z();
+    let (roll, pitch) = if axis.z.abs() < AHEAD_SIN {
+        let level = |direction: &Vector3<f64>| direction - axis * axis.dot(direction);
+        let (own, expected) = (level(up), level(&Vector3::z()));
+        let roll = axis.dot(&expected.cross(&own)).atan2(expected.dot(&own));
+        (roll, axis.dot(up).clamp(-1.0, 1.0).asin() - axis.z.asin())
+    } else {
+        (lean / 2f64.sqrt(), lean / 2f64.sqrt())
+    };
+    (lean / LEAN_RAD, roll / LEAN_RAD, pitch / LEAN_RAD)
+}

@@ -1,0 +1,160 @@
+"""The vertical of views that look anywhere: what is found, and how well it is learned which direction is up."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+import polars as pl
+
+from tiltvp.lab.datasets.ahead import AHEAD_CAMERAS, ahead_views, roll_pitch
+from tiltvp.rotations import read_rotation
+from tiltvp.tilt import TiltEstimator
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from tiltvp.lab.datasets.panoramas import Panorama
+
+__all__ = ["REACH_RAD", "LearnedView", "ahead_table", "look_ahead", "train_choice"]
+
+REACH_RAD: Final = float(np.deg2rad(60.0))
+"""Roll and pitch of 45 degrees each lean by 60 together."""
+SEEDS: Final = (0, 1000, 2000, 3000)
+"""What is added to the number of a panorama for the seed of its views: the first are judged, the others train."""
+RIGHT_DEG: Final = 5.0
+"""A view trains if one of its hypotheses is as near as this."""
+PENALTY: Final = 5.0
+"""Of the squared weights of features that are scaled to a standard deviation of one: as good as any from 1 to 10."""
+FOLDS: Final = 5
+NONE_ODDS: Final = 0.04
+"""Odds, against the best hypothesis, that none is right, as the software has them."""
+
+
+@dataclass(frozen=True)
+class LearnedView:
+    """One view: where it is, what is up, hypotheses (K, 3) with features (K, F), and what the estimate said."""
+
+    camera: str
+    location: str
+    seed: int
+    up: NDArray[np.float64]
+    ups: NDArray[np.float64]
+    features: NDArray[np.float64]
+    estimate: NDArray[np.float64] | None
+    confidence: float
+
+    def errors_deg(self) -> NDArray[np.float64]:
+        """(K,): how far each hypothesis is off."""
+        return np.rad2deg(np.arccos(np.clip(self.ups @ self.up, -1.0, 1.0)))
+
+
+def look_ahead(
+    panoramas: Sequence[Panorama],
+    *,
+    seeds: Sequence[int] = SEEDS,
+    samples: int = 2,
+    noise_sigma: float = 2.0,
+    advance: Callable[[], None] = lambda: None,
+) -> list[LearnedView]:
+    """What "segments" finds in views of panoramas, in the camera frame. `advance` is called per panorama."""
+    forward = np.array(read_rotation("forward"))
+    estimators = {
+        name: TiltEstimator(camera, method="segments", robot_from_camera=forward, tilt_max_rad=REACH_RAD)
+        for name, camera in AHEAD_CAMERAS.items()
+    }
+    seen = []
+    for number, panorama in enumerate(panoramas):
+        for seed in seeds:
+            for view in ahead_views(panorama, number + seed, samples=samples, noise_sigma=noise_sigma):
+                estimator = estimators[view.camera]
+                ups, features = estimator._hypotheses(view.image)
+                estimate = estimator(view.image)
+                found = np.asarray(estimate.normal) @ forward if estimate else None
+                answer = (ups @ forward, features, found, estimate.confidence)
+                seen.append(LearnedView(view.camera, panorama.location, seed, view.up, *answer))
+        advance()
+    return seen
+
+
+def train_choice(views: Sequence[LearnedView]) -> NDArray[np.float64]:
+    """(F,): weights of the features: a conditional logit (McFadden 1974) with a penalty, by Newton's method."""
+    told = [view for view in views if len(view.ups) > 1 and view.errors_deg().min() <= RIGHT_DEG]
+    scale = np.std(np.concatenate([view.features for view in told]), axis=0) + 1e-9
+    weights = np.zeros(len(scale))
+    for _ in range(60):
+        gradient, curvature = -PENALTY * weights, PENALTY * np.eye(len(weights))
+        for view in told:
+            scaled = view.features / scale
+            shares = _shares(scaled @ weights)
+            mean = shares @ scaled
+            away = scaled - mean
+            gradient += scaled[view.errors_deg().argmin()] - mean
+            curvature += (away * shares[:, None]).T @ away
+        step = np.linalg.solve(curvature, gradient)
+        weights += step
+        if np.linalg.norm(step) < 1e-6:
+            break
+    return np.asarray(weights / scale)
+
+
+def _shares(log_odds: NDArray[np.float64]) -> NDArray[np.float64]:
+    odds = np.exp(log_odds - log_odds.max())
+    return np.asarray(odds / odds.sum())
+
+
+def ahead_table(views: Sequence[LearnedView], *, rng_seed: int = 0) -> pl.DataFrame:
+    """Area under the recall curve up to 1, 5 and 10 degrees, for roll and pitch, by the kind of camera and of choice.
+
+    "unseen buildings" chooses by weights that were trained without the building of the view, in five folds; "as
+    shipped" by those in the software, which have seen all; "best" is the nearest hypothesis. `sure_wrong` is the share
+    of all views whose error exceeds two degrees at a probability (as shipped: a confidence) of at least 0.9.
+    """
+    judged = [view for view in views if view.seed == SEEDS[0]]
+    locations = np.random.default_rng(rng_seed).permutation(sorted({view.location for view in views}))
+    fold = {location: k % FOLDS for k, location in enumerate(locations)}
+    weights = [train_choice([view for view in views if fold[view.location] != k]) for k in range(FOLDS)]
+    nothing = np.array([0.0, -1.0, 0.0])
+
+    def unseen(view: LearnedView) -> tuple[NDArray[np.float64], float]:
+        if not len(view.ups):
+            return nothing, 0.0
+        shares = _shares(view.features @ weights[fold[view.location]])
+        best = float(shares.max())
+        return view.ups[shares.argmax()], best / (1.0 + NONE_ODDS * best)
+
+    def best(view: LearnedView) -> tuple[NDArray[np.float64], float]:
+        return (view.ups[view.errors_deg().argmin()], 0.0) if len(view.ups) else (nothing, 0.0)
+
+    def shipped(view: LearnedView) -> tuple[NDArray[np.float64], float]:
+        return (view.ups[0] if len(view.ups) else nothing), view.confidence
+
+    rows = []
+    for kind in ("pinhole", "fisheye"):
+        own = [view for view in judged if view.camera.startswith(kind)]
+        truth = np.array([view.up for view in own])
+        for name, choose in (("unseen buildings", unseen), ("as shipped", shipped), ("best", best)):
+            picked = [choose(view) for view in own]
+            ups, sure = np.array([up for up, _ in picked]), np.array([share >= 0.9 for _, share in picked])
+            roll, pitch = (np.rad2deg(np.abs(a - b)) for a, b in zip(roll_pitch(ups), roll_pitch(truth), strict=True))
+            roll = np.minimum(roll, 360.0 - roll)
+            error = np.rad2deg(np.arccos(np.clip(np.sum(ups * truth, axis=1), -1.0, 1.0)))
+            row: dict[str, str | int | float | None] = {"camera": kind, "choice": name, "views": len(own)}
+            for what, errors in (("roll", roll), ("pitch", pitch)):
+                row |= {f"{what} {limit}": _area(errors, limit) for limit in (1, 5, 10)}
+            answered = sum(view.estimate is not None for view in own) / len(own)
+            row |= {
+                "above 5 deg": 100.0 * float(np.mean(error > 5.0)),
+                "sure": 100.0 * float(np.mean(sure)),
+                "sure_wrong": 100.0 * float(np.mean(sure & (error > 2.0))),
+                "answered": 100.0 * answered if name == "as shipped" else None,
+            }
+            rows.append(row)
+    return pl.DataFrame(rows)
+
+
+def _area(errors: NDArray[np.float64], limit: float) -> float:
+    """Area under the share of errors below x, for x from 0 to a limit, in per cent of the whole."""
+    return float(100.0 * np.mean(np.clip(1.0 - errors / limit, 0.0, 1.0)))
