@@ -164,6 +164,7 @@ const ALL: [Bound; METHODS.len()] = [
     Bound { method: "image-space-ransac", each: 5.0, mean: 2.2 },
     Bound { method: "image-space-reject-refit", each: 3.2, mean: 1.5 },
     Bound { method: "vector-consensus", each: 5.0, mean: 2.2 },
+    Bound { method: "segments", each: 1.3, mean: 0.3 },
 ];
 
 /// A camera near the floor that looks up.
