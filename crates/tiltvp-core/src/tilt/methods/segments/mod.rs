@@ -448,7 +448,8 @@ impl SegmentFit {
             let spread = squares_of * (pooled / total_information) + Matrix2::identity() * (clutter * clutter);
             // From the plane of `(x, y, 1)` to the tangent plane of the normal.
             let plane = tangent_basis(&normal).transpose().fixed_columns::<2>(0) * normal.z;
-            plane * (inverse * spread * inverse) * plane.transpose() + Matrix2::identity() * (FLOOR_RAD * FLOOR_RAD)
+            let covariance = plane * (inverse * spread * inverse) * plane.transpose();
+            0.5 * (covariance + covariance.transpose()) + Matrix2::identity() * (FLOOR_RAD * FLOOR_RAD)
         });
         for (row, (_, vertical)) in rows.iter().zip(weighed.iter_mut()) {
             *vertical = row.vertical;
