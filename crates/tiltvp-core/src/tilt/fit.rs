@@ -18,6 +18,7 @@ use crate::robust::{FitReport, Stop};
 pub(super) const STRAY_RAD: f64 = 2.0 * std::f64::consts::PI / 180.0;
 
 /// What a method finds in the edge pixels of one image.
+#[derive(Debug, Clone, Copy)]
 pub(super) struct Fit {
     pub tilt: Option<Tilt>,
     /// In squared radians in the tangent plane of the normal; `None` if the edges do not tell.

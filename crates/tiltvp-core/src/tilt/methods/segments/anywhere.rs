@@ -154,7 +154,7 @@ impl Search {
             let axes = self.frames[k].1;
             let refined = self.refine(axes);
             for turn in 0..3 {
-                let mut own = refined.clone();
+                let mut own = refined;
                 own.0.rotate_left(turn);
                 let towards = |up: Vector3<f64>| if up.z < 0.0 { -up } else { up };
                 let up = towards(own.0[2]);
