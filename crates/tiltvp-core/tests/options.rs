@@ -54,7 +54,7 @@ fn second(method: &str, name: &str, default: &Value) -> Value {
         "elevation_min_rad" => Value::Float(0.2),
         "elevation_max_rad" => Value::Float(0.5),
         "margin_px" => Value::Float(6.0),
-        "tilt_max_rad" => Value::Float(0.1),
+        "tilt_max_rad" | "stray_max_px" | "rms_max_px" => Value::Float(0.1),
         "row_stride" => Value::Int(2),
         "mask" => {
             let n = SIDE as usize;
@@ -69,16 +69,13 @@ fn second(method: &str, name: &str, default: &Value) -> Value {
         "threshold_rad" => Value::Float(0.03),
         "normal" => Value::Text("tangent".to_owned()),
         "scale_rad" => Value::Float(0.01),
-        "tolerance_rad" => Value::Float(0.05),
+        "tolerance_rad" | "scatter_rad" => Value::Float(0.05),
         "sampling" => Value::Text("progressive".to_owned()),
         "local_optimization" => Value::Bool(true),
         "score" => Value::Text("msac".to_owned()),
         "gradient_start" => Value::Float(1200.0),
-        "stray_max_px" => Value::Float(0.1),
-        "rms_max_px" => Value::Float(0.1),
         "support_min_px" => Value::Int(30),
         "gap_max" => Value::Float(0.0),
-        "scatter_rad" => Value::Float(0.05),
         "segments_max" => Value::Int(4),
         _ => panic!("{method}: the option {name} has no second value here, which would show that it is read"),
     }
