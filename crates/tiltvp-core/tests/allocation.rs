@@ -142,7 +142,9 @@ fn no_detection_of_straight_edges_allocates_once_lists_have_grown() {
     let images = [constant(&camera, 128.0), few, many, noise(&camera, 7)];
     let detector = SegmentDetector::new(camera, SegmentDetectorOptions::default()).unwrap();
     let (mut scratch, mut found) = (detector.scratch(), Segments::default());
-    images.iter().for_each(|image| detector.detect(&image.view(), &mut scratch, &mut found).unwrap());
+    for image in &images {
+        detector.detect(&image.view(), &mut scratch, &mut found).unwrap();
+    }
     let mut most = 0;
     for (i, image) in images.iter().enumerate() {
         let taken = allocations(|| detector.detect(&image.view(), &mut scratch, &mut found).unwrap());
