@@ -13,7 +13,7 @@ import tiltvp
 from tiltvp.errors import InvalidInputError
 from tiltvp.synth import RoomImage
 
-PAPERS = [method for method in tiltvp.METHODS if method != "refined"]
+PAPERS = [method for method in tiltvp.METHODS if method not in ("refined", "segments")]
 
 
 def draws(count: int = 400, factor: float = 130.0, seed: int = 0) -> tuple[np.ndarray, np.ndarray]:

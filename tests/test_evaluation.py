@@ -342,7 +342,7 @@ def test_the_command(tmp_path: Path, dataset: TiltDataset, whole: Run, capfd: py
     assert main(words) == 0
     assert "15 of 15 images were done before" in capfd.readouterr().out
     assert main([*words, "--methods", "refined"]) == 2
-    assert "combinations: 11 there, 1 now" in capfd.readouterr().err
+    assert "combinations: 12 there, 1 now" in capfd.readouterr().err
     assert main([*words[:2], "--sweep", "table4", *words[4:]]) == 2
     assert "did you mean table3" in capfd.readouterr().err
 

@@ -1321,7 +1321,6 @@ class FitReport:
         "out-of-reach",
         "chosen",
         "ambiguous",
-        "undetermined",
     ]:
         """Why the fit stopped, in a word.
 
@@ -1329,8 +1328,7 @@ class FitReport:
         it may. "converged": the model has stopped changing; "settled": the residuals are small enough;
         "iteration-limit": refitting has been repeated as often as it may. "chosen": of several alternatives one is more
         probable than all others together; "ambiguous": none is. No answer comes of "too-few" observations, "no-model"
-        (they are all alike), "out-of-reach" (an angle that the method cannot mean) and "undetermined" (nothing tells
-        how far it may be off).
+        (they are all alike) and "out-of-reach" (an angle that the method cannot mean).
         """
 
     def to_dict(self) -> dict[str, Any]:

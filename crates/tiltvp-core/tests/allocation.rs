@@ -114,9 +114,12 @@ fn no_estimate_after_the_first_allocates() {
         let mut scratch = estimator.scratch();
         // The first image has no edge at all: nothing can have grown to fit the next.
         estimator.estimate(&images[0].view(), &mut scratch).unwrap();
-        if let Method::Segments(_) = estimator.options().method {
+        let by_segments = matches!(estimator.options().method, Method::Segments(_));
+        if by_segments {
             // Lists of straight edges grow with what images hold.
-            images.iter().for_each(|image| drop(estimator.estimate(&image.view(), &mut scratch).unwrap()));
+            for image in &images {
+                estimator.estimate(&image.view(), &mut scratch).unwrap();
+            }
         }
         let mut most = 0;
         for (i, image) in images.iter().enumerate() {
@@ -125,7 +128,9 @@ fn no_estimate_after_the_first_allocates() {
             assert_eq!(taken, 0, "image {i}, {edges} edge pixels, {:?}", estimator.options());
             most = most.max(edges);
         }
-        assert!(most * 10 > estimator.region_pixels() * 4, "{most} of {} pixels", estimator.region_pixels());
+        // Noise has edge pixels everywhere, and few straight edges.
+        let enough = if by_segments { 1000 } else { estimator.region_pixels() * 4 / 10 };
+        assert!(most > enough, "{most} of {} pixels", estimator.region_pixels());
     }
 }
 
@@ -137,7 +142,9 @@ fn no_detection_of_straight_edges_allocates_once_lists_have_grown() {
     let images = [constant(&camera, 128.0), few, many, noise(&camera, 7)];
     let detector = SegmentDetector::new(camera, SegmentDetectorOptions::default()).unwrap();
     let (mut scratch, mut found) = (detector.scratch(), Segments::default());
-    images.iter().for_each(|image| detector.detect(&image.view(), &mut scratch, &mut found).unwrap());
+    for image in &images {
+        detector.detect(&image.view(), &mut scratch, &mut found).unwrap();
+    }
     let mut most = 0;
     for (i, image) in images.iter().enumerate() {
         let taken = allocations(|| detector.detect(&image.view(), &mut scratch, &mut found).unwrap());
@@ -145,7 +152,7 @@ fn no_detection_of_straight_edges_allocates_once_lists_have_grown() {
         most = most.max(found.list.len());
     }
     // A stable sort allocates from some twenty on.
-    assert!(most > 40, "{most} edges");
+    assert!(most > 30, "{most} edges");
 }
 
 #[test]

@@ -20,6 +20,7 @@ fn bits(estimate: &TiltEstimate) -> Vec<u64> {
         prefiltered_pixels,
         inlier_pixels,
         shift_px,
+        alternatives,
         residual_rms,
         iterations,
         stop,
@@ -28,6 +29,10 @@ fn bits(estimate: &TiltEstimate) -> Vec<u64> {
     let mut floats = vec![confidence, residual_rms, shift_px.unwrap_or(-1.0)];
     floats.extend(covariance_rad2.iter());
     floats.extend(tilt.map_or([2.0; 3], |tilt| tilt.normal().into()));
+    for alternative in alternatives.iter().flatten() {
+        floats.push(alternative.probability);
+        floats.extend(alternative.normal.iter());
+    }
     let counts = [edge_pixels, prefiltered_pixels, inlier_pixels, iterations as usize];
     floats.into_iter().map(f64::to_bits).chain(counts.map(|n| n as u64)).chain(reason.bytes().map(u64::from)).collect()
 }

@@ -48,12 +48,13 @@ fn refused(options: TiltOptions) -> String {
 fn second(method: &str, name: &str, default: &Value) -> Value {
     let number = default.numbers().first().copied().unwrap_or(f64::NAN);
     match name {
-        "gradient_min" => Value::Float(1.3 * number),
+        // Far above where a chain may start; of single pixels a little does.
+        "gradient_min" => Value::Float(if method == "segments" { 900.0 } else { 1.3 * number }),
         "smoothing_px" => Value::Float(number + 0.7),
         "elevation_min_rad" => Value::Float(0.2),
         "elevation_max_rad" => Value::Float(0.5),
         "margin_px" => Value::Float(6.0),
-        "tilt_max_rad" => Value::Float(0.1),
+        "tilt_max_rad" | "stray_max_px" | "rms_max_px" => Value::Float(0.1),
         "row_stride" => Value::Int(2),
         "mask" => {
             let n = SIDE as usize;
@@ -68,16 +69,13 @@ fn second(method: &str, name: &str, default: &Value) -> Value {
         "threshold_rad" => Value::Float(0.03),
         "normal" => Value::Text("tangent".to_owned()),
         "scale_rad" => Value::Float(0.01),
-        "tolerance_rad" => Value::Float(0.05),
+        "tolerance_rad" | "scatter_rad" => Value::Float(0.05),
         "sampling" => Value::Text("progressive".to_owned()),
         "local_optimization" => Value::Bool(true),
         "score" => Value::Text("msac".to_owned()),
         "gradient_start" => Value::Float(1200.0),
-        "stray_max_px" => Value::Float(0.1),
-        "rms_max_px" => Value::Float(0.1),
         "support_min_px" => Value::Int(30),
         "gap_max" => Value::Float(0.0),
-        "scatter_rad" => Value::Float(0.05),
         "segments_max" => Value::Int(4),
         _ => panic!("{method}: the option {name} has no second value here, which would show that it is read"),
     }
@@ -221,7 +219,8 @@ fn wrong_values_are_refused_by_name() {
         for wrong in [0, 1000] {
             assert_eq!(refused(TiltOptions { row_stride: wrong, ..defaults(method) }), "row_stride");
         }
-        for wrong in [0.0, -0.1, 1.6, f64::NAN] {
+        let beyond = if method == "segments" { 3.2 } else { 1.6 };
+        for wrong in [0.0, -0.1, beyond, f64::NAN] {
             assert_eq!(refused(TiltOptions { tilt_max_rad: Some(wrong), ..defaults(method) }), "tilt_max_rad");
         }
         let mask = Some(Mask::new(3, 5, vec![true; 15]).unwrap());

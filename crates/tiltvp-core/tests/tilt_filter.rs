@@ -8,7 +8,9 @@ use nalgebra::{Matrix2, Rotation3, Vector2, Vector3};
 use proptest::prelude::*;
 use tiltvp_core::geometry::{Tilt, angle_between};
 use tiltvp_core::robust::Stop;
-use tiltvp_core::tilt::{MountingOptions, TiltEstimate, TiltFilter, TiltFilterOptions, TiltFilterState, Verdict};
+use tiltvp_core::tilt::{
+    ALTERNATIVES, MountingOptions, TiltEstimate, TiltFilter, TiltFilterOptions, TiltFilterState, Verdict,
+};
 
 const DEGREE: f64 = std::f64::consts::PI / 180.0;
 
@@ -115,6 +117,7 @@ fn image(tilt: Option<Tilt>, sigma_rad: f64, confidence: f64) -> TiltEstimate {
         prefiltered_pixels: 0,
         inlier_pixels: 0,
         shift_px: None,
+        alternatives: [None; ALTERNATIVES],
         residual_rms: f64::NAN,
         iterations: 0,
         stop: Stop::NoModel { trials: 0 },

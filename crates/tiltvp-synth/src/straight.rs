@@ -63,12 +63,14 @@ impl World {
             let ([s0, t0], [s1, t1]) = (piece.low, piece.high);
             let (o, u, v) = (at(s0, t0), at(s1, t0), at(s0, t1));
             if patch.triangle {
-                [(o, u), (u, v), (v, o)].into_iter().for_each(|(a, b)| eye.see(&a, &b, contrast_min, &mut found));
+                for (a, b) in [(o, u), (u, v), (v, o)] {
+                    eye.see(&a, &b, contrast_min, &mut found);
+                }
             } else {
                 let w = at(s1, t1);
-                [(o, u), (u, w), (w, v), (v, o)]
-                    .into_iter()
-                    .for_each(|(a, b)| eye.see(&a, &b, contrast_min, &mut found));
+                for (a, b) in [(o, u), (u, w), (w, v), (v, o)] {
+                    eye.see(&a, &b, contrast_min, &mut found);
+                }
             }
         }
         for segment in self.painted_edges() {

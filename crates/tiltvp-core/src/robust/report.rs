@@ -68,11 +68,6 @@ pub enum Stop {
         /// How many there are.
         of: usize,
     },
-    /// The observations that agree do not tell how far the model may be off.
-    Undetermined {
-        /// How many agree.
-        agreeing: usize,
-    },
     /// The observations do not determine a model (they are all alike).
     NoModel {
         /// Samples or refits tried.
@@ -83,14 +78,7 @@ pub enum Stop {
 impl Stop {
     /// Whether the fit has no model to offer.
     pub fn is_failure(self) -> bool {
-        matches!(
-            self,
-            Self::TooFew { .. }
-                | Self::NoModel { .. }
-                | Self::OutOfReach { .. }
-                | Self::Ambiguous { .. }
-                | Self::Undetermined { .. }
-        )
+        matches!(self, Self::TooFew { .. } | Self::NoModel { .. } | Self::OutOfReach { .. } | Self::Ambiguous { .. })
     }
 }
 
@@ -113,9 +101,6 @@ impl fmt::Display for Stop {
             }
             Self::Ambiguous { probability, limit, of } => {
                 write!(f, "which of {of} directions is up is not told: probability {probability:.2}, {limit:.2} needed")
-            }
-            Self::Undetermined { agreeing } => {
-                write!(f, "the {agreeing} observations that agree do not tell how far it may be off")
             }
             Self::NoModel { trials } => write!(f, "no model: the observations are degenerate ({trials} tried)"),
         }

@@ -18,6 +18,7 @@ use crate::robust::{FitReport, Stop};
 pub(super) const STRAY_RAD: f64 = 2.0 * std::f64::consts::PI / 180.0;
 
 /// What a method finds in the edge pixels of one image.
+#[derive(Debug, Clone, Copy)]
 pub(super) struct Fit {
     pub tilt: Option<Tilt>,
     /// In squared radians in the tangent plane of the normal; `None` if the edges do not tell.
@@ -56,14 +57,11 @@ impl Fit {
         Self { stop, rms: f64::NAN, ..Self::without_tilt(report) }
     }
 
-    /// The estimate of an image with so many edge pixels, of which so many passed the prefilter. A tilt of which the error is not
-    /// known is none.
+    /// The estimate of an image with so many edge pixels, of which so many passed the prefilter.
     pub(super) fn into_estimate(self, edge_pixels: usize, prefiltered_pixels: usize) -> TiltEstimate {
         let chosen = self.alternatives[0].map_or(1.0, |best| best.probability);
-        let undetermined = self.tilt.is_some() && self.covariance.is_none();
-        let undetermined = undetermined.then_some(Stop::Undetermined { agreeing: self.inliers });
         TiltEstimate {
-            tilt: self.tilt.filter(|_| undetermined.is_none()),
+            tilt: self.tilt,
             covariance_rad2: self.covariance.unwrap_or(Matrix2::from_diagonal_element(f64::INFINITY)),
             confidence: self.covariance.map_or(0.0, |covariance| chosen * confidence::confidence(&covariance)),
             edge_pixels,
@@ -71,9 +69,9 @@ impl Fit {
             inlier_pixels: self.inliers,
             shift_px: self.shift_px,
             alternatives: self.alternatives,
-            residual_rms: if undetermined.is_some() { f64::NAN } else { self.rms },
+            residual_rms: self.rms,
             iterations: self.iterations,
-            stop: undetermined.unwrap_or(self.stop),
+            stop: self.stop,
         }
     }
 }

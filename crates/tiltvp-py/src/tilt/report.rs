@@ -14,8 +14,7 @@ value! {
         /// it may. "converged": the model has stopped changing; "settled": the residuals are small enough;
         /// "iteration-limit": refitting has been repeated as often as it may. "chosen": of several alternatives one is more
         /// probable than all others together; "ambiguous": none is. No answer comes of "too-few" observations,
-        /// "no-model" (they are all alike), "out-of-reach" (an angle that the method cannot mean)
-        /// and "undetermined" (nothing tells how far it may be off).
+        /// "no-model" (they are all alike) and "out-of-reach" (an angle that the method cannot mean).
         stop: StopWord,
         /// The same in a sentence, with the measured number and the limit.
         reason: String,
@@ -39,7 +38,6 @@ impl FitReport {
             Stop::OutOfReach { .. } => "out-of-reach",
             Stop::Chosen { .. } => "chosen",
             Stop::Ambiguous { .. } => "ambiguous",
-            Stop::Undetermined { .. } => "undetermined",
         };
         Self { stop: StopWord(word.to_owned()), reason: stop.to_string(), iterations, residual_rms }
     }

@@ -154,7 +154,7 @@ impl Search {
             let axes = self.frames[k].1;
             let refined = self.refine(axes);
             for turn in 0..3 {
-                let mut own = refined.clone();
+                let mut own = refined;
                 own.0.rotate_left(turn);
                 let towards = |up: Vector3<f64>| if up.z < 0.0 { -up } else { up };
                 let up = towards(own.0[2]);
@@ -190,7 +190,7 @@ impl Search {
         for hypothesis in &mut self.hypotheses {
             hypothesis.probability = (log_odds(&hypothesis.features) - best).exp() / total;
         }
-        self.hypotheses.sort_by(|a, b| b.probability.total_cmp(&a.probability));
+        self.hypotheses.sort_unstable_by(|a, b| b.probability.total_cmp(&a.probability));
     }
 
     /// Directions in which pairs of long edges meet and many others pass: the best one, then the best of those apart from it.
@@ -229,7 +229,7 @@ impl Search {
                 frames.push((likelihood, [first, up.cross(&first), up]));
             }
         }
-        frames.sort_by(|a, b| b.0.total_cmp(&a.0));
+        frames.sort_unstable_by(|a, b| b.0.total_cmp(&a.0));
     }
 
     /// Gauss-Newton over a turn of the axes and the angle between the horizontals: axes, log-likelihood and information.
@@ -285,7 +285,8 @@ impl Hypothesis {
         let inverse = (self.information + stiffness + Matrix4::identity()).try_inverse()?;
         let turns: Matrix3<f64> = inverse.fixed_view::<3, 3>(0, 0).into();
         let moves: SMatrix<f64, 2, 3> = -tangent_basis(&self.up).transpose() * self.up.cross_matrix();
-        Some(moves * turns * moves.transpose())
+        let covariance = moves * turns * moves.transpose();
+        Some(0.5 * (covariance + covariance.transpose()))
     }
 
     /// Probabilities that an edge is of the two horizontals and of the vertical.

@@ -214,22 +214,22 @@ struct Sector {
 
 /// The fit to the segments with the vote of the pixels, by information. Where they differ by more than they may, the covariance
 /// grows with the square of it (Birge 1932). The vote alone where the segments tell nothing.
-fn fused(fit: Fit, vote: Fit) -> Fit {
+fn fused(fit: &Fit, vote: &Fit) -> Fit {
     let (Some(tilt), Some(covariance)) = (fit.tilt, fit.covariance) else {
-        return if vote.covariance.is_some() { Fit { inliers: fit.inliers, ..vote } } else { fit };
+        return if vote.covariance.is_some() { Fit { inliers: fit.inliers, ..*vote } } else { *fit };
     };
-    let (Some(other), Some(other_covariance)) = (vote.tilt, vote.covariance) else { return fit };
+    let (Some(other), Some(other_covariance)) = (vote.tilt, vote.covariance) else { return *fit };
     let basis = tangent_basis(&tilt.normal());
     let away = basis.transpose() * other.normal();
     let theirs = other_covariance + Matrix2::identity() * (PIXELS_RAD * PIXELS_RAD);
-    let Some(inverse) = (covariance + theirs).try_inverse() else { return fit };
+    let Some(inverse) = (covariance + theirs).try_inverse() else { return *fit };
     let gain = covariance * inverse;
     let normal = tilt.normal() + basis * (gain * away);
     // Its expectation is one.
     let disagreement = 0.5 * away.dot(&(inverse * away));
     let together = (Matrix2::identity() - gain) * covariance * disagreement.max(1.0);
     let symmetric = 0.5 * (together + together.transpose());
-    Fit { tilt: Tilt::from_normal(&normal), covariance: Some(symmetric), ..fit }
+    Fit { tilt: Tilt::from_normal(&normal), covariance: Some(symmetric), ..*fit }
 }
 
 /// Rows by their numbers, for the grid: normals, half the inverse variances, logarithms of the odds, weights.
@@ -271,7 +271,7 @@ impl SegmentFit {
         } else {
             self.weigh(work);
             let fit = self.fit(work);
-            fused(fit, self.vote(&work.finder.ridge, tables, &mut work.strong, pixel_work))
+            fused(&fit, &self.vote(&work.finder.ridge, tables, &mut work.strong, pixel_work))
         };
         let considered = work.weighed.iter().map(|(i, _)| work.segments.list[*i as usize].support()).sum();
         fit.into_estimate(work.segments.points.len(), considered)
@@ -296,7 +296,9 @@ impl SegmentFit {
         }
         let (probability, limit) = (best.probability, PROBABILITY_MIN);
         if probability < limit {
-            weighed.iter_mut().for_each(|(_, share)| *share = 0.0);
+            for (_, share) in weighed.iter_mut() {
+                *share = 0.0;
+            }
             let stop = Stop::Ambiguous { probability, limit, of: search.hypotheses.len() };
             return Fit { alternatives, ..Fit::failed(stop) };
         }
@@ -452,7 +454,8 @@ impl SegmentFit {
             let spread = squares_of * (pooled / total_information) + Matrix2::identity() * (clutter * clutter);
             // From the plane of `(x, y, 1)` to the tangent plane of the normal.
             let plane = tangent_basis(&normal).transpose().fixed_columns::<2>(0) * normal.z;
-            plane * (inverse * spread * inverse) * plane.transpose() + Matrix2::identity() * (FLOOR_RAD * FLOOR_RAD)
+            let covariance = plane * (inverse * spread * inverse) * plane.transpose();
+            0.5 * (covariance + covariance.transpose()) + Matrix2::identity() * (FLOOR_RAD * FLOOR_RAD)
         });
         for (row, (_, vertical)) in rows.iter().zip(weighed.iter_mut()) {
             *vertical = row.vertical;
