@@ -276,9 +276,8 @@ def test_overlay_and_level_of_equal_names(run: Run, world: Path, tmp_path: Path)
     assert drawn.shape == image.shape
     assert (drawn.max(axis=2) > drawn.min(axis=2) + 60).sum() > 100
     levelled = tiltvp.read_image(level / "images_a.png")
-    camera = small_camera()
-    estimate = tiltvp.TiltEstimator(camera)(image)
-    assert np.array_equal(levelled, tiltvp.level(image, camera, estimate))
+    estimator = tiltvp.TiltEstimator(small_camera())
+    assert np.array_equal(levelled, tiltvp.level(image, estimator, estimator(image)))
     assert tiltvp.read_image(level / "more_a.png").ndim == 2
 
 

@@ -163,10 +163,10 @@ def test_estimates_of_images_are_fused(camera: tiltvp.Camera, room: RoomImage) -
     assert filter_.estimate == known
     assert filter_.update(estimator(noise)).verdict in ("no-tilt", "low-confidence", "outside-gate")
     assert filter_.estimate == known
-    level = tiltvp.level(room.gray, camera, known)
+    level = tiltvp.level(room.gray, estimator, known)
     assert level.shape == room.gray.shape
     with pytest.raises(InvalidInputError, match="without a tilt"):
-        tiltvp.level(room.gray, camera, tiltvp.TiltFilter().estimate)
+        tiltvp.level(room.gray, estimator, tiltvp.TiltFilter().estimate)
 
 
 def test_turning_moves_the_floor_but_not_the_mounting() -> None:

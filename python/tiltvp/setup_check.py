@@ -54,7 +54,7 @@ _WEIGHTS: Final = np.array([0.0] * 9)
 """Logarithm of the odds for each unit of a feature of one image: a conditional logit, as `tiltvp measure trust` trains it."""
 _SHARED: Final = 0.6
 """Images of one place err together: the logarithm of the odds of N images is that of N to this power of them."""
-_BELIEVABLE: Final = 0.05
+BELIEVABLE: Final = 0.05
 
 
 @dataclass(frozen=True)
@@ -74,7 +74,7 @@ class SetupCheck:
     @property
     def believable(self) -> bool:
         """Whether the direction that was given has a probability of at least 0.05."""
-        return self.probabilities[self.given] >= _BELIEVABLE
+        return self.probabilities[self.given] >= BELIEVABLE
 
     @property
     def reason(self) -> str:
@@ -105,12 +105,17 @@ def check_setup(
     seen = setup_features(images, camera, mask=mask)
     if not len(seen):
         raise InvalidInputError("images: none, expected at least one")
-    log_odds = seen.sum(axis=0) @ _WEIGHTS * len(seen) ** (_SHARED - 1.0)
-    odds = np.exp(log_odds - log_odds.max())
-    shares = {name: float(share) for name, share in zip(DIRECTIONS, odds / odds.sum(), strict=True)}
+    shares = {name: float(share) for name, share in zip(DIRECTIONS, shares_of(seen), strict=True)}
     up = rotation.T @ np.array([0.0, 0.0, 1.0])
     given = max(DIRECTIONS, key=lambda name: float(np.dot(up, DIRECTIONS[name])))
     return SetupCheck(given, max(shares, key=lambda name: shares[name]), shares, len(seen))
+
+
+def shares_of(features: Matrix, weights: Matrix | None = None) -> Matrix:
+    """(6,): probabilities of the six directions by the features (N, 6, F) of images."""
+    log_odds = features.sum(axis=0) @ (_WEIGHTS if weights is None else weights) * len(features) ** (_SHARED - 1.0)
+    odds = np.exp(log_odds - log_odds.max())
+    return np.asarray(odds / odds.sum())
 
 
 def setup_features(images: Iterable[ArrayLike], camera: Camera, *, mask: ArrayLike | None = None) -> Matrix:

@@ -80,7 +80,7 @@ def test_a_finite_answer_or_a_reason(data: Path, case: Case, method: str) -> Non
     assert np.isfinite(estimate.normal).all()
     assert 0.0 <= estimate.confidence <= 1.0
     assert estimate.alpha_rad < math.pi / 2
-    levelled = tiltvp.level(image, camera, estimate, robot_from_camera=rotation)
+    levelled = tiltvp.level(image, estimator, estimate)
     assert levelled.shape == image.shape
     assert levelled.any()
 

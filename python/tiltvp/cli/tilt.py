@@ -139,8 +139,7 @@ class Work:
             (estimate, edges), time_s = _timed(lambda: self.estimator.with_edges(gray))
             write_image(self.overlay / f"{name}.png", self._overlay(gray, estimate, edges, file.name))
         if self.level is not None and estimate and self.filtering.accepts(estimate.confidence):
-            rotation = self.estimator.robot_from_camera
-            write_image(self.level / f"{name}.png", level(image, self.estimator.camera, estimate, rotation))
+            write_image(self.level / f"{name}.png", level(image, self.estimator, estimate))
         return Outcome(file, estimate, time_s)
 
     def _overlay(
@@ -148,9 +147,7 @@ class Work:
     ) -> NDArray[np.uint8]:
         from tiltvp.overlays.tilt import tilt_overlay
 
-        return tilt_overlay(
-            gray, self.estimator.camera, estimate, edges, self.estimator.robot_from_camera, words_of(estimate, title)
-        )
+        return tilt_overlay(gray, self.estimator, estimate, edges, words_of(estimate, title))
 
 
 def words_of(estimate: TiltEstimate, title: str) -> str:

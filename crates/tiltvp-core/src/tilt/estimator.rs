@@ -10,7 +10,9 @@ use super::image_edges::{EdgeOrigin, ImageEdges};
 use super::methods::{Fitter, Prepared, Setting, edge_offset};
 use super::options::TiltOptions;
 use super::scratch::{Scratch, Work};
+use super::fit::Seen;
 use super::tables::PixelTables;
+use super::trust;
 use crate::camera::Camera;
 use crate::edges::{EdgeOptions, EdgePixels};
 use crate::error::{Error, Result};
@@ -96,6 +98,11 @@ impl TiltEstimator {
     /// How many pixels are looked at.
     pub fn region_pixels(&self) -> usize {
         self.pixels.region.len()
+    }
+
+    /// What the trust in an estimate of this estimator is told by, for training.
+    pub fn trust_features(&self, estimate: &TiltEstimate) -> Vec<f64> {
+        trust::features(estimate, self.pixels.region.pixels_per_rad()).to_vec()
     }
 
     /// Memory for one thread, with room for an image in which every pixel is an edge.
@@ -188,7 +195,9 @@ impl TiltEstimator {
     /// keep out only what the prefilters reject.
     fn fit(&self, method: &dyn Fitter, edges: &EdgePixels, work: &mut Work) -> TiltEstimate {
         let fit = method.fit(edges, &self.pixels, work);
-        fit.into_estimate(edges.strong(), work.rows.len())
+        let (edge_pixels, prefiltered_pixels) = (edges.strong(), work.rows.len());
+        let pixels_per_rad = self.pixels.region.pixels_per_rad();
+        fit.into_estimate(&Seen { edge_pixels, prefiltered_pixels, pixels_per_rad, trust: method.trust() })
     }
 
     /// The directions that may be up and what tells which one is, [`estimate`](Self::estimate)'s way where it looks anywhere: for

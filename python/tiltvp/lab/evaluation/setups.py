@@ -12,7 +12,7 @@ import polars as pl
 from tiltvp.lab.datasets.hostile import AHEAD, DOWN, FORWARD, LEAN_MAX_DEG, ROLLED, UP, UPWARD, WHOLE
 from tiltvp.lab.datasets.panoramas import Panorama, PanoramaViews
 from tiltvp.lab.evaluation.trust import was_set_on
-from tiltvp.setup_check import DIRECTIONS, setup_features
+from tiltvp.setup_check import BELIEVABLE, DIRECTIONS, setup_features, shares_of
 from tiltvp.tilt import normal_from_alpha_beta
 
 if TYPE_CHECKING:
@@ -88,3 +88,25 @@ def train_setups(sets: Sequence[ImageSet]) -> NDArray[np.float64]:
         if np.linalg.norm(step) < 1e-6:
             break
     return np.asarray(weights / scale)
+
+
+def summarise_sets(sets: Sequence[ImageSet], weights: NDArray[np.float64] | None = None) -> pl.DataFrame:
+    """One row for each setup and half of the buildings: sets, and in per cent of them those whose right direction is the
+    best, those that believe the right one, and those that believe each wrong one. `weights` are those of the software.
+    """
+    rows = []
+    for item in sets:
+        shares = shares_of(item.features, weights)
+        rows.append(
+            {
+                "setup": item.setup,
+                "half": "set" if was_set_on(item.location) else "unseen",
+                "right": int(shares.argmax()) == item.up,
+                "right_believed": shares[item.up] >= BELIEVABLE,
+                "wrong_believed": float(np.mean(np.delete(shares, item.up) >= BELIEVABLE)),
+            }
+        )
+    table = pl.DataFrame(rows)
+    table = pl.concat([table.sort("half", "setup"), table.with_columns(setup=pl.lit("all"))])
+    shares_ = [(100.0 * pl.col(name).mean()).alias(name) for name in ("right", "right_believed", "wrong_believed")]
+    return table.group_by("half", "setup", maintain_order=True).agg(pl.len().alias("sets"), *shares_)

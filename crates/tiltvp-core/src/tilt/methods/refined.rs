@@ -15,6 +15,7 @@ use crate::tilt::fit::{Evidence, Fit};
 use crate::tilt::scratch::{Inliers, Work};
 use crate::tilt::tables::PixelTables;
 use crate::tilt::trained::TrainedCorrection;
+use crate::tilt::trust::{FEATURES, Trust};
 
 options! {
     /// Options of the refined method. Angles are those between an edge's great circle and the vertical.
@@ -33,6 +34,9 @@ options! {
 
 /// Largest lean without `tilt_max_rad`: 10 degrees, and a `scale_rad` more for edges that stray.
 pub(super) const TILT_MAX_RAD: f64 = 12f64.to_radians();
+
+/// How a fit tells whether it is of the vertical: `tiltvp measure trust --weights` prints it.
+static TRUST: Trust = Trust { constant: 0.0, weights: [0.0; FEATURES] };
 
 impl TiltMethod for RefineOptions {
     fn edges(&self) -> EdgeOptions {
@@ -60,6 +64,10 @@ impl Refined {
 impl Fitter for Refined {
     fn prefilter(&self) -> Option<&Prefilter> {
         Some(self.normals.prefilter())
+    }
+
+    fn trust(&self) -> Option<&'static Trust> {
+        Some(&TRUST)
     }
 
     fn normal(&self, slot: usize, gx: f32, gy: f32) -> Option<[f32; 3]> {
