@@ -30,6 +30,7 @@ from tiltvp.selfcalib import (
     calibrate,
     wheel_displacements,
 )
+from tiltvp.setup_check import SetupCheck, check_setup
 from tiltvp.tilt import (
     CommonDirection,
     EdgeElements,
@@ -69,11 +70,13 @@ __all__ = [
     "SegmentDetector",
     "Segments",
     "SelfCalibrator",
+    "SetupCheck",
     "TiltEstimate",
     "TiltEstimator",
     "TiltFilter",
     "apply_correction",
     "calibrate",
+    "check_setup",
     "common_direction",
     "corner",
     "draw_edges",

@@ -50,7 +50,7 @@ _EVEN_RAD: Final = float(np.deg2rad(3.0))
 _LENGTH_RAD: Final = 0.2
 _LONGEST: Final = 120
 """Straight edges of an image that are looked at."""
-_WEIGHTS: Final = np.array([0.0] * 9)
+_WEIGHTS: Final = np.array([0.0] * 20)
 """Logarithm of the odds for each unit of a feature of one image: a conditional logit, as `tiltvp measure trust` trains it."""
 _SHARED: Final = 0.6
 """Images of one place err together: the logarithm of the odds of N images is that of N to this power of them."""
@@ -184,6 +184,9 @@ def _signed(
     elevation = bearings @ up
     spread = float(levels.std() * elevation.std())
     light = float(np.mean((levels - levels.mean()) * (elevation - elevation.mean()))) / spread if spread > 1e-6 else 0.0
+    centre = float(elevation.mean())
+    lightest, darkest = (levels >= np.percentile(levels, 95)), (levels <= np.percentile(levels, 10))
+    short = length < np.median(length) if len(length) else np.zeros(0, dtype=bool)
     across = middle[vertical > 0.5] @ np.eye(3)[direction == 0.0].T
     sectors = np.unique(np.floor(np.arctan2(across[:, 1], across[:, 0]) * 6.0 / np.pi))
     return [
@@ -196,4 +199,15 @@ def _signed(
         float(weight @ (level * height)) / total,
         light,
         float(np.max(length * vertical, initial=0.0)),
+        float(elevation[lightest].mean()) - centre,
+        float(elevation[darkest].mean()) - centre,
+        float(height[short].mean()) - centre if short.any() else 0.0,
+        float(height.mean()) - centre if len(height) else 0.0,
+        float((vertical @ height) / (1.0 + vertical.sum())),
+        centre * np.log1p(len(edges.length_rad)),
+        centre * float(levels.mean()) / 100.0,
+        centre * float(np.mean(levels > 235.0)),
+        centre * float(levels.std()) / 50.0,
+        centre,
+        centre * total / 20.0,
     ]

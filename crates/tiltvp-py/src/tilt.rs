@@ -161,8 +161,8 @@ impl TiltEstimator {
     fn _trust_features<'py>(&self, py: Python<'py>, image: &Bound<'_, PyAny>) -> PyResult<Array<'py, f64>> {
         let image = convert::gray(image, "image")?;
         let (view, inner) = (convert::view(&image)?, &self.inner);
-        let found = self.with_scratch(py, |scratch| inner.estimate(&view, scratch))?;
-        Ok(Array::new(PyArray1::from_vec(py, inner.trust_features(&found))))
+        let found = self.with_scratch(py, |scratch| inner.trust_features(&view, scratch))?;
+        Ok(Array::new(PyArray1::from_vec(py, found)))
     }
 
     /// The tilts of many such images, in their order, the same for any number of threads.

@@ -12,7 +12,6 @@ use super::options::TiltOptions;
 use super::scratch::{Scratch, Work};
 use super::fit::Seen;
 use super::tables::PixelTables;
-use super::trust;
 use crate::camera::Camera;
 use crate::edges::{EdgeOptions, EdgePixels};
 use crate::error::{Error, Result};
@@ -101,9 +100,13 @@ impl TiltEstimator {
         self.pixels.region.len()
     }
 
-    /// What the trust in an estimate of this estimator is told by, for training.
-    pub fn trust_features(&self, estimate: &TiltEstimate) -> Vec<f64> {
-        trust::features(estimate, self.pixels.region.pixels_per_rad()).to_vec()
+    /// What tells whether the estimate of an image is of the vertical at all, for training. Allocates.
+    ///
+    /// # Errors
+    /// Those of [`estimate`](Self::estimate).
+    pub fn trust_features(&self, image: &ImageView<'_>, scratch: &mut Scratch) -> Result<Vec<f64>> {
+        self.estimate(image, scratch)?;
+        Ok(scratch.work.trusted.to_vec())
     }
 
     /// Memory for one thread, with room for an image in which every pixel is an edge.
@@ -198,7 +201,7 @@ impl TiltEstimator {
         let fit = method.fit(edges, &self.pixels, work);
         let (edge_pixels, prefiltered_pixels) = (edges.strong(), work.rows.len());
         let pixels_per_rad = self.pixels.region.pixels_per_rad();
-        fit.into_estimate(&Seen { edge_pixels, prefiltered_pixels, pixels_per_rad, trust: method.trust() })
+        fit.into_estimate(&Seen { edge_pixels, prefiltered_pixels, pixels_per_rad, trust: method.trust() }, &mut work.trusted)
     }
 
     /// The directions that may be up and what tells which one is, [`estimate`](Self::estimate)'s way where it looks anywhere: for

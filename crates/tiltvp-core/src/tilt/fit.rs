@@ -10,7 +10,7 @@ use super::estimate::{ALTERNATIVES, Alternative, TiltEstimate};
 use super::scratch::Work;
 use super::tables::PixelTables;
 use super::trained::TrainedCorrection;
-use super::trust::{Doubt, Trust};
+use super::trust::{self, Doubt, FEATURES, Support, Trust};
 use crate::geometry::{Tilt, tangent_basis};
 use crate::robust::{FitReport, Stop};
 
@@ -30,6 +30,7 @@ pub(super) struct Fit {
     pub iterations: u32,
     pub stop: Stop,
     pub alternatives: [Option<Alternative>; ALTERNATIVES],
+    pub support: Support,
 }
 
 impl Fit {
@@ -44,6 +45,7 @@ impl Fit {
             iterations: 0,
             stop,
             alternatives: [None; ALTERNATIVES],
+            support: Support::NONE,
         }
     }
 
@@ -70,7 +72,7 @@ impl Fit {
     }
 
     /// The estimate of an image. A tilt of which the error is not known is none.
-    pub(super) fn into_estimate(self, seen: &Seen) -> TiltEstimate {
+    pub(super) fn into_estimate(self, seen: &Seen, features: &mut [f64; FEATURES]) -> TiltEstimate {
         let chosen = self.alternatives[0].map_or(1.0, |best| best.probability);
         let undetermined = self.tilt.is_some() && self.covariance.is_none();
         let undetermined = undetermined.then_some(Stop::Undetermined { agreeing: self.inliers });
@@ -88,8 +90,9 @@ impl Fit {
             stop: undetermined.unwrap_or(self.stop),
             doubt: None,
         };
+        *features = trust::features(&estimate, &self.support, seen.pixels_per_rad);
         if let Some(trust) = seen.trust {
-            estimate.confidence *= trust.probability(&estimate, seen.pixels_per_rad);
+            estimate.confidence *= trust.probability(features);
         }
         estimate.doubt = Doubt::of(&estimate, seen.pixels_per_rad);
         estimate

@@ -10,7 +10,7 @@ from cyclopts import Parameter, validators
 from tiltvp.cli.lab.tables import show_frame
 from tiltvp.cli.options import Switch
 from tiltvp.cli.tables import check_ending, write_frame
-from tiltvp.cli.terminal import progress_bar
+from tiltvp.cli.terminal import progress_bar, say
 
 
 def trust(
@@ -20,6 +20,7 @@ def trust(
     count: Annotated[int, Parameter(validator=validators.Number(gte=1))] = 200,
     seed: Annotated[int, Parameter(validator=validators.Number(gte=0))] = 0,
     unseen: Switch = False,
+    weights: Switch = False,
     out: Path | None = None,
 ) -> None:
     """Each method on images that mislead: answers, those wrong and sure, abstentions, and whether reasons name the cause.
@@ -37,12 +38,14 @@ def trust(
         Seed of headings, leans and harm.
     unseen
         Only the half of the buildings on which nothing was set.
+    weights
+        Also print the weights that the other half trains, by which confidences trust a fit to be of the vertical.
     out
         Also write the long table, one row for each image and method: .csv, .json or .parquet.
     """
     from tiltvp.lab.datasets.hostile import CASES, hostile_images
     from tiltvp.lab.datasets.panoramas import read_panorama_index
-    from tiltvp.lab.evaluation.hostile import judge_images, summarise_cases
+    from tiltvp.lab.evaluation.hostile import METHODS, judge_images, summarise_cases, train_trust
     from tiltvp.lab.evaluation.trust import was_set_on
 
     if out is not None:
@@ -54,9 +57,13 @@ def trust(
         if not (unseen and was_set_on(panorama.location))
     ]
     with progress_bar(count * len(CASES), "images") as bar:
-        table = judge_images(hostile_images(chosen, count=count, seed=seed), advance=bar.advance)
+        images = hostile_images(chosen, count=count, seed=seed)
+        table = judge_images(images, features=weights, advance=bar.advance)
     if out is not None:
-        write_frame(table, out)
+        write_frame(table.select(column for column in table.columns if column != "features"), out)
     places = len({panorama.location for panorama in chosen})
     title = f"Shares in per cent, of {count} images of each case, {len(chosen)} panoramas of {places} buildings"
     show_frame(title, summarise_cases(table), ["method", "case"])
+    for method in METHODS if weights else ():
+        constant, own = train_trust(table, method)
+        say(f"{method}: {constant:.4g}; {', '.join(f'{weight:.4g}' for weight in own)}")

@@ -10,13 +10,17 @@ import numpy as np
 import polars as pl
 
 from tiltvp.errors import InvalidInputError
+from tiltvp.images import gray_from
 from tiltvp.lab.datasets.hostile import UNHARMED, HostileImage
+from tiltvp.lab.evaluation.trust import was_set_on
 from tiltvp.tilt import TiltEstimator, tilt_error_rad
 
 if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
     from tiltvp.tilt import TiltEstimate
 
-__all__ = ["METHODS", "SURE", "judge_images", "summarise_cases"]
+__all__ = ["METHODS", "SURE", "judge_images", "summarise_cases", "train_trust"]
 
 METHODS: Final = ("refined", "segments")
 SURE: Final = 0.9
@@ -42,11 +46,19 @@ CAUSES: Final = {
 """What a reason names the cause by, for each case whose name begins with or holds the words; others by any reason."""
 
 
+BLIND: Final = ("upward read as downward", "downward read as upward", "centre off by 10 px")
+"""Cases that an image is as consistent with as with the truth, from which nothing is learned."""
+HOPELESS: Final = 0.3
+"""Confidence by the covariance below which an estimate is not sure anyway, and teaches nothing."""
+PENALTY: Final = 1.0
+"""Of the squared weights of features that are scaled to a standard deviation of one."""
+
+
 def judge_images(
-    images: Iterable[HostileImage], *, advance: Callable[[], None] = lambda: None
+    images: Iterable[HostileImage], *, features: bool = False, advance: Callable[[], None] = lambda: None
 ) -> pl.DataFrame:
     """One row for each image and method: error in degrees (NaN without a truth, null without an answer), confidence,
-    reason. An estimator that cannot be made, for the camera sees nothing of what the method looks at, has no answer.
+    reason, and with `features` also what tells whether the fit is of the vertical. An estimator that cannot be made, for the camera sees nothing of what the method looks at, has no answer.
     """
     made: dict[str, TiltEstimator | InvalidInputError] = {}
     rows: list[dict[str, object]] = []
@@ -63,7 +75,10 @@ def judge_images(
             if isinstance(estimator, InvalidInputError):
                 rows.append(row | {"confidence": 0.0, "reason": str(estimator)})
                 continue
-            rows.append(row | _judged(estimator(item.image), item))
+            row |= _judged(estimator(item.image), item)
+            if features:
+                row["features"] = estimator._trust_features(gray_from(item.image)).tolist()
+            rows.append(row)
         advance()
     return pl.DataFrame(rows, infer_schema_length=None)
 
@@ -108,3 +123,29 @@ def summarise_cases(table: pl.DataFrame) -> pl.DataFrame:
 def _names_cause(row: dict[str, str]) -> bool:
     causes = [cause for words, cause in CAUSES.items() if row["case"].startswith(words) or f" {words}" in row["case"]]
     return all(re.search(cause, row["reason"]) for cause in causes)
+
+
+def train_trust(table: pl.DataFrame, method: str) -> tuple[float, NDArray[np.float64]]:
+    """Constant and weights (F,) of what tells whether a fit is of the vertical: a logistic regression by Newton's method,
+    on the half of the buildings that is for setting things, from rows with features.
+    """
+    told = table.filter(
+        (pl.col("method") == method) & pl.col("error_deg").is_not_null() & ~pl.col("case").is_in(BLIND)
+    ).filter(pl.col("location").map_elements(was_set_on, return_dtype=pl.Boolean))
+    features = np.array(told["features"].to_list())
+    # The first is the logarithm of the stated error in degrees.
+    hopeful = 1.0 - np.exp(-((WRONG_DEG / np.exp(features[:, 0])) ** 2)) > HOPELESS
+    right = (told["error_deg"].fill_nan(np.inf).to_numpy() <= WRONG_DEG)[hopeful]
+    features = features[hopeful]
+    scale = features.std(axis=0) + 1e-9
+    rows = np.column_stack([np.ones(len(features)), features / scale])
+    weights, stiffness = np.zeros(rows.shape[1]), PENALTY * np.eye(rows.shape[1])
+    stiffness[0, 0] = 0.0
+    for _ in range(100):
+        shares = 1.0 / (1.0 + np.exp(-rows @ weights))
+        gradient = rows.T @ (right - shares) - stiffness @ weights
+        step = np.linalg.solve((rows.T * (shares * (1.0 - shares))) @ rows + stiffness, gradient)
+        weights += step
+        if np.abs(step).max() < 1e-7:
+            break
+    return float(weights[0]), np.asarray(weights[1:] / scale)

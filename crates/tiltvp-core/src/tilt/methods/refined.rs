@@ -12,10 +12,11 @@ use crate::options;
 use crate::options::{Between, NOT_NEGATIVE};
 use crate::robust::{Direction, FitReport, Real, RejectRefitOptions, ReweightOptions, Rows, reject_refit, reweight};
 use crate::tilt::fit::{Evidence, Fit};
+use crate::tilt::confidence::SECTORS;
 use crate::tilt::scratch::{Inliers, Work};
 use crate::tilt::tables::PixelTables;
 use crate::tilt::trained::TrainedCorrection;
-use crate::tilt::trust::{FEATURES, Trust};
+use crate::tilt::trust::{FEATURES, Support, Trust};
 
 options! {
     /// Options of the refined method. Angles are those between an edge's great circle and the vertical.
@@ -53,11 +54,14 @@ impl TiltMethod for RefineOptions {
 pub(super) struct Refined {
     normals: Normals,
     options: RefineOptions,
+    /// Of the pixels of the region, the sines of their heights above or below the horizon, in 255ths.
+    heights: Vec<u8>,
 }
 
 impl Refined {
     pub(super) fn new(setting: &Setting<'_>, options: RefineOptions) -> Self {
-        Self { normals: Normals::new(setting, NormalKind::Tangent, TILT_MAX_RAD), options }
+        let heights = setting.pixels.region.pixels().map(|(_, _, bearing)| (255.0 * bearing.z.abs()) as u8).collect();
+        Self { normals: Normals::new(setting, NormalKind::Tangent, TILT_MAX_RAD), options, heights }
     }
 }
 
@@ -82,9 +86,18 @@ impl Fitter for Refined {
         let within = |direction: Vector3<f64>| Inliers::Within { model: direction.into(), threshold };
         work.inliers = report.model.map_or(Inliers::None, within);
         let evidence = Evidence { scale, weighted: true, approximate: false };
-        normals::conclude(&report, &TrainedCorrection::IDENTITY, &evidence, pixels, work)
+        let fit = normals::conclude(&report, &TrainedCorrection::IDENTITY, &evidence, pixels, work);
+        let stride = (work.rows.len() / SUPPORT).max(1);
+        let agreeing = (0..work.rows.len()).step_by(stride).filter(|row| work.is_inlier(*row));
+        let slots = agreeing.filter_map(|row| work.slots.get(row).map(|slot| *slot as usize));
+        let places = slots.filter_map(|slot| Some((1.0, *self.heights.get(slot)?, *pixels.sectors.get(slot)?)));
+        let placed = places.map(|(weight, height, sector)| (weight, f64::from(height) / 255.0, usize::from(sector) * 12 / SECTORS));
+        Fit { support: Support::of(placed), ..fit }
     }
 }
+
+/// Rows that are enough to tell where what agrees stands.
+const SUPPORT: usize = 1024;
 
 /// Scales of the soft gate within which a pixel is reported as an inlier: 95 % of a normal distribution.
 const INLIER_SCALES: f64 = 2.0;
