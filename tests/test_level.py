@@ -92,7 +92,7 @@ def test_wrong_questions_are_refused(camera: tiltvp.Camera, room: RoomImage) -> 
 
 
 def test_the_mounting_of_the_estimate_is_not_forgotten(camera: tiltvp.Camera) -> None:
-    """A view by a camera in another mounting, levelled by the estimator, is as upright as by the camera with the mounting."""
+    """The estimator levels as its camera with its mounting does, and neither goes without."""
     tipped = np.array([[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]])
     estimator = tiltvp.TiltEstimator(camera, robot_from_camera=tipped, elevation_min_rad=-0.8)
     image = np.random.default_rng(0).integers(0, 255, (256, 256), dtype=np.uint8)

@@ -31,6 +31,7 @@ from tiltvp.selfcalib import (
     wheel_displacements,
 )
 from tiltvp.setup_check import SetupCheck, check_setup
+from tiltvp.surround import surround_mask
 from tiltvp.tilt import (
     CommonDirection,
     EdgeElements,
@@ -85,6 +86,7 @@ __all__ = [
     "lines",
     "normal_from_alpha_beta",
     "read_image",
+    "surround_mask",
     "synth",
     "tilt_error_rad",
     "tilt_from_wheel_heights",

@@ -43,8 +43,8 @@ class Camera(Lenses):
 
         The format is recognised by its content unless `format` names it (`tiltvp.formats.FORMATS` lists them). `camera`
         picks one by its name or place where the file has several. `image_size`, (width, height) in pixels, is for the
-        files that do not carry it. `mirror` says that the images are seen in a mirror, where the file does not. Raises `tiltvp.errors.CalibrationError` that says what was wrong, what was expected
-        and where.
+        files that do not carry it. `mirror` says that the images are seen in a mirror, where the file does not.
+        Raises `tiltvp.errors.CalibrationError` that says what was wrong, what was expected and where.
         """
         from tiltvp.formats import read_cameras
 

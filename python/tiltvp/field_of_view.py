@@ -17,8 +17,8 @@ __all__ = ["FieldOfView", "field_of_view", "looks_like_a_mirror"]
 
 _SAMPLES = 2048
 _MIRROR_RAD = math.radians(205.0)
-"""Of 40 published calibrations those of mirrors see 210 to 281 degrees all round, those of fisheyes up to 190, but for a few of
-220 degrees, which are named too."""
+"""Of 40 published calibrations those of mirrors see 210 to 281 degrees all round, those of fisheyes up to 190 but for a
+few of 220 degrees, which are named too."""
 
 
 @dataclass(frozen=True)
@@ -73,7 +73,7 @@ def field_of_view(camera: Camera) -> FieldOfView:
 
 
 def looks_like_a_mirror(camera: Camera, view: FieldOfView) -> bool:
-    """Whether a camera that is not said to look into a mirror sees so far behind itself as mirrors do and hardly a lens.
+    """Whether a camera that is not said to look into a mirror sees as far behind itself as mirrors do and few lenses.
 
     Only lens models that mirrors are calibrated with are looked at: `ocam` (whose a0 is then short beside the radius of
     the image) and `unified`.

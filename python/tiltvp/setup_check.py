@@ -51,7 +51,8 @@ _LENGTH_RAD: Final = 0.2
 _LONGEST: Final = 120
 """Straight edges of an image that are looked at."""
 _WEIGHTS: Final = np.array([0.0] * 20)
-"""Logarithm of the odds for each unit of a feature of one image: a conditional logit, as `tiltvp measure trust` trains it."""
+"""Logarithm of the odds for each unit of a feature of one image: a conditional logit on views of half of the panoramas
+of `tiltvp measure trust`, by `tiltvp.lab.evaluation.setups`."""
 _SHARED: Final = 0.6
 """Images of one place err together: the logarithm of the odds of N images is that of N to this power of them."""
 BELIEVABLE: Final = 0.05
@@ -80,17 +81,24 @@ class SetupCheck:
     def reason(self) -> str:
         """What was found, in a sentence."""
         shares = self.probabilities
-        told = f"{self.images} images: up is the camera's {self.best} ({_WORDS[self.best]}; probability {shares[self.best]:.2f})"
+        what = f"{_WORDS[self.best]}; probability {shares[self.best]:.2f}"
+        told = f"{self.images} images: up is the camera's {self.best} ({what})"
         if self.best == self.given:
             return f"{told}, as the mounting says"
-        return f"{told}, where the mounting says {self.given} ({_WORDS[self.given]}; probability {shares[self.given]:.2f})"
+        return (
+            f"{told}, where the mounting says {self.given} ({_WORDS[self.given]}; probability {shares[self.given]:.2f})"
+        )
 
     def __bool__(self) -> bool:
         return self.believable
 
 
 def check_setup(
-    images: Iterable[ArrayLike], camera: Camera, robot_from_camera: ArrayLike | None = None, *, mask: ArrayLike | None = None
+    images: Iterable[ArrayLike],
+    camera: Camera,
+    robot_from_camera: ArrayLike | None = None,
+    *,
+    mask: ArrayLike | None = None,
 ) -> SetupCheck:
     """Which of the camera's six directions is up in some images, and whether the given mounting is believable.
 

@@ -118,8 +118,8 @@ def level(
 
     `seen_by` is the estimator of the tilt, of which camera and mounting are taken, or a camera with its mounting,
     `robot_from_camera` (3, 3). `tilt` is an estimate, a filter's or an image's, or (alpha_rad, beta_rad). Raises
-    `InvalidInputError` if the image has another size than the camera's, the estimate has no tilt, a camera comes without
-    a mounting, or an estimator with another one.
+    `InvalidInputError` if the image has another size than the camera's, the estimate has no tilt, a camera comes
+    without a mounting, or an estimator with another one.
     """
     import cv2
 
@@ -151,7 +151,7 @@ def _camera_and_mounting(
     if not isinstance(seen_by, TiltEstimator):
         if robot_from_camera is None:
             raise InvalidInputError(
-                "robot_from_camera: none, expected the mounting (3, 3) beside a camera, or the TiltEstimator in its place"
+                "robot_from_camera: none, expected the mounting (3, 3) beside a camera, or the TiltEstimator instead"
             )
         return seen_by, robot_from_camera
     own = seen_by.robot_from_camera

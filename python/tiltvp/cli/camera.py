@@ -180,7 +180,9 @@ def _info_table(spec: CameraSpec, camera: Camera) -> Table:
         table.add_row("note", note)
     if looks_like_a_mirror(camera, view):
         around = angle(min(view.horizontal_rad, view.vertical_rad))
-        table.add_row("note", f"sees {around} all round, as mirrors do: give --mirror if it looks into one, images do not tell")
+        table.add_row(
+            "note", f"sees {around} all round, as mirrors do: give --mirror if it looks into one, images do not tell"
+        )
     return table
 
 

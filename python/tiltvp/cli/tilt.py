@@ -74,7 +74,7 @@ def tilt(
     for problem in problems:
         complain(problem)
     motions = filtering.motions(files)
-    _warn_of_setup(estimator, files)
+    estimator = _checked(estimator, files)
     names = distinct_names(files)
     work = Work(estimator, overlay, level, filtering)
     outcomes = filtering.judged(_done(work, files, names, threads), motions)
@@ -92,12 +92,16 @@ def tilt(
 
 
 _FIRST = 5
-"""Images by which the mounting is checked: so many tell it, by `just measure-trust`."""
+"""Images by which mounting and rim are checked: what they have in common is of the camera, not of the place."""
 
 
-def _warn_of_setup(estimator: TiltEstimator, files: Sequence[Path]) -> None:
-    """One line on stderr if the first images speak against the mounting."""
-    from tiltvp import check_setup, read_image
+def _checked(estimator: TiltEstimator, files: Sequence[Path]) -> TiltEstimator:
+    """The estimator without the dark surround that the first images have, if nothing else says where they end; one line
+    on stderr says so, and one if they speak against the mounting.
+    """
+    import numpy as np
+
+    from tiltvp import check_setup, read_image, surround_mask
 
     camera, images = estimator.camera, []
     for file in files[:_FIRST]:
@@ -108,10 +112,16 @@ def _warn_of_setup(estimator: TiltEstimator, files: Sequence[Path]) -> None:
         if image.shape[:2] == (camera.height, camera.width):
             images.append(image)
     if len(images) < _FIRST:
-        return
-    found = check_setup(images, camera, estimator.robot_from_camera, mask=estimator.options["mask"])
+        return estimator
+    mask = estimator.options["mask"]
+    if mask is None and (mask := surround_mask(images, camera)) is not None:
+        share = 100.0 * float(np.mean(mask))
+        complain(f"--mask: none, and the images have a dark surround: {share:.0f} % within its rim are looked at")
+        estimator = estimator.with_options(mask=mask)
+    found = check_setup(images, camera, estimator.robot_from_camera, mask=mask)
     if not found:
         complain(f"--robot-from-camera: {found.reason}")
+    return estimator
 
 
 def _write_plot(outcomes: Sequence[Outcome], method: str, path: Path) -> None:

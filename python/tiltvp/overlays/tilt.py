@@ -31,7 +31,8 @@ def tilt_overlay(
 ) -> Picture:
     """The image in dimmed grey, (H, W, 3) BGR uint8, with inlier edges in colour, horizons, zenith, nadir and `words`.
 
-    Camera and mounting are those of the `estimator`. Yellow are the horizon and the vertical vanishing points of the estimate, grey those of an upright robot.
+    Camera and mounting are those of the `estimator`. Yellow are the horizon and the vertical vanishing points of the
+    estimate, grey those of an upright robot.
     """
     gray, camera, mounting = gray_from(image), estimator.camera, estimator.robot_from_camera
     inlier_offsets = np.abs(edges.offset_px[edges.inlier])

@@ -74,9 +74,7 @@ def panoramas(*, out: Path, rooms: int = 4, places: int = 2, height: int = 640, 
     from tiltvp.synth import ROOM_KINDS
 
     with progress_bar(rooms * places * len(ROOM_KINDS), "panoramas") as bar:
-        render_room_panoramas(
-            out, rooms=rooms, places=places, height=height, first_seed=seed, advance=bar.advance
-        )
+        render_room_panoramas(out, rooms=rooms, places=places, height=height, first_seed=seed, advance=bar.advance)
 
 
 @app.command

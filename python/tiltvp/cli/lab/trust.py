@@ -23,7 +23,7 @@ def trust(
     weights: Switch = False,
     out: Path | None = None,
 ) -> None:
-    """Each method on images that mislead: answers, those wrong and sure, abstentions, and whether reasons name the cause.
+    """Each method on images that mislead: answers, those wrong and sure, abstentions, reasons that name the cause.
 
     Mountings and lenses that are not as told, harmed views, and images without a vertical. An error beyond two degrees
     is wrong, a confidence from 0.9 on is sure.

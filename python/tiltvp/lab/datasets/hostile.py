@@ -1,4 +1,4 @@
-"""Images that mislead: views of known lean through cameras that are not as told, harmed views, and images without a vertical."""
+"""Images that mislead: views through cameras that are not as told, harmed views, and images without a vertical."""
 
 from __future__ import annotations
 
@@ -116,7 +116,14 @@ def _bytes(levels: NDArray[Any]) -> NDArray[np.uint8]:
 
 
 def _equidistant(**changes: Any) -> Camera:
-    parts = {"width": 640, "height": 480, "focal_px": 139.7, "cx": 319.5, "cy": 239.5, "max_theta_rad": np.deg2rad(92.5)}
+    parts = {
+        "width": 640,
+        "height": 480,
+        "focal_px": 139.7,
+        "cx": 319.5,
+        "cy": 239.5,
+        "max_theta_rad": np.deg2rad(92.5),
+    }
     return Camera.equidistant(**parts | changes)
 
 
@@ -178,7 +185,9 @@ def _deep(bits: int) -> Make:
     """Of a sensor of so many bits, in 16."""
 
     def harm(image: NDArray[np.uint8], rng: np.random.Generator) -> NDArray[np.uint16]:
-        levels = image.astype(np.float64) * (2**bits - 1) / 255.0 + rng.uniform(-0.5, 0.5, image.shape) * 2 ** (bits - 8)
+        levels = image.astype(np.float64) * (2**bits - 1) / 255.0 + rng.uniform(-0.5, 0.5, image.shape) * 2 ** (
+            bits - 8
+        )
         return np.asarray(np.clip(np.rint(levels), 0, 2**bits - 1), dtype=np.uint16)
 
     return _harmed(harm)
@@ -214,7 +223,11 @@ def _slanted(image: NDArray[np.uint8], rng: np.random.Generator) -> NDArray[np.u
         normal = np.cross(along, rng.normal(size=3))
         normal /= np.linalg.norm(normal)
         start = normal_from_alpha_beta(np.deg2rad(rng.uniform(40.0, 90.0)), rng.uniform(-np.pi, np.pi))
-        half, reach, level = np.deg2rad(rng.uniform(0.2, 1.0)), np.cos(np.deg2rad(rng.uniform(15.0, 45.0))), rng.uniform(10.0, 245.0)
+        half, reach, level = (
+            np.deg2rad(rng.uniform(0.2, 1.0)),
+            np.cos(np.deg2rad(rng.uniform(15.0, 45.0))),
+            rng.uniform(10.0, 245.0),
+        )
         aside, ahead = np.abs(bearings @ normal.astype(np.float32)), bearings @ start.astype(np.float32)
         at = np.nonzero((aside < half + 0.01) & (ahead > reach))
         shown = np.clip(1.0 + (half - aside[at]) * 139.7, 0.0, 1.0) * np.clip((ahead[at] - reach) * 60.0, 0.0, 1.0)

@@ -58,7 +58,9 @@ def judge_images(
     images: Iterable[HostileImage], *, features: bool = False, advance: Callable[[], None] = lambda: None
 ) -> pl.DataFrame:
     """One row for each image and method: error in degrees (NaN without a truth, null without an answer), confidence,
-    reason, and with `features` also what tells whether the fit is of the vertical. An estimator that cannot be made, for the camera sees nothing of what the method looks at, has no answer.
+    reason, and with `features` also what tells whether the fit is of the vertical.
+
+    An estimator that cannot be made, for the camera sees nothing of what the method looks at, has no answer.
     """
     made: dict[str, TiltEstimator | InvalidInputError] = {}
     rows: list[dict[str, object]] = []
@@ -92,8 +94,8 @@ def _judged(estimate: TiltEstimate, item: HostileImage) -> dict[str, object]:
 
 
 def summarise_cases(table: pl.DataFrame) -> pl.DataFrame:
-    """One row for each method and case, and for all hostile ones together: images, and in per cent of them answers, sure
-    ones, and those wrong and sure; of what was right, how much is sure; of what is not sure, how much names its cause.
+    """One row for each method and case, and for all hostile ones together: images, and in per cent of them answers,
+    sure ones, and those wrong and sure; of what was right, how much is sure; of the rest, how much names its cause.
     """
     right = pl.col("error_deg").is_not_nan() & (pl.col("error_deg") <= WRONG_DEG)
     judged = table.with_columns(
@@ -126,8 +128,8 @@ def _names_cause(row: dict[str, str]) -> bool:
 
 
 def train_trust(table: pl.DataFrame, method: str) -> tuple[float, NDArray[np.float64]]:
-    """Constant and weights (F,) of what tells whether a fit is of the vertical: a logistic regression by Newton's method,
-    on the half of the buildings that is for setting things, from rows with features.
+    """Constant and weights (F,) of what tells whether a fit is of the vertical, from rows with features: a logistic
+    regression by Newton's method on the half of the buildings that is for setting things.
     """
     told = table.filter(
         (pl.col("method") == method) & pl.col("error_deg").is_not_null() & ~pl.col("case").is_in(BLIND)

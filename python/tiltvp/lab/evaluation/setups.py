@@ -91,8 +91,8 @@ def train_setups(sets: Sequence[ImageSet]) -> NDArray[np.float64]:
 
 
 def summarise_sets(sets: Sequence[ImageSet], weights: NDArray[np.float64] | None = None) -> pl.DataFrame:
-    """One row for each setup and half of the buildings: sets, and in per cent of them those whose right direction is the
-    best, those that believe the right one, and those that believe each wrong one. `weights` are those of the software.
+    """One row for each setup and half of the buildings: sets, and in per cent of them those whose right direction is
+    the best, that believe the right one, and that believe each wrong one. `weights` are those of the software.
     """
     rows = []
     for item in sets:
