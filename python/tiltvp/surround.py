@@ -29,10 +29,10 @@ _INSIDE: Final = 0.03
 
 
 def surround_mask(images: Iterable[ArrayLike], camera: Camera) -> NDArray[np.bool_] | None:
-    """(H, W), True within the image circle; None where images have no dark surround or the camera knows its rim.
-
     """(H, W), True within the image circle; None without a dark surround, and where the camera knows its rim.
-    a surround from shadows. Raises `InvalidInputError` for what is no image.
+
+    At least three corners are dark in every image, and what is not dark has a round rim. Five images of different
+    places tell a surround from shadows. Raises `InvalidInputError` for what is no image.
     """
     import cv2
 
