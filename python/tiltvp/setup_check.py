@@ -50,7 +50,10 @@ _EVEN_RAD: Final = float(np.deg2rad(3.0))
 _LENGTH_RAD: Final = 0.2
 _LONGEST: Final = 120
 """Straight edges of an image that are looked at."""
-_WEIGHTS: Final = np.array([0.0] * 20)
+_WEIGHTS: Final = np.array([
+    3.921, -0.951, 2.311, -4.545, 0.965, -2.992, 0.179, -1.487,
+    2.046, -2.544, -2.818, 2.292, 2.573, 0.379, 5.181,
+])  # fmt: skip
 """Logarithm of the odds for each unit of a feature of one image: a conditional logit on views of half of the panoramas
 of `tiltvp measure trust`, by `tiltvp.lab.evaluation.setups`."""
 _SHARED: Final = 0.6
@@ -198,7 +201,6 @@ def _signed(
     across = middle[vertical > 0.5] @ np.eye(3)[direction == 0.0].T
     sectors = np.unique(np.floor(np.arctan2(across[:, 1], across[:, 0]) * 6.0 / np.pi))
     return [
-        score / 10.0,
         score / total,
         float(weight @ vertical) / total,
         np.log1p(len(sectors)),
@@ -212,10 +214,6 @@ def _signed(
         float(height[short].mean()) - centre if short.any() else 0.0,
         float(height.mean()) - centre if len(height) else 0.0,
         float((vertical @ height) / (1.0 + vertical.sum())),
-        centre * np.log1p(len(edges.length_rad)),
         centre * float(levels.mean()) / 100.0,
         centre * float(np.mean(levels > 235.0)),
-        centre * float(levels.std()) / 50.0,
-        centre,
-        centre * total / 20.0,
     ]

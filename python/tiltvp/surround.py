@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from tiltvp.errors import InvalidInputError
 from tiltvp.images import gray_from
 
 if TYPE_CHECKING:
@@ -39,10 +40,14 @@ def surround_mask(images: Iterable[ArrayLike], camera: Camera) -> NDArray[np.boo
     if not camera.valid_mask().all():
         return None
     lightest: NDArray[np.uint8] | None = None
-    for image in images:
-        gray = cv2.medianBlur(gray_from(image), 5)
+    for number, image in enumerate(images):
+        gray = gray_from(image, f"images[{number}]")
+        if gray.shape != (camera.height, camera.width):
+            expected = f"({camera.height}, {camera.width}), as the camera's images"
+            raise InvalidInputError(f"images[{number}]: shape {gray.shape}, expected {expected}")
+        gray = np.asarray(cv2.medianBlur(gray, 5), dtype=np.uint8)
         lightest = gray if lightest is None else np.maximum(lightest, gray)
-    if lightest is None or lightest.shape != (camera.height, camera.width):
+    if lightest is None:
         return None
     side = max(3, round(_PATCH * min(lightest.shape)))
     corners = [

@@ -6,11 +6,11 @@ use std::sync::Arc;
 use nalgebra::{Matrix3, Vector3};
 
 use super::estimate::{EdgeElement, TiltEstimate};
+use super::fit::Seen;
 use super::image_edges::{EdgeOrigin, ImageEdges};
-use super::methods::{Fitter, Prepared, Setting, edge_offset};
+use super::methods::{Fitter, Prepared, Setting, TILT_MAX_RAD, edge_offset};
 use super::options::TiltOptions;
 use super::scratch::{Scratch, Work};
-use super::fit::Seen;
 use super::tables::PixelTables;
 use crate::camera::Camera;
 use crate::edges::{EdgeOptions, EdgePixels};
@@ -200,8 +200,14 @@ impl TiltEstimator {
     fn fit(&self, method: &dyn Fitter, edges: &EdgePixels, work: &mut Work) -> TiltEstimate {
         let fit = method.fit(edges, &self.pixels, work);
         let (edge_pixels, prefiltered_pixels) = (edges.strong(), work.rows.len());
-        let pixels_per_rad = self.pixels.region.pixels_per_rad();
-        fit.into_estimate(&Seen { edge_pixels, prefiltered_pixels, pixels_per_rad, trust: method.trust() }, &mut work.trusted)
+        let seen = Seen {
+            edge_pixels,
+            prefiltered_pixels,
+            pixels_per_rad: self.pixels.region.pixels_per_rad(),
+            tilt_max_rad: self.options.tilt_max_rad.unwrap_or(TILT_MAX_RAD),
+            trust: method.trust(),
+        };
+        fit.into_estimate(&seen, &mut work.trusted)
     }
 
     /// The directions that may be up and what tells which one is, [`estimate`](Self::estimate)'s way where it looks anywhere: for

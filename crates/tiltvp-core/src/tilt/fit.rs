@@ -10,7 +10,7 @@ use super::estimate::{ALTERNATIVES, Alternative, TiltEstimate};
 use super::scratch::Work;
 use super::tables::PixelTables;
 use super::trained::TrainedCorrection;
-use super::trust::{self, Doubt, FEATURES, Support, Trust};
+use super::trust::{self, Doubt, FEATURES, Trust};
 use crate::geometry::{Tilt, tangent_basis};
 use crate::robust::{FitReport, Stop};
 
@@ -30,7 +30,6 @@ pub(super) struct Fit {
     pub iterations: u32,
     pub stop: Stop,
     pub alternatives: [Option<Alternative>; ALTERNATIVES],
-    pub support: Support,
 }
 
 impl Fit {
@@ -45,7 +44,6 @@ impl Fit {
             iterations: 0,
             stop,
             alternatives: [None; ALTERNATIVES],
-            support: Support::NONE,
         }
     }
 
@@ -90,7 +88,7 @@ impl Fit {
             stop: undetermined.unwrap_or(self.stop),
             doubt: None,
         };
-        *features = trust::features(&estimate, &self.support, seen.pixels_per_rad);
+        *features = trust::features(&estimate, seen.pixels_per_rad, seen.tilt_max_rad);
         if let Some(trust) = seen.trust {
             estimate.confidence *= trust.probability(features);
         }
@@ -105,6 +103,8 @@ pub(super) struct Seen {
     /// Edge pixels that passed the prefilter.
     pub prefiltered_pixels: usize,
     pub pixels_per_rad: f64,
+    /// The largest lean that is looked for.
+    pub tilt_max_rad: f64,
     /// How far the method's fits can be trusted to be of the vertical at all.
     pub trust: Option<&'static Trust>,
 }

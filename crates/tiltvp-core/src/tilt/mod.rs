@@ -33,5 +33,5 @@ pub use options::TiltOptions;
 pub use posterior::{PosteriorCorrection, PriorOfTilt, train_posterior};
 pub use scratch::Scratch;
 pub use shift_model::ShiftModel;
-pub use trust::Doubt;
 pub use trained::{AffineCorrection, TrainedCorrection, train_affine, train_factor};
+pub use trust::Doubt;

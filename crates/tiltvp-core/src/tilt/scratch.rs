@@ -2,8 +2,8 @@
 
 use tiltvp_kernels::compaction::ROOM;
 
-use super::trust::FEATURES;
 use super::methods::{SamplingScratch, SegmentWork, Subsample};
+use super::trust::FEATURES;
 use crate::edges::{Detector, EdgeOptions, EdgePixels, Region};
 use crate::robust::Rows;
 

@@ -5,44 +5,7 @@ use std::fmt;
 use super::estimate::TiltEstimate;
 
 /// How many numbers tell whether a fit is of the vertical.
-pub(super) const FEATURES: usize = 13;
-
-/// Where what agrees with a fit stands, and how much agrees with other axes of the robot.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Support {
-    /// Mean sine of the height above or below the horizon, as it is weighted: vertical edges are seen about the horizon, those of other
-    /// directions that pass near the zenith are seen anywhere.
-    pub height: f64,
-    /// How many of twelve sectors of azimuth hold what agrees.
-    pub sectors: u32,
-    /// Logarithm of the log odds of the vertical over those of the best direction near the robot's x or y.
-    pub lead: f64,
-    /// The mean height of what agrees with that one, above the horizon that it has.
-    pub rival_height: f64,
-}
-
-impl Support {
-    /// Of nothing that is known.
-    pub(super) const NONE: Self = Self { height: 0.5, sectors: 0, lead: 0.0, rival_height: 0.5 };
-
-    /// Of weights, heights and sectors.
-    pub(super) fn of(placed: impl Iterator<Item = (f64, f64, usize)>) -> Self {
-        let (mut sectors, mut heights, mut total) = ([0.0; 12], 0.0, 0.0);
-        for (weight, height, sector) in placed {
-            sectors[sector.min(11)] += weight;
-            heights += weight * height;
-            total += weight;
-        }
-        if total <= 0.0 {
-            return Self::NONE;
-        }
-        let held = sectors.iter().filter(|sector| **sector > HELD * total).count();
-        Self { height: heights / total, sectors: held as u32, ..Self::NONE }
-    }
-}
-
-/// Share of the whole from which on a sector holds something.
-const HELD: f64 = 0.02;
+pub(super) const FEATURES: usize = 8;
 
 /// How a method's fits tell whether they are of the vertical and not of some other direction that edges share: a logistic
 /// regression on views whose cameras, mountings or scenes mislead, `tiltvp measure trust`, which prints it.
@@ -55,35 +18,29 @@ pub(super) struct Trust {
 impl Trust {
     /// Probability that a fit is of the vertical.
     pub(super) fn probability(&self, features: &[f64; FEATURES]) -> f64 {
-        let log_odds: f64 = self.constant + features.iter().zip(self.weights).map(|(x, weight)| x * weight).sum::<f64>();
+        let log_odds: f64 =
+            self.constant + features.iter().zip(self.weights).map(|(x, weight)| x * weight).sum::<f64>();
         1.0 / (1.0 + (-log_odds).exp())
     }
 }
 
 /// What tells it: the stated error, how much agrees of what might and of all, how fine the pixels are, how well it agrees, how much
-/// that is, how far it leans, how unlike the stated errors in two directions are, and where what agrees stands.
-pub(super) fn features(estimate: &TiltEstimate, support: &Support, pixels_per_rad: f64) -> [f64; FEATURES] {
+/// that is, and how near it is to the largest lean.
+pub(super) fn features(estimate: &TiltEstimate, pixels_per_rad: f64, tilt_max_rad: f64) -> [f64; FEATURES] {
     let [inliers, near, all] =
         [estimate.inlier_pixels, estimate.prefiltered_pixels, estimate.edge_pixels].map(|n| n as f64);
-    let eigenvalues = estimate.covariance_rad2.symmetric_eigenvalues();
-    let spread = (eigenvalues.max() / eigenvalues.min()).max(1.0).ln();
     let sigma_deg = estimate.covariance_rad2.trace().sqrt().to_degrees().clamp(0.1, 30.0);
-    let lean = estimate.tilt.map_or(0.0, |tilt| tilt.alpha_rad().to_degrees());
+    let lean = estimate.tilt.map_or(0.0, |tilt| tilt.alpha_rad() / tilt_max_rad);
     let share = ((inliers + 1.0) / (all + 10.0)).ln();
     [
         sigma_deg.ln(),
         ((inliers + 5.0) / (near + 50.0)).ln(),
         share,
         share * share,
-        (pixels_per_rad / 150.0).ln(),
+        (pixels_per_rad / 150.0).ln().min(0.0),
         if estimate.residual_rms.is_finite() { estimate.residual_rms.to_degrees() } else { 2.0 },
         (inliers / pixels_per_rad).ln_1p(),
-        0.1 * lean,
-        if spread.is_finite() { 0.5 * spread } else { 0.0 },
-        support.height,
-        f64::from(support.sectors).ln_1p(),
-        support.lead,
-        support.rival_height,
+        1.2 * lean,
     ]
 }
 
@@ -172,10 +129,17 @@ impl fmt::Display for Doubt {
                 100.0 * share
             ),
             Self::OneSided { ratio } => {
-                write!(f, "the edges stand in few directions: {ratio:.0} times the error along one that it has along the other")
+                write!(
+                    f,
+                    "the edges stand in few directions: {ratio:.0} times the error along one that it has along the other"
+                )
             }
             Self::Scattered { sigma_rad } => {
-                write!(f, "the edges stray: a standard deviation of {:.1} degrees (noise, blur, clutter)", sigma_rad.to_degrees())
+                write!(
+                    f,
+                    "the edges stray: a standard deviation of {:.1} degrees (noise, blur, clutter)",
+                    sigma_rad.to_degrees()
+                )
             }
         }
     }

@@ -50,6 +50,9 @@ BLIND: Final = ("upward read as downward", "downward read as upward", "centre of
 """Cases that an image is as consistent with as with the truth, from which nothing is learned."""
 HOPELESS: Final = 0.3
 """Confidence by the covariance below which an estimate is not sure anyway, and teaches nothing."""
+RIGHT: Final = {"refined": 3.0, "segments": 6.0}
+"""How much a right estimate weighs against a wrong one: so much that of the right ones of unharmed views looking up nine
+in ten stay sure, on the half of the buildings that sets the weights."""
 PENALTY: Final = 1.0
 """Of the squared weights of features that are scaled to a standard deviation of one."""
 
@@ -142,11 +145,12 @@ def train_trust(table: pl.DataFrame, method: str) -> tuple[float, NDArray[np.flo
     scale = features.std(axis=0) + 1e-9
     rows = np.column_stack([np.ones(len(features)), features / scale])
     weights, stiffness = np.zeros(rows.shape[1]), PENALTY * np.eye(rows.shape[1])
-    stiffness[0, 0] = 0.0
+    stiffness[0, 0] = 1e-3
+    count = np.where(right, RIGHT[method], 1.0)
     for _ in range(100):
         shares = 1.0 / (1.0 + np.exp(-rows @ weights))
-        gradient = rows.T @ (right - shares) - stiffness @ weights
-        step = np.linalg.solve((rows.T * (shares * (1.0 - shares))) @ rows + stiffness, gradient)
+        gradient = rows.T @ (count * (right - shares)) - stiffness @ weights
+        step = np.linalg.solve((rows.T * (count * shares * (1.0 - shares))) @ rows + stiffness, gradient)
         weights += step
         if np.abs(step).max() < 1e-7:
             break

@@ -31,7 +31,7 @@ pub use self::image_space_ransac::ImageSpaceRansacOptions;
 pub use self::image_space_reject_refit::ImageSpaceRejectRefitOptions;
 pub(super) use self::offsets::edge_offset;
 pub use self::refined::RefineOptions;
-pub(super) use self::refined::{Subsample, refine};
+pub(super) use self::refined::{Subsample, TILT_MAX_RAD, refine};
 pub(super) use self::sampling::SamplingScratch;
 pub use self::segments::SegmentsOptions;
 pub(super) use self::segments::{SegmentFit, SegmentWork};

@@ -12,11 +12,10 @@ use crate::options;
 use crate::options::{Between, NOT_NEGATIVE};
 use crate::robust::{Direction, FitReport, Real, RejectRefitOptions, ReweightOptions, Rows, reject_refit, reweight};
 use crate::tilt::fit::{Evidence, Fit};
-use crate::tilt::confidence::SECTORS;
 use crate::tilt::scratch::{Inliers, Work};
 use crate::tilt::tables::PixelTables;
 use crate::tilt::trained::TrainedCorrection;
-use crate::tilt::trust::{FEATURES, Support, Trust};
+use crate::tilt::trust::Trust;
 
 options! {
     /// Options of the refined method. Angles are those between an edge's great circle and the vertical.
@@ -34,10 +33,10 @@ options! {
 }
 
 /// Largest lean without `tilt_max_rad`: 10 degrees, and a `scale_rad` more for edges that stray.
-pub(super) const TILT_MAX_RAD: f64 = 12f64.to_radians();
+pub(in crate::tilt) const TILT_MAX_RAD: f64 = 12f64.to_radians();
 
 /// How a fit tells whether it is of the vertical: `tiltvp measure trust --weights` prints it.
-static TRUST: Trust = Trust { constant: 0.0, weights: [0.0; FEATURES] };
+static TRUST: Trust = Trust { constant: 5.304, weights: [-1.75, 4.583, 0.556, 0.09, -0.464, 0.255, 0.375, -1.192] };
 
 impl TiltMethod for RefineOptions {
     fn edges(&self) -> EdgeOptions {
@@ -54,14 +53,11 @@ impl TiltMethod for RefineOptions {
 pub(super) struct Refined {
     normals: Normals,
     options: RefineOptions,
-    /// Of the pixels of the region, the sines of their heights above or below the horizon, in 255ths.
-    heights: Vec<u8>,
 }
 
 impl Refined {
     pub(super) fn new(setting: &Setting<'_>, options: RefineOptions) -> Self {
-        let heights = setting.pixels.region.pixels().map(|(_, _, bearing)| (255.0 * bearing.z.abs()) as u8).collect();
-        Self { normals: Normals::new(setting, NormalKind::Tangent, TILT_MAX_RAD), options, heights }
+        Self { normals: Normals::new(setting, NormalKind::Tangent, TILT_MAX_RAD), options }
     }
 }
 
@@ -86,18 +82,9 @@ impl Fitter for Refined {
         let within = |direction: Vector3<f64>| Inliers::Within { model: direction.into(), threshold };
         work.inliers = report.model.map_or(Inliers::None, within);
         let evidence = Evidence { scale, weighted: true, approximate: false };
-        let fit = normals::conclude(&report, &TrainedCorrection::IDENTITY, &evidence, pixels, work);
-        let stride = (work.rows.len() / SUPPORT).max(1);
-        let agreeing = (0..work.rows.len()).step_by(stride).filter(|row| work.is_inlier(*row));
-        let slots = agreeing.filter_map(|row| work.slots.get(row).map(|slot| *slot as usize));
-        let places = slots.filter_map(|slot| Some((1.0, *self.heights.get(slot)?, *pixels.sectors.get(slot)?)));
-        let placed = places.map(|(weight, height, sector)| (weight, f64::from(height) / 255.0, usize::from(sector) * 12 / SECTORS));
-        Fit { support: Support::of(placed), ..fit }
+        normals::conclude(&report, &TrainedCorrection::IDENTITY, &evidence, pixels, work)
     }
 }
-
-/// Rows that are enough to tell where what agrees stands.
-const SUPPORT: usize = 1024;
 
 /// Scales of the soft gate within which a pixel is reported as an inlier: 95 % of a normal distribution.
 const INLIER_SCALES: f64 = 2.0;

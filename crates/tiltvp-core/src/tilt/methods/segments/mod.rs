@@ -25,7 +25,7 @@ use crate::tilt::estimate::{ALTERNATIVES, Alternative, EdgeElement, TiltEstimate
 use crate::tilt::fit::{Fit, Seen};
 use crate::tilt::scratch::{Scratch, Work};
 use crate::tilt::tables::PixelTables;
-use crate::tilt::trust::{FEATURES, Support, Trust};
+use crate::tilt::trust::Trust;
 
 options! {
     /// Options of the method of straight edges.
@@ -79,20 +79,6 @@ const PIXELS_RAD: f64 = 0.7f64.to_radians();
 /// five degrees are within the 90 % regions in 648 views of panoramas, the same ones on which it was set.
 const ANYWHERE_GROWTH: f64 = 4.0;
 
-/// The longest edges by which the axes of the robot are compared, the steps in radians of the directions that are tried about each, and
-/// how far they go: 14 degrees, of a lean of 10 and of mountings that are 4 off.
-const RIVALS: usize = 120;
-const RIVAL_STEP_RAD: f64 = 2f64.to_radians();
-const RIVAL_STEPS: i32 = 7;
-
-/// Offsets across an axis within reach.
-fn cap() -> impl Iterator<Item = (f64, f64)> {
-    let steps = -RIVAL_STEPS..=RIVAL_STEPS;
-    let places = steps.clone().flat_map(move |i| steps.clone().map(move |k| (i, k)));
-    let within = places.filter(|(i, k)| i * i + k * k <= RIVAL_STEPS * RIVAL_STEPS);
-    within.map(|(i, k)| (f64::from(i) * RIVAL_STEP_RAD, f64::from(k) * RIVAL_STEP_RAD))
-}
-
 /// Leans of the grid, the best ones, of which the odds are summed exactly.
 const BEST: usize = 6;
 
@@ -101,7 +87,7 @@ const ITERATIONS: u32 = 8;
 const TOLERANCE_RAD: f64 = 1e-4;
 
 /// How a fit tells whether it is of the vertical: `tiltvp measure trust --weights` prints it.
-static TRUST: Trust = Trust { constant: 0.0, weights: [0.0; FEATURES] };
+static TRUST: Trust = Trust { constant: 6.782, weights: [-1.164, 2.173, 1.694, 0.317, -0.112, 0.615, -0.279, -1.218] };
 
 impl TiltMethod for SegmentsOptions {
     fn edges(&self) -> EdgeOptions {
@@ -211,7 +197,6 @@ struct Row {
     /// Odds at no distance, that the segment is of a direction near the vertical and not of any.
     odds: f64,
     weight: f64,
-    middle: Vector3<f64>,
     azimuth: f64,
     /// Probability of being vertical, by the last fit.
     vertical: f64,
@@ -290,9 +275,7 @@ impl SegmentFit {
         } else {
             self.weigh(work);
             let fit = self.fit(work);
-            let support = self.support(work);
-            let vote = self.vote(&work.finder.ridge, tables, &mut work.strong, pixel_work);
-            Fit { support, ..fused(&fit, &vote) }
+            fused(&fit, &self.vote(&work.finder.ridge, tables, &mut work.strong, pixel_work))
         };
         let considered = work.weighed.iter().map(|(i, _)| work.segments.list[*i as usize].support()).sum();
         let trust = (self.tilt_max_rad <= NEAR_MAX_RAD).then_some(&TRUST);
@@ -300,6 +283,7 @@ impl SegmentFit {
             edge_pixels: work.segments.points.len(),
             prefiltered_pixels: considered,
             pixels_per_rad: region.pixels_per_rad(),
+            tilt_max_rad: self.tilt_max_rad,
             trust,
         };
         fit.into_estimate(&seen, &mut pixel_work.trusted)
@@ -381,7 +365,6 @@ impl SegmentFit {
                 variance,
                 odds: EVEN_RAD * chance / variance.sqrt(),
                 weight: 2.0 * (segment.length_rad / LENGTH_RAD).sqrt(),
-                middle,
                 azimuth: middle.y.atan2(middle.x),
                 vertical: 0.0,
             });
@@ -401,50 +384,6 @@ impl SegmentFit {
                 .sum();
             rows[i].weight /= (together * variance).sqrt();
         }
-    }
-
-    /// Where the vertical edges stand, and how much agrees with the other axes of the robot.
-    fn support(&self, work: &mut SegmentWork) -> Support {
-        let SegmentWork { segments, rows, columns, .. } = work;
-        let sector = |azimuth: f64| ((azimuth / (2.0 * PI) + 0.5) * 12.0) as usize;
-        let placed = rows.iter().map(|row| (row.weight * row.vertical, row.middle.z.abs(), sector(row.azimuth)));
-        let support = Support::of(placed);
-        let mut axis_score = |axis: usize| {
-            columns.clear();
-            let up = self.robot_from_camera.transpose().column(axis).into_owned();
-            for segment in segments.list.iter().take(RIVALS) {
-                let (normal, middle) = (self.robot_from_camera * segment.normal, self.robot_from_camera * segment.middle);
-                let chance = (1.0 - middle[axis] * middle[axis]).max(1e-3).sqrt();
-                let variance = segment.variance_at(&up) + self.options.scatter_rad.powi(2);
-                columns.push(&normal, variance, EVEN_RAD * chance / variance.sqrt(), (segment.length_rad / LENGTH_RAD).sqrt(), 0.5 * RIVAL_STEP_RAD);
-            }
-            let (mut best, mut at) = (0.0f32, Vector3::zeros());
-            for (x, y) in cap() {
-                let mut direction = Vector3::zeros();
-                direction[axis] = (1.0 - x * x - y * y).sqrt();
-                direction[(axis + 1) % 3] = x;
-                direction[(axis + 2) % 3] = y;
-                let score = columns.score(&direction.map(|x| x as f32).into());
-                if score > best {
-                    (best, at) = (score, direction);
-                }
-            }
-            (f64::from(best), at)
-        };
-        let (own, _) = axis_score(2);
-        let (along, across) = (axis_score(0), axis_score(1));
-        let (rival, direction) = if along.0 > across.0 { along } else { across };
-        let (mut heights, mut total) = (0.0, 0.0);
-        for segment in segments.list.iter().take(RIVALS) {
-            let normal = self.robot_from_camera * segment.normal;
-            if normal.dot(&direction).abs() < EVEN_RAD {
-                let weight = segment.length_rad.sqrt();
-                heights += weight * (self.robot_from_camera * segment.middle).dot(&direction).abs();
-                total += weight;
-            }
-        }
-        let rival_height = if total > 0.0 { heights / total } else { Support::NONE.rival_height };
-        Support { lead: ((own + 1.0) / (rival + 1.0)).ln(), rival_height, ..support }
     }
 
     /// The lean with the greatest sum of odds, then reweighted least squares.
@@ -573,26 +512,17 @@ impl SegmentFit {
 impl Columns {
     /// The rows, with variances that are as much greater as half a step of the grid makes them.
     fn fill(&mut self, rows: &[Row], half_step: f64) {
-        self.clear();
-        for row in rows {
-            self.push(&row.normal, row.variance, row.odds, row.weight, half_step);
-        }
-    }
-
-    fn clear(&mut self) {
         let Self { x, y, z, half, log_odds, weight } = self;
-        [x, y, z, half, log_odds, weight].into_iter().for_each(Vec::clear);
-    }
-
-    /// Another row; `odds` are those at no distance.
-    fn push(&mut self, normal: &Vector3<f64>, own: f64, odds: f64, weight: f64, half_step: f64) {
-        let variance = own + half_step * half_step;
-        self.x.push(normal.x as f32);
-        self.y.push(normal.y as f32);
-        self.z.push(normal.z as f32);
-        self.half.push((0.5 / variance) as f32);
-        self.log_odds.push((odds * (own / variance).sqrt()).ln() as f32);
-        self.weight.push(weight as f32);
+        [&mut *x, &mut *y, &mut *z, &mut *half, &mut *log_odds, &mut *weight].into_iter().for_each(Vec::clear);
+        for row in rows {
+            let variance = row.variance + half_step * half_step;
+            x.push(row.normal.x as f32);
+            y.push(row.normal.y as f32);
+            z.push(row.normal.z as f32);
+            half.push((0.5 / variance) as f32);
+            log_odds.push((row.odds * (row.variance / variance).sqrt()).ln() as f32);
+            weight.push(row.weight as f32);
+        }
     }
 
     /// Sum of the weighted logarithms of the odds of a lean, of those above even.
