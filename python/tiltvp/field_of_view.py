@@ -75,8 +75,10 @@ def field_of_view(camera: Camera) -> FieldOfView:
 def looks_like_a_mirror(camera: Camera, view: FieldOfView) -> bool:
     """Whether a camera that is not said to look into a mirror sees as far behind itself as mirrors do and few lenses.
 
-    Only lens models that mirrors are calibrated with are looked at: `ocam` (whose a0 is then short beside the radius of
-    the image) and `unified`.
+    Only lens models that mirrors are calibrated with are looked at: `ocam`, whose a0 is then short beside the radius of
+    the image, and `unified` with a xi of at most 1: mirrors have no more (Geyer and Daniilidis 2000).
     """
     all_round = min(view.horizontal_rad, view.vertical_rad) > _MIRROR_RAD
-    return camera.model in ("ocam", "unified") and not camera.mirror and all_round
+    xi = camera.parameters.get("xi", 0.0)
+    of_mirrors = camera.model == "ocam" or (camera.model == "unified" and isinstance(xi, float) and xi <= 1.0)
+    return of_mirrors and not camera.mirror and all_round

@@ -51,8 +51,8 @@ BLIND: Final = ("upward read as downward", "downward read as upward", "centre of
 HOPELESS: Final = 0.3
 """Confidence by the covariance below which an estimate is not sure anyway, and teaches nothing."""
 RIGHT: Final = {"refined": 3.0, "segments": 6.0}
-"""How much a right estimate weighs against a wrong one: so much that of the right ones of unharmed views looking up nine
-in ten stay sure, on the half of the buildings that sets the weights."""
+"""How much a right estimate weighs against a wrong one: so much that of the right ones of unharmed upward views nine in
+ten stay sure, on the half of the buildings that sets the weights."""
 PENALTY: Final = 1.0
 """Of the squared weights of features that are scaled to a standard deviation of one."""
 
