@@ -188,7 +188,7 @@ measure-line-peers *arguments: drives
 
 # Our straight edges against OpenCV's LSD on rendered rooms whose edges are known, and the picture of both, in out/segments.
 measure-segments *arguments: setup
-    {{bin}}/python benches/peers/segments.py --picture out/segments/beside-lsd.png {{arguments}}
+    {{bin}}/python benches/peers/segments.py --picture out/segments/beside-lsd.jpg {{arguments}}
 
 # cv2 is that with contrib, as above; lu-vp-detect wants it too.
 # The vertical of an image by us, by the paper's methods on OpenCV and NumPy, by LSD and FLD, and by lu-vp-detect.

@@ -88,8 +88,10 @@ def check_output(path: str | os.PathLike[str]) -> None:
 
 
 def check_output_folder(path: str | os.PathLike[str]) -> None:
-    """Refuses a folder that is to be kept: one that holds anything. Raises `InvalidInputError`."""
+    """Refuses a file, and a folder that is to be kept: one that holds anything. Raises `InvalidInputError`."""
     folder = Path(path)
+    if folder.exists() and not folder.is_dir():
+        raise InvalidInputError(f"{folder}: is a file, expected a folder")
     if _KEEPS.get() and folder.is_dir() and any(folder.iterdir()):
         raise InvalidInputError(f"{folder}: exists, expected a new or empty folder, or --overwrite to replace it")
 
