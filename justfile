@@ -153,6 +153,11 @@ measure-database *arguments: setup
     {{bin}}/tiltvp measure scaling --overwrite --out out/database/runs/panoramas/scaling.parquet
     {{bin}}/tiltvp report out/database/runs/panoramas --overwrite --out out/database/report
 
+# Each method on images that mislead, of the panoramas of TILTVP_DATA and of rendered rooms: how often it is wrong and sure.
+measure-trust *arguments: setup
+    test -e out/room-panoramas/INDEX.csv || {{bin}}/tiltvp dataset panoramas --out out/room-panoramas
+    {{bin}}/tiltvp measure trust "$TILTVP_DATA/panos" out/room-panoramas {{arguments}}
+
 # What an evaluation costs over the number of images and over their pixels.
 measure-scaling *arguments: setup
     {{bin}}/tiltvp measure scaling {{arguments}}

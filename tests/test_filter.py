@@ -163,10 +163,10 @@ def test_estimates_of_images_are_fused(camera: tiltvp.Camera, room: RoomImage) -
     assert filter_.estimate == known
     assert filter_.update(estimator(noise)).verdict in ("no-tilt", "low-confidence", "outside-gate")
     assert filter_.estimate == known
-    level = tiltvp.level(room.gray, camera, known)
+    level = tiltvp.level(room.gray, estimator, known)
     assert level.shape == room.gray.shape
     with pytest.raises(InvalidInputError, match="without a tilt"):
-        tiltvp.level(room.gray, camera, tiltvp.TiltFilter().estimate)
+        tiltvp.level(room.gray, estimator, tiltvp.TiltFilter().estimate)
 
 
 def test_turning_moves_the_floor_but_not_the_mounting() -> None:
@@ -335,7 +335,12 @@ def test_the_command_filters(folder: Path, tmp_path: Path, capfd: pytest.Capture
     still = tmp_path / "still.csv"
     run(folder, "--filter", "--estimate-mounting", "--out", still)
     capfd.readouterr()
-    assert pl.read_csv(still).columns == table.columns
+    told = pl.read_csv(still)
+    own = [name for name in told.columns if name.startswith("mounting_")]
+    assert [name for name in told.columns if name not in own] == table.columns
+    # A robot that has not turned does not know its own lean, and says no angle.
+    assert told["mounting_alpha_rad"].null_count() == len(told)
+    assert told["mounting_sigma_rad"].min() > 0.0
 
 
 def test_the_command_abstains(folder: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:

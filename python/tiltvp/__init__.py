@@ -30,6 +30,8 @@ from tiltvp.selfcalib import (
     calibrate,
     wheel_displacements,
 )
+from tiltvp.setup_check import SetupCheck, check_setup
+from tiltvp.surround import surround_mask
 from tiltvp.tilt import (
     CommonDirection,
     EdgeElements,
@@ -69,11 +71,13 @@ __all__ = [
     "SegmentDetector",
     "Segments",
     "SelfCalibrator",
+    "SetupCheck",
     "TiltEstimate",
     "TiltEstimator",
     "TiltFilter",
     "apply_correction",
     "calibrate",
+    "check_setup",
     "common_direction",
     "corner",
     "draw_edges",
@@ -82,6 +86,7 @@ __all__ = [
     "lines",
     "normal_from_alpha_beta",
     "read_image",
+    "surround_mask",
     "synth",
     "tilt_error_rad",
     "tilt_from_wheel_heights",

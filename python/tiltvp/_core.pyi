@@ -1301,7 +1301,9 @@ class FitReport:
 
     @property
     def reason(self) -> str:
-        """The same in a sentence, with the measured number and the limit."""
+        """The same in a sentence, with the measured number and the limit; after it what keeps an estimate from being
+        sure.
+        """
 
     @property
     def residual_rms(self) -> float:
@@ -1328,7 +1330,8 @@ class FitReport:
         it may. "converged": the model has stopped changing; "settled": the residuals are small enough;
         "iteration-limit": refitting has been repeated as often as it may. "chosen": of several alternatives one is more
         probable than all others together; "ambiguous": none is. No answer comes of "too-few" observations, "no-model"
-        (they are all alike) and "out-of-reach" (an angle that the method cannot mean).
+        (they are all alike), "undetermined" (they do not tell how far it may be off) and "out-of-reach" (an angle that
+        the method cannot mean).
         """
 
     def to_dict(self) -> dict[str, Any]:
@@ -2830,6 +2833,9 @@ class TiltEstimator:
 
     def _hypotheses(self, image: NDArray[np.uint8]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """(K, 3), (K, F): directions that may be up in such an image and what tells which is, for training."""
+
+    def _trust_features(self, image: NDArray[np.uint8]) -> NDArray[np.float64]:
+        """(F,): what tells whether the estimate of such an image is of the vertical at all, for training."""
 
     @property
     def camera(self) -> Camera:

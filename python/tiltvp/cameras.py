@@ -37,14 +37,14 @@ class Camera(Lenses):
     @classmethod
     def load(
         cls, path: str | os.PathLike[str], format: str | None = None, *, camera: str | int = 0,
-        image_size: tuple[int, int] | None = None,
+        image_size: tuple[int, int] | None = None, mirror: bool = False,
     ) -> Self:  # fmt: skip
         """The camera of a calibration file.
 
         The format is recognised by its content unless `format` names it (`tiltvp.formats.FORMATS` lists them). `camera`
         picks one by its name or place where the file has several. `image_size`, (width, height) in pixels, is for the
-        files that do not carry it. Raises `tiltvp.errors.CalibrationError` that says what was wrong, what was expected
-        and where.
+        files that do not carry it. `mirror` says that the images are seen in a mirror, where the file does not.
+        Raises `tiltvp.errors.CalibrationError` that says what was wrong, what was expected and where.
         """
         from tiltvp.formats import read_cameras
 
@@ -57,7 +57,8 @@ class Camera(Lenses):
         if not 0 <= camera < len(specs):
             raise InvalidInputError(f"{path}: no camera number {camera}, expected 0 to {len(specs) - 1}")
         try:
-            return cls.from_spec(specs[camera])
+            found = cls.from_spec(specs[camera])
+            return found.mirrored() if mirror and not found.mirror else found
         except CalibrationError as error:
             raise CalibrationError(f"{path}: {error}") from error
 

@@ -13,9 +13,12 @@ if TYPE_CHECKING:
 
     from tiltvp.cameras import Camera
 
-__all__ = ["FieldOfView", "field_of_view"]
+__all__ = ["FieldOfView", "field_of_view", "looks_like_a_mirror"]
 
 _SAMPLES = 2048
+_MIRROR_RAD = math.radians(205.0)
+"""Of 40 published calibrations those of mirrors see 210 to 281 degrees all round, those of fisheyes up to 190 but for a
+few of 220 degrees, which are named too."""
 
 
 @dataclass(frozen=True)
@@ -67,3 +70,15 @@ def field_of_view(camera: Camera) -> FieldOfView:
         valid_radius_px=math.sqrt(float(((columns - u) ** 2 + (rows - v) ** 2).max())) if rows.size else 0.0,
         valid_share=float(mask.mean()),
     )
+
+
+def looks_like_a_mirror(camera: Camera, view: FieldOfView) -> bool:
+    """Whether a camera that is not said to look into a mirror sees as far behind itself as mirrors do and few lenses.
+
+    Only lens models that mirrors are calibrated with are looked at: `ocam`, whose a0 is then short beside the radius of
+    the image, and `unified` with a xi of at most 1: mirrors have no more (Geyer and Daniilidis 2000).
+    """
+    all_round = min(view.horizontal_rad, view.vertical_rad) > _MIRROR_RAD
+    xi = camera.parameters.get("xi", 0.0)
+    of_mirrors = camera.model == "ocam" or (camera.model == "unified" and isinstance(xi, float) and xi <= 1.0)
+    return of_mirrors and not camera.mirror and all_round

@@ -110,17 +110,20 @@ class TiltEstimator(_core.TiltEstimator):
 
 def level(
     image: NDArray[Any],
-    camera: Camera,
+    seen_by: TiltEstimator | Camera,
     tilt: TiltEstimate | FilteredTilt | tuple[float, float],
     robot_from_camera: ArrayLike | None = None,
 ) -> NDArray[Any]:
     """The image as the untilted camera would have seen it, same shape and dtype; black where nothing was seen.
 
-    `tilt` is an estimate, a filter's or an image's, or (alpha_rad, beta_rad). Raises
-    `InvalidInputError` if the image has another size than the camera's or the estimate has no tilt.
+    `seen_by` is the estimator of the tilt, of which camera and mounting are taken, or a camera with its mounting,
+    `robot_from_camera` (3, 3). `tilt` is an estimate, a filter's or an image's, or (alpha_rad, beta_rad). Raises
+    `InvalidInputError` if the image has another size than the camera's, the estimate has no tilt, a camera comes
+    without a mounting, or an estimator with another one.
     """
     import cv2
 
+    camera, mounting = _camera_and_mounting(seen_by, robot_from_camera)
     array = np.asarray(image)
     if array.ndim not in (2, 3) or array.shape[:2] != (camera.height, camera.width):
         expected = f"({camera.height}, {camera.width}) or ({camera.height}, {camera.width}, channels)"
@@ -135,7 +138,23 @@ def level(
     else:
         alpha_rad, beta_rad = tilt
         normal = normal_from_alpha_beta(alpha_rad, beta_rad)
-    places = np.nan_to_num(_core.level_map(camera, normal, robot_from_camera=robot_from_camera), nan=-1e6)
+    places = np.nan_to_num(_core.level_map(camera, normal, robot_from_camera=mounting), nan=-1e6)
     across, down = np.ascontiguousarray(places[:, :, 0]), np.ascontiguousarray(places[:, :, 1])
     # OpenCV drops an axis of length one.
     return np.asarray(cv2.remap(array, across, down, cv2.INTER_LINEAR)).reshape(array.shape)
+
+
+def _camera_and_mounting(
+    seen_by: TiltEstimator | Camera, robot_from_camera: ArrayLike | None
+) -> tuple[Camera, ArrayLike]:
+    """A tilt means something only together with the mounting that it was estimated for."""
+    if not isinstance(seen_by, TiltEstimator):
+        if robot_from_camera is None:
+            raise InvalidInputError(
+                "robot_from_camera: none, expected the mounting (3, 3) beside a camera, or the TiltEstimator instead"
+            )
+        return seen_by, robot_from_camera
+    own = seen_by.robot_from_camera
+    if robot_from_camera is not None and not np.allclose(own, np.asarray(robot_from_camera, dtype=np.float64)):
+        raise InvalidInputError("robot_from_camera: another one than that of the estimator, expected none beside it")
+    return seen_by.camera, own

@@ -121,7 +121,7 @@ def tilts() -> Iterator[tuple[str, Any]]:
                 estimate, edges = estimator.with_edges(image)
                 yield f"{name} edges", {part: getattr(edges, part) for part in EDGES}
                 if estimate:
-                    yield f"{name} level", tiltvp.level(image, camera, estimate)
+                    yield f"{name} level", tiltvp.level(image, estimator, estimate)
     rng = np.random.default_rng(1)
     normals = rng.normal(size=(60, 3)) * [1.0, 1.0, 0.03]
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)

@@ -24,8 +24,9 @@ fn bits(estimate: &TiltEstimate) -> Vec<u64> {
         residual_rms,
         iterations,
         stop,
+        doubt,
     } = *estimate;
-    let reason = format!("{stop:?}");
+    let reason = format!("{stop:?} {doubt:?}");
     let mut floats = vec![confidence, residual_rms, shift_px.unwrap_or(-1.0)];
     floats.extend(covariance_rad2.iter());
     floats.extend(tilt.map_or([2.0; 3], |tilt| tilt.normal().into()));

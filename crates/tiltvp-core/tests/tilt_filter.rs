@@ -121,6 +121,7 @@ fn image(tilt: Option<Tilt>, sigma_rad: f64, confidence: f64) -> TiltEstimate {
         residual_rms: f64::NAN,
         iterations: 0,
         stop: Stop::NoModel { trials: 0 },
+        doubt: None,
     }
 }
 

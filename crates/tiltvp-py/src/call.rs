@@ -45,7 +45,10 @@ pub(crate) fn call_long<T: Send>(py: Python<'_>, work: impl FnOnce() -> Result<T
             let mut signal = None;
             while ended.recv_timeout(POLL) == Err(RecvTimeoutError::Timeout) {
                 if signal.is_none() {
-                    #[expect(clippy::redundant_closure_for_method_calls, reason = "the method alone is for one lifetime")]
+                    #[expect(
+                        clippy::redundant_closure_for_method_calls,
+                        reason = "the method alone is for one lifetime"
+                    )]
                     let raised = Python::attach(|py| py.check_signals()).err();
                     signal = raised;
                     if signal.is_some() {

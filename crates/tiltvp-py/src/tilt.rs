@@ -156,6 +156,15 @@ impl TiltEstimator {
         ))
     }
 
+    /// (F,): what tells whether the estimate of such an image is of the vertical at all, for training.
+    #[pyo3(signature = (image: "NDArray[np.uint8]"))]
+    fn _trust_features<'py>(&self, py: Python<'py>, image: &Bound<'_, PyAny>) -> PyResult<Array<'py, f64>> {
+        let image = convert::gray(image, "image")?;
+        let (view, inner) = (convert::view(&image)?, &self.inner);
+        let found = self.with_scratch(py, |scratch| inner.trust_features(&view, scratch))?;
+        Ok(Array::new(PyArray1::from_vec(py, found)))
+    }
+
     /// The tilts of many such images, in their order, the same for any number of threads.
     #[pyo3(signature = (images: "list[NDArray[np.uint8]]", *, threads: "int | None" = None))]
     #[expect(clippy::needless_pass_by_value, reason = "what the interpreter hands over is owned")]

@@ -154,7 +154,7 @@ def _built(file: Path, spec: CameraSpec, mirror: bool = False) -> Camera:
 
 
 def _info_table(spec: CameraSpec, camera: Camera) -> Table:
-    from tiltvp.field_of_view import field_of_view
+    from tiltvp.field_of_view import field_of_view, looks_like_a_mirror
 
     view = field_of_view(camera)
     table = new_table(spec.name, ("", "value"), ("", "value"))
@@ -178,6 +178,11 @@ def _info_table(spec: CameraSpec, camera: Camera) -> Table:
     table.add_row("valid pixels", f"{100.0 * view.valid_share:.1f} % of the image")
     for note in spec.notes:
         table.add_row("note", note)
+    if looks_like_a_mirror(camera, view):
+        around = angle(min(view.horizontal_rad, view.vertical_rad))
+        table.add_row(
+            "note", f"sees {around} all round, as mirrors do: give --mirror if it looks into one, images do not tell"
+        )
     return table
 
 

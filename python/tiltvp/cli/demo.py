@@ -153,14 +153,15 @@ def _pictures(camera: Camera, room: RoomImage, trials: Sequence[Trial]) -> dict[
     """The first trial is drawn and levels the image."""
     import numpy as np
 
-    from tiltvp import level
+    from tiltvp import TiltEstimator, level
     from tiltvp.overlays.chart import titled
     from tiltvp.overlays.offsets import error_chart, lean_chart, offset_chart
     from tiltvp.overlays.tilt import draw_words, tilt_overlay
 
     best, size = trials[0], (_PANEL_PX, _PANEL_PX)
-    overlay = tilt_overlay(room.bgr, camera, best.estimate, best.edges)
-    levelled = level(room.bgr, camera, best.estimate) if best.estimate else room.bgr
+    estimator = TiltEstimator(camera)
+    overlay = tilt_overlay(room.bgr, estimator, best.estimate, best.edges)
+    levelled = level(room.bgr, estimator, best.estimate) if best.estimate else room.bgr
     seen = _seen_square(camera)
     offsets = offset_chart(size, best.edges.phi_rad, best.edges.offset_px, _cosines(camera, room, trials))
     errors = [(trial.label, math.degrees(trial.error_rad)) for trial in trials]

@@ -35,7 +35,8 @@ class FilterOptions(LibraryOptions):
     odometry: Path | None = None
     """CSV of the motion that led to each image: yaw_rad or yaw_deg, distance_m; file, or one row for each image."""
     estimate_mounting: Switch = False
-    """Also estimate a lean of the robot itself, which turning tells from that of the floor."""
+    """Also estimate a lean of the robot itself, which turning tells from that of the floor: printed, and in columns
+    mounting_... of the table."""
     filter_plot: Path | None = None
     """Picture of the tilt over the images, estimated and filtered (.png)."""
 
@@ -96,5 +97,5 @@ def _filtered(outcomes: Sequence[Outcome], motions: Sequence[Motion], filter_: T
             told = replace(
                 outcome, accepted=step.accepted, verdict=step.verdict, verdict_reason=step.reason, nis=step.nis
             )
-        done.append(replace(told, filtered=filter_.estimate))
+        done.append(replace(told, filtered=filter_.estimate, mounting=filter_.mounting))
     return done

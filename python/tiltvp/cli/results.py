@@ -49,6 +49,8 @@ class Outcome:
     nis: float | None = None
     filtered: FilteredTilt | None = None
     """What the filter held to be true after it; None without a filter."""
+    mounting: FilteredTilt | None = None
+    """The lean of the robot itself that the filter held to be true after it; None where nobody asked."""
 
 
 def sigma_rad(estimate: TiltEstimate | FilteredTilt) -> float:
@@ -80,6 +82,15 @@ def people_table(outcomes: Sequence[Outcome], width: int) -> PrintedTable:
     return table
 
 
+def mounting_words(outcomes: Sequence[Outcome]) -> str:
+    """The lean of the robot itself after the last image, in a line."""
+    held = next((outcome.mounting for outcome in reversed(outcomes) if outcome.mounting is not None), None)
+    if not held:
+        return "the robot's own lean: not told, for the robot has not turned enough"
+    angles = f"alpha {degrees(held.alpha_rad)} deg, beta {degrees(held.beta_rad, 1)} deg"
+    return f"the robot's own lean: {angles}, 1-sigma {degrees(held.sigma_rad)} deg"
+
+
 def _left_out(outcome: Outcome) -> bool:
     return not outcome.estimate or outcome.accepted is False
 
@@ -107,7 +118,8 @@ def outcome_table(outcomes: Sequence[Outcome], method: str) -> Table:
     """One row for each image in SI units; None where there is no value, `error` where the image could not be used.
 
     Judged outcomes have `accepted`, `verdict` and `verdict_reason`; those of a filter also `nis`, and the filtered tilt
-    in columns `filtered_...`, None where the filter abstains but for covariance, sigma and confidence.
+    in columns `filtered_...`, None where the filter abstains but for covariance, sigma and confidence. The lean of the
+    robot itself, where it was asked for, is in columns `mounting_...`.
     """
     types = {"file": "String", "method": "String"}
     types |= dict.fromkeys(_NUMBERS, "Float64") | dict.fromkeys(_COUNTS, "Int64")
@@ -116,6 +128,8 @@ def outcome_table(outcomes: Sequence[Outcome], method: str) -> Table:
         types |= {"accepted": "Boolean", "verdict": "String", "verdict_reason": "String"}
     if any(outcome.filtered is not None for outcome in outcomes):
         types |= {"nis": "Float64"} | {f"filtered_{name}": "Float64" for name in _NUMBERS}
+    if any(outcome.mounting is not None for outcome in outcomes):
+        types |= {f"mounting_{name}": "Float64" for name in _NUMBERS}
     rows = [{"file": str(outcome.file), "method": method} | _row(outcome) | _judged(outcome) for outcome in outcomes]
     return Table(types, [{name: finite(row.get(name)) for name in types} for row in rows])
 
@@ -134,6 +148,8 @@ def _judged(outcome: Outcome) -> dict[str, object]:
     row: dict[str, object] = {name: getattr(outcome, name) for name in ("accepted", "verdict", "verdict_reason", "nis")}
     if outcome.filtered is not None:
         row |= {f"filtered_{name}": value for name, value in _numbers(outcome.filtered).items()}
+    if outcome.mounting is not None:
+        row |= {f"mounting_{name}": value for name, value in _numbers(outcome.mounting).items()}
     return row
 
 

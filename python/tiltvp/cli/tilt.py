@@ -15,9 +15,9 @@ from cyclopts import Parameter, validators
 from tiltvp.cli.filtering import FilterOptions
 from tiltvp.cli.inputs import distinct_names, find_images
 from tiltvp.cli.options import CameraOptions, MethodOptions
-from tiltvp.cli.results import Outcome, degrees, outcome_table, people_table
+from tiltvp.cli.results import Outcome, degrees, mounting_words, outcome_table, people_table
 from tiltvp.cli.tables import check_ending, write_table
-from tiltvp.cli.terminal import ProgressBar, complain, named, progress_bar, show, width
+from tiltvp.cli.terminal import ProgressBar, complain, named, progress_bar, say, show, width
 from tiltvp.errors import InvalidInputError, OutputError, TiltvpError
 from tiltvp.files import check_output_folder
 
@@ -57,7 +57,7 @@ def tilt(
     overlay
         Folder for the images with inlier edges in colour, horizon and vanishing points.
     level
-        Folder for the images made level, each by its own tilt.
+        Folder for the images made level: each by its own tilt, with --filter by the filtered one.
     threads
         How many images are worked on at the same time.
     """
@@ -74,14 +74,54 @@ def tilt(
     for problem in problems:
         complain(problem)
     motions = filtering.motions(files)
+    estimator = _checked(estimator, files)
+    names = distinct_names(files)
     work = Work(estimator, overlay, level, filtering)
-    outcomes = filtering.judged(_done(work, files, distinct_names(files), threads), motions)
+    outcomes = filtering.judged(_done(work, files, names, threads), motions)
+    if level is not None and filtering.filter:
+        for outcome, name in zip(outcomes, names, strict=True):
+            work.write_level(outcome, name)
     show(people_table(outcomes, width()))
+    if filtering.estimate_mounting:
+        say(mounting_words(outcomes))
     if out is not None:
         write_table(outcome_table(outcomes, estimator.method), out)
     if filtering.filter_plot is not None:
         _write_plot(outcomes, estimator.method, filtering.filter_plot)
     return 1 if problems or any(outcome.error for outcome in outcomes) else 0
+
+
+_FIRST = 5
+"""Images by which mounting and rim are checked: what they have in common is of the camera, not of the place."""
+
+
+def _checked(estimator: TiltEstimator, files: Sequence[Path]) -> TiltEstimator:
+    """The estimator without the dark surround that the first images have, if nothing else says where they end; one line
+    on stderr says so, and one if they speak against the mounting.
+    """
+    import numpy as np
+
+    from tiltvp import check_setup, read_image, surround_mask
+
+    camera, images = estimator.camera, []
+    for file in files[:_FIRST]:
+        try:
+            image = read_image(file)
+        except TiltvpError:
+            continue  # It is named when its turn comes.
+        if image.shape[:2] == (camera.height, camera.width):
+            images.append(image)
+    if len(images) < _FIRST:
+        return estimator
+    mask = estimator.options["mask"]
+    if mask is None and (mask := surround_mask(images, camera)) is not None:
+        share = 100.0 * float(np.mean(mask))
+        complain(f"--mask: none, and the images have a dark surround: {share:.0f} % within its rim are looked at")
+        estimator = estimator.with_options(mask=mask)
+    found = check_setup(images, camera, estimator.robot_from_camera, mask=mask)
+    if not found:
+        complain(f"--robot-from-camera: {found.reason}")
+    return estimator
 
 
 def _write_plot(outcomes: Sequence[Outcome], method: str, path: Path) -> None:
@@ -147,19 +187,25 @@ class Work:
         else:
             (estimate, edges), time_s = _timed(lambda: self.estimator.with_edges(gray))
             write_image(self.overlay / f"{name}.png", self._overlay(gray, estimate, edges, file.name))
-        if self.level is not None and estimate and self.filtering.accepts(estimate.confidence):
-            rotation = self.estimator.robot_from_camera
-            write_image(self.level / f"{name}.png", level(image, self.estimator.camera, estimate, rotation))
+        accepted = estimate and self.filtering.accepts(estimate.confidence)
+        if self.level is not None and accepted and not self.filtering.filter:
+            write_image(self.level / f"{name}.png", level(image, self.estimator, estimate))
         return Outcome(file, estimate, time_s)
+
+    def write_level(self, outcome: Outcome, name: str) -> None:
+        """The image made level by what the filter held to be true after it, where it did."""
+        from tiltvp import level, read_image, write_image
+
+        if self.level is not None and outcome.filtered and outcome.error is None:
+            image = read_image(outcome.file)
+            write_image(self.level / f"{name}.png", level(image, self.estimator, outcome.filtered))
 
     def _overlay(
         self, gray: NDArray[np.uint8], estimate: TiltEstimate, edges: EdgeElements, title: str
     ) -> NDArray[np.uint8]:
         from tiltvp.overlays.tilt import tilt_overlay
 
-        return tilt_overlay(
-            gray, self.estimator.camera, estimate, edges, self.estimator.robot_from_camera, words_of(estimate, title)
-        )
+        return tilt_overlay(gray, self.estimator, estimate, edges, words_of(estimate, title))
 
 
 def words_of(estimate: TiltEstimate, title: str) -> str:

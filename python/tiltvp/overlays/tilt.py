@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
     from tiltvp._core import Camera, EdgeElements, TiltEstimate
+    from tiltvp.tilt import TiltEstimator
 
     Picture = NDArray[np.uint8]
     Colour = tuple[int, int, int]
@@ -26,25 +27,21 @@ _HORIZON_POINTS = 1440
 
 
 def tilt_overlay(
-    image: ArrayLike,
-    camera: Camera,
-    estimate: TiltEstimate,
-    edges: EdgeElements,
-    robot_from_camera: ArrayLike | None = None,
-    words: str = "",
+    image: ArrayLike, estimator: TiltEstimator, estimate: TiltEstimate, edges: EdgeElements, words: str = ""
 ) -> Picture:
     """The image in dimmed grey, (H, W, 3) BGR uint8, with inlier edges in colour, horizons, zenith, nadir and `words`.
 
-    Yellow are the horizon and the vertical vanishing points of the estimate, grey those of an upright robot.
+    Camera and mounting are those of the `estimator`. Yellow are the horizon and the vertical vanishing points of the
+    estimate, grey those of an upright robot.
     """
-    gray = gray_from(image)
+    gray, camera, mounting = gray_from(image), estimator.camera, estimator.robot_from_camera
     inlier_offsets = np.abs(edges.offset_px[edges.inlier])
     largest = float(np.nanmax(inlier_offsets)) if np.isfinite(inlier_offsets).any() else 0.0
     dimmed = np.asarray(gray * 0.6, dtype=np.uint8)
     picture = draw_edges(dimmed, edges, offset_max_px=max(40.0, 1.5 * largest), only="inlier")
-    picture = draw_tilt(picture, camera, (0.0, 0.0, 1.0), robot_from_camera, colour=UPRIGHT)
+    picture = draw_tilt(picture, camera, (0.0, 0.0, 1.0), mounting, colour=UPRIGHT)
     if estimate:
-        picture = draw_tilt(picture, camera, estimate.normal, robot_from_camera, colour=ESTIMATED)
+        picture = draw_tilt(picture, camera, estimate.normal, mounting, colour=ESTIMATED)
     return draw_words(picture, words) if words else picture
 
 
@@ -52,7 +49,7 @@ def draw_tilt(
     picture: Picture,
     camera: Camera,
     normal: ArrayLike,
-    robot_from_camera: ArrayLike | None = None,
+    robot_from_camera: ArrayLike,
     *,
     colour: Colour = ESTIMATED,
 ) -> Picture:
@@ -60,8 +57,7 @@ def draw_tilt(
     import cv2
 
     canvas = picture.copy()
-    rotation = np.eye(3) if robot_from_camera is None else np.asarray(robot_from_camera, dtype=np.float64)
-    up = rotation.T @ np.asarray(normal, dtype=np.float64)
+    up = np.asarray(robot_from_camera, dtype=np.float64).T @ np.asarray(normal, dtype=np.float64)
     scale = max(1, round(min(canvas.shape[:2]) / 480))
     for place in camera.project(np.stack([up, -up])):
         if _inside(canvas, place):

@@ -52,21 +52,21 @@ pub fn reject_refit<P: Problem>(
     let Some(mut model) = problem.fit_weighted(&moments) else {
         return FitReport::failed(Stop::NoModel { trials: 1 }, 1);
     };
-    let mut iterations = 1;
+    let (mut iterations, mut change) = (1, f64::INFINITY);
     let stop = loop {
         let rms = moments.rms(problem.coefficients(&model));
         if rms <= options.rms_min {
             break Stop::Settled { rms, limit: options.rms_min };
         }
         if iterations > options.max_iterations {
-            break Stop::IterationLimit { limit: options.max_iterations };
+            break Stop::IterationLimit { limit: options.max_iterations, change };
         }
         let coefficients = problem.coefficients(&model);
         let trimmed = problem.rows().trim(&moments, coefficients, quantile * rms, (&mut *weights, P::WEIGHTS));
         let Some(next) = problem.fit_weighted(&trimmed) else {
             return FitReport::failed(Stop::NoModel { trials: iterations }, iterations);
         };
-        let change = problem.distance(&model, &next);
+        change = problem.distance(&model, &next);
         model = next;
         moments = trimmed;
         iterations += 1;
@@ -123,7 +123,7 @@ pub fn reweight<P: Problem>(
             let stop = if settled {
                 Stop::Converged { iterations, change, tolerance: options.tolerance }
             } else {
-                Stop::IterationLimit { limit }
+                Stop::IterationLimit { limit, change }
             };
             let (rms, inliers) = (moments.rms(problem.coefficients(&model)), moments.count);
             return FitReport { rms, model: Some(model), inliers, iterations, stop };

@@ -37,6 +37,8 @@ pub enum Stop {
     IterationLimit {
         /// The limit.
         limit: u32,
+        /// The last change, in the problem's unit of distance.
+        change: f64,
     },
     /// There are fewer observations than a model needs.
     TooFew {
@@ -68,6 +70,11 @@ pub enum Stop {
         /// How many there are.
         of: usize,
     },
+    /// The observations that agree do not tell how far the model may be off.
+    Undetermined {
+        /// How many agree.
+        agreeing: usize,
+    },
     /// The observations do not determine a model (they are all alike).
     NoModel {
         /// Samples or refits tried.
@@ -78,7 +85,14 @@ pub enum Stop {
 impl Stop {
     /// Whether the fit has no model to offer.
     pub fn is_failure(self) -> bool {
-        matches!(self, Self::TooFew { .. } | Self::NoModel { .. } | Self::OutOfReach { .. } | Self::Ambiguous { .. })
+        matches!(
+            self,
+            Self::TooFew { .. }
+                | Self::NoModel { .. }
+                | Self::OutOfReach { .. }
+                | Self::Ambiguous { .. }
+                | Self::Undetermined { .. }
+        )
     }
 }
 
@@ -91,7 +105,9 @@ impl fmt::Display for Stop {
                 write!(f, "converged after {iterations} iterations (change {change:.2e}, tolerance {tolerance:.2e})")
             }
             Self::Settled { rms, limit } => write!(f, "residuals settled at {rms:.2e} (limit {limit:.2e})"),
-            Self::IterationLimit { limit } => write!(f, "limit of {limit} iterations reached"),
+            Self::IterationLimit { limit, change } => {
+                write!(f, "limit of {limit} iterations reached (last change {change:.2e})")
+            }
             Self::TooFew { have, need } => write!(f, "too few observations: {have}, at least {need} needed"),
             Self::OutOfReach { angle_rad, limit_rad } => {
                 write!(f, "an angle of {angle_rad:.3} rad was found, beyond the limit of {limit_rad:.3} rad")
@@ -101,6 +117,9 @@ impl fmt::Display for Stop {
             }
             Self::Ambiguous { probability, limit, of } => {
                 write!(f, "which of {of} directions is up is not told: probability {probability:.2}, {limit:.2} needed")
+            }
+            Self::Undetermined { agreeing } => {
+                write!(f, "the {agreeing} observations that agree do not tell how far it may be off")
             }
             Self::NoModel { trials } => write!(f, "no model: the observations are degenerate ({trials} tried)"),
         }

@@ -17,7 +17,7 @@ const GOOD_RAD: f64 = 2.0 * std::f64::consts::PI / 180.0;
 
 /// Standard deviation in radians of what no image tells: bent lenses, walls out of plumb, blur. Set on images of known tilt, see
 /// [`clustered_covariance`].
-const FLOOR_RAD: f64 = 0.17 * std::f64::consts::PI / 180.0;
+pub(super) const FLOOR_RAD: f64 = 0.17 * std::f64::consts::PI / 180.0;
 
 /// Share of the pooled variance of the sectors' residuals that each sector brings into the estimate, set likewise.
 const SECTOR_SHARE: f64 = 0.55;
@@ -38,7 +38,10 @@ const CLUTTER_RAD: f64 = 0.056;
 /// location of 108 panoramas and 72 rendered rooms, as they are and darkened, blurred or half hidden, and checked on the others
 /// (`tiltvp measure confidence`).
 ///
-/// `None` if fewer than three sectors hold anything or the model is near no minimum.
+/// Where `H` is not positive, for as much lies on the falling side of the gate as on the rising one, a share of the information takes
+/// its place in the directions that it is not.
+///
+/// `None` if fewer than three sectors hold anything.
 pub(super) fn clustered_covariance(
     rows: &Rows<f32>,
     model: [f64; 3],
@@ -51,11 +54,15 @@ pub(super) fn clustered_covariance(
     let stride = (rows.len() / ENOUGH).max(1);
     let GroupSums { groups: sectors, slopes: [xx, xy, yy] } =
         rows.sums_by_group(model, scale, weights, stride, sector_of);
-    let inverse = inverse_of_positive(&Matrix2::new(xx, xy, xy, yy))?;
     let held = || sectors.iter().filter(|[a, _, c, ..]| a + c > 0.0);
     if held().count() < 3 {
         return None;
     }
+    let slopes = Matrix2::new(xx, xy, xy, yy);
+    let inverse = inverse_of_positive(&slopes).or_else(|| {
+        let information: f64 = held().map(|[a, _, c, ..]| a + c).sum();
+        inverse_of_positive(&raised(&slopes, LEAST_SLOPE * information))
+    })?;
     let total: f64 = held().map(|[a, _, c, ..]| a + c).sum();
     let pooled = held().map(|[a, _, c, x, y]| (x * x + y * y) / (a + c)).sum::<f64>() / total;
     let squares: Matrix2<f64> = held()
@@ -70,6 +77,17 @@ pub(super) fn clustered_covariance(
     let away = inverse * sectors.iter().map(|[.., x, y]| Vector2::new(*x, *y)).sum::<Vector2<f64>>();
     let covariance = inverse * spread * inverse + away * away.transpose();
     covariance.iter().all(|x| x.is_finite()).then_some(covariance)
+}
+
+/// Share of the information that `H` has at least: what the gate leaves of rows that fill it evenly, up to noise, which makes
+/// confidences of nearly nothing.
+const LEAST_SLOPE: f64 = 0.02;
+
+/// A symmetric matrix with eigenvalues of at least a limit.
+fn raised(matrix: &Matrix2<f64>, least: f64) -> Matrix2<f64> {
+    let mut eigen = matrix.symmetric_eigen();
+    eigen.eigenvalues.apply(|value| *value = value.max(least));
+    eigen.recompose()
 }
 
 /// The mean, in lanes of single precision that are added up in double precision every now and then.

@@ -2,6 +2,7 @@
 
 use nalgebra::{Matrix2, Vector3};
 
+use super::trust::Doubt;
 use crate::geometry::Tilt;
 use crate::robust::Stop;
 
@@ -44,6 +45,8 @@ pub struct TiltEstimate {
     pub iterations: u32,
     /// Why the fit stopped.
     pub stop: Stop,
+    /// What most likely keeps the estimate from being sure of itself; `None` where it is sure.
+    pub doubt: Option<Doubt>,
 }
 
 /// One edge pixel of the last image, for pictures and experiments.

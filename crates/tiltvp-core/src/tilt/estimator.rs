@@ -6,8 +6,9 @@ use std::sync::Arc;
 use nalgebra::{Matrix3, Vector3};
 
 use super::estimate::{EdgeElement, TiltEstimate};
+use super::fit::Seen;
 use super::image_edges::{EdgeOrigin, ImageEdges};
-use super::methods::{Fitter, Prepared, Setting, edge_offset};
+use super::methods::{Fitter, Prepared, Setting, TILT_MAX_RAD, edge_offset};
 use super::options::TiltOptions;
 use super::scratch::{Scratch, Work};
 use super::tables::PixelTables;
@@ -97,6 +98,15 @@ impl TiltEstimator {
     /// How many pixels are looked at.
     pub fn region_pixels(&self) -> usize {
         self.pixels.region.len()
+    }
+
+    /// What tells whether the estimate of an image is of the vertical at all, for training. Allocates.
+    ///
+    /// # Errors
+    /// Those of [`estimate`](Self::estimate).
+    pub fn trust_features(&self, image: &ImageView<'_>, scratch: &mut Scratch) -> Result<Vec<f64>> {
+        self.estimate(image, scratch)?;
+        Ok(scratch.work.trusted.to_vec())
     }
 
     /// Memory for one thread, with room for an image in which every pixel is an edge.
@@ -189,7 +199,15 @@ impl TiltEstimator {
     /// keep out only what the prefilters reject.
     fn fit(&self, method: &dyn Fitter, edges: &EdgePixels, work: &mut Work) -> TiltEstimate {
         let fit = method.fit(edges, &self.pixels, work);
-        fit.into_estimate(edges.strong(), work.rows.len())
+        let (edge_pixels, prefiltered_pixels) = (edges.strong(), work.rows.len());
+        let seen = Seen {
+            edge_pixels,
+            prefiltered_pixels,
+            pixels_per_rad: self.pixels.region.pixels_per_rad(),
+            tilt_max_rad: self.options.tilt_max_rad.unwrap_or(TILT_MAX_RAD),
+            trust: method.trust(),
+        };
+        fit.into_estimate(&seen, &mut work.trusted)
     }
 
     /// The directions that may be up and what tells which one is, [`estimate`](Self::estimate)'s way where it looks anywhere: for

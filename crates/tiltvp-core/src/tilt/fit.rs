@@ -10,6 +10,7 @@ use super::estimate::{ALTERNATIVES, Alternative, TiltEstimate};
 use super::scratch::Work;
 use super::tables::PixelTables;
 use super::trained::TrainedCorrection;
+use super::trust::{self, Doubt, FEATURES, Trust};
 use crate::geometry::{Tilt, tangent_basis};
 use crate::robust::{FitReport, Stop};
 
@@ -57,23 +58,55 @@ impl Fit {
         Self { stop, rms: f64::NAN, ..Self::without_tilt(report) }
     }
 
-    /// The estimate of an image with so many edge pixels, of which so many passed the prefilter.
-    pub(super) fn into_estimate(self, edge_pixels: usize, prefiltered_pixels: usize) -> TiltEstimate {
+    /// A fit in radians that reached its limit of iterations has converged if it last moved by less than any image tells.
+    pub(super) fn settled(self) -> Self {
+        match self.stop {
+            Stop::IterationLimit { change, .. } if change < confidence::FLOOR_RAD => {
+                let (iterations, tolerance) = (self.iterations, confidence::FLOOR_RAD);
+                Self { stop: Stop::Converged { iterations, change, tolerance }, ..self }
+            }
+            _ => self,
+        }
+    }
+
+    /// The estimate of an image. A tilt of which the error is not known is none.
+    pub(super) fn into_estimate(self, seen: &Seen, features: &mut [f64; FEATURES]) -> TiltEstimate {
         let chosen = self.alternatives[0].map_or(1.0, |best| best.probability);
-        TiltEstimate {
-            tilt: self.tilt,
+        let undetermined = self.tilt.is_some() && self.covariance.is_none();
+        let undetermined = undetermined.then_some(Stop::Undetermined { agreeing: self.inliers });
+        let mut estimate = TiltEstimate {
+            tilt: self.tilt.filter(|_| undetermined.is_none()),
             covariance_rad2: self.covariance.unwrap_or(Matrix2::from_diagonal_element(f64::INFINITY)),
             confidence: self.covariance.map_or(0.0, |covariance| chosen * confidence::confidence(&covariance)),
-            edge_pixels,
-            prefiltered_pixels,
+            edge_pixels: seen.edge_pixels,
+            prefiltered_pixels: seen.prefiltered_pixels,
             inlier_pixels: self.inliers,
             shift_px: self.shift_px,
             alternatives: self.alternatives,
-            residual_rms: self.rms,
+            residual_rms: if undetermined.is_some() { f64::NAN } else { self.rms },
             iterations: self.iterations,
-            stop: self.stop,
+            stop: undetermined.unwrap_or(self.stop),
+            doubt: None,
+        };
+        *features = trust::features(&estimate, seen.pixels_per_rad, seen.tilt_max_rad);
+        if let Some(trust) = seen.trust {
+            estimate.confidence *= trust.probability(features);
         }
+        estimate.doubt = Doubt::of(&estimate, seen.pixels_per_rad);
+        estimate
     }
+}
+
+/// What is known of an image beside its fit.
+pub(super) struct Seen {
+    pub edge_pixels: usize,
+    /// Edge pixels that passed the prefilter.
+    pub prefiltered_pixels: usize,
+    pub pixels_per_rad: f64,
+    /// The largest lean that is looked for.
+    pub tilt_max_rad: f64,
+    /// How far the method's fits can be trusted to be of the vertical at all.
+    pub trust: Option<&'static Trust>,
 }
 
 /// How the rows of a fit tell its error.

@@ -19,6 +19,7 @@ mod simplex;
 mod tables;
 mod trained;
 mod training_set;
+mod trust;
 
 pub use common_direction::{CommonDirection, CommonDirectionOptions, common_direction};
 pub use correction::Correction;
@@ -33,3 +34,4 @@ pub use posterior::{PosteriorCorrection, PriorOfTilt, train_posterior};
 pub use scratch::Scratch;
 pub use shift_model::ShiftModel;
 pub use trained::{AffineCorrection, TrainedCorrection, train_affine, train_factor};
+pub use trust::Doubt;

@@ -3,6 +3,7 @@
 use tiltvp_kernels::compaction::ROOM;
 
 use super::methods::{SamplingScratch, SegmentWork, Subsample};
+use super::trust::FEATURES;
 use crate::edges::{Detector, EdgeOptions, EdgePixels, Region};
 use crate::robust::Rows;
 
@@ -35,6 +36,8 @@ pub(super) struct Work {
     pub subsample: Subsample<f32>,
     /// Of the sampling methods.
     pub sampling: SamplingScratch,
+    /// What told whether the last fit was of the vertical.
+    pub trusted: [f64; FEATURES],
 }
 
 /// What an estimator's scratch depends on.
@@ -88,6 +91,7 @@ impl Scratch {
                 inliers: Inliers::None,
                 subsample: Subsample::with_capacity(n),
                 sampling: SamplingScratch::default(),
+                trusted: [0.0; FEATURES],
             },
             segments: None,
         }

@@ -64,7 +64,7 @@ macro_rules! words {
 words! {
     /// Why a robust fit stopped.
     StopWord: "confident", "trial-limit", "converged", "settled", "iteration-limit", "too-few", "no-model", "out-of-reach", "chosen",
-        "ambiguous";
+        "ambiguous", "undetermined";
     /// What a filter did with an estimate.
     VerdictWord: "accepted", "jumped", "no-tilt", "low-confidence", "outside-gate", "lost";
 }

@@ -1,6 +1,7 @@
 //! `FitReport`: how a robust fit went and why it stopped, as a frozen Python value.
 
 use tiltvp_core::robust::Stop;
+use tiltvp_core::tilt::Doubt;
 
 use crate::field::StopWord;
 use crate::value::value;
@@ -14,9 +15,10 @@ value! {
         /// it may. "converged": the model has stopped changing; "settled": the residuals are small enough;
         /// "iteration-limit": refitting has been repeated as often as it may. "chosen": of several alternatives one is more
         /// probable than all others together; "ambiguous": none is. No answer comes of "too-few" observations,
-        /// "no-model" (they are all alike) and "out-of-reach" (an angle that the method cannot mean).
+        /// "no-model" (they are all alike), "undetermined" (they do not tell how far it may be off) and "out-of-reach" (an angle
+        /// that the method cannot mean).
         stop: StopWord,
-        /// The same in a sentence, with the measured number and the limit.
+        /// The same in a sentence, with the measured number and the limit; after it what keeps an estimate from being sure.
         reason: String,
         /// Random samples drawn or refits done.
         iterations: u32,
@@ -38,7 +40,16 @@ impl FitReport {
             Stop::OutOfReach { .. } => "out-of-reach",
             Stop::Chosen { .. } => "chosen",
             Stop::Ambiguous { .. } => "ambiguous",
+            Stop::Undetermined { .. } => "undetermined",
         };
         Self { stop: StopWord(word.to_owned()), reason: stop.to_string(), iterations, residual_rms }
+    }
+
+    /// With what keeps an estimate from being sure.
+    pub(super) fn doubted(mut self, doubt: Option<Doubt>) -> Self {
+        if let Some(doubt) = doubt {
+            self.reason = format!("{}; {doubt}", self.reason);
+        }
+        self
     }
 }

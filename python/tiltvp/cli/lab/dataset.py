@@ -54,6 +54,30 @@ def check(directory: Path, /) -> int:
 
 
 @app.command
+def panoramas(*, out: Path, rooms: int = 4, places: int = 2, height: int = 640, seed: int = 0) -> None:
+    """Render upright panoramas of rooms, with the index that folders of panoramas have.
+
+    Parameters
+    ----------
+    out
+        Folder to write to.
+    rooms
+        Rooms of each kind.
+    places
+        Places in each room.
+    height
+        Rows of a panorama; it has twice as many columns.
+    seed
+        Seed of the first room of each kind; those of the others follow.
+    """
+    from tiltvp.lab.datasets.room_panoramas import render_room_panoramas
+    from tiltvp.synth import ROOM_KINDS
+
+    with progress_bar(rooms * places * len(ROOM_KINDS), "panoramas") as bar:
+        render_room_panoramas(out, rooms=rooms, places=places, height=height, first_seed=seed, advance=bar.advance)
+
+
+@app.command
 def render(
     making: MakingOptions,
     lens: LensOptions = _LENS,

@@ -16,6 +16,7 @@ from tiltvp.cli.lab.line_measures import lines
 from tiltvp.cli.lab.planar_pose import planar_pose
 from tiltvp.cli.lab.striding import striding
 from tiltvp.cli.lab.tables import show_frame
+from tiltvp.cli.lab.trust import trust
 from tiltvp.cli.tables import check_ending, write_frame
 from tiltvp.cli.terminal import progress_bar, say
 from tiltvp.errors import InvalidInputError
@@ -29,6 +30,7 @@ app.command(descriptors)
 app.command(lines)
 app.command(planar_pose)
 app.command(striding)
+app.command(trust)
 
 
 @app.command

@@ -31,7 +31,7 @@ pub use self::image_space_ransac::ImageSpaceRansacOptions;
 pub use self::image_space_reject_refit::ImageSpaceRejectRefitOptions;
 pub(super) use self::offsets::edge_offset;
 pub use self::refined::RefineOptions;
-pub(super) use self::refined::{Subsample, refine};
+pub(super) use self::refined::{Subsample, TILT_MAX_RAD, refine};
 pub(super) use self::sampling::SamplingScratch;
 pub use self::segments::SegmentsOptions;
 pub(super) use self::segments::{SegmentFit, SegmentWork};
@@ -41,6 +41,7 @@ use super::image_edges::EdgeOrigin;
 use super::options::TiltOptions;
 use super::scratch::Work;
 use super::tables::PixelTables;
+use super::trust::Trust;
 use crate::edges::{EdgeOptions, EdgePixels, Prefilter};
 use crate::error::Result;
 
@@ -116,6 +117,11 @@ pub(super) enum Prepared {
 pub(super) trait Fitter: Debug + Send + Sync {
     /// Keeps out edge pixels that the prefilter rejects anyway; none if the method takes every edge pixel.
     fn prefilter(&self) -> Option<&Prefilter>;
+
+    /// How its fits tell whether they are of the vertical at all, if that has been learned.
+    fn trust(&self) -> Option<&'static Trust> {
+        None
+    }
 
     /// Unit normal in the robot frame of the great circle of an edge pixel, by its place in the region and its gradient, if the
     /// method makes normals.

@@ -96,6 +96,7 @@ pub(super) fn conclude(
         },
         ..Fit::without_tilt(report)
     }
+    .settled()
 }
 
 #[cfg(test)]

@@ -15,6 +15,7 @@ use crate::tilt::fit::{Evidence, Fit};
 use crate::tilt::scratch::{Inliers, Work};
 use crate::tilt::tables::PixelTables;
 use crate::tilt::trained::TrainedCorrection;
+use crate::tilt::trust::Trust;
 
 options! {
     /// Options of the refined method. Angles are those between an edge's great circle and the vertical.
@@ -32,7 +33,10 @@ options! {
 }
 
 /// Largest lean without `tilt_max_rad`: 10 degrees, and a `scale_rad` more for edges that stray.
-pub(super) const TILT_MAX_RAD: f64 = 12f64.to_radians();
+pub(in crate::tilt) const TILT_MAX_RAD: f64 = 12f64.to_radians();
+
+/// How a fit tells whether it is of the vertical: `tiltvp measure trust --weights` prints it.
+static TRUST: Trust = Trust { constant: 5.304, weights: [-1.75, 4.583, 0.556, 0.09, -0.464, 0.255, 0.375, -1.192] };
 
 impl TiltMethod for RefineOptions {
     fn edges(&self) -> EdgeOptions {
@@ -60,6 +64,10 @@ impl Refined {
 impl Fitter for Refined {
     fn prefilter(&self) -> Option<&Prefilter> {
         Some(self.normals.prefilter())
+    }
+
+    fn trust(&self) -> Option<&'static Trust> {
+        Some(&TRUST)
     }
 
     fn normal(&self, slot: usize, gx: f32, gy: f32) -> Option<[f32; 3]> {

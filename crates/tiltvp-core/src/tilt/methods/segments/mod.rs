@@ -22,9 +22,10 @@ use crate::robust::Stop;
 use crate::segments::{FinderScratch, SegmentDetectorOptions, SegmentFinder, SegmentOptions, Segments};
 use crate::tilt::confidence::inverse_of_positive;
 use crate::tilt::estimate::{ALTERNATIVES, Alternative, EdgeElement, TiltEstimate};
-use crate::tilt::fit::Fit;
+use crate::tilt::fit::{Fit, Seen};
 use crate::tilt::scratch::{Scratch, Work};
 use crate::tilt::tables::PixelTables;
+use crate::tilt::trust::Trust;
 
 options! {
     /// Options of the method of straight edges.
@@ -84,6 +85,9 @@ const BEST: usize = 6;
 /// Most refits, and the change in radians at which they end.
 const ITERATIONS: u32 = 8;
 const TOLERANCE_RAD: f64 = 1e-4;
+
+/// How a fit tells whether it is of the vertical: `tiltvp measure trust --weights` prints it.
+static TRUST: Trust = Trust { constant: 6.782, weights: [-1.164, 2.173, 1.694, 0.317, -0.112, 0.615, -0.279, -1.218] };
 
 impl TiltMethod for SegmentsOptions {
     fn edges(&self) -> EdgeOptions {
@@ -274,7 +278,15 @@ impl SegmentFit {
             fused(&fit, &self.vote(&work.finder.ridge, tables, &mut work.strong, pixel_work))
         };
         let considered = work.weighed.iter().map(|(i, _)| work.segments.list[*i as usize].support()).sum();
-        fit.into_estimate(work.segments.points.len(), considered)
+        let trust = (self.tilt_max_rad <= NEAR_MAX_RAD).then_some(&TRUST);
+        let seen = Seen {
+            edge_pixels: work.segments.points.len(),
+            prefiltered_pixels: considered,
+            pixels_per_rad: region.pixels_per_rad(),
+            tilt_max_rad: self.tilt_max_rad,
+            trust,
+        };
+        fit.into_estimate(&seen, &mut pixel_work.trusted)
     }
 
     /// The most probable of the directions that may be up, unless none is more probable than all others together.
@@ -397,7 +409,7 @@ impl SegmentFit {
         let Some((_, mut normal)) = best else { return failed(Stop::NoModel { trials: 0 }) };
 
         // In the tangent plane of the upright: `normal = (x, y, 1)`, scaled.
-        let mut stop = Stop::IterationLimit { limit: ITERATIONS };
+        let mut stop = Stop::IterationLimit { limit: ITERATIONS, change: f64::INFINITY };
         let mut iterations = 0;
         while iterations < ITERATIONS {
             iterations += 1;
@@ -421,6 +433,7 @@ impl SegmentFit {
                 stop = Stop::Converged { iterations, change, tolerance: TOLERANCE_RAD };
                 break;
             }
+            stop = Stop::IterationLimit { limit: ITERATIONS, change };
         }
         let Some(tilt) = Tilt::from_normal(&normal) else { return failed(Stop::NoModel { trials: iterations }) };
         if tilt.alpha_rad() > self.tilt_max_rad + BEYOND_RAD {
@@ -463,7 +476,7 @@ impl SegmentFit {
         let inliers = weighed.iter().filter(|(_, vertical)| *vertical > 0.5);
         let inliers = inliers.map(|(i, _)| segments.list[*i as usize].support()).sum();
         let rms = (squares / total).sqrt();
-        Fit { tilt: Some(tilt), covariance, inliers, rms, iterations, ..failed(stop) }
+        Fit { tilt: Some(tilt), covariance, inliers, rms, iterations, ..failed(stop) }.settled()
     }
 
     /// The edge pixels of the segments of the last image, in their order.

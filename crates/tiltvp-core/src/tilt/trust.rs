@@ -1,0 +1,146 @@
+//! Whether a fit is of the vertical at all, and what most likely keeps an estimate from being sure.
+
+use std::fmt;
+
+use super::estimate::TiltEstimate;
+
+/// How many numbers tell whether a fit is of the vertical.
+pub(super) const FEATURES: usize = 8;
+
+/// How a method's fits tell whether they are of the vertical and not of some other direction that edges share: a logistic
+/// regression on views whose cameras, mountings or scenes mislead, `tiltvp measure trust`, which prints it.
+#[derive(Debug)]
+pub(super) struct Trust {
+    pub constant: f64,
+    pub weights: [f64; FEATURES],
+}
+
+impl Trust {
+    /// Probability that a fit is of the vertical.
+    pub(super) fn probability(&self, features: &[f64; FEATURES]) -> f64 {
+        let log_odds: f64 =
+            self.constant + features.iter().zip(self.weights).map(|(x, weight)| x * weight).sum::<f64>();
+        1.0 / (1.0 + (-log_odds).exp())
+    }
+}
+
+/// What tells it: the stated error, how much agrees of what might and of all, how fine the pixels are, how well it agrees, how much
+/// that is, and how near it is to the largest lean.
+pub(super) fn features(estimate: &TiltEstimate, pixels_per_rad: f64, tilt_max_rad: f64) -> [f64; FEATURES] {
+    let [inliers, near, all] =
+        [estimate.inlier_pixels, estimate.prefiltered_pixels, estimate.edge_pixels].map(|n| n as f64);
+    let sigma_deg = estimate.covariance_rad2.trace().sqrt().to_degrees().clamp(0.1, 30.0);
+    let lean = estimate.tilt.map_or(0.0, |tilt| tilt.alpha_rad() / tilt_max_rad);
+    let share = ((inliers + 1.0) / (all + 10.0)).ln();
+    [
+        sigma_deg.ln(),
+        ((inliers + 5.0) / (near + 50.0)).ln(),
+        share,
+        share * share,
+        (pixels_per_rad / 150.0).ln().min(0.0),
+        if estimate.residual_rms.is_finite() { estimate.residual_rms.to_degrees() } else { 2.0 },
+        (inliers / pixels_per_rad).ln_1p(),
+        1.2 * lean,
+    ]
+}
+
+/// Confidence from which on nothing is in doubt.
+const SURE: f64 = 0.9;
+
+/// Pixels per degree below which pixels are named as the cause: of images of known tilt through an upward camera of 160 x 120 pixels, with
+/// 0.7, a third errs by more than two degrees, of 320 x 240 hardly any.
+const PIXELS_PER_DEG: f64 = 1.0;
+
+/// Share of all edge pixels below which few agree: the fifth of a hundred views that are read as they are.
+const AGREEING: f64 = 0.09;
+
+/// Edge pixels for each radian's worth of pixels below which there are few: a tenth of what views of rooms have.
+const EDGES: f64 = 20.0;
+
+/// Ratio of the stated errors in two directions from which on edges stand in too few directions.
+const UNLIKE: f64 = 3.0;
+
+/// What most likely keeps an estimate from being sure of itself.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Doubt {
+    /// The pixels are coarse.
+    Coarse {
+        /// Pixels for each degree.
+        per_deg: f64,
+    },
+    /// There are few edges.
+    FewEdges {
+        /// Edge pixels.
+        pixels: usize,
+    },
+    /// Of the edges few agree.
+    FewAgree {
+        /// Share of the edge pixels, in `[0, 1]`.
+        share: f64,
+    },
+    /// The edges that agree stand in too few directions.
+    OneSided {
+        /// Ratio of the standard deviations in two directions.
+        ratio: f64,
+    },
+    /// What agrees strays.
+    Scattered {
+        /// Standard deviation of the estimate, in radians.
+        sigma_rad: f64,
+    },
+}
+
+impl Doubt {
+    /// What most likely is wrong with an image, if its estimate is not sure.
+    pub(super) fn of(estimate: &TiltEstimate, pixels_per_rad: f64) -> Option<Self> {
+        if estimate.confidence >= SURE {
+            return None;
+        }
+        let per_deg = pixels_per_rad.to_radians();
+        let share = estimate.inlier_pixels as f64 / estimate.edge_pixels.max(1) as f64;
+        let eigenvalues = estimate.covariance_rad2.symmetric_eigenvalues();
+        let ratio = (eigenvalues.max() / eigenvalues.min()).sqrt();
+        Some(if per_deg < PIXELS_PER_DEG {
+            Self::Coarse { per_deg }
+        } else if (estimate.edge_pixels as f64) < EDGES * pixels_per_rad {
+            Self::FewEdges { pixels: estimate.edge_pixels }
+        } else if estimate.tilt.is_some() && share < AGREEING {
+            Self::FewAgree { share }
+        } else if ratio > UNLIKE {
+            Self::OneSided { ratio }
+        } else if estimate.tilt.is_some() {
+            Self::Scattered { sigma_rad: estimate.covariance_rad2.trace().sqrt() }
+        } else {
+            return None;
+        })
+    }
+}
+
+impl fmt::Display for Doubt {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match *self {
+            Self::Coarse { per_deg } => write!(f, "{per_deg:.1} pixels for each degree are coarse"),
+            Self::FewEdges { pixels } => {
+                write!(f, "{pixels} edge pixels are few: little contrast, dark, over-exposed or blurred")
+            }
+            Self::FewAgree { share } => write!(
+                f,
+                "only {:.0} % of the edge pixels agree: check mounting, calibration, mask and tilt_max_rad",
+                100.0 * share
+            ),
+            Self::OneSided { ratio } => {
+                write!(
+                    f,
+                    "the edges stand in few directions: {ratio:.0} times the error along one that it has along the other"
+                )
+            }
+            Self::Scattered { sigma_rad } => {
+                write!(
+                    f,
+                    "the edges stray: a standard deviation of {:.1} degrees (noise, blur, clutter)",
+                    sigma_rad.to_degrees()
+                )
+            }
+        }
+    }
+}

@@ -1,0 +1,69 @@
+"""`tiltvp measure trust`: how often estimates are wrong and sure, where images, cameras and mountings mislead them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+from cyclopts import Parameter, validators
+
+from tiltvp.cli.lab.tables import show_frame
+from tiltvp.cli.options import Switch
+from tiltvp.cli.tables import check_ending, write_frame
+from tiltvp.cli.terminal import progress_bar, say
+
+
+def trust(
+    panoramas: Annotated[list[Path], Parameter(consume_multiple=True)],
+    /,
+    *,
+    count: Annotated[int, Parameter(validator=validators.Number(gte=1))] = 200,
+    seed: Annotated[int, Parameter(validator=validators.Number(gte=0))] = 0,
+    unseen: Switch = False,
+    weights: Switch = False,
+    out: Path | None = None,
+) -> None:
+    """Each method on images that mislead: answers, those wrong and sure, abstentions, reasons that name the cause.
+
+    Mountings and lenses that are not as told, harmed views, and images without a vertical. An error beyond two degrees
+    is wrong, a confidence from 0.9 on is sure.
+
+    Parameters
+    ----------
+    panoramas
+        Folders with panoramas and an INDEX.csv of columns name, environment, tilt_x_deg, tilt_z_deg.
+    count
+        Images of each case.
+    seed
+        Seed of headings, leans and harm.
+    unseen
+        Only the half of the buildings on which nothing was set.
+    weights
+        Also print the weights that the other half trains, by which confidences trust a fit to be of the vertical.
+    out
+        Also write the long table, one row for each image and method: .csv, .json or .parquet.
+    """
+    from tiltvp.lab.datasets.hostile import CASES, hostile_images
+    from tiltvp.lab.datasets.panoramas import read_panorama_index
+    from tiltvp.lab.evaluation.hostile import METHODS, judge_images, summarise_cases, train_trust
+    from tiltvp.lab.evaluation.trust import was_set_on
+
+    if out is not None:
+        check_ending(out)
+    chosen = [
+        panorama
+        for folder in panoramas
+        for panorama in read_panorama_index(folder)
+        if not (unseen and was_set_on(panorama.location))
+    ]
+    with progress_bar(count * len(CASES), "images") as bar:
+        images = hostile_images(chosen, count=count, seed=seed)
+        table = judge_images(images, features=weights, advance=bar.advance)
+    if out is not None:
+        write_frame(table.select(column for column in table.columns if column != "features"), out)
+    places = len({panorama.location for panorama in chosen})
+    title = f"Shares in per cent, of {count} images of each case, {len(chosen)} panoramas of {places} buildings"
+    show_frame(title, summarise_cases(table), ["method", "case"])
+    for method in METHODS if weights else ():
+        constant, own = train_trust(table, method)
+        say(f"{method}: {constant:.4g}; {', '.join(f'{weight:.4g}' for weight in own)}")

@@ -1,0 +1,219 @@
+"""Whether a camera sits as it is said to: which of its six directions is up, as a few images tell."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from tiltvp.errors import InvalidInputError
+from tiltvp.images import gray_from
+from tiltvp.segments import SegmentDetector
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike, NDArray
+
+    from tiltvp._core import Camera, Segments
+
+    Matrix = NDArray[np.float64]
+
+__all__ = ["DIRECTIONS", "SetupCheck", "check_setup"]
+
+DIRECTIONS: Final[dict[str, tuple[float, float, float]]] = {
+    "-y": (0.0, -1.0, 0.0),
+    "+y": (0.0, 1.0, 0.0),
+    "-x": (-1.0, 0.0, 0.0),
+    "+x": (1.0, 0.0, 0.0),
+    "+z": (0.0, 0.0, 1.0),
+    "-z": (0.0, 0.0, -1.0),
+}
+"""The six directions of the camera frame that may be up, by name."""
+
+_WORDS: Final = {
+    "-y": "it looks ahead, image upright",
+    "+y": "it looks ahead, image upside down",
+    "-x": "it looks ahead, the left side of the image up",
+    "+x": "it looks ahead, the right side of the image up",
+    "+z": "it looks up",
+    "-z": "it looks down",
+}
+
+_REACH_RAD: Final = float(np.deg2rad(14.0))
+"""How far from a direction the vertical is looked for: 10 degrees of lean, and 4 by which mountings are off."""
+_STEP_RAD: Final = float(np.deg2rad(1.75))
+_SCATTER_RAD: Final = float(np.deg2rad(0.8))
+"""By how much the edges of vertical things miss the vertical, with half a step of the grid."""
+_EVEN_RAD: Final = float(np.deg2rad(3.0))
+"""As of the method "segments": the scatter at which a segment is as likely vertical as not."""
+_LENGTH_RAD: Final = 0.2
+_LONGEST: Final = 120
+"""Straight edges of an image that are looked at."""
+_WEIGHTS: Final = np.array([
+    3.921, -0.951, 2.311, -4.545, 0.965, -2.992, 0.179, -1.487,
+    2.046, -2.544, -2.818, 2.292, 2.573, 0.379, 5.181,
+])  # fmt: skip
+"""Logarithm of the odds for each unit of a feature of one image: a conditional logit on views of half of the panoramas
+of `tiltvp measure trust`, by `tiltvp.lab.evaluation.setups`."""
+_SHARED: Final = 0.6
+"""Images of one place err together: the logarithm of the odds of N images is that of N to this power of them."""
+BELIEVABLE: Final = 0.05
+
+
+@dataclass(frozen=True)
+class SetupCheck:
+    """Which of the camera's six directions is up. True if the given mounting is believable.
+
+    `given` is the direction of `DIRECTIONS` that is nearest to up by the mounting that was given, `best` the most
+    probable by the images, `probabilities` those of all six, `images` how many were looked at, and `reason` says all
+    this in a sentence.
+    """
+
+    given: str
+    best: str
+    probabilities: dict[str, float]
+    images: int
+
+    @property
+    def believable(self) -> bool:
+        """Whether the direction that was given has a probability of at least 0.05."""
+        return self.probabilities[self.given] >= BELIEVABLE
+
+    @property
+    def reason(self) -> str:
+        """What was found, in a sentence."""
+        shares = self.probabilities
+        what = f"{_WORDS[self.best]}; probability {shares[self.best]:.2f}"
+        told = f"{self.images} images: up is the camera's {self.best} ({what})"
+        if self.best == self.given:
+            return f"{told}, as the mounting says"
+        return (
+            f"{told}, where the mounting says {self.given} ({_WORDS[self.given]}; probability {shares[self.given]:.2f})"
+        )
+
+    def __bool__(self) -> bool:
+        return self.believable
+
+
+def check_setup(
+    images: Iterable[ArrayLike],
+    camera: Camera,
+    robot_from_camera: ArrayLike | None = None,
+    *,
+    mask: ArrayLike | None = None,
+) -> SetupCheck:
+    """Which of the camera's six directions is up in some images, and whether the given mounting is believable.
+
+    Five images from different places, or with different headings, are enough. `robot_from_camera` is (3, 3), by default
+    the identity; `mask` (H, W) bool is True where images show the world. A turn of the camera about the vertical, and
+    an image that is mirrored, cannot be told from images alone. Raises `InvalidInputError` for no images and for images
+    of another size than the camera's.
+    """
+    rotation = np.eye(3) if robot_from_camera is None else np.asarray(robot_from_camera, dtype=np.float64)
+    if rotation.shape != (3, 3):
+        raise InvalidInputError(f"robot_from_camera: shape {rotation.shape}, expected (3, 3)")
+    seen = setup_features(images, camera, mask=mask)
+    if not len(seen):
+        raise InvalidInputError("images: none, expected at least one")
+    shares = {name: float(share) for name, share in zip(DIRECTIONS, shares_of(seen), strict=True)}
+    up = rotation.T @ np.array([0.0, 0.0, 1.0])
+    given = max(DIRECTIONS, key=lambda name: float(np.dot(up, DIRECTIONS[name])))
+    return SetupCheck(given, max(shares, key=lambda name: shares[name]), shares, len(seen))
+
+
+def shares_of(features: Matrix, weights: Matrix | None = None) -> Matrix:
+    """(6,): probabilities of the six directions by the features (N, 6, F) of images."""
+    log_odds = features.sum(axis=0) @ (_WEIGHTS if weights is None else weights) * len(features) ** (_SHARED - 1.0)
+    odds = np.exp(log_odds - log_odds.max())
+    return np.asarray(odds / odds.sum())
+
+
+def setup_features(images: Iterable[ArrayLike], camera: Camera, *, mask: ArrayLike | None = None) -> Matrix:
+    """(N, 6, F): what tells of each image how likely each of the six directions is up."""
+    detector = SegmentDetector(camera) if mask is None else SegmentDetector(camera, mask=mask)
+    places, bearings = _sample_of(camera)
+    rows = []
+    for image in images:
+        gray = gray_from(image)
+        edges = detector(gray)
+        levels = gray[places[:, 1], places[:, 0]].astype(np.float64)
+        axes = [_axis_features(edges, axis) for axis in np.eye(3)]
+        rows.append([_signed(edges, axes, np.array(direction), levels, bearings) for direction in DIRECTIONS.values()])
+    return np.array(rows)
+
+
+def _sample_of(camera: Camera) -> tuple[NDArray[np.int64], Matrix]:
+    """Pixels (N, 2) that have bearings (N, 3), one in so many that about 2000 are left."""
+    step = max(1, int(np.sqrt(camera.width * camera.height / 2000.0)))
+    v, u = np.mgrid[step // 2 : camera.height : step, step // 2 : camera.width : step]
+    places = np.column_stack([u.ravel(), v.ravel()])
+    bearings = camera.unproject(places.astype(np.float64))
+    held = np.isfinite(bearings).all(axis=1)
+    return places[held], bearings[held]
+
+
+def _cap() -> Matrix:
+    """(K, 2): offsets across an axis, a grid of steps within the reach."""
+    n = int(_REACH_RAD / _STEP_RAD)
+    i, k = np.mgrid[-n : n + 1, -n : n + 1]
+    grid = np.column_stack([i.ravel(), k.ravel()]) * _STEP_RAD
+    return np.asarray(np.sin(grid[np.hypot(grid[:, 0], grid[:, 1]) <= _REACH_RAD]))
+
+
+def _axis_features(edges: Segments, axis: Matrix) -> tuple[Matrix, Matrix, float]:
+    """The most likely vertical near an axis, how likely each edge is vertical, and the sum of the log odds."""
+    normal, middle, length = edges.normal[:_LONGEST], edges.middle[:_LONGEST], edges.length_rad[:_LONGEST]
+    if not len(normal):
+        return axis, np.zeros(0), 0.0
+    basis = np.eye(3)[axis == 0.0]
+    cap = _cap()
+    ups = cap @ basis + np.sqrt(1.0 - np.sum(cap**2, axis=1))[:, None] * axis
+    variance = _SCATTER_RAD**2 + edges.variances_rad2[:_LONGEST].max(axis=1)
+    chance = np.sqrt(np.maximum(1.0 - (middle @ axis) ** 2, 1e-3))
+    odds = _EVEN_RAD * chance / np.sqrt(variance) * np.exp(-0.5 * (ups @ normal.T) ** 2 / variance)
+    weight = np.sqrt(length / _LENGTH_RAD)
+    score = np.log1p(odds) @ weight
+    best = int(np.argmax(score))
+    shares = odds[best] / (1.0 + odds[best])
+    return ups[best], shares, float(score[best])
+
+
+def _signed(
+    edges: Segments, axes: list[tuple[Matrix, Matrix, float]], direction: Matrix, levels: Matrix, bearings: Matrix
+) -> list[float]:
+    """What tells whether a direction is up, of one image."""
+    own = int(np.argmax(np.abs(direction)))
+    up, vertical, score = axes[own]
+    up = up if up @ direction > 0.0 else -up
+    normal, middle, length = edges.normal[:_LONGEST], edges.middle[:_LONGEST], edges.length_rad[:_LONGEST]
+    weight = np.sqrt(length / _LENGTH_RAD)
+    level = 1.0 - vertical
+    total = float(weight.sum()) + 1.0
+    height = middle @ up
+    brighter = normal @ up
+    elevation = bearings @ up
+    spread = float(levels.std() * elevation.std())
+    light = float(np.mean((levels - levels.mean()) * (elevation - elevation.mean()))) / spread if spread > 1e-6 else 0.0
+    centre = float(elevation.mean())
+    lightest, darkest = (levels >= np.percentile(levels, 95)), (levels <= np.percentile(levels, 10))
+    short = length < np.median(length) if len(length) else np.zeros(0, dtype=bool)
+    across = middle[vertical > 0.5] @ np.eye(3)[direction == 0.0].T
+    sectors = np.unique(np.floor(np.arctan2(across[:, 1], across[:, 0]) * 6.0 / np.pi))
+    return [
+        score / total,
+        float(weight @ vertical) / total,
+        np.log1p(len(sectors)),
+        float(weight @ (vertical * np.abs(height))) / (1.0 + float(weight @ vertical)),
+        float(weight @ (level * brighter)) / total,
+        float(weight @ (level * height)) / total,
+        light,
+        float(np.max(length * vertical, initial=0.0)),
+        float(elevation[lightest].mean()) - centre,
+        float(elevation[darkest].mean()) - centre,
+        float(height[short].mean()) - centre if short.any() else 0.0,
+        float(height.mean()) - centre if len(height) else 0.0,
+        float((vertical @ height) / (1.0 + vertical.sum())),
+        centre * float(levels.mean()) / 100.0,
+        centre * float(np.mean(levels > 235.0)),
+    ]

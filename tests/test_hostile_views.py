@@ -1,0 +1,95 @@
+"""What misleads tilt estimates: the images, their truths, and the table of who was wrong and sure."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import polars as pl
+import pytest
+
+import tiltvp
+from tiltvp.cli import main
+from tiltvp.lab.datasets.hostile import CASES, UNHARMED, hostile_images
+from tiltvp.lab.datasets.panoramas import Panorama, read_panorama_index
+from tiltvp.lab.evaluation.hostile import judge_images, summarise_cases
+
+
+@pytest.fixture(scope="module")
+def stripes(tmp_path_factory: pytest.TempPathFactory) -> Panorama:
+    """A panorama of upright stripes of drawn widths and levels, light above."""
+    folder = tmp_path_factory.mktemp("stripes")
+    rng = np.random.default_rng(3)
+    columns = np.repeat(rng.uniform(40.0, 200.0, 64), 16)[None, :]
+    rows = np.linspace(1.0, 0.4, 512)[:, None]
+    tiltvp.write_image(folder / "stripes.jpg", np.asarray(columns * rows, dtype=np.uint8))
+    (folder / "INDEX.csv").write_text("name,environment,tilt_x_deg,tilt_z_deg\nstripes,hall,0,0\n")
+    return read_panorama_index(folder)[0]
+
+
+def test_truths_are_those_of_the_mounting_as_told(stripes: Panorama) -> None:
+    images = {item.case: item for item in hostile_images([stripes], count=1)}
+    assert list(images) == list(CASES)
+    lean = images["upward"].normal
+    assert lean is not None
+    assert math.degrees(math.acos(lean[2])) <= 8.0
+    for case, item in images.items():
+        assert item.image.shape == (item.camera.height, item.camera.width)
+        if item.normal is None:
+            continue
+        off = math.degrees(math.acos(np.clip(item.normal[2], -1.0, 1.0)))
+        if "downward read as upward" in case or "upward read as downward" in case:
+            assert off > 170.0
+        elif "read as" in case:
+            assert 80.0 < off < 100.0
+        elif "lean" in case:
+            assert 20.0 <= off <= 40.0
+        else:
+            assert np.allclose(item.normal, lean)
+    assert images["12 bits in 16"].image.max() > 255
+    # What is told differs from what the image was made with, or the image itself does.
+    upward = images["upward"]
+    for case in ("focal length off by 10 %", "centre off by 10 px"):
+        assert images[case].camera != upward.camera
+        assert np.array_equal(images[case].image, upward.image)
+
+
+def test_unharmed_views_are_answered_rightly_and_a_wrong_camera_is_counted(stripes: Panorama) -> None:
+    cases = ("upward", "panorama", "centre off by 10 px")
+    table = judge_images(hostile_images([stripes], count=2, cases=cases))
+    assert len(table) == 2 * 3 * 2
+    unharmed = table.filter(pl.col("case").is_in(UNHARMED))
+    assert unharmed["error_deg"].max() < 1.0
+    assert table.filter(case="centre off by 10 px")["error_deg"].min() > 2.0
+
+
+def test_the_table_counts_who_was_wrong_and_sure() -> None:
+    rows = [
+        ("sky", "refined", math.nan, 0.95, "converged"),
+        ("sky", "refined", None, 0.0, "too few observations"),
+        ("sky", "refined", math.nan, 0.2, "converged"),
+        ("dark", "refined", 1.0, 0.95, "converged"),
+        ("dark", "refined", 3.0, 0.91, "converged"),
+        ("dark", "refined", 1.5, 0.5, "converged; 3 edge pixels are few: little contrast, dark"),
+        ("upward", "refined", 5.0, 0.99, "converged"),
+    ]
+    table = pl.DataFrame(rows, schema=["case", "method", "error_deg", "confidence", "reason"], orient="row")
+    table = summarise_cases(table.with_columns(pl.col("error_deg").cast(pl.Float64)))
+    sky, dark = (table.filter(case=case).row(0, named=True) for case in ("sky", "dark"))
+    assert (sky["images"], sky["answers"], sky["abstained"]) == pytest.approx((3, 200 / 3, 100 / 3))
+    assert sky["wrong_and_sure"] == pytest.approx(100 / 3)
+    assert sky["sure_of_right"] is None
+    assert dark["wrong_and_sure"] == pytest.approx(100 / 3)
+    assert dark["sure_of_right"] == pytest.approx(50.0)
+    assert dark["cause_named"] == pytest.approx(100.0)
+    # Unharmed views do not count as misleading.
+    assert table.filter(case="all that mislead")["wrong_and_sure"].item() == pytest.approx(100 * 2 / 6)
+
+
+@pytest.mark.slow
+def test_the_command(stripes: Panorama, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    out = tmp_path / "trust.csv"
+    assert main(["measure", "trust", str(stripes.path.parent), "--count", "1", "--out", str(out)]) == 0
+    assert "upward read as ahead" in capsys.readouterr().out
+    assert len(pl.read_csv(out)) == 2 * len(CASES)

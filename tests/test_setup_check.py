@@ -1,0 +1,73 @@
+"""Which of a camera's six directions is up, by images of rendered rooms and by edges that were drawn."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import tiltvp
+from tiltvp.cli import main
+from tiltvp.errors import InvalidInputError
+from tiltvp.rotations import read_rotation
+from tiltvp.setup_check import DIRECTIONS
+
+PINHOLE = tiltvp.Camera.pinhole(width=320, height=240, fx=190.0, fy=190.0, cx=159.5, cy=119.5)
+
+
+def ahead(seed: int) -> np.ndarray:
+    """A level camera before upright bars, at places and of levels drawn by the seed."""
+    rng = np.random.default_rng(seed)
+    image = np.full((240, 320), 90.0) + rng.normal(0.0, 2.0, (240, 320))
+    for left in rng.choice(np.arange(10, 300, 12), 9, replace=False):
+        image[rng.integers(10, 60) : rng.integers(170, 230), left : left + 6] += rng.uniform(40.0, 120.0)
+    return np.asarray(np.clip(image, 0, 255), dtype=np.uint8)
+
+
+IMAGES = [ahead(seed) for seed in range(5)]
+
+
+def test_upright_bars_tell_that_the_camera_looks_ahead() -> None:
+    found = tiltvp.check_setup(IMAGES, PINHOLE, read_rotation("forward"))
+    assert found.given == "-y"
+    assert found.best in ("-y", "+y")
+    assert found
+    assert found.images == 5
+    assert sum(found.probabilities.values()) == pytest.approx(1.0)
+    assert list(found.probabilities) == list(DIRECTIONS)
+
+
+def test_a_quarter_turn_and_an_upward_mounting_are_not_believed() -> None:
+    portrait = [np.ascontiguousarray(np.rot90(image)) for image in IMAGES]
+    turned = tiltvp.Camera.pinhole(width=240, height=320, fx=190.0, fy=190.0, cx=119.5, cy=159.5)
+    found = tiltvp.check_setup(portrait, turned, read_rotation("forward"))
+    assert not found
+    assert found.best in ("-x", "+x")
+    assert "where the mounting says -y (it looks ahead, image upright" in found.reason
+    upward = tiltvp.check_setup(IMAGES, PINHOLE)
+    assert not upward
+    assert upward.given == "+z"
+
+
+def test_what_it_cannot_look_at_is_refused() -> None:
+    with pytest.raises(InvalidInputError, match="images: none"):
+        tiltvp.check_setup([], PINHOLE)
+    with pytest.raises(InvalidInputError, match=r"shape \(2, 2\)"):
+        tiltvp.check_setup(IMAGES, PINHOLE, np.eye(2))
+    with pytest.raises(InvalidInputError, match="as the camera's images"):
+        tiltvp.check_setup([IMAGES[0][:-1]], PINHOLE)
+
+
+def test_tilt_warns_in_one_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    folder = tmp_path / "images"
+    for k, image in enumerate(IMAGES):
+        tiltvp.write_image(folder / f"{k}.png", image)
+    calibration = tmp_path / "camera.toml"
+    PINHOLE.save(calibration)
+    options = ["--camera", str(calibration), "--method", "segments"]
+    assert main(["tilt", str(folder), *options, "--robot-from-camera", "forward"]) == 0
+    assert "where the mounting says" not in capsys.readouterr().err
+    assert main(["tilt", str(folder), *options]) == 0
+    said = [line for line in capsys.readouterr().err.splitlines() if "where the mounting says +z" in line]
+    assert len(said) == 1
