@@ -95,6 +95,13 @@ impl SelfCalibrator {
         Ok(CalibrationStep { nis, used, rejected, started })
     }
 
+    /// Examines what the drive so far contradicts, which happens by itself whenever it has become a quarter longer.
+    pub fn examine(&mut self) {
+        if let Filter::SlidingWindow(filter) = &mut self.filter {
+            filter.examine();
+        }
+    }
+
     /// The number of landmarks that are followed.
     pub fn landmarks(&self) -> usize {
         match &self.filter {
@@ -117,6 +124,7 @@ impl SelfCalibrator {
                     nis,
                     filter.monitor().alarmed(),
                 )
+                .judged(filter.examination().contradictions, filter.examination().suspect)
             }
             Filter::Paper(filter) => {
                 let Some((polar, covariance)) = filter.mounting() else {

@@ -28,7 +28,8 @@ impl SlidingWindow {
         let shrunk = keyframes >= self.spurious_until && self.any_sigma_below(&(solved * SIGMA_RATIO));
         let disputed = outcome.contradiction > 0.0
             || rejected.iter().any(|slot| self.rejections[*slot] >= DISPUTED_REJECTIONS || self.closes_loop(*slot));
-        let due = keyframes >= self.next_relinearisation || moved > limit || shrunk || disputed || outcome.slipped;
+        let asked = moved > limit || shrunk || disputed || outcome.slipped;
+        let due = keyframes >= self.next_relinearisation || asked && !self.examination.hopeless();
         let mut recorded = outcome;
         if due && keyframes > 2 && self.problem.keyframes.last().is_some_and(|last| !last.observations.is_empty()) {
             let trusted = outcome.contradiction == 0.0 && !shrunk && moved < TRUSTED_SIGMAS;
@@ -46,6 +47,9 @@ impl SlidingWindow {
             }
         }
         self.monitor.record(&recorded, self.gate.limit());
+        if !seen.is_empty() {
+            self.examine_if_due();
+        }
         outcome
     }
 
