@@ -86,7 +86,10 @@ impl fmt::Display for MountingEstimate {
         }
         let Contradictions { motions, contradicted_motions, turns, contradicted_turns } = self.contradictions;
         if contradicted_motions + contradicted_turns > 0 {
-            write!(f, "; {contradicted_motions} of {motions} motions and {contradicted_turns} of {turns} turns contradicted")?;
+            write!(
+                f,
+                "; {contradicted_motions} of {motions} motions and {contradicted_turns} of {turns} turns contradicted"
+            )?;
         }
         Ok(())
     }

@@ -1,4 +1,4 @@
-"""Logs that mislead: simulated drives that are read wrongly, disturbed, noisier than told, or too poor to tell anything."""
+"""Logs that mislead: simulated drives read wrongly, disturbed, noisier than told, or too poor to tell anything."""
 
 from __future__ import annotations
 

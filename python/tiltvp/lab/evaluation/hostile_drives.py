@@ -9,6 +9,7 @@ from typing import Any, Final
 import numpy as np
 import polars as pl
 
+from tiltvp.errors import InvalidInputError
 from tiltvp.lab.datasets.hostile_drives import HostileDrive
 from tiltvp.selfcalib import LogCalibration, MountingEstimate, SelfCalibrator, calibrate
 
@@ -43,16 +44,15 @@ CAUSES: Final = {
 def judge_drives(drives: Iterable[HostileDrive], *, advance: Callable[[], None] = lambda: None) -> pl.DataFrame:
     """Two rows for each drive, of the filter and of the whole log.
 
-    Columns: case, seed, by, answered (the verdict says that it can be relied upon), nees, worst (the largest error of x,
-    y and yaw in standard deviations of the bound), wrong, named, reason.
+    Columns: case, seed, by, answered (the verdict says that it can be relied upon), nees, worst (the largest error
+    of x, y and yaw in standard deviations of the bound), wrong, named, reason.
     """
     rows: list[dict[str, Any]] = []
     for item in drives:
         calibrator = SelfCalibrator(**item.options)
         calibrator.follow(item.odometry, item.bearings)
         rows.append(_row(item, "filter", calibrator.estimate, calibrator.estimate))
-        whole = calibrate(item.odometry, item.bearings, **item.options)
-        rows.append(_row(item, "whole log", whole, whole.mounting))
+        rows.append(_whole_log(item))
         advance()
     return pl.DataFrame(rows)
 
@@ -60,7 +60,7 @@ def judge_drives(drives: Iterable[HostileDrive], *, advance: Callable[[], None] 
 def summarise_drive_cases(table: pl.DataFrame) -> pl.DataFrame:
     """One row for each case and way: drives, and shares in per cent of answers, wrong and sure, abstained, and named.
 
-    Named is of the drives that were not answered, and null where a case has no cause to name.
+    Named is null where a case has no cause to name.
     """
     sure = pl.col("answered")
     columns = {
@@ -73,7 +73,33 @@ def summarise_drive_cases(table: pl.DataFrame) -> pl.DataFrame:
     return table.group_by("case", "by", maintain_order=True).agg(**columns)
 
 
-def _row(item: HostileDrive, by: str, verdict: LogCalibration | MountingEstimate, e: MountingEstimate) -> dict[str, Any]:
+def _whole_log(item: HostileDrive) -> dict[str, Any]:
+    try:
+        whole = calibrate(item.odometry, item.bearings, **item.options)
+    except InvalidInputError as error:
+        named = _cause(item) in str(error)
+        return _columns(item, "whole log", math.nan, math.nan) | {"named": named, "reason": str(error)}
+    row = _row(item, "whole log", whole, whole.mounting)
+    # What was estimated need not be named.
+    told = SelfCalibrator(**item.options).options
+    own = {"bearing_sigma_rad": whole.bearing_sigma_rad, "odometry_k_m": whole.odometry_k_m}
+    estimated = own.get(_cause(item)) not in (None, told.get(_cause(item)))
+    return row | {"named": row["named"] or estimated if row["named"] is not None else None}
+
+
+def _cause(item: HostileDrive) -> str:
+    return next((words for name, words in CAUSES.items() if item.case.startswith(name)), "")
+
+
+def _columns(item: HostileDrive, by: str, nees: float, worst: float) -> dict[str, Any]:
+    """The columns of a drive without an answer."""
+    columns = {"case": item.case, "seed": item.seed, "by": by, "answered": False, "nees": nees, "worst": worst}
+    return columns | {"wrong": True, "named": False, "reason": ""}
+
+
+def _row(
+    item: HostileDrive, by: str, verdict: LogCalibration | MountingEstimate, e: MountingEstimate
+) -> dict[str, Any]:
     error = np.array([e.x_m, e.y_m, e.yaw_rad]) - item.truth
     error[2] = math.remainder(error[2], math.tau)
     try:
@@ -81,15 +107,10 @@ def _row(item: HostileDrive, by: str, verdict: LogCalibration | MountingEstimate
     except np.linalg.LinAlgError:
         nees = math.inf
     worst = float(np.max(np.abs(error) / np.sqrt(np.diag(item.bound))))
-    cause = next((words for name, words in CAUSES.items() if item.case.startswith(name)), None)
-    return {
-        "case": item.case,
-        "seed": item.seed,
-        "by": by,
+    cause = _cause(item)
+    return _columns(item, by, nees, worst) | {
         "answered": bool(verdict),
-        "nees": nees,
-        "worst": worst,
         "wrong": not (nees <= NEES_LIMIT and worst <= BOUND_SIGMAS),
-        "named": None if cause is None else cause in getattr(verdict, "reason", e.reason),
-        "reason": getattr(verdict, "reason", e.reason),
+        "named": cause in verdict.reason if cause else None,
+        "reason": verdict.reason,
     }

@@ -24,7 +24,8 @@ impl BundleProblem {
         let asked = [self.free.wheels, self.free.wheels, self.free.offset];
         let information = covariance.try_inverse().unwrap_or_else(Matrix3::zeros);
         std::array::from_fn(|k| {
-            let drop: Vec<usize> = (0..3).filter(|other| *other != k && !asked[*other]).map(|other| 3 + other).collect();
+            let drop: Vec<usize> =
+                (0..3).filter(|other| *other != k && !asked[*other]).map(|other| 3 + other).collect();
             let at = 3 + (0..k).filter(|other| asked[*other]).count();
             let left = system.equations.information.clone().remove_rows_at(&drop).remove_columns_at(&drop);
             let factor = (!asked[k]).then(|| CholeskyFactor::regularised(left)).flatten()?;

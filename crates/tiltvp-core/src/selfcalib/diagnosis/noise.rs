@@ -71,7 +71,15 @@ impl BundleProblem {
             .1
             .iter()
             .map(Vector3::norm_squared)
-            .map(|s| if s <= MOST_SQUARED { s } else if rare { 0.0 } else { MOST_SQUARED })
+            .map(|s| {
+                if s <= MOST_SQUARED {
+                    s
+                } else if rare {
+                    0.0
+                } else {
+                    MOST_SQUARED
+                }
+            })
             .sum();
         let free = if rare { motions } else { motions + 3.0 * slips };
         NoiseFactors {

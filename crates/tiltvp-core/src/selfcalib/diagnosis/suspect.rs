@@ -5,6 +5,7 @@ use std::fmt;
 use nalgebra::Matrix3;
 
 use super::contradictions::Contradictions;
+use super::deviations::Deviation;
 use super::noise::NoiseFactors;
 use crate::selfcalib::bundle::BundleProblem;
 use crate::selfcalib::model::OUTLIER_SIGMAS;
@@ -17,9 +18,13 @@ const MOST_OUTLIERS: f64 = 0.15;
 const MOST_CONTRADICTED: f64 = 0.1;
 
 /// Standard deviations of a deviation of the wheels or the clock beyond which it is not chance, and of the mounting by which it
-/// would move, below which it does not matter.
+/// would move, below which it does not matter where the noise is as told.
 const DEVIATION_SIGMAS: f64 = 5.0;
 const DEVIATION_SHIFT: f64 = 1.0;
+
+/// Correlation of successive residuals of a landmark from which on more noise than told is no noise: that of white noise is within
+/// 0.05 for a thousand bearings.
+const NO_NOISE_CORRELATION: f64 = 0.3;
 
 words! {
     /// What is most likely wrong with a log or with what is told of the robot.
@@ -29,6 +34,8 @@ words! {
         Turns = "turns",
         /// Many bearings are outliers: a bump of the camera, or wrong names of landmarks.
         Outliers = "outliers",
+        /// Bearings scatter more than told, and for long to one side: a bump of the camera.
+        Bump = "bump",
         /// Many motions are contradicted: wheels slip.
         Slips = "slips",
         /// The bearings' noise is larger than told.
@@ -50,7 +57,7 @@ words! {
 pub struct Suspect {
     /// What is most likely wrong.
     pub cause: Cause,
-    /// The number that would suit; of `turns`, `outliers` and `slips` the share that is contradicted.
+    /// The number that would suit; of `turns`, `outliers` and `slips` the share that is contradicted, of `bump` the correlation.
     pub value: f64,
 }
 
@@ -61,13 +68,26 @@ impl fmt::Display for Suspect {
         match cause {
             Cause::Turns => write!(f, "{percent:.0} % of the turns contradicted: a wrong sign or unit"),
             Cause::Outliers => {
-                write!(f, "{percent:.0} % of the bearings are outliers: a bump of the camera, or wrong names of landmarks")
+                write!(
+                    f,
+                    "{percent:.0} % of the bearings are outliers: a bump of the camera, or wrong names of landmarks"
+                )
             }
-            Cause::Slips => write!(f, "{percent:.0} % of the motions contradicted: wheels slip, or odometry_k_m is too small"),
+            Cause::Bump => write!(
+                f,
+                "bearings are off to one side for long (correlation {value:.2}): a bump of the camera, or wrong names of landmarks"
+            ),
+            Cause::Slips => {
+                write!(f, "{percent:.0} % of the motions contradicted: wheels slip, or odometry_k_m is too small")
+            }
             Cause::BearingSigma => write!(f, "bearings scatter more than told: try bearing_sigma_rad = {value:.2e}"),
             Cause::OdometryK => write!(f, "wheels are noisier than told: try odometry_k_m = {value:.1e}"),
-            Cause::WheelBase => write!(f, "turns tell another wheel base: try wheel_base_m = {value:.4}, or estimate_odometry"),
-            Cause::Wheels => write!(f, "the right wheel runs {value:.4} times as far as the left: try estimate_odometry"),
+            Cause::WheelBase => {
+                write!(f, "turns tell another wheel base: try wheel_base_m = {value:.4}, or estimate_odometry")
+            }
+            Cause::Wheels => {
+                write!(f, "the right wheel runs {value:.4} times as far as the left: try estimate_odometry")
+            }
             Cause::TimeOffset => write!(
                 f,
                 "bearings seem to be {value:.2} steps later than the odometry (earlier if negative): try estimate_time_offset, with times"
@@ -77,6 +97,19 @@ impl fmt::Display for Suspect {
 }
 
 impl BundleProblem {
+    /// A bump, where the noise that the residuals told is none.
+    pub(crate) fn suspect_of_noise(&self) -> Option<Suspect> {
+        let mut before: Vec<f64> = vec![0.0; self.landmarks.len()];
+        let (mut products, mut squares) = (0.0, 0.0);
+        for (observation, r) in self.observations().zip(self.residuals()) {
+            let r = r.clamp(-OUTLIER_SIGMAS, OUTLIER_SIGMAS);
+            products += r * std::mem::replace(&mut before[observation.landmark], r);
+            squares += r * r;
+        }
+        let value = products / squares;
+        (value > NO_NOISE_CORRELATION).then_some(Suspect { cause: Cause::Bump, value })
+    }
+
     /// What is most likely wrong at this solution, whose mounting has that covariance.
     pub(crate) fn suspect(
         &self,
@@ -89,14 +122,12 @@ impl BundleProblem {
         if counts.most_turns() {
             return found(Cause::Turns, share(counts.contradicted_turns, counts.turns));
         }
-        if factors.bearings > 1.0 {
-            return found(Cause::BearingSigma, self.bearing_sigma * factors.bearings.sqrt());
-        }
-        let excess = factors.motions.max(1.0).sqrt();
-        let deviations = self.deviations(&(covariance * (excess * excess)));
-        let matters = deviations.iter().enumerate().filter_map(|(k, d)| d.map(|d| (k, d, d.value.abs() / d.sigma / excess)));
+        let excess = factors.motions.max(factors.bearings).max(1.0);
+        let deviations = self.deviations(&(covariance * excess));
+        let sigmas = |d: Deviation| d.value.abs() / d.sigma / excess.sqrt();
+        let matters = deviations.iter().enumerate().filter_map(|(k, d)| d.map(|d| (k, d, sigmas(d))));
         let worst = matters
-            .filter(|(_, d, sigmas)| *sigmas > DEVIATION_SIGMAS && d.shift > DEVIATION_SHIFT)
+            .filter(|(_, d, sigmas)| *sigmas > DEVIATION_SIGMAS && (excess > 1.0 || d.shift > DEVIATION_SHIFT))
             .max_by(|a, b| a.2.total_cmp(&b.2));
         if let Some((k, d, _)) = worst {
             return match k {
@@ -104,6 +135,9 @@ impl BundleProblem {
                 1 => found(Cause::WheelBase, self.wheels.base_m * d.value.exp()),
                 _ => found(Cause::TimeOffset, d.value),
             };
+        }
+        if factors.bearings > 1.0 {
+            return found(Cause::BearingSigma, self.bearing_sigma * factors.bearings.sqrt());
         }
         if factors.motions > 1.0 {
             return found(Cause::OdometryK, self.noise.k_m * factors.motions);

@@ -26,6 +26,11 @@ words! {
 }
 
 impl Misreading {
+    /// Whether bearings allow it: degrees only where some are beyond a turn in radians.
+    pub(super) fn possible(self, bearings: &[LogBearing]) -> bool {
+        self != Self::Degrees || bearings.iter().any(|b| b.bearing_rad.abs() > std::f64::consts::TAU)
+    }
+
     /// The log as it may have been meant; of the reflections that with bearings clockwise.
     pub(super) fn read(self, readings: &[WheelMotion], bearings: &[LogBearing]) -> (Vec<WheelMotion>, Vec<LogBearing>) {
         let (mut readings, mut bearings) = (readings.to_vec(), bearings.to_vec());

@@ -85,6 +85,9 @@ const OUTLIER_SHARE: f64 = 0.03;
 const MISREAD_SHARE: f64 = 0.3;
 const FITTING_SHARE: f64 = 0.2;
 
+/// Turns by some 0.1 rad that a reading must leave to be believed: signs and units are told by turns.
+const LEAST_TURNS: usize = 3;
+
 /// Where an attempt starts, and what is free until the loops are closed.
 #[derive(Clone, Copy)]
 enum Attempt {
@@ -121,7 +124,12 @@ pub fn calibrate_log(
     if misreading.is_none() && !problem.contradictions().most_turns() {
         descent = solve_with_noise(&mut problem, options.max_iterations).unwrap_or(descent);
     }
-    report(options, &problem, &descent, misreading)
+    report(options, &problem, &descent, misreading).map_err(|error| match misreading {
+        Some(misreading) => {
+            Error::argument("odometry", format!("a log that determines nothing; {misreading}"), "metres and radians")
+        }
+        None => error,
+    })
 }
 
 /// The best solution of several starts.
@@ -133,7 +141,9 @@ fn solved(log: &SortedLog<'_>) -> Result<Option<(BundleProblem, DescentReport)>>
             // The wheels were free in the first attempt and would be again.
             continue;
         }
-        if matches!(attempt, Attempt::Window) && best.as_ref().is_some_and(|(problem, _)| problem.contradictions().most_turns()) {
+        if matches!(attempt, Attempt::Window)
+            && best.as_ref().is_some_and(|(problem, _)| problem.contradictions().most_turns())
+        {
             // No start mends an odometry that turns otherwise, and the filter's is the dearest.
             continue;
         }
@@ -177,9 +187,12 @@ fn fitting_misreading(
         let log = SortedLog::new(options, &readings, times_s, &bearings).ok()?;
         let mut problem = started(&log, Attempt::FreeWheels).ok()?;
         let descent = solve(&mut problem, options.max_iterations);
-        (descent.cost.is_finite() && fits(&problem, FITTING_SHARE)).then_some(descent.cost)
+        // A reading that leaves nearly no motion fits anything.
+        let turns = problem.contradictions().turns >= LEAST_TURNS;
+        (descent.cost.is_finite() && turns && fits(&problem, FITTING_SHARE)).then_some(descent.cost)
     };
-    let fitting = Misreading::ALL.into_iter().filter_map(|misreading| Some((misreading, cost(&misreading)?)));
+    let possible = Misreading::ALL.into_iter().filter(|misreading| misreading.possible(bearings));
+    let fitting = possible.filter_map(|misreading| Some((misreading, cost(&misreading)?)));
     fitting.min_by(|a, b| a.1.total_cmp(&b.1)).map(|(misreading, _)| misreading)
 }
 
@@ -266,6 +279,8 @@ fn report(
     let mounting = widening * mounting * widening.transpose();
     let counts = problem.contradictions();
     let suspect = problem.suspect(&counts, problem.noise_factors(), &mounting);
+    let noisier = problem.bearing_sigma > o.bearing_sigma_rad;
+    let suspect = suspect.or_else(|| problem.suspect_of_noise().filter(|_| noisier));
     let sigma = |at: usize| covariance[(at, at)].sqrt();
     let (wheels, offset) = (options.estimate_odometry, options.estimate_time_offset);
     Ok(LogCalibration {

@@ -2,7 +2,7 @@
 
 use super::state::{MOUNTING, SlidingWindow};
 use super::tuning::{COST_TOLERANCE, EXAMINATION_GROWTH, EXAMINATION_STEPS, ITERATIONS};
-use crate::selfcalib::diagnosis::{Contradictions, Suspect};
+use crate::selfcalib::diagnosis::{Cause, Contradictions, Suspect};
 
 /// What an examination found, and when the next is due.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -16,10 +16,12 @@ pub(crate) struct Examination {
 }
 
 impl Examination {
-    /// Whether most of the odometry is contradicted, so that solving the window at every contradiction does not help.
+    /// Whether most of the odometry is contradicted, or bearings scatter more than told, so that solving the window at every
+    /// contradiction does not help.
     pub(super) fn hopeless(&self) -> bool {
         let Contradictions { motions, contradicted_motions, .. } = self.contradictions;
-        self.contradictions.most_turns() || 2 * contradicted_motions > motions
+        let noisy = self.suspect.is_some_and(|suspect| suspect.cause == Cause::BearingSigma);
+        noisy || self.contradictions.most_turns() || 2 * contradicted_motions > motions
     }
 }
 
