@@ -7,6 +7,9 @@ use crate::words;
 
 use super::log::LogBearing;
 
+/// Displacements and bearings.
+type Log = (Vec<WheelMotion>, Vec<LogBearing>);
+
 words! {
     /// How a log may have been meant, that fits where the log as it is does not.
     pub enum Misreading {
@@ -31,8 +34,19 @@ impl Misreading {
         self != Self::Degrees || bearings.iter().any(|b| b.bearing_rad.abs() > std::f64::consts::TAU)
     }
 
+    /// The logs that may have been meant. Of the reflections swapped wheels fit where clockwise bearings do, while wheels that are both
+    /// negated turn the camera by half a turn, which may be far from the start.
+    pub(super) fn logs(self, readings: &[WheelMotion], bearings: &[LogBearing]) -> Vec<Log> {
+        let mut logs = vec![self.read(readings, bearings)];
+        if self == Self::Reflected {
+            let negated = |motion: &WheelMotion| WheelMotion { left_m: -motion.left_m, right_m: -motion.right_m };
+            logs.push((readings.iter().map(negated).collect(), bearings.to_vec()));
+        }
+        logs
+    }
+
     /// The log as it may have been meant; of the reflections that with bearings clockwise.
-    pub(super) fn read(self, readings: &[WheelMotion], bearings: &[LogBearing]) -> (Vec<WheelMotion>, Vec<LogBearing>) {
+    fn read(self, readings: &[WheelMotion], bearings: &[LogBearing]) -> Log {
         let (mut readings, mut bearings) = (readings.to_vec(), bearings.to_vec());
         let mut wheels = |left: f64, right: f64| {
             for motion in &mut readings {

@@ -182,8 +182,7 @@ fn fitting_misreading(
     times_s: Option<&[f64]>,
     bearings: &[LogBearing],
 ) -> Option<Misreading> {
-    let cost = |misreading: &Misreading| {
-        let (readings, bearings) = misreading.read(readings, bearings);
+    let cost = |(readings, bearings): (Vec<WheelMotion>, Vec<LogBearing>)| {
         let log = SortedLog::new(options, &readings, times_s, &bearings).ok()?;
         let mut problem = started(&log, Attempt::FreeWheels).ok()?;
         let descent = solve(&mut problem, options.max_iterations);
@@ -192,7 +191,9 @@ fn fitting_misreading(
         (descent.cost.is_finite() && turns && fits(&problem, FITTING_SHARE)).then_some(descent.cost)
     };
     let possible = Misreading::ALL.into_iter().filter(|misreading| misreading.possible(bearings));
-    let fitting = possible.filter_map(|misreading| Some((misreading, cost(&misreading)?)));
+    let fitting = possible.filter_map(|misreading| {
+        Some((misreading, misreading.logs(readings, bearings).into_iter().filter_map(cost).min_by(f64::total_cmp)?))
+    });
     fitting.min_by(|a, b| a.1.total_cmp(&b.1)).map(|(misreading, _)| misreading)
 }
 
