@@ -61,7 +61,7 @@ class _Log:
 class _Case:
     harm: Callable[[_Log], None] = lambda _: None
     kinds: tuple[str, ...] = ("paper", "alternating")
-    noise: dict[str, float] = field(default_factory=dict)
+    noise: dict[str, Any] = field(default_factory=dict)
     told: dict[str, float] = field(default_factory=dict)
 
 
