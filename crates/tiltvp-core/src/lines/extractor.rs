@@ -230,5 +230,10 @@ impl LineExtractor {
 
 /// Short pieces, wherever one begins: lines join them by what is known of the vertical.
 fn segment_options(options: &GreatCircleOptions) -> SegmentOptions {
-    SegmentOptions { gradient_start: 0.0, support_min_px: options.run_min_px, gap_max: 0.0, ..SegmentOptions::default() }
+    SegmentOptions {
+        gradient_start: 0.0,
+        support_min_px: options.run_min_px,
+        gap_max: 0.0,
+        ..SegmentOptions::default()
+    }
 }

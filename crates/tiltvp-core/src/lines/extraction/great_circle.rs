@@ -28,10 +28,6 @@ struct Arc {
     taken: bool,
 }
 
-/// Lines closer than this, in pixels, whose polarities differ are one line that changes polarity: two edges so close
-/// blend.
-const ONE_LINE_PX: f64 = 0.8;
-
 /// Greatest root mean square distance in pixels of a straight edge from a line that it is a piece of.
 const JOIN_PX: f64 = 0.7;
 
@@ -68,16 +64,8 @@ pub(crate) fn find(
     by_azimuth.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
     fits.clear();
     for first in 0..arcs.len() {
-        if let Some(fit) = grow(arcs, by_azimuth, first, options, members) {
-            // Either half of a line of both polarities may be short.
-            if 2 * fit.support() >= options.support_min_px && 2.0 * fit.length >= options.length_min_rad {
-                fits.push(fit);
-            }
-        }
+        fits.extend(grow(arcs, by_azimuth, first, options, members).filter(|fit| fit.is_one_line(options)));
     }
-    by_length(fits);
-    join(fits);
-    fits.retain(|fit| fit.is_one_line(options));
     keep_apart(fits, options.separation_px);
     if let Some(most) = options.lines_max {
         fits.truncate(most);
@@ -87,10 +75,10 @@ pub(crate) fn find(
     out.lines.extend(fits.iter().map(|fit| Line {
         bearing_rad: fit.azimuth,
         sigma_rad: fit.sigma,
-        support_px: fit.support(),
+        support_px: fit.support,
         elevation_min_rad: fit.ends.0,
         elevation_max_rad: fit.ends.1,
-        polarity: (f64::from(fit.rising) - f64::from(fit.falling)) / f64::from(fit.support()),
+        polarity: if fit.rising { 1.0 } else { -1.0 },
     }));
     out.lines.sort_unstable_by(|a, b| a.bearing_rad.total_cmp(&b.bearing_rad));
 }
@@ -178,7 +166,7 @@ fn grow(
             break;
         }
     }
-    *(if rising { &mut fit.rising } else { &mut fit.falling }) = line.support;
+    fit.rising = rising;
     members.sort_unstable_by(|a, b| arcs[*a as usize].ends.0.total_cmp(&arcs[*b as usize].ends.0).then(a.cmp(b)));
     let (lowest, mut highest) = arcs[members[0] as usize].ends;
     fit.length = highest - lowest;
@@ -194,40 +182,14 @@ fn grow(
     Some(fit)
 }
 
-/// Joins lines of opposite polarity at the same azimuth.
-fn join(fits: &mut Vec<LineFit>) {
-    let mut first = 0;
-    while first < fits.len() {
-        let a = fits[first];
-        let partner = (first + 1..fits.len()).find(|second| {
-            let b = fits[*second];
-            let opposite = (a.rising == 0) != (b.rising == 0);
-            opposite && wrap(a.azimuth - b.azimuth).abs() < ONE_LINE_PX * 0.5 * (a.per_px + b.per_px)
-        });
-        match partner {
-            Some(second) => {
-                fits[first] = a.joined(&fits[second]);
-                fits.remove(second);
-            }
-            None => first += 1,
-        }
-    }
-}
-
-/// Sorts by length, the longest first.
-fn by_length(fits: &mut [LineFit]) {
-    fits.sort_unstable_by(|a, b| b.length.total_cmp(&a.length).then(a.azimuth.total_cmp(&b.azimuth)));
-}
-
-/// Drops lines beside a longer one of the same polarity, and leaves the longest first.
+/// Sorts by length, the longest first, and drops lines beside a longer one: two edges so close blend, whatever their polarity.
 fn keep_apart(fits: &mut Vec<LineFit>, separation_px: f64) {
-    by_length(fits);
+    fits.sort_unstable_by(|a, b| b.length.total_cmp(&a.length).then(a.azimuth.total_cmp(&b.azimuth)));
     let mut kept = 0;
     for i in 0..fits.len() {
-        let (fit, mostly) = (fits[i], |fit: &LineFit| fit.rising > fit.falling);
+        let fit = fits[i];
         let beside = |other: &LineFit| {
-            let apart = 0.5 * separation_px * (fit.per_px + other.per_px);
-            mostly(other) == mostly(&fit) && wrap(other.azimuth - fit.azimuth).abs() < apart
+            wrap(other.azimuth - fit.azimuth).abs() < 0.5 * separation_px * (fit.per_px + other.per_px)
         };
         if !fits[..kept].iter().any(beside) {
             fits[kept] = fit;

@@ -1,6 +1,6 @@
 //! The azimuth of one line from the moments of its points.
 
-use nalgebra::{Matrix2, Matrix3, Vector2, Vector3};
+use nalgebra::{Matrix2, Matrix3, Matrix3x2, Vector2, Vector3};
 
 use crate::lines::angles::wrap;
 use crate::lines::options::GreatCircleOptions;
@@ -61,9 +61,10 @@ pub(super) struct LineFit {
     pub(super) sigma: f64,
     /// Standard deviation of the pixels about the line, pixels.
     scatter_px: f64,
-    /// How many pixels are brighter towards greater azimuth, and how many towards the other side.
-    pub(super) rising: u32,
-    pub(super) falling: u32,
+    /// How many pixels are on it.
+    pub(super) support: u32,
+    /// Whether it is brighter towards greater azimuth.
+    pub(super) rising: bool,
     /// Lowest and highest elevation, radians.
     pub(super) ends: (f64, f64),
     /// Elevation that its pieces cover, radians.
@@ -77,12 +78,15 @@ impl LineFit {
     /// the points determine none.
     pub(super) fn of(points: &Moments, near: f64, options: &GreatCircleOptions) -> Option<Self> {
         let n = f64::from(points.support);
-        let mut fit = Self { azimuth: near, per_px: points.wide / n, ..Self::default() };
+        let mut fit = Self { azimuth: near, support: points.support, per_px: points.wide / n, ..Self::default() };
         let prior = Matrix2::new(0.0, 0.0, 0.0, options.tilt_sigma_rad.powi(-2));
         let information = |fit: &Self, together: f64| {
             let ways = fit.ways();
             let known = 1.0 / (fit.scatter_px.powi(2) * together.min(n));
-            (ways.transpose() * points.squares * ways * known + prior, ways.transpose() * points.squares * fit.normal() * known)
+            (
+                ways.transpose() * points.squares * ways * known + prior,
+                ways.transpose() * points.squares * fit.normal() * known,
+            )
         };
         fit.scatter_px = points.rms_px(&fit.normal()).max(PIXEL_SIGMA_MIN_PX);
         for _ in 0..STEPS {
@@ -104,40 +108,16 @@ impl LineFit {
     }
 
     /// Minus the changes of the normal with the azimuth and with the slant.
-    fn ways(&self) -> nalgebra::Matrix3x2<f64> {
+    fn ways(&self) -> Matrix3x2<f64> {
         let (sin, cos) = self.azimuth.sin_cos();
-        nalgebra::Matrix3x2::new(cos, 0.0, sin, 0.0, 0.0, 1.0)
-    }
-
-    /// How many pixels are on it.
-    pub(super) fn support(&self) -> u32 {
-        self.rising + self.falling
+        Matrix3x2::new(cos, 0.0, sin, 0.0, 0.0, 1.0)
     }
 
     /// Whether it is long enough, and one edge rather than two that blend or several short ones that happen to be in line.
     pub(super) fn is_one_line(&self, options: &GreatCircleOptions) -> bool {
-        self.support() >= options.support_min_px
+        self.support >= options.support_min_px
             && self.length >= options.length_min_rad
             && self.length >= options.covered_min * (self.ends.1 - self.ends.0)
             && self.scatter_px <= options.scatter_max_px
-    }
-
-    /// This and another fit of one line that is brighter on one side here and on the other there, as one.
-    pub(super) fn joined(&self, other: &Self) -> Self {
-        let (a, b) = (self, other);
-        let (wa, wb) = (a.sigma.powi(-2), b.sigma.powi(-2));
-        let (na, nb) = (f64::from(a.support()), f64::from(b.support()));
-        let ends = (a.ends.0.min(b.ends.0), a.ends.1.max(b.ends.1));
-        Self {
-            azimuth: wrap(a.azimuth + wb / (wa + wb) * wrap(b.azimuth - a.azimuth)),
-            slant: a.slant,
-            sigma: (wa + wb).powf(-0.5),
-            scatter_px: ((na * a.scatter_px.powi(2) + nb * b.scatter_px.powi(2)) / (na + nb)).sqrt(),
-            rising: a.rising + b.rising,
-            falling: a.falling + b.falling,
-            ends,
-            length: (a.length + b.length).min(ends.1 - ends.0),
-            per_px: 0.5 * (a.per_px + b.per_px),
-        }
     }
 }
