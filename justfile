@@ -17,7 +17,7 @@ setup:
 
 # Sets up; renders rooms at known leans, estimates them with every method, prints a table, writes pictures.
 demo *arguments: setup
-    {{bin}}/tiltvp demo {{arguments}}
+    {{bin}}/tiltvp demo --overwrite {{arguments}}
 
 # Lints, the unit tests of the crates and the fast Python tests: for every round of change. It builds by the profile `quick`.
 quick: quick-extension check
@@ -109,6 +109,10 @@ stub: setup
     {{bin}}/ruff check --fix --quiet --select I python/tiltvp/_core.pyi
     {{bin}}/ruff format --quiet python/tiltvp/_core.pyi python/tiltvp/lenses.pyi
 
+# Hostile files, damaged files and states, full disks, kills: what SECURITY.md promises, in about five minutes of the processor.
+survive *arguments: setup
+    {{bin}}/pytest --quiet --numprocesses 2 --dist worksteal tests/survive {{arguments}}
+
 # The tests on real data, in the folder that TILTVP_DATA names.
 test-real *arguments: setup
     {{bin}}/pytest --quiet tests/real_data {{arguments}}
@@ -134,8 +138,8 @@ measure-database *arguments: setup
         {{bin}}/tiltvp evaluate out/database/$name --sweep table3 --out out/database/runs/$name {{arguments}}; \
     done
     {{bin}}/tiltvp measure confidence out/database/runs/panoramas out/database/runs/rooms out/database/runs/panoramas-degraded out/database/runs/rooms-degraded
-    {{bin}}/tiltvp measure scaling --out out/database/runs/panoramas/scaling.parquet
-    {{bin}}/tiltvp report out/database/runs/panoramas --out out/database/report
+    {{bin}}/tiltvp measure scaling --overwrite --out out/database/runs/panoramas/scaling.parquet
+    {{bin}}/tiltvp report out/database/runs/panoramas --overwrite --out out/database/report
 
 # What an evaluation costs over the number of images and over their pixels.
 measure-scaling *arguments: setup
@@ -168,7 +172,7 @@ drives: setup
 
 # The descriptor of vertical lines: figures 9 to 18 and 22 of Scaramuzza, Siegwart and Martinelli 2009, tables beside them, in out/descriptors.
 measure-descriptors *arguments: drives
-    {{bin}}/tiltvp measure descriptors out/drives/corridor out/drives/hall --out out/descriptors {{arguments}}
+    {{bin}}/tiltvp measure descriptors out/drives/corridor out/drives/hall --overwrite --out out/descriptors {{arguments}}
 
 # cv2 is that of opencv-contrib-python-headless, of the version that is installed without contrib, in a folder of its own.
 # Our vertical lines against OpenCV's LSD and LBD on the same frames: times as ratios, and how well pairs are matched.
@@ -179,7 +183,7 @@ measure-line-peers *arguments: drives
 
 # Our straight edges against OpenCV's LSD on rendered rooms whose edges are known, and the picture of both, in out/segments.
 measure-segments *arguments: setup
-    {{bin}}/python benches/peers/segments.py --picture out/segments/beside-lsd.png {{arguments}}
+    {{bin}}/python benches/peers/segments.py --picture out/segments/beside-lsd.jpg {{arguments}}
 
 # cv2 is that with contrib, as above; lu-vp-detect wants it too.
 # The vertical of an image by us, by the paper's methods on OpenCV and NumPy, by LSD and FLD, and by lu-vp-detect.
@@ -190,11 +194,11 @@ measure-vertical-peers *arguments: setup
 
 # Corners of a real cabinet and a real box: attitude against motion capture, sizes, smoothness.
 measure-corners-real folder *arguments: setup
-    {{bin}}/tiltvp measure corners-real {{folder}} --overlay out/corners-real {{arguments}}
+    {{bin}}/tiltvp measure corners-real {{folder}} --overwrite --overlay out/corners-real {{arguments}}
 
 # Poses of corners: the closed form on random poses, and rendered sequences of a hand-held stereo pair, with plots.
 measure-corners *arguments: setup
-    {{bin}}/tiltvp measure corners --out out/corners {{arguments}}
+    {{bin}}/tiltvp measure corners --overwrite --out out/corners {{arguments}}
 
 # Round trips and Jacobians of the calibrations of TILTVP_DATA, as a table.
 measure-cameras: setup

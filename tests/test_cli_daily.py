@@ -122,7 +122,7 @@ def test_corner_in_a_mask(run: Run, world: Path, level: int, found: str) -> None
     mask = np.full((CAMERA.height, CAMERA.width), 255, dtype=np.uint8)
     mask[CAMERA.height // 8 :] = level
     tiltvp.write_image(world / "mask.png", mask)
-    words = ("--calibration", "rig.toml", "--mask", "mask.png", "--out", "masked.csv")
+    words = ("--calibration", "rig.toml", "--mask", "mask.png", "--out", "masked.csv", "--overwrite")
     done = run("corner", "grey-left", "grey-right", "--method", "general", *words)
     assert (done.returncode, done.stderr) == (0, "")
     assert [row["found"] for row in rows_of(world / "masked.csv")] == [found]

@@ -74,7 +74,15 @@ def test_lines_of_images(run: Run, folder: Path, tmp_path: Path) -> None:
 
 
 def test_options_reach_the_method(run: Run, folder: Path, tmp_path: Path) -> None:
-    words = ("lines", folder / "frames" / "0.png", "--camera", folder / "camera.toml", "--out", tmp_path / "l.csv")
+    words = (
+        "lines",
+        folder / "frames" / "0.png",
+        "--camera",
+        folder / "camera.toml",
+        "--out",
+        tmp_path / "l.csv",
+        "--overwrite",
+    )
     assert run(*words, "--lines-max", "3")[0] == 0
     assert pl.read_csv(tmp_path / "l.csv").height == 3
     assert run(*words, "--method", "radial", "--length-min", "0.3")[0] == 0

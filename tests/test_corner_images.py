@@ -285,5 +285,5 @@ def test_the_command_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) ->
     assert len(path.read_text().splitlines()) == 2
     assert tiltvp.read_image(tmp_path / "over" / "a.png").shape == (360, 480, 3)
     assert (tmp_path / "plot.png").exists()
-    assert main(["corner", left, "--calibration", str(tmp_path / "one.toml"), "--out", str(out)]) == 0
+    assert main(["corner", left, "--calibration", str(tmp_path / "one.toml"), "--out", str(out), "--overwrite"]) == 0
     assert main(["corner", left, right, "--calibration", str(tmp_path / "one.toml")]) == 2

@@ -183,5 +183,5 @@ def test_the_command(folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture
     for name in ("similarity", "settings", "rules", "tracks"):
         assert read_image(out / f"{name}.png").shape[2] == 3
         assert pl.read_parquet(out / f"{name if name != 'rules' else 'matches'}.parquet").height > 0
-    assert main(["measure", "descriptors", str(folder), "--out", str(out), "--frame", "6"]) == 2
+    assert main(["measure", "descriptors", str(folder), "--overwrite", "--out", str(out), "--frame", "6"]) == 2
     assert "--frame 6" in capsys.readouterr().err

@@ -187,7 +187,7 @@ def test_half_a_run_is_continued(
 
     with pytest.raises(Stop), open_experiment(dataset, choose("table3"), tmp_path / "run", sweep="table3") as first:
         first.estimate(advance=stop)
-    (tmp_path / "run" / "parts" / ".000004.parquet.00.part").write_bytes(b"half")
+    (tmp_path / "run" / "parts" / ".000004.00.part.parquet").write_bytes(b"half")
     with pytest.raises(RunError, match="4 of 15 images are done"):
         read_run(tmp_path / "run")
     assert same_bytes(evaluated(dataset, tmp_path / "run").table, whole.table)

@@ -11,7 +11,7 @@ import pytest
 
 import tiltvp
 from tiltvp.cli.inputs import distinct_names, find_images
-from tiltvp.errors import ImageFileError, InvalidInputError
+from tiltvp.errors import ImageFileError, InvalidInputError, OutputError
 from tiltvp.images import gray_from, read_image
 
 LEVELS = np.arange(256, dtype=np.uint8).reshape(16, 16)
@@ -114,8 +114,9 @@ def test_unreadable_files_are_named(tmp_path: Path) -> None:
 
 def test_unwritable_files_are_named(tmp_path: Path) -> None:
     (tmp_path / "file").touch()
-    for path in (tmp_path / "image.unknown", tmp_path / "file" / "image.png"):
-        with pytest.raises(ImageFileError) as refusal:
+    cases = ((tmp_path / "image.unknown", ImageFileError), (tmp_path / "file" / "image.png", OutputError))
+    for path, kind in cases:
+        with pytest.raises(kind) as refusal:
             tiltvp.write_image(path, LEVELS)
         assert str(path) in str(refusal.value)
     assert [file.name for file in tmp_path.iterdir()] == ["file"]

@@ -21,8 +21,12 @@ __all__ = [
     "CALIBRATION_METHODS",
     "CAMERA_MODELS",
     "CORNER_METHODS",
+    "LARGEST_SIDE_PX",
     "LINE_METHODS",
     "METHODS",
+    "MOST_COEFFICIENTS",
+    "MOST_LANDMARKS",
+    "MOST_PIXELS",
     "ROOM_KINDS",
     "WALL_PATTERNS",
     "AffineCorrection",
@@ -100,8 +104,12 @@ __all__ = [
 CALIBRATION_METHODS: Final[list[str]]
 CAMERA_MODELS: Final[list[str]]
 CORNER_METHODS: Final[list[str]]
+LARGEST_SIDE_PX: Final[int]
 LINE_METHODS: Final[list[str]]
 METHODS: Final[list[str]]
+MOST_COEFFICIENTS: Final[int]
+MOST_LANDMARKS: Final[int]
+MOST_PIXELS: Final[int]
 ROOM_KINDS: Final[list[str]]
 WALL_PATTERNS: Final[list[str]]
 

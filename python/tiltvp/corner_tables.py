@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
 from tiltvp.errors import InvalidInputError
+from tiltvp.files import write_whole
 from tiltvp.rotations import quaternion
 
 if TYPE_CHECKING:
@@ -68,7 +68,7 @@ def pose_rows(estimates: Sequence[tuple[float, str, CornerEstimate]]) -> list[di
 def write_trajectory(rows: Sequence[Mapping[str, Any]], path: str | os.PathLike[str]) -> None:
     """The poses of `pose_rows` in TUM's format: time x y z qx qy qz qw, a line for each; whole or not at all.
 
-    Raises `InvalidInputError` where no row has a position, and where the file cannot be written.
+    Raises `InvalidInputError` where no row has a position, `OutputError` where the file cannot be written.
     """
     poses = [[row[name] for name in ("time_s", *_POSITION, *_QUATERNION)] for row in rows]
     placed = [pose for pose in poses if None not in pose]
@@ -76,14 +76,7 @@ def write_trajectory(rows: Sequence[Mapping[str, Any]], path: str | os.PathLike[
         raise InvalidInputError(f"{path}: no pose has a position, expected the images of two cameras")
     lines = ["# time_s x_m y_m z_m qx qy qz qw of object_from_camera"]
     lines += [" ".join(f"{value:.9f}" for value in pose) for pose in placed]
-    file = Path(path)
-    part = file.with_name(f".{file.name}.part")
-    try:
-        file.parent.mkdir(parents=True, exist_ok=True)
-        part.write_text("\n".join(lines) + "\n", encoding="utf-8")
-        part.replace(file)
-    except OSError as error:
-        raise InvalidInputError(f"{file}: cannot be written ({error.strerror or error})") from error
+    write_whole(path, "\n".join(lines) + "\n")
 
 
 def roll_pitch_yaw(object_from_camera: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-import csv
 import math
 import os
+from array import array
 from dataclasses import dataclass
-from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from tiltvp.csv_files import CsvFile
 from tiltvp.errors import InvalidInputError
 
 if TYPE_CHECKING:
@@ -20,6 +20,8 @@ __all__ = ["DriveLog", "read_drive_log"]
 
 _ODOMETRY = ("step", "time_s", "delta_left_m", "delta_right_m")
 _BEARINGS = ("step", "landmark", "bearing_rad")
+LARGEST_WHOLE: Final = 2**53 - 1
+"""Of steps and landmarks: from the next on, two of them would be the same float."""
 
 
 @dataclass(frozen=True)
@@ -41,73 +43,69 @@ def read_drive_log(odometry: str | os.PathLike[str], bearings: str | os.PathLike
     `landmark`, `bearing_rad`, taken at the end of that step's motion, in the sensor's frame, counter-clockwise. Steps
     and landmarks are whole numbers, steps of the odometry grow. Raises `InvalidInputError` that names file and line.
     """
-    steps, rows = _table(odometry, _ODOMETRY, optional="time_s")
+    table, columns = _table(odometry, _ODOMETRY, optional="time_s")
     order: dict[int, int] = {}
-    for i, (where, row) in enumerate(rows):
-        step = _whole(where, "step", row["step"])
-        if order and step <= max(order):
-            raise InvalidInputError(f"{where}: step {step} after {max(order)}, expected growing steps")
-        order[step] = i
-    numbers = [[_number(where, row, c) for c in ("delta_left_m", "delta_right_m")] for where, row in rows]
-    times = [_number(where, row, "time_s") for where, row in rows] if "time_s" in steps else None
-    _, seen = _table(bearings, _BEARINGS)
-    found = []
-    for where, row in seen:
-        step = _whole(where, "step", row["step"])
+    last, wheels, times = None, array("d"), array("d")
+    for line, cells in table.rows():
+        step = _whole(table, line, "step", cells[columns["step"]])
+        if last is not None and step <= last:
+            raise InvalidInputError(f"{table.where(line)}: step {step} after {last}, expected growing steps")
+        order[step], last = len(order), step
+        wheels.extend(_number(table, line, name, cells[columns[name]]) for name in ("delta_left_m", "delta_right_m"))
+        if "time_s" in columns:
+            times.append(_number(table, line, "time_s", cells[columns["time_s"]]))
+    _refuse_nothing(table, len(order), _ODOMETRY)
+    seen_from, columns = _table(bearings, _BEARINGS)
+    found = array("d")
+    for line, cells in seen_from.rows():
+        step = _whole(seen_from, line, "step", cells[columns["step"]])
         if step not in order:
-            raise InvalidInputError(f"{where}: step {step} is not one of {os.fspath(odometry)}")
-        landmark = _whole(where, "landmark", row["landmark"])
-        found.append([order[step], landmark, _number(where, row, "bearing_rad")])
+            raise InvalidInputError(f"{seen_from.where(line)}: step {step} is not one of {os.fspath(odometry)}")
+        landmark = _whole(seen_from, line, "landmark", cells[columns["landmark"]])
+        bearing = _number(seen_from, line, "bearing_rad", cells[columns["bearing_rad"]])
+        found.extend((order[step], landmark, bearing))
+    _refuse_nothing(seen_from, len(found), _BEARINGS)
     return DriveLog(
-        np.array(numbers, dtype=np.float64).reshape(-1, 2),
+        np.array(wheels, dtype=np.float64).reshape(-1, 2),
         np.array(found, dtype=np.float64).reshape(-1, 3),
-        None if times is None else np.array(times, dtype=np.float64),
+        np.array(times, dtype=np.float64) if times else None,
     )
 
 
-def _table(
-    path: str | os.PathLike[str], columns: tuple[str, ...], optional: str = ""
-) -> tuple[list[str], list[tuple[str, dict[str, str]]]]:
-    """The header, and each row with the words that say where it is."""
-    name = os.fspath(path)
-    try:
-        text = Path(path).read_text(encoding="utf-8-sig")
-    except OSError as error:
-        raise InvalidInputError(f"{name}: cannot be read ({error.strerror or error}), expected a CSV file") from error
-    except UnicodeDecodeError as error:
-        raise InvalidInputError(f"{name}: not UTF-8, expected a CSV file") from error
-    lines = csv.reader(text.splitlines())
-    header = [cell.strip() for cell in next(lines, [])]
-    expected = ", ".join(columns)
-    for column in columns:
-        if header.count(column) != 1 and not (column == optional and column not in header):
-            raise InvalidInputError(
-                f"{name}, line 1: column {column!r} {header.count(column)} times, expected {expected}"
-            )
-    rows = []
-    for cells in lines:
-        if not any(cell.strip() for cell in cells):
-            continue
-        if len(cells) != len(header):
-            raise InvalidInputError(f"{name}, line {lines.line_num}: {len(cells)} cells, expected {len(header)}")
-        rows.append((f"{name}, line {lines.line_num}", dict(zip(header, (c.strip() for c in cells), strict=True))))
+def _table(path: str | os.PathLike[str], names: tuple[str, ...], optional: str = "") -> tuple[CsvFile, dict[str, int]]:
+    """The file, and the places of its columns."""
+    table = CsvFile(path, "a CSV file")
+    expected = ", ".join(names)
+    for name in names:
+        count = table.header.count(name)
+        if count != 1 and not (name == optional and count == 0):
+            raise InvalidInputError(f"{table.where(1)}: column {name!r} {count} times, expected {expected}")
+    return table, {name: table.header.index(name) for name in names if name in table.header}
+
+
+def _refuse_nothing(table: CsvFile, rows: int, names: tuple[str, ...]) -> None:
     if not rows:
-        raise InvalidInputError(f"{name}: no rows, expected {expected}")
-    return header, rows
+        raise InvalidInputError(f"{table.name}: no rows, expected {', '.join(names)}")
 
 
-def _number(where: str, row: dict[str, str], column: str) -> float:
+def _number(table: CsvFile, line: int, column: str, word: str) -> float:
     try:
-        value = float(row[column])
+        value = float(word)
     except ValueError:
         value = math.nan
     if not math.isfinite(value):
-        raise InvalidInputError(f"{where}: {column} = {row[column]!r}, expected a finite number")
+        raise InvalidInputError(f"{table.where(line)}: {column} = {word!r}, expected a finite number")
     return value
 
 
-def _whole(where: str, column: str, word: str) -> int:
+def _whole(table: CsvFile, line: int, column: str, word: str) -> int:
     try:
-        return int(word)
+        # The longest within the limit has 16 digits and a sign.
+        value = int(word) if len(word) < 20 else None
     except ValueError:
-        raise InvalidInputError(f"{where}: {column} = {word!r}, expected a whole number") from None
+        value = None
+    if value is None or abs(value) > LARGEST_WHOLE:
+        raise InvalidInputError(
+            f"{table.where(line)}: {column} = {word!r}, expected a whole number of at most {LARGEST_WHOLE}"
+        )
+    return value

@@ -1,8 +1,25 @@
 """The exceptions of the package: everything it raises on purpose derives from `TiltvpError`."""
 
+from typing import Final
+
+LONGEST_MESSAGE: Final = 2_000
+"""Characters of a message: what was given may be in it, and a file may give megabytes. A path may have 4,096 bytes, of
+which the beginning and the end tell most."""
+
 
 class TiltvpError(Exception):
-    """Base of every error the package raises on purpose."""
+    """Base of every error the package raises on purpose. Of longer messages the middle is left out."""
+
+    def __init__(self, *arguments: object) -> None:
+        super().__init__(*(_shortened(one) if isinstance(one, str) else one for one in arguments))
+
+
+def _shortened(text: str) -> str:
+    if len(text) <= LONGEST_MESSAGE:
+        return text
+    end = LONGEST_MESSAGE // 4
+    begin = LONGEST_MESSAGE - end - 40
+    return f"{text[:begin]} ... ({len(text) - begin - end} characters) ... {text[-end:]}"
 
 
 class InvalidInputError(TiltvpError, ValueError):
@@ -23,6 +40,10 @@ class CalibrationNotFoundError(CalibrationError, FileNotFoundError):
 
 class ImageFileError(TiltvpError, OSError):
     """An image file cannot be read or written."""
+
+
+class OutputError(TiltvpError, OSError):
+    """A file or folder cannot be written: a full disk, no permission, something else in its place."""
 
 
 class RunError(TiltvpError, RuntimeError):

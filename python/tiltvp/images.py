@@ -3,19 +3,23 @@
 from __future__ import annotations
 
 import os
-from contextlib import suppress
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
+from tiltvp import _core
 from tiltvp.errors import ImageFileError, InvalidInputError
+from tiltvp.files import read_bytes, write_whole
+from tiltvp.image_headers import header_size
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
 __all__ = ["bgr_from", "gray_from", "read_image", "write_image"]
 
+LARGEST_IMAGE_BYTES: Final = 1 << 30
+"""Of an image file: as many pixels as a camera may have, in three uncompressed colours, and a half more."""
 _EXPECTED = "(H, W) or (H, W, 3 or 4 in BGR order) of uint8, uint16, or float in [0, 1]"
 _DEPTHS = (10, 12, 14, 16)
 """Bits that sensors have where files and arrays have 16."""
@@ -94,23 +98,25 @@ def read_image(path: str | os.PathLike[str]) -> NDArray[np.uint8]:
     """
     file = Path(path)
     try:
-        data = np.frombuffer(file.read_bytes(), dtype=np.uint8)
+        data = read_bytes(file, LARGEST_IMAGE_BYTES)
     except OSError as error:
         raise ImageFileError(f"{file}: {error.strerror or error}") from error
-    image = _decode(data)
+    size = header_size(data)
+    if size is not None and size[0] * size[1] > _core.MOST_PIXELS:
+        raise ImageFileError(f"{file}: {size[0]} x {size[1]} pixels, expected at most {_core.MOST_PIXELS} in all")
+    image = None if size is None else _decode(data)
     if image is None:
-        raise ImageFileError(f"{file}: not an image that can be decoded ({data.size} bytes)")
+        raise ImageFileError(f"{file}: not an image that can be decoded ({len(data)} bytes)")
     return image
 
 
-def _decode(data: NDArray[np.uint8]) -> NDArray[np.uint8] | None:
+def _decode(data: bytes) -> NDArray[np.uint8] | None:
     import cv2
 
-    if data.size == 0:
-        return None
     try:
-        image = cv2.imdecode(data, cv2.IMREAD_ANYCOLOR | cv2.IMREAD_ANYDEPTH | cv2.IMREAD_IGNORE_ORIENTATION)
-    except cv2.error:
+        depths = cv2.IMREAD_ANYCOLOR | cv2.IMREAD_ANYDEPTH | cv2.IMREAD_IGNORE_ORIENTATION
+        image = cv2.imdecode(np.frombuffer(data, dtype=np.uint8), depths)
+    except (cv2.error, MemoryError):
         return None
     if image is None or image.dtype not in (np.uint8, np.uint16):
         return None
@@ -118,7 +124,10 @@ def _decode(data: NDArray[np.uint8]) -> NDArray[np.uint8] | None:
 
 
 def write_image(path: str | os.PathLike[str], image: NDArray[np.uint8]) -> None:
-    """Writes an image file whole or not at all; the ending says the format. Raises `ImageFileError` with the path."""
+    """Writes an image file whole or not at all; the ending says the format.
+
+    Raises `ImageFileError` for an image that the format cannot hold, `OutputError` where it cannot be written.
+    """
     import cv2
 
     file = Path(path)
@@ -130,12 +139,4 @@ def write_image(path: str | os.PathLike[str], image: NDArray[np.uint8]) -> None:
         ) from error
     if not done:
         raise ImageFileError(f"{file}: cannot be encoded as {file.suffix!r}")
-    part = file.with_name(f".{file.name}.part")
-    try:
-        file.parent.mkdir(parents=True, exist_ok=True)
-        part.write_bytes(data.tobytes())
-        part.replace(file)
-    except OSError as error:
-        with suppress(OSError):
-            part.unlink()
-        raise ImageFileError(f"{file}: {error.strerror or error}") from error
+    write_whole(file, data.tobytes())

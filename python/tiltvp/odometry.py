@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import csv
 import math
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from tiltvp.csv_files import CsvFile
 from tiltvp.errors import InvalidInputError
 
 __all__ = ["Motion", "read_odometry"]
@@ -38,25 +38,10 @@ def read_odometry(path: str | os.PathLike[str], files: Sequence[Path]) -> list[M
     row for each image, in their order. Raises `InvalidInputError` that names the file and the line for columns and
     images that are not known, images without a row, and numbers that are none.
     """
-    name = os.fspath(path)
-    try:
-        text = Path(path).read_text(encoding="utf-8-sig")
-    except OSError as error:
-        raise InvalidInputError(
-            f"{name}: cannot be read ({error.strerror or error}), expected odometry as CSV"
-        ) from error
-    except UnicodeDecodeError as error:
-        raise InvalidInputError(f"{name}: not UTF-8, expected odometry as CSV") from error
-    lines = csv.reader(text.splitlines())
-    header = [cell.strip() for cell in next(lines, [])]
+    table = CsvFile(path, "odometry as CSV")
+    name, header = table.name, table.header
     _check_header(name, header)
-    rows: list[tuple[int, dict[str, str]]] = []
-    for cells in lines:
-        if not any(cell.strip() for cell in cells):
-            continue
-        if len(cells) != len(header):
-            raise InvalidInputError(f"{name}, line {lines.line_num}: {len(cells)} cells, expected {len(header)}")
-        rows.append((lines.line_num, dict(zip(header, (cell.strip() for cell in cells), strict=True))))
+    rows = [(line, dict(zip(header, cells, strict=True))) for line, cells in table.rows()]
     motions = [(line, row, _motion(f"{name}, line {line}", row)) for line, row in rows]
     if "file" not in header:
         if len(motions) != len(files):

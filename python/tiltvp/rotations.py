@@ -6,7 +6,6 @@ import difflib
 import math
 import os
 import re
-import tomllib
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
@@ -119,10 +118,7 @@ def _plain_numbers(text: str) -> list[float] | None:
 
 def _tree(document: Document) -> dict[str, object]:
     if document.path.suffix.lower() == ".toml":
-        try:
-            return tomllib.loads(document.text)
-        except (ValueError, RecursionError) as error:
-            raise CalibrationError(f"{document.path}: is not TOML ({error}), expected {_EXPECTED}") from None
+        return document.toml(_EXPECTED)
     if not document.tree:
         raise CalibrationError(f"{document.path}: no rotation ({document.syntax_problem}), expected {_EXPECTED}")
     return document.tree

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import os
-import secrets
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from tiltvp.errors import ImageFileError, InvalidInputError
+from tiltvp.errors import ImageFileError, InvalidInputError, OutputError
+from tiltvp.files import whole_file
 
 if TYPE_CHECKING:
     import cv2
@@ -57,11 +57,13 @@ class VideoReader:
 class VideoWriter:
     """Takes the frames of a video that is being written, all of the size of the first."""
 
-    def __init__(self, path: Path, rate_hz: float) -> None:
-        """Nothing is written before the first frame."""
-        self._path, self._rate_hz = path, rate_hz
+    def __init__(self, path: Path, rate_hz: float, name: Path) -> None:
+        """Nothing is written before the first frame. `name` is what messages call it."""
+        self._path, self._rate_hz, self._name = path, rate_hz, name
         self._writer: cv2.VideoWriter | None = None
         self._shape: tuple[int, ...] = ()
+        self.count = 0
+        """How many frames it was given."""
 
     def add(self, image: NDArray[np.uint8]) -> None:
         """The next frame, (H, W, 3) BGR uint8."""
@@ -72,10 +74,11 @@ class VideoWriter:
             code = cv2.VideoWriter.fourcc(*_CODECS[self._path.suffix.lower()])
             self._writer = cv2.VideoWriter(str(self._path), code, self._rate_hz, (image.shape[1], image.shape[0]))
             if not self._writer.isOpened():
-                raise ImageFileError(f"{self._path}: this OpenCV cannot write such a video")
+                raise OutputError(f"{self._name}: cannot be written (OpenCV opens no such video there)")
         if image.shape != self._shape:
             raise InvalidInputError(f"video frame: shape {image.shape}, expected {self._shape}")
         self._writer.write(image)
+        self.count += 1
 
     def close(self) -> None:
         """Writes what is left."""
@@ -87,25 +90,28 @@ class VideoWriter:
 def video_writer(path: str | os.PathLike[str], rate_hz: float = 25.0) -> Iterator[VideoWriter]:
     """A video (.mp4 or .avi) that appears when the block ends, unless an exception leaves it or it has no frames.
 
-    Raises `InvalidInputError` for other endings, `ImageFileError` where it cannot be written.
+    Raises `InvalidInputError` for other endings, `OutputError` where it cannot be written.
     """
     file = Path(path)
     if file.suffix.lower() not in _CODECS:
         raise InvalidInputError(f"{file}: ends in {file.suffix!r}, expected {' or '.join(_CODECS)}")
-    # The ending, which says the format, stays at the end.
-    part = file.with_name(f".{file.stem}.{secrets.token_hex(8)}.part{file.suffix.lower()}")
-    writer = VideoWriter(part, rate_hz)
-    try:
-        file.parent.mkdir(parents=True, exist_ok=True)
-        yield writer
-        writer.close()
-        if part.exists():
-            os.replace(part, file)
-    except OSError as error:
-        if isinstance(error, ImageFileError):
-            raise
-        raise ImageFileError(f"{file}: cannot be written ({error.strerror or error})") from error
-    finally:
-        writer.close()
-        with suppress(OSError):
+    with whole_file(file) as part:
+        writer = VideoWriter(part, rate_hz, file)
+        try:
+            yield writer
+        finally:
+            writer.close()
+        if writer.count == 0:
             part.unlink()
+        elif _frames_in(part) < writer.count:
+            # OpenCV does not say that it could not write.
+            raise OutputError(
+                f"{file}: cannot be written (not all of {writer.count} frames), expected a place that can"
+            )
+
+
+def _frames_in(path: Path) -> int:
+    try:
+        return VideoReader(path).count
+    except ImageFileError:
+        return 0

@@ -14,8 +14,8 @@ from hypothesis import strategies as st
 
 from calibration_reading import Read
 from calibration_texts import OCAM, SAMPLES
-from tiltvp import _core, formats
-from tiltvp.errors import CalibrationError, TiltvpError
+from tiltvp import _core
+from tiltvp.errors import CalibrationError, OutputError, TiltvpError
 from tiltvp.formats import CameraSpec, read_cameras, write_toml
 
 pixels = st.floats(-1e6, 1e6)
@@ -80,14 +80,15 @@ def test_writing_is_all_or_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPat
     def broken(*_: object) -> None:
         raise OSError("disk full")
 
-    monkeypatch.setattr(formats.own.os, "replace", broken)
-    with pytest.raises(CalibrationError, match="cannot be written"):
+    monkeypatch.setattr(os, "replace", broken)
+    with pytest.raises(OutputError, match="cannot be written"):
         write_toml(CameraSpec("equirectangular", 64, 32, {}), path)
     monkeypatch.undo()
     assert path.read_bytes() == before
     assert os.listdir(tmp_path) == ["camera.toml"]
-    with pytest.raises(CalibrationError, match="cannot be written"):
-        write_toml(spec, tmp_path / "no" / "such" / "folder.toml")
+    with pytest.raises(OutputError, match="cannot be written"):
+        write_toml(spec, path / "below_a_file.toml")
+    write_toml(spec, tmp_path / "new" / "folder" / "camera.toml")
 
 
 @pytest.mark.parametrize(

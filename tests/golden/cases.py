@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import hashlib
+import json
 import math
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -35,11 +36,11 @@ CAMERAS = {
 }  # fmt: skip
 AHEAD = ((0.0, 0.0, 1.0), (-1.0, 0.0, 0.0), (0.0, -1.0, 0.0))
 LONG = 24
-"""Arrays of more values than this are kept as a hash."""
+"""Arrays and lists of more values than this are kept as a hash."""
 
 
 def plain(answer: Any) -> Any:
-    """An answer as JSON holds it: numbers to the last bit, long arrays by their bytes' hash."""
+    """An answer as JSON holds it: numbers to the last bit, long arrays and lists by their hash."""
     if answer is None or isinstance(answer, bool | int | str):
         return answer
     if isinstance(answer, float | np.floating):
@@ -57,10 +58,13 @@ def plain(answer: Any) -> Any:
         return {field.name: plain(getattr(answer, field.name)) for field in dataclasses.fields(answer)}
     if isinstance(answer, dict):
         return {str(key): plain(value) for key, value in answer.items()}
-    if isinstance(answer, list | tuple) and len(answer) > LONG and all(isinstance(x, float | int) for x in answer):
-        return plain(np.array(answer))
     if isinstance(answer, list | tuple):
-        return [plain(value) for value in answer]
+        if len(answer) <= LONG:
+            return [plain(value) for value in answer]
+        if all(isinstance(x, float | int) for x in answer):
+            return plain(np.array(answer))
+        digest = hashlib.sha256(json.dumps([plain(value) for value in answer]).encode()).hexdigest()[:16]
+        return f"{len(answer)} values {digest}"
     raise TypeError(f"{type(answer).__name__}: expected an answer that has a dict")
 
 

@@ -13,7 +13,7 @@ import polars as pl
 import pytest
 
 from tiltvp.cli import main
-from tiltvp.errors import RunError
+from tiltvp.errors import OutputError, RunError
 from tiltvp.lab.evaluation import curves
 from tiltvp.lab.evaluation.runs import Run, read_run
 from tiltvp.lab.evaluation.summary import errors
@@ -154,7 +154,7 @@ def test_failing_leaves_the_earlier_report(run: Path, tmp_path: Path, monkeypatc
     monkeypatch.setattr("tiltvp.lab.report.files.page_of", fail)
     contents = contents_of(read_run(run))
     contents = replace(contents, sections=contents.sections[:1])
-    with pytest.raises(RunError, match="No space"):
+    with pytest.raises(OutputError, match="No space"):
         write_report(contents, out, dpi=20.0)
     assert (out / PAGE).read_text() == "earlier"
     assert [path.name for path in tmp_path.iterdir()] == ["out"]

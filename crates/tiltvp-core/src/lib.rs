@@ -3,7 +3,7 @@
 //! The floors of the house, from the ground up; a module imports only from floors below its own, and any of them from
 //! [`tiltvp_kernels`], which holds all vector code and all `unsafe`:
 //!
-//! 1. [`error`], [`geometry`], [`options`]
+//! 1. [`error`], [`geometry`], [`interrupt`], [`options`]
 //! 2. [`camera`], [`image`], [`robust`], [`filter`]
 //! 3. [`edges`]
 //! 4. [`segments`]
@@ -22,6 +22,7 @@ pub mod error;
 pub mod filter;
 pub mod geometry;
 pub mod image;
+pub mod interrupt;
 pub mod lines;
 pub mod options;
 pub mod robust;

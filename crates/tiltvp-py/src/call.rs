@@ -1,18 +1,70 @@
 //! The one door into the core: releases the interpreter, catches panics, and maps errors to exceptions.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::mpsc::{RecvTimeoutError, channel};
+use std::thread;
+use std::time::Duration;
 
 use pyo3::import_exception;
 use pyo3::prelude::*;
 use tiltvp_core::Error;
+use tiltvp_core::interrupt::Interrupt;
 
 import_exception!(tiltvp.errors, CalibrationError);
 import_exception!(tiltvp.errors, InvalidInputError);
 import_exception!(tiltvp.errors, InternalError);
 
+/// How often a long call asks whether a signal has come.
+const POLL: Duration = Duration::from_millis(50);
+
+/// Memory of the stack of the thread of a long call: what the main thread has on Linux.
+const STACK_BYTES: usize = 8 << 20;
+
 /// Runs `work` without the interpreter.
 pub(crate) fn call<T: Send>(py: Python<'_>, work: impl FnOnce() -> Result<T, Error> + Send) -> PyResult<T> {
-    let outcome = py.detach(|| catch_unwind(AssertUnwindSafe(work)));
+    answer(py.detach(|| catch_unwind(AssertUnwindSafe(work))))
+}
+
+/// As [`call`], for work that may take longer than a person waits: a signal such as Ctrl-C ends it and is raised.
+///
+/// The work has a thread of its own, so that signals are heard on this one, and nobody waits for the interpreter with a lock in hand.
+pub(crate) fn call_long<T: Send>(py: Python<'_>, work: impl FnOnce() -> Result<T, Error> + Send) -> PyResult<T> {
+    let flag = Interrupt::default();
+    let (done, ended) = channel::<()>();
+    let outcome = py.detach(move || {
+        thread::scope(|scope| {
+            let own = flag.clone();
+            let work = move || {
+                let _until_the_end = done;
+                own.run(work)
+            };
+            let worker = match thread::Builder::new().stack_size(STACK_BYTES).spawn_scoped(scope, work) {
+                Ok(worker) => worker,
+                Err(error) => return Err(invalid(format!("no thread can be started ({error}), expected one"))),
+            };
+            let mut signal = None;
+            while ended.recv_timeout(POLL) == Err(RecvTimeoutError::Timeout) {
+                if signal.is_none() {
+                    #[expect(clippy::redundant_closure_for_method_calls, reason = "the method alone is for one lifetime")]
+                    let raised = Python::attach(|py| py.check_signals()).err();
+                    signal = raised;
+                    if signal.is_some() {
+                        flag.ask();
+                    }
+                }
+            }
+            let outcome = worker.join();
+            signal.map_or(Ok(outcome), Err)
+        })
+    })?;
+    answer(
+        outcome
+            .map(|answer| answer.unwrap_or_else(|| Err(Error::argument("call", "interrupted", "to run to its end")))),
+    )
+}
+
+/// The answer, or the exception for an error or a panic.
+fn answer<T>(outcome: thread::Result<Result<T, Error>>) -> PyResult<T> {
     match outcome {
         Ok(result) => result.map_err(|error| exception(&error)),
         Err(panic) => {

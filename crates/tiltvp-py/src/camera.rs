@@ -5,9 +5,10 @@ use numpy::{PyArray1, PyArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::{PyBool, PyDict, PyList, PyTuple, PyType};
 use tiltvp_core::camera::{self as core, Kind, Model, Parameter};
+use tiltvp_core::interrupt::check;
 
 use crate::array::Array;
-use crate::call::{call, exception, invalid};
+use crate::call::{call, call_long, exception, invalid};
 use crate::convert;
 use crate::value::{frozen, getters};
 
@@ -123,8 +124,14 @@ impl Camera {
     /// Fresh (H, W) bool: the pixels that have a bearing.
     fn valid_mask<'py>(&self, py: Python<'py>) -> PyResult<Array<'py, bool>> {
         let (width, height) = (self.inner.width() as usize, self.inner.height() as usize);
-        let mask = call(py, || {
-            let seen = |i: usize| self.inner.unproject(&Vector2::new((i % width) as f64, (i / width) as f64)).is_some();
+        let mask = call_long(py, || {
+            self.inner.check_memory(2)?;
+            let seen = |i: usize| {
+                if i.is_multiple_of(width) {
+                    check();
+                }
+                self.inner.unproject(&Vector2::new((i % width) as f64, (i / width) as f64)).is_some()
+            };
             Ok((0..width * height).map(seen).collect::<Vec<bool>>())
         })?;
         Ok(Array::new(PyArray1::from_vec(py, mask).reshape([height, width])?))
@@ -155,7 +162,7 @@ impl Camera {
     /// `rim_theta_rad`, the largest angle that was tested.
     #[pyo3(signature = () -> "dict[str, float]")]
     fn conformance<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        let found = call(py, || Ok(core::conformance(&self.inner)))?;
+        let found = call_long(py, || Ok(core::conformance(&self.inner)))?;
         let dict = PyDict::new(py);
         dict.set_item("pixels_tested", found.pixels_tested)?;
         dict.set_item("pixels_outside", found.pixels_outside)?;

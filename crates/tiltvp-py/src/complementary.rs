@@ -1,7 +1,5 @@
 //! `ComplementaryFilter`: rates of turn and a reference attitude, fused.
 
-use std::sync::Mutex;
-
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use tiltvp_core::filter::{ComplementaryFilter as Filter, ComplementaryOptions};
@@ -10,7 +8,8 @@ use crate::array::Array;
 use crate::call::exception;
 use crate::convert;
 use crate::options;
-use crate::value::{changing, getters};
+use crate::shared::Shared;
+use crate::value::changing;
 
 /// Rates of turn in the short run, a reference attitude in the long run: `ComplementaryFilter(reference_from_body)`.
 ///
@@ -19,10 +18,15 @@ use crate::value::{changing, getters};
 /// `tiltvp.errors.InvalidInputError`.
 #[pyclass(frozen, module = "tiltvp._core")]
 pub(crate) struct ComplementaryFilter {
-    inner: Mutex<Filter>,
+    inner: Shared<Filter>,
 }
 
-changing!(ComplementaryFilter(Filter), |own| own);
+changing!(ComplementaryFilter(Filter), |own| own, {
+    /// Time after which a difference from the reference has shrunk to 1/e, seconds.
+    time_constant_s: f64 = own.options().time_constant_s,
+    /// Time over which a lasting difference becomes a bias of the rates, seconds.
+    bias_time_constant_s: f64 = own.options().bias_time_constant_s,
+});
 
 #[pymethods]
 impl ComplementaryFilter {
@@ -38,20 +42,20 @@ impl ComplementaryFilter {
     /// (3, 3): the attitude now, which takes vectors of the body to the frame of the reference.
     #[getter]
     fn reference_from_body<'py>(&self, py: Python<'py>) -> PyResult<Array<'py, f64>> {
-        convert::to_matrix(py, &self.lock().attitude())
+        convert::to_matrix(py, &self.inner.look(py, Filter::attitude))
     }
 
     /// (3,): the bias of the rates, in the body's axes.
     #[getter]
     fn bias_rad_s<'py>(&self, py: Python<'py>) -> PyResult<Array<'py, f64>> {
-        convert::to_rows(py, &[self.lock().bias_rad_s().into()], true)
+        convert::to_rows(py, &[self.inner.look(py, |filter| filter.bias_rad_s().into())], true)
     }
 
     /// Turns on by a rate (3,), in the body's axes, that holds for so long.
     #[pyo3(signature = (rate_rad_s: "ArrayLike", duration_s))]
     fn predict(&self, rate_rad_s: &Bound<'_, PyAny>, duration_s: f64) -> PyResult<()> {
         let rate = convert::vector3(rate_rad_s, "rate_rad_s")?;
-        self.lock().predict(&rate, duration_s).map_err(|error| exception(&error))
+        self.inner.change(rate_rad_s.py(), |filter| filter.predict(&rate, duration_s))
     }
 
     /// Moves towards a reference (3, 3) by the share 1 - exp(-t / time_constant_s), t the time since the last one.
@@ -60,20 +64,12 @@ impl ComplementaryFilter {
     #[pyo3(signature = (reference_from_body: "ArrayLike"))]
     fn correct<'py>(&self, reference_from_body: &Bound<'py, PyAny>) -> PyResult<Array<'py, f64>> {
         let reference = convert::matrix3(reference_from_body, "reference_from_body")?;
-        let found = self.lock().correct(&reference).map_err(|error| exception(&error))?;
-        convert::to_rows(reference_from_body.py(), &[found.into()], true)
+        let py = reference_from_body.py();
+        let found = self.inner.change(py, |filter| filter.correct(&reference))?;
+        convert::to_rows(py, &[found.into()], true)
     }
 
     fn __repr__(&self, py: Python<'_>) -> PyResult<String> {
-        Ok(format!("ComplementaryFilter({})", options::shown(py, self.lock().options())?))
-    }
-}
-
-getters! {
-    ComplementaryFilter as own {
-        /// Time after which a difference from the reference has shrunk to 1/e, seconds.
-        time_constant_s: f64 = own.lock().options().time_constant_s,
-        /// Time over which a lasting difference becomes a bias of the rates, seconds.
-        bias_time_constant_s: f64 = own.lock().options().bias_time_constant_s,
+        Ok(format!("ComplementaryFilter({})", options::shown(py, &self.inner.look(py, |filter| *filter.options()))?))
     }
 }

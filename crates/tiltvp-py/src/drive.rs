@@ -6,7 +6,7 @@ use pyo3::types::PyDict;
 use tiltvp_synth::{DriveOptions, Mount, on_threads};
 
 use crate::array::Array;
-use crate::call::{call, invalid};
+use crate::call::{call_long, invalid};
 use crate::camera::Camera;
 use crate::convert;
 use crate::options;
@@ -45,7 +45,7 @@ impl Drive {
         let parsed = options::given(DriveOptions::default(), options)?;
         let threads = threads_from(threads)?;
         let (world, lens) = (room.get().world.clone(), camera.get().inner.clone());
-        let inner = call(room.py(), || on_threads(threads, || tiltvp_synth::Drive::new(world, lens, parsed))?)?;
+        let inner = call_long(room.py(), || on_threads(threads, || tiltvp_synth::Drive::new(world, lens, parsed))?)?;
         Ok(Self { room: room.clone().unbind(), camera: camera.clone().unbind(), inner })
     }
 
@@ -138,7 +138,7 @@ impl Drive {
         threads: Option<&Bound<'py, PyAny>>,
     ) -> PyResult<Pictures<'py>> {
         let (frame, threads) = (self.frame(frame)?, threads_from(threads)?);
-        let image = call(py, || on_threads(threads, || self.inner.render(frame))?)?;
+        let image = call_long(py, || on_threads(threads, || self.inner.render(frame))?)?;
         pictures(py, image)
     }
 
@@ -151,7 +151,7 @@ impl Drive {
         threads: Option<&Bound<'py, PyAny>>,
     ) -> PyResult<Sightings<'py>> {
         let (frame, threads) = (self.frame(frame)?, threads_from(threads)?);
-        let seen = call(py, || on_threads(threads, || self.inner.sightings(frame))?)?;
+        let seen = call_long(py, || on_threads(threads, || self.inner.sightings(frame))?)?;
         let column = |value: fn(&tiltvp_synth::EdgeSighting) -> f64| {
             Array::new(PyArray1::from_vec(py, seen.iter().map(value).collect()))
         };

@@ -6,7 +6,7 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use tiltvp_synth::{LaboratoryOptions, World, on_threads};
 
-use crate::call::call;
+use crate::call::call_long;
 use crate::options;
 use crate::synth::{seed_from, threads_from};
 use crate::value::{frozen, getters};
@@ -34,7 +34,7 @@ impl Laboratory {
         let options =
             options::given(LaboratoryOptions { seed: seed_from(seed)?, ..LaboratoryOptions::default() }, options)?;
         let threads = threads_from(threads)?;
-        let world = call(py, || on_threads(threads, || World::laboratory(&options))?)?;
+        let world = call_long(py, || on_threads(threads, || World::laboratory(&options))?)?;
         Ok(Self { options, world: Arc::new(world) })
     }
 

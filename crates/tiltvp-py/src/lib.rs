@@ -16,6 +16,7 @@ mod reader;
 mod scratch;
 mod segments;
 mod selfcalib;
+mod shared;
 mod stereo;
 mod synth;
 mod tilt;
@@ -84,6 +85,10 @@ mod _core {
         module.add("CALIBRATION_METHODS", tiltvp_core::selfcalib::CalibrationMethod::NAMES.to_vec())?;
         module.add("CORNER_METHODS", tiltvp_core::corner::CornerMethod::NAMES.to_vec())?;
         module.add("LINE_METHODS", tiltvp_core::lines::LineMethod::NAMES.to_vec())?;
+        module.add("MOST_PIXELS", tiltvp_core::camera::MOST_PIXELS)?;
+        module.add("LARGEST_SIDE_PX", tiltvp_core::camera::LARGEST_SIDE_PX)?;
+        module.add("MOST_COEFFICIENTS", tiltvp_core::camera::MOST_COEFFICIENTS)?;
+        module.add("MOST_LANDMARKS", tiltvp_core::selfcalib::MOST_LANDMARKS)?;
         module.add("CAMERA_MODELS", tiltvp_core::camera::Model::names().collect::<Vec<_>>())?;
         module.add("ROOM_KINDS", tiltvp_synth::RoomKind::NAMES.to_vec())?;
         module.add("WALL_PATTERNS", tiltvp_synth::WallPattern::NAMES.to_vec())

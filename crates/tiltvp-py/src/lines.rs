@@ -13,7 +13,7 @@ pub(crate) use self::matching::{descriptor_distances, match_descriptors, ssd_mat
 pub(crate) use self::tracker::{LineTracker, TrackedLines};
 pub(crate) use self::values::Lines;
 use crate::array::Array;
-use crate::call::{call, exception, invalid};
+use crate::call::{call_long, exception, invalid};
 use crate::camera::Camera;
 use crate::convert;
 use crate::options;
@@ -58,7 +58,7 @@ impl LineExtractor {
         let mut parsed = core::LineOptions::for_method(method).map_err(|error| exception(&error))?;
         options::set(&mut parsed, options)?;
         let lens = camera.get().inner.clone();
-        let inner = call(py, move || core::LineExtractor::new(lens, rotation, parsed))?;
+        let inner = call_long(py, move || core::LineExtractor::new(lens, rotation, parsed))?;
         Ok(Self { inner, camera: camera.clone().unbind(), scratch: ScratchPool::default() })
     }
 

@@ -6,7 +6,7 @@ use pyo3::types::PyDict;
 use tiltvp_core::camera::{self as core, Equirectangular};
 
 use crate::array::Array;
-use crate::call::call;
+use crate::call::call_long;
 use crate::camera::Camera;
 use crate::convert;
 use crate::value::frozen;
@@ -27,7 +27,7 @@ impl PixelRays {
     fn new(py: Python<'_>, camera: &Bound<'_, Camera>, samples: &Bound<'_, PyAny>) -> PyResult<Self> {
         let samples = convert::whole(samples, "samples", "rays per pixel and side from 1 to 16")?;
         let lens = &camera.get().inner;
-        let inner = call(py, || core::PixelRays::new(lens, samples))?;
+        let inner = call_long(py, || core::PixelRays::new(lens, samples))?;
         Ok(Self { inner, camera: camera.clone().unbind() })
     }
 
@@ -60,7 +60,7 @@ impl PixelRays {
         let rotation = convert::matrix3(rotation, "rotation")?;
         let pixels = "a whole number of pixels";
         let (width, height) = (convert::whole(width, "width", pixels)?, convert::whole(height, "height", pixels)?);
-        let map = call(py, || {
+        let map = call_long(py, || {
             let mut map = vec![0.0; 2 * self.inner.len()];
             let (u, v) = map.split_at_mut(self.inner.len());
             self.inner.panorama_map(&Equirectangular::new(width, height)?, &rotation, u, v)?;

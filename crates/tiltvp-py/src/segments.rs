@@ -6,7 +6,7 @@ use pyo3::types::{PyDict, PyTuple};
 use tiltvp_core::segments::{self as core, Segment, SegmentScratch};
 
 use crate::array::Array;
-use crate::call::{call, invalid};
+use crate::call::{call_long, invalid};
 use crate::camera::Camera;
 use crate::convert;
 use crate::field::Field;
@@ -40,7 +40,7 @@ impl SegmentDetector {
         let mut parsed = core::SegmentDetectorOptions::default();
         options::set(&mut parsed, options)?;
         let lens = camera.get().inner.clone();
-        let inner = call(py, move || core::SegmentDetector::new(lens, parsed))?;
+        let inner = call_long(py, move || core::SegmentDetector::new(lens, parsed))?;
         Ok(Self { inner, camera: camera.clone().unbind(), scratch: ScratchPool::default() })
     }
 

@@ -5,12 +5,11 @@ mod log;
 mod mounting;
 mod step;
 
-use std::sync::Mutex;
-
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict, PyTuple};
 use tiltvp_core::Error;
 use tiltvp_core::filter::ConsistencyBand;
+use tiltvp_core::interrupt::check;
 use tiltvp_core::selfcalib::{self as core, LogBearing, LogOptions, SelfCalibratorOptions, WheelMotion};
 
 pub(crate) use self::drive::{SimulatedDrive, drive_legs, simulate_drive};
@@ -18,9 +17,10 @@ pub(crate) use self::log::LogCalibration;
 pub(crate) use self::mounting::MountingEstimate;
 pub(crate) use self::step::CalibrationStep;
 use crate::array::Array;
-use crate::call::{call, exception, invalid};
+use crate::call::{call_long, exception, invalid};
 use crate::convert;
 use crate::options;
+use crate::shared::Shared;
 use crate::value::changing;
 
 /// Estimates where a camera sits on a robot, step by step while it drives past landmarks. Changes as it goes.
@@ -33,7 +33,7 @@ use crate::value::changing;
 /// Raises `tiltvp.errors.InvalidInputError` for options out of their domain or of the other method.
 #[pyclass(frozen, module = "tiltvp._core")]
 pub(crate) struct SelfCalibrator {
-    inner: Mutex<core::SelfCalibrator>,
+    inner: Shared<core::SelfCalibrator>,
 }
 
 changing!(SelfCalibrator(core::SelfCalibrator), |own| own);
@@ -69,7 +69,7 @@ impl SelfCalibrator {
             .map(|name| landmark(name, "landmark_ids"))
             .collect::<PyResult<Vec<u64>>>()?;
         let bearings = convert::vector(bearings_rad, "bearings_rad")?;
-        call(py, || self.lock().step(&motion, &names, &bearings)).map(CalibrationStep::from)
+        self.inner.change(py, |calibrator| calibrator.step(&motion, &names, &bearings)).map(CalibrationStep::from)
     }
 
     /// Steps through a log, (N, 2) left and right, (M, 3) step, landmark, bearing: the estimate after each step.
@@ -82,9 +82,7 @@ impl SelfCalibrator {
     ) -> PyResult<Vec<MountingEstimate>> {
         let (readings, mut seen) = log(odometry, bearings)?;
         seen.sort_by_key(|b| b.step);
-        let found = call(py, || {
-            let mut inner = self.lock();
-            let mut filter = inner.clone();
+        let found = self.inner.change_long(py, |filter| {
             let mut rest = seen.as_slice();
             let mut all = Vec::with_capacity(readings.len());
             for (step, motion) in readings.iter().enumerate() {
@@ -92,6 +90,7 @@ impl SelfCalibrator {
                 rest = later;
                 let names: Vec<u64> = now.iter().map(|b| b.landmark).collect();
                 let angles: Vec<f64> = now.iter().map(|b| b.bearing_rad).collect();
+                check();
                 filter.step(motion, &names, &angles)?;
                 all.push(filter.estimate());
             }
@@ -99,7 +98,6 @@ impl SelfCalibrator {
                 let expected = format!("steps below {}, the length of the odometry", readings.len());
                 return Err(Error::argument("bearings", format!("step {}", beyond.step), expected));
             }
-            *inner = filter;
             Ok(all)
         })?;
         Ok(found.into_iter().map(MountingEstimate::from).collect())
@@ -107,47 +105,50 @@ impl SelfCalibrator {
 
     /// The mounting as it is believed to be now.
     #[getter]
-    fn estimate(&self) -> MountingEstimate {
-        self.lock().estimate().into()
+    fn estimate(&self, py: Python<'_>) -> MountingEstimate {
+        self.inner.look(py, core::SelfCalibrator::estimate).into()
     }
 
     /// Landmarks that are being followed.
     #[getter]
-    fn landmarks(&self) -> usize {
-        self.lock().landmarks()
+    fn landmarks(&self, py: Python<'_>) -> usize {
+        self.inner.look(py, core::SelfCalibrator::landmarks)
     }
 
     /// Forgets everything but the options.
-    fn reset(&self) -> PyResult<()> {
-        self.lock().reset().map_err(|error| exception(&error))
+    fn reset(&self, py: Python<'_>) -> PyResult<()> {
+        self.inner.change(py, core::SelfCalibrator::reset)
     }
 
     /// Sets what pickle has kept.
-    fn __setstate__(&self, state: &[u8]) -> PyResult<()> {
+    fn __setstate__(&self, py: Python<'_>, state: &[u8]) -> PyResult<()> {
         let kept =
             postcard::from_bytes::<core::SelfCalibrator>(state).ok().filter(core::SelfCalibrator::is_well_formed);
-        *self.lock() = kept.ok_or_else(|| invalid("state: expected the bytes that pickle keeps".to_owned()))?;
-        Ok(())
+        let kept = kept.ok_or_else(|| invalid("state: expected the bytes that pickle keeps".to_owned()))?;
+        self.inner.change(py, |calibrator| {
+            *calibrator = kept;
+            Ok(())
+        })
     }
 
     fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyTuple>> {
         let (py, this) = (slf.py(), slf.get());
         let make = py.import("functools")?.getattr("partial")?.call((slf.get_type(),), Some(&this.options(py)?))?;
-        let state = postcard::to_stdvec(&*this.lock()).map_err(|error| invalid(format!("state: {error}")))?;
+        let state = postcard::to_stdvec(&this.inner.copied(py)).map_err(|error| invalid(format!("state: {error}")))?;
         (make, PyTuple::empty(py), PyBytes::new(py, &state)).into_pyobject(py)
     }
 
-    fn __repr__(&self) -> String {
-        let inner = self.lock();
-        let o = inner.options();
-        format!("SelfCalibrator(method={:?}, wheel_base_m={}): {}", o.method.name(), o.wheel_base_m, inner.estimate())
+    fn __repr__(&self, py: Python<'_>) -> String {
+        let (o, estimate) = self.inner.look(py, |inner| (*inner.options(), inner.estimate()));
+        format!("SelfCalibrator(method={:?}, wheel_base_m={}): {estimate}", o.method.name(), o.wheel_base_m)
     }
 }
 
 /// A landmark's number: any whole number.
 fn landmark(name: f64, what: &str) -> PyResult<u64> {
-    if name.fract() != 0.0 || name.abs() > 2f64.powi(53) {
-        return Err(invalid(format!("{what}: {name}, expected whole numbers")));
+    // From 2^53 on two whole numbers may be the same float.
+    if name.fract() != 0.0 || name.abs() >= 2f64.powi(53) {
+        return Err(invalid(format!("{what}: {name}, expected whole numbers below 2^53")));
     }
     Ok((name as i64) as u64)
 }
@@ -191,7 +192,7 @@ pub(crate) fn calibrate(
     let parsed = options::given(usual, options)?;
     let (readings, seen) = log(odometry, bearings)?;
     let times = times_s.map(|times| convert::vector(times, "times_s")).transpose()?;
-    let found = call(py, || core::calibrate_log(&parsed, &readings, times.as_deref(), &seen))?;
+    let found = call_long(py, || core::calibrate_log(&parsed, &readings, times.as_deref(), &seen))?;
     Ok(LogCalibration::from(found))
 }
 
@@ -225,7 +226,14 @@ pub(crate) fn wheel_displacements<'py>(
 ///
 /// The mean NEES of so many runs of a consistent filter falls there.
 #[pyfunction]
-pub(crate) fn consistency_band(probability: f64, dof: u32, samples: u32) -> PyResult<(f64, f64)> {
+#[pyo3(signature = (probability, dof: "SupportsIndex", samples: "SupportsIndex"))]
+pub(crate) fn consistency_band(
+    probability: f64,
+    dof: &Bound<'_, PyAny>,
+    samples: &Bound<'_, PyAny>,
+) -> PyResult<(f64, f64)> {
+    let count = |value, name| convert::whole::<u32>(value, name, "a whole number from 1 to 2^32 - 1");
+    let (dof, samples) = (count(dof, "dof")?, count(samples, "samples")?);
     ConsistencyBand::of_mean(probability, dof, samples).map(|band| (band.low, band.high)).ok_or_else(|| {
         invalid(format!(
             "probability = {probability}, dof = {dof}, samples = {samples}, expected (0, 1) and counts from 1"

@@ -12,7 +12,7 @@ use tiltvp_synth::{
 };
 
 use crate::array::Array;
-use crate::call::{call, invalid};
+use crate::call::{call_long, invalid};
 use crate::camera::Camera;
 use crate::convert;
 use crate::laboratory::Laboratory;
@@ -64,7 +64,8 @@ impl StereoSequence {
         let world = world_of(scene)?;
         let cameras = [left.get().inner.clone(), right.get().inner.clone()];
         let threads = threads_from(threads)?;
-        let inner = call(py, || on_threads(threads, || tiltvp_synth::StereoSequence::new(world, cameras, parsed))?)?;
+        let inner =
+            call_long(py, || on_threads(threads, || tiltvp_synth::StereoSequence::new(world, cameras, parsed))?)?;
         Ok(Self { scene: scene.clone().unbind(), left: left.clone().unbind(), right: right.clone().unbind(), inner })
     }
 
@@ -133,7 +134,7 @@ impl StereoSequence {
         threads: Option<&Bound<'py, PyAny>>,
     ) -> PyResult<(Picture<'py>, Picture<'py>)> {
         let (frame, threads) = (self.frame(frame)?, threads_from(threads)?);
-        let [left, right] = call(py, || on_threads(threads, || self.inner.render(frame))?)?;
+        let [left, right] = call_long(py, || on_threads(threads, || self.inner.render(frame))?)?;
         Ok((picture(py, left)?, picture(py, right)?))
     }
 
@@ -146,7 +147,7 @@ impl StereoSequence {
         threads: Option<&Bound<'py, PyAny>>,
     ) -> PyResult<Sightings<'py>> {
         let (frame, threads) = (self.frame(frame)?, threads_from(threads)?);
-        let seen = call(py, || on_threads(threads, || self.inner.sightings(frame))?)?;
+        let seen = call_long(py, || on_threads(threads, || self.inner.sightings(frame))?)?;
         let vertices = |s: &CornerSighting| Matrix2::from_columns(&s.vertex_px).transpose();
         let lengths = |s: &CornerSighting| Matrix2x3::from_row_slice(s.edges_px.as_flattened());
         Ok((
@@ -161,7 +162,7 @@ impl StereoSequence {
     fn _imu<'py>(&self, py: Python<'py>, options: Option<&Bound<'py, PyDict>>) -> PyResult<Readings<'py>> {
         let options = options::given(ImuOptions::default(), options)?;
         let duration_s = self.inner.time_s(self.__len__() - 1);
-        let readings = call(py, || imu_readings(self.inner.motion(), duration_s, &options))?;
+        let readings = call_long(py, || imu_readings(self.inner.motion(), duration_s, &options))?;
         let rows = |value: fn(&tiltvp_synth::ImuReading) -> Vector3<f64>| {
             let rows: Vec<[f64; 3]> = readings.iter().map(|reading| value(reading).into()).collect();
             convert::to_rows(py, &rows, false)

@@ -11,7 +11,7 @@ use tiltvp_core::geometry::Tilt;
 use tiltvp_synth::{Image, Lens, RenderOptions, RobotPose, RoomKind, RoomOptions, Segment, View, World, on_threads};
 
 use crate::array::Array;
-use crate::call::{call, exception, invalid};
+use crate::call::{call_long, exception, invalid};
 use crate::camera::Camera;
 use crate::convert;
 use crate::options;
@@ -46,7 +46,7 @@ impl Room {
         let kind: RoomKind = kind.parse().map_err(|error| exception(&error))?;
         let (seed, threads) = (seed_from(seed)?, threads_from(threads)?);
         let options = options::given(RoomOptions::new(kind, seed), options)?;
-        let world = call(py, || on_threads(threads, || World::new(&options))?)?;
+        let world = call_long(py, || on_threads(threads, || World::new(&options))?)?;
         Ok(Self { options, world: Arc::new(world) })
     }
 
@@ -82,7 +82,7 @@ impl Room {
     ) -> PyResult<Array<'py, f64>> {
         let count = convert::whole(count, "count", "a whole number")?;
         let seed = seed_from(seed)?;
-        let poses = call(py, || self.world.free_poses(count, seed))?;
+        let poses = call_long(py, || self.world.free_poses(count, seed))?;
         let rows: Vec<[f64; 3]> = poses.iter().map(|pose| [pose.x_m, pose.y_m, pose.yaw_rad]).collect();
         convert::to_rows(py, &rows, false)
     }
@@ -100,7 +100,7 @@ impl Room {
         shot.check()?;
         let (options, threads) = (shot.rendering.clone(), threads_from(threads)?);
         let camera = &camera.get().inner;
-        let image = call(py, || {
+        let image = call_long(py, || {
             let lens = |x: f64, y: f64| camera.unproject(&Vector2::new(x, y));
             let view = shot.view(&lens, camera);
             Ok(on_threads(threads, || tiltvp_synth::render(&self.world, &view, &options))??.image)
@@ -121,7 +121,7 @@ impl Room {
         let (pose, options) = (shot.pose(), shot.rendering.clone());
         let height: u16 = convert::whole(height, "height", "a whole number of pixels")?;
         let threads = threads_from(threads)?;
-        let image = call(py, || {
+        let image = call_long(py, || {
             let up = shot.camera_height_m.unwrap_or_else(|| View::new(&|_, _| None, 1, 1, pose).camera_height_m);
             let work = || tiltvp_synth::render_panorama(&self.world, pose, up, usize::from(height), &options);
             Ok(on_threads(threads, work)??.image)
@@ -141,7 +141,7 @@ impl Room {
         let shot = options::given(Shot::default(), options)?;
         shot.check()?;
         let camera = &camera.get().inner;
-        let edges = call(py, || {
+        let edges = call_long(py, || {
             let view = shot.view(&|_, _| None, camera);
             self.world.straight_edges(camera, &view, contrast_min)
         })?;

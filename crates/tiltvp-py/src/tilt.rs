@@ -27,7 +27,7 @@ pub(crate) use self::filtered::{FilterStep, FilteredTilt};
 pub(crate) use self::image_edges::ImageEdges;
 pub(crate) use self::report::FitReport;
 use crate::array::Array;
-use crate::call::{call, exception, invalid};
+use crate::call::{call_long, exception, invalid};
 use crate::camera::Camera;
 use crate::convert;
 use crate::options;
@@ -79,7 +79,7 @@ impl TiltEstimator {
         let mut parsed = core::TiltOptions::for_method(method).map_err(|error| exception(&error))?;
         options::set(&mut parsed, options)?;
         let lens = camera.get().inner.clone();
-        let inner = call(py, move || core::TiltEstimator::new(lens, rotation, parsed))?;
+        let inner = call_long(py, move || core::TiltEstimator::new(lens, rotation, parsed))?;
         let given = options.map_or(Ok(Vec::new()), |options| options.keys().extract())?;
         Ok(Self { inner, camera: camera.clone().unbind(), given, scratch: Arc::default() })
     }
@@ -169,7 +169,7 @@ impl TiltEstimator {
         let named = images.iter().enumerate().map(|(i, image)| convert::gray(image, &format!("images[{i}]")));
         let arrays = named.collect::<PyResult<Vec<_>>>()?;
         let views = arrays.iter().map(convert::view).collect::<PyResult<Vec<_>>>()?;
-        let estimates = call(py, || self.inner.estimate_many(&views, threads))?;
+        let estimates = call_long(py, || self.inner.estimate_many(&views, threads))?;
         Ok(estimates.into_iter().map(TiltEstimate::from).collect())
     }
 
@@ -193,7 +193,7 @@ impl TiltEstimator {
     fn with_options(&self, py: Python<'_>, changes: Option<&Bound<'_, PyDict>>) -> PyResult<Self> {
         let mut options = self.inner.options().clone();
         options::set(&mut options, changes)?;
-        let inner = call(py, || self.inner.with_options(options))?;
+        let inner = call_long(py, || self.inner.with_options(options))?;
         let mut given = self.given.clone();
         for key in changes.into_iter().flat_map(PyDictMethods::keys) {
             let key: String = key.extract()?;
@@ -223,7 +223,7 @@ pub(crate) fn level_map<'py>(
     let tilt = convert::tilt(normal, "normal")?;
     let rotation = reader::robot_from_camera(robot_from_camera)?;
     let camera = &camera.get().inner;
-    let map = call(py, || core::level_map(camera, &rotation, &tilt))?;
+    let map = call_long(py, || core::level_map(camera, &rotation, &tilt))?;
     let shape = [camera.height() as usize, camera.width() as usize, 2];
     Ok(PyArray1::from_slice(py, map.as_flattened()).reshape(shape)?.into_any())
 }

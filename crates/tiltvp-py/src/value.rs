@@ -220,19 +220,16 @@ macro_rules! getters {
 }
 pub(crate) use getters;
 
-/// What classes that change as they go have: one core object behind a lock, its options, copies, and equality by what tells two
-/// of them apart.
+/// What classes that change as they go have: one core object, which threads share, its options, copies, equality by what tells two
+/// of them apart, and attributes `name: type = expression,` of it.
 macro_rules! changing {
-    ($class:ident($($inner:ident)::+), |$own:ident| $same:expr) => {
-        impl $class {
-            fn lock(&self) -> std::sync::MutexGuard<'_, $($inner)::+> {
-                self.inner.lock().unwrap_or_else(std::sync::PoisonError::into_inner)
-            }
-        }
-
+    (
+        $class:ident($($inner:ident)::+), |$own:ident| $same:expr
+        $(, { $($(#[$doc:meta])* $name:ident: $type:ty = $get:expr,)* })?
+    ) => {
         impl From<$($inner)::+> for $class {
             fn from(inner: $($inner)::+) -> Self {
-                Self { inner: std::sync::Mutex::new(inner) }
+                Self { inner: $crate::shared::Shared::new(inner) }
             }
         }
 
@@ -241,27 +238,33 @@ macro_rules! changing {
             /// The options in force, by name, defaults included; a fresh dict, good as keywords.
             #[getter]
             fn options<'py>(&self, py: pyo3::Python<'py>) -> pyo3::PyResult<pyo3::Bound<'py, pyo3::types::PyDict>> {
-                $crate::options::in_force(py, self.lock().options())
+                $crate::options::in_force(py, &self.inner.look(py, |own| *own.options()))
             }
 
-            fn __eq__(&self, other: &pyo3::Bound<'_, pyo3::PyAny>) -> bool {
+            $($(
+                $(#[$doc])*
+                #[getter]
+                fn $name(&self, py: pyo3::Python<'_>) -> $type {
+                    self.inner.look(py, |$own| $get)
+                }
+            )*)?
+
+            fn __eq__(&self, py: pyo3::Python<'_>, other: &pyo3::Bound<'_, pyo3::PyAny>) -> bool {
                 fn same($own: &$($inner)::+) -> impl PartialEq + use<'_> {
                     $same
                 }
                 let Some(other) = $crate::value::of_class::<Self>(other) else { return false };
                 // One at a time: it may be compared with itself.
-                let own = self.lock().clone();
-                let other = other.lock();
-                let equal = same(&own) == same(&other);
-                equal
+                let own = self.inner.copied(py);
+                other.inner.look(py, |other| same(&own) == same(other))
             }
 
-            fn __copy__(&self) -> Self {
-                Self::from(self.lock().clone())
+            fn __copy__(&self, py: pyo3::Python<'_>) -> Self {
+                Self::from(self.inner.copied(py))
             }
 
-            fn __deepcopy__(&self, _memo: &pyo3::Bound<'_, pyo3::PyAny>) -> Self {
-                self.__copy__()
+            fn __deepcopy__(&self, py: pyo3::Python<'_>, _memo: &pyo3::Bound<'_, pyo3::PyAny>) -> Self {
+                self.__copy__(py)
             }
         }
     };

@@ -2,6 +2,7 @@
 
 use nalgebra::Vector3;
 use rayon::prelude::*;
+use tiltvp_core::interrupt::check;
 
 use crate::builder::Material;
 use crate::noise::hash_unit;
@@ -209,7 +210,10 @@ fn per_point<T: Send>(
         .map(|(patch, grid)| {
             let normal = scene.normal(patch);
             (0..grid.counts[0] * grid.counts[1])
-                .map(|k| f(grid.first + k, normal, &grid.point(scene, patch, k)))
+                .map(|k| {
+                    check();
+                    f(grid.first + k, normal, &grid.point(scene, patch, k))
+                })
                 .collect()
         })
         .collect();

@@ -4,6 +4,7 @@ use nalgebra::{Matrix3, Vector3};
 use rayon::prelude::*;
 use tiltvp_core::Result;
 use tiltvp_core::geometry::{Tilt, angle_between};
+use tiltvp_core::interrupt::check;
 
 use crate::noise::hash_unit;
 use crate::segment::Segment;
@@ -53,6 +54,7 @@ pub fn render(world: &World, view: &View<'_>, options: &RenderOptions) -> Result
     let mut valid = vec![false; width * height];
     light.par_chunks_mut(width).zip(valid.par_chunks_mut(width)).enumerate().for_each(|(y, (row, valid_row))| {
         for x in 0..width {
+            check();
             let pixel_angle = pixel_angle(view, x as f64, y as f64) / n as f64;
             let mut sum = [0.0; 3];
             for k in 0..n * n {

@@ -3,6 +3,7 @@
 use nalgebra::{Matrix3, Vector2, Vector3};
 use rayon::prelude::*;
 use tiltvp_core::camera::Camera;
+use tiltvp_core::interrupt::check;
 
 use crate::builder::Material;
 use crate::lights::Lights;
@@ -136,6 +137,7 @@ impl<'a> Sweep<'a> {
             .map(|band| {
                 let mut tiles = Vec::new();
                 for column in 0..width.div_ceil(side) {
+                    check();
                     self.split(0, [column, band], &all, &all_mirrored, &mut tiles);
                 }
                 let first = band * side * width;
@@ -154,6 +156,7 @@ impl<'a> Sweep<'a> {
         light.par_chunks_mut(side * width).zip(&bands).enumerate().for_each(|(band, (light, (tiles, met)))| {
             let first = band * side * width;
             for tile in tiles {
+                check();
                 for k in pixels(tile.at, SIDES[SIDES.len() - 1], [width, height]) {
                     if let Some(meeting) = met[k - first] {
                         let single = options.samples == 1 || !self.is_mixed(&surfaces, &meeting, k);

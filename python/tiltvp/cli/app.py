@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import sys
 from collections.abc import Sequence
+from contextlib import nullcontext
 
 from cyclopts import App, CycloptsError, Parameter
 
@@ -12,14 +13,18 @@ from tiltvp import __version__
 from tiltvp.cli import calibrate, camera, corner, demo, lines, segments, tilt, track
 from tiltvp.cli.lab import dataset, evaluate, measure, report
 from tiltvp.cli.terminal import complain
-from tiltvp.errors import MissingExtraError, TiltvpError
+from tiltvp.errors import MissingExtraError, OutputError, TiltvpError
+from tiltvp.files import keeping_existing
 
+_OVERWRITE = "--overwrite"
+"""Anywhere in the line: every command that writes keeps what exists without it."""
 DONE, SOME_FAILED, WRONG_USE, INTERRUPTED = 0, 1, 2, 130
 
 app = App(
     name="tiltvp",
     help="Orientation and calibration from the straight lines of man-made places: a robot's tilt, vertical lines, "
-    "where a camera sits on a robot, and the pose of corners.",
+    "where a camera sits on a robot, and the pose of corners. Files and folders that exist are kept; with --overwrite, "
+    "which every command takes, its outputs replace them.",
     version=__version__,
     default_parameter=Parameter(negative_iterable=()),
     suppress_keyboard_interrupt=False,
@@ -39,16 +44,30 @@ app.command(report.report)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Runs the command line and gives the exit code: 0 done, 1 some failed or an extra is missing, 2 wrong use."""
+    """Runs the command line and gives the exit code.
+
+    0 done, 1 some failed, an extra is missing or an output cannot be written, 2 wrong use.
+    """
+    words = list(sys.argv[1:] if arguments is None else arguments)
+    overwrite = _OVERWRITE in words
     try:
-        code = app(arguments, exit_on_error=False, print_error=False, result_action="return_value")
+        with nullcontext() if overwrite else keeping_existing():
+            code = app(
+                [word for word in words if word != _OVERWRITE],
+                exit_on_error=False,
+                print_error=False,
+                result_action="return_value",
+            )
         sys.stdout.flush()
         return code if isinstance(code, int) else DONE
     except CycloptsError as error:
         complain(f"{error} Try `tiltvp --help`.")
         return WRONG_USE
-    except MissingExtraError as error:
+    except (MissingExtraError, OutputError) as error:
         complain(str(error))
+        return SOME_FAILED
+    except MemoryError:
+        complain("the memory does not suffice, expected a smaller camera, image or file")
         return SOME_FAILED
     except TiltvpError as error:
         complain(str(error))
@@ -56,7 +75,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except KeyboardInterrupt:
         complain("interrupted")
         return INTERRUPTED
-    except BrokenPipeError:
-        # Whoever read the output has seen enough; nothing more may be written to it, not even at exit.
+    except OSError as error:
+        # Nothing more may be written to the output, not even at exit. Whoever reads a pipe may have seen enough.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        if not isinstance(error, BrokenPipeError):
+            complain(f"{error.filename or 'the output'}: {error.strerror or error}")
         return SOME_FAILED

@@ -11,9 +11,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 from cyclopts import Group, Parameter
 
-from tiltvp.cli.tables import check_plot, finite, write_whole
+from tiltvp.cli.tables import check_plot, finite
 from tiltvp.cli.terminal import new_table, say, show
 from tiltvp.errors import InvalidInputError
+from tiltvp.files import check_output, write_whole
 
 if TYPE_CHECKING:
     from tiltvp import LogCalibration, MountingEstimate, SelfCalibrator
@@ -48,6 +49,8 @@ class ResultOptions:
         """Refuses files that cannot be written, before any work is done."""
         if self.out is not None and self.out.suffix.lower() != ".json":
             raise InvalidInputError(f"--out {self.out}: ends in {self.out.suffix!r}, expected .json")
+        if self.out is not None:
+            check_output(self.out)
         check_plot("--plot", self.plot)
 
     def tell(self, calibration: Calibration) -> None:
@@ -74,7 +77,7 @@ class ResultOptions:
                 "urdf_origin": origin,
             }
             text = json.dumps(finite(found), indent=1, allow_nan=False) + "\n"
-            write_whole(self.out, lambda part: part.write_text(text, encoding="utf-8"))
+            write_whole(self.out, text)
 
 
 def _write_plot(history: Sequence[MountingEstimate], path: Path) -> None:

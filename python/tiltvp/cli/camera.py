@@ -13,6 +13,7 @@ from cyclopts import App, Parameter
 from tiltvp.cli.options import Switch, image_size_from
 from tiltvp.cli.terminal import complain, named, new_table, say, show
 from tiltvp.errors import CalibrationError, InvalidInputError, TiltvpError
+from tiltvp.files import check_output
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -75,6 +76,7 @@ def convert(
         raise InvalidInputError(f"{out}: ends in {out.suffix!r}, expected .toml")
     if os.path.realpath(out) == os.path.realpath(file):
         raise InvalidInputError(f"{out}: is the file to be read, expected another name")
+    check_output(out)
     specs = _specs(file, format, image_size)
     if camera_name is not None:
         names = [spec.name for spec in specs]
@@ -88,7 +90,6 @@ def convert(
         specs = chosen[:1]
     for spec in specs:
         _built(file, spec)
-    out.parent.mkdir(parents=True, exist_ok=True)
     write_toml(specs, out)
     say(f"{out}: {len(specs)} camera{'s' if len(specs) > 1 else ''}, {', '.join(spec.model for spec in specs)}")
 

@@ -17,6 +17,7 @@ from tiltvp.cli.options import image_size_from
 from tiltvp.cli.tables import Table, check_ending, check_plot, write_table
 from tiltvp.cli.terminal import named, progress_bar, say
 from tiltvp.errors import InvalidInputError, TiltvpError
+from tiltvp.files import check_output, check_output_folder
 
 if TYPE_CHECKING:
     import numpy as np
@@ -105,6 +106,10 @@ def corner(
 
     if out is not None:
         check_ending(out)
+    if trajectory is not None:
+        check_output(trajectory)
+    if overlay is not None:
+        check_output_folder(overlay)
     check_plot("--plot", plot)
     camera, estimator = _estimator(
         calibration, right is not None, method, options, math.radians(gamma), pitch, image_size_from(image_size)

@@ -15,6 +15,7 @@ from cyclopts import Parameter
 from tiltvp.cli.results import degrees
 from tiltvp.cli.terminal import new_table, say, show, status
 from tiltvp.cli.tilt import words_of
+from tiltvp.files import check_output_folder
 
 if TYPE_CHECKING:
     import numpy as np
@@ -85,6 +86,7 @@ def demo(
     from tiltvp import write_image
     from tiltvp.synth import render_room
 
+    check_output_folder(out)
     camera = _camera(width, height)
     with status(f"rendering a room ({kind}, seed {seed})"):
         room = render_room(

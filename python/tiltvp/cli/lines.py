@@ -11,7 +11,8 @@ from tiltvp.cli.options import CameraOptions
 from tiltvp.cli.results import degrees
 from tiltvp.cli.tables import Table, check_ending, write_table
 from tiltvp.cli.terminal import complain, named, new_table, progress_bar, show
-from tiltvp.errors import TiltvpError
+from tiltvp.errors import OutputError, TiltvpError
+from tiltvp.files import check_output_folder
 
 if TYPE_CHECKING:
     from tiltvp.lines import Lines
@@ -46,6 +47,8 @@ def lines(
 
     if out is not None:
         check_ending(out)
+    if overlay is not None:
+        check_output_folder(overlay)
     lens = camera.load()
     extractor, tilt = options.extractor(lens), options.tilts(lens)
     files, problems = find_images(images)
@@ -61,6 +64,8 @@ def lines(
                 if overlay is not None:
                     write_image(overlay / f"{name}.png", draw_lines(gray, lens, seen, extractor.robot_from_camera))
                 found.append((str(file), seen))
+            except OutputError:
+                raise
             except TiltvpError as error:
                 bar.complain(named(file, str(error)))
                 failed = True

@@ -14,7 +14,8 @@ from tiltvp.cli.options import CameraOptions
 from tiltvp.cli.results import degrees
 from tiltvp.cli.tables import Table, check_ending, write_table
 from tiltvp.cli.terminal import complain, named, new_table, progress_bar, show
-from tiltvp.errors import TiltvpError
+from tiltvp.errors import OutputError, TiltvpError
+from tiltvp.files import check_output_folder
 
 if TYPE_CHECKING:
     from tiltvp.segments import Segments
@@ -60,6 +61,8 @@ def segments(
 
     if out is not None:
         check_ending(out)
+    if overlay is not None:
+        check_output_folder(overlay)
     lens = camera.load()
     detector = SegmentDetector(lens, **options.given())
     files, problems = find_images(images)
@@ -75,6 +78,8 @@ def segments(
                 if overlay is not None:
                     write_image(overlay / f"{name}.png", draw_segments(gray, lens, seen))
                 found.append((str(file), seen))
+            except OutputError:
+                raise
             except TiltvpError as error:
                 bar.complain(named(file, str(error)))
                 failed = True

@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 import csv
+import io
 import json
 import math
-import os
-import secrets
-from collections.abc import Callable, Iterable, Mapping
-from contextlib import suppress
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
-from tiltvp.errors import ImageFileError, InvalidInputError, MissingExtraError
+from tiltvp.errors import InvalidInputError, MissingExtraError
+from tiltvp.files import check_output, write_whole
 
 if TYPE_CHECKING:
     import polars as pl
@@ -47,6 +46,7 @@ def check_ending(path: Path) -> None:
         raise InvalidInputError(f"--out {path}: ends in {path.suffix!r}, expected one of {', '.join(ENDINGS)}")
     if path.suffix.lower() == ".parquet":
         need_lab(f"--out {path}")
+    check_output(path)
 
 
 def check_plot(option: str, path: Path | None) -> None:
@@ -56,6 +56,7 @@ def check_plot(option: str, path: Path | None) -> None:
     if path.suffix.lower() != ".png":
         raise InvalidInputError(f"{option} {path}: ends in {path.suffix!r}, expected .png")
     need_lab(f"{option} {path}")
+    check_output(path)
 
 
 def need_lab(what: str) -> None:
@@ -70,9 +71,9 @@ def write_table(table: Table, path: Path) -> None:
     """Writes the table whole or not at all; the ending says the format."""
     match path.suffix.lower():
         case ".csv":
-            write_whole(path, lambda part: _write_csv(table, part))
+            write_whole(path, _csv(table))
         case ".json":
-            write_whole(path, lambda part: _write_json(table, part))
+            write_whole(path, _json(table))
         case _:
             write_frame(table.frame(), path)
 
@@ -80,34 +81,23 @@ def write_table(table: Table, path: Path) -> None:
 def write_frame(frame: pl.DataFrame, path: Path) -> None:
     """Writes a data frame whole or not at all; the ending says the format."""
     check_ending(path)
+    memory = io.BytesIO()
     match path.suffix.lower():
         case ".csv":
-            write_whole(path, frame.write_csv)
+            frame.write_csv(memory)
         case ".json":
-            write_whole(path, frame.write_json)
+            frame.write_json(memory)
         case _:
-            write_whole(path, frame.write_parquet)
+            frame.write_parquet(memory)
+    write_whole(path, memory.getvalue())
 
 
-def write_whole(path: Path, write: Callable[[Path], Any]) -> None:
-    """Lets `write` make a file that appears at `path` when it is complete."""
-    part = path.with_name(f".{path.stem}.{secrets.token_hex(8)}.part{path.suffix}")
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        write(part)
-        os.replace(part, path)
-    except OSError as error:
-        raise ImageFileError(f"{path}: cannot be written ({error.strerror or error})") from error
-    finally:
-        with suppress(OSError):
-            part.unlink()
-
-
-def _write_csv(table: Table, path: Path) -> None:
-    with path.open("w", encoding="utf-8", newline="") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(table.types)
-        writer.writerows([_word(row[name]) for name in table.types] for row in table.rows)
+def _csv(table: Table) -> str:
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(table.types)
+    writer.writerows([_word(row[name]) for name in table.types] for row in table.rows)
+    return text.getvalue()
 
 
 def _word(cell: object) -> object:
@@ -117,9 +107,9 @@ def _word(cell: object) -> object:
     return "NaN" if isinstance(cell, float) and math.isnan(cell) else cell
 
 
-def _write_json(table: Table, path: Path) -> None:
+def _json(table: Table) -> str:
     rows = [{name: finite(row[name]) for name in table.types} for row in table.rows]
-    path.write_text(json.dumps(rows, allow_nan=False, ensure_ascii=False, separators=(",", ":")), encoding="utf-8")
+    return json.dumps(rows, allow_nan=False, ensure_ascii=False, separators=(",", ":"))
 
 
 def finite(value: Any) -> Any:

@@ -18,7 +18,8 @@ from tiltvp.cli.options import CameraOptions, MethodOptions
 from tiltvp.cli.results import Outcome, degrees, outcome_table, people_table
 from tiltvp.cli.tables import check_ending, write_table
 from tiltvp.cli.terminal import ProgressBar, complain, named, progress_bar, show, width
-from tiltvp.errors import InvalidInputError, TiltvpError
+from tiltvp.errors import InvalidInputError, OutputError, TiltvpError
+from tiltvp.files import check_output_folder
 
 if TYPE_CHECKING:
     import numpy as np
@@ -64,6 +65,9 @@ def tilt(
         check_ending(out)
     if overlay is not None and level is not None and os.path.realpath(overlay) == os.path.realpath(level):
         raise InvalidInputError(f"--overlay and --level are both {overlay}, expected two folders")
+    for folder in (overlay, level):
+        if folder is not None:
+            check_output_folder(folder)
     filtering.check()
     estimator = method.estimator(camera.load())
     files, problems = find_images(images)
@@ -121,9 +125,14 @@ class Work:
     filtering: FilterOptions
 
     def __call__(self, file: Path, name: str) -> Outcome:
-        """Estimates, and writes the pictures asked for; any problem of this image becomes its outcome."""
+        """Estimates, and writes the pictures asked for; any problem of this image becomes its outcome.
+
+        Raises `OutputError`, which all images would have.
+        """
         try:
             return self._run(file, name)
+        except OutputError:
+            raise
         except TiltvpError as error:
             return Outcome(file, error=" ".join(str(error).split()))
 

@@ -18,6 +18,7 @@ from tiltvp.cli.options import CameraOptions
 from tiltvp.cli.tables import Table, check_ending, check_plot, write_table
 from tiltvp.cli.terminal import ProgressBar, named, progress_bar, say
 from tiltvp.errors import InvalidInputError, TiltvpError
+from tiltvp.files import check_output
 
 if TYPE_CHECKING:
     import numpy as np
@@ -78,6 +79,8 @@ def track(
     from tiltvp.videos import video_writer
 
     check_ending(out)
+    if video is not None:
+        check_output(video)
     check_plot("--plot", plot)
     lens = camera.load()
     extractor, tilt = options.extractor(lens), options.tilts(lens)

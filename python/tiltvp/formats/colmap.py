@@ -26,6 +26,8 @@ _MODELS: Final[dict[str, tuple[str, tuple[str, ...]]]] = {
     "SIMPLE_RADIAL_FISHEYE": ("kannala_brandt", (*_F, "k1")),
     "RADIAL_FISHEYE": ("kannala_brandt", (*_F, "k1", "k2")),
 }
+MOST_CAMERAS: Final = 10_000
+"""Of a file: they are checked one by one, 10,000 a second."""
 _LINE: Final = re.compile(r"\s*\d+\s+[A-Z][A-Z0-9_]*\s+\d+\s+\d+(\s|$)", re.ASCII)
 _COUNT: Final = re.compile(r"#\s*Number of cameras:\s*(\d{1,9})\s*$", re.MULTILINE | re.ASCII)
 _HEADER: Final = "CAMERA_ID, MODEL, WIDTH, HEIGHT, PARAMS"
@@ -39,16 +41,19 @@ def recognise(document: Document) -> bool:
 
 def parse(document: Document, image_size: ImageSize | None) -> list[CameraSpec]:
     """The cameras of the file, in file order, each named `cam` and its id."""
+    if len(document.content_lines) > MOST_CAMERAS:
+        document.fail(f"{len(document.content_lines)} cameras", f"at most {MOST_CAMERAS}", "the end of the file")
     cameras = [_camera(document, number, words, image_size) for number, words in document.content_lines]
     if not cameras:
         document.fail("there is no camera", "a line CAMERA_ID MODEL WIDTH HEIGHT PARAMS[]", "the end of the file")
     stated = _COUNT.search(document.text)
     if stated is not None and int(stated[1]) != len(cameras):
         document.fail(f"{len(cameras)} cameras", f"the {stated[1]} of the header", "the end of the file")
-    names = [camera.name for camera in cameras]
-    for (number, _), name in zip(document.content_lines, names, strict=True):
-        if names.count(name) > 1:
-            document.fail(f"the camera id {name[3:]} occurs twice", "one line for each camera", f"line {number}")
+    names: set[str] = set()
+    for (number, _), camera in zip(document.content_lines, cameras, strict=True):
+        if camera.name in names:
+            document.fail(f"the camera id {camera.name[3:]} occurs twice", "one line for each camera", f"line {number}")
+        names.add(camera.name)
     return cameras
 
 

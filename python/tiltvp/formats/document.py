@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 import os
+import re
+import tomllib
 import xml.etree.ElementTree as ElementTree
 from dataclasses import dataclass
 from functools import cached_property
@@ -11,10 +13,18 @@ from pathlib import Path
 from typing import Final, NoReturn
 
 from tiltvp.errors import CalibrationError, CalibrationNotFoundError
+from tiltvp.files import read_bytes
 
 Tree = dict[str, object]
 
-_LARGEST_BYTES: Final = 4 << 20
+LARGEST_BYTES: Final = 1 << 20
+"""Of a calibration file. Calibrations have up to 100 kB, COLMAP's of 10,000 cameras 800 kB; JSON and XML take up to 100
+bytes of memory a byte."""
+LARGEST_TOML_BYTES: Final = 200_000
+"""The standard library reads some 200 kB a second of the worst text."""
+DEEPEST_KEY: Final = 16
+"""Parts of a dotted key, whose number the standard library takes squared; ours have 2."""
+_PART: Final = re.compile(r"[ \t]*[^\s,=\[\]{}#]+[ \t]*")
 
 
 @dataclass(frozen=True)
@@ -29,20 +39,16 @@ class Document:
         """Reads the file; a missing, unreadable, empty, oversized or binary one is a `CalibrationError`."""
         try:
             file = Path(path)
-            with file.open("rb") as stream:
-                raw = stream.read(_LARGEST_BYTES + 1)
+            raw = read_bytes(file, LARGEST_BYTES)
         except FileNotFoundError:
             raise CalibrationNotFoundError(f"{path}: no such file, expected a calibration file, at this path") from None
         except IsADirectoryError:
             raise CalibrationError(f"{path}: is a folder, expected a calibration file, at this path") from None
         except (OSError, ValueError, TypeError) as error:
+            why = (error.strerror if isinstance(error, OSError) else None) or error
             raise CalibrationError(
-                f"{path!s}: cannot be read ({error}), expected a calibration file, at this path"
+                f"{path!s}: cannot be read ({why}), expected a calibration file, at this path"
             ) from None
-        if len(raw) > _LARGEST_BYTES:
-            raise CalibrationError(
-                f"{path}: larger than {_LARGEST_BYTES} bytes, expected a calibration file, at its end"
-            )
         try:
             text = raw.decode("utf-8-sig")
         except UnicodeDecodeError as error:
@@ -70,6 +76,22 @@ class Document:
         """Whether the text begins as XML does."""
         return self.text.lstrip().startswith("<")
 
+    def toml(self, expected: str) -> Tree:
+        """The content as TOML; what is none is refused."""
+        problem = None
+        if len(self.text) > LARGEST_TOML_BYTES:
+            problem = f"{len(self.text)} characters, more than {LARGEST_TOML_BYTES}"
+        elif _has_deep_key(self.text):
+            problem = f"a key of more than {DEEPEST_KEY} parts"
+        if problem is None:
+            try:
+                return tomllib.loads(self.text)
+            except RecursionError:
+                problem = "nested too deeply"
+            except ValueError as error:
+                problem = str(error)
+        self.fail(f"is not TOML that is read ({problem})", expected, "the place named")
+
     @cached_property
     def content_lines(self) -> list[tuple[int, list[str]]]:
         """(line number, words) of the lines that hold something besides a `#` comment."""
@@ -89,11 +111,23 @@ class Document:
                 from tiltvp.formats.yaml_text import tree_of
 
                 tree = tree_of(self.text)
-        except (ElementTree.ParseError, ValueError, LookupError, RecursionError) as error:
+        except RecursionError:
+            return {}, "nested too deeply"
+        except (ElementTree.ParseError, ValueError, LookupError) as error:
             return {}, " ".join(str(error).split()) or type(error).__name__
         if not isinstance(tree, dict):
             return {}, f"a {type(tree).__name__} at the top"
         return {str(key): value for key, value in tree.items()}, ""
+
+
+def _has_deep_key(text: str) -> bool:
+    """Whether so many words follow each other with dots between; a sentence has spaces within its parts."""
+    parts = 0
+    for part in text.split("."):
+        parts = parts + 1 if _PART.fullmatch(part) else 1
+        if parts > DEEPEST_KEY:
+            return True
+    return False
 
 
 def _from_pairs(pairs: list[tuple[str, object]]) -> Tree:

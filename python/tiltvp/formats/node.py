@@ -14,9 +14,12 @@ from tiltvp.errors import CalibrationError, TiltvpError, UnsupportedFormatError
 from tiltvp.formats.document import Document
 from tiltvp.formats.spec import CameraSpec, ImageSize, Parameters
 
-_NUMBER: Final = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
+_NUMBER: Final = re.compile(r"[+-]?(\d+(\.\d*)?|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 _DEEPEST: Final = 4
-_MOST_NUMBERS: Final = 10_000
+MOST_NUMBERS: Final = 10_000
+"""Of a list or a matrix; the largest that a camera has are 20."""
+LONGEST_NUMBER: Final = 400
+"""Characters of a number: the longest decimals of a double have 327."""
 
 
 class Node:
@@ -122,9 +125,9 @@ class Node:
         if isinstance(value, dict):
             shape = (self.need("rows").integer(), self.need("cols").integer())
             value = self.need("data").value
-        items = list(itertools.islice(self._flat(value, _DEEPEST), _MOST_NUMBERS + 1))
-        if len(items) > _MOST_NUMBERS:
-            self.fail(f"more than {_MOST_NUMBERS} numbers", "the numbers of one camera")
+        items = list(itertools.islice(self._flat(value, _DEEPEST), MOST_NUMBERS + 1))
+        if len(items) > MOST_NUMBERS:
+            self.fail(f"more than {MOST_NUMBERS} numbers", "the numbers of one camera")
         numbers = [self._number(item) for item in items]
         if shape is not None and shape[0] * shape[1] != len(numbers):
             self.fail(f"{len(numbers)} numbers", f"{shape[0]} rows of {shape[1]}")
@@ -155,7 +158,7 @@ class Node:
             word = value.strip()
             if word.lower().lstrip("+-.") in ("nan", "inf", "infinity"):
                 self.fail(f"found {word}", "a finite number")
-            if not _NUMBER.fullmatch(word):
+            if len(word) > LONGEST_NUMBER or not _NUMBER.fullmatch(word):
                 self.fail(f"found {_shown(value)}", "a number")
             number = float(word)
         elif isinstance(value, int | float) and not isinstance(value, bool):

@@ -14,13 +14,13 @@ from __future__ import annotations
 
 import re
 
+from tiltvp import _core
 from tiltvp.formats.document import Document
 from tiltvp.formats.node import Node
 from tiltvp.formats.spec import CameraSpec, ImageSize
 
-_NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?|[+-]?(nan|inf)", re.ASCII | re.IGNORECASE)
+_NUMBER = re.compile(r"[+-]?(\d+(\.\d*)?|\.\d+)([eE][+-]?\d+)?|[+-]?(nan|inf)", re.ASCII | re.IGNORECASE)
 _OMNI_CAM_WORDS = 2 + 5 + 2 + 3 + 12
-_LONGEST_POLYNOMIAL = 200
 
 
 def recognise(document: Document) -> bool:
@@ -109,8 +109,8 @@ class _Words:
         """A count and that many numbers."""
         node = self.node(f"number of coefficients of the {what}")
         count = node.integer()
-        if not 1 <= count <= _LONGEST_POLYNOMIAL:
-            node.fail(f"found {count} coefficients", f"1 to {_LONGEST_POLYNOMIAL}")
+        if not 1 <= count <= _core.MOST_COEFFICIENTS:
+            node.fail(f"found {count} coefficients", f"1 to {_core.MOST_COEFFICIENTS}")
         return self.take(count, what)
 
     def end(self) -> None:

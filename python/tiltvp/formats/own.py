@@ -17,21 +17,19 @@ from __future__ import annotations
 
 import os
 import re
-import secrets
-import tomllib
 from collections.abc import Sequence
 from dataclasses import replace
-from pathlib import Path
 from typing import Final
 
 from tiltvp.errors import CalibrationError, TiltvpError
+from tiltvp.files import write_whole
 from tiltvp.formats.document import Document
 from tiltvp.formats.node import Node
 from tiltvp.formats.spec import CameraSpec, ImageSize, Parameters
 
 _FORMAT: Final = "tiltvp-camera"
 _VERSION: Final = 1
-_MARK: Final = re.compile(r"^\s*format\s*=\s*[\"']tiltvp-camera[\"']", re.MULTILINE)
+_MARK: Final = re.compile(r"^[^\S\n]*format[^\S\n]*=[^\S\n]*[\"']tiltvp-camera[\"']", re.MULTILINE)
 _KEYS: Final = ("name", "model", "width", "height", "mirror", "max_theta_rad", "notes", "parameters")
 
 
@@ -42,11 +40,7 @@ def recognise(document: Document) -> bool:
 
 def parse(document: Document, image_size: ImageSize | None) -> list[CameraSpec]:
     """The cameras of the file, in file order."""
-    try:
-        tree = tomllib.loads(document.text)
-    except (ValueError, RecursionError) as error:
-        document.fail(f"is not TOML ({error})", "a file written by tiltvp", "the place named")
-    root = Node(document, tree)
+    root = Node(document, document.toml("a file written by tiltvp"))
     root.only("format", "version", "camera")
     if root.need("format").text() != _FORMAT:
         root.need("format").fail(f"found {root.need('format').text()!r}", _FORMAT)
@@ -60,7 +54,7 @@ def parse(document: Document, image_size: ImageSize | None) -> list[CameraSpec]:
 
 
 def write_toml(spec: CameraSpec | Sequence[CameraSpec], path: str | os.PathLike[str]) -> None:
-    """Writes one camera, or several, to `path`; the file appears whole or not at all."""
+    """Writes one camera, or several, to `path`; the file appears whole or not at all. Raises `OutputError`."""
     specs = [spec] if isinstance(spec, CameraSpec) else list(spec)
     if not specs:
         raise CalibrationError(f"{path}: there is no camera to write, expected one or more, at spec")
@@ -72,7 +66,7 @@ def write_toml(spec: CameraSpec | Sequence[CameraSpec], path: str | os.PathLike[
     tree = {"format": _FORMAT, "version": _VERSION, "camera": [camera_table(as_floats(one)) for one in specs]}
     import tomli_w
 
-    write_whole(Path(path), tomli_w.dumps(tree).encode("utf-8"))
+    write_whole(path, tomli_w.dumps(tree))
 
 
 def camera_from(camera: Node, given: ImageSize | None) -> CameraSpec:
@@ -118,21 +112,3 @@ def camera_table(spec: CameraSpec) -> dict[str, object]:
         table["notes"] = list(spec.notes)
     table["parameters"] = dict(spec.parameters)
     return table
-
-
-def write_whole(path: Path, content: bytes) -> None:
-    """Writes a file that appears whole or not at all."""
-    target = Path(os.path.realpath(path))
-    beside = target.with_name(f".{target.name}.{secrets.token_hex(8)}.part")
-    try:
-        with open(beside, "xb") as stream:
-            stream.write(content)
-            stream.flush()
-            os.fsync(stream.fileno())
-        os.replace(beside, target)
-    except OSError as error:
-        raise CalibrationError(
-            f"{path}: cannot be written ({error}), expected a writable place, at this path"
-        ) from None
-    finally:
-        beside.unlink(missing_ok=True)

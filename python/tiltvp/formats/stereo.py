@@ -18,26 +18,25 @@ from __future__ import annotations
 
 import os
 import re
-import tomllib
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tiltvp.errors import CalibrationError
+from tiltvp.files import write_whole
 from tiltvp.formats import kalibr
 from tiltvp.formats.document import Document
 from tiltvp.formats.node import Node
-from tiltvp.formats.own import as_floats, camera_from, camera_table, write_whole
+from tiltvp.formats.own import as_floats, camera_from, camera_table
 from tiltvp.formats.spec import CameraSpec, ImageSize
 
 __all__ = ["StereoSpec", "read_stereo", "write_stereo_toml"]
 
 _FORMAT: Final = "tiltvp-stereo"
 _VERSION: Final = 1
-_MARK: Final = re.compile(r"^\s*format\s*=\s*[\"']tiltvp-stereo[\"']", re.MULTILINE)
+_MARK: Final = re.compile(r"^[^\S\n]*format[^\S\n]*=[^\S\n]*[\"']tiltvp-stereo[\"']", re.MULTILINE)
 _EXPECTED: Final = 'a camchain of Kalibr with two cameras, or a file with format = "tiltvp-stereo"'
 
 
@@ -64,20 +63,16 @@ def read_stereo(path: str | os.PathLike[str], image_size: ImageSize | None = Non
 
 
 def write_stereo_toml(spec: StereoSpec, path: str | os.PathLike[str]) -> None:
-    """Writes a pair to `path`; the file appears whole or not at all."""
+    """Writes a pair to `path`; the file appears whole or not at all. Raises `OutputError`."""
     tree = {"format": _FORMAT, "version": _VERSION, "left_from_right": np.asarray(spec.left_from_right).tolist()}
     tree |= {"left": camera_table(as_floats(spec.left)), "right": camera_table(as_floats(spec.right))}
     import tomli_w
 
-    write_whole(Path(path), tomli_w.dumps(tree).encode("utf-8"))
+    write_whole(path, tomli_w.dumps(tree))
 
 
 def _own(document: Document, image_size: ImageSize | None) -> StereoSpec:
-    try:
-        tree = tomllib.loads(document.text)
-    except (ValueError, RecursionError) as error:
-        document.fail(f"is not TOML ({error})", "a file written by tiltvp", "the place named")
-    root = Node(document, tree)
+    root = Node(document, document.toml("a file written by tiltvp"))
     root.only("format", "version", "left_from_right", "left", "right")
     version = root.need("version")
     if version.integer() != _VERSION:

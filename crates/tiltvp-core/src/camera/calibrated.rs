@@ -11,6 +11,10 @@ use crate::error::{Error, Result};
 /// tables of its pixels would not fit into memory (`every_model_refuses_an_impossible_size`).
 pub const LARGEST_SIDE_PX: u32 = 100_000;
 
+/// The most pixels of an image: a panorama of 20,000 x 10,000, above the 151 megapixels of the largest sensors that are sold.
+/// Tables of more would take over 8 GB, so that a slip in a small file could end the process.
+pub const MOST_PIXELS: u64 = 200_000_000;
+
 /// A calibrated central camera.
 ///
 /// If `mirror` is set the image is seen in a mirror: bearings have the `z` component of the model negated, so that the
@@ -32,13 +36,17 @@ impl Camera {
     /// A camera with images of `width` x `height` pixels that answers wherever its model does.
     ///
     /// # Errors
-    /// [`Error::InvalidCamera`] unless the sides of the image are from 1 to [`LARGEST_SIDE_PX`], and those of the model if
-    /// it is made for one size.
+    /// [`Error::InvalidCamera`] unless the sides of the image are from 1 to [`LARGEST_SIDE_PX`], its pixels at most
+    /// [`MOST_PIXELS`], and the sides those of the model if it is made for one size.
     pub fn new(width: u32, height: u32, model: Model) -> Result<Self> {
         for (name, side) in [("width", width), ("height", height)] {
             if !(1..=LARGEST_SIDE_PX).contains(&side) {
                 return Err(Error::camera(model.name(), name, side, format!("1 to {LARGEST_SIDE_PX} pixels")));
             }
+        }
+        if u64::from(width) * u64::from(height) > MOST_PIXELS {
+            let expected = format!("at most {MOST_PIXELS} pixels in all");
+            return Err(Error::camera(model.name(), "width, height", format!("{width} x {height}"), expected));
         }
         if let Some([w, h]) = model.as_dyn().image_size().filter(|size| *size != [width, height]) {
             let expected = format!("{w} x {h}, the size that the model is made for");
@@ -92,6 +100,19 @@ impl Camera {
     /// The largest angle, from the ray through the centre of the image, for which the camera answers, in radians.
     pub fn max_theta_rad(&self) -> f64 {
         self.max_theta_rad
+    }
+
+    /// Asks for so many bytes a pixel of the image at once and gives them back: tables of this size can be made then, and need not
+    /// be asked for one by one. (Another thread may take the memory in between; a process that is short of it then ends.)
+    ///
+    /// # Errors
+    /// [`Error::InvalidCamera`] where the memory cannot be had.
+    pub fn check_memory(&self, bytes_per_pixel: usize) -> Result<()> {
+        let bytes = self.width as usize * self.height as usize * bytes_per_pixel;
+        Vec::<u8>::new().try_reserve_exact(bytes).map_err(|_| {
+            let expected = format!("an image for whose tables, here of {} MiB, there is memory", bytes >> 20);
+            Error::camera(self.model.name(), "width, height", format!("{} x {}", self.width, self.height), expected)
+        })
     }
 
     /// Whether a pixel lies in the image, the outer halves of the border pixels included.

@@ -5,6 +5,7 @@ use nalgebra::{Matrix2, SVector, Vector2, Vector3};
 use super::calibrated::Camera;
 use super::difference::{Derivative, derivative};
 use crate::geometry::angle_between;
+use crate::interrupt::check;
 
 /// What [`conformance`] measured. A camera that is right has round trips of rounding error and Jacobians that differ from
 /// the differences by about the error of these.
@@ -71,6 +72,7 @@ pub fn conformance(camera: &Camera) -> Conformance {
     let centre = on_axis.unwrap_or(middle);
     let mut test = Test::new(camera, &centre);
     for i in 0..GRID {
+        check();
         for j in 0..GRID {
             let part = Vector2::new(f64::from(j), f64::from(i)) / f64::from(GRID - 1);
             test.pixel(&Vector2::new(part.x * (w - 1.0), part.y * (h - 1.0)), true);

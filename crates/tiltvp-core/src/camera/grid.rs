@@ -72,12 +72,16 @@ impl PixelGrid {
     }
 }
 
-/// Refuses a parameter that is not a positive finite number.
+/// No lens has a focal length or another scale below this: an image of it is a point. It mirrors the largest number of a parameter.
+const SMALLEST: f64 = 1e-15;
+
+/// Refuses a parameter that is not a positive finite number of ordinary size.
 pub(super) fn positive(model: &'static str, name: &str, value: f64) -> Result<()> {
-    if value.is_finite() && value > 0.0 {
+    if value.is_finite() && value >= SMALLEST {
         return Ok(());
     }
-    Err(Error::camera(model, name, value, "a positive finite number"))
+    let expected = if value > 0.0 { "a number from 1e-15 on" } else { "a positive finite number" };
+    Err(Error::camera(model, name, value, expected))
 }
 
 /// Refuses parameters that are not finite.

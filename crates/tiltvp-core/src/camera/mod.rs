@@ -44,7 +44,7 @@ mod sphere;
 mod table;
 mod unified;
 
-pub use calibrated::{Camera, LARGEST_SIDE_PX};
+pub use calibrated::{Camera, LARGEST_SIDE_PX, MOST_PIXELS};
 pub use conformance::{Conformance, conformance};
 pub use difference::{Derivative, derivative};
 pub use double_sphere::DoubleSphere;
@@ -57,7 +57,7 @@ pub use ocam::Ocam;
 pub use pinhole::Pinhole;
 pub use radial_polynomial::RadialPolynomial;
 pub use rays::PixelRays;
-pub use schema::{Kind, LensSchema, Parameter, ParameterSchema, Resize};
+pub use schema::{Kind, LensSchema, MOST_COEFFICIENTS, Parameter, ParameterSchema, Resize};
 pub use unified::Unified;
 
 use parameters::Values;

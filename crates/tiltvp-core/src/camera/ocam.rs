@@ -7,7 +7,7 @@ use super::lens::Lens;
 use super::parameters::Values;
 use super::polynomial::{evaluate, first_fall, product, root_bound, sum};
 use super::rim::FOLD;
-use super::schema::{CX, CY, Kind, LensSchema, Parameter, ParameterSchema, Parametric, Resize, scalars};
+use super::schema::{CX, CY, Kind, LensSchema, Parameter, ParameterSchema, Parametric, Resize, scalars, too_many};
 use super::solve;
 use super::table::Table;
 use crate::error::{Error, Result};
@@ -82,9 +82,12 @@ impl Ocam {
     /// OCamCalib's own order and sign, with the inverse polynomial of the file or none.
     ///
     /// # Errors
-    /// [`Error::InvalidCamera`] if a number is not finite, `a0` is zero, `c - d e` is not positive, or the angle does not
+    /// [`Error::InvalidCamera`] if a list has more than [`MOST_COEFFICIENTS`](super::MOST_COEFFICIENTS) numbers, a number is not
+    /// finite, `a0` is zero, `c - d e` is not positive, or the angle does not
     /// grow with the radius.
     pub fn new(polynomial: &[f64], affine: [f64; 3], centre_px: [f64; 2], inverse_polynomial: &[f64]) -> Result<Self> {
+        too_many(NAME, "polynomial", polynomial)?;
+        too_many(NAME, "inverse_polynomial", inverse_polynomial)?;
         let all_finite = |c: &[f64]| c.iter().all(|x| x.is_finite());
         let a0 = polynomial.first().copied().unwrap_or(0.0);
         if a0 == 0.0 || !all_finite(polynomial) {

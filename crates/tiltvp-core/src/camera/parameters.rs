@@ -1,6 +1,6 @@
 //! Camera models by name, with named parameters: what is given is matched against what the lens declares.
 
-use super::schema::{Kind, LensSchema, Parameter, Parametric, Resize};
+use super::schema::{Kind, LensSchema, Parameter, Parametric, Resize, too_many};
 use super::{Entry, LENSES, Model, with_model};
 use crate::error::{Error, Result};
 use crate::options::edit_distance;
@@ -84,9 +84,14 @@ impl<'a> Values<'a> {
             let value = given.iter().find(|(name, _)| name == parameter.name).map(|(_, value)| value);
             match (value, parameter.kind) {
                 (Some(Parameter::Scalar(x)), Kind::Required | Kind::Optional(_)) => values.numbers.push(*x),
-                (Some(Parameter::List(x)), Kind::RequiredList | Kind::OptionalList) => values.lists.push(x),
+                (Some(Parameter::List(x)), Kind::RequiredList | Kind::OptionalList) => {
+                    too_many(schema.name, parameter.name, x)?;
+                    values.lists.push(x);
+                }
                 (Some(Parameter::Scalar(x)), _) => return Err(wrong(x.to_string(), "a list of numbers".into())),
-                (Some(Parameter::List(x)), _) => return Err(wrong(format!("{x:?}"), "one number, not a list".into())),
+                (Some(Parameter::List(x)), _) => {
+                    return Err(wrong(format!("a list of {}", x.len()), "one number, not a list".into()));
+                }
                 (None, Kind::Optional(default)) => values.numbers.push(default),
                 (None, Kind::OptionalList) => values.lists.push(&[]),
                 (None, Kind::Required | Kind::RequiredList) => {

@@ -6,6 +6,7 @@ use super::calibrated::Camera;
 use super::equirectangular::Equirectangular;
 use super::model::CameraModel;
 use crate::error::{Error, Result};
+use crate::interrupt::check;
 
 /// `samples` x `samples` rays in each pixel that sees anything, at the centres of as many equal parts of it.
 ///
@@ -43,6 +44,9 @@ impl PixelRays {
         let mut rays = vec![[f32::NAN; 3]; samples * samples];
         for place in 0..count {
             let (u, v) = (f64::from(place % width), f64::from(place / width));
+            if u == 0.0 {
+                check();
+            }
             let places = offsets.iter().flat_map(|dv| offsets.iter().map(move |du| Vector2::new(u + du, v + dv)));
             let mut is_seen = false;
             for (ray, pixel) in rays.iter_mut().zip(places) {

@@ -1,7 +1,11 @@
 //! What a lens declares of itself: its name, its parameters in order, how it is made of them, and their values.
 
 use super::parameters::Values;
-use crate::error::Result;
+use crate::error::{Error, Result};
+
+/// The most numbers in a list of a lens. Calibrations have up to 20; the rim of a polynomial is found by the roots of all its
+/// derivatives, in time cubic and memory quadratic in their number: 200 take 10 ms and 300 kB.
+pub const MOST_COEFFICIENTS: usize = 200;
 
 /// The value of a named parameter of a camera model.
 #[derive(Debug, Clone, PartialEq)]
@@ -110,6 +114,15 @@ pub(super) const FY: ParameterSchema = ParameterSchema::required("fy", Resize::L
 pub(super) const CX: ParameterSchema =
     ParameterSchema::required("cx", Resize::Coordinate, "column of the centre, pixels");
 pub(super) const CY: ParameterSchema = ParameterSchema::required("cy", Resize::Coordinate, "row of the centre, pixels");
+
+/// Refuses a list of more than [`MOST_COEFFICIENTS`] numbers.
+pub(super) fn too_many(model: &'static str, parameter: &'static str, numbers: &[f64]) -> Result<()> {
+    if numbers.len() <= MOST_COEFFICIENTS {
+        return Ok(());
+    }
+    let expected = format!("at most {MOST_COEFFICIENTS} numbers");
+    Err(Error::camera(model, parameter, format!("a list of {}", numbers.len()), expected))
+}
 
 /// Numbers as values of parameters.
 pub(super) fn scalars(groups: &[&[f64]]) -> Vec<Parameter> {

@@ -42,15 +42,19 @@ impl LiftTable {
             });
             matrix.map_or(Matrix3x2::zeros(), |matrix| robot_from_camera * matrix)
         };
-        let matrices: Vec<Matrix3x2<f64>> = region.pixels().map(|(u, v, _)| map(u, v)).collect();
-        let mean_square =
-            matrices.iter().map(Matrix3x2::norm_squared).sum::<f64>() / (2 * matrices.len().max(1)) as f64;
+        // Twice, as the matrices would take four times the memory of the table.
+        let matrices = || region.places().map(|(u, v)| map(u, v));
+        let (squares, largest) = matrices().fold((0.0, 0.0f64), |(squares, largest), matrix| {
+            (squares + matrix.norm_squared(), largest.max(matrix.amax()))
+        });
+        let mean_square = squares / (2 * region.len().max(1)) as f64;
         let scale = 1.0 / mean_square.sqrt().max(f64::MIN_POSITIVE);
-        let unit =
-            matrices.iter().map(Matrix3x2::amax).fold(0.0, f64::max).max(f64::MIN_POSITIVE) / f64::from(i16::MAX);
+        let unit = largest.max(f64::MIN_POSITIVE) / f64::from(i16::MAX);
         let entry = |m: &Matrix3x2<f64>, i: usize, j: usize| u32::from((m[(i, j)] / unit).round() as i16 as u16);
-        let words = |m: &Matrix3x2<f64>| std::array::from_fn(|i| entry(m, i, 0) | (entry(m, i, 1) << 16));
-        Self { maps: matrices.iter().map(words).collect(), unit: (unit * scale) as f32 }
+        let words = |m: Matrix3x2<f64>| std::array::from_fn(|i| entry(&m, i, 0) | (entry(&m, i, 1) << 16));
+        let mut maps = Vec::with_capacity(region.len());
+        maps.extend(matrices().map(words));
+        Self { maps, unit: (unit * scale) as f32 }
     }
 
     /// The prefilter of the test that [`lift`](Self::lift) makes: `|m_z| <= sin_max |m|` with `|m|` no more than the largest

@@ -1,11 +1,11 @@
 //! The pixels of the elevation band, as spans of rows, computed once per camera.
 
 use nalgebra::{Matrix3, Vector2, Vector3};
-use tiltvp_kernels::prefetch::prefetch;
 
 use super::options::{EdgeOptions, Mask};
 use crate::camera::Camera;
 use crate::error::{Error, Result};
+use crate::interrupt::check;
 
 /// A run of pixels `first..end` of row `v`; `slot` numbers its first pixel among all pixels of the region.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -23,8 +23,9 @@ pub struct Span {
 /// The pixels whose bearings lie in the elevation band, clear of everything that is not the world.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Region {
+    camera: Camera,
+    robot_from_camera: Matrix3<f64>,
     spans: Vec<Span>,
-    bearings: Vec<Vector3<f64>>,
     /// Column and row of each pixel.
     places: Vec<(u16, u16)>,
     first_column: usize,
@@ -32,12 +33,22 @@ pub struct Region {
     pixels_per_rad: f64,
 }
 
+/// Bytes a pixel of the image that its tables take at most while they are made: places 4, sectors 1, maps 12, the prefilter's vectors
+/// 4 and, while they are made, 8 more.
+const TABLE_BYTES: usize = 29;
+
+/// Bytes a pixel that the memory of one thread takes at most, where every pixel is an edge pixel.
+const SCRATCH_BYTES: usize = 48;
+
+/// Pixels after which a walk over all asks whether it is to end: a millisecond where a pixel takes 0.2 us.
+const CHECKED_PIXELS: usize = 4096;
+
 impl Region {
-    /// Walks over the image once.
+    /// Walks over the image once. Bearings are computed again where they are asked for: they would be most of the memory.
     ///
     /// # Errors
     /// [`Error::InvalidArgument`] if the mask has another size than the camera's images, [`Error::InvalidOption`] if no
-    /// pixel is left.
+    /// pixel is left, [`Error::InvalidCamera`] if the tables of the camera do not fit into memory.
     pub fn new(
         camera: &Camera,
         robot_from_camera: &Matrix3<f64>,
@@ -62,54 +73,62 @@ impl Region {
                 "images of at most 65535 pixels a side",
             ));
         }
+        camera.check_memory(TABLE_BYTES + SCRATCH_BYTES)?;
         let (lowest, highest) = (options.elevation_min_rad.sin(), options.elevation_max_rad.sin());
-        let mut bearings = vec![None; width * height];
-        for (i, bearing) in bearings.iter_mut().enumerate() {
+        let mut seen = vec![false; width * height];
+        let mut in_band = seen.clone();
+        for (i, (seen, in_band)) in seen.iter_mut().zip(&mut in_band).enumerate() {
             let (u, v) = (i % width, i / width);
+            if u == 0 {
+                check();
+            }
             if mask.is_none_or(|mask| mask.usable(u, v)) {
-                *bearing = camera.unproject(&Vector2::new(u as f64, v as f64)).map(|b| robot_from_camera * b);
+                let bearing = camera.unproject(&Vector2::new(u as f64, v as f64)).map(|b| robot_from_camera * b);
+                *seen = bearing.is_some();
+                *in_band = bearing.is_some_and(|b| (lowest..=highest).contains(&b.z));
             }
         }
-        let clear = erode(&bearings.iter().map(Option::is_some).collect::<Vec<_>>(), width, height, options.reach_px());
+        let clear = erode(&seen, width, options.reach_px());
+        drop(seen);
+        let mut inside = in_band;
+        inside.iter_mut().zip(&clear).for_each(|(inside, clear)| *inside &= clear);
+        drop(clear);
+        let count = inside.iter().filter(|inside| **inside).count();
         let mut region = Self {
+            camera: camera.clone(),
+            robot_from_camera: *robot_from_camera,
             spans: Vec::new(),
-            bearings: Vec::new(),
-            places: Vec::new(),
+            places: Vec::with_capacity(count),
             first_column: width,
             end_column: 0,
             pixels_per_rad: 0.0,
         };
-        for v in 0..height {
+        for (v, row) in inside.chunks_exact(width).enumerate() {
             let mut open: Option<Span> = None;
             for u in 0..=width {
-                let inside = (u < width && clear[v * width + u])
-                    .then(|| bearings[v * width + u])
-                    .flatten()
-                    .filter(|bearing| (lowest..=highest).contains(&bearing.z));
-                match (inside, &mut open) {
-                    (Some(bearing), _) => {
-                        open.get_or_insert(Span { v, first: u, end: u, slot: region.bearings.len() }).end = u + 1;
-                        region.bearings.push(bearing);
+                match (row.get(u).is_some_and(|inside| *inside), &mut open) {
+                    (true, _) => {
+                        open.get_or_insert(Span { v, first: u, end: u, slot: region.places.len() }).end = u + 1;
                         region.places.push((u as u16, v as u16));
                     }
-                    (None, Some(span)) => {
+                    (false, Some(span)) => {
                         region.first_column = region.first_column.min(span.first);
                         region.end_column = region.end_column.max(span.end);
                         region.spans.push(*span);
                         open = None;
                     }
-                    (None, None) => {}
+                    (false, None) => {}
                 }
             }
         }
-        if region.bearings.is_empty() {
+        if region.places.is_empty() {
             return Err(Error::option(
                 "elevation_min_rad, elevation_max_rad",
                 format!("[{:.3}, {:.3}]", options.elevation_min_rad, options.elevation_max_rad),
                 "a band that some pixel of the camera sees: check robot_from_camera, the mask and the margin",
             ));
         }
-        region.pixels_per_rad = 1.0 / region.mean_solid_angle(camera).sqrt();
+        region.pixels_per_rad = 1.0 / region.mean_solid_angle().sqrt();
         Ok(region)
     }
 
@@ -122,8 +141,9 @@ impl Region {
             return Ok(self);
         }
         let mut thinned = Self {
+            camera: self.camera,
+            robot_from_camera: self.robot_from_camera,
             spans: Vec::new(),
-            bearings: Vec::new(),
             places: Vec::new(),
             first_column: usize::MAX,
             end_column: 0,
@@ -131,22 +151,21 @@ impl Region {
         };
         for span in self.spans.iter().filter(|span| span.v.checked_rem(stride as usize) == Some(0)) {
             let own = span.slot..span.slot + span.end - span.first;
-            thinned.spans.push(Span { slot: thinned.bearings.len(), ..*span });
-            thinned.bearings.extend_from_slice(&self.bearings[own.clone()]);
+            thinned.spans.push(Span { slot: thinned.places.len(), ..*span });
             thinned.places.extend_from_slice(&self.places[own]);
             thinned.first_column = thinned.first_column.min(span.first);
             thinned.end_column = thinned.end_column.max(span.end);
         }
-        if thinned.bearings.is_empty() {
+        if thinned.places.is_empty() {
             return Err(Error::option("row_stride", stride, "a number of rows from 1 on that leaves some of the band"));
         }
         Ok(thinned)
     }
 
     /// Mean solid angle of a pixel in steradians, over a sample of the pixels.
-    fn mean_solid_angle(&self, camera: &Camera) -> f64 {
+    fn mean_solid_angle(&self) -> f64 {
         let angle = |(u, v): &(u16, u16)| {
-            let (_, back) = camera.unproject_jacobian(&Vector2::new(f64::from(*u), f64::from(*v)))?;
+            let (_, back) = self.camera.unproject_jacobian(&Vector2::new(f64::from(*u), f64::from(*v)))?;
             Some(back.column(0).cross(&back.column(1)).norm())
         };
         let angles: Vec<f64> = self.places.iter().step_by(1 + self.places.len() / 1024).filter_map(angle).collect();
@@ -160,12 +179,12 @@ impl Region {
 
     /// How many pixels there are.
     pub fn len(&self) -> usize {
-        self.bearings.len()
+        self.places.len()
     }
 
     /// Whether there are none (never, once made).
     pub fn is_empty(&self) -> bool {
-        self.bearings.is_empty()
+        self.places.is_empty()
     }
 
     /// Columns `first..end` that hold all spans.
@@ -184,41 +203,50 @@ impl Region {
         self.places.get(slot).copied().unwrap_or_default()
     }
 
-    /// The unit bearing of the pixel `slot` in the robot frame; none beyond the region.
-    #[inline]
-    pub fn bearing(&self, slot: usize) -> Option<&Vector3<f64>> {
-        self.bearings.get(slot)
-    }
-
-    /// Asks for the bearing of a pixel that will be read soon.
-    #[inline]
-    pub(crate) fn prefetch(&self, slot: usize) {
-        prefetch(&self.bearings, slot);
-    }
-
     /// Each pixel `(u, v)` of the region with its bearing in the robot frame, in slot order.
     pub fn pixels(&self) -> impl Iterator<Item = (usize, usize, Vector3<f64>)> + '_ {
-        self.places.iter().zip(&self.bearings).map(|((u, v), bearing)| (usize::from(*u), usize::from(*v), *bearing))
+        let bearing = |u: usize, v: usize| {
+            let seen = self.camera.unproject(&Vector2::new(u as f64, v as f64));
+            self.robot_from_camera * seen.unwrap_or_else(|| Vector3::repeat(f64::NAN))
+        };
+        self.places().map(move |(u, v)| (u, v, bearing(u, v)))
+    }
+
+    /// `(u, v)` of every pixel, in slot order.
+    pub fn places(&self) -> impl Iterator<Item = (usize, usize)> + '_ {
+        self.places.iter().enumerate().map(|(slot, (u, v))| {
+            if slot.is_multiple_of(CHECKED_PIXELS) {
+                check();
+            }
+            (usize::from(*u), usize::from(*v))
+        })
     }
 }
 
 /// `true` where the whole square of `reach` pixels about a pixel is `true`; what lies outside the image is not.
-fn erode(inside: &[bool], width: usize, height: usize, reach: usize) -> Vec<bool> {
-    let shrink = |source: &[bool], length: usize, lines: usize, at: &dyn Fn(usize, usize) -> usize| {
-        let mut out = vec![false; source.len()];
-        for line in 0..lines {
-            let mut run = 0;
-            for i in 0..length {
-                run = if source[at(line, i)] { run + 1 } else { 0 };
-                if run > 2 * reach {
-                    out[at(line, i - reach)] = true;
-                }
+fn erode(inside: &[bool], width: usize, reach: usize) -> Vec<bool> {
+    let mut rows = vec![false; inside.len()];
+    for (source, row) in inside.chunks_exact(width).zip(rows.chunks_exact_mut(width)) {
+        let mut run = 0;
+        for (u, inside) in source.iter().enumerate() {
+            run = if *inside { run + 1 } else { 0 };
+            if run > 2 * reach {
+                row[u - reach] = true;
             }
         }
-        out
-    };
-    let rows = shrink(inside, width, height, &|v, u| v * width + u);
-    shrink(&rows, height, width, &|u, v| v * width + u)
+    }
+    let mut out = vec![false; inside.len()];
+    let mut runs = vec![0; width];
+    for (v, row) in rows.chunks_exact(width).enumerate() {
+        check();
+        for (u, (inside, run)) in row.iter().zip(&mut runs).enumerate() {
+            *run = if *inside { *run + 1 } else { 0 };
+            if *run > 2 * reach {
+                out[(v - reach) * width + u] = true;
+            }
+        }
+    }
+    out
 }
 
 #[cfg(test)]

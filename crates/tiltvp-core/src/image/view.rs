@@ -28,6 +28,8 @@ impl<'a> ImageView<'a> {
                 format!("{height} rows of {width} bytes"),
             ));
         }
+        // Of a single row the stride says nothing, and may be anything: places below it must not overflow.
+        let stride = if height == 1 { width } else { stride };
         Ok(Self { data, width, height, stride })
     }
 
@@ -69,5 +71,19 @@ impl<'a> ImageView<'a> {
         let at = v * self.stride + u;
         let (above, below) = (self.data.get(at..at + 2)?, self.data.get(at + self.stride..at + self.stride + 2)?);
         Some([above[0], above[1], below[0], below[1]])
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_stride_of_a_single_row_is_its_width() {
+        for stride in [4, 5, usize::MAX] {
+            let view = ImageView::new(&[1, 2, 3, 4], 4, 1, stride).unwrap();
+            assert_eq!((view.stride(), view.row(0), view.row(1)), (4, &[1, 2, 3, 4][..], &[][..]));
+        }
+        assert!(ImageView::new(&[0; 8], 4, 2, usize::MAX).is_err());
     }
 }

@@ -6,6 +6,7 @@ use super::options::LineOptions;
 use crate::camera::Camera;
 use crate::edges::{EdgeOptions, LiftTable, NormalKind, Prefilter, Region};
 use crate::error::Result;
+use crate::interrupt::check;
 
 /// The unit of a table of bearings: the largest that 16 bits hold for components from -1 to 1.
 const UNIT: f32 = 1.0 / 32767.0;
@@ -39,6 +40,9 @@ impl LineTables {
         let prefilter = lift.prefilter(1.0);
         let (width, height) = (camera.width() as usize, camera.height() as usize);
         let rays = (0..width * height).map(|i| {
+            if i.is_multiple_of(width) {
+                check();
+            }
             let pixel = Vector2::new((i % width) as f64, (i / width) as f64);
             camera.unproject(&pixel).map_or([NO_RAY; 3], |ray| {
                 let ray = (robot_from_camera * ray) / f64::from(UNIT);

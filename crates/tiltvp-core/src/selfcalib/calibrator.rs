@@ -3,7 +3,7 @@
 use nalgebra::{Matrix3, Vector3};
 
 use super::estimate::MountingEstimate;
-use super::model::{Mounting, WheelMotion};
+use super::model::{MOST_LANDMARKS, Mounting, WheelMotion};
 use super::options::{CalibrationMethod, SelfCalibratorOptions};
 use super::paper::PaperFilter;
 use super::step_outcome::StepOutcome;
@@ -80,10 +80,10 @@ impl SelfCalibrator {
     /// the identifier of its landmark.
     ///
     /// # Errors
-    /// [`Error::InvalidArgument`] for numbers that are not finite, counts that differ, and landmarks seen twice; the filter is
-    /// then as before.
+    /// [`Error::InvalidArgument`] for numbers that are not finite, counts that differ, landmarks seen twice, and more than
+    /// [`MOST_LANDMARKS`]; the filter is then as before.
     pub fn step(&mut self, motion: &WheelMotion, landmarks: &[u64], bearings_rad: &[f64]) -> Result<CalibrationStep> {
-        check(motion, landmarks, bearings_rad)?;
+        check(motion, landmarks, bearings_rad, self.landmarks())?;
         let seen: Vec<(u64, f64)> = landmarks.iter().copied().zip(bearings_rad.iter().copied()).collect();
         let StepOutcome { nis, used, rejected, started, .. } = match &mut self.filter {
             Filter::SlidingWindow(filter) => filter.step(motion, &seen),
@@ -139,7 +139,7 @@ impl SelfCalibrator {
 }
 
 /// Refuses a step that makes no sense.
-fn check(motion: &WheelMotion, landmarks: &[u64], bearings_rad: &[f64]) -> Result<()> {
+fn check(motion: &WheelMotion, landmarks: &[u64], bearings_rad: &[f64], followed: usize) -> Result<()> {
     for (name, value) in [("delta_left_m", motion.left_m), ("delta_right_m", motion.right_m)] {
         if !value.is_finite() {
             return Err(Error::argument(name, value, "a finite number of metres"));
@@ -148,6 +148,10 @@ fn check(motion: &WheelMotion, landmarks: &[u64], bearings_rad: &[f64]) -> Resul
     if landmarks.len() != bearings_rad.len() {
         let got = format!("{} for {} landmarks", bearings_rad.len(), landmarks.len());
         return Err(Error::argument("bearings_rad", got, "one bearing for each landmark"));
+    }
+    if followed + landmarks.len() > MOST_LANDMARKS {
+        let got = format!("{} landmarks beside {followed} that are followed", landmarks.len());
+        return Err(Error::argument("landmark_ids", got, format!("at most {MOST_LANDMARKS} in all")));
     }
     for (i, bearing) in bearings_rad.iter().enumerate() {
         if !bearing.is_finite() {

@@ -16,6 +16,7 @@ use crate::edges::{EdgeOptions, EdgePixels};
 use crate::error::{Error, Result};
 use crate::geometry::validate_rotation;
 use crate::image::ImageView;
+use crate::interrupt::{Interrupt, check};
 
 /// Estimates the tilt of a robot from single images of one camera.
 ///
@@ -212,20 +213,29 @@ impl TiltEstimator {
         if threads == 0 {
             return Err(Error::option("threads", threads, "at least 1"));
         }
+        let one = |image: &ImageView<'_>, scratch: &mut Scratch| {
+            check();
+            self.estimate(image, scratch)
+        };
         if threads == 1 || images.len() < 2 {
             let mut scratch = self.scratch();
-            return images.iter().map(|image| self.estimate(image, &mut scratch)).collect();
+            return images.iter().map(|image| one(image, &mut scratch)).collect();
         }
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads.min(images.len())).build().map_err(|error| {
-            Error::option("threads", format!("{threads} ({error})"), "a number that the system can start")
-        })?;
+        let flag = Interrupt::current();
+        let pool = rayon::ThreadPoolBuilder::new()
+            .num_threads(threads.min(images.len()))
+            .start_handler(move |_| Interrupt::adopt(flag.as_ref()))
+            .build()
+            .map_err(|error| {
+                Error::option("threads", format!("{threads} ({error})"), "a number that the system can start")
+            })?;
         // Each thread has one memory, and takes the next image when it has done the one before.
         let next = AtomicUsize::new(0);
         let by_thread = pool.broadcast(|_| {
             let mut scratch = self.scratch();
-            let one = || next.fetch_add(1, Ordering::Relaxed);
-            std::iter::repeat_with(one)
-                .map_while(|i| images.get(i).map(|image| (i, self.estimate(image, &mut scratch))))
+            let number = || next.fetch_add(1, Ordering::Relaxed);
+            std::iter::repeat_with(number)
+                .map_while(|i| images.get(i).map(|image| (i, one(image, &mut scratch))))
                 .collect::<Vec<_>>()
         });
         let mut answers: Vec<_> = by_thread.into_iter().flatten().collect();

@@ -5,6 +5,7 @@ use nalgebra::{Matrix3, Vector2};
 use crate::camera::Camera;
 use crate::error::Result;
 use crate::geometry::Tilt;
+use crate::interrupt::check;
 
 /// For each pixel of the upright image, in row order, the pixel `(u, v)` of the leaning image that shows the same direction.
 ///
@@ -16,7 +17,11 @@ use crate::geometry::Tilt;
 pub fn level_map(camera: &Camera, robot_from_camera: &Matrix3<f64>, tilt: &Tilt) -> Result<Vec<[f32; 2]>> {
     crate::geometry::validate_rotation(robot_from_camera)?;
     let rotation = robot_from_camera.transpose() * tilt.leaning_from_upright() * robot_from_camera;
+    camera.check_memory(size_of::<[f32; 2]>())?;
     let place = |u: u32, v: u32| -> Option<[f32; 2]> {
+        if u == 0 {
+            check();
+        }
         let bearing = camera.unproject(&Vector2::new(f64::from(u), f64::from(v)))?;
         let pixel = camera.project(&(rotation * bearing))?;
         Some([pixel.x as f32, pixel.y as f32])

@@ -7,7 +7,7 @@ use tiltvp_core::edges::Mask;
 
 use super::feature::CornerFeature;
 use crate::array::Array;
-use crate::call::{call, exception, invalid};
+use crate::call::{call_long, exception, invalid};
 use crate::camera::Camera;
 use crate::convert;
 use crate::options;
@@ -48,7 +48,7 @@ impl CornerDetector {
         });
         let mask = mask.transpose()?;
         let lens = camera.get().inner.clone();
-        let inner = call(py, move || core::CornerDetector::new(lens, parsed, mask))?;
+        let inner = call_long(py, move || core::CornerDetector::new(lens, parsed, mask))?;
         Ok(Self { inner, camera: camera.clone().unbind(), scratch: ScratchPool::default() })
     }
 

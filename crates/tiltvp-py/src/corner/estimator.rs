@@ -1,20 +1,19 @@
 //! `CornerPoseEstimator`: poses from the images of one camera or a pair, frame after frame.
 
-use std::sync::{Mutex, MutexGuard, PoisonError};
-
 use nalgebra::Matrix4;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyTuple};
-use tiltvp_core::corner::{self as core, CornerMethod, EstimatorOptions, Frame};
+use tiltvp_core::corner::{self as core, CornerMethod, EstimatorOptions, Frame, Track};
 use tiltvp_core::geometry::RigidMotion;
 
 use super::detector::CornerDetector;
 use super::estimate::CornerEstimate;
 use super::memory;
 use crate::array::Array;
-use crate::call::{call, invalid};
+use crate::call::{call_long, invalid};
 use crate::convert;
 use crate::options;
+use crate::shared::Shared;
 
 /// Poses from the images of one camera or a pair; `tiltvp.corner.CornerPoseEstimator` takes cameras and any images.
 ///
@@ -22,7 +21,7 @@ use crate::options;
 /// what was seen.
 #[pyclass(frozen, subclass, module = "tiltvp._core")]
 pub(crate) struct CornerPoseEstimator {
-    inner: Mutex<core::CornerPoseEstimator>,
+    inner: Shared<core::CornerPoseEstimator>,
     left: Py<CornerDetector>,
     right: Option<Py<CornerDetector>>,
     left_from_right: Option<RigidMotion>,
@@ -55,9 +54,9 @@ impl CornerPoseEstimator {
         let own = left.get().inner().clone();
         let other = right.map(|right| right.get().inner().clone()).zip(motion);
         let (copy, coloured) = (options.clone(), matches!(own.options().method, CornerMethod::Coloured(_)));
-        let inner = call(py, move || core::CornerPoseEstimator::new(own, other, copy))?;
+        let inner = call_long(py, move || core::CornerPoseEstimator::new(own, other, copy))?;
         Ok(Self {
-            inner: Mutex::new(inner),
+            inner: Shared::new(inner),
             left: left.clone().unbind(),
             right: right.map(|right| right.clone().unbind()),
             left_from_right: motion,
@@ -101,8 +100,11 @@ impl CornerPoseEstimator {
     }
 
     /// Forgets the poses of the frames before.
-    fn reset(&self) {
-        self.lock().reset();
+    fn reset(&self, py: Python<'_>) -> PyResult<()> {
+        self.inner.change(py, |estimator| {
+            estimator.reset();
+            Ok(())
+        })
     }
 
     /// What one frame tells: C-contiguous images of uint8, (H, W, 3) or (H, W) as `_coloured` says.
@@ -115,8 +117,7 @@ impl CornerPoseEstimator {
     ) -> PyResult<CornerEstimate> {
         let inner = &self.inner;
         let observe = |left: Frame<'_>, right: Option<Frame<'_>>| {
-            let work = || inner.lock().unwrap_or_else(PoisonError::into_inner).observe(&left, right.as_ref());
-            call(py, work).map(CornerEstimate::from)
+            inner.change(py, |estimator| estimator.observe(&left, right.as_ref())).map(CornerEstimate::from)
         };
         if self.coloured {
             let left = convert::color(left, "left")?;
@@ -150,34 +151,34 @@ impl CornerPoseEstimator {
             return Ok(false);
         }
         // One at a time: an estimator may be compared with itself.
-        let own = self.lock().clone();
-        let inner = other.lock();
-        Ok((own.options(), own.state(), &self.left_from_right)
-            == (inner.options(), inner.state(), &other.left_from_right))
+        let own = self.state(py);
+        Ok((&self.options, own, &self.left_from_right) == (&other.options, other.state(py), &other.left_from_right))
     }
 
     /// Sets what pickle has kept.
     fn __setstate__(slf: &Bound<'_, Self>, state: (u32, Option<Bound<'_, PyDict>>)) -> PyResult<()> {
         let (objects, track) = state;
         let track = track.map(|values| memory::from_dict(&values)).transpose()?;
-        let mut inner = slf.get().lock();
-        *inner = inner.clone().with_state(objects, track);
-        Ok(())
+        slf.get().inner.change(slf.py(), |estimator| {
+            estimator.set_state(objects, track);
+            Ok(())
+        })
     }
 
     fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyTuple>> {
         let (py, this) = (slf.py(), slf.get());
         let cameras = (slf.get_type(), this.left(py), this.right(py), this.left_from_right(py)?);
         let make = py.import("functools")?.getattr("partial")?.call(cameras, Some(&this.options(py)?))?;
-        let inner = this.lock();
-        let (objects, track) = inner.state();
-        let track = track.map(|track| memory::to_dict(py, track)).transpose()?;
+        let (objects, track) = this.state(py);
+        let track = track.map(|track| memory::to_dict(py, &track)).transpose()?;
         (make, PyTuple::empty(py), (objects, track)).into_pyobject(py)
     }
 }
 
 impl CornerPoseEstimator {
-    fn lock(&self) -> MutexGuard<'_, core::CornerPoseEstimator> {
-        self.inner.lock().unwrap_or_else(PoisonError::into_inner)
+    /// The number of objects so far, and the track of the last one.
+    fn state(&self, py: Python<'_>) -> (u32, Option<Track>) {
+        let owned = |(objects, track): (u32, Option<&Track>)| (objects, track.cloned());
+        self.inner.look(py, |estimator| owned(estimator.state()))
     }
 }

@@ -1,16 +1,15 @@
 //! `LineTracker`: identities of lines through successive frames.
 
-use std::sync::Mutex;
-
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyTuple};
 use tiltvp_core::lines::{self as core, Followed, FrameMemory, Motion, Parallax, TrackerOptions, TrackerState};
 
 use super::matching;
 use super::values::Lines;
-use crate::call::{call, exception, invalid};
+use crate::call::{exception, invalid};
 use crate::options;
-use crate::value::{changing, getters, value};
+use crate::shared::Shared;
+use crate::value::{changing, value};
 
 value! {
     /// The lines of one frame and whose they are. Frozen.
@@ -51,10 +50,15 @@ impl TrackedLines {
 /// Raises `tiltvp.errors.InvalidInputError` for an option that is unknown or out of its domain.
 #[pyclass(frozen, module = "tiltvp._core")]
 pub(crate) struct LineTracker {
-    inner: Mutex<core::LineTracker>,
+    inner: Shared<core::LineTracker>,
 }
 
-changing!(LineTracker(core::LineTracker), |own| (own.options(), own.state()));
+changing!(LineTracker(core::LineTracker), |own| (own.options(), own.state()), {
+    /// Number of the next frame.
+    next_frame: u64 = own.state().next_frame,
+    /// How many identities have been given.
+    track_count: u64 = own.state().next_track,
+});
 
 #[pymethods]
 impl LineTracker {
@@ -90,8 +94,7 @@ impl LineTracker {
         if n != inner.lines.len() {
             return Err(invalid(format!("descriptors: {n} rows, expected {}, one for each line", inner.lines.len())));
         }
-        let (frame, tracked) = call(py, || {
-            let mut tracker = self.lock();
+        let (frame, tracked) = self.inner.change(py, |tracker| {
             let (frame, mut out) = (tracker.state().next_frame, Vec::new());
             tracker.update(inner, &values, motion.as_ref(), &mut out)?;
             Ok((frame, out))
@@ -102,11 +105,11 @@ impl LineTracker {
     }
 
     fn __repr__(&self, py: Python<'_>) -> PyResult<String> {
-        Ok(format!("LineTracker({})", options::shown(py, self.lock().options())?))
+        Ok(format!("LineTracker({})", options::shown(py, &self.inner.look(py, |tracker| *tracker.options()))?))
     }
 
     /// Sets what pickle has kept.
-    fn __setstate__(&self, state: (u64, u64, Vec<Memory>, Vec<Edge>)) -> PyResult<()> {
+    fn __setstate__(&self, py: Python<'_>, state: (u64, u64, Vec<Memory>, Vec<Edge>)) -> PyResult<()> {
         let (next_frame, next_track, frames, followed) = state;
         let frames = frames.into_iter().map(|(tracks, descriptors)| FrameMemory { tracks, descriptors }).collect();
         let edge =
@@ -115,16 +118,17 @@ impl LineTracker {
                 Followed { track, seen, parallax, polarity, descriptor }
             };
         let followed = followed.into_iter().map(edge).collect();
-        let mut inner = self.lock();
         let state = TrackerState { next_frame, next_track, frames, followed };
-        *inner = core::LineTracker::with_state(*inner.options(), state).map_err(|error| exception(&error))?;
-        Ok(())
+        self.inner.change(py, |tracker| {
+            *tracker = core::LineTracker::with_state(*tracker.options(), state)?;
+            Ok(())
+        })
     }
 
     fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyTuple>> {
         let (py, this) = (slf.py(), slf.get());
         let make = py.import("functools")?.getattr("partial")?.call((slf.get_type(),), Some(&this.options(py)?))?;
-        let tracker = this.lock();
+        let tracker = this.inner.copied(py);
         let edge = |edge: &Followed| -> Edge {
             let Parallax { bearing_rad, inverse_distance, covariance, is_metric } = edge.parallax;
             let place = (bearing_rad, inverse_distance, covariance, is_metric);
@@ -134,15 +138,6 @@ impl LineTracker {
         let frames: Vec<Memory> = state.frames.iter().map(|f| (f.tracks.clone(), f.descriptors.clone())).collect();
         let followed: Vec<Edge> = state.followed.iter().map(edge).collect();
         (make, PyTuple::empty(py), (state.next_frame, state.next_track, frames, followed)).into_pyobject(py)
-    }
-}
-
-getters! {
-    LineTracker as own {
-        /// Number of the next frame.
-        next_frame: u64 = own.lock().state().next_frame,
-        /// How many identities have been given.
-        track_count: u64 = own.lock().state().next_track,
     }
 }
 

@@ -8,7 +8,7 @@ use tiltvp_core::selfcalib::{self as core, SelfCalibratorOptions};
 use tiltvp_synth::{BearingDrive, BearingDriveKind, BearingDriveOptions};
 
 use crate::array::Array;
-use crate::call::{call, exception, invalid};
+use crate::call::{call_long, exception, invalid};
 use crate::convert;
 use crate::options;
 use crate::value::frozen;
@@ -85,7 +85,7 @@ impl SimulatedDrive {
             ..SelfCalibratorOptions::default()
         };
         let sights = vec![(0..o.landmarks).collect::<Vec<_>>(); self.drive.poses.len()];
-        let bound = call(py, || {
+        let bound = call_long(py, || {
             let drive = &self.drive;
             core::cramer_rao_bound(&options, &o.mounting, &drive.readings, &drive.poses, &drive.landmarks_m, &sights)
         })?;
@@ -109,7 +109,7 @@ pub(crate) fn simulate_drive(
     let options =
         options::given(BearingDriveOptions { kind: kind_from(kind)?, ..BearingDriveOptions::default() }, options)?;
     options.validate().map_err(|error| exception(&error))?;
-    let drive = call(py, || Ok::<_, Error>(BearingDrive::new(&options)))?;
+    let drive = call_long(py, || Ok::<_, Error>(BearingDrive::new(&options)))?;
     Ok(SimulatedDrive { options, drive })
 }
 

@@ -1,7 +1,5 @@
 //! `TiltFilter`: successive tilts fused.
 
-use std::sync::Mutex;
-
 use nalgebra::{Matrix2, Matrix6, Vector2, Vector3};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyTuple};
@@ -10,10 +8,11 @@ use tiltvp_core::tilt::{self as core, TiltFilterOptions, TiltFilterState, Verdic
 
 use super::estimate::TiltEstimate;
 use super::filtered::{FilterStep, FilteredTilt};
-use crate::call::{call, exception, invalid};
+use crate::call::{exception, invalid};
 use crate::convert;
 use crate::options;
-use crate::value::{changing, getters};
+use crate::shared::Shared;
+use crate::value::changing;
 
 /// Keys of the dict of a state, by the way of pickle.
 const STATE_KEYS: [&str; 9] =
@@ -28,10 +27,21 @@ const STATE_KEYS: [&str; 9] =
 /// Raises `tiltvp.errors.InvalidInputError` for options out of their domain.
 #[pyclass(frozen, module = "tiltvp._core")]
 pub(crate) struct TiltFilter {
-    inner: Mutex<core::TiltFilter>,
+    inner: Shared<core::TiltFilter>,
 }
 
-changing!(TiltFilter(core::TiltFilter), |own| own);
+changing!(TiltFilter(core::TiltFilter), |own| own, {
+    /// The ground normal in the robot's frame, as the filter holds it to be now.
+    estimate: FilteredTilt = own.estimate().into(),
+    /// The floor's part of it alone, in the frame of the wheels.
+    floor: FilteredTilt = own.floor().into(),
+    /// The robot's own part alone, what it would see on level ground; None unless `estimate_mounting`.
+    mounting: Option<FilteredTilt> = own.mounting().map(FilteredTilt::from),
+    /// The largest normalised innovation squared that passes the gate.
+    nis_limit: f64 = own.nis_limit(),
+    /// How many estimates in a row the gate has rejected: above 0, the estimate may be about to jump.
+    rejected: u32 = own.state().rejected,
+});
 
 #[pymethods]
 impl TiltFilter {
@@ -52,7 +62,7 @@ impl TiltFilter {
         distance_m: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<()> {
         let [yaw_rad, distance_m] = motion(yaw_rad, distance_m)?;
-        call(py, || self.lock().predict(yaw_rad, distance_m))
+        self.inner.change(py, |filter| filter.predict(yaw_rad, distance_m))
     }
 
     /// Fuses an estimate, or says why not.
@@ -62,7 +72,7 @@ impl TiltFilter {
     #[pyo3(signature = (estimate: "TiltEstimate | tuple[ArrayLike, ArrayLike]", /))]
     fn update(&self, py: Python<'_>, estimate: &Bound<'_, PyAny>) -> PyResult<FilterStep> {
         let measured = measurement(estimate)?;
-        call(py, || fuse(&mut self.lock(), &measured)).map(FilterStep::from)
+        self.inner.change(py, |filter| fuse(filter, &measured)).map(FilterStep::from)
     }
 
     /// `predict`, then `update`; where either is refused, the filter is as before.
@@ -79,55 +89,43 @@ impl TiltFilter {
     ) -> PyResult<FilterStep> {
         let measured = measurement(estimate)?;
         let [yaw_rad, distance_m] = motion(yaw_rad, distance_m)?;
-        let fused = call(py, || {
-            let mut inner = self.lock();
-            let mut next = inner.clone();
+        let fused = self.inner.change(py, |filter| {
+            let mut next = filter.clone();
             next.predict(yaw_rad, distance_m)?;
             let verdict = fuse(&mut next, &measured)?;
-            *inner = next;
+            *filter = next;
             Ok(verdict)
         });
         fused.map(FilterStep::from)
     }
 
     /// Forgets everything but the options.
-    fn reset(&self) {
-        self.lock().reset();
+    fn reset(&self, py: Python<'_>) -> PyResult<()> {
+        self.inner.change(py, |filter| {
+            filter.reset();
+            Ok(())
+        })
     }
 
     fn __repr__(&self, py: Python<'_>) -> PyResult<String> {
-        Ok(format!("TiltFilter({})", options::shown(py, self.lock().options())?))
+        Ok(format!("TiltFilter({})", options::shown(py, &self.inner.look(py, |filter| *filter.options()))?))
     }
 
     /// Sets what pickle has kept.
-    fn __setstate__(&self, state: &Bound<'_, PyAny>) -> PyResult<()> {
+    fn __setstate__(&self, py: Python<'_>, state: &Bound<'_, PyAny>) -> PyResult<()> {
         let values = state.cast::<PyDict>().map_err(|_| invalid("state: expected a dict".to_owned()))?;
         let state = read_state(values)?;
-        let mut inner = self.lock();
-        *inner = core::TiltFilter::with_state(*inner.options(), state).map_err(|error| exception(&error))?;
-        Ok(())
+        self.inner.change(py, |filter| {
+            *filter = core::TiltFilter::with_state(*filter.options(), state)?;
+            Ok(())
+        })
     }
 
     fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyTuple>> {
         let (py, this) = (slf.py(), slf.get());
         let make = py.import("functools")?.getattr("partial")?.call((slf.get_type(),), Some(&this.options(py)?))?;
-        let state = written_state(py, this.lock().state())?;
+        let state = written_state(py, this.inner.copied(py).state())?;
         (make, PyTuple::empty(py), state).into_pyobject(py)
-    }
-}
-
-getters! {
-    TiltFilter as own {
-        /// The ground normal in the robot's frame, as the filter holds it to be now.
-        estimate: FilteredTilt = own.lock().estimate().into(),
-        /// The floor's part of it alone, in the frame of the wheels.
-        floor: FilteredTilt = own.lock().floor().into(),
-        /// The robot's own part alone, what it would see on level ground; None unless `estimate_mounting`.
-        mounting: Option<FilteredTilt> = own.lock().mounting().map(FilteredTilt::from),
-        /// The largest normalised innovation squared that passes the gate.
-        nis_limit: f64 = own.lock().nis_limit(),
-        /// How many estimates in a row the gate has rejected: above 0, the estimate may be about to jump.
-        rejected: u32 = own.lock().state().rejected,
     }
 }
 

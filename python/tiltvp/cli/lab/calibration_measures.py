@@ -52,7 +52,7 @@ def calibration(odometry: Path | None = None, /, *, runs: int = 1000, only: str 
                 parts.append(table.with_columns(trajectory=pl.lit(kind), method=pl.lit(method)))
                 summaries.append({"trajectory": kind, "method": method, **summarise_drives(table)})
         if out is not None:
-            pl.concat(parts).write_parquet(out)
+            write_frame(pl.concat(parts), out)
         low, high = consistency_band(0.95, 3, runs)
         title = f"Simulated drives; NEES of a consistent filter: {low:.3f} to {high:.3f}"
         show_frame(title, pl.DataFrame(summaries), ["method"])

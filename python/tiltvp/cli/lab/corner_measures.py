@@ -9,8 +9,10 @@ from typing import Annotated
 from cyclopts import Parameter, validators
 
 from tiltvp.cli.lab.tables import show_frame
+from tiltvp.cli.tables import write_frame
 from tiltvp.cli.terminal import progress_bar, say
 from tiltvp.errors import InvalidInputError
+from tiltvp.files import check_output_folder
 
 
 def corners(
@@ -75,10 +77,7 @@ def _sequences(frames: int, names: tuple[str, ...], seed: int, threads: int, out
         frames=frames, scenes=tuple(known[name] for name in names) or CORNER_SCENES, seed=seed
     )
     if out is not None:
-        try:
-            out.mkdir(parents=True, exist_ok=True)
-        except OSError as error:
-            raise InvalidInputError(f"--out {out}: {error.strerror or error}, expected a folder") from error
+        check_output_folder(out)
     with progress_bar(sum(experiment.lengths()), "frames") as bar:
         table, inertial = measure_corners(experiment, threads=threads, advance=bar.advance)
     show_frame("Rendered sequences, errors of poses", summarise_corners(table), ["scene"])
@@ -86,11 +85,11 @@ def _sequences(frames: int, names: tuple[str, ...], seed: int, threads: int, out
         summary = summarise_inertial_comparison(inertial)
         show_frame("With an inertial sensor, errors in degrees", summary, ["method"])
     if out is not None:
-        table.write_parquet(out / "corners.parquet")
+        write_frame(table, out / "corners.parquet")
         for (name,), part in table.partition_by("scene", as_dict=True, maintain_order=True).items():
             file = out / f"{str(name).replace(', ', '-').replace(' ', '-')}.png"
             write_image(file, figure_picture(corner_errors(part, str(name))))
         if inertial.height:
-            inertial.write_parquet(out / "inertial.parquet")
+            write_frame(inertial, out / "inertial.parquet")
             write_image(out / "inertial.png", figure_picture(inertial_errors(inertial)))
         say(f"{out}: tables and plots")

@@ -12,6 +12,7 @@ from tiltvp.cli.lab.tables import show_frame
 from tiltvp.cli.tables import write_frame
 from tiltvp.cli.terminal import progress_bar, say
 from tiltvp.errors import InvalidInputError
+from tiltvp.files import check_output_folder
 
 
 def descriptors(
@@ -52,6 +53,7 @@ def descriptors(
     from tiltvp.lab.plots.picture import figure_picture
     from tiltvp.lab.plots.tracks import track_plot
 
+    check_output_folder(out)
     known = [read_drive(directory) for directory in drives]
     if frame >= len(known[0]):
         raise InvalidInputError(f"--frame {frame}, expected one of the {len(known[0])} frames of {drives[0]}")

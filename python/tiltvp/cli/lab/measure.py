@@ -268,4 +268,4 @@ def sampling(
             words = [f"{way} (in {what}, at {image:.2f} of an image's time)" for way, what, image in paying]
             say(f"Pays: {'; '.join(words) or 'none'}.")
     if out is not None:
-        pl.concat(tables).write_parquet(out)
+        write_frame(pl.concat(tables), out)

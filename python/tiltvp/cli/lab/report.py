@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from tiltvp.cli.terminal import say, status
+from tiltvp.files import check_output_folder
 
 
 def report(run: Path, /, *, out: Path, also: Path | None = None, label: str | None = None) -> None:
@@ -27,6 +28,7 @@ def report(run: Path, /, *, out: Path, also: Path | None = None, label: str | No
     from tiltvp.lab.report.files import check_target, write_report
 
     check_target(out)
+    check_output_folder(out)
     with status("reading") as say_what:
         other = None
         if also is not None:

@@ -6,7 +6,6 @@ import csv
 import io
 import math
 import os
-import shutil
 from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
@@ -18,6 +17,7 @@ import numpy as np
 import tomli_w
 
 from tiltvp.errors import CalibrationError, InvalidInputError
+from tiltvp.files import whole_folder
 from tiltvp.images import write_image
 from tiltvp.lab.datasets.description import DESCRIPTION
 from tiltvp.lab.datasets.rows import ROWS, TiltImage
@@ -104,23 +104,9 @@ def new_folder(directory: str | os.PathLike[str], *, force: bool = False) -> Ite
     """A folder to be filled in a `with` block, dataset.toml included; else as `new_dataset`."""
     target = Path(directory)
     _refuse_taken(target, force)
-    part = target.absolute().parent / f".{target.absolute().name}.{os.getpid()}.part"
-    try:
-        part.mkdir(parents=True)
-    except OSError as error:
-        raise InvalidInputError(f"{target}: {error.strerror or error}, expected a place for a new folder") from error
-    try:
+    with whole_folder(target) as part:
         yield NewDataset(part)
         _refuse_taken(target, force)
-        if target.exists():
-            old = part.with_suffix(".old")
-            target.rename(old)
-            part.rename(target)
-            shutil.rmtree(old)
-        else:
-            part.rename(target)
-    finally:
-        shutil.rmtree(part, ignore_errors=True)
 
 
 def in_order(

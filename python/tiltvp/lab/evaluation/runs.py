@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
+import io
 import json
 import os
 import platform
 import re
-import secrets
 import sys
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from datetime import UTC, datetime
@@ -21,14 +21,15 @@ import numpy as np
 import polars as pl
 
 from tiltvp import _core
-from tiltvp.errors import RunError
+from tiltvp.errors import OutputError, RunError
+from tiltvp.files import write_whole
 
 __all__ = ["Run", "RunFolder", "new_manifest", "open_run", "read_run", "versions"]
 
 _MANIFEST: Final = "manifest.json"
 _TABLE: Final = "estimates.parquet"
 _PARTS: Final = "parts"
-_OWN: Final = re.compile(r"manifest\.json|estimates\.parquet|parts|\..*\.part")
+_OWN: Final = re.compile(r"manifest\.json|estimates\.parquet|parts|\..*\.part\..*")
 
 
 @dataclass(frozen=True)
@@ -92,7 +93,7 @@ class RunFolder:
 
     def add(self, number: int, rows: pl.DataFrame) -> None:
         """Writes the part of an image."""
-        _write(self._part(number), rows.write_parquet)
+        write_whole(self._part(number), _parquet(rows))
 
     def parts(self) -> pl.DataFrame:
         """The rows of all parts, by image."""
@@ -100,13 +101,13 @@ class RunFolder:
 
     def finish(self, table: pl.DataFrame) -> Run:
         """Writes the table, and then deletes the parts."""
-        _write(self.directory / _TABLE, table.write_parquet)
+        write_whole(self.directory / _TABLE, _parquet(table))
         self.tidy()
         return Run(self.manifest, table)
 
     def tidy(self) -> None:
         """Deletes what an interrupted sitting has left: files half written, and the parts of a table that is there."""
-        for path in [*self.directory.glob(".*.part"), *self._parts.glob(".*.part")]:
+        for path in [*self.directory.glob(".*.part.*"), *self._parts.glob(".*.part.*")]:
             path.unlink()
         if self.whole:
             for path in self._parts.glob("*.parquet"):
@@ -137,7 +138,7 @@ def open_run(directory: Path, manifest: dict[str, Any]) -> Iterator[RunFolder]:
             if others:
                 raise RunError(f"{directory}: holds {others[0]} and no {_MANIFEST}, expected an empty folder or a run")
             text = json.dumps(manifest, indent=1)
-            _write(path, lambda part: part.write_text(text + "\n", encoding="utf-8"))
+            write_whole(path, text + "\n")
         folder = RunFolder(directory, manifest)
         folder.tidy()
         if not folder.whole:
@@ -203,20 +204,14 @@ def _make(directory: Path) -> None:
     try:
         directory.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise RunError(f"{directory}: {error.strerror or error}, expected a folder that can be written") from error
+        why = error.strerror or error
+        raise OutputError(f"{directory}: cannot be written ({why}), expected a folder that can") from error
 
 
-def _write(path: Path, write: Callable[[Path], object]) -> None:
-    """Writes a file whole or not at all."""
-    part = path.with_name(f".{path.name}.{secrets.token_hex(8)}.part")
-    try:
-        write(part)
-        os.replace(part, path)
-    except (OSError, pl.exceptions.PolarsError) as error:
-        raise RunError(f"{path}: cannot be written ({error})") from error
-    finally:
-        with suppress(OSError):
-            part.unlink()
+def _parquet(table: pl.DataFrame) -> bytes:
+    memory = io.BytesIO()
+    table.write_parquet(memory)
+    return memory.getvalue()
 
 
 @contextmanager

@@ -3,11 +3,7 @@
 from __future__ import annotations
 
 import io
-import os
-import secrets
-import shutil
 from collections.abc import Callable
-from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
@@ -15,6 +11,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.backends.backend_pdf import FigureCanvasPdf
 
 from tiltvp.errors import RunError
+from tiltvp.files import whole_folder
 from tiltvp.lab.plots.report.tables import table_figure
 from tiltvp.lab.report.page import page_of
 from tiltvp.lab.report.panel import Contents, Panel, Sheet
@@ -45,18 +42,11 @@ def write_report(
     """Writes the report in place of an earlier one and gives the path of its page.
 
     Everything is made in a folder beside it, which takes its place at the end. Raises `RunError` if the folder holds
-    something else or cannot be written.
+    something else, `OutputError` if it cannot be written.
     """
     check_target(directory)
-    part = directory.with_name(f".{directory.name}.{secrets.token_hex(4)}.part")
-    try:
-        part.mkdir(parents=True)
+    with whole_folder(directory) as part:
         _fill(part, contents, dpi, advance)
-        _take_place(part, directory)
-    except OSError as error:
-        raise RunError(f"{directory}: {error.strerror or error}, expected a folder that can be written") from error
-    finally:
-        shutil.rmtree(part, ignore_errors=True)
     return directory / PAGE
 
 
@@ -101,19 +91,3 @@ def _saved(figure: Figure, kind: str, metadata: dict[str, None], dpi: float) -> 
     memory = io.BytesIO()
     figure.savefig(memory, format=kind, dpi=dpi, metadata=metadata)
     return memory.getvalue()
-
-
-def _take_place(part: Path, directory: Path) -> None:
-    """A folder cannot replace a full one: the earlier report steps aside first, and comes back if that fails."""
-    if not directory.exists():
-        part.rename(directory)
-        return
-    old = directory.with_name(f".{directory.name}.{secrets.token_hex(4)}.old")
-    directory.rename(old)
-    try:
-        part.rename(directory)
-    except OSError:
-        with suppress(OSError):
-            os.rename(old, directory)
-        raise
-    shutil.rmtree(old, ignore_errors=True)

@@ -2,6 +2,7 @@
 
 use multiversion::multiversion;
 use nalgebra::{Matrix3, Vector2, Vector3};
+use tiltvp_kernels::prefetch::prefetch;
 
 use crate::camera::Camera;
 use crate::corner::options::GeneralOptions;
@@ -45,6 +46,8 @@ pub struct Segment {
 #[derive(Debug, Clone)]
 pub(crate) struct SegmentFinder {
     region: Region,
+    /// Unit bearings of the region's pixels.
+    bearings: Vec<Vector3<f64>>,
     edges: EdgeOptions,
     /// For each row its one span of pixels: the first column, one past the last, and the slot of the first; none for rows
     /// with several spans.
@@ -129,7 +132,8 @@ impl SegmentFinder {
             spans_in[span.v] += 1;
             rows[span.v] = (spans_in[span.v] == 1).then_some((span.first, span.end, span.slot));
         }
-        Ok(Self { region, edges, rows })
+        let bearings = region.pixels().map(|(_, _, bearing)| bearing).collect();
+        Ok(Self { region, bearings, edges, rows })
     }
 
     /// The slot of the pixel beside `(u, v)` on whose side a place is, where it is known.
@@ -144,7 +148,7 @@ impl SegmentFinder {
     /// column; between the bearings of pixel centres where both are known.
     fn bearing(&self, camera: &Camera, slot: usize, (u, v): (usize, usize), shift: (f64, f64)) -> Option<Vector3<f64>> {
         let between = || {
-            let (here, there) = (self.region.bearing(slot)?, self.region.bearing(self.beside((u, v), shift)?)?);
+            let (here, there) = (self.bearings.get(slot)?, self.bearings.get(self.beside((u, v), shift)?)?);
             (here + (there - here) * shift.0.abs().max(shift.1.abs())).try_normalize(0.5)
         };
         between().or_else(|| camera.unproject(&Vector2::new(u as f64 + shift.0, v as f64 + shift.1)))
@@ -213,8 +217,8 @@ impl SegmentFinder {
             points.extend(members.iter().enumerate().filter_map(|(k, i)| {
                 if let Some(later) = members.get(k + AHEAD) {
                     let later = *later as usize;
-                    self.region.prefetch(slots[later] as usize);
-                    self.region.prefetch(self.beside(place(later), shift(later)).unwrap_or(0));
+                    prefetch(&self.bearings, slots[later] as usize);
+                    prefetch(&self.bearings, self.beside(place(later), shift(later)).unwrap_or(0));
                 }
                 let (i, (u, v)) = (*i as usize, place(*i as usize));
                 let (du, dv) = shift(i);

@@ -83,11 +83,9 @@ impl CornerPoseEstimator {
         (self.objects, self.track.as_ref())
     }
 
-    /// The same estimator that goes on from a state.
-    #[must_use]
-    pub fn with_state(mut self, objects: u32, track: Option<Track>) -> Self {
+    /// Goes on from a state.
+    pub fn set_state(&mut self, objects: u32, track: Option<Track>) {
         (self.objects, self.track) = (objects, track);
-        self
     }
 
     /// Forgets what was seen.

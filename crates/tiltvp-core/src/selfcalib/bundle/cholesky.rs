@@ -3,6 +3,8 @@
 use multiversion::multiversion;
 use nalgebra::{DMatrix, DVector};
 
+use crate::interrupt::check;
+
 /// Columns of a block: 24 columns of the 200 to 800 rows that a window has are 40 to 150 kB, which stay in the second-level
 /// cache. It changes the time (`just bench calibration`) and, by rounding, the last bits.
 const BLOCK: usize = 24;
@@ -26,6 +28,7 @@ impl CholeskyFactor {
         let mut lower = matrix;
         let n = lower.nrows();
         for first in (0..n).step_by(BLOCK) {
+            check();
             let width = BLOCK.min(n - first);
             if first > 0 {
                 let (done, mut rest) = lower.columns_range_pair_mut(..first, first..first + width);
@@ -62,6 +65,7 @@ impl CholeskyFactor {
     pub(crate) fn whiten(&self, mut t: DMatrix<f64>) -> DMatrix<f64> {
         let (rows, columns) = t.shape();
         for first in (0..columns).step_by(BLOCK) {
+            check();
             let width = BLOCK.min(columns - first);
             if first > 0 {
                 let (done, mut rest) = t.columns_range_pair_mut(..first, first..first + width);
@@ -84,6 +88,7 @@ impl CholeskyFactor {
         // L^-T, upper triangular.
         let mut t = DMatrix::identity(n, n);
         for first in (0..n).step_by(BLOCK) {
+            check();
             let width = BLOCK.min(n - first);
             if first > 0 {
                 let (done, mut rest) = t.columns_range_pair_mut(..first, first..first + width);
@@ -95,6 +100,7 @@ impl CholeskyFactor {
         }
         let mut inverse = DMatrix::zeros(n, n);
         for first in (0..n).step_by(BLOCK) {
+            check();
             let width = BLOCK.min(n - first);
             // Columns of L^-T before `first` are zero in these rows.
             let own = t.view((first, first), (width, n - first)).transpose();

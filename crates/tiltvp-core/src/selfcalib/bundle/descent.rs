@@ -5,6 +5,7 @@ use nalgebra::{DVector, Vector3};
 use super::cholesky::CholeskyFactor;
 use super::problem::BundleProblem;
 use super::schur::ReducedSystem;
+use crate::interrupt::check;
 use crate::selfcalib::model::FitSummary;
 
 /// Damping, as a share of the normal equations' diagonal, with which Levenberg-Marquardt starts where little is known: small
@@ -89,6 +90,7 @@ impl BundleProblem {
         let mut iterations = 0;
         while iterations < max_iterations {
             iterations += 1;
+            check();
             let before = self.save();
             let last = self.keyframes.len() - 1;
             let moved = self.eliminate_poses(last, false, damping).and_then(|system| self.take_step(&system));
@@ -122,6 +124,7 @@ impl BundleProblem {
         let mut reached = f64::INFINITY;
         let mut before = self.save();
         for iteration in 0..max_iterations {
+            check();
             let here = self.eliminate_poses(last, true, 0.0).filter(|here| !rises(here.fit.cost, reached));
             let Some(here) = here else { break };
             before = self.save();

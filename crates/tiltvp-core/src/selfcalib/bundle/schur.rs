@@ -9,6 +9,7 @@ use nalgebra::{DVector, Matrix3, Vector3};
 use super::linearisation::NormalEquations;
 use super::pose_elimination::{EliminatedPose, PoseEquations, eliminate_pose, join};
 use super::problem::BundleProblem;
+use crate::interrupt::check;
 use crate::selfcalib::model::{FitSummary, HomogeneousLandmark};
 
 /// Poses of a run, and shared parameters up to which all poses are one run. Both change the time and, by rounding, the last
@@ -133,6 +134,7 @@ impl BundleProblem {
         let (mut runs, mut between) = (Vec::new(), Vec::new());
         let (mut left, mut reach) = (0, calibration_width);
         while left < last {
+            check();
             let right = left.saturating_add(length).min(last);
             let (run, blocks) = self.eliminate_run(left, right, damping, &points)?;
             for (c, column) in run.columns.iter().enumerate() {
@@ -203,6 +205,7 @@ impl BundleProblem {
         let mut before = motion.across.transpose();
         let mut at = PoseEquations::after(&motion, width, wheels);
         for i in left + 1..right {
+            check();
             self.for_each_bearing_row(&self.keyframes[i], points, |row| {
                 fit.add(row.residual, self.loss);
                 let place = places[(row.at - calibration_width) / 2];

@@ -8,6 +8,7 @@ pub(super) mod odometry;
 mod planar_pose;
 
 pub(super) use self::bearing::{Prediction, Viewpoint, predict};
+pub use self::landmark::MOST_LANDMARKS;
 pub(super) use self::landmark::{HomogeneousLandmark, InverseDistanceLandmark, camera_position, landmark_from_bearing};
 pub(super) use self::loss::{BearingLoss, FitSummary, MotionLoss, OUTLIER_SIGMAS};
 pub use self::mounting::Mounting;

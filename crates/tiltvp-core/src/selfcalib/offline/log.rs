@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use crate::error::{Error, Result};
 use crate::options;
-use crate::selfcalib::model::WheelMotion;
+use crate::selfcalib::model::{MOST_LANDMARKS, WheelMotion};
 use crate::selfcalib::options::SelfCalibratorOptions;
 
 /// A bearing of a log.
@@ -104,8 +104,13 @@ fn check(
         }
     }
     let mut first: BTreeMap<u64, usize> = BTreeMap::new();
-    if !bearings.iter().any(|b| *first.entry(b.landmark).or_insert(b.step) != b.step) {
+    let again = bearings.iter().filter(|b| *first.entry(b.landmark).or_insert(b.step) != b.step).count();
+    if again == 0 {
         return Err(Error::argument("bearings", "no landmark seen twice", "landmarks seen from several poses"));
+    }
+    if first.len() > MOST_LANDMARKS {
+        let expected = format!("at most {MOST_LANDMARKS}");
+        return Err(Error::argument("bearings", format!("{} landmarks", first.len()), expected));
     }
     match times_s {
         None if options.estimate_time_offset => {

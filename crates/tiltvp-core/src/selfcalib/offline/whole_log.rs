@@ -66,7 +66,8 @@ enum Attempt {
 ///
 /// # Errors
 /// [`Error::InvalidOption`] for options that make no sense, [`Error::InvalidArgument`] for numbers that are not finite, steps
-/// that do not exist, times that do not grow or are missing, and logs without a landmark that is seen twice.
+/// that do not exist, times that do not grow or are missing, more than [`MOST_LANDMARKS`](crate::selfcalib::MOST_LANDMARKS), and
+/// logs without a landmark that is seen twice.
 pub fn calibrate_log(
     options: &LogOptions,
     readings: &[WheelMotion],

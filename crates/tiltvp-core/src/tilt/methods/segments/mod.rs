@@ -106,6 +106,9 @@ impl TiltMethod for SegmentsOptions {
         SegmentFinder::check_margin(&origin.options)?;
         let finder = SegmentFinder::new(&origin.camera, &pixels.region, self.segments);
         let refined = RefineOptions::default();
+        let usual = refined.edges();
+        let heights = usual.elevation_min_rad.sin()..=usual.elevation_max_rad.sin();
+        let in_band = pixels.region.pixels().map(|(_, _, bearing)| heights.contains(&bearing.z)).collect();
         let tilt_max_rad = options.tilt_max_rad.unwrap_or(TILT_MAX_RAD);
         let step = tilt_max_rad / f64::from(GRID);
         let places = (-GRID..=GRID).flat_map(|i| (-GRID..=GRID).map(move |k| (i, k)));
@@ -125,7 +128,8 @@ impl TiltMethod for SegmentsOptions {
             step_rad: step,
             leans: leans.collect(),
             pixels: Refined::new(setting, refined),
-            strong: refined.edges(),
+            strong: usual,
+            in_band,
             options: *self,
         })))
     }
@@ -144,6 +148,8 @@ pub(in crate::tilt) struct SegmentFit {
     /// The method of the pixels, and which of them vote.
     pixels: Refined,
     strong: EdgeOptions,
+    /// Whether each pixel of the region is in the band of elevations of those that vote.
+    in_band: Vec<bool>,
     options: SegmentsOptions,
 }
 
@@ -317,12 +323,10 @@ impl SegmentFit {
     /// What the strong ridge pixels near the horizon say by their gradients.
     fn vote(&self, ridge: &RidgePixels, tables: &PixelTables, strong: &mut EdgePixels, work: &mut Work) -> Fit {
         let least = (self.strong.gradient_min * self.strong.gradient_min) as f32;
-        let heights = self.strong.elevation_min_rad.sin()..=self.strong.elevation_max_rad.sin();
         strong.clear();
         let edges = &ridge.edges;
         for ((slot, gx), gy) in edges.slot().iter().zip(edges.gx()).zip(edges.gy()) {
-            let votes = || tables.region.bearing(*slot as usize).is_some_and(|bearing| heights.contains(&bearing.z));
-            if gx * gx + gy * gy >= least && votes() {
+            if gx * gx + gy * gy >= least && self.in_band[*slot as usize] {
                 strong.push(&tables.region, *slot, *gx, *gy);
             }
         }

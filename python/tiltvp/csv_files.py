@@ -1,0 +1,57 @@
+"""CSV files as rows of words, of which each knows its line."""
+
+from __future__ import annotations
+
+import csv
+import io
+import os
+from collections.abc import Iterator
+from typing import Final
+
+from tiltvp.errors import InvalidInputError
+from tiltvp.files import read_text
+
+__all__ = ["LARGEST_CSV_BYTES", "CsvFile"]
+
+LARGEST_CSV_BYTES: Final = 64 << 20
+"""Of a table: the bearings of a drive of an hour, 20 at 10 Hz, take 20 MB."""
+
+
+class CsvFile:
+    """A table with a header."""
+
+    def __init__(self, path: str | os.PathLike[str], expected: str) -> None:
+        """Reads the header. `expected` is what the file should be, for messages. Raises `InvalidInputError`."""
+        self.name = os.fspath(path)
+        self._expected = expected
+        try:
+            text = read_text(path, LARGEST_CSV_BYTES)
+        except OSError as error:
+            raise InvalidInputError(
+                f"{self.name}: cannot be read ({error.strerror or error}), expected {expected}"
+            ) from error
+        except UnicodeDecodeError as error:
+            raise InvalidInputError(f"{self.name}: not UTF-8, expected {expected}") from error
+        self._lines = csv.reader(io.StringIO(text, newline=None))
+        self.header = [cell.strip() for cell in self._next() or []]
+
+    def where(self, line: int) -> str:
+        """The place of a line, for messages."""
+        return f"{self.name}, line {line}"
+
+    def rows(self) -> Iterator[tuple[int, list[str]]]:
+        """Line and cells of each row that is not empty, as many as the header has. Raises `InvalidInputError`."""
+        while (cells := self._next()) is not None:
+            cells = [cell.strip() for cell in cells]
+            if not any(cells):
+                continue
+            line = self._lines.line_num
+            if len(cells) != len(self.header):
+                raise InvalidInputError(f"{self.where(line)}: {len(cells)} cells, expected {len(self.header)}")
+            yield line, cells
+
+    def _next(self) -> list[str] | None:
+        try:
+            return next(self._lines, None)
+        except csv.Error as error:
+            raise InvalidInputError(f"{self.where(self._lines.line_num)}: {error}, expected {self._expected}") from None

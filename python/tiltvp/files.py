@@ -1,0 +1,235 @@
+"""The doors to files: what is read is a regular file of a limited size, what is written appears whole or not at all."""
+
+from __future__ import annotations
+
+import errno
+import glob
+import os
+import secrets
+import shutil
+import stat
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from contextvars import ContextVar
+from pathlib import Path
+from typing import Final
+
+from tiltvp.errors import InvalidInputError, OutputError, TiltvpError
+
+__all__ = [
+    "check_output",
+    "check_output_folder",
+    "keeping_existing",
+    "read_bytes",
+    "read_text",
+    "whole_file",
+    "whole_folder",
+    "write_whole",
+]
+
+_KEEPS: Final[ContextVar[bool]] = ContextVar("keeps", default=False)
+
+
+def read_bytes(path: str | os.PathLike[str], most: int) -> bytes:
+    """The content of a regular file of at most so many bytes; pipes and devices are refused. Raises `OSError`."""
+    flags = os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0) | getattr(os, "O_CLOEXEC", 0)
+    try:
+        handle = os.open(path, flags)
+    except ValueError:
+        raise OSError(errno.EINVAL, "a name with a zero byte") from None
+    with open(handle, "rb") as stream:
+        state = os.fstat(handle)
+        if stat.S_ISDIR(state.st_mode):
+            raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR))
+        if not stat.S_ISREG(state.st_mode):
+            raise OSError(errno.EINVAL, "is no regular file")
+        content = stream.read(min(state.st_size, most) + 1)
+        if len(content) > state.st_size:
+            # It grows, or does not tell its size, as in /proc.
+            content += stream.read(max(0, most + 1 - len(content)))
+    size = max(state.st_size, len(content))
+    if size > most:
+        raise OSError(errno.EFBIG, f"larger than {most} bytes: {size}")
+    return content
+
+
+def read_text(path: str | os.PathLike[str], most: int) -> str:
+    """The same as UTF-8, with or without a mark at its beginning. Raises `OSError` and `UnicodeDecodeError`."""
+    return read_bytes(path, most).decode("utf-8-sig")
+
+
+@contextmanager
+def keeping_existing() -> Iterator[None]:
+    """Within, outputs that exist are refused, not replaced."""
+    token = _KEEPS.set(True)
+    try:
+        yield
+    finally:
+        _KEEPS.reset(token)
+
+
+def check_output(path: str | os.PathLike[str]) -> None:
+    """Refuses what no file can be written to, before any work is done: what is no regular file, and what is to be kept.
+
+    Raises `OutputError` or `InvalidInputError`.
+    """
+    try:
+        state = os.stat(path)
+    except FileNotFoundError:
+        return
+    except (OSError, ValueError) as error:
+        raise _failed(path, error) from None
+    if not stat.S_ISREG(state.st_mode):
+        what = "a folder" if stat.S_ISDIR(state.st_mode) else "no regular file"
+        raise OutputError(f"{os.fspath(path)}: cannot be written (is {what}), expected a file")
+    if _KEEPS.get():
+        raise InvalidInputError(f"{os.fspath(path)}: exists, expected a new file, or --overwrite to replace it")
+
+
+def check_output_folder(path: str | os.PathLike[str]) -> None:
+    """Refuses a file, and a folder that is to be kept: one that holds anything. Raises `InvalidInputError`."""
+    folder = Path(path)
+    if folder.exists() and not folder.is_dir():
+        raise InvalidInputError(f"{folder}: is a file, expected a folder")
+    if _KEEPS.get() and folder.is_dir() and any(folder.iterdir()):
+        raise InvalidInputError(f"{folder}: exists, expected a new or empty folder, or --overwrite to replace it")
+
+
+def write_whole(path: str | os.PathLike[str], content: bytes | str) -> None:
+    """Writes a file that appears whole or not at all, text as UTF-8. Raises as `whole_file`."""
+    with whole_file(path) as part:
+        part.write_bytes(content.encode("utf-8") if isinstance(content, str) else content)
+
+
+@contextmanager
+def whole_file(path: str | os.PathLike[str]) -> Iterator[Path]:
+    """A file beside `path`, to be filled in the block; at its end, and on the disk, it takes the place of `path`.
+
+    After any failure it is removed, and so is what killed processes have left of the same output. If the block removes
+    it, nothing happens to `path`. Folders above are made. Raises `OutputError` where it cannot be written,
+    `InvalidInputError` where `path` exists and is to be kept.
+    """
+    check_output(path)
+    part = None
+    try:
+        target = Path(os.path.realpath(path))
+        target.parent.mkdir(parents=True, exist_ok=True)
+        part, handle = _locked_beside(target, target.suffix, _new_file)
+        try:
+            yield part
+            if part.exists():
+                with open(part, "rb+") as written:
+                    os.fsync(written.fileno())
+                os.replace(part, target)
+                _sync_folder(target.parent)
+        finally:
+            os.close(handle)
+    except TiltvpError:
+        raise
+    except (OSError, ValueError) as error:
+        raise _failed(path, error) from error
+    finally:
+        if part is not None:
+            with suppress(OSError):
+                part.unlink()
+
+
+@contextmanager
+def whole_folder(path: str | os.PathLike[str]) -> Iterator[Path]:
+    """A new folder beside `path`, to be filled in the block; at its end it takes the place of `path`, which may exist.
+
+    After any failure it is removed, and so is what killed processes have left of the same output. Raises `OutputError`.
+    """
+    part = None
+    try:
+        target = Path(path).absolute()
+        target.parent.mkdir(parents=True, exist_ok=True)
+        part, handle = _locked_beside(target, "", _new_folder)
+        try:
+            yield part
+            if target.exists():
+                # A folder cannot replace a full one: the earlier one steps aside first, and comes back if that fails.
+                old = part.with_suffix(".old")
+                target.rename(old)
+                try:
+                    part.rename(target)
+                except OSError:
+                    old.rename(target)
+                    raise
+                shutil.rmtree(old, ignore_errors=True)
+            else:
+                part.rename(target)
+        finally:
+            os.close(handle)
+    except TiltvpError:
+        raise
+    except (OSError, ValueError) as error:
+        raise _failed(path, error) from error
+    finally:
+        if part is not None:
+            shutil.rmtree(part, ignore_errors=True)
+
+
+def _failed(path: str | os.PathLike[str], error: OSError | ValueError) -> OutputError:
+    why = (error.strerror if isinstance(error, OSError) else None) or error
+    return OutputError(f"{os.fspath(path)}: cannot be written ({why}), expected a place that can")
+
+
+def _new_file(part: Path) -> int:
+    return os.open(part, os.O_RDWR | os.O_CREAT | os.O_EXCL | getattr(os, "O_BINARY", 0), 0o666)
+
+
+def _new_folder(part: Path) -> int:
+    part.mkdir()
+    return os.open(part if sys.platform != "win32" else os.devnull, os.O_RDONLY)
+
+
+def _locked_beside(target: Path, ending: str, make: Callable[[Path], int]) -> tuple[Path, int]:
+    """A part beside the target that is locked as long as its handle is open, so that a dead process's is known."""
+    stem = target.name.removesuffix(ending)
+    _sweep(target.parent, f".{stem}.", f".part{ending}")
+    _sweep(target.parent, f".{stem}.", ".old")
+    while True:
+        part = target.with_name(f".{stem}.{secrets.token_hex(8)}.part{ending}")
+        handle = make(part)
+        with suppress(OSError):
+            _lock(handle)
+        if part.exists():
+            return part, handle
+        # Somebody who sweeps has come between the making and the lock.
+        os.close(handle)
+
+
+def _sweep(folder: Path, begin: str, end: str) -> None:
+    """Removes the parts of processes that were killed."""
+    for left in folder.glob(f"{glob.escape(begin)}{'[0-9a-f]' * 16}{glob.escape(end)}"):
+        with suppress(OSError):
+            handle = os.open(left, os.O_RDONLY)
+            try:
+                _lock(handle)
+                if left.is_dir():
+                    shutil.rmtree(left, ignore_errors=True)
+                else:
+                    left.unlink()
+            finally:
+                os.close(handle)
+
+
+def _lock(handle: int) -> None:
+    """Takes the lock till the handle is closed. Raises `OSError` where another process has it or there are none."""
+    if sys.platform == "win32":
+        raise OSError(errno.ENOSYS, "no such locks")
+    import fcntl
+
+    fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+
+
+def _sync_folder(folder: Path) -> None:
+    """Brings the new name to the disk too, where folders can be opened."""
+    with suppress(OSError):
+        handle = os.open(folder, os.O_RDONLY)
+        try:
+            os.fsync(handle)
+        finally:
+            os.close(handle)

@@ -1,0 +1,116 @@
+"""How many pixels an image file says it has, so that no more is decoded than memory should hold."""
+
+from __future__ import annotations
+
+import re
+import struct
+from collections.abc import Callable
+from typing import Final
+
+__all__ = ["header_size"]
+
+_PNM: Final = re.compile(rb"P[1-7](?:\s|#[^\n]*\n)+")
+_PNM_NUMBER: Final = re.compile(rb"(?:\s|#[^\n]*\n)*(\d{1,9})")
+_PAM_SIDE: Final = re.compile(rb"^(WIDTH|HEIGHT)[ \t]+(\d{1,9})\s*$", re.MULTILINE)
+_JPEG_FRAMES: Final = frozenset(range(0xC0, 0xD0)) - {0xC4, 0xC8, 0xCC}
+_TIFF_TYPES: Final = {1: "B", 3: "H", 4: "I", 16: "Q"}
+
+
+def header_size(data: bytes) -> tuple[int, int] | None:
+    """(width, height) of a PNG, JPEG, BMP, TIFF, PNM, WebP or JPEG 2000 file; None for any other or a broken header."""
+    for begin, read in _READERS:
+        if re.match(begin, data, re.DOTALL):
+            try:
+                size = read(data)
+            except (struct.error, IndexError):
+                return None
+            return size if size is not None and min(size) > 0 else None
+    return None
+
+
+def _png(data: bytes) -> tuple[int, int] | None:
+    width, height = struct.unpack_from(">II", data, 16)
+    return (width, height) if data[12:16] == b"IHDR" else None
+
+
+def _jpeg(data: bytes) -> tuple[int, int] | None:
+    at = 2
+    while True:
+        at = data.find(b"\xff", at)
+        if at < 0:
+            return None
+        while data[at] == 0xFF:
+            at += 1
+        marker = data[at]
+        at += 1
+        if marker in _JPEG_FRAMES:
+            height, width = struct.unpack_from(">HH", data, at + 3)
+            return width, height
+        if marker not in (0x00, 0x01, *range(0xD0, 0xD9)):
+            at += int(struct.unpack_from(">H", data, at)[0])
+
+
+def _bmp(data: bytes) -> tuple[int, int] | None:
+    if struct.unpack_from("<I", data, 14)[0] == 12:
+        width, height = struct.unpack_from("<HH", data, 18)
+    else:
+        width, height = struct.unpack_from("<ii", data, 18)
+    return abs(width), abs(height)
+
+
+def _pnm(data: bytes) -> tuple[int, int] | None:
+    if data[1:2] == b"7":
+        sides = {name: int(number) for name, number in _PAM_SIDE.findall(data[:4096])}
+        return (sides[b"WIDTH"], sides[b"HEIGHT"]) if len(sides) == 2 else None
+    start = _PNM.match(data)
+    width = None if start is None else _PNM_NUMBER.match(data, start.end())
+    height = None if width is None else _PNM_NUMBER.match(data, width.end())
+    return (int(width[1]), int(height[1])) if width is not None and height is not None else None
+
+
+def _tiff(data: bytes) -> tuple[int, int] | None:
+    order = "<" if data[:2] == b"II" else ">"
+    big = struct.unpack_from(order + "H", data, 2)[0] == 43
+    place = int(struct.unpack_from(order + ("Q" if big else "I"), data, 8 if big else 4)[0])
+    count = int(struct.unpack_from(order + ("Q" if big else "H"), data, place)[0])
+    entries, each = place + (8 if big else 2), 20 if big else 12
+    sides: dict[int, int] = {}
+    for k in range(min(count, 4096)):
+        tag, kind = struct.unpack_from(order + "HH", data, entries + each * k)
+        if tag in (256, 257) and kind in _TIFF_TYPES:
+            value = struct.unpack_from(order + _TIFF_TYPES[kind], data, entries + each * k + (12 if big else 8))[0]
+            sides[tag] = max(sides.get(tag, 0), int(value))
+    return (sides[256], sides[257]) if len(sides) == 2 else None
+
+
+def _webp(data: bytes) -> tuple[int, int] | None:
+    match data[12:16]:
+        case b"VP8X":
+            return 1 + int.from_bytes(data[24:27], "little"), 1 + int.from_bytes(data[27:30], "little")
+        case b"VP8L":
+            bits = int(struct.unpack_from("<I", data, 21)[0])
+            return 1 + (bits & 0x3FFF), 1 + (bits >> 14 & 0x3FFF)
+        case b"VP8 ":
+            width, height = struct.unpack_from("<HH", data, 26)
+            return width & 0x3FFF, height & 0x3FFF
+    return None
+
+
+def _jpeg2000(data: bytes) -> tuple[int, int] | None:
+    """The SIZ marker of the code stream, which is what is decoded."""
+    at = data.find(b"\xff\x4f\xff\x51")
+    if at < 0:
+        return None
+    right, bottom, left, top = struct.unpack_from(">IIII", data, at + 8)
+    return right - left, bottom - top
+
+
+_READERS: Final[tuple[tuple[bytes, Callable[[bytes], tuple[int, int] | None]], ...]] = (
+    (rb"\x89PNG\r\n\x1a\n", _png),
+    (rb"\xff\xd8\xff", _jpeg),
+    (rb"BM", _bmp),
+    (rb"P[1-7][\s#]", _pnm),
+    (rb"II[\x2a\x2b]\x00|MM\x00[\x2a\x2b]", _tiff),
+    (rb"RIFF....WEBP", _webp),
+    (rb"\x00\x00\x00\x0cjP  |\xff\x4f\xff\x51", _jpeg2000),
+)

@@ -1,0 +1,159 @@
+"""docs/limits.md has the limits that the code has, and what is beyond them is refused by a sentence."""
+
+from __future__ import annotations
+
+import importlib
+import os
+import re
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import tiltvp
+from hostile import aliases, own, png
+from tiltvp import _core
+from tiltvp.drive_logs import read_drive_log
+from tiltvp.errors import CalibrationError, ImageFileError, InvalidInputError, OutputError, TiltvpError
+from tiltvp.files import keeping_existing, whole_file, write_whole
+
+ROOT = Path(__file__).resolve().parent.parent
+ROW = re.compile(r"^\| .+ \| (\d+) \| `(\S+)` \|$", re.MULTILINE)
+
+
+def test_the_page_has_the_limits_of_the_code() -> None:
+    rows = ROW.findall((ROOT / "docs" / "limits.md").read_text(encoding="utf-8"))
+    assert len(rows) == 17
+    for value, place in rows:
+        module, _, name = place.replace("::", ".").rpartition(".")
+        home = _core if "::" in place else importlib.import_module(f"tiltvp.{module}")
+        assert getattr(home, name) == int(value), place
+
+
+@pytest.mark.parametrize(("width", "height"), [(65_535, 65_535), (20_000, 20_000), (100_000, 100_000)])
+def test_a_camera_of_too_many_pixels_is_refused(width: int, height: int, tmp_path: Path) -> None:
+    (tmp_path / "camera.toml").write_bytes(own(width, height))
+    with pytest.raises(CalibrationError, match=rf"{width} x {height}, expected at most 200000000 pixels"):
+        tiltvp.Camera.load(tmp_path / "camera.toml")
+
+
+def test_a_focal_length_of_nothing_is_refused() -> None:
+    for fx in (1e-308, 5e-324, 0.0, -1.0):
+        with pytest.raises(CalibrationError, match="fx = "):
+            tiltvp.Camera.pinhole(width=640, height=480, fx=fx, fy=500.0, cx=320.0, cy=240.0)
+
+
+@pytest.mark.parametrize("count", [201, 2_000, 9_999])
+def test_a_polynomial_of_too_many_numbers_is_refused(count: int) -> None:
+    for name in ("polynomial", "inverse_polynomial"):
+        lists = {"polynomial": [-200.0, 0.0, 1e-3], name: [-200.0] + [1e-9] * (count - 1)}
+        with pytest.raises(CalibrationError, match=rf"{name} = a list of {count}, expected at most 200 numbers"):
+            tiltvp.Camera.ocam(width=640, height=480, cx=319.5, cy=239.5, **lists)
+
+
+def test_a_bomb_of_aliases_is_refused_and_common_aliases_are_read(tmp_path: Path) -> None:
+    path = tmp_path / "camera.yaml"
+    path.write_bytes(aliases())
+    start = time.process_time()
+    with pytest.raises(CalibrationError, match="more than 10000 keys and values"):
+        tiltvp.Camera.load(path)
+    assert time.process_time() - start < 2.0
+    camera = "  camera_model: pinhole\n  distortion_model: radtan\n  distortion_coeffs: [0, 0, 0, 0]\n"
+    path.write_text(
+        f"cam0:\n{camera}  intrinsics: &k [50, 50, 31, 23]\n  resolution: &size [64, 48]\n"
+        f"cam1:\n{camera}  intrinsics: *k\n  resolution: *size\n"
+    )
+    assert tiltvp.Camera.load(path, camera=0) == tiltvp.Camera.load(path, camera=1)
+
+
+def test_an_image_that_says_too_many_pixels_is_not_decoded(tmp_path: Path) -> None:
+    (tmp_path / "image.png").write_bytes(png(16_000, 16_000))
+    with pytest.raises(ImageFileError, match="16000 x 16000 pixels, expected at most 200000000"):
+        tiltvp.read_image(tmp_path / "image.png")
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="pipes of POSIX")
+@pytest.mark.timeout(20)
+def test_pipes_and_devices_are_not_read(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "pipe")
+    for path in (tmp_path / "pipe", "/dev/zero"):
+        for read in (tiltvp.Camera.load, tiltvp.read_image, lambda path: read_drive_log(path, path)):
+            with pytest.raises(TiltvpError, match="is no regular file"):
+                read(path)
+
+
+def test_names_and_numbers_that_python_refuses_are_errors_of_ours(tmp_path: Path) -> None:
+    for read in (tiltvp.Camera.load, tiltvp.read_image, lambda path: read_drive_log(path, path)):
+        with pytest.raises(TiltvpError):
+            read("a\0b")
+    with pytest.raises(OutputError):
+        tiltvp.write_image(f"{tmp_path}/a\0b.png", np.zeros((2, 2), np.uint8))
+    with pytest.raises(InvalidInputError):
+        _core.consistency_band(0.95, 3, 2**62)
+    (tmp_path / "odometry.csv").write_text("step,delta_left_m,delta_right_m\n0,0,0\n1,1,1\n")
+    for landmark in ("9" * 400, str(2**53), "1" * 200_000):
+        (tmp_path / "bearings.csv").write_text(f"step,landmark,bearing_rad\n0,{landmark},0.1\n")
+        with pytest.raises(InvalidInputError):
+            read_drive_log(tmp_path / "odometry.csv", tmp_path / "bearings.csv")
+    with pytest.raises(InvalidInputError):
+        tiltvp.SelfCalibrator(wheel_base_m=0.4).step(0.1, 0.1, [2**53], [0.1])
+    (tmp_path / "camera.toml").write_bytes(own(640, 480).replace(b"640", b"0x" + b"f" * 20_000))
+    with pytest.raises(CalibrationError):
+        tiltvp.Camera.load(tmp_path / "camera.toml")
+
+
+def test_more_landmarks_than_the_limit_are_refused() -> None:
+    count = _core.MOST_LANDMARKS + 1
+    with pytest.raises(InvalidInputError, match=f"{count} landmarks"):
+        tiltvp.SelfCalibrator(wheel_base_m=0.4).step(0.1, 0.1, np.arange(count), np.zeros(count))
+    bearings = [[step, landmark, 0.1] for step in (0, 1) for landmark in range(count)]
+    with pytest.raises(InvalidInputError, match=f"{count} landmarks"):
+        tiltvp.calibrate([[0.1, 0.1]] * 2, bearings, wheel_base_m=0.4)
+
+
+def test_long_messages_are_shortened(tmp_path: Path) -> None:
+    (tmp_path / "camera.toml").write_bytes(own(640, 480).replace(b"equidistant", b"m" * 150_000))
+    with pytest.raises(CalibrationError) as refusal:
+        tiltvp.Camera.load(tmp_path / "camera.toml")
+    assert len(str(refusal.value)) < 2100
+    assert str(refusal.value).startswith(str(tmp_path))
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(sys.platform != "linux", reason="limits of Linux")
+def test_memory_that_cannot_be_had_is_an_error_of_ours() -> None:
+    script = (
+        "import resource, tiltvp\n"
+        "pages = int(open('/proc/self/statm').read().split()[0])\n"
+        "limit = pages * resource.getpagesize() + (1 << 28)\n"
+        "resource.setrlimit(resource.RLIMIT_AS, (limit, limit))\n"
+        "camera = tiltvp.Camera.equidistant(width=8000, height=6000, focal_px=1700, cx=4000, cy=3000)\n"
+        "try:\n    tiltvp.TiltEstimator(camera)\n"
+        "except tiltvp.errors.CalibrationError as error:\n    print(error)\n"
+    )
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, timeout=60, check=False)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert "for whose tables" in done.stdout
+
+
+def test_outputs_are_kept_where_that_is_asked_and_parts_of_the_dead_are_swept(tmp_path: Path) -> None:
+    out = tmp_path / "out.txt"
+    write_whole(out, "first")
+    with keeping_existing(), pytest.raises(InvalidInputError, match="--overwrite"):
+        write_whole(out, "second")
+    assert out.read_text() == "first"
+    (tmp_path / f".out.{'0' * 16}.part.txt").write_text("half")
+    with whole_file(out) as part:
+        part.write_text("third")
+        # Another one at the same time leaves this part alone.
+        write_whole(out, "second")
+        assert part.exists()
+    assert out.read_text() == "third"
+    with pytest.raises(ZeroDivisionError), whole_file(out):
+        raise ZeroDivisionError
+    assert [path.name for path in tmp_path.iterdir()] == ["out.txt"]
+    with pytest.raises(OutputError, match="no regular file"):
+        write_whole("/dev/null", "lost")
