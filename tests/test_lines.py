@@ -97,7 +97,7 @@ def test_extractor_is_a_value_and_takes_any_usual_image(room: RoomImage, camera:
 OTHER_VALUES = [
     ("great-circle", {"gradient_min": 400.0}), ("great-circle", {"smoothing_px": 1.5}),
     ("great-circle", {"elevation_min_rad": 0.3}), ("great-circle", {"elevation_max_rad": 0.5}),
-    ("great-circle", {"margin_px": 30.0}), ("great-circle", {"plane_max_rad": 1e-4}),
+    ("great-circle", {"margin_px": 30.0}), ("great-circle", {"plane_max_rad": 0.5}),
     ("great-circle", {"separation_px": 20.0}), ("great-circle", {"length_min_rad": 0.5}),
     ("great-circle", {"support_min_px": 60}), ("great-circle", {"gap_max_rad": 0.3}),
     ("great-circle", {"run_min_px": 20}), ("great-circle", {"tilt_sigma_rad": 0.05}),
