@@ -97,8 +97,8 @@ def test_extractor_is_a_value_and_takes_any_usual_image(room: RoomImage, camera:
 OTHER_VALUES = [
     ("great-circle", {"gradient_min": 400.0}), ("great-circle", {"smoothing_px": 1.5}),
     ("great-circle", {"elevation_min_rad": 0.3}), ("great-circle", {"elevation_max_rad": 0.5}),
-    ("great-circle", {"margin_px": 30.0}), ("great-circle", {"plane_max_rad": 0.01}), ("great-circle", {"bins": 100}),
-    ("great-circle", {"separation_rad": 0.2}), ("great-circle", {"length_min_rad": 0.5}),
+    ("great-circle", {"margin_px": 30.0}), ("great-circle", {"plane_max_rad": 0.5}),
+    ("great-circle", {"separation_px": 20.0}), ("great-circle", {"length_min_rad": 0.5}),
     ("great-circle", {"support_min_px": 60}), ("great-circle", {"gap_max_rad": 0.3}),
     ("great-circle", {"run_min_px": 20}), ("great-circle", {"tilt_sigma_rad": 0.05}),
     ("great-circle", {"covered_min": 1.0}), ("great-circle", {"scatter_max_px": 0.1}),
@@ -139,8 +139,8 @@ def test_a_mask_keeps_lines_out(room: RoomImage, camera: tiltvp.Camera) -> None:
     [
         ({"lines_mx": 3}, "did you mean lines_max"),
         ({"sectors": 300}, "unknown to method"),
-        ({"bins": 3}, "bins = 3"),
-        ({"bins": "many"}, "bins"),
+        ({"separation_px": -3}, "separation_px = -3"),
+        ({"separation_px": "many"}, "separation_px"),
         ({"method": "square"}, "great-circle"),
         ({"plane_max_rad": -1.0}, "plane_max_rad"),
         ({"descriptor_clip": 0.0}, "clip"),
