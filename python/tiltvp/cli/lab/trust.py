@@ -18,6 +18,7 @@ def trust(
     /,
     *,
     count: Annotated[int, Parameter(validator=validators.Number(gte=1))] = 200,
+    sets: Annotated[int, Parameter(validator=validators.Number(gte=0))] = 2,
     seed: Annotated[int, Parameter(validator=validators.Number(gte=0))] = 0,
     unseen: Switch = False,
     weights: Switch = False,
@@ -34,18 +35,21 @@ def trust(
         Folders with panoramas and an INDEX.csv of columns name, environment, tilt_x_deg, tilt_z_deg.
     count
         Images of each case.
+    sets
+        Sets of five images of each building that `check_setup` is asked about.
     seed
         Seed of headings, leans and harm.
     unseen
         Only the half of the buildings on which nothing was set.
     weights
-        Also print the weights that the other half trains, by which confidences trust a fit to be of the vertical.
+        Also print the weights that the other half trains: of the confidences, and of `check_setup`.
     out
         Also write the long table, one row for each image and method: .csv, .json or .parquet.
     """
     from tiltvp.lab.datasets.hostile import CASES, hostile_images
     from tiltvp.lab.datasets.panoramas import read_panorama_index
     from tiltvp.lab.evaluation.hostile import METHODS, judge_images, summarise_cases, train_trust
+    from tiltvp.lab.evaluation.setups import image_sets, summarise_sets, train_setups
     from tiltvp.lab.evaluation.trust import was_set_on
 
     if out is not None:
@@ -56,14 +60,21 @@ def trust(
         for panorama in read_panorama_index(folder)
         if not (unseen and was_set_on(panorama.location))
     ]
-    with progress_bar(count * len(CASES), "images") as bar:
+    places = len({panorama.location for panorama in chosen})
+    with progress_bar(count * len(CASES) + places, "images") as bar:
         images = hostile_images(chosen, count=count, seed=seed)
         table = judge_images(images, features=weights, advance=bar.advance)
+        asked = image_sets(chosen, sets=sets, seed=seed, advance=bar.advance)
     if out is not None:
         write_frame(table.select(column for column in table.columns if column != "features"), out)
-    places = len({panorama.location for panorama in chosen})
     title = f"Shares in per cent, of {count} images of each case, {len(chosen)} panoramas of {places} buildings"
     show_frame(title, summarise_cases(table), ["method", "case"])
     for method in METHODS if weights else ():
         constant, own = train_trust(table, method)
         say(f"{method}: {constant:.4g}; {', '.join(f'{weight:.4g}' for weight in own)}")
+    if asked:
+        show_frame(
+            "Sets of five images of one building: which direction is up", summarise_sets(asked), ["half", "setup"]
+        )
+    if weights and (told := [item for item in asked if was_set_on(item.location)]):
+        say(f"check_setup: {', '.join(f'{weight:.4g}' for weight in train_setups(told))}")
