@@ -113,12 +113,12 @@ stub: setup
 survive *arguments: setup
     {{bin}}/pytest --quiet --numprocesses 2 --dist worksteal tests/survive {{arguments}}
 
-# Attacks on the core that coverage guides, on fuzz/targets one after the other, each for so many seconds; what they find is in
-# fuzz/artifacts. They want a nightly compiler (`rustup toolchain install nightly`).
-survive-long seconds="900":
+# Attacks on the core that coverage guides, on fuzz/targets one after the other, a quarter of an hour each (`-max_total_time=60` for a
+# minute); what they find is in fuzz/artifacts. They want a nightly compiler (`rustup toolchain install nightly`).
+survive-long *arguments:
     test -x target/tools/bin/cargo-fuzz || cargo install --quiet --locked --root target/tools cargo-fuzz
     for target in lens images state rays; do \
-        PATH="$PWD/target/tools/bin:$PATH" cargo +nightly fuzz run $target -- -max_total_time={{seconds}} -timeout=10 -rss_limit_mb=2048 -print_final_stats=1; \
+        PATH="$PWD/target/tools/bin:$PATH" cargo +nightly fuzz run $target -- -timeout=10 -rss_limit_mb=2048 -print_final_stats=1 -max_total_time=900 {{arguments}}; \
     done
 
 # The tests of the crates under AddressSanitizer, whose nightly compiler it wants. (Its own folder of the build: nothing is built anew after it.)

@@ -131,7 +131,7 @@ def shares_of(features: Matrix, weights: Matrix | None = None) -> Matrix:
 
 def setup_features(images: Iterable[ArrayLike], camera: Camera, *, mask: ArrayLike | None = None) -> Matrix:
     """(N, 6, F): what tells of each image how likely each of the six directions is up."""
-    detector = SegmentDetector(camera) if mask is None else SegmentDetector(camera, mask=mask)
+    detector = SegmentDetector(camera, mask=None if mask is None else np.asarray(mask, dtype=bool))
     places, bearings = _sample_of(camera)
     rows = []
     for image in images:
