@@ -5,7 +5,6 @@ from __future__ import annotations
 import errno
 import glob
 import os
-import secrets
 import shutil
 import stat
 import sys
@@ -191,7 +190,7 @@ def _locked_beside(target: Path, ending: str, make: Callable[[Path], int]) -> tu
     _sweep(target.parent, f".{stem}.", f".part{ending}")
     _sweep(target.parent, f".{stem}.", ".old")
     while True:
-        part = target.with_name(f".{stem}.{secrets.token_hex(8)}.part{ending}")
+        part = target.with_name(f".{stem}.{os.urandom(8).hex()}.part{ending}")
         handle = make(part)
         with suppress(OSError):
             _lock(handle)
