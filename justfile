@@ -113,18 +113,6 @@ stub: setup
 survive *arguments: setup
     {{bin}}/pytest --quiet --numprocesses 2 --dist worksteal tests/survive {{arguments}}
 
-# Attacks on the core that coverage guides, on fuzz/targets one after the other, a quarter of an hour each (`-max_total_time=60` for a
-# minute); what they find is in fuzz/artifacts. They want a nightly compiler (`rustup toolchain install nightly`).
-survive-long *arguments:
-    test -x target/tools/bin/cargo-fuzz || cargo install --quiet --locked --root target/tools cargo-fuzz
-    for target in lens images state rays; do \
-        PATH="$PWD/target/tools/bin:$PATH" cargo +nightly fuzz run $target -- -timeout=10 -rss_limit_mb=2048 -print_final_stats=1 -max_total_time=900 {{arguments}}; \
-    done
-
-# The tests of the crates under AddressSanitizer, whose nightly compiler it wants. (Its own folder of the build: nothing is built anew after it.)
-sanitize:
-    RUSTFLAGS=-Zsanitizer=address PROPTEST_RNG_SEED=20171028 PROPTEST_CASES=64 cargo +nightly test --quiet --target x86_64-unknown-linux-gnu --target-dir target/address --package tiltvp-kernels --package tiltvp-core --lib --tests
-
 # The tests on real data, in the folder that TILTVP_DATA names.
 test-real *arguments: setup
     {{bin}}/pytest --quiet tests/real_data {{arguments}}

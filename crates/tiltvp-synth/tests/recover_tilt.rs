@@ -203,7 +203,9 @@ fn under_a_convex_mirror() {
 /// The image-space methods need a lens about the vertical. Only half of the horizon is seen, so the edges tell less of the lean.
 #[test]
 fn looking_forward() {
-    let setup = Setup { name: "forward", robot_from_camera: forward(), height_m: 1.0, confidence: 0.1, ..upward() };
+    // A view ahead with few verticals has a stated error of five degrees, of which next to nothing is left by whether it is of the
+    // vertical at all.
+    let setup = Setup { name: "forward", robot_from_camera: forward(), height_m: 1.0, confidence: 0.02, ..upward() };
     check(
         &setup,
         &[
