@@ -1500,7 +1500,7 @@ class LineExtractor:
             "great-circle": Least distance of two lines, in pixels: of two closer ones the longer stays. Default: 1.
         length_min_rad
             "great-circle": Least supported length of a line: the elevations that its pieces cover, in radians. Default:
-            0.20944.
+            0.261799.
         support_min_px
             "great-circle": Least number of pixels of a line. Default: 15.
         gap_max_rad

@@ -16,7 +16,7 @@ options! {
         /// Least distance of two lines, in pixels: of two closer ones the longer stays.
         separation_px: f64 = 1.0 => 0.0..=100.0, "a distance from 0 to 100 pixels";
         /// Least supported length of a line: the elevations that its pieces cover, in radians.
-        length_min_rad: f64 = 12.0 * PI / 180.0 => 0.0..=PI, "an angle from 0 to pi";
+        length_min_rad: f64 = 15.0 * PI / 180.0 => 0.0..=PI, "an angle from 0 to pi";
         /// Least number of pixels of a line.
         support_min_px: u32 = 15 => 3.0..=1e6, "at least 3 pixels";
         /// Widest gap between two pieces of a line that counts as covered, in radians of elevation.
