@@ -1452,8 +1452,7 @@ class LineExtractor:
         margin_px: float = ...,
         mask: NDArray[np.bool_] | None = ...,
         plane_max_rad: float = ...,
-        bins: SupportsIndex = ...,
-        separation_rad: float = ...,
+        separation_px: float = ...,
         length_min_rad: float = ...,
         support_min_px: SupportsIndex = ...,
         gap_max_rad: float = ...,
@@ -1496,24 +1495,23 @@ class LineExtractor:
         mask
             Pixels that show the world and not the robot; none for all. Default: None.
         plane_max_rad
-            "great-circle": How far from the vertical the great circle of an edge pixel may pass, in radians. Default:
-            0.0872665.
-        bins
-            "great-circle": Number of bins of the histogram over azimuth. Default: 720.
-        separation_rad
-            "great-circle": Least angle between two lines of the same polarity, in radians. Default: 0.0174533.
+            "great-circle": How far from the vertical the great circle of a straight edge may pass, in radians, beyond
+            what is unknown of it. Default: 0.0872665.
+        separation_px
+            "great-circle": Least distance of two lines, in pixels: of two closer ones the longer stays. Default: 1.
         length_min_rad
-            "great-circle": Least supported length of a line: the elevations that its runs of pixels cover, in radians.
-            Default: 0.261799.
+            "great-circle": Least supported length of a line: the elevations that its pieces cover, in radians. Default:
+            0.261799.
         support_min_px
             "great-circle": Least number of pixels of a line. Default: 15.
         gap_max_rad
-            "great-circle": Widest gap within a run of pixels, in radians of elevation. Default: 0.0349066.
+            "great-circle": Widest gap between two pieces of a line that counts as covered, in radians of elevation.
+            Default: 0.0349066.
         run_min_px
-            "great-circle": Least number of pixels of a run. Default: 6.
+            "great-circle": Least number of pixels of a piece. Default: 8.
         covered_min
-            "great-circle": Least share of the elevations from the lowest to the highest pixel of a line that its runs
-            cover, from 0 to 1: lines that cover less are short edges in line by chance. Default: 0.6.
+            "great-circle": Least share of the elevations from the lowest to the highest pixel of a line that its pieces
+            cover, from 0 to 1: lines that cover less are short edges in line by chance. Default: 0.4.
         scatter_max_px
             "great-circle": Greatest standard deviation of the pixels about their line, in pixels: lines that scatter
             more are edges that blend. Default: 0.36.

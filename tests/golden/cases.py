@@ -181,7 +181,7 @@ def lines_and_tracks() -> Iterator[tuple[str, Any]]:
     )  # fmt: skip
     extractors = {
         "great-circle": lines.LineExtractor(camera),
-        "loose": lines.LineExtractor(camera, length_min_rad=0.1, bins=1440, scatter_max_px=0.6, gradient_min=60.0),
+        "loose": lines.LineExtractor(camera, length_min_rad=0.1, scatter_max_px=0.6, gradient_min=60.0),
         "radial": lines.LineExtractor(camera, method="radial"),
     }
     trackers = {name: lines.LineTracker() for name in extractors}

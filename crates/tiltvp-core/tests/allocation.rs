@@ -12,6 +12,7 @@ use scene::{constant, fisheye, noise, stripes};
 use tiltvp_core::camera::Camera;
 use tiltvp_core::edges::NormalKind;
 use tiltvp_core::geometry::Tilt;
+use tiltvp_core::lines::{LineExtractor, LineOptions, Lines};
 use tiltvp_core::robust::{LocalOptimization, SampleOrder, Sampling, Score};
 use tiltvp_core::segments::{SegmentDetector, SegmentDetectorOptions, Segments};
 use tiltvp_core::tilt::{Correction, METHODS, Method, TiltEstimator, TiltOptions, TrainedCorrection};
@@ -153,6 +154,28 @@ fn no_detection_of_straight_edges_allocates_once_lists_have_grown() {
     }
     // A stable sort allocates from some twenty on.
     assert!(most > 30, "{most} edges");
+}
+
+#[test]
+fn no_extraction_of_lines_allocates_once_lists_have_grown() {
+    let camera = camera();
+    let tilt = Tilt::from_alpha_beta(0.05, 1.0);
+    let few = stripes(&camera, &Matrix3::identity(), &tilt, 5, 0.0, 1);
+    let many = stripes(&camera, &Matrix3::identity(), &tilt, 40, 3.0, 1);
+    let images = [constant(&camera, 128.0), few, many, noise(&camera, 7)];
+    let extractor = LineExtractor::new(camera, Matrix3::identity(), LineOptions::default()).unwrap();
+    let (mut scratch, mut found) = (extractor.scratch(), Lines::default());
+    for image in &images {
+        extractor.extract(&image.view(), Some(&tilt), &mut scratch, &mut found).unwrap();
+    }
+    let mut most = 0;
+    for (i, image) in images.iter().enumerate() {
+        let taken = allocations(|| extractor.extract(&image.view(), Some(&tilt), &mut scratch, &mut found).unwrap());
+        assert_eq!(taken, 0, "image {i}, {} lines", found.lines.len());
+        most = most.max(found.lines.len());
+    }
+    // A stable sort allocates from some twenty on.
+    assert!(most > 25, "{most} lines");
 }
 
 #[test]

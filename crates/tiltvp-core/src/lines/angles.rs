@@ -16,19 +16,6 @@ pub(super) fn atan2(y: f32, x: f32) -> f32 {
     if y < 0.0 { -r } else { r }
 }
 
-/// The difference of two angles of one turn in `[-pi, pi]`, without a division.
-#[inline]
-pub(super) fn difference(a: f64, b: f64) -> f64 {
-    let turned = a - b;
-    if turned > PI {
-        turned - TAU
-    } else if turned < -PI {
-        turned + TAU
-    } else {
-        turned
-    }
-}
-
 /// The angle in `(-pi, pi]`.
 pub(super) fn wrap(angle: f64) -> f64 {
     let turned = angle - TAU * (angle / TAU).round();

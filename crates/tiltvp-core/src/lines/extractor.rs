@@ -1,19 +1,21 @@
 //! From an image to its vertical lines and their descriptors: the tables of a camera, made once.
 
+use std::f64::consts::FRAC_PI_2;
+
 use nalgebra::Matrix3;
 
 use super::description::descriptor::{DescriptorScratch, DescriptorSpan, describe};
 use super::description::patch::{Chart, Patch, Raster};
-use super::extraction::great_circle::{self, GreatCircleScratch};
+use super::extraction::great_circle::{self, GreatCircleScratch, MISS_MAX_RAD};
 use super::extraction::radial::{self, RadialScratch, Radii};
 use super::line::{Line, LineFrame, Lines};
-use super::options::{LineMethod, LineOptions};
+use super::options::{GreatCircleOptions, LineMethod, LineOptions};
 use super::tables::LineTables;
 use crate::camera::Camera;
-use crate::edges::{RidgeDetector, RidgePixels};
 use crate::error::{Error, Result};
 use crate::geometry::Tilt;
 use crate::image::ImageView;
+use crate::segments::{FinderScratch, SegmentFinder, SegmentOptions, Segments};
 
 /// Samples of a descriptor from the middle of an area to its rim, along great circles: about one a pixel where 90
 /// degrees of elevation cover 110 pixels.
@@ -26,14 +28,15 @@ pub struct LineExtractor {
     robot_from_camera: Matrix3<f64>,
     options: LineOptions,
     tables: LineTables,
+    finder: Option<SegmentFinder>,
     radii: Option<Radii>,
 }
 
 /// Memory for one thread.
 #[derive(Debug, Clone)]
 pub struct LineScratch {
-    detector: RidgeDetector,
-    ridge: RidgePixels,
+    finder: Option<FinderScratch>,
+    segments: Segments,
     great_circle: GreatCircleScratch,
     radial: RadialScratch,
     descriptor: DescriptorScratch,
@@ -54,13 +57,17 @@ impl LineExtractor {
             LineMethod::GreatCircle(_) => None,
             LineMethod::Radial(radial) => Some(Radii::new(&camera, &robot_from_camera, &tables, radial)),
         };
+        let finder = match &options.method {
+            LineMethod::GreatCircle(own) => Some(SegmentFinder::new(&camera, &tables.region, segment_options(own))),
+            LineMethod::Radial(_) => None,
+        };
         if let Some(radii) = radii
             && radii.outer - radii.inner < 6.0
         {
             let got = format!("[{:.1}, {:.1}]", radii.inner, radii.outer);
             return Err(Error::option("radius_min_px, radius_max_px", got, "radii at least 6 pixels apart"));
         }
-        Ok(Self { camera, robot_from_camera, options, tables, radii })
+        Ok(Self { camera, robot_from_camera, options, tables, finder, radii })
     }
 
     /// The camera.
@@ -86,8 +93,8 @@ impl LineExtractor {
     /// Memory for one thread.
     pub fn scratch(&self) -> LineScratch {
         LineScratch {
-            detector: RidgeDetector::new(&self.tables.region, &self.options.edges),
-            ridge: RidgePixels::default(),
+            finder: self.finder.as_ref().map(|finder| finder.scratch(&self.tables.region, &self.options.edges)),
+            segments: Segments::default(),
             great_circle: GreatCircleScratch::default(),
             radial: RadialScratch::default(),
             descriptor: DescriptorScratch::default(),
@@ -121,20 +128,20 @@ impl LineExtractor {
     ) -> Result<()> {
         self.check(image, scratch)?;
         let edges = &self.options.edges;
-        match (&self.options.method, &self.radii) {
-            (LineMethod::Radial(options), Some(radii)) => {
-                radial::find(image, &self.tables, radii, edges.gradient_min, options, &mut scratch.radial, out);
+        let LineScratch { finder: work, segments, great_circle, radial, .. } = scratch;
+        match (&self.options.method, &self.finder, work, &self.radii) {
+            (LineMethod::Radial(options), _, _, Some(radii)) => {
+                radial::find(image, &self.tables, radii, edges.gradient_min, options, radial, out);
             }
-            (LineMethod::GreatCircle(options), _) => {
+            (LineMethod::GreatCircle(options), Some(finder), Some(work), _) => {
                 let tilt = tilt.copied().unwrap_or(Tilt::UPRIGHT);
-                let reach = (options.plane_max_rad + tilt.alpha_rad()).min(std::f64::consts::FRAC_PI_2);
+                let reach = (MISS_MAX_RAD.max(options.plane_max_rad) + tilt.alpha_rad()).min(FRAC_PI_2);
                 let prefilter = self.tables.prefilter.with_limit(reach.sin());
-                let LineScratch { detector, ridge, great_circle, .. } = scratch;
-                detector.detect(image, &self.tables.region, edges.gradient_min, Some(&prefilter), ridge);
+                finder.find(image, &self.tables.region, edges.gradient_min, Some(&prefilter), work, segments);
                 let frame = LineFrame { normal: tilt.normal(), center_px: None };
-                great_circle::find(&self.tables, ridge, frame, options, great_circle, out);
+                great_circle::find(&self.robot_from_camera, segments, frame, options, great_circle, out);
             }
-            (LineMethod::Radial(_), None) => {}
+            _ => {}
         }
         Ok(())
     }
@@ -218,5 +225,15 @@ impl LineExtractor {
             out.extend_from_slice(&patch.levels);
         }
         Ok((rows, columns))
+    }
+}
+
+/// Short pieces, wherever one begins: lines join them by what is known of the vertical.
+fn segment_options(options: &GreatCircleOptions) -> SegmentOptions {
+    SegmentOptions {
+        gradient_start: 0.0,
+        support_min_px: options.run_min_px,
+        gap_max: 0.0,
+        ..SegmentOptions::default()
     }
 }

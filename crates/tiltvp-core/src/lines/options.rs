@@ -11,23 +11,21 @@ options! {
     /// Options of the great circles.
     #[derive(Copy)]
     pub struct GreatCircleOptions {
-        /// How far from the vertical the great circle of an edge pixel may pass, in radians.
+        /// How far from the vertical the great circle of a straight edge may pass, in radians, beyond what is unknown of it.
         plane_max_rad: f64 = 5.0 * PI / 180.0 => 1e-4..=0.5, "an angle from 1e-4 to 0.5 rad";
-        /// Number of bins of the histogram over azimuth.
-        bins: usize = 720 => 16.0..=1e5, "a whole number from 16 to 100000";
-        /// Least angle between two lines of the same polarity, in radians.
-        separation_rad: f64 = PI / 180.0 => 1e-4..=0.5, "an angle from 1e-4 to 0.5 rad";
-        /// Least supported length of a line: the elevations that its runs of pixels cover, in radians.
+        /// Least distance of two lines, in pixels: of two closer ones the longer stays.
+        separation_px: f64 = 1.0 => 0.0..=100.0, "a distance from 0 to 100 pixels";
+        /// Least supported length of a line: the elevations that its pieces cover, in radians.
         length_min_rad: f64 = 15.0 * PI / 180.0 => 0.0..=PI, "an angle from 0 to pi";
         /// Least number of pixels of a line.
         support_min_px: u32 = 15 => 3.0..=1e6, "at least 3 pixels";
-        /// Widest gap within a run of pixels, in radians of elevation.
+        /// Widest gap between two pieces of a line that counts as covered, in radians of elevation.
         gap_max_rad: f64 = 2.0 * PI / 180.0 => 1e-4..=PI, "an angle from 1e-4 to pi";
-        /// Least number of pixels of a run.
-        run_min_px: u32 = 6 => 1.0..=1e6, "at least 1 pixel";
-        /// Least share of the elevations from the lowest to the highest pixel of a line that its runs cover, from 0 to 1: lines
+        /// Least number of pixels of a piece.
+        run_min_px: u32 = 8 => 4.0..=1e6, "at least 4 pixels";
+        /// Least share of the elevations from the lowest to the highest pixel of a line that its pieces cover, from 0 to 1: lines
         /// that cover less are short edges in line by chance.
-        covered_min: f64 = 0.6 => 0.0..=1.0, "a share from 0 to 1";
+        covered_min: f64 = 0.4 => 0.0..=1.0, "a share from 0 to 1";
         /// Greatest standard deviation of the pixels about their line, in pixels: lines that scatter more are edges that blend.
         scatter_max_px: f64 = 0.36 => 0.01..=100.0, "a distance from 0.01 to 100 pixels";
         /// Standard deviation of the tilt that the frame is given, in radians: lines may slant by as much.

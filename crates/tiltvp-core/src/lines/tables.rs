@@ -1,7 +1,6 @@
 //! Tables that a line extractor computes once for a camera: the pixels it looks at, their rays, and the elevations it sees.
 
 use nalgebra::{Matrix3, Vector2};
-use tiltvp_kernels::prefetch::prefetch;
 
 use super::options::LineOptions;
 use crate::camera::Camera;
@@ -19,7 +18,6 @@ const NO_RAY: i16 = i16::MIN;
 #[derive(Debug, Clone)]
 pub(super) struct LineTables {
     pub(super) region: Region,
-    pub(super) lift: LiftTable,
     pub(super) prefilter: Prefilter,
     /// Bearing of every pixel in the robot frame, in row order and units of [`UNIT`]: half the memory of single precision, to
     /// a thousandth of a degree. [`NO_RAY`] where there is none.
@@ -64,7 +62,7 @@ impl LineTables {
         }
         let clearance = distances(clear, width);
         let band = band_of(&region);
-        Ok(Self { region, lift, prefilter, rays, clearance, width, height, band })
+        Ok(Self { region, prefilter, rays, clearance, width, height, band })
     }
 
     /// Whether the world is seen at every pixel up to `reach` away from `(u, v)`, along rows, columns or both, and around it.
@@ -72,13 +70,6 @@ impl LineTables {
     pub(super) fn is_clear_around(&self, u: i32, v: i32, reach: u32) -> bool {
         let (Ok(u), Ok(v)) = (usize::try_from(u), usize::try_from(v)) else { return false };
         u < self.width && self.clearance.get(v * self.width + u).is_some_and(|clear| u32::from(*clear) > reach)
-    }
-
-    /// Asks for the rays of a pixel and one above or below it, which will be read soon.
-    #[inline]
-    pub(super) fn expect(&self, u: usize, v: usize, beside: usize) {
-        prefetch(&self.rays, v * self.width + u);
-        prefetch(&self.rays, beside * self.width + u);
     }
 
     /// The ray of a pixel, and whether it has one.

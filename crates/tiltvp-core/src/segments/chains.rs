@@ -42,7 +42,7 @@ pub(super) struct Chains {
     starts: Vec<usize>,
 }
 
-/// The part of an image that holds a region, one pixel wider on every side.
+/// The part of an image that holds a region, two pixels wider on every side: as far as a chain looks for its next pixel.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub(super) struct Window {
     pub left: usize,
@@ -58,10 +58,10 @@ impl Window {
         let columns = region.columns();
         // Regions keep clear of the image's border.
         Self {
-            left: columns.start.saturating_sub(1),
-            top: top.saturating_sub(1),
-            width: columns.len() + 2,
-            height: bottom - top + 2,
+            left: columns.start.saturating_sub(2),
+            top: top.saturating_sub(2),
+            width: columns.len() + 4,
+            height: bottom - top + 4,
         }
     }
 
@@ -110,26 +110,10 @@ impl Chains {
                     members.push(seed as u32);
                 }
                 loop {
-                    let [x, y] = units[here];
-                    let along = [-y * way, x * way];
-                    let nearest = step_towards(along);
-                    let mut best = (0.0, 0, 0);
-                    for step in [nearest, (nearest + 1) % 8, (nearest + 7) % 8] {
-                        let there = at.wrapping_add_signed(steps[step]);
-                        let Some(next) = free[there].checked_sub(1) else { continue };
-                        let [p, q] = units[next as usize];
-                        let turn = x * p + y * q;
-                        let score = turn * (along[0] * DIRECTIONS[step][0] + along[1] * DIRECTIONS[step][1]);
-                        if turn >= TURN_COS && score > best.0 {
-                            best = (score, next, there);
-                        }
-                    }
-                    if best.0 == 0.0 {
-                        break;
-                    }
-                    (here, at) = (best.1 as usize, best.2);
+                    let Some((next, there)) = next(free, units, &steps, here, at, way) else { break };
+                    (here, at) = (next as usize, there);
                     free[at] = 0;
-                    members.push(best.1);
+                    members.push(next);
                 }
             }
             starts.push(members.len());
@@ -149,6 +133,39 @@ impl Chains {
     pub(super) fn unit(&self, ridge_pixel: u32) -> [f32; 2] {
         self.units[ridge_pixel as usize]
     }
+}
+
+/// The free ridge pixel that goes on from one along its edge, one way or the other, and its place. The gradient turns least there.
+#[inline(always)]
+fn next(
+    free: &[u32],
+    units: &[[f32; 2]],
+    steps: &[isize; 8],
+    here: usize,
+    at: usize,
+    way: f32,
+) -> Option<(u32, usize)> {
+    let [x, y] = units[here];
+    let along = [-y * way, x * way];
+    let nearest = step_towards(along);
+    // Along a diagonal a ridge may lack a pixel: of two neighbours one is judged by its row, one by its column, and each is beaten.
+    for from in [at, at.wrapping_add_signed(steps[nearest])] {
+        let mut best = (0.0, None);
+        for side in [nearest, (nearest + 1) % 8, (nearest + 7) % 8] {
+            let there = from.wrapping_add_signed(steps[side]);
+            let Some(next) = free[there].checked_sub(1) else { continue };
+            let [p, q] = units[next as usize];
+            let turn = x * p + y * q;
+            let score = turn * (along[0] * DIRECTIONS[side][0] + along[1] * DIRECTIONS[side][1]);
+            if turn >= TURN_COS && score > best.0 {
+                best = (score, Some((next, there)));
+            }
+        }
+        if best.1.is_some() {
+            return best.1;
+        }
+    }
+    None
 }
 
 /// Number of the step nearest to a direction.

@@ -12,7 +12,7 @@ use super::options::{SegmentDetectorOptions, SegmentOptions};
 use super::pieces::split;
 use super::segment::{EdgePoint, Segment, Segments};
 use crate::camera::Camera;
-use crate::edges::{EdgeOptions, Region, RidgeDetector, RidgePixels};
+use crate::edges::{EdgeOptions, Prefilter, Region, RidgeDetector, RidgePixels};
 use crate::error::{Error, Result};
 use crate::image::ImageView;
 
@@ -73,19 +73,20 @@ impl SegmentFinder {
         }
     }
 
-    /// Writes the segments of an image, the longest first. Allocates nothing once `scratch` and `out` have grown.
+    /// Writes the segments of an image whose pixels pass a prefilter, the longest first. Allocates nothing once `scratch` and `out` have grown.
     pub(crate) fn find(
         &self,
         image: &ImageView<'_>,
         region: &Region,
         gradient_min: f64,
+        prefilter: Option<&Prefilter>,
         scratch: &mut FinderScratch,
         out: &mut Segments,
     ) {
         let FinderScratch { detector, ridge, chains, stack, points, pieces, toward, groups, cut } = scratch;
         let SegmentOptions { gradient_start, stray_max_px, rms_max_px, support_min_px, gap_max } = self.options;
         let least = support_min_px as usize;
-        detector.detect(image, region, gradient_min, None, ridge);
+        detector.detect(image, region, gradient_min, prefilter, ridge);
         chains.link(ridge, (gradient_start * gradient_start) as f32);
         points.clear();
         pieces.clear();
@@ -213,7 +214,7 @@ impl SegmentDetector {
             let expected = format!("{height} x {width} (rows x columns), as the camera's images");
             return Err(Error::argument("image", got, expected));
         }
-        self.finder.find(image, &self.region, self.options.edges.gradient_min, &mut scratch.finder, out);
+        self.finder.find(image, &self.region, self.options.edges.gradient_min, None, &mut scratch.finder, out);
         Ok(())
     }
 }

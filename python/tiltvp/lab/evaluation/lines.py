@@ -56,6 +56,8 @@ LINE_VARIANTS: tuple[LineVariant, ...] = (
 )
 """The default, with what is known of the robot and without, and the paper's."""
 
+_DUE_MIN_RAD: Final = math.radians(15.0)
+"""In sight over how much elevation any method is asked for an edge."""
 _COUNTS: Final = ("lines", "on_edges", "correct", "false_matches", "false_new", "unknown", "due", "found")
 _TIMES: Final = ("extract_ms", "describe_ms", "match_ms")
 _SCHEMA: Final[dict[str, Any]] = (
@@ -160,8 +162,6 @@ class _Run:
         self.variant = variant
         options = {"robot_from_camera": drive.robot_from_camera} | variant.extractor
         self._extractor = LineExtractor(drive.camera, **options)
-        # What any method is asked for: the least length of the default one.
-        self._length_min_rad = float(LineExtractor(drive.camera).options["length_min_rad"])
         self._tracker = LineTracker(**variant.tracker)
         self._judge = Judge(int(self._tracker.options["look_back"]))
 
@@ -181,7 +181,7 @@ class _Run:
         told = dict(zip(("distance_m", "yaw_change_rad"), motion, strict=True)) if self.variant.odometry else {}
         tracked = self._tracker.update(lines, descriptors, **told)
         clock.append(time.thread_time())
-        known: Identities = identities(lines, truth, length_min_rad=self._length_min_rad)
+        known: Identities = identities(lines, truth, length_min_rad=_DUE_MIN_RAD)
         errors = known.error_rad[np.isfinite(known.error_rad)]
         counts = {"lines": len(lines), "on_edges": len(errors), "due": known.due, "found": known.found}
         counts |= asdict(self._judge(tracked, known, everywhere))

@@ -1,67 +1,72 @@
-//! Vertical lines as great circles through the vertical: a histogram over azimuth, its peaks, and a fit at each.
+//! Vertical lines as great circles through the vertical: straight edges that pass it, joined by great circle and polarity.
 
-use std::f64::consts::{PI, TAU};
+use nalgebra::{Matrix3, Vector3};
 
-use super::candidates::Candidates;
-use super::line_fit::{FitScratch, LineFit, fit_line, joined, take};
-use crate::edges::RidgePixels;
+use super::line_fit::{LineFit, Moments};
 use crate::lines::angles::wrap;
 use crate::lines::line::{Line, LineFrame, Lines};
 use crate::lines::options::GreatCircleOptions;
-use crate::lines::tables::LineTables;
+use crate::segments::{EdgePoint, Segment, Segments};
 
 /// Memory of the search.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct GreatCircleScratch {
-    candidates: Candidates,
-    votes: [Vec<f32>; 2],
-    smooth: [Vec<f32>; 2],
-    peaks: Vec<Peak>,
+    arcs: Vec<Arc>,
+    by_azimuth: Vec<(f64, u32)>,
+    members: Vec<u32>,
     fits: Vec<LineFit>,
-    fit: FitScratch,
 }
 
-/// A local maximum of the histogram of one polarity.
-#[derive(Debug, Clone, Copy)]
-struct Peak {
-    height: f32,
+/// A straight edge that may be of a vertical line, in the upright frame.
+#[derive(Debug, Clone)]
+struct Arc {
+    moments: Moments,
     azimuth: f64,
     rising: bool,
+    /// Lowest and highest elevation, radians.
+    ends: (f64, f64),
+    taken: bool,
 }
 
-/// Lines closer than this, in pixels, whose polarities differ are one line that changes polarity: two edges so close
-/// blend.
-const ONE_LINE_PX: f64 = 0.8;
+/// Greatest root mean square distance in pixels of a straight edge from a line that it is a piece of.
+const JOIN_PX: f64 = 0.7;
 
-/// Finds the lines among the ridge pixels of an image.
+/// How far in pixels the middle of a straight edge may be from the first of its line: [`JOIN_PX`], and what the line's slant moves it.
+const REACH_PX: f64 = 4.0;
+
+/// Pixels farther from their straight edge are where it bends away at a corner.
+const STRAY_PX: f64 = 1.2;
+
+/// Standard deviations of a straight edge's direction within which it may pass the vertical.
+const DIRECTION_SIGMAS: f64 = 3.0;
+
+/// The largest angle in radians, 20 degrees, by which the great circle of a straight edge or one pixel of it may miss the vertical,
+/// however little is known of its direction.
+pub(crate) const MISS_MAX_RAD: f64 = 0.35;
+
+/// Finds the lines among the straight edges of an image.
 pub(crate) fn find(
-    tables: &LineTables,
-    ridge: &RidgePixels,
+    robot_from_camera: &Matrix3<f64>,
+    segments: &Segments,
     frame: LineFrame,
     options: &GreatCircleOptions,
     scratch: &mut GreatCircleScratch,
     out: &mut Lines,
 ) {
-    let GreatCircleScratch { candidates, votes, smooth, peaks, fits, fit } = scratch;
-    candidates.refill(tables, ridge, &frame.robot_from_upright(), options.plane_max_rad, options.bins);
-    vote(candidates, options.bins, votes);
-    peaks.clear();
-    for (rising, (votes, smooth)) in [false, true].into_iter().zip(votes.iter().zip(smooth)) {
-        find_peaks(votes, smooth, options, rising, peaks);
-    }
-    peaks.sort_by(|a, b| b.height.total_cmp(&a.height).then(a.azimuth.total_cmp(&b.azimuth)));
+    let GreatCircleScratch { arcs, by_azimuth, members, fits } = scratch;
+    let upright_from_camera = frame.robot_from_upright().transpose() * robot_from_camera;
+    arcs.clear();
+    let arc = |segment: &Segment| Arc::new(segment, segments.points_of(segment), &upright_from_camera, options);
+    arcs.extend(segments.list.iter().filter_map(arc));
+    arcs.sort_unstable_by(|a, b| b.extent().total_cmp(&a.extent()).then(a.azimuth.total_cmp(&b.azimuth)));
+    by_azimuth.clear();
+    by_azimuth.extend(arcs.iter().zip(0..).map(|(arc, i)| (arc.azimuth, i)));
+    by_azimuth.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
     fits.clear();
-    for peak in peaks.iter() {
-        let Some(found) = fit_line(candidates, peak.azimuth, peak.rising, options, fit) else { continue };
-        // Either half of a line of both polarities may be short.
-        if 2 * found.support >= options.support_min_px && 2.0 * found.length >= options.length_min_rad {
-            take(candidates, fit);
-            fits.push(found);
-        }
+    for first in 0..arcs.len() {
+        fits.extend(grow(arcs, by_azimuth, first, options, members).filter(|fit| fit.is_one_line(options)));
     }
-    join(fits);
-    fits.retain(|fit| fit.is_one_line(options));
-    keep_apart(fits, options.separation_rad);
+    keep_apart(fits, options.separation_px);
     if let Some(most) = options.lines_max {
         fits.truncate(most);
     }
@@ -71,80 +76,121 @@ pub(crate) fn find(
         bearing_rad: fit.azimuth,
         sigma_rad: fit.sigma,
         support_px: fit.support,
-        elevation_min_rad: fit.slopes.0.atan(),
-        elevation_max_rad: fit.slopes.1.atan(),
-        polarity: 2.0 * f64::from(fit.rising) / f64::from(fit.support) - 1.0,
+        elevation_min_rad: fit.ends.0,
+        elevation_max_rad: fit.ends.1,
+        polarity: if fit.rising { 1.0 } else { -1.0 },
     }));
-    out.lines.sort_by(|a, b| a.bearing_rad.total_cmp(&b.bearing_rad));
+    out.lines.sort_unstable_by(|a, b| a.bearing_rad.total_cmp(&b.bearing_rad));
 }
 
-/// Each candidate votes for the two bins next to its azimuth.
-fn vote(candidates: &Candidates, bins: usize, votes: &mut [Vec<f32>; 2]) {
-    for votes in votes.iter_mut() {
-        votes.clear();
-        votes.resize(bins, 0.0);
-    }
-    for pixel in &candidates.pixels {
-        let place = (f64::from(pixel.azimuth) + PI) / TAU * bins as f64 - 0.5;
-        let (low, share) = (place.floor(), (place - place.floor()) as f32);
-        let low = (low as i64).rem_euclid(bins as i64) as usize;
-        let votes = &mut votes[usize::from(pixel.rising)];
-        votes[low] += 1.0 - share;
-        votes[(low + 1) % bins] += share;
-    }
-}
-
-/// The local maxima of the smoothed histogram that are no neighbour of a higher one.
-fn find_peaks(votes: &[f32], smooth: &mut Vec<f32>, options: &GreatCircleOptions, rising: bool, peaks: &mut Vec<Peak>) {
-    let bins = votes.len();
-    smooth.clear();
-    smooth
-        .extend((0..bins).map(|b| 0.25 * votes[(b + bins - 1) % bins] + 0.5 * votes[b] + 0.25 * votes[(b + 1) % bins]));
-    let reach = ((0.5 * options.separation_rad / TAU * bins as f64) as usize).clamp(1, bins / 4);
-    // A line of the least support that falls between bins, or has half of its pixels in the other polarity.
-    let least = 0.25 * options.support_min_px as f32;
-    for b in 0..bins {
-        let here = smooth[b];
-        let higher = |offset: usize| smooth[(b + bins - offset) % bins] >= here || smooth[(b + offset) % bins] > here;
-        if here < least || (1..=reach).any(higher) {
-            continue;
+impl Arc {
+    /// None for an edge that passes the vertical too far off.
+    fn new(
+        segment: &Segment,
+        points: &[EdgePoint],
+        upright_from_camera: &Matrix3<f64>,
+        options: &GreatCircleOptions,
+    ) -> Option<Self> {
+        let up = upright_from_camera.row(2).transpose();
+        let unknown = (segment.variance_at(&up) + options.tilt_sigma_rad.powi(2)).sqrt();
+        let limit = (options.plane_max_rad + DIRECTION_SIGMAS * unknown).min(MISS_MAX_RAD.max(options.plane_max_rad));
+        if segment.normal.dot(&up).abs() > limit.sin() {
+            return None;
         }
-        let (before, after) = (smooth[(b + bins - 1) % bins], smooth[(b + 1) % bins]);
-        let bend = 2.0 * here - before - after;
-        let shift = if bend > 0.0 { 0.5 * (after - before) / bend } else { 0.0 };
-        let azimuth = wrap((b as f64 + 0.5 + f64::from(shift)) / bins as f64 * TAU - PI);
-        peaks.push(Peak { height: here, azimuth, rising });
-    }
-}
-
-/// Joins lines of opposite polarity at the same azimuth.
-fn join(fits: &mut Vec<LineFit>) {
-    let mut first = 0;
-    while first < fits.len() {
-        let a = fits[first];
-        let partner = (first + 1..fits.len()).find(|second| {
-            let b = fits[*second];
-            let opposite = (a.rising == 0) != (b.rising == 0);
-            opposite && wrap(a.azimuth - b.azimuth).abs() < ONE_LINE_PX * 0.5 * (a.per_px + b.per_px)
-        });
-        match partner {
-            Some(second) => {
-                fits[first] = joined(&a, &fits[second]);
-                fits.remove(second);
+        let normal = upright_from_camera * segment.normal;
+        let (mut moments, mut lowest, mut highest) = (Moments::default(), 1.0, -1.0);
+        let mut middle = Vector3::zeros();
+        for point in points {
+            let bearing = upright_from_camera * Vector3::from(point.bearing.map(f64::from));
+            let px_per_rad = f64::from(point.px_per_rad);
+            if (normal.dot(&bearing) * px_per_rad).abs() < STRAY_PX {
+                moments.add(&bearing, px_per_rad);
+                middle += bearing;
+                (lowest, highest) = (bearing.z.min(lowest), bearing.z.max(highest));
             }
-            None => first += 1,
         }
+        let turn = normal.y * middle.x - normal.x * middle.y;
+        (moments.support >= options.run_min_px).then(|| Self {
+            moments,
+            azimuth: middle.y.atan2(middle.x),
+            rising: turn > 0.0,
+            ends: (lowest.asin(), highest.asin()),
+            taken: false,
+        })
+    }
+
+    fn extent(&self) -> f64 {
+        self.ends.1 - self.ends.0
     }
 }
 
-/// Sorts by length, the longest first, and drops lines beside a longer one of the same polarity.
-fn keep_apart(fits: &mut Vec<LineFit>, separation: f64) {
-    fits.sort_by(|a, b| b.length.total_cmp(&a.length).then(a.azimuth.total_cmp(&b.azimuth)));
+/// The line of an edge and of those on its great circle that no line has yet.
+fn grow(
+    arcs: &mut [Arc],
+    by_azimuth: &[(f64, u32)],
+    first: usize,
+    options: &GreatCircleOptions,
+    members: &mut Vec<u32>,
+) -> Option<LineFit> {
+    if std::mem::replace(&mut arcs[first].taken, true) {
+        return None;
+    }
+    members.clear();
+    members.push(first as u32);
+    let Arc { moments, azimuth, rising, .. } = arcs[first].clone();
+    let mut line = moments;
+    let mut fit = LineFit::of(&line, azimuth, options)?;
+    let reach = REACH_PX * fit.per_px + 3.0 * options.tilt_sigma_rad;
+    let n = by_azimuth.len();
+    let start = by_azimuth.partition_point(|(other, _)| *other < azimuth);
+    loop {
+        let before = members.len();
+        for step in [1, n - 1] {
+            let mut at = if step == 1 { start } else { (start + n - 1) % n };
+            for _ in 0..n {
+                let (other, i) = by_azimuth[at];
+                if wrap(other - azimuth).abs() > reach {
+                    break;
+                }
+                at = (at + step) % n;
+                let arc = &mut arcs[i as usize];
+                if !arc.taken && arc.rising == rising && arc.moments.rms_px(&fit.normal()) < JOIN_PX {
+                    arc.taken = true;
+                    members.push(i);
+                    line.join(&arc.moments);
+                    fit = LineFit::of(&line, fit.azimuth, options)?;
+                }
+            }
+        }
+        if members.len() == before {
+            break;
+        }
+    }
+    fit.rising = rising;
+    members.sort_unstable_by(|a, b| arcs[*a as usize].ends.0.total_cmp(&arcs[*b as usize].ends.0).then(a.cmp(b)));
+    let (lowest, mut highest) = arcs[members[0] as usize].ends;
+    fit.length = highest - lowest;
+    for member in &members[1..] {
+        let (low, high) = arcs[*member as usize].ends;
+        if high > highest {
+            // Narrow gaps count as covered.
+            fit.length += high - if low - highest <= options.gap_max_rad { highest } else { low };
+            highest = high;
+        }
+    }
+    fit.ends = (lowest, highest);
+    Some(fit)
+}
+
+/// Sorts by length, the longest first, and drops lines beside a longer one: two edges so close blend, whatever their polarity.
+fn keep_apart(fits: &mut Vec<LineFit>, separation_px: f64) {
+    fits.sort_unstable_by(|a, b| b.length.total_cmp(&a.length).then(a.azimuth.total_cmp(&b.azimuth)));
     let mut kept = 0;
     for i in 0..fits.len() {
-        let (fit, mostly) = (fits[i], |fit: &LineFit| 2 * fit.rising > fit.support);
-        let beside =
-            |other: &LineFit| mostly(other) == mostly(&fit) && wrap(other.azimuth - fit.azimuth).abs() < separation;
+        let fit = fits[i];
+        let beside = |other: &LineFit| {
+            wrap(other.azimuth - fit.azimuth).abs() < 0.5 * separation_px * (fit.per_px + other.per_px)
+        };
         if !fits[..kept].iter().any(beside) {
             fits[kept] = fit;
             kept += 1;

@@ -269,7 +269,7 @@ impl SegmentFit {
                 scores: Vec::new(),
             })
         });
-        self.finder.find(image, region, self.edges.gradient_min, &mut work.finder, &mut work.segments);
+        self.finder.find(image, region, self.edges.gradient_min, None, &mut work.finder, &mut work.segments);
         let fit = if self.tilt_max_rad > NEAR_MAX_RAD {
             self.fit_anywhere(work)
         } else {
