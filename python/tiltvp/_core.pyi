@@ -1754,7 +1754,7 @@ class LogCalibration:
     def __hash__(self) -> int: ...
     @property
     def bearing_sigma_rad(self) -> float:
-        """Standard deviation of a bearing: as given, or as the residuals tell it where they say that it is another."""
+        """Standard deviation of a bearing: as given, or as the residuals tell it where they say that it is larger."""
 
     @property
     def bearings(self) -> int:
@@ -2433,7 +2433,8 @@ class SelfCalibrator:
         """Looks now for what the drive so far contradicts and which assumption is likely wrong; `estimate` then says
         so.
 
-        That happens by itself whenever the drive has become a quarter longer, and at the end of `follow`.
+        That happens by itself at the end of `follow`, and not between steps, for it costs some ten solutions of the
+        window.
         """
 
     def follow(self, odometry: ArrayLike, bearings: ArrayLike) -> list[MountingEstimate]:

@@ -115,7 +115,7 @@ impl SelfCalibrator {
 
     /// Looks now for what the drive so far contradicts and which assumption is likely wrong; `estimate` then says so.
     ///
-    /// That happens by itself whenever the drive has become a quarter longer, and at the end of `follow`.
+    /// That happens by itself at the end of `follow`, and not between steps, for it costs some ten solutions of the window.
     fn examine(&self, py: Python<'_>) -> PyResult<()> {
         self.inner.change(py, |calibrator| {
             calibrator.examine();

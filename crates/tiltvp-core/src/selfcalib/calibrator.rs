@@ -95,7 +95,8 @@ impl SelfCalibrator {
         Ok(CalibrationStep { nis, used, rejected, started })
     }
 
-    /// Examines what the drive so far contradicts, which happens by itself whenever it has become a quarter longer.
+    /// Looks for what the drive so far contradicts and which assumption is likely wrong; estimates then say so. It costs some ten solutions
+    /// of the window.
     pub fn examine(&mut self) {
         if let Filter::SlidingWindow(filter) = &mut self.filter {
             filter.examine();

@@ -38,7 +38,7 @@ value! {
         iterations: u32,
         /// Whether the descent came to rest.
         converged: bool,
-        /// Standard deviation of a bearing: as given, or as the residuals tell it where they say that it is another.
+        /// Standard deviation of a bearing: as given, or as the residuals tell it where they say that it is larger.
         bearing_sigma_rad: f64,
         /// Variance of a wheel's displacement for each metre of it, likewise.
         odometry_k_m: f64,

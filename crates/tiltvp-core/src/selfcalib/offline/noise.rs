@@ -7,7 +7,7 @@ use crate::selfcalib::diagnosis::NoiseFactors;
 /// Most rounds of solving with the noise that the last residuals told: variance components converge in two or three.
 const NOISE_ROUNDS: usize = 5;
 
-/// Solves a problem again with the noise that its residuals tell; `None` where they agree with what was told.
+/// Solves a problem again with the noise that its residuals tell where that is more than was told; `None` where it is not.
 ///
 /// Wheels and clock are free meanwhile, so that what they are wrong by does not count as noise.
 pub(super) fn solve_with_noise(problem: &mut BundleProblem, max_iterations: u32) -> Option<DescentReport> {
@@ -25,9 +25,11 @@ pub(super) fn solve_with_noise(problem: &mut BundleProblem, max_iterations: u32)
         free.scale_noise(factors);
         total = total.times(factors);
     }
-    if total == NoiseFactors::ONE {
+    // Noise that is told too large costs accuracy, but leaves the stated errors true: what is told stays.
+    let more = NoiseFactors { bearings: total.bearings.max(1.0), motions: total.motions.max(1.0) };
+    if more == NoiseFactors::ONE {
         return None;
     }
-    problem.scale_noise(total);
+    problem.scale_noise(more);
     Some(solve(problem, max_iterations))
 }

@@ -42,7 +42,6 @@ impl SlidingWindow {
         let sigma = self.options.start_covariance[(2, 2)].sqrt();
         let yaws =
             if self.problem.keyframes.len() > RESTART_KEYFRAMES { &RESTART_YAWS[..1] } else { &RESTART_YAWS[..] };
-        let yaws = if self.examination.hopeless() { &[] } else { yaws };
         for (i, yaw) in yaws.iter().enumerate() {
             let fit = solution.as_ref().map(|solution| solution.fit);
             if fit.is_some_and(|fit| fit.outliers == 0) {

@@ -47,7 +47,7 @@ pub(crate) struct SlidingWindow {
     /// Covariance that the last motion added to the pose.
     pub(super) motion_noise: Matrix3<f64>,
     pub(super) monitor: InnovationMonitor,
-    /// What the last examination of the window found, and when the next is due.
+    /// What the last examination of the window found.
     pub(super) examination: Examination,
 }
 

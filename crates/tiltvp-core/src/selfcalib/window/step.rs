@@ -28,8 +28,7 @@ impl SlidingWindow {
         let shrunk = keyframes >= self.spurious_until && self.any_sigma_below(&(solved * SIGMA_RATIO));
         let disputed = outcome.contradiction > 0.0
             || rejected.iter().any(|slot| self.rejections[*slot] >= DISPUTED_REJECTIONS || self.closes_loop(*slot));
-        let asked = moved > limit || shrunk || disputed || outcome.slipped;
-        let due = keyframes >= self.next_relinearisation || asked && !self.examination.hopeless();
+        let due = keyframes >= self.next_relinearisation || moved > limit || shrunk || disputed || outcome.slipped;
         let mut recorded = outcome;
         if due && keyframes > 2 && self.problem.keyframes.last().is_some_and(|last| !last.observations.is_empty()) {
             let trusted = outcome.contradiction == 0.0 && !shrunk && moved < TRUSTED_SIGMAS;
@@ -47,9 +46,6 @@ impl SlidingWindow {
             }
         }
         self.monitor.record(&recorded, self.gate.limit());
-        if !seen.is_empty() {
-            self.examine_if_due();
-        }
         outcome
     }
 

@@ -106,8 +106,3 @@ pub(super) const INCONSISTENT_EXCESS: f64 = 1.5;
 
 /// Share of rejected bearings from which on it counts as inconsistent: 200 times that of the default gate.
 pub(super) const INCONSISTENT_REJECTED_SHARE: f64 = 0.02;
-
-/// Steps with bearings before the window is examined for wrong assumptions, and the growth of their number from one examination to
-/// the next: all together cost five times the last, which is some ten linearisations.
-pub(super) const EXAMINATION_STEPS: usize = 20;
-pub(super) const EXAMINATION_GROWTH: f64 = 1.25;
