@@ -143,6 +143,7 @@ def test_a_mask_keeps_lines_out(room: RoomImage, camera: tiltvp.Camera) -> None:
         ({"lines_mx": 3}, "did you mean lines_max"),
         ({"sectors": 300}, "unknown to method"),
         ({"separation_px": -3}, "separation_px = -3"),
+        ({"margin_px": 0.5}, "at least 1 pixel"),
         ({"separation_px": "many"}, "separation_px"),
         ({"method": "square"}, "great-circle"),
         ({"plane_max_rad": -1.0}, "plane_max_rad"),

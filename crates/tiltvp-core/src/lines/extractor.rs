@@ -58,7 +58,10 @@ impl LineExtractor {
             LineMethod::Radial(radial) => Some(Radii::new(&camera, &robot_from_camera, &tables, radial)),
         };
         let finder = match &options.method {
-            LineMethod::GreatCircle(own) => Some(SegmentFinder::new(&camera, &tables.region, segment_options(own))),
+            LineMethod::GreatCircle(own) => {
+                SegmentFinder::check_margin(&options.edges)?;
+                Some(SegmentFinder::new(&camera, &tables.region, segment_options(own)))
+            }
             LineMethod::Radial(_) => None,
         };
         if let Some(radii) = radii

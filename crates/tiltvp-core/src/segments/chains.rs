@@ -109,11 +109,10 @@ impl Chains {
                     members[begin..].reverse();
                     members.push(seed as u32);
                 }
-                loop {
-                    let Some((next, there)) = next(free, units, &steps, here, at, way) else { break };
-                    (here, at) = (next as usize, there);
+                while let Some((following, place)) = next(free, units, &steps, here, at, way) {
+                    (here, at) = (following as usize, place);
                     free[at] = 0;
-                    members.push(next);
+                    members.push(following);
                 }
             }
             starts.push(members.len());
