@@ -1,5 +1,6 @@
 //! How well a solution fits its log, and which assumption is most likely wrong where it does not.
 
+mod bump;
 mod contradictions;
 mod deviations;
 mod noise;

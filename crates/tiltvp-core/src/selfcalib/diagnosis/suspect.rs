@@ -9,6 +9,7 @@ use super::deviations::Deviation;
 use super::noise::NoiseFactors;
 use crate::selfcalib::bundle::BundleProblem;
 use crate::selfcalib::model::OUTLIER_SIGMAS;
+use crate::selfcalib::options::SelfCalibratorOptions;
 use crate::words;
 
 /// Share of outliers from which on names, or a bump, are to blame and not strays.
@@ -22,10 +23,6 @@ const MOST_CONTRADICTED: f64 = 0.1;
 const DEVIATION_SIGMAS: f64 = 5.0;
 const DEVIATION_SHIFT: f64 = 1.0;
 
-/// Correlation of successive residuals of a landmark from which on more noise than told is no noise: that of white noise is within
-/// 0.05 for a thousand bearings.
-const NO_NOISE_CORRELATION: f64 = 0.3;
-
 words! {
     /// What is most likely wrong with a log or with what is told of the robot.
     #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -34,7 +31,7 @@ words! {
         Turns = "turns",
         /// Many bearings are outliers: a bump of the camera, or wrong names of landmarks.
         Outliers = "outliers",
-        /// Bearings scatter more than told, and for long to one side: a bump of the camera.
+        /// Odometry and bearings jump, and the camera may have been bumped as well as the wheels may have slipped.
         Bump = "bump",
         /// Many motions are contradicted: wheels slip.
         Slips = "slips",
@@ -57,7 +54,8 @@ words! {
 pub struct Suspect {
     /// What is most likely wrong.
     pub cause: Cause,
-    /// The number that would suit; of `turns`, `outliers` and `slips` the share that is contradicted, of `bump` the correlation.
+    /// The number that would suit; of `turns`, `outliers` and `slips` the share that is contradicted, of `bump` the
+    /// angle in radians.
     pub value: f64,
 }
 
@@ -75,7 +73,8 @@ impl fmt::Display for Suspect {
             }
             Cause::Bump => write!(
                 f,
-                "bearings are off to one side for long (correlation {value:.2}): a bump of the camera, or wrong names of landmarks"
+                "a jump by {:.1} degrees, which may be a bump of the camera as well as a slip of the wheels",
+                value.to_degrees()
             ),
             Cause::Slips => {
                 write!(f, "{percent:.0} % of the motions contradicted: wheels slip, or odometry_k_m is too small")
@@ -97,22 +96,10 @@ impl fmt::Display for Suspect {
 }
 
 impl BundleProblem {
-    /// A bump, where the noise that the residuals told is none.
-    pub(crate) fn suspect_of_noise(&self) -> Option<Suspect> {
-        let mut before: Vec<f64> = vec![0.0; self.landmarks.len()];
-        let (mut products, mut squares) = (0.0, 0.0);
-        for (observation, r) in self.observations().zip(self.residuals()) {
-            let r = r.clamp(-OUTLIER_SIGMAS, OUTLIER_SIGMAS);
-            products += r * std::mem::replace(&mut before[observation.landmark], r);
-            squares += r * r;
-        }
-        let value = products / squares;
-        (value > NO_NOISE_CORRELATION).then_some(Suspect { cause: Cause::Bump, value })
-    }
-
     /// What is most likely wrong at this solution, whose mounting has that covariance.
     pub(crate) fn suspect(
         &self,
+        options: &SelfCalibratorOptions,
         counts: &Contradictions,
         factors: NoiseFactors,
         covariance: &Matrix3<f64>,
@@ -148,6 +135,9 @@ impl BundleProblem {
         if outliers > MOST_OUTLIERS {
             return found(Cause::Outliers, outliers);
         }
-        if contradicted > MOST_CONTRADICTED { found(Cause::Slips, contradicted) } else { None }
+        if contradicted > MOST_CONTRADICTED {
+            return found(Cause::Slips, contradicted);
+        }
+        self.possible_bump(options, covariance).and_then(|angle| found(Cause::Bump, angle))
     }
 }

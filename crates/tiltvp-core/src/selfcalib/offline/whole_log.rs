@@ -279,9 +279,7 @@ fn report(
     let mounting: Matrix3<f64> = covariance.fixed_view::<3, 3>(0, 0).into();
     let mounting = widening * mounting * widening.transpose();
     let counts = problem.contradictions();
-    let suspect = problem.suspect(&counts, problem.noise_factors(), &mounting);
-    let noisier = problem.bearing_sigma > o.bearing_sigma_rad;
-    let suspect = suspect.or_else(|| problem.suspect_of_noise().filter(|_| noisier));
+    let suspect = problem.suspect(o, &counts, problem.noise_factors(), &mounting);
     let sigma = |at: usize| covariance[(at, at)].sqrt();
     let (wheels, offset) = (options.estimate_odometry, options.estimate_time_offset);
     Ok(LogCalibration {

@@ -21,7 +21,7 @@ impl SlidingWindow {
         }
         let counts = now.contradictions();
         let covariance = self.covariance.fixed_view::<3, 3>(MOUNTING, MOUNTING).into();
-        let suspect = now.suspect(&counts, now.noise_factors(), &covariance);
+        let suspect = now.suspect(&self.options, &counts, now.noise_factors(), &covariance);
         self.examination = Examination { contradictions: counts, suspect };
     }
 
