@@ -113,6 +113,24 @@ def test_a_wrong_wheel_base_is_named() -> None:
         type(e).from_dict(e.to_dict() | {"suspect": "moon"})
 
 
+@pytest.mark.parametrize("seed", [100002, 100003])
+def test_a_bump_may_be_behind_a_jump(seed: int) -> None:
+    (bumped,) = hostile_drives("camera bumped", range(seed, seed + 1))
+    e = tiltvp.calibrate(bumped.odometry, bumped.bearings, **bumped.options).mounting
+    assert (bool(e), e.suspect) == (False, "bump")
+    assert e.suspect_value == pytest.approx(math.radians(4.0), abs=math.radians(0.5))
+    calibrator = tiltvp.SelfCalibrator(**bumped.options)
+    calibrator.follow(bumped.odometry, bumped.bearings)
+    assert calibrator.estimate.suspect == "bump"
+
+
+def test_slips_between_legs_that_determine_the_mounting_are_slips() -> None:
+    (slipped,) = hostile_drives("wheels slip", range(100003, 100004))
+    e = tiltvp.calibrate(slipped.odometry, slipped.bearings, **slipped.options).mounting
+    assert e
+    assert e.contradicted_motions == 3
+
+
 def test_the_filter_of_the_command_is_that_of_method(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     words = write(tmp_path, one(UNDISTURBED))
     found = []

@@ -1934,7 +1934,7 @@ class MountingEstimate:
     @property
     def suspect_value(self) -> float | None:
         """The value that would suit the log better, of what `suspect` names (a time offset in steps); of "turns",
-        "outliers" and "slips" their share, of "bump" the correlation of the residuals.
+        "outliers" and "slips" their share, of "bump" its angle in radians.
         """
 
     def to_dict(self) -> dict[str, Any]:

@@ -57,7 +57,7 @@ value! {
         /// "slips", "bearing_sigma_rad", "odometry_k_m", "wheel_base_m", "right_over_left" or "time_offset_s". None if nothing is.
         suspect: Option<String> = own.suspect.map(|suspect| suspect.cause.name().to_owned()),
         /// The value that would suit the log better, of what `suspect` names (a time offset in steps); of "turns", "outliers" and
-        /// "slips" their share, of "bump" the correlation of the residuals.
+        /// "slips" their share, of "bump" its angle in radians.
         suspect_value: Option<f64> = own.suspect.map(|suspect| suspect.value),
         /// What is determined, what motion would help, whether there was an alarm and what is suspected, in a sentence.
         reason: String = own.to_string(),

@@ -26,11 +26,7 @@ const UNSEEN_INFORMATION: f64 = 1.0;
 impl BundleProblem {
     /// The angle, in radians, of the first jump that may be a bump of the camera: the mountings before and after it do not say clearly
     /// enough that it was a slip. `covariance` is that of the mounting.
-    pub(crate) fn possible_bump(
-        &self,
-        options: &SelfCalibratorOptions,
-        covariance: &Matrix3<f64>,
-    ) -> Option<f64> {
+    pub(super) fn possible_bump(&self, options: &SelfCalibratorOptions, covariance: &Matrix3<f64>) -> Option<f64> {
         let information = covariance.try_inverse()?;
         let mut jumps: Vec<(usize, Vector3<f64>, f64)> = (1..self.keyframes.len())
             .filter(|to| self.slipped(*to))
