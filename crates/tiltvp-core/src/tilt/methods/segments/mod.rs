@@ -5,10 +5,10 @@ mod anywhere;
 mod choice;
 mod near;
 
-use std::f64::consts::{FRAC_PI_2, PI};
+use std::f64::consts::PI;
 use std::sync::Arc;
 
-use nalgebra::{Matrix2, Matrix3, Vector2, Vector3};
+use nalgebra::{Matrix2, Matrix3, Vector3};
 
 use self::anywhere::{Edge, Prior, Search};
 use self::near::{Near, NearWork};
@@ -22,7 +22,6 @@ use crate::options;
 use crate::options::Between;
 use crate::robust::Stop;
 use crate::segments::{FinderScratch, SegmentDetectorOptions, SegmentFinder, SegmentOptions, Segments};
-use crate::tilt::confidence::inverse_of_positive;
 use crate::tilt::estimate::{ALTERNATIVES, Alternative, EdgeElement, TiltEstimate};
 use crate::tilt::fit::{Fit, Seen};
 use crate::tilt::scratch::{Scratch, Work};
