@@ -5,13 +5,12 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
-from tiltvp.cli.inputs import distinct_names, find_images
+from tiltvp.cli.each_image import find_in_each
 from tiltvp.cli.line_options import LineOptions
 from tiltvp.cli.options import CameraOptions
 from tiltvp.cli.results import degrees
 from tiltvp.cli.tables import Table, check_ending, write_table
-from tiltvp.cli.terminal import complain, named, new_table, progress_bar, show
-from tiltvp.errors import OutputError, TiltvpError
+from tiltvp.cli.terminal import new_table, show
 from tiltvp.files import check_output_folder
 
 if TYPE_CHECKING:
@@ -42,7 +41,6 @@ def lines(
     overlay
         Folder for the images with their lines in colour.
     """
-    from tiltvp.images import gray_from, read_image, write_image
     from tiltvp.overlays.lines import draw_lines
 
     if out is not None:
@@ -51,25 +49,12 @@ def lines(
         check_output_folder(overlay)
     lens = camera.load()
     extractor, tilt = options.extractor(lens), options.tilts(lens)
-    files, problems = find_images(images)
-    for problem in problems:
-        complain(problem)
-    found: list[tuple[str, Lines]] = []
-    failed = bool(problems)
-    with progress_bar(len(files), "images") as bar:
-        for file, name in zip(files, distinct_names(files), strict=True):
-            try:
-                gray = gray_from(read_image(file))
-                seen = extractor(gray, tilt(gray))
-                if overlay is not None:
-                    write_image(overlay / f"{name}.png", draw_lines(gray, lens, seen, extractor.robot_from_camera))
-                found.append((str(file), seen))
-            except OutputError:
-                raise
-            except TiltvpError as error:
-                bar.complain(named(file, str(error)))
-                failed = True
-            bar.advance()
+    found, well = find_in_each(
+        images,
+        lambda gray: extractor(gray, tilt(gray)),
+        overlay,
+        lambda gray, seen: draw_lines(gray, lens, seen, extractor.robot_from_camera),
+    )
     table = line_table(found)
     printed = new_table(
         None, ("file", "line", "bearing deg", "1-sigma deg", "from deg", "to deg", "support px"), ["file"]
@@ -81,7 +66,7 @@ def lines(
     show(printed)
     if out is not None:
         write_table(table, out)
-    return 1 if failed else 0
+    return 0 if well else 1
 
 
 LINE_TYPES: Final = {"bearing_rad": "Float64", "sigma_rad": "Float64", "support_px": "UInt32"} | dict.fromkeys(

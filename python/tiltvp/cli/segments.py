@@ -8,13 +8,12 @@ from typing import TYPE_CHECKING, Any
 
 from cyclopts import Group, Parameter
 
-from tiltvp.cli.inputs import distinct_names, find_images
+from tiltvp.cli.each_image import find_in_each
 from tiltvp.cli.library_options import LibraryOptions, from_library
 from tiltvp.cli.options import CameraOptions
 from tiltvp.cli.results import degrees
 from tiltvp.cli.tables import Table, check_ending, write_table
-from tiltvp.cli.terminal import complain, named, new_table, progress_bar, show
-from tiltvp.errors import OutputError, TiltvpError
+from tiltvp.cli.terminal import new_table, show
 from tiltvp.files import check_output_folder
 
 if TYPE_CHECKING:
@@ -55,7 +54,6 @@ def segments(
     overlay
         Folder for the images with their edges in colour.
     """
-    from tiltvp.images import gray_from, read_image, write_image
     from tiltvp.overlays.segments import draw_segments
     from tiltvp.segments import SegmentDetector
 
@@ -65,32 +63,14 @@ def segments(
         check_output_folder(overlay)
     lens = camera.load()
     detector = SegmentDetector(lens, **options.given())
-    files, problems = find_images(images)
-    for problem in problems:
-        complain(problem)
-    found: list[tuple[str, Segments]] = []
-    failed = bool(problems)
-    with progress_bar(len(files), "images") as bar:
-        for file, name in zip(files, distinct_names(files), strict=True):
-            try:
-                gray = gray_from(read_image(file))
-                seen = detector(gray)
-                if overlay is not None:
-                    write_image(overlay / f"{name}.png", draw_segments(gray, lens, seen))
-                found.append((str(file), seen))
-            except OutputError:
-                raise
-            except TiltvpError as error:
-                bar.complain(named(file, str(error)))
-                failed = True
-            bar.advance()
+    found, well = find_in_each(images, detector, overlay, lambda gray, seen: draw_segments(gray, lens, seen))
     printed = new_table(None, ("file", "edges", "pixels", "longest deg", "median deg", "median rms px"), ["file"])
     for image, seen in found:
         printed.add_row(image, *_summary(seen))
     show(printed)
     if out is not None:
         write_table(segment_table(found), out)
-    return 1 if failed else 0
+    return 0 if well else 1
 
 
 def _summary(seen: Segments) -> list[str]:
