@@ -146,6 +146,10 @@ measure-trust *arguments: setup
     test -e out/room-panoramas/INDEX.csv || {{bin}}/tiltvp dataset panoramas --out out/room-panoramas
     {{bin}}/tiltvp measure trust "$TILTVP_DATA/panos" out/room-panoramas {{arguments}}
 
+# The robot's own body, painted into rendered drives and into views of the panoramas of TILTVP_DATA: how much of it is found.
+measure-body *arguments: setup
+    {{bin}}/tiltvp measure body "$TILTVP_DATA/panos" {{arguments}}
+
 # What an evaluation costs over the number of images and over their pixels.
 measure-scaling *arguments: setup
     {{bin}}/tiltvp measure scaling {{arguments}}
