@@ -15,7 +15,7 @@ from cyclopts import Parameter, validators
 from tiltvp.cli.filtering import FilterOptions
 from tiltvp.cli.inputs import distinct_names, find_images
 from tiltvp.cli.options import CameraOptions, MethodOptions
-from tiltvp.cli.results import Outcome, degrees, mounting_words, outcome_table, people_table
+from tiltvp.cli.results import Outcome, degrees, mounting_words, outcome_table, people_table, summary_words
 from tiltvp.cli.tables import check_ending, write_table
 from tiltvp.cli.terminal import ProgressBar, complain, named, progress_bar, say, show, width
 from tiltvp.errors import InvalidInputError, OutputError, TiltvpError
@@ -82,6 +82,8 @@ def tilt(
     if level is not None and filtering.filter:
         for outcome, name in zip(outcomes, names, strict=True):
             work.write_level(outcome, name)
+    if outcomes:
+        say(summary_words(outcomes))
     show(people_table(outcomes, width()))
     if filtering.estimate_mounting:
         say(mounting_words(outcomes))
@@ -92,9 +94,9 @@ def tilt(
     return 1 if problems or any(outcome.error for outcome in outcomes) else 0
 
 
-_FEW, _MANY = 5, 24
+_FEW, _MANY, _TRIES = 5, 24, 3
 """Images, spread over the input, by which mounting and rim are checked, and those in which the body is looked for: what
-they have in common is of the camera, not of the place.
+they have in common is of the camera, not of the place. Of each part of the input so many files are tried.
 """
 
 
@@ -130,17 +132,19 @@ def _checked(estimator: TiltEstimator, files: Sequence[Path]) -> TiltEstimator:
 
 
 def _spread(files: Sequence[Path], count: int, camera: Camera) -> Iterator[NDArray[np.uint8]]:
-    """So many images spread over the files, at most; one that cannot be used is named when its turn comes."""
+    """An image of each of so many parts of the input: of the first files in it, one that can be used."""
     from tiltvp import read_image
 
-    last = len(files) - 1
-    for place in sorted({k * last // (count - 1) for k in range(count)}):
-        try:
-            image = read_image(files[place])
-        except TiltvpError:
-            continue
-        if image.shape[:2] == (camera.height, camera.width):
-            yield image
+    for part in range(count):
+        start, end = (k * len(files) // count for k in (part, part + 1))
+        for file in files[start : min(end, start + _TRIES)]:
+            try:
+                image = read_image(file)
+            except TiltvpError:
+                continue  # It is named when its turn comes.
+            if image.shape[:2] == (camera.height, camera.width):
+                yield image
+                break
 
 
 def _write_plot(outcomes: Sequence[Outcome], method: str, path: Path) -> None:
