@@ -59,4 +59,6 @@ def body(
         if tables:
             masks, tilts = (pl.concat(part, how="vertical_relaxed") for part in zip(*tables, strict=True))
             show_frame(f"Shares in per cent, {source}", summarise_masks(masks), ["case", "straight"])
-            show_frame(f"Tilt in degrees (eq. 44), {source}", summarise_tilts(tilts), ["looks", "method", "way"])
+            show_frame(
+                f"Tilt in degrees (eq. 44), {source}", summarise_tilts(tilts), ["straight", "looks", "method", "way"]
+            )

@@ -120,7 +120,8 @@ def judge_drive(drive: DriveImages, seed: int) -> tuple[pl.DataFrame, pl.DataFra
     if found is not None and found.mask is not None:
         ways["body left out"] = (painted, found.mask)
     tilts = [
-        {"place": drive.place, "looks": drive.looks, "method": method, "way": way} | _tilt(estimator(image), normal)
+        {"straight": "straight" in drive.place, "looks": drive.looks, "method": method, "way": way}
+        | _tilt(estimator(image), normal)
         for method in METHODS
         for way, (images, mask) in ways.items()
         for estimator in [TiltEstimator(camera, robot_from_camera=mounting, method=method, mask=mask)]
@@ -143,7 +144,7 @@ def summarise_masks(table: pl.DataFrame) -> pl.DataFrame:
 
 def summarise_tilts(table: pl.DataFrame) -> pl.DataFrame:
     """Errors in degrees of the answers of each method, with and without the body and its mask."""
-    return table.group_by("looks", "method", "way", maintain_order=True).agg(
+    return table.group_by("straight", "looks", "method", "way", maintain_order=True).agg(
         (100.0 * pl.col("error_deg").is_not_null().mean()).alias("answered"),
         pl.col("error_deg").mean().alias("mean"),
         pl.col("error_deg").median().alias("median"),
