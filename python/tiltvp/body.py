@@ -85,9 +85,9 @@ def body_mask(images: Iterable[ArrayLike], camera: Camera, *, mask: ArrayLike | 
         if gray.shape != shape:
             raise InvalidInputError(f"images[{number}]: shape {gray.shape}, expected {shape}, as the camera's images")
         small = np.asarray(cv2.resize(gray, size, interpolation=cv2.INTER_AREA), dtype=np.uint8)
-        doubled, strong = _edges_of(small)
-        sums += doubled * inside
-        seen += strong & inside
+        at, directions = _edges_of(small, inside)
+        sums.reshape(2, -1)[:, at] += directions
+        seen.ravel()[at] += 1.0
         count += 1
     if count < _LEAST:
         return BodyMask(None, count, f"{count} images, expected at least {_LEAST} from different places")
@@ -109,8 +109,8 @@ def body_mask(images: Iterable[ArrayLike], camera: Camera, *, mask: ArrayLike | 
     return BodyMask(~large, count, f"{count} images: {found}")
 
 
-def _edges_of(gray: NDArray[np.uint8]) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
-    """(2, H, W): cosine and sine of twice the gradient's direction, 0 where no edge is, and (H, W): where one is.
+def _edges_of(gray: NDArray[np.uint8], inside: NDArray[np.bool_]) -> tuple[NDArray[np.int64], NDArray[np.float32]]:
+    """(N,): where edges are, in row order; (2, N): cosine and sine of twice the direction of each one's gradient.
 
     Twice, for a body is darker than one background and lighter than the next.
     """
@@ -118,10 +118,11 @@ def _edges_of(gray: NDArray[np.uint8]) -> tuple[NDArray[np.float32], NDArray[np.
 
     smooth = cv2.GaussianBlur(gray, (0, 0), _SMOOTHING_PX)
     x, y = cv2.Scharr(smooth, cv2.CV_32F, 1, 0), cv2.Scharr(smooth, cv2.CV_32F, 0, 1)
-    square = x * x + y * y
-    strong = square >= _GRADIENT**2
-    scale = strong / np.maximum(square, 1.0)
-    return np.stack([(x * x - y * y) * scale, 2.0 * x * y * scale]).astype(np.float32), strong
+    at = np.flatnonzero((x * x + y * y >= _GRADIENT**2) & inside)
+    along, across = x.ravel()[at], y.ravel()[at]
+    square = along * along + across * across
+    doubled = np.stack([along * along - across * across, 2.0 * along * across]) / square
+    return at, np.asarray(doubled, dtype=np.float32)
 
 
 def _share_of(count: int) -> float:
