@@ -9,7 +9,7 @@ from typing import Annotated
 from cyclopts import App, Parameter, validators
 
 from tiltvp.cli.lab.body import body
-from tiltvp.cli.lab.calibration_measures import calibration, calibration_images
+from tiltvp.cli.lab.calibration_measures import calibration, calibration_images, trust_calibration
 from tiltvp.cli.lab.corner_measures import corners
 from tiltvp.cli.lab.corner_real import corners_real
 from tiltvp.cli.lab.descriptors import descriptors
@@ -33,6 +33,7 @@ app.command(lines)
 app.command(planar_pose)
 app.command(striding)
 app.command(trust)
+app.command(trust_calibration)
 
 
 @app.command
