@@ -122,9 +122,7 @@ def test_images_are_not_kept() -> None:
 
 def test_bad_input_is_named() -> None:
     images = [world(seed) for seed in range(COUNT)]
-    with pytest.raises(
-        tiltvp.errors.InvalidInputError, match=r"images\[1\]: shape \(239, 320\), expected"
-    ):
+    with pytest.raises(tiltvp.errors.InvalidInputError, match=r"images\[1\]: shape \(239, 320\), expected"):
         tiltvp.body_mask([images[0], images[1][:-1]], SMALL)
     with pytest.raises(tiltvp.errors.InvalidInputError, match=r"mask: shape \(320, 240\), expected \(240, 320\)"):
         tiltvp.body_mask(images, SMALL, mask=np.ones((320, 240), dtype=bool))
