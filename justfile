@@ -150,6 +150,10 @@ measure-trust *arguments: setup
     test -e out/room-panoramas/INDEX.csv || {{bin}}/tiltvp dataset panoramas --out out/room-panoramas
     {{bin}}/tiltvp measure trust "$TILTVP_DATA/panos" out/room-panoramas {{arguments}}
 
+# The robot's own body, painted into rendered drives and into views of the panoramas of TILTVP_DATA: how much of it is found.
+measure-body *arguments: setup
+    {{bin}}/tiltvp measure body "$TILTVP_DATA/panos" {{arguments}}
+
 # Self-calibration on simulated logs that mislead: how often it is wrong and sure.
 measure-trust-calibration *arguments: setup
     {{bin}}/tiltvp measure trust-calibration {{arguments}}

@@ -320,7 +320,7 @@ def test_the_command_filters(folder: Path, tmp_path: Path, capfd: pytest.Capture
     said = capfd.readouterr()
     assert code == 1
     assert "4.png" in said.err
-    assert "filtered alpha deg" in said.out
+    assert "filtered roll deg" in said.out
     assert "no-tilt" in said.out
     table = pl.read_csv(out)
     assert table["verdict"].to_list() == ["accepted"] * 3 + ["no-tilt", "no-image", "accepted"]

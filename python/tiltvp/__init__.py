@@ -7,6 +7,7 @@ pixel centres at integers. `robot_from_camera` is R in v_robot = R v_camera. A l
 
 from tiltvp import corner, lines, synth
 from tiltvp._core import METHODS, ComplementaryFilter
+from tiltvp.body import BodyMask, body_mask
 from tiltvp.cameras import Camera
 from tiltvp.corrections import (
     AffineCorrection,
@@ -55,6 +56,7 @@ __all__ = [
     "CALIBRATION_METHODS",
     "METHODS",
     "AffineCorrection",
+    "BodyMask",
     "CalibrationStep",
     "Camera",
     "CommonDirection",
@@ -76,6 +78,7 @@ __all__ = [
     "TiltEstimator",
     "TiltFilter",
     "apply_correction",
+    "body_mask",
     "calibrate",
     "check_setup",
     "common_direction",

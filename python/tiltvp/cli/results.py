@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+import os
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,14 +19,14 @@ if TYPE_CHECKING:
     from tiltvp import FilteredTilt, TiltEstimate
 
 _PEOPLE: Final = (
-    "file", "alpha deg", "beta deg", "roll deg", "pitch deg", "confidence", "1-sigma deg", "edges px", "inliers px",
+    "file", "roll deg", "pitch deg", "alpha deg", "beta deg", "1-sigma deg", "confidence", "edges px", "inliers px",
     "ms", "reason",
 )  # fmt: skip
-_PEOPLE_NARROW: Final = ("file", "alpha deg", "beta deg", "confidence", "1-sigma deg")
-_JUDGED: Final = ("verdict",)
-_FILTERED: Final = ("filtered alpha deg", "filtered beta deg", "filtered 1-sigma deg")
-_NUMBERS_WIDTH, _FILE_WIDTH = 135, 40
-"""Columns of text that all but the file and a folded reason take, and those that a long file name is granted."""
+_PEOPLE_NARROW: Final = ("file", "roll deg", "pitch deg", "1-sigma deg")
+_JUDGED, _SURE = ("verdict",), ("confidence",)
+_FILTERED: Final = ("filtered roll deg", "filtered pitch deg", "filtered 1-sigma deg")
+_REASON_WIDTH, _FILE_WIDTH = 30, (12, 20, 40)
+"""Columns of text that a folded reason takes, and those of a file's name: at least, with all columns, and at most."""
 _NUMBERS: Final = (
     "alpha_rad", "beta_rad", "roll_rad", "pitch_rad", "normal_x", "normal_y", "normal_z",
     "covariance_xx_rad2", "covariance_xy_rad2", "covariance_yy_rad2", "sigma_rad", "confidence",
@@ -65,21 +67,74 @@ def degrees(value_rad: float, digits: int = 2) -> str:
 
 
 def people_table(outcomes: Sequence[Outcome], width: int) -> PrintedTable:
-    """One row for each image, angles in degrees; only the columns that matter most where `width` holds no more."""
+    """One row for each image, angles in degrees; only the columns that matter most where `width` holds no more.
+
+    Files are named from the folder that all are in; of a name that is too long the end is shown.
+    """
     rows = [_people_row(outcome) for outcome in outcomes]
-    longest = max((len(row["file"]) for row in rows), default=0)
+    for row, name in zip(rows, _short_names([outcome.file for outcome in outcomes]), strict=True):
+        row["file"] = name
     judged = _JUDGED if any(outcome.verdict for outcome in outcomes) else ()
-    filtered = _FILTERED if any(outcome.filtered is not None for outcome in outcomes) else ()
-    more = sum(len(name) + 2 for name in judged + filtered)
-    if width >= _NUMBERS_WIDTH + more + min(longest, _FILE_WIDTH):
-        columns = (*_PEOPLE[:-1], *filtered, *judged, _PEOPLE[-1])
-    else:
-        columns = (*_PEOPLE_NARROW, *filtered[:2], *judged)
+    filtered = any(outcome.filtered is not None for outcome in outcomes)
+    columns = (*_PEOPLE[:-1], *(_FILTERED if filtered else ()), *judged, _PEOPLE[-1])
+    least, enough, most = _FILE_WIDTH
+    if _room(columns, rows, width) < min(enough, max((len(row["file"]) for row in rows), default=0)):
+        columns = ("file", *_FILTERED[:2], *judged) if filtered else (*_PEOPLE_NARROW, *(judged or _SURE))
+    room = min(most, max(least, _room(columns, rows, width)))
     table = new_table(None, columns, left=("file", "verdict", "reason"))
     for outcome, row in zip(outcomes, rows, strict=True):
+        if len(row["file"]) > room:
+            row["file"] = "…" + row["file"][1 - room :]
         style = "red" if outcome.estimate is None else "yellow" if _left_out(outcome) else None
         table.add_row(*[row[column] for column in columns], style=style)
     return table
+
+
+def _room(columns: Sequence[str], rows: Sequence[dict[str, str]], width: int) -> int:
+    """Columns of text that the others leave to the files' names."""
+    taken = 0
+    for column in columns:
+        if column != "file":
+            longest = max((len(row[column]) for row in rows), default=0)
+            cells = min(longest, _REASON_WIDTH) if column == "reason" else longest
+            taken += max(len(column), cells) + 3
+    return width - taken - 2
+
+
+def _short_names(files: Sequence[Path]) -> list[str]:
+    """The files without the folders that all of them are in."""
+    if not files:
+        return []
+    folder = os.path.commonpath([os.path.abspath(file.parent) for file in files])
+    return [os.path.relpath(os.path.abspath(file), folder) for file in files]
+
+
+def summary_words(outcomes: Sequence[Outcome]) -> str:
+    """All images in a line: how many, how they lean, how many have no tilt and why, and the time of one.
+
+    The time is the median of all but the first, which finds nothing in the processor's caches.
+    """
+    count = f"{len(outcomes)} image{'s' if len(outcomes) != 1 else ''}"
+    given = [outcome.estimate for outcome in outcomes if outcome.estimate is not None]
+    leans = sorted(estimate.alpha_rad for estimate in given if estimate)
+    if leans:
+        low, middle, high = (leans[round(share * (len(leans) - 1))] for share in (0.05, 0.5, 0.95))
+        spread = f", 90 % from {degrees(low)} to {degrees(high)}" if len(leans) > 1 else ""
+        words = [f"{count}: lean {degrees(middle)} deg{' in the median' if spread else ''}{spread}"]
+    else:
+        words = [f"{count}: no tilt"]
+    stops = Counter(estimate.report.stop.replace("-", " ") for estimate in given if not estimate)
+    if stops:
+        told = ", ".join(f"{number} {stop}" for stop, number in stops.most_common())
+        words.append(f"{stops.total()} without a tilt ({told})")
+    refused = Counter(outcome.verdict for outcome in outcomes if outcome.estimate and outcome.accepted is False)
+    words += [f"{number} {verdict}" for verdict, number in refused.most_common()]
+    if unread := len(outcomes) - len(given):
+        words.append(f"{unread} could not be used")
+    times = sorted(outcome.time_s for outcome in outcomes[1:] if outcome.estimate is not None)
+    if times:
+        words.append(f"{1e3 * times[len(times) // 2]:.2f} ms an image")
+    return "; ".join(words)
 
 
 def mounting_words(outcomes: Sequence[Outcome]) -> str:
@@ -96,11 +151,11 @@ def _left_out(outcome: Outcome) -> bool:
 
 
 def _people_row(outcome: Outcome) -> dict[str, str]:
-    row = dict.fromkeys((*_PEOPLE, *_FILTERED), "-") | {"file": str(outcome.file), "reason": outcome.error or ""}
+    row = dict.fromkeys((*_PEOPLE, *_FILTERED), "-") | {"reason": outcome.error or ""}
     row["verdict"] = outcome.verdict or "-"
     e, filtered = outcome.estimate, outcome.filtered
     if filtered is not None:
-        held = (filtered.alpha_rad, filtered.beta_rad, filtered.sigma_rad)
+        held = (filtered.roll_rad, filtered.pitch_rad, filtered.sigma_rad)
         row |= {name: degrees(angle) for name, angle in zip(_FILTERED, held, strict=True)}
     if e is None:
         return row

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,7 +15,7 @@ from cyclopts import Parameter, validators
 from tiltvp.cli.filtering import FilterOptions
 from tiltvp.cli.inputs import distinct_names, find_images
 from tiltvp.cli.options import CameraOptions, MethodOptions
-from tiltvp.cli.results import Outcome, degrees, mounting_words, outcome_table, people_table
+from tiltvp.cli.results import Outcome, degrees, mounting_words, outcome_table, people_table, summary_words
 from tiltvp.cli.tables import check_ending, write_table
 from tiltvp.cli.terminal import ProgressBar, complain, named, progress_bar, say, show, width
 from tiltvp.errors import InvalidInputError, OutputError, TiltvpError
@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from tiltvp import EdgeElements, TiltEstimate, TiltEstimator
+    from tiltvp._core import Camera
 
 _METHOD_DEFAULTS = MethodOptions()
 _FILTER_DEFAULTS = FilterOptions()
@@ -81,6 +82,8 @@ def tilt(
     if level is not None and filtering.filter:
         for outcome, name in zip(outcomes, names, strict=True):
             work.write_level(outcome, name)
+    if outcomes:
+        say(summary_words(outcomes))
     show(people_table(outcomes, width()))
     if filtering.estimate_mounting:
         say(mounting_words(outcomes))
@@ -91,37 +94,57 @@ def tilt(
     return 1 if problems or any(outcome.error for outcome in outcomes) else 0
 
 
-_FIRST = 5
-"""Images by which mounting and rim are checked: what they have in common is of the camera, not of the place."""
+_FEW, _MANY, _TRIES = 5, 24, 3
+"""Images, spread over the input, by which mounting and rim are checked, and those in which the body is looked for: what
+they have in common is of the camera, not of the place. Of each part of the input so many files are tried.
+"""
 
 
 def _checked(estimator: TiltEstimator, files: Sequence[Path]) -> TiltEstimator:
-    """The estimator without the dark surround that the first images have, if nothing else says where they end; one line
-    on stderr says so, and one if they speak against the mounting.
+    """The estimator without the dark surround and the body of the robot that the images have, if no mask is given; a
+    line on stderr says so of each, and one if they speak against the mounting.
     """
     import numpy as np
 
-    from tiltvp import check_setup, read_image, surround_mask
+    from tiltvp import body_mask, check_setup, surround_mask
 
-    camera, images = estimator.camera, []
-    for file in files[:_FIRST]:
-        try:
-            image = read_image(file)
-        except TiltvpError:
-            continue  # It is named when its turn comes.
-        if image.shape[:2] == (camera.height, camera.width):
-            images.append(image)
-    if len(images) < _FIRST:
+    camera = estimator.camera
+    images = list(_spread(files, _FEW, camera))
+    if len(images) < _FEW:
         return estimator
     mask = estimator.options["mask"]
-    if mask is None and (mask := surround_mask(images, camera)) is not None:
-        share = 100.0 * float(np.mean(mask))
-        complain(f"--mask: none, and the images have a dark surround: {share:.0f} % within its rim are looked at")
-        estimator = estimator.with_options(mask=mask)
+    if mask is None:
+        if (mask := surround_mask(images, camera)) is not None:
+            share = 100.0 * float(np.mean(mask))
+            complain(f"--mask: none, and the images have a dark surround: {share:.0f} % within its rim are looked at")
+        body = body_mask(_spread(files, _MANY, camera), camera, mask=mask)
+        if body:
+            complain(f"--mask: none, and in {body.reason}: they are the robot's own, and left out")
+            mask = body.mask if mask is None else mask & body.mask
+        elif body.mask is None:
+            complain(f"--mask: none, and images do not tell whether they show the robot itself: {body.reason}")
+        if mask is not None:
+            estimator = estimator.with_options(mask=mask)
     found = check_setup(images, camera, estimator.robot_from_camera, mask=mask)
     if not found:
         complain(f"--robot-from-camera: {found.reason}")
     return estimator
+
+
+def _spread(files: Sequence[Path], count: int, camera: Camera) -> Iterator[NDArray[np.uint8]]:
+    """An image of each of so many parts of the input: of the first files in it, one that can be used."""
+    from tiltvp import read_image
+
+    for part in range(count):
+        start, end = (k * len(files) // count for k in (part, part + 1))
+        for file in files[start : min(end, start + _TRIES)]:
+            try:
+                image = read_image(file)
+            except TiltvpError:
+                continue  # It is named when its turn comes.
+            if image.shape[:2] == (camera.height, camera.width):
+                yield image
+                break
 
 
 def _write_plot(outcomes: Sequence[Outcome], method: str, path: Path) -> None:

@@ -8,6 +8,7 @@ from typing import Annotated
 
 from cyclopts import App, Parameter, validators
 
+from tiltvp.cli.lab.body import body
 from tiltvp.cli.lab.calibration_measures import calibration, calibration_images, trust_calibration
 from tiltvp.cli.lab.corner_measures import corners
 from tiltvp.cli.lab.corner_real import corners_real
@@ -22,6 +23,7 @@ from tiltvp.cli.terminal import progress_bar, say
 from tiltvp.errors import InvalidInputError
 
 app = App(name="measure", help="Measure how well all this works, where the truth is known.")
+app.command(body)
 app.command(calibration)
 app.command(calibration_images)
 app.command(corners)

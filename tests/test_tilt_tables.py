@@ -1,0 +1,59 @@
+"""The table of `tiltvp tilt` for people: a line of summary, and rows that a narrow terminal holds."""
+
+from __future__ import annotations
+
+import io
+from pathlib import Path
+
+import numpy as np
+import pytest
+from rich.console import Console
+
+import tiltvp
+from tiltvp.cli.results import Outcome, people_table, summary_words
+
+CAMERA = tiltvp.Camera.equidistant(width=160, height=120, focal_px=35.0, cx=79.5, cy=59.5)
+ESTIMATOR = tiltvp.TiltEstimator(CAMERA)
+ROOM = tiltvp.synth.render_room(CAMERA, kind="office", seed=1, alpha_rad=0.07, beta_rad=0.5, samples=1).gray
+FOLDER = Path("/data/of a long name/drive of that day")
+
+
+def outcomes(verdict: str | None = None, *, filtered: bool = False) -> list[Outcome]:
+    """Two images of a room, one that is blank, and one that cannot be read."""
+    held = tiltvp.TiltFilter().predict() if filtered else None
+    accepted = None if verdict is None else False
+    files = [FOLDER / f"a frame whose name is rather long {k:06d}.png" for k in range(4)]
+    room, blank = ESTIMATOR(ROOM), ESTIMATOR(np.zeros_like(ROOM))
+    return [
+        Outcome(files[0], room, 0.5, accepted=accepted, verdict=verdict, filtered=held),
+        Outcome(files[1], room, 0.001, accepted=accepted, verdict=verdict, filtered=held),
+        Outcome(files[2], blank, 0.002, accepted=accepted, verdict=verdict, filtered=held),
+        Outcome(files[3], error="not an image", accepted=accepted, verdict=verdict, filtered=held),
+    ]
+
+
+@pytest.mark.parametrize("width", [80, 240])
+@pytest.mark.parametrize("verdict", [None, "low-confidence"])
+@pytest.mark.parametrize("filtered", [False, True])
+def test_a_row_is_a_line_and_names_are_told_by_their_ends(width: int, verdict: str | None, filtered: bool) -> None:
+    console = Console(file=io.StringIO(), width=width)
+    rows = outcomes(verdict, filtered=filtered)
+    console.print(people_table(rows, width))
+    lines = [line for line in console.file.getvalue().splitlines() if line.strip()]
+    assert max(map(len, lines)) <= width
+    if width == 80:
+        assert len(lines) == 2 + len(rows)
+    assert all(any(f"{k:06d}.png" in line for line in lines) for k in range(4))
+    assert "drive" not in "".join(lines)
+    assert lines[0].index("roll deg") < lines[0].index("pitch deg")
+
+
+def test_the_summary_says_how_many_how_they_lean_and_why_not() -> None:
+    alpha = np.degrees(ESTIMATOR(ROOM).alpha_rad)
+    assert summary_words(outcomes()) == (
+        f"4 images: lean {alpha:.2f} deg in the median, 90 % from {alpha:.2f} to {alpha:.2f}; "
+        "1 without a tilt (1 too few); 1 could not be used; 2.00 ms an image"
+    )
+    assert "2 low-confidence" in summary_words(outcomes("low-confidence"))
+    assert summary_words(outcomes()[:1]) == f"1 image: lean {alpha:.2f} deg"
+    assert summary_words(outcomes()[3:]) == "1 image: no tilt; 1 could not be used"
