@@ -146,6 +146,10 @@ measure-trust *arguments: setup
     test -e out/room-panoramas/INDEX.csv || {{bin}}/tiltvp dataset panoramas --out out/room-panoramas
     {{bin}}/tiltvp measure trust "$TILTVP_DATA/panos" out/room-panoramas {{arguments}}
 
+# Self-calibration on simulated logs that mislead: how often it is wrong and sure.
+measure-trust-calibration *arguments: setup
+    {{bin}}/tiltvp measure trust-calibration {{arguments}}
+
 # What an evaluation costs over the number of images and over their pixels.
 measure-scaling *arguments: setup
     {{bin}}/tiltvp measure scaling {{arguments}}

@@ -1323,6 +1323,7 @@ class FitReport:
         "out-of-reach",
         "chosen",
         "ambiguous",
+        "undetermined",
     ]:
         """Why the fit stopped, in a word.
 
@@ -1752,6 +1753,10 @@ class LogCalibration:
     def __eq__(self, other: object, /) -> bool: ...
     def __hash__(self) -> int: ...
     @property
+    def bearing_sigma_rad(self) -> float:
+        """Standard deviation of a bearing: as given, or as the residuals tell it where they say that it is larger."""
+
+    @property
     def bearings(self) -> int:
         """Bearings that were used; of those taken at a standstill only the first."""
 
@@ -1776,12 +1781,27 @@ class LogCalibration:
         """Linearisations."""
 
     @property
+    def misreading(self) -> str | None:
+        """How the log may have been meant, where it fits that way only: "reflected" (wheels swapped, both negated, or
+        bearings clockwise), "left wheel negated", "right wheel negated", "degrees", "millimetres" or "cumulative". None
+        if it fits.
+        """
+
+    @property
     def mounting(self) -> MountingEstimate:
         """The mounting; covariances are scaled by the residuals where these are larger than assumed."""
 
     @property
+    def odometry_k_m(self) -> float:
+        """Variance of a wheel's displacement for each metre of it, likewise."""
+
+    @property
     def outliers(self) -> int:
         """Bearings farther off than 4.5 standard deviations, which count for nothing."""
+
+    @property
+    def reason(self) -> str:
+        """Whether the answer can be relied upon, and what speaks against it, in a sentence."""
 
     @property
     def residual_rms(self) -> float:
@@ -1834,6 +1854,14 @@ class MountingEstimate:
         """Whether bearings ever disagreed with the mounting over a window of steps, as after a bump."""
 
     @property
+    def contradicted_motions(self) -> int:
+        """Those that the bearings contradict: farther off than five standard deviations of the odometry."""
+
+    @property
+    def contradicted_turns(self) -> int:
+        """Those that the bearings contradict by more than half of the turn, whatever the noise."""
+
+    @property
     def covariance_phi_rho_psi(self) -> NDArray[np.float64]:
         """Fresh (3, 3) float64: covariance of (phi, rho, psi); infinite where rho is 0."""
 
@@ -1859,6 +1887,10 @@ class MountingEstimate:
         """
 
     @property
+    def motions(self) -> int:
+        """Motions from one pose with bearings to the next: of the whole log, or of the filter's window."""
+
+    @property
     def phi_rad(self) -> float:
         """The paper's phi, the direction in which the camera is, in (-pi, pi] radians; means nothing where rho is near
         0.
@@ -1870,7 +1902,9 @@ class MountingEstimate:
 
     @property
     def reason(self) -> str:
-        """What is determined, what motion would help, and whether there was an alarm, in a sentence."""
+        """What is determined, what motion would help, whether there was an alarm and what is suspected, in a
+        sentence.
+        """
 
     @property
     def rho_m(self) -> float:
@@ -1890,8 +1924,25 @@ class MountingEstimate:
     def sigma_of_drive_xy_yaw(self) -> NDArray[np.float64]:
         """Fresh (3,) float64: standard deviations of (x, y, yaw) by the drive alone."""
 
+    @property
+    def suspect(self) -> str | None:
+        """What is most likely wrong where the log does not fit: "turns" (a sign or a unit), "outliers" (a bump, or
+        names), "bump", "slips", "bearing_sigma_rad", "odometry_k_m", "wheel_base_m", "right_over_left" or
+        "time_offset_s". None if nothing is.
+        """
+
+    @property
+    def suspect_value(self) -> float | None:
+        """The value that would suit the log better, of what `suspect` names (a time offset in steps); of "turns",
+        "outliers" and "slips" their share, of "bump" its angle in radians.
+        """
+
     def to_dict(self) -> dict[str, Any]:
         """The attributes by name, arrays as nested lists: plain, good for JSON."""
+
+    @property
+    def turns(self) -> int:
+        """Turns by some 0.1 rad by the odometry."""
 
     @property
     def x_m(self) -> float:
@@ -2377,6 +2428,14 @@ class SelfCalibrator:
     @property
     def estimate(self) -> MountingEstimate:
         """The mounting as it is believed to be now."""
+
+    def examine(self) -> None:
+        """Looks now for what the drive so far contradicts and which assumption is likely wrong; `estimate` then says
+        so.
+
+        That happens by itself at the end of `follow`, and not between steps, for it costs some ten solutions of the
+        window.
+        """
 
     def follow(self, odometry: ArrayLike, bearings: ArrayLike) -> list[MountingEstimate]:
         """Steps through a log, (N, 2) left and right, (M, 3) step, landmark, bearing: the estimate after each step."""
@@ -3226,7 +3285,8 @@ def simulate_drive(
     wheel_base_m: float | None = None,
     outliers: float | None = None,
 ) -> SimulatedDrive:
-    """A drive past 10 vertical lines: "paper" (2.3 m straight on, half a turn), "alternating" or "straight".
+    """A drive past 10 vertical lines: "paper" (2.3 m straight on, half a turn), "alternating", "straight", "rotation"
+    or "arcs".
 
     `mounting` is (x_m, y_m, yaw_rad), None: the paper's phi = -0.34, rho = 0.23, psi = 0.33. The noise is that of the
     defaults of `SelfCalibrator`, wheels are 0.4 m apart, `outliers` is the share of bearings that are of nothing.

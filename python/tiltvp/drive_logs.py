@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import os
 from array import array
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
@@ -14,9 +14,11 @@ from tiltvp.csv_files import CsvFile
 from tiltvp.errors import InvalidInputError
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from numpy.typing import NDArray
 
-__all__ = ["DriveLog", "read_drive_log"]
+__all__ = ["READINGS", "DriveLog", "read_drive_log"]
 
 _ODOMETRY = ("step", "time_s", "delta_left_m", "delta_right_m")
 _BEARINGS = ("step", "landmark", "bearing_rad")
@@ -34,6 +36,39 @@ class DriveLog:
     """(M, 3): row of `odometry` after whose motion it was taken, landmark, bearing in radians."""
     times_s: NDArray[np.float64] | None
     """(N,): when each step ended; None where the file has no column time_s."""
+
+    def read_as(self, *conventions: str) -> DriveLog:
+        """This log, recorded by other conventions than ours, by ours; names of `READINGS`.
+
+        Raises `InvalidInputError` for other names.
+        """
+        log = self
+        for name in conventions:
+            if name not in READINGS:
+                raise InvalidInputError(f"{name!r}: no convention of a log, expected one of {', '.join(READINGS)}")
+            log = READINGS[name](log)
+        return log
+
+
+def _wheels(left: float, right: float) -> Callable[[DriveLog], DriveLog]:
+    return lambda log: replace(log, odometry=log.odometry * [left, right])
+
+
+def _bearings(factor: float) -> Callable[[DriveLog], DriveLog]:
+    return lambda log: replace(log, bearings=log.bearings * [1.0, 1.0, factor])
+
+
+READINGS: Final[dict[str, Callable[[DriveLog], DriveLog]]] = {
+    "wheels-swapped": lambda log: replace(log, odometry=log.odometry[:, ::-1].copy()),
+    "wheels-negated": _wheels(-1.0, -1.0),
+    "left-wheel-negated": _wheels(-1.0, 1.0),
+    "right-wheel-negated": _wheels(1.0, -1.0),
+    "clockwise": _bearings(-1.0),
+    "degrees": _bearings(math.pi / 180.0),
+    "millimetres": _wheels(1e-3, 1e-3),
+    "cumulative": lambda log: replace(log, odometry=np.diff(log.odometry, axis=0, prepend=0.0)),
+}
+"""How logs are recorded elsewhere: which wheel is which, which way they count, and in which units."""
 
 
 def read_drive_log(odometry: str | os.PathLike[str], bearings: str | os.PathLike[str]) -> DriveLog:

@@ -98,6 +98,10 @@ impl SelfCalibrator {
                 let expected = format!("steps below {}, the length of the odometry", readings.len());
                 return Err(Error::argument("bearings", format!("step {}", beyond.step), expected));
             }
+            filter.examine();
+            if let Some(last) = all.last_mut() {
+                *last = filter.estimate();
+            }
             Ok(all)
         })?;
         Ok(found.into_iter().map(MountingEstimate::from).collect())
@@ -107,6 +111,16 @@ impl SelfCalibrator {
     #[getter]
     fn estimate(&self, py: Python<'_>) -> MountingEstimate {
         self.inner.look(py, core::SelfCalibrator::estimate).into()
+    }
+
+    /// Looks now for what the drive so far contradicts and which assumption is likely wrong; `estimate` then says so.
+    ///
+    /// That happens by itself at the end of `follow`, and not between steps, for it costs some ten solutions of the window.
+    fn examine(&self, py: Python<'_>) -> PyResult<()> {
+        self.inner.change(py, |calibrator| {
+            calibrator.examine();
+            Ok(())
+        })
     }
 
     /// Landmarks that are being followed.

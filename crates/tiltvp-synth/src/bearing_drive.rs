@@ -18,6 +18,10 @@ words! {
         Alternating = "alternating",
         /// 4 m straight on, nothing else.
         Straight = "straight",
+        /// A whole turn in place, nothing else.
+        Rotation = "rotation",
+        /// Four arcs of 1 m, to the left and to the right by turns.
+        Arcs = "arcs",
     }
 }
 
@@ -29,13 +33,15 @@ impl BearingDriveKind {
             Self::Paper => vec![straight(2.3), turn(180.0)],
             Self::Alternating => [straight(1.0), turn(90.0)].repeat(4),
             Self::Straight => vec![straight(4.0)],
+            Self::Rotation => vec![turn(360.0)],
+            Self::Arcs => [90.0f64, -60.0, 120.0, -45.0].map(|degrees| (1.0, degrees.to_radians())).to_vec(),
         }
     }
 
     /// Distance and turn of each step.
     fn steps(self) -> Vec<(f64, f64)> {
         let steps = |(distance, turn): (f64, f64)| {
-            let count = (distance / 0.038).max(turn / 3f64.to_radians()).round();
+            let count = (distance / 0.038).max(turn.abs() / 3f64.to_radians()).round();
             vec![(distance / count, turn / count); count as usize]
         };
         self.legs().into_iter().flat_map(steps).collect()

@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Annotated
 
-from tiltvp.cli.calibrate_inputs import DriveOptions, PictureOptions, log_of_images, log_of_tables
+from cyclopts import Parameter
+
+from tiltvp.cli.calibrate_inputs import DriveOptions, PictureOptions, log_of_images, log_of_tables, other_readings
 from tiltvp.cli.calibrate_results import Calibration, ResultOptions
 from tiltvp.cli.line_options import DrivingLineOptions
 from tiltvp.cli.options import CameraOptions, Switch
+from tiltvp.cli.terminal import say
 from tiltvp.errors import InvalidInputError
 
-NOT_DETERMINED = 1
+NOT_RELIABLE = 1
 _PICTURES, _LINES, _RESULTS = PictureOptions(), DrivingLineOptions(), ResultOptions()
 
 
@@ -24,6 +28,7 @@ def calibrate(
     camera: CameraOptions | None = None,
     options: DrivingLineOptions = _LINES,
     method: str = "default",
+    read_as: Annotated[tuple[str, ...], Parameter(consume_multiple=True)] = (),
     estimate_odometry: Switch = False,
     estimate_time_offset: Switch = False,
     results: ResultOptions = _RESULTS,
@@ -32,8 +37,8 @@ def calibrate(
 
     From two tables, ODOMETRY.csv BEARINGS.csv; or from pictures, --images FOLDER --camera FILE --odometry CSV: the lean
     of each, its vertical lines, and which line is which from image to image. Prints what the filter found step by step,
-    and what the whole log says at once; exit code 1 if the drive has not determined everything or
-    images could not be read.
+    what the whole log says at once, and the transform of the whole log if it can be relied upon; exit code 1 if it
+    cannot, or if images could not be read.
 
     Parameters
     ----------
@@ -43,6 +48,9 @@ def calibrate(
         CSV with the columns step, landmark, bearing_rad.
     method
         The filter: default, or paper.
+    read_as
+        How the log was recorded, where not by our conventions: wheels-swapped, wheels-negated, left-wheel-negated,
+        right-wheel-negated, clockwise, degrees, millimetres, cumulative.
     estimate_odometry
         From the whole log also the wheel base and which wheel runs farther.
     estimate_time_offset
@@ -63,6 +71,7 @@ def calibrate(
             raise InvalidInputError("--estimate-time-offset with --images, whose times are not known")
         log, sigma_rad, bad = log_of_images(pictures, camera, options, drive)
         sigma = {"bearing_sigma_rad": sigma_rad}
+    log = log.read_as(*read_as)
     calibrator = SelfCalibrator(**sigma | drive.of_filter(), method=method)
     history = calibrator.follow(log.odometry, log.bearings)
     whole = calibrate_log(
@@ -70,4 +79,6 @@ def calibrate(
         estimate_odometry=estimate_odometry, estimate_time_offset=estimate_time_offset,
     )  # fmt: skip
     results.tell(Calibration(calibrator, history, whole))
-    return 0 if whole and not bad else NOT_DETERMINED
+    for word in other_readings(whole.misreading):
+        say(f"try {' '.join([*(f'--read-as {known}' for known in read_as), f'--read-as {word}'])}")
+    return 0 if whole and not bad else NOT_RELIABLE

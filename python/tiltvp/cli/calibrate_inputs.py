@@ -22,7 +22,14 @@ from tiltvp.errors import InvalidInputError
 if TYPE_CHECKING:
     from tiltvp.drive_logs import DriveLog
 
-__all__ = ["DriveOptions", "PictureOptions", "log_of_images", "log_of_tables"]
+__all__ = ["DriveOptions", "PictureOptions", "log_of_images", "log_of_tables", "other_readings"]
+
+_REMEDIES = {
+    "reflected": ("wheels-swapped", "wheels-negated", "clockwise"),
+    "left wheel negated": ("left-wheel-negated",),
+    "right wheel negated": ("right-wheel-negated",),
+}
+"""What may mend a log that was misread, where it has another name."""
 
 _FORMS = "ODOMETRY.csv BEARINGS.csv, or --images FOLDER --camera FILE --odometry ODOMETRY.csv"
 
@@ -79,6 +86,11 @@ class PictureOptions:
         for name, value in (("--odometry", self.odometry), ("--camera", camera), ("--tracks", self.tracks)):
             if value is not None:
                 raise InvalidInputError(f"{name} without --images, which it is for")
+
+
+def other_readings(misreading: str | None) -> tuple[str, ...]:
+    """The words of `--read-as` to try for a log that fits in another reading only."""
+    return () if misreading is None else _REMEDIES.get(misreading, (misreading,))
 
 
 def log_of_tables(odometry: Path | None, bearings: Path | None, *, with_times: bool) -> DriveLog:

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from cyclopts import Group, Parameter
 
+from tiltvp.cli.options import Switch
 from tiltvp.cli.tables import check_plot, finite
 from tiltvp.cli.terminal import new_table, say, show
 from tiltvp.errors import InvalidInputError
@@ -42,6 +43,8 @@ class ResultOptions:
     """Height of the camera in the robot's frame, metres, for the ROS transform and the URDF snippet."""
     out: Path | None = None
     """File for everything that was found (.json)."""
+    anyway: Switch = False
+    """Print and write the transform even if the whole log says that it cannot be relied upon."""
     plot: Path | None = None
     """Picture of the filter's convergence, as figure 25 of Scaramuzza, Siegwart and Martinelli 2009 (.png)."""
 
@@ -59,12 +62,18 @@ class ResultOptions:
 
         filtered, whole = calibration.calibrator.estimate, calibration.whole
         _show(filtered, whole)
-        transform = ros_static_transform(
-            whole.mounting, parent=self.parent_frame, child=self.child_frame, z_m=self.height
-        )
-        origin = urdf_origin(whole.mounting, z_m=self.height)
-        say(transform)
-        say(origin)
+        transforms = {}
+        if whole or self.anyway:
+            transforms = {
+                "ros_static_transform": ros_static_transform(
+                    whole.mounting, parent=self.parent_frame, child=self.child_frame, z_m=self.height
+                ),
+                "urdf_origin": urdf_origin(whole.mounting, z_m=self.height),
+            }
+        for text in transforms.values():
+            say(text)
+        if not transforms:
+            say("no transform, since the whole log cannot be relied upon: --anyway prints it")
         if self.plot is not None:
             _write_plot(calibration.history, self.plot)
         if self.out is not None:
@@ -73,9 +82,7 @@ class ResultOptions:
                 "whole_log": whole.to_dict(),
                 "filter": filtered.to_dict(),
                 "options": {name: _plain(value) for name, value in options.items()},
-                "ros_static_transform": transform,
-                "urdf_origin": origin,
-            }
+            } | transforms
             text = json.dumps(finite(found), indent=1, allow_nan=False) + "\n"
             write_whole(self.out, text)
 
@@ -107,12 +114,14 @@ def _show(filtered: MountingEstimate, whole: LogCalibration) -> None:
         ]  # fmt: skip
         table.add_row(name, *cells)
     show(table)
-    for name, e in (("filter", filtered), ("whole log", whole.mounting)):
-        say(f"{name}: {e.reason}")
+    for name, reason in (("filter", filtered.reason), ("whole log", whole.reason)):
+        say(f"{name}: {reason}")
+    e = whole.mounting
     say(
-        f"whole log: {whole.bearings} bearings, {whole.outliers} outliers, residual {whole.residual_rms:.2f} sigma"
-        f"{'' if whole.converged else ', not converged'}"
+        f"whole log: {whole.bearings} bearings, {whole.outliers} outliers, residual {whole.residual_rms:.2f} sigma, "
+        f"{e.contradicted_motions} of {e.motions} motions and {e.contradicted_turns} of {e.turns} turns contradicted"
     )
+    say(f"noise: bearings {np.degrees(whole.bearing_sigma_rad):.3g} deg, odometry K {whole.odometry_k_m:.2g} m")
     if whole.wheel_base_sigma_m > 0.0:
         say(
             f"wheels: base {1e3 * whole.wheel_base_m:.2f} +- {1e3 * whole.wheel_base_sigma_m:.2f} mm, "

@@ -95,6 +95,14 @@ impl SelfCalibrator {
         Ok(CalibrationStep { nis, used, rejected, started })
     }
 
+    /// Looks for what the drive so far contradicts and which assumption is likely wrong; estimates then say so. It costs some ten solutions
+    /// of the window.
+    pub fn examine(&mut self) {
+        if let Filter::SlidingWindow(filter) = &mut self.filter {
+            filter.examine();
+        }
+    }
+
     /// The number of landmarks that are followed.
     pub fn landmarks(&self) -> usize {
         match &self.filter {
@@ -117,6 +125,7 @@ impl SelfCalibrator {
                     nis,
                     filter.monitor().alarmed(),
                 )
+                .judged(filter.examination().contradictions, filter.examination().suspect)
             }
             Filter::Paper(filter) => {
                 let Some((polar, covariance)) = filter.mounting() else {

@@ -4,6 +4,7 @@ use std::fmt;
 
 use nalgebra::Matrix3;
 
+use super::diagnosis::{Contradictions, Suspect};
 use super::model::Mounting;
 use super::observability::Observability;
 
@@ -23,6 +24,10 @@ pub struct MountingEstimate {
     pub mean_nis: Option<f64>,
     /// Whether the innovations of some steps in a row were ever too large: the mount was bumped, or an assumption is wrong.
     pub alarm: bool,
+    /// How many motions and turns of the odometry the bearings contradict.
+    pub contradictions: Contradictions,
+    /// What is most likely wrong where the log does not fit.
+    pub suspect: Option<Suspect>,
 }
 
 impl MountingEstimate {
@@ -44,12 +49,22 @@ impl MountingEstimate {
             observability: Observability::new(&mounting, &covariance_xy_yaw, start),
             mean_nis,
             alarm,
+            contradictions: Contradictions::default(),
+            suspect: None,
         }
     }
 
-    /// Whether the estimate can be relied upon: everything determined, no alarm, finite.
+    /// This estimate with what its solution says of the log.
+    pub(crate) fn judged(self, contradictions: Contradictions, suspect: Option<Suspect>) -> Self {
+        Self { contradictions, suspect, ..self }
+    }
+
+    /// Whether the estimate can be relied upon: everything determined, no alarm, nothing suspected, finite.
     pub fn reliable(&self) -> bool {
-        self.observability.complete() && !self.alarm && self.mounting.vector().iter().all(|x| x.is_finite())
+        self.observability.complete()
+            && !self.alarm
+            && self.suspect.is_none()
+            && self.mounting.vector().iter().all(|x| x.is_finite())
     }
 }
 
@@ -65,6 +80,16 @@ impl fmt::Display for MountingEstimate {
         write!(f, "{}", self.observability)?;
         if self.alarm {
             write!(f, "; alarm: bearings disagree with the mounting, as after a bump (calibrate anew)")?;
+        }
+        if let Some(suspect) = self.suspect {
+            write!(f, "; {suspect}")?;
+        }
+        let Contradictions { motions, contradicted_motions, turns, contradicted_turns } = self.contradictions;
+        if contradicted_motions + contradicted_turns > 0 {
+            write!(
+                f,
+                "; {contradicted_motions} of {motions} motions and {contradicted_turns} of {turns} turns contradicted"
+            )?;
         }
         Ok(())
     }

@@ -6,6 +6,7 @@
 
 mod bundle;
 mod calibrator;
+mod diagnosis;
 mod estimate;
 mod model;
 mod observability;
@@ -16,10 +17,11 @@ mod step_outcome;
 mod window;
 
 pub use self::calibrator::{CalibrationStep, SelfCalibrator};
+pub use self::diagnosis::{Cause, Contradictions, Suspect};
 pub use self::estimate::MountingEstimate;
 pub use self::model::{MOST_LANDMARKS, MotionNoise, Mounting, RelativeMotion, WheelMotion, Wheels};
 pub use self::observability::{FeatureRange, Observability, PureMotion, cramer_rao_bound, observable_dimension};
-pub use self::offline::{LogBearing, LogCalibration, LogOptions, calibrate_log};
+pub use self::offline::{LogBearing, LogCalibration, LogOptions, Misreading, calibrate_log};
 pub use self::options::{CalibrationMethod, SelfCalibratorOptions, StartSigma};
 pub use self::paper::{Feature, dynamics, dynamics_jacobians, observation, observation_jacobians};
 

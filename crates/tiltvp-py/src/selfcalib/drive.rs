@@ -95,7 +95,7 @@ impl SimulatedDrive {
 
 frozen!(SimulatedDrive, |own| own.options, |own| (own.options.kind.name(), own.options.seed));
 
-/// A drive past 10 vertical lines: "paper" (2.3 m straight on, half a turn), "alternating" or "straight".
+/// A drive past 10 vertical lines: "paper" (2.3 m straight on, half a turn), "alternating", "straight", "rotation" or "arcs".
 ///
 /// `mounting` is (x_m, y_m, yaw_rad), None: the paper's phi = -0.34, rho = 0.23, psi = 0.33. The noise is that of the
 /// defaults of `SelfCalibrator`, wheels are 0.4 m apart, `outliers` is the share of bearings that are of nothing.

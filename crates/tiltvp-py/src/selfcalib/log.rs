@@ -4,6 +4,7 @@ use pyo3::prelude::*;
 use tiltvp_core::selfcalib as core;
 
 use super::mounting::MountingEstimate;
+use crate::call::invalid;
 use crate::value::value;
 
 value! {
@@ -37,6 +38,15 @@ value! {
         iterations: u32,
         /// Whether the descent came to rest.
         converged: bool,
+        /// Standard deviation of a bearing: as given, or as the residuals tell it where they say that it is larger.
+        bearing_sigma_rad: f64,
+        /// Variance of a wheel's displacement for each metre of it, likewise.
+        odometry_k_m: f64,
+        /// How the log may have been meant, where it fits that way only: "reflected" (wheels swapped, both negated, or bearings
+        /// clockwise), "left wheel negated", "right wheel negated", "degrees", "millimetres" or "cumulative". None if it fits.
+        misreading: Option<String> = own.misreading.map(|misreading| misreading.name().to_owned()),
+        /// Whether the answer can be relied upon, and what speaks against it, in a sentence.
+        reason: String = own.to_string(),
     }
     make core::LogCalibration {
         estimate: mounting.inner,
@@ -49,6 +59,9 @@ value! {
         residual_rms,
         iterations,
         converged,
+        bearing_sigma_rad,
+        odometry_k_m,
+        misreading: misread(misreading.as_deref())?,
     };
     repr format!(
         "LogCalibration({}, residual_rms={:.3}, bearings={}, outliers={}, converged={})",
@@ -60,10 +73,19 @@ fn right_over_left(log: &core::LogCalibration) -> f64 {
     (2.0 * log.wheels.imbalance).exp()
 }
 
+/// The misreading of a name.
+fn misread(name: Option<&str>) -> PyResult<Option<core::Misreading>> {
+    let found = name.map(|name| core::Misreading::from_name(name).ok_or(name)).transpose();
+    found.map_err(|name| {
+        let expected = core::Misreading::NAMES.join(", ");
+        invalid(format!("values[\"misreading\"]: unknown name {name:?}, expected {expected}"))
+    })
+}
+
 #[pymethods]
 impl LogCalibration {
-    /// Whether the answer can be relied upon: the mounting is determined, and the descent came to rest.
+    /// Whether the answer can be relied upon: the mounting can be, the descent came to rest, and the log was not misread.
     fn __bool__(&self) -> bool {
-        self.inner.converged && self.inner.estimate.reliable()
+        self.inner.reliable()
     }
 }

@@ -45,7 +45,21 @@ value! {
         mean_nis: Option<f64>,
         /// Whether bearings ever disagreed with the mounting over a window of steps, as after a bump.
         alarm: bool,
-        /// What is determined, what motion would help, and whether there was an alarm, in a sentence.
+        /// Motions from one pose with bearings to the next: of the whole log, or of the filter's window.
+        motions: usize = own.contradictions.motions,
+        /// Those that the bearings contradict: farther off than five standard deviations of the odometry.
+        contradicted_motions: usize = own.contradictions.contradicted_motions,
+        /// Turns by some 0.1 rad by the odometry.
+        turns: usize = own.contradictions.turns,
+        /// Those that the bearings contradict by more than half of the turn, whatever the noise.
+        contradicted_turns: usize = own.contradictions.contradicted_turns,
+        /// What is most likely wrong where the log does not fit: "turns" (a sign or a unit), "outliers" (a bump, or names), "bump",
+        /// "slips", "bearing_sigma_rad", "odometry_k_m", "wheel_base_m", "right_over_left" or "time_offset_s". None if nothing is.
+        suspect: Option<String> = own.suspect.map(|suspect| suspect.cause.name().to_owned()),
+        /// The value that would suit the log better, of what `suspect` names (a time offset in steps); of "turns", "outliers" and
+        /// "slips" their share, of "bump" its angle in radians.
+        suspect_value: Option<f64> = own.suspect.map(|suspect| suspect.value),
+        /// What is determined, what motion would help, whether there was an alarm and what is suspected, in a sentence.
         reason: String = own.to_string(),
     }
     make core::MountingEstimate {
@@ -59,6 +73,8 @@ value! {
         },
         mean_nis,
         alarm,
+        contradictions: core::Contradictions { motions, contradicted_motions, turns, contradicted_turns },
+        suspect: suspected(suspect.as_deref(), suspect_value)?,
     };
     repr {
         let m = &own.mounting;
@@ -83,9 +99,22 @@ fn flags(determined: &[String]) -> PyResult<[bool; 4]> {
     Ok(DETERMINABLE.map(|name| determined.iter().any(|found| found == name)))
 }
 
+/// The suspect of a name and a value.
+fn suspected(name: Option<&str>, value: Option<f64>) -> PyResult<Option<core::Suspect>> {
+    let Some(name) = name else { return Ok(None) };
+    match (core::Cause::from_name(name), value) {
+        (Some(cause), Some(value)) => Ok(Some(core::Suspect { cause, value })),
+        (None, _) => {
+            let expected = core::Cause::NAMES.join(", ");
+            Err(invalid(format!("values[\"suspect\"]: unknown name {name:?}, expected {expected}")))
+        }
+        (_, None) => Err(invalid("values[\"suspect_value\"]: None, expected a number".to_owned())),
+    }
+}
+
 #[pymethods]
 impl MountingEstimate {
-    /// Whether the answer can be relied upon: everything determined, finite, and no alarm.
+    /// Whether the answer can be relied upon: everything determined, finite, no alarm, nothing suspected.
     fn __bool__(&self) -> bool {
         self.inner.reliable()
     }

@@ -1,4 +1,4 @@
-"""`tiltvp measure calibration` and `calibration-images`: self-calibration against what is known."""
+"""`tiltvp measure calibration`, `calibration-images` and `trust-calibration`: self-calibration and what is known."""
 
 from __future__ import annotations
 
@@ -103,3 +103,44 @@ def calibration_images(
     if out is not None:
         write_frame(table, out)
     show_frame(f"From pictures, errors along the {trajectory} trajectory, degrees and mm", table, ["kind", "by"])
+
+
+def trust_calibration(
+    *,
+    drives: Annotated[int, Parameter(validator=validators.Number(gte=1))] = 100,
+    seed: Annotated[int, Parameter(validator=validators.Number(gte=0))] = 100_000,
+    only: str = "",
+    out: Path | None = None,
+) -> None:
+    """Self-calibration on simulated logs that mislead: answers, those wrong and sure, abstentions, causes named.
+
+    Wrong is a NEES beyond its 99.9 % quantile, or an error beyond five standard deviations of the Cramer-Rao bound;
+    sure is a verdict that the answer can be relied upon. A cause is named by the reason, whatever the verdict.
+
+    Parameters
+    ----------
+    drives
+        Drives of each case.
+    seed
+        Seed of the first drive.
+    only
+        Only the cases whose names hold this: "base", "wheels swapped".
+    out
+        Also write the long table, one row for each drive and way: .csv, .json or .parquet.
+    """
+    import polars as pl
+
+    from tiltvp.lab.datasets.hostile_drives import DRIVE_CASES, hostile_drives
+    from tiltvp.lab.evaluation.hostile_drives import judge_drives, summarise_drive_cases
+
+    cases = [name for name in DRIVE_CASES if only in name]
+    if not cases:
+        raise InvalidInputError(f"--only {only}: no case of that name, expected one of {', '.join(DRIVE_CASES)}")
+    if out is not None:
+        check_ending(out)
+    with progress_bar(len(cases) * drives, "drives") as bar:
+        seeds = range(seed, seed + drives)
+        table = pl.concat([judge_drives(hostile_drives(case, seeds), advance=bar.advance) for case in cases])
+    if out is not None:
+        write_frame(table, out)
+    show_frame(f"Shares in per cent, of {drives} drives of each case", summarise_drive_cases(table), ["case", "by"])

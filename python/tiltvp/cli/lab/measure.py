@@ -8,7 +8,7 @@ from typing import Annotated
 
 from cyclopts import App, Parameter, validators
 
-from tiltvp.cli.lab.calibration_measures import calibration, calibration_images
+from tiltvp.cli.lab.calibration_measures import calibration, calibration_images, trust_calibration
 from tiltvp.cli.lab.corner_measures import corners
 from tiltvp.cli.lab.corner_real import corners_real
 from tiltvp.cli.lab.descriptors import descriptors
@@ -31,6 +31,7 @@ app.command(lines)
 app.command(planar_pose)
 app.command(striding)
 app.command(trust)
+app.command(trust_calibration)
 
 
 @app.command

@@ -132,6 +132,33 @@ impl BundleProblem {
         g
     }
 
+    /// This problem with more parameters free, where they are now.
+    pub(crate) fn with_free(&self, free: FreeParameters) -> Self {
+        let mut problem = self.clone();
+        let information = &mut problem.prior_information;
+        let mut insert = |at: usize, values: &[(f64, f64)]| {
+            let count = values.len();
+            let mean = std::mem::replace(&mut problem.prior_mean, DVector::zeros(0));
+            problem.prior_mean = mean.insert_rows(at, count, 0.0);
+            let before = std::mem::replace(information, DMatrix::zeros(0, 0));
+            *information = before.insert_rows(at, count, 0.0).insert_columns(at, count, 0.0);
+            for (k, (value, sigma)) in values.iter().enumerate() {
+                problem.prior_mean[at + k] = *value;
+                information[(at + k, at + k)] = 1.0 / (sigma * sigma);
+            }
+        };
+        if free.wheels && !problem.free.wheels {
+            let [imbalance, base] = WHEELS_SIGMA;
+            insert(3, &[(problem.wheels.imbalance, imbalance), (problem.wheels.base_m.ln(), base)]);
+            problem.free.wheels = true;
+        }
+        if free.offset && !problem.free.offset {
+            insert(problem.free.offset_at(), &[(problem.offset_s, OFFSET_SIGMA_S)]);
+            problem.free.offset = true;
+        }
+        problem
+    }
+
     /// This problem with fixed wheels.
     pub(crate) fn with_fixed_wheels(mut self, wheels: Wheels) -> Self {
         if self.free.wheels {

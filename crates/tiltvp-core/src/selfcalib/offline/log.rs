@@ -45,7 +45,7 @@ pub(super) struct SortedLog<'a> {
 /// A step of a log.
 pub(super) struct LogStep<'a> {
     pub(super) reading: &'a WheelMotion,
-    /// Time since the step before; 0 at the first step and without times.
+    /// Time since the step before, 0 at the first step; without times steps count as seconds.
     pub(super) seconds: f64,
     pub(super) bearings: &'a [LogBearing],
 }
@@ -69,7 +69,7 @@ impl<'a> SortedLog<'a> {
     pub(super) fn steps(&self) -> impl Iterator<Item = LogStep<'_>> {
         let mut rest = self.bearings.as_slice();
         self.readings.iter().enumerate().map(move |(step, reading)| {
-            let seconds = self.times_s.map_or(0.0, |t| if step == 0 { 0.0 } else { t[step] - t[step - 1] });
+            let seconds = self.times_s.map_or(1.0, |t| if step == 0 { 0.0 } else { t[step] - t[step - 1] });
             let (bearings, later) = rest.split_at(rest.partition_point(|b| b.step <= step));
             rest = later;
             LogStep { reading, seconds, bearings }

@@ -2,7 +2,10 @@
 
 mod incremental;
 mod log;
+mod misreading;
+mod noise;
 mod whole_log;
 
 pub use self::log::{LogBearing, LogOptions};
+pub use self::misreading::Misreading;
 pub use self::whole_log::{LogCalibration, calibrate_log};

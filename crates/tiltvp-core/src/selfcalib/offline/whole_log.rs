@@ -1,11 +1,14 @@
 //! The mounting from a whole log: robust bundle adjustment from several starts, optionally with the wheels and a time offset.
 
 use std::collections::BTreeMap;
+use std::fmt;
 
 use nalgebra::Matrix3;
 
 use super::incremental::{ROBUST_LOSS, incremental_problem, problem_along};
 use super::log::{LogBearing, LogOptions, SortedLog};
+use super::misreading::Misreading;
+use super::noise::solve_with_noise;
 use crate::error::{Error, Result};
 use crate::selfcalib::bundle::{BundleProblem, CholeskyFactor, DescentReport, FIRST_DAMPING, FreeParameters};
 use crate::selfcalib::estimate::MountingEstimate;
@@ -36,6 +39,34 @@ pub struct LogCalibration {
     pub iterations: u32,
     /// Whether the last descent converged.
     pub converged: bool,
+    /// Standard deviation of a bearing, and variance of a wheel's displacement for each metre, as given or, where the residuals say that
+    /// they are others, as estimated.
+    pub bearing_sigma_rad: f64,
+    /// See there.
+    pub odometry_k_m: f64,
+    /// How the log may have been meant, where it fits that way only.
+    pub misreading: Option<Misreading>,
+}
+
+impl LogCalibration {
+    /// Whether the answer can be relied upon: the descent came to rest, the mounting can be relied upon, and the log was not misread.
+    pub fn reliable(&self) -> bool {
+        self.converged && self.misreading.is_none() && self.estimate.reliable()
+    }
+}
+
+/// A sentence: whether the answer can be relied upon, and why not.
+impl fmt::Display for LogCalibration {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if self.estimate.reliable() && !self.reliable() {
+            write!(f, "not to be relied upon; ")?;
+        }
+        write!(f, "{}", self.estimate)?;
+        if !self.converged {
+            write!(f, "; not converged")?;
+        }
+        self.misreading.map_or(Ok(()), |misreading| write!(f, "; {misreading}"))
+    }
 }
 
 /// Fall of the cost below which a descent has converged: far below the 1/2 by which the cost rises at one standard deviation.
@@ -48,6 +79,14 @@ const SCATTER_ROUNDS: usize = 4;
 /// Share of outliers of a converged solution up to which no other start is tried: as many as single wrong bearings make. A solution
 /// with a loop that did not close has more.
 const OUTLIER_SHARE: f64 = 0.03;
+
+/// Share of turns, motions and bearings that may be contradicted before other readings of the log are tried, and with which such a
+/// reading fits: a wrong sign or unit contradicts nearly all of one kind, slips and strays few of all.
+const MISREAD_SHARE: f64 = 0.3;
+const FITTING_SHARE: f64 = 0.2;
+
+/// Turns by some 0.1 rad that a reading must leave to be believed: signs and units are told by turns.
+const LEAST_TURNS: usize = 3;
 
 /// Where an attempt starts, and what is free until the loops are closed.
 #[derive(Clone, Copy)]
@@ -75,13 +114,40 @@ pub fn calibrate_log(
     bearings: &[LogBearing],
 ) -> Result<LogCalibration> {
     let log = SortedLog::new(options, readings, times_s, bearings)?;
+    let Some((mut problem, mut descent)) = solved(&log)? else {
+        return Err(Error::argument("bearings", "a problem without a solution", "a drive past landmarks"));
+    };
+    let mut misreading = None;
+    if !fits(&problem, MISREAD_SHARE) {
+        misreading = fitting_misreading(options, readings, times_s, bearings);
+    }
+    if misreading.is_none() && !problem.contradictions().most_turns() {
+        descent = solve_with_noise(&mut problem, options.max_iterations).unwrap_or(descent);
+    }
+    report(options, &problem, &descent, misreading).map_err(|error| match misreading {
+        Some(misreading) => {
+            Error::argument("odometry", format!("a log that determines nothing; {misreading}"), "metres and radians")
+        }
+        None => error,
+    })
+}
+
+/// The best solution of several starts.
+fn solved(log: &SortedLog<'_>) -> Result<Option<(BundleProblem, DescentReport)>> {
+    let options = log.options;
     let mut best: Option<(BundleProblem, DescentReport)> = None;
     for attempt in [Attempt::FreeWheels, Attempt::Window, Attempt::Start, Attempt::WithoutLoops] {
         if matches!(attempt, Attempt::Start) && options.estimate_odometry {
             // The wheels were free in the first attempt and would be again.
             continue;
         }
-        let mut problem = started(&log, attempt)?;
+        if matches!(attempt, Attempt::Window)
+            && best.as_ref().is_some_and(|(problem, _)| problem.contradictions().most_turns())
+        {
+            // No start mends an odometry that turns otherwise, and the filter's is the dearest.
+            continue;
+        }
+        let mut problem = started(log, attempt)?;
         let descent = solve(&mut problem, options.max_iterations);
         let residuals = problem.residuals();
         let outliers = residuals.iter().filter(|r| r.abs() > OUTLIER_SIGMAS).count();
@@ -93,10 +159,42 @@ pub fn calibrate_log(
             break;
         }
     }
-    let Some((problem, descent)) = best else {
-        return Err(Error::argument("bearings", "a problem without a solution", "a drive past landmarks"));
+    Ok(best)
+}
+
+/// Whether at most a share of the turns is contradicted, and of the motions and bearings.
+fn fits(problem: &BundleProblem, share: f64) -> bool {
+    let residuals = problem.residuals();
+    let outliers = residuals.iter().filter(|r| r.abs() > OUTLIER_SIGMAS).count();
+    let counts = problem.contradictions();
+    let parts = [
+        (counts.contradicted_turns, counts.turns),
+        (counts.contradicted_motions, counts.motions),
+        (outliers, residuals.len()),
+    ];
+    parts.iter().all(|(part, whole)| *part as f64 <= share * *whole as f64)
+}
+
+/// The misreading with which the log fits best, of those with which it fits at all.
+fn fitting_misreading(
+    options: &LogOptions,
+    readings: &[WheelMotion],
+    times_s: Option<&[f64]>,
+    bearings: &[LogBearing],
+) -> Option<Misreading> {
+    let cost = |(readings, bearings): (Vec<WheelMotion>, Vec<LogBearing>)| {
+        let log = SortedLog::new(options, &readings, times_s, &bearings).ok()?;
+        let mut problem = started(&log, Attempt::FreeWheels).ok()?;
+        let descent = solve(&mut problem, options.max_iterations);
+        // A reading that leaves nearly no motion fits anything.
+        let turns = problem.contradictions().turns >= LEAST_TURNS;
+        (descent.cost.is_finite() && turns && fits(&problem, FITTING_SHARE)).then_some(descent.cost)
     };
-    report(options, &problem, &descent)
+    let possible = Misreading::ALL.into_iter().filter(|misreading| misreading.possible(bearings));
+    let fitting = possible.filter_map(|misreading| {
+        Some((misreading, misreading.logs(readings, bearings).into_iter().filter_map(cost).min_by(f64::total_cmp)?))
+    });
+    fitting.min_by(|a, b| a.1.total_cmp(&b.1)).map(|(misreading, _)| misreading)
 }
 
 /// The problem that an attempt starts from, with the parameters free that the options ask for.
@@ -122,7 +220,7 @@ fn started(log: &SortedLog<'_>, attempt: Attempt) -> Result<BundleProblem> {
 }
 
 /// Solves a problem with a robust loss, then without outliers, then with the scatters of the landmarks.
-fn solve(problem: &mut BundleProblem, max_iterations: u32) -> DescentReport {
+pub(super) fn solve(problem: &mut BundleProblem, max_iterations: u32) -> DescentReport {
     let descend = |problem: &mut BundleProblem, loss: BearingLoss| {
         problem.loss = loss;
         problem.levenberg_marquardt(max_iterations, TOLERANCE, FIRST_DAMPING)
@@ -159,7 +257,12 @@ fn whole_window(log: &SortedLog<'_>) -> Result<BundleProblem> {
 }
 
 /// The answer: the solution with its covariance, scaled by the residuals where these are larger than assumed.
-fn report(options: &LogOptions, problem: &BundleProblem, descent: &DescentReport) -> Result<LogCalibration> {
+fn report(
+    options: &LogOptions,
+    problem: &BundleProblem,
+    descent: &DescentReport,
+    misreading: Option<Misreading>,
+) -> Result<LogCalibration> {
     let o = &options.filter;
     let residuals = problem.residuals();
     let kept: Vec<f64> = residuals.iter().copied().filter(|r| r.abs() <= OUTLIER_SIGMAS).collect();
@@ -174,16 +277,20 @@ fn report(options: &LogOptions, problem: &BundleProblem, descent: &DescentReport
     let widening = problem.covariance_widening(&system, &covariance);
     let covariance = covariance * scale;
     let mounting: Matrix3<f64> = covariance.fixed_view::<3, 3>(0, 0).into();
+    let mounting = widening * mounting * widening.transpose();
+    let counts = problem.contradictions();
+    let suspect = problem.suspect(o, &counts, problem.noise_factors(), &mounting);
     let sigma = |at: usize| covariance[(at, at)].sqrt();
     let (wheels, offset) = (options.estimate_odometry, options.estimate_time_offset);
     Ok(LogCalibration {
         estimate: MountingEstimate::new(
             Mounting::from_vector(&problem.mounting),
-            widening * mounting * widening.transpose(),
+            mounting,
             &(o.start_covariance * scale),
             Some(sum / kept.len().max(1) as f64),
             false,
-        ),
+        )
+        .judged(counts, suspect),
         wheels: problem.wheels,
         wheels_sigma: if wheels { [sigma(3), sigma(4) * problem.wheels.base_m] } else { [0.0; 2] },
         time_offset_s: problem.offset_s,
@@ -193,5 +300,8 @@ fn report(options: &LogOptions, problem: &BundleProblem, descent: &DescentReport
         residual_rms: (sum / kept.len().max(1) as f64).sqrt(),
         iterations: descent.iterations,
         converged: descent.converged,
+        bearing_sigma_rad: problem.bearing_sigma,
+        odometry_k_m: problem.noise.k_m,
+        misreading,
     })
 }

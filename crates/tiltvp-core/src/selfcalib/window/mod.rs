@@ -1,6 +1,7 @@
 //! The sliding-window estimator: an iterated Kalman filter whose last keyframes are kept, solved again and relinearised, and
 //! marginalised when there are too many.
 
+mod examination;
 mod landmark_initialisation;
 mod marginalise;
 mod monitor;

@@ -2,6 +2,7 @@
 
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 
+use super::examination::Examination;
 use super::monitor::InnovationMonitor;
 use super::tuning::HUBER_SIGMAS;
 use crate::error::Result;
@@ -46,6 +47,8 @@ pub(crate) struct SlidingWindow {
     /// Covariance that the last motion added to the pose.
     pub(super) motion_noise: Matrix3<f64>,
     pub(super) monitor: InnovationMonitor,
+    /// What the last examination of the window found.
+    pub(super) examination: Examination,
 }
 
 impl SlidingWindow {
@@ -71,6 +74,7 @@ impl SlidingWindow {
             widening: Matrix3::identity(),
             motion_noise: Matrix3::zeros(),
             monitor: InnovationMonitor::default(),
+            examination: Examination::default(),
         })
     }
 

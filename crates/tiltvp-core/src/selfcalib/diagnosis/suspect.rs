@@ -1,0 +1,143 @@
+//! The assumption that is most likely wrong where a solution does not fit its log.
+
+use std::fmt;
+
+use nalgebra::Matrix3;
+
+use super::contradictions::Contradictions;
+use super::deviations::Deviation;
+use super::noise::NoiseFactors;
+use crate::selfcalib::bundle::BundleProblem;
+use crate::selfcalib::model::OUTLIER_SIGMAS;
+use crate::selfcalib::options::SelfCalibratorOptions;
+use crate::words;
+
+/// Share of outliers from which on names, or a bump, are to blame and not strays.
+const MOST_OUTLIERS: f64 = 0.15;
+
+/// Share of contradicted motions from which on they are not single slips.
+const MOST_CONTRADICTED: f64 = 0.1;
+
+/// Standard deviations of a deviation of the wheels or the clock beyond which it is not chance, and of the mounting by which it
+/// would move, below which it does not matter where the noise is as told.
+const DEVIATION_SIGMAS: f64 = 5.0;
+const DEVIATION_SHIFT: f64 = 1.0;
+
+words! {
+    /// What is most likely wrong with a log or with what is told of the robot.
+    #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+    pub enum Cause {
+        /// Most turns are others than the odometry's: a sign or a unit.
+        Turns = "turns",
+        /// Many bearings are outliers: a bump of the camera, or wrong names of landmarks.
+        Outliers = "outliers",
+        /// Odometry and bearings jump, and the camera may have been bumped as well as the wheels may have slipped.
+        Bump = "bump",
+        /// Many motions are contradicted: wheels slip.
+        Slips = "slips",
+        /// The bearings' noise is larger than told.
+        BearingSigma = "bearing_sigma_rad",
+        /// The motions' noise is larger than told.
+        OdometryK = "odometry_k_m",
+        /// The wheel base is another one.
+        WheelBase = "wheel_base_m",
+        /// One wheel runs farther than the other.
+        Wheels = "right_over_left",
+        /// The bearings are later than the odometry, or earlier.
+        TimeOffset = "time_offset_s",
+    }
+}
+
+/// A cause, and the number that would suit the log: that of the option or quantity of the cause's name, or a share.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct Suspect {
+    /// What is most likely wrong.
+    pub cause: Cause,
+    /// The number that would suit; of `turns`, `outliers` and `slips` the share that is contradicted, of `bump` the
+    /// angle in radians.
+    pub value: f64,
+}
+
+impl fmt::Display for Suspect {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { cause, value } = *self;
+        let percent = 100.0 * value;
+        match cause {
+            Cause::Turns => write!(f, "{percent:.0} % of the turns contradicted: a wrong sign or unit"),
+            Cause::Outliers => {
+                write!(
+                    f,
+                    "{percent:.0} % of the bearings are outliers: a bump of the camera, or wrong names of landmarks"
+                )
+            }
+            Cause::Bump => write!(
+                f,
+                "a jump by {:.1} degrees, which may be a bump of the camera as well as a slip of the wheels",
+                value.to_degrees()
+            ),
+            Cause::Slips => {
+                write!(f, "{percent:.0} % of the motions contradicted: wheels slip, or odometry_k_m is too small")
+            }
+            Cause::BearingSigma => write!(f, "bearings scatter more than told: try bearing_sigma_rad = {value:.2e}"),
+            Cause::OdometryK => write!(f, "wheels are noisier than told: try odometry_k_m = {value:.1e}"),
+            Cause::WheelBase => {
+                write!(f, "turns tell another wheel base: try wheel_base_m = {value:.4}, or estimate_odometry")
+            }
+            Cause::Wheels => {
+                write!(f, "the right wheel runs {value:.4} times as far as the left: try estimate_odometry")
+            }
+            Cause::TimeOffset => write!(
+                f,
+                "bearings seem to be {value:.2} steps later than the odometry (earlier if negative): try estimate_time_offset, with times"
+            ),
+        }
+    }
+}
+
+impl BundleProblem {
+    /// What is most likely wrong at this solution, whose mounting has that covariance.
+    pub(crate) fn suspect(
+        &self,
+        options: &SelfCalibratorOptions,
+        counts: &Contradictions,
+        factors: NoiseFactors,
+        covariance: &Matrix3<f64>,
+    ) -> Option<Suspect> {
+        let share = |part: usize, whole: usize| part as f64 / whole.max(1) as f64;
+        let found = |cause, value| Some(Suspect { cause, value });
+        if counts.most_turns() {
+            return found(Cause::Turns, share(counts.contradicted_turns, counts.turns));
+        }
+        let excess = factors.motions.max(factors.bearings).max(1.0);
+        let deviations = self.deviations(&(covariance * excess));
+        let sigmas = |d: Deviation| d.value.abs() / d.sigma / excess.sqrt();
+        let matters = deviations.iter().enumerate().filter_map(|(k, d)| d.map(|d| (k, d, sigmas(d))));
+        let worst = matters
+            .filter(|(_, d, sigmas)| *sigmas > DEVIATION_SIGMAS && (excess > 1.0 || d.shift > DEVIATION_SHIFT))
+            .max_by(|a, b| a.2.total_cmp(&b.2));
+        if let Some((k, d, _)) = worst {
+            return match k {
+                0 => found(Cause::Wheels, (2.0 * (self.wheels.imbalance + d.value)).exp()),
+                1 => found(Cause::WheelBase, self.wheels.base_m * d.value.exp()),
+                _ => found(Cause::TimeOffset, d.value),
+            };
+        }
+        if factors.bearings > 1.0 {
+            return found(Cause::BearingSigma, self.bearing_sigma * factors.bearings.sqrt());
+        }
+        if factors.motions > 1.0 {
+            return found(Cause::OdometryK, self.noise.k_m * factors.motions);
+        }
+        let residuals = self.residuals();
+        let outliers = share(residuals.iter().filter(|r| r.abs() > OUTLIER_SIGMAS).count(), residuals.len());
+        let contradicted = share(counts.contradicted_motions, counts.motions);
+        if outliers > MOST_OUTLIERS {
+            return found(Cause::Outliers, outliers);
+        }
+        if contradicted > MOST_CONTRADICTED {
+            return found(Cause::Slips, contradicted);
+        }
+        self.possible_bump(options, covariance).and_then(|angle| found(Cause::Bump, angle))
+    }
+}

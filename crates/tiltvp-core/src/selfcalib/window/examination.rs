@@ -1,0 +1,32 @@
+//! The examination of the window: what its solution contradicts, and which assumption is most likely wrong.
+
+use super::state::{MOUNTING, SlidingWindow};
+use super::tuning::{COST_TOLERANCE, ITERATIONS};
+use crate::selfcalib::diagnosis::{Contradictions, Suspect};
+
+/// What the last examination found.
+#[derive(Debug, Clone, PartialEq, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub(crate) struct Examination {
+    pub(crate) contradictions: Contradictions,
+    pub(crate) suspect: Option<Suspect>,
+}
+
+impl SlidingWindow {
+    /// Solves a copy of the window, and asks what it contradicts and what is suspect.
+    pub(crate) fn examine(&mut self) {
+        let mut now = self.problem.clone();
+        if now.keyframes.len() < 3 || now.gauss_newton(ITERATIONS, COST_TOLERANCE, false).is_none() {
+            return;
+        }
+        let counts = now.contradictions();
+        let covariance = self.covariance.fixed_view::<3, 3>(MOUNTING, MOUNTING).into();
+        let suspect = now.suspect(&self.options, &counts, now.noise_factors(), &covariance);
+        self.examination = Examination { contradictions: counts, suspect };
+    }
+
+    /// What the last examination found.
+    pub(crate) fn examination(&self) -> &Examination {
+        &self.examination
+    }
+}

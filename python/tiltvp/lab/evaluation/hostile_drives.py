@@ -1,0 +1,116 @@
+"""How often calibrations are wrong and sure, where logs mislead them, and how often they name the cause."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable
+from typing import Any, Final
+
+import numpy as np
+import polars as pl
+
+from tiltvp.errors import InvalidInputError
+from tiltvp.lab.datasets.hostile_drives import HostileDrive
+from tiltvp.selfcalib import LogCalibration, MountingEstimate, SelfCalibrator, calibrate
+
+__all__ = ["judge_drives", "summarise_drive_cases"]
+
+NEES_LIMIT: Final = 16.27
+"""99.9 % quantile of chi-square with three degrees of freedom."""
+BOUND_SIGMAS: Final = 5.0
+"""Errors beyond so many standard deviations of the Cramer-Rao bound are wrong."""
+
+CAUSES: Final = {
+    "wheels swapped": "wheels swapped",
+    "both wheels negated": "wheels swapped",
+    "bearings clockwise": "wheels swapped",
+    "left wheel negated": "left wheel",
+    "right wheel negated": "right wheel",
+    "bearings in degrees": "degrees",
+    "lengths in millimetres": "millimetres",
+    "cumulative": "cumulative",
+    "wheel base": "wheel base",
+    "sigma": "bearing_sigma_rad",
+    "K told": "odometry_k_m",
+    "bearings 0.2 s late": "later than the odometry",
+    "camera bumped": "bump",
+    "straight": "rotate in place",
+    "rotation": "drive straight",
+    "too short": "drive straight",
+}
+"""What a reason names the cause by, for each case whose name begins so; reflections are one family."""
+
+
+def judge_drives(drives: Iterable[HostileDrive], *, advance: Callable[[], None] = lambda: None) -> pl.DataFrame:
+    """Two rows for each drive, of the filter and of the whole log.
+
+    Columns: case, seed, by, answered (the verdict says that it can be relied upon), nees, worst (the largest error
+    of x, y and yaw in standard deviations of the bound), wrong, named, reason.
+    """
+    rows: list[dict[str, Any]] = []
+    for item in drives:
+        calibrator = SelfCalibrator(**item.options)
+        calibrator.follow(item.odometry, item.bearings)
+        rows.append(_row(item, "filter", calibrator.estimate, calibrator.estimate))
+        rows.append(_whole_log(item))
+        advance()
+    return pl.DataFrame(rows)
+
+
+def summarise_drive_cases(table: pl.DataFrame) -> pl.DataFrame:
+    """One row for each case and way: drives, and shares in per cent of answers, wrong and sure, abstained, and named.
+
+    Named is null where a case has no cause to name.
+    """
+    sure = pl.col("answered")
+    columns = {
+        "drives": pl.len(),
+        "answers": 100.0 * sure.mean(),
+        "wrong and sure": 100.0 * (sure & pl.col("wrong")).mean(),
+        "abstained": 100.0 * (~sure).mean(),
+        "cause named": 100.0 * pl.col("named").mean(),
+    }
+    return table.group_by("case", "by", maintain_order=True).agg(**columns)
+
+
+def _whole_log(item: HostileDrive) -> dict[str, Any]:
+    try:
+        whole = calibrate(item.odometry, item.bearings, **item.options)
+    except InvalidInputError as error:
+        named = _cause(item) in str(error)
+        return _columns(item, "whole log", math.nan, math.nan) | {"named": named, "reason": str(error)}
+    row = _row(item, "whole log", whole, whole.mounting)
+    # What was estimated need not be named.
+    told = SelfCalibrator(**item.options).options
+    own = {"bearing_sigma_rad": whole.bearing_sigma_rad, "odometry_k_m": whole.odometry_k_m}
+    estimated = own.get(_cause(item)) not in (None, told.get(_cause(item)))
+    return row | {"named": row["named"] or estimated if row["named"] is not None else None}
+
+
+def _cause(item: HostileDrive) -> str:
+    return next((words for name, words in CAUSES.items() if item.case.startswith(name)), "")
+
+
+def _columns(item: HostileDrive, by: str, nees: float, worst: float) -> dict[str, Any]:
+    """The columns of a drive without an answer."""
+    columns = {"case": item.case, "seed": item.seed, "by": by, "answered": False, "nees": nees, "worst": worst}
+    return columns | {"wrong": True, "named": False, "reason": ""}
+
+
+def _row(
+    item: HostileDrive, by: str, verdict: LogCalibration | MountingEstimate, e: MountingEstimate
+) -> dict[str, Any]:
+    error = np.array([e.x_m, e.y_m, e.yaw_rad]) - item.truth
+    error[2] = math.remainder(error[2], math.tau)
+    try:
+        nees = float(error @ np.linalg.solve(e.covariance_xy_yaw, error))
+    except np.linalg.LinAlgError:
+        nees = math.inf
+    worst = float(np.max(np.abs(error) / np.sqrt(np.diag(item.bound))))
+    cause = _cause(item)
+    return _columns(item, by, nees, worst) | {
+        "answered": bool(verdict),
+        "wrong": not (nees <= NEES_LIMIT and worst <= BOUND_SIGMAS),
+        "named": cause in verdict.reason if cause else None,
+        "reason": verdict.reason,
+    }

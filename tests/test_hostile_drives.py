@@ -1,0 +1,155 @@
+"""Logs that mislead a calibration: misreadings are named, noise is found, and the command obeys."""
+
+from __future__ import annotations
+
+import csv
+import json
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import tiltvp
+from tiltvp.cli import main
+from tiltvp.drive_logs import READINGS, DriveLog
+from tiltvp.errors import InvalidInputError
+from tiltvp.lab.datasets.hostile_drives import UNDISTURBED, HostileDrive, hostile_drives
+from tiltvp.lab.evaluation.hostile_drives import judge_drives, summarise_drive_cases
+from tiltvp.synth import simulate_drive
+
+
+def one(case: str, seed: int = 1) -> HostileDrive:
+    return next(hostile_drives(case, range(seed, seed + 1)))
+
+
+def whole(case: str, seed: int = 1) -> tiltvp.LogCalibration:
+    drive = one(case, seed)
+    return tiltvp.calibrate(drive.odometry, drive.bearings, **drive.options)
+
+
+def write(folder: Path, drive: HostileDrive) -> list[str]:
+    names = [folder / "odometry.csv", folder / "bearings.csv"]
+    columns = ("step,delta_left_m,delta_right_m", "step,landmark,bearing_rad")
+    rows = ([[i, *row] for i, row in enumerate(drive.odometry)], [[int(a), int(b), c] for a, b, c in drive.bearings])
+    for name, header, table in zip(names, columns, rows, strict=True):
+        with name.open("w", newline="") as file:
+            csv.writer(file).writerows([header.split(","), *table])
+    return ["calibrate", *map(str, names), "--wheel-base", "0.4"]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("case", "misreading", "remedies"),
+    [
+        ("bearings clockwise", "reflected", ["wheels-swapped", "wheels-negated", "clockwise"]),
+        ("left wheel negated", "left wheel negated", ["left-wheel-negated"]),
+        ("lengths in millimetres", "millimetres", ["millimetres"]),
+        ("cumulative", "cumulative", ["cumulative"]),
+    ],
+)
+def test_a_misread_log_is_refused_and_named(
+    case: str, misreading: str, remedies: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    found = whole(case)
+    assert not found
+    assert found.misreading == misreading
+    words = write(tmp_path, one(case))
+    out = tmp_path / "found.json"
+    assert main([*words, "--out", str(out)]) == 1
+    printed = capsys.readouterr().out
+    assert all(f"try --read-as {word}" in printed for word in remedies)
+    assert "static_transform_publisher" not in printed
+    assert "urdf_origin" not in json.loads(out.read_text())
+    assert main([*words, "--read-as", remedies[-1]]) == 0
+    assert "static_transform_publisher" in capsys.readouterr().out
+
+
+def test_readings_are_undone() -> None:
+    drive = simulate_drive("paper", seed=4)
+    log = DriveLog(drive.odometry, drive.bearings, None)
+    for names in (["wheels-swapped"] * 2, ["clockwise"] * 2, ["wheels-swapped", "wheels-negated"] * 2):
+        again = log.read_as(*names)
+        np.testing.assert_array_equal(again.odometry, log.odometry)
+        np.testing.assert_array_equal(again.bearings, log.bearings)
+    summed = DriveLog(np.cumsum(log.odometry, axis=0), log.bearings, None).read_as("cumulative")
+    np.testing.assert_allclose(summed.odometry, log.odometry, atol=1e-12)
+    assert log.read_as("degrees").bearings[0, 2] == math.radians(log.bearings[0, 2])
+    with pytest.raises(InvalidInputError, match="mirrored"):
+        log.read_as("mirrored")
+    assert len(READINGS) == 8
+
+
+def test_every_answer_counts_what_is_contradicted() -> None:
+    drive = simulate_drive("alternating", seed=3)
+    start = {"wheel_base_m": 0.4, "start": (0.2, 0.0, 0.0), "start_sigma": (0.2, 0.2, 0.6)}
+    odometry = drive.odometry.copy()
+    odometry[len(odometry) // 2] += [0.15, -0.1]
+    e = tiltvp.calibrate(odometry, drive.bearings, **start).mounting
+    assert e.contradicted_motions >= 1
+    assert f"{e.contradicted_motions} of {e.motions} motions" in e.reason
+    calibrator = tiltvp.SelfCalibrator(**start)  # type: ignore[arg-type]
+    calibrator.follow(drive.odometry * [1.0, -1.0], drive.bearings)
+    assert 2 * calibrator.estimate.contradicted_turns > calibrator.estimate.turns
+    assert calibrator.estimate.suspect == "turns"
+    assert not calibrator.estimate
+
+
+def test_noise_is_estimated_where_it_is_another_than_told() -> None:
+    loud = whole("sigma told 5 times too small")
+    assert math.degrees(loud.bearing_sigma_rad) == pytest.approx(2.5, rel=0.2)
+    right = whole(UNDISTURBED)
+    assert right.bearing_sigma_rad == math.radians(0.5)
+    assert right.odometry_k_m == 1e-5
+
+
+def test_a_wrong_wheel_base_is_named() -> None:
+    e = whole("wheel base +30 %").mounting
+    assert not e
+    assert e.suspect == "wheel_base_m"
+    assert e.suspect_value == pytest.approx(0.4, abs=0.05)
+    assert type(e).from_dict(e.to_dict()) == e
+    with pytest.raises(InvalidInputError, match="suspect"):
+        type(e).from_dict(e.to_dict() | {"suspect": "moon"})
+
+
+@pytest.mark.parametrize("seed", [100002, 100003])
+def test_a_bump_may_be_behind_a_jump(seed: int) -> None:
+    (bumped,) = hostile_drives("camera bumped", range(seed, seed + 1))
+    e = tiltvp.calibrate(bumped.odometry, bumped.bearings, **bumped.options).mounting
+    assert (bool(e), e.suspect) == (False, "bump")
+    assert e.suspect_value == pytest.approx(math.radians(4.0), abs=math.radians(0.5))
+    calibrator = tiltvp.SelfCalibrator(**bumped.options)
+    calibrator.follow(bumped.odometry, bumped.bearings)
+    assert calibrator.estimate.suspect == "bump"
+
+
+def test_slips_between_legs_that_determine_the_mounting_are_slips() -> None:
+    (slipped,) = hostile_drives("wheels slip", range(100003, 100004))
+    e = tiltvp.calibrate(slipped.odometry, slipped.bearings, **slipped.options).mounting
+    assert e
+    assert e.contradicted_motions == 3
+
+
+def test_the_filter_of_the_command_is_that_of_method(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    words = write(tmp_path, one(UNDISTURBED))
+    found = []
+    for method in ("default", "paper"):
+        out = tmp_path / f"{method}.json"
+        main([*words, "--start", "0.1", "0", "0", "--method", method, "--out", str(out)])
+        kept = json.loads(out.read_text())
+        assert kept["options"]["method"] == method
+        found.append(kept["filter"]["x_m"])
+    assert found[0] != found[1]
+    capsys.readouterr()
+    assert main([*words, "--method", "nonsense"]) == 2
+    assert "method" in capsys.readouterr().err
+
+
+def test_the_table_counts_as_it_says() -> None:
+    table = judge_drives(hostile_drives(UNDISTURBED, range(2)))
+    summary = summarise_drive_cases(table)
+    assert summary["drives"].to_list() == [2, 2]
+    assert summary["wrong and sure"].to_list() == [0.0, 0.0]
+    assert summary["answers"].to_list() == [100.0, 100.0]
+    assert main(["measure", "trust-calibration", "--only", "no such case"]) == 2
