@@ -125,8 +125,9 @@ pub(super) struct TraceScratch {
     ransac: RansacScratch,
 }
 
-/// Follows a ray from its vertex: at each pixel along it the `signal` fills in a profile across it (from the middle, the step
-/// from sample to sample, and the samples; false if not all are in the image), the edge is found between samples, and a great circle is fitted robustly. None if less than `support_min` agree.
+/// Follows a ray from its vertex: at each pixel along it the `signal` fills in a profile across it, the edge is found between
+/// samples, and a great circle is fitted robustly. None if less than `support_min` agree. The signal is given the middle of the
+/// profile, the step from sample to sample, and the samples, and says whether all of them are in the image.
 pub(super) fn trace(
     camera: &Camera,
     search: &RaySearch,
