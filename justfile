@@ -12,8 +12,8 @@ default:
 # The virtual environment with the package, built for speed, and the tools that develop it.
 setup:
     test -x {{bin}}/python || python3 -m venv .venv
-    {{bin}}/pip install --quiet --constraint requirements-dev.lock 'maturin>=1.9,<2'
-    PATH="$PWD/{{bin}}:$PATH" {{bin}}/pip install --quiet --no-build-isolation --constraint requirements-dev.lock --editable '.[dev]'
+    {{bin}}/pip install --quiet --require-hashes --requirement requirements-dev.lock
+    PATH="$PWD/{{bin}}:$PATH" {{bin}}/pip install --quiet --no-build-isolation --no-deps --editable .
 
 # Sets up; renders rooms at known leans, estimates them with every method, prints a table, writes pictures.
 demo *arguments: setup
@@ -94,6 +94,10 @@ record recipe *arguments: setup
 # Writes docs/options.md from what the core declares.
 options: setup
     {{bin}}/python tests/options_page.py
+
+# Writes THIRD-PARTY-LICENSES, which wheels carry, from the crates in Cargo.lock.
+licences:
+    python3 crates/tiltvp-py/licences.py
 
 # Writes the stubs: that of the extension, from what Rust declares, and that of the cameras' constructors, from the core's lenses.
 stub: setup
@@ -272,7 +276,8 @@ format:
     {{bin}}/ruff check --fix --quiet
     {{bin}}/ruff format --quiet
 
-# Writes the versions now installed as the constraints of `setup`.
-lock:
-    echo '# Versions that the package is developed and tested with: constraints for pip, written by `just lock`.' > requirements-dev.lock
-    {{bin}}/pip freeze --exclude-editable | grep --invert-match '^rust-just' >> requirements-dev.lock
+# Writes versions and hashes of what `setup` installs, for every platform and Python; with --upgrade the newest.
+lock *arguments:
+    test -x target/tools/uv/bin/uv || {{bin}}/pip install --quiet --target target/tools/uv uv
+    target/tools/uv/bin/uv pip compile pyproject.toml --extra dev --universal --generate-hashes --no-annotate --quiet {{arguments}} \
+        --custom-compile-command 'just lock' --output-file requirements-dev.lock

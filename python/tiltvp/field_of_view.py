@@ -26,7 +26,8 @@ class FieldOfView:
     """Full angles through the axis in radians (beyond pi where the lens sees behind itself), and the valid pixels.
 
     `axis_px` is the pixel (u, v) of the optical axis, `valid_radius_px` the distance from it to the farthest pixel that
-    has a bearing, `valid_share` the share of pixels that have one.
+    has a bearing, `valid_share` the share of pixels that have one; of images larger than 2048 pixels a grid of at most
+    2048 x 2048 pixels is looked at.
     """
 
     horizontal_rad: float
@@ -60,15 +61,22 @@ def field_of_view(camera: Camera) -> FieldOfView:
         return float(np.nanmax(angles(border, beyond)))
 
     (u, v), (right, bottom) = axis, last
-    mask = camera.valid_mask()
-    rows, columns = np.nonzero(mask)
+    step = -(-max(camera.width, camera.height) // _SAMPLES)
+    columns, rows = np.arange(0, camera.width, step), np.arange(0, camera.height, step)
+    farthest, seen = 0.0, 0
+    for row in rows:
+        pixels = np.column_stack([columns, np.full(len(columns), row)])
+        within = columns[np.isfinite(camera.unproject(pixels)[:, 0])]
+        seen += within.size
+        # The farthest pixel of a row is its first or its last.
+        farthest = max([farthest, *(math.hypot(column - u, row - v) for column in within[[0, -1][: within.size]])])
     return FieldOfView(
         horizontal_rad=reach(0.0, v) + reach(right, v),
         vertical_rad=reach(u, 0.0) + reach(u, bottom),
         diagonal_rad=max(reach(0.0, 0.0) + reach(right, bottom), reach(right, 0.0) + reach(0.0, bottom)),
         axis_px=(float(u), float(v)),
-        valid_radius_px=math.sqrt(float(((columns - u) ** 2 + (rows - v) ** 2).max())) if rows.size else 0.0,
-        valid_share=float(mask.mean()),
+        valid_radius_px=farthest,
+        valid_share=seen / (len(rows) * len(columns)),
     )
 
 
