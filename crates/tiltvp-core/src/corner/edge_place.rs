@@ -4,6 +4,9 @@
 /// whole: [`REACH`] and one more for the difference.
 pub(super) const SHOULDER: usize = 4;
 
+/// Longest profile, in samples: the largest search of 15 pixels and the shoulders, on both sides of the middle.
+pub(super) const PROFILE_MAX: usize = 41;
+
 /// How far from its steepest place an edge's own gradient reaches, in samples: three standard deviations of the blur of
 /// a focused lens (1 pixel). The test of blurred steps covers 0.5 to 1.2 pixels.
 const REACH: usize = 3;
@@ -21,30 +24,47 @@ pub(super) struct EdgePlace {
     pub(super) step: f64,
 }
 
-/// The edge nearest to the middle of a profile with an odd number of samples, at most `search` samples from it.
+/// Where in profiles of one length the edge is looked for.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct SearchWindow {
+    /// What gradients count in the choice of the edge: less far from the middle, nothing outside the search.
+    weights: [f64; PROFILE_MAX],
+    search: f64,
+}
+
+impl SearchWindow {
+    /// For profiles of `samples`, an odd number, at most `search` samples from the middle.
+    pub(super) fn new(samples: usize, search: f64) -> Self {
+        let middle = (samples / 2) as f64;
+        let weights = std::array::from_fn(|i| {
+            let distance = (i as f64 + 0.5 - middle) / (search + 0.5);
+            if distance.abs() <= 1.0 { 1.0 - 0.5 * distance * distance } else { 0.0 }
+        });
+        Self { weights, search }
+    }
+}
+
+/// The edge nearest to the middle of a profile with an odd number of samples, within the window.
 ///
 /// The place is the centroid of the profile's gradient: that of a step seen through any symmetric blur, whatever its width.
-/// Gradients far from the middle count less in the choice of the edge, not in its place. None without a step of `step_min`.
-pub(super) fn edge_place(profile: &[f64], search: f64, step_min: f64) -> Option<EdgePlace> {
+/// None without a step of `step_min`.
+pub(super) fn edge_place(profile: &[f64], window: &SearchWindow, step_min: f64) -> Option<EdgePlace> {
     let middle = (profile.len() / 2) as f64;
     let gradient = |i: usize| profile[i + 1] - profile[i];
     let offset = |i: usize| i as f64 + 0.5 - middle;
     let count = profile.len().checked_sub(1)?;
     let (mut peak, mut most) = (None, 0.0);
-    for i in 0..count {
-        let distance = offset(i) / (search + 0.5);
-        if distance.abs() <= 1.0 {
-            let strength = gradient(i).abs() * (1.0 - 0.5 * distance * distance);
-            if strength > most {
-                (peak, most) = (Some(i), strength);
-            }
+    for (i, (pair, weight)) in profile.windows(2).zip(&window.weights).enumerate() {
+        let strength = (pair[1] - pair[0]).abs() * weight;
+        if strength > most {
+            (peak, most) = (Some(i), strength);
         }
     }
     let peak = peak?;
     let steepest = gradient(peak);
     // The flank of a steeper edge beyond the reach of the search is no edge.
     let is_steeper = |i: usize| i < count && gradient(i) * steepest > steepest * steepest;
-    let beyond = |i: usize| offset(i).abs() > search + 0.5;
+    let beyond = |i: usize| offset(i).abs() > window.search + 0.5;
     if [peak.wrapping_sub(1), peak + 1].into_iter().any(|i| is_steeper(i) && beyond(i)) {
         return None;
     }
@@ -74,7 +94,7 @@ mod tests {
         for sigma in [0.5, 0.8, 1.2] {
             for place in [-2.3, -0.5, 0.0, 0.21, 1.77] {
                 for step in [-80.0, 25.0] {
-                    let found = edge_place(&blurred(place, sigma, step), 4.0, 5.0).unwrap();
+                    let found = edge_place(&blurred(place, sigma, step), &SearchWindow::new(17, 4.0), 5.0).unwrap();
                     assert!(
                         (found.shift - place).abs() < if sigma > 1.0 { 0.08 } else { 0.06 },
                         "{sigma} {place}: {found:?}"
@@ -87,8 +107,8 @@ mod tests {
 
     #[test]
     fn flat_profiles_have_no_edge_and_far_ones_are_not_looked_at() {
-        assert_eq!(edge_place(&[50.0; 17], 4.0, 5.0), None);
-        assert_eq!(edge_place(&blurred(6.5, 0.5, 80.0), 3.0, 5.0), None);
-        assert_eq!(edge_place(&[], 3.0, 5.0), None);
+        assert_eq!(edge_place(&[50.0; 17], &SearchWindow::new(17, 4.0), 5.0), None);
+        assert_eq!(edge_place(&blurred(6.5, 0.5, 80.0), &SearchWindow::new(17, 3.0), 5.0), None);
+        assert_eq!(edge_place(&[], &SearchWindow::new(0, 3.0), 5.0), None);
     }
 }

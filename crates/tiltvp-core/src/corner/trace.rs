@@ -2,7 +2,7 @@
 
 use nalgebra::{Matrix2, Vector2, Vector3};
 
-use super::edge_place::{EdgePlace, SHOULDER, edge_place};
+use super::edge_place::{EdgePlace, PROFILE_MAX, SHOULDER, SearchWindow, edge_place};
 use super::ray::FittedRay;
 use crate::camera::Camera;
 use crate::geometry::tangent_basis;
@@ -23,9 +23,6 @@ const FIRST_PX: f64 = 20.0;
 /// Least share of the first profiles that agree with the ray. Less than half, as the gradients of all three edges mix
 /// at the vertex. Doubled, true corners of a real box are lost (0.218 instead of 0.206 degrees from frame to frame).
 const FIRST_SHARE: f64 = 0.3;
-
-/// Longest profile, in samples: the largest search of 15 pixels and the shoulders, on both sides of the middle.
-const PROFILE_MAX: usize = 41;
 
 /// Where a ray is expected, and how far from there it is looked for.
 #[derive(Debug, Clone, Copy)]
@@ -68,7 +65,15 @@ pub(super) struct RayProfile {
 impl RaySearch {
     /// The profile at an angle from the vertex.
     pub(super) fn profile(&self, camera: &Camera, angle_rad: f64) -> Option<RayProfile> {
-        let along = self.normal.cross(&self.vertex).try_normalize(1e-9)?;
+        self.profile_along(camera, &self.along()?, angle_rad)
+    }
+
+    /// The direction along the ray at the vertex.
+    fn along(&self) -> Option<Vector3<f64>> {
+        self.normal.cross(&self.vertex).try_normalize(1e-9)
+    }
+
+    fn profile_along(&self, camera: &Camera, along: &Vector3<f64>, angle_rad: f64) -> Option<RayProfile> {
         let (sin, cos) = angle_rad.sin_cos();
         let (bearing, onwards) = (self.vertex * cos + along * sin, along * cos - self.vertex * sin);
         let (pixel, jacobian) = camera.project_jacobian(&bearing)?;
@@ -120,13 +125,14 @@ pub(super) struct TraceScratch {
     ransac: RansacScratch,
 }
 
-/// Follows a ray from its vertex: at each pixel along it the `signal` (a function of the pixel `(u, v)`) is sampled across
-/// it, the edge is found between samples, and a great circle is fitted robustly. None if less than `support_min` agree.
+/// Follows a ray from its vertex: at each pixel along it the `signal` fills in a profile across it, the edge is found between
+/// samples, and a great circle is fitted robustly. None if less than `support_min` agree. The signal is given the middle of the
+/// profile, the step from sample to sample, and the samples, and says whether all of them are in the image.
 pub(super) fn trace(
     camera: &Camera,
     search: &RaySearch,
     support_min: usize,
-    signal: impl Fn(f64, f64) -> Option<f64>,
+    signal: impl Fn(&Vector2<f64>, &Vector2<f64>, &mut [f64]) -> bool,
     scratch: &mut TraceScratch,
 ) -> Option<TracedRay> {
     trace_every(1.0, camera, search, support_min, signal, scratch)
@@ -138,12 +144,12 @@ pub(super) fn trace_every(
     camera: &Camera,
     search: &RaySearch,
     support_min: usize,
-    signal: impl Fn(f64, f64) -> Option<f64>,
+    signal: impl Fn(&Vector2<f64>, &Vector2<f64>, &mut [f64]) -> bool,
     scratch: &mut TraceScratch,
 ) -> Option<TracedRay> {
     let TraceScratch { rows, places, steps, weights, ransac: memory } = scratch;
-    let along = search.normal.cross(&search.vertex).try_normalize(1e-9)?;
-    let looked_at = edge_points(stride_px, camera, search, signal, places);
+    let along = search.along()?;
+    let looked_at = edge_points(stride_px, camera, (search, &along), signal, places);
     if search.step_share_min > 0.0 && !places.is_empty() {
         keep_alike(places, search.step_share_min, support_min, steps);
     }
@@ -207,29 +213,25 @@ pub(super) fn trace_every(
 fn edge_points(
     stride_px: f64,
     camera: &Camera,
-    search: &RaySearch,
-    signal: impl Fn(f64, f64) -> Option<f64>,
+    (search, along): (&RaySearch, &Vector3<f64>),
+    signal: impl Fn(&Vector2<f64>, &Vector2<f64>, &mut [f64]) -> bool,
     places: &mut Vec<EdgePoint>,
 ) -> usize {
     places.clear();
     let half = (search.search_px.ceil() as usize + SHOULDER).min(PROFILE_MAX / 2);
     let mut profile = [0.0; PROFILE_MAX];
     let profile = &mut profile[..=2 * half];
+    let window = SearchWindow::new(profile.len(), search.search_px);
     let (mut angle, mut looked_at) = (search.from_rad, 0_usize);
     while angle <= search.to_rad {
-        let Some(RayProfile { pixel, across, pace, px_per_rad }) = search.profile(camera, angle) else { break };
+        let Some(RayProfile { pixel, across, pace, px_per_rad }) = search.profile_along(camera, along, angle) else {
+            break;
+        };
         let along_rad = angle;
         angle += stride_px / pace;
         looked_at += 1;
-        let mut inside = true;
-        for (i, value) in profile.iter_mut().enumerate() {
-            let place = pixel + across * (i as f64 - half as f64);
-            match signal(place.x, place.y) {
-                Some(level) => *value = level,
-                None => inside = false,
-            }
-        }
-        let found = if inside { edge_place(profile, search.search_px, search.step_min) } else { None };
+        let inside = signal(&pixel, &across, profile);
+        let found = if inside { edge_place(profile, &window, search.step_min) } else { None };
         let Some(EdgePlace { shift, step }) = found else { continue };
         let (shift_rad, rad_per_px) = (shift / px_per_rad, 1.0 / px_per_rad.abs());
         places.push(EdgePoint { profile: looked_at, along_rad, shift_rad, step, rad_per_px });

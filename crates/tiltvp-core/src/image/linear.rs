@@ -1,5 +1,7 @@
 //! Light between pixel centres: levels through the inverse of the display curve, interpolated where light adds up.
 
+use nalgebra::Vector2;
+
 use super::color::ColorView;
 use super::view::ImageView;
 use crate::error::{Error, Result};
@@ -46,6 +48,43 @@ impl LightTable {
         Some(top + (bottom - top) * dv)
     }
 
+    /// Fills in the light of a grey image at places one step apart about a middle one; whether all of them are in the image.
+    pub(crate) fn gray_profile(
+        &self,
+        image: &ImageView<'_>,
+        middle: &Vector2<f64>,
+        step: &Vector2<f64>,
+        out: &mut [f64],
+    ) -> bool {
+        let half = (out.len() / 2) as f64;
+        let place = |i: usize| middle + step * (i as f64 - half);
+        let inside = |i: usize| {
+            let place = place(i);
+            corner_of(place.x, place.y, image.width(), image.height()).is_some()
+        };
+        // Rounding keeps the order of places along a line, so the first and the last are the outermost.
+        if out.is_empty() || !(inside(0) && inside(out.len() - 1)) {
+            return false;
+        }
+        let (data, stride) = (image.data(), image.stride());
+        for (i, out) in out.iter_mut().enumerate() {
+            let place = place(i);
+            let (column, row) = (place.x as u32, place.y as u32);
+            let (du, dv) = (place.x - f64::from(column), place.y - f64::from(row));
+            let at = row as usize * stride + column as usize;
+            let (Some([a, b]), Some([c, d])) = (
+                data.get(at..).and_then(|data| data.first_chunk::<2>()),
+                data.get(at + stride..).and_then(|data| data.first_chunk::<2>()),
+            ) else {
+                return false;
+            };
+            let [a, b, c, d] = [*a, *b, *c, *d].map(|level| self.of(level));
+            let (top, bottom) = (a + (b - a) * du, c + (d - c) * du);
+            *out = top + (bottom - top) * dv;
+        }
+        true
+    }
+
     /// The light of blue, green and red between pixel centres, bilinear; `None` where that would need pixels outside the
     /// image.
     pub fn color(&self, image: &ColorView<'_>, u: f64, v: f64) -> Option<[f64; 3]> {
@@ -86,6 +125,15 @@ mod tests {
         let view = ImageView::new(&gray, 4, 3, 4).unwrap();
         assert_eq!(table.gray(&view, 1.5, 1.0), Some(15.0));
         assert_eq!(table.gray(&view, 1.5, 2.0), None);
+        let mut profile = [0.0; 3];
+        let (middle, step) = (Vector2::new(1.4, 0.9), Vector2::new(0.7, -0.5));
+        assert!(table.gray_profile(&view, &middle, &step, &mut profile));
+        for (i, light) in profile.iter().enumerate() {
+            let place = middle + step * (i as f64 - 1.0);
+            assert_eq!(table.gray(&view, place.x, place.y), Some(*light));
+        }
+        assert!(!table.gray_profile(&view, &middle, &(3.0 * step), &mut profile));
+        assert!(!table.gray_profile(&view, &Vector2::new(f64::NAN, 1.0), &step, &mut profile));
         assert!(ColorView::new(&bytes, 4, 3, 11).is_err() && ColorView::new(&bytes, 4, 4, 12).is_err());
     }
 

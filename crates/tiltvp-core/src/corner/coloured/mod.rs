@@ -150,9 +150,17 @@ fn difference(
     light: &LightTable,
     (a, b): (Primary, Primary),
     trusts: [f64; 2],
-) -> impl Fn(f64, f64) -> Option<f64> {
+) -> impl Fn(&Vector2<f64>, &Vector2<f64>, &mut [f64]) -> bool {
     let (a, b) = (a.byte(), b.byte());
-    move |u, v| light.color(image, u, v).map(|levels| trusts[0] * levels[a] - trusts[1] * levels[b])
+    move |middle, step, out| {
+        let half = (out.len() / 2) as f64;
+        out.iter_mut().enumerate().all(|(i, out)| {
+            let place = middle + step * (i as f64 - half);
+            let Some(levels) = light.color(image, place.x, place.y) else { return false };
+            *out = trusts[0] * levels[a] - trusts[1] * levels[b];
+            true
+        })
+    }
 }
 
 /// RANSAC over the candidates of an edge, lifted to bearings: only these are rectified.

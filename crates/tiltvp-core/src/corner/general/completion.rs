@@ -112,7 +112,7 @@ impl CornerCompletion<'_> {
             gray_search(options, normal, vertex, [CLEAR_OF_VERTEX_PX / px_per_rad, to_rad])
         };
         let mut follow = |search: &RaySearch, stride_px: f64, least_share: f64| -> Option<TracedRay> {
-            let signal = |u, v| self.light.gray(self.image, u, v);
+            let signal = |at: &_, step: &_, out: &mut [f64]| self.light.gray_profile(self.image, at, step, out);
             let profiles = (search.to_rad - search.from_rad) * px_per_rad;
             let support_min = f64::from(options.support_min_px).min(SHORT_SHARE * profiles);
             let found =
@@ -133,6 +133,7 @@ impl CornerCompletion<'_> {
                 (RaySearch { to_rad: SHORT_PX / px_per_rad, ..long }, SHORT_SHARE)
             })
         });
+        let thirds = thirds.map(|look| look.and_then(|(search, least_share)| follow(&search, 1.0, least_share)));
         if thirds.iter().all(Option::is_none) {
             return;
         }
@@ -146,8 +147,8 @@ impl CornerCompletion<'_> {
                 return;
             }
         }
-        for (search, least_share) in thirds.iter().flatten() {
-            rays[third] = follow(search, 1.0, *least_share);
+        for found in thirds.into_iter().flatten() {
+            rays[third] = Some(found);
             let [Some(x), Some(y), Some(z)] = rays else { continue };
             let Some(corner) = clockwise(&[x, y, z]) else { continue };
             let good = corner.residual_rad() * px_per_rad <= options.residual_max_px;

@@ -111,14 +111,23 @@ pub(crate) fn seen_ends(seen: &ObservedCorner<'_>, scratch: &mut GeneralScratch)
         let normal = seen.corner.rays()[axis].normal;
         let mut follow = |from_rad: f64, to_rad: f64, least_share: f64| {
             let search = gray_search(seen.options, normal, seen.corner.vertex(), [from_rad, to_rad]);
-            trace(seen.camera, &search, PLACES_MIN, |u, v| seen.light.gray(seen.image, u, v), memory)
-                .filter(|traced| traced.share >= least_share)
+            trace(
+                seen.camera,
+                &search,
+                PLACES_MIN,
+                |at, step, out| seen.light.gray_profile(seen.image, at, step, out),
+                memory,
+            )
+            .filter(|traced| traced.share >= least_share)
         };
         let clear_rad = CLEAR_OF_VERTEX_PX / px_per_rad;
         for (place, (angle, _)) in found.iter().enumerate() {
             let last_rad = (angle - LAST_PX / px_per_rad).max(clear_rad);
-            let whole = follow(clear_rad, angle - clear_rad, seen.options.guided_min_share);
-            let (Some(whole), Some(_)) = (whole, follow(last_rad, angle - clear_rad, LAST_SHARE)) else { continue };
+            // The last pixels are sooner looked at than all.
+            if follow(last_rad, angle - clear_rad, LAST_SHARE).is_none() {
+                continue;
+            }
+            let Some(whole) = follow(clear_rad, angle - clear_rad, seen.options.guided_min_share) else { continue };
             // Of lines that meet the edge next to each other the longest.
             let together = found[place..].iter().take_while(|(other, _)| (angle - other) * px_per_rad < SAME_END_PX);
             let Some((_, line)) = together.max_by(|a, b| a.1.length_px.total_cmp(&b.1.length_px)) else { continue };

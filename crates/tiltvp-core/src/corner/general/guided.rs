@@ -81,18 +81,22 @@ pub(crate) fn find_near(
         }
         let px_per_rad = pixel.1.norm() / 2f64.sqrt();
         let mut rays = [None; 3];
-        for ((ray, normal), far) in rays.iter_mut().zip(normals).zip(&expected.far) {
-            let normal = normal?;
+        let lengths = expected.far.map(|far| vertex.angle(&far));
+        // Where one ray is missing none of the others is needed, and the shortest is the soonest looked at.
+        let mut order = [0, 1, 2];
+        order.sort_by(|a, b| lengths[*a].total_cmp(&lengths[*b]));
+        for axis in order {
+            let normal = normals[axis]?;
             let on_circle = (vertex - normal * normal.dot(&vertex)).try_normalize(0.5)?;
-            let angles = [CLEAR_OF_VERTEX_PX / px_per_rad, vertex.angle(far) + BEYOND_END_PX / px_per_rad];
+            let angles = [CLEAR_OF_VERTEX_PX / px_per_rad, lengths[axis] + BEYOND_END_PX / px_per_rad];
             let search = RaySearch { search_px, ..gray_search(options, normal, on_circle, angles) };
-            let signal = |u, v| light.gray(image, u, v);
+            let signal = |at: &_, step: &_, out: &mut [f64]| light.gray_profile(image, at, step, out);
             let support_min = (f64::from(options.support_min_px) / stride_px) as usize;
             let traced = trace_every(stride_px, camera, &search, support_min, signal, scratch)?;
             if traced.share < least_share {
                 return None;
             }
-            *ray = Some(traced.ray);
+            rays[axis] = Some(traced.ray);
         }
         let [Some(x), Some(y), Some(z)] = rays else { return None };
         let corner = CornerFeature::from_rays([x, y, z])?;

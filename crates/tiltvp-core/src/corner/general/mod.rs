@@ -100,8 +100,15 @@ pub(crate) fn find(
             } else {
                 let search = search_of(segments, end, &junction.vertex, options);
                 let support_min = options.support_min_px as usize;
-                let found = search
-                    .and_then(|search| trace(camera, &search, support_min, |u, v| light.gray(image, u, v), memory));
+                let found = search.and_then(|search| {
+                    trace(
+                        camera,
+                        &search,
+                        support_min,
+                        |at, step, out| light.gray_profile(image, at, step, out),
+                        memory,
+                    )
+                });
                 known.push((junction.vertex, found));
                 found
             };
