@@ -58,21 +58,16 @@ def test_importing_needs_numpy_alone(topic: str) -> None:
 @pytest.mark.slow
 def test_importing_is_quick() -> None:
     """The limit is for the processor's time: other programs of a busy machine do not count."""
-    script = """
-import os, subprocess, sys
-def seconds(program):
-    before = os.times()
-    subprocess.run([sys.executable, "-c", program], check=True)
-    after = os.times()
-    return after.children_user + after.children_system - before.children_user - before.children_system
-both = [min(seconds(program) for _ in range(5)) for program in ("import numpy", "import tiltvp")]
-print(both[1] - both[0])
-"""
+    # By the process's own clock: the times of children are counted in ticks of ten milliseconds.
+    script = "import time, numpy; start = time.process_time(); import tiltvp; print(time.process_time() - start)"
     environment = os.environ | {"OPENBLAS_NUM_THREADS": "1"}
-    done = subprocess.run(
-        [sys.executable, "-c", script], capture_output=True, text=True, timeout=60, check=True, env=environment
-    )
-    assert float(done.stdout) < 0.1
+    times = []
+    for _ in range(5):
+        done = subprocess.run(
+            [sys.executable, "-c", script], capture_output=True, text=True, timeout=60, check=True, env=environment
+        )
+        times.append(float(done.stdout))
+    assert min(times) < 0.1
 
 
 def test_one_import_brings_the_topics() -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import json
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +11,8 @@ import pytest
 from rich.console import Console
 
 import tiltvp
+import tiltvp.cli.tilt as verb
+from tiltvp.cli import main
 from tiltvp.cli.results import Outcome, people_table, summary_words
 
 CAMERA = tiltvp.Camera.equidistant(width=160, height=120, focal_px=35.0, cx=79.5, cy=59.5)
@@ -57,3 +60,28 @@ def test_the_summary_says_how_many_how_they_lean_and_why_not() -> None:
     assert "2 low-confidence" in summary_words(outcomes("low-confidence"))
     assert summary_words(outcomes()[:1]) == f"1 image: lean {alpha:.2f} deg"
     assert summary_words(outcomes()[3:]) == "1 image: no tilt; 1 could not be used"
+
+
+@pytest.mark.parametrize("extra", [[], ["--filter"]])
+def test_rows_come_as_lines_of_json_as_soon_as_they_are_there(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, extra: list[str]
+) -> None:
+    CAMERA.save(tmp_path / "camera.toml")
+    for name in ("a.png", "c.png"):
+        tiltvp.write_image(tmp_path / "images" / name, ROOM)
+    (tmp_path / "images" / "b.png").write_bytes(b"no image")
+    words = ["tilt", str(tmp_path / "images"), "--camera", str(tmp_path / "camera.toml"), *extra, "--out"]
+    run, say, events = verb.Work.__call__, verb.say, []
+    monkeypatch.setattr(verb.Work, "__call__", lambda *given: (events.append("look"), run(*given))[1])
+    monkeypatch.setattr(verb, "say", lambda text: (events.append("say"), say(text))[1])
+    assert main([*words, "-"]) == 1
+    lines = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
+    assert events == ["look", "say"] * 3
+    assert not Path("-").exists()
+    assert main([*words, str(tmp_path / "rows.json")]) == 1
+    kept = json.loads((tmp_path / "rows.json").read_text())
+    for row in lines + kept:
+        del row["time_s"]
+    assert lines == kept
+    assert [Path(row["file"]).name for row in lines] == ["a.png", "b.png", "c.png"]
+    assert lines[1]["error"]

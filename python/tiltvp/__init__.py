@@ -5,7 +5,9 @@ pixel centres at integers. `robot_from_camera` is R in v_robot = R v_camera. A l
 (-sin a cos b, -sin a sin b, cos a) in the robot frame; beta = 0 is a forward lean. Radians and metres.
 """
 
-from tiltvp import corner, lines, synth
+from typing import TYPE_CHECKING, Any
+
+from tiltvp import lines
 from tiltvp._core import METHODS, ComplementaryFilter
 from tiltvp.body import BodyMask, body_mask
 from tiltvp.cameras import Camera
@@ -49,6 +51,9 @@ from tiltvp.tilt import (
     tilt_error_rad,
     tilt_from_wheel_heights,
 )
+
+if TYPE_CHECKING:
+    from tiltvp import corner, synth
 
 __version__ = "0.1.0"
 
@@ -99,3 +104,12 @@ __all__ = [
     "wheel_displacements",
     "write_image",
 ]
+
+
+def __getattr__(name: str) -> Any:
+    """The modules that many programs do without: they come when they are asked for, a quarter of the import's time."""
+    if name in ("corner", "synth"):
+        from importlib import import_module
+
+        return import_module(f"tiltvp.{name}")
+    raise AttributeError(f"module 'tiltvp' has no attribute {name!r}")

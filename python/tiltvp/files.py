@@ -5,7 +5,6 @@ from __future__ import annotations
 import errno
 import glob
 import os
-import shutil
 import stat
 import sys
 from collections.abc import Callable, Iterator
@@ -156,7 +155,7 @@ def whole_folder(path: str | os.PathLike[str]) -> Iterator[Path]:
                 except OSError:
                     old.rename(target)
                     raise
-                shutil.rmtree(old, ignore_errors=True)
+                _remove_folder(old)
             else:
                 part.rename(target)
         finally:
@@ -167,7 +166,7 @@ def whole_folder(path: str | os.PathLike[str]) -> Iterator[Path]:
         raise _failed(path, error) from error
     finally:
         if part is not None:
-            shutil.rmtree(part, ignore_errors=True)
+            _remove_folder(part)
 
 
 def _failed(path: str | os.PathLike[str], error: OSError | ValueError) -> OutputError:
@@ -200,6 +199,13 @@ def _locked_beside(target: Path, ending: str, make: Callable[[Path], int]) -> tu
         os.close(handle)
 
 
+def _remove_folder(folder: Path) -> None:
+    # It brings five modules, a twentieth of what importing the package takes, and most programs make no folder.
+    import shutil
+
+    shutil.rmtree(folder, ignore_errors=True)
+
+
 def _sweep(folder: Path, begin: str, end: str) -> None:
     """Removes the parts of processes that were killed."""
     for left in folder.glob(f"{glob.escape(begin)}{'[0-9a-f]' * 16}{glob.escape(end)}"):
@@ -208,7 +214,7 @@ def _sweep(folder: Path, begin: str, end: str) -> None:
             try:
                 _lock(handle)
                 if left.is_dir():
-                    shutil.rmtree(left, ignore_errors=True)
+                    _remove_folder(left)
                 else:
                     left.unlink()
             finally:

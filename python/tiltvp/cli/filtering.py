@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -66,13 +66,14 @@ class FilterOptions(LibraryOptions):
         """Whether an image is sure enough of itself."""
         return self.confidence_min is None or confidence >= self.confidence_min
 
-    def judged(self, outcomes: Sequence[Outcome], motions: Sequence[Motion]) -> list[Outcome]:
-        """The outcomes with what was made of them."""
+    def judged(self, outcomes: Iterable[Outcome], motions: Sequence[Motion]) -> Iterator[Outcome]:
+        """The outcomes with what was made of them, as they come."""
         if self.filter:
-            return _filtered(outcomes, motions, self.make())
-        if self.confidence_min is not None:
-            return [self._marked(outcome) for outcome in outcomes]
-        return list(outcomes)
+            yield from _filtered(outcomes, motions, self.make())
+        elif self.confidence_min is not None:
+            yield from map(self._marked, outcomes)
+        else:
+            yield from outcomes
 
     def _marked(self, outcome: Outcome) -> Outcome:
         e = outcome.estimate
@@ -86,8 +87,7 @@ class FilterOptions(LibraryOptions):
         return replace(outcome, accepted=False, verdict="low-confidence", verdict_reason=words)
 
 
-def _filtered(outcomes: Sequence[Outcome], motions: Sequence[Motion], filter_: TiltFilter) -> list[Outcome]:
-    done = []
+def _filtered(outcomes: Iterable[Outcome], motions: Sequence[Motion], filter_: TiltFilter) -> Iterator[Outcome]:
     for outcome, motion in zip(outcomes, motions, strict=True):
         filter_.predict(motion.yaw_rad, motion.distance_m)
         if outcome.estimate is None:
@@ -97,5 +97,4 @@ def _filtered(outcomes: Sequence[Outcome], motions: Sequence[Motion], filter_: T
             told = replace(
                 outcome, accepted=step.accepted, verdict=step.verdict, verdict_reason=step.reason, nis=step.nis
             )
-        done.append(replace(told, filtered=filter_.estimate, mounting=filter_.mounting))
-    return done
+        yield replace(told, filtered=filter_.estimate, mounting=filter_.mounting)

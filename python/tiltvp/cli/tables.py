@@ -18,6 +18,8 @@ if TYPE_CHECKING:
     import polars as pl
 
 ENDINGS: Final = (".csv", ".json", ".parquet")
+STDOUT: Final = Path("-")
+"""The output of rows as they come, as JSON lines, for verbs that know it."""
 
 
 @dataclass(frozen=True)
@@ -110,6 +112,12 @@ def _word(cell: object) -> object:
 def _json(table: Table) -> str:
     rows = [{name: finite(row[name]) for name in table.types} for row in table.rows]
     return json.dumps(rows, allow_nan=False, ensure_ascii=False, separators=(",", ":"))
+
+
+def json_lines(table: Table) -> str:
+    """A line of JSON for each row."""
+    rows = ({name: finite(row[name]) for name in table.types} for row in table.rows)
+    return "\n".join(json.dumps(row, allow_nan=False, ensure_ascii=False) for row in rows)
 
 
 def finite(value: Any) -> Any:

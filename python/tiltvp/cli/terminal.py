@@ -39,8 +39,8 @@ def width() -> int:
 
 
 def say(text: str) -> None:
-    """One line on stdout, as it is."""
-    print(text)
+    """Lines on stdout at once, as they are."""
+    print(text, flush=True)
 
 
 def complain(problem: str) -> None:

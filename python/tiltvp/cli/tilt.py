@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import os
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Generator, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, TypeVar
@@ -16,7 +17,7 @@ from tiltvp.cli.filtering import FilterOptions
 from tiltvp.cli.inputs import distinct_names, find_images
 from tiltvp.cli.options import CameraOptions, MethodOptions
 from tiltvp.cli.results import Outcome, degrees, mounting_words, outcome_table, people_table, summary_words
-from tiltvp.cli.tables import check_ending, write_table
+from tiltvp.cli.tables import STDOUT, check_ending, json_lines, write_table
 from tiltvp.cli.terminal import ProgressBar, complain, named, progress_bar, say, show, width
 from tiltvp.errors import InvalidInputError, OutputError, TiltvpError
 from tiltvp.files import check_output_folder
@@ -40,7 +41,7 @@ def tilt(
     camera: CameraOptions,
     method: MethodOptions = _METHOD_DEFAULTS,
     filtering: FilterOptions = _FILTER_DEFAULTS,
-    out: Path | None = None,
+    out: Annotated[Path | None, Parameter(allow_leading_hyphen=True)] = None,
     overlay: Path | None = None,
     level: Path | None = None,
     threads: Annotated[int, Parameter(validator=validators.Number(gte=1))] = 1,
@@ -54,7 +55,7 @@ def tilt(
     images
         Image files, folders of images, and glob patterns.
     out
-        File for the results in radians: .csv, .json or .parquet.
+        File for the results in radians: .csv, .json or .parquet; - for a line of JSON on stdout as each image is done.
     overlay
         Folder for the images with inlier edges in colour, horizon and vanishing points.
     level
@@ -62,7 +63,8 @@ def tilt(
     threads
         How many images are worked on at the same time.
     """
-    if out is not None:
+    rows_only = out == STDOUT
+    if out is not None and not rows_only:
         check_ending(out)
     if overlay is not None and level is not None and os.path.realpath(overlay) == os.path.realpath(level):
         raise InvalidInputError(f"--overlay and --level are both {overlay}, expected two folders")
@@ -78,20 +80,30 @@ def tilt(
     estimator = _checked(estimator, files)
     names = distinct_names(files)
     work = Work(estimator, overlay, level, filtering)
-    outcomes = filtering.judged(_done(work, files, names, threads), motions)
-    if level is not None and filtering.filter:
-        for outcome, name in zip(outcomes, names, strict=True):
-            work.write_level(outcome, name)
+    outcomes: list[Outcome] = []
+    with closing(_done(work, files, names, threads)) as done:
+        for outcome, name in zip(filtering.judged(done, motions), names, strict=True):
+            outcomes.append(outcome)
+            if filtering.filter:
+                work.write_level(outcome, name)
+            if rows_only:
+                say(json_lines(outcome_table([outcome], estimator.method)))
+    if not rows_only:
+        _show(outcomes, estimator.method, filtering, out)
+    if filtering.filter_plot is not None:
+        _write_plot(outcomes, estimator.method, filtering.filter_plot)
+    return 1 if problems or any(outcome.error for outcome in outcomes) else 0
+
+
+def _show(outcomes: Sequence[Outcome], method: str, filtering: FilterOptions, out: Path | None) -> None:
+    """What people read on stdout, and the table as a file."""
     if outcomes:
         say(summary_words(outcomes))
     show(people_table(outcomes, width()))
     if filtering.estimate_mounting:
         say(mounting_words(outcomes))
     if out is not None:
-        write_table(outcome_table(outcomes, estimator.method), out)
-    if filtering.filter_plot is not None:
-        _write_plot(outcomes, estimator.method, filtering.filter_plot)
-    return 1 if problems or any(outcome.error for outcome in outcomes) else 0
+        write_table(outcome_table(outcomes, method), out)
 
 
 _FEW, _MANY, _TRIES = 5, 24, 3
@@ -155,20 +167,19 @@ def _write_plot(outcomes: Sequence[Outcome], method: str, path: Path) -> None:
     write_image(path, figure_picture(filtered_tilt(outcome_table(outcomes, method).frame())))
 
 
-def _done(work: Work, files: Sequence[Path], names: Sequence[str], threads: int) -> list[Outcome]:
-    """The outcomes in the order of the files."""
-    outcomes: list[Outcome] = []
+def _done(work: Work, files: Sequence[Path], names: Sequence[str], threads: int) -> Generator[Outcome, None, None]:
+    """The outcomes in the order of the files, each as soon as it is there."""
     with progress_bar(len(files), "images") as bar:
         if threads == 1:
             for file, name in zip(files, names, strict=True):
-                outcomes.append(_noted(work(file, name), bar))
-            return outcomes
+                yield _noted(work(file, name), bar)
+            return
         pool = ThreadPoolExecutor(threads)
         try:
-            outcomes.extend(_noted(outcome, bar) for outcome in pool.map(work, files, names))
+            for outcome in pool.map(work, files, names):
+                yield _noted(outcome, bar)
         finally:
             pool.shutdown(cancel_futures=True)
-    return outcomes
 
 
 def _noted(outcome: Outcome, bar: ProgressBar) -> Outcome:
