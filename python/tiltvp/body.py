@@ -95,7 +95,9 @@ def body_mask(images: Iterable[ArrayLike], camera: Camera, *, mask: ArrayLike | 
     staying = _staying(length / count, _share_of(count))
     apart = ~staying
     total, others = float(seen.sum()), float(seen[apart].sum())
-    share = 1.0 - others / total if total > 0.0 else 1.0
+    if total == 0.0:
+        return BodyMask(None, count, f"{count} images without an edge")
+    share = 1.0 - others / total
     if share > _STAYING_MAX:
         what = f"{100 * share:.0f} % of their edges stay in place, expected at most {100 * _STAYING_MAX:.0f} %"
         return BodyMask(None, count, f"{count} images: {what}: they are not from different places")

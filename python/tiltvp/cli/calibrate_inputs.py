@@ -10,8 +10,8 @@ import numpy as np
 from cyclopts import Group, Parameter, validators
 
 from tiltvp._core import CALIBRATION_METHODS, option_fields
+from tiltvp.cli.declared_options import LibraryOptions, from_library
 from tiltvp.cli.frames import open_frames
-from tiltvp.cli.library_options import LibraryOptions, from_library
 from tiltvp.cli.line_options import LineOptions
 from tiltvp.cli.options import CameraOptions
 from tiltvp.cli.tables import check_ending, write_table

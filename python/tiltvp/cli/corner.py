@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 from cyclopts import Group, Parameter, validators
 
 from tiltvp._core import CORNER_METHODS
+from tiltvp.cli.declared_options import LibraryOptions, from_library, mask_from
 from tiltvp.cli.frames import Frames, open_frames
-from tiltvp.cli.library_options import LibraryOptions, from_library, mask_from
 from tiltvp.cli.options import image_size_from
 from tiltvp.cli.tables import Table, check_ending, check_plot, write_table
 from tiltvp.cli.terminal import named, progress_bar, say

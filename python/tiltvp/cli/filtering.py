@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from cyclopts import Group, Parameter
 
-from tiltvp.cli.library_options import LibraryOptions, from_library
+from tiltvp.cli.declared_options import LibraryOptions, from_library
 from tiltvp.cli.options import Switch
 from tiltvp.cli.results import Outcome
 from tiltvp.cli.tables import check_plot

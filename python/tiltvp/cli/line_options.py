@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from cyclopts import Group, Parameter, validators
 
 from tiltvp._core import LINE_METHODS
-from tiltvp.cli.library_options import from_library, mask_from
+from tiltvp.cli.declared_options import from_library, mask_from
 from tiltvp.cli.options import MountedOptions, check_word
 
 if TYPE_CHECKING:

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated
 from cyclopts import Group, Parameter
 
 from tiltvp._core import METHODS
-from tiltvp.cli.library_options import LibraryOptions, from_library
+from tiltvp.cli.declared_options import LibraryOptions, from_library
 from tiltvp.errors import InvalidInputError
 
 if TYPE_CHECKING:

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 from cyclopts import Group, Parameter
 
+from tiltvp.cli.declared_options import LibraryOptions, from_library
 from tiltvp.cli.each_image import find_in_each
-from tiltvp.cli.library_options import LibraryOptions, from_library
 from tiltvp.cli.options import CameraOptions
 from tiltvp.cli.results import degrees
 from tiltvp.cli.tables import Table, check_ending, write_table

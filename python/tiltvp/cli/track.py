@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Group, Parameter, validators
 
+from tiltvp.cli.declared_options import LibraryOptions, from_library
 from tiltvp.cli.frames import Frames, open_frames
-from tiltvp.cli.library_options import LibraryOptions, from_library
 from tiltvp.cli.line_options import LineOptions
 from tiltvp.cli.lines import LINE_TYPES, line_columns
 from tiltvp.cli.options import CameraOptions

@@ -90,10 +90,13 @@ impl BundleProblem {
         part
     }
 
+    /// Holds the directions of landmarks of which nothing but bearings would tell them. What is known of others stays as it is.
     fn hold_landmarks(&mut self) {
         for at in (self.free.width()..self.width()).step_by(2) {
-            self.prior_information[(at, at)] += UNSEEN_INFORMATION;
-            self.prior_mean[at] = self.landmarks[(at - self.free.width()) / 2].direction;
+            if self.prior_information[(at, at)] == 0.0 {
+                self.prior_information[(at, at)] = UNSEEN_INFORMATION;
+                self.prior_mean[at] = self.landmarks[(at - self.free.width()) / 2].direction;
+            }
         }
     }
 
