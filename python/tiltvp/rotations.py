@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
     Matrix = NDArray[np.float64]
 
-__all__ = ["ROTATION_WORDS", "about_vertical", "quaternion", "read_rotation", "rotation_from"]
+__all__ = ["ROTATION_WORDS", "about_vertical", "levelling", "quaternion", "read_rotation", "rotation_from"]
 
 ROTATION_WORDS: Final[dict[str, tuple[tuple[float, float, float], ...]]] = {
     "up": ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)),
@@ -42,6 +42,13 @@ def about_vertical(angle_rad: float) -> Matrix:
     return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
 
 
+def levelling(normal: NDArray[np.floating]) -> Matrix:
+    """(3, 3): the smallest rotation that takes a unit vector (3,), not straight down, to the robot's z axis."""
+    x, y, z = (float(value) for value in normal)
+    scale = 1.0 / (1.0 + z)
+    return np.array([[1.0 - x * x * scale, -x * y * scale, -x], [-x * y * scale, 1.0 - y * y * scale, -y], [x, y, z]])
+
+
 def quaternion(rotation: NDArray[np.floating]) -> Matrix:
     """(4,): x, y, z, w of a rotation (3, 3), w not negative: the main eigenvector of Bar-Itzhack's matrix."""
     (xx, xy, xz), (yx, yy, yz), (zx, zy, zz) = rotation
@@ -59,7 +66,7 @@ def read_rotation(source: str | os.PathLike[str]) -> Matrix:
     """The (3, 3) rotation `R` of v_robot = R v_camera that a word of `ROTATION_WORDS` or a file names.
 
     A file is nine numbers as text (white space or commas), or JSON, TOML or YAML with the key `robot_from_camera`, or
-    `quaternion` in the order [x, y, z, w]. What is within 1e-3 of a rotation is taken as the nearest rotation. Raises
+    `quaternion` in the order [x, y, z, w]; or a robot's file (`tiltvp.Robot`). What is within 1e-3 of a rotation is taken as the nearest rotation. Raises
     `CalibrationError` with the file, what is wrong and what was expected; `InvalidInputError` for an unknown word.
     """
     if isinstance(source, str) and source in ROTATION_WORDS:
@@ -125,6 +132,8 @@ def _tree(document: Document) -> dict[str, object]:
 
 
 def _from_keys(file: Path, tree: dict[str, object]) -> Matrix:
+    if isinstance(mounting := tree.get("mounting"), dict):
+        tree = mounting  # A robot's file.
     found = [key for key in _KEYS if key in tree]
     if len(found) != 1:
         what = "both keys" if found else f"the keys {', '.join(list(tree)[:6])}"

@@ -11,6 +11,8 @@ height = 480
 focal_px = 139.7
 cx = 319.5
 cy = 239.5
+
+A robot's file, `format = "tiltvp-robot"`, has one such camera and more beside it: see `tiltvp.Robot`.
 """
 
 from __future__ import annotations
@@ -28,29 +30,38 @@ from tiltvp.formats.node import Node
 from tiltvp.formats.spec import CameraSpec, ImageSize, Parameters
 
 _FORMAT: Final = "tiltvp-camera"
-_VERSION: Final = 1
-_MARK: Final = re.compile(r"^[^\S\n]*format[^\S\n]*=[^\S\n]*[\"']tiltvp-camera[\"']", re.MULTILINE)
+ROBOT_FORMAT: Final = "tiltvp-robot"
+ROBOT_KEYS: Final = ("mask", "mounting", "wheels", "topics")
+VERSION: Final = 1
+_MARK: Final = re.compile(r"^[^\S\n]*format[^\S\n]*=[^\S\n]*[\"']tiltvp-(camera|robot)[\"']", re.MULTILINE)
 _KEYS: Final = ("name", "model", "width", "height", "mirror", "max_theta_rad", "notes", "parameters")
 
 
 def recognise(document: Document) -> bool:
-    """It says `format = "tiltvp-camera"`."""
+    """It says `format = "tiltvp-camera"` or `"tiltvp-robot"`."""
     return _MARK.search(document.text) is not None
 
 
 def parse(document: Document, image_size: ImageSize | None) -> list[CameraSpec]:
     """The cameras of the file, in file order."""
-    root = Node(document, document.toml("a file written by tiltvp"))
-    root.only("format", "version", "camera")
-    if root.need("format").text() != _FORMAT:
-        root.need("format").fail(f"found {root.need('format').text()!r}", _FORMAT)
-    version = root.need("version")
-    if version.integer() != _VERSION:
-        version.refuse(f"version {version.integer()} is not supported", f"version {_VERSION}")
+    root = root_of(document)
     cameras = root.need("camera").items()
     if not cameras:
         root.fail("there is no camera", "one or more [[camera]]")
     return [camera_from(camera, image_size) for camera in cameras]
+
+
+def root_of(document: Document) -> Node:
+    """The top of one of our files, its format, version and keys checked."""
+    root = Node(document, document.toml("a file written by tiltvp"))
+    word = root.need("format")
+    if word.text() not in (_FORMAT, ROBOT_FORMAT):
+        word.fail(f"found {word.text()!r}", f"{_FORMAT} or {ROBOT_FORMAT}")
+    root.only("format", "version", "camera", *(ROBOT_KEYS if word.text() == ROBOT_FORMAT else ()))
+    version = root.need("version")
+    if version.integer() != VERSION:
+        version.refuse(f"version {version.integer()} is not supported", f"version {VERSION}")
+    return root
 
 
 def write_toml(spec: CameraSpec | Sequence[CameraSpec], path: str | os.PathLike[str]) -> None:
@@ -63,7 +74,7 @@ def write_toml(spec: CameraSpec | Sequence[CameraSpec], path: str | os.PathLike[
             one.check()
         except TiltvpError as error:
             raise CalibrationError(f"{path}: {error}, at {one.name}") from None
-    tree = {"format": _FORMAT, "version": _VERSION, "camera": [camera_table(as_floats(one)) for one in specs]}
+    tree = {"format": _FORMAT, "version": VERSION, "camera": [camera_table(as_floats(one)) for one in specs]}
     import tomli_w
 
     write_whole(path, tomli_w.dumps(tree))

@@ -1,0 +1,166 @@
+"""What is known of a robot with a camera, in one file: calibration, mounting, mask, wheels, topics of its recordings."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final, Self
+
+import numpy as np
+
+from tiltvp.cameras import Camera
+from tiltvp.errors import CalibrationError, InvalidInputError
+from tiltvp.files import check_output, write_whole
+from tiltvp.formats.document import Document
+from tiltvp.formats.node import Node
+from tiltvp.formats.own import ROBOT_FORMAT, VERSION, camera_from, camera_table, root_of
+from tiltvp.images import gray_from, read_image, write_image
+from tiltvp.rotations import rotation_from
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from tiltvp.tilt import TiltEstimator
+
+__all__ = ["Robot", "Wheels"]
+
+TOPICS: Final = ("images", "odometry", "joints", "inertial")
+"""What a recording may have topics of."""
+_BRIGHT: Final = 127
+"""Grey level above which a mask's image shows the world."""
+
+
+@dataclass(frozen=True)
+class Wheels:
+    """Two wheels on one axis. None for what is not known."""
+
+    base_m: float | None = None
+    """Distance between their contact points."""
+    radius_m: float | None = None
+    ticks_per_turn: float | None = None
+    """Ticks of an encoder in a turn of its wheel."""
+
+    def __post_init__(self) -> None:
+        for name, value in asdict(self).items():
+            if value is not None and not (np.isfinite(value) and value > 0.0):
+                raise InvalidInputError(f"wheels: {name} = {value}, expected a positive number")
+
+
+@dataclass(frozen=True, eq=False)
+class Robot:
+    """A robot with a camera. `Robot.load("robot.toml")`; `tiltvp setup` writes such a file.
+
+    Every command takes the file as its `--camera`, and with it the mounting and the mask.
+    """
+
+    camera: Camera
+    robot_from_camera: NDArray[np.float64]
+    """(3, 3): rotation R of v_robot = R v_camera."""
+    covariance_rad2: NDArray[np.float64] | None = None
+    """(2, 2): of the errors of the mounting about the robot's x and y axes; None where it was not measured."""
+    mask: NDArray[np.bool_] | None = None
+    """(H, W): True where images show the world; None: everywhere."""
+    wheels: Wheels = field(default_factory=Wheels)
+    topics: dict[str, str] = field(default_factory=dict)
+    """Topics of its recordings, by what they are of: images, odometry, joints, inertial."""
+
+    def __post_init__(self) -> None:
+        rotation = rotation_from(np.asarray(self.robot_from_camera, dtype=np.float64).tolist(), "robot_from_camera")
+        object.__setattr__(self, "robot_from_camera", rotation)
+        shape = (self.camera.height, self.camera.width)
+        if self.mask is not None and np.shape(self.mask) != shape:
+            raise InvalidInputError(f"mask: shape {np.shape(self.mask)}, expected {shape}, as the camera's images")
+        if self.covariance_rad2 is not None:
+            _check_covariance(np.asarray(self.covariance_rad2, dtype=np.float64))
+        for name in self.topics:
+            if name not in TOPICS:
+                raise InvalidInputError(f"topics: {name!r}, expected one of {', '.join(TOPICS)}")
+
+    @classmethod
+    def load(cls, path: str | os.PathLike[str]) -> Self:
+        """The robot of a file. Raises `CalibrationError` that says what was wrong, what was expected and where."""
+        document = Document.load(path)
+        root = root_of(document)
+        if root.need("format").text() != ROBOT_FORMAT:
+            root.need("format").fail(f"found {root.need('format').text()!r}", f"{ROBOT_FORMAT}, a robot's file")
+        cameras = root.need("camera").items()
+        if len(cameras) != 1:
+            root.fail(f"{len(cameras)} cameras", "one [[camera]]")
+        mounting = root.need("mounting")
+        mounting.only("robot_from_camera", "covariance_rad2")
+        covariance = mounting.get("covariance_rad2")
+        try:
+            return cls(
+                camera=Camera.from_spec(camera_from(cameras[0], None)),
+                robot_from_camera=np.reshape(mounting.need("robot_from_camera").numbers(9), (3, 3)),
+                covariance_rad2=None if covariance is None else np.reshape(covariance.numbers(4), (2, 2)),
+                mask=_mask_of(Path(path), root.get("mask")),
+                wheels=_wheels_of(root.get("wheels")),
+                topics=_topics_of(root.get("topics")),
+            )
+        except CalibrationError:
+            raise
+        except InvalidInputError as error:
+            raise CalibrationError(f"{path}: {error}") from error
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Writes the file, and the mask as an image beside it. Raises `OutputError`; nothing half-written is left."""
+        import tomli_w
+
+        file = Path(path)
+        check_output(file)
+        tree: dict[str, Any] = {"format": ROBOT_FORMAT, "version": VERSION}
+        if self.mask is not None:
+            picture = mask_path(file)
+            write_image(picture, np.where(self.mask, 255, 0).astype(np.uint8))
+            tree["mask"] = picture.name
+        mounting: dict[str, Any] = {"robot_from_camera": self.robot_from_camera.tolist()}
+        if self.covariance_rad2 is not None:
+            mounting["covariance_rad2"] = np.asarray(self.covariance_rad2).tolist()
+        tree["mounting"] = mounting
+        known = {name: value for name, value in asdict(self.wheels).items() if value is not None}
+        tree |= {name: table for name, table in (("wheels", known), ("topics", dict(self.topics))) if table}
+        tree["camera"] = [camera_table(self.camera.to_spec())]
+        write_whole(file, tomli_w.dumps(tree))
+
+    def estimator(self, **options: Any) -> TiltEstimator:
+        """An estimator of this robot's tilt, with the options of `TiltEstimator`."""
+        from tiltvp.tilt import TiltEstimator
+
+        own = {"robot_from_camera": self.robot_from_camera, "mask": self.mask}
+        return TiltEstimator(self.camera, **(own | options))
+
+
+def mask_path(path: Path) -> Path:
+    """The image of the mask of a robot's file."""
+    return path.with_name(f"{path.stem}-mask.png")
+
+
+def _mask_of(path: Path, node: Node | None) -> NDArray[np.bool_] | None:
+    if node is None:
+        return None
+    name = node.text()
+    if Path(name).name != name:
+        node.fail(f"found {name!r}", "the name of an image beside this file")
+    return np.asarray(gray_from(read_image(path.with_name(name)), name) > _BRIGHT)
+
+
+def _wheels_of(node: Node | None) -> Wheels:
+    if node is None:
+        return Wheels()
+    node.only("base_m", "radius_m", "ticks_per_turn")
+    return Wheels(**{key: node.need(key).number() for key in node.tree})
+
+
+def _topics_of(node: Node | None) -> dict[str, str]:
+    if node is None:
+        return {}
+    node.only(*TOPICS)
+    return {key: node.need(key).text() for key in node.tree}
+
+
+def _check_covariance(covariance: NDArray[np.float64]) -> None:
+    fits = covariance.shape == (2, 2) and bool(np.isfinite(covariance).all())
+    if not fits or np.linalg.eigvalsh(0.5 * (covariance + covariance.T))[0] < 0.0:
+        raise InvalidInputError(f"covariance_rad2: {covariance.tolist()}, expected a covariance (2, 2)")
