@@ -53,7 +53,7 @@ from tiltvp.tilt import (
 )
 
 if TYPE_CHECKING:
-    from tiltvp import corner, synth
+    from tiltvp import corner, streams, synth
 
 __version__ = "0.1.0"
 
@@ -94,6 +94,7 @@ __all__ = [
     "lines",
     "normal_from_alpha_beta",
     "read_image",
+    "streams",
     "surround_mask",
     "synth",
     "tilt_error_rad",
@@ -108,7 +109,7 @@ __all__ = [
 
 def __getattr__(name: str) -> Any:
     """The modules that many programs do without: they come when they are asked for, a quarter of the import's time."""
-    if name in ("corner", "synth"):
+    if name in ("corner", "streams", "synth"):
         from importlib import import_module
 
         return import_module(f"tiltvp.{name}")

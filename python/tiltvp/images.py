@@ -16,7 +16,7 @@ from tiltvp.image_headers import header_size
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
-__all__ = ["bgr_from", "gray_from", "read_image", "write_image"]
+__all__ = ["bgr_from", "decode_image", "gray_from", "read_image", "write_image"]
 
 LARGEST_IMAGE_BYTES: Final = 1 << 30
 """Of an image file: as many pixels as a camera may have, in three uncompressed colours, and a half more."""
@@ -101,12 +101,17 @@ def read_image(path: str | os.PathLike[str]) -> NDArray[np.uint8]:
         data = read_bytes(file, LARGEST_IMAGE_BYTES)
     except OSError as error:
         raise ImageFileError(f"{file}: {error.strerror or error}") from error
+    return decode_image(data, str(file))
+
+
+def decode_image(data: bytes, name: str) -> NDArray[np.uint8]:
+    """The content of an image file as `read_image` gives it. Raises `ImageFileError` that begins with `name`."""
     size = header_size(data)
     if size is not None and size[0] * size[1] > _core.MOST_PIXELS:
-        raise ImageFileError(f"{file}: {size[0]} x {size[1]} pixels, expected at most {_core.MOST_PIXELS} in all")
+        raise ImageFileError(f"{name}: {size[0]} x {size[1]} pixels, expected at most {_core.MOST_PIXELS} in all")
     image = None if size is None else _decode(data)
     if image is None:
-        raise ImageFileError(f"{file}: not an image that can be decoded ({len(data)} bytes)")
+        raise ImageFileError(f"{name}: not an image that can be decoded ({len(data)} bytes)")
     return image
 
 

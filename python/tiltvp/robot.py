@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, Self
 
@@ -17,34 +17,20 @@ from tiltvp.formats.node import Node
 from tiltvp.formats.own import ROBOT_FORMAT, VERSION, camera_from, camera_table, root_of
 from tiltvp.images import gray_from, read_image, write_image
 from tiltvp.rotations import rotation_from
+from tiltvp.streams.wheels import Wheels
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from tiltvp.tilt import TiltEstimator
 
-__all__ = ["Robot", "Wheels"]
+__all__ = ["TOPICS", "Robot", "mask_path"]
 
 TOPICS: Final = ("images", "odometry", "joints", "inertial")
 """What a recording may have topics of."""
+_WHEELS: Final = ("wheel_base_m", "wheel_radius_m", "ticks_per_turn")
 _BRIGHT: Final = 127
 """Grey level above which a mask's image shows the world."""
-
-
-@dataclass(frozen=True)
-class Wheels:
-    """Two wheels on one axis. None for what is not known."""
-
-    base_m: float | None = None
-    """Distance between their contact points."""
-    radius_m: float | None = None
-    ticks_per_turn: float | None = None
-    """Ticks of an encoder in a turn of its wheel."""
-
-    def __post_init__(self) -> None:
-        for name, value in asdict(self).items():
-            if value is not None and not (np.isfinite(value) and value > 0.0):
-                raise InvalidInputError(f"wheels: {name} = {value}, expected a positive number")
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,7 +105,8 @@ class Robot:
         if self.covariance_rad2 is not None:
             mounting["covariance_rad2"] = np.asarray(self.covariance_rad2).tolist()
         tree["mounting"] = mounting
-        known = {name: value for name, value in asdict(self.wheels).items() if value is not None}
+        known = {name: getattr(self.wheels, name) for name in (*_WHEELS, "joints")}
+        known = {name: value for name, value in known.items() if value is not None}
         tree |= {name: table for name, table in (("wheels", known), ("topics", dict(self.topics))) if table}
         tree["camera"] = [camera_table(self.camera.to_spec())]
         write_whole(file, tomli_w.dumps(tree))
@@ -149,8 +136,14 @@ def _mask_of(path: Path, node: Node | None) -> NDArray[np.bool_] | None:
 def _wheels_of(node: Node | None) -> Wheels:
     if node is None:
         return Wheels()
-    node.only("base_m", "radius_m", "ticks_per_turn")
-    return Wheels(**{key: node.need(key).number() for key in node.tree})
+    node.only(*_WHEELS, "joints")
+    known: dict[str, Any] = {key: node.need(key).number() for key in _WHEELS if node.has(key)}
+    if (joints := node.get("joints")) is not None:
+        names = [joint.text() for joint in joints.items()]
+        if len(names) != 2:
+            joints.fail(f"{len(names)} names", "those of the left and the right wheel")
+        known["joints"] = (names[0], names[1])
+    return Wheels(**known)
 
 
 def _topics_of(node: Node | None) -> dict[str, str]:

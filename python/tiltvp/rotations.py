@@ -20,7 +20,15 @@ if TYPE_CHECKING:
 
     Matrix = NDArray[np.float64]
 
-__all__ = ["ROTATION_WORDS", "about_vertical", "levelling", "quaternion", "read_rotation", "rotation_from"]
+__all__ = [
+    "ROTATION_WORDS",
+    "about_vertical",
+    "levelling",
+    "quaternion",
+    "read_rotation",
+    "rotation_from",
+    "rotation_from_quaternion",
+]
 
 ROTATION_WORDS: Final[dict[str, tuple[tuple[float, float, float], ...]]] = {
     "up": ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)),
@@ -144,7 +152,7 @@ def _from_keys(file: Path, tree: dict[str, object]) -> Matrix:
         value = value.get("data", value)
     array = _array(f"{file}: {key}", value)
     if array.shape == (4,):
-        return _from_quaternion(array, f"{file}: {key}")
+        return rotation_from_quaternion(array, f"{file}: {key}")
     if key == "robot_from_camera" and array.shape in ((3, 3), (9,)):
         return _rotation(array.reshape(3, 3), f"{file}: {key}")
     expected = "3 x 3 numbers" if key == "robot_from_camera" else "[x, y, z, w]"
@@ -160,7 +168,11 @@ def _array(where: str, value: object) -> Matrix:
         raise CalibrationError(f"{where}: {value!r}, expected a list of numbers") from None
 
 
-def _from_quaternion(q: Matrix, where: str) -> Matrix:
+def rotation_from_quaternion(q: Matrix, where: str) -> Matrix:
+    """(3, 3) of a quaternion (4,) x, y, z, w whose length is within 1e-3 of 1.
+
+    Raises `CalibrationError` that begins with `where`.
+    """
     norm = math.sqrt(float(q @ q))
     if not abs(norm - 1.0) <= _SLACK:
         raise CalibrationError(f"{where}: a quaternion of length {norm:.6g}, expected [x, y, z, w] of length 1")

@@ -1,0 +1,120 @@
+"""Frames of a recording: messages of sensor_msgs/Image and CompressedImage, decoded as OpenCV has images."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from tiltvp import _core
+from tiltvp.errors import ImageFileError, InvalidInputError, TiltvpError
+from tiltvp.images import bgr_from, decode_image, gray_from
+from tiltvp.streams.bags import Message, Recording
+from tiltvp.streams.frames import Frame, Frames, median_rate_hz
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+__all__ = ["IMAGE_KINDS", "BagFrames", "image_from_message"]
+
+IMAGE_KINDS: Final = ("sensor_msgs/Image", "sensor_msgs/CompressedImage")
+_DEPTH_8: Final = {"mono8": 1, "8UC1": 1, "rgb8": 3, "bgr8": 3, "8UC3": 3, "rgba8": 4, "bgra8": 4, "8UC4": 4}
+_DEPTH_16: Final = {"mono16": 1, "16UC1": 1, "rgb16": 3, "bgr16": 3, "rgba16": 4, "bgra16": 4}
+_BAYER: Final = ("rggb", "bggr", "gbrg", "grbg")
+"""Which colours the first two pixels of the first two rows have."""
+_EXPECTED: Final = "mono8, mono16, rgb8, bgr8, rgba8, bgra8, the same with 16, bayer_rggb8 and the like"
+
+
+class BagFrames(Frames):
+    """The images of one topic of a recording, at the times of their headers."""
+
+    def __init__(self, recording: Recording, topic: str | None = None, *, option: str = "--topic") -> None:
+        """Reads the times of all. Raises `InvalidInputError` without one topic of images."""
+        self._recording = recording
+        self._topic = recording.choose(IMAGE_KINDS, option, topic)
+        self.source, self.recording = str(recording.path), recording.path
+        times = [_stamp_s(message) for message in recording.messages(self._topic)]
+        digits = len(str(max(len(times) - 1, 0)))
+        self.names = [f"{recording.path}#{k:0{digits}d}" for k in range(len(times))]
+        self.times_s = np.array(times)
+        self.rate_hz = median_rate_hz(self.times_s)
+
+    @property
+    def topic(self) -> str:
+        """The name of the topic."""
+        return self._topic.name
+
+    def __iter__(self) -> Iterator[Frame]:
+        assert self.names is not None
+        assert self.times_s is not None
+        messages = self._recording.messages(self._topic)
+        for name, time_s, message in zip(self.names, self.times_s.tolist(), messages, strict=False):
+            yield Frame(name, time_s, _reading(name, message))
+
+
+def _reading(name: str, message: Message) -> Callable[[], NDArray[np.uint8]]:
+    def read() -> NDArray[np.uint8]:
+        try:
+            return image_from_message(message.decode())
+        except TiltvpError as error:
+            raise ImageFileError(f"{name}: {error}") from error
+
+    return read
+
+
+def _stamp_s(message: Message) -> float:
+    """The time of an image; that of its writing where the message is damaged."""
+    try:
+        return message.stamp_s(message.decode())
+    except InvalidInputError:
+        return message.time_s
+
+
+def image_from_message(message: Any) -> NDArray[np.uint8]:
+    """(H, W) or (H, W, 3) uint8, colour in BGR order, of a decoded sensor_msgs/Image or CompressedImage.
+
+    16 bits a value are scaled as files of 16 bits are. Raises `ImageFileError` that says what does not fit.
+    """
+    data = np.asarray(message.data, dtype=np.uint8)
+    if not hasattr(message, "encoding"):
+        return decode_image(data.tobytes(), "an image")
+    width, height, encoding = int(message.width), int(message.height), str(message.encoding)
+    if not 0 < width * height <= _core.MOST_PIXELS:
+        raise ImageFileError(f"{width} x {height} pixels, expected 1 to {_core.MOST_PIXELS} in all")
+    bayer = encoding.removeprefix("bayer_")
+    sixteen = encoding in _DEPTH_16 or (bayer[:-2] in _BAYER and bayer.endswith("16"))
+    channels = _DEPTH_8.get(encoding) or _DEPTH_16.get(encoding)
+    if channels is None and bayer.rstrip("168") in _BAYER and bayer != encoding:
+        channels = 1
+    if channels is None:
+        raise ImageFileError(f"encoding {encoding!r}, expected {_EXPECTED}")
+    row = width * channels * (2 if sixteen else 1)
+    step = int(message.step) or row
+    if step < row or len(data) < step * (height - 1) + row:
+        raise ImageFileError(
+            f"{len(data)} bytes in rows of {step}, expected {height} rows of {row} ({width} x {height} {encoding})"
+        )
+    whole = np.zeros(step * height, np.uint8)
+    whole[: min(len(data), step * height)] = data[: step * height]
+    levels: NDArray[Any] = np.ascontiguousarray(whole.reshape(height, step)[:, :row])
+    if sixteen:
+        levels = levels.view(">u2" if message.is_bigendian else "<u2").astype(np.uint16)
+    return _bgr(levels.reshape((height, width, channels) if channels > 1 else (height, width)), encoding)
+
+
+def _bgr(levels: NDArray[Any], encoding: str) -> NDArray[np.uint8]:
+    import cv2
+
+    if encoding.startswith("bayer_"):
+        # OpenCV names the pattern by the second row's second and third pixel: its RG is the sensor's BGGR.
+        code = {
+            "rggb": cv2.COLOR_BayerBG2BGR, "bggr": cv2.COLOR_BayerRG2BGR,
+            "gbrg": cv2.COLOR_BayerGR2BGR, "grbg": cv2.COLOR_BayerGB2BGR,
+        }[encoding[6:10]]  # fmt: skip
+        levels = np.asarray(cv2.cvtColor(levels, code))
+    elif encoding.startswith("rgb"):
+        levels = levels[:, :, 2::-1]
+    elif levels.ndim == 3:
+        levels = levels[:, :, :3]
+    return gray_from(levels) if levels.ndim == 2 else bgr_from(levels)

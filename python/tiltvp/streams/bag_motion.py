@@ -1,0 +1,143 @@
+"""Motion and inertial data of a recording: Odometry, JointState, Twist and Imu of ROS."""
+
+from __future__ import annotations
+
+import re
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from tiltvp.errors import InvalidInputError
+from tiltvp.streams.bags import Recording, Topic
+from tiltvp.streams.inertial import InertialSamples
+from tiltvp.streams.odometry import Odometry
+from tiltvp.streams.wheels import Wheels, cumulative_m
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+__all__ = ["ODOMETRY_KINDS", "bag_odometry", "inertial_samples"]
+
+_POSES, _JOINTS = "nav_msgs/Odometry", "sensor_msgs/JointState"
+_TWISTS: Final = ("geometry_msgs/TwistStamped", "geometry_msgs/TwistWithCovarianceStamped", "geometry_msgs/Twist")
+ODOMETRY_KINDS: Final = (_POSES, _JOINTS, *_TWISTS)
+_IMU: Final = "sensor_msgs/Imu"
+_SIDES: Final = (r"(^|[_/.\-])(l|left)([_/.\-]|$)|left", r"(^|[_/.\-])(r|right)([_/.\-]|$)|right")
+"""What the names of joints of the left and of the right wheel have in them."""
+
+
+def bag_odometry(recording: Recording, topic: str | None, wheels: Wheels) -> Odometry:
+    """The odometry of a topic; without one, of the only nav_msgs/Odometry, or of the only sensor_msgs/JointState.
+
+    With a wheel's radius the JointState is preferred. Velocities are taken only from a topic that is named: most are
+    what a robot was told, not what it did. Raises `InvalidInputError` that lists the topics.
+    """
+    chosen = _chosen(recording, topic, wheels)
+    if chosen.kind == _JOINTS:
+        return _from_joints(recording, chosen, wheels)
+    more: dict[str, Any] = {"source": f"{recording.path} {chosen.name}", "gap_max_s": wheels.gap_max_s}
+    rows = [(time_s, *_values(content, chosen.kind)) for time_s, content in recording.decoded(chosen)]
+    table = _rising(np.array(rows, dtype=np.float64), more["source"])
+    if chosen.kind == _POSES:
+        return Odometry.from_poses(*table.T, **more)
+    return Odometry.from_velocities(*table.T, **more)
+
+
+def _chosen(recording: Recording, topic: str | None, wheels: Wheels) -> Topic:
+    if topic is not None:
+        return recording.choose(ODOMETRY_KINDS, "--odometry-topic", topic)
+    by_kind = {kind: [one for one in recording.topics if one.kind == kind and one.count] for kind in ODOMETRY_KINDS}
+    order = (_JOINTS, _POSES) if wheels.wheel_radius_m is not None else (_POSES, _JOINTS)
+    for kind in order:
+        if len(by_kind[kind]) == 1:
+            return by_kind[kind][0]
+    return recording.choose(order, "--odometry-topic")
+
+
+def _values(content: Any, kind: str) -> tuple[float, ...]:
+    if kind == _POSES:
+        place, q = content.pose.pose.position, content.pose.pose.orientation
+        yaw = np.arctan2(2.0 * (q.w * q.z + q.x * q.y), 1.0 - 2.0 * (q.y * q.y + q.z * q.z))
+        return place.x, place.y, float(yaw)
+    twist = content.twist if hasattr(content, "twist") else content
+    twist = twist.twist if hasattr(twist, "twist") else twist
+    return twist.linear.x, twist.angular.z
+
+
+def _from_joints(recording: Recording, topic: Topic, wheels: Wheels) -> Odometry:
+    source = f"{recording.path} {topic.name}"
+    if wheels.wheel_radius_m is None:
+        raise InvalidInputError(f"{source}: angles of wheels, expected their radius by --wheel-radius")
+    rows: list[tuple[float, float, float]] = []
+    names: tuple[str, str] | None = None
+    for time_s, content in recording.decoded(topic):
+        if names is None or not set(names) <= set(content.name):
+            # Some robots send the joints of arms and wheels in turn.
+            found = _wheel_joints(list(content.name), wheels.joints, source, must=False)
+            if found is None:
+                continue
+            names = found
+        angles = dict(zip(content.name, np.asarray(content.position).tolist(), strict=False))
+        if not set(names) <= set(angles):
+            raise InvalidInputError(f"{source}: no positions of {' and '.join(names)}, expected the angles of wheels")
+        rows.append((time_s, angles[names[0]], angles[names[1]]))
+    if names is None:
+        seen = sorted({name for _, content in recording.decoded(topic) for name in content.name})
+        _wheel_joints(seen, wheels.joints, source, must=True)
+    table = _rising(np.array(rows, dtype=np.float64), source)
+    rolled, notes = cumulative_m(table[:, 1:], 2.0 * np.pi, wheels.wheel_radius_m, source)
+    return Odometry.from_wheels(
+        table[:, 0], rolled, wheel_base_m=wheels.wheel_base_m, source=source, gap_max_s=wheels.gap_max_s, notes=notes
+    )
+
+
+def _wheel_joints(
+    names: list[str], joints: tuple[str, str] | None, source: str, *, must: bool
+) -> tuple[str, str] | None:
+    """The joints of the left and the right wheel: those that were named, or the only ones that are called so."""
+    if joints is not None:
+        sides = [[name for name in names if name == joint] for joint in joints]
+    else:
+        wheels = [name for name in names if "wheel" in name.lower()] or names
+        sides = [[name for name in wheels if re.search(side, name.lower())] for side in _SIDES]
+    if len(sides[0]) == len(sides[1]) == 1:
+        return sides[0][0], sides[1][0]
+    if must or any(sides):
+        told = ", ".join(names) or "none"
+        raise InvalidInputError(f"{source}: joints {told}, expected those of two wheels, by --wheel-joints LEFT RIGHT")
+    return None
+
+
+def inertial_samples(recording: Recording, topic: str | None = None) -> InertialSamples:
+    """What the inertial sensor of a recording has measured: of a topic, or of the only one.
+
+    Raises `InvalidInputError` that lists the topics, and for a sensor without rates or accelerations.
+    """
+    chosen = recording.choose((_IMU,), "--imu-topic", topic)
+    source, frame = f"{recording.path} {chosen.name}", ""
+    rows = []
+    told = {"angular_velocity": True, "linear_acceleration": True, "orientation": True}
+    for time_s, content in recording.decoded(chosen):
+        frame = content.header.frame_id
+        # By sensor_msgs/Imu a sensor without a quantity says so by -1 as the first number of its covariance.
+        for name in told:
+            told[name] &= float(getattr(content, f"{name}_covariance")[0]) != -1.0
+        w, a, q = content.angular_velocity, content.linear_acceleration, content.orientation
+        rows.append((time_s, w.x, w.y, w.z, a.x, a.y, a.z, q.x, q.y, q.z, q.w))
+    for name in ("angular_velocity", "linear_acceleration"):
+        if not told[name]:
+            raise InvalidInputError(f"{source}: a sensor that says it has no {name}, expected one that has")
+    table = _rising(np.array(rows, dtype=np.float64), source)
+    norms = np.linalg.norm(table[:, 7:], axis=1)
+    whole = told["orientation"] and bool((np.abs(norms - 1.0) < 1e-2).all())
+    turns = table[:, 7:] / norms[:, None] if whole else None
+    return InertialSamples(table[:, 0], table[:, 1:4], table[:, 4:7], turns, frame, source)
+
+
+def _rising(table: NDArray[np.float64], source: str) -> NDArray[np.float64]:
+    """The rows in the order of their times, the first of each time."""
+    if table.ndim != 2 or not np.isfinite(table).all():
+        what = "no messages" if table.ndim != 2 else "numbers that are not finite"
+        raise InvalidInputError(f"{source}: {what}, expected finite numbers")
+    order = np.unique(table[:, 0], return_index=True)[1]
+    return table[order]

@@ -1,0 +1,93 @@
+"""What a recording says of its camera: the calibration of CameraInfo, and the mounting of the static transforms."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from tiltvp.cameras import Camera
+from tiltvp.errors import CalibrationError, InvalidInputError
+from tiltvp.formats.document import Document
+from tiltvp.formats.ros import parse
+from tiltvp.rotations import rotation_from_quaternion
+from tiltvp.streams.bag_images import IMAGE_KINDS
+from tiltvp.streams.bags import Recording
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+__all__ = ["recorded_camera", "robot_from_camera"]
+
+_INFO, _TRANSFORMS, _STATIC = "sensor_msgs/CameraInfo", "tf2_msgs/TFMessage", "/tf_static"
+
+
+def recorded_camera(recording: Recording, topic: str | None = None) -> Camera:
+    """The camera of a topic of CameraInfo, or of the only one: of its first message.
+
+    Raises `InvalidInputError` that lists the topics, `CalibrationError` for a lens that is not supported and for a
+    camera that was not calibrated.
+    """
+    chosen = recording.choose((_INFO,), "--camera-name", topic)
+    source = f"{recording.path} {chosen.name}"
+    info = next(content for _, content in recording.decoded(chosen))
+    # ROS 1 has capitals.
+    matrix = [float(x) for x in np.ravel(getattr(info, "k", getattr(info, "K", [])))]
+    if not any(matrix):
+        raise CalibrationError(f"{source}: a camera that was not calibrated, expected a matrix that is not 0")
+    region = info.roi
+    if max(info.binning_x, info.binning_y) > 1 or region.x_offset or region.y_offset:
+        raise CalibrationError(f"{source}: images of a part of the sensor or binned, expected whole ones")
+    tree: dict[str, object] = {
+        "image_width": int(info.width), "image_height": int(info.height), "camera_name": "cam0",
+        "distortion_model": str(info.distortion_model), "K": [matrix[k : k + 3] for k in (0, 3, 6)],
+        "D": [float(x) for x in np.ravel(getattr(info, "d", getattr(info, "D", [])))],
+    }  # fmt: skip
+    return Camera.from_spec(parse(Document(Path(source), json.dumps(tree)), None)[0])
+
+
+def robot_from_camera(
+    recording: Recording, *, robot_frame: str = "base_link", camera_frame: str | None = None
+) -> NDArray[np.float64]:
+    """The (3, 3) rotation R in v_robot = R v_camera by the static transforms of a recording.
+
+    `camera_frame` is the optical frame, z ahead and x right; by default that of the headers of the only topic of
+    images. Raises `InvalidInputError` that names the frames there are, where they do not join the two.
+    """
+    if camera_frame is None:
+        images = recording.choose(IMAGE_KINDS, "--topic")
+        camera_frame = str(next(content for _, content in recording.decoded(images)).header.frame_id)
+    topic = recording.choose((_TRANSFORMS,), _STATIC, _STATIC)
+    parents: dict[str, tuple[str, NDArray[np.float64]]] = {}
+    for _, content in recording.decoded(topic):
+        for one in content.transforms:
+            parents[_plain(one.child_frame_id)] = (_plain(one.header.frame_id), _rotation(one, str(recording.path)))
+    to_root, roots = {}, {}
+    for frame in (_plain(robot_frame), _plain(camera_frame)):
+        rotation, at = np.eye(3), frame
+        for _ in parents:
+            if at not in parents:
+                break
+            at, step = parents[at]
+            rotation = step @ rotation
+        to_root[frame], roots[frame] = rotation, at
+    robot, camera = _plain(robot_frame), _plain(camera_frame)
+    known = sorted({*parents, *(parent for parent, _ in parents.values())})
+    if roots[robot] != roots[camera] or robot not in known or camera not in known:
+        raise InvalidInputError(
+            f"{recording.path}: {_STATIC} does not join {robot!r} and {camera!r}, expected both among its frames: "
+            + (", ".join(known) or "none")
+        )
+    found: NDArray[np.float64] = to_root[robot].T @ to_root[camera]
+    return found
+
+
+def _plain(frame: object) -> str:
+    return str(frame).lstrip("/")
+
+
+def _rotation(transform: Any, source: str) -> NDArray[np.float64]:
+    q = transform.transform.rotation
+    return rotation_from_quaternion(np.array([q.x, q.y, q.z, q.w]), f"{source} {_STATIC}")

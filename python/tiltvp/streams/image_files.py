@@ -1,0 +1,137 @@
+"""Frames that are image files: from files, folders and glob patterns, with their times where a table or names tell."""
+
+from __future__ import annotations
+
+import glob
+import os
+import re
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from tiltvp.csv_files import CsvFile
+from tiltvp.errors import InvalidInputError
+from tiltvp.images import read_image
+from tiltvp.streams.frames import Frame, Frames, median_rate_hz
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+__all__ = ["IMAGE_ENDINGS", "ImageFiles", "find_images"]
+
+IMAGE_ENDINGS: Final = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".pgm", ".ppm", ".pnm", ".webp", ".jp2")
+_INNER: Final = ("images", "frames")
+"""Folders in which the images of a drive's folder are: that of `tiltvp dataset drive`, and a usual other name."""
+_TIMES, _ODOMETRY = "frames.csv", "odometry.csv"
+_NANOSECONDS: Final = r"1\d{18}"
+"""Names of images as EuRoC's tools write them: nanoseconds since 1970, of the years 2001 to 2033."""
+_SECONDS: Final = r"1\d{9}\.\d+"
+"""Names of images as the RGB-D tools of TUM write them: seconds of the same years, with decimals."""
+
+
+class ImageFiles(Frames):
+    """Image files in the order in which they are given; those of a folder or pattern in that of their names."""
+
+    def __init__(self, words: Sequence[str]) -> None:
+        """Finds the files, each once. Raises `InvalidInputError` for a table of times that is wrong."""
+        self.source = " ".join(words)
+        self.files, problems = find_images(words)
+        self.problems = tuple(problems)
+        self.names = [str(file) for file in self.files]
+        drive = _drive_folder(words)
+        if drive is not None and (drive / _ODOMETRY).is_file():
+            self.recording = drive / _ODOMETRY
+        if drive is not None and (drive / _TIMES).is_file():
+            self.times_s = _table_times(drive / _TIMES, self.files)
+        else:
+            self.times_s = _times_of_names(self.files)
+            if self.times_s is not None:
+                self.notes = (f"{self.source}: times are those that the names of the images tell",)
+        self.rate_hz = median_rate_hz(self.times_s)
+
+    def __iter__(self) -> Iterator[Frame]:
+        return self.sample(range(len(self.files)))
+
+    def sample(self, numbers: Sequence[int]) -> Iterator[Frame]:
+        """Those frames."""
+        for number in numbers:
+            file = self.files[number]
+            time_s = None if self.times_s is None else float(self.times_s[number])
+            yield Frame(str(file), time_s, lambda file=file: read_image(file))  # type: ignore[misc]
+
+
+def find_images(words: Sequence[str]) -> tuple[list[Path], list[str]]:
+    """The image files that files, folders and glob patterns name, each once, and what is wrong with the words.
+
+    A folder stands for the images directly in it, or, if there are none, in its folder `images` or `frames`; a pattern
+    for what it matches (`**` for folders below), both sorted.
+    """
+    files: list[Path] = []
+    problems: list[str] = []
+    for word in words:
+        path = Path(word)
+        if _is_folder(path):
+            found = _images_of(path)
+            if not found:
+                inner = ", nor in a folder images or frames in it"
+                problems.append(f"{word}: a folder without images, expected files in {' '.join(IMAGE_ENDINGS)}{inner}")
+        elif path.exists() or not glob.has_magic(word):
+            found = [path]
+        else:
+            found = [Path(match) for match in sorted(glob.glob(word, recursive=True)) if not os.path.isdir(match)]
+            if not found:
+                problems.append(f"{word}: no file fits this pattern")
+        files.extend(found)
+    once = {os.path.realpath(file): file for file in reversed(files)}
+    return [file for file in dict.fromkeys(files) if once[os.path.realpath(file)] is file], problems
+
+
+def _is_folder(path: Path) -> bool:
+    try:
+        return path.is_dir()
+    except ValueError:
+        raise InvalidInputError(f"{str(path)!r}: a name with a zero byte, expected a file, folder or pattern") from None
+
+
+def _images_of(folder: Path) -> list[Path]:
+    for place in (folder, *(folder / name for name in _INNER)):
+        if place.is_dir():
+            found = [file for file in place.iterdir() if file.suffix.lower() in IMAGE_ENDINGS and file.is_file()]
+            if found:
+                return sorted(found)
+    return []
+
+
+def _drive_folder(words: Sequence[str]) -> Path | None:
+    """The one folder that was given, where tables may be beside the images."""
+    return Path(words[0]) if len(words) == 1 and Path(words[0]).is_dir() else None
+
+
+def _table_times(path: Path, files: Sequence[Path]) -> NDArray[np.float64] | None:
+    """(N,): the times that a table of columns `file` and `time_s` tells; None for a table without these columns."""
+    table = CsvFile(path, "a table of frames with the columns file and time_s")
+    if not {"file", "time_s"} <= set(table.header):
+        return None
+    which, when = table.header.index("file"), table.header.index("time_s")
+    times: dict[str, float] = {}
+    for line, cells in table.rows():
+        try:
+            times[Path(cells[which]).name] = float(cells[when])
+        except ValueError:
+            raise InvalidInputError(f"{table.where(line)}: time_s = {cells[when]!r}, expected a number") from None
+    missing = [str(file) for file in files if not np.isfinite(times.get(file.name, np.nan))]
+    if missing:
+        raise InvalidInputError(
+            f"{path}: no time of {missing[0]} ({len(missing)} missing), expected one for each image"
+        )
+    return np.array([times[file.name] for file in files])
+
+
+def _times_of_names(files: Sequence[Path]) -> NDArray[np.float64] | None:
+    """(N,): the times that the names of all files are; None where one is no time."""
+    for pattern, scale in ((_NANOSECONDS, 1e-9), (_SECONDS, 1.0)):
+        if files and all(re.fullmatch(pattern, file.stem) for file in files):
+            return np.array([float(file.stem) * scale for file in files])
+    return None

@@ -1,0 +1,212 @@
+"""Odometry over time: how far a robot had turned and driven at any instant of its record."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from tiltvp.errors import InvalidInputError
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike, NDArray
+
+__all__ = ["GAP_MAX_S", "Motion", "Odometry", "Travelled"]
+
+GAP_MAX_S: Final = 0.5
+"""Longest time between two samples that is interpolated. A robot that changes its speed by 1 m/s in a second is then at
+most 1 * 0.5^2 / 8 = 3 cm from where the straight line between the samples has it."""
+_SAME_S: Final = 1e-6
+"""Times closer than this are one: seconds since 1970 are told to 2.4e-7 s by a float, and clocks to less."""
+
+
+@dataclass(frozen=True)
+class Motion:
+    """What the robot did between two instants."""
+
+    yaw_rad: float = 0.0
+    """How far it turned, to the left positive; 0 where nobody knows."""
+    distance_m: float = 0.0
+    """How far the middle of its axle drove, forwards positive."""
+    wheels_m: tuple[float, float] | None = None
+    """How far the left and the right wheel rolled; None where that is not recorded."""
+
+
+@dataclass(frozen=True, eq=False)
+class Travelled:
+    """How far the robot had come at each of some instants, since the record began. NaN where it does not tell."""
+
+    distance_m: NDArray[np.float64]
+    """(N,): of the middle of the axle, forwards positive."""
+    yaw_rad: NDArray[np.float64] | None
+    """(N,): turns, left positive, beyond pi too; None where wheels are recorded and their base is not known."""
+    wheels_m: NDArray[np.float64] | None
+    """(N, 2): of the left and the right wheel; None where they are not recorded."""
+    outside: NDArray[np.bool_]
+    """(N,): before the first or after the last sample."""
+    in_gap: NDArray[np.bool_]
+    """(N,): between two samples that are too far apart to be interpolated."""
+
+    @property
+    def known(self) -> NDArray[np.bool_]:
+        """(N,): where there is an answer."""
+        return ~(self.outside | self.in_gap)
+
+
+@dataclass(frozen=True, eq=False)
+class Odometry:
+    """What wheels or a localisation have recorded, summed up from its first sample on. N is the number of samples."""
+
+    times_s: NDArray[np.float64]
+    """(N,): rising."""
+    distance_m: NDArray[np.float64]
+    """(N,): how far the middle of the axle had driven, forwards positive."""
+    yaw_rad: NDArray[np.float64] | None
+    """(N,): how far the robot had turned, left positive, beyond pi too; None where that is not known."""
+    wheels_m: NDArray[np.float64] | None = None
+    """(N, 2): how far the left and the right wheel had rolled; None where that is not recorded."""
+    source: str = "odometry"
+    """What messages call it."""
+    notes: tuple[str, ...] = ()
+    """Sentences about it that whoever uses it should know."""
+    gap_max_s: float = GAP_MAX_S
+    """Longest time between two samples that is interpolated, seconds."""
+
+    def __post_init__(self) -> None:
+        """Raises `InvalidInputError` for arrays that do not fit, values that are not finite, and times that fall."""
+        n = len(self.times_s)
+        arrays: list[tuple[str, NDArray[np.float64], tuple[int, ...]]]
+        arrays = [("times_s", self.times_s, (n,)), ("distance_m", self.distance_m, (n,))]
+        arrays += [("yaw_rad", self.yaw_rad, (n,))] if self.yaw_rad is not None else []
+        arrays += [("wheels_m", self.wheels_m, (n, 2))] if self.wheels_m is not None else []
+        for name, values, shape in arrays:
+            if values.shape != shape or not np.isfinite(values).all():
+                raise InvalidInputError(f"{self.source}: {name} {values.shape}, expected {shape} of finite numbers")
+        if n < 2 or (np.diff(self.times_s) <= 0.0).any():
+            raise InvalidInputError(f"{self.source}: {n} samples, expected two or more of rising times")
+        if not self.gap_max_s > 0.0:
+            raise InvalidInputError(f"gap_max_s = {self.gap_max_s}, expected more than 0")
+
+    @classmethod
+    def from_wheels(
+        cls, times_s: ArrayLike, wheels_m: ArrayLike, *, wheel_base_m: float | None = None, source: str = "odometry",
+        notes: tuple[str, ...] = (), gap_max_s: float = GAP_MAX_S,
+    ) -> Odometry:  # fmt: skip
+        """From how far both wheels (N, 2) had rolled. Without the distance between them turns are not known."""
+        wheels = np.asarray(wheels_m, dtype=np.float64)
+        if wheels.ndim != 2 or wheels.shape[1:] != (2,):
+            raise InvalidInputError(f"wheels_m: {wheels.shape}, expected (N, 2)")
+        yaw = None
+        if wheel_base_m is not None:
+            if not (np.isfinite(wheel_base_m) and wheel_base_m > 0.0):
+                raise InvalidInputError(f"wheel_base_m = {wheel_base_m}, expected a length above 0")
+            yaw = (wheels[:, 1] - wheels[:, 0]) / wheel_base_m
+        return cls(np.asarray(times_s, dtype=np.float64), wheels.mean(axis=1), yaw, wheels, source, notes, gap_max_s)
+
+    @classmethod
+    def from_velocities(
+        cls, times_s: ArrayLike, speed_mps: ArrayLike, yaw_rate_radps: ArrayLike, *, source: str = "odometry",
+        notes: tuple[str, ...] = (), gap_max_s: float = GAP_MAX_S,
+    ) -> Odometry:  # fmt: skip
+        """From speeds (N,) at instants, between which they change evenly.
+
+        Raises `InvalidInputError` where samples are too far apart: what was driven meanwhile is not known.
+        """
+        times = np.asarray(times_s, dtype=np.float64)
+        steps = np.diff(times)
+        if (steps > gap_max_s).any():
+            k = int(np.argmax(steps > gap_max_s))
+            raise InvalidInputError(
+                f"{source}: no velocities from {times[k]:.3f} to {times[k + 1]:.3f} s, expected gaps of at most "
+                f"{gap_max_s:g} s"
+            )
+
+        def sums(values: ArrayLike) -> NDArray[np.float64]:
+            rates = np.asarray(values, dtype=np.float64)
+            return np.concatenate([[0.0], np.cumsum(0.5 * (rates[1:] + rates[:-1]) * steps)])
+
+        return cls(times, sums(speed_mps), sums(yaw_rate_radps), None, source, notes, gap_max_s)
+
+    @classmethod
+    def from_poses(
+        cls, times_s: ArrayLike, x_m: ArrayLike, y_m: ArrayLike, yaw_rad: ArrayLike, *, source: str = "odometry",
+        notes: tuple[str, ...] = (), gap_max_s: float = GAP_MAX_S,
+    ) -> Odometry:  # fmt: skip
+        """From poses (N,) each, which are joined by arcs; what is driven is that along the robot's heading."""
+        x, y = (np.asarray(values, dtype=np.float64) for values in (x_m, y_m))
+        yaw = np.unwrap(np.asarray(yaw_rad, dtype=np.float64))
+        turns = np.diff(yaw)
+        middle = yaw[:-1] + 0.5 * turns
+        chord = np.diff(x) * np.cos(middle) + np.diff(y) * np.sin(middle)
+        # An arc of angle a is a / (2 sin(a / 2)) times as long as its chord.
+        driven = np.concatenate([[0.0], np.cumsum(chord / np.sinc(0.5 * turns / np.pi))])
+        return cls(np.asarray(times_s, dtype=np.float64), driven, yaw - yaw[:1], None, source, notes, gap_max_s)
+
+    def at(self, times_s: ArrayLike) -> Travelled:
+        """How far it had come at these times (M,); NaN outside the record and in its gaps, where nothing is made up."""
+        times = np.atleast_1d(np.asarray(times_s, dtype=np.float64))
+        after = np.clip(np.searchsorted(self.times_s, times), 1, len(self.times_s) - 1)
+        low, high = self.times_s[after - 1], self.times_s[after]
+        outside = ~((times >= self.times_s[0] - _SAME_S) & (times <= self.times_s[-1] + _SAME_S))
+        at_sample = np.minimum(np.abs(times - low), np.abs(times - high)) <= _SAME_S
+        in_gap = ~outside & ~at_sample & (high - low > self.gap_max_s)
+        share = np.clip((times - low) / (high - low), 0.0, 1.0)
+        share[outside | in_gap] = np.nan
+
+        def between(values: NDArray[np.float64]) -> NDArray[np.float64]:
+            part = share if values.ndim == 1 else share[:, None]
+            found: NDArray[np.float64] = values[after - 1] + part * (values[after] - values[after - 1])
+            return found
+
+        return Travelled(
+            between(self.distance_m),
+            None if self.yaw_rad is None else between(self.yaw_rad),
+            None if self.wheels_m is None else between(self.wheels_m),
+            outside,
+            in_gap,
+        )
+
+    def between(self, start_s: float, end_s: float) -> Motion | None:
+        """What the robot did from one instant to another; None where the record does not tell of one of them."""
+        return self.motions([start_s, end_s])[1]
+
+    def motions(self, times_s: ArrayLike) -> list[Motion | None]:
+        """What the robot did up to each of these times since the last one before it that the record tells of.
+
+        The first of these did nothing; None for times that it does not tell of.
+        """
+        there = self.at(times_s)
+        found: list[Motion | None] = []
+        last: int | None = None
+        for k, known in enumerate(there.known.tolist()):
+            if not known:
+                found.append(None)
+                continue
+            before = k if last is None else last
+            yaw = 0.0 if there.yaw_rad is None else float(there.yaw_rad[k] - there.yaw_rad[before])
+            wheels = None
+            if there.wheels_m is not None:
+                left, right = (there.wheels_m[k] - there.wheels_m[before]).tolist()
+                wheels = (left, right)
+            found.append(Motion(yaw, float(there.distance_m[k] - there.distance_m[before]), wheels))
+            last = k
+        return found
+
+    def missing(self, times_s: ArrayLike, names: Sequence[str]) -> str | None:
+        """A sentence about those of the times that the record does not tell of, by the frames' names; None: of all."""
+        there = self.at(times_s)
+        parts = []
+        for flags, why in (
+            (there.outside, "outside its span"),
+            (there.in_gap, f"in gaps of over {self.gap_max_s:g} s"),
+        ):
+            places = np.flatnonzero(flags)
+            if len(places):
+                to = f" to {names[places[-1]]}" if len(places) > 1 else ""
+                parts.append(f"{len(places)} frames {why} ({names[places[0]]}{to})")
+        if not parts:
+            return None
+        span = f"from {self.times_s[0]:.3f} to {self.times_s[-1]:.3f} s"
+        return f"{self.source}: {span}; {' and '.join(parts)}"

@@ -1,0 +1,51 @@
+"""The one door to frames: from what a person names to where they come from."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from pathlib import Path
+
+from tiltvp.errors import InvalidInputError
+from tiltvp.streams.bags import Recording, is_recording
+from tiltvp.streams.frames import Frames
+from tiltvp.streams.image_files import IMAGE_ENDINGS, ImageFiles
+from tiltvp.streams.video_files import VIDEO_ENDINGS, open_video
+
+__all__ = ["open_frames"]
+
+
+def open_frames(
+    source: str | os.PathLike[str] | Sequence[str | os.PathLike[str]], *, topic: str | None = None
+) -> Frames:
+    """The frames of image files, folders and glob patterns, of a video, or of a bag or MCAP of ROS.
+
+    Several sources may be given where all are images. `topic` is that of a recording's images, by default the only one.
+    What was asked for and is not there is in `Frames.problems`; raises `TiltvpError` where there are no frames at all.
+    """
+    words = [os.fspath(source)] if isinstance(source, str | os.PathLike) else [os.fspath(word) for word in source]
+    others = [word for word in words if is_recording(word) or _is_video(word)]
+    if others and len(words) > 1:
+        raise InvalidInputError(f"{others[0]}: beside other sources, expected one video or recording, or any images")
+    if topic is not None and not (others and is_recording(words[0])):
+        raise InvalidInputError(f"topic {topic!r} of {' '.join(words)}: no recording, expected a bag or MCAP")
+    frames: Frames
+    if others:
+        frames = _recorded(words[0], topic) if is_recording(words[0]) else open_video(Path(words[0]))
+    else:
+        frames = ImageFiles(words)
+    if frames.count == 0:
+        told = "; ".join(frames.problems) or f"{frames.source}: no frames"
+        kinds = f"images ({' '.join(IMAGE_ENDINGS)}), a video or a bag"
+        raise InvalidInputError(told if frames.problems else f"{told}, expected {kinds}")
+    return frames
+
+
+def _is_video(word: str) -> bool:
+    return Path(word).suffix.lower() in VIDEO_ENDINGS and not os.path.isdir(word)
+
+
+def _recorded(word: str, topic: str | None) -> Frames:
+    from tiltvp.streams.bag_images import BagFrames
+
+    return BagFrames(Recording(word), topic)

@@ -1,0 +1,224 @@
+"""Frames of video files: with their own time stamps by PyAV, evenly spaced by OpenCV where that is not installed."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from tiltvp import _core
+from tiltvp.errors import ImageFileError, TiltvpError
+from tiltvp.streams.frames import DEFAULT_RATE_HZ, Frame, Frames, median_rate_hz
+
+if TYPE_CHECKING:
+    import av
+    from numpy.typing import NDArray
+
+__all__ = ["VIDEO_ENDINGS", "open_video"]
+
+VIDEO_ENDINGS: Final = (".mp4", ".avi", ".mkv", ".mov", ".webm", ".m4v", ".mpg", ".mpeg")
+_DAMAGED: Final = "cannot be decoded"
+
+
+def open_video(path: Path) -> Frames:
+    """The frames of a video. Raises `ImageFileError` with the path for what is none, and for one without frames."""
+    if not path.is_file():
+        raise ImageFileError(f"{path}: no such file, expected a video")
+    try:
+        import av  # noqa: F401
+    except ImportError:
+        return _OpenCvVideo(path)
+    return _Video(path)
+
+
+def _names(path: Path, count: int) -> list[str]:
+    digits = len(str(count - 1))
+    return [f"{path}#{k:0{digits}d}" for k in range(count)]
+
+
+class _Video(Frames):
+    """A video by PyAV. Which packets there are, and when each is shown, is read first; nothing is decoded for that."""
+
+    def __init__(self, path: Path) -> None:
+        self.source, self._path = str(path), path
+        with _opened(path) as container:
+            stream = container.streams.video[0]
+            _check_size(path, stream.codec_context.width, stream.codec_context.height)
+            stamps, complete = _stamps(container, stream)
+            if not stamps:
+                raise ImageFileError(f"{path}: a video without frames, expected at least one")
+            rate = stream.average_rate
+            base = None if stream.time_base is None or any(stamp is None for stamp in stamps) else stream.time_base
+        self.names = _names(path, len(stamps))
+        notes = []
+        self._stamps: list[int] | None = None
+        if base is None:
+            self.rate_hz = float(rate) if rate else DEFAULT_RATE_HZ
+            self.times_s = np.arange(len(stamps)) / self.rate_hz
+            notes.append(f"{path}: its frames have no time stamps; {self.rate_hz:.6g} a second are assumed")
+        else:
+            self._stamps = sorted(stamp for stamp in stamps if stamp is not None)
+            self.times_s = np.array([float(stamp * base) for stamp in self._stamps])
+            self.rate_hz = median_rate_hz(self.times_s)
+        if not complete:
+            notes.append(f"{path}: ends before its end, after {len(stamps)} frames (cut off?)")
+        self.notes = tuple(notes)
+
+    def __iter__(self) -> Iterator[Frame]:
+        with _opened(self._path) as container:
+            yield from self._filled(_decoded(container), 0, self.count or 0)
+
+    def sample(self, numbers: Sequence[int]) -> Iterator[Frame]:
+        """Those frames, each from the key frame before it."""
+        if self._stamps is None:
+            yield from super().sample(numbers)
+            return
+        with _opened(self._path) as container:
+            stream = container.streams.video[0]
+            for number in numbers:
+                container.seek(self._stamps[number], stream=stream, backward=True)
+                yield from self._filled(_decoded(container), number, number + 1)
+
+    def _filled(self, decoded: Iterator[av.VideoFrame], first: int, end: int) -> Iterator[Frame]:
+        """The frames from the first on, in the places that their stamps have; what is missing cannot be decoded."""
+        at = first
+        for number, frame in self._numbered(decoded):
+            if number >= end:
+                break
+            if number < at:
+                continue
+            for k in range(at, number):
+                yield self._missing(k)
+            yield self._frame(number, frame)
+            at = number + 1
+            if at == end:
+                return
+        for k in range(at, end):
+            yield self._missing(k)
+
+    def _numbered(self, decoded: Iterator[av.VideoFrame]) -> Iterator[tuple[int, av.VideoFrame]]:
+        places = None if self._stamps is None else {stamp: k for k, stamp in enumerate(self._stamps)}
+        for k, frame in enumerate(decoded):
+            if places is None:
+                yield k, frame
+            elif frame.pts in places:
+                yield places[frame.pts], frame
+
+    def _frame(self, number: int, frame: av.VideoFrame) -> Frame:
+        def read() -> NDArray[np.uint8]:
+            return np.ascontiguousarray(frame.to_ndarray(format="bgr24"), dtype=np.uint8)
+
+        return Frame(self._name(number), self._time_s(number), read)
+
+    def _missing(self, number: int) -> Frame:
+        name = self._name(number)
+        return Frame.of(name, self._time_s(number), ImageFileError(f"{name}: {_DAMAGED}"))
+
+    def _name(self, number: int) -> str:
+        assert self.names is not None
+        return self.names[number]
+
+    def _time_s(self, number: int) -> float:
+        assert self.times_s is not None
+        return float(self.times_s[number])
+
+
+@contextmanager
+def _opened(path: Path) -> Iterator[Any]:
+    """The container of a video; everything that PyAV says of it is an `ImageFileError`."""
+    import av
+
+    try:
+        # PyAV would take a name with a colon for an address, and the network has nothing to do with a file.
+        with av.open(f"file:{os.fspath(path)}") as container:
+            if not container.streams.video:
+                raise ImageFileError(f"{path}: no video stream, expected a video")
+            container.streams.video[0].thread_type = "AUTO"
+            yield container
+    except TiltvpError:
+        raise
+    except (av.FFmpegError, ValueError, UnicodeError) as error:
+        why = getattr(error, "strerror", None) or error
+        raise ImageFileError(f"{path}: not a video that can be decoded ({why})") from error
+
+
+def _check_size(path: Path, width: int, height: int) -> None:
+    if not 0 < width * height <= _core.MOST_PIXELS:
+        raise ImageFileError(f"{path}: {width} x {height} pixels, expected 1 to {_core.MOST_PIXELS} in all")
+
+
+def _stamps(container: Any, stream: Any) -> tuple[list[int | None], bool]:
+    """When each packet is shown, in the order of the file, and whether the file was read to its end."""
+    import av
+
+    found: list[int | None] = []
+    try:
+        found.extend(packet.pts for packet in container.demux(stream) if packet.size and not packet.is_corrupt)
+    except av.FFmpegError:
+        return found, False
+    return found, True
+
+
+def _decoded(container: Any) -> Iterator[av.VideoFrame]:
+    """The frames that can be decoded: what is between them is passed over."""
+    import av
+
+    packets = container.demux(video=0)
+    while True:
+        try:
+            packet = next(packets, None)
+        except av.FFmpegError:
+            packet = None
+        if packet is None:
+            return
+        with suppress(av.FFmpegError):
+            yield from packet.decode()
+
+
+class _OpenCvVideo(Frames):
+    """A video by OpenCV, which tells no time stamps that can be relied upon: its frames are taken to be even."""
+
+    def __init__(self, path: Path) -> None:
+        import cv2
+
+        self.source, self._path = str(path), path
+        capture = self._capture()
+        count = max(0, int(capture.get(cv2.CAP_PROP_FRAME_COUNT)))
+        rate = float(capture.get(cv2.CAP_PROP_FPS))
+        _check_size(path, *(int(capture.get(side)) for side in (cv2.CAP_PROP_FRAME_WIDTH, cv2.CAP_PROP_FRAME_HEIGHT)))
+        capture.release()
+        if count == 0:
+            raise ImageFileError(f"{path}: a video without frames, expected at least one")
+        self.rate_hz = rate if np.isfinite(rate) and rate > 0.0 else DEFAULT_RATE_HZ
+        self.times_s = np.arange(count) / self.rate_hz
+        self.names = _names(path, count)
+        self.notes = (
+            f"{path}: read without its time stamps, as {self.rate_hz:.6g} even frames a second; "
+            "`pip install 'tiltvp[video]'` reads them",
+        )
+
+    def _capture(self) -> Any:
+        import cv2
+
+        capture = cv2.VideoCapture(str(self._path))
+        if not capture.isOpened():
+            raise ImageFileError(f"{self._path}: not a video that can be decoded")
+        # As with photographs, pixels stay where the sensor has them.
+        capture.set(cv2.CAP_PROP_ORIENTATION_AUTO, 0)
+        return capture
+
+    def __iter__(self) -> Iterator[Frame]:
+        assert self.names is not None
+        assert self.times_s is not None
+        capture = self._capture()
+        try:
+            for name, time_s in zip(self.names, self.times_s.tolist(), strict=True):
+                done, image = capture.read()
+                error = ImageFileError(f"{name}: {_DAMAGED}")
+                yield Frame.of(name, time_s, np.asarray(image, dtype=np.uint8) if done else error)
+        finally:
+            capture.release()

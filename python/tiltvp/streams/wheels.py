@@ -1,0 +1,67 @@
+"""What counters of wheels and their angles mean in metres."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from tiltvp.errors import InvalidInputError
+from tiltvp.streams.odometry import GAP_MAX_S
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+__all__ = ["Wheels", "cumulative_m"]
+
+_WRAPS: Final = (2**16, 2**32)
+"""Counts after which counters of two and four bytes begin anew."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Wheels:
+    """What a record does not say of the wheels that made it. None: not known."""
+
+    wheel_base_m: float | None = None
+    """Distance between the wheels, metres: without it turns are not known."""
+    wheel_radius_m: float | None = None
+    """Radius of the wheels, metres: for ticks and angles."""
+    ticks_per_turn: float | None = None
+    """What the counter of a wheel counts in one turn."""
+    joints: tuple[str, str] | None = None
+    """Names of the joints of the left and the right wheel; None: those that are called so."""
+    gap_max_s: float = GAP_MAX_S
+    """Longest time between two samples that is interpolated, seconds."""
+
+    def __post_init__(self) -> None:
+        """Raises `InvalidInputError` for what is no length or count above 0."""
+        for name in ("wheel_base_m", "wheel_radius_m", "ticks_per_turn", "gap_max_s"):
+            value = getattr(self, name)
+            if value is not None and not (np.isfinite(value) and value > 0.0):
+                raise InvalidInputError(f"{name} = {value}, expected a number above 0")
+
+
+def cumulative_m(
+    counts: NDArray[np.float64], per_turn: float, wheel_radius_m: float, source: str
+) -> tuple[NDArray[np.float64], tuple[str, ...]]:
+    """(N, 2): how far both wheels had rolled, from counters (N, 2) of so many counts a turn; and what was noticed.
+
+    Whole counts of two or four bytes that fall or rise by more than half their range have begun anew.
+    """
+    steps = np.diff(counts, axis=0, prepend=counts[:1])
+    notes: list[str] = []
+    if (counts == np.rint(counts)).all():
+        for k, side in enumerate(("left", "right")):
+            values = counts[:, k]
+            for wrap in _WRAPS:
+                low = -wrap // 2 if values.min() < 0 else 0
+                jumps = np.abs(steps[:, k]) > wrap // 2
+                if low <= values.min() and values.max() < low + wrap and jumps.any():
+                    steps[jumps, k] -= np.sign(steps[jumps, k]) * wrap
+                    notes.append(
+                        f"{source}: the counter of the {side} wheel begins anew {jumps.sum()} times, at {wrap}"
+                    )
+                    break
+    metres = 2.0 * np.pi * wheel_radius_m / per_turn
+    return np.cumsum(steps, axis=0) * metres, tuple(notes)
