@@ -86,6 +86,7 @@ __all__ = [
     "match_descriptors",
     "normal_from_alpha_beta",
     "option_fields",
+    "read_imu",
     "resolve_corners",
     "screen_corner",
     "simulate_drive",
@@ -1052,6 +1053,11 @@ class Drive:
         self, frame: SupportsIndex, *, threads: SupportsIndex | None = None
     ) -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:
         """Grey (H, W) and RGB (H, W, 3) images of a frame."""
+
+    def _render_at(
+        self, frame: SupportsIndex, pose: ArrayLike, normal: ArrayLike, *, threads: SupportsIndex | None = None
+    ) -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:
+        """Grey (H, W) and RGB (H, W, 3) images in a frame's light, from a pose (3,) with a ground normal (3,)."""
 
     def _truth(
         self, frame: SupportsIndex, *, threads: SupportsIndex | None = None
@@ -3264,6 +3270,15 @@ def option_fields(owner: str, method: str | None = None) -> list[dict[str, Any]]
     """The options of a class or function, and of one of its methods; a `Drive` has "legs" as a method.
 
     A dict with `name`, `type` (an annotation), `default`, `doc` and `expected` for each, in the order of declaration.
+    """
+
+def read_imu(
+    rates_rad_s: ArrayLike, forces_m_s2: ArrayLike, **options: Any
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """Readings of an inertial sensor, such as those of `StereoSequence.imu`, along any motion.
+
+    `rates_rad_s` and `forces_m_s2` are its true rates of turn and specific forces in the sensor's axes, (M, 3) each and
+    `rate_hz` a second. Times, rates (M, 3), forces (M, 3), and the rates' true biases (M, 3).
     """
 
 def resolve_corners(

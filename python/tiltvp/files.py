@@ -21,6 +21,7 @@ __all__ = [
     "keeping_existing",
     "read_bytes",
     "read_text",
+    "scratch_folder",
     "whole_file",
     "whole_folder",
     "write_whole",
@@ -158,6 +159,30 @@ def whole_folder(path: str | os.PathLike[str]) -> Iterator[Path]:
                 _remove_folder(old)
             else:
                 part.rename(target)
+        finally:
+            os.close(handle)
+    except TiltvpError:
+        raise
+    except (OSError, ValueError) as error:
+        raise _failed(path, error) from error
+    finally:
+        if part is not None:
+            _remove_folder(part)
+
+
+@contextmanager
+def scratch_folder(path: str | os.PathLike[str]) -> Iterator[Path]:
+    """A folder beside the output `path` for what must be made before it, removed at the end of the block.
+
+    What killed processes have left of it is removed by the next one that writes `path`. Raises `OutputError`.
+    """
+    part = None
+    try:
+        target = Path(os.path.realpath(path))
+        target.parent.mkdir(parents=True, exist_ok=True)
+        part, handle = _locked_beside(target, target.suffix, _new_folder)
+        try:
+            yield part
         finally:
             os.close(handle)
     except TiltvpError:

@@ -217,6 +217,17 @@ class Drive(_core.Drive):
         alpha, beta = self.tilts[frame]
         return RoomImage(gray, np.ascontiguousarray(rgb[:, :, ::-1]), float(alpha), float(beta))
 
+    def render_at(
+        self, frame: int, *, pose: ArrayLike, alpha_rad: float = 0.0, beta_rad: float = 0.0, threads: int | None = None
+    ) -> RoomImage:
+        """What the camera sees in a frame's light where the robot is elsewhere, or leans otherwise, than on this drive.
+
+        `pose` is (x_m, y_m, yaw_rad); any number from 0 is a `frame`, of which light and noise are taken. Raises
+        `tiltvp.errors.InvalidInputError`, also for a place outside the room.
+        """
+        gray, rgb = self._render_at(frame, pose, _core.normal_from_alpha_beta(alpha_rad, beta_rad), threads=threads)
+        return RoomImage(gray, np.ascontiguousarray(rgb[:, :, ::-1]), alpha_rad, beta_rad)
+
     def truth(self, frame: int, *, threads: int | None = None) -> DriveTruth:
         """The upright edges in sight at one frame, however faint; silhouettes of round things are none."""
         return DriveTruth(*self._truth(frame, threads=threads))

@@ -3,7 +3,7 @@
 use numpy::PyArray1;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use tiltvp_synth::{DriveOptions, Mount, on_threads};
+use tiltvp_synth::{DriveOptions, Mount, RobotPose, on_threads};
 
 use crate::array::Array;
 use crate::call::{call_long, invalid};
@@ -139,6 +139,24 @@ impl Drive {
     ) -> PyResult<Pictures<'py>> {
         let (frame, threads) = (self.frame(frame)?, threads_from(threads)?);
         let image = call_long(py, || on_threads(threads, || self.inner.render(frame))?)?;
+        pictures(py, image)
+    }
+
+    /// Grey (H, W) and RGB (H, W, 3) images in a frame's light, from a pose (3,) with a ground normal (3,).
+    #[pyo3(signature = (frame: "SupportsIndex", pose: "ArrayLike", normal: "ArrayLike", *, threads: "SupportsIndex | None" = None))]
+    fn _render_at<'py>(
+        &self,
+        py: Python<'py>,
+        frame: &Bound<'py, PyAny>,
+        pose: &Bound<'py, PyAny>,
+        normal: &Bound<'py, PyAny>,
+        threads: Option<&Bound<'py, PyAny>>,
+    ) -> PyResult<Pictures<'py>> {
+        let frame = convert::whole(frame, "frame", "a whole number from 0")?;
+        let [x_m, y_m, yaw_rad] = convert::vector3(pose, "pose")?.into();
+        let (tilt, threads) = (convert::tilt(normal, "normal")?, threads_from(threads)?);
+        let pose = RobotPose { x_m, y_m, yaw_rad };
+        let image = call_long(py, || on_threads(threads, || self.inner.render_at(frame, pose, tilt))?)?;
         pictures(py, image)
     }
 

@@ -68,7 +68,7 @@ mod _core {
         drive_legs, simulate_drive, wheel_displacements,
     };
     #[pymodule_export]
-    use crate::stereo::StereoSequence;
+    use crate::stereo::{StereoSequence, read_imu};
     #[pymodule_export]
     use crate::synth::Room;
     #[pymodule_export]

@@ -8,11 +8,11 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use tiltvp_synth::{
     ColorImage, CornerSighting, ImuOptions, LaboratoryOptions, RoomOptions, StereoOptions, World, imu_readings,
-    on_threads,
+    on_threads, readings_of,
 };
 
 use crate::array::Array;
-use crate::call::{call_long, invalid};
+use crate::call::{call_long, exception, invalid};
 use crate::camera::Camera;
 use crate::convert;
 use crate::laboratory::Laboratory;
@@ -163,16 +163,7 @@ impl StereoSequence {
         let options = options::given(ImuOptions::default(), options)?;
         let duration_s = self.inner.time_s(self.__len__() - 1);
         let readings = call_long(py, || imu_readings(self.inner.motion(), duration_s, &options))?;
-        let rows = |value: fn(&tiltvp_synth::ImuReading) -> Vector3<f64>| {
-            let rows: Vec<[f64; 3]> = readings.iter().map(|reading| value(reading).into()).collect();
-            convert::to_rows(py, &rows, false)
-        };
-        Ok((
-            Array::new(PyArray1::from_vec(py, readings.iter().map(|reading| reading.time_s).collect())),
-            rows(|reading| reading.rate_rad_s)?,
-            rows(|reading| reading.force_m_s2)?,
-            rows(|reading| reading.rate_bias_rad_s)?,
-        ))
+        imu_columns(py, &readings)
     }
 
     fn __len__(&self) -> usize {
@@ -242,4 +233,41 @@ fn to_poses<'py>(py: Python<'py>, poses: &[Isometry3<f64>], single: bool) -> PyR
 
 fn picture(py: Python<'_>, image: ColorImage) -> PyResult<Picture<'_>> {
     Ok(Array::new(PyArray1::from_vec(py, image.bgr).reshape([image.height_px, image.width_px, 3])?))
+}
+
+/// Readings of an inertial sensor, such as those of `StereoSequence.imu`, along any motion.
+///
+/// `rates_rad_s` and `forces_m_s2` are its true rates of turn and specific forces in the sensor's axes, (M, 3) each and `rate_hz` a
+/// second. Times, rates (M, 3), forces (M, 3), and the rates' true biases (M, 3).
+#[pyfunction]
+#[pyo3(signature = (rates_rad_s: "ArrayLike", forces_m_s2: "ArrayLike", **options: "Any"))]
+pub(crate) fn read_imu<'py>(
+    py: Python<'py>,
+    rates_rad_s: &Bound<'py, PyAny>,
+    forces_m_s2: &Bound<'py, PyAny>,
+    options: Option<&Bound<'py, PyDict>>,
+) -> PyResult<Readings<'py>> {
+    let options = options::given(ImuOptions::default(), options)?;
+    let (rates, _) = convert::rows::<3>(rates_rad_s, "rates_rad_s")?;
+    let (forces, _) = convert::rows::<3>(forces_m_s2, "forces_m_s2")?;
+    if rates.len() != forces.len() {
+        let (rates, forces) = (rates.len(), forces.len());
+        return Err(invalid(format!("forces_m_s2: {forces} rows, expected {rates}, as rates_rad_s has")));
+    }
+    let truths = rates.into_iter().zip(forces).map(|(rate, force)| (rate.into(), force.into()));
+    let readings = readings_of(truths, &options).map_err(|error| exception(&error))?;
+    imu_columns(py, &readings)
+}
+
+fn imu_columns<'py>(py: Python<'py>, readings: &[tiltvp_synth::ImuReading]) -> PyResult<Readings<'py>> {
+    let rows = |value: fn(&tiltvp_synth::ImuReading) -> Vector3<f64>| {
+        let rows: Vec<[f64; 3]> = readings.iter().map(|reading| value(reading).into()).collect();
+        convert::to_rows(py, &rows, false)
+    };
+    Ok((
+        Array::new(PyArray1::from_vec(py, readings.iter().map(|reading| reading.time_s).collect())),
+        rows(|reading| reading.rate_rad_s)?,
+        rows(|reading| reading.force_m_s2)?,
+        rows(|reading| reading.rate_bias_rad_s)?,
+    ))
 }

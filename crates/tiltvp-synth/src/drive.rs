@@ -72,10 +72,7 @@ impl Drive {
     /// # Errors
     /// [`Error::InvalidArgument`] if there is no such frame.
     pub fn center(&self, frame: usize) -> Result<Vector3<f64>> {
-        let (pose, _) = self.state(frame)?;
-        let Mount { x_m, y_m, height_m, .. } = self.options.mount;
-        let (s, c) = pose.yaw_rad.sin_cos();
-        Ok(Vector3::new(pose.x_m + c * x_m - s * y_m, pose.y_m + s * x_m + c * y_m, height_m))
+        Ok(self.center_at(self.state(frame)?.0))
     }
 
     /// The image of a frame, rendered in parallel on the current rayon pool; its bytes depend on room, camera, options and
@@ -85,8 +82,21 @@ impl Drive {
     /// [`Error::InvalidArgument`] if there is no such frame.
     pub fn render(&self, frame: usize) -> Result<Image> {
         let (pose, tilt) = self.state(frame)?;
+        self.render_at(frame, pose, tilt)
+    }
+
+    /// What the camera sees in a frame's light, and with its noise, where the robot is elsewhere or leans otherwise than on
+    /// this drive; any frame's number will do.
+    ///
+    /// # Errors
+    /// [`Error::InvalidArgument`] if the camera is outside the room there.
+    pub fn render_at(&self, frame: usize, pose: RobotPose, tilt: Tilt) -> Result<Image> {
+        let center = self.center_at(pose);
+        if !(self.world.contains(&center) && pose.yaw_rad.is_finite()) {
+            return Err(Error::argument("pose", format!("{pose:?}"), "a place in the room, and a finite heading"));
+        }
         let (lights, level) = self.lights(frame);
-        let sweep = Sweep::new(&self.world, &self.rays, self.center(frame)?, self.world_from_camera(pose, tilt));
+        let sweep = Sweep::new(&self.world, &self.rays, center, self.world_from_camera(pose, tilt));
         let options = self.options.exposed((0.45 * level).clamp(0.1, 0.8), frame);
         Ok(sweep.film(&lights, &options).develop(&options))
     }
@@ -116,6 +126,12 @@ impl Drive {
             (Some(pose), Some(tilt)) => Ok((*pose, *tilt)),
             _ => Err(Error::argument("frame", frame, format!("a frame below {}", self.trajectory.poses.len()))),
         }
+    }
+
+    fn center_at(&self, pose: RobotPose) -> Vector3<f64> {
+        let Mount { x_m, y_m, height_m, .. } = self.options.mount;
+        let (s, c) = pose.yaw_rad.sin_cos();
+        Vector3::new(pose.x_m + c * x_m - s * y_m, pose.y_m + s * x_m + c * y_m, height_m)
     }
 
     fn world_from_camera(&self, pose: RobotPose, tilt: Tilt) -> Matrix3<f64> {

@@ -1,4 +1,4 @@
-//! An inertial sensor of the MPU6050's grade that rides on a moving pair of cameras: rates and specific forces, with bias,
+//! An inertial sensor of the MPU6050's grade that rides on a pair of cameras or a robot: rates and specific forces, with bias,
 //! noise, wrong scales, a limited range and 16 bits.
 
 use nalgebra::{Matrix3, Vector3};
@@ -87,7 +87,7 @@ fn channels_are_possible(options: &ImuOptions) -> Result<()> {
     Ok(())
 }
 
-/// One reading, in the axes of the left camera and at its centre.
+/// One reading, in the sensor's axes: on a pair of cameras those of the left one, at its centre.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ImuReading {
     /// When, seconds.
@@ -105,13 +105,23 @@ pub struct ImuReading {
 /// # Errors
 /// If the options are outside their domains.
 pub fn imu_readings(motion: &Handheld, duration_s: f64, options: &ImuOptions) -> Result<Vec<ImuReading>> {
+    let count = (duration_s * options.rate_hz).ceil().max(0.0) as usize + 1;
+    readings_of((0..count).map(|k| truth(motion, k as f64 / options.rate_hz)), options)
+}
+
+/// What the sensor makes of true rates of turn (rad/s) and specific forces (m/s^2) in its axes, `rate_hz` a second from time 0.
+///
+/// # Errors
+/// If the options are outside their domains.
+pub fn readings_of(
+    truths: impl Iterator<Item = (Vector3<f64>, Vector3<f64>)>,
+    options: &ImuOptions,
+) -> Result<Vec<ImuReading>> {
     options.validate()?;
     let mut gyroscope = Sensor::new(options.gyroscope, options.rate_hz, options.seed, 1 << 35);
     let mut accelerometer = Sensor::new(options.accelerometer, options.rate_hz, options.seed, (1 << 35) + 1);
-    let count = (duration_s * options.rate_hz).ceil().max(0.0) as usize + 1;
-    let readings = (0..count).map(|k| {
+    let readings = truths.enumerate().map(|(k, (rate, force))| {
         let time_s = k as f64 / options.rate_hz;
-        let (rate, force) = truth(motion, time_s);
         let rate_bias_rad_s = gyroscope.bias;
         let (rate_rad_s, force_m_s2) = (gyroscope.read(&rate), accelerometer.read(&force));
         ImuReading { time_s, rate_rad_s, force_m_s2, rate_bias_rad_s }

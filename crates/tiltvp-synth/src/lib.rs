@@ -52,7 +52,7 @@ pub use drive::Drive;
 pub use drive_options::{DriveOptions, Mount, Way};
 pub use encoders::Wheels;
 pub use handheld::Handheld;
-pub use imu::{GRAVITY_M_S2, ImuChannel, ImuOptions, ImuReading, imu_readings};
+pub use imu::{GRAVITY_M_S2, ImuChannel, ImuOptions, ImuReading, imu_readings, readings_of};
 pub use laboratory::LaboratoryOptions;
 pub use options::{RoomKind, RoomOptions, WallPattern};
 pub use render::{Rendering, Truth, render, render_panorama};

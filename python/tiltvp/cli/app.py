@@ -11,7 +11,7 @@ from cyclopts import App, CycloptsError, Parameter
 
 from tiltvp import __version__
 from tiltvp.cli import calibrate, camera, corner, demo, lines, segments, tilt, track
-from tiltvp.cli.lab import dataset, evaluate, measure, report
+from tiltvp.cli.lab import dataset, drive, evaluate, measure, report
 from tiltvp.cli.terminal import complain
 from tiltvp.errors import MissingExtraError, OutputError, TiltvpError
 from tiltvp.files import keeping_existing
@@ -38,6 +38,7 @@ app.command(calibrate.calibrate)
 app.command(demo.demo)
 app.command(camera.app)
 app.command(dataset.app)
+app.command(drive.app)
 app.command(evaluate.evaluate)
 app.command(measure.app)
 app.command(report.report)

@@ -1,0 +1,115 @@
+"""`tiltvp lab drive`: a recording of a robot, made by the package."""
+
+from __future__ import annotations
+
+import math
+import os
+from pathlib import Path
+from typing import Annotated
+
+from cyclopts import App, Parameter, validators
+
+from tiltvp.cli.lab.dataset_options import LensOptions, Words, legs_from
+from tiltvp.cli.options import Switch
+from tiltvp.cli.terminal import progress_bar, say
+
+app = App(name="lab", help="What the laboratory makes to try the package on.")
+_LENS = LensOptions()
+
+
+@app.command
+def drive(
+    *,
+    out: Path,
+    camera_out: Path | None = None,
+    lens: LensOptions = _LENS,
+    kind: str = "office",
+    legs: Words = None,
+    mount: tuple[float, float, float, float] | None = None,
+    mounting_deg: tuple[float, float] = (0.0, 0.0),
+    floor_slope_deg: tuple[float, float] = (0.0, 0.0),
+    bumps_deg: float = 2.0,
+    camera_delay_s: float = 0.0,
+    compressed: Switch = False,
+    noise_sigma: float | None = None,
+    samples: int | None = None,
+    encoder_k_m: float | None = None,
+    seed: Annotated[int, Parameter(validator=validators.Number(gte=0))] = 0,
+    threads: int | None = None,
+) -> None:
+    """Make a recording of a robot's drive through a room, as its sensors tell of it: an MCAP file for ROS 2.
+
+    Topics: /camera/image_raw (5 Hz), /camera/camera_info, /joint_states (wheel angles of ticks, 50 Hz), /imu/data_raw
+    (100 Hz, with noise and bias), /tf_static (the nominal mounting); and the truth: /truth/pose, /truth/tilt (the
+    ground normal in the robot frame, with the stamp of the frame), /truth/mounting, /truth/description. The same
+    arguments give the same bytes.
+
+    Parameters
+    ----------
+    out
+        The recording (.mcap).
+    camera_out
+        File for the calibration (.toml); needed for lenses that no CameraInfo describes.
+    kind
+        Where to drive: corridor, hall, office, living-room, l-shaped, narrow or under-table.
+    legs
+        The legs of the way, METRES,DEGREES each; default is a turn in place and most of a triangle.
+    mount
+        Where the camera is on the robot: metres to the front and to the left, degrees turned to the left, metres up;
+        default 0.1 0.03 0 0.4.
+    mounting_deg
+        Roll and pitch of the camera's mounting, which nobody knows.
+    floor_slope_deg
+        By how much the floor falls, and where to: degrees to the left of the robot's first heading.
+    bumps_deg
+        Greatest lean from bumps.
+    camera_delay_s
+        By how much the stamps of frames are late.
+    compressed
+        Frames as PNG, on /camera/image_raw/compressed.
+    noise_sigma
+        Gaussian noise in grey levels; default 2.
+    samples
+        Rays per pixel and side where surfaces meet; default 3.
+    encoder_k_m
+        Variance of an encoder's reading per metre; default 1e-5.
+    seed
+        Seed of room, way and noise.
+    threads
+        How many threads; default is one per core.
+    """
+    from tiltvp.files import check_output
+    from tiltvp.lab.datasets.driving import drive_room
+    from tiltvp.lab.datasets.recording import LEGS, MOUNT, Mount, RecordedDrive
+    from tiltvp.streams.outputs.mcap import check_recording
+
+    check_recording(out)
+    if camera_out is not None:
+        check_output(camera_out)
+    count = (os.cpu_count() or 1) if threads is None else threads
+    camera = lens.load()
+    made = RecordedDrive(
+        drive_room(kind, seed, threads=count),
+        camera,
+        legs=LEGS if legs is None else legs_from(legs),
+        robot_from_camera=lens.rotation(),
+        mount=MOUNT if mount is None else Mount(mount[0], mount[1], math.radians(mount[2]), mount[3]),
+        mounting_rad=(math.radians(mounting_deg[0]), math.radians(mounting_deg[1])),
+        floor_slope_rad=(math.radians(floor_slope_deg[0]), math.radians(floor_slope_deg[1])),
+        bumps_max_rad=math.radians(bumps_deg),
+        camera_delay_s=camera_delay_s,
+        compressed=compressed,
+        noise_sigma=noise_sigma,
+        samples=samples,
+        encoder_k_m=encoder_k_m,
+        seed=seed,
+    )
+    with progress_bar(len(made), "frames") as bar:
+        made.write(out, threads=count, advance=bar.advance)
+    if camera_out is not None:
+        camera.save(camera_out)
+    wheels = made.description()["wheels"]
+    say(
+        f"{out}: {made.motion.duration_s:.1f} s with {len(made)} frames; wheels of {wheels['radius_m']:g} m, "
+        f"{wheels['base_m']:g} m apart"
+    )

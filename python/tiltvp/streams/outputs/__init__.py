@@ -1,0 +1,1 @@
+"""Where answers go: recordings for ROS 2, trajectories of TUM's format, static transforms."""
