@@ -14,6 +14,9 @@ from rosbags.rosbag2 import StoragePlugin
 from rosbags.rosbag2 import Writer as Writer2
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
+from tiltvp.streams import Motion, Wheels
+from tiltvp.streams.odometry_tables import OdometryTable
+
 KINDS = ("ros1", "sqlite3", "mcap")
 START_S = 1_700_000_000.0
 """When the recordings begin: an hour of the real world, where floats of seconds have few digits left."""
@@ -135,3 +138,8 @@ def write_video(path: Path, images: Iterable[np.ndarray], times_ms: Sequence[int
             frame.pts, frame.time_base = time_ms, base
             container.mux(stream.encode(frame))
         container.mux(stream.encode())
+
+
+def motions_of(path: Path, files: Sequence[Path]) -> list[Motion]:
+    """The motion that led to each image, by a table with a row for each."""
+    return OdometryTable.read(path).motions([str(file) for file in files], Wheels())[0]

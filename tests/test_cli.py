@@ -130,7 +130,7 @@ def test_installed_program(world: Path) -> None:
         (["tilt", "x.png", "--camera", "camera.toml", "--mask", "none.png"], "none.png"),
         (["tilt", "x.png", "--camera", "missing.yaml"], "missing.yaml"),
         (["tilt", "x.png"], "--camera"),
-        (["tilt", "--camera", "camera.toml"], "IMAGES"),
+        (["tilt", "--camera", "camera.toml"], "no source, expected images"),
         (["tlt"], '"tilt"'),
         (["camera", "infos"], '"info"'),
         (["camera", "convert", "camera.toml", "out.yaml"], ".toml"),

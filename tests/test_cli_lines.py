@@ -16,8 +16,9 @@ from tiltvp.cli.line_options import LineOptions
 from tiltvp.errors import ImageFileError, InvalidInputError
 from tiltvp.images import read_image, write_image
 from tiltvp.lab.plots.tracks import track_plot
+from tiltvp.streams import open_frames
 from tiltvp.synth import MIRROR_BLIND_RAD, Drive, Room, RoomImage, mirror_camera
-from tiltvp.videos import VideoReader, video_writer
+from tiltvp.videos import video_writer
 
 pytestmark = pytest.mark.slow
 
@@ -107,7 +108,7 @@ def test_track_a_folder(run: Run, folder: Path, tmp_path: Path) -> None:
     assert count < 0.5 * table.height
     assert table.filter(pl.col("frame") == 0)["frames_back"].to_list() == [0] * (table["frame"] == 0).sum()
     assert read_image(plot).shape[2] == 3
-    assert [frame.shape for frame in VideoReader(film)] == [(288, 384, 3)] * FRAMES
+    assert [frame.read().shape for frame in open_frames(film)] == [(288, 384, 3)] * FRAMES
     again = tmp_path / "again.csv"
     code, said, complaints = run("track", film, "--camera", folder / "camera.toml", "--out", again)
     assert (code, complaints) == (0, "")
@@ -159,7 +160,7 @@ def test_nothing_is_left_behind(run: Run, folder: Path, tmp_path: Path) -> None:
 def test_videos(tmp_path: Path) -> None:
     (tmp_path / "text.mp4").write_bytes(b"text")
     with pytest.raises(ImageFileError, match=r"text\.mp4: not a video"):
-        VideoReader(tmp_path / "text.mp4")
+        open_frames(tmp_path / "text.mp4")
     with video_writer(tmp_path / "empty.avi"):
         pass
     with pytest.raises(InvalidInputError, match="expected"):

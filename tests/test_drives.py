@@ -9,12 +9,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from recordings import motions_of
 from tiltvp._core import leaning_from_upright, normal_from_alpha_beta
 from tiltvp.cli import main
 from tiltvp.errors import InvalidInputError
 from tiltvp.lab.datasets.driving import DRIVE_KINDS, drive_room, write_drive
 from tiltvp.lab.datasets.folder import read_dataset
-from tiltvp.odometry import read_odometry
 from tiltvp.synth import MIRROR_BLIND_RAD, WALL_PATTERNS, Drive, Room, mirror_camera
 
 pytestmark = pytest.mark.slow
@@ -129,7 +129,7 @@ def test_a_drive_as_a_folder(drive: Drive, tmp_path: Path) -> None:
     dataset = read_dataset(one)
     assert len(dataset.images) == FRAMES
     assert np.array_equal(dataset.read(dataset.images[4]), drive.render(4).gray)
-    motions = read_odometry(one / "odometry.csv", [image.path for image in dataset.images])
+    motions = motions_of(one / "odometry.csv", [image.path for image in dataset.images])
     assert np.allclose([(m.distance_m, m.yaw_rad) for m in motions], drive.motions)
     lines = (one / "truth.csv").read_text(encoding="utf-8").splitlines()
     rows = [row for row in csv.DictReader(lines) if row["frame"] == "4"]

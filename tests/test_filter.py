@@ -13,11 +13,12 @@ import polars as pl
 import pytest
 
 import tiltvp
+from recordings import motions_of
 from tiltvp.cli import main
 from tiltvp.errors import InvalidInputError
 from tiltvp.lab.plots.filtering import filtered_tilt
 from tiltvp.lab.plots.picture import figure_picture
-from tiltvp.odometry import Motion, read_odometry
+from tiltvp.streams import Motion
 from tiltvp.synth import RoomImage
 
 Array = np.ndarray
@@ -250,11 +251,11 @@ def test_odometry_by_row_and_by_file(tmp_path: Path) -> None:
     path = tmp_path / "odometry.csv"
     path.write_text("yaw_deg,distance_m\n0,0\n90,0.5\n\n-90, 0.25\n")
     expected = [Motion(), Motion(math.pi / 2, 0.5), Motion(-math.pi / 2, 0.25)]
-    assert read_odometry(path, FILES) == expected
+    assert motions_of(path, FILES) == expected
     path.write_text("distance_m,file,yaw_rad\n0.25,other/b.png,-1\n0,a.png,0\n0.5,drive/b.png,1\n")
-    assert read_odometry(path, FILES) == [Motion(), Motion(1.0, 0.5), Motion(-1.0, 0.25)]
+    assert motions_of(path, FILES) == [Motion(), Motion(1.0, 0.5), Motion(-1.0, 0.25)]
     path.write_text("distance_m\n1\n2\n3\n")
-    assert read_odometry(path, FILES) == [Motion(0.0, 1.0), Motion(0.0, 2.0), Motion(0.0, 3.0)]
+    assert motions_of(path, FILES) == [Motion(0.0, 1.0), Motion(0.0, 2.0), Motion(0.0, 3.0)]
 
 
 @pytest.mark.parametrize(
@@ -279,17 +280,17 @@ def test_wrong_odometry_is_refused(tmp_path: Path, text: str, words: str) -> Non
     path = tmp_path / "odometry.csv"
     path.write_text(text)
     with pytest.raises(InvalidInputError) as caught:
-        read_odometry(path, FILES)
+        motions_of(path, FILES)
     assert words in str(caught.value)
     assert str(path) in str(caught.value)
 
 
 def test_odometry_that_cannot_be_read(tmp_path: Path) -> None:
     with pytest.raises(InvalidInputError, match="cannot be read"):
-        read_odometry(tmp_path / "none.csv", FILES)
+        motions_of(tmp_path / "none.csv", FILES)
     (tmp_path / "binary.csv").write_bytes(b"\xff\xfe\x00")
     with pytest.raises(InvalidInputError, match="not UTF-8"):
-        read_odometry(tmp_path / "binary.csv", FILES)
+        motions_of(tmp_path / "binary.csv", FILES)
 
 
 # --- the command -------------------------------------------------------------------------------------------------

@@ -10,9 +10,10 @@ import numpy as np
 import pytest
 
 import tiltvp
-from tiltvp.cli.inputs import distinct_names, find_images
+from tiltvp.cli.sources import distinct_names
 from tiltvp.errors import ImageFileError, InvalidInputError, OutputError
 from tiltvp.images import gray_from, read_image
+from tiltvp.streams.image_files import find_images
 
 LEVELS = np.arange(256, dtype=np.uint8).reshape(16, 16)
 

@@ -9,13 +9,14 @@ import numpy as np
 import polars as pl
 import pytest
 
+from recordings import motions_of
 from tiltvp.cli import main
 from tiltvp.errors import ImageFileError, InvalidInputError
 from tiltvp.lab.datasets.driving import write_drive
 from tiltvp.line_logs import FollowedFrame, bearing_log, displacements, follow_lines
 from tiltvp.lines import LineExtractor, LineTracker
-from tiltvp.odometry import Motion, read_odometry
 from tiltvp.selfcalib import wheel_displacements
+from tiltvp.streams import Motion
 from tiltvp.synth import MIRROR_BLIND_RAD, Drive, Room, drive_legs, mirror_camera
 
 LEGS = [(0.25, 0.0), (0.0, 0.4)]
@@ -66,7 +67,7 @@ def test_frames_that_cannot_be_used_are_told_and_their_motion_kept(drive: Drive)
 
 def test_wheels_are_as_recorded_or_as_the_motion_has_them(folder: Path, drive: Drive) -> None:
     files = sorted((folder / "images").iterdir())
-    motions = read_odometry(folder / "odometry.csv", files)
+    motions = motions_of(folder / "odometry.csv", files)
     np.testing.assert_array_equal(displacements(motions, wheel_base_m=0.5), drive.odometry)
     bare = [Motion(motion.yaw_rad, motion.distance_m) for motion in motions]
     expected = wheel_displacements(drive.motions[:, 0], drive.motions[:, 1], wheel_base_m=0.5)

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
     from tiltvp._core import TiltEstimate
     from tiltvp.lines import LineExtractor, LineTracker, TrackedLines
-    from tiltvp.odometry import Motion
+    from tiltvp.streams.odometry import Motion
 
 __all__ = ["FollowedFrame", "bearing_log", "displacements", "follow_lines"]
 

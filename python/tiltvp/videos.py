@@ -1,4 +1,4 @@
-"""Video files, read frame by frame and written whole or not at all."""
+"""Video files, written whole or not at all."""
 
 from __future__ import annotations
 
@@ -8,50 +8,17 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import numpy as np
-
-from tiltvp.errors import ImageFileError, InvalidInputError, OutputError
+from tiltvp.errors import InvalidInputError, OutputError
 from tiltvp.files import whole_file
 
 if TYPE_CHECKING:
     import cv2
+    import numpy as np
     from numpy.typing import NDArray
 
-__all__ = ["VIDEO_ENDINGS", "VideoReader", "VideoWriter", "video_writer"]
+__all__ = ["VideoWriter", "video_writer"]
 
-VIDEO_ENDINGS: tuple[str, ...] = (".mp4", ".avi", ".mkv", ".mov", ".webm", ".m4v", ".mpg", ".mpeg")
 _CODECS = {".mp4": "mp4v", ".avi": "MJPG"}
-
-
-class VideoReader:
-    """The frames of a video in their order. Iterate once."""
-
-    def __init__(self, path: str | os.PathLike[str]) -> None:
-        """Opens the file. Raises `ImageFileError` with the path."""
-        import cv2
-
-        self._path = Path(path)
-        if not self._path.is_file():
-            raise ImageFileError(f"{self._path}: no such file, expected a video")
-        self._capture = cv2.VideoCapture(str(self._path))
-        if not self._capture.isOpened():
-            raise ImageFileError(f"{self._path}: not a video that can be decoded")
-        self.count: int = max(0, int(self._capture.get(cv2.CAP_PROP_FRAME_COUNT)))
-        """How many frames the file says it has."""
-        rate = float(self._capture.get(cv2.CAP_PROP_FPS))
-        self.rate_hz: float = rate if np.isfinite(rate) and rate > 0.0 else 25.0
-        """Frames per second."""
-
-    def __iter__(self) -> Iterator[NDArray[np.uint8]]:
-        """(H, W, 3) BGR uint8."""
-        try:
-            while True:
-                done, image = self._capture.read()
-                if not done:
-                    return
-                yield np.asarray(image, dtype=np.uint8)
-        finally:
-            self._capture.release()
 
 
 class VideoWriter:
@@ -111,7 +78,10 @@ def video_writer(path: str | os.PathLike[str], rate_hz: float = 25.0) -> Iterato
 
 
 def _frames_in(path: Path) -> int:
+    import cv2
+
+    capture = cv2.VideoCapture(str(path))
     try:
-        return VideoReader(path).count
-    except ImageFileError:
-        return 0
+        return int(capture.get(cv2.CAP_PROP_FRAME_COUNT)) if capture.isOpened() else 0
+    finally:
+        capture.release()

@@ -14,11 +14,11 @@ import tiltvp.formats.stereo
 import tiltvp.lines
 import tiltvp.rotations
 from hostile import calibrations, images, logs
+from recordings import motions_of
 from survive.conftest import survived
 from tiltvp.drive_logs import read_drive_log
 from tiltvp.errors import TiltvpError
 from tiltvp.formats import FORMATS
-from tiltvp.odometry import read_odometry
 
 CAMERA_USES: dict[str, Callable[[Path], object]] = {
     "load": tiltvp.Camera.load,
@@ -33,7 +33,7 @@ READERS: dict[str, Callable[[str], object]] = {
     "camera": tiltvp.Camera.load,
     "image": tiltvp.read_image,
     "log": lambda path: read_drive_log(path, path),
-    "odometry": lambda path: read_odometry(path, []),
+    "odometry": lambda path: motions_of(path, []),
     "rotation": tiltvp.rotations.read_rotation,
 }
 

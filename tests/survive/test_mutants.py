@@ -16,11 +16,11 @@ import pytest
 import tiltvp
 from calibration_texts import SAMPLES
 from hostile import noise
+from recordings import motions_of
 from tiltvp.drive_logs import read_drive_log
 from tiltvp.errors import TiltvpError
 from tiltvp.formats import FORMATS
 from tiltvp.lines import LineExtractor, LineTracker
-from tiltvp.odometry import read_odometry
 
 PIECES = (
     b"nan",
@@ -110,7 +110,7 @@ def test_logs(tmp_path: Path) -> None:
 
     def use_turns(content: bytes) -> None:
         paths[2].write_bytes(content)
-        read_odometry(paths[2], files)
+        motions_of(paths[2], files)
 
     attack(500, 4, lambda _: turns, use_turns)
 

@@ -11,11 +11,12 @@ from tiltvp.cli.calibrate_inputs import DriveOptions, PictureOptions, log_of_ima
 from tiltvp.cli.calibrate_results import Calibration, ResultOptions
 from tiltvp.cli.line_options import DrivingLineOptions
 from tiltvp.cli.options import CameraOptions, Switch
+from tiltvp.cli.sources import MotionOptions
 from tiltvp.cli.terminal import say
 from tiltvp.errors import InvalidInputError
 
 NOT_RELIABLE = 1
-_PICTURES, _LINES, _RESULTS = PictureOptions(), DrivingLineOptions(), ResultOptions()
+_PICTURES, _LINES, _RESULTS, _MOTION = PictureOptions(), DrivingLineOptions(), ResultOptions(), MotionOptions()
 
 
 def calibrate(
@@ -25,6 +26,7 @@ def calibrate(
     *,
     drive: DriveOptions,
     pictures: PictureOptions = _PICTURES,
+    motion: MotionOptions = _MOTION,
     camera: CameraOptions | None = None,
     options: DrivingLineOptions = _LINES,
     method: str = "default",
@@ -35,10 +37,10 @@ def calibrate(
 ) -> int:
     """Where a camera (or any sensor of bearings) sits on a robot, from a drive past landmarks.
 
-    From two tables, ODOMETRY.csv BEARINGS.csv; or from pictures, --images FOLDER --camera FILE --odometry CSV: the lean
-    of each, its vertical lines, and which line is which from image to image. Prints what the filter found step by step,
-    what the whole log says at once, and the transform of the whole log if it can be relied upon; exit code 1 if it
-    cannot, or if images could not be read.
+    From two tables, ODOMETRY.csv BEARINGS.csv; or from pictures, --images SOURCE --camera FILE --odometry FILE: the
+    lean of each, its vertical lines, and which line is which from image to image. Prints what the filter found step by
+    step, what the whole log says at once, and the transform of the whole log if it can be relied upon; exit code 1 if
+    it cannot, or if images could not be read.
 
     Parameters
     ----------
@@ -62,14 +64,16 @@ def calibrate(
     results.check()
     bad, sigma = 0, {}
     if pictures.images is None:
-        pictures.refuse(camera)
+        pictures.refuse(camera, motion)
         log = log_of_tables(odometry_log, bearings_log, with_times=estimate_time_offset)
     else:
         if odometry_log is not None:
             raise InvalidInputError(f"{odometry_log}: a log beside --images, expected one of them")
-        if estimate_time_offset:
-            raise InvalidInputError("--estimate-time-offset with --images, whose times are not known")
-        log, sigma_rad, bad = log_of_images(pictures, camera, options, drive)
+        log, sigma_rad, bad = log_of_images(pictures, motion, camera, options, drive)
+        if estimate_time_offset and log.times_s is None:
+            raise InvalidInputError(
+                f"--estimate-time-offset with --images {pictures.images}, whose times are not known"
+            )
         sigma = {"bearing_sigma_rad": sigma_rad}
     log = log.read_as(*read_as)
     calibrator = SelfCalibrator(**sigma | drive.of_filter(), method=method)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -11,12 +11,12 @@ from cyclopts import Group, Parameter, validators
 
 from tiltvp._core import CALIBRATION_METHODS, option_fields
 from tiltvp.cli.declared_options import LibraryOptions, from_library
-from tiltvp.cli.frames import open_frames
 from tiltvp.cli.line_options import LineOptions
 from tiltvp.cli.options import CameraOptions
+from tiltvp.cli.sources import MotionOptions, SourceOptions
 from tiltvp.cli.tables import check_ending, write_table
 from tiltvp.cli.terminal import progress_bar, say
-from tiltvp.cli.track import followed, track_table
+from tiltvp.cli.track import Drive, needed_turns, track_table
 from tiltvp.errors import InvalidInputError
 
 if TYPE_CHECKING:
@@ -72,18 +72,18 @@ class PictureOptions:
     """The images of a drive, in place of a log of bearings."""
 
     images: str | None = None
-    """Folder of images in the order of their names, glob pattern, or video."""
-    odometry: Path | None = None
-    """CSV of the motion that led to each image: yaw_rad or yaw_deg, and distance_m; file, or one row for each image;
-    left_m and right_m, what the wheels rolled, where that is recorded."""
+    """Folder of images in the order of their names, glob pattern, video, or recording of ROS."""
+    topic: str | None = None
+    """The topic of a recording's images, where it has several."""
     track_frames_min: Annotated[int, Parameter(validator=validators.Number(gte=2))] = 3
     """A line counts if it is seen in so many images."""
     tracks: Path | None = None
     """Also write the lines of all images, as `tiltvp track` does: .csv, .json or .parquet."""
 
-    def refuse(self, camera: CameraOptions | None) -> None:
+    def refuse(self, camera: CameraOptions | None, motion: MotionOptions) -> None:
         """Refuses what belongs to images where there are none."""
-        for name, value in (("--odometry", self.odometry), ("--camera", camera), ("--tracks", self.tracks)):
+        motion.refuse("--images")
+        for name, value in (("--camera", camera), ("--tracks", self.tracks), ("--topic", self.topic)):
             if value is not None:
                 raise InvalidInputError(f"{name} without --images, which it is for")
 
@@ -106,7 +106,11 @@ def log_of_tables(odometry: Path | None, bearings: Path | None, *, with_times: b
 
 
 def log_of_images(
-    pictures: PictureOptions, camera: CameraOptions | None, options: LineOptions, drive: DriveOptions
+    pictures: PictureOptions,
+    motion: MotionOptions,
+    camera: CameraOptions | None,
+    options: LineOptions,
+    drive: DriveOptions,
 ) -> tuple[DriveLog, float, int]:
     """The log of a drive's images: the lean of each, its lines, and whose they are.
 
@@ -116,31 +120,37 @@ def log_of_images(
     from tiltvp.drive_logs import DriveLog
     from tiltvp.line_logs import bearing_log, displacements
     from tiltvp.lines import LineTracker
-    from tiltvp.odometry import read_odometry
+    from tiltvp.streams import Motion
 
     source = str(pictures.images)
     if pictures.tracks is not None:
         check_ending(pictures.tracks)
-    if camera is None or pictures.odometry is None:
-        missing = "--camera" if camera is None else "--odometry"
-        raise InvalidInputError(f"--images {source} without {missing}, expected {_FORMS}")
+    if camera is None:
+        raise InvalidInputError(f"--images {source} without --camera, expected {_FORMS}")
+    frames = SourceOptions(topic=pictures.topic).open([source])
+    told = needed_turns(motion.motions(frames, drive.wheel_base))
+    if told is None:
+        raise InvalidInputError(f"--images {source} without --odometry, expected {_FORMS}")
     lens = camera.load()
     x_m, y_m, yaw_rad = drive.start
     extractor, tilt = options.extractor(lens, yaw_rad=yaw_rad), options.tilts(lens, yaw_rad=yaw_rad)
-    tracker = LineTracker(camera_m=(x_m, y_m))
-    frames = open_frames(source)
-    motions = read_odometry(pictures.odometry, frames.files)
-    with progress_bar(len(frames.files), "frames") as bar:
-        seen = list(followed(frames, extractor, tracker, tilt, motions, bar))
-    bearings = bearing_log(seen, frames_min=pictures.track_frames_min)
+    looked = Drive(extractor, LineTracker(camera_m=(x_m, y_m)), tilt, told)
+    with progress_bar(len(told.motions), "frames") as bar:
+        nothing = np.zeros((0, 0), np.uint8)
+        # A drive's images together are more than the memory holds.
+        seen = [
+            (frame.name, frame.time_s, replace(one, gray=nothing)) for frame, one in looked.followed(iter(frames), bar)
+        ]
+    bearings = bearing_log([one for _, _, one in seen], frames_min=pictures.track_frames_min)
     if not len(bearings):
         least = pictures.track_frames_min
-        raise InvalidInputError(f"{source}: no line is seen in {least} of {len(frames.files)} frames")
+        raise InvalidInputError(f"{source}: no line is seen in {least} of {len(told.motions)} frames")
     # From the robot's frame back to the camera's.
     bearings[:, 2] -= yaw_rad
-    table = track_table([(frame.number, str(frames.files[frame.number]), frame.tracked) for frame in seen])
+    table = track_table([(one.number, name, time_s, one.tracked) for name, time_s, one in seen])
     if pictures.tracks is not None:
         write_table(table, pictures.tracks)
     say(f"{source}: {len(bearings)} bearings of {len(set(bearings[:, 1].tolist()))} lines")
-    log = DriveLog(displacements(motions, wheel_base_m=drive.wheel_base), bearings, None)
-    return log, float(np.median([row["sigma_rad"] for row in table.rows])), len(frames.files) - len(seen)
+    motions = [one or Motion() for one in told.motions]
+    log = DriveLog(displacements(motions, wheel_base_m=drive.wheel_base), bearings, told.times_s)
+    return log, float(np.median([row["sigma_rad"] for row in table.rows])), looked.bad

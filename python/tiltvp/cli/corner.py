@@ -12,8 +12,8 @@ from cyclopts import Group, Parameter, validators
 
 from tiltvp._core import CORNER_METHODS
 from tiltvp.cli.declared_options import LibraryOptions, from_library, mask_from
-from tiltvp.cli.frames import Frames, open_frames
 from tiltvp.cli.options import image_size_from
+from tiltvp.cli.sources import SourceOptions, ending_at_interrupt, picture_names
 from tiltvp.cli.tables import Table, check_ending, check_plot, write_table
 from tiltvp.cli.terminal import named, progress_bar, say
 from tiltvp.errors import InvalidInputError, TiltvpError
@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 
     from tiltvp import Camera
     from tiltvp.corner import CornerEstimate, CornerPoseEstimator
+    from tiltvp.streams import Frames
 
 _ANGLE = Parameter(validator=validators.Number(gt=0, lt=180))
 
@@ -44,16 +45,18 @@ class CornerOptions(LibraryOptions):
         return super().given() | ({} if self.mask is None else {"mask": mask_from(self.mask)})
 
 
-_OPTIONS = CornerOptions()
+_OPTIONS, _SOURCE = CornerOptions(), SourceOptions()
 _POSE = ("roll_deg", "pitch_deg", "yaw_deg", "x_m", "y_m", "z_m")
 
 
 def corner(
-    left: str,
+    left: str | None = None,
     right: str | None = None,
     /,
     *,
     calibration: Path,
+    source: SourceOptions = _SOURCE,
+    topic_right: str | None = None,
     method: str = "coloured",
     options: CornerOptions = _OPTIONS,
     gamma: Annotated[float, _ANGLE] = 90.0,
@@ -74,12 +77,15 @@ def corner(
     Parameters
     ----------
     left
-        Image, folder of images, glob pattern, or video of the left or only camera.
+        Image, folder of images, glob pattern, video or recording of ROS of the left or only camera; or - for names of
+        files on stdin.
     right
         The same of the right camera, with as many frames.
     calibration
         Of two cameras: a camchain of Kalibr or a TOML of tiltvp with left, right and left_from_right. Of one camera:
         any format that `tiltvp camera formats` lists.
+    topic_right
+        The topic of the right camera's images, where its recording has several.
     method
         coloured: a cuboid with red, green and blue faces; general: corners of rooms, boxes and buildings.
     gamma
@@ -96,7 +102,7 @@ def corner(
     plot
         Picture of attitude and position over time (.png).
     frame_rate
-        Frames per second: by default those of the video, 25 for images.
+        Frames per second: by default the times that frames tell, and 25 for images that tell none.
     image_size
         WIDTHxHEIGHT in pixels, for calibrations that do not carry it.
     independent
@@ -114,25 +120,23 @@ def corner(
     camera, estimator = _estimator(
         calibration, right is not None, method, options, math.radians(gamma), pitch, image_size_from(image_size)
     )
-    frames = open_frames(left)
-    others = None if right is None else open_frames(right)
-    if others is not None and len(others.files) != len(frames.files):
-        raise InvalidInputError(f"{right}: {len(others.files)} frames, expected {len(frames.files)} as in {left}")
+    frames = source.open([] if left is None else [left])
+    others = None if right is None else SourceOptions(topic=topic_right).open([right])
+    if others is not None and (others.count != frames.count or frames.count is None):
+        raise InvalidInputError(f"{right}: {others.count} frames, expected {frames.count} as in {left}")
     look = Look(camera, estimator, independent, overlay)
-    rate_hz = frame_rate or frames.rate_hz
-    estimates = [(number / rate_hz, file, estimate) for number, file, estimate in look.each(frames, others)]
-    bad = len(frames.files) - len(estimates)
+    estimates = list(look.each(frames, others, frame_rate))
     if not estimates:
-        raise InvalidInputError(f"{left}: {bad} frames, none of which can be used")
+        raise InvalidInputError(f"{frames.source}: {look.bad} frames, none of which can be used")
     table = Table(POSE_COLUMNS, pose_rows(estimates))
     _write(table, out, trajectory, plot)
     found = sum(bool(estimate) for _, _, estimate in estimates)
-    skipped = f", {bad} skipped" if bad else ""
-    say(f"{left}: {len(estimates)} frames{skipped}, {found} with a pose")
-    return 1 if bad else 0
+    skipped = f", {look.bad} skipped" if look.bad else ""
+    say(f"{frames.source}: {len(estimates)} frames{skipped}, {found} with a pose")
+    return 1 if look.bad or frames.problems else 0
 
 
-@dataclass(frozen=True)
+@dataclass
 class Look:
     """What is done with each frame."""
 
@@ -140,37 +144,43 @@ class Look:
     estimator: CornerPoseEstimator
     independent: bool
     overlay: Path | None
+    bad: int = 0
+    """How many frames could not be used so far."""
 
-    def each(self, frames: Frames, others: Frames | None) -> Iterator[tuple[int, str, CornerEstimate]]:
-        """Number, file and estimate of the frames that can be used; the others are complained about."""
-        with progress_bar(len(frames.files), "frames") as bar:
-            for number, images in enumerate(_pairs(frames, others)):
-                file = frames.files[number]
+    def each(
+        self, frames: Frames, others: Frames | None, rate_hz: float | None
+    ) -> Iterator[tuple[float, str, CornerEstimate]]:
+        """Time, name and estimate of the frames that can be used; the others are complained about.
+
+        Times are those of the frames, if `rate_hz` does not say how many there are in a second.
+        """
+        with ending_at_interrupt(frames) as coming, progress_bar(frames.count or 0, "frames") as bar:
+            pairs = ((frame,) for frame in coming) if others is None else zip(coming, others, strict=True)
+            for number, (pair, name) in enumerate(zip(pairs, picture_names(frames), strict=False)):
+                frame = pair[0]
+                even_s = number / (rate_hz or frames.rate_hz)
+                time_s = even_s if rate_hz is not None or frame.time_s is None else frame.time_s
                 try:
+                    images = [one.read() for one in pair]
                     estimate = self._estimate(images)
                 except TiltvpError as error:
-                    bar.complain(named(file, str(error)))
+                    bar.complain(named(frame.name, str(error)))
+                    self.bad += 1
                 else:
-                    self._draw(number, file, images[0], estimate)
-                    yield number, str(file), estimate
+                    self._draw(name, images[0], estimate)
+                    yield time_s, frame.name, estimate
                 bar.advance()
 
-    def _estimate(self, images: Sequence[NDArray[np.uint8] | TiltvpError]) -> CornerEstimate:
-        usable = []
-        for image in images:
-            if isinstance(image, TiltvpError):
-                raise image
-            usable.append(image)
+    def _estimate(self, images: Sequence[NDArray[np.uint8]]) -> CornerEstimate:
         if self.independent:
             self.estimator.reset()
-        return self.estimator(*usable)
+        return self.estimator(*images)
 
-    def _draw(self, number: int, file: Path, image: NDArray[np.uint8], estimate: CornerEstimate) -> None:
+    def _draw(self, name: str, image: NDArray[np.uint8], estimate: CornerEstimate) -> None:
         from tiltvp.images import write_image
 
         if self.overlay is not None:
-            name = f"{file.stem}_{number:06d}.png" if "#" in file.name else f"{file.stem}.png"
-            write_image(self.overlay / name, drawn(image, self.camera, estimate))
+            write_image(self.overlay / f"{name}.png", drawn(image, self.camera, estimate))
 
 
 def _write(table: Table, out: Path | None, trajectory: Path | None, plot: Path | None) -> None:
@@ -210,12 +220,6 @@ def _estimator(
         return camera, CornerPoseEstimator(camera, **options)
     rig = StereoRig.load(calibration, image_size=image_size)
     return rig.left, CornerPoseEstimator(rig.left, rig.right, rig.left_from_right, **options)
-
-
-def _pairs(frames: Frames, others: Frames | None) -> Any:
-    if others is None:
-        return ((image,) for image in frames)
-    return zip(frames, others, strict=True)
 
 
 def drawn(image: NDArray[np.uint8], camera: Camera, estimate: CornerEstimate) -> NDArray[np.uint8]:

@@ -6,8 +6,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from tiltvp.cli.inputs import distinct_names, find_images
-from tiltvp.cli.terminal import complain, named, progress_bar
+from tiltvp.cli.sources import SourceOptions, ending_at_interrupt, picture_names
+from tiltvp.cli.terminal import named, progress_bar
 from tiltvp.errors import OutputError, TiltvpError
 
 if TYPE_CHECKING:
@@ -21,28 +21,30 @@ Found = TypeVar("Found")
 
 
 def find_in_each(
-    images: list[str], look: Callable[[Image], Found], overlay: Path | None, draw: Callable[[Image, Found], Image]
+    images: list[str],
+    source: SourceOptions,
+    look: Callable[[Image], Found],
+    overlay: Path | None,
+    draw: Callable[[Image, Found], Image],
 ) -> tuple[list[tuple[str, Found]], bool]:
-    """What `look` finds in each gray image, with its file, drawn into the folder `overlay`; whether all went well."""
-    from tiltvp.images import gray_from, read_image, write_image
+    """What `look` finds in each gray frame, with its name, drawn into the folder `overlay`; whether all went well."""
+    from tiltvp.images import gray_from, write_image
 
-    files, problems = find_images(images)
-    for problem in problems:
-        complain(problem)
+    frames = source.open(images)
     found: list[tuple[str, Found]] = []
-    well = not problems
-    with progress_bar(len(files), "images") as bar:
-        for file, name in zip(files, distinct_names(files), strict=True):
+    well = not frames.problems
+    with ending_at_interrupt(frames) as coming, progress_bar(frames.count or 0, "images") as bar:
+        for frame, name in zip(coming, picture_names(frames), strict=False):
             try:
-                gray = gray_from(read_image(file))
+                gray = gray_from(frame.read())
                 seen = look(gray)
                 if overlay is not None:
                     write_image(overlay / f"{name}.png", draw(gray, seen))
-                found.append((str(file), seen))
+                found.append((frame.name, seen))
             except OutputError:
                 raise
             except TiltvpError as error:
-                bar.complain(named(file, str(error)))
+                bar.complain(named(frame.name, str(error)))
                 well = False
             bar.advance()
     return found, well

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -17,7 +16,7 @@ from tiltvp.errors import InvalidInputError
 
 if TYPE_CHECKING:
     from tiltvp import TiltFilter
-    from tiltvp.odometry import Motion
+    from tiltvp.streams import Motion
 
 _FILTER = Group("Abstaining and filtering")
 
@@ -32,8 +31,6 @@ class FilterOptions(LibraryOptions):
     """Least confidence: images below are marked as not accepted, not made level, and with --filter not fused."""
     filter: Switch = False
     """Fuse the images in their order, as taken one after the other on a drive: columns filtered_... and verdicts."""
-    odometry: Path | None = None
-    """CSV of the motion that led to each image: yaw_rad or yaw_deg, distance_m; file, or one row for each image."""
     estimate_mounting: Switch = False
     """Also estimate a lean of the robot itself, which turning tells from that of the floor: printed, and in columns
     mounting_... of the table."""
@@ -42,7 +39,7 @@ class FilterOptions(LibraryOptions):
 
     def check(self) -> None:
         """Refuses what cannot be, before any work is done."""
-        for name in ("odometry", "filter_plot", *self._keywords):
+        for name in ("filter_plot", *self._keywords):
             given = getattr(self, name) not in (None, False)
             if given and name != "confidence_min" and not self.filter:
                 raise InvalidInputError(f"--{name.replace('_', '-')} without --filter, expected both")
@@ -56,45 +53,50 @@ class FilterOptions(LibraryOptions):
 
         return TiltFilter(**self.given())
 
-    def motions(self, files: Sequence[Path]) -> list[Motion]:
-        """What the robot did between the images; nothing that is known without odometry."""
-        from tiltvp.odometry import Motion, read_odometry
-
-        return [Motion()] * len(files) if self.odometry is None else read_odometry(self.odometry, files)
-
     def accepts(self, confidence: float) -> bool:
         """Whether an image is sure enough of itself."""
         return self.confidence_min is None or confidence >= self.confidence_min
 
-    def judged(self, outcomes: Iterable[Outcome], motions: Sequence[Motion]) -> Iterator[Outcome]:
-        """The outcomes with what was made of them, as they come."""
-        if self.filter:
-            yield from _filtered(outcomes, motions, self.make())
-        elif self.confidence_min is not None:
-            yield from map(self._marked, outcomes)
-        else:
-            yield from outcomes
+    def judge(self) -> Judge:
+        """What makes something of the outcomes, which are given in the order of the frames."""
+        return Judge(self, self.make() if self.filter else None)
 
-    def _marked(self, outcome: Outcome) -> Outcome:
+
+@dataclass(frozen=True)
+class Judge:
+    """Makes the verdict of each outcome."""
+
+    options: FilterOptions
+    filter: TiltFilter | None
+
+    def __call__(self, outcome: Outcome, motion: Motion | None) -> Outcome:
+        """The outcome with what was made of it; `motion` is what the robot did since the last, None: nobody knows."""
+        if self.filter is not None:
+            return _filtered(outcome, motion, self.filter)
+        if self.options.confidence_min is not None:
+            return self._marked(outcome, self.options.confidence_min)
+        return outcome
+
+    def _marked(self, outcome: Outcome, least: float) -> Outcome:
         e = outcome.estimate
         if e is None:
             return replace(outcome, accepted=False, verdict="no-image", verdict_reason=outcome.error)
         if not e:
             return replace(outcome, accepted=False, verdict="no-tilt", verdict_reason=e.reason)
-        words = f"confidence {e.confidence:.3f}, at least {self.confidence_min:.3f} expected"
-        if self.accepts(e.confidence):
+        words = f"confidence {e.confidence:.3f}, at least {least:.3f} expected"
+        if e.confidence >= least:
             return replace(outcome, accepted=True, verdict="accepted", verdict_reason=words)
         return replace(outcome, accepted=False, verdict="low-confidence", verdict_reason=words)
 
 
-def _filtered(outcomes: Iterable[Outcome], motions: Sequence[Motion], filter_: TiltFilter) -> Iterator[Outcome]:
-    for outcome, motion in zip(outcomes, motions, strict=True):
-        filter_.predict(motion.yaw_rad, motion.distance_m)
-        if outcome.estimate is None:
-            told = replace(outcome, accepted=False, verdict="no-image", verdict_reason=outcome.error)
-        else:
-            step = filter_.update(outcome.estimate)
-            told = replace(
-                outcome, accepted=step.accepted, verdict=step.verdict, verdict_reason=step.reason, nis=step.nis
-            )
-        yield replace(told, filtered=filter_.estimate, mounting=filter_.mounting)
+def _filtered(outcome: Outcome, motion: Motion | None, filter_: TiltFilter) -> Outcome:
+    if motion is None:
+        words = "the odometry does not tell of its time"
+        return replace(outcome, accepted=False, verdict="no-odometry", verdict_reason=words)
+    filter_.predict(motion.yaw_rad, motion.distance_m)
+    if outcome.estimate is None:
+        told = replace(outcome, accepted=False, verdict="no-image", verdict_reason=outcome.error)
+    else:
+        step = filter_.update(outcome.estimate)
+        told = replace(outcome, accepted=step.accepted, verdict=step.verdict, verdict_reason=step.reason, nis=step.nis)
+    return replace(told, filtered=filter_.estimate, mounting=filter_.mounting)

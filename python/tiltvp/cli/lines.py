@@ -9,6 +9,7 @@ from tiltvp.cli.each_image import find_in_each
 from tiltvp.cli.line_options import LineOptions
 from tiltvp.cli.options import CameraOptions
 from tiltvp.cli.results import degrees
+from tiltvp.cli.sources import SourceOptions
 from tiltvp.cli.tables import Table, check_ending, write_table
 from tiltvp.cli.terminal import new_table, show
 from tiltvp.files import check_output_folder
@@ -16,26 +17,28 @@ from tiltvp.files import check_output_folder
 if TYPE_CHECKING:
     from tiltvp.lines import Lines
 
-_DEFAULTS = LineOptions()
+_DEFAULTS, _SOURCE = LineOptions(), SourceOptions()
 
 
 def lines(
-    images: list[str],
+    images: list[str] | None = None,
     /,
     *,
     camera: CameraOptions,
     options: LineOptions = _DEFAULTS,
     out: Path | None = None,
     overlay: Path | None = None,
+    source: SourceOptions = _SOURCE,
 ) -> int:
     """Find the vertical lines of each image.
 
-    Images that cannot be read are named on stderr, the others are done, and the exit code is 1.
+    Frames that cannot be read are named on stderr, the others are done, and the exit code is 1.
 
     Parameters
     ----------
     images
-        Image files, folders of images, and glob patterns.
+        Image files, folders of images and glob patterns; or one video or recording of ROS; or -, for names of files
+        on stdin.
     out
         File for the lines in radians, one row for each: .csv, .json or .parquet.
     overlay
@@ -50,7 +53,8 @@ def lines(
     lens = camera.load()
     extractor, tilt = options.extractor(lens), options.tilts(lens)
     found, well = find_in_each(
-        images,
+        images or [],
+        source,
         lambda gray: extractor(gray, tilt(gray)),
         overlay,
         lambda gray, seen: draw_lines(gray, lens, seen, extractor.robot_from_camera),

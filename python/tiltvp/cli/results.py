@@ -51,6 +51,8 @@ class Outcome:
     nis: float | None = None
     filtered: FilteredTilt | None = None
     """What the filter held to be true after it; None without a filter."""
+    taken_s: float | None = None
+    """When the image was taken, by the clock of its source; None where that does not tell."""
     mounting: FilteredTilt | None = None
     """The lean of the robot itself that the filter held to be true after it; None where nobody asked."""
 
@@ -172,11 +174,14 @@ def _people_row(outcome: Outcome) -> dict[str, str]:
 def outcome_table(outcomes: Sequence[Outcome], method: str) -> Table:
     """One row for each image in SI units; None where there is no value, `error` where the image could not be used.
 
-    Judged outcomes have `accepted`, `verdict` and `verdict_reason`; those of a filter also `nis`, and the filtered tilt
-    in columns `filtered_...`, None where the filter abstains but for covariance, sigma and confidence. The lean of the
-    robot itself, where it was asked for, is in columns `mounting_...`.
+    `taken_s` is there where images tell when they were taken. Judged outcomes have `accepted`, `verdict` and
+    `verdict_reason`; those of a filter also `nis`, and the filtered tilt in columns `filtered_...`, None where the
+    filter abstains but for covariance, sigma and confidence. The lean of the robot itself, where it was asked for, is
+    in columns `mounting_...`.
     """
     types = {"file": "String", "method": "String"}
+    if any(outcome.taken_s is not None for outcome in outcomes):
+        types |= {"taken_s": "Float64"}
     types |= dict.fromkeys(_NUMBERS, "Float64") | dict.fromkeys(_COUNTS, "Int64")
     types |= dict.fromkeys(_MORE_NUMBERS, "Float64") | dict.fromkeys(_WORDS, "String")
     if any(outcome.accepted is not None for outcome in outcomes):
@@ -185,7 +190,10 @@ def outcome_table(outcomes: Sequence[Outcome], method: str) -> Table:
         types |= {"nis": "Float64"} | {f"filtered_{name}": "Float64" for name in _NUMBERS}
     if any(outcome.mounting is not None for outcome in outcomes):
         types |= {f"mounting_{name}": "Float64" for name in _NUMBERS}
-    rows = [{"file": str(outcome.file), "method": method} | _row(outcome) | _judged(outcome) for outcome in outcomes]
+    rows = [
+        {"file": str(outcome.file), "method": method, "taken_s": outcome.taken_s} | _row(outcome) | _judged(outcome)
+        for outcome in outcomes
+    ]
     return Table(types, [{name: finite(row.get(name)) for name in types} for row in rows])
 
 

@@ -12,6 +12,7 @@ from tiltvp.cli.declared_options import LibraryOptions, from_library
 from tiltvp.cli.each_image import find_in_each
 from tiltvp.cli.options import CameraOptions
 from tiltvp.cli.results import degrees
+from tiltvp.cli.sources import SourceOptions
 from tiltvp.cli.tables import Table, check_ending, write_table
 from tiltvp.cli.terminal import new_table, show
 from tiltvp.files import check_output_folder
@@ -29,26 +30,28 @@ class SegmentOptions(LibraryOptions):
     """What a straight edge is."""
 
 
-_DEFAULTS = SegmentOptions()
+_DEFAULTS, _SOURCE = SegmentOptions(), SourceOptions()
 
 
 def segments(
-    images: list[str],
+    images: list[str] | None = None,
     /,
     *,
     camera: CameraOptions,
     options: SegmentOptions = _DEFAULTS,
     out: Path | None = None,
     overlay: Path | None = None,
+    source: SourceOptions = _SOURCE,
 ) -> int:
     """Find the straight edges of each image, as arcs of great circles.
 
-    Images that cannot be read are named on stderr, the others are done, and the exit code is 1.
+    Frames that cannot be read are named on stderr, the others are done, and the exit code is 1.
 
     Parameters
     ----------
     images
-        Image files, folders of images, and glob patterns.
+        Image files, folders of images and glob patterns; or one video or recording of ROS; or -, for names of files
+        on stdin.
     out
         File for the edges in the camera frame, radians, one row for each: .csv, .json or .parquet.
     overlay
@@ -63,7 +66,9 @@ def segments(
         check_output_folder(overlay)
     lens = camera.load()
     detector = SegmentDetector(lens, **options.given())
-    found, well = find_in_each(images, detector, overlay, lambda gray, seen: draw_segments(gray, lens, seen))
+    found, well = find_in_each(
+        images or [], source, detector, overlay, lambda gray, seen: draw_segments(gray, lens, seen)
+    )
     printed = new_table(None, ("file", "edges", "pixels", "longest deg", "median deg", "median rms px"), ["file"])
     for image, seen in found:
         printed.add_row(image, *_summary(seen))

@@ -4,19 +4,21 @@ from __future__ import annotations
 
 import os
 import time
-from collections.abc import Callable, Generator, Iterator, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from collections import deque
+from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import closing
 from dataclasses import dataclass
+from itertools import repeat
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, TypeVar
 
 from cyclopts import Parameter, validators
 
 from tiltvp.cli.filtering import FilterOptions
-from tiltvp.cli.inputs import distinct_names, find_images
 from tiltvp.cli.options import CameraOptions, MethodOptions
 from tiltvp.cli.results import Outcome, degrees, mounting_words, outcome_table, people_table, summary_words
+from tiltvp.cli.sources import MotionOptions, SourceOptions, ending_at_interrupt, picture_names
 from tiltvp.cli.tables import STDOUT, check_ending, json_lines, write_table
 from tiltvp.cli.terminal import ProgressBar, complain, named, progress_bar, say, show, width
 from tiltvp.errors import InvalidInputError, OutputError, TiltvpError
@@ -28,32 +30,40 @@ if TYPE_CHECKING:
 
     from tiltvp import EdgeElements, TiltEstimate, TiltEstimator
     from tiltvp._core import Camera
+    from tiltvp.streams import Frame, Frames
 
 _METHOD_DEFAULTS = MethodOptions()
 _FILTER_DEFAULTS = FilterOptions()
+_SOURCE, _MOTION = SourceOptions(), MotionOptions()
 T = TypeVar("T")
 
 
 def tilt(
-    images: list[str],
+    images: list[str] | None = None,
     /,
     *,
     camera: CameraOptions,
+    source: SourceOptions = _SOURCE,
     method: MethodOptions = _METHOD_DEFAULTS,
     filtering: FilterOptions = _FILTER_DEFAULTS,
+    motion: MotionOptions = _MOTION,
+    wheel_base: Annotated[float | None, Parameter(validator=validators.Number(gt=0))] = None,
     out: Annotated[Path | None, Parameter(allow_leading_hyphen=True)] = None,
     overlay: Path | None = None,
     level: Path | None = None,
     threads: Annotated[int, Parameter(validator=validators.Number(gte=1))] = 1,
 ) -> int:
-    """Estimate the tilt of each image.
+    """Estimate the tilt of each image, of files, a video, a recording of ROS or a live camera.
 
-    Images that cannot be read are named on stderr, the others are done, and the exit code is 1.
+    Frames that cannot be read are named on stderr, the others are done, and the exit code is 1.
 
     Parameters
     ----------
     images
-        Image files, folders of images, and glob patterns.
+        Image files, folders of images and glob patterns; or one video or recording of ROS; or -, for names of files
+        on stdin.
+    wheel_base
+        Distance between the wheels, metres, for odometry of wheels with --filter.
     out
         File for the results in radians: .csv, .json or .parquet; - for a line of JSON on stdout as each image is done.
     overlay
@@ -63,6 +73,8 @@ def tilt(
     threads
         How many images are worked on at the same time.
     """
+    from tiltvp.streams import Motion
+
     rows_only = out == STDOUT
     if out is not None and not rows_only:
         check_ending(out)
@@ -72,27 +84,28 @@ def tilt(
         if folder is not None:
             check_output_folder(folder)
     filtering.check()
+    if not filtering.filter:
+        motion.refuse("--filter", wheel_base)
     estimator = method.estimator(camera.load())
-    files, problems = find_images(images)
-    for problem in problems:
-        complain(problem)
-    motions = filtering.motions(files)
-    estimator = _checked(estimator, files)
-    names = distinct_names(files)
-    work = Work(estimator, overlay, level, filtering)
+    frames = source.open(images or [])
+    moved = motion.motions(frames, wheel_base) if filtering.filter else None
+    motions: Iterable[Motion | None] = repeat(Motion()) if moved is None else moved.motions
+    estimator = _checked(estimator, frames)
+    work, judge = Work(estimator, overlay, level, filtering), filtering.judge()
     outcomes: list[Outcome] = []
-    with closing(_done(work, files, names, threads)) as done:
-        for outcome, name in zip(filtering.judged(done, motions), names, strict=True):
+    with ending_at_interrupt(frames) as coming, closing(_done(work, coming, frames, threads)) as done:
+        for (frame, name, found), driven in zip(done, motions, strict=False):
+            outcome = judge(found, driven)
             outcomes.append(outcome)
             if filtering.filter:
-                work.write_level(outcome, name)
+                work.write_level(frame, outcome, name)
             if rows_only:
                 say(json_lines(outcome_table([outcome], estimator.method)))
     if not rows_only:
         _show(outcomes, estimator.method, filtering, out)
     if filtering.filter_plot is not None:
         _write_plot(outcomes, estimator.method, filtering.filter_plot)
-    return 1 if problems or any(outcome.error for outcome in outcomes) else 0
+    return 1 if frames.problems or any(outcome.error for outcome in outcomes) else 0
 
 
 def _show(outcomes: Sequence[Outcome], method: str, filtering: FilterOptions, out: Path | None) -> None:
@@ -112,16 +125,17 @@ they have in common is of the camera, not of the place. Of each part of the inpu
 """
 
 
-def _checked(estimator: TiltEstimator, files: Sequence[Path]) -> TiltEstimator:
-    """The estimator without the dark surround and the body of the robot that the images have, if no mask is given; a
-    line on stderr says so of each, and one if they speak against the mounting.
+def _checked(estimator: TiltEstimator, frames: Frames) -> TiltEstimator:
+    """The estimator without the dark surround and the body of the robot that the frames have, if no mask is given; a
+    line on stderr says so of each, and one if they speak against the mounting. Of frames that come only once nothing is
+    looked at first.
     """
     import numpy as np
 
     from tiltvp import body_mask, check_setup, surround_mask
 
     camera = estimator.camera
-    images = list(_spread(files, _FEW, camera))
+    images = list(_spread(frames, _FEW, camera))
     if len(images) < _FEW:
         return estimator
     mask = estimator.options["mask"]
@@ -129,7 +143,7 @@ def _checked(estimator: TiltEstimator, files: Sequence[Path]) -> TiltEstimator:
         if (mask := surround_mask(images, camera)) is not None:
             share = 100.0 * float(np.mean(mask))
             complain(f"--mask: none, and the images have a dark surround: {share:.0f} % within its rim are looked at")
-        body = body_mask(_spread(files, _MANY, camera), camera, mask=mask)
+        body = body_mask(_spread(frames, _MANY, camera), camera, mask=mask)
         if body:
             complain(f"--mask: none, and in {body.reason}: they are the robot's own, and left out")
             mask = body.mask if mask is None else mask & body.mask
@@ -143,20 +157,30 @@ def _checked(estimator: TiltEstimator, files: Sequence[Path]) -> TiltEstimator:
     return estimator
 
 
-def _spread(files: Sequence[Path], count: int, camera: Camera) -> Iterator[NDArray[np.uint8]]:
-    """An image of each of so many parts of the input: of the first files in it, one that can be used."""
-    from tiltvp import read_image
+def _spread(frames: Frames, parts: int, camera: Camera) -> Iterator[NDArray[np.uint8]]:
+    """An image of each of so many parts of the source: of the first frames in it, one that can be used."""
+    from tiltvp.streams.image_files import ImageFiles
 
-    for part in range(count):
-        start, end = (k * len(files) // count for k in (part, part + 1))
-        for file in files[start : min(end, start + _TRIES)]:
-            try:
-                image = read_image(file)
-            except TiltvpError:
-                continue  # It is named when its turn comes.
-            if image.shape[:2] == (camera.height, camera.width):
-                yield image
-                break
+    count = frames.count or 0
+    # Files of a folder may be anything; a video or a recording has images of one kind.
+    tries = _TRIES if isinstance(frames, ImageFiles) else 1
+    starts = [part * count // parts for part in range(parts + 1)]
+    tried = [
+        (part, number)
+        for part in range(parts)
+        for number in range(starts[part], min(starts[part + 1], starts[part] + tries))
+    ]
+    had = -1
+    for (part, _), frame in zip(tried, frames.sample([number for _, number in tried]) if tried else (), strict=False):
+        if part == had:
+            continue
+        try:
+            image = frame.read()
+        except TiltvpError:
+            continue  # It is named when its turn comes.
+        if image.shape[:2] == (camera.height, camera.width):
+            had = part
+            yield image
 
 
 def _write_plot(outcomes: Sequence[Outcome], method: str, path: Path) -> None:
@@ -167,19 +191,33 @@ def _write_plot(outcomes: Sequence[Outcome], method: str, path: Path) -> None:
     write_image(path, figure_picture(filtered_tilt(outcome_table(outcomes, method).frame())))
 
 
-def _done(work: Work, files: Sequence[Path], names: Sequence[str], threads: int) -> Generator[Outcome, None, None]:
-    """The outcomes in the order of the files, each as soon as it is there."""
-    with progress_bar(len(files), "images") as bar:
+def _done(
+    work: Work, coming: Iterator[Frame], frames: Frames, threads: int
+) -> Generator[tuple[Frame, str, Outcome], None, None]:
+    """The frames with names and outcomes, in their order, each as soon as it is there."""
+    named_frames = zip(coming, picture_names(frames), strict=False)
+    with progress_bar(frames.count or 0, "images") as bar:
         if threads == 1:
-            for file, name in zip(files, names, strict=True):
-                yield _noted(work(file, name), bar)
+            for frame, name in named_frames:
+                yield frame, name, _noted(work(frame, name), bar)
             return
         pool = ThreadPoolExecutor(threads)
+        # As many more than can be worked on wait decoded; a source may have more frames than the memory holds.
+        waiting: deque[tuple[Frame, str, Future[Outcome]]] = deque()
         try:
-            for outcome in pool.map(work, files, names):
-                yield _noted(outcome, bar)
+            for frame, name in named_frames:
+                waiting.append((frame, name, pool.submit(work, frame, name)))
+                if len(waiting) > 2 * threads:
+                    yield _first(waiting, bar)
+            while waiting:
+                yield _first(waiting, bar)
         finally:
             pool.shutdown(cancel_futures=True)
+
+
+def _first(waiting: deque[tuple[Frame, str, Future[Outcome]]], bar: ProgressBar) -> tuple[Frame, str, Outcome]:
+    frame, name, outcome = waiting.popleft()
+    return frame, name, _noted(outcome.result(), bar)
 
 
 def _noted(outcome: Outcome, bar: ProgressBar) -> Outcome:
@@ -198,23 +236,23 @@ class Work:
     level: Path | None
     filtering: FilterOptions
 
-    def __call__(self, file: Path, name: str) -> Outcome:
+    def __call__(self, frame: Frame, name: str) -> Outcome:
         """Estimates, and writes the pictures asked for; any problem of this image becomes its outcome.
 
         Raises `OutputError`, which all images would have.
         """
         try:
-            return self._run(file, name)
+            return self._run(frame, name)
         except OutputError:
             raise
         except TiltvpError as error:
-            return Outcome(file, error=" ".join(str(error).split()))
+            return Outcome(Path(frame.name), error=" ".join(str(error).split()), taken_s=frame.time_s)
 
-    def _run(self, file: Path, name: str) -> Outcome:
-        from tiltvp import level, read_image, write_image
+    def _run(self, frame: Frame, name: str) -> Outcome:
+        from tiltvp import level, write_image
         from tiltvp.images import gray_from
 
-        image = read_image(file)
+        file, image = Path(frame.name), frame.read()
         gray = gray_from(image)
         if self.overlay is None:
             estimate, time_s = _timed(lambda: self.estimator(gray))
@@ -224,15 +262,14 @@ class Work:
         accepted = estimate and self.filtering.accepts(estimate.confidence)
         if self.level is not None and accepted and not self.filtering.filter:
             write_image(self.level / f"{name}.png", level(image, self.estimator, estimate))
-        return Outcome(file, estimate, time_s)
+        return Outcome(file, estimate, time_s, taken_s=frame.time_s)
 
-    def write_level(self, outcome: Outcome, name: str) -> None:
+    def write_level(self, frame: Frame, outcome: Outcome, name: str) -> None:
         """The image made level by what the filter held to be true after it, where it did."""
-        from tiltvp import level, read_image, write_image
+        from tiltvp import level, write_image
 
         if self.level is not None and outcome.filtered and outcome.error is None:
-            image = read_image(outcome.file)
-            write_image(self.level / f"{name}.png", level(image, self.estimator, outcome.filtered))
+            write_image(self.level / f"{name}.png", level(frame.read(), self.estimator, outcome.filtered))
 
     def _overlay(
         self, gray: NDArray[np.uint8], estimate: TiltEstimate, edges: EdgeElements, title: str

@@ -6,15 +6,15 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any, Final
 
 from cyclopts import Group, Parameter, validators
 
 from tiltvp.cli.declared_options import LibraryOptions, from_library
-from tiltvp.cli.frames import Frames, open_frames
 from tiltvp.cli.line_options import LineOptions
 from tiltvp.cli.lines import LINE_TYPES, line_columns
 from tiltvp.cli.options import CameraOptions
+from tiltvp.cli.sources import MotionOptions, SourceOptions, ending_at_interrupt
 from tiltvp.cli.tables import Table, check_ending, check_plot, write_table
 from tiltvp.cli.terminal import ProgressBar, named, progress_bar, say
 from tiltvp.errors import InvalidInputError, TiltvpError
@@ -27,7 +27,10 @@ if TYPE_CHECKING:
     from tiltvp import TiltEstimate
     from tiltvp.line_logs import FollowedFrame
     from tiltvp.lines import LineExtractor, LineTracker, TrackedLines
-    from tiltvp.odometry import Motion
+    from tiltvp.streams import Frame, FrameMotions
+
+    Seen = tuple[int, str, float | None, TrackedLines]
+    """Number, name and time of a frame, and its lines."""
 
 
 @Parameter(name="*", group=Group("Tracking"))
@@ -37,17 +40,19 @@ class TrackerOptions(LibraryOptions):
     """How lines are followed."""
 
 
-_DEFAULTS, _TRACKER = LineOptions(), TrackerOptions()
+_DEFAULTS, _TRACKER, _SOURCE, _MOTION = LineOptions(), TrackerOptions(), SourceOptions(), MotionOptions()
 
 
 def track(
-    source: str,
+    source: str | None = None,
     /,
     *,
     camera: CameraOptions,
+    frames_of: SourceOptions = _SOURCE,
     options: LineOptions = _DEFAULTS,
     out: Path,
-    odometry: Path | None = None,
+    motion: MotionOptions = _MOTION,
+    wheel_base: Annotated[float | None, Parameter(validator=validators.Number(gt=0))] = None,
     plot: Path | None = None,
     video: Path | None = None,
     frame_rate: Annotated[float | None, Parameter(validator=validators.Number(gt=0))] = None,
@@ -60,11 +65,11 @@ def track(
     Parameters
     ----------
     source
-        Folder of images, glob pattern, or video.
+        Folder of images, glob pattern, video or recording of ROS; or - for names of files on stdin.
     out
         File for the tracks in radians, one row for each line of each frame: .csv, .json or .parquet.
-    odometry
-        CSV of the motion that led to each frame: yaw_rad or yaw_deg; file, or one row for each frame.
+    wheel_base
+        Distance between the wheels, metres, for odometry of wheels.
     plot
         Picture of the bearings over the frames, one colour for each track (.png).
     video
@@ -74,7 +79,6 @@ def track(
     """
     from tiltvp.images import write_image
     from tiltvp.lines import LineTracker
-    from tiltvp.odometry import read_odometry
     from tiltvp.overlays.lines import draw_lines
     from tiltvp.videos import video_writer
 
@@ -85,20 +89,23 @@ def track(
     lens = camera.load()
     extractor, tilt = options.extractor(lens), options.tilts(lens)
     tracker = LineTracker(**tracking.given())
-    frames = open_frames(source)
-    motions = None if odometry is None else read_odometry(odometry, frames.files)
-    tracked: list[tuple[int, str, TrackedLines]] = []
+    frames = frames_of.open([] if source is None else [source])
+    motions = needed_turns(motion.motions(frames, wheel_base))
+    drive = Drive(extractor, tracker, tilt, motions)
+    tracked: list[Seen] = []
     showing = nullcontext() if video is None else video_writer(video, frame_rate or frames.rate_hz)
-    with showing as film, progress_bar(len(frames.files), "frames") as bar:
-        for frame in followed(frames, extractor, tracker, tilt, motions, bar):
-            found = frame.tracked
-            tracked.append((frame.number, str(frames.files[frame.number]), found))
+    with (
+        showing as film,
+        ending_at_interrupt(frames) as coming,
+        progress_bar(frames.count or 0, "frames") as bar,
+    ):
+        for frame, seen in drive.followed(coming, bar):
+            tracked.append((seen.number, frame.name, frame.time_s, seen.tracked))
             if film is not None:
-                rotation, tracks = extractor.robot_from_camera, found.track.tolist()
-                film.add(draw_lines(frame.gray, lens, found.lines, rotation, tracks=tracks))
-    bad = len(frames.files) - len(tracked)
+                rotation, tracks = extractor.robot_from_camera, seen.tracked.track.tolist()
+                film.add(draw_lines(seen.gray, lens, seen.tracked.lines, rotation, tracks=tracks))
     if not tracked:
-        raise InvalidInputError(f"{source}: {bad} frames, none of which can be read")
+        raise InvalidInputError(f"{frames.source}: {drive.bad} frames, none of which can be read")
     table = track_table(tracked)
     write_table(table, out)
     if plot is not None:
@@ -106,37 +113,76 @@ def track(
         from tiltvp.lab.plots.tracks import track_plot
 
         write_image(plot, figure_picture(track_plot(table.frame())))
-    skipped = f", {bad} skipped" if bad else ""
+    skipped = f", {drive.bad} skipped" if drive.bad else ""
     say(f"{out}: {len(tracked)} frames{skipped}, {len(table.rows)} lines, {tracker.track_count} tracks")
-    return 1 if bad else 0
+    return 1 if drive.bad or frames.problems else 0
 
 
-def followed(
-    frames: Frames,
-    extractor: LineExtractor,
-    tracker: LineTracker,
-    tilt: Callable[[NDArray[np.uint8]], TiltEstimate | None],
-    motions: Sequence[Motion] | None,
-    bar: ProgressBar,
-) -> Iterator[FollowedFrame]:
-    """The frames that can be used, with their lines; the others are complained about."""
-    from tiltvp.line_logs import follow_lines
-
-    for file, frame in zip(
-        frames.files, follow_lines(frames, extractor, tracker, tilt=tilt, motions=motions), strict=True
-    ):
-        if isinstance(frame, TiltvpError):
-            bar.complain(named(file, str(frame)))
-        else:
-            yield frame
-        bar.advance()
+def needed_turns(motions: FrameMotions | None) -> FrameMotions | None:
+    """The motions, which must tell turns: lines are looked for where these take them."""
+    if motions is not None and not motions.turns_known:
+        raise InvalidInputError("odometry without turns, expected --wheel-base for that of wheels, or other columns")
+    return motions
 
 
-def track_table(tracked: Sequence[tuple[int, str, TrackedLines]]) -> Table:
-    """One row for each line of each frame: frame, file, track, frames_back (0: a new track), and the line's columns."""
-    table = Table({"frame": "UInt32", "file": "String", "track": "Int64"} | LINE_TYPES | {"frames_back": "Int64"})
-    for frame, file, found in tracked:
+class Drive:
+    """The lines of a drive, followed from frame to frame."""
+
+    def __init__(
+        self,
+        extractor: LineExtractor,
+        tracker: LineTracker,
+        tilt: Callable[[NDArray[np.uint8]], TiltEstimate | None],
+        motions: FrameMotions | None,
+    ) -> None:
+        self._parts = extractor, tracker, tilt
+        self._motions = motions
+        self.bad = 0
+        """How many frames could not be used so far."""
+
+    def followed(self, frames: Iterator[Frame], bar: ProgressBar) -> Iterator[tuple[Frame, FollowedFrame]]:
+        """The frames that can be used, with their lines; the others are complained about.
+
+        Frames of whose time the odometry does not tell are left out; a line about them has been told before.
+        """
+        from tiltvp.line_logs import follow_lines
+        from tiltvp.streams import Motion
+
+        extractor, tracker, tilt = self._parts
+        motions = None if self._motions is None else self._motions.motions
+        passed: list[Frame] = []
+
+        def images() -> Iterator[NDArray[np.uint8] | TiltvpError]:
+            for number, frame in enumerate(frames):
+                passed.append(frame)
+                yield _LEFT_OUT if motions is not None and motions[number] is None else frame.image
+
+        driven = None if motions is None else [motion or Motion() for motion in motions]
+        for seen in follow_lines(images(), extractor, tracker, tilt=tilt, motions=driven):
+            frame = passed.pop()
+            if seen is not _LEFT_OUT:
+                if isinstance(seen, TiltvpError):
+                    bar.complain(named(frame.name, str(seen)))
+                    self.bad += 1
+                else:
+                    yield frame, seen
+            bar.advance()
+
+
+_LEFT_OUT: Final = TiltvpError("the odometry does not tell of its time")
+
+
+def track_table(tracked: Sequence[Seen]) -> Table:
+    """One row for each line of each frame: frame, file, track, the line's columns, frames_back (0: a new track).
+
+    Where frames tell their times also time_s.
+    """
+    types = {"frame": "UInt32", "file": "String", "track": "Int64"} | LINE_TYPES | {"frames_back": "Int64"}
+    timed = any(time_s is not None for _, _, time_s, _ in tracked)
+    table = Table(types | ({"time_s": "Float64"} if timed else {}))
+    for number, name, time_s, found in tracked:
         n = len(found)
-        columns = {"frame": [frame] * n, "file": [file] * n, "track": found.track.tolist()}
-        table.add(columns | line_columns(found.lines) | {"frames_back": found.frames_back.tolist()})
+        columns: dict[str, list[Any]] = {"frame": [number] * n, "file": [name] * n, "track": found.track.tolist()}
+        columns |= line_columns(found.lines) | {"frames_back": found.frames_back.tolist()}
+        table.add(columns | {"time_s": [time_s] * n})
     return table

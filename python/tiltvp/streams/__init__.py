@@ -7,6 +7,7 @@ from tiltvp.streams.bag_setup import recorded_camera, robot_from_camera
 from tiltvp.streams.bags import Recording, Topic, is_recording
 from tiltvp.streams.frames import Frame, Frames
 from tiltvp.streams.inertial import InertialSamples
+from tiltvp.streams.live import LiveCamera, NamedImages, RawImages
 from tiltvp.streams.motions import FrameMotions, frame_motions, read_odometry
 from tiltvp.streams.odometry import Motion, Odometry, Travelled
 from tiltvp.streams.sources import open_frames
@@ -17,8 +18,11 @@ __all__ = [
     "FrameMotions",
     "Frames",
     "InertialSamples",
+    "LiveCamera",
     "Motion",
+    "NamedImages",
     "Odometry",
+    "RawImages",
     "Recording",
     "Topic",
     "Travelled",

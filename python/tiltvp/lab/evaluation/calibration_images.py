@@ -16,9 +16,9 @@ from tiltvp.lab.datasets.driving import drive_room
 from tiltvp.lab.datasets.new import in_order
 from tiltvp.line_logs import FollowedFrame, bearing_log, follow_lines
 from tiltvp.lines import LineExtractor, LineTracker
-from tiltvp.odometry import Motion
 from tiltvp.rotations import about_vertical
 from tiltvp.selfcalib import MountingEstimate, SelfCalibrator, calibrate
+from tiltvp.streams import Motion
 from tiltvp.synth import MIRROR_BLIND_RAD, Drive, drive_legs, mirror_camera
 from tiltvp.tilt import TiltEstimator
 

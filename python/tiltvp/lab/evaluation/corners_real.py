@@ -18,7 +18,7 @@ from tiltvp.corner import CornerEstimate, CornerPoseEstimator
 from tiltvp.errors import InvalidInputError
 from tiltvp.images import read_image
 from tiltvp.stereo_rigs import StereoRig
-from tiltvp.videos import VideoReader
+from tiltvp.streams import open_frames
 
 Show = Callable[[int, NDArray[np.uint8], CornerEstimate], None]
 """Takes the number of a frame, its (left) image, and what was found."""
@@ -143,11 +143,12 @@ def tea_box(folder: Path, advance: Callable[[], None] = lambda: None, show: Show
     estimator = CornerPoseEstimator(
         rig.left, rig.right, rig.left_from_right, method="general", down=_down(TEA_BOX_PITCH_DEG)
     )
-    videos = [VideoReader(folder / f"teabox_{side}.mp4") for side in ("left", "right")]
+    videos = [open_frames(folder / f"teabox_{side}.mp4") for side in ("left", "right")]
     rows = []
     frames = 0
-    for place, (left, right) in enumerate(zip(*videos, strict=True)):
+    for place, pair in enumerate(zip(*videos, strict=True)):
         frames += 1
+        left, right = (frame.read() for frame in pair)
         estimate = estimator(left, right)
         if show is not None:
             show(place, left, estimate)

@@ -1,0 +1,207 @@
+"""Where frames and odometry of a verb come from: the options that say so, and the names of what is written for them."""
+
+from __future__ import annotations
+
+import os
+import signal
+import threading
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+from cyclopts import Group, Parameter, validators
+
+from tiltvp.cli.terminal import complain
+from tiltvp.errors import InvalidInputError
+
+if TYPE_CHECKING:
+    from tiltvp.streams import Frame, FrameMotions, Frames, Wheels
+
+__all__ = ["MotionOptions", "SourceOptions", "distinct_names", "ending_at_interrupt", "picture_names", "tell"]
+
+_STDIN = "-"
+_SOURCE = Group("Source", help="Images, a video, or a recording of ROS: docs/recordings.md.")
+_ABOVE_0 = Parameter(validator=validators.Number(gt=0))
+
+
+@Parameter(name="*", group=_SOURCE)
+@dataclass(frozen=True, kw_only=True)
+class SourceOptions:
+    """Where frames come from, where the words do not tell."""
+
+    topic: str | None = None
+    """The topic of a recording's images, where it has several."""
+    live: Annotated[int | None, Parameter(validator=validators.Number(gte=0))] = None
+    """A camera by its number, in place of files; Ctrl-C ends it."""
+    raw: str | None = None
+    """WIDTHxHEIGHT or WIDTHxHEIGHTxCHANNELS of images that come as bytes, BGR, on stdin (-)."""
+
+    def open(self, words: Sequence[str]) -> Frames:
+        """The frames that words and options name; a line on stderr for each that is not there and for what is noted."""
+        from tiltvp.streams import LiveCamera, NamedImages, RawImages, open_frames
+        from tiltvp.streams.live import raw_size
+
+        if self.live is not None and words:
+            raise InvalidInputError(f"--live {self.live} beside {words[0]}, expected one of them")
+        if self.raw is not None and list(words) != [_STDIN]:
+            raise InvalidInputError("--raw without -, the standard input, which it is for")
+        if self.live is not None:
+            return LiveCamera(self.live)
+        if not words:
+            raise InvalidInputError("no source, expected images, a video, a recording, - or --live")
+        if list(words) == [_STDIN]:
+            return NamedImages() if self.raw is None else RawImages(raw_size(self.raw))
+        frames = open_frames(list(words), topic=self.topic)
+        tell(*frames.problems, *frames.notes)
+        return frames
+
+
+@Parameter(name="*", group=Group("Odometry"))
+@dataclass(frozen=True, kw_only=True)
+class MotionOptions:
+    """What the robot did between the frames."""
+
+    odometry: Path | None = None
+    """Table, or recording of ROS, with what the robot did (docs/recordings.md). By default that of the recording that
+    the frames are from, if there is one."""
+    odometry_topic: str | None = None
+    """Its topic in a recording, where that has several: Odometry, JointState or Twist."""
+    wheel_radius: Annotated[float | None, _ABOVE_0] = None
+    """Radius of the wheels, metres, for ticks and the angles of a JointState."""
+    ticks_per_turn: Annotated[float | None, _ABOVE_0] = None
+    """What the counter of a wheel counts in one turn."""
+    wheel_joints: tuple[str, str] | None = None
+    """Names of the joints of the left and the right wheel, where these do not tell."""
+    odometry_gap: Annotated[float, _ABOVE_0] = 0.5
+    """Longest time between two samples that is interpolated, seconds."""
+
+    def refuse(self, needed: str, wheel_base_m: float | None = None) -> None:
+        """Refuses options of odometry where the option that needs it is not given."""
+        given = [field.name for field in fields(self) if getattr(self, field.name) != field.default]
+        given += [] if wheel_base_m is None else ["wheel_base"]
+        if given:
+            raise InvalidInputError(f"--{given[0].replace('_', '-')} without {needed}, expected both")
+
+    def motions(self, frames: Frames, wheel_base_m: float | None) -> FrameMotions | None:
+        """What the robot did up to each frame, None without odometry; a line on stderr for what is noted."""
+        from tiltvp.streams import Wheels, frame_motions
+
+        wheels = Wheels(
+            wheel_base_m=wheel_base_m, wheel_radius_m=self.wheel_radius, ticks_per_turn=self.ticks_per_turn,
+            joints=self.wheel_joints, gap_max_s=self.odometry_gap,
+        )  # fmt: skip
+        if self.odometry is None:
+            return self._of_recording(frames, wheels)
+        found = frame_motions(frames, self.odometry, topic=self.odometry_topic, wheels=wheels)
+        tell(*found.notes)
+        return found
+
+    def _of_recording(self, frames: Frames, wheels: Wheels) -> FrameMotions | None:
+        """What the recording of the frames tells; None where it tells nothing and nobody asked."""
+        from tiltvp.streams import frame_motions
+
+        if frames.recording is None:
+            if self.odometry_topic is not None:
+                raise InvalidInputError(f"--odometry-topic {self.odometry_topic}: no recording, expected --odometry")
+            return None
+        try:
+            found = frame_motions(frames, frames.recording, topic=self.odometry_topic, wheels=wheels)
+        except InvalidInputError as error:
+            if self.odometry_topic is not None:
+                raise
+            tell(f"no odometry: {error}")
+            return None
+        tell(f"--odometry: not given, that of {frames.recording} is taken", *found.notes)
+        return found
+
+
+def tell(*lines: str) -> None:
+    """Lines on stderr."""
+    for line in lines:
+        complain(line)
+
+
+@contextmanager
+def ending_at_interrupt(frames: Frames) -> Iterator[Iterator[Frame]]:
+    """The frames; those of a live camera end at the first Ctrl-C, after which what is begun is finished."""
+    from tiltvp.streams import LiveCamera
+
+    if not isinstance(frames, LiveCamera) or threading.current_thread() is not threading.main_thread():
+        yield iter(frames)
+        return
+    stop = threading.Event()
+
+    def note(*_: object) -> None:
+        if stop.is_set():
+            raise KeyboardInterrupt
+        stop.set()
+
+    def until() -> Iterator[Frame]:
+        for frame in frames:
+            yield frame
+            if stop.is_set():
+                return
+
+    before = signal.signal(signal.SIGINT, note)
+    try:
+        yield until()
+    finally:
+        signal.signal(signal.SIGINT, before)
+
+
+def picture_names(frames: Frames) -> Iterator[str]:
+    """A name without ending for what is written for each frame: of files that of the file, else source and number."""
+    from tiltvp.streams.image_files import ImageFiles
+
+    if isinstance(frames, ImageFiles):
+        yield from distinct_names(frames.files)
+        return
+    stem = {_STDIN: "frame"}.get(frames.source, Path(frames.source).stem.replace(" ", "_"))
+    number = 0
+    while True:
+        yield f"{stem}_{number:06d}"
+        number += 1
+
+
+def distinct_names(files: Sequence[Path]) -> list[str]:
+    """A name without ending for each file: its stem, with folders in front and the ending behind where stems are equal.
+
+    Names that differ only in case count as equal, as some file systems have it.
+    """
+    groups: dict[str, list[int]] = {}
+    for i, file in enumerate(files):
+        groups.setdefault(file.stem.lower(), []).append(i)
+    names = [file.stem for file in files]
+    for places in groups.values():
+        if len(places) > 1:
+            for i, name in zip(places, _told_apart([files[i] for i in places]), strict=True):
+                names[i] = name
+    return _numbered(names)
+
+
+def _told_apart(files: Sequence[Path]) -> list[str]:
+    """Names for files of one stem: as few folders as tell them apart, and the endings if one folder has several."""
+    folders = [Path(os.path.abspath(file)).parent.parts[1:] for file in files]
+    several = len(set(folders)) < len(folders)
+    ends = [f"{file.stem}_{file.suffix.lstrip('.')}" if several else file.stem for file in files]
+    for depth in range(0 if len(set(folders)) == 1 else 1, max(map(len, folders)) + 1):
+        names = [
+            "_".join([*parts[max(0, len(parts) - depth) :], end]) for parts, end in zip(folders, ends, strict=True)
+        ]
+        if len({name.lower() for name in names}) == len(names):
+            return names
+    return ["_".join([*parts[-1:], end]) for parts, end in zip(folders, ends, strict=True)]
+
+
+def _numbered(names: list[str]) -> list[str]:
+    """The names, with a number where two are still equal."""
+    taken: set[str] = set()
+    for i, name in enumerate(names):
+        number, candidate = 2, name
+        while candidate.lower() in taken:
+            candidate, number = f"{name}_{number}", number + 1
+        names[i] = candidate
+        taken.add(candidate.lower())
+    return names
