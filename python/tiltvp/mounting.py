@@ -1,4 +1,4 @@
-"""Roll and pitch of a camera's mounting, from the tilts of a drive: what stays when the robot turns is not the floor's."""
+"""Roll and pitch of a camera's mounting from the tilts of a drive: what stays when the robot turns."""
 
 from __future__ import annotations
 
@@ -62,7 +62,8 @@ class MountingTilt:
         if not self:
             if not self.used:
                 return f"{told}: no image tells a tilt"
-            return f"{told}: the floor's tilt and the mounting's are not told apart; turn in place, or say that it is level"
+            need = "expected a robot that turns in place, or a floor that is said to be level"
+            return f"{told}: the floor's tilt and the mounting's are not told apart, {need}"
         off, sigma = math.degrees(self.lean.alpha_rad), math.degrees(self.lean.sigma_rad)
         return f"{told}: the mounting is {off:.3f} degrees off, 1-sigma {sigma:.3f}"
 
@@ -96,9 +97,7 @@ def mounting_tilt(
     """
     rotation = rotation_from(np.asarray(robot_from_camera, dtype=np.float64).tolist(), "robot_from_camera")
     floor = {"prior_rad": _LEVEL_RAD, "walk_rad_per_sqrt_m": 0.0, "walk_rad_per_sqrt_step": 0.0} if level_floor else {}
-    held = TiltFilter(
-        estimate_mounting=True, mounting_prior_rad=_PRIOR_RAD, mounting_walk_rad_per_sqrt_m=0.0, **floor
-    )
+    held = TiltFilter(estimate_mounting=True, mounting_prior_rad=_PRIOR_RAD, mounting_walk_rad_per_sqrt_m=0.0, **floor)
     given = list(estimates)
     if len(given) != len(motions):
         raise InvalidInputError(f"motions: {len(motions)}, expected {len(given)}, one for each image")

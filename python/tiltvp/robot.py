@@ -1,8 +1,9 @@
-"""What is known of a robot with a camera, in one file: calibration, mounting, mask, wheels, topics of its recordings."""
+"""What is known of a robot with a camera, in one file: calibration, mounting, mask, wheels, topics."""
 
 from __future__ import annotations
 
 import os
+import re
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, Self
@@ -24,11 +25,12 @@ if TYPE_CHECKING:
 
     from tiltvp.tilt import TiltEstimator
 
-__all__ = ["TOPICS", "Robot", "mask_path"]
+__all__ = ["TOPICS", "Robot", "is_robot", "mask_path"]
 
 TOPICS: Final = ("images", "odometry", "joints", "inertial")
 """What a recording may have topics of."""
 _WHEELS: Final = ("wheel_base_m", "wheel_radius_m", "ticks_per_turn")
+_MARK: Final = re.compile(rf"^[^\S\n]*format[^\S\n]*=[^\S\n]*[\"']{ROBOT_FORMAT}[\"']", re.MULTILINE)
 _BRIGHT: Final = 127
 """Grey level above which a mask's image shows the world."""
 
@@ -117,6 +119,15 @@ class Robot:
 
         own = {"robot_from_camera": self.robot_from_camera, "mask": self.mask}
         return TiltEstimator(self.camera, **(own | options))
+
+
+def is_robot(path: str | os.PathLike[str]) -> bool:
+    """Whether it is a robot's file, and no other calibration; whoever reads it says what is wrong with it."""
+    try:
+        text = Document.load(path).text
+    except CalibrationError:
+        return False
+    return _MARK.search(text) is not None
 
 
 def mask_path(path: Path) -> Path:

@@ -74,8 +74,9 @@ def read_rotation(source: str | os.PathLike[str]) -> Matrix:
     """The (3, 3) rotation `R` of v_robot = R v_camera that a word of `ROTATION_WORDS` or a file names.
 
     A file is nine numbers as text (white space or commas), or JSON, TOML or YAML with the key `robot_from_camera`, or
-    `quaternion` in the order [x, y, z, w]; or a robot's file (`tiltvp.Robot`). What is within 1e-3 of a rotation is taken as the nearest rotation. Raises
-    `CalibrationError` with the file, what is wrong and what was expected; `InvalidInputError` for an unknown word.
+    `quaternion` in the order [x, y, z, w]; or a robot's file, of `tiltvp setup`. What is within 1e-3 of a rotation is
+    taken as the nearest rotation. Raises `CalibrationError` with the file, what is wrong and what was expected;
+    `InvalidInputError` for an unknown word.
     """
     if isinstance(source, str) and source in ROTATION_WORDS:
         return np.array(ROTATION_WORDS[source])

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
     Matrix = NDArray[np.float64]
 
-__all__ = ["DIRECTIONS", "SetupCheck", "check_setup"]
+__all__ = ["DIRECTIONS", "SetupCheck", "check_setup", "mounting_looking"]
 
 DIRECTIONS: Final[dict[str, tuple[float, float, float]]] = {
     "-y": (0.0, -1.0, 0.0),
@@ -40,6 +40,8 @@ _WORDS: Final = {
     "-z": "it looks down",
 }
 
+_AHEAD: Final = {"+z": (1.0, 0.0, 0.0), "-z": (0.0, -1.0, 0.0)}
+"""What of the camera frame is to the front where it looks up or down: the words up and down of mountings; else z."""
 _REACH_RAD: Final = float(np.deg2rad(14.0))
 """How far from a direction the vertical is looked for: 10 degrees of lean, and 4 by which mountings are off."""
 _STEP_RAD: Final = float(np.deg2rad(1.75))
@@ -120,6 +122,13 @@ def check_setup(
     up = rotation.T @ np.array([0.0, 0.0, 1.0])
     given = max(DIRECTIONS, key=lambda name: float(np.dot(up, DIRECTIONS[name])))
     return SetupCheck(given, max(shares, key=lambda name: shares[name]), shares, len(seen))
+
+
+def mounting_looking(direction: str) -> Matrix:
+    """(3, 3): the mounting with that direction of `DIRECTIONS` up, looking ahead, or with the image's right or top side
+    to the front where it looks up or down."""
+    up, ahead = np.array(DIRECTIONS[direction]), np.array(_AHEAD.get(direction, (0.0, 0.0, 1.0)))
+    return np.array([ahead, np.cross(up, ahead), up])
 
 
 def shares_of(features: Matrix, weights: Matrix | None = None) -> Matrix:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
@@ -23,7 +23,7 @@ __all__ = ["TurnCheck", "check_turns"]
 _SIDE_PX: Final = 120
 """Longer side to which images are made smaller: what is near moves by less than a pixel while the robot drives on."""
 _TURNS_RAD: Final = (math.radians(6.0), math.radians(50.0))
-"""Turns between two images that are compared: below, both directions look alike; above, views ahead share too little."""
+"""Turns between two images that are compared: below, both directions look alike; above, views ahead share little."""
 _PARTNERS: Final = 2
 """Images that each is compared with: the nearest that have turned by so much."""
 _SHARED_MIN: Final = 100
@@ -78,18 +78,18 @@ class TurnCheck:
 
 
 def check_turns(
-    images: Sequence[ArrayLike], yaw_rad: ArrayLike, camera: Camera, robot_from_camera: ArrayLike
+    images: Iterable[ArrayLike], yaw_rad: ArrayLike, camera: Camera, robot_from_camera: ArrayLike
 ) -> TurnCheck:
-    """Whether images (N of them) turn as headings (N,) say, left positive.
+    """Whether images (N of them, taken one after the other) turn as headings (N,) say, left positive.
 
     A mirrored image, or a camera whose calibration says wrongly that it is one, leaves a consistent world that turns
-    the other way round; so do a robot's wheels that are swapped. Which of them it is cannot be told. The mounting (3, 3)
-    has to be right about which way is up, not about its yaw. Raises `InvalidInputError` for sizes that do not fit.
+    the other way round; so do wheels that are swapped. Which of them it is cannot be told. The mounting (3, 3) has to
+    be right about which way is up, not about its yaw. Raises `InvalidInputError` for sizes that do not fit.
     """
-    headings = np.asarray(yaw_rad, dtype=np.float64)
-    if headings.shape != (len(images),) or not np.isfinite(headings).all():
-        raise InvalidInputError(f"yaw_rad: shape {headings.shape}, expected ({len(images)},) of finite angles")
     small, grays = _small(images, camera)
+    headings = np.asarray(yaw_rad, dtype=np.float64)
+    if headings.shape != (len(grays),) or not np.isfinite(headings).all():
+        raise InvalidInputError(f"yaw_rad: shape {headings.shape}, expected ({len(grays)},) of finite angles")
     places, rays = _robot_rays(small, np.asarray(robot_from_camera, dtype=np.float64))
     differences, scores = [], []
     for k in range(len(grays)):
@@ -110,10 +110,12 @@ def check_turns(
     mean = np.mean(scores, axis=0)
     # Both pairs of an image err together.
     spread = float(np.std(differences)) / math.sqrt(max(1.0, len(differences) / _PARTNERS))
-    return TurnCheck(len(scores), turned, float(mean[0]), float(mean[1]), float(np.mean(differences) / max(spread, 1e-6)))
+    return TurnCheck(
+        len(scores), turned, float(mean[0]), float(mean[1]), float(np.mean(differences) / max(spread, 1e-6))
+    )
 
 
-def _small(images: Sequence[ArrayLike], camera: Camera) -> tuple[Camera, list[NDArray[np.float64]]]:
+def _small(images: Iterable[ArrayLike], camera: Camera) -> tuple[Camera, list[NDArray[np.float64]]]:
     import cv2
 
     scale = min(1.0, _SIDE_PX / max(camera.width, camera.height))
@@ -128,7 +130,9 @@ def _small(images: Sequence[ArrayLike], camera: Camera) -> tuple[Camera, list[ND
     return small, grays
 
 
-def _robot_rays(camera: Camera, robot_from_camera: NDArray[np.float64]) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+def _robot_rays(
+    camera: Camera, robot_from_camera: NDArray[np.float64]
+) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
     """Pixels (M, 2) with a bearing, and these (M, 3) in the robot's frame."""
     v, u = np.nonzero(camera.valid_mask())
     places = np.column_stack([u, v])

@@ -10,7 +10,7 @@ from contextlib import nullcontext
 from cyclopts import App, CycloptsError, Parameter
 
 from tiltvp import __version__
-from tiltvp.cli import calibrate, camera, corner, demo, lines, segments, tilt, track
+from tiltvp.cli import calibrate, camera, corner, demo, lines, mount, segments, setup, tilt, track
 from tiltvp.cli.lab import dataset, drive, evaluate, measure, report
 from tiltvp.cli.terminal import complain
 from tiltvp.errors import MissingExtraError, OutputError, TiltvpError
@@ -29,7 +29,9 @@ app = App(
     default_parameter=Parameter(negative_iterable=()),
     suppress_keyboard_interrupt=False,
 )
+app.command(setup.setup)
 app.command(tilt.tilt)
+app.command(mount.mount)
 app.command(segments.segments)
 app.command(lines.lines)
 app.command(track.track)

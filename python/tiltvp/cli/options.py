@@ -5,9 +5,9 @@
 import difflib
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, TypeVar
 
 from cyclopts import Group, Parameter
 
@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 
 _CAMERA = Group("Camera")
 _METHOD = Group("Method", help="An option that is not given has the default of its method.")
+M = TypeVar("M", bound="MountedOptions")
 Switch = Annotated[bool, Parameter(negative="", show_default=False)]
 
 
@@ -61,6 +62,17 @@ class CameraOptions:
             image_size=image_size_from(self.image_size),
         )
         return camera.mirrored() if self.mirror and not camera.mirror else camera
+
+    def complete(self, options: "M") -> "M":
+        """Options with the mounting and the mask of a robot's file (`tiltvp setup`) where these are not given."""
+        from tiltvp.robot import Robot, is_robot, mask_path
+
+        if not is_robot(self.camera):
+            return options
+        known = {"robot_from_camera": str(self.camera)}
+        if Robot.load(self.camera).mask is not None:
+            known["mask"] = mask_path(self.camera)
+        return replace(options, **{name: value for name, value in known.items() if getattr(options, name) is None})
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -29,7 +29,6 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from tiltvp import EdgeElements, TiltEstimate, TiltEstimator
-    from tiltvp._core import Camera
     from tiltvp.streams import Frame, Frames
 
 _METHOD_DEFAULTS = MethodOptions()
@@ -119,12 +118,6 @@ def _show(outcomes: Sequence[Outcome], method: str, filtering: FilterOptions, ou
         write_table(outcome_table(outcomes, method), out)
 
 
-_FEW, _MANY, _TRIES = 5, 24, 3
-"""Images, spread over the input, by which mounting and rim are checked, and those in which the body is looked for: what
-they have in common is of the camera, not of the place. Of each part of the input so many files are tried.
-"""
-
-
 def _checked(estimator: TiltEstimator, frames: Frames) -> TiltEstimator:
     """The estimator without the dark surround and the body of the robot that the frames have, if no mask is given; a
     line on stderr says so of each, and one if they speak against the mounting. Of frames that come only once nothing is
@@ -132,55 +125,30 @@ def _checked(estimator: TiltEstimator, frames: Frames) -> TiltEstimator:
     """
     import numpy as np
 
-    from tiltvp import body_mask, check_setup, surround_mask
+    from tiltvp import check_setup
+    from tiltvp.robot_setup import LEAST, joined_mask, rim_and_body, spread
 
     camera = estimator.camera
-    images = list(_spread(frames, _FEW, camera))
-    if len(images) < _FEW:
+    images = [image for _, image in spread(frames, camera, LEAST)]
+    if len(images) < LEAST:
         return estimator
     mask = estimator.options["mask"]
     if mask is None:
-        if (mask := surround_mask(images, camera)) is not None:
-            share = 100.0 * float(np.mean(mask))
+        rim, body = rim_and_body(frames, camera)
+        if rim is not None:
+            share = 100.0 * float(np.mean(rim))
             complain(f"--mask: none, and the images have a dark surround: {share:.0f} % within its rim are looked at")
-        body = body_mask(_spread(frames, _MANY, camera), camera, mask=mask)
         if body:
             complain(f"--mask: none, and in {body.reason}: they are the robot's own, and left out")
-            mask = body.mask if mask is None else mask & body.mask
         elif body.mask is None:
             complain(f"--mask: none, and images do not tell whether they show the robot itself: {body.reason}")
+        mask = joined_mask(rim, body)
         if mask is not None:
             estimator = estimator.with_options(mask=mask)
     found = check_setup(images, camera, estimator.robot_from_camera, mask=mask)
     if not found:
         complain(f"--robot-from-camera: {found.reason}")
     return estimator
-
-
-def _spread(frames: Frames, parts: int, camera: Camera) -> Iterator[NDArray[np.uint8]]:
-    """An image of each of so many parts of the source: of the first frames in it, one that can be used."""
-    from tiltvp.streams.image_files import ImageFiles
-
-    count = frames.count or 0
-    # Files of a folder may be anything; a video or a recording has images of one kind.
-    tries = _TRIES if isinstance(frames, ImageFiles) else 1
-    starts = [part * count // parts for part in range(parts + 1)]
-    tried = [
-        (part, number)
-        for part in range(parts)
-        for number in range(starts[part], min(starts[part + 1], starts[part] + tries))
-    ]
-    had = -1
-    for (part, _), frame in zip(tried, frames.sample([number for _, number in tried]) if tried else (), strict=False):
-        if part == had:
-            continue
-        try:
-            image = frame.read()
-        except TiltvpError:
-            continue  # It is named when its turn comes.
-        if image.shape[:2] == (camera.height, camera.width):
-            had = part
-            yield image
 
 
 def _write_plot(outcomes: Sequence[Outcome], method: str, path: Path) -> None:

@@ -1,0 +1,117 @@
+"""`tiltvp mount`: whether a camera sits upright, within a tolerance; for one robot or for all that leave a factory."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Annotated
+
+from cyclopts import Parameter, validators
+
+from tiltvp.cli.options import CameraOptions, MethodOptions, Switch
+from tiltvp.cli.results import degrees
+from tiltvp.cli.sources import MotionOptions, SourceOptions
+from tiltvp.cli.tables import finite
+from tiltvp.cli.terminal import progress_bar, say
+from tiltvp.files import check_output, write_whole
+from tiltvp.mounting import MountingTilt
+
+DONE, FAILED, NOT_TOLD = 0, 1, 3
+_METHOD = MethodOptions()
+_SOURCE = SourceOptions()
+_MOTION = MotionOptions()
+_ABOVE_0 = Parameter(validator=validators.Number(gt=0))
+
+
+def mount(
+    images: list[str],
+    /,
+    *,
+    camera: CameraOptions,
+    source: SourceOptions = _SOURCE,
+    method: MethodOptions = _METHOD,
+    motion: MotionOptions = _MOTION,
+    wheel_base: Annotated[float | None, _ABOVE_0] = None,
+    level_floor: Switch = False,
+    tolerance_deg: Annotated[float | None, _ABOVE_0] = None,
+    out: Path | None = None,
+) -> int:
+    """Measure roll and pitch of a camera's mounting on a drive: what stays when the robot turns is not the floor's.
+
+    The exit code is 0 where the mounting is known and, with a tolerance, within it at 95 %; 1 where it is beyond, 3
+    where the drive does not tell. What of a constant lean is the camera's and what the robot's own cannot be told.
+
+    Parameters
+    ----------
+    images
+        Images, a video or a recording of a drive with turns.
+    wheel_base
+        Distance between the wheels, metres, for odometry of wheels.
+    level_floor
+        The floor is level within 0.05 degrees: no turn is needed.
+    tolerance_deg
+        By how much the mounting may be off.
+    out
+        File for the result (.json).
+    """
+    from tiltvp.robot_setup import METHOD, drive_mounting, drive_tilts, measured_count
+
+    if out is not None:
+        check_output(out)
+    chosen = camera.complete(method)
+    estimator = (chosen if chosen.method is not None else replace(chosen, method=METHOD)).estimator(camera.load())
+    frames = source.open(images)
+    moved = motion.motions(frames, wheel_base)
+    with progress_bar(measured_count(frames), "images") as bar:
+        tilts = drive_tilts(frames, estimator, None if moved is None else moved.motions, advance=bar.advance)
+    known = moved is not None and moved.turns_known
+    found = drive_mounting(tilts, estimator.robot_from_camera, known=known, level_floor=level_floor)
+    verdict = None if tolerance_deg is None else found.within(_radians(tolerance_deg))
+    for line in mounting_lines(found):
+        say(line)
+    if tolerance_deg is not None and found:
+        words = {True: "pass: within", False: "fail: beyond", None: "not told: about"}[verdict]
+        say(f"{words} {tolerance_deg:g} degrees, at 95 %")
+    if out is not None:
+        result = mounting_result(found) | {"tolerance_deg": tolerance_deg, "within_tolerance": verdict}
+        write_whole(out, json.dumps(finite(result), indent=1, allow_nan=False) + "\n")
+    if not found or (tolerance_deg is not None and verdict is None):
+        return NOT_TOLD
+    return FAILED if verdict is False else DONE
+
+
+def mounting_lines(found: MountingTilt) -> Sequence[str]:
+    """What was found, for people."""
+    if not found:
+        return [found.reason]
+    lean, floor = found.lean, found.floor
+    lines = [
+        found.reason,
+        f"roll {degrees(lean.roll_rad)} deg, pitch {degrees(lean.pitch_rad)} deg: so a level robot seems to lean",
+    ]
+    if floor:
+        lines.append(f"the floor's tilt at the end: {degrees(floor.alpha_rad)} deg, 1-sigma {degrees(floor.sigma_rad)}")
+    return lines
+
+
+def mounting_result(found: MountingTilt) -> dict[str, object]:
+    """The same as JSON takes it, in SI units."""
+    return {
+        "reason": found.reason,
+        "known": bool(found),
+        "robot_from_camera": found.robot_from_camera.tolist(),
+        "lean": found.lean.to_dict(),
+        "floor": found.floor.to_dict(),
+        "images": found.images,
+        "used": found.used,
+        "turned_rad": found.turned_rad,
+        "level_floor": found.level_floor,
+    }
+
+
+def _radians(angle_deg: float) -> float:
+    import math
+
+    return math.radians(angle_deg)

@@ -1,0 +1,122 @@
+"""`tiltvp setup`: from a recording to the file that every command reads."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+from cyclopts import Parameter, validators
+
+from tiltvp.cli.declared_options import mask_from
+from tiltvp.cli.mount import mounting_lines
+from tiltvp.cli.options import CameraOptions, Switch
+from tiltvp.cli.sources import MotionOptions, SourceOptions
+from tiltvp.cli.terminal import complain, progress_bar, say
+from tiltvp.errors import InvalidInputError
+from tiltvp.files import check_output
+
+if TYPE_CHECKING:
+    from tiltvp import Camera
+    from tiltvp.robot_setup import RobotSetup
+    from tiltvp.streams import Frames
+
+_SOURCE = SourceOptions()
+_MOTION = MotionOptions()
+
+
+def setup(
+    recording: list[str],
+    /,
+    *,
+    camera: CameraOptions,
+    out: Path,
+    source: SourceOptions = _SOURCE,
+    motion: MotionOptions = _MOTION,
+    wheel_base: Annotated[float | None, Parameter(validator=validators.Number(gt=0))] = None,
+    robot_from_camera: str | None = None,
+    mask: Path | None = None,
+    level_floor: Switch = False,
+    picture: Path | None = None,
+) -> int:
+    """Find out what a robot's recording tells of its camera, and write it to a file that every command reads.
+
+    The image circle, the robot's own body, which way the camera looks, roll and pitch of its mounting, and whether
+    images turn as the odometry says. The exit code is 1 where something keeps the file from being relied upon; it is
+    written all the same, without what is not known. Its turn about the vertical, and where the camera sits, are left
+    to `tiltvp calibrate`.
+
+    Parameters
+    ----------
+    recording
+        Images, a video or a recording of a drive with turns, best a turn in place.
+    out
+        File for the robot (.toml); its mask goes beside it. Give it as --camera to other commands.
+    wheel_base
+        Distance between the wheels, metres, for odometry of wheels.
+    robot_from_camera
+        How the camera sits on the robot, where it is known roughly: up, forward, or a file with a rotation. By default
+        the direction that is up is found.
+    mask
+        Image of the camera's size, white where the world is seen. By default rim and body are looked for.
+    level_floor
+        The floor is level within 0.05 degrees: no turn is needed.
+    picture
+        Picture of what was found (.png).
+    """
+    from tiltvp.robot_setup import find_setup, measured_count
+    from tiltvp.rotations import read_rotation
+    from tiltvp.streams import Wheels
+
+    if out.suffix.lower() != ".toml":
+        raise InvalidInputError(f"--out {out}: ends in {out.suffix!r}, expected .toml")
+    for file in (out, picture):
+        if file is not None:
+            check_output(file)
+    lens = camera.load()
+    frames = source.open(recording)
+    moved = motion.motions(frames, wheel_base)
+    with progress_bar(measured_count(frames), "images") as bar:
+        found = find_setup(
+            frames,
+            lens,
+            moved.motions if moved is not None and moved.turns_known else None,
+            robot_from_camera=None if robot_from_camera is None else read_rotation(robot_from_camera),
+            mask=None if mask is None else mask_from(mask),  # type: ignore[arg-type]
+            level_floor=level_floor,
+            wheels=Wheels(
+                wheel_base_m=wheel_base, wheel_radius_m=motion.wheel_radius, ticks_per_turn=motion.ticks_per_turn,
+                joints=motion.wheel_joints,
+            ),
+            topics={k: v for k, v in (("images", source.topic), ("odometry", motion.odometry_topic)) if v is not None},
+            advance=bar.advance,
+        )  # fmt: skip
+    for line in _lines(found):
+        say(line)
+    if picture is not None:
+        _draw(frames, lens, found, picture)
+    found.robot.save(out)
+    for reason in found.reasons:
+        complain(f"{out}: not to be relied upon: {reason}")
+    return 0 if found else 1
+
+
+def _lines(found: RobotSetup) -> list[str]:
+    """What was found, for people."""
+    lines = [found.direction.reason]
+    lines.append(
+        "rim: a dark surround that the calibration does not know is left out" if found.rim else "rim: none found"
+    )
+    lines.append(f"body: {found.body.reason}")
+    lines.append("turns: no odometry" if found.turns is None else f"turns: {found.turns.reason}")
+    first, *others = mounting_lines(found.mounting)
+    return [*lines, f"mounting: {first}", *others]
+
+
+def _draw(frames: Frames, camera: Camera, found: RobotSetup, path: Path) -> None:
+    from tiltvp import write_image
+    from tiltvp.overlays.setup import setup_picture
+    from tiltvp.robot_setup import METHOD, spread
+
+    _, image = next(spread(frames, camera, 1))
+    estimate = found.robot.estimator(method=METHOD)(image)
+    write_image(path, setup_picture(image, found.robot, estimate, found.given_robot_from_camera, found.direction.best))

@@ -1,0 +1,230 @@
+"""From a recording to what is known of a robot: image circle, own body, which way is up, mounting, sense of turns."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from tiltvp.body import BodyMask, body_mask
+from tiltvp.errors import InvalidInputError, TiltvpError
+from tiltvp.mounting import MountingTilt, mounting_tilt
+from tiltvp.robot import Robot
+from tiltvp.setup_check import SetupCheck, check_setup, mounting_looking
+from tiltvp.streams.odometry import Motion
+from tiltvp.streams.wheels import Wheels
+from tiltvp.surround import surround_mask
+from tiltvp.tilt import TiltEstimate, TiltEstimator
+from tiltvp.turning import TurnCheck, check_turns
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike, NDArray
+
+    from tiltvp.cameras import Camera
+    from tiltvp.streams.frames import Frame, Frames
+
+    Image = NDArray[np.uint8]
+
+__all__ = ["DriveTilts", "RobotSetup", "drive_mounting", "drive_tilts", "find_setup"]
+
+LOOKED_AT: Final = 24
+"""Images, spread over the drive, by which rim, body, direction and sense of turns are found: see `body_mask`."""
+LEAST: Final = 5
+"""Images without which none of these can be told."""
+_TRIES: Final = 3
+"""Frames of each part that are tried: files of a folder may be anything."""
+MEASURED: Final = 200
+"""Images, spread over the drive, whose tilts tell the mounting. Of rendered drives 60 leave 0.02 degrees."""
+_SURE: Final = 0.9
+"""Least probability of a direction that is taken for up."""
+METHOD: Final = "segments"
+"""The mean of its errors over a drive is a fifth of a degree below that of "refined": `tiltvp measure mounting`."""
+
+
+@dataclass(frozen=True, eq=False)
+class DriveTilts:
+    """The tilts of images spread over a drive, and what the robot did from each to the next."""
+
+    estimates: list[TiltEstimate | None]
+    motions: list[Motion]
+
+
+@dataclass(frozen=True, eq=False)
+class RobotSetup:
+    """What a recording tells of a robot with a camera. False, with reasons, where it cannot be relied upon."""
+
+    robot: Robot
+    """What was found, to be saved."""
+    given_robot_from_camera: NDArray[np.float64]
+    """(3, 3): the mounting that was given, or that of the direction that is up, before roll and pitch."""
+    direction: SetupCheck
+    """Which way is up."""
+    rim: bool
+    """Whether a dark surround was found that the calibration does not know."""
+    body: BodyMask
+    """The robot's own body in view."""
+    turns: TurnCheck | None
+    """Whether images turn as the odometry says; None without odometry."""
+    mounting: MountingTilt
+    """Roll and pitch of the mounting."""
+
+    @property
+    def sure_of_direction(self) -> bool:
+        """Whether the direction that is up is that of the mounting, with a probability of at least 0.9."""
+        given, best = self.direction.given, self.direction.best
+        return best == given and self.direction.probabilities[best] >= _SURE
+
+    @property
+    def reasons(self) -> list[str]:
+        """What keeps it from being used, a sentence each."""
+        found = [] if self.sure_of_direction else [f"which way is up is not sure: {self.direction.reason}"]
+        if self.turns is not None and self.turns.reversed:
+            found.append(self.turns.reason)
+        return found if self.mounting else [*found, self.mounting.reason]
+
+    def __bool__(self) -> bool:
+        return not self.reasons
+
+
+def find_setup(
+    frames: Frames,
+    camera: Camera,
+    motions: Sequence[Motion | None] | None = None,
+    *,
+    robot_from_camera: ArrayLike | None = None,
+    mask: NDArray[np.bool_] | None = None,
+    level_floor: bool = False,
+    wheels: Wheels | None = None,
+    topics: dict[str, str] | None = None,
+    advance: Callable[[], None] = lambda: None,
+) -> RobotSetup:
+    """Looks at a recording: finds the image circle, the robot's own body, which way is up, and the mounting.
+
+    `frames` are those of `tiltvp.streams.open_frames`; `motions` say of each what the robot did since the one before,
+    None where nobody knows, and none of them without odometry. Where `robot_from_camera` (3, 3) is not given, the
+    direction that is up is found; its turn about the vertical is left as of a camera that looks along the robot.
+    `mask` (H, W) bool is True where images show the world; without it rim and body are looked for. `level_floor` is as
+    for `mounting_tilt`. `advance` is called after each image. Raises `InvalidInputError` for frames that come only once
+    and for fewer than 5 images of the camera's size.
+    """
+    numbers = [number for number, _ in spread(frames, camera, LOOKED_AT)]
+    if len(numbers) < LEAST:
+        expected = f"{LEAST} or more of {camera.width} x {camera.height} pixels"
+        raise InvalidInputError(f"{frames.source}: {len(numbers)} images of the camera's size, expected {expected}")
+    rim, body = None, BodyMask(None, 0, "a mask was given")
+    if mask is None:
+        rim, body = rim_and_body(frames, camera)
+        mask = joined_mask(rim, body)
+
+    def images() -> Iterator[Image]:
+        return (image for _, image in spread(frames, camera, LOOKED_AT))
+
+    direction = check_setup(images(), camera, robot_from_camera, mask=mask)
+    if robot_from_camera is None:
+        rotation = mounting_looking(direction.best)
+        direction = replace(direction, given=direction.best)
+    else:
+        rotation = np.asarray(robot_from_camera, dtype=np.float64)
+    turns = None
+    if motions is not None:
+        headings = np.cumsum([0.0 if motion is None else motion.yaw_rad for motion in motions])
+        turns = check_turns(images(), headings[numbers], camera, rotation)
+    estimator = TiltEstimator(camera, method=METHOD, robot_from_camera=rotation, mask=mask)
+    tilts = drive_tilts(frames, estimator, motions, advance=advance)
+    mounting = drive_mounting(tilts, rotation, known=motions is not None, level_floor=level_floor)
+    robot = Robot(
+        camera,
+        mounting.robot_from_camera,
+        covariance_rad2=mounting.lean.covariance_rad2 if mounting else None,
+        mask=mask,
+        wheels=wheels or Wheels(),
+        topics=topics or {},
+    )
+    return RobotSetup(robot, rotation, direction, rim is not None, body, turns, mounting)
+
+
+def drive_tilts(
+    frames: Frames,
+    estimator: TiltEstimator,
+    motions: Sequence[Motion | None] | None,
+    *,
+    advance: Callable[[], None] = lambda: None,
+) -> DriveTilts:
+    """The tilts of at most 200 images, spread over a drive of known length. What cannot be read is None."""
+    count = frames.count
+    if count is None:
+        raise InvalidInputError(f"{frames.source}: comes only once, expected images, a video or a recording")
+    numbers = [int(number) for number in np.linspace(0, count - 1, measured_count(frames))]
+    estimates: list[TiltEstimate | None] = []
+    for frame in frames.sample(numbers):
+        image = _usable(frame, estimator.camera)
+        estimates.append(None if image is None else estimator(image))
+        advance()
+    return DriveTilts(estimates, _joined(motions, numbers))
+
+
+def measured_count(frames: Frames) -> int:
+    """How many frames are measured."""
+    return min(MEASURED, frames.count or 0)
+
+
+def drive_mounting(
+    tilts: DriveTilts, robot_from_camera: ArrayLike, *, known: bool, level_floor: bool = False
+) -> MountingTilt:
+    """The mounting by the tilts of a drive; without odometry (`known`) only of a floor that is level."""
+    if not known and not level_floor:
+        # Without turns floor and mounting cannot be told apart, and no motion looks like standing.
+        return mounting_tilt([None] * len(tilts.estimates), tilts.motions, robot_from_camera)
+    return mounting_tilt(tilts.estimates, tilts.motions, robot_from_camera, level_floor=level_floor)
+
+
+def rim_and_body(frames: Frames, camera: Camera) -> tuple[NDArray[np.bool_] | None, BodyMask]:
+    """The image circle, where a dark surround shows one that the camera does not know, and the robot's own body."""
+    rim = surround_mask((image for _, image in spread(frames, camera, LEAST)), camera)
+    return rim, body_mask((image for _, image in spread(frames, camera, LOOKED_AT)), camera, mask=rim)
+
+
+def joined_mask(rim: NDArray[np.bool_] | None, body: BodyMask) -> NDArray[np.bool_] | None:
+    """Where images show the world; None: everywhere."""
+    if not body:
+        return rim
+    return body.mask if rim is None else rim & np.asarray(body.mask)
+
+
+def spread(frames: Frames, camera: Camera, parts: int) -> Iterator[tuple[int, Image]]:
+    """Number and image of the first usable frame in each of so many parts of a source; none of one that comes once."""
+    count = frames.count or 0
+    starts = [part * count // parts for part in range(parts + 1)]
+    tried = [
+        (part, number)
+        for part in range(parts)
+        for number in range(starts[part], min(starts[part + 1], starts[part] + _TRIES))
+    ]
+    coming = frames.sample([number for _, number in tried]) if tried else iter(())
+    had = -1
+    for (part, number), frame in zip(tried, coming, strict=False):
+        if part != had and (image := _usable(frame, camera)) is not None:
+            had = part
+            yield number, image
+
+
+def _usable(frame: Frame, camera: Camera) -> Image | None:
+    image = frame.image
+    if isinstance(image, TiltvpError) or image.shape[:2] != (camera.height, camera.width):
+        return None
+    return image
+
+
+def _joined(motions: Sequence[Motion | None] | None, numbers: Sequence[int]) -> list[Motion]:
+    """What the robot did between frames of these numbers."""
+    if motions is None:
+        return [Motion() for _ in numbers]
+    joined = []
+    before = numbers[0] if numbers else 0
+    for number in numbers:
+        parts = [motion for motion in motions[before + 1 : number + 1] if motion is not None]
+        joined.append(Motion(sum(part.yaw_rad for part in parts), sum(abs(part.distance_m) for part in parts)))
+        before = number
+    return joined
