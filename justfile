@@ -154,6 +154,10 @@ measure-trust *arguments: setup
 measure-body *arguments: setup
     {{bin}}/tiltvp measure body "$TILTVP_DATA/panos" {{arguments}}
 
+# Which way is up, roll and pitch of the mounting, and the sense of turns, from rendered recordings of drives.
+measure-mounting *arguments: setup
+    {{bin}}/tiltvp measure mounting {{arguments}}
+
 # Self-calibration on simulated logs that mislead: how often it is wrong and sure.
 measure-trust-calibration *arguments: setup
     {{bin}}/tiltvp measure trust-calibration {{arguments}}

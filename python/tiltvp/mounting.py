@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
@@ -16,14 +16,16 @@ from tiltvp.tilt import TiltFilter
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
-    from tiltvp.odometry import Motion
+    from tiltvp.streams.odometry import Motion
     from tiltvp.tilt import FilteredTilt, TiltEstimate
 
 __all__ = ["MountingTilt", "mounting_tilt"]
 
 _PRIOR_RAD: Final = math.radians(5.0)
 """How far a mounting may be off before it is known: as far as a camera that is screwed on by eye."""
-_LEVEL_RAD: Final = math.radians(0.05)
+_LEVEL: Final[dict[str, Any]] = {
+    "prior_rad": math.radians(0.05), "walk_rad_per_sqrt_m": 0.0, "walk_rad_per_sqrt_step": 0.0,
+}  # fmt: skip
 """How level a floor is that is said to be level: a millimetre in a metre, as a builder's spirit level tells."""
 _QUANTILE: Final = math.sqrt(5.991)
 """Radius of the region of 95 % of two normal angles, in standard deviations."""
@@ -96,8 +98,10 @@ def mounting_tilt(
     images, and for a matrix that is no rotation.
     """
     rotation = rotation_from(np.asarray(robot_from_camera, dtype=np.float64).tolist(), "robot_from_camera")
-    floor = {"prior_rad": _LEVEL_RAD, "walk_rad_per_sqrt_m": 0.0, "walk_rad_per_sqrt_step": 0.0} if level_floor else {}
-    held = TiltFilter(estimate_mounting=True, mounting_prior_rad=_PRIOR_RAD, mounting_walk_rad_per_sqrt_m=0.0, **floor)
+    held = TiltFilter(
+        estimate_mounting=True, mounting_prior_rad=_PRIOR_RAD, mounting_walk_rad_per_sqrt_m=0.0,
+        **(_LEVEL if level_floor else {}),
+    )  # fmt: skip
     given = list(estimates)
     if len(given) != len(motions):
         raise InvalidInputError(f"motions: {len(motions)}, expected {len(given)}, one for each image")

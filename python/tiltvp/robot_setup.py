@@ -22,6 +22,7 @@ from tiltvp.turning import TurnCheck, check_turns
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
+    from tiltvp import _core
     from tiltvp.cameras import Camera
     from tiltvp.streams.frames import Frame, Frames
 
@@ -180,7 +181,7 @@ def drive_mounting(
     return mounting_tilt(tilts.estimates, tilts.motions, robot_from_camera, level_floor=level_floor)
 
 
-def rim_and_body(frames: Frames, camera: Camera) -> tuple[NDArray[np.bool_] | None, BodyMask]:
+def rim_and_body(frames: Frames, camera: _core.Camera) -> tuple[NDArray[np.bool_] | None, BodyMask]:
     """The image circle, where a dark surround shows one that the camera does not know, and the robot's own body."""
     rim = surround_mask((image for _, image in spread(frames, camera, LEAST)), camera)
     return rim, body_mask((image for _, image in spread(frames, camera, LOOKED_AT)), camera, mask=rim)
@@ -193,7 +194,7 @@ def joined_mask(rim: NDArray[np.bool_] | None, body: BodyMask) -> NDArray[np.boo
     return body.mask if rim is None else rim & np.asarray(body.mask)
 
 
-def spread(frames: Frames, camera: Camera, parts: int) -> Iterator[tuple[int, Image]]:
+def spread(frames: Frames, camera: _core.Camera, parts: int) -> Iterator[tuple[int, Image]]:
     """Number and image of the first usable frame in each of so many parts of a source; none of one that comes once."""
     count = frames.count or 0
     starts = [part * count // parts for part in range(parts + 1)]
@@ -210,7 +211,7 @@ def spread(frames: Frames, camera: Camera, parts: int) -> Iterator[tuple[int, Im
             yield number, image
 
 
-def _usable(frame: Frame, camera: Camera) -> Image | None:
+def _usable(frame: Frame, camera: _core.Camera) -> Image | None:
     image = frame.image
     if isinstance(image, TiltvpError) or image.shape[:2] != (camera.height, camera.width):
         return None

@@ -131,7 +131,7 @@ def log_of_images(
     told = needed_turns(motion.motions(frames, drive.wheel_base))
     if told is None:
         raise InvalidInputError(f"--images {source} without --odometry, expected {_FORMS}")
-    lens = camera.load()
+    lens, options = camera.load(), camera.complete(options)
     x_m, y_m, yaw_rad = drive.start
     extractor, tilt = options.extractor(lens, yaw_rad=yaw_rad), options.tilts(lens, yaw_rad=yaw_rad)
     looked = Drive(extractor, LineTracker(camera_m=(x_m, y_m)), tilt, told)

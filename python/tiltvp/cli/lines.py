@@ -50,7 +50,7 @@ def lines(
         check_ending(out)
     if overlay is not None:
         check_output_folder(overlay)
-    lens = camera.load()
+    lens, options = camera.load(), camera.complete(options)
     extractor, tilt = options.extractor(lens), options.tilts(lens)
     found, well = find_in_each(
         images or [],

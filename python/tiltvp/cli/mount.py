@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -35,7 +36,7 @@ def mount(
     motion: MotionOptions = _MOTION,
     wheel_base: Annotated[float | None, _ABOVE_0] = None,
     level_floor: Switch = False,
-    tolerance_deg: Annotated[float | None, _ABOVE_0] = None,
+    within_deg: Annotated[float | None, _ABOVE_0] = None,
     out: Path | None = None,
 ) -> int:
     """Measure roll and pitch of a camera's mounting on a drive: what stays when the robot turns is not the floor's.
@@ -51,7 +52,7 @@ def mount(
         Distance between the wheels, metres, for odometry of wheels.
     level_floor
         The floor is level within 0.05 degrees: no turn is needed.
-    tolerance_deg
+    within_deg
         By how much the mounting may be off.
     out
         File for the result (.json).
@@ -68,16 +69,16 @@ def mount(
         tilts = drive_tilts(frames, estimator, None if moved is None else moved.motions, advance=bar.advance)
     known = moved is not None and moved.turns_known
     found = drive_mounting(tilts, estimator.robot_from_camera, known=known, level_floor=level_floor)
-    verdict = None if tolerance_deg is None else found.within(_radians(tolerance_deg))
+    verdict = None if within_deg is None else found.within(math.radians(within_deg))
     for line in mounting_lines(found):
         say(line)
-    if tolerance_deg is not None and found:
+    if within_deg is not None and found:
         words = {True: "pass: within", False: "fail: beyond", None: "not told: about"}[verdict]
-        say(f"{words} {tolerance_deg:g} degrees, at 95 %")
+        say(f"{words} {within_deg:g} degrees, at 95 %")
     if out is not None:
-        result = mounting_result(found) | {"tolerance_deg": tolerance_deg, "within_tolerance": verdict}
+        result = mounting_result(found) | {"tolerance_deg": within_deg, "within_tolerance": verdict}
         write_whole(out, json.dumps(finite(result), indent=1, allow_nan=False) + "\n")
-    if not found or (tolerance_deg is not None and verdict is None):
+    if not found or (within_deg is not None and verdict is None):
         return NOT_TOLD
     return FAILED if verdict is False else DONE
 
@@ -109,9 +110,3 @@ def mounting_result(found: MountingTilt) -> dict[str, object]:
         "turned_rad": found.turned_rad,
         "level_floor": found.level_floor,
     }
-
-
-def _radians(angle_deg: float) -> float:
-    import math
-
-    return math.radians(angle_deg)

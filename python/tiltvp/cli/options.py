@@ -7,7 +7,7 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, TypeVar
+from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
 from cyclopts import Group, Parameter
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 _CAMERA = Group("Camera")
 _METHOD = Group("Method", help="An option that is not given has the default of its method.")
-M = TypeVar("M", bound="MountedOptions")
+M = TypeVar("M", bound=LibraryOptions)
 Switch = Annotated[bool, Parameter(negative="", show_default=False)]
 
 
@@ -69,10 +69,12 @@ class CameraOptions:
 
         if not is_robot(self.camera):
             return options
-        known = {"robot_from_camera": str(self.camera)}
+        known: dict[str, Any] = {"robot_from_camera": str(self.camera)}
         if Robot.load(self.camera).mask is not None:
             known["mask"] = mask_path(self.camera)
-        return replace(options, **{name: value for name, value in known.items() if getattr(options, name) is None})
+        return replace(
+            options, **{name: value for name, value in known.items() if getattr(options, name, options) is None}
+        )
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -65,7 +65,7 @@ def segments(
     if overlay is not None:
         check_output_folder(overlay)
     lens = camera.load()
-    detector = SegmentDetector(lens, **options.given())
+    detector = SegmentDetector(lens, **camera.complete(options).given())
     found, well = find_in_each(
         images or [], source, detector, overlay, lambda gray, seen: draw_segments(gray, lens, seen)
     )

@@ -119,4 +119,4 @@ def _draw(frames: Frames, camera: Camera, found: RobotSetup, path: Path) -> None
 
     _, image = next(spread(frames, camera, 1))
     estimate = found.robot.estimator(method=METHOD)(image)
-    write_image(path, setup_picture(image, found.robot, estimate, found.given_robot_from_camera, found.direction.best))
+    write_image(path, setup_picture(image, found.robot, estimate, found.given_robot_from_camera, found.mounting.reason))

@@ -85,7 +85,7 @@ def tilt(
     filtering.check()
     if not filtering.filter:
         motion.refuse("--filter", wheel_base)
-    estimator = method.estimator(camera.load())
+    estimator = camera.complete(method).estimator(camera.load())
     frames = source.open(images or [])
     moved = motion.motions(frames, wheel_base) if filtering.filter else None
     motions: Iterable[Motion | None] = repeat(Motion()) if moved is None else moved.motions

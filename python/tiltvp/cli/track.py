@@ -86,7 +86,7 @@ def track(
     if video is not None:
         check_output(video)
     check_plot("--plot", plot)
-    lens = camera.load()
+    lens, options = camera.load(), camera.complete(options)
     extractor, tilt = options.extractor(lens), options.tilts(lens)
     tracker = LineTracker(**tracking.given())
     frames = frames_of.open([] if source is None else [source])

@@ -14,6 +14,7 @@ from tiltvp.cli.lab.corner_measures import corners
 from tiltvp.cli.lab.corner_real import corners_real
 from tiltvp.cli.lab.descriptors import descriptors
 from tiltvp.cli.lab.line_measures import lines
+from tiltvp.cli.lab.mounting import mounting
 from tiltvp.cli.lab.planar_pose import planar_pose
 from tiltvp.cli.lab.striding import striding
 from tiltvp.cli.lab.tables import show_frame
@@ -30,6 +31,7 @@ app.command(corners)
 app.command(corners_real)
 app.command(descriptors)
 app.command(lines)
+app.command(mounting)
 app.command(planar_pose)
 app.command(striding)
 app.command(trust)

@@ -1,0 +1,40 @@
+"""`tiltvp measure mounting`: how well a recording tells a camera's mounting, which way is up and how it turns."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from cyclopts import Parameter, validators
+
+from tiltvp.cli.lab.tables import show_frame
+from tiltvp.cli.terminal import progress_bar
+
+
+def mounting(
+    *,
+    drives: Annotated[int, Parameter(validator=validators.Number(gte=1))] = 6,
+    seed: Annotated[int, Parameter(validator=validators.Number(gte=0))] = 900,
+) -> None:
+    """What `tiltvp setup` finds on rendered recordings of drives over level floors, floors of one degree and bumps.
+
+    Parameters
+    ----------
+    drives
+        Drives by each camera over each floor, through rooms of all kinds in turn; each takes a minute.
+    seed
+        Seed of rooms, drives, mountings and floors.
+    """
+    import polars as pl
+
+    from tiltvp.lab.evaluation.mounting import (
+        CAMERAS,
+        CASES,
+        judge_mountings,
+        summarise_findings,
+        summarise_mountings,
+    )
+
+    with progress_bar(drives * len(CAMERAS) * len(CASES), "drives") as bar:
+        rows = pl.DataFrame(list(judge_mountings(drives, seed, advance=bar.advance)), infer_schema_length=None)
+    show_frame("Errors of the mounting in degrees", summarise_mountings(rows), ["looks", "floor", "method"])
+    show_frame("Shares of drives in per cent", summarise_findings(rows), ["looks"])

@@ -1,0 +1,135 @@
+"""How well a mounting is found on rendered drives over level and sloping floors, and whether its covariance holds."""
+
+from __future__ import annotations
+
+import math
+import tempfile
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+import polars as pl
+
+from tiltvp.lab.datasets.ahead import AHEAD_CAMERAS
+from tiltvp.lab.datasets.driving import drive_room
+from tiltvp.lab.datasets.panoramas import paper_camera
+from tiltvp.lab.datasets.recording import WHEEL_RADIUS_M, RecordedDrive
+from tiltvp.mounting import mounting_tilt
+from tiltvp.robot_setup import drive_tilts, find_setup
+from tiltvp.rotations import read_rotation
+from tiltvp.streams import Wheels, frame_motions, open_frames
+from tiltvp.synth import ROOM_KINDS
+from tiltvp.tilt import TiltEstimator
+from tiltvp.turning import check_turns
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+__all__ = ["CAMERAS", "CASES", "judge_mountings", "summarise_findings", "summarise_mountings"]
+
+CAMERAS: Final = {
+    "up": (paper_camera(), read_rotation("up")),
+    "ahead": (AHEAD_CAMERAS["pinhole 80"], read_rotation("forward")),
+}
+CASES: Final = {"level": (0.0, 0.0), "1 degree": (1.0, 0.0), "1 degree, bumps": (1.0, 1.0)}
+"""Floors by name: slope and greatest lean from bumps, degrees."""
+KINDS: Final = tuple(kind for kind in ROOM_KINDS if kind != "under-table")
+"""Under tables no image tells which way is up."""
+_OFF_DEG: Final = 1.5
+"""Roll and pitch of mountings are drawn up to this: as camera mounts of service robots are off (1 to 2 degrees)."""
+_QUANTILES: Final = {50: 1.386, 95: 5.991}
+"""Chi-square of two degrees of freedom."""
+
+
+def judge_mountings(
+    drives: int, seed: int, *, advance: Callable[[], None] = lambda: None
+) -> Iterator[dict[str, object]]:
+    """A row for each of so many drives through rooms of all kinds, by each camera over each floor.
+
+    Each is written as a recording and read as a user would: frames and wheels from it, the mounting by `find_setup`.
+    """
+    for number in range(drives):
+        for looks in CAMERAS:
+            for floor in CASES:
+                with tempfile.TemporaryDirectory() as folder:
+                    yield _judged(Path(folder) / "drive.mcap", number, seed, looks, floor)
+                advance()
+
+
+def _judged(path: Path, number: int, seed: int, looks: str, floor: str) -> dict[str, object]:
+    camera, nominal = CAMERAS[looks]
+    slope_deg, bumps_deg = CASES[floor]
+    rng = np.random.default_rng((seed, number))
+    roll, pitch = np.radians(rng.uniform(-_OFF_DEG, _OFF_DEG, 2))
+    kind = KINDS[number % len(KINDS)]
+    drive = RecordedDrive(
+        drive_room(kind, seed + number), camera, robot_from_camera=nominal, mounting_rad=(roll, pitch),
+        floor_slope_rad=(math.radians(slope_deg), rng.uniform(-math.pi, math.pi)),
+        bumps_max_rad=math.radians(bumps_deg), samples=1, seed=seed + number,
+    )  # fmt: skip
+    drive.write(path)
+    frames = open_frames(path)
+    wheels = Wheels(wheel_base_m=drive.drive.wheel_base_m, wheel_radius_m=WHEEL_RADIUS_M)
+    motions = frame_motions(frames, path, wheels=wheels).motions
+    found = find_setup(frames, camera, motions)
+    images = [frame.read() for frame in frames.sample(range(0, len(motions), 4))]
+    headings = np.cumsum([0.0 if motion is None else motion.yaw_rad for motion in motions])[::4]
+    swapped = check_turns(images, -headings, camera, nominal)
+    row: dict[str, object] = {
+        "room": kind, "looks": looks, "floor": floor, "direction": found.direction.given == _given(looks),
+        "sure": found.sure_of_direction, "turns": bool(found.turns), "reversed told": swapped.reversed,
+        "turns wrong": bool(found.turns and found.turns.reversed) or bool(swapped),
+    }  # fmt: skip
+    for method in ("segments", "refined"):
+        tilts = drive_tilts(frames, TiltEstimator(camera, method=method, robot_from_camera=nominal), motions)
+        mounting = mounting_tilt(tilts.estimates, tilts.motions, nominal)
+        row |= _errors(f"{method} ", mounting.lean, drive.robot_from_mounted_camera, nominal)
+    return row
+
+
+def _errors(prefix: str, lean: object, true: NDArray[np.float64], nominal: NDArray[np.float64]) -> dict[str, object]:
+    # What a robot that stands upright seems to lean by the nominal mounting.
+    normal = nominal @ true.T @ np.array([0.0, 0.0, 1.0])
+    if not lean:
+        return {f"{prefix}error_deg": None, f"{prefix}nees": None, f"{prefix}sigma_deg": None}
+    off = (lean.normal - normal)[:2]  # type: ignore[attr-defined]
+    covariance = lean.covariance_rad2  # type: ignore[attr-defined]
+    return {
+        f"{prefix}error_deg": math.degrees(float(np.linalg.norm(off))),
+        f"{prefix}nees": float(off @ np.linalg.solve(covariance, off)),
+        f"{prefix}sigma_deg": math.degrees(lean.sigma_rad),  # type: ignore[attr-defined]
+    }
+
+
+def _given(looks: str) -> str:
+    return {"up": "+z", "ahead": "-y"}[looks]
+
+
+def summarise_mountings(rows: pl.DataFrame) -> pl.DataFrame:
+    """For each camera, floor and method: errors in degrees, regions that hold, answers; and what else was found."""
+    tables = []
+    for method in ("segments", "refined"):
+        error, nees = pl.col(f"{method} error_deg"), pl.col(f"{method} nees")
+        tables.append(
+            rows.group_by("looks", "floor", maintain_order=True).agg(
+                pl.lit(method).first().alias("method"),
+                pl.len().alias("drives"),
+                (100.0 * error.is_not_null().mean()).alias("answered"),
+                error.median().alias("median"),
+                error.max().alias("worst"),
+                (100.0 * (error < 0.1).mean()).alias("below 0.1"),
+                *((100.0 * (nees < limit).mean()).alias(f"in {share} %") for share, limit in _QUANTILES.items()),
+                pl.col(f"{method} sigma_deg").median().alias("1-sigma"),
+            )
+        )
+    return pl.concat(tables)
+
+
+def summarise_findings(rows: pl.DataFrame) -> pl.DataFrame:
+    """For each camera: shares in per cent of drives whose direction was right and sure, and whose turns were told."""
+    return rows.group_by("looks", maintain_order=True).agg(
+        pl.len().alias("drives"),
+        *((100.0 * pl.col(name).mean()).alias(name) for name in ("direction", "sure", "turns", "reversed told")),
+        (100.0 * pl.col("turns wrong").mean()).alias("turns wrong"),
+    )
