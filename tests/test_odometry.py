@@ -45,7 +45,8 @@ def columns(kind: str) -> dict[str, np.ndarray]:
         # The world's frame is another one than that in which the drive begins.
         c, s = math.cos(3.0), math.sin(3.0)
         return {
-            "x_m": c * x - s * y + 3, "y_m": s * x + c * y - 2, "yaw_rad": (yaw + 3 + math.pi) % (2 * math.pi) - math.pi,
+            "x_m": c * x - s * y + 3, "y_m": s * x + c * y - 2,
+            "yaw_rad": (yaw + 3 + math.pi) % (2 * math.pi) - math.pi,
         }  # fmt: skip
     steps = np.diff(TIMES, prepend=0.0)
     return {"distance_m": SPEED * steps, "yaw_deg": np.degrees(RATE * steps)}
