@@ -131,10 +131,11 @@ def write_video(path: Path, images: Iterable[np.ndarray], times_ms: Sequence[int
     with av.open(str(path), "w") as container:
         stream = container.add_stream(codec, rate=30)
         stream.time_base = stream.codec_context.time_base = base
-        for image, time_ms in zip(images, times_ms, strict=True):
+        for number, (image, time_ms) in enumerate(zip(images, times_ms, strict=True)):
             frame = av.VideoFrame.from_ndarray(image, format="bgr24")
-            stream.height, stream.width = image.shape[:2]
-            stream.pix_fmt = "yuv420p"
+            if number == 0:
+                stream.height, stream.width = image.shape[:2]
+                stream.pix_fmt = "yuv420p"
             frame.pts, frame.time_base = time_ms, base
             container.mux(stream.encode(frame))
         container.mux(stream.encode())

@@ -10,7 +10,7 @@ from cyclopts import Group, Parameter, validators
 
 from tiltvp._core import LINE_METHODS
 from tiltvp.cli.declared_options import from_library, mask_from
-from tiltvp.cli.options import MountedOptions, check_word
+from tiltvp.cli.options import MountedOptions, check_word, rotation_of
 
 if TYPE_CHECKING:
     import numpy as np
@@ -65,9 +65,9 @@ class LineOptions(MountedOptions):
         return tilt
 
     def _rotation(self, yaw_rad: float) -> NDArray[np.float64]:
-        from tiltvp.rotations import about_vertical, read_rotation
+        from tiltvp.rotations import about_vertical
 
-        return about_vertical(yaw_rad) @ read_rotation(self.robot_from_camera or "up")
+        return about_vertical(yaw_rad) @ rotation_of(self.robot_from_camera or "up")
 
 
 @Parameter(name="*", group=_LINES)

@@ -16,6 +16,9 @@ from tiltvp.cli.declared_options import LibraryOptions, from_library
 from tiltvp.errors import InvalidInputError
 
 if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
     from tiltvp import Camera, TiltEstimator
 
 _CAMERA = Group("Camera")
@@ -40,11 +43,11 @@ class CameraOptions:
     """Which camera took the images."""
 
     camera: Path
-    """Calibration file, of any of the formats that `tiltvp camera formats` lists."""
+    """Calibration file, of any of the formats that `tiltvp camera formats` lists, or recording of ROS with CameraInfo."""
     camera_format: str | None = None
     """Its format, where its content does not tell."""
     camera_name: str | None = None
-    """Name or number of the camera in a file of several; the first is 0."""
+    """Name or number of the camera in a file of several; the first is 0. Of a recording the topic."""
     image_size: str | None = None
     """WIDTHxHEIGHT in pixels, for formats that do not carry it."""
     mirror: Switch = False
@@ -53,7 +56,10 @@ class CameraOptions:
     def load(self) -> "Camera":
         """The camera."""
         from tiltvp import Camera
+        from tiltvp.streams import Recording, is_recording, recorded_camera
 
+        if is_recording(self.camera):
+            return self._mirrored(recorded_camera(Recording(self.camera), self.camera_name))
         name = self.camera_name or "0"
         camera = Camera.load(
             self.camera,
@@ -61,6 +67,9 @@ class CameraOptions:
             camera=int(name) if name.isdecimal() else name,
             image_size=image_size_from(self.image_size),
         )
+        return self._mirrored(camera)
+
+    def _mirrored(self, camera: "Camera") -> "Camera":
         return camera.mirrored() if self.mirror and not camera.mirror else camera
 
     def complete(self, options: "M") -> "M":
@@ -82,7 +91,8 @@ class MountedOptions(LibraryOptions):
     """How the camera sits on the robot, and where the robot sees itself."""
 
     robot_from_camera: str | None = None
-    """How the camera sits on the robot: up (the default), forward, or a file with a rotation."""
+    """How the camera sits on the robot: up (the default), forward, a file with a rotation, or a recording of ROS whose
+    /tf_static joins base_link to the frame of the only topic of images."""
     mask: Path | None = None
     """Image of the camera's size, white where the world is seen and black where the robot is."""
 
@@ -101,15 +111,22 @@ class MethodOptions(MountedOptions):
     def estimator(self, camera: "Camera") -> "TiltEstimator":
         """The estimator with the options that were given."""
         from tiltvp import TiltEstimator
-        from tiltvp.rotations import read_rotation
 
         options = self.given()
         if self.robot_from_camera is not None:
-            options["robot_from_camera"] = read_rotation(self.robot_from_camera)
+            options["robot_from_camera"] = rotation_of(self.robot_from_camera)
         if self.method is not None:
             check_word("--method", self.method, METHODS)
             options["method"] = self.method
         return TiltEstimator(camera, **options)
+
+
+def rotation_of(source: str) -> "NDArray[np.float64]":
+    """The (3, 3) rotation of a word, a file or a recording."""
+    from tiltvp.rotations import read_rotation
+    from tiltvp.streams import Recording, is_recording, robot_from_camera
+
+    return robot_from_camera(Recording(source)) if is_recording(source) else read_rotation(source)
 
 
 def check_word(option: str, word: str, known: Sequence[str]) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -51,14 +51,14 @@ class Message:
     """When it was written down, seconds: by the clock of the recorder."""
     raw: bytes
     kind: str
-    _reader: AnyReader
+    _decode: Callable[[bytes, str], Any]
 
     def decode(self) -> Any:
         """Its content, with the fields of its definition. Raises `InvalidInputError` for a damaged one."""
         if len(self.raw) > LARGEST_IMAGE_BYTES:
             raise InvalidInputError(f"a message of {len(self.raw)} bytes, expected at most {LARGEST_IMAGE_BYTES}")
         try:
-            return self._reader.deserialize(self.raw, self.kind)
+            return self._decode(self.raw, self.kind)
         except Exception as error:
             raise InvalidInputError(f"a message that is no {_short(self.kind)} ({error})") from error
 
@@ -112,8 +112,10 @@ class Recording:
         """
         with self._opened() as reader:
             connections = [one for one in reader.connections if one.topic == topic.name]
+            types = reader.typestore
+            decode = types.deserialize_cdr if reader.is2 else types.deserialize_ros1
             for connection, time_ns, raw in reader.messages(connections):
-                yield Message(1e-9 * time_ns, raw, connection.msgtype, reader)
+                yield Message(1e-9 * time_ns, raw, connection.msgtype, decode)
 
     def decoded(self, topic: Topic) -> Iterator[tuple[float, Any]]:
         """The time and the content of each message of a topic, which has no damaged ones."""

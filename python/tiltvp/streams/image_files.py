@@ -71,8 +71,10 @@ def find_images(words: Sequence[str]) -> tuple[list[Path], list[str]]:
     files: list[Path] = []
     problems: list[str] = []
     for word in words:
+        if "\0" in word:
+            raise InvalidInputError(f"{word!r}: a name with a zero byte, expected a file, folder or pattern")
         path = Path(word)
-        if _is_folder(path):
+        if path.is_dir():
             found = _images_of(path)
             if not found:
                 inner = ", nor in a folder images or frames in it"
@@ -86,13 +88,6 @@ def find_images(words: Sequence[str]) -> tuple[list[Path], list[str]]:
         files.extend(found)
     once = {os.path.realpath(file): file for file in reversed(files)}
     return [file for file in dict.fromkeys(files) if once[os.path.realpath(file)] is file], problems
-
-
-def _is_folder(path: Path) -> bool:
-    try:
-        return path.is_dir()
-    except ValueError:
-        raise InvalidInputError(f"{str(path)!r}: a name with a zero byte, expected a file, folder or pattern") from None
 
 
 def _images_of(folder: Path) -> list[Path]:

@@ -1,0 +1,244 @@
+"""Odometry over time: every kind of record tells the same drive, between its samples too, and never beyond."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+import tiltvp
+from recordings import KINDS, START_S, Bag
+from tiltvp.errors import InvalidInputError
+from tiltvp.streams import Motion, Odometry, Wheels, frame_motions, open_frames, read_odometry
+
+BASE_M, RADIUS_M, TURN = 0.4, 0.05, 1000.0
+SPEED, RATE = 0.5, 0.8
+TIMES = np.arange(0.0, 4.0, 0.05)
+WHEELS = Wheels(wheel_base_m=BASE_M, wheel_radius_m=RADIUS_M, ticks_per_turn=TURN)
+
+
+def rolled(times: Any) -> np.ndarray:
+    """(N, 2): how far the wheels have rolled on an arc."""
+    return np.stack([(SPEED - 0.5 * RATE * BASE_M) * times, (SPEED + 0.5 * RATE * BASE_M) * times], axis=1)
+
+
+def columns(kind: str) -> dict[str, np.ndarray]:
+    if kind == "wheels":
+        steps = np.diff(rolled(TIMES), axis=0, prepend=0.0)
+        return {"left_m": steps[:, 0], "right_m": steps[:, 1]}
+    if kind == "deltas":
+        steps = np.diff(rolled(TIMES), axis=0, prepend=0.0)
+        return {"step": np.arange(len(TIMES)), "delta_left_m": steps[:, 0], "delta_right_m": steps[:, 1]}
+    if kind == "ticks":
+        counts = np.rint(rolled(TIMES) / (2 * math.pi * RADIUS_M) * TURN)
+        return {"left_ticks": (counts[:, 0] + 64_000) % 65_536, "right_ticks": counts[:, 1] - 32_768 + 30_000}
+    if kind == "velocities":
+        return {"speed_mps": np.full(len(TIMES), SPEED), "yaw_rate_radps": np.full(len(TIMES), RATE)}
+    if kind == "poses":
+        yaw = RATE * TIMES
+        x, y = SPEED / RATE * np.sin(yaw), SPEED / RATE * (1 - np.cos(yaw))
+        # The world's frame is another one than that in which the drive begins.
+        c, s = math.cos(3.0), math.sin(3.0)
+        return {
+            "x_m": c * x - s * y + 3, "y_m": s * x + c * y - 2,
+            "yaw_rad": (yaw + 3 + math.pi) % (2 * math.pi) - math.pi,
+        }  # fmt: skip
+    steps = np.diff(TIMES, prepend=0.0)
+    return {"distance_m": SPEED * steps, "yaw_deg": np.degrees(RATE * steps)}
+
+
+TABLES = ("wheels", "deltas", "ticks", "velocities", "poses", "increments")
+
+
+def write(path: Path, table: dict[str, np.ndarray]) -> Path:
+    rows = zip(*(values.tolist() for values in table.values()), strict=True)
+    path.write_text("\n".join([",".join(table), *(",".join(map(repr, row)) for row in rows)]) + "\n")
+    return path
+
+
+@pytest.mark.parametrize("kind", TABLES)
+def test_every_table_tells_the_same_drive(kind: str, tmp_path: Path) -> None:
+    path = write(tmp_path / "odometry.csv", {"time_s": START_S + TIMES} | columns(kind))
+    odometry = read_odometry(path, wheels=WHEELS)
+    there = odometry.at(START_S + np.array([0.0, 0.513, 1.777, 3.95]))
+    step_m = 2 * math.pi * RADIUS_M / TURN if kind == "ticks" else 1e-6
+    for start, end in ((0, 1), (1, 2), (0, 3)):
+        elapsed = np.array([0.0, 0.513, 1.777, 3.95])[[start, end]]
+        driven = SPEED * (elapsed[1] - elapsed[0])
+        assert there.distance_m[end] - there.distance_m[start] == pytest.approx(driven, abs=2 * step_m)
+        turned = RATE * (elapsed[1] - elapsed[0])
+        assert there.yaw_rad[end] - there.yaw_rad[start] == pytest.approx(turned, abs=4 * step_m / BASE_M)
+    found = odometry.between(START_S + 0.513, START_S + 1.777)
+    assert found.distance_m == pytest.approx(SPEED * 1.264, abs=2 * step_m)
+    assert (found.wheels_m is not None) == (kind in ("wheels", "deltas", "ticks"))
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_every_topic_tells_the_same_drive(kind: str, tmp_path: Path) -> None:
+    made = Bag(kind)
+    poses, wheels = columns("poses"), rolled(TIMES) / RADIUS_M
+    for k, elapsed in enumerate(TIMES.tolist()):
+        made.odometry(START_S + elapsed, *(float(poses[name][k]) for name in ("x_m", "y_m", "yaw_rad")))
+        # The joints of an arm come in messages of their own.
+        made.joints(START_S + elapsed, ["elbow"], [1.0])
+        made.joints(
+            START_S + elapsed, ["wheel_right_joint", "elbow", "wheel_left_joint"], [wheels[k, 1], 0.0, wheels[k, 0]]
+        )
+        made.twist(START_S + elapsed, SPEED, RATE)
+    path = made.write(tmp_path)
+    plain, by_wheels = Wheels(), Wheels(wheel_base_m=BASE_M, wheel_radius_m=RADIUS_M)
+    for topic, known, name in (
+        (None, plain, "/odom"), (None, by_wheels, "/joint_states"), ("/cmd_vel", plain, "/cmd_vel"),
+        ("/joint_states", by_wheels, "/joint_states"),
+    ):  # fmt: skip
+        odometry = read_odometry(path, topic=topic, wheels=known)
+        assert odometry.source == f"{path} {name}"
+        found = odometry.between(START_S + 1.01, START_S + 2.24)
+        assert (found.distance_m, found.yaw_rad) == pytest.approx((SPEED * 1.23, RATE * 1.23), abs=1e-6)
+    with pytest.raises(InvalidInputError, match="expected their radius by --wheel-radius"):
+        read_odometry(path, topic="/joint_states")
+    with pytest.raises(InvalidInputError, match=r"joints elbow, wheel_left_joint, .*by --wheel-joints LEFT RIGHT"):
+        read_odometry(path, topic="/joint_states", wheels=Wheels(wheel_radius_m=0.1, joints=("a", "b")))
+
+
+def test_velocities_that_were_commanded_are_not_taken_by_themselves(tmp_path: Path) -> None:
+    made = Bag("mcap")
+    for elapsed in TIMES.tolist():
+        made.twist(START_S + elapsed, SPEED, RATE)
+    with pytest.raises(
+        InvalidInputError, match=r"no topics of .*; topics and messages: /cmd_vel \(geometry_msgs/Twist, 80\)"
+    ):
+        read_odometry(made.write(tmp_path))
+
+
+def test_without_a_base_there_are_distances(tmp_path: Path) -> None:
+    path = write(tmp_path / "odometry.csv", {"time_s": TIMES} | columns("wheels"))
+    odometry = read_odometry(path)
+    assert odometry.yaw_rad is None
+    assert odometry.between(1.0, 2.0).distance_m == pytest.approx(SPEED)
+    for k in range(3):
+        tiltvp.write_image(tmp_path / "images" / f"{k}.png", np.zeros((4, 4), np.uint8))
+    (tmp_path / "frames.csv").write_text("file,time_s\n0.png,0.5\n1.png,1.0\n2.png,1.5\n")
+    told = frame_motions(open_frames(tmp_path), path)
+    assert not told.turns_known
+    assert "--wheel-base" in told.notes[0]
+    assert frame_motions(open_frames(tmp_path), path, wheels=WHEELS).turns_known
+
+
+def test_nothing_is_made_up_outside_and_in_gaps() -> None:
+    times = np.array([0.0, 0.1, 0.2, 2.2, 2.3])
+    odometry = Odometry.from_wheels(times, np.stack([times, times], axis=1), wheel_base_m=1.0)
+    there = odometry.at([-0.1, 0.0, 0.15, 0.2, 1.0, 2.2, 2.3, 2.4])
+    assert there.outside.tolist() == [True, *[False] * 6, True]
+    assert there.in_gap.tolist() == [False] * 4 + [True] + [False] * 3
+    assert np.isnan(there.distance_m).tolist() == (~there.known).tolist()
+    assert odometry.between(0.15, 2.25).distance_m == pytest.approx(2.1), "wheels have counted through the gap"
+    assert odometry.between(0.15, 1.0) is None
+    motions = odometry.motions([-0.1, 0.0, 1.0, 2.3])
+    assert [motion and motion.distance_m for motion in motions] == [None, 0.0, None, 2.3]
+    assert odometry.missing([-0.1, 0.0, 1.0, 2.4], ["a", "b", "c", "d"]) == (
+        "odometry: from 0.000 to 2.300 s; 2 frames outside its span (a to d) and 1 frames in gaps of over 0.5 s (c)"
+    )
+    assert odometry.missing([0.0, 0.2], ["a", "b"]) is None
+    with pytest.raises(InvalidInputError, match=r"no velocities from 0\.200 to 2\.200 s"):
+        Odometry.from_velocities(times, times, times)
+
+
+@given(st.integers(0, 2**32 - 1), st.floats(0.0, 1.0))
+def test_motions_add_up(seed: int, share: float) -> None:
+    rng = np.random.default_rng(seed)
+    times = np.cumsum(rng.uniform(0.01, 0.4, 30))
+    odometry = Odometry.from_wheels(times, np.cumsum(rng.normal(0, 0.1, (30, 2)), axis=0), wheel_base_m=0.3)
+    a, c = np.sort(rng.uniform(times[0], times[-1], 2))
+    b = a + share * (c - a)
+    parts = odometry.between(a, b), odometry.between(b, c)
+    whole = odometry.between(a, c)
+    assert sum(part.distance_m for part in parts) == pytest.approx(whole.distance_m, abs=1e-9)
+    assert sum(part.yaw_rad for part in parts) == pytest.approx(whole.yaw_rad, abs=1e-9)
+    assert whole.yaw_rad == pytest.approx((whole.wheels_m[1] - whole.wheels_m[0]) / 0.3, abs=1e-9)
+
+
+@pytest.mark.parametrize("wrap", [2**16, 2**32])
+def test_counters_that_begin_anew_are_told(wrap: int, tmp_path: Path) -> None:
+    counts = np.arange(50) * (wrap // 12)
+    table = {"time_s": 0.1 * np.arange(50), "left_ticks": counts % wrap, "right_ticks": (-counts) % wrap}
+    odometry = read_odometry(write(tmp_path / "odometry.csv", table), wheels=WHEELS)
+    metres = 2 * math.pi * RADIUS_M / TURN
+    assert odometry.wheels_m[:, 0] == pytest.approx(counts * metres)
+    assert odometry.wheels_m[:, 1] == pytest.approx(-counts * metres)
+    assert [note.split(": ")[1] for note in odometry.notes] == [
+        f"the counter of the left wheel begins anew 4 times, at {wrap}",
+        f"the counter of the right wheel begins anew 5 times, at {wrap}",
+    ]
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("time_s,left_m\n", "line 1: one of the columns left_m and right_m"),
+        ("time_s,left_m,right_m,left_ticks,right_ticks\n", "line 1: columns of several kinds"),
+        ("time_s,speed_mps,yaw_rate_radps,distance_m\n", "line 1: columns of several kinds"),
+        ("time_s,x_m,y_m\n", "expected x_m, y_m and yaw_rad"),
+        ("time_s\n1\n2\n", "line 1: no motion"),
+        ("time_s,left_m,delta_left_m,right_m\n", "column 'left_m' twice"),
+        ("time_s,yaw_rad\n0,0\n1,0\n1,0\n", "line 4: time_s = 1.0 after 1.0"),
+        ("time_s,yaw_rad\n0,0\n", "1 samples, expected two or more"),
+        ("time_s,yaw_rad\n", "0 samples, expected two or more"),
+        ("time_s,yaw_rad\n0,0\nnan,0\n", "line 3: time_s = 'nan'"),
+        ("time_s,left_ticks,right_ticks\n0,0,0\n1,1,1\n", "expected --wheel-radius and --ticks-per-turn"),
+        ("yaw_rad\n0\n1\n", "no column time_s"),
+    ],
+)
+def test_wrong_tables_are_refused(tmp_path: Path, text: str, words: str) -> None:
+    path = tmp_path / "odometry.csv"
+    path.write_text(text)
+    with pytest.raises(InvalidInputError) as caught:
+        read_odometry(path)
+    assert words in str(caught.value)
+    assert str(path) in str(caught.value)
+
+
+def test_rows_of_images_without_times(tmp_path: Path) -> None:
+    for k in range(3):
+        tiltvp.write_image(tmp_path / "images" / f"{k}.png", np.zeros((4, 4), np.uint8))
+    frames, path = open_frames(tmp_path), tmp_path / "odometry.csv"
+    path.write_text("left_m,right_m\n0,0\n0.1,0.3\n0.2,0.2\n")
+    told = frame_motions(frames, path, wheels=Wheels(wheel_base_m=0.4))
+    assert [(motion.distance_m, motion.yaw_rad) for motion in told.motions] == [
+        (0.0, 0.0), (pytest.approx(0.2), pytest.approx(0.5)), (0.2, 0.0),
+    ]  # fmt: skip
+    assert told.times_s is None
+    path.write_text("time_s,file,x_m,y_m,yaw_deg\n5,2.png,2,0,0\n3,0.png,0,0,0\n4,1.png,1,0,0\n")
+    told = frame_motions(frames, path)
+    assert told.motions == [Motion(), Motion(0.0, 1.0), Motion(0.0, 1.0)]
+    assert told.times_s.tolist() == [3.0, 4.0, 5.0]
+    path.write_text("time_s,distance_m\n0,0\n1,1\n")
+    with pytest.raises(InvalidInputError, match=r"no times of the images, expected them in frames\.csv"):
+        frame_motions(frames, path)
+    path.write_text("speed_mps,yaw_rate_radps\n0,0\n1,1\n1,1\n")
+    with pytest.raises(InvalidInputError, match="velocities without times"):
+        frame_motions(frames, path)
+    (tmp_path / "frames.csv").write_text("file,time_s\n0.png,100\n1.png,101\n2.png,102\n")
+    path.write_text("time_s,distance_m\n0,0\n1,1\n")
+    with pytest.raises(
+        InvalidInputError, match=r"none is left of .*from 100\.000 to 102\.000 s; expected clocks that agree"
+    ):
+        frame_motions(open_frames(tmp_path), path)
+
+
+def test_wheels_are_lengths() -> None:
+    for name in ("wheel_base_m", "wheel_radius_m", "ticks_per_turn", "gap_max_s"):
+        for value in (0.0, -1.0, math.nan, math.inf):
+            with pytest.raises(InvalidInputError, match=name):
+                Wheels(**{name: value})
+    with pytest.raises(InvalidInputError, match=r"expected \(N, 2\)"):
+        Odometry.from_wheels([0, 1], [0, 1])
+    with pytest.raises(InvalidInputError, match="wheel_base_m = 0"):
+        Odometry.from_wheels([0, 1], [[0, 0], [1, 1]], wheel_base_m=0.0)
+    with pytest.raises(InvalidInputError, match="finite numbers"):
+        Odometry.from_velocities([0, 0.1], [math.nan, 1], [0, 0])
