@@ -51,6 +51,8 @@ class Outcome:
     nis: float | None = None
     filtered: FilteredTilt | None = None
     """What the filter held to be true after it; None without a filter."""
+    taken_s: float | None = None
+    """When the image was taken, by the clock of its source; None where that does not tell."""
     mounting: FilteredTilt | None = None
     """The lean of the robot itself that the filter held to be true after it; None where nobody asked."""
 
