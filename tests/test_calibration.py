@@ -17,7 +17,7 @@ from tiltvp.cli import main
 from tiltvp.drive_logs import read_drive_log
 from tiltvp.errors import InvalidInputError
 from tiltvp.lab.plots.calibration import convergence
-from tiltvp.selfcalib import consistency_band, convergence_table, ros_static_transform, urdf_origin
+from tiltvp.selfcalib import consistency_band, convergence_table
 from tiltvp.synth import SimulatedDrive, simulate_drive
 
 TRUE = np.array([0.23 * math.cos(-0.34), 0.23 * math.sin(-0.34), -0.01])
@@ -212,11 +212,6 @@ def test_snippets_and_convergence() -> None:
     assert len(table["alarm"]) == len(drive.odometry)
     assert table["variance_psi"][-1] < 1e-3 < table["variance_psi"][5]
     assert len(convergence(table, {"phi_rad": -0.34}).axes) == 6
-    e = history[-1]
-    assert f"--x {e.x_m:.6f} --y {e.y_m:.6f} --z 0.300000 --yaw {e.yaw_rad:.6f}" in ros_static_transform(e, z_m=0.3)
-    assert urdf_origin(e).startswith(f'<origin xyz="{e.x_m:.6f} {e.y_m:.6f}')
-    with pytest.raises(InvalidInputError, match="child"):
-        ros_static_transform(e, child="a; b")
 
 
 def write_log(folder: Path, drive: SimulatedDrive) -> tuple[Path, Path]:

@@ -60,7 +60,7 @@ def test_a_misread_log_is_refused_and_named(
     printed = capsys.readouterr().out
     assert all(f"try --read-as {word}" in printed for word in remedies)
     assert "static_transform_publisher" not in printed
-    assert "urdf_origin" not in json.loads(out.read_text())
+    assert "urdf_joint" not in json.loads(out.read_text())
     assert main([*words, "--read-as", remedies[-1]]) == 0
     assert "static_transform_publisher" in capsys.readouterr().out
 

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from tiltvp.errors import InvalidInputError
-from tiltvp.files import write_whole
 from tiltvp.rotations import quaternion
+from tiltvp.streams.outputs.tum import write_tum
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -71,12 +71,10 @@ def write_trajectory(rows: Sequence[Mapping[str, Any]], path: str | os.PathLike[
     Raises `InvalidInputError` where no row has a position, `OutputError` where the file cannot be written.
     """
     poses = [[row[name] for name in ("time_s", *_POSITION, *_QUATERNION)] for row in rows]
-    placed = [pose for pose in poses if None not in pose]
-    if not placed:
+    placed = np.array([pose for pose in poses if None not in pose])
+    if not len(placed):
         raise InvalidInputError(f"{path}: no pose has a position, expected the images of two cameras")
-    lines = ["# time_s x_m y_m z_m qx qy qz qw of object_from_camera"]
-    lines += [" ".join(f"{value:.9f}" for value in pose) for pose in placed]
-    write_whole(path, "\n".join(lines) + "\n")
+    write_tum(path, placed[:, 0], placed[:, 1:4], placed[:, 4:], "of object_from_camera")
 
 
 def roll_pitch_yaw(object_from_camera: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -17,7 +16,8 @@ from tiltvp._core import (
     consistency_band,
     wheel_displacements,
 )
-from tiltvp.errors import InvalidInputError
+from tiltvp.rotations import about_vertical
+from tiltvp.streams.outputs.transforms import StaticTransform
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -33,8 +33,7 @@ __all__ = [
     "calibrate",
     "consistency_band",
     "convergence_table",
-    "ros_static_transform",
-    "urdf_origin",
+    "static_transform",
     "wheel_displacements",
 ]
 
@@ -49,31 +48,29 @@ def convergence_table(estimates: Sequence[MountingEstimate]) -> dict[str, NDArra
     return columns | {"alarm": np.array([e.alarm for e in estimates], dtype=bool)}
 
 
-def ros_static_transform(
-    mounting: MountingEstimate, *, parent: str = "base_link", child: str = "camera_mount", z_m: float = 0.0
-) -> str:
-    """The command that publishes the mounting in ROS 2: the child's frame is x, y, yaw of the parent's, z as given."""
-    _frame_name("parent", parent)
-    _frame_name("child", child)
-    x, y, z, yaw = _finite(mounting.x_m, mounting.y_m, z_m, mounting.yaw_rad)
-    return (
-        f"ros2 run tf2_ros static_transform_publisher --x {x:.6f} --y {y:.6f} --z {z:.6f} "
-        f"--yaw {yaw:.6f} --pitch 0 --roll 0 --frame-id {parent} --child-frame-id {child}"
+def static_transform(
+    mounting: MountingEstimate,
+    *,
+    parent: str = "base_link",
+    child: str | None = None,
+    z_m: float | None = None,
+    robot_from_camera: NDArray[np.float64] | None = None,
+) -> StaticTransform:
+    """The mounting as a transform for ROS, with the standard deviations of x, y and yaw.
+
+    `robot_from_camera` (3, 3) is how the camera was taken to sit while bearings were measured; the estimated yaw turns
+    it further, and the child is the camera's frame (`camera_optical`, z along the optical axis). Without one the child
+    is a level frame at the camera (`camera_mount`), and roll and pitch are not known. Neither is z where `z_m` is None.
+    Raises `InvalidInputError` for names that no frame can have and for a mounting that is not finite.
+    """
+    missing = (*(("z",) if z_m is None else ()), *(("roll", "pitch") if robot_from_camera is None else ()))
+    place, turn = np.array([mounting.x_m, mounting.y_m, z_m or 0.0]), mounting.yaw_rad
+    sigmas = np.sqrt(np.diag(mounting.covariance_xy_yaw)).tolist()
+    return StaticTransform(
+        parent,
+        child or ("camera_mount" if robot_from_camera is None else "camera_optical"),
+        place,
+        about_vertical(turn) @ (np.eye(3) if robot_from_camera is None else np.asarray(robot_from_camera)),
+        missing,
+        tuple(zip(("x", "y", "yaw"), sigmas, strict=True)),
     )
-
-
-def urdf_origin(mounting: MountingEstimate, *, z_m: float = 0.0) -> str:
-    """The `origin` element of a URDF joint from the robot's base to the camera's mount."""
-    x, y, z, yaw = _finite(mounting.x_m, mounting.y_m, z_m, mounting.yaw_rad)
-    return f'<origin xyz="{x:.6f} {y:.6f} {z:.6f}" rpy="0 0 {yaw:.6f}"/>'
-
-
-def _finite(*numbers: float) -> tuple[float, ...]:
-    if not all(math.isfinite(number) for number in numbers):
-        raise InvalidInputError(f"mounting: {numbers}, expected finite numbers")
-    return numbers
-
-
-def _frame_name(what: str, name: str) -> None:
-    if not name or not all(c.isalnum() or c in "_/" for c in name):
-        raise InvalidInputError(f"{what} = {name!r}, expected the name of a frame: letters, digits, _ and /")

@@ -12,7 +12,7 @@ use tiltvp_core::segments::SegmentDetectorOptions;
 use tiltvp_core::selfcalib::{CalibrationMethod, LogOptions, SelfCalibratorOptions};
 use tiltvp_core::tilt::{CommonDirectionOptions, Method, TiltFilterOptions, TiltOptions};
 use tiltvp_core::{Error, corner};
-use tiltvp_synth::{BearingDriveOptions, DriveOptions, LaboratoryOptions, RoomOptions, StereoOptions};
+use tiltvp_synth::{BearingDriveOptions, DriveOptions, ImuOptions, LaboratoryOptions, RoomOptions, StereoOptions};
 
 use crate::call::{exception, invalid};
 use crate::tilt::correction;
@@ -184,6 +184,7 @@ fn defaults(owner: &str, method: Option<&str>) -> Result<Box<dyn Options>, Error
             Box::new(options)
         }
         "StereoSequence" => Box::new(StereoOptions::default()),
+        "read_imu" => Box::new(ImuOptions::default()),
         _ => return Err(Error::argument("owner", owner, "the name of a class or function that takes options")),
     })
 }

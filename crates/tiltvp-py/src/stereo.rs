@@ -240,7 +240,7 @@ fn picture(py: Python<'_>, image: ColorImage) -> PyResult<Picture<'_>> {
 /// `rates_rad_s` and `forces_m_s2` are its true rates of turn and specific forces in the sensor's axes, (M, 3) each and `rate_hz` a
 /// second. Times, rates (M, 3), forces (M, 3), and the rates' true biases (M, 3).
 #[pyfunction]
-#[pyo3(signature = (rates_rad_s: "ArrayLike", forces_m_s2: "ArrayLike", **options: "Any"))]
+#[pyo3(signature = (rates_rad_s: "ArrayLike", forces_m_s2: "ArrayLike", **options: "Option | None"))]
 pub(crate) fn read_imu<'py>(
     py: Python<'py>,
     rates_rad_s: &Bound<'py, PyAny>,

@@ -82,7 +82,7 @@ def calibrate(
         log.odometry, log.bearings, **sigma | drive.of_whole_log(), times_s=log.times_s,
         estimate_odometry=estimate_odometry, estimate_time_offset=estimate_time_offset,
     )  # fmt: skip
-    results.tell(Calibration(calibrator, history, whole))
+    results.tell(Calibration(calibrator, history, whole), options.robot_from_camera)
     for word in other_readings(whole.misreading):
         say(f"try {' '.join([*(f'--read-as {known}' for known in read_as), f'--read-as {word}'])}")
     return 0 if whole and not bad else NOT_RELIABLE

@@ -16,9 +16,11 @@ from tiltvp.cli.tables import check_plot, finite
 from tiltvp.cli.terminal import new_table, say, show
 from tiltvp.errors import InvalidInputError
 from tiltvp.files import check_output, write_whole
+from tiltvp.streams.outputs.transforms import check_transform
 
 if TYPE_CHECKING:
     from tiltvp import LogCalibration, MountingEstimate, SelfCalibrator
+    from tiltvp.streams.outputs.transforms import StaticTransform
 
 
 @dataclass(frozen=True)
@@ -37,10 +39,13 @@ class ResultOptions:
 
     parent_frame: str = "base_link"
     """Name of the robot's frame, for the ROS transform."""
-    child_frame: str = "camera_mount"
-    """Name of the camera's frame, for the ROS transform."""
-    height: float = 0.0
-    """Height of the camera in the robot's frame, metres, for the ROS transform and the URDF snippet."""
+    child_frame: str | None = None
+    """Name of the camera's frame, for the ROS transform; default is camera_optical with --robot-from-camera, of which
+    roll and pitch are taken, and without it camera_mount, whose roll and pitch are not known."""
+    height: float | None = None
+    """Height of the camera in the robot's frame, metres, for the ROS transform."""
+    transform: Path | None = None
+    """File for the transform: .urdf (link and joint), .yaml, or .mcap (/tf_static of ROS 2)."""
     out: Path | None = None
     """File for everything that was found (.json)."""
     anyway: Switch = False
@@ -54,25 +59,26 @@ class ResultOptions:
             raise InvalidInputError(f"--out {self.out}: ends in {self.out.suffix!r}, expected .json")
         if self.out is not None:
             check_output(self.out)
+        if self.transform is not None:
+            check_transform(self.transform)
         check_plot("--plot", self.plot)
 
-    def tell(self, calibration: Calibration) -> None:
-        """Prints and writes everything that was found."""
-        from tiltvp.selfcalib import ros_static_transform, urdf_origin
-
+    def tell(self, calibration: Calibration, robot_from_camera: str | None) -> None:
+        """Prints and writes everything that was found, with a camera that was taken to sit so."""
         filtered, whole = calibration.calibrator.estimate, calibration.whole
         _show(filtered, whole)
-        transforms = {}
+        found_transforms = {}
         if whole or self.anyway:
-            transforms = {
-                "ros_static_transform": ros_static_transform(
-                    whole.mounting, parent=self.parent_frame, child=self.child_frame, z_m=self.height
-                ),
-                "urdf_origin": urdf_origin(whole.mounting, z_m=self.height),
-            }
-        for text in transforms.values():
-            say(text)
-        if not transforms:
+            transform = self._transform(whole.mounting, robot_from_camera)
+            found_transforms = {
+                "ros_static_transform": transform.ros_command(), "urdf_joint": transform.urdf_joint(),
+                "transform_not_known": list(transform.missing),
+            }  # fmt: skip
+            for text in filter(None, (transform.ros_command(), transform.urdf_joint(), transform.note)):
+                say(text)
+            if self.transform is not None:
+                transform.write(self.transform)
+        else:
             say("no transform, since the whole log cannot be relied upon: --anyway prints it")
         if self.plot is not None:
             _write_plot(calibration.history, self.plot)
@@ -82,9 +88,18 @@ class ResultOptions:
                 "whole_log": whole.to_dict(),
                 "filter": filtered.to_dict(),
                 "options": {name: _plain(value) for name, value in options.items()},
-            } | transforms
+            } | found_transforms
             text = json.dumps(finite(found), indent=1, allow_nan=False) + "\n"
             write_whole(self.out, text)
+
+    def _transform(self, mounting: MountingEstimate, robot_from_camera: str | None) -> StaticTransform:
+        from tiltvp.rotations import read_rotation
+        from tiltvp.selfcalib import static_transform
+
+        return static_transform(
+            mounting, parent=self.parent_frame, child=self.child_frame, z_m=self.height,
+            robot_from_camera=None if robot_from_camera is None else read_rotation(robot_from_camera),
+        )  # fmt: skip
 
 
 def _write_plot(history: Sequence[MountingEstimate], path: Path) -> None:

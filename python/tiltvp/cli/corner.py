@@ -112,6 +112,8 @@ def corner(
 
     if out is not None:
         check_ending(out)
+    if trajectory is not None and right is None:
+        raise InvalidInputError(f"--trajectory {trajectory} of one camera, which tells no position: expected two")
     if trajectory is not None:
         check_output(trajectory)
     if overlay is not None:

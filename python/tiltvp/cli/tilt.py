@@ -15,11 +15,12 @@ from typing import TYPE_CHECKING, Annotated, TypeVar
 
 from cyclopts import Parameter, validators
 
+from tiltvp.cli.answers import check_answers, write_answers
 from tiltvp.cli.filtering import FilterOptions
 from tiltvp.cli.options import CameraOptions, MethodOptions
 from tiltvp.cli.results import Outcome, degrees, mounting_words, outcome_table, people_table, summary_words
 from tiltvp.cli.sources import MotionOptions, SourceOptions, ending_at_interrupt, picture_names
-from tiltvp.cli.tables import STDOUT, check_ending, json_lines, write_table
+from tiltvp.cli.tables import STDOUT, json_lines
 from tiltvp.cli.terminal import ProgressBar, complain, named, progress_bar, say, show, width
 from tiltvp.errors import InvalidInputError, OutputError, TiltvpError
 from tiltvp.files import check_output_folder
@@ -50,6 +51,7 @@ def tilt(
     out: Annotated[Path | None, Parameter(allow_leading_hyphen=True)] = None,
     overlay: Path | None = None,
     level: Path | None = None,
+    frame_rate: Annotated[float | None, Parameter(validator=validators.Number(gt=0))] = None,
     threads: Annotated[int, Parameter(validator=validators.Number(gte=1))] = 1,
 ) -> int:
     """Estimate the tilt of each image, of files, a video, a recording of ROS or a live camera.
@@ -64,11 +66,14 @@ def tilt(
     wheel_base
         Distance between the wheels, metres, for odometry of wheels with --filter.
     out
-        File for the results in radians: .csv, .json or .parquet; - for a line of JSON on stdout as each image is done.
+        File for the results in radians: .csv, .json or .parquet; for attitudes with yaw 0: .mcap (sensor_msgs/Imu of
+        ROS 2) or .tum; - for a line of JSON on stdout as each image is done.
     overlay
         Folder for the images with inlier edges in colour, horizon and vanishing points.
     level
         Folder for the images made level: each by its own tilt, with --filter by the filtered one.
+    frame_rate
+        Frames per second, for attitudes: by default the times that frames tell, and 25 where they tell none.
     threads
         How many images are worked on at the same time.
     """
@@ -76,7 +81,7 @@ def tilt(
 
     rows_only = out == STDOUT
     if out is not None and not rows_only:
-        check_ending(out)
+        check_answers(out)
     if overlay is not None and level is not None and os.path.realpath(overlay) == os.path.realpath(level):
         raise InvalidInputError(f"--overlay and --level are both {overlay}, expected two folders")
     for folder in (overlay, level):
@@ -101,21 +106,23 @@ def tilt(
             if rows_only:
                 say(json_lines(outcome_table([outcome], estimator.method)))
     if not rows_only:
-        _show(outcomes, estimator.method, filtering, out)
+        _show(outcomes, estimator.method, filtering, out, frame_rate)
     if filtering.filter_plot is not None:
         _write_plot(outcomes, estimator.method, filtering.filter_plot)
     return 1 if frames.problems or any(outcome.error for outcome in outcomes) else 0
 
 
-def _show(outcomes: Sequence[Outcome], method: str, filtering: FilterOptions, out: Path | None) -> None:
-    """What people read on stdout, and the table as a file."""
+def _show(
+    outcomes: Sequence[Outcome], method: str, filtering: FilterOptions, out: Path | None, frame_rate: float | None
+) -> None:
+    """What people read on stdout, and the answers as a file."""
     if outcomes:
         say(summary_words(outcomes))
     show(people_table(outcomes, width()))
     if filtering.estimate_mounting:
         say(mounting_words(outcomes))
     if out is not None:
-        write_table(outcome_table(outcomes, method), out)
+        write_answers(outcomes, method, out, frame_rate)
 
 
 def _checked(estimator: TiltEstimator, frames: Frames) -> TiltEstimator:

@@ -22,7 +22,7 @@ from tiltvp.lab.datasets.motion import RobotMotion
 from tiltvp.lab.datasets.new import in_order
 from tiltvp.rotations import about_vertical
 from tiltvp.streams.outputs import messages
-from tiltvp.streams.outputs.mcap import Message, Recording, check_recording, new_recording
+from tiltvp.streams.outputs.mcap import Message, NewRecording, check_recording, new_recording
 from tiltvp.synth import Drive, Room
 
 if TYPE_CHECKING:
@@ -185,7 +185,7 @@ class RecordedDrive:
             stands.append((pose, (math.atan2(math.hypot(x, y), z), math.atan2(-y, -x))))
         return stands
 
-    def _write_constants(self, recording: Recording) -> None:
+    def _write_constants(self, recording: NewRecording) -> None:
         """What does not change: the nominal transforms, and the truth that a robot does not know."""
         start = _stamp(0.0)
         x, y, _, height = self.mount

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from rosbags.rosbag2 import Writer
     from rosbags.typesys.store import Typestore
 
-__all__ = ["Message", "Recording", "check_recording", "new_recording"]
+__all__ = ["Message", "NewRecording", "check_recording", "new_recording"]
 
 _ENDING: Final = ".mcap"
 _NAME: Final = "recording"
@@ -32,7 +32,7 @@ class Message(NamedTuple):
     fields: Mapping[str, Any]
 
 
-class Recording:
+class NewRecording:
     """Takes the messages of an MCAP file that is being written."""
 
     def __init__(self, writer: Writer, types: Typestore) -> None:
@@ -74,7 +74,7 @@ class Recording:
 
 
 @contextmanager
-def new_recording(path: str | os.PathLike[str]) -> Iterator[Recording]:
+def new_recording(path: str | os.PathLike[str]) -> Iterator[NewRecording]:
     """An MCAP file of ROS 2 messages that appears when the block ends, unless an exception leaves it.
 
     Raises as `check_recording` does.
@@ -85,7 +85,7 @@ def new_recording(path: str | os.PathLike[str]) -> Iterator[Recording]:
 
     with scratch_folder(path) as folder:
         with Writer(folder / _NAME, version=Writer.VERSION_LATEST, storage_plugin=StoragePlugin.MCAP) as writer:
-            yield Recording(writer, get_typestore(Stores.ROS2_JAZZY))
+            yield NewRecording(writer, get_typestore(Stores.ROS2_JAZZY))
         with whole_file(path) as part:
             shutil.copyfile(folder / _NAME / f"{_NAME}{_ENDING}", part)
 

@@ -17,7 +17,6 @@ if TYPE_CHECKING:
     from tiltvp._core import Camera
 
 __all__ = [
-    "UNKNOWN_RAD2",
     "camera_info",
     "compressed_image",
     "image",
@@ -31,9 +30,6 @@ __all__ = [
     "vector",
 ]
 
-UNKNOWN_RAD2: Final = 1e6
-"""Variance of an angle that is not known: REP 145 keeps -1 for attitudes of which nothing is known, and programs that
-invert covariances want a number."""
 _NONE: Final = (-1.0, *(0.0,) * 8)
 """REP 145: the covariance of a quantity that a message does not carry."""
 

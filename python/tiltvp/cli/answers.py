@@ -1,0 +1,63 @@
+"""The answers of `tiltvp tilt` as files: tables, and attitudes over time for ROS and for programs that judge them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Final
+
+from tiltvp.cli.results import Outcome, outcome_table
+from tiltvp.cli.tables import ENDINGS, check_ending, write_table
+from tiltvp.cli.terminal import say
+from tiltvp.errors import InvalidInputError, TiltvpError
+from tiltvp.streams.outputs.tilts import TILT_ENDINGS, TILT_TOPIC, check_tilts, write_tilts
+
+__all__ = ["check_answers", "write_answers"]
+
+_RATE_HZ: Final = 25.0
+"""Frames per second where nothing tells: that of a film, as for `tiltvp corner`."""
+
+
+def check_answers(path: Path) -> None:
+    """Refuses a file of answers that cannot be written in its format, before any work is done."""
+    ending = path.suffix.lower()
+    if ending not in (*ENDINGS, *TILT_ENDINGS):
+        known = ", ".join((*ENDINGS, *TILT_ENDINGS))
+        raise InvalidInputError(f"--out {path}: ends in {path.suffix!r}, expected one of {known}")
+    if ending in ENDINGS:
+        check_ending(path)
+        return
+    try:
+        check_tilts(path)
+    except TiltvpError as error:
+        raise type(error)(f"--out {error}") from None
+
+
+def write_answers(outcomes: Sequence[Outcome], method: str, path: Path, frame_rate: float | None) -> None:
+    """Writes the answers, the ending says how, and says what of them a file of attitudes has and lacks.
+
+    Attitudes are those of the filter where there is one, else the estimates that were accepted. `frame_rate` is how
+    many frames there are in a second, None for the times that they tell themselves.
+    """
+    if path.suffix.lower() in ENDINGS:
+        write_table(outcome_table(outcomes, method), path)
+        return
+    is_filtered = any(outcome.filtered is not None for outcome in outcomes)
+    tilts = [
+        outcome.filtered if is_filtered else None if outcome.accepted is False else outcome.estimate
+        for outcome in outcomes
+    ]
+    known = [outcome.taken_s for outcome in outcomes if outcome.taken_s is not None]
+    if frame_rate is None and len(known) == len(outcomes):
+        times, clock = known, "at the frames' own times"
+    else:
+        rate_hz = frame_rate or _RATE_HZ
+        times = [number / rate_hz for number in range(len(outcomes))]
+        clock = f"at {rate_hz:g} frames a second from 0"
+        clock += "" if frame_rate else ", as not all tell a time: --frame-rate"
+    count = write_tilts(path, times, tilts)
+    what = "filtered tilts" if is_filtered else "tilts"
+    where = f" as sensor_msgs/Imu on {TILT_TOPIC}" if path.suffix.lower() == ".mcap" else ""
+    lacking = len(outcomes) - count
+    left_out = f"; {lacking} frames without one are left out" if lacking else ""
+    say(f"{path}: {count} {what}{where}, yaw 0, {clock}{left_out}")
