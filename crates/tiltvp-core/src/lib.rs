@@ -33,3 +33,8 @@ pub mod testing;
 pub mod tilt;
 
 pub use error::{Error, Result};
+
+/// The README's program is run with those of the documentation.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;
