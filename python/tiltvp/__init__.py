@@ -54,6 +54,10 @@ from tiltvp.tilt import (
 
 if TYPE_CHECKING:
     from tiltvp import corner, streams, synth
+    from tiltvp.mounting import MountingTilt, mounting_tilt
+    from tiltvp.robot import Robot
+    from tiltvp.robot_setup import RobotSetup, find_setup
+    from tiltvp.turning import TurnCheck, check_turns
 
 __version__ = "0.1.0"
 
@@ -73,8 +77,11 @@ __all__ = [
     "ImageEdges",
     "LogCalibration",
     "MountingEstimate",
+    "MountingTilt",
     "PosteriorCorrection",
     "PriorOfTilt",
+    "Robot",
+    "RobotSetup",
     "SegmentDetector",
     "Segments",
     "SelfCalibrator",
@@ -82,16 +89,20 @@ __all__ = [
     "TiltEstimate",
     "TiltEstimator",
     "TiltFilter",
+    "TurnCheck",
     "apply_correction",
     "body_mask",
     "calibrate",
     "check_setup",
+    "check_turns",
     "common_direction",
     "corner",
     "draw_edges",
     "draw_segments",
+    "find_setup",
     "level",
     "lines",
+    "mounting_tilt",
     "normal_from_alpha_beta",
     "read_image",
     "streams",
@@ -107,10 +118,19 @@ __all__ = [
 ]
 
 
-def __getattr__(name: str) -> Any:
-    """The modules that many programs do without: they come when they are asked for, a quarter of the import's time."""
-    if name in ("corner", "streams", "synth"):
-        from importlib import import_module
+_MODULES = ("corner", "streams", "synth")
+_HOMES = {
+    "MountingTilt": "mounting", "Robot": "robot", "RobotSetup": "robot_setup", "TurnCheck": "turning",
+    "check_turns": "turning", "find_setup": "robot_setup", "mounting_tilt": "mounting",
+}  # fmt: skip
 
+
+def __getattr__(name: str) -> Any:
+    """What many programs do without: it comes when it is asked for, a half of the import's time."""
+    from importlib import import_module
+
+    if name in _MODULES:
         return import_module(f"tiltvp.{name}")
+    if name in _HOMES:
+        return getattr(import_module(f"tiltvp.{_HOMES[name]}"), name)
     raise AttributeError(f"module 'tiltvp' has no attribute {name!r}")

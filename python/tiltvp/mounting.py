@@ -27,6 +27,8 @@ _LEVEL: Final[dict[str, Any]] = {
     "prior_rad": math.radians(0.05), "walk_rad_per_sqrt_m": 0.0, "walk_rad_per_sqrt_step": 0.0,
 }  # fmt: skip
 """How level a floor is that is said to be level: a millimetre in a metre, as a builder's spirit level tells."""
+_SYSTEMATIC_RAD: Final = math.radians(0.07)
+"""Standard deviation of what the method errs by alike at all headings, which no turn averages out."""
 _QUANTILE: Final = math.sqrt(5.991)
 """Radius of the region of 95 % of two normal angles, in standard deviations."""
 
@@ -58,6 +60,16 @@ class MountingTilt:
         return bool(self.lean)
 
     @property
+    def covariance_rad2(self) -> NDArray[np.float64]:
+        """(2, 2): of the errors of the mounting about the robot's axes, with what no turn averages out."""
+        return np.asarray(self.lean.covariance_rad2) + _SYSTEMATIC_RAD**2 * np.eye(2)
+
+    @property
+    def sigma_rad(self) -> float:
+        """One standard deviation in any one direction."""
+        return math.sqrt(0.5 * float(np.trace(self.covariance_rad2)))
+
+    @property
     def reason(self) -> str:
         """What was found, or why nothing was, in a sentence."""
         told = f"{self.used} of {self.images} images, headings within {math.degrees(self.turned_rad):.0f} degrees"
@@ -66,7 +78,7 @@ class MountingTilt:
                 return f"{told}: no image tells a tilt"
             need = "expected a robot that turns in place, or a floor that is said to be level"
             return f"{told}: the floor's tilt and the mounting's are not told apart, {need}"
-        off, sigma = math.degrees(self.lean.alpha_rad), math.degrees(self.lean.sigma_rad)
+        off, sigma = math.degrees(self.lean.alpha_rad), math.degrees(self.sigma_rad)
         return f"{told}: the mounting is {off:.3f} degrees off, 1-sigma {sigma:.3f}"
 
     def within(self, tolerance_rad: float) -> bool | None:
@@ -75,7 +87,7 @@ class MountingTilt:
             raise InvalidInputError(f"tolerance_rad = {tolerance_rad}, expected a positive number of radians")
         if not self:
             return None
-        reach = _QUANTILE * self.lean.sigma_rad
+        reach = _QUANTILE * self.sigma_rad
         if self.lean.alpha_rad + reach <= tolerance_rad:
             return True
         return False if self.lean.alpha_rad - reach > tolerance_rad else None

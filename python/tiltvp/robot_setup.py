@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
     Image = NDArray[np.uint8]
 
-__all__ = ["DriveTilts", "RobotSetup", "drive_mounting", "drive_tilts", "find_setup"]
+__all__ = ["DriveTilts", "RobotSetup", "drive_tilts", "find_setup"]
 
 LOOKED_AT: Final = 24
 """Images, spread over the drive, by which rim, body, direction and sense of turns are found: see `body_mask`."""
@@ -134,11 +134,11 @@ def find_setup(
         turns = check_turns(images(), headings[numbers], camera, rotation)
     estimator = TiltEstimator(camera, method=METHOD, robot_from_camera=rotation, mask=mask)
     tilts = drive_tilts(frames, estimator, motions, advance=advance)
-    mounting = drive_mounting(tilts, rotation, known=motions is not None, level_floor=level_floor)
+    mounting = mounting_tilt(tilts.estimates, tilts.motions, rotation, level_floor=level_floor)
     robot = Robot(
         camera,
         mounting.robot_from_camera,
-        covariance_rad2=mounting.lean.covariance_rad2 if mounting else None,
+        covariance_rad2=mounting.covariance_rad2 if mounting else None,
         mask=mask,
         wheels=wheels or Wheels(),
         topics=topics or {},
@@ -153,7 +153,11 @@ def drive_tilts(
     *,
     advance: Callable[[], None] = lambda: None,
 ) -> DriveTilts:
-    """The tilts of at most 200 images, spread over a drive of known length. What cannot be read is None."""
+    """The tilts of at most 200 images, spread over a drive of known length. What cannot be read is None.
+
+    Without odometry (`motions` is None) the robot is taken not to have moved, so that nothing can tell floor and
+    mounting apart.
+    """
     count = frames.count
     if count is None:
         raise InvalidInputError(f"{frames.source}: comes only once, expected images, a video or a recording")
@@ -169,16 +173,6 @@ def drive_tilts(
 def measured_count(frames: Frames) -> int:
     """How many frames are measured."""
     return min(MEASURED, frames.count or 0)
-
-
-def drive_mounting(
-    tilts: DriveTilts, robot_from_camera: ArrayLike, *, known: bool, level_floor: bool = False
-) -> MountingTilt:
-    """The mounting by the tilts of a drive; without odometry (`known`) only of a floor that is level."""
-    if not known and not level_floor:
-        # Without turns floor and mounting cannot be told apart, and no motion looks like standing.
-        return mounting_tilt([None] * len(tilts.estimates), tilts.motions, robot_from_camera)
-    return mounting_tilt(tilts.estimates, tilts.motions, robot_from_camera, level_floor=level_floor)
 
 
 def rim_and_body(frames: Frames, camera: _core.Camera) -> tuple[NDArray[np.bool_] | None, BodyMask]:

@@ -5,22 +5,23 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Sequence
-from dataclasses import replace
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter, validators
 
-from tiltvp.cli.options import CameraOptions, MethodOptions, Switch
+from tiltvp.cli.options import CameraOptions, MountedOptions, Switch
 from tiltvp.cli.results import degrees
 from tiltvp.cli.sources import MotionOptions, SourceOptions
 from tiltvp.cli.tables import finite
 from tiltvp.cli.terminal import progress_bar, say
 from tiltvp.files import check_output, write_whole
-from tiltvp.mounting import MountingTilt
+
+if TYPE_CHECKING:
+    from tiltvp.mounting import MountingTilt
 
 DONE, FAILED, NOT_TOLD = 0, 1, 3
-_METHOD = MethodOptions()
+_MOUNTED = MountedOptions()
 _SOURCE = SourceOptions()
 _MOTION = MotionOptions()
 _ABOVE_0 = Parameter(validator=validators.Number(gt=0))
@@ -32,7 +33,7 @@ def mount(
     *,
     camera: CameraOptions,
     source: SourceOptions = _SOURCE,
-    method: MethodOptions = _METHOD,
+    mounted: MountedOptions = _MOUNTED,
     motion: MotionOptions = _MOTION,
     wheel_base: Annotated[float | None, _ABOVE_0] = None,
     level_floor: Switch = False,
@@ -57,18 +58,18 @@ def mount(
     out
         File for the result (.json).
     """
-    from tiltvp.robot_setup import METHOD, drive_mounting, drive_tilts, measured_count
+    from tiltvp.mounting import mounting_tilt
+    from tiltvp.robot_setup import METHOD, drive_tilts, measured_count
 
     if out is not None:
         check_output(out)
-    chosen = camera.complete(method)
-    estimator = (chosen if chosen.method is not None else replace(chosen, method=METHOD)).estimator(camera.load())
+    estimator = camera.complete(mounted).mounted(camera.load(), method=METHOD)
     frames = source.open(images)
     moved = motion.motions(frames, wheel_base)
+    motions = moved.motions if moved is not None and moved.turns_known else None
     with progress_bar(measured_count(frames), "images") as bar:
-        tilts = drive_tilts(frames, estimator, None if moved is None else moved.motions, advance=bar.advance)
-    known = moved is not None and moved.turns_known
-    found = drive_mounting(tilts, estimator.robot_from_camera, known=known, level_floor=level_floor)
+        tilts = drive_tilts(frames, estimator, motions, advance=bar.advance)
+    found = mounting_tilt(tilts.estimates, tilts.motions, estimator.robot_from_camera, level_floor=level_floor)
     verdict = None if within_deg is None else found.within(math.radians(within_deg))
     for line in mounting_lines(found):
         say(line)
@@ -104,6 +105,7 @@ def mounting_result(found: MountingTilt) -> dict[str, object]:
         "known": bool(found),
         "robot_from_camera": found.robot_from_camera.tolist(),
         "lean": found.lean.to_dict(),
+        "covariance_rad2": found.covariance_rad2.tolist(),
         "floor": found.floor.to_dict(),
         "images": found.images,
         "used": found.used,

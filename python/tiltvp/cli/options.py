@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 from cyclopts import Group, Parameter
 
 from tiltvp._core import METHODS
-from tiltvp.cli.declared_options import LibraryOptions, from_library
+from tiltvp.cli.declared_options import LibraryOptions, from_library, mask_from
 from tiltvp.errors import InvalidInputError
 
 if TYPE_CHECKING:
@@ -43,7 +43,8 @@ class CameraOptions:
     """Which camera took the images."""
 
     camera: Path
-    """Calibration file, of any of the formats that `tiltvp camera formats` lists, or recording of ROS with CameraInfo."""
+    """Calibration file, of any of the formats that `tiltvp camera formats` lists, a robot's file (`tiltvp setup`), or a
+    recording of ROS with CameraInfo."""
     camera_format: str | None = None
     """Its format, where its content does not tell."""
     camera_name: str | None = None
@@ -81,9 +82,8 @@ class CameraOptions:
         known: dict[str, Any] = {"robot_from_camera": str(self.camera)}
         if Robot.load(self.camera).mask is not None:
             known["mask"] = mask_path(self.camera)
-        return replace(
-            options, **{name: value for name, value in known.items() if getattr(options, name, options) is None}
-        )
+        missing = {name: value for name, value in known.items() if getattr(options, name, options) is None}
+        return replace(options, **missing)  # type: ignore[type-var]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -95,6 +95,16 @@ class MountedOptions(LibraryOptions):
     /tf_static joins base_link to the frame of the only topic of images."""
     mask: Path | None = None
     """Image of the camera's size, white where the world is seen and black where the robot is."""
+
+    def mounted(self, camera: "Camera", **options: Any) -> "TiltEstimator":
+        """An estimator of that mounting and mask, with these options."""
+        from tiltvp import TiltEstimator
+
+        if self.robot_from_camera is not None:
+            options["robot_from_camera"] = rotation_of(self.robot_from_camera)
+        if self.mask is not None and "mask" not in options:
+            options["mask"] = mask_from(self.mask)
+        return TiltEstimator(camera, **options)
 
 
 @Parameter(name="*", group=_METHOD)
@@ -110,15 +120,11 @@ class MethodOptions(MountedOptions):
 
     def estimator(self, camera: "Camera") -> "TiltEstimator":
         """The estimator with the options that were given."""
-        from tiltvp import TiltEstimator
-
         options = self.given()
-        if self.robot_from_camera is not None:
-            options["robot_from_camera"] = rotation_of(self.robot_from_camera)
         if self.method is not None:
             check_word("--method", self.method, METHODS)
             options["method"] = self.method
-        return TiltEstimator(camera, **options)
+        return self.mounted(camera, **options)
 
 
 def rotation_of(source: str) -> "NDArray[np.float64]":

@@ -9,7 +9,7 @@ from cyclopts import Parameter, validators
 
 from tiltvp.cli.declared_options import mask_from
 from tiltvp.cli.mount import mounting_lines
-from tiltvp.cli.options import CameraOptions, Switch
+from tiltvp.cli.options import CameraOptions, Switch, rotation_of
 from tiltvp.cli.sources import MotionOptions, SourceOptions
 from tiltvp.cli.terminal import complain, progress_bar, say
 from tiltvp.errors import InvalidInputError
@@ -64,7 +64,6 @@ def setup(
         Picture of what was found (.png).
     """
     from tiltvp.robot_setup import find_setup, measured_count
-    from tiltvp.rotations import read_rotation
     from tiltvp.streams import Wheels
 
     if out.suffix.lower() != ".toml":
@@ -80,7 +79,7 @@ def setup(
             frames,
             lens,
             moved.motions if moved is not None and moved.turns_known else None,
-            robot_from_camera=None if robot_from_camera is None else read_rotation(robot_from_camera),
+            robot_from_camera=None if robot_from_camera is None else rotation_of(robot_from_camera),
             mask=None if mask is None else mask_from(mask),  # type: ignore[arg-type]
             level_floor=level_floor,
             wheels=Wheels(

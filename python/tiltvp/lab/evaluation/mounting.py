@@ -15,7 +15,7 @@ from tiltvp.lab.datasets.ahead import AHEAD_CAMERAS
 from tiltvp.lab.datasets.driving import drive_room
 from tiltvp.lab.datasets.panoramas import paper_camera
 from tiltvp.lab.datasets.recording import WHEEL_RADIUS_M, RecordedDrive
-from tiltvp.mounting import mounting_tilt
+from tiltvp.mounting import MountingTilt, mounting_tilt
 from tiltvp.robot_setup import drive_tilts, find_setup
 from tiltvp.rotations import read_rotation
 from tiltvp.streams import Wheels, frame_motions, open_frames
@@ -84,21 +84,22 @@ def _judged(path: Path, number: int, seed: int, looks: str, floor: str) -> dict[
     for method in ("segments", "refined"):
         tilts = drive_tilts(frames, TiltEstimator(camera, method=method, robot_from_camera=nominal), motions)
         mounting = mounting_tilt(tilts.estimates, tilts.motions, nominal)
-        row |= _errors(f"{method} ", mounting.lean, drive.robot_from_mounted_camera, nominal)
+        row |= _errors(f"{method} ", mounting, drive.robot_from_mounted_camera, nominal)
     return row
 
 
-def _errors(prefix: str, lean: object, true: NDArray[np.float64], nominal: NDArray[np.float64]) -> dict[str, object]:
+def _errors(
+    prefix: str, found: MountingTilt, true: NDArray[np.float64], nominal: NDArray[np.float64]
+) -> dict[str, object]:
     # What a robot that stands upright seems to lean by the nominal mounting.
     normal = nominal @ true.T @ np.array([0.0, 0.0, 1.0])
-    if not lean:
+    if not found:
         return {f"{prefix}error_deg": None, f"{prefix}nees": None, f"{prefix}sigma_deg": None}
-    off = (lean.normal - normal)[:2]  # type: ignore[attr-defined]
-    covariance = lean.covariance_rad2  # type: ignore[attr-defined]
+    off = (found.lean.normal - normal)[:2]
     return {
         f"{prefix}error_deg": math.degrees(float(np.linalg.norm(off))),
-        f"{prefix}nees": float(off @ np.linalg.solve(covariance, off)),
-        f"{prefix}sigma_deg": math.degrees(lean.sigma_rad),  # type: ignore[attr-defined]
+        f"{prefix}nees": float(off @ np.linalg.solve(found.covariance_rad2, off)),
+        f"{prefix}sigma_deg": math.degrees(found.sigma_rad),
     }
 
 

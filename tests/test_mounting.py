@@ -1,0 +1,110 @@
+"""Roll and pitch of a mounting from a drive: what turns with the robot is the floor's, what stays is the mounting's."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from tiltvp import Camera, TiltEstimate, TiltEstimator, mounting_tilt
+from tiltvp.errors import InvalidInputError
+from tiltvp.rotations import about_vertical, levelling
+from tiltvp.streams import Motion
+
+SIGMA = math.radians(0.3)
+
+
+@pytest.fixture(scope="module")
+def template():
+    """An estimate, of which the tilt is replaced."""
+    camera = Camera.equidistant(width=64, height=48, focal_px=20.0, cx=31.5, cy=23.5)
+    return TiltEstimator(camera)(np.zeros((48, 64), np.uint8)).to_dict()
+
+
+def estimate(template: dict, normal: np.ndarray) -> TiltEstimate:
+    x, y, z = normal / np.linalg.norm(normal)
+    told = {
+        "alpha_rad": math.atan2(math.hypot(x, y), z), "beta_rad": math.atan2(-y, -x), "normal": [x, y, z],
+        "covariance_rad2": [[SIGMA**2, 0.0], [0.0, SIGMA**2]], "confidence": 0.99, "inlier_pixels": 500,
+        "roll_rad": math.atan2(y, z), "pitch_rad": math.atan2(-x, math.hypot(y, z)), "stop": "converged",
+    }  # fmt: skip
+    return TiltEstimate.from_dict(template | told)
+
+
+def drive(template, lean, slope, turns, seed=0):
+    """Estimates and motions of a robot whose mounting makes it lean, on a floor that slopes."""
+    rng = np.random.default_rng(seed)
+    estimates, motions = [], []
+    for heading, step in zip(np.cumsum(turns), turns, strict=True):
+        floor = about_vertical(-heading) @ slope
+        seen = levelling(lean).T @ floor + rng.normal(0.0, SIGMA, 3)
+        estimates.append(estimate(template, seen))
+        motions.append(Motion(yaw_rad=float(step), distance_m=0.5))
+    return estimates, motions
+
+
+def direction(x_deg: float, y_deg: float) -> np.ndarray:
+    x, y = math.radians(x_deg), math.radians(y_deg)
+    return np.array([x, y, math.sqrt(1.0 - x * x - y * y)])
+
+
+TURNS = np.full(60, 2.0 * math.pi / 30)
+
+
+def test_turns_tell_the_mounting_from_the_floor(template):
+    lean, slope = direction(1.2, -0.7), direction(0.0, 1.5)
+    found = mounting_tilt(*drive(template, lean, slope, TURNS), np.eye(3))
+    assert found
+    assert np.linalg.norm(found.lean.normal - lean) < 3.0 * found.sigma_rad < math.radians(1.2)
+    # A robot that stands upright on a level floor has the camera's up straight up.
+    np.testing.assert_allclose(found.robot_from_camera @ lean, [0.0, 0.0, 1.0], atol=4.0 * found.lean.sigma_rad)
+    assert found.turned_rad == pytest.approx(59 * 2.0 * math.pi / 30, abs=1e-9) or found.turned_rad == math.tau
+    assert (found.images, found.used) == (60, 60)
+
+
+def test_the_mounting_that_was_given_is_corrected_and_not_replaced(template):
+    given = about_vertical(0.4)
+    found = mounting_tilt(*drive(template, direction(1.0, 0.0), direction(0.0, 0.0), TURNS), given)
+    np.testing.assert_allclose(found.robot_from_camera, levelling(found.lean.normal) @ given, atol=1e-12)
+
+
+def test_without_turns_it_is_not_told(template):
+    found = mounting_tilt(*drive(template, direction(1.2, 0.0), direction(0.0, 1.0), np.zeros(60)), np.eye(3))
+    assert not found
+    assert "not told apart" in found.reason
+    np.testing.assert_array_equal(found.robot_from_camera, np.eye(3))
+    assert found.within(math.radians(0.5)) is None
+
+
+def test_a_floor_that_is_said_to_be_level_needs_no_turn(template):
+    lean = direction(1.2, 0.3)
+    estimates, motions = drive(template, lean, direction(0.0, 0.0), np.zeros(60))
+    found = mounting_tilt(estimates, motions, np.eye(3), level_floor=True)
+    assert found
+    assert math.degrees(np.linalg.norm(found.lean.normal - lean)) < 0.3
+
+
+def test_a_tolerance_is_passed_failed_or_not_told(template):
+    found = mounting_tilt(*drive(template, direction(1.0, 0.0), direction(0.0, 0.0), TURNS), np.eye(3))
+    assert [found.within(math.radians(limit)) for limit in (3.0, 0.2, 1.0)] == [True, False, None]
+    for limit in (0.0, math.nan, -1.0):
+        with pytest.raises(InvalidInputError, match="tolerance_rad"):
+            found.within(limit)
+
+
+def test_images_without_a_tilt_are_counted(template):
+    estimates, motions = drive(template, direction(1.0, 0.0), direction(0.0, 0.0), TURNS)
+    found = mounting_tilt([None, TiltEstimate.from_dict(template), *estimates[2:]], motions, np.eye(3))
+    assert (found.images, found.used) == (60, 58)
+    nothing = mounting_tilt([None] * 60, motions, np.eye(3))
+    assert not nothing
+    assert "no image tells a tilt" in nothing.reason
+
+
+def test_what_does_not_fit_is_refused(template):
+    estimates, motions = drive(template, direction(1.0, 0.0), direction(0.0, 0.0), TURNS)
+    with pytest.raises(InvalidInputError, match="motions: 59, expected 60"):
+        mounting_tilt(estimates, motions[1:], np.eye(3))
+    with pytest.raises(ValueError, match="robot_from_camera"):
+        mounting_tilt(estimates, motions, np.diag([1.0, 1.0, -1.0]))

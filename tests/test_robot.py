@@ -1,0 +1,102 @@
+"""The robot's file: what is written is read, every command reads it, and what cannot be is refused."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tiltvp import Camera, Robot, TiltEstimator
+from tiltvp.errors import CalibrationError, InvalidInputError
+from tiltvp.rotations import levelling, read_rotation
+from tiltvp.streams import Wheels
+
+CAMERA = Camera.equidistant(width=64, height=48, focal_px=20.0, cx=31.5, cy=23.5)
+
+
+def robot(**values: object) -> Robot:
+    """One with everything that a file may have."""
+    mask = np.ones((48, 64), dtype=bool)
+    mask[40:, :20] = False
+    found = Robot(
+        CAMERA,
+        levelling(np.array([0.02, -0.01, math.sqrt(1.0 - 0.0005)])),
+        covariance_rad2=np.diag([1e-6, 2e-6]),
+        mask=mask,
+        wheels=Wheels(wheel_base_m=0.35, wheel_radius_m=0.05, ticks_per_turn=2048.0, joints=("a", "b")),
+        topics={"images": "/camera/image_raw"},
+    )
+    return replace(found, **values)
+
+
+def test_what_is_written_is_read(tmp_path):
+    path = tmp_path / "robot.toml"
+    robot().save(path)
+    read = Robot.load(path)
+    assert read.camera == CAMERA
+    np.testing.assert_allclose(read.robot_from_camera, robot().robot_from_camera, atol=1e-15)
+    np.testing.assert_array_equal(read.covariance_rad2, np.diag([1e-6, 2e-6]))
+    np.testing.assert_array_equal(read.mask, robot().mask)
+    assert (read.wheels, read.topics) == (robot().wheels, {"images": "/camera/image_raw"})
+    assert sorted(file.name for file in tmp_path.iterdir()) == ["robot-mask.png", "robot.toml"]
+
+
+def test_a_robot_of_which_little_is_known(tmp_path):
+    path = tmp_path / "robot.toml"
+    Robot(CAMERA, np.eye(3)).save(path)
+    read = Robot.load(path)
+    assert (read.mask, read.covariance_rad2, read.wheels, read.topics) == (None, None, Wheels(), {})
+    assert [file.name for file in tmp_path.iterdir()] == ["robot.toml"]
+
+
+def test_it_is_a_calibration_and_a_mounting_too(tmp_path):
+    path = tmp_path / "robot.toml"
+    robot().save(path)
+    assert Camera.load(path) == CAMERA
+    np.testing.assert_allclose(read_rotation(path), robot().robot_from_camera, atol=1e-15)
+
+
+def test_its_estimator_has_its_mounting_and_its_mask():
+    made = robot().estimator(method="segments")
+    assert made == TiltEstimator(
+        CAMERA, method="segments", robot_from_camera=robot().robot_from_camera, mask=robot().mask
+    )
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "told"),
+    [
+        ('format = "tiltvp-robot"', 'format = "tiltvp-camera"', "unknown key"),
+        ("version = 1", "version = 2", "version 2"),
+        ("[mounting]", "[mountings]", "unknown key 'mountings'"),
+        ("wheel_base_m = 0.35", "wheel_base_m = -1.0", "wheel_base_m = -1.0"),
+        ("wheel_base_m = 0.35", "wheel_bas_m = 0.35", "unknown key 'wheel_bas_m'"),
+        ('mask = "robot-mask.png"', 'mask = "../robot-mask.png"', "beside this file"),
+        ("[topics]\nimages", "[topics]\nimage", "unknown key 'image'"),
+    ],
+)
+def test_what_cannot_be_is_refused(tmp_path, old, new, told):
+    path = tmp_path / "robot.toml"
+    robot().save(path)
+    text = path.read_text()
+    assert old in text
+    path.write_text(text.replace(old, new))
+    with pytest.raises(CalibrationError, match=told):
+        Robot.load(path)
+
+
+@pytest.mark.parametrize(
+    "values",
+    [
+        {"robot_from_camera": np.diag([1.0, 1.0, -1.0])},
+        {"mask": np.ones((4, 4), dtype=bool)},
+        {"covariance_rad2": np.diag([1.0, -1.0])},
+        {"covariance_rad2": np.full((2, 2), math.nan)},
+        {"topics": {"image": "/x"}},
+    ],
+)
+def test_a_robot_that_cannot_be(values):
+    with pytest.raises((InvalidInputError, CalibrationError)):
+        robot(**values)

@@ -1,0 +1,103 @@
+"""`tiltvp setup` and `tiltvp mount` on a rendered turn in place: what was wrong with the robot is found."""
+
+from __future__ import annotations
+
+import json
+import math
+
+import numpy as np
+import pytest
+
+from tiltvp import Camera, Robot, check_turns, find_setup, tilt_error_rad
+from tiltvp.cli import main
+from tiltvp.errors import InvalidInputError
+from tiltvp.images import read_image, write_image
+from tiltvp.rotations import levelling
+from tiltvp.streams import open_frames
+from tiltvp.synth import Room
+
+CAMERA = Camera.equidistant(width=240, height=240, focal_px=72.0, cx=119.5, cy=119.5, max_theta_rad=math.radians(92))
+COUNT = 26
+STEP = 2.0 * math.pi / 24
+UP = np.array([math.sin(math.radians(1.5)), 0.0, math.cos(math.radians(1.5))])
+"""Where the ceiling is by a mounting that is wrongly taken for upright."""
+
+
+@pytest.fixture(scope="module")
+def drive(tmp_path_factory):
+    """A folder of frames of a robot that turns in place, with a mounting that is 1.5 degrees off; and its odometry."""
+    folder = tmp_path_factory.mktemp("drive")
+    room = Room("office", 3)
+    x, y, yaw = room.free_poses(1, 3)[0]
+    (folder / "frames").mkdir()
+    for k in range(COUNT):
+        pose = (x, y, yaw + k * STEP)
+        view = room.render(CAMERA, pose=pose, robot_from_camera=levelling(UP), samples=1, seed=k)
+        write_image(folder / "frames" / f"{k:02d}.png", view.gray)
+    rows = "\n".join(f"{STEP if k else 0.0},0.0" for k in range(COUNT))
+    (folder / "odometry.csv").write_text(f"yaw_rad,distance_m\n{rows}\n")
+    CAMERA.save(folder / "camera.toml")
+    return folder
+
+
+def run(*words: object) -> int:
+    return main([str(word) for word in words])
+
+
+def options(drive):
+    return ["--camera", drive / "camera.toml", "--odometry", drive / "odometry.csv"]
+
+
+def test_setup_writes_a_robot_that_stands_upright(drive, tmp_path, capsys):
+    out = tmp_path / "robot.toml"
+    code = run("setup", drive / "frames", *options(drive), "--out", out, "--picture", tmp_path / "found.png")
+    told = capsys.readouterr()
+    assert code == 0, told
+    assert "images turn as told" in told.out
+    robot = Robot.load(out)
+    assert math.degrees(tilt_error_rad(robot.robot_from_camera @ UP, np.array([0.0, 0.0, 1.0]))) < 0.2
+    assert robot.covariance_rad2 is not None
+    assert (tmp_path / "found.png").stat().st_size > 1000
+    # Other commands take it: the robot's lean is the floor's now.
+    answer = tmp_path / "tilts.json"
+    assert run("tilt", drive / "frames", "--camera", out, "--method", "segments", "--out", answer) == 0
+    alphas = [row["alpha_rad"] for row in json.loads(answer.read_text())]
+    assert math.degrees(float(np.median(alphas))) < 0.4
+
+
+def test_setup_finds_that_images_are_mirrored(drive, tmp_path, capsys):
+    mirrored = tmp_path / "frames"
+    mirrored.mkdir()
+    for file in (drive / "frames").iterdir():
+        write_image(mirrored / file.name, np.ascontiguousarray(read_image(file)[:, ::-1]))
+    code = run("setup", mirrored, *options(drive), "--out", tmp_path / "robot.toml")
+    assert code == 1
+    assert "the image is mirrored, or left and right" in capsys.readouterr().err
+
+
+def test_mount_passes_and_fails_by_its_exit_code(drive, tmp_path, capsys):
+    out = tmp_path / "mounting.json"
+    assert run("mount", drive / "frames", *options(drive), "--within-deg", 3, "--out", out) == 0
+    assert json.loads(out.read_text())["within_tolerance"] is True
+    assert run("mount", drive / "frames", *options(drive), "--within-deg", 0.5) == 1
+    assert "fail: beyond 0.5 degrees" in capsys.readouterr().out
+    assert run("mount", drive / "frames", "--camera", drive / "camera.toml", "--within-deg", 3) == 3
+    assert "not told apart" in capsys.readouterr().out
+    level = run("mount", drive / "frames", "--camera", drive / "camera.toml", "--within-deg", 3, "--level-floor")
+    assert level == 0
+
+
+def test_too_few_images_are_refused(drive, tmp_path):
+    frames = open_frames([str(drive / "frames" / f"{k:02d}.png") for k in range(4)])
+    with pytest.raises(InvalidInputError, match="4 images of the camera's size, expected 5 or more"):
+        find_setup(frames, CAMERA)
+
+
+def test_turns_are_not_told_without_turning(drive):
+    images = [frame.read() for frame in open_frames(str(drive / "frames"))]
+    found = check_turns(images[:6], np.zeros(6), CAMERA, np.eye(3))
+    assert not found
+    assert not found.reversed
+    assert "not told" in found.reason
+    with pytest.raises(InvalidInputError, match="yaw_rad"):
+        check_turns(images[:6], np.zeros(5), CAMERA, np.eye(3))
