@@ -42,7 +42,7 @@ class CameraOptions:
     """Which camera took the images."""
 
     camera: Path
-    """Calibration file, of any of the formats that `tiltvp camera formats` lists, or recording of ROS with CameraInfo."""
+    """Calibration file, of any of the formats that `tiltvp camera formats` lists, or recording with CameraInfo."""
     camera_format: str | None = None
     """Its format, where its content does not tell."""
     camera_name: str | None = None
