@@ -20,10 +20,9 @@ if TYPE_CHECKING:
     from tiltvp.streams import Frame, FrameMotions, Frames, Wheels
 
 __all__ = [
+    "STDIN",
     "MotionOptions",
-    "Source",
     "SourceOptions",
-    "Sources",
     "distinct_names",
     "ending_at_interrupt",
     "picture_names",
