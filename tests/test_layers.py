@@ -47,9 +47,23 @@ sys.meta_path.insert(0, Blocked())
 """
 
 
-@pytest.mark.parametrize("topic", ["", "cameras", "formats", "synth", "lines", "corner", "selfcalib"])
+@pytest.mark.parametrize("topic", ["", "cameras", "formats", "synth", "lines", "corner", "selfcalib", "streams"])
 def test_importing_needs_numpy_alone(topic: str) -> None:
-    others = ("cv2", "yaml", "tomli_w", "rich", "cyclopts", "polars", "matplotlib", "plotly", "jinja2", "scipy", "dask")
+    others = (
+        "cv2",
+        "yaml",
+        "tomli_w",
+        "rich",
+        "cyclopts",
+        "polars",
+        "matplotlib",
+        "plotly",
+        "jinja2",
+        "scipy",
+        "dask",
+        "av",
+        "rosbags",
+    )
     script = blocked(*others) + f"import tiltvp{topic and '.' + topic}; print('lab' in dir(tiltvp))"
     done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, timeout=60, check=True)
     assert done.stdout.strip() == "False"

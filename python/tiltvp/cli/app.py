@@ -12,6 +12,7 @@ from cyclopts import App, CycloptsError, Parameter
 from tiltvp import __version__
 from tiltvp.cli import calibrate, camera, corner, demo, lines, mount, segments, setup, tilt, track
 from tiltvp.cli.lab import dataset, drive, evaluate, measure, report
+from tiltvp.cli.sources import STDIN
 from tiltvp.cli.terminal import complain
 from tiltvp.errors import MissingExtraError, OutputError, TiltvpError
 from tiltvp.files import keeping_existing
@@ -53,6 +54,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """
     words = list(sys.argv[1:] if arguments is None else arguments)
     overwrite = _OVERWRITE in words
+    if words[1:2] == ["-"]:
+        # Elsewhere a word that begins so is taken for an option, which its name should then be looked for among.
+        words[1] = STDIN
     try:
         with nullcontext() if overwrite else keeping_existing():
             code = app(

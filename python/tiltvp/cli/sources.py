@@ -9,7 +9,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Final
 
 from cyclopts import Group, Parameter, validators
 
@@ -19,9 +19,18 @@ from tiltvp.errors import InvalidInputError
 if TYPE_CHECKING:
     from tiltvp.streams import Frame, FrameMotions, Frames, Wheels
 
-__all__ = ["MotionOptions", "SourceOptions", "distinct_names", "ending_at_interrupt", "picture_names", "tell"]
+__all__ = [
+    "STDIN",
+    "MotionOptions",
+    "SourceOptions",
+    "distinct_names",
+    "ending_at_interrupt",
+    "picture_names",
+    "tell",
+]
 
-_STDIN = "-"
+STDIN: Final = "/dev/stdin"
+"""What - stands for as the source of a verb."""
 _SOURCE = Group("Source", help="Images, a video, or a recording of ROS: docs/recordings.md.")
 _ABOVE_0 = Parameter(validator=validators.Number(gt=0))
 
@@ -45,13 +54,13 @@ class SourceOptions:
 
         if self.live is not None and words:
             raise InvalidInputError(f"--live {self.live} beside {words[0]}, expected one of them")
-        if self.raw is not None and list(words) != [_STDIN]:
+        if self.raw is not None and list(words) != [STDIN]:
             raise InvalidInputError("--raw without -, the standard input, which it is for")
         if self.live is not None:
             return LiveCamera(self.live)
         if not words:
             raise InvalidInputError("no source, expected images, a video, a recording, - or --live")
-        if list(words) == [_STDIN]:
+        if list(words) == [STDIN]:
             return NamedImages() if self.raw is None else RawImages(raw_size(self.raw))
         frames = open_frames(list(words), topic=self.topic)
         tell(*frames.problems, *frames.notes)
@@ -158,7 +167,7 @@ def picture_names(frames: Frames) -> Iterator[str]:
     if isinstance(frames, ImageFiles):
         yield from distinct_names(frames.files)
         return
-    stem = {_STDIN: "frame"}.get(frames.source, Path(frames.source).stem.replace(" ", "_"))
+    stem = "frame" if frames.source == "-" else Path(frames.source).stem.replace(" ", "_")
     number = 0
     while True:
         yield f"{stem}_{number:06d}"

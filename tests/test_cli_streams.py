@@ -1,0 +1,221 @@
+"""The verbs on videos, bags, live cameras and stdin."""
+
+from __future__ import annotations
+
+import io
+import json
+import os
+import signal
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from types import SimpleNamespace
+
+import cv2
+import numpy as np
+import polars as pl
+import pytest
+
+import tiltvp
+from recordings import START_S, Bag, write_video
+from tiltvp.cli import main
+from tiltvp.synth import RoomImage
+
+pytestmark = pytest.mark.slow
+
+Run = Callable[..., tuple[int, str, str]]
+FRAMES = 6
+QUARTER = np.pi / 2
+
+
+@pytest.fixture
+def run(capfd: pytest.CaptureFixture[str]) -> Run:
+    """Runs `tiltvp` in this process: exit code, stdout, stderr."""
+
+    def run_main(*words: object) -> tuple[int, str, str]:
+        code = main([str(word) for word in words])
+        said = capfd.readouterr()
+        return code, said.out, said.err
+
+    return run_main
+
+
+@pytest.fixture(scope="module")
+def world(tmp_path_factory: pytest.TempPathFactory, camera: tiltvp.Camera, room: RoomImage) -> Path:
+    """A robot that turns to the left, a quarter a second, as a bag and a video; its first image is a second early."""
+    root = tmp_path_factory.mktemp("world")
+    camera.save(root / "camera.toml")
+    made = Bag("mcap")
+    for k in range(FRAMES):
+        made.image("/image", START_S + k - 1, np.rot90(room.gray, k - 1), "mono8")
+    for k in range(10 * FRAMES):
+        made.odometry(START_S + 0.1 * k, 0.0, 0.0, QUARTER * 0.1 * k)
+    made.write(root)
+    frames = [cv2.cvtColor(np.ascontiguousarray(np.rot90(room.gray, k)), cv2.COLOR_GRAY2BGR) for k in range(FRAMES)]
+    write_video(root / "drive.mp4", frames, [0, 40, 200, 230, 500, 510])
+    tiltvp.write_image(root / "images" / "a.png", room.gray)
+    return root
+
+
+def test_tilt_of_a_bag_with_the_odometry_of_the_same(run: Run, world: Path, tmp_path: Path) -> None:
+    out = tmp_path / "out.csv"
+    bag = world / "drive_mcap"
+    code, said, complaints = run("tilt", bag, "--camera", world / "camera.toml", "--filter", "--out", out)
+    assert code == 0
+    assert f"--odometry: not given, that of {bag} is taken" in complaints
+    assert f"1 frames outside its span ({bag}#0)" in complaints
+    assert "no-odometry" in said
+    table = pl.read_csv(out)
+    assert table["taken_s"].to_list() == pytest.approx([START_S + k - 1 for k in range(FRAMES)], abs=1e-6)
+    assert table["verdict"].to_list() == ["no-odometry"] + ["accepted"] * (FRAMES - 1)
+    # With turns that are known the images of one lean agree.
+    assert table["nis"].drop_nulls()[1:].max() < 9.0
+    assert table["file"][3] == f"{bag}#3"
+
+
+def test_pictures_of_a_video_and_threads(run: Run, world: Path, tmp_path: Path) -> None:
+    words = ("tilt", world / "drive.mp4", "--camera", world / "camera.toml")
+    code, _, complaints = run(
+        *words, "--overlay", tmp_path / "seen", "--level", tmp_path / "level", "--out", tmp_path / "a.csv"
+    )
+    assert (code, complaints) == (0, "")
+    names = [f"drive_{k:06d}.png" for k in range(FRAMES)]
+    assert sorted(file.name for file in (tmp_path / "seen").iterdir()) == names
+    assert sorted(file.name for file in (tmp_path / "level").iterdir()) == names
+    assert run(*words, "--threads", "3", "--out", tmp_path / "b.csv")[0] == 0
+    one, three = (pl.read_csv(tmp_path / name).drop("time_s") for name in ("a.csv", "b.csv"))
+    assert one.equals(three)
+    assert one["taken_s"].to_list() == pytest.approx([0, 0.04, 0.2, 0.23, 0.5, 0.51], abs=1e-3)
+
+
+@pytest.mark.parametrize("verb", ["lines", "segments"])
+def test_lines_and_segments_of_a_bag(verb: str, run: Run, world: Path, tmp_path: Path) -> None:
+    bag = world / "drive_mcap"
+    words = (
+        verb,
+        bag,
+        "--camera",
+        world / "camera.toml",
+        "--out",
+        tmp_path / "found.csv",
+        "--overlay",
+        tmp_path / "seen",
+    )
+    assert run(*words)[0] == 0
+    assert pl.read_csv(tmp_path / "found.csv")["file"].n_unique() == FRAMES
+    assert len(list((tmp_path / "seen").iterdir())) == FRAMES
+    code, _, complaints = run(*words, "--topic", "/none", "--overwrite")
+    assert (code, "no topic '/none'" in complaints) == (2, True)
+
+
+def test_tracks_of_a_bag_have_times(run: Run, world: Path, tmp_path: Path) -> None:
+    words = (
+        "track",
+        world / "drive_mcap",
+        "--camera",
+        world / "camera.toml",
+        "--out",
+        tmp_path / "t.csv",
+        "--tilt",
+        "refined",
+    )
+    code, said, complaints = run(*words)
+    assert code == 0
+    assert "1 frames outside its span" in complaints
+    assert f"{FRAMES - 1} frames, " in said
+    table = pl.read_csv(tmp_path / "t.csv")
+    assert table["frame"].unique().sort().to_list() == list(range(1, FRAMES))
+    assert (table["time_s"] - START_S - table["frame"] + 1).abs().max() < 1e-6
+    # A robot that turns in place sees the same lines again.
+    assert (table.filter(pl.col("frame") > 1)["frames_back"] > 0).mean() > 0.5
+    wheels = tmp_path / "wheels.csv"
+    wheels.write_text(f"time_s,left_m,right_m\n{START_S - 2},0,0\n{START_S + 9},1,1\n")
+    code, _, complaints = run(*words, "--odometry", wheels, "--odometry-gap", "20", "--overwrite")
+    assert (code, "expected --wheel-base" in complaints) == (2, True)
+    assert run(*words, "--odometry", wheels, "--odometry-gap", "20", "--wheel-base", "0.4", "--overwrite")[0] == 0
+
+
+def test_stdin(run: Run, world: Path, room: RoomImage, monkeypatch: pytest.MonkeyPatch) -> None:
+    image = world / "images" / "a.png"
+    words = ("tilt", "-", "--camera", world / "camera.toml", "--out", "-")
+    monkeypatch.setattr(sys, "stdin", SimpleNamespace(buffer=io.BytesIO(f"{image}\nnone.png\n".encode())))
+    code, said, complaints = run(*words)
+    named, missing = map(json.loads, said.splitlines())
+    assert (code, "none.png" in complaints, "none.png" in missing["error"]) == (1, True, True)
+    height, width = room.gray.shape
+    monkeypatch.setattr(sys, "stdin", SimpleNamespace(buffer=io.BytesIO(room.gray.tobytes() * 2)))
+    code, said, complaints = run(*words, "--raw", f"{width}x{height}")
+    first, second = map(json.loads, said.splitlines())
+    assert (code, complaints, first["file"]) == (0, "", "-#000000")
+    assert first["alpha_rad"] == second["alpha_rad"] == named["alpha_rad"]
+
+
+def test_a_live_camera_ends_at_an_interrupt(
+    run: Run, world: Path, room: RoomImage, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    class Capture:
+        """Images without end; somebody presses Ctrl-C during the third."""
+
+        count = 0
+
+        def __init__(self, number: int) -> None:
+            assert number == 2
+
+        def isOpened(self) -> bool:  # noqa: N802
+            return True
+
+        def get(self, _: int) -> float:
+            return 30.0
+
+        def read(self) -> tuple[bool, np.ndarray]:
+            self.count += 1
+            if self.count == 3:
+                os.kill(os.getpid(), signal.SIGINT)
+            assert self.count < 5
+            return True, room.gray
+
+        def release(self) -> None:
+            pass
+
+    monkeypatch.setattr(cv2, "VideoCapture", Capture)
+    before = signal.getsignal(signal.SIGINT)
+    code, said, _ = run("tilt", "--live", "2", "--camera", world / "camera.toml", "--out", "-")
+    rows = [json.loads(line) for line in said.splitlines()]
+    assert (code, [row["file"] for row in rows]) == (0, [f"camera 2#{k:06d}" for k in range(3)])
+    assert rows[0]["taken_s"] < rows[1]["taken_s"] < rows[2]["taken_s"]
+    assert signal.getsignal(signal.SIGINT) is before
+
+
+@pytest.mark.parametrize(
+    ("words", "hint"),
+    [
+        (["--live", "0", "a.png"], "--live 0 beside a.png"),
+        (["a.png", "--raw", "4x4"], "--raw without -"),
+        (["-", "--raw", "4by4"], "expected WIDTHxHEIGHT"),
+        (["-", "--raw", "99999x99999"], "expected 1 to 200000000"),
+        (["a.png", "--topic", "/image"], "no recording"),
+        (["none.bag"], "none.bag: no such file"),
+        (["images", "--filter", "--odometry-topic", "/odom"], "no recording, expected --odometry"),
+        (["images", "--wheel-base", "0.4"], "--wheel-base without --filter"),
+        (["images", "--wheel-radius", "0.4"], "--wheel-radius without --filter"),
+    ],
+)
+def test_wrong_use(run: Run, world: Path, words: list[str], hint: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(world)
+    code, said, complaints = run("tilt", *words, "--camera", "camera.toml")
+    assert (code, said, complaints.count("\n")) == (2, "", 1)
+    assert hint in complaints
+
+
+def test_a_recording_tells_its_camera_and_mounting(run: Run, world: Path, tmp_path: Path, room: RoomImage) -> None:
+    made = Bag("mcap")
+    height, width = room.gray.shape
+    made.image("/image", START_S, room.gray, "mono8")
+    made.camera_info(
+        START_S, width, height, "equidistant", [0.0] * 4, [150.0, 0, width / 2, 0, 150.0, height / 2, 0, 0, 1]
+    )
+    made.static("base_link", "camera", [0, 0, 0, 1.0])
+    bag = made.write(tmp_path)
+    code, said, complaints = run("tilt", bag, "--camera", bag, "--robot-from-camera", bag)
+    assert (code, complaints) == (0, "")
+    assert "1 image" in said
