@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import math
+import re
 import xml.etree.ElementTree as ET
 from pathlib import Path
 from typing import Any
@@ -251,6 +252,20 @@ def test_the_command_writes_the_attitudes_of_its_table(
         assert said == f"{out}: 3 filtered tilts as sensor_msgs/Imu on {TILT_TOPIC}, yaw 0, at 5 frames a second from 0"
     else:
         assert said.endswith("yaw 0, at 5 frames a second from 0; 1 frames without one are left out")
+
+
+PAGE = (Path(__file__).parents[1] / "docs/outputs.md").read_text(encoding="utf-8")
+
+
+def test_the_python_of_the_page_runs(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    programs = re.findall(r"^```python\n(.*?)^```$", PAGE, re.MULTILINE | re.DOTALL)
+    for program in programs:
+        exec(compile(program, "outputs.md", "exec"), {})
+    assert capsys.readouterr().out.strip() == programs[-1].split(" # ")[-1].strip()
+    assert len(messages(tmp_path / "answer.mcap")) == 2
 
 
 def test_the_command_says_which_endings_there_are(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:

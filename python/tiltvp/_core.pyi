@@ -3273,12 +3273,32 @@ def option_fields(owner: str, method: str | None = None) -> list[dict[str, Any]]
     """
 
 def read_imu(
-    rates_rad_s: ArrayLike, forces_m_s2: ArrayLike, **options: Any
+    rates_rad_s: ArrayLike,
+    forces_m_s2: ArrayLike,
+    *,
+    rate_hz: float | None = None,
+    seed: SupportsIndex | None = None,
+    gyroscope: ArrayLike | None = None,
+    accelerometer: ArrayLike | None = None,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
     """Readings of an inertial sensor, such as those of `StereoSequence.imu`, along any motion.
 
     `rates_rad_s` and `forces_m_s2` are its true rates of turn and specific forces in the sensor's axes, (M, 3) each and
     `rate_hz` a second. Times, rates (M, 3), forces (M, 3), and the rates' true biases (M, 3).
+
+    The options, by keyword.
+
+    Parameters
+    ----------
+    rate_hz
+        Readings per second. Default: 200.
+    seed
+        Seed of biases and noise. Default: 0.
+    gyroscope
+        Rates of turn, rad/s: noise density, bias, bias walk, scale error and range. Default: (8.7e-05, 0.0035, 0.0001,
+        0.005, 4.363323).
+    accelerometer
+        Specific forces, m/s^2: the same. Default: (0.00392266, 0.04903325, 0.0001, 0.005, 19.6133).
     """
 
 def resolve_corners(

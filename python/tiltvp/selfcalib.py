@@ -16,13 +16,13 @@ from tiltvp._core import (
     consistency_band,
     wheel_displacements,
 )
-from tiltvp.rotations import about_vertical
-from tiltvp.streams.outputs.transforms import StaticTransform
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from numpy.typing import NDArray
+
+    from tiltvp.streams.outputs.transforms import StaticTransform
 
 __all__ = [
     "CALIBRATION_METHODS",
@@ -63,6 +63,10 @@ def static_transform(
     is a level frame at the camera (`camera_mount`), and roll and pitch are not known. Neither is z where `z_m` is None.
     Raises `InvalidInputError` for names that no frame can have and for a mounting that is not finite.
     """
+    # They would double the time that importing the package takes.
+    from tiltvp.rotations import about_vertical
+    from tiltvp.streams.outputs.transforms import StaticTransform
+
     missing = (*(("z",) if z_m is None else ()), *(("roll", "pitch") if robot_from_camera is None else ()))
     place, turn = np.array([mounting.x_m, mounting.y_m, z_m or 0.0]), mounting.yaw_rad
     sigmas = np.sqrt(np.diag(mounting.covariance_xy_yaw)).tolist()

@@ -32,7 +32,9 @@ COMMANDS: dict[str, tuple[str, ...]] = {
     "track video": ("track", "images", "--camera", "camera.toml", "--out", "../tracks.csv", "--video", "OUT.mp4"),
     "calibrate": ("calibrate", "wheels.csv", "bearings.csv", "--wheel-base", "0.4", "--out", "OUT.json"),
     "calibrate plot": ("calibrate", "wheels.csv", "bearings.csv", "--wheel-base", "0.4", "--plot", "OUT.png"),
-    "calibrate transform": ("calibrate", "wheels.csv", "bearings.csv", "--wheel-base", "0.4", "--transform", "OUT.urdf"),
+    "calibrate transform": (
+        "calibrate", "wheels.csv", "bearings.csv", "--wheel-base", "0.4", "--transform", "OUT.urdf",
+    ),
     "corner": ("corner", "left", "right", "--calibration", "rig.toml", "--out", "OUT.csv"),
     "corner trajectory": ("corner", "left", "right", "--calibration", "rig.toml", "--trajectory", "OUT.txt"),
     "corner overlay": ("corner", "left", "right", "--calibration", "rig.toml", "--overlay", "OUT"),
