@@ -55,8 +55,9 @@ test-system *arguments: setup system-programs smoke notebooks
 # Runs the notebooks: each ends in assertions, and has a minute.
 notebooks *arguments:
     rm -rf target/notebooks
-    {{bin}}/jupytext --quiet --to ipynb --output target/notebooks/ notebooks/*.py
-    {{bin}}/pytest --quiet --nbmake --nbmake-timeout=60 --timeout=0 {{arguments}} target/notebooks
+    mkdir -p target/notebooks
+    for name in notebooks/*.py; do {{bin}}/jupytext --quiet --to ipynb --output target/notebooks/$(basename $name .py).ipynb $name; done
+    {{bin}}/pytest --quiet --nbmake --nbmake-timeout=60 --timeout=0 -p no:run-parallel {{arguments}} target/notebooks
 
 # The pages of the site, with the notebooks' figures, in target/docs/html; a warning fails, and so does a link within that leads nowhere.
 docs:

@@ -39,6 +39,7 @@ html_theme = "furo"
 html_title = f"tiltvp {release}"
 html_copy_source = False
 html_show_sphinx = False
+html_show_copyright = False
 html_extra_path = ["site/index.html"]
 html_static_path = ["site/static"]
 html_css_files = ["wide.css"]
