@@ -46,10 +46,27 @@ system-programs:
     $root apt-get update --quiet --quiet
     DEBIAN_FRONTEND=noninteractive $root apt-get install --quiet --quiet --yes --no-install-recommends $missing > /dev/null
 
-# The tests that want a browser and valgrind: the page of a report, and what an image costs in instructions.
-test-system *arguments: setup system-programs
+# The wheel in a bare environment, the notebooks, and the tests that want a browser and valgrind: the page of a report, and what an
+# image costs in instructions.
+test-system *arguments: setup system-programs smoke notebooks
     {{bin}}/pytest --quiet tests/system {{arguments}}
     cargo test --locked --package tiltvp-core --features valgrind --test instructions --quiet
+
+# Runs the notebooks: each ends in assertions, and has a minute.
+notebooks *arguments:
+    rm -rf target/notebooks
+    mkdir -p target/notebooks
+    for name in notebooks/*.py; do {{bin}}/jupytext --quiet --to ipynb --output target/notebooks/$(basename $name .py).ipynb $name; done
+    {{bin}}/pytest --quiet --nbmake --nbmake-timeout=60 --timeout=0 -p no:run-parallel {{arguments}} target/notebooks
+
+# The pages of the site, with the notebooks' figures, in target/docs/html; a warning fails, and so does a link within that leads nowhere.
+docs:
+    {{bin}}/sphinx-build --quiet --fail-on-warning --keep-going --conf-dir docs --doctree-dir target/docs/doctrees . target/docs/html
+
+# Licences, duplicates, sources and advisories of the crates, by cargo-deny, which is built if it is not there.
+deny *arguments:
+    test -x target/tools/bin/cargo-deny || cargo install --quiet --locked --root target/tools cargo-deny
+    target/tools/bin/cargo-deny check {{arguments}}
 
 # The core for 64-bit ARM, by the compiler alone. (Not among the tests: it needs the target's standard library, `rustup target add
 # aarch64-unknown-linux-gnu`.)
@@ -255,8 +272,8 @@ measure-constants *arguments: setup
 
 # The wheel is built if sources are newer than the last one. (It has a folder of its own: target/wheels has what `setup` makes, which
 # only points to the sources.)
-# The size of `pip install tiltvp` without extras, in an environment of its own, and the time of `import tiltvp`.
-measure-install:
+# Builds the wheel, installs it without extras into an environment of its own, and tries it there.
+smoke:
     #!/usr/bin/env bash
     set -euo pipefail
     mkdir -p target/install
@@ -264,11 +281,15 @@ measure-install:
     wheel=$(newest)
     if [ -z "$wheel" ] || [ -n "$(find Cargo.toml Cargo.lock pyproject.toml crates python -name '*.*' -newer "$wheel" \
             ! -name '*.pyc' ! -name '*.so' -type f -print -quit)" ]; then
-        {{bin}}/maturin build --release --locked --quiet --out target/install
+        PATH="$PWD/{{bin}}:$PATH" {{bin}}/maturin build --release --locked --quiet --out target/install
         wheel=$(newest)
     fi
     python3 -m venv --clear --without-pip out/install
     {{bin}}/pip --quiet --python out/install/bin/python install "$wheel"
+    env --unset=PYTHONPATH out/install/bin/python -W error tests/smoke.py
+
+# The size of `pip install tiltvp` without extras, in an environment of its own, and the time of `import tiltvp`.
+measure-install: smoke
     python3 benches/install.py out/install
 
 # The benches of the core.

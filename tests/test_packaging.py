@@ -8,7 +8,10 @@ import sys
 import tomllib
 from pathlib import Path
 
+import yaml
+
 ROOT = Path(__file__).parents[1]
+WORKFLOWS = ROOT / ".github" / "workflows"
 
 
 def test_the_licences_are_those_of_the_crates_in_the_lock() -> None:
@@ -25,3 +28,31 @@ def test_the_lock_has_every_requirement_and_its_hashes() -> None:
     locked = re.findall(r"^([\w.-]+)==.*\\\n    --hash=sha256:\w{64}", lock, flags=re.MULTILINE)
     assert names <= set(locked)
     assert len(locked) == len(re.findall(r"^[\w.-]+==", lock, flags=re.MULTILINE))
+
+
+def test_all_parts_have_one_version() -> None:
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    workspace = tomllib.loads((ROOT / "Cargo.toml").read_text(encoding="utf-8"))["workspace"]
+    crates = [one["version"] for name, one in workspace["dependencies"].items() if name.startswith("tiltvp-")]
+    face = (ROOT / "python" / "tiltvp" / "__init__.py").read_text(encoding="utf-8")
+    cited = yaml.safe_load((ROOT / "CITATION.cff").read_text(encoding="utf-8"))["version"]
+    (told,) = re.findall(r'^__version__ = "(.*)"$', face, re.MULTILINE)
+    assert {project["version"], workspace["package"]["version"], *crates, told, cited} == {told}
+
+
+def test_the_workflows_run_the_commands_of_the_readme() -> None:
+    readme = (ROOT / "README.md").read_text(encoding="utf-8")
+    commands = [line for line in readme.splitlines() if line.startswith("python3 -m venv")]
+    jobs = yaml.safe_load((WORKFLOWS / "ci.yml").read_text(encoding="utf-8"))["jobs"]
+    steps = [step.get("run") for step in jobs["test"]["steps"]]
+    assert len(commands) == 2
+    assert [command for command in commands if command not in steps] == []
+
+
+def test_every_wheel_is_tried_before_it_is_published() -> None:
+    jobs = yaml.safe_load((WORKFLOWS / "wheels.yml").read_text(encoding="utf-8"))["jobs"]
+    built = {one["name"] for one in jobs["build"]["strategy"]["matrix"]["include"]}
+    tested = {one["name"] for job in ("test", "test-musl") for one in jobs[job]["strategy"]["matrix"]["include"]}
+    assert built == tested
+    assert set(jobs["publish"]["needs"]) == set(jobs) - {"publish"}
+    assert all("tests/smoke.py" in str(jobs[job]["steps"]) for job in ("test", "test-musl", "sdist"))

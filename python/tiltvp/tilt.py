@@ -62,7 +62,7 @@ class TiltEstimator(_core.TiltEstimator):
     Parameters
     ----------
     camera : tiltvp.Camera
-    method : {"refined", "image-space-ransac", "image-space-reject-refit", "vector-consensus"}
+    method : {"refined", "image-space-ransac", "image-space-reject-refit", "vector-consensus", "segments"}
     robot_from_camera : (3, 3) rotation R, v_robot = R v_camera; default identity: an upward camera, columns to
         the front.
     gradient_min, smoothing_px, elevation_min_rad, elevation_max_rad, margin_px, tilt_max_rad, mask, row_stride, seed
