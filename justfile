@@ -52,12 +52,12 @@ test-system *arguments: setup system-programs smoke notebooks
     {{bin}}/pytest --quiet tests/system {{arguments}}
     cargo test --locked --package tiltvp-core --features valgrind --test instructions --quiet
 
-# Runs the notebooks: each ends in assertions, and has a minute.
+# Runs the notebooks: each ends in assertions, and takes less than a minute of a quiet machine.
 notebooks *arguments:
     rm -rf target/notebooks
     mkdir -p target/notebooks
     for name in notebooks/*.py; do {{bin}}/jupytext --quiet --to ipynb --output target/notebooks/$(basename $name .py).ipynb $name; done
-    {{bin}}/pytest --quiet --nbmake --nbmake-timeout=60 --timeout=0 -p no:run-parallel {{arguments}} target/notebooks
+    {{bin}}/pytest --quiet --nbmake --nbmake-timeout=300 --timeout=0 -p no:run-parallel {{arguments}} target/notebooks
 
 # The pages of the site, with the notebooks' figures, in target/docs/html; a warning fails, and so does a link within that leads nowhere.
 docs:

@@ -25,7 +25,7 @@ extensions = ["myst_nb", "sphinx.ext.autodoc"]
 nb_custom_formats = {".py": ["jupytext.reads", {"fmt": "py:percent"}]}
 nb_execution_mode = "cache"
 nb_execution_raise_on_error = True
-nb_execution_timeout = 180
+nb_execution_timeout = 300
 nb_execution_cache_path = str(ROOT / "target" / "docs" / "notebooks")
 nb_merge_streams = True
 

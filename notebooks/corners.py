@@ -56,7 +56,7 @@ assert nearest < 1e-9
 
 # %%
 left, right = zed_cameras()
-sequence = StereoSequence(Laboratory(3), left=left, right=right, frames=8, seed=3)
+sequence = StereoSequence(Laboratory(3), left=left, right=right, frames=6, seed=3)
 estimator = corner.CornerPoseEstimator(left, right, sequence.left_from_right)
 estimates, angles_deg, places_mm, squares = [], [], [], []
 for frame in range(len(sequence)):
@@ -92,7 +92,7 @@ axis.set(title="the last left picture: rays x red, y green, z blue, and the imag
 # %% [markdown]
 # ## Is the covariance true?
 #
-# The squared error over the covariance has the mean 6 for six numbers. Eight frames of one motion are few, so the
+# The squared error over the covariance has the mean 6 for six numbers. Six frames of one motion are few, so the
 # bounds are wide.
 
 # %%
