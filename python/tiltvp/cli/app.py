@@ -10,7 +10,7 @@ from contextlib import nullcontext
 from cyclopts import App, CycloptsError, Parameter
 
 from tiltvp import __version__
-from tiltvp.cli import calibrate, camera, corner, demo, lines, segments, tilt, track
+from tiltvp.cli import calibrate, camera, corner, demo, level, lines, segments, tilt, track
 from tiltvp.cli.lab import dataset, evaluate, measure, report
 from tiltvp.cli.terminal import complain
 from tiltvp.errors import MissingExtraError, OutputError, TiltvpError
@@ -30,6 +30,7 @@ app = App(
     suppress_keyboard_interrupt=False,
 )
 app.command(tilt.tilt)
+app.command(level.level)
 app.command(segments.segments)
 app.command(lines.lines)
 app.command(track.track)

@@ -7,7 +7,7 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Group, Parameter
 
@@ -23,13 +23,16 @@ _METHOD = Group("Method", help="An option that is not given has the default of i
 Switch = Annotated[bool, Parameter(negative="", show_default=False)]
 
 
-def image_size_from(text: str | None) -> tuple[int, int] | None:
+_PANORAMA = "equirectangular:"
+
+
+def image_size_from(text: str | None, option: str = "--image-size") -> tuple[int, int] | None:
     """(width, height) from `640x480`."""
     if text is None:
         return None
     found = re.fullmatch(r"\s*(\d+)\s*[xX*,]\s*(\d+)\s*", text)
     if found is None:
-        raise InvalidInputError(f"--image-size {text!r}, expected WIDTHxHEIGHT in pixels, such as 640x480")
+        raise InvalidInputError(f"{option} {text!r}, expected WIDTHxHEIGHT in pixels, such as 640x480")
     return int(found[1]), int(found[2])
 
 
@@ -39,7 +42,7 @@ class CameraOptions:
     """Which camera took the images."""
 
     camera: Path
-    """Calibration file, of any of the formats that `tiltvp camera formats` lists."""
+    """Calibration file, of any of the formats that `tiltvp camera formats` lists; or equirectangular:WIDTHxHEIGHT."""
     camera_format: str | None = None
     """Its format, where its content does not tell."""
     camera_name: str | None = None
@@ -53,6 +56,11 @@ class CameraOptions:
         """The camera."""
         from tiltvp import Camera
 
+        word = str(self.camera)
+        if word.startswith(_PANORAMA):
+            size = image_size_from(word.removeprefix(_PANORAMA), f"--camera {_PANORAMA}")
+            assert size is not None  # There is a text.
+            return Camera.equirectangular(width=size[0], height=size[1])
         name = self.camera_name or "0"
         camera = Camera.load(
             self.camera,
@@ -68,7 +76,7 @@ class MountedOptions(LibraryOptions):
     """How the camera sits on the robot, and where the robot sees itself."""
 
     robot_from_camera: str | None = None
-    """How the camera sits on the robot: up (the default), forward, or a file with a rotation."""
+    """How the camera sits on the robot: up (the default, but for panoramas), forward, or a file with a rotation."""
     mask: Path | None = None
     """Image of the camera's size, white where the world is seen and black where the robot is."""
 
@@ -84,14 +92,15 @@ class MethodOptions(MountedOptions):
     correction: str | None = None
     """closed-form, none or a number: the factor from shift (or raw angle) to angle."""
 
-    def estimator(self, camera: "Camera") -> "TiltEstimator":
-        """The estimator with the options that were given."""
+    def estimator(self, camera: "Camera", **otherwise: Any) -> "TiltEstimator":
+        """The estimator with the options that were given, and others where they were not."""
         from tiltvp import TiltEstimator
         from tiltvp.rotations import read_rotation
 
-        options = self.given()
-        if self.robot_from_camera is not None:
-            options["robot_from_camera"] = read_rotation(self.robot_from_camera)
+        options = otherwise | self.given()
+        mounting = self.robot_from_camera or ("forward" if camera.model == "equirectangular" else None)
+        if mounting is not None:
+            options["robot_from_camera"] = read_rotation(mounting)
         if self.method is not None:
             check_word("--method", self.method, METHODS)
             options["method"] = self.method

@@ -8,6 +8,7 @@ from collections.abc import Callable, Generator, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import closing
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, TypeVar
 
@@ -26,7 +27,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from tiltvp import EdgeElements, TiltEstimate, TiltEstimator
+    from tiltvp import EdgeElements, Leveller, TiltEstimate, TiltEstimator
     from tiltvp._core import Camera
 
 _METHOD_DEFAULTS = MethodOptions()
@@ -198,6 +199,13 @@ class Work:
     level: Path | None
     filtering: FilterOptions
 
+    @cached_property
+    def leveller(self) -> Leveller:
+        """Of the estimator's camera, with tables that are made once."""
+        from tiltvp import Leveller
+
+        return Leveller(self.estimator.camera, self.estimator.robot_from_camera)
+
     def __call__(self, file: Path, name: str) -> Outcome:
         """Estimates, and writes the pictures asked for; any problem of this image becomes its outcome.
 
@@ -211,7 +219,7 @@ class Work:
             return Outcome(file, error=" ".join(str(error).split()))
 
     def _run(self, file: Path, name: str) -> Outcome:
-        from tiltvp import level, read_image, write_image
+        from tiltvp import read_image, write_image
         from tiltvp.images import gray_from
 
         image = read_image(file)
@@ -223,16 +231,16 @@ class Work:
             write_image(self.overlay / f"{name}.png", self._overlay(gray, estimate, edges, file.name))
         accepted = estimate and self.filtering.accepts(estimate.confidence)
         if self.level is not None and accepted and not self.filtering.filter:
-            write_image(self.level / f"{name}.png", level(image, self.estimator, estimate))
+            write_image(self.level / f"{name}.png", self.leveller(image, estimate))
         return Outcome(file, estimate, time_s)
 
     def write_level(self, outcome: Outcome, name: str) -> None:
         """The image made level by what the filter held to be true after it, where it did."""
-        from tiltvp import level, read_image, write_image
+        from tiltvp import read_image, write_image
 
         if self.level is not None and outcome.filtered and outcome.error is None:
             image = read_image(outcome.file)
-            write_image(self.level / f"{name}.png", level(image, self.estimator, outcome.filtered))
+            write_image(self.level / f"{name}.png", self.leveller(image, outcome.filtered))
 
     def _overlay(
         self, gray: NDArray[np.uint8], estimate: TiltEstimate, edges: EdgeElements, title: str
