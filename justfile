@@ -187,6 +187,10 @@ measure-scaling *arguments: setup
 measure-inertial *arguments: setup
     {{bin}}/tiltvp measure inertial "$TILTVP_DATA/panos_theta_imu" {{arguments}}
 
+# 360-degree panoramas made level, and times of levelling beside OpenCV's remapping.
+measure-level *arguments: setup
+    {{bin}}/tiltvp measure level "$TILTVP_DATA/panos" --inertial "$TILTVP_DATA/panos_theta_imu" {{arguments}}
+
 # Planar-motion pose estimation over tilt in rendered rooms, without and with tilt correction.
 measure-planar-pose *arguments: setup
     {{bin}}/tiltvp measure planar-pose {{arguments}}

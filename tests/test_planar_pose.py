@@ -15,7 +15,7 @@ import tiltvp
 from tiltvp._core import leaning_from_upright
 from tiltvp.cli import main
 from tiltvp.errors import InvalidInputError
-from tiltvp.lab.evaluation.planar.panorama import PanoramaGrid, Unwrapper
+from tiltvp.lab.evaluation.planar.panorama import PanoramaGrid
 from tiltvp.lab.evaluation.planar.warping import MinWarping, bearing_and_orientation
 from tiltvp.lab.evaluation.planar_pose import CORRECTIONS, PlanarPoseExperiment, measure_planar_pose
 from tiltvp.lab.evaluation.planar_summary import crossings, summarise_planar_pose
@@ -116,7 +116,7 @@ def test_panorama_is_made_level_by_the_tilt() -> None:
     camera = tiltvp.Camera.equidistant(
         width=640, height=480, focal_px=139.7, cx=319.5, cy=239.5, max_theta_rad=math.radians(95.0)
     )
-    unwrap = Unwrapper(camera, GRID)
+    unwrap = tiltvp.Unwrapper(camera)
     bearings = np.nan_to_num(camera.unproject(np.stack(np.meshgrid(np.arange(640), np.arange(480)), -1).reshape(-1, 2)))
 
     def image(normal: NDArray[np.float64]) -> NDArray[np.uint8]:

@@ -21,6 +21,7 @@ from tiltvp.corrections import (
     train_posterior,
 )
 from tiltvp.images import read_image, write_image
+from tiltvp.levelling import Leveller, Unwrapper, level
 from tiltvp.overlays.edges import draw_edges
 from tiltvp.overlays.segments import draw_segments
 from tiltvp.segments import SegmentDetector, Segments
@@ -46,7 +47,6 @@ from tiltvp.tilt import (
     TiltEstimator,
     TiltFilter,
     common_direction,
-    level,
     normal_from_alpha_beta,
     tilt_error_rad,
     tilt_from_wheel_heights,
@@ -75,6 +75,7 @@ __all__ = [
     "FilteredTilt",
     "FitReport",
     "ImageEdges",
+    "Leveller",
     "LogCalibration",
     "MountingEstimate",
     "MountingTilt",
@@ -90,6 +91,7 @@ __all__ = [
     "TiltEstimator",
     "TiltFilter",
     "TurnCheck",
+    "Unwrapper",
     "apply_correction",
     "body_mask",
     "calibrate",

@@ -1,11 +1,9 @@
-"""The tilt of single and of successive images: the estimator over images of any usual kind, the filter, levelling."""
+"""The tilt of single and of successive images: the estimator over images of any usual kind, the filter."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any, Self
-
-import numpy as np
 
 from tiltvp import _core
 from tiltvp._core import (
@@ -22,13 +20,10 @@ from tiltvp._core import (
     tilt_error_rad,
     tilt_from_wheel_heights,
 )
-from tiltvp.errors import InvalidInputError
 from tiltvp.images import gray_from
 
 if TYPE_CHECKING:
-    from numpy.typing import ArrayLike, NDArray
-
-    from tiltvp._core import Camera
+    from numpy.typing import ArrayLike
 
 __all__ = [
     "CommonDirection",
@@ -41,14 +36,10 @@ __all__ = [
     "TiltEstimator",
     "TiltFilter",
     "common_direction",
-    "level",
     "normal_from_alpha_beta",
     "tilt_error_rad",
     "tilt_from_wheel_heights",
 ]
-
-
-_LEVELLED = ("uint8", "uint16", "int16", "float32", "float64")
 
 
 class TiltEstimator(_core.TiltEstimator):
@@ -106,55 +97,3 @@ class TiltEstimator(_core.TiltEstimator):
         """The tilts of many images, in their order, the same for any number of threads."""
         grays = [gray_from(image, f"images[{i}]") for i, image in enumerate(images)]
         return self._estimate_many(grays, threads=threads)
-
-
-def level(
-    image: NDArray[Any],
-    seen_by: TiltEstimator | Camera,
-    tilt: TiltEstimate | FilteredTilt | tuple[float, float],
-    robot_from_camera: ArrayLike | None = None,
-) -> NDArray[Any]:
-    """The image as the untilted camera would have seen it, same shape and dtype; black where nothing was seen.
-
-    `seen_by` is the estimator of the tilt, of which camera and mounting are taken, or a camera with its mounting,
-    `robot_from_camera` (3, 3). `tilt` is an estimate, a filter's or an image's, or (alpha_rad, beta_rad). Raises
-    `InvalidInputError` if the image has another size than the camera's, the estimate has no tilt, a camera comes
-    without a mounting, or an estimator with another one.
-    """
-    import cv2
-
-    camera, mounting = _camera_and_mounting(seen_by, robot_from_camera)
-    array = np.asarray(image)
-    if array.ndim not in (2, 3) or array.shape[:2] != (camera.height, camera.width):
-        expected = f"({camera.height}, {camera.width}) or ({camera.height}, {camera.width}, channels)"
-        raise InvalidInputError(f"image: shape {array.shape}, expected {expected}, as the camera's images")
-    if array.dtype not in _LEVELLED or (array.ndim == 3 and not 1 <= array.shape[2] <= 4):
-        kinds = ", ".join(_LEVELLED)
-        raise InvalidInputError(f"image: dtype {array.dtype}, shape {array.shape}, expected {kinds} of 1 to 4 channels")
-    if isinstance(tilt, TiltEstimate | FilteredTilt):
-        if not tilt:
-            raise InvalidInputError(f"tilt: an estimate without a tilt ({tilt.reason}), expected one with a tilt")
-        normal = tilt.normal
-    else:
-        alpha_rad, beta_rad = tilt
-        normal = normal_from_alpha_beta(alpha_rad, beta_rad)
-    places = np.nan_to_num(_core.level_map(camera, normal, robot_from_camera=mounting), nan=-1e6)
-    across, down = np.ascontiguousarray(places[:, :, 0]), np.ascontiguousarray(places[:, :, 1])
-    # OpenCV drops an axis of length one.
-    return np.asarray(cv2.remap(array, across, down, cv2.INTER_LINEAR)).reshape(array.shape)
-
-
-def _camera_and_mounting(
-    seen_by: TiltEstimator | Camera, robot_from_camera: ArrayLike | None
-) -> tuple[Camera, ArrayLike]:
-    """A tilt means something only together with the mounting that it was estimated for."""
-    if not isinstance(seen_by, TiltEstimator):
-        if robot_from_camera is None:
-            raise InvalidInputError(
-                "robot_from_camera: none, expected the mounting (3, 3) beside a camera, or the TiltEstimator instead"
-            )
-        return seen_by, robot_from_camera
-    own = seen_by.robot_from_camera
-    if robot_from_camera is not None and not np.allclose(own, np.asarray(robot_from_camera, dtype=np.float64)):
-        raise InvalidInputError("robot_from_camera: another one than that of the estimator, expected none beside it")
-    return seen_by.camera, own

@@ -9,6 +9,7 @@ pub mod compaction;
 pub mod gradient;
 pub mod normals;
 pub mod prefetch;
+pub mod remap;
 pub mod ridge;
 pub mod rows;
 pub mod smoothing;

@@ -9,6 +9,7 @@ mod corner;
 mod drive;
 mod field;
 mod laboratory;
+mod level;
 mod lines;
 mod options;
 mod rays;
@@ -52,6 +53,8 @@ mod _core {
     #[pymodule_export]
     use crate::laboratory::Laboratory;
     #[pymodule_export]
+    use crate::level::Leveller;
+    #[pymodule_export]
     use crate::lines::{
         LineExtractor, LineTracker, Lines, TrackedLines, descriptor_distances, match_descriptors, ssd_matrix,
         zncc_matrix,
@@ -75,8 +78,8 @@ mod _core {
     use crate::tilt::{
         AffineCorrection, CommonDirection, EdgeElements, FilterStep, FilteredTilt, FitReport, ImageEdges,
         PosteriorCorrection, PriorOfTilt, TiltAlternative, TiltEstimate, TiltEstimator, TiltFilter, apply_correction,
-        common_direction, leaning_from_upright, level_map, normal_from_alpha_beta, tilt_error_rad,
-        tilt_from_wheel_heights, train_affine, train_factor, train_posterior,
+        common_direction, leaning_from_upright, normal_from_alpha_beta, tilt_error_rad, tilt_from_wheel_heights,
+        train_affine, train_factor, train_posterior,
     };
 
     #[pymodule_init]

@@ -216,27 +216,6 @@ impl TiltEstimator {
     }
 }
 
-/// (H, W, 2): where each pixel (u, v) of the upright image is found in the leaning one; NaN where it was not seen.
-///
-/// `normal` is the ground normal (3,) in the robot frame, of any length but zero.
-#[pyfunction]
-#[pyo3(signature = (
-    camera, normal: "ArrayLike", *, robot_from_camera: "ArrayLike | None" = None,
-) -> "NDArray[np.float32]")]
-pub(crate) fn level_map<'py>(
-    py: Python<'py>,
-    camera: &Bound<'py, Camera>,
-    normal: &Bound<'py, PyAny>,
-    robot_from_camera: Option<&Bound<'py, PyAny>>,
-) -> PyResult<Bound<'py, PyAny>> {
-    let tilt = convert::tilt(normal, "normal")?;
-    let rotation = reader::robot_from_camera(robot_from_camera)?;
-    let camera = &camera.get().inner;
-    let map = call_long(py, || core::level_map(camera, &rotation, &tilt))?;
-    let shape = [camera.height() as usize, camera.width() as usize, 2];
-    Ok(PyArray1::from_slice(py, map.as_flattened()).reshape(shape)?.into_any())
-}
-
 /// The angle in [0, pi] radians between two ground normals (3,), of any length but zero (eq. 44).
 #[pyfunction]
 #[pyo3(signature = (a: "ArrayLike", b: "ArrayLike"))]

@@ -10,7 +10,7 @@ from contextlib import nullcontext
 from cyclopts import App, CycloptsError, Parameter
 
 from tiltvp import __version__
-from tiltvp.cli import calibrate, camera, corner, demo, lines, mount, segments, setup, tilt, track
+from tiltvp.cli import calibrate, camera, corner, demo, level, lines, mount, segments, setup, tilt, track
 from tiltvp.cli.lab import dataset, drive, evaluate, measure, report
 from tiltvp.cli.sources import STDIN
 from tiltvp.cli.terminal import complain
@@ -33,6 +33,7 @@ app = App(
 app.command(setup.setup)
 app.command(tilt.tilt)
 app.command(mount.mount)
+app.command(level.level)
 app.command(segments.segments)
 app.command(lines.lines)
 app.command(track.track)

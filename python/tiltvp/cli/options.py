@@ -27,13 +27,16 @@ M = TypeVar("M", bound=LibraryOptions)
 Switch = Annotated[bool, Parameter(negative="", show_default=False)]
 
 
-def image_size_from(text: str | None) -> tuple[int, int] | None:
+_PANORAMA = "equirectangular:"
+
+
+def image_size_from(text: str | None, option: str = "--image-size") -> tuple[int, int] | None:
     """(width, height) from `640x480`."""
     if text is None:
         return None
     found = re.fullmatch(r"\s*(\d+)\s*[xX*,]\s*(\d+)\s*", text)
     if found is None:
-        raise InvalidInputError(f"--image-size {text!r}, expected WIDTHxHEIGHT in pixels, such as 640x480")
+        raise InvalidInputError(f"{option} {text!r}, expected WIDTHxHEIGHT in pixels, such as 640x480")
     return int(found[1]), int(found[2])
 
 
@@ -43,8 +46,8 @@ class CameraOptions:
     """Which camera took the images."""
 
     camera: Path
-    """Calibration file, of any of the formats that `tiltvp camera formats` lists, a robot's file (`tiltvp setup`), or a
-    recording of ROS with CameraInfo."""
+    """Calibration file, of any of the formats that `tiltvp camera formats` lists, a robot's file (`tiltvp setup`), a
+    recording of ROS with CameraInfo, or equirectangular:WIDTHxHEIGHT."""
     camera_format: str | None = None
     """Its format, where its content does not tell."""
     camera_name: str | None = None
@@ -61,6 +64,11 @@ class CameraOptions:
 
         if is_recording(self.camera):
             return self._mirrored(recorded_camera(Recording(self.camera), self.camera_name))
+        word = str(self.camera)
+        if word.startswith(_PANORAMA):
+            size = image_size_from(word.removeprefix(_PANORAMA), f"--camera {_PANORAMA}")
+            assert size is not None  # There is a text.
+            return Camera.equirectangular(width=size[0], height=size[1])
         name = self.camera_name or "0"
         camera = Camera.load(
             self.camera,
@@ -91,8 +99,8 @@ class MountedOptions(LibraryOptions):
     """How the camera sits on the robot, and where the robot sees itself."""
 
     robot_from_camera: str | None = None
-    """How the camera sits on the robot: up (the default), forward, a file with a rotation, or a recording of ROS whose
-    /tf_static joins base_link to the frame of the only topic of images."""
+    """How the camera sits on the robot: up (the default, but for panoramas), forward, a file with a rotation, or a
+    recording of ROS whose /tf_static joins base_link to the frame of the only topic of images."""
     mask: Path | None = None
     """Image of the camera's size, white where the world is seen and black where the robot is."""
 
@@ -100,8 +108,9 @@ class MountedOptions(LibraryOptions):
         """An estimator of that mounting and mask, with these options."""
         from tiltvp import TiltEstimator
 
-        if self.robot_from_camera is not None:
-            options["robot_from_camera"] = rotation_of(self.robot_from_camera)
+        mounting = self.robot_from_camera or ("forward" if camera.model == "equirectangular" else None)
+        if mounting is not None:
+            options["robot_from_camera"] = rotation_of(mounting)
         if self.mask is not None and "mask" not in options:
             options["mask"] = mask_from(self.mask)
         return TiltEstimator(camera, **options)
@@ -118,9 +127,9 @@ class MethodOptions(MountedOptions):
     correction: str | None = None
     """closed-form, none or a number: the factor from shift (or raw angle) to angle."""
 
-    def estimator(self, camera: "Camera") -> "TiltEstimator":
-        """The estimator with the options that were given."""
-        options = self.given()
+    def estimator(self, camera: "Camera", **otherwise: Any) -> "TiltEstimator":
+        """The estimator with the options that were given, and others where they were not."""
+        options = otherwise | self.given()
         if self.method is not None:
             check_word("--method", self.method, METHODS)
             options["method"] = self.method

@@ -9,6 +9,7 @@ from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import closing
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import repeat
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, TypeVar
@@ -29,7 +30,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from tiltvp import EdgeElements, TiltEstimate, TiltEstimator
+    from tiltvp import EdgeElements, Leveller, TiltEstimate, TiltEstimator
     from tiltvp.streams import Frame, Frames
 
 _METHOD_DEFAULTS = MethodOptions()
@@ -211,6 +212,13 @@ class Work:
     level: Path | None
     filtering: FilterOptions
 
+    @cached_property
+    def leveller(self) -> Leveller:
+        """Of the estimator's camera, with tables that are made once."""
+        from tiltvp import Leveller
+
+        return Leveller(self.estimator.camera, self.estimator.robot_from_camera)
+
     def __call__(self, frame: Frame, name: str) -> Outcome:
         """Estimates, and writes the pictures asked for; any problem of this image becomes its outcome.
 
@@ -224,7 +232,7 @@ class Work:
             return Outcome(Path(frame.name), error=" ".join(str(error).split()), taken_s=frame.time_s)
 
     def _run(self, frame: Frame, name: str) -> Outcome:
-        from tiltvp import level, write_image
+        from tiltvp import write_image
         from tiltvp.images import gray_from
 
         file, image = Path(frame.name), frame.read()
@@ -236,15 +244,15 @@ class Work:
             write_image(self.overlay / f"{name}.png", self._overlay(gray, estimate, edges, file.name))
         accepted = estimate and self.filtering.accepts(estimate.confidence)
         if self.level is not None and accepted and not self.filtering.filter:
-            write_image(self.level / f"{name}.png", level(image, self.estimator, estimate))
+            write_image(self.level / f"{name}.png", self.leveller(image, estimate))
         return Outcome(file, estimate, time_s, taken_s=frame.time_s)
 
     def write_level(self, frame: Frame, outcome: Outcome, name: str) -> None:
         """The image made level by what the filter held to be true after it, where it did."""
-        from tiltvp import level, write_image
+        from tiltvp import write_image
 
         if self.level is not None and outcome.filtered and outcome.error is None:
-            write_image(self.level / f"{name}.png", level(frame.read(), self.estimator, outcome.filtered))
+            write_image(self.level / f"{name}.png", self.leveller(frame.read(), outcome.filtered))
 
     def _overlay(
         self, gray: NDArray[np.uint8], estimate: TiltEstimate, edges: EdgeElements, title: str

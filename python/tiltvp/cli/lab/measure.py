@@ -13,6 +13,7 @@ from tiltvp.cli.lab.calibration_measures import calibration, calibration_images,
 from tiltvp.cli.lab.corner_measures import corners
 from tiltvp.cli.lab.corner_real import corners_real
 from tiltvp.cli.lab.descriptors import descriptors
+from tiltvp.cli.lab.levelling import level
 from tiltvp.cli.lab.line_measures import lines
 from tiltvp.cli.lab.mounting import mounting
 from tiltvp.cli.lab.planar_pose import planar_pose
@@ -30,6 +31,7 @@ app.command(calibration_images)
 app.command(corners)
 app.command(corners_real)
 app.command(descriptors)
+app.command(level)
 app.command(lines)
 app.command(mounting)
 app.command(planar_pose)

@@ -18,8 +18,9 @@ import polars as pl
 
 from tiltvp.errors import InvalidInputError
 from tiltvp.lab.datasets.panoramas import paper_camera
-from tiltvp.lab.evaluation.planar.panorama import PanoramaGrid, Unwrapper
+from tiltvp.lab.evaluation.planar.panorama import PanoramaGrid
 from tiltvp.lab.evaluation.planar.warping import MinWarping, bearing_and_orientation
+from tiltvp.levelling import Unwrapper
 from tiltvp.synth import ROOM_KINDS, Room
 from tiltvp.tilt import TiltEstimator, normal_from_alpha_beta, tilt_error_rad
 
@@ -201,7 +202,10 @@ class _Matcher:
 
     def __init__(self, experiment: PlanarPoseExperiment) -> None:
         self._experiment = experiment
-        self._unwrapper = Unwrapper(experiment.camera, experiment.grid)
+        grid = experiment.grid
+        self._unwrapper = Unwrapper(
+            experiment.camera, size=(grid.columns, grid.rows), elevation_max_rad=grid.elevation_max_rad
+        )
         self._warping = MinWarping(experiment.grid)
         self._closed_form = TiltEstimator(experiment.camera, method=_PAPER, correction="closed-form")
         self._refined = TiltEstimator(experiment.camera, method="refined")

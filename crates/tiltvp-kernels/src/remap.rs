@@ -1,0 +1,229 @@
+//! Pixels about places in another image: places interpolated over a patch, levels between four pixels, all in fixed point.
+
+use multiversion::multiversion;
+
+use crate::bilinear::quads;
+
+/// Columns of a patch at most, which are worked on together.
+pub const COLUMNS: usize = 8;
+
+/// Bits behind the point of a place. Of them the first eight weigh levels; the others keep sums of steps exact to 1/1000 px.
+const PLACE_BITS: u32 = 16;
+
+/// Bits of a weight: a level moves by less than one from one weight to the next.
+const WEIGHT_BITS: u32 = 8;
+const WEIGHT_MAX: i32 = (1 << WEIGHT_BITS) - 1;
+
+/// A few pixels of the new image, and where the first of each row and of each column is in the old one.
+#[derive(Debug, Clone, Copy)]
+pub struct Patch {
+    /// Columns and rows, from 1 to [`COLUMNS`] columns.
+    pub size: [usize; 2],
+    /// Of the first pixel, of the one `reach` columns to its right, of the one `reach` rows below, and of the one after both:
+    /// column and row in the old image, less those of `origin`; below 2^15.
+    pub corners: [[f32; 2]; 4],
+    /// Columns and rows between corners, at least 1.
+    pub reach: [usize; 2],
+    /// A pixel of the old image, above and left of all places: its place in the data in bytes.
+    pub origin: u32,
+}
+
+type Lanes = [i32; COLUMNS];
+
+/// The places of a row of a patch: first bytes of pixels, and the weights of their right and lower neighbours.
+struct Row {
+    first: [u32; COLUMNS],
+    right: Lanes,
+    below: Lanes,
+}
+
+// Plain loops here and below: closures and adaptors over arrays are compiled without the vector instructions of their caller.
+
+/// Places of a row of the patch along an axis, relative to the origin, with [`PLACE_BITS`] behind the point.
+#[inline(always)]
+fn along<const AXIS: usize>(patch: &Patch, down: f32) -> Lanes {
+    let [left_top, right_top, left_bottom, right_bottom] = &patch.corners;
+    let left = left_top[AXIS] + down * (left_bottom[AXIS] - left_top[AXIS]);
+    let right = right_top[AXIS] + down * (right_bottom[AXIS] - right_top[AXIS]);
+    let unit = (1 << PLACE_BITS) as f32;
+    // Half a weight more, for weights are cut off.
+    let first = (left * unit) as i32 + (1 << (PLACE_BITS - WEIGHT_BITS - 1));
+    let step = ((right - left) * unit / patch.reach[0] as f32) as i32;
+    let mut lanes = [0; COLUMNS];
+    for i in 0..COLUMNS {
+        lanes[i] = first.wrapping_add(step.wrapping_mul(i.min(patch.size[0] - 1) as i32));
+    }
+    lanes
+}
+
+#[inline(always)]
+fn places<const CHANNELS: usize>(patch: &Patch, row: usize, stride: usize) -> Row {
+    let down = row as f32 / patch.reach[1] as f32;
+    let (u, v) = (along::<0>(patch, down), along::<1>(patch, down));
+    let mut found = Row { first: [0; COLUMNS], right: [0; COLUMNS], below: [0; COLUMNS] };
+    for i in 0..COLUMNS {
+        let (across, down) = ((u[i] >> PLACE_BITS) as u32, (v[i] >> PLACE_BITS) as u32);
+        let from_origin = down.wrapping_mul(stride as u32).wrapping_add(across.wrapping_mul(CHANNELS as u32));
+        found.first[i] = patch.origin.wrapping_add(from_origin);
+        found.right[i] = (u[i] >> (PLACE_BITS - WEIGHT_BITS)) & WEIGHT_MAX;
+        found.below[i] = (v[i] >> (PLACE_BITS - WEIGHT_BITS)) & WEIGHT_MAX;
+    }
+    found
+}
+
+/// The levels between the bytes at `shifts` of four words, which are those of the four pixels.
+#[inline(always)]
+fn blend(words: &[[u32; COLUMNS]; 4], shifts: [u32; 4], row: &Row, out: &mut [u8; COLUMNS]) {
+    for i in 0..COLUMNS {
+        let a = ((words[0][i] >> shifts[0]) & 255) as i32;
+        let b = ((words[1][i] >> shifts[1]) & 255) as i32;
+        let c = ((words[2][i] >> shifts[2]) & 255) as i32;
+        let d = ((words[3][i] >> shifts[3]) & 255) as i32;
+        let above = (a << WEIGHT_BITS) + (b - a) * row.right[i];
+        let under = (c << WEIGHT_BITS) + (d - c) * row.right[i];
+        let level = (above << WEIGHT_BITS) + (under - above) * row.below[i];
+        out[i] = ((level + (1 << (2 * WEIGHT_BITS - 1))) >> (2 * WEIGHT_BITS)) as u8;
+    }
+}
+
+/// Fills a patch of a grey image; `out` begins with its first pixel. Nothing tells where a place is outside the old image but
+/// inside its data: the caller sees to it that places are in the image, with a neighbour to the right and below.
+///
+/// False where a place is outside the data; the patch is then filled in part.
+///
+/// # Panics
+/// If a patch is wider than [`COLUMNS`], or `out` ends within it.
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512vl", "x86_64+avx2"))]
+pub fn fill_gray(data: &[u8], stride: usize, patch: &Patch, out: &mut [u8], out_stride: usize) -> bool {
+    let columns = patch.size[0];
+    let mut levels = [0; COLUMNS];
+    for number in 0..patch.size[1] {
+        let row = places::<1>(patch, number, stride);
+        let Some(quads) = quads(data, stride, &row.first) else { return false };
+        blend(&[quads; 4], [0, 8, 16, 24], &row, &mut levels);
+        let into = &mut out[number * out_stride..][..columns];
+        if columns == COLUMNS {
+            into.copy_from_slice(&levels);
+        } else {
+            into.copy_from_slice(&levels[..columns]);
+        }
+    }
+    true
+}
+
+/// The same for an image of three bytes a pixel; `stride` and `out_stride` are bytes.
+///
+/// # Panics
+/// As [`fill_gray`].
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512vl", "x86_64+avx2"))]
+pub fn fill_color(data: &[u8], stride: usize, patch: &Patch, out: &mut [u8], out_stride: usize) -> bool {
+    let columns = patch.size[0];
+    for number in 0..patch.size[1] {
+        let row = places::<3>(patch, number, stride);
+        let Some(words) = neighbours(data, stride, &row.first) else { return false };
+        let [mut blue, mut green, mut red] = [[0; COLUMNS]; 3];
+        blend(&words, [0; 4], &row, &mut blue);
+        blend(&words, [8; 4], &row, &mut green);
+        blend(&words, [16; 4], &row, &mut red);
+        let mut pixels = [0; 3 * COLUMNS];
+        for i in 0..COLUMNS {
+            pixels[3 * i] = blue[i];
+            pixels[3 * i + 1] = green[i];
+            pixels[3 * i + 2] = red[i];
+        }
+        let into = &mut out[number * out_stride..][..3 * columns];
+        if columns == COLUMNS {
+            into.copy_from_slice(&pixels);
+        } else {
+            into.copy_from_slice(&pixels[..3 * columns]);
+        }
+    }
+    true
+}
+
+/// Four bytes from each place on, from three bytes to its right, and from the places a stride farther; none unless all are in the
+/// data.
+#[inline(always)]
+fn neighbours(data: &[u8], stride: usize, places: &[u32; COLUMNS]) -> Option<[[u32; COLUMNS]; 4]> {
+    let mut last = 0;
+    for i in 0..COLUMNS {
+        last = last.max(places[i]);
+    }
+    if (last as usize).checked_add(stride)?.checked_add(7)? > data.len() {
+        return None;
+    }
+    let mut found = [[0; COLUMNS]; 4];
+    for i in 0..COLUMNS {
+        // SAFETY: none is farther on than the last, after which seven bytes in the next row are in the data.
+        unsafe {
+            let above = data.as_ptr().add(places[i] as usize);
+            let below = above.add(stride);
+            found[0][i] = u32::from_le_bytes(above.cast::<[u8; 4]>().read());
+            found[1][i] = u32::from_le_bytes(above.add(3).cast::<[u8; 4]>().read());
+            found[2][i] = u32::from_le_bytes(below.cast::<[u8; 4]>().read());
+            found[3][i] = u32::from_le_bytes(below.add(3).cast::<[u8; 4]>().read());
+        }
+    }
+    Some(found)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const WIDTH: usize = 40;
+
+    fn level(data: &[u8], channels: usize, place: [f32; 2], channel: usize) -> f32 {
+        let at = |u: usize, v: usize| f32::from(data[(v * WIDTH + u) * channels + channel]);
+        let (u, v) = (place[0] as usize, place[1] as usize);
+        let (right, below) = (place[0] - u as f32, place[1] - v as f32);
+        let row = |v: usize| at(u, v) * (1.0 - right) + at(u + 1, v) * right;
+        row(v) * (1.0 - below) + row(v + 1) * below
+    }
+
+    #[test]
+    fn patches_are_what_interpolation_of_places_and_levels_says() {
+        let gray: Vec<u8> = (0..40 * 40).map(|k| ((k * 7 + k / WIDTH * 31) % 251) as u8).collect();
+        let color: Vec<u8> = (0..3 * 40 * 40).map(|k| ((k * 13 + k / 120 * 17) % 253) as u8).collect();
+        let corners = [[3.2, 2.5], [14.7, 5.1], [1.1, 13.9], [13.3, 17.4]];
+        for size in [[8, 8], [5, 8], [1, 1], [8, 3]] {
+            let reach = size.map(|n: usize| n.max(2) - 1);
+            let patch = Patch { size, corners, reach, origin: (4 * WIDTH + 6) as u32 };
+            let (mut grays, mut colors) = ([0; 9 * 8], [0; 25 * 8]);
+            assert!(fill_gray(&gray, WIDTH, &patch, &mut grays, 9));
+            let patch = Patch { origin: 3 * patch.origin, ..patch };
+            assert!(fill_color(&color, 3 * WIDTH, &patch, &mut colors, 25));
+            for (row, column) in (0..size[1]).flat_map(|row| (0..size[0]).map(move |column| (row, column))) {
+                let (t, s) = (row as f32 / reach[1] as f32, column as f32 / reach[0] as f32);
+                let place: [f32; 2] = std::array::from_fn(|k| {
+                    let [a, b, c, d] = corners.map(|corner| corner[k]);
+                    let origin = [6.0, 4.0][k];
+                    origin + (a + (b - a) * s) * (1.0 - t) + (c + (d - c) * s) * t
+                });
+                // A weight is rounded to 1/256 on either axis, and neighbours differ by at most 253 levels.
+                let near =
+                    |got: u8, expected: f32| assert!((f32::from(got) - expected).abs() < 1.6, "{got} {expected}");
+                near(grays[row * 9 + column], level(&gray, 1, place, 0));
+                for channel in 0..3 {
+                    near(colors[row * 25 + 3 * column + channel], level(&color, 3, place, channel));
+                }
+            }
+            assert_eq!(grays[size[0]], 0);
+        }
+    }
+
+    #[test]
+    fn whole_places_are_copied_and_places_outside_the_data_are_told() {
+        let data: Vec<u8> = (0..=255).collect();
+        let corners = [[0.0, 0.0], [7.0, 0.0], [0.0, 7.0], [7.0, 7.0]];
+        let patch = Patch { size: [8, 8], corners, reach: [7, 7], origin: 17 };
+        let mut out = [0; 64];
+        assert!(fill_gray(&data, 16, &patch, &mut out, 8));
+        assert!((0..64).all(|k| usize::from(out[k]) == 17 + k / 8 * 16 + k % 8));
+        assert!(!fill_gray(&data, 16, &Patch { origin: 150, ..patch }, &mut out, 8));
+        assert!(!fill_gray(&data, 16, &Patch { origin: u32::MAX, ..patch }, &mut out, 8));
+        assert!(!fill_color(&data, 16, &Patch { origin: 120, ..patch }, &mut out, 8));
+        let back = corners.map(|corner| corner.map(|c| -2.0 * c));
+        assert!(!fill_gray(&data, 16, &Patch { corners: back, origin: 17, ..patch }, &mut out, 8));
+    }
+}
