@@ -1,16 +1,19 @@
-"""The same question has the same answer, to the last bit: again, in another process, after other questions."""
+"""The same question has the same answer, to the last bit: again, elsewhere, after others, with other vectors."""
 
 from __future__ import annotations
 
+import os
 import pickle
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 import tiltvp
+from tiltvp._core import SIMD_LEVELS
 from tiltvp.synth import RoomImage, render_room
 
 
@@ -32,17 +35,39 @@ def test_seeds(camera: tiltvp.Camera, room: RoomImage, method: str) -> None:
     assert len(set(answers)) > 1
 
 
-def test_another_process(tmp_path: Path, camera: tiltvp.Camera, room: RoomImage) -> None:
-    estimators = [tiltvp.TiltEstimator(camera, method=method) for method in tiltvp.METHODS]
+@pytest.mark.parametrize("level", SIMD_LEVELS)
+def test_another_process_with_any_vectors(tmp_path: Path, camera: tiltvp.Camera, room: RoomImage, level: str) -> None:
+    askers: list[Callable[[np.ndarray], object]] = [
+        *(tiltvp.TiltEstimator(camera, method=method) for method in tiltvp.METHODS),
+        tiltvp.TiltEstimator(camera, method="refined", smoothing_px=0.0, gradient_min=300.0),
+        tiltvp.TiltEstimator(camera, method="vector-consensus", normal="gradient", threshold_rad=0.05),
+        tiltvp.SegmentDetector(camera),
+    ]
     question, answer = tmp_path / "question", tmp_path / "answer"
-    question.write_bytes(pickle.dumps((estimators, room.gray)))
+    question.write_bytes(pickle.dumps((askers, room.gray)))
     script = (
-        "import pickle, pathlib, sys\n"
-        "estimators, image = pickle.loads(pathlib.Path(sys.argv[1]).read_bytes())\n"
-        "pathlib.Path(sys.argv[2]).write_bytes(pickle.dumps([estimator(image) for estimator in estimators]))\n"
+        "import pickle, pathlib, sys, tiltvp\n"
+        "askers, image = pickle.loads(pathlib.Path(sys.argv[1]).read_bytes())\n"
+        "answers = tiltvp.simd_level(), [asker(image) for asker in askers]\n"
+        "pathlib.Path(sys.argv[2]).write_bytes(pickle.dumps(answers))\n"
     )
-    subprocess.run([sys.executable, "-c", script, str(question), str(answer)], check=True, timeout=120)
-    assert pickle.loads(answer.read_bytes()) == [estimator(room.gray) for estimator in estimators]
+    environment = {**os.environ, "TILTVP_SIMD": level}
+    command = [sys.executable, "-c", script, str(question), str(answer)]
+    subprocess.run(command, check=True, timeout=120, env=environment)
+    used, answers = pickle.loads(answer.read_bytes())
+    assert used == level
+    assert answers == [asker(room.gray) for asker in askers]
+
+
+def test_vectors_that_the_machine_has_not_got() -> None:
+    assert tiltvp.simd_level() in SIMD_LEVELS
+    assert SIMD_LEVELS[0] == "fallback"
+    environment = {**os.environ, "TILTVP_SIMD": "mmx"}
+    command = [sys.executable, "-c", "import tiltvp"]
+    outcome = subprocess.run(command, capture_output=True, text=True, timeout=120, env=environment)
+    assert outcome.returncode == 1
+    expected = f'InvalidInputError: option TILTVP_SIMD = "mmx", expected one of {", ".join(SIMD_LEVELS)} (what this'
+    assert expected in outcome.stderr
 
 
 @pytest.mark.slow

@@ -8,7 +8,7 @@ pixel centres at integers. `robot_from_camera` is R in v_robot = R v_camera. A l
 from typing import TYPE_CHECKING, Any
 
 from tiltvp import lines
-from tiltvp._core import METHODS, ComplementaryFilter
+from tiltvp._core import METHODS, ComplementaryFilter, simd_level
 from tiltvp.body import BodyMask, body_mask
 from tiltvp.cameras import Camera
 from tiltvp.corrections import (
@@ -107,6 +107,7 @@ __all__ = [
     "mounting_tilt",
     "normal_from_alpha_beta",
     "read_image",
+    "simd_level",
     "streams",
     "surround_mask",
     "synth",

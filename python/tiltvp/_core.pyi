@@ -6,7 +6,8 @@ where nothing else is said.
 
 `METHODS` are the methods of `TiltEstimator`, `LINE_METHODS` those of `LineExtractor`, `CORNER_METHODS` those of
 `CornerDetector`, `CALIBRATION_METHODS` those of `SelfCalibrator`, the default first. `CAMERA_MODELS` are the models of
-`Camera`, `ROOM_KINDS` the kinds of `Room`, and `WALL_PATTERNS` what its walls may have in common.
+`Camera`, `ROOM_KINDS` the kinds of `Room`, and `WALL_PATTERNS` what its walls may have in common. `SIMD_LEVELS` are what
+`simd_level` may say on this machine, the widest last.
 """
 
 import builtins
@@ -28,6 +29,7 @@ __all__ = [
     "MOST_LANDMARKS",
     "MOST_PIXELS",
     "ROOM_KINDS",
+    "SIMD_LEVELS",
     "WALL_PATTERNS",
     "AffineCorrection",
     "CalibrationStep",
@@ -89,6 +91,7 @@ __all__ = [
     "read_imu",
     "resolve_corners",
     "screen_corner",
+    "simd_level",
     "simulate_drive",
     "solve_corner",
     "solve_corners",
@@ -112,6 +115,7 @@ MOST_COEFFICIENTS: Final[int]
 MOST_LANDMARKS: Final[int]
 MOST_PIXELS: Final[int]
 ROOM_KINDS: Final[list[str]]
+SIMD_LEVELS: Final[list[str]]
 WALL_PATTERNS: Final[list[str]]
 
 @final
@@ -3308,6 +3312,13 @@ def resolve_corners(
 
 def screen_corner(feature: CornerFeature, gamma_rad: float) -> str | None:
     """Why a feature is no corner of that angle, in a sentence; None if it is one."""
+
+def simd_level() -> str:
+    """The vectors that this process uses: "fallback", "sse4.2", "avx2", "avx512" or "neon". Answers do not depend on them.
+
+    They are the widest of the machine, or those that the environment's `TILTVP_SIMD` names when tiltvp is imported,
+    where a word that is none of the machine's raises `InvalidInputError`.
+    """
 
 def simulate_drive(
     kind: str = "paper",

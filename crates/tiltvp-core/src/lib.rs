@@ -28,11 +28,13 @@ pub mod options;
 pub mod robust;
 pub mod segments;
 pub mod selfcalib;
+mod simd;
 #[cfg(feature = "testing")]
 pub mod testing;
 pub mod tilt;
 
 pub use error::{Error, Result};
+pub use simd::{simd_level, simd_levels};
 
 /// The README's program is run with those of the documentation.
 #[cfg(doctest)]

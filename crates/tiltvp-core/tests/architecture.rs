@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 /// The floors of the house, the ground first. Modules of one floor are sisters, which never import each other; only the
 /// ground floor is one.
 const FLOORS: [&[&str]; 6] = [
-    &["geometry", "error", "interrupt", "options"],
+    &["geometry", "error", "interrupt", "options", "simd"],
     &["robust", "camera", "image", "filter"],
     &["edges"],
     &["segments"],

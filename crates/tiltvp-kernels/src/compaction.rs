@@ -1,5 +1,13 @@
 //! Keeping some rows of a block: those whose weight is above zero, with the machine's own instruction where there is one.
 
+use std::ops::Range;
+
+#[cfg(target_arch = "x86_64")]
+use fearless_simd::{Simd as _, SimdBase as _, f32x8, u32x8};
+
+#[cfg(target_arch = "x86_64")]
+use crate::level::{Level, level, loops};
+
 /// Rows of columns in single precision, the last of which are weights, and their numbers.
 #[derive(Debug, Clone, Copy)]
 pub struct RowBlock<'a> {
@@ -37,19 +45,58 @@ pub fn compact_rows(block: &RowBlock<'_>, kept: &mut KeptRows<'_>) {
     let room = lengths.into_iter().min().unwrap_or(0).min(kept.numbers.len()).min(kept.places.len());
     assert!(room >= kept.len + n + ROOM);
     #[cfg(target_arch = "x86_64")]
-    if is_x86_feature_detected!("avx512f") && is_x86_feature_detected!("popcnt") {
-        // SAFETY: the machine has the features, there are n rows, and there is room for n and 16 more.
+    if level() == Level::Avx512 {
+        // SAFETY: the machine has the level, there are n rows, and there is room for n and 16 more.
         unsafe { avx512::compact_rows(block, n, kept) };
         return;
     }
-    scalar(block, n, kept);
+    #[cfg(target_arch = "x86_64")]
+    if let Some(token) = loops().as_avx2() {
+        let done = n / EIGHT * EIGHT;
+        eights(token, block, done, kept);
+        scalar(block, done..n, kept);
+        return;
+    }
+    scalar(block, 0..n, kept);
 }
 
-fn scalar(block: &RowBlock<'_>, n: usize, kept: &mut KeptRows<'_>) {
+/// Rows that vectors of 256 bits hold.
+#[cfg(target_arch = "x86_64")]
+const EIGHT: usize = 8;
+
+#[cfg(target_arch = "x86_64")]
+fearless_simd::kernel! {
+    /// Whole eights of rows.
+    fn eights(token: Avx2, block: &RowBlock<'_>, n: usize, kept: &mut KeptRows<'_>) {
+        let [x, y, z, w] = block.columns;
+        let from = [&x[..n], &y[..n], &z[..n], &w[..n]];
+        let numbers = &block.numbers[..n];
+        let [to_x, to_y, to_z, to_w] = &mut kept.columns;
+        let (to_numbers, to_places) = (&mut *kept.numbers, &mut *kept.places);
+        let mut place = u32x8::from_slice(token, &[0, 1, 2, 3, 4, 5, 6, 7]) + block.first as u32;
+        let mut len = kept.len;
+        for start in (0..n).step_by(EIGHT) {
+            let (own, to) = (start..start + EIGHT, len..len + EIGHT);
+            let passing = f32x8::from_slice(token, &from[3][own.clone()]).simd_gt(0.0);
+            for (from, to_column) in from.iter().zip([&mut *to_x, to_y, to_z, to_w]) {
+                let values = f32x8::from_slice(token, &from[own.clone()]);
+                token.compress_f32x8(values, passing).store_slice(&mut to_column[to.clone()]);
+            }
+            let values = u32x8::from_slice(token, &numbers[own]);
+            token.compress_u32x8(values, passing).store_slice(&mut to_numbers[to.clone()]);
+            token.compress_u32x8(place, passing).store_slice(&mut to_places[to]);
+            place += EIGHT as u32;
+            len += token.to_bitmask_mask32x8(passing).count_ones() as usize;
+        }
+        kept.len = len;
+    }
+}
+
+fn scalar(block: &RowBlock<'_>, rows: Range<usize>, kept: &mut KeptRows<'_>) {
     let [x, y, z, w] = block.columns;
     let [to_x, to_y, to_z, to_w] = &mut kept.columns;
     let mut len = kept.len;
-    for i in 0..n {
+    for i in rows {
         // Written always and kept if it passes: a branch here would be guessed wrong too often.
         (to_x[len], to_y[len], to_z[len], to_w[len]) = (x[i], y[i], z[i], w[i]);
         (kept.numbers[len], kept.places[len]) = (block.numbers[i], (block.first + i) as u32);
@@ -131,8 +178,17 @@ mod tests {
     #[test]
     fn the_machine_keeps_the_same_rows_as_a_loop() {
         for n in (0..70).chain([128, 1000]) {
-            let plainly = |block: &RowBlock<'_>, kept: &mut KeptRows<'_>| scalar(block, block.numbers.len(), kept);
+            let plainly = |block: &RowBlock<'_>, kept: &mut KeptRows<'_>| scalar(block, 0..block.numbers.len(), kept);
             assert_eq!(found(compact_rows, n), found(plainly, n), "{n} rows");
+            #[cfg(target_arch = "x86_64")]
+            if loops().as_avx2().is_some() {
+                let by_eights = |block: &RowBlock<'_>, kept: &mut KeptRows<'_>| {
+                    let (n, token) = (block.numbers.len(), loops().as_avx2().unwrap());
+                    eights(token, block, n / EIGHT * EIGHT, kept);
+                    scalar(block, n / EIGHT * EIGHT..n, kept);
+                };
+                assert_eq!(found(by_eights, n), found(plainly, n), "{n} rows");
+            }
         }
         assert!(found(compact_rows, 1000).1.len() > 300);
     }

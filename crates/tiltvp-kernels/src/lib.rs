@@ -7,6 +7,7 @@ pub mod aligned;
 pub mod bilinear;
 pub mod compaction;
 pub mod gradient;
+pub mod level;
 pub mod normals;
 pub mod prefetch;
 pub mod remap;

@@ -1,6 +1,6 @@
 //! From gradients to unit normals of great circles, by one 3x2 matrix for each pixel.
 
-use multiversion::multiversion;
+use crate::vectorised;
 
 /// Edge pixels that are lifted together: 3.5 KB, which the nearest cache holds. Only time depends on it.
 pub const BLOCK: usize = 128;
@@ -22,10 +22,11 @@ impl Default for Normals {
     }
 }
 
-/// Lifts gradients, at most [`BLOCK`]: weights are zero where `z^2 > limit` of the unit normal.
-#[multiversion(targets("x86_64+avx512f+avx512vl", "x86_64+avx2"))]
-pub fn lift(normals: &mut Normals, gx: &[f32], gy: &[f32], limit: f32, unit: f32) {
-    lift_body(normals, gx, gy, limit, unit);
+vectorised! {
+    /// Lifts gradients, at most [`BLOCK`]: weights are zero where `z^2 > limit` of the unit normal.
+    pub fn lift(normals: &mut Normals, gx: &[f32], gy: &[f32], limit: f32, unit: f32) {
+        lift_body(normals, gx, gy, limit, unit);
+    }
 }
 
 #[inline(always)]

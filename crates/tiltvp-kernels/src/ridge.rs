@@ -1,6 +1,6 @@
 //! Ridges of gradients: the gradients of a row, which of them are greatest across their edge, and where between pixels.
 
-use multiversion::multiversion;
+use crate::vectorised;
 
 /// Pixels that are marked together: spans are padded to whole blocks of this many, a vector of bytes of 256 bits.
 pub const MARKED: usize = 32;
@@ -8,18 +8,19 @@ pub const MARKED: usize = 32;
 /// Pixels whose marks are looked at together: those of a word of 64 bits.
 const MARKS: usize = 8;
 
-/// The 3x3 Scharr derivatives (3, 10, 3) of the middle row and their squared magnitude; rows are one pixel wider on both sides.
-#[multiversion(targets("x86_64+avx512f+avx512vl", "x86_64+avx2"))]
-pub fn scharr(above: &[f32], middle: &[f32], below: &[f32], gx: &mut [f32], gy: &mut [f32], strength: &mut [f32]) {
-    let n = gx.len();
-    let (above, middle, below) = (&above[..n + 2], &middle[..n + 2], &below[..n + 2]);
-    let (gy, strength) = (&mut gy[..n], &mut strength[..n]);
-    for i in 0..n {
-        let x = 3.0 * ((above[i + 2] - above[i]) + (below[i + 2] - below[i])) + 10.0 * (middle[i + 2] - middle[i]);
-        let y = 3.0 * ((below[i] - above[i]) + (below[i + 2] - above[i + 2])) + 10.0 * (below[i + 1] - above[i + 1]);
-        gx[i] = x;
-        gy[i] = y;
-        strength[i] = x * x + y * y;
+vectorised! {
+    /// The 3x3 Scharr derivatives (3, 10, 3) of the middle row and their squared magnitude; rows are one pixel wider on both sides.
+    pub fn scharr(above: &[f32], middle: &[f32], below: &[f32], gx: &mut [f32], gy: &mut [f32], strength: &mut [f32]) {
+        let n = gx.len();
+        let (above, middle, below) = (&above[..n + 2], &middle[..n + 2], &below[..n + 2]);
+        let (gy, strength) = (&mut gy[..n], &mut strength[..n]);
+        for i in 0..n {
+            let x = 3.0 * ((above[i + 2] - above[i]) + (below[i + 2] - below[i])) + 10.0 * (middle[i + 2] - middle[i]);
+            let y = 3.0 * ((below[i] - above[i]) + (below[i + 2] - above[i + 2])) + 10.0 * (below[i + 1] - above[i + 1]);
+            gx[i] = x;
+            gy[i] = y;
+            strength[i] = x * x + y * y;
+        }
     }
 }
 
@@ -38,23 +39,25 @@ pub struct Around<'a> {
     pub below: &'a [f32],
 }
 
-/// Marks with one the pixels whose squared magnitude reaches `least` and is the greatest of three across the edge: in the row
-/// where `|gx| >= |gy|`, in the column elsewhere. The others are marked with zero.
-#[multiversion(targets("x86_64+avx512f+avx512bw+avx512vl", "x86_64+avx2"))]
-pub fn mark(around: &Around<'_>, least: f32, marks: &mut [u8]) {
-    mark_where(around, least, marks, std::iter::repeat(|_, _, _, _| true));
+vectorised! {
+    /// Marks with one the pixels whose squared magnitude reaches `least` and is the greatest of three across the edge: in the row
+    /// where `|gx| >= |gy|`, in the column elsewhere. The others are marked with zero.
+    pub fn mark(around: &Around<'_>, least: f32, marks: &mut [u8]) {
+        mark_where(around, least, marks, std::iter::repeat(|_, _, _, _| true));
+    }
 }
 
-/// The same where also `(q . g)^2 <= limit |g|^2`, with a vector `q` for each pixel.
-#[multiversion(targets("x86_64+avx512f+avx512bw+avx512vl", "x86_64+avx2"))]
-pub fn mark_directed(around: &Around<'_>, least: f32, vectors: &[[i16; 2]], limit: f32, marks: &mut [u8]) {
-    let tests = vectors.as_chunks::<MARKED>().0.iter().map(|vectors| {
-        move |i: usize, x: f32, y: f32, strength: f32| {
-            let across = f32::from(vectors[i][0]) * x + f32::from(vectors[i][1]) * y;
-            across * across <= limit * strength
-        }
-    });
-    mark_where(around, least, marks, tests);
+vectorised! {
+    /// The same where also `(q . g)^2 <= limit |g|^2`, with a vector `q` for each pixel.
+    pub fn mark_directed(around: &Around<'_>, least: f32, vectors: &[[i16; 2]], limit: f32, marks: &mut [u8]) {
+        let tests = vectors.as_chunks::<MARKED>().0.iter().map(|vectors| {
+            move |i: usize, x: f32, y: f32, strength: f32| {
+                let across = f32::from(vectors[i][0]) * x + f32::from(vectors[i][1]) * y;
+                across * across <= limit * strength
+            }
+        });
+        mark_where(around, least, marks, tests);
+    }
 }
 
 /// With a test for each block.
@@ -106,16 +109,17 @@ pub fn each_mark(marks: &[u8], mut with: impl FnMut(usize)) {
     }
 }
 
-/// Where the parabolas through magnitudes at -1, 0 and 1 are highest, in `[-0.5, 0.5]`; from squared ones.
-#[multiversion(targets("x86_64+avx512f+avx512vl", "x86_64+avx2"))]
-pub fn tops(before: &[f32], middle: &[f32], after: &[f32], out: &mut [f32]) {
-    let n = out.len();
-    let (before, middle, after) = (&before[..n], &middle[..n], &after[..n]);
-    for i in 0..n {
-        let (before, after) = (before[i].sqrt(), after[i].sqrt());
-        let bend = 2.0 * middle[i].sqrt() - before - after;
-        let top = (0.5 * (after - before) / bend).clamp(-0.5, 0.5);
-        out[i] = if bend > 0.0 { top } else { 0.0 };
+vectorised! {
+    /// Where the parabolas through magnitudes at -1, 0 and 1 are highest, in `[-0.5, 0.5]`; from squared ones.
+    pub fn tops(before: &[f32], middle: &[f32], after: &[f32], out: &mut [f32]) {
+        let n = out.len();
+        let (before, middle, after) = (&before[..n], &middle[..n], &after[..n]);
+        for i in 0..n {
+            let (before, after) = (before[i].sqrt(), after[i].sqrt());
+            let bend = 2.0 * middle[i].sqrt() - before - after;
+            let top = (0.5 * (after - before) / bend).clamp(-0.5, 0.5);
+            out[i] = if bend > 0.0 { top } else { 0.0 };
+        }
     }
 }
 

@@ -33,7 +33,8 @@ use pyo3::prelude::*;
 ///
 /// `METHODS` are the methods of `TiltEstimator`, `LINE_METHODS` those of `LineExtractor`, `CORNER_METHODS` those of
 /// `CornerDetector`, `CALIBRATION_METHODS` those of `SelfCalibrator`, the default first. `CAMERA_MODELS` are the models of
-/// `Camera`, `ROOM_KINDS` the kinds of `Room`, and `WALL_PATTERNS` what its walls may have in common.
+/// `Camera`, `ROOM_KINDS` the kinds of `Room`, and `WALL_PATTERNS` what its walls may have in common. `SIMD_LEVELS` are what
+/// `simd_level` may say on this machine, the widest last.
 #[pymodule]
 mod _core {
     use pyo3::prelude::*;
@@ -82,8 +83,18 @@ mod _core {
         train_affine, train_factor, train_posterior,
     };
 
+    /// The vectors that this process uses: "fallback", "sse4.2", "avx2", "avx512" or "neon". Answers do not depend on them.
+    ///
+    /// They are the widest of the machine, or those that the environment's `TILTVP_SIMD` names when tiltvp is imported,
+    /// where a word that is none of the machine's raises `InvalidInputError`.
+    #[pyfunction]
+    fn simd_level() -> PyResult<&'static str> {
+        tiltvp_core::simd_level().map_err(|error| crate::call::exception(&error))
+    }
+
     #[pymodule_init]
     fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {
+        simd_level()?;
         module.add("METHODS", tiltvp_core::tilt::METHODS.to_vec())?;
         module.add("CALIBRATION_METHODS", tiltvp_core::selfcalib::CalibrationMethod::NAMES.to_vec())?;
         module.add("CORNER_METHODS", tiltvp_core::corner::CornerMethod::NAMES.to_vec())?;
@@ -94,6 +105,7 @@ mod _core {
         module.add("MOST_LANDMARKS", tiltvp_core::selfcalib::MOST_LANDMARKS)?;
         module.add("CAMERA_MODELS", tiltvp_core::camera::Model::names().collect::<Vec<_>>())?;
         module.add("ROOM_KINDS", tiltvp_synth::RoomKind::NAMES.to_vec())?;
+        module.add("SIMD_LEVELS", tiltvp_core::simd_levels())?;
         module.add("WALL_PATTERNS", tiltvp_synth::WallPattern::NAMES.to_vec())
     }
 }

@@ -4,24 +4,25 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from itertools import repeat
 from pathlib import Path
-from typing import Literal, TypeAlias
+from typing import Annotated, Literal, TypeAlias
 
-from cyclopts import Group, Parameter
+from cyclopts import Group, Parameter, validators
 
 from tiltvp.cli.filtering import FilterOptions
-from tiltvp.cli.frames import open_frames
-from tiltvp.cli.inputs import distinct_names, find_images
 from tiltvp.cli.level_images import Levelling, Looks, write_images
 from tiltvp.cli.level_videos import write_video
-from tiltvp.cli.options import CameraOptions, MethodOptions, Switch, image_size_from
-from tiltvp.cli.terminal import complain, say
+from tiltvp.cli.options import CameraOptions, MethodOptions, Switch, image_size_from, rotation_of
+from tiltvp.cli.sources import MotionOptions, SourceOptions
+from tiltvp.cli.terminal import say
 from tiltvp.errors import InvalidInputError
 from tiltvp.files import check_output, check_output_folder
-from tiltvp.videos import VIDEO_ENDINGS
 
 _OUTPUT = Group("What is shown")
 _METHOD_DEFAULTS, _FILTER_DEFAULTS = MethodOptions(), FilterOptions()
+_SOURCE, _MOTION = SourceOptions(), MotionOptions()
+_VIDEOS = (".mp4", ".avi")
 To: TypeAlias = Literal["same", "fisheye", "pinhole", "panorama"]
 
 
@@ -41,10 +42,8 @@ class OutputOptions:
 
     def keywords(self) -> dict[str, object]:
         """Those of `tiltvp.Leveller`."""
-        from tiltvp.rotations import read_rotation
-
         angle = None if self.field_of_view_deg is None else math.radians(self.field_of_view_deg)
-        looks = None if self.robot_from_output is None else read_rotation(self.robot_from_output)
+        looks = None if self.robot_from_output is None else rotation_of(self.robot_from_output)
         size = image_size_from(self.size, "--size")
         return {"to": self.to, "size": size, "field_of_view_rad": angle, "robot_from_output": looks}
 
@@ -53,14 +52,17 @@ _OUTPUT_DEFAULTS = OutputOptions()
 
 
 def level(
-    sources: list[str],
+    images: list[str] | None = None,
     /,
     *,
     out: Path,
+    source: SourceOptions = _SOURCE,
     camera: CameraOptions | None = None,
     output: OutputOptions = _OUTPUT_DEFAULTS,
     method: MethodOptions = _METHOD_DEFAULTS,
     filtering: FilterOptions = _FILTER_DEFAULTS,
+    motion: MotionOptions = _MOTION,
+    wheel_base: Annotated[float | None, Parameter(validator=validators.Number(gt=0))] = None,
     metadata_only: Switch = False,
     copy_unlevelled: Switch = False,
 ) -> int:
@@ -73,44 +75,42 @@ def level(
 
     Parameters
     ----------
-    sources
-        Image files, folders of images, glob patterns, and videos.
+    images
+        Image files, folders of images and glob patterns; or one video or recording of ROS.
     out
-        Folder for level images, or a video (.mp4 or .avi) of the one source's frames in their order.
+        Folder for level images, or a video (.mp4 or .avi) of the frames in their order. Of a video, a recording or a
+        live camera a folder gets a video.
+    wheel_base
+        Distance between the wheels, metres, for odometry of wheels.
     metadata_only
         Of 360-degree JPEG photographs: write pitch and roll as GPano metadata, and leave the pixels' bytes untouched.
     copy_unlevelled
         Write images whose tilt is not believed as they are, instead of leaving them out; video frames too.
     """
+    from tiltvp.streams import Motion
+    from tiltvp.streams.image_files import ImageFiles
+
     filtering.check()
+    if camera is not None:
+        method = camera.complete(method)
     looks = Looks(None if camera is None else camera.load(), method, output.keywords(), metadata_only)
     work = Levelling(looks, filtering, copy_unlevelled)
-    videos = [word for word in sources if _is_video(word)]
-    if _is_video(str(out)):
-        _check_video(sources, metadata_only)
-        check_output(out)
-        levelled, of = write_video(open_frames(sources[0]), out, work)
+    as_video = out.suffix.lower() in _VIDEOS and not out.is_dir()
+    check_output(out) if as_video else check_output_folder(out)
+    frames = source.open(images or [])
+    of_files = isinstance(frames, ImageFiles)
+    if metadata_only and (as_video or not of_files):
+        raise InvalidInputError("--metadata-only with a video, expected photographs")
+    fused = filtering.filter or as_video or not of_files
+    if not fused:
+        motion.refuse("--filter", wheel_base)
+    moved = motion.motions(frames, wheel_base) if fused else None
+    motions = repeat(Motion()) if moved is None else moved.motions
+    if isinstance(frames, ImageFiles) and not as_video:
+        levelled, of = write_images(frames, motions, out, work)
     else:
-        check_output_folder(out)
-        files, problems = find_images([word for word in sources if word not in videos])
-        for problem in problems:
-            complain(problem)
-        levelled, of = write_images(files, distinct_names(files), out, work)
-        of += len(problems)
-        for word in videos:
-            _check_video([word], metadata_only)
-            more, frames = write_video(open_frames(word), out / f"{Path(word).stem}.mp4", work)
-            levelled, of = levelled + more, of + frames
+        path = out if as_video else out / f"{Path(frames.source).stem}.mp4"
+        levelled, of = write_video(frames, motions, path, work)
+    of += len(frames.problems)
     say(f"{levelled} of {of} made level" + ("" if not metadata_only else ", by their metadata alone"))
     return 0 if levelled == of else 1
-
-
-def _is_video(word: str) -> bool:
-    return Path(word).suffix.lower() in VIDEO_ENDINGS and not Path(word).is_dir()
-
-
-def _check_video(sources: list[str], metadata_only: bool) -> None:
-    if len(sources) != 1:
-        raise InvalidInputError(f"--out is a video, and there are {len(sources)} sources, expected one")
-    if metadata_only:
-        raise InvalidInputError("--metadata-only with a video, expected photographs")

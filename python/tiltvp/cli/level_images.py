@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, Final
 from tiltvp.cli.filtering import FilterOptions
 from tiltvp.cli.options import MethodOptions
 from tiltvp.cli.results import Outcome
+from tiltvp.cli.sources import picture_names
 from tiltvp.cli.terminal import named, progress_bar
 from tiltvp.errors import ImageFileError, InvalidInputError, OutputError, TiltvpError
 
@@ -19,6 +20,8 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from tiltvp import Camera, FilteredTilt, Leveller, TiltEstimate, TiltEstimator
+    from tiltvp.streams import Frame, Motion
+    from tiltvp.streams.image_files import ImageFiles
 
 BELIEVED_MIN: Final = 0.5
 """Least confidence of an image that is made level where no other is asked for: a tilt that is rather right than not."""
@@ -132,51 +135,47 @@ class Levelling:
         return f"its tilt is not believed, confidence {estimate.confidence:.2f}"
 
 
-def write_images(files: Sequence[Path], names: Sequence[str], folder: Path, work: Levelling) -> tuple[int, int]:
+def write_images(
+    frames: ImageFiles, motions: Iterable[Motion | None], folder: Path, work: Levelling
+) -> tuple[int, int]:
     """Writes level images into a folder, JPEG as JPEG, others as PNG; how many of how many were made level."""
-    motions = work.filtering.motions(files)
-    # Outcomes are judged one by one, in the order of the files: this is the image of the one at hand, and its file.
-    held: list[tuple[NDArray[np.uint8], bytes]] = []
-    levelled = 0
-    with progress_bar(len(files), "images") as bar:
-        outcomes = work.filtering.judged(_outcomes(files, work, held), motions)
-        for outcome, name in zip(outcomes, names, strict=True):
-            if outcome.error is not None:
-                bar.complain(named(outcome.file, outcome.error))
+    judge, levelled = work.filtering.judge(), 0
+    with progress_bar(len(frames.files), "images") as bar:
+        for frame, name, motion in zip(frames, picture_names(frames), motions, strict=False):
+            problem = _level(frame, folder / name, work, lambda outcome, motion=motion: judge(outcome, motion))
+            if problem is None:
+                levelled += 1
             else:
-                problem = _write(outcome, *held[0], folder / f"{name}{_ending(outcome.file)}", work)
-                if problem is None:
-                    levelled += 1
-                else:
-                    bar.complain(named(outcome.file, problem))
+                bar.complain(named(Path(frame.name), problem))
             bar.advance()
-    return levelled, len(files)
+    return levelled, len(frames.files)
+
+
+def _level(frame: Frame, path: Path, work: Levelling, judge: Callable[[Outcome], Outcome]) -> str | None:
+    """Makes one image level, and says what is wrong. Raises `OutputError`, which all images would have."""
+    file = Path(frame.name)
+    try:
+        image, data = _read(frame, work)
+        estimate = work.look(image).estimate(image)
+    except TiltvpError as error:
+        told = " ".join(str(error).split())
+        judge(Outcome(file, error=told, taken_s=frame.time_s))
+        return told
+    outcome = judge(Outcome(file, estimate, taken_s=frame.time_s))
+    return _write(outcome, image, data, path.with_name(f"{path.name}{_ending(file)}"), work)
 
 
 def _ending(file: Path) -> str:
     return file.suffix if file.suffix.lower() in _JPEG else ".png"
 
 
-def _outcomes(files: Sequence[Path], work: Levelling, held: list[tuple[NDArray[np.uint8], bytes]]) -> Iterator[Outcome]:
-    for file in files:
-        held.clear()
-        try:
-            image, data = _read(file, work)
-            estimate = work.look(image).estimate(image)
-        except TiltvpError as error:
-            yield Outcome(file, error=" ".join(str(error).split()))
-            continue
-        held.append((image, data))
-        yield Outcome(file, estimate)
-
-
-def _read(file: Path, work: Levelling) -> tuple[NDArray[np.uint8], bytes]:
+def _read(frame: Frame, work: Levelling) -> tuple[NDArray[np.uint8], bytes]:
     """An image and its file's bytes. Raises `ImageFileError` for what is no panorama where one is expected."""
     from tiltvp.files import read_bytes
-    from tiltvp.images import LARGEST_IMAGE_BYTES, read_image
+    from tiltvp.images import LARGEST_IMAGE_BYTES
     from tiltvp.photos import is_jpeg, panorama_kind
 
-    image = read_image(file)
+    file, image = Path(frame.name), frame.read()
     try:
         data = read_bytes(file, LARGEST_IMAGE_BYTES)
     except OSError as error:

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from tiltvp.cli.results import Outcome
+from tiltvp.cli.sources import ending_at_interrupt
 from tiltvp.cli.terminal import progress_bar
 from tiltvp.errors import TiltvpError
 
@@ -15,11 +16,13 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from tiltvp.cli.frames import Frames
     from tiltvp.cli.level_images import Levelling
+    from tiltvp.streams import Frame, Frames, Motion
 
 
-def write_video(frames: Frames, path: Path, work: Levelling) -> tuple[int, int]:
+def write_video(
+    frames: Frames, motions: Iterable[Motion | None], path: Path, work: Levelling
+) -> tuple[int, int]:
     """Writes a level video, whole or not at all, always by the filter; how many of how many frames are level.
 
     Frames for which it has no tilt are black, so that time goes on, or as they are where that is asked for.
@@ -27,14 +30,17 @@ def write_video(frames: Frames, path: Path, work: Levelling) -> tuple[int, int]:
     from tiltvp.videos import video_writer
 
     work = replace(work, filtering=replace(work.filtering, filter=True))
-    # Outcomes are judged one by one, in the order of the frames: this is the frame of the one at hand.
-    held: list[NDArray[np.uint8] | None] = [None]
-    levelled, shape = 0, None
-    motions = work.filtering.motions(frames.files)
-    with progress_bar(len(frames.files), "frames") as bar, video_writer(path, frames.rate_hz) as video:
-        for outcome in work.filtering.judged(_outcomes(frames, work, held), motions):
-            image, tilt = held[0], work.believed(outcome)
-            shown = None
+    judge, levelled, count, shape = work.filtering.judge(), 0, 0, None
+    with (
+        progress_bar(frames.count or 0, "frames") as bar,
+        video_writer(path, frames.rate_hz) as video,
+        ending_at_interrupt(frames) as coming,
+    ):
+        for frame, motion in zip(coming, motions, strict=False):
+            count += 1
+            image, outcome = _looked_at(frame, work)
+            outcome = judge(outcome, motion)
+            tilt, shown = work.believed(outcome), None
             if image is not None:
                 leveller = work.look(image).leveller
                 shape = (leveller.output.height, leveller.output.width, 3)
@@ -49,21 +55,17 @@ def write_video(frames: Frames, path: Path, work: Levelling) -> tuple[int, int]:
             if shape is not None:
                 video.add(_black(shape) if shown is None else shown)
             bar.advance()
-    return levelled, len(frames.files)
+    return levelled, count
 
 
-def _outcomes(frames: Frames, work: Levelling, held: list[NDArray[np.uint8] | None]) -> Iterator[Outcome]:
-    for file, image in zip(frames.files, frames, strict=True):
-        held[0] = None
-        try:
-            if isinstance(image, TiltvpError):
-                raise image
-            estimate = work.look(image).estimate(image)
-        except TiltvpError as error:
-            yield Outcome(file, error=" ".join(str(error).split()))
-            continue
-        held[0] = image
-        yield Outcome(file, estimate)
+def _looked_at(frame: Frame, work: Levelling) -> tuple[NDArray[np.uint8] | None, Outcome]:
+    """A frame's image, None where it cannot be used, and what its edges tell."""
+    file = Path(frame.name)
+    try:
+        image = frame.read()
+        return image, Outcome(file, work.look(image).estimate(image), taken_s=frame.time_s)
+    except TiltvpError as error:
+        return None, Outcome(file, error=" ".join(str(error).split()), taken_s=frame.time_s)
 
 
 def _bgr(image: NDArray[np.uint8]) -> NDArray[np.uint8]:

@@ -1,5 +1,7 @@
 //! Chains: ridge pixels that follow one another along their edge.
 
+use tiltvp_kernels::vectorised;
+
 use crate::edges::{Region, RidgePixels};
 
 /// The eight neighbours, by turns of 45 degrees from `u` towards `v`.
@@ -185,11 +187,12 @@ fn step_towards([x, y]: [f32; 2]) -> usize {
     }
 }
 
-/// Unit vectors along gradients.
-#[multiversion::multiversion(targets("x86_64+avx512f+avx512vl", "x86_64+avx2"))]
-fn directions(gx: &[f32], gy: &[f32], out: &mut [[f32; 2]]) {
-    for ((x, y), out) in gx.iter().zip(gy).zip(out) {
-        let length = (f64::from(*x) * f64::from(*x) + f64::from(*y) * f64::from(*y)).sqrt() as f32;
-        *out = [x / length, y / length];
+vectorised! {
+    /// Unit vectors along gradients.
+    fn directions(gx: &[f32], gy: &[f32], out: &mut [[f32; 2]]) {
+        for ((x, y), out) in gx.iter().zip(gy).zip(out) {
+            let length = (f64::from(*x) * f64::from(*x) + f64::from(*y) * f64::from(*y)).sqrt() as f32;
+            *out = [x / length, y / length];
+        }
     }
 }

@@ -10,15 +10,11 @@ use std::arch::x86_64::{
 };
 
 use super::block::REACH;
+use crate::level::{Level, level};
 
-/// Whether this machine has them, and compacts 8- and 16-bit numbers.
+/// Whether the level has them, and the machine compacts 8- and 16-bit numbers. (Every machine of 512 bits has BMI2.)
 pub(super) fn is_available() -> bool {
-    is_x86_feature_detected!("avx512f")
-        && is_x86_feature_detected!("avx512bw")
-        && is_x86_feature_detected!("avx512vl")
-        && is_x86_feature_detected!("avx512vbmi2")
-        && is_x86_feature_detected!("bmi2")
-        && is_x86_feature_detected!("popcnt")
+    level() == Level::Avx512 && is_x86_feature_detected!("avx512vbmi2")
 }
 
 /// Gradients of a block, 32 along `u` in each of two vectors and as many along `v`.

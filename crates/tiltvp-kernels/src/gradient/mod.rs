@@ -1,18 +1,22 @@
 //! Scharr gradients in 16-bit integers, their threshold and their compaction, in one pass over blocks of pixels.
 
 #[cfg(target_arch = "x86_64")]
+mod avx2;
+#[cfg(target_arch = "x86_64")]
 mod avx512;
 #[cfg(target_arch = "x86_64")]
 mod avx512_scharr;
 mod block;
 mod portable;
 
-use multiversion::multiversion;
+use crate::vectorised;
 
 #[cfg(target_arch = "x86_64")]
 use avx512::Pending;
 #[cfg(target_arch = "x86_64")]
 use avx512_scharr::VectorLevel;
+#[cfg(target_arch = "x86_64")]
+use fearless_simd::Avx2;
 pub use block::{BLOCK, Directions, KeptPixels, Level, Levels, PixelBlock, REACH, Threshold, place};
 
 /// Stands where there are no kernels but the portable one.
@@ -27,21 +31,36 @@ pub trait GradientLevel: Level + VectorLevel {
     /// The portable kernel for such levels.
     #[doc(hidden)]
     fn portable(levels: &Levels<'_, Self>, blocks: &[PixelBlock], threshold: &Threshold<'_>, kept: &mut KeptPixels<'_>);
+
+    /// The kernel of 256 bits for such levels.
+    #[cfg(target_arch = "x86_64")]
+    #[doc(hidden)]
+    const AVX2: Kernel256<Self>;
 }
+
+/// A kernel of 256 bits.
+#[cfg(target_arch = "x86_64")]
+type Kernel256<L> = fn(Avx2, &Levels<'_, L>, &[PixelBlock], &Threshold<'_>, &mut KeptPixels<'_>);
 
 impl GradientLevel for u8 {
     fn portable(levels: &Levels<'_, u8>, blocks: &[PixelBlock], threshold: &Threshold<'_>, kept: &mut KeptPixels<'_>) {
         portable::bytes(levels, blocks, threshold, kept);
     }
+
+    #[cfg(target_arch = "x86_64")]
+    const AVX2: Kernel256<Self> = avx2::bytes;
 }
 
 impl GradientLevel for i16 {
     fn portable(levels: &Levels<'_, i16>, blocks: &[PixelBlock], threshold: &Threshold<'_>, kept: &mut KeptPixels<'_>) {
         portable::words(levels, blocks, threshold, kept);
     }
+
+    #[cfg(target_arch = "x86_64")]
+    const AVX2: Kernel256<Self> = avx2::words;
 }
 
-/// The kernel with the widest vectors of this machine.
+/// The kernel with the widest vectors of the level.
 #[derive(Debug, Clone)]
 pub struct GradientKernel(Machine);
 
@@ -50,6 +69,9 @@ enum Machine {
     /// Vectors of 512 bits, and blocks that are not compacted yet.
     #[cfg(target_arch = "x86_64")]
     Avx512(Box<Pending>),
+    /// Vectors of 256 bits.
+    #[cfg(target_arch = "x86_64")]
+    Avx2(Avx2),
     /// What the compiler makes of loops.
     Portable,
 }
@@ -60,17 +82,30 @@ impl Default for GradientKernel {
         if avx512_scharr::is_available() {
             return Self(Machine::Avx512(Box::default()));
         }
+        #[cfg(target_arch = "x86_64")]
+        if let Some(token) = crate::level::loops().as_avx2() {
+            return Self(Machine::Avx2(token));
+        }
         Self(Machine::Portable)
     }
 }
 
 impl GradientKernel {
+    /// Every kernel that this machine can run at this level.
+    #[cfg(test)]
+    fn all() -> Vec<Self> {
+        let mut all = vec![Self::default(), Self(Machine::Portable)];
+        #[cfg(target_arch = "x86_64")]
+        all.extend(crate::level::loops().as_avx2().map(|token| Self(Machine::Avx2(token))));
+        all
+    }
+
     /// The mask of a block whose pixels are these bits, in the order in which the kernel has its pixels.
     pub fn mask<L: GradientLevel>(&self, pixels: u64) -> u64 {
         match self.0 {
             #[cfg(target_arch = "x86_64")]
             Machine::Avx512(_) => L::own(pixels),
-            Machine::Portable => pixels,
+            _ => pixels,
         }
     }
 
@@ -85,6 +120,8 @@ impl GradientKernel {
         match &mut self.0 {
             #[cfg(target_arch = "x86_64")]
             Machine::Avx512(pending) => avx512::threshold_blocks(levels, blocks, threshold, pending, kept),
+            #[cfg(target_arch = "x86_64")]
+            Machine::Avx2(token) => L::AVX2(*token, levels, blocks, threshold, kept),
             Machine::Portable => L::portable(levels, blocks, threshold, kept),
         }
     }
@@ -94,30 +131,21 @@ impl GradientKernel {
         match &mut self.0 {
             #[cfg(target_arch = "x86_64")]
             Machine::Avx512(pending) => avx512::flush::<L>(pending, kept),
-            Machine::Portable => {
+            _ => {
                 let _ = kept;
             }
         }
     }
 }
 
-/// Divides gradients by the parts of their unit.
-#[multiversion(targets("x86_64+avx512f+avx512bw+avx512vl", "x86_64+avx2"))]
-pub fn widen_gradients(gradients: &[i16], unit: f32, out: &mut [f32]) {
-    for (g, out) in gradients.iter().zip(out) {
-        *out = f32::from(*g) * unit;
+vectorised! {
+    /// Divides gradients by the parts of their unit.
+    pub fn widen_gradients(gradients: &[i16], unit: f32, out: &mut [f32]) {
+        for (g, out) in gradients.iter().zip(out) {
+            *out = f32::from(*g) * unit;
+        }
     }
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn widened_gradients_are_those_of_a_loop() {
-        let gradients: Vec<i16> = (0..1000).map(|i| (i * 97 - 32_000) as i16).collect();
-        let mut out = vec![f32::NAN; 1000];
-        widen_gradients(&gradients, 0.125, &mut out);
-        assert!(gradients.iter().zip(&out).all(|(g, out)| *out == f32::from(*g) * 0.125));
-    }
-}
+mod tests;

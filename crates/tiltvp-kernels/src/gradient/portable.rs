@@ -1,28 +1,39 @@
-//! The kernel in loops that the compiler makes vectors of: the scalar twin, for every machine.
+//! The kernel in loops that the compiler makes vectors of, for every machine.
 
-use multiversion::multiversion;
+use crate::vectorised;
 
 use super::block::{BLOCK, Directions, KeptPixels, Level, Levels, PixelBlock, REACH, Threshold};
 
-macro_rules! portable {
-    ($name:ident, $level:ty) => {
-        #[multiversion(targets("x86_64+avx2+bmi1+bmi2", "x86_64+sse4.1"))]
-        pub(super) fn $name(
-            levels: &Levels<'_, $level>,
-            blocks: &[PixelBlock],
-            threshold: &Threshold<'_>,
-            kept: &mut KeptPixels<'_>,
-        ) {
-            body(levels, blocks, threshold, kept);
-        }
-    };
+vectorised! {
+    pub(super) fn bytes(
+        levels: &Levels<'_, u8>,
+        blocks: &[PixelBlock],
+        threshold: &Threshold<'_>,
+        kept: &mut KeptPixels<'_>,
+    ) {
+        threshold_blocks(levels, blocks, threshold, kept);
+    }
 }
 
-portable!(bytes, u8);
-portable!(words, i16);
+vectorised! {
+    pub(super) fn words(
+        levels: &Levels<'_, i16>,
+        blocks: &[PixelBlock],
+        threshold: &Threshold<'_>,
+        kept: &mut KeptPixels<'_>,
+    ) {
+        threshold_blocks(levels, blocks, threshold, kept);
+    }
+}
 
+/// The scalar twin of every kernel.
 #[inline(always)]
-fn body<L: Level>(levels: &Levels<'_, L>, blocks: &[PixelBlock], threshold: &Threshold<'_>, kept: &mut KeptPixels<'_>) {
+pub(super) fn threshold_blocks<L: Level>(
+    levels: &Levels<'_, L>,
+    blocks: &[PixelBlock],
+    threshold: &Threshold<'_>,
+    kept: &mut KeptPixels<'_>,
+) {
     let mut all = Gradients::default();
     let mut rest = [[L::default(); REACH]; 3];
     for block in blocks {

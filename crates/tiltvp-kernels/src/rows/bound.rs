@@ -1,6 +1,6 @@
 //! The upper bound of the consensus of a model, without a look at every row: tables of the rows by direction and place.
 
-use multiversion::multiversion;
+use crate::vectorised;
 
 use super::real::Real;
 
@@ -166,18 +166,20 @@ fn copy<T: Real>(columns: [&[T]; 3], start: usize, to: &mut [[f32; BLOCK]; 3]) -
     end - start
 }
 
-/// The largest end of an interval, infinite or none if there is a row without a direction.
-#[multiversion(targets("x86_64+avx512f+avx512vl", "x86_64+avx2"))]
-fn furthest([x, y, z]: &[&[f32]; 3], threshold: f32) -> f32 {
-    let mut most = [0.0f32; 16];
-    let whole = x.as_chunks::<16>().0.iter().zip(y.as_chunks::<16>().0).zip(z.as_chunks::<16>().0);
-    for ((x, y), z) in whole {
-        for i in 0..16 {
-            let end = (z[i].abs() + threshold) / (x[i] * x[i] + y[i] * y[i]).sqrt();
-            most[i] = if end > most[i] { end } else { most[i] };
+vectorised! {
+    /// The largest end of an interval, infinite or none if there is a row without a direction.
+    fn furthest(rows: &[&[f32]; 3], threshold: f32) -> f32 {
+        let [x, y, z] = rows;
+        let mut most = [0.0f32; 16];
+        let whole = x.as_chunks::<16>().0.iter().zip(y.as_chunks::<16>().0).zip(z.as_chunks::<16>().0);
+        for ((x, y), z) in whole {
+            for i in 0..16 {
+                let end = (z[i].abs() + threshold) / (x[i] * x[i] + y[i] * y[i]).sqrt();
+                most[i] = if end > most[i] { end } else { most[i] };
+            }
         }
+        most.iter().fold(0.0, |most, end| if *end > most { *end } else { most })
     }
-    most.iter().fold(0.0, |most, end| if *end > most { *end } else { most })
 }
 
 /// The place of a point, with everything beyond the first and the last taken for those; what is no number is at the first.
@@ -188,50 +190,54 @@ fn place_of(point: f32, (first, per_unit): (f32, f32)) -> f32 {
     if place < (PLACES - 1) as f32 { place } else { (PLACES - 1) as f32 }
 }
 
-/// For each row, in which cell its interval begins and in which it ends; beyond the tables for rows without a direction.
-#[multiversion(targets("x86_64+avx512f+avx512vl", "x86_64+avx2"))]
-fn place_all(
-    [x, y, z]: &[&[f32]; 3],
-    threshold: f32,
-    scale: (f32, f32),
-    begin: &mut [u32; BLOCK],
-    past: &mut [u32; BLOCK],
-) {
-    let n = x.len().min(BLOCK);
-    let (x, y, z, begin, past) = (&x[..n], &y[..n], &z[..n], &mut begin[..n], &mut past[..n]);
-    for i in 0..n {
-        // Both signs of a row are the same.
-        let sign = if y[i] < 0.0 { -1.0 } else { 1.0 };
-        let (x, y, z) = (sign * x[i], sign * y[i], sign * z[i]);
-        let inverse = 1.0 / (x * x + y * y).sqrt();
-        let direction = (1.0 - x / (x.abs() + y)) * (0.5 * DIRECTIONS as f32);
-        let (middle, half) = (z * inverse, threshold * inverse);
-        let half = half + ROUNDED * (middle.abs() + half);
-        let (from, to) = (place_of(middle - half, scale), place_of(middle + half, scale));
-        let last = (DIRECTIONS - 1) as f32;
-        let direction = if direction < last { direction } else { last };
-        let row = (direction as i32 as u32) * PLACES as u32;
-        let known = inverse < 1e18;
-        begin[i] = if known { row + from as i32 as u32 } else { u32::MAX };
-        past[i] = if known { row + to as i32 as u32 } else { u32::MAX };
+vectorised! {
+    /// For each row, in which cell its interval begins and in which it ends; beyond the tables for rows without a direction.
+    fn place_all(
+        rows: &[&[f32]; 3],
+        threshold: f32,
+        scale: (f32, f32),
+        begin: &mut [u32; BLOCK],
+        past: &mut [u32; BLOCK],
+    ) {
+        let [x, y, z] = rows;
+        let n = x.len().min(BLOCK);
+        let (x, y, z, begin, past) = (&x[..n], &y[..n], &z[..n], &mut begin[..n], &mut past[..n]);
+        for i in 0..n {
+            // Both signs of a row are the same.
+            let sign = if y[i] < 0.0 { -1.0 } else { 1.0 };
+            let (x, y, z) = (sign * x[i], sign * y[i], sign * z[i]);
+            let inverse = 1.0 / (x * x + y * y).sqrt();
+            let direction = (1.0 - x / (x.abs() + y)) * (0.5 * DIRECTIONS as f32);
+            let (middle, half) = (z * inverse, threshold * inverse);
+            let half = half + ROUNDED * (middle.abs() + half);
+            let (from, to) = (place_of(middle - half, scale), place_of(middle + half, scale));
+            let last = (DIRECTIONS - 1) as f32;
+            let direction = if direction < last { direction } else { last };
+            let row = (direction as i32 as u32) * PLACES as u32;
+            let known = inverse < 1e18;
+            begin[i] = if known { row + from as i32 as u32 } else { u32::MAX };
+            past[i] = if known { row + to as i32 as u32 } else { u32::MAX };
+        }
     }
 }
 
-/// The first and the last place that the point of a model has within each part.
-#[multiversion(targets("x86_64+avx512f+avx512vl", "x86_64+avx2"))]
-fn reached(parts: &Parts, [a, b]: [f32; 2], scale: (f32, f32), [lowest, highest]: &mut [[u16; DIRECTIONS]; 2]) {
-    let size = a.abs() + b.abs();
-    for i in 0..DIRECTIONS {
-        let (cos, sin, half) = (parts.cos[i], parts.sin[i], parts.half[i]);
-        let point = -(a * cos + b * sin);
-        // The slope in the middle, and the most that it can change by.
-        let away = half * (a * sin - b * cos).abs() + (0.5 * half * half + ROUNDED) * size;
-        let place = (point + away - scale.0) * scale.1;
-        let last = (PLACES - 1) as f32;
-        // What is no number, of a model beyond all bounds, is at the last.
-        let place = if place < last { place } else { last };
-        highest[i] = if place > 0.0 { place as i32 as u16 } else { 0 };
-        lowest[i] = place_of(point - away, scale) as i32 as u16;
+vectorised! {
+    /// The first and the last place that the point of a model has within each part.
+    fn reached(parts: &Parts, [a, b]: [f32; 2], scale: (f32, f32), out: &mut [[u16; DIRECTIONS]; 2]) {
+        let [lowest, highest] = out;
+        let size = a.abs() + b.abs();
+        for i in 0..DIRECTIONS {
+            let (cos, sin, half) = (parts.cos[i], parts.sin[i], parts.half[i]);
+            let point = -(a * cos + b * sin);
+            // The slope in the middle, and the most that it can change by.
+            let away = half * (a * sin - b * cos).abs() + (0.5 * half * half + ROUNDED) * size;
+            let place = (point + away - scale.0) * scale.1;
+            let last = (PLACES - 1) as f32;
+            // What is no number, of a model beyond all bounds, is at the last.
+            let place = if place < last { place } else { last };
+            highest[i] = if place > 0.0 { place as i32 as u16 } else { 0 };
+            lowest[i] = place_of(point - away, scale) as i32 as u16;
+        }
     }
 }
 

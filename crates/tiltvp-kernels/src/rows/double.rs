@@ -1,6 +1,6 @@
 //! Rows in double precision: counting, and sums of gated products in loops that the compiler makes vectors of.
 
-use multiversion::multiversion;
+use crate::vectorised;
 
 use super::simd::WIDTH;
 use super::{Gate, HARD, OPEN, REJECTED, SOFT, Sums, WITHIN};
@@ -8,25 +8,27 @@ use super::{Gate, HARD, OPEN, REJECTED, SOFT, Sums, WITHIN};
 /// Rows that are added up together: five columns of as many are 20 KB, which the nearest cache holds.
 pub(super) const BLOCK: usize = 512;
 
-/// Counts rows with `|d| <= reach`.
-#[multiversion(targets("x86_64+avx512f+avx512vl", "x86_64+avx2"))]
-pub(super) fn count([x, y, z]: [&[f64]; 3], [h0, h1, h2]: [f64; 3], reach: f64) -> usize {
-    let within = |((x, y), z): ((&f64, &f64), &f64)| {
-        let d = x * h0 + y * h1 + z * h2;
-        u32::from(d.abs() <= reach)
-    };
-    x.iter().zip(y).zip(z).map(within).sum::<u32>() as usize
+vectorised! {
+    /// Counts rows with `|d| <= reach`.
+    pub(super) fn count([x, y, z]: [&[f64]; 3], [h0, h1, h2]: [f64; 3], reach: f64) -> usize {
+        let within = |((x, y), z): ((&f64, &f64), &f64)| {
+            let d = x * h0 + y * h1 + z * h2;
+            u32::from(d.abs() <= reach)
+        };
+        x.iter().zip(y).zip(z).map(within).sum::<u32>() as usize
+    }
 }
 
-/// Adds a block of rows to the sums and applies the gate to their weights.
-#[multiversion(targets("x86_64+avx512f+avx512vl", "x86_64+avx2"))]
-pub(super) fn accumulate(rows: [&[f64]; 3], weights: &mut [f32], model: [f64; 3], gate: Gate<f64>, sums: &mut Sums) {
-    match gate {
-        Gate::Open => accumulate_body::<OPEN>(rows, weights, model, 0.0, sums),
-        Gate::Hard { reach } => accumulate_body::<HARD>(rows, weights, model, reach, sums),
-        Gate::Rejected { reach } => accumulate_body::<REJECTED>(rows, weights, model, reach, sums),
-        Gate::Within { reach } => accumulate_body::<WITHIN>(rows, weights, model, reach, sums),
-        Gate::Soft { inverse } => accumulate_body::<SOFT>(rows, weights, model, inverse, sums),
+vectorised! {
+    /// Adds a block of rows to the sums and applies the gate to their weights.
+    pub(super) fn accumulate(rows: [&[f64]; 3], weights: &mut [f32], model: [f64; 3], gate: Gate<f64>, sums: &mut Sums) {
+        match gate {
+            Gate::Open => accumulate_body::<OPEN>(rows, weights, model, 0.0, sums),
+            Gate::Hard { reach } => accumulate_body::<HARD>(rows, weights, model, reach, sums),
+            Gate::Rejected { reach } => accumulate_body::<REJECTED>(rows, weights, model, reach, sums),
+            Gate::Within { reach } => accumulate_body::<WITHIN>(rows, weights, model, reach, sums),
+            Gate::Soft { inverse } => accumulate_body::<SOFT>(rows, weights, model, inverse, sums),
+        }
     }
 }
 

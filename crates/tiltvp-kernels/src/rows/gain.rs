@@ -1,6 +1,6 @@
 //! The truncated quadratic of residuals: `max(0, 1 - d^2 / threshold^2)`, added up.
 
-use multiversion::multiversion;
+use crate::vectorised;
 
 use super::double::BLOCK;
 use super::simd::WIDTH;
@@ -8,9 +8,10 @@ use super::simd::WIDTH;
 /// The gain of each row of a block, then their sum, in [`WIDTH`] partial sums. `gain` has the residual and the inverse threshold.
 macro_rules! sum_of_gains {
     ($name:ident, $body:ident, $float:ty) => {
-        #[multiversion(targets("x86_64+avx512f+avx512vl", "x86_64+avx2"))]
-        pub(super) fn $name(rows: [&[$float]; 3], model: [$float; 3], inverse: $float) -> f64 {
-            $body(rows, model, inverse)
+        vectorised! {
+            pub(super) fn $name(rows: [&[$float]; 3], model: [$float; 3], inverse: $float) -> f64 {
+                $body(rows, model, inverse)
+            }
         }
 
         #[inline(always)]

@@ -251,7 +251,7 @@ mod tests {
         let scalar = with(&|terms, slopes| unsafe { terms_of::scalar(rows, &column, model, 3.0, terms, slopes) });
         assert_eq!(with(&|terms, slopes| terms_of(rows, &column, model, 3.0, terms, slopes)), scalar);
         #[cfg(target_arch = "x86_64")]
-        if is_x86_feature_detected!("avx2") && is_x86_feature_detected!("popcnt") {
+        if crate::level::Level::available().any(|level| level == crate::level::Level::Avx2) {
             // SAFETY: the machine has them.
             let avx2 = with(&|terms, slopes| unsafe { terms_of::avx2(rows, &column, model, 3.0, terms, slopes) });
             assert_eq!(avx2, scalar);

@@ -163,15 +163,12 @@ macro_rules! kernel {
         $(#[$doc])*
         pub(super) fn $name($($argument: $type),*) $(-> $out)? {
             #[cfg(target_arch = "x86_64")]
-            {
-                if is_x86_feature_detected!("avx512f") && is_x86_feature_detected!("popcnt") {
-                    // SAFETY: the machine has them.
-                    return unsafe { $name::avx512($($argument),*) };
-                }
-                if is_x86_feature_detected!("avx2") && is_x86_feature_detected!("popcnt") {
-                    // SAFETY: the machine has them.
-                    return unsafe { $name::avx2($($argument),*) };
-                }
+            match crate::level::level() {
+                // SAFETY: the machine has the level.
+                crate::level::Level::Avx512 => return unsafe { $name::avx512($($argument),*) },
+                // SAFETY: as above.
+                crate::level::Level::Avx2 => return unsafe { $name::avx2($($argument),*) },
+                _ => {}
             }
             // SAFETY: every machine has single numbers.
             unsafe { $name::scalar($($argument),*) }

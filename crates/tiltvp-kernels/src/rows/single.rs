@@ -308,7 +308,7 @@ mod tests {
                             |r: [&[f32]; 3], w: &mut [f32], s: &mut Sums| accumulate(r, (w, kind), model, gate, s);
                         assert_eq!(found(with, n, weight), scalar, "{n} rows, {gate:?}, {kind:?}");
                         #[cfg(target_arch = "x86_64")]
-                        if is_x86_feature_detected!("avx2") && is_x86_feature_detected!("popcnt") {
+                        if crate::level::Level::available().any(|level| level == crate::level::Level::Avx2) {
                             // SAFETY: the machine has them.
                             let with = |r: [&[f32]; 3], w: &mut [f32], s: &mut Sums| unsafe {
                                 accumulate::avx2(r, (w, kind), model, gate, s);
@@ -333,7 +333,7 @@ mod tests {
                 // SAFETY: every machine has single numbers.
                 assert_eq!(unsafe { count::scalar(rows, model, 0.3) }, plain);
                 #[cfg(target_arch = "x86_64")]
-                if is_x86_feature_detected!("avx2") && is_x86_feature_detected!("popcnt") {
+                if crate::level::Level::available().any(|level| level == crate::level::Level::Avx2) {
                     // SAFETY: the machine has them.
                     assert_eq!(unsafe { count::avx2(rows, model, 0.3) }, plain);
                 }

@@ -1,6 +1,8 @@
 //! Narrow Gaussians in fixed point: sums of three columns, then of three of those, rounded once.
 
-use multiversion::multiversion;
+#[cfg(target_arch = "x86_64")]
+use crate::level::{Level, level, loops};
+use crate::vectorised;
 
 /// Units of the taps: three by three pixels weighted by them are exact in whole numbers.
 pub const TAP_UNITS: i32 = 256;
@@ -19,13 +21,14 @@ const HALF_UNIT: (i16, i16) = (64, 64);
 
 const _: () = assert!(HALF_UNIT.0 as i32 * HALF_UNIT.1 as i32 == 1 << (BITS - 1));
 
-/// The middle row and its neighbours weighted by taps in units of 1/256, exactly, in units of 1/256 of a grey level, less 128.
-#[multiversion(targets("x86_64+avx512f+avx512bw+avx512vl", "x86_64+avx2"))]
-pub fn fixed_columns([above, middle, below]: [&[u8]; 3], [centre, side]: [i16; 2], out: &mut [i16]) {
-    let (centre, side) = (centre as u16, side as u16);
-    for (((o, a), m), b) in out.iter_mut().zip(above).zip(middle).zip(below) {
-        let sum = u16::from(*m) * centre + (u16::from(*a) + u16::from(*b)) * side;
-        *o = (sum ^ HALF as u16) as i16;
+vectorised! {
+    /// The middle row and its neighbours weighted by taps in units of 1/256, exactly, in units of 1/256 of a grey level, less 128.
+    pub fn fixed_columns([above, middle, below]: [&[u8]; 3], [centre, side]: [i16; 2], out: &mut [i16]) {
+        let (centre, side) = (centre as u16, side as u16);
+        for (((o, a), m), b) in out.iter_mut().zip(above).zip(middle).zip(below) {
+            let sum = u16::from(*m) * centre + (u16::from(*a) + u16::from(*b)) * side;
+            *o = (sum ^ HALF as u16) as i16;
+        }
     }
 }
 
@@ -37,23 +40,88 @@ pub fn fixed_columns([above, middle, below]: [&[u8]; 3], [centre, side]: [i16; 2
 pub fn fixed_rows(sums: &[i16], taps: [i16; 2], out: &mut [i16]) {
     assert!(sums.len() >= out.len() + 2);
     #[cfg(target_arch = "x86_64")]
-    if is_x86_feature_detected!("avx512f") && is_x86_feature_detected!("avx512bw") {
-        // SAFETY: the machine has the features, and there are two more sums than levels.
+    if level() == Level::Avx512 {
+        // SAFETY: the machine has the level, and there are two more sums than levels.
         unsafe { avx512::fixed_rows(sums, taps, out) };
+        return;
+    }
+    #[cfg(target_arch = "x86_64")]
+    if let Some(token) = loops().as_avx2() {
+        avx2::fixed_rows(token, sums, taps, out);
         return;
     }
     scalar(sums, taps, out);
 }
 
-#[multiversion(targets("x86_64+avx2", "x86_64+sse4.1"))]
-fn scalar(sums: &[i16], [centre, side]: [i16; 2], out: &mut [i16]) {
-    let n = out.len();
-    let (left, middle, right) = (&sums[..n], &sums[1..=n], &sums[2..n + 2]);
-    let (centre, side) = (i32::from(centre), i32::from(side));
-    for (((o, l), m), r) in out.iter_mut().zip(left).zip(middle).zip(right) {
-        let sum = i32::from(*m) * centre + (i32::from(*l) + i32::from(*r)) * side;
-        let even = (sum >> BITS) & 1;
-        *o = (((sum + (1 << (BITS - 1)) - 1 + even) >> BITS) + MIDDLE) as i16;
+vectorised! {
+    fn scalar(sums: &[i16], [centre, side]: [i16; 2], out: &mut [i16]) {
+        let n = out.len();
+        let (left, middle, right) = (&sums[..n], &sums[1..=n], &sums[2..n + 2]);
+        let (centre, side) = (i32::from(centre), i32::from(side));
+        for (((o, l), m), r) in out.iter_mut().zip(left).zip(middle).zip(right) {
+            let sum = i32::from(*m) * centre + (i32::from(*l) + i32::from(*r)) * side;
+            let even = (sum >> BITS) & 1;
+            *o = (((sum + (1 << (BITS - 1)) - 1 + even) >> BITS) + MIDDLE) as i16;
+        }
+    }
+}
+
+#[cfg(target_arch = "x86_64")]
+mod avx2 {
+    use std::arch::x86_64::{
+        __m256i, _mm256_add_epi16, _mm256_add_epi32, _mm256_and_si256, _mm256_andnot_si256, _mm256_cmpeq_epi32,
+        _mm256_madd_epi16, _mm256_packs_epi32, _mm256_set1_epi16, _mm256_set1_epi32, _mm256_setzero_si256,
+        _mm256_srai_epi32, _mm256_srli_epi32, _mm256_unpackhi_epi16, _mm256_unpacklo_epi16,
+    };
+
+    use fearless_simd::{Avx2, SimdBase as _, SimdInto as _, i16x16};
+
+    use super::{BITS, HALF_UNIT, MIDDLE, scalar};
+
+    fearless_simd::kernel! {
+        /// See [`fixed_rows`](super::fixed_rows).
+        pub(super) fn fixed_rows(token: Avx2, sums: &[i16], taps: [i16; 2], out: &mut [i16]) {
+            let [centre, side] = taps;
+            let sides = _mm256_set1_epi16(side);
+            let middles = _mm256_set1_epi32((i32::from(HALF_UNIT.1) << 16) | i32::from(centre as u16));
+            let taps = [sides, middles];
+            let (whole, rest) = out.as_chunks_mut::<16>();
+            for (out, sums) in whole.iter_mut().zip(sums.windows(18).step_by(16)) {
+                let [l, m, r] = [&sums[..16], &sums[1..17], &sums[2..18]];
+                let [l, m, r] = [i16x16::from_slice(token, l), i16x16::from_slice(token, m), i16x16::from_slice(token, r)];
+                let levels: i16x16<Avx2> = levels([l.into(), m.into(), r.into()], taps).simd_into(token);
+                levels.store_slice(out);
+            }
+            let done = whole.len() * 16;
+            scalar(&sums[done..], [centre, side], rest);
+        }
+    }
+
+    /// Levels of 16 pixels.
+    #[inline]
+    #[target_feature(enable = "avx2")]
+    fn levels([l, m, r]: [__m256i; 3], [sides, middles]: [__m256i; 2]) -> __m256i {
+        let offset = _mm256_set1_epi16(HALF_UNIT.0);
+        let low = sum(
+            _mm256_madd_epi16(_mm256_unpacklo_epi16(l, r), sides),
+            _mm256_madd_epi16(_mm256_unpacklo_epi16(m, offset), middles),
+        );
+        let high = sum(
+            _mm256_madd_epi16(_mm256_unpackhi_epi16(l, r), sides),
+            _mm256_madd_epi16(_mm256_unpackhi_epi16(m, offset), middles),
+        );
+        _mm256_add_epi16(_mm256_packs_epi32(low, high), _mm256_set1_epi16(MIDDLE as i16))
+    }
+
+    /// The rounded sum of two, of which one has the half in it.
+    #[inline]
+    #[target_feature(enable = "avx2")]
+    fn sum(a: __m256i, b: __m256i) -> __m256i {
+        let more = _mm256_add_epi32(a, b);
+        // Nothing is rounded off a half and a half: it has gone up, perhaps to an odd number.
+        let off = _mm256_and_si256(more, _mm256_set1_epi32((1 << BITS) - 1));
+        let halves = _mm256_cmpeq_epi32(off, _mm256_setzero_si256());
+        _mm256_andnot_si256(_mm256_srli_epi32::<31>(halves), _mm256_srai_epi32::<{ BITS as i32 }>(more))
     }
 }
 
@@ -155,6 +223,12 @@ mod tests {
             fixed_rows(&sums, taps, &mut ours);
             scalar(&sums, taps, &mut plainly);
             assert_eq!(ours, plainly);
+            #[cfg(target_arch = "x86_64")]
+            if let Some(token) = loops().as_avx2() {
+                ours.fill(0);
+                avx2::fixed_rows(token, &sums, taps, &mut ours);
+                assert_eq!(ours, plainly);
+            }
         }
         // All sums of a grey level's 1/256 parts, and of the negative.
         for sum in (0..=65_280u32).step_by(16) {

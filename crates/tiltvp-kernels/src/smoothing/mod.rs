@@ -2,7 +2,7 @@
 
 mod fixed;
 
-use multiversion::multiversion;
+use crate::vectorised;
 
 pub use fixed::{TAP_UNITS, fixed_columns, fixed_rows};
 
@@ -10,43 +10,48 @@ pub use fixed::{TAP_UNITS, fixed_columns, fixed_rows};
 /// which is in 16 bits.
 const EIGHTHS: f32 = 8.0;
 
-/// Grey levels as numbers of single precision.
-#[multiversion(targets("x86_64+avx512f+avx512bw+avx512vl", "x86_64+avx2+fma"))]
-pub fn widen(row: &[u8], out: &mut [f32]) {
-    for (o, i) in out.iter_mut().zip(row) {
-        *o = f32::from(*i);
+vectorised! {
+    /// Grey levels as numbers of single precision.
+    pub fn widen(row: &[u8], out: &mut [f32]) {
+        for (o, i) in out.iter_mut().zip(row) {
+            *o = f32::from(*i);
+        }
     }
 }
 
-/// Grey levels times a tap.
-#[multiversion(targets("x86_64+avx512f+avx512bw+avx512vl", "x86_64+avx2+fma"))]
-pub fn scale(row: &[u8], tap: f32, out: &mut [f32]) {
-    for (o, i) in out.iter_mut().zip(row) {
-        *o = f32::from(*i) * tap;
+vectorised! {
+    /// Grey levels times a tap.
+    pub fn scale(row: &[u8], tap: f32, out: &mut [f32]) {
+        for (o, i) in out.iter_mut().zip(row) {
+            *o = f32::from(*i) * tap;
+        }
     }
 }
 
-/// The middle row and its neighbours at once, which is all that narrow Gaussians take.
-#[multiversion(targets("x86_64+avx512f+avx512bw+avx512vl", "x86_64+avx2+fma"))]
-pub fn three_rows([above, middle, below]: [&[u8]; 3], [centre, side]: [f32; 2], out: &mut [f32]) {
-    for (((o, a), m), b) in out.iter_mut().zip(above).zip(middle).zip(below) {
-        *o = f32::from(*m) * centre + (f32::from(*a) + f32::from(*b)) * side;
+vectorised! {
+    /// The middle row and its neighbours at once, which is all that narrow Gaussians take.
+    pub fn three_rows([above, middle, below]: [&[u8]; 3], [centre, side]: [f32; 2], out: &mut [f32]) {
+        for (((o, a), m), b) in out.iter_mut().zip(above).zip(middle).zip(below) {
+            *o = f32::from(*m) * centre + (f32::from(*a) + f32::from(*b)) * side;
+        }
     }
 }
 
-/// Adds two rows at like distances times their tap.
-#[multiversion(targets("x86_64+avx512f+avx512bw+avx512vl", "x86_64+avx2+fma"))]
-pub fn add_scaled(above: &[u8], below: &[u8], tap: f32, out: &mut [f32]) {
-    for ((o, a), b) in out.iter_mut().zip(above).zip(below) {
-        *o += (f32::from(*a) + f32::from(*b)) * tap;
+vectorised! {
+    /// Adds two rows at like distances times their tap.
+    pub fn add_scaled(above: &[u8], below: &[u8], tap: f32, out: &mut [f32]) {
+        for ((o, a), b) in out.iter_mut().zip(above).zip(below) {
+            *o += (f32::from(*a) + f32::from(*b)) * tap;
+        }
     }
 }
 
-/// Rounds levels to eighths; halves go to the even one.
-#[multiversion(targets("x86_64+avx512f+avx512bw+avx512vl", "x86_64+avx2"))]
-pub fn quantise(row: &[f32], out: &mut [i16]) {
-    for (o, i) in out.iter_mut().zip(row) {
-        *o = (i * EIGHTHS).round_ties_even() as i16;
+vectorised! {
+    /// Rounds levels to eighths; halves go to the even one.
+    pub fn quantise(row: &[f32], out: &mut [i16]) {
+        for (o, i) in out.iter_mut().zip(row) {
+            *o = (i * EIGHTHS).round_ties_even() as i16;
+        }
     }
 }
 
@@ -57,17 +62,18 @@ pub fn add_scaled_one(row: &[u8], tap: f32, out: &mut [f32]) {
     }
 }
 
-/// `sums` reach as far beyond `out` on both sides as the taps do, of which there are at least two.
-#[multiversion(targets("x86_64+avx512f+avx512bw+avx512vl", "x86_64+avx2+fma"))]
-pub fn convolve(sums: &[f32], taps: &[f32], out: &mut [f32]) {
-    let (radius, length) = (taps.len() - 1, out.len());
-    let window = |shift: usize| &sums[shift..shift + length];
-    for (((o, l), c), r) in out.iter_mut().zip(window(radius - 1)).zip(window(radius)).zip(window(radius + 1)) {
-        *o = c * taps[0] + (l + r) * taps[1];
-    }
-    for (offset, tap) in taps.iter().enumerate().skip(2) {
-        for ((o, l), r) in out.iter_mut().zip(window(radius - offset)).zip(window(radius + offset)) {
-            *o += (l + r) * tap;
+vectorised! {
+    /// `sums` reach as far beyond `out` on both sides as the taps do, of which there are at least two.
+    pub fn convolve(sums: &[f32], taps: &[f32], out: &mut [f32]) {
+        let (radius, length) = (taps.len() - 1, out.len());
+        let window = |shift: usize| &sums[shift..shift + length];
+        for (((o, l), c), r) in out.iter_mut().zip(window(radius - 1)).zip(window(radius)).zip(window(radius + 1)) {
+            *o = c * taps[0] + (l + r) * taps[1];
+        }
+        for (offset, tap) in taps.iter().enumerate().skip(2) {
+            for ((o, l), r) in out.iter_mut().zip(window(radius - offset)).zip(window(radius + offset)) {
+                *o += (l + r) * tap;
+            }
         }
     }
 }

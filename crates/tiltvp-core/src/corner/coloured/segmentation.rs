@@ -1,6 +1,6 @@
 //! Which face of the coloured cuboid each pixel shows: thresholds on chromaticity and intensity (Liu et al. 2018, section II-B).
 
-use multiversion::multiversion;
+use tiltvp_kernels::vectorised;
 
 use crate::error::{Error, Result};
 use crate::image::ColorView;
@@ -145,26 +145,27 @@ struct Face {
 /// one.
 const BLOCK: usize = 64;
 
-/// Labels every `step`-th pixel of a row of blue, green and red.
-#[multiversion(targets("x86_64+avx2", "x86_64+sse4.1"))]
-fn label_row(row: &[u8], step: usize, face: Face, out: &mut [u8]) {
-    let (blocks, _) = out.as_chunks_mut::<BLOCK>();
-    let mut done = 0;
-    for (pixels, out) in row.chunks_exact(3 * step * BLOCK).zip(blocks) {
-        // With steps known at compile time the planes are separated in registers.
-        let planes = match step {
-            1 => planes(pixels, 1),
-            2 => planes(pixels, 2),
-            _ => planes(pixels, step),
-        };
-        *out = labels(&planes, face);
-        done += BLOCK;
-    }
-    for (pixels, out) in
-        row[(3 * step * done).min(row.len())..].chunks(3 * step * BLOCK).zip(out[done..].chunks_mut(BLOCK))
-    {
-        let found = labels(&planes(pixels, step), face);
-        out.copy_from_slice(&found[..out.len()]);
+vectorised! {
+    /// Labels every `step`-th pixel of a row of blue, green and red.
+    fn label_row(row: &[u8], step: usize, face: Face, out: &mut [u8]) {
+        let (blocks, _) = out.as_chunks_mut::<BLOCK>();
+        let mut done = 0;
+        for (pixels, out) in row.chunks_exact(3 * step * BLOCK).zip(blocks) {
+            // With steps known at compile time the planes are separated in registers.
+            let planes = match step {
+                1 => planes(pixels, 1),
+                2 => planes(pixels, 2),
+                _ => planes(pixels, step),
+            };
+            *out = labels(&planes, face);
+            done += BLOCK;
+        }
+        for (pixels, out) in
+            row[(3 * step * done).min(row.len())..].chunks(3 * step * BLOCK).zip(out[done..].chunks_mut(BLOCK))
+        {
+            let found = labels(&planes(pixels, step), face);
+            out.copy_from_slice(&found[..out.len()]);
+        }
     }
 }
 

@@ -1,6 +1,6 @@
 //! Line segments: ridge pixels grown together where their gradients agree, and split until each lies on one great circle.
 
-use multiversion::multiversion;
+use tiltvp_kernels::vectorised;
 use nalgebra::{Matrix3, Vector2, Vector3};
 use tiltvp_kernels::prefetch::prefetch;
 
@@ -284,12 +284,13 @@ fn length([x, y]: [f32; 2]) -> f32 {
     (f64::from(x) * f64::from(x) + f64::from(y) * f64::from(y)).sqrt() as f32
 }
 
-/// Unit vectors along gradients.
-#[multiversion(targets("x86_64+avx512f+avx512vl", "x86_64+avx2"))]
-fn directions(gx: &[f32], gy: &[f32], out: &mut [[f32; 2]]) {
-    for ((x, y), out) in gx.iter().zip(gy).zip(out) {
-        let length = length([*x, *y]);
-        *out = [x / length, y / length];
+vectorised! {
+    /// Unit vectors along gradients.
+    fn directions(gx: &[f32], gy: &[f32], out: &mut [[f32; 2]]) {
+        for ((x, y), out) in gx.iter().zip(gy).zip(out) {
+            let length = length([*x, *y]);
+            *out = [x / length, y / length];
+        }
     }
 }
 

@@ -2,7 +2,7 @@
 
 use std::f32::consts::{PI, TAU};
 
-use multiversion::multiversion;
+use tiltvp_kernels::vectorised;
 
 use crate::lines::angles::atan2;
 
@@ -110,54 +110,56 @@ pub(crate) fn histograms(
 /// Values that are worked on together, in registers. Answers do not depend on it; a test compares with one by one.
 const BLOCK: usize = 32;
 
-/// Weights values by a Gaussian over neighbours that are `step` apart; it loses its reach on both ends.
-#[multiversion(targets("x86_64+avx512f+avx512vl", "x86_64+avx2"))]
-fn blend(values: &[f32], kernel: &[f32], step: usize, out: &mut [f32]) {
-    let reach = kernel.len() - 1;
-    let (blocks, rest) = out.as_chunks_mut::<BLOCK>();
-    let done = BLOCK * blocks.len();
-    for (block, start) in blocks.iter_mut().zip((reach * step..).step_by(BLOCK)) {
-        let mut sums = [0.0; BLOCK];
-        for (sum, value) in sums.iter_mut().zip(&values[start..start + BLOCK]) {
-            *sum = kernel[0] * value;
-        }
-        for (tap, off) in kernel[1..].iter().zip((step..).step_by(step)) {
-            let (before, after) = (&values[start - off..][..BLOCK], &values[start + off..][..BLOCK]);
-            for ((sum, before), after) in sums.iter_mut().zip(before).zip(after) {
-                *sum += tap * (before + after);
+vectorised! {
+    /// Weights values by a Gaussian over neighbours that are `step` apart; it loses its reach on both ends.
+    fn blend(values: &[f32], kernel: &[f32], step: usize, out: &mut [f32]) {
+        let reach = kernel.len() - 1;
+        let (blocks, rest) = out.as_chunks_mut::<BLOCK>();
+        let done = BLOCK * blocks.len();
+        for (block, start) in blocks.iter_mut().zip((reach * step..).step_by(BLOCK)) {
+            let mut sums = [0.0; BLOCK];
+            for (sum, value) in sums.iter_mut().zip(&values[start..start + BLOCK]) {
+                *sum = kernel[0] * value;
             }
+            for (tap, off) in kernel[1..].iter().zip((step..).step_by(step)) {
+                let (before, after) = (&values[start - off..][..BLOCK], &values[start + off..][..BLOCK]);
+                for ((sum, before), after) in sums.iter_mut().zip(before).zip(after) {
+                    *sum += tap * (before + after);
+                }
+            }
+            *block = sums;
         }
-        *block = sums;
-    }
-    for (sum, at) in rest.iter_mut().zip(reach * step + done..) {
-        *sum = kernel[0] * values[at];
-        for (tap, off) in kernel[1..].iter().zip((step..).step_by(step)) {
-            *sum += tap * (values[at - off] + values[at + off]);
+        for (sum, at) in rest.iter_mut().zip(reach * step + done..) {
+            *sum = kernel[0] * values[at];
+            for (tap, off) in kernel[1..].iter().zip((step..).step_by(step)) {
+                *sum += tap * (values[at - off] + values[at + off]);
+            }
         }
     }
 }
 
-/// The votes of the Sobel gradients about each sample: weighted magnitudes, shared by the two bins next to the orientation
-/// (eq. 2), zero where a sample is not of the world. Rows are two samples wider than those of the weights.
-#[multiversion(targets("x86_64+avx512f+avx512vl", "x86_64+avx2"))]
-fn cast(levels: &[f32], stride: usize, weights: &[f32], bins: u32, votes: &mut Votes) {
-    let [first, second] = &mut votes.bins;
-    let [low, high] = &mut votes.shares;
-    let outs =
-        first.chunks_mut(BLOCK).zip(second.chunks_mut(BLOCK)).zip(low.chunks_mut(BLOCK).zip(high.chunks_mut(BLOCK)));
-    for ((weights, outs), start) in weights.chunks(BLOCK).zip(outs).zip((0..).step_by(BLOCK)) {
-        let n = weights.len();
-        let mut block = VoteBlock::default();
-        block.weights[..n].copy_from_slice(weights);
-        for (row, at) in block.rows.iter_mut().zip((start..).step_by(stride)) {
-            row[..n + 2].copy_from_slice(&levels[at..at + n + 2]);
+vectorised! {
+    /// The votes of the Sobel gradients about each sample: weighted magnitudes, shared by the two bins next to the orientation
+    /// (eq. 2), zero where a sample is not of the world. Rows are two samples wider than those of the weights.
+    fn cast(levels: &[f32], stride: usize, weights: &[f32], bins: u32, votes: &mut Votes) {
+        let [first, second] = &mut votes.bins;
+        let [low, high] = &mut votes.shares;
+        let outs =
+            first.chunks_mut(BLOCK).zip(second.chunks_mut(BLOCK)).zip(low.chunks_mut(BLOCK).zip(high.chunks_mut(BLOCK)));
+        for ((weights, outs), start) in weights.chunks(BLOCK).zip(outs).zip((0..).step_by(BLOCK)) {
+            let n = weights.len();
+            let mut block = VoteBlock::default();
+            block.weights[..n].copy_from_slice(weights);
+            for (row, at) in block.rows.iter_mut().zip((start..).step_by(stride)) {
+                row[..n + 2].copy_from_slice(&levels[at..at + n + 2]);
+            }
+            block.cast(bins);
+            let ((first, second), (low, high)) = outs;
+            first.copy_from_slice(&block.bins[0][..n]);
+            second.copy_from_slice(&block.bins[1][..n]);
+            low.copy_from_slice(&block.shares[0][..n]);
+            high.copy_from_slice(&block.shares[1][..n]);
         }
-        block.cast(bins);
-        let ((first, second), (low, high)) = outs;
-        first.copy_from_slice(&block.bins[0][..n]);
-        second.copy_from_slice(&block.bins[1][..n]);
-        low.copy_from_slice(&block.shares[0][..n]);
-        high.copy_from_slice(&block.shares[1][..n]);
     }
 }
 

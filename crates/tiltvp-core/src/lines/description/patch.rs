@@ -1,6 +1,6 @@
 //! The image around a line, resampled with the line upright: rows along it, columns across it.
 
-use multiversion::multiversion;
+use tiltvp_kernels::vectorised;
 use nalgebra::{Matrix3, Vector2, Vector3};
 use tiltvp_kernels::bilinear::quads;
 
@@ -141,21 +141,22 @@ struct Cell {
 /// Samples of a cell.
 const SAMPLES: usize = SUBDIVISIONS * SUBDIVISIONS;
 
-/// Samples cells of a patch in row order.
-#[multiversion(targets("x86_64+avx512f+avx512bw+avx512vl", "x86_64+avx2", "x86_64+sse4.1"))]
-fn fill(cells: &[Cell], image: &ImageView<'_>, tables: &LineTables, columns: usize, levels: &mut [f32]) {
-    for cell in cells {
-        let (x, y) = places(cell);
-        let found = if is_clear(cell, tables) {
-            levels_at(image, &x, &y)
-        } else {
-            std::array::from_fn(|k| level_at(image, tables, x[k], y[k]))
-        };
-        let rows = levels[cell.row * columns..].chunks_mut(columns);
-        for (row, found) in rows.zip(found.as_chunks::<SUBDIVISIONS>().0) {
-            match row[cell.column..].first_chunk_mut() {
-                Some(out) => *out = *found,
-                None => row[cell.column..].iter_mut().zip(found).for_each(|(out, level)| *out = *level),
+vectorised! {
+    /// Samples cells of a patch in row order.
+    fn fill(cells: &[Cell], image: &ImageView<'_>, tables: &LineTables, columns: usize, levels: &mut [f32]) {
+        for cell in cells {
+            let (x, y) = places(cell);
+            let found = if is_clear(cell, tables) {
+                levels_at(image, &x, &y)
+            } else {
+                std::array::from_fn(|k| level_at(image, tables, x[k], y[k]))
+            };
+            let rows = levels[cell.row * columns..].chunks_mut(columns);
+            for (row, found) in rows.zip(found.as_chunks::<SUBDIVISIONS>().0) {
+                match row[cell.column..].first_chunk_mut() {
+                    Some(out) => *out = *found,
+                    None => row[cell.column..].iter_mut().zip(found).for_each(|(out, level)| *out = *level),
+                }
             }
         }
     }

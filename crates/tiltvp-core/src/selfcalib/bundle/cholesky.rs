@@ -1,6 +1,6 @@
 //! Symmetric positive definite matrices: factored, inverted and reduced in blocks of columns.
 
-use multiversion::multiversion;
+use tiltvp_kernels::vectorised;
 use nalgebra::{DMatrix, DVector};
 
 use crate::interrupt::check;
@@ -180,36 +180,40 @@ fn subtract_columns(into: &mut [f64], done: &[f64], height: usize, top: usize, m
     }
 }
 
-#[multiversion(targets("x86_64+avx512f+avx512vl", "x86_64+avx2"))]
-fn subtract_four(into: &mut [f64], [a, b, c, d]: [&[f64]; 4], [fa, fb, fc, fd]: [f64; 4]) {
-    for ((((value, a), b), c), d) in into.iter_mut().zip(a).zip(b).zip(c).zip(d) {
-        *value -= (fa * a + fb * b) + (fc * c + fd * d);
+vectorised! {
+    fn subtract_four(into: &mut [f64], [a, b, c, d]: [&[f64]; 4], [fa, fb, fc, fd]: [f64; 4]) {
+        for ((((value, a), b), c), d) in into.iter_mut().zip(a).zip(b).zip(c).zip(d) {
+            *value -= (fa * a + fb * b) + (fc * c + fd * d);
+        }
     }
 }
 
-#[multiversion(targets("x86_64+avx512f+avx512vl", "x86_64+avx2"))]
-fn subtract_one(into: &mut [f64], column: &[f64], factor: f64) {
-    for (value, column) in into.iter_mut().zip(column) {
-        *value -= factor * column;
+vectorised! {
+    fn subtract_one(into: &mut [f64], column: &[f64], factor: f64) {
+        for (value, column) in into.iter_mut().zip(column) {
+            *value -= factor * column;
+        }
     }
 }
 
-#[multiversion(targets("x86_64+avx512f+avx512vl", "x86_64+avx2"))]
-fn scale(column: &mut [f64], factor: f64) {
-    for value in column {
-        *value *= factor;
+vectorised! {
+    fn scale(column: &mut [f64], factor: f64) {
+        for value in column {
+            *value *= factor;
+        }
     }
 }
 
-/// The sum of eight columns times factors.
-#[multiversion(targets("x86_64+avx512f+avx512vl", "x86_64+avx2"))]
-pub(crate) fn combine(out: &mut [f64], columns: [&[f64]; 8], factors: [f64; 8]) {
-    let n = out.len();
-    let [a, b, c, d, e, f, g, h] = columns.map(|column| &column[..n]);
-    let [fa, fb, fc, fd, fe, ff, fg, fh] = factors;
-    for (i, value) in out.iter_mut().enumerate() {
-        let first = (fa * a[i] + fb * b[i]) + (fc * c[i] + fd * d[i]);
-        *value = first + ((fe * e[i] + ff * f[i]) + (fg * g[i] + fh * h[i]));
+vectorised! {
+    /// The sum of eight columns times factors.
+    pub(crate) fn combine(out: &mut [f64], columns: [&[f64]; 8], factors: [f64; 8]) {
+        let n = out.len();
+        let [a, b, c, d, e, f, g, h] = columns.map(|column| &column[..n]);
+        let [fa, fb, fc, fd, fe, ff, fg, fh] = factors;
+        for (i, value) in out.iter_mut().enumerate() {
+            let first = (fa * a[i] + fb * b[i]) + (fc * c[i] + fd * d[i]);
+            *value = first + ((fe * e[i] + ff * f[i]) + (fg * g[i] + fh * h[i]));
+        }
     }
 }
 

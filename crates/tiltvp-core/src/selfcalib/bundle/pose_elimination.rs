@@ -1,6 +1,6 @@
 //! The normal equations of one pose, coupled to its neighbours and to shared parameters, and its elimination (Schur complement).
 
-use multiversion::multiversion;
+use tiltvp_kernels::vectorised;
 use nalgebra::{Cholesky, Matrix3, Matrix3x2, Vector3};
 
 use super::linearisation::{BearingRow, MotionBlocks, NormalEquations};
@@ -146,33 +146,35 @@ pub(crate) fn eliminate_pose(
     Some(EliminatedPose { inverse, coupling, before: Matrix3::zeros(), next: across, rhs })
 }
 
-/// `into -= factor coupling` in the first `reach` columns.
-#[multiversion(targets("x86_64+avx512f+avx512vl", "x86_64+avx2"))]
-fn subtract_product(into: [&mut [f64]; 3], factor: [[f64; 3]; 3], coupling: [&[f64]; 3], reach: usize) {
-    let [b0, b1, b2] = coupling.map(|b| &b[..reach]);
-    for (values, [a, b, d]) in into.into_iter().zip(factor) {
-        for (((value, b0), b1), b2) in values[..reach].iter_mut().zip(b0).zip(b1).zip(b2) {
-            *value -= a * b0 + b * b1 + d * b2;
+vectorised! {
+    /// `into -= factor coupling` in the first `reach` columns.
+    fn subtract_product(into: [&mut [f64]; 3], factor: [[f64; 3]; 3], coupling: [&[f64]; 3], reach: usize) {
+        let [b0, b1, b2] = coupling.map(|b| &b[..reach]);
+        for (values, [a, b, d]) in into.into_iter().zip(factor) {
+            for (((value, b0), b1), b2) in values[..reach].iter_mut().zip(b0).zip(b1).zip(b2) {
+                *value -= a * b0 + b * b1 + d * b2;
+            }
         }
     }
 }
 
-/// `information -= coupling^T inverse coupling` in the upper triangle of the first `reach` rows and columns of a matrix with
-/// columns of this height.
-#[multiversion(targets("x86_64+avx512f+avx512vl", "x86_64+avx2"))]
-fn subtract_outer(information: &mut [f64], height: usize, inverse: [[f64; 3]; 3], coupling: [&[f64]; 3], reach: usize) {
-    let [b0, b1, b2] = coupling.map(|b| &b[..reach]);
-    let [f0, f1, f2] = inverse;
-    for (c, column) in information.chunks_exact_mut(height).take(reach).enumerate() {
-        let (x, y, z) = (b0[c], b1[c], b2[c]);
-        if x == 0.0 && y == 0.0 && z == 0.0 {
-            continue;
-        }
-        let p = f0[0] * x + f1[0] * y + f2[0] * z;
-        let q = f0[1] * x + f1[1] * y + f2[1] * z;
-        let r = f0[2] * x + f1[2] * y + f2[2] * z;
-        for (((value, b0), b1), b2) in column[..=c].iter_mut().zip(b0).zip(b1).zip(b2) {
-            *value -= b0 * p + b1 * q + b2 * r;
+vectorised! {
+    /// `information -= coupling^T inverse coupling` in the upper triangle of the first `reach` rows and columns of a matrix with
+    /// columns of this height.
+    fn subtract_outer(information: &mut [f64], height: usize, inverse: [[f64; 3]; 3], coupling: [&[f64]; 3], reach: usize) {
+        let [b0, b1, b2] = coupling.map(|b| &b[..reach]);
+        let [f0, f1, f2] = inverse;
+        for (c, column) in information.chunks_exact_mut(height).take(reach).enumerate() {
+            let (x, y, z) = (b0[c], b1[c], b2[c]);
+            if x == 0.0 && y == 0.0 && z == 0.0 {
+                continue;
+            }
+            let p = f0[0] * x + f1[0] * y + f2[0] * z;
+            let q = f0[1] * x + f1[1] * y + f2[1] * z;
+            let r = f0[2] * x + f1[2] * y + f2[2] * z;
+            for (((value, b0), b1), b2) in column[..=c].iter_mut().zip(b0).zip(b1).zip(b2) {
+                *value -= b0 * p + b1 * q + b2 * r;
+            }
         }
     }
 }

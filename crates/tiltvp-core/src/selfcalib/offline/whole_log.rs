@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::fmt;
 
-use nalgebra::Matrix3;
+use nalgebra::{DMatrix, Matrix3};
 
 use super::incremental::{ROBUST_LOSS, incremental_problem, problem_along};
 use super::log::{LogBearing, LogOptions, SortedLog};
@@ -269,12 +269,20 @@ fn report(
     let free = kept.len().saturating_sub(problem.width()).max(1) as f64;
     let sum: f64 = kept.iter().map(|r| r * r).sum();
     let scale = (sum / free).max(1.0);
-    let nothing =
-        || Error::argument("bearings", "a drive that determines nothing", "landmarks seen from several poses");
-    let system = problem.eliminate_poses(problem.keyframes.len() - 1, false, 0.0).ok_or_else(nothing)?;
-    let covariance = CholeskyFactor::regularised(system.equations.information.clone()).ok_or_else(nothing)?;
-    let covariance = covariance.inverse();
-    let widening = problem.covariance_widening(&system, &covariance);
+    if residuals.is_empty() {
+        return Err(Error::argument("bearings", "a drive that determines nothing", "landmarks seen from several poses"));
+    }
+    let solution = problem.eliminate_poses(problem.keyframes.len() - 1, false, 0.0).and_then(|system| {
+        let covariance = CholeskyFactor::regularised(system.equations.information.clone())?.inverse();
+        Some((problem.covariance_widening(&system, &covariance), covariance))
+    });
+    // No minimum is there: nothing is known beyond the start, and this is no answer.
+    let converged = descent.converged && solution.is_some();
+    let (widening, covariance) = solution.unwrap_or_else(|| {
+        let mut unknown = DMatrix::from_diagonal_element(problem.width(), problem.width(), f64::INFINITY);
+        unknown.fixed_view_mut::<3, 3>(0, 0).copy_from(&o.start_covariance);
+        (Matrix3::identity(), unknown)
+    });
     let covariance = covariance * scale;
     let mounting: Matrix3<f64> = covariance.fixed_view::<3, 3>(0, 0).into();
     let mounting = widening * mounting * widening.transpose();
@@ -299,7 +307,7 @@ fn report(
         outliers: residuals.len() - kept.len(),
         residual_rms: (sum / kept.len().max(1) as f64).sqrt(),
         iterations: descent.iterations,
-        converged: descent.converged,
+        converged,
         bearing_sigma_rad: problem.bearing_sigma,
         odometry_k_m: problem.noise.k_m,
         misreading,

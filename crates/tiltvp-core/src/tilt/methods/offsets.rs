@@ -1,6 +1,6 @@
 //! Edge offsets as rows of a cosine that is fitted to them (Fleer 2017, section 2.1).
 
-use multiversion::multiversion;
+use tiltvp_kernels::vectorised;
 use nalgebra::Vector2;
 use tiltvp_kernels::compaction::{KeptRows, ROOM, RowBlock, compact_rows};
 
@@ -133,17 +133,18 @@ impl Default for Block {
     }
 }
 
-/// Makes rows of places, which hold the row in the upper half and the column in the lower.
-#[multiversion(targets("x86_64+avx512f+avx512vl", "x86_64+avx2"))]
-fn fill(block: &mut Block, places: &[u32], middle: (f32, f32), gx: &[f32], gy: &[f32], limit: f32) {
-    let n = gx.len();
-    let (u, v, s, gain) = (&mut block.u[..n], &mut block.v[..n], &mut block.s[..n], &mut block.gain[..n]);
-    let (gy, places) = (&gy[..n], &places[..n]);
-    for i in 0..n {
-        let (column, row) = ((places[i] & 0xffff) as i32 as f32, (places[i] >> 16) as i32 as f32);
-        let [cos, sin, offset] = edge_offset(column - middle.0, row - middle.1, gx[i], gy[i]);
-        (u[i], v[i], s[i]) = (gain[i] * cos, gain[i] * sin, -offset);
-        gain[i] = if offset.abs() <= limit { gain[i] } else { 0.0 };
+vectorised! {
+    /// Makes rows of places, which hold the row in the upper half and the column in the lower.
+    fn fill(block: &mut Block, places: &[u32], middle: (f32, f32), gx: &[f32], gy: &[f32], limit: f32) {
+        let n = gx.len();
+        let (u, v, s, gain) = (&mut block.u[..n], &mut block.v[..n], &mut block.s[..n], &mut block.gain[..n]);
+        let (gy, places) = (&gy[..n], &places[..n]);
+        for i in 0..n {
+            let (column, row) = ((places[i] & 0xffff) as i32 as f32, (places[i] >> 16) as i32 as f32);
+            let [cos, sin, offset] = edge_offset(column - middle.0, row - middle.1, gx[i], gy[i]);
+            (u[i], v[i], s[i]) = (gain[i] * cos, gain[i] * sin, -offset);
+            gain[i] = if offset.abs() <= limit { gain[i] } else { 0.0 };
+        }
     }
 }
 

@@ -1,0 +1,145 @@
+//! The widest vectors that kernels use: those of the machine, or narrower ones where the environment says so.
+
+use std::sync::OnceLock;
+
+#[doc(hidden)]
+pub use fearless_simd;
+
+/// The variable of the environment that caps the level of a process, read once.
+pub const VARIABLE: &str = "TILTVP_SIMD";
+
+/// Vectors that a machine may have. Answers do not depend on them.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Level {
+    /// What every machine of the kind has: on x86-64 the 128 bits of SSE2.
+    Fallback,
+    /// 128 bits (x86-64-v2).
+    Sse42,
+    /// 256 bits (x86-64-v3: Haswell, Zen and later).
+    Avx2,
+    /// 512 bits (x86-64-v4). Gradients are compacted by VBMI2 where there is that too (Ice Lake, Zen 4), and loops without a kernel
+    /// of their own use 256 bits elsewhere.
+    Avx512,
+    /// 128 bits, which every 64-bit ARM has.
+    Neon,
+}
+
+impl Level {
+    /// All there are, on any machine.
+    const ALL: [Self; 5] = [Self::Fallback, Self::Sse42, Self::Avx2, Self::Avx512, Self::Neon];
+
+    /// The word that the environment takes.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Fallback => "fallback",
+            Self::Sse42 => "sse4.2",
+            Self::Avx2 => "avx2",
+            Self::Avx512 => "avx512",
+            Self::Neon => "neon",
+        }
+    }
+
+    /// Those of this machine, the widest last.
+    pub fn available() -> impl Iterator<Item = Self> {
+        Self::ALL.into_iter().filter(|level| level.loops().is_some())
+    }
+
+    /// What runs loops without a kernel of their own at this level; none where the machine has not got it.
+    fn loops(self) -> Option<fearless_simd::Level> {
+        use fearless_simd::{Level as Loops, Simd as _};
+        let machine = Loops::new();
+        match self {
+            Self::Fallback => Some(Loops::baseline()),
+            #[cfg(target_arch = "x86_64")]
+            Self::Sse42 => machine.as_sse4_2().map(|token| token.level()),
+            #[cfg(target_arch = "x86_64")]
+            Self::Avx2 => machine.as_avx2().map(|token| token.level()),
+            #[cfg(target_arch = "x86_64")]
+            Self::Avx512 => {
+                let there = is_x86_feature_detected!("avx512f")
+                    && is_x86_feature_detected!("avx512bw")
+                    && is_x86_feature_detected!("avx512cd")
+                    && is_x86_feature_detected!("avx512dq")
+                    && is_x86_feature_detected!("avx512vl");
+                machine.as_avx2().filter(|_| there).map(|_| machine)
+            }
+            #[cfg(target_arch = "aarch64")]
+            Self::Neon => machine.as_neon().map(|token| token.level()),
+            _ => None,
+        }
+    }
+}
+
+/// What the environment may say on this machine.
+pub fn expected() -> String {
+    let names: Vec<_> = Level::available().map(Level::name).collect();
+    format!("one of {} (what this machine has)", names.join(", "))
+}
+
+/// The level of this process and what runs its loops, and the word that was not understood.
+struct Chosen {
+    level: Level,
+    loops: fearless_simd::Level,
+    wrong: Option<String>,
+}
+
+fn chosen() -> &'static Chosen {
+    static CHOSEN: OnceLock<Chosen> = OnceLock::new();
+    CHOSEN.get_or_init(|| {
+        // An empty word is none.
+        let word = std::env::var_os(VARIABLE).filter(|word| !word.is_empty());
+        let word = word.map(|word| word.to_string_lossy().into_owned());
+        let named = word.as_deref().and_then(|word| Level::available().find(|level| level.name() == word));
+        let wrong = word.filter(|_| named.is_none());
+        let level = named.or_else(|| Level::available().last()).unwrap_or(Level::Fallback);
+        let loops = level.loops().unwrap_or(fearless_simd::Level::baseline());
+        Chosen { level, loops, wrong }
+    })
+}
+
+/// The level of this process: the machine's widest where the environment says nothing that is understood. The machine has it.
+#[inline]
+pub fn level() -> Level {
+    chosen().level
+}
+
+/// The level of this process, or the word in the environment that is none of the machine's.
+pub fn checked() -> Result<Level, &'static str> {
+    let Chosen { level, wrong, .. } = chosen();
+    wrong.as_deref().map_or(Ok(*level), Err)
+}
+
+#[doc(hidden)]
+#[inline]
+pub fn loops() -> fearless_simd::Level {
+    chosen().loops
+}
+
+/// A function whose loops the compiler makes vectors of, once for each level; the one of this process is called. Arguments are
+/// names, or names in brackets where an array is taken apart.
+#[macro_export]
+macro_rules! vectorised {
+    ($(#[$meta:meta])* $vis:vis fn $name:ident($($argument:tt: $type:ty),* $(,)?) $(-> $out:ty)? $body:block) => {
+        $(#[$meta])*
+        $vis fn $name($($argument: $type),*) $(-> $out)? {
+            // A function and no closure: the compiler is to know that its arguments do not overlap.
+            #[inline(always)]
+            fn body($($argument: $type),*) $(-> $out)? $body
+            $crate::level::fearless_simd::dispatch!($crate::level::loops(), _ => body($($argument),*))
+        }
+    };
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_widest_level_of_a_machine_is_chosen_and_every_word_is_of_one_level() {
+        let names: Vec<_> = Level::ALL.map(Level::name).to_vec();
+        assert_eq!(names, ["fallback", "sse4.2", "avx2", "avx512", "neon"]);
+        assert!(Level::available().any(|one| one == level()));
+        assert_eq!(checked(), Ok(level()));
+        assert!(expected().starts_with("one of fallback, "));
+    }
+}
