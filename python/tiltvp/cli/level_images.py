@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
-from tiltvp.cli.filtering import FilterOptions
+from tiltvp.cli.filtering import FilterOptions, Judge
 from tiltvp.cli.options import MethodOptions
 from tiltvp.cli.results import Outcome
 from tiltvp.cli.sources import picture_names
@@ -142,7 +142,7 @@ def write_images(
     judge, levelled = work.filtering.judge(), 0
     with progress_bar(len(frames.files), "images") as bar:
         for frame, name, motion in zip(frames, picture_names(frames), motions, strict=False):
-            problem = _level(frame, folder / name, work, lambda outcome, motion=motion: judge(outcome, motion))
+            problem = _level(frame, motion, folder / name, work, judge)
             if problem is None:
                 levelled += 1
             else:
@@ -151,7 +151,7 @@ def write_images(
     return levelled, len(frames.files)
 
 
-def _level(frame: Frame, path: Path, work: Levelling, judge: Callable[[Outcome], Outcome]) -> str | None:
+def _level(frame: Frame, motion: Motion | None, path: Path, work: Levelling, judge: Judge) -> str | None:
     """Makes one image level, and says what is wrong. Raises `OutputError`, which all images would have."""
     file = Path(frame.name)
     try:
@@ -159,9 +159,9 @@ def _level(frame: Frame, path: Path, work: Levelling, judge: Callable[[Outcome],
         estimate = work.look(image).estimate(image)
     except TiltvpError as error:
         told = " ".join(str(error).split())
-        judge(Outcome(file, error=told, taken_s=frame.time_s))
+        judge(Outcome(file, error=told, taken_s=frame.time_s), motion)
         return told
-    outcome = judge(Outcome(file, estimate, taken_s=frame.time_s))
+    outcome = judge(Outcome(file, estimate, taken_s=frame.time_s), motion)
     return _write(outcome, image, data, path.with_name(f"{path.name}{_ending(file)}"), work)
 
 

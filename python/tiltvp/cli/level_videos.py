@@ -20,9 +20,7 @@ if TYPE_CHECKING:
     from tiltvp.streams import Frame, Frames, Motion
 
 
-def write_video(
-    frames: Frames, motions: Iterable[Motion | None], path: Path, work: Levelling
-) -> tuple[int, int]:
+def write_video(frames: Frames, motions: Iterable[Motion | None], path: Path, work: Levelling) -> tuple[int, int]:
     """Writes a level video, whole or not at all, always by the filter; how many of how many frames are level.
 
     Frames for which it has no tilt are black, so that time goes on, or as they are where that is asked for.

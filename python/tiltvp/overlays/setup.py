@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from tiltvp.images import gray_from
+from tiltvp.levelling import level
 from tiltvp.overlays.tilt import ESTIMATED, UPRIGHT, draw_tilt, draw_words
-from tiltvp.tilt import level
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
