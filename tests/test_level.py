@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import pickle
 from collections.abc import Callable
 
 import numpy as np
@@ -102,3 +103,61 @@ def test_the_mounting_of_the_estimate_is_not_forgotten(camera: tiltvp.Camera) ->
         tiltvp.level(image, camera, (0.1, 0.7))
     with pytest.raises(InvalidInputError, match="another one than that of the estimator"):
         tiltvp.level(image, estimator, (0.1, 0.7), np.eye(3))
+
+
+def test_levellers_show_what_they_are_asked_for(camera: tiltvp.Camera, room: RoomImage) -> None:
+    tilt = (0.1, 0.7)
+    same = tiltvp.Leveller(camera)
+    assert np.array_equal(same(room.gray, tilt), tiltvp.level(room.gray, camera, tilt, np.eye(3)))
+    colour = same(np.stack([room.gray] * 3, axis=2), tilt)
+    assert np.array_equal(colour[:, :, 1], same(room.gray, tilt))
+    assert np.array_equal(same(room.gray, tilt), same(room.gray, tiltvp.normal_from_alpha_beta(*tilt)))
+    again = pickle.loads(pickle.dumps(same))
+    assert np.array_equal(again(room.gray, tilt), same(room.gray, tilt))
+    panorama = tiltvp.Leveller(camera, to="panorama")
+    assert panorama.output.width == 2 * panorama.output.height
+    seen = panorama(room.gray, tilt)
+    middle = panorama.output.height // 2
+    assert seen[: middle // 2].any(axis=1).all()
+    assert not seen[-middle // 2 :].any()
+    pinhole = tiltvp.Leveller(camera, to="pinhole", size=(90, 60), field_of_view_rad=1.0)
+    assert pinhole(room.gray, tilt).shape == (60, 90)
+    assert tiltvp.Leveller(camera, size=(128, 128))(room.gray, tilt).shape == (128, 128)
+    assert tiltvp.Leveller(camera, to=pinhole.output)(room.gray, tilt).shape == (60, 90)
+
+
+def test_impossible_levellers_are_refused(camera: tiltvp.Camera) -> None:
+    for words, options in (
+        ("expected one of same", {"to": "sphere"}),
+        ("fisheye or pinhole only", {"field_of_view_rad": 1.0}),
+        ("field_of_view_rad = 3.2", {"to": "pinhole", "field_of_view_rad": 3.2}),
+        ("of the shape", {"size": (100, 30)}),
+        ("beside a camera", {"to": camera, "size": (10, 10)}),
+    ):
+        with pytest.raises(InvalidInputError, match=words):
+            tiltvp.Leveller(camera, **options)
+    with pytest.raises(InvalidInputError, match="8 x 4"):
+        tiltvp.Unwrapper(camera, size=(4, 4))
+    with pytest.raises(InvalidInputError, match="rising"):
+        tiltvp.Unwrapper(camera, elevation_max_rad=-0.1)
+
+
+def test_strips_of_a_leaning_robot_are_those_of_the_upright(
+    camera: tiltvp.Camera, render: Callable[..., RoomImage], upright_room: RoomImage
+) -> None:
+    unwrap = tiltvp.Unwrapper(camera, size=(90, 30), elevation_min_rad=0.1)
+    upright = unwrap(upright_room.gray)
+    assert upright.shape == (30, 90)
+    leaning = render(kind="living-room", seed=1, alpha_rad=0.06, beta_rad=0.8, noise_sigma=0.0)
+    level, not_level = unwrap(leaning.gray, (0.06, 0.8)), unwrap(leaning.gray)
+    assert np.abs(level - upright).mean() < 0.5 * np.abs(not_level - upright).mean()
+    assert np.array_equal(pickle.loads(pickle.dumps(unwrap))(leaning.gray), not_level)
+
+
+@pytest.mark.parametrize("dtype", [np.uint16, np.float32])
+def test_other_types_are_the_same_picture(camera: tiltvp.Camera, room: RoomImage, dtype: type) -> None:
+    leveller = tiltvp.Leveller(camera)
+    levelled = leveller(room.gray, (0.1, 1.0)).astype(float)
+    other = leveller(room.gray.astype(dtype), (0.1, 1.0)).astype(float)
+    # OpenCV's weights have 5 bits, ours 8.
+    assert np.abs(levelled - other).mean() < 0.5

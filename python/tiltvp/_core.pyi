@@ -51,6 +51,7 @@ __all__ = [
     "FitReport",
     "ImageEdges",
     "Laboratory",
+    "Leveller",
     "LineExtractor",
     "LineTracker",
     "Lines",
@@ -84,7 +85,6 @@ __all__ = [
     "included_angle",
     "leaning_from_upright",
     "lens_schema",
-    "level_map",
     "match_descriptors",
     "normal_from_alpha_beta",
     "option_fields",
@@ -1428,6 +1428,44 @@ class Laboratory:
     @property
     def size_m(self) -> tuple[float, float, float]:
         """Lengths of the cuboid's edges x, y, z, metres."""
+
+@final
+class Leveller:
+    """Level images of one camera, as another camera would take them on the upright robot, or along given rays.
+
+    The rays of their pixels are made once. `tiltvp.Leveller` and `tiltvp.Unwrapper` say what is shown. `camera` is the
+    camera whose images will come, `robot_from_camera` (3, 3) its mounting, by default the identity; what is shown is
+    what the camera `shown` sees that is mounted by `robot_from_shown`, or the `rays` (H W, 3) of the robot frame of an
+    image of `columns` columns, NaN where it shows nothing.
+    """
+
+    def __new__(
+        cls,
+        camera: Camera,
+        shown: Camera | None = None,
+        *,
+        robot_from_camera: ArrayLike | None = None,
+        robot_from_shown: ArrayLike | None = None,
+        rays: ArrayLike | None = None,
+        columns: int = 0,
+    ) -> Self: ...
+    def _level(self, image: NDArray[np.uint8], normal: ArrayLike) -> NDArray[np.uint8]:
+        """(H, W) or (H, W, 3): the level image of one of the camera, C-contiguous uint8."""
+
+    def _map(self, normal: ArrayLike) -> NDArray[np.float32]:
+        """(H, W, 2): where each pixel (u, v) of the level image is in the leaning one; NaN where it was not seen."""
+
+    @property
+    def camera(self) -> Camera:
+        """The camera whose images are made level."""
+
+    @property
+    def robot_from_camera(self) -> NDArray[np.float64]:
+        """(3, 3): R of v_robot = R v_camera."""
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """(H, W): rows and columns of level images."""
 
 @disjoint_base
 class LineExtractor:
@@ -3223,12 +3261,6 @@ def leaning_from_upright(normal: ArrayLike) -> NDArray[np.float64]:
 def lens_schema(model: str) -> dict[str, Any]:
     """What the lens model of a name declares: `name`, `doc`, and its `parameters` in order, each with `name`,
     `required`, `default`, `is_list` and `doc`.
-    """
-
-def level_map(camera: Camera, normal: ArrayLike, *, robot_from_camera: ArrayLike | None = None) -> NDArray[np.float32]:
-    """(H, W, 2): where each pixel (u, v) of the upright image is found in the leaning one; NaN where it was not seen.
-
-    `normal` is the ground normal (3,) in the robot frame, of any length but zero.
     """
 
 def match_descriptors(

@@ -28,8 +28,6 @@ _FIELD_OF_VIEW_RAD: Final = {"fisheye": math.pi, "pinhole": 0.5 * math.pi}
 _LEVELLED: Final = ("uint8", "uint16", "int16", "float32", "float64")
 _OUTSIDE_PX: Final = -1e6
 """Where OpenCV is sent for what was not seen."""
-_NO_MAP: Final = np.empty(0, dtype=np.float32)
-"""Beside a map of columns and rows in one."""
 _UPRIGHT: Final = (0.0, 0.0, 1.0)
 _ACROSS, _DOWN = 4, 2
 """Places that are averaged in each pixel of a strip, along the row and along the column."""
@@ -109,7 +107,7 @@ class Leveller:
         last = np.array(array.shape[1::-1], dtype=np.float32) - 1.0
         seen = np.isfinite(places[:, :, 0]) & ((places >= -0.5) & (places < last + 0.5)).all(axis=2)
         places = np.where(seen[:, :, None], np.clip(places, 0.0, last), _OUTSIDE_PX).astype(np.float32)
-        found = cv2.remap(array, np.ascontiguousarray(places), _NO_MAP, cv2.INTER_LINEAR)
+        found = cv2.remap(array, *_maps(places), cv2.INTER_LINEAR)
         # OpenCV drops an axis of length one.
         return np.asarray(found).reshape(places.shape[:2] + array.shape[2:])
 
@@ -220,6 +218,11 @@ def _closed(array: NDArray[Any], places: NDArray[np.float32], camera: _core.Came
     return np.concatenate([array[:, -1:], array, array[:, :1]], axis=1)
 
 
+def _maps(places: NDArray[np.float32]) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """Columns and rows, each for itself, as OpenCV takes them."""
+    return np.ascontiguousarray(places[:, :, 0]), np.ascontiguousarray(places[:, :, 1])
+
+
 def level(
     image: ArrayLike,
     seen_by: TiltEstimator | _core.Camera,
@@ -311,7 +314,7 @@ class Unwrapper:
         # The number of the last row that is seen, from the top down to each row.
         rows = np.maximum.accumulate(np.where(seen, np.arange(places.shape[0])[:, None], 0), axis=0)
         places = np.nan_to_num(np.take_along_axis(places, rows[:, :, None], axis=0), nan=_OUTSIDE_PX)
-        fine = cv2.remap(array, places, _NO_MAP, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+        fine = cv2.remap(array, *_maps(places), cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
         return np.asarray(cv2.resize(fine.astype(np.float32), self.size, interpolation=cv2.INTER_AREA))
 
     def __reduce__(self) -> tuple[Any, ...]:

@@ -103,7 +103,7 @@ impl Leveller {
         Ok(level.reshape([height, width, 3])?.into_any())
     }
 
-    /// (H, W, 2) float32: where each pixel (u, v) of the level image is in the leaning one; NaN where it was not seen.
+    /// (H, W, 2): where each pixel (u, v) of the level image is in the leaning one; NaN where it was not seen.
     #[pyo3(signature = (normal: "ArrayLike") -> "NDArray[np.float32]")]
     fn _map<'py>(&self, py: Python<'py>, normal: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
         let tilt = convert::tilt(normal, "normal")?;

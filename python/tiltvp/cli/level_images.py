@@ -64,10 +64,15 @@ class Looks:
 
     def __post_init__(self) -> None:
         """Raises `InvalidInputError` for what cannot be together."""
+        from tiltvp import Camera
+
         if self.metadata_only and (self.camera is not None or self.keywords["to"] != "same"):
             raise InvalidInputError("--metadata-only with --camera or --to, expected 360-degree photographs alone")
         if self.camera is not None:
             self.of(self.camera.width, self.camera.height)
+        else:
+            # What is wrong with all sizes is so with a small one, and is told before any work is done.
+            self._look(Camera.equirectangular(width=64, height=32), size=None)
 
     @property
     def are_panoramas(self) -> bool:
@@ -90,7 +95,7 @@ class Looks:
             self._made[width, height] = self._look(camera)
         return self._made[width, height]
 
-    def _look(self, camera: Camera) -> Look:
+    def _look(self, camera: Camera, **other: Any) -> Look:
         from tiltvp import Camera, Leveller
 
         seen_by, otherwise = camera, {}
@@ -101,7 +106,7 @@ class Looks:
             if self.method.method is None:
                 otherwise = {"method": "segments", "tilt_max_rad": math.pi}
         estimator = self.method.estimator(seen_by, **otherwise)
-        return Look(estimator, Leveller(camera, estimator.robot_from_camera, **self.keywords))
+        return Look(estimator, Leveller(camera, estimator.robot_from_camera, **(self.keywords | other)))
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,125 @@
+"""`tiltvp level`: images of a camera, 360-degree photographs, videos."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+import tiltvp
+from tiltvp.cli import main
+from tiltvp.photos import panorama_kind
+from tiltvp.rotations import rotation_from
+from tiltvp.synth import RoomImage
+from tiltvp.videos import VideoReader, video_writer
+
+FORWARD = rotation_from("forward", "the mounting")
+LEAN = (math.radians(12.0), 0.7)
+
+
+@pytest.fixture(scope="module")
+def photo(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """What a panoramic camera that leans by 12 degrees sees in a room."""
+    camera = tiltvp.Camera.equirectangular(width=1024, height=512)
+    room = tiltvp.synth.Room("living-room", 1, threads=1)
+    seen = room.render(
+        camera,
+        pose=room.free_poses(1, 0)[0],
+        robot_from_camera=FORWARD,
+        alpha_rad=LEAN[0],
+        beta_rad=LEAN[1],
+        threads=1,
+    )
+    path = tmp_path_factory.mktemp("photos") / "photo.jpg"
+    path.write_bytes(cv2.imencode(".jpg", seen.bgr, [cv2.IMWRITE_JPEG_QUALITY, 91])[1].tobytes())
+    return path
+
+
+def lean_deg(path: Path) -> float:
+    image = tiltvp.read_image(path)
+    camera = tiltvp.Camera.equirectangular(width=image.shape[1], height=image.shape[0])
+    estimate = tiltvp.TiltEstimator(camera, method="segments", robot_from_camera=FORWARD, tilt_max_rad=math.pi)(image)
+    assert estimate.confidence > 0.5
+    return math.degrees(estimate.alpha_rad)
+
+
+def test_a_photograph_is_level_and_says_so(photo: Path, tmp_path: Path) -> None:
+    assert lean_deg(photo) == pytest.approx(12.0, abs=1.0)
+    assert main(["level", str(photo), "--out", str(tmp_path / "level")]) == 0
+    written = tmp_path / "level" / "photo.jpg"
+    assert lean_deg(written) < 1.0
+    image = tiltvp.read_image(written)
+    assert image.shape == (512, 1024, 3)
+    assert panorama_kind(written.read_bytes(), 1024, 512).reason == "GPano metadata"
+    # The first and the last column are neighbours: as near to one another as any two are.
+    steps = np.abs(np.diff(image.astype(int), axis=1)).mean(axis=(0, 2))
+    assert np.abs(image[:, 0].astype(int) - image[:, -1]).mean() <= steps.max()
+
+
+def test_metadata_alone_leave_the_pixels_as_they_are(photo: Path, tmp_path: Path) -> None:
+    assert main(["level", str(photo), "--out", str(tmp_path), "--metadata-only", "--overwrite"]) == 0
+    written = (tmp_path / "photo.jpg").read_bytes()
+    begin = photo.read_bytes().index(b"\xff\xdb")
+    assert written.endswith(photo.read_bytes()[begin:])
+    # Leaning forward the middle of the image looks down.
+    pitch_deg = float(written.split(b'PosePitchDegrees="')[1].split(b'"')[0])
+    roll_deg = float(written.split(b'PoseRollDegrees="')[1].split(b'"')[0])
+    normal = tiltvp.normal_from_alpha_beta(*LEAN)
+    assert pitch_deg == pytest.approx(math.degrees(math.asin(normal[0])), abs=1.0)
+    assert roll_deg == pytest.approx(math.degrees(math.atan2(normal[1], normal[2])), abs=1.0)
+
+
+def test_what_is_not_believed_is_said_and_left_out_or_copied(
+    photo: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    blank, narrow = tmp_path / "blank.png", tmp_path / "narrow.png"
+    tiltvp.write_image(blank, np.full((256, 512), 90, np.uint8))
+    tiltvp.write_image(narrow, np.full((256, 300), 90, np.uint8))
+    out = tmp_path / "out"
+    assert main(["level", str(blank), str(narrow), str(photo), "--out", str(out)]) == 1
+    seen = capsys.readouterr()
+    assert "blank.png: no tilt" in seen.err
+    assert "left out" in seen.err
+    assert "300 x 256 pixels, expected twice as wide as high" in seen.err
+    assert "1 of 3 made level" in seen.out
+    assert [file.name for file in out.iterdir()] == ["photo.jpg"]
+    assert main(["level", str(blank), "--out", str(out), "--copy-unlevelled", "--overwrite"]) == 1
+    assert (out / "blank.png").read_bytes() == blank.read_bytes()
+    assert "copied as it is" in capsys.readouterr().err
+
+
+def test_views_of_a_photograph(photo: Path, tmp_path: Path) -> None:
+    pinhole = ["--to", "pinhole", "--size", "320x240", "--field-of-view-deg", "80"]
+    assert main(["level", str(photo), "--out", str(tmp_path / "pinhole"), *pinhole]) == 0
+    assert tiltvp.read_image(tmp_path / "pinhole" / "photo.jpg").shape == (240, 320, 3)
+    assert b"GPano" not in (tmp_path / "pinhole" / "photo.jpg").read_bytes()
+    assert main(["level", str(photo), "--out", str(tmp_path / "x"), "--field-of-view-deg", "80"]) == 2
+    assert main(["level", str(photo), "--out", str(tmp_path / "x"), "--metadata-only", "--to", "pinhole"]) == 2
+
+
+def test_a_video_is_level_at_its_own_rate(camera: tiltvp.Camera, room: RoomImage, tmp_path: Path) -> None:
+    camera.save(tmp_path / "camera.toml")
+    with video_writer(tmp_path / "drive.avi", 12.0) as video:
+        for gray in [np.zeros_like(room.gray), *[room.gray] * 4]:
+            video.add(cv2.cvtColor(gray, cv2.COLOR_GRAY2BGR))
+    words = ["level", str(tmp_path / "drive.avi"), "--camera", str(tmp_path / "camera.toml")]
+    # The first frame is black, and comes before the filter knows anything.
+    assert main([*words, "--out", str(tmp_path / "level.avi")]) == 1
+    level = VideoReader(tmp_path / "level.avi")
+    assert level.count == 5
+    assert level.rate_hz == pytest.approx(12.0)
+    frames = list(level)
+    assert not frames[0].any()
+    estimate = tiltvp.TiltEstimator(camera)(frames[-1])
+    assert estimate.alpha_rad < math.radians(1.0)
+
+
+def test_a_panorama_is_a_camera_in_every_command(photo: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["tilt", str(photo), "--camera", "equirectangular:1024x512", "--method", "segments",
+                 "--tilt-max-deg", "90", "--out", "-"]) == 0  # fmt: skip
+    assert '"error": null' in capsys.readouterr().out
+    assert main(["tilt", str(photo), "--camera", "equirectangular:wide"]) == 2
+    assert "expected WIDTHxHEIGHT" in capsys.readouterr().err
