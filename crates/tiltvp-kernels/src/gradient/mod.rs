@@ -15,9 +15,9 @@ use crate::vectorised;
 use avx512::Pending;
 #[cfg(target_arch = "x86_64")]
 use avx512_scharr::VectorLevel;
+pub use block::{BLOCK, Directions, KeptPixels, Level, Levels, PixelBlock, REACH, Threshold, place};
 #[cfg(target_arch = "x86_64")]
 use fearless_simd::Avx2;
-pub use block::{BLOCK, Directions, KeptPixels, Level, Levels, PixelBlock, REACH, Threshold, place};
 
 /// Stands where there are no kernels but the portable one.
 #[cfg(not(target_arch = "x86_64"))]

@@ -1,8 +1,8 @@
 //! Line segments: ridge pixels grown together where their gradients agree, and split until each lies on one great circle.
 
-use tiltvp_kernels::vectorised;
 use nalgebra::{Matrix3, Vector2, Vector3};
 use tiltvp_kernels::prefetch::prefetch;
+use tiltvp_kernels::vectorised;
 
 use crate::camera::Camera;
 use crate::corner::options::GeneralOptions;

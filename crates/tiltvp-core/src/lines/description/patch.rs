@@ -1,8 +1,8 @@
 //! The image around a line, resampled with the line upright: rows along it, columns across it.
 
-use tiltvp_kernels::vectorised;
 use nalgebra::{Matrix3, Vector2, Vector3};
 use tiltvp_kernels::bilinear::quads;
+use tiltvp_kernels::vectorised;
 
 use crate::camera::Camera;
 use crate::image::ImageView;

@@ -1,7 +1,7 @@
 //! Symmetric positive definite matrices: factored, inverted and reduced in blocks of columns.
 
-use tiltvp_kernels::vectorised;
 use nalgebra::{DMatrix, DVector};
+use tiltvp_kernels::vectorised;
 
 use crate::interrupt::check;
 

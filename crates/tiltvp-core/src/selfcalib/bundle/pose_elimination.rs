@@ -1,7 +1,7 @@
 //! The normal equations of one pose, coupled to its neighbours and to shared parameters, and its elimination (Schur complement).
 
-use tiltvp_kernels::vectorised;
 use nalgebra::{Cholesky, Matrix3, Matrix3x2, Vector3};
+use tiltvp_kernels::vectorised;
 
 use super::linearisation::{BearingRow, MotionBlocks, NormalEquations};
 

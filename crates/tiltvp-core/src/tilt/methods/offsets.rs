@@ -1,8 +1,8 @@
 //! Edge offsets as rows of a cosine that is fitted to them (Fleer 2017, section 2.1).
 
-use tiltvp_kernels::vectorised;
 use nalgebra::Vector2;
 use tiltvp_kernels::compaction::{KeptRows, ROOM, RowBlock, compact_rows};
+use tiltvp_kernels::vectorised;
 
 use crate::edges::EdgePixels;
 use crate::robust::{Moments, Problem, Rows, Weights};
