@@ -25,9 +25,9 @@ _SPEED_M_S, _TURN_RAD_S = 0.35, math.radians(60.0)
 """Means along a leg, as of an indoor robot with a camera; the greatest are 1.875 times as much."""
 _REST_S: Final = 0.3
 """Before the first leg and after each: the robot stands while the direction of its motion changes."""
-_WAVES_M: Final = (0.31, 0.47, 0.73, 1.1)
-"""Wavelengths of bumps along the wheels' way, no multiples of each other: at the greatest speed the shortest takes
-about half a second."""
+_WAVES_M: Final = (0.9, 1.3, 2.1, 3.4)
+"""Wavelengths of bumps along the wheels' way, no multiples of each other: a robot whose wheels are 0.35 m apart spans
+those shorter than about twice that."""
 _STEP_S: Final = 1e-3
 """Of central differences: a hundredth of the shortest bump's time or less."""
 
