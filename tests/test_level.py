@@ -11,6 +11,7 @@ import pytest
 
 import tiltvp
 from tiltvp.errors import InvalidInputError
+from tiltvp.rotations import rotation_from
 from tiltvp.synth import RoomImage
 
 
@@ -161,3 +162,8 @@ def test_other_types_are_the_same_picture(camera: tiltvp.Camera, room: RoomImage
     other = leveller(room.gray.astype(dtype), (0.1, 1.0)).astype(float)
     # OpenCV's weights have 5 bits, ours 8.
     assert np.abs(levelled - other).mean() < 0.5
+
+
+def test_panoramas_look_ahead(camera: tiltvp.Camera, room: RoomImage) -> None:
+    ahead = tiltvp.Leveller(camera, to="panorama", robot_from_output=rotation_from("forward", "the mounting"))
+    assert np.array_equal(tiltvp.Leveller(camera, to="panorama")(room.gray, (0.1, 0.2)), ahead(room.gray, (0.1, 0.2)))

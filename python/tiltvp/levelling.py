@@ -10,7 +10,6 @@ import numpy as np
 from tiltvp import _core
 from tiltvp.cameras import Camera
 from tiltvp.errors import InvalidInputError
-from tiltvp.rotations import rotation_from
 from tiltvp.tilt import FilteredTilt, TiltEstimate, TiltEstimator, normal_from_alpha_beta
 
 if TYPE_CHECKING:
@@ -28,6 +27,8 @@ _FIELD_OF_VIEW_RAD: Final = {"fisheye": math.pi, "pinhole": 0.5 * math.pi}
 _LEVELLED: Final = ("uint8", "uint16", "int16", "float32", "float64")
 _OUTSIDE_PX: Final = -1e6
 """Where OpenCV is sent for what was not seen."""
+_AHEAD: Final = ((0.0, 0.0, 1.0), (-1.0, 0.0, 0.0), (0.0, -1.0, 0.0))
+"""The mounting "forward", as `tiltvp.rotations` has it, which would double the time of the import."""
 _UPRIGHT: Final = (0.0, 0.0, 1.0)
 _ACROSS, _DOWN = 4, 2
 """Places that are averaged in each pixel of a strip, along the row and along the column."""
@@ -72,7 +73,7 @@ class Leveller:
         self.output: _core.Camera = _output(camera, to, size, field_of_view_rad)
         """Whose images they become."""
         ahead = to == "panorama" and robot_from_output is None
-        looks = rotation_from("forward", "robot_from_output") if ahead else robot_from_output
+        looks = _AHEAD if ahead else robot_from_output
         self._given = (camera, robot_from_camera, self.output, looks)
         self._core = _core.Leveller(camera, self.output, robot_from_camera=robot_from_camera, robot_from_shown=looks)
 
