@@ -17,8 +17,9 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
     from tiltvp._core import Camera
+    from tiltvp.streams.odometry import Odometry
 
-__all__ = ["TurnCheck", "check_turns"]
+__all__ = ["FrameDelay", "TurnCheck", "check_turns", "frame_delay"]
 
 _SIDE_PX: Final = 120
 """Longer side to which images are made smaller: what is near moves by less than a pixel while the robot drives on."""
@@ -33,6 +34,15 @@ _TURNED_RAD: Final = math.radians(45.0)
 _SIGMAS: Final = 3.0
 """By how many of its standard errors the mean difference has to be off zero."""
 _LEAST: Final = 4
+_DELAY_STEP_S: Final = 0.02
+"""Of delays that are tried: half a frame at 25 a second."""
+_DELAY_FLOOR_S: Final = 0.005
+"""Least standard deviation of a delay: what a parabola over steps of 0.02 s leaves."""
+_DELAY_SIGMA_MAX_S: Final = 0.03
+_LIKENESS_MIN: Final = 0.3
+"""Least mean correlation of a delay that is believed: pairs of unlike images have below 0.2."""
+_PARTS: Final = 8
+"""Of a drive, each of which is left out in turn."""
 
 
 @dataclass(frozen=True)
@@ -86,24 +96,16 @@ def check_turns(
     the other way round; so do wheels that are swapped. Which of them it is cannot be told. The mounting (3, 3) has to
     be right about which way is up, not about its yaw. Raises `InvalidInputError` for sizes that do not fit.
     """
-    small, grays = _small(images, camera)
+    pictures = _Pictures(images, camera, robot_from_camera)
     headings = np.asarray(yaw_rad, dtype=np.float64)
-    if headings.shape != (len(grays),) or not np.isfinite(headings).all():
-        raise InvalidInputError(f"yaw_rad: shape {headings.shape}, expected ({len(grays)},) of finite angles")
-    places, rays = _robot_rays(small, np.asarray(robot_from_camera, dtype=np.float64))
-    differences, scores = [], []
-    for k in range(len(grays)):
-        here = grays[k][places[:, 1], places[:, 0]]
-        for other in _partners(headings, k):
-            turn = float(headings[k] - headings[other])
-            pair = []
-            for sign in (1.0, -1.0):
-                # A direction that is seen here at ray r was seen there at Rz(turn) r.
-                there = rays @ about_vertical(sign * turn).T @ np.asarray(robot_from_camera, dtype=np.float64)
-                pair.append(_correlation(here, grays[other], small.project(there)))
-            if np.isfinite(pair).all():
-                scores.append(pair)
-                differences.append(pair[0] - pair[1])
+    if headings.shape != (len(pictures),) or not np.isfinite(headings).all():
+        raise InvalidInputError(f"yaw_rad: shape {headings.shape}, expected ({len(pictures)},) of finite angles")
+    scores = [
+        [pictures.likeness(k, other, sign * float(headings[k] - headings[other])) for sign in (1.0, -1.0)]
+        for k, other in _pairs(headings)
+    ]
+    scores = [pair for pair in scores if np.isfinite(pair).all()]
+    differences = [told - otherwise for told, otherwise in scores]
     turned = min(float(np.ptp(headings)) if len(headings) else 0.0, math.tau)
     if not scores:
         return TurnCheck(0, turned, 0.0, 0.0, 0.0)
@@ -113,6 +115,101 @@ def check_turns(
     return TurnCheck(
         len(scores), turned, float(mean[0]), float(mean[1]), float(np.mean(differences) / max(spread, 1e-6))
     )
+
+
+@dataclass(frozen=True)
+class FrameDelay:
+    """By how much the times of images are later than those of the odometry. False where the drive does not tell."""
+
+    delay_s: float
+    sigma_s: float
+    """Its standard deviation, by leaving out parts of the drive."""
+    likeness: float
+    """Mean correlation of pairs turned back with that delay."""
+    pairs: int
+
+    def __bool__(self) -> bool:
+        return self.likeness >= _LIKENESS_MIN and self.sigma_s <= _DELAY_SIGMA_MAX_S
+
+    @property
+    def reason(self) -> str:
+        """What was found, in a sentence."""
+        told = f"{self.pairs} pairs of images correlate by {self.likeness:.2f} at a delay of {self.delay_s:.3f} s"
+        return f"{told}, 1-sigma {self.sigma_s:.3f}" if self else f"{told}: not told, expected turns that begin and end"
+
+
+def frame_delay(
+    images: Iterable[ArrayLike],
+    times_s: ArrayLike,
+    odometry: Odometry,
+    camera: Camera,
+    robot_from_camera: ArrayLike,
+    *,
+    reach_s: float = 1.0,
+) -> FrameDelay:
+    """By how much the times (N,) of images are later than the odometry's, where the robot's turns begin and end.
+
+    For each delay within `reach_s` images are turned back by what the odometry says of their true times, and compared.
+    The mounting (3, 3) has to be right about which way is up. Raises `InvalidInputError` for sizes that do not fit.
+    """
+    pictures = _Pictures(images, camera, robot_from_camera)
+    times = np.asarray(times_s, dtype=np.float64)
+    if times.shape != (len(pictures),) or not np.isfinite(times).all():
+        raise InvalidInputError(f"times_s: shape {times.shape}, expected ({len(pictures)},) of finite times")
+    headings = odometry.at(times).yaw_rad
+    if headings is None:
+        raise InvalidInputError(f"{odometry.source}: distances without turns, expected the distance between the wheels")
+    pairs = _pairs(headings)
+    steps = max(2, round(reach_s / _DELAY_STEP_S))
+    delays = np.linspace(-reach_s, reach_s, 2 * steps + 1)
+    table = np.full((len(pairs), len(delays)), np.nan)
+    for column, delay in enumerate(delays):
+        turned = odometry.at(times - delay).yaw_rad
+        if turned is not None:
+            table[:, column] = [pictures.likeness(k, other, float(turned[k] - turned[other])) for k, other in pairs]
+    table = table[np.isfinite(table).all(axis=1)]
+    if len(table) < _PARTS:
+        return FrameDelay(0.0, math.inf, 0.0, len(table))
+    best, likeness = _peak(delays, table)
+    parts = np.arange(len(table)) * _PARTS // len(table)
+    without = np.array([_peak(delays, table[parts != part])[0] for part in range(_PARTS)])
+    sigma = math.sqrt((_PARTS - 1) / _PARTS * float(np.sum((without - without.mean()) ** 2)))
+    # At the border of what is looked at there is no peak.
+    sigma = math.inf if abs(best) > reach_s - 2.0 * _DELAY_STEP_S else max(sigma, _DELAY_FLOOR_S)
+    return FrameDelay(best, sigma, likeness, len(table))
+
+
+def _peak(delays: NDArray[np.float64], table: NDArray[np.float64]) -> tuple[float, float]:
+    """The delay (D,) at which pairs (P, D) are most alike, by a parabola, and how much they are."""
+    mean = table.mean(axis=0)
+    at = int(np.clip(np.argmax(mean), 1, len(delays) - 2))
+    low, top, high = mean[at - 1 : at + 2]
+    bend = low - 2.0 * top + high
+    shift = 0.5 * (low - high) / bend if bend < 0.0 else 0.0
+    return float(delays[at] + np.clip(shift, -1.0, 1.0) * (delays[1] - delays[0])), float(top)
+
+
+class _Pictures:
+    """Small images, and how alike two of them are after a turn of the robot."""
+
+    def __init__(self, images: Iterable[ArrayLike], camera: Camera, robot_from_camera: ArrayLike) -> None:
+        self._camera, self._grays = _small(images, camera)
+        self._mounting = np.asarray(robot_from_camera, dtype=np.float64)
+        v, u = np.nonzero(self._camera.valid_mask())
+        self._places = np.column_stack([u, v])
+        self._rays = self._camera.unproject(self._places.astype(np.float64)) @ self._mounting.T
+
+    def __len__(self) -> int:
+        return len(self._grays)
+
+    def likeness(self, k: int, other: int, turn_rad: float) -> float:
+        """Correlation of two images where the robot turned so far to the left from the other to `k`; NaN: not known."""
+        if not math.isfinite(turn_rad):
+            return math.nan
+        # A direction that is seen here at ray r was seen there at Rz(turn) r.
+        there = self._rays @ about_vertical(turn_rad).T @ self._mounting
+        here = self._grays[k][self._places[:, 1], self._places[:, 0]]
+        return _correlation(here, self._grays[other], self._camera.project(there))
 
 
 def _small(images: Iterable[ArrayLike], camera: Camera) -> tuple[Camera, list[NDArray[np.float64]]]:
@@ -130,20 +227,14 @@ def _small(images: Iterable[ArrayLike], camera: Camera) -> tuple[Camera, list[ND
     return small, grays
 
 
-def _robot_rays(
-    camera: Camera, robot_from_camera: NDArray[np.float64]
-) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    """Pixels (M, 2) with a bearing, and these (M, 3) in the robot's frame."""
-    v, u = np.nonzero(camera.valid_mask())
-    places = np.column_stack([u, v])
-    return places, camera.unproject(places.astype(np.float64)) @ robot_from_camera.T
-
-
-def _partners(headings: NDArray[np.float64], k: int) -> list[int]:
-    """The next images that have turned by an angle that is compared."""
+def _pairs(headings: NDArray[np.float64]) -> list[tuple[int, int]]:
+    """Each image with the next ones that have turned by an angle that is compared."""
     low, high = _TURNS_RAD
-    turns = np.abs(headings[k + 1 :] - headings[k])
-    return [int(k + 1 + at) for at in np.flatnonzero((turns >= low) & (turns <= high))[:_PARTNERS]]
+    found = []
+    for k in range(len(headings)):
+        turns = np.abs(headings[k + 1 :] - headings[k])
+        found += [(k, int(k + 1 + at)) for at in np.flatnonzero((turns >= low) & (turns <= high))[:_PARTNERS]]
+    return found
 
 
 def _correlation(here: NDArray[np.float64], image: NDArray[np.float64], pixels: NDArray[np.float64]) -> float:

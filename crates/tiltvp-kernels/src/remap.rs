@@ -1,8 +1,7 @@
 //! Pixels about places in another image: places interpolated over a patch, levels between four pixels, all in fixed point.
 
-use multiversion::multiversion;
-
 use crate::bilinear::quads;
+use crate::vectorised;
 
 /// Columns of a patch at most, which are worked on together.
 pub const COLUMNS: usize = 8;
@@ -12,6 +11,7 @@ const PLACE_BITS: u32 = 16;
 
 /// Bits of a weight: a level moves by less than one from one weight to the next.
 const WEIGHT_BITS: u32 = 8;
+const WEIGHT_MAX: i32 = (1 << WEIGHT_BITS) - 1;
 
 /// A few pixels of the new image, and where the first of each row and of each column is in the old one.
 #[derive(Debug, Clone, Copy)]
@@ -29,104 +29,140 @@ pub struct Patch {
 
 type Lanes = [i32; COLUMNS];
 
-impl Patch {
-    /// Columns and rows of the places of a row of the patch, relative to the origin, with [`PLACE_BITS`] behind the point.
-    #[inline(always)]
-    fn row(&self, row: usize) -> [Lanes; 2] {
-        let down = row as f32 / self.reach[1] as f32;
-        let unit = (1 << PLACE_BITS) as f32;
-        let half_weight = 1 << (PLACE_BITS - WEIGHT_BITS - 1);
-        std::array::from_fn(|axis| {
-            let [left_top, right_top, left_bottom, right_bottom] = self.corners.map(|corner| corner[axis]);
-            let left = left_top + down * (left_bottom - left_top);
-            let right = right_top + down * (right_bottom - right_top);
-            let first = (left * unit).round_ties_even() as i32 + half_weight;
-            let step = ((right - left) / self.reach[0] as f32 * unit) as i32;
-            std::array::from_fn(|i| first + step * i.min(self.size[0] - 1) as i32)
-        })
-    }
+/// The places of a row of a patch: first bytes of pixels, and the weights of their right and lower neighbours.
+struct Row {
+    first: [u32; COLUMNS],
+    right: Lanes,
+    below: Lanes,
 }
 
-/// The first bytes of the pixels at places, and the weights of their right and lower neighbours.
+// Plain loops here and below: closures and adaptors over arrays are compiled without the vector instructions of their caller.
+
+/// Places of a row of the patch along an axis, relative to the origin, with [`PLACE_BITS`] behind the point.
 #[inline(always)]
-fn places<const CHANNELS: usize>(patch: &Patch, row: usize, stride: usize) -> ([u32; COLUMNS], Lanes, Lanes) {
-    let [u, v] = patch.row(row);
-    let weight = |at: i32| (at >> (PLACE_BITS - WEIGHT_BITS)) & ((1 << WEIGHT_BITS) - 1);
-    let first = std::array::from_fn(|i| {
+fn along<const AXIS: usize>(patch: &Patch, down: f32) -> Lanes {
+    let [left_top, right_top, left_bottom, right_bottom] = &patch.corners;
+    let left = left_top[AXIS] + down * (left_bottom[AXIS] - left_top[AXIS]);
+    let right = right_top[AXIS] + down * (right_bottom[AXIS] - right_top[AXIS]);
+    let unit = (1 << PLACE_BITS) as f32;
+    // Half a weight more, for weights are cut off.
+    let first = (left * unit) as i32 + (1 << (PLACE_BITS - WEIGHT_BITS - 1));
+    let step = ((right - left) * unit / patch.reach[0] as f32) as i32;
+    let mut lanes = [0; COLUMNS];
+    for i in 0..COLUMNS {
+        lanes[i] = first.wrapping_add(step.wrapping_mul(i.min(patch.size[0] - 1) as i32));
+    }
+    lanes
+}
+
+#[inline(always)]
+fn places<const CHANNELS: usize>(patch: &Patch, row: usize, stride: usize) -> Row {
+    let down = row as f32 / patch.reach[1] as f32;
+    let (u, v) = (along::<0>(patch, down), along::<1>(patch, down));
+    let mut found = Row { first: [0; COLUMNS], right: [0; COLUMNS], below: [0; COLUMNS] };
+    for i in 0..COLUMNS {
         let (across, down) = ((u[i] >> PLACE_BITS) as u32, (v[i] >> PLACE_BITS) as u32);
-        patch.origin.wrapping_add(down.wrapping_mul(stride as u32)).wrapping_add(across * CHANNELS as u32)
-    });
-    (first, u.map(weight), v.map(weight))
-}
-
-#[inline(always)]
-fn blend([a, b, c, d]: [Lanes; 4], right: &Lanes, below: &Lanes) -> [u8; COLUMNS] {
-    std::array::from_fn(|i| {
-        let above = (a[i] << WEIGHT_BITS) + (b[i] - a[i]) * right[i];
-        let under = (c[i] << WEIGHT_BITS) + (d[i] - c[i]) * right[i];
-        let level = (above << WEIGHT_BITS) + (under - above) * below[i];
-        ((level + (1 << (2 * WEIGHT_BITS - 1))) >> (2 * WEIGHT_BITS)) as u8
-    })
-}
-
-/// Fills a patch of a grey image; `out` begins with its first pixel. Nothing tells where a place is outside the old image but
-/// inside its data: the caller sees to it that places are in the image, with a neighbour to the right and below.
-///
-/// False where a place is outside the data; the patch is then filled in part.
-///
-/// # Panics
-/// If a patch is wider than [`COLUMNS`], or `out` ends within it.
-#[multiversion(targets("x86_64+avx512f+avx512bw+avx512vl", "x86_64+avx2"))]
-pub fn fill_gray(data: &[u8], stride: usize, patch: &Patch, out: &mut [u8], out_stride: usize) -> bool {
-    let columns = patch.size[0];
-    for row in 0..patch.size[1] {
-        let (first, right, below) = places::<1>(patch, row, stride);
-        let Some(quads) = quads(data, stride, &first) else { return false };
-        let corners = [0, 8, 16, 24].map(|shift| quads.map(|quad| ((quad >> shift) & 255) as i32));
-        out[row * out_stride..][..columns].copy_from_slice(&blend(corners, &right, &below)[..columns]);
+        let from_origin = down.wrapping_mul(stride as u32).wrapping_add(across.wrapping_mul(CHANNELS as u32));
+        found.first[i] = patch.origin.wrapping_add(from_origin);
+        found.right[i] = (u[i] >> (PLACE_BITS - WEIGHT_BITS)) & WEIGHT_MAX;
+        found.below[i] = (v[i] >> (PLACE_BITS - WEIGHT_BITS)) & WEIGHT_MAX;
     }
-    true
+    found
 }
 
-/// The same for an image of three bytes a pixel; `stride` and `out_stride` are bytes.
-///
-/// # Panics
-/// As [`fill_gray`].
-#[multiversion(targets("x86_64+avx512f+avx512bw+avx512vl", "x86_64+avx2"))]
-pub fn fill_color(data: &[u8], stride: usize, patch: &Patch, out: &mut [u8], out_stride: usize) -> bool {
-    let columns = patch.size[0];
-    for row in 0..patch.size[1] {
-        let (first, right, below) = places::<3>(patch, row, stride);
-        let Some(corners) = neighbours(data, stride, &first) else { return false };
-        let mut pixels = [0; 3 * COLUMNS];
-        for channel in 0..3 {
-            let levels = corners.map(|four| four.map(|bytes| ((bytes >> (8 * channel)) & 255) as i32));
-            for (i, level) in blend(levels, &right, &below).into_iter().enumerate() {
-                pixels[3 * i + channel] = level;
+/// The levels between the bytes at `shifts` of four words, which are those of the four pixels.
+#[inline(always)]
+fn blend(words: &[[u32; COLUMNS]; 4], shifts: [u32; 4], row: &Row, out: &mut [u8; COLUMNS]) {
+    for i in 0..COLUMNS {
+        let a = ((words[0][i] >> shifts[0]) & 255) as i32;
+        let b = ((words[1][i] >> shifts[1]) & 255) as i32;
+        let c = ((words[2][i] >> shifts[2]) & 255) as i32;
+        let d = ((words[3][i] >> shifts[3]) & 255) as i32;
+        let above = (a << WEIGHT_BITS) + (b - a) * row.right[i];
+        let under = (c << WEIGHT_BITS) + (d - c) * row.right[i];
+        let level = (above << WEIGHT_BITS) + (under - above) * row.below[i];
+        out[i] = ((level + (1 << (2 * WEIGHT_BITS - 1))) >> (2 * WEIGHT_BITS)) as u8;
+    }
+}
+
+vectorised! {
+    /// Fills a patch of a grey image; `out` begins with its first pixel. Nothing tells where a place is outside the old image but
+    /// inside its data: the caller sees to it that places are in the image, with a neighbour to the right and below.
+    ///
+    /// False where a place is outside the data; the patch is then filled in part.
+    ///
+    /// # Panics
+    /// If a patch is wider than [`COLUMNS`], or `out` ends within it.
+    pub fn fill_gray(data: &[u8], stride: usize, patch: &Patch, out: &mut [u8], out_stride: usize) -> bool {
+        let columns = patch.size[0];
+        let mut levels = [0; COLUMNS];
+        for number in 0..patch.size[1] {
+            let row = places::<1>(patch, number, stride);
+            let Some(quads) = quads(data, stride, &row.first) else { return false };
+            blend(&[quads; 4], [0, 8, 16, 24], &row, &mut levels);
+            let into = &mut out[number * out_stride..][..columns];
+            if columns == COLUMNS {
+                into.copy_from_slice(&levels);
+            } else {
+                into.copy_from_slice(&levels[..columns]);
             }
         }
-        out[row * out_stride..][..3 * columns].copy_from_slice(&pixels[..3 * columns]);
+        true
     }
-    true
+}
+
+vectorised! {
+    /// The same for an image of three bytes a pixel; `stride` and `out_stride` are bytes.
+    ///
+    /// # Panics
+    /// As [`fill_gray`].
+    pub fn fill_color(data: &[u8], stride: usize, patch: &Patch, out: &mut [u8], out_stride: usize) -> bool {
+        let columns = patch.size[0];
+        for number in 0..patch.size[1] {
+            let row = places::<3>(patch, number, stride);
+            let Some(words) = neighbours(data, stride, &row.first) else { return false };
+            let [mut blue, mut green, mut red] = [[0; COLUMNS]; 3];
+            blend(&words, [0; 4], &row, &mut blue);
+            blend(&words, [8; 4], &row, &mut green);
+            blend(&words, [16; 4], &row, &mut red);
+            let mut pixels = [0; 3 * COLUMNS];
+            for i in 0..COLUMNS {
+                pixels[3 * i] = blue[i];
+                pixels[3 * i + 1] = green[i];
+                pixels[3 * i + 2] = red[i];
+            }
+            let into = &mut out[number * out_stride..][..3 * columns];
+            if columns == COLUMNS {
+                into.copy_from_slice(&pixels);
+            } else {
+                into.copy_from_slice(&pixels[..3 * columns]);
+            }
+        }
+        true
+    }
 }
 
 /// Four bytes from each place on, from three bytes to its right, and from the places a stride farther; none unless all are in the
 /// data.
 #[inline(always)]
 fn neighbours(data: &[u8], stride: usize, places: &[u32; COLUMNS]) -> Option<[[u32; COLUMNS]; 4]> {
-    let last = places.iter().fold(0, |last, place| *place.max(&last)) as usize;
-    if last.checked_add(stride)?.checked_add(7)? > data.len() {
+    let mut last = 0;
+    for i in 0..COLUMNS {
+        last = last.max(places[i]);
+    }
+    if (last as usize).checked_add(stride)?.checked_add(7)? > data.len() {
         return None;
     }
     let mut found = [[0; COLUMNS]; 4];
-    for (i, place) in places.iter().enumerate() {
+    for i in 0..COLUMNS {
         // SAFETY: none is farther on than the last, after which seven bytes in the next row are in the data.
         unsafe {
-            let above = data.as_ptr().add(*place as usize);
+            let above = data.as_ptr().add(places[i] as usize);
             let below = above.add(stride);
-            for (into, from) in found.iter_mut().zip([above, above.add(3), below, below.add(3)]) {
-                into[i] = u32::from_le_bytes(from.cast::<[u8; 4]>().read());
-            }
+            found[0][i] = u32::from_le_bytes(above.cast::<[u8; 4]>().read());
+            found[1][i] = u32::from_le_bytes(above.add(3).cast::<[u8; 4]>().read());
+            found[2][i] = u32::from_le_bytes(below.cast::<[u8; 4]>().read());
+            found[3][i] = u32::from_le_bytes(below.add(3).cast::<[u8; 4]>().read());
         }
     }
     Some(found)

@@ -270,7 +270,11 @@ fn report(
     let sum: f64 = kept.iter().map(|r| r * r).sum();
     let scale = (sum / free).max(1.0);
     if residuals.is_empty() {
-        return Err(Error::argument("bearings", "a drive that determines nothing", "landmarks seen from several poses"));
+        return Err(Error::argument(
+            "bearings",
+            "a drive that determines nothing",
+            "landmarks seen from several poses",
+        ));
     }
     let solution = problem.eliminate_poses(problem.keyframes.len() - 1, false, 0.0).and_then(|system| {
         let covariance = CholeskyFactor::regularised(system.equations.information.clone())?.inverse();
