@@ -57,7 +57,7 @@ if TYPE_CHECKING:
     from tiltvp.mounting import MountingTilt, mounting_tilt
     from tiltvp.robot import Robot
     from tiltvp.robot_setup import RobotSetup, find_setup
-    from tiltvp.turning import TurnCheck, check_turns
+    from tiltvp.turning import FrameDelay, TurnCheck, check_turns, frame_delay
 
 __version__ = "0.1.0"
 
@@ -74,6 +74,7 @@ __all__ = [
     "FilterStep",
     "FilteredTilt",
     "FitReport",
+    "FrameDelay",
     "ImageEdges",
     "Leveller",
     "LogCalibration",
@@ -102,6 +103,7 @@ __all__ = [
     "draw_edges",
     "draw_segments",
     "find_setup",
+    "frame_delay",
     "level",
     "lines",
     "mounting_tilt",
@@ -123,8 +125,8 @@ __all__ = [
 
 _MODULES = ("corner", "streams", "synth")
 _HOMES = {
-    "MountingTilt": "mounting", "Robot": "robot", "RobotSetup": "robot_setup", "TurnCheck": "turning",
-    "check_turns": "turning", "find_setup": "robot_setup", "mounting_tilt": "mounting",
+    "FrameDelay": "turning", "MountingTilt": "mounting", "Robot": "robot", "RobotSetup": "robot_setup", "TurnCheck": "turning",
+    "check_turns": "turning", "frame_delay": "turning", "find_setup": "robot_setup", "mounting_tilt": "mounting",
 }  # fmt: skip
 
 

@@ -34,6 +34,9 @@ _TURNED_RAD: Final = math.radians(45.0)
 _SIGMAS: Final = 3.0
 """By how many of its standard errors the mean difference has to be off zero."""
 _LEAST: Final = 4
+_COARSE_STEP_S: Final = 0.1
+_FINE_STEPS: Final = 7
+"""To both sides of the best coarse one: a step of these and two more."""
 _DELAY_STEP_S: Final = 0.02
 """Of delays that are tried: half a frame at 25 a second."""
 _DELAY_FLOOR_S: Final = 0.005
@@ -160,23 +163,33 @@ def frame_delay(
     if headings is None:
         raise InvalidInputError(f"{odometry.source}: distances without turns, expected the distance between the wheels")
     pairs = _pairs(headings)
-    steps = max(2, round(reach_s / _DELAY_STEP_S))
-    delays = np.linspace(-reach_s, reach_s, 2 * steps + 1)
-    table = np.full((len(pairs), len(delays)), np.nan)
-    for column, delay in enumerate(delays):
-        turned = odometry.at(times - delay).yaw_rad
-        if turned is not None:
-            table[:, column] = [pictures.likeness(k, other, float(turned[k] - turned[other])) for k, other in pairs]
-    table = table[np.isfinite(table).all(axis=1)]
-    if len(table) < _PARTS:
-        return FrameDelay(0.0, math.inf, 0.0, len(table))
-    best, likeness = _peak(delays, table)
-    parts = np.arange(len(table)) * _PARTS // len(table)
-    without = np.array([_peak(delays, table[parts != part])[0] for part in range(_PARTS)])
+
+    def likenesses(delays: NDArray[np.float64]) -> NDArray[np.float64]:
+        found = np.full((len(pairs), len(delays)), np.nan)
+        for column, delay in enumerate(delays):
+            turned = odometry.at(times - delay).yaw_rad
+            assert turned is not None  # As above.
+            found[:, column] = [pictures.likeness(k, other, float(turned[k] - turned[other])) for k, other in pairs]
+        return found
+
+    coarse = np.arange(-reach_s, reach_s + 0.5 * _COARSE_STEP_S, _COARSE_STEP_S)
+    table = likenesses(coarse)
+    known = np.isfinite(table).all(axis=1)
+    if known.sum() < _PARTS:
+        return FrameDelay(0.0, math.inf, 0.0, int(known.sum()))
+    rough = float(coarse[int(np.argmax(table[known].mean(axis=0)))])
+    delays = rough + np.arange(-_FINE_STEPS, _FINE_STEPS + 1) * _DELAY_STEP_S
+    fine = likenesses(delays)
+    fine = fine[known & np.isfinite(fine).all(axis=1)]
+    if len(fine) < _PARTS:
+        return FrameDelay(rough, math.inf, 0.0, len(fine))
+    best, likeness = _peak(delays, fine)
+    parts = np.arange(len(fine)) * _PARTS // len(fine)
+    without = np.array([_peak(delays, fine[parts != part])[0] for part in range(_PARTS)])
     sigma = math.sqrt((_PARTS - 1) / _PARTS * float(np.sum((without - without.mean()) ** 2)))
     # At the border of what is looked at there is no peak.
-    sigma = math.inf if abs(best) > reach_s - 2.0 * _DELAY_STEP_S else max(sigma, _DELAY_FLOOR_S)
-    return FrameDelay(best, sigma, likeness, len(table))
+    sigma = math.inf if abs(rough) > reach_s - 0.5 * _COARSE_STEP_S else max(sigma, _DELAY_FLOOR_S)
+    return FrameDelay(best, sigma, likeness, len(fine))
 
 
 def _peak(delays: NDArray[np.float64], table: NDArray[np.float64]) -> tuple[float, float]:

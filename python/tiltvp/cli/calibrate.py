@@ -69,11 +69,7 @@ def calibrate(
     else:
         if odometry_log is not None:
             raise InvalidInputError(f"{odometry_log}: a log beside --images, expected one of them")
-        log, sigma_rad, bad = log_of_images(pictures, motion, camera, options, drive)
-        if estimate_time_offset and log.times_s is None:
-            raise InvalidInputError(
-                f"--estimate-time-offset with --images {pictures.images}, whose times are not known"
-            )
+        log, sigma_rad, bad = log_of_images(pictures, motion, camera, options, drive, with_times=estimate_time_offset)
         sigma = {"bearing_sigma_rad": sigma_rad}
     log = log.read_as(*read_as)
     calibrator = SelfCalibrator(**sigma | drive.of_filter(), method=method)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Final
 
 import numpy as np
 from cyclopts import Group, Parameter, validators
@@ -20,7 +20,11 @@ from tiltvp.cli.track import Drive, needed_turns, track_table
 from tiltvp.errors import InvalidInputError
 
 if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from tiltvp import Camera
     from tiltvp.drive_logs import DriveLog
+    from tiltvp.streams import Frames
 
 __all__ = ["DriveOptions", "PictureOptions", "log_of_images", "log_of_tables", "other_readings"]
 
@@ -105,16 +109,43 @@ def log_of_tables(odometry: Path | None, bearings: Path | None, *, with_times: b
     return log
 
 
+_CLOCK_FRAMES: Final = 120
+"""Frames by which the delay is told: at 5 a second the first 24 seconds of a drive."""
+
+
+def _bring_to_clock(
+    frames: Frames, motion: MotionOptions, camera: Camera, rotation: NDArray[np.float64], wheel_base_m: float | None
+) -> None:
+    """Takes from the times of the frames by how much they are late. Raises `InvalidInputError` where nothing tells."""
+    from tiltvp.streams import read_odometry
+    from tiltvp.turning import frame_delay
+
+    record = motion.odometry or frames.recording
+    if frames.times_s is None or record is None:
+        raise InvalidInputError(f"--estimate-time-offset with --images {frames.source}, whose times are not known")
+    odometry = read_odometry(record, topic=motion.odometry_topic, wheels=motion.wheels(wheel_base_m))
+    count = min(_CLOCK_FRAMES, len(frames.times_s))
+    images = [frame.read() for frame in frames.sample(range(count))]
+    found = frame_delay(images, frames.times_s[:count], odometry, camera, rotation)
+    if not found:
+        raise InvalidInputError(f"--estimate-time-offset with --images {frames.source}: {found.reason}")
+    say(f"{frames.source}: frames are stamped {found.delay_s:.3f} +- {found.sigma_s:.3f} s late, which is mended first")
+    frames.times_s = frames.times_s - found.delay_s
+
+
 def log_of_images(
     pictures: PictureOptions,
     motion: MotionOptions,
     camera: CameraOptions | None,
     options: LineOptions,
     drive: DriveOptions,
+    *,
+    with_times: bool,
 ) -> tuple[DriveLog, float, int]:
     """The log of a drive's images: the lean of each, its lines, and whose they are.
 
-    Also the median standard deviation of a bearing, radians, and how many images were bad. Writes the tracks where they
+    Also the median standard deviation of a bearing, radians, and how many images were bad. `with_times` asks for the
+    times of the frames, which are brought to the odometry's clock first, by how the images turn. Writes the tracks where they
     are asked for. Tracks are predicted with the mounting as it is thought to be.
     """
     from tiltvp.drive_logs import DriveLog
@@ -128,10 +159,12 @@ def log_of_images(
     if camera is None:
         raise InvalidInputError(f"--images {source} without --camera, expected {_FORMS}")
     frames = SourceOptions(topic=pictures.topic).open([source])
+    lens, options = camera.load(), camera.complete(options)
+    if with_times:
+        _bring_to_clock(frames, motion, lens, options.rotation(), drive.wheel_base)
     told = needed_turns(motion.motions(frames, drive.wheel_base))
     if told is None:
         raise InvalidInputError(f"--images {source} without --odometry, expected {_FORMS}")
-    lens, options = camera.load(), camera.complete(options)
     x_m, y_m, yaw_rad = drive.start
     extractor, tilt = options.extractor(lens, yaw_rad=yaw_rad), options.tilts(lens, yaw_rad=yaw_rad)
     looked = Drive(extractor, LineTracker(camera_m=(x_m, y_m)), tilt, told)

@@ -43,7 +43,7 @@ class LineOptions(MountedOptions):
 
         check_word("--method", self.method or LINE_METHODS[0], LINE_METHODS)
         options = self.given() | ({} if self.method is None else {"method": self.method})
-        return LineExtractor(camera, robot_from_camera=self._rotation(yaw_rad), **options)
+        return LineExtractor(camera, robot_from_camera=self.rotation(yaw_rad), **options)
 
     def tilts(self, camera: Camera, *, yaw_rad: float = 0.0) -> Callable[[NDArray[np.uint8]], TiltEstimate | None]:
         """What tells the lean of a grey image: None where the robot is taken to be upright."""
@@ -52,7 +52,7 @@ class LineOptions(MountedOptions):
         check_word("--tilt", self.tilt, (_UPRIGHT, *METHODS))
         if self.tilt == _UPRIGHT:
             return lambda _: None
-        options: dict[str, Any] = {"method": self.tilt, "robot_from_camera": self._rotation(yaw_rad)}
+        options: dict[str, Any] = {"method": self.tilt, "robot_from_camera": self.rotation(yaw_rad)}
         if self.mask is not None:
             options["mask"] = mask_from(self.mask)
         estimator, extractor = TiltEstimator(camera, **options), self.extractor(camera, yaw_rad=yaw_rad)
@@ -64,7 +64,8 @@ class LineOptions(MountedOptions):
 
         return tilt
 
-    def _rotation(self, yaw_rad: float) -> NDArray[np.float64]:
+    def rotation(self, yaw_rad: float = 0.0) -> NDArray[np.float64]:
+        """The mounting that was given, further turned by `yaw_rad`."""
         from tiltvp.rotations import about_vertical
 
         return about_vertical(yaw_rad) @ rotation_of(self.robot_from_camera or "up")

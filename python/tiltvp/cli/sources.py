@@ -95,17 +95,23 @@ class MotionOptions:
 
     def motions(self, frames: Frames, wheel_base_m: float | None) -> FrameMotions | None:
         """What the robot did up to each frame, None without odometry; a line on stderr for what is noted."""
-        from tiltvp.streams import Wheels, frame_motions
+        from tiltvp.streams import frame_motions
 
-        wheels = Wheels(
-            wheel_base_m=wheel_base_m, wheel_radius_m=self.wheel_radius, ticks_per_turn=self.ticks_per_turn,
-            joints=self.wheel_joints, gap_max_s=self.odometry_gap,
-        )  # fmt: skip
+        wheels = self.wheels(wheel_base_m)
         if self.odometry is None:
             return self._of_recording(frames, wheels)
         found = frame_motions(frames, self.odometry, topic=self.odometry_topic, wheels=wheels)
         tell(*found.notes)
         return found
+
+    def wheels(self, wheel_base_m: float | None) -> Wheels:
+        """What was said of the wheels."""
+        from tiltvp.streams import Wheels
+
+        return Wheels(
+            wheel_base_m=wheel_base_m, wheel_radius_m=self.wheel_radius, ticks_per_turn=self.ticks_per_turn,
+            joints=self.wheel_joints, gap_max_s=self.odometry_gap,
+        )  # fmt: skip
 
     def _of_recording(self, frames: Frames, wheels: Wheels) -> FrameMotions | None:
         """What the recording of the frames tells; None where it tells nothing and nobody asked."""
