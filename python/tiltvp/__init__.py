@@ -125,8 +125,9 @@ __all__ = [
 
 _MODULES = ("corner", "streams", "synth")
 _HOMES = {
-    "FrameDelay": "turning", "MountingTilt": "mounting", "Robot": "robot", "RobotSetup": "robot_setup", "TurnCheck": "turning",
-    "check_turns": "turning", "frame_delay": "turning", "find_setup": "robot_setup", "mounting_tilt": "mounting",
+    "FrameDelay": "turning", "MountingTilt": "mounting", "Robot": "robot", "RobotSetup": "robot_setup",
+    "TurnCheck": "turning", "check_turns": "turning", "find_setup": "robot_setup", "frame_delay": "turning",
+    "mounting_tilt": "mounting",
 }  # fmt: skip
 
 

@@ -164,7 +164,7 @@ def frame_delay(
         raise InvalidInputError(f"{odometry.source}: distances without turns, expected the distance between the wheels")
     pairs = _pairs(headings)
 
-    def likenesses(delays: NDArray[np.float64]) -> NDArray[np.float64]:
+    def likenesses(delays: NDArray[np.floating]) -> NDArray[np.float64]:
         found = np.full((len(pairs), len(delays)), np.nan)
         for column, delay in enumerate(delays):
             turned = odometry.at(times - delay).yaw_rad
@@ -192,7 +192,7 @@ def frame_delay(
     return FrameDelay(best, sigma, likeness, len(fine))
 
 
-def _peak(delays: NDArray[np.float64], table: NDArray[np.float64]) -> tuple[float, float]:
+def _peak(delays: NDArray[np.floating], table: NDArray[np.float64]) -> tuple[float, float]:
     """The delay (D,) at which pairs (P, D) are most alike, by a parabola, and how much they are."""
     mean = table.mean(axis=0)
     at = int(np.clip(np.argmax(mean), 1, len(delays) - 2))

@@ -33,8 +33,8 @@ use pyo3::prelude::*;
 ///
 /// `METHODS` are the methods of `TiltEstimator`, `LINE_METHODS` those of `LineExtractor`, `CORNER_METHODS` those of
 /// `CornerDetector`, `CALIBRATION_METHODS` those of `SelfCalibrator`, the default first. `CAMERA_MODELS` are the models of
-/// `Camera`, `ROOM_KINDS` the kinds of `Room`, and `WALL_PATTERNS` what its walls may have in common. `SIMD_LEVELS` are what
-/// `simd_level` may say on this machine, the widest last.
+/// `Camera`, `ROOM_KINDS` the kinds of `Room`, and `WALL_PATTERNS` what its walls may have in common. `SIMD_LEVELS` are
+/// what `simd_level` may say on this machine, the widest last.
 #[pymodule]
 mod _core {
     use pyo3::prelude::*;
@@ -83,8 +83,9 @@ mod _core {
         train_affine, train_factor, train_posterior,
     };
 
-    /// The vectors that this process uses: "fallback", "sse4.2", "avx2", "avx512" or "neon". Answers do not depend on them.
+    /// The vectors that this process uses: "fallback", "sse4.2", "avx2", "avx512" or "neon".
     ///
+    /// Answers do not depend on them.
     /// They are the widest of the machine, or those that the environment's `TILTVP_SIMD` names when tiltvp is imported,
     /// where a word that is none of the machine's raises `InvalidInputError`.
     #[pyfunction]

@@ -145,8 +145,8 @@ def log_of_images(
     """The log of a drive's images: the lean of each, its lines, and whose they are.
 
     Also the median standard deviation of a bearing, radians, and how many images were bad. `with_times` asks for the
-    times of the frames, which are brought to the odometry's clock first, by how the images turn. Writes the tracks where they
-    are asked for. Tracks are predicted with the mounting as it is thought to be.
+    times of the frames, which are brought to the odometry's clock first, by how the images turn. Writes the tracks
+    where they are asked for. Tracks are predicted with the mounting as it is thought to be.
     """
     from tiltvp.drive_logs import DriveLog
     from tiltvp.line_logs import bearing_log, displacements
