@@ -8,12 +8,12 @@ import math
 import numpy as np
 import pytest
 
-from tiltvp import Camera, Robot, check_turns, find_setup, tilt_error_rad
+from tiltvp import Camera, Robot, check_turns, find_setup, frame_delay, tilt_error_rad
 from tiltvp.cli import main
 from tiltvp.errors import InvalidInputError
 from tiltvp.images import read_image, write_image
 from tiltvp.rotations import levelling
-from tiltvp.streams import open_frames
+from tiltvp.streams import Odometry, open_frames
 from tiltvp.synth import Room
 
 CAMERA = Camera.equidistant(width=240, height=240, focal_px=72.0, cx=119.5, cy=119.5, max_theta_rad=math.radians(92))
@@ -101,3 +101,31 @@ def test_turns_are_not_told_without_turning(drive):
     assert "not told" in found.reason
     with pytest.raises(InvalidInputError, match="yaw_rad"):
         check_turns(images[:6], np.zeros(5), CAMERA, np.eye(3))
+
+
+def odometry(steps_s: np.ndarray) -> tuple[np.ndarray, Odometry]:
+    """When the images were taken, and odometry between them that is much finer."""
+    times = np.concatenate([[1.0], 1.0 + np.cumsum(steps_s)])
+    fine = np.arange(0.0, times[-1] + 1.0, 0.02)
+    headings = np.interp(fine, times, np.arange(COUNT) * STEP)
+    return times, Odometry.from_poses(fine, 0.0 * fine, 0.0 * fine, headings)
+
+
+def test_frames_that_are_stamped_late_are_found_where_turns_begin_and_end(drive):
+    images = [frame.read() for frame in open_frames(str(drive / "frames"))]
+    times, told = odometry(np.tile([0.2, 0.2, 0.9, 0.9, 0.4], 5))
+    for delay in (-0.3, 0.15):
+        found = frame_delay(images, times + delay, told, CAMERA, np.eye(3))
+        assert found, found.reason
+        assert found.delay_s == pytest.approx(delay, abs=3.0 * found.sigma_s)
+        assert found.sigma_s < 0.03
+
+
+def test_a_steady_turn_tells_no_delay(drive):
+    images = [frame.read() for frame in open_frames(str(drive / "frames"))]
+    times, told = odometry(np.full(COUNT - 1, 0.4))
+    found = frame_delay(images, times, told, CAMERA, np.eye(3))
+    assert not found, found.reason
+    assert "not told" in found.reason
+    with pytest.raises(InvalidInputError, match="times_s"):
+        frame_delay(images, times[1:], told, CAMERA, np.eye(3))
