@@ -13,8 +13,9 @@ import tiltvp
 from tiltvp.cli import main
 from tiltvp.photos import panorama_kind
 from tiltvp.rotations import rotation_from
+from tiltvp.streams import open_frames
 from tiltvp.synth import RoomImage
-from tiltvp.videos import VideoReader, video_writer
+from tiltvp.videos import video_writer
 
 FORWARD = rotation_from("forward", "the mounting")
 LEAN = (math.radians(12.0), 0.7)
@@ -108,10 +109,10 @@ def test_a_video_is_level_at_its_own_rate(camera: tiltvp.Camera, room: RoomImage
     words = ["level", str(tmp_path / "drive.avi"), "--camera", str(tmp_path / "camera.toml")]
     # The first frame is black, and comes before the filter knows anything.
     assert main([*words, "--out", str(tmp_path / "level.avi")]) == 1
-    level = VideoReader(tmp_path / "level.avi")
+    level = open_frames(tmp_path / "level.avi")
     assert level.count == 5
     assert level.rate_hz == pytest.approx(12.0)
-    frames = list(level)
+    frames = [frame.read() for frame in level]
     assert not frames[0].any()
     estimate = tiltvp.TiltEstimator(camera)(frames[-1])
     assert estimate.alpha_rad < math.radians(1.0)

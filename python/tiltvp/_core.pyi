@@ -6,8 +6,8 @@ where nothing else is said.
 
 `METHODS` are the methods of `TiltEstimator`, `LINE_METHODS` those of `LineExtractor`, `CORNER_METHODS` those of
 `CornerDetector`, `CALIBRATION_METHODS` those of `SelfCalibrator`, the default first. `CAMERA_MODELS` are the models of
-`Camera`, `ROOM_KINDS` the kinds of `Room`, and `WALL_PATTERNS` what its walls may have in common. `SIMD_LEVELS` are what
-`simd_level` may say on this machine, the widest last.
+`Camera`, `ROOM_KINDS` the kinds of `Room`, and `WALL_PATTERNS` what its walls may have in common. `SIMD_LEVELS` are
+what `simd_level` may say on this machine, the widest last.
 """
 
 import builtins
@@ -3346,10 +3346,10 @@ def screen_corner(feature: CornerFeature, gamma_rad: float) -> str | None:
     """Why a feature is no corner of that angle, in a sentence; None if it is one."""
 
 def simd_level() -> str:
-    """The vectors that this process uses: "fallback", "sse4.2", "avx2", "avx512" or "neon". Answers do not depend on them.
+    """The vectors that this process uses: "fallback", "sse4.2", "avx2", "avx512" or "neon".
 
-    They are the widest of the machine, or those that the environment's `TILTVP_SIMD` names when tiltvp is imported,
-    where a word that is none of the machine's raises `InvalidInputError`.
+    Answers do not depend on them. They are the widest of the machine, or those that the environment's `TILTVP_SIMD`
+    names when tiltvp is imported, where a word that is none of the machine's raises `InvalidInputError`.
     """
 
 def simulate_drive(

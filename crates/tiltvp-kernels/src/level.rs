@@ -46,14 +46,14 @@ impl Level {
 
     /// What runs loops without a kernel of their own at this level; none where the machine has not got it.
     fn loops(self) -> Option<fearless_simd::Level> {
-        use fearless_simd::{Level as Loops, Simd as _};
+        use fearless_simd::Level as Loops;
         let machine = Loops::new();
         match self {
             Self::Fallback => Some(Loops::baseline()),
             #[cfg(target_arch = "x86_64")]
-            Self::Sse42 => machine.as_sse4_2().map(|token| token.level()),
+            Self::Sse42 => machine.as_sse4_2().map(fearless_simd::Simd::level),
             #[cfg(target_arch = "x86_64")]
-            Self::Avx2 => machine.as_avx2().map(|token| token.level()),
+            Self::Avx2 => machine.as_avx2().map(fearless_simd::Simd::level),
             #[cfg(target_arch = "x86_64")]
             Self::Avx512 => {
                 let there = is_x86_feature_detected!("avx512f")
@@ -103,7 +103,10 @@ pub fn level() -> Level {
     chosen().level
 }
 
-/// The level of this process, or the word in the environment that is none of the machine's.
+/// The level of this process.
+///
+/// # Errors
+/// The word in the environment that is none of the machine's.
 pub fn checked() -> Result<Level, &'static str> {
     let Chosen { level, wrong, .. } = chosen();
     wrong.as_deref().map_or(Ok(*level), Err)

@@ -49,8 +49,8 @@ fn along<const AXIS: usize>(patch: &Patch, down: f32) -> Lanes {
     let first = (left * unit) as i32 + (1 << (PLACE_BITS - WEIGHT_BITS - 1));
     let step = ((right - left) * unit / patch.reach[0] as f32) as i32;
     let mut lanes = [0; COLUMNS];
-    for i in 0..COLUMNS {
-        lanes[i] = first.wrapping_add(step.wrapping_mul(i.min(patch.size[0] - 1) as i32));
+    for (i, lane) in lanes.iter_mut().enumerate() {
+        *lane = first.wrapping_add(step.wrapping_mul(i.min(patch.size[0] - 1) as i32));
     }
     lanes
 }
@@ -147,8 +147,8 @@ vectorised! {
 #[inline(always)]
 fn neighbours(data: &[u8], stride: usize, places: &[u32; COLUMNS]) -> Option<[[u32; COLUMNS]; 4]> {
     let mut last = 0;
-    for i in 0..COLUMNS {
-        last = last.max(places[i]);
+    for place in places {
+        last = last.max(*place);
     }
     if (last as usize).checked_add(stride)?.checked_add(7)? > data.len() {
         return None;

@@ -278,12 +278,12 @@ fn directed<L: Level256>(q: Marks, g: Marks, squared: Marks, limit: f32) -> u64 
 #[target_feature(enable = "avx2")]
 fn along<L: Level256>(token: Avx2, parts: i16) -> Marks {
     let mut along = [[_mm256_set1_epi32(0); 2]; 4];
-    for k in 0..4 {
-        for half in 0..2 {
-            let first = L::FIRST[k] + 4 * half;
+    for (along, first) in along.iter_mut().zip(L::FIRST) {
+        for (half, along) in along.iter_mut().enumerate() {
+            let first = first + 4 * half;
             let number = |i: usize| (first + i % 4 + L::HALF * (i / 4)) as i32;
             let numbers = i32x8::from_slice(token, &std::array::from_fn::<i32, 8, _>(number)).into();
-            along[k][half] = _mm256_mullo_epi16(numbers, _mm256_set1_epi16(parts));
+            *along = _mm256_mullo_epi16(numbers, _mm256_set1_epi16(parts));
         }
     }
     along
@@ -296,10 +296,10 @@ fn vectors<L: Level256>(token: Avx2, each: &[[i16; 2]; BLOCK]) -> Marks {
     let each: &[i16] = each.as_flattened();
     let four = |first: usize| i16x8::from_slice(token, &each[2 * first..2 * first + 8]).into();
     let mut q = [[_mm256_set1_epi32(0); 2]; 4];
-    for k in 0..4 {
-        for half in 0..2 {
-            let first = L::FIRST[k] + 4 * half;
-            q[k][half] = _mm256_set_m128i(four(first + L::HALF), four(first));
+    for (q, first) in q.iter_mut().zip(L::FIRST) {
+        for (half, q) in q.iter_mut().enumerate() {
+            let first = first + 4 * half;
+            *q = _mm256_set_m128i(four(first + L::HALF), four(first));
         }
     }
     q
