@@ -7,7 +7,8 @@ use crate::error::{Error, Result};
 /// The level of this process: `"fallback"`, `"sse4.2"`, `"avx2"`, `"avx512"` or `"neon"`. It is the widest of the machine, or what the
 /// environment's `TILTVP_SIMD` names. Answers do not depend on it.
 ///
-/// A word that is none of the machine's is an error here, and means nothing elsewhere.
+/// # Errors
+/// [`Error::InvalidOption`] for a word that is none of the machine's, which means nothing elsewhere.
 pub fn simd_level() -> Result<&'static str> {
     match level::checked() {
         Ok(level) => Ok(level.name()),

@@ -1,5 +1,7 @@
 //! Level images: how exact their maps are over all lenses, and what becomes of levels.
 
+#![allow(clippy::expect_used)]
+
 use nalgebra::{Matrix3, Rotation3, Vector2, Vector3};
 use tiltvp_core::camera::{Camera, Equirectangular, Model, Pinhole};
 use tiltvp_core::geometry::Tilt;
@@ -59,7 +61,7 @@ fn maps_are_as_exact_as_they_say() {
 
 #[test]
 fn panoramas_are_exact_at_seams_and_poles_too() {
-    let (camera, ahead) = (panorama(1024), Pinhole::new(200.0, 200.0, 319.5, 239.5).expect("a lens"));
+    let (camera, ahead) = (panorama(1024), Pinhole::new([200.0, 200.0], [319.5, 239.5], &[]).expect("a lens"));
     let ahead = Camera::new(640, 480, ahead.into()).expect("a camera");
     for (alpha, beta) in [(0.1, 0.7), (0.5, -2.0), (1.5, 3.0)] {
         for shown in [&camera, &ahead] {

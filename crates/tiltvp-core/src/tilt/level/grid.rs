@@ -104,7 +104,7 @@ impl Corners {
         places: &Places<'_>,
         sink: &mut impl Sink,
     ) {
-        let found = self.found(corner_rays, places);
+        let found = found_places(corner_rays, places);
         let bends = self.bends(&found, places);
         let [across, down] = self.counts;
         for (j, i) in (0..down - 1).flat_map(|j| (0..across - 1).map(move |i| (j, i))) {
@@ -123,16 +123,6 @@ impl Corners {
                 split(first, size, (reach == size).then_some(corners), ray, places, sink);
             }
         }
-    }
-
-    /// The places of the corners, NaN where there is none.
-    fn found(&self, rays: &[[f32; 3]], places: &Places<'_>) -> Vec<Vector2<f64>> {
-        let turned: Vec<Vector3<f64>> =
-            rays.iter().map(|ray| places.rotation * Vector3::from(ray.map(f64::from))).collect();
-        let mut found = vec![Vector2::zeros(); turned.len()];
-        // Both are as long as there are corners.
-        let _ = places.camera.project_all(&turned, &mut found);
-        found
     }
 
     /// By how much interpolation errs about each corner; NaN where neighbours do not tell.
@@ -209,4 +199,14 @@ fn split(
             _ => split(first, size, Some(four), ray, places, sink),
         }
     }
+}
+
+/// The places of corners, NaN where there is none.
+fn found_places(rays: &[[f32; 3]], places: &Places<'_>) -> Vec<Vector2<f64>> {
+    let turned: Vec<Vector3<f64>> =
+        rays.iter().map(|ray| places.rotation * Vector3::from(ray.map(f64::from))).collect();
+    let mut found = vec![Vector2::zeros(); turned.len()];
+    // Both are as long as there are corners.
+    let _ = places.camera.project_all(&turned, &mut found);
+    found
 }
