@@ -34,7 +34,7 @@ pub mod testing;
 pub mod tilt;
 
 pub use error::{Error, Result};
-pub use simd::{simd_level, simd_levels};
+pub use simd::{cap_simd_level, simd_level, simd_levels};
 
 /// The README's program is run with those of the documentation.
 #[cfg(doctest)]

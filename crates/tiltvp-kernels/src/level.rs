@@ -1,12 +1,9 @@
-//! The widest vectors that kernels use: those of the machine, or narrower ones where the environment says so.
+//! The widest vectors that kernels use: those of the machine, or narrower ones where a program says so first.
 
 use std::sync::OnceLock;
 
 #[doc(hidden)]
 pub use fearless_simd;
-
-/// The variable of the environment that caps the level of a process, read once.
-pub const VARIABLE: &str = "TILTVP_SIMD";
 
 /// Vectors that a machine may have. Answers do not depend on them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -28,7 +25,7 @@ impl Level {
     /// All there are, on any machine.
     const ALL: [Self; 5] = [Self::Fallback, Self::Sse42, Self::Avx2, Self::Avx512, Self::Neon];
 
-    /// The word that the environment takes.
+    /// Its word.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Fallback => "fallback",
@@ -70,46 +67,41 @@ impl Level {
     }
 }
 
-/// What the environment may say on this machine.
+/// What [`cap`] takes on this machine.
 pub fn expected() -> String {
     let names: Vec<_> = Level::available().map(Level::name).collect();
     format!("one of {} (what this machine has)", names.join(", "))
 }
 
-/// The level of this process and what runs its loops, and the word that was not understood.
+/// The level of this process and what runs its loops.
 struct Chosen {
     level: Level,
     loops: fearless_simd::Level,
-    wrong: Option<String>,
+}
+
+static CHOSEN: OnceLock<Chosen> = OnceLock::new();
+
+impl Chosen {
+    fn of(level: Level) -> Self {
+        Self { level, loops: level.loops().unwrap_or(fearless_simd::Level::baseline()) }
+    }
 }
 
 fn chosen() -> &'static Chosen {
-    static CHOSEN: OnceLock<Chosen> = OnceLock::new();
-    CHOSEN.get_or_init(|| {
-        // An empty word is none.
-        let word = std::env::var_os(VARIABLE).filter(|word| !word.is_empty());
-        let word = word.map(|word| word.to_string_lossy().into_owned());
-        let named = word.as_deref().and_then(|word| Level::available().find(|level| level.name() == word));
-        let wrong = word.filter(|_| named.is_none());
-        let level = named.or_else(|| Level::available().last()).unwrap_or(Level::Fallback);
-        let loops = level.loops().unwrap_or(fearless_simd::Level::baseline());
-        Chosen { level, loops, wrong }
-    })
+    CHOSEN.get_or_init(|| Chosen::of(Level::available().last().unwrap_or(Level::Fallback)))
 }
 
-/// The level of this process: the machine's widest where the environment says nothing that is understood. The machine has it.
+/// Caps the level of this process before anything was asked of it. False for a word that is none of the machine's, and where
+/// another level is in use already.
+pub fn cap(word: &str) -> bool {
+    let Some(level) = Level::available().find(|level| level.name() == word) else { return false };
+    CHOSEN.get_or_init(|| Chosen::of(level)).level == level
+}
+
+/// The level of this process: the machine's widest where nobody has capped it. The machine has it.
 #[inline]
 pub fn level() -> Level {
     chosen().level
-}
-
-/// The level of this process.
-///
-/// # Errors
-/// The word in the environment that is none of the machine's.
-pub fn checked() -> Result<Level, &'static str> {
-    let Chosen { level, wrong, .. } = chosen();
-    wrong.as_deref().map_or(Ok(*level), Err)
 }
 
 #[doc(hidden)]
@@ -142,7 +134,8 @@ mod tests {
         let names: Vec<_> = Level::ALL.map(Level::name).to_vec();
         assert_eq!(names, ["fallback", "sse4.2", "avx2", "avx512", "neon"]);
         assert!(Level::available().any(|one| one == level()));
-        assert_eq!(checked(), Ok(level()));
+        assert!(cap(level().name()));
+        assert!(!cap("mmx"));
         assert!(expected().starts_with("one of fallback, "));
     }
 }

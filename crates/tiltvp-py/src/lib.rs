@@ -25,6 +25,9 @@ mod value;
 
 use pyo3::prelude::*;
 
+/// The variable of the environment that caps the level of vectors.
+const SIMD_VARIABLE: &str = "TILTVP_SIMD";
+
 /// What Rust computes for the package: cameras, the tilt of images, common directions, vertical lines, rooms.
 ///
 /// Arrays that come in may have any strides and any real dtype unless a shape and dtype is asked for; they are never
@@ -38,6 +41,8 @@ use pyo3::prelude::*;
 #[pymodule]
 mod _core {
     use pyo3::prelude::*;
+
+    use super::SIMD_VARIABLE;
 
     #[pymodule_export]
     use crate::camera::{Camera, check_camera, lens_schema};
@@ -85,17 +90,20 @@ mod _core {
 
     /// The vectors that this process uses: "fallback", "sse4.2", "avx2", "avx512" or "neon".
     ///
-    /// Answers do not depend on them.
-    /// They are the widest of the machine, or those that the environment's `TILTVP_SIMD` names when tiltvp is imported,
-    /// where a word that is none of the machine's raises `InvalidInputError`.
+    /// Answers do not depend on them. They are the widest of the machine, or those that the environment's `TILTVP_SIMD`
+    /// names when tiltvp is imported, where a word that is none of the machine's raises `InvalidInputError`.
     #[pyfunction]
-    fn simd_level() -> PyResult<&'static str> {
-        tiltvp_core::simd_level().map_err(|error| crate::call::exception(&error))
+    fn simd_level() -> &'static str {
+        tiltvp_core::simd_level()
     }
 
     #[pymodule_init]
     fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {
-        simd_level()?;
+        // An empty word is none.
+        if let Some(word) = std::env::var_os(SIMD_VARIABLE).filter(|word| !word.is_empty()) {
+            tiltvp_core::cap_simd_level(SIMD_VARIABLE, &word.to_string_lossy())
+                .map_err(|error| crate::call::exception(&error))?;
+        }
         module.add("METHODS", tiltvp_core::tilt::METHODS.to_vec())?;
         module.add("CALIBRATION_METHODS", tiltvp_core::selfcalib::CalibrationMethod::NAMES.to_vec())?;
         module.add("CORNER_METHODS", tiltvp_core::corner::CornerMethod::NAMES.to_vec())?;
