@@ -25,7 +25,7 @@ import numpy as np
 import tiltvp
 from tiltvp.line_logs import bearing_log, follow_lines
 from tiltvp.lines import LineExtractor, LineTracker
-from tiltvp.odometry import Motion
+from tiltvp.streams import Motion
 from tiltvp.synth import Drive, Room, drive_legs, simulate_drive
 
 WHEEL_BASE_M = 0.4
