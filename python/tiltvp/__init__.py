@@ -140,3 +140,8 @@ def __getattr__(name: str) -> Any:
     if name in _HOMES:
         return getattr(import_module(f"tiltvp.{_HOMES[name]}"), name)
     raise AttributeError(f"module 'tiltvp' has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    """For completion and documentation, those names too."""
+    return sorted({*globals(), *__all__})
