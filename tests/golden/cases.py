@@ -109,6 +109,13 @@ METHODS: dict[str, tuple[str, dict[str, Any]]] = {
 }  # fmt: skip
 
 
+def level_images() -> Iterator[tuple[str, Any]]:
+    for name, camera, image, mounting in leaning_views():
+        estimator = tiltvp.TiltEstimator(camera, robot_from_camera=mounting)
+        if estimate := estimator(image):
+            yield name, tiltvp.level(image, estimator, estimate)
+
+
 def tilts() -> Iterator[tuple[str, Any]]:
     for name, camera, image, mounting in leaning_views():
         yield f"{name} image", image
@@ -120,8 +127,6 @@ def tilts() -> Iterator[tuple[str, Any]]:
             if title == "refined":
                 estimate, edges = estimator.with_edges(image)
                 yield f"{name} edges", {part: getattr(edges, part) for part in EDGES}
-                if estimate:
-                    yield f"{name} level", tiltvp.level(image, estimator, estimate)
     rng = np.random.default_rng(1)
     normals = rng.normal(size=(60, 3)) * [1.0, 1.0, 0.03]
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
@@ -251,6 +256,7 @@ def corners() -> Iterator[tuple[str, Any]]:
 GROUPS: dict[str, Callable[[], Iterator[tuple[str, Any]]]] = {
     "cameras": lenses,
     "tilt": tilts,
+    "level": level_images,
     "segments": straight_edges,
     "filters": filters,
     "lines": lines_and_tracks,

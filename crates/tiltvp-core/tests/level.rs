@@ -26,6 +26,12 @@ fn distance(camera: &Camera, a: &Vector2<f64>, b: &Vector2<f64>) -> f64 {
     a.cross(&b).norm().atan2(a.dot(&b)) * f64::from(camera.width()) / std::f64::consts::TAU
 }
 
+/// Whether a place is in the image or within a pixel of it.
+fn is_near(camera: &Camera, place: &Vector2<f64>) -> bool {
+    let within = |at: f64, side: u32| (-1.0..=f64::from(side)).contains(&at);
+    within(place.x, camera.width()) && within(place.y, camera.height())
+}
+
 /// The largest error of a map, and which part of the pixels that are seen, or are not, it has otherwise.
 fn errors(camera: &Camera, shown: &Camera, tilt: &Tilt) -> (f64, f64) {
     let leveller = Leveller::new(camera.clone(), &mounting(), shown.clone(), &mounting()).expect("rotations");
@@ -36,6 +42,8 @@ fn errors(camera: &Camera, shown: &Camera, tilt: &Tilt) -> (f64, f64) {
         let pixel = Vector2::new((at % leveller.width()) as f64, (at / leveller.width()) as f64);
         let exact = shown.unproject(&pixel).and_then(|ray| camera.project(&(rotation * ray)));
         match exact {
+            // What is far outside has no levels to show.
+            Some(exact) if !is_near(camera, &exact) => {}
             Some(exact) if place[0].is_finite() => {
                 let place = Vector2::new(f64::from(place[0]), f64::from(place[1]));
                 largest = largest.max(distance(camera, &place, &exact));

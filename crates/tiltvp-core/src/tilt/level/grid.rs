@@ -11,9 +11,16 @@ pub(super) const CELL: usize = 8;
 /// Cells are split until they are so small; then each pixel is projected by itself.
 const SMALLEST: usize = 2;
 
-/// How far interpolation may be wrong, in pixels: half of the bound that [`MAP_ERROR_PX`](super::MAP_ERROR_PX) promises, for the second
+/// How far interpolation may be wrong, in pixels: a quarter of the bound that [`MAP_ERROR_PX`](super::MAP_ERROR_PX) promises, for the second
 /// differences that tell it are those at a cell's corners, not within it.
-const BEND_MAX_PX: f64 = 0.025;
+const BEND_MAX_PX: f64 = 0.0125;
+
+/// By how much more the map is taken to bend at the image's border than a cell's length before it: with it all lenses of the zoo stay
+/// within the bound.
+const BORDER: f64 = 4.0;
+
+/// Rows of a panorama beside its poles where columns turn too fast for a grid to tell.
+const POLE_PX: f64 = 2.0 * CELL as f64;
 
 /// A rectangle of pixels of the new image, and the places of its corners: at its first pixel, and `reach` columns and rows from there.
 #[derive(Debug, Clone, Copy)]
@@ -64,12 +71,21 @@ impl<'a> Places<'a> {
     /// What a line through three places in equal steps is wrong by in the middle of a step, in pixels; in a panorama a column counts as
     /// much as it is wide there.
     fn bend(&self, three: [&Vector2<f64>; 3]) -> f64 {
+        if self.is_polar(three[1]) {
+            return f64::INFINITY;
+        }
         let mut second = self.between(three[1], three[2]) - self.between(three[0], three[1]);
         if self.period.is_some() {
             let height = f64::from(self.camera.height());
             second.x *= (std::f64::consts::PI * ((three[1].y + 0.5) / height)).sin();
         }
         second.norm() / 8.0
+    }
+
+    /// Whether a place is beside a pole of a panorama.
+    fn is_polar(&self, place: &Vector2<f64>) -> bool {
+        let last = f64::from(self.camera.height()) - 1.0;
+        self.period.is_some() && (place.y < POLE_PX || place.y > last - POLE_PX)
     }
 
     /// Four corners on one side of the seam: that of the first.
@@ -113,7 +129,7 @@ impl Corners {
             let first = [i * CELL, j * CELL];
             let size = std::array::from_fn(|axis| CELL.min(self.image[axis] - first[axis]));
             let reach = std::array::from_fn(|axis| CELL.min(self.image[axis] - 1 - first[axis]).max(1));
-            let bend = four.iter().map(|k| bends[*k]).fold(f64::NAN, f64::max);
+            let bend = four.iter().map(|k| bends[*k]).fold(0.0, f64::max);
             let corners = four.map(|k| found[k]);
             let whole = corners.iter().all(|corner| corner.x.is_finite());
             if whole && bend <= BEND_MAX_PX {
@@ -125,10 +141,10 @@ impl Corners {
         }
     }
 
-    /// By how much interpolation errs about each corner; NaN where neighbours do not tell.
+    /// By how much interpolation errs about each corner; infinite where neighbours do not tell.
     fn bends(&self, found: &[Vector2<f64>], places: &Places<'_>) -> Vec<f64> {
         let [across, down] = self.counts;
-        let mut bends = vec![f64::NAN; found.len()];
+        let mut bends = vec![f64::INFINITY; found.len()];
         if across < 4 || down < 4 {
             return bends;
         }
@@ -136,11 +152,15 @@ impl Corners {
         for (j, i) in (1..=last_down).flat_map(|j| (1..=last_across).map(move |i| (j, i))) {
             let at = j * across + i;
             let along = |step: usize| places.bend([&found[at - step], &found[at], &found[at + step]]);
-            bends[at] = along(1) + along(across);
+            let bend = along(1) + along(across);
+            bends[at] = if bend.is_nan() { f64::INFINITY } else { bend };
         }
-        // Corners at the border, the last of which are nearer to one another, are taken to be as those next to them.
+        // At the border, whose last corners are nearer to one another, lenses bend more than where the next corners are.
         for (j, i) in (0..down).flat_map(|j| (0..across).map(move |i| (j, i))) {
-            bends[j * across + i] = bends[j.clamp(1, last_down) * across + i.clamp(1, last_across)];
+            let next = j.clamp(1, last_down) * across + i.clamp(1, last_across);
+            if next != j * across + i {
+                bends[j * across + i] = BORDER * bends[next];
+            }
         }
         bends
     }
