@@ -125,7 +125,7 @@ def tilts() -> Iterator[tuple[str, Any]]:
             estimator = tiltvp.TiltEstimator(camera, method=method, robot_from_camera=mounting, **options)
             yield f"{name} {title}", estimator(image)
             if title == "refined":
-                estimate, edges = estimator.with_edges(image)
+                _, edges = estimator.with_edges(image)
                 yield f"{name} edges", {part: getattr(edges, part) for part in EDGES}
     rng = np.random.default_rng(1)
     normals = rng.normal(size=(60, 3)) * [1.0, 1.0, 0.03]
