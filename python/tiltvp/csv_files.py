@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
+import math
 import os
 from collections.abc import Iterator
 from typing import Final
@@ -49,6 +50,16 @@ class CsvFile:
             if len(cells) != len(self.header):
                 raise InvalidInputError(f"{self.where(line)}: {len(cells)} cells, expected {len(self.header)}")
             yield line, cells
+
+    def number(self, line: int, column: str, word: str) -> float:
+        """A finite number of a cell. Raises `InvalidInputError` that names its place."""
+        try:
+            value = float(word)
+        except ValueError:
+            value = math.nan
+        if not math.isfinite(value):
+            raise InvalidInputError(f"{self.where(line)}: {column} = {word!r}, expected a finite number")
+        return value
 
     def _next(self) -> list[str] | None:
         try:

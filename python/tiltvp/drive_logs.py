@@ -86,9 +86,9 @@ def read_drive_log(odometry: str | os.PathLike[str], bearings: str | os.PathLike
         if last is not None and step <= last:
             raise InvalidInputError(f"{table.where(line)}: step {step} after {last}, expected growing steps")
         order[step], last = len(order), step
-        wheels.extend(_number(table, line, name, cells[columns[name]]) for name in ("delta_left_m", "delta_right_m"))
+        wheels.extend(table.number(line, name, cells[columns[name]]) for name in ("delta_left_m", "delta_right_m"))
         if "time_s" in columns:
-            times.append(_number(table, line, "time_s", cells[columns["time_s"]]))
+            times.append(table.number(line, "time_s", cells[columns["time_s"]]))
     _refuse_nothing(table, len(order), _ODOMETRY)
     seen_from, columns = _table(bearings, _BEARINGS)
     found = array("d")
@@ -97,7 +97,7 @@ def read_drive_log(odometry: str | os.PathLike[str], bearings: str | os.PathLike
         if step not in order:
             raise InvalidInputError(f"{seen_from.where(line)}: step {step} is not one of {os.fspath(odometry)}")
         landmark = _whole(seen_from, line, "landmark", cells[columns["landmark"]])
-        bearing = _number(seen_from, line, "bearing_rad", cells[columns["bearing_rad"]])
+        bearing = seen_from.number(line, "bearing_rad", cells[columns["bearing_rad"]])
         found.extend((order[step], landmark, bearing))
     _refuse_nothing(seen_from, len(found), _BEARINGS)
     return DriveLog(
@@ -121,16 +121,6 @@ def _table(path: str | os.PathLike[str], names: tuple[str, ...], optional: str =
 def _refuse_nothing(table: CsvFile, rows: int, names: tuple[str, ...]) -> None:
     if not rows:
         raise InvalidInputError(f"{table.name}: no rows, expected {', '.join(names)}")
-
-
-def _number(table: CsvFile, line: int, column: str, word: str) -> float:
-    try:
-        value = float(word)
-    except ValueError:
-        value = math.nan
-    if not math.isfinite(value):
-        raise InvalidInputError(f"{table.where(line)}: {column} = {word!r}, expected a finite number")
-    return value
 
 
 def _whole(table: CsvFile, line: int, column: str, word: str) -> int:

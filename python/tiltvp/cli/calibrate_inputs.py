@@ -125,7 +125,7 @@ def _bring_to_clock(
         raise InvalidInputError(f"--estimate-time-offset with --images {frames.source}, whose times are not known")
     odometry = read_odometry(record, topic=motion.odometry_topic, wheels=motion.wheels(wheel_base_m))
     count = min(_CLOCK_FRAMES, len(frames.times_s))
-    images = [frame.read() for frame in frames.sample(range(count))]
+    images = (frame.read() for frame in frames.sample(range(count)))
     found = frame_delay(images, frames.times_s[:count], odometry, camera, rotation)
     if not found:
         raise InvalidInputError(f"--estimate-time-offset with --images {frames.source}: {found.reason}")

@@ -63,12 +63,12 @@ def setup(
     picture
         Picture of what was found (.png).
     """
+    from tiltvp.robot import mask_path
     from tiltvp.robot_setup import find_setup, measured_count
-    from tiltvp.streams import Wheels
 
     if out.suffix.lower() != ".toml":
         raise InvalidInputError(f"--out {out}: ends in {out.suffix!r}, expected .toml")
-    for file in (out, picture):
+    for file in (out, mask_path(out), picture):
         if file is not None:
             check_output(file)
     lens = camera.load()
@@ -82,13 +82,10 @@ def setup(
             robot_from_camera=None if robot_from_camera is None else rotation_of(robot_from_camera),
             mask=None if mask is None else mask_from(mask),  # type: ignore[arg-type]
             level_floor=level_floor,
-            wheels=Wheels(
-                wheel_base_m=wheel_base, wheel_radius_m=motion.wheel_radius, ticks_per_turn=motion.ticks_per_turn,
-                joints=motion.wheel_joints,
-            ),
+            wheels=motion.wheels(wheel_base),
             topics={k: v for k, v in (("images", source.topic), ("odometry", motion.odometry_topic)) if v is not None},
             advance=bar.advance,
-        )  # fmt: skip
+        )
     for line in _lines(found):
         say(line)
     if picture is not None:

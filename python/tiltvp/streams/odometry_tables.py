@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -58,7 +57,7 @@ class OdometryTable:
         names = [_ALIASES.get(column, column) for column in table.header]
         cells = [(line, dict(zip(names, row, strict=True))) for line, row in table.rows()]
         columns = {
-            name: np.array([_number(table, line, name, row[name]) for line, row in cells], dtype=np.float64)
+            name: np.array([table.number(line, name, row[name]) for line, row in cells], dtype=np.float64)
             for name in names
             if name not in ("file", "step")
         }
@@ -206,13 +205,3 @@ def _kind_of(name: str, header: Sequence[str]) -> str:
             f"{where}: no motion, expected a column yaw_rad, yaw_deg or distance_m, or both of one of: {every}"
         )
     return kinds[0] if kinds else "increments"
-
-
-def _number(table: CsvFile, line: int, column: str, word: str) -> float:
-    try:
-        value = float(word)
-    except ValueError:
-        value = math.nan
-    if not math.isfinite(value):
-        raise InvalidInputError(f"{table.where(line)}: {column} = {word!r}, expected a finite number")
-    return value
