@@ -16,6 +16,7 @@ from tiltvp.images import gray_from, read_image
 from tiltvp.lab.datasets.panoramas import Panorama, PanoramaViews, paper_camera
 from tiltvp.lab.evaluation.imu import InertialPanorama
 from tiltvp.levelling import Leveller
+from tiltvp.photos import PHOTO_TILT_MAX_RAD
 from tiltvp.rotations import rotation_from
 from tiltvp.tilt import TiltEstimate, TiltEstimator, normal_from_alpha_beta, tilt_error_rad
 
@@ -42,7 +43,7 @@ def _estimator(method: str, width: int) -> TiltEstimator:
     """Of panoramas of that width that look ahead; refined starts upright, with a gate as wide as need be."""
     camera = _panorama_camera(width)
     if method == "segments":
-        return TiltEstimator(camera, method=method, robot_from_camera=_FORWARD, tilt_max_rad=math.pi)
+        return TiltEstimator(camera, method=method, robot_from_camera=_FORWARD, tilt_max_rad=PHOTO_TILT_MAX_RAD)
     return TiltEstimator(
         camera,
         method=method,
