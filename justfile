@@ -191,6 +191,10 @@ measure-inertial *arguments: setup
 measure-level *arguments: setup
     {{bin}}/tiltvp measure level "$TILTVP_DATA/panos" --inertial "$TILTVP_DATA/panos_theta_imu" {{arguments}}
 
+# COLMAP's reconstructions of rendered rooms: how far their gravity is off, without our priors and with them.
+measure-colmap *arguments: setup
+    {{bin}}/tiltvp measure colmap {{arguments}}
+
 # Planar-motion pose estimation over tilt in rendered rooms, without and with tilt correction.
 measure-planar-pose *arguments: setup
     {{bin}}/tiltvp measure planar-pose {{arguments}}
