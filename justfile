@@ -63,6 +63,10 @@ notebooks *arguments:
 docs:
     {{bin}}/sphinx-build --quiet --fail-on-warning --keep-going --conf-dir docs --doctree-dir target/docs/doctrees . target/docs/html
 
+# Pictures of the guides, of rooms that the package renders, in docs/images.
+pictures: setup
+    {{bin}}/python docs/pictures.py
+
 # Licences, duplicates, sources and advisories of the crates, by cargo-deny, which is built if it is not there.
 deny *arguments:
     test -x target/tools/bin/cargo-deny || cargo install --quiet --locked --root target/tools cargo-deny

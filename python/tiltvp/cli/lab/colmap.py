@@ -18,7 +18,7 @@ _WAYS = 3
 
 def colmap(
     *,
-    kinds: Annotated[tuple[str, ...], Parameter(consume_multiple=True)] = ("office", "living-room", "l-shaped"),
+    kinds: Annotated[tuple[str, ...], Parameter(consume_multiple=True)] = ("office", "living-room"),
     seed: int = 5,
     views: Annotated[int, Parameter(validator=validators.Number(gte=3))] = 24,
     out: Path | None = None,
