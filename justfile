@@ -33,12 +33,12 @@ quick-extension:
 # Sets up; checks and tests everything that needs neither data nor programs of the system.
 test: setup check test-rust test-python
 
-# Debian's chromium and valgrind, by apt-get, if they are not there. (The only recipe that installs into the system.)
+# Debian's chromium, valgrind and Xvfb, by apt-get, if they are not there. (The only recipe that installs into the system.)
 system-programs:
     #!/usr/bin/env bash
     set -euo pipefail
     missing=""
-    for name in chromium valgrind; do command -v $name > /dev/null || missing="$missing $name"; done
+    for name in chromium valgrind Xvfb; do command -v $name > /dev/null || missing="$missing ${name,,}"; done
     [ -n "$missing" ] || exit 0
     root=""
     [ "$(id -u)" = 0 ] || root=sudo
@@ -46,8 +46,8 @@ system-programs:
     $root apt-get update --quiet --quiet
     DEBIAN_FRONTEND=noninteractive $root apt-get install --quiet --quiet --yes --no-install-recommends $missing > /dev/null
 
-# The wheel in a bare environment, the notebooks, and the tests that want a browser and valgrind: the page of a report, and what an
-# image costs in instructions.
+# The wheel in a bare environment, the notebooks, and the tests that want a browser, a screen and valgrind: the page of a report, the
+# window of `--show`, and what an image costs in instructions.
 test-system *arguments: setup system-programs smoke notebooks
     {{bin}}/pytest --quiet tests/system {{arguments}}
     cargo test --locked --package tiltvp-core --features valgrind --test instructions --quiet
