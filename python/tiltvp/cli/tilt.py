@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Annotated
 from cyclopts import Parameter, validators
 
 from tiltvp.cli.answers import check_answers, write_answers
+from tiltvp.cli.cluster import check_cluster, files_of, is_begun
 from tiltvp.cli.filtering import FilterOptions
 from tiltvp.cli.options import CameraOptions, MethodOptions
 from tiltvp.cli.results import Outcome, mounting_words, outcome_table, people_table, summary_words
@@ -21,7 +22,7 @@ from tiltvp.cli.showing import ShowOptions
 from tiltvp.cli.sources import MotionOptions, SourceOptions, ending_at_interrupt, picture_names
 from tiltvp.cli.tables import STDOUT, json_lines
 from tiltvp.cli.terminal import ProgressBar, complain, named, progress_bar, say, show, width
-from tiltvp.cli.tilt_work import Work
+from tiltvp.cli.tilt_work import Work, tilts_on_cluster
 from tiltvp.errors import InvalidInputError
 from tiltvp.files import check_output_folder
 
@@ -57,6 +58,7 @@ def tilt(
     frame_rate: Annotated[float | None, Parameter(validator=validators.Number(gt=0))] = None,
     threads: Annotated[int, Parameter(validator=validators.Number(gte=1))] = 1,
     showing: ShowOptions = _SHOWING,
+    cluster: str | None = None,
 ) -> int:
     """Estimate the tilt of each image, of files, a video, a recording of ROS or a live camera.
 
@@ -80,17 +82,16 @@ def tilt(
         Frames per second, for attitudes: by default the times that frames tell, and 25 where they tell none.
     threads
         How many images are worked on at the same time.
+    cluster
+        Address of a Dask scheduler: its workers, which must see the same files, do the work. --out is then a folder of
+        Parquet files, written as they are done; the same command goes on with it.
     """
     from tiltvp.streams import Motion
 
     rows_only = out == STDOUT
-    if out is not None and not rows_only:
-        check_answers(out)
-    if overlay is not None and level is not None and os.path.realpath(overlay) == os.path.realpath(level):
-        raise InvalidInputError(f"--overlay and --level are both {overlay}, expected two folders")
-    for folder in (overlay, level):
-        if folder is not None:
-            check_output_folder(folder)
+    _check_outputs(out, overlay, level, cluster)
+    if cluster is not None:
+        check_cluster(out, filter=filtering.filter, show=showing.show, rerun=showing.rerun, frame_rate=frame_rate)
     filtering.check()
     showing.check()
     if not filtering.filter:
@@ -101,6 +102,8 @@ def tilt(
     motions: Iterable[Motion | None] = repeat(Motion()) if moved is None else moved.motions
     estimator = _checked(estimator, frames)
     work, judge = Work(estimator, overlay, level, filtering, showing.asked), filtering.judge()
+    if cluster is not None and out is not None:
+        return tilts_on_cluster(cluster, files_of(frames), work, out)
     outcomes: list[Outcome] = []
     with (
         showing.watch(work.leveller) as watch,
@@ -121,6 +124,18 @@ def tilt(
     if filtering.filter_plot is not None:
         _write_plot(outcomes, estimator.method, filtering.filter_plot)
     return 1 if frames.problems or any(outcome.error for outcome in outcomes) else 0
+
+
+def _check_outputs(out: Path | None, overlay: Path | None, level: Path | None, cluster: str | None) -> None:
+    """Refuses outputs that cannot be written, before any work is done."""
+    if out is not None and out != STDOUT and cluster is None:
+        check_answers(out)
+    if overlay is not None and level is not None and os.path.realpath(overlay) == os.path.realpath(level):
+        raise InvalidInputError(f"--overlay and --level are both {overlay}, expected two folders")
+    for folder in (overlay, level):
+        # What is gone on with has pictures already.
+        if folder is not None and (cluster is None or out is None or not is_begun(out)):
+            check_output_folder(folder)
 
 
 def _show(

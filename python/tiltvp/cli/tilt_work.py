@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
 
+from tiltvp.cli.cluster import Task, on_cluster
 from tiltvp.cli.filtering import FilterOptions
-from tiltvp.cli.results import Outcome, degrees
+from tiltvp.cli.results import Outcome, degrees, outcome_table
+from tiltvp.cli.tables import Table
+from tiltvp.cli.terminal import say
 from tiltvp.errors import OutputError, TiltvpError
 
 if TYPE_CHECKING:
@@ -19,10 +22,11 @@ if TYPE_CHECKING:
 
     from tiltvp import EdgeElements, Leveller, TiltEstimate, TiltEstimator
     from tiltvp.streams import Frame
+    from tiltvp.streams.image_files import ImageFiles
 
     Picture = NDArray[np.uint8]
 
-__all__ = ["Work", "words_of"]
+__all__ = ["TiltTask", "Work", "tilts_on_cluster", "words_of"]
 
 T = TypeVar("T")
 
@@ -106,3 +110,32 @@ def _timed(work: Callable[[], T]) -> tuple[T, float]:
     start = time.perf_counter()
     result = work()
     return result, time.perf_counter() - start
+
+
+@dataclass(frozen=True)
+class TiltTask:
+    """The rows of `tiltvp tilt` as the task of a worker."""
+
+    work: Work
+
+    def __call__(self, images: Sequence[tuple[Frame, str]]) -> Table:
+        judge = self.work.filtering.judge()
+        outcomes = [judge(self.work(frame, name)[0], None) for frame, name in images]
+        return outcome_table(outcomes, self.work.estimator.method)
+
+
+def tilts_on_cluster(address: str, frames: ImageFiles, work: Work, out: Path) -> int:
+    """The tilts of images by the workers of a scheduler, as a folder of tables; the exit code."""
+    import polars as pl
+
+    whole = replace(
+        work,
+        overlay=None if work.overlay is None else work.overlay.absolute(),
+        level=None if work.level is None else work.level.absolute(),
+    )
+    before, table = on_cluster(address, frames, Task("tilt", TiltTask(whole)), out)
+    counts = table.select(images=pl.len(), bad=pl.col("error").count(), tilts=pl.col("alpha_rad").count())
+    images, bad, tilts = counts.collect().row(0)
+    done_before = f", {before} of them before" if before else ""
+    say(f"{out}: {images} images{done_before}; {tilts} with a tilt, {bad} could not be used")
+    return 1 if bad or frames.problems else 0
