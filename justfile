@@ -134,6 +134,10 @@ stub: setup
 survive *arguments: setup
     {{bin}}/pytest --quiet --numprocesses 2 --dist worksteal tests/survive {{arguments}}
 
+# A robot's hours: cameras that are unplugged, clocks that are set back, disks that fill, Ctrl-C. Takes --minutes (default 60).
+soak *arguments: setup
+    {{bin}}/python tests/soak.py {{arguments}}
+
 # The tests on real data, in the folder that TILTVP_DATA names.
 test-real *arguments: setup
     {{bin}}/pytest --quiet tests/real_data {{arguments}}
@@ -269,6 +273,10 @@ measure-markers *arguments: setup
 # A step of the self-calibration filters against a dense NumPy filter of the paper's equations, in one process.
 measure-calibration-time *arguments: setup
     OPENBLAS_NUM_THREADS=1 {{bin}}/python benches/peers/calibration_filter.py {{arguments}}
+
+# `tiltvp tilt --cluster` on two worker processes, of which one is killed: the table, and time over the number of images.
+measure-cluster *arguments: setup
+    {{bin}}/python benches/many_machines.py {{arguments}}
 
 # What each constant of the core does when it is halved and doubled; paths of files or folders choose some of them.
 measure-constants *arguments: setup

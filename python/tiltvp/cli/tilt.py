@@ -9,7 +9,7 @@ from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import closing
 from itertools import repeat
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Final
 
 from cyclopts import Parameter, validators
 
@@ -37,6 +37,8 @@ if TYPE_CHECKING:
     Done = tuple[Outcome, Picture | None]
     Named = tuple[Frame, str, Outcome, Picture | None]
 
+_LAST: Final = 1_000
+"""Of the frames of a stream, of which a table is shown at its end: what a terminal lets one scroll back to."""
 _METHOD_DEFAULTS = MethodOptions()
 _FILTER_DEFAULTS = FilterOptions()
 _SOURCE, _MOTION, _SHOWING = SourceOptions(), MotionOptions(), ShowOptions()
@@ -88,7 +90,6 @@ def tilt(
     """
     from tiltvp.streams import Motion
 
-    rows_only = out == STDOUT
     _check_outputs(out, overlay, level, cluster)
     if cluster is not None:
         check_cluster(out, filter=filtering.filter, show=showing.show, rerun=showing.rerun, frame_rate=frame_rate)
@@ -104,7 +105,7 @@ def tilt(
     work, judge = Work(estimator, overlay, level, filtering, showing.asked), filtering.judge()
     if cluster is not None and out is not None:
         return tilts_on_cluster(cluster, files_of(frames), work, out)
-    outcomes: list[Outcome] = []
+    answers = Answers(frames.count is not None, estimator.method, out, filtering, frame_rate)
     with (
         showing.watch(work.leveller) as watch,
         ending_at_interrupt(frames) as coming,
@@ -112,18 +113,13 @@ def tilt(
     ):
         for (frame, name, found, marked), driven in zip(done, motions, strict=False):
             outcome = judge(found, driven)
-            outcomes.append(outcome)
+            answers.add(outcome)
             if filtering.filter:
                 work.write_level(frame, outcome, name)
-            if rows_only:
-                say(json_lines(outcome_table([outcome], estimator.method)))
             if watch is not None and not watch(frame, outcome, marked):
                 break
-    if not rows_only:
-        _show(outcomes, estimator.method, filtering, out, frame_rate)
-    if filtering.filter_plot is not None:
-        _write_plot(outcomes, estimator.method, filtering.filter_plot)
-    return 1 if frames.problems or any(outcome.error for outcome in outcomes) else 0
+    answers.conclude(frames.source)
+    return 1 if frames.problems or answers.bad else 0
 
 
 def _check_outputs(out: Path | None, overlay: Path | None, level: Path | None, cluster: str | None) -> None:
@@ -138,17 +134,48 @@ def _check_outputs(out: Path | None, overlay: Path | None, level: Path | None, c
             check_output_folder(folder)
 
 
-def _show(
-    outcomes: Sequence[Outcome], method: str, filtering: FilterOptions, out: Path | None, frame_rate: float | None
-) -> None:
-    """What people read on stdout, and the answers as a file."""
-    if outcomes:
-        say(summary_words(outcomes))
-    show(people_table(outcomes, width()))
-    if filtering.estimate_mounting:
-        say(mounting_words(outcomes))
-    if out is not None:
-        write_answers(outcomes, method, out, frame_rate)
+class Answers:
+    """What is told of the outcomes, at once or at the end."""
+
+    def __init__(
+        self, ends: bool, method: str, out: Path | None, filtering: FilterOptions, frame_rate: float | None
+    ) -> None:
+        """`ends` is whether the source is known to have an end."""
+        self._method, self._out, self._filtering, self._frame_rate = method, out, filtering, frame_rate
+        self._rows_only = out == STDOUT
+        # So that a stream may go on for ever in the same memory.
+        most = 0 if self._rows_only else _LAST if out is None and not ends else None
+        self._kept: deque[Outcome] = deque(maxlen=None if filtering.filter_plot is not None else most)
+        self.count = 0
+        """How many there were."""
+        self.bad = 0
+        """How many of them could not be used."""
+
+    def add(self, outcome: Outcome) -> None:
+        """The next one."""
+        self._kept.append(outcome)
+        self.count += 1
+        self.bad += outcome.error is not None
+        if self._rows_only:
+            say(json_lines(outcome_table([outcome], self._method)))
+
+    def conclude(self, source: str) -> None:
+        """What people read on stdout, and the answers as files."""
+        outcomes = list(self._kept)
+        if self.bad and len(outcomes) < self.count:
+            complain(f"{source}: {self.bad} of {self.count} frames could not be used")
+        if not self._rows_only:
+            if len(outcomes) < self.count:
+                say(f"{source}: {self.count} frames, of which the last {len(outcomes)} are shown")
+            if outcomes:
+                say(summary_words(outcomes))
+            show(people_table(outcomes, width()))
+            if self._filtering.estimate_mounting:
+                say(mounting_words(outcomes))
+            if self._out is not None:
+                write_answers(outcomes, self._method, self._out, self._frame_rate)
+        if self._filtering.filter_plot is not None:
+            _write_plot(outcomes, self._method, self._filtering.filter_plot)
 
 
 def _checked(estimator: TiltEstimator, frames: Frames) -> TiltEstimator:

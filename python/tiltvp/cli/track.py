@@ -107,10 +107,9 @@ def track(
     ):
         for frame, seen in drive.followed(coming, bar):
             tracked.append((seen.number, frame.name, frame.time_s, seen.tracked))
-            if film is None and viewer is None:
-                continue
-            rotation, tracks = extractor.robot_from_camera, seen.tracked.track.tolist()
-            picture = draw_lines(seen.gray, lens, seen.tracked.lines, rotation, tracks=tracks)
+            if film is not None or viewer is not None:
+                rotation, tracks = extractor.robot_from_camera, seen.tracked.track.tolist()
+                picture = draw_lines(seen.gray, lens, seen.tracked.lines, rotation, tracks=tracks)
             if film is not None:
                 film.add(picture)
             if viewer is not None:
