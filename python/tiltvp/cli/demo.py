@@ -14,7 +14,7 @@ from cyclopts import Parameter
 
 from tiltvp.cli.results import degrees
 from tiltvp.cli.terminal import new_table, progress_bar, say, show, status
-from tiltvp.cli.tilt import words_of
+from tiltvp.cli.tilt_work import words_of
 from tiltvp.errors import InvalidInputError
 from tiltvp.files import check_output, check_output_folder, write_whole
 
