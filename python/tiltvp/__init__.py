@@ -54,6 +54,7 @@ from tiltvp.tilt import (
 
 if TYPE_CHECKING:
     from tiltvp import corner, streams, synth
+    from tiltvp.extrinsics import Extrinsics, JoinedLogs, JoinedTilts, join_logs, join_tilts
     from tiltvp.mounting import MountingTilt, mounting_tilt
     from tiltvp.robot import Robot
     from tiltvp.robot_setup import RobotSetup, find_setup
@@ -71,11 +72,14 @@ __all__ = [
     "CommonDirection",
     "ComplementaryFilter",
     "EdgeElements",
+    "Extrinsics",
     "FilterStep",
     "FilteredTilt",
     "FitReport",
     "FrameDelay",
     "ImageEdges",
+    "JoinedLogs",
+    "JoinedTilts",
     "Leveller",
     "LogCalibration",
     "MountingEstimate",
@@ -104,6 +108,8 @@ __all__ = [
     "draw_segments",
     "find_setup",
     "frame_delay",
+    "join_logs",
+    "join_tilts",
     "level",
     "lines",
     "mounting_tilt",
@@ -125,9 +131,10 @@ __all__ = [
 
 _MODULES = ("corner", "streams", "synth")
 _HOMES = {
-    "FrameDelay": "turning", "MountingTilt": "mounting", "Robot": "robot", "RobotSetup": "robot_setup",
-    "TurnCheck": "turning", "check_turns": "turning", "find_setup": "robot_setup", "frame_delay": "turning",
-    "mounting_tilt": "mounting",
+    "Extrinsics": "extrinsics", "FrameDelay": "turning", "JoinedLogs": "extrinsics", "JoinedTilts": "extrinsics",
+    "MountingTilt": "mounting", "Robot": "robot", "RobotSetup": "robot_setup", "TurnCheck": "turning",
+    "check_turns": "turning", "find_setup": "robot_setup", "frame_delay": "turning", "join_logs": "extrinsics",
+    "join_tilts": "extrinsics", "mounting_tilt": "mounting",
 }  # fmt: skip
 
 
