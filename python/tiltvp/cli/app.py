@@ -10,7 +10,7 @@ from contextlib import nullcontext
 from cyclopts import App, CycloptsError, Parameter
 
 from tiltvp import __version__
-from tiltvp.cli import calibrate, camera, corner, demo, level, lines, mount, segments, setup, tilt, track
+from tiltvp.cli import calibrate, camera_making, corner, demo, level, lines, mount, segments, setup, tilt, track
 from tiltvp.cli.lab import dataset, drive, evaluate, measure, report
 from tiltvp.cli.sources import STDIN
 from tiltvp.cli.terminal import complain
@@ -40,7 +40,7 @@ app.command(track.track)
 app.command(corner.corner)
 app.command(calibrate.calibrate)
 app.command(demo.demo)
-app.command(camera.app)
+app.command(camera_making.app)
 app.command(dataset.app)
 app.command(drive.app)
 app.command(evaluate.evaluate)
