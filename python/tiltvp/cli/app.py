@@ -11,7 +11,7 @@ from cyclopts import App, CycloptsError, Parameter
 
 from tiltvp import __version__
 from tiltvp.cli import calibrate, camera_making, corner, demo, level, lines, mount, segments, setup, tilt, track
-from tiltvp.cli.lab import dataset, drive, evaluate, measure, report
+from tiltvp.cli.lab import dataset, evaluate, measure, report, train
 from tiltvp.cli.sources import STDIN
 from tiltvp.cli.terminal import complain
 from tiltvp.errors import MissingExtraError, OutputError, TiltvpError
@@ -42,7 +42,7 @@ app.command(calibrate.calibrate)
 app.command(demo.demo)
 app.command(camera_making.app)
 app.command(dataset.app)
-app.command(drive.app)
+app.command(train.app)
 app.command(evaluate.evaluate)
 app.command(measure.app)
 app.command(report.report)
