@@ -20,8 +20,6 @@ from tiltvp._core import (
 )
 from tiltvp.errors import CalibrationError, InvalidInputError
 from tiltvp.files import check_output, write_whole
-from tiltvp.formats.document import Document
-from tiltvp.formats.node import Node
 
 if TYPE_CHECKING:
     import numpy as np
@@ -70,6 +68,10 @@ class TrainedCorrection:
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> Self:
         """The correction of a file of `save`. Raises `CalibrationError` that says what was wrong and where."""
+        # Importing the package would take longer with them.
+        from tiltvp.formats.document import Document
+        from tiltvp.formats.node import Node
+
         document = Document.load(path)
         root = Node(document, document.toml("a file written by `tiltvp lab train`"))
         if not root.has("format") or root.need("format").text() != _FORMAT:
