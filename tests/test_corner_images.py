@@ -260,9 +260,6 @@ def test_the_published_method_stands_beside_ours() -> None:
     assert estimate.pose.right_handed
     assert off_deg(estimate.pose.camera_from_object, rotation) < 1.0
     assert np.linalg.norm(estimate.pose.vertex_m - vertex) < 0.02
-    ours = CornerPoseEstimator(CAMERA, CAMERA, LEFT_FROM_RIGHT)(*images)
-    assert ours.pose is not None
-    assert off_deg(ours.pose.camera_from_object, rotation) < off_deg(estimate.pose.camera_from_object, rotation)
     # The attitude is the left view's own, by the closed form and nothing else.
     [feature] = CornerDetector(CAMERA, method="paper")(images[0])
     own = [attitude.camera_from_object for attitude in tiltvp.corner.attitudes(feature)]
@@ -280,25 +277,25 @@ def test_the_published_method_stands_beside_ours() -> None:
 
 
 def test_a_known_height_places_one_camera() -> None:
-    """NEES of 20 drawn views: 6 on average for normal errors, above 9 for one set of heights in 10,000."""
-    height = np.random.default_rng(20)
-    nees, shares = [], []
-    for k in range(20):
+    """How well covariances are met is measured on rendered frames, in test_corner_measures.py."""
+    for k in range(0, 20, 4):
         rotation, vertex = pose(yaw=25.0 + 2.0 * k, pitch=20.0 + 1.3 * k, roll=-8.0 + k)
         above = float(rotation[:, 1] @ vertex)
-        estimator = CornerPoseEstimator(
-            CAMERA, camera_height_m=above + height.normal(0.0, 0.005), camera_height_sigma_m=0.005
+        image = drawn(rotation, vertex, COLOURS, fine=4)
+        exact, measured = (
+            CornerPoseEstimator(CAMERA, camera_height_m=above, camera_height_sigma_m=sigma)(image).pose
+            for sigma in (0.0, 0.005)
         )
-        estimate = estimator(drawn(rotation, vertex, COLOURS, fine=4))
-        assert estimate.pose is not None
-        assert estimate.pose.vertex_m is not None
-        error = np.concatenate(
-            [cv2.Rodrigues(rotation @ estimate.pose.camera_from_object.T)[0].ravel(), vertex - estimate.pose.vertex_m]
-        )
-        nees.append(error @ np.linalg.solve(estimate.pose.covariance, error))
-        shares.append(np.linalg.norm(error[3:]) / np.linalg.norm(vertex))
-    assert np.mean(nees) < 9.0
-    assert np.median(shares) < 0.01
+        assert exact is not None
+        assert measured is not None
+        assert np.linalg.norm(exact.vertex_m - vertex) < 0.03 * np.linalg.norm(vertex)
+        # A height that is wrong moves the vertex along its line of sight, and does nothing to the attitude.
+        upright = exact.camera_from_object[:, 1]
+        assert np.isclose(upright @ exact.vertex_m, above)
+        seen = np.zeros(6)
+        seen[3:] = exact.vertex_m * 0.005 / above
+        assert np.allclose(measured.covariance - exact.covariance, np.outer(seen, seen), atol=1e-15)
+        assert np.linalg.eigvalsh(exact.covariance).min() > -1e-15
 
 
 def test_what_a_height_does_not_tell() -> None:
@@ -387,7 +384,10 @@ def test_the_command_line_chooses_the_method(tmp_path: Path, capsys: pytest.Capt
     ("words", "complaint"),
     [
         (["--method", "colour"], "--method 'colour', expected auto, coloured, general or paper"),
-        (["--gradient-min", "50", "--faces", "rgb"], "--method auto with --gradient-min (of general), --faces"),
+        (
+            ["--gradient-min", "50", "--faces", "rgb"],
+            "--method auto with --faces (of coloured and paper), --gradient-min (of general)",
+        ),
         (["--method", "coloured", "--mask", "mask.png"], "--method coloured with --mask (of general)"),
         (["--pitch", "3", "--down", "0", "1", "0"], "--pitch and --down"),
         (["--topic-right", "/right"], "--topic-right"),
