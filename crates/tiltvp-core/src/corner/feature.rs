@@ -122,7 +122,16 @@ impl CornerFeature {
             covariance = information.try_inverse()?;
             vertex = (vertex - basis * (covariance * pull)).try_normalize(0.5)?;
         }
-        let rays = facing(rays, &vertex)?;
+        let mut rays = rays;
+        for ray in &mut rays {
+            let side = vertex.cross(&ray.toward).dot(&ray.normal);
+            if side.abs() < PLANES_APART {
+                return None;
+            }
+            if side < 0.0 {
+                *ray = ray.reversed();
+            }
+        }
         let off = rays.map(|ray| ray.normal.dot(&vertex));
         let basis = tangent_basis(&vertex);
         let pencil = Pencil::new(vertex, &rays, &spread, basis * covariance * basis.transpose())?;
@@ -131,23 +140,6 @@ impl CornerFeature {
             rays,
             vertex,
             vertex_covariance: covariance,
-            residual_rad: (off.iter().map(|off| off * off).sum::<f64>() / 3.0).sqrt(),
-            chi_square: off.iter().zip(variance).map(|(off, variance)| off * off / variance).sum(),
-            pencil,
-        })
-    }
-
-    /// The feature of fitted rays with a vertex and half-planes of its own; none where a ray's `toward` is at the vertex.
-    pub(super) fn with_pencil(rays: [FittedRay; 3], pencil: Pencil) -> Option<Self> {
-        let vertex = pencil.vertex;
-        let rays = facing(rays, &vertex)?;
-        let off = rays.map(|ray| ray.normal.dot(&vertex));
-        let variance = rays.map(|ray| vertex.dot(&(ray.covariance_3d() * vertex)).max(VARIANCE_MIN));
-        let basis = tangent_basis(&vertex);
-        Some(Self {
-            rays,
-            vertex,
-            vertex_covariance: basis.transpose() * pencil.vertex_covariance * basis,
             residual_rad: (off.iter().map(|off| off * off).sum::<f64>() / 3.0).sqrt(),
             chi_square: off.iter().zip(variance).map(|(off, variance)| off * off / variance).sum(),
             pencil,
@@ -216,20 +208,6 @@ impl CornerFeature {
     pub fn meets_probability(&self) -> f64 {
         1.0 - chi_square_cdf(self.chi_square, 1)
     }
-}
-
-/// The rays with normals about which the walk from the vertex to `toward` is a positive turn; none where one begins there.
-pub(super) fn facing(mut rays: [FittedRay; 3], vertex: &Vector3<f64>) -> Option<[FittedRay; 3]> {
-    for ray in &mut rays {
-        let side = vertex.cross(&ray.toward).dot(&ray.normal);
-        if side.abs() < PLANES_APART {
-            return None;
-        }
-        if side < 0.0 {
-            *ray = ray.reversed();
-        }
-    }
-    Some(rays)
 }
 
 impl Pencil {

@@ -1,10 +1,10 @@
 //! The front end as the paper has it: lines through midpoints between labels, and the vertex nearest to them (eqs. 25 to 27).
 
-use nalgebra::{Matrix2, Matrix3, Vector2, Vector3};
+use nalgebra::{Matrix2, Vector2, Vector3};
 
 use super::{CandidateLine, ColouredScratch, Window, find_lines};
 use crate::camera::Camera;
-use crate::corner::feature::{CornerFeature, Pencil, facing};
+use crate::corner::feature::CornerFeature;
 use crate::corner::options::PaperOptions;
 use crate::corner::ray::FittedRay;
 use crate::geometry::tangent_basis;
@@ -51,17 +51,17 @@ pub(crate) fn find(
     if lines.iter().any(|line| line.middle.z <= 0.0) {
         return None;
     }
-    let [Some(x), Some(y), Some(z)] = lines.map(|line| ray(&line, &bearing, options.line_sigma_px)) else {
+    let missed = in_plane.iter().map(|line| (line.normal.dot(&point) - line.offset).powi(2)).sum::<f64>();
+    let px_per_unit = camera.project_jacobian(&bearing).map(|(_, jacobian)| jacobian.norm() / 2f64.sqrt())? * bearing.z;
+    if (missed / 3.0).sqrt() * px_per_unit > options.residual_max_px {
         return None;
-    };
-    let rays = facing([x, y, z], &bearing)?;
-    let mut parallel = in_plane.map(|line| line.moved_to(&point));
-    for (normal, ray) in parallel.iter_mut().zip(&rays) {
-        *normal *= normal.dot(&ray.normal).signum();
     }
-    let feature = CornerFeature::with_pencil(rays, pencil(bearing, parallel, &rays)?)?;
-    let px_per_rad = camera.project_jacobian(&bearing).map(|(_, jacobian)| jacobian.norm() / 2f64.sqrt())?;
-    (feature.residual_rad() * px_per_rad <= options.residual_max_px).then_some(feature)
+    let mut rays = [None; 3];
+    for ((ray, line), parallel) in rays.iter_mut().zip(&lines).zip(&in_plane) {
+        *ray = Some(ray_through(&bearing, line, &parallel.moved_to(&point), options.line_sigma_px)?);
+    }
+    let [Some(x), Some(y), Some(z)] = rays else { return None };
+    CornerFeature::from_rays([x, y, z])
 }
 
 /// Eq. 27: the point with the least sum of squared distances from the lines.
@@ -74,10 +74,15 @@ fn vertex(lines: &[PlaneLine; 3]) -> Option<Vector2<f64>> {
     Some(matrix.try_inverse()? * right).filter(|point| point.iter().all(|x| x.is_finite()))
 }
 
-/// A line as a ray away from the vertex; none if its midpoints lie as far on the one side of the vertex as on the other. The paper
-/// has no covariances: this one is that of evenly spread midpoints which scatter as these do, and of `sigma_px` across the line that
-/// all of them share.
-fn ray(line: &CandidateLine, vertex: &Vector3<f64>, sigma_px: f64) -> Option<FittedRay> {
+/// A line as a ray away from the vertex, with the normal of the parallel through it; none if its midpoints lie as far on the one side
+/// of the vertex as on the other. The paper has no covariances: this one is that of evenly spread midpoints which scatter as these
+/// do, and of `sigma_px` across the line that all of them share.
+fn ray_through(
+    vertex: &Vector3<f64>,
+    line: &CandidateLine,
+    parallel: &Vector3<f64>,
+    sigma_px: f64,
+) -> Option<FittedRay> {
     let at = vertex.dot(&line.along).atan2(vertex.dot(&line.middle));
     let [low, high] = line.reach.map(|angle| angle - at);
     let (far, near) = if high.abs() >= low.abs() { (high, -low) } else { (low, high) };
@@ -88,12 +93,13 @@ fn ray(line: &CandidateLine, vertex: &Vector3<f64>, sigma_px: f64) -> Option<Fit
     let scatter = line.rms_rad.powi(2) * ERRING_TOGETHER / line.support as f64;
     let (offset, slope) = (scatter + (sigma_px / line.px_per_rad).powi(2), 12.0 * scatter / (length * length));
     let spread = line.middle * line.middle.transpose() * offset + line.along * line.along.transpose() * slope;
-    let basis = tangent_basis(&line.normal);
+    let basis = tangent_basis(parallel);
     let (sin, cos) = (at + far).sin_cos();
+    let toward = line.middle * cos + line.along * sin;
     Some(FittedRay {
-        normal: line.normal,
+        normal: *parallel,
         covariance: basis.transpose() * spread * basis,
-        toward: line.middle * cos + line.along * sin,
+        toward: (toward - parallel * parallel.dot(&toward)).try_normalize(1e-9)?,
         support: line.support,
         residual_rms_rad: line.rms_rad,
     })
@@ -102,27 +108,3 @@ fn ray(line: &CandidateLine, vertex: &Vector3<f64>, sigma_px: f64) -> Option<Fit
 /// From the vertex the midpoints lie on one side, but for a few that the gap's width brings about: the share of the longer side that
 /// the shorter one may have.
 const NEAR_SHARE_MAX: f64 = 0.3;
-
-/// The rays about a vertex that all three lines have the same say in, and to first order how their errors turn them about it.
-fn pencil(vertex: Vector3<f64>, normal: [Vector3<f64>; 3], rays: &[FittedRay; 3]) -> Option<Pencil> {
-    let basis = tangent_basis(&vertex);
-    let across = normal.map(|normal| basis.transpose() * normal);
-    let inverse = across.iter().map(|a| a * a.transpose()).sum::<Matrix2<f64>>().try_inverse()?;
-    let spread = rays.map(|ray| ray.covariance_3d());
-    let along = normal.map(|normal| normal.cross(&vertex));
-    let mut covariance = Matrix2::zeros();
-    for (a, spread) in across.iter().zip(&spread) {
-        let pull = inverse * a;
-        covariance += pull * pull.transpose() * vertex.dot(&(spread * vertex));
-    }
-    let (mut lever, mut noise) = ([0.0; 3], [0.0; 3]);
-    for i in 0..3 {
-        // What the ray's own error moves the vertex across it, and how far that goes with its turn.
-        let moved = across[i].dot(&(covariance * across[i]));
-        let together = across[i].dot(&(inverse * across[i])) * along[i].dot(&(spread[i] * vertex));
-        lever[i] = if moved > 0.0 { together / moved } else { 0.0 };
-        noise[i] = (along[i].dot(&(spread[i] * along[i])) - lever[i] * together).max(0.0);
-    }
-    let vertex_covariance: Matrix3<f64> = basis * covariance * basis.transpose();
-    Some(Pencil { vertex, normal, along, vertex_covariance, lever, noise })
-}

@@ -10,9 +10,9 @@ use crate::corner::triangulation::{BearingObservation, midpoint};
 use crate::error::Result;
 use crate::geometry::RigidMotion;
 
-/// Degrees of freedom of what two views of one corner disagree in: three of the attitude, one of the lines of sight that do not
-/// meet, and in each image one of three lines that do not meet.
-const FREEDOM: f64 = 6.0;
+/// Degrees of freedom of what two views of one corner disagree in: three of the attitude, and one of the lines of sight, which do
+/// not meet.
+const FREEDOM: f64 = 4.0;
 
 impl CornerPoseEstimator {
     /// The poses of the one corner of either image. The attitude is the left view's own (eq. 48), of the interpretation that the
@@ -40,9 +40,11 @@ impl CornerPoseEstimator {
         else {
             return Ok(());
         };
-        let missed = vertex.chi_square + left.chi_square() + right.chi_square();
         let resolved = resolve(&views, Alignment::Same, self.right_handed(), &self.priors(true))?;
-        if resolved.first().is_none_or(|best| ((best.chi_square + missed) / FREEDOM).sqrt() > self.options.misfit_max) {
+        if resolved
+            .first()
+            .is_none_or(|best| ((best.chi_square + vertex.chi_square) / FREEDOM).sqrt() > self.options.misfit_max)
+        {
             return Ok(());
         }
         estimate.hypotheses = resolved
@@ -59,7 +61,7 @@ impl CornerPoseEstimator {
                     covariance,
                     probability: resolved.probability,
                     right_handed: chosen.is_right_handed(),
-                    misfit: ((resolved.chi_square + missed) / FREEDOM).sqrt(),
+                    misfit: ((resolved.chi_square + vertex.chi_square) / FREEDOM).sqrt(),
                 })
             })
             .collect();
