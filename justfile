@@ -33,12 +33,12 @@ quick-extension:
 # Sets up; checks and tests everything that needs neither data nor programs of the system.
 test: setup check test-rust test-python
 
-# Debian's chromium and valgrind, by apt-get, if they are not there. (The only recipe that installs into the system.)
+# Debian's chromium, valgrind and Xvfb, by apt-get, if they are not there. (The only recipe that installs into the system.)
 system-programs:
     #!/usr/bin/env bash
     set -euo pipefail
     missing=""
-    for name in chromium valgrind; do command -v $name > /dev/null || missing="$missing $name"; done
+    for name in chromium valgrind Xvfb; do command -v $name > /dev/null || missing="$missing ${name,,}"; done
     [ -n "$missing" ] || exit 0
     root=""
     [ "$(id -u)" = 0 ] || root=sudo
@@ -46,8 +46,8 @@ system-programs:
     $root apt-get update --quiet --quiet
     DEBIAN_FRONTEND=noninteractive $root apt-get install --quiet --quiet --yes --no-install-recommends $missing > /dev/null
 
-# The wheel in a bare environment, the notebooks, and the tests that want a browser and valgrind: the page of a report, and what an
-# image costs in instructions.
+# The wheel in a bare environment, the notebooks, and the tests that want a browser, a screen and valgrind: the page of a report, the
+# window of `--show`, and what an image costs in instructions.
 test-system *arguments: setup system-programs smoke notebooks
     {{bin}}/pytest --quiet tests/system {{arguments}}
     cargo test --locked --package tiltvp-core --features valgrind --test instructions --quiet
@@ -62,6 +62,10 @@ notebooks *arguments:
 # The pages of the site, with the notebooks' figures, in target/docs/html; a warning fails, and so does a link within that leads nowhere.
 docs:
     {{bin}}/sphinx-build --quiet --fail-on-warning --keep-going --conf-dir docs --doctree-dir target/docs/doctrees . target/docs/html
+
+# Pictures of the guides, of rooms that the package renders, in docs/images.
+pictures: setup
+    {{bin}}/python docs/pictures.py
 
 # Licences, duplicates, sources and advisories of the crates, by cargo-deny, which is built if it is not there.
 deny *arguments:
@@ -138,6 +142,10 @@ stub: setup
 survive *arguments: setup
     {{bin}}/pytest --quiet --numprocesses 2 --dist worksteal tests/survive {{arguments}}
 
+# A robot's hours: cameras that are unplugged, clocks that are set back, disks that fill, Ctrl-C. Takes --minutes (default 60).
+soak *arguments: setup
+    {{bin}}/python tests/soak.py {{arguments}}
+
 # The tests on real data, in the folder that TILTVP_DATA names.
 test-real *arguments: setup
     {{bin}}/pytest --quiet tests/real_data {{arguments}}
@@ -194,6 +202,10 @@ measure-inertial *arguments: setup
 # 360-degree panoramas made level, and times of levelling beside OpenCV's remapping.
 measure-level *arguments: setup
     {{bin}}/tiltvp measure level "$TILTVP_DATA/panos" --inertial "$TILTVP_DATA/panos_theta_imu" {{arguments}}
+
+# COLMAP's reconstructions of rendered rooms: how far their gravity is off, without our priors and with them.
+measure-colmap *arguments: setup
+    {{bin}}/tiltvp measure colmap {{arguments}}
 
 # Planar-motion pose estimation over tilt in rendered rooms, without and with tilt correction.
 measure-planar-pose *arguments: setup
@@ -273,6 +285,10 @@ measure-markers *arguments: setup
 # A step of the self-calibration filters against a dense NumPy filter of the paper's equations, in one process.
 measure-calibration-time *arguments: setup
     OPENBLAS_NUM_THREADS=1 {{bin}}/python benches/peers/calibration_filter.py {{arguments}}
+
+# `tiltvp tilt --cluster` on two worker processes, of which one is killed: the table, and time over the number of images.
+measure-cluster *arguments: setup
+    {{bin}}/python benches/many_machines.py {{arguments}}
 
 # What each constant of the core does when it is halved and doubled; paths of files or folders choose some of them.
 measure-constants *arguments: setup

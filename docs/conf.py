@@ -18,7 +18,7 @@ release = tiltvp.__version__
 
 root_doc = "docs/index"
 include_patterns = ["docs/**", "notebooks/*.py", "*.md", "benches/README.md"]
-exclude_patterns = ["docs/conf.py", "docs/measured/*", "README.md", "CODE_OF_CONDUCT.md"]
+exclude_patterns = ["docs/conf.py", "docs/pictures.py", "docs/measured/*", "README.md", "CODE_OF_CONDUCT.md"]
 extensions = ["myst_nb", "sphinx.ext.autodoc"]
 
 # Notebooks are programs in the percent format. A cell that fails, a failed assertion too, fails the build.

@@ -87,7 +87,7 @@ figure, axis = plt.subplots(figsize=(9, 5.2), layout="constrained")
 axis.imshow(canvas[:, :, ::-1])
 u, v = left.project(estimate.pose.vertex_m)
 axis.set(xlim=(u - 240, u + 240), ylim=(v + 140, v - 140))
-axis.set(title="the last left picture: rays x red, y green, z blue, and the imaginary box", xticks=[], yticks=[])
+_ = axis.set(title="the last left picture: rays x red, y green, z blue, and the imaginary box", xticks=[], yticks=[])
 
 # %% [markdown]
 # ## Is the covariance true?

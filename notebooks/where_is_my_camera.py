@@ -125,4 +125,4 @@ figure, axis = plt.subplots(figsize=(8, 3.6), layout="constrained")
 for track in np.unique(log[:, 1]):
     rows = log[log[:, 1] == track]
     axis.plot(rows[:, 0], np.degrees(rows[:, 2]), ".", markersize=2)
-axis.set(xlabel="frame", ylabel="bearing, degrees", title="tracks of vertical lines: straight on, then half a turn")
+_ = axis.set(xlabel="frame", ylabel="bearing, degrees", title="tracks of vertical lines: straight on, then half a turn")

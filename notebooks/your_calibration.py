@@ -108,7 +108,7 @@ figure, (left, right) = plt.subplots(1, 2, figsize=(10, 3.2), layout="constraine
 left.imshow(pictures[2][:, :, ::-1])
 left.set(title="one of the pictures", xticks=[], yticks=[])
 right.bar(list(told_right.probabilities), list(told_right.probabilities.values()))
-right.set(title="which direction of the camera is up", ylabel="probability", ylim=(0, 1))
+_ = right.set(title="which direction of the camera is up", ylabel="probability", ylim=(0, 1))
 
 # %% [markdown]
 # ## A mirror

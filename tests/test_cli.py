@@ -133,7 +133,9 @@ def test_installed_program(world: Path) -> None:
         (["tilt", "--camera", "camera.toml"], "no source, expected images"),
         (["tlt"], '"tilt"'),
         (["camera", "infos"], '"info"'),
-        (["camera", "convert", "camera.toml", "out.yaml"], ".toml"),
+        (["camera", "convert", "camera.toml", "out.yaml"], ".toml, or --to"),
+        (["camera", "convert", "camera.toml", "out.yaml", "--to", "ocamcalib"], "tiltvp, opencv, kalibr"),
+        (["camera", "convert", "camera.toml", "out.yaml", "--to", "gyroflow"], "gyroflow is not written"),
         (["camera", "convert", "camera.toml", "./camera.toml"], "another name"),
         (["camera", "info", "broken.png"], "broken.png"),
         (["demo", "--kind", "ofice"], "office"),
@@ -342,6 +344,11 @@ def test_camera_convert_and_check(run: Run, tmp_path: Path) -> None:
         words = ("camera", "convert", tmp_path / "chain.yaml", tmp_path / "one.toml", "--format", "kalibr")
         assert run(*words, "--camera-name", name, "--overwrite").code == 0
         assert tiltvp.Camera.load(tmp_path / "one.toml") == loaded
+    for ending in ("txt", "bin"):
+        theirs = tmp_path / f"cameras.{ending}"
+        said = run("camera", "convert", tmp_path / "chain.yaml", theirs, "--to", "colmap")
+        assert (said.code, said.err) == (0, "")
+        assert tiltvp.Camera.load(theirs, camera=1) == loaded
     said = run("camera", "check", tmp_path / "both.toml", tmp_path / "chain.yaml")
     assert (said.code, said.err) == (0, "")
     assert said.out.count("sound") == 4
@@ -349,6 +356,12 @@ def test_camera_convert_and_check(run: Run, tmp_path: Path) -> None:
     assert said.code == 1
     assert said.out.count("sound") == 2
     assert "none.yaml" in one_line(said.err)
+
+
+def test_camera_convert_tells_that_a_limit_is_lost(run: Run, world: Path, tmp_path: Path) -> None:
+    said = run("camera", "convert", world / "camera.toml", tmp_path / "camera.json", "--to", "basalt")
+    assert said.code == 0
+    assert "the limit of 92.50 deg from the axis is not in it" in one_line(said.err)
 
 
 def test_camera_formats(run: Run) -> None:

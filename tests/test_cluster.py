@@ -70,7 +70,7 @@ def test_a_worker_killed_half_way(
 def test_nobody_answers(
     tmp_path: Path, dataset: TiltDataset, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr(module, "_PATIENCE_S", 0.5)
+    monkeypatch.setattr("tiltvp.lab.cluster._PATIENCE_S", 0.5)
     words = ["evaluate", str(dataset.directory), "--sweep", "table3", "--out", str(tmp_path / "run")]
     for address in (NOBODY, "nowhere"):
         assert main([*words, "--cluster", address]) == 2

@@ -2988,6 +2988,7 @@ class TiltFilter:
         cls,
         *,
         walk_rad_per_sqrt_m: float | None = None,
+        half_track_m: float | None = None,
         walk_rad_per_sqrt_step: float | None = None,
         gate_probability: float | None = None,
         confidence_min: float | None = None,
@@ -3007,7 +3008,12 @@ class TiltFilter:
         Parameters
         ----------
         walk_rad_per_sqrt_m
-            How fast the floor's tilt changes, in radians per square root of a metre driven. Default: 0.01.
+            How fast the floor's tilt changes, in radians per square root of a metre that the wheels roll. Default:
+            0.01.
+        half_track_m
+            Half the distance between the wheels in metres: how far they roll while the robot turns in place by one
+            radian. The default lies between those of vacuum cleaners (0.12) and of robots that people ride on (0.2).
+            Default: 0.15.
         walk_rad_per_sqrt_step
             How fast it changes however far the robot drives, in radians per square root of a prediction. Default:
             0.001.

@@ -18,6 +18,7 @@ from tiltvp.errors import InvalidInputError, OutputError, TiltvpError
 __all__ = [
     "check_output",
     "check_output_folder",
+    "check_replacing",
     "keeping_existing",
     "read_bytes",
     "read_text",
@@ -84,6 +85,12 @@ def check_output(path: str | os.PathLike[str]) -> None:
         raise OutputError(f"{os.fspath(path)}: cannot be written (is {what}), expected a file")
     if _KEEPS.get():
         raise InvalidInputError(f"{os.fspath(path)}: exists, expected a new file, or --overwrite to replace it")
+
+
+def check_replacing(what: str) -> None:
+    """Refuses to replace what a file has within it where outputs are kept. Raises `InvalidInputError`."""
+    if _KEEPS.get():
+        raise InvalidInputError(f"{what}, expected none, or --overwrite to replace it")
 
 
 def check_output_folder(path: str | os.PathLike[str]) -> None:

@@ -1,4 +1,5 @@
-"""How many pixels an image file says it has, so that no more is decoded than memory should hold."""
+"""What headers of image files say: how many pixels, so that no more is decoded than memory should hold, and how a
+photograph was held."""
 
 from __future__ import annotations
 
@@ -7,7 +8,7 @@ import struct
 from collections.abc import Callable
 from typing import Final
 
-__all__ = ["header_size"]
+__all__ = ["header_size", "orientation"]
 
 # Compiled at the first file and not at the import, a tenth of whose time that would be; `re` keeps them.
 _PNM: Final = rb"P[1-7](?:\s|#[^\n]*\n)+"
@@ -27,6 +28,30 @@ def header_size(data: bytes) -> tuple[int, int] | None:
                 return None
             return size if size is not None and min(size) > 0 else None
     return None
+
+
+def orientation(data: bytes) -> int:
+    """The orientation tag (1 to 8, Exif 2.3) of a JPEG file by its beginning; 1, upright, for any other and without."""
+    try:
+        at = 2 if data[:2] == b"\xff\xd8" else len(data)
+        while data[at : at + 1] == b"\xff" and data[at + 1] != 0xDA:
+            length = int(struct.unpack_from(">H", data, at + 2)[0])
+            if data[at + 1] == 0xE1 and data[at + 4 : at + 10] == b"Exif\0\0":
+                return _orientation_of(data[at + 10 : at + 2 + length])
+            at += 2 + length
+    except (struct.error, IndexError):
+        pass
+    return 1
+
+
+def _orientation_of(tiff: bytes) -> int:
+    end = ">" if tiff[:2] == b"MM" else "<"
+    first = int(struct.unpack_from(end + "I", tiff, 4)[0])
+    for number in range(struct.unpack_from(end + "H", tiff, first)[0]):
+        tag, kind, count, value = struct.unpack_from(end + "HHIH", tiff, first + 2 + 12 * number)
+        if (tag, kind, count) == (0x0112, 3, 1):
+            return int(value) if 1 <= value <= 8 else 1
+    return 1
 
 
 def _png(data: bytes) -> tuple[int, int] | None:

@@ -167,6 +167,7 @@ fn every_option_changes_something() {
     for other in [
         TiltFilterOptions { walk_rad_per_sqrt_m: 0.02, ..base },
         TiltFilterOptions { walk_rad_per_sqrt_step: 0.003, ..base },
+        TiltFilterOptions { half_track_m: 5.0, ..base },
         TiltFilterOptions { gate_probability: 0.9, ..base },
         TiltFilterOptions { confidence_min: 0.9, ..base },
         TiltFilterOptions { jump_after: 2, ..base },
@@ -191,6 +192,7 @@ fn impossible_options_and_arguments_are_refused() {
     for (options, name) in [
         (TiltFilterOptions { walk_rad_per_sqrt_m: -1.0, ..base }, "walk_rad_per_sqrt_m"),
         (TiltFilterOptions { walk_rad_per_sqrt_step: f64::NAN, ..base }, "walk_rad_per_sqrt_step"),
+        (TiltFilterOptions { half_track_m: -0.1, ..base }, "half_track_m"),
         (TiltFilterOptions { gate_probability: 1.0, ..base }, "gate_probability"),
         (TiltFilterOptions { confidence_min: 1.1, ..base }, "confidence_min"),
         (TiltFilterOptions { jump_after: 0, ..base }, "jump_after"),

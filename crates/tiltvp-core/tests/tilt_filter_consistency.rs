@@ -57,7 +57,8 @@ impl Drive {
     fn drive(&mut self, yaw_rad: f64, distance_m: f64) {
         let turn = Rotation3::from_axis_angle(&Vector3::z_axis(), -yaw_rad);
         let o = &self.options;
-        let walk = (o.walk_rad_per_sqrt_m.powi(2) * distance_m + o.walk_rad_per_sqrt_step.powi(2)).sqrt();
+        let rolled_m = distance_m.max(o.half_track_m * yaw_rad.abs());
+        let walk = (o.walk_rad_per_sqrt_m.powi(2) * rolled_m + o.walk_rad_per_sqrt_step.powi(2)).sqrt();
         self.floor = tangent_exp(&(turn * self.floor), &self.random.normal(walk));
         if let Some(mounting) = o.mounting {
             let walk = mounting.walk_rad_per_sqrt_m * distance_m.sqrt();

@@ -4,8 +4,11 @@
 /// of all places are in the data.
 #[inline(always)]
 pub fn quads<const N: usize>(data: &[u8], stride: usize, places: &[u32; N]) -> Option<[u32; N]> {
-    let last = places.iter().fold(0, |last, place| *place.max(&last)) as usize;
-    if last.checked_add(stride)?.checked_add(2)? > data.len() {
+    let mut last = 0;
+    for place in places {
+        last = last.max(*place);
+    }
+    if (last as usize).checked_add(stride)?.checked_add(2)? > data.len() {
         return None;
     }
     let mut quads = [0; N];

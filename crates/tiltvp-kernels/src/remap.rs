@@ -29,6 +29,14 @@ pub struct Patch {
 
 type Lanes = [i32; COLUMNS];
 
+/// Places over a patch along an axis, with [`PLACE_BITS`] behind the point: bilinear, so that two sums lead from a row to the next.
+struct Axis {
+    /// Of the pixels of the row.
+    row: Lanes,
+    /// From a row to the next.
+    down: Lanes,
+}
+
 /// The places of a row of a patch: first bytes of pixels, and the weights of their right and lower neighbours.
 struct Row {
     first: [u32; COLUMNS],
@@ -38,34 +46,43 @@ struct Row {
 
 // Plain loops here and below: closures and adaptors over arrays are compiled without the vector instructions of their caller.
 
-/// Places of a row of the patch along an axis, relative to the origin, with [`PLACE_BITS`] behind the point.
+/// The places along an axis, relative to the origin.
 #[inline(always)]
-fn along<const AXIS: usize>(patch: &Patch, down: f32) -> Lanes {
+fn axis<const AXIS: usize>(patch: &Patch) -> Axis {
     let [left_top, right_top, left_bottom, right_bottom] = &patch.corners;
-    let left = left_top[AXIS] + down * (left_bottom[AXIS] - left_top[AXIS]);
-    let right = right_top[AXIS] + down * (right_bottom[AXIS] - right_top[AXIS]);
     let unit = (1 << PLACE_BITS) as f32;
+    let (across, down) = (unit / patch.reach[0] as f32, 1.0 / patch.reach[1] as f32);
+    let (top, bottom) = (right_top[AXIS] - left_top[AXIS], right_bottom[AXIS] - left_bottom[AXIS]);
     // Half a weight more, for weights are cut off.
-    let first = (left * unit) as i32 + (1 << (PLACE_BITS - WEIGHT_BITS - 1));
-    let step = ((right - left) * unit / patch.reach[0] as f32) as i32;
-    let mut lanes = [0; COLUMNS];
-    for (i, lane) in lanes.iter_mut().enumerate() {
-        *lane = first.wrapping_add(step.wrapping_mul(i.min(patch.size[0] - 1) as i32));
+    let first = (left_top[AXIS] * unit) as i32 + (1 << (PLACE_BITS - WEIGHT_BITS - 1));
+    let step = (top * across) as i32;
+    let first_down = ((left_bottom[AXIS] - left_top[AXIS]) * unit * down) as i32;
+    let step_down = ((bottom - top) * across * down) as i32;
+    let mut places = Axis { row: [0; COLUMNS], down: [0; COLUMNS] };
+    for i in 0..COLUMNS {
+        let column = i.min(patch.size[0] - 1) as i32;
+        places.row[i] = first.wrapping_add(step.wrapping_mul(column));
+        places.down[i] = first_down.wrapping_add(step_down.wrapping_mul(column));
     }
-    lanes
+    places
 }
 
+/// The places of the present row, after which both axes are those of the next.
 #[inline(always)]
-fn places<const CHANNELS: usize>(patch: &Patch, row: usize, stride: usize) -> Row {
-    let down = row as f32 / patch.reach[1] as f32;
-    let (u, v) = (along::<0>(patch, down), along::<1>(patch, down));
+fn places<const CHANNELS: usize>(u: &mut Axis, v: &mut Axis, origin: u32, stride: usize) -> Row {
     let mut found = Row { first: [0; COLUMNS], right: [0; COLUMNS], below: [0; COLUMNS] };
     for i in 0..COLUMNS {
-        let (across, down) = ((u[i] >> PLACE_BITS) as u32, (v[i] >> PLACE_BITS) as u32);
+        let (across, down) = ((u.row[i] >> PLACE_BITS) as u32, (v.row[i] >> PLACE_BITS) as u32);
         let from_origin = down.wrapping_mul(stride as u32).wrapping_add(across.wrapping_mul(CHANNELS as u32));
-        found.first[i] = patch.origin.wrapping_add(from_origin);
-        found.right[i] = (u[i] >> (PLACE_BITS - WEIGHT_BITS)) & WEIGHT_MAX;
-        found.below[i] = (v[i] >> (PLACE_BITS - WEIGHT_BITS)) & WEIGHT_MAX;
+        found.first[i] = origin.wrapping_add(from_origin);
+    }
+    for i in 0..COLUMNS {
+        found.right[i] = (u.row[i] >> (PLACE_BITS - WEIGHT_BITS)) & WEIGHT_MAX;
+        found.below[i] = (v.row[i] >> (PLACE_BITS - WEIGHT_BITS)) & WEIGHT_MAX;
+    }
+    for i in 0..COLUMNS {
+        u.row[i] = u.row[i].wrapping_add(u.down[i]);
+        v.row[i] = v.row[i].wrapping_add(v.down[i]);
     }
     found
 }
@@ -95,9 +112,10 @@ vectorised! {
     /// If a patch is wider than [`COLUMNS`], or `out` ends within it.
     pub fn fill_gray(data: &[u8], stride: usize, patch: &Patch, out: &mut [u8], out_stride: usize) -> bool {
         let columns = patch.size[0];
+        let (mut u, mut v) = (axis::<0>(patch), axis::<1>(patch));
         let mut levels = [0; COLUMNS];
         for number in 0..patch.size[1] {
-            let row = places::<1>(patch, number, stride);
+            let row = places::<1>(&mut u, &mut v, patch.origin, stride);
             let Some(quads) = quads(data, stride, &row.first) else { return false };
             blend(&[quads; 4], [0, 8, 16, 24], &row, &mut levels);
             let into = &mut out[number * out_stride..][..columns];
@@ -118,8 +136,9 @@ vectorised! {
     /// As [`fill_gray`].
     pub fn fill_color(data: &[u8], stride: usize, patch: &Patch, out: &mut [u8], out_stride: usize) -> bool {
         let columns = patch.size[0];
+        let (mut u, mut v) = (axis::<0>(patch), axis::<1>(patch));
         for number in 0..patch.size[1] {
-            let row = places::<3>(patch, number, stride);
+            let row = places::<3>(&mut u, &mut v, patch.origin, stride);
             let Some(words) = neighbours(data, stride, &row.first) else { return false };
             let [mut blue, mut green, mut red] = [[0; COLUMNS]; 3];
             blend(&words, [0; 4], &row, &mut blue);

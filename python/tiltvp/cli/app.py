@@ -10,12 +10,14 @@ from contextlib import nullcontext
 from cyclopts import App, CycloptsError, Parameter
 
 from tiltvp import __version__
-from tiltvp.cli import calibrate, camera, corner, demo, level, lines, mount, segments, setup, tilt, track
+from tiltvp.cli import calibrate, camera, colmap, corner, demo, level, lines, mount, segments, setup, tilt, track
 from tiltvp.cli.lab import dataset, drive, evaluate, measure, report
+from tiltvp.cli.showing import RERUN
 from tiltvp.cli.sources import STDIN
 from tiltvp.cli.terminal import complain
 from tiltvp.errors import MissingExtraError, OutputError, TiltvpError
 from tiltvp.files import keeping_existing
+from tiltvp.streams.outputs.viewer import VIEWER
 
 _OVERWRITE = "--overwrite"
 """Anywhere in the line: every command that writes keeps what exists without it."""
@@ -39,6 +41,7 @@ app.command(lines.lines)
 app.command(track.track)
 app.command(corner.corner)
 app.command(calibrate.calibrate)
+app.command(colmap.colmap)
 app.command(demo.demo)
 app.command(camera.app)
 app.command(dataset.app)
@@ -58,6 +61,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if words[1:2] == ["-"]:
         # Elsewhere a word that begins so is taken for an option, which its name should then be looked for among.
         words[1] = STDIN
+    for place in [place for place, word in enumerate(words) if word == RERUN]:
+        if not "".join(words[place + 1 : place + 2]).lower().endswith(".rrd"):
+            # Without a file it is the viewer that is meant; an option takes a word, or none, not both.
+            words[place] = f"{RERUN}={VIEWER}"
     try:
         with nullcontext() if overwrite else keeping_existing():
             code = app(

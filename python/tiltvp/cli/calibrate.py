@@ -11,12 +11,15 @@ from tiltvp.cli.calibrate_inputs import DriveOptions, PictureOptions, log_of_ima
 from tiltvp.cli.calibrate_results import Calibration, ResultOptions
 from tiltvp.cli.line_options import DrivingLineOptions
 from tiltvp.cli.options import CameraOptions, Switch
+from tiltvp.cli.rerun_views import send_calibration
+from tiltvp.cli.showing import RerunOptions
 from tiltvp.cli.sources import MotionOptions
 from tiltvp.cli.terminal import say
 from tiltvp.errors import InvalidInputError
 
 NOT_RELIABLE = 1
 _PICTURES, _LINES, _RESULTS, _MOTION = PictureOptions(), DrivingLineOptions(), ResultOptions(), MotionOptions()
+_WATCHING = RerunOptions()
 
 
 def calibrate(
@@ -34,6 +37,7 @@ def calibrate(
     estimate_odometry: Switch = False,
     estimate_time_offset: Switch = False,
     results: ResultOptions = _RESULTS,
+    watching: RerunOptions = _WATCHING,
 ) -> int:
     """Where a camera (or any sensor of bearings) sits on a robot, from a drive past landmarks.
 
@@ -62,6 +66,7 @@ def calibrate(
     from tiltvp import calibrate as calibrate_log
 
     results.check()
+    watching.check()
     bad, sigma = 0, {}
     if pictures.images is None:
         pictures.refuse(camera, motion)
@@ -78,6 +83,9 @@ def calibrate(
         log.odometry, log.bearings, **sigma | drive.of_whole_log(), times_s=log.times_s,
         estimate_odometry=estimate_odometry, estimate_time_offset=estimate_time_offset,
     )  # fmt: skip
+    with watching.viewer() as viewer:
+        if viewer is not None:
+            send_calibration(viewer, log, history, whole)
     results.tell(Calibration(calibrator, history, whole), options.robot_from_camera)
     for word in other_readings(whole.misreading):
         say(f"try {' '.join([*(f'--read-as {known}' for known in read_as), f'--read-as {word}'])}")

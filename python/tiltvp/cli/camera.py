@@ -53,16 +53,28 @@ def info(file: Path, /, *, format: Format = None, image_size: str | None = None,
 
 @app.command
 def convert(
-    file: Path, out: Path, /, *, format: Format = None, image_size: str | None = None, camera_name: str | None = None
+    file: Path,
+    out: Path,
+    /,
+    *,
+    to: str | None = None,
+    format: Format = None,
+    image_size: str | None = None,
+    camera_name: str | None = None,
 ) -> None:
-    """Write the cameras of a file as tiltvp's own TOML.
+    """Write the cameras of a file as a file of another tool, or as tiltvp's own TOML.
+
+    A lens that the other format cannot hold is refused, with the formats that can.
 
     Parameters
     ----------
     file
         Calibration file.
     out
-        File to write, whole or not at all; ends in .toml.
+        File to write, whole or not at all.
+    to
+        Its format: kalibr, opencv, colmap (binary if OUT ends in .bin), ros, basalt, ocamcalib, or tiltvp, which OUT
+        that ends in .toml is without being asked.
     format
         The format of FILE, where its content does not tell.
     image_size
@@ -70,10 +82,10 @@ def convert(
     camera_name
         Name or number of the one camera to write, the first being 0; otherwise all are.
     """
-    from tiltvp.formats import write_toml
+    from tiltvp.formats import write_cameras
 
-    if out.suffix.lower() != ".toml":
-        raise InvalidInputError(f"{out}: ends in {out.suffix!r}, expected .toml")
+    if to is None and out.suffix.lower() != ".toml":
+        raise InvalidInputError(f"{out}: ends in {out.suffix!r}, expected .toml, or --to with another format")
     if os.path.realpath(out) == os.path.realpath(file):
         raise InvalidInputError(f"{out}: is the file to be read, expected another name")
     check_output(out)
@@ -90,7 +102,11 @@ def convert(
         specs = chosen[:1]
     for spec in specs:
         _built(file, spec)
-    write_toml(specs, out)
+    write_cameras(specs, out, to or "tiltvp")
+    for spec in specs:
+        if spec.max_theta_rad is not None and to not in (None, "tiltvp"):
+            limit = f"{math.degrees(spec.max_theta_rad):.2f} deg from the axis"
+            complain(f"{out}: {spec.name}: the limit of {limit} is not in it, {to} has no word for that")
     say(f"{out}: {len(specs)} camera{'s' if len(specs) > 1 else ''}, {', '.join(spec.model for spec in specs)}")
 
 
@@ -125,15 +141,16 @@ def check(files: list[Path], /, *, format: Format = None, image_size: str | None
 
 @app.command
 def formats() -> None:
-    """List the formats of calibration files that can be read."""
+    """List the formats of calibration files that can be read, and which of them are written too."""
     from tiltvp.formats import FORMATS
 
-    table = new_table(None, ("format", "what it is"), ("format", "what it is"))
+    table = new_table(None, ("format", "written", "what it is"), ("format", "written", "what it is"))
     for one in FORMATS:
         words = " ".join((sys.modules[one.parse.__module__].__doc__ or "").split("\n\n")[0].split())
         family, _, kind = one.name.partition("-")
         is_variant = any(other.name == family for other in FORMATS) and kind
-        table.add_row(one.name, f"The same as {family}, taken as a {kind} camera." if is_variant else words)
+        what = f"The same as {family}, taken as a {kind} camera." if is_variant else words
+        table.add_row(one.name, "yes" if one.written else "", what)
     show(table)
 
 

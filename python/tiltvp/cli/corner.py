@@ -13,6 +13,8 @@ from cyclopts import Group, Parameter, validators
 from tiltvp._core import CORNER_METHODS
 from tiltvp.cli.declared_options import LibraryOptions, from_library, mask_from
 from tiltvp.cli.options import image_size_from
+from tiltvp.cli.rerun_views import send_corner
+from tiltvp.cli.showing import RerunOptions
 from tiltvp.cli.sources import SourceOptions, ending_at_interrupt, picture_names
 from tiltvp.cli.tables import Table, check_ending, check_plot, write_table
 from tiltvp.cli.terminal import named, progress_bar, say
@@ -26,6 +28,7 @@ if TYPE_CHECKING:
     from tiltvp import Camera
     from tiltvp.corner import CornerEstimate, CornerPoseEstimator
     from tiltvp.streams import Frames
+    from tiltvp.streams.outputs.viewer import Viewer
 
 _ANGLE = Parameter(validator=validators.Number(gt=0, lt=180))
 
@@ -45,7 +48,7 @@ class CornerOptions(LibraryOptions):
         return super().given() | ({} if self.mask is None else {"mask": mask_from(self.mask)})
 
 
-_OPTIONS, _SOURCE = CornerOptions(), SourceOptions()
+_OPTIONS, _SOURCE, _WATCHING = CornerOptions(), SourceOptions(), RerunOptions()
 _POSE = ("roll_deg", "pitch_deg", "yaw_deg", "x_m", "y_m", "z_m")
 
 
@@ -68,6 +71,7 @@ def corner(
     frame_rate: Annotated[float | None, Parameter(validator=validators.Number(gt=0))] = None,
     image_size: str | None = None,
     independent: Annotated[bool, Parameter(negative="")] = False,
+    watching: RerunOptions = _WATCHING,
 ) -> int:
     """Find a corner in each image, or pair of images, and from it the camera's attitude, with a pair also its position.
 
@@ -119,6 +123,7 @@ def corner(
     if overlay is not None:
         check_output_folder(overlay)
     check_plot("--plot", plot)
+    watching.check()
     camera, estimator = _estimator(
         calibration, right is not None, method, options, math.radians(gamma), pitch, image_size_from(image_size)
     )
@@ -126,8 +131,9 @@ def corner(
     others = None if right is None else SourceOptions(topic=topic_right).open([right])
     if others is not None and (others.count != frames.count or frames.count is None):
         raise InvalidInputError(f"{right}: {others.count} frames, expected {frames.count} as in {left}")
-    look = Look(camera, estimator, independent, overlay)
-    estimates = list(look.each(frames, others, frame_rate))
+    with watching.viewer() as viewer:
+        look = Look(camera, estimator, independent, overlay, viewer)
+        estimates = list(look.each(frames, others, frame_rate))
     if not estimates:
         raise InvalidInputError(f"{frames.source}: {look.bad} frames, none of which can be used")
     table = Table(POSE_COLUMNS, pose_rows(estimates))
@@ -146,6 +152,7 @@ class Look:
     estimator: CornerPoseEstimator
     independent: bool
     overlay: Path | None
+    viewer: Viewer | None
     bad: int = 0
     """How many frames could not be used so far."""
 
@@ -169,7 +176,7 @@ class Look:
                     bar.complain(named(frame.name, str(error)))
                     self.bad += 1
                 else:
-                    self._draw(name, images[0], estimate)
+                    self._draw(name, number, time_s, images[0], estimate)
                     yield time_s, frame.name, estimate
                 bar.advance()
 
@@ -178,11 +185,16 @@ class Look:
             self.estimator.reset()
         return self.estimator(*images)
 
-    def _draw(self, name: str, image: NDArray[np.uint8], estimate: CornerEstimate) -> None:
+    def _draw(self, name: str, number: int, time_s: float, image: NDArray[np.uint8], estimate: CornerEstimate) -> None:
         from tiltvp.images import write_image
 
+        if self.overlay is None and self.viewer is None:
+            return
+        picture = drawn(image, self.camera, estimate)
         if self.overlay is not None:
-            write_image(self.overlay / f"{name}.png", drawn(image, self.camera, estimate))
+            write_image(self.overlay / f"{name}.png", picture)
+        if self.viewer is not None:
+            send_corner(self.viewer, number, time_s, picture, estimate)
 
 
 def _write(table: Table, out: Path | None, trajectory: Path | None, plot: Path | None) -> None:

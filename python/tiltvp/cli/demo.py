@@ -13,9 +13,10 @@ from typing import TYPE_CHECKING, Annotated, Any, Final
 from cyclopts import Parameter
 
 from tiltvp.cli.results import degrees
-from tiltvp.cli.terminal import new_table, say, show, status
-from tiltvp.cli.tilt import words_of
-from tiltvp.files import check_output_folder
+from tiltvp.cli.terminal import new_table, progress_bar, say, show, status
+from tiltvp.cli.tilt_work import words_of
+from tiltvp.errors import InvalidInputError
+from tiltvp.files import check_output, check_output_folder, write_whole
 
 if TYPE_CHECKING:
     import numpy as np
@@ -57,6 +58,7 @@ class Trial:
 def demo(
     *,
     out: Path = Path("out/demo"),
+    page: Path | None = None,
     seed: int = 8,
     alpha_deg: float = 4.0,
     beta_deg: float = 30.0,
@@ -70,6 +72,9 @@ def demo(
     ----------
     out
         Folder for input.png, overlay.png, levelled.png, plot.png and summary.png.
+    page
+        Write this page (.html) in place of the pictures: two sliders lean the robot, and show what its camera sees, the
+        edges, the estimate and the level view. It needs no network.
     seed
         Which room.
     alpha_deg
@@ -86,6 +91,9 @@ def demo(
     from tiltvp import write_image
     from tiltvp.synth import render_room
 
+    if page is not None:
+        _write_page(page, kind, seed)
+        return
     check_output_folder(out)
     camera = _camera(width, height)
     with status(f"rendering a room ({kind}, seed {seed})"):
@@ -100,6 +108,18 @@ def demo(
     _print_table(room, trials)
     for name in pictures:
         say(str(out / name))
+
+
+def _write_page(path: Path, kind: str, seed: int) -> None:
+    from tiltvp.cli.demo_page import LEANS_DEG, page
+
+    if path.suffix.lower() != ".html":
+        raise InvalidInputError(f"--page {path}: ends in {path.suffix!r}, expected .html")
+    check_output(path)
+    with progress_bar(len(LEANS_DEG) ** 2, "leans") as bar:
+        text = page(kind, seed, advance=bar.advance)
+    write_whole(path, text)
+    say(str(path))
 
 
 def _camera(width: int, height: int) -> Camera:

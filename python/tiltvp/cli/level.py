@@ -10,8 +10,9 @@ from typing import Annotated, Literal, TypeAlias
 
 from cyclopts import Group, Parameter, validators
 
+from tiltvp.cli.cluster import check_cluster, files_of, is_begun
 from tiltvp.cli.filtering import FilterOptions
-from tiltvp.cli.level_images import Levelling, Looks, write_images
+from tiltvp.cli.level_images import TILTS, Levelling, Looks, level_on_cluster, write_images
 from tiltvp.cli.level_videos import write_video
 from tiltvp.cli.options import CameraOptions, MethodOptions, Switch, image_size_from, rotation_of
 from tiltvp.cli.sources import MotionOptions, SourceOptions
@@ -65,6 +66,7 @@ def level(
     wheel_base: Annotated[float | None, Parameter(validator=validators.Number(gt=0))] = None,
     metadata_only: Switch = False,
     copy_unlevelled: Switch = False,
+    cluster: str | None = None,
 ) -> int:
     """Make images level by the tilt of each, videos by the tilt of the drive.
 
@@ -86,6 +88,9 @@ def level(
         Of 360-degree JPEG photographs: write pitch and roll as GPano metadata, and leave the pixels' bytes untouched.
     copy_unlevelled
         Write images whose tilt is not believed as they are, instead of leaving them out; video frames too.
+    cluster
+        Address of a Dask scheduler: its workers, which must see the same files, make the images level. Their tilts are
+        Parquet files in the folder tilts of --out; the same command goes on where it was ended.
     """
     from tiltvp.streams import Motion
     from tiltvp.streams.image_files import ImageFiles
@@ -96,7 +101,10 @@ def level(
     looks = Looks(None if camera is None else camera.load(), method, output.keywords(), metadata_only)
     work = Levelling(looks, filtering, copy_unlevelled)
     as_video = out.suffix.lower() in _VIDEOS and not out.is_dir()
-    check_output(out) if as_video else check_output_folder(out)
+    if cluster is not None:
+        check_cluster(out, filter=filtering.filter)
+    if cluster is None or not is_begun(out / TILTS):
+        check_output(out) if as_video else check_output_folder(out)
     frames = source.open(images or [])
     of_files = isinstance(frames, ImageFiles)
     if metadata_only and (as_video or not of_files):
@@ -106,7 +114,9 @@ def level(
         motion.refuse("--filter", wheel_base)
     moved = motion.motions(frames, wheel_base) if fused else None
     motions = repeat(Motion()) if moved is None else moved.motions
-    if isinstance(frames, ImageFiles) and not as_video:
+    if cluster is not None:
+        levelled, of = level_on_cluster(cluster, files_of(frames), out, work)
+    elif isinstance(frames, ImageFiles) and not as_video:
         levelled, of = write_images(frames, motions, out, work)
     else:
         path = out if as_video else out / f"{Path(frames.source).stem}.mp4"

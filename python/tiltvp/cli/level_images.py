@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
+from tiltvp.cli.cluster import Task, on_cluster
 from tiltvp.cli.filtering import FilterOptions, Judge
 from tiltvp.cli.options import MethodOptions
-from tiltvp.cli.results import Outcome
+from tiltvp.cli.results import Outcome, outcome_table
 from tiltvp.cli.sources import picture_names
+from tiltvp.cli.tables import Table
 from tiltvp.cli.terminal import named, progress_bar
 from tiltvp.errors import ImageFileError, InvalidInputError, OutputError, TiltvpError
 
@@ -29,6 +31,8 @@ _WIDTH_PX: Final = 1024
 """Columns of a panorama in which edges are looked for. At 2,048 those of 108 panoramas tell the tilt no better, in
 three times the time (`tiltvp measure level`)."""
 _JPEG: Final = (".jpg", ".jpeg")
+TILTS: Final = "tilts"
+"""Folder, in that of level images, for the table of a cluster."""
 
 
 @dataclass(frozen=True)
@@ -147,7 +151,7 @@ def write_images(
     judge, levelled = work.filtering.judge(), 0
     with progress_bar(len(frames.files), "images") as bar:
         for frame, name, motion in zip(frames, picture_names(frames), motions, strict=False):
-            problem = _level(frame, motion, folder / name, work, judge)
+            _, problem = _level(frame, motion, folder / name, work, judge)
             if problem is None:
                 levelled += 1
             else:
@@ -156,7 +160,9 @@ def write_images(
     return levelled, len(frames.files)
 
 
-def _level(frame: Frame, motion: Motion | None, path: Path, work: Levelling, judge: Judge) -> str | None:
+def _level(
+    frame: Frame, motion: Motion | None, path: Path, work: Levelling, judge: Judge
+) -> tuple[Outcome, str | None]:
     """Makes one image level, and says what is wrong. Raises `OutputError`, which all images would have."""
     file = Path(frame.name)
     try:
@@ -164,10 +170,38 @@ def _level(frame: Frame, motion: Motion | None, path: Path, work: Levelling, jud
         estimate = work.look(image).estimate(image)
     except TiltvpError as error:
         told = " ".join(str(error).split())
-        judge(Outcome(file, error=told, taken_s=frame.time_s), motion)
-        return told
+        return judge(Outcome(file, error=told, taken_s=frame.time_s), motion), told
     outcome = judge(Outcome(file, estimate, taken_s=frame.time_s), motion)
-    return _write(outcome, image, data, path.with_name(f"{path.name}{_ending(file)}"), work)
+    return outcome, _write(outcome, image, data, path.with_name(f"{path.name}{_ending(file)}"), work)
+
+
+@dataclass(frozen=True)
+class LevelTask:
+    """`write_images` as the task of a worker: the tilt of each image, whether it was made level, and why not."""
+
+    work: Levelling
+    folder: Path
+
+    def __call__(self, images: Sequence[tuple[Frame, str]]) -> Table:
+        judge = self.work.filtering.judge()
+        done = [_level(frame, None, self.folder / name, self.work, judge) for frame, name in images]
+        table = outcome_table([outcome for outcome, _ in done], "")
+        # Panoramas have a method of their own, if none is asked for.
+        types = {name: kind for name, kind in table.types.items() if name != "method"}
+        types |= {"levelled": "Boolean", "problem": "String"}
+        ends = ({"levelled": problem is None, "problem": problem} for _, problem in done)
+        return Table(
+            types, [{name: (row | end)[name] for name in types} for row, end in zip(table.rows, ends, strict=True)]
+        )
+
+
+def level_on_cluster(address: str, frames: ImageFiles, folder: Path, work: Levelling) -> tuple[int, int]:
+    """The same as `write_images` by the workers of a scheduler, with a table in `folder`/tilts."""
+    import polars as pl
+
+    task = Task("level", LevelTask(work, folder.absolute()))
+    _, table = on_cluster(address, frames, task, folder / TILTS)
+    return table.select(pl.col("levelled").sum(), pl.len()).collect().row(0)
 
 
 def _ending(file: Path) -> str:

@@ -152,6 +152,7 @@ def ending_at_interrupt(frames: Frames) -> Iterator[Iterator[Frame]]:
         if stop.is_set():
             raise KeyboardInterrupt
         stop.set()
+        frames.end()
 
     def until() -> Iterator[Frame]:
         for frame in frames:

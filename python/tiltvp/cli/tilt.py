@@ -3,40 +3,45 @@
 from __future__ import annotations
 
 import os
-import time
 from collections import deque
-from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
+from collections.abc import Generator, Iterable, Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import closing
-from dataclasses import dataclass
-from functools import cached_property
 from itertools import repeat
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, TypeVar
+from typing import TYPE_CHECKING, Annotated, Final
 
 from cyclopts import Parameter, validators
 
 from tiltvp.cli.answers import check_answers, write_answers
+from tiltvp.cli.cluster import check_cluster, files_of, is_begun
 from tiltvp.cli.filtering import FilterOptions
 from tiltvp.cli.options import CameraOptions, MethodOptions
-from tiltvp.cli.results import Outcome, degrees, mounting_words, outcome_table, people_table, summary_words
+from tiltvp.cli.results import Outcome, mounting_words, outcome_table, people_table, summary_words
+from tiltvp.cli.showing import ShowOptions
 from tiltvp.cli.sources import MotionOptions, SourceOptions, ending_at_interrupt, picture_names
 from tiltvp.cli.tables import STDOUT, json_lines
 from tiltvp.cli.terminal import ProgressBar, complain, named, progress_bar, say, show, width
-from tiltvp.errors import InvalidInputError, OutputError, TiltvpError
+from tiltvp.cli.tilt_work import Work, tilts_on_cluster
+from tiltvp.errors import InvalidInputError
 from tiltvp.files import check_output_folder
 
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from tiltvp import EdgeElements, Leveller, TiltEstimate, TiltEstimator
+    from tiltvp import TiltEstimator
     from tiltvp.streams import Frame, Frames
 
+    Picture = NDArray[np.uint8]
+    Done = tuple[Outcome, Picture | None]
+    Named = tuple[Frame, str, Outcome, Picture | None]
+
+_LAST: Final = 1_000
+"""Of the frames of a stream, of which a table is shown at its end: what a terminal lets one scroll back to."""
 _METHOD_DEFAULTS = MethodOptions()
 _FILTER_DEFAULTS = FilterOptions()
-_SOURCE, _MOTION = SourceOptions(), MotionOptions()
-T = TypeVar("T")
+_SOURCE, _MOTION, _SHOWING = SourceOptions(), MotionOptions(), ShowOptions()
 
 
 def tilt(
@@ -54,6 +59,8 @@ def tilt(
     level: Path | None = None,
     frame_rate: Annotated[float | None, Parameter(validator=validators.Number(gt=0))] = None,
     threads: Annotated[int, Parameter(validator=validators.Number(gte=1))] = 1,
+    showing: ShowOptions = _SHOWING,
+    cluster: str | None = None,
 ) -> int:
     """Estimate the tilt of each image, of files, a video, a recording of ROS or a live camera.
 
@@ -77,18 +84,17 @@ def tilt(
         Frames per second, for attitudes: by default the times that frames tell, and 25 where they tell none.
     threads
         How many images are worked on at the same time.
+    cluster
+        Address of a Dask scheduler: its workers, which must see the same files, do the work. --out is then a folder of
+        Parquet files, written as they are done; the same command goes on with it.
     """
     from tiltvp.streams import Motion
 
-    rows_only = out == STDOUT
-    if out is not None and not rows_only:
-        check_answers(out)
-    if overlay is not None and level is not None and os.path.realpath(overlay) == os.path.realpath(level):
-        raise InvalidInputError(f"--overlay and --level are both {overlay}, expected two folders")
-    for folder in (overlay, level):
-        if folder is not None:
-            check_output_folder(folder)
+    _check_outputs(out, overlay, level, cluster)
+    if cluster is not None:
+        check_cluster(out, filter=filtering.filter, show=showing.show, rerun=showing.rerun, frame_rate=frame_rate)
     filtering.check()
+    showing.check()
     if not filtering.filter:
         motion.refuse("--filter", wheel_base)
     estimator = camera.complete(method).estimator(camera.load())
@@ -96,34 +102,80 @@ def tilt(
     moved = motion.motions(frames, wheel_base) if filtering.filter else None
     motions: Iterable[Motion | None] = repeat(Motion()) if moved is None else moved.motions
     estimator = _checked(estimator, frames)
-    work, judge = Work(estimator, overlay, level, filtering), filtering.judge()
-    outcomes: list[Outcome] = []
-    with ending_at_interrupt(frames) as coming, closing(_done(work, coming, frames, threads)) as done:
-        for (frame, name, found), driven in zip(done, motions, strict=False):
+    work, judge = Work(estimator, overlay, level, filtering, showing.asked), filtering.judge()
+    if cluster is not None and out is not None:
+        return tilts_on_cluster(cluster, files_of(frames), work, out)
+    answers = Answers(frames.count is not None, estimator.method, out, filtering, frame_rate)
+    with (
+        showing.watch(work.leveller) as watch,
+        ending_at_interrupt(frames) as coming,
+        closing(_done(work, coming, frames, threads)) as done,
+    ):
+        for (frame, name, found, marked), driven in zip(done, motions, strict=False):
             outcome = judge(found, driven)
-            outcomes.append(outcome)
+            answers.add(outcome)
             if filtering.filter:
                 work.write_level(frame, outcome, name)
-            if rows_only:
-                say(json_lines(outcome_table([outcome], estimator.method)))
-    if not rows_only:
-        _show(outcomes, estimator.method, filtering, out, frame_rate)
-    if filtering.filter_plot is not None:
-        _write_plot(outcomes, estimator.method, filtering.filter_plot)
-    return 1 if frames.problems or any(outcome.error for outcome in outcomes) else 0
+            if watch is not None and not watch(frame, outcome, marked):
+                break
+    answers.conclude(frames.source)
+    return 1 if frames.problems or answers.bad else 0
 
 
-def _show(
-    outcomes: Sequence[Outcome], method: str, filtering: FilterOptions, out: Path | None, frame_rate: float | None
-) -> None:
-    """What people read on stdout, and the answers as a file."""
-    if outcomes:
-        say(summary_words(outcomes))
-    show(people_table(outcomes, width()))
-    if filtering.estimate_mounting:
-        say(mounting_words(outcomes))
-    if out is not None:
-        write_answers(outcomes, method, out, frame_rate)
+def _check_outputs(out: Path | None, overlay: Path | None, level: Path | None, cluster: str | None) -> None:
+    """Refuses outputs that cannot be written, before any work is done."""
+    if out is not None and out != STDOUT and cluster is None:
+        check_answers(out)
+    if overlay is not None and level is not None and os.path.realpath(overlay) == os.path.realpath(level):
+        raise InvalidInputError(f"--overlay and --level are both {overlay}, expected two folders")
+    for folder in (overlay, level):
+        # What is gone on with has pictures already.
+        if folder is not None and (cluster is None or out is None or not is_begun(out)):
+            check_output_folder(folder)
+
+
+class Answers:
+    """What is told of the outcomes, at once or at the end."""
+
+    def __init__(
+        self, ends: bool, method: str, out: Path | None, filtering: FilterOptions, frame_rate: float | None
+    ) -> None:
+        """`ends` is whether the source is known to have an end."""
+        self._method, self._out, self._filtering, self._frame_rate = method, out, filtering, frame_rate
+        self._rows_only = out == STDOUT
+        # So that a stream may go on for ever in the same memory.
+        most = 0 if self._rows_only else _LAST if out is None and not ends else None
+        self._kept: deque[Outcome] = deque(maxlen=None if filtering.filter_plot is not None else most)
+        self.count = 0
+        """How many there were."""
+        self.bad = 0
+        """How many of them could not be used."""
+
+    def add(self, outcome: Outcome) -> None:
+        """The next one."""
+        self._kept.append(outcome)
+        self.count += 1
+        self.bad += outcome.error is not None
+        if self._rows_only:
+            say(json_lines(outcome_table([outcome], self._method)))
+
+    def conclude(self, source: str) -> None:
+        """What people read on stdout, and the answers as files."""
+        outcomes = list(self._kept)
+        if self.bad and len(outcomes) < self.count:
+            complain(f"{source}: {self.bad} of {self.count} frames could not be used")
+        if not self._rows_only:
+            if len(outcomes) < self.count:
+                say(f"{source}: {self.count} frames, of which the last {len(outcomes)} are shown")
+            if outcomes:
+                say(summary_words(outcomes))
+            show(people_table(outcomes, width()))
+            if self._filtering.estimate_mounting:
+                say(mounting_words(outcomes))
+            if self._out is not None:
+                write_answers(outcomes, self._method, self._out, self._frame_rate)
+        if self._filtering.filter_plot is not None:
+            _write_plot(outcomes, self._method, self._filtering.filter_plot)
 
 
 def _checked(estimator: TiltEstimator, frames: Frames) -> TiltEstimator:
@@ -167,19 +219,17 @@ def _write_plot(outcomes: Sequence[Outcome], method: str, path: Path) -> None:
     write_image(path, figure_picture(filtered_tilt(outcome_table(outcomes, method).frame())))
 
 
-def _done(
-    work: Work, coming: Iterator[Frame], frames: Frames, threads: int
-) -> Generator[tuple[Frame, str, Outcome], None, None]:
-    """The frames with names and outcomes, in their order, each as soon as it is there."""
+def _done(work: Work, coming: Iterator[Frame], frames: Frames, threads: int) -> Generator[Named, None, None]:
+    """The frames with names, outcomes and marked images, in their order, each as soon as it is there."""
     named_frames = zip(coming, picture_names(frames), strict=False)
     with progress_bar(frames.count or 0, "images") as bar:
         if threads == 1:
             for frame, name in named_frames:
-                yield frame, name, _noted(work(frame, name), bar)
+                yield frame, name, *_noted(work(frame, name), bar)
             return
         pool = ThreadPoolExecutor(threads)
         # As many more than can be worked on wait decoded; a source may have more frames than the memory holds.
-        waiting: deque[tuple[Frame, str, Future[Outcome]]] = deque()
+        waiting: deque[tuple[Frame, str, Future[Done]]] = deque()
         try:
             for frame, name in named_frames:
                 waiting.append((frame, name, pool.submit(work, frame, name)))
@@ -191,87 +241,14 @@ def _done(
             pool.shutdown(cancel_futures=True)
 
 
-def _first(waiting: deque[tuple[Frame, str, Future[Outcome]]], bar: ProgressBar) -> tuple[Frame, str, Outcome]:
-    frame, name, outcome = waiting.popleft()
-    return frame, name, _noted(outcome.result(), bar)
+def _first(waiting: deque[tuple[Frame, str, Future[Done]]], bar: ProgressBar) -> Named:
+    frame, name, done = waiting.popleft()
+    return frame, name, *_noted(done.result(), bar)
 
 
-def _noted(outcome: Outcome, bar: ProgressBar) -> Outcome:
+def _noted(done: Done, bar: ProgressBar) -> Done:
+    outcome, _ = done
     if outcome.error is not None:
         bar.complain(named(outcome.file, outcome.error))
     bar.advance()
-    return outcome
-
-
-@dataclass(frozen=True)
-class Work:
-    """What is done with each image."""
-
-    estimator: TiltEstimator
-    overlay: Path | None
-    level: Path | None
-    filtering: FilterOptions
-
-    @cached_property
-    def leveller(self) -> Leveller:
-        """Of the estimator's camera, with tables that are made once."""
-        from tiltvp import Leveller
-
-        return Leveller(self.estimator.camera, self.estimator.robot_from_camera)
-
-    def __call__(self, frame: Frame, name: str) -> Outcome:
-        """Estimates, and writes the pictures asked for; any problem of this image becomes its outcome.
-
-        Raises `OutputError`, which all images would have.
-        """
-        try:
-            return self._run(frame, name)
-        except OutputError:
-            raise
-        except TiltvpError as error:
-            return Outcome(Path(frame.name), error=" ".join(str(error).split()), taken_s=frame.time_s)
-
-    def _run(self, frame: Frame, name: str) -> Outcome:
-        from tiltvp import write_image
-        from tiltvp.images import gray_from
-
-        file, image = Path(frame.name), frame.read()
-        gray = gray_from(image)
-        if self.overlay is None:
-            estimate, time_s = _timed(lambda: self.estimator(gray))
-        else:
-            (estimate, edges), time_s = _timed(lambda: self.estimator.with_edges(gray))
-            write_image(self.overlay / f"{name}.png", self._overlay(gray, estimate, edges, file.name))
-        accepted = estimate and self.filtering.accepts(estimate.confidence)
-        if self.level is not None and accepted and not self.filtering.filter:
-            write_image(self.level / f"{name}.png", self.leveller(image, estimate))
-        return Outcome(file, estimate, time_s, taken_s=frame.time_s)
-
-    def write_level(self, frame: Frame, outcome: Outcome, name: str) -> None:
-        """The image made level by what the filter held to be true after it, where it did."""
-        from tiltvp import write_image
-
-        if self.level is not None and outcome.filtered and outcome.error is None:
-            write_image(self.level / f"{name}.png", self.leveller(frame.read(), outcome.filtered))
-
-    def _overlay(
-        self, gray: NDArray[np.uint8], estimate: TiltEstimate, edges: EdgeElements, title: str
-    ) -> NDArray[np.uint8]:
-        from tiltvp.overlays.tilt import tilt_overlay
-
-        return tilt_overlay(gray, self.estimator, estimate, edges, words_of(estimate, title))
-
-
-def words_of(estimate: TiltEstimate, title: str) -> str:
-    """One line about an estimate, of the letters that pictures can show."""
-    name = title.encode("ascii", "replace").decode()
-    if not estimate:
-        return f"{name}: no tilt, {estimate.reason}"
-    angles = f"alpha {degrees(estimate.alpha_rad)} deg, beta {degrees(estimate.beta_rad, 1)} deg"
-    return f"{name}: {angles}, confidence {estimate.confidence:.3f}, {estimate.inlier_pixels} inliers"
-
-
-def _timed(work: Callable[[], T]) -> tuple[T, float]:
-    start = time.perf_counter()
-    result = work()
-    return result, time.perf_counter() - start
+    return done

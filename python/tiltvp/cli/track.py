@@ -14,6 +14,8 @@ from tiltvp.cli.declared_options import LibraryOptions, from_library
 from tiltvp.cli.line_options import LineOptions
 from tiltvp.cli.lines import LINE_TYPES, line_columns
 from tiltvp.cli.options import CameraOptions
+from tiltvp.cli.rerun_views import send_lines
+from tiltvp.cli.showing import RerunOptions
 from tiltvp.cli.sources import MotionOptions, SourceOptions, ending_at_interrupt
 from tiltvp.cli.tables import Table, check_ending, check_plot, write_table
 from tiltvp.cli.terminal import ProgressBar, named, progress_bar, say
@@ -41,6 +43,7 @@ class TrackerOptions(LibraryOptions):
 
 
 _DEFAULTS, _TRACKER, _SOURCE, _MOTION = LineOptions(), TrackerOptions(), SourceOptions(), MotionOptions()
+_WATCHING = RerunOptions()
 
 
 def track(
@@ -57,6 +60,7 @@ def track(
     video: Path | None = None,
     frame_rate: Annotated[float | None, Parameter(validator=validators.Number(gt=0))] = None,
     tracking: TrackerOptions = _TRACKER,
+    watching: RerunOptions = _WATCHING,
 ) -> int:
     """Follow vertical lines through the images of a folder, in the order of their names, or through a video.
 
@@ -86,6 +90,7 @@ def track(
     if video is not None:
         check_output(video)
     check_plot("--plot", plot)
+    watching.check()
     lens, options = camera.load(), camera.complete(options)
     extractor, tilt = options.extractor(lens), options.tilts(lens)
     tracker = LineTracker(**tracking.given())
@@ -96,14 +101,19 @@ def track(
     showing = nullcontext() if video is None else video_writer(video, frame_rate or frames.rate_hz)
     with (
         showing as film,
+        watching.viewer() as viewer,
         ending_at_interrupt(frames) as coming,
         progress_bar(frames.count or 0, "frames") as bar,
     ):
         for frame, seen in drive.followed(coming, bar):
             tracked.append((seen.number, frame.name, frame.time_s, seen.tracked))
-            if film is not None:
+            if film is not None or viewer is not None:
                 rotation, tracks = extractor.robot_from_camera, seen.tracked.track.tolist()
-                film.add(draw_lines(seen.gray, lens, seen.tracked.lines, rotation, tracks=tracks))
+                picture = draw_lines(seen.gray, lens, seen.tracked.lines, rotation, tracks=tracks)
+            if film is not None:
+                film.add(picture)
+            if viewer is not None:
+                send_lines(viewer, seen.number, frame.time_s, picture, seen.tracked)
     if not tracked:
         raise InvalidInputError(f"{frames.source}: {drive.bad} frames, none of which can be read")
     table = track_table(tracked)

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import difflib
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import Final
 
 from tiltvp.errors import InvalidInputError, UnsupportedFormatError
+from tiltvp.files import write_whole
 from tiltvp.formats import (
     basalt,
     boofcv,
@@ -33,29 +35,30 @@ from tiltvp.formats.document import Document
 from tiltvp.formats.own import write_toml
 from tiltvp.formats.spec import CameraSpec, ImageSize
 
-__all__ = ["FORMATS", "CameraSpec", "Format", "read_cameras", "write_toml"]
+__all__ = ["FORMATS", "CameraSpec", "Format", "read_cameras", "write_cameras", "write_toml"]
 
 
 @dataclass(frozen=True)
 class Format:
-    """One format: its name for `format=`, whether a document looks like it, and how it is read."""
+    """One format: its name for `format=`, whether a document looks like it, how it is read and, if it is, written."""
 
     name: str
     recognise: Callable[[Document], bool]
     parse: Callable[[Document, ImageSize | None], list[CameraSpec]]
+    written: Callable[[Sequence[CameraSpec]], str] | None = None
 
 
 FORMATS: Final[tuple[Format, ...]] = (
-    Format("tiltvp", own.recognise, own.parse),
-    Format("ocamcalib", ocamcalib.recognise, ocamcalib.parse),
+    Format("tiltvp", own.recognise, own.parse, own.written),
+    Format("ocamcalib", ocamcalib.recognise, ocamcalib.parse, ocamcalib.written),
     Format("pyocamcalib", pyocamcalib.recognise, pyocamcalib.parse),
-    Format("opencv", opencv.recognise, opencv.parse),
+    Format("opencv", opencv.recognise, opencv.parse, opencv.written),
     Format("opencv-pinhole", opencv.never, opencv.parse_as_pinhole),
     Format("opencv-fisheye", opencv.never, opencv.parse_as_fisheye),
-    Format("kalibr", kalibr.recognise, kalibr.parse),
-    Format("basalt", basalt.recognise, basalt.parse),
-    Format("colmap", colmap.recognise, colmap.parse),
-    Format("ros", ros.recognise, ros.parse),
+    Format("kalibr", kalibr.recognise, kalibr.parse, kalibr.written),
+    Format("basalt", basalt.recognise, basalt.parse, basalt.written),
+    Format("colmap", colmap.recognise, colmap.parse, colmap.written),
+    Format("ros", ros.recognise, ros.parse, ros.written),
     Format("camodocal", camodocal.recognise, camodocal.parse),
     Format("woodscape", woodscape.recognise, woodscape.parse),
     Format("vikit", vikit.recognise, vikit.parse),
@@ -84,6 +87,38 @@ def read_cameras(
     document = Document.load(path)
     chosen = chosen or _recognised(document)
     return [replace(spec, format=chosen.name) for spec in chosen.parse(document, size)]
+
+
+def write_cameras(specs: Sequence[CameraSpec], path: str | os.PathLike[str], format: str = "tiltvp") -> None:
+    """Writes cameras as a calibration file of `format`; the file appears whole or not at all.
+
+    Formats that are written are those of `FORMATS` with `written`. COLMAP's is binary if `path` ends in .bin. A limit
+    `max_theta_rad` is kept by our own format alone. Raises `CalibrationError` for what no camera can be,
+    `UnsupportedFormatError`, which is one, for a lens or a number of cameras that the format cannot hold, with those
+    that can, and `OutputError`.
+    """
+    chosen = _named(format)
+    if chosen.written is None:
+        known = ", ".join(one.name for one in FORMATS if one.written)
+        raise UnsupportedFormatError(f"{path}: {chosen.name} is not written, expected one of {known}")
+    checked = own.checked(specs, path)
+    try:
+        is_binary = chosen.name == "colmap" and os.fspath(path).lower().endswith(".bin")
+        content = colmap.written_binary(checked) if is_binary else chosen.written(checked)
+    except UnsupportedFormatError as error:
+        raise UnsupportedFormatError(f"{path}: {error}; {', '.join(_holding(checked))} can hold it") from None
+    write_whole(path, content)
+
+
+def _holding(specs: Sequence[CameraSpec]) -> list[str]:
+    """The formats that can hold all the cameras; our own can."""
+    names = []
+    for one in FORMATS:
+        if one.written is not None:
+            with suppress(UnsupportedFormatError):
+                one.written(specs)
+                names.append(one.name)
+    return names
 
 
 def _checked_size(image_size: ImageSize) -> ImageSize:

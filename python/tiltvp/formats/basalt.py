@@ -5,10 +5,14 @@
 
 from __future__ import annotations
 
+import json
+from collections.abc import Sequence
+
 from tiltvp.formats.coefficients import unified_from_alpha
 from tiltvp.formats.document import Document
 from tiltvp.formats.node import Node
 from tiltvp.formats.spec import CameraSpec, ImageSize
+from tiltvp.formats.writing import brown_of, general, mei_of, refuse, value
 
 _KEYS = {
     "ds": ("double_sphere", ("fx", "fy", "cx", "cy", "xi", "alpha")),
@@ -58,3 +62,34 @@ def _camera(camera: Node, resolution: Node | None, given: ImageSize | None, name
         del parameters["alpha"]
         parameters |= unified_from_alpha(values.need("alpha"), fx, fy, alpha)
     return values.spec(model, size, parameters, name)
+
+
+def written(specs: Sequence[CameraSpec]) -> str:
+    """The text of `intrinsics` and `resolution`, to which Basalt wants poses and the numbers of an IMU added.
+
+    Raises `UnsupportedFormatError`.
+    """
+    plain = [general(spec, "Basalt") for spec in specs]
+    tree = {"intrinsics": [_table(spec) for spec in plain], "resolution": [[one.width, one.height] for one in plain]}
+    return json.dumps({"value0": tree}, indent=2) + "\n"
+
+
+def _table(spec: CameraSpec) -> dict[str, object]:
+    kind = next((kind for kind, (model, _) in _KEYS.items() if model == spec.model), None)
+    unwritten = (
+        (kind == "pinhole" and any(brown_of(spec)))
+        or (kind == "ucm" and (any(mei_of(spec) or [1.0]) or value(spec, "skew") or value(spec, "xi") < 0.0))
+    )  # fmt: skip
+    if kind is None or unwritten:
+        refuse(
+            spec,
+            "Basalt",
+            "double_sphere, extended_unified, kannala_brandt, and pinhole and unified (xi at least 0) without "
+            "coefficients",
+        )
+    values = {key: value(spec, key) for key in _KEYS[kind][1]}
+    if kind == "ucm":
+        # The inverse of `coefficients.unified_from_alpha`.
+        shrink = 1.0 / (1.0 + value(spec, "xi"))
+        values |= {"fx": values["fx"] * shrink, "fy": values["fy"] * shrink, "alpha": value(spec, "xi") * shrink}
+    return {"camera_type": kind, "intrinsics": values}

@@ -1,4 +1,4 @@
-"""A calibration file as text, and as the tree of its YAML, JSON or XML, with every syntax error turned into ours."""
+"""A calibration file as text or bytes, and as the tree of its YAML, JSON or XML; every syntax error is one of ours."""
 
 from __future__ import annotations
 
@@ -24,6 +24,9 @@ LARGEST_TOML_BYTES: Final = 200_000
 """The standard library reads some 200 kB a second of the worst text."""
 DEEPEST_KEY: Final = 16
 """Parts of a dotted key, whose number the standard library takes squared; ours have 2."""
+_COUNT_BYTES: Final = 4
+"""Of the eight that count things in a binary file, those that are used by any number that could be meant. No text has
+four zero bytes."""
 _PART: Final = re.compile(r"[ \t]*[^\s,=\[\]{}#]+[ \t]*")
 
 
@@ -33,6 +36,13 @@ class Document:
 
     path: Path
     text: str
+    binary: bytes = b""
+    """The bytes of a file that begins with a count in eight of them, as COLMAP's; `text` is then empty."""
+
+    @staticmethod
+    def of(source: str) -> Document:
+        """A document without a text: something else than a file, which has this name where something is wrong."""
+        return Document(Path(source), "")
 
     @staticmethod
     def load(path: str | os.PathLike[str]) -> Document:
@@ -49,6 +59,8 @@ class Document:
             raise CalibrationError(
                 f"{path!s}: cannot be read ({why}), expected a calibration file, at this path"
             ) from None
+        if len(raw) >= 8 and not any(raw[_COUNT_BYTES:8]):
+            return Document(file, "", raw)
         try:
             text = raw.decode("utf-8-sig")
         except UnicodeDecodeError as error:

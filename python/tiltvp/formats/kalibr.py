@@ -7,11 +7,13 @@ pv] (eucm); radtan is k1 k2 p1 p2, equidistant k1..k4. Pixel centres are at inte
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 
 from tiltvp.formats.coefficients import four, kannala_brandt, mei
 from tiltvp.formats.document import Document
 from tiltvp.formats.node import Node
 from tiltvp.formats.spec import CameraSpec, ImageSize
+from tiltvp.formats.writing import brown_of, four_of, general, kannala_brandt_of, mei_of, refuse, value
 
 _CAMERA = re.compile(r"cam\d+", re.ASCII)
 _SUPPORTED = (
@@ -80,3 +82,41 @@ def _size(camera: Node, given: ImageSize | None) -> ImageSize:
         return camera.image_size(given, None, None, "the camera")
     width, height = (Node(camera.document, value, resolution.at) for value in resolution.numbers(2))
     return resolution.image_size(given, width, height, "the camera")
+
+
+def written(specs: Sequence[CameraSpec]) -> str:
+    """The text of a chain of cameras, without the rotations between them. Raises `UnsupportedFormatError`."""
+    import yaml
+
+    cameras = {f"cam{index}": _table(general(spec, "Kalibr"), index) for index, spec in enumerate(specs)}
+    return str(yaml.safe_dump(cameras, sort_keys=False, default_flow_style=None))
+
+
+def _table(spec: CameraSpec, index: int) -> dict[str, object]:
+    word, lens, intrinsics, coefficients = _lens(spec)
+    return {
+        "camera_model": word,
+        "intrinsics": intrinsics,
+        "distortion_model": lens,
+        "distortion_coeffs": coefficients,
+        "resolution": [spec.width, spec.height],
+        "rostopic": f"/cam{index}/image_raw",
+    }
+
+
+def _lens(spec: CameraSpec) -> tuple[str, str, list[float], list[float]]:
+    """camera_model, distortion_model, intrinsics and distortion_coeffs."""
+    if spec.model == "pinhole" and len(brown_of(spec)) == 4:
+        return "pinhole", "radtan", four_of(spec), brown_of(spec)
+    if spec.model == "kannala_brandt":
+        return "pinhole", "equidistant", four_of(spec), kannala_brandt_of(spec)
+    if spec.model == "double_sphere":
+        return "ds", "none", [value(spec, "xi"), value(spec, "alpha"), *four_of(spec)], []
+    if spec.model == "extended_unified":
+        return "eucm", "none", [value(spec, "alpha"), value(spec, "beta"), *four_of(spec)], []
+    coefficients = mei_of(spec)
+    if spec.model != "unified" or coefficients is None or value(spec, "skew"):
+        refuse(
+            spec, "Kalibr", "pinhole and unified with k1 k2 p1 p2, kannala_brandt, double_sphere and extended_unified"
+        )
+    return "omni", "radtan", [value(spec, "xi"), *four_of(spec)], coefficients

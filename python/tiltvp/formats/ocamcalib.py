@@ -12,15 +12,26 @@ camera with the centre written the other way round.
 
 from __future__ import annotations
 
+import math
 import re
+from collections.abc import Sequence
+from typing import Final
 
 from tiltvp import _core
+from tiltvp.errors import UnsupportedFormatError
 from tiltvp.formats.document import Document
 from tiltvp.formats.node import Node
 from tiltvp.formats.spec import CameraSpec, ImageSize
+from tiltvp.formats.writing import only_one, refuse, refuse_mirror, value
 
 _NUMBER = re.compile(r"[+-]?(\d+(\.\d*)?|\.\d+)([eE][+-]?\d+)?|[+-]?(nan|inf)", re.ASCII | re.IGNORECASE)
 _OMNI_CAM_WORDS = 2 + 5 + 2 + 3 + 12
+INVERSE_ERROR_PX: Final = 0.01
+"""Largest error of an inverse polynomial that is made: that of OCamCalib's own `findinvpoly`."""
+_MOST_INVERSE: Final = 33
+"""Coefficients of an inverse polynomial: the most of calibrations in use (docs/cameras.md)."""
+_SAMPLES: Final = 500
+"""Radii that it is fitted to: a pixel or two apart."""
 
 
 def recognise(document: Document) -> bool:
@@ -122,3 +133,52 @@ class _Words:
     def starts_with_image_size(self) -> bool:
         """Whether the first two words are whole numbers too large to be a count of what follows."""
         return all(re.fullmatch(r"\d+", word, re.ASCII) and int(word[:9]) > 24 for _, word in self.words[:2])
+
+
+def written(specs: Sequence[CameraSpec]) -> str:
+    """The text of `calib_results.txt`. A camera without an inverse polynomial is given one that is fitted.
+
+    Raises `UnsupportedFormatError`, also for several cameras, and where no inverse polynomial is near enough.
+    """
+    spec = only_one(specs, "OCamCalib")
+    refuse_mirror(spec, "OCamCalib")
+    polynomial, inverse = spec.parameters.get("polynomial"), spec.parameters.get("inverse_polynomial")
+    if spec.model != "ocam" or not isinstance(polynomial, list):
+        refuse(spec, "OCamCalib", "ocam")
+    if not isinstance(inverse, list) or not inverse:
+        inverse = _fitted_inverse(spec, polynomial)
+    row_and_column = [value(spec, "cy"), value(spec, "cx")]
+    affine = [value(spec, "c", 1.0), value(spec, "d"), value(spec, "e")]
+    parts: dict[str, Sequence[float]] = {
+        "polynomial coefficients for the DIRECT mapping function": [len(polynomial), *polynomial],
+        "polynomial coefficients for the inverse mapping function": [len(inverse), *inverse],
+        'center: "row" and "column", starting from 0 (C convention)': row_and_column,
+        'affine parameters "c", "d", "e"': affine,
+        'image size: "height" and "width"': [spec.height, spec.width],
+    }
+    return "\n".join(f"#{what}\n\n{' '.join(map(repr, numbers))}\n" for what, numbers in parts.items())
+
+
+def _fitted_inverse(spec: CameraSpec, polynomial: list[float]) -> list[float]:
+    """rho = sum b_k t^k of t = atan2(f(rho), rho), as OCamCalib fits it: of the least degree that is near enough, from
+    the centre to the farthest corner or to where the angle stops growing.
+    """
+    import numpy as np
+
+    across = max(value(spec, "cx"), spec.width - 1 - value(spec, "cx"))
+    down = max(value(spec, "cy"), spec.height - 1 - value(spec, "cy"))
+    rho = np.linspace(0.0, math.hypot(across, down), _SAMPLES)
+    angle = np.arctan2(np.polynomial.polynomial.polyval(rho, polynomial), rho)
+    growing = np.diff(angle) * (-1.0 if polynomial[0] > 0.0 else 1.0) > 0.0
+    last = _SAMPLES if growing.all() else int(np.argmin(growing)) + 1
+    rho, angle = rho[:last], angle[:last]
+    for degree in range(1, _MOST_INVERSE):
+        # With `full` it says nothing of a fit that is poorly conditioned: how good it is, is seen below.
+        fit, _ = np.polynomial.Polynomial.fit(angle, rho, degree, full=True)
+        inverse = [float(number) for number in fit.convert().coef]
+        if np.abs(np.polynomial.polynomial.polyval(angle, inverse) - rho).max() <= INVERSE_ERROR_PX:
+            return inverse
+    raise UnsupportedFormatError(
+        f"{spec.name}: no inverse polynomial of {_MOST_INVERSE} coefficients is within {INVERSE_ERROR_PX} px, "
+        "and files of OCamCalib need one"
+    )

@@ -8,11 +8,15 @@ a fisheye is refused. The formats `opencv-pinhole` and `opencv-fisheye` say it o
 
 from __future__ import annotations
 
+import json
+from collections.abc import Sequence
+
 from tiltvp.formats import multicol
 from tiltvp.formats.coefficients import brown_conrady, camera_matrix, kannala_brandt, mei, refuse_skew
 from tiltvp.formats.document import Document
 from tiltvp.formats.node import Node
 from tiltvp.formats.spec import CameraSpec, ImageSize, Parameters
+from tiltvp.formats.writing import brown_of, four_of, general, kannala_brandt_of, mei_of, only_one, refuse, value
 
 _MATRIX = ("camera_matrix", "cameraMatrix", "Camera_Matrix", "CameraMatrix", "K", "M", "intrinsic_matrix", "mtx")
 _COEFFICIENTS = (
@@ -165,3 +169,36 @@ def _size(root: Node, given: ImageSize | None) -> ImageSize:
         return both.image_size(given, both.get("width"), both.get("height"), "the file")
     width, height = (Node(root.document, value, both.at) for value in both.numbers(2))
     return both.image_size(given, width, height, "the file")
+
+
+def written(specs: Sequence[CameraSpec]) -> str:
+    """The text of a file of cv::FileStorage with the names that `parse` tells models by.
+
+    Raises `UnsupportedFormatError`, also for several cameras.
+    """
+    spec = general(only_one(specs, "OpenCV"), "OpenCV")
+    fx, fy, cx, cy = four_of(spec)
+    skew, names = 0.0, ("camera_matrix", "distortion_coefficients")
+    lines = [f"image_width: {spec.width}", f"image_height: {spec.height}", f"camera_name: {json.dumps(spec.name)}"]
+    if spec.model == "pinhole":
+        # Of five or eight numbers it is known whose they are.
+        coefficients = [*brown_of(spec), 0.0] if len(brown_of(spec)) == 4 else brown_of(spec)
+        lines.append("model: pinhole")
+    elif spec.model == "kannala_brandt":
+        coefficients, names = kannala_brandt_of(spec), ("K", "D")
+        lines.append("model: fisheye")
+    else:
+        mei_four = mei_of(spec)
+        if spec.model != "unified" or mei_four is None:
+            refuse(spec, "OpenCV", "pinhole, kannala_brandt, and unified with k1 k2 p1 p2")
+        coefficients, skew = mei_four, value(spec, "skew")
+        lines += ["model: omnidir", _matrix("xi", [[value(spec, "xi")]])]
+    lines.append(_matrix(names[0], [[fx, skew, cx], [0.0, fy, cy], [0.0, 0.0, 1.0]]))
+    lines.append(_matrix(names[1], [coefficients]))
+    return "\n".join(["%YAML:1.0", "---", *lines, ""])
+
+
+def _matrix(name: str, rows: list[list[float]]) -> str:
+    data = ", ".join(repr(number) for row in rows for number in row)
+    head = f"{name}: !!opencv-matrix\n   rows: {len(rows)}\n   cols: {len(rows[0])}\n   dt: d\n"
+    return f"{head}   data: [ {data} ]"

@@ -66,7 +66,11 @@ def root_of(document: Document) -> Node:
 
 def write_toml(spec: CameraSpec | Sequence[CameraSpec], path: str | os.PathLike[str]) -> None:
     """Writes one camera, or several, to `path`; the file appears whole or not at all. Raises `OutputError`."""
-    specs = [spec] if isinstance(spec, CameraSpec) else list(spec)
+    write_whole(path, written(checked([spec] if isinstance(spec, CameraSpec) else spec, path)))
+
+
+def checked(specs: Sequence[CameraSpec], path: str | os.PathLike[str]) -> list[CameraSpec]:
+    """The cameras with plain numbers, before they are written. Raises `CalibrationError` for what no camera can be."""
     if not specs:
         raise CalibrationError(f"{path}: there is no camera to write, expected one or more, at spec")
     for one in specs:
@@ -74,10 +78,15 @@ def write_toml(spec: CameraSpec | Sequence[CameraSpec], path: str | os.PathLike[
             one.check()
         except TiltvpError as error:
             raise CalibrationError(f"{path}: {error}, at {one.name}") from None
-    tree = {"format": _FORMAT, "version": VERSION, "camera": [camera_table(as_floats(one)) for one in specs]}
+    return [as_floats(one) for one in specs]
+
+
+def written(specs: Sequence[CameraSpec]) -> str:
+    """The text of a file of these cameras."""
     import tomli_w
 
-    write_whole(path, tomli_w.dumps(tree))
+    tree = {"format": _FORMAT, "version": VERSION, "camera": [camera_table(one) for one in specs]}
+    return tomli_w.dumps(tree)
 
 
 def camera_from(camera: Node, given: ImageSize | None) -> CameraSpec:

@@ -7,10 +7,13 @@ Pixel centres are at integers, as in image_geometry and OpenCV.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from tiltvp.formats.coefficients import brown_conrady, kannala_brandt, without_skew
 from tiltvp.formats.document import Document
 from tiltvp.formats.node import Node
 from tiltvp.formats.spec import CameraSpec, ImageSize
+from tiltvp.formats.writing import brown_of, four_of, general, kannala_brandt_of, only_one, refuse
 
 _MATRIX = ("camera_matrix", "K", "k")
 _COEFFICIENTS = ("distortion_coefficients", "D", "d")
@@ -44,3 +47,37 @@ def parse(document: Document, image_size: ImageSize | None) -> list[CameraSpec]:
     elif word not in ("none", ""):
         root.need(*_COEFFICIENTS)
     return [root.spec("pinhole", size, values | brown_conrady(coefficients), title)]
+
+
+def written(specs: Sequence[CameraSpec]) -> str:
+    """The YAML of camera_calibration_parsers, of an image that is not rectified: R is the identity, P is K.
+
+    Raises `UnsupportedFormatError`, also for several cameras.
+    """
+    import yaml
+
+    spec = general(only_one(specs, "ROS"), "ROS")
+    fx, fy, cx, cy = four_of(spec)
+    if spec.model == "kannala_brandt":
+        word, coefficients = "equidistant", kannala_brandt_of(spec)
+    elif spec.model == "pinhole":
+        coefficients = brown_of(spec)
+        word = "rational_polynomial" if len(coefficients) == 8 else "plumb_bob"
+        coefficients += [0.0] * (5 - len(coefficients))
+    else:
+        refuse(spec, "ROS", "pinhole and kannala_brandt")
+    table = {
+        "image_width": spec.width,
+        "image_height": spec.height,
+        "camera_name": spec.name,
+        "camera_matrix": _matrix(3, [fx, 0.0, cx, 0.0, fy, cy, 0.0, 0.0, 1.0]),
+        "distortion_model": word,
+        "distortion_coefficients": _matrix(1, coefficients),
+        "rectification_matrix": _matrix(3, [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0]),
+        "projection_matrix": _matrix(3, [fx, 0.0, cx, 0.0, 0.0, fy, cy, 0.0, 0.0, 0.0, 1.0, 0.0]),
+    }
+    return str(yaml.safe_dump(table, sort_keys=False, default_flow_style=None, width=200))
+
+
+def _matrix(rows: int, data: list[float]) -> dict[str, object]:
+    return {"rows": rows, "cols": len(data) // rows, "data": data}

@@ -86,6 +86,18 @@ class Chart:
             if seen and not (dashed and i % 10 >= 6):
                 cv2.line(self.picture, a, b, bgr_of(colour), width, cv2.LINE_AA)
 
+    def band(self, x: Any, low: Any, high: Any, colour: str) -> None:
+        """An area between two curves over the same values of x; where bands lie on each other both are seen."""
+        import cv2
+
+        left, top, width, height = self._box()
+        there, back = self.places(x, low), self.places(x, high)[::-1]
+        corners = np.rint(np.clip(np.concatenate([there, back]), -1e4, 1e4)).astype(np.int32)
+        shade = self.picture.copy()
+        cv2.fillPoly(shade, [corners.reshape(-1, 1, 2)], bgr_of(colour))
+        inside = (slice(top, top + height), slice(left, left + width))
+        self.picture[inside] = np.minimum(self.picture[inside], shade[inside])
+
     def bar(self, x: float, y: Limits, colour: str) -> None:
         """A filled bar from zero to `x`, between two values of y."""
         import cv2

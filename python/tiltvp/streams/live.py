@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import sys
+import threading
 import time
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, BinaryIO, Final
@@ -24,14 +25,27 @@ LONGEST_NAME: Final = 4096
 """Bytes of a file's name on the standard input: the longest path that Linux knows."""
 
 
-class LiveCamera(Frames):
-    """A camera that OpenCV opens by its number: frames as they come, at the times of a clock that never goes back."""
+_AGAIN_S: Final = 0.2
+"""After which a camera that has gone is opened again: half of what an interrupt may take."""
 
-    def __init__(self, number: int) -> None:
-        """Opens the camera. Raises `ImageFileError` where there is none."""
+
+class LiveCamera(Frames):
+    """A camera that OpenCV opens by its number: frames as they come, at the times of a clock that never goes back.
+
+    A camera that gives no image is opened again, until it does: the images that it did not give are one frame that
+    cannot be read and says for how long.
+    """
+
+    def __init__(self, number: int, *, patience_s: float = 60.0) -> None:
+        """Opens the camera. `patience_s` is how long one that has gone is waited for; then frames end.
+
+        Raises `ImageFileError` where there is none.
+        """
         import cv2
 
         self.source = f"camera {number}"
+        self._number, self._patience_s = number, patience_s
+        self._ended = threading.Event()
         self._capture = cv2.VideoCapture(number)
         if not self._capture.isOpened():
             raise ImageFileError(f"{self.source}: cannot be opened, expected the number of a camera, from 0")
@@ -39,20 +53,50 @@ class LiveCamera(Frames):
         if np.isfinite(rate) and rate > 0.0:
             self.rate_hz = rate
 
+    def end(self) -> None:
+        """No more frames after the one that is read now; may be called from another thread or a signal's handler."""
+        self._ended.set()
+
     def __iter__(self) -> Iterator[Frame]:
-        """Ends when the camera gives no more images."""
-        number = 0
+        """Ends with `end`, and when a camera that has gone does not come back."""
+        number, last_s = 0, time.monotonic()
         try:
-            while True:
-                done, image = self._capture.read()
+            while not self._ended.is_set():
+                image = self._image()
+                if image is None:
+                    image = self._awaited(last_s)
+                    name, now_s = f"{self.source}#{number:06d}", time.monotonic()
+                    what = "it was opened again" if image is not None else "it is waited for no longer"
+                    if image is None and self._ended.is_set():
+                        what = "nobody waits for it"
+                    gone = ImageFileError(f"{name}: the camera gave no image for {now_s - last_s:.1f} s, {what}")
+                    yield Frame.of(name, now_s, gone)
+                    number += 1
+                    if image is None:
+                        return
                 # As near to the exposure as a program knows: the image has just arrived.
-                time_s = time.monotonic()
-                if not done:
-                    return
-                yield Frame.of(f"{self.source}#{number:06d}", time_s, np.asarray(image, dtype=np.uint8))
+                last_s = time.monotonic()
+                yield Frame.of(f"{self.source}#{number:06d}", last_s, image)
                 number += 1
         finally:
             self._capture.release()
+
+    def _image(self) -> NDArray[np.uint8] | None:
+        done, image = self._capture.read()
+        return np.asarray(image, dtype=np.uint8) if done else None
+
+    def _awaited(self, since_s: float) -> NDArray[np.uint8] | None:
+        """The first image of the camera after it has come back; None where it does not, or nobody waits any more."""
+        import cv2
+
+        while time.monotonic() - since_s < self._patience_s and not self._ended.wait(_AGAIN_S):
+            self._capture.release()
+            self._capture = cv2.VideoCapture(self._number)
+            if self._capture.isOpened():
+                image = self._image()
+                if image is not None:
+                    return image
+        return None
 
 
 class NamedImages(Frames):

@@ -10,6 +10,7 @@ from cyclopts import App, Parameter, validators
 
 from tiltvp.cli.lab.body import body
 from tiltvp.cli.lab.calibration_measures import calibration, calibration_images, trust_calibration
+from tiltvp.cli.lab.colmap import colmap
 from tiltvp.cli.lab.corner_measures import corners
 from tiltvp.cli.lab.corner_real import corners_real
 from tiltvp.cli.lab.descriptors import descriptors
@@ -28,6 +29,7 @@ app = App(name="measure", help="Measure how well all this works, where the truth
 app.command(body)
 app.command(calibration)
 app.command(calibration_images)
+app.command(colmap)
 app.command(corners)
 app.command(corners_real)
 app.command(descriptors)

@@ -6,10 +6,11 @@ import json
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict
 from functools import lru_cache
-from importlib import import_module, metadata
-from typing import TYPE_CHECKING, Any
+from importlib import metadata
+from typing import TYPE_CHECKING
 
 from tiltvp.errors import RunError
+from tiltvp.lab.cluster import results_of
 from tiltvp.lab.evaluation.combinations import Combination
 
 if TYPE_CHECKING:
@@ -23,12 +24,6 @@ __all__ = ["estimate_on_cluster"]
 _CHUNK = 4
 """Images of a task: a second or so of work, lost if its worker dies."""
 
-_PATIENCE_S = 20.0
-"""How long the scheduler may take to answer."""
-
-_WORKERS_S = 120.0
-"""How long the first worker may take to join."""
-
 
 def estimate_on_cluster(
     address: str, dataset: TiltDataset, combinations: Sequence[Combination], numbers: Sequence[int], seed: int
@@ -38,7 +33,6 @@ def estimate_on_cluster(
     The workers read the dataset from its path; it has to be the same there. Raises `RunError` if Dask is not installed,
     the scheduler does not answer or has no workers, and if a worker has another version or another dataset.
     """
-    distributed = _dask()
     job = json.dumps(
         {
             "directory": str(dataset.directory.resolve()),
@@ -48,36 +42,9 @@ def estimate_on_cluster(
             "version": metadata.version("tiltvp"),
         }
     )
-    chunks = [list(numbers[i : i + _CHUNK]) for i in range(0, len(numbers), _CHUNK)]
-    client = _client(distributed, address)
-    try:
-        futures = client.map(_estimate_chunk, [job] * len(chunks), chunks, pure=False)
-        for _, results in distributed.as_completed(futures, loop=client.loop, with_results=True):
-            yield from results
-    finally:
-        client.close()
-
-
-def _dask() -> Any:
-    try:
-        return import_module("dask.distributed")
-    except ImportError as error:
-        hint = "pip install 'tiltvp[cluster]'"
-        raise RunError(f"a cluster needs Dask, which is not installed ({error}), expected it: {hint}") from error
-
-
-def _client(distributed: Any, address: str) -> Any:
-    """A client of the scheduler, which has at least one worker."""
-    try:
-        client = distributed.Client(address, timeout=_PATIENCE_S, set_as_default=False)
-    except (OSError, ValueError, TypeError) as error:
-        raise RunError(f"{address}: no Dask scheduler answers ({error}), expected one, as tcp://host:8786") from error
-    try:
-        client.wait_for_workers(1, timeout=_WORKERS_S)
-    except TimeoutError as error:
-        client.close()
-        raise RunError(f"{address}: a scheduler without workers for {_WORKERS_S:g} s, expected one or more") from error
-    return client
+    chunks = ((i, list(numbers[i : i + _CHUNK])) for i in range(0, len(numbers), _CHUNK))
+    for _, results in results_of(address, _estimate_chunk, job, chunks):
+        yield from results
 
 
 def _estimate_chunk(job: str, numbers: Sequence[int]) -> list[tuple[int, pl.DataFrame]]:

@@ -16,11 +16,11 @@ from tiltvp.lab.datasets.driving import drive_room
 from tiltvp.lab.datasets.panoramas import paper_camera
 from tiltvp.lab.datasets.recording import WHEEL_RADIUS_M, RecordedDrive
 from tiltvp.mounting import MountingTilt, mounting_tilt
-from tiltvp.robot_setup import drive_tilts, find_setup
+from tiltvp.robot_setup import DriveTilts, drive_tilts, find_setup
 from tiltvp.rotations import read_rotation
 from tiltvp.streams import Wheels, frame_motions, open_frames
 from tiltvp.synth import ROOM_KINDS
-from tiltvp.tilt import TiltEstimator
+from tiltvp.tilt import TiltEstimator, TiltFilter
 from tiltvp.turning import check_turns
 
 if TYPE_CHECKING:
@@ -85,6 +85,7 @@ def _judged(path: Path, number: int, seed: int, looks: str, floor: str) -> dict[
         tilts = drive_tilts(frames, TiltEstimator(camera, method=method, robot_from_camera=nominal), motions)
         mounting = mounting_tilt(tilts.estimates, tilts.motions, nominal)
         row |= _errors(f"{method} ", mounting, drive.robot_from_mounted_camera, nominal)
+        row |= _leans(f"{method} ", tilts, drive, nominal)
     return row
 
 
@@ -103,12 +104,30 @@ def _errors(
     }
 
 
+def _leans(prefix: str, tilts: DriveTilts, drive: RecordedDrive, nominal: NDArray[np.float64]) -> dict[str, object]:
+    """Rms errors of the tilts of single images and of the filter, at the instants at which both answer."""
+    # What the robot seems to lean by the nominal mounting.
+    true = drive.tilts @ (nominal @ drive.robot_from_mounted_camera.T).T
+    filtered, errors = TiltFilter(estimate_mounting=True), []
+    for estimate, motion, normal in zip(tilts.estimates, tilts.motions, true, strict=True):
+        filtered.predict(motion.yaw_rad, motion.distance_m)
+        if estimate is None:
+            continue
+        filtered.update(estimate)
+        found = filtered.estimate
+        if estimate and found:
+            errors.append([float(np.sum((np.asarray(each.normal) - normal) ** 2)) for each in (estimate, found)])
+    single, fused = np.degrees(np.sqrt(np.mean(errors, axis=0))).tolist() if errors else (None, None)
+    return {f"{prefix}single_deg": single, f"{prefix}fused_deg": fused}
+
+
 def _given(looks: str) -> str:
     return {"up": "+z", "ahead": "-y"}[looks]
 
 
 def summarise_mountings(rows: pl.DataFrame) -> pl.DataFrame:
-    """For each camera, floor and method: errors in degrees, regions that hold, answers; and what else was found."""
+    """For each camera, floor and method: errors in degrees, regions that hold, answers; and in the median of the drives
+    the rms errors of the tilt of a single image and of the filter."""
     tables = []
     for method in ("segments", "refined"):
         error, nees = pl.col(f"{method} error_deg"), pl.col(f"{method} nees")
@@ -122,6 +141,7 @@ def summarise_mountings(rows: pl.DataFrame) -> pl.DataFrame:
                 (100.0 * (error < 0.1).mean()).alias("below 0.1"),
                 *((100.0 * (nees < limit).mean()).alias(f"in {share} %") for share, limit in _QUANTILES.items()),
                 pl.col(f"{method} sigma_deg").median().alias("1-sigma"),
+                *(pl.col(f"{method} {tilts}_deg").median().alias(f"{tilts} rms") for tilts in ("single", "fused")),
             )
         )
     return pl.concat(tables)

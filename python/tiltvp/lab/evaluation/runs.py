@@ -24,7 +24,7 @@ from tiltvp import _core
 from tiltvp.errors import OutputError, RunError
 from tiltvp.files import write_whole
 
-__all__ = ["Run", "RunFolder", "new_manifest", "open_run", "read_run", "versions"]
+__all__ = ["Run", "RunFolder", "kept", "new_manifest", "open_run", "read_run", "versions"]
 
 _MANIFEST: Final = "manifest.json"
 _TABLE: Final = "estimates.parquet"
@@ -127,7 +127,7 @@ def open_run(directory: Path, manifest: dict[str, Any]) -> Iterator[RunFolder]:
     other files.
     """
     _make(directory)
-    with _kept(directory):
+    with kept(directory):
         path = directory / _MANIFEST
         if path.exists():
             earlier = _read_manifest(directory)
@@ -215,7 +215,7 @@ def _parquet(table: pl.DataFrame) -> bytes:
 
 
 @contextmanager
-def _kept(directory: Path) -> Iterator[None]:
+def kept(directory: Path) -> Iterator[None]:
     """Keeps other processes out until this one leaves or dies, where the system has such locks."""
     if sys.platform == "win32":
         yield

@@ -79,7 +79,8 @@ impl BundleProblem {
         Some(predicted_reduction)
     }
 
-    /// Levenberg-Marquardt until the cost falls by less than `tolerance`.
+    /// Levenberg-Marquardt until the cost falls by less than `tolerance`, or would: beside a kink of a robust loss a step that
+    /// is predicted to gain less may lead up.
     pub(crate) fn levenberg_marquardt(
         &mut self,
         max_iterations: u32,
@@ -93,19 +94,23 @@ impl BundleProblem {
             check();
             let before = self.save();
             let last = self.keyframes.len() - 1;
-            let moved = self.eliminate_poses(last, false, damping).and_then(|system| self.take_step(&system));
+            let system = self.eliminate_poses(last, false, damping);
+            let moved = system.and_then(|system| Some(system.predicted_reduction + self.take_step(&system)?));
+            let at_minimum = moved.is_some_and(|predicted| predicted < tolerance) && damping < CONVERGED_DAMPING;
             let lower = moved.map(|_| self.cost()).filter(|next| next.is_finite() && *next <= cost + ROUNDING * cost);
             if let Some(next) = lower {
-                let gain = cost - next;
+                let small_gain = cost - next < tolerance && damping < CONVERGED_DAMPING;
                 cost = next;
-                let was = damping;
-                damping = if damping < LEAST_DAMPING { 0.0 } else { 0.1 * damping };
-                if gain < tolerance && was < CONVERGED_DAMPING {
+                if small_gain || at_minimum {
                     return DescentReport { iterations, converged: true, cost };
                 }
+                damping = if damping < LEAST_DAMPING { 0.0 } else { 0.1 * damping };
             } else {
                 if moved.is_some() {
                     self.restore(&before);
+                }
+                if at_minimum {
+                    return DescentReport { iterations, converged: true, cost };
                 }
                 damping = if damping == 0.0 { SMALL_DAMPING } else { 10.0 * damping };
                 if damping > MOST_DAMPING {

@@ -24,8 +24,8 @@ use crate::geometry::{Tilt, tangent_basis, tangent_exp, tangent_log, tangent_tra
 /// stays where it is, `m`. The robot sees `n = B(m) f` with the smallest rotation `B(m)` that takes `z` to `m`. Without
 /// [`TiltFilterOptions::mounting`] `m` is `z`; with it, turning tells `f` and `m` apart.
 ///
-/// **Motion.** The floor's tilt walks randomly, by a variance for each metre and one for each prediction; steps of it (a
-/// threshold, a ramp) are left to the gate.
+/// **Motion.** The floor's tilt walks randomly, by a variance for each metre that the wheels roll and one for each
+/// prediction; steps of it (a threshold, a ramp) are left to the gate. Wheels roll also while a robot turns in place.
 ///
 /// **Measurement.** An estimate is `n` with an error of covariance `R` (and the noise floor). Images of one place err alike:
 /// the error `c` of the scene is a state, of which only so much is new in an image as the robot has driven on. Its covariance
@@ -110,7 +110,8 @@ impl TiltFilter {
         let distance_m = distance_m.abs();
         // No step, however long, makes a tilt more unknown than it was before anything was known.
         let grown = |variance: f64, prior: f64| variance.min(prior * prior);
-        let walk = options.walk_rad_per_sqrt_m.powi(2) * distance_m + options.walk_rad_per_sqrt_step.powi(2);
+        let rolled_m = distance_m.max(options.half_track_m * yaw_rad.abs());
+        let walk = options.walk_rad_per_sqrt_m.powi(2) * rolled_m + options.walk_rad_per_sqrt_step.powi(2);
         let floor_walk = Matrix2::identity() * grown(walk, options.prior_rad);
 
         let turn = Rotation3::from_axis_angle(&Vector3::z_axis(), -yaw_rad).into_inner();

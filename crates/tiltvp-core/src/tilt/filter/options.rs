@@ -20,8 +20,11 @@ options! {
     /// Everything that can be chosen about a [`TiltFilter`](super::TiltFilter).
     #[derive(Copy)]
     pub struct TiltFilterOptions {
-        /// How fast the floor's tilt changes, in radians per square root of a metre driven.
+        /// How fast the floor's tilt changes, in radians per square root of a metre that the wheels roll.
         walk_rad_per_sqrt_m: f64 = 0.01 => 0.0..=PI, "an angle from 0 to pi";
+        /// Half the distance between the wheels in metres: how far they roll while the robot turns in place by one radian. The
+        /// default lies between those of vacuum cleaners (0.12) and of robots that people ride on (0.2).
+        half_track_m: f64 = 0.15 => 0.0..=100.0, "a number of metres from 0 to 100";
         /// How fast it changes however far the robot drives, in radians per square root of a prediction.
         walk_rad_per_sqrt_step: f64 = 0.001 => 0.0..=PI, "an angle from 0 to pi";
         /// Probability with which the gate lets an estimate pass whose covariance is right.

@@ -202,12 +202,12 @@ fn split(
             _ => places.of(ray([first[0] + half * i, first[1] + half * j])),
         };
     }
-    let all: Option<Vec<Vector2<f64>>> = nine.iter().flatten().copied().collect();
-    let is_flat = all.is_some_and(|all| {
-        let line = |k: usize, step: usize| places.bend([&all[k], &all[k + step], &all[k + 2 * step]]);
-        let (across, down) = ([0, 3, 6].map(|k| line(k, 1)), [0, 1, 2].map(|k| line(k, 3)));
-        across.into_iter().fold(0.0, f64::max) + down.into_iter().fold(0.0, f64::max) <= BEND_MAX_PX
-    });
+    let is_flat = nine.as_flattened().iter().all(Option::is_some) && {
+        let all = nine.map(|row| row.map(Option::unwrap_or_default));
+        let across = all.iter().map(|[a, b, c]| places.bend([a, b, c])).fold(0.0, f64::max);
+        let down = (0..3).map(|i| places.bend([&all[0][i], &all[1][i], &all[2][i]])).fold(0.0, f64::max);
+        across + down <= BEND_MAX_PX
+    };
     for (j, i) in [(0, 0), (0, 1), (1, 0), (1, 1)] {
         let four = [nine[j][i], nine[j][i + 1], nine[j + 1][i], nine[j + 1][i + 1]];
         let (first, size) = ([first[0] + half * i, first[1] + half * j], [half; 2]);

@@ -1,0 +1,78 @@
+"""Work on a Dask cluster: tasks that workers do, done again where a worker dies, and their results as they come."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator
+from importlib import import_module
+from itertools import islice
+from typing import Any, Final, TypeVar
+
+from tiltvp.errors import RunError
+
+__all__ = ["results_of"]
+
+_PATIENCE_S = 20.0
+"""How long the scheduler may take to answer."""
+
+_WORKERS_S = 120.0
+"""How long the first worker may take to join."""
+
+_WAITING: Final = 1024
+"""Tasks that the scheduler holds at once, so that it and this process need the same memory for any number of them. A
+cluster of a hundred workers with eight threads is never idle."""
+
+Given = TypeVar("Given")
+Made = TypeVar("Made")
+
+
+def results_of(
+    address: str, task: Callable[[Any, Given], Made], job: object, chunks: Iterable[tuple[int, Given]]
+) -> Iterator[tuple[int, Made]]:
+    """The numbers of the chunks and what `task(job, chunk)` made of each, as they come.
+
+    Raises `RunError` if Dask is not installed, the scheduler does not answer or has no workers, and where a task has
+    ended one worker after the other.
+    """
+    distributed = _dask()
+    client = _client(distributed, address)
+    left, numbers = iter(chunks), {}
+    try:
+        done = distributed.as_completed([], loop=client.loop, with_results=True)
+
+        def submit(count: int) -> None:
+            for number, chunk in islice(left, count):
+                future = client.submit(task, job, chunk, pure=False)
+                numbers[future.key] = number
+                done.add(future)
+
+        submit(_WAITING)
+        try:
+            for future, made in done:
+                yield numbers.pop(future.key), made
+                submit(1)
+        except distributed.KilledWorker as error:
+            raise RunError(f"{address}: {error}, expected workers that live") from error
+    finally:
+        client.close()
+
+
+def _dask() -> Any:
+    try:
+        return import_module("dask.distributed")
+    except ImportError as error:
+        hint = "pip install 'tiltvp[cluster]'"
+        raise RunError(f"a cluster needs Dask, which is not installed ({error}), expected it: {hint}") from error
+
+
+def _client(distributed: Any, address: str) -> Any:
+    """A client of the scheduler, which has at least one worker."""
+    try:
+        client = distributed.Client(address, timeout=_PATIENCE_S, set_as_default=False)
+    except (OSError, ValueError, TypeError) as error:
+        raise RunError(f"{address}: no Dask scheduler answers ({error}), expected one, as tcp://host:8786") from error
+    try:
+        client.wait_for_workers(1, timeout=_WORKERS_S)
+    except TimeoutError as error:
+        client.close()
+        raise RunError(f"{address}: a scheduler without workers for {_WORKERS_S:g} s, expected one or more") from error
+    return client

@@ -1,0 +1,277 @@
+"""What a person watches: the picture of `--show` without a screen, and recordings of `--rerun` read back."""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections import Counter
+from collections.abc import Callable
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+from rerun.chunk import RrdReader
+
+import tiltvp
+from recordings import write_video
+from test_corner_images import CAMERA, COLOURS, LEFT_FROM_RIGHT, pair
+from tiltvp.cli import main
+from tiltvp.overlays.drive_map import landmark_places, robot_poses
+from tiltvp.overlays.live import TiltView, live_words, roll_and_pitch
+from tiltvp.stereo_rigs import StereoRig
+from tiltvp.synth import RoomImage, simulate_drive
+
+Run = Callable[..., tuple[int, str, str]]
+FRAMES = 5
+
+
+@pytest.fixture
+def run(capfd: pytest.CaptureFixture[str]) -> Run:
+    """Runs `tiltvp` in this process: exit code, stdout, stderr."""
+
+    def run_main(*words: object) -> tuple[int, str, str]:
+        code = main([str(word) for word in words])
+        said = capfd.readouterr()
+        return code, said.out, said.err
+
+    return run_main
+
+
+@pytest.fixture(scope="module")
+def world(tmp_path_factory: pytest.TempPathFactory, camera: tiltvp.Camera, room: RoomImage) -> Path:
+    """A video of a robot that turns, whose third frame is black, and a folder with the same beside a broken file."""
+    folder = tmp_path_factory.mktemp("watched")
+    camera.save(folder / "camera.toml")
+    frames = [np.rot90(room.bgr, k) for k in range(FRAMES)]
+    frames[2] = np.zeros_like(frames[2])
+    write_video(folder / "drive.mp4", [np.ascontiguousarray(frame) for frame in frames], [0, 40, 80, 120, 160])
+    for number, frame in enumerate(frames):
+        tiltvp.write_image(folder / "images" / f"{number}.png", np.ascontiguousarray(frame))
+    (folder / "images" / "9.png").write_bytes(b"no image")
+    return folder
+
+
+@pytest.fixture(scope="module")
+def tilt(camera: tiltvp.Camera, room: RoomImage) -> tiltvp.TiltEstimate:
+    return tiltvp.TiltEstimator(camera)(room.gray)
+
+
+def rows_of(path: Path) -> Counter[str]:
+    """How many rows each entity of a recording has, but for what Rerun writes of itself."""
+    counts: Counter[str] = Counter()
+    for chunk in RrdReader(path).stream():
+        entity = str(chunk.entity_path)
+        if not entity.startswith("/__") and not chunk.is_static:
+            counts[entity] += chunk.num_rows
+    return counts
+
+
+def values_of(path: Path, entity: str) -> np.ndarray:
+    """(N, k): the values of the curves of an entity, by their frames."""
+    rows: dict[int, list[float]] = {}
+    for chunk in RrdReader(path).stream():
+        if str(chunk.entity_path) == entity and not chunk.is_static:
+            batch = chunk.to_record_batch()
+            (scalars,) = (name for name in batch.schema.names if "scalars" in name)
+            rows |= dict(zip(batch["frame"].to_pylist(), batch[scalars].to_pylist(), strict=True))
+    return np.array([rows[frame] for frame in sorted(rows)])
+
+
+def test_the_picture_has_three_parts(tilt: tiltvp.TiltEstimate, room: RoomImage) -> None:
+    view, words = TiltView(), live_words(tilt, tilt.confidence, 24.96)
+    for k in range(10):
+        view.add(0.1 * k, None if k == 5 else tilt)
+    picture = view.picture(room.bgr, room.gray, words)
+    assert (picture.shape, picture.dtype) == ((660, 1280, 3), np.uint8)
+    # The right panel is the gray image, the left one has colours.
+    assert np.ptp(picture[60:400, 700:1200].astype(int), axis=2).max() == 0
+    # One red curve and its band, with a gap where there was no tilt, in the last second of the chart.
+    chart = picture[460:, 1150:1265].astype(int)
+    red = (chart[:, :, 2] > 150) & (chart[:, :, 0] < 80)
+    assert red.any()
+    assert words.endswith("25.0 frames/s")
+    assert f"roll {np.degrees(tilt.roll_rad):.2f} +- " in words
+    assert live_words(None, 0.0, np.nan) == "no tilt; - frames/s"
+
+
+def test_bands_are_those_of_the_covariance(tilt: tiltvp.TiltEstimate) -> None:
+    roll, pitch = np.radians(roll_and_pitch(tilt))
+    sigmas = np.sqrt(np.diag(tilt.covariance_rad2))
+    # At small leans the normal is (pitch, -roll, 1).
+    assert (pitch[2] - pitch[1], roll[2] - roll[1]) == pytest.approx(2 * 1.96 * sigmas[:2], rel=0.01)
+    assert (roll[0], pitch[0]) == pytest.approx((tilt.roll_rad, tilt.pitch_rad))
+    assert np.isnan(roll_and_pitch(None)).all()
+
+
+def test_time_that_goes_back_begins_a_new_chart(tilt: tiltvp.TiltEstimate, room: RoomImage) -> None:
+    view, fresh = TiltView(), TiltView()
+    for time_s in (0.0, 1.0, 100.0, 3.0):
+        view.add(time_s, tilt)
+    fresh.add(3.0, tilt)
+    assert np.array_equal(view.picture(room.bgr, None, ""), fresh.picture(room.bgr, None, ""))
+
+
+def test_closing_the_window_ends(run: Run, world: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    shown: list[np.ndarray] = []
+
+    class Window:
+        def __init__(self, _: str) -> None:
+            self.is_open = True
+
+        def show(self, picture: np.ndarray) -> None:
+            shown.append(picture)
+            self.is_open = len(shown) < 4
+
+        def close(self) -> None:
+            pass
+
+    monkeypatch.setattr("tiltvp.cli.window.Window", Window)
+    out = tmp_path / "a.csv"
+    code, said, complaints = run("tilt", world / "drive.mp4", "--camera", world / "camera.toml", "--show", "--out", out)
+    assert (code, len(out.read_text().splitlines())) == (0, 1 + 4), complaints
+    assert said.startswith("4 images: ")
+    # The black frame has no tilt: the right panel is black too.
+    assert shown[2][100:350, 850:1050].max() == 0
+    assert shown[3][100:350, 850:1050].max() > 100
+
+
+def test_no_screen(run: Run, world: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv("DISPLAY", raising=False)
+    words = ("tilt", world / "drive.mp4", "--camera", world / "camera.toml", "--show")
+    code, _, complaints = run(*words)
+    assert code == 2
+    assert complaints.splitlines()[-1].endswith("expected a screen, or --rerun FILE.rrd")
+    monkeypatch.setitem(sys.modules, "tkinter", None)
+    code, _, complaints = run(*words)
+    assert code == 1
+    assert "expected the system's package python3-tk" in complaints
+
+
+@pytest.mark.parametrize("threads", [1, 2])
+def test_tilt_in_rerun(run: Run, world: Path, tmp_path: Path, threads: int) -> None:
+    record, table = tmp_path / "tilt.rrd", tmp_path / "tilt.csv"
+    words = ("--camera", world / "camera.toml", "--threads", threads, "--out", table)
+    code, _, _ = run("tilt", "--rerun", record, world / "images", *words)
+    assert code == 1  # One file is no image.
+    expected = {"/image": FRAMES, "/level": FRAMES - 1, "/log": 1}
+    each = ("/tilt/roll_deg", "/tilt/pitch_deg", "/confidence", "/frame_rate_hz")
+    assert rows_of(record) == expected | dict.fromkeys(each, FRAMES + 1)
+    rolls = [row.split(",")[4] for row in table.read_text().splitlines()[1:]]
+    values = values_of(record, "/tilt/roll_deg")
+    assert values[[0, 1, 3, 4], 0] == pytest.approx(np.degrees([float(rolls[k]) for k in (0, 1, 3, 4)]))
+    assert values[0, 1] < values[0, 0] < values[0, 2]
+    assert np.isnan(values[[2, 5]]).all()
+
+
+def test_tracks_in_rerun(run: Run, world: Path, tmp_path: Path) -> None:
+    record, out = tmp_path / "tracks.rrd", tmp_path / "tracks.csv"
+    words = ("--camera", world / "camera.toml", "--support-min-px", 5, "--out", out)
+    assert run("track", world / "drive.mp4", *words, "--rerun", record)[0] == 0
+    rows = rows_of(record)
+    tracks = Counter(f"/tracks/{line.split(',')[2]}/bearing_deg" for line in out.read_text().splitlines()[1:])
+    assert rows == tracks | {"/image": FRAMES}
+    assert len(tracks) > 3
+
+
+def test_a_mounting_that_converges_in_rerun(run: Run, tmp_path: Path) -> None:
+    drive, record = simulate_drive("paper", seed=1), tmp_path / "mounting.rrd"
+    for name, header, rows in (
+        ("wheels.csv", "step,delta_left_m,delta_right_m", [(i, *row) for i, row in enumerate(drive.odometry.tolist())]),
+        ("bearings.csv", "step,landmark,bearing_rad", [(int(a), int(b), c) for a, b, c in drive.bearings.tolist()]),
+    ):
+        (tmp_path / name).write_text("\n".join([header, *(",".join(map(str, row)) for row in rows)]) + "\n")
+    sure = ("--wheel-base", 0.4, "--step-sigma", 1e-4, "--step-sigma-deg", 0.01)
+    assert run("calibrate", tmp_path / "wheels.csv", tmp_path / "bearings.csv", *sure, "--rerun", record)[0] == 0
+    rows, steps = rows_of(record), len(drive.odometry)
+    each = ("/mounting/x_mm", "/mounting/y_mm", "/mounting/yaw_deg", "/world/robot", "/world/seen")
+    assert rows == dict.fromkeys(each, steps) | dict.fromkeys(
+        ("/world/way", "/world/robot/camera", "/world/landmarks"), 1
+    )
+    x_mm = values_of(record, "/mounting/x_mm")
+    half = 0.5 * (x_mm[:, 2] - x_mm[:, 1])
+    assert half[-1] < 0.2 * half[0]
+
+
+def test_landmarks_are_where_they_were(tmp_path: Path) -> None:
+    """Exact bearings of known places, from a camera that is turned and off the axis."""
+    wheels = np.tile([[0.10, 0.13]], (60, 1))
+    poses = robot_poses(wheels, wheel_base_m=0.4)
+    x, y, yaw = 0.2, -0.1, 0.7
+    truth = {3: np.array([2.0, 1.0]), 8: np.array([-3.0, 4.0])}
+    rows = []
+    for step, (px, py, heading) in enumerate(poses):
+        c, s = np.cos(heading), np.sin(heading)
+        camera_at = np.array([px + c * x - s * y, py + s * x + c * y])
+        for name, place in truth.items():
+            toward = place - camera_at
+            rows.append((step, name, np.arctan2(toward[1], toward[0]) - heading - yaw))
+    rows.append((0, 5, 0.1))  # Seen once: nobody knows how far.
+    found = landmark_places(poses, rows, (x, y, yaw))
+    assert found.keys() == truth.keys()
+    for name, place in truth.items():
+        assert found[name] == pytest.approx(place, abs=1e-9)
+    # A full circle of arcs comes back.
+    around = robot_poses(np.tile([[0.1, 0.1 + 0.4 * 2 * np.pi / 100]], (100, 1)), wheel_base_m=0.4)
+    assert around[-1] == pytest.approx([0.0, 0.0, 2 * np.pi], abs=1e-12)
+
+
+def test_corner_poses_in_rerun(run: Run, tmp_path: Path) -> None:
+    StereoRig(CAMERA, CAMERA, LEFT_FROM_RIGHT).save(tmp_path / "rig.toml")
+    for side, image in zip(("left", "right"), pair(COLOURS), strict=True):
+        for name in "ab":
+            tiltvp.write_image(tmp_path / side / f"{name}.png", image)
+    record = tmp_path / "corner.rrd"
+    words = ("corner", tmp_path / "left", tmp_path / "right", "--calibration", tmp_path / "rig.toml", "--rerun", record)
+    code, _, complaints = run(*words)
+    assert code == 0, complaints
+    curves = [f"/corner/{name}" for name in ("roll_deg", "pitch_deg", "yaw_deg", "confidence")]
+    assert rows_of(record) == dict.fromkeys([*curves, "/image", "/world/camera"], 2)
+    code, _, complaints = run(*words)
+    assert (code, "--rerun" in complaints, "expected a new file, or --overwrite" in complaints) == (2, True, True)
+
+
+def test_without_rerun_and_wrong_words(run: Run, world: Path, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    words = ("tilt", world / "images", "--camera", world / "camera.toml")
+    spawned: list[Any] = []
+    monkeypatch.setattr("rerun.RecordingStream.spawn", lambda stream: spawned.append(stream))
+    run(*words, "--rerun")
+    assert len(spawned) == 1
+    code, _, complaints = run(*words, "--rerun=answers.csv")
+    assert code == 2
+    assert "--rerun answers.csv: ends in '.csv', expected .rrd or viewer" in complaints
+    monkeypatch.setitem(sys.modules, "rerun", None)
+    code, _, complaints = run(*words, "--rerun", tmp_path / "a.rrd")
+    assert code == 1
+    assert "pip install 'tiltvp[rerun]'" in complaints
+    assert os.listdir(tmp_path) == []
+
+
+def test_the_window_by_a_toolkit_of_paper(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What a picture becomes: pixels in the order of red, green, blue, with their size in front."""
+    from tiltvp.cli.window import Window
+
+    given: list[bytes] = []
+
+    class Anything:
+        def __init__(self, *_: object, **keywords: Any) -> None:
+            self.configure(**keywords)
+
+        def configure(self, **keywords: Any) -> None:
+            given.extend(value for key, value in keywords.items() if key == "data")
+
+        def __getattr__(self, _: str) -> Callable[..., None]:
+            return lambda *_, **__: None
+
+    toolkit = SimpleNamespace(Tk=Anything, Label=Anything, PhotoImage=Anything, TclError=RuntimeError)
+    monkeypatch.setitem(sys.modules, "tkinter", toolkit)
+    window = Window("title")
+    picture = np.zeros((1, 2, 3), np.uint8)
+    picture[0, 0] = (1, 2, 3)
+    for _ in range(2):
+        window.show(picture)
+    assert given == [b"P6 2 1 255\n\x03\x02\x01\0\0\0"] * 2
+    window.close()
+    window.show(picture)
+    assert (window.is_open, len(given)) == (False, 2)
