@@ -120,6 +120,10 @@ options: setup
 licences:
     python3 crates/tiltvp-py/licences.py
 
+# Writes the C header, from the sources of the C interface.
+header:
+    cargo test --locked --quiet --package tiltvp-capi --lib write_the_header -- --ignored
+
 # Writes the stubs: that of the extension, from what Rust declares, and that of the cameras' constructors, from the core's lenses.
 stub: setup
     #!/usr/bin/env bash

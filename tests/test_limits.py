@@ -19,6 +19,7 @@ from tiltvp import _core
 from tiltvp.drive_logs import read_drive_log
 from tiltvp.errors import CalibrationError, ImageFileError, InvalidInputError, OutputError, TiltvpError
 from tiltvp.files import keeping_existing, whole_file, write_whole
+from tiltvp.formats import document
 
 ROOT = Path(__file__).resolve().parent.parent
 ROW = re.compile(r"^\| .+ \| (\d+) \| `(\S+)` \|$", re.MULTILINE)
@@ -31,6 +32,12 @@ def test_the_page_has_the_limits_of_the_code() -> None:
         module, _, name = place.replace("::", ".").rpartition(".")
         home = _core if "::" in place else importlib.import_module(f"tiltvp.{module}")
         assert getattr(home, name) == int(value), place
+
+
+def test_the_c_interface_takes_as_much_toml() -> None:
+    source = (ROOT / "crates" / "tiltvp-capi" / "src" / "text.rs").read_text(encoding="utf-8")
+    (limit,) = re.findall(r"const LARGEST_TOML_BYTES: usize = (\w+);", source)
+    assert int(limit) == document.LARGEST_TOML_BYTES
 
 
 @pytest.mark.parametrize(("width", "height"), [(65_535, 65_535), (20_000, 20_000), (100_000, 100_000)])

@@ -1,7 +1,7 @@
 //! Orientation and calibration from the straight lines of man-made places.
 //!
 //! The floors of the house, from the ground up; a module imports only from floors below its own, and any of them from
-//! [`tiltvp_kernels`], which holds all vector code and all `unsafe`:
+//! [`tiltvp_kernels`], which holds all vector code and its `unsafe`:
 //!
 //! 1. [`error`], [`geometry`], [`interrupt`], [`options`]
 //! 2. [`camera`], [`image`], [`robust`], [`filter`]

@@ -19,6 +19,9 @@ const FLOORS: [&[&str]; 6] = [
 /// The crates, the ground first: the kernels are floor 0, below all modules of the core.
 const CRATES: [&str; 4] = ["tiltvp_kernels", "tiltvp_core", "tiltvp_synth", "tiltvp_py"];
 
+/// The folders of the crates that may say `unsafe`: the kernels for vectors, the C interface for the pointers of its callers.
+const UNSAFE: [&str; 2] = ["tiltvp-capi", "tiltvp-kernels"];
+
 /// The first part of the path of a file of the kernels; the others are files of the core.
 const KERNELS: &str = CRATES[0];
 
@@ -286,6 +289,23 @@ fn imports_point_down_and_the_core_knows_no_outside_world() {
         assert!(floor(module).is_some() || ABOVE_ALL.contains(&module.as_str()), "src/{module} has no floor");
     }
     assert!(seen.len() >= 7 && files.len() > 30, "only {} files seen", files.len());
+}
+
+#[test]
+fn only_the_kernels_and_the_c_interface_say_unsafe() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap();
+    let says_unsafe = |folder: &Path| {
+        let mut files = Vec::new();
+        sources(folder, &mut files);
+        files.iter().any(|file| tokens(&std::fs::read_to_string(file).unwrap()).iter().any(|t| t.text == "unsafe"))
+    };
+    let folders = std::fs::read_dir(root).unwrap().map(|entry| entry.unwrap().path());
+    let mut found: Vec<String> = folders
+        .filter(|folder| says_unsafe(&folder.join("src")))
+        .map(|folder| folder.file_name().unwrap().to_string_lossy().into_owned())
+        .collect();
+    found.sort();
+    assert_eq!(found, UNSAFE);
 }
 
 #[test]

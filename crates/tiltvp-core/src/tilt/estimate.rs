@@ -49,6 +49,16 @@ pub struct TiltEstimate {
     pub doubt: Option<Doubt>,
 }
 
+impl TiltEstimate {
+    /// Why the fit stopped, and what most likely keeps the estimate from being sure of itself: a sentence.
+    pub fn reason(&self) -> String {
+        match self.doubt {
+            Some(doubt) => format!("{}; {doubt}", self.stop),
+            None => self.stop.to_string(),
+        }
+    }
+}
+
 /// One edge pixel of the last image, for pictures and experiments.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct EdgeElement {

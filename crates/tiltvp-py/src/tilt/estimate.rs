@@ -87,7 +87,10 @@ impl From<core::TiltEstimate> for TiltEstimate {
             inlier_pixels: found.inlier_pixels,
             shift_px: found.shift_px,
             alternatives: Alternatives(found.alternatives.into_iter().flatten().map(TiltAlternative::from).collect()),
-            report: Flat(FitReport::new(found.stop, found.iterations, found.residual_rms).doubted(found.doubt)),
+            report: Flat(FitReport {
+                reason: found.reason(),
+                ..FitReport::new(found.stop, found.iterations, found.residual_rms)
+            }),
         }
     }
 }

@@ -1,7 +1,6 @@
 //! `FitReport`: how a robust fit went and why it stopped, as a frozen Python value.
 
 use tiltvp_core::robust::Stop;
-use tiltvp_core::tilt::Doubt;
 
 use crate::field::StopWord;
 use crate::value::value;
@@ -43,13 +42,5 @@ impl FitReport {
             Stop::Undetermined { .. } => "undetermined",
         };
         Self { stop: StopWord(word.to_owned()), reason: stop.to_string(), iterations, residual_rms }
-    }
-
-    /// With what keeps an estimate from being sure.
-    pub(super) fn doubted(mut self, doubt: Option<Doubt>) -> Self {
-        if let Some(doubt) = doubt {
-            self.reason = format!("{}; {doubt}", self.reason);
-        }
-        self
     }
 }
