@@ -2,6 +2,7 @@
 
 use nalgebra::{Matrix2, Matrix3, Vector3};
 
+use crate::filter::symmetric;
 use crate::geometry::{RigidMotion, tangent_basis};
 
 /// A bearing of a point, from a camera of a rig.
@@ -110,7 +111,7 @@ pub(super) fn midpoint(observations: &[BearingObservation; 2]) -> Option<Triangu
         let weight = (observation.covariance + Matrix2::from_diagonal_element(VARIANCE_MIN)).try_inverse()?;
         chi_square += miss.dot(&(weight * miss));
     }
-    Some(TriangulatedPoint { point_m: point, covariance_m2: inverse * spread * inverse, chi_square })
+    Some(TriangulatedPoint { point_m: point, covariance_m2: symmetric(&(inverse * spread * inverse)), chi_square })
 }
 
 /// Least eigenvalue of the sum of projections across the lines of sight, about half of their squared angle: 1e-8 rad,

@@ -7,6 +7,7 @@ use crate::camera::Camera;
 use crate::corner::feature::CornerFeature;
 use crate::corner::options::PaperOptions;
 use crate::corner::ray::FittedRay;
+use crate::filter::symmetric;
 use crate::geometry::tangent_basis;
 use crate::image::ColorView;
 
@@ -98,7 +99,7 @@ fn ray_through(
     let toward = line.middle * cos + line.along * sin;
     Some(FittedRay {
         normal: *parallel,
-        covariance: basis.transpose() * spread * basis,
+        covariance: symmetric(&(basis.transpose() * spread * basis)),
         toward: (toward - parallel * parallel.dot(&toward)).try_normalize(1e-9)?,
         support: line.support,
         residual_rms_rad: line.rms_rad,
