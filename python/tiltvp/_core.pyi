@@ -671,13 +671,13 @@ class CornerEstimate:
     @property
     def edge_ends_m(self) -> NDArray[np.float64]:
         """Fresh (3, 3) float64, rows x, y, z: where these edges end in the left camera's frame, metres, from both
-        images alone; NaN where only one of them shows it, or none.
+        images alone; NaN where only one of them shows it, or none. With a known length from the pose of the one image.
         """
 
     @property
     def edge_lengths_m(self) -> NDArray[np.float64]:
         """Fresh (3,) float64: how long the edges x, y, z are, metres, to where lines along the others meet them; NaN
-        where no image shows that. From two grey images and with right angles.
+        where no image shows that. From two grey images with right angles, and from one image with a known length.
         """
 
     @property
@@ -705,6 +705,10 @@ class CornerEstimate:
         """The number of the corner that is the object, from 1: it grows where another corner has become the object;
         from one camera, whose attitude all parallel corners share, only after the poses before were forgotten.
         """
+
+    @property
+    def place_reason(self) -> str:
+        """Why the likeliest hypothesis has no place; empty where it has one, and where there is none."""
 
     @property
     def pose(self) -> CornerHypothesis | None:
@@ -826,7 +830,7 @@ class CornerHypothesis:
     @property
     def vertex_m(self) -> NDArray[np.float64] | None:
         """Fresh (3,) float64: the vertex in the left camera's frame, metres; None from one image without
-        `camera_height_m`.
+        `camera_height_m`, `edge_length_m` or `box_size_m`, and where these do not tell it.
         """
 
 @final
@@ -919,6 +923,10 @@ class CornerPoseEstimator:
         distance_max_m: float = ...,
         camera_height_m: float | None = ...,
         camera_height_sigma_m: float = ...,
+        edge_length_m: float | None = ...,
+        known_edge: Literal["x", "y", "z"] = ...,
+        box_size_m: ArrayLike | None = ...,
+        length_sigma_m: float = ...,
         probability_min: float = ...,
     ) -> Self:
         """The options, by keyword.
@@ -960,6 +968,17 @@ class CornerPoseEstimator:
             Default: None.
         camera_height_sigma_m
             Standard deviation of that height, metres. Default: 0.
+        edge_length_m
+            The length of one edge of the corner, metres, which tells one camera its place. None where that is not
+            known. Default: None.
+        known_edge
+            Which edge has that length: y is the upright one; x and z only before the coloured cuboid, whose colours
+            name them. Default: "y".
+        box_size_m
+            The sizes of the box along its edges x, y (the upright one) and z, metres, which tell one camera its place.
+            Without colours x and z may be exchanged. None where they are not known. Default: None.
+        length_sigma_m
+            Standard deviation of the known length, or of each size of the box, metres. Default: 0.
         probability_min
             Least probability of the best hypothesis; below it none is chosen. Default: 0.9.
         """

@@ -60,12 +60,12 @@ class CornerPoseEstimator(_core.CornerPoseEstimator):
     """The pose of one camera, or of a pair, before a corner: `CornerPoseEstimator(left, right, left_from_right)`.
 
     `left` and `right` are cameras or `CornerDetector`s; `left_from_right` (4, 4) is the right camera's pose in the left
-    one's frame, metres. Without `right` only the attitude is estimated, and with `camera_height_m`, the height of the
-    camera above the vertex, the place too. Call it with the images of one frame after the
-    other: the last pose is the prior for the next one. `gamma_rad` is the angle between the corner's level edges,
-    `down` (3,) the direction down in the left camera's frame as far as it is known. Other options are the
-    estimator's, or those of detectors that are made here for `method`. Comparable; copies and pickles go on from the
-    same last pose.
+    one's frame, metres. Without `right` only the attitude is estimated, and with `camera_height_m` (the height of the
+    camera above the vertex), `edge_length_m` or `box_size_m` the place too; `place_reason` says why there is none.
+    Call it with the images of one frame after the other: the last pose is the prior for the next one. `gamma_rad` is
+    the angle between the corner's level edges, `down` (3,) the direction down in the left camera's frame as far as it
+    is known. Other options are the estimator's, or those of detectors that are made here for `method`. Comparable;
+    copies and pickles go on from the same last pose.
     """
 
     def __new__(

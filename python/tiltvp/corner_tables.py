@@ -29,7 +29,7 @@ POSE_COLUMNS: Final[dict[str, str]] = (
     {"time_s": "Float64", "file": "String", "found": "Boolean"}
     | dict.fromkeys((*_ANGLES, *_QUATERNION, *_POSITION, *_SIGMAS), "Float64")
     | {"confidence": "Float64", "hypotheses": "Int64", "misfit": "Float64", "object": "Int64"}
-    | {"corners_left": "Int64", "corners_right": "Int64", "reason": "String"}
+    | {"corners_left": "Int64", "corners_right": "Int64", "reason": "String", "place_reason": "String"}
 )
 """The keys of the rows in their order, each with the name of its type in Polars."""
 
@@ -39,8 +39,8 @@ def pose_rows(estimates: Sequence[tuple[float, str, CornerEstimate]]) -> list[di
 
     qx..qw and x_m..z_m are `object_from_camera`; the object's frame has y along the vertical edge away from the vertex.
     roll, pitch and yaw are those of `object_from_camera` about the camera's z, x and y axis. The standard deviations
-    are of the rotation vector and of the vertex in the camera's frame. None where there is no pose, from one camera no
-    position.
+    are of the rotation vector and of the vertex in the camera's frame. None where there is no pose, and where it has
+    no position, which `place_reason` says why.
     """
     rows = []
     for time_s, file, estimate in estimates:
@@ -48,6 +48,7 @@ def pose_rows(estimates: Sequence[tuple[float, str, CornerEstimate]]) -> list[di
         row |= {"time_s": time_s, "file": file, "found": bool(estimate), "confidence": estimate.confidence}
         row |= {"hypotheses": len(estimate.hypotheses), "reason": estimate.reason, "object": estimate.object}
         row |= {"corners_left": len(estimate.features_left), "corners_right": len(estimate.features_right)}
+        row["place_reason"] = estimate.place_reason
         pose = estimate.pose
         if pose is not None:
             turn = pose.camera_from_object.T
@@ -74,7 +75,7 @@ def write_trajectory(rows: Sequence[Mapping[str, Any]], path: str | os.PathLike[
     placed = np.array([pose for pose in poses if None not in pose])
     if not len(placed):
         raise InvalidInputError(
-            f"{path}: no pose has a position, expected images of two cameras, or of one with a known height"
+            f"{path}: no pose has a position, expected images of two cameras, or of one with a known height or length"
         )
     write_tum(path, placed[:, 0], placed[:, 1:4], placed[:, 4:], "of object_from_camera")
 

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from cyclopts import Group, Parameter, validators
 
 from tiltvp._core import CORNER_METHODS
-from tiltvp.cli.corner_methods import AUTO, Searches, advice, looked_for, methods_for, shown
+from tiltvp.cli.corner_methods import AUTO, SCALES, Searches, advice, looked_for, methods_for, shown
 from tiltvp.cli.declared_options import LibraryOptions, from_library, mask_from
 from tiltvp.cli.options import image_size_from
 from tiltvp.cli.rerun_views import send_corner
@@ -76,7 +76,8 @@ def corner(
 ) -> int:
     """Find a corner in each image, or pair of images, and from it the camera's attitude, with a pair also its position.
 
-    One camera tells its position too where its height above the corner is known (--camera-height-m).
+    One camera tells its position too where its height above the corner (--camera-height-m), the length of an edge
+    (--edge-length-m) or the size of the box (--box-size-m) is known.
 
     The last pose is where the next one is looked for. Images that cannot be read are named on stderr and skipped,
     and the exit code is 1; images without a corner have rows without a pose that say why. Where no image has a pose, a
@@ -123,8 +124,9 @@ def corner(
     if out is not None:
         check_ending(out)
     known = _known(options, math.radians(gamma), pitch)
-    if trajectory is not None and right is None and "camera_height_m" not in known:
-        expected = "expected two, or --camera-height-m"
+    has_scale = right is not None or not SCALES.isdisjoint(known)
+    if trajectory is not None and not has_scale:
+        expected = "expected two, or --camera-height-m, --edge-length-m or --box-size-m"
         raise InvalidInputError(f"--trajectory {trajectory} of one camera, which tells no position: {expected}")
     if topic_right is not None and right is None:
         raise InvalidInputError(f"--topic-right {topic_right} of one camera: expected two")
@@ -148,7 +150,7 @@ def corner(
         raise InvalidInputError(f"{frames.source}: {look.bad} frames, none of which can be used")
     table = Table(POSE_COLUMNS, pose_rows(estimates))
     _write(table, out, trajectory, plot)
-    _conclude(str(frames.source), estimator, look.bad, advice_for=(right is not None, known))
+    _conclude(str(frames.source), estimator, look.bad, has_scale=has_scale, advice_for=(right is not None, known))
     return 1 if look.bad or frames.problems else 0
 
 
@@ -220,7 +222,9 @@ def _write(table: Table, out: Path | None, trajectory: Path | None, plot: Path |
         write_image(plot, figure_picture(pose_plot(table.frame())))
 
 
-def _conclude(source: str, estimator: Searches, bad: int, *, advice_for: tuple[bool, dict[str, Any]]) -> None:
+def _conclude(
+    source: str, estimator: Searches, bad: int, *, has_scale: bool, advice_for: tuple[bool, dict[str, Any]]
+) -> None:
     """How many frames have a pose, by which method, why the others have none, and what to try if all are such."""
     found, without = estimator.found.total(), estimator.without.total()
     skipped = f", {bad} skipped" if bad else ""
@@ -228,6 +232,8 @@ def _conclude(source: str, estimator: Searches, bad: int, *, advice_for: tuple[b
     say(f"{source}: {found + without} frames{skipped}, {found} with a pose{by}")
     if without:
         say(f"without a pose: {shown(estimator.without)}")
+    if has_scale and estimator.placeless:
+        say(f"without a place: {shown(estimator.placeless)}")
     if without and not found:
         [(reason, _)] = estimator.without.most_common(1)
         is_pair, known = advice_for

@@ -19,6 +19,9 @@ AUTO: Final = "auto"
 _IN_TURN: Final = ("coloured", "general")
 """What auto tries: the cuboid takes a fortieth of the time of straight edges, and nothing else looks like it."""
 
+SCALES: Final = frozenset(("camera_height_m", "edge_length_m", "box_size_m"))
+"""Options of which each tells one camera its place."""
+
 _LOOKED_FOR: Final = {
     "coloured": "the coloured cuboid",
     "general": "corners of straight edges",
@@ -34,6 +37,8 @@ class Searches:
         self._chosen: str | None = next(iter(estimators)) if len(estimators) == 1 else None
         self.found: Counter[str] = Counter()
         self.without: Counter[str] = Counter()
+        self.placeless: Counter[str] = Counter()
+        """Why poses have no place."""
 
     @property
     def methods(self) -> tuple[str, ...]:
@@ -58,12 +63,14 @@ class Searches:
             if estimate:
                 self._chosen = method
                 self.found[method] += 1
+                if estimate.place_reason:
+                    self.placeless[estimate.place_reason] += 1
                 return estimate
         self.without[estimate.reason] += 1
         return estimate
 
 
-def methods_for(method: str, options: Iterable[str]) -> tuple[str, ...]:
+def methods_for(method: str, options: Mapping[str, Any]) -> tuple[str, ...]:
     """The methods that are tried, of those that take all `options` (keywords of the library).
 
     Raises `InvalidInputError` for a method that there is not, and for options that do not go together.
@@ -75,6 +82,9 @@ def methods_for(method: str, options: Iterable[str]) -> tuple[str, ...]:
     own = {name: _options_of(name) for name in CORNER_METHODS}
     lone = [option for option in options if option not in shared]
     candidates = _IN_TURN if method == AUTO else (method,)
+    if method == AUTO and options.get("known_edge", "y") != "y":
+        # Only its colours name level edges.
+        candidates = ("coloured",)
     fitting = tuple(name for name in candidates if own[name].issuperset(lone))
     if not fitting:
         whose = [f"{_flag(o)} (of {' and '.join(m for m in own if o in own[m])})" for o in lone]

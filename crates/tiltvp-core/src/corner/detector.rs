@@ -12,6 +12,8 @@ use super::general::guided::{ExpectedCorner, find_near};
 use super::general::segments::{Segment, SegmentFinder};
 use super::general::{self, GeneralScratch};
 use super::options::{CornerMethod, DetectorOptions};
+use super::sequence::estimator::Frame;
+use super::sized::{BoxView, EndSight};
 use crate::camera::Camera;
 use crate::edges::Mask;
 use crate::error::{Error, Result};
@@ -216,6 +218,30 @@ impl CornerDetector {
             vertex_m: camera_from_left.point(vertex_m),
         };
         seen_ends(&seen, memory)
+    }
+
+    /// The end of an edge of a corner with edges in these directions, in the image that was looked at last with this scratch; hidden
+    /// for the method as published and for an image of the other kind.
+    pub(super) fn end(
+        &self,
+        frame: &Frame<'_>,
+        corner: &CornerFeature,
+        edges: &[Vector3<f64>; 3],
+        axis: usize,
+        scratch: &mut CornerScratch,
+    ) -> EndSight {
+        let camera = &self.camera;
+        match (&self.options.method, frame, &mut scratch.general) {
+            (CornerMethod::Coloured(options), Frame::Color(image), _) => {
+                let view = BoxView { camera, corner, edges, search: coloured::box_search(options) };
+                coloured::find_end(&view, axis, image, options, &self.light, &mut scratch.coloured)
+            }
+            (CornerMethod::General(options), Frame::Gray(image), Some(memory)) => {
+                let view = BoxView { camera, corner, edges, search: general::box_search(options) };
+                general::find_end(&view, axis, image, &self.light, memory)
+            }
+            _ => EndSight::Hidden,
+        }
     }
 
     /// The line segments of the last grey image, the longest first; none for the coloured front end.

@@ -36,6 +36,67 @@ impl CornerVerdict {
     }
 }
 
+/// Why a pose has a place, or none.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum PlaceVerdict {
+    /// It has one, or there is no hypothesis.
+    Told,
+    /// One camera alone has no scale.
+    NoScale,
+    /// It is told from an upright edge, and any may be that.
+    NotUpright,
+    /// The known height is above what is not below the camera.
+    NotBelow,
+    /// What is known tells too little of it.
+    Uncertain,
+    /// It would be nearer or farther than a vertex may be.
+    OutOfReach,
+    /// No edge of known length is seen up to its end.
+    EndHidden,
+    /// The edges of known length leave the image.
+    EndOutside,
+    /// The edges seen do not fit the known lengths.
+    NotTheSize,
+    /// The known lengths fit the edges in several ways.
+    WhichEdge,
+    /// There are other corners, and nothing tells whose edge is known.
+    WhichCorner,
+}
+
+impl PlaceVerdict {
+    /// All of them.
+    pub const ALL: [Self; 11] = [
+        Self::Told,
+        Self::NoScale,
+        Self::NotUpright,
+        Self::NotBelow,
+        Self::Uncertain,
+        Self::OutOfReach,
+        Self::EndHidden,
+        Self::EndOutside,
+        Self::NotTheSize,
+        Self::WhichEdge,
+        Self::WhichCorner,
+    ];
+
+    /// In words.
+    pub fn reason(self) -> &'static str {
+        match self {
+            Self::Told => "",
+            Self::NoScale => "one camera, of which neither its height nor a length is known",
+            Self::NotUpright => "nothing tells which edge is the upright one",
+            Self::NotBelow => "the corner is not below the camera",
+            Self::Uncertain => "the distance would be known to less than a tenth",
+            Self::OutOfReach => "beyond distance_min_m or distance_max_m",
+            Self::EndHidden => "no edge of known length is seen up to its end",
+            Self::EndOutside => "the edges of known length leave the image",
+            Self::NotTheSize => "the edges do not fit the known lengths",
+            Self::WhichEdge => "the known lengths fit the edges in several ways",
+            Self::WhichCorner => "several corners, and nothing tells whose edge is known",
+        }
+    }
+}
+
 /// One explanation of what is seen.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Hypothesis {
@@ -43,7 +104,8 @@ pub struct Hypothesis {
     pub camera_from_object: Matrix3<f64>,
     /// The directions of the edges x, y, z of the corner away from its vertex, left camera's frame, unit vectors.
     pub edges: [Vector3<f64>; 3],
-    /// The vertex in the left camera's frame, metres; none from one image without a known height.
+    /// The vertex in the left camera's frame, metres; none from one image where neither its height nor a
+    /// length is known.
     pub vertex_m: Option<Vector3<f64>>,
     /// Covariance of the attitude's rotation vector (left camera's frame, radians) and of the vertex (metres; zero where that is
     /// none).
@@ -77,8 +139,10 @@ pub struct CornerEstimate {
     /// Which feature of the right image it is from.
     pub chosen_right: Option<usize>,
     /// Where the edges x, y, z of the pose end, where lines along the others meet them; from two grey images with edges at right
-    /// angles.
+    /// angles, and from one image with a known length.
     pub ends: [Option<EdgeEnd>; 3],
+    /// Why the pose has no place.
+    pub place: PlaceVerdict,
     /// Whether the pose before was a prior.
     pub followed: bool,
     /// The number of the corner that is the object: it grows where another corner than before has become the object.

@@ -6,8 +6,20 @@ use nalgebra::Vector3;
 
 use super::attitude::IncludedAngle;
 use crate::error::{Error, Result};
-use crate::options;
-use crate::options::{NOT_NEGATIVE, POSITIVE};
+use crate::options::{NOT_NEGATIVE, OptionValue, POSITIVE};
+use crate::{options, words};
+
+words! {
+    /// An edge of a corner.
+    pub enum KnownEdge {
+        /// A level one.
+        X = "x",
+        /// The upright one.
+        Y = "y",
+        /// The other level one.
+        Z = "z",
+    }
+}
 
 options! {
     /// What is known, and how far frames are apart.
@@ -43,6 +55,15 @@ options! {
         camera_height_m: Option<f64> = None;
         /// Standard deviation of that height, metres.
         camera_height_sigma_m: f64 = 0.0 => NOT_NEGATIVE, "a number of metres from 0";
+        /// The length of one edge of the corner, metres, which tells one camera its place. None where that is not known.
+        edge_length_m: Option<f64> = None;
+        /// Which edge has that length: y is the upright one; x and z only before the coloured cuboid, whose colours name them.
+        known_edge: KnownEdge = KnownEdge::Y;
+        /// The sizes of the box along its edges x, y (the upright one) and z, metres, which tell one camera its place. Without colours
+        /// x and z may be exchanged. None where they are not known.
+        box_size_m: Option<Vector3<f64>> = None;
+        /// Standard deviation of the known length, or of each size of the box, metres.
+        length_sigma_m: f64 = 0.0 => NOT_NEGATIVE, "a number of metres from 0";
         /// Least probability of the best hypothesis; below it none is chosen.
         probability_min: f64 = 0.9 => 0.0..=1.0, "a probability from 0 to 1";
     }
@@ -50,13 +71,35 @@ options! {
 }
 
 fn priors(options: &EstimatorOptions) -> Result<()> {
-    if let Some(height_m) = options.camera_height_m.filter(|height_m| !(*height_m > 0.0 && height_m.is_finite())) {
-        return Err(Error::option("camera_height_m", height_m, "a positive number of metres"));
+    let is_length = |x: f64| x > 0.0 && x.is_finite();
+    for (name, value) in [("camera_height_m", options.camera_height_m), ("edge_length_m", options.edge_length_m)] {
+        if let Some(length_m) = value.filter(|length_m| !is_length(*length_m)) {
+            return Err(Error::option(name, length_m, "a positive number of metres"));
+        }
+    }
+    if let Some(size_m) = options.box_size_m.filter(|size_m| !size_m.iter().all(|x| is_length(*x))) {
+        return Err(Error::option("box_size_m", size_m.to_value(), "three positive numbers of metres"));
+    }
+    let scales = options.scales();
+    if let [first, second, ..] = scales.as_slice() {
+        return Err(Error::argument("scale", format!("{first} and {second}"), "one of them, or none"));
     }
     match options.down.map(|down| down.norm()) {
         Some(length) if (length - 1.0).abs() >= 1e-6 || length.is_nan() => {
             Err(Error::argument("down", format!("a vector of length {length}"), "a unit vector"))
         }
         _ => Ok(()),
+    }
+}
+
+impl EstimatorOptions {
+    /// The options given that tell one camera its place, by name.
+    pub(super) fn scales(&self) -> Vec<&'static str> {
+        let given = [
+            ("camera_height_m", self.camera_height_m.is_some()),
+            ("edge_length_m", self.edge_length_m.is_some()),
+            ("box_size_m", self.box_size_m.is_some()),
+        ];
+        given.into_iter().filter(|(_, given)| *given).map(|(name, _)| name).collect()
     }
 }

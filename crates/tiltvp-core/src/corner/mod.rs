@@ -22,6 +22,7 @@ mod options;
 mod pose;
 mod ray;
 mod sequence;
+mod sized;
 mod trace;
 mod triangulation;
 
@@ -37,8 +38,8 @@ pub use self::closed_form::standard_model::{CornerCase, StandardType};
 pub use self::coloured::Window;
 pub use self::coloured::segmentation::{ColorOptions, Primary};
 pub use self::detector::{CornerDetector, CornerScratch};
-pub use self::estimate::{CornerEstimate, CornerVerdict, Hypothesis};
-pub use self::estimator_options::EstimatorOptions;
+pub use self::estimate::{CornerEstimate, CornerVerdict, Hypothesis, PlaceVerdict};
+pub use self::estimator_options::{EstimatorOptions, KnownEdge};
 pub use self::feature::{CornerFeature, Edge};
 pub use self::fusion::{FusedPose, fuse_rays};
 pub use self::general::edge_ends::EdgeEnd;

@@ -3,7 +3,7 @@
 use nalgebra::{Matrix3, Matrix6, Vector3};
 use pyo3::IntoPyObjectExt;
 use pyo3::prelude::*;
-use tiltvp_core::corner::{self as core, CornerVerdict, EdgeEnd, Hypothesis};
+use tiltvp_core::corner::{self as core, CornerVerdict, EdgeEnd, Hypothesis, PlaceVerdict};
 
 use super::feature::CornerFeature;
 use crate::array::Array;
@@ -23,7 +23,8 @@ value! {
         /// Fresh (3, 3) float64, rows x, y, z: directions of the corner's edges away from its vertex, left camera's frame.
         /// The frame of `camera_from_object` keeps its axes from frame to frame, whatever the edges are called.
         edges: [Vector3<f64>; 3],
-        /// Fresh (3,) float64: the vertex in the left camera's frame, metres; None from one image without `camera_height_m`.
+        /// Fresh (3,) float64: the vertex in the left camera's frame, metres; None from one image without
+        /// `camera_height_m`, `edge_length_m` or `box_size_m`, and where these do not tell it.
         vertex_m: Option<Vector3<f64>>,
         /// Fresh (6, 6) float64: covariance of the attitude's rotation vector (left camera's frame, radians) and of the
         /// vertex (metres; zero where that is None).
@@ -65,11 +66,13 @@ value! {
         /// Which corner of the right image it is from, or None.
         chosen_right: Option<usize>,
         /// Fresh (3,) float64: how long the edges x, y, z are, metres, to where lines along the others meet them; NaN where
-        /// no image shows that. From two grey images and with right angles.
+        /// no image shows that. From two grey images with right angles, and from one image with a known length.
         edge_lengths_m: [Option<f64>; 3] = own.ends.map(|end| end.map(|end| end.length_m)),
         /// Fresh (3, 3) float64, rows x, y, z: where these edges end in the left camera's frame, metres, from both images
-        /// alone; NaN where only one of them shows it, or none.
+        /// alone; NaN where only one of them shows it, or none. With a known length from the pose of the one image.
         edge_ends_m: [Option<Vector3<f64>>; 3] = own.ends.map(|end| end.and_then(|end| end.place_m)),
+        /// Why the likeliest hypothesis has no place; empty where it has one, and where there is none.
+        place_reason: String = own.place.reason().to_owned(),
         /// Whether the pose of a frame before was a prior.
         followed: bool,
         /// The number of the corner that is the object, from 1: it grows where another corner has become the object; from
@@ -78,6 +81,9 @@ value! {
     }
     make {
         let verdict = CornerVerdict::ALL.into_iter().find(|verdict| verdict.reason() == reason);
+        let place = PlaceVerdict::ALL.into_iter().find(|place| place.reason() == place_reason).ok_or_else(|| {
+            invalid(format!("values[\"place_reason\"] = {place_reason:?}, expected one that `place_reason` gives"))
+        })?;
         let end = |k: usize| edge_lengths_m[k].map(|length_m| EdgeEnd { length_m, place_m: edge_ends_m[k] });
         let inner = |features: Vec<CornerFeature>| features.into_iter().map(|feature| feature.inner).collect();
         core::CornerEstimate {
@@ -88,6 +94,7 @@ value! {
             chosen_left,
             chosen_right,
             ends: [end(0), end(1), end(2)],
+            place,
             followed,
             object,
         }

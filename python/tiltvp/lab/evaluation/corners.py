@@ -34,6 +34,13 @@ _FLIP_DEG: Final = 20.0
 _ONE_CAMERA: Final = "coloured, one camera, height known"
 """The left camera alone, each frame for itself, with its height above the vertex as somebody measures it."""
 
+_ONE_EDGE: Final = "coloured, one camera, edge y known"
+_ONE_BOX: Final = "coloured, one camera, size known"
+"""The same with the length of the upright edge, and with all three sizes, as somebody measures them."""
+
+_LENGTH_SIGMA_M: Final = 0.001
+"""Of a length: of a folding rule laid along an edge."""
+
 _HEIGHT_SIGMA_M: Final = 0.005
 """Of that height: of a folding rule held upright from the lens to the floor."""
 
@@ -205,11 +212,20 @@ def _estimates(
         for frame, pair in enumerate(pairs):
             looks = {method: _timed(estimator, *pair) for method, estimator in estimators.items()}
             if scene.kind == "laboratory":
-                object_from_left = np.linalg.inv(sequence.left_from_object(frame))
-                height_m = abs(float(object_from_left[1, 3])) + heights.normal(0.0, _HEIGHT_SIGMA_M)
-                alone: dict[str, Any] = {"camera_height_m": height_m, "camera_height_sigma_m": _HEIGHT_SIGMA_M}
-                looks[_ONE_CAMERA] = _timed(CornerPoseEstimator(left, method="coloured", **known, **alone), pair[0])
+                for method, scale in _scales(sequence, frame, heights):
+                    looks[method] = _timed(CornerPoseEstimator(left, method="coloured", **known, **scale), pair[0])
             yield looks
+
+
+def _scales(sequence: StereoSequence, frame: int, heights: np.random.Generator) -> Iterator[tuple[str, dict[str, Any]]]:
+    """What one camera may know beside the image, each as it is measured once."""
+    object_from_left = np.linalg.inv(sequence.left_from_object(frame))
+    height_m = abs(float(object_from_left[1, 3])) + heights.normal(0.0, _HEIGHT_SIGMA_M)
+    yield _ONE_CAMERA, {"camera_height_m": height_m, "camera_height_sigma_m": _HEIGHT_SIGMA_M}
+    size_m = np.asarray(sequence.corners[sequence.corner].lengths_m)
+    size_m = size_m + np.random.default_rng((sequence.seed, frame)).normal(0.0, _LENGTH_SIGMA_M, 3)
+    yield _ONE_EDGE, {"edge_length_m": float(size_m[1]), "length_sigma_m": _LENGTH_SIGMA_M}
+    yield _ONE_BOX, {"box_size_m": size_m, "length_sigma_m": _LENGTH_SIGMA_M}
 
 
 def _timed(estimator: CornerPoseEstimator, *images: NDArray[np.uint8]) -> tuple[CornerEstimate, float]:

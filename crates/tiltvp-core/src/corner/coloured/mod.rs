@@ -4,8 +4,11 @@ mod edge_candidates;
 mod highlights;
 pub(super) mod paper;
 pub(super) mod segmentation;
+mod sized_ends;
 
 use nalgebra::{Vector2, Vector3};
+
+pub(super) use self::sized_ends::{box_search, find_end};
 
 use self::edge_candidates::{Doubled, EdgeCandidates, Orientation};
 use self::highlights::trusts;

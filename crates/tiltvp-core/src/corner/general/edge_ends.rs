@@ -144,7 +144,7 @@ pub(crate) fn seen_ends(seen: &ObservedCorner<'_>, scratch: &mut GeneralScratch)
 
 /// How far from a point along an edge the place is that is nearest to a line of sight; none where that is behind the camera or
 /// on the other side of the point.
-fn along(point: &Vector3<f64>, edge: &Vector3<f64>, bearing: &Vector3<f64>) -> Option<f64> {
+pub(crate) fn along(point: &Vector3<f64>, edge: &Vector3<f64>, bearing: &Vector3<f64>) -> Option<f64> {
     let across = |vector: &Vector3<f64>| vector - bearing * bearing.dot(vector);
     let length_m = -across(point).dot(&across(edge)) / across(edge).norm_squared();
     let ahead = (point + edge * length_m).dot(bearing) > 0.0;

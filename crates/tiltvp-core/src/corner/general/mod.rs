@@ -6,8 +6,11 @@ pub(super) mod edge_ends;
 pub(super) mod guided;
 mod junctions;
 pub(super) mod segments;
+mod sized_ends;
 
 use nalgebra::Vector3;
+
+pub(super) use self::sized_ends::{box_search, find_end};
 
 use self::junctions::{Junction, RayEnd};
 use self::segments::{Segment, SegmentFinder, SegmentScratch};

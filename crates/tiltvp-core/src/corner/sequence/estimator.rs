@@ -8,8 +8,8 @@ use crate::corner::closed_form::attitude::IncludedAngle;
 use crate::corner::closed_form::prior::{AttitudePrior, VerticalSense};
 use crate::corner::closed_form::resolve::{Alignment, View, resolve};
 use crate::corner::detector::{CornerDetector, CornerScratch};
-use crate::corner::estimate::{CornerEstimate, CornerVerdict, Hypothesis};
-use crate::corner::estimator_options::EstimatorOptions;
+use crate::corner::estimate::{CornerEstimate, CornerVerdict, Hypothesis, PlaceVerdict};
+use crate::corner::estimator_options::{EstimatorOptions, KnownEdge};
 use crate::corner::feature::CornerFeature;
 use crate::corner::general::edge_ends::{EdgeEnd, edge_ends};
 use crate::corner::general::guided::ExpectedCorner;
@@ -55,13 +55,23 @@ impl CornerPoseEstimator {
             if names[0] != names[1] {
                 return Err(Error::argument("right", names[1], format!("the method of left, {}", names[0])));
             }
-            if let Some(height_m) = options.camera_height_m {
+            if let Some(scale) = options.scales().first() {
                 let expected = "none for two cameras, which tell the distance themselves";
-                return Err(Error::argument("camera_height_m", height_m.to_string(), expected));
+                return Err(Error::argument(scale, "given", expected));
             }
             if left_from_right.translation_m.norm() <= 0.0 {
                 return Err(Error::argument("left_from_right", "no baseline", "two cameras at different places"));
             }
+        }
+        let is_coloured = matches!(left.options().method, CornerMethod::Coloured(_));
+        if options.edge_length_m.is_some() && options.known_edge != KnownEdge::Y && !is_coloured {
+            let expected = "y for corners without colours, whose level edges have no names";
+            return Err(Error::argument("known_edge", options.known_edge.name(), expected));
+        }
+        if let CornerMethod::Paper(_) = left.options().method
+            && let Some(scale) = options.scales().iter().find(|scale| **scale != "camera_height_m")
+        {
+            return Err(Error::argument(scale, "given for method \"paper\"", "none, or method \"coloured\""));
         }
         let scratch = [left.scratch(), right.as_ref().map_or(left.scratch(), |(right, _)| right.scratch())];
         Ok(Self { left, right, options, track: None, objects: 0, scratch })
@@ -152,6 +162,7 @@ impl CornerPoseEstimator {
             chosen_left: Vec::new(),
             chosen_right: None,
             ends: [None; 3],
+            place: PlaceVerdict::Told,
             followed: self.track.is_some(),
             object: self.objects,
         };
@@ -204,9 +215,7 @@ impl CornerPoseEstimator {
             let corners = [parallel(0, pose.camera_from_object), parallel(1, turned * pose.camera_from_object)];
             self.track = Some(Track::next(self.track.take(), pose, corners, estimate.object, &seen));
         }
-        if self.right.is_none() {
-            self.place_by_height(vertical.as_ref(), &mut estimate);
-        }
+        self.place_by_scale(left, vertical.as_ref(), &mut estimate);
         Ok(estimate)
     }
 

@@ -4,36 +4,48 @@ use nalgebra::{Matrix3, Matrix6, Vector3};
 
 use super::estimator::CornerPoseEstimator;
 use crate::corner::closed_form::attitude::with_vertex;
-use crate::corner::estimate::{CornerEstimate, Hypothesis};
+use crate::corner::estimate::{CornerEstimate, Hypothesis, PlaceVerdict};
 use crate::corner::feature::CornerFeature;
 
 /// The largest standard deviation of a distance as a share of it. Covariances are to first order; the next order is as much
 /// again of what they say, 1 % of the distance here. Larger ones are those of corners at the height of the camera.
-const SHARE_MAX: f64 = 0.1;
+pub(super) const SHARE_MAX: f64 = 0.1;
 
 impl CornerPoseEstimator {
-    /// Gives the poses from one image the place that the known height above the vertex tells, each its own. None where the vertex
-    /// is not below the camera as far as that is known, where nothing told which edge is the vertical one, where the height tells
-    /// too little, and beyond the limits of the distance.
-    pub(super) fn place_by_height(&self, vertical: Option<&Vector3<f64>>, estimate: &mut CornerEstimate) {
+    /// Gives the poses from one image the place that the known height above the vertex tells, each its own, and says why the first
+    /// has none: where the vertex is not below the camera as far as that is known, where nothing told which edge is the vertical
+    /// one, where the height tells too little, and beyond the limits of the distance.
+    pub(super) fn place_by_height(
+        &self,
+        vertical: Option<&Vector3<f64>>,
+        estimate: &mut CornerEstimate,
+    ) -> PlaceVerdict {
         let (Some(height_m), Some(corner)) =
             (self.options.camera_height_m, estimate.chosen_left.first().and_then(|i| estimate.features[0].get(*i)))
         else {
-            return;
+            return PlaceVerdict::NoScale;
         };
-        let named = self.is_one_object() || vertical.is_some();
-        let above = !estimate.followed && self.options.down.is_some_and(|down| down.dot(&corner.vertex()) <= 0.0);
-        if !named || above {
-            return;
+        if !self.is_one_object() && vertical.is_none() {
+            return PlaceVerdict::NotUpright;
         }
+        if !estimate.followed && self.options.down.is_some_and(|down| down.dot(&corner.vertex()) <= 0.0) {
+            return PlaceVerdict::NotBelow;
+        }
+        let mut verdicts = Vec::with_capacity(estimate.hypotheses.len());
         for pose in &mut estimate.hypotheses {
             let height = (height_m, self.options.camera_height_sigma_m);
-            if let Some((vertex_m, covariance)) = placed(pose, corner, height, self.options.angle.sigma_rad)
-                && (self.options.distance_min_m..=self.options.distance_max_m).contains(&vertex_m.norm())
-            {
-                (pose.vertex_m, pose.covariance) = (Some(vertex_m), covariance);
-            }
+            let found = placed(pose, corner, height, self.options.angle.sigma_rad);
+            let reach = self.options.distance_min_m..=self.options.distance_max_m;
+            verdicts.push(match found {
+                None => PlaceVerdict::Uncertain,
+                Some((vertex_m, _)) if !reach.contains(&vertex_m.norm()) => PlaceVerdict::OutOfReach,
+                Some((vertex_m, covariance)) => {
+                    (pose.vertex_m, pose.covariance) = (Some(vertex_m), covariance);
+                    PlaceVerdict::Told
+                }
+            });
         }
+        verdicts.first().copied().unwrap_or(PlaceVerdict::Told)
     }
 }
 

@@ -6,6 +6,7 @@ mod height;
 mod pairs;
 mod paper;
 mod shared_attitude;
+mod size;
 mod support;
 pub(super) mod track;
 mod transfer;

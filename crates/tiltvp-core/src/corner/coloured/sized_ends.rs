@@ -1,0 +1,85 @@
+//! Where edges of the coloured cuboid end: where the outlines of its two faces meet.
+
+use nalgebra::{Vector2, Vector3};
+
+use super::segmentation::Primary;
+use super::{ColouredScratch, ERRING_TOGETHER, difference};
+use crate::corner::options::ColouredOptions;
+use crate::corner::sized::{BoxLine, BoxView, EndSight, PLACES_MIN};
+use crate::corner::trace::{RaySearch, trace};
+use crate::image::{ColorView, LightTable};
+
+/// Where an edge may end from where its ray does, in pixels: a ray is fitted up to 3 pixels before the last labels on both its
+/// sides, and these reach as far as the search width of 8 pixels beside it.
+const OFFSETS_PX: [f64; 4] = [4.0, 0.0, 10.0, -8.0];
+
+/// How far either end of an outline may be off, in pixels: unlike an edge between two faces, of which one primary falls where the
+/// other rises, it has one bright side, and what lies behind it.
+const OUTLINE_SIGMA_PX: f64 = 0.15;
+
+/// The search for lines of a cuboid, whose line and reach are set for each.
+pub(in crate::corner) fn box_search(options: &ColouredOptions) -> RaySearch {
+    RaySearch {
+        normal: Vector3::z(),
+        vertex: Vector3::x(),
+        from_rad: 0.0,
+        to_rad: 0.0,
+        search_px: options.search_px,
+        step_min: options.step_min,
+        step_share_min: 0.0,
+        threshold_px: options.threshold_px,
+        erring_together: ERRING_TOGETHER,
+        ray_sigma_px: OUTLINE_SIGMA_PX,
+    }
+}
+
+/// The end of an edge.
+pub(in crate::corner) fn find_end(
+    view: &BoxView<'_>,
+    axis: usize,
+    image: &ColorView<'_>,
+    options: &ColouredOptions,
+    light: &LightTable,
+    scratch: &mut ColouredScratch,
+) -> EndSight {
+    let [top, left, right] = options.lines.color.faces;
+    // The face that holds two edges: x and z the top, y and z the left one, x and y the right one.
+    let face = |a: usize, b: usize| match 3 - a - b {
+        0 => left,
+        1 => top,
+        _ => right,
+    };
+    let ray = view.corner.rays()[axis];
+    let last = view.corner.vertex().angle(&ray.toward);
+    let Some((_, jacobian)) = view.camera.project_jacobian(&ray.toward) else { return EndSight::Outside };
+    let px_per_rad = jacobian.norm() / 2f64.sqrt();
+    let candidates = OFFSETS_PX.map(|offset| last + offset / px_per_rad);
+    let memory = &mut scratch.trace;
+    view.end(axis, &candidates, &mut |line, search| match line {
+        BoxLine::Edge(own) => {
+            let faces = (face(own, (own + 1) % 3), face(own, (own + 2) % 3));
+            trace(view.camera, search, PLACES_MIN, difference(image, light, faces, [1.0; 2]), memory)
+        }
+        BoxLine::Far { end_of, along } => {
+            trace(view.camera, search, PLACES_MIN, outline(image, light, face(end_of, along)), memory)
+        }
+    })
+}
+
+/// How much of a face's primary there is beyond the mean of the others: what is behind its outline has little of it.
+fn outline(
+    image: &ColorView<'_>,
+    light: &LightTable,
+    face: Primary,
+) -> impl Fn(&Vector2<f64>, &Vector2<f64>, &mut [f64]) -> bool {
+    let own = face.byte();
+    move |middle, step, out| {
+        let half = (out.len() / 2) as f64;
+        out.iter_mut().enumerate().all(|(i, out)| {
+            let place = middle + step * (i as f64 - half);
+            let Some(levels) = light.color(image, place.x, place.y) else { return false };
+            *out = 1.5 * levels[own] - 0.5 * levels.iter().sum::<f64>();
+            true
+        })
+    }
+}

@@ -1,0 +1,7 @@
+//! A corner of a box of which lengths are known: where its edges end, and the pose that rays, ends and lengths agree on.
+
+mod far_edges;
+mod fit;
+
+pub(super) use self::far_edges::{BoxLine, BoxView, EndSight, PLACES_MIN, SeenEnd};
+pub(super) use self::fit::{KnownLengths, SizedPose, fit_sized};

@@ -1,0 +1,183 @@
+"""One camera that knows the length of an edge or the size of a box: its place, how sure it is, where it abstains."""
+
+from __future__ import annotations
+
+import pickle
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+import tiltvp
+from test_corner_images import CAMERA, COLOURS, GREYS, LEFT_FROM_RIGHT, drawn, pose
+from tiltvp.cli.app import main
+from tiltvp.corner import CornerPoseEstimator
+from tiltvp.errors import InvalidInputError
+
+pytestmark = pytest.mark.slow
+
+SIZE_M = 0.3
+"""Of the cuboid that `drawn` draws, along all edges."""
+
+
+def errors(found: object, rotation: np.ndarray, vertex: np.ndarray) -> np.ndarray:
+    """(6,): rotation vector and vertex."""
+    turn = cv2.Rodrigues(rotation @ found.camera_from_object.T)[0].ravel()
+    return np.concatenate([turn, vertex - found.vertex_m])
+
+
+KNOWN = [
+    {"edge_length_m": SIZE_M, "known_edge": "x"},
+    {"edge_length_m": SIZE_M},
+    {"edge_length_m": SIZE_M, "known_edge": "z"},
+    {"box_size_m": (SIZE_M,) * 3},
+]
+
+
+@pytest.mark.parametrize("known", KNOWN, ids=["x", "y", "z", "box"])
+def test_a_known_length_places_one_camera(known: dict[str, object]) -> None:
+    """The mean of 20 chi-squares of 6 is above 9.8 for one set of 20 independent views in 10,000."""
+    nees, shares = [], []
+    for k in range(20):
+        rotation, vertex = pose(yaw=28.0 + 1.6 * k, pitch=20.0 + 1.1 * k, roll=-8.0 + k)
+        vertex = vertex + (0.004 * k, -0.003 * k, 0.03 * k)
+        estimate = CornerPoseEstimator(CAMERA, **known)(drawn(rotation, vertex, COLOURS, fine=4))
+        assert estimate.pose is not None
+        assert estimate.place_reason == ""
+        error = errors(estimate.pose, rotation, vertex)
+        nees.append(error @ np.linalg.solve(estimate.pose.covariance, error))
+        shares.append(np.linalg.norm(error[3:]) / np.linalg.norm(vertex))
+        seen = estimate.edge_lengths_m
+        assert np.allclose(seen[np.isfinite(seen)], SIZE_M, rtol=0.05)
+    assert np.mean(nees) < 9.8
+    assert np.max(shares) < 0.01
+
+
+def test_a_length_that_is_known_roughly_says_so() -> None:
+    rotation, vertex = pose()
+    image = drawn(rotation, vertex, COLOURS)
+    exact, rough = (
+        CornerPoseEstimator(CAMERA, edge_length_m=SIZE_M, length_sigma_m=sigma)(image).pose for sigma in (0.0, 0.006)
+    )
+    assert exact is not None
+    assert rough is not None
+    # One length stretches everything alike: 2 % of it are 2 % of the distance, and nothing of the attitude.
+    added = rough.covariance - exact.covariance
+    seen = np.zeros(6)
+    seen[3:] = 0.02 * exact.vertex_m
+    assert np.allclose(added, np.outer(seen, seen), atol=1e-9)
+    assert np.allclose(rough.vertex_m, exact.vertex_m)
+
+
+def test_a_grey_box_needs_no_names() -> None:
+    rotation, vertex = pose()
+    image = drawn(rotation, vertex, GREYS)
+    known = {"down": rotation[:, 1], "right_handed": True, "method": "general"}
+    for length in ({"edge_length_m": SIZE_M}, {"box_size_m": (SIZE_M,) * 3, "length_sigma_m": 0.001}):
+        estimate = CornerPoseEstimator(CAMERA, **known, **length)(image)
+        assert estimate.pose is not None
+        assert estimate.place_reason == ""
+        error = errors(estimate.pose, estimate.pose.camera_from_object, vertex)
+        assert np.linalg.norm(error[3:]) < 0.01 * np.linalg.norm(vertex)
+        assert error[3:] @ np.linalg.solve(estimate.pose.covariance[3:, 3:], error[3:]) < 21.1  # one in 10,000
+    # A box that is not a cube is none of this shape, whichever way it stands.
+    other = CornerPoseEstimator(CAMERA, **known, box_size_m=(0.3, 0.3, 0.2))(image)
+    assert other.pose is not None
+    assert other.pose.vertex_m is None
+    assert other.place_reason == "the edges do not fit the known lengths"
+    # Which edge is upright is not known without the direction down.
+    unknown = CornerPoseEstimator(CAMERA, method="general", edge_length_m=SIZE_M, right_handed=True)(image)
+    assert all(one.vertex_m is None for one in unknown.hypotheses)
+
+
+def covered(image: np.ndarray, middle: np.ndarray, half_px: int, slope: float) -> np.ndarray:
+    """The image with a grey board before a place."""
+    board = np.array([[-1, -1], [1, -1 + slope], [1 - slope, 1], [-1 - slope, 1 - slope]]) * half_px + middle
+    canvas = image.copy()
+    cv2.fillPoly(canvas, [np.rint(board * 16).astype(np.int32)], (90, 90, 90), lineType=cv2.LINE_AA, shift=4)
+    return canvas
+
+
+@pytest.mark.parametrize("slope", [0.0, 0.25, -0.3])
+@pytest.mark.parametrize("faces", [COLOURS, GREYS], ids=["coloured", "grey"])
+def test_an_end_that_is_hidden_tells_no_place(faces: dict[str, tuple[int, int, int]], slope: float) -> None:
+    rotation, vertex = pose()
+    image = drawn(rotation, vertex, faces)
+    known = {"edge_length_m": SIZE_M, "down": rotation[:, 1], "right_handed": True}
+    known |= {"method": "coloured" if faces is COLOURS else "general"}
+    for share in (0.55, 0.7, 0.85, 1.0):
+        end = vertex + share * SIZE_M * rotation[:, 1]
+        middle = end[:2] / end[2] * 400.0 + (240.0, 180.0)
+        # From this place to beyond the end.
+        half_px = 14 + int(0.5 * (1.0 - share) * 120)
+        estimate = CornerPoseEstimator(CAMERA, **known)(covered(image, middle + (0.0, half_px - 14), half_px, slope))
+        assert all(one.vertex_m is None for one in estimate.hypotheses), share
+        assert bool(estimate.place_reason) == bool(estimate.hypotheses)
+
+
+def test_an_edge_that_leaves_the_image_tells_no_place() -> None:
+    rotation, vertex = pose()
+    for down_m in (0.26, 0.3, 0.34):
+        moved = vertex + (0.0, down_m, 0.0)
+        estimate = CornerPoseEstimator(CAMERA, edge_length_m=SIZE_M)(drawn(rotation, moved, COLOURS))
+        if estimate.pose is None:
+            continue
+        assert estimate.pose.vertex_m is None
+        assert estimate.place_reason == "the edges of known length leave the image"
+        # The ends of others are seen.
+        other = CornerPoseEstimator(CAMERA, box_size_m=(SIZE_M,) * 3)(drawn(rotation, moved, COLOURS))
+        assert other.pose is not None
+        if other.pose.vertex_m is not None:
+            assert np.linalg.norm(other.pose.vertex_m - moved) < 0.01 * np.linalg.norm(moved)
+
+
+def test_a_wrong_size_is_refused() -> None:
+    rotation, vertex = pose()
+    image = drawn(rotation, vertex, COLOURS)
+    estimate = CornerPoseEstimator(CAMERA, box_size_m=(0.3, 0.3, 0.26))(image)
+    assert estimate.pose is not None
+    assert estimate.pose.vertex_m is None
+    assert estimate.place_reason == "the edges do not fit the known lengths"
+    assert pickle.loads(pickle.dumps(estimate)) == estimate
+    assert CornerPoseEstimator(CAMERA)(image).place_reason.startswith("one camera, of which neither")
+
+
+@pytest.mark.parametrize(
+    ("known", "complaint"),
+    [
+        ({"edge_length_m": 0.0}, "edge_length_m = 0"),
+        ({"box_size_m": (0.1, -0.1, 0.1)}, "box_size_m"),
+        ({"length_sigma_m": -1.0}, "length_sigma_m"),
+        ({"known_edge": "w"}, "known_edge"),
+        ({"edge_length_m": 0.3, "camera_height_m": 1.0}, "camera_height_m and edge_length_m"),
+        ({"edge_length_m": 0.3, "box_size_m": (0.3,) * 3}, "edge_length_m and box_size_m"),
+        ({"edge_length_m": 0.3, "known_edge": "x", "method": "general"}, "known_edge"),
+        ({"edge_length_m": 0.3, "method": "paper"}, "paper"),
+    ],
+)
+def test_what_does_not_go_together_is_refused(known: dict[str, object], complaint: str) -> None:
+    with pytest.raises(InvalidInputError, match=complaint):
+        CornerPoseEstimator(CAMERA, **known)
+
+
+def test_two_cameras_tell_the_scale_themselves() -> None:
+    for known in ({"edge_length_m": SIZE_M}, {"box_size_m": (SIZE_M,) * 3}):
+        with pytest.raises(InvalidInputError, match=r"two cameras"):
+            CornerPoseEstimator(CAMERA, CAMERA, LEFT_FROM_RIGHT, **known)
+
+
+def test_the_command_line_takes_lengths(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    rotation, vertex = pose()
+    CAMERA.save(tmp_path / "one.toml")
+    tiltvp.write_image(tmp_path / "left" / "a.png", drawn(rotation, vertex, COLOURS))
+    words = ["corner", str(tmp_path / "left"), "--calibration", str(tmp_path / "one.toml"), "--overwrite"]
+    trajectory = tmp_path / "trajectory.txt"
+    for known in (["--edge-length-m", "0.3", "--known-edge", "x"], ["--box-size-m", "0.3", "0.3", "0.3"]):
+        assert main([*words, *known, "--length-sigma-m", "0.001", "--trajectory", str(trajectory)]) == 0
+        place = np.loadtxt(trajectory)[1:4]
+        assert np.linalg.norm(place + rotation.T @ vertex) < 0.012
+        assert "without a place" not in capsys.readouterr().out
+    assert main([*words, "--box-size-m", "0.3", "0.3", "0.2"]) == 0
+    assert "without a place: the edges do not fit the known lengths (1)" in capsys.readouterr().out
+    assert main([*words, "--edge-length-m", "0.3", "--camera-height-m", "1"]) == 2
