@@ -66,11 +66,16 @@ def drawn(
             points = np.array([vertex + 2.0 * x, vertex + 2.4 * x, vertex + 2.4 * x + side, vertex + 2.0 * x + side])
             pixels = points[:, :2] / points[:, 2:] * 400.0 + (240.0, 180.0)
             cv2.fillPoly(picture, [np.rint(((pixels + 0.5) * fine - 0.5) * 16).astype(np.int32)], faces[face], shift=4)
+    return photographed(picture, noise)
+
+
+def photographed(picture: np.ndarray, noise: float, seed: int = 5) -> np.ndarray:
+    """What the camera makes of a fine picture: light blurred, rolled off above 0.7, and noisy."""
     light = (picture.astype(np.float32) / 255.0) ** 2.2
     light = cv2.GaussianBlur(cv2.resize(light, (480, 360), interpolation=cv2.INTER_AREA), (0, 0), 0.7)
     light = np.where(light < 0.7, light, 1.0 - 0.3 * np.exp((0.7 - light) / 0.3))
-    noise = np.random.default_rng(5).normal(0.0, noise, light.shape)
-    return np.clip(np.rint(255.0 * light ** (1 / 2.2) + noise), 0, 255).astype(np.uint8)
+    grain = np.random.default_rng(seed).normal(0.0, noise, light.shape)
+    return np.clip(np.rint(255.0 * light ** (1 / 2.2) + grain), 0, 255).astype(np.uint8)
 
 
 def off_px(found: np.ndarray, true: np.ndarray) -> np.ndarray:

@@ -13,7 +13,7 @@ use super::general::segments::{Segment, SegmentFinder};
 use super::general::{self, GeneralScratch};
 use super::options::{CornerMethod, DetectorOptions};
 use super::sequence::estimator::Frame;
-use super::sized::{BoxView, EndSight};
+use super::sized::{BoxView, SeenEnd, Unseen};
 use crate::camera::Camera;
 use crate::edges::Mask;
 use crate::error::{Error, Result};
@@ -229,7 +229,7 @@ impl CornerDetector {
         edges: &[Vector3<f64>; 3],
         axis: usize,
         scratch: &mut CornerScratch,
-    ) -> EndSight {
+    ) -> std::result::Result<SeenEnd, Unseen> {
         let camera = &self.camera;
         match (&self.options.method, frame, &mut scratch.general) {
             (CornerMethod::Coloured(options), Frame::Color(image), _) => {
@@ -240,7 +240,7 @@ impl CornerDetector {
                 let view = BoxView { camera, corner, edges, search: general::box_search(options) };
                 general::find_end(&view, axis, image, &self.light, memory)
             }
-            _ => EndSight::Hidden,
+            _ => Err(Unseen::Hidden),
         }
     }
 

@@ -5,7 +5,7 @@ use nalgebra::{Vector2, Vector3};
 use super::segmentation::Primary;
 use super::{ColouredScratch, ERRING_TOGETHER, difference};
 use crate::corner::options::ColouredOptions;
-use crate::corner::sized::{BoxLine, BoxView, EndSight, PLACES_MIN};
+use crate::corner::sized::{BoxLine, BoxView, PLACES_MIN, SeenEnd, Unseen};
 use crate::corner::trace::{RaySearch, trace};
 use crate::image::{ColorView, LightTable};
 
@@ -14,7 +14,7 @@ use crate::image::{ColorView, LightTable};
 const OFFSETS_PX: [f64; 4] = [4.0, 0.0, 10.0, -8.0];
 
 /// How far either end of an outline may be off, in pixels: unlike an edge between two faces, of which one primary falls where the
-/// other rises, it has one bright side, and what lies behind it.
+/// other rises, it has one bright side, and what lies behind it. Poses of rendered cuboids have a NEES of 2 of 6 with it.
 const OUTLINE_SIGMA_PX: f64 = 0.15;
 
 /// The search for lines of a cuboid, whose line and reach are set for each.
@@ -41,7 +41,7 @@ pub(in crate::corner) fn find_end(
     options: &ColouredOptions,
     light: &LightTable,
     scratch: &mut ColouredScratch,
-) -> EndSight {
+) -> Result<SeenEnd, Unseen> {
     let [top, left, right] = options.lines.color.faces;
     // The face that holds two edges: x and z the top, y and z the left one, x and y the right one.
     let face = |a: usize, b: usize| match 3 - a - b {
@@ -51,7 +51,7 @@ pub(in crate::corner) fn find_end(
     };
     let ray = view.corner.rays()[axis];
     let last = view.corner.vertex().angle(&ray.toward);
-    let Some((_, jacobian)) = view.camera.project_jacobian(&ray.toward) else { return EndSight::Outside };
+    let Some((_, jacobian)) = view.camera.project_jacobian(&ray.toward) else { return Err(Unseen::Outside) };
     let px_per_rad = jacobian.norm() / 2f64.sqrt();
     let candidates = OFFSETS_PX.map(|offset| last + offset / px_per_rad);
     let memory = &mut scratch.trace;

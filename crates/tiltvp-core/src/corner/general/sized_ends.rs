@@ -4,7 +4,7 @@ use nalgebra::Vector3;
 
 use super::{AXIS_SINE, GeneralScratch, gray_search};
 use crate::corner::options::GeneralOptions;
-use crate::corner::sized::{BoxView, EndSight, PLACES_MIN};
+use crate::corner::sized::{BoxView, PLACES_MIN, SeenEnd, Unseen};
 use crate::corner::trace::{RaySearch, trace};
 use crate::image::{ImageView, LightTable};
 
@@ -29,7 +29,7 @@ pub(in crate::corner) fn find_end(
     image: &ImageView<'_>,
     light: &LightTable,
     scratch: &mut GeneralScratch,
-) -> EndSight {
+) -> Result<SeenEnd, Unseen> {
     let GeneralScratch { segments, trace: memory, .. } = scratch;
     let (vertex, normal) = (view.corner.vertex(), view.corner.rays()[axis].normal);
     let along = normal.cross(&vertex);

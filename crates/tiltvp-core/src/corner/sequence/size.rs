@@ -9,7 +9,7 @@ use crate::corner::closed_form::attitude::{IncludedAngle, corner_attitudes};
 use crate::corner::estimate::{CornerEstimate, Hypothesis, PlaceVerdict};
 use crate::corner::feature::CornerFeature;
 use crate::corner::general::edge_ends::{EdgeEnd, along};
-use crate::corner::sized::{EndSight, KnownLengths, SeenEnd, SizedPose, fit_sized};
+use crate::corner::sized::{KnownLengths, SeenEnd, SizedPose, Unseen, fit_sized};
 
 /// A corner of the image that may be the box' own, and what is seen of the ends of its edges.
 struct Candidate {
@@ -126,13 +126,13 @@ impl CornerPoseEstimator {
         let mut candidate = Candidate { corner, edges, ends: Vec::new(), outside: false };
         for axis in 0..3 {
             match self.left.end(frame, feature, &edges, axis, &mut self.scratch[0]) {
-                EndSight::Seen(end) => {
+                Ok(end) => {
                     if let Some(share) = along(&feature.vertex(), &edges[axis], &end.bearing) {
                         candidate.ends.push((end, share));
                     }
                 }
-                EndSight::Outside => candidate.outside = true,
-                EndSight::Hidden => {}
+                Err(Unseen::Outside) => candidate.outside = true,
+                Err(Unseen::Hidden) => {}
             }
         }
         Some(candidate)
@@ -174,7 +174,7 @@ impl CornerPoseEstimator {
             return Err(PlaceVerdict::OutOfReach);
         }
         let sigma_m = away.dot(&(place * away)).sqrt();
-        if !(sigma_m <= SHARE_MAX * distance_m) {
+        if sigma_m.is_nan() || sigma_m > SHARE_MAX * distance_m {
             return Err(PlaceVerdict::Uncertain);
         }
         // One length does not tell the box from others; a corner that is not of it might have the edge.

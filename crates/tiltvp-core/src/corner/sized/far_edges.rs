@@ -62,12 +62,10 @@ pub(crate) struct SeenEnd {
     pub(crate) far: [(usize, FittedRay); 2],
 }
 
-/// What is seen of the end of an edge.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) enum EndSight {
-    /// It is seen.
-    Seen(SeenEnd),
-    /// It is not: something is before it, or its further edges are too faint.
+/// Why the end of an edge is not seen.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Unseen {
+    /// Something is before it, or its further edges are too faint.
     Hidden,
     /// The edge leaves the image.
     Outside,
@@ -91,13 +89,13 @@ impl BoxView<'_> {
         axis: usize,
         candidates: &[f64],
         follow: &mut dyn FnMut(BoxLine, &RaySearch) -> Option<TracedRay>,
-    ) -> EndSight {
+    ) -> Result<SeenEnd, Unseen> {
         for candidate in candidates {
             if let Some(end) = self.far_edges(axis, *candidate, follow).filter(|end| self.ends_at(end, follow)) {
-                return EndSight::Seen(end);
+                return Ok(end);
             }
         }
-        if self.leaves(axis) { EndSight::Outside } else { EndSight::Hidden }
+        Err(if self.leaves(axis) { Unseen::Outside } else { Unseen::Hidden })
     }
 
     /// The bearing at an angle along a ray.
