@@ -12,7 +12,7 @@ import pytest
 
 import tiltvp
 from tiltvp.cli.line_options import LineOptions
-from tiltvp.errors import ImageFileError, InvalidInputError
+from tiltvp.errors import ImageFileError, InvalidInputError, UnknownLeanError
 from tiltvp.images import read_image, write_image
 from tiltvp.lab.plots.tracks import track_plot
 from tiltvp.streams import open_frames
@@ -109,7 +109,8 @@ def test_a_lean_that_loses_lines_is_not_believed(
     estimate = tiltvp.TiltEstimator(camera)(room.gray)
     assert options.tilts(camera)(room.gray) == estimate
     monkeypatch.setattr(tiltvp, "TiltEstimator", lambda *_, **__: lambda _: estimate)
-    assert options.tilts(camera)(upright_room.gray) is None
+    with pytest.raises(UnknownLeanError, match=r"lean not known: confidence .*, or lines"):
+        options.tilts(camera)(upright_room.gray)
 
 
 def test_bad_frames_are_skipped_and_the_turn_is_kept(run: Run, folder: Path, tmp_path: Path) -> None:
