@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 import tiltvp
-from test_corner_images import CAMERA, COLOURS, GREYS, LEFT_FROM_RIGHT, pair
+from drawn_corners import CAMERA, COLOURS, GREYS, LEFT_FROM_RIGHT, pair
 from tiltvp.stereo_rigs import StereoRig
 from tiltvp.synth import render_room, simulate_drive
 

@@ -15,8 +15,8 @@ import pytest
 from rerun.chunk import RrdReader
 
 import tiltvp
+from drawn_corners import CAMERA, COLOURS, LEFT_FROM_RIGHT, pair
 from recordings import write_video
-from test_corner_images import CAMERA, COLOURS, LEFT_FROM_RIGHT, pair
 from tiltvp.overlays.drive_map import landmark_places, robot_poses
 from tiltvp.overlays.live import TiltView, live_words, roll_and_pitch
 from tiltvp.stereo_rigs import StereoRig
