@@ -97,7 +97,7 @@ test-rust:
 
 # The tests of the Python package, without real data, with the same random cases every time.
 test-python *arguments:
-    {{bin}}/pytest --quiet --hypothesis-seed=20171028 {{arguments}}
+    {{bin}}/pytest --quiet --numprocesses 2 --dist worksteal --hypothesis-seed=20171028 {{arguments}}
 
 # The tests of properties, of both languages, with random cases of their own: run it now and then, mend what it finds.
 test-random: setup
