@@ -15,6 +15,7 @@ import pytest
 from rerun.chunk import RrdReader
 
 import tiltvp
+from commands import Run
 from drawn_corners import CAMERA, COLOURS, LEFT_FROM_RIGHT, pair
 from recordings import write_video
 from tiltvp.overlays.drive_map import landmark_places, robot_poses
@@ -22,7 +23,6 @@ from tiltvp.overlays.live import TiltView, live_words, roll_and_pitch
 from tiltvp.stereo_rigs import StereoRig
 from tiltvp.synth import RoomImage, simulate_drive
 
-Run = Callable[..., tuple[int, str, str]]
 FRAMES = 5
 
 
