@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +10,7 @@ import polars as pl
 import pytest
 
 import tiltvp
+from commands import Run
 from tiltvp.cli.line_options import LineOptions
 from tiltvp.errors import ImageFileError, InvalidInputError, UnknownLeanError
 from tiltvp.images import read_image, write_image
@@ -22,7 +22,6 @@ from tiltvp.videos import video_writer
 pytestmark = pytest.mark.slow
 
 FRAMES = 6
-Run = Callable[..., tuple[int, str, str]]
 
 
 @pytest.fixture(scope="module")
