@@ -202,7 +202,7 @@ measure-trust *arguments: setup
 measure-body *arguments: setup
     {{bin}}/tiltvp measure body "$TILTVP_DATA/panos" {{arguments}}
 
-# Which way is up, roll and pitch of the mounting, and the sense of turns, from rendered recordings of drives.
+# Which way is up, the mounting with all extrinsics but the height, and the sense of turns, from rendered recordings of drives.
 measure-mounting *arguments: setup
     {{bin}}/tiltvp measure mounting {{arguments}}
 

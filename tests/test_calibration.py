@@ -18,6 +18,7 @@ from tiltvp.drive_logs import read_drive_log
 from tiltvp.errors import InvalidInputError
 from tiltvp.lab.plots.calibration import convergence
 from tiltvp.selfcalib import consistency_band, convergence_table
+from tiltvp.streams import Wheels
 from tiltvp.synth import SimulatedDrive, simulate_drive
 
 TRUE = np.array([0.23 * math.cos(-0.34), 0.23 * math.sin(-0.34), -0.01])
@@ -211,7 +212,11 @@ def test_snippets_and_convergence() -> None:
     table = convergence_table(history)
     assert len(table["alarm"]) == len(drive.odometry)
     assert table["variance_psi"][-1] < 1e-3 < table["variance_psi"][5]
-    assert len(convergence(table, {"phi_rad": -0.34}).axes) == 6
+    figure = convergence({"a drive": table, "the same": table}, {"a drive": history[-1]})
+    assert [axes.get_ylabel() for axes in figure.axes[::2]] == ["x (m)", "y (m)", "yaw (deg)"]
+    for axes in figure.axes[1::2]:
+        low, high = axes.get_ylim()
+        assert high / low < 10.0**6
 
 
 def write_log(folder: Path, drive: SimulatedDrive) -> tuple[Path, Path]:
@@ -237,9 +242,11 @@ def test_the_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None
     printed = capsys.readouterr().out
     assert "static_transform_publisher" in printed
     found = json.loads(out.read_text())
-    assert found["whole_log"]["mounting"]["rho_m"] == pytest.approx(0.23, abs=0.02)
-    assert found["options"]["step_sigma_m"] == 1e-4
-    assert found["options"]["step_sigma_rad"] == pytest.approx(math.radians(0.01))
+    (log,) = found["logs"]
+    assert log["whole_log"]["mounting"]["rho_m"] == pytest.approx(0.23, abs=0.02)
+    assert log["options"]["step_sigma_m"] == 1e-4
+    assert log["options"]["step_sigma_rad"] == pytest.approx(math.radians(0.01))
+    assert found["extrinsics"]["not_known"] == ["z", "roll", "pitch"]
     assert plot.read_bytes().startswith(b"\x89PNG")
     assert {path.name for path in tmp_path.iterdir()} == {"odometry.csv", "bearings.csv", "calib.json", "conv.png"}
     straight = simulate_drive("straight", seed=1)
@@ -254,6 +261,50 @@ def test_the_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None
     capsys.readouterr()
     assert main([*words[:5], "--method", "paper"]) == 2
     assert "from the axle" in capsys.readouterr().err
+
+
+@pytest.mark.slow
+def test_several_logs_of_one_robot(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    tables: list[str] = []
+    for seed in (1, 2):
+        folder = tmp_path / f"{seed}"
+        folder.mkdir()
+        tables += map(str, write_log(folder, simulate_drive("alternating", seed=seed)))
+    camera = tiltvp.Camera.equidistant(width=64, height=48, focal_px=20.0, cx=31.5, cy=23.5)
+    robot, found = tmp_path / "robot.toml", tmp_path / "found.toml"
+    wheels = Wheels(wheel_base_m=0.4)
+    tiltvp.Robot(camera, np.eye(3), covariance_rad2=np.diag([1e-6, 1e-6]), wheels=wheels).save(robot)
+    words = [*tables, "--camera", str(robot), "--robot-out", str(found), "--start", "0.2", "0", "0"]
+    assert main(["calibrate", *words, "--height", "0.3"]) == 0
+    printed = capsys.readouterr().out
+    assert "x, y and yaw of 2 logs" in printed
+    assert "they agree" in printed
+    read = tiltvp.Robot.load(found)
+    assert read.height_m == 0.3
+    assert read.place_m == pytest.approx((0.2168, -0.0767), abs=0.003)
+    assert read.covariance is not None
+    assert read.covariance[0, 0] > 0.0
+    assert read.wheels == wheels
+    # Nothing is written of logs that contradict one another: the camera was turned between them.
+    log = tmp_path / "2" / "bearings.csv"
+    lines = [line.split(",") for line in log.read_text().splitlines()]
+    turned = [lines[0], *([step, landmark, repr(float(bearing) + 0.05)] for step, landmark, bearing in lines[1:])]
+    log.write_text("".join(",".join(row) + "\n" for row in turned))
+    found.unlink()
+    assert main(["calibrate", *words]) == 1
+    printed = capsys.readouterr()
+    assert "contradict one another" in printed.out
+    assert "not written" in printed.err
+    assert not found.exists()
+    assert main(["calibrate", *words, "--anyway"]) == 1
+    assert tiltvp.Robot.load(found).covariance is None
+    # A robot's file of which roll and pitch are not known is not complete.
+    tiltvp.Robot(camera, np.eye(3), wheels=wheels).save(tmp_path / "bare.toml")
+    words[words.index(str(robot))] = str(tmp_path / "bare.toml")
+    words[words.index(str(found))] = str(tmp_path / "more.toml")
+    assert main(["calibrate", *tables[:2], *words[4:]]) == 0
+    assert "roll and pitch were not measured" in capsys.readouterr().err
+    assert not (tmp_path / "more.toml").exists()
 
 
 @pytest.mark.parametrize(

@@ -105,7 +105,7 @@ def test_calibrate(run: Run, world: Path) -> None:
     done = run("calibrate", "wheels.csv", "bearings.csv", *words)
     assert (done.returncode, done.stderr) == (0, "")
     assert "static_transform_publisher" in done.stdout
-    assert json.loads((world / "mounting.json").read_text())["whole_log"]
+    assert json.loads((world / "mounting.json").read_text())["logs"][0]["whole_log"]
 
 
 def test_corner(run: Run, world: Path) -> None:

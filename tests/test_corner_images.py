@@ -251,6 +251,74 @@ def test_estimators_go_on_where_they_were(method: str, faces: dict[str, tuple[in
     assert estimator != again[0]
 
 
+def test_the_published_method_stands_beside_ours() -> None:
+    """The paper's lines of midpoints, eq. 27, its closed form, and the middle between two lines of sight."""
+    images, (rotation, vertex) = pair(COLOURS), pose()
+    published = CornerPoseEstimator(CAMERA, CAMERA, LEFT_FROM_RIGHT, method="paper")
+    estimate = published(*images)
+    assert estimate.pose is not None
+    assert estimate.pose.right_handed
+    assert off_deg(estimate.pose.camera_from_object, rotation) < 1.0
+    assert np.linalg.norm(estimate.pose.vertex_m - vertex) < 0.02
+    # The attitude is the left view's own, by the closed form and nothing else.
+    [feature] = CornerDetector(CAMERA, method="paper")(images[0])
+    own = [attitude.camera_from_object for attitude in tiltvp.corner.attitudes(feature)]
+    assert min(np.abs(one - estimate.pose.camera_from_object).max() for one in own) == 0.0
+    # The vertex is equally far from both lines of sight.
+    [other] = CornerDetector(CAMERA, method="paper")(images[1])
+    seen = [np.cross(estimate.pose.vertex_m - at, one.vertex) for at, one in
+            ((np.zeros(3), feature), (LEFT_FROM_RIGHT[:3, 3], other))]  # fmt: skip
+    assert np.allclose(seen[0], -seen[1] * np.sign(seen[0] @ -seen[1]), atol=1e-3)
+    assert np.isclose(np.linalg.norm(seen[0]), np.linalg.norm(seen[1]), rtol=1e-9)
+    assert CornerPoseEstimator(CAMERA, method="paper")(images[0]).reason.startswith("several hypotheses")
+    assert CornerPoseEstimator(CAMERA, method="paper", down=rotation[:, 1])(images[0])
+    with pytest.raises(InvalidInputError, match=r"mask.*paper.*general"):
+        CornerDetector(CAMERA, method="paper", mask=np.ones((360, 480), np.bool_))
+
+
+def test_a_known_height_places_one_camera() -> None:
+    """How well covariances are met is measured on rendered frames, in test_corner_measures.py."""
+    for k in range(0, 20, 4):
+        rotation, vertex = pose(yaw=25.0 + 2.0 * k, pitch=20.0 + 1.3 * k, roll=-8.0 + k)
+        above = float(rotation[:, 1] @ vertex)
+        image = drawn(rotation, vertex, COLOURS, fine=4)
+        exact, measured = (
+            CornerPoseEstimator(CAMERA, camera_height_m=above, camera_height_sigma_m=sigma)(image).pose
+            for sigma in (0.0, 0.005)
+        )
+        assert exact is not None
+        assert measured is not None
+        assert np.linalg.norm(exact.vertex_m - vertex) < 0.03 * np.linalg.norm(vertex)
+        # A height that is wrong moves the vertex along its line of sight, and does nothing to the attitude.
+        upright = exact.camera_from_object[:, 1]
+        assert np.isclose(upright @ exact.vertex_m, above)
+        seen = np.zeros(6)
+        seen[3:] = exact.vertex_m * 0.005 / above
+        assert np.allclose(measured.covariance - exact.covariance, np.outer(seen, seen), atol=1e-15)
+        assert np.linalg.eigvalsh(exact.covariance).min() > -1e-15
+
+
+def test_what_a_height_does_not_tell() -> None:
+    rotation, vertex = pose()
+    image = drawn(rotation, vertex, COLOURS)
+    above = float(rotation[:, 1] @ vertex)
+    for known in ({}, {"camera_height_m": above, "down": -rotation[:, 1]}, {"camera_height_m": 500.0}):
+        estimate = CornerPoseEstimator(CAMERA, **known)(image)
+        assert estimate
+        assert estimate.pose.vertex_m is None
+        assert not estimate.pose.covariance[3:].any()
+    # Which edge of a grey corner is the upright one is not known without the direction down.
+    grey = drawn(rotation, vertex, GREYS)
+    down = {"down": rotation[:, 1], "right_handed": True}
+    assert CornerPoseEstimator(CAMERA, method="general", camera_height_m=above, **down)(grey).pose.vertex_m is not None
+    unknown = CornerPoseEstimator(CAMERA, method="general", camera_height_m=above, right_handed=True)(grey)
+    assert all(one.vertex_m is None for one in unknown.hypotheses)
+    with pytest.raises(InvalidInputError, match=r"camera_height_m.*two cameras"):
+        CornerPoseEstimator(CAMERA, CAMERA, LEFT_FROM_RIGHT, camera_height_m=1.0)
+    with pytest.raises(InvalidInputError, match="camera_height_m"):
+        CornerPoseEstimator(CAMERA, camera_height_m=0.0)
+
+
 def test_rigs_come_back_from_disk(tmp_path: Path) -> None:
     rig = StereoRig(CAMERA, CAMERA, LEFT_FROM_RIGHT)
     rig.save(tmp_path / "rig.toml")
@@ -287,3 +355,55 @@ def test_the_command_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) ->
     assert (tmp_path / "plot.png").exists()
     assert main(["corner", left, "--calibration", str(tmp_path / "one.toml"), "--out", str(out), "--overwrite"]) == 0
     assert main(["corner", left, right, "--calibration", str(tmp_path / "one.toml")]) == 2
+
+
+def test_the_command_line_chooses_the_method(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    StereoRig(CAMERA, CAMERA, LEFT_FROM_RIGHT).save(tmp_path / "rig.toml")
+    for faces, name in ((COLOURS, "colours"), (GREYS, "greys"), (dict.fromkeys(GREYS, (150, 150, 150)), "nothing")):
+        for side, image in zip(("left", "right"), pair(faces), strict=True):
+            tiltvp.write_image(tmp_path / name / side / "a.png", image)
+
+    def run(name: str, *words: str) -> str:
+        sides = [str(tmp_path / name / side) for side in ("left", "right")]
+        assert main(["corner", *sides, "--calibration", str(tmp_path / "rig.toml"), *words]) == 0
+        return capsys.readouterr().out
+
+    assert "1 with a pose (the coloured cuboid)" in run("colours")
+    assert "1 with a pose (corners of straight edges)" in run("greys", "--pitch", "-28", "--right-handed")
+    assert "1 with a pose (the coloured cuboid, as published)" in run("colours", "--method", "paper")
+    assert "1 with a pose (corners of straight edges)" in run("colours", "--gradient-min", "50", "--right-handed")
+    said = run("nothing")
+    assert "0 with a pose" in said
+    assert "without a pose: no corner in the left image (1)" in said
+    assert "looked for the coloured cuboid, else corners of straight edges" in said
+    assert "try: " in said
+    assert "--method general" in run("greys", "--method", "coloured")
+
+
+@pytest.mark.parametrize(
+    ("words", "complaint"),
+    [
+        (["--method", "colour"], "--method 'colour', expected auto, coloured, general or paper"),
+        (
+            ["--gradient-min", "50", "--faces", "rgb"],
+            "--method auto with --faces (of coloured and paper), --gradient-min (of general)",
+        ),
+        (["--method", "coloured", "--mask", "mask.png"], "--method coloured with --mask (of general)"),
+        (["--pitch", "3", "--down", "0", "1", "0"], "--pitch and --down"),
+        (["--topic-right", "/right"], "--topic-right"),
+        (["--trajectory", "t.txt"], "--camera-height-m"),
+    ],
+)
+def test_impossible_combinations_are_refused_at_once(
+    words: list[str],
+    complaint: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    CAMERA.save("one.toml")
+    tiltvp.write_image(tmp_path / "mask.png", np.full((360, 480), 255, np.uint8))
+    # There is no such image: what is wrong with the words is said before it is looked for.
+    assert main(["corner", "none.png", "--calibration", "one.toml", *words]) == 2
+    assert complaint in capsys.readouterr().err

@@ -62,6 +62,16 @@ def test_poses_of_the_cuboid_are_close(measured: tuple[pl.DataFrame, pl.DataFram
     assert summary["attitude rms deg"] < 0.2
     assert summary["position rms mm"] < 10.0
     assert set(inertial["method"]) >= {"image", "gyroscope + image", "gyroscope + accelerometer, Mahony"}
+    assert summary["method"] == "coloured"
+    published, alone = summarise_corners(table).slice(1).iter_rows(named=True)
+    assert (published["method"], published["flips"]) == ("paper", 0)
+    assert 2.0 * summary["attitude rms deg"] < published["attitude rms deg"] < 1.0
+    assert alone["method"] == "coloured, one camera, height known"
+    assert alone["found"] == 1.0
+    # 5 mm of a height of half a metre are 1 %.
+    assert alone["% of distance"] < 2.0
+    # Means of 12 chi-squares of 6 are above 11 for one seed in 1,000,000; frames err together a little.
+    assert max(summary["NEES of 6"], published["NEES of 6"], alone["NEES of 6"]) < 11.0
     found = table.filter("found")
     angles = found.select((pl.col("roll_deg") ** 2 + pl.col("pitch_deg") ** 2 + pl.col("yaw_deg") ** 2).sqrt())
     assert np.allclose(angles.to_series(), found["attitude_deg"])

@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 import copy
+import json
+import math
 import pickle
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
 import tiltvp
-from tiltvp.errors import InvalidInputError
+from tiltvp.cli import main
+from tiltvp.errors import CalibrationError, InvalidInputError
 from tiltvp.synth import RoomImage
 
 PAPERS = [method for method in tiltvp.METHODS if method not in ("refined", "segments")]
@@ -134,3 +138,61 @@ def test_the_prefilter_follows_the_lens() -> None:
             tiltvp.TiltEstimator(small, method=method, offset_max_px=40.0)
         with pytest.raises(InvalidInputError, match="correction = 1"):
             tiltvp.TiltEstimator(paper, method=method, correction=1.0)
+
+
+@pytest.mark.parametrize("kind", tiltvp.corrections.CORRECTION_KINDS)
+def test_a_trained_correction_is_a_file(camera: tiltvp.Camera, tmp_path: Path, kind: str) -> None:
+    estimator = tiltvp.TiltEstimator(camera, method="image-space-ransac", correction=None, threshold_px=8.0)
+    shift, alpha = draws()
+    trained = tiltvp.train_correction(estimator, [*shift, math.nan], [*alpha, 0.1], kind=kind)
+    assert (trained.kind, trained.images, trained.options["threshold_px"]) == (kind, len(shift), 8.0)
+    path = tmp_path / "correction.toml"
+    trained.save(path)
+    read = tiltvp.TrainedCorrection.load(path)
+    assert read == trained
+    options = read.estimator_options(camera, {"threshold_px": 8.0, "seed": 3}, None)
+    made = tiltvp.TiltEstimator(camera, **options)
+    assert (made.method, made.options["correction"]) == ("image-space-ransac", trained.correction)
+    for told, others in (
+        ("trained at 8.0", (camera, {"threshold_px": 9.0}, None)),
+        ("tilt_max_rad = 0.1", (camera, {"tilt_max_rad": 0.1}, None)),
+        ("method vector-consensus", (camera, {}, "vector-consensus")),
+        ("another camera", (camera.scaled(0.5), {}, None)),
+    ):
+        with pytest.raises(InvalidInputError, match=told):
+            read.estimator_options(*others)
+    text = path.read_text()
+    for old, new in (
+        ("version = 1", "version = 2"), (f'kind = "{kind}"', 'kind = "line"'), ("factor = ", "faktor = "),
+        ("tiltvp-correction", "tiltvp-camera"),
+    ):  # fmt: skip
+        path.write_text(text.replace(old, new))
+        with pytest.raises(CalibrationError, match=str(path)):
+            tiltvp.TrainedCorrection.load(path)
+
+
+def test_what_has_no_correction_is_refused(camera: tiltvp.Camera) -> None:
+    with pytest.raises(InvalidInputError, match="no correction"):
+        tiltvp.train_correction(tiltvp.TiltEstimator(camera), *draws())
+    estimator = tiltvp.TiltEstimator(camera, method="vector-consensus", correction=None)
+    with pytest.raises(InvalidInputError, match="expected one of"):
+        tiltvp.train_correction(estimator, *draws(), kind="line")
+
+
+def test_a_correction_is_trained_and_read_on_the_command_line(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    data, out = tmp_path / "set", tmp_path / "correction.toml"
+    size = ["--rooms", "1", "--locations-per-room", "2", "--samples", "1"]
+    assert main(["dataset", "synth", *size, "--out", str(data)]) == 0
+    assert main(["lab", "train", str(data), "--out", str(out), "--kind", "affine"]) == 0
+    assert "trained on" in capsys.readouterr().out
+    camera, image = str(data / "camera.toml"), str(next(data.rglob("*.png")))
+    assert main(["tilt", image, "--camera", camera, "--correction", str(out), "--out", str(tmp_path / "a.json")]) == 0
+    trained = tiltvp.TrainedCorrection.load(out)
+    estimator = tiltvp.TiltEstimator(trained_camera := tiltvp.Camera.load(camera), **trained.estimator_options(
+        trained_camera, {}, None))  # fmt: skip
+    (row,) = json.loads((tmp_path / "a.json").read_text())
+    assert row["alpha_rad"] == pytest.approx(estimator(tiltvp.read_image(image)).alpha_rad, abs=1e-12)
+    assert main(["tilt", image, "--camera", camera, "--correction", str(out), "--method", "vector-consensus"]) == 2
+    assert "expected image-space-ransac" in capsys.readouterr().err

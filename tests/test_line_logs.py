@@ -78,7 +78,6 @@ def test_calibrate_from_images(folder: Path, tmp_path: Path, capsys: pytest.Capt
     out, tracks = tmp_path / "found.json", tmp_path / "tracks.csv"
     words = [
         "calibrate",
-        "--images",
         str(folder / "images"),
         "--camera",
         str(folder / "camera.toml"),
@@ -90,12 +89,20 @@ def test_calibrate_from_images(folder: Path, tmp_path: Path, capsys: pytest.Capt
     assert main([*words, *odometry, *start, "--out", str(out), "--tracks", str(tracks)]) in (0, 1)
     found = json.loads(out.read_text())
     table = pl.read_csv(tracks)
-    assert found["options"]["bearing_sigma_rad"] == pytest.approx(table["sigma_rad"].median())
+    (log,) = found["logs"]
+    assert log["options"]["bearing_sigma_rad"] == pytest.approx(table["sigma_rad"].median())
     kept = table.filter(pl.len().over("track") >= 3)
-    assert found["whole_log"]["bearings"] == kept.height > 100
+    assert log["whole_log"]["bearings"] == kept.height > 100
     assert "bearings of" in capsys.readouterr().out
-    for missing, given in (("--odometry", []), ("one of them", [*odometry, "log.csv"])):
-        assert main([words[0], *given[2:], *words[1:], *given[:2]]) == 2
-        assert missing in capsys.readouterr().err
-    assert main(["calibrate", "--wheel-base", "0.35"]) == 2
-    assert "no log of bearings" in capsys.readouterr().err
+    alone = tmp_path / "images"
+    alone.symlink_to(folder / "images")
+    for told, wrong in (
+        ("expected --odometry", [words[0], str(alone), *words[2:]]),
+        ("without another one", [*words[:2], "log.csv", *words[2:], *odometry]),
+        ("expected one log", [*words[:2], *words[1:], *odometry]),
+        ("--wheel-base", [*words[:-2], *odometry]),
+        ("without --camera", [*words[:2], *words[-2:]]),
+        ("expected the folder", ["calibrate", str(next((folder / "images").iterdir())), *words[2:]]),
+    ):
+        assert main(wrong) == 2
+        assert told in capsys.readouterr().err

@@ -15,12 +15,12 @@ import yaml
 from rosbags.highlevel import AnyReader
 
 import tiltvp
+from tiltvp import Camera, Extrinsics, Robot
 from tiltvp._core import leaning_from_upright
 from tiltvp.cli import main
 from tiltvp.errors import InvalidInputError, MissingExtraError, OutputError
 from tiltvp.lab.datasets.panoramas import paper_camera
 from tiltvp.rotations import read_rotation
-from tiltvp.selfcalib import static_transform
 from tiltvp.streams.outputs.tilts import TILT_TOPIC, YAW_VARIANCE_RAD2, attitude, write_tilts
 from tiltvp.streams.outputs.transforms import StaticTransform
 from tiltvp.synth import render_room, simulate_drive
@@ -149,15 +149,17 @@ def test_nothing_is_left_where_writing_fails(tmp_path: Path) -> None:
 
 
 TURN = read_rotation("forward")
+CAMERA = Camera.equidistant(width=64, height=48, focal_px=20.0, cx=31.5, cy=23.5)
 
 
-@pytest.mark.parametrize("ending", [".mcap", ".urdf", ".yaml"])
+@pytest.mark.parametrize("ending", [".mcap", ".urdf", ".yaml", ".kalibr.yaml"])
 def test_a_mounting_comes_back_from_its_file(tmp_path: Path, ending: str) -> None:
     drive = simulate_drive("alternating", seed=4)
-    calibrator = tiltvp.SelfCalibrator(wheel_base_m=0.4, start=(0.2, 0.0, 0.0), start_sigma=(0.2, 0.2, 0.6))
-    e = calibrator.follow(drive.odometry, drive.bearings)[-1]
+    whole = tiltvp.calibrate(drive.odometry, drive.bearings, wheel_base_m=0.4, start=(0.2, 0.0, 0.0))
+    e, lean = whole.mounting, np.diag([4e-6, 1e-6])
     path = tmp_path / f"camera{ending}"
-    static_transform(e, z_m=0.3, robot_from_camera=TURN).write(path)
+    robot = Robot(CAMERA, TURN, covariance_rad2=lean)
+    Extrinsics.of(whole, robot, height_m=0.3).transform().write(path)
     c, s = math.cos(e.yaw_rad), math.sin(e.yaw_rad)
     rotation = np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]]) @ TURN
     if ending == ".yaml":
@@ -167,6 +169,15 @@ def test_a_mounting_comes_back_from_its_file(tmp_path: Path, ending: str) -> Non
         )
         assert tree["not_known"] == []
         assert tree["sigma"]["yaw"] == pytest.approx(math.sqrt(e.covariance_xy_yaw[2, 2]), abs=1e-6)
+        covariance = np.array(tree["covariance"])
+        assert tree["covariance_axes"] == ["x", "y", "roll", "pitch", "yaw"]
+        np.testing.assert_allclose(covariance[:2, 4], e.covariance_xy_yaw[:2, 2], rtol=1e-5)
+        np.testing.assert_allclose(np.trace(covariance[2:4, 2:4]), np.trace(lean), rtol=1e-5)
+    elif ending == ".kalibr.yaml":
+        camera_from_robot = np.array(yaml.safe_load(path.read_text())["cam0"]["T_cam_imu"])
+        robot_from_camera = np.linalg.inv(camera_from_robot)
+        np.testing.assert_allclose(robot_from_camera[:3, :3], rotation, atol=1e-8)
+        np.testing.assert_allclose(robot_from_camera[:3, 3], [e.x_m, e.y_m, 0.3], atol=1e-8)
     elif ending == ".urdf":
         joint = ET.fromstring(f"<robot>{path.read_text()}</robot>").find("joint")
         assert joint is not None
@@ -205,15 +216,15 @@ def test_roll_pitch_yaw_are_those_of_urdf(angles: tuple[float, float, float]) ->
 
 def test_what_is_not_known_is_said() -> None:
     drive = simulate_drive("paper", seed=4)
-    e = tiltvp.calibrate(drive.odometry, drive.bearings, wheel_base_m=0.4).mounting
-    transform = static_transform(e)
+    whole = tiltvp.calibrate(drive.odometry, drive.bearings, wheel_base_m=0.4)
+    transform = Extrinsics.of(whole).transform()
     assert transform.child == "camera_mount"
     for text in (transform.urdf_joint(), transform.yaml(), transform.note):
         assert "not known, and set to 0: z, roll, pitch" in text
     assert yaml.safe_load(transform.yaml())["not_known"] == ["z", "roll", "pitch"]
-    assert static_transform(e, z_m=0.2, robot_from_camera=TURN).note == ""
+    assert Extrinsics.of(whole, height_m=0.2, robot_from_camera=TURN).transform().note == ""
     with pytest.raises(InvalidInputError, match="child"):
-        static_transform(e, child="a; b")
+        Extrinsics.of(whole).transform(child="a; b")
 
 
 @pytest.fixture(scope="module")

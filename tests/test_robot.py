@@ -43,6 +43,17 @@ def test_what_is_written_is_read(tmp_path):
     assert sorted(file.name for file in tmp_path.iterdir()) == ["robot-mask.png", "robot.toml"]
 
 
+def test_where_the_camera_is_comes_back_too(tmp_path):
+    path = tmp_path / "robot.toml"
+    covariance = np.diag([1e-6, 2e-6, 3e-6, 4e-6, 5e-6])
+    robot(place_m=(0.1, 0.02), height_m=0.4, covariance_rad2=None, covariance=covariance).save(path)
+    read = Robot.load(path)
+    assert (read.place_m, read.height_m) == ((0.1, 0.02), 0.4)
+    np.testing.assert_array_equal(read.covariance, covariance)
+    np.testing.assert_array_equal(read.covariance_rad2, np.diag([3e-6, 4e-6]))
+    assert "covariance_rad2" not in path.read_text()
+
+
 def test_a_robot_of_which_little_is_known(tmp_path):
     path = tmp_path / "robot.toml"
     Robot(CAMERA, np.eye(3)).save(path)
@@ -95,6 +106,9 @@ def test_what_cannot_be_is_refused(tmp_path, old, new, told):
         {"covariance_rad2": np.diag([1.0, -1.0])},
         {"covariance_rad2": np.full((2, 2), math.nan)},
         {"topics": {"image": "/x"}},
+        {"place_m": (0.1, math.nan)},
+        {"covariance": np.eye(5)},
+        {"place_m": (0.1, 0.2), "covariance": np.eye(4)},
     ],
 )
 def test_a_robot_that_cannot_be(values):

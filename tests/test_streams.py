@@ -84,6 +84,21 @@ def test_what_else_a_bag_tells(bag: Path) -> None:
         robot_from_camera(recording, camera_frame="lidar")
 
 
+def test_the_camera_of_a_region_that_is_binned(tmp_path: Path) -> None:
+    made = Bag("mcap")
+    made.camera_info(START_S, 640, 480, "", [], [300.0, 0, 319.5, 0, 300, 239.5, 0, 0, 1], (2, 2), (100, 40, 401, 501))
+    camera = recorded_camera(Recording(made.write(tmp_path)))
+    whole = tiltvp.Camera.pinhole(width=640, height=480, fx=300.0, fy=300.0, cx=319.5, cy=239.5)
+    assert (camera.width, camera.height) == (250, 200)
+    # The first bin is of the pixels 100 and 101 of the sensor's columns, 40 and 41 of its rows.
+    np.testing.assert_allclose(camera.unproject([0.0, 0.0]), whole.unproject([100.5, 40.5]), atol=1e-12)
+    odd = Bag("mcap")
+    odd.camera_info(START_S, 8, 6, "", [], [5.0, 0, 4, 0, 5, 3, 0, 0, 1], (2, 1))
+    (tmp_path / "odd").mkdir()
+    with pytest.raises(CalibrationError, match="binned 2 x 1"):
+        recorded_camera(Recording(odd.write(tmp_path / "odd")))
+
+
 def test_single_files_of_ros_2_bags_are_read_too(bag: Path) -> None:
     for file in (*bag.glob("*.mcap"), *bag.glob("*.db3")):
         assert [frame.read()[0, 0] for frame in open_frames(file)] == list(range(20))

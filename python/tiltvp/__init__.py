@@ -15,8 +15,10 @@ from tiltvp.corrections import (
     AffineCorrection,
     PosteriorCorrection,
     PriorOfTilt,
+    TrainedCorrection,
     apply_correction,
     train_affine,
+    train_correction,
     train_factor,
     train_posterior,
 )
@@ -54,6 +56,7 @@ from tiltvp.tilt import (
 
 if TYPE_CHECKING:
     from tiltvp import corner, streams, synth
+    from tiltvp.extrinsics import Extrinsics, JoinedLogs, JoinedTilts, join_logs, join_tilts
     from tiltvp.mounting import MountingTilt, mounting_tilt
     from tiltvp.robot import Robot
     from tiltvp.robot_setup import RobotSetup, find_setup
@@ -71,11 +74,14 @@ __all__ = [
     "CommonDirection",
     "ComplementaryFilter",
     "EdgeElements",
+    "Extrinsics",
     "FilterStep",
     "FilteredTilt",
     "FitReport",
     "FrameDelay",
     "ImageEdges",
+    "JoinedLogs",
+    "JoinedTilts",
     "Leveller",
     "LogCalibration",
     "MountingEstimate",
@@ -91,6 +97,7 @@ __all__ = [
     "TiltEstimate",
     "TiltEstimator",
     "TiltFilter",
+    "TrainedCorrection",
     "TurnCheck",
     "Unwrapper",
     "apply_correction",
@@ -104,6 +111,8 @@ __all__ = [
     "draw_segments",
     "find_setup",
     "frame_delay",
+    "join_logs",
+    "join_tilts",
     "level",
     "lines",
     "mounting_tilt",
@@ -116,6 +125,7 @@ __all__ = [
     "tilt_error_rad",
     "tilt_from_wheel_heights",
     "train_affine",
+    "train_correction",
     "train_factor",
     "train_posterior",
     "wheel_displacements",
@@ -125,9 +135,10 @@ __all__ = [
 
 _MODULES = ("corner", "streams", "synth")
 _HOMES = {
-    "FrameDelay": "turning", "MountingTilt": "mounting", "Robot": "robot", "RobotSetup": "robot_setup",
-    "TurnCheck": "turning", "check_turns": "turning", "find_setup": "robot_setup", "frame_delay": "turning",
-    "mounting_tilt": "mounting",
+    "Extrinsics": "extrinsics", "FrameDelay": "turning", "JoinedLogs": "extrinsics", "JoinedTilts": "extrinsics",
+    "MountingTilt": "mounting", "Robot": "robot", "RobotSetup": "robot_setup", "TurnCheck": "turning",
+    "check_turns": "turning", "find_setup": "robot_setup", "frame_delay": "turning", "join_logs": "extrinsics",
+    "join_tilts": "extrinsics", "mounting_tilt": "mounting",
 }  # fmt: skip
 
 

@@ -498,18 +498,18 @@ class CornerDetector:
         cls,
         camera: Camera,
         *,
-        method: Literal["coloured", "general"] | str = ...,
+        method: Literal["coloured", "general", "paper"] | str = ...,
         mask: NDArray[np.bool_] | None = None,
         display_gamma: float = ...,
         chromaticity_min: float = ...,
         intensity_min: SupportsIndex = ...,
         faces: str = ...,
         orientation: Literal["either", "upright", "upside-down"] = ...,
-        label_step_px: SupportsIndex = ...,
         search_width_px: SupportsIndex = ...,
         candidates_min: SupportsIndex = ...,
         line_threshold_px: float = ...,
         seed: SupportsIndex = ...,
+        label_step_px: SupportsIndex = ...,
         search_px: float = ...,
         refine_px: float = ...,
         step_min: float = ...,
@@ -532,6 +532,7 @@ class CornerDetector:
         support_min_share: float = ...,
         guided_min_share: float = ...,
         corners_max: SupportsIndex = ...,
+        line_sigma_px: float = ...,
     ) -> Self:
         """The options, by keyword.
 
@@ -540,26 +541,27 @@ class CornerDetector:
         display_gamma
             The exponent of the images' display curve, `level = light^(1 / gamma)`; 1 for linear images. Default: 2.2.
         chromaticity_min
-            "coloured": Least share of the face's own primary in the sum of all three. Default: 0.45.
+            "coloured", "paper": Least share of the face's own primary in the sum of all three. Default: 0.45.
         intensity_min
-            "coloured": Least value of the face's own primary, out of 255. Default: 50.
+            "coloured", "paper": Least value of the face's own primary, out of 255. Default: 50.
         faces
-            "coloured": Colours of the top, the left and the right face as an upright camera sees them, by their
-            letters. Default: "rgb".
+            "coloured", "paper": Colours of the top, the left and the right face as an upright camera sees them, by
+            their letters. Default: "rgb".
         orientation
-            "coloured": Which way the camera is held. Default: "either".
+            "coloured", "paper": Which way the camera is held. Default: "either".
+        search_width_px
+            "coloured", "paper": How far apart the faces on both sides of an edge are looked for, in pixels (the paper's
+            search width). The default depends on the method.
+        candidates_min
+            "coloured", "paper": Least number of candidates of each edge, if every pixel were labelled. Default: 40.
+        line_threshold_px
+            "coloured", "paper": Largest distance of a candidate from the line that RANSAC fits, in pixels. The default
+            depends on the method.
+        seed
+            "coloured", "paper": Seed of the random samples. Default: 0.
         label_step_px
             "coloured": Every how many-th pixel is labelled, along rows and columns; the rays are fitted to all pixels
             whatever it is. The paper's is 1. Default: 2.
-        search_width_px
-            "coloured": How far apart the faces on both sides of an edge are looked for, in pixels (the paper's search
-            width). Default: 8.
-        candidates_min
-            "coloured": Least number of candidates of each edge, if every pixel were labelled. Default: 40.
-        line_threshold_px
-            "coloured": Largest distance of a candidate from the line that RANSAC fits, in pixels. Default: 1.5.
-        seed
-            "coloured": Seed of the random samples. Default: 0.
         search_px
             "coloured": How far from the candidates' line the edge is looked for, in pixels. Default: 4.
             "general": How far from a segment the edge is looked for, in pixels. Default: 2.5.
@@ -569,14 +571,15 @@ class CornerDetector:
             "coloured": Least step across an edge in the light of the two faces' primaries, out of 255. Default: 8.
             "general": Least step across an edge, in the light of grey levels out of 255. Default: 1.
         threshold_px
-            Largest distance of a place of the edge from its ray, in pixels. The default depends on the method.
+            "coloured", "general": Largest distance of a place of the edge from its ray, in pixels. The default depends
+            on the method.
         ray_sigma_px
             "coloured": What places of an edge do not tell: how far either end of a ray may be off, in pixels. Default:
             0.01.
             "general": What places of an edge do not tell, as real edges are bevelled and worn: how far either end of a
             ray may be off, in pixels. Default: 0.2.
         support_min_px
-            Least number of places that agree with a ray. The default depends on the method.
+            "coloured", "general": Least number of places that agree with a ray. The default depends on the method.
         residual_max_px
             Largest root mean square distance of the vertex from the three rays, in pixels. The default depends on the
             method.
@@ -611,6 +614,9 @@ class CornerDetector:
             "general": The same for a corner that is looked for near where it is expected. Default: 0.4.
         corners_max
             "general": Most corners of an image, the best ones. Default: 12.
+        line_sigma_px
+            "paper": How far colours and blur may shift all midpoints of an edge alike, in pixels: a standard deviation.
+            Default: 0.35.
         """
 
     def _detect_color(self, image: NDArray[np.uint8]) -> list[CornerFeature]:
@@ -784,12 +790,12 @@ class CornerHypothesis:
 
     @property
     def camera_in_object_m(self) -> NDArray[np.float64] | None:
-        """Fresh (3,) float64: where the left camera is in the object's frame, metres; None from one image."""
+        """Fresh (3,) float64: where the left camera is in the object's frame, metres; None where `vertex_m` is."""
 
     @property
     def covariance(self) -> NDArray[np.float64]:
         """Fresh (6, 6) float64: covariance of the attitude's rotation vector (left camera's frame, radians) and of the
-        vertex (metres; zero from one image).
+        vertex (metres; zero where that is None).
         """
 
     @property
@@ -819,7 +825,9 @@ class CornerHypothesis:
 
     @property
     def vertex_m(self) -> NDArray[np.float64] | None:
-        """Fresh (3,) float64: the vertex in the left camera's frame, metres; None from one image."""
+        """Fresh (3,) float64: the vertex in the left camera's frame, metres; None from one image without
+        `camera_height_m`.
+        """
 
 @final
 class CornerPose:
@@ -909,6 +917,8 @@ class CornerPoseEstimator:
         misfit_max: float = ...,
         distance_min_m: float = ...,
         distance_max_m: float = ...,
+        camera_height_m: float | None = ...,
+        camera_height_sigma_m: float = ...,
         probability_min: float = ...,
     ) -> Self:
         """The options, by keyword.
@@ -944,6 +954,12 @@ class CornerPoseEstimator:
             The least distance of a vertex, metres. Default: 0.05.
         distance_max_m
             The largest distance of a vertex, metres. Default: 100.
+        camera_height_m
+            How far one camera is above the level plane through the vertex, metres, as above the floor for a corner on
+            the floor: it tells the place. None where that is not known, and for two cameras, which tell it themselves.
+            Default: None.
+        camera_height_sigma_m
+            Standard deviation of that height, metres. Default: 0.
         probability_min
             Least probability of the best hypothesis; below it none is chosen. Default: 0.9.
         """

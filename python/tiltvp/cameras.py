@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import math
 import os
-from typing import TYPE_CHECKING, Self
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any, Final, Self
 
 from tiltvp.errors import CalibrationError, InvalidInputError
 from tiltvp.lenses import Lenses
@@ -11,7 +13,13 @@ from tiltvp.lenses import Lenses
 if TYPE_CHECKING:
     from tiltvp.formats import CameraSpec
 
-__all__ = ["Camera"]
+__all__ = ["VIEW_LENSES", "Camera"]
+
+VIEW_LENSES: Final = ("equidistant", "equisolid", "stereographic", "pinhole")
+"""Lenses that an angle and a radius determine, for `Camera.from_view`: theta, 2 sin(theta/2), 2 tan(theta/2) and
+tan(theta) times the focal length from the centre."""
+_EQUISOLID: Final = (-1.0 / 24.0, 1.0 / 1920.0, -1.0 / 322560.0, 1.0 / 92897280.0)
+"""2 sin(theta/2) as theta + k1 theta^3 + ...: at 100 degrees the next term is 7e-9."""
 
 
 class Camera(Lenses):
@@ -33,6 +41,63 @@ class Camera(Lenses):
             spec.model, width=spec.width, height=spec.height, max_theta_rad=spec.max_theta_rad, mirror=spec.mirror,
             **spec.parameters,
         )  # fmt: skip
+
+    @classmethod
+    def from_view(
+        cls, lens: str = "equidistant", *, width: int, height: int, view_rad: float, radius_px: float | None = None,
+        centre_px: tuple[float, float] | None = None, mirror: bool = False,
+    ) -> Self:  # fmt: skip
+        """A camera of an ideal lens of `VIEW_LENSES` that sees `view_rad` across 2 `radius_px` pixels.
+
+        With the centre (u, v) and the radius of the image circle it is the camera of Fleer 2017 (2.1.1), which ends at
+        the circle; without a radius the view is that across the width of the image, and the centre is that of the image
+        if none is given. How far a real lens is from its ideal it does not know: calibrate where you can. Raises
+        `InvalidInputError` for an unknown lens and for angles and lengths that cannot be.
+        """
+        if lens not in VIEW_LENSES:
+            raise InvalidInputError(f"lens = {lens!r}, expected one of {', '.join(VIEW_LENSES)}")
+        most = math.pi if lens == "pinhole" else 2.0 * math.pi
+        if not 0.0 < view_rad < most:
+            degrees = f"{math.degrees(view_rad):g} degrees"
+            raise InvalidInputError(f"view_rad: {degrees}, expected more than 0 and less than {math.degrees(most):g}")
+        radius = 0.5 * width if radius_px is None else radius_px
+        if not (math.isfinite(radius) and radius > 0.0):
+            raise InvalidInputError(f"radius_px = {radius_px}, expected a positive number of pixels")
+        cx, cy = (0.5 * (width - 1), 0.5 * (height - 1)) if centre_px is None else centre_px
+        half = 0.5 * view_rad
+        common: dict[str, Any] = {
+            "width": width, "height": height, "cx": cx, "cy": cy, "mirror": mirror,
+            "max_theta_rad": None if radius_px is None else half,
+        }  # fmt: skip
+        if lens == "equidistant":
+            return cls("equidistant", focal_px=radius / half, **common)
+        if lens == "equisolid":
+            focal = radius / (2.0 * math.sin(0.5 * half))
+            k1, k2, k3, k4 = _EQUISOLID
+            return cls("kannala_brandt", fx=focal, fy=focal, k1=k1, k2=k2, k3=k3, k4=k4, **common)
+        if lens == "stereographic":
+            # A unified camera with xi = 1 has f sin(theta) / (1 + cos(theta)) = f tan(theta/2).
+            focal = radius / math.tan(0.5 * half)
+            return cls("unified", xi=1.0, fx=focal, fy=focal, **common)
+        focal = radius / math.tan(half)
+        return cls("pinhole", fx=focal, fy=focal, **common)
+
+    def cropped(self, u: int, v: int, width: int, height: int) -> Self:
+        """The camera of a part of the image, whose first pixel is (u, v). Parts beyond the image are black borders.
+
+        Raises `InvalidInputError` for an equirectangular camera, which covers the whole sphere.
+        """
+        parameters = self.parameters
+        if not {"cx", "cy"} <= parameters.keys():
+            raise InvalidInputError(f"a part of an image of model {self.model}, expected a model with a centre")
+        moved = {"cx": float(parameters["cx"]) - u, "cy": float(parameters["cy"]) - v}
+        spec = replace(
+            self.to_spec(), width=width, height=height, parameters={**parameters, **moved}, max_theta_rad=None
+        )
+        found = type(self).from_spec(spec)
+        if self.max_theta_rad < found.max_theta_rad:
+            return type(self).from_spec(replace(spec, max_theta_rad=self.max_theta_rad))
+        return found
 
     @classmethod
     def load(

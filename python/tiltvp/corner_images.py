@@ -47,7 +47,7 @@ class CornerDetector(_core.CornerDetector):
         which of the three rays is the vertical one. Without it that is the one nearest to the image's columns. Raises
         `InvalidInputError` for an image of another size than the camera's.
         """
-        if self.method == "coloured":
+        if self.method != "general":
             return self._detect_color(bgr_from(image))
         return self._detect_gray(gray_from(image), vertical)
 
@@ -60,7 +60,8 @@ class CornerPoseEstimator(_core.CornerPoseEstimator):
     """The pose of one camera, or of a pair, before a corner: `CornerPoseEstimator(left, right, left_from_right)`.
 
     `left` and `right` are cameras or `CornerDetector`s; `left_from_right` (4, 4) is the right camera's pose in the left
-    one's frame, metres. Without `right` only the attitude is estimated. Call it with the images of one frame after the
+    one's frame, metres. Without `right` only the attitude is estimated, and with `camera_height_m`, the height of the
+    camera above the vertex, the place too. Call it with the images of one frame after the
     other: the last pose is the prior for the next one. `gamma_rad` is the angle between the corner's level edges,
     `down` (3,) the direction down in the left camera's frame as far as it is known. Other options are the
     estimator's, or those of detectors that are made here for `method`. Comparable; copies and pickles go on from the

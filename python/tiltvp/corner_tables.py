@@ -73,7 +73,9 @@ def write_trajectory(rows: Sequence[Mapping[str, Any]], path: str | os.PathLike[
     poses = [[row[name] for name in ("time_s", *_POSITION, *_QUATERNION)] for row in rows]
     placed = np.array([pose for pose in poses if None not in pose])
     if not len(placed):
-        raise InvalidInputError(f"{path}: no pose has a position, expected the images of two cameras")
+        raise InvalidInputError(
+            f"{path}: no pose has a position, expected images of two cameras, or of one with a known height"
+        )
     write_tum(path, placed[:, 0], placed[:, 1:4], placed[:, 4:], "of object_from_camera")
 
 

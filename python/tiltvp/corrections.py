@@ -2,22 +2,171 @@
 
 from __future__ import annotations
 
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, Final, Self, TypeAlias
+
 from tiltvp._core import (
+    METHODS,
     AffineCorrection,
     PosteriorCorrection,
     PriorOfTilt,
     apply_correction,
+    option_fields,
     train_affine,
     train_factor,
     train_posterior,
 )
+from tiltvp.errors import CalibrationError, InvalidInputError
+from tiltvp.files import check_output, write_whole
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from tiltvp._core import Camera
+    from tiltvp.tilt import TiltEstimator
 
 __all__ = [
+    "CORRECTION_KINDS",
     "AffineCorrection",
     "PosteriorCorrection",
     "PriorOfTilt",
+    "TrainedCorrection",
     "apply_correction",
     "train_affine",
+    "train_correction",
     "train_factor",
     "train_posterior",
 ]
+
+Correction: TypeAlias = "float | AffineCorrection | PosteriorCorrection"
+
+CORRECTION_KINDS: Final = ("posterior", "affine", "factor")
+"""What `train_correction` trains: P(alpha | l) of section 5.1 of Fleer 2017, a and b of section 4, a of eq. 30 or a' of
+eq. 45."""
+_FORMAT: Final = "tiltvp-correction"
+_VERSION: Final = 1
+_FREE: Final = ("correction", "mask", "seed", "robot_from_camera")
+"""Options that a correction does not depend on, or that it is."""
+
+
+@dataclass(frozen=True)
+class TrainedCorrection:
+    """A correction with what it was trained for: it means nothing for another method, other options or another lens."""
+
+    correction: Correction
+    method: str
+    options: dict[str, Any] = field(default_factory=dict)
+    """Options of the method, without mask and seed."""
+    camera: dict[str, Any] = field(default_factory=dict)
+    """As `Camera.to_dict` gives it."""
+    images: int = 0
+    """How many images it was trained on."""
+
+    @classmethod
+    def load(cls, path: str | os.PathLike[str]) -> Self:
+        """The correction of a file of `save`. Raises `CalibrationError` that says what was wrong and where."""
+        # Importing the package would take longer with them.
+        from tiltvp.formats.document import Document
+        from tiltvp.formats.node import Node
+
+        document = Document.load(path)
+        root = Node(document, document.toml("a file written by `tiltvp lab train`"))
+        if not root.has("format") or root.need("format").text() != _FORMAT:
+            root.fail("it is no correction", f'format = "{_FORMAT}"')
+        root.only("format", "version", "kind", "method", "images", "correction", "options", "camera")
+        version = root.need("version")
+        if version.integer() != _VERSION:
+            version.refuse(f"version {version.integer()} is not supported", f"version {_VERSION}")
+        kind, method = root.need("kind"), root.need("method")
+        if kind.text() not in CORRECTION_KINDS:
+            kind.fail(f"found {kind.text()!r}", f"one of {', '.join(CORRECTION_KINDS)}")
+        if method.text() not in METHODS:
+            method.fail(f"found {method.text()!r}", f"one of {', '.join(METHODS)}")
+        values = dict(root.need("correction").tree)
+        try:
+            made: Correction
+            match kind.text():
+                case "factor":
+                    made = root.need("correction").need("factor").number()
+                case "affine":
+                    made = AffineCorrection.from_dict(values)
+                case _:
+                    made = PosteriorCorrection.from_dict(values)
+        except CalibrationError:
+            raise
+        except (InvalidInputError, KeyError, TypeError, ValueError) as error:
+            raise CalibrationError(f"{path}: {error}, expected a {kind.text()} correction, at correction") from error
+        options, camera = dict(root.need("options").tree), dict(root.need("camera").tree)
+        return cls(made, method.text(), options, camera, root.need("images").integer())
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Writes it as TOML, whole or not at all. Raises `OutputError`."""
+        import tomli_w
+
+        check_output(path)
+        made = self.correction
+        values = {"factor": made} if isinstance(made, float) else made.to_dict()
+        tree = {
+            "format": _FORMAT, "version": _VERSION, "kind": self.kind, "method": self.method, "images": self.images,
+            "correction": values, "options": self.options, "camera": self.camera,
+        }  # fmt: skip
+        write_whole(path, tomli_w.dumps(tree))
+
+    @property
+    def kind(self) -> str:
+        """One of `CORRECTION_KINDS`."""
+        names = {AffineCorrection: "affine", PosteriorCorrection: "posterior"}
+        return names.get(type(self.correction), "factor")
+
+    def estimator_options(self, camera: Camera, given: dict[str, Any], method: str | None) -> dict[str, Any]:
+        """The keywords of an estimator that it corrects: what was given, and for the rest what it was trained with.
+
+        Raises `InvalidInputError` for another method, for an option that was given otherwise, and for another camera.
+        """
+        if method is not None and method != self.method:
+            raise InvalidInputError(f"a correction of {self.method} with the method {method}, expected {self.method}")
+        for name, value in given.items():
+            if name not in _FREE and value != (trained := self.options.get(name)):
+                raise InvalidInputError(f"{name} = {value} with a correction that was trained at {trained}")
+        if (seen := camera.to_dict()) != self.camera:
+            names = [name for name in {**seen, **self.camera} if seen.get(name) != self.camera.get(name)]
+            raise InvalidInputError(
+                f"a correction of another camera ({', '.join(sorted(names))} differ), expected that of its training"
+            )
+        return {**self.options, **given, "method": self.method, "correction": self.correction}
+
+
+def train_correction(
+    estimator: TiltEstimator,
+    measured: NDArray[np.float64] | Sequence[float],
+    alpha_rad: NDArray[np.float64] | Sequence[float],
+    *,
+    kind: str = "posterior",
+) -> TrainedCorrection:
+    """A correction of an estimator from what it measured (N,), shifts or raw angles, at known leans (N,).
+
+    NaN is an image without an estimate, which is left out. Raises `InvalidInputError` for an unknown kind, for a method
+    that has no correction, and where the images do not determine one.
+    """
+    import numpy as np
+
+    if kind not in CORRECTION_KINDS:
+        raise InvalidInputError(f"kind = {kind!r}, expected one of {', '.join(CORRECTION_KINDS)}")
+    if all(one["name"] != "correction" for one in option_fields("TiltEstimator", estimator.method)):
+        raise InvalidInputError(f"method {estimator.method} has no correction, expected one of the paper's methods")
+    shifts, leans = np.asarray(measured, dtype=np.float64), np.asarray(alpha_rad, dtype=np.float64)
+    known = np.isfinite(shifts)
+    shifts, leans = shifts[known], leans[known]
+    made: Correction
+    match kind:
+        case "factor":
+            made = train_factor(shifts[leans > 0.0], leans[leans > 0.0])
+        case "affine":
+            made = train_affine(shifts, leans)
+        case _:
+            made = train_posterior(shifts, leans)
+    options = {name: value for name, value in estimator.options.items() if name not in _FREE and value is not None}
+    return TrainedCorrection(made, estimator.method, options, estimator.camera.to_dict(), len(shifts))

@@ -58,8 +58,10 @@ class MountingTilt:
     level_floor: bool
     """Whether the floor was said to be level."""
     covariance_rad2: NDArray[np.float64]
-    """(2, 2): of the errors of the mounting about the robot's axes. To the filter's covariance, larger where images
-    disagree more than it expects, as over bumps, comes what no turn averages out."""
+    """(2, 2): of the errors of the mounting about the robot's x and y axes. To the filter's covariance, larger where
+    images disagree more than it expects, as over bumps, comes `shared_rad2`."""
+    shared_rad2: NDArray[np.float64]
+    """(2, 2): what no turn averages out, for which one image errs at all headings alike."""
 
     def __bool__(self) -> bool:
         return bool(self.lean)
@@ -135,6 +137,13 @@ def mounting_tilt(
     upright = levelling(lean.normal) @ rotation if lean else rotation
     # Of a filter that is right the mean normalised innovation squared is 2.
     excess = max(1.0, 0.5 * float(np.mean(surprises))) if surprises else 1.0
-    alike = _SHARED**2 * np.median(covariances, axis=0) if covariances else np.zeros((2, 2))
-    covariance = excess * np.asarray(lean.covariance_rad2) + alike
-    return MountingTilt(upright, lean, held.floor, len(given), used, turned, level_floor, covariance)
+    shared = _about_axes(_SHARED**2 * np.median(covariances, axis=0) if covariances else np.zeros((2, 2)))
+    covariance = _about_axes(excess * np.asarray(lean.covariance_rad2)) + shared
+    return MountingTilt(upright, lean, held.floor, len(given), used, turned, level_floor, covariance, shared)
+
+
+def _about_axes(covariance: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(2, 2): of the small turn (w_x, w_y) of a mounting, by which the normal that it sees moves by (-w_y, w_x)."""
+    turn = np.array([[0.0, 1.0], [-1.0, 0.0]])
+    turned: NDArray[np.float64] = turn @ covariance @ turn.T
+    return turned

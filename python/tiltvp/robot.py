@@ -46,12 +46,19 @@ class Robot:
     robot_from_camera: NDArray[np.float64]
     """(3, 3): rotation R of v_robot = R v_camera."""
     covariance_rad2: NDArray[np.float64] | None = None
-    """(2, 2): of the errors of the mounting about the robot's x and y axes; None where it was not measured."""
+    """(2, 2): of the errors of the mounting about the robot's x and y axes; None where it was not measured. Where
+    `covariance` is given it is that one's."""
     mask: NDArray[np.bool_] | None = None
     """(H, W): True where images show the world; None: everywhere."""
     wheels: Wheels = field(default_factory=Wheels)
     topics: dict[str, str] = field(default_factory=dict)
     """Topics of its recordings, by what they are of: images, odometry, joints, inertial."""
+    place_m: tuple[float, float] | None = None
+    """x and y of the camera in the robot's frame; None where they are not known."""
+    height_m: float | None = None
+    """Its z there, likewise."""
+    covariance: NDArray[np.float64] | None = None
+    """(5, 5): of the errors of x, y and the mounting about the robot's x, y and z axes (see `tiltvp.Extrinsics`)."""
 
     def __post_init__(self) -> None:
         rotation = rotation_from(np.asarray(self.robot_from_camera, dtype=np.float64).tolist(), "robot_from_camera")
@@ -59,8 +66,16 @@ class Robot:
         shape = (self.camera.height, self.camera.width)
         if self.mask is not None and np.shape(self.mask) != shape:
             raise InvalidInputError(f"mask: shape {np.shape(self.mask)}, expected {shape}, as the camera's images")
-        if self.covariance_rad2 is not None:
-            _check_covariance(np.asarray(self.covariance_rad2, dtype=np.float64))
+        if self.covariance is not None:
+            if self.place_m is None:
+                raise InvalidInputError("covariance: without place_m, expected both")
+            _check_covariance("covariance", np.asarray(self.covariance, dtype=np.float64), 5)
+            object.__setattr__(self, "covariance_rad2", np.asarray(self.covariance, dtype=np.float64)[2:4, 2:4])
+        elif self.covariance_rad2 is not None:
+            _check_covariance("covariance_rad2", np.asarray(self.covariance_rad2, dtype=np.float64), 2)
+        lengths = [*(self.place_m or ()), *(() if self.height_m is None else (self.height_m,))]
+        if not np.isfinite(lengths).all() or len(self.place_m or (0, 0)) != 2:
+            raise InvalidInputError(f"place_m, height_m: {self.place_m}, {self.height_m}, expected finite metres")
         for name in self.topics:
             if name not in TOPICS:
                 raise InvalidInputError(f"topics: {name!r}, expected one of {', '.join(TOPICS)}")
@@ -76,16 +91,20 @@ class Robot:
         if len(cameras) != 1:
             root.fail(f"{len(cameras)} cameras", "one [[camera]]")
         mounting = root.need("mounting")
-        mounting.only("robot_from_camera", "covariance_rad2")
-        covariance = mounting.get("covariance_rad2")
+        mounting.only("robot_from_camera", "covariance_rad2", "place_m", "height_m", "covariance")
+        place, height = mounting.get("place_m"), mounting.get("height_m")
+        lean, covariance = mounting.get("covariance_rad2"), mounting.get("covariance")
         try:
             return cls(
                 camera=Camera.from_spec(camera_from(cameras[0], None)),
                 robot_from_camera=np.reshape(mounting.need("robot_from_camera").numbers(9), (3, 3)),
-                covariance_rad2=None if covariance is None else np.reshape(covariance.numbers(4), (2, 2)),
+                covariance_rad2=None if lean is None else np.reshape(lean.numbers(4), (2, 2)),
                 mask=_mask_of(Path(path), root.get("mask")),
                 wheels=_wheels_of(root.get("wheels")),
                 topics=_topics_of(root.get("topics")),
+                place_m=None if place is None else _two(place),
+                height_m=None if height is None else height.number(),
+                covariance=None if covariance is None else np.reshape(covariance.numbers(25), (5, 5)),
             )
         except CalibrationError:
             raise
@@ -104,7 +123,13 @@ class Robot:
             write_image(picture, np.where(self.mask, 255, 0).astype(np.uint8))
             tree["mask"] = picture.name
         mounting: dict[str, Any] = {"robot_from_camera": self.robot_from_camera.tolist()}
-        if self.covariance_rad2 is not None:
+        if self.place_m is not None:
+            mounting["place_m"] = list(self.place_m)
+        if self.height_m is not None:
+            mounting["height_m"] = self.height_m
+        if self.covariance is not None:
+            mounting["covariance"] = np.asarray(self.covariance).tolist()
+        elif self.covariance_rad2 is not None:
             mounting["covariance_rad2"] = np.asarray(self.covariance_rad2).tolist()
         tree["mounting"] = mounting
         known = {name: getattr(self.wheels, name) for name in (*_WHEELS, "joints")}
@@ -164,7 +189,16 @@ def _topics_of(node: Node | None) -> dict[str, str]:
     return {key: node.need(key).text() for key in node.tree}
 
 
-def _check_covariance(covariance: NDArray[np.float64]) -> None:
-    fits = covariance.shape == (2, 2) and bool(np.isfinite(covariance).all())
-    if not fits or np.linalg.eigvalsh(0.5 * (covariance + covariance.T))[0] < 0.0:
-        raise InvalidInputError(f"covariance_rad2: {covariance.tolist()}, expected a covariance (2, 2)")
+def _two(node: Node) -> tuple[float, float]:
+    first, second = node.numbers(2)
+    return first, second
+
+
+def _check_covariance(name: str, covariance: NDArray[np.float64], size: int) -> None:
+    fits = covariance.shape == (size, size) and bool(np.isfinite(covariance).all())
+    # One that is nearly singular may by rounding have a value just below zero.
+    if fits:
+        values = np.linalg.eigvalsh(0.5 * (covariance + covariance.T))
+        fits = bool(values[0] >= -1e-9 * values[-1] and values[-1] >= 0.0)
+    if not fits:
+        raise InvalidInputError(f"{name}: {covariance.tolist()}, expected a covariance ({size}, {size})")

@@ -31,7 +31,6 @@ pub struct CalibrationStep {
 
 /// The mounting as it is known.
 #[repr(C)]
-#[expect(clippy::struct_excessive_bools, reason = "one answer for each quantity")]
 pub struct MountingEstimate {
     /// Whether it can be relied upon: everything determined, finite, no alarm, nothing suspected.
     pub reliable: bool,

@@ -14,6 +14,7 @@ use crate::pointers::{maybe_text, text};
 use crate::text::{LARGEST_TOML_BYTES, number, table};
 
 /// A calibrated camera, with the mounting that its file tells. Any number of threads may use it at once.
+#[expect(clippy::struct_field_names, reason = "the mounting's name everywhere")]
 pub struct Camera {
     pub(crate) inner: core::Camera,
     pub(crate) robot_from_camera: Option<Matrix3<f64>>,

@@ -162,7 +162,7 @@ mod tests {
             assert!(text(c"\xff".as_ptr(), "path").unwrap_err().1.contains("expected a text in UTF-8"));
             assert_eq!(text(c"a".as_ptr(), "path").unwrap(), "a");
             let numbers = [0.0f64; 2];
-            let odd = numbers.as_ptr().cast::<u8>().wrapping_add(1).cast::<f64>();
+            let odd = numbers.as_ptr().wrapping_byte_add(1);
             assert!(slice(odd, 1, "row").unwrap_err().1.contains("an odd address"));
             assert!(slice(numbers.as_ptr(), usize::MAX / 4, "row").unwrap_err().1.contains("memory"));
             assert!(slice::<f64>(std::ptr::null(), 0, "row").unwrap().is_empty());

@@ -10,8 +10,8 @@ from contextlib import nullcontext
 from cyclopts import App, CycloptsError, Parameter
 
 from tiltvp import __version__
-from tiltvp.cli import calibrate, camera, colmap, corner, demo, level, lines, mount, segments, setup, tilt, track
-from tiltvp.cli.lab import dataset, drive, evaluate, measure, report
+from tiltvp.cli import calibrate, camera_making, colmap, corner, demo, level, lines, mount, segments, setup, tilt, track
+from tiltvp.cli.lab import dataset, evaluate, measure, report, train
 from tiltvp.cli.showing import RERUN
 from tiltvp.cli.sources import STDIN
 from tiltvp.cli.terminal import complain
@@ -43,9 +43,9 @@ app.command(corner.corner)
 app.command(calibrate.calibrate)
 app.command(colmap.colmap)
 app.command(demo.demo)
-app.command(camera.app)
+app.command(camera_making.app)
 app.command(dataset.app)
-app.command(drive.app)
+app.command(train.app)
 app.command(evaluate.evaluate)
 app.command(measure.app)
 app.command(report.report)

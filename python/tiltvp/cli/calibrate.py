@@ -1,92 +1,130 @@
-"""`tiltvp calibrate`: where a camera sits on a robot, from the log of a drive."""
+"""`tiltvp calibrate`: where a camera sits on a robot, from the logs of its drives."""
 
 from __future__ import annotations
 
-from pathlib import Path
-from typing import Annotated
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
-from cyclopts import Parameter
-
-from tiltvp.cli.calibrate_inputs import DriveOptions, PictureOptions, log_of_images, log_of_tables, other_readings
+from tiltvp.cli.calibrate_inputs import DriveOptions, LogOptions, Tables, known_robot, other_readings, sources_from
+from tiltvp.cli.calibrate_pictures import PictureLog, PictureOptions
 from tiltvp.cli.calibrate_results import Calibration, ResultOptions
 from tiltvp.cli.line_options import DrivingLineOptions
-from tiltvp.cli.options import CameraOptions, Switch
+from tiltvp.cli.options import CameraOptions
 from tiltvp.cli.rerun_views import send_calibration
-from tiltvp.cli.showing import RerunOptions
+from tiltvp.cli.showing import RERUN, RerunOptions
 from tiltvp.cli.sources import MotionOptions
-from tiltvp.cli.terminal import say
+from tiltvp.cli.terminal import say, status
 from tiltvp.errors import InvalidInputError
 
+if TYPE_CHECKING:
+    from tiltvp import JoinedTilts, Robot
+
 NOT_RELIABLE = 1
-_PICTURES, _LINES, _RESULTS, _MOTION = PictureOptions(), DrivingLineOptions(), ResultOptions(), MotionOptions()
+_DRIVE, _READ, _MOTION = DriveOptions(), LogOptions(), MotionOptions()
+_PICTURES, _LINES, _RESULTS = PictureOptions(), DrivingLineOptions(), ResultOptions()
 _WATCHING = RerunOptions()
 
 
 def calibrate(
-    odometry_log: Path | None = None,
-    bearings_log: Path | None = None,
+    logs: list[str],
     /,
     *,
-    drive: DriveOptions,
+    drive: DriveOptions = _DRIVE,
     pictures: PictureOptions = _PICTURES,
     motion: MotionOptions = _MOTION,
     camera: CameraOptions | None = None,
     options: DrivingLineOptions = _LINES,
     method: str = "default",
-    read_as: Annotated[tuple[str, ...], Parameter(consume_multiple=True)] = (),
-    estimate_odometry: Switch = False,
-    estimate_time_offset: Switch = False,
+    read: LogOptions = _READ,
     results: ResultOptions = _RESULTS,
     watching: RerunOptions = _WATCHING,
 ) -> int:
-    """Where a camera (or any sensor of bearings) sits on a robot, from a drive past landmarks.
+    """Where a camera (or any sensor of bearings) sits on a robot, from drives past landmarks.
 
-    From two tables, ODOMETRY.csv BEARINGS.csv; or from pictures, --images SOURCE --camera FILE --odometry FILE: the
-    lean of each, its vertical lines, and which line is which from image to image. Prints what the filter found step by
-    step, what the whole log says at once, and the transform of the whole log if it can be relied upon; exit code 1 if
-    it cannot, or if images could not be read.
+    A log is two tables, ODOMETRY.csv BEARINGS.csv, or pictures of a drive with --camera FILE: the lean of each, its
+    vertical lines, and which line is which from image to image. Several logs of one robot are joined. Prints what the
+    filter found step by step, what each whole log says at once, roll and pitch as the leans tell them, and the
+    transform if it can be relied upon; exit code 1 if it cannot, or if images could not be read.
 
     Parameters
     ----------
-    odometry_log
-        CSV with the columns step, delta_left_m, delta_right_m, and time_s if known.
-    bearings_log
-        CSV with the columns step, landmark, bearing_rad.
+    logs
+        Two tables: step, delta_left_m, delta_right_m, and time_s if known; and step, landmark, bearing_rad. Or a folder
+        of images, a glob pattern in quotes, a video or a recording of ROS. Or several of these.
     method
         The filter: default, or paper.
-    read_as
-        How the log was recorded, where not by our conventions: wheels-swapped, wheels-negated, left-wheel-negated,
-        right-wheel-negated, clockwise, degrees, millimetres, cumulative.
-    estimate_odometry
-        From the whole log also the wheel base and which wheel runs farther.
-    estimate_time_offset
-        From the whole log also by how much the bearings are later than the odometry.
     """
+    results.check(camera)
+    watching.check()
+    sources, robot = sources_from(logs), known_robot(camera)
+    drive = drive.settled(robot)
+    if camera is not None:
+        options = camera.complete(options)
+    if any(isinstance(source, Tables) for source in sources):
+        pictures.refuse(motion, camera if robot is None else None)
+    of_one_log = {"--odometry": motion.odometry, "--tracks": pictures.tracks, RERUN: watching.rerun}
+    name = next((name for name, value in of_one_log.items() if value is not None), None)
+    if len(sources) > 1 and name is not None:
+        raise InvalidInputError(f"{name} with {len(sources)} logs, expected one log, or logs that tell of their own")
+    opened: list[Tables | PictureLog] = []
+    for source in sources:
+        if isinstance(source, Tables):
+            opened.append(source.checked(with_times=read.estimate_time_offset))
+        else:
+            with_times = read.estimate_time_offset
+            opened.append(
+                PictureLog.open(source, pictures, motion, camera, options, drive, robot, with_times=with_times)
+            )
+    measured = robot is not None and robot.covariance_rad2 is not None
+    tilt = robot if measured else _joined_tilts([one for one in opened if isinstance(one, PictureLog)])
+    found = [_calibrated(one, tilt, drive, read, method, watching) for one in opened]
+    known = results.tell(found, tilt, options.robot_from_camera, drive)
+    if known is not None and results.robot_out is not None:
+        looked = next((one for one in opened if isinstance(one, PictureLog)), None)
+        results.write_robot(known, robot or (None if looked is None else looked.robot()))
+    return 0 if known and not any(one.bad for one in opened) else NOT_RELIABLE
+
+
+def _joined_tilts(logs: Sequence[PictureLog]) -> JoinedTilts | None:
+    """Roll and pitch as the images of all logs tell them; None where none does."""
+    from tiltvp import join_tilts
+
+    tilts = []
+    for log in logs:
+        tilt = log.tilt()
+        say(f"{log.name}: roll and pitch: {tilt.reason}")
+        tilts += [tilt] if tilt else []
+    joined = join_tilts(tilts) if tilts else None
+    if joined is not None and joined.logs > 1:
+        say(joined.reason)
+    return joined
+
+
+def _calibrated(
+    one: Tables | PictureLog,
+    tilt: JoinedTilts | Robot | None,
+    drive: DriveOptions,
+    read: LogOptions,
+    method: str,
+    watching: RerunOptions,
+) -> Calibration:
+    """The filter's and the whole log's answer."""
     from tiltvp import SelfCalibrator
     from tiltvp import calibrate as calibrate_log
 
-    results.check()
-    watching.check()
-    bad, sigma = 0, {}
-    if pictures.images is None:
-        pictures.refuse(camera, motion)
-        log = log_of_tables(odometry_log, bearings_log, with_times=estimate_time_offset)
-    else:
-        if odometry_log is not None:
-            raise InvalidInputError(f"{odometry_log}: a log beside --images, expected one of them")
-        log, sigma_rad, bad = log_of_images(pictures, motion, camera, options, drive, with_times=estimate_time_offset)
-        sigma = {"bearing_sigma_rad": sigma_rad}
-    log = log.read_as(*read_as)
+    log = one.log(None if tilt is None else tilt.robot_from_camera).read_as(*read.read_as)
+    sigma = {} if one.sigma_rad is None else {"bearing_sigma_rad": one.sigma_rad}
     calibrator = SelfCalibrator(**sigma | drive.of_filter(), method=method)
-    history = calibrator.follow(log.odometry, log.bearings)
-    whole = calibrate_log(
-        log.odometry, log.bearings, **sigma | drive.of_whole_log(), times_s=log.times_s,
-        estimate_odometry=estimate_odometry, estimate_time_offset=estimate_time_offset,
-    )  # fmt: skip
+    with status(f"{one.name}: the filter, {len(log.bearings)} bearings"):
+        history = calibrator.follow(log.odometry, log.bearings)
+    with status(f"{one.name}: the whole log, {len(log.bearings)} bearings"):
+        whole = calibrate_log(
+            log.odometry, log.bearings, **sigma | drive.of_whole_log(), times_s=log.times_s,
+            estimate_odometry=read.estimate_odometry, estimate_time_offset=read.estimate_time_offset,
+        )  # fmt: skip
     with watching.viewer() as viewer:
         if viewer is not None:
             send_calibration(viewer, log, history, whole)
-    results.tell(Calibration(calibrator, history, whole), options.robot_from_camera)
     for word in other_readings(whole.misreading):
-        say(f"try {' '.join([*(f'--read-as {known}' for known in read_as), f'--read-as {word}'])}")
-    return 0 if whole and not bad else NOT_RELIABLE
+        say(f"{one.name}: try {' '.join(f'--read-as {known}' for known in (*read.read_as, word))}")
+    return Calibration(one.name, calibrator, history, whole)

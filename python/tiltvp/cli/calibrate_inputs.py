@@ -1,32 +1,26 @@
-"""Where `tiltvp calibrate` has its log from: two tables, or the images of a drive and its odometry."""
+"""Where `tiltvp calibrate` has its logs from, how they were recorded, and what is known of the robot."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Final
+from typing import TYPE_CHECKING, Annotated, Any, Final, Self
 
-import numpy as np
-from cyclopts import Group, Parameter, validators
+from cyclopts import Group, Parameter
 
 from tiltvp._core import CALIBRATION_METHODS, option_fields
 from tiltvp.cli.declared_options import LibraryOptions, from_library
-from tiltvp.cli.line_options import LineOptions
-from tiltvp.cli.options import CameraOptions
-from tiltvp.cli.sources import MotionOptions, SourceOptions
-from tiltvp.cli.tables import check_ending, write_table
-from tiltvp.cli.terminal import progress_bar, say
-from tiltvp.cli.track import Drive, needed_turns, track_table
+from tiltvp.cli.options import CameraOptions, Switch
 from tiltvp.errors import InvalidInputError
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from tiltvp import Camera
+    from tiltvp import Robot
     from tiltvp.drive_logs import DriveLog
-    from tiltvp.streams import Frames
 
-__all__ = ["DriveOptions", "PictureOptions", "log_of_images", "log_of_tables", "other_readings"]
+__all__ = ["DriveOptions", "LogOptions", "Tables", "known_robot", "other_readings", "sources_from"]
 
 _REMEDIES = {
     "reflected": ("wheels-swapped", "wheels-negated", "clockwise"),
@@ -34,8 +28,8 @@ _REMEDIES = {
     "right wheel negated": ("right-wheel-negated",),
 }
 """What may mend a log that was misread, where it has another name."""
-
-_FORMS = "ODOMETRY.csv BEARINGS.csv, or --images FOLDER --camera FILE --odometry ODOMETRY.csv"
+_FORMS: Final = "ODOMETRY.csv BEARINGS.csv, or the pictures of a drive with --camera FILE"
+_TABLE: Final = ".csv"
 
 
 @Parameter(name="*", group=Group("Drive"))
@@ -48,14 +42,28 @@ _FORMS = "ODOMETRY.csv BEARINGS.csv, or --images FOLDER --camera FILE --odometry
 class DriveOptions(LibraryOptions):
     """The robot, the mounting as it is thought to be, and how sure measurements are."""
 
-    wheel_base: float
-    """Distance between the wheels, metres."""
-    start: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    """x and y in metres and yaw in radians of the mounting as it is thought to be."""
+    wheel_base: float | None = None
+    """Distance between the wheels, metres; by default that of a robot's file."""
+    start: tuple[float, float, float] | None = None
+    """x and y in metres and yaw in radians of the mounting as it is thought to be; by default x and y of a robot's
+    file, or 0 0 0."""
     start_sigma: tuple[float, float, float] | None = None
     """Their standard deviations."""
     bearing_sigma_deg: float | None = None
     """Standard deviation of a bearing; for images by default the median of what the lines' own are."""
+
+    def settled(self, robot: Robot | None) -> Self:
+        """With what a robot's file knows where nothing was given. Raises `InvalidInputError` without a wheel base."""
+        base = self.wheel_base or (None if robot is None else robot.wheels.wheel_base_m)
+        if base is None:
+            raise InvalidInputError("--wheel-base: not given, expected the distance between the wheels in metres")
+        place = (0.0, 0.0) if robot is None or robot.place_m is None else robot.place_m
+        return replace(self, wheel_base=base, start=self.start or (*place, 0.0))
+
+    @property
+    def start_known(self) -> tuple[float, float, float]:
+        """The mounting as it is thought to be."""
+        return self.start or (0.0, 0.0, 0.0)
 
     def of_filter(self) -> dict[str, Any]:
         """What `SelfCalibrator` takes."""
@@ -67,123 +75,82 @@ class DriveOptions(LibraryOptions):
         return {name: value for name, value in self.given().items() if name in known} | self._wheels()
 
     def _wheels(self) -> dict[str, float]:
+        assert self.wheel_base is not None  # As `settled` has it.
         return {"wheel_base_m": self.wheel_base}
 
 
-@Parameter(name="*", group=Group("From pictures"))
+@Parameter(name="*", group=Group("Log"))
 @dataclass(frozen=True, kw_only=True)
-class PictureOptions:
-    """The images of a drive, in place of a log of bearings."""
+class LogOptions:
+    """How logs were recorded, and what else they are to tell."""
 
-    images: str | None = None
-    """Folder of images in the order of their names, glob pattern, video, or recording of ROS."""
-    topic: str | None = None
-    """The topic of a recording's images, where it has several."""
-    track_frames_min: Annotated[int, Parameter(validator=validators.Number(gte=2))] = 3
-    """A line counts if it is seen in so many images."""
-    tracks: Path | None = None
-    """Also write the lines of all images, as `tiltvp track` does: .csv, .json or .parquet."""
+    read_as: Annotated[tuple[str, ...], Parameter(consume_multiple=True)] = ()
+    """How logs were recorded, where not by our conventions: wheels-swapped, wheels-negated, left-wheel-negated,
+    right-wheel-negated, clockwise, degrees, millimetres, cumulative."""
+    estimate_odometry: Switch = False
+    """From each whole log also the wheel base and which wheel runs farther."""
+    estimate_time_offset: Switch = False
+    """From each whole log also by how much the bearings are later than the odometry."""
 
-    def refuse(self, camera: CameraOptions | None, motion: MotionOptions) -> None:
-        """Refuses what belongs to images where there are none."""
-        motion.refuse("--images")
-        for name, value in (("--camera", camera), ("--tracks", self.tracks), ("--topic", self.topic)):
-            if value is not None:
-                raise InvalidInputError(f"{name} without --images, which it is for")
+
+@dataclass(frozen=True)
+class Tables:
+    """A log of two tables."""
+
+    odometry: Path
+    bearings: Path
+    read: DriveLog | None = None
+    sigma_rad: float | None = None
+    bad: int = 0
+
+    @property
+    def name(self) -> str:
+        """What it is called."""
+        return str(self.bearings)
+
+    def checked(self, *, with_times: bool) -> Tables:
+        """The same, read. Raises `InvalidInputError` that names file and line."""
+        from tiltvp.drive_logs import read_drive_log
+
+        log = read_drive_log(self.odometry, self.bearings)
+        if with_times and log.times_s is None:
+            raise InvalidInputError(f"{self.odometry}: no column time_s, expected one with --estimate-time-offset")
+        return replace(self, read=log)
+
+    def log(self, _: NDArray[Any] | None = None) -> DriveLog:
+        """What was read; bearings are what they are, whatever the mounting."""
+        assert self.read is not None  # As `checked` has it.
+        return self.read
+
+
+def sources_from(words: Sequence[str]) -> list[Tables | str]:
+    """The logs that words name: tables come in pairs, all else is pictures."""
+    from tiltvp.streams.image_files import IMAGE_ENDINGS
+
+    found: list[Tables | str] = []
+    rest = list(words)
+    while rest:
+        word = rest.pop(0)
+        if Path(word).suffix.lower() in IMAGE_ENDINGS and Path(word).is_file():
+            raise InvalidInputError(f"{word}: one image, expected the folder of a drive's, or a pattern in quotes")
+        if Path(word).suffix.lower() != _TABLE:
+            found.append(word)
+        elif rest and Path(rest[0]).suffix.lower() == _TABLE:
+            found.append(Tables(Path(word), Path(rest.pop(0))))
+        else:
+            raise InvalidInputError(f"{word}: a table without another one, expected {_FORMS}")
+    if not found:
+        raise InvalidInputError(f"calibrate: no log, expected {_FORMS}")
+    return found
+
+
+def known_robot(camera: CameraOptions | None) -> Robot | None:
+    """What a robot's file (`tiltvp setup`) knows; None for other calibrations."""
+    from tiltvp.robot import Robot, is_robot
+
+    return Robot.load(camera.camera) if camera is not None and is_robot(camera.camera) else None
 
 
 def other_readings(misreading: str | None) -> tuple[str, ...]:
     """The words of `--read-as` to try for a log that fits in another reading only."""
     return () if misreading is None else _REMEDIES.get(misreading, (misreading,))
-
-
-def log_of_tables(odometry: Path | None, bearings: Path | None, *, with_times: bool) -> DriveLog:
-    """The log of a table of displacements and one of bearings."""
-    from tiltvp.drive_logs import read_drive_log
-
-    if odometry is None or bearings is None:
-        raise InvalidInputError(f"calibrate: no log of bearings, expected {_FORMS}")
-    log = read_drive_log(odometry, bearings)
-    if with_times and log.times_s is None:
-        raise InvalidInputError(f"{odometry}: no column time_s, expected one with --estimate-time-offset")
-    return log
-
-
-_CLOCK_FRAMES: Final = 120
-"""Frames by which the delay is told: at 5 a second the first 24 seconds of a drive."""
-
-
-def _bring_to_clock(
-    frames: Frames, motion: MotionOptions, camera: Camera, rotation: NDArray[np.float64], wheel_base_m: float | None
-) -> None:
-    """Takes from the times of the frames by how much they are late. Raises `InvalidInputError` where nothing tells."""
-    from tiltvp.streams import read_odometry
-    from tiltvp.turning import frame_delay
-
-    record = motion.odometry or frames.recording
-    if frames.times_s is None or record is None:
-        raise InvalidInputError(f"--estimate-time-offset with --images {frames.source}, whose times are not known")
-    odometry = read_odometry(record, topic=motion.odometry_topic, wheels=motion.wheels(wheel_base_m))
-    count = min(_CLOCK_FRAMES, len(frames.times_s))
-    images = (frame.read() for frame in frames.sample(range(count)))
-    found = frame_delay(images, frames.times_s[:count], odometry, camera, rotation)
-    if not found:
-        raise InvalidInputError(f"--estimate-time-offset with --images {frames.source}: {found.reason}")
-    say(f"{frames.source}: frames are stamped {found.delay_s:.3f} +- {found.sigma_s:.3f} s late, which is mended first")
-    frames.times_s = frames.times_s - found.delay_s
-
-
-def log_of_images(
-    pictures: PictureOptions,
-    motion: MotionOptions,
-    camera: CameraOptions | None,
-    options: LineOptions,
-    drive: DriveOptions,
-    *,
-    with_times: bool,
-) -> tuple[DriveLog, float, int]:
-    """The log of a drive's images: the lean of each, its lines, and whose they are.
-
-    Also the median standard deviation of a bearing, radians, and how many images were bad. `with_times` asks for the
-    times of the frames, which are brought to the odometry's clock first, by how the images turn. Writes the tracks
-    where they are asked for. Tracks are predicted with the mounting as it is thought to be.
-    """
-    from tiltvp.drive_logs import DriveLog
-    from tiltvp.line_logs import bearing_log, displacements
-    from tiltvp.lines import LineTracker
-    from tiltvp.streams import Motion
-
-    source = str(pictures.images)
-    if pictures.tracks is not None:
-        check_ending(pictures.tracks)
-    if camera is None:
-        raise InvalidInputError(f"--images {source} without --camera, expected {_FORMS}")
-    frames = SourceOptions(topic=pictures.topic).open([source])
-    lens, options = camera.load(), camera.complete(options)
-    if with_times:
-        _bring_to_clock(frames, motion, lens, options.rotation(), drive.wheel_base)
-    told = needed_turns(motion.motions(frames, drive.wheel_base))
-    if told is None:
-        raise InvalidInputError(f"--images {source} without --odometry, expected {_FORMS}")
-    x_m, y_m, yaw_rad = drive.start
-    extractor, tilt = options.extractor(lens, yaw_rad=yaw_rad), options.tilts(lens, yaw_rad=yaw_rad)
-    looked = Drive(extractor, LineTracker(camera_m=(x_m, y_m)), tilt, told)
-    with progress_bar(len(told.motions), "frames") as bar:
-        nothing = np.zeros((0, 0), np.uint8)
-        # A drive's images together are more than the memory holds.
-        seen = [
-            (frame.name, frame.time_s, replace(one, gray=nothing)) for frame, one in looked.followed(iter(frames), bar)
-        ]
-    bearings = bearing_log([one for _, _, one in seen], frames_min=pictures.track_frames_min)
-    if not len(bearings):
-        least = pictures.track_frames_min
-        raise InvalidInputError(f"{source}: no line is seen in {least} of {len(told.motions)} frames")
-    # From the robot's frame back to the camera's.
-    bearings[:, 2] -= yaw_rad
-    table = track_table([(one.number, name, time_s, one.tracked) for name, time_s, one in seen])
-    if pictures.tracks is not None:
-        write_table(table, pictures.tracks)
-    say(f"{source}: {len(bearings)} bearings of {len(set(bearings[:, 1].tolist()))} lines")
-    motions = [one or Motion() for one in told.motions]
-    log = DriveLog(displacements(motions, wheel_base_m=drive.wheel_base), bearings, told.times_s)
-    return log, float(np.median([row["sigma_rad"] for row in table.rows])), looked.bad

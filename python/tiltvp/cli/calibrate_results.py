@@ -1,4 +1,4 @@
-"""What `tiltvp calibrate` prints and writes: the mounting for people, as JSON, as a picture, for ROS and for URDF."""
+"""What `tiltvp calibrate` prints and writes: extrinsics for people, as JSON, pictures, transforms, a robot's file."""
 
 from __future__ import annotations
 
@@ -6,27 +6,29 @@ import json
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from cyclopts import Group, Parameter
 
-from tiltvp.cli.options import Switch
+from tiltvp.cli.options import Switch, rotation_of
 from tiltvp.cli.tables import check_plot, finite
-from tiltvp.cli.terminal import new_table, say, show
+from tiltvp.cli.terminal import complain, new_table, say, show
 from tiltvp.errors import InvalidInputError
 from tiltvp.files import check_output, write_whole
-from tiltvp.streams.outputs.transforms import check_transform
+from tiltvp.streams.outputs.transforms import COVARIANCE_AXES, check_transform
 
 if TYPE_CHECKING:
-    from tiltvp import LogCalibration, MountingEstimate, SelfCalibrator
-    from tiltvp.streams.outputs.transforms import StaticTransform
+    from tiltvp import Extrinsics, JoinedTilts, LogCalibration, MountingEstimate, Robot, SelfCalibrator
+    from tiltvp.cli.calibrate_inputs import DriveOptions
+    from tiltvp.cli.options import CameraOptions
 
 
 @dataclass(frozen=True)
 class Calibration:
-    """The filter after the last step, its estimate after each, and the whole log at once."""
+    """Of one log: the filter after the last step, its estimate after each, and the whole log at once."""
 
+    name: str
     calibrator: SelfCalibrator
     history: Sequence[MountingEstimate]
     whole: LogCalibration
@@ -38,39 +40,54 @@ class ResultOptions:
     """Where results go, and how frames are called."""
 
     parent_frame: str = "base_link"
-    """Name of the robot's frame, for the ROS transform."""
+    """Name of the robot's frame, for transforms."""
     child_frame: str | None = None
-    """Name of the camera's frame, for the ROS transform; default is camera_optical with --robot-from-camera, of which
-    roll and pitch are taken, and without it camera_mount, whose roll and pitch are not known."""
+    """Name of the camera's frame, for transforms; default is camera_optical where roll and pitch are known, and
+    otherwise camera_mount."""
     height: float | None = None
-    """Height of the camera in the robot's frame, metres, for the ROS transform."""
+    """Height of the camera in the robot's frame, metres: no drive tells it."""
     transform: Path | None = None
-    """File for the transform: .urdf (link and joint), .yaml, or .mcap (/tf_static of ROS 2)."""
+    """File for the transform: .urdf (link and joint), .yaml, .kalibr.yaml, or .mcap (/tf_static of ROS 2)."""
+    robot_out: Path | None = None
+    """The robot's file (.toml) that every command takes as its --camera, with all that was found."""
     out: Path | None = None
     """File for everything that was found (.json)."""
     anyway: Switch = False
-    """Print and write the transform even if the whole log says that it cannot be relied upon."""
+    """Print and write the transform and the robot's file even if they cannot be relied upon."""
     plot: Path | None = None
-    """Picture of the filter's convergence, as figure 25 of Scaramuzza, Siegwart and Martinelli 2009 (.png)."""
+    """Picture of the filter's convergence (.png)."""
 
-    def check(self) -> None:
+    def check(self, camera: CameraOptions | None) -> None:
         """Refuses files that cannot be written, before any work is done."""
-        if self.out is not None and self.out.suffix.lower() != ".json":
-            raise InvalidInputError(f"--out {self.out}: ends in {self.out.suffix!r}, expected .json")
-        if self.out is not None:
-            check_output(self.out)
+        for name, path, ending in (("--out", self.out, ".json"), ("--robot-out", self.robot_out, ".toml")):
+            if path is not None:
+                if path.suffix.lower() != ending:
+                    raise InvalidInputError(f"{name} {path}: ends in {path.suffix!r}, expected {ending}")
+                check_output(path)
+        if self.robot_out is not None and camera is None:
+            raise InvalidInputError(f"--robot-out {self.robot_out} without --camera, expected both")
         if self.transform is not None:
             check_transform(self.transform)
         check_plot("--plot", self.plot)
 
-    def tell(self, calibration: Calibration, robot_from_camera: str | None) -> None:
-        """Prints and writes everything that was found, with a camera that was taken to sit so."""
-        filtered, whole = calibration.calibrator.estimate, calibration.whole
-        _show(filtered, whole)
-        found_transforms = {}
-        if whole or self.anyway:
-            transform = self._transform(whole.mounting, robot_from_camera)
-            found_transforms = {
+    def tell(
+        self,
+        found: Sequence[Calibration],
+        tilt: JoinedTilts | Robot | None,
+        robot_from_camera: str | None,
+        drive: DriveOptions,
+    ) -> Extrinsics | None:
+        """Prints and writes what was found; the extrinsics, None where no log tells them."""
+        for one in found:
+            _show(one, several=len(found) > 1)
+        known = self._joined(found, tilt, robot_from_camera, drive)
+        written: dict[str, Any] = {}
+        if known is not None:
+            _show_extrinsics(known)
+            written["extrinsics"] = _plain_extrinsics(known)
+        if known is not None and (known or self.anyway):
+            transform = known.transform(parent=self.parent_frame, child=self.child_frame)
+            written |= {
                 "ros_static_transform": transform.ros_command(), "urdf_joint": transform.urdf_joint(),
                 "transform_not_known": list(transform.missing),
             }  # fmt: skip
@@ -79,45 +96,114 @@ class ResultOptions:
             if self.transform is not None:
                 transform.write(self.transform)
         else:
-            say("no transform, since the whole log cannot be relied upon: --anyway prints it")
+            reasons = ["no log can be relied upon"] if known is None else known.reasons
+            say(f"no transform: {'; '.join(reasons)}: --anyway prints it")
         if self.plot is not None:
-            _write_plot(calibration.history, self.plot)
+            _write_plot(found, self.plot)
         if self.out is not None:
-            options = calibration.calibrator.options
-            found = {
-                "whole_log": whole.to_dict(),
-                "filter": filtered.to_dict(),
-                "options": {name: _plain(value) for name, value in options.items()},
-            } | found_transforms
-            text = json.dumps(finite(found), indent=1, allow_nan=False) + "\n"
-            write_whole(self.out, text)
+            written = {"logs": [_plain_log(one) for one in found]} | written
+            write_whole(self.out, json.dumps(finite(written), indent=1, allow_nan=False) + "\n")
+        return known
 
-    def _transform(self, mounting: MountingEstimate, robot_from_camera: str | None) -> StaticTransform:
-        from tiltvp.rotations import read_rotation
-        from tiltvp.selfcalib import static_transform
+    def write_robot(self, known: Extrinsics, robot: Robot | None) -> None:
+        """Writes the robot's file, or says why it is not written."""
+        assert self.robot_out is not None  # Else nobody asks.
+        assert robot is not None  # There is a camera.
+        reasons = [*known.reasons, *([] if known.measured else ["roll and pitch were not measured"])]
+        if reasons and not self.anyway:
+            complain(f"{self.robot_out}: not written: {'; '.join(reasons)}: --anyway writes it")
+            return
+        known.robot(robot).save(self.robot_out)
+        without = "" if not reasons else ", without covariance, since it cannot be relied upon"
+        say(f"{self.robot_out}: the robot's file{without}")
 
-        return static_transform(
-            mounting, parent=self.parent_frame, child=self.child_frame, z_m=self.height,
-            robot_from_camera=None if robot_from_camera is None else read_rotation(robot_from_camera),
-        )  # fmt: skip
+    def _joined(
+        self,
+        found: Sequence[Calibration],
+        tilt: JoinedTilts | Robot | None,
+        robot_from_camera: str | None,
+        drive: DriveOptions,
+    ) -> Extrinsics | None:
+        """What the logs that can be relied upon say together, or with --anyway all of them."""
+        from tiltvp import Extrinsics, join_logs
+
+        given = None if robot_from_camera is None else rotation_of(robot_from_camera)
+        used = [one for one in found if one.whole or self.anyway]
+        if len(found) == 1:
+            place: Any = found[0].whole
+        elif not used:
+            return None
+        else:
+            for one in found:
+                if not one.whole:
+                    complain(f"{one.name}: {'joined all the same' if self.anyway else 'left out'}: {one.whole.reason}")
+            begun = {} if drive.start_sigma is None else {"start_sigma": drive.start_sigma}
+            place = join_logs([one.whole for one in used], start=drive.start_known, **begun)
+            say(place.reason if place.odd is None else f"{place.reason} (log {place.odd + 1}: {used[place.odd].name})")
+        return Extrinsics.of(place, tilt, robot_from_camera=given, height_m=self.height)
 
 
-def _write_plot(history: Sequence[MountingEstimate], path: Path) -> None:
+def _write_plot(found: Sequence[Calibration], path: Path) -> None:
     from tiltvp import write_image
     from tiltvp.lab.plots.calibration import convergence
     from tiltvp.lab.plots.picture import figure_picture
     from tiltvp.selfcalib import convergence_table
 
-    write_image(path, figure_picture(convergence(convergence_table(history)), dpi=110.0))
+    tables = {one.name: convergence_table(one.history) for one in found}
+    answers = {one.name: one.whole.mounting for one in found}
+    write_image(path, figure_picture(convergence(tables, answers), dpi=110.0))
 
 
 def _plain(value: object) -> object:
     return value.tolist() if isinstance(value, np.ndarray) else value
 
 
-def _show(filtered: MountingEstimate, whole: LogCalibration) -> None:
+def _plain_log(one: Calibration) -> dict[str, object]:
+    return {
+        "name": one.name,
+        "whole_log": one.whole.to_dict(),
+        "filter": one.calibrator.estimate.to_dict(),
+        "options": {name: _plain(value) for name, value in one.calibrator.options.items()},
+    }
+
+
+def _plain_extrinsics(known: Extrinsics) -> dict[str, object]:
+    return {
+        "known": bool(known),
+        "reasons": list(known.reasons),
+        "robot_from_camera": known.robot_from_camera.tolist(),
+        "place_m": known.place_m.tolist(),
+        "height_m": known.height_m,
+        "covariance_axes": list(COVARIANCE_AXES),
+        "covariance": known.covariance.tolist(),
+        "not_known": list(known.missing),
+    }
+
+
+def _show_extrinsics(known: Extrinsics) -> None:
+    transform = known.transform()
+    sigmas = dict(transform.sigmas)
+    roll, pitch, yaw = np.degrees(transform.roll_pitch_yaw_rad)
     table = new_table(
-        "The camera on the robot, with one standard deviation",
+        "Extrinsics, with one standard deviation along and about the robot's axes",
+        ["x mm", "y mm", "z mm", "roll deg", "pitch deg", "yaw deg"],
+    )
+    turns = []
+    for name, value in (("roll", roll), ("pitch", pitch), ("yaw", yaw)):
+        if name in known.missing:
+            turns.append("not known")
+        else:
+            turns.append(_cell(value, np.degrees(sigmas[name])) if name in sigmas else f"{value:.2f} as given")
+    x, y = 1e3 * known.place_m
+    z = "not known" if known.height_m is None else f"{1e3 * known.height_m:.2f} as given"
+    table.add_row(_cell(x, 1e3 * sigmas["x"]), _cell(y, 1e3 * sigmas["y"]), z, *turns)
+    show(table)
+
+
+def _show(one: Calibration, *, several: bool) -> None:
+    filtered, whole = one.calibrator.estimate, one.whole
+    table = new_table(
+        f"{one.name + ': the' if several else 'The'} camera on the robot, with one standard deviation",
         ["", "x mm", "y mm", "yaw deg", "phi deg", "rho mm", "psi deg"],
         left=[""],
     )

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from cyclopts import Group, Parameter, validators
 
 from tiltvp._core import CORNER_METHODS
+from tiltvp.cli.corner_methods import AUTO, Searches, advice, looked_for, methods_for, shown
 from tiltvp.cli.declared_options import LibraryOptions, from_library, mask_from
 from tiltvp.cli.options import image_size_from
 from tiltvp.cli.rerun_views import send_corner
@@ -26,7 +27,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from tiltvp import Camera
-    from tiltvp.corner import CornerEstimate, CornerPoseEstimator
+    from tiltvp.corner import CornerEstimate
     from tiltvp.streams import Frames
     from tiltvp.streams.outputs.viewer import Viewer
 
@@ -35,7 +36,7 @@ _ANGLE = Parameter(validator=validators.Number(gt=0, lt=180))
 
 @Parameter(name="*", group=Group("Corners", help="An option that is not given has the default of its method."))
 @dataclass(frozen=True, kw_only=True)
-@from_library({"CornerDetector": CORNER_METHODS, "CornerPoseEstimator": ()}, but=("gamma_rad", "down"))
+@from_library({"CornerDetector": CORNER_METHODS, "CornerPoseEstimator": ()}, but=("gamma_rad",))
 class CornerOptions(LibraryOptions):
     """How corners are found and told apart."""
 
@@ -60,7 +61,7 @@ def corner(
     calibration: Path,
     source: SourceOptions = _SOURCE,
     topic_right: str | None = None,
-    method: str = "coloured",
+    method: str = AUTO,
     options: CornerOptions = _OPTIONS,
     gamma: Annotated[float, _ANGLE] = 90.0,
     pitch: Annotated[float | None, Parameter(validator=validators.Number(gte=-90, lte=90))] = None,
@@ -75,8 +76,11 @@ def corner(
 ) -> int:
     """Find a corner in each image, or pair of images, and from it the camera's attitude, with a pair also its position.
 
+    One camera tells its position too where its height above the corner is known (--camera-height-m).
+
     The last pose is where the next one is looked for. Images that cannot be read are named on stderr and skipped,
-    and the exit code is 1; images without a corner have rows without a pose that say why.
+    and the exit code is 1; images without a corner have rows without a pose that say why. Where no image has a pose, a
+    line says what to try.
 
     Parameters
     ----------
@@ -91,12 +95,14 @@ def corner(
     topic_right
         The topic of the right camera's images, where its recording has several.
     method
-        coloured: a cuboid with red, green and blue faces; general: corners of rooms, boxes and buildings.
+        auto: coloured, and where it finds nothing general; the first that has a pose goes on alone. coloured: a cuboid
+        with red, green and blue faces; general: corners of rooms, boxes and buildings; paper: the cuboid by the method
+        as it was published, to compare.
     gamma
         Angle between the corner's level edges, degrees.
     pitch
         How far the left camera looks above the horizon, degrees, held without roll: negative looks down. Roughly; it
-        says which of the edges is vertical, for the first image.
+        says which of the edges is vertical, for the first image. With roll: --down.
     out
         File for the poses, one row for each frame: .csv, .json or .parquet.
     trajectory
@@ -116,17 +122,21 @@ def corner(
 
     if out is not None:
         check_ending(out)
-    if trajectory is not None and right is None:
-        raise InvalidInputError(f"--trajectory {trajectory} of one camera, which tells no position: expected two")
+    known = _known(options, math.radians(gamma), pitch)
+    if trajectory is not None and right is None and "camera_height_m" not in known:
+        expected = "expected two, or --camera-height-m"
+        raise InvalidInputError(f"--trajectory {trajectory} of one camera, which tells no position: {expected}")
+    if topic_right is not None and right is None:
+        raise InvalidInputError(f"--topic-right {topic_right} of one camera: expected two")
+    if pitch is not None and options.given().get("down") is not None:
+        raise InvalidInputError("--pitch and --down: expected one of them")
     if trajectory is not None:
         check_output(trajectory)
     if overlay is not None:
         check_output_folder(overlay)
     check_plot("--plot", plot)
     watching.check()
-    camera, estimator = _estimator(
-        calibration, right is not None, method, options, math.radians(gamma), pitch, image_size_from(image_size)
-    )
+    camera, estimator = _searches(calibration, right is not None, method, known, image_size_from(image_size))
     frames = source.open([] if left is None else [left])
     others = None if right is None else SourceOptions(topic=topic_right).open([right])
     if others is not None and (others.count != frames.count or frames.count is None):
@@ -138,9 +148,7 @@ def corner(
         raise InvalidInputError(f"{frames.source}: {look.bad} frames, none of which can be used")
     table = Table(POSE_COLUMNS, pose_rows(estimates))
     _write(table, out, trajectory, plot)
-    found = sum(bool(estimate) for _, _, estimate in estimates)
-    skipped = f", {look.bad} skipped" if look.bad else ""
-    say(f"{frames.source}: {len(estimates)} frames{skipped}, {found} with a pose")
+    _conclude(str(frames.source), estimator, look.bad, advice_for=(right is not None, known))
     return 1 if look.bad or frames.problems else 0
 
 
@@ -149,7 +157,7 @@ class Look:
     """What is done with each frame."""
 
     camera: Camera
-    estimator: CornerPoseEstimator
+    estimator: Searches
     independent: bool
     overlay: Path | None
     viewer: Viewer | None
@@ -212,28 +220,44 @@ def _write(table: Table, out: Path | None, trajectory: Path | None, plot: Path |
         write_image(plot, figure_picture(pose_plot(table.frame())))
 
 
-def _estimator(
-    calibration: Path,
-    is_pair: bool,
-    method: str,
-    given: CornerOptions,
-    gamma_rad: float,
-    pitch_deg: float | None,
-    image_size: tuple[int, int] | None,
-) -> tuple[Camera, CornerPoseEstimator]:
+def _conclude(source: str, estimator: Searches, bad: int, *, advice_for: tuple[bool, dict[str, Any]]) -> None:
+    """How many frames have a pose, by which method, why the others have none, and what to try if all are such."""
+    found, without = estimator.found.total(), estimator.without.total()
+    skipped = f", {bad} skipped" if bad else ""
+    by = f" ({looked_for(estimator.found)})" if found else ""
+    say(f"{source}: {found + without} frames{skipped}, {found} with a pose{by}")
+    if without:
+        say(f"without a pose: {shown(estimator.without)}")
+    if without and not found:
+        [(reason, _)] = estimator.without.most_common(1)
+        is_pair, known = advice_for
+        say(f"looked for {looked_for(estimator.methods)}")
+        say(f"try: {advice(reason, estimator.methods, is_pair=is_pair, given=known)}")
+
+
+def _known(options: CornerOptions, gamma_rad: float, pitch_deg: float | None) -> dict[str, Any]:
+    """The keywords of the estimator."""
+    known: dict[str, Any] = {"gamma_rad": gamma_rad} | options.given()
+    if pitch_deg is not None:
+        pitch_rad = math.radians(pitch_deg)
+        known["down"] = (0.0, math.cos(pitch_rad), -math.sin(pitch_rad))
+    return known
+
+
+def _searches(
+    calibration: Path, is_pair: bool, method: str, known: dict[str, Any], image_size: tuple[int, int] | None
+) -> tuple[Camera, Searches]:
     from tiltvp import Camera
     from tiltvp.corner import CornerPoseEstimator
     from tiltvp.stereo_rigs import StereoRig
 
-    options: dict[str, Any] = {"method": method, "gamma_rad": gamma_rad} | given.given()
-    if pitch_deg is not None:
-        pitch_rad = math.radians(pitch_deg)
-        options["down"] = (0.0, math.cos(pitch_rad), -math.sin(pitch_rad))
+    methods = methods_for(method, known)
     if not is_pair:
         camera = Camera.load(calibration, image_size=image_size)
-        return camera, CornerPoseEstimator(camera, **options)
+        return camera, Searches({name: CornerPoseEstimator(camera, method=name, **known) for name in methods})
     rig = StereoRig.load(calibration, image_size=image_size)
-    return rig.left, CornerPoseEstimator(rig.left, rig.right, rig.left_from_right, **options)
+    pair = (rig.left, rig.right, rig.left_from_right)
+    return rig.left, Searches({name: CornerPoseEstimator(*pair, method=name, **known) for name in methods})
 
 
 def drawn(image: NDArray[np.uint8], camera: Camera, estimate: CornerEstimate) -> NDArray[np.uint8]:

@@ -83,7 +83,7 @@ def _annotation(
     kind = _TYPES.get(plain, str)
     flag = f"--{name.replace('_', '-')}"
     names = [flag] if further is None else [further, flag]
-    off = "" if plain == "bool" and not field["default"] else None
+    off = "" if plain == "bool" and field["default"] is False else None
     shown = Parameter(name=names, help=_help(field, defaults, several=several), negative=off, show_default=False)
     return Annotated[kind | None, shown]
 

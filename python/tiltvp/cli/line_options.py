@@ -37,25 +37,28 @@ class LineOptions(MountedOptions):
     tilt_confidence_min: Annotated[float, Parameter(validator=validators.Number(gte=0, lte=1))] = 0.5
     """A frame whose estimated lean is less confident, or leaves far less of its lines, is taken to be upright."""
 
-    def extractor(self, camera: Camera, *, yaw_rad: float = 0.0) -> LineExtractor:
-        """The extractor with the options that were given, for a camera that is further turned by `yaw_rad`."""
+    def extractor(self, camera: Camera, *, rotation: NDArray[np.float64] | None = None) -> LineExtractor:
+        """The extractor with the options that were given, for their mounting or another."""
         from tiltvp.lines import LineExtractor
 
         check_word("--method", self.method or LINE_METHODS[0], LINE_METHODS)
         options = self.given() | ({} if self.method is None else {"method": self.method})
-        return LineExtractor(camera, robot_from_camera=self.rotation(yaw_rad), **options)
+        return LineExtractor(camera, robot_from_camera=self.rotation() if rotation is None else rotation, **options)
 
-    def tilts(self, camera: Camera, *, yaw_rad: float = 0.0) -> Callable[[NDArray[np.uint8]], TiltEstimate | None]:
+    def tilts(
+        self, camera: Camera, *, rotation: NDArray[np.float64] | None = None
+    ) -> Callable[[NDArray[np.uint8]], TiltEstimate | None]:
         """What tells the lean of a grey image: None where the robot is taken to be upright."""
         from tiltvp import METHODS, TiltEstimator
 
         check_word("--tilt", self.tilt, (_UPRIGHT, *METHODS))
         if self.tilt == _UPRIGHT:
             return lambda _: None
-        options: dict[str, Any] = {"method": self.tilt, "robot_from_camera": self.rotation(yaw_rad)}
+        mounting = self.rotation() if rotation is None else rotation
+        options: dict[str, Any] = {"method": self.tilt, "robot_from_camera": mounting}
         if self.mask is not None:
             options["mask"] = mask_from(self.mask)
-        estimator, extractor = TiltEstimator(camera, **options), self.extractor(camera, yaw_rad=yaw_rad)
+        estimator, extractor = TiltEstimator(camera, **options), self.extractor(camera, rotation=mounting)
 
         def tilt(gray: NDArray[np.uint8]) -> TiltEstimate | None:
             estimate = estimator(gray)
@@ -64,11 +67,9 @@ class LineOptions(MountedOptions):
 
         return tilt
 
-    def rotation(self, yaw_rad: float = 0.0) -> NDArray[np.float64]:
-        """The mounting that was given, further turned by `yaw_rad`."""
-        from tiltvp.rotations import about_vertical
-
-        return about_vertical(yaw_rad) @ rotation_of(self.robot_from_camera or "up")
+    def rotation(self) -> NDArray[np.float64]:
+        """The mounting that was given, or that of a camera that looks up."""
+        return rotation_of(self.robot_from_camera or "up")
 
 
 @Parameter(name="*", group=_LINES)

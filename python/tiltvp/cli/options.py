@@ -125,11 +125,18 @@ class MethodOptions(MountedOptions):
     method: str | None = None
     """refined, image-space-ransac, image-space-reject-refit, vector-consensus or segments."""
     correction: str | None = None
-    """closed-form, none or a number: the factor from shift (or raw angle) to angle."""
+    """closed-form, none or a number, the factor from shift (or raw angle) to angle; or a file of `tiltvp lab train`,
+    which brings its method and options."""
 
     def estimator(self, camera: "Camera", **otherwise: Any) -> "TiltEstimator":
         """The estimator with the options that were given, and others where they were not."""
         options = otherwise | self.given()
+        if self.correction is not None and Path(self.correction).suffix.lower() == ".toml":
+            from tiltvp.corrections import TrainedCorrection
+
+            trained = TrainedCorrection.load(self.correction)
+            del options["correction"]
+            return self.mounted(camera, **trained.estimator_options(camera, options, self.method))
         if self.method is not None:
             check_word("--method", self.method, METHODS)
             options["method"] = self.method

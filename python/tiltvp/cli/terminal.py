@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import sys
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
@@ -52,7 +53,22 @@ def _line(problem: str) -> str:
     """One line, in the words of the command line where the library speaks of its arguments."""
     words = " ".join(problem.split())
     words = words.replace("image_size=(width, height) from the caller", "--image-size WIDTHxHEIGHT")
-    return "tiltvp: " + words.replace("format= to say which", "--format or --camera-format to say which")
+    words = words.replace("format= to say which", "--format or --camera-format to say which")
+    return f"tiltvp: {words}{_remedy(words)}"
+
+
+def _remedy(problem: str) -> str:
+    """What makes a calibration fit images of another size; empty where nothing is wrong with the size."""
+    found = re.search(r"got (\d+) x (\d+) pixels, expected (\d+) x (\d+) \(rows x columns\), as the camera's", problem)
+    if found is None:
+        return ""
+    rows, columns, height, width = (int(number) for number in found.groups())
+    # As many rows as a camera that is scaled to these columns has, up to the rounding of both.
+    if abs(rows * width - columns * height) <= max(width, height):
+        return f": if they were resized, `tiltvp camera scale FILE OUT --to {columns}x{rows}` makes one that fits"
+    if (rows, columns) == (width, height):
+        return ": rows and columns are swapped, turn the images by a quarter"
+    return f": if they are a part, `tiltvp camera crop FILE OUT --at U V --size {columns}x{rows}` makes one that fits"
 
 
 def named(name: object, problem: str) -> str:

@@ -37,15 +37,31 @@ def recorded_camera(recording: Recording, topic: str | None = None) -> Camera:
     matrix = [float(x) for x in np.ravel(getattr(info, "k", getattr(info, "K", [])))]
     if not any(matrix):
         raise CalibrationError(f"{source}: a camera that was not calibrated, expected a matrix that is not 0")
-    region = info.roi
-    if max(info.binning_x, info.binning_y) > 1 or region.x_offset or region.y_offset:
-        raise CalibrationError(f"{source}: images of a part of the sensor or binned, expected whole ones")
     tree: dict[str, object] = {
         "image_width": int(info.width), "image_height": int(info.height), "camera_name": "cam0",
         "distortion_model": str(info.distortion_model), "K": [matrix[k : k + 3] for k in (0, 3, 6)],
         "D": [float(x) for x in np.ravel(getattr(info, "d", getattr(info, "D", [])))],
     }  # fmt: skip
-    return Camera.from_spec(parse(Document(Path(source), json.dumps(tree)), None)[0])
+    return _as_taken(Camera.from_spec(parse(Document(Path(source), json.dumps(tree)), None)[0]), info, source)
+
+
+def _as_taken(camera: Camera, info: Any, source: str) -> Camera:
+    """The camera of the images: of the region of the sensor that is read out, and binned."""
+    region = info.roi
+    width, height = int(region.width) or camera.width, int(region.height) or camera.height
+    corner = (int(region.x_offset), int(region.y_offset))
+    if (*corner, width, height) != (0, 0, camera.width, camera.height):
+        camera = camera.cropped(*corner, width, height)
+    binned = (max(1, int(info.binning_x)), max(1, int(info.binning_y)))
+    if binned == (1, 1):
+        return camera
+    if binned[0] != binned[1]:
+        raise CalibrationError(
+            f"{source}: binned {binned[0]} x {binned[1]}, expected as many pixels in both directions"
+        )
+    # Pixels that do not fill a bin are left out.
+    whole = camera.cropped(0, 0, width // binned[0] * binned[0], height // binned[1] * binned[1])
+    return whole.scaled(1.0 / binned[0])
 
 
 def robot_from_camera(

@@ -45,14 +45,11 @@ impl CornerDetector {
         options.validate()?;
         let light = LightTable::new(options.display_gamma)?;
         let finder = match &options.method {
-            CornerMethod::Coloured(_) if mask.is_some() => {
-                return Err(Error::argument(
-                    "mask",
-                    "one for method \"coloured\"",
-                    "a mask for method \"general\" alone",
-                ));
+            CornerMethod::Coloured(_) | CornerMethod::Paper(_) if mask.is_some() => {
+                let got = format!("one for method \"{}\"", options.method.name());
+                return Err(Error::argument("mask", got, "a mask for method \"general\" alone"));
             }
-            CornerMethod::Coloured(_) => None,
+            CornerMethod::Coloured(_) | CornerMethod::Paper(_) => None,
             CornerMethod::General(general) => Some(SegmentFinder::new(&camera, general, mask.as_ref())?),
         };
         Ok(Self { camera, options, mask, light, finder })
@@ -105,15 +102,22 @@ impl CornerDetector {
         scratch: &mut CornerScratch,
     ) -> Result<Option<CornerFeature>> {
         self.check(image.width(), image.height())?;
-        let CornerMethod::Coloured(options) = &self.options.method else {
-            return Err(Error::argument("method", "general", "coloured, for images in colour"));
-        };
         let whole = Window { columns: 0..image.width(), rows: 0..image.height() };
         let window = window.map_or(whole.clone(), |window| Window {
             columns: window.columns.start.min(whole.columns.end)..window.columns.end.min(whole.columns.end),
             rows: window.rows.start.min(whole.rows.end)..window.rows.end.min(whole.rows.end),
         });
-        Ok(coloured::find(&self.camera, image, options, &self.light, &window, &mut scratch.coloured))
+        match &self.options.method {
+            CornerMethod::Coloured(options) => {
+                Ok(coloured::find(&self.camera, image, options, &self.light, &window, &mut scratch.coloured))
+            }
+            CornerMethod::Paper(options) => {
+                Ok(coloured::paper::find(&self.camera, image, options, &window, &mut scratch.coloured))
+            }
+            CornerMethod::General(_) => {
+                Err(Error::argument("method", "general", "coloured or paper, for images in colour"))
+            }
+        }
     }
 
     /// The corners of a grey image, the best first. `vertical` is a unit vector along the vertical in the camera frame, either
@@ -133,7 +137,7 @@ impl CornerDetector {
         let (CornerMethod::General(options), Some(finder), Some(memory)) =
             (&self.options.method, &self.finder, &mut scratch.general)
         else {
-            return Err(Error::argument("method", "coloured", "general, for grey images"));
+            return Err(Error::argument("method", self.options.method.name(), "general, for grey images"));
         };
         let (angle, least) = (IncludedAngle::exact(options.gamma_rad), options.vertical_max_rad.cos());
         // The vertical is the edge nearest to the prior, or to the image's columns where there is none.
@@ -153,7 +157,7 @@ impl CornerDetector {
         Ok(())
     }
 
-    /// The corner near where it is expected; none if it is not there, and for the coloured front end, which finds its corner
+    /// The corner near where it is expected; none if it is not there, and for coloured cuboids, which are found
     /// anywhere. `search_px` is how far from there, none for the option.
     pub(super) fn find_near(
         &self,

@@ -43,10 +43,10 @@ pub struct Hypothesis {
     pub camera_from_object: Matrix3<f64>,
     /// The directions of the edges x, y, z of the corner away from its vertex, left camera's frame, unit vectors.
     pub edges: [Vector3<f64>; 3],
-    /// The vertex in the left camera's frame, metres; none from one image.
+    /// The vertex in the left camera's frame, metres; none from one image without a known height.
     pub vertex_m: Option<Vector3<f64>>,
-    /// Covariance of the attitude's rotation vector (left camera's frame, radians) and of the vertex (metres; zero from one
-    /// image).
+    /// Covariance of the attitude's rotation vector (left camera's frame, radians) and of the vertex (metres; zero where that is
+    /// none).
     pub covariance: Matrix6<f64>,
     /// The probability that it is this one, in [0, 1].
     pub probability: f64,

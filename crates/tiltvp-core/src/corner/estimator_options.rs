@@ -7,7 +7,7 @@ use nalgebra::Vector3;
 use super::attitude::IncludedAngle;
 use crate::error::{Error, Result};
 use crate::options;
-use crate::options::POSITIVE;
+use crate::options::{NOT_NEGATIVE, POSITIVE};
 
 options! {
     /// What is known, and how far frames are apart.
@@ -38,13 +38,21 @@ options! {
         /// The largest distance of a vertex, metres.
         distance_max_m: f64 = 100.0
             => |o: &EstimatorOptions, x| x > o.distance_min_m, "a number of metres above distance_min_m";
+        /// How far one camera is above the level plane through the vertex, metres, as above the floor for a corner on the floor: it
+        /// tells the place. None where that is not known, and for two cameras, which tell it themselves.
+        camera_height_m: Option<f64> = None;
+        /// Standard deviation of that height, metres.
+        camera_height_sigma_m: f64 = 0.0 => NOT_NEGATIVE, "a number of metres from 0";
         /// Least probability of the best hypothesis; below it none is chosen.
         probability_min: f64 = 0.9 => 0.0..=1.0, "a probability from 0 to 1";
     }
-    check unit_down
+    check priors
 }
 
-fn unit_down(options: &EstimatorOptions) -> Result<()> {
+fn priors(options: &EstimatorOptions) -> Result<()> {
+    if let Some(height_m) = options.camera_height_m.filter(|height_m| !(*height_m > 0.0 && height_m.is_finite())) {
+        return Err(Error::option("camera_height_m", height_m, "a positive number of metres"));
+    }
     match options.down.map(|down| down.norm()) {
         Some(length) if (length - 1.0).abs() >= 1e-6 || length.is_nan() => {
             Err(Error::argument("down", format!("a vector of length {length}"), "a unit vector"))

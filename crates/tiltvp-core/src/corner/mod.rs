@@ -43,7 +43,9 @@ pub use self::feature::{CornerFeature, Edge};
 pub use self::fusion::{FusedPose, fuse_rays};
 pub use self::general::edge_ends::EdgeEnd;
 pub use self::general::segments::Segment;
-pub use self::options::{ColouredOptions, CornerMethod, DetectorOptions, GeneralOptions, OrientationChoice};
+pub use self::options::{
+    ColouredOptions, CornerMethod, DetectorOptions, EdgeLineOptions, GeneralOptions, OrientationChoice, PaperOptions,
+};
 pub use self::pose::{CornerOptions, CornerPose, corner_poses};
 pub use self::ray::FittedRay;
 pub use self::sequence::estimator::{CornerPoseEstimator, Frame};

@@ -19,16 +19,13 @@ words! {
 }
 
 options! {
-    /// Options of the paper's front end.
+    /// How the three edges between the coloured faces are found in the labels of pixels (algorithm 1).
     #[derive(Copy)]
-    pub struct ColouredOptions {
+    pub struct EdgeLineOptions {
         /// When a pixel shows a face.
         [flat] color: ColorOptions = ColorOptions::default();
         /// Which way the camera is held.
         orientation: OrientationChoice = OrientationChoice::Either;
-        /// Every how many-th pixel is labelled, along rows and columns; the rays are fitted to all pixels whatever it is. The
-        /// paper's is 1.
-        label_step_px: u32 = 2 => 1.0..=16.0, "from 1 to 16 pixels";
         /// How far apart the faces on both sides of an edge are looked for, in pixels (the paper's search width).
         search_width_px: u32 = 8 => 2.0..=100.0, "from 2 to 100 pixels";
         /// Least number of candidates of each edge, if every pixel were labelled.
@@ -37,6 +34,18 @@ options! {
         line_threshold_px: f64 = 1.5 => 0.1..=20.0, "from 0.1 to 20 pixels";
         /// Seed of the random samples.
         seed: u64 = 0;
+    }
+}
+
+options! {
+    /// Options of the front end for the coloured cuboid, whose rays run between pixels.
+    #[derive(Copy)]
+    pub struct ColouredOptions {
+        /// How the edges are found in the labels.
+        [flat] lines: EdgeLineOptions = EdgeLineOptions::default();
+        /// Every how many-th pixel is labelled, along rows and columns; the rays are fitted to all pixels whatever it is. The
+        /// paper's is 1.
+        label_step_px: u32 = 2 => 1.0..=16.0, "from 1 to 16 pixels";
         /// How far from the candidates' line the edge is looked for, in pixels.
         search_px: f64 = 4.0 => 1.0..=15.0, "from 1 to 15 pixels";
         /// How far from the first ray it is looked for the second time, in pixels.
@@ -51,6 +60,20 @@ options! {
         support_min_px: u32 = 15 => 2.0..=1e6, "from 2 to 1000000 pixels";
         /// Largest root mean square distance of the vertex from the three rays, in pixels.
         residual_max_px: f64 = 1.0 => 0.01..=100.0, "from 0.01 to 100 pixels";
+    }
+}
+
+options! {
+    /// Options of the paper as it was published.
+    #[derive(Copy)]
+    pub struct PaperOptions {
+        /// How the edges are found in the labels. The paper names neither a search width nor a threshold: these let the lines be
+        /// fitted to all midpoints next to an edge, with which the method is at its best.
+        [flat] lines: EdgeLineOptions = EdgeLineOptions { search_width_px: 4, line_threshold_px: 4.0, ..EdgeLineOptions::default() };
+        /// How far colours and blur may shift all midpoints of an edge alike, in pixels: a standard deviation.
+        line_sigma_px: f64 = 0.35 => 0.0..=10.0, "from 0 to 10 pixels";
+        /// Largest root mean square distance of the vertex from the three rays, in pixels.
+        residual_max_px: f64 = 3.0 => 0.01..=100.0, "from 0.01 to 100 pixels";
     }
 }
 
@@ -107,10 +130,12 @@ options! {
 methods! {
     /// Which front end finds corners.
     pub enum CornerMethod {
-        /// The paper's, for a cuboid whose three faces are red, green and blue.
+        /// For a cuboid whose three faces are red, green and blue: the paper's labels, then rays between pixels.
         Coloured(ColouredOptions) = "coloured",
         /// For corners of rooms, boxes and buildings without colours.
         General(GeneralOptions) = "general",
+        /// The paper as it was published, for the same cuboid.
+        Paper(PaperOptions) = "paper",
     }
 }
 

@@ -3,6 +3,7 @@
 use nalgebra::{Matrix2, Matrix3, Vector2, Vector3};
 
 use crate::camera::Camera;
+use crate::filter::symmetric;
 use crate::geometry::{GreatCircleFit, fit_great_circle, tangent_basis};
 
 /// The image of one edge of a corner.
@@ -70,7 +71,7 @@ impl FittedRay {
     pub fn reversed(mut self) -> Self {
         let turn = tangent_basis(&-self.normal).transpose() * tangent_basis(&self.normal);
         self.normal = -self.normal;
-        self.covariance = turn * self.covariance * turn.transpose();
+        self.covariance = symmetric(&(turn * self.covariance * turn.transpose()));
         self
     }
 

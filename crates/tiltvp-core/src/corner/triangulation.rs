@@ -2,6 +2,7 @@
 
 use nalgebra::{Matrix2, Matrix3, Vector3};
 
+use crate::filter::symmetric;
 use crate::geometry::{RigidMotion, tangent_basis};
 
 /// A bearing of a point, from a camera of a rig.
@@ -39,22 +40,7 @@ const VARIANCE_MIN: f64 = 1e-30;
 /// `None` for fewer than two observations, for lines of sight that are parallel to rounding, and where a camera would have the
 /// point behind it.
 pub fn triangulate(observations: &[BearingObservation]) -> Option<TriangulatedPoint> {
-    if observations.len() < 2 {
-        return None;
-    }
-    let (mut matrix, mut right) = (Matrix3::zeros(), Vector3::zeros());
-    for observation in observations {
-        let along = observation.rig_from_camera.rotation * observation.bearing;
-        let across = Matrix3::identity() - along * along.transpose();
-        matrix += across;
-        right += across * observation.rig_from_camera.translation_m;
-    }
-    // The least eigenvalue is about half of the squared angle between the lines of sight.
-    let apart = matrix.symmetric_eigenvalues().min();
-    if apart <= PARALLEL || apart.is_nan() {
-        return None;
-    }
-    let mut point = matrix.try_inverse()? * right;
+    let (mut point, _) = nearest(observations)?;
     for step in 0..=STEPS {
         let (mut information, mut pull, mut chi_square) = (Matrix3::zeros(), Vector3::zeros(), 0.0);
         for observation in observations {
@@ -83,6 +69,49 @@ pub fn triangulate(observations: &[BearingObservation]) -> Option<TriangulatedPo
         point -= move_m;
     }
     None
+}
+
+/// The point nearest to all lines of sight, and the inverse of the sum of projections across them; none where they are parallel.
+fn nearest(observations: &[BearingObservation]) -> Option<(Vector3<f64>, Matrix3<f64>)> {
+    if observations.len() < 2 {
+        return None;
+    }
+    let (mut matrix, mut right) = (Matrix3::zeros(), Vector3::zeros());
+    for observation in observations {
+        let along = observation.rig_from_camera.rotation * observation.bearing;
+        let across = Matrix3::identity() - along * along.transpose();
+        matrix += across;
+        right += across * observation.rig_from_camera.translation_m;
+    }
+    // The least eigenvalue is about half of the squared angle between the lines of sight.
+    let apart = matrix.symmetric_eigenvalues().min();
+    if apart <= PARALLEL || apart.is_nan() {
+        return None;
+    }
+    let inverse = matrix.try_inverse()?;
+    Some((inverse * right, inverse))
+}
+
+/// The middle of the shortest line between two lines of sight, which is the point nearest to both, with its covariance to first
+/// order; none where they are parallel and where the point would be behind a camera.
+pub(super) fn midpoint(observations: &[BearingObservation; 2]) -> Option<TriangulatedPoint> {
+    let (point, inverse) = nearest(observations)?;
+    let (mut spread, mut chi_square) = (Matrix3::zeros(), 0.0);
+    for observation in observations {
+        let rotation = observation.rig_from_camera.rotation;
+        let to = rotation.transpose() * (point - observation.rig_from_camera.translation_m);
+        let ahead = to.dot(&observation.bearing);
+        if ahead <= 0.0 || ahead.is_nan() {
+            return None;
+        }
+        let basis = tangent_basis(&observation.bearing);
+        let carried = rotation * basis * ahead;
+        spread += carried * observation.covariance * carried.transpose();
+        let miss = basis.transpose() * to / ahead;
+        let weight = (observation.covariance + Matrix2::from_diagonal_element(VARIANCE_MIN)).try_inverse()?;
+        chi_square += miss.dot(&(weight * miss));
+    }
+    Some(TriangulatedPoint { point_m: point, covariance_m2: symmetric(&(inverse * spread * inverse)), chi_square })
 }
 
 /// Least eigenvalue of the sum of projections across the lines of sight, about half of their squared angle: 1e-8 rad,

@@ -23,10 +23,10 @@ value! {
         /// Fresh (3, 3) float64, rows x, y, z: directions of the corner's edges away from its vertex, left camera's frame.
         /// The frame of `camera_from_object` keeps its axes from frame to frame, whatever the edges are called.
         edges: [Vector3<f64>; 3],
-        /// Fresh (3,) float64: the vertex in the left camera's frame, metres; None from one image.
+        /// Fresh (3,) float64: the vertex in the left camera's frame, metres; None from one image without `camera_height_m`.
         vertex_m: Option<Vector3<f64>>,
         /// Fresh (6, 6) float64: covariance of the attitude's rotation vector (left camera's frame, radians) and of the
-        /// vertex (metres; zero from one image).
+        /// vertex (metres; zero where that is None).
         covariance: Matrix6<f64>,
         /// The probability that it is this one, in [0, 1].
         probability: f64,
@@ -39,7 +39,7 @@ value! {
 
 #[pymethods]
 impl CornerHypothesis {
-    /// Fresh (3,) float64: where the left camera is in the object's frame, metres; None from one image.
+    /// Fresh (3,) float64: where the left camera is in the object's frame, metres; None where `vertex_m` is.
     #[getter]
     fn camera_in_object_m<'py>(&self, py: Python<'py>) -> PyResult<Option<Array<'py, f64>>> {
         self.inner.camera_in_object_m().map(|place| convert::to_matrix(py, &place)).transpose()

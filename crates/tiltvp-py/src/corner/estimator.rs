@@ -53,7 +53,7 @@ impl CornerPoseEstimator {
         }
         let own = left.get().inner().clone();
         let other = right.map(|right| right.get().inner().clone()).zip(motion);
-        let (copy, coloured) = (options.clone(), matches!(own.options().method, CornerMethod::Coloured(_)));
+        let (copy, coloured) = (options.clone(), !matches!(own.options().method, CornerMethod::General(_)));
         let inner = call_long(py, move || core::CornerPoseEstimator::new(own, other, copy))?;
         Ok(Self {
             inner: Shared::new(inner),

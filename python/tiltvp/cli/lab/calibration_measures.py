@@ -140,7 +140,9 @@ def trust_calibration(
         check_ending(out)
     with progress_bar(len(cases) * drives, "drives") as bar:
         seeds = range(seed, seed + drives)
-        table = pl.concat([judge_drives(hostile_drives(case, seeds), advance=bar.advance) for case in cases])
+        tables = [judge_drives(hostile_drives(case, seeds), advance=bar.advance) for case in cases]
+    # Where no cause is to be named, a table does not tell the type of its column.
+    table = pl.concat(tables, how="vertical_relaxed")
     if out is not None:
         write_frame(table, out)
     show_frame(f"Shares in per cent, of {drives} drives of each case", summarise_drive_cases(table), ["case", "by"])

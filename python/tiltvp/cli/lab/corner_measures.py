@@ -28,7 +28,8 @@ def corners(
     """Poses of corners: the closed form on random poses, and rendered sequences of a hand-held stereo pair.
 
     Tables have the closed form's error, errors with noise against the Cramer-Rao bound, errors of attitude and position
-    with flips in the sequences, and what an inertial sensor makes of the attitudes.
+    with flips in the sequences, of the published method beside ours, and what an inertial sensor makes of the
+    attitudes.
 
     Parameters
     ----------
@@ -80,15 +81,16 @@ def _sequences(frames: int, names: tuple[str, ...], seed: int, threads: int, out
         check_output_folder(out)
     with progress_bar(sum(experiment.lengths()), "frames") as bar:
         table, inertial = measure_corners(experiment, threads=threads, advance=bar.advance)
-    show_frame("Rendered sequences, errors of poses", summarise_corners(table), ["scene"])
+    show_frame("Rendered sequences, errors of poses", summarise_corners(table), ["scene", "method"])
     if inertial.height:
         summary = summarise_inertial_comparison(inertial)
         show_frame("With an inertial sensor, errors in degrees", summary, ["method"])
     if out is not None:
         write_frame(table, out / "corners.parquet")
-        for (name,), part in table.partition_by("scene", as_dict=True, maintain_order=True).items():
-            file = out / f"{str(name).replace(', ', '-').replace(' ', '-')}.png"
-            write_image(file, figure_picture(corner_errors(part, str(name))))
+        for key, part in table.partition_by("scene", "method", as_dict=True, maintain_order=True).items():
+            name = ", ".join(map(str, key))
+            file = out / f"{name.replace(', ', '-').replace(' ', '-')}.png"
+            write_image(file, figure_picture(corner_errors(part, name)))
         if inertial.height:
             write_frame(inertial, out / "inertial.parquet")
             write_image(out / "inertial.png", figure_picture(inertial_errors(inertial)))

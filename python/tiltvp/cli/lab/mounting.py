@@ -15,7 +15,7 @@ def mounting(
     drives: Annotated[int, Parameter(validator=validators.Number(gte=1))] = 6,
     seed: Annotated[int, Parameter(validator=validators.Number(gte=0))] = 900,
 ) -> None:
-    """What `tiltvp setup` finds on rendered recordings of drives over level floors, floors of one degree and bumps.
+    """What `tiltvp setup` and `calibrate` find on rendered recordings of drives: level and sloping floors, and bumps.
 
     Parameters
     ----------
@@ -26,6 +26,7 @@ def mounting(
     """
     import polars as pl
 
+    from tiltvp.lab.evaluation.extrinsics import summarise_extrinsics
     from tiltvp.lab.evaluation.mounting import (
         CAMERAS,
         CASES,
@@ -38,3 +39,5 @@ def mounting(
         rows = pl.DataFrame(list(judge_mountings(drives, seed, advance=bar.advance)), infer_schema_length=None)
     show_frame("Errors of the mounting in degrees", summarise_mountings(rows), ["looks", "floor", "method"])
     show_frame("Shares of drives in per cent", summarise_findings(rows), ["looks"])
+    title = "Extrinsics but the height: rms errors where said to be reliable, shares of drives in per cent"
+    show_frame(title, summarise_extrinsics(rows), ["looks", "floor"])

@@ -31,8 +31,21 @@ __all__ = ["CORNER_SCENES", "CornerExperiment", "CornerScene", "measure_corners"
 _FLIP_DEG: Final = 20.0
 """An attitude that is farther off is another interpretation, not a noisy one."""
 
+_ONE_CAMERA: Final = "coloured, one camera, height known"
+"""The left camera alone, each frame for itself, with its height above the vertex as somebody measures it."""
+
+_HEIGHT_SIGMA_M: Final = 0.005
+"""Of that height: of a folding rule held upright from the lens to the floor."""
+
 _SCHEMA: Final[dict[str, Any]] = (
-    {"scene": pl.String, "frame": pl.UInt32, "time_s": pl.Float64, "distance_m": pl.Float64, "found": pl.Boolean}
+    {
+        "scene": pl.String,
+        "method": pl.String,
+        "frame": pl.UInt32,
+        "time_s": pl.Float64,
+        "distance_m": pl.Float64,
+        "found": pl.Boolean,
+    }
     | {"corner": pl.Int64}
     | dict.fromkeys(("attitude_deg", "roll_deg", "pitch_deg", "yaw_deg"), pl.Float64)
     | dict.fromkeys(("position_m", "x_m", "y_m", "z_m", "probability", "nees", "ms"), pl.Float64)
@@ -42,7 +55,7 @@ _SCHEMA: Final[dict[str, Any]] = (
 
 @dataclass(frozen=True)
 class CornerScene:
-    """A sequence, and the front end that looks at it."""
+    """A sequence, and the methods that look at it."""
 
     name: str
     kind: str = "laboratory"
@@ -55,12 +68,13 @@ class CornerScene:
     options: dict[str, Any] = field(default_factory=dict)
     """Of `StereoSequence`."""
     known: dict[str, Any] = field(default_factory=dict)
-    """Options of `CornerPoseEstimator`: what is known beforehand, but for gamma, and which way is down in a room."""
+    """Options of `CornerPoseEstimator`, but not for the published method: what is known beforehand, beside gamma, and
+    which way is down in a room."""
 
     @property
-    def method(self) -> str:
-        """The front end of `CornerDetector`."""
-        return "coloured" if self.kind == "laboratory" else "general"
+    def methods(self) -> tuple[str, ...]:
+        """Those of `CornerDetector` for both cameras: ours, and before the cuboid the published one beside it."""
+        return ("coloured", "paper") if self.kind == "laboratory" else ("general",)
 
     def sequence(self, frames: int, seed: int, threads: int | None) -> StereoSequence:
         """The sequence."""
@@ -111,7 +125,7 @@ class CornerExperiment:
 def measure_corners(
     experiment: CornerExperiment, *, threads: int = 1, advance: Callable[[], None] = lambda: None
 ) -> tuple[pl.DataFrame, pl.DataFrame]:
-    """One row for each frame, and the comparison of `compare_inertial` on the first scene with a cuboid.
+    """One row for each frame and method, and the comparison of `compare_inertial` on the first scene with a cuboid.
 
     Angles are components of the error's rotation vector in the left camera: pitch about x, yaw about y, roll about z.
     x_m, y_m, z_m are errors of the left camera's place in the corner's frame. `nees` is the squared error of attitude
@@ -125,27 +139,29 @@ def measure_corners(
     inertial: list[pl.DataFrame] = []
     for k, (scene, frames) in enumerate(zip(experiment.scenes, experiment.lengths(), strict=True)):
         sequence = scene.sequence(frames, experiment.seed + k, threads)
-        estimates: list[CornerEstimate] = []
-        times_ms: list[float] = []
-        for estimate, ms in _estimates(scene, sequence, threads):
-            estimates.append(estimate)
-            times_ms.append(ms)
+        seen: dict[str, list[tuple[CornerEstimate, float]]] = {}
+        for looks in _estimates(scene, sequence, threads):
+            for method, look in looks.items():
+                seen.setdefault(method, []).append(look)
             advance()
-        places = own_places(sequence, estimates)
-        for frame, (estimate, ms) in enumerate(zip(estimates, times_ms, strict=True)):
-            rows.append({"scene": scene.name, "ms": ms} | _judged(scene, sequence, frame, estimate, places))
-        attitudes = [None if estimate.pose is None else estimate.pose.camera_from_object for estimate in estimates]
+        for method, looked in seen.items():
+            estimates = [estimate for estimate, _ in looked]
+            places = own_places(sequence, estimates)
+            for frame, (estimate, ms) in enumerate(looked):
+                judged = _judged(scene, sequence, frame, estimate, places)
+                rows.append({"scene": scene.name, "method": method, "ms": ms} | judged)
+        attitudes = [None if one.pose is None else one.pose.camera_from_object for one, _ in seen[scene.methods[0]]]
         if scene.kind == "laboratory" and not inertial and any(a is not None for a in attitudes):
             inertial.append(compare_inertial(sequence, attitudes, seed=experiment.seed))
     return pl.DataFrame(rows, schema=_SCHEMA), pl.concat(inertial) if inertial else pl.DataFrame()
 
 
 def summarise_corners(table: pl.DataFrame) -> pl.DataFrame:
-    """Found rate, root mean square errors and flips of each scene."""
+    """Found rate, root mean square errors and flips of each scene and method."""
     attitude, position = pl.col("attitude_deg"), pl.col("position_m")
     flipped = attitude > _FLIP_DEG
     kept = ~flipped
-    return table.group_by("scene", maintain_order=True).agg(
+    return table.group_by("scene", "method", maintain_order=True).agg(
         pl.len().alias("frames"),
         pl.col("found").mean().alias("found"),
         pl.col("corner").filter(pl.col("found")).ge(0).mean().alias("listed corner"),
@@ -155,21 +171,30 @@ def summarise_corners(table: pl.DataFrame) -> pl.DataFrame:
         position.quantile(0.99).mul(1000).alias("99 % mm"),
         flipped.sum().alias("flips"),
         pl.col("nees").filter(kept).mean().alias("NEES of 6"),
+        ((position / pl.col("distance_m")) ** 2).filter(kept).mean().sqrt().mul(100).alias("% of distance"),
         pl.col("distance_m").min().alias("from m"),
         pl.col("distance_m").max().alias("to m"),
         pl.col("ms").median().alias("ms"),
     )
 
 
-def _estimates(scene: CornerScene, sequence: StereoSequence, threads: int) -> Iterator[tuple[CornerEstimate, float]]:
-    """What the estimator says of each frame in turn, and the processor time it took, milliseconds."""
-    known: dict[str, Any] = {"gamma_rad": math.radians(scene.gamma_deg)} | scene.known
+def _estimates(
+    scene: CornerScene, sequence: StereoSequence, threads: int
+) -> Iterator[dict[str, tuple[CornerEstimate, float]]]:
+    """What each method says of each frame in turn, and the processor time it took, milliseconds."""
+    angle: dict[str, Any] = {"gamma_rad": math.radians(scene.gamma_deg)}
+    known = angle | scene.known
     if scene.kind != "laboratory":
         # What tells upright edges from level ones is how the board is held, as its accelerometer has it on average.
         known["down"] = -sequence.imu(seed=sequence.seed).forces_m_s2.mean(axis=0)
     left, right = sequence.cameras
-    estimator = CornerPoseEstimator(left, right, sequence.left_from_right, method=scene.method, **known)
-    stop = Event()
+    estimators = {
+        method: CornerPoseEstimator(
+            left, right, sequence.left_from_right, method=method, **(angle if method == "paper" else known)
+        )
+        for method in scene.methods
+    }
+    stop, heights = Event(), np.random.default_rng(sequence.seed)
 
     def render(frame: int) -> Pair:
         if stop.is_set():
@@ -177,10 +202,21 @@ def _estimates(scene: CornerScene, sequence: StereoSequence, threads: int) -> It
         return sequence.render(frame, threads=1)
 
     with closing(in_order(render, range(len(sequence)), threads, stop)) as pairs:
-        for pair in pairs:
-            start = time.thread_time()
-            estimate = estimator(*pair)
-            yield estimate, 1000.0 * (time.thread_time() - start)
+        for frame, pair in enumerate(pairs):
+            looks = {method: _timed(estimator, *pair) for method, estimator in estimators.items()}
+            if scene.kind == "laboratory":
+                object_from_left = np.linalg.inv(sequence.left_from_object(frame))
+                height_m = abs(float(object_from_left[1, 3])) + heights.normal(0.0, _HEIGHT_SIGMA_M)
+                alone: dict[str, Any] = {"camera_height_m": height_m, "camera_height_sigma_m": _HEIGHT_SIGMA_M}
+                looks[_ONE_CAMERA] = _timed(CornerPoseEstimator(left, method="coloured", **known, **alone), pair[0])
+            yield looks
+
+
+def _timed(estimator: CornerPoseEstimator, *images: NDArray[np.uint8]) -> tuple[CornerEstimate, float]:
+    """The estimate, and the processor time it took, milliseconds."""
+    start = time.thread_time()
+    estimate = estimator(*images)
+    return estimate, 1000.0 * (time.thread_time() - start)
 
 
 def _judged(

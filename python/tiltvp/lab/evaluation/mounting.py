@@ -15,6 +15,7 @@ from tiltvp.lab.datasets.ahead import AHEAD_CAMERAS
 from tiltvp.lab.datasets.driving import drive_room
 from tiltvp.lab.datasets.panoramas import paper_camera
 from tiltvp.lab.datasets.recording import WHEEL_RADIUS_M, RecordedDrive
+from tiltvp.lab.evaluation.extrinsics import judged_extrinsics
 from tiltvp.mounting import MountingTilt, mounting_tilt
 from tiltvp.robot_setup import DriveTilts, drive_tilts, find_setup
 from tiltvp.rotations import read_rotation
@@ -86,7 +87,7 @@ def _judged(path: Path, number: int, seed: int, looks: str, floor: str) -> dict[
         mounting = mounting_tilt(tilts.estimates, tilts.motions, nominal)
         row |= _errors(f"{method} ", mounting, drive.robot_from_mounted_camera, nominal)
         row |= _leans(f"{method} ", tilts, drive, nominal)
-    return row
+    return row | judged_extrinsics(frames, motions, drive, found.mounting)
 
 
 def _errors(
@@ -96,7 +97,8 @@ def _errors(
     normal = nominal @ true.T @ np.array([0.0, 0.0, 1.0])
     if not found:
         return {f"{prefix}error_deg": None, f"{prefix}nees": None, f"{prefix}sigma_deg": None}
-    off = (found.lean.normal - normal)[:2]
+    # The turn about the robot's axes from the one to the other.
+    off = np.array([[0.0, 1.0], [-1.0, 0.0]]) @ (found.lean.normal - normal)[:2]
     return {
         f"{prefix}error_deg": math.degrees(float(np.linalg.norm(off))),
         f"{prefix}nees": float(off @ np.linalg.solve(found.covariance_rad2, off)),

@@ -21,10 +21,12 @@ if TYPE_CHECKING:
 
     Matrix = NDArray[np.float64]
 
-__all__ = ["TRANSFORM_ENDINGS", "StaticTransform", "check_transform"]
+__all__ = ["COVARIANCE_AXES", "TRANSFORM_ENDINGS", "StaticTransform", "check_transform"]
 
-TRANSFORM_ENDINGS: Final = (".mcap", ".urdf", ".yaml")
+TRANSFORM_ENDINGS: Final = (".mcap", ".urdf", ".kalibr.yaml", ".yaml")
 """Of the files that `StaticTransform.write` writes."""
+COVARIANCE_AXES: Final = ("x", "y", "roll", "pitch", "yaw")
+"""Of `StaticTransform.covariance`; roll, pitch and yaw are turns about the parent's x, y and z axes."""
 _AXES: Final = ("x", "y", "z", "roll", "pitch", "yaw")
 
 
@@ -41,7 +43,9 @@ class StaticTransform:
     missing: tuple[str, ...] = ()
     """What is not known, of x, y, z, roll, pitch and yaw."""
     sigmas: tuple[tuple[str, float], ...] = ()
-    """Standard deviations of what was estimated, by the same names; metres and radians."""
+    """Standard deviations of what was estimated, by the names of `COVARIANCE_AXES`; metres and radians."""
+    covariance: Matrix | None = None
+    """(5, 5): of the errors along and about the parent's axes, in the order of `COVARIANCE_AXES`."""
 
     def __post_init__(self) -> None:
         """Raises `InvalidInputError` for names that no frame can have and for numbers that are not finite."""
@@ -104,21 +108,41 @@ class StaticTransform:
             "parent_from_child:",
             *(f"  - [{', '.join(map(_number, row))}]" for row in matrix),
             f"sigma: {_flow(dict(self.sigmas))}",
+            *self._covariance_lines(),
             f"not_known: [{', '.join(self.missing)}]",
+        ])  # fmt: skip
+
+    def _covariance_lines(self) -> list[str]:
+        if self.covariance is None:
+            return []
+        rows = [f"  - [{', '.join(f'{value:.6e}' for value in row)}]" for row in self.covariance]
+        return [f"covariance_axes: [{', '.join(COVARIANCE_AXES)}]", "covariance:", *rows]
+
+    def kalibr(self) -> str:
+        """As a camera chain of Kalibr has it: the parent is in the place of the inertial sensor."""
+        matrix = np.eye(4)
+        matrix[:3, :3], matrix[:3, 3] = self.rotation.T, -self.rotation.T @ self.translation_m
+        return "\n".join([
+            *([f"# {self.note}"] if self.missing else []),
+            f"# {self.parent} is in the place of the imu, {self.child} is the camera",
+            "cam0:",
+            "  T_cam_imu:",
+            *(f"    - [{', '.join(f'{value:.9f}' if value else '0.0' for value in row)}]" for row in matrix),
         ])  # fmt: skip
 
     def write(self, path: str | os.PathLike[str]) -> None:
         """As a file, whole or not at all: the ending says which.
 
-        .urdf is `urdf_joint`, .yaml is `yaml`, .mcap has the transform on /tf_static, with the stamp 0, and `yaml` as
-        text on /tiltvp/static_transform. Raises as `check_transform` does.
+        .urdf is `urdf_joint`, .kalibr.yaml is `kalibr`, other .yaml is `yaml`, .mcap has the transform on /tf_static,
+        with the stamp 0, and `yaml` as text on /tiltvp/static_transform. Raises as `check_transform` does.
         """
         check_transform(path)
         match Path(path).suffix.lower():
             case ".urdf":
                 write_whole(path, self.urdf_joint() + "\n")
             case ".yaml":
-                write_whole(path, self.yaml() + "\n")
+                text = self.kalibr() if str(path).lower().endswith(".kalibr.yaml") else self.yaml()
+                write_whole(path, text + "\n")
             case _:
                 one = messages.transform(0, self.parent, self.child, self.translation_m, self.rotation)
                 with new_recording(path) as recording:

@@ -284,6 +284,24 @@ fn attitude(
     }
 }
 
+/// The covariance of the attitude with these edges, and its covariance with the error of the vertex' bearing; none where the attitude
+/// is not determined.
+pub(in crate::corner) fn with_vertex(
+    feature: &CornerFeature,
+    edges: &[Vector3<f64>; 3],
+    gamma_sigma_rad: f64,
+) -> Option<(Matrix3<f64>, Matrix3<f64>)> {
+    let pencil = &feature.pencil;
+    let leaning = [0, 1, 2].map(|i: usize| (edges[i].dot(&pencil.along[i]), edges[i].dot(&pencil.vertex)));
+    let rows = [0, 1, 2].map(|i: usize| pencil.vertex * leaning[i].0 - pencil.along[i] * leaning[i].1);
+    let inverse = Matrix3::from_columns(&rows).transpose().try_inverse()?;
+    let pulled = [0, 1, 2].map(|i: usize| pencil.normal[i] * (leaning[i].1 + pencil.lever[i] * leaning[i].0));
+    let opening = edges[1].cross(&edges[2]);
+    let spread = right_hand_side_covariance(pencil, &leaning, pencil.normal[2].dot(&opening) * gamma_sigma_rad);
+    let with = inverse * Matrix3::from_columns(&pulled).transpose() * pencil.vertex_covariance;
+    Some((inverse * spread * inverse.transpose(), with))
+}
+
 /// The covariance of the right-hand side `r` of [`attitude`]'s equations; `leaning` holds the sine and cosine of each edge's
 /// angle from the line of sight, `gamma_sigma` is what an uncertain gamma adds to the third equation, as a standard deviation.
 ///

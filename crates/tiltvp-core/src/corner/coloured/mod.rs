@@ -2,6 +2,7 @@
 
 mod edge_candidates;
 mod highlights;
+pub(super) mod paper;
 pub(super) mod segmentation;
 
 use nalgebra::{Vector2, Vector3};
@@ -10,7 +11,7 @@ use self::edge_candidates::{Doubled, EdgeCandidates, Orientation};
 use self::highlights::trusts;
 use self::segmentation::{Labels, Primary};
 use super::feature::CornerFeature;
-use super::options::{ColouredOptions, OrientationChoice};
+use super::options::{ColouredOptions, EdgeLineOptions, OrientationChoice};
 use super::trace::{RaySearch, TraceScratch, TracedRay, trace};
 use crate::camera::Camera;
 use crate::image::{ColorView, LightTable};
@@ -69,6 +70,11 @@ struct CandidateLine {
     /// A unit tangent along the line, and the angles from `middle` along it between which they lie.
     along: Vector3<f64>,
     reach: [f64; 2],
+    /// How many candidates agree, and the root mean square of their distances from the line.
+    support: usize,
+    rms_rad: f64,
+    /// Pixels per radian about the middle.
+    px_per_rad: f64,
 }
 
 /// The cuboid's corner in a window of the image; none where an edge has too few candidates or the edges do not meet.
@@ -80,40 +86,10 @@ pub(crate) fn find(
     window: &Window,
     scratch: &mut ColouredScratch,
 ) -> Option<CornerFeature> {
-    scratch.labels.fill(
-        image,
-        &options.color,
-        window.columns.clone(),
-        window.rows.clone(),
-        options.label_step_px as usize,
-    );
-    let orientations: &[Orientation] = match options.orientation {
-        OrientationChoice::Upright => &[Orientation::Upright],
-        OrientationChoice::UpsideDown => &[Orientation::UpsideDown],
-        OrientationChoice::Either => &[Orientation::Upright, Orientation::UpsideDown],
-    };
-    let width = options.search_width_px as usize;
-    let mut found = false;
-    for orientation in orientations {
-        scratch.candidates.find(&scratch.labels, width, *orientation);
-        found = scratch.candidates.fewest() >= (options.candidates_min / options.label_step_px.pow(2)).max(2) as usize;
-        if found {
-            break;
-        }
-    }
-    if !found {
-        return None;
-    }
-    let mut lines = [None; 3];
-    for (line, candidates) in lines.iter_mut().zip(&scratch.candidates.edges) {
-        let memory = (&mut scratch.rows, &mut scratch.bearings, &mut scratch.weights, &mut scratch.ransac);
-        *line = fit_line(camera, candidates, options, memory);
-    }
-    let [Some(x), Some(y), Some(z)] = lines else { return None };
-    let lines = [x, y, z];
+    let lines = find_lines(camera, image, &options.lines, (options.label_step_px, LIFTED_MAX), window, scratch)?;
     let mut vertex = meeting_point(&lines);
     let px_per_rad = camera.project_jacobian(&vertex).map(|(_, jacobian)| jacobian.norm() / 2f64.sqrt())?;
-    let [top, left, right] = options.color.faces;
+    let [top, left, right] = options.lines.color.faces;
     let faces = [(top, right), (left, right), (top, left)];
     let mut searches = lines.map(|line| search_of(&line, &vertex, px_per_rad, options));
     let mut feature = None;
@@ -143,6 +119,40 @@ pub(crate) fn find(
     feature.filter(|found| found.residual_rad() * px_per_rad <= options.residual_max_px)
 }
 
+/// The lines of the three edges by algorithm 1 and RANSAC; every `step`-th pixel is labelled, and at most `lifted_max` candidates
+/// of an edge are lifted to bearings. None where an edge has too few candidates.
+fn find_lines(
+    camera: &Camera,
+    image: &ColorView<'_>,
+    options: &EdgeLineOptions,
+    (step, lifted_max): (u32, usize),
+    window: &Window,
+    scratch: &mut ColouredScratch,
+) -> Option<[CandidateLine; 3]> {
+    scratch.labels.fill(image, &options.color, window.columns.clone(), window.rows.clone(), step as usize);
+    let orientations: &[Orientation] = match options.orientation {
+        OrientationChoice::Upright => &[Orientation::Upright],
+        OrientationChoice::UpsideDown => &[Orientation::UpsideDown],
+        OrientationChoice::Either => &[Orientation::Upright, Orientation::UpsideDown],
+    };
+    let width = options.search_width_px as usize;
+    let least = (options.candidates_min / step.pow(2)).max(2) as usize;
+    let found = orientations.iter().any(|orientation| {
+        scratch.candidates.find(&scratch.labels, width, *orientation);
+        scratch.candidates.fewest() >= least
+    });
+    if !found {
+        return None;
+    }
+    let mut lines = [None; 3];
+    for (line, candidates) in lines.iter_mut().zip(&scratch.candidates.edges) {
+        let memory = (&mut scratch.rows, &mut scratch.bearings, &mut scratch.weights, &mut scratch.ransac);
+        *line = fit_line(camera, candidates, options, lifted_max, memory);
+    }
+    let [Some(x), Some(y), Some(z)] = lines else { return None };
+    Some([x, y, z])
+}
+
 /// How much brighter the one primary is than the other: across the edge between their faces one rises where the other falls,
 /// so that what glare does to both cancels.
 fn difference(
@@ -167,11 +177,12 @@ fn difference(
 fn fit_line(
     camera: &Camera,
     candidates: &[Doubled],
-    options: &ColouredOptions,
+    options: &EdgeLineOptions,
+    lifted_max: usize,
     (rows, bearings, weights, memory): (&mut Rows<f64>, &mut Vec<Vector3<f64>>, &mut Vec<f32>, &mut RansacScratch),
 ) -> Option<CandidateLine> {
     bearings.clear();
-    let stride = candidates.len().div_ceil(LIFTED_MAX).max(1);
+    let stride = candidates.len().div_ceil(lifted_max).max(1);
     let pixels = candidates.iter().step_by(stride).map(|[u, v]| Vector2::new(f64::from(*u), f64::from(*v)) * 0.5);
     bearings.extend(pixels.filter_map(|pixel| camera.unproject(&pixel)));
     let middle = bearings.iter().sum::<Vector3<f64>>().try_normalize(1e-3)?;
@@ -197,11 +208,13 @@ fn fit_line(
     let middle = (middle - normal * normal.dot(&middle)).try_normalize(1e-6)?;
     let along = normal.cross(&middle);
     let mut reach = [f64::INFINITY, f64::NEG_INFINITY];
-    for bearing in agreeing {
+    for bearing in agreeing.clone() {
         let angle = bearing.dot(&along).atan2(bearing.dot(&middle));
         reach = [reach[0].min(angle), reach[1].max(angle)];
     }
-    (reach[0] < reach[1]).then_some(CandidateLine { normal, middle, along, reach })
+    let support = agreeing.clone().count();
+    let rms_rad = (agreeing.map(|bearing| bearing.dot(&normal).powi(2)).sum::<f64>() / support as f64).sqrt();
+    (reach[0] < reach[1]).then_some(CandidateLine { normal, middle, along, reach, support, rms_rad, px_per_rad })
 }
 
 /// Where three lines meet, by unweighted least squares (eqs. 25 to 27 in bearings).

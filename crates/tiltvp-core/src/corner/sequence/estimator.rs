@@ -55,6 +55,10 @@ impl CornerPoseEstimator {
             if names[0] != names[1] {
                 return Err(Error::argument("right", names[1], format!("the method of left, {}", names[0])));
             }
+            if let Some(height_m) = options.camera_height_m {
+                let expected = "none for two cameras, which tell the distance themselves";
+                return Err(Error::argument("camera_height_m", height_m.to_string(), expected));
+            }
             if left_from_right.translation_m.norm() <= 0.0 {
                 return Err(Error::argument("left_from_right", "no baseline", "two cameras at different places"));
             }
@@ -163,6 +167,8 @@ impl CornerPoseEstimator {
             estimate.verdict = CornerVerdict::NoneLeft;
         } else if right.is_some() && estimate.features[1].is_empty() {
             estimate.verdict = CornerVerdict::NoneRight;
+        } else if self.right.is_some() && self.is_as_published() {
+            self.by_paper(&mut estimate)?;
         } else if self.right.is_some() {
             seen = self.by_pair(attitude.as_ref(), common.as_ref(), &mut estimate)?;
         } else {
@@ -198,6 +204,9 @@ impl CornerPoseEstimator {
             let corners = [parallel(0, pose.camera_from_object), parallel(1, turned * pose.camera_from_object)];
             self.track = Some(Track::next(self.track.take(), pose, corners, estimate.object, &seen));
         }
+        if self.right.is_none() {
+            self.place_by_height(vertical.as_ref(), &mut estimate);
+        }
         Ok(estimate)
     }
 
@@ -225,11 +234,18 @@ impl CornerPoseEstimator {
 
     /// Whether edges and object are the same from frame to frame, as those of the coloured cuboid are.
     pub(super) fn is_one_object(&self) -> bool {
-        matches!(self.left.options().method, CornerMethod::Coloured(_))
+        !matches!(self.left.options().method, CornerMethod::General(_))
     }
 
+    /// Whether poses are made as the paper has it.
+    fn is_as_published(&self) -> bool {
+        matches!(self.left.options().method, CornerMethod::Paper(_))
+    }
+
+    /// What is known of the interpretation. The coloured cuboid's corner is an outer one; the paper does not use it.
     pub(super) fn right_handed(&self) -> Option<bool> {
-        self.options.right_handed.or(self.is_one_object().then_some(true))
+        let told = matches!(self.left.options().method, CornerMethod::Coloured(_));
+        self.options.right_handed.or(told.then_some(true))
     }
 
     /// Attitudes from one image: of all features that agree with one another.

@@ -2,7 +2,9 @@
 
 mod agreement;
 pub(super) mod estimator;
+mod height;
 mod pairs;
+mod paper;
 mod shared_attitude;
 mod support;
 pub(super) mod track;

@@ -1,0 +1,75 @@
+//! The place of a corner before one camera whose height above it is known.
+
+use nalgebra::{Matrix3, Matrix6, Vector3};
+
+use super::estimator::CornerPoseEstimator;
+use crate::corner::closed_form::attitude::with_vertex;
+use crate::corner::estimate::{CornerEstimate, Hypothesis};
+use crate::corner::feature::CornerFeature;
+
+/// The largest standard deviation of a distance as a share of it. Covariances are to first order; the next order is as much
+/// again of what they say, 1 % of the distance here. Larger ones are those of corners at the height of the camera.
+const SHARE_MAX: f64 = 0.1;
+
+impl CornerPoseEstimator {
+    /// Gives the poses from one image the place that the known height above the vertex tells, each its own. None where the vertex
+    /// is not below the camera as far as that is known, where nothing told which edge is the vertical one, where the height tells
+    /// too little, and beyond the limits of the distance.
+    pub(super) fn place_by_height(&self, vertical: Option<&Vector3<f64>>, estimate: &mut CornerEstimate) {
+        let (Some(height_m), Some(corner)) =
+            (self.options.camera_height_m, estimate.chosen_left.first().and_then(|i| estimate.features[0].get(*i)))
+        else {
+            return;
+        };
+        let named = self.is_one_object() || vertical.is_some();
+        let above = !estimate.followed && self.options.down.is_some_and(|down| down.dot(&corner.vertex()) <= 0.0);
+        if !named || above {
+            return;
+        }
+        for pose in &mut estimate.hypotheses {
+            let height = (height_m, self.options.camera_height_sigma_m);
+            if let Some((vertex_m, covariance)) = placed(pose, corner, height, self.options.angle.sigma_rad)
+                && (self.options.distance_min_m..=self.options.distance_max_m).contains(&vertex_m.norm())
+            {
+                (pose.vertex_m, pose.covariance) = (Some(vertex_m), covariance);
+            }
+        }
+    }
+}
+
+/// The vertex at the distance `h / (v . u)` along its bearing `v`, with `u` the direction down, and the covariance of attitude and
+/// vertex to first order in the errors of the bearing, of the attitude and of the height.
+fn placed(
+    pose: &Hypothesis,
+    corner: &CornerFeature,
+    (height_m, height_sigma_m): (f64, f64),
+    gamma_sigma_rad: f64,
+) -> Option<(Vector3<f64>, Matrix6<f64>)> {
+    let bearing = corner.vertex();
+    let upright = pose.camera_from_object.column(1).into_owned();
+    let down = if upright.dot(&bearing) < 0.0 { -upright } else { upright };
+    let drop = down.dot(&bearing);
+    let distance_m = height_m / drop;
+    let attitude: Matrix3<f64> = pose.covariance.fixed_view::<3, 3>(0, 0).into_owned();
+    let by_bearing = (Matrix3::identity() - bearing * down.transpose() / drop) * distance_m;
+    let by_attitude = -bearing * down.cross(&bearing).transpose() * (distance_m / drop);
+    let by_height = bearing * (height_sigma_m / drop);
+    let seen = corner.pencil.vertex_covariance;
+    // The attitude errs with the bearing of its own vertex; a mean of several corners does by this one's share of it.
+    let (own, with) = with_vertex(corner, &pose.edges, gamma_sigma_rad)?;
+    let together = attitude * own.try_inverse()? * with;
+    let mixed = by_attitude * together * by_bearing.transpose();
+    let place = by_bearing * seen * by_bearing.transpose()
+        + by_attitude * attitude * by_attitude.transpose()
+        + mixed
+        + mixed.transpose()
+        + by_height * by_height.transpose();
+    let cross = attitude * by_attitude.transpose() + together * by_bearing.transpose();
+    let known = bearing.dot(&(place * bearing)).sqrt() <= SHARE_MAX * distance_m;
+    let mut covariance = Matrix6::zeros();
+    covariance.fixed_view_mut::<3, 3>(0, 0).copy_from(&attitude);
+    covariance.fixed_view_mut::<3, 3>(0, 3).copy_from(&cross);
+    covariance.fixed_view_mut::<3, 3>(3, 0).copy_from(&cross.transpose());
+    covariance.fixed_view_mut::<3, 3>(3, 3).copy_from(&place);
+    (known && covariance.iter().all(|x| x.is_finite())).then_some((bearing * distance_m, covariance))
+}

@@ -1,0 +1,196 @@
+"""The pictures of a drive as a log for `tiltvp calibrate`: the lean of each, its lines, and whose they are."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Final
+
+import numpy as np
+from cyclopts import Group, Parameter, validators
+
+from tiltvp.cli.declared_options import mask_from
+from tiltvp.cli.options import CameraOptions, Switch
+from tiltvp.cli.sources import MotionOptions, SourceOptions
+from tiltvp.cli.tables import check_ending, write_table
+from tiltvp.cli.terminal import progress_bar, say
+from tiltvp.cli.track import Drive, needed_turns, track_table
+from tiltvp.errors import InvalidInputError
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from tiltvp import Camera, MountingTilt, Robot
+    from tiltvp.cli.calibrate_inputs import DriveOptions
+    from tiltvp.cli.line_options import LineOptions
+    from tiltvp.drive_logs import DriveLog
+    from tiltvp.streams import FrameMotions, Frames, Wheels
+
+__all__ = ["PictureLog", "PictureOptions"]
+
+_CLOCK_FRAMES: Final = 120
+"""Frames by which the delay is told: at 5 a second the first 24 seconds of a drive."""
+
+
+@Parameter(name="*", group=Group("From pictures"))
+@dataclass(frozen=True, kw_only=True)
+class PictureOptions:
+    """Logs that are the images of a drive."""
+
+    topic: str | None = None
+    """The topic of a recording's images, where it has several."""
+    track_frames_min: Annotated[int, Parameter(validator=validators.Number(gte=2))] = 3
+    """A line counts if it is seen in so many images."""
+    tracks: Path | None = None
+    """Also write the lines of all images, as `tiltvp track` does: .csv, .json or .parquet."""
+    level_floor: Switch = False
+    """The floor is level within 0.05 degrees: roll and pitch need no turn."""
+
+    def refuse(self, motion: MotionOptions, camera: CameraOptions | None) -> None:
+        """Refuses what belongs to images where there is a log of tables."""
+        motion.refuse("pictures")
+        for name, value in (("--camera", camera), ("--tracks", self.tracks), ("--topic", self.topic)):
+            if value is not None:
+                told = "a robot's file (tiltvp setup)" if value is camera else "pictures, which it is for"
+                raise InvalidInputError(f"{name} with a log of tables, expected {told}")
+
+
+@dataclass(eq=False)
+class PictureLog:
+    """The images of one drive, and what the robot did between them."""
+
+    frames: Frames
+    moved: FrameMotions
+    camera: Camera
+    lines: LineOptions
+    drive: DriveOptions
+    pictures: PictureOptions
+    wheels: Wheels
+    topics: dict[str, str]
+    sigma_rad: float | None = None
+    """Median standard deviation of a bearing, once there is a log."""
+    bad: int = 0
+    """Images that could not be read."""
+
+    @property
+    def name(self) -> str:
+        """What it is called."""
+        return self.frames.source
+
+    @classmethod
+    def open(
+        cls,
+        source: str,
+        pictures: PictureOptions,
+        motion: MotionOptions,
+        camera: CameraOptions | None,
+        lines: LineOptions,
+        drive: DriveOptions,
+        robot: Robot | None,
+        *,
+        with_times: bool,
+    ) -> PictureLog:
+        """Opens a drive. With times these are brought to the odometry's clock, by how the images turn."""
+        from tiltvp.streams import is_recording
+
+        if camera is None:
+            raise InvalidInputError(f"{source}: pictures without --camera, expected the camera's calibration")
+        if pictures.tracks is not None:
+            check_ending(pictures.tracks)
+        known = {} if robot is None or not is_recording(source) else robot.topics
+        topic = pictures.topic or known.get("images")
+        if robot is not None:
+            motion = replace(
+                motion,
+                odometry_topic=motion.odometry_topic or known.get("odometry"),
+                wheel_radius=motion.wheel_radius or robot.wheels.wheel_radius_m,
+                ticks_per_turn=motion.ticks_per_turn or robot.wheels.ticks_per_turn,
+                wheel_joints=motion.wheel_joints or robot.wheels.joints,
+            )
+        frames, lens = SourceOptions(topic=topic).open([source]), camera.load()
+        if with_times:
+            _bring_to_clock(frames, motion, lens, lines.rotation(), drive.wheel_base)
+        moved = needed_turns(motion.motions(frames, drive.wheel_base))
+        if moved is None:
+            raise InvalidInputError(f"{source}: pictures without odometry, expected --odometry FILE")
+        named = {"images": topic, "odometry": motion.odometry_topic}
+        topics = {name: word for name, word in named.items() if word is not None}
+        return cls(frames, moved, lens, lines, drive, pictures, motion.wheels(drive.wheel_base), topics)
+
+    def tilt(self) -> MountingTilt:
+        """Roll and pitch of the mounting, by what stays of the images' leans when the robot turns."""
+        from tiltvp.mounting import mounting_tilt
+        from tiltvp.robot_setup import METHOD, drive_tilts, measured_count
+
+        estimator = self.lines.mounted(self.camera, method=METHOD)
+        rotation = estimator.robot_from_camera
+        with progress_bar(measured_count(self.frames), f"{self.name}: leans") as bar:
+            tilts = drive_tilts(self.frames, estimator, self.moved.motions, advance=bar.advance)
+        return mounting_tilt(tilts.estimates, tilts.motions, rotation, level_floor=self.pictures.level_floor)
+
+    def log(self, robot_from_camera: NDArray[np.float64] | None = None) -> DriveLog:
+        """The bearings of lines, in the frame of the mounting (3, 3) or of that which was given.
+
+        Tracks are predicted with the mounting as it is thought to be; they are written where they are asked for.
+        """
+        from tiltvp.drive_logs import DriveLog
+        from tiltvp.line_logs import bearing_log, displacements
+        from tiltvp.lines import LineTracker
+        from tiltvp.rotations import about_vertical
+        from tiltvp.streams import Motion
+
+        x_m, y_m, yaw_rad = self.drive.start_known
+        rotation = self.lines.rotation() if robot_from_camera is None else robot_from_camera
+        turned = about_vertical(yaw_rad) @ rotation
+        extractor = self.lines.extractor(self.camera, rotation=turned)
+        tilt = self.lines.tilts(self.camera, rotation=turned)
+        looked = Drive(extractor, LineTracker(camera_m=(x_m, y_m)), tilt, self.moved)
+        count, nothing = len(self.moved.motions), np.zeros((0, 0), np.uint8)
+        with progress_bar(count, f"{self.name}: lines") as bar:
+            # A drive's images together are more than the memory holds.
+            seen = [
+                (frame.name, frame.time_s, replace(one, gray=nothing))
+                for frame, one in looked.followed(iter(self.frames), bar)
+            ]
+        least = self.pictures.track_frames_min
+        bearings = bearing_log([one for _, _, one in seen], frames_min=least)
+        if not len(bearings):
+            raise InvalidInputError(f"{self.name}: no line is seen in {least} of {count} frames")
+        # From the robot's frame back to the camera's.
+        bearings[:, 2] -= yaw_rad
+        table = track_table([(one.number, name, time_s, one.tracked) for name, time_s, one in seen])
+        if self.pictures.tracks is not None:
+            write_table(table, self.pictures.tracks)
+        say(f"{self.name}: {len(bearings)} bearings of {len(set(bearings[:, 1].tolist()))} lines")
+        self.bad, self.sigma_rad = looked.bad, float(np.median([row["sigma_rad"] for row in table.rows]))
+        base = self.drive.wheel_base
+        assert base is not None  # As `settled` has it.
+        motions = [one or Motion() for one in self.moved.motions]
+        return DriveLog(displacements(motions, wheel_base_m=base), bearings, self.moved.times_s)
+
+    def robot(self) -> Robot:
+        """The robot as far as it was told: camera, mounting as it was given, mask, wheels, topics."""
+        from tiltvp import Robot
+
+        mask: Any = None if self.lines.mask is None else mask_from(self.lines.mask)
+        return Robot(self.camera, self.lines.rotation(), mask=mask, wheels=self.wheels, topics=self.topics)
+
+
+def _bring_to_clock(
+    frames: Frames, motion: MotionOptions, camera: Camera, rotation: NDArray[np.float64], wheel_base_m: float | None
+) -> None:
+    """Takes from the times of the frames by how much they are late. Raises `InvalidInputError` where nothing tells."""
+    from tiltvp.streams import read_odometry
+    from tiltvp.turning import frame_delay
+
+    record = motion.odometry or frames.recording
+    if frames.times_s is None or record is None:
+        raise InvalidInputError(f"--estimate-time-offset with {frames.source}, whose times are not known")
+    odometry = read_odometry(record, topic=motion.odometry_topic, wheels=motion.wheels(wheel_base_m))
+    count = min(_CLOCK_FRAMES, len(frames.times_s))
+    images = (frame.read() for frame in frames.sample(range(count)))
+    found = frame_delay(images, frames.times_s[:count], odometry, camera, rotation)
+    if not found:
+        raise InvalidInputError(f"--estimate-time-offset with {frames.source}: {found.reason}")
+    say(f"{frames.source}: frames are stamped {found.delay_s:.3f} +- {found.sigma_s:.3f} s late, which is mended first")
+    frames.times_s = frames.times_s - found.delay_s

@@ -1,0 +1,166 @@
+"""`tiltvp camera new`, `crop` and `scale`: cameras of ideal lenses, of parts of images and of resized images."""
+
+from __future__ import annotations
+
+import math
+import os
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+from cyclopts import Parameter, validators
+
+from tiltvp.cli.camera import Format, app
+from tiltvp.cli.options import Switch, image_size_from
+from tiltvp.cli.terminal import say
+from tiltvp.errors import InvalidInputError
+from tiltvp.files import check_output
+
+if TYPE_CHECKING:
+    from tiltvp import Camera
+
+__all__ = ["app"]
+
+_ABOVE_0 = Parameter(validator=validators.Number(gt=0))
+
+
+@app.command
+def new(
+    out: Path,
+    /,
+    *,
+    image_size: str,
+    view_deg: Annotated[float, _ABOVE_0],
+    lens: str = "equidistant",
+    centre: tuple[float, float] | None = None,
+    radius_px: Annotated[float | None, _ABOVE_0] = None,
+    mirror: Switch = False,
+) -> None:
+    """Write the camera of an ideal lens, where there is no calibration: from a field of view, or an image circle.
+
+    How far the real lens is from it nobody knows: calibrate where you can.
+
+    Parameters
+    ----------
+    out
+        File to write (.toml).
+    image_size
+        WIDTHxHEIGHT in pixels.
+    view_deg
+        The angle that is seen across the image circle, or without --radius-px across the width of the image.
+    lens
+        equidistant, equisolid, stereographic or pinhole.
+    centre
+        u and v of the image circle's centre; by default the image's.
+    radius_px
+        Radius of the image circle.
+    mirror
+        The image is seen in a mirror.
+    """
+    from tiltvp import Camera
+
+    size = image_size_from(image_size)
+    assert size is not None  # There is a text.
+    _check(out)
+    camera = Camera.from_view(
+        lens, width=size[0], height=size[1], view_rad=math.radians(view_deg), radius_px=radius_px, centre_px=centre,
+        mirror=mirror,
+    )  # fmt: skip
+    _write(camera, out)
+
+
+@app.command
+def crop(
+    file: Path, out: Path, /, *, at: tuple[int, int], size: str, format: Format = None, image_size: str | None = None
+) -> None:
+    """Write the camera of a part of the images.
+
+    Parameters
+    ----------
+    file
+        Calibration file of the whole images.
+    out
+        File to write (.toml).
+    at
+        u and v of the part's first pixel.
+    size
+        WIDTHxHEIGHT of the part.
+    format
+        The format of FILE, where its content does not tell.
+    image_size
+        WIDTHxHEIGHT in pixels, for formats that do not carry it.
+    """
+    from tiltvp import Camera
+
+    part = image_size_from(size, "--size")
+    assert part is not None  # There is a text.
+    _check(out, file)
+    whole = Camera.load(file, format, image_size=image_size_from(image_size))
+    u, v = at
+    if min(u, v) < 0 or u + part[0] > whole.width or v + part[1] > whole.height:
+        inside = f"a part of {whole.width} x {whole.height} pixels"
+        raise InvalidInputError(f"--at {u} {v} --size {size}: reaches beyond the image, expected {inside}")
+    _write(whole.cropped(u, v, *part), out)
+
+
+@app.command
+def scale(
+    file: Path,
+    out: Path,
+    /,
+    *,
+    factor: Annotated[float | None, _ABOVE_0] = None,
+    to: str | None = None,
+    format: Format = None,
+    image_size: str | None = None,
+) -> None:
+    """Write the camera of resized images.
+
+    Parameters
+    ----------
+    file
+        Calibration file of the images as they were.
+    out
+        File to write (.toml).
+    factor
+        By how much they were made larger.
+    to
+        WIDTHxHEIGHT that they have now, in place of a factor.
+    format
+        The format of FILE, where its content does not tell.
+    image_size
+        WIDTHxHEIGHT in pixels, for formats that do not carry it.
+    """
+    from tiltvp import Camera
+
+    if (factor is None) == (to is None):
+        raise InvalidInputError("--factor and --to: expected one of them")
+    _check(out, file)
+    camera = Camera.load(file, format, image_size=image_size_from(image_size))
+    wanted = image_size_from(to, "--to")
+    if wanted is not None:
+        # Either side tells it to half a pixel; the longer one better.
+        factor = wanted[0] / camera.width if camera.width >= camera.height else wanted[1] / camera.height
+        scaled = camera.scaled(factor)
+        if max(abs(scaled.width - wanted[0]), abs(scaled.height - wanted[1])) > 1:
+            expected = f"{scaled.width}x{scaled.height}, or `tiltvp camera crop` first"
+            raise InvalidInputError(
+                f"--to {to}: other proportions than {camera.width}x{camera.height}, expected {expected}"
+            )
+        camera = scaled if (scaled.width, scaled.height) == wanted else scaled.cropped(0, 0, *wanted)
+    else:
+        assert factor is not None  # One of them was given.
+        camera = camera.scaled(factor)
+    _write(camera, out)
+
+
+def _check(out: Path, file: Path | None = None) -> None:
+    if out.suffix.lower() != ".toml":
+        raise InvalidInputError(f"{out}: ends in {out.suffix!r}, expected .toml")
+    if file is not None and os.path.realpath(out) == os.path.realpath(file):
+        raise InvalidInputError(f"{out}: is the file to be read, expected another name")
+    check_output(out)
+
+
+def _write(camera: Camera, out: Path) -> None:
+    camera.save(out)
+    say(f"{out}: {camera.model}, {camera.width} x {camera.height} px")

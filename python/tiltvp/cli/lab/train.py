@@ -1,0 +1,73 @@
+"""`tiltvp lab train`: a correction of the paper's methods from images of known lean, as a file."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Annotated
+
+from cyclopts import Parameter, validators
+
+from tiltvp.cli.lab.drive import app
+from tiltvp.cli.options import MethodOptions
+from tiltvp.cli.terminal import progress_bar, say
+from tiltvp.errors import InvalidInputError
+
+__all__ = ["app"]
+
+_OPTIONS = MethodOptions()
+_METHOD = "image-space-ransac"
+
+
+@app.command
+def train(
+    dataset: Path,
+    /,
+    *,
+    out: Path,
+    kind: str = "posterior",
+    options: MethodOptions = _OPTIONS,
+    threads: Annotated[int | None, Parameter(validator=validators.Number(gte=1))] = None,
+) -> None:
+    """Train what takes a method's shift or raw angle to the lean, on a dataset of known lean.
+
+    Give the file as --correction to `tiltvp tilt`, which takes method and options from it. It is for the camera of the
+    dataset. `tiltvp evaluate` says how good such a correction is where it was not trained.
+
+    Parameters
+    ----------
+    dataset
+        Folder with a dataset.toml and an images.csv.
+    out
+        File for the correction (.toml).
+    kind
+        posterior (the mean lean given the shift), affine, or factor.
+    options
+        The method, image-space-ransac if none is given, and its options.
+    threads
+        Images at the same time; all cores by default.
+    """
+    import os
+
+    from tiltvp.corrections import train_correction
+    from tiltvp.files import check_output
+    from tiltvp.lab.datasets.folder import read_dataset
+    from tiltvp.lab.evaluation.training import measured_shifts
+
+    if out.suffix.lower() != ".toml":
+        raise InvalidInputError(f"--out {out}: ends in {out.suffix!r}, expected .toml")
+    check_output(out)
+    for name in ("correction", "robot_from_camera", "mask"):
+        if getattr(options, name) is not None:
+            told = f"--{name.replace('_', '-')}"
+            raise InvalidInputError(f"{told} with a training, expected none: it is the dataset's, or what is trained")
+    known = read_dataset(dataset)
+    method = options.method or _METHOD
+    estimator = replace(options, method=method).estimator(
+        known.camera, correction=None, robot_from_camera=known.robot_from_camera, mask=known.mask
+    )
+    with progress_bar(len(known.images), "images") as bar:
+        shifts = measured_shifts(known, estimator, threads=threads or os.cpu_count() or 1, advance=bar.advance)
+    trained = train_correction(estimator, shifts, [image.alpha_rad for image in known.images], kind=kind)
+    trained.save(out)
+    say(f"{out}: {kind} of {method}, trained on {trained.images} of {len(known.images)} images")
