@@ -51,7 +51,7 @@ def render(folder: Path) -> list[Path]:
 def run(folder: Path, count: int, *, kills: bool) -> None:
     """The command on two workers, and what it cost."""
     results, begin_s, begin = cluster.results_of, processor_s(), time.perf_counter()
-    quiet = {"dashboard_address": None, "silence_logs": "CRITICAL"}
+    quiet = {"dashboard_address": ":0", "silence_logs": "CRITICAL"}
     with LocalCluster(n_workers=2, threads_per_worker=1, processes=True, **quiet) as workers:
 
         def killing(*given: Any) -> Iterator[Any]:

@@ -11,6 +11,7 @@ import pytest
 
 import tiltvp
 from evaluations import evaluated
+from tiltvp.cli import main
 from tiltvp.lab.datasets.folder import TiltDataset, read_dataset
 from tiltvp.lab.datasets.new import new_dataset
 from tiltvp.lab.evaluation.runs import Run
@@ -34,6 +35,18 @@ def one_opencv_thread() -> Iterator[None]:
     cv2.setNumThreads(1)
     yield
     cv2.setNumThreads(before)
+
+
+@pytest.fixture
+def run(capfd: pytest.CaptureFixture[str]) -> Callable[..., tuple[int, str, str]]:
+    """Runs `tiltvp` in this process: exit code, stdout, stderr."""
+
+    def run_main(*words: object) -> tuple[int, str, str]:
+        code = main([str(word) for word in words])
+        said = capfd.readouterr()
+        return code, said.out, said.err
+
+    return run_main
 
 
 @pytest.fixture(scope="session")

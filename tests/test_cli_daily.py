@@ -126,7 +126,7 @@ def test_corner_in_a_mask(run: Run, world: Path, level: int, found: str) -> None
     done = run("corner", "grey-left", "grey-right", "--method", "general", *words)
     assert (done.returncode, done.stderr) == (0, "")
     assert [row["found"] for row in rows_of(world / "masked.csv")] == [found]
-    refused = run("corner", "left", "right", *words)
+    refused = run("corner", "left", "right", "--method", "coloured", *words)
     assert refused.returncode == 2
     assert "mask" in refused.stderr
 

@@ -11,7 +11,6 @@ import polars as pl
 import pytest
 
 import tiltvp
-from tiltvp.cli import main
 from tiltvp.cli.line_options import LineOptions
 from tiltvp.errors import ImageFileError, InvalidInputError
 from tiltvp.images import read_image, write_image
@@ -24,18 +23,6 @@ pytestmark = pytest.mark.slow
 
 FRAMES = 6
 Run = Callable[..., tuple[int, str, str]]
-
-
-@pytest.fixture
-def run(capfd: pytest.CaptureFixture[str]) -> Run:
-    """Runs `tiltvp` in this process: exit code, stdout, stderr."""
-
-    def run_main(*words: object) -> tuple[int, str, str]:
-        code = main([str(word) for word in words])
-        said = capfd.readouterr()
-        return code, said.out, said.err
-
-    return run_main
 
 
 @pytest.fixture(scope="module")

@@ -18,7 +18,6 @@ import pytest
 
 import tiltvp
 from recordings import START_S, Bag, write_video
-from tiltvp.cli import main
 from tiltvp.synth import RoomImage
 
 pytestmark = pytest.mark.slow
@@ -26,18 +25,6 @@ pytestmark = pytest.mark.slow
 Run = Callable[..., tuple[int, str, str]]
 FRAMES = 6
 QUARTER = np.pi / 2
-
-
-@pytest.fixture
-def run(capfd: pytest.CaptureFixture[str]) -> Run:
-    """Runs `tiltvp` in this process: exit code, stdout, stderr."""
-
-    def run_main(*words: object) -> tuple[int, str, str]:
-        code = main([str(word) for word in words])
-        said = capfd.readouterr()
-        return code, said.out, said.err
-
-    return run_main
 
 
 @pytest.fixture(scope="module")

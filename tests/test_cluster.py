@@ -29,7 +29,7 @@ NOBODY = "tcp://127.0.0.1:9"
 @pytest.fixture(scope="module")
 def cluster() -> Iterator[Any]:
     """Two worker processes of one thread each, on a scheduler in this process."""
-    quiet = {"dashboard_address": None, "silence_logs": "CRITICAL"}
+    quiet = {"dashboard_address": ":0", "silence_logs": "CRITICAL"}
     with LocalCluster(n_workers=2, threads_per_worker=1, processes=True, **quiet) as local:
         yield local
 

@@ -19,7 +19,6 @@ from polars.testing import assert_frame_equal
 
 import tiltvp
 from tiltvp.cli import cluster as module
-from tiltvp.cli import main
 from tiltvp.lab import cluster as on_dask
 from tiltvp.synth import RoomImage
 
@@ -32,23 +31,17 @@ Run = Callable[..., tuple[int, str, str]]
 @pytest.fixture(scope="module")
 def workers() -> Iterator[Any]:
     """Two worker processes of one thread each, on a scheduler in this process."""
-    quiet = {"dashboard_address": None, "silence_logs": "CRITICAL"}
+    quiet = {"dashboard_address": ":0", "silence_logs": "CRITICAL"}
     with LocalCluster(n_workers=2, threads_per_worker=1, processes=True, **quiet) as local:
         yield local
 
 
 @pytest.fixture
-def run(capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, world: Path) -> Run:
+def run(run: Run, monkeypatch: pytest.MonkeyPatch, world: Path) -> Run:
     """Runs `tiltvp` in the folder of the images: exit code, stdout, stderr."""
     monkeypatch.chdir(world)
     monkeypatch.setattr(module, "_CHUNK", 2)
-
-    def run_main(*words: object) -> tuple[int, str, str]:
-        code = main([str(word) for word in words])
-        said = capfd.readouterr()
-        return code, said.out, said.err
-
-    return run_main
+    return run
 
 
 @pytest.fixture(scope="module")

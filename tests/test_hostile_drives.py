@@ -137,7 +137,7 @@ def test_the_filter_of_the_command_is_that_of_method(tmp_path: Path, capsys: pyt
     for method in ("default", "paper"):
         out = tmp_path / f"{method}.json"
         main([*words, "--start", "0.1", "0", "0", "--method", method, "--out", str(out)])
-        kept = json.loads(out.read_text())
+        kept = json.loads(out.read_text())["logs"][0]
         assert kept["options"]["method"] == method
         found.append(kept["filter"]["x_m"])
     assert found[0] != found[1]

@@ -17,7 +17,6 @@ from rerun.chunk import RrdReader
 import tiltvp
 from recordings import write_video
 from test_corner_images import CAMERA, COLOURS, LEFT_FROM_RIGHT, pair
-from tiltvp.cli import main
 from tiltvp.overlays.drive_map import landmark_places, robot_poses
 from tiltvp.overlays.live import TiltView, live_words, roll_and_pitch
 from tiltvp.stereo_rigs import StereoRig
@@ -25,18 +24,6 @@ from tiltvp.synth import RoomImage, simulate_drive
 
 Run = Callable[..., tuple[int, str, str]]
 FRAMES = 5
-
-
-@pytest.fixture
-def run(capfd: pytest.CaptureFixture[str]) -> Run:
-    """Runs `tiltvp` in this process: exit code, stdout, stderr."""
-
-    def run_main(*words: object) -> tuple[int, str, str]:
-        code = main([str(word) for word in words])
-        said = capfd.readouterr()
-        return code, said.out, said.err
-
-    return run_main
 
 
 @pytest.fixture(scope="module")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, ClassVar, Final
 
 import numpy as np
 
@@ -31,14 +31,10 @@ _START_SIGMA: Final = (0.3, 0.3, 0.5)
 """That of `tiltvp.calibrate`, by default."""
 
 
-@dataclass(frozen=True, eq=False)
-class JoinedLogs:
-    """x, y and yaw as all logs of one robot together have them. False where they contradict one another."""
+@dataclass(frozen=True, eq=False, kw_only=True)
+class _Joined:
+    """How far what was joined is apart."""
 
-    xy_yaw: Matrix
-    """(3,): metres and radians, yaw in (-pi, pi]."""
-    covariance: Matrix
-    """(3, 3): of x, y and yaw. What all logs have in common, such as a wrong wheel base, is not in it."""
     logs: int
     """How many logs were joined."""
     distance: float
@@ -48,35 +44,46 @@ class JoinedLogs:
     odd: int | None = None
     """The place of the one log without which the others agree, where there is one alone; from 0."""
 
+    _what: ClassVar[str]
+
     def __bool__(self) -> bool:
         return self.distance <= self.limit
 
     @property
     def reason(self) -> str:
         """Whether the logs agree, in a sentence."""
-        return _agreement(self.logs, "x, y and yaw", self.distance, self.limit, self.odd)
+        if self.logs < 2:
+            return f"{self._what} of one log: nothing to compare it with"
+        apart = f"{self.distance:.1f} squared standard deviations apart, by chance below {self.limit:.1f}"
+        found = f"{self._what} of {self.logs} logs: {apart}"
+        if self:
+            return f"{found}: they agree"
+        blame = "" if self.odd is None else f"; without log {self.odd + 1} the others agree"
+        return f"{found}: the logs contradict one another, as when the camera was moved between them{blame}"
 
 
 @dataclass(frozen=True, eq=False)
-class JoinedTilts:
+class JoinedLogs(_Joined):
+    """x, y and yaw as all logs of one robot together have them. False where they contradict one another."""
+
+    xy_yaw: Matrix
+    """(3,): metres and radians, yaw in (-pi, pi]."""
+    covariance: Matrix
+    """(3, 3): of x, y and yaw. What all logs have in common, such as a wrong wheel base, is not in it."""
+
+    _what = "x, y and yaw"
+
+
+@dataclass(frozen=True, eq=False)
+class JoinedTilts(_Joined):
     """Roll and pitch as all drives of one robot together have them. False where they contradict one another."""
 
     robot_from_camera: Matrix
     """(3, 3): the mounting but for its turn about the vertical, which is as it was given."""
     covariance_rad2: Matrix
     """(2, 2): of its errors about the robot's x and y axes."""
-    logs: int
-    distance: float
-    limit: float
-    odd: int | None = None
 
-    def __bool__(self) -> bool:
-        return self.distance <= self.limit
-
-    @property
-    def reason(self) -> str:
-        """Whether the drives agree, in a sentence."""
-        return _agreement(self.logs, "roll and pitch", self.distance, self.limit, self.odd)
+    _what = "roll and pitch"
 
 
 @dataclass(frozen=True, eq=False)
@@ -202,7 +209,7 @@ def join_logs(
     first = np.asarray(start, dtype=np.float64)
     value, covariance, distance, limit, odd = _joined(values, covariances, "logs", start=first, prior=prior)
     value[2] = math.remainder(value[2], math.tau)
-    return JoinedLogs(value, covariance, len(found), distance, limit, odd)
+    return JoinedLogs(value, covariance, logs=len(found), distance=distance, limit=limit, odd=odd)
 
 
 def join_tilts(tilts: Sequence[MountingTilt]) -> JoinedTilts:
@@ -222,7 +229,8 @@ def join_tilts(tilts: Sequence[MountingTilt]) -> JoinedTilts:
     value, covariance, distance, limit, odd = _joined(values, covariances - shared, "tilts", looked_at=covariances)
     about_x, about_y = value
     rotation = _small_turn(about_x, about_y) @ tilts[0].robot_from_camera
-    return JoinedTilts(rotation, covariance + shared.mean(axis=0), len(tilts), distance, limit, odd)
+    covariance = covariance + shared.mean(axis=0)
+    return JoinedTilts(rotation, covariance, logs=len(tilts), distance=distance, limit=limit, odd=odd)
 
 
 def _joined(
@@ -289,13 +297,3 @@ def _small_turn(about_x: float, about_y: float) -> Matrix:
         np.eye(3) + np.sinc(angle / math.pi) * cross + 0.5 * np.sinc(0.5 * angle / math.pi) ** 2 * cross @ cross
     )
     return turned
-
-
-def _agreement(logs: int, what: str, distance: float, limit: float, odd: int | None) -> str:
-    if logs < 2:
-        return f"{what} of one log: nothing to compare it with"
-    found = f"{what} of {logs} logs: {distance:.1f} squared standard deviations apart, by chance below {limit:.1f}"
-    if distance <= limit:
-        return f"{found}: they agree"
-    blame = "" if odd is None else f"; without log {odd + 1} the others agree"
-    return f"{found}: the logs contradict one another, as when the camera was moved between them{blame}"

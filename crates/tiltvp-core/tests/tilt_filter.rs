@@ -268,7 +268,12 @@ proptest! {
     /// Turning in steps by whole turns leaves the floor's tilt, and everything known about it, where it was.
     #[test]
     fn whole_turns_are_nothing(alpha in 0.0..0.4f64, beta in -3.1..3.1f64, steps in 1u32..50, back in any::<bool>()) {
-        let options = TiltFilterOptions { walk_rad_per_sqrt_step: 0.0, mounting: Some(MountingOptions::default()), ..TiltFilterOptions::default() };
+        let options = TiltFilterOptions {
+            walk_rad_per_sqrt_step: 0.0,
+            half_track_m: 0.0,
+            mounting: Some(MountingOptions::default()),
+            ..TiltFilterOptions::default()
+        };
         let mut filter = TiltFilter::new(options).unwrap();
         filter.update_normal(&Tilt::from_alpha_beta(alpha, beta).normal(), &Matrix2::new(1e-4, 3e-5, 3e-5, 4e-4)).unwrap();
         let before = filter.state().clone();

@@ -20,7 +20,7 @@ from tiltvp.errors import InvalidInputError
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from tiltvp import Camera, MountingTilt, Robot
+    from tiltvp import Camera, MountingTilt, Robot, TiltEstimate
     from tiltvp.cli.calibrate_inputs import DriveOptions
     from tiltvp.cli.line_options import LineOptions
     from tiltvp.drive_logs import DriveLog
@@ -144,7 +144,15 @@ class PictureLog:
         turned = about_vertical(yaw_rad) @ rotation
         extractor = self.lines.extractor(self.camera, rotation=turned)
         tilt = self.lines.tilts(self.camera, rotation=turned)
-        looked = Drive(extractor, LineTracker(camera_m=(x_m, y_m)), tilt, self.moved)
+        upright = 0
+
+        def told(gray: NDArray[np.uint8]) -> TiltEstimate | None:
+            nonlocal upright
+            found = tilt(gray)
+            upright += found is None
+            return found
+
+        looked = Drive(extractor, LineTracker(camera_m=(x_m, y_m)), told, self.moved)
         count, nothing = len(self.moved.motions), np.zeros((0, 0), np.uint8)
         with progress_bar(count, f"{self.name}: lines") as bar:
             # A drive's images together are more than the memory holds.
@@ -161,6 +169,8 @@ class PictureLog:
         table = track_table([(one.number, name, time_s, one.tracked) for name, time_s, one in seen])
         if self.pictures.tracks is not None:
             write_table(table, self.pictures.tracks)
+        if upright:
+            say(f"{self.name}: in {upright} of {count} frames the robot is taken to stand upright")
         say(f"{self.name}: {len(bearings)} bearings of {len(set(bearings[:, 1].tolist()))} lines")
         self.bad, self.sigma_rad = looked.bad, float(np.median([row["sigma_rad"] for row in table.rows]))
         base = self.drive.wheel_base

@@ -79,6 +79,6 @@ class DrivingLineOptions(LineOptions):
 
     method: Annotated[str | None, Parameter(name="--line-method")] = None
     """How lines are found: great-circle (the default) or radial, the paper's."""
-    tilt: str = "refined"
-    """How the lean of each frame is estimated: refined or another method of `tiltvp tilt`, or upright: the robot
+    tilt: str = "segments"
+    """How the lean of each frame is estimated: segments or another method of `tiltvp tilt`, or upright: the robot
     stands upright. A frame without an estimate is taken to be upright."""

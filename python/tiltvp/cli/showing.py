@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import time
 from collections import deque
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, ExitStack, contextmanager, nullcontext
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final
@@ -77,8 +77,8 @@ class ShowOptions(RerunOptions):
         return self.show or self.rerun is not None
 
     @contextmanager
-    def watch(self, leveller: Leveller) -> Iterator[TiltWatch | None]:
-        """What shows the frames, None where nothing was asked for."""
+    def watch(self, leveller: Callable[[], Leveller]) -> Iterator[TiltWatch | None]:
+        """What shows the frames, None where nothing was asked for; the leveller is made only then."""
         if not self.asked:
             yield None
             return
@@ -90,7 +90,7 @@ class ShowOptions(RerunOptions):
 
                 window = Window("tiltvp tilt")
                 stack.callback(window.close)
-            yield TiltWatch(leveller, window, viewer)
+            yield TiltWatch(leveller(), window, viewer)
 
 
 class TiltWatch:
