@@ -146,24 +146,15 @@ survive *arguments: setup
 soak *arguments: setup
     {{bin}}/python tests/soak.py {{arguments}}
 
-# What they find is in fuzz/artifacts, what they have learned in out/fuzz. They want a nightly compiler (`rustup toolchain install nightly`).
-# Attacks on the core that coverage guides, an hour of them: each of fuzz/targets for 600 seconds, or for as many as are given.
-survive-long *seconds:
-    #!/usr/bin/env bash
-    set -euo pipefail
-    test -x target/tools/bin/cargo-fuzz || cargo install --quiet --locked --root target/tools cargo-fuzz
-    seconds="{{seconds}}"
-    for target in images lens options rays segments state; do
-        mkdir -p out/fuzz/$target fuzz/seeds/$target
-        PATH="$PWD/target/tools/bin:$PATH" cargo +nightly fuzz run $target out/fuzz/$target fuzz/seeds/$target -- \
-            -max_total_time=${seconds:-600} -timeout=10 -rss_limit_mb=2048 -print_final_stats=1
-    done
-
-# It has its own folder of the build, and wants a nightly compiler too.
-# The tests of kernels, core and C interface under AddressSanitizer; those of the kernels try every level of vectors that there is.
-sanitize:
-    RUSTFLAGS=-Zsanitizer=address PROPTEST_RNG_SEED=20171028 PROPTEST_CASES=64 cargo +nightly test --locked --quiet \
-        --target x86_64-unknown-linux-gnu --target-dir target/address --package tiltvp-kernels --package tiltvp-core --package tiltvp-capi --lib --tests
+# What they find is in out/fuzz, what they have learned in out/fuzz/readers. atheris has an environment of its own, in target.
+# Attacks on what reads files, options and states, which coverage guides: for an hour, or for as many seconds as are given.
+survive-long seconds="3600": setup
+    test -x target/atheris/bin/python || {{bin}}/python -m venv target/atheris
+    target/atheris/bin/pip install --quiet atheris==3.0.0
+    mkdir -p out/fuzz
+    PYTHONPATH="$PWD/python:$PWD/tests:$({{bin}}/python -c 'import sysconfig; print(sysconfig.get_path("purelib"))')" \
+        target/atheris/bin/python tests/fuzz_readers.py out/fuzz/readers \
+        -max_total_time={{seconds}} -timeout=5 -rss_limit_mb=1024 -artifact_prefix=out/fuzz/ -print_final_stats=1
 
 # The tests on real data, in the folder that TILTVP_DATA names.
 test-real *arguments: setup
