@@ -146,6 +146,16 @@ survive *arguments: setup
 soak *arguments: setup
     {{bin}}/python tests/soak.py {{arguments}}
 
+# What they find is in out/fuzz, what they have learned in out/fuzz/readers. atheris has an environment of its own, in target.
+# Attacks on what reads files, options and states, which coverage guides: for an hour, or as `-max_total_time=SECONDS` says.
+survive-long *arguments: setup
+    test -x target/atheris/bin/python || {{bin}}/python -m venv target/atheris
+    target/atheris/bin/pip install --quiet atheris==3.0.0
+    mkdir -p out/fuzz
+    PYTHONPATH="$PWD/python:$PWD/tests:$({{bin}}/python -c 'import sysconfig; print(sysconfig.get_path("purelib"))')" \
+        target/atheris/bin/python tests/fuzz_readers.py out/fuzz/readers \
+        -max_total_time=3600 -timeout=5 -rss_limit_mb=1024 -artifact_prefix=out/fuzz/ -print_final_stats=1 {{arguments}}
+
 # The tests on real data, in the folder that TILTVP_DATA names.
 test-real *arguments: setup
     {{bin}}/pytest --quiet --numprocesses 2 --dist worksteal tests/real_data {{arguments}}
