@@ -49,15 +49,15 @@ system-programs:
 # The wheel in a bare environment, the notebooks, and the tests that want a browser, a screen and valgrind: the page of a report, the
 # window of `--show`, and what an image costs in instructions.
 test-system *arguments: setup system-programs smoke notebooks
-    {{bin}}/pytest --quiet tests/system {{arguments}}
-    cargo test --locked --package tiltvp-core --features valgrind --test instructions --quiet
+    {{bin}}/pytest --quiet --numprocesses 2 --dist loadfile tests/system {{arguments}}
+    cargo test --locked --workspace --test instructions --quiet
 
 # Runs the notebooks: each ends in assertions, and takes less than a minute of a quiet machine.
 notebooks *arguments:
     rm -rf target/notebooks
     mkdir -p target/notebooks
     for name in notebooks/*.py; do {{bin}}/jupytext --quiet --to ipynb --output target/notebooks/$(basename $name .py).ipynb $name; done
-    {{bin}}/pytest --quiet --nbmake --nbmake-timeout=300 --timeout=0 -p no:run-parallel {{arguments}} target/notebooks
+    {{bin}}/pytest --quiet --numprocesses 2 --dist worksteal --nbmake --nbmake-timeout=300 --timeout=0 -p no:run-parallel {{arguments}} target/notebooks
 
 # The pages of the site, with the notebooks' figures, in target/docs/html; a warning fails, and so does a link within that leads nowhere.
 docs:
@@ -97,7 +97,7 @@ test-rust:
 
 # The tests of the Python package, without real data, with the same random cases every time.
 test-python *arguments:
-    {{bin}}/pytest --quiet --hypothesis-seed=20171028 {{arguments}}
+    {{bin}}/pytest --quiet --numprocesses 2 --dist worksteal --hypothesis-seed=20171028 {{arguments}}
 
 # The tests of properties, of both languages, with random cases of their own: run it now and then, mend what it finds.
 test-random: setup
@@ -146,9 +146,19 @@ survive *arguments: setup
 soak *arguments: setup
     {{bin}}/python tests/soak.py {{arguments}}
 
+# What they find is in out/fuzz, what they have learned in out/fuzz/readers. atheris has an environment of its own, in target.
+# Attacks on what reads files, options and states, which coverage guides: for an hour, or as `-max_total_time=SECONDS` says.
+survive-long *arguments: setup
+    test -x target/atheris/bin/python || {{bin}}/python -m venv target/atheris
+    target/atheris/bin/pip install --quiet atheris==3.0.0
+    mkdir -p out/fuzz
+    PYTHONPATH="$PWD/python:$PWD/tests:$({{bin}}/python -c 'import sysconfig; print(sysconfig.get_path("purelib"))')" \
+        target/atheris/bin/python tests/fuzz_readers.py out/fuzz/readers \
+        -max_total_time=3600 -timeout=5 -rss_limit_mb=1024 -artifact_prefix=out/fuzz/ -print_final_stats=1 {{arguments}}
+
 # The tests on real data, in the folder that TILTVP_DATA names.
 test-real *arguments: setup
-    {{bin}}/pytest --quiet tests/real_data {{arguments}}
+    {{bin}}/pytest --quiet --numprocesses 2 --dist worksteal tests/real_data {{arguments}}
 
 # Every method on views of upright panoramas of known tilt, in the folder panos of TILTVP_DATA.
 measure-panoramas *arguments: setup

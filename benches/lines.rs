@@ -48,7 +48,7 @@ fn whole(bencher: Bencher) {
     let (mut scratch, mut matching) = (extractor.scratch(), MatchScratch::default());
     let (mut values, mut matches, picture, tilt) = (Vec::new(), Vec::new(), view(&PICTURE).unwrap(), tilt());
     bencher.bench_local(|| {
-        extractor.extract(black_box(&picture), Some(&tilt), &mut scratch, &mut lines).unwrap();
+        extractor.extract(black_box(&picture), Some(&tilt), None, &mut scratch, &mut lines).unwrap();
         extractor.describe(&picture, &lines, &mut scratch, &mut values).unwrap();
         match_descriptors(&before, &values, 192, &MatchOptions::default(), None, &mut matching, &mut matches).unwrap();
     });
@@ -59,7 +59,7 @@ fn whole(bencher: Bencher) {
 fn extract(bencher: Bencher, method: &str) {
     let (extractor, mut lines, _) = found(method, Some(10));
     let (mut scratch, picture, tilt) = (extractor.scratch(), view(&PICTURE).unwrap(), tilt());
-    bencher.bench_local(|| extractor.extract(black_box(&picture), Some(&tilt), &mut scratch, &mut lines));
+    bencher.bench_local(|| extractor.extract(black_box(&picture), Some(&tilt), None, &mut scratch, &mut lines));
 }
 
 /// The descriptors of ten lines.

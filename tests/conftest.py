@@ -9,12 +9,12 @@ import cv2
 import numpy as np
 import pytest
 
+import commands
 import tiltvp
 from evaluations import evaluated
 from tiltvp.cli import main
 from tiltvp.lab.datasets.folder import TiltDataset, read_dataset
 from tiltvp.lab.datasets.new import new_dataset
-from tiltvp.lab.evaluation.runs import Run
 from tiltvp.synth import Room, RoomImage, render_room
 
 SIDE = 256
@@ -38,13 +38,13 @@ def one_opencv_thread() -> Iterator[None]:
 
 
 @pytest.fixture
-def run(capfd: pytest.CaptureFixture[str]) -> Callable[..., tuple[int, str, str]]:
-    """Runs `tiltvp` in this process: exit code, stdout, stderr."""
+def run(capfd: pytest.CaptureFixture[str]) -> commands.Run:
+    """Runs `tiltvp` in this process."""
 
-    def run_main(*words: object) -> tuple[int, str, str]:
+    def run_main(*words: object) -> commands.Said:
         code = main([str(word) for word in words])
         said = capfd.readouterr()
-        return code, said.out, said.err
+        return commands.Said(code, said.out, said.err)
 
     return run_main
 
@@ -103,7 +103,7 @@ def dataset(tmp_path_factory: pytest.TempPathFactory, camera: tiltvp.Camera) -> 
 
 
 @pytest.fixture(scope="session")
-def whole(tmp_path_factory: pytest.TempPathFactory, dataset: TiltDataset) -> Run:
+def whole(tmp_path_factory: pytest.TempPathFactory, dataset: TiltDataset) -> commands.Run:
     """The run of table 3's parameters over it, on one thread."""
     return evaluated(dataset, tmp_path_factory.mktemp("whole") / "run")
 

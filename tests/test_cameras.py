@@ -13,7 +13,6 @@ import numpy as np
 import pytest
 
 import tiltvp
-from tiltvp.cli import main
 from tiltvp.errors import CalibrationError, InvalidInputError, TiltvpError
 
 Camera = tiltvp.Camera
@@ -397,88 +396,3 @@ def test_max_theta_limits_the_lens() -> None:
     assert np.isfinite(camera.project([math.sin(inside), 0.0, math.cos(inside)])).all()
     assert np.isnan(camera.project([math.sin(outside), 0.0, math.cos(outside)])).all()
     assert np.isnan(camera.unproject([319.5 + 139.7 * outside, 239.5])).all()
-
-
-@pytest.mark.parametrize(
-    ("lens", "law"),
-    [
-        ("equidistant", lambda theta: theta),
-        ("equisolid", lambda theta: 2.0 * np.sin(theta / 2.0)),
-        ("stereographic", lambda theta: 2.0 * np.tan(theta / 2.0)),
-        ("pinhole", np.tan),
-    ],
-)
-def test_a_camera_of_a_view(lens: str, law: Any) -> None:
-    view = 1.4 if lens == "pinhole" else 3.4
-    found = Camera.from_view(lens, width=640, height=480, view_rad=view, radius_px=230.0, centre_px=(310.0, 250.0))
-    theta = np.linspace(0.0, 0.4999 * view, 50)
-    bearings = np.column_stack([np.sin(theta), np.zeros(50), np.cos(theta)])
-    radii = found.project(bearings)[:, 0] - 310.0
-    np.testing.assert_allclose(radii, 230.0 * law(theta) / law(0.5 * view), atol=1e-4)
-    assert np.isnan(found.project([np.sin(0.51 * view), 0.0, np.cos(0.51 * view)])).all()
-    across = Camera.from_view(lens, width=640, height=480, view_rad=view)
-    u, v = across.project([-np.sin(0.5 * view), 0.0, np.cos(0.5 * view)])
-    np.testing.assert_allclose((u, v), (-0.5, 239.5), atol=1e-4)
-
-
-@pytest.mark.parametrize(
-    "wrong",
-    [
-        {"lens": "fisheye"},
-        {"view_rad": 0.0},
-        {"view_rad": 7.0},
-        {"radius_px": -1.0},
-        {"lens": "pinhole", "view_rad": 3.2},
-    ],
-)
-def test_a_view_that_cannot_be(wrong: dict[str, Any]) -> None:
-    with pytest.raises(InvalidInputError, match="expected"):
-        Camera.from_view(**({"width": 64, "height": 48, "view_rad": 1.0} | wrong))
-
-
-def test_a_part_of_an_image_sees_what_it_saw() -> None:
-    whole = Camera.equidistant(width=640, height=480, focal_px=139.7, cx=319.5, cy=239.5, max_theta_rad=1.2)
-    part = whole.cropped(100, 50, 300, 200)
-    assert (part.width, part.height, part.max_theta_rad) == (300, 200, 1.2)
-    pixels = np.array([[0.0, 0.0], [299.0, 199.0], [150.0, 120.0]])
-    np.testing.assert_allclose(part.unproject(pixels), whole.unproject(pixels + [100.0, 50.0]), atol=1e-12)
-    assert whole.mirrored().cropped(0, 0, 640, 480) == whole.mirrored()
-    with pytest.raises(InvalidInputError, match="equirectangular"):
-        Camera.equirectangular(width=64, height=32).cropped(0, 0, 32, 32)
-
-
-def test_cameras_are_made_on_the_command_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    new, part, small = (str(tmp_path / f"{name}.toml") for name in ("new", "part", "small"))
-    circle = ["--centre", "310", "250", "--radius-px", "230", "--view-deg", "185"]
-    assert main(["camera", "new", new, "--image-size", "640x480", *circle]) == 0
-    assert Camera.load(new).parameters["cx"] == 310.0
-    assert main(["camera", "crop", new, part, "--at", "80", "0", "--size", "480x480"]) == 0
-    assert Camera.load(part) == Camera.load(new).cropped(80, 0, 480, 480)
-    assert main(["camera", "scale", new, small, "--to", "321x241"]) == 0
-    assert (Camera.load(small).width, Camera.load(small).height) == (321, 241)
-    assert main(["camera", "scale", new, small, "--factor", "0.5", "--overwrite"]) == 0
-    assert Camera.load(small) == Camera.load(new).scaled(0.5)
-    capsys.readouterr()
-    for told, words in (
-        ("other proportions", ["scale", new, small, "--to", "320x320"]),
-        ("expected one of them", ["scale", new, small]),
-        ("beyond the image", ["crop", new, part, "--at", "300", "0", "--size", "480x480"]),
-        ("is the file to be read", ["crop", new, new, "--at", "0", "0", "--size", "48x48"]),
-        ("expected .toml", ["new", str(tmp_path / "a.yaml"), "--image-size", "64x48", "--view-deg", "90"]),
-    ):
-        assert main(["camera", *words, "--overwrite"]) == 2
-        assert told in capsys.readouterr().err
-
-
-@pytest.mark.parametrize(
-    ("size", "told"),
-    [((320, 240), "camera scale FILE OUT --to 320x240"), ((480, 640), "by a quarter"), ((600, 480), "camera crop")],
-)
-def test_images_of_another_size_are_told_what_fits(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], size: tuple[int, int], told: str
-) -> None:
-    camera, image = tmp_path / "camera.toml", tmp_path / "a.png"
-    Camera.from_view(width=640, height=480, view_rad=3.0).save(camera)
-    tiltvp.write_image(image, np.zeros((size[1], size[0]), np.uint8))
-    assert main(["tilt", str(image), "--camera", str(camera)]) == 1
-    assert told in capsys.readouterr().err

@@ -6,8 +6,6 @@ import json
 import math
 import subprocess
 import sys
-from collections.abc import Callable
-from dataclasses import dataclass
 from pathlib import Path
 
 import cv2
@@ -16,34 +14,10 @@ import polars as pl
 import pytest
 
 import tiltvp
-from tiltvp.cli import main
+from commands import Run, Said
 from tiltvp.synth import render_room
 
 ALPHA_RAD, BETA_RAD = math.radians(4.0), math.radians(30.0)
-
-
-@dataclass(frozen=True)
-class Said:
-    """What a command left: its exit code and what it wrote."""
-
-    code: int
-    out: str
-    err: str
-
-
-Run = Callable[..., Said]
-
-
-@pytest.fixture
-def run(capfd: pytest.CaptureFixture[str]) -> Run:
-    """Runs `tiltvp` in this process."""
-
-    def run_main(*words: object) -> Said:
-        code = main([str(word) for word in words])
-        captured = capfd.readouterr()
-        return Said(code, captured.out, captured.err)
-
-    return run_main
 
 
 @pytest.fixture(scope="module")
@@ -66,14 +40,6 @@ def small_camera() -> tiltvp.Camera:
     """185 degrees on 240 x 180 pixels."""
     limit = math.radians(92.5)
     return tiltvp.Camera.equidistant(width=240, height=180, focal_px=52.4, cx=119.5, cy=89.5, max_theta_rad=limit)
-
-
-def one_line(text: str) -> str:
-    """The one line that a complaint has to be."""
-    assert text.startswith("tiltvp: "), text
-    assert text.count("\n") == 1, text
-    assert "Traceback" not in text
-    return text
 
 
 # --- the program -------------------------------------------------------------------------------------------------
@@ -105,7 +71,7 @@ def test_installed_program(world: Path) -> None:
         timeout=60,
     )
     assert done.returncode == 1
-    assert "broken.png" in one_line(done.stderr)
+    assert "broken.png" in Said(done.returncode, done.stdout, done.stderr).complaint
 
 
 @pytest.mark.parametrize(
@@ -148,7 +114,7 @@ def test_wrong_use_is_one_line_and_code_2(
     said = run(*words)
     assert said.code == 2
     assert said.out == ""
-    assert hint in one_line(said.err)
+    assert hint in said.complaint
 
 
 # --- tilt --------------------------------------------------------------------------------------------------------
@@ -312,71 +278,7 @@ def test_results_that_cannot_be_written(run: Run, world: Path, tmp_path: Path) -
     out = tmp_path / "file" / "r.csv"
     said = run("tilt", world / "images/a.png", "--camera", world / "camera.toml", "--out", out)
     assert said.code == 1
-    assert str(out) in one_line(said.err)
-
-
-# --- camera ------------------------------------------------------------------------------------------------------
-
-
-def test_camera_info(run: Run, world: Path) -> None:
-    said = run("camera", "info", world / "camera.toml")
-    assert said.code == 0
-    for words in ("equidistant", "240 x 180 px", "focal_px", "52.4", "185.00 deg", "92.50 deg", "valid pixels"):
-        assert words in said.out
-    share = float(said.out.split("valid pixels")[1].split("%")[0])
-    assert abs(share - 100.0 * small_camera().valid_mask().mean()) < 0.1
-    assert "seen in a mirror" in run("camera", "info", world / "camera.toml", "--mirror").out
-
-
-def test_camera_convert_and_check(run: Run, tmp_path: Path) -> None:
-    chain = "\n".join(
-        f"{name}:\n  camera_model: pinhole\n  intrinsics: [{focal}, {focal}, 320.0, 240.0]\n"
-        "  distortion_model: equidistant\n  distortion_coeffs: [0.01, -0.002, 0.001, -0.0001]\n  resolution: [640, 480]"
-        for name, focal in (("cam0", 200.0), ("cam1", 210.0))
-    )
-    (tmp_path / "chain.yaml").write_text(chain)
-    said = run("camera", "convert", tmp_path / "chain.yaml", tmp_path / "both.toml")
-    assert (said.code, said.err) == (0, "")
-    for name in ("cam0", "cam1"):
-        loaded = tiltvp.Camera.load(tmp_path / "both.toml", camera=name)
-        assert loaded == tiltvp.Camera.load(tmp_path / "chain.yaml", camera=name)
-    for name in ("cam1", "1"):
-        words = ("camera", "convert", tmp_path / "chain.yaml", tmp_path / "one.toml", "--format", "kalibr")
-        assert run(*words, "--camera-name", name, "--overwrite").code == 0
-        assert tiltvp.Camera.load(tmp_path / "one.toml") == loaded
-    for ending in ("txt", "bin"):
-        theirs = tmp_path / f"cameras.{ending}"
-        said = run("camera", "convert", tmp_path / "chain.yaml", theirs, "--to", "colmap")
-        assert (said.code, said.err) == (0, "")
-        assert tiltvp.Camera.load(theirs, camera=1) == loaded
-    said = run("camera", "check", tmp_path / "both.toml", tmp_path / "chain.yaml")
-    assert (said.code, said.err) == (0, "")
-    assert said.out.count("sound") == 4
-    said = run("camera", "check", tmp_path / "none.yaml", tmp_path / "both.toml")
-    assert said.code == 1
-    assert said.out.count("sound") == 2
-    assert "none.yaml" in one_line(said.err)
-
-
-def test_camera_convert_tells_that_a_limit_is_lost(run: Run, world: Path, tmp_path: Path) -> None:
-    said = run("camera", "convert", world / "camera.toml", tmp_path / "camera.json", "--to", "basalt")
-    assert said.code == 0
-    assert "the limit of 92.50 deg from the axis is not in it" in one_line(said.err)
-
-
-def test_camera_formats(run: Run) -> None:
-    said = run("camera", "formats")
-    assert said.code == 0
-    for one in tiltvp.formats.FORMATS:
-        assert one.name in said.out
-
-
-def test_a_size_that_a_file_lacks_is_asked_for_by_its_option(run: Run, tmp_path: Path) -> None:
-    coefficients = "poly_incident_angle_to_radius: [0.0, 120.0]\npoly_radius_to_z: [-120.0, 0.0, 0.002]\n"
-    (tmp_path / "c.yml").write_text(coefficients + "principal_point: [160.0, 120.0]\n")
-    said = run("camera", "info", tmp_path / "c.yml", "--format", "py-omnicalib")
-    assert said.code == 2
-    assert "--image-size" in one_line(said.err)
+    assert str(out) in said.complaint
 
 
 # --- demo --------------------------------------------------------------------------------------------------------

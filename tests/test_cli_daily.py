@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import csv
 import json
-import math
 import subprocess
 import sys
 from collections.abc import Callable
@@ -14,9 +13,8 @@ import numpy as np
 import pytest
 
 import tiltvp
-from test_corner_images import CAMERA, COLOURS, GREYS, LEFT_FROM_RIGHT, pair
-from tiltvp.stereo_rigs import StereoRig
-from tiltvp.synth import render_room, simulate_drive
+from command_inputs import write_drive_log, write_pair, write_rooms
+from drawn_corners import CAMERA, COLOURS, GREYS, pair
 
 pytestmark = pytest.mark.slow
 
@@ -40,22 +38,12 @@ Run = Callable[..., "subprocess.CompletedProcess[str]"]
 def world(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A camera with three images of a turning robot, a log of a drive, and a stereo pair before a corner."""
     folder = tmp_path_factory.mktemp("daily")
-    limit = math.radians(92.5)
-    camera = tiltvp.Camera.equidistant(width=240, height=180, focal_px=52.4, cx=119.5, cy=89.5, max_theta_rad=limit)
-    camera.save(folder / "camera.toml")
-    for number in range(3):
-        image = render_room(camera, kind="office", seed=3, alpha_rad=0.03, beta_rad=0.02 * number)
-        tiltvp.write_image(folder / "images" / f"{number}.png", image.bgr)
+    write_rooms(folder, 3)
     (folder / "odometry.csv").write_text("yaw_rad,distance_m\n" + "0.02,0.0\n" * 3)
-    drive = simulate_drive("paper", seed=1)
-    for name, header, rows in (
-        ("wheels.csv", "step,delta_left_m,delta_right_m", [(i, *row) for i, row in enumerate(drive.odometry.tolist())]),
-        ("bearings.csv", "step,landmark,bearing_rad", [(int(a), int(b), c) for a, b, c in drive.bearings.tolist()]),
-    ):
-        (folder / name).write_text("\n".join([header, *(",".join(map(str, row)) for row in rows)]) + "\n")
-    StereoRig(CAMERA, CAMERA, LEFT_FROM_RIGHT).save(folder / "rig.toml")
-    for side, image in zip(("left", "right", "grey-left", "grey-right"), pair(COLOURS) + pair(GREYS), strict=True):
-        tiltvp.write_image(folder / side / "a.png", image)
+    write_drive_log(folder)
+    write_pair(
+        folder, dict(zip(("left", "right", "grey-left", "grey-right"), pair(COLOURS) + pair(GREYS), strict=True))
+    )
     return folder
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from pathlib import Path
 
 import cv2
@@ -11,22 +10,14 @@ import numpy as np
 import pytest
 
 import tiltvp
-from tiltvp.cli import main
+from commands import Run
 from tiltvp.lab.datasets.folder import read_dataset
-
-Run = Callable[..., tuple[int, str, str]]
 
 
 @pytest.fixture
-def run(capfd: pytest.CaptureFixture[str]) -> Run:
-    """Runs `tiltvp dataset` in this process: exit code, stdout, stderr."""
-
-    def run_main(*words: object) -> tuple[int, str, str]:
-        code = main(["dataset", *(str(word) for word in words)])
-        said = capfd.readouterr()
-        return code, said.out, said.err
-
-    return run_main
+def run(run: Run) -> Run:
+    """Runs `tiltvp dataset` in this process."""
+    return lambda *words: run("dataset", *words)
 
 
 @pytest.fixture(scope="module")

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -11,8 +10,9 @@ import polars as pl
 import pytest
 
 import tiltvp
+from commands import Run
 from tiltvp.cli.line_options import LineOptions
-from tiltvp.errors import ImageFileError, InvalidInputError
+from tiltvp.errors import ImageFileError, InvalidInputError, UnknownLeanError
 from tiltvp.images import read_image, write_image
 from tiltvp.lab.plots.tracks import track_plot
 from tiltvp.streams import open_frames
@@ -22,7 +22,6 @@ from tiltvp.videos import video_writer
 pytestmark = pytest.mark.slow
 
 FRAMES = 6
-Run = Callable[..., tuple[int, str, str]]
 
 
 @pytest.fixture(scope="module")
@@ -109,7 +108,8 @@ def test_a_lean_that_loses_lines_is_not_believed(
     estimate = tiltvp.TiltEstimator(camera)(room.gray)
     assert options.tilts(camera)(room.gray) == estimate
     monkeypatch.setattr(tiltvp, "TiltEstimator", lambda *_, **__: lambda _: estimate)
-    assert options.tilts(camera)(upright_room.gray) is None
+    with pytest.raises(UnknownLeanError, match=r"lean not known: confidence .*, or lines"):
+        options.tilts(camera)(upright_room.gray)
 
 
 def test_bad_frames_are_skipped_and_the_turn_is_kept(run: Run, folder: Path, tmp_path: Path) -> None:

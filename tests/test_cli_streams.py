@@ -7,7 +7,6 @@ import json
 import os
 import signal
 import sys
-from collections.abc import Callable
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -17,12 +16,12 @@ import polars as pl
 import pytest
 
 import tiltvp
+from commands import Run
 from recordings import START_S, Bag, write_video
 from tiltvp.synth import RoomImage
 
 pytestmark = pytest.mark.slow
 
-Run = Callable[..., tuple[int, str, str]]
 FRAMES = 6
 QUARTER = np.pi / 2
 

@@ -7,7 +7,7 @@ import os
 import shutil
 import signal
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +18,7 @@ from dask.distributed import LocalCluster
 from polars.testing import assert_frame_equal
 
 import tiltvp
+from commands import Run
 from tiltvp.cli import cluster as module
 from tiltvp.lab import cluster as on_dask
 from tiltvp.synth import RoomImage
@@ -25,7 +26,6 @@ from tiltvp.synth import RoomImage
 pytestmark = pytest.mark.slow
 
 COUNT = 17
-Run = Callable[..., tuple[int, str, str]]
 
 
 @pytest.fixture(scope="module")

@@ -1,94 +1,22 @@
-"""Corners in drawn images: both front ends, one camera and two, rigs on disk, the command line."""
+"""Corners in drawn images: both front ends, one camera and two, rigs on disk."""
 
 from __future__ import annotations
 
 import copy
 import json
-import math
 import pickle
 from pathlib import Path
 
-import cv2
 import numpy as np
-import polars as pl
 import pytest
 
 import tiltvp
-from tiltvp.cli.app import main
+from drawn_corners import CAMERA, COLOURS, GREYS, LEFT_FROM_RIGHT, LIT_FROM_ABOVE, drawn, off_deg, off_px, pair, pose
 from tiltvp.corner import CornerDetector, CornerPoseEstimator
 from tiltvp.errors import CalibrationError, InvalidInputError
 from tiltvp.stereo_rigs import StereoRig
 
 pytestmark = pytest.mark.slow
-
-CAMERA = tiltvp.Camera.pinhole(width=480, height=360, fx=400.0, fy=400.0, cx=240.0, cy=180.0)
-COLOURS = {"top": (30, 40, 220), "left": (50, 190, 40), "right": (210, 60, 30)}
-LIT_FROM_ABOVE = {"top": (45, 55, 255), "left": (35, 120, 28), "right": (130, 38, 20)}
-GREYS = {"top": (200, 200, 200), "left": (120, 120, 120), "right": (60, 60, 60)}
-LEFT_FROM_RIGHT = np.eye(4)
-LEFT_FROM_RIGHT[:3, 3] = (0.12, 0.01, -0.02)
-
-
-def turn(axis: str, degrees: float) -> np.ndarray:
-    c, s = math.cos(math.radians(degrees)), math.sin(math.radians(degrees))
-    rows = {"x": [[1, 0, 0], [0, c, -s], [0, s, c]], "y": [[c, 0, s], [0, 1, 0], [-s, 0, c]]}
-    return np.array(rows.get(axis, [[c, -s, 0], [s, c, 0], [0, 0, 1]]), dtype=np.float64)
-
-
-def pose(yaw: float = 40.0, pitch: float = 28.0, roll: float = 4.0) -> tuple[np.ndarray, np.ndarray]:
-    """The cuboid's frame (y down, x and z to the back) and its corner, in the camera's frame."""
-    return turn("z", roll) @ turn("x", pitch) @ turn("y", -yaw), np.array([0.02, -0.03, 1.2])
-
-
-def drawn(
-    rotation: np.ndarray,
-    vertex: np.ndarray,
-    faces: dict[str, tuple[int, int, int]],
-    fine: int = 8,
-    *,
-    noise: float = 1.0,
-    beyond: bool = False,
-) -> np.ndarray:
-    """The cuboid in front of grey, every pixel the mean light of `fine` squared places.
-
-    Light above 0.7 is rolled off. `beyond`: where the line of the edge x goes on behind the cuboid, things of the
-    colours of its two faces meet.
-    """
-    x, y, z = 0.3 * rotation.T
-    corners = {"top": (x, x + z, z), "left": (z, y + z, y), "right": (y, x + y, x)}
-    picture = np.full((360 * fine, 480 * fine, 3), 150, np.uint8)
-    for face, (a, b, c) in corners.items():
-        points = np.array([vertex, vertex + a, vertex + b, vertex + c])
-        pixels = points[:, :2] / points[:, 2:] * 400.0 + (240.0, 180.0)
-        cv2.fillPoly(picture, [np.rint(((pixels + 0.5) * fine - 0.5) * 16).astype(np.int32)], faces[face], shift=4)
-    if beyond:
-        for face, side in (("top", -y), ("right", y)):
-            points = np.array([vertex + 2.0 * x, vertex + 2.4 * x, vertex + 2.4 * x + side, vertex + 2.0 * x + side])
-            pixels = points[:, :2] / points[:, 2:] * 400.0 + (240.0, 180.0)
-            cv2.fillPoly(picture, [np.rint(((pixels + 0.5) * fine - 0.5) * 16).astype(np.int32)], faces[face], shift=4)
-    return photographed(picture, noise)
-
-
-def photographed(picture: np.ndarray, noise: float, seed: int = 5) -> np.ndarray:
-    """What the camera makes of a fine picture: light blurred, rolled off above 0.7, and noisy."""
-    light = (picture.astype(np.float32) / 255.0) ** 2.2
-    light = cv2.GaussianBlur(cv2.resize(light, (480, 360), interpolation=cv2.INTER_AREA), (0, 0), 0.7)
-    light = np.where(light < 0.7, light, 1.0 - 0.3 * np.exp((0.7 - light) / 0.3))
-    grain = np.random.default_rng(seed).normal(0.0, noise, light.shape)
-    return np.clip(np.rint(255.0 * light ** (1 / 2.2) + grain), 0, 255).astype(np.uint8)
-
-
-def off_px(found: np.ndarray, true: np.ndarray) -> np.ndarray:
-    return 400.0 * (found / found[2] - true / true[2])[:2]
-
-
-def off_deg(found: np.ndarray, true: np.ndarray) -> float:
-    return math.degrees(2.0 * math.asin(min(1.0, float(np.linalg.norm(found - true)) / math.sqrt(8.0))))
-
-
-def pair(faces: dict[str, tuple[int, int, int]]) -> tuple[np.ndarray, np.ndarray]:
-    rotation, vertex = pose()
-    return drawn(rotation, vertex, faces), drawn(rotation, vertex - LEFT_FROM_RIGHT[:3, 3], faces)
 
 
 @pytest.mark.parametrize("yaw", [25.0, 45.0, 62.0])
@@ -339,76 +267,3 @@ def test_rigs_come_back_from_disk(tmp_path: Path) -> None:
     (tmp_path / "chain.yaml").write_text(f"cam0: {camera}}}\ncam1: {camera}, T_cn_cnm1: {motion}}}\n")
     chain = StereoRig.load(tmp_path / "chain.yaml")
     assert np.allclose(chain.left_from_right, LEFT_FROM_RIGHT, atol=1e-12)
-
-
-def test_the_command_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    StereoRig(CAMERA, CAMERA, LEFT_FROM_RIGHT).save(tmp_path / "rig.toml")
-    CAMERA.save(tmp_path / "one.toml")
-    for side, image in zip(("left", "right"), pair(COLOURS), strict=True):
-        tiltvp.write_image(tmp_path / side / "a.png", image)
-    left, right = str(tmp_path / "left"), str(tmp_path / "right")
-    out, path = tmp_path / "poses.csv", tmp_path / "poses.txt"
-    words = ["corner", left, right, "--calibration", str(tmp_path / "rig.toml"), "--out", str(out)]
-    more = ["--overlay", str(tmp_path / "over"), "--trajectory", str(path), "--plot", str(tmp_path / "plot.png")]
-    assert main([*words, *more]) == 0
-    assert "1 with a pose" in capsys.readouterr().out
-    [row] = pl.read_csv(out).iter_rows(named=True)
-    rotation, vertex = pose()
-    assert np.allclose([row[name] for name in ("x_m", "y_m", "z_m")], -rotation.T @ vertex, atol=0.01)
-    assert len(path.read_text().splitlines()) == 2
-    assert tiltvp.read_image(tmp_path / "over" / "a.png").shape == (360, 480, 3)
-    assert (tmp_path / "plot.png").exists()
-    assert main(["corner", left, "--calibration", str(tmp_path / "one.toml"), "--out", str(out), "--overwrite"]) == 0
-    assert main(["corner", left, right, "--calibration", str(tmp_path / "one.toml")]) == 2
-
-
-def test_the_command_line_chooses_the_method(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    StereoRig(CAMERA, CAMERA, LEFT_FROM_RIGHT).save(tmp_path / "rig.toml")
-    for faces, name in ((COLOURS, "colours"), (GREYS, "greys"), (dict.fromkeys(GREYS, (150, 150, 150)), "nothing")):
-        for side, image in zip(("left", "right"), pair(faces), strict=True):
-            tiltvp.write_image(tmp_path / name / side / "a.png", image)
-
-    def run(name: str, *words: str) -> str:
-        sides = [str(tmp_path / name / side) for side in ("left", "right")]
-        assert main(["corner", *sides, "--calibration", str(tmp_path / "rig.toml"), *words]) == 0
-        return capsys.readouterr().out
-
-    assert "1 with a pose (the coloured cuboid)" in run("colours")
-    assert "1 with a pose (corners of straight edges)" in run("greys", "--pitch", "-28", "--right-handed")
-    assert "1 with a pose (the coloured cuboid, as published)" in run("colours", "--method", "paper")
-    assert "1 with a pose (corners of straight edges)" in run("colours", "--gradient-min", "50", "--right-handed")
-    said = run("nothing")
-    assert "0 with a pose" in said
-    assert "without a pose: no corner in the left image (1)" in said
-    assert "looked for the coloured cuboid, else corners of straight edges" in said
-    assert "try: " in said
-    assert "--method general" in run("greys", "--method", "coloured")
-
-
-@pytest.mark.parametrize(
-    ("words", "complaint"),
-    [
-        (["--method", "colour"], "--method 'colour', expected auto, coloured, general or paper"),
-        (
-            ["--gradient-min", "50", "--faces", "rgb"],
-            "--method auto with --faces (of coloured and paper), --gradient-min (of general)",
-        ),
-        (["--method", "coloured", "--mask", "mask.png"], "--method coloured with --mask (of general)"),
-        (["--pitch", "3", "--down", "0", "1", "0"], "--pitch and --down"),
-        (["--topic-right", "/right"], "--topic-right"),
-        (["--trajectory", "t.txt"], "--camera-height-m"),
-    ],
-)
-def test_impossible_combinations_are_refused_at_once(
-    words: list[str],
-    complaint: str,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    CAMERA.save("one.toml")
-    tiltvp.write_image(tmp_path / "mask.png", np.full((360, 480), 255, np.uint8))
-    # There is no such image: what is wrong with the words is said before it is looked for.
-    assert main(["corner", "none.png", "--calibration", "one.toml", *words]) == 2
-    assert complaint in capsys.readouterr().err

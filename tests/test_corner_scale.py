@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import tiltvp
-from test_corner_images import CAMERA, COLOURS, GREYS, LEFT_FROM_RIGHT, photographed, pose
+from drawn_corners import CAMERA, COLOURS, GREYS, LEFT_FROM_RIGHT, photographed, pose
 from tiltvp.cli.app import main
 from tiltvp.corner import CornerPoseEstimator
 from tiltvp.errors import InvalidInputError

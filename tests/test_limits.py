@@ -20,6 +20,7 @@ from tiltvp.drive_logs import read_drive_log
 from tiltvp.errors import CalibrationError, ImageFileError, InvalidInputError, OutputError, TiltvpError
 from tiltvp.files import keeping_existing, whole_file, write_whole
 from tiltvp.formats import document
+from tiltvp.stereo_rigs import StereoRig
 
 ROOT = Path(__file__).resolve().parent.parent
 ROW = re.compile(r"^\| .+ \| (\d+) \| `(\S+)` \|$", re.MULTILINE)
@@ -110,6 +111,14 @@ def test_names_and_numbers_that_python_refuses_are_errors_of_ours(tmp_path: Path
     (tmp_path / "camera.toml").write_bytes(own(640, 480).replace(b"640", b"0x" + b"f" * 20_000))
     with pytest.raises(CalibrationError):
         tiltvp.Camera.load(tmp_path / "camera.toml")
+    camera = tiltvp.Camera.equidistant(width=64, height=48, focal_px=20.0, cx=31.5, cy=23.5)
+    motion = np.eye(4)
+    motion[0, 3] = 0.5
+    StereoRig(camera, camera, motion).save(tmp_path / "rig.toml")
+    text = (tmp_path / "rig.toml").read_text()
+    (tmp_path / "rig.toml").write_text(text.replace("0.5,", f"{10**400},", 1))
+    with pytest.raises(CalibrationError, match="matrix of numbers"):
+        StereoRig.load(tmp_path / "rig.toml")
 
 
 def test_more_landmarks_than_the_limit_are_refused() -> None:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from types import SimpleNamespace
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import polars as pl
@@ -11,13 +13,16 @@ import pytest
 
 from recordings import motions_of
 from tiltvp.cli import main
-from tiltvp.errors import ImageFileError, InvalidInputError
+from tiltvp.errors import ImageFileError, InvalidInputError, UnknownLeanError
 from tiltvp.lab.datasets.driving import write_drive
 from tiltvp.line_logs import FollowedFrame, bearing_log, displacements, follow_lines
 from tiltvp.lines import LineExtractor, LineTracker
 from tiltvp.selfcalib import wheel_displacements
 from tiltvp.streams import Motion
 from tiltvp.synth import MIRROR_BLIND_RAD, Drive, Room, drive_legs, mirror_camera
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
 
 LEGS = [(0.25, 0.0), (0.0, 0.4)]
 
@@ -36,6 +41,15 @@ def folder(tmp_path_factory: pytest.TempPathFactory, drive: Drive) -> Path:
     return out
 
 
+def test_a_log_has_the_tracks_that_are_seen_longest() -> None:
+    def frame(number: int, count: int) -> Any:
+        seen = SimpleNamespace(track=np.arange(count), lines=SimpleNamespace(bearing_rad=np.zeros(count)))
+        return SimpleNamespace(number=number, tracked=seen)
+
+    log = bearing_log([frame(0, 400), frame(1, 300), frame(2, 200)])
+    assert set(log[:, 1].tolist()) == set(range(150))
+
+
 def test_the_legs_are_what_is_driven(drive: Drive) -> None:
     assert len(drive) == 1 + 5 + 5
     np.testing.assert_allclose(np.diff(drive.poses[5:, 2]), 0.08, atol=1e-12)
@@ -50,11 +64,20 @@ def test_the_legs_are_what_is_driven(drive: Drive) -> None:
 def test_frames_that_cannot_be_used_are_told_and_their_motion_kept(drive: Drive) -> None:
     images = [drive.render(k).gray for k in range(4)]
     motions = [Motion(yaw, distance) for distance, yaw in drive.motions[:4].tolist()]
-    bad = ImageFileError("cannot be decoded")
-    followed = list(
-        follow_lines([*images[:2], bad, images[3]], LineExtractor(drive.camera), LineTracker(), motions=motions)
-    )
+    bad, unknown = ImageFileError("cannot be decoded"), UnknownLeanError("lean not known")
+
+    def leaning(gray: NDArray[np.uint8]) -> None:
+        if gray is images[2]:
+            raise unknown
+
+    extractor = LineExtractor(drive.camera)
+    followed = list(follow_lines([*images[:2], bad, images[3]], extractor, LineTracker(), motions=motions))
     assert followed[2] is bad
+    left_out = list(follow_lines(images, extractor, LineTracker(), motions=motions, tilt=leaning))
+    assert left_out[2] is unknown
+    assert [one.tracked for one in left_out if isinstance(one, FollowedFrame)] == [
+        one.tracked for one in followed if isinstance(one, FollowedFrame)
+    ]
     frames = [frame for frame in followed if isinstance(frame, FollowedFrame)]
     assert [frame.number for frame in frames] == [0, 1, 3]
     log = bearing_log(frames)

@@ -90,7 +90,9 @@ def test_extractor_is_a_value_and_takes_any_usual_image(room: RoomImage, camera:
     assert 0 < len(lines) <= 7
     assert np.allclose(lines.normal, tilt.normal)
     assert extractor.describe(room.bgr, lines).shape == (len(lines), 96)
-    assert lines == extractor(room.bgr, tilt.normal)
+    sigma_rad = np.sqrt(np.linalg.eigvalsh(tilt.covariance_rad2)[-1])
+    told = tl.LineExtractor(camera, lines_max=7, descriptor_bins=16, tilt_sigma_rad=sigma_rad)
+    assert lines == told(room.bgr, tilt.normal) != extractor(room.bgr, tilt.normal)
     assert extractor.describe(room.gray, extractor(np.full_like(room.gray, 9))).shape == (0, 96)
 
 

@@ -15,14 +15,14 @@ import pytest
 from rerun.chunk import RrdReader
 
 import tiltvp
+from commands import Run
+from drawn_corners import CAMERA, COLOURS, LEFT_FROM_RIGHT, pair
 from recordings import write_video
-from test_corner_images import CAMERA, COLOURS, LEFT_FROM_RIGHT, pair
 from tiltvp.overlays.drive_map import landmark_places, robot_poses
 from tiltvp.overlays.live import TiltView, live_words, roll_and_pitch
 from tiltvp.stereo_rigs import StereoRig
 from tiltvp.synth import RoomImage, simulate_drive
 
-Run = Callable[..., tuple[int, str, str]]
 FRAMES = 5
 
 

@@ -53,6 +53,8 @@ def test_rotation_files(tmp_path: Path, name: str, text: str) -> None:
         ("r.json", '{"quaternion": [0, 0, 0, 1], "robot_from_camera": [0, 0, 0, 1]}', "both keys"),
         ("r.yaml", "robot_from_camera: up\n", "a list of numbers"),
         ("r.yaml", "robot_from_camera: [[1, 0], [0]]\n", "a list of numbers"),
+        ("r.json", f'{{"quaternion": [0, 0, 0, {10**400}]}}', "a list of numbers"),
+        ("r.txt", "1e200 -1e200 0\n1e200 1e200 0\n0 0 1\n", "no rotation"),
         ("r.toml", "robot_from_camera = [", "not TOML"),
         ("r.yaml", "[", "no rotation"),
     ],

@@ -3,10 +3,7 @@
 from __future__ import annotations
 
 import io
-import re
 import sys
-import threading
-import time
 from collections.abc import Callable
 from pathlib import Path
 from types import SimpleNamespace
@@ -19,7 +16,6 @@ import tiltvp
 from recordings import KINDS, START_S, Bag, write_video
 from tiltvp.errors import CalibrationError, ImageFileError, InvalidInputError, MissingExtraError, TiltvpError
 from tiltvp.streams import (
-    LiveCamera,
     NamedImages,
     RawImages,
     Recording,
@@ -371,77 +367,6 @@ def test_raw_pixels(shape: tuple[int, ...]) -> None:
         assert np.array_equal(frame.read(), expected if len(shape) == 2 else expected[:, :, :3])
     with pytest.raises(ImageFileError, match="-#000002: 3 bytes, expected"):
         rest.read()
-
-
-class Capture:
-    """A camera that gives three images."""
-
-    def __init__(self, number: int) -> None:
-        self.left = 3 if number == 0 else 0
-
-    def isOpened(self) -> bool:  # noqa: N802
-        return self.left > 0
-
-    def get(self, _: int) -> float:
-        return 0.0
-
-    def read(self) -> tuple[bool, np.ndarray | None]:
-        self.left -= 1
-        return (True, shade(self.left)) if self.left >= 0 else (False, None)
-
-    def release(self) -> None:
-        self.left = -1
-
-
-def test_a_live_camera(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(cv2, "VideoCapture", Capture)
-    frames = LiveCamera(0, patience_s=0.0)
-    *seen, gone = list(frames)
-    assert (len(seen), frames.count, frames.rate_hz) == (3, None, 25.0)
-    assert seen[0].time_s <= seen[1].time_s <= seen[2].time_s <= gone.time_s
-    assert re.fullmatch(
-        r"camera 0#000003: the camera gave no image for 0\.0 s, it is waited for no longer", str(gone.image)
-    )
-    with pytest.raises(InvalidInputError, match="read only once"):
-        next(frames.sample([0]))
-    with pytest.raises(ImageFileError, match="camera 5: cannot be opened"):
-        LiveCamera(5)
-
-
-def test_a_camera_unplugged_and_plugged_in(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("tiltvp.streams.live._AGAIN_S", 0.01)
-    opened: list[int] = []
-
-    def plugged(number: int) -> Capture:
-        # Three times in five there is no camera.
-        opened.append(number)
-        return Capture(0 if len(opened) % 5 in (1, 0) else 1)
-
-    monkeypatch.setattr(cv2, "VideoCapture", plugged)
-    frames = LiveCamera(4)
-    seen = []
-    for frame in frames:
-        seen.append(frame)
-        if len(seen) == 9:
-            frames.end()
-    # Three images, the gap, three images of the camera that was opened again, and so on.
-    assert [isinstance(frame.image, ImageFileError) for frame in seen] == [k % 4 == 3 for k in range(9)]
-    assert [frame.name for frame in seen] == [f"camera 4#{k:06d}" for k in range(9)]
-    assert "s, it was opened again" in str(seen[3].image)
-    assert set(opened) == {4}
-
-
-def test_nobody_waits_for_a_camera_after_the_end(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(cv2, "VideoCapture", lambda _: Capture(0 if not opened else 1))
-    opened: list[int] = []
-    frames = LiveCamera(0)
-    opened.append(1)
-    threading.Timer(0.3, frames.end).start()
-    start_s = time.monotonic()
-    seen = list(frames)
-    assert time.monotonic() - start_s < 5.0
-    assert str(seen[3].image).endswith("nobody waits for it")
-    assert len(seen) == 4
 
 
 def test_frames_are_decoded_late(tmp_path: Path) -> None:

@@ -11,12 +11,12 @@ from __future__ import annotations
 
 import argparse
 import math
-import time
 from collections.abc import Callable
 from pathlib import Path
 
 import cv2
 import numpy as np
+from timing import times_s
 
 from tiltvp import Camera, corner
 from tiltvp.corner import CornerDetector
@@ -169,12 +169,7 @@ class Coloured:
 
 def seconds(work: Callable[[], object], rounds: int) -> float:
     """Median time of a call."""
-    times = []
-    for _ in range(rounds):
-        start = time.perf_counter()
-        work()
-        times.append(time.perf_counter() - start)
-    return float(np.median(times))
+    return float(np.median(times_s(work, rounds)))
 
 
 def main() -> None:

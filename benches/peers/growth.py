@@ -6,12 +6,12 @@ Images are rendered rooms, scaled to each size; the lens is scaled with them.
 from __future__ import annotations
 
 import argparse
-import time
 from collections.abc import Callable
 
 import cv2
 import numpy as np
 from scharr import images
+from timing import times_s
 
 from tiltvp import METHODS, Camera, TiltEstimator
 
@@ -35,12 +35,7 @@ def scaled_camera(width: int, height: int) -> Camera:
 def fastest(work: Callable[[], object], rounds: int) -> float:
     """The least time of several calls, the first not counted."""
     work()
-    times = []
-    for _ in range(rounds):
-        start = time.perf_counter()
-        work()
-        times.append(time.perf_counter() - start)
-    return min(times)
+    return min(times_s(work, rounds))
 
 
 def growth(pictures: list[np.ndarray], method: str, rounds: int) -> list[float]:

@@ -10,13 +10,13 @@ from __future__ import annotations
 
 import argparse
 import math
-import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 
 import cv2
 import numpy as np
+from timing import times_s
 
 from tiltvp import Camera, SegmentDetector, write_image
 from tiltvp.lab.datasets.panoramas import paper_camera
@@ -179,12 +179,7 @@ def judge(
 
 def seconds(work: Callable[[], object], rounds: int) -> float:
     """The fastest of some calls."""
-    times = []
-    for _ in range(rounds):
-        start = time.perf_counter()
-        work()
-        times.append(time.perf_counter() - start)
-    return min(times)
+    return min(times_s(work, rounds))
 
 
 def scene(camera: Camera, mounting: np.ndarray, seed: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -1599,8 +1599,8 @@ class LineExtractor:
             "great-circle": Greatest standard deviation of the pixels about their line, in pixels: lines that scatter
             more are edges that blend. Default: 0.36.
         tilt_sigma_rad
-            "great-circle": Standard deviation of the tilt that the frame is given, in radians: lines may slant by as
-            much. Default: 0.00872665.
+            "great-circle": Standard deviation of the tilt that the frame is given, in radians, where the tilt does not
+            tell its own as estimates do: lines may slant by as much. Default: 0.00872665.
         lines_max
             "great-circle": The most lines of an image, the longest ones; none for all. Default: None.
         descriptor_areas
@@ -1641,8 +1641,8 @@ class LineExtractor:
     def _describe(self, image: NDArray[np.uint8], lines: Lines) -> NDArray[np.float32]:
         """(N, K): descriptors of the lines of such an image."""
 
-    def _extract(self, image: NDArray[np.uint8], normal: ArrayLike | None) -> Lines:
-        """The lines of a C-contiguous (H, W) image of uint8."""
+    def _extract(self, image: NDArray[np.uint8], normal: ArrayLike | None, tilt_sigma_rad: float | None) -> Lines:
+        """The lines of a C-contiguous (H, W) image of uint8; with a normal its standard deviation where known."""
 
     def _lines_at(self, bearing_rad: ArrayLike, normal: ArrayLike | None) -> Lines:
         """Lines at any bearings, without support."""

@@ -38,6 +38,10 @@ class CalibrationNotFoundError(CalibrationError, FileNotFoundError):
     """There is no calibration file at that path."""
 
 
+class UnknownLeanError(TiltvpError):
+    """How an image leans is not known, or not believed, so that verticals cannot be told from other edges."""
+
+
 class ImageFileError(TiltvpError, OSError):
     """An image file cannot be read or written."""
 

@@ -117,28 +117,13 @@ def whole_file(path: str | os.PathLike[str]) -> Iterator[Path]:
     `InvalidInputError` where `path` exists and is to be kept.
     """
     check_output(path)
-    part = None
-    try:
-        target = Path(os.path.realpath(path))
-        target.parent.mkdir(parents=True, exist_ok=True)
-        part, handle = _locked_beside(target, target.suffix, _new_file)
-        try:
-            yield part
-            if part.exists():
-                with open(part, "rb+") as written:
-                    os.fsync(written.fileno())
-                os.replace(part, target)
-                _sync_folder(target.parent)
-        finally:
-            os.close(handle)
-    except TiltvpError:
-        raise
-    except (OSError, ValueError) as error:
-        raise _failed(path, error) from error
-    finally:
-        if part is not None:
-            with suppress(OSError):
-                part.unlink()
+    with _part_of(path, _new_file, follow=True) as (part, target):
+        yield part
+        if part.exists():
+            with open(part, "rb+") as written:
+                os.fsync(written.fileno())
+            os.replace(part, target)
+            _sync_folder(target.parent)
 
 
 @contextmanager
@@ -147,34 +132,20 @@ def whole_folder(path: str | os.PathLike[str]) -> Iterator[Path]:
 
     After any failure it is removed, and so is what killed processes have left of the same output. Raises `OutputError`.
     """
-    part = None
-    try:
-        target = Path(path).absolute()
-        target.parent.mkdir(parents=True, exist_ok=True)
-        part, handle = _locked_beside(target, "", _new_folder)
-        try:
-            yield part
-            if target.exists():
-                # A folder cannot replace a full one: the earlier one steps aside first, and comes back if that fails.
-                old = part.with_suffix(".old")
-                target.rename(old)
-                try:
-                    part.rename(target)
-                except OSError:
-                    old.rename(target)
-                    raise
-                _remove_folder(old)
-            else:
+    with _part_of(path, _new_folder, follow=False) as (part, target):
+        yield part
+        if target.exists():
+            # A folder cannot replace a full one: the earlier one steps aside first, and comes back if that fails.
+            old = part.with_suffix(".old")
+            target.rename(old)
+            try:
                 part.rename(target)
-        finally:
-            os.close(handle)
-    except TiltvpError:
-        raise
-    except (OSError, ValueError) as error:
-        raise _failed(path, error) from error
-    finally:
-        if part is not None:
-            _remove_folder(part)
+            except OSError:
+                old.rename(target)
+                raise
+            _remove(old)
+        else:
+            part.rename(target)
 
 
 @contextmanager
@@ -183,13 +154,23 @@ def scratch_folder(path: str | os.PathLike[str]) -> Iterator[Path]:
 
     What killed processes have left of it is removed by the next one that writes `path`. Raises `OutputError`.
     """
+    with _part_of(path, _new_folder, follow=True) as (part, _):
+        yield part
+
+
+@contextmanager
+def _part_of(path: str | os.PathLike[str], make: Callable[[Path], int], *, follow: bool) -> Iterator[tuple[Path, Path]]:
+    """A locked part beside `path`, and where `path` is. With `follow` that is where links lead, and has its ending.
+
+    What is left of the part at the end of the block is removed. Raises `OutputError`.
+    """
     part = None
     try:
-        target = Path(os.path.realpath(path))
+        target = Path(os.path.realpath(path)) if follow else Path(path).absolute()
         target.parent.mkdir(parents=True, exist_ok=True)
-        part, handle = _locked_beside(target, target.suffix, _new_folder)
+        part, handle = _locked_beside(target, target.suffix if follow else "", make)
         try:
-            yield part
+            yield part, target
         finally:
             os.close(handle)
     except TiltvpError:
@@ -198,7 +179,7 @@ def scratch_folder(path: str | os.PathLike[str]) -> Iterator[Path]:
         raise _failed(path, error) from error
     finally:
         if part is not None:
-            _remove_folder(part)
+            _remove(part)
 
 
 def _failed(path: str | os.PathLike[str], error: OSError | ValueError) -> OutputError:
@@ -231,11 +212,15 @@ def _locked_beside(target: Path, ending: str, make: Callable[[Path], int]) -> tu
         os.close(handle)
 
 
-def _remove_folder(folder: Path) -> None:
+def _remove(part: Path) -> None:
+    if not part.is_dir():
+        with suppress(OSError):
+            part.unlink()
+        return
     # It brings five modules, a twentieth of what importing the package takes, and most programs make no folder.
     import shutil
 
-    shutil.rmtree(folder, ignore_errors=True)
+    shutil.rmtree(part, ignore_errors=True)
 
 
 def _sweep(folder: Path, begin: str, end: str) -> None:
@@ -245,10 +230,7 @@ def _sweep(folder: Path, begin: str, end: str) -> None:
             handle = os.open(left, os.O_RDONLY)
             try:
                 _lock(handle)
-                if left.is_dir():
-                    _remove_folder(left)
-                else:
-                    left.unlink()
+                _remove(left)
             finally:
                 os.close(handle)
 

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, Final
 
+import numpy as np
+
 from tiltvp import _core
 from tiltvp._core import (
     LINE_METHODS,
@@ -23,7 +25,6 @@ from tiltvp.images import gray_from
 if TYPE_CHECKING:
     from typing import TypeAlias
 
-    import numpy as np
     from numpy.typing import ArrayLike, NDArray
 
     from tiltvp._core import Camera
@@ -44,6 +45,8 @@ __all__ = [
     "zncc_matrix",
 ]
 
+_SIGMA_MOST_RAD: Final = 0.5
+"""The most that `tilt_sigma_rad` may be."""
 _SUPPORT_KEPT: Final = 0.75
 """The least share of the upright robot's edge pixels on lines that lines keep under a lean that is believed."""
 
@@ -62,10 +65,11 @@ class LineExtractor(_core.LineExtractor):
         """The vertical lines of one image, by rising bearing.
 
         `tilt` is an estimate, a filter's or an image's, (alpha_rad, beta_rad), or a ground normal (3,); None: upright.
+        Lines may slant by what an estimate's covariance says that it is off, else by `tilt_sigma_rad`.
         Bearings are azimuths about the vertical in the upright robot's frame. "radial" knows no tilt. Raises
         `InvalidInputError` for an image of another size than the camera's and for an estimate without a tilt.
         """
-        return self._extract(gray_from(image), _normal(tilt))
+        return self._extract(gray_from(image), _normal(tilt), _sigma_rad(tilt))
 
     def believes(self, image: ArrayLike, tilt: TiltEstimate, *, confidence_min: float = 0.5) -> bool:
         """Whether an estimate of the lean is confident enough, and the lines of the image do not speak against it.
@@ -76,7 +80,8 @@ class LineExtractor(_core.LineExtractor):
         """
         if not tilt or tilt.confidence < confidence_min:
             return False
-        leaning, upright = (int(self(image, lean).support_px.sum()) for lean in (tilt, None))
+        # Both may slant by the same.
+        leaning, upright = (int(self(image, lean).support_px.sum()) for lean in (tilt.normal, None))
         return leaning >= _SUPPORT_KEPT * upright
 
     def describe(self, image: ArrayLike, lines: Lines) -> NDArray[np.float32]:
@@ -110,6 +115,13 @@ def _normal(tilt: Any) -> ArrayLike | None:
     if isinstance(tilt, tuple) and len(tilt) == 2:
         return normal_from_alpha_beta(*tilt)
     return tilt  # type: ignore[no-any-return]
+
+
+def _sigma_rad(tilt: Any) -> float | None:
+    """The standard deviation of a lean, in the direction in which it is known least; None where it tells none."""
+    if not isinstance(tilt, TiltEstimate | FilteredTilt):
+        return None
+    return min(float(np.sqrt(np.linalg.eigvalsh(tilt.covariance_rad2)[-1])), _SIGMA_MOST_RAD)
 
 
 def extract(

@@ -165,7 +165,7 @@ def _array(where: str, value: object) -> Matrix:
         raise CalibrationError(f"{where}: {value!r}, expected a list of numbers")
     try:
         return np.array(value, dtype=np.float64)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         raise CalibrationError(f"{where}: {value!r}, expected a list of numbers") from None
 
 
@@ -190,9 +190,11 @@ def rotation_from_quaternion(q: Matrix, where: str) -> Matrix:
 def _rotation(matrix: Matrix, where: object) -> Matrix:
     if not np.isfinite(matrix).all():
         raise CalibrationError(f"{where}: numbers that are not finite, expected a rotation")
-    off = float(np.linalg.norm(matrix.T @ matrix - np.eye(3)))
-    determinant = float(np.linalg.det(matrix))
-    if off > _SLACK or determinant < 0.0:
+    # Of huge numbers both are infinite or none at all.
+    with np.errstate(over="ignore", invalid="ignore"):
+        off = float(np.linalg.norm(matrix.T @ matrix - np.eye(3)))
+        determinant = float(np.linalg.det(matrix))
+    if not off <= _SLACK or determinant < 0.0:
         what = "a reflection" if off <= _SLACK else "no rotation"
         raise CalibrationError(
             f"{where}: {what} (determinant {determinant:.6g}, |R^T R - I| = {off:.2g}), "

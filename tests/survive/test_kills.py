@@ -10,8 +10,7 @@ from pathlib import Path
 
 import pytest
 
-import tiltvp
-from tiltvp.synth import render_room, simulate_drive
+from command_inputs import write_drive_log, write_rooms
 
 KILLS = 3
 COMMANDS: dict[str, tuple[str, ...]] = {
@@ -29,17 +28,8 @@ COMMANDS: dict[str, tuple[str, ...]] = {
 def world(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Inputs of all commands."""
     folder = tmp_path_factory.mktemp("world")
-    camera = tiltvp.Camera.equidistant(width=240, height=180, focal_px=52.4, cx=119.5, cy=89.5, max_theta_rad=1.6)
-    camera.save(folder / "camera.toml")
-    image = render_room(camera, kind="office", seed=3, alpha_rad=0.03)
-    for number in range(12):
-        tiltvp.write_image(folder / "images" / f"{number}.png", image.bgr)
-    drive = simulate_drive("paper", seed=1)
-    for name, header, rows in (
-        ("wheels.csv", "step,delta_left_m,delta_right_m", [(i, *row) for i, row in enumerate(drive.odometry.tolist())]),
-        ("bearings.csv", "step,landmark,bearing_rad", [(int(a), int(b), c) for a, b, c in drive.bearings.tolist()]),
-    ):
-        (folder / name).write_text("\n".join([header, *(",".join(map(str, row)) for row in rows)]) + "\n")
+    write_rooms(folder, 12)
+    write_drive_log(folder)
     return folder
 
 

@@ -13,10 +13,9 @@ import numpy as np
 import pytest
 
 import tiltvp
-from test_corner_images import CAMERA, COLOURS, LEFT_FROM_RIGHT, pair
+from command_inputs import write_drive_log, write_pair, write_rooms
+from drawn_corners import COLOURS, pair
 from tiltvp.cli import main
-from tiltvp.stereo_rigs import StereoRig
-from tiltvp.synth import render_room, simulate_drive
 
 COMMANDS: dict[str, tuple[str, ...]] = {
     "camera convert": ("camera", "convert", "camera.toml", "OUT.toml"),
@@ -53,20 +52,9 @@ COMMANDS: dict[str, tuple[str, ...]] = {
 def world(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Inputs of all commands."""
     folder = tmp_path_factory.mktemp("world")
-    camera = tiltvp.Camera.equidistant(width=240, height=180, focal_px=52.4, cx=119.5, cy=89.5, max_theta_rad=1.6)
-    camera.save(folder / "camera.toml")
-    for number in range(3):
-        image = render_room(camera, kind="office", seed=3, alpha_rad=0.03, beta_rad=0.02 * number)
-        tiltvp.write_image(folder / "images" / f"{number}.png", image.bgr)
-    drive = simulate_drive("paper", seed=1)
-    for name, header, rows in (
-        ("wheels.csv", "step,delta_left_m,delta_right_m", [(i, *row) for i, row in enumerate(drive.odometry.tolist())]),
-        ("bearings.csv", "step,landmark,bearing_rad", [(int(a), int(b), c) for a, b, c in drive.bearings.tolist()]),
-    ):
-        (folder / name).write_text("\n".join([header, *(",".join(map(str, row)) for row in rows)]) + "\n")
-    StereoRig(CAMERA, CAMERA, LEFT_FROM_RIGHT).save(folder / "rig.toml")
-    for side, image in zip(("left", "right"), pair(COLOURS), strict=True):
-        tiltvp.write_image(folder / side / "a.png", image)
+    write_rooms(folder, 3)
+    write_drive_log(folder)
+    write_pair(folder, dict(zip(("left", "right"), pair(COLOURS), strict=True)))
     noise = np.random.default_rng(1).integers(0, 256, (64, 128), dtype=np.uint8)
     tiltvp.write_image(folder / "panos" / "hall.jpg", cv2.resize(noise, (512, 256), interpolation=cv2.INTER_CUBIC))
     (folder / "panos" / "INDEX.csv").write_text("name,environment,tilt_x_deg,tilt_z_deg\nhall,house,0,0\n")

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import shutil
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import pytest
-from playwright.sync_api import Page, sync_playwright
+from playwright.sync_api import Browser, Page
 
 from tiltvp.lab.report.files import PAGE
 
@@ -26,24 +25,19 @@ class Opened:
 
 
 @pytest.fixture(scope="module")
-def opened(report: Path) -> Iterator[Opened]:
+def opened(browser: Browser, report: Path) -> Iterator[Opened]:
     """The report by its file, in a window of 1200 x 900 pixels that has no network."""
-    browser_path = shutil.which("chromium")
-    assert browser_path, "no chromium: `just test-system` installs it"
-    with sync_playwright() as playwright:
-        arguments = ["--no-sandbox", "--enable-unsafe-swiftshader", "--use-gl=angle", "--use-angle=swiftshader"]
-        browser = playwright.chromium.launch(executable_path=browser_path, args=arguments)
-        context = browser.new_context(viewport={"width": 1200, "height": 900}, offline=True)
-        page = context.new_page()
-        seen = Opened(page)
-        page.on("console", lambda message: seen.complaints.append(message.text) if message.type == "error" else None)
-        page.on("pageerror", lambda error: seen.complaints.append(str(error)))
-        page.on("request", lambda request: seen.requests.append(request.url))
-        page.goto((report / PAGE).as_uri())
-        for stem in WEB_FIGURES:
-            page.wait_for_selector(f"#{stem} .main-svg, #{stem} canvas", state="attached", timeout=60_000)
-        yield seen
-        browser.close()
+    context = browser.new_context(viewport={"width": 1200, "height": 900}, offline=True)
+    page = context.new_page()
+    seen = Opened(page)
+    page.on("console", lambda message: seen.complaints.append(message.text) if message.type == "error" else None)
+    page.on("pageerror", lambda error: seen.complaints.append(str(error)))
+    page.on("request", lambda request: seen.requests.append(request.url))
+    page.goto((report / PAGE).as_uri())
+    for stem in WEB_FIGURES:
+        page.wait_for_selector(f"#{stem} .main-svg, #{stem} canvas", state="attached", timeout=60_000)
+    yield seen
+    context.close()
 
 
 def test_nothing_is_asked_of_a_network(opened: Opened) -> None:

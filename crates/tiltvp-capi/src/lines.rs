@@ -84,7 +84,7 @@ pub unsafe extern "C" fn tiltvp_line_extractor_extract(
         scratch.with(
             || (inner.scratch(), Lines::default()),
             |(scratch, found)| {
-                inner.extract(&view, tilt.as_ref(), scratch, found)?;
+                inner.extract(&view, tilt.as_ref(), None, scratch, found)?;
                 *count = found.lines.len();
                 if places.len() < found.lines.len() {
                     return refused(
@@ -147,7 +147,7 @@ mod tests {
         // SAFETY: rows of the test.
         let view = unsafe { image.view("image") }.unwrap();
         let mut expected = Lines::default();
-        extractor.inner.extract(&view, Some(&LEAN), &mut extractor.inner.scratch(), &mut expected).unwrap();
+        extractor.inner.extract(&view, Some(&LEAN), None, &mut extractor.inner.scratch(), &mut expected).unwrap();
         assert_eq!((status, count), (Status::Ok, expected.lines.len()));
         assert!(count > 3, "{count}");
         for (line, expected) in lines.iter().zip(&expected.lines) {

@@ -82,7 +82,7 @@ fn measured_once() {
     let options = LineOptions::for_method("great-circle").unwrap();
     let extractor = LineExtractor::new(camera, Matrix3::identity(), options).unwrap();
     let (mut scratch, mut lines, mut values) = (extractor.scratch(), Lines::default(), Vec::new());
-    extractor.extract(&image.view(), Some(&tilt), &mut scratch, &mut lines).unwrap();
+    extractor.extract(&image.view(), Some(&tilt), None, &mut scratch, &mut lines).unwrap();
     extractor.describe(&image.view(), &lines, &mut scratch, &mut values).unwrap();
     extracted_lines(&extractor, &image.view(), &tilt, &mut scratch, &mut lines);
     described_lines(&extractor, &image.view(), &lines, &mut scratch, &mut values);
@@ -115,7 +115,7 @@ fn extracted_lines(
     scratch: &mut LineScratch,
     out: &mut Lines,
 ) {
-    extractor.extract(black_box(image), Some(tilt), scratch, out).unwrap();
+    extractor.extract(black_box(image), Some(tilt), None, scratch, out).unwrap();
 }
 
 #[inline(never)]

@@ -36,7 +36,7 @@ fn apart(a: f64, b: f64) -> f64 {
 
 fn extract(extractor: &LineExtractor, image: &Image, tilt: Option<&Tilt>) -> Lines {
     let mut lines = Lines::default();
-    extractor.extract(&image.view(), tilt, &mut extractor.scratch(), &mut lines).unwrap();
+    extractor.extract(&image.view(), tilt, None, &mut extractor.scratch(), &mut lines).unwrap();
     lines
 }
 

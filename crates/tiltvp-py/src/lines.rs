@@ -74,15 +74,21 @@ impl LineExtractor {
         self.inner.band_rad()
     }
 
-    /// The lines of a C-contiguous (H, W) image of uint8.
-    #[pyo3(signature = (image: "NDArray[np.uint8]", normal: "ArrayLike | None"))]
-    fn _extract(&self, py: Python<'_>, image: &Bound<'_, PyAny>, normal: Option<&Bound<'_, PyAny>>) -> PyResult<Lines> {
+    /// The lines of a C-contiguous (H, W) image of uint8; with a normal its standard deviation where known.
+    #[pyo3(signature = (image: "NDArray[np.uint8]", normal: "ArrayLike | None", tilt_sigma_rad: "float | None"))]
+    fn _extract(
+        &self,
+        py: Python<'_>,
+        image: &Bound<'_, PyAny>,
+        normal: Option<&Bound<'_, PyAny>>,
+        tilt_sigma_rad: Option<f64>,
+    ) -> PyResult<Lines> {
         let image = convert::gray(image, "image")?;
         let (view, inner) = (convert::view(&image)?, &self.inner);
         let tilt = normal.map(|normal| convert::tilt(normal, "normal")).transpose()?;
         let lines = self.with_scratch(py, |scratch| {
             let mut lines = core::Lines::default();
-            inner.extract(&view, tilt.as_ref(), scratch, &mut lines).map(|()| lines)
+            inner.extract(&view, tilt.as_ref(), tilt_sigma_rad, scratch, &mut lines).map(|()| lines)
         })?;
         Ok(Lines::from(lines))
     }

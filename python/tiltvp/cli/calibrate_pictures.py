@@ -20,7 +20,7 @@ from tiltvp.errors import InvalidInputError
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from tiltvp import Camera, MountingTilt, Robot, TiltEstimate
+    from tiltvp import Camera, MountingTilt, Robot
     from tiltvp.cli.calibrate_inputs import DriveOptions
     from tiltvp.cli.line_options import LineOptions
     from tiltvp.drive_logs import DriveLog
@@ -144,15 +144,7 @@ class PictureLog:
         turned = about_vertical(yaw_rad) @ rotation
         extractor = self.lines.extractor(self.camera, rotation=turned)
         tilt = self.lines.tilts(self.camera, rotation=turned)
-        upright = 0
-
-        def told(gray: NDArray[np.uint8]) -> TiltEstimate | None:
-            nonlocal upright
-            found = tilt(gray)
-            upright += found is None
-            return found
-
-        looked = Drive(extractor, LineTracker(camera_m=(x_m, y_m)), told, self.moved)
+        looked = Drive(extractor, LineTracker(camera_m=(x_m, y_m)), tilt, self.moved)
         count, nothing = len(self.moved.motions), np.zeros((0, 0), np.uint8)
         with progress_bar(count, f"{self.name}: lines") as bar:
             # A drive's images together are more than the memory holds.
@@ -163,14 +155,14 @@ class PictureLog:
         least = self.pictures.track_frames_min
         bearings = bearing_log([one for _, _, one in seen], frames_min=least)
         if not len(bearings):
-            raise InvalidInputError(f"{self.name}: no line is seen in {least} of {count} frames")
+            raise InvalidInputError(f"{self.name}: no line is seen in {least} of {count} frames, {looked.told()}")
         # From the robot's frame back to the camera's.
         bearings[:, 2] -= yaw_rad
         table = track_table([(one.number, name, time_s, one.tracked) for name, time_s, one in seen])
         if self.pictures.tracks is not None:
             write_table(table, self.pictures.tracks)
-        if upright:
-            say(f"{self.name}: in {upright} of {count} frames the robot is taken to stand upright")
+        if looked.leaning:
+            say(f"{self.name}: of {count} frames {looked.told()}")
         say(f"{self.name}: {len(bearings)} bearings of {len(set(bearings[:, 1].tolist()))} lines")
         self.bad, self.sigma_rad = looked.bad, float(np.median([row["sigma_rad"] for row in table.rows]))
         base = self.drive.wheel_base

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import os
 import sys
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -29,25 +30,46 @@ _CHECK_COLUMNS = (
     "file", "camera", "model", "pixels", "lost", "round trip px", "round trip rad", "Jacobian error", "rim deg",
     "verdict",
 )  # fmt: skip
-Format = Annotated[str | None, Parameter(name=("--format", "--camera-format"))]
+
+
+@Parameter(name="*")
+@dataclass(frozen=True, kw_only=True)
+class FileOptions:
+    """What a calibration file is, where it does not tell itself."""
+
+    format: Annotated[str | None, Parameter(name=("--format", "--camera-format"))] = None
+    """The format of FILE, where its content does not tell."""
+    image_size: str | None = None
+    """WIDTHxHEIGHT in pixels, for formats that do not carry it."""
+
+    def specs(self, file: Path) -> list[CameraSpec]:
+        """The cameras of a file."""
+        from tiltvp.formats import read_cameras
+
+        return read_cameras(file, self.format, image_size_from(self.image_size))
+
+    def first(self, file: Path) -> Camera:
+        """The first camera of a file."""
+        from tiltvp import Camera
+
+        return Camera.load(file, self.format, image_size=image_size_from(self.image_size))
+
+
+_READING = FileOptions()
 
 
 @app.command
-def info(file: Path, /, *, format: Format = None, image_size: str | None = None, mirror: Switch = False) -> None:
+def info(file: Path, /, reading: FileOptions = _READING, *, mirror: Switch = False) -> None:
     """Show model, size, parameters and field of view of every camera in a file.
 
     Parameters
     ----------
     file
         Calibration file.
-    format
-        Its format, where its content does not tell.
-    image_size
-        WIDTHxHEIGHT in pixels, for formats that do not carry it.
     mirror
         The image is seen in a mirror.
     """
-    for spec in _specs(file, format, image_size):
+    for spec in reading.specs(file):
         show(_info_table(spec, _built(file, spec, mirror)))
 
 
@@ -56,10 +78,9 @@ def convert(
     file: Path,
     out: Path,
     /,
+    reading: FileOptions = _READING,
     *,
     to: str | None = None,
-    format: Format = None,
-    image_size: str | None = None,
     camera_name: str | None = None,
 ) -> None:
     """Write the cameras of a file as a file of another tool, or as tiltvp's own TOML.
@@ -75,10 +96,6 @@ def convert(
     to
         Its format: kalibr, opencv, colmap (binary if OUT ends in .bin), ros, basalt, ocamcalib, or tiltvp, which OUT
         that ends in .toml is without being asked.
-    format
-        The format of FILE, where its content does not tell.
-    image_size
-        WIDTHxHEIGHT in pixels, for formats that do not carry it.
     camera_name
         Name or number of the one camera to write, the first being 0; otherwise all are.
     """
@@ -89,7 +106,7 @@ def convert(
     if os.path.realpath(out) == os.path.realpath(file):
         raise InvalidInputError(f"{out}: is the file to be read, expected another name")
     check_output(out)
-    specs = _specs(file, format, image_size)
+    specs = reading.specs(file)
     if camera_name is not None:
         names = [spec.name for spec in specs]
         chosen = [spec for spec in specs if spec.name == camera_name]
@@ -111,7 +128,7 @@ def convert(
 
 
 @app.command
-def check(files: list[Path], /, *, format: Format = None, image_size: str | None = None) -> int:
+def check(files: list[Path], /, reading: FileOptions = _READING) -> int:
     """Measure round trips and Jacobians of every camera, from the axis to the rim.
 
     The exit code is 1 if a pixel comes back more than 1e-6 pixels off or not at all, a Jacobian is more than 1e-6 off
@@ -121,16 +138,12 @@ def check(files: list[Path], /, *, format: Format = None, image_size: str | None
     ----------
     files
         Calibration files.
-    format
-        Their format, where their content does not tell.
-    image_size
-        WIDTHxHEIGHT in pixels, for formats that do not carry it.
     """
     table = new_table(None, _CHECK_COLUMNS, ("file", "camera", "model", "verdict"))
     sound = True
     for file in files:
         try:
-            for spec in _specs(file, format, image_size):
+            for spec in reading.specs(file):
                 sound &= _check_row(table, file, spec, _built(file, spec))
         except TiltvpError as error:
             complain(named(file, str(error)))
@@ -152,12 +165,6 @@ def formats() -> None:
         what = f"The same as {family}, taken as a {kind} camera." if is_variant else words
         table.add_row(one.name, "yes" if one.written else "", what)
     show(table)
-
-
-def _specs(file: Path, format: str | None, image_size: str | None) -> list[CameraSpec]:
-    from tiltvp.formats import read_cameras
-
-    return read_cameras(file, format, image_size_from(image_size))
 
 
 def _built(file: Path, spec: CameraSpec, mirror: bool = False) -> Camera:

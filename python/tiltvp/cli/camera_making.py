@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter, validators
 
-from tiltvp.cli.camera import Format, app
+from tiltvp.cli.camera import FileOptions, app
 from tiltvp.cli.options import Switch, image_size_from
 from tiltvp.cli.terminal import say
 from tiltvp.errors import InvalidInputError
@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 
 __all__ = ["app"]
 
+_READING = FileOptions()
 _ABOVE_0 = Parameter(validator=validators.Number(gt=0))
 
 
@@ -69,9 +70,7 @@ def new(
 
 
 @app.command
-def crop(
-    file: Path, out: Path, /, *, at: tuple[int, int], size: str, format: Format = None, image_size: str | None = None
-) -> None:
+def crop(file: Path, out: Path, /, reading: FileOptions = _READING, *, at: tuple[int, int], size: str) -> None:
     """Write the camera of a part of the images.
 
     Parameters
@@ -84,17 +83,11 @@ def crop(
         u and v of the part's first pixel.
     size
         WIDTHxHEIGHT of the part.
-    format
-        The format of FILE, where its content does not tell.
-    image_size
-        WIDTHxHEIGHT in pixels, for formats that do not carry it.
     """
-    from tiltvp import Camera
-
     part = image_size_from(size, "--size")
     assert part is not None  # There is a text.
     _check(out, file)
-    whole = Camera.load(file, format, image_size=image_size_from(image_size))
+    whole = reading.first(file)
     u, v = at
     if min(u, v) < 0 or u + part[0] > whole.width or v + part[1] > whole.height:
         inside = f"a part of {whole.width} x {whole.height} pixels"
@@ -107,11 +100,10 @@ def scale(
     file: Path,
     out: Path,
     /,
+    reading: FileOptions = _READING,
     *,
     factor: Annotated[float | None, _ABOVE_0] = None,
     to: str | None = None,
-    format: Format = None,
-    image_size: str | None = None,
 ) -> None:
     """Write the camera of resized images.
 
@@ -125,17 +117,11 @@ def scale(
         By how much they were made larger.
     to
         WIDTHxHEIGHT that they have now, in place of a factor.
-    format
-        The format of FILE, where its content does not tell.
-    image_size
-        WIDTHxHEIGHT in pixels, for formats that do not carry it.
     """
-    from tiltvp import Camera
-
     if (factor is None) == (to is None):
         raise InvalidInputError("--factor and --to: expected one of them")
     _check(out, file)
-    camera = Camera.load(file, format, image_size=image_size_from(image_size))
+    camera = reading.first(file)
     wanted = image_size_from(to, "--to")
     if wanted is not None:
         # Either side tells it to half a pixel; the longer one better.

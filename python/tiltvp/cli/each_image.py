@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Annotated, Any, TypeVar
+
+from cyclopts import Parameter
 
 from tiltvp.cli.sources import SourceOptions, ending_at_interrupt, picture_names
 from tiltvp.cli.terminal import named, progress_bar
@@ -15,8 +17,13 @@ if TYPE_CHECKING:
 
     Image = NDArray[Any]
 
-__all__ = ["find_in_each"]
+__all__ = ["Images", "find_in_each"]
 
+_IMAGES = (
+    "Image files, folders of images and glob patterns; or one video or recording of ROS; or -, for names of files "
+    "on stdin."
+)
+Images = Annotated[list[str] | None, Parameter(help=_IMAGES)]
 Found = TypeVar("Found")
 
 

@@ -33,9 +33,9 @@ class LineOptions(MountedOptions):
     """great-circle (the default) or radial, the paper's."""
     tilt: str = _UPRIGHT
     """upright: the robot stands upright; or how the lean of each frame is estimated: refined or another method of
-    `tiltvp tilt`. A frame without an estimate is taken to be upright."""
+    `tiltvp tilt`. A frame whose lean is not known is left out."""
     tilt_confidence_min: Annotated[float, Parameter(validator=validators.Number(gte=0, lte=1))] = 0.5
-    """A frame whose estimated lean is less confident, or leaves far less of its lines, is taken to be upright."""
+    """A frame whose estimated lean is less confident, or leaves far less of its lines, is left out."""
 
     def extractor(self, camera: Camera, *, rotation: NDArray[np.float64] | None = None) -> LineExtractor:
         """The extractor with the options that were given, for their mounting or another."""
@@ -48,8 +48,9 @@ class LineOptions(MountedOptions):
     def tilts(
         self, camera: Camera, *, rotation: NDArray[np.float64] | None = None
     ) -> Callable[[NDArray[np.uint8]], TiltEstimate | None]:
-        """What tells the lean of a grey image: None where the robot is taken to be upright."""
+        """What tells the lean of a grey image: None with --tilt upright; raises `UnknownLeanError`."""
         from tiltvp import METHODS, TiltEstimator
+        from tiltvp.line_logs import believed_leans
 
         check_word("--tilt", self.tilt, (_UPRIGHT, *METHODS))
         if self.tilt == _UPRIGHT:
@@ -60,12 +61,7 @@ class LineOptions(MountedOptions):
             options["mask"] = mask_from(self.mask)
         estimator, extractor = TiltEstimator(camera, **options), self.extractor(camera, rotation=mounting)
 
-        def tilt(gray: NDArray[np.uint8]) -> TiltEstimate | None:
-            estimate = estimator(gray)
-            believed = extractor.believes(gray, estimate, confidence_min=self.tilt_confidence_min)
-            return estimate if believed else None
-
-        return tilt
+        return believed_leans(estimator, extractor, confidence_min=self.tilt_confidence_min)
 
     def rotation(self) -> NDArray[np.float64]:
         """The mounting that was given, or that of a camera that looks up."""
@@ -81,4 +77,4 @@ class DrivingLineOptions(LineOptions):
     """How lines are found: great-circle (the default) or radial, the paper's."""
     tilt: str = "segments"
     """How the lean of each frame is estimated: segments or another method of `tiltvp tilt`, or upright: the robot
-    stands upright. A frame without an estimate is taken to be upright."""
+    stands upright. A frame whose lean is not known is left out."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
-from tiltvp.cli.each_image import find_in_each
+from tiltvp.cli.each_image import Images, find_in_each
 from tiltvp.cli.line_options import LineOptions
 from tiltvp.cli.options import CameraOptions
 from tiltvp.cli.results import degrees
@@ -21,7 +21,7 @@ _DEFAULTS, _SOURCE = LineOptions(), SourceOptions()
 
 
 def lines(
-    images: list[str] | None = None,
+    images: Images = None,
     /,
     *,
     camera: CameraOptions,
@@ -36,9 +36,6 @@ def lines(
 
     Parameters
     ----------
-    images
-        Image files, folders of images and glob patterns; or one video or recording of ROS; or -, for names of files
-        on stdin.
     out
         File for the lines in radians, one row for each: .csv, .json or .parquet.
     overlay
@@ -46,8 +43,7 @@ def lines(
     """
     from tiltvp.overlays.lines import draw_lines
 
-    if out is not None:
-        check_ending(out)
+    check_ending(out)
     if overlay is not None:
         check_output_folder(overlay)
     lens, options = camera.load(), camera.complete(options)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from cyclopts import Group, Parameter
 
 from tiltvp.cli.declared_options import LibraryOptions, from_library
-from tiltvp.cli.each_image import find_in_each
+from tiltvp.cli.each_image import Images, find_in_each
 from tiltvp.cli.options import CameraOptions
 from tiltvp.cli.results import degrees
 from tiltvp.cli.sources import SourceOptions
@@ -34,7 +34,7 @@ _DEFAULTS, _SOURCE = SegmentOptions(), SourceOptions()
 
 
 def segments(
-    images: list[str] | None = None,
+    images: Images = None,
     /,
     *,
     camera: CameraOptions,
@@ -49,9 +49,6 @@ def segments(
 
     Parameters
     ----------
-    images
-        Image files, folders of images and glob patterns; or one video or recording of ROS; or -, for names of files
-        on stdin.
     out
         File for the edges in the camera frame, radians, one row for each: .csv, .json or .parquet.
     overlay
@@ -60,8 +57,7 @@ def segments(
     from tiltvp.overlays.segments import draw_segments
     from tiltvp.segments import SegmentDetector
 
-    if out is not None:
-        check_ending(out)
+    check_ending(out)
     if overlay is not None:
         check_output_folder(overlay)
     lens = camera.load()

@@ -42,8 +42,10 @@ class Table:
         return pl.DataFrame(self.rows, schema={name: getattr(pl, word) for name, word in self.types.items()})
 
 
-def check_ending(path: Path) -> None:
+def check_ending(path: Path | None) -> None:
     """Refuses a file of results that cannot be written in its format, before any work is done."""
+    if path is None:
+        return
     if path.suffix.lower() not in ENDINGS:
         raise InvalidInputError(f"--out {path}: ends in {path.suffix!r}, expected one of {', '.join(ENDINGS)}")
     if path.suffix.lower() == ".parquet":

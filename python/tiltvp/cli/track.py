@@ -19,7 +19,7 @@ from tiltvp.cli.showing import RerunOptions
 from tiltvp.cli.sources import MotionOptions, SourceOptions, ending_at_interrupt
 from tiltvp.cli.tables import Table, check_ending, check_plot, write_table
 from tiltvp.cli.terminal import ProgressBar, named, progress_bar, say
-from tiltvp.errors import InvalidInputError, TiltvpError
+from tiltvp.errors import InvalidInputError, TiltvpError, UnknownLeanError
 from tiltvp.files import check_output
 
 if TYPE_CHECKING:
@@ -115,7 +115,9 @@ def track(
             if viewer is not None:
                 send_lines(viewer, seen.number, frame.time_s, picture, seen.tracked)
     if not tracked:
-        raise InvalidInputError(f"{frames.source}: {drive.bad} frames, none of which can be read")
+        count = drive.bad + drive.leaning
+        which = "none of which can be read" if not drive.leaning else f"{drive.told()}, and no other can be read"
+        raise InvalidInputError(f"{frames.source}: {count} frames, {which}")
     table = track_table(tracked)
     write_table(table, out)
     if plot is not None:
@@ -123,7 +125,7 @@ def track(
         from tiltvp.lab.plots.tracks import track_plot
 
         write_image(plot, figure_picture(track_plot(table.frame())))
-    skipped = f", {drive.bad} skipped" if drive.bad else ""
+    skipped = "".join([f", {drive.bad} skipped" if drive.bad else "", f", {drive.told()}" if drive.leaning else ""])
     say(f"{out}: {len(tracked)} frames{skipped}, {len(table.rows)} lines, {tracker.track_count} tracks")
     return 1 if drive.bad or frames.problems else 0
 
@@ -149,11 +151,18 @@ class Drive:
         self._motions = motions
         self.bad = 0
         """How many frames could not be used so far."""
+        self.leaning = 0
+        """How many were left out so far because their lean is not known."""
+
+    def told(self) -> str:
+        """How many frames were left out because of their lean."""
+        return f"{self.leaning} left out whose lean is not known"
 
     def followed(self, frames: Iterator[Frame], bar: ProgressBar) -> Iterator[tuple[Frame, FollowedFrame]]:
         """The frames that can be used, with their lines; the others are complained about.
 
-        Frames of whose time the odometry does not tell are left out; a line about them has been told before.
+        Frames whose lean is not known are left out and counted. So are those of whose time the odometry does not tell;
+        a line about them has been told before.
         """
         from tiltvp.line_logs import follow_lines
         from tiltvp.streams import Motion
@@ -170,7 +179,9 @@ class Drive:
         driven = None if motions is None else [motion or Motion() for motion in motions]
         for seen in follow_lines(images(), extractor, tracker, tilt=tilt, motions=driven):
             frame = passed.pop()
-            if seen is not _LEFT_OUT:
+            if isinstance(seen, UnknownLeanError):
+                self.leaning += 1
+            elif seen is not _LEFT_OUT:
                 if isinstance(seen, TiltvpError):
                     bar.complain(named(frame.name, str(seen)))
                     self.bad += 1

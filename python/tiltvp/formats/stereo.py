@@ -94,7 +94,7 @@ def _motion(node: Node) -> NDArray[np.float64]:
     """A (4, 4) rigid motion; a rotation to the digits that files have is made one to all."""
     try:
         matrix = np.array(node.value, dtype=np.float64)
-    except (ValueError, TypeError):
+    except (ValueError, TypeError, OverflowError):
         matrix = np.zeros(0)
     if matrix.shape != (4, 4) or not np.isfinite(matrix).all():
         node.fail("is no (4, 4) matrix of numbers", "four rows of four numbers")

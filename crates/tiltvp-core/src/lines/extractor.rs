@@ -117,15 +117,18 @@ impl LineExtractor {
         Err(Error::argument("image", got, format!("{height} x {width} (rows x columns), as the camera's images")))
     }
 
-    /// The vertical lines of an image, by rising bearing. `tilt` is the lean of the frame where it is known; the radial
-    /// variant has none.
+    /// The vertical lines of an image, by rising bearing. `tilt` is the lean of the frame where it is known, and
+    /// `tilt_sigma_rad` its standard deviation where that is known, as of an estimate; else that of the options. The
+    /// radial variant has neither.
     ///
     /// # Errors
-    /// [`Error::InvalidArgument`] if the image has another size than the camera's, or the scratch is another extractor's.
+    /// [`Error::InvalidArgument`] if the image has another size than the camera's, or the scratch is another extractor's;
+    /// [`Error::InvalidOption`] for a standard deviation that the option could not have.
     pub fn extract(
         &self,
         image: &ImageView<'_>,
         tilt: Option<&Tilt>,
+        tilt_sigma_rad: Option<f64>,
         scratch: &mut LineScratch,
         out: &mut Lines,
     ) -> Result<()> {
@@ -138,6 +141,11 @@ impl LineExtractor {
             }
             (LineMethod::GreatCircle(options), Some(finder), Some(work), _) => {
                 let tilt = tilt.copied().unwrap_or(Tilt::UPRIGHT);
+                let options = match tilt_sigma_rad {
+                    Some(tilt_sigma_rad) => &GreatCircleOptions { tilt_sigma_rad, ..options.clone() },
+                    None => options,
+                };
+                options.validate()?;
                 let reach = (MISS_MAX_RAD.max(options.plane_max_rad) + tilt.alpha_rad()).min(FRAC_PI_2);
                 let prefilter = self.tables.prefilter.with_limit(reach.sin());
                 finder.find(image, &self.tables.region, edges.gradient_min, Some(&prefilter), work, segments);

@@ -28,7 +28,8 @@ options! {
         covered_min: f64 = 0.4 => 0.0..=1.0, "a share from 0 to 1";
         /// Greatest standard deviation of the pixels about their line, in pixels: lines that scatter more are edges that blend.
         scatter_max_px: f64 = 0.36 => 0.01..=100.0, "a distance from 0.01 to 100 pixels";
-        /// Standard deviation of the tilt that the frame is given, in radians: lines may slant by as much.
+        /// Standard deviation of the tilt that the frame is given, in radians, where the tilt does not tell its own as estimates do: lines
+        /// may slant by as much.
         tilt_sigma_rad: f64 = 0.5 * PI / 180.0 => 1e-6..=0.5, "an angle from 1e-6 to 0.5 rad";
         /// The most lines of an image, the longest ones; none for all.
         lines_max: Option<usize> = None => 1.0..f64::INFINITY, "at least 1, or none";

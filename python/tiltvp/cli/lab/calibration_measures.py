@@ -93,8 +93,7 @@ def calibration_images(
     """
     from tiltvp.lab.evaluation.calibration_images import PictureExperiment, picture_drives
 
-    if out is not None:
-        check_ending(out)
+    check_ending(out)
     experiment = PictureExperiment(
         kinds=kinds, leans_max_deg=leans_deg, drives=drives, seed=seed, trajectory=trajectory
     )
@@ -136,8 +135,7 @@ def trust_calibration(
     cases = [name for name in DRIVE_CASES if only in name]
     if not cases:
         raise InvalidInputError(f"--only {only}: no case of that name, expected one of {', '.join(DRIVE_CASES)}")
-    if out is not None:
-        check_ending(out)
+    check_ending(out)
     with progress_bar(len(cases) * drives, "drives") as bar:
         seeds = range(seed, seed + drives)
         tables = [judge_drives(hostile_drives(case, seeds), advance=bar.advance) for case in cases]

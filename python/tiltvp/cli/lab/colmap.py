@@ -8,6 +8,7 @@ from typing import Annotated
 from cyclopts import Parameter, validators
 
 from tiltvp.cli.colmap import BELIEVED_MIN
+from tiltvp.cli.lab.panorama_options import Out
 from tiltvp.cli.lab.tables import show_frame
 from tiltvp.cli.tables import check_ending, write_frame
 from tiltvp.cli.terminal import progress_bar
@@ -21,7 +22,7 @@ def colmap(
     kinds: Annotated[tuple[str, ...], Parameter(consume_multiple=True)] = ("office", "living-room"),
     seed: int = 5,
     views: Annotated[int, Parameter(validator=validators.Number(gte=3))] = 24,
-    out: Path | None = None,
+    out: Out = None,
 ) -> None:
     """COLMAP on views of rendered rooms: errors of gravity of its reconstructions, without priors and with them.
 
@@ -33,15 +34,12 @@ def colmap(
         Which room of its kind.
     views
         Of each room, leaning by up to 20 degrees.
-    out
-        Also write the table: .csv, .json or .parquet.
     """
     import polars as pl
 
     from tiltvp.lab.evaluation.colmap import reconstruct_room
 
-    if out is not None:
-        check_ending(out)
+    check_ending(out)
     with scratch_folder(Path("out/colmap")) as folder, progress_bar(len(kinds) * (views + _WAYS), "steps") as bar:
         wanted = {"views": views, "confidence_min": BELIEVED_MIN, "advance": bar.advance}
         table = pl.concat([reconstruct_room(kind, seed, folder / kind, **wanted) for kind in kinds])  # type: ignore[arg-type]

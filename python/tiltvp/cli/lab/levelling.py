@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from tiltvp.cli.lab.panorama_options import Every
 from tiltvp.cli.lab.tables import show_frame
 from tiltvp.cli.tables import check_ending, write_frame
 from tiltvp.cli.terminal import progress_bar
 
 
 def level(
-    directory: Path | None = None, /, *, inertial: Path | None = None, every: int = 1, out: Path | None = None
+    directory: Path | None = None, /, *, inertial: Path | None = None, every: Every = 1, out: Path | None = None
 ) -> None:
     """360-degree panoramas made level, turned by up to 30 degrees, and times beside OpenCV's remapping with ready maps.
 
@@ -21,8 +22,6 @@ def level(
         one, times alone are measured.
     inertial
         Folder with panoramas as taken, and an INDEX.csv of columns name, environment, imu_pitch_deg, imu_roll_deg.
-    every
-        Take one panorama in so many.
     out
         Also write the table of turned panoramas: .csv, .json or .parquet.
     """
@@ -30,8 +29,7 @@ def level(
     from tiltvp.lab.evaluation.imu import read_inertial_index, summarise_inertial
     from tiltvp.lab.evaluation.levelling import lean_against_sensor, remap_times, summarise_turned, turned_panoramas
 
-    if out is not None:
-        check_ending(out)
+    check_ending(out)
     with progress_bar(6, "times") as bar:
         times = remap_times(advance=bar.advance)
     show_frame("A level image by a new tilt beside cv2.remap with ready maps, one thread", times, ["image"])

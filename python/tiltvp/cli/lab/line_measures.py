@@ -47,8 +47,7 @@ def lines(
     """
     from tiltvp.lab.evaluation.lines import LineExperiment, line_intervals, measure_lines, summarise_lines
 
-    if out is not None:
-        check_ending(out)
+    check_ending(out)
     experiment = LineExperiment(frames=frames, kinds=kinds, leans_max_deg=leans_deg, seed=seed, samples=samples)
     with progress_bar(experiment.steps, "frames") as bar:
         table = measure_lines(experiment, threads=threads or os.cpu_count() or 1, advance=bar.advance)

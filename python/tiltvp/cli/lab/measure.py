@@ -17,6 +17,7 @@ from tiltvp.cli.lab.descriptors import descriptors
 from tiltvp.cli.lab.levelling import level
 from tiltvp.cli.lab.line_measures import lines
 from tiltvp.cli.lab.mounting import mounting
+from tiltvp.cli.lab.panorama_options import Every, Out, Panoramas, PanoramasIfAny, Rooms
 from tiltvp.cli.lab.planar_pose import planar_pose
 from tiltvp.cli.lab.striding import striding
 from tiltvp.cli.lab.tables import show_frame
@@ -44,10 +45,10 @@ app.command(trust_calibration)
 
 @app.command
 def panoramas(
-    directory: Path,
+    directory: Panoramas,
     /,
     *,
-    every: int = 1,
+    every: Every = 1,
     samples: int = 2,
     noise_sigma: float = 2.0,
     turn: Annotated[bool, Parameter(negative="")] = False,
@@ -57,10 +58,6 @@ def panoramas(
 
     Parameters
     ----------
-    directory
-        Folder with the panoramas and an INDEX.csv of columns name, environment, tilt_x_deg, tilt_z_deg.
-    every
-        Take one panorama in so many.
     samples
         Rays per pixel and side.
     noise_sigma
@@ -75,8 +72,7 @@ def panoramas(
     from tiltvp.lab.evaluation.panoramas import evaluate_views
     from tiltvp.lab.evaluation.summary import errors, variants
 
-    if out is not None:
-        check_ending(out)
+    check_ending(out)
     chosen = read_panorama_index(directory)[::every]
     with progress_bar(len(chosen), "panoramas") as bar:
         table = evaluate_views(
@@ -89,27 +85,20 @@ def panoramas(
 
 
 @app.command
-def views(directory: Path, /, *, every: int = 1, weights: bool = False, out: Path | None = None) -> None:
+def views(directory: Panoramas, /, *, every: Every = 1, weights: bool = False, out: Out = None) -> None:
     """The vertical of views that look anywhere, pinhole and fisheye, by the method of straight edges.
 
     Roll and pitch are within 45 degrees; which direction is up is chosen by weights that have not seen the building.
 
     Parameters
     ----------
-    directory
-        Folder with the panoramas and an INDEX.csv of columns name, environment, tilt_x_deg, tilt_z_deg.
-    every
-        Take one panorama in so many.
     weights
         Also print the weights that all views train.
-    out
-        Also write the table: .csv, .json or .parquet.
     """
     from tiltvp.lab.datasets.panoramas import read_panorama_index
     from tiltvp.lab.evaluation.ahead import ahead_table, look_ahead, train_choice
 
-    if out is not None:
-        check_ending(out)
+    check_ending(out)
     chosen = read_panorama_index(directory)[::every]
     with progress_bar(len(chosen), "panoramas") as bar:
         seen = look_ahead(chosen, advance=bar.advance)
@@ -150,7 +139,7 @@ def scaling(
     scales: Annotated[tuple[float, ...], Parameter(consume_multiple=True)] = (0.25, 0.5, 1.0, 2.0, 4.0),
     sweep: str = "paper",
     threads: Annotated[int | None, Parameter(validator=validators.Number(gte=1))] = None,
-    out: Path | None = None,
+    out: Out = None,
 ) -> None:
     """The time that an evaluation of rendered rooms takes, over the number of images and over their pixels.
 
@@ -164,15 +153,12 @@ def scaling(
         What is tried: paper or table3.
     threads
         Images at the same time; all cores by default.
-    out
-        Also write the table: .csv, .json or .parquet.
     """
     from tiltvp.lab.datasets.panoramas import paper_camera
     from tiltvp.lab.evaluation.combinations import choose
     from tiltvp.lab.evaluation.scaling import exponents, measure_scaling
 
-    if out is not None:
-        check_ending(out)
+    check_ending(out)
     combinations = choose(sweep)
     with progress_bar(len(images) + len(scales), "evaluations") as bar:
         table = measure_scaling(
@@ -190,7 +176,7 @@ def confidence(
     runs: Annotated[list[Path], Parameter(consume_multiple=True)],
     /,
     *,
-    out: Path | None = None,
+    out: Out = None,
 ) -> None:
     """How far covariance and confidence can be trusted: the truths that regions hold, and failures that were foreseen.
 
@@ -198,16 +184,13 @@ def confidence(
     ----------
     runs
         Folders that `tiltvp evaluate` has written.
-    out
-        Also write the table: .csv, .json or .parquet.
     """
     from tiltvp.lab.evaluation.runs import read_run
     from tiltvp.lab.evaluation.summary import errors
     from tiltvp.lab.evaluation.trust import trust
     from tiltvp.lab.evaluation.variants import best_rows
 
-    if out is not None:
-        check_ending(out)
+    check_ending(out)
     tables = {}
     for directory in runs:
         table = read_run(directory).table
@@ -224,11 +207,11 @@ def confidence(
 
 @app.command
 def sampling(
-    directory: Path | None = None,
+    directory: PanoramasIfAny = None,
     /,
     *,
-    every: int = 4,
-    rooms: int = 4,
+    every: Every = 4,
+    rooms: Rooms = 4,
     kind: str | None = None,
     seeds: int = 5,
     samples: int = 2,
@@ -239,13 +222,6 @@ def sampling(
 
     Parameters
     ----------
-    directory
-        Folder with the panoramas and an INDEX.csv of columns name, environment, tilt_x_deg, tilt_z_deg; without one,
-        rendered rooms alone are measured.
-    every
-        Take one panorama in so many.
-    rooms
-        Rendered rooms of each kind; 0 for none.
     kind
         Rooms of this kind alone.
     seeds
@@ -255,7 +231,7 @@ def sampling(
     noise_sigma
         Gaussian noise in grey levels.
     out
-        Also write the long table, one row for each image, method, way and seed, as Parquet.
+        Also write the long table, one row for each image, method, way and seed: .csv, .json or .parquet.
     """
     import polars as pl
 
@@ -264,6 +240,7 @@ def sampling(
     from tiltvp.lab.evaluation.views import view_sources
     from tiltvp.synth import ROOM_KINDS
 
+    check_ending(out)
     camera, kinds = paper_camera(), ROOM_KINDS if kind is None else (kind,)
     tables = []
     for source in view_sources(

@@ -44,8 +44,7 @@ def planar_pose(
     from tiltvp.lab.evaluation.planar_pose import PlanarPoseExperiment, measure_planar_pose
     from tiltvp.lab.evaluation.planar_summary import crossings, summarise_planar_pose
 
-    if out is not None:
-        check_ending(out)
+    check_ending(out)
     if plot is not None and plot.suffix.lower() not in _PICTURES:
         raise InvalidInputError(f"--plot {plot}: ends in {plot.suffix!r}, expected one of {', '.join(_PICTURES)}")
     experiment = PlanarPoseExperiment(rooms=max(2, -(-pairs // _PAIRS_OF_A_ROOM)), seed=seed)

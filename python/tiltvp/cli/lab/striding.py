@@ -3,34 +3,25 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
 
-from cyclopts import Parameter, validators
-
+from tiltvp.cli.lab.panorama_options import Every, PanoramasIfAny, Rooms
 from tiltvp.cli.lab.tables import show_frame
 from tiltvp.cli.tables import check_ending, write_frame
 from tiltvp.cli.terminal import progress_bar
 
 
 def striding(
-    directory: Path | None = None,
+    directory: PanoramasIfAny = None,
     /,
     *,
-    every: Annotated[int, Parameter(validator=validators.Number(gte=1))] = 1,
-    rooms: Annotated[int, Parameter(validator=validators.Number(gte=0))] = 6,
+    every: Every = 1,
+    rooms: Rooms = 6,
     out: Path | None = None,
 ) -> None:
     """Methods of edge pixels on every row, every second, third and fourth row of views: errors, regions, times.
 
     Parameters
     ----------
-    directory
-        Folder with the panoramas and an INDEX.csv of columns name, environment, tilt_x_deg, tilt_z_deg; without one,
-        rendered rooms alone are measured.
-    every
-        Take one panorama in so many.
-    rooms
-        Rendered rooms of each kind; 0 for none.
     out
         Also write the long table, one row for each view, method and stride: .csv, .json or .parquet.
     """
@@ -40,8 +31,7 @@ def striding(
     from tiltvp.lab.evaluation.striding import stride_views, summarise_strides
     from tiltvp.lab.evaluation.views import view_sources
 
-    if out is not None:
-        check_ending(out)
+    check_ending(out)
     camera, tables = paper_camera(), []
     for source in view_sources(directory, camera, every=every, rooms=rooms):
         with progress_bar(source.count, source.title) as bar:

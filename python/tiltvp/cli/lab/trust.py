@@ -52,8 +52,7 @@ def trust(
     from tiltvp.lab.evaluation.setups import image_sets, summarise_sets, train_setups
     from tiltvp.lab.evaluation.trust import was_set_on
 
-    if out is not None:
-        check_ending(out)
+    check_ending(out)
     chosen = [
         panorama
         for folder in panoramas

@@ -10,6 +10,7 @@ import numpy as np
 import polars as pl
 
 from tiltvp.lab.datasets.ahead import AHEAD_CAMERAS, ahead_views, roll_pitch
+from tiltvp.lab.evaluation.choices import choice_shares, train_weights
 from tiltvp.rotations import read_rotation
 from tiltvp.tilt import TiltEstimator
 
@@ -80,29 +81,9 @@ def look_ahead(
 
 
 def train_choice(views: Sequence[LearnedView]) -> NDArray[np.float64]:
-    """(F,): weights of the features: a conditional logit (McFadden 1974) with a penalty, by Newton's method."""
+    """(F,): weights of the features."""
     told = [view for view in views if len(view.ups) > 1 and view.errors_deg().min() <= RIGHT_DEG]
-    scale = np.std(np.concatenate([view.features for view in told]), axis=0) + 1e-9
-    weights = np.zeros(len(scale))
-    for _ in range(60):
-        gradient, curvature = -PENALTY * weights, PENALTY * np.eye(len(weights))
-        for view in told:
-            scaled = view.features / scale
-            shares = _shares(scaled @ weights)
-            mean = shares @ scaled
-            away = scaled - mean
-            gradient += scaled[view.errors_deg().argmin()] - mean
-            curvature += (away * shares[:, None]).T @ away
-        step = np.linalg.solve(curvature, gradient)
-        weights += step
-        if np.linalg.norm(step) < 1e-6:
-            break
-    return np.asarray(weights / scale)
-
-
-def _shares(log_odds: NDArray[np.float64]) -> NDArray[np.float64]:
-    odds = np.exp(log_odds - log_odds.max())
-    return np.asarray(odds / odds.sum())
+    return train_weights([(view.features, int(view.errors_deg().argmin())) for view in told], PENALTY)
 
 
 def ahead_table(views: Sequence[LearnedView], *, rng_seed: int = 0) -> pl.DataFrame:
@@ -121,7 +102,7 @@ def ahead_table(views: Sequence[LearnedView], *, rng_seed: int = 0) -> pl.DataFr
     def unseen(view: LearnedView) -> tuple[NDArray[np.float64], float]:
         if not len(view.ups):
             return nothing, 0.0
-        shares = _shares(view.features @ weights[fold[view.location]])
+        shares = choice_shares(view.features @ weights[fold[view.location]])
         best = float(shares.max())
         return view.ups[shares.argmax()], best / (1.0 + NONE_ODDS * best)
 

@@ -11,16 +11,13 @@ import polars as pl
 
 from tiltvp.errors import InvalidInputError
 from tiltvp.extrinsics import Extrinsics
-from tiltvp.line_logs import FollowedFrame, bearing_log, displacements, follow_lines
+from tiltvp.line_logs import FollowedFrame, bearing_log, believed_leans, displacements, follow_lines
 from tiltvp.lines import LineExtractor, LineTracker
 from tiltvp.selfcalib import calibrate
 from tiltvp.streams import Motion
 from tiltvp.tilt import TiltEstimator
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from tiltvp._core import TiltEstimate
     from tiltvp.lab.datasets.recording import RecordedDrive
     from tiltvp.mounting import MountingTilt
     from tiltvp.streams.frames import Frames
@@ -48,11 +45,7 @@ def judged_extrinsics(
     camera, rotation = drive.camera, tilt.robot_from_camera
     estimator = TiltEstimator(camera, method="segments", robot_from_camera=rotation)
     extractor = LineExtractor(camera, robot_from_camera=rotation)
-
-    def lean(gray: NDArray[np.uint8]) -> TiltEstimate | None:
-        estimate = estimator(gray)
-        return estimate if extractor.believes(gray, estimate, confidence_min=0.5) else None
-
+    lean = believed_leans(estimator, extractor)
     told = [motion or Motion() for motion in motions]
     images = (frame.image for frame in frames)
     followed = [

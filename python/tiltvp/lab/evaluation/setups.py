@@ -11,6 +11,7 @@ import polars as pl
 
 from tiltvp.lab.datasets.hostile import AHEAD, DOWN, FORWARD, LEAN_MAX_DEG, ROLLED, UP, UPWARD, WHOLE
 from tiltvp.lab.datasets.panoramas import Panorama, PanoramaViews
+from tiltvp.lab.evaluation.choices import train_weights
 from tiltvp.lab.evaluation.trust import was_set_on
 from tiltvp.setup_check import BELIEVABLE, DIRECTIONS, setup_features, shares_of
 from tiltvp.tilt import normal_from_alpha_beta
@@ -70,24 +71,8 @@ def image_sets(
 
 
 def train_setups(sets: Sequence[ImageSet]) -> NDArray[np.float64]:
-    """(F,): weights of the features: a conditional logit of single images with a penalty, by Newton's method."""
-    told = [(image, item.up) for item in sets for image in item.features]
-    scale = np.std(np.concatenate([image for image, _ in told]), axis=0) + 1e-9
-    weights = np.zeros(len(scale))
-    for _ in range(60):
-        gradient, curvature = -PENALTY * weights, PENALTY * np.eye(len(weights))
-        for image, up in told:
-            scaled = image / scale
-            odds = np.exp(scaled @ weights - (scaled @ weights).max())
-            shares = odds / odds.sum()
-            away = scaled - shares @ scaled
-            gradient += away[up]
-            curvature += (away * shares[:, None]).T @ away
-        step = np.linalg.solve(curvature, gradient)
-        weights += step
-        if np.linalg.norm(step) < 1e-6:
-            break
-    return np.asarray(weights / scale)
+    """(F,): weights of the features of single images."""
+    return train_weights([(image, item.up) for item in sets for image in item.features], PENALTY)
 
 
 def summarise_sets(sets: Sequence[ImageSet], weights: NDArray[np.float64] | None = None) -> pl.DataFrame:

@@ -1,0 +1,59 @@
+"""Cameras made of a view, and parts of cameras."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from tiltvp import Camera
+from tiltvp.errors import InvalidInputError
+
+
+@pytest.mark.parametrize(
+    ("lens", "law"),
+    [
+        ("equidistant", lambda theta: theta),
+        ("equisolid", lambda theta: 2.0 * np.sin(theta / 2.0)),
+        ("stereographic", lambda theta: 2.0 * np.tan(theta / 2.0)),
+        ("pinhole", np.tan),
+    ],
+)
+def test_a_camera_of_a_view(lens: str, law: Any) -> None:
+    view = 1.4 if lens == "pinhole" else 3.4
+    found = Camera.from_view(lens, width=640, height=480, view_rad=view, radius_px=230.0, centre_px=(310.0, 250.0))
+    theta = np.linspace(0.0, 0.4999 * view, 50)
+    bearings = np.column_stack([np.sin(theta), np.zeros(50), np.cos(theta)])
+    radii = found.project(bearings)[:, 0] - 310.0
+    np.testing.assert_allclose(radii, 230.0 * law(theta) / law(0.5 * view), atol=1e-4)
+    assert np.isnan(found.project([np.sin(0.51 * view), 0.0, np.cos(0.51 * view)])).all()
+    across = Camera.from_view(lens, width=640, height=480, view_rad=view)
+    u, v = across.project([-np.sin(0.5 * view), 0.0, np.cos(0.5 * view)])
+    np.testing.assert_allclose((u, v), (-0.5, 239.5), atol=1e-4)
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        {"lens": "fisheye"},
+        {"view_rad": 0.0},
+        {"view_rad": 7.0},
+        {"radius_px": -1.0},
+        {"lens": "pinhole", "view_rad": 3.2},
+    ],
+)
+def test_a_view_that_cannot_be(wrong: dict[str, Any]) -> None:
+    with pytest.raises(InvalidInputError, match="expected"):
+        Camera.from_view(**({"width": 64, "height": 48, "view_rad": 1.0} | wrong))
+
+
+def test_a_part_of_an_image_sees_what_it_saw() -> None:
+    whole = Camera.equidistant(width=640, height=480, focal_px=139.7, cx=319.5, cy=239.5, max_theta_rad=1.2)
+    part = whole.cropped(100, 50, 300, 200)
+    assert (part.width, part.height, part.max_theta_rad) == (300, 200, 1.2)
+    pixels = np.array([[0.0, 0.0], [299.0, 199.0], [150.0, 120.0]])
+    np.testing.assert_allclose(part.unproject(pixels), whole.unproject(pixels + [100.0, 50.0]), atol=1e-12)
+    assert whole.mirrored().cropped(0, 0, 640, 480) == whole.mirrored()
+    with pytest.raises(InvalidInputError, match="equirectangular"):
+        Camera.equirectangular(width=64, height=32).cropped(0, 0, 32, 32)

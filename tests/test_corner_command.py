@@ -1,0 +1,89 @@
+"""`tiltvp corner`: its files, how it chooses the method, and combinations that it refuses."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import polars as pl
+import pytest
+
+import tiltvp
+from drawn_corners import CAMERA, COLOURS, GREYS, LEFT_FROM_RIGHT, pair, pose
+from tiltvp.cli import main
+from tiltvp.stereo_rigs import StereoRig
+
+pytestmark = pytest.mark.slow
+
+
+def test_the_command_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    StereoRig(CAMERA, CAMERA, LEFT_FROM_RIGHT).save(tmp_path / "rig.toml")
+    CAMERA.save(tmp_path / "one.toml")
+    for side, image in zip(("left", "right"), pair(COLOURS), strict=True):
+        tiltvp.write_image(tmp_path / side / "a.png", image)
+    left, right = str(tmp_path / "left"), str(tmp_path / "right")
+    out, path = tmp_path / "poses.csv", tmp_path / "poses.txt"
+    words = ["corner", left, right, "--calibration", str(tmp_path / "rig.toml"), "--out", str(out)]
+    more = ["--overlay", str(tmp_path / "over"), "--trajectory", str(path), "--plot", str(tmp_path / "plot.png")]
+    assert main([*words, *more]) == 0
+    assert "1 with a pose" in capsys.readouterr().out
+    [row] = pl.read_csv(out).iter_rows(named=True)
+    rotation, vertex = pose()
+    assert np.allclose([row[name] for name in ("x_m", "y_m", "z_m")], -rotation.T @ vertex, atol=0.01)
+    assert len(path.read_text().splitlines()) == 2
+    assert tiltvp.read_image(tmp_path / "over" / "a.png").shape == (360, 480, 3)
+    assert (tmp_path / "plot.png").exists()
+    assert main(["corner", left, "--calibration", str(tmp_path / "one.toml"), "--out", str(out), "--overwrite"]) == 0
+    assert main(["corner", left, right, "--calibration", str(tmp_path / "one.toml")]) == 2
+
+
+def test_the_command_line_chooses_the_method(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    StereoRig(CAMERA, CAMERA, LEFT_FROM_RIGHT).save(tmp_path / "rig.toml")
+    for faces, name in ((COLOURS, "colours"), (GREYS, "greys"), (dict.fromkeys(GREYS, (150, 150, 150)), "nothing")):
+        for side, image in zip(("left", "right"), pair(faces), strict=True):
+            tiltvp.write_image(tmp_path / name / side / "a.png", image)
+
+    def run(name: str, *words: str) -> str:
+        sides = [str(tmp_path / name / side) for side in ("left", "right")]
+        assert main(["corner", *sides, "--calibration", str(tmp_path / "rig.toml"), *words]) == 0
+        return capsys.readouterr().out
+
+    assert "1 with a pose (the coloured cuboid)" in run("colours")
+    assert "1 with a pose (corners of straight edges)" in run("greys", "--pitch", "-28", "--right-handed")
+    assert "1 with a pose (the coloured cuboid, as published)" in run("colours", "--method", "paper")
+    assert "1 with a pose (corners of straight edges)" in run("colours", "--gradient-min", "50", "--right-handed")
+    said = run("nothing")
+    assert "0 with a pose" in said
+    assert "without a pose: no corner in the left image (1)" in said
+    assert "looked for the coloured cuboid, else corners of straight edges" in said
+    assert "try: " in said
+    assert "--method general" in run("greys", "--method", "coloured")
+
+
+@pytest.mark.parametrize(
+    ("words", "complaint"),
+    [
+        (["--method", "colour"], "--method 'colour', expected auto, coloured, general or paper"),
+        (
+            ["--gradient-min", "50", "--faces", "rgb"],
+            "--method auto with --faces (of coloured and paper), --gradient-min (of general)",
+        ),
+        (["--method", "coloured", "--mask", "mask.png"], "--method coloured with --mask (of general)"),
+        (["--pitch", "3", "--down", "0", "1", "0"], "--pitch and --down"),
+        (["--topic-right", "/right"], "--topic-right"),
+        (["--trajectory", "t.txt"], "--camera-height-m"),
+    ],
+)
+def test_impossible_combinations_are_refused_at_once(
+    words: list[str],
+    complaint: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    CAMERA.save("one.toml")
+    tiltvp.write_image(tmp_path / "mask.png", np.full((360, 480), 255, np.uint8))
+    # There is no such image: what is wrong with the words is said before it is looked for.
+    assert main(["corner", "none.png", "--calibration", "one.toml", *words]) == 2
+    assert complaint in capsys.readouterr().err
