@@ -65,8 +65,8 @@ docs:
     {{bin}}/sphinx-build --quiet --fail-on-warning --keep-going --conf-dir docs --doctree-dir target/docs/doctrees . target/docs/html
 
 # Pictures of the guides, of rooms that the package renders, in docs/images.
-pictures: setup
-    {{bin}}/python docs/pictures.py
+pictures *names: setup
+    {{bin}}/python docs/pictures.py {{names}}
 
 # Licences, duplicates, sources and advisories of the crates, by cargo-deny, which is built if it is not there.
 deny *arguments:

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 import tiltvp
+from tiltvp.cli.app import app
 from tiltvp.cli.lab.demo import DRIVE, MOUNTED, ROBOT, TILTS, answered, asked
 from tiltvp.errors import InvalidInputError
 from tiltvp.lab.datasets.panoramas import paper_camera
@@ -21,8 +22,16 @@ from tiltvp.streams import open_frames
 from tiltvp.streams.outputs.tilts import write_tilts
 from tiltvp.synth import Room
 
-pytestmark = pytest.mark.slow
+ROOT = Path(__file__).parents[1]
 ROLL, PITCH = math.radians(2.0), math.radians(-1.0)
+
+
+def test_the_ten_minutes_of_the_guide_are_what_the_demo_types() -> None:
+    guide = (ROOT / "docs" / "setup.md").read_text(encoding="utf-8")
+    typed = [shlex.split(words) for words in re.findall(r"^\$ tiltvp (.*)$", guide, re.MULTILINE)]
+    assert typed == asked() + answered(MOUNTED)
+    for words in typed:
+        app.parse_args(words, print_error=False, exit_on_error=False)
 
 
 @pytest.fixture(scope="module")
@@ -40,6 +49,7 @@ def path(drive: RecordedDrive, tmp_path_factory: pytest.TempPathFactory) -> Path
     return path
 
 
+@pytest.mark.slow
 def test_the_truth_is_that_of_the_drive(drive: RecordedDrive, path: Path) -> None:
     truth = RecordedTruth.of(path)
     np.testing.assert_allclose(truth.robot_from_camera, drive.robot_from_mounted_camera, atol=1e-12)
@@ -49,6 +59,7 @@ def test_the_truth_is_that_of_the_drive(drive: RecordedDrive, path: Path) -> Non
     assert upright.tolist() == pytest.approx([-ROLL, -PITCH, 0.0], abs=1e-3)
 
 
+@pytest.mark.slow
 def test_tilts_are_held_against_it_frame_by_frame(drive: RecordedDrive, path: Path, tmp_path: Path) -> None:
     truth, out = RecordedTruth.of(path), tmp_path / TILTS
     # A robot that is said to stand upright all the time.
@@ -68,6 +79,7 @@ def test_tilts_are_held_against_it_frame_by_frame(drive: RecordedDrive, path: Pa
         RecordedTruth.of(out)
 
 
+@pytest.mark.slow
 def test_every_command_is_printed_as_it_was_run(run: Callable[..., tuple[int, str, str]], tmp_path: Path) -> None:
     out = tmp_path / "demo"
     code, said, complaints = run("lab", "demo", "--out", out, "--resolution-scale", 0.3)
