@@ -17,7 +17,7 @@ from tiltvp.streams.outputs.tilts import TILT_TOPIC
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from tiltvp import Robot
+    from tiltvp.robot import Robot
 
     Rows = NDArray[np.float64]
 
