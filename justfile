@@ -15,9 +15,10 @@ setup:
     {{bin}}/pip install --quiet --require-hashes --requirement requirements-dev.lock
     PATH="$PWD/{{bin}}:$PATH" {{bin}}/pip install --quiet --no-build-isolation --no-deps --editable .
 
-# Sets up; renders rooms at known leans, estimates them with every method, prints a table, writes pictures.
+# Sets up; a rendered room by every method, with pictures; then a robot's drive, from its recording to mounting, level video and MCAP.
 demo *arguments: setup
     {{bin}}/tiltvp demo --overwrite {{arguments}}
+    {{bin}}/tiltvp lab demo --overwrite
 
 # Lints, the unit tests of the crates and the fast Python tests: for every round of change. It builds by the profile `quick`.
 quick: quick-extension check
@@ -64,8 +65,8 @@ docs:
     {{bin}}/sphinx-build --quiet --fail-on-warning --keep-going --conf-dir docs --doctree-dir target/docs/doctrees . target/docs/html
 
 # Pictures of the guides, of rooms that the package renders, in docs/images.
-pictures: setup
-    {{bin}}/python docs/pictures.py
+pictures *names: setup
+    {{bin}}/python docs/pictures.py {{names}}
 
 # Licences, duplicates, sources and advisories of the crates, by cargo-deny, which is built if it is not there.
 deny *arguments:

@@ -3,15 +3,23 @@
 from __future__ import annotations
 
 import math
+import sys
+import tempfile
+from collections.abc import Sequence
 from pathlib import Path
 
 import cv2
 import numpy as np
 
 import tiltvp
+import tiltvp.cli
 from tiltvp.corner import CornerPoseEstimator
+from tiltvp.lab.datasets.driving import drive_room
+from tiltvp.lab.datasets.recording import WHEEL_RADIUS_M, RecordedDrive
 from tiltvp.overlays.corners import draw_box, draw_corners
-from tiltvp.overlays.tilt import draw_words
+from tiltvp.overlays.offsets import error_chart
+from tiltvp.overlays.tilt import draw_words, tilt_overlay
+from tiltvp.streams import Wheels, frame_motions, open_frames
 from tiltvp.synth import MIRROR_BLIND_RAD, Laboratory, Room, StereoSequence, mirror_camera, zed_cameras
 
 IMAGES = Path(__file__).parent / "images"
@@ -23,12 +31,20 @@ PINHOLE = tiltvp.Camera.pinhole(width=480, height=360, fx=240.0, fy=240.0, cx=23
 FORWARD = np.array([[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]])
 
 
-def main() -> None:
+def main(names: Sequence[str]) -> None:
+    """Those of these names, all without any."""
     room = Room("living-room", 5)
     pose = room.free_poses(1, 5)[0]
-    lenses(room, pose)
-    levelling(room, pose)
-    corners()
+    makers = {
+        "lenses": lambda: lenses(room, pose),
+        "level": lambda: levelling(room, pose),
+        "corner": corners,
+        "colmap": lambda: gravity(room, pose),
+        "datasets": lambda: known_leans(room, pose),
+        "recordings": recording,
+    }
+    for name in names or makers:
+        makers[name]()
 
 
 def lenses(room: Room, pose: np.ndarray) -> None:
@@ -75,6 +91,68 @@ def corners() -> None:
     write("corner.jpg", [pictures[0][part], canvas[part]])
 
 
+def gravity(room: Room, pose: np.ndarray) -> None:
+    """A photograph that leans, with the edges and the horizon that its gravity is known by, and level."""
+    estimator = tiltvp.TiltEstimator(PINHOLE, method="segments", robot_from_camera=FORWARD)
+    view = {"pose": pose, "robot_from_camera": FORWARD, "camera_height_m": 1.2, "samples": 2}
+    image = room.render(PINHOLE, alpha_rad=ALPHA_RAD, beta_rad=BETA_RAD, **view).bgr
+    estimate, edges = estimator.with_edges(image)
+    assert estimate
+    assert tiltvp.tilt_error_rad(estimate.normal, tiltvp.normal_from_alpha_beta(ALPHA_RAD, BETA_RAD)) < 0.01
+    pictures = {
+        "a photograph": image,
+        "vertical edges and horizon": tilt_overlay(image, estimator, estimate, edges),
+        "level": tiltvp.level(image, estimator, estimate),
+    }
+    write("colmap.jpg", [draw_words(picture, name) for name, picture in pictures.items()])
+
+
+def known_leans(room: Room, pose: np.ndarray) -> None:
+    """One place at four leans, and how far each method is off in the median of them, as bars."""
+    leans_deg = ((0.0, 0.0), (4.0, 0.0), (8.0, 90.0), (12.0, 200.0))
+    camera = FISHEYE.scaled(2.0 / 3.0)
+    images, errors = [], {method: [] for method in tiltvp.METHODS}
+    for alpha_deg, beta_deg in leans_deg:
+        lean = math.radians(alpha_deg), math.radians(beta_deg)
+        image = room.render(camera, pose=pose, alpha_rad=lean[0], beta_rad=lean[1], samples=2).bgr
+        images.append(draw_words(image, f"alpha {alpha_deg:g}, beta {beta_deg:g} deg"))
+        for method, found in errors.items():
+            estimate = tiltvp.TiltEstimator(camera, method=method)(image)
+            found.append(math.degrees(tiltvp.tilt_error_rad(estimate.normal, tiltvp.normal_from_alpha_beta(*lean))))
+    write("datasets.jpg", images)
+    bars = [(method, float(np.median(found))) for method, found in errors.items()]
+    write("evaluation.png", [error_chart((260, 600), bars)])
+
+
+def recording() -> None:
+    """Frames of a recording with what its wheels tell, and the filtered tilt of its frames beside that of each."""
+    camera = FISHEYE.scaled(2.0 / 3.0)
+    with tempfile.TemporaryDirectory() as folder:
+        path, known, answers = (Path(folder) / name for name in ("drive.mcap", "camera.toml", "tilts.mcap"))
+        legs, bumps = ((0.0, math.pi), (0.6, 0.5)), math.radians(3.0)
+        RecordedDrive(drive_room("office", 0), camera, legs=legs, bumps_max_rad=bumps, samples=1).write(path)
+        camera.save(known)
+        frames = open_frames(path)
+        motions = frame_motions(frames, path, wheels=Wheels(wheel_base_m=0.35, wheel_radius_m=WHEEL_RADIUS_M)).motions
+        shown = [round(share * (len(motions) - 1)) for share in (0.1, 0.35, 0.6, 0.95)]
+        images = []
+        for number, frame in zip(shown, frames.sample(shown), strict=True):
+            yaw = math.degrees(sum(motion.yaw_rad for motion in motions[: number + 1]))
+            way = sum(motion.distance_m for motion in motions[: number + 1])
+            seconds = frame.time_s - frames.times_s[0]
+            images.append(draw_words(bgr_from(frame.read()), f"{seconds:.1f} s: {yaw:.0f} deg, {way:z.2f} m"))
+        write("recordings.jpg", images)
+        wheels = ["--wheel-base", "0.35", "--wheel-radius", f"{WHEEL_RADIUS_M:g}"]
+        plot = ["--filter-plot", str(IMAGES / "outputs.png"), "--out", str(answers), "--overwrite"]
+        words = ["tilt", str(path), "--camera", str(known), "--method", "segments", "--filter", *wheels, *plot]
+        assert tiltvp.cli.main(words) == 0
+
+
+def bgr_from(image: np.ndarray) -> np.ndarray:
+    """(H, W, 3) of a gray image."""
+    return image if image.ndim == 3 else np.dstack([image] * 3)
+
+
 def write(name: str, pictures: list[np.ndarray]) -> None:
     """Pictures side by side."""
     IMAGES.mkdir(exist_ok=True)
@@ -82,4 +160,4 @@ def write(name: str, pictures: list[np.ndarray]) -> None:
 
 
 if __name__ == "__main__":
-    main()
+    main(sys.argv[1:])

@@ -9,7 +9,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from tiltvp.errors import InvalidInputError, OutputError
-from tiltvp.files import whole_file
+from tiltvp.files import scratch_folder, whole_file
+from tiltvp.video_sound import add_sound
 
 if TYPE_CHECKING:
     import cv2
@@ -31,9 +32,13 @@ class VideoWriter:
         self._shape: tuple[int, ...] = ()
         self.count = 0
         """How many frames it was given."""
+        self.times_s: list[float | None] = []
+        """When they were taken, None where nobody said."""
+        self.note: str | None = None
+        """What of the sound was not copied, after the block."""
 
-    def add(self, image: NDArray[np.uint8]) -> None:
-        """The next frame, (H, W, 3) BGR uint8."""
+    def add(self, image: NDArray[np.uint8], time_s: float | None = None) -> None:
+        """The next frame, (H, W, 3) BGR uint8; `time_s` is by the clock of the video that the sound is of."""
         import cv2
 
         if self._writer is None:
@@ -46,6 +51,7 @@ class VideoWriter:
             raise InvalidInputError(f"video frame: shape {image.shape}, expected {self._shape}")
         self._writer.write(image)
         self.count += 1
+        self.times_s.append(time_s)
 
     def close(self) -> None:
         """Writes what is left."""
@@ -54,9 +60,12 @@ class VideoWriter:
 
 
 @contextmanager
-def video_writer(path: str | os.PathLike[str], rate_hz: float = 25.0) -> Iterator[VideoWriter]:
+def video_writer(
+    path: str | os.PathLike[str], rate_hz: float = 25.0, *, sound_of: str | os.PathLike[str] | None = None
+) -> Iterator[VideoWriter]:
     """A video (.mp4 or .avi) that appears when the block ends, unless an exception leaves it or it has no frames.
 
+    `sound_of` is a video whose sound is copied (`pip install 'tiltvp[video]'`); `VideoWriter.note` says what is not.
     Raises `InvalidInputError` for other endings, `OutputError` where it cannot be written.
     """
     file = Path(path)
@@ -75,6 +84,9 @@ def video_writer(path: str | os.PathLike[str], rate_hz: float = 25.0) -> Iterato
             raise OutputError(
                 f"{file}: cannot be written (not all of {writer.count} frames), expected a place that can"
             )
+        elif sound_of is not None:
+            with scratch_folder(file) as folder:
+                writer.note = add_sound(part, writer.times_s, sound_of, folder)
 
 
 def _frames_in(path: Path) -> int:

@@ -51,6 +51,12 @@ app.command(measure.app)
 app.command(report.report)
 
 
+def run(words: Sequence[str]) -> int:
+    """Runs one command within another or for `main`: its exit code, and what is wrong with it as an exception."""
+    code = app(list(words), exit_on_error=False, print_error=False, result_action="return_value")
+    return code if isinstance(code, int) else DONE
+
+
 def main(arguments: Sequence[str] | None = None) -> int:
     """Runs the command line and gives the exit code.
 
@@ -67,14 +73,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
             words[place] = f"{RERUN}={VIEWER}"
     try:
         with nullcontext() if overwrite else keeping_existing():
-            code = app(
-                [word for word in words if word != _OVERWRITE],
-                exit_on_error=False,
-                print_error=False,
-                result_action="return_value",
-            )
+            code = run([word for word in words if word != _OVERWRITE])
         sys.stdout.flush()
-        return code if isinstance(code, int) else DONE
+        return code
     except CycloptsError as error:
         complain(f"{error} Try `tiltvp --help`.")
         return WRONG_USE

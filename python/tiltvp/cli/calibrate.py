@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from tiltvp.cli.calibrate_inputs import DriveOptions, LogOptions, Tables, known_robot, other_readings, sources_from
+from tiltvp.cli.calibrate_inputs import DriveOptions, LogOptions, Tables, other_readings, sources_from
 from tiltvp.cli.calibrate_pictures import PictureLog, PictureOptions
 from tiltvp.cli.calibrate_results import Calibration, ResultOptions
 from tiltvp.cli.line_options import DrivingLineOptions
@@ -56,7 +56,7 @@ def calibrate(
     """
     results.check(camera)
     watching.check()
-    sources, robot = sources_from(logs), known_robot(camera)
+    sources, robot = sources_from(logs), None if camera is None else camera.robot()
     drive = drive.settled(robot)
     if camera is not None:
         options = camera.complete(options)

@@ -11,7 +11,7 @@ from cyclopts import Group, Parameter
 
 from tiltvp._core import CALIBRATION_METHODS, option_fields
 from tiltvp.cli.declared_options import LibraryOptions, from_library
-from tiltvp.cli.options import CameraOptions, Switch
+from tiltvp.cli.options import Switch
 from tiltvp.errors import InvalidInputError
 
 if TYPE_CHECKING:
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from tiltvp import Robot
     from tiltvp.drive_logs import DriveLog
 
-__all__ = ["DriveOptions", "LogOptions", "Tables", "known_robot", "other_readings", "sources_from"]
+__all__ = ["DriveOptions", "LogOptions", "Tables", "other_readings", "sources_from"]
 
 _REMEDIES = {
     "reflected": ("wheels-swapped", "wheels-negated", "clockwise"),
@@ -142,13 +142,6 @@ def sources_from(words: Sequence[str]) -> list[Tables | str]:
     if not found:
         raise InvalidInputError(f"calibrate: no log, expected {_FORMS}")
     return found
-
-
-def known_robot(camera: CameraOptions | None) -> Robot | None:
-    """What a robot's file (`tiltvp setup`) knows; None for other calibrations."""
-    from tiltvp.robot import Robot, is_robot
-
-    return Robot.load(camera.camera) if camera is not None and is_robot(camera.camera) else None
 
 
 def other_readings(misreading: str | None) -> tuple[str, ...]:

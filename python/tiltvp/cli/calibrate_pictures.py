@@ -91,29 +91,19 @@ class PictureLog:
         with_times: bool,
     ) -> PictureLog:
         """Opens a drive. With times these are brought to the odometry's clock, by how the images turn."""
-        from tiltvp.streams import is_recording
-
         if camera is None:
             raise InvalidInputError(f"{source}: pictures without --camera, expected the camera's calibration")
         if pictures.tracks is not None:
             check_ending(pictures.tracks)
-        known = {} if robot is None or not is_recording(source) else robot.topics
-        topic = pictures.topic or known.get("images")
-        if robot is not None:
-            motion = replace(
-                motion,
-                odometry_topic=motion.odometry_topic or known.get("odometry"),
-                wheel_radius=motion.wheel_radius or robot.wheels.wheel_radius_m,
-                ticks_per_turn=motion.ticks_per_turn or robot.wheels.ticks_per_turn,
-                wheel_joints=motion.wheel_joints or robot.wheels.joints,
-            )
-        frames, lens = SourceOptions(topic=topic).open([source]), camera.load()
+        looked = SourceOptions(topic=pictures.topic).of_robot(robot, [source])
+        frames, lens = looked.open([source]), camera.load()
+        motion = motion.of_robot(robot, frames)
         if with_times:
             _bring_to_clock(frames, motion, lens, lines.rotation(), drive.wheel_base)
         moved = needed_turns(motion.motions(frames, drive.wheel_base))
         if moved is None:
             raise InvalidInputError(f"{source}: pictures without odometry, expected --odometry FILE")
-        named = {"images": topic, "odometry": motion.odometry_topic}
+        named = {"images": looked.topic, "odometry": motion.odometry_topic}
         topics = {name: word for name, word in named.items() if word is not None}
         return cls(frames, moved, lens, lines, drive, pictures, motion.wheels(drive.wheel_base), topics)
 

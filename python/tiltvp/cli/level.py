@@ -105,14 +105,15 @@ def level(
         check_cluster(out, filter=filtering.filter)
     if cluster is None or not is_begun(out / TILTS):
         check_output(out) if as_video else check_output_folder(out)
-    frames = source.open(images or [])
+    robot = None if camera is None else camera.robot()
+    frames = source.of_robot(robot, images or []).open(images or [])
     of_files = isinstance(frames, ImageFiles)
     if metadata_only and (as_video or not of_files):
         raise InvalidInputError("--metadata-only with a video, expected photographs")
     fused = filtering.filter or as_video or not of_files
     if not fused:
         motion.refuse("--filter", wheel_base)
-    moved = motion.motions(frames, wheel_base) if fused else None
+    moved = motion.motions_of(robot, frames, wheel_base) if fused else None
     motions = repeat(Motion()) if moved is None else moved.motions
     if cluster is not None:
         levelled, of = level_on_cluster(cluster, files_of(frames), out, work)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from tiltvp.cli.results import Outcome
 from tiltvp.cli.sources import ending_at_interrupt
-from tiltvp.cli.terminal import progress_bar
+from tiltvp.cli.terminal import complain, progress_bar
 from tiltvp.errors import TiltvpError
 
 if TYPE_CHECKING:
@@ -23,15 +23,18 @@ if TYPE_CHECKING:
 def write_video(frames: Frames, motions: Iterable[Motion | None], path: Path, work: Levelling) -> tuple[int, int]:
     """Writes a level video, whole or not at all, always by the filter; how many of how many frames are level.
 
-    Frames for which it has no tilt are black, so that time goes on, or as they are where that is asked for.
+    Frames for which it has no tilt are black, so that time goes on, or as they are where that is asked for. The sound
+    of a video file is copied; what cannot be is a line on stderr.
     """
+    from tiltvp.streams.video_files import VIDEO_ENDINGS
     from tiltvp.videos import video_writer
 
+    sound_of = frames.source if Path(frames.source).suffix.lower() in VIDEO_ENDINGS else None
     work = replace(work, filtering=replace(work.filtering, filter=True))
     judge, levelled, count, shape = work.filtering.judge(), 0, 0, None
     with (
         progress_bar(frames.count or 0, "frames") as bar,
-        video_writer(path, frames.rate_hz) as video,
+        video_writer(path, frames.rate_hz, sound_of=sound_of) as video,
         ending_at_interrupt(frames) as coming,
     ):
         for frame, motion in zip(coming, motions, strict=False):
@@ -51,8 +54,10 @@ def write_video(frames: Frames, motions: Iterable[Motion | None], path: Path, wo
                 done = "as it is" if shown is not None else "black" if shape is not None else "left out"
                 bar.complain(f"{outcome.file}: {work.why_not(outcome)}; the frame is {done}")
             if shape is not None:
-                video.add(_black(shape) if shown is None else shown)
+                video.add(_black(shape) if shown is None else shown, frame.time_s)
             bar.advance()
+    if video.note is not None:
+        complain(f"{frames.source}: {video.note}")
     return levelled, count
 
 

@@ -64,8 +64,9 @@ def mount(
     if out is not None:
         check_output(out)
     estimator = camera.complete(mounted).mounted(camera.load(), method=METHOD)
-    frames = source.open(images)
-    moved = motion.motions(frames, wheel_base)
+    robot = camera.robot()
+    frames = source.of_robot(robot, images).open(images)
+    moved = motion.motions_of(robot, frames, wheel_base)
     motions = moved.motions if moved is not None and moved.turns_known else None
     with progress_bar(measured_count(frames), "images") as bar:
         tilts = drive_tilts(frames, estimator, motions, advance=bar.advance)

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from tiltvp import Camera, TiltEstimator
+    from tiltvp import Camera, Robot, TiltEstimator
 
 _CAMERA = Group("Camera")
 _METHOD = Group("Method", help="An option that is not given has the default of its method.")
@@ -81,14 +81,21 @@ class CameraOptions:
     def _mirrored(self, camera: "Camera") -> "Camera":
         return camera.mirrored() if self.mirror and not camera.mirror else camera
 
+    def robot(self) -> "Robot | None":
+        """What a robot's file (`tiltvp setup`) knows; None for other calibrations."""
+        from tiltvp.robot import Robot, is_robot
+
+        return Robot.load(self.camera) if is_robot(self.camera) else None
+
     def complete(self, options: "M") -> "M":
         """Options with the mounting and the mask of a robot's file (`tiltvp setup`) where these are not given."""
-        from tiltvp.robot import Robot, is_robot, mask_path
+        from tiltvp.robot import mask_path
 
-        if not is_robot(self.camera):
+        robot = self.robot()
+        if robot is None:
             return options
         known: dict[str, Any] = {"robot_from_camera": str(self.camera)}
-        if Robot.load(self.camera).mask is not None:
+        if robot.mask is not None:
             known["mask"] = mask_path(self.camera)
         missing = {name: value for name, value in known.items() if getattr(options, name, options) is None}
         return replace(options, **missing)  # type: ignore[type-var]

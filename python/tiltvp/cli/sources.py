@@ -7,9 +7,9 @@ import signal
 import threading
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Final
+from typing import TYPE_CHECKING, Annotated, Final, Self
 
 from cyclopts import Group, Parameter, validators
 
@@ -17,6 +17,7 @@ from tiltvp.cli.terminal import complain
 from tiltvp.errors import InvalidInputError
 
 if TYPE_CHECKING:
+    from tiltvp import Robot
     from tiltvp.streams import Frame, FrameMotions, Frames, Wheels
 
 __all__ = [
@@ -46,6 +47,14 @@ class SourceOptions:
     """A camera by its number, in place of files; Ctrl-C ends it."""
     raw: str | None = None
     """WIDTHxHEIGHT or WIDTHxHEIGHTxCHANNELS of images that come as bytes, BGR, on stdin (-)."""
+
+    def of_robot(self, robot: Robot | None, words: Sequence[str]) -> Self:
+        """With the topic that a robot's file names, where the words name a recording and the topic is not given."""
+        from tiltvp.streams import is_recording
+
+        if robot is None or len(words) != 1 or not is_recording(words[0]):
+            return self
+        return replace(self, topic=self.topic or robot.topics.get("images"))
 
     def open(self, words: Sequence[str]) -> Frames:
         """The frames that words and options name; a line on stderr for each that is not there and for what is noted."""
@@ -92,6 +101,24 @@ class MotionOptions:
         given += [] if wheel_base_m is None else ["wheel_base"]
         if given:
             raise InvalidInputError(f"--{given[0].replace('_', '-')} without {needed}, expected both")
+
+    def of_robot(self, robot: Robot | None, frames: Frames) -> Self:
+        """With what a robot's file knows of wheels and topics, where these are not given."""
+        if robot is None:
+            return self
+        known = robot.wheels
+        return replace(
+            self,
+            odometry_topic=self.odometry_topic or (robot.topics.get("odometry") if frames.recording else None),
+            wheel_radius=self.wheel_radius or known.wheel_radius_m,
+            ticks_per_turn=self.ticks_per_turn or known.ticks_per_turn,
+            wheel_joints=self.wheel_joints or known.joints,
+        )
+
+    def motions_of(self, robot: Robot | None, frames: Frames, wheel_base_m: float | None) -> FrameMotions | None:
+        """The same as `motions`, with what a robot's file knows where it is not given."""
+        base = wheel_base_m if robot is None else wheel_base_m or robot.wheels.wheel_base_m
+        return self.of_robot(robot, frames).motions(frames, base)
 
     def motions(self, frames: Frames, wheel_base_m: float | None) -> FrameMotions | None:
         """What the robot did up to each frame, None without odometry; a line on stderr for what is noted."""

@@ -97,9 +97,9 @@ def tilt(
     showing.check()
     if not filtering.filter:
         motion.refuse("--filter", wheel_base)
-    estimator = camera.complete(method).estimator(camera.load())
-    frames = source.open(images or [])
-    moved = motion.motions(frames, wheel_base) if filtering.filter else None
+    estimator, robot = camera.complete(method).estimator(camera.load()), camera.robot()
+    frames = source.of_robot(robot, images or []).open(images or [])
+    moved = motion.motions_of(robot, frames, wheel_base) if filtering.filter else None
     motions: Iterable[Motion | None] = repeat(Motion()) if moved is None else moved.motions
     estimator = _checked(estimator, frames)
     work, judge = Work(estimator, overlay, level, filtering, showing.asked), filtering.judge()

@@ -94,8 +94,9 @@ def track(
     lens, options = camera.load(), camera.complete(options)
     extractor, tilt = options.extractor(lens), options.tilts(lens)
     tracker = LineTracker(**tracking.given())
-    frames = frames_of.open([] if source is None else [source])
-    motions = needed_turns(motion.motions(frames, wheel_base))
+    robot, words = camera.robot(), [] if source is None else [source]
+    frames = frames_of.of_robot(robot, words).open(words)
+    motions = needed_turns(motion.motions_of(robot, frames, wheel_base))
     drive = Drive(extractor, tracker, tilt, motions)
     tracked: list[Seen] = []
     showing = nullcontext() if video is None else video_writer(video, frame_rate or frames.rate_hz)

@@ -8,6 +8,7 @@ from typing import Annotated
 
 from cyclopts import Parameter, validators
 
+from tiltvp.cli.lab.demo import demo
 from tiltvp.cli.lab.drive import app
 from tiltvp.cli.options import MethodOptions
 from tiltvp.cli.terminal import progress_bar, say
@@ -17,6 +18,8 @@ __all__ = ["app"]
 
 _OPTIONS = MethodOptions()
 _METHOD = "image-space-ransac"
+
+app.command(demo)
 
 
 @app.command

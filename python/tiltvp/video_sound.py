@@ -1,0 +1,85 @@
+"""The sound of one video put beside the frames of another: packets are copied, nothing is encoded anew."""
+
+from __future__ import annotations
+
+import heapq
+import os
+from collections.abc import Iterator, Sequence
+from fractions import Fraction
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+if TYPE_CHECKING:
+    from av.container import InputContainer
+
+__all__ = ["add_sound"]
+
+_TICK_S: Final = Fraction(1, 90_000)
+"""Of the times of frames: MPEG's clock, which has all usual rates as whole numbers."""
+_APART_S: Final = 0.1
+"""By how much sound may run apart from the picture unnoticed: ITU-R BT.1359 has 0.125 s as the first that is seen."""
+
+
+def add_sound(path: Path, times_s: Sequence[float | None], source: str | os.PathLike[str], scratch: Path) -> str | None:
+    """Copies the sound of `source` into the video `path`, whose frames were taken at `times_s` by the source's clock.
+
+    MP4 files keep the frames' times, so that sound and picture stay together; AVI has frames at even times only. What
+    could not be copied, or will not stay together, is told as a sentence; None where there is nothing to tell. Then the
+    video is as it was. `scratch` is a folder on the same disk.
+    """
+    try:
+        import av
+    except ImportError:
+        return "its sound, if it has any, is not copied, expected `pip install 'tiltvp[video]'`"
+    joined = scratch / f"joined{path.suffix}"
+    copied: list[str] = []
+    try:
+        # As for frames, a name with a colon is no address.
+        with av.open(f"file:{os.fspath(source)}") as heard, av.open(str(path)) as seen:
+            copied = [stream.codec_context.name for stream in heard.streams.audio]
+            if not copied:
+                return None
+            known = [time_s for time_s in times_s if time_s is not None]
+            own = known if path.suffix.lower() != ".avi" and len(known) == len(times_s) else None
+            rate = seen.streams.video[0].average_rate
+            with av.open(str(joined), "w") as out:
+                _copy(heard, seen, own, out)
+        os.replace(joined, path)
+    except (av.FFmpegError, ValueError) as error:
+        why = " ".join(str(getattr(error, "strerror", None) or error).split())
+        return f"its sound ({', '.join(copied) or 'of unknown kind'}) is not copied into {path.suffix} ({why})"
+    return None if own is not None or rate is None else _apart(known, float(rate))
+
+
+def _copy(heard: InputContainer, seen: InputContainer, times_s: Sequence[float] | None, out: Any) -> None:
+    """Writes the frames' packets and those of the sound, in the order of their times."""
+    frames = seen.streams.video[0]
+    video = out.add_stream_from_template(frames)
+    if times_s is not None:
+        video.time_base = _TICK_S
+    sound = {stream.index: out.add_stream_from_template(stream) for stream in heard.streams.audio}
+
+    def pictures() -> Iterator[Any]:
+        for number, packet in enumerate(packet for packet in seen.demux(frames) if packet.size):
+            if times_s is not None:
+                packet.time_base = _TICK_S
+                packet.pts = packet.dts = round(times_s[number] / _TICK_S)
+            packet.stream = video
+            yield packet
+
+    def sounds() -> Iterator[Any]:
+        for packet in heard.demux(list(heard.streams.audio)):
+            if packet.size and packet.dts is not None:
+                packet.stream = sound[packet.stream.index]
+                yield packet
+
+    for packet in heapq.merge(pictures(), sounds(), key=lambda packet: packet.dts * packet.time_base):
+        out.mux(packet)
+
+
+def _apart(times_s: Sequence[float], rate_hz: float) -> str | None:
+    """What to tell of frames that are shown at even times."""
+    apart = max((abs(time_s - times_s[0] - number / rate_hz) for number, time_s in enumerate(times_s)), default=0.0)
+    if apart <= _APART_S:
+        return None
+    return f"its frames are not even: sound and picture are up to {apart:.2f} s apart; .mp4 keeps them together"
