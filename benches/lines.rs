@@ -36,7 +36,7 @@ fn found(method: &str, lines_max: Option<usize>) -> (LineExtractor, Lines, Vec<f
     let extractor = extractor(method, lines_max);
     let (mut scratch, mut lines, mut values) = (extractor.scratch(), Lines::default(), Vec::new());
     let picture = view(&PICTURE).unwrap();
-    extractor.extract(&picture, Some(&tilt()), &mut scratch, &mut lines).unwrap();
+    extractor.extract(&picture, Some(&tilt()), None, &mut scratch, &mut lines).unwrap();
     extractor.describe(&picture, &lines, &mut scratch, &mut values).unwrap();
     (extractor, lines, values)
 }

@@ -74,8 +74,11 @@ def test_poses_of_the_cuboid_are_close(measured: tuple[pl.DataFrame, pl.DataFram
         "coloured, one camera, edge y known",
         "coloured, one camera, size known",
     ]
-    for row in scaled:
-        assert row["found"] == 1.0
+    # An edge whose end is hidden tells no place, and says so.
+    unplaced = table.filter(~pl.col("found"))
+    assert set(unplaced["reason"]) <= {"no edge of known length is seen up to its end"}
+    for row, found_min in zip(scaled, (0.75, 1.0), strict=True):
+        assert row["found"] >= found_min
         # 1 mm of 0.36 m is 0.3 %; three times that.
         assert row["% of distance"] < 0.9
         assert row["NEES of 6"] < 11.0

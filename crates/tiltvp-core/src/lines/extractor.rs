@@ -142,7 +142,7 @@ impl LineExtractor {
             (LineMethod::GreatCircle(options), Some(finder), Some(work), _) => {
                 let tilt = tilt.copied().unwrap_or(Tilt::UPRIGHT);
                 let options = match tilt_sigma_rad {
-                    Some(tilt_sigma_rad) => &GreatCircleOptions { tilt_sigma_rad, ..options.clone() },
+                    Some(tilt_sigma_rad) => &GreatCircleOptions { tilt_sigma_rad, ..*options },
                     None => options,
                 };
                 options.validate()?;

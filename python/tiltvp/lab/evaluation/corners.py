@@ -247,14 +247,14 @@ def _judged(
         "frame": frame,
         "time_s": float(sequence.times_s[frame]),
         "distance_m": float(np.linalg.norm(target[:3, 3])),
-        "found": estimate.pose is not None,
+        "found": estimate.pose is not None and estimate.pose.vertex_m is not None,
         "corner": -1,
         "hypotheses": len(estimate.hypotheses),
         "reason": estimate.reason,
     }
     pose = estimate.pose
     if pose is None or pose.vertex_m is None:
-        return row
+        return row | {"reason": estimate.place_reason or estimate.reason}
     row["probability"] = pose.probability
     if scene.kind == "laboratory":
         number, truth = sequence.corner, target
