@@ -45,8 +45,6 @@ __all__ = [
     "zncc_matrix",
 ]
 
-_SIGMA_MOST_RAD: Final = 0.5
-"""The most that `tilt_sigma_rad` may be."""
 _SUPPORT_KEPT: Final = 0.75
 """The least share of the upright robot's edge pixels on lines that lines keep under a lean that is believed."""
 
@@ -121,7 +119,7 @@ def _sigma_rad(tilt: Any) -> float | None:
     """The standard deviation of a lean, in the direction in which it is known least; None where it tells none."""
     if not isinstance(tilt, TiltEstimate | FilteredTilt):
         return None
-    return min(float(np.sqrt(np.linalg.eigvalsh(tilt.covariance_rad2)[-1])), _SIGMA_MOST_RAD)
+    return float(np.sqrt(np.linalg.eigvalsh(tilt.covariance_rad2)[-1]))
 
 
 def extract(

@@ -122,8 +122,8 @@ impl LineExtractor {
     /// radial variant has neither.
     ///
     /// # Errors
-    /// [`Error::InvalidArgument`] if the image has another size than the camera's, or the scratch is another extractor's;
-    /// [`Error::InvalidOption`] for a standard deviation that the option could not have.
+    /// [`Error::InvalidArgument`] if the image has another size than the camera's, the scratch is another extractor's, or the
+    /// standard deviation is not an angle above 0.
     pub fn extract(
         &self,
         image: &ImageView<'_>,
@@ -133,6 +133,9 @@ impl LineExtractor {
         out: &mut Lines,
     ) -> Result<()> {
         self.check(image, scratch)?;
+        if let Some(sigma) = tilt_sigma_rad.filter(|sigma| !(sigma.is_finite() && *sigma > 0.0)) {
+            return Err(Error::argument("tilt_sigma_rad", sigma, "an angle above 0"));
+        }
         let edges = &self.options.edges;
         let LineScratch { finder: work, segments, great_circle, radial, .. } = scratch;
         match (&self.options.method, &self.finder, work, &self.radii) {
@@ -145,7 +148,6 @@ impl LineExtractor {
                     Some(tilt_sigma_rad) => &GreatCircleOptions { tilt_sigma_rad, ..*options },
                     None => options,
                 };
-                options.validate()?;
                 let reach = (MISS_MAX_RAD.max(options.plane_max_rad) + tilt.alpha_rad()).min(FRAC_PI_2);
                 let prefilter = self.tables.prefilter.with_limit(reach.sin());
                 finder.find(image, &self.tables.region, edges.gradient_min, Some(&prefilter), work, segments);
