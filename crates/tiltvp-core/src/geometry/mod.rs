@@ -10,6 +10,7 @@ mod wheels;
 
 pub use angle::wrap_angle;
 pub use bearing::{angle_between, tangent_basis, tangent_exp, tangent_log, tangent_transport};
+pub(crate) use great_circle::meeting;
 pub use great_circle::{GreatCircleFit, fit_great_circle};
 pub use rigid::RigidMotion;
 pub(crate) use rotation::check_rotation;

@@ -165,12 +165,21 @@ fn difference(
     trusts: [f64; 2],
 ) -> impl Fn(&Vector2<f64>, &Vector2<f64>, &mut [f64]) -> bool {
     let (a, b) = (a.byte(), b.byte());
+    profile(image, light, move |levels| trusts[0] * levels[a] - trusts[1] * levels[b])
+}
+
+/// What `of` makes of the levels of places across an edge.
+fn profile(
+    image: &ColorView<'_>,
+    light: &LightTable,
+    of: impl Fn([f64; 3]) -> f64,
+) -> impl Fn(&Vector2<f64>, &Vector2<f64>, &mut [f64]) -> bool {
     move |middle, step, out| {
         let half = (out.len() / 2) as f64;
         out.iter_mut().enumerate().all(|(i, out)| {
             let place = middle + step * (i as f64 - half);
             let Some(levels) = light.color(image, place.x, place.y) else { return false };
-            *out = trusts[0] * levels[a] - trusts[1] * levels[b];
+            *out = of(levels);
             true
         })
     }

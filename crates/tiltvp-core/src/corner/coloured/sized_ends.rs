@@ -3,7 +3,7 @@
 use nalgebra::{Vector2, Vector3};
 
 use super::segmentation::Primary;
-use super::{ColouredScratch, ERRING_TOGETHER, difference};
+use super::{ColouredScratch, ERRING_TOGETHER, difference, profile};
 use crate::corner::options::ColouredOptions;
 use crate::corner::sized::{BoxLine, BoxView, PLACES_MIN, SeenEnd, Unseen};
 use crate::corner::trace::{RaySearch, trace};
@@ -73,13 +73,5 @@ fn outline(
     face: Primary,
 ) -> impl Fn(&Vector2<f64>, &Vector2<f64>, &mut [f64]) -> bool {
     let own = face.byte();
-    move |middle, step, out| {
-        let half = (out.len() / 2) as f64;
-        out.iter_mut().enumerate().all(|(i, out)| {
-            let place = middle + step * (i as f64 - half);
-            let Some(levels) = light.color(image, place.x, place.y) else { return false };
-            *out = 1.5 * levels[own] - 0.5 * levels.iter().sum::<f64>();
-            true
-        })
-    }
+    profile(image, light, move |levels| 1.5 * levels[own] - 0.5 * levels.iter().sum::<f64>())
 }

@@ -9,7 +9,7 @@ use crate::corner::general::{AXIS_SINE, CLEAR_OF_VERTEX_PX, GeneralScratch, gray
 use crate::corner::options::GeneralOptions;
 use crate::corner::trace::trace;
 use crate::corner::triangulation::{BearingObservation, triangulate};
-use crate::geometry::RigidMotion;
+use crate::geometry::{RigidMotion, meeting};
 use crate::image::{ImageView, LightTable};
 
 /// The far end of an edge.
@@ -45,10 +45,10 @@ pub(crate) struct ObservedCorner<'a> {
 }
 
 /// Least length of an edge, in pixels: that of a segment.
-const EDGE_MIN_PX: f64 = 20.0;
+pub(super) const EDGE_MIN_PX: f64 = 20.0;
 
 /// How far from the edge a line along another axis may begin, in pixels: vertices of real things are rounded and worn.
-const GAP_PX: f64 = 15.0;
+pub(super) const GAP_PX: f64 = 15.0;
 
 /// Ends that are closer than this are one, in pixels: both sides of a bevelled edge.
 const SAME_END_PX: f64 = 8.0;
@@ -83,8 +83,7 @@ fn meetings<'a>(
         if nearest == own || sines[nearest] > AXIS_SINE {
             continue;
         }
-        let Some(crossing) = normal.cross(&segment.normal).try_normalize(0.05) else { continue };
-        let crossing = if crossing.dot(&vertex) < 0.0 { -crossing } else { crossing };
+        let Some(crossing) = meeting(&normal, &segment.normal, &vertex) else { continue };
         let angle = crossing.dot(&along).atan2(crossing.dot(&vertex));
         let own_px = segment.px_per_rad;
         let aside = segment.ends.map(|end| end.angle(&crossing) * own_px);
@@ -131,8 +130,7 @@ pub(crate) fn seen_ends(seen: &ObservedCorner<'_>, scratch: &mut GeneralScratch)
             // Of lines that meet the edge next to each other the longest.
             let together = found[place..].iter().take_while(|(other, _)| (angle - other) * px_per_rad < SAME_END_PX);
             let Some((_, line)) = together.max_by(|a, b| a.1.length_px.total_cmp(&b.1.length_px)) else { continue };
-            let Some(crossing) = whole.ray.normal.cross(&line.normal).try_normalize(0.05) else { continue };
-            let bearing = if crossing.dot(&seen.corner.vertex()) < 0.0 { -crossing } else { crossing };
+            let Some(bearing) = meeting(&whole.ray.normal, &line.normal, &seen.corner.vertex()) else { continue };
             if let Some(length_m) = along(&seen.vertex_m, &seen.edges[axis], &bearing) {
                 *out = Some(ObservedEnd { bearing, sigma_rad: seen.options.ray_sigma_px / px_per_rad, length_m });
                 break;

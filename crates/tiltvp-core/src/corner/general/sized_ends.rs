@@ -2,20 +2,16 @@
 
 use nalgebra::Vector3;
 
+use super::edge_ends::{EDGE_MIN_PX, GAP_PX};
 use super::{AXIS_SINE, GeneralScratch, gray_search};
 use crate::corner::options::GeneralOptions;
 use crate::corner::sized::{BoxView, PLACES_MIN, SeenEnd, Unseen};
 use crate::corner::trace::{RaySearch, trace};
+use crate::geometry::meeting;
 use crate::image::{ImageView, LightTable};
-
-/// How far from the edge a segment along another axis may begin, in pixels: vertices of real things are rounded and worn.
-const GAP_PX: f64 = 15.0;
 
 /// Ends that are closer than this are looked for together, in pixels: half of the width of the first look.
 const TOGETHER_PX: f64 = 4.0;
-
-/// Least length of an edge, in pixels: that of a segment.
-const EDGE_MIN_PX: f64 = 20.0;
 
 /// The search for lines of a box, whose line and reach are set for each.
 pub(in crate::corner) fn box_search(options: &GeneralOptions) -> RaySearch {
@@ -39,8 +35,7 @@ pub(in crate::corner) fn find_end(
         if !(0..3).any(|other| other != axis && is_along(other)) {
             continue;
         }
-        let Some(crossing) = normal.cross(&segment.normal).try_normalize(0.05) else { continue };
-        let crossing = if crossing.dot(&vertex) < 0.0 { -crossing } else { crossing };
+        let Some(crossing) = meeting(&normal, &segment.normal, &vertex) else { continue };
         let angle = crossing.dot(&along).atan2(crossing.dot(&vertex));
         let px_per_rad = segment.px_per_rad;
         let off_px = segment.ends.map(|end| end.angle(&crossing) * px_per_rad);

@@ -6,6 +6,7 @@ use crate::camera::Camera;
 use crate::corner::feature::CornerFeature;
 use crate::corner::ray::FittedRay;
 use crate::corner::trace::{RaySearch, TracedRay};
+use crate::geometry::meeting;
 
 /// How far from where an end is expected its further edges are looked for first, and again, in pixels: colours and segments end
 /// within the search width of 8 pixels of the edge, and a fit of 15 pixels and more leaves less than one.
@@ -138,8 +139,7 @@ impl BoxView<'_> {
                 let search = RaySearch { normal, vertex: bearing, from_rad, to_rad, search_px, ..self.search };
                 let traced = follow(BoxLine::Far { end_of: axis, along }, &search)
                     .filter(|traced| traced.share >= SEEN_SHARE && traced.begins_at_vertex())?;
-                let crossing = ray.normal.cross(&traced.ray.normal).try_normalize(0.05)?;
-                *end = if crossing.dot(&bearing) < 0.0 { -crossing } else { crossing };
+                *end = meeting(&ray.normal, &traced.ray.normal, &bearing)?;
                 *found = Some((along, traced.ray));
             }
             if search_px < SEARCH_PX[0] && ends[0].angle(&ends[1]) * px_per_rad > MEET_PX {
