@@ -18,13 +18,15 @@
 
 # %%
 import math
+from functools import partial
 
 import matplotlib.pyplot as plt
 import numpy as np
 
 import tiltvp
-from tiltvp.line_logs import bearing_log, follow_lines
-from tiltvp.lines import LineExtractor, LineTracker
+from tiltvp.line_calibration import calibrate_lines
+from tiltvp.line_logs import see_lines
+from tiltvp.lines import LineExtractor
 from tiltvp.streams import Motion
 from tiltvp.synth import Drive, Room, drive_legs, simulate_drive
 
@@ -94,8 +96,9 @@ assert abs(wrong.suspect_value / WHEEL_BASE_M - 1.0) < 0.03
 # %% [markdown]
 # ## From pictures
 #
-# The same from what a camera sees: lean, vertical lines, and tracks of each image of a rendered drive. Edges that
-# are points err by 0.02 degrees (docs/calibration.md); tracks of fewer than six images are left out.
+# The same from what a camera sees: lean and vertical lines of each image of a rendered drive, and which line is which,
+# found together with the mounting. Edges that are points err by 0.02 degrees (docs/calibration.md); tracks of fewer than
+# six images are left out.
 
 # %%
 camera = tiltvp.Camera.equidistant(width=480, height=480, focal_px=140.0, cx=239.5, cy=239.5, max_theta_rad=1.6)
@@ -105,19 +108,20 @@ way = Drive(
 )  # fmt: skip
 motions = [Motion(yaw_rad=turn, distance_m=metres) for metres, turn in way.motions.tolist()]
 estimator = tiltvp.TiltEstimator(camera)
-followed = list(
-    follow_lines(
-        (way.render(frame).gray for frame in range(len(way))),
-        LineExtractor(camera), LineTracker(), tilt=estimator, motions=motions,
+seen = list(
+    see_lines(
+        (way.render(frame).gray for frame in range(len(way))), LineExtractor(camera), tilt=estimator, motions=motions
     )
-)  # fmt: skip
-log = bearing_log(followed, frames_min=6)
-whole = tiltvp.calibrate(way.odometry, log, wheel_base_m=way.wheel_base_m, bearing_sigma_rad=math.radians(0.02))
+)
+options = {"wheel_base_m": way.wheel_base_m, "bearing_sigma_rad": math.radians(0.02)}
+found = calibrate_lines(seen, partial(tiltvp.calibrate, way.odometry, **options), frames_min=6)
+log, whole = found.bearings, found.whole
 print(f"{len(way)} images, {len(np.unique(log[:, 1]))} tracks")
 print(whole.reason)
 errors = np.array([whole.mounting.x_m, whole.mounting.y_m, whole.mounting.yaw_rad]) - way.mount[:3]
 print(f"errors: {1e3 * errors[0]:.1f} mm, {1e3 * errors[1]:.1f} mm, {math.degrees(errors[2]):.2f} degrees")
 assert whole
+assert found.settled
 assert np.abs(errors[:2]).max() < 0.03
 assert abs(math.degrees(errors[2])) < 1.0
 

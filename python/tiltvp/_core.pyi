@@ -1691,6 +1691,7 @@ class LineTracker:
         look_back: SupportsIndex = ...,
         nearest_m: float = ...,
         camera_m: ArrayLike = ...,
+        camera_yaw_rad: float = ...,
         turn_sigma_rad: float = ...,
         distance_sigma: float = ...,
         rate_sigma_rad: float = ...,
@@ -1717,6 +1718,8 @@ class LineTracker:
         camera_m
             Where the camera's centre is on the robot, x and y from the middle between the wheels, metres. Default:
             (0.0, 0.0).
+        camera_yaw_rad
+            How far the frame of the bearings is turned to the left of the robot's, radians. Default: 0.
         turn_sigma_rad
             Standard deviation of a turn that is given, radians. Default: 0.005.
         distance_sigma

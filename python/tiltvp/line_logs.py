@@ -16,11 +16,19 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
     from tiltvp._core import TiltEstimate
-    from tiltvp.lines import LineExtractor, LineTracker, TrackedLines
+    from tiltvp.lines import LineExtractor, Lines, LineTracker, TrackedLines
     from tiltvp.streams.odometry import Motion
     from tiltvp.tilt import TiltEstimator
 
-__all__ = ["FollowedFrame", "bearing_log", "believed_leans", "displacements", "follow_lines"]
+__all__ = [
+    "FollowedFrame",
+    "SeenFrame",
+    "bearing_log",
+    "believed_leans",
+    "displacements",
+    "follow_lines",
+    "see_lines",
+]
 
 _TRACKS: Final = 150
 """Tracks of a log, or as many as there are frames where these are more: those that are seen longest. A step of the
@@ -40,6 +48,29 @@ class FollowedFrame:
     """The lines and whose they are."""
 
 
+@dataclass(frozen=True)
+class SeenFrame:
+    """An image of a drive, the lines in it, and what the robot did since the image before that could be used."""
+
+    number: int
+    """As of a `FollowedFrame`."""
+    gray: NDArray[np.uint8]
+    """(H, W)."""
+    lines: Lines
+    """What is to be followed."""
+    descriptors: NDArray[np.float32]
+    """(N, D): of each line."""
+    turn_rad: float | None
+    """None where the motion is not known."""
+    distance_m: float | None
+    """None where it is not known, or motions tell turns only."""
+
+    def followed(self, tracker: LineTracker) -> FollowedFrame:
+        """The lines as `tracker` has them, which has seen the frames before."""
+        tracked = tracker.update(self.lines, self.descriptors, yaw_change_rad=self.turn_rad, distance_m=self.distance_m)
+        return FollowedFrame(self.number, self.gray, tracked)
+
+
 def believed_leans(
     estimator: TiltEstimator, extractor: LineExtractor, *, confidence_min: float = 0.5
 ) -> Callable[[NDArray[np.uint8]], TiltEstimate]:
@@ -55,15 +86,14 @@ def believed_leans(
     return lean
 
 
-def follow_lines(
+def see_lines(
     images: Iterable[NDArray[np.uint8] | TiltvpError],
     extractor: LineExtractor,
-    tracker: LineTracker,
     *,
     tilt: Callable[[NDArray[np.uint8]], TiltEstimate | ArrayLike | None] = lambda _: None,
     motions: Sequence[Motion] | None = None,
-) -> Iterator[FollowedFrame | TiltvpError]:
-    """For each image, grey or BGR, its lines as `tracker` has them, or what is wrong with it.
+) -> Iterator[SeenFrame | TiltvpError]:
+    """For each image, grey or BGR, its lines with their descriptors, or what is wrong with it.
 
     `tilt` tells the lean of a grey image (None: upright), or raises that it is not known; `motions`, one for each
     image, what the robot did since the one before. The motion of a frame that cannot be used is added to that of the
@@ -86,14 +116,22 @@ def follow_lines(
         except TiltvpError as error:
             yield error
             continue
-        tracked = tracker.update(
-            lines,
-            extractor.describe(gray, lines),
-            yaw_change_rad=None if motions is None else turn_rad,
-            distance_m=distance_m if drives else None,
-        )
+        turn, distance = None if motions is None else turn_rad, distance_m if drives else None
         turn_rad, distance_m = 0.0, 0.0
-        yield FollowedFrame(number, gray, tracked)
+        yield SeenFrame(number, gray, lines, extractor.describe(gray, lines), turn, distance)
+
+
+def follow_lines(
+    images: Iterable[NDArray[np.uint8] | TiltvpError],
+    extractor: LineExtractor,
+    tracker: LineTracker,
+    *,
+    tilt: Callable[[NDArray[np.uint8]], TiltEstimate | ArrayLike | None] = lambda _: None,
+    motions: Sequence[Motion] | None = None,
+) -> Iterator[FollowedFrame | TiltvpError]:
+    """For each image its lines as `tracker` has them, or what is wrong with it; arguments are those of `see_lines`."""
+    for seen in see_lines(images, extractor, tilt=tilt, motions=motions):
+        yield seen if isinstance(seen, TiltvpError) else seen.followed(tracker)
 
 
 def bearing_log(frames: Sequence[FollowedFrame], *, frames_min: int = 2) -> NDArray[np.float64]:

@@ -311,6 +311,7 @@ fn every_option_of_the_tracker_is_read() {
         ("f3", matching(1.05, 0.75, 0.1)),
         ("nearest_m", TrackerOptions { nearest_m: 1.0, ..plain }),
         ("camera_m", TrackerOptions { camera_m: [0.3, 0.1], ..plain }),
+        ("camera_yaw_rad", TrackerOptions { camera_yaw_rad: 0.5, ..plain }),
         ("turn_sigma_rad", TrackerOptions { turn_sigma_rad: 0.05, ..plain }),
         ("distance_sigma", TrackerOptions { distance_sigma: 0.9, ..plain }),
         ("rate_sigma_rad", TrackerOptions { rate_sigma_rad: 0.001, ..plain }),

@@ -17,7 +17,8 @@ from tiltvp.cli.terminal import say, status
 from tiltvp.errors import InvalidInputError
 
 if TYPE_CHECKING:
-    from tiltvp import JoinedTilts, Robot
+    from tiltvp import JoinedTilts, LogCalibration, Robot
+    from tiltvp.drive_logs import DriveLog
 
 NOT_RELIABLE = 1
 _DRIVE, _READ, _MOTION = DriveOptions(), LogOptions(), MotionOptions()
@@ -112,19 +113,22 @@ def _calibrated(
     from tiltvp import SelfCalibrator
     from tiltvp import calibrate as calibrate_log
 
-    log = one.log(None if tilt is None else tilt.robot_from_camera).read_as(*read.read_as)
-    sigma = {} if one.sigma_rad is None else {"bearing_sigma_rad": one.sigma_rad}
-    calibrator = SelfCalibrator(**sigma | drive.of_filter(), method=method)
-    with status(f"{one.name}: the filter, {len(log.bearings)} bearings"):
-        history = calibrator.follow(log.odometry, log.bearings)
-    with status(f"{one.name}: the whole log, {len(log.bearings)} bearings"):
-        whole = calibrate_log(
-            log.odometry, log.bearings, **sigma | drive.of_whole_log(), times_s=log.times_s,
+    def noise() -> dict[str, float]:
+        return {} if one.sigma_rad is None else {"bearing_sigma_rad": one.sigma_rad}
+
+    def solve(log: DriveLog) -> LogCalibration:
+        return calibrate_log(
+            log.odometry, log.bearings, **noise() | drive.of_whole_log(), times_s=log.times_s,
             estimate_odometry=read.estimate_odometry, estimate_time_offset=read.estimate_time_offset,
         )  # fmt: skip
+
+    log, whole, doubt = one.solved(None if tilt is None else tilt.robot_from_camera, read.read_as, solve)
+    calibrator = SelfCalibrator(**noise() | drive.of_filter(), method=method)
+    with status(f"{one.name}: the filter, {len(log.bearings)} bearings"):
+        history = calibrator.follow(log.odometry, log.bearings)
     with watching.viewer() as viewer:
         if viewer is not None:
             send_calibration(viewer, log, history, whole)
     for word in other_readings(whole.misreading):
         say(f"{one.name}: try {' '.join(f'--read-as {known}' for known in (*read.read_as, word))}")
-    return Calibration(one.name, calibrator, history, whole)
+    return Calibration(one.name, calibrator, history, whole, doubt)

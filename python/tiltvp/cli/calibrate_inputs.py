@@ -2,25 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Final, Self
+from typing import TYPE_CHECKING, Annotated, Any, Final, NamedTuple, Self, TypeAlias
 
 from cyclopts import Group, Parameter
 
 from tiltvp._core import CALIBRATION_METHODS, option_fields
 from tiltvp.cli.declared_options import LibraryOptions, from_library
 from tiltvp.cli.options import Switch
+from tiltvp.cli.terminal import status
 from tiltvp.errors import InvalidInputError
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from tiltvp import Robot
+    from tiltvp import LogCalibration, Robot
     from tiltvp.drive_logs import DriveLog
 
-__all__ = ["DriveOptions", "LogOptions", "Tables", "other_readings", "sources_from"]
+    Solve: TypeAlias = Callable[[DriveLog], LogCalibration]
+
+__all__ = ["DriveOptions", "LogOptions", "Solved", "Tables", "other_readings", "sources_from"]
 
 _REMEDIES = {
     "reflected": ("wheels-swapped", "wheels-negated", "clockwise"),
@@ -93,6 +96,15 @@ class LogOptions:
     """From each whole log also by how much the bearings are later than the odometry."""
 
 
+class Solved(NamedTuple):
+    """A log by our conventions, and the mounting that it tells."""
+
+    log: DriveLog
+    whole: LogCalibration
+    doubt: str = ""
+    """Why the mounting cannot be relied upon, beside what it says itself."""
+
+
 @dataclass(frozen=True)
 class Tables:
     """A log of two tables."""
@@ -117,10 +129,12 @@ class Tables:
             raise InvalidInputError(f"{self.odometry}: no column time_s, expected one with --estimate-time-offset")
         return replace(self, read=log)
 
-    def log(self, _: NDArray[Any] | None = None) -> DriveLog:
-        """What was read; bearings are what they are, whatever the mounting."""
+    def solved(self, _: NDArray[Any] | None, read_as: Sequence[str], solve: Solve) -> Solved:
+        """What was read, and what it says; bearings are what they are, whatever the mounting."""
         assert self.read is not None  # As `checked` has it.
-        return self.read
+        log = self.read.read_as(*read_as)
+        with status(f"{self.name}: the whole log, {len(log.bearings)} bearings"):
+            return Solved(log, solve(log))
 
 
 def sources_from(words: Sequence[str]) -> list[Tables | str]:

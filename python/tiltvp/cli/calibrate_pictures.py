@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Final
@@ -9,11 +10,12 @@ from typing import TYPE_CHECKING, Annotated, Any, Final
 import numpy as np
 from cyclopts import Group, Parameter, validators
 
+from tiltvp.cli.calibrate_inputs import Solved
 from tiltvp.cli.declared_options import mask_from
 from tiltvp.cli.options import CameraOptions, Switch
 from tiltvp.cli.sources import MotionOptions, SourceOptions
 from tiltvp.cli.tables import check_ending, write_table
-from tiltvp.cli.terminal import progress_bar, say
+from tiltvp.cli.terminal import progress_bar, say, status
 from tiltvp.cli.track import Drive, needed_turns, track_table
 from tiltvp.errors import InvalidInputError
 
@@ -21,10 +23,10 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from tiltvp import Camera, MountingTilt, Robot
-    from tiltvp.cli.calibrate_inputs import DriveOptions
+    from tiltvp.cli.calibrate_inputs import DriveOptions, Solve
     from tiltvp.cli.line_options import LineOptions
-    from tiltvp.drive_logs import DriveLog
-    from tiltvp.streams import FrameMotions, Frames, Wheels
+    from tiltvp.line_logs import SeenFrame
+    from tiltvp.streams import Frame, FrameMotions, Frames, Wheels
 
 __all__ = ["PictureLog", "PictureOptions"]
 
@@ -118,47 +120,73 @@ class PictureLog:
             tilts = drive_tilts(self.frames, estimator, self.moved.motions, advance=bar.advance)
         return mounting_tilt(tilts.estimates, tilts.motions, rotation, level_floor=self.pictures.level_floor)
 
-    def log(self, robot_from_camera: NDArray[np.float64] | None = None) -> DriveLog:
-        """The bearings of lines, in the frame of the mounting (3, 3) or of that which was given.
+    def solved(self, robot_from_camera: NDArray[np.float64] | None, read_as: Sequence[str], solve: Solve) -> Solved:
+        """The bearings of lines in the frame of the mounting (3, 3), or of that which was given, and what they say.
 
-        Tracks are predicted with the mounting as it is thought to be; they are written where they are asked for.
+        Tracks are written where they are asked for.
         """
         from tiltvp.drive_logs import DriveLog
-        from tiltvp.line_logs import bearing_log, displacements
-        from tiltvp.lines import LineTracker
-        from tiltvp.rotations import about_vertical
+        from tiltvp.line_calibration import calibrate_lines
+        from tiltvp.line_logs import displacements
         from tiltvp.streams import Motion
 
-        x_m, y_m, yaw_rad = self.drive.start_known
-        rotation = self.lines.rotation() if robot_from_camera is None else robot_from_camera
-        turned = about_vertical(yaw_rad) @ rotation
-        extractor = self.lines.extractor(self.camera, rotation=turned)
-        tilt = self.lines.tilts(self.camera, rotation=turned)
-        looked = Drive(extractor, LineTracker(camera_m=(x_m, y_m)), tilt, self.moved)
-        count, nothing = len(self.moved.motions), np.zeros((0, 0), np.uint8)
-        with progress_bar(count, f"{self.name}: lines") as bar:
-            # A drive's images together are more than the memory holds.
-            seen = [
-                (frame.name, frame.time_s, replace(one, gray=nothing))
-                for frame, one in looked.followed(iter(self.frames), bar)
-            ]
-        least = self.pictures.track_frames_min
-        bearings = bearing_log([one for _, _, one in seen], frames_min=least)
-        if not len(bearings):
-            raise InvalidInputError(f"{self.name}: no line is seen in {least} of {count} frames, {looked.told()}")
-        # From the robot's frame back to the camera's.
-        bearings[:, 2] -= yaw_rad
-        table = track_table([(one.number, name, time_s, one.tracked) for name, time_s, one in seen])
+        moved = self._moved(read_as)
+        frames, seen = self._seen(moved, self.lines.rotation() if robot_from_camera is None else robot_from_camera)
+        self.sigma_rad = float(np.median(np.concatenate([one.lines.sigma_rad for one in seen])))
+        motions = [one or Motion() for one in moved.motions]
+        odometry = displacements(motions, wheel_base_m=self._base_m)
+        with status(f"{self.name}: which line is which, and the whole log"):
+            found = calibrate_lines(
+                seen, lambda bearings: solve(DriveLog(odometry, bearings, moved.times_s)),
+                start=self.drive.start_known, frames_min=self.pictures.track_frames_min,
+            )  # fmt: skip
         if self.pictures.tracks is not None:
+            rows = zip(frames, found.frames, strict=True)
+            table = track_table([(one.number, frame.name, frame.time_s, one.tracked) for frame, one in rows])
             write_table(table, self.pictures.tracks)
-        if looked.leaning:
-            say(f"{self.name}: of {count} frames {looked.told()}")
-        say(f"{self.name}: {len(bearings)} bearings of {len(set(bearings[:, 1].tolist()))} lines")
-        self.bad, self.sigma_rad = looked.bad, float(np.median([row["sigma_rad"] for row in table.rows]))
-        base = self.drive.wheel_base
-        assert base is not None  # As `settled` has it.
-        motions = [one or Motion() for one in self.moved.motions]
-        return DriveLog(displacements(motions, wheel_base_m=base), bearings, self.moved.times_s)
+        say(f"{self.name}: {len(found.bearings)} bearings of {len(set(found.bearings[:, 1].tolist()))} lines")
+        doubt = "" if found.settled else "which line is which does not settle with the mounting"
+        return Solved(DriveLog(odometry, found.bearings, moved.times_s), found.whole, doubt)
+
+    def _seen(
+        self, moved: FrameMotions, rotation: NDArray[np.float64]
+    ) -> tuple[tuple[Frame, ...], tuple[SeenFrame, ...]]:
+        """The frames that can be used, and their lines: a drive's images together are more than the memory holds."""
+        extractor = self.lines.extractor(self.camera, rotation=rotation)
+        drive = Drive(extractor, self.lines.tilts(self.camera, rotation=rotation), moved)
+        count, nothing = len(moved.motions), np.zeros((0, 0), np.uint8)
+        with progress_bar(count, f"{self.name}: lines") as bar:
+            seen = [(frame, replace(one, gray=nothing)) for frame, one in drive.seen(iter(self.frames), bar)]
+        self.bad = drive.bad
+        if drive.leaning:
+            say(f"{self.name}: of {count} frames {drive.told()}")
+        if not seen:
+            raise InvalidInputError(f"{self.name}: no line is seen in {count} frames, {drive.told()}")
+        frames, lines = zip(*seen, strict=True)
+        return frames, lines
+
+    def _moved(self, read_as: Sequence[str]) -> FrameMotions:
+        """What the robot did, by our conventions."""
+        from tiltvp.drive_logs import DriveLog
+        from tiltvp.line_logs import displacements
+        from tiltvp.streams import Motion
+
+        if not read_as:
+            return self.moved
+        recorded = displacements([one or Motion() for one in self.moved.motions], wheel_base_m=self._base_m)
+        log = DriveLog(recorded, np.array([[0.0, 0.0, 1.0]]), self.moved.times_s).read_as(*read_as)
+        if log.bearings[0, 2] != 1.0:
+            raise InvalidInputError(f"--read-as {' '.join(read_as)} with pictures, expected words about the wheels")
+        read = [
+            one and Motion((right - left) / self._base_m, 0.5 * (left + right), (left, right))
+            for one, (left, right) in zip(self.moved.motions, log.odometry.tolist(), strict=True)
+        ]
+        return replace(self.moved, motions=read)
+
+    @property
+    def _base_m(self) -> float:
+        assert self.drive.wheel_base is not None  # As `settled` has it.
+        return self.drive.wheel_base
 
     def robot(self) -> Robot:
         """The robot as far as it was told: camera, mounting as it was given, mask, wheels, topics."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -32,6 +32,16 @@ class Calibration:
     calibrator: SelfCalibrator
     history: Sequence[MountingEstimate]
     whole: LogCalibration
+    doubt: str = ""
+    """Why the whole log's answer cannot be relied upon, beside what it says itself."""
+
+    def __bool__(self) -> bool:
+        return bool(self.whole) and not self.doubt
+
+    @property
+    def reason(self) -> str:
+        """Whether the whole log's answer can be relied upon, and why not, in a sentence."""
+        return "; ".join(filter(None, (self.doubt, self.whole.reason)))
 
 
 @Parameter(name="*", group=Group("Results"))
@@ -128,19 +138,21 @@ class ResultOptions:
         from tiltvp import Extrinsics, join_logs
 
         given = None if robot_from_camera is None else rotation_of(robot_from_camera)
-        used = [one for one in found if one.whole or self.anyway]
+        used = [one for one in found if one or self.anyway or len(found) == 1]
         if len(found) == 1:
             place: Any = found[0].whole
         elif not used:
             return None
         else:
             for one in found:
-                if not one.whole:
-                    complain(f"{one.name}: {'joined all the same' if self.anyway else 'left out'}: {one.whole.reason}")
+                if not one:
+                    complain(f"{one.name}: {'joined all the same' if self.anyway else 'left out'}: {one.reason}")
             begun = {} if drive.start_sigma is None else {"start_sigma": drive.start_sigma}
             place = join_logs([one.whole for one in used], start=drive.start_known, **begun)
             say(place.reason if place.odd is None else f"{place.reason} (log {place.odd + 1}: {used[place.odd].name})")
-        return Extrinsics.of(place, tilt, robot_from_camera=given, height_m=self.height)
+        known = Extrinsics.of(place, tilt, robot_from_camera=given, height_m=self.height)
+        doubts = [one.doubt for one in used if one.doubt]
+        return replace(known, reasons=(*doubts, *known.reasons))
 
 
 def _write_plot(found: Sequence[Calibration], path: Path) -> None:
@@ -162,6 +174,7 @@ def _plain_log(one: Calibration) -> dict[str, object]:
     return {
         "name": one.name,
         "whole_log": one.whole.to_dict(),
+        "doubt": one.doubt,
         "filter": one.calibrator.estimate.to_dict(),
         "options": {name: _plain(value) for name, value in one.calibrator.options.items()},
     }
@@ -215,7 +228,7 @@ def _show(one: Calibration, *, several: bool) -> None:
         ]  # fmt: skip
         table.add_row(name, *cells)
     show(table)
-    for name, reason in (("filter", filtered.reason), ("whole log", whole.reason)):
+    for name, reason in (("filter", filtered.reason), ("whole log", one.reason)):
         say(f"{name}: {reason}")
     e = whole.mounting
     say(

@@ -27,8 +27,8 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from tiltvp import TiltEstimate
-    from tiltvp.line_logs import FollowedFrame
-    from tiltvp.lines import LineExtractor, LineTracker, TrackedLines
+    from tiltvp.line_logs import SeenFrame
+    from tiltvp.lines import LineExtractor, TrackedLines
     from tiltvp.streams import Frame, FrameMotions
 
     Seen = tuple[int, str, float | None, TrackedLines]
@@ -97,7 +97,7 @@ def track(
     robot, words = camera.robot(), [] if source is None else [source]
     frames = frames_of.of_robot(robot, words).open(words)
     motions = needed_turns(motion.motions_of(robot, frames, wheel_base))
-    drive = Drive(extractor, tracker, tilt, motions)
+    drive = Drive(extractor, tilt, motions)
     tracked: list[Seen] = []
     showing = nullcontext() if video is None else video_writer(video, frame_rate or frames.rate_hz)
     with (
@@ -106,7 +106,8 @@ def track(
         ending_at_interrupt(frames) as coming,
         progress_bar(frames.count or 0, "frames") as bar,
     ):
-        for frame, seen in drive.followed(coming, bar):
+        for frame, found in drive.seen(coming, bar):
+            seen = found.followed(tracker)
             tracked.append((seen.number, frame.name, frame.time_s, seen.tracked))
             if film is not None or viewer is not None:
                 rotation, tracks = extractor.robot_from_camera, seen.tracked.track.tolist()
@@ -139,16 +140,15 @@ def needed_turns(motions: FrameMotions | None) -> FrameMotions | None:
 
 
 class Drive:
-    """The lines of a drive, followed from frame to frame."""
+    """The lines of a drive, frame by frame."""
 
     def __init__(
         self,
         extractor: LineExtractor,
-        tracker: LineTracker,
         tilt: Callable[[NDArray[np.uint8]], TiltEstimate | None],
         motions: FrameMotions | None,
     ) -> None:
-        self._parts = extractor, tracker, tilt
+        self._parts = extractor, tilt
         self._motions = motions
         self.bad = 0
         """How many frames could not be used so far."""
@@ -159,16 +159,16 @@ class Drive:
         """How many frames were left out because of their lean."""
         return f"{self.leaning} left out whose lean is not known"
 
-    def followed(self, frames: Iterator[Frame], bar: ProgressBar) -> Iterator[tuple[Frame, FollowedFrame]]:
+    def seen(self, frames: Iterator[Frame], bar: ProgressBar) -> Iterator[tuple[Frame, SeenFrame]]:
         """The frames that can be used, with their lines; the others are complained about.
 
         Frames whose lean is not known are left out and counted. So are those of whose time the odometry does not tell;
         a line about them has been told before.
         """
-        from tiltvp.line_logs import follow_lines
+        from tiltvp.line_logs import see_lines
         from tiltvp.streams import Motion
 
-        extractor, tracker, tilt = self._parts
+        extractor, tilt = self._parts
         motions = None if self._motions is None else self._motions.motions
         passed: list[Frame] = []
 
@@ -178,7 +178,7 @@ class Drive:
                 yield _LEFT_OUT if motions is not None and motions[number] is None else frame.image
 
         driven = None if motions is None else [motion or Motion() for motion in motions]
-        for seen in follow_lines(images(), extractor, tracker, tilt=tilt, motions=driven):
+        for seen in see_lines(images(), extractor, tilt=tilt, motions=driven):
             frame = passed.pop()
             if isinstance(seen, UnknownLeanError):
                 self.leaning += 1

@@ -14,6 +14,8 @@ options! {
         nearest_m: f64 = 0.3 => Above(0.0, 1e6), "a positive distance";
         /// Where the camera's centre is on the robot, x and y from the middle between the wheels, metres.
         camera_m: [f64; 2] = [0.0; 2] => -10.0..=10.0, "metres from -10 to 10";
+        /// How far the frame of the bearings is turned to the left of the robot's, radians.
+        camera_yaw_rad: f64 = 0.0 => -7.0..=7.0, "an angle from -7 to 7";
         /// Standard deviation of a turn that is given, radians.
         turn_sigma_rad: f64 = 0.005 => Above(0.0, 1e6), "a positive angle";
         /// Standard deviation of a distance driven that is given, as a share of it.

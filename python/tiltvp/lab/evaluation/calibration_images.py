@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable, Iterator
 from contextlib import closing
 from dataclasses import dataclass
+from functools import partial
 from threading import Event
 from typing import TYPE_CHECKING, Any
 
@@ -14,9 +15,9 @@ import polars as pl
 
 from tiltvp.lab.datasets.driving import drive_room
 from tiltvp.lab.datasets.new import in_order
-from tiltvp.line_logs import FollowedFrame, bearing_log, follow_lines
-from tiltvp.lines import LineExtractor, LineTracker
-from tiltvp.rotations import about_vertical
+from tiltvp.line_calibration import calibrate_lines
+from tiltvp.line_logs import SeenFrame, see_lines
+from tiltvp.lines import LineExtractor
 from tiltvp.selfcalib import MountingEstimate, SelfCalibrator, calibrate
 from tiltvp.streams import Motion
 from tiltvp.synth import MIRROR_BLIND_RAD, Drive, drive_legs, mirror_camera
@@ -79,17 +80,16 @@ def picture_drives(
             threads=threads,
         )
         start = _start(seed)
-        frames = list(_followed(drive, start, threads))
-        sigma_rad = float(np.median(np.concatenate([frame.tracked.lines.sigma_rad for frame in frames])))
-        bearings = bearing_log(frames, frames_min=3)
-        bearings[:, 2] -= start[2]
+        seen = list(_seen(drive, threads))
+        sigma_rad = float(np.median(np.concatenate([one.lines.sigma_rad for one in seen])))
         options: dict[str, Any] = {
             "wheel_base_m": drive.wheel_base_m, "bearing_sigma_rad": sigma_rad,
             "start": start, "start_sigma": _START_SIGMA,
         }  # fmt: skip
+        found = calibrate_lines(seen, partial(calibrate, drive.odometry, **options), start=start)
+        bearings, whole = found.bearings, found.whole
         calibrator = SelfCalibrator(**options)
         calibrator.follow(drive.odometry, bearings)
-        whole = calibrate(drive.odometry, bearings, **options)
         case = {"kind": kind, "lean max": lean_deg, "seed": seed, "frames": len(drive), "bearings": len(bearings)}
         for name, estimate in (("filter", calibrator.estimate), ("whole log", whole.mounting)):
             rows.append(case | {"by": name} | _errors(estimate))
@@ -102,12 +102,9 @@ def _start(seed: int) -> tuple[float, float, float]:
     return max(rho, 0.05) * math.cos(phi), max(rho, 0.05) * math.sin(phi), phi + psi
 
 
-def _followed(drive: Drive, start: tuple[float, float, float], threads: int) -> Iterator[FollowedFrame]:
-    """The frames of a drive, rendered on so many threads, with their lines as seen from the mounting at the start."""
-    camera, (x_m, y_m, yaw_rad) = drive.camera, start
-    rotation = about_vertical(yaw_rad)
-    estimator = TiltEstimator(camera, robot_from_camera=rotation)
-    extractor, tracker = LineExtractor(camera, robot_from_camera=rotation), LineTracker(camera_m=(x_m, y_m))
+def _seen(drive: Drive, threads: int) -> Iterator[SeenFrame]:
+    """The frames of a drive, rendered on so many threads, and their lines in the frame of the camera."""
+    estimator, extractor = TiltEstimator(drive.camera), LineExtractor(drive.camera)
     motions = [
         Motion(yaw, distance, (left, right))
         for (distance, yaw), (left, right) in zip(drive.motions.tolist(), drive.odometry.tolist(), strict=True)
@@ -118,11 +115,10 @@ def _followed(drive: Drive, start: tuple[float, float, float], threads: int) -> 
         return estimate if estimate else None
 
     with closing(in_order(lambda k: drive.render(k, threads=1), range(len(drive)), threads, Event())) as views:
-        images = (view.gray for view in views)
-        for frame in follow_lines(images, extractor, tracker, tilt=tilt, motions=motions):
-            if isinstance(frame, Exception):
-                raise frame
-            yield frame
+        for seen in see_lines((view.gray for view in views), extractor, tilt=tilt, motions=motions):
+            if isinstance(seen, Exception):
+                raise seen
+            yield seen
 
 
 def _errors(e: MountingEstimate) -> dict[str, float | str]:

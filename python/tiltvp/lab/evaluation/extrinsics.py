@@ -11,8 +11,9 @@ import polars as pl
 
 from tiltvp.errors import InvalidInputError
 from tiltvp.extrinsics import Extrinsics
-from tiltvp.line_logs import FollowedFrame, bearing_log, believed_leans, displacements, follow_lines
-from tiltvp.lines import LineExtractor, LineTracker
+from tiltvp.line_calibration import calibrate_lines
+from tiltvp.line_logs import SeenFrame, believed_leans, displacements, see_lines
+from tiltvp.lines import LineExtractor
 from tiltvp.selfcalib import calibrate
 from tiltvp.streams import Motion
 from tiltvp.tilt import TiltEstimator
@@ -48,20 +49,19 @@ def judged_extrinsics(
     lean = believed_leans(estimator, extractor)
     told = [motion or Motion() for motion in motions]
     images = (frame.image for frame in frames)
-    followed = [
-        frame
-        for frame in follow_lines(images, extractor, LineTracker(), tilt=lean, motions=told)
-        if isinstance(frame, FollowedFrame)
-    ]
+    seen = [one for one in see_lines(images, extractor, tilt=lean, motions=told) if isinstance(one, SeenFrame)]
     base = drive.drive.wheel_base_m
-    sigma_rad = float(np.median(np.concatenate([frame.tracked.lines.sigma_rad for frame in followed])))
+    odometry = displacements(told, wheel_base_m=base)
     try:
-        bearings = bearing_log(followed, frames_min=_FRAMES_MIN)
-        whole = calibrate(
-            displacements(told, wheel_base_m=base), bearings, wheel_base_m=base, bearing_sigma_rad=sigma_rad
+        sigma_rad = float(np.median(np.concatenate([one.lines.sigma_rad for one in seen])))
+        lines = calibrate_lines(
+            seen,
+            lambda bearings: calibrate(odometry, bearings, wheel_base_m=base, bearing_sigma_rad=sigma_rad),
+            frames_min=_FRAMES_MIN,
         )
     except InvalidInputError:
         return nothing | {"reliable": False, "converged": False}
+    whole = lines.whole
     found = Extrinsics.of(whole, tilt)
     off = drive.robot_from_mounted_camera @ found.robot_from_camera.T
     place = np.array([drive.mount.x_m, drive.mount.y_m]) - found.place_m
@@ -71,7 +71,7 @@ def judged_extrinsics(
     return row | {
         "nees": float(error @ np.linalg.solve(found.covariance, error)),
         "nees of place": float(error[[0, 1, 4]] @ np.linalg.solve(found.covariance[plane], error[[0, 1, 4]])),
-        "reliable": bool(found),
+        "reliable": bool(found) and lines.settled,
         "converged": whole.converged,
     }
 

@@ -61,7 +61,7 @@ impl Parallax {
                 [bb + 2.0 * bn + nn + DRIFT_RAD * DRIFT_RAD, bn + nn, nn + RATE_DRIFT_RAD * RATE_DRIFT_RAD];
             return;
         };
-        let [tx, ty] = shift_of(distance, motion.turn_rad, options.camera_m);
+        let [tx, ty] = shift_of(distance, motion.turn_rad, options);
         let n = self.inverse_distance;
         let (sin, cos) = self.bearing_rad.sin_cos();
         // The edge in units of its distance, seen from the new place.
@@ -96,12 +96,16 @@ impl Parallax {
     }
 }
 
-/// How the camera's centre moves, in the robot's frame before the motion, metres.
-fn shift_of(distance_m: f64, turn_rad: f64, [x, y]: [f64; 2]) -> [f64; 2] {
+/// How the camera's centre moves, in the frame of the bearings before the motion, metres.
+fn shift_of(distance_m: f64, turn_rad: f64, options: &TrackerOptions) -> [f64; 2] {
+    let [x, y] = options.camera_m;
     let half = 0.5 * turn_rad;
     let chord = distance_m * if half.abs() < 1e-8 { 1.0 } else { half.sin() / half };
     let ((sin_half, cos_half), (sin, cos)) = (half.sin_cos(), turn_rad.sin_cos());
-    [chord * cos_half + (cos - 1.0) * x - sin * y, chord * sin_half + sin * x + (cos - 1.0) * y]
+    let ahead = chord * cos_half + (cos - 1.0) * x - sin * y;
+    let aside = chord * sin_half + sin * x + (cos - 1.0) * y;
+    let (sin_yaw, cos_yaw) = options.camera_yaw_rad.sin_cos();
+    [cos_yaw * ahead + sin_yaw * aside, cos_yaw * aside - sin_yaw * ahead]
 }
 
 #[cfg(test)]
@@ -111,7 +115,8 @@ mod tests {
     /// An edge at a place, a robot on its way: bearings and distances are those of plane geometry, derivatives too.
     #[test]
     fn a_motion_moves_an_edge_as_in_the_plane() {
-        let options = TrackerOptions { camera_m: [0.1, -0.05], ..TrackerOptions::default() };
+        let camera_yaw_rad = 0.7;
+        let options = TrackerOptions { camera_m: [0.1, -0.05], camera_yaw_rad, ..TrackerOptions::default() };
         let motion = Motion { turn_rad: 0.3, distance_m: Some(0.2) };
         let seen = |bearing: f64, inverse_distance: f64| {
             let mut edge =
@@ -122,12 +127,13 @@ mod tests {
         let (bearing, inverse_distance) = (0.8f64, 0.5f64);
         let edge = seen(bearing, inverse_distance);
         // World frame: the robot starts at the origin. The arc has the radius 0.2 / 0.3.
-        let place = [0.1 + 2.0 * bearing.cos(), -0.05 + 2.0 * bearing.sin()];
+        let azimuth = camera_yaw_rad + bearing;
+        let place = [0.1 + 2.0 * azimuth.cos(), -0.05 + 2.0 * azimuth.sin()];
         let (radius, yaw) = (0.2 / 0.3, 0.3f64);
         let robot = [radius * yaw.sin(), radius * (1.0 - yaw.cos())];
         let camera = [robot[0] + 0.1 * yaw.cos() + 0.05 * yaw.sin(), robot[1] + 0.1 * yaw.sin() - 0.05 * yaw.cos()];
         let (dx, dy) = (place[0] - camera[0], place[1] - camera[1]);
-        assert!((edge.bearing_rad - (dy.atan2(dx) - yaw)).abs() < 1e-12);
+        assert!((edge.bearing_rad - (dy.atan2(dx) - yaw - camera_yaw_rad)).abs() < 1e-12);
         assert!((edge.inverse_distance - 1.0 / dx.hypot(dy)).abs() < 1e-12);
         let step = 1e-6;
         let (more, nearer) = (seen(bearing + step, inverse_distance), seen(bearing, inverse_distance + step));
