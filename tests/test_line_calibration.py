@@ -1,0 +1,102 @@
+"""The mounting from the lines of a drive's images, with which line is which found in turns with it."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from functools import partial
+
+import numpy as np
+import pytest
+
+from tiltvp import Camera
+from tiltvp.errors import InvalidInputError
+from tiltvp.line_calibration import calibrate_lines, place_of_longest_tracks
+from tiltvp.line_logs import SeenFrame, bearing_log, see_lines
+from tiltvp.lines import LineExtractor, LineTracker
+from tiltvp.selfcalib import LogCalibration, calibrate
+from tiltvp.streams import Motion
+from tiltvp.synth import Drive, Room
+
+MOUNT = (0.12, -0.07, 0.2)
+LEGS = [(0.0, 2.0), (0.8, 0.0), (0.0, -2.5), (0.5, 0.6)]
+
+
+@pytest.fixture(scope="module")
+def drive() -> Drive:
+    camera = Camera.equidistant(width=360, height=360, focal_px=105.0, cx=179.5, cy=179.5, max_theta_rad=1.6)
+    room = Room("office", 31, light_spacing_m=0.6)
+    return Drive(
+        room, camera=camera, legs=LEGS, mount=(*MOUNT, 0.4), step_m=0.12, turn_max_rad=0.3, samples=2, seed=4
+    )  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def seen(drive: Drive) -> list[SeenFrame]:
+    motions = [Motion(turn, distance) for distance, turn in drive.motions.tolist()]
+    images = (drive.render(frame).gray for frame in range(len(drive)))
+    extractor = LineExtractor(drive.camera)
+    return [one for one in see_lines(images, extractor, motions=motions) if isinstance(one, SeenFrame)]
+
+
+@pytest.fixture(scope="module")
+def solve(drive: Drive) -> partial[LogCalibration]:
+    return partial(
+        calibrate, drive.odometry, wheel_base_m=drive.wheel_base_m, bearing_sigma_rad=math.radians(0.05)
+    )  # fmt: skip
+
+
+def errors(whole: LogCalibration) -> np.ndarray:
+    found = whole.mounting
+    return np.array([found.x_m, found.y_m, found.yaw_rad]) - MOUNT
+
+
+@pytest.mark.parametrize("start", [(0.0, 0.0, 0.0), (-0.2, 0.2, 0.5)])
+def test_the_mounting_is_found_from_a_start_that_is_far_off(
+    seen: list[SeenFrame], solve: partial[LogCalibration], start: tuple[float, float, float]
+) -> None:
+    found = calibrate_lines(seen, solve, start=start)
+    assert found.settled
+    assert found.whole
+    assert (np.abs(errors(found.whole)) < (0.004, 0.004, math.radians(0.3))).all()
+    assert len(found.frames) == len(seen)
+
+
+def test_tracks_from_a_wrong_place_are_short_and_lead_to_a_wrong_one(
+    seen: list[SeenFrame], solve: partial[LogCalibration]
+) -> None:
+    """What is mended: lines that are lost where the robot turns, and a mounting that is off by more."""
+    tracker = LineTracker()
+    bearings = bearing_log([one.followed(tracker) for one in seen], frames_min=3)
+    found = calibrate_lines(seen, solve)
+    assert len(bearings) < 0.9 * len(found.bearings)
+    assert np.linalg.norm(errors(solve(bearings))[:2]) > 2.0 * np.linalg.norm(errors(found.whole)[:2])
+
+
+def test_the_place_is_told_by_motions_that_turn_and_drive(seen: list[SeenFrame]) -> None:
+    x, y = place_of_longest_tracks(seen, (0.0, 0.0, MOUNT[2]))
+    assert math.hypot(x - MOUNT[0], y - MOUNT[1]) < 0.05
+    # The same at a hundred frames a second, most of which say nothing.
+    slow = [one for frame in seen for one in (frame, *[replace(frame, turn_rad=0.0, distance_m=0.0)] * 4)]
+    assert place_of_longest_tracks(slow, (0.0, 0.0, MOUNT[2])) == (x, y)
+    start = (0.3, 0.1, 0.0)
+    for still in ({"turn_rad": 0.0}, {"distance_m": 0.0}, {"turn_rad": None, "distance_m": None}):
+        assert place_of_longest_tracks([replace(one, **still) for one in seen], start) == start[:2]
+    assert place_of_longest_tracks([], start) == start[:2]
+
+
+def test_what_does_not_settle_says_so(seen: list[SeenFrame], solve: partial[LogCalibration]) -> None:
+    away = calibrate_lines(seen, lambda bearings: moved(solve(bearings), x_m=30.0))
+    assert not away.settled
+    places = iter(np.linspace(0.0, 0.4, 9))
+    assert not calibrate_lines(seen, lambda bearings: moved(solve(bearings), x_m=float(next(places)))).settled
+    with pytest.raises(InvalidInputError, match="no line is seen in 3 of 2 frames"):
+        calibrate_lines(seen[:2], solve)
+    with pytest.raises(InvalidInputError, match="no line is seen in 3 of 0 frames"):
+        calibrate_lines([], solve)
+
+
+def moved(whole: LogCalibration, **place: float) -> LogCalibration:
+    """A mounting that is elsewhere."""
+    values = whole.to_dict()
+    return LogCalibration.from_dict(values | {"mounting": values["mounting"] | place})
