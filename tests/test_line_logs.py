@@ -12,6 +12,7 @@ import polars as pl
 import pytest
 
 from recordings import motions_of
+from tiltvp import Camera, Robot
 from tiltvp.cli import main
 from tiltvp.errors import ImageFileError, InvalidInputError, UnknownLeanError
 from tiltvp.lab.datasets.driving import write_drive
@@ -129,3 +130,20 @@ def test_calibrate_from_images(folder: Path, tmp_path: Path, capsys: pytest.Capt
     ):
         assert main(wrong) == 2
         assert told in capsys.readouterr().err
+
+
+def test_lines_are_followed_from_where_a_robots_file_has_the_camera(folder: Path, tmp_path: Path) -> None:
+    Robot(Camera.load(folder / "camera.toml"), np.eye(3), place_m=(0.1, 0.0)).save(tmp_path / "robot.toml")
+    tables = []
+    for number, words in enumerate(
+        (
+            ["--camera", str(tmp_path / "robot.toml")],
+            ["--camera", str(folder / "camera.toml"), "--camera-at", "0.1", "0"],
+            ["--camera", str(tmp_path / "robot.toml"), "--camera-at", "0.5", "0.5"],
+        )
+    ):
+        out = tmp_path / f"{number}.csv"
+        odometry = ["--odometry", str(folder / "odometry.csv"), "--wheel-base", "0.35"]
+        assert main(["track", str(folder / "images"), *words, *odometry, "--out", str(out)]) == 0
+        tables.append(out.read_text())
+    assert tables[0] == tables[1] != tables[2]

@@ -93,8 +93,9 @@ def track(
     watching.check()
     lens, options = camera.load(), camera.complete(options)
     extractor, tilt = options.extractor(lens), options.tilts(lens)
-    tracker = LineTracker(**tracking.given())
     robot, words = camera.robot(), [] if source is None else [source]
+    place = {} if robot is None or robot.place_m is None else {"camera_m": robot.place_m}
+    tracker = LineTracker(**place | tracking.given())
     frames = frames_of.of_robot(robot, words).open(words)
     motions = needed_turns(motion.motions_of(robot, frames, wheel_base))
     drive = Drive(extractor, tilt, motions)
