@@ -73,6 +73,10 @@ deny *arguments:
     test -x target/tools/bin/cargo-deny || cargo install --quiet --locked --root target/tools cargo-deny
     target/tools/bin/cargo-deny check {{arguments}}
 
+# What `cargo publish` would send to crates.io, each crate built from its package alone; nothing is sent. (It asks crates.io's index.)
+crates *arguments:
+    cargo publish --dry-run --locked --package tiltvp-kernels --package tiltvp-core {{arguments}}
+
 # The core for 64-bit ARM, by the compiler alone. (Not among the tests: it needs the target's standard library, `rustup target add
 # aarch64-unknown-linux-gnu`.)
 check-aarch64:
