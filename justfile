@@ -327,6 +327,10 @@ smoke:
     {{bin}}/pip --quiet --python out/install/bin/python install "$wheel"
     env --unset=PYTHONPATH out/install/bin/python -W error tests/smoke.py
 
+# The steps of the Dockerfile as a script: its context, its build, its installation, its smoke test. No engine of containers is needed.
+docker-steps:
+    python3 tests/docker_steps.py
+
 # The size of `pip install tiltvp` without extras, in an environment of its own, and the time of `import tiltvp`.
 measure-install: smoke
     python3 benches/install.py out/install
