@@ -73,6 +73,10 @@ deny *arguments:
     test -x target/tools/bin/cargo-deny || cargo install --quiet --locked --root target/tools cargo-deny
     target/tools/bin/cargo-deny check {{arguments}}
 
+# What `cargo publish` would send to crates.io, each crate built from its package alone; nothing is sent. (It asks crates.io's index.)
+crates *arguments:
+    cargo publish --dry-run --locked --package tiltvp-kernels --package tiltvp-core {{arguments}}
+
 # The core for 64-bit ARM, by the compiler alone. (Not among the tests: it needs the target's standard library, `rustup target add
 # aarch64-unknown-linux-gnu`.)
 check-aarch64:
@@ -322,6 +326,10 @@ smoke:
     python3 -m venv --clear --without-pip out/install
     {{bin}}/pip --quiet --python out/install/bin/python install "$wheel"
     env --unset=PYTHONPATH out/install/bin/python -W error tests/smoke.py
+
+# The steps of the Dockerfile as a script: its context, its build, its installation, its smoke test. No engine of containers is needed.
+docker-steps:
+    python3 tests/docker_steps.py
 
 # The size of `pip install tiltvp` without extras, in an environment of its own, and the time of `import tiltvp`.
 measure-install: smoke

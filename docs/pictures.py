@@ -16,7 +16,9 @@ import tiltvp.cli
 from tiltvp.corner import CornerPoseEstimator
 from tiltvp.lab.datasets.driving import drive_room
 from tiltvp.lab.datasets.recording import WHEEL_RADIUS_M, RecordedDrive
+from tiltvp.lines import LineExtractor
 from tiltvp.overlays.corners import draw_box, draw_corners
+from tiltvp.overlays.lines import draw_lines
 from tiltvp.overlays.offsets import error_chart
 from tiltvp.overlays.tilt import draw_words, tilt_overlay
 from tiltvp.streams import Wheels, frame_motions, open_frames
@@ -42,6 +44,8 @@ def main(names: Sequence[str]) -> None:
         "colmap": lambda: gravity(room, pose),
         "datasets": lambda: known_leans(room, pose),
         "recordings": recording,
+        "lines": found_lines,
+        "many": many_images,
     }
     for name in names or makers:
         makers[name]()
@@ -105,6 +109,38 @@ def gravity(room: Room, pose: np.ndarray) -> None:
         "level": tiltvp.level(image, estimator, estimate),
     }
     write("colmap.jpg", [draw_words(picture, name) for name, picture in pictures.items()])
+
+
+def found_lines() -> None:
+    """What `tilt.c` prints of an image, drawn over it: the tilt, then the lines that are vertical by it."""
+    room = drive_room("corridor", 0)
+    pose = room.free_poses(1, 5)[0]
+    image = room.render(FISHEYE, pose=pose, alpha_rad=ALPHA_RAD, beta_rad=BETA_RAD, samples=2).bgr
+    estimator = tiltvp.TiltEstimator(FISHEYE, method="segments")
+    estimate, edges = estimator.with_edges(image)
+    assert estimate
+    lines = LineExtractor(FISHEYE)(image, estimate)
+    pictures = {
+        "a leaning image": image,
+        "its tilt": tilt_overlay(image, estimator, estimate, edges),
+        "its vertical lines": draw_lines(image, FISHEYE, lines),
+    }
+    write("c.jpg", [draw_words(picture, name) for name, picture in pictures.items()])
+
+
+def many_images() -> None:
+    """Views of several places, each with a lean of its own, above; and the same made level, below."""
+    camera = FISHEYE.scaled(1.0 / 3.0)
+    estimator, leveller = tiltvp.TiltEstimator(camera, method="segments"), tiltvp.Leveller(camera)
+    rng = np.random.default_rng(0)
+    columns = []
+    for kind in ("office", "living-room", "corridor"):
+        room = Room(kind, 2)
+        for pose in room.free_poses(4, 2):
+            lean = {"alpha_rad": math.radians(rng.uniform(5.0, 15.0)), "beta_rad": rng.uniform(-math.pi, math.pi)}
+            image = room.render(camera, pose=pose, samples=3, **lean).bgr
+            columns.append(np.vstack([image, leveller(image, estimator(image))]))
+    write("many.jpg", columns)
 
 
 def known_leans(room: Room, pose: np.ndarray) -> None:

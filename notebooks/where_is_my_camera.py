@@ -97,8 +97,8 @@ assert abs(wrong.suspect_value / WHEEL_BASE_M - 1.0) < 0.03
 # ## From pictures
 #
 # The same from what a camera sees: lean and vertical lines of each image of a rendered drive, and which line is which,
-# found together with the mounting. Edges that are points err by 0.02 degrees (docs/calibration.md); tracks of fewer than
-# six images are left out.
+# found together with the mounting. Edges that are points err by 0.02 degrees (docs/calibration.md); tracks of
+# fewer than six images are left out.
 
 # %%
 camera = tiltvp.Camera.equidistant(width=480, height=480, focal_px=140.0, cx=239.5, cy=239.5, max_theta_rad=1.6)

@@ -21,6 +21,8 @@ RESTS_ON: dict[str, tuple[str, ...]] = {
     "measure-inertial": ("cameras", "tilt"),
     "measure-database": ("cameras", "tilt"),
     "measure-striding": ("cameras", "tilt"),
+    "measure-level": ("cameras", "tilt", "segments"),
+    "measure-colmap": ("cameras", "segments"),
     "measure-planar-pose": ("cameras", "tilt"),
     "measure-lines": ("cameras", "lines"),
     "measure-calibration": ("calibration",),

@@ -48,14 +48,14 @@ def table(owner: str, methods: Sequence[str]) -> list[str]:
     of_method = {method: _core.option_fields(owner, method) for method in methods or [None]}
     names = dict.fromkeys(field["name"] for fields in of_method.values() for field in fields)
     heads = [f"`{method}`" for method in methods] or ["default"]
-    rows = [f"| option | {' | '.join(heads)} | meaning | expected |", "|---" * (len(heads) + 3) + "|"]
+    rows = [f"| option | meaning | {' | '.join(heads)} | expected |", "|---" * (len(heads) + 3) + "|"]
     for name in names:
         found = [next((field for field in fields if field["name"] == name), None) for fields in of_method.values()]
         told = next(field for field in found if field)
         docs = {field["doc"]: method for field, method in zip(found, of_method, strict=True) if field}
         doc = told["doc"] if len(docs) == 1 else " ".join(f"`{method}`: {doc}" for doc, method in docs.items())
         defaults = ["–" if field is None else shown(field["default"]) for field in found]  # noqa: RUF001
-        rows.append(f"| `{name}` | {' | '.join(defaults)} | {' '.join(doc.split())} | {told['expected']} |")
+        rows.append(f"| `{name}` | {' '.join(doc.split())} | {' | '.join(defaults)} | {told['expected']} |")
     return rows
 
 

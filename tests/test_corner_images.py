@@ -162,7 +162,7 @@ def test_estimates_are_kept() -> None:
         type(seen.pose).from_dict(seen.pose.to_dict() | {"camera_from_object": [1.0]})
 
 
-@pytest.mark.parametrize(("method", "faces"), [("coloured", COLOURS), ("general", GREYS)])
+@pytest.mark.parametrize(("method", "faces"), [("coloured", COLOURS), ("general", GREYS), ("paper", COLOURS)])
 def test_estimators_go_on_where_they_were(method: str, faces: dict[str, tuple[int, int, int]]) -> None:
     images = pair(faces)
     estimator = CornerPoseEstimator(CAMERA, CAMERA, LEFT_FROM_RIGHT, method=method, down=(0.0, 1.0, 0.0))

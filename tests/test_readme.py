@@ -88,3 +88,20 @@ def test_as_many_formats_and_the_methods_of_the_library() -> None:
 def test_links_lead_to_files(page: Path) -> None:
     links = re.findall(r"\]\((?!https?:)([^)#]+)(?:#[^)]*)?\)", page.read_text(encoding="utf-8"))
     assert [link for link in links if not (page.parent / link).exists()] == []
+
+
+def guides() -> list[Path]:
+    """The pages that the site lists as guides."""
+    index = (ROOT / "docs" / "index.md").read_text(encoding="utf-8")
+    return [ROOT / "docs" / f"{name}.md" for name in index.split(":caption: Guides\n")[1].split("```")[0].split()]
+
+
+@pytest.mark.parametrize("page", guides(), ids=lambda page: page.stem)
+def test_guides_open_with_a_picture_and_an_example(page: Path) -> None:
+    title, picture, *_ = page.read_text(encoding="utf-8").split("\n\n")
+    assert title.startswith("# ")
+    assert re.match(r"!\[[^]]{10,}\]\(images/", picture), picture
+    opening = page.read_text(encoding="utf-8").split("\n## ")[0]
+    example = re.search(r"^```(?:python|console|c)\n(.*?)^```$", opening, re.MULTILINE | re.DOTALL)
+    assert example is not None
+    assert 2 <= len(example[1].splitlines()) <= 10

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -11,7 +12,9 @@ from typing import Any
 ROOT = Path(__file__).parents[2]
 OUT = ROOT / "THIRD-PARTY-LICENSES"
 NAMES = ("LICENSE*", "LICENCE*", "COPYING*", "COPYRIGHT*", "NOTICE*", "UNLICENSE*")
-ABOUT = "The extension of tiltvp contains code of these crates. Written by `just licences`.\n"
+ABOUT = """The extension of tiltvp contains code of these crates. Written by `just licences`.
+Of those that are offered under the MIT licence or another, the MIT licence is taken.
+"""
 
 
 def linked() -> list[dict[str, Any]]:
@@ -35,9 +38,12 @@ def linked() -> list[dict[str, Any]]:
 
 
 def texts(package: dict[str, Any]) -> list[str]:
-    """What a package says in its files of licences and notices."""
+    """What a package says in its files of licences and notices: the MIT licence alone, where that is among a choice."""
     folder = Path(package["manifest_path"]).parent
     files = sorted({path for name in NAMES for path in folder.glob(name) if path.is_file()})
+    if re.search(r"\bMIT\b", package["license"]) and re.search(r" OR |/", package["license"]):
+        chosen = [path for path in files if "APACHE" not in path.name.upper()]
+        files = chosen if any("MIT" in path.name.upper() for path in chosen) else files
     return [path.read_text(encoding="utf-8", errors="replace").strip() for path in files]
 
 

@@ -62,7 +62,7 @@ if TYPE_CHECKING:
     from tiltvp.robot_setup import RobotSetup, find_setup
     from tiltvp.turning import FrameDelay, TurnCheck, check_turns, frame_delay
 
-__version__ = "0.1.0"
+__version__ = "0.2.0"
 
 __all__ = [
     "CALIBRATION_METHODS",

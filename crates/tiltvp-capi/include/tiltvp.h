@@ -158,7 +158,7 @@ extern "C" {
 // failed. It stays till a call of this thread fails again.
 const char *tiltvp_last_error(void);
 
-// The version of the library, such as "0.1.0".
+// The version of the library, such as "0.2.0".
 const char *tiltvp_version(void);
 
 // A calibrator that has seen nothing. `options` is a text in TOML with the options of `SelfCalibrator` in docs/options.md, NULL for

@@ -112,7 +112,7 @@ pub extern "C" fn tiltvp_last_error() -> *const c_char {
     LAST_ERROR.with_borrow(|error| error.as_ptr())
 }
 
-/// The version of the library, such as "0.1.0".
+/// The version of the library, such as "0.2.0".
 #[unsafe(no_mangle)]
 pub extern "C" fn tiltvp_version() -> *const c_char {
     concat!(env!("CARGO_PKG_VERSION"), "\0").as_ptr().cast()

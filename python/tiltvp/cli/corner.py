@@ -11,16 +11,15 @@ from typing import TYPE_CHECKING, Annotated, Any
 from cyclopts import Group, Parameter, validators
 
 from tiltvp._core import CORNER_METHODS
-from tiltvp.cli.corner_methods import AUTO, SCALES, Searches, advice, looked_for, methods_for, shown
+from tiltvp.cli.corner_methods import AUTO, SCALES, Searches, methods_for
+from tiltvp.cli.corner_results import CornerResults, tell
 from tiltvp.cli.declared_options import LibraryOptions, from_library, mask_from
 from tiltvp.cli.options import image_size_from
 from tiltvp.cli.rerun_views import send_corner
 from tiltvp.cli.showing import RerunOptions
 from tiltvp.cli.sources import SourceOptions, ending_at_interrupt, picture_names
-from tiltvp.cli.tables import Table, check_ending, check_plot, write_table
-from tiltvp.cli.terminal import named, progress_bar, say
+from tiltvp.cli.terminal import named, progress_bar
 from tiltvp.errors import InvalidInputError, TiltvpError
-from tiltvp.files import check_output, check_output_folder
 
 if TYPE_CHECKING:
     import numpy as np
@@ -31,8 +30,6 @@ if TYPE_CHECKING:
     from tiltvp.streams import Frames
     from tiltvp.streams.outputs.viewer import Viewer
 
-_ANGLE = Parameter(validator=validators.Number(gt=0, lt=180))
-
 
 @Parameter(name="*", group=Group("Corners", help="An option that is not given has the default of its method."))
 @dataclass(frozen=True, kw_only=True)
@@ -40,17 +37,27 @@ _ANGLE = Parameter(validator=validators.Number(gt=0, lt=180))
 class CornerOptions(LibraryOptions):
     """How corners are found and told apart."""
 
+    gamma: Annotated[float, Parameter(validator=validators.Number(gt=0, lt=180))] = 90.0
+    """Angle between the corner's level edges, degrees."""
+    pitch: Annotated[float | None, Parameter(validator=validators.Number(gte=-90, lte=90))] = None
+    """How far the left camera looks above the horizon, degrees, held without roll: negative looks down. Roughly; it
+    says which of the edges is vertical, for the first image. With roll: --down."""
     mask: Path | None = None
     """For general: image of the cameras' size, white where the world is seen and black where it is not; of a pair, for
     both images."""
 
     def given(self) -> dict[str, Any]:
         """The keywords of the library."""
-        return super().given() | ({} if self.mask is None else {"mask": mask_from(self.mask)})
+        known = {"gamma_rad": math.radians(self.gamma)} | super().given()
+        if self.pitch is not None:
+            if "down" in known:
+                raise InvalidInputError("--pitch and --down: expected one of them")
+            pitch_rad = math.radians(self.pitch)
+            known["down"] = (0.0, math.cos(pitch_rad), -math.sin(pitch_rad))
+        return known | ({} if self.mask is None else {"mask": mask_from(self.mask)})
 
 
-_OPTIONS, _SOURCE, _WATCHING = CornerOptions(), SourceOptions(), RerunOptions()
-_POSE = ("roll_deg", "pitch_deg", "yaw_deg", "x_m", "y_m", "z_m")
+_OPTIONS, _SOURCE, _RESULTS, _WATCHING = CornerOptions(), SourceOptions(), CornerResults(), RerunOptions()
 
 
 def corner(
@@ -63,12 +70,7 @@ def corner(
     topic_right: str | None = None,
     method: str = AUTO,
     options: CornerOptions = _OPTIONS,
-    gamma: Annotated[float, _ANGLE] = 90.0,
-    pitch: Annotated[float | None, Parameter(validator=validators.Number(gte=-90, lte=90))] = None,
-    out: Path | None = None,
-    trajectory: Path | None = None,
-    overlay: Path | None = None,
-    plot: Path | None = None,
+    results: CornerResults = _RESULTS,
     frame_rate: Annotated[float | None, Parameter(validator=validators.Number(gt=0))] = None,
     image_size: str | None = None,
     independent: Annotated[bool, Parameter(negative="")] = False,
@@ -99,19 +101,6 @@ def corner(
         auto: coloured, and where it finds nothing general; the first that has a pose goes on alone. coloured: a cuboid
         with red, green and blue faces; general: corners of rooms, boxes and buildings; paper: the cuboid by the method
         as it was published, to compare.
-    gamma
-        Angle between the corner's level edges, degrees.
-    pitch
-        How far the left camera looks above the horizon, degrees, held without roll: negative looks down. Roughly; it
-        says which of the edges is vertical, for the first image. With roll: --down.
-    out
-        File for the poses, one row for each frame: .csv, .json or .parquet.
-    trajectory
-        File for the trajectory in TUM's format: time, position and quaternion of the camera in the object's frame.
-    overlay
-        Folder for the left images with corners and imaginary boxes.
-    plot
-        Picture of attitude and position over time (.png).
     frame_rate
         Frames per second: by default the times that frames tell, and 25 for images that tell none.
     image_size
@@ -119,24 +108,11 @@ def corner(
     independent
         Look at every frame anew.
     """
-    from tiltvp.corner_tables import POSE_COLUMNS, pose_rows
-
-    if out is not None:
-        check_ending(out)
-    known = _known(options, math.radians(gamma), pitch)
+    known = options.given()
     has_scale = right is not None or not SCALES.isdisjoint(known)
-    if trajectory is not None and not has_scale:
-        expected = "expected two, or --camera-height-m, --edge-length-m or --box-size-m"
-        raise InvalidInputError(f"--trajectory {trajectory} of one camera, which tells no position: {expected}")
+    results.check(has_scale=has_scale)
     if topic_right is not None and right is None:
         raise InvalidInputError(f"--topic-right {topic_right} of one camera: expected two")
-    if pitch is not None and options.given().get("down") is not None:
-        raise InvalidInputError("--pitch and --down: expected one of them")
-    if trajectory is not None:
-        check_output(trajectory)
-    if overlay is not None:
-        check_output_folder(overlay)
-    check_plot("--plot", plot)
     watching.check()
     camera, estimator = _searches(calibration, right is not None, method, known, image_size_from(image_size))
     frames = source.open([] if left is None else [left])
@@ -144,13 +120,12 @@ def corner(
     if others is not None and (others.count != frames.count or frames.count is None):
         raise InvalidInputError(f"{right}: {others.count} frames, expected {frames.count} as in {left}")
     with watching.viewer() as viewer:
-        look = Look(camera, estimator, independent, overlay, viewer)
+        look = Look(camera, estimator, independent, results.overlay, viewer)
         estimates = list(look.each(frames, others, frame_rate))
     if not estimates:
         raise InvalidInputError(f"{frames.source}: {look.bad} frames, none of which can be used")
-    table = Table(POSE_COLUMNS, pose_rows(estimates))
-    _write(table, out, trajectory, plot)
-    _conclude(str(frames.source), estimator, look.bad, has_scale=has_scale, advice_for=(right is not None, known))
+    results.write(estimates)
+    tell(str(frames.source), estimator, look.bad, has_scale=has_scale, advice_for=(right is not None, known))
     return 1 if look.bad or frames.problems else 0
 
 
@@ -205,49 +180,6 @@ class Look:
             write_image(self.overlay / f"{name}.png", picture)
         if self.viewer is not None:
             send_corner(self.viewer, number, time_s, picture, estimate)
-
-
-def _write(table: Table, out: Path | None, trajectory: Path | None, plot: Path | None) -> None:
-    if out is not None:
-        write_table(table, out)
-    if trajectory is not None:
-        from tiltvp.corner_tables import write_trajectory
-
-        write_trajectory(table.rows, trajectory)
-    if plot is not None:
-        from tiltvp.images import write_image
-        from tiltvp.lab.plots.corner_poses import pose_plot
-        from tiltvp.lab.plots.picture import figure_picture
-
-        write_image(plot, figure_picture(pose_plot(table.frame())))
-
-
-def _conclude(
-    source: str, estimator: Searches, bad: int, *, has_scale: bool, advice_for: tuple[bool, dict[str, Any]]
-) -> None:
-    """How many frames have a pose, by which method, why the others have none, and what to try if all are such."""
-    found, without = estimator.found.total(), estimator.without.total()
-    skipped = f", {bad} skipped" if bad else ""
-    by = f" ({looked_for(estimator.found)})" if found else ""
-    say(f"{source}: {found + without} frames{skipped}, {found} with a pose{by}")
-    if without:
-        say(f"without a pose: {shown(estimator.without)}")
-    if has_scale and estimator.placeless:
-        say(f"without a place: {shown(estimator.placeless)}")
-    if without and not found:
-        [(reason, _)] = estimator.without.most_common(1)
-        is_pair, known = advice_for
-        say(f"looked for {looked_for(estimator.methods)}")
-        say(f"try: {advice(reason, estimator.methods, is_pair=is_pair, given=known)}")
-
-
-def _known(options: CornerOptions, gamma_rad: float, pitch_deg: float | None) -> dict[str, Any]:
-    """The keywords of the estimator."""
-    known: dict[str, Any] = {"gamma_rad": gamma_rad} | options.given()
-    if pitch_deg is not None:
-        pitch_rad = math.radians(pitch_deg)
-        known["down"] = (0.0, math.cos(pitch_rad), -math.sin(pitch_rad))
-    return known
 
 
 def _searches(

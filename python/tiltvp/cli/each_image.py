@@ -3,21 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
 from cyclopts import Parameter
 
 from tiltvp.cli.sources import SourceOptions, ending_at_interrupt, picture_names
+from tiltvp.cli.tables import check_ending
 from tiltvp.cli.terminal import named, progress_bar
 from tiltvp.errors import OutputError, TiltvpError
+from tiltvp.files import check_output_folder
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     Image = NDArray[Any]
 
-__all__ = ["Images", "find_in_each"]
+__all__ = ["FoundOptions", "Images", "find_in_each"]
 
 _IMAGES = (
     "Image files, folders of images and glob patterns; or one video or recording of ROS; or -, for names of files "
@@ -27,8 +30,25 @@ Images = Annotated[list[str] | None, Parameter(help=_IMAGES)]
 Found = TypeVar("Found")
 
 
+@Parameter(name="*")
+@dataclass(frozen=True, kw_only=True)
+class FoundOptions:
+    """Where what is found goes."""
+
+    out: Path | None = None
+    """File for what is found, angles in radians, one row for each: .csv, .json or .parquet."""
+    overlay: Path | None = None
+    """Folder for the images with what is found in colour."""
+
+    def check(self) -> None:
+        """Refuses what cannot be written, before any work is done."""
+        check_ending(self.out)
+        if self.overlay is not None:
+            check_output_folder(self.overlay)
+
+
 def find_in_each(
-    images: list[str],
+    images: list[str] | None,
     source: SourceOptions,
     look: Callable[[Image], Found],
     overlay: Path | None,
@@ -37,7 +57,7 @@ def find_in_each(
     """What `look` finds in each gray frame, with its name, drawn into the folder `overlay`; whether all went well."""
     from tiltvp.images import gray_from, write_image
 
-    frames = source.open(images)
+    frames = source.open(images or [])
     found: list[tuple[str, Found]] = []
     well = not frames.problems
     with ending_at_interrupt(frames) as coming, progress_bar(frames.count or 0, "images") as bar:

@@ -2,22 +2,20 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
-from tiltvp.cli.each_image import Images, find_in_each
+from tiltvp.cli.each_image import FoundOptions, Images, find_in_each
 from tiltvp.cli.line_options import LineOptions
 from tiltvp.cli.options import CameraOptions
 from tiltvp.cli.results import degrees
 from tiltvp.cli.sources import SourceOptions
-from tiltvp.cli.tables import Table, check_ending, write_table
+from tiltvp.cli.tables import Table, write_table
 from tiltvp.cli.terminal import new_table, show
-from tiltvp.files import check_output_folder
 
 if TYPE_CHECKING:
     from tiltvp.lines import Lines
 
-_DEFAULTS, _SOURCE = LineOptions(), SourceOptions()
+_DEFAULTS, _RESULTS, _SOURCE = LineOptions(), FoundOptions(), SourceOptions()
 
 
 def lines(
@@ -26,33 +24,23 @@ def lines(
     *,
     camera: CameraOptions,
     options: LineOptions = _DEFAULTS,
-    out: Path | None = None,
-    overlay: Path | None = None,
+    results: FoundOptions = _RESULTS,
     source: SourceOptions = _SOURCE,
 ) -> int:
     """Find the vertical lines of each image.
 
     Frames that cannot be read are named on stderr, the others are done, and the exit code is 1.
-
-    Parameters
-    ----------
-    out
-        File for the lines in radians, one row for each: .csv, .json or .parquet.
-    overlay
-        Folder for the images with their lines in colour.
     """
     from tiltvp.overlays.lines import draw_lines
 
-    check_ending(out)
-    if overlay is not None:
-        check_output_folder(overlay)
+    results.check()
     lens, options = camera.load(), camera.complete(options)
     extractor, tilt = options.extractor(lens), options.tilts(lens)
     found, well = find_in_each(
-        images or [],
+        images,
         source,
         lambda gray: extractor(gray, tilt(gray)),
-        overlay,
+        results.overlay,
         lambda gray, seen: draw_lines(gray, lens, seen, extractor.robot_from_camera),
     )
     table = line_table(found)
@@ -64,8 +52,8 @@ def lines(
         bearing, sigma = degrees(row["bearing_rad"]), degrees(row["sigma_rad"], 3)
         printed.add_row(row["file"], str(row["line"]), bearing, sigma, low, high, str(row["support_px"]))
     show(printed)
-    if out is not None:
-        write_table(table, out)
+    if results.out is not None:
+        write_table(table, results.out)
     return 0 if well else 1
 
 

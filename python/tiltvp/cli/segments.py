@@ -3,19 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from cyclopts import Group, Parameter
 
 from tiltvp.cli.declared_options import LibraryOptions, from_library
-from tiltvp.cli.each_image import Images, find_in_each
+from tiltvp.cli.each_image import FoundOptions, Images, find_in_each
 from tiltvp.cli.options import CameraOptions
 from tiltvp.cli.results import degrees
 from tiltvp.cli.sources import SourceOptions
-from tiltvp.cli.tables import Table, check_ending, write_table
+from tiltvp.cli.tables import Table, write_table
 from tiltvp.cli.terminal import new_table, show
-from tiltvp.files import check_output_folder
 
 if TYPE_CHECKING:
     from tiltvp.segments import Segments
@@ -30,7 +28,7 @@ class SegmentOptions(LibraryOptions):
     """What a straight edge is."""
 
 
-_DEFAULTS, _SOURCE = SegmentOptions(), SourceOptions()
+_DEFAULTS, _RESULTS, _SOURCE = SegmentOptions(), FoundOptions(), SourceOptions()
 
 
 def segments(
@@ -39,38 +37,28 @@ def segments(
     *,
     camera: CameraOptions,
     options: SegmentOptions = _DEFAULTS,
-    out: Path | None = None,
-    overlay: Path | None = None,
+    results: FoundOptions = _RESULTS,
     source: SourceOptions = _SOURCE,
 ) -> int:
-    """Find the straight edges of each image, as arcs of great circles.
+    """Find the straight edges of each image, as arcs of great circles in the camera frame.
 
     Frames that cannot be read are named on stderr, the others are done, and the exit code is 1.
-
-    Parameters
-    ----------
-    out
-        File for the edges in the camera frame, radians, one row for each: .csv, .json or .parquet.
-    overlay
-        Folder for the images with their edges in colour.
     """
     from tiltvp.overlays.segments import draw_segments
     from tiltvp.segments import SegmentDetector
 
-    check_ending(out)
-    if overlay is not None:
-        check_output_folder(overlay)
+    results.check()
     lens = camera.load()
     detector = SegmentDetector(lens, **camera.complete(options).given())
     found, well = find_in_each(
-        images or [], source, detector, overlay, lambda gray, seen: draw_segments(gray, lens, seen)
+        images, source, detector, results.overlay, lambda gray, seen: draw_segments(gray, lens, seen)
     )
     printed = new_table(None, ("file", "edges", "pixels", "longest deg", "median deg", "median rms px"), ["file"])
     for image, seen in found:
         printed.add_row(image, *_summary(seen))
     show(printed)
-    if out is not None:
-        write_table(segment_table(found), out)
+    if results.out is not None:
+        write_table(segment_table(found), results.out)
     return 0 if well else 1
 
 

@@ -26,10 +26,12 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from tiltvp import TiltEstimate
+    from tiltvp import Camera, TiltEstimate
     from tiltvp.line_logs import SeenFrame
-    from tiltvp.lines import LineExtractor, TrackedLines
-    from tiltvp.streams import Frame, FrameMotions
+    from tiltvp.lines import LineExtractor, LineTracker, TrackedLines
+    from tiltvp.streams import Frame, FrameMotions, Frames
+    from tiltvp.streams.outputs.viewer import Viewer
+    from tiltvp.videos import VideoWriter
 
     Seen = tuple[int, str, float | None, TrackedLines]
     """Number, name and time of a frame, and its lines."""
@@ -81,9 +83,7 @@ def track(
     frame_rate
         Frames per second of that video: those of the source by default, 25 for images.
     """
-    from tiltvp.images import write_image
     from tiltvp.lines import LineTracker
-    from tiltvp.overlays.lines import draw_lines
     from tiltvp.videos import video_writer
 
     check_ending(out)
@@ -99,24 +99,9 @@ def track(
     frames = frames_of.of_robot(robot, words).open(words)
     motions = needed_turns(motion.motions_of(robot, frames, wheel_base))
     drive = Drive(extractor, tilt, motions)
-    tracked: list[Seen] = []
     showing = nullcontext() if video is None else video_writer(video, frame_rate or frames.rate_hz)
-    with (
-        showing as film,
-        watching.viewer() as viewer,
-        ending_at_interrupt(frames) as coming,
-        progress_bar(frames.count or 0, "frames") as bar,
-    ):
-        for frame, found in drive.seen(coming, bar):
-            seen = found.followed(tracker)
-            tracked.append((seen.number, frame.name, frame.time_s, seen.tracked))
-            if film is not None or viewer is not None:
-                rotation, tracks = extractor.robot_from_camera, seen.tracked.track.tolist()
-                picture = draw_lines(seen.gray, lens, seen.tracked.lines, rotation, tracks=tracks)
-            if film is not None:
-                film.add(picture)
-            if viewer is not None:
-                send_lines(viewer, seen.number, frame.time_s, picture, seen.tracked)
+    with showing as film, watching.viewer() as viewer:
+        tracked = _follow(drive, tracker, frames, lens, film, viewer)
     if not tracked:
         count = drive.bad + drive.leaning
         which = "none of which can be read" if not drive.leaning else f"{drive.told()}, and no other can be read"
@@ -124,6 +109,7 @@ def track(
     table = track_table(tracked)
     write_table(table, out)
     if plot is not None:
+        from tiltvp.images import write_image
         from tiltvp.lab.plots.picture import figure_picture
         from tiltvp.lab.plots.tracks import track_plot
 
@@ -131,6 +117,28 @@ def track(
     skipped = "".join([f", {drive.bad} skipped" if drive.bad else "", f", {drive.told()}" if drive.leaning else ""])
     say(f"{out}: {len(tracked)} frames{skipped}, {len(table.rows)} lines, {tracker.track_count} tracks")
     return 1 if drive.bad or frames.problems else 0
+
+
+def _follow(
+    drive: Drive, tracker: LineTracker, frames: Frames, lens: Camera, film: VideoWriter | None, viewer: Viewer | None
+) -> list[Seen]:
+    """The lines of all frames that can be used; the film gets a picture of each, and so does the viewer."""
+    from tiltvp.overlays.lines import draw_lines
+
+    found: list[Seen] = []
+    with ending_at_interrupt(frames) as coming, progress_bar(frames.count or 0, "frames") as bar:
+        for frame, one in drive.seen(coming, bar):
+            seen = one.followed(tracker)
+            found.append((seen.number, frame.name, frame.time_s, seen.tracked))
+            if film is None and viewer is None:
+                continue
+            tracks = seen.tracked.track.tolist()
+            picture = draw_lines(seen.gray, lens, seen.tracked.lines, drive.robot_from_camera, tracks=tracks)
+            if film is not None:
+                film.add(picture)
+            if viewer is not None:
+                send_lines(viewer, seen.number, frame.time_s, picture, seen.tracked)
+    return found
 
 
 def needed_turns(motions: FrameMotions | None) -> FrameMotions | None:
@@ -155,6 +163,11 @@ class Drive:
         """How many frames could not be used so far."""
         self.leaning = 0
         """How many were left out so far because their lean is not known."""
+
+    @property
+    def robot_from_camera(self) -> NDArray[np.float64]:
+        """(3, 3): how the camera is mounted where lines are looked for."""
+        return self._parts[0].robot_from_camera
 
     def told(self) -> str:
         """How many frames were left out because of their lean."""

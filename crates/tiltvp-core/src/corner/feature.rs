@@ -89,6 +89,20 @@ const PLANES_APART: f64 = 1e-9;
 /// is.
 const VERTEX_STEPS: usize = 3;
 
+/// Rays with normals along `vertex x toward`; none where a `toward` is at the vertex.
+fn turned_about(vertex: &Vector3<f64>, mut rays: [FittedRay; 3]) -> Option<[FittedRay; 3]> {
+    for ray in &mut rays {
+        let side = vertex.cross(&ray.toward).dot(&ray.normal);
+        if side.abs() < PLANES_APART {
+            return None;
+        }
+        if side < 0.0 {
+            *ray = ray.reversed();
+        }
+    }
+    Some(rays)
+}
+
 impl CornerFeature {
     /// The feature of three rays, in the order x, y (the vertical one), z; the vertex minimises the sum of its squared
     /// distances to the three great circles, each by its variance there (eqs. 25 to 27 in bearings, weighted).
@@ -99,7 +113,6 @@ impl CornerFeature {
         if !rays.iter().all(FittedRay::is_valid) {
             return None;
         }
-        let spread = rays.map(|ray| ray.covariance_3d());
         let side: Vector3<f64> = rays.iter().map(|ray| ray.toward).sum();
         let mut vertex = [(0, 1), (1, 2), (2, 0)]
             .map(|(i, j): (usize, usize)| rays[i].normal.cross(&rays[j].normal))
@@ -109,6 +122,9 @@ impl CornerFeature {
         if vertex.dot(&side) < 0.0 {
             vertex = -vertex;
         }
+        // Before the fit: the rays of a feature then make the same feature again, to the last bit.
+        let rays = turned_about(&vertex, rays)?;
+        let spread = rays.map(|ray| ray.covariance_3d());
         let mut covariance = Matrix2::zeros();
         for _ in 0..VERTEX_STEPS {
             let basis = tangent_basis(&vertex);
@@ -122,16 +138,7 @@ impl CornerFeature {
             covariance = information.try_inverse()?;
             vertex = (vertex - basis * (covariance * pull)).try_normalize(0.5)?;
         }
-        let mut rays = rays;
-        for ray in &mut rays {
-            let side = vertex.cross(&ray.toward).dot(&ray.normal);
-            if side.abs() < PLANES_APART {
-                return None;
-            }
-            if side < 0.0 {
-                *ray = ray.reversed();
-            }
-        }
+        let rays = turned_about(&vertex, rays)?;
         let off = rays.map(|ray| ray.normal.dot(&vertex));
         let basis = tangent_basis(&vertex);
         let pencil = Pencil::new(vertex, &rays, &spread, basis * covariance * basis.transpose())?;
@@ -288,7 +295,9 @@ mod tests {
             assert_abs_diff_eq!(a.covariance, b.covariance, epsilon = 1e-16);
             assert!(feature.vertex().cross(&a.toward).dot(&a.normal) > 0.0);
         }
-        assert_eq!(CornerFeature::from_rays(*feature.rays()).unwrap(), feature);
+        for made in [feature, turned] {
+            assert_eq!(CornerFeature::from_rays(*made.rays()).unwrap(), made);
+        }
         for plane in feature.pencil.normal {
             assert_abs_diff_eq!(plane.dot(&feature.vertex()), 0.0, epsilon = 1e-15);
         }

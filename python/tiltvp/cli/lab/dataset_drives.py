@@ -4,12 +4,18 @@ from __future__ import annotations
 
 import math
 
-from tiltvp.cli.lab.dataset_options import DriveLensOptions, MakingOptions, Words, legs_from, made_by
+from tiltvp.cli.lab.dataset_options import (
+    DriveLensOptions,
+    MakingOptions,
+    RenderingOptions,
+    WayOptions,
+    legs_from,
+    made_by,
+)
 from tiltvp.cli.terminal import progress_bar, say
 from tiltvp.errors import InvalidInputError
 
-Mount = tuple[float, float, float, float]
-_LENS = DriveLensOptions()
+_LENS, _WAY, _RENDERING = DriveLensOptions(), WayOptions(), RenderingOptions()
 
 
 def drive(
@@ -18,16 +24,12 @@ def drive(
     *,
     kind: str = "corridor",
     frames: int | None = None,
-    legs: Words = None,
-    mount: Mount | None = None,
-    bumps_deg: float = 0.0,
+    way: WayOptions = _WAY,
     lighting: float | None = None,
     floor_gloss: float | None = None,
     wall_pattern: str | None = None,
     extent: float | None = None,
-    noise_sigma: float | None = None,
-    samples: int | None = None,
-    encoder_k_m: float | None = None,
+    rendering: RenderingOptions = _RENDERING,
 ) -> None:
     """Make a dataset of a robot's drive through a room: frames, odometry, and the identity of every upright edge.
 
@@ -37,13 +39,6 @@ def drive(
         Where to drive: corridor, hall, office, living-room, l-shaped, narrow or under-table.
     frames
         How many frames of wandering; default 1500.
-    legs
-        Instead of wandering, the legs of a way, METRES,DEGREES each (2.3,0 0,180); or paper, alternating or straight.
-    mount
-        Where the camera is on the robot: metres to the front and to the left, degrees turned to the left, metres up;
-        default 0 0 0 0.4.
-    bumps_deg
-        Greatest lean from bumps.
     lighting
         How much the light changes along the way, from 0 to 1; default 0.5.
     floor_gloss
@@ -52,12 +47,6 @@ def drive(
         What all walls have in common: drawn (nothing, the default), stripes, panels or tiles.
     extent
         How many times larger than usual the floor is, from 1 to 4; default is 2 for corridor and hall, 1 otherwise.
-    noise_sigma
-        Gaussian noise in grey levels; default 2.
-    samples
-        Rays per pixel and side where surfaces meet; default 3.
-    encoder_k_m
-        Variance of an encoder's reading per metre; default 1e-5.
     """
     from tiltvp.lab.datasets.driving import drive_room, write_drive
     from tiltvp.synth import Drive
@@ -70,16 +59,16 @@ def drive(
         room,
         camera=lens.load(),
         robot_from_camera=lens.rotation(),
-        mount=None if mount is None else (mount[0], mount[1], math.radians(mount[2]), mount[3]),
+        mount=way.mount_rad,
         blind_rad=lens.blind_rad,
         frames=frames,
-        legs=None if legs is None else legs_from(legs),
+        legs=None if way.legs is None else legs_from(way.legs),
         seed=making.seed,
-        encoder_k_m=encoder_k_m,
-        bumps_max_rad=math.radians(bumps_deg),
+        encoder_k_m=way.encoder_k_m,
+        bumps_max_rad=math.radians(way.bumps_deg),
         lighting=lighting,
-        samples=samples,
-        noise_sigma=noise_sigma,
+        samples=rendering.samples,
+        noise_sigma=rendering.noise_sigma,
         threads=count,
     )
     with progress_bar(len(made), "frames") as bar:
@@ -100,8 +89,7 @@ def stereo(
     clutter: float | None = None,
     exposure_ms: float = 0.0,
     blur_sigma: float | None = None,
-    noise_sigma: float | None = None,
-    samples: int | None = None,
+    rendering: RenderingOptions = _RENDERING,
 ) -> None:
     """Make a sequence of a hand-held stereo pair that looks at a corner: images, calibration, poses, inertial data.
 
@@ -126,10 +114,6 @@ def stereo(
         How long the shutter is open, for motion blur.
     blur_sigma
         What lens and sensor do to a point, in pixels; default 0.6.
-    noise_sigma
-        Gaussian noise in grey levels; default 2.
-    samples
-        Rays per pixel and side where surfaces meet; default 3.
     """
     from tiltvp.lab.datasets.stereo import write_stereo
     from tiltvp.synth import Laboratory, Room, StereoSequence, zed_cameras
@@ -151,8 +135,8 @@ def stereo(
         seed=making.seed,
         corner=corner,
         distance_m=distance,
-        samples=samples,
-        noise_sigma=noise_sigma,
+        samples=rendering.samples,
+        noise_sigma=rendering.noise_sigma,
         blur_sigma_px=blur_sigma,
         exposure_s=exposure_ms / 1000.0,
         threads=count,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import math
 import os
 from dataclasses import dataclass
 from pathlib import Path
@@ -112,6 +113,44 @@ class DriveLensOptions(LensOptions):
         from tiltvp.synth import MIRROR_BLIND_RAD
 
         return MIRROR_BLIND_RAD if str(self.camera) == "mirror" else None
+
+
+Mount = tuple[float, float, float, float]
+
+
+@Parameter(name="*")
+@dataclass(frozen=True, kw_only=True)
+class WayOptions:
+    """Where a robot drives, with its camera where."""
+
+    legs: Words = None
+    """Instead of wandering, the legs of a way, METRES,DEGREES each (2.3,0 0,180); or paper, alternating or straight."""
+    mount: Mount | None = None
+    """Where the camera is on the robot: metres to the front and to the left, degrees turned to the left, metres up;
+    default 0 0 0 0.4."""
+    bumps_deg: float = 0.0
+    """Greatest lean from bumps."""
+    encoder_k_m: float | None = None
+    """Variance of an encoder's reading per metre; default 1e-5."""
+
+    @property
+    def mount_rad(self) -> Mount | None:
+        """The mount, where it was given, its angle in radians."""
+        if self.mount is None:
+            return None
+        x, y, yaw_deg, height = self.mount
+        return x, y, math.radians(yaw_deg), height
+
+
+@Parameter(name="*")
+@dataclass(frozen=True, kw_only=True)
+class RenderingOptions:
+    """How pictures of rooms are taken."""
+
+    noise_sigma: float | None = None
+    """Gaussian noise in grey levels; default 2."""
+    samples: int | None = None
+    """Rays per pixel and side where surfaces meet; default 3."""
 
 
 def tilts_from(words: list[str] | None) -> list[tuple[float, float]]:

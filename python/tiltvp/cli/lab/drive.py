@@ -4,17 +4,38 @@ from __future__ import annotations
 
 import math
 import os
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
 from cyclopts import App, Parameter, validators
 
-from tiltvp.cli.lab.dataset_options import LensOptions, Words, legs_from
+from tiltvp.cli.lab.dataset_options import LensOptions, Mount, RenderingOptions, WayOptions, Words, legs_from
 from tiltvp.cli.options import Switch
 from tiltvp.cli.terminal import progress_bar, say
 
 app = App(name="lab", help="What the laboratory makes to try the package on.")
-_LENS = LensOptions()
+
+
+@Parameter(name="*")
+@dataclass(frozen=True, kw_only=True)
+class RecordedWayOptions(WayOptions):
+    """Where a robot drives that leans, with its camera nearly where its makers mean it."""
+
+    legs: Words = None
+    """The legs of the way, METRES,DEGREES each; default is a turn in place and most of a triangle."""
+    mount: Mount | None = None
+    """Where the camera is on the robot: metres to the front and to the left, degrees turned to the left, metres up;
+    default 0.1 0.03 0 0.4."""
+    mounting_deg: tuple[float, float] = (0.0, 0.0)
+    """Roll and pitch of the camera's mounting, which nobody knows."""
+    floor_slope_deg: tuple[float, float] = (0.0, 0.0)
+    """By how much the floor falls, and where to: degrees to the left of the robot's first heading."""
+    bumps_deg: float = 2.0
+    """Greatest lean from bumps."""
+
+
+_LENS, _WAY, _RENDERING = LensOptions(), RecordedWayOptions(), RenderingOptions()
 
 
 @app.command
@@ -24,16 +45,10 @@ def drive(
     camera_out: Path | None = None,
     lens: LensOptions = _LENS,
     kind: str = "office",
-    legs: Words = None,
-    mount: tuple[float, float, float, float] | None = None,
-    mounting_deg: tuple[float, float] = (0.0, 0.0),
-    floor_slope_deg: tuple[float, float] = (0.0, 0.0),
-    bumps_deg: float = 2.0,
+    way: RecordedWayOptions = _WAY,
     camera_delay_s: float = 0.0,
     compressed: Switch = False,
-    noise_sigma: float | None = None,
-    samples: int | None = None,
-    encoder_k_m: float | None = None,
+    rendering: RenderingOptions = _RENDERING,
     seed: Annotated[int, Parameter(validator=validators.Number(gte=0))] = 0,
     threads: int | None = None,
 ) -> None:
@@ -52,27 +67,10 @@ def drive(
         File for the calibration (.toml); needed for lenses that no CameraInfo describes.
     kind
         Where to drive: corridor, hall, office, living-room, l-shaped, narrow or under-table.
-    legs
-        The legs of the way, METRES,DEGREES each; default is a turn in place and most of a triangle.
-    mount
-        Where the camera is on the robot: metres to the front and to the left, degrees turned to the left, metres up;
-        default 0.1 0.03 0 0.4.
-    mounting_deg
-        Roll and pitch of the camera's mounting, which nobody knows.
-    floor_slope_deg
-        By how much the floor falls, and where to: degrees to the left of the robot's first heading.
-    bumps_deg
-        Greatest lean from bumps.
     camera_delay_s
         By how much the stamps of frames are late.
     compressed
         Frames as PNG, on /camera/image_raw/compressed.
-    noise_sigma
-        Gaussian noise in grey levels; default 2.
-    samples
-        Rays per pixel and side where surfaces meet; default 3.
-    encoder_k_m
-        Variance of an encoder's reading per metre; default 1e-5.
     seed
         Seed of room, way and noise.
     threads
@@ -80,7 +78,8 @@ def drive(
     """
     from tiltvp.files import check_output
     from tiltvp.lab.datasets.driving import drive_room
-    from tiltvp.lab.datasets.recording import LEGS, MOUNT, Mount, RecordedDrive
+    from tiltvp.lab.datasets.recording import LEGS, MOUNT, RecordedDrive
+    from tiltvp.lab.datasets.recording import Mount as CameraMount
     from tiltvp.streams.outputs.mcap import check_recording
 
     check_recording(out)
@@ -91,17 +90,17 @@ def drive(
     made = RecordedDrive(
         drive_room(kind, seed, threads=count),
         camera,
-        legs=LEGS if legs is None else legs_from(legs),
+        legs=LEGS if way.legs is None else legs_from(way.legs),
         robot_from_camera=lens.rotation(),
-        mount=MOUNT if mount is None else Mount(mount[0], mount[1], math.radians(mount[2]), mount[3]),
-        mounting_rad=(math.radians(mounting_deg[0]), math.radians(mounting_deg[1])),
-        floor_slope_rad=(math.radians(floor_slope_deg[0]), math.radians(floor_slope_deg[1])),
-        bumps_max_rad=math.radians(bumps_deg),
+        mount=MOUNT if way.mount_rad is None else CameraMount(*way.mount_rad),
+        mounting_rad=_radians(way.mounting_deg),
+        floor_slope_rad=_radians(way.floor_slope_deg),
+        bumps_max_rad=math.radians(way.bumps_deg),
         camera_delay_s=camera_delay_s,
         compressed=compressed,
-        noise_sigma=noise_sigma,
-        samples=samples,
-        encoder_k_m=encoder_k_m,
+        noise_sigma=rendering.noise_sigma,
+        samples=rendering.samples,
+        encoder_k_m=way.encoder_k_m,
         seed=seed,
     )
     with progress_bar(len(made), "frames") as bar:
@@ -113,3 +112,8 @@ def drive(
         f"{out}: {made.motion.duration_s:.1f} s with {len(made)} frames; wheels of {wheels['radius_m']:g} m, "
         f"{wheels['base_m']:g} m apart"
     )
+
+
+def _radians(pair_deg: tuple[float, float]) -> tuple[float, float]:
+    first, second = pair_deg
+    return math.radians(first), math.radians(second)

@@ -9,6 +9,9 @@ from tiltvp.cli.lab.tables import show_frame
 from tiltvp.cli.tables import check_ending, write_frame
 from tiltvp.cli.terminal import progress_bar
 
+_PHOTOS = 12
+"""As many are timed, more or less."""
+
 
 def level(
     directory: Path | None = None, /, *, inertial: Path | None = None, every: Every = 1, out: Path | None = None
@@ -27,7 +30,13 @@ def level(
     """
     from tiltvp.lab.datasets.panoramas import read_panorama_index
     from tiltvp.lab.evaluation.imu import read_inertial_index, summarise_inertial
-    from tiltvp.lab.evaluation.levelling import lean_against_sensor, remap_times, summarise_turned, turned_panoramas
+    from tiltvp.lab.evaluation.levelling import (
+        lean_against_sensor,
+        photo_times,
+        remap_times,
+        summarise_turned,
+        turned_panoramas,
+    )
 
     check_ending(out)
     with progress_bar(6, "times") as bar:
@@ -35,6 +44,11 @@ def level(
     show_frame("A level image by a new tilt beside cv2.remap with ready maps, one thread", times, ["image"])
     if directory is not None:
         chosen = read_panorama_index(directory)[::every]
+        photos = chosen[:: max(1, len(chosen) // _PHOTOS)]
+        with progress_bar(len(photos), "photographs") as bar:
+            times = photo_times(photos, advance=bar.advance)
+        title = f"A photograph, 2048 x 1024, ms ({len(photos)})"
+        show_frame(title, times, ["step"])
         with progress_bar(len(chosen), "panoramas") as bar:
             table = turned_panoramas(chosen, advance=bar.advance)
         if out is not None:

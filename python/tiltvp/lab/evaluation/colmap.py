@@ -33,6 +33,9 @@ _WALK_M: Final = 0.5
 """Views are from places within so much of one, a full turn of headings: enough is seen of each by its neighbours."""
 _HEIGHT_M: Final = (1.1, 1.5)
 _FORWARD: Final = rotation_from("forward", "the mounting")
+_SEED: Final = 0
+"""Of whatever COLMAP draws. By default it draws matches anew in every run, and its threads add in any order: sums that
+differ by rounding end in other reconstructions. With the seed and one thread the same views give the same numbers."""
 
 
 def reconstruct_room(
@@ -45,6 +48,7 @@ def reconstruct_room(
     """
     pycolmap = _pycolmap()
     pycolmap.logging.minloglevel = pycolmap.logging.ERROR.value
+    pycolmap.set_random_seed(_SEED)
     camera = Camera.pinhole(width=640, height=480, fx=320.0, fy=320.0, cx=319.5, cy=239.5)
     truth = _render(camera, kind, seed, folder / "images", views, advance)
     database = folder / "database.db"
@@ -56,7 +60,8 @@ def reconstruct_room(
         rows.append({"room": f"{kind} {seed}", "way": way, "views": views} | _errors(model, truth))
         advance()
 
-    add("incremental", pycolmap.incremental_mapping(database, folder / "images", _new(folder / "incremental")))
+    options = pycolmap.IncrementalPipelineOptions(random_seed=_SEED, num_threads=1)
+    add("incremental", pycolmap.incremental_mapping(database, folder / "images", _new(folder / "incremental"), options))
     add("global", _global(pycolmap, database, folder, "global", use_gravity=False))
     found = _write_priors(database, folder, confidence_min)
     add("global, with priors", _global(pycolmap, database, folder, "priors", use_gravity=True))
@@ -101,9 +106,14 @@ def _match(pycolmap: Any, camera: Camera, database: Path, folder: Path) -> None:
     reader = pycolmap.ImageReaderOptions(camera_model=model, camera_params=",".join(numbers))
     pycolmap.extract_features(
         database, folder / "images", camera_mode=pycolmap.CameraMode.SINGLE, reader_options=reader,
+        extraction_options=pycolmap.FeatureExtractionOptions(num_threads=1), device=pycolmap.Device.cpu,
+    )  # fmt: skip
+    verification = pycolmap.TwoViewGeometryOptions()
+    verification.ransac.random_seed = _SEED
+    pycolmap.match_exhaustive(
+        database, matching_options=pycolmap.FeatureMatchingOptions(num_threads=1), verification_options=verification,
         device=pycolmap.Device.cpu,
     )  # fmt: skip
-    pycolmap.match_exhaustive(database, device=pycolmap.Device.cpu)
 
 
 def _write_priors(database: Path, folder: Path, confidence_min: float) -> list[ImageGravity]:
@@ -117,7 +127,7 @@ def _write_priors(database: Path, folder: Path, confidence_min: float) -> list[I
 
 
 def _global(pycolmap: Any, database: Path, folder: Path, name: str, *, use_gravity: bool) -> dict[int, Any]:
-    options = pycolmap.GlobalPipelineOptions(random_seed=0)
+    options = pycolmap.GlobalPipelineOptions(random_seed=_SEED, num_threads=1)
     options.mapper.rotation_averaging.use_gravity = use_gravity
     options.mapper.bundle_adjustment.refine_focal_length = False
     return dict(pycolmap.global_mapping(database, folder / "images", _new(folder / name), options))

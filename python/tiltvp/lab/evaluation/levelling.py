@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from typing import TYPE_CHECKING, Final
 
 import cv2
@@ -16,14 +17,14 @@ from tiltvp.images import gray_from, read_image
 from tiltvp.lab.datasets.panoramas import Panorama, PanoramaViews, paper_camera
 from tiltvp.lab.evaluation.imu import InertialPanorama
 from tiltvp.levelling import Leveller
-from tiltvp.photos import PHOTO_TILT_MAX_RAD
+from tiltvp.photos import PHOTO_TILT_MAX_RAD, encode_like
 from tiltvp.rotations import rotation_from
 from tiltvp.tilt import TiltEstimate, TiltEstimator, normal_from_alpha_beta, tilt_error_rad
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-__all__ = ["lean_against_sensor", "remap_times", "summarise_turned", "turned_panoramas"]
+__all__ = ["lean_against_sensor", "photo_times", "remap_times", "summarise_turned", "turned_panoramas"]
 
 _METHODS: Final = (("segments", 1024), ("segments", 2048), ("refined", 1024))
 """What is compared: a method, and the columns of the panorama that it is given."""
@@ -31,6 +32,8 @@ _LARGEST_DEG: Final = 30.0
 _BELIEVED_MIN: Final = 0.5
 _FORWARD: Final = rotation_from("forward", "the mounting")
 _WIDTH: Final = 2048
+_QUALITY: Final = 90
+"""Of JPEG photographs: what cameras write."""
 _RUNS: Final = 30
 """Of each way, in turns, of which the least time counts: others come from what else the machine does."""
 
@@ -138,7 +141,7 @@ def lean_against_sensor(
 
 
 def remap_times(*, seed: int = 0, advance: Callable[[], None] = lambda: None) -> pl.DataFrame:
-    """Milliseconds of a level image by a new tilt, beside `cv2.remap` with maps that are ready, on one thread.
+    """Milliseconds of the processor for a level image by a new tilt, beside `cv2.remap` with ready maps, on one thread.
 
     Floating maps and those that `cv2.convertMaps` makes of them are both tried; the ratio is to the faster way.
     """
@@ -150,10 +153,8 @@ def remap_times(*, seed: int = 0, advance: Callable[[], None] = lambda: None) ->
         ("OCam, 640 x 480", ocam, None),
         ("panorama, 2048 x 1024", _panorama_camera(_WIDTH), _FORWARD),
     ]
-    threads = cv2.getNumThreads()
-    cv2.setNumThreads(1)
-    try:
-        rows = []
+    rows = []
+    with _one_thread():
         for name, camera, mounting in cases:
             leveller = Leveller(camera, mounting)
             for channels in (1, 3):
@@ -161,9 +162,46 @@ def remap_times(*, seed: int = 0, advance: Callable[[], None] = lambda: None) ->
                 image = rng.integers(0, 256, shape, dtype=np.uint8)
                 rows.append({"image": name, "channels": channels} | _times(leveller, image))
                 advance()
+    return pl.DataFrame(rows)
+
+
+@contextmanager
+def _one_thread() -> Iterator[None]:
+    """OpenCV on one thread, as the extension is."""
+    threads = cv2.getNumThreads()
+    cv2.setNumThreads(1)
+    try:
+        yield
     finally:
         cv2.setNumThreads(threads)
-    return pl.DataFrame(rows)
+
+
+def photo_times(panoramas: Sequence[Panorama], *, advance: Callable[[], None] = lambda: None) -> pl.DataFrame:
+    """Milliseconds of the processor for a 360-degree photograph in colour of 2048 x 1024, from JPEG to JPEG.
+
+    The median of the photographs for each step, and for all steps together; tables of the camera are ready.
+    """
+    camera = _panorama_camera(_WIDTH)
+    estimator, leveller = _estimator("segments", 1024), Leveller(camera, _FORWARD)
+    rows = []
+    with _one_thread():
+        for panorama in panoramas:
+            image = cv2.resize(read_image(panorama.path), (_WIDTH, _WIDTH // 2), interpolation=cv2.INTER_AREA)
+            photo = cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, _QUALITY])[1].tobytes()
+            clock = [time.process_time()]
+            read = cv2.imdecode(np.frombuffer(photo, np.uint8), cv2.IMREAD_COLOR)
+            clock.append(time.process_time())
+            estimate = _seen(estimator, gray_from(np.asarray(read, dtype=np.uint8)))
+            clock.append(time.process_time())
+            level = leveller(np.asarray(read, dtype=np.uint8), estimate if estimate else (0.1, 0.5))
+            clock.append(time.process_time())
+            encode_like(level, photo)
+            clock.append(time.process_time())
+            rows.append([*np.diff(clock), clock[-1] - clock[0]])
+            advance()
+    steps = ("read", "tilt", "level image", "write", "in all")
+    medians = 1e3 * np.median(np.array(rows), axis=0)
+    return pl.DataFrame({"step": steps, "ms": medians})
 
 
 def _times(leveller: Leveller, image: NDArray[np.uint8]) -> dict[str, float]:
@@ -179,8 +217,8 @@ def _times(leveller: Leveller, image: NDArray[np.uint8]) -> dict[str, float]:
             "fixed maps": lambda: cv2.remap(image, *fixed, cv2.INTER_LINEAR),
         }
         for way, work in ways.items():
-            begin = time.perf_counter()
+            begin = time.process_time()
             work()
-            best[way] = min(best[way], 1e3 * (time.perf_counter() - begin))
+            best[way] = min(best[way], 1e3 * (time.process_time() - begin))
     ratio = best["leveller"] / min(best["floating maps"], best["fixed maps"])
     return {f"{way}, ms": took for way, took in best.items()} | {"ratio": ratio}

@@ -1,0 +1,84 @@
+"""What `tiltvp corner` writes, and how it says what it found."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from cyclopts import Group, Parameter
+
+from tiltvp.cli.corner_methods import Searches, advice, looked_for, shown
+from tiltvp.cli.tables import Table, check_ending, check_plot, write_table
+from tiltvp.cli.terminal import say
+from tiltvp.errors import InvalidInputError
+from tiltvp.files import check_output, check_output_folder
+
+if TYPE_CHECKING:
+    from tiltvp.corner import CornerEstimate
+
+
+@Parameter(name="*", group=Group("Results"))
+@dataclass(frozen=True, kw_only=True)
+class CornerResults:
+    """Where poses and pictures go."""
+
+    out: Path | None = None
+    """File for the poses, one row for each frame: .csv, .json or .parquet."""
+    trajectory: Path | None = None
+    """File for the trajectory in TUM's format: time, position and quaternion of the camera in the object's frame."""
+    overlay: Path | None = None
+    """Folder for the left images with corners and imaginary boxes."""
+    plot: Path | None = None
+    """Picture of attitude and position over time (.png)."""
+
+    def check(self, *, has_scale: bool) -> None:
+        """Refuses what cannot be written, before any work is done; a trajectory wants poses that have a place."""
+        if self.out is not None:
+            check_ending(self.out)
+        if self.trajectory is not None:
+            if not has_scale:
+                expected = "expected two, or --camera-height-m, --edge-length-m or --box-size-m"
+                raise InvalidInputError(
+                    f"--trajectory {self.trajectory} of one camera, which tells no position: {expected}"
+                )
+            check_output(self.trajectory)
+        if self.overlay is not None:
+            check_output_folder(self.overlay)
+        check_plot("--plot", self.plot)
+
+    def write(self, estimates: Sequence[tuple[float, str, CornerEstimate]]) -> None:
+        """The table, the trajectory and the plot of estimates with times and names of their frames."""
+        from tiltvp.corner_tables import POSE_COLUMNS, pose_rows, write_trajectory
+
+        table = Table(POSE_COLUMNS, pose_rows(estimates))
+        if self.out is not None:
+            write_table(table, self.out)
+        if self.trajectory is not None:
+            write_trajectory(table.rows, self.trajectory)
+        if self.plot is not None:
+            from tiltvp.images import write_image
+            from tiltvp.lab.plots.corner_poses import pose_plot
+            from tiltvp.lab.plots.picture import figure_picture
+
+            write_image(self.plot, figure_picture(pose_plot(table.frame())))
+
+
+def tell(
+    source: str, estimator: Searches, bad: int, *, has_scale: bool, advice_for: tuple[bool, dict[str, Any]]
+) -> None:
+    """How many frames have a pose, by which method, why the others have none, and what to try if all are such."""
+    found, without = estimator.found.total(), estimator.without.total()
+    skipped = f", {bad} skipped" if bad else ""
+    by = f" ({looked_for(estimator.found)})" if found else ""
+    say(f"{source}: {found + without} frames{skipped}, {found} with a pose{by}")
+    if without:
+        say(f"without a pose: {shown(estimator.without)}")
+    if has_scale and estimator.placeless:
+        say(f"without a place: {shown(estimator.placeless)}")
+    if without and not found:
+        [(reason, _)] = estimator.without.most_common(1)
+        is_pair, known = advice_for
+        say(f"looked for {looked_for(estimator.methods)}")
+        say(f"try: {advice(reason, estimator.methods, is_pair=is_pair, given=known)}")
