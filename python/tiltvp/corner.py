@@ -16,6 +16,7 @@ from tiltvp import _core
 from tiltvp._core import CornerAttitude, CornerAttitudes, CornerFeature, CornerPose, ResolvedAttitude
 from tiltvp.corner_images import (
     CORNER_METHODS,
+    BelievedCorner,
     CornerDetector,
     CornerEstimate,
     CornerHypothesis,
@@ -33,6 +34,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "CORNER_METHODS",
+    "BelievedCorner",
     "CornerAttitude",
     "CornerAttitudes",
     "CornerDetector",

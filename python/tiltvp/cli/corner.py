@@ -66,6 +66,7 @@ def corner(
     gamma: Annotated[float, _ANGLE] = 90.0,
     pitch: Annotated[float | None, Parameter(validator=validators.Number(gte=-90, lte=90))] = None,
     out: Path | None = None,
+    corners: Path | None = None,
     trajectory: Path | None = None,
     overlay: Path | None = None,
     plot: Path | None = None,
@@ -106,10 +107,13 @@ def corner(
         says which of the edges is vertical, for the first image. With roll: --down.
     out
         File for the poses, one row for each frame: .csv, .json or .parquet.
+    corners
+        File for all corners that are believed, with names that last, poses, covariances, and lengths and angles of
+        their edges, one row for each hypothesis of each corner in each frame: .csv, .json or .parquet.
     trajectory
         File for the trajectory in TUM's format: time, position and quaternion of the camera in the object's frame.
     overlay
-        Folder for the left images with corners and imaginary boxes.
+        Folder for the left images with corners, their names, and imaginary boxes.
     plot
         Picture of attitude and position over time (.png).
     frame_rate
@@ -119,10 +123,11 @@ def corner(
     independent
         Look at every frame anew.
     """
-    from tiltvp.corner_tables import POSE_COLUMNS, pose_rows
+    from tiltvp.corner_tables import CORNER_COLUMNS, POSE_COLUMNS, corner_rows, pose_rows
 
-    if out is not None:
-        check_ending(out)
+    for file in (out, corners):
+        if file is not None:
+            check_ending(file)
     known = _known(options, math.radians(gamma), pitch)
     has_scale = right is not None or not SCALES.isdisjoint(known)
     if trajectory is not None and not has_scale:
@@ -150,6 +155,8 @@ def corner(
         raise InvalidInputError(f"{frames.source}: {look.bad} frames, none of which can be used")
     table = Table(POSE_COLUMNS, pose_rows(estimates))
     _write(table, out, trajectory, plot)
+    if corners is not None:
+        write_table(Table(CORNER_COLUMNS, corner_rows(estimates)), corners)
     _conclude(str(frames.source), estimator, look.bad, has_scale=has_scale, advice_for=(right is not None, known))
     return 1 if look.bad or frames.problems else 0
 
@@ -267,8 +274,8 @@ def _searches(
 
 
 def drawn(image: NDArray[np.uint8], camera: Camera, estimate: CornerEstimate) -> NDArray[np.uint8]:
-    """The image with its corners and the imaginary box."""
-    from tiltvp.overlays.corners import draw_box, draw_corners
+    """The image with its corners, their names, and the imaginary box."""
+    from tiltvp.overlays.corners import draw_box, draw_corners, draw_names
 
     canvas = draw_corners(image, camera, estimate.features_left, estimate.chosen_left)
     pose = estimate.pose
@@ -277,4 +284,5 @@ def drawn(image: NDArray[np.uint8], camera: Camera, estimate: CornerEstimate) ->
         if vertex is None:
             vertex = estimate.features_left[estimate.chosen_left[0]].vertex
         draw_box(canvas, camera, vertex, pose.edges)
+    draw_names(canvas, camera, estimate.features_left, estimate.corners)
     return canvas

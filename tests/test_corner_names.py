@@ -1,0 +1,99 @@
+"""All corners of a frame by name: in rendered rooms where some are hidden for a while, and in drawn pairs."""
+
+from __future__ import annotations
+
+import math
+import pickle
+
+import numpy as np
+import polars as pl
+import pytest
+
+from drawn_corners import CAMERA, COLOURS, GREYS, LEFT_FROM_RIGHT, drawn, pair, pose
+from tiltvp.corner import CornerPoseEstimator
+from tiltvp.corner_tables import CORNER_COLUMNS, corner_rows
+from tiltvp.errors import InvalidInputError
+from tiltvp.lab.evaluation.corner_names import names_seen, summarise_names
+from tiltvp.lab.evaluation.corners import down_in
+from tiltvp.overlays.corners import draw_names
+from tiltvp.synth import Room, StereoSequence, zed_cameras
+
+pytestmark = pytest.mark.slow
+
+
+@pytest.fixture(scope="module")
+def walk() -> StereoSequence:
+    """A hand-held pair in a furnished room, in small images."""
+    left, right = (camera.scaled(0.5) for camera in zed_cameras())
+    room = Room("living-room", 7008, light_spacing_m=0.3)
+    return StereoSequence(room, left=left, right=right, frames=40, seed=7008, samples=1)
+
+
+@pytest.mark.parametrize("cover", ["corner", "all"])
+def test_names_last_while_a_corner_is_hidden(walk: StereoSequence, cover: str) -> None:
+    seen = names_seen(walk, cover, threads=2, down=down_in(walk))
+    told = summarise_names(seen)
+    assert told["named"] > 40
+    assert told["shared"] == 0
+    assert told["back"] >= 1
+    if cover == "corner":
+        # The others tell where the camera is, so that what was covered is known again.
+        assert told["kept"] == told["back"]
+    # No two corners of one frame have one name.
+    named = seen.drop_nulls("id")
+    assert named.select("frame", "id").is_duplicated().sum() == 0
+    with pytest.raises(InvalidInputError, match="cover"):
+        names_seen(walk, "half")
+
+
+def test_what_a_believed_corner_tells() -> None:
+    rotation, _ = pose()
+    estimator = CornerPoseEstimator(
+        CAMERA, CAMERA, LEFT_FROM_RIGHT, method="general", down=rotation[:, 1], right_handed=True
+    )
+    images = pair(GREYS)
+    estimate = estimator(*images)
+    first = estimate.corners[0]
+    assert first.id == 1
+    assert first.pose == estimate.pose
+    assert first.hypotheses == estimate.hypotheses
+    assert np.array_equal(first.edge_lengths_m, estimate.edge_lengths_m, equal_nan=True)
+    off = (first.edge_lengths_m - 0.3) / first.edge_length_sigmas_m
+    assert np.isfinite(off).any()
+    assert np.nanmax(np.abs(off)) < 4.0
+    angle = (first.edge_angles_rad - math.pi / 2) / first.edge_angle_sigmas_rad
+    assert np.nanmax(np.abs(angle)) < 4.0
+    assert pickle.loads(pickle.dumps(first)) == first
+    # Names go on in copies, and `poses` is the same list.
+    copy = pickle.loads(pickle.dumps(estimator))
+    again = estimator.poses(*images)
+    assert again == copy.poses(*images)
+    assert again[0].id == 1
+    # What has a name keeps it to itself.
+    estimator.reset()
+    assert estimator.poses(*images)[0].id not in {corner.id for corner in estimate.corners}
+    rows = corner_rows([(0.0, "a.png", estimate)])
+    assert len(rows) == sum(len(corner.hypotheses) for corner in estimate.corners)
+    table = pl.DataFrame(rows, schema={name: getattr(pl, kind) for name, kind in CORNER_COLUMNS.items()})
+    assert table["id"][0] == 1
+    assert math.isclose(table["cov_z_z"][0], first.pose.covariance[5, 5])
+    assert np.allclose(table.select("vertex_x_m", "vertex_y_m", "vertex_z_m").row(0), first.pose.vertex_m)
+    canvas = np.zeros((360, 480, 3), np.uint8)
+    draw_names(canvas, CAMERA, estimate.features_left, estimate.corners)
+    assert canvas.max() == 255
+
+
+def test_corners_without_a_place_have_no_name() -> None:
+    rotation, vertex = pose()
+    [one] = CornerPoseEstimator(CAMERA, method="general", down=rotation[:, 1], right_handed=True).poses(
+        drawn(rotation, vertex, GREYS)
+    )
+    assert one.id is None
+    assert one.pose.vertex_m is None
+    assert np.isnan(one.edge_angles_rad).all()
+    # Colours are a name.
+    estimator = CornerPoseEstimator(CAMERA, CAMERA, LEFT_FROM_RIGHT)
+    assert [corner.id for corner in estimator.poses(*pair(COLOURS))] == [1]
+    estimator.reset()
+    assert [corner.id for corner in estimator.poses(*pair(COLOURS))] == [1]
+    assert estimator.poses(*pair(dict.fromkeys(GREYS, (150, 150, 150)))) == []
