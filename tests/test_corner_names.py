@@ -13,7 +13,7 @@ from drawn_corners import CAMERA, COLOURS, GREYS, LEFT_FROM_RIGHT, drawn, pair, 
 from tiltvp.corner import CornerPoseEstimator
 from tiltvp.corner_tables import CORNER_COLUMNS, corner_rows
 from tiltvp.errors import InvalidInputError
-from tiltvp.lab.evaluation.corner_names import names_seen, summarise_names
+from tiltvp.lab.evaluation.corner_names import COVERS, names_seen, summarise_names
 from tiltvp.lab.evaluation.corners import down_in
 from tiltvp.overlays.corners import draw_names
 from tiltvp.synth import Room, StereoSequence, zed_cameras
@@ -29,21 +29,24 @@ def walk() -> StereoSequence:
     return StereoSequence(room, left=left, right=right, frames=40, seed=7008, samples=1)
 
 
-@pytest.mark.parametrize("cover", ["corner", "all"])
-def test_names_last_while_a_corner_is_hidden(walk: StereoSequence, cover: str) -> None:
-    seen = names_seen(walk, cover, threads=2, down=down_in(walk))
-    told = summarise_names(seen)
-    assert told["named"] > 40
-    assert told["shared"] == 0
-    assert told["back"] >= 1
-    if cover == "corner":
-        # The others tell where the camera is, so that what was covered is known again.
-        assert told["kept"] == told["back"]
-    # No two corners of one frame have one name.
-    named = seen.drop_nulls("id")
-    assert named.select("frame", "id").is_duplicated().sum() == 0
-    with pytest.raises(InvalidInputError, match="cover"):
-        names_seen(walk, "half")
+def test_names_last_while_a_corner_is_hidden(walk: StereoSequence) -> None:
+    every = names_seen(walk, threads=2, down=down_in(walk))
+    assert list(every) == list(COVERS)
+    for cover, seen in every.items():
+        told = summarise_names(seen)
+        assert told["named"] > 40
+        assert told["shared"] == 0
+        assert told["back"] >= 1
+        if cover != "all":
+            # The others tell where the camera is, so that what was covered is known again.
+            assert told["kept"] == told["back"]
+        # No two corners of one frame have one name.
+        named = seen.drop_nulls("id")
+        assert named.select("frame", "id").is_duplicated().sum() == 0
+    left, right = walk.cameras
+    short = StereoSequence(walk.scene, left=left, right=right, frames=39)
+    with pytest.raises(InvalidInputError, match="40 or more"):
+        names_seen(short)
 
 
 def test_what_a_believed_corner_tells() -> None:

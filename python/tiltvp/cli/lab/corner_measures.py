@@ -109,7 +109,7 @@ def _names(experiment: CornerExperiment, threads: int) -> pl.DataFrame | None:
     """The table of names of corners, shown; None without a room of 40 frames."""
     import polars as pl
 
-    from tiltvp.lab.evaluation.corner_names import COVERS, names_seen, summarise_names
+    from tiltvp.lab.evaluation.corner_names import names_seen, summarise_names
     from tiltvp.lab.evaluation.corners import down_in
 
     rooms = [
@@ -120,13 +120,11 @@ def _names(experiment: CornerExperiment, threads: int) -> pl.DataFrame | None:
     if not rooms:
         return None
     rows = []
-    with progress_bar(len(COVERS) * sum(frames for _, frames, _ in rooms), "frames of rooms") as bar:
+    with progress_bar(sum(frames for _, frames, _ in rooms), "frames of rooms") as bar:
         for scene, frames, seed in rooms:
             sequence = scene.sequence(frames, seed, threads)
-            down = down_in(sequence)
-            for cover in COVERS:
-                seen = names_seen(sequence, cover, threads=threads, advance=bar.advance, down=down)
-                rows.append({"scene": scene.name, "hidden": cover} | summarise_names(seen))
+            seen = names_seen(sequence, threads=threads, advance=bar.advance, down=down_in(sequence))
+            rows += [{"scene": scene.name, "hidden": cover} | summarise_names(part) for cover, part in seen.items()]
     table = pl.DataFrame(rows)
     show_frame("Names of corners, 12 frames of each room hidden", table, ["scene", "hidden"])
     return table

@@ -48,19 +48,20 @@ _SCHEMA: Final[dict[str, Any]] = {
 
 
 def names_seen(
-    sequence: StereoSequence, cover: str, *, threads: int = 1, advance: Callable[[], None] = lambda: None, **known: Any
-) -> pl.DataFrame:
-    """The corners of each frame by name, with one of `COVERS` for 12 frames from a third of the sequence on.
+    sequence: StereoSequence, *, threads: int = 1, advance: Callable[[], None] = lambda: None, **known: Any
+) -> dict[str, pl.DataFrame]:
+    """For each of `COVERS` the corners of each frame by name, with it hidden for 12 frames from a third on.
 
     `known` are options of `CornerPoseEstimator`, general method. Columns as `name_sightings`. `advance` is called after
-    each frame. Raises `InvalidInputError` for another cover, and for less than 40 frames.
+    each frame. Raises `InvalidInputError` for less than 40 frames.
     """
-    if cover not in COVERS:
-        raise InvalidInputError(f"cover = {cover!r}, expected {', '.join(COVERS)}")
     if len(sequence) < 40:
         raise InvalidInputError(f"sequence of {len(sequence)} frames, expected 40 or more")
     left, right = sequence.cameras
-    estimator = CornerPoseEstimator(left, right, sequence.left_from_right, method="general", **known)
+    estimators = {
+        cover: CornerPoseEstimator(left, right, sequence.left_from_right, method="general", **known) for cover in COVERS
+    }
+    estimates: dict[str, list[CornerEstimate]] = {cover: [] for cover in COVERS}
     hidden = range(len(sequence) // 3, len(sequence) // 3 + _HIDDEN)
     stop = Event()
 
@@ -69,20 +70,20 @@ def names_seen(
             raise CancelledError
         return sequence.render(frame, threads=1)
 
-    estimates = []
     place: NDArray[np.float64] | None = None
     poses = sequence.poses_at(sequence.times_s)
     with closing(in_order(render, range(len(sequence)), threads, stop)) as pairs:
         for frame, pair in enumerate(pairs):
-            images = pair
-            if frame in hidden and cover != "nothing":
-                images = _covered(sequence, np.linalg.inv(poses[frame]), pair, place if cover == "corner" else None)
-            estimate = estimator(*images)
-            if estimate.pose is not None and estimate.pose.vertex_m is not None and frame < hidden[0]:
-                place = poses[frame][:3, :3] @ estimate.pose.vertex_m + poses[frame][:3, 3]
-            estimates.append(estimate)
+            for cover, estimator in estimators.items():
+                images = pair
+                if frame in hidden and cover != "nothing":
+                    images = _covered(sequence, np.linalg.inv(poses[frame]), pair, place if cover == "corner" else None)
+                estimates[cover].append(estimator(*images))
+            pose = estimates["nothing"][-1].pose
+            if pose is not None and pose.vertex_m is not None and frame < hidden[0]:
+                place = poses[frame][:3, :3] @ pose.vertex_m + poses[frame][:3, 3]
             advance()
-    return name_sightings(sequence, estimates, hidden)
+    return {cover: name_sightings(sequence, seen, hidden) for cover, seen in estimates.items()}
 
 
 def name_sightings(sequence: StereoSequence, estimates: Sequence[CornerEstimate], hidden: range) -> pl.DataFrame:
