@@ -10,7 +10,7 @@ import polars as pl
 import pytest
 
 from drawn_corners import CAMERA, COLOURS, GREYS, LEFT_FROM_RIGHT, drawn, pair, pose
-from tiltvp.corner import CornerPoseEstimator
+from tiltvp.corner import BelievedCorner, CornerPoseEstimator, join_boxes
 from tiltvp.corner_tables import CORNER_COLUMNS, corner_rows
 from tiltvp.errors import InvalidInputError
 from tiltvp.lab.evaluation.corner_names import COVERS, names_seen, summarise_names
@@ -100,3 +100,59 @@ def test_corners_without_a_place_have_no_name() -> None:
     estimator.reset()
     assert [corner.id for corner in estimator.poses(*pair(COLOURS))] == [1]
     assert estimator.poses(*pair(dict.fromkeys(GREYS, (150, 150, 150)))) == []
+
+
+def corner(
+    vertex: tuple[float, float, float],
+    signs: tuple[int, int, int],
+    lengths: tuple[float | None, ...],
+    turn_deg: float = 0.0,
+) -> BelievedCorner:
+    """A corner with edges along the axes, turned about the y axis, and lengths known to 2 mm."""
+    c, s = math.cos(math.radians(turn_deg)), math.sin(math.radians(turn_deg))
+    rotation = np.array([[c, 0.0, s], [0.0, 1.0, 0.0], [-s, 0.0, c]])
+    pose = {
+        "camera_from_object": rotation.tolist(), "edges": (np.diag(signs) @ rotation.T).tolist(),
+        "vertex_m": list(vertex), "covariance": (1e-6 * np.eye(6)).tolist(), "probability": 1.0, "right_handed": True,
+        "misfit": 0.0,
+    }  # fmt: skip
+    return BelievedCorner.from_dict({
+        "id": None, "hypotheses": [pose], "left": 0, "right": 0, "edge_lengths_m": list(lengths),
+        "edge_length_sigmas_m": [None if length is None else 0.002 for length in lengths],
+        "edge_ends_m": [None] * 3, "edge_angles_rad": [None] * 3, "edge_angle_sigmas_rad": [None] * 3,
+    })  # fmt: skip
+
+
+def test_corners_that_share_edges_are_joined() -> None:
+    first = corner((0.0, 0.0, 2.0), (1, 1, 1), (0.4, None, None))
+    second = corner((0.401, 0.0, 2.0), (-1, 1, 1), (None, 0.3, None))
+    third = corner((0.4, 0.301, 2.0), (-1, -1, 1), (None, None, None))
+    [box] = join_boxes([first, second, third])
+    assert box.corners == (0, 1, 2)
+    # Vertices are known to 1 mm, their distance to 1.4 mm, better than the ends; nothing shows the depth.
+    assert np.allclose(box.sizes_m[:2], (0.401, 0.301), atol=1e-4)
+    assert np.allclose(box.size_sigmas_m[:2], 0.001 * math.sqrt(2.0))
+    assert np.isnan(box.sizes_m[2])
+    # Not joined: no end is seen there; the end is elsewhere; another box in line, of other edges; turned; no place.
+    assert join_boxes([third, corner((0.0, 0.301, 2.0), (1, -1, 1), (None, None, None))]) == []
+    assert join_boxes([corner((0.0, 0.0, 2.0), (1, 1, 1), (0.3, None, None)), second]) == []
+    assert join_boxes([first, corner((0.4, 0.0, 2.0), (1, 1, 1), (None, None, None))]) == []
+    assert join_boxes([first, corner((0.4, 0.0, 2.0), (-1, 1, 1), (None, None, None), turn_deg=8.0)]) == []
+    # One corner whose edges are all seen; edges that disagree tell nothing.
+    [alone] = join_boxes([corner((0.0, 0.0, 2.0), (1, 1, 1), (0.4, 0.3, 0.2))])
+    assert np.allclose(alone.sizes_m, (0.4, 0.3, 0.2))
+    torn = [corner((0.0, 0.0, 2.0), (1, 1, 1), (0.4, 0.2, None)), second]
+    assert np.isnan(join_boxes(torn)[0].sizes_m[1])
+
+
+def test_a_drawn_box_has_its_sizes() -> None:
+    rotation, _ = pose()
+    estimator = CornerPoseEstimator(
+        CAMERA, CAMERA, LEFT_FROM_RIGHT, method="general", down=rotation[:, 1], right_handed=True
+    )
+    estimate = estimator(*pair(GREYS))
+    [box] = join_boxes(estimate.corners)
+    off = (box.sizes_m - 0.3) / box.size_sigmas_m
+    assert np.isfinite(off).sum() >= 2
+    assert np.nanmax(np.abs(off)) < 4.0
+    assert corner_rows([(0.0, "a.png", estimate)])[0]["box"] == 1

@@ -14,6 +14,7 @@ import numpy as np
 
 from tiltvp import _core
 from tiltvp._core import CornerAttitude, CornerAttitudes, CornerFeature, CornerPose, ResolvedAttitude
+from tiltvp.corner_boxes import CornerBox, join_boxes
 from tiltvp.corner_images import (
     CORNER_METHODS,
     BelievedCorner,
@@ -37,6 +38,7 @@ __all__ = [
     "BelievedCorner",
     "CornerAttitude",
     "CornerAttitudes",
+    "CornerBox",
     "CornerDetector",
     "CornerEstimate",
     "CornerFeature",
@@ -50,6 +52,7 @@ __all__ = [
     "attitudes",
     "fit",
     "included_angle",
+    "join_boxes",
     "poses",
     "resolve",
     "screen",

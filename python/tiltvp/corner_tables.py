@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
+from tiltvp.corner_boxes import join_boxes
 from tiltvp.errors import InvalidInputError
 from tiltvp.rotations import quaternion
 from tiltvp.streams.outputs.tum import write_tum
@@ -74,12 +75,16 @@ _LENGTHS: Final = ("edge_x_m", "edge_y_m", "edge_z_m")
 _LENGTH_SIGMAS: Final = ("sigma_edge_x_m", "sigma_edge_y_m", "sigma_edge_z_m")
 _BETWEEN: Final = ("angle_yz_deg", "angle_zx_deg", "angle_xy_deg")
 _BETWEEN_SIGMAS: Final = ("sigma_angle_yz_deg", "sigma_angle_zx_deg", "sigma_angle_xy_deg")
+_SIZES: Final = ("box_x_m", "box_y_m", "box_z_m")
+_SIZE_SIGMAS: Final = ("sigma_box_x_m", "sigma_box_y_m", "sigma_box_z_m")
 
 CORNER_COLUMNS: Final[dict[str, str]] = (
     {"time_s": "Float64", "file": "String", "id": "Int64", "hypothesis": "Int64", "probability": "Float64"}
     | dict.fromkeys((*_QUATERNION, *_VERTEX), "Float64")
     | {"right_handed": "Boolean", "misfit": "Float64"}
-    | dict.fromkeys((*_LENGTHS, *_LENGTH_SIGMAS, *_BETWEEN, *_BETWEEN_SIGMAS, *_COVARIANCE), "Float64")
+    | dict.fromkeys((*_LENGTHS, *_LENGTH_SIGMAS, *_BETWEEN, *_BETWEEN_SIGMAS), "Float64")
+    | {"box": "Int64"}
+    | dict.fromkeys((*_SIZES, *_SIZE_SIGMAS, *_COVARIANCE), "Float64")
 )
 """The keys of the rows of `corner_rows` in their order, each with the name of its type in Polars."""
 
@@ -89,13 +94,20 @@ def corner_rows(estimates: Sequence[tuple[float, str, CornerEstimate]]) -> list[
 
     `hypothesis` counts from 0, the likeliest. qx..qw are `object_from_camera`, the vertex is in the left camera's
     frame, cov_rx_rx..cov_z_z are the upper triangle of its `covariance`. Lengths and angles of edges are of the corner,
-    not of the hypothesis. None where something is not told.
+    not of the hypothesis. `box` is the number of its cuboid in the frame, from 1 (`join_boxes`), with its sizes along
+    the edges of the first corner of it. None where something is not told.
     """
     rows = []
     upper = np.triu_indices(6)
     for time_s, file, estimate in estimates:
-        for corner in estimate.corners:
+        boxes: dict[int, dict[str, Any]] = {}
+        for number, box in enumerate(join_boxes(estimate.corners), start=1):
+            sizes: dict[str, Any] = dict(zip(_SIZES, box.sizes_m.tolist(), strict=True))
+            sizes |= {"box": number} | dict(zip(_SIZE_SIGMAS, box.size_sigmas_m.tolist(), strict=True))
+            boxes |= dict.fromkeys(box.corners, sizes)
+        for place, corner in enumerate(estimate.corners):
             edges: dict[str, Any] = dict(zip(_LENGTHS, corner.edge_lengths_m.tolist(), strict=True))
+            edges |= boxes.get(place, {})
             edges |= dict(zip(_LENGTH_SIGMAS, corner.edge_length_sigmas_m.tolist(), strict=True))
             edges |= dict(zip(_BETWEEN, np.degrees(corner.edge_angles_rad).tolist(), strict=True))
             edges |= dict(zip(_BETWEEN_SIGMAS, np.degrees(corner.edge_angle_sigmas_rad).tolist(), strict=True))

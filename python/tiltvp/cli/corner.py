@@ -113,7 +113,7 @@ def corner(
     trajectory
         File for the trajectory in TUM's format: time, position and quaternion of the camera in the object's frame.
     overlay
-        Folder for the left images with corners, their names, and imaginary boxes.
+        Folder for the left images with corners, their names, the cuboids that they make, and imaginary boxes.
     plot
         Picture of attitude and position over time (.png).
     frame_rate
@@ -274,12 +274,15 @@ def _searches(
 
 
 def drawn(image: NDArray[np.uint8], camera: Camera, estimate: CornerEstimate) -> NDArray[np.uint8]:
-    """The image with its corners, their names, and the imaginary box."""
+    """The image with its corners, their names, and their boxes: the imaginary one where the pose is of none."""
+    from tiltvp.corner_boxes import join_boxes
     from tiltvp.overlays.corners import draw_box, draw_corners, draw_names
 
     canvas = draw_corners(image, camera, estimate.features_left, estimate.chosen_left)
-    pose = estimate.pose
-    if pose is not None:
+    pose, boxes = estimate.pose, join_boxes(estimate.corners)
+    for box in boxes:
+        draw_box(canvas, camera, box.vertex_m, box.edges, box.sizes_m)
+    if pose is not None and not any(0 in box.corners for box in boxes):
         vertex = pose.vertex_m
         if vertex is None:
             vertex = estimate.features_left[estimate.chosen_left[0]].vertex

@@ -51,15 +51,16 @@ def draw_corners(
 
 
 def draw_box(
-    canvas: NDArray[np.uint8], camera: Camera, vertex: ArrayLike, edges: ArrayLike, length: float | None = None
+    canvas: NDArray[np.uint8], camera: Camera, vertex: ArrayLike, edges: ArrayLike, length: ArrayLike | None = None
 ) -> None:
-    """Draws the imaginary box into a picture: edges of equal `length` from the vertex along the rows of `edges`.
+    """Draws the imaginary box into a picture: edges of equal `length`, or of one each, along the rows of `edges`.
 
     `vertex` (3,) is the vertex in the camera's frame, metres, or its bearing; the default length is a share of its
-    distance. The three edges from the vertex are coloured, the others grey.
+    distance. The three edges from the vertex are coloured, the others grey. A length that is NaN is 0.
     """
     origin = np.asarray(vertex, dtype=np.float64)
-    axes = np.asarray(edges, dtype=np.float64) * (_LENGTH * np.linalg.norm(origin) if length is None else length)
+    lengths = np.nan_to_num(np.asarray(_LENGTH * np.linalg.norm(origin) if length is None else length))
+    axes = np.asarray(edges, dtype=np.float64) * np.broadcast_to(lengths, 3)[:, None]
     share = np.linspace(0.0, 1.0, _POINTS)[:, None]
     for k, axis in enumerate(axes):
         others = [axes[j] for j in range(3) if j != k]

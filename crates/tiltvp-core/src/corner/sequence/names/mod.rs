@@ -90,18 +90,15 @@ impl CornerNames {
         });
         // The world of which most is seen; of several the one that was seen last.
         let most = found.max_by(|a, b| a.2.pairs.len().cmp(&b.2.pairs.len()).then(b.1.cmp(&a.1)).then(b.0.cmp(&a.0)));
-        let names = match most {
-            Some((i, _, found)) => {
-                self.worlds[..=i].rotate_right(1);
-                self.worlds[0].take(&seen, &found, &mut self.last)
-            }
-            None => {
-                self.worlds.insert(0, KnownWorld::new(&seen[0]));
-                self.worlds.truncate(WORLDS_MAX);
-                let nothing = Found::nothing(self.worlds[0].camera_from_world);
-                self.worlds[0].take(&seen, &nothing, &mut self.last)
-            }
+        let found = if let Some((i, _, found)) = most {
+            self.worlds[..=i].rotate_right(1);
+            found
+        } else {
+            self.worlds.insert(0, KnownWorld::new(&seen[0]));
+            self.worlds.truncate(WORLDS_MAX);
+            Found::nothing(self.worlds[0].camera_from_world)
         };
+        let names = self.worlds[0].take(&seen, &found, &mut self.last);
         for (place, id) in places.into_iter().zip(names) {
             corners[place].id = id;
         }
@@ -112,7 +109,7 @@ impl KnownWorld {
     /// An empty world with the axes of a corner and its origin there.
     fn new(seen: &Sighting) -> Self {
         let camera_from_world = RigidMotion { rotation: seen.camera_from_object, translation_m: seen.place_m };
-        Self { camera_from_world, age: 0, pace: motion::MOVED, places: Vec::new() }
+        Self { camera_from_world, age: 0, pace: 0.0, places: Vec::new() }
     }
 
     /// One frame more. What was seen too rarely is forgotten.

@@ -9,8 +9,8 @@ use crate::corner::estimator_options::EstimatorOptions;
 use crate::geometry::RigidMotion;
 
 /// The share of the distance of what it sees by which a camera may have moved since it knew its way and few corners are enough: 1
-/// m/s at 10 frames a second and 1 m. Let it grow with the frames since, and of 400 made-up worlds one has a wrong name more.
-pub(super) const MOVED: f64 = 0.1;
+/// m/s at 10 frames a second and 1 m. Where it grows with the frames since, one more of 400 made-up worlds has a wrong name.
+const MOVED: f64 = 0.1;
 
 /// How many times as far as before a camera may move from one frame to the next: a hand speeds up by as much.
 const PACES: f64 = 3.0;
@@ -142,6 +142,8 @@ struct Candidate {
     moved: f64,
     /// Whether the camera can have moved so far; what it cannot is only there to contradict.
     within: bool,
+    /// Whether it moved no faster than before, so that one corner is enough.
+    is_usual: bool,
 }
 
 /// How the camera moved in a world since it was seen there, and what is at which place; none where that is not sure. A world that
@@ -163,11 +165,12 @@ pub(super) fn find(world: &KnownWorld, seen: &[Sighting], options: &EstimatorOpt
     }
     let of = |(found, candidate): &(Found, &Candidate)| (found.pairs.len(), candidate.moved);
     let order = |a: &(usize, f64), b: &(usize, f64)| a.0.cmp(&b.0).then(b.1.total_cmp(&a.1));
-    let best = tried.iter().filter(|(_, candidate)| candidate.within).max_by(|a, b| order(&of(a), &of(b)))?;
+    let enough = |(found, candidate): &&(Found, &Candidate)| {
+        let least = if is_lost { FOUND_AGAIN_MIN } else { 2 - usize::from(candidate.is_usual) };
+        candidate.within && (candidate.is_usual || !is_lost) && found.pairs.len() >= least
+    };
+    let best = tried.iter().filter(enough).max_by(|a, b| order(&of(a), &of(b)))?;
     let (count, moved) = of(best);
-    if count < if is_lost { FOUND_AGAIN_MIN } else { 1 } {
-        return None;
-    }
     let contradicts = |other: &Found| {
         other.pairs.iter().any(|(number, place)| best.0.pairs.iter().any(|(n, p)| (n == number) != (p == place)))
     };
@@ -192,7 +195,7 @@ pub(super) fn find(world: &KnownWorld, seen: &[Sighting], options: &EstimatorOpt
 fn candidates(world: &KnownWorld, seen: &[Sighting], options: &EstimatorOptions, is_lost: bool) -> Vec<Candidate> {
     let frames = f64::from(world.age.max(1));
     let longest = if is_lost { MOVED * frames } else { MOVED };
-    let reach = ((PACES * world.pace + PACE_MIN) * frames).min(longest);
+    let usual = ((PACES * world.pace + PACE_MIN) * frames).min(longest);
     let turn_max = (PACES * options.turn_sigma_rad * frames.sqrt()).min(TURN_MAX);
     let mut places: Vec<&NamedPlace> = world.places.iter().collect();
     if is_lost {
@@ -214,17 +217,20 @@ fn candidates(world: &KnownWorld, seen: &[Sighting], options: &EstimatorOptions,
                     continue;
                 }
                 let turn = rotation * world.camera_from_world.rotation.transpose();
-                // What is left when the camera's turn about itself is undone.
-                let moved_m = corner.place_m - turn * world.camera_from_world.point(&place.place_m);
-                let moved = moved_m.norm() / corner.place_m.norm();
-                let within = moved <= reach && turned(&turn) <= turn_max;
+                // A camera that turns about itself moves what it sees, and an attitude that errs seems to turn it: the lesser of what
+                // the corner moved in its frame and of what is left of that when the turn is undone.
+                let before_m = world.camera_from_world.point(&place.place_m);
+                let [step_m, left_m] = [before_m, turn * before_m].map(|before| (corner.place_m - before).norm());
+                let moved = step_m.min(left_m) / corner.place_m.norm();
+                let within = moved <= longest && turned(&turn) <= turn_max;
                 if !within && !is_lost {
                     continue;
                 }
                 let motion = RigidMotion { rotation, translation_m: corner.place_m - rotation * place.place_m };
                 let of_place = rotation * place.covariance_m2 * rotation.transpose();
                 let covariance_m2 = corner.covariance_m2 + of_place;
-                out.push(Candidate { motion, about_m: place.place_m, covariance_m2, moved, within });
+                let is_usual = moved <= usual;
+                out.push(Candidate { motion, about_m: place.place_m, covariance_m2, moved, within, is_usual });
             }
         }
     }
@@ -310,8 +316,8 @@ fn refined(world: &KnownWorld, seen: &[Sighting], found: &Found) -> Option<(Rigi
         let (corner, place) = (&seen[*number], &world.places[*which]);
         let expected = place.edges.map(|edge| found.camera_from_world.rotation * edge);
         let order = paired(&expected, &corner.edges)?;
-        for axis in 0..3 {
-            sum += corner.edges[order[axis]] * place.edges[axis].transpose();
+        for (edge, other) in place.edges.iter().zip(order) {
+            sum += corner.edges[other] * edge.transpose();
         }
     }
     let rotation = nearest_rotation(&sum)?;
