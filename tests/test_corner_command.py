@@ -24,11 +24,15 @@ def test_the_command_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) ->
     left, right = str(tmp_path / "left"), str(tmp_path / "right")
     out, path = tmp_path / "poses.csv", tmp_path / "poses.txt"
     words = ["corner", left, right, "--calibration", str(tmp_path / "rig.toml"), "--out", str(out)]
+    words += ["--corners", str(tmp_path / "corners.csv")]
     more = ["--overlay", str(tmp_path / "over"), "--trajectory", str(path), "--plot", str(tmp_path / "plot.png")]
     assert main([*words, *more]) == 0
     assert "1 with a pose" in capsys.readouterr().out
     [row] = pl.read_csv(out).iter_rows(named=True)
     rotation, vertex = pose()
+    assert row["id"] == 1
+    [corner] = pl.read_csv(tmp_path / "corners.csv").iter_rows(named=True)
+    assert (corner["file"], corner["id"], corner["hypothesis"]) == (row["file"], 1, 0)
     assert np.allclose([row[name] for name in ("x_m", "y_m", "z_m")], -rotation.T @ vertex, atol=0.01)
     assert len(path.read_text().splitlines()) == 2
     assert tiltvp.read_image(tmp_path / "over" / "a.png").shape == (360, 480, 3)

@@ -32,6 +32,7 @@ __all__ = [
     "SIMD_LEVELS",
     "WALL_PATTERNS",
     "AffineCorrection",
+    "BelievedCorner",
     "CalibrationStep",
     "Camera",
     "CommonDirection",
@@ -141,6 +142,73 @@ class AffineCorrection:
     @property
     def offset_rad(self) -> float:
         """What is added, in radians."""
+
+    def to_dict(self) -> dict[str, Any]:
+        """The attributes by name, arrays as nested lists: plain, good for JSON."""
+
+@final
+class BelievedCorner:
+    """A corner of a frame that is believed: seen in all images, in one way, with one interpretation that stands out.
+
+    Frozen, comparable, and to be pickled.
+    """
+
+    def __copy__(self) -> Self: ...
+    def __deepcopy__(self, _memo: Any) -> Self: ...
+    def __eq__(self, other: object, /) -> bool: ...
+    def __hash__(self) -> int: ...
+    @property
+    def edge_angle_sigmas_rad(self) -> NDArray[np.float64]:
+        """Fresh (3,) float64: the standard deviations of these angles, radians."""
+
+    @property
+    def edge_angles_rad(self) -> NDArray[np.float64]:
+        """Fresh (3,) float64: the angles between the edges y and z, z and x, x and y, radians, from the planes of each
+        edge in both images alone; NaN from one image, and where the two planes of an edge nearly coincide.
+        """
+
+    @property
+    def edge_ends_m(self) -> NDArray[np.float64]:
+        """Fresh (3, 3) float64, rows x, y, z: where its edges end in the left camera's frame, metres, as
+        `CornerEstimate.edge_ends_m`.
+        """
+
+    @property
+    def edge_length_sigmas_m(self) -> NDArray[np.float64]:
+        """Fresh (3,) float64: the standard deviations of these lengths, metres."""
+
+    @property
+    def edge_lengths_m(self) -> NDArray[np.float64]:
+        """Fresh (3,) float64: how long its edges x, y, z are, metres, as `CornerEstimate.edge_lengths_m`; NaN where no
+        image shows it.
+        """
+
+    @classmethod
+    def from_dict(cls, values: dict[str, Any]) -> Self:
+        """The value of a dict as `to_dict` makes it, equal to the last bit."""
+
+    @property
+    def hypotheses(self) -> list[CornerHypothesis]:
+        """All of its hypotheses, the likeliest first."""
+
+    @property
+    def id(self) -> int | None:
+        """The name of its place in the world, from 1: kept from frame to frame, and when the corner was out of sight
+        and is seen again. None where it has no place or one that is hardly known, and where it is too near to a named
+        place to be told from it.
+        """
+
+    @property
+    def left(self) -> int:
+        """Which corner of `features_left` it is."""
+
+    @property
+    def pose(self) -> CornerHypothesis:
+        """Its pose, the likeliest of its hypotheses."""
+
+    @property
+    def right(self) -> int | None:
+        """Which corner of `features_right` it is; None with one camera."""
 
     def to_dict(self) -> dict[str, Any]:
         """The attributes by name, arrays as nested lists: plain, good for JSON."""
@@ -669,10 +737,20 @@ class CornerEstimate:
         """The probability of the likeliest hypothesis; 0 where there is none."""
 
     @property
+    def corners(self) -> list[BelievedCorner]:
+        """All corners that are believed, each with a name, that of the pose first. From one camera that of the pose
+        alone.
+        """
+
+    @property
     def edge_ends_m(self) -> NDArray[np.float64]:
         """Fresh (3, 3) float64, rows x, y, z: where these edges end in the left camera's frame, metres, from both
         images alone; NaN where only one of them shows it, or none. With a known length from the pose of the one image.
         """
+
+    @property
+    def edge_length_sigmas_m(self) -> NDArray[np.float64]:
+        """Fresh (3,) float64: the standard deviations of these lengths, metres."""
 
     @property
     def edge_lengths_m(self) -> NDArray[np.float64]:
@@ -1003,7 +1081,7 @@ class CornerPoseEstimator:
         """The options that are in force, by name, defaults included."""
 
     def reset(self) -> None:
-        """Forgets the poses of the frames before."""
+        """Forgets the poses of the frames before and the corners that have a name; no name is given again."""
 
     @property
     def right(self) -> CornerDetector | None:

@@ -14,8 +14,10 @@ import numpy as np
 
 from tiltvp import _core
 from tiltvp._core import CornerAttitude, CornerAttitudes, CornerFeature, CornerPose, ResolvedAttitude
+from tiltvp.corner_boxes import CornerBox, join_boxes
 from tiltvp.corner_images import (
     CORNER_METHODS,
+    BelievedCorner,
     CornerDetector,
     CornerEstimate,
     CornerHypothesis,
@@ -33,8 +35,10 @@ if TYPE_CHECKING:
 
 __all__ = [
     "CORNER_METHODS",
+    "BelievedCorner",
     "CornerAttitude",
     "CornerAttitudes",
+    "CornerBox",
     "CornerDetector",
     "CornerEstimate",
     "CornerFeature",
@@ -48,6 +52,7 @@ __all__ = [
     "attitudes",
     "fit",
     "included_angle",
+    "join_boxes",
     "poses",
     "resolve",
     "screen",

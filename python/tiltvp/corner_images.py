@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from tiltvp import _core
-from tiltvp._core import CORNER_METHODS, CornerEstimate, CornerFeature, CornerHypothesis
+from tiltvp._core import CORNER_METHODS, BelievedCorner, CornerEstimate, CornerFeature, CornerHypothesis
 from tiltvp.errors import InvalidInputError
 from tiltvp.images import bgr_from, gray_from
 
@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "CORNER_METHODS",
+    "BelievedCorner",
     "CornerDetector",
     "CornerEstimate",
     "CornerFeature",
@@ -98,3 +99,10 @@ class CornerPoseEstimator(_core.CornerPoseEstimator):
         """
         made = bgr_from if self._coloured else gray_from
         return self._observe(made(left), None if right is None else made(right))
+
+    def poses(self, left: ArrayLike, right: ArrayLike | None = None) -> list[BelievedCorner]:
+        """All corners of one frame that are believed, each with its `id`, `pose` and edges; that of the pose first.
+
+        Empty where none is. It is `self(left, right).corners`, and goes on from frame to frame alike.
+        """
+        return self(left, right).corners

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
+from tiltvp.corner_boxes import join_boxes
 from tiltvp.errors import InvalidInputError
 from tiltvp.rotations import quaternion
 from tiltvp.streams.outputs.tum import write_tum
@@ -17,7 +18,7 @@ if TYPE_CHECKING:
 
     from tiltvp._core import CornerEstimate
 
-__all__ = ["POSE_COLUMNS", "pose_rows", "roll_pitch_yaw", "write_trajectory"]
+__all__ = ["CORNER_COLUMNS", "POSE_COLUMNS", "corner_rows", "pose_rows", "roll_pitch_yaw", "write_trajectory"]
 
 _QUATERNION = ("qx", "qy", "qz", "qw")
 _POSITION = ("x_m", "y_m", "z_m")
@@ -28,14 +29,14 @@ _SIGMAS = ("sigma_rx_rad", "sigma_ry_rad", "sigma_rz_rad", "sigma_x_m", "sigma_y
 POSE_COLUMNS: Final[dict[str, str]] = (
     {"time_s": "Float64", "file": "String", "found": "Boolean"}
     | dict.fromkeys((*_ANGLES, *_QUATERNION, *_POSITION, *_SIGMAS), "Float64")
-    | {"confidence": "Float64", "hypotheses": "Int64", "misfit": "Float64", "object": "Int64"}
+    | {"confidence": "Float64", "hypotheses": "Int64", "misfit": "Float64", "object": "Int64", "id": "Int64"}
     | {"corners_left": "Int64", "corners_right": "Int64", "reason": "String", "place_reason": "String"}
 )
 """The keys of the rows in their order, each with the name of its type in Polars."""
 
 
 def pose_rows(estimates: Sequence[tuple[float, str, CornerEstimate]]) -> list[dict[str, Any]]:
-    """One row for each frame: time_s, file, found, the camera in the object's frame, and how sure it is.
+    """One row for each frame: time_s, file, found, the camera in the object's frame, how sure it is, and its name.
 
     qx..qw and x_m..z_m are `object_from_camera`; the object's frame has y along the vertical edge away from the vertex.
     roll, pitch and yaw are those of `object_from_camera` about the camera's z, x and y axis. The standard deviations
@@ -49,6 +50,7 @@ def pose_rows(estimates: Sequence[tuple[float, str, CornerEstimate]]) -> list[di
         row |= {"hypotheses": len(estimate.hypotheses), "reason": estimate.reason, "object": estimate.object}
         row |= {"corners_left": len(estimate.features_left), "corners_right": len(estimate.features_right)}
         row["place_reason"] = estimate.place_reason
+        row["id"] = estimate.corners[0].id if estimate else None
         pose = estimate.pose
         if pose is not None:
             turn = pose.camera_from_object.T
@@ -63,6 +65,61 @@ def pose_rows(estimates: Sequence[tuple[float, str, CornerEstimate]]) -> list[di
                 row |= dict(zip(_POSITION, place.tolist(), strict=True))
             row["misfit"] = pose.misfit
         rows.append(row)
+    return rows
+
+
+_AXES: Final = ("rx", "ry", "rz", "x", "y", "z")
+_COVARIANCE: Final = tuple(f"cov_{a}_{b}" for k, a in enumerate(_AXES) for b in _AXES[k:])
+_VERTEX: Final = ("vertex_x_m", "vertex_y_m", "vertex_z_m")
+_LENGTHS: Final = ("edge_x_m", "edge_y_m", "edge_z_m")
+_LENGTH_SIGMAS: Final = ("sigma_edge_x_m", "sigma_edge_y_m", "sigma_edge_z_m")
+_BETWEEN: Final = ("angle_yz_deg", "angle_zx_deg", "angle_xy_deg")
+_BETWEEN_SIGMAS: Final = ("sigma_angle_yz_deg", "sigma_angle_zx_deg", "sigma_angle_xy_deg")
+_SIZES: Final = ("box_x_m", "box_y_m", "box_z_m")
+_SIZE_SIGMAS: Final = ("sigma_box_x_m", "sigma_box_y_m", "sigma_box_z_m")
+
+CORNER_COLUMNS: Final[dict[str, str]] = (
+    {"time_s": "Float64", "file": "String", "id": "Int64", "hypothesis": "Int64", "probability": "Float64"}
+    | dict.fromkeys((*_QUATERNION, *_VERTEX), "Float64")
+    | {"right_handed": "Boolean", "misfit": "Float64"}
+    | dict.fromkeys((*_LENGTHS, *_LENGTH_SIGMAS, *_BETWEEN, *_BETWEEN_SIGMAS), "Float64")
+    | {"box": "Int64"}
+    | dict.fromkeys((*_SIZES, *_SIZE_SIGMAS, *_COVARIANCE), "Float64")
+)
+"""The keys of the rows of `corner_rows` in their order, each with the name of its type in Polars."""
+
+
+def corner_rows(estimates: Sequence[tuple[float, str, CornerEstimate]]) -> list[dict[str, Any]]:
+    """One row for each hypothesis of each corner that is believed in each frame, that of the pose first.
+
+    `hypothesis` counts from 0, the likeliest. qx..qw are `object_from_camera`, the vertex is in the left camera's
+    frame, cov_rx_rx..cov_z_z are the upper triangle of its `covariance`. Lengths and angles of edges are of the corner,
+    not of the hypothesis. `box` is the number of its cuboid in the frame, from 1 (`join_boxes`), with its sizes along
+    the edges of the first corner of it. None where something is not told.
+    """
+    rows = []
+    upper = np.triu_indices(6)
+    for time_s, file, estimate in estimates:
+        boxes: dict[int, dict[str, Any]] = {}
+        for number, box in enumerate(join_boxes(estimate.corners), start=1):
+            sizes: dict[str, Any] = dict(zip(_SIZES, box.sizes_m.tolist(), strict=True))
+            sizes |= {"box": number} | dict(zip(_SIZE_SIGMAS, box.size_sigmas_m.tolist(), strict=True))
+            boxes |= dict.fromkeys(box.corners, sizes)
+        for place, corner in enumerate(estimate.corners):
+            edges: dict[str, Any] = dict(zip(_LENGTHS, corner.edge_lengths_m.tolist(), strict=True))
+            edges |= boxes.get(place, {})
+            edges |= dict(zip(_LENGTH_SIGMAS, corner.edge_length_sigmas_m.tolist(), strict=True))
+            edges |= dict(zip(_BETWEEN, np.degrees(corner.edge_angles_rad).tolist(), strict=True))
+            edges |= dict(zip(_BETWEEN_SIGMAS, np.degrees(corner.edge_angle_sigmas_rad).tolist(), strict=True))
+            edges = {name: None if np.isnan(value) else value for name, value in edges.items()}
+            for number, pose in enumerate(corner.hypotheses):
+                row: dict[str, Any] = dict.fromkeys(CORNER_COLUMNS)
+                row |= {"time_s": time_s, "file": file, "id": corner.id, "hypothesis": number}
+                row |= {"probability": pose.probability, "right_handed": pose.right_handed, "misfit": pose.misfit}
+                row |= dict(zip(_QUATERNION, quaternion(pose.camera_from_object.T).tolist(), strict=True))
+                if pose.vertex_m is not None:
+                    row |= dict(zip(_VERTEX, pose.vertex_m.tolist(), strict=True))
+                rows.append(row | edges | dict(zip(_COVARIANCE, pose.covariance[upper].tolist(), strict=True)))
     return rows
 
 

@@ -13,7 +13,7 @@ mod solve;
 
 pub(crate) use self::attitude::{CornerAttitude, CornerAttitudes};
 pub(crate) use self::detector::CornerDetector;
-pub(crate) use self::estimate::{CornerEstimate, CornerHypothesis};
+pub(crate) use self::estimate::{BelievedCorner, CornerEstimate, CornerHypothesis};
 pub(crate) use self::estimator::CornerPoseEstimator;
 pub(crate) use self::feature::CornerFeature;
 pub(crate) use self::pose::CornerPose;

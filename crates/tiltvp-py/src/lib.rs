@@ -50,9 +50,9 @@ mod _core {
     use crate::complementary::ComplementaryFilter;
     #[pymodule_export]
     use crate::corner::{
-        CornerAttitude, CornerAttitudes, CornerDetector, CornerEstimate, CornerFeature, CornerHypothesis, CornerPose,
-        CornerPoseEstimator, ResolvedAttitude, corner_attitudes, corner_poses, fit_corner, included_angle,
-        resolve_corners, screen_corner, solve_corner, solve_corners, triangulate,
+        BelievedCorner, CornerAttitude, CornerAttitudes, CornerDetector, CornerEstimate, CornerFeature,
+        CornerHypothesis, CornerPose, CornerPoseEstimator, ResolvedAttitude, corner_attitudes, corner_poses,
+        fit_corner, included_angle, resolve_corners, screen_corner, solve_corner, solve_corners, triangulate,
     };
     #[pymodule_export]
     use crate::drive::Drive;

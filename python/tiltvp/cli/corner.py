@@ -199,14 +199,18 @@ def _searches(
 
 
 def drawn(image: NDArray[np.uint8], camera: Camera, estimate: CornerEstimate) -> NDArray[np.uint8]:
-    """The image with its corners and the imaginary box."""
-    from tiltvp.overlays.corners import draw_box, draw_corners
+    """The image with its corners, their names, and their boxes: the imaginary one where the pose is of none."""
+    from tiltvp.corner_boxes import join_boxes
+    from tiltvp.overlays.corners import draw_box, draw_corners, draw_names
 
     canvas = draw_corners(image, camera, estimate.features_left, estimate.chosen_left)
-    pose = estimate.pose
-    if pose is not None:
+    pose, boxes = estimate.pose, join_boxes(estimate.corners)
+    for box in boxes:
+        draw_box(canvas, camera, box.vertex_m, box.edges, box.sizes_m)
+    if pose is not None and not any(0 in box.corners for box in boxes):
         vertex = pose.vertex_m
         if vertex is None:
             vertex = estimate.features_left[estimate.chosen_left[0]].vertex
         draw_box(canvas, camera, vertex, pose.edges)
+    draw_names(canvas, camera, estimate.features_left, estimate.corners)
     return canvas

@@ -26,17 +26,21 @@ class CornerResults:
 
     out: Path | None = None
     """File for the poses, one row for each frame: .csv, .json or .parquet."""
+    corners: Path | None = None
+    """File for all corners that are believed, with names that last, poses, covariances, and lengths and angles of their
+    edges, one row for each hypothesis of each corner in each frame: .csv, .json or .parquet."""
     trajectory: Path | None = None
     """File for the trajectory in TUM's format: time, position and quaternion of the camera in the object's frame."""
     overlay: Path | None = None
-    """Folder for the left images with corners and imaginary boxes."""
+    """Folder for the left images with corners, their names, the cuboids that they make, and imaginary boxes."""
     plot: Path | None = None
     """Picture of attitude and position over time (.png)."""
 
     def check(self, *, has_scale: bool) -> None:
         """Refuses what cannot be written, before any work is done; a trajectory wants poses that have a place."""
-        if self.out is not None:
-            check_ending(self.out)
+        for file in (self.out, self.corners):
+            if file is not None:
+                check_ending(file)
         if self.trajectory is not None:
             if not has_scale:
                 expected = "expected two, or --camera-height-m, --edge-length-m or --box-size-m"
@@ -49,12 +53,14 @@ class CornerResults:
         check_plot("--plot", self.plot)
 
     def write(self, estimates: Sequence[tuple[float, str, CornerEstimate]]) -> None:
-        """The table, the trajectory and the plot of estimates with times and names of their frames."""
-        from tiltvp.corner_tables import POSE_COLUMNS, pose_rows, write_trajectory
+        """The tables, the trajectory and the plot of estimates with times and names of their frames."""
+        from tiltvp.corner_tables import CORNER_COLUMNS, POSE_COLUMNS, corner_rows, pose_rows, write_trajectory
 
         table = Table(POSE_COLUMNS, pose_rows(estimates))
         if self.out is not None:
             write_table(table, self.out)
+        if self.corners is not None:
+            write_table(Table(CORNER_COLUMNS, corner_rows(estimates)), self.corners)
         if self.trajectory is not None:
             write_trajectory(table.rows, self.trajectory)
         if self.plot is not None:

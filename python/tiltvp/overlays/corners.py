@@ -13,14 +13,16 @@ from tiltvp.images import gray_from
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
-    from tiltvp._core import Camera, CornerFeature
+    from tiltvp._core import BelievedCorner, Camera, CornerFeature
 
-__all__ = ["draw_box", "draw_corners"]
+__all__ = ["draw_box", "draw_corners", "draw_names"]
 
 _EDGE_COLOURS = ((60, 60, 255), (80, 220, 80), (255, 140, 60))
 """BGR of the edges x, y, z."""
 _BOX = (170, 170, 170)
 _POINTS = 24
+_TEXT = 0.6
+"""Size of names: 13 pixels, that of the vertices' circles."""
 _LENGTH = 0.15
 """Length of the box's edges where nothing is known of its distance, as a share of it."""
 
@@ -49,15 +51,16 @@ def draw_corners(
 
 
 def draw_box(
-    canvas: NDArray[np.uint8], camera: Camera, vertex: ArrayLike, edges: ArrayLike, length: float | None = None
+    canvas: NDArray[np.uint8], camera: Camera, vertex: ArrayLike, edges: ArrayLike, length: ArrayLike | None = None
 ) -> None:
-    """Draws the imaginary box into a picture: edges of equal `length` from the vertex along the rows of `edges`.
+    """Draws the imaginary box into a picture: edges of equal `length`, or of one each, along the rows of `edges`.
 
     `vertex` (3,) is the vertex in the camera's frame, metres, or its bearing; the default length is a share of its
-    distance. The three edges from the vertex are coloured, the others grey.
+    distance. The three edges from the vertex are coloured, the others grey. A length that is NaN is 0.
     """
     origin = np.asarray(vertex, dtype=np.float64)
-    axes = np.asarray(edges, dtype=np.float64) * (_LENGTH * np.linalg.norm(origin) if length is None else length)
+    lengths = np.nan_to_num(np.asarray(_LENGTH * np.linalg.norm(origin) if length is None else length))
+    axes = np.asarray(edges, dtype=np.float64) * np.broadcast_to(lengths, 3)[:, None]
     share = np.linspace(0.0, 1.0, _POINTS)[:, None]
     for k, axis in enumerate(axes):
         others = [axes[j] for j in range(3) if j != k]
@@ -65,6 +68,21 @@ def draw_box(
             _curve(canvas, camera, origin + start + axis * share, _BOX, 1)
     for axis, colour in zip(axes, _EDGE_COLOURS, strict=True):
         _curve(canvas, camera, origin + axis * share, colour, 2)
+
+
+def draw_names(
+    canvas: NDArray[np.uint8], camera: Camera, features: Sequence[CornerFeature], corners: Iterable[BelievedCorner]
+) -> None:
+    """Writes the names of corners beside their vertices, as in the left image; those without one have none."""
+    import cv2
+
+    for corner in corners:
+        at = _whole(camera.project(features[corner.left].vertex))
+        if at is not None and corner.id is not None:
+            place = (at[0] + 9, at[1] - 9)
+            # Dark around light, for any ground.
+            for colour, width in (((0, 0, 0), 4), ((255, 255, 255), 1)):
+                cv2.putText(canvas, str(corner.id), place, cv2.FONT_HERSHEY_SIMPLEX, _TEXT, colour, width, cv2.LINE_AA)
 
 
 def _curve(

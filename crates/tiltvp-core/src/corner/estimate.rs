@@ -125,6 +125,34 @@ impl Hypothesis {
     }
 }
 
+/// The angle between two edges.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct EdgeAngle {
+    /// The angle, radians, in [0, pi].
+    pub angle_rad: f64,
+    /// Its standard deviation, radians.
+    pub sigma_rad: f64,
+}
+
+/// A corner of a frame that is believed: seen in all images, with one interpretation that stands out.
+#[derive(Debug, Clone, PartialEq)]
+pub struct BelievedCorner {
+    /// The name of its place in the world, from 1: kept from frame to frame, and when the corner was out of sight and is seen again.
+    /// None where it has no place or one that is hardly known, and where it is too near to a named place to be told from it.
+    pub id: Option<u32>,
+    /// All of its hypotheses, the likeliest first; that is its pose.
+    pub hypotheses: Vec<Hypothesis>,
+    /// Which feature of the left image it is.
+    pub left: usize,
+    /// Which feature of the right image it is.
+    pub right: Option<usize>,
+    /// Where its edges x, y, z end.
+    pub ends: [Option<EdgeEnd>; 3],
+    /// The angles between the edges y and z, z and x, x and y, from the planes of each edge in two images alone: right angles
+    /// are not in them. None from one image, and where both planes of an edge nearly coincide.
+    pub angles: [Option<EdgeAngle>; 3],
+}
+
 /// The estimate from one frame.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CornerEstimate {
@@ -141,6 +169,8 @@ pub struct CornerEstimate {
     /// Where the edges x, y, z of the pose end, where lines along the others meet them; from two grey images with edges at right
     /// angles, and from one image with a known length.
     pub ends: [Option<EdgeEnd>; 3],
+    /// All corners that are believed, that of the pose first.
+    pub corners: Vec<BelievedCorner>,
     /// Why the pose has no place.
     pub place: PlaceVerdict,
     /// Whether the pose before was a prior.

@@ -38,7 +38,7 @@ pub use self::closed_form::standard_model::{CornerCase, StandardType};
 pub use self::coloured::Window;
 pub use self::coloured::segmentation::{ColorOptions, Primary};
 pub use self::detector::{CornerDetector, CornerScratch};
-pub use self::estimate::{CornerEstimate, CornerVerdict, Hypothesis, PlaceVerdict};
+pub use self::estimate::{BelievedCorner, CornerEstimate, CornerVerdict, EdgeAngle, Hypothesis, PlaceVerdict};
 pub use self::estimator_options::{EstimatorOptions, KnownEdge};
 pub use self::feature::{CornerFeature, Edge};
 pub use self::fusion::{FusedPose, fuse_rays};
@@ -50,5 +50,6 @@ pub use self::options::{
 pub use self::pose::{CornerOptions, CornerPose, corner_poses};
 pub use self::ray::FittedRay;
 pub use self::sequence::estimator::{CornerPoseEstimator, Frame};
+pub use self::sequence::names::{CornerNames, KnownWorld, NamedPlace};
 pub use self::sequence::track::{KnownCorner, Track};
 pub use self::triangulation::{BearingObservation, TriangulatedPoint, triangulate};

@@ -1,9 +1,9 @@
-//! `CornerEstimate` and `CornerHypothesis`: what a frame tells, as frozen Python values.
+//! `CornerEstimate`, `BelievedCorner` and `CornerHypothesis`: what a frame tells, as frozen Python values.
 
 use nalgebra::{Matrix3, Matrix6, Vector3};
 use pyo3::IntoPyObjectExt;
 use pyo3::prelude::*;
-use tiltvp_core::corner::{self as core, CornerVerdict, EdgeEnd, Hypothesis, PlaceVerdict};
+use tiltvp_core::corner::{self as core, CornerVerdict, EdgeAngle, EdgeEnd, Hypothesis, PlaceVerdict};
 
 use super::feature::CornerFeature;
 use crate::array::Array;
@@ -48,6 +48,80 @@ impl CornerHypothesis {
 }
 
 value! {
+    /// A corner of a frame that is believed: seen in all images, in one way, with one interpretation that stands out.
+    ///
+    /// Frozen, comparable, and to be pickled.
+    BelievedCorner(core::BelievedCorner as own) {
+        /// The name of its place in the world, from 1: kept from frame to frame, and when the corner was out of sight and is
+        /// seen again. None where it has no place or one that is hardly known, and where it is too near to a named place to
+        /// be told from it.
+        id: Option<u32>,
+        /// All of its hypotheses, the likeliest first.
+        hypotheses: Vec<CornerHypothesis> = own.hypotheses.iter().copied().map(CornerHypothesis::from).collect(),
+        /// Which corner of `features_left` it is.
+        left: usize,
+        /// Which corner of `features_right` it is; None with one camera.
+        right: Option<usize>,
+        /// Fresh (3,) float64: how long its edges x, y, z are, metres, as `CornerEstimate.edge_lengths_m`; NaN where no image
+        /// shows it.
+        edge_lengths_m: [Option<f64>; 3] = own.ends.map(|end| end.map(|end| end.length_m)),
+        /// Fresh (3,) float64: the standard deviations of these lengths, metres.
+        edge_length_sigmas_m: [Option<f64>; 3] = own.ends.map(|end| end.map(|end| end.sigma_m)),
+        /// Fresh (3, 3) float64, rows x, y, z: where its edges end in the left camera's frame, metres, as
+        /// `CornerEstimate.edge_ends_m`.
+        edge_ends_m: [Option<Vector3<f64>>; 3] = own.ends.map(|end| end.and_then(|end| end.place_m)),
+        /// Fresh (3,) float64: the angles between the edges y and z, z and x, x and y, radians, from the planes of each edge in
+        /// both images alone; NaN from one image, and where the two planes of an edge nearly coincide.
+        edge_angles_rad: [Option<f64>; 3] = own.angles.map(|angle| angle.map(|angle| angle.angle_rad)),
+        /// Fresh (3,) float64: the standard deviations of these angles, radians.
+        edge_angle_sigmas_rad: [Option<f64>; 3] = own.angles.map(|angle| angle.map(|angle| angle.sigma_rad)),
+    }
+    make {
+        if hypotheses.is_empty() {
+            return Err(invalid("values[\"hypotheses\"]: none, expected one or more".to_owned()));
+        }
+        let angle = |(angle, sigma): (Option<f64>, Option<f64>)| {
+            Some(EdgeAngle { angle_rad: angle?, sigma_rad: sigma.unwrap_or(f64::NAN) })
+        };
+        core::BelievedCorner {
+            id,
+            hypotheses: hypotheses.into_iter().map(|hypothesis| hypothesis.inner).collect(),
+            left,
+            right,
+            ends: ends(&edge_lengths_m, &edge_length_sigmas_m, &edge_ends_m),
+            angles: [0, 1, 2].map(|k| angle((edge_angles_rad[k], edge_angle_sigmas_rad[k]))),
+        }
+    };
+    repr {
+        let probability = own.hypotheses[0].probability;
+        match own.id {
+            Some(id) => format!("BelievedCorner(id {id}, probability {probability:.3})"),
+            None => format!("BelievedCorner(no id, probability {probability:.3})"),
+        }
+    };
+}
+
+#[pymethods]
+impl BelievedCorner {
+    /// Its pose, the likeliest of its hypotheses.
+    #[getter]
+    fn pose(&self) -> CornerHypothesis {
+        self.inner.hypotheses[0].into()
+    }
+}
+
+fn ends(
+    lengths_m: &[Option<f64>; 3],
+    sigmas_m: &[Option<f64>; 3],
+    places_m: &[Option<Vector3<f64>>; 3],
+) -> [Option<EdgeEnd>; 3] {
+    [0, 1, 2].map(|k| {
+        let sigma_m = sigmas_m[k].unwrap_or(f64::NAN);
+        lengths_m[k].map(|length_m| EdgeEnd { length_m, sigma_m, place_m: places_m[k] })
+    })
+}
+
+value! {
     /// What one frame tells of a corner: the likeliest pose if one stands out, and all hypotheses. False without a
     /// pose.
     ///
@@ -68,9 +142,13 @@ value! {
         /// Fresh (3,) float64: how long the edges x, y, z are, metres, to where lines along the others meet them; NaN where
         /// no image shows that. From two grey images with right angles, and from one image with a known length.
         edge_lengths_m: [Option<f64>; 3] = own.ends.map(|end| end.map(|end| end.length_m)),
+        /// Fresh (3,) float64: the standard deviations of these lengths, metres.
+        edge_length_sigmas_m: [Option<f64>; 3] = own.ends.map(|end| end.map(|end| end.sigma_m)),
         /// Fresh (3, 3) float64, rows x, y, z: where these edges end in the left camera's frame, metres, from both images
         /// alone; NaN where only one of them shows it, or none. With a known length from the pose of the one image.
         edge_ends_m: [Option<Vector3<f64>>; 3] = own.ends.map(|end| end.and_then(|end| end.place_m)),
+        /// All corners that are believed, each with a name, that of the pose first. From one camera that of the pose alone.
+        corners: Vec<BelievedCorner> = own.corners.iter().cloned().map(BelievedCorner::from).collect(),
         /// Why the likeliest hypothesis has no place; empty where it has one, and where there is none.
         place_reason: String = own.place.reason().to_owned(),
         /// Whether the pose of a frame before was a prior.
@@ -84,7 +162,6 @@ value! {
         let place = PlaceVerdict::ALL.into_iter().find(|place| place.reason() == place_reason).ok_or_else(|| {
             invalid(format!("values[\"place_reason\"] = {place_reason:?}, expected one that `place_reason` gives"))
         })?;
-        let end = |k: usize| edge_lengths_m[k].map(|length_m| EdgeEnd { length_m, place_m: edge_ends_m[k] });
         let inner = |features: Vec<CornerFeature>| features.into_iter().map(|feature| feature.inner).collect();
         core::CornerEstimate {
             hypotheses: hypotheses.into_iter().map(|hypothesis| hypothesis.inner).collect(),
@@ -93,7 +170,8 @@ value! {
             features: [inner(features_left), inner(features_right)],
             chosen_left,
             chosen_right,
-            ends: [end(0), end(1), end(2)],
+            ends: ends(&edge_lengths_m, &edge_length_sigmas_m, &edge_ends_m),
+            corners: corners.into_iter().map(|corner| corner.inner).collect(),
             place,
             followed,
             object,

@@ -3,7 +3,7 @@
 use nalgebra::Matrix4;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyTuple};
-use tiltvp_core::corner::{self as core, CornerMethod, EstimatorOptions, Frame, Track};
+use tiltvp_core::corner::{self as core, CornerMethod, CornerNames, EstimatorOptions, Frame, Track};
 use tiltvp_core::geometry::RigidMotion;
 
 use super::detector::CornerDetector;
@@ -99,7 +99,7 @@ impl CornerPoseEstimator {
         self.coloured
     }
 
-    /// Forgets the poses of the frames before.
+    /// Forgets the poses of the frames before and the corners that have a name; no name is given again.
     fn reset(&self, py: Python<'_>) -> PyResult<()> {
         self.inner.change(py, |estimator| {
             estimator.reset();
@@ -156,11 +156,12 @@ impl CornerPoseEstimator {
     }
 
     /// Sets what pickle has kept.
-    fn __setstate__(slf: &Bound<'_, Self>, state: (u32, Option<Bound<'_, PyDict>>)) -> PyResult<()> {
-        let (objects, track) = state;
+    fn __setstate__(slf: &Bound<'_, Self>, state: (u32, Option<Bound<'_, PyDict>>, Bound<'_, PyDict>)) -> PyResult<()> {
+        let (objects, track, names) = state;
         let track = track.map(|values| memory::from_dict(&values)).transpose()?;
+        let names = memory::names_from_dict(&names)?;
         slf.get().inner.change(slf.py(), |estimator| {
-            estimator.set_state(objects, track);
+            estimator.set_state(objects, track, names);
             Ok(())
         })
     }
@@ -169,16 +170,17 @@ impl CornerPoseEstimator {
         let (py, this) = (slf.py(), slf.get());
         let cameras = (slf.get_type(), this.left(py), this.right(py), this.left_from_right(py)?);
         let make = py.import("functools")?.getattr("partial")?.call(cameras, Some(&this.options(py)?))?;
-        let (objects, track) = this.state(py);
+        let (objects, track, names) = this.state(py);
         let track = track.map(|track| memory::to_dict(py, &track)).transpose()?;
-        (make, PyTuple::empty(py), (objects, track)).into_pyobject(py)
+        (make, PyTuple::empty(py), (objects, track, memory::names_to_dict(py, &names)?)).into_pyobject(py)
     }
 }
 
 impl CornerPoseEstimator {
-    /// The number of objects so far, and the track of the last one.
-    fn state(&self, py: Python<'_>) -> (u32, Option<Track>) {
-        let owned = |(objects, track): (u32, Option<&Track>)| (objects, track.cloned());
+    /// The number of objects so far, the track of the last one, and the corners that have a name.
+    fn state(&self, py: Python<'_>) -> (u32, Option<Track>, CornerNames) {
+        let owned =
+            |(objects, track, names): (u32, Option<&Track>, &CornerNames)| (objects, track.cloned(), names.clone());
         self.inner.look(py, |estimator| owned(estimator.state()))
     }
 }

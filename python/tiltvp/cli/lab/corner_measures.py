@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter, validators
 
@@ -13,6 +13,11 @@ from tiltvp.cli.tables import write_frame
 from tiltvp.cli.terminal import progress_bar, say
 from tiltvp.errors import InvalidInputError
 from tiltvp.files import check_output_folder
+
+if TYPE_CHECKING:
+    import polars as pl
+
+    from tiltvp.lab.evaluation.corners import CornerExperiment
 
 
 def corners(
@@ -28,8 +33,8 @@ def corners(
     """Poses of corners: the closed form on random poses, and rendered sequences of a hand-held stereo pair.
 
     Tables have the closed form's error, errors with noise against the Cramer-Rao bound, errors of attitude and position
-    with flips in the sequences, of the published method beside ours, and what an inertial sensor makes of the
-    attitudes.
+    with flips in the sequences, of the published method beside ours, what an inertial sensor makes of the attitudes,
+    and whether names of corners in rooms last.
 
     Parameters
     ----------
@@ -85,8 +90,11 @@ def _sequences(frames: int, names: tuple[str, ...], seed: int, threads: int, out
     if inertial.height:
         summary = summarise_inertial_comparison(inertial)
         show_frame("With an inertial sensor, errors in degrees", summary, ["method"])
+    named = _names(experiment, threads)
     if out is not None:
         write_frame(table, out / "corners.parquet")
+        if named is not None:
+            write_frame(named, out / "names.parquet")
         for key, part in table.partition_by("scene", "method", as_dict=True, maintain_order=True).items():
             name = ", ".join(map(str, key))
             file = out / f"{name.replace(', ', '-').replace(' ', '-')}.png"
@@ -95,3 +103,28 @@ def _sequences(frames: int, names: tuple[str, ...], seed: int, threads: int, out
             write_frame(inertial, out / "inertial.parquet")
             write_image(out / "inertial.png", figure_picture(inertial_errors(inertial)))
         say(f"{out}: tables and plots")
+
+
+def _names(experiment: CornerExperiment, threads: int) -> pl.DataFrame | None:
+    """The table of names of corners, shown; None without a room of 40 frames."""
+    import polars as pl
+
+    from tiltvp.lab.evaluation.corner_names import names_seen, summarise_names
+    from tiltvp.lab.evaluation.corners import down_in
+
+    rooms = [
+        (scene, frames, experiment.seed + k)
+        for k, (scene, frames) in enumerate(zip(experiment.scenes, experiment.lengths(), strict=True))
+        if scene.kind != "laboratory" and frames >= 40
+    ]
+    if not rooms:
+        return None
+    rows = []
+    with progress_bar(sum(frames for _, frames, _ in rooms), "frames of rooms") as bar:
+        for scene, frames, seed in rooms:
+            sequence = scene.sequence(frames, seed, threads)
+            seen = names_seen(sequence, threads=threads, advance=bar.advance, down=down_in(sequence))
+            rows += [{"scene": scene.name, "hidden": cover} | summarise_names(part) for cover, part in seen.items()]
+    table = pl.DataFrame(rows)
+    show_frame("Names of corners, 12 frames of each room hidden", table, ["scene", "hidden"])
+    return table

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
     Pair = tuple[NDArray[np.uint8], NDArray[np.uint8]]
 
-__all__ = ["CORNER_SCENES", "CornerExperiment", "CornerScene", "measure_corners", "summarise_corners"]
+__all__ = ["CORNER_SCENES", "CornerExperiment", "CornerScene", "down_in", "measure_corners", "summarise_corners"]
 
 _FLIP_DEG: Final = 20.0
 """An attitude that is farther off is another interpretation, not a noisy one."""
@@ -192,8 +192,7 @@ def _estimates(
     angle: dict[str, Any] = {"gamma_rad": math.radians(scene.gamma_deg)}
     known = angle | scene.known
     if scene.kind != "laboratory":
-        # What tells upright edges from level ones is how the board is held, as its accelerometer has it on average.
-        known["down"] = -sequence.imu(seed=sequence.seed).forces_m_s2.mean(axis=0)
+        known["down"] = down_in(sequence)
     left, right = sequence.cameras
     estimators = {
         method: CornerPoseEstimator(
@@ -215,6 +214,12 @@ def _estimates(
                 for method, scale in _scales(sequence, frame, heights):
                     looks[method] = _timed(CornerPoseEstimator(left, method="coloured", **known, **scale), pair[0])
             yield looks
+
+
+def down_in(sequence: StereoSequence) -> NDArray[np.float64]:
+    """(3,): what tells upright edges from level ones: how the board is held, as its accelerometer has it on average."""
+    down: NDArray[np.float64] = -sequence.imu(seed=sequence.seed).forces_m_s2.mean(axis=0)
+    return down
 
 
 def _scales(sequence: StereoSequence, frame: int, heights: np.random.Generator) -> Iterator[tuple[str, dict[str, Any]]]:

@@ -17,6 +17,8 @@ use crate::image::{ImageView, LightTable};
 pub struct EdgeEnd {
     /// How far it is from the vertex, metres: along the edge where one camera sees it, else the distance of the two points.
     pub length_m: f64,
+    /// The standard deviation of that length, metres.
+    pub sigma_m: f64,
     /// Where it is in the left camera's frame, metres, from its bearings in both images alone; none where one image shows it.
     pub place_m: Option<Vector3<f64>>,
 }
@@ -28,6 +30,26 @@ pub(crate) struct ObservedEnd {
     sigma_rad: f64,
     length_m: f64,
 }
+
+impl ObservedEnd {
+    /// The end as this image alone has it, with the vertex in the frame of its camera. Of a triangle with the sides d (to the
+    /// vertex), e (to the end) and L, L err by what the bearing does, times e over the sine of the angle at the end, and as d by
+    /// what the vertex does along the line of sight; the pose's directions err far less.
+    fn alone(&self, vertex_m: &Vector3<f64>, covariance_m2: &Matrix3<f64>) -> EdgeEnd {
+        let away = vertex_m / vertex_m.norm();
+        let at_camera = away.angle(&self.bearing);
+        // The sine rule: L / sin(angle at the camera) = d / sin(angle at the end).
+        let sine = (vertex_m.norm() * at_camera.sin() / self.length_m).clamp(SINE_MIN, 1.0);
+        let end_m = (vertex_m.norm_squared() + self.length_m * self.length_m).sqrt();
+        let by_bearing = self.sigma_rad * end_m / sine;
+        let by_distance = away.dot(&(covariance_m2 * away)).sqrt() * self.length_m / vertex_m.norm();
+        EdgeEnd { length_m: self.length_m, sigma_m: by_bearing.hypot(by_distance), place_m: None }
+    }
+}
+
+/// The least sine of the angle between an edge and the line of sight to its end: below it (3 degrees) its length in one image
+/// is told to nothing better than a share of a tenth.
+const SINE_MIN: f64 = 0.05;
 
 /// What one camera sees of a corner.
 pub(crate) struct ObservedCorner<'a> {
@@ -154,6 +176,7 @@ pub(crate) fn edge_ends(
     [left, right]: [[Option<ObservedEnd>; 3]; 2],
     left_from_right: &RigidMotion,
     vertex_m: &Vector3<f64>,
+    vertex_covariance_m2: &Matrix3<f64>,
 ) -> [Option<EdgeEnd>; 3] {
     let observation = |end: &ObservedEnd, rig_from_camera| BearingObservation {
         bearing: end.bearing,
@@ -166,11 +189,20 @@ pub(crate) fn edge_ends(
             (Some(left), Some(right)) => {
                 let apart = (left.length_m - right.length_m).abs();
                 let both = [observation(left, RigidMotion::identity()), observation(right, *left_from_right)];
-                triangulate(&both)
-                    .filter(|_| apart <= LENGTHS_APART * left.length_m.max(right.length_m))
-                    .map(|point| EdgeEnd { length_m: (point.point_m - vertex_m).norm(), place_m: Some(point.point_m) })
+                triangulate(&both).filter(|_| apart <= LENGTHS_APART * left.length_m.max(right.length_m)).map(|point| {
+                    let reach_m = point.point_m - vertex_m;
+                    let along = reach_m / reach_m.norm();
+                    let variance = along.dot(&((point.covariance_m2 + vertex_covariance_m2) * along));
+                    EdgeEnd { length_m: reach_m.norm(), sigma_m: variance.sqrt(), place_m: Some(point.point_m) }
+                })
             }
-            (Some(one), None) | (None, Some(one)) => Some(EdgeEnd { length_m: one.length_m, place_m: None }),
+            (Some(one), None) => Some(one.alone(vertex_m, vertex_covariance_m2)),
+            (None, Some(one)) => {
+                // The vertex as the right camera has it.
+                let turned = left_from_right.rotation.transpose();
+                let covariance_m2 = turned * vertex_covariance_m2 * turned.transpose();
+                Some(one.alone(&left_from_right.inverse().point(vertex_m), &covariance_m2))
+            }
             (None, None) => None,
         };
     }

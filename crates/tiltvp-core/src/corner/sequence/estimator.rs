@@ -3,15 +3,16 @@
 use nalgebra::{Matrix3, Matrix6, Vector3};
 
 use super::agreement::{SAME_VERTEX_RAD, agreement, fits, renamed};
+use super::believed::SeenPair;
+use super::names::CornerNames;
 use super::track::Track;
 use crate::corner::closed_form::attitude::IncludedAngle;
 use crate::corner::closed_form::prior::{AttitudePrior, VerticalSense};
 use crate::corner::closed_form::resolve::{Alignment, View, resolve};
 use crate::corner::detector::{CornerDetector, CornerScratch};
-use crate::corner::estimate::{CornerEstimate, CornerVerdict, Hypothesis, PlaceVerdict};
+use crate::corner::estimate::{BelievedCorner, CornerEstimate, CornerVerdict, Hypothesis, PlaceVerdict};
 use crate::corner::estimator_options::{EstimatorOptions, KnownEdge};
 use crate::corner::feature::CornerFeature;
-use crate::corner::general::edge_ends::{EdgeEnd, edge_ends};
 use crate::corner::general::guided::ExpectedCorner;
 use crate::corner::options::CornerMethod;
 use crate::error::{Error, Result};
@@ -35,6 +36,7 @@ pub struct CornerPoseEstimator {
     pub(super) options: EstimatorOptions,
     pub(super) track: Option<Track>,
     objects: u32,
+    names: CornerNames,
     pub(super) scratch: [CornerScratch; 2],
 }
 
@@ -74,7 +76,7 @@ impl CornerPoseEstimator {
             return Err(Error::argument(scale, "given for method \"paper\"", "none, or method \"coloured\""));
         }
         let scratch = [left.scratch(), right.as_ref().map_or(left.scratch(), |(right, _)| right.scratch())];
-        Ok(Self { left, right, options, track: None, objects: 0, scratch })
+        Ok(Self { left, right, options, track: None, objects: 0, names: CornerNames::default(), scratch })
     }
 
     /// The left or only camera's detector.
@@ -92,19 +94,20 @@ impl CornerPoseEstimator {
         &self.options
     }
 
-    /// The number of objects so far, and the track of the last one, if there is one.
-    pub fn state(&self) -> (u32, Option<&Track>) {
-        (self.objects, self.track.as_ref())
+    /// The number of objects so far, the track of the last one, if there is one, and the corners that have a name.
+    pub fn state(&self) -> (u32, Option<&Track>, &CornerNames) {
+        (self.objects, self.track.as_ref(), &self.names)
     }
 
     /// Goes on from a state.
-    pub fn set_state(&mut self, objects: u32, track: Option<Track>) {
-        (self.objects, self.track) = (objects, track);
+    pub fn set_state(&mut self, objects: u32, track: Option<Track>, names: CornerNames) {
+        (self.objects, self.track, self.names) = (objects, track, names);
     }
 
-    /// Forgets what was seen.
+    /// Forgets what was seen; what had a number or a name does not share it with anything that comes.
     pub fn reset(&mut self) {
         self.track = None;
+        self.names.forget();
     }
 
     /// The direction of the vertical in the left camera's frame, from the last pose or from before.
@@ -162,6 +165,7 @@ impl CornerPoseEstimator {
             chosen_left: Vec::new(),
             chosen_right: None,
             ends: [None; 3],
+            corners: Vec::new(),
             place: PlaceVerdict::Told,
             followed: self.track.is_some(),
             object: self.objects,
@@ -189,56 +193,55 @@ impl CornerPoseEstimator {
             let decided = best.probability >= self.options.probability_min;
             estimate.verdict = if decided { CornerVerdict::Found } else { CornerVerdict::Ambiguous };
         }
-        if let Some(right) = right {
-            estimate.ends = self.ends([left, right], &estimate);
+        let frames = [left, right.unwrap_or(left)];
+        if let (Some(_), Some(left), Some(right)) =
+            (estimate.pose(), estimate.chosen_left.first(), estimate.chosen_right)
+        {
+            let own = SeenPair { left: *left, right, poses: estimate.hypotheses.clone() };
+            estimate.ends = self.ends_of(frames, &estimate, &own);
         }
-        if let Some(pose) = estimate.hypotheses.first().filter(|_| estimate.verdict == CornerVerdict::Found) {
-            if !self.track.as_ref().is_some_and(|track| track.is_of(pose)) {
-                self.objects += 1;
-                estimate.object = self.objects;
-            }
-            let turned = self.right.as_ref().map_or(Matrix3::identity(), |(_, motion)| motion.rotation.transpose());
-            let parallel = |side: usize, attitude: Matrix3<f64>| -> Vec<CornerFeature> {
-                let fits = |corner: &&CornerFeature| fits(corner, &attitude, self.options.agree_max_rad);
-                let mut out: Vec<CornerFeature> = Vec::new();
-                for corner in estimate.features[side].iter().filter(fits) {
-                    // The longest rays of each vertex.
-                    let apart_rad = |other: &CornerFeature| other.vertex().angle(&corner.vertex());
-                    match out.iter_mut().find(|other| apart_rad(other) < SAME_VERTEX_RAD) {
-                        Some(other) if other.support_score() < corner.support_score() => *other = *corner,
-                        Some(_) => {}
-                        None => out.push(*corner),
-                    }
-                }
-                out
-            };
-            let corners = [parallel(0, pose.camera_from_object), parallel(1, turned * pose.camera_from_object)];
-            self.track = Some(Track::next(self.track.take(), pose, corners, estimate.object, &seen));
-        }
+        self.follow(&mut estimate, &seen);
         self.place_by_scale(left, vertical.as_ref(), &mut estimate);
+        estimate.corners = self.believed(frames, &estimate, seen);
+        self.name(&mut estimate.corners);
         Ok(estimate)
     }
 
-    /// Where the edges of the pose end.
-    fn ends(&mut self, frames: [&Frame<'_>; 2], estimate: &CornerEstimate) -> [Option<EdgeEnd>; 3] {
-        let (Some((detector, left_from_right)), Some(pose), Some(chosen)) =
-            (&self.right, estimate.pose(), estimate.chosen_right)
-        else {
-            return [None; 3];
-        };
-        let (Some(vertex_m), [Frame::Gray(left), Frame::Gray(right)]) = (pose.vertex_m, frames) else {
-            return [None; 3];
-        };
-        if self.options.angle != IncludedAngle::RIGHT {
-            return [None; 3];
+    /// Goes on to the pose of a frame, and to the corners beside it.
+    fn follow(&mut self, estimate: &mut CornerEstimate, seen: &[SeenPair]) {
+        let Some(pose) = estimate.pose().copied() else { return };
+        if !self.track.as_ref().is_some_and(|track| track.is_of(&pose)) {
+            self.objects += 1;
+            estimate.object = self.objects;
         }
-        let corners = [&estimate.features[0][estimate.chosen_left[0]], &estimate.features[1][chosen]];
-        let [first, second] = &mut self.scratch;
-        let seen = [
-            self.left.ends(left, corners[0], pose, &RigidMotion::identity(), first),
-            detector.ends(right, corners[1], pose, &left_from_right.inverse(), second),
-        ];
-        edge_ends(seen, left_from_right, &vertex_m)
+        let turned = self.right.as_ref().map_or(Matrix3::identity(), |(_, motion)| motion.rotation.transpose());
+        let parallel = |side: usize, attitude: Matrix3<f64>| -> Vec<CornerFeature> {
+            let fits = |corner: &&CornerFeature| fits(corner, &attitude, self.options.agree_max_rad);
+            let mut out: Vec<CornerFeature> = Vec::new();
+            for corner in estimate.features[side].iter().filter(fits) {
+                // The longest rays of each vertex.
+                let apart_rad = |other: &CornerFeature| other.vertex().angle(&corner.vertex());
+                match out.iter_mut().find(|other| apart_rad(other) < SAME_VERTEX_RAD) {
+                    Some(other) if other.support_score() < corner.support_score() => *other = *corner,
+                    Some(_) => {}
+                    None => out.push(*corner),
+                }
+            }
+            out
+        };
+        let corners = [parallel(0, pose.camera_from_object), parallel(1, turned * pose.camera_from_object)];
+        let others: Vec<Hypothesis> = seen.iter().map(|pair| pair.poses[0]).collect();
+        self.track = Some(Track::next(self.track.take(), &pose, corners, estimate.object, &others));
+    }
+
+    /// Gives the corners of a frame their names. The coloured cuboid is known by its colours.
+    fn name(&mut self, corners: &mut [BelievedCorner]) {
+        if !self.is_one_object() {
+            return self.names.give(corners, &self.options);
+        }
+        for corner in corners {
+            corner.id = Some(1);
+        }
     }
 
     /// Whether edges and object are the same from frame to frame, as those of the coloured cuboid are.

@@ -1,8 +1,10 @@
 //! Corners in a sequence of images of one camera or a pair: hypotheses from pairs of corners, tracking, and transfer between views.
 
 mod agreement;
+mod believed;
 pub(super) mod estimator;
 mod height;
+pub(super) mod names;
 mod pairs;
 mod paper;
 mod shared_attitude;

@@ -3,6 +3,7 @@
 use nalgebra::{Matrix3, Vector3};
 
 use super::agreement::{apart, renamed};
+use super::believed::SeenPair;
 use super::estimator::CornerPoseEstimator;
 use super::support::CornerSupport;
 use super::transfer::upright;
@@ -119,13 +120,13 @@ impl CornerPoseEstimator {
 
     /// The poses of the pair of features, one of each image, that fits best; of the corner that is followed or one that is known
     /// beside it, where there is one. Where an `attitude` is known on which several corners agree, pairs that do not are left
-    /// out. Returns the poses of all pairs that fit well, chosen or not.
+    /// out. Returns all pairs that fit well, chosen or not.
     pub(crate) fn by_pair(
         &self,
         attitude: Option<&Matrix3<f64>>,
         common: Option<&CommonAttitude>,
         estimate: &mut CornerEstimate,
-    ) -> Result<Vec<Hypothesis>> {
+    ) -> Result<Vec<SeenPair>> {
         let mut seen = Vec::new();
         let Some((_, left_from_right)) = &self.right else { return Ok(seen) };
         let priors = self.priors(self.is_one_object());
@@ -151,7 +152,7 @@ impl CornerPoseEstimator {
                 }
                 let fits_well = misfit <= WELL * self.options.misfit_max;
                 if fits_well {
-                    seen.push(*pose);
+                    seen.push(SeenPair { left: i, right: j, poses: poses.clone() });
                 }
                 let likely = match &self.track {
                     Some(track) if !self.is_one_object() => track.likelihood(pose, fits_well),

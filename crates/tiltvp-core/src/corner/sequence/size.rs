@@ -167,6 +167,7 @@ impl CornerPoseEstimator {
         }
         let mut best = *best;
         best.covariance *= inflation;
+        best.length_sigmas_m = best.length_sigmas_m.map(|sigma_m| sigma_m * inflation.sqrt());
         let distance_m = best.vertex_m.norm();
         let away = best.vertex_m / distance_m;
         let place = best.covariance.fixed_view::<3, 3>(3, 3).into_owned();
@@ -201,8 +202,11 @@ impl CornerPoseEstimator {
             estimate.chosen_left[..=at].rotate_right(1);
         }
         for axis in 0..3 {
-            estimate.ends[axis] = sized.lengths_m[axis]
-                .map(|length_m| EdgeEnd { length_m, place_m: Some(sized.vertex_m + sized.edges[axis] * length_m) });
+            estimate.ends[axis] = sized.lengths_m[axis].map(|length_m| EdgeEnd {
+                length_m,
+                sigma_m: sized.length_sigmas_m[axis],
+                place_m: Some(sized.vertex_m + sized.edges[axis] * length_m),
+            });
         }
     }
 }

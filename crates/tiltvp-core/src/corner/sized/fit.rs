@@ -45,6 +45,8 @@ pub(crate) struct SizedPose {
     pub(crate) covariance: Matrix6<f64>,
     /// The lengths of the edges whose ends are seen, metres.
     pub(crate) lengths_m: [Option<f64>; 3],
+    /// The standard deviations of these, as the rays' covariances have it; 0 for a length that is known exactly, and without one.
+    pub(crate) length_sigmas_m: [f64; 3],
     /// Sum of the squared misses of all lines and known numbers, in standard deviations.
     pub(crate) chi_square: f64,
     /// Its degrees of freedom.
@@ -120,6 +122,8 @@ pub(crate) fn fit_sized(
                 vertex_m: state.vertex,
                 covariance: covariance.fixed_view::<6, 6>(0, 0).into_owned(),
                 lengths_m: state.lengths,
+                length_sigmas_m: [0, 1, 2]
+                    .map(|i| if free[LENGTHS + i] { covariance[(LENGTHS + i, LENGTHS + i)].sqrt() } else { 0.0 }),
                 chi_square: system.chi_square,
                 freedom: (2 * lines.len() + system.known).checked_sub(free.iter().filter(|free| **free).count())?,
             });
