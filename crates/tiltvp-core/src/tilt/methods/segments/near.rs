@@ -162,16 +162,9 @@ impl Near {
         }
     }
 
-    /// The lean with the greatest sum of odds, then reweighted least squares.
-    ///
-    /// `weighed` becomes the numbers of the segments that were weighed, with their probabilities of being vertical.
-    pub(super) fn fit(&self, segments: &Segments, weighed: &mut Vec<(u32, f64)>, work: &mut NearWork) -> Fit {
-        self.weigh(segments, weighed, &mut work.rows);
+    /// The normal of the lean with the greatest sum of odds.
+    fn best_of_grid(&self, work: &mut NearWork) -> Option<Vector3<f64>> {
         let NearWork { rows, columns, scores } = work;
-        let failed = Fit::failed;
-        if rows.len() < 2 {
-            return failed(Stop::TooFew { have: rows.len(), need: 2 });
-        }
         columns.fill(rows, 0.5 * self.step_rad);
         scores.clear();
         scores.extend(
@@ -184,8 +177,21 @@ impl Near {
             let sum: f64 = rows.iter().map(|row| row.weight * row.odds_at(row.normal.dot(&normal)).ln_1p()).sum();
             (sum + f64::from(lean.prior), normal)
         };
-        let best = scores.iter().take(BEST).map(|(_, i)| exact(*i)).max_by(|a, b| a.0.total_cmp(&b.0));
-        let Some((_, mut normal)) = best else { return failed(Stop::NoModel { trials: 0 }) };
+        let best = scores.iter().take(BEST).map(|(_, i)| exact(*i)).max_by(|a, b| a.0.total_cmp(&b.0))?;
+        Some(best.1)
+    }
+
+    /// The lean with the greatest sum of odds, then reweighted least squares.
+    ///
+    /// `weighed` becomes the numbers of the segments that were weighed, with their probabilities of being vertical.
+    pub(super) fn fit(&self, segments: &Segments, weighed: &mut Vec<(u32, f64)>, work: &mut NearWork) -> Fit {
+        self.weigh(segments, weighed, &mut work.rows);
+        let failed = Fit::failed;
+        if work.rows.len() < 2 {
+            return failed(Stop::TooFew { have: work.rows.len(), need: 2 });
+        }
+        let Some(mut normal) = self.best_of_grid(work) else { return failed(Stop::NoModel { trials: 0 }) };
+        let rows = &mut work.rows;
 
         // In the tangent plane of the upright: `normal = (x, y, 1)`, scaled.
         let mut stop = Stop::IterationLimit { limit: ITERATIONS, change: f64::INFINITY };
