@@ -70,10 +70,26 @@ def fixture_values(camera: tiltvp.Camera, room: RoomImage) -> dict[str, list[Any
         *corners(),
     ]
     values += values[-1].hypotheses or [_core.CornerHypothesis.from_dict(hypothesis())]
+    values.append(_core.BelievedCorner.from_dict(believed()))
     by_name: dict[str, list[Any]] = {}
     for value in values:
         by_name.setdefault(type(value).__name__, []).append(value)
     return by_name
+
+
+def believed() -> dict[str, Any]:
+    """A corner of which each edge tells something else."""
+    return {
+        "id": 3,
+        "hypotheses": [hypothesis()],
+        "left": 2,
+        "right": None,
+        "edge_lengths_m": [0.4, 0.3, None],
+        "edge_length_sigmas_m": [0.002, 0.001, None],
+        "edge_ends_m": [[0.4, 0.0, 2.0], None, None],
+        "edge_angles_rad": [1.5, None, 1.6],
+        "edge_angle_sigmas_rad": [0.05, None, 0.02],
+    }
 
 
 def hypothesis() -> dict[str, Any]:

@@ -206,7 +206,7 @@ mod tests {
         let turned = *Rotation3::from_euler_angles(0.5, 0.6, 0.1).matrix();
         let edges = [Vector3::x(), Vector3::new(0.1, 1.0, 0.0).normalize(), Vector3::new(0.3, 0.0, 1.0).normalize()]
             .map(|edge| turned * edge);
-        let (vertex, baseline) = (Vector3::new(0.1, -0.2, 2.0), Vector3::new(0.12, 0.05, 0.0));
+        let (vertex, baseline) = (Vector3::new(0.1, -0.2, 2.0), Vector3::new(0.9, 0.6, 0.0));
         let seen = |from: Vector3<f64>| {
             let toward = edges.map(|edge| vertex - from + 0.3 * edge);
             CornerFeature::from_bearings(&(vertex - from), &toward).unwrap()
