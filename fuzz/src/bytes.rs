@@ -1,7 +1,21 @@
 //! Numbers of every kind from the bytes that the fuzzer makes: the bytes that are missing are zeros.
 
+use std::sync::LazyLock;
+
+use tiltvp_core::cap_simd_level;
+
 /// The bytes that are left.
 pub(crate) struct Bytes<'a>(pub(crate) &'a [u8]);
+
+/// The variable that caps the vectors, as in Python.
+const SIMD_VARIABLE: &str = "TILTVP_SIMD";
+
+/// The vectors of this process are those that are asked for.
+static CAPPED: LazyLock<()> = LazyLock::new(|| {
+    if let Ok(word) = std::env::var(SIMD_VARIABLE) {
+        cap_simd_level(SIMD_VARIABLE, &word).expect("a level of this machine");
+    }
+});
 
 /// Numbers at which formulas end.
 const ODD: [f64; 16] = [
@@ -23,7 +37,12 @@ const ODD: [f64; 16] = [
     f64::MAX,
 ];
 
-impl Bytes<'_> {
+impl<'a> Bytes<'a> {
+    pub(crate) fn new(data: &'a [u8]) -> Self {
+        LazyLock::force(&CAPPED);
+        Self(data)
+    }
+
     pub(crate) fn byte(&mut self) -> u8 {
         let Some((first, rest)) = self.0.split_first() else { return 0 };
         self.0 = rest;

@@ -14,7 +14,7 @@ pub(crate) static ZOO: LazyLock<Vec<Camera>> = LazyLock::new(|| zoo().into_iter(
 
 /// A lens of the zoo of which some parameters are changed, and questions.
 pub fn lens(data: &[u8]) {
-    let mut bytes = Bytes(data);
+    let mut bytes = Bytes::new(data);
     let camera = match camera(&mut bytes) {
         Ok(camera) => camera,
         Err(error) => {

@@ -8,7 +8,7 @@ use crate::picture::{Picture, SMALL};
 
 /// A detector of a small camera and two pictures, the second with the memory of the first.
 pub fn segments(data: &[u8]) {
-    let mut bytes = Bytes(data);
+    let mut bytes = Bytes::new(data);
     let camera = &SMALL[bytes.below(SMALL.len())];
     let own = SegmentDetectorOptions::default();
     let edges = EdgeOptions {
