@@ -151,15 +151,49 @@ survive *arguments: setup
 soak *arguments: setup
     {{bin}}/python tests/soak.py {{arguments}}
 
-# What they find is in out/fuzz, what they have learned in out/fuzz/readers. atheris has an environment of its own, in target.
-# Attacks on what reads files, options and states, which coverage guides: for an hour, or as `-max_total_time=SECONDS` says.
-survive-long *arguments: setup
+# What they find is in out/fuzz, what they have learned in the folders of it. atheris has an environment of its own, in target.
+# Attacks on the readers of files, options and states, then on the core, which coverage guides: for an hour, or the given seconds.
+survive-long seconds="3600": setup (fuzz seconds)
     test -x target/atheris/bin/python || {{bin}}/python -m venv target/atheris
     target/atheris/bin/pip install --quiet atheris==3.0.0
-    mkdir -p out/fuzz
     PYTHONPATH="$PWD/python:$PWD/tests:$({{bin}}/python -c 'import sysconfig; print(sysconfig.get_path("purelib"))')" \
         target/atheris/bin/python tests/fuzz_readers.py out/fuzz/readers \
-        -max_total_time=3600 -timeout=5 -rss_limit_mb=1024 -artifact_prefix=out/fuzz/ -print_final_stats=1 {{arguments}}
+        -max_total_time=$(({{seconds}} / 2 + 1)) -timeout=5 -rss_limit_mb=1024 -artifact_prefix=out/fuzz/ -print_final_stats=1
+
+# For the toolchain that alone has coverage and sanitizers: not installed by a recipe, as it takes a gigabyte.
+[private]
+nightly:
+    @cargo +nightly --version > /dev/null 2>&1 || { echo "needs Rust's nightly toolchain: rustup toolchain install nightly" >&2; exit 1; }
+
+# What cargo-fuzz would say to the compiler: coverage of blocks and comparisons, and AddressSanitizer.
+coverage := "-Cpasses=sancov-module -Cllvm-args=-sanitizer-coverage-level=4 -Cllvm-args=-sanitizer-coverage-inline-8bit-counters \
+    -Cllvm-args=-sanitizer-coverage-pc-table -Cllvm-args=-sanitizer-coverage-trace-compares -Zsanitizer=address"
+
+# Attacks on the core alone, by each file of fuzz/src/bin for as long, half of the given seconds in all. TILTVP_SIMD caps the vectors.
+fuzz seconds="3600": nightly
+    #!/usr/bin/env bash
+    set -euo pipefail
+    host=$(rustc --print host-tuple)
+    RUSTFLAGS="{{coverage}}" cargo +nightly build --locked --release --manifest-path fuzz/Cargo.toml --target $host --target-dir target/fuzz
+    targets=$(ls fuzz/src/bin | sed 's/[.]rs$//')
+    for target in $targets; do
+        mkdir -p out/fuzz/$target
+        echo "== $target"
+        target/fuzz/$host/release/$target out/fuzz/$target fuzz/corpus/$target -max_len=400 -timeout=10 -rss_limit_mb=2048 -verbosity=0 \
+            -max_total_time=$(({{seconds}} / 2 / $(wc -w <<< $targets) + 1)) -artifact_prefix=out/fuzz/$target- -print_final_stats=1
+    done
+
+# The unit tests of kernels and core under AddressSanitizer, at each level of vectors that the machine has.
+sanitize: setup nightly
+    #!/usr/bin/env bash
+    set -euo pipefail
+    host=$(rustc --print host-tuple)
+    tests() { cargo +nightly test --locked --target $host --target-dir target/sanitize --quiet --lib "$@"; }
+    export PROPTEST_RNG_SEED=20171028 PROPTEST_CASES=32
+    for level in $({{bin}}/python -c 'import tiltvp._core; print(*tiltvp._core.SIMD_LEVELS)'); do
+        echo "== AddressSanitizer, $level"
+        TILTVP_SIMD=$level RUSTFLAGS="-Zsanitizer=address --cfg asked_level" tests --package tiltvp-kernels --package tiltvp-core
+    done
 
 # The tests on real data, in the folder that TILTVP_DATA names.
 test-real *arguments: setup

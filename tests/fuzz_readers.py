@@ -46,7 +46,7 @@ OPTIONED: tuple[Callable[..., object], ...] = (
     tiltvp.corner.CornerPoseEstimator,
 )
 VALUES = sorted(name for name in _core.__all__ if hasattr(getattr(_core, name), "from_dict") and name != "Camera")
-"""Without `Camera`, whose `max_theta_rad` and `mirror` of other types are still a TypeError or OverflowError."""
+"""Without `Camera`, whose `mirror` of other types is a TypeError."""
 CAMERA = tiltvp.Camera.equidistant(width=32, height=24, focal_px=9.0, cx=15.5, cy=11.5)
 
 
@@ -108,9 +108,7 @@ def options(content: bytes) -> object:
     except (ValueError, RecursionError):
         return None
     made = OPTIONED[content[0] % len(OPTIONED)]
-    # No option, but an argument: of other types it is Python's TypeError.
-    values.pop("wheel_base_m", None)
-    return made(**values, **({"wheel_base_m": 0.4} if made is tiltvp.SelfCalibrator else {}))
+    return made(**({"wheel_base_m": 0.4} | values if made is tiltvp.SelfCalibrator else values))
 
 
 def value(content: bytes) -> object:

@@ -8,16 +8,26 @@ import re
 import subprocess
 import sys
 import time
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 import tiltvp
+import tiltvp.lines
 from hostile import aliases, own, png
 from tiltvp import _core
 from tiltvp.drive_logs import read_drive_log
-from tiltvp.errors import CalibrationError, ImageFileError, InvalidInputError, OutputError, TiltvpError
+from tiltvp.errors import (
+    LONGEST_MESSAGE,
+    CalibrationError,
+    ImageFileError,
+    InvalidInputError,
+    OutputError,
+    TiltvpError,
+)
 from tiltvp.files import keeping_existing, whole_file, write_whole
 from tiltvp.formats import document
 from tiltvp.stereo_rigs import StereoRig
@@ -173,3 +183,21 @@ def test_outputs_are_kept_where_that_is_asked_and_parts_of_the_dead_are_swept(tm
     assert [path.name for path in tmp_path.iterdir()] == ["out.txt"]
     with pytest.raises(OutputError, match="no regular file"):
         write_whole("/dev/null", "lost")
+
+
+@pytest.mark.parametrize("value", [10**400, 10**5000, "1", [1.0], object()], ids=type)
+def test_arguments_that_no_float_can_hold_are_refused_by_name(value: Any) -> None:
+    camera = {"width": 64, "height": 48, "focal_px": 30.0, "cx": 31.5, "cy": 23.5}
+    calibrator, tracker = tiltvp.SelfCalibrator(wheel_base_m=0.4), tiltvp.lines.LineTracker()
+    seen = tiltvp.lines.LineExtractor(tiltvp.Camera.equidistant(**camera))(np.zeros((48, 64), np.uint8))
+    asked: dict[str, Callable[[], object]] = {
+        "max_theta_rad": lambda: tiltvp.Camera.equidistant(**camera, max_theta_rad=value),
+        "wheel_base_m": lambda: tiltvp.SelfCalibrator(wheel_base_m=value),
+        "delta_left_m": lambda: calibrator.step(value, 0.1, [1], [0.2]),
+        "distance_m": lambda: tracker.update(seen, np.zeros((0, 4), np.float32), distance_m=value),
+    }
+    for name, ask in asked.items():
+        with pytest.raises(InvalidInputError, match="expected a number that a float can hold") as caught:
+            ask()
+        assert len(str(caught.value)) <= LONGEST_MESSAGE
+        assert caught.value.__notes__ == [f"while processing '{name}'"]

@@ -264,6 +264,23 @@ fn vertical_edge_along_the_line_of_sight() {
 }
 
 #[test]
+fn angles_are_not_below_none_and_bearings_of_any_length() {
+    // With the vertical edge along the line of sight the root is a zero, which had a sign.
+    let toward = [[-1.0, -1.0, -1.0], [-0.75, -1.0, 1.0], [0.0, -1.0, 2.121_963_412e-314]].map(Vector3::from);
+    let along = CornerFeature::from_bearings(&Vector3::new(5e-312, -1.0, -1.0), &toward).unwrap();
+    let found = corner_attitudes(&along, &IncludedAngle::RIGHT).unwrap();
+    assert!(!found.is_empty() && found.iter().all(|attitude| (0.0..=PI).contains(&attitude.alpha_rad)), "{found:?}");
+    let truth = perpendicular(0.9, 2.0, 0.7).unwrap();
+    let exact = truth.feature();
+    for length in [1e-300, 1e-162, 1e200] {
+        let toward = truth.edges.map(|edge| (truth.vertex * 2.0 + edge) * length);
+        let same = CornerFeature::from_bearings(&(truth.vertex * length), &toward).unwrap();
+        assert!((same.vertex() - exact.vertex()).norm() < 1e-15, "{length}");
+        assert!((0..3).all(|i| (same.rays()[i].normal - exact.rays()[i].normal).norm() < 1e-14), "{length}");
+    }
+}
+
+#[test]
 fn wrong_questions_are_errors() {
     let truth = perpendicular(0.9, 2.0, 0.7).unwrap();
     for gamma_rad in [0.0, PI, -1.0, f64::NAN, f64::INFINITY] {

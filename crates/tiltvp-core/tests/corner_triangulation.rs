@@ -66,4 +66,21 @@ fn nothing_is_triangulated_from_parallel_or_parting_lines_of_sight() {
     assert!(triangulate(&[ahead, parallel]).is_none());
     let parting = observe(left_from_right.rotation.transpose() * Vector3::new(0.3, 0.0, 1.0), left_from_right);
     assert!(triangulate(&[ahead, parting]).is_none());
+    let meeting = observe(left_from_right.inverse().point(&(ahead.bearing * 2.0)), left_from_right);
+    let sure = |covariance| [ahead, meeting].map(|one| BearingObservation { covariance, ..one });
+    assert!(triangulate(&sure(ahead.covariance)).is_some());
+    for wrong in [Matrix2::new(-1e-8, 0.0, 0.0, 1e-8), Matrix2::new(1e-8, 1e-7, 1e-7, 1e-8), Matrix2::repeat(f64::NAN)]
+    {
+        assert!(triangulate(&sure(wrong)).is_none());
+    }
+    // The same line of sight twice, of which rounding may make two.
+    for k in 0..200 {
+        let turn = Rotation3::from_scaled_axis(Vector3::new(-3.0, 0.01 * f64::from(k), -2.9)).into_inner();
+        let place = RigidMotion { rotation: turn, translation_m: Vector3::new(-1.0, -1.0, -1.0) };
+        for covariance in [Matrix2::zeros(), Matrix2::identity() * 1e-8] {
+            let one = BearingObservation { covariance, ..observe(Vector3::repeat(-1.0), place) };
+            let found = triangulate(&[one, one]);
+            assert!(found.is_none_or(|found| found.covariance_m2.cholesky().is_some()), "{found:?}");
+        }
+    }
 }

@@ -229,8 +229,14 @@ fn a_known_turn_keeps_far_lines_apart_and_unknown_turns_do_not() {
     assert_eq!(see(&mut tracker, -0.5, Some(0.5)), [0, 1, 2]);
     assert_eq!(see(&mut tracker, 0.0, Some(0.5)), [3, 4, 5]);
     assert_eq!(see(&mut tracker, 2.0, None), [3, 4, 5]);
-    let state = TrackerState { next_track: 1, ..tracker.state().clone() };
-    assert!(LineTracker::with_state(TrackerOptions::default(), state).is_err());
+    let own = tracker.state().clone();
+    for wrong in [
+        TrackerState { next_track: 1, ..own.clone() },
+        TrackerState { next_track: u64::MAX, ..own.clone() },
+        TrackerState { next_frame: u64::MAX, ..own },
+    ] {
+        assert!(LineTracker::with_state(TrackerOptions::default(), wrong).is_err());
+    }
 }
 
 /// Edges around a robot that drives to and fro, the nearest half a metre away, three of them alike: each keeps its track, also

@@ -9,7 +9,7 @@ use tiltvp_core::interrupt::check;
 
 use crate::array::Array;
 use crate::call::{call, call_long, exception, invalid};
-use crate::convert;
+use crate::convert::{self, Number};
 use crate::value::{frozen, getters};
 
 /// Points and their Jacobians.
@@ -38,10 +38,11 @@ impl Camera {
         model: &str,
         width: &Bound<'_, PyAny>,
         height: &Bound<'_, PyAny>,
-        max_theta_rad: Option<f64>,
+        max_theta_rad: Option<Number>,
         mirror: bool,
         parameters: Option<&Bound<'_, PyDict>>,
     ) -> PyResult<Self> {
+        let max_theta_rad = max_theta_rad.map(|number| number.0);
         let pixels = format!("1 to {} pixels", core::LARGEST_SIDE_PX);
         let (width, height) = (convert::whole(width, "width", &pixels)?, convert::whole(height, "height", &pixels)?);
         let mut named = Vec::new();
@@ -250,7 +251,7 @@ pub(crate) fn check_camera(
     width: &Bound<'_, PyAny>,
     height: &Bound<'_, PyAny>,
     parameters: &Bound<'_, PyDict>,
-    max_theta_rad: Option<f64>,
+    max_theta_rad: Option<Number>,
 ) -> PyResult<()> {
     Camera::new(model, width, height, max_theta_rad, false, Some(parameters)).map(|_| ())
 }

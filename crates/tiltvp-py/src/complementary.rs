@@ -6,7 +6,7 @@ use tiltvp_core::filter::{ComplementaryFilter as Filter, ComplementaryOptions};
 
 use crate::array::Array;
 use crate::call::exception;
-use crate::convert;
+use crate::convert::{self, Number};
 use crate::options;
 use crate::shared::Shared;
 use crate::value::changing;
@@ -53,7 +53,8 @@ impl ComplementaryFilter {
 
     /// Turns on by a rate (3,), in the body's axes, that holds for so long.
     #[pyo3(signature = (rate_rad_s: "ArrayLike", duration_s))]
-    fn predict(&self, rate_rad_s: &Bound<'_, PyAny>, duration_s: f64) -> PyResult<()> {
+    fn predict(&self, rate_rad_s: &Bound<'_, PyAny>, duration_s: Number) -> PyResult<()> {
+        let duration_s = duration_s.0;
         let rate = convert::vector3(rate_rad_s, "rate_rad_s")?;
         self.inner.change(rate_rad_s.py(), |filter| filter.predict(&rate, duration_s))
     }

@@ -157,15 +157,36 @@ pub(crate) fn to_mask<'py>(py: Python<'py>, mask: &Mask) -> PyResult<Bound<'py, 
     PyArray1::from_vec(py, usable).reshape([height, width])
 }
 
+/// A number as an argument of Python: of everything else, and of whole numbers beyond floats, a refusal of ours, to whose notes the
+/// argument's name is added.
+#[derive(Clone, Copy)]
+pub(crate) struct Number(pub(crate) f64);
+
+impl<'py> FromPyObject<'_, 'py> for Number {
+    type Error = PyErr;
+
+    #[cfg(feature = "stub")]
+    const INPUT_TYPE: pyo3::inspect::PyStaticExpr = <f64 as FromPyObject<'_, 'py>>::INPUT_TYPE;
+
+    fn extract(value: Borrowed<'_, 'py, PyAny>) -> PyResult<Self> {
+        value
+            .extract()
+            .map(Self)
+            .map_err(|_| invalid(format!("{}: expected a number that a float can hold", shown(&value))))
+    }
+}
+
+/// How a refusal shows a value.
+fn shown(value: &Bound<'_, PyAny>) -> String {
+    value.repr().map_or_else(|_| "an object".to_owned(), |repr| repr.to_string())
+}
+
 /// A whole number that the type can hold.
 pub(crate) fn whole<'py, T>(value: &Bound<'py, PyAny>, name: &str, expected: &str) -> PyResult<T>
 where
     T: for<'a> FromPyObject<'a, 'py>,
 {
-    value.extract().map_err(|_| {
-        let shown = value.repr().map_or_else(|_| "an object".to_owned(), |repr| repr.to_string());
-        invalid(format!("{name} = {shown}, expected {expected}"))
-    })
+    value.extract().map_err(|_| invalid(format!("{name} = {}, expected {expected}", shown(value))))
 }
 
 /// An item of a dict as `to_dict` makes it.

@@ -15,7 +15,7 @@ pub(crate) use self::values::Lines;
 use crate::array::Array;
 use crate::call::{call_long, exception, invalid};
 use crate::camera::Camera;
-use crate::convert;
+use crate::convert::{self, Number};
 use crate::options;
 use crate::reader::{self, image_reader};
 use crate::scratch::ScratchPool;
@@ -81,8 +81,9 @@ impl LineExtractor {
         py: Python<'_>,
         image: &Bound<'_, PyAny>,
         normal: Option<&Bound<'_, PyAny>>,
-        tilt_sigma_rad: Option<f64>,
+        tilt_sigma_rad: Option<Number>,
     ) -> PyResult<Lines> {
+        let tilt_sigma_rad = tilt_sigma_rad.map(|number| number.0);
         let image = convert::gray(image, "image")?;
         let (view, inner) = (convert::view(&image)?, &self.inner);
         let tilt = normal.map(|normal| convert::tilt(normal, "normal")).transpose()?;

@@ -18,7 +18,7 @@ pub(crate) use self::mounting::MountingEstimate;
 pub(crate) use self::step::CalibrationStep;
 use crate::array::Array;
 use crate::call::{call_long, exception, invalid};
-use crate::convert;
+use crate::convert::{self, Number};
 use crate::options;
 use crate::shared::Shared;
 use crate::value::changing;
@@ -42,7 +42,8 @@ changing!(SelfCalibrator(core::SelfCalibrator), |own| own);
 impl SelfCalibrator {
     #[new]
     #[pyo3(signature = (*, wheel_base_m, **options: "Option | None"))]
-    fn new(wheel_base_m: f64, options: Option<&Bound<'_, PyDict>>) -> PyResult<Self> {
+    fn new(wheel_base_m: Number, options: Option<&Bound<'_, PyDict>>) -> PyResult<Self> {
+        let wheel_base_m = wheel_base_m.0;
         let parsed =
             options::given(SelfCalibratorOptions { wheel_base_m, ..SelfCalibratorOptions::default() }, options)?;
         let inner = core::SelfCalibrator::new(parsed).map_err(|error| exception(&error))?;
@@ -58,11 +59,12 @@ impl SelfCalibrator {
     fn step(
         &self,
         py: Python<'_>,
-        delta_left_m: f64,
-        delta_right_m: f64,
+        delta_left_m: Number,
+        delta_right_m: Number,
         landmark_ids: &Bound<'_, PyAny>,
         bearings_rad: &Bound<'_, PyAny>,
     ) -> PyResult<CalibrationStep> {
+        let (delta_left_m, delta_right_m) = (delta_left_m.0, delta_right_m.0);
         let motion = WheelMotion { left_m: delta_left_m, right_m: delta_right_m };
         let names = convert::vector(landmark_ids, "landmark_ids")?
             .into_iter()
@@ -197,10 +199,11 @@ pub(crate) fn calibrate(
     py: Python<'_>,
     odometry: &Bound<'_, PyAny>,
     bearings: &Bound<'_, PyAny>,
-    wheel_base_m: f64,
+    wheel_base_m: Number,
     times_s: Option<&Bound<'_, PyAny>>,
     options: Option<&Bound<'_, PyDict>>,
 ) -> PyResult<LogCalibration> {
+    let wheel_base_m = wheel_base_m.0;
     let mut usual = LogOptions::default();
     usual.filter.wheel_base_m = wheel_base_m;
     let parsed = options::given(usual, options)?;
@@ -217,8 +220,9 @@ pub(crate) fn wheel_displacements<'py>(
     py: Python<'py>,
     distance_m: &Bound<'py, PyAny>,
     heading_change_rad: &Bound<'py, PyAny>,
-    wheel_base_m: f64,
+    wheel_base_m: Number,
 ) -> PyResult<Array<'py, f64>> {
+    let wheel_base_m = wheel_base_m.0;
     let distances = convert::vector(distance_m, "distance_m")?;
     let turns = convert::vector(heading_change_rad, "heading_change_rad")?;
     if distances.len() != turns.len() {
@@ -242,10 +246,11 @@ pub(crate) fn wheel_displacements<'py>(
 #[pyfunction]
 #[pyo3(signature = (probability, dof: "SupportsIndex", samples: "SupportsIndex"))]
 pub(crate) fn consistency_band(
-    probability: f64,
+    probability: Number,
     dof: &Bound<'_, PyAny>,
     samples: &Bound<'_, PyAny>,
 ) -> PyResult<(f64, f64)> {
+    let probability = probability.0;
     let count = |value, name| convert::whole::<u32>(value, name, "a whole number from 1 to 2^32 - 1");
     let (dof, samples) = (count(dof, "dof")?, count(samples, "samples")?);
     ConsistencyBand::of_mean(probability, dof, samples).map(|band| (band.low, band.high)).ok_or_else(|| {

@@ -13,7 +13,7 @@ use tiltvp_synth::{Image, Lens, RenderOptions, RobotPose, RoomKind, RoomOptions,
 use crate::array::Array;
 use crate::call::{call_long, exception, invalid};
 use crate::camera::Camera;
-use crate::convert;
+use crate::convert::{self, Number};
 use crate::options;
 use crate::value::{frozen, getters};
 
@@ -66,7 +66,8 @@ impl Room {
     }
 
     /// Whether a round robot of 0.22 m radius and less than 0.4 m height can stand with its centre there.
-    fn is_free(&self, x_m: f64, y_m: f64) -> bool {
+    fn is_free(&self, x_m: Number, y_m: Number) -> bool {
+        let (x_m, y_m) = (x_m.0, y_m.0);
         self.world.is_free(x_m, y_m)
     }
 
@@ -135,9 +136,10 @@ impl Room {
         &self,
         py: Python<'py>,
         camera: &Bound<'py, Camera>,
-        contrast_min: f64,
+        contrast_min: Number,
         options: Option<&Bound<'py, PyDict>>,
     ) -> PyResult<(Array<'py, f64>, Array<'py, f64>)> {
+        let contrast_min = contrast_min.0;
         let shot = options::given(Shot::default(), options)?;
         shot.check()?;
         let camera = &camera.get().inner;

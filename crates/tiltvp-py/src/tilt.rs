@@ -29,7 +29,7 @@ pub(crate) use self::report::FitReport;
 use crate::array::Array;
 use crate::call::{call_long, exception, invalid};
 use crate::camera::Camera;
-use crate::convert;
+use crate::convert::{self, Number};
 use crate::options;
 use crate::reader::{self, image_reader};
 use crate::scratch::ScratchPool;
@@ -225,7 +225,8 @@ pub(crate) fn tilt_error_rad(a: &Bound<'_, PyAny>, b: &Bound<'_, PyAny>) -> PyRe
 
 /// (3,): the ground normal of a lean, (-sin a cos b, -sin a sin b, cos a) (eq. 1).
 #[pyfunction]
-pub(crate) fn normal_from_alpha_beta(py: Python<'_>, alpha_rad: f64, beta_rad: f64) -> PyResult<Array<'_, f64>> {
+pub(crate) fn normal_from_alpha_beta(py: Python<'_>, alpha_rad: Number, beta_rad: Number) -> PyResult<Array<'_, f64>> {
+    let (alpha_rad, beta_rad) = (alpha_rad.0, beta_rad.0);
     if !(alpha_rad.is_finite() && beta_rad.is_finite()) {
         return Err(invalid(format!("alpha_rad, beta_rad = {alpha_rad}, {beta_rad}, expected finite angles")));
     }
@@ -241,12 +242,14 @@ pub(crate) fn normal_from_alpha_beta(py: Python<'_>, alpha_rad: f64, beta_rad: f
 #[pyfunction]
 #[pyo3(signature = (*, left_m, right_m, caster_m, half_track_m, caster_behind_m))]
 pub(crate) fn tilt_from_wheel_heights(
-    left_m: f64,
-    right_m: f64,
-    caster_m: f64,
-    half_track_m: f64,
-    caster_behind_m: f64,
+    left_m: Number,
+    right_m: Number,
+    caster_m: Number,
+    half_track_m: Number,
+    caster_behind_m: Number,
 ) -> PyResult<(f64, f64)> {
+    let (left_m, right_m, caster_m, half_track_m, caster_behind_m) =
+        (left_m.0, right_m.0, caster_m.0, half_track_m.0, caster_behind_m.0);
     let layout = WheelLayout { half_track_m, caster_behind_m };
     let tilt = layout.tilt(left_m, right_m, caster_m).map_err(|error| exception(&error))?;
     Ok((tilt.alpha_rad(), tilt.beta_rad()))

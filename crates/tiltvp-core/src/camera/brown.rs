@@ -119,6 +119,10 @@ impl Brown {
         if goal == 0.0 {
             return Some(Vector2::zeros());
         }
+        // Beyond what can be squared every point would seem to be at the centre.
+        if !goal.is_finite() {
+            return None;
+        }
         let radial = |r: f64| {
             let (f, df) = self.factor(r * r);
             (r * f - goal, f + 2.0 * r * r * df)
@@ -170,6 +174,14 @@ impl Brown {
 mod tests {
     use super::*;
     use proptest::prelude::*;
+
+    #[test]
+    fn no_ray_comes_from_where_squares_overflow() {
+        let brown = Brown::new("pinhole", [-0.31, 0.12, 9e-4, -7e-4, -0.021, 0.0, 0.0, 0.0]).expect("a lens");
+        for far in [1e3, 1e100, 1e154, 1e200, 1e300, f64::MAX] {
+            assert_eq!(brown.undistort(&Vector2::new(far, -0.5)), None, "{far}");
+        }
+    }
 
     proptest! {
         #[test]

@@ -4,7 +4,7 @@ use nalgebra::{Matrix2, Matrix3, Vector3};
 
 use super::ray::FittedRay;
 use crate::filter::chi_square_cdf;
-use crate::geometry::tangent_basis;
+use crate::geometry::{tangent_basis, unit};
 
 /// An edge of a corner, in the order in which rays are given.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -138,6 +138,8 @@ impl CornerFeature {
             covariance = information.try_inverse()?;
             vertex = (vertex - basis * (covariance * pull)).try_normalize(0.5)?;
         }
+        // Rays of which some are known exactly and others hardly: rounding may leave no covariance.
+        covariance.cholesky()?;
         let rays = turned_about(&vertex, rays)?;
         let off = rays.map(|ray| ray.normal.dot(&vertex));
         let basis = tangent_basis(&vertex);
@@ -158,7 +160,6 @@ impl CornerFeature {
     ///
     /// `None` where a ray's point is at the vertex or opposite to it, or anything is zero or not finite.
     pub fn from_bearings(vertex: &Vector3<f64>, toward: &[Vector3<f64>; 3]) -> Option<Self> {
-        let unit = |v: &Vector3<f64>| v.try_normalize(f64::MIN_POSITIVE).filter(|v| v.iter().all(|x| x.is_finite()));
         let vertex = unit(vertex)?;
         let mut rays = [None; 3];
         for (ray, toward) in rays.iter_mut().zip(toward) {

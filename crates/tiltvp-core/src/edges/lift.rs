@@ -66,7 +66,7 @@ impl LiftTable {
             let largest = 0.5 * (xx + yy) + (0.25 * (xx - yy) * (xx - yy) + xy * xy).sqrt();
             if largest > 0.0 { [e / largest.sqrt(), f / largest.sqrt()] } else { [0.0; 2] }
         };
-        Prefilter::new(&self.maps.iter().map(vector).collect::<Vec<_>>(), sin_max)
+        Prefilter::new(self.maps.iter().map(vector), sin_max)
     }
 
     /// The unit normal that [`lift`](Self::lift) makes of one edge pixel: its place in the region and its gradient. None for

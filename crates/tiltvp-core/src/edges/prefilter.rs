@@ -41,12 +41,13 @@ const HAIR: f64 = 1.0 + 5e-5;
 const ROUNDED: f64 = std::f64::consts::FRAC_1_SQRT_2 + 1e-3;
 
 impl Prefilter {
-    /// One vector for each pixel of the region, in slot order, and the limit of `|q . g| / |g|`.
-    pub(super) fn new(vectors: &[[f32; 2]], limit: f64) -> Self {
-        let largest = vectors.iter().flatten().fold(0.0, |most: f32, x| most.max(x.abs()));
+    /// One vector for each pixel of the region, in slot order, and the limit of `|q . g| / |g|`. The vectors are asked for twice, as
+    /// they would take twice the memory of what is kept of them.
+    pub(super) fn new(vectors: impl ExactSizeIterator<Item = [f32; 2]> + Clone, limit: f64) -> Self {
+        let largest = vectors.clone().flatten().fold(0.0, |most: f32, x| most.max(x.abs()));
         let unit = f64::from(largest.max(f32::MIN_POSITIVE)) / f64::from(i16::MAX);
-        let whole = |vector: &[f32; 2]| vector.map(|x| (f64::from(x) / unit).round() as i16);
-        let shape = Shape::Each(vectors.iter().map(whole).collect());
+        let whole = |vector: [f32; 2]| vector.map(|x| (f64::from(x) / unit).round() as i16);
+        let shape = Shape::Each(vectors.map(whole).collect());
         Self { vectors: Arc::new(Source { shape, unit }), limit: 0.0 }.with_limit(limit)
     }
 
@@ -64,8 +65,8 @@ impl Prefilter {
         let largest = region.pixels().map(most).fold(1.0, f64::max);
         let parts = ((f64::from(i16::MAX) - 1.0) / largest).floor();
         if parts < 8.0 {
-            let vectors: Vec<_> = region.pixels().map(|(u, v, _)| away((u, v)).map(|x| x as f32)).collect();
-            return Self::new(&vectors, offset_max_px);
+            let vectors = region.places().map(|place| away(place).map(|x| x as f32));
+            return Self::new(vectors, offset_max_px);
         }
         let centre = [centre.0, centre.1].map(|x| (x * parts).round() as i32);
         let shape = Shape::From { centre, parts: parts as i16 };

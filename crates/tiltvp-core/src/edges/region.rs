@@ -33,9 +33,8 @@ pub struct Region {
     pixels_per_rad: f64,
 }
 
-/// Bytes a pixel of the image that its tables take at most while they are made: places 4, sectors 1, maps 12, the prefilter's vectors
-/// 4 and, while they are made, 8 more.
-const TABLE_BYTES: usize = 29;
+/// Bytes a pixel of the image that its tables take at most: places 4, sectors 1, maps 12, the prefilter's vectors 4.
+const TABLE_BYTES: usize = 21;
 
 /// Bytes a pixel that the memory of one thread takes at most, where every pixel is an edge pixel.
 const SCRATCH_BYTES: usize = 48;
@@ -213,7 +212,7 @@ impl Region {
     }
 
     /// `(u, v)` of every pixel, in slot order.
-    pub fn places(&self) -> impl Iterator<Item = (usize, usize)> + '_ {
+    pub fn places(&self) -> impl ExactSizeIterator<Item = (usize, usize)> + Clone + '_ {
         self.places.iter().enumerate().map(|(slot, (u, v))| {
             if slot.is_multiple_of(CHECKED_PIXELS) {
                 check();

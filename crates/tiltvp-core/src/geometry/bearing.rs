@@ -10,6 +10,17 @@ pub fn angle_between(a: &Vector3<f64>, b: &Vector3<f64>) -> f64 {
     2.0 * (a - b).norm().atan2((a + b).norm())
 }
 
+/// The largest coordinates, either way, between which squares lose no digits: the squares of numbers from 1e-150 to 1e150 are
+/// far from the ends of the floats, 1e-308 and 1e308.
+const SQUARES: std::ops::RangeInclusive<f64> = 1e-150..=1e150;
+
+/// The unit vector along a vector of any length; none of zeros and of what is not finite.
+pub fn unit(v: &Vector3<f64>) -> Option<Vector3<f64>> {
+    let largest = v.amax();
+    let scaled = if SQUARES.contains(&largest) { *v } else { v / largest };
+    scaled.try_normalize(0.0).filter(|unit| unit.iter().all(|x| x.is_finite()))
+}
+
 /// Two unit vectors `e1`, `e2` that span the plane orthogonal to a unit bearing `n`, with `e1 x e2 = n`.
 ///
 /// For `n` close to `+z` they are close to `x` and `y`: `e1` and `e2` are the images of `x` and `y` under the smallest
@@ -58,6 +69,17 @@ pub fn tangent_transport(from: &Vector3<f64>, to: &Vector3<f64>) -> Matrix2<f64>
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn vectors_of_any_length_have_a_unit() {
+        for length in [5e-324, 1e-310, 1e-162, 1e-150, 1.0, 1e150, 1e200, 1e308] {
+            let found = unit(&Vector3::new(length, -length, 0.0)).expect("a unit vector");
+            assert!((found - Vector3::new(0.5f64.sqrt(), -0.5f64.sqrt(), 0.0)).amax() < 1e-15, "{length}: {found}");
+        }
+        for wrong in [0.0, f64::NAN, f64::INFINITY] {
+            assert_eq!(unit(&Vector3::new(wrong, 0.0, 0.0)), None);
+        }
+    }
     use proptest::prelude::*;
 
     fn unit() -> impl Strategy<Value = Vector3<f64>> {

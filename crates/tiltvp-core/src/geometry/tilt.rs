@@ -2,6 +2,8 @@
 
 use nalgebra::{Matrix3, Vector3};
 
+use super::bearing::unit;
+
 /// A lean of the robot against the ground plane (Fleer 2017, eq. 1).
 ///
 /// `normal` is the ground plane's normal seen from the leaning robot,
@@ -27,10 +29,7 @@ impl Tilt {
         if (normal.norm_squared() - 1.0).abs() <= 8.0 * f64::EPSILON {
             return Some(Self { normal: *normal });
         }
-        normal
-            .try_normalize(f64::MIN_POSITIVE)
-            .filter(|n| n.iter().all(|x| x.is_finite()))
-            .map(|normal| Self { normal })
+        unit(normal).map(|normal| Self { normal })
     }
 
     /// From roll about `x` (to the right positive) and pitch about `y` (nose down positive), in radians: the lean of a

@@ -13,7 +13,7 @@ use super::prior;
 use super::resolved::ResolvedAttitude;
 use crate::array::Array;
 use crate::call::{call, exception, invalid};
-use crate::convert;
+use crate::convert::{self, Number};
 
 /// A feature from exact bearings, or what is wrong with them.
 fn exact(vertex: [f64; 3], rays: [[f64; 3]; 3], place: &str) -> PyResult<core::CornerFeature> {
@@ -38,8 +38,9 @@ pub(crate) fn solve_corner(
     x_ray: &Bound<'_, PyAny>,
     y_ray: &Bound<'_, PyAny>,
     z_ray: &Bound<'_, PyAny>,
-    gamma_rad: f64,
+    gamma_rad: Number,
 ) -> PyResult<Vec<CornerAttitude>> {
+    let gamma_rad = gamma_rad.0;
     let vector = |value, name| convert::vector3(value, name).map(<[f64; 3]>::from);
     let rays = [vector(x_ray, "x_ray")?, vector(y_ray, "y_ray")?, vector(z_ray, "z_ray")?];
     let feature = exact(vector(vertex, "vertex")?, rays, "")?;
@@ -100,8 +101,9 @@ pub(crate) fn fit_corner(
     x: &Bound<'_, PyAny>,
     y: &Bound<'_, PyAny>,
     z: &Bound<'_, PyAny>,
-    sigma_rad: f64,
+    sigma_rad: Number,
 ) -> PyResult<CornerFeature> {
+    let sigma_rad = sigma_rad.0;
     if !(sigma_rad > 0.0 && sigma_rad.is_finite()) {
         return Err(invalid(format!("sigma_rad = {sigma_rad}, expected a standard deviation above 0, finite")));
     }
@@ -132,9 +134,10 @@ pub(crate) fn fit_corner(
 pub(crate) fn corner_attitudes(
     py: Python<'_>,
     feature: &Bound<'_, CornerFeature>,
-    gamma_rad: f64,
-    gamma_sigma_rad: f64,
+    gamma_rad: Number,
+    gamma_sigma_rad: Number,
 ) -> PyResult<Vec<CornerAttitude>> {
+    let (gamma_rad, gamma_sigma_rad) = (gamma_rad.0, gamma_sigma_rad.0);
     let feature = &feature.get().inner;
     let found = call(py, || core::corner_attitudes(feature, &IncludedAngle { gamma_rad, sigma_rad: gamma_sigma_rad }))?;
     Ok(found.iter().map(|attitude| CornerAttitude::from(*attitude)).collect())
@@ -142,7 +145,8 @@ pub(crate) fn corner_attitudes(
 
 /// Why a feature is no corner of that angle, in a sentence; None if it is one.
 #[pyfunction]
-pub(crate) fn screen_corner(feature: &Bound<'_, CornerFeature>, gamma_rad: f64) -> PyResult<Option<String>> {
+pub(crate) fn screen_corner(feature: &Bound<'_, CornerFeature>, gamma_rad: Number) -> PyResult<Option<String>> {
+    let gamma_rad = gamma_rad.0;
     let screening = Screening::of(&feature.get().inner, &IncludedAngle::exact(gamma_rad)).map_err(|e| exception(&e))?;
     let degrees = f64::to_degrees;
     Ok(match screening {
@@ -185,8 +189,8 @@ pub(crate) fn included_angle(
 #[derive(FromPyObject)]
 #[pyo3(from_item_all)]
 pub(crate) struct KnownBeforehand<'py> {
-    gamma_rad: f64,
-    gamma_sigma_rad: f64,
+    gamma_rad: Number,
+    gamma_sigma_rad: Number,
     right_handed: Option<bool>,
     priors: Bound<'py, PyAny>,
 }
@@ -194,7 +198,7 @@ pub(crate) struct KnownBeforehand<'py> {
 impl KnownBeforehand<'_> {
     fn options(&self) -> PyResult<CornerOptions> {
         Ok(CornerOptions {
-            angle: IncludedAngle { gamma_rad: self.gamma_rad, sigma_rad: self.gamma_sigma_rad },
+            angle: IncludedAngle { gamma_rad: self.gamma_rad.0, sigma_rad: self.gamma_sigma_rad.0 },
             right_handed: self.right_handed,
             priors: prior::parse(&self.priors)?,
             ..CornerOptions::default()

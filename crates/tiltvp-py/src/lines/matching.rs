@@ -6,7 +6,7 @@ use pyo3::types::PyDict;
 use tiltvp_core::lines::{self as core, BearingGate, MatchOptions};
 
 use crate::call::{call, invalid};
-use crate::convert;
+use crate::convert::{self, Number};
 use crate::options;
 
 /// `(N, K)` numbers as `f32` in row order, and K.
@@ -53,9 +53,10 @@ pub(crate) fn match_descriptors<'py>(
     b: &Bound<'py, PyAny>,
     expected_rad: Option<&Bound<'py, PyAny>>,
     seen_rad: Option<&Bound<'py, PyAny>>,
-    gate_rad: Option<f64>,
+    gate_rad: Option<Number>,
     options: Option<&Bound<'py, PyDict>>,
 ) -> PyResult<Bound<'py, PyArray2<i64>>> {
+    let gate_rad = gate_rad.map(|number| number.0);
     let Pair { a, b, width, .. } = pair(a, b)?;
     let mut parsed = MatchOptions::default();
     options::set(&mut parsed, options)?;

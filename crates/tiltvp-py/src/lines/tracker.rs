@@ -7,6 +7,7 @@ use tiltvp_core::lines::{self as core, Followed, FrameMemory, Motion, Parallax, 
 use super::matching;
 use super::values::Lines;
 use crate::call::{exception, invalid};
+use crate::convert::Number;
 use crate::options;
 use crate::shared::Shared;
 use crate::value::{changing, value};
@@ -82,9 +83,10 @@ impl LineTracker {
         py: Python<'_>,
         lines: &Bound<'_, Lines>,
         descriptors: &Bound<'_, PyAny>,
-        yaw_change_rad: Option<f64>,
-        distance_m: Option<f64>,
+        yaw_change_rad: Option<Number>,
+        distance_m: Option<Number>,
     ) -> PyResult<TrackedLines> {
+        let (yaw_change_rad, distance_m) = (yaw_change_rad.map(|number| number.0), distance_m.map(|number| number.0));
         if yaw_change_rad.is_none() && distance_m.is_some() {
             return Err(invalid("distance_m: given without yaw_change_rad, expected both or neither".to_owned()));
         }

@@ -6,7 +6,7 @@ use pyo3::types::PyTuple;
 use tiltvp_core::tilt::{self as core, ShiftModel, TrainedCorrection};
 
 use crate::call::{call, exception, invalid};
-use crate::convert;
+use crate::convert::{self, Number};
 use crate::value::{frozen, value};
 
 /// A correction from a number or one of the classes here.
@@ -51,14 +51,15 @@ value! {
         /// What is added, in radians.
         offset_rad: f64,
     }
-    make Self::new(factor, offset_rad)?.inner;
+    make Self::new(Number(factor), Number(offset_rad))?.inner;
     repr format!("AffineCorrection({:?}, {:?})", own.factor, own.offset_rad);
 }
 
 #[pymethods]
 impl AffineCorrection {
     #[new]
-    fn new(factor: f64, offset_rad: f64) -> PyResult<Self> {
+    fn new(factor: Number, offset_rad: Number) -> PyResult<Self> {
+        let (factor, offset_rad) = (factor.0, offset_rad.0);
         let inner = core::AffineCorrection { factor, offset_rad };
         inner.validate().map_err(|error| exception(&error))?;
         Ok(Self { inner })
@@ -128,13 +129,15 @@ impl PriorOfTilt {
 
     /// Every lean up to `max_rad`, in (0, pi/2), is as likely.
     #[staticmethod]
-    fn uniform(max_rad: f64) -> PyResult<Self> {
+    fn uniform(max_rad: Number) -> PyResult<Self> {
+        let max_rad = max_rad.0;
         Self::checked(core::PriorOfTilt::Uniform { max_rad })
     }
 
     /// Leans forward and sideways are independent and normal, each with standard deviation `sigma_rad`.
     #[staticmethod]
-    fn rayleigh(sigma_rad: f64) -> PyResult<Self> {
+    fn rayleigh(sigma_rad: Number) -> PyResult<Self> {
+        let sigma_rad = sigma_rad.0;
         Self::checked(core::PriorOfTilt::Rayleigh { sigma_rad })
     }
 

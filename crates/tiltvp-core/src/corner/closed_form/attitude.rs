@@ -174,7 +174,12 @@ pub(crate) fn roots(projected: &Projected, g: f64) -> [Option<f64>; 2] {
         let width = s * width;
         // Of the two forms of a root the one without cancellation.
         let t = if (b <= 0.0) == (width >= 0.0) { (width - b) / (2.0 * a) } else { 2.0 * c / (-b - width) };
-        if t.is_finite() && t >= 0.0 { Some(t) } else { (c.abs() <= ROUNDING && t < 0.0 && t > -1e-6).then_some(0.0) }
+        if t.is_finite() && t >= 0.0 {
+            // No zero with a sign, of which the angle would be less than none.
+            Some(t + 0.0)
+        } else {
+            (c.abs() <= ROUNDING && t < 0.0 && t > -1e-6).then_some(0.0)
+        }
     };
     // With two rays in one line the other root of the square has the cosine 0.
     if second > 0.0 || (second == 0.0 && product != 0.0 && g * product >= 0.0) {

@@ -43,5 +43,6 @@ pub fn included_angle(
     let [x, z] = edges;
     let (apart, tilted) = (by_vertex[1] - by_vertex[0], by_vertical[1] - by_vertical[0]);
     let variance = apart.dot(&(pencil.vertex_covariance * apart)) + tilted.dot(&(vertical_covariance * tilted)) + noise;
-    Some(IncludedAngle { gamma_rad: x.cross(&z).norm().atan2(x.dot(&z)), sigma_rad: variance.max(0.0).sqrt() })
+    let (gamma_rad, sigma_rad) = (x.cross(&z).norm().atan2(x.dot(&z)), variance.max(0.0).sqrt());
+    gamma_rad.is_finite().then_some(IncludedAngle { gamma_rad, sigma_rad })
 }

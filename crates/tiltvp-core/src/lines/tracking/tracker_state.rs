@@ -65,6 +65,12 @@ impl TrackerState {
             n => frame.descriptors.len().is_multiple_of(n) && frame.tracks.iter().all(is_known),
         };
         let is_true = |edge: &Followed| is_known(&edge.track) && edge.seen < self.next_frame;
+        // Half of what a number can be: whoever counts from there will not see the end.
+        for (name, number) in [("next_frame", self.next_frame), ("next_track", self.next_track)] {
+            if number > u64::MAX / 2 {
+                return Err(Error::argument(name, number, "a number below 2^63"));
+            }
+        }
         if !self.frames.iter().all(is_whole) || !self.followed.iter().all(is_true) {
             return Err(Error::argument(
                 "state",
