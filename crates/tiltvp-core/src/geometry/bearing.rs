@@ -69,6 +69,48 @@ pub fn tangent_transport(from: &Vector3<f64>, to: &Vector3<f64>) -> Matrix2<f64>
 #[cfg(test)]
 mod tests {
     use super::*;
+    use proptest::prelude::*;
+
+    fn bearing() -> impl Strategy<Value = Vector3<f64>> {
+        (-1.0..1.0f64, -1.0..1.0f64, -1.0..1.0f64)
+            .prop_filter_map("zero", |(x, y, z)| Vector3::new(x, y, z).try_normalize(1e-6))
+    }
+
+    proptest! {
+        #[test]
+        fn tangent_basis_is_right_handed_and_orthonormal(n in bearing()) {
+            let basis = tangent_basis(&n);
+            let (e1, e2) = (basis.column(0).into_owned(), basis.column(1).into_owned());
+            prop_assert!((e1.norm() - 1.0).abs() < 1e-9 && (e2.norm() - 1.0).abs() < 1e-9);
+            prop_assert!((e1.cross(&e2) - n).norm() < 1e-9);
+        }
+
+        #[test]
+        fn exponential_and_logarithm_are_inverse(n in bearing(), x in -2.0..2.0f64, y in -2.0..2.0f64) {
+            let step = Vector2::new(x, y);
+            let there = tangent_exp(&n, &step);
+            prop_assert!((there.norm() - 1.0).abs() < 1e-14);
+            prop_assert!((angle_between(&n, &there) - step.norm()).abs() < 1e-9);
+            prop_assert!((tangent_log(&n, &there) - step).norm() < 1e-7);
+        }
+
+        #[test]
+        fn transport_is_a_rotation_that_keeps_the_arc(n in bearing(), to in bearing()) {
+            prop_assume!(n.dot(&to) > -0.99);
+            let transport = tangent_transport(&n, &to);
+            prop_assert!((transport * transport.transpose() - Matrix2::identity()).norm() < 1e-9);
+            // The direction of the arc at its end is the transported direction at its start.
+            prop_assert!((transport * tangent_log(&n, &to) + tangent_log(&to, &n)).norm() < 1e-7);
+        }
+
+        #[test]
+        fn angle_is_symmetric_and_bounded(a in bearing(), b in bearing()) {
+            let angle = angle_between(&a, &b);
+            prop_assert!((0.0..=std::f64::consts::PI).contains(&angle));
+            prop_assert!((angle.cos() - a.dot(&b)).abs() < 1e-12);
+            prop_assert_eq!(angle, angle_between(&b, &a));
+        }
+    }
 
     #[test]
     fn vectors_of_any_length_have_a_unit() {
@@ -78,48 +120,6 @@ mod tests {
         }
         for wrong in [0.0, f64::NAN, f64::INFINITY] {
             assert_eq!(unit(&Vector3::new(wrong, 0.0, 0.0)), None);
-        }
-    }
-    use proptest::prelude::*;
-
-    fn unit() -> impl Strategy<Value = Vector3<f64>> {
-        (-1.0..1.0f64, -1.0..1.0f64, -1.0..1.0f64)
-            .prop_filter_map("zero", |(x, y, z)| Vector3::new(x, y, z).try_normalize(1e-6))
-    }
-
-    proptest! {
-        #[test]
-        fn tangent_basis_is_right_handed_and_orthonormal(n in unit()) {
-            let basis = tangent_basis(&n);
-            let (e1, e2) = (basis.column(0).into_owned(), basis.column(1).into_owned());
-            prop_assert!((e1.norm() - 1.0).abs() < 1e-9 && (e2.norm() - 1.0).abs() < 1e-9);
-            prop_assert!((e1.cross(&e2) - n).norm() < 1e-9);
-        }
-
-        #[test]
-        fn exponential_and_logarithm_are_inverse(n in unit(), x in -2.0..2.0f64, y in -2.0..2.0f64) {
-            let step = Vector2::new(x, y);
-            let there = tangent_exp(&n, &step);
-            prop_assert!((there.norm() - 1.0).abs() < 1e-14);
-            prop_assert!((angle_between(&n, &there) - step.norm()).abs() < 1e-9);
-            prop_assert!((tangent_log(&n, &there) - step).norm() < 1e-7);
-        }
-
-        #[test]
-        fn transport_is_a_rotation_that_keeps_the_arc(n in unit(), to in unit()) {
-            prop_assume!(n.dot(&to) > -0.99);
-            let transport = tangent_transport(&n, &to);
-            prop_assert!((transport * transport.transpose() - Matrix2::identity()).norm() < 1e-9);
-            // The direction of the arc at its end is the transported direction at its start.
-            prop_assert!((transport * tangent_log(&n, &to) + tangent_log(&to, &n)).norm() < 1e-7);
-        }
-
-        #[test]
-        fn angle_is_symmetric_and_bounded(a in unit(), b in unit()) {
-            let angle = angle_between(&a, &b);
-            prop_assert!((0.0..=std::f64::consts::PI).contains(&angle));
-            prop_assert!((angle.cos() - a.dot(&b)).abs() < 1e-12);
-            prop_assert_eq!(angle, angle_between(&b, &a));
         }
     }
 }
