@@ -192,7 +192,7 @@ sanitize: setup nightly
     export PROPTEST_RNG_SEED=20171028 PROPTEST_CASES=32
     for level in $({{bin}}/python -c 'import tiltvp._core; print(*tiltvp._core.SIMD_LEVELS)'); do
         echo "== AddressSanitizer, $level"
-        TILTVP_SIMD=$level RUSTFLAGS="-Zsanitizer=address --cfg asked_level" tests --package tiltvp-kernels --package tiltvp-core
+        TILTVP_BUILT_FOR=$level RUSTFLAGS="-Zsanitizer=address" tests --package tiltvp-kernels --package tiltvp-core
     done
 
 # The tests on real data, in the folder that TILTVP_DATA names.

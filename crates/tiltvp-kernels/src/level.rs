@@ -91,15 +91,12 @@ fn chosen() -> &'static Chosen {
     CHOSEN.get_or_init(|| Chosen::of(asked().or(Level::available().last()).unwrap_or(Level::Fallback)))
 }
 
-/// What the environment asks for, in builds for tests of whole crates at each level (`just sanitize`); else programs do, by [`cap`].
+/// What a build for the tests of whole crates at one level asks for (`just sanitize`); else programs do, by [`cap`].
 fn asked() -> Option<Level> {
-    #[cfg(asked_level)]
-    if let Some(word) = std::env::var_os("TILTVP_SIMD") {
-        let level = Level::available().find(|level| word == level.name());
-        assert!(level.is_some(), "TILTVP_SIMD = {word:?}, expected {}", expected());
-        return level;
-    }
-    None
+    let word = option_env!("TILTVP_BUILT_FOR")?;
+    let level = Level::available().find(|level| level.name() == word);
+    assert!(level.is_some(), "TILTVP_BUILT_FOR = {word:?}, expected {}", expected());
+    level
 }
 
 /// Caps the level of this process before anything was asked of it. False for a word that is none of the machine's, and where
