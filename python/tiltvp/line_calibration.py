@@ -152,5 +152,9 @@ def _followed(seen: Sequence[SeenFrame], tracker: LineTracker) -> list[FollowedF
 def _agree(before: LogCalibration, now: LogCalibration) -> bool:
     """Whether two mountings are within one standard deviation of each other."""
     a, b = before.mounting, now.mounting
-    off = np.array([b.x_m - a.x_m, b.y_m - a.y_m, np.remainder(b.yaw_rad - a.yaw_rad + np.pi, 2.0 * np.pi) - np.pi])
-    return float(off @ np.linalg.solve(b.covariance_xy_yaw, off)) < 1.0
+    turned = math.remainder(b.yaw_rad - a.yaw_rad, math.tau)
+    off = np.array([b.x_m - a.x_m, b.y_m - a.y_m, turned])
+    try:
+        return float(off @ np.linalg.solve(b.covariance_xy_yaw, off)) < 1.0
+    except np.linalg.LinAlgError:
+        return False

@@ -132,14 +132,18 @@ class PictureLog:
 
         moved = self._moved(read_as)
         frames, seen = self._seen(moved, self.lines.rotation() if robot_from_camera is None else robot_from_camera)
-        self.sigma_rad = float(np.median(np.concatenate([one.lines.sigma_rad for one in seen])))
+        sigmas = np.concatenate([one.lines.sigma_rad for one in seen])
+        self.sigma_rad = float(np.median(sigmas)) if len(sigmas) else None
         motions = [one or Motion() for one in moved.motions]
         odometry = displacements(motions, wheel_base_m=self._base_m)
-        with status(f"{self.name}: which line is which, and the whole log"):
-            found = calibrate_lines(
-                seen, lambda bearings: solve(DriveLog(odometry, bearings, moved.times_s)),
-                start=self.drive.start_known, frames_min=self.pictures.track_frames_min,
-            )  # fmt: skip
+        try:
+            with status(f"{self.name}: which line is which, and the whole log"):
+                found = calibrate_lines(
+                    seen, lambda bearings: solve(DriveLog(odometry, bearings, moved.times_s)),
+                    start=self.drive.start_known, frames_min=self.pictures.track_frames_min,
+                )  # fmt: skip
+        except InvalidInputError as error:
+            raise InvalidInputError(f"{self.name}: {error}") from error
         if self.pictures.tracks is not None:
             rows = zip(frames, found.frames, strict=True)
             table = track_table([(one.number, frame.name, frame.time_s, one.tracked) for frame, one in rows])
