@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from tiltvp.cli.calibrate_inputs import DriveOptions, Solve
     from tiltvp.cli.line_options import LineOptions
     from tiltvp.line_logs import SeenFrame
-    from tiltvp.streams import Frame, FrameMotions, Frames, Wheels
+    from tiltvp.streams import FrameMotions, Frames, Wheels
 
 __all__ = ["PictureLog", "PictureOptions"]
 
@@ -131,7 +131,7 @@ class PictureLog:
         from tiltvp.streams import Motion
 
         moved = self._moved(read_as)
-        frames, seen = self._seen(moved, self.lines.rotation() if robot_from_camera is None else robot_from_camera)
+        named, seen = self._seen(moved, self.lines.rotation() if robot_from_camera is None else robot_from_camera)
         sigmas = np.concatenate([one.lines.sigma_rad for one in seen])
         self.sigma_rad = float(np.median(sigmas)) if len(sigmas) else None
         motions = [one or Motion() for one in moved.motions]
@@ -145,8 +145,8 @@ class PictureLog:
         except InvalidInputError as error:
             raise InvalidInputError(f"{self.name}: {error}") from error
         if self.pictures.tracks is not None:
-            rows = zip(frames, found.frames, strict=True)
-            table = track_table([(one.number, frame.name, frame.time_s, one.tracked) for frame, one in rows])
+            rows = zip(named, found.frames, strict=True)
+            table = track_table([(one.number, name, time_s, one.tracked) for (name, time_s), one in rows])
             write_table(table, self.pictures.tracks)
         say(f"{self.name}: {len(found.bearings)} bearings of {len(set(found.bearings[:, 1].tolist()))} lines")
         doubt = "" if found.settled else "which line is which does not settle with the mounting"
@@ -154,20 +154,24 @@ class PictureLog:
 
     def _seen(
         self, moved: FrameMotions, rotation: NDArray[np.float64]
-    ) -> tuple[tuple[Frame, ...], tuple[SeenFrame, ...]]:
-        """The frames that can be used, and their lines: a drive's images together are more than the memory holds."""
+    ) -> tuple[tuple[tuple[str, float | None], ...], tuple[SeenFrame, ...]]:
+        """Names and times of the frames that can be used, and their lines, without the images: a drive's together are
+        more than the memory holds."""
         extractor = self.lines.extractor(self.camera, rotation=rotation)
         drive = Drive(extractor, self.lines.tilts(self.camera, rotation=rotation), moved)
         count, nothing = len(moved.motions), np.zeros((0, 0), np.uint8)
         with progress_bar(count, f"{self.name}: lines") as bar:
-            seen = [(frame, replace(one, gray=nothing)) for frame, one in drive.seen(iter(self.frames), bar)]
+            seen = [
+                ((frame.name, frame.time_s), replace(one, gray=nothing))
+                for frame, one in drive.seen(iter(self.frames), bar)
+            ]
         self.bad = drive.bad
         if drive.leaning:
             say(f"{self.name}: of {count} frames {drive.told()}")
         if not seen:
             raise InvalidInputError(f"{self.name}: no line is seen in {count} frames, {drive.told()}")
-        frames, lines = zip(*seen, strict=True)
-        return frames, lines
+        named, lines = zip(*seen, strict=True)
+        return named, lines
 
     def _moved(self, read_as: Sequence[str]) -> FrameMotions:
         """What the robot did, by our conventions."""
