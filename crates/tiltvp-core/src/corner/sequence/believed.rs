@@ -4,6 +4,7 @@ use nalgebra::{Matrix3, Vector3};
 
 use super::agreement::SAME_VERTEX_RAD;
 use super::estimator::{CornerPoseEstimator, Frame};
+use super::track::SAME_PLACE;
 use crate::corner::closed_form::attitude::IncludedAngle;
 use crate::corner::estimate::{BelievedCorner, CornerEstimate, EdgeAngle, Hypothesis};
 use crate::corner::feature::CornerFeature;
@@ -23,10 +24,6 @@ const OPEN: f64 = 2.0;
 
 /// The least misfit that is told from none, in standard deviations: that of rays as good as their covariances.
 const MISFIT_MIN: f64 = 1.0;
-
-/// How far apart two matches of a corner may place it and be the same, as a share of its distance: three standard deviations of a
-/// triangulated vertex (1 %).
-const SAME_PLACE: f64 = 0.03;
 
 /// How far an angle between edges may be from that of the pose, radians: 20 degrees, beyond which a pose is another interpretation
 /// or the images do not show the same corner; and beyond as many standard deviations.

@@ -7,15 +7,15 @@ use crate::corner::feature::CornerFeature;
 
 /// The share of its distance by which a vertex moves at most in the camera's frame from one frame to the next: 1 m/s at
 /// 10 frames a second and 1 m.
-const MOVED: f64 = 0.1;
+pub(super) const MOVED: f64 = 0.1;
 
 /// How far apart places of one corner of the object may be, as a share of its distance from the camera: three standard
 /// deviations of a triangulated vertex (1 %).
-const SAME_PLACE: f64 = 0.03;
+pub(super) const SAME_PLACE: f64 = 0.03;
 
 /// In how many frames a corner has to be in one place of the object before it can replace the tracked one: chance
 /// repeats once, hardly twice.
-const SEEN_MIN: u32 = 3;
+pub(super) const SEEN_MIN: u32 = 3;
 
 /// How much less likely another corner of the object is than the tracked one. The order of tracked, known and new
 /// corners is what matters, which a test holds: between 0.15 and 0.6 the poses of a real box and of rendered rooms are
@@ -35,10 +35,10 @@ const PACE_MIN: f64 = 0.005;
 
 /// How many times as far as in the frame before a vertex may move and be the same corner; more than [`PACES`], so that a hard
 /// limit comes after the soft one.
-const JUMP: f64 = 3.0;
+pub(super) const JUMP: f64 = 3.0;
 
 /// The share of its distance that is added to that: the noise of a vertex, and a camera that starts to move.
-const JUMP_MIN: f64 = 0.02;
+pub(super) const JUMP_MIN: f64 = 0.02;
 
 /// Most other corners that are remembered, those seen most often, which bounds the memory; images give at most 12 each.
 const OTHERS_MAX: usize = 32;

@@ -11,10 +11,8 @@ use nalgebra::{Matrix3, Vector3};
 use self::motion::{Found, Sighting};
 use crate::corner::estimate::BelievedCorner;
 use crate::corner::estimator_options::EstimatorOptions;
+use crate::corner::sequence::track::SEEN_MIN;
 use crate::geometry::RigidMotion;
-
-/// In how many frames a corner has to be seen for its place to be kept for later: chance repeats once, hardly twice.
-const SEEN_MIN: u32 = 3;
 
 /// Sightings after which the mean of a place hardly moves any more. Errors of neighbouring frames are much the same, so that more
 /// do not make it better; a camera that goes around a corner shows it from elsewhere by then.
@@ -178,7 +176,7 @@ impl NamedPlace {
         let paired = motion::paired(&self.edges, &seen.edges).unwrap_or([0, 1, 2]);
         for (axis, other) in paired.into_iter().enumerate() {
             self.edges[axis] = (self.edges[axis] + (seen.edges[other] - self.edges[axis]) * share).normalize();
-            // The longest that was seen well: an end may be hidden, and then the edge seems to end before it.
+            // The one that is known best.
             let length = [self.lengths_m[axis], seen.lengths_m[other]].into_iter().flatten();
             self.lengths_m[axis] = length.min_by(|a, b| a.1.total_cmp(&b.1));
         }

@@ -6,17 +6,12 @@ use nalgebra::{Matrix3, Vector3};
 use super::{KnownWorld, NamedPlace};
 use crate::corner::estimate::BelievedCorner;
 use crate::corner::estimator_options::EstimatorOptions;
+use crate::corner::sequence::agreement::apart;
+use crate::corner::sequence::track::{JUMP, JUMP_MIN, MOVED, SEEN_MIN};
 use crate::geometry::RigidMotion;
 
-/// The share of the distance of what it sees by which a camera may have moved since it knew its way and few corners are enough: 1
-/// m/s at 10 frames a second and 1 m. Where it grows with the frames since, one more of 400 made-up worlds has a wrong name.
-const MOVED: f64 = 0.1;
-
-/// How many times as far as before a camera may move from one frame to the next: a hand speeds up by as much.
-const PACES: f64 = 3.0;
-
-/// The share of the distance that is added to that: a camera that starts to move.
-const PACE_MIN: f64 = 0.02;
+/// The farthest turn of a camera from frame to frame, in its standard deviations: 99.7 % of them.
+const TURN_SIGMAS: f64 = 3.0;
 
 /// How much farther another explanation with as many corners has to be to be ruled out: a step of twice the length.
 const FARTHER: f64 = 2.0;
@@ -194,12 +189,13 @@ pub(super) fn find(world: &KnownWorld, seen: &[Sighting], options: &EstimatorOpt
 /// too, as what looks the same from elsewhere, a table from its other side, tells nothing.
 fn candidates(world: &KnownWorld, seen: &[Sighting], options: &EstimatorOptions, is_lost: bool) -> Vec<Candidate> {
     let frames = f64::from(world.age.max(1));
+    // Of a world that is not lost it does not grow with the frames: then one more of 400 made-up worlds has a wrong name.
     let longest = if is_lost { MOVED * frames } else { MOVED };
-    let usual = ((PACES * world.pace + PACE_MIN) * frames).min(longest);
-    let turn_max = (PACES * options.turn_sigma_rad * frames.sqrt()).min(TURN_MAX);
+    let usual = ((JUMP * world.pace + JUMP_MIN) * frames).min(longest);
+    let turn_max = (TURN_SIGMAS * options.turn_sigma_rad * frames.sqrt()).min(TURN_MAX);
     let mut places: Vec<&NamedPlace> = world.places.iter().collect();
     if is_lost {
-        places.retain(|place| place.seen >= super::SEEN_MIN);
+        places.retain(|place| place.seen >= SEEN_MIN);
         places.sort_by_key(|place| std::cmp::Reverse(place.seen));
         places.truncate(PLACES_LOST_MAX);
     }
@@ -222,7 +218,7 @@ fn candidates(world: &KnownWorld, seen: &[Sighting], options: &EstimatorOptions,
                 let before_m = world.camera_from_world.point(&place.place_m);
                 let [step_m, left_m] = [before_m, turn * before_m].map(|before| (corner.place_m - before).norm());
                 let moved = step_m.min(left_m) / corner.place_m.norm();
-                let within = moved <= longest && turned(&turn) <= turn_max;
+                let within = moved <= longest && apart(&rotation, &world.camera_from_world.rotation) <= turn_max;
                 if !within && !is_lost {
                     continue;
                 }
@@ -341,9 +337,4 @@ fn nearest_rotation(matrix: &Matrix3<f64>) -> Option<Matrix3<f64>> {
     let (u, v) = (svd.u?, svd.v_t?);
     let side = (u * v).determinant().signum();
     (svd.singular_values.min() > 0.1).then(|| u * Matrix3::from_diagonal(&Vector3::new(1.0, 1.0, side)) * v)
-}
-
-/// How far a rotation turns, radians.
-fn turned(rotation: &Matrix3<f64>) -> f64 {
-    (0.5 * (rotation.trace() - 1.0)).clamp(-1.0, 1.0).acos()
 }
