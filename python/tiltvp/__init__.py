@@ -23,6 +23,7 @@ from tiltvp.corrections import (
     train_posterior,
 )
 from tiltvp.images import read_image, write_image
+from tiltvp.lens_check import LensCheck, check_lens
 from tiltvp.levelling import Leveller, Unwrapper, level
 from tiltvp.overlays.edges import draw_edges
 from tiltvp.overlays.segments import draw_segments
@@ -82,6 +83,7 @@ __all__ = [
     "ImageEdges",
     "JoinedLogs",
     "JoinedTilts",
+    "LensCheck",
     "Leveller",
     "LogCalibration",
     "MountingEstimate",
@@ -103,6 +105,7 @@ __all__ = [
     "apply_correction",
     "body_mask",
     "calibrate",
+    "check_lens",
     "check_setup",
     "check_turns",
     "common_direction",

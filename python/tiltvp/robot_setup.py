@@ -61,7 +61,7 @@ class RobotSetup:
     given_robot_from_camera: NDArray[np.float64]
     """(3, 3): the mounting that was given, or that of the direction that is up, before roll and pitch."""
     direction: SetupCheck
-    """Which way is up."""
+    """Which way is up, and whether the lens is as told."""
     rim: bool
     """Whether a dark surround was found that the calibration does not know."""
     body: BodyMask
@@ -80,7 +80,9 @@ class RobotSetup:
     @property
     def reasons(self) -> list[str]:
         """What keeps it from being used, a sentence each."""
-        found = [] if self.sure_of_direction else [f"which way is up is not sure: {self.direction.reason}"]
+        found = [] if self.sure_of_direction else [f"which way is up is not sure: {self.direction.direction_reason}"]
+        if not self.direction.lens:
+            found.append(self.direction.lens.reason)
         if self.turns is not None and self.turns.reversed:
             found.append(self.turns.reason)
         return found if self.mounting else [*found, self.mounting.reason]

@@ -1,4 +1,4 @@
-"""Whether a camera sits as it is said to: which of its six directions is up, as a few images tell."""
+"""Whether a camera is and sits as it is said to, as a few images tell: which of six directions is up, and the lens."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ import numpy as np
 
 from tiltvp.errors import InvalidInputError
 from tiltvp.images import gray_from
+from tiltvp.lens_check import LensCheck, check_lens
 from tiltvp.segments import SegmentDetector
 
 if TYPE_CHECKING:
@@ -65,17 +66,19 @@ BELIEVABLE: Final = 0.05
 
 @dataclass(frozen=True)
 class SetupCheck:
-    """Which of the camera's six directions is up. True if the given mounting is believable.
+    """Which of the camera's six directions is up, and whether its lens is as told. True if mounting and calibration are
+    believable.
 
     `given` is the direction of `DIRECTIONS` that is nearest to up by the mounting that was given, `best` the most
-    probable by the images, `probabilities` those of all six, `images` how many were looked at, and `reason` says all
-    this in a sentence.
+    probable by the images, `probabilities` those of all six, `images` how many were looked at, `lens` what the
+    straightness of edges says of the calibration, and `reason` says all this in a sentence or two.
     """
 
     given: str
     best: str
     probabilities: dict[str, float]
     images: int
+    lens: LensCheck
 
     @property
     def believable(self) -> bool:
@@ -84,7 +87,12 @@ class SetupCheck:
 
     @property
     def reason(self) -> str:
-        """What was found, in a sentence."""
+        """What was found; of the lens only if it is not believable."""
+        return self.direction_reason if self.lens else f"{self.direction_reason}; {self.lens.reason}"
+
+    @property
+    def direction_reason(self) -> str:
+        """Which direction is up, in a sentence."""
         shares = self.probabilities
         what = f"{_WORDS[self.best]}; probability {shares[self.best]:.2f}"
         told = f"{self.images} images: up is the camera's {self.best} ({what})"
@@ -95,7 +103,7 @@ class SetupCheck:
         )
 
     def __bool__(self) -> bool:
-        return self.believable
+        return self.believable and bool(self.lens)
 
 
 def check_setup(
@@ -105,23 +113,23 @@ def check_setup(
     *,
     mask: ArrayLike | None = None,
 ) -> SetupCheck:
-    """Which of the camera's six directions is up in some images, and whether the given mounting is believable.
+    """Which of the camera's six directions is up in some images, and whether mounting and calibration are believable.
 
     Five images from different places, or with different headings, are enough. `robot_from_camera` is (3, 3), by default
-    the identity; `mask` (H, W) bool is True where images show the world. A turn of the camera about the vertical, and
-    an image that is mirrored, cannot be told from images alone. Raises `InvalidInputError` for no images and for images
-    of another size than the camera's.
+    the identity; `mask` (H, W) bool is True where images show the world. `check_lens` looks at the lens. A turn of the
+    camera about the vertical, and an image that is mirrored, cannot be told from images alone. Raises
+    `InvalidInputError` for no images and for images of another size than the camera's.
     """
     rotation = np.eye(3) if robot_from_camera is None else np.asarray(robot_from_camera, dtype=np.float64)
     if rotation.shape != (3, 3):
         raise InvalidInputError(f"robot_from_camera: shape {rotation.shape}, expected (3, 3)")
-    seen = setup_features(images, camera, mask=mask)
-    if not len(seen):
-        raise InvalidInputError("images: none, expected at least one")
+    grays = [gray_from(image, f"images[{number}]") for number, image in enumerate(images)]
+    lens = check_lens(grays, camera, mask=mask)
+    seen = setup_features(grays, camera, mask=mask)
     shares = {name: float(share) for name, share in zip(DIRECTIONS, shares_of(seen), strict=True)}
     up = rotation.T @ np.array([0.0, 0.0, 1.0])
     given = max(DIRECTIONS, key=lambda name: float(np.dot(up, DIRECTIONS[name])))
-    return SetupCheck(given, max(shares, key=lambda name: shares[name]), shares, len(seen))
+    return SetupCheck(given, max(shares, key=lambda name: shares[name]), shares, len(seen), lens)
 
 
 def mounting_looking(direction: str) -> Matrix:

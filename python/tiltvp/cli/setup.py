@@ -98,7 +98,7 @@ def setup(
 
 def _lines(found: RobotSetup) -> list[str]:
     """What was found, for people."""
-    lines = [found.direction.reason]
+    lines = [found.direction.direction_reason, f"lens: {found.direction.lens.reason}"]
     lines.append(
         "rim: a dark surround that the calibration does not know is left out" if found.rim else "rim: none found"
     )

@@ -207,7 +207,8 @@ def _checked(estimator: TiltEstimator, frames: Frames) -> TiltEstimator:
             estimator = estimator.with_options(mask=mask)
     found = check_setup(images, camera, estimator.robot_from_camera, mask=mask)
     if not found:
-        complain(f"--robot-from-camera: {found.reason}")
+        suspect = "--camera" if found.believable else "--robot-from-camera"
+        complain(f"{suspect}: {found.reason}")
     return estimator
 
 

@@ -36,7 +36,7 @@ def trust(
     count
         Images of each case.
     sets
-        Sets of five images of each building that `check_setup` is asked about.
+        Sets of five images of each building that `check_setup` is asked about; with one or more, `check_lens` too.
     seed
         Seed of headings, leans and harm.
     unseen
@@ -49,7 +49,7 @@ def trust(
     from tiltvp.lab.datasets.hostile import CASES, hostile_images
     from tiltvp.lab.datasets.panoramas import read_panorama_index
     from tiltvp.lab.evaluation.hostile import METHODS, judge_images, summarise_cases, train_trust
-    from tiltvp.lab.evaluation.setups import image_sets, summarise_sets, train_setups
+    from tiltvp.lab.evaluation.setups import image_sets, judge_lenses, summarise_sets, train_setups
     from tiltvp.lab.evaluation.trust import was_set_on
 
     check_ending(out)
@@ -60,10 +60,11 @@ def trust(
         if not (unseen and was_set_on(panorama.location))
     ]
     places = len({panorama.location for panorama in chosen})
-    with progress_bar(count * len(CASES) + places, "images") as bar:
+    with progress_bar(count * len(CASES) + 2 * places, "images") as bar:
         images = hostile_images(chosen, count=count, seed=seed)
         table = judge_images(images, features=weights, advance=bar.advance)
         asked = image_sets(chosen, sets=sets, seed=seed, advance=bar.advance)
+        lenses = judge_lenses(chosen, seed=seed, advance=bar.advance) if sets else None
     if out is not None:
         write_frame(table.select(column for column in table.columns if column != "features"), out)
     title = f"Shares in per cent, of {count} images of each case, {len(chosen)} panoramas of {places} buildings"
@@ -75,5 +76,7 @@ def trust(
         show_frame(
             "Sets of five images of one building: which direction is up", summarise_sets(asked), ["half", "setup"]
         )
+    if lenses is not None:
+        show_frame("Sets of five images of one building: whether its lens is believed", lenses, ["setup", "told"])
     if weights and (told := [item for item in asked if was_set_on(item.location)]):
         say(f"check_setup: {', '.join(f'{weight:.4g}' for weight in train_setups(told))}")

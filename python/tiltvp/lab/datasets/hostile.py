@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
     Matrix = NDArray[np.float64]
 
-__all__ = ["CASES", "UNHARMED", "HostileImage", "hostile_images"]
+__all__ = ["CASES", "UNHARMED", "HostileImage", "centre_off", "focal_off", "hostile_images"]
 
 LEAN_MAX_DEG: Final = 8.0
 """Leans are drawn up to this: the default method looks for 10."""
@@ -127,18 +127,23 @@ def _equidistant(**changes: Any) -> Camera:
     return Camera.equidistant(**parts | changes)
 
 
-def _off_by(**shares: float) -> Make:
-    """An upward view, told to be of a camera whose parameters are off by a factor or by pixels, either way."""
+def focal_off(rng: np.random.Generator, share: float = 0.1) -> Camera:
+    """The upward camera with a focal length that is off by a share, either way."""
+    focal = 139.7 * (1.0 + share * rng.choice([-1.0, 1.0]))
+    return _equidistant(focal_px=focal, max_theta_rad=np.deg2rad(92.5) * 139.7 / focal)
+
+
+def centre_off(rng: np.random.Generator, off_px: float = 10.0) -> Camera:
+    """The upward camera with a centre that is off by so many pixels, in any direction."""
+    azimuth = rng.uniform(-np.pi, np.pi)
+    return _equidistant(cx=319.5 + off_px * np.cos(azimuth), cy=239.5 + off_px * np.sin(azimuth))
+
+
+def _by(told: Callable[[np.random.Generator], Camera]) -> Make:
+    """An upward view, told to be of another camera."""
 
     def make(place: _Place, rng: np.random.Generator) -> Made:
-        sign = rng.choice([-1.0, 1.0])
-        if "focal" in shares:
-            focal = 139.7 * (1.0 + sign * shares["focal"])
-            camera = _equidistant(focal_px=focal, max_theta_rad=np.deg2rad(92.5) * 139.7 / focal)
-        else:
-            azimuth, off = rng.uniform(-np.pi, np.pi), shares["centre_px"]
-            camera = _equidistant(cx=319.5 + off * np.cos(azimuth), cy=239.5 + off * np.sin(azimuth))
-        return place.upward(), camera, UP, place.lean
+        return place.upward(), told(rng), UP, place.lean
 
     return make
 
@@ -305,8 +310,8 @@ CASES: Final[dict[str, Make]] = {
     "ahead read as downward": _told(AHEAD, FORWARD, DOWN),
     "portrait read as landscape": _told(AHEAD, FORWARD @ ROLLED, FORWARD),
     "panorama read as upward": _told(WHOLE, FORWARD, UP),
-    "focal length off by 10 %": _off_by(focal=0.1),
-    "centre off by 10 px": _off_by(centre_px=10.0),
+    "focal length off by 10 %": _by(focal_off),
+    "centre off by 10 px": _by(centre_off),
     "rim not masked": _rim,
     "robot not masked": _robot,
     "320 x 240": _small(0.5),
