@@ -132,11 +132,16 @@ def _names_cause(row: dict[str, str]) -> bool:
 
 def train_trust(table: pl.DataFrame, method: str) -> tuple[float, NDArray[np.float64]]:
     """Constant and weights (F,) of what tells whether a fit is of the vertical, from rows with features: a logistic
-    regression by Newton's method on the half of the buildings that is for setting things.
+    regression by Newton's method on the half of the buildings that is for setting things. Raises `InvalidInputError`
+    where none of them has an answer.
     """
     told = table.filter(
         (pl.col("method") == method) & pl.col("error_deg").is_not_null() & ~pl.col("case").is_in(BLIND)
     ).filter(pl.col("location").map_elements(was_set_on, return_dtype=pl.Boolean))
+    if told.is_empty():
+        raise InvalidInputError(
+            f"{method}: no answer on the half that sets the weights, expected more images of each case"
+        )
     features = np.array(told["features"].to_list())
     # The first is the logarithm of the stated error in degrees.
     hopeful = 1.0 - np.exp(-((WRONG_DEG / np.exp(features[:, 0])) ** 2)) > HOPELESS

@@ -1,4 +1,4 @@
-"""How often a few images tell which of a camera's six directions is up, by which weights, and a lens that is not as told."""
+"""How often a few images tell which of a camera's directions is up, the weights for it, and how often its lens."""
 
 from __future__ import annotations
 
