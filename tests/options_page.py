@@ -17,6 +17,7 @@ OWNERS: dict[str, tuple[str, Sequence[str]]] = {
     "SegmentDetector": ("straight edges of an image: [segments.md](segments.md)", ()),
     "LineExtractor": ("vertical lines of an image: [lines.md](lines.md)", _core.LINE_METHODS),
     "match_descriptors": ("`tiltvp.lines.match`", ()),
+    "match_wide": ("`tiltvp.lines.match_wide`", ()),
     "LineTracker": ("lines through successive images", ()),
     "SelfCalibrator": ("the mounting while driving: [calibration.md](calibration.md)", _core.CALIBRATION_METHODS),
     "calibrate": ("the mounting from a whole log", ()),

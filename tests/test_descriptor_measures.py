@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -18,7 +19,9 @@ from tiltvp.lab.datasets.driven import DrivenFrames, read_drive
 from tiltvp.lab.datasets.driving import write_drive
 from tiltvp.lab.evaluation.descriptor_summary import RULES, alike, rules
 from tiltvp.lab.evaluation.descriptors import DescriptorExperiment, follow, measure_descriptors, similarity
+from tiltvp.lab.evaluation.dissimilarities import DISSIMILARITIES
 from tiltvp.lab.evaluation.line_pairs import FALSE, OPEN, RIGHT, frame_pairs, pair_verdicts
+from tiltvp.lab.evaluation.wide_lines import metres_apart
 from tiltvp.lab.plots.descriptors import correct_matches, rule_densities, similarity_matrices
 from tiltvp.synth import MIRROR_BLIND_RAD, Drive, DriveTruth, Room, mirror_camera
 
@@ -137,12 +140,13 @@ def test_tables_and_figures(driven: DrivenFrames) -> None:
     default = [shares.row(by_predicate=(pl.col("sweep") == s) & (pl.col("value") == v), named=True)["correct_%"]
                for s, v in (("clip", 0.1), ("noise", 0.0), ("bins", 32.0))]  # fmt: skip
     assert default[0] == default[1] == default[2] > 90.0
-    assert tables.measures["measure"].unique(maintain_order=True).to_list() == ["descriptor", "SSD", "ZNCC"]
-    assert tables.measures.height == 6
+    assert tables.measures["measure"].unique(maintain_order=True).to_list() == [*DISSIMILARITIES, "SSD", "ZNCC"]
+    assert tables.measures.height == 2 * len(DISSIMILARITIES) + 4
     matches = tables.matches
     assert (matches["mean_ratio"] <= 1.0).all()
     assert (matches["second_ratio"] <= 1.0).all()
     assert matches["frames_apart"].unique().sort().to_list() == [1, 3]
+    assert tables.wide.is_empty()  # The drive is half a metre long.
     again = measure_descriptors([driven], SMALL, threads=1)
     assert again.settings.equals(settings)
     assert again.matches.equals(matches)
@@ -153,6 +157,34 @@ def test_tables_and_figures(driven: DrivenFrames) -> None:
     assert kept["false_refused_%"].max() == kept["false_refused_%"][3]
     tracks = follow(driven, 3)
     assert tracks["frame"].unique().sort().to_list() == [0, 1, 2]
+
+
+def test_dissimilarities() -> None:
+    rng = np.random.default_rng(5)
+    rows = rng.random((4, 192)).astype(np.float32)
+    empty = np.zeros((1, 192), dtype=np.float32)
+    for name, measure in DISSIMILARITIES.items():
+        unlike = measure(rows, rows)
+        assert unlike.shape == (4, 4), name
+        assert (unlike.argmin(axis=1) == np.arange(4)).all(), name
+        assert unlike == pytest.approx(unlike.T, abs=1e-6), name
+        assert np.isfinite(measure(empty, rows)).all(), name
+    h, k = np.zeros((2, 1, 192), dtype=np.float32)
+    h[0, 0] = k[0, 1] = 1.0
+    apart = {name: float(measure(h, k)[0, 0]) for name, measure in DISSIMILARITIES.items()}
+    # Two bins that have nothing in common; to the quadratic form they are neighbours of 32.
+    assert apart == pytest.approx({
+        "descriptor": math.sqrt(2.0), "descriptor, L1": 2.0, "descriptor, chi-square": 1.0,
+        "descriptor, Jeffrey divergence": 2.0 * math.log(2.0), "descriptor, Bhattacharyya": 1.0,
+        "descriptor, histogram intersection": 0.0, "descriptor, quadratic form": math.sqrt(2.0 / 16.0),
+    }, abs=1e-5)  # fmt: skip
+
+
+def test_pairs_metres_apart() -> None:
+    poses = np.zeros((61, 3))
+    poses[:, 0] = 0.0625 * np.arange(61)
+    assert list(metres_apart(poses)) == [(0, 16), (10, 30), (20, 44), (30, 58), (40, 56)]
+    assert not list(metres_apart(poses[:10]))
 
 
 def test_similarity(driven: DrivenFrames) -> None:

@@ -105,6 +105,7 @@ OTHER_VALUES = [
     ("great-circle", {"run_min_px": 20}), ("great-circle", {"tilt_sigma_rad": 0.05}),
     ("great-circle", {"covered_min": 1.0}), ("great-circle", {"scatter_max_px": 0.1}),
     ("great-circle", {"lines_max": 2}), ("great-circle", {"descriptor_areas": 2}),
+    ("great-circle", {"descriptor_kind": "profile"}),
     ("great-circle", {"descriptor_areas": 3, "descriptor_overlapping": True}), ("great-circle", {"descriptor_bins": 8}),
     ("great-circle", {"descriptor_clip": 0.3}), ("great-circle", {"descriptor_window": 1.0}),
     ("great-circle", {"descriptor_smoothing": 0.0}),
@@ -151,6 +152,7 @@ def test_a_mask_keeps_lines_out(room: RoomImage, camera: tiltvp.Camera) -> None:
         ({"plane_max_rad": -1.0}, "plane_max_rad"),
         ({"descriptor_clip": 0.0}, "clip"),
         ({"descriptor_normalisation": "none"}, "normalisation"),
+        ({"method": "radial", "descriptor_kind": "profile"}, "radial lines"),
         ({"robot_from_camera": np.zeros((3, 3))}, "rotation"),
         ({"method": "radial", "radius_min_px": 90.0, "radius_max_px": 80.0}, "radius_min_px"),
     ],
@@ -237,6 +239,42 @@ def test_similarity_matrices_are_darkest_on_the_diagonal(mirror: tiltvp.Camera, 
         assert np.median(matrix) > 0.0
     pairs = tl.match(extractor.describe(image.gray, lines), extractor.describe(image.gray, lines))
     assert np.array_equal(pairs, np.stack([np.arange(36)] * 2, axis=1))
+
+
+@pytest.mark.slow
+def test_lines_match_after_more_than_a_metre(mirror: tiltvp.Camera, office: Room) -> None:
+    x, y, yaw = office.free_poses(1, 4)[0]
+    poses = office.free_poses(200, 6)
+    away = np.hypot(*(poses[:, :2] - (x, y)).T)
+    there = poses[np.flatnonzero((away > 1.0) & (away < 1.5))[0]]
+    extractor = tl.LineExtractor(mirror, descriptor_kind="profile")
+    seen = []
+    for pose in ((x, y, yaw), there):
+        image = office.render(mirror, pose=pose, samples=2)
+        lines = extractor(image.gray)
+        seen += [lines, extractor.describe(image.gray, lines)]
+        assert seen[-1].shape == (len(lines), 190)
+    ahead = math.atan2(there[1] - y, there[0] - x)
+    told = (ahead - yaw, ahead - there[2])
+    for ahead_rad in (None, told):
+        pairs, confidences = tl.match_wide(*seen, ahead_rad=ahead_rad, confidence_min=0.0)
+        assert pairs.shape == (len(confidences), 2)
+        assert (confidences > 0.0).all()
+        assert (confidences < 1.0).all()
+        assert all(len(set(column)) == len(column) for column in pairs.T.tolist())
+        sure, _ = tl.match_wide(*seen, ahead_rad=ahead_rad, confidence_min=0.7)
+        assert len(sure) == (confidences >= 0.7).sum()
+    # A line stays on its side of the way, and turns away from where the camera goes.
+    first, second = (np.angle(np.exp(1j * (lines.bearing_rad - at))) for lines, at in zip(seen[::2], told, strict=True))
+    assert (first[pairs[:, 0]] * second[pairs[:, 1]] > -0.1).all()
+    same, _ = tl.match_wide(*seen[:2], *seen[:2], ahead_rad=told)
+    assert (same[:, 0] == same[:, 1]).all()
+    with pytest.raises(InvalidInputError, match="190 for each line"):
+        tl.match_wide(seen[0], seen[1][:, 1:], seen[2], seen[3])
+    with pytest.raises(InvalidInputError, match="two bearings"):
+        tl.match_wide(*seen, ahead_rad=[0.0])
+    with pytest.raises(InvalidInputError, match="match_wide"):
+        tl.match(seen[1], seen[3])
 
 
 def test_lines_are_drawn_where_they_are(room: RoomImage, camera: tiltvp.Camera) -> None:

@@ -87,6 +87,7 @@ __all__ = [
     "leaning_from_upright",
     "lens_schema",
     "match_descriptors",
+    "match_wide",
     "normal_from_alpha_beta",
     "option_fields",
     "read_imu",
@@ -1622,6 +1623,7 @@ class LineExtractor:
         scatter_max_px: float = ...,
         tilt_sigma_rad: float = ...,
         lines_max: SupportsIndex | None = ...,
+        descriptor_kind: Literal["areas", "profile"] = ...,
         descriptor_areas: SupportsIndex = ...,
         descriptor_overlapping: bool = ...,
         descriptor_bins: SupportsIndex = ...,
@@ -1681,6 +1683,9 @@ class LineExtractor:
             tell its own as estimates do: lines may slant by as much. Default: 0.00872665.
         lines_max
             "great-circle": The most lines of an image, the longest ones; none for all. Default: None.
+        descriptor_kind
+            What is described: "areas", the paper's histograms, or "profile", grey levels along the line for
+            `match_wide`, to which the other options of descriptors are nothing. Default: "areas".
         descriptor_areas
             Number of circular areas. Default: 3.
         descriptor_overlapping
@@ -3419,6 +3424,38 @@ def match_descriptors(
         Whether both lines must be nearest to each other, so that no line is matched twice. Default: True.
     ordered
         Whether matches must keep the cyclic order of the lines. Default: False.
+    """
+
+def match_wide(
+    lines_a: Lines,
+    a: NDArray[np.float32],
+    lines_b: Lines,
+    b: NDArray[np.float32],
+    *,
+    ahead_rad: ArrayLike | None = None,
+    confidence_min: float = ...,
+    likeness_min: float = ...,
+    motion_sigma_rad: float = ...,
+) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    """(M, 2) and (M,): lines of an image and those of another, metres away, that are the same, and how confident that
+    is.
+
+    `a` and `b` are the descriptors of the lines, of `descriptor_kind` "profile", (N_A, 190) and (N_B, 190) float32. One
+    motion of the camera in the plane must explain all matches; `ahead_rad` is its direction as the first and as the
+    second image see it, bearings in radians, where it is known, as by odometry. By rising line of the first image;
+    confidences are float64 from 0 to 1. Raises `tiltvp.errors.InvalidInputError`.
+
+    The options, by keyword.
+
+    Parameters
+    ----------
+    confidence_min
+        Least confidence of a match. Default: 0.8.
+    likeness_min
+        Least likeness of two profiles, of at most 2.1. Default: 1.2.
+    motion_sigma_rad
+        Standard deviation of a direction of motion that is told, in radians: it is looked for up to three of them away.
+        Default: 0.0349066.
     """
 
 def normal_from_alpha_beta(alpha_rad: float, beta_rad: float) -> NDArray[np.float64]:

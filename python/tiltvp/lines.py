@@ -15,6 +15,7 @@ from tiltvp._core import (
     TiltEstimate,
     TrackedLines,
     descriptor_distances,
+    match_wide,
     normal_from_alpha_beta,
     ssd_matrix,
     zncc_matrix,
@@ -41,6 +42,7 @@ __all__ = [
     "descriptor_distances",
     "extract",
     "match",
+    "match_wide",
     "ssd_matrix",
     "zncc_matrix",
 ]

@@ -62,8 +62,8 @@ mod _core {
     use crate::level::Leveller;
     #[pymodule_export]
     use crate::lines::{
-        LineExtractor, LineTracker, Lines, TrackedLines, descriptor_distances, match_descriptors, ssd_matrix,
-        zncc_matrix,
+        LineExtractor, LineTracker, Lines, TrackedLines, descriptor_distances, match_descriptors, match_wide,
+        ssd_matrix, zncc_matrix,
     };
     #[pymodule_export]
     use crate::options::option_fields;

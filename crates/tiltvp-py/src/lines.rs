@@ -9,7 +9,7 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use tiltvp_core::lines::{self as core, LineScratch};
 
-pub(crate) use self::matching::{descriptor_distances, match_descriptors, ssd_matrix, zncc_matrix};
+pub(crate) use self::matching::{descriptor_distances, match_descriptors, match_wide, ssd_matrix, zncc_matrix};
 pub(crate) use self::tracker::{LineTracker, TrackedLines};
 pub(crate) use self::values::Lines;
 use crate::array::Array;

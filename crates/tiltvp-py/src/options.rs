@@ -6,7 +6,7 @@ use numpy::{PyArray1, PyArrayDyn, PyArrayMethods, PyUntypedArray, PyUntypedArray
 use pyo3::prelude::*;
 use pyo3::types::{PyBool, PyDict, PyList, PyTuple};
 use tiltvp_core::filter::ComplementaryOptions;
-use tiltvp_core::lines::{LineMethod, LineOptions, MatchOptions, TrackerOptions};
+use tiltvp_core::lines::{LineMethod, LineOptions, MatchOptions, TrackerOptions, WideOptions};
 use tiltvp_core::options::{Kind, Options, Value};
 use tiltvp_core::segments::SegmentDetectorOptions;
 use tiltvp_core::selfcalib::{CalibrationMethod, LogOptions, SelfCalibratorOptions};
@@ -171,6 +171,7 @@ fn defaults(owner: &str, method: Option<&str>) -> Result<Box<dyn Options>, Error
         "simulate_drive" => Box::new(BearingDriveOptions::default()),
         "LineTracker" => Box::new(TrackerOptions::default()),
         "match_descriptors" => Box::new(MatchOptions::default()),
+        "match_wide" => Box::new(WideOptions::default()),
         "TiltFilter" => Box::new(TiltFilterOptions::default()),
         "common_direction" => Box::new(CommonDirectionOptions::default()),
         "ComplementaryFilter" => Box::new(ComplementaryOptions::default()),

@@ -1,7 +1,19 @@
 //! How lines are described: areas, bins, window, normalisation.
 
+use super::description::profile;
 use crate::options::Above;
 use crate::{options, words};
+
+words! {
+    /// What a descriptor is made of.
+    pub enum DescriptorKind {
+        /// Histograms of gradient orientation in circular areas, eqs. 2 to 5: for images that are little apart.
+        Areas = "areas",
+        /// Grey levels beside the line over the logarithm of the height, for `match_wide`: for images that are metres apart.
+        /// The other options of descriptors are those of areas.
+        Profile = "profile",
+    }
+}
 
 words! {
     /// What is brought to unit length, clipped, and brought to unit length again.
@@ -17,6 +29,9 @@ options! {
     /// Options of the descriptor.
     #[derive(Copy)]
     pub struct DescriptorOptions {
+        /// What is described: "areas", the paper's histograms, or "profile", grey levels along the line for `match_wide`, to which the
+        /// other options of descriptors are nothing.
+        kind: DescriptorKind = DescriptorKind::Areas;
         /// Number of circular areas.
         areas: usize = 3 => 1.0..=64.0, "a whole number from 1 to 64";
         /// Whether neighbouring areas overlap by half.
@@ -36,9 +51,12 @@ options! {
 }
 
 impl DescriptorOptions {
-    /// How many values a descriptor has, eq. 5.
+    /// How many values a descriptor has, eq. 5 for areas.
     pub fn values(&self) -> usize {
-        2 * self.areas * self.bins
+        match self.kind {
+            DescriptorKind::Areas => 2 * self.areas * self.bins,
+            DescriptorKind::Profile => profile::VALUES,
+        }
     }
 
     /// Radius and middles of the areas along a line from `low` to `high`.

@@ -6,6 +6,8 @@ use nalgebra::Matrix3;
 
 use super::description::descriptor::{DescriptorScratch, DescriptorSpan, describe};
 use super::description::patch::{Chart, Patch, Raster};
+use super::description::profile;
+use super::descriptor_options::DescriptorKind;
 use super::extraction::great_circle::{self, GreatCircleScratch, MISS_MAX_RAD};
 use super::extraction::radial::{self, RadialScratch, Radii};
 use super::line::{Line, LineFrame, Lines};
@@ -15,6 +17,7 @@ use crate::camera::Camera;
 use crate::error::{Error, Result};
 use crate::geometry::Tilt;
 use crate::image::ImageView;
+use crate::options::OptionValue;
 use crate::segments::{FinderScratch, SegmentFinder, SegmentOptions, Segments};
 
 /// Samples of a descriptor from the middle of an area to its rim, along great circles: about one a pixel where 90
@@ -52,6 +55,10 @@ impl LineExtractor {
     pub fn new(camera: Camera, robot_from_camera: Matrix3<f64>, options: LineOptions) -> Result<Self> {
         options.validate()?;
         crate::geometry::validate_rotation(&robot_from_camera)?;
+        if options.descriptor.kind == DescriptorKind::Profile && matches!(options.method, LineMethod::Radial(_)) {
+            let expected = "areas for radial lines, which know no elevations";
+            return Err(Error::option("descriptor_kind", DescriptorKind::Profile.to_value(), expected));
+        }
         let tables = LineTables::new(&camera, &robot_from_camera, &options)?;
         let radii = match &options.method {
             LineMethod::GreatCircle(_) => None,
@@ -206,6 +213,10 @@ impl LineExtractor {
         self.check(image, scratch)?;
         self.check_frame(&lines.frame)?;
         let chart = Chart::new(&self.camera, &self.robot_from_camera, &lines.frame);
+        if self.options.descriptor.kind == DescriptorKind::Profile {
+            profile::describe(image, &self.tables, &chart, lines, out);
+            return Ok(());
+        }
         let samples = lines.frame.center_px.is_none().then_some(SAMPLES);
         let (low, high) = self.range(&lines.frame);
         let course = DescriptorSpan { chart, low, high, samples };

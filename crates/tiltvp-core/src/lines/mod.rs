@@ -14,9 +14,10 @@ mod order;
 mod tables;
 mod tracker_options;
 mod tracking;
+mod wide;
 
 pub use self::description::dissimilarity::{descriptor_distances, ssd_matrix, zncc_matrix};
-pub use self::descriptor_options::{DescriptorOptions, Normalisation};
+pub use self::descriptor_options::{DescriptorKind, DescriptorOptions, Normalisation};
 pub use self::extractor::{LineExtractor, LineScratch};
 pub use self::line::{Line, LineFrame, Lines};
 pub use self::matcher::{BearingGate, MatchOptions, MatchScratch, match_descriptors};
@@ -26,3 +27,4 @@ pub use self::tracker_options::TrackerOptions;
 pub use self::tracking::parallax::{Motion, Parallax};
 pub use self::tracking::tracker::LineTracker;
 pub use self::tracking::tracker_state::{Followed, FrameMemory, TrackedLine, TrackerState};
+pub use self::wide::{Profiles, WideMatch, WideOptions, WideScratch, match_wide};

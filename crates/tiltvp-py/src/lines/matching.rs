@@ -3,10 +3,11 @@
 use numpy::{PyArray1, PyArray2, PyArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use tiltvp_core::lines::{self as core, BearingGate, MatchOptions};
+use tiltvp_core::lines::{self as core, BearingGate, MatchOptions, Profiles, WideOptions};
 
 use crate::call::{call, invalid};
 use crate::convert::{self, Number};
+use crate::lines::values::Lines;
 use crate::options;
 
 /// `(N, K)` numbers as `f32` in row order, and K.
@@ -79,6 +80,48 @@ pub(crate) fn match_descriptors<'py>(
     })?;
     let flat: Vec<i64> = matches.iter().flat_map(|found| [found.a as i64, found.b as i64]).collect();
     PyArray1::from_vec(py, flat).reshape([matches.len(), 2])
+}
+
+/// (M, 2) and (M,): lines of an image and those of another, metres away, that are the same, and how confident that is.
+///
+/// `a` and `b` are the descriptors of the lines, of `descriptor_kind` "profile", (N_A, 190) and (N_B, 190) float32. One motion
+/// of the camera in the plane must explain all matches; `ahead_rad` is its direction as the first and as the second image
+/// see it, bearings in radians, where it is known, as by odometry. By rising line of the first image; confidences are
+/// float64 from 0 to 1. Raises `tiltvp.errors.InvalidInputError`.
+#[pyfunction]
+#[pyo3(signature = (
+    lines_a: "Lines", a: "NDArray[np.float32]", lines_b: "Lines", b: "NDArray[np.float32]", *,
+    ahead_rad: "ArrayLike | None" = None, **options: "Option"
+) -> "tuple[NDArray[np.int64], NDArray[np.float64]]")]
+pub(crate) fn match_wide<'py>(
+    py: Python<'py>,
+    lines_a: &Bound<'py, Lines>,
+    a: &Bound<'py, PyAny>,
+    lines_b: &Bound<'py, Lines>,
+    b: &Bound<'py, PyAny>,
+    ahead_rad: Option<&Bound<'py, PyAny>>,
+    options: Option<&Bound<'py, PyDict>>,
+) -> PyResult<(Bound<'py, PyArray2<i64>>, Bound<'py, PyArray1<f64>>)> {
+    let ((a, ..), (b, ..)) = (descriptors(a, "a")?, descriptors(b, "b")?);
+    let mut parsed = WideOptions::default();
+    options::set(&mut parsed, options)?;
+    let ahead = match ahead_rad.map(|ahead| convert::vector(ahead, "ahead_rad")).transpose()?.as_deref() {
+        None => None,
+        Some(&[first, second]) => Some([first, second]),
+        Some(other) => {
+            return Err(invalid(format!("ahead_rad: {} values, expected two bearings", other.len())));
+        }
+    };
+    let (first, second) = (&lines_a.get().inner, &lines_b.get().inner);
+    let matches = call(py, || {
+        let (mut scratch, mut out) = (core::WideScratch::default(), Vec::new());
+        let (a, b) = (Profiles { lines: first, values: &a }, Profiles { lines: second, values: &b });
+        core::match_wide(&a, &b, ahead, &parsed, &mut scratch, &mut out)?;
+        Ok(out)
+    })?;
+    let flat: Vec<i64> = matches.iter().flat_map(|found| [found.a as i64, found.b as i64]).collect();
+    let confidences = matches.iter().map(|found| found.confidence).collect();
+    Ok((PyArray1::from_vec(py, flat).reshape([matches.len(), 2])?, PyArray1::from_vec(py, confidences)))
 }
 
 fn matrix<'py>(

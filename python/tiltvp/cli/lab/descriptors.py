@@ -81,4 +81,5 @@ def descriptors(
     measures = tables.measures.pivot("frames_apart", index="measure", values="correct_%")
     show_frame("Nearest is the same edge, by frames apart, per cent", measures, ["measure"])
     show_frame("What the rules keep out (figures 16 to 18)", rules(tables.matches), ["rule"])
+    show_frame("Matched between frames 1 to 2 m apart", tables.wide, ["matcher"])
     say(f"{out}: pictures and tables")

@@ -14,8 +14,10 @@ import polars as pl
 
 from tiltvp.errors import InvalidInputError
 from tiltvp.lab.datasets.new import in_order
+from tiltvp.lab.evaluation.dissimilarities import DISSIMILARITIES
 from tiltvp.lab.evaluation.line_pairs import FALSE, RIGHT, FramePair, frame_pairs
 from tiltvp.lab.evaluation.line_truth import identities
+from tiltvp.lab.evaluation.wide_lines import wide_rows
 from tiltvp.lines import LineExtractor, LineTracker, descriptor_distances, ssd_matrix, zncc_matrix
 
 if TYPE_CHECKING:
@@ -105,11 +107,13 @@ class DescriptorTables:
     settings: pl.DataFrame
     """sweep, chart, areas, value, queries (lines with the same edge in the other frame), correct_% of them."""
     measures: pl.DataFrame
-    """measure (descriptor, SSD, ZNCC), frames_apart, queries, correct_%."""
+    """measure (those of `DISSIMILARITIES`, SSD, ZNCC), frames_apart, queries, correct_%."""
     matches: pl.DataFrame
     """One row for each line and other frame: drive, frame, frames_apart, baseline_m, distance, mean_ratio,
     second_ratio, correct; with lines whose edge is not found in the other frame, whose nearest is wrong whatever it is.
     """
+    wide: pl.DataFrame
+    """Frames 1 to 2 m apart: matcher, pairs, possible, right, false, found_% (of the possible), precision_%."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -135,6 +139,7 @@ def measure_descriptors(
     counted: list[dict[str, Any]] = []
     measured: list[dict[str, Any]] = []
     matches: list[pl.DataFrame] = []
+    wide: list[dict[str, Any]] = []
     for drive in drives:
         frames = _found(drive, threads)
         advance()
@@ -147,11 +152,36 @@ def measure_descriptors(
         plain = _described(drive, frames, DescriptorSetting("", 0.0), experiment.seed, threads)
         matches.append(_matches(drive.name, pairs, plain))
         measured += _measures(drive, frames, pairs, plain, threads)
+        profile = DescriptorSetting("", 0.0, options={"descriptor_kind": "profile"})
+        wide += wide_rows(
+            drive,
+            [frame.lines for frame in frames],
+            [frame.edges for frame in frames],
+            plain,
+            _described(drive, frames, profile, experiment.seed, threads),
+            experiment.seed,
+        )
         advance()
     return DescriptorTables(
         _shares(pl.DataFrame(counted), ("sweep", "chart", "areas", "value")),
         _shares(pl.DataFrame(measured), ("measure", "frames_apart")),
         pl.concat(matches),
+        _wide(wide),
+    )
+
+
+def _wide(rows: list[dict[str, Any]]) -> pl.DataFrame:
+    """`DescriptorTables.wide` of the rows of all pairs."""
+    counts = ("pairs", "possible", "right", "false")
+    table = pl.DataFrame(rows, schema={"matcher": pl.String} | dict.fromkeys(counts, pl.Int64))
+    right, false = pl.col("right"), pl.col("false")
+    return (
+        table.group_by("matcher", maintain_order=True)
+        .agg(pl.col(counts).sum())
+        .with_columns(
+            (100.0 * right / pl.col("possible")).alias("found_%"),
+            (100.0 * right / (right + false)).alias("precision_%"),
+        )
     )
 
 
@@ -303,8 +333,8 @@ def _measures(
     rows: list[dict[str, Any]] = []
     for pair in pairs:
         a, b = pair.a, pair.b
-        unlike = {
-            "descriptor": descriptor_distances(described[a], described[b]),
+        unlike = {name: measure(described[a], described[b]) for name, measure in DISSIMILARITIES.items()}
+        unlike |= {
             "SSD": ssd_matrix(cut[a], cut[b]),
             "ZNCC": 1.0 - zncc_matrix(cut[a], cut[b]),
         }

@@ -35,6 +35,14 @@ fn squared_distance(a: &[f32], b: &[f32]) -> f32 {
     sums.iter().sum::<f32>() + rest
 }
 
+/// Refuses what has no distance: profiles are NaN where the world is not seen.
+pub(crate) fn check_finite(name: &'static str, descriptors: &[f32]) -> Result<()> {
+    if descriptors.iter().all(|value| value.is_finite()) {
+        return Ok(());
+    }
+    Err(Error::argument(name, "values that are not finite", "descriptors of areas: profiles are for match_wide"))
+}
+
 /// Euclidean distance of two descriptors, eq. 6.
 pub(crate) fn descriptor_distance(a: &[f32], b: &[f32]) -> f64 {
     f64::from(squared_distance(a, b)).sqrt()
@@ -43,8 +51,10 @@ pub(crate) fn descriptor_distance(a: &[f32], b: &[f32]) -> f64 {
 /// Euclidean distances of descriptors of `width` values, eq. 6: `(N_A, N_B)` in row order.
 ///
 /// # Errors
-/// [`Error::InvalidArgument`] unless both hold whole rows.
+/// [`Error::InvalidArgument`] unless both hold whole rows of finite values.
 pub fn descriptor_distances(a: &[f32], b: &[f32], width: usize, out: &mut Vec<f64>) -> Result<()> {
+    check_finite("a", a)?;
+    check_finite("b", b)?;
     matrix(a, b, width, descriptor_distance, out)
 }
 

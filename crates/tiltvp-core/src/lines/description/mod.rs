@@ -4,3 +4,4 @@ pub(super) mod descriptor;
 pub(super) mod dissimilarity;
 mod histogram;
 pub(super) mod patch;
+pub(super) mod profile;

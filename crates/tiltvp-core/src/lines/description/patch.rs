@@ -32,7 +32,7 @@ impl<'a> Chart<'a> {
     }
 
     /// The place about `(bearing, middle)` that is `along` and `across` from it.
-    fn around(&self, bearing: f64, middle: f64) -> impl Fn(f64, f64) -> Option<Vector2<f64>> {
+    pub(super) fn around(&self, bearing: f64, middle: f64) -> impl Fn(f64, f64) -> Option<Vector2<f64>> {
         let (sin, cos) = bearing.sin_cos();
         let chart = *self;
         let (a, b, c) = match self {
@@ -212,7 +212,7 @@ fn levels_at(image: &ImageView<'_>, x: &[f32; SAMPLES], y: &[f32; SAMPLES]) -> [
 
 /// The grey level between four pixels, NaN where the world is not seen.
 #[inline(always)]
-fn level_at(image: &ImageView<'_>, tables: &LineTables, x: f32, y: f32) -> f32 {
+pub(super) fn level_at(image: &ImageView<'_>, tables: &LineTables, x: f32, y: f32) -> f32 {
     // Written so that NaN fails.
     if !(x >= 0.0 && y >= 0.0) {
         return f32::NAN;

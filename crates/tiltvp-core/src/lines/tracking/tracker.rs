@@ -6,7 +6,7 @@ use super::parallax::{Motion, Parallax};
 use super::tracker_state::{Followed, FrameMemory, TrackedLine, TrackerState};
 use crate::error::{Error, Result};
 use crate::lines::angles::wrap;
-use crate::lines::description::dissimilarity::descriptor_distance;
+use crate::lines::description::dissimilarity::{check_finite, descriptor_distance};
 use crate::lines::line::{Line, Lines};
 use crate::lines::matcher::{MatchScratch, select};
 use crate::lines::order::Match;
@@ -231,6 +231,7 @@ impl LineTracker {
             let got = format!("{} values for {} lines", descriptors.len(), lines.len());
             return Err(Error::argument("descriptors", got, "as many values for each line"));
         }
+        check_finite("descriptors", descriptors)?;
         match self.state.widths().find(|before| width > 0 && *before != width) {
             None => Ok(width),
             Some(before) => {
