@@ -5,6 +5,7 @@ use nalgebra::{Matrix3, Rotation3, Vector3};
 use super::attitude::{CornerAttitude, CornerAttitudes};
 use super::prior::{AttitudePrior, gaussian, rotation_vector};
 use crate::error::Result;
+use crate::filter::symmetric;
 use crate::geometry::validate_rotation;
 
 /// The attitudes that one feature admits, and where its camera looks.
@@ -181,13 +182,15 @@ fn extended(joint: &Joint, single: &Joint, alignment: Alignment) -> Joint {
     }
     let sum = joint.covariance + spread;
     let (chi_square, ln_density) = gaussian(&off, &sum);
-    let gain = sum.try_inverse().map_or_else(Matrix3::zeros, |inverse| joint.covariance * inverse);
-    let covariance = joint.covariance - gain * joint.covariance;
+    // Joseph's form: what rounding has done to the gain leaves the covariance one.
+    let gain = sum.cholesky().map_or_else(Matrix3::zeros, |factor| factor.solve(&joint.covariance).transpose());
+    let keep = Matrix3::identity() - gain;
+    let covariance = keep * joint.covariance * keep.transpose() + gain * spread * gain.transpose();
     let mut choice = joint.choice.clone();
     choice.extend_from_slice(&single.choice);
     Joint {
         rotation: Rotation3::new(gain * off).matrix() * joint.rotation,
-        covariance: 0.5 * (covariance + covariance.transpose()),
+        covariance: symmetric(&covariance),
         ln_likelihood: joint.ln_likelihood + single.ln_likelihood + ln_density,
         chi_square: joint.chi_square + chi_square,
         choice,
