@@ -157,8 +157,8 @@ impl StereoSequence {
         ))
     }
 
-    /// (N,): how far away the first surface is along bearings (N, 3) of the left camera at a frame, metres; NaN where there
-    /// is none.
+    /// (N,): how far away the first surface is along bearings (N, 3) of the left camera at a frame, metres; NaN
+    /// where there is none.
     #[pyo3(signature = (frame: "SupportsIndex", bearings: "ArrayLike"))]
     fn distances<'py>(
         &self,

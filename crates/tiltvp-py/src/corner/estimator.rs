@@ -4,7 +4,8 @@ use nalgebra::{Matrix4, Vector3};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyTuple};
 use tiltvp_core::corner::{
-    self as core, CameraTurn, CornerMethod, CornerNames, EstimatorOptions, Frame, FrameKnowledge, GravityDirection, Track,
+    self as core, CameraTurn, CornerMethod, CornerNames, EstimatorOptions, Frame, FrameKnowledge, GravityDirection,
+    Track,
 };
 use tiltvp_core::geometry::RigidMotion;
 
@@ -108,8 +109,8 @@ impl CornerPoseEstimator {
         })
     }
 
-    /// What one frame tells: C-contiguous images of uint8, (H, W, 3) or (H, W) as `_coloured` says; which way is down (3,)
-    /// with its standard deviation, and the turn since the frame before (3, 3) with its covariance (3, 3).
+    /// What one frame tells: C-contiguous images of uint8, (H, W, 3) or (H, W) as `_coloured` says; which way is
+    /// down (3,) with its standard deviation, and the turn since the frame before (3, 3) with its covariance (3, 3).
     #[pyo3(signature = (
         left: "NDArray[np.uint8]", right: "NDArray[np.uint8] | None", gravity: "tuple[ArrayLike, float] | None" = None,
         gyro: "tuple[ArrayLike, ArrayLike] | None" = None

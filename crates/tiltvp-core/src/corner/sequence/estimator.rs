@@ -78,7 +78,16 @@ impl CornerPoseEstimator {
             return Err(Error::argument(scale, "given for method \"paper\"", "none, or method \"coloured\""));
         }
         let scratch = [left.scratch(), right.as_ref().map_or(left.scratch(), |(right, _)| right.scratch())];
-        Ok(Self { left, right, options, track: None, objects: 0, names: CornerNames::default(), known: FrameKnowledge::default(), scratch })
+        Ok(Self {
+            left,
+            right,
+            options,
+            track: None,
+            objects: 0,
+            names: CornerNames::default(),
+            known: FrameKnowledge::default(),
+            scratch,
+        })
     }
 
     /// The left or only camera's detector.
@@ -130,7 +139,8 @@ impl CornerPoseEstimator {
             return Err(Error::argument("right image", got, format!("{expected}, as there are cameras")));
         }
         self.known = *known;
-        let right_from_left = self.right.as_ref().map_or(Matrix3::identity(), |(_, motion)| motion.rotation.transpose());
+        let right_from_left =
+            self.right.as_ref().map_or(Matrix3::identity(), |(_, motion)| motion.rotation.transpose());
         if let Some(track) = &mut self.track {
             track.go_on(known.turn.as_ref(), &right_from_left);
         }

@@ -6,7 +6,7 @@ use super::estimator::CornerPoseEstimator;
 use super::track::Track;
 use crate::corner::closed_form::prior::{AttitudePrior, VerticalSense};
 use crate::corner::feature::CornerFeature;
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::filter::{positive_semidefinite, symmetric};
 use crate::geometry::{check_rotation, tangent_basis};
 
@@ -49,7 +49,7 @@ impl GravityDirection {
 
 impl FrameKnowledge {
     /// # Errors
-    /// [`Error::InvalidArgument`](crate::Error::InvalidArgument) for a direction that is no unit vector, a standard deviation that
+    /// [`Error::InvalidArgument`] for a direction that is no unit vector, a standard deviation that
     /// is not positive, and matrices that are no rotation or no covariance.
     pub fn validate(&self) -> Result<()> {
         if let Some(gravity) = &self.gravity {
@@ -59,7 +59,7 @@ impl FrameKnowledge {
             check_rotation("before_from_now", &turn.before_from_now)?;
             if !positive_semidefinite(&turn.covariance) {
                 let expected = "a covariance in square radians, symmetric and not negative";
-                return Err(crate::Error::argument("gyro", "another matrix", expected));
+                return Err(Error::argument("gyro", "another matrix", expected));
             }
         }
         Ok(())
@@ -148,6 +148,66 @@ impl CornerPoseEstimator {
         match track.turned {
             Some(_) => (self.attitude_covariance(track).trace() / 3.0 + self.options.agree_max_rad.powi(2)).sqrt(),
             None => self.options.turn_sigma_rad,
+        }
+    }
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod tests {
+    use super::*;
+    use crate::corner::estimate::Hypothesis;
+    use nalgebra::Rotation3;
+
+    fn track(rotation: &Matrix3<f64>) -> Track {
+        let vertex = Vector3::new(0.1, 0.0, 2.0);
+        let toward = [0, 1, 2].map(|axis| vertex + 0.3 * rotation.column(axis).into_owned());
+        let corner = CornerFeature::from_bearings(&vertex, &toward).unwrap();
+        let pose = Hypothesis {
+            camera_from_object: *rotation,
+            edges: [0, 1, 2].map(|axis| rotation.column(axis).into_owned()),
+            vertex_m: Some(vertex),
+            covariance: Matrix6::from_diagonal_element(1e-6),
+            probability: 1.0,
+            right_handed: true,
+            misfit: 0.0,
+        };
+        Track::next(None, &pose, [vec![corner], vec![corner]], 1, &[])
+    }
+
+    #[test]
+    fn a_track_turns_with_the_camera() {
+        let rotation = *Rotation3::from_euler_angles(0.4, 0.5, 0.1).matrix();
+        let turn = Rotation3::new(Vector3::new(0.02, -0.3, 0.1)).into_inner();
+        let gyro = CameraTurn { before_from_now: turn, covariance: Matrix3::identity() * 1e-4 };
+        let mut gone = track(&rotation);
+        gone.go_on(Some(&gyro), &Matrix3::identity());
+        gone.go_on(Some(&gyro), &Matrix3::identity());
+        let now = (turn * turn).transpose();
+        assert!((gone.pose.camera_from_object - now * rotation).norm() < 1e-12);
+        assert!((gone.pose.vertex_m.unwrap() - now * Vector3::new(0.1, 0.0, 2.0)).norm() < 1e-12);
+        let seen = gone.corners[1][0].vertex();
+        assert!((seen - now * Vector3::new(0.1, 0.0, 2.0).normalize()).norm() < 1e-9, "{seen}");
+        assert!((gone.turned.unwrap() - Matrix3::identity() * 2e-4).norm() < 1e-15);
+        // Of one frame the turn is not known: by how much it has turned since is not either.
+        gone.go_on(None, &Matrix3::identity());
+        gone.go_on(Some(&gyro), &Matrix3::identity());
+        assert_eq!((gone.turned, gone.age), (None, 4));
+    }
+
+    #[test]
+    fn what_is_no_direction_or_turn_is_refused() {
+        let good = CameraTurn { before_from_now: Matrix3::identity(), covariance: Matrix3::zeros() };
+        let gravity = |down, sigma_rad| Some(GravityDirection { down, sigma_rad });
+        let known = FrameKnowledge { gravity: gravity(Vector3::y(), 0.1), turn: Some(good) };
+        assert!(known.validate().is_ok() && FrameKnowledge::default().validate().is_ok());
+        for wrong in [
+            FrameKnowledge { gravity: gravity(Vector3::zeros(), 0.1), ..known },
+            FrameKnowledge { gravity: gravity(Vector3::y(), 0.0), ..known },
+            FrameKnowledge { turn: Some(CameraTurn { before_from_now: Matrix3::zeros(), ..good }), ..known },
+            FrameKnowledge { turn: Some(CameraTurn { covariance: -Matrix3::identity(), ..good }), ..known },
+        ] {
+            assert!(wrong.validate().is_err(), "{wrong:?}");
         }
     }
 }

@@ -151,9 +151,7 @@ impl TiltFilter {
     /// [`update`](Self::update) by what it looks at: the tilt, its covariance and its confidence.
     pub fn update_tilt(&mut self, tilt: Option<Tilt>, covariance_rad2: &Matrix2<f64>, confidence: f64) -> Verdict {
         match tilt {
-            Some(tilt) if is_of_angles(covariance_rad2) => {
-                self.fuse(tilt.normal(), covariance_rad2, confidence)
-            }
+            Some(tilt) if is_of_angles(covariance_rad2) => self.fuse(tilt.normal(), covariance_rad2, confidence),
             _ => Verdict::NoTilt,
         }
     }

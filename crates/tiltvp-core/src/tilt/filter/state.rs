@@ -90,11 +90,7 @@ impl TiltFilterState {
             }
         }
         let spread = |name, matrix: &Matrix2<f64>| {
-            if matrix.cholesky().is_some() && is_of_angles(matrix) {
-                Ok(())
-            } else {
-                Err(no_covariance(name, matrix))
-            }
+            if matrix.cholesky().is_some() && is_of_angles(matrix) { Ok(()) } else { Err(no_covariance(name, matrix)) }
         };
         if let Some(common) = &self.common {
             spread("common", common)?;
