@@ -74,6 +74,9 @@ const PROBABILITY_MIN: f64 = 1e-9;
 /// Variance of a direction about which nothing is known, square radians: that of an angle uniform in (-pi, pi].
 const UNKNOWN: f64 = std::f64::consts::PI * std::f64::consts::PI / 3.0;
 
+/// By how much rounding may carry a variance below 0, as a share of the sum of all: some fifty products of three numbers each.
+const ROUNDING: f64 = 1e-14;
+
 /// A joint hypothesis about the views up to now.
 #[derive(Debug, Clone)]
 struct Joint {
@@ -139,6 +142,8 @@ pub fn resolve(
 fn single(attitude: &CornerAttitude, common_from_camera: &Matrix3<f64>, index: usize) -> Joint {
     let known = attitude.covariance.iter().all(|x| x.is_finite()) && attitude.ln_volume.is_finite();
     let own = if known { attitude.covariance } else { Matrix3::from_diagonal_element(UNKNOWN) };
+    // Where rounding has taken a little more than there was, two views that contradict each other would show it alone.
+    let own = own + Matrix3::from_diagonal_element(ROUNDING * own.trace());
     Joint {
         rotation: common_from_camera * attitude.camera_from_object,
         covariance: common_from_camera * own * common_from_camera.transpose(),
