@@ -138,8 +138,8 @@ class InertialSamples:
         forces = np.einsum("ji,njk,nk->ni", now, np.stack(turns), self.accelerations_m_s2[near])
         mean = forces.mean(axis=0)
         length = float(np.linalg.norm(mean))
-        # What moves the sensor is alike in many samples, so that their number makes it no smaller, and at a sway's end it
-        # is the square root of two of its root mean square.
+        # What moves the sensor is alike in many samples, so that their number makes it no smaller, and at a sway's end
+        # it is the square root of two of its root mean square.
         scatter = float(np.sqrt(((forces - mean) ** 2).sum(axis=1).mean() / 3.0)) / _GRAVITY_M_S2
         sigma_rad = float(np.sqrt(_LEVEL_RAD**2 + 2.0 * scatter**2 + (length / _GRAVITY_M_S2 - 1.0) ** 2))
         if sigma_rad > _STEADY_RAD:
