@@ -92,11 +92,19 @@ def test_poses_of_the_cuboid_are_close(measured: tuple[pl.DataFrame, pl.DataFram
 def test_in_rooms_axes_may_be_named_at_will_and_corners_lack_in_the_list() -> None:
     turn = np.array([[0.8, -0.6, 0.0], [0.6, 0.8, 0.0], [0.0, 0.0, 1.0]])
     listed = SceneCorner(np.array([0.2, 0.1, 2.0]), turn.T, np.ones(3), "solid")
-    sequence = SimpleNamespace(corners=(listed,), times_s=np.zeros(1), poses_at=lambda _: np.eye(4)[None])
+    sight = [0]
+    sequence = SimpleNamespace(
+        corners=(listed,),
+        times_s=np.zeros(1),
+        poses_at=lambda _: np.eye(4)[None],
+        truth=lambda _: SimpleNamespace(corners=sight),
+    )
 
-    def seen(rotation: np.ndarray, vertex: tuple[float, float, float]) -> CornerHypothesis:
+    def seen(
+        rotation: np.ndarray, vertex: tuple[float, float, float], edges: np.ndarray = listed.edges
+    ) -> CornerHypothesis:
         return CornerHypothesis.from_dict({
-            "camera_from_object": rotation.tolist(), "edges": rotation.T.tolist(), "vertex_m": list(vertex),
+            "camera_from_object": rotation.tolist(), "edges": edges.tolist(), "vertex_m": list(vertex),
             "covariance": np.eye(6).tolist(), "probability": 1.0, "right_handed": True, "misfit": 0.0,
         })  # fmt: skip
 
@@ -106,6 +114,12 @@ def test_in_rooms_axes_may_be_named_at_will_and_corners_lack_in_the_list() -> No
     assert number == 0
     assert np.allclose(truth[:3, :3], over)
     assert np.allclose(truth[:3, 3], listed.position_m)
+    # The corner of something beside it has edges that run the other way, and one that is hidden is not seen.
+    beside = seen(over, (0.2, 0.1, 2.03), listed.edges * [[-1.0], [1.0], [1.0]])
+    assert truth_near(sequence, 0, beside, own)[0] == -1  # type: ignore[arg-type]
+    sight.clear()
+    assert truth_near(sequence, 0, seen(over, (0.2, 0.1, 2.03)), own)[0] == -1  # type: ignore[arg-type]
+    sight.append(0)
     number, truth = truth_near(sequence, 0, seen(over, (1.01, 0.0, 2.0)), own)  # type: ignore[arg-type]
     assert number == -1
     assert np.allclose(truth[:3, :3], over)

@@ -1066,8 +1066,16 @@ class CornerPoseEstimator:
     def _coloured(self) -> bool:
         """Whether images in colour are wanted."""
 
-    def _observe(self, left: NDArray[np.uint8], right: NDArray[np.uint8] | None) -> CornerEstimate:
-        """What one frame tells: C-contiguous images of uint8, (H, W, 3) or (H, W) as `_coloured` says."""
+    def _observe(
+        self,
+        left: NDArray[np.uint8],
+        right: NDArray[np.uint8] | None,
+        gravity: tuple[ArrayLike, float] | None = None,
+        gyro: tuple[ArrayLike, ArrayLike] | None = None,
+    ) -> CornerEstimate:
+        """What one frame tells: C-contiguous images of uint8, (H, W, 3) or (H, W) as `_coloured` says; which way is
+        down (3,) with its standard deviation, and the turn since the frame before (3, 3) with its covariance (3, 3).
+        """
 
     @property
     def left(self) -> CornerDetector:
@@ -2756,6 +2764,11 @@ class StereoSequence:
     @property
     def corner(self) -> int:
         """Which of the scene's corners is looked at."""
+
+    def distances(self, frame: SupportsIndex, bearings: ArrayLike) -> NDArray[np.float64]:
+        """(N,): how far away the first surface is along bearings (N, 3) of the left camera at a frame, metres; NaN
+        where there is none.
+        """
 
     @property
     def exposure_s(self) -> float:

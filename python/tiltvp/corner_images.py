@@ -93,16 +93,30 @@ class CornerPoseEstimator(_core.CornerPoseEstimator):
         other = None if right is None else detector(right)
         return super().__new__(cls, detector(left), other, left_from_right, **own)
 
-    def __call__(self, left: ArrayLike, right: ArrayLike | None = None) -> CornerEstimate:
+    def __call__(
+        self,
+        left: ArrayLike,
+        right: ArrayLike | None = None,
+        *,
+        gravity: tuple[ArrayLike, float] | None = None,
+        gyro: tuple[ArrayLike, ArrayLike] | None = None,
+    ) -> CornerEstimate:
         """What one frame tells; false if no pose stands out, `reason` says why. One image for one camera, two for a
         pair.
+
+        `gravity` is which way is down in this frame: a direction (3,) in the left camera's frame, and its standard
+        deviation in any one direction, radians. `gyro` is how the camera has turned since the frame before: the
+        rotation `before_from_now` (3, 3), which takes vectors of the left camera's frame now to that at the frame
+        before, and the covariance (3, 3) of the rotation vector of its error, frame now, square radians. Both choose
+        between interpretations and say where to look; they do not move a pose. `tiltvp.streams.InertialSamples.known`
+        makes them of readings. Raises `InvalidInputError` for what is no direction, rotation or covariance.
         """
         made = bgr_from if self._coloured else gray_from
-        return self._observe(made(left), None if right is None else made(right))
+        return self._observe(made(left), None if right is None else made(right), gravity, gyro)
 
-    def poses(self, left: ArrayLike, right: ArrayLike | None = None) -> list[BelievedCorner]:
+    def poses(self, left: ArrayLike, right: ArrayLike | None = None, **known: Any) -> list[BelievedCorner]:
         """All corners of one frame that are believed, each with its `id`, `pose` and edges; that of the pose first.
 
-        Empty where none is. It is `self(left, right).corners`, and goes on from frame to frame alike.
+        Empty where none is. It is `self(left, right, **known).corners`, and goes on from frame to frame alike.
         """
-        return self(left, right).corners
+        return self(left, right, **known).corners

@@ -6,7 +6,7 @@ use nalgebra::{Matrix2, Rotation3, Vector2, Vector3};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use tiltvp_core::corner::{BearingObservation, triangulate};
-use tiltvp_core::filter::{ConsistencyBand, squared_mahalanobis};
+use tiltvp_core::filter::{ConsistencyBand, positive_semidefinite, squared_mahalanobis};
 use tiltvp_core::geometry::{RigidMotion, tangent_basis};
 
 fn normal(rng: &mut ChaCha8Rng) -> f64 {
@@ -83,4 +83,35 @@ fn nothing_is_triangulated_from_parallel_or_parting_lines_of_sight() {
             assert!(found.is_none_or(|found| found.covariance_m2.cholesky().is_some()), "{found:?}");
         }
     }
+}
+
+/// Covariances of which one direction is known 1e8 times as well as the other: whatever rounding leaves, an answer is one.
+#[test]
+fn nearly_singular_bearings_give_a_point_with_a_covariance_or_none() {
+    let mut rng = ChaCha8Rng::seed_from_u64(18);
+    let (left_from_right, right_from_left) = right_camera();
+    let mut answers = 0;
+    for k in 0..20_000 {
+        let mut number = || 2.0 * rng.random::<f64>() - 1.0;
+        let point = Vector3::new(number(), number(), 2.0);
+        let thin = |angle: f64, size: f64| {
+            let along = Vector2::new(angle.cos(), angle.sin());
+            along * along.transpose() * size
+        };
+        let size = 10f64.powi(-(k % 16));
+        let covariances = [thin(3.0 * number(), size), thin(3.0 * number(), size)];
+        let off = Vector3::new(number(), number(), number()) * 0.01;
+        let bearings = [(point + off).normalize(), right_from_left.point(&point).normalize()];
+        let cameras = [RigidMotion::identity(), left_from_right];
+        let observations = [0, 1].map(|k| BearingObservation {
+            bearing: bearings[k],
+            covariance: covariances[k],
+            rig_from_camera: cameras[k],
+        });
+        let Some(found) = triangulate(&observations) else { continue };
+        answers += 1;
+        assert!(found.point_m.iter().all(|x| x.is_finite()) && found.chi_square >= 0.0, "{observations:?} {found:?}");
+        assert!(positive_semidefinite(&found.covariance_m2), "{observations:?} {found:?}");
+    }
+    assert!(answers > 100, "{answers}");
 }

@@ -2,7 +2,7 @@
 
 #![allow(clippy::unwrap_used)]
 
-use std::f64::consts::TAU;
+use std::f64::consts::{PI, TAU};
 
 use nalgebra::{Matrix2, Rotation3, Vector2, Vector3};
 use proptest::prelude::*;
@@ -12,7 +12,7 @@ use tiltvp_core::tilt::{
     ALTERNATIVES, MountingOptions, TiltEstimate, TiltFilter, TiltFilterOptions, TiltFilterState, Verdict,
 };
 
-const DEGREE: f64 = std::f64::consts::PI / 180.0;
+const DEGREE: f64 = PI / 180.0;
 
 fn settled(options: TiltFilterOptions, normal: &Vector3<f64>) -> TiltFilter {
     let mut filter = TiltFilter::new(options).unwrap();
@@ -228,9 +228,36 @@ fn impossible_options_and_arguments_are_refused() {
         TiltFilterState { common: Some(Matrix2::zeros()), ..before.state().clone() },
         TiltFilterState { pending: Some((Vector3::zeros(), small())), ..before.state().clone() },
         TiltFilterState { scene: Vector2::new(f64::NAN, 0.0), ..before.state().clone() },
+        TiltFilterState { covariance: before.state().covariance * 1e306, ..before.state().clone() },
+        TiltFilterState { common: Some(Matrix2::identity() * 1e306), ..before.state().clone() },
+        TiltFilterState { pending: Some((Vector3::z(), Matrix2::identity() * 11.0)), ..before.state().clone() },
     ] {
-        assert!(TiltFilter::with_state(base, wrong).is_err());
+        let error = TiltFilter::with_state(base, wrong).unwrap_err();
+        assert!(matches!(error, tiltvp_core::Error::InvalidArgument { .. }), "{error}");
     }
+    assert!(filter.update_normal(&Vector3::z(), &(Matrix2::identity() * 11.0)).is_err());
+}
+
+#[test]
+fn no_tilt_becomes_more_unknown_than_an_angle() {
+    let mounting = MountingOptions { walk_rad_per_sqrt_m: PI, ..MountingOptions::default() };
+    let options = TiltFilterOptions {
+        walk_rad_per_sqrt_m: PI,
+        confidence_min: 0.0,
+        mounting: Some(mounting),
+        ..TiltFilterOptions::default()
+    };
+    let mut filter = settled(options, &Vector3::z());
+    for k in 0..1000 {
+        filter.predict(0.1, 1e6).unwrap();
+        if k % 100 == 99 {
+            filter.update_normal(&Vector3::z(), &(Matrix2::identity() * 9.8)).unwrap();
+        }
+        let again = TiltFilter::with_state(options, filter.state().clone()).unwrap();
+        assert!(again.estimate().covariance_rad2.amax() < 4.0 * PI * PI);
+    }
+    filter.update_normal(&Vector3::z(), &small()).unwrap();
+    assert!(filter.estimate().sigma_rad < 0.1, "{:?}", filter.estimate());
 }
 
 /// A few steps of a drive: turn, distance, lean, its direction, standard deviation.

@@ -157,6 +157,25 @@ impl StereoSequence {
         ))
     }
 
+    /// (N,): how far away the first surface is along bearings (N, 3) of the left camera at a frame, metres; NaN
+    /// where there is none.
+    #[pyo3(signature = (frame: "SupportsIndex", bearings: "ArrayLike"))]
+    fn distances<'py>(
+        &self,
+        py: Python<'py>,
+        frame: &Bound<'py, PyAny>,
+        bearings: &Bound<'py, PyAny>,
+    ) -> PyResult<Array<'py, f64>> {
+        let pose = self.inner.pose(self.frame(frame)?).map_err(|error| exception(&error))?;
+        let (bearings, _) = convert::rows::<3>(bearings, "bearings")?;
+        let world = world_of(self.scene.bind(py))?;
+        let distance = |bearing: [f64; 3]| {
+            let hit = world.cast(&pose.translation.vector, &(pose.rotation * Vector3::from(bearing)));
+            hit.map_or(f64::NAN, |hit| hit.distance_m)
+        };
+        Ok(Array::new(PyArray1::from_vec(py, bearings.into_iter().map(distance).collect())))
+    }
+
     /// Readings of an inertial sensor: times, rates (M, 3), forces (M, 3), the rates' true biases (M, 3).
     #[pyo3(signature = (**options: "Any"))]
     fn _imu<'py>(&self, py: Python<'py>, options: Option<&Bound<'py, PyDict>>) -> PyResult<Readings<'py>> {

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from cyclopts import Group, Parameter, validators
 
 from tiltvp._core import CORNER_METHODS
+from tiltvp.cli.corner_inertial import Inertial, InertialOptions
 from tiltvp.cli.corner_methods import AUTO, SCALES, Searches, methods_for
 from tiltvp.cli.corner_results import CornerResults, tell
 from tiltvp.cli.declared_options import LibraryOptions, from_library, mask_from
@@ -18,7 +19,7 @@ from tiltvp.cli.options import image_size_from
 from tiltvp.cli.rerun_views import send_corner
 from tiltvp.cli.showing import RerunOptions
 from tiltvp.cli.sources import SourceOptions, ending_at_interrupt, picture_names
-from tiltvp.cli.terminal import named, progress_bar
+from tiltvp.cli.terminal import named, progress_bar, say
 from tiltvp.errors import InvalidInputError, TiltvpError
 
 if TYPE_CHECKING:
@@ -58,6 +59,7 @@ class CornerOptions(LibraryOptions):
 
 
 _OPTIONS, _SOURCE, _RESULTS, _WATCHING = CornerOptions(), SourceOptions(), CornerResults(), RerunOptions()
+_INERTIAL = InertialOptions()
 
 
 def corner(
@@ -74,6 +76,7 @@ def corner(
     frame_rate: Annotated[float | None, Parameter(validator=validators.Number(gt=0))] = None,
     image_size: str | None = None,
     independent: Annotated[bool, Parameter(negative="")] = False,
+    inertial: InertialOptions = _INERTIAL,
     watching: RerunOptions = _WATCHING,
 ) -> int:
     """Find a corner in each image, or pair of images, and from it the camera's attitude, with a pair also its position.
@@ -114,18 +117,21 @@ def corner(
     if topic_right is not None and right is None:
         raise InvalidInputError(f"--topic-right {topic_right} of one camera: expected two")
     watching.check()
+    sensor = inertial.knowledge()
     camera, estimator = _searches(calibration, right is not None, method, known, image_size_from(image_size))
     frames = source.open([] if left is None else [left])
     others = None if right is None else SourceOptions(topic=topic_right).open([right])
     if others is not None and (others.count != frames.count or frames.count is None):
         raise InvalidInputError(f"{right}: {others.count} frames, expected {frames.count} as in {left}")
     with watching.viewer() as viewer:
-        look = Look(camera, estimator, independent, results.overlay, viewer)
+        look = Look(camera, estimator, independent, results.overlay, viewer, sensor)
         estimates = list(look.each(frames, others, frame_rate))
     if not estimates:
         raise InvalidInputError(f"{frames.source}: {look.bad} frames, none of which can be used")
     results.write(estimates)
     tell(str(frames.source), estimator, look.bad, has_scale=has_scale, advice_for=(right is not None, known))
+    if sensor is not None:
+        say(sensor.summary())
     return 1 if look.bad or frames.problems else 0
 
 
@@ -138,6 +144,7 @@ class Look:
     independent: bool
     overlay: Path | None
     viewer: Viewer | None
+    sensor: Inertial | None = None
     bad: int = 0
     """How many frames could not be used so far."""
 
@@ -156,7 +163,7 @@ class Look:
                 time_s = even_s if rate_hz is not None or frame.time_s is None else frame.time_s
                 try:
                     images = [one.read() for one in pair]
-                    estimate = self._estimate(images)
+                    estimate = self._estimate(images, time_s)
                 except TiltvpError as error:
                     bar.complain(named(frame.name, str(error)))
                     self.bad += 1
@@ -165,10 +172,11 @@ class Look:
                     yield time_s, frame.name, estimate
                 bar.advance()
 
-    def _estimate(self, images: Sequence[NDArray[np.uint8]]) -> CornerEstimate:
+    def _estimate(self, images: Sequence[NDArray[np.uint8]], time_s: float) -> CornerEstimate:
         if self.independent:
             self.estimator.reset()
-        return self.estimator(*images)
+        known = {} if self.sensor is None else self.sensor.known(time_s)
+        return self.estimator(*images, **known)
 
     def _draw(self, name: str, number: int, time_s: float, image: NDArray[np.uint8], estimate: CornerEstimate) -> None:
         from tiltvp.images import write_image

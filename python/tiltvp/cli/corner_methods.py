@@ -52,14 +52,14 @@ class Searches:
         if len(self._estimators) > 1:
             self._chosen = None
 
-    def __call__(self, *images: NDArray[np.uint8]) -> CornerEstimate:
-        """The first pose that a method has, or the last one's reason for none."""
+    def __call__(self, *images: NDArray[np.uint8], **known: Any) -> CornerEstimate:
+        """The first pose that a method has, or the last one's reason for none; `known` is what a sensor tells."""
         for method, estimator in self._estimators.items():
             if self._chosen not in (None, method):
                 continue
             if method != "general" and len(self._estimators) > 1 and any(image.ndim == 2 for image in images):
                 continue
-            estimate = estimator(*images)
+            estimate = estimator(*images, **known)
             if estimate:
                 self._chosen = method
                 self.found[method] += 1

@@ -1,15 +1,39 @@
-"""What an inertial sensor has measured over time."""
+"""What an inertial sensor has measured over time, and what that tells of a camera from frame to frame."""
 
 from __future__ import annotations
 
+import os
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, Final, Self
+
+import numpy as np
+
+from tiltvp.csv_files import CsvFile
+from tiltvp.errors import InvalidInputError
 
 if TYPE_CHECKING:
-    import numpy as np
     from numpy.typing import NDArray
 
 __all__ = ["InertialSamples"]
+
+_RATES: Final = tuple(f"rate_{axis}_radps" for axis in "xyz")
+_FORCES: Final = tuple(f"acceleration_{axis}_mps2" for axis in "xyz")
+_NOISE_RAD_S: Final = float(np.radians(0.005))
+"""Noise density of rates, rad/s per square root of Hz: of an MPU-6050, as `StereoSequence.imu` has it."""
+_BIAS_RAD_S: Final = float(np.radians(0.2))
+"""Standard deviation of the bias of rates, alike."""
+_SCALE: Final = 0.01
+"""Standard deviation of scale and axes of rates together, as a share of the turn: 0.5 % each, and mountings by hand."""
+_GRAVITY_M_S2: Final = 9.81
+_LEVEL_RAD: Final = float(np.radians(0.5))
+"""Standard deviation of down by a sensor at rest: a bias of 5 mg is 0.3 degrees, and as much of the mounting."""
+_STEADY_RAD: Final = float(np.radians(5.0))
+"""Down with a larger standard deviation is not told: the sensor moves."""
+_SWAY_S: Final = 0.5
+"""How long before and after a frame accelerations are averaged: a hand sways for a second and more, and what stays the
+same for less than that passes for gravity."""
+_GAP_S: Final = 0.1
+"""The longest time between two samples over which turns are told: at 2 rad/s a tenth of a turn goes on unseen."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -20,11 +44,104 @@ class InertialSamples:
     """(N,): rising."""
     rates_rad_s: NDArray[np.float64]
     """(N, 3): of rotation."""
-    accelerations_m_s2: NDArray[np.float64]
-    """(N, 3): what a body at rest feels upwards is positive (specific force, as ROS has it)."""
+    accelerations_m_s2: NDArray[np.float64] | None
+    """(N, 3): what a body at rest feels upwards is positive (specific force, as ROS has it); None of rates alone."""
     orientations: NDArray[np.float64] | None = None
     """(N, 4): quaternions x y z w that take the sensor's axes to the world's; None where the sensor tells none."""
     frame: str = ""
     """The frame of the sensor, by the name that the recording has for it."""
     source: str = "inertial sensor"
     """What messages call it."""
+
+    @classmethod
+    def read(cls, path: str | os.PathLike[str]) -> Self:
+        """Reads a CSV file with columns time_s, rate_x_radps, rate_y_radps, rate_z_radps, and alike
+        acceleration_x_mps2 where there are any.
+
+        Raises `InvalidInputError` that names file and line.
+        """
+        table = CsvFile(path, "readings of an inertial sensor as CSV")
+        wanted = ("time_s", *_RATES)
+        has_forces = any(name in table.header for name in _FORCES)
+        wanted += _FORCES if has_forces else ()
+        missing = [name for name in wanted if name not in table.header]
+        if missing:
+            raise InvalidInputError(f"{table.name}: no column {missing[0]}, expected {', '.join(wanted)}")
+        places = [table.header.index(name) for name in wanted]
+        numbers, before = [], -np.inf
+        for line, row in table.rows():
+            values = [table.number(line, name, row[place]) for name, place in zip(wanted, places, strict=True)]
+            if values[0] <= before:
+                raise InvalidInputError(f"{table.where(line)}: time_s = {values[0]}, expected one after {before}")
+            before = values[0]
+            numbers.append(values)
+        if len(numbers) < 2:
+            raise InvalidInputError(f"{table.name}: {len(numbers)} rows, expected two or more")
+        columns = np.array(numbers, dtype=np.float64)
+        forces = columns[:, 4:7] if has_forces else None
+        return cls(columns[:, 0], columns[:, 1:4], forces, source=table.name)
+
+    def known(
+        self, before_s: float | None, now_s: float, camera_from_sensor: NDArray[np.float64] | None = None
+    ) -> dict[str, Any]:
+        """What is known of a frame: the keywords `gravity` and `gyro` of `CornerPoseEstimator`.
+
+        `before_s` is the time of the frame before, None where there is none. `camera_from_sensor` (3, 3) takes vectors
+        of the sensor's axes to the camera's; None where these are the same. `gyro` is the product of the rotations by
+        the rates, each held half-way to its neighbours, with the covariance of noise, bias and scale; None where
+        samples do not cover the time. `gravity` is the mean acceleration within half a second, carried to the
+        frame by the rates; its standard deviation has the sensor's bias, the scatter of accelerations and how far their
+        length is from gravity's. None where that is above 5 degrees, as of a sensor that is moved.
+        """
+        turn = np.eye(3) if camera_from_sensor is None else np.asarray(camera_from_sensor, dtype=np.float64)
+        gyro = None if before_s is None else self._turned(before_s, now_s, turn)
+        return {"gravity": self._down(now_s, turn), "gyro": gyro}
+
+    def _turned(
+        self, before_s: float, now_s: float, camera_from_sensor: NDArray[np.float64]
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]] | None:
+        import cv2
+
+        inside = (self.times_s > before_s) & (self.times_s < now_s)
+        nodes = np.concatenate([[before_s], self.times_s[inside], [now_s]])
+        covered = self.times_s[0] - _GAP_S <= before_s and now_s <= self.times_s[-1] + _GAP_S
+        # Frames nearer to each other than samples are covered by those about them.
+        about = self.times_s[
+            max(np.searchsorted(self.times_s, before_s) - 1, 0) : np.searchsorted(self.times_s, now_s) + 1
+        ]
+        if not covered or now_s <= before_s or (len(about) > 1 and float(np.diff(about).max()) > _GAP_S):
+            return None
+        rates = np.column_stack([np.interp(nodes, self.times_s, rate) for rate in self.rates_rad_s.T])
+        steps_s = np.diff(nodes)
+        before_from_now = np.eye(3)
+        for vector in 0.5 * (rates[1:] + rates[:-1]) @ camera_from_sensor.T * steps_s[:, None]:
+            before_from_now = before_from_now @ cv2.Rodrigues(vector)[0]
+        time_s = now_s - before_s
+        angle = float(np.linalg.norm(cv2.Rodrigues(before_from_now)[0]))
+        variance = _NOISE_RAD_S**2 * time_s + (_BIAS_RAD_S * time_s) ** 2 + (_SCALE * angle) ** 2
+        return before_from_now, np.eye(3) * variance
+
+    def _down(self, now_s: float, camera_from_sensor: NDArray[np.float64]) -> tuple[NDArray[np.float64], float] | None:
+        import cv2
+
+        if self.accelerations_m_s2 is None:
+            return None
+        near = np.flatnonzero(np.abs(self.times_s - now_s) <= _SWAY_S)
+        if len(near) < 2:
+            return None
+        times_s, rates = self.times_s[near], self.rates_rad_s[near]
+        turns = [np.eye(3)]
+        for vector in 0.5 * (rates[1:] + rates[:-1]) * np.diff(times_s)[:, None]:
+            turns.append(turns[-1] @ cv2.Rodrigues(vector)[0])
+        now = turns[int(np.argmin(np.abs(times_s - now_s)))]
+        # All in the axes at the frame.
+        forces = np.einsum("ji,njk,nk->ni", now, np.stack(turns), self.accelerations_m_s2[near])
+        mean = forces.mean(axis=0)
+        length = float(np.linalg.norm(mean))
+        # What moves the sensor is alike in many samples, so that their number makes it no smaller, and at a sway's end
+        # it is the square root of two of its root mean square.
+        scatter = float(np.sqrt(((forces - mean) ** 2).sum(axis=1).mean() / 3.0)) / _GRAVITY_M_S2
+        sigma_rad = float(np.sqrt(_LEVEL_RAD**2 + 2.0 * scatter**2 + (length / _GRAVITY_M_S2 - 1.0) ** 2))
+        if sigma_rad > _STEADY_RAD:
+            return None
+        return -(camera_from_sensor @ mean) / length, sigma_rad

@@ -50,6 +50,7 @@ pub use self::options::{
 pub use self::pose::{CornerOptions, CornerPose, corner_poses};
 pub use self::ray::FittedRay;
 pub use self::sequence::estimator::{CornerPoseEstimator, Frame};
+pub use self::sequence::knowledge::{CameraTurn, FrameKnowledge, GravityDirection};
 pub use self::sequence::names::{CornerNames, KnownWorld, NamedPlace};
 pub use self::sequence::track::{KnownCorner, Track};
 pub use self::triangulation::{BearingObservation, TriangulatedPoint, triangulate};

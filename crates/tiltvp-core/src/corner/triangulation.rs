@@ -53,20 +53,22 @@ pub fn triangulate(observations: &[BearingObservation]) -> Option<TriangulatedPo
                 return None;
             }
             let basis = tangent_basis(&observation.bearing).transpose();
-            let weight = weight(&observation.covariance)?;
-            let miss = basis * seen;
-            let by_point = basis * (Matrix3::identity() - seen * seen.transpose()) * rotation.transpose() / distance;
-            information += by_point.transpose() * weight * by_point;
-            pull += by_point.transpose() * (weight * miss);
-            chi_square += miss.dot(&(weight * miss));
+            // In standard deviations, so that squares of what is left stay squares however thin the covariance.
+            let whitener = whitener(&observation.covariance)?;
+            let miss = whitener * basis * seen;
+            let across = Matrix3::identity() - seen * seen.transpose();
+            let by_point = whitener * basis * across * rotation.transpose() / distance;
+            information += by_point.transpose() * by_point;
+            pull += by_point.transpose() * miss;
+            chi_square += miss.norm_squared();
         }
-        let covariance_m2 = information.try_inverse()?;
+        let covariance_m2 = information.cholesky()?.inverse();
         let move_m = covariance_m2 * pull;
         if step == STEPS || move_m.norm() <= 1e-14 * point.norm() {
             // A covariance that rounding has turned round is that of lines of sight too near to parallel ones.
             let covariance_m2 = symmetric(&covariance_m2);
             let positive = covariance_m2.cholesky().is_some();
-            let finite = point.iter().chain(covariance_m2.iter()).all(|x| x.is_finite());
+            let finite = point.iter().chain(covariance_m2.iter()).chain([&chi_square]).all(|x| x.is_finite());
             return (finite && positive).then_some(TriangulatedPoint { point_m: point, covariance_m2, chi_square });
         }
         point -= move_m;
@@ -74,10 +76,10 @@ pub fn triangulate(observations: &[BearingObservation]) -> Option<TriangulatedPo
     None
 }
 
-/// The inverse of a bearing's covariance; none of a matrix that is no covariance.
-fn weight(covariance: &Matrix2<f64>) -> Option<Matrix2<f64>> {
-    let spread = covariance + Matrix2::from_diagonal_element(VARIANCE_MIN);
-    if spread.m11 > 0.0 && spread.determinant() > 0.0 { spread.try_inverse() } else { None }
+/// What takes a miss of a bearing to standard deviations: the inverse of its covariance's Cholesky factor; none of a matrix that is
+/// no covariance.
+fn whitener(covariance: &Matrix2<f64>) -> Option<Matrix2<f64>> {
+    (covariance + Matrix2::from_diagonal_element(VARIANCE_MIN)).cholesky()?.l().try_inverse()
 }
 
 /// The point nearest to all lines of sight, and the inverse of the sum of projections across them; none where they are parallel.
@@ -117,8 +119,7 @@ pub(super) fn midpoint(observations: &[BearingObservation; 2]) -> Option<Triangu
         let carried = rotation * basis * ahead;
         spread += carried * observation.covariance * carried.transpose();
         let miss = basis.transpose() * to / ahead;
-        let weight = weight(&observation.covariance)?;
-        chi_square += miss.dot(&(weight * miss));
+        chi_square += (whitener(&observation.covariance)? * miss).norm_squared();
     }
     Some(TriangulatedPoint { point_m: point, covariance_m2: symmetric(&(inverse * spread * inverse)), chi_square })
 }

@@ -1,9 +1,12 @@
 //! `CornerPoseEstimator`: poses from the images of one camera or a pair, frame after frame.
 
-use nalgebra::Matrix4;
+use nalgebra::{Matrix4, Vector3};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyTuple};
-use tiltvp_core::corner::{self as core, CornerMethod, CornerNames, EstimatorOptions, Frame, Track};
+use tiltvp_core::corner::{
+    self as core, CameraTurn, CornerMethod, CornerNames, EstimatorOptions, Frame, FrameKnowledge, GravityDirection,
+    Track,
+};
 use tiltvp_core::geometry::RigidMotion;
 
 use super::detector::CornerDetector;
@@ -43,8 +46,7 @@ impl CornerPoseEstimator {
         let mut parsed = EstimatorOptions::default();
         options::set(&mut parsed, options)?;
         if let Some(down) = &mut parsed.down {
-            let unit = down.try_normalize(1e-12);
-            *down = unit.ok_or_else(|| invalid("down: no direction, expected a vector".to_owned()))?;
+            *down = direction(down, "down")?;
         }
         let options = parsed;
         let motion = left_from_right.map(|matrix| convert::rigid_motion(matrix, "left_from_right")).transpose()?;
@@ -107,17 +109,24 @@ impl CornerPoseEstimator {
         })
     }
 
-    /// What one frame tells: C-contiguous images of uint8, (H, W, 3) or (H, W) as `_coloured` says.
-    #[pyo3(signature = (left: "NDArray[np.uint8]", right: "NDArray[np.uint8] | None"))]
+    /// What one frame tells: C-contiguous images of uint8, (H, W, 3) or (H, W) as `_coloured` says; which way is
+    /// down (3,) with its standard deviation, and the turn since the frame before (3, 3) with its covariance (3, 3).
+    #[pyo3(signature = (
+        left: "NDArray[np.uint8]", right: "NDArray[np.uint8] | None", gravity: "tuple[ArrayLike, float] | None" = None,
+        gyro: "tuple[ArrayLike, ArrayLike] | None" = None
+    ))]
     fn _observe(
         &self,
         py: Python<'_>,
         left: &Bound<'_, PyAny>,
         right: Option<&Bound<'_, PyAny>>,
+        gravity: Option<(Bound<'_, PyAny>, f64)>,
+        gyro: Option<(Bound<'_, PyAny>, Bound<'_, PyAny>)>,
     ) -> PyResult<CornerEstimate> {
+        let known = knowledge(gravity, gyro)?;
         let inner = &self.inner;
         let observe = |left: Frame<'_>, right: Option<Frame<'_>>| {
-            inner.change(py, |estimator| estimator.observe(&left, right.as_ref())).map(CornerEstimate::from)
+            inner.change(py, |estimator| estimator.observe(&left, right.as_ref(), &known)).map(CornerEstimate::from)
         };
         if self.coloured {
             let left = convert::color(left, "left")?;
@@ -174,6 +183,25 @@ impl CornerPoseEstimator {
         let track = track.map(|track| memory::to_dict(py, &track)).transpose()?;
         (make, PyTuple::empty(py), (objects, track, memory::names_to_dict(py, &names)?)).into_pyobject(py)
     }
+}
+
+fn direction(vector: &Vector3<f64>, name: &str) -> PyResult<Vector3<f64>> {
+    vector.try_normalize(1e-12).ok_or_else(|| invalid(format!("{name}: no direction, expected a vector")))
+}
+
+fn knowledge(
+    gravity: Option<(Bound<'_, PyAny>, f64)>,
+    gyro: Option<(Bound<'_, PyAny>, Bound<'_, PyAny>)>,
+) -> PyResult<FrameKnowledge> {
+    let gravity = gravity.map(|(down, sigma_rad)| {
+        let down = direction(&convert::vector3(&down, "gravity")?, "gravity")?;
+        PyResult::Ok(GravityDirection { down, sigma_rad })
+    });
+    let turn = gyro.map(|(before_from_now, covariance)| {
+        let before_from_now = convert::matrix3(&before_from_now, "gyro")?;
+        PyResult::Ok(CameraTurn { before_from_now, covariance: convert::matrix3(&covariance, "gyro")? })
+    });
+    Ok(FrameKnowledge { gravity: gravity.transpose()?, turn: turn.transpose()? })
 }
 
 impl CornerPoseEstimator {

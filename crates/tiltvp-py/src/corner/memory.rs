@@ -12,7 +12,7 @@ use crate::convert;
 use crate::field::{Field, Value};
 
 /// Keys of the dict of what is kept.
-const KEYS: [&str; 7] = ["pose", "corners_left", "corners_right", "age", "object", "others", "pace"];
+const KEYS: [&str; 8] = ["pose", "corners_left", "corners_right", "age", "object", "others", "pace", "turned"];
 
 /// Plain numbers and lists.
 pub(super) fn to_dict<'py>(py: Python<'py>, track: &Track) -> PyResult<Bound<'py, PyDict>> {
@@ -27,6 +27,7 @@ pub(super) fn to_dict<'py>(py: Python<'py>, track: &Track) -> PyResult<Bound<'py
     dict.set_item("age", track.age)?;
     dict.set_item("object", track.object)?;
     dict.set_item("pace", track.pace)?;
+    track.turned.write(&dict, "turned")?;
     Ok(dict)
 }
 
@@ -45,6 +46,7 @@ pub(super) fn from_dict(values: &Bound<'_, PyDict>) -> PyResult<Track> {
         object: convert::item(values, "object", "a whole number")?,
         others: others.into_iter().map(known).collect(),
         pace: convert::item(values, "pace", "a share of the distance")?,
+        turned: <Option<Matrix3<f64>> as Field>::take(values, "turned")?,
     })
 }
 

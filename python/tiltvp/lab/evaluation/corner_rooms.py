@@ -14,10 +14,19 @@ from tiltvp.synth import StereoSequence
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-__all__ = ["own_places", "truth_near"]
+__all__ = ["own_places", "surface_off", "truth_near"]
 
 _SAME_M: Final = 0.08
 """An estimate is of the listed corner that is this near."""
+
+_SAME_WAY_DEG: Final = 20.0
+"""An estimate is of a listed corner whose edges run the same ways, each within as much as another interpretation."""
+
+_PIXEL_RAD: Final = 1.5e-3
+"""A pixel of the cameras of `zed_cameras` at 1280 x 720."""
+
+_EDGE_WIDTH: Final = 0.005
+"""How thick what makes an edge may be, as a share of the distance: rounded edges, joints of boards."""
 
 _BESIDE_M: Final = 1.0
 """Corners that are this near may be of the same piece of furniture, and their edges parallel."""
@@ -40,12 +49,41 @@ def own_places(sequence: StereoSequence, estimates: Sequence[CornerEstimate]) ->
     return {number: np.median(places, axis=0) for number, places in seen.items()}
 
 
+def surface_off(sequence: StereoSequence, frame: int, pose: CornerHypothesis) -> float:
+    """How far along its line of sight a vertex is from the nearest surface seen there, in its standard deviations.
+
+    Surfaces are those within 2 pixels; half a percent of the distance, which the edges' own width makes, is added to
+    the standard deviation. Listed or not, a corner of two things that meet in the image alone is on neither.
+    """
+    assert pose.vertex_m is not None
+    distance = float(np.linalg.norm(pose.vertex_m))
+    along = pose.vertex_m / distance
+    across = np.linalg.svd(along[None])[2][1:]
+    reach = 2.0 * _PIXEL_RAD
+    angles = np.linspace(0.0, 2.0 * np.pi, 16, endpoint=False)
+    ring = np.column_stack([np.cos(angles), np.sin(angles)]) @ across
+    bearings = np.concatenate([[along], along + 0.5 * reach * ring, along + reach * ring])
+    surfaces = sequence.distances(frame, bearings)
+    sigma = float(np.sqrt(along @ pose.covariance[3:, 3:] @ along)) + _EDGE_WIDTH * distance
+    return float(np.nanmin(np.abs(surfaces - distance))) / sigma
+
+
+def _run_alike(edges: NDArray[np.float64], others: NDArray[np.float64]) -> bool:
+    """Whether each of three directions is near another one of the others."""
+    cosines = np.asarray(edges) @ others.T
+    return sorted(np.argmax(cosines, axis=1)) == [0, 1, 2] and float(cosines.max(axis=1).min()) >= np.cos(
+        np.radians(_SAME_WAY_DEG)
+    )
+
+
 def truth_near(
     sequence: StereoSequence, frame: int, pose: CornerHypothesis, own_place_m: NDArray[np.float64]
 ) -> tuple[int, NDArray[np.float64]]:
     """The listed corner that an estimate is of, or -1, and its pose (4, 4) in the left camera.
 
-    Where none is near the place is `own_place_m`, in the world, which tells how steady estimates are and not whether
+    An estimate can be of corners that both cameras see, near it, with edges that run the same ways: beside a cabinet's
+    corner may be that of a table's frame, and before that of the room that of its skirting board, which the list lacks.
+    Where there is none the place is `own_place_m`, in the world, which tells how steady estimates are and not whether
     they are right; the attitude is that of the room's walls or of a corner beside it. Axes are named as the estimate
     has them.
     """
@@ -56,9 +94,12 @@ def truth_near(
     away = np.linalg.norm(vertices - pose.vertex_m, axis=1)
     number = int(np.argmin(away))
     truth = np.eye(4)
-    if away[number] <= _SAME_M:
+    edges = np.stack(pose.edges) @ from_world[:3, :3]
+    same = [k for k in sequence.truth(frame).corners if away[k] <= _SAME_M and _run_alike(corners[k].edges, edges)]
+    if same:
+        number = min(same, key=lambda k: float(away[k]))
         # Of corners in one place, as of stacked boxes, the one nearest to the estimate.
-        candidates = np.flatnonzero(away < away[number] + 1e-6)
+        candidates = np.array([k for k in same if away[k] < away[number] + 1e-6])
         truth[:3, 3] = vertices[number]
     else:
         number = -1

@@ -18,7 +18,7 @@ from tiltvp.corner_images import CornerEstimate, CornerPoseEstimator
 from tiltvp.errors import InvalidInputError
 from tiltvp.lab.datasets.new import in_order
 from tiltvp.lab.evaluation.corner_inertial import compare_inertial
-from tiltvp.lab.evaluation.corner_rooms import own_places, truth_near
+from tiltvp.lab.evaluation.corner_rooms import own_places, surface_off, truth_near
 from tiltvp.synth import Laboratory, Room, StereoSequence, zed_cameras
 
 if TYPE_CHECKING:
@@ -30,6 +30,12 @@ __all__ = ["CORNER_SCENES", "CornerExperiment", "CornerScene", "down_in", "measu
 
 _FLIP_DEG: Final = 20.0
 """An attitude that is farther off is another interpretation, not a noisy one."""
+
+_NEES_MAX: Final = 22.5
+"""The 99.9 % quantile of chi-square of 6: a pose whose NEES is above it is wrong and sure."""
+
+_OFF_SIGMAS: Final = 3.3
+"""That of a normal deviate: a vertex farther from every surface is wrong and sure, listed or not."""
 
 _ONE_CAMERA: Final = "coloured, one camera, height known"
 """The left camera alone, each frame for itself, with its height above the vertex as somebody measures it."""
@@ -55,7 +61,7 @@ _SCHEMA: Final[dict[str, Any]] = (
     }
     | {"corner": pl.Int64}
     | dict.fromkeys(("attitude_deg", "roll_deg", "pitch_deg", "yaw_deg"), pl.Float64)
-    | dict.fromkeys(("position_m", "x_m", "y_m", "z_m", "probability", "nees", "ms"), pl.Float64)
+    | dict.fromkeys(("position_m", "x_m", "y_m", "z_m", "probability", "nees", "surface", "ms"), pl.Float64)
     | {"hypotheses": pl.UInt32, "reason": pl.String}
 )
 
@@ -139,8 +145,9 @@ def measure_corners(
     and vertex by its covariance, 6 on average at best. In rooms the truth is that of the listed corner near the
     estimate, in whichever of eight ways its axes are named. Where none is near, as the list has no corners with an
     edge below 0.15 m and none of furniture made of boards, `corner` is -1, the attitude is compared with that of the
-    walls and of corners beside it, and the place, without `nees`, with the object's own median in the world. `ms` is
-    the processor time of one pair. `advance` is called after each frame.
+    walls and of corners beside it, and the place, without `nees`, with the object's own median in the world. `surface`
+    is how far the vertex is from what is seen there (`surface_off`). `ms` is the processor time of one pair. `advance`
+    is called after each frame.
     """
     rows: list[dict[str, Any]] = []
     inertial: list[pl.DataFrame] = []
@@ -178,6 +185,8 @@ def summarise_corners(table: pl.DataFrame) -> pl.DataFrame:
         position.quantile(0.99).mul(1000).alias("99 % mm"),
         flipped.sum().alias("flips"),
         pl.col("nees").filter(kept).mean().alias("NEES of 6"),
+        pl.col("nees").gt(_NEES_MAX).mean().mul(100).alias("% NEES > 22.5"),
+        pl.col("surface").gt(_OFF_SIGMAS).mean().mul(100).alias("% off surface"),
         ((position / pl.col("distance_m")) ** 2).filter(kept).mean().sqrt().mul(100).alias("% of distance"),
         pl.col("distance_m").min().alias("from m"),
         pl.col("distance_m").max().alias("to m"),
@@ -281,6 +290,7 @@ def _judged(
         "x_m": x,
         "y_m": y,
         "z_m": z,
+        "surface": surface_off(sequence, frame, pose),
         "nees": float(error @ np.linalg.solve(pose.covariance, error)) if number >= 0 else None,
     }
 

@@ -5,6 +5,7 @@ use nalgebra::{Matrix3, Rotation3, Vector3};
 use super::attitude::{CornerAttitude, CornerAttitudes};
 use super::prior::{AttitudePrior, gaussian, rotation_vector};
 use crate::error::Result;
+use crate::filter::symmetric;
 use crate::geometry::validate_rotation;
 
 /// The attitudes that one feature admits, and where its camera looks.
@@ -73,6 +74,9 @@ const PROBABILITY_MIN: f64 = 1e-9;
 /// Variance of a direction about which nothing is known, square radians: that of an angle uniform in (-pi, pi].
 const UNKNOWN: f64 = std::f64::consts::PI * std::f64::consts::PI / 3.0;
 
+/// By how much rounding may carry a variance below 0, as a share of the sum of all: some fifty products of three numbers each.
+const ROUNDING: f64 = 1e-14;
+
 /// A joint hypothesis about the views up to now.
 #[derive(Debug, Clone)]
 struct Joint {
@@ -138,6 +142,8 @@ pub fn resolve(
 fn single(attitude: &CornerAttitude, common_from_camera: &Matrix3<f64>, index: usize) -> Joint {
     let known = attitude.covariance.iter().all(|x| x.is_finite()) && attitude.ln_volume.is_finite();
     let own = if known { attitude.covariance } else { Matrix3::from_diagonal_element(UNKNOWN) };
+    // Where rounding has taken a little more than there was, two views that contradict each other would show it alone.
+    let own = own + Matrix3::from_diagonal_element(ROUNDING * own.trace());
     Joint {
         rotation: common_from_camera * attitude.camera_from_object,
         covariance: common_from_camera * own * common_from_camera.transpose(),
@@ -181,13 +187,15 @@ fn extended(joint: &Joint, single: &Joint, alignment: Alignment) -> Joint {
     }
     let sum = joint.covariance + spread;
     let (chi_square, ln_density) = gaussian(&off, &sum);
-    let gain = sum.try_inverse().map_or_else(Matrix3::zeros, |inverse| joint.covariance * inverse);
-    let covariance = joint.covariance - gain * joint.covariance;
+    // Joseph's form: what rounding has done to the gain leaves the covariance one.
+    let gain = sum.cholesky().map_or_else(Matrix3::zeros, |factor| factor.solve(&joint.covariance).transpose());
+    let keep = Matrix3::identity() - gain;
+    let covariance = keep * joint.covariance * keep.transpose() + gain * spread * gain.transpose();
     let mut choice = joint.choice.clone();
     choice.extend_from_slice(&single.choice);
     Joint {
         rotation: Rotation3::new(gain * off).matrix() * joint.rotation,
-        covariance: 0.5 * (covariance + covariance.transpose()),
+        covariance: symmetric(&covariance),
         ln_likelihood: joint.ln_likelihood + single.ln_likelihood + ln_density,
         chi_square: joint.chi_square + chi_square,
         choice,
@@ -202,4 +210,30 @@ fn kept(mut joints: Vec<Joint>) -> Vec<Joint> {
     joints.retain(|joint| joint.ln_likelihood - best >= NEGLIGIBLE);
     joints.truncate(FOLLOWED_MAX);
     joints
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::filter::positive_semidefinite;
+
+    /// Views of which each knows another direction 1e5 times as well as the rest.
+    #[test]
+    fn covariances_of_very_different_views_stay_covariances() {
+        let joint = |axis: Vector3<f64>, large: f64, small: f64| Joint {
+            rotation: Matrix3::identity(),
+            covariance: Matrix3::identity() * large + axis * axis.transpose() * (small - large),
+            ln_likelihood: 0.0,
+            chi_square: 0.0,
+            choice: vec![0],
+        };
+        for k in 0..500 {
+            let turn = |k: f64| Rotation3::new(Vector3::new(k, 0.7 * k, -0.3 * k)) * Vector3::z();
+            let (first, second) = (turn(0.01 * f64::from(k)), turn(0.02 * f64::from(k) + 1.0));
+            let joined = extended(&joint(first, 1.0, 1e-10), &joint(second, 1e-3, 1e-13), Alignment::Same);
+            assert!(positive_semidefinite(&joined.covariance), "{k}: {}", joined.covariance);
+            let along = |axis: Vector3<f64>| axis.dot(&(joined.covariance * axis));
+            assert!(along(first) <= 1.1e-10 && along(second) <= 1.1e-13, "{k}: {}", joined.covariance);
+        }
+    }
 }

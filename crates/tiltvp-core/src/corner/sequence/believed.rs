@@ -20,7 +20,7 @@ pub(crate) struct SeenPair {
 
 /// How much worse another match of a corner may fit and still leave it open which one is right: twice the misfit, of noise that has
 /// the same in both. What two matches share in misfit does not tell them apart.
-const OPEN: f64 = 2.0;
+pub(super) const OPEN: f64 = 2.0;
 
 /// The least misfit that is told from none, in standard deviations: that of rays as good as their covariances.
 const MISFIT_MIN: f64 = 1.0;

@@ -4,10 +4,10 @@ use nalgebra::{Matrix3, Matrix6, Vector3};
 
 use super::agreement::{SAME_VERTEX_RAD, agreement, fits, renamed};
 use super::believed::SeenPair;
+use super::knowledge::FrameKnowledge;
 use super::names::CornerNames;
 use super::track::Track;
 use crate::corner::closed_form::attitude::IncludedAngle;
-use crate::corner::closed_form::prior::{AttitudePrior, VerticalSense};
 use crate::corner::closed_form::resolve::{Alignment, View, resolve};
 use crate::corner::detector::{CornerDetector, CornerScratch};
 use crate::corner::estimate::{BelievedCorner, CornerEstimate, CornerVerdict, Hypothesis, PlaceVerdict};
@@ -37,6 +37,8 @@ pub struct CornerPoseEstimator {
     pub(super) track: Option<Track>,
     objects: u32,
     names: CornerNames,
+    /// Of the frame that is looked at.
+    pub(super) known: FrameKnowledge,
     pub(super) scratch: [CornerScratch; 2],
 }
 
@@ -76,7 +78,16 @@ impl CornerPoseEstimator {
             return Err(Error::argument(scale, "given for method \"paper\"", "none, or method \"coloured\""));
         }
         let scratch = [left.scratch(), right.as_ref().map_or(left.scratch(), |(right, _)| right.scratch())];
-        Ok(Self { left, right, options, track: None, objects: 0, names: CornerNames::default(), scratch })
+        Ok(Self {
+            left,
+            right,
+            options,
+            track: None,
+            objects: 0,
+            names: CornerNames::default(),
+            known: FrameKnowledge::default(),
+            scratch,
+        })
     }
 
     /// The left or only camera's detector.
@@ -110,41 +121,28 @@ impl CornerPoseEstimator {
         self.names.forget();
     }
 
-    /// The direction of the vertical in the left camera's frame, from the last pose or from before.
-    pub(super) fn vertical(&self) -> Option<Vector3<f64>> {
-        let last = self.track.as_ref().map(|track| track.pose.camera_from_object.column(1).into_owned());
-        last.or(self.options.down)
-    }
-
-    pub(super) fn priors(&self, same_object: bool) -> Vec<AttitudePrior> {
-        let Some(track) = &self.track else {
-            let gravity = |down| AttitudePrior::Gravity {
-                down,
-                sigma_rad: self.options.down_sigma_rad,
-                sense: VerticalSense::Either,
-            };
-            return self.options.down.map(gravity).into_iter().collect();
-        };
-        let sigma_rad = self.options.turn_sigma_rad * f64::from(track.age).sqrt();
-        let rotation = track.pose.camera_from_object;
-        if same_object {
-            let covariance = Matrix3::from_diagonal_element(sigma_rad * sigma_rad);
-            return vec![AttitudePrior::Attitude { camera_from_object: rotation, covariance }];
-        }
-        vec![AttitudePrior::Gravity { down: rotation.column(1).into_owned(), sigma_rad, sense: VerticalSense::Either }]
-    }
-
-    /// The estimate from a frame: the image of the left or only camera, and that of the right one where there are two.
+    /// The estimate from a frame: the image of the left or only camera, that of the right one where there are two, and what is
+    /// known beside them.
     ///
     /// # Errors
-    /// [`Error::InvalidArgument`] for images of another size or kind than the detectors', and for one image too many or few.
-    pub fn observe(&mut self, left: &Frame<'_>, right: Option<&Frame<'_>>) -> Result<CornerEstimate> {
+    /// [`Error::InvalidArgument`] for images of another size or kind than the detectors', for one image too many or few, and of
+    /// [`FrameKnowledge::validate`].
+    pub fn observe(
+        &mut self,
+        left: &Frame<'_>,
+        right: Option<&Frame<'_>>,
+        known: &FrameKnowledge,
+    ) -> Result<CornerEstimate> {
+        known.validate()?;
         if right.is_some() != self.right.is_some() {
             let (got, expected) = if right.is_some() { ("an image", "none") } else { ("none", "an image") };
             return Err(Error::argument("right image", got, format!("{expected}, as there are cameras")));
         }
+        self.known = *known;
+        let right_from_left =
+            self.right.as_ref().map_or(Matrix3::identity(), |(_, motion)| motion.rotation.transpose());
         if let Some(track) = &mut self.track {
-            track.age += 1;
+            track.go_on(known.turn.as_ref(), &right_from_left);
         }
         if self.track.as_ref().is_some_and(|track| track.age > self.options.forget_after) {
             self.track = None;

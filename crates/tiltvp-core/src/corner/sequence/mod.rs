@@ -4,6 +4,7 @@ mod agreement;
 mod believed;
 pub(super) mod estimator;
 mod height;
+pub(super) mod knowledge;
 pub(super) mod names;
 mod pairs;
 mod paper;

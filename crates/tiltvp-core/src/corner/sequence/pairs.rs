@@ -3,7 +3,7 @@
 use nalgebra::{Matrix3, Vector3};
 
 use super::agreement::{apart, renamed};
-use super::believed::SeenPair;
+use super::believed::{OPEN, SeenPair};
 use super::estimator::CornerPoseEstimator;
 use super::support::CornerSupport;
 use super::transfer::upright;
@@ -21,7 +21,7 @@ use crate::geometry::RigidMotion;
 /// different interpretations far apart.
 const SAME_POSE_RAD: f64 = 0.035;
 
-/// The share of the largest misfit up to which a corner that was not seen before can replace the tracked one.
+/// The share of the largest misfit up to which a corner is believed that was not seen in the frame before.
 const WELL: f64 = 0.4;
 
 /// The least probability of a hypothesis that is returned.
@@ -118,6 +118,17 @@ impl CornerPoseEstimator {
         }
     }
 
+    /// The largest misfit that is believed. The edges of a corner without colours miss each other as they did in the frame
+    /// before: one that fits far worse has another edge, as a table's top that continues in the leg behind.
+    fn misfit_most(&self) -> f64 {
+        let most = self.options.misfit_max;
+        if self.is_one_object() {
+            return most;
+        }
+        let before = self.track.as_ref().map_or(0.0, |track| OPEN * track.pose.misfit);
+        before.max(WELL * most).min(most)
+    }
+
     /// The poses of the pair of features, one of each image, that fits best; of the corner that is followed or one that is known
     /// beside it, where there is one. Where an `attitude` is known on which several corners agree, pairs that do not are left
     /// out. Returns all pairs that fit well, chosen or not.
@@ -131,6 +142,7 @@ impl CornerPoseEstimator {
         let Some((_, left_from_right)) = &self.right else { return Ok(seen) };
         let priors = self.priors(self.is_one_object());
         let (nearest, farthest) = (self.options.distance_min_m, self.options.distance_max_m);
+        let misfit_most = self.misfit_most();
         let mut best: Option<(f64, Vec<Hypothesis>, usize, usize)> = None;
         let support = CornerSupport::new(&estimate.features, left_from_right);
         for (i, left) in estimate.features[0].iter().enumerate() {
@@ -147,7 +159,7 @@ impl CornerPoseEstimator {
                 if attitude.is_some_and(|attitude| !agrees(attitude)) {
                     continue;
                 }
-                if misfit > self.options.misfit_max || !(nearest..=farthest).contains(&vertex.norm()) {
+                if misfit > misfit_most || !(nearest..=farthest).contains(&vertex.norm()) {
                     continue;
                 }
                 let fits_well = misfit <= WELL * self.options.misfit_max;
@@ -164,7 +176,7 @@ impl CornerPoseEstimator {
                     likely * agreeing * left.support_score().min(right.support_score()) / (1.0 + misfit * misfit);
                 if let Some(track) = &self.track {
                     let turned = apart(&pose.camera_from_object, &track.pose.camera_from_object);
-                    score /= 1.0 + (turned / self.options.turn_sigma_rad).powi(2);
+                    score /= 1.0 + (turned / self.turn_sigma_rad(track)).powi(2);
                 }
                 if best.as_ref().is_none_or(|(most, ..)| score > *most) {
                     best = Some((score, poses, i, j));

@@ -1,6 +1,6 @@
 //! The track of a corner: the last pose, its corners in the images, and other corners of the same object.
 
-use nalgebra::Vector3;
+use nalgebra::{Matrix3, Vector3};
 
 use crate::corner::estimate::Hypothesis;
 use crate::corner::feature::CornerFeature;
@@ -67,6 +67,9 @@ pub struct Track {
     pub others: Vec<KnownCorner>,
     /// How far the vertex moved in the camera's frame from the pose before to the last one, as a share of its distance.
     pub pace: f64,
+    /// Covariance of how the camera has turned since the last pose, its frame now, square radians: the pose is turned by it. None
+    /// where that is not known of every frame since.
+    pub turned: Option<Matrix3<f64>>,
 }
 
 impl Track {
@@ -142,7 +145,7 @@ impl Track {
             others.sort_by_key(|other| std::cmp::Reverse(other.seen));
             others.truncate(OTHERS_MAX);
         }
-        Self { pose: *pose, corners, age: 0, object, others, pace }
+        Self { pose: *pose, corners, age: 0, object, others, pace, turned: Some(Matrix3::zeros()) }
     }
 
     /// The other corners as seen from the one that a pose is of, which may be one of them.
@@ -174,7 +177,7 @@ fn reach_m(place: &Vector3<f64>) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use nalgebra::{Matrix3, Matrix6};
+    use nalgebra::Matrix6;
 
     fn pose(vertex_m: Vector3<f64>) -> Hypothesis {
         Hypothesis {

@@ -10,11 +10,11 @@ use nalgebra::{Matrix2, Matrix2x6, Matrix6, Rotation2, Rotation3, Vector3};
 pub use self::options::{MountingOptions, TiltFilterOptions};
 pub use self::report::{FilteredTilt, Verdict};
 pub use self::state::TiltFilterState;
-use self::state::{FLOOR, MOUNTING, SCENE, add, no_covariance};
+use self::state::{FLOOR, MOUNTING, SCENE, add, is_of_angles, no_covariance, of_angles, of_state};
 use super::confidence;
 use super::estimate::TiltEstimate;
 use crate::error::{Error, Result};
-use crate::filter::{ChiSquareGate, Innovation, positive_semidefinite, symmetric};
+use crate::filter::{ChiSquareGate, Innovation, symmetric};
 use crate::geometry::{Tilt, tangent_basis, tangent_exp, tangent_log, tangent_transport};
 
 /// A recursive filter of the robot's ground normal.
@@ -69,7 +69,7 @@ impl TiltFilter {
     /// The filter of a state that [`state`](Self::state) gave.
     ///
     /// # Errors
-    /// [`Error::InvalidArgument`] unless normals have length one and covariances can be such, and the errors of `new`.
+    /// [`Error::InvalidArgument`] unless normals have length one and covariances can be such of angles, and the errors of `new`.
     pub fn with_state(options: TiltFilterOptions, state: TiltFilterState) -> Result<Self> {
         state.validate()?;
         Ok(Self { state, ..Self::new(options)? })
@@ -128,6 +128,7 @@ impl TiltFilter {
             let walk = grown(mounting.walk_rad_per_sqrt_m.powi(2) * distance_m, mounting.prior_rad);
             add(&mut state.covariance, MOUNTING, &(Matrix2::identity() * walk));
         }
+        state.covariance = of_state(&state.covariance);
         state.floor = turned;
         state.scene = plane_turn * state.scene;
         state.common = state.common.map(|common| symmetric(&(plane_turn * common * plane_turn.transpose())));
@@ -137,7 +138,7 @@ impl TiltFilter {
             let robot_turn = wheels * turn * wheels.transpose();
             let there = (robot_turn * normal).normalize();
             let carried = tangent_basis(&there).transpose() * robot_turn * tangent_basis(&normal);
-            (there, symmetric(&(carried * covariance * carried.transpose() + floor_walk)))
+            (there, of_angles(&symmetric(&(carried * covariance * carried.transpose() + floor_walk))))
         });
         Ok(())
     }
@@ -150,9 +151,7 @@ impl TiltFilter {
     /// [`update`](Self::update) by what it looks at: the tilt, its covariance and its confidence.
     pub fn update_tilt(&mut self, tilt: Option<Tilt>, covariance_rad2: &Matrix2<f64>, confidence: f64) -> Verdict {
         match tilt {
-            Some(tilt) if positive_semidefinite(covariance_rad2) => {
-                self.fuse(tilt.normal(), covariance_rad2, confidence)
-            }
+            Some(tilt) if is_of_angles(covariance_rad2) => self.fuse(tilt.normal(), covariance_rad2, confidence),
             _ => Verdict::NoTilt,
         }
     }
@@ -161,14 +160,14 @@ impl TiltFilter {
     /// [`tangent_basis`]; its confidence is the probability of an error below two degrees under that covariance.
     ///
     /// # Errors
-    /// [`Error::InvalidArgument`] for a normal that is zero or not finite, and for a matrix that is no covariance; the filter
-    /// is as before.
+    /// [`Error::InvalidArgument`] for a normal that is zero or not finite, and for a matrix that is no covariance of angles;
+    /// the filter is as before.
     pub fn update_normal(&mut self, normal: &Vector3<f64>, covariance_rad2: &Matrix2<f64>) -> Result<Verdict> {
         let Some(tilt) = Tilt::from_normal(normal) else {
             let got = format!("[{}, {}, {}]", normal.x, normal.y, normal.z);
             return Err(Error::argument("normal", got, "a finite vector that is not zero"));
         };
-        if !positive_semidefinite(covariance_rad2) {
+        if !is_of_angles(covariance_rad2) {
             return Err(no_covariance("covariance_rad2", covariance_rad2));
         }
         Ok(self.fuse(tilt.normal(), covariance_rad2, confidence::confidence(covariance_rad2)))
@@ -204,7 +203,7 @@ impl TiltFilter {
             return Verdict::LowConfidence { confidence, limit: options.confidence_min };
         }
         let floor = Matrix2::identity() * (options.noise_floor_rad * options.noise_floor_rad);
-        let measured = Measured { normal, covariance: symmetric(covariance_rad2) + floor };
+        let measured = Measured { normal, covariance: of_angles(&(symmetric(covariance_rad2) + floor)) };
         let limit = self.gate.limit();
         let before = self.state.covariance;
         let (nis, corrected) = self.corrected(&measured, &before);
@@ -262,7 +261,7 @@ impl TiltFilter {
             floor,
             mounting,
             scene: scene + step.fixed_rows::<2>(SCENE),
-            covariance: symmetric(&(moved * after * moved.transpose())),
+            covariance: of_state(&symmetric(&(moved * after * moved.transpose()))),
             common: Some(common),
             driven_m: 0.0,
             pending: None,

@@ -1,5 +1,7 @@
 //! What the tilt filter knows between two images.
 
+use std::f64::consts::PI;
+
 use nalgebra::{Matrix2, Matrix6, Vector2, Vector3};
 
 use super::options::TiltFilterOptions;
@@ -38,6 +40,13 @@ pub(super) const FLOOR: usize = 0;
 pub(super) const MOUNTING: usize = 2;
 pub(super) const SCENE: usize = 4;
 
+/// The largest sum of the variances of an angle's two components, square radians: each is within pi of its mean.
+const VARIANCES_MAX: f64 = 2.0 * PI * PI;
+
+/// By how much rounding may carry a sum of variances above [`VARIANCES_MAX`], as a share of it: that of covariances that are
+/// symmetric and positive ([`positive_semidefinite`]).
+const ROUNDING: f64 = 1e-9;
+
 impl TiltFilterState {
     /// Before the first image.
     pub(super) fn unknown(options: &TiltFilterOptions) -> Self {
@@ -74,12 +83,14 @@ impl TiltFilterState {
         if !positive_semidefinite(&self.covariance) {
             return Err(Error::argument("covariance", "another matrix", "a covariance, symmetric and positive"));
         }
-        let spread = |name, matrix: &Matrix2<f64>| {
-            if matrix.cholesky().is_some() && positive_semidefinite(matrix) {
-                Ok(())
-            } else {
-                Err(no_covariance(name, matrix))
+        for at in [FLOOR, MOUNTING, SCENE] {
+            let block = self.covariance.fixed_view::<2, 2>(at, at).into_owned();
+            if !is_of_angles(&block) {
+                return Err(no_covariance("covariance", &block));
             }
+        }
+        let spread = |name, matrix: &Matrix2<f64>| {
+            if matrix.cholesky().is_some() && is_of_angles(matrix) { Ok(()) } else { Err(no_covariance(name, matrix)) }
         };
         if let Some(common) = &self.common {
             spread("common", common)?;
@@ -102,8 +113,37 @@ pub(super) fn add(covariance: &mut Matrix6<f64>, at: usize, block: &Matrix2<f64>
     view += block;
 }
 
+/// Whether a matrix can be the covariance of two angles.
+pub(super) fn is_of_angles(matrix: &Matrix2<f64>) -> bool {
+    positive_semidefinite(matrix) && matrix.trace() <= VARIANCES_MAX * (1.0 + ROUNDING)
+}
+
+/// The factor for errors of two angles that leaves them no more unknown than angles can be.
+fn within_reach(variances: f64) -> f64 {
+    if variances > VARIANCES_MAX { (VARIANCES_MAX / variances).sqrt() } else { 1.0 }
+}
+
+/// The covariance of two angles, no more unknown than angles can be.
+pub(super) fn of_angles(covariance: &Matrix2<f64>) -> Matrix2<f64> {
+    covariance * within_reach(covariance.trace()).powi(2)
+}
+
+/// The covariance of the error state with no angle more unknown than angles can be.
+pub(super) fn of_state(covariance: &Matrix6<f64>) -> Matrix6<f64> {
+    let mut out = *covariance;
+    for at in [FLOOR, MOUNTING, SCENE] {
+        let factor = within_reach(out[(at, at)] + out[(at + 1, at + 1)]);
+        if factor < 1.0 {
+            out.fixed_rows_mut::<2>(at).scale_mut(factor);
+            out.fixed_columns_mut::<2>(at).scale_mut(factor);
+        }
+    }
+    out
+}
+
 /// The refusal of a matrix that is no covariance.
 pub(super) fn no_covariance(name: &'static str, m: &Matrix2<f64>) -> Error {
     let got = format!("[[{}, {}], [{}, {}]]", m[(0, 0)], m[(0, 1)], m[(1, 0)], m[(1, 1)]);
-    Error::argument(name, got, "a covariance in squared radians, symmetric and positive")
+    let expected = "a covariance in squared radians, symmetric and positive, with variances that angles can have";
+    Error::argument(name, got, expected)
 }

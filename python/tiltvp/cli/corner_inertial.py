@@ -1,0 +1,74 @@
+"""What an inertial sensor tells `tiltvp corner` of each frame."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from cyclopts import Group, Parameter
+
+from tiltvp.errors import InvalidInputError
+from tiltvp.rotations import read_rotation
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from tiltvp.streams import InertialSamples
+
+
+@Parameter(name="*", group=Group("Inertial sensor"))
+@dataclass(frozen=True, kw_only=True)
+class InertialOptions:
+    """Readings between and at the frames."""
+
+    imu: Path | None = None
+    """Table with time_s, rate_x_radps, rate_y_radps, rate_z_radps and, where there are any, acceleration_x_mps2 and
+    so on, or recording of ROS with sensor_msgs/Imu. Times are those of the frames."""
+    imu_topic: str | None = None
+    """Its topic in a recording, where that has several."""
+    camera_from_imu: str | None = None
+    """File with nine numbers, row by row: the rotation that takes vectors of the sensor's axes to the left camera's. By
+    default the axes are the same."""
+
+    def knowledge(self) -> Inertial | None:
+        """What tells each frame; None without a sensor."""
+        from tiltvp.streams import InertialSamples, Recording, inertial_samples, is_recording
+
+        if self.imu is None:
+            for name in ("imu_topic", "camera_from_imu"):
+                if getattr(self, name) is not None:
+                    raise InvalidInputError(f"--{name.replace('_', '-')} without --imu, expected both")
+            return None
+        turn = np.eye(3) if self.camera_from_imu is None else read_rotation(self.camera_from_imu)
+        if is_recording(self.imu):
+            return Inertial(inertial_samples(Recording(self.imu), self.imu_topic), turn)
+        if self.imu_topic is not None:
+            raise InvalidInputError(f"--imu-topic {self.imu_topic} of {self.imu}, expected a recording")
+        return Inertial(InertialSamples.read(self.imu), turn)
+
+
+@dataclass
+class Inertial:
+    """A sensor, and the time of the frame before."""
+
+    samples: InertialSamples
+    camera_from_sensor: NDArray[np.float64]
+    before_s: float | None = None
+    told: dict[str, int] = field(default_factory=lambda: {"frames": 0, "gravity": 0, "gyro": 0})
+    """How many frames there were, and of how many there is something to tell."""
+
+    def known(self, now_s: float) -> dict[str, Any]:
+        """The keywords of the estimator for the frame of a time."""
+        known = self.samples.known(self.before_s, now_s, self.camera_from_sensor)
+        self.before_s = now_s
+        self.told["frames"] += 1
+        for name, value in known.items():
+            self.told[name] += value is not None
+        return known
+
+    def summary(self) -> str:
+        """In how many frames it told something."""
+        told = self.told
+        return f"{self.samples.source}: turns of {told['gyro']}, down of {told['gravity']} of {told['frames']} frames"

@@ -1,0 +1,141 @@
+"""What an inertial sensor tells of a camera from frame to frame, and what estimators of corners make of it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tiltvp.cli import main
+from tiltvp.corner import CornerPoseEstimator
+from tiltvp.errors import InvalidInputError
+from tiltvp.rotations import ROTATION_WORDS
+from tiltvp.streams import InertialSamples
+from tiltvp.synth import Laboratory, StereoSequence, zed_cameras
+
+
+@pytest.fixture(scope="module")
+def sequence() -> StereoSequence:
+    left, right = zed_cameras()
+    return StereoSequence(Laboratory(5), left=left, right=right, frames=6, seed=5, samples=1)
+
+
+def samples_of(sequence: StereoSequence, seed: int) -> InertialSamples:
+    imu = sequence.imu(seed=seed)
+    return InertialSamples(imu.times_s, imu.rates_rad_s, imu.forces_m_s2)
+
+
+def test_turns_and_down_have_covariances_that_hold() -> None:
+    """Of ten sensors, each with its own bias: mean squared errors by their covariances, of 3 and of 2."""
+    left, right = zed_cameras()
+    turns, downs = [], []
+    sequence = StereoSequence(Laboratory(5), left=left, right=right, frames=60, seed=8, samples=1)
+    poses = sequence.poses[:, :3, :3]
+    for seed in range(10):
+        samples = samples_of(sequence, seed)
+        for k in range(1, len(poses)):
+            known = samples.known(sequence.times_s[k - 1], sequence.times_s[k])
+            turn, covariance = known["gyro"]
+            off = turn.T @ poses[k - 1].T @ poses[k]
+            error = 0.5 * np.array([off[2, 1] - off[1, 2], off[0, 2] - off[2, 0], off[1, 0] - off[0, 1]])
+            turns.append(error @ np.linalg.solve(covariance, error))
+            if known["gravity"] is not None:
+                down, sigma = known["gravity"]
+                downs.append((np.linalg.norm(np.cross(down, poses[k].T @ [0, 0, -1])) / sigma) ** 2)
+    assert 0.3 < np.mean(turns) < 4.5
+    assert np.quantile(turns, 0.99) < 16
+    assert len(downs) > 100
+    assert np.mean(downs) < 3
+
+
+def test_axes_of_the_sensor_are_taken_to_those_of_the_camera(sequence: StereoSequence) -> None:
+    samples, turn = samples_of(sequence, 1), np.array(ROTATION_WORDS["forward"])
+    assert samples.accelerations_m_s2 is not None
+    other = InertialSamples(samples.times_s, samples.rates_rad_s @ turn.T, samples.accelerations_m_s2 @ turn.T)
+    own, same = samples.known(0.0, 0.08), other.known(0.0, 0.08, turn.T)
+    assert np.allclose(own["gyro"][0], same["gyro"][0])
+    assert np.allclose(own["gravity"][0], same["gravity"][0])
+
+
+def test_what_samples_do_not_cover_is_not_told(sequence: StereoSequence) -> None:
+    samples = samples_of(sequence, 1)
+    assert samples.known(None, 0.05)["gyro"] is None
+    assert samples.known(0.0, samples.times_s[-1] + 1.0)["gyro"] is None
+    keep = (samples.times_s < 0.02) | (samples.times_s > 0.15)
+    gap = InertialSamples(samples.times_s[keep], samples.rates_rad_s[keep], None)
+    assert gap.known(0.0, 0.16) == {"gravity": None, "gyro": None}
+    shaken = InertialSamples(samples.times_s, samples.rates_rad_s, np.zeros((len(samples.times_s), 3)))
+    assert shaken.known(0.0, 0.05)["gravity"] is None
+
+
+def test_tables_of_readings(tmp_path: Path) -> None:
+    table = tmp_path / "imu.csv"
+    table.write_text("time_s,rate_x_radps,rate_y_radps,rate_z_radps\n0,0,0,1\n0.1,0,0,1\n")
+    read = InertialSamples.read(table)
+    assert (read.accelerations_m_s2, read.rates_rad_s.tolist()) == (None, [[0, 0, 1], [0, 0, 1]])
+    turn, _ = read.known(0.0, 0.1)["gyro"]
+    assert turn[1, 0] == pytest.approx(np.sin(0.1))
+    for text, problem in (
+        ("time_s,rate_x_radps\n0,0\n", "no column rate_y_radps"),
+        ("time_s,rate_x_radps,rate_y_radps,rate_z_radps\n1,0,0,1\n1,0,0,1\n", "after 1"),
+        ("time_s,rate_x_radps,rate_y_radps,rate_z_radps\n1,0,0,1\n", "1 rows"),
+    ):
+        table.write_text(text)
+        with pytest.raises(InvalidInputError, match=problem):
+            InertialSamples.read(table)
+
+
+def test_an_estimator_takes_what_is_known_of_a_frame(sequence: StereoSequence) -> None:
+    left, right = sequence.cameras
+    samples = samples_of(sequence, 1)
+    told = CornerPoseEstimator(left, right, sequence.left_from_right, method="coloured")
+    plain = CornerPoseEstimator(left, right, sequence.left_from_right, method="coloured")
+    before = None
+    for frame, time_s in enumerate(sequence.times_s.tolist()):
+        images = sequence.render(frame)
+        found, alone = told(*images, **samples.known(before, time_s)), plain(*images)
+        before = time_s
+        assert found.pose is not None
+        assert alone.pose is not None
+        assert np.allclose(found.pose.camera_from_object, alone.pose.camera_from_object), "priors move no pose"
+    with pytest.raises(InvalidInputError, match="gravity"):
+        told(*images, gravity=((0, 0, 0), 0.1))
+    with pytest.raises(InvalidInputError, match="before_from_now"):
+        told(*images, gyro=(np.zeros((3, 3)), np.eye(3)))
+    with pytest.raises(InvalidInputError, match="sigma_rad"):
+        told(*images, gravity=((0, 1, 0), 0.0))
+
+
+def test_one_grey_camera_takes_gravity_in_place_of_a_frame_before(sequence: StereoSequence) -> None:
+    """What looks alike from two sides is told apart by down alone, in every frame for itself."""
+    image = sequence.render(2)[0]
+    down = sequence.poses[2, :3, :3].T @ [0.0, 0.0, -1.0]
+    estimator = CornerPoseEstimator(sequence.cameras[0], method="general", right_handed=True)
+    found = estimator(image.mean(axis=2).astype(np.uint8), gravity=(down, 0.01))
+    estimator.reset()
+    turned = estimator(image.mean(axis=2).astype(np.uint8), gravity=(np.roll(down, 1), 0.01))
+    if found.pose is not None:
+        vertical = found.pose.camera_from_object[:, 1]
+        assert abs(vertical @ down) > np.cos(np.radians(3))
+    assert found.hypotheses != turned.hypotheses
+
+
+def test_the_command_takes_readings(
+    sequence: StereoSequence, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    from tiltvp.images import write_image
+
+    for frame in range(3):
+        write_image(tmp_path / "left" / f"{frame}.png", sequence.render(frame)[0])
+    calibration = tmp_path / "camera.toml"
+    sequence.cameras[0].save(calibration)
+    imu = sequence.imu(seed=1)
+    rows = np.column_stack([imu.times_s, imu.rates_rad_s, imu.forces_m_s2])
+    names = ["time_s", *(f"rate_{a}_radps" for a in "xyz"), *(f"acceleration_{a}_mps2" for a in "xyz")]
+    np.savetxt(tmp_path / "imu.csv", rows, delimiter=",", header=",".join(names), comments="")
+    asked = ["corner", str(tmp_path / "left"), "--calibration", str(calibration), "--frame-rate", "25"]
+    assert main([*asked, "--imu", str(tmp_path / "imu.csv")]) == 0
+    assert "turns of 2, down of" in capsys.readouterr().out
+    assert main([*asked, "--imu-topic", "/imu"]) != 0
+    assert "--imu-topic without --imu" in capsys.readouterr().err
