@@ -1,5 +1,6 @@
 //! The kernel in loops that the compiler makes vectors of, for every machine.
 
+use crate::marks::{MARK, bits};
 use crate::vectorised;
 
 use super::block::{BLOCK, Directions, KeptPixels, Level, Levels, PixelBlock, REACH, Threshold};
@@ -39,7 +40,7 @@ pub(super) fn threshold_blocks<L: Level>(
     for block in blocks {
         gradients_of(levels.around(block, &mut rest), &mut all);
         for i in 0..BLOCK {
-            all.marks[i] = if all.squared[i] >= threshold.at_least { 0x80 } else { 0 };
+            all.marks[i] = if all.squared[i] >= threshold.at_least { MARK } else { 0 };
         }
         let mut passing = bits(&all.marks) & block.own;
         kept.strong += passing.count_ones() as usize;
@@ -117,23 +118,7 @@ fn directed(vectors: &[[i16; 2]; BLOCK], all: &mut Gradients, limit: f32) -> u64
     for (i, vector) in vectors.iter().enumerate() {
         let (x, y) = (i32::from(vector[0]), i32::from(vector[1]));
         let across = (x * i32::from(all.gx[i])).wrapping_add(y * i32::from(all.gy[i])) as f32;
-        all.marks[i] = if across * across <= limit * all.squared[i] as f32 { 0x80 } else { 0 };
+        all.marks[i] = if across * across <= limit * all.squared[i] as f32 { MARK } else { 0 };
     }
     bits(&all.marks)
-}
-
-/// The uppermost bit of each mark.
-#[inline(always)]
-fn bits(marks: &[u8; BLOCK]) -> u64 {
-    #[cfg(target_arch = "x86_64")]
-    {
-        use std::arch::x86_64::{_mm_loadu_si128, _mm_movemask_epi8};
-        marks.as_chunks::<16>().0.iter().rev().fold(0, |bits, marks| {
-            // SAFETY: there are 16 marks, and SSE2 is part of every x86-64.
-            let word = unsafe { _mm_movemask_epi8(_mm_loadu_si128(marks.as_ptr().cast())) };
-            (bits << 16) | u64::from(word as u32)
-        })
-    }
-    #[cfg(not(target_arch = "x86_64"))]
-    marks.iter().enumerate().fold(0, |bits, (i, mark)| bits | (u64::from(*mark >> 7) << i))
 }
