@@ -103,8 +103,7 @@ impl Chains {
         starts.push(0);
         for (((place, gx), gy), number) in places.iter().zip(gx).zip(gy).zip(1..) {
             let at = window.place(*place);
-            // One look at both: whether a pixel is strong is as hard to guess as whether it is free.
-            if (gx * gx + gy * gy < start) | (free[at] == 0) {
+            if free[at] == 0 || gx * gx + gy * gy < start {
                 continue;
             }
             free[at] = 0;

@@ -85,7 +85,9 @@ impl Groups {
                     let (at, a, b) = candidates.remove(k);
                     (low, high) = (low.min(a), high.max(b));
                     taken[at as usize] = true;
-                    normals.iter_mut().for_each(|normals| normals[at as usize] = 0.0);
+                    for normals in &mut *normals {
+                        normals[at as usize] = 0.0;
+                    }
                     members.push(order[at as usize]);
                 }
             }

@@ -106,8 +106,8 @@ impl Simd for Sse2 {
     }
     #[inline(always)]
     unsafe fn store_fours([a, b, c, d]: [Self; 4], to: &mut [[[f32; 4]; TURNS]; TURNS]) {
-        for four in 0..4 {
-            let (a, b, c, d) = (a.0[four], b.0[four], c.0[four], d.0[four]);
+        let fours = a.0.into_iter().zip(b.0).zip(c.0.into_iter().zip(d.0));
+        for (four, ((a, b), (c, d))) in fours.enumerate() {
             // SAFETY: every x86-64 has SSE2, and there is room for four numbers.
             unsafe {
                 let low = (_mm_castps_pd(_mm_unpacklo_ps(a, b)), _mm_castps_pd(_mm_unpacklo_ps(c, d)));
