@@ -8,6 +8,7 @@ pub mod bilinear;
 pub mod compaction;
 pub mod gradient;
 pub mod level;
+pub mod marks;
 pub mod normals;
 pub mod prefetch;
 pub mod remap;

@@ -1,12 +1,12 @@
 //! Ridges of gradients: the gradients of a row, which of them are greatest across their edge, and where between pixels.
 
+use std::hint::select_unpredictable;
+
+use crate::marks::MARK;
 use crate::vectorised;
 
 /// Pixels that are marked together: spans are padded to whole blocks of this many, a vector of bytes of 256 bits.
 pub const MARKED: usize = 32;
-
-/// Pixels whose marks are looked at together: those of a word of 64 bits.
-const MARKS: usize = 8;
 
 vectorised! {
     /// The 3x3 Scharr derivatives (3, 10, 3) of the middle row and their squared magnitude; rows are one pixel wider on both sides.
@@ -40,8 +40,8 @@ pub struct Around<'a> {
 }
 
 vectorised! {
-    /// Marks with one the pixels whose squared magnitude reaches `least` and is the greatest of three across the edge: in the row
-    /// where `|gx| >= |gy|`, in the column elsewhere. The others are marked with zero.
+    /// Marks the pixels whose squared magnitude reaches `least` and is the greatest of three across the edge: in the row
+    /// where `|gx| >= |gy|`, in the column elsewhere. The others become zero.
     pub fn mark(around: &Around<'_>, least: f32, marks: &mut [u8]) {
         mark_where(around, least, marks, std::iter::repeat(|_, _, _, _| true));
     }
@@ -86,26 +86,33 @@ fn mark_where<T: Fn(usize, f32, f32, f32) -> bool>(
             *marked = u32::from(middle >= least) & greatest & u32::from(passes(i, x, y, middle));
         }
         for (mark, marked) in marks.iter_mut().zip(marked) {
-            *mark = marked as u8;
+            *mark = marked as u8 * MARK;
         }
     }
 }
 
-/// Calls with the place of each mark.
-#[inline(always)]
-pub fn each_mark(marks: &[u8], mut with: impl FnMut(usize)) {
-    let (eights, rest) = marks.as_chunks::<MARKS>();
-    for (eight, start) in eights.iter().zip((0..).step_by(MARKS)) {
-        let mut bits = u64::from_le_bytes(*eight);
-        while bits != 0 {
-            with(start + bits.trailing_zeros() as usize / 8);
-            bits &= bits - 1;
-        }
-    }
-    for (place, mark) in rest.iter().enumerate() {
-        if *mark != 0 {
-            with(MARKS * eights.len() + place);
-        }
+/// What is kept of the pixels of a ridge, side by side.
+#[derive(Debug)]
+pub struct KeptRidge<'a> {
+    /// Gradients along `u`.
+    pub gx: &'a mut [f32],
+    /// Gradients along `v`.
+    pub gy: &'a mut [f32],
+    /// Squared magnitudes before, at and after the pixels, across their edges.
+    pub across: [&'a mut [f32]; 3],
+}
+
+/// Writes gradients and magnitudes of the pixels of a row at these places.
+pub fn keep(around: &Around<'_>, places: &[u32], out: KeptRidge<'_>) {
+    let KeptRidge { gx, gy, across: [before, middle, after] } = out;
+    let pixels = gx.iter_mut().zip(gy).zip(before.iter_mut().zip(middle).zip(after)).zip(places);
+    for (((gx, gy), ((before, middle), after)), place) in pixels {
+        let i = *place as usize;
+        let (x, y, here) = (around.gx[i], around.gy[i], &around.here[i..i + 3]);
+        let in_row = x.abs() >= y.abs();
+        (*gx, *gy, *middle) = (x, y, here[1]);
+        *before = select_unpredictable(in_row, here[0], around.above[i]);
+        *after = select_unpredictable(in_row, here[2], around.below[i]);
     }
 }
 
@@ -144,19 +151,25 @@ mod tests {
             let (mut all, mut directed) = (vec![7; n], vec![7; n]);
             mark(&around, 1.0, &mut all);
             mark_directed(&around, 1.0, &vectors, 900.0, &mut directed);
-            let mut places = Vec::new();
+            let (mut places, mut expected) = (Vec::new(), Vec::new());
             for i in 0..n {
                 let (x, y, middle) = (gx[i], gy[i], here[i + 1]);
                 let (before, after) = if x.abs() >= y.abs() { (here[i], here[i + 2]) } else { (above[i], below[i]) };
                 let ridge = middle >= 1.0 && middle > before && middle >= after;
                 let across = f32::from(vectors[i][0]) * x + f32::from(vectors[i][1]) * y;
-                assert_eq!(all[i], u8::from(ridge));
-                assert_eq!(directed[i], u8::from(ridge && across * across <= 900.0 * middle));
-                places.extend(ridge.then_some(i));
+                assert_eq!(all[i], u8::from(ridge) * MARK);
+                assert_eq!(directed[i], u8::from(ridge && across * across <= 900.0 * middle) * MARK);
+                if ridge {
+                    places.push(i as u32);
+                    expected.push([x, y, before, middle, after]);
+                }
             }
-            let mut found = Vec::new();
-            each_mark(&all, |place| found.push(place));
-            assert_eq!(found, places);
+            let mut kept = [(); 5].map(|()| vec![f32::NAN; places.len()]);
+            let [gx, gy, before, middle, after] = kept.each_mut().map(|values| &mut values[..]);
+            keep(&around, &places, KeptRidge { gx, gy, across: [before, middle, after] });
+            for (i, expected) in expected.iter().enumerate() {
+                assert_eq!(kept.each_ref().map(|values| values[i]), *expected);
+            }
         }
     }
 

@@ -75,24 +75,40 @@ impl EdgePixels {
 
     /// Appends the pixel `slot` of a region.
     pub fn push(&mut self, region: &Region, slot: u32, gx: f32, gy: f32) {
-        self.make_room_for(1);
-        self.put(slot, place_of(region, slot), gx, gy);
+        let [x, y] = self.put_all(&[0], slot, place_of(region, slot));
+        (x[0], y[0]) = (gx, gy);
     }
 
     /// Makes room for so many more.
-    pub(super) fn make_room_for(&mut self, more: usize) {
+    fn make_room_for(&mut self, more: usize) {
         if self.slot.len() < self.len + more {
             self.make_room(2 * self.len + more);
         }
     }
 
-    /// Appends a pixel for which there is room.
-    #[inline]
-    pub(super) fn put(&mut self, slot: u32, place: u32, gx: f32, gy: f32) {
-        let at = self.len;
-        (self.slot[at], self.place[at], self.gx[at], self.gy[at]) = (slot, place, gx, gy);
-        self.len += 1;
-        self.strong += 1;
+    /// Appends the pixels that are so far beyond a first one in their row, and returns where their gradients are to be written.
+    pub(super) fn put_all(&mut self, beyond: &[u32], first_slot: u32, first_place: u32) -> [&mut [f32]; 2] {
+        self.make_room_for(beyond.len());
+        let new = self.len..self.len + beyond.len();
+        for ((slot, place), beyond) in self.slot[new.clone()].iter_mut().zip(&mut self.place[new.clone()]).zip(beyond) {
+            (*slot, *place) = (first_slot + beyond, first_place + beyond);
+        }
+        self.len = new.end;
+        self.strong += beyond.len();
+        [&mut self.gx[new.clone()], &mut self.gy[new]]
+    }
+
+    /// Replaces all pixels by those of others that pass a test of slot and gradient.
+    pub fn refill_where(&mut self, others: &Self, test: impl Fn(u32, f32, f32) -> bool) {
+        self.make_room(others.len);
+        let mut len = 0;
+        let pixels = others.slot().iter().zip(others.place()).zip(others.gx().iter().zip(others.gy()));
+        for ((slot, place), (gx, gy)) in pixels {
+            (self.slot[len], self.place[len], self.gx[len], self.gy[len]) = (*slot, *place, *gx, *gy);
+            // One that does not pass is written over by the next.
+            len += usize::from(test(*slot, *gx, *gy));
+        }
+        (self.len, self.strong) = (len, len);
     }
 
     /// Replaces all pixels by these of a region.

@@ -1,7 +1,8 @@
 //! Ridge pixels: edge pixels thinned to one pixel across the edge, with the place of the edge between pixels.
 
 use tiltvp_kernels::gradient::place;
-use tiltvp_kernels::ridge::{Around, MARKED, each_mark, mark, mark_directed, scharr, tops};
+use tiltvp_kernels::marks::{BEYOND, places};
+use tiltvp_kernels::ridge::{Around, KeptRidge, MARKED, keep, mark, mark_directed, scharr, tops};
 
 use super::detect::EdgePixels;
 use super::options::EdgeOptions;
@@ -46,6 +47,8 @@ pub struct RidgeDetector {
     /// Three rows of gradients, row `v` in place `v % 3`, each at least one pixel wider than the region's columns on both sides.
     gradients: [Gradients; 3],
     marks: Vec<u8>,
+    /// Columns of a span that are marked.
+    marked: Vec<u32>,
     /// The prefilter's vectors of a span, where they are not stored.
     vectors: Vec<[i16; 2]>,
 }
@@ -61,6 +64,7 @@ impl RidgeDetector {
             smoothed: [row(), row(), row()],
             gradients: [gradients(), gradients(), gradients()],
             marks: vec![0; width + MARKED],
+            marked: vec![0; width + BEYOND],
             vectors: Vec::new(),
         }
     }
@@ -117,16 +121,15 @@ impl RidgeDetector {
                 }
                 None => mark(&around, least, marks),
             }
-            let marks = &marks[..n];
-            edges.make_room_for(n);
-            each_mark(marks, |i| {
-                let (gx, gy, strength) = (around.gx[i], around.gy[i], around.here[i + 1]);
-                let in_row = gx.abs() >= gy.abs();
-                before.push(if in_row { around.here[i] } else { around.above[i] });
-                middle.push(strength);
-                after.push(if in_row { around.here[i + 2] } else { around.below[i] });
-                edges.put((span.slot + i) as u32, place(span.v, span.first + i), gx, gy);
+            let count = places(&marks[..n], &mut self.marked);
+            let marked = &self.marked[..count];
+            let across = [&mut *before, &mut *middle, &mut *after].map(|values| {
+                let first = values.len();
+                values.resize(first + count, 0.0);
+                &mut values[first..]
             });
+            let [gx, gy] = edges.put_all(marked, span.slot as u32, place(span.v, span.first));
+            keep(&around, marked, KeptRidge { gx, gy, across });
         }
         shift_px.resize(middle.len(), 0.0);
         tops(before, middle, after, shift_px);

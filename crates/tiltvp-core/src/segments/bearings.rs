@@ -15,8 +15,9 @@ const SAMPLES: usize = 5;
 /// Least number of answers of the lens in a square, for six unknowns.
 const ANSWERS_MIN: usize = 8;
 
-/// The six coefficients of 1, x, y, x^2, x y, y^2 for each coordinate, x and y in half squares from the middle.
-type Quadratic = [[f32; 3]; 6];
+/// The six coefficients of 1, x, y, x^2, x y, y^2 for each coordinate, x and y in half squares from the middle; of four coordinates,
+/// of which the last is nothing, so that all are one vector.
+type Quadratic = [[f32; 4]; 6];
 
 /// The bearings of a window in the camera frame; NaN where the lens has no answer.
 #[derive(Debug, Clone)]
@@ -36,20 +37,21 @@ impl Bearings {
     }
 
     /// The unit bearing at a place of the window, but for some millionths, and its change by one pixel along a unit vector of the
-    /// image.
+    /// image; of four coordinates each, of which the last says nothing.
     #[inline(always)]
-    pub(super) fn at(&self, [u, v]: [f32; 2], unit: [f32; 2]) -> ([f32; 3], [f32; 3]) {
+    pub(super) fn at(&self, [u, v]: [f32; 2], unit: [f32; 2]) -> [[f32; 4]; 2] {
         let (u, v) = (u - self.origin[0], v - self.origin[1]);
-        let (column, row) = (u as usize / SIDE, v as usize / SIDE);
+        // Places are far below what 32 bits hold, and those are faster to make.
+        let (column, row) = (u as i32 as usize / SIDE, v as i32 as usize / SIDE);
         let [c0, cx, cy, cxx, cxy, cyy] = &self.squares[row * self.across + column];
         let (x, y) = (scaled(u - (column * SIDE) as f32), scaled(v - (row * SIDE) as f32));
-        let (mut bearing, mut change) = ([0.0; 3], [0.0; 3]);
-        for k in 0..3 {
+        let (mut bearing, mut change) = ([0.0; 4], [0.0; 4]);
+        for k in 0..4 {
             bearing[k] = c0[k] + x * (cx[k] + x * cxx[k] + y * cxy[k]) + y * (cy[k] + y * cyy[k]);
             let (du, dv) = (cx[k] + 2.0 * x * cxx[k] + y * cxy[k], cy[k] + 2.0 * y * cyy[k] + x * cxy[k]);
             change[k] = (du * unit[0] + dv * unit[1]) * PER_PIXEL;
         }
-        (bearing, change)
+        [bearing, change]
     }
 }
 
@@ -79,10 +81,10 @@ fn quadratic(camera: &Camera, u: f64, v: f64) -> Quadratic {
         }
     }
     let solved = if answers < ANSWERS_MIN { None } else { moments.cholesky().map(|cholesky| cholesky.solve(&sums)) };
-    let mut out = [[f32::NAN; 3]; 6];
+    let mut out = [[f32::NAN; 4]; 6];
     if let Some(coefficients) = solved {
         for (own, row) in out.iter_mut().zip(coefficients.row_iter()) {
-            *own = [row[0] as f32, row[1] as f32, row[2] as f32];
+            *own = [row[0] as f32, row[1] as f32, row[2] as f32, 0.0];
         }
     }
     out

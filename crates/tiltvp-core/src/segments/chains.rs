@@ -1,5 +1,7 @@
 //! Chains: ridge pixels that follow one another along their edge.
 
+use std::hint::select_unpredictable;
+
 use tiltvp_kernels::vectorised;
 
 use crate::edges::{Region, RidgePixels};
@@ -36,8 +38,10 @@ pub(super) struct Chains {
     /// and everywhere between images.
     free: Vec<u32>,
     window: Window,
-    /// Unit gradients of the ridge pixels.
+    /// Unit gradients of the ridge pixels, each in the place one more than its number; in the first one of none, which goes on from nothing.
     units: Vec<[f32; 2]>,
+    /// The step nearest to the edge's direction, with the brighter side to the right, in the same places.
+    towards: Vec<u8>,
     /// Ridge pixels in the order of the chains.
     members: Vec<u32>,
     /// Where each chain begins, and the end.
@@ -83,38 +87,37 @@ impl Chains {
 
     /// Links ridge pixels, from those with a squared gradient of at least `start` on, in the order of the pixels.
     pub(super) fn link(&mut self, ridge: &RidgePixels, start: f32) {
-        let Self { free, window, units, members, starts } = self;
+        let Self { free, window, units, towards, members, starts } = self;
         let edges = &ridge.edges;
         let (places, gx, gy) = (edges.place(), edges.gx(), edges.gy());
-        units.resize(places.len(), [0.0; 2]);
-        directions(gx, gy, units);
-        for (i, place) in places.iter().enumerate() {
-            free[window.place(*place)] = i as u32 + 1;
+        units.resize(places.len() + 1, [0.0; 2]);
+        towards.resize(places.len() + 1, 0);
+        directions(gx, gy, &mut units[1..]);
+        nearest_steps(&units[1..], &mut towards[1..]);
+        for (number, place) in (1..).zip(places) {
+            free[window.place(*place)] = number;
         }
-        let steps = STEPS.map(|(u, v)| (v * window.width as i32 + u) as isize);
+        let steps = Step::of(window);
         members.clear();
         starts.clear();
         starts.push(0);
-        for (seed, place) in places.iter().enumerate() {
-            if gx[seed] * gx[seed] + gy[seed] * gy[seed] < start {
-                continue;
-            }
+        for (((place, gx), gy), number) in places.iter().zip(gx).zip(gy).zip(1..) {
             let at = window.place(*place);
-            if free[at] == 0 {
+            if free[at] == 0 || gx * gx + gy * gy < start {
                 continue;
             }
             free[at] = 0;
             let begin = members.len();
-            for way in [1.0, -1.0] {
-                let (mut here, mut at) = (seed, at);
-                if way < 0.0 {
+            for way in [Way::Forward, Way::Back] {
+                let mut here = Here { number, place: at };
+                if way == Way::Back {
                     members[begin..].reverse();
-                    members.push(seed as u32);
+                    members.push(number - 1);
                 }
-                while let Some((following, place)) = next(free, units, &steps, here, at, way) {
-                    (here, at) = (following as usize, place);
-                    free[at] = 0;
-                    members.push(following);
+                while let Some(following) = next(free, units, towards, &steps, here, way) {
+                    here = following;
+                    free[here.place] = 0;
+                    members.push(here.number - 1);
                 }
             }
             starts.push(members.len());
@@ -129,60 +132,109 @@ impl Chains {
         self.starts.windows(2).map(|ends| &self.members[ends[0]..ends[1]]).filter(move |chain| chain.len() >= pixels)
     }
 
-    /// The unit gradient of a ridge pixel.
-    #[inline(always)]
-    pub(super) fn unit(&self, ridge_pixel: u32) -> [f32; 2] {
-        self.units[ridge_pixel as usize]
+    /// The unit gradients of the ridge pixels.
+    pub(super) fn units(&self) -> &[[f32; 2]] {
+        &self.units[1..]
     }
 }
 
-/// The free ridge pixel that goes on from one along its edge, one way or the other, and its place. The gradient turns least there.
+/// A step to a neighbour: how far places lie apart, and its direction.
+#[derive(Debug, Clone, Copy)]
+struct Step {
+    places: isize,
+    direction: [f32; 2],
+}
+
+impl Step {
+    /// Each step of a window, followed by its two neighbours.
+    fn of(window: &Window) -> [[Self; 3]; 8] {
+        let one = |k: usize| {
+            let (u, v) = STEPS[k % 8];
+            Self { places: (v * window.width as i32 + u) as isize, direction: DIRECTIONS[k % 8] }
+        };
+        std::array::from_fn(|k| [one(k), one(k + 1), one(k + 7)])
+    }
+}
+
+/// Which of its two ways an edge is followed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Way {
+    Forward,
+    Back,
+}
+
+/// A ridge pixel, by one more than its number.
+#[derive(Debug, Clone, Copy)]
+struct Here {
+    number: u32,
+    place: usize,
+}
+
+/// The free ridge pixel that goes on from one along its edge, one way or the other. The gradient turns least there.
 #[inline(always)]
 fn next(
     free: &[u32],
     units: &[[f32; 2]],
-    steps: &[isize; 8],
-    here: usize,
-    at: usize,
-    way: f32,
-) -> Option<(u32, usize)> {
-    let [x, y] = units[here];
-    let along = [-y * way, x * way];
-    let nearest = step_towards(along);
+    towards: &[u8],
+    steps: &[[Step; 3]; 8],
+    here: Here,
+    way: Way,
+) -> Option<Here> {
+    let [x, y] = units[here.number as usize];
+    let (along, turned) = if way == Way::Forward { ([-y, x], 0) } else { ([y, -x], 4) };
+    let sides = &steps[usize::from(towards[here.number as usize] + turned) % 8];
     // Along a diagonal a ridge may lack a pixel: of two neighbours one is judged by its row, one by its column, and each is beaten.
-    for from in [at, at.wrapping_add_signed(steps[nearest])] {
-        let mut best = (0.0, None);
-        for side in [nearest, (nearest + 1) % 8, (nearest + 7) % 8] {
-            let there = from.wrapping_add_signed(steps[side]);
-            let Some(next) = free[there].checked_sub(1) else { continue };
-            let [p, q] = units[next as usize];
-            let turn = x * p + y * q;
-            let score = turn * (along[0] * DIRECTIONS[side][0] + along[1] * DIRECTIONS[side][1]);
-            if turn >= TURN_COS && score > best.0 {
-                best = (score, Some((next, there)));
-            }
+    for from in [here.place, here.place.wrapping_add_signed(sides[0].places)] {
+        let there: [Here; 3] = sides.map(|side| {
+            let place = from.wrapping_add_signed(side.places);
+            Here { number: free[place], place }
+        });
+        let weigh = |side: usize| {
+            let [p, q] = units[there[side].number as usize];
+            let (turn, direction) = (x * p + y * q, sides[side].direction);
+            let score = turn * (along[0] * direction[0] + along[1] * direction[1]);
+            if turn >= TURN_COS { score } else { 0.0 }
+        };
+        let [a, b, c] = there.map(|here| usize::from(here.number != 0));
+        if a + b + c == 0 {
+            continue;
         }
-        if best.1.is_some() {
-            return best.1;
+        if a + b + c == 1 {
+            // Most often: who follows is known before it is known whether it does.
+            let only = b + 2 * c;
+            if weigh(only) > 0.0 {
+                return Some(there[only]);
+            }
+            continue;
+        }
+        // All three are weighed, also where nobody is, and chosen from without a branch: none could be guessed.
+        let (mut best, mut chosen) = (0.0, Here { number: 0, place: 0 });
+        for (side, here) in there.iter().enumerate() {
+            let score = weigh(side);
+            let better = score > best;
+            best = select_unpredictable(better, score, best);
+            chosen.number = select_unpredictable(better, here.number, chosen.number);
+            chosen.place = select_unpredictable(better, here.place, chosen.place);
+        }
+        if chosen.number != 0 {
+            return Some(chosen);
         }
     }
     None
 }
 
-/// Number of the step nearest to a direction.
-#[inline(always)]
-fn step_towards([x, y]: [f32; 2]) -> usize {
-    let (a, b) = (x.abs(), y.abs());
-    if b <= HALF_STEP * a {
-        if x > 0.0 { 0 } else { 4 }
-    } else if a <= HALF_STEP * b {
-        if y > 0.0 { 2 } else { 6 }
-    } else {
-        match (x > 0.0, y > 0.0) {
-            (true, true) => 1,
-            (false, true) => 3,
-            (false, false) => 5,
-            (true, false) => 7,
+vectorised! {
+    /// The steps nearest to the directions of edges: unit gradients turned by a quarter.
+    fn nearest_steps(units: &[[f32; 2]], out: &mut [u8]) {
+        for ([gx, gy], out) in units.iter().zip(out) {
+            let (x, y) = (-gy, *gx);
+            let (a, b) = (x.abs(), y.abs());
+            let (right, down) = (i32::from(x > 0.0), i32::from(y > 0.0));
+            let level = if right == 1 { 0 } else { 4 };
+            let upright = if down == 1 { 2 } else { 6 };
+            let diagonal = if down == 1 { 3 - 2 * right } else { 5 + 2 * right };
+            let steep = if a <= HALF_STEP * b { upright } else { diagonal };
+            *out = (if b <= HALF_STEP * a { level } else { steep }) as u8;
         }
     }
 }

@@ -1,5 +1,6 @@
 //! From an image to its straight edges: the tables of a camera, made once.
 
+use std::hint::select_unpredictable;
 use std::ops::Range;
 
 use nalgebra::{Matrix3, Vector3};
@@ -31,6 +32,8 @@ pub(crate) struct FinderScratch {
     pub(crate) ridge: RidgePixels,
     chains: Chains,
     stack: Vec<Range<usize>>,
+    /// Bearings of a chain and their changes.
+    lifted: Vec<[[f32; 4]; 2]>,
     /// Points of pieces, and the pieces as segments with the directions to their brighter sides.
     points: Vec<EdgePoint>,
     pieces: Vec<Segment>,
@@ -65,6 +68,7 @@ impl SegmentFinder {
             ridge: RidgePixels::default(),
             chains: Chains::new(self.window),
             stack: Vec::new(),
+            lifted: Vec::new(),
             points: Vec::new(),
             pieces: Vec::new(),
             toward: Vec::new(),
@@ -83,7 +87,7 @@ impl SegmentFinder {
         scratch: &mut FinderScratch,
         out: &mut Segments,
     ) {
-        let FinderScratch { detector, ridge, chains, stack, points, pieces, toward, groups, cut } = scratch;
+        let FinderScratch { detector, ridge, chains, stack, lifted, points, pieces, toward, groups, cut } = scratch;
         let SegmentOptions { gradient_start, stray_max_px, rms_max_px, support_min_px, gap_max } = self.options;
         let least = support_min_px as usize;
         detector.detect(image, region, gradient_min, prefilter, ridge);
@@ -91,13 +95,14 @@ impl SegmentFinder {
         points.clear();
         pieces.clear();
         toward.clear();
+        let lifter = Lifter::new(&self.bearings, ridge, chains.units());
         for chain in chains.of_at_least(least) {
             let begin = points.len();
-            points.extend(chain.iter().map(|i| self.lift(ridge, chains, *i).0));
+            lifter.lift(chain, lifted, points);
             cut.clear();
             split(&points[begin..], stray_max_px as f32, least, stack, |piece| cut.push(piece));
             for piece in cut.iter() {
-                let brighter = self.brighter(ridge, chains, &chain[piece.clone()]);
+                let brighter = lifter.brighter(&chain[piece.clone()]);
                 let range = begin + piece.start..begin + piece.end;
                 if let Some(segment) = fit(&points[range.clone()], &brighter, range.start) {
                     pieces.push(segment);
@@ -129,25 +134,65 @@ impl SegmentFinder {
             |a: &Segment, b: &Segment| b.length_rad.total_cmp(&a.length_rad).then(a.points.start.cmp(&b.points.start));
         out.list.sort_unstable_by(order);
     }
+}
 
-    /// A ridge pixel's point, and the change of the bearing by one pixel along its gradient.
+/// What the points of ridge pixels are made of, by their numbers.
+struct Lifter<'a> {
+    bearings: &'a Bearings,
+    places: &'a [u32],
+    shifts: &'a [f32],
+    gradients: [&'a [f32]; 2],
+    slots: &'a [u32],
+    units: &'a [[f32; 2]],
+}
+
+impl<'a> Lifter<'a> {
+    fn new(bearings: &'a Bearings, ridge: &'a RidgePixels, units: &'a [[f32; 2]]) -> Self {
+        let edges = &ridge.edges;
+        let (places, slots, gradients) = (edges.place(), edges.slot(), [edges.gx(), edges.gy()]);
+        Self { bearings, places, shifts: ridge.shift_px(), gradients, slots, units }
+    }
+
+    /// Where the edge passes a ridge pixel.
     #[inline(always)]
-    fn lift(&self, ridge: &RidgePixels, chains: &Chains, i: u32) -> (EdgePoint, [f32; 3]) {
-        let (k, edges, unit) = (i as usize, &ridge.edges, chains.unit(i));
-        let (packed, along) = (edges.place()[k], ridge.shift_px()[k]);
-        let (gx, gy) = (edges.gx()[k], edges.gy()[k]);
-        let shift = if gx.abs() >= gy.abs() { [along, 0.0] } else { [0.0, along] };
-        let pixel = [(packed & 0xffff) as f32 + shift[0], (packed >> 16) as f32 + shift[1]];
-        let (bearing, change) = self.bearings.at(pixel, unit);
-        let length = super::fit::dot(change, change).sqrt();
-        let point = EdgePoint { bearing, px_per_rad: 1.0 / length, gradient: [gx, gy], pixel, slot: edges.slot()[k] };
-        (point, change)
+    fn pixel(&self, i: u32) -> [f32; 2] {
+        let k = i as usize;
+        let (packed, along) = (self.places[k], self.shifts[k]);
+        let in_row = self.gradients[0][k].abs() >= self.gradients[1][k].abs();
+        let shift = [select_unpredictable(in_row, along, 0.0), select_unpredictable(in_row, 0.0, along)];
+        [(packed & 0xffff) as f32 + shift[0], (packed >> 16) as f32 + shift[1]]
+    }
+
+    /// The bearing of a ridge pixel, and its change by one pixel along the gradient.
+    #[inline(always)]
+    fn bearing(&self, i: u32) -> [[f32; 4]; 2] {
+        self.bearings.at(self.pixel(i), self.units[i as usize])
+    }
+
+    /// Appends the points of a chain. Bearings are written first, as vectors of four, which the compiler takes apart otherwise.
+    fn lift(&self, chain: &[u32], lifted: &mut Vec<[[f32; 4]; 2]>, points: &mut Vec<EdgePoint>) {
+        lifted.clear();
+        lifted.extend(chain.iter().map(|i| self.bearing(*i)));
+        points.extend(chain.iter().zip(lifted).map(|(i, [[x, y, z, _], [p, q, r, _]])| {
+            let k = *i as usize;
+            let length = super::fit::dot([*p, *q, *r], [*p, *q, *r]).sqrt();
+            EdgePoint {
+                bearing: [*x, *y, *z],
+                px_per_rad: 1.0 / length,
+                gradient: self.gradients.map(|values| values[k]),
+                pixel: self.pixel(*i),
+                slot: self.slots[k],
+            }
+        }));
     }
 
     /// The direction across a piece of a chain to its brighter side: the sum of three points', for one may be noisy.
-    fn brighter(&self, ridge: &RidgePixels, chains: &Chains, piece: &[u32]) -> Vector3<f64> {
+    fn brighter(&self, piece: &[u32]) -> Vector3<f64> {
         let n = piece.len();
-        let change = |i: usize| Vector3::from(self.lift(ridge, chains, piece[i]).1.map(f64::from));
+        let change = |i: usize| {
+            let [x, y, z, _] = self.bearing(piece[i])[1].map(f64::from);
+            Vector3::new(x, y, z)
+        };
         change(n / 4) + change(n / 2) + change(3 * n / 4)
     }
 }

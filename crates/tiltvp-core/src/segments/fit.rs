@@ -1,6 +1,7 @@
 //! The great circle through the points of a piece, with what is known of its error.
 
 use nalgebra::{Matrix2, Vector2, Vector3};
+use tiltvp_kernels::vectorised;
 
 use super::segment::{EdgePoint, Segment};
 
@@ -32,6 +33,7 @@ pub(super) fn cross(a: [f32; 3], b: [f32; 3]) -> [f32; 3] {
     [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }
 
+#[inline(always)]
 fn bearing(point: &EdgePoint) -> Vector3<f64> {
     Vector3::from(point.bearing.map(f64::from))
 }
@@ -44,6 +46,7 @@ struct Frame {
 }
 
 impl Frame {
+    #[inline(always)]
     fn new(normal: Vector3<f64>, middle: &Vector3<f64>) -> Option<Self> {
         let middle = (middle - normal * normal.dot(middle)).try_normalize(1e-9)?;
         Some(Self { normal, middle, along: normal.cross(&middle) })
@@ -51,6 +54,7 @@ impl Frame {
 
     /// One step of least squares of the points within `limit` pixels: the normal and the root mean square distance of those
     /// before the step, and how many there are.
+    #[inline(always)]
     fn step(&self, points: &[EdgePoint], limit: f64) -> Option<(Vector3<f64>, usize)> {
         let (mut information, mut pull, mut count) = (Matrix2::zeros(), Vector2::zeros(), 0);
         for point in points {
@@ -70,6 +74,7 @@ impl Frame {
 }
 
 /// Root mean square distance in pixels of the points within `limit` pixels of a circle.
+#[inline(always)]
 fn rms(points: &[EdgePoint], normal: &Vector3<f64>, limit: f64) -> f64 {
     let (mut sum, mut count) = (0.0, 0);
     for point in points {
@@ -82,59 +87,61 @@ fn rms(points: &[EdgePoint], normal: &Vector3<f64>, limit: f64) -> f64 {
     (sum / f64::from(count.max(1))).sqrt()
 }
 
-/// The circle of points of which the brighter side is where `toward` is: least squares of distances in pixels, trimmed once.
-/// The points are those of a [`Segments`](super::Segments) that begin at `start` there. None for points that determine no circle.
-pub(super) fn fit(points: &[EdgePoint], toward: &Vector3<f64>, start: usize) -> Option<Segment> {
-    let (first, last) = (bearing(points.first()?), bearing(points.last()?));
-    let mean: Vector3<f64> = points.iter().map(bearing).sum();
-    // Points of a joined segment are in no order: any that lie far apart will do to begin with.
-    let chord = first.cross(&last).try_normalize(1e-9)?;
-    let mut frame = Frame::new(chord, &mean)?;
-    let (normal, _) = frame.step(points, f64::INFINITY)?;
-    frame = Frame::new(normal, &mean)?;
-    let sigma = rms(points, &frame.normal, f64::INFINITY).max(TRIM_SIGMA_MIN_PX);
-    let (normal, inliers) = frame.step(points, TRIM * sigma)?;
-    if inliers < points.len().div_ceil(2) {
-        return None;
-    }
-    let rms_px = rms(points, &normal, TRIM * sigma);
-    let normal = if normal.dot(toward) < 0.0 { -normal } else { normal };
-    let Frame { normal, middle, along } = Frame::new(normal, &mean)?;
-
-    // Arcs are shorter than half a turn, so that the tangent of the angle from the middle rises along them.
-    let (mut low, mut high, mut px_per_rad, mut gradient) = (f64::INFINITY, f64::NEG_INFINITY, 0.0, 0.0);
-    for point in points {
-        let b = bearing(point);
-        let x = middle.dot(&b);
-        if x <= 0.0 {
+vectorised! {
+    /// The circle of points of which the brighter side is where `toward` is: least squares of distances in pixels, trimmed once.
+    /// The points are those of a [`Segments`](super::Segments) that begin at `start` there. None for points that determine no circle.
+    pub(super) fn fit(points: &[EdgePoint], toward: &Vector3<f64>, start: usize) -> Option<Segment> {
+        let (first, last) = (bearing(points.first()?), bearing(points.last()?));
+        let mean: Vector3<f64> = points.iter().map(bearing).sum();
+        // Points of a joined segment are in no order: any that lie far apart will do to begin with.
+        let chord = first.cross(&last).try_normalize(1e-9)?;
+        let mut frame = Frame::new(chord, &mean)?;
+        let (normal, _) = frame.step(points, f64::INFINITY)?;
+        frame = Frame::new(normal, &mean)?;
+        let sigma = rms(points, &frame.normal, f64::INFINITY).max(TRIM_SIGMA_MIN_PX);
+        let (normal, inliers) = frame.step(points, TRIM * sigma)?;
+        if inliers < points.len().div_ceil(2) {
             return None;
         }
-        let tangent = along.dot(&b) / x;
-        (low, high) = (low.min(tangent), high.max(tangent));
-        px_per_rad += f64::from(point.px_per_rad);
-        let [gx, gy] = point.gradient;
-        gradient += f64::from((gx * gx + gy * gy).sqrt());
+        let rms_px = rms(points, &normal, TRIM * sigma);
+        let normal = if normal.dot(toward) < 0.0 { -normal } else { normal };
+        let Frame { normal, middle, along } = Frame::new(normal, &mean)?;
+
+        // Arcs are shorter than half a turn, so that the tangent of the angle from the middle rises along them.
+        let (mut low, mut high, mut px_per_rad, mut gradient) = (f64::INFINITY, f64::NEG_INFINITY, 0.0, 0.0);
+        for point in points {
+            let b = bearing(point);
+            let x = middle.dot(&b);
+            if x <= 0.0 {
+                return None;
+            }
+            let tangent = along.dot(&b) / x;
+            (low, high) = (low.min(tangent), high.max(tangent));
+            px_per_rad += f64::from(point.px_per_rad);
+            let [gx, gy] = point.gradient;
+            gradient += f64::from((gx * gx + gy * gy).sqrt());
+        }
+        let n = points.len() as f64;
+        let (px_per_rad, contrast) = (px_per_rad / n, gradient / n / SCHARR);
+        let ends = [low, high].map(|tangent| (middle + along * tangent).normalize());
+        let length_rad = high.atan() - low.atan();
+        if length_rad.is_nan() || length_rad * px_per_rad < 1.0 {
+            return None;
+        }
+        let point = (rms_px.max(POINT_SIGMA_PX) / px_per_rad).powi(2) * CORRELATED / inliers as f64;
+        let offset = point + (EDGE_SIGMA_PX / px_per_rad).powi(2);
+        // The variance of the slope of points spread evenly over a length.
+        let slope = 12.0 * offset / (length_rad * length_rad);
+        Some(Segment {
+            normal,
+            middle,
+            ends,
+            length_rad,
+            variances_rad2: [offset, slope],
+            contrast,
+            rms_px,
+            px_per_rad,
+            points: start..start + points.len(),
+        })
     }
-    let n = points.len() as f64;
-    let (px_per_rad, contrast) = (px_per_rad / n, gradient / n / SCHARR);
-    let ends = [low, high].map(|tangent| (middle + along * tangent).normalize());
-    let length_rad = high.atan() - low.atan();
-    if length_rad.is_nan() || length_rad * px_per_rad < 1.0 {
-        return None;
-    }
-    let point = (rms_px.max(POINT_SIGMA_PX) / px_per_rad).powi(2) * CORRELATED / inliers as f64;
-    let offset = point + (EDGE_SIGMA_PX / px_per_rad).powi(2);
-    // The variance of the slope of points spread evenly over a length.
-    let slope = 12.0 * offset / (length_rad * length_rad);
-    Some(Segment {
-        normal,
-        middle,
-        ends,
-        length_rad,
-        variances_rad2: [offset, slope],
-        contrast,
-        rms_px,
-        px_per_rad,
-        points: start..start + points.len(),
-    })
 }

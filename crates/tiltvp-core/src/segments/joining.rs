@@ -1,11 +1,16 @@
 //! Pieces of one great circle and one polarity are one edge.
 
 use nalgebra::Vector3;
+use tiltvp_kernels::marks::{BEYOND, MARK, places};
+use tiltvp_kernels::vectorised;
 
 use super::segment::Segment;
 
 /// Cosine of the largest angle between the normals of pieces of one edge, 14 degrees: short ones turn by noise.
 const NORMALS_COS: f64 = 0.97;
+
+/// By how much the cosine in single precision may be off: a hundred times its rounding.
+const HAIR: f32 = 1e-5;
 
 /// How far in pixels the ends of a piece may be from the circle of the longer one.
 const APART_PX: f64 = 1.0;
@@ -22,17 +27,20 @@ pub(super) struct Groups {
     members: Vec<u32>,
     starts: Vec<usize>,
     order: Vec<u32>,
-    /// Normals in that order, side by side.
-    normals: Vec<Vector3<f64>>,
+    /// Normals in that order in single precision, zero of those that are in a group.
+    normals: [Vec<f32>; 3],
+    /// Which of them are near one, and where.
+    marks: Vec<u8>,
+    near: Vec<u32>,
     taken: Vec<bool>,
-    /// Segments on the circle of the longest, and the angles of their ends from its middle.
+    /// Ranks of segments on the circle of the longest, and the angles of their ends from its middle.
     candidates: Vec<(u32, f64, f64)>,
 }
 
 impl Groups {
     /// Groups the pieces greedily, the longest first: those of its circle with a gap of at most `gap_max` lengths.
     pub(super) fn join(&mut self, pieces: &[Segment], gap_max: f64) {
-        let Self { members, starts, order, normals, taken, candidates } = self;
+        let Self { members, starts, order, normals, marks, near, taken, candidates } = self;
         members.clear();
         starts.clear();
         starts.push(0);
@@ -40,23 +48,32 @@ impl Groups {
         order.extend(0..pieces.len() as u32);
         let length = |i: u32| pieces[i as usize].length_rad;
         order.sort_unstable_by(|a, b| length(*b).total_cmp(&length(*a)).then(a.cmp(b)));
-        normals.clear();
-        normals.extend(order.iter().map(|i| pieces[*i as usize].normal));
+        for (k, normals) in normals.iter_mut().enumerate() {
+            normals.clear();
+            normals.extend(order.iter().map(|i| pieces[*i as usize].normal[k] as f32));
+        }
+        marks.resize(pieces.len(), 0);
+        near.resize(pieces.len() + BEYOND, 0);
         taken.clear();
         taken.resize(pieces.len(), false);
         for (rank, longest) in order.iter().enumerate() {
-            if std::mem::replace(&mut taken[*longest as usize], true) {
+            if std::mem::replace(&mut taken[rank], true) {
                 continue;
             }
             members.push(*longest);
             let base = &pieces[*longest as usize];
             if gap_max > 0.0 {
                 candidates.clear();
-                for (i, normal) in order.iter().zip(normals.iter()).skip(rank + 1) {
-                    let other = &pieces[*i as usize];
-                    if base.normal.dot(normal) > NORMALS_COS && !taken[*i as usize] && on_circle(base, other) {
+                let marks = &mut marks[rank + 1..];
+                let others = normals.each_ref().map(|normals| &normals[rank + 1..]);
+                mark_near(others, base.normal.cast().into(), NORMALS_COS as f32 - HAIR, marks);
+                let count = places(marks, near);
+                for beyond in &near[..count] {
+                    let at = rank + 1 + *beyond as usize;
+                    let other = &pieces[order[at] as usize];
+                    if base.normal.dot(&other.normal) > NORMALS_COS && on_circle(base, other) {
                         let [a, b] = other.ends.map(|end| angle(base, &end));
-                        candidates.push((*i, a.min(b), a.max(b)));
+                        candidates.push((at as u32, a.min(b), a.max(b)));
                     }
                 }
                 let [mut low, mut high] = base.ends.map(|end| angle(base, &end));
@@ -65,10 +82,13 @@ impl Groups {
                     gap < gap_max * (high - low).clamp(SCALE_RAD[0], SCALE_RAD[1])
                         && high.max(*b) - low.min(*a) < LONGEST_RAD
                 }) {
-                    let (i, a, b) = candidates.remove(k);
+                    let (at, a, b) = candidates.remove(k);
                     (low, high) = (low.min(a), high.max(b));
-                    taken[i as usize] = true;
-                    members.push(i);
+                    taken[at as usize] = true;
+                    for normals in &mut *normals {
+                        normals[at as usize] = 0.0;
+                    }
+                    members.push(order[at as usize]);
                 }
             }
             starts.push(members.len());
@@ -78,6 +98,18 @@ impl Groups {
     /// The groups, each with its longest piece first.
     pub(super) fn iter(&self) -> impl Iterator<Item = &[u32]> {
         self.starts.windows(2).map(|ends| &self.members[ends[0]..ends[1]])
+    }
+}
+
+vectorised! {
+    /// Marks the unit normals whose cosine with another is above a limit.
+    fn mark_near([x, y, z]: [&[f32]; 3], other: [f32; 3], limit: f32, marks: &mut [u8]) {
+        let n = marks.len();
+        let (x, y, z) = (&x[..n], &y[..n], &z[..n]);
+        for i in 0..n {
+            let cosine = x[i] * other[0] + y[i] * other[1] + z[i] * other[2];
+            marks[i] = if cosine > limit { MARK } else { 0 };
+        }
     }
 }
 

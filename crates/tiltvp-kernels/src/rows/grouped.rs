@@ -251,6 +251,12 @@ mod tests {
         let scalar = with(&|terms, slopes| unsafe { terms_of::scalar(rows, &column, model, 3.0, terms, slopes) });
         assert_eq!(with(&|terms, slopes| terms_of(rows, &column, model, 3.0, terms, slopes)), scalar);
         #[cfg(target_arch = "x86_64")]
+        {
+            // SAFETY: every x86-64 has them.
+            let sse2 = with(&|terms, slopes| unsafe { terms_of::sse2(rows, &column, model, 3.0, terms, slopes) });
+            assert_eq!(sse2, scalar);
+        }
+        #[cfg(target_arch = "x86_64")]
         if crate::level::Level::available().any(|level| level == crate::level::Level::Avx2) {
             // SAFETY: the machine has them.
             let avx2 = with(&|terms, slopes| unsafe { terms_of::avx2(rows, &column, model, 3.0, terms, slopes) });

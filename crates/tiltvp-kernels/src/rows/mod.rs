@@ -7,6 +7,8 @@ mod grouped;
 mod real;
 mod simd;
 mod single;
+#[cfg(target_arch = "x86_64")]
+mod sse2;
 mod sums;
 
 pub use bound::ConsensusBound;

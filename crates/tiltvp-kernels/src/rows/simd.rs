@@ -1,5 +1,6 @@
 //! Sixteen numbers of single precision at a time, in vectors of any width: what the kernels of single precision are written in.
 
+#[cfg(any(test, not(target_arch = "x86_64")))]
 use std::cmp::Ordering;
 
 /// Numbers that are worked on together: those of the widest vectors.
@@ -43,10 +44,12 @@ pub(super) trait Simd: Copy {
     unsafe fn store_fours(columns: [Self; 4], to: &mut [[[f32; 4]; TURNS]; TURNS]);
 }
 
-/// One number after the other, for every machine.
+/// One number after the other, for machines without a kernel, and what kernels are held to.
+#[cfg(any(test, not(target_arch = "x86_64")))]
 #[derive(Clone, Copy)]
 pub(super) struct Scalar([f32; WIDTH]);
 
+#[cfg(any(test, not(target_arch = "x86_64")))]
 impl Scalar {
     #[inline(always)]
     fn zip(self, other: Self, with: impl Fn(f32, f32) -> f32) -> Self {
@@ -54,6 +57,7 @@ impl Scalar {
     }
 }
 
+#[cfg(any(test, not(target_arch = "x86_64")))]
 impl Simd for Scalar {
     type Mask = [bool; WIDTH];
 
@@ -136,9 +140,18 @@ macro_rules! kernel {
 
             /// # Safety
             /// None: every machine has single numbers.
+            #[cfg(any(test, not(target_arch = "x86_64")))]
             pub(super) unsafe fn scalar($($argument: $type),*) $(-> $out)? {
                 // SAFETY: every machine has single numbers.
                 unsafe { $body::<crate::rows::simd::Scalar>($($argument),*) }
+            }
+
+            /// # Safety
+            /// None: every x86-64 has SSE2.
+            #[cfg(target_arch = "x86_64")]
+            pub(super) unsafe fn sse2($($argument: $type),*) $(-> $out)? {
+                // SAFETY: every x86-64 has SSE2.
+                unsafe { $body::<crate::rows::sse2::Sse2>($($argument),*) }
             }
 
             /// # Safety
@@ -165,13 +178,17 @@ macro_rules! kernel {
             #[cfg(target_arch = "x86_64")]
             match crate::level::level() {
                 // SAFETY: the machine has the level.
-                crate::level::Level::Avx512 => return unsafe { $name::avx512($($argument),*) },
+                crate::level::Level::Avx512 => unsafe { $name::avx512($($argument),*) },
                 // SAFETY: as above.
-                crate::level::Level::Avx2 => return unsafe { $name::avx2($($argument),*) },
-                _ => {}
+                crate::level::Level::Avx2 => unsafe { $name::avx2($($argument),*) },
+                // SAFETY: every x86-64 has it.
+                _ => unsafe { $name::sse2($($argument),*) },
             }
             // SAFETY: every machine has single numbers.
-            unsafe { $name::scalar($($argument),*) }
+            #[cfg(not(target_arch = "x86_64"))]
+            unsafe {
+                $name::scalar($($argument),*)
+            }
         }
     };
 }

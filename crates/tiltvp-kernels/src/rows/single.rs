@@ -308,6 +308,14 @@ mod tests {
                             |r: [&[f32]; 3], w: &mut [f32], s: &mut Sums| accumulate(r, (w, kind), model, gate, s);
                         assert_eq!(found(with, n, weight), scalar, "{n} rows, {gate:?}, {kind:?}");
                         #[cfg(target_arch = "x86_64")]
+                        {
+                            // SAFETY: every x86-64 has them.
+                            let with = |r: [&[f32]; 3], w: &mut [f32], s: &mut Sums| unsafe {
+                                accumulate::sse2(r, (w, kind), model, gate, s);
+                            };
+                            assert_eq!(found(with, n, weight), scalar, "{n} rows, {gate:?}, {kind:?}");
+                        }
+                        #[cfg(target_arch = "x86_64")]
                         if crate::level::Level::available().any(|level| level == crate::level::Level::Avx2) {
                             // SAFETY: the machine has them.
                             let with = |r: [&[f32]; 3], w: &mut [f32], s: &mut Sums| unsafe {
@@ -332,6 +340,9 @@ mod tests {
                 assert_eq!(count(rows, model, 0.3), plain);
                 // SAFETY: every machine has single numbers.
                 assert_eq!(unsafe { count::scalar(rows, model, 0.3) }, plain);
+                #[cfg(target_arch = "x86_64")]
+                // SAFETY: every x86-64 has them.
+                assert_eq!(unsafe { count::sse2(rows, model, 0.3) }, plain);
                 #[cfg(target_arch = "x86_64")]
                 if crate::level::Level::available().any(|level| level == crate::level::Level::Avx2) {
                     // SAFETY: the machine has them.

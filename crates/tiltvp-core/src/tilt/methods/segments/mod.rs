@@ -240,13 +240,7 @@ impl SegmentFit {
     /// What the strong ridge pixels near the horizon say by their gradients.
     fn vote(&self, ridge: &RidgePixels, tables: &PixelTables, strong: &mut EdgePixels, work: &mut Work) -> Fit {
         let least = (self.strong.gradient_min * self.strong.gradient_min) as f32;
-        strong.clear();
-        let edges = &ridge.edges;
-        for ((slot, gx), gy) in edges.slot().iter().zip(edges.gx()).zip(edges.gy()) {
-            if gx * gx + gy * gy >= least && self.in_band[*slot as usize] {
-                strong.push(&tables.region, *slot, *gx, *gy);
-            }
-        }
+        strong.refill_where(&ridge.edges, |slot, gx, gy| (gx * gx + gy * gy >= least) & self.in_band[slot as usize]);
         self.pixels.fit(strong, tables, work)
     }
 
