@@ -60,9 +60,9 @@ _FEW: Final = 20
 _VARIES: Final = 1.0
 """Grey levels by which a view varies at least, for one that does not."""
 _WEIGHTS: Final = np.array([
-    3.513, 1.696, 2.476, -5.464, 0.323, 2.917, 0.615, -7.803, 5.106, -2.534,
-    -0.407, -0.725, -0.526, -1.466, 1.990, 1.159, -0.578, 1.510,
-    -2.085, -0.966, 1.002, -0.497, 0.942, -0.297, -1.194, -1.843,
+    4.897, -0.3919, 1.937, -3.579, -2.262, 4.982, 0.9539, -2.97, -2.172, -2.282,
+    -0.003112, -0.4236, -0.7259, -1.435, 2.215, 0.05672, 0.7524, 1.387,
+    -1.946, 0.7086, 0.2233, 0.05972, 0.08465, -0.9837, -0.258, -3.007,
 ])  # fmt: skip
 """Logarithm of the odds for each unit of a feature of one image: a conditional logit on views of half of the panoramas
 of `tiltvp measure trust`, by `tiltvp.lab.evaluation.setups`."""

@@ -82,6 +82,9 @@ pub(crate) fn match_descriptors<'py>(
     PyArray1::from_vec(py, flat).reshape([matches.len(), 2])
 }
 
+/// Pairs `(M, 2)` and confidences `(M,)`.
+type WideMatches<'py> = (Bound<'py, PyArray2<i64>>, Bound<'py, PyArray1<f64>>);
+
 /// (M, 2) and (M,): lines of an image and those of another, metres away, that are the same, and how confident that is.
 ///
 /// `a` and `b` are the descriptors of the lines, of `descriptor_kind` "profile", (N_A, 190) and (N_B, 190) float32. One motion
@@ -101,7 +104,7 @@ pub(crate) fn match_wide<'py>(
     b: &Bound<'py, PyAny>,
     ahead_rad: Option<&Bound<'py, PyAny>>,
     options: Option<&Bound<'py, PyDict>>,
-) -> PyResult<(Bound<'py, PyArray2<i64>>, Bound<'py, PyArray1<f64>>)> {
+) -> PyResult<WideMatches<'py>> {
     let ((a, ..), (b, ..)) = (descriptors(a, "a")?, descriptors(b, "b")?);
     let mut parsed = WideOptions::default();
     options::set(&mut parsed, options)?;

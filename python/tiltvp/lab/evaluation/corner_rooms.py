@@ -94,7 +94,7 @@ def truth_near(
     away = np.linalg.norm(vertices - pose.vertex_m, axis=1)
     number = int(np.argmin(away))
     truth = np.eye(4)
-    edges = np.stack(pose.edges) @ from_world[:3, :3]
+    edges = pose.edges @ from_world[:3, :3]
     same = [k for k in sequence.truth(frame).corners if away[k] <= _SAME_M and _run_alike(corners[k].edges, edges)]
     if same:
         number = min(same, key=lambda k: float(away[k]))

@@ -129,12 +129,11 @@ pub fn match_wide(
     search.fill(scores);
     let least = options.likeness_min as f32;
     let [first, second] = &*bearings;
-    let (motion, rival) = match ahead {
-        Some(ahead) => (search.near(first, second, ahead, 3.0 * options.motion_sigma_rad, least), None),
-        None => {
-            let (motion, rival) = search.best(first, second, least);
-            (motion, Some(rival))
-        }
+    let (motion, rival) = if let Some(ahead) = ahead {
+        (search.near(first, second, ahead, 3.0 * options.motion_sigma_rad, least), None)
+    } else {
+        let (motion, rival) = search.best(first, second, least);
+        (motion, Some(rival))
     };
     let found = search.under(first, second, &motion, false);
     mutual(found, second.len(), least, kept);
