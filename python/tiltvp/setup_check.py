@@ -66,8 +66,10 @@ _WEIGHTS: Final = np.array([
 ])  # fmt: skip
 """Logarithm of the odds for each unit of a feature of one image: a conditional logit on views of half of the panoramas
 of `tiltvp measure trust`, by `tiltvp.lab.evaluation.setups`."""
-_SHARED: Final = 0.6
-"""Images of one place err together: the logarithm of the odds of N images is that of N to this power of them."""
+_SHARED: Final = 0.5
+"""Images of one place err together: the logarithm of the odds of N images is that of N to this power of them. Of sets
+of five of one building, cross-validated by building, 97 % believe the right direction and each wrong one 6 %; 0.2 tells
+such sets best (98, 11 %), but the headings of a drive add more."""
 BELIEVABLE: Final = 0.05
 
 
