@@ -72,6 +72,10 @@ impl FittedRay {
         let turn = tangent_basis(&-self.normal).transpose() * tangent_basis(&self.normal);
         self.normal = -self.normal;
         self.covariance = symmetric(&(turn * self.covariance * turn.transpose()));
+        // Of a normal that is known exactly in one direction, the turn's rounding leaves a variance on either side of zero.
+        for i in 0..2 {
+            self.covariance[(i, i)] = self.covariance[(i, i)].max(0.0);
+        }
         self
     }
 
@@ -84,14 +88,59 @@ impl FittedRay {
     /// Whether every number is finite, the bearings of unit length and the variances not negative.
     pub fn is_valid(&self) -> bool {
         let unit = |v: &Vector3<f64>| (v.norm_squared() - 1.0).abs() < 1e-6;
-        let (c, scale) = (&self.covariance, self.covariance.amax());
-        scale.is_finite()
-            && c.iter().all(|x| x.is_finite())
-            && (c[(0, 1)] - c[(1, 0)]).abs() <= 1e-9 * scale
+        // In units of the largest entry, whose square may be none of a float.
+        let scale = self.covariance.amax();
+        let c = if scale > 0.0 { self.covariance / scale } else { self.covariance };
+        c.iter().all(|x| x.is_finite())
+            && (c[(0, 1)] - c[(1, 0)]).abs() <= 1e-9
             && c[(0, 0)] >= 0.0
             && c[(1, 1)] >= 0.0
-            && c.determinant() >= -1e-9 * scale * scale
+            && c.determinant() >= -1e-9
             && unit(&self.normal)
             && unit(&self.toward)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    #[test]
+    fn covariances_are_judged_whatever_their_unit() {
+        let ray = |covariance| {
+            let normal = Vector3::z();
+            FittedRay { normal, covariance, toward: Vector3::x(), support: 2, residual_rms_rad: 0.0 }
+        };
+        let (good, bad) = (Matrix2::new(2.0, 1.0, 1.0, 0.5), Matrix2::new(2.0, 1.1, 1.1, 0.5));
+        for unit in [1e-300, 1e-160, 1.0, 1e160, 1e300] {
+            assert!(ray(good * unit).is_valid(), "{unit:e}");
+            assert!(!ray(bad * unit).is_valid(), "{unit:e}");
+        }
+        assert!(ray(Matrix2::zeros()).is_valid());
+        for wrong in [f64::NAN, f64::INFINITY] {
+            assert!(!ray(Matrix2::new(wrong, 0.0, 0.0, 1.0)).is_valid());
+            assert!(!ray(Matrix2::new(1.0, wrong, 1.0, 1.0)).is_valid());
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn a_ray_that_is_exact_in_one_direction_is_valid_either_way_round(
+            x in -1.0..1.0f64, y in -1.0..1.0f64, z in -1.0..1.0f64, variance in 0.0..1.0f64, along in 0.0..6.3f64,
+        ) {
+            let normal = Vector3::new(x, y, z).normalize();
+            let direction = Vector2::new(along.cos(), along.sin());
+            let directions = [direction, Vector2::x(), Vector2::y()];
+            for direction in directions {
+                // Along an axis of the basis on the other side, whose variances rounding takes below zero.
+                let turn = tangent_basis(&normal).transpose() * tangent_basis(&-normal);
+                let covariance = symmetric(&(turn * direction * direction.transpose() * turn.transpose() * variance));
+                let ray = FittedRay { normal, covariance, toward: normal, support: 2, residual_rms_rad: 0.0 };
+                prop_assume!(ray.is_valid());
+                prop_assert!(ray.reversed().is_valid(), "{:?}", ray.reversed());
+                prop_assert!(ray.reversed().reversed().is_valid());
+            }
+        }
     }
 }

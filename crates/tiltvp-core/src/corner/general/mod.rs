@@ -1,5 +1,6 @@
 //! The general front end: line segments joined at vertices, each ray then fitted between pixels.
 
+pub(super) mod beginnings;
 pub(super) mod common_attitude;
 pub(super) mod completion;
 pub(super) mod edge_ends;

@@ -183,7 +183,7 @@ impl CornerPoseEstimator {
         } else if self.right.is_some() && self.is_as_published() {
             self.by_paper(&mut estimate)?;
         } else if self.right.is_some() {
-            seen = self.by_pair(attitude.as_ref(), common.as_ref(), &mut estimate)?;
+            seen = self.by_pair([left, right.unwrap_or(left)], attitude.as_ref(), common.as_ref(), &mut estimate)?;
         } else {
             self.by_one(&mut estimate)?;
         }

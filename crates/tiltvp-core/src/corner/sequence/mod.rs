@@ -8,6 +8,7 @@ pub(super) mod knowledge;
 pub(super) mod names;
 mod pairs;
 mod paper;
+mod rivals;
 mod shared_attitude;
 mod size;
 mod support;

@@ -4,7 +4,8 @@ use nalgebra::{Matrix3, Vector3};
 
 use super::agreement::{apart, renamed};
 use super::believed::{OPEN, SeenPair};
-use super::estimator::CornerPoseEstimator;
+use super::estimator::{CornerPoseEstimator, Frame};
+use super::rivals::{Rival, add_rivals};
 use super::support::CornerSupport;
 use super::transfer::upright;
 use crate::corner::closed_form::attitude::{IncludedAngle, corner_attitudes};
@@ -23,6 +24,10 @@ const SAME_POSE_RAD: f64 = 0.035;
 
 /// The share of the largest misfit up to which a corner is believed that was not seen in the frame before.
 const WELL: f64 = 0.4;
+
+/// How many of a corner's three rays in two images begin at its vertex at least: those of two edges. Where fewer do, edges of
+/// several things meet in the images alone, as those of a drawer's front and of the case behind it.
+const BEGIN_MIN: usize = 4;
 
 /// The least probability of a hypothesis that is returned.
 const PROBABILITY_MIN: f64 = 1e-9;
@@ -134,19 +139,28 @@ impl CornerPoseEstimator {
     /// out. Returns all pairs that fit well, chosen or not.
     pub(crate) fn by_pair(
         &self,
+        frames: [&Frame<'_>; 2],
         attitude: Option<&Matrix3<f64>>,
         common: Option<&CommonAttitude>,
         estimate: &mut CornerEstimate,
     ) -> Result<Vec<SeenPair>> {
         let mut seen = Vec::new();
-        let Some((_, left_from_right)) = &self.right else { return Ok(seen) };
+        let Some((detector, left_from_right)) = &self.right else { return Ok(seen) };
+        let begin = [(&self.left, 0), (detector, 1)].map(|(detector, side)| -> Vec<usize> {
+            let features = estimate.features[side].iter();
+            features.map(|corner| detector.begin_at_vertex(frames[side], corner)).collect()
+        });
         let priors = self.priors(self.is_one_object());
         let (nearest, farthest) = (self.options.distance_min_m, self.options.distance_max_m);
         let misfit_most = self.misfit_most();
         let mut best: Option<(f64, Vec<Hypothesis>, usize, usize)> = None;
+        let mut rivals = Vec::new();
         let support = CornerSupport::new(&estimate.features, left_from_right);
         for (i, left) in estimate.features[0].iter().enumerate() {
             for (j, right) in estimate.features[1].iter().enumerate() {
+                if begin[0][i] + begin[1][j] < BEGIN_MIN {
+                    continue;
+                }
                 let poses = self.pair_poses([left, right], left_from_right, &priors, common)?;
                 let Some((pose, vertex)) = poses.first().and_then(|pose| Some((pose, pose.vertex_m?))) else {
                     continue;
@@ -178,12 +192,16 @@ impl CornerPoseEstimator {
                     let turned = apart(&pose.camera_from_object, &track.pose.camera_from_object);
                     score /= 1.0 + (turned / self.turn_sigma_rad(track)).powi(2);
                 }
+                rivals.push(Rival { score, left: i, right: j, vertex_m: vertex });
                 if best.as_ref().is_none_or(|(most, ..)| score > *most) {
                     best = Some((score, poses, i, j));
                 }
             }
         }
-        if let Some((_, poses, i, j)) = best {
+        if let Some((_, mut poses, i, j)) = best {
+            if !self.is_one_object() {
+                add_rivals(&mut poses, [i, j], &rivals, estimate);
+            }
             estimate.hypotheses = poses;
             (estimate.chosen_left, estimate.chosen_right) = (vec![i], Some(j));
         }
