@@ -3,10 +3,11 @@
 use std::f64::consts::PI;
 use std::sync::Arc;
 
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::{Matrix3, Vector2, Vector3};
 
 use super::estimate::{EdgeElement, TiltEstimate};
 use super::fit::Seen;
+use super::image_circle::CentreOff;
 use super::image_edges::{EdgeOrigin, ImageEdges};
 use super::methods::{Fitter, Prepared, Setting, TILT_MAX_RAD, edge_offset};
 use super::options::TiltOptions;
@@ -147,13 +148,14 @@ impl TiltEstimator {
         self.check_image(image)?;
         self.check_scratch(scratch)?;
         let gradient_min = self.options.edges.gradient_min;
+        let off_px = self.centre_off_px(image);
         match &self.method {
             Prepared::Pixels(method) => {
                 let Scratch { detector, edges, work, .. } = scratch;
                 detector.detect(image, &self.pixels.region, gradient_min, method.prefilter(), edges);
-                Ok(self.fit(&**method, edges, work))
+                Ok(self.fit(&**method, edges, off_px, work))
             }
-            Prepared::Segments(method) => Ok(method.estimate(image, &self.pixels, scratch)),
+            Prepared::Segments(method) => Ok(method.estimate(image, &self.pixels, self.centre_off(off_px), scratch)),
         }
     }
 
@@ -168,7 +170,19 @@ impl TiltEstimator {
         self.check_scratch(scratch)?;
         let Scratch { detector, edges, .. } = scratch;
         detector.detect(image, &self.pixels.region, self.options.edges.gradient_min, None, edges);
-        ImageEdges::new(Arc::clone(&self.origin), edges.slot(), edges.gx(), edges.gy())
+        ImageEdges::new(Arc::clone(&self.origin), edges.slot(), edges.gx(), edges.gy())?
+            .with_centre_off_px(self.centre_off_px(image))
+    }
+
+    /// How far the image circle lies beside the calibration's, where both are seen.
+    fn centre_off_px(&self, image: &ImageView<'_>) -> Option<Vector2<f64>> {
+        self.pixels.circle.as_ref()?.off_px(image)
+    }
+
+    /// The same, with what it does to estimates.
+    fn centre_off(&self, off_px: Option<Vector2<f64>>) -> Option<CentreOff<'_>> {
+        let (circle, robot_from_camera) = (self.pixels.circle.as_ref()?, &self.origin.robot_from_camera);
+        off_px.map(|off_px| CentreOff { circle, robot_from_camera, off_px })
     }
 
     /// The tilt of the image that the edge pixels are of: the same, to the last bit, as [`estimate`](Self::estimate) gives.
@@ -181,7 +195,7 @@ impl TiltEstimator {
         self.check_scratch(scratch)?;
         let Scratch { edges, work, .. } = scratch;
         image_edges.copy_to(&self.origin, &self.pixels.region, edges)?;
-        Ok(self.fit(method, edges, work))
+        Ok(self.fit(method, edges, image_edges.centre_off_px(), work))
     }
 
     /// The method, if it looks at edge pixels.
@@ -197,7 +211,13 @@ impl TiltEstimator {
 
     /// The estimate of the edge pixels of an image. What passed a prefilter and what passed none give the same one: prefilters
     /// keep out only what the prefilters reject.
-    fn fit(&self, method: &dyn Fitter, edges: &EdgePixels, work: &mut Work) -> TiltEstimate {
+    fn fit(
+        &self,
+        method: &dyn Fitter,
+        edges: &EdgePixels,
+        off_px: Option<Vector2<f64>>,
+        work: &mut Work,
+    ) -> TiltEstimate {
         let fit = method.fit(edges, &self.pixels, work);
         let (edge_pixels, prefiltered_pixels) = (edges.strong(), work.rows.len());
         let seen = Seen {
@@ -206,6 +226,7 @@ impl TiltEstimator {
             pixels_per_rad: self.pixels.region.pixels_per_rad(),
             tilt_max_rad: self.options.tilt_max_rad.unwrap_or(TILT_MAX_RAD),
             trust: method.trust(),
+            centre_off: self.centre_off(off_px),
         };
         fit.into_estimate(&seen, &mut work.trusted)
     }

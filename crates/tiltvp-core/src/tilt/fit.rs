@@ -7,6 +7,7 @@ use nalgebra::{Matrix2, Vector2};
 use super::confidence;
 use super::corrected::Corrected;
 use super::estimate::{ALTERNATIVES, Alternative, TiltEstimate};
+use super::image_circle::CentreOff;
 use super::scratch::Work;
 use super::tables::PixelTables;
 use super::trained::TrainedCorrection;
@@ -70,14 +71,15 @@ impl Fit {
     }
 
     /// The estimate of an image. A tilt of which the error is not known is none.
-    pub(super) fn into_estimate(self, seen: &Seen, features: &mut [f64; FEATURES]) -> TiltEstimate {
+    pub(super) fn into_estimate(self, seen: &Seen<'_>, features: &mut [f64; FEATURES]) -> TiltEstimate {
         let chosen = self.alternatives[0].map_or(1.0, |best| best.probability);
         let undetermined = self.tilt.is_some() && self.covariance.is_none();
         let undetermined = undetermined.then_some(Stop::Undetermined { agreeing: self.inliers });
+        let (covariance, off_rad) = self.with_centre_off(seen);
         let mut estimate = TiltEstimate {
             tilt: self.tilt.filter(|_| undetermined.is_none()),
-            covariance_rad2: self.covariance.unwrap_or(Matrix2::from_diagonal_element(f64::INFINITY)),
-            confidence: self.covariance.map_or(0.0, |covariance| chosen * confidence::confidence(&covariance)),
+            covariance_rad2: covariance.unwrap_or(Matrix2::from_diagonal_element(f64::INFINITY)),
+            confidence: covariance.map_or(0.0, |covariance| chosen * confidence::confidence(&covariance)),
             edge_pixels: seen.edge_pixels,
             prefiltered_pixels: seen.prefiltered_pixels,
             inlier_pixels: self.inliers,
@@ -92,13 +94,22 @@ impl Fit {
         if let Some(trust) = seen.trust {
             estimate.confidence *= trust.probability(features);
         }
-        estimate.doubt = Doubt::of(&estimate, seen.pixels_per_rad);
+        estimate.doubt = Doubt::of(&estimate, seen.pixels_per_rad, off_rad);
         estimate
+    }
+
+    /// The covariance with the error of a centre that is off, and how large that is: the image does not tell which of its circle
+    /// and its edges is right.
+    fn with_centre_off(&self, seen: &Seen<'_>) -> (Option<Matrix2<f64>>, f64) {
+        let (Some(tilt), Some(off)) = (&self.tilt, &seen.centre_off) else { return (self.covariance, 0.0) };
+        let normal = tilt.normal();
+        let error = tangent_basis(&normal).transpose() * off.error_of(&normal);
+        (self.covariance.map(|covariance| covariance + error * error.transpose()), error.norm())
     }
 }
 
 /// What is known of an image beside its fit.
-pub(super) struct Seen {
+pub(super) struct Seen<'a> {
     pub edge_pixels: usize,
     /// Edge pixels that passed the prefilter.
     pub prefiltered_pixels: usize,
@@ -107,6 +118,8 @@ pub(super) struct Seen {
     pub tilt_max_rad: f64,
     /// How far the method's fits can be trusted to be of the vertical at all.
     pub trust: Option<&'static Trust>,
+    /// A centre that is off.
+    pub centre_off: Option<CentreOff<'a>>,
 }
 
 /// How the rows of a fit tell its error.

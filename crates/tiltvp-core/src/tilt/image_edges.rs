@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use nalgebra::Matrix3;
+use nalgebra::{Matrix3, Vector2};
 
 use crate::camera::Camera;
 use crate::edges::{EdgeOptions, EdgePixels, Mask, Region};
@@ -60,6 +60,7 @@ pub struct ImageEdges {
     slots: Arc<[u32]>,
     gx: Arc<[f32]>,
     gy: Arc<[f32]>,
+    centre_off_px: Option<Vector2<f64>>,
 }
 
 impl ImageEdges {
@@ -78,7 +79,19 @@ impl ImageEdges {
         if !gx.iter().chain(gy).all(|g| g.is_finite()) {
             return Err(Error::argument("edges", "gradients that are not finite", "finite gradients"));
         }
-        Ok(Self { origin, slots: slots.into(), gx: gx.into(), gy: gy.into() })
+        Ok(Self { origin, slots: slots.into(), gx: gx.into(), gy: gy.into(), centre_off_px: None })
+    }
+
+    /// The same with how far the image circle lies beside the calibration's, which no edge pixel tells.
+    ///
+    /// # Errors
+    /// [`Error::InvalidArgument`] unless it is finite.
+    pub fn with_centre_off_px(mut self, centre_off_px: Option<Vector2<f64>>) -> Result<Self> {
+        if let Some(off) = centre_off_px.filter(|off| !off.iter().all(|x| x.is_finite())) {
+            return Err(Error::argument("edges", format!("a centre off by {}, {} px", off.x, off.y), "finite pixels"));
+        }
+        self.centre_off_px = centre_off_px;
+        Ok(self)
     }
 
     /// What they depend on beside the image.
@@ -109,6 +122,11 @@ impl ImageEdges {
     /// Gradient of each pixel along `v`.
     pub fn gy(&self) -> &[f32] {
         &self.gy
+    }
+
+    /// How far in pixels the image circle lies beside the calibration's; `None` where no dark surround tells.
+    pub fn centre_off_px(&self) -> Option<Vector2<f64>> {
+        self.centre_off_px
     }
 
     /// Copies them to where the fits read them, if they are of this origin.

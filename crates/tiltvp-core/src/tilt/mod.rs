@@ -8,6 +8,7 @@ mod estimate;
 mod estimator;
 mod filter;
 mod fit;
+mod image_circle;
 mod image_edges;
 mod level;
 mod methods;

@@ -4,6 +4,7 @@ use nalgebra::Vector3;
 
 use super::confidence::SECTORS;
 use super::correction::VanishingPoint;
+use super::image_circle::ImageCircle;
 use super::image_edges::EdgeOrigin;
 use super::methods::SharedTables;
 use crate::edges::Region;
@@ -17,6 +18,8 @@ pub(super) struct PixelTables {
     pub sectors: Vec<u8>,
     /// Where the vertical of the upright robot is seen.
     pub vertical: Option<VanishingPoint>,
+    /// Where the rim of the image circle is to be, if the calibration says so.
+    pub circle: Option<ImageCircle>,
     /// What the methods look up.
     pub shared: SharedTables,
 }
@@ -31,6 +34,7 @@ impl PixelTables {
         };
         let sectors = region.pixels().map(|(_, _, bearing)| sector(bearing)).collect();
         let vertical = VanishingPoint::new(camera, robot_from_camera);
-        Ok(Self { region, sectors, vertical, shared: SharedTables::default() })
+        let circle = ImageCircle::new(camera);
+        Ok(Self { region, sectors, vertical, circle, shared: SharedTables::default() })
     }
 }

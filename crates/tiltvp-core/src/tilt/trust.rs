@@ -63,6 +63,11 @@ const UNLIKE: f64 = 3.0;
 /// What most likely keeps an estimate from being sure of itself.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Doubt {
+    /// The image circle is not where the calibration says.
+    Decentred {
+        /// By how much leans err if the calibration's centre is off as the circle is, in radians.
+        off_rad: f64,
+    },
     /// The pixels are coarse.
     Coarse {
         /// Pixels for each degree.
@@ -92,7 +97,7 @@ pub enum Doubt {
 
 impl Doubt {
     /// What most likely is wrong with an image, if its estimate is not sure.
-    pub(super) fn of(estimate: &TiltEstimate, pixels_per_rad: f64) -> Option<Self> {
+    pub(super) fn of(estimate: &TiltEstimate, pixels_per_rad: f64, off_rad: f64) -> Option<Self> {
         if estimate.confidence >= SURE {
             return None;
         }
@@ -100,7 +105,9 @@ impl Doubt {
         let share = estimate.inlier_pixels as f64 / estimate.edge_pixels.max(1) as f64;
         let eigenvalues = estimate.covariance_rad2.symmetric_eigenvalues();
         let ratio = (eigenvalues.max() / eigenvalues.min()).sqrt();
-        Some(if per_deg < PIXELS_PER_DEG {
+        Some(if off_rad > 0.0 {
+            Self::Decentred { off_rad }
+        } else if per_deg < PIXELS_PER_DEG {
             Self::Coarse { per_deg }
         } else if (estimate.edge_pixels as f64) < EDGES * pixels_per_rad {
             Self::FewEdges { pixels: estimate.edge_pixels }
@@ -119,6 +126,11 @@ impl Doubt {
 impl fmt::Display for Doubt {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match *self {
+            Self::Decentred { off_rad } => write!(
+                f,
+                "the image circle is beside the calibration's, whose centre may be off by what makes {:.1} degrees",
+                off_rad.to_degrees()
+            ),
             Self::Coarse { per_deg } => write!(f, "{per_deg:.1} pixels for each degree are coarse"),
             Self::FewEdges { pixels } => {
                 write!(f, "{pixels} edge pixels are few: little contrast, dark, over-exposed or blurred")

@@ -50,15 +50,14 @@ impl ImageEdges {
 
     /// The value of its parts, for pickle.
     #[classmethod]
-    #[expect(clippy::needless_pass_by_value, reason = "what the interpreter hands over is owned")]
     fn _from_parts(
         _cls: &Bound<'_, PyType>,
         camera: Py<Camera>,
         robot_from_camera: &Bound<'_, PyAny>,
         options: ([f64; 5], u32),
         mask: Option<&Bound<'_, PyAny>>,
-        slots: PyReadonlyArray1<'_, u32>,
-        gradients: [PyReadonlyArray1<'_, f32>; 2],
+        pixels: (PyReadonlyArray1<'_, u32>, [PyReadonlyArray1<'_, f32>; 2]),
+        centre_off_px: Option<[f64; 2]>,
     ) -> PyResult<Self> {
         let ([gradient_min, smoothing_px, elevation_min_rad, elevation_max_rad, margin_px], row_stride) = options;
         let options = EdgeOptions { gradient_min, smoothing_px, elevation_min_rad, elevation_max_rad, margin_px };
@@ -73,8 +72,10 @@ impl ImageEdges {
             mask: mask.transpose()?,
             row_stride,
         };
+        let (slots, gradients) = pixels;
         let [gx, gy] = gradients.each_ref().map(|g| g.to_vec());
-        let inner = core::ImageEdges::new(Arc::new(origin), &slots.to_vec()?, &gx?, &gy?);
+        let inner = core::ImageEdges::new(Arc::new(origin), &slots.to_vec()?, &gx?, &gy?)
+            .and_then(|edges| edges.with_centre_off_px(centre_off_px.map(Into::into)));
         Ok(Self { inner: inner.map_err(|error| exception(&error))?, camera })
     }
 
@@ -87,7 +88,8 @@ impl ImageEdges {
         let mask = mask.as_ref().map(|mask| convert::to_mask(py, mask)).transpose()?;
         let slots = PyArray1::from_slice(py, this.inner.slots());
         let gradients = [this.inner.gx(), this.inner.gy()].map(|g| PyArray1::from_slice(py, g));
-        let parts = (this.camera.clone_ref(py), rotation, options, mask, slots, gradients);
+        let off = this.inner.centre_off_px().map(<[f64; 2]>::from);
+        let parts = (this.camera.clone_ref(py), rotation, options, mask, (slots, gradients), off);
         (slf.get_type().getattr("_from_parts")?, parts).into_pyobject(py)
     }
 }

@@ -24,6 +24,7 @@ use crate::robust::Stop;
 use crate::segments::{FinderScratch, SegmentDetectorOptions, SegmentFinder, SegmentOptions, Segments};
 use crate::tilt::estimate::{ALTERNATIVES, Alternative, EdgeElement, TiltEstimate};
 use crate::tilt::fit::{Fit, Seen};
+use crate::tilt::image_circle::CentreOff;
 use crate::tilt::scratch::{Scratch, Work};
 use crate::tilt::tables::PixelTables;
 use crate::tilt::trust::Trust;
@@ -161,6 +162,7 @@ impl SegmentFit {
         &self,
         image: &ImageView<'_>,
         tables: &PixelTables,
+        centre_off: Option<CentreOff<'_>>,
         scratch: &mut Scratch,
     ) -> TiltEstimate {
         let region = &tables.region;
@@ -190,6 +192,7 @@ impl SegmentFit {
             pixels_per_rad: region.pixels_per_rad(),
             tilt_max_rad: self.tilt_max_rad,
             trust,
+            centre_off,
         };
         fit.into_estimate(&seen, &mut pixel_work.trusted)
     }
