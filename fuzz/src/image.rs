@@ -1,8 +1,10 @@
 //! Images of any size, stride and content: refused, or looked at alike wherever their rows lie.
 
 use std::cell::RefCell;
+use std::collections::HashMap;
 
 use nalgebra::{Matrix3, Vector3};
+use tiltvp_core::camera::Camera;
 use tiltvp_core::corner::{CornerDetector, CornerFeature, CornerScratch, DetectorOptions};
 use tiltvp_core::filter::positive_semidefinite;
 use tiltvp_core::geometry::Tilt;
@@ -18,14 +20,18 @@ pub fn image(data: &[u8]) {
     let mut bytes = Bytes::new(data);
     views(&mut bytes);
     LOOKERS.with_borrow_mut(|lookers| {
-        let which = usize::from(bytes.word()) % lookers.len();
-        let (camera, looker) = &mut lookers[which];
-        let camera = &SMALL[*camera];
+        let which = usize::from(bytes.word()) % (SMALL.len() * KINDS);
+        let camera = &SMALL[which / KINDS];
+        let Some(looker) = lookers.entry(which).or_insert_with(|| looker(camera, which % KINDS)) else { return };
         match looker {
             Looker::Tilt(estimator, scratch) => {
                 let picture = Picture::of(camera, 1, &mut bytes);
                 let found = estimator.estimate(&picture.view(), scratch).expect("an image of the camera");
                 estimate(&found, estimator.region_pixels());
+                // As long again.
+                if !bytes.byte().is_multiple_of(8) {
+                    return;
+                }
                 let packed = picture.packed();
                 let (_, width, height, _) = picture.bytes();
                 let packed = ImageView::new(&packed, width, height, width).expect("packed rows");
@@ -62,43 +68,41 @@ enum Looker {
     Level(Box<Leveller>),
 }
 
+/// How many look at the pictures of one camera.
+const KINDS: usize = METHODS.len() + LineMethod::NAMES.len() + DETECTORS.len() + 1;
+
+/// Methods of corner detectors.
+const DETECTORS: [&str; 3] = ["coloured", "general", "paper"];
+
 thread_local! {
-    /// All there are, each with the place of its camera.
-    static LOOKERS: RefCell<Vec<(usize, Looker)>> = RefCell::new(lookers());
+    /// Those that have been asked for, which are kept: each takes a hundred times what a picture takes.
+    static LOOKERS: RefCell<HashMap<usize, Option<Looker>>> = RefCell::default();
 }
 
-fn lookers() -> Vec<(usize, Looker)> {
-    let mut all = Vec::new();
-    for (place, camera) in SMALL.iter().enumerate() {
-        let upright = Matrix3::identity();
-        let mut keep = |looker| all.push((place, looker));
-        for method in METHODS {
-            let options = TiltOptions::for_method(method).expect("one of the methods");
-            // Not every camera sees what a method looks at.
-            if let Ok(estimator) = TiltEstimator::new(camera.clone(), upright, options) {
-                let scratch = estimator.scratch();
-                keep(Looker::Tilt(estimator.into(), scratch));
-            }
-        }
-        for method in LineMethod::NAMES {
-            let options = LineOptions::for_method(method).expect("one of the methods");
-            if let Ok(extractor) = LineExtractor::new(camera.clone(), upright, options) {
-                let scratch = extractor.scratch();
-                keep(Looker::Lines(extractor.into(), scratch));
-            }
-        }
-        for method in ["coloured", "general", "paper"] {
-            let options = DetectorOptions::for_method(method).expect("one of the methods");
-            if let Ok(detector) = CornerDetector::new(camera.clone(), options, None) {
-                let scratch = detector.scratch();
-                keep(Looker::Corners(detector.into(), scratch));
-            }
-        }
-        if let Ok(leveller) = Leveller::new(camera.clone(), &upright, camera.clone(), &upright) {
-            keep(Looker::Level(leveller.into()));
-        }
+/// One of [`KINDS`]; none where the camera does not see what a method looks at.
+fn looker(camera: &Camera, kind: usize) -> Option<Looker> {
+    let (camera, upright) = (camera.clone(), Matrix3::identity());
+    if let Some(method) = METHODS.get(kind) {
+        let options = TiltOptions::for_method(method).expect("one of the methods");
+        let estimator = TiltEstimator::new(camera, upright, options).ok()?;
+        let scratch = estimator.scratch();
+        return Some(Looker::Tilt(estimator.into(), scratch));
     }
-    all
+    let kind = kind - METHODS.len();
+    if let Some(method) = LineMethod::NAMES.get(kind) {
+        let options = LineOptions::for_method(method).expect("one of the methods");
+        let extractor = LineExtractor::new(camera, upright, options).ok()?;
+        let scratch = extractor.scratch();
+        return Some(Looker::Lines(extractor.into(), scratch));
+    }
+    let kind = kind - LineMethod::NAMES.len();
+    if let Some(method) = DETECTORS.get(kind) {
+        let options = DetectorOptions::for_method(method).expect("one of the methods");
+        let detector = CornerDetector::new(camera, options, None).ok()?;
+        let scratch = detector.scratch();
+        return Some(Looker::Corners(detector.into(), scratch));
+    }
+    Leveller::new(camera.clone(), &upright, camera, &upright).ok().map(|leveller| Looker::Level(leveller.into()))
 }
 
 /// Any bytes as an image of any size.

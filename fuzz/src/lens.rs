@@ -23,9 +23,13 @@ pub fn lens(data: &[u8]) {
         }
     };
     assert!(camera.max_theta_rad() > 0.0 && camera.max_theta_rad() <= std::f64::consts::PI, "{camera:?}");
-    let named: Vec<_> = camera.model().parameters().into_iter().map(|(name, value)| (name.to_owned(), value)).collect();
-    let again = Model::from_parameters(camera.model().name(), camera.width(), camera.height(), &named);
-    assert_eq!(again.as_ref(), Ok(camera.model()));
+    // As long again as the lens took to be made.
+    if bytes.byte().is_multiple_of(8) {
+        let parameters = camera.model().parameters().into_iter();
+        let named: Vec<_> = parameters.map(|(name, value)| (name.to_owned(), value)).collect();
+        let again = Model::from_parameters(camera.model().name(), camera.width(), camera.height(), &named);
+        assert_eq!(again.as_ref(), Ok(camera.model()));
+    }
     for _ in 0..8 {
         let pixel = Vector2::new(
             bytes.mostly(-0.5, f64::from(camera.width()) - 0.5),

@@ -1,4 +1,19 @@
 //! What attacks the core: each function takes any bytes, and panics where an answer is neither right nor refused.
+//!
+//! | target | what is attacked | what is checked |
+//! |---|---|---|
+//! | [`lens`] | parameters, sizes and limits of every lens; pixels and bearings of any numbers | refusals; unit rays; round trips; finite Jacobians; parameters are told as they were taken |
+//! | [`image()`] | views of any size, stride and length; any picture before every method of tilt, lines, corners and levelling, by default options | nothing beyond rows is read; answers agree with themselves; strides do not tell |
+//! | [`segments`] | any picture before detectors of straight edges of any options | arcs of unit bearings; memory that has served does not tell |
+//! | [`corner`] | rays, angles, priors and pairs of cameras of any numbers | rotations, probabilities and covariances are such |
+//! | [`point`] | bearings, covariances and cameras of any numbers | points are finite and have covariances |
+//! | [`options`] | values and names of the options of every class, with tables made of some | refusals by name; options are told as they were taken |
+//! | [`state`] | states of tilt filters and line trackers of any numbers; then steps | refusals; a state that was taken can be taken again |
+//! | [`calibrator`] | states of calibrators of any bytes; then steps | refusals; a refused step changes nothing |
+//!
+//! Cameras are small and what is costly is made once and kept, so that an execution takes a fraction of a millisecond: coverage guides by
+//! numbers of executions. Checks that take as long as what they check are left to some of the executions, which a byte chooses.
+//! What is kept has served other inputs: where an input alone does not show a finding again, the folder of all does.
 
 mod bytes;
 mod corner;
@@ -14,4 +29,4 @@ pub use image::image;
 pub use lens::lens;
 pub use options::options;
 pub use segments::segments;
-pub use state::state;
+pub use state::{calibrator, state};

@@ -8,9 +8,13 @@ use tiltvp_core::image::ImageView;
 use crate::bytes::Bytes;
 use crate::lens::ZOO;
 
-/// The zoo over images of a few thousand pixels.
+/// Longest side of a small camera's image, pixels: of those of 24 some have no region left within their margins, and above the time of an
+/// execution grows with the pixels.
+const SIDE_PX: f64 = 32.0;
+
+/// The zoo over images of some hundred pixels.
 pub(crate) static SMALL: LazyLock<Vec<Camera>> = LazyLock::new(|| {
-    let small = |camera: &Camera| camera.scaled(40.0 / f64::from(camera.width().max(camera.height()))).ok();
+    let small = |camera: &Camera| camera.scaled(SIDE_PX / f64::from(camera.width().max(camera.height()))).ok();
     ZOO.iter().filter_map(small).collect()
 });
 
@@ -28,46 +32,43 @@ impl Picture {
         let (width, height) = (camera.width() as usize * channels, camera.height() as usize);
         let stride = width + bytes.below(70);
         let mut data = vec![bytes.byte(); stride * (height - 1) + width];
-        for _ in 0..=bytes.byte() % 8 {
+        for _ in 0..=bytes.byte() % 4 {
             Self::draw(&mut data, stride, channels, bytes);
         }
         Self { data, width, height, stride }
     }
 
-    /// A half plane, stripes, a box, noise, or single bytes.
+    /// A half plane, stripes, a box, a ramp, noise, or single bytes; of coloured pictures the first four in one colour.
     fn draw(data: &mut [u8], stride: usize, channels: usize, bytes: &mut Bytes<'_>) {
         let (kind, level) = (bytes.byte() % 6, bytes.byte());
-        let (a, b, c) = (bytes.byte() as i8, bytes.byte() as i8, bytes.word() as i16);
+        let (a, b, c) = (i32::from(bytes.byte() as i8), i32::from(bytes.byte() as i8), i32::from(bytes.word() as i16));
         let (u, v, w, h) = (bytes.byte(), bytes.byte(), bytes.byte(), bytes.byte());
-        let color = bytes.below(channels);
+        let (first, step) = if kind < 4 { (bytes.below(channels), channels) } else { (0, 1) };
         let period = i32::from(w) + 1;
         let mut state = u64::from(bytes.word()) | 1;
-        for (k, pixel) in data.iter_mut().enumerate() {
-            let (x, y) = ((k % stride / channels) as i32, (k / stride) as i32);
-            let across = i32::from(a) * x + i32::from(b) * y + i32::from(c);
-            if kind < 4 && channels > 1 && k % stride % channels != color {
-                continue;
-            }
-            match kind {
-                0 if across >= 0 => *pixel = level,
-                1 if across.rem_euclid(2 * period) >= period => *pixel = level,
-                2 if (i32::from(u)..i32::from(u) + i32::from(w)).contains(&x)
-                    && (i32::from(v)..i32::from(v) + i32::from(h)).contains(&y) =>
-                {
-                    *pixel = level;
-                }
-                3 => *pixel = pixel.wrapping_add((across / 8) as u8),
-                4 => {
-                    // Marsaglia 2003.
-                    state ^= state << 13;
-                    state ^= state >> 7;
-                    state ^= state << 17;
-                    if (state >> 32) as u8 <= level {
-                        *pixel = pixel.wrapping_add(state as u8 & w);
+        for (y, row) in data.chunks_mut(stride).enumerate() {
+            let mut across = b * y as i32 + c;
+            let in_rows = (usize::from(v)..usize::from(v) + usize::from(h)).contains(&y);
+            for (x, pixel) in row.iter_mut().skip(first).step_by(step).enumerate() {
+                match kind {
+                    0 if across >= 0 => *pixel = level,
+                    1 if across.rem_euclid(2 * period) >= period => *pixel = level,
+                    2 if in_rows && (usize::from(u)..usize::from(u) + usize::from(w)).contains(&x) => *pixel = level,
+                    3 => *pixel = pixel.wrapping_add((across / 8) as u8),
+                    4 => {
+                        // Marsaglia 2003.
+                        state ^= state << 13;
+                        state ^= state >> 7;
+                        state ^= state << 17;
+                        if (state >> 32) as u8 <= level {
+                            *pixel = pixel.wrapping_add(state as u8 & w);
+                        }
                     }
+                    5 if bytes.is_empty() => return,
+                    5 => *pixel = bytes.byte(),
+                    _ => {}
                 }
-                5 => *pixel = if bytes.is_empty() { *pixel } else { bytes.byte() },
-                _ => {}
+                across += a;
             }
         }
     }

@@ -12,14 +12,10 @@ use tiltvp_core::tilt::{MountingOptions, TiltFilter, TiltFilterOptions};
 
 use crate::bytes::Bytes;
 
-/// One of the three.
+/// A tilt filter or a line tracker.
 pub fn state(data: &[u8]) {
     let mut bytes = Bytes::new(data);
-    match bytes.byte() % 8 {
-        0..4 => calibrator(&mut bytes),
-        4..7 => filter(&mut bytes),
-        _ => tracker(&mut bytes),
-    }
+    if bytes.flag() { filter(&mut bytes) } else { tracker(&mut bytes) }
 }
 
 /// What calibrators keep after some steps, as bytes.
@@ -41,8 +37,9 @@ static KEPT: LazyLock<Vec<Vec<u8>>> = LazyLock::new(|| {
     kept
 });
 
-/// The bytes of a calibrator, of which some are others; then steps.
-fn calibrator(bytes: &mut Bytes<'_>) {
+/// The bytes of a calibrator, of which some are others; then steps, each of which takes a hundred times what one of the others takes.
+pub fn calibrator(data: &[u8]) {
+    let mut bytes = Bytes::new(data);
     let mut kept = KEPT[bytes.below(KEPT.len())].clone();
     for _ in 0..bytes.byte() % 5 {
         let place = usize::from(bytes.word()) % kept.len();

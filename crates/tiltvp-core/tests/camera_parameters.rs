@@ -104,3 +104,15 @@ fn unknown_names_are_answered_with_near_ones() {
     let text = message("pinhole", &named(&[("fx", -1.0), ("fy", 1.0), ("cx", 1.0), ("cy", 1.0)]));
     assert!(text.contains("fx = -1, expected a positive finite number"), "{text}");
 }
+
+/// Numbers of a polynomial so far apart that no float holds it within its own disc: the tables of its inverse had none either.
+#[test]
+fn a_polynomial_beyond_the_floats_is_refused() {
+    let mut polynomial = vec![-9.947_203_784_237_43e-22, -1_706.172_274_357_213_6];
+    polynomial.extend([0.0; 7]);
+    polynomial.extend([0.999_176_012_817_578_4, -8.941_715_664_017_115e-108, 2.130_274_465e-314]);
+    let mut parameters = named(&[("cx", 456.3), ("cy", 382.8), ("d", -6.25e-4), ("e", 4.31e-4), ("c", 1.000_65)]);
+    parameters.push(("polynomial".to_owned(), Parameter::List(polynomial)));
+    let refusal = message("ocam", &parameters);
+    assert!(refusal.contains("polynomial") && refusal.contains("rays that leave the axis"), "{refusal}");
+}

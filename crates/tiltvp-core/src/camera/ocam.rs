@@ -106,9 +106,9 @@ impl Ocam {
         let grid = PixelGrid::affine(NAME, Matrix2::new(1.0, e, d, c), centre_px)?;
         let sign = -a0.signum();
         let depth: Vec<f64> = polynomial.iter().map(|a| -sign * a).collect();
-        let radius = disc(&depth).ok_or_else(|| {
-            Error::camera(NAME, "polynomial", format!("{polynomial:?}"), "rays that leave the axis as rho grows")
-        })?;
+        let refused =
+            || Error::camera(NAME, "polynomial", format!("{polynomial:?}"), "rays that leave the axis as rho grows");
+        let radius = disc(&depth).ok_or_else(refused)?;
         let max_theta = radius.atan2(evaluate(&depth, radius).0);
         let table = Table::new(max_theta, |theta| {
             let (t, z) = theta.sin_cos();
@@ -116,6 +116,10 @@ impl Ocam {
             let (z, slope) = evaluate(&depth, rho);
             (rho, (rho * rho + z * z) / (z - rho * slope))
         });
+        // Where the polynomial is beyond the floats within its own disc.
+        if !table.is_finite() {
+            return Err(refused());
+        }
         Ok(Self { grid, depth, sign, inverse_polynomial: inverse_polynomial.to_vec(), max_theta, table })
     }
 

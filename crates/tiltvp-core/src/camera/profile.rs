@@ -45,15 +45,21 @@ impl Inverse {
     ) -> Result<Self> {
         let max_theta = first_fall(slope, PI).unwrap_or(PI);
         let max_radius = profile(max_theta).0;
-        if max_theta <= NARROWEST_RAD || !max_radius.is_finite() {
+        let refused = || {
             let expected = "coefficients under which the radius grows with the angle at first";
-            return Err(Error::camera(model, "k1 .. k4", format!("{coefficients:?}"), expected));
+            Error::camera(model, "k1 .. k4", format!("{coefficients:?}"), expected)
+        };
+        if max_theta <= NARROWEST_RAD || !max_radius.is_finite() {
+            return Err(refused());
         }
         let (_, scale) = profile(0.0);
         let table = Table::new(max_radius, |radius| {
             let theta = root(&profile, 0.0, max_theta, radius / scale, radius);
             (theta, 1.0 / profile(theta).1)
         });
+        if !table.is_finite() {
+            return Err(refused());
+        }
         Ok(Self { max_theta, max_radius, table })
     }
 }

@@ -24,6 +24,11 @@ impl Table {
         Self { cells_per_unit: CELLS as f64 / end, knots }
     }
 
+    /// Whether every value and slope is a number: of a function that rounding has left without, nothing can be told.
+    pub(super) fn is_finite(&self) -> bool {
+        self.knots.iter().flatten().all(|x| x.is_finite())
+    }
+
     /// The value at the end.
     pub(super) fn last(&self) -> f64 {
         self.knots.last().map_or(0.0, |knot| knot[0])
