@@ -27,6 +27,7 @@ from tiltvp.lens_check import LensCheck, check_lens
 from tiltvp.levelling import Leveller, Unwrapper, level
 from tiltvp.overlays.edges import draw_edges
 from tiltvp.overlays.segments import draw_segments
+from tiltvp.rim import RimCircle, rim_circle
 from tiltvp.segments import SegmentDetector, Segments
 from tiltvp.selfcalib import (
     CALIBRATION_METHODS,
@@ -90,6 +91,7 @@ __all__ = [
     "MountingTilt",
     "PosteriorCorrection",
     "PriorOfTilt",
+    "RimCircle",
     "Robot",
     "RobotSetup",
     "SegmentDetector",
@@ -121,6 +123,7 @@ __all__ = [
     "mounting_tilt",
     "normal_from_alpha_beta",
     "read_image",
+    "rim_circle",
     "simd_level",
     "streams",
     "surround_mask",

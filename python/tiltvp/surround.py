@@ -9,6 +9,7 @@ import numpy as np
 
 from tiltvp.errors import InvalidInputError
 from tiltvp.images import gray_from
+from tiltvp.rim import circle_through
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
@@ -81,9 +82,7 @@ def _circle(rim: NDArray[np.float64]) -> tuple[NDArray[np.float64], float] | Non
     """Centre and radius of the circle through points (N, 2), if they lie on one and on half of it at least."""
     if len(rim) < 12:
         return None
-    rows = np.column_stack([2.0 * rim, np.ones(len(rim))])
-    found = np.linalg.lstsq(rows, np.sum(rim**2, axis=1), rcond=None)[0]
-    centre, radius = found[:2], float(np.sqrt(found[2] + found[:2] @ found[:2]))
+    centre, radius = circle_through(rim)
     away = rim - centre
     sectors = np.unique(np.floor(np.arctan2(away[:, 1], away[:, 0]) * 6.0 / np.pi))
     strays = float(np.sqrt(np.mean((np.linalg.norm(away, axis=1) - radius) ** 2)))

@@ -77,3 +77,45 @@ def test_a_chessboard_that_is_held_up_is_not_taken_for_a_lean(data: Path, name: 
     tilt = LineOptions(tilt="refined", elevation_max_deg=30.0).tilts(camera)
     with nullcontext() if believed else pytest.raises(UnknownLeanError):
         assert tilt(gray_from(image))
+
+
+RIMS = {
+    "tasptz_py-omnicalib": (("KaidanOmni1.jpg", "KaidanOmni11.jpg", "KaidanOmni13.jpg"), 2),
+    "riyueshi_ocamcalib-plus": (tuple(f"VMRImage{k}.jpg" for k in (0, 2, 4, 6, 8)), 5),
+    "xmba15_omnidirectional_camera": (tuple(f"img_para_00{k}.pgm" for k in (1, 4, 8)), 3),
+    "ShuyunYuan_OmnidirectionalCamera": (("test2.jpg", "test3.jpg"), 2),
+}
+"""Photographs by one mirror each, and in how many of them its rim is found."""
+
+
+@pytest.mark.parametrize("folder", sorted(RIMS))
+def test_the_rim_of_a_mirror_is_the_same_in_all_its_photographs(data: Path, folder: str) -> None:
+    names, count = RIMS[folder]
+    circles = [tiltvp.rim_circle(tiltvp.read_image(data / "omni" / folder / name)) for name in names]
+    found = np.array([[*circle.centre_px, circle.radius_px] for circle in circles if circle is not None])
+    print(folder, found.round(1).tolist())
+    assert len(found) == count
+    assert np.ptp(found, axis=0).max() < 1.2
+
+
+@pytest.mark.parametrize("folder", ["arnoRalli_python_camera_library", "valeoai_WoodScape"])
+def test_where_no_rim_is_seen_none_is_found(data: Path, folder: str) -> None:
+    paths = [path for path in (data / "omni").glob("*/*.jpg") if path.parent.name.endswith(folder)]
+    assert paths
+    assert [tiltvp.rim_circle(tiltvp.read_image(path)) for path in paths] == [None] * len(paths)
+
+
+def test_lines_follow_the_rim_of_a_mirror_that_shakes(data: Path) -> None:
+    """By the radius from one photograph the centre is followed in another one, wherever that is shifted to."""
+    folder = data / "omni/tasptz_py-omnicalib"
+    camera = tiltvp.Camera.load(folder / "calibration.yml", image_size=(640, 480))
+    image = tiltvp.read_image(folder / "KaidanOmni13.jpg")
+    circle = tiltvp.rim_circle(tiltvp.read_image(folder / "KaidanOmni11.jpg"))
+    assert circle is not None
+    extractor = tl.LineExtractor(camera, method="radial", rim_radius_px=circle.radius_px)
+    for du, dv in ((0.0, 0.0), (5.0, -3.0), (-2.5, 4.5)):
+        moved = cv2.warpAffine(gray_from(image), np.array([[1.0, 0.0, du], [0.0, 1.0, dv]]), image.shape[1::-1])
+        centre = extractor(np.asarray(moved)).center_px
+        assert centre is not None
+        print(du, dv, centre)
+        assert math.dist(centre, (circle.centre_px[0] + du, circle.centre_px[1] + dv)) < 1.0

@@ -1,4 +1,4 @@
-"""`tiltvp camera new`, `crop` and `scale`: cameras of ideal lenses, of parts of images and of resized images."""
+"""`tiltvp camera rim`, `new`, `crop` and `scale`: image circles, ideal lenses, parts of images, resized images."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from cyclopts import Parameter, validators
 
 from tiltvp.cli.camera import FileOptions, app
 from tiltvp.cli.options import Switch, image_size_from
-from tiltvp.cli.terminal import say
-from tiltvp.errors import InvalidInputError
+from tiltvp.cli.terminal import complain, named, new_table, say, show
+from tiltvp.errors import InvalidInputError, TiltvpError
 from tiltvp.files import check_output
 
 if TYPE_CHECKING:
@@ -22,6 +22,39 @@ __all__ = ["app"]
 
 _READING = FileOptions()
 _ABOVE_0 = Parameter(validator=validators.Number(gt=0))
+
+
+@app.command
+def rim(images: list[Path], /) -> int:
+    """Find the circle of a mirror's or a lens' rim in images, for `camera new`, and for `lines --rim-radius-px`.
+
+    The exit code is 1 if an image shows none well enough, or cannot be read.
+
+    Parameters
+    ----------
+    images
+        Images of a camera that stands still, or single ones.
+    """
+    from tiltvp.images import read_image
+    from tiltvp.rim import rim_circle
+
+    table = new_table(None, ("file", "centre u px", "centre v px", "radius px", "covered %"), ("file",))
+    well = True
+    for file in images:
+        try:
+            found = rim_circle(read_image(file))
+        except TiltvpError as error:
+            complain(named(file, str(error)))
+            well = False
+            continue
+        if found is None:
+            complain(f"{file}: no circle gets darker outwards all round, as a rim does")
+            well = False
+            continue
+        u, v = found.centre_px
+        table.add_row(file.name, f"{u:.1f}", f"{v:.1f}", f"{found.radius_px:.1f}", f"{100.0 * found.covered:.0f}")
+    show(table)
+    return 0 if well else 1
 
 
 @app.command
