@@ -13,9 +13,13 @@ from tiltvp.cli.tables import check_ending, write_frame
 from tiltvp.cli.terminal import progress_bar
 from tiltvp.errors import InvalidInputError
 
+_LINES = (1, 2, 5, 10, 20)
+"""How many vertical lines are seen, for how soon a calibration is right."""
+
 
 def calibration(odometry: Path | None = None, /, *, runs: int = 1000, only: str = "", out: Path | None = None) -> None:
-    """Self-calibration on simulated drives, both filters, against the Cramer-Rao bound; and on real logs.
+    """Self-calibration on simulated drives, both filters, against the Cramer-Rao bound; by how many lines are seen, how
+    soon it is right; and on real logs.
 
     Parameters
     ----------
@@ -25,14 +29,21 @@ def calibration(odometry: Path | None = None, /, *, runs: int = 1000, only: str 
         Simulated drives of each trajectory.
     only
         Only the parts whose names hold this: "simulated paper default", "simulated paper paper", "simulated alternating
-        default", "simulated alternating paper" (trajectory and method), "victoria_park", "brenner_lego",
-        "censi lstraight", "censi l90", "censi lmov".
+        default", "simulated alternating paper" (trajectory and method), "lines paper", "lines alternating",
+        "victoria_park", "brenner_lego", "censi lstraight", "censi l90", "censi lmov".
     out
         Also write the table of all simulated runs as Parquet.
     """
     import polars as pl
 
-    from tiltvp.lab.evaluation.calibration import LOG_PARTS, LOGS, real_logs, simulated_drives, summarise_drives
+    from tiltvp.lab.evaluation.calibration import (
+        LOG_PARTS,
+        LOGS,
+        convergence,
+        real_logs,
+        simulated_drives,
+        summarise_drives,
+    )
     from tiltvp.selfcalib import consistency_band
 
     drives = [
@@ -41,8 +52,9 @@ def calibration(odometry: Path | None = None, /, *, runs: int = 1000, only: str 
         for method in ("default", "paper")
         if only in f"simulated {kind} {method}"
     ]
+    counted = [kind for kind in ("paper", "alternating") if only in f"lines {kind}"]
     logs = [name for name in LOGS if only in name] if odometry is not None else []
-    if not drives and not logs:
+    if not drives and not counted and not logs:
         raise InvalidInputError(f'--only {only}: no part of that name, expected for example "simulated" or "victoria"')
     parts, summaries = [], []
     if drives:
@@ -56,6 +68,12 @@ def calibration(odometry: Path | None = None, /, *, runs: int = 1000, only: str 
         low, high = consistency_band(0.95, 3, runs)
         title = f"Simulated drives; NEES of a consistent filter: {low:.3f} to {high:.3f}"
         show_frame(title, pl.DataFrame(summaries), ["method"])
+    if counted:
+        # A tenth of the runs tells it well enough: differences are of several times.
+        few = max(1, runs // 10)
+        with progress_bar(len(counted) * len(_LINES) * few, "drives") as bar:
+            rows = [convergence(kind, lines, few, advance=bar.advance) for kind in counted for lines in _LINES]
+        show_frame("How far to drive until errors stay below 10 mm and 0.5 degrees", pl.DataFrame(rows), ["trajectory"])
     if odometry is not None and logs:
         with progress_bar(LOG_PARTS * len(logs), "logs") as bar:
             table = real_logs(odometry, only=only, advance=bar.advance)
