@@ -198,6 +198,13 @@ sanitize: setup nightly
         TILTVP_BUILT_FOR=$level RUSTFLAGS="-Zsanitizer=address" tests --package tiltvp-kernels --package tiltvp-core
     done
 
+# What is found is in out/mutants.out; `--in-place` changes the checkout and puts it back.
+# Mutation testing of the core's tests, by cargo-mutants: tilt, selfcalib and corner; one in 64 mutants, or other `--shard`s.
+mutants shard="0/64" *arguments:
+    test -x target/tools/bin/cargo-mutants || cargo install --quiet --locked --root target/tools cargo-mutants
+    PROPTEST_RNG_SEED=20171028 PROPTEST_CASES=32 CARGO_INCREMENTAL=1 target/tools/bin/cargo-mutants mutants \
+        --in-place --baseline skip --timeout 120 --sharding round-robin --shard {{shard}} --output out {{arguments}}
+
 # The tests on real data, in the folder that TILTVP_DATA names.
 test-real *arguments: setup
     {{bin}}/pytest --quiet --numprocesses 2 --dist worksteal tests/real_data {{arguments}}

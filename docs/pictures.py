@@ -16,9 +16,9 @@ import tiltvp.cli
 from tiltvp.corner import CornerPoseEstimator
 from tiltvp.lab.datasets.driving import drive_room
 from tiltvp.lab.datasets.recording import WHEEL_RADIUS_M, RecordedDrive
-from tiltvp.lines import LineExtractor
+from tiltvp.lines import LineExtractor, match_wide
 from tiltvp.overlays.corners import draw_box, draw_corners
-from tiltvp.overlays.lines import draw_lines
+from tiltvp.overlays.lines import draw_lines, line_pixels, track_colour
 from tiltvp.overlays.offsets import error_chart
 from tiltvp.overlays.tilt import draw_words, tilt_overlay
 from tiltvp.streams import Wheels, frame_motions, open_frames
@@ -45,6 +45,7 @@ def main(names: Sequence[str]) -> None:
         "datasets": lambda: known_leans(room, pose),
         "recordings": recording,
         "lines": found_lines,
+        "wide": matched_wide,
         "many": many_images,
     }
     for name in names or makers:
@@ -126,6 +127,33 @@ def found_lines() -> None:
         "its vertical lines": draw_lines(image, FISHEYE, lines),
     }
     write("c.jpg", [draw_words(picture, name) for name, picture in pictures.items()])
+
+
+def matched_wide() -> None:
+    """The lines that two images a metre and a half apart have in common, one colour and number for each."""
+    room = drive_room("corridor", 8301)
+    camera = FISHEYE.scaled(4.0 / 3.0)
+    places = room.free_poses(12, 5)[:, :2]
+    apart = np.linalg.norm(places[:, None] - places, axis=-1)
+    first, second = np.unravel_index(np.argmin(np.abs(apart - 1.5)), apart.shape)
+    extractor = LineExtractor(camera, descriptor_kind="profile")
+    images = [room.render(camera, pose=(*places[k], 0.0), samples=2).bgr for k in (first, second)]
+    lines = [extractor(image) for image in images]
+    described = [extractor.describe(image, seen) for image, seen in zip(images, lines, strict=True)]
+    pairs, confidences = match_wide(lines[0], described[0], lines[1], described[1])
+    words = f"{len(pairs)} lines in common, confidence {confidences.min():.2f} or more"
+    pictures = []
+    for side, (image, seen) in enumerate(zip(images, lines, strict=True)):
+        picture = np.array(image // 2)
+        pixels = line_pixels(camera, seen)
+        for name, pair in enumerate(pairs):
+            curve = pixels[pair[side]][np.isfinite(pixels[pair[side]]).all(axis=1)]
+            points = np.rint(curve * 16.0).astype(np.int32).reshape(-1, 1, 2)
+            cv2.polylines(picture, [points], False, track_colour(name), 2, cv2.LINE_AA, shift=4)
+            at = (round(float(curve[-1, 0])), round(float(curve[-1, 1])))
+            cv2.putText(picture, str(name), at, cv2.FONT_HERSHEY_SIMPLEX, 0.5, track_colour(name), 1, cv2.LINE_AA)
+        pictures.append(draw_words(picture, words if side == 0 else f"{apart[first, second]:.1f} m from there"))
+    write("lines-wide.jpg", pictures)
 
 
 def many_images() -> None:
