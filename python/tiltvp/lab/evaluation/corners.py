@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import CancelledError
 from contextlib import closing
 from dataclasses import dataclass, field
@@ -26,7 +26,16 @@ if TYPE_CHECKING:
 
     Pair = tuple[NDArray[np.uint8], NDArray[np.uint8]]
 
-__all__ = ["CORNER_SCENES", "CornerExperiment", "CornerScene", "down_in", "measure_corners", "summarise_corners"]
+__all__ = [
+    "CORNER_SCENES",
+    "CornerExperiment",
+    "CornerScene",
+    "down_in",
+    "fresh_rooms",
+    "measure_corners",
+    "summarise_corners",
+    "summarise_rooms",
+]
 
 _FLIP_DEG: Final = 20.0
 """An attitude that is farther off is another interpretation, not a noisy one."""
@@ -36,6 +45,9 @@ _NEES_MAX: Final = 22.5
 
 _OFF_SIGMAS: Final = 3.3
 """That of a normal deviate: a vertex farther from every surface is wrong and sure, listed or not."""
+
+_FOUND_IN: Final = 0.95
+"""The share of a room's frames with a pose above which its corners count as found."""
 
 _ONE_CAMERA: Final = "coloured, one camera, height known"
 """The left camera alone, each frame for itself, with its height above the vertex as somebody measures it."""
@@ -117,6 +129,12 @@ CORNER_SCENES: tuple[CornerScene, ...] = (
 """The paper's cuboid: with and without a word on its side, in full HD, blurred, of other angles; corners of rooms."""
 
 
+def fresh_rooms(count: int) -> tuple[CornerScene, ...]:
+    """So many rooms of each kind that `CORNER_SCENES` has, in turn, all with as many frames as the experiment."""
+    kinds = [scene.kind for scene in CORNER_SCENES if scene.kind != "laboratory"]
+    return tuple(CornerScene(f"{kind} {number}", kind=kind) for number in range(1, count + 1) for kind in kinds)
+
+
 @dataclass(frozen=True)
 class CornerExperiment:
     """`frames` of the first scene, and their shares of the others; equal experiments give equal tables, times aside."""
@@ -191,6 +209,35 @@ def summarise_corners(table: pl.DataFrame) -> pl.DataFrame:
         pl.col("distance_m").min().alias("from m"),
         pl.col("distance_m").max().alias("to m"),
         pl.col("ms").median().alias("ms"),
+    )
+
+
+def summarise_rooms(table: pl.DataFrame, rooms: Sequence[CornerScene]) -> pl.DataFrame:
+    """How many rooms of each kind, and of all, have a pose in nearly all frames, and what those poses are worth.
+
+    NEES is of frames with a listed truth. Medians are of frames with a pose: of attitudes, and of places of listed
+    corners, those of other corners being beside their own median alone.
+    """
+    kinds = {room.name: room.kind for room in rooms}
+    table = table.filter(pl.col("scene").is_in(list(kinds)))
+    by_kind = table.with_columns(kind=pl.col("scene").replace_strict(kinds))
+    listed = pl.col("corner") >= 0
+    return (
+        pl.concat([by_kind, table.with_columns(kind=pl.lit("all"))])
+        .with_columns(good=pl.col("found").mean().over("kind", "scene") >= _FOUND_IN)
+        .group_by("kind", maintain_order=True)
+        .agg(
+            pl.col("scene").n_unique().alias("rooms"),
+            pl.col("scene").filter("good").n_unique().alias(f"rooms with >= {_FOUND_IN:.0%} found"),
+            pl.len().alias("frames"),
+            pl.col("found").mean().mul(100).alias("% found"),
+            pl.col("nees").count().alias("listed"),
+            pl.col("nees").gt(_NEES_MAX).mean().mul(100).alias("% NEES > 22.5"),
+            pl.col("surface").gt(_OFF_SIGMAS).mean().mul(100).alias("% off surface"),
+            (pl.col("attitude_deg") > _FLIP_DEG).sum().alias("flips"),
+            pl.col("attitude_deg").median().alias("median deg"),
+            pl.col("position_m").filter(listed).median().mul(1000).alias("listed median mm"),
+        )
     )
 
 
