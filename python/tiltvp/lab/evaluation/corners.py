@@ -17,7 +17,7 @@ import polars as pl
 from tiltvp.corner_images import CornerEstimate, CornerPoseEstimator
 from tiltvp.errors import InvalidInputError
 from tiltvp.lab.datasets.new import in_order
-from tiltvp.lab.evaluation.corner_inertial import compare_inertial
+from tiltvp.lab.evaluation.corner_inertial import IMAGE, InertialLooks, compare_inertial
 from tiltvp.lab.evaluation.corner_rooms import own_places, surface_off, truth_near
 from tiltvp.synth import Laboratory, Room, StereoSequence, zed_cameras
 
@@ -101,6 +101,11 @@ class CornerScene:
         """Those of `CornerDetector` for both cameras: ours, and before the cuboid the published one beside it."""
         return ("coloured", "paper") if self.kind == "laboratory" else ("general",)
 
+    @property
+    def angle(self) -> dict[str, Any]:
+        """That between the level edges, as options of all methods have it."""
+        return {"gamma_rad": math.radians(self.gamma_deg)}
+
     def sequence(self, frames: int, seed: int, threads: int | None) -> StereoSequence:
         """The sequence."""
         scene: Laboratory | Room
@@ -172,7 +177,10 @@ def measure_corners(
     for k, (scene, frames) in enumerate(zip(experiment.scenes, experiment.lengths(), strict=True)):
         sequence = scene.sequence(frames, experiment.seed + k, threads)
         seen: dict[str, list[tuple[CornerEstimate, float]]] = {}
-        for looks in _estimates(scene, sequence, threads):
+        told = None
+        if scene.kind == "laboratory" and not inertial:
+            told = InertialLooks(sequence, seed=experiment.seed, **scene.angle, **scene.known)
+        for looks in _estimates(scene, sequence, threads, told):
             for method, look in looks.items():
                 seen.setdefault(method, []).append(look)
             advance()
@@ -183,8 +191,8 @@ def measure_corners(
                 judged = _judged(scene, sequence, frame, estimate, places)
                 rows.append({"scene": scene.name, "method": method, "ms": ms} | judged)
         attitudes = [None if one.pose is None else one.pose.camera_from_object for one, _ in seen[scene.methods[0]]]
-        if scene.kind == "laboratory" and not inertial and any(a is not None for a in attitudes):
-            inertial.append(compare_inertial(sequence, attitudes, seed=experiment.seed))
+        if told is not None and any(a is not None for a in attitudes):
+            inertial.append(compare_inertial(sequence, {IMAGE: attitudes} | told.attitudes, seed=experiment.seed))
     return pl.DataFrame(rows, schema=_SCHEMA), pl.concat(inertial) if inertial else pl.DataFrame()
 
 
@@ -242,10 +250,10 @@ def summarise_rooms(table: pl.DataFrame, rooms: Sequence[CornerScene]) -> pl.Dat
 
 
 def _estimates(
-    scene: CornerScene, sequence: StereoSequence, threads: int
+    scene: CornerScene, sequence: StereoSequence, threads: int, told: InertialLooks | None
 ) -> Iterator[dict[str, tuple[CornerEstimate, float]]]:
-    """What each method says of each frame in turn, and the processor time it took, milliseconds."""
-    angle: dict[str, Any] = {"gamma_rad": math.radians(scene.gamma_deg)}
+    """What each method says of each frame in turn, and the processor time it took, milliseconds; `told` looks too."""
+    angle = scene.angle
     known = angle | scene.known
     if scene.kind != "laboratory":
         known["down"] = down_in(sequence)
@@ -269,6 +277,8 @@ def _estimates(
             if scene.kind == "laboratory":
                 for method, scale in _scales(sequence, frame, heights):
                     looks[method] = _timed(CornerPoseEstimator(left, method="coloured", **known, **scale), pair[0])
+            if told is not None:
+                told.look(frame, pair)
             yield looks
 
 
