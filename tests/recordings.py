@@ -80,11 +80,19 @@ class Bag:
     def twist(self, time_s: float, speed: float, rate: float, topic: str = "/cmd_vel") -> None:
         self.add(topic, "geometry_msgs/Twist", time_s, self.vector(speed, 0.0, 0.0), self.vector(0.0, 0.0, rate))
 
-    def imu(self, time_s: float, rates: Sequence[float], accelerations: Sequence[float], *, told: float = -1.0) -> None:
+    def imu(
+        self,
+        time_s: float,
+        rates: Sequence[float],
+        accelerations: Sequence[float],
+        topic: str = "/imu",
+        *,
+        told: float = -1.0,
+    ) -> None:
         turn = self.make("geometry_msgs/Quaternion", 0.0, 0.0, 0.0, 1.0)
         unknown = np.full(9, told)
         self.add(
-            "/imu", "sensor_msgs/Imu", time_s, self.header(time_s, "imu"), turn, unknown,
+            topic, "sensor_msgs/Imu", time_s, self.header(time_s, "imu"), turn, unknown,
             self.vector(*rates), np.zeros(9), self.vector(*accelerations), np.zeros(9),
         )  # fmt: skip
 

@@ -5,12 +5,15 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+import polars as pl
 import pytest
 
+from drawn_corners import CAMERA, GREYS, drawn, off_deg, pose
+from recordings import START_S, Bag
 from tiltvp.cli import main
 from tiltvp.corner import CornerPoseEstimator
 from tiltvp.errors import InvalidInputError
-from tiltvp.rotations import ROTATION_WORDS
+from tiltvp.rotations import ROTATION_WORDS, rotation_from_quaternion
 from tiltvp.streams import InertialSamples
 from tiltvp.synth import Laboratory, StereoSequence, zed_cameras
 
@@ -139,3 +142,47 @@ def test_the_command_takes_readings(
     assert "turns of 2, down of" in capsys.readouterr().out
     assert main([*asked, "--imu-topic", "/imu"]) != 0
     assert "--imu-topic without --imu" in capsys.readouterr().err
+
+
+@pytest.fixture(scope="module", params=["ros1", "mcap"])
+def turning(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, list[np.ndarray]]:
+    """A recording of a camera on its side that turns about the vertical before a grey box, with two sensors, and its
+    attitudes. Images arrive 80 ms after they were taken; "/board" has other axes than the camera.
+    """
+    bag, attitudes = Bag(request.param), []
+    turned_deg, on_board = 2.0, np.array(ROTATION_WORDS["forward"])
+    for frame in range(3):
+        rotation, vertex = pose(yaw=40.0 + turned_deg * frame, roll=70.0)
+        bag.image("/camera", START_S + 0.1 * frame, drawn(rotation, vertex, GREYS), "bgr8", late_s=0.08)
+        attitudes.append(rotation)
+    down = attitudes[0][:, 1]
+    rates, forces = np.radians(turned_deg) / 0.1 * down, -9.81 * down
+    for time_s in START_S + np.arange(-0.6, 0.8, 0.01):
+        bag.imu(time_s, rates, forces)
+        bag.imu(time_s, on_board @ rates, on_board @ forces, "/board")
+    return bag.write(tmp_path_factory.mktemp("turning")), attitudes
+
+
+def test_the_command_takes_the_sensor_of_a_recording(
+    turning: tuple[Path, list[np.ndarray]], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Of a camera on its side only down tells which edge is upright: 120 degrees off without, right with the sensor."""
+    recording, attitudes = turning
+    CAMERA.save(tmp_path / "camera.toml")
+    np.savetxt(tmp_path / "camera_from_board.txt", np.array(ROTATION_WORDS["forward"]).T)
+
+    def off(*words: str) -> list[float]:
+        asked = ["corner", str(recording), "--calibration", str(tmp_path / "camera.toml"), "--method", "general"]
+        table = tmp_path / "poses.json"
+        assert main([*asked, "--independent", "--out", str(table), "--overwrite", *words]) == 0
+        turns = pl.read_json(table).select("qx", "qy", "qz", "qw").to_numpy()
+        found = [rotation_from_quaternion(turn, "pose").T for turn in turns]
+        return [off_deg(one, true) for one, true in zip(found, attitudes, strict=True)]
+
+    assert min(off()) > 60.0
+    imu = ["--imu", str(recording)]
+    assert max(off(*imu, "--imu-topic", "/imu")) < 0.5
+    assert "/imu: turns of 2, down of 3 of 3 frames" in capsys.readouterr().out
+    board = [*imu, "--imu-topic", "/board"]
+    assert max(off(*board, "--camera-from-imu", str(tmp_path / "camera_from_board.txt"))) < 0.5
+    assert min(off(*board)) > 60.0

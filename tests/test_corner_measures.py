@@ -137,8 +137,8 @@ def test_plots_show_what_the_tables_hold(measured: tuple[pl.DataFrame, pl.DataFr
     assert labels == ["roll", "pitch", "yaw", "x", "y", "z", "no corner found"]
     assert figure_picture(figure, dpi=50).std() > 5
     rows = inertial_errors(inertial).axes
-    assert len(rows[0].lines) - 1 == 4
-    assert len(rows[2].lines) - 1 == 2
+    assert len(rows[0].lines) - 1 == 7
+    assert len(rows[2].lines) - 1 == 5
 
 
 def test_the_command_measures_and_refuses(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -17,7 +17,7 @@ from tiltvp.files import check_output_folder
 if TYPE_CHECKING:
     import polars as pl
 
-    from tiltvp.lab.evaluation.corners import CornerExperiment
+    from tiltvp.lab.evaluation.corners import CornerExperiment, CornerScene
 
 
 def corners(
@@ -26,6 +26,7 @@ def corners(
     noisy_poses: Annotated[int, Parameter(validator=validators.Number(gte=0))] = 2000,
     frames: Annotated[int, Parameter(validator=validators.Number(gte=0))] = 1000,
     scenes: Annotated[tuple[str, ...], Parameter(consume_multiple=True)] = (),
+    rooms: Annotated[int, Parameter(validator=validators.Number(gte=0))] = 0,
     seed: Annotated[int, Parameter(validator=validators.Number(gte=0))] = 7001,
     threads: Annotated[int | None, Parameter(validator=validators.Number(gte=1))] = None,
     out: Path | None = None,
@@ -46,6 +47,9 @@ def corners(
         Frames of the first sequence, the cuboid at 1280 x 720; the others have a tenth. 0 for none.
     scenes
         Only these sequences.
+    rooms
+        So many rooms of each kind in place of these sequences, each with a seed of its own and all of `--frames`, and a
+        table over them.
     seed
         Seed of the first scene and motion.
     threads
@@ -65,28 +69,39 @@ def corners(
         title = "Closed form, 0.3 px of noise on rays of 200 px, against the Cramer-Rao bound"
         show_frame(title, closed.summarise_noisy(noisy), [])
     if frames:
-        _sequences(frames, scenes, seed, threads or os.cpu_count() or 1, out)
+        from tiltvp.lab.evaluation.corners import CornerExperiment
+
+        experiment = CornerExperiment(frames=frames, scenes=_scenes(scenes, rooms), seed=seed)
+        _sequences(experiment, threads or os.cpu_count() or 1, out, has_rooms=rooms > 0)
 
 
-def _sequences(frames: int, names: tuple[str, ...], seed: int, threads: int, out: Path | None) -> None:
-    from tiltvp.images import write_image
-    from tiltvp.lab.evaluation.corner_inertial import summarise_inertial_comparison
-    from tiltvp.lab.evaluation.corners import CORNER_SCENES, CornerExperiment, measure_corners, summarise_corners
-    from tiltvp.lab.plots.corners import corner_errors, inertial_errors
-    from tiltvp.lab.plots.picture import figure_picture
+def _scenes(names: tuple[str, ...], rooms: int) -> tuple[CornerScene, ...]:
+    """What the options name."""
+    from tiltvp.lab.evaluation.corners import CORNER_SCENES, fresh_rooms
 
+    if names and rooms:
+        raise InvalidInputError(f"--scenes {' '.join(names)} and --rooms {rooms}, expected one of them")
     known = {scene.name: scene for scene in CORNER_SCENES}
     for name in names:
         if name not in known:
             raise InvalidInputError(f"--scenes {name!r}, expected some of {', '.join(known)}")
-    experiment = CornerExperiment(
-        frames=frames, scenes=tuple(known[name] for name in names) or CORNER_SCENES, seed=seed
-    )
+    return fresh_rooms(rooms) if rooms else tuple(known[name] for name in names) or CORNER_SCENES
+
+
+def _sequences(experiment: CornerExperiment, threads: int, out: Path | None, *, has_rooms: bool) -> None:
+    from tiltvp.images import write_image
+    from tiltvp.lab.evaluation.corner_inertial import summarise_inertial_comparison
+    from tiltvp.lab.evaluation.corners import measure_corners, summarise_corners, summarise_rooms
+    from tiltvp.lab.plots.corners import corner_errors, inertial_errors
+    from tiltvp.lab.plots.picture import figure_picture
+
     if out is not None:
         check_output_folder(out)
     with progress_bar(sum(experiment.lengths()), "frames") as bar:
         table, inertial = measure_corners(experiment, threads=threads, advance=bar.advance)
     show_frame("Rendered sequences, errors of poses", summarise_corners(table), ["scene", "method"])
+    if has_rooms:
+        show_frame("Rooms", summarise_rooms(table, experiment.scenes), ["kind"])
     if inertial.height:
         summary = summarise_inertial_comparison(inertial)
         show_frame("With an inertial sensor, errors in degrees", summary, ["method"])

@@ -1,16 +1,18 @@
-"""Attitudes of corners as the reference of a complementary filter, against one that has an accelerometer alone."""
+"""Corners and an inertial sensor: what estimators that are told its readings, and complementary filters, make of it."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 import polars as pl
 
 from tiltvp._core import ComplementaryFilter
+from tiltvp.corner_images import CornerPoseEstimator
 from tiltvp.errors import InvalidInputError
 from tiltvp.rotations import ROTATION_WORDS
+from tiltvp.streams import InertialSamples
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -19,6 +21,8 @@ if TYPE_CHECKING:
 
 __all__ = [
     "CONVENTIONAL",
+    "IMAGE",
+    "InertialLooks",
     "compare_inertial",
     "conventional_angles",
     "filter_attitudes",
@@ -27,6 +31,12 @@ __all__ = [
 
 CONVENTIONAL: Final = ("complementary", "Mahony")
 """The complementary filter of angles, and the explicit one on rotations, as the `ahrs` package has them."""
+
+IMAGE: Final = "image"
+"""The attitudes that the complementary filter has as its reference: of the pair, each without the sensor."""
+
+_TOLD: Final = ", told down and turns"
+_GRAY: Final = "image, one grey camera"
 
 _TIME_CONSTANTS_S: Final = (0.5, 1.0, 2.0, 5.0, 10.0, 20.0)
 """What the conventional filters are tried with; the best one of each is compared."""
@@ -38,33 +48,65 @@ _FORWARD: Final = np.array(ROTATION_WORDS["forward"])
 """From a camera to the board that holds it, and alike from an object's frame, y downwards, to one with z upwards."""
 
 
+class InertialLooks:
+    """What estimators make of a sequence of the coloured cuboid that are told down and turns frame by frame
+    (`InertialSamples.known`), and of the left images alone by straight edges, told so and not.
+    """
+
+    def __init__(self, sequence: StereoSequence, *, seed: int, **known: Any) -> None:
+        """`seed` is the sensor's; `known` are options of `CornerPoseEstimator`."""
+        left, right = sequence.cameras
+        imu = sequence.imu(seed=seed)
+        self._samples = InertialSamples(imu.times_s, imu.rates_rad_s, imu.forces_m_s2)
+        self._times_s = sequence.times_s.tolist()
+        pair = CornerPoseEstimator(left, right, sequence.left_from_right, method="coloured", **known)
+        self._estimators = {IMAGE + _TOLD: pair} | {
+            name: CornerPoseEstimator(left, method="general", **known) for name in (_GRAY, _GRAY + _TOLD)
+        }
+        self.attitudes: dict[str, list[NDArray[np.float64] | None]] = {name: [] for name in self._estimators}
+        """`camera_from_object` of each frame so far, by method."""
+
+    def look(self, frame: int, pair: tuple[NDArray[np.uint8], NDArray[np.uint8]]) -> None:
+        """The next frame."""
+        known = self._samples.known(self._times_s[frame - 1] if frame else None, self._times_s[frame])
+        for name, estimator in self._estimators.items():
+            images = pair[:1] if name.startswith(_GRAY) else pair
+            pose = estimator(*images, **(known if name.endswith(_TOLD) else {})).pose
+            self.attitudes[name].append(None if pose is None else pose.camera_from_object)
+
+
 def compare_inertial(
-    sequence: StereoSequence, attitudes: Sequence[NDArray[np.float64] | None], *, seed: int = 0
+    sequence: StereoSequence, attitudes: Mapping[str, Sequence[NDArray[np.float64] | None]], *, seed: int = 0
 ) -> pl.DataFrame:
     """Errors of roll, pitch and yaw in degrees, with columns `method` and `time_s`.
 
-    `attitudes` are the estimates `camera_from_object` of each frame, or None. Methods: the image alone, at its frames;
-    `ComplementaryFilter` with the image as its reference, and `CONVENTIONAL`, filters of accelerometer and gyroscope,
-    at the readings of a simulated sensor (`StereoSequence.imu` of that seed). The latter know no yaw; each has the
-    time constant that suits the truth best. Angles are those of the board that holds the cameras, x forward and z up
-    (ROS REP 103). Raises `InvalidInputError` where the package is missing or no frame has an attitude.
+    `attitudes` are the estimates `camera_from_object` of each frame, or None, by method, among them `IMAGE`. Methods:
+    these, at the frames; `ComplementaryFilter` with `IMAGE` as its reference, and `CONVENTIONAL`, filters of
+    accelerometer and gyroscope, at the readings of a simulated sensor (`StereoSequence.imu` of that seed). The latter
+    know no yaw; each has the time constant that suits the truth best. Angles are those of the board that holds the
+    cameras, x forward and z up (ROS REP 103). Raises `InvalidInputError` where the package is missing or no frame has
+    an attitude of `IMAGE`.
     """
     imu = sequence.imu(seed=seed)
     corner = sequence.corners[sequence.corner]
     truth = _board_angles(_level(sequence.poses_at(imu.times_s), corner.world_from_object))
-    seen = {float(t): a for t, a in zip(sequence.times_s, attitudes, strict=True) if a is not None}
-    if not seen:
+    by_time = {
+        method: {float(t): a for t, a in zip(sequence.times_s, seen, strict=True) if a is not None}
+        for method, seen in attitudes.items()
+    }
+    if not by_time.get(IMAGE):
         raise InvalidInputError("attitudes: none in any frame, expected some")
-    frames = np.array(list(seen))
-    images = np.stack([_FORWARD @ a.T @ _FORWARD.T for a in seen.values()])
-    at_frames = _board_angles(_level(sequence.poses_at(frames), corner.world_from_object))
-    fused = filter_attitudes(imu, seen)
+    tables = []
+    for method, seen in by_time.items():
+        if seen:
+            frames = np.array(list(seen))
+            images = np.stack([_FORWARD @ a.T @ _FORWARD.T for a in seen.values()])
+            at_frames = _board_angles(_level(sequence.poses_at(frames), corner.world_from_object))
+            tables.append(_errors(method, frames, _board_angles(images), at_frames))
+    fused = filter_attitudes(imu, by_time[IMAGE])
     known = np.isfinite(fused).all(axis=(1, 2))
     level = np.einsum("ij,njk,lk->nil", _FORWARD, fused[known], _FORWARD)
-    tables = [
-        _errors("image", frames, _board_angles(images), at_frames),
-        _errors("gyroscope + image", imu.times_s[known], _board_angles(level), truth[known]),
-    ]
+    tables.append(_errors("gyroscope + image", imu.times_s[known], _board_angles(level), truth[known]))
     for method in CONVENTIONAL:
         every = [conventional_angles(imu, method, tau)[known] for tau in _TIME_CONSTANTS_S]
         best = min(every, key=lambda angles: float(np.sum(_wrapped(angles - truth[known])[:, :2] ** 2)))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import CancelledError
 from contextlib import closing
 from dataclasses import dataclass, field
@@ -17,7 +17,7 @@ import polars as pl
 from tiltvp.corner_images import CornerEstimate, CornerPoseEstimator
 from tiltvp.errors import InvalidInputError
 from tiltvp.lab.datasets.new import in_order
-from tiltvp.lab.evaluation.corner_inertial import compare_inertial
+from tiltvp.lab.evaluation.corner_inertial import IMAGE, InertialLooks, compare_inertial
 from tiltvp.lab.evaluation.corner_rooms import own_places, surface_off, truth_near
 from tiltvp.synth import Laboratory, Room, StereoSequence, zed_cameras
 
@@ -26,7 +26,16 @@ if TYPE_CHECKING:
 
     Pair = tuple[NDArray[np.uint8], NDArray[np.uint8]]
 
-__all__ = ["CORNER_SCENES", "CornerExperiment", "CornerScene", "down_in", "measure_corners", "summarise_corners"]
+__all__ = [
+    "CORNER_SCENES",
+    "CornerExperiment",
+    "CornerScene",
+    "down_in",
+    "fresh_rooms",
+    "measure_corners",
+    "summarise_corners",
+    "summarise_rooms",
+]
 
 _FLIP_DEG: Final = 20.0
 """An attitude that is farther off is another interpretation, not a noisy one."""
@@ -36,6 +45,9 @@ _NEES_MAX: Final = 22.5
 
 _OFF_SIGMAS: Final = 3.3
 """That of a normal deviate: a vertex farther from every surface is wrong and sure, listed or not."""
+
+_FOUND_IN: Final = 0.95
+"""The share of a room's frames with a pose above which its corners count as found."""
 
 _ONE_CAMERA: Final = "coloured, one camera, height known"
 """The left camera alone, each frame for itself, with its height above the vertex as somebody measures it."""
@@ -89,6 +101,11 @@ class CornerScene:
         """Those of `CornerDetector` for both cameras: ours, and before the cuboid the published one beside it."""
         return ("coloured", "paper") if self.kind == "laboratory" else ("general",)
 
+    @property
+    def angle(self) -> dict[str, Any]:
+        """That between the level edges, as options of all methods have it."""
+        return {"gamma_rad": math.radians(self.gamma_deg)}
+
     def sequence(self, frames: int, seed: int, threads: int | None) -> StereoSequence:
         """The sequence."""
         scene: Laboratory | Room
@@ -115,6 +132,12 @@ CORNER_SCENES: tuple[CornerScene, ...] = (
     CornerScene("l-shaped", kind="l-shaped", share=0.1),
 )
 """The paper's cuboid: with and without a word on its side, in full HD, blurred, of other angles; corners of rooms."""
+
+
+def fresh_rooms(count: int) -> tuple[CornerScene, ...]:
+    """So many rooms of each kind that `CORNER_SCENES` has, in turn, all with as many frames as the experiment."""
+    kinds = [scene.kind for scene in CORNER_SCENES if scene.kind != "laboratory"]
+    return tuple(CornerScene(f"{kind} {number}", kind=kind) for number in range(1, count + 1) for kind in kinds)
 
 
 @dataclass(frozen=True)
@@ -154,7 +177,10 @@ def measure_corners(
     for k, (scene, frames) in enumerate(zip(experiment.scenes, experiment.lengths(), strict=True)):
         sequence = scene.sequence(frames, experiment.seed + k, threads)
         seen: dict[str, list[tuple[CornerEstimate, float]]] = {}
-        for looks in _estimates(scene, sequence, threads):
+        told = None
+        if scene.kind == "laboratory" and not inertial:
+            told = InertialLooks(sequence, seed=experiment.seed, **scene.angle, **scene.known)
+        for looks in _estimates(scene, sequence, threads, told):
             for method, look in looks.items():
                 seen.setdefault(method, []).append(look)
             advance()
@@ -165,8 +191,8 @@ def measure_corners(
                 judged = _judged(scene, sequence, frame, estimate, places)
                 rows.append({"scene": scene.name, "method": method, "ms": ms} | judged)
         attitudes = [None if one.pose is None else one.pose.camera_from_object for one, _ in seen[scene.methods[0]]]
-        if scene.kind == "laboratory" and not inertial and any(a is not None for a in attitudes):
-            inertial.append(compare_inertial(sequence, attitudes, seed=experiment.seed))
+        if told is not None and any(a is not None for a in attitudes):
+            inertial.append(compare_inertial(sequence, {IMAGE: attitudes} | told.attitudes, seed=experiment.seed))
     return pl.DataFrame(rows, schema=_SCHEMA), pl.concat(inertial) if inertial else pl.DataFrame()
 
 
@@ -194,11 +220,40 @@ def summarise_corners(table: pl.DataFrame) -> pl.DataFrame:
     )
 
 
+def summarise_rooms(table: pl.DataFrame, rooms: Sequence[CornerScene]) -> pl.DataFrame:
+    """How many rooms of each kind, and of all, have a pose in nearly all frames, and what those poses are worth.
+
+    NEES is of frames with a listed truth. Medians are of frames with a pose: of attitudes, and of places of listed
+    corners, those of other corners being beside their own median alone.
+    """
+    kinds = {room.name: room.kind for room in rooms}
+    table = table.filter(pl.col("scene").is_in(list(kinds)))
+    by_kind = table.with_columns(kind=pl.col("scene").replace_strict(kinds))
+    listed = pl.col("corner") >= 0
+    return (
+        pl.concat([by_kind, table.with_columns(kind=pl.lit("all"))])
+        .with_columns(good=pl.col("found").mean().over("kind", "scene") >= _FOUND_IN)
+        .group_by("kind", maintain_order=True)
+        .agg(
+            pl.col("scene").n_unique().alias("rooms"),
+            pl.col("scene").filter("good").n_unique().alias(f"rooms with >= {_FOUND_IN:.0%} found"),
+            pl.len().alias("frames"),
+            pl.col("found").mean().mul(100).alias("% found"),
+            pl.col("nees").count().alias("listed"),
+            pl.col("nees").gt(_NEES_MAX).mean().mul(100).alias("% NEES > 22.5"),
+            pl.col("surface").gt(_OFF_SIGMAS).mean().mul(100).alias("% off surface"),
+            (pl.col("attitude_deg") > _FLIP_DEG).sum().alias("flips"),
+            pl.col("attitude_deg").median().alias("median deg"),
+            pl.col("position_m").filter(listed).median().mul(1000).alias("listed median mm"),
+        )
+    )
+
+
 def _estimates(
-    scene: CornerScene, sequence: StereoSequence, threads: int
+    scene: CornerScene, sequence: StereoSequence, threads: int, told: InertialLooks | None
 ) -> Iterator[dict[str, tuple[CornerEstimate, float]]]:
-    """What each method says of each frame in turn, and the processor time it took, milliseconds."""
-    angle: dict[str, Any] = {"gamma_rad": math.radians(scene.gamma_deg)}
+    """What each method says of each frame in turn, and the processor time it took, milliseconds; `told` looks too."""
+    angle = scene.angle
     known = angle | scene.known
     if scene.kind != "laboratory":
         known["down"] = down_in(sequence)
@@ -222,6 +277,8 @@ def _estimates(
             if scene.kind == "laboratory":
                 for method, scale in _scales(sequence, frame, heights):
                     looks[method] = _timed(CornerPoseEstimator(left, method="coloured", **known, **scale), pair[0])
+            if told is not None:
+                told.look(frame, pair)
             yield looks
 
 

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 __all__ = ["corner_errors", "draw_attitude_errors", "draw_position_errors", "inertial_errors"]
 
 _COLOURS: Final = ("tab:red", "tab:green", "tab:blue")
-_METHOD_COLOURS: Final = ("0.55", "tab:blue", "tab:orange", "tab:purple")
+_METHOD_COLOURS: Final = ("0.55", "black", "tab:olive", "tab:green", "tab:blue", "tab:orange", "tab:purple")
 
 
 def draw_attitude_errors(axes: Axes, table: pl.DataFrame) -> None:

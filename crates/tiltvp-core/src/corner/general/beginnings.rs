@@ -66,3 +66,85 @@ fn step_across(
     let inside = light.gray_profile(image, &pixel, &(across * ACROSS_PX), &mut samples);
     inside.then(|| 0.5 * (samples[4] + samples[3] - samples[1] - samples[0]))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::camera;
+    use nalgebra::Vector2;
+
+    /// Where the three edges meet, pixels: between pixel centres, so that nothing hangs on those.
+    const AT: Vector2<f64> = Vector2::new(80.3, 59.6);
+
+    /// The ways of the edges in the image, degrees from its rows downwards: as of a box seen from above.
+    const WAYS_DEG: [f64; 3] = [-25.0, 90.0, 205.0];
+
+    /// How many of the three rays are said to begin at the vertex, in an image whose level is that of the sector between two
+    /// edges, by `level(sector, pixels from the vertex)`, as the mean over each pixel.
+    fn begin(level: impl Fn(usize, f64) -> f64) -> usize {
+        let (wide, high) = (160, 120);
+        let camera = camera("pinhole", [wide, high], &[("fx", 200.0), ("fy", 200.0), ("cx", 79.5), ("cy", 59.5)], &[]);
+        let mean = |u: u32, v: u32| {
+            let part = |k: u32| (f64::from(k) + 0.5) / 4.0 - 0.5;
+            let inside = (0..16).map(|k| {
+                let off = Vector2::new(f64::from(u) + part(k % 4), f64::from(v) + part(k / 4)) - AT;
+                let turn = (off.y.atan2(off.x).to_degrees() - WAYS_DEG[0]).rem_euclid(360.0);
+                level(WAYS_DEG.iter().rposition(|way| turn >= way - WAYS_DEG[0]).unwrap_or(0), off.norm())
+            });
+            (inside.sum::<f64>() / 16.0).round() as u8
+        };
+        let data: Vec<u8> = (0..wide * high).map(|i| mean(i % wide, i / wide)).collect();
+        let image = ImageView::new(&data, wide as usize, high as usize, wide as usize).unwrap();
+        let bearing = |pixel: Vector2<f64>| camera.unproject(&pixel).unwrap();
+        let on = WAYS_DEG.map(|way| bearing(AT + 30.0 * Vector2::new(way.to_radians().cos(), way.to_radians().sin())));
+        let corner = CornerFeature::from_bearings(&bearing(AT), &on).unwrap();
+        let options = GeneralOptions::default();
+        begin_at_vertex(&camera, &image, &LightTable::new(2.2).unwrap(), &options, &corner)
+    }
+
+    #[test]
+    fn edges_that_end_before_a_vertex_do_not_begin_there() {
+        let levels = [60.0, 150.0, 230.0];
+        // Lighter or darker, weak or strong.
+        for levels in [levels, levels.map(|level| 255.0 - level), [100.0, 112.0, 124.0]] {
+            assert_eq!(begin(|sector, _| levels[sector]), 3, "{levels:?}");
+            // One of the edges begins eight pixels away, as the side of a board does behind its front; then all of them do.
+            for ended in 0..3 {
+                let near = |sector: usize| if sector == ended { levels[(ended + 2) % 3] } else { levels[sector] };
+                let seen = begin(|sector, away_px| if away_px < 8.0 { near(sector) } else { levels[sector] });
+                assert!(seen < 3, "{seen} of {levels:?}, {ended}");
+            }
+            assert_eq!(begin(|sector, away_px| if away_px < 8.0 { 200.0 } else { levels[sector] }), 0, "{levels:?}");
+        }
+    }
+
+    #[test]
+    fn another_edge_in_the_same_line_is_not_the_one_that_begins() {
+        let levels = [60.0, 150.0, 230.0];
+        // What is light on an edge's one side farther on is dark there next to the vertex.
+        let turned = |sector: usize| 255.0 - levels[sector];
+        assert_eq!(begin(|sector, away_px| if away_px < 6.0 { turned(sector) } else { levels[sector] }), 0);
+        // A step that fades towards the vertex is still there at half of its height, and not at a fifth.
+        let faded = |share: f64| move |sector: usize| 150.0 + share * (levels[sector] - 150.0);
+        for (share, count) in [(0.6, 3), (0.2, 0)] {
+            let near = faded(share);
+            assert_eq!(begin(|sector, away_px| if away_px < 6.0 { near(sector) } else { levels[sector] }), count);
+        }
+    }
+
+    #[test]
+    fn an_edge_at_the_border_of_the_image_is_not_known_to_begin() {
+        let light = LightTable::new(2.2).unwrap();
+        let camera = camera("pinhole", [40, 40], &[("fx", 50.0), ("fy", 50.0), ("cx", 20.0), ("cy", 20.0)], &[]);
+        let data: Vec<u8> = (0..1600).map(|i| if i % 40 < 20 { 50 } else { 200 }).collect();
+        let image = ImageView::new(&data, 40, 40, 40).unwrap();
+        let bearing = |u: f64, v: f64| camera.unproject(&Vector2::new(u, v)).unwrap();
+        let count = |v: f64, to: f64| {
+            let toward = [bearing(19.5, v + to), bearing(30.0, v), bearing(5.0, v + 1.0)];
+            let corner = CornerFeature::from_bearings(&bearing(19.5, v), &toward).unwrap();
+            begin_at_vertex(&camera, &image, &light, &GeneralOptions::default(), &corner)
+        };
+        // Along the image's one edge, towards its middle and out of it; the other two rays have no step across them.
+        assert_eq!([count(10.0, 5.0), count(30.0, 5.0)], [1, 0]);
+    }
+}

@@ -258,7 +258,8 @@ impl CornerPoseEstimator {
         self.options.right_handed.or(told.then_some(true))
     }
 
-    /// Attitudes from one image: of all features that agree with one another.
+    /// Attitudes from one image: of all features that agree with one another; none where the likeliest one's features contradict
+    /// each other or gravity.
     fn by_one(&self, estimate: &mut CornerEstimate) -> Result<()> {
         let features = &estimate.features[0];
         let priors = self.priors(self.is_one_object());
@@ -269,7 +270,7 @@ impl CornerPoseEstimator {
         let views: Vec<View<'_>> = agreed.attitudes.iter().map(view).collect();
         let alignment = if views.len() > 1 { Alignment::Manhattan } else { Alignment::Same };
         let resolved = resolve(&views, alignment, self.right_handed(), &priors)?;
-        estimate.hypotheses = resolved
+        let hypotheses: Vec<Hypothesis> = resolved
             .iter()
             .filter_map(|resolved| {
                 let chosen = agreed.attitudes.first()?.get(*resolved.choice.first()?)?;
@@ -286,7 +287,9 @@ impl CornerPoseEstimator {
                 })
             })
             .collect();
-        estimate.chosen_left = agreed.members;
+        if hypotheses.first().is_some_and(|pose| pose.misfit <= self.options.misfit_max && self.is_upright(pose)) {
+            (estimate.hypotheses, estimate.chosen_left) = (hypotheses, agreed.members);
+        }
         Ok(())
     }
 

@@ -1,18 +1,22 @@
 //! What an inertial sensor knows of a frame, and what it and the frames before say of the attitude.
 
-use nalgebra::{Matrix3, Matrix6, Vector3};
+use nalgebra::{Matrix2, Matrix3, Matrix6, Vector3};
 
 use super::estimator::CornerPoseEstimator;
 use super::track::Track;
 use crate::corner::closed_form::prior::{AttitudePrior, VerticalSense};
+use crate::corner::estimate::Hypothesis;
 use crate::corner::feature::CornerFeature;
 use crate::error::{Error, Result};
 use crate::filter::{positive_semidefinite, symmetric};
-use crate::geometry::{check_rotation, tangent_basis};
+use crate::geometry::{check_rotation, tangent_basis, tangent_log};
 
 /// Standard deviation of an attitude that its covariance does not tell, radians: the attitudes of a real cabinet scatter by 0.7
 /// degrees about the truth, where edges are not quite straight or parallel.
 const UNTOLD_RAD: f64 = 0.7 * std::f64::consts::PI / 180.0;
+
+/// The 99.9 % quantile of chi-square of 2: an upright edge that is farther from gravity's direction is none.
+const UPRIGHT_CHI_SQUARE: f64 = 13.8;
 
 /// What is known of one frame beside its images, in the left camera's frame.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -44,6 +48,16 @@ pub struct CameraTurn {
 impl GravityDirection {
     fn prior(&self) -> AttitudePrior {
         AttitudePrior::Gravity { down: self.down, sigma_rad: self.sigma_rad, sense: VerticalSense::Either }
+    }
+
+    /// Whether the upright edge of a pose is along this direction, either way, by what both are known to.
+    fn is_along(&self, pose: &Hypothesis) -> bool {
+        let vertical = pose.camera_from_object.column(1).into_owned();
+        let off = tangent_log(&self.down, &(vertical * vertical.dot(&self.down).signum()));
+        let turn = tangent_basis(&self.down).transpose() * vertical.cross_matrix();
+        let own = turn * pose.covariance.fixed_view::<3, 3>(0, 0) * turn.transpose();
+        let spread = own + Matrix2::from_diagonal_element(self.sigma_rad.powi(2) + UNTOLD_RAD.powi(2));
+        spread.cholesky().is_some_and(|factor| off.dot(&factor.solve(&off)) <= UPRIGHT_CHI_SQUARE)
     }
 }
 
@@ -112,6 +126,12 @@ impl CornerPoseEstimator {
         self.known.gravity.map(|gravity| gravity.down).or(last).or(self.options.down)
     }
 
+    /// Whether gravity, where this frame has it, bears a pose out. A corner without colours has an upright edge; the coloured
+    /// cuboid may be held aslant.
+    pub(super) fn is_upright(&self, pose: &Hypothesis) -> bool {
+        self.is_one_object() || self.known.gravity.is_none_or(|gravity| gravity.is_along(pose))
+    }
+
     /// Covariance of the attitude of a track as it is known at this frame, before its images.
     fn attitude_covariance(&self, track: &Track) -> Matrix3<f64> {
         let Some(turned) = track.turned else {
@@ -156,7 +176,6 @@ impl CornerPoseEstimator {
 #[allow(clippy::unwrap_used)]
 mod tests {
     use super::*;
-    use crate::corner::estimate::Hypothesis;
     use nalgebra::Rotation3;
 
     fn track(rotation: &Matrix3<f64>) -> Track {
@@ -193,6 +212,22 @@ mod tests {
         gone.go_on(None, &Matrix3::identity());
         gone.go_on(Some(&gyro), &Matrix3::identity());
         assert_eq!((gone.turned, gone.age), (None, 4));
+    }
+
+    #[test]
+    fn an_upright_edge_is_along_gravity_by_what_both_are_known_to() {
+        let along = |off_deg: f64, gravity_deg: f64, own_deg: f64| {
+            let turn = Rotation3::from_axis_angle(&Vector3::z_axis(), off_deg.to_radians());
+            let mut pose = track(&Matrix3::identity()).pose;
+            pose.covariance = Matrix6::from_diagonal_element(own_deg.to_radians().powi(2));
+            let gravity = GravityDirection { down: turn * Vector3::y(), sigma_rad: gravity_deg.to_radians() };
+            gravity.is_along(&pose)
+        };
+        // Either way; 3.7 standard deviations are its end, those of gravity, of the pose, and of what it does not tell.
+        assert!(along(0.0, 0.5, 0.0) && along(181.0, 0.5, 0.0));
+        assert!(along(3.0, 0.5, 0.0) && !along(3.5, 0.5, 0.0));
+        assert!(along(11.0, 3.0, 0.0) && !along(12.0, 3.0, 0.0));
+        assert!(along(11.0, 0.5, 3.0) && !along(12.0, 0.5, 3.0));
     }
 
     #[test]

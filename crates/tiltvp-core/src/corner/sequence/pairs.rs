@@ -173,7 +173,8 @@ impl CornerPoseEstimator {
                 if attitude.is_some_and(|attitude| !agrees(attitude)) {
                     continue;
                 }
-                if misfit > misfit_most || !(nearest..=farthest).contains(&vertex.norm()) {
+                let within = misfit <= misfit_most && (nearest..=farthest).contains(&vertex.norm());
+                if !within || !self.is_upright(pose) {
                     continue;
                 }
                 let fits_well = misfit <= WELL * self.options.misfit_max;
