@@ -70,12 +70,14 @@ impl Fit {
         }
     }
 
-    /// The estimate of an image. A tilt of which the error is not known is none.
+    /// The estimate of an image. A tilt of which the error is not known is none: nor one whose covariance is singular to rounding,
+    /// for a direction in which an image tells nothing.
     pub(super) fn into_estimate(self, seen: &Seen<'_>, features: &mut [f64; FEATURES]) -> TiltEstimate {
         let chosen = self.alternatives[0].map_or(1.0, |best| best.probability);
-        let undetermined = self.tilt.is_some() && self.covariance.is_none();
-        let undetermined = undetermined.then_some(Stop::Undetermined { agreeing: self.inliers });
         let (covariance, off_rad) = self.with_centre_off(seen);
+        let covariance = covariance.filter(|covariance| confidence::inverse_of_positive(covariance).is_some());
+        let undetermined = self.tilt.is_some() && covariance.is_none();
+        let undetermined = undetermined.then_some(Stop::Undetermined { agreeing: self.inliers });
         let mut estimate = TiltEstimate {
             tilt: self.tilt.filter(|_| undetermined.is_none()),
             covariance_rad2: covariance.unwrap_or(Matrix2::from_diagonal_element(f64::INFINITY)),

@@ -5,7 +5,7 @@ use nalgebra::{Matrix3, Rotation3, Vector3};
 use super::attitude::{CornerAttitude, CornerAttitudes};
 use super::prior::{AttitudePrior, gaussian, rotation_vector};
 use crate::error::Result;
-use crate::filter::symmetric;
+use crate::filter::{restored, symmetric};
 use crate::geometry::validate_rotation;
 
 /// The attitudes that one feature admits, and where its camera looks.
@@ -127,15 +127,18 @@ pub fn resolve(
         joints = kept(next);
     }
     let best = joints.first().map_or(0.0, |joint| joint.ln_likelihood);
-    let total: f64 = joints.iter().map(|joint| (joint.ln_likelihood - best).exp()).sum();
+    let total = |joints: &[Joint]| joints.iter().map(|joint| (joint.ln_likelihood - best).exp()).sum::<f64>();
+    let of_all = total(&joints);
+    joints.retain(|joint| (joint.ln_likelihood - best).exp() / of_all >= PROBABILITY_MIN);
+    let of_kept = total(&joints);
     let resolved = joints.into_iter().map(|joint| ResolvedAttitude {
         common_from_object: joint.rotation,
-        covariance: joint.covariance,
-        probability: (joint.ln_likelihood - best).exp() / total,
+        covariance: restored(&joint.covariance),
+        probability: (joint.ln_likelihood - best).exp() / of_kept,
         choice: joint.choice,
         chi_square: joint.chi_square,
     });
-    Ok(resolved.filter(|resolved| resolved.probability >= PROBABILITY_MIN).collect())
+    Ok(resolved.collect())
 }
 
 /// A hypothesis about one view alone.

@@ -16,6 +16,7 @@ use super::refined::{Refined, TILT_MAX_RAD};
 use super::{Fitter, Prepared, RefineOptions, Setting, TiltMethod, edge_offset};
 use crate::edges::{EdgeOptions, EdgePixels, RidgePixels};
 use crate::error::{Error, Result};
+use crate::filter::symmetric;
 use crate::geometry::{Tilt, tangent_basis};
 use crate::image::ImageView;
 use crate::options;
@@ -151,9 +152,10 @@ fn fused(fit: &Fit, vote: &Fit) -> Fit {
     let normal = tilt.normal() + basis * (gain * away);
     // Its expectation is one.
     let disagreement = 0.5 * away.dot(&(inverse * away));
-    let together = (Matrix2::identity() - gain) * covariance * disagreement.max(1.0);
-    let symmetric = 0.5 * (together + together.transpose());
-    Fit { tilt: Tilt::from_normal(&normal), covariance: Some(symmetric), ..*fit }
+    let keep = Matrix2::identity() - gain;
+    // In Joseph's form: rounding leaves a covariance, however unlike the two are.
+    let together = keep * covariance * keep.transpose() + gain * theirs * gain.transpose();
+    Fit { tilt: Tilt::from_normal(&normal), covariance: Some(symmetric(&together) * disagreement.max(1.0)), ..*fit }
 }
 
 impl SegmentFit {
