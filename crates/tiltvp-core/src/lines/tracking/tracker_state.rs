@@ -69,7 +69,9 @@ impl TrackerState {
         let is_known = |track: &u64| *track < self.next_track;
         let is_whole = |frame: &FrameMemory| match frame.tracks.len() {
             0 => frame.descriptors.is_empty(),
-            n => frame.descriptors.len().is_multiple_of(n) && frame.tracks.iter().all(is_known) && differ(&frame.tracks),
+            n => {
+                frame.descriptors.len().is_multiple_of(n) && frame.tracks.iter().all(is_known) && differ(&frame.tracks)
+            }
         };
         let followed: Vec<_> = self.followed.iter().map(|edge| edge.track).collect();
         let is_true = |edge: &Followed| is_known(&edge.track) && edge.seen < self.next_frame;
