@@ -79,10 +79,10 @@ fn is_covariance<const N: usize>(matrix: &SMatrix<f64, N, N>) -> bool {
     matrix.amax() < 1e-290 || positive_semidefinite(matrix)
 }
 
-/// Probabilities of all there is add up to one.
+/// Probabilities of all there is add up to one, but for those below 1e-9 of which there are at most four times four.
 fn probabilities(all: impl ExactSizeIterator<Item = f64> + Clone) {
     let sum: f64 = all.clone().sum();
-    assert!(all.len() == 0 || (sum - 1.0).abs() < 1e-9, "{:?}", all.collect::<Vec<_>>());
+    assert!(all.len() == 0 || (1.0 - 17e-9..=1.0 + 1e-9).contains(&sum), "{:?}", all.collect::<Vec<_>>());
     assert!(all.clone().all(|p| (0.0..=1.0 + 1e-12).contains(&p)), "{:?}", all.collect::<Vec<_>>());
 }
 

@@ -190,7 +190,8 @@ def resolve(
     right_handed: bool | None = None,
     priors: Sequence[Prior] = (),
 ) -> list[ResolvedAttitude]:
-    """The attitudes that several features agree on, the likeliest first, with probabilities that add up to 1.
+    """The attitudes that several features agree on, the likeliest first, with probabilities that add up to 1 (but for those
+    below 1e-9, which are left out).
 
     Features of one camera, or of several whose rotations to a common frame are given, (3, 3) each. `alignment` says how
     the objects' frames stand: the "same", "manhattan" (right angles, named anyhow), or sharing the "vertical" only.
@@ -214,7 +215,8 @@ def poses(
     priors: Sequence[Prior] = (),
     fuse: bool = True,
 ) -> list[CornerPose]:
-    """The poses that explain the features of a pair of cameras, the likeliest first; their probabilities add up to 1.
+    """The poses that explain the features of a pair of cameras, the likeliest first; their probabilities add up to 1
+    (but for those below 1e-9, which are left out).
 
     `left_from_right` is the (4, 4) rigid motion, metres, that takes points of the right camera's frame to the left
     one's; the cameras may be of any kind. The interpretations are told apart by the agreement of the two views, by

@@ -3,6 +3,8 @@
 #![allow(clippy::unwrap_used)]
 
 use std::collections::BTreeSet;
+
+use nalgebra::Vector2;
 use tiltvp_core::camera::{Camera, Kind, LARGEST_SIDE_PX, Model, Parameter};
 use tiltvp_core::testing::zoo;
 
@@ -103,6 +105,43 @@ fn unknown_names_are_answered_with_near_ones() {
     assert!(text.contains("did you mean k1?") && text.contains("fx, fy, cx, cy"), "{text}");
     let text = message("pinhole", &named(&[("fx", -1.0), ("fy", 1.0), ("cx", 1.0), ("cy", 1.0)]));
     assert!(text.contains("fx = -1, expected a positive finite number"), "{text}");
+}
+
+/// What no image is: of a lens whose pixels are as wide as the world, or of one whose axis is beyond where pixels can be told apart.
+#[test]
+fn lenses_without_a_scale_or_too_far_away_are_refused() {
+    for (model, name, value, expected) in [
+        ("equidistant", "focal_px", 7e-10, "a number from 1e-5 on"),
+        ("pinhole", "fx", 7e-10, "a number from 1e-5 on"),
+        ("extended_unified", "fy", 9.9e-6, "a number from 1e-5 on"),
+        ("unified", "cx", -1.1e9, "pixels from -1e9 to 1e9"),
+        ("equidistant", "cy", 1e15, "pixels from -1e9 to 1e9"),
+    ] {
+        let (_, mut given) = examples().into_iter().find(|(known, _)| *known == model).unwrap();
+        given.iter_mut().filter(|(known, _)| known == name).for_each(|(_, x)| *x = Parameter::Scalar(value));
+        let text = message(model, &given);
+        assert!(text.contains(&format!("{name} = {value}, expected {expected}")), "{text}");
+    }
+}
+
+/// Where distortion goes to infinity, or rises by high powers, pixels beyond those of any image have no ray, and all others come back.
+#[test]
+fn pixels_that_distortion_carries_beyond_all_images_have_no_ray() {
+    let unified = named(&[("xi", 0.91), ("fx", 520.0), ("fy", 521.04), ("cx", 632.7), ("cy", 487.5), ("k1", -0.12)]);
+    let unified = [unified, named(&[("k2", 0.02), ("p1", 6e-4), ("p2", -4e-4)])].concat();
+    let pole = named(&[("fx", 458.0), ("fy", 457.0), ("cx", 367.2), ("cy", 248.4), ("k1", 0.0), ("k2", 0.0)]);
+    let pole = [pole, named(&[("p1", 0.0), ("p2", 0.0), ("k4", -1.484)])].concat();
+    for (model, given) in [("unified", unified), ("pinhole", pole)] {
+        let lens = Model::from_parameters(model, 1280, 960, &given).unwrap();
+        let camera = Camera::new(1280, 960, lens).unwrap();
+        for far in [1e2, 1e4, 1e6, 1e8, 1e10, 1e26, 1e111] {
+            let pixel = Vector2::new(-far, 380.0);
+            let Some(bearing) = camera.unproject(&pixel) else { continue };
+            let (back, jacobian) = camera.project_jacobian(&bearing).unwrap();
+            assert!((back - pixel).amax() <= 1e-6 * far + 1e-12 * jacobian.norm(), "{model} {far:e} {back}");
+            assert!(far < 1e10, "{model} {far:e}");
+        }
+    }
 }
 
 /// Numbers of a polynomial so far apart that no float holds it within its own disc: the tables of its inverse had none either.

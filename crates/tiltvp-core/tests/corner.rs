@@ -280,6 +280,39 @@ fn angles_are_not_below_none_and_bearings_of_any_length() {
     }
 }
 
+/// The vertical edge in the line of sight but for the last bits, a direction that underflows, and an included angle of which nothing
+/// is known.
+#[test]
+fn what_rounding_decides_is_undetermined() {
+    let corners = [
+        (
+            Vector3::new(0.0, 0.7120919679534533, -0.7020861978248669),
+            [[-2.98e-160, -8.9e-161, 1.0], [-0.6897, 0.2206, 0.6897], [-1.0, 0.0, 0.0]],
+            IncludedAngle::RIGHT,
+        ),
+        (
+            Vector3::new(0.6614270598238038, -0.7500094962951058, 3.03e-307),
+            [[1.0, 0.0, 0.0], [0.3535, 0.3574, 0.8645], [-7.98e-84, 0.0, 1.0]],
+            IncludedAngle { gamma_rad: FRAC_PI_2, sigma_rad: 3e-4 },
+        ),
+        (
+            Vector3::new(-0.577062938375109, -0.5774938809865803, -0.5774938809865803),
+            [[-1.0, -1.0, -1.0], [-1.0, -1.0, -1.0], [-0.8958, -0.2933, 0.334]],
+            IncludedAngle { gamma_rad: 0.0117, sigma_rad: 1e160 },
+        ),
+    ];
+    for (vertex, toward, angle) in corners {
+        let feature = CornerFeature::from_bearings(&vertex, &toward.map(Vector3::from)).unwrap();
+        let found = corner_attitudes(&feature, &angle).unwrap();
+        assert!(!found.is_empty());
+        for attitude in found.iter() {
+            assert!((0.0..=PI).contains(&attitude.alpha_rad), "{attitude:?}");
+            assert!(attitude.sensitivity.is_infinite() && !attitude.ln_volume.is_nan(), "{attitude:?}");
+            assert_eq!(attitude.covariance, Matrix3::from_diagonal_element(f64::INFINITY), "{attitude:?}");
+        }
+    }
+}
+
 #[test]
 fn wrong_questions_are_errors() {
     let truth = perpendicular(0.9, 2.0, 0.7).unwrap();

@@ -11,7 +11,7 @@ use scene::{Image, constant, fisheye, noise, random, stripes};
 use tiltvp_core::camera::{Camera, Model, Unified};
 use tiltvp_core::geometry::Tilt;
 use tiltvp_core::lines::{
-    Line, LineExtractor, LineOptions, LineTracker, Lines, MatchOptions, MatchScratch, Motion, TrackedLine,
+    FrameMemory, Line, LineExtractor, LineOptions, LineTracker, Lines, MatchOptions, MatchScratch, Motion, TrackedLine,
     TrackerOptions, TrackerState, descriptor_distances, match_descriptors,
 };
 
@@ -230,10 +230,15 @@ fn a_known_turn_keeps_far_lines_apart_and_unknown_turns_do_not() {
     assert_eq!(see(&mut tracker, 0.0, Some(0.5)), [3, 4, 5]);
     assert_eq!(see(&mut tracker, 2.0, None), [3, 4, 5]);
     let own = tracker.state().clone();
+    // Two of one track would give it to two lines.
+    let twice =
+        |frame: &FrameMemory| FrameMemory { tracks: frame.tracks.repeat(2), descriptors: frame.descriptors.repeat(2) };
     for wrong in [
         TrackerState { next_track: 1, ..own.clone() },
         TrackerState { next_track: u64::MAX, ..own.clone() },
-        TrackerState { next_frame: u64::MAX, ..own },
+        TrackerState { next_frame: u64::MAX, ..own.clone() },
+        TrackerState { followed: own.followed.iter().chain(&own.followed).cloned().collect(), ..own.clone() },
+        TrackerState { frames: own.frames.iter().map(twice).collect(), ..own },
     ] {
         assert!(LineTracker::with_state(TrackerOptions::default(), wrong).is_err());
     }

@@ -2,7 +2,7 @@
 
 #![allow(clippy::unwrap_used)]
 
-use std::f64::consts::{PI, TAU};
+use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 use nalgebra::{Matrix2, Rotation3, Vector2, Vector3};
 use proptest::prelude::*;
@@ -236,6 +236,27 @@ fn impossible_options_and_arguments_are_refused() {
         assert!(matches!(error, tiltvp_core::Error::InvalidArgument { .. }), "{error}");
     }
     assert!(filter.update_normal(&Vector3::z(), &(Matrix2::identity() * 11.0)).is_err());
+}
+
+/// Covariances of a mounting that is none, of which rounding, and numbers that a state is read with, would leave negative variances.
+#[test]
+fn a_state_that_was_taken_can_be_taken_again() {
+    let exact = TiltFilterOptions { prior_rad: FRAC_PI_2, noise_floor_rad: 1e-6, ..TiltFilterOptions::default() };
+    for options in [TiltFilterOptions::default(), exact] {
+        for cross in [0.0, 1e-33, 1e-12, 1e-10, 1e-7] {
+            let mut state = TiltFilter::new(options).unwrap().state().clone();
+            (state.covariance[(1, 3)], state.covariance[(3, 1)]) = (cross, cross);
+            let mut filter = TiltFilter::with_state(options, state).unwrap();
+            for k in 0..4 {
+                let normal = lean(8.0 * f64::from(k), 1.2);
+                filter.update_normal(&normal, &Matrix2::zeros()).unwrap();
+                filter.predict(0.3, 0.1).unwrap();
+                assert!(filter.floor().sigma_rad >= 0.0, "{cross} {k}: {:?}", filter.state());
+                let again = TiltFilter::with_state(options, filter.state().clone());
+                assert_eq!(again.as_ref(), Ok(&filter), "{cross} {k}: {:?}", filter.state());
+            }
+        }
+    }
 }
 
 #[test]

@@ -19,7 +19,8 @@ pub(super) const P2: ParameterSchema = ParameterSchema::coefficient("p2", "tange
 ///
 /// It is the gradient of a potential, so its Jacobian is symmetric; where that is positive definite on a disc, no two
 /// points of the disc meet. Its eigenvalues are at least `min(f, d(r f)/dr) - 6 r |p|`; the valid disc ends where this
-/// bound falls to zero (by [`FOLD`], measured per angle: `(1 + r^2)` times the bound).
+/// bound falls to zero (by [`FOLD`], measured per angle: `(1 + r^2)` times the bound), or where points are distorted to
+/// beyond twice [`FARTHEST`].
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Brown {
     k: [f64; 6],
@@ -45,10 +46,12 @@ impl Brown {
         let radial = sum(&product(&n, &d), 1.0, &product(&r, &wronskian));
         let along = sum(&product(&radial, &circle), -1.0, &product(&dd, &least));
         let across = sum(&product(&n, &circle), -1.0, &product(&d, &least));
+        // A radius in the distorted plane of no more than twice what one may be without distortion.
+        let reach = sum(&product(&[2.0 * FARTHEST], &d), -1.0, &product(&r, &n));
         if along.iter().chain(&across).any(|c| !c.is_finite()) {
             return Err(Error::camera(model, "k1 .. k6, p1, p2", format!("{coefficients:?}"), "numbers below 1e100"));
         }
-        let limit = [&d[..], &along, &across]
+        let limit = [&d[..], &along, &across, &reach]
             .into_iter()
             .filter_map(|bound| first_fall(bound, FARTHEST))
             .fold(FARTHEST, f64::min);

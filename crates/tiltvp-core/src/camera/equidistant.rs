@@ -2,12 +2,13 @@
 
 use nalgebra::{Matrix2x3, Matrix3x2, Vector2, Vector3};
 
+use super::grid;
 use super::lens::{sane, seen};
 use super::model::CameraModel;
 use super::parameters::Values;
 use super::radial::{self, Radial};
 use super::schema::{CX, CY, LensSchema, Parameter, ParameterSchema, Parametric, Resize, scalars};
-use crate::error::{Error, Result};
+use crate::error::Result;
 
 const NAME: &str = "equidistant";
 
@@ -43,17 +44,11 @@ impl Equidistant {
     /// Checks the parameters.
     ///
     /// # Errors
-    /// [`Error::InvalidCamera`] if the focal length is below `1e-100`, where squares of image points underflow, or a number is
-    /// not finite.
+    /// [`Error::InvalidCamera`](crate::Error::InvalidCamera) if the focal length is below `1e-5` pixels, the centre beyond `1e9`
+    /// pixels, or a number not finite.
     pub fn new(focal_px: f64, cx: f64, cy: f64) -> Result<Self> {
-        if !(focal_px.is_finite() && focal_px >= 1e-100) {
-            return Err(Error::camera(NAME, "focal_px", focal_px, "a positive number of pixels per radian"));
-        }
-        for (name, value) in [("cx", cx), ("cy", cy)] {
-            if !value.is_finite() {
-                return Err(Error::camera(NAME, name, value, "a finite number of pixels"));
-            }
-        }
+        grid::positive(NAME, "focal_px", focal_px)?;
+        grid::centre(NAME, [cx, cy])?;
         Ok(Self { focal_px, cx, cy })
     }
 }

@@ -1,5 +1,7 @@
 //! The last step of every lens: its image plane to pixels, by an affine map.
 
+use std::ops::RangeInclusive;
+
 use nalgebra::{Matrix2, Matrix2x3, Matrix3x2, Vector2};
 
 use crate::error::{Error, Result};
@@ -25,7 +27,7 @@ impl PixelGrid {
 
     /// The grid of any matrix that does not turn the image over.
     pub(super) fn affine(model: &'static str, matrix: Matrix2<f64>, centre_px: [f64; 2]) -> Result<Self> {
-        finite(model, ["cx", "cy"], centre_px)?;
+        centre(model, centre_px)?;
         match matrix.try_inverse() {
             Some(inverse) if matrix.determinant() > 0.0 && inverse.iter().all(|x| x.is_finite()) => {
                 Ok(Self { pixel_from_point: matrix, point_from_pixel: inverse, centre: centre_px.into() })
@@ -72,16 +74,29 @@ impl PixelGrid {
     }
 }
 
-/// No lens has a focal length or another scale below this: an image of it is a point. It mirrors the largest number of a parameter.
-const SMALLEST: f64 = 1e-15;
+/// No lens has a focal length, in pixels, or another scale below this: its image is a point. Places in the largest images are known
+/// to 1e-11 pixels by their rounding, which at this focal length is a millionth of a radian.
+const SMALLEST: f64 = 1e-5;
+
+/// No image is farther from the axis of its lens than this, in pixels: ten thousand of the longest sides. Rounding of places beyond
+/// would be seen, at a ten-millionth of a pixel here.
+const WITHIN_PX: RangeInclusive<f64> = -1e9..=1e9;
 
 /// Refuses a parameter that is not a positive finite number of ordinary size.
 pub(super) fn positive(model: &'static str, name: &str, value: f64) -> Result<()> {
     if value.is_finite() && value >= SMALLEST {
         return Ok(());
     }
-    let expected = if value > 0.0 { "a number from 1e-15 on" } else { "a positive finite number" };
+    let expected = if value > 0.0 { "a number from 1e-5 on" } else { "a positive finite number" };
     Err(Error::camera(model, name, value, expected))
+}
+
+/// Refuses a centre `[cx, cy]` that is not finite or too far from any image.
+pub(super) fn centre(model: &'static str, centre_px: [f64; 2]) -> Result<()> {
+    match ["cx", "cy"].into_iter().zip(centre_px).find(|(_, value)| !WITHIN_PX.contains(value)) {
+        Some((name, value)) => Err(Error::camera(model, name, value, "pixels from -1e9 to 1e9")),
+        None => Ok(()),
+    }
 }
 
 /// Refuses parameters that are not finite.

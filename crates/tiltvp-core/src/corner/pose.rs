@@ -72,7 +72,8 @@ impl CornerPose {
     }
 }
 
-/// Every pose that explains the features of both cameras, the likeliest first; their probabilities add up to 1.
+/// Every pose that explains the features of both cameras, the likeliest first; their probabilities add up to 1, but for those below 1e-9
+/// that are left out.
 ///
 /// Empty where either feature is no corner of that angle (or hand), and where the vertex is before neither camera.
 ///

@@ -1,6 +1,6 @@
 //! The correction of an extended Kalman filter of any size, in the error state: gate first, then correct.
 
-use nalgebra::{Cholesky, Const, SMatrix, SVector, SymmetricEigen};
+use nalgebra::{Cholesky, Const, DMatrix, SMatrix, SVector, SymmetricEigen};
 
 /// An innovation, measured minus predicted, with its covariance.
 #[derive(Debug, Clone)]
@@ -55,9 +55,28 @@ pub fn positive_semidefinite<const N: usize>(matrix: &SMatrix<f64, N, N>) -> boo
     if (matrix - matrix.transpose()).amax() > 1e-9 * scale {
         return false;
     }
-    // The dynamic form: nalgebra's fixed one has no bound for every N.
-    let dynamic = nalgebra::DMatrix::from_column_slice(N, N, symmetric(matrix).as_slice());
-    SymmetricEigen::new(dynamic).eigenvalues.iter().all(|value| *value >= -1e-9 * scale)
+    principal_axes(matrix).eigenvalues.iter().all(|value| *value >= -1e-9 * scale)
+}
+
+/// The least variance, as a share of the largest entry, that [`restored`] takes for rounding of none: a thousandth of what
+/// [`positive_semidefinite`] does, so that a covariance that is restored is one wherever it is carried next.
+const RESTORED: f64 = 1e-12;
+
+/// The covariance that a matrix is but for rounding. Where that has left a negative variance along a principal axis, it is zero;
+/// what is one, or is not finite, stays as it is.
+pub fn restored<const N: usize>(matrix: &SMatrix<f64, N, N>) -> SMatrix<f64, N, N> {
+    let raised = matrix + SMatrix::identity() * (RESTORED * matrix.amax());
+    if matrix.amax() == 0.0 || !matrix.iter().all(|x| x.is_finite()) || Cholesky::new(raised).is_some() {
+        return *matrix;
+    }
+    let mut axes = principal_axes(matrix);
+    axes.eigenvalues.apply(|value| *value = value.max(0.0));
+    symmetric(&SMatrix::from_column_slice(axes.recompose().as_slice()))
+}
+
+/// In the dynamic form: nalgebra's fixed one has no bound for every N.
+fn principal_axes<const N: usize>(matrix: &SMatrix<f64, N, N>) -> SymmetricEigen<f64, nalgebra::Dyn> {
+    SymmetricEigen::new(DMatrix::from_column_slice(N, N, symmetric(matrix).as_slice()))
 }
 
 #[cfg(test)]
@@ -76,6 +95,20 @@ mod tests {
         assert_relative_eq!(step, SVector::from([1.0, 0.25]));
         assert_relative_eq!(after, Matrix2::new(2.0, 0.5, 0.5, 1.875), max_relative = 1e-12);
         assert!(positive_semidefinite(&after));
+    }
+
+    #[test]
+    fn what_rounding_has_taken_is_given_back() {
+        let whole = Matrix2::new(4.0, 1.0, 1.0, 2.0);
+        assert_eq!(restored(&whole), whole);
+        assert_eq!(restored(&Matrix2::<f64>::zeros()), Matrix2::zeros());
+        assert!(restored(&Matrix2::new(f64::INFINITY, 0.0, 0.0, 1.0))[(0, 0)].is_infinite());
+        // Of full correlation, with a trace more than there can be.
+        for unit in [1e-200, 1.0, 1e200] {
+            let torn = Matrix2::new(1.0, 1.0 + 4e-10, 1.0 + 4e-10, 1.0) * unit;
+            let mended = restored(&torn);
+            assert!(mended.symmetric_eigenvalues().min() > -1e-15 * unit && (mended - torn).amax() < 1e-9 * unit);
+        }
     }
 
     #[test]

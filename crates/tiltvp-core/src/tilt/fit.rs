@@ -70,12 +70,14 @@ impl Fit {
         }
     }
 
-    /// The estimate of an image. A tilt of which the error is not known is none.
+    /// The estimate of an image. A tilt of which the error is not known is none: nor one whose covariance is singular to rounding,
+    /// for a direction in which an image tells nothing.
     pub(super) fn into_estimate(self, seen: &Seen<'_>, features: &mut [f64; FEATURES]) -> TiltEstimate {
         let chosen = self.alternatives[0].map_or(1.0, |best| best.probability);
-        let undetermined = self.tilt.is_some() && self.covariance.is_none();
-        let undetermined = undetermined.then_some(Stop::Undetermined { agreeing: self.inliers });
         let (covariance, off_rad) = self.with_centre_off(seen);
+        let covariance = covariance.filter(|covariance| confidence::inverse_of_positive(covariance).is_some());
+        let undetermined = self.tilt.is_some() && covariance.is_none();
+        let undetermined = undetermined.then_some(Stop::Undetermined { agreeing: self.inliers });
         let mut estimate = TiltEstimate {
             tilt: self.tilt.filter(|_| undetermined.is_none()),
             covariance_rad2: covariance.unwrap_or(Matrix2::from_diagonal_element(f64::INFINITY)),
@@ -200,6 +202,44 @@ impl Lean {
                 // The training set has seen what this image may not know of itself.
                 let raised = (corrected.std_rad * corrected.std_rad - own).max(0.0);
                 covariance + radial * radial.transpose() * raised
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_tilt_whose_covariance_is_singular_to_rounding_is_none() {
+        let estimate = |weak: f64, turn: f64| {
+            let axes = *nalgebra::Rotation2::new(turn).matrix();
+            let covariance = axes * Matrix2::from_diagonal(&Vector2::new(weak, 1e-5)) * axes.transpose();
+            let fit = Fit {
+                tilt: Some(Tilt::from_alpha_beta(0.1, 0.3)),
+                covariance: Some(covariance),
+                inliers: 7,
+                ..Fit::failed(Stop::Converged { iterations: 3, change: 0.0, tolerance: 1e-6 })
+            };
+            let seen = Seen {
+                edge_pixels: 9,
+                prefiltered_pixels: 8,
+                pixels_per_rad: 100.0,
+                tilt_max_rad: 0.5,
+                trust: None,
+                centre_off: None,
+            };
+            fit.into_estimate(&seen, &mut [0.0; FEATURES])
+        };
+        for turn in [0.0, 0.3, 0.8, 2.0] {
+            let known = estimate(1e-4, turn);
+            assert!(known.tilt.is_some() && known.confidence > 0.9 && known.covariance_rad2[(0, 0)] < 1e-3);
+            for weak in [-1e-6, 0.0, 1e9, 1e20] {
+                let found = estimate(weak, turn);
+                assert_eq!((found.tilt, found.confidence), (None, 0.0), "{weak} {turn}");
+                assert!(matches!(found.stop, Stop::Undetermined { agreeing: 7 }) && found.residual_rms.is_nan());
+                assert_eq!(found.covariance_rad2, Matrix2::from_diagonal_element(f64::INFINITY));
             }
         }
     }

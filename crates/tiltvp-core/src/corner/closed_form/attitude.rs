@@ -207,6 +207,10 @@ const CORRECTION_MAX: f64 = 1e-4;
 /// the square, 5e-19.
 const FIRST_ORDER: f64 = 1e-9;
 
+/// Radians of attitude per radian of the rays' angles from which on the attitude is not determined: rounding of the rays alone, 1e-16
+/// rad, then turns it by a tenth of a radian.
+const UNDETERMINED: f64 = 1e15;
+
 /// The attitude of one root in one interpretation, with its covariance.
 ///
 /// An edge of the half-plane of `d` at the angle `a` from the line of sight `v` is `sin a d + cos a v`. With the vertical
@@ -240,17 +244,18 @@ fn attitude(
     let row = |i: usize| pencil.vertex * leaning[i].0 - pencil.along[i] * leaning[i].1;
     let rows = [row(0), row(1), row(2)];
     let matrix = Matrix3::from_columns(&rows).transpose();
-    let Some(inverse) = matrix.try_inverse().filter(|inverse| inverse.iter().all(|x| x.is_finite())) else {
-        return CornerAttitude {
-            camera_from_object: rotation,
-            edges,
-            alpha_rad: leaning[1].0.atan2(leaning[1].1),
-            mirrored,
-            case,
-            covariance: Matrix3::from_diagonal_element(f64::INFINITY),
-            sensitivity: f64::INFINITY,
-            ln_volume: f64::INFINITY,
-        };
+    let undetermined = CornerAttitude {
+        camera_from_object: rotation,
+        edges,
+        alpha_rad: leaning[1].0.atan2(leaning[1].1),
+        mirrored,
+        case,
+        covariance: Matrix3::from_diagonal_element(f64::INFINITY),
+        sensitivity: f64::INFINITY,
+        ln_volume: f64::INFINITY,
+    };
+    let Some(inverse) = matrix.try_inverse().filter(|inverse| inverse.iter().all(|x| x.abs() < UNDETERMINED)) else {
+        return undetermined;
     };
 
     // The z edge of the included angle beside the one of the root: what rounding has left of the equation.
@@ -273,6 +278,9 @@ fn attitude(
     let opening = rotation.column(2) * (side * cos_gamma) - rotation.column(0) * sin_gamma;
     let spread = right_hand_side_covariance(pencil, &leaning, pencil.normal[2].dot(&opening) * angle.sigma_rad);
     let covariance = inverse * spread * inverse.transpose();
+    if !covariance.iter().all(|x| x.is_finite()) {
+        return undetermined;
+    }
     let mut squares = 0.0;
     for (column, (sine, _)) in inverse.column_iter().zip(leaning) {
         squares += column.norm_squared() * sine * sine;
@@ -280,7 +288,8 @@ fn attitude(
     CornerAttitude {
         camera_from_object: rotation,
         edges,
-        alpha_rad: edges[1].dot(&pencil.along[1]).atan2(edges[1].dot(&pencil.vertex)),
+        // No sine below zero, nor a zero with a sign: both are rounding of an edge along the line of sight.
+        alpha_rad: (edges[1].dot(&pencil.along[1]).max(0.0) + 0.0).atan2(edges[1].dot(&pencil.vertex)),
         mirrored,
         case,
         covariance: 0.5 * (covariance + covariance.transpose()),

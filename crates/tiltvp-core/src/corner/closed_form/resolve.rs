@@ -5,7 +5,7 @@ use nalgebra::{Matrix3, Rotation3, Vector3};
 use super::attitude::{CornerAttitude, CornerAttitudes};
 use super::prior::{AttitudePrior, gaussian, rotation_vector};
 use crate::error::Result;
-use crate::filter::symmetric;
+use crate::filter::{restored, symmetric};
 use crate::geometry::validate_rotation;
 
 /// The attitudes that one feature admits, and where its camera looks.
@@ -87,7 +87,8 @@ struct Joint {
     choice: Vec<usize>,
 }
 
-/// Every attitude that can be had from one attitude of each view, the likeliest first; their probabilities add up to 1.
+/// Every attitude that can be had from one attitude of each view, the likeliest first; their probabilities add up to 1, but for those
+/// below 1e-9 that are left out.
 ///
 /// Before the views are compared all attitudes are alike, so that the likelihood of a joint hypothesis is what the rays'
 /// densities leave when the attitude is integrated out (Laplace): for each view the volume of attitudes per volume of rays,
@@ -187,7 +188,7 @@ fn extended(joint: &Joint, single: &Joint, alignment: Alignment) -> Joint {
     }
     let sum = joint.covariance + spread;
     let (chi_square, ln_density) = gaussian(&off, &sum);
-    // Joseph's form: what rounding has done to the gain leaves the covariance one.
+    // Joseph's form: what rounding has done to the gain leaves the covariance one, unless the gain is many times one.
     let gain = sum.cholesky().map_or_else(Matrix3::zeros, |factor| factor.solve(&joint.covariance).transpose());
     let keep = Matrix3::identity() - gain;
     let covariance = keep * joint.covariance * keep.transpose() + gain * spread * gain.transpose();
@@ -195,7 +196,7 @@ fn extended(joint: &Joint, single: &Joint, alignment: Alignment) -> Joint {
     choice.extend_from_slice(&single.choice);
     Joint {
         rotation: Rotation3::new(gain * off).matrix() * joint.rotation,
-        covariance: symmetric(&covariance),
+        covariance: restored(&symmetric(&covariance)),
         ln_likelihood: joint.ln_likelihood + single.ln_likelihood + ln_density,
         chi_square: joint.chi_square + chi_square,
         choice,
@@ -234,6 +235,8 @@ mod tests {
             assert!(positive_semidefinite(&joined.covariance), "{k}: {}", joined.covariance);
             let along = |axis: Vector3<f64>| axis.dot(&(joined.covariance * axis));
             assert!(along(first) <= 1.1e-10 && along(second) <= 1.1e-13, "{k}: {}", joined.covariance);
+            let thin = extended(&joint(first, 1.0, 1e-14), &joint(second, 1e-10, 1e-24), Alignment::Same);
+            assert!(positive_semidefinite(&thin.covariance), "{k}: {}", thin.covariance);
         }
     }
 }

@@ -56,14 +56,24 @@ pub struct TrackerState {
     pub followed: Vec<Followed>,
 }
 
+/// Whether no two are alike.
+fn differ(tracks: &[u64]) -> bool {
+    let mut sorted = tracks.to_vec();
+    sorted.sort_unstable();
+    sorted.windows(2).all(|two| two[0] != two[1])
+}
+
 impl TrackerState {
     /// Whether its parts agree with each other.
     pub(crate) fn validate(&self) -> Result<()> {
         let is_known = |track: &u64| *track < self.next_track;
         let is_whole = |frame: &FrameMemory| match frame.tracks.len() {
             0 => frame.descriptors.is_empty(),
-            n => frame.descriptors.len().is_multiple_of(n) && frame.tracks.iter().all(is_known),
+            n => {
+                frame.descriptors.len().is_multiple_of(n) && frame.tracks.iter().all(is_known) && differ(&frame.tracks)
+            }
         };
+        let followed: Vec<_> = self.followed.iter().map(|edge| edge.track).collect();
         let is_true = |edge: &Followed| is_known(&edge.track) && edge.seen < self.next_frame;
         // Half of what a number can be: whoever counts from there will not see the end.
         for (name, number) in [("next_frame", self.next_frame), ("next_track", self.next_track)] {
@@ -71,7 +81,7 @@ impl TrackerState {
                 return Err(Error::argument(name, number, "a number below 2^63"));
             }
         }
-        if !self.frames.iter().all(is_whole) || !self.followed.iter().all(is_true) {
+        if !self.frames.iter().all(is_whole) || !self.followed.iter().all(is_true) || !differ(&followed) {
             return Err(Error::argument(
                 "state",
                 "frames or tracks whose parts disagree",

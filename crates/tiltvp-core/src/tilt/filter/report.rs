@@ -124,7 +124,7 @@ pub struct FilteredTilt {
 
 impl FilteredTilt {
     pub(super) fn new(tilt: Tilt, covariance_rad2: Matrix2<f64>, sigma_max_rad: f64) -> Self {
-        let sigma_rad = (0.5 * covariance_rad2.trace()).sqrt();
+        let sigma_rad = (0.5 * covariance_rad2.trace()).max(0.0).sqrt();
         Self {
             tilt: (sigma_rad <= sigma_max_rad).then_some(tilt),
             covariance_rad2,

@@ -6,7 +6,7 @@ use nalgebra::{Matrix2, Matrix6, Vector2, Vector3};
 
 use super::options::TiltFilterOptions;
 use crate::error::{Error, Result};
-use crate::filter::positive_semidefinite;
+use crate::filter::{positive_semidefinite, restored};
 
 /// What a [`TiltFilter`] knows, but for its options: everything the next answer depends on.
 ///
@@ -43,9 +43,9 @@ pub(super) const SCENE: usize = 4;
 /// The largest sum of the variances of an angle's two components, square radians: each is within pi of its mean.
 const VARIANCES_MAX: f64 = 2.0 * PI * PI;
 
-/// By how much rounding may carry a sum of variances above [`VARIANCES_MAX`], as a share of it: that of covariances that are
-/// symmetric and positive ([`positive_semidefinite`]).
-const ROUNDING: f64 = 1e-9;
+/// The same and what rounding may carry it above, as a share of it: that of covariances that are symmetric and positive
+/// ([`positive_semidefinite`]).
+const REACH: f64 = VARIANCES_MAX * (1.0 + 1e-9);
 
 impl TiltFilterState {
     /// Before the first image.
@@ -85,7 +85,7 @@ impl TiltFilterState {
         }
         for at in [FLOOR, MOUNTING, SCENE] {
             let block = self.covariance.fixed_view::<2, 2>(at, at).into_owned();
-            if !is_of_angles(&block) {
+            if block.trace() > REACH {
                 return Err(no_covariance("covariance", &block));
             }
         }
@@ -115,7 +115,7 @@ pub(super) fn add(covariance: &mut Matrix6<f64>, at: usize, block: &Matrix2<f64>
 
 /// Whether a matrix can be the covariance of two angles.
 pub(super) fn is_of_angles(matrix: &Matrix2<f64>) -> bool {
-    positive_semidefinite(matrix) && matrix.trace() <= VARIANCES_MAX * (1.0 + ROUNDING)
+    positive_semidefinite(matrix) && matrix.trace() <= REACH
 }
 
 /// The factor for errors of two angles that leaves them no more unknown than angles can be.
@@ -128,9 +128,10 @@ pub(super) fn of_angles(covariance: &Matrix2<f64>) -> Matrix2<f64> {
     covariance * within_reach(covariance.trace()).powi(2)
 }
 
-/// The covariance of the error state with no angle more unknown than angles can be.
+/// The covariance of the error state with no angle more unknown than angles can be, and restored: rounding of what was large, or what
+/// a state was read with, is not small beside an image's covariance.
 pub(super) fn of_state(covariance: &Matrix6<f64>) -> Matrix6<f64> {
-    let mut out = *covariance;
+    let mut out = restored(covariance);
     for at in [FLOOR, MOUNTING, SCENE] {
         let factor = within_reach(out[(at, at)] + out[(at + 1, at + 1)]);
         if factor < 1.0 {

@@ -276,3 +276,31 @@ impl SegmentFit {
         segments.list.iter().zip(vertical).flat_map(of_segment).collect()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A fit of one wall's edges, which says next to nothing about the lean along it, and the pixels' vote: of variances as far apart
+    /// as those of a fit can be.
+    #[test]
+    fn a_fit_that_tells_one_direction_alone_takes_the_other_from_the_vote() {
+        let fit = |covariance| Fit {
+            tilt: Some(Tilt::from_alpha_beta(0.1, 0.3)),
+            covariance: Some(covariance),
+            ..Fit::failed(Stop::TooFew { have: 0, need: 1 })
+        };
+        let (weak, strong, vote) = (1e6, 1e-5, 1e-4);
+        let together = |own: f64| {
+            let theirs = vote + PIXELS_RAD * PIXELS_RAD;
+            own * theirs / (own + theirs)
+        };
+        for turn in [0.0, 0.3, 0.8, 2.0] {
+            let axes = *nalgebra::Rotation2::new(turn).matrix();
+            let of = |a, b| axes * Matrix2::new(a, 0.0, 0.0, b) * axes.transpose();
+            let found = fused(&fit(of(weak, strong)), &fit(Matrix2::identity() * vote)).covariance.unwrap();
+            let expected = of(together(weak), together(strong));
+            assert!((found - expected).amax() < 1e-3 * expected.amax(), "{turn}: {found} {expected}");
+        }
+    }
+}
