@@ -1035,8 +1035,9 @@ class CornerPoseEstimator:
             common, radians, for its edges to be taken as parallel to them; 0 takes none as parallel. Default:
             0.0698132.
         misfit_max
-            How far the attitudes of one corner in both images may be apart, and the rays from the fused pose, in
-            standard deviations of the covariances as they are: root mean square per degree of freedom. Default: 5.
+            How far the attitudes of one corner in both images may be apart, those of several corners in one image, and
+            the rays from the fused pose, in standard deviations of the covariances as they are: root mean square per
+            degree of freedom. Default: 5.
         distance_min_m
             The least distance of a vertex, metres. Default: 0.05.
         distance_max_m

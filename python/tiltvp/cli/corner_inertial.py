@@ -55,6 +55,8 @@ class Inertial:
 
     samples: InertialSamples
     camera_from_sensor: NDArray[np.float64]
+    first_s: float | None = None
+    """The time of the first frame."""
     before_s: float | None = None
     told: dict[str, int] = field(default_factory=lambda: {"frames": 0, "gravity": 0, "gyro": 0})
     """How many frames there were, and of how many there is something to tell."""
@@ -63,12 +65,17 @@ class Inertial:
         """The keywords of the estimator for the frame of a time."""
         known = self.samples.known(self.before_s, now_s, self.camera_from_sensor)
         self.before_s = now_s
+        self.first_s = now_s if self.first_s is None else self.first_s
         self.told["frames"] += 1
         for name, value in known.items():
             self.told[name] += value is not None
         return known
 
     def summary(self) -> str:
-        """In how many frames it told something."""
-        told = self.told
-        return f"{self.samples.source}: turns of {told['gyro']}, down of {told['gravity']} of {told['frames']} frames"
+        """In how many frames it told something, and where its times are if in none."""
+        told, times_s = self.told, self.samples.times_s
+        text = f"{self.samples.source}: turns of {told['gyro']}, down of {told['gravity']} of {told['frames']} frames"
+        if told["gyro"] or told["gravity"] or self.first_s is None:
+            return text
+        spans = (times_s[0], times_s[-1], self.first_s, self.before_s)
+        return "{}; its times are {:.3f} to {:.3f} s, those of the frames {:.3f} to {:.3f} s".format(text, *spans)

@@ -42,8 +42,8 @@ options! {
         /// How far a corner's own attitude may be from that which all straight edges of a pair of images have in common, radians,
         /// for its edges to be taken as parallel to them; 0 takes none as parallel.
         parallel_max_rad: f64 = 4f64.to_radians() => 0.0..=PI, "an angle from 0 to pi";
-        /// How far the attitudes of one corner in both images may be apart, and the rays from the fused pose, in standard
-        /// deviations of the covariances as they are: root mean square per degree of freedom.
+        /// How far the attitudes of one corner in both images may be apart, those of several corners in one image, and the rays
+        /// from the fused pose, in standard deviations of the covariances as they are: root mean square per degree of freedom.
         misfit_max: f64 = 5.0 => POSITIVE, "a positive number of standard deviations";
         /// The least distance of a vertex, metres.
         distance_min_m: f64 = 0.05 => POSITIVE, "a positive number of metres";

@@ -83,7 +83,8 @@ def compare_inertial(
     `attitudes` are the estimates `camera_from_object` of each frame, or None, by method, among them `IMAGE`. Methods:
     these, at the frames; `ComplementaryFilter` with `IMAGE` as its reference, and `CONVENTIONAL`, filters of
     accelerometer and gyroscope, at the readings of a simulated sensor (`StereoSequence.imu` of that seed). The latter
-    know no yaw; each has the time constant that suits the truth best. Angles are those of the board that holds the
+    know no yaw; each has the time constant that suits the truth best. The level edges of a corner without colours have
+    no names, so that the yaw of one grey camera is up to quarter turns. Angles are those of the board that holds the
     cameras, x forward and z up (ROS REP 103). Raises `InvalidInputError` where the package is missing or no frame has
     an attitude of `IMAGE`.
     """
@@ -102,7 +103,8 @@ def compare_inertial(
             frames = np.array(list(seen))
             images = np.stack([_FORWARD @ a.T @ _FORWARD.T for a in seen.values()])
             at_frames = _board_angles(_level(sequence.poses_at(frames), corner.world_from_object))
-            tables.append(_errors(method, frames, _board_angles(images), at_frames))
+            quarters = method.startswith(_GRAY)
+            tables.append(_errors(method, frames, _board_angles(images), at_frames, quarters=quarters))
     fused = filter_attitudes(imu, by_time[IMAGE])
     known = np.isfinite(fused).all(axis=(1, 2))
     level = np.einsum("ij,njk,lk->nil", _FORWARD, fused[known], _FORWARD)
@@ -193,9 +195,16 @@ def _wrapped(angles: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def _errors(
-    method: str, times: NDArray[np.float64], angles: NDArray[np.float64], truth: NDArray[np.float64]
+    method: str,
+    times: NDArray[np.float64],
+    angles: NDArray[np.float64],
+    truth: NDArray[np.float64],
+    *,
+    quarters: bool = False,
 ) -> pl.DataFrame:
     errors = np.degrees(_wrapped(angles - truth))
+    if quarters:
+        errors[:, 2] = (errors[:, 2] + 45.0) % 90.0 - 45.0
     columns: dict[str, Any] = {"method": [method] * len(times), "time_s": times}
     columns |= {name: errors[:, k] for k, name in enumerate(("roll", "pitch", "yaw"))}
     return pl.DataFrame(columns).with_columns(pl.col("roll", "pitch", "yaw").fill_nan(None))
