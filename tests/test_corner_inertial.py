@@ -167,8 +167,9 @@ def turning(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFac
 def test_the_command_takes_the_sensor_of_a_recording(
     turning: tuple[Path, list[np.ndarray]], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """Of a camera on its side only down tells which edge is upright: 120 degrees off without, right with the sensor, and
-    no pose with one whose axes are taken for others.
+    """Of a camera on its side only down tells which edge is upright: 120 degrees off without, right with the sensor.
+
+    With one whose axes are taken for others there is no pose.
     """
     recording, attitudes = turning
     CAMERA.save(tmp_path / "camera.toml")
