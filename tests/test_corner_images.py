@@ -11,7 +11,19 @@ import numpy as np
 import pytest
 
 import tiltvp
-from drawn_corners import CAMERA, COLOURS, GREYS, LEFT_FROM_RIGHT, LIT_FROM_ABOVE, drawn, off_deg, off_px, pair, pose
+from drawn_corners import (
+    CAMERA,
+    COLOURS,
+    GREYS,
+    LEFT_FROM_RIGHT,
+    LIT_FROM_ABOVE,
+    drawn,
+    off_deg,
+    off_px,
+    pair,
+    pose,
+    turn,
+)
 from tiltvp.corner import CornerDetector, CornerPoseEstimator
 from tiltvp.errors import CalibrationError, InvalidInputError
 from tiltvp.stereo_rigs import StereoRig
@@ -267,3 +279,15 @@ def test_rigs_come_back_from_disk(tmp_path: Path) -> None:
     (tmp_path / "chain.yaml").write_text(f"cam0: {camera}}}\ncam1: {camera}, T_cn_cnm1: {motion}}}\n")
     chain = StereoRig.load(tmp_path / "chain.yaml")
     assert np.allclose(chain.left_from_right, LEFT_FROM_RIGHT, atol=1e-12)
+
+
+def test_corners_of_one_image_that_contradict_each_other_are_no_pose() -> None:
+    """Two boxes, one leaning: alike within `agree_max_rad`, and not within what their edges are known to."""
+    rotation, _ = pose(roll=0.0)
+    for lean_deg, misfit_max, found in ((0.0, 1.0, True), (3.0, 1.0, False), (3.0, 5.0, True)):
+        left = drawn(rotation, np.array([-0.45, 0.0, 1.6]), GREYS)
+        right = drawn(turn("x", lean_deg) @ rotation, np.array([0.45, 0.0, 1.6]), GREYS)
+        estimator = CornerPoseEstimator(CAMERA, method="general", misfit_max=misfit_max)
+        estimate = estimator(np.hstack([left[:, :240], right[:, 240:]]))
+        assert len(estimate.features_left) >= 2
+        assert (estimate.pose is not None) == found, (lean_deg, misfit_max)

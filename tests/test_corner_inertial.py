@@ -9,7 +9,7 @@ import numpy as np
 import polars as pl
 import pytest
 
-from drawn_corners import CAMERA, GREYS, drawn, off_deg, pose
+from drawn_corners import CAMERA, GREYS, LEFT_FROM_RIGHT, drawn, off_deg, pair, pose, turn
 from recordings import START_S, Bag
 from tiltvp.cli import main
 from tiltvp.corner import CornerPoseEstimator
@@ -123,6 +123,18 @@ def test_one_grey_camera_takes_gravity_in_place_of_a_frame_before(sequence: Ster
         vertical = found.pose.camera_from_object[:, 1]
         assert abs(vertical @ down) > np.cos(np.radians(3))
     assert found.hypotheses != turned.hypotheses
+
+
+@pytest.mark.parametrize("cameras", [1, 2])
+def test_a_pose_that_gravity_contradicts_is_none(cameras: int) -> None:
+    rotation, _ = pose()
+    rig = (CAMERA, CAMERA, LEFT_FROM_RIGHT)[: 2 * cameras - 1]
+    for off_by_deg, sigma_rad, found in ((0.0, 0.01, True), (10.0, 0.1, True), (10.0, 0.01, False)):
+        estimator = CornerPoseEstimator(*rig, method="general")
+        down = turn("x", off_by_deg) @ rotation[:, 1]
+        estimate = estimator(*pair(GREYS)[:cameras], gravity=(down, sigma_rad))
+        assert (estimate.pose is not None) == found, (off_by_deg, sigma_rad)
+        assert estimate.reason == ("" if found else "no corner that fits")
 
 
 def test_the_command_takes_readings(

@@ -18,8 +18,10 @@ from tiltvp.lab.evaluation.corners import (
     CORNER_SCENES,
     CornerExperiment,
     CornerScene,
+    fresh_rooms,
     measure_corners,
     summarise_corners,
+    summarise_rooms,
 )
 from tiltvp.lab.plots.corners import corner_errors, inertial_errors
 from tiltvp.lab.plots.picture import figure_picture
@@ -61,7 +63,11 @@ def test_poses_of_the_cuboid_are_close(measured: tuple[pl.DataFrame, pl.DataFram
     assert summary["flips"] == 0
     assert summary["attitude rms deg"] < 0.2
     assert summary["position rms mm"] < 10.0
-    assert set(inertial["method"]) >= {"image", "gyroscope + image", "gyroscope + accelerometer, Mahony"}
+    told = ("image, told down and turns", "image, one grey camera", "image, one grey camera, told down and turns")
+    assert set(inertial["method"]) >= {"image", *told, "gyroscope + image", "gyroscope + accelerometer, Mahony"}
+    assert inertial.filter(pl.col("method") == told[0])["roll"].to_list() == pytest.approx(
+        inertial.filter(pl.col("method") == "image")["roll"].to_list()
+    )
     assert summary["method"] == "coloured"
     published, alone, *scaled = summarise_corners(table).slice(1).iter_rows(named=True)
     assert (published["method"], published["flips"]) == ("paper", 0)
@@ -87,6 +93,30 @@ def test_poses_of_the_cuboid_are_close(measured: tuple[pl.DataFrame, pl.DataFram
     found = table.filter("found")
     angles = found.select((pl.col("roll_deg") ** 2 + pl.col("pitch_deg") ** 2 + pl.col("yaw_deg") ** 2).sqrt())
     assert np.allclose(angles.to_series(), found["attitude_deg"])
+
+
+def test_rooms_are_counted_that_have_a_pose_in_nearly_all_frames() -> None:
+    rooms = fresh_rooms(2)
+    kinds = [room.kind for room in rooms]
+    assert len(set(kinds)) == 3
+    assert kinds[3:] == kinds[:3]
+    assert {room.share for room in rooms} == {1.0}
+    rows = []
+    for number, room in enumerate(rooms):
+        for frame in range(20):
+            # One of twenty frames is none of the second room's, two of the last one's.
+            found = frame >= {1: 1, 5: 2}.get(number, 0)
+            seen = {"corner": 4, "attitude_deg": 0.1, "position_m": 0.002, "nees": 30.0 if number == 0 else 5.0}
+            row = {"scene": room.name, "found": found, "surface": 4.0 if frame == 19 else 0.0}
+            rows.append(row | seen if found else {"scene": room.name, "found": False, "corner": -1})
+    table = pl.DataFrame(rows, schema_overrides={"corner": pl.Int64})
+    *by_kind, of_all = summarise_rooms(table, rooms).iter_rows(named=True)
+    assert [row["rooms with >= 95% found"] for row in by_kind] == [2, 2, 1]
+    assert [row["% NEES > 22.5"] for row in by_kind] == [50.0, 0.0, 0.0]
+    assert (of_all["kind"], of_all["rooms"], of_all["rooms with >= 95% found"]) == ("all", 6, 5)
+    assert (of_all["frames"], of_all["listed"]) == (120, 117)
+    assert of_all["% off surface"] == pytest.approx(100 * 6 / 117)
+    assert (of_all["median deg"], of_all["listed median mm"]) == (0.1, 2.0)
 
 
 def test_in_rooms_axes_may_be_named_at_will_and_corners_lack_in_the_list() -> None:
@@ -147,6 +177,8 @@ def test_the_command_measures_and_refuses(tmp_path: Path, capsys: pytest.Capture
     asked = ["measure", "corners", "--poses", "0", "--noisy-poses", "0", "--frames", "20"]
     assert main([*asked, "--scenes", "attic"]) != 0
     assert CORNER_SCENES[0].name in capsys.readouterr().err
+    assert main([*asked, "--scenes", "office", "--rooms", "1"]) != 0
+    assert "--scenes office and --rooms 1" in capsys.readouterr().err
     (tmp_path / "file").write_text("")
     assert main([*asked, "--out", str(tmp_path / "file")]) != 0
     assert "expected a folder" in capsys.readouterr().err
