@@ -244,6 +244,19 @@ fn a_known_turn_keeps_far_lines_apart_and_unknown_turns_do_not() {
     }
 }
 
+/// There is no frame after the last, whose number a state could not have.
+#[test]
+fn counting_ends_with_a_refusal() {
+    let last = u64::MAX / 2;
+    for (next_frame, next_track, lines) in [(last, 0, 0), (last, 0, 2), (0, last - 1, 2)] {
+        let state = TrackerState { next_frame, next_track, ..TrackerState::default() };
+        let mut tracker = LineTracker::with_state(TrackerOptions::default(), state.clone()).unwrap();
+        let (lines, descriptors) = frame(&[0, 1][..lines], |name| name as f64);
+        let refusal = tracker.update(&lines, &descriptors, None, &mut Vec::new()).unwrap_err().to_string();
+        assert!(refusal.contains("below 2^63") && tracker.state() == &state, "{refusal}");
+    }
+}
+
 /// Edges around a robot that drives to and fro, the nearest half a metre away, three of them alike: each keeps its track, also
 /// after frames without it.
 #[test]

@@ -228,6 +228,7 @@ fn impossible_options_and_arguments_are_refused() {
         TiltFilterState { common: Some(Matrix2::zeros()), ..before.state().clone() },
         TiltFilterState { pending: Some((Vector3::zeros(), small())), ..before.state().clone() },
         TiltFilterState { scene: Vector2::new(f64::NAN, 0.0), ..before.state().clone() },
+        TiltFilterState { scene: Vector2::new(3.75e255, 0.0), ..before.state().clone() },
         TiltFilterState { covariance: before.state().covariance * 1e306, ..before.state().clone() },
         TiltFilterState { common: Some(Matrix2::identity() * 1e306), ..before.state().clone() },
         TiltFilterState { pending: Some((Vector3::z(), Matrix2::identity() * 11.0)), ..before.state().clone() },

@@ -91,9 +91,9 @@ impl FittedRay {
     /// Whether every number is finite, the bearings of unit length and the variances not negative nor above 1e150.
     pub fn is_valid(&self) -> bool {
         let unit = |v: &Vector3<f64>| (v.norm_squared() - 1.0).abs() < 1e-6;
-        // In units of the largest entry, whose square may be none of a float.
+        // In units of the largest entry, whose square may be none of a float; what is below the floats' own digits is none.
         let scale = self.covariance.amax();
-        let c = if scale > 0.0 { self.covariance / scale } else { self.covariance };
+        let c = if scale >= f64::MIN_POSITIVE { self.covariance / scale } else { self.covariance * 0.0 };
         c.iter().all(|x| x.is_finite())
             && scale <= VARIANCE_MAX
             && (c[(0, 1)] - c[(1, 0)]).abs() <= 1e-9
@@ -117,11 +117,18 @@ mod tests {
             FittedRay { normal, covariance, toward: Vector3::x(), support: 2, residual_rms_rad: 0.0 }
         };
         let (good, bad) = (Matrix2::new(2.0, 1.0, 1.0, 0.5), Matrix2::new(2.0, 1.1, 1.1, 0.5));
-        for unit in [1e-300, 1e-160, 1.0, 1e149] {
+        for unit in [1e-307, 1e-160, 1.0, 1e149] {
             assert!(ray(good * unit).is_valid(), "{unit:e}");
             assert!(!ray(bad * unit).is_valid(), "{unit:e}");
         }
         assert!(ray(Matrix2::zeros()).is_valid());
+        // Numbers of so few digits that they are a covariance one way round alone.
+        for few in [[8.443e-319, 1.04553e-318, 1.29472e-318], [1e-322, 5.66e-321, 3.24e-319], [1e-323, 1e-323, 5e-324]]
+        {
+            let [a, b, c] = few;
+            let thin = ray(Matrix2::new(a, b, b, c));
+            assert!(thin.is_valid() && thin.reversed().is_valid(), "{few:?}");
+        }
         for wrong in [f64::NAN, f64::INFINITY, 1e160] {
             assert!(!ray(Matrix2::new(wrong, 0.0, 0.0, 1.0)).is_valid());
             assert!(!ray(Matrix2::new(1.0, wrong, 1.0, 1.0)).is_valid());

@@ -65,7 +65,8 @@ impl LineTracker {
     /// predicted after it.
     ///
     /// # Errors
-    /// [`Error::InvalidArgument`] unless there is a descriptor for each line, as wide as those before, and the motion is finite.
+    /// [`Error::InvalidArgument`] unless there is a descriptor for each line, as wide as those before, the motion is finite, and
+    /// there are numbers left for the frame and its lines; the tracker is as before.
     pub fn update(
         &mut self,
         lines: &Lines,
@@ -232,6 +233,7 @@ impl LineTracker {
             return Err(Error::argument("descriptors", got, "as many values for each line"));
         }
         check_finite("descriptors", descriptors)?;
+        self.state.check_room(1, lines.len() as u64)?;
         match self.state.widths().find(|before| width > 0 && *before != width) {
             None => Ok(width),
             Some(before) => {

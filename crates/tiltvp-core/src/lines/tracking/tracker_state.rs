@@ -56,6 +56,9 @@ pub struct TrackerState {
     pub followed: Vec<Followed>,
 }
 
+/// The largest number of a frame or a track, half of what a number can be: whoever counts to there will not see the end.
+const COUNT_MAX: u64 = u64::MAX / 2;
+
 /// Whether no two are alike.
 fn differ(tracks: &[u64]) -> bool {
     let mut sorted = tracks.to_vec();
@@ -75,18 +78,23 @@ impl TrackerState {
         };
         let followed: Vec<_> = self.followed.iter().map(|edge| edge.track).collect();
         let is_true = |edge: &Followed| is_known(&edge.track) && edge.seen < self.next_frame;
-        // Half of what a number can be: whoever counts from there will not see the end.
-        for (name, number) in [("next_frame", self.next_frame), ("next_track", self.next_track)] {
-            if number > u64::MAX / 2 {
-                return Err(Error::argument(name, number, "a number below 2^63"));
-            }
-        }
+        self.check_room(0, 0)?;
         if !self.frames.iter().all(is_whole) || !self.followed.iter().all(is_true) || !differ(&followed) {
             return Err(Error::argument(
                 "state",
                 "frames or tracks whose parts disagree",
                 "a state that a tracker gave",
             ));
+        }
+        Ok(())
+    }
+
+    /// Whether so many frames and lines more can be counted.
+    pub(crate) fn check_room(&self, frames: u64, lines: u64) -> Result<()> {
+        for (name, number, more) in [("next_frame", self.next_frame, frames), ("next_track", self.next_track, lines)] {
+            if number > COUNT_MAX.saturating_sub(more) {
+                return Err(Error::argument(name, number, "a number below 2^63"));
+            }
         }
         Ok(())
     }

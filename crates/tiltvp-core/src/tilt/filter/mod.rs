@@ -10,7 +10,7 @@ use nalgebra::{Matrix2, Matrix2x6, Matrix6, Rotation2, Rotation3, Vector3};
 pub use self::options::{MountingOptions, TiltFilterOptions};
 pub use self::report::{FilteredTilt, Verdict};
 pub use self::state::TiltFilterState;
-use self::state::{FLOOR, MOUNTING, SCENE, add, is_of_angles, no_covariance, of_angles, of_state};
+use self::state::{FLOOR, MOUNTING, SCENE, add, is_of_angles, no_covariance, of_angles, of_scene, of_state};
 use super::confidence;
 use super::estimate::TiltEstimate;
 use crate::error::{Error, Result};
@@ -130,7 +130,7 @@ impl TiltFilter {
         }
         state.covariance = of_state(&state.covariance);
         state.floor = turned;
-        state.scene = plane_turn * state.scene;
+        state.scene = of_scene(&(plane_turn * state.scene));
         state.common = state.common.map(|common| symmetric(&(plane_turn * common * plane_turn.transpose())));
         state.driven_m += distance_m;
         let wheels = model::robot_from_wheels(&state.mounting);
@@ -260,7 +260,7 @@ impl TiltFilter {
         let after = TiltFilterState {
             floor,
             mounting,
-            scene: scene + step.fixed_rows::<2>(SCENE),
+            scene: of_scene(&(scene + step.fixed_rows::<2>(SCENE))),
             covariance: of_state(&symmetric(&(moved * after * moved.transpose()))),
             common: Some(common),
             driven_m: 0.0,

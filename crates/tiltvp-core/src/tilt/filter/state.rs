@@ -77,8 +77,9 @@ impl TiltFilterState {
         };
         unit("floor", &self.floor)?;
         unit("mounting", &self.mounting)?;
-        if !self.scene.iter().all(|x| x.is_finite()) {
-            return Err(Error::argument("scene", format!("[{}, {}]", self.scene.x, self.scene.y), "finite angles"));
+        if of_scene(&self.scene) != self.scene {
+            let got = format!("[{}, {}]", self.scene.x, self.scene.y);
+            return Err(Error::argument("scene", got, "angles from -pi to pi"));
         }
         if !positive_semidefinite(&self.covariance) {
             return Err(Error::argument("covariance", "another matrix", "a covariance, symmetric and positive"));
@@ -126,6 +127,11 @@ fn within_reach(variances: f64) -> f64 {
 /// The covariance of two angles, no more unknown than angles can be.
 pub(super) fn of_angles(covariance: &Matrix2<f64>) -> Matrix2<f64> {
     covariance * within_reach(covariance.trace()).powi(2)
+}
+
+/// The scene's error with no angle beyond what angles can be.
+pub(super) fn of_scene(scene: &Vector2<f64>) -> Vector2<f64> {
+    scene.map(|angle| angle.clamp(-PI, PI))
 }
 
 /// The covariance of the error state with no angle more unknown than angles can be, and restored: rounding of what was large, or what
