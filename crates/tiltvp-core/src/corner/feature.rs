@@ -323,4 +323,22 @@ mod tests {
             assert!(!spoilt[2].is_valid() && CornerFeature::from_rays(spoilt).is_none());
         }
     }
+
+    #[test]
+    fn long_edges_support_a_corner_and_the_shortest_of_them_most() {
+        let score = |x, y, z| length_score(&[x, y, z]);
+        assert_abs_diff_eq!(score(10.0, 20.0, 30.0), 28.0, epsilon = 1e-12);
+        assert!(score(20.0, 20.0, 20.0) > score(10.0, 20.0, 45.0));
+        assert_abs_diff_eq!(score(200.0, 500.0, 900.0), 380.0, epsilon = 1e-12);
+    }
+
+    #[test]
+    fn rays_are_apart_where_every_two_of_them_are() {
+        let apart = |angles: [f64; 3]| {
+            let rays = angles.map(|angle| ray(angle, 0.0, [1e-6, 1e-6]));
+            CornerFeature::from_rays(rays).unwrap().rays_apart(0.1)
+        };
+        assert!(apart([0.0, 2.0, -2.0]) && apart([0.0, 0.11, 0.22]));
+        assert!(!apart([0.0, 0.09, 2.0]) && !apart([2.0, 0.0, 0.09]) && !apart([0.09, 2.0, 0.0]));
+    }
 }
