@@ -190,8 +190,8 @@ def resolve(
     right_handed: bool | None = None,
     priors: Sequence[Prior] = (),
 ) -> list[ResolvedAttitude]:
-    """The attitudes that several features agree on, the likeliest first, with probabilities that add up to 1 (but for those
-    below 1e-9, which are left out).
+    """The attitudes that several features agree on, the likeliest first, with probabilities that add up to 1 (but for
+    those below 1e-9, which are left out).
 
     Features of one camera, or of several whose rotations to a common frame are given, (3, 3) each. `alignment` says how
     the objects' frames stand: the "same", "manhattan" (right angles, named anyhow), or sharing the "vertical" only.
