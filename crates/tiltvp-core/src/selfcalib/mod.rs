@@ -8,6 +8,8 @@ mod bundle;
 mod calibrator;
 mod diagnosis;
 mod estimate;
+#[cfg(feature = "serde")]
+mod matrix_state;
 mod model;
 mod observability;
 mod offline;

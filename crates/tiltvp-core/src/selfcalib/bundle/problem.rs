@@ -46,6 +46,7 @@ pub(crate) struct BundleProblem {
     /// Mean of the shared parameters without the bearings of the keyframes.
     pub(crate) prior_mean: DVector<f64>,
     /// Information about them.
+    #[cfg_attr(feature = "serde", serde(deserialize_with = "crate::selfcalib::matrix_state::matrix"))]
     pub(crate) prior_information: DMatrix<f64>,
     pub(crate) bearing_sigma: f64,
     /// The scatter of each landmark's bearings, in units of `bearing_sigma`.

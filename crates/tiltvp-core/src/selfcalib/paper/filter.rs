@@ -18,6 +18,7 @@ pub(crate) struct PaperFilter {
     features: Vec<Feature>,
     /// (phi, rho, psi).
     mounting: Vector3<f64>,
+    #[cfg_attr(feature = "serde", serde(deserialize_with = "crate::selfcalib::matrix_state::matrix"))]
     covariance: DMatrix<f64>,
 }
 

@@ -29,6 +29,7 @@ pub(crate) struct SlidingWindow {
     pub(super) problem: BundleProblem,
     /// (pose, mounting, landmarks) now.
     pub(super) mean: DVector<f64>,
+    #[cfg_attr(feature = "serde", serde(deserialize_with = "crate::selfcalib::matrix_state::matrix"))]
     pub(super) covariance: DMatrix<f64>,
     /// The caller's identifiers of the landmarks; `None` once an identifier means another landmark.
     pub(super) landmark_ids: Vec<Option<u64>>,
