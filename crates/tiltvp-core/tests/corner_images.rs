@@ -55,7 +55,7 @@ fn the_corner_of_a_grey_cube_is_among_those_that_are_found() {
         let best = found.iter().map(|corner| errors(corner, right_m)).min_by(|a, b| a.0.total_cmp(&b.0)).unwrap();
         assert!(best.0 < 2.0 * CLOSE_RAD && best.1 < 0.01, "{right_m}: {best:?} of {}", found.len());
     }
-    let wall = [150; 320 * 180];
+    let wall = vec![150; 320 * 180];
     let image = ImageView::new(&wall, 320, 180, 320).unwrap();
     detector.detect_general(&image, None, &mut scratch, &mut found).unwrap();
     assert!(found.is_empty());
