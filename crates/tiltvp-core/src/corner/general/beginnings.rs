@@ -70,8 +70,12 @@ fn step_across(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::testing::camera;
+    use crate::camera::{Model, Pinhole};
     use nalgebra::Vector2;
+
+    fn camera(width: u32, height: u32, focal_px: f64, centre_px: [f64; 2]) -> Camera {
+        Camera::new(width, height, Model::Pinhole(Pinhole::new([focal_px; 2], centre_px, &[]).unwrap())).unwrap()
+    }
 
     /// Where the three edges meet, pixels: between pixel centres, so that nothing hangs on those.
     const AT: Vector2<f64> = Vector2::new(80.3, 59.6);
@@ -83,7 +87,7 @@ mod tests {
     /// edges, by `level(sector, pixels from the vertex)`, as the mean over each pixel.
     fn begin(level: impl Fn(usize, f64) -> f64) -> usize {
         let (wide, high) = (160, 120);
-        let camera = camera("pinhole", [wide, high], &[("fx", 200.0), ("fy", 200.0), ("cx", 79.5), ("cy", 59.5)], &[]);
+        let camera = camera(wide, high, 200.0, [79.5, 59.5]);
         let mean = |u: u32, v: u32| {
             let part = |k: u32| (f64::from(k) + 0.5) / 4.0 - 0.5;
             let inside = (0..16).map(|k| {
@@ -135,7 +139,7 @@ mod tests {
     #[test]
     fn an_edge_at_the_border_of_the_image_is_not_known_to_begin() {
         let light = LightTable::new(2.2).unwrap();
-        let camera = camera("pinhole", [40, 40], &[("fx", 50.0), ("fy", 50.0), ("cx", 20.0), ("cy", 20.0)], &[]);
+        let camera = camera(40, 40, 50.0, [20.0; 2]);
         let data: Vec<u8> = (0..1600).map(|i| if i % 40 < 20 { 50 } else { 200 }).collect();
         let image = ImageView::new(&data, 40, 40, 40).unwrap();
         let bearing = |u: f64, v: f64| camera.unproject(&Vector2::new(u, v)).unwrap();
