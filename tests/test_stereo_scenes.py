@@ -107,14 +107,14 @@ def test_the_truth_is_where_the_images_have_it(sequence: StereoSequence) -> None
 
 
 def test_an_image_attitude_fuses_with_the_gyroscope(laboratory: Laboratory) -> None:
-    from tiltvp.lab.evaluation.corner_inertial import compare_inertial, summarise_inertial_comparison
+    from tiltvp.lab.evaluation.corner_inertial import IMAGE, compare_inertial, summarise_inertial_comparison
 
     left, right = small_cameras()
     sequence = StereoSequence(laboratory, left=left, right=right, frames=300, seed=2)
     rng = np.random.default_rng(0)
     noise = [cv2.Rodrigues(np.deg2rad(0.2) * rng.standard_normal(3))[0] for _ in range(300)]
     seen = [turn @ sequence.left_from_object(k)[:3, :3] if k % 10 else None for k, turn in enumerate(noise)]
-    table = summarise_inertial_comparison(compare_inertial(sequence, seen))
+    table = summarise_inertial_comparison(compare_inertial(sequence, {IMAGE: seen}))
     rms = {row["method"]: row for row in table.to_dicts()}
     image, fused = rms["image"], rms["gyroscope + image"]
     assert image["readings"] == 270
