@@ -105,6 +105,7 @@ __all__ = [
     "train_posterior",
     "triangulate",
     "wheel_displacements",
+    "yaml_tree",
     "zncc_matrix",
 ]
 CALIBRATION_METHODS: Final[list[str]]
@@ -1570,7 +1571,7 @@ class Leveller:
         robot_from_camera: ArrayLike | None = None,
         robot_from_shown: ArrayLike | None = None,
         rays: ArrayLike | None = None,
-        columns: int = 0,
+        columns: SupportsIndex = 0,
     ) -> Self: ...
     def _level(self, image: NDArray[np.uint8], normal: ArrayLike) -> NDArray[np.uint8]:
         """(H, W) or (H, W, 3): the level image of one of the camera, C-contiguous uint8."""
@@ -3624,6 +3625,13 @@ def wheel_displacements(
     distance_m: ArrayLike, heading_change_rad: ArrayLike, *, wheel_base_m: float
 ) -> NDArray[np.float64]:
     """(N, 2) displacements (left, right) of wheels that drive distances (N,) and turn (N,) to the left (eq. 15)."""
+
+def yaml_tree(text: str, *, most_values: SupportsIndex, deepest: SupportsIndex) -> Any:
+    """The tree of a YAML text; every scalar is its text, tags are ignored, an alias is the object that it names.
+
+    Raises `ValueError` for what is no YAML of one document, for more than `most_values` keys and values, where what an
+    alias stands for counts every time, for more than `deepest` levels, and for a key with two values that differ.
+    """
 
 def zncc_matrix(a: NDArray[np.float32], b: NDArray[np.float32]) -> NDArray[np.float64]:
     """(N_A, N_B): zero-mean normalised cross-correlations of patches (N, K), eq. 13; 1 for equal ones."""

@@ -22,6 +22,7 @@ mod stereo;
 mod synth;
 mod tilt;
 mod value;
+mod yaml;
 
 use pyo3::prelude::*;
 
@@ -87,6 +88,8 @@ mod _core {
         common_direction, leaning_from_upright, normal_from_alpha_beta, tilt_error_rad, tilt_from_wheel_heights,
         train_affine, train_factor, train_posterior,
     };
+    #[pymodule_export]
+    use crate::yaml::yaml_tree;
 
     /// The vectors that this process uses: "fallback", "sse4.2", "avx2", "avx512" or "neon".
     ///

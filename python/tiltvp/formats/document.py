@@ -14,6 +14,7 @@ from typing import Final, NoReturn
 
 from tiltvp.errors import CalibrationError, CalibrationNotFoundError
 from tiltvp.files import read_bytes
+from tiltvp.formats.yaml_text import tree_of
 
 Tree = dict[str, object]
 
@@ -119,9 +120,6 @@ class Document:
             elif start in "{[":
                 tree = json.loads(self.text, object_pairs_hook=_from_pairs)
             else:
-                # Here, so that `import tiltvp` does without PyYAML.
-                from tiltvp.formats.yaml_text import tree_of
-
                 tree = tree_of(self.text)
         except RecursionError:
             return {}, "nested too deeply"

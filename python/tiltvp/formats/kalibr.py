@@ -14,6 +14,7 @@ from tiltvp.formats.document import Document
 from tiltvp.formats.node import Node
 from tiltvp.formats.spec import CameraSpec, ImageSize
 from tiltvp.formats.writing import brown_of, four_of, general, kannala_brandt_of, mei_of, refuse, value
+from tiltvp.formats.yaml_text import yaml_of
 
 _CAMERA = re.compile(r"cam\d+", re.ASCII)
 _SUPPORTED = (
@@ -86,10 +87,8 @@ def _size(camera: Node, given: ImageSize | None) -> ImageSize:
 
 def written(specs: Sequence[CameraSpec]) -> str:
     """The text of a chain of cameras, without the rotations between them. Raises `UnsupportedFormatError`."""
-    import yaml
-
     cameras = {f"cam{index}": _table(general(spec, "Kalibr"), index) for index, spec in enumerate(specs)}
-    return str(yaml.safe_dump(cameras, sort_keys=False, default_flow_style=None))
+    return yaml_of(cameras)
 
 
 def _table(spec: CameraSpec, index: int) -> dict[str, object]:

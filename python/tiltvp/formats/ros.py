@@ -14,6 +14,7 @@ from tiltvp.formats.document import Document
 from tiltvp.formats.node import Node
 from tiltvp.formats.spec import CameraSpec, ImageSize
 from tiltvp.formats.writing import brown_of, four_of, general, kannala_brandt_of, only_one, refuse
+from tiltvp.formats.yaml_text import yaml_of
 
 _MATRIX = ("camera_matrix", "K", "k")
 _COEFFICIENTS = ("distortion_coefficients", "D", "d")
@@ -54,8 +55,6 @@ def written(specs: Sequence[CameraSpec]) -> str:
 
     Raises `UnsupportedFormatError`, also for several cameras.
     """
-    import yaml
-
     spec = general(only_one(specs, "ROS"), "ROS")
     fx, fy, cx, cy = four_of(spec)
     if spec.model == "kannala_brandt":
@@ -76,7 +75,7 @@ def written(specs: Sequence[CameraSpec]) -> str:
         "rectification_matrix": _matrix(3, [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0]),
         "projection_matrix": _matrix(3, [fx, 0.0, cx, 0.0, 0.0, fy, cy, 0.0, 0.0, 0.0, 1.0, 0.0]),
     }
-    return str(yaml.safe_dump(table, sort_keys=False, default_flow_style=None, width=200))
+    return yaml_of(table)
 
 
 def _matrix(rows: int, data: list[float]) -> dict[str, object]:

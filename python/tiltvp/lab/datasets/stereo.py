@@ -11,10 +11,10 @@ from threading import Event
 from typing import Any, Final
 
 import numpy as np
-import yaml
 
 from tiltvp import _core
 from tiltvp.errors import InvalidInputError
+from tiltvp.formats.yaml_text import yaml_of
 from tiltvp.images import write_image
 from tiltvp.lab.datasets.new import NewDataset, in_order, new_folder
 from tiltvp.rotations import quaternion
@@ -59,7 +59,7 @@ def write_stereo(
     """
     digits = max(6, len(str(len(sequence) - 1)))
     names = [f"{frame:0{digits}d}.png" for frame in range(len(sequence))]
-    calibration = yaml.safe_dump(_camchain(sequence), sort_keys=False, default_flow_style=None)
+    calibration = yaml_of(_camchain(sequence))
     stop = Event()
     with new_folder(out, force=force) as new:
         for side in ("left", "right"):
