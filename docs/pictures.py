@@ -25,10 +25,17 @@ from tiltvp.streams import Wheels, frame_motions, open_frames
 from tiltvp.synth import MIRROR_BLIND_RAD, Laboratory, Room, StereoSequence, mirror_camera, zed_cameras
 
 IMAGES = Path(__file__).parent / "images"
+
+
+def fisheye(cx: float, cy: float) -> tiltvp.Camera:
+    """A lens that sees somewhat more than a half of all directions."""
+    return tiltvp.Camera.equidistant(
+        width=360, height=360, focal_px=110.0, cx=cx, cy=cy, max_theta_rad=math.radians(92.5)
+    )
+
+
 ALPHA_RAD, BETA_RAD = math.radians(12.0), math.radians(40.0)
-FISHEYE = tiltvp.Camera.equidistant(
-    width=360, height=360, focal_px=110.0, cx=179.5, cy=179.5, max_theta_rad=math.radians(92.5)
-)
+FISHEYE = fisheye(179.5, 179.5)
 PINHOLE = tiltvp.Camera.pinhole(width=480, height=360, fx=240.0, fy=240.0, cx=239.5, cy=179.5)
 FORWARD = np.array([[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]])
 
@@ -40,6 +47,7 @@ def main(names: Sequence[str]) -> None:
     makers = {
         "lenses": lambda: lenses(room, pose),
         "level": lambda: levelling(room, pose),
+        "lens": lambda: checked_lens(room),
         "corner": corners,
         "colmap": lambda: gravity(room, pose),
         "datasets": lambda: known_leans(room, pose),
@@ -80,6 +88,21 @@ def levelling(room: Room, pose: np.ndarray) -> None:
         'level, to="panorama"': panorama(image, estimate),
     }
     write("level.jpg", [draw_words(picture, name) for name, picture in pictures.items()])
+
+
+def checked_lens(room: Room) -> None:
+    """An image as a panorama by a lens whose centre is told wrong, and by the one that `check_lens` makes of it."""
+    images = [room.render(FISHEYE, pose=pose, samples=2).bgr for pose in room.free_poses(5, 5)]
+    told = fisheye(189.5, 172.5)
+    found = tiltvp.check_lens([cv2.cvtColor(image, cv2.COLOR_BGR2GRAY) for image in images], told)
+    assert not found
+    du, dv = found.centre_off_px
+    cameras = {"centre as told": told, f"moved by {du:.1f}, {dv:.1f} px": fisheye(189.5 + du, 172.5 + dv)}
+    rows = []
+    for name, camera in cameras.items():
+        panorama = tiltvp.Leveller(camera, to="panorama", size=(1080, 540))(images[0], (0.0, 0.0, 1.0))
+        rows.append(draw_words(panorama[70:280], name))
+    write("lens.jpg", [np.vstack(rows)])
 
 
 def corners() -> None:
