@@ -3,14 +3,14 @@
 use numpy::PyArray1;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use tiltvp_synth::{DriveOptions, Mount, RobotPose, on_threads};
+use tiltvp_synth::{DriveOptions, Mount, RobotPose};
 
 use crate::array::Array;
-use crate::call::{call_long, invalid};
+use crate::call::invalid;
 use crate::camera::Camera;
 use crate::convert;
 use crate::options;
-use crate::synth::{Pictures, Room, pictures, threads_from};
+use crate::synth::{Pictures, Room, call_on_threads, pictures};
 use crate::value::{frozen, getters};
 
 type Rows<'py> = Array<'py, f64>;
@@ -43,9 +43,8 @@ impl Drive {
             return Err(invalid("frames and legs, expected one of them: legs have as many frames as they need".into()));
         }
         let parsed = options::given(DriveOptions::default(), options)?;
-        let threads = threads_from(threads)?;
         let (world, lens) = (room.get().world.clone(), camera.get().inner.clone());
-        let inner = call_long(room.py(), || on_threads(threads, || tiltvp_synth::Drive::new(world, lens, parsed))?)?;
+        let inner = call_on_threads(room.py(), threads, || tiltvp_synth::Drive::new(world, lens, parsed))?;
         Ok(Self { room: room.clone().unbind(), camera: camera.clone().unbind(), inner })
     }
 
@@ -137,8 +136,8 @@ impl Drive {
         frame: &Bound<'py, PyAny>,
         threads: Option<&Bound<'py, PyAny>>,
     ) -> PyResult<Pictures<'py>> {
-        let (frame, threads) = (self.frame(frame)?, threads_from(threads)?);
-        let image = call_long(py, || on_threads(threads, || self.inner.render(frame))?)?;
+        let frame = self.frame(frame)?;
+        let image = call_on_threads(py, threads, || self.inner.render(frame))?;
         pictures(py, image)
     }
 
@@ -154,9 +153,9 @@ impl Drive {
     ) -> PyResult<Pictures<'py>> {
         let frame = convert::whole(frame, "frame", "a whole number from 0")?;
         let [x_m, y_m, yaw_rad] = convert::vector3(pose, "pose")?.into();
-        let (tilt, threads) = (convert::tilt(normal, "normal")?, threads_from(threads)?);
+        let tilt = convert::tilt(normal, "normal")?;
         let pose = RobotPose { x_m, y_m, yaw_rad };
-        let image = call_long(py, || on_threads(threads, || self.inner.render_at(frame, pose, tilt))?)?;
+        let image = call_on_threads(py, threads, || self.inner.render_at(frame, pose, tilt))?;
         pictures(py, image)
     }
 
@@ -168,8 +167,8 @@ impl Drive {
         frame: &Bound<'py, PyAny>,
         threads: Option<&Bound<'py, PyAny>>,
     ) -> PyResult<Sightings<'py>> {
-        let (frame, threads) = (self.frame(frame)?, threads_from(threads)?);
-        let seen = call_long(py, || on_threads(threads, || self.inner.sightings(frame))?)?;
+        let frame = self.frame(frame)?;
+        let seen = call_on_threads(py, threads, || self.inner.sightings(frame))?;
         let column = |value: fn(&tiltvp_synth::EdgeSighting) -> f64| {
             Array::new(PyArray1::from_vec(py, seen.iter().map(value).collect()))
         };

@@ -4,11 +4,10 @@ use std::sync::Arc;
 
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use tiltvp_synth::{LaboratoryOptions, World, on_threads};
+use tiltvp_synth::{LaboratoryOptions, World};
 
-use crate::call::call_long;
 use crate::options;
-use crate::synth::{seed_from, threads_from};
+use crate::synth::{call_on_threads, seed_from};
 use crate::value::{frozen, getters};
 
 /// A plain room with a coloured cuboid, to be looked at by `tiltvp.synth.StereoSequence`.
@@ -33,8 +32,7 @@ impl Laboratory {
     ) -> PyResult<Self> {
         let options =
             options::given(LaboratoryOptions { seed: seed_from(seed)?, ..LaboratoryOptions::default() }, options)?;
-        let threads = threads_from(threads)?;
-        let world = call_long(py, || on_threads(threads, || World::laboratory(&options))?)?;
+        let world = call_on_threads(py, threads, || World::laboratory(&options))?;
         Ok(Self { options, world: Arc::new(world) })
     }
 

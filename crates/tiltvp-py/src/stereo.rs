@@ -8,7 +8,7 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use tiltvp_synth::{
     ColorImage, CornerSighting, ImuOptions, LaboratoryOptions, RoomOptions, StereoOptions, World, imu_readings,
-    on_threads, readings_of,
+    readings_of,
 };
 
 use crate::array::Array;
@@ -17,7 +17,7 @@ use crate::camera::Camera;
 use crate::convert;
 use crate::laboratory::Laboratory;
 use crate::options;
-use crate::synth::{Room, threads_from};
+use crate::synth::{Room, call_on_threads};
 use crate::value::{frozen, getters, of_class};
 
 /// Position, directions of the edges x, y, z in rows, their lengths, and the kind, of a corner.
@@ -63,9 +63,7 @@ impl StereoSequence {
         let parsed = options::given(StereoOptions::default(), options)?;
         let world = world_of(scene)?;
         let cameras = [left.get().inner.clone(), right.get().inner.clone()];
-        let threads = threads_from(threads)?;
-        let inner =
-            call_long(py, || on_threads(threads, || tiltvp_synth::StereoSequence::new(world, cameras, parsed))?)?;
+        let inner = call_on_threads(py, threads, || tiltvp_synth::StereoSequence::new(world, cameras, parsed))?;
         Ok(Self { scene: scene.clone().unbind(), left: left.clone().unbind(), right: right.clone().unbind(), inner })
     }
 
@@ -133,8 +131,8 @@ impl StereoSequence {
         frame: &Bound<'py, PyAny>,
         threads: Option<&Bound<'py, PyAny>>,
     ) -> PyResult<(Picture<'py>, Picture<'py>)> {
-        let (frame, threads) = (self.frame(frame)?, threads_from(threads)?);
-        let [left, right] = call_long(py, || on_threads(threads, || self.inner.render(frame))?)?;
+        let frame = self.frame(frame)?;
+        let [left, right] = call_on_threads(py, threads, || self.inner.render(frame))?;
         Ok((picture(py, left)?, picture(py, right)?))
     }
 
@@ -146,8 +144,8 @@ impl StereoSequence {
         frame: &Bound<'py, PyAny>,
         threads: Option<&Bound<'py, PyAny>>,
     ) -> PyResult<Sightings<'py>> {
-        let (frame, threads) = (self.frame(frame)?, threads_from(threads)?);
-        let seen = call_long(py, || on_threads(threads, || self.inner.sightings(frame))?)?;
+        let frame = self.frame(frame)?;
+        let seen = call_on_threads(py, threads, || self.inner.sightings(frame))?;
         let vertices = |s: &CornerSighting| Matrix2::from_columns(&s.vertex_px).transpose();
         let lengths = |s: &CornerSighting| Matrix2x3::from_row_slice(s.edges_px.as_flattened());
         Ok((

@@ -6,6 +6,7 @@ use nalgebra::{Matrix3, Matrix3x2, Vector2};
 use numpy::{PyArray1, PyArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
+use tiltvp_core::Error;
 use tiltvp_core::camera::Camera as CoreCamera;
 use tiltvp_core::geometry::Tilt;
 use tiltvp_synth::{Image, Lens, RenderOptions, RobotPose, RoomKind, RoomOptions, Segment, View, World, on_threads};
@@ -44,9 +45,8 @@ impl Room {
         options: Option<&Bound<'_, PyDict>>,
     ) -> PyResult<Self> {
         let kind: RoomKind = kind.parse().map_err(|error| exception(&error))?;
-        let (seed, threads) = (seed_from(seed)?, threads_from(threads)?);
-        let options = options::given(RoomOptions::new(kind, seed), options)?;
-        let world = call_long(py, || on_threads(threads, || World::new(&options))?)?;
+        let options = options::given(RoomOptions::new(kind, seed_from(seed)?), options)?;
+        let world = call_on_threads(py, threads, || World::new(&options))?;
         Ok(Self { options, world: Arc::new(world) })
     }
 
@@ -99,14 +99,12 @@ impl Room {
     ) -> PyResult<Pictures<'py>> {
         let shot = options::given(Shot::default(), options)?;
         shot.check()?;
-        let (options, threads) = (shot.rendering.clone(), threads_from(threads)?);
         let camera = &camera.get().inner;
-        let image = call_long(py, || {
+        let seen = call_on_threads(py, threads, || {
             let lens = |x: f64, y: f64| camera.unproject(&Vector2::new(x, y));
-            let view = shot.view(&lens, camera);
-            Ok(on_threads(threads, || tiltvp_synth::render(&self.world, &view, &options))??.image)
+            tiltvp_synth::render(&self.world, &shot.view(&lens, camera), &shot.rendering)
         })?;
-        pictures(py, image)
+        pictures(py, seen.image)
     }
 
     /// Grey (height, 2 height) and RGB (height, 2 height, 3) images of everything around a place.
@@ -119,15 +117,13 @@ impl Room {
         options: Option<&Bound<'py, PyDict>>,
     ) -> PyResult<Pictures<'py>> {
         let shot = options::given(Shot::default(), options)?;
-        let (pose, options) = (shot.pose(), shot.rendering.clone());
+        let pose = shot.pose();
         let height: u16 = convert::whole(height, "height", "a whole number of pixels")?;
-        let threads = threads_from(threads)?;
-        let image = call_long(py, || {
+        let seen = call_on_threads(py, threads, || {
             let up = shot.camera_height_m.unwrap_or_else(|| View::new(&|_, _| None, 1, 1, pose).camera_height_m);
-            let work = || tiltvp_synth::render_panorama(&self.world, pose, up, usize::from(height), &options);
-            Ok(on_threads(threads, work)??.image)
+            tiltvp_synth::render_panorama(&self.world, pose, up, usize::from(height), &shot.rendering)
         })?;
-        pictures(py, image)
+        pictures(py, seen.image)
     }
 
     /// (N, 2, 3) bearings of the ends in the camera frame and (N,) contrasts of the straight edges in sight.
@@ -193,8 +189,18 @@ pub(crate) fn seed_from(seed: &Bound<'_, PyAny>) -> PyResult<u64> {
     convert::whole(seed, "seed", "a whole number from 0 to 2^64 - 1")
 }
 
+/// As [`call_long`], on that many threads; without a number on one per core.
+pub(crate) fn call_on_threads<T: Send>(
+    py: Python<'_>,
+    threads: Option<&Bound<'_, PyAny>>,
+    work: impl FnOnce() -> Result<T, Error> + Send,
+) -> PyResult<T> {
+    let threads = threads_from(threads)?;
+    call_long(py, || on_threads(threads, work)?)
+}
+
 /// How many threads; 0 for one per core.
-pub(crate) fn threads_from(threads: Option<&Bound<'_, PyAny>>) -> PyResult<usize> {
+fn threads_from(threads: Option<&Bound<'_, PyAny>>) -> PyResult<usize> {
     let Some(threads) = threads else { return Ok(0) };
     match convert::whole(threads, "threads", "a whole number from 1")? {
         0 => Err(invalid("threads = 0, expected a whole number from 1".to_owned())),

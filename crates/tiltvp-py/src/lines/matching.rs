@@ -78,8 +78,14 @@ pub(crate) fn match_descriptors<'py>(
         core::match_descriptors(&a, &b, width, &parsed, gate.as_ref(), &mut scratch, &mut out)?;
         Ok(out)
     })?;
-    let flat: Vec<i64> = matches.iter().flat_map(|found| [found.a as i64, found.b as i64]).collect();
-    PyArray1::from_vec(py, flat).reshape([matches.len(), 2])
+    pairs(py, matches.iter().map(|found| [found.a, found.b]))
+}
+
+/// `(M, 2)`.
+fn pairs(py: Python<'_>, rows: impl Iterator<Item = [usize; 2]>) -> PyResult<Bound<'_, PyArray2<i64>>> {
+    let flat: Vec<i64> = rows.flatten().map(|row| row as i64).collect();
+    let count = flat.len() / 2;
+    PyArray1::from_vec(py, flat).reshape([count, 2])
 }
 
 /// Pairs `(M, 2)` and confidences `(M,)`.
@@ -122,9 +128,8 @@ pub(crate) fn match_wide<'py>(
         core::match_wide(&a, &b, ahead, &parsed, &mut scratch, &mut out)?;
         Ok(out)
     })?;
-    let flat: Vec<i64> = matches.iter().flat_map(|found| [found.a as i64, found.b as i64]).collect();
     let confidences = matches.iter().map(|found| found.confidence).collect();
-    Ok((PyArray1::from_vec(py, flat).reshape([matches.len(), 2])?, PyArray1::from_vec(py, confidences)))
+    Ok((pairs(py, matches.iter().map(|found| [found.a, found.b]))?, PyArray1::from_vec(py, confidences)))
 }
 
 fn matrix<'py>(
