@@ -186,17 +186,19 @@ fuzz seconds="3600": nightly
             -max_total_time=$(({{seconds}} / 2 / $(wc -w <<< $targets) + 1)) -artifact_prefix=out/fuzz/$target- -print_final_stats=1
     done
 
-# The unit tests of kernels and core under AddressSanitizer, at each level of vectors that the machine has.
+# The unit tests of kernels and core under AddressSanitizer, at each level of vectors that the machine has, and of the C interface.
 sanitize: setup nightly
     #!/usr/bin/env bash
     set -euo pipefail
     host=$(rustc --print host-tuple)
     tests() { cargo +nightly test --locked --target $host --target-dir target/sanitize --quiet --lib "$@"; }
-    export PROPTEST_RNG_SEED=20171028 PROPTEST_CASES=32
+    export PROPTEST_RNG_SEED=20171028 PROPTEST_CASES=32 RUSTFLAGS="-Zsanitizer=address"
     for level in $({{bin}}/python -c 'import tiltvp._core; print(*tiltvp._core.SIMD_LEVELS)'); do
         echo "== AddressSanitizer, $level"
-        TILTVP_BUILT_FOR=$level RUSTFLAGS="-Zsanitizer=address" tests --package tiltvp-kernels --package tiltvp-core
+        TILTVP_BUILT_FOR=$level tests --package tiltvp-kernels --package tiltvp-core
     done
+    echo "== AddressSanitizer, C interface"
+    tests --package tiltvp-capi
 
 # What is found is in out/mutants.out; `--in-place` changes the checkout and puts it back.
 # Mutation testing of the core's tests, by cargo-mutants: tilt, selfcalib and corner; one in 64 mutants, or other `--shard`s.

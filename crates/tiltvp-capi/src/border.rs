@@ -62,10 +62,16 @@ thread_local! {
 /// Does the work of a call; panics end here.
 pub(crate) fn run(work: impl FnOnce() -> Outcome<()>) -> Status {
     let outcome = catch_unwind(AssertUnwindSafe(work)).unwrap_or_else(|payload| {
-        let told = payload.downcast_ref::<String>().map(String::as_str).or(payload.downcast_ref::<&str>().copied());
-        let why = format!("a fault of tiltvp, please report it: {}", told.unwrap_or("a panic"));
-        // A payload that panics when it is dropped would cross the border.
-        std::mem::forget(payload);
+        let told = payload
+            .downcast::<String>()
+            .map(|text| *text)
+            .or_else(|other| other.downcast().map(|text: Box<&str>| text.to_string()));
+        let told = told.unwrap_or_else(|other| {
+            // A payload that panics when it is dropped would cross the border.
+            std::mem::forget(other);
+            "a panic".to_owned()
+        });
+        let why = format!("a fault of tiltvp, please report it: {told}");
         Err(Failure(Status::InternalError, why))
     });
     let Err(Failure(status, why)) = outcome else { return Status::Ok };
