@@ -88,12 +88,12 @@ def panoramas(
 def views(directory: Panoramas, /, *, every: Every = 1, weights: bool = False, out: Out = None) -> None:
     """The vertical of views that look anywhere, pinhole and fisheye, by the method of straight edges.
 
-    Roll and pitch are within 45 degrees; which direction is up is chosen by weights that have not seen the building.
+    Roll and pitch are within 45 degrees; which direction is up is chosen by a network that has not seen the building.
 
     Parameters
     ----------
     weights
-        Also print the weights that all views train.
+        Also print the network that all views train, as `choice_weights.rs` has it.
     """
     from tiltvp.lab.datasets.panoramas import read_panorama_index
     from tiltvp.lab.evaluation.ahead import ahead_table, look_ahead, train_choice
@@ -109,7 +109,7 @@ def views(directory: Panoramas, /, *, every: Every = 1, weights: bool = False, o
         "Area under the recall curve of roll and pitch, per cent, to 1, 5 and 10 degrees", table, ["camera", "choice"]
     )
     if weights:
-        say(", ".join(f"{weight:.4g}" for weight in train_choice(seen)))
+        say(train_choice(seen).rust())
 
 
 @app.command
