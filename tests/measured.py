@@ -16,12 +16,12 @@ ROOT = Path(__file__).parents[1]
 RUNS = ROOT / "docs" / "measured"
 RESTS_ON: dict[str, tuple[str, ...]] = {
     "measure-panoramas": ("cameras", "tilt", "segments"),
-    "measure-views": ("cameras", "segments"),
+    "measure-views": ("cameras", "segments", "anywhere"),
     "measure-segments": ("cameras", "segments"),
     "measure-inertial": ("cameras", "tilt"),
     "measure-database": ("cameras", "tilt"),
     "measure-striding": ("cameras", "tilt"),
-    "measure-level": ("cameras", "tilt", "segments"),
+    "measure-level": ("cameras", "tilt", "segments", "anywhere"),
     "measure-colmap": ("cameras", "segments"),
     "measure-planar-pose": ("cameras", "tilt"),
     "measure-lines": ("cameras", "lines"),

@@ -155,6 +155,17 @@ def straight_edges() -> Iterator[tuple[str, Any]]:
     yield "panorama", tiltvp.SegmentDetector(camera)(image)
 
 
+def looking_anywhere() -> Iterator[tuple[str, Any]]:
+    for name, camera, image, mounting in leaning_views():
+        for limit in (1.0, math.pi):
+            options = {"method": "segments", "robot_from_camera": mounting, "tilt_max_rad": limit}
+            yield f"{name} within {limit:.2f}", tiltvp.TiltEstimator(camera, **options)(image)
+    camera = tiltvp.Camera.equirectangular(width=512, height=256)
+    image = synth.Room("office", 7).render_panorama(pose=(2.0, 2.0, 0.4), height=256, samples=2).gray
+    options = {"method": "segments", "robot_from_camera": AHEAD, "tilt_max_rad": math.pi}
+    yield "panorama", tiltvp.TiltEstimator(camera, **options)(image)
+
+
 def filters() -> Iterator[tuple[str, Any]]:
     rng = np.random.default_rng(2)
     for title, options in (("plain", {}), ("mounting", {"estimate_mounting": True})):
@@ -258,6 +269,7 @@ GROUPS: dict[str, Callable[[], Iterator[tuple[str, Any]]]] = {
     "tilt": tilts,
     "level": level_images,
     "segments": straight_edges,
+    "anywhere": looking_anywhere,
     "filters": filters,
     "lines": lines_and_tracks,
     "calibration": calibrations,

@@ -85,31 +85,38 @@ def panoramas(
 
 
 @app.command
-def views(directory: Panoramas, /, *, every: Every = 1, weights: bool = False, out: Out = None) -> None:
+def views(
+    directory: Panoramas, /, *, every: Every = 1, weights: bool = False, prior_deg: float = 15.0, out: Out = None
+) -> None:
     """The vertical of views that look anywhere, pinhole and fisheye, by the method of straight edges.
 
-    Roll and pitch are within 45 degrees; which direction is up is chosen by weights that have not seen the building.
+    Roll and pitch are within 45 degrees; which direction is up is chosen by a network that has not seen the building.
+    A second table is of views that lean by at most what the method is told.
 
     Parameters
     ----------
     weights
-        Also print the weights that all views train.
+        Also print the network that all views train, as `choice_weights.rs` has it.
+    prior_deg
+        Largest lean of the views of the second table.
     """
     from tiltvp.lab.datasets.panoramas import read_panorama_index
-    from tiltvp.lab.evaluation.ahead import ahead_table, look_ahead, train_choice
+    from tiltvp.lab.evaluation.ahead import ahead_table, look_ahead, prior_table, train_choice
 
     check_ending(out)
     chosen = read_panorama_index(directory)[::every]
-    with progress_bar(len(chosen), "panoramas") as bar:
+    with progress_bar(2 * len(chosen), "panoramas") as bar:
         seen = look_ahead(chosen, advance=bar.advance)
+        told = prior_table(chosen, prior_deg, advance=bar.advance)
     table = ahead_table(seen)
     if out is not None:
         write_frame(table, out)
     show_frame(
         "Area under the recall curve of roll and pitch, per cent, to 1, 5 and 10 degrees", table, ["camera", "choice"]
     )
+    show_frame(f"Views that lean by at most {prior_deg:g} degrees, per cent and degrees", told, ["camera"])
     if weights:
-        say(", ".join(f"{weight:.4g}" for weight in train_choice(seen)))
+        say(train_choice(seen).rust())
 
 
 @app.command

@@ -18,7 +18,7 @@ def trust(
     /,
     *,
     count: Annotated[int, Parameter(validator=validators.Number(gte=1))] = 200,
-    sets: Annotated[int, Parameter(validator=validators.Number(gte=0))] = 2,
+    sets: Annotated[int, Parameter(validator=validators.Number(gte=0))] = 8,
     seed: Annotated[int, Parameter(validator=validators.Number(gte=0))] = 0,
     unseen: Switch = False,
     weights: Switch = False,
@@ -36,13 +36,14 @@ def trust(
     count
         Images of each case.
     sets
-        Sets of five images of each building that `check_setup` is asked about; with one or more, `check_lens` too.
+        Sets of five images of each building that `check_setup` is asked about, weighed by what those of other buildings
+        train; with one or more, `check_lens` is asked too.
     seed
         Seed of headings, leans and harm.
     unseen
         Only the half of the buildings on which nothing was set.
     weights
-        Also print the weights that the other half trains: of the confidences, and of `check_setup`.
+        Also print the weights that the other half trains of the confidences, and all buildings of `check_setup`.
     out
         Also write the long table, one row for each image and method: .csv, .json or .parquet.
     """
@@ -74,9 +75,9 @@ def trust(
         say(f"{method}: {constant:.4g}; {', '.join(f'{weight:.4g}' for weight in own)}")
     if asked:
         show_frame(
-            "Sets of five images of one building: which direction is up", summarise_sets(asked), ["half", "setup"]
+            "Sets of five images of one building: which direction is up", summarise_sets(asked), ["weights", "setup"]
         )
     if lenses is not None:
         show_frame("Sets of five images of one building: whether its lens is believed", lenses, ["setup", "told"])
-    if weights and (told := [item for item in asked if was_set_on(item.location)]):
-        say(f"check_setup: {', '.join(f'{weight:.4g}' for weight in train_setups(told))}")
+    if weights and asked:
+        say(f"check_setup: {', '.join(f'{weight:.4g}' for weight in train_setups(asked))}")

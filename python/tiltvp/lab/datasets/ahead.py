@@ -59,13 +59,20 @@ def roll_pitch(up: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np
     return np.arctan2(-up[..., 0], -up[..., 1]), np.arcsin(np.clip(up[..., 2], -1.0, 1.0))
 
 
-def ahead_views(panorama: Panorama, number: int, *, samples: int = 2, noise_sigma: float = 2.0) -> Iterator[AheadView]:
-    """One view of a panorama by each camera; heading, roll and pitch are drawn with `number` as seed."""
+def ahead_views(
+    panorama: Panorama,
+    number: int,
+    *,
+    lean_max_deg: float = LEAN_MAX_DEG,
+    samples: int = 2,
+    noise_sigma: float = 2.0,
+) -> Iterator[AheadView]:
+    """One view of a panorama by each camera; heading, roll and pitch, up to so much, by the seed `number`."""
     rng = np.random.default_rng(number)
     forward = read_rotation("forward")
     for place, (name, camera) in enumerate(AHEAD_CAMERAS.items()):
         yaw = float(rng.uniform(-np.pi, np.pi))
-        roll, pitch = np.deg2rad(rng.uniform(-LEAN_MAX_DEG, LEAN_MAX_DEG, 2))
+        roll, pitch = np.deg2rad(rng.uniform(-lean_max_deg, lean_max_deg, 2))
         up = up_from(roll, pitch)
         views = PanoramaViews(panorama, camera, robot_from_camera=forward, samples=samples)
         seed = 1000 * number + place

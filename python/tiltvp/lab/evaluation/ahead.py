@@ -10,7 +10,7 @@ import numpy as np
 import polars as pl
 
 from tiltvp.lab.datasets.ahead import AHEAD_CAMERAS, ahead_views, roll_pitch
-from tiltvp.lab.evaluation.choices import choice_shares, train_weights
+from tiltvp.lab.evaluation.choices import Network, choice_shares, train_network
 from tiltvp.rotations import read_rotation
 from tiltvp.tilt import TiltEstimator
 
@@ -19,18 +19,16 @@ if TYPE_CHECKING:
 
     from tiltvp.lab.datasets.panoramas import Panorama
 
-__all__ = ["REACH_RAD", "LearnedView", "ahead_table", "look_ahead", "train_choice"]
+__all__ = ["REACH_RAD", "LearnedView", "ahead_table", "look_ahead", "prior_table", "train_choice"]
 
 REACH_RAD: Final = float(np.deg2rad(60.0))
 """Roll and pitch of 45 degrees each lean by 60 together."""
 SEEDS: Final = (0, 1000, 2000, 3000)
-"""What is added to the number of a panorama for the seed of its views: the first are judged, the others train."""
+"""What is added to the number of a panorama for the seed of its views."""
 RIGHT_DEG: Final = 5.0
 """A view trains if one of its hypotheses is as near as this."""
-PENALTY: Final = 5.0
-"""Of the squared weights of features that are scaled to a standard deviation of one: as good as any from 1 to 10."""
 FOLDS: Final = 5
-NONE_ODDS: Final = 0.04
+NONE_ODDS: Final = 0.08
 """Odds, against the best hypothesis, that none is right, as the software has them."""
 
 
@@ -40,7 +38,6 @@ class LearnedView:
 
     camera: str
     location: str
-    seed: int
     up: NDArray[np.float64]
     ups: NDArray[np.float64]
     features: NDArray[np.float64]
@@ -75,34 +72,84 @@ def look_ahead(
                 estimate = estimator(view.image)
                 found = np.asarray(estimate.normal) @ forward if estimate else None
                 answer = (ups @ forward, features, found, estimate.confidence)
-                seen.append(LearnedView(view.camera, panorama.location, seed, view.up, *answer))
+                seen.append(LearnedView(view.camera, panorama.location, view.up, *answer))
         advance()
     return seen
 
 
-def train_choice(views: Sequence[LearnedView]) -> NDArray[np.float64]:
-    """(F,): weights of the features."""
+def prior_table(
+    panoramas: Sequence[Panorama],
+    prior_deg: float,
+    *,
+    samples: int = 2,
+    noise_sigma: float = 2.0,
+    advance: Callable[[], None] = lambda: None,
+) -> pl.DataFrame:
+    """What "segments" makes of views that are known to lean by at most so many degrees, by the kind of camera.
+
+    In per cent of all views: right (off by at most two degrees), answered, sure (a confidence of at least 0.9), sure
+    and wrong; the median error of the answers.
+    """
+    forward = np.array(read_rotation("forward"))
+    limit = float(np.deg2rad(prior_deg))
+    estimators = {
+        name: TiltEstimator(camera, method="segments", robot_from_camera=forward, tilt_max_rad=limit)
+        for name, camera in AHEAD_CAMERAS.items()
+    }
+    rows = []
+    for number, panorama in enumerate(panoramas):
+        # Roll and pitch of the corner of a square lean by the square's half diagonal.
+        own = ahead_views(
+            panorama, number, lean_max_deg=prior_deg / np.sqrt(2.0), samples=samples, noise_sigma=noise_sigma
+        )
+        for view in own:
+            estimate = estimators[view.camera](view.image)
+            error = None
+            if estimate:
+                cosine = np.clip(np.asarray(estimate.normal) @ forward @ view.up, -1.0, 1.0)
+                error = float(np.rad2deg(np.arccos(cosine)))
+            rows.append({"camera": view.camera.split()[0], "error": error, "sure": estimate.confidence >= 0.9})
+        advance()
+    wrong = pl.col("error").is_not_null() & (pl.col("error") > 2.0)
+    shares = {
+        "right": pl.col("error").fill_null(180.0) <= 2.0,
+        "answered": pl.col("error").is_not_null(),
+        "sure": pl.col("sure"),
+        "sure_wrong": pl.col("sure") & wrong,
+    }
+    return (
+        pl.DataFrame(rows, schema={"camera": pl.String, "error": pl.Float64, "sure": pl.Boolean})
+        .group_by("camera", maintain_order=True)
+        .agg(
+            pl.len().alias("views"),
+            *((100.0 * share.mean()).alias(name) for name, share in shares.items()),
+            pl.col("error").median().alias("median"),
+        )
+    )
+
+
+def train_choice(views: Sequence[LearnedView]) -> Network:
+    """What tells the right one by the features."""
     told = [view for view in views if len(view.ups) > 1 and view.errors_deg().min() <= RIGHT_DEG]
-    return train_weights([(view.features, int(view.errors_deg().argmin())) for view in told], PENALTY)
+    return train_network([(view.features, int(view.errors_deg().argmin())) for view in told])
 
 
 def ahead_table(views: Sequence[LearnedView], *, rng_seed: int = 0) -> pl.DataFrame:
     """Area under the recall curve up to 1, 5 and 10 degrees, for roll and pitch, by the kind of camera and of choice.
 
-    "unseen buildings" chooses by weights that were trained without the building of the view, in five folds; "as
-    shipped" by those in the software, which have seen all; "best" is the nearest hypothesis. `sure_wrong` is the share
+    "unseen buildings" chooses by a network that was trained without the building of the view, in five folds; "as
+    shipped" by that in the software, which has seen all; "best" is the nearest hypothesis. `sure_wrong` is the share
     of all views whose error exceeds two degrees at a probability (as shipped: a confidence) of at least 0.9.
     """
-    judged = [view for view in views if view.seed == SEEDS[0]]
     locations = np.random.default_rng(rng_seed).permutation(sorted({view.location for view in views}))
     fold = {location: k % FOLDS for k, location in enumerate(locations)}
-    weights = [train_choice([view for view in views if fold[view.location] != k]) for k in range(FOLDS)]
+    networks = [train_choice([view for view in views if fold[view.location] != k]) for k in range(FOLDS)]
     nothing = np.array([0.0, -1.0, 0.0])
 
     def unseen(view: LearnedView) -> tuple[NDArray[np.float64], float]:
         if not len(view.ups):
             return nothing, 0.0
-        shares = choice_shares(view.features @ weights[fold[view.location]])
+        shares = choice_shares(networks[fold[view.location]].log_odds(view.features))
         best = float(shares.max())
         return view.ups[shares.argmax()], best / (1.0 + NONE_ODDS * best)
 
@@ -114,7 +161,7 @@ def ahead_table(views: Sequence[LearnedView], *, rng_seed: int = 0) -> pl.DataFr
 
     rows = []
     for kind in ("pinhole", "fisheye"):
-        own = [view for view in judged if view.camera.startswith(kind)]
+        own = [view for view in views if view.camera.startswith(kind)]
         truth = np.array([view.up for view in own])
         for name, choose in (("unseen buildings", unseen), ("as shipped", shipped), ("best", best)):
             picked = [choose(view) for view in own]

@@ -5,6 +5,7 @@
 use nalgebra::{Matrix3, Matrix4, Rotation3, SMatrix, Vector3, Vector4};
 
 use super::choice::{FEATURES, features, log_odds};
+use super::lightness::Lightness;
 use crate::geometry::tangent_basis;
 
 /// Scatter of the edges of vertical and of horizontal things about their vanishing points, radians: beams sag, frames do not.
@@ -18,15 +19,15 @@ const EVEN_RAD: f64 = 0.03;
 const LENGTH_RAD: f64 = 0.2;
 
 /// Standard deviation in radians by which horizontal edges of one building miss the right angle.
-const SKEW_RAD: f64 = 2f64.to_radians();
+const SKEW_RAD: f64 = 1f64.to_radians();
 
 /// Segments that are weighed, the longest ones, and those of which pairs make directions.
-const WEIGHED: usize = 100;
-const PAIRED: usize = 30;
+const WEIGHED: usize = 160;
+const PAIRED: usize = 36;
 
 /// Vanishing points that frames are made of, and frames that are refined.
-const VANISHING_POINTS: usize = 12;
-const REFINED: usize = 10;
+const VANISHING_POINTS: usize = 16;
+const REFINED: usize = 14;
 
 /// Least sum of odds of a vanishing point.
 const SCORE_MIN: f64 = 0.3;
@@ -46,7 +47,7 @@ const STEP_MAX_RAD: f64 = 0.05;
 
 /// Odds, against the most probable hypothesis, that none is right: so that of the views of unseen buildings that are surer than 0.9
 /// at most one in fifty is wrong.
-const NONE_ODDS: f64 = 0.04;
+const NONE_ODDS: f64 = 0.08;
 
 /// Least share of a probability at which an edge counts in a step. Only time depends on it.
 const NEGLIGIBLE: f64 = 1e-3;
@@ -145,7 +146,7 @@ impl Search {
     }
 
     /// Fills the hypotheses, the most probable first.
-    pub(super) fn run(&mut self, prior: &Prior) {
+    pub(super) fn run(&mut self, prior: &Prior, lightness: &Lightness<'_>) {
         self.hypotheses.clear();
         self.vanishing_points();
         self.make_frames(prior);
@@ -181,7 +182,7 @@ impl Search {
                 self.hypotheses.retain(|other| !same(other));
                 let mut hypothesis =
                     Hypothesis { up, log_likelihood, axes, information, features: [0.0; FEATURES], probability: 0.0 };
-                hypothesis.features = features(&self.edges, &hypothesis, prior);
+                hypothesis.features = features(&self.edges, &hypothesis, prior, lightness);
                 self.hypotheses.push(hypothesis);
             }
         }

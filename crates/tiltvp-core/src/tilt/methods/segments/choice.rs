@@ -3,20 +3,29 @@
 use nalgebra::Vector3;
 
 use super::anywhere::{Edge, Hypothesis, Prior};
+use super::choice_weights::{BIASES, HIDDEN, LINEAR, MEANS, OUT, SCALES};
+use super::lightness::{BANDS, Lightness};
 
-/// How many numbers tell it.
-pub(super) const FEATURES: usize = 19;
+/// How many numbers of edges, and of edges and lightness, tell it.
+const OF_EDGES: usize = 19;
+pub(super) const FEATURES: usize = OF_EDGES + 2 * BANDS;
 
-/// Logarithm of the odds for each unit of a feature: a conditional logit on views of panoramas, `tiltvp measure views`, which
-/// prints them and how well others do that have not seen the building.
-const WEIGHTS: [f64; FEATURES] = [
-    0.01687, -1.397, 0.3973, 1.023, -0.1595, 0.3314, 0.567, 1.309, -0.1152, -2.806, -2.214, -0.265, 1.045, 3.761,
-    -1.297, 0.4098, 1.024, 1.588, 15.48,
-];
+/// Features that say what was expected before the image was seen: they count in proportion, so that no lean is ruled out.
+const EXPECTED: std::ops::Range<usize> = 1..4;
 
-/// The logarithm of the odds of a hypothesis, up to a constant.
+/// Standard deviations beyond which a feature tells no more: views that taught had none farther.
+const FARTHEST: f64 = 4.0;
+
+/// The logarithm of the odds of a hypothesis, up to a constant: a line and a layer of hidden units, whose weights `tiltvp measure
+/// views` trains on views of panoramas; it tells how well they do on buildings that they have not seen.
 pub(super) fn log_odds(features: &[f64; FEATURES]) -> f64 {
-    features.iter().zip(WEIGHTS).map(|(feature, weight)| feature * weight).sum()
+    let scaled: [f64; FEATURES] = std::array::from_fn(|i| {
+        let own = (features[i] - MEANS[i]) / SCALES[i];
+        if EXPECTED.contains(&i) { own } else { own.clamp(-FARTHEST, FARTHEST) }
+    });
+    let sum = |weights: &[f64; FEATURES]| weights.iter().zip(&scaled).map(|(weight, own)| weight * own).sum::<f64>();
+    let hidden = HIDDEN.iter().zip(BIASES).zip(OUT).map(|((weights, bias), out)| out * (sum(weights) + bias).tanh());
+    sum(&LINEAR) + hidden.sum::<f64>()
 }
 
 /// The unit of leans in radians.
@@ -26,8 +35,18 @@ const LEAN_RAD: f64 = 30f64.to_radians();
 const AHEAD_SIN: f64 = std::f64::consts::FRAC_1_SQRT_2;
 
 /// What tells whether a hypothesis is the right one: its likelihood; how far it is from what was expected, by roll and pitch of the
-/// camera; how much agrees with each of its axes, how long, how high and of which polarity that is.
-pub(super) fn features(edges: &[Edge], hypothesis: &Hypothesis, prior: &Prior) -> [f64; FEATURES] {
+/// camera; how much agrees with each of its axes, how long, how high and of which polarity that is; how light it is above and below.
+pub(super) fn features(
+    edges: &[Edge],
+    hypothesis: &Hypothesis,
+    prior: &Prior,
+    lightness: &Lightness<'_>,
+) -> [f64; FEATURES] {
+    let (own, bands) = (of_edges(edges, hypothesis, prior), lightness.bands(&hypothesis.up));
+    std::array::from_fn(|i| if i < OF_EDGES { own[i] } else { bands[i - OF_EDGES] })
+}
+
+fn of_edges(edges: &[Edge], hypothesis: &Hypothesis, prior: &Prior) -> [f64; OF_EDGES] {
     let up = &hypothesis.up;
     let (mut of_axis, mut total) = ([0.0; 3], 0.0);
     let (mut polarity, mut polarity_of_all, mut rest) = (0.0, 0.0, 0.0);

@@ -3,6 +3,8 @@
 
 mod anywhere;
 mod choice;
+mod choice_weights;
+mod lightness;
 mod near;
 
 use std::f64::consts::PI;
@@ -11,6 +13,7 @@ use std::sync::Arc;
 use nalgebra::{Matrix2, Matrix3, Vector3};
 
 use self::anywhere::{Edge, Prior, Search};
+use self::lightness::Sample;
 use self::near::{Near, NearWork};
 use super::refined::{Refined, TILT_MAX_RAD};
 use super::{Fitter, Prepared, RefineOptions, Setting, TiltMethod, edge_offset};
@@ -97,6 +100,7 @@ impl TiltMethod for SegmentsOptions {
             pixels: Refined::new(setting, refined),
             strong: usual,
             in_band,
+            sample: if tilt_max_rad > NEAR_MAX_RAD { Sample::new(&pixels.region) } else { Sample::default() },
         })))
     }
 }
@@ -114,6 +118,8 @@ pub(in crate::tilt) struct SegmentFit {
     strong: EdgeOptions,
     /// Whether each pixel of the region is in the band of elevations of those that vote.
     in_band: Vec<bool>,
+    /// Pixels whose levels tell what is up: none where the lean is small.
+    sample: Sample,
 }
 
 /// The memory of one thread.
@@ -126,6 +132,8 @@ pub(in crate::tilt) struct SegmentWork {
     /// Of the segments that are weighed: their numbers, and the probability of being vertical by the last fit.
     weighed: Vec<(u32, f64)>,
     search: Search,
+    /// Levels of the sample.
+    levels: Vec<f32>,
     near: NearWork,
 }
 
@@ -184,12 +192,13 @@ impl SegmentFit {
                 strong: EdgePixels::default(),
                 weighed: Vec::new(),
                 search: Search::default(),
+                levels: Vec::new(),
                 near: NearWork::default(),
             })
         });
         self.finder.find(image, region, self.edges.gradient_min, None, &mut work.finder, &mut work.segments);
         let fit = if self.tilt_max_rad > NEAR_MAX_RAD {
-            self.fit_anywhere(work)
+            self.fit_anywhere(image, work)
         } else {
             let fit = self.near.fit(&work.segments, &mut work.weighed, &mut work.near);
             fused(&fit, &self.vote(&work.finder.ridge, tables, &mut work.strong, pixel_work))
@@ -208,12 +217,13 @@ impl SegmentFit {
     }
 
     /// The most probable of the directions that may be up, unless none is more probable than all others together.
-    fn fit_anywhere(&self, work: &mut SegmentWork) -> Fit {
-        let SegmentWork { segments, weighed, search, .. } = work;
+    fn fit_anywhere(&self, image: &ImageView<'_>, work: &mut SegmentWork) -> Fit {
+        let SegmentWork { segments, weighed, search, levels, .. } = work;
         let turn = &self.robot_from_camera;
         search
             .take(segments.list.iter().map(|s| Edge::new(turn, &s.normal, &s.middle, s.variances_rad2, s.length_rad)));
-        search.run(&Prior { reach_rad: self.tilt_max_rad, robot_from_camera: *turn });
+        let lightness = self.sample.lightness(image, levels);
+        search.run(&Prior { reach_rad: self.tilt_max_rad, robot_from_camera: *turn }, &lightness);
         weighed.clear();
         let Some(best) = search.hypotheses.first() else {
             return Fit::failed(Stop::TooFew { have: search.edges.len(), need: 3 });
