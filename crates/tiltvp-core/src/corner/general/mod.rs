@@ -116,8 +116,7 @@ pub(crate) fn find(
                 known.push((junction.vertex, found));
                 found
             };
-            if ray.is_none_or(|traced| traced.share < options.support_min_share) {
-                *ray = None;
+            if ray.is_none() {
                 break;
             }
         }
@@ -172,7 +171,7 @@ fn search_of(segments: &[Segment], ray: RayEnd, vertex: &Vector3<f64>, options: 
         }
     }
     let angles = [CLEAR_OF_VERTEX_PX / px_per_rad, to_rad - CLEAR_OF_END_PX / px_per_rad];
-    Some(gray_search(options, normal, on_line, angles))
+    Some(RaySearch { share_min: options.support_min_share, ..gray_search(options, normal, on_line, angles) })
 }
 
 /// The search for a ray of a grey image near a great circle, between two angles from the vertex.
@@ -191,6 +190,7 @@ fn gray_search(
         step_min: options.step_min,
         step_share_min: 0.0,
         threshold_px: options.threshold_px,
+        share_min: 0.0,
         erring_together: ERRING_TOGETHER,
         ray_sigma_px: options.ray_sigma_px,
     }
