@@ -154,16 +154,20 @@ fn search_of(segments: &[Segment], ray: RayEnd, vertex: &Vector3<f64>, options: 
     let px_per_rad = segment.px_per_rad;
     let mut to_rad = angle_of(ray.far(segments));
     let gap_rad = options.gap_max_px.max(options.gap_max_share * segment.length_px) / px_per_rad;
+    let in_line = |other: &&Segment| other.ends.iter().all(|end| normal.dot(end).abs() * px_per_rad < SAME_LINE_PX);
+    let in_line: Vec<[f64; 2]> = segments
+        .iter()
+        .filter(in_line)
+        .map(|other| {
+            let angles = other.ends.map(|end| angle_of(&end));
+            [angles[0].min(angles[1]), angles[0].max(angles[1])]
+        })
+        .collect();
     for _ in 0..3 {
         let before = to_rad;
-        for other in segments {
-            let off_px = other.ends.iter().map(|end| normal.dot(end).abs()).fold(0.0, f64::max) * px_per_rad;
-            if off_px < SAME_LINE_PX {
-                let angles = other.ends.map(|end| angle_of(&end));
-                let (near, far) = (angles[0].min(angles[1]), angles[0].max(angles[1]));
-                if near > 0.0 && near - to_rad < gap_rad && far > to_rad && far < 1.4 {
-                    to_rad = far;
-                }
+        for [near, far] in &in_line {
+            if *near > 0.0 && near - to_rad < gap_rad && *far > to_rad && *far < 1.4 {
+                to_rad = *far;
             }
         }
         if to_rad == before {
