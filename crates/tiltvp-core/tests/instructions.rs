@@ -11,10 +11,12 @@ use std::collections::BTreeMap;
 use std::hint::black_box;
 use std::process::Command;
 
-use nalgebra::Matrix3;
+use nalgebra::{Matrix3, Vector3};
 use scene::{Image, cube, fisheye, round, stripes};
-use tiltvp_core::corner::{CornerDetector, DetectorOptions};
-use tiltvp_core::geometry::Tilt;
+use tiltvp_core::corner::{
+    CornerDetector, CornerPoseEstimator, DetectorOptions, EstimatorOptions, Frame, FrameKnowledge,
+};
+use tiltvp_core::geometry::{RigidMotion, Tilt};
 use tiltvp_core::image::ImageView;
 use tiltvp_core::lines::{LineExtractor, LineOptions, LineScratch, Lines};
 use tiltvp_core::selfcalib::{SelfCalibrator, SelfCalibratorOptions, WheelMotion};
@@ -22,7 +24,7 @@ use tiltvp_core::tilt::{METHODS, Scratch, TiltEstimate, TiltEstimator, TiltOptio
 
 /// Most instructions in the profile of the tests (with its checks of overflows; optimised builds take fewer), in thousands, by
 /// the names that valgrind shows: a twentieth to a tenth more than when they were last looked at.
-const LIMITS: [(&str, u64); 10] = [
+const LIMITS: [(&str, u64); 11] = [
     // The tilt of one image of 240 x 240 pixels.
     ("refined_image", 2750),
     ("sampled_image", 1340),
@@ -33,7 +35,9 @@ const LIMITS: [(&str, u64); 10] = [
     ("extracted_lines", 4120),
     ("described_lines", 32_200),
     // Two images of 320 x 180 pixels to the corner of the coloured cube in each.
-    ("segmented_pair", 6000),
+    ("segmented_pair", 4740),
+    // The same in grey, by straight edges, to the poses before both.
+    ("general_pair", 140_000),
     // Ten steps of the self-calibration amid a drive, with 10 and with 100 landmarks.
     ("steps_among_10", 17_900),
     ("steps_among_100", 345_000),
@@ -94,6 +98,17 @@ fn measured_once() {
     assert!(detector.detect_coloured(&cube::view(&pair[1]), None, &mut detector.scratch()).unwrap().is_some());
     assert_eq!(segmented_pair(&detector, &pair), 2);
 
+    let grey = pair.map(|bytes| bytes.chunks(3).map(|bgr| bgr[1] / 2 + bgr[2] / 2).collect());
+    let side = || CornerDetector::new(cube::pinhole(), DetectorOptions::for_method("general").unwrap(), None).unwrap();
+    let left_from_right =
+        RigidMotion::new("left_from_right", Matrix3::identity(), Vector3::new(0.12, 0.0, 0.0)).unwrap();
+    let right = Some((side(), left_from_right));
+    let mut estimator = CornerPoseEstimator::new(side(), right, EstimatorOptions::default()).unwrap();
+    general_pair(&mut estimator, &grey);
+    // What follows is to be looked for everywhere again.
+    estimator.reset();
+    assert!(general_pair(&mut estimator, &grey));
+
     for (landmarks, function) in [(10, steps_among_10 as Steps), (100, steps_among_100)] {
         let drive = round::drive(landmarks, 60);
         let names: Vec<u64> = (0..landmarks as u64).collect();
@@ -135,6 +150,14 @@ fn segmented_pair(detector: &CornerDetector, pair: &[Vec<u8>; 2]) -> usize {
     let mut scratch = detector.scratch();
     let found = |bytes: &Vec<u8>| detector.detect_coloured(&cube::view(black_box(bytes)), None, &mut scratch).unwrap();
     pair.iter().filter_map(found).count()
+}
+
+/// Whether there is a pose.
+#[inline(never)]
+fn general_pair(estimator: &mut CornerPoseEstimator, pair: &[Vec<u8>; 2]) -> bool {
+    let [left, right] =
+        pair.each_ref().map(|grey| Frame::Gray(ImageView::new(black_box(grey), 320, 180, 320).unwrap()));
+    estimator.observe(&left, Some(&right), &FrameKnowledge::default()).unwrap().pose().is_some()
 }
 
 type Steps = fn(&mut SelfCalibrator, &[(WheelMotion, Vec<f64>)], &[u64]) -> usize;

@@ -53,11 +53,14 @@ pub(super) fn edge_place(profile: &[f64], window: &SearchWindow, step_min: f64) 
     let gradient = |i: usize| profile[i + 1] - profile[i];
     let offset = |i: usize| i as f64 + 0.5 - middle;
     let count = profile.len().checked_sub(1)?;
+    let mut strengths = [0.0; PROFILE_MAX];
+    for ((strength, pair), weight) in strengths.iter_mut().zip(profile.windows(2)).zip(&window.weights) {
+        *strength = (pair[1] - pair[0]).abs() * weight;
+    }
     let (mut peak, mut most) = (None, 0.0);
-    for (i, (pair, weight)) in profile.windows(2).zip(&window.weights).enumerate() {
-        let strength = (pair[1] - pair[0]).abs() * weight;
-        if strength > most {
-            (peak, most) = (Some(i), strength);
+    for (i, strength) in strengths.iter().take(count).enumerate() {
+        if *strength > most {
+            (peak, most) = (Some(i), *strength);
         }
     }
     let peak = peak?;

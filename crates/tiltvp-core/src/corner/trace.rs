@@ -44,6 +44,8 @@ pub(super) struct RaySearch {
     pub(super) step_share_min: f64,
     /// Largest distance of a profile's edge from the fitted circle, in pixels.
     pub(super) threshold_px: f64,
+    /// Least share of the profiles that agree with the ray.
+    pub(super) share_min: f64,
     /// How many profiles along the ray err together: neighbours share pixels and the edge's crookedness.
     pub(super) erring_together: f64,
     /// How far either end of a whole ray may be off in a way that no profile shows, in pixels.
@@ -65,7 +67,7 @@ pub(super) struct RayProfile {
 impl RaySearch {
     /// The profile at an angle from the vertex.
     pub(super) fn profile(&self, camera: &Camera, angle_rad: f64) -> Option<RayProfile> {
-        self.profile_along(camera, &self.along()?, angle_rad)
+        self.profile_along(camera, &self.along()?, [angle_rad.cos(), angle_rad.sin()])
     }
 
     /// The direction along the ray at the vertex.
@@ -73,8 +75,8 @@ impl RaySearch {
         self.normal.cross(&self.vertex).try_normalize(1e-9)
     }
 
-    fn profile_along(&self, camera: &Camera, along: &Vector3<f64>, angle_rad: f64) -> Option<RayProfile> {
-        let (sin, cos) = angle_rad.sin_cos();
+    /// The same by the cosine and the sine of the angle.
+    fn profile_along(&self, camera: &Camera, along: &Vector3<f64>, [cos, sin]: [f64; 2]) -> Option<RayProfile> {
         let (bearing, onwards) = (self.vertex * cos + along * sin, along * cos - self.vertex * sin);
         let (pixel, jacobian) = camera.project_jacobian(&bearing)?;
         let (forwards, sideways) = (jacobian * onwards, jacobian * self.normal);
@@ -89,7 +91,8 @@ impl RaySearch {
 struct EdgePoint {
     /// Which profile of the ray it is from.
     profile: usize,
-    along_rad: f64,
+    /// The cosine and the sine of its angle from the vertex.
+    along: [f64; 2],
     /// Distance from the expected circle, in radians.
     shift_rad: f64,
     step: f64,
@@ -126,7 +129,7 @@ pub(super) struct TraceScratch {
 }
 
 /// Follows a ray from its vertex: at each pixel along it the `signal` fills in a profile across it, the edge is found between
-/// samples, and a great circle is fitted robustly. None if less than `support_min` agree. The signal is given the middle of the
+/// samples, and a great circle is fitted robustly. None if less than `support_min` or a smaller share than that of the search agree. The signal is given the middle of the
 /// profile, the step from sample to sample, and the samples, and says whether all of them are in the image.
 pub(super) fn trace(
     camera: &Camera,
@@ -156,10 +159,12 @@ pub(super) fn trace_every(
     rows.clear();
     for place in places.iter() {
         // In the chart of the ray: x along the vertex, y along the ray, z the expected normal.
-        let (sin, cos) = place.along_rad.sin_cos();
-        rows.push(cos, sin, place.shift_rad);
+        rows.push(place.along[0], place.along[1], place.shift_rad);
     }
-    if places.len() < support_min.max(2) {
+    let share = |agree: usize, of: usize| agree as f64 / of.max(1) as f64;
+    let is_enough = |agree: usize| agree >= support_min.max(2) && share(agree, looked_at) >= search.share_min;
+    // No more places agree than there are.
+    if !is_enough(places.len()) {
         return None;
     }
     let rad_per_px = places.iter().map(|place| place.rad_per_px).sum::<f64>() / places.len() as f64;
@@ -178,19 +183,18 @@ pub(super) fn trace_every(
 
     let agreeing = || places.iter().zip(weights.iter()).filter(|(_, weight)| **weight > 0.0);
     let support = agreeing().count();
-    if support < support_min.max(2) {
+    if !is_enough(support) {
         return None;
     }
-    let (first, last) = (agreeing().next()?.0.along_rad, agreeing().next_back()?.0.along_rad);
+    let (first, last) = (agreeing().next()?.0.along, agreeing().next_back()?.0.along);
     let chart = [search.vertex, along, search.normal];
     let normal = (chart[0] * model.x + chart[1] * model.y + chart[2] * model.z).try_normalize(1e-9)?;
-    let agreeing_places = agreeing().map(|(place, weight)| (place.along_rad, f64::from(*weight)));
+    let agreeing_places = agreeing().map(|(place, weight)| (place.along, f64::from(*weight)));
     let in_chart = plane_covariance(search, agreeing_places, [first, last], rms, rad_per_px)?;
     // The chart's plane is tangent at the expected normal, which is close to the fitted one.
     let basis = tangent_basis(&normal);
     let turn = basis.transpose() * nalgebra::Matrix3x2::from_columns(&[chart[0], chart[1]]);
-    let (sin, cos) = last.sin_cos();
-    let toward = chart[0] * cos + chart[1] * sin;
+    let toward = chart[0] * last[0] + chart[1] * last[1];
     let ray = FittedRay {
         normal,
         covariance: turn * in_chart * turn.transpose(),
@@ -198,7 +202,6 @@ pub(super) fn trace_every(
         support,
         residual_rms_rad: rms,
     };
-    let share = |agree: usize, of: usize| agree as f64 / of.max(1) as f64;
     let first_profiles = ((FIRST_PX / stride_px) as usize).min(looked_at);
     let first = agreeing().filter(|(place, _)| place.profile <= first_profiles).count();
     Some(TracedRay {
@@ -224,38 +227,37 @@ fn edge_points(
     let window = SearchWindow::new(profile.len(), search.search_px);
     let (mut angle, mut looked_at) = (search.from_rad, 0_usize);
     while angle <= search.to_rad {
-        let Some(RayProfile { pixel, across, pace, px_per_rad }) = search.profile_along(camera, along, angle) else {
-            break;
-        };
-        let along_rad = angle;
+        let (sin, cos) = angle.sin_cos();
+        let crossing = search.profile_along(camera, along, [cos, sin]);
+        let Some(RayProfile { pixel, across, pace, px_per_rad }) = crossing else { break };
         angle += stride_px / pace;
         looked_at += 1;
         let inside = signal(&pixel, &across, profile);
         let found = if inside { edge_place(profile, &window, search.step_min) } else { None };
         let Some(EdgePlace { shift, step }) = found else { continue };
         let (shift_rad, rad_per_px) = (shift / px_per_rad, 1.0 / px_per_rad.abs());
-        places.push(EdgePoint { profile: looked_at, along_rad, shift_rad, step, rad_per_px });
+        places.push(EdgePoint { profile: looked_at, along: [cos, sin], shift_rad, step, rad_per_px });
     }
     looked_at
 }
 
-/// The covariance of a ray's plane in the chart of the ray, from the angles and weights of the places that agree, the angles of
-/// the first and the last one, and the root mean square of their distances.
+/// The covariance of a ray's plane in the chart of the ray, from the cosines and sines of the angles and the weights of the
+/// places that agree, those of the first and the last one, and the root mean square of their distances.
 fn plane_covariance(
     search: &RaySearch,
-    agreeing: impl Iterator<Item = (f64, f64)>,
-    ends: [f64; 2],
+    agreeing: impl Iterator<Item = ([f64; 2], f64)>,
+    ends: [[f64; 2]; 2],
     rms: f64,
     rad_per_px: f64,
 ) -> Option<Matrix2<f64>> {
     let sigma = (rms * rms + (PLACE_SIGMA_MIN_PX * rad_per_px).powi(2)).sqrt();
     let mut information = Matrix2::zeros();
-    for (along_rad, weight) in agreeing {
-        let at = Vector2::new(along_rad.cos(), along_rad.sin());
+    for (along, weight) in agreeing {
+        let at = Vector2::from(along);
         information += at * at.transpose() * weight;
     }
     information /= sigma * sigma * search.erring_together;
-    let ends = ends.map(|angle| Vector2::new(angle.cos(), angle.sin()));
+    let ends = ends.map(Vector2::from);
     let from_ends = Matrix2::from_rows(&[ends[0].transpose(), ends[1].transpose()]).try_inverse()?;
     let whole = from_ends * from_ends.transpose() * (search.ray_sigma_px * rad_per_px).powi(2);
     Some(information.try_inverse()? + whole)

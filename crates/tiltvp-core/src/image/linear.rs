@@ -1,6 +1,7 @@
 //! Light between pixel centres: levels through the inverse of the display curve, interpolated where light adds up.
 
 use nalgebra::Vector2;
+use tiltvp_kernels::bilinear::along_line;
 
 use super::color::ColorView;
 use super::view::ImageView;
@@ -56,33 +57,8 @@ impl LightTable {
         step: &Vector2<f64>,
         out: &mut [f64],
     ) -> bool {
-        let half = (out.len() / 2) as f64;
-        let place = |i: usize| middle + step * (i as f64 - half);
-        let inside = |i: usize| {
-            let place = place(i);
-            corner_of(place.x, place.y, image.width(), image.height()).is_some()
-        };
-        // Rounding keeps the order of places along a line, so the first and the last are the outermost.
-        if out.is_empty() || !(inside(0) && inside(out.len() - 1)) {
-            return false;
-        }
-        let (data, stride) = (image.data(), image.stride());
-        for (i, out) in out.iter_mut().enumerate() {
-            let place = place(i);
-            let (column, row) = (place.x as u32, place.y as u32);
-            let (du, dv) = (place.x - f64::from(column), place.y - f64::from(row));
-            let at = row as usize * stride + column as usize;
-            let (Some([a, b]), Some([c, d])) = (
-                data.get(at..).and_then(|data| data.first_chunk::<2>()),
-                data.get(at + stride..).and_then(|data| data.first_chunk::<2>()),
-            ) else {
-                return false;
-            };
-            let [a, b, c, d] = [*a, *b, *c, *d].map(|level| self.of(level));
-            let (top, bottom) = (a + (b - a) * du, c + (d - c) * du);
-            *out = top + (bottom - top) * dv;
-        }
-        true
+        let sizes = [image.width(), image.height(), image.stride()];
+        along_line(image.data(), sizes, &self.light, (*middle).into(), (*step).into(), out)
     }
 
     /// The light of blue, green and red between pixel centres, bilinear; `None` where that would need pixels outside the

@@ -8,6 +8,9 @@ use super::{Gate, HARD, OPEN, REJECTED, SOFT, Sums, WITHIN};
 /// Rows that are added up together: five columns of as many are 20 KB, which the nearest cache holds.
 pub(super) const BLOCK: usize = 512;
 
+/// Rows of a small problem, for which a tenth of that memory is cleared: the places along a ray of a corner.
+const FEW: usize = 64;
+
 vectorised! {
     /// Counts rows with `|d| <= reach`.
     pub(super) fn count([x, y, z]: [&[f64]; 3], [h0, h1, h2]: [f64; 3], reach: f64) -> usize {
@@ -22,28 +25,44 @@ vectorised! {
 vectorised! {
     /// Adds a block of rows to the sums and applies the gate to their weights.
     pub(super) fn accumulate(rows: [&[f64]; 3], weights: &mut [f32], model: [f64; 3], gate: Gate<f64>, sums: &mut Sums) {
-        match gate {
-            Gate::Open => accumulate_body::<OPEN>(rows, weights, model, 0.0, sums),
-            Gate::Hard { reach } => accumulate_body::<HARD>(rows, weights, model, reach, sums),
-            Gate::Rejected { reach } => accumulate_body::<REJECTED>(rows, weights, model, reach, sums),
-            Gate::Within { reach } => accumulate_body::<WITHIN>(rows, weights, model, reach, sums),
-            Gate::Soft { inverse } => accumulate_body::<SOFT>(rows, weights, model, inverse, sums),
+        if weights.len() <= FEW {
+            accumulate_gated::<FEW>(rows, weights, model, gate, sums);
+        } else {
+            accumulate_gated::<BLOCK>(rows, weights, model, gate, sums);
         }
+    }
+}
+
+/// The same for at most `ROOM` rows.
+#[inline(always)]
+fn accumulate_gated<const ROOM: usize>(
+    rows: [&[f64]; 3],
+    weights: &mut [f32],
+    model: [f64; 3],
+    gate: Gate<f64>,
+    sums: &mut Sums,
+) {
+    match gate {
+        Gate::Open => accumulate_body::<OPEN, ROOM>(rows, weights, model, 0.0, sums),
+        Gate::Hard { reach } => accumulate_body::<HARD, ROOM>(rows, weights, model, reach, sums),
+        Gate::Rejected { reach } => accumulate_body::<REJECTED, ROOM>(rows, weights, model, reach, sums),
+        Gate::Within { reach } => accumulate_body::<WITHIN, ROOM>(rows, weights, model, reach, sums),
+        Gate::Soft { inverse } => accumulate_body::<SOFT, ROOM>(rows, weights, model, inverse, sums),
     }
 }
 
 /// Residuals and gated weights first, then each sum, all of it in the first-level cache. `limit` is the number of the gate.
 #[inline(always)]
-fn accumulate_body<const GATE: u8>(
+fn accumulate_body<const GATE: u8, const ROOM: usize>(
     [x, y, z]: [&[f64]; 3],
     weights: &mut [f32],
     [h0, h1, h2]: [f64; 3],
     limit: f64,
     sums: &mut Sums,
 ) {
-    let (mut d, mut w) = ([0.0f64; BLOCK], [0.0f64; BLOCK]);
-    let (mut wx, mut wy, mut wd) = ([0.0f64; BLOCK], [0.0f64; BLOCK], [0.0f64; BLOCK]);
-    let n = weights.len().min(BLOCK);
+    let (mut d, mut w) = ([0.0f64; ROOM], [0.0f64; ROOM]);
+    let (mut wx, mut wy, mut wd) = ([0.0f64; ROOM], [0.0f64; ROOM], [0.0f64; ROOM]);
+    let n = weights.len().min(ROOM);
     let (x, y, z, weights) = (&x[..n], &y[..n], &z[..n], &mut weights[..n]);
     let mut count = 0u32;
     for i in 0..n {
@@ -116,7 +135,7 @@ mod tests {
     #[test]
     fn counts_and_sums_are_those_of_the_plain_loop_to_the_last_bit() {
         let model = [0.02, -0.03, 0.9];
-        for n in (0..40).chain([100, BLOCK - 1, BLOCK]) {
+        for n in (0..40).chain([FEW, FEW + 1, BLOCK - 1, BLOCK]) {
             let column = |k: usize| -> Vec<f64> { (0..n).map(|i| ((i * (3 + k)) as f64 * 0.37).sin()).collect() };
             let (x, y, z) = (column(0), column(1), column(2));
             let rows = [&x[..], &y, &z];
@@ -128,15 +147,7 @@ mod tests {
             for gate in gates.into_iter().chain([Gate::Soft { inverse: 2.0 }]) {
                 let (mut found, mut plain) = ((own.clone(), Sums::default()), (own.clone(), Sums::default()));
                 accumulate(rows, &mut found.0, model, gate, &mut found.1);
-                match gate {
-                    Gate::Open => accumulate_body::<OPEN>(rows, &mut plain.0, model, 0.0, &mut plain.1),
-                    Gate::Hard { reach } => accumulate_body::<HARD>(rows, &mut plain.0, model, reach, &mut plain.1),
-                    Gate::Rejected { reach } => {
-                        accumulate_body::<REJECTED>(rows, &mut plain.0, model, reach, &mut plain.1);
-                    }
-                    Gate::Within { reach } => accumulate_body::<WITHIN>(rows, &mut plain.0, model, reach, &mut plain.1),
-                    Gate::Soft { inverse } => accumulate_body::<SOFT>(rows, &mut plain.0, model, inverse, &mut plain.1),
-                }
+                accumulate_gated::<BLOCK>(rows, &mut plain.0, model, gate, &mut plain.1);
                 assert_eq!((found.0, found.1.count), (plain.0, plain.1.count), "{n} rows, {gate:?}");
                 assert_eq!(found.1.sums.map(f64::to_bits), plain.1.sums.map(f64::to_bits), "{n} rows, {gate:?}");
             }

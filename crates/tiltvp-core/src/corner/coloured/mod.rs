@@ -263,6 +263,7 @@ fn search_of(
         step_min: options.step_min,
         step_share_min: STEP_SHARE_MIN,
         threshold_px: options.threshold_px,
+        share_min: 0.0,
         erring_together: ERRING_TOGETHER,
         ray_sigma_px: options.ray_sigma_px,
     })

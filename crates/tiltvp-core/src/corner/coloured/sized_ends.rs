@@ -28,6 +28,7 @@ pub(in crate::corner) fn box_search(options: &ColouredOptions) -> RaySearch {
         step_min: options.step_min,
         step_share_min: 0.0,
         threshold_px: options.threshold_px,
+        share_min: 0.0,
         erring_together: ERRING_TOGETHER,
         ray_sigma_px: OUTLINE_SIGMA_PX,
     }

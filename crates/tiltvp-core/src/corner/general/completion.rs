@@ -111,13 +111,13 @@ impl CornerCompletion<'_> {
             let vertex = (crossing.place - normal * normal.dot(&crossing.place)).normalize();
             gray_search(options, normal, vertex, [CLEAR_OF_VERTEX_PX / px_per_rad, to_rad])
         };
-        let mut follow = |search: &RaySearch, stride_px: f64, least_share: f64| -> Option<TracedRay> {
+        let mut follow = |search: &RaySearch, stride_px: f64, share_min: f64| -> Option<TracedRay> {
             let signal = |at: &_, step: &_, out: &mut [f64]| self.light.gray_profile(self.image, at, step, out);
             let profiles = (search.to_rad - search.from_rad) * px_per_rad;
             let support_min = f64::from(options.support_min_px).min(SHORT_SHARE * profiles);
-            let found =
-                trace_every(stride_px, self.camera, search, (support_min / stride_px) as usize, signal, memory)?;
-            Some(found).filter(|found| found.share >= least_share && (stride_px > 1.0 || found.begins_at_vertex()))
+            let (search, support_min) = (RaySearch { share_min, ..*search }, (support_min / stride_px) as usize);
+            trace_every(stride_px, self.camera, &search, support_min, signal, memory)
+                .filter(|found| stride_px > 1.0 || found.begins_at_vertex())
         };
         let share_min = options.support_min_share;
         let third = 3 - crossing.axes[0] - crossing.axes[1];

@@ -7,7 +7,7 @@ use crate::camera::Camera;
 use crate::corner::feature::CornerFeature;
 use crate::corner::general::{AXIS_SINE, CLEAR_OF_VERTEX_PX, GeneralScratch, gray_search};
 use crate::corner::options::GeneralOptions;
-use crate::corner::trace::trace;
+use crate::corner::trace::{RaySearch, trace};
 use crate::corner::triangulation::{BearingObservation, triangulate};
 use crate::geometry::{RigidMotion, meeting};
 use crate::image::{ImageView, LightTable};
@@ -130,8 +130,9 @@ pub(crate) fn seen_ends(seen: &ObservedCorner<'_>, scratch: &mut GeneralScratch)
     for (axis, out) in out.iter_mut().enumerate() {
         let found = meetings(seen, &segments.segments, axis, px_per_rad);
         let normal = seen.corner.rays()[axis].normal;
-        let mut follow = |from_rad: f64, to_rad: f64, least_share: f64| {
-            let search = gray_search(seen.options, normal, seen.corner.vertex(), [from_rad, to_rad]);
+        let mut follow = |from_rad: f64, to_rad: f64, share_min: f64| {
+            let along = gray_search(seen.options, normal, seen.corner.vertex(), [from_rad, to_rad]);
+            let search = RaySearch { share_min, ..along };
             trace(
                 seen.camera,
                 &search,
@@ -139,7 +140,6 @@ pub(crate) fn seen_ends(seen: &ObservedCorner<'_>, scratch: &mut GeneralScratch)
                 |at, step, out| seen.light.gray_profile(seen.image, at, step, out),
                 memory,
             )
-            .filter(|traced| traced.share >= least_share)
         };
         let clear_rad = CLEAR_OF_VERTEX_PX / px_per_rad;
         for (place, (angle, _)) in found.iter().enumerate() {

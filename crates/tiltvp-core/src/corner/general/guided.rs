@@ -4,6 +4,7 @@ use nalgebra::Vector3;
 
 use crate::camera::Camera;
 use crate::corner::feature::CornerFeature;
+use crate::corner::general::segments::Segment;
 use crate::corner::general::{CLEAR_OF_VERTEX_PX, gray_search};
 use crate::corner::options::GeneralOptions;
 use crate::corner::trace::{RaySearch, TraceScratch, trace_every};
@@ -13,6 +14,10 @@ use crate::image::{ImageView, LightTable};
 /// How far beyond its end a ray is looked for, in pixels: what follows a ray must not shorten it from frame to frame,
 /// and each fit loses up to a pixel.
 const BEYOND_END_PX: f64 = 1.0;
+
+/// Least number of a corner's rays for which segments of the image speak: two, as for a corner of which the third edge is known
+/// from an attitude. With one, 4 times as many places are followed up.
+const SPEAKING_MIN: usize = 2;
 
 /// Where a corner is expected: its vertex, and a bearing at the far end of each of the rays x, y, z.
 #[derive(Debug, Clone, Copy)]
@@ -57,6 +62,38 @@ impl ExpectedCorner {
     }
 }
 
+/// The segments of an image along each edge of a corner of another image.
+pub(crate) struct EdgeSegments<'a> {
+    along: [Vec<&'a Segment>; 3],
+}
+
+impl<'a> EdgeSegments<'a> {
+    /// Those of the segments that are along edges with these directions, within `most_rad`.
+    pub(crate) fn new(segments: &'a [Segment], edges: &[Vector3<f64>; 3], most_rad: f64) -> Self {
+        let along = |edge: &Vector3<f64>| {
+            let is_along = |segment: &&Segment| segment.normal.dot(edge).abs() <= most_rad.sin();
+            segments.iter().filter(is_along).collect()
+        };
+        Self { along: edges.each_ref().map(along) }
+    }
+
+    /// Whether enough of a corner's rays have segments in them, at most `reach_px` from where they are expected.
+    pub(crate) fn speak_for(&self, expected: &ExpectedCorner, reach_px: f64) -> bool {
+        let ExpectedCorner { vertex, far } = expected;
+        let is_seen = |(segments, far): &(&Vec<&Segment>, &Vector3<f64>)| {
+            let Some(normal) = vertex.cross(far).try_normalize(1e-6) else { return false };
+            // Segments end beyond the vertex, and begin before the far end.
+            let (onwards, back) = (normal.cross(vertex), far.cross(&normal));
+            segments.iter().any(|segment| {
+                segment.ends.iter().all(|end| normal.dot(end).abs() * segment.px_per_rad <= reach_px)
+                    && segment.ends.iter().any(|end| onwards.dot(end) > 0.0)
+                    && segment.ends.iter().any(|end| back.dot(end) > 0.0)
+            })
+        };
+        self.along.iter().zip(far).filter(is_seen).count() >= SPEAKING_MIN
+    }
+}
+
 /// The corner near where it is expected, at most `search_px` from there; none if its rays are not all seen.
 pub(crate) fn find_near(
     camera: &Camera,
@@ -72,7 +109,7 @@ pub(crate) fn find_near(
     let mut found = None;
     // So far about a long ray there are other edges too: the first pass, along every third pixel, only has to lead to the
     // second.
-    for (search_px, stride_px, least_share) in
+    for (search_px, stride_px, share_min) in
         [(search_px, 3.0, 0.5 * options.guided_min_share), (options.search_px, 1.0, options.guided_min_share)]
     {
         let pixel = camera.project_jacobian(&vertex)?;
@@ -89,14 +126,10 @@ pub(crate) fn find_near(
             let normal = normals[axis]?;
             let on_circle = (vertex - normal * normal.dot(&vertex)).try_normalize(0.5)?;
             let angles = [CLEAR_OF_VERTEX_PX / px_per_rad, lengths[axis] + BEYOND_END_PX / px_per_rad];
-            let search = RaySearch { search_px, ..gray_search(options, normal, on_circle, angles) };
+            let search = RaySearch { search_px, share_min, ..gray_search(options, normal, on_circle, angles) };
             let signal = |at: &_, step: &_, out: &mut [f64]| light.gray_profile(image, at, step, out);
             let support_min = (f64::from(options.support_min_px) / stride_px) as usize;
-            let traced = trace_every(stride_px, camera, &search, support_min, signal, scratch)?;
-            if traced.share < least_share {
-                return None;
-            }
-            rays[axis] = Some(traced.ray);
+            rays[axis] = Some(trace_every(stride_px, camera, &search, support_min, signal, scratch)?.ray);
         }
         let [Some(x), Some(y), Some(z)] = rays else { return None };
         let corner = CornerFeature::from_rays([x, y, z])?;

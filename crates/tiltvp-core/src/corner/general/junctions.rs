@@ -66,15 +66,21 @@ pub(crate) fn find(
         list.clear();
     }
     meetings.resize(ends.len(), Vec::new());
-    for (i, a) in ends.iter().enumerate() {
-        for (j, b) in ends.iter().enumerate().skip(i + 1) {
+    let places: Vec<(Vector3<f64>, f64)> =
+        ends.iter().map(|end| (*end.near(segments), reach_rad(&segments[end.segment], options))).collect();
+    for (i, (a, (place, reach))) in ends.iter().zip(&places).enumerate() {
+        for (j, (b, (other_place, other_reach))) in ends.iter().zip(&places).enumerate().skip(i + 1) {
+            // Most are far from each other.
+            if (place - other_place).norm() > reach + other_reach {
+                continue;
+            }
             if let Some(Meeting { place, gap_share, .. }) = meeting(segments, *a, *b, options) {
                 meetings[i].push((j, place, gap_share));
                 meetings[j].push((i, place, gap_share));
             }
         }
     }
-    let sine = options.vertical_max_rad.sin();
+    let (sine, apart) = (options.vertical_max_rad.sin(), options.ray_angle_min_rad.sin());
     for (i, upright) in ends.iter().enumerate() {
         let segment = &segments[upright.segment];
         if vertical.is_some_and(|vertical| segment.normal.dot(vertical).abs() > sine) {
@@ -82,13 +88,15 @@ pub(crate) fn find(
         }
         for (k, (j, place, gap)) in meetings[i].iter().enumerate() {
             for (l, other_place, other_gap) in meetings[i].iter().skip(k + 1) {
-                let rays = [ends[*j], *upright, ends[*l]];
-                let between = segments[rays[0].segment].normal.cross(&segments[rays[2].segment].normal).norm();
-                if rays[0].segment == rays[2].segment || between < options.ray_angle_min_rad.sin() {
+                let px_per_rad = segment.px_per_rad;
+                // No angle is below its chord.
+                let is_near = |away_rad: f64| away_rad * px_per_rad <= 2.0 * LOOSE_PX;
+                if !(is_near((place - other_place).norm()) && is_near(place.angle(other_place))) {
                     continue;
                 }
-                let px_per_rad = segment.px_per_rad;
-                if place.angle(other_place) * px_per_rad > 2.0 * LOOSE_PX {
+                let rays = [ends[*j], *upright, ends[*l]];
+                let between = segments[rays[0].segment].normal.cross(&segments[rays[2].segment].normal).norm();
+                if rays[0].segment == rays[2].segment || between < apart {
                     continue;
                 }
                 if let Some(junction) = junction(camera, segments, rays, px_per_rad, gap + other_gap, place) {
@@ -101,6 +109,16 @@ pub(crate) fn find(
     out.truncate(JUNCTIONS_MAX);
 }
 
+/// How far before its begin a segment may meet another one, in pixels.
+fn widest_px(segment: &Segment, options: &GeneralOptions) -> f64 {
+    options.gap_max_px.max(options.gap_max_share * segment.length_px)
+}
+
+/// How far from its begin it may, either way, in radians.
+fn reach_rad(segment: &Segment, options: &GeneralOptions) -> f64 {
+    widest_px(segment, options).max(options.overshoot_max_px) / segment.px_per_rad
+}
+
 /// Where the lines of two ends cross, if both rays begin there and run away from it.
 pub(crate) fn meeting(segments: &[Segment], a: RayEnd, b: RayEnd, options: &GeneralOptions) -> Option<Meeting> {
     let (first, second) = (&segments[a.segment], &segments[b.segment]);
@@ -108,9 +126,7 @@ pub(crate) fn meeting(segments: &[Segment], a: RayEnd, b: RayEnd, options: &Gene
         return None;
     }
     // Both begin near the crossing, so they begin near each other.
-    let widest_px = |segment: &Segment| options.gap_max_px.max(options.gap_max_share * segment.length_px);
-    let reach_rad = |segment: &Segment| widest_px(segment).max(options.overshoot_max_px) / segment.px_per_rad;
-    if (a.near(segments) - b.near(segments)).norm() > reach_rad(first) + reach_rad(second) {
+    if (a.near(segments) - b.near(segments)).norm() > reach_rad(first, options) + reach_rad(second, options) {
         return None;
     }
     let crossing = first.normal.cross(&second.normal);
@@ -125,7 +141,7 @@ pub(crate) fn meeting(segments: &[Segment], a: RayEnd, b: RayEnd, options: &Gene
         // Positive where the segment begins beyond the crossing.
         let sign = if place.cross(near).dot(&near.cross(far)) < 0.0 { -1.0 } else { 1.0 };
         let gap_px = sign * place.angle(near) * segment.px_per_rad;
-        if gap_px < -options.overshoot_max_px || gap_px > widest_px(segment) {
+        if gap_px < -options.overshoot_max_px || gap_px > widest_px(segment, options) {
             return None;
         }
         gap_share += gap_px.abs() / segment.length_px;

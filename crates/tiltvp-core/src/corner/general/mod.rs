@@ -116,8 +116,7 @@ pub(crate) fn find(
                 known.push((junction.vertex, found));
                 found
             };
-            if ray.is_none_or(|traced| traced.share < options.support_min_share) {
-                *ray = None;
+            if ray.is_none() {
                 break;
             }
         }
@@ -155,16 +154,20 @@ fn search_of(segments: &[Segment], ray: RayEnd, vertex: &Vector3<f64>, options: 
     let px_per_rad = segment.px_per_rad;
     let mut to_rad = angle_of(ray.far(segments));
     let gap_rad = options.gap_max_px.max(options.gap_max_share * segment.length_px) / px_per_rad;
+    let in_line = |other: &&Segment| other.ends.iter().all(|end| normal.dot(end).abs() * px_per_rad < SAME_LINE_PX);
+    let in_line: Vec<[f64; 2]> = segments
+        .iter()
+        .filter(in_line)
+        .map(|other| {
+            let angles = other.ends.map(|end| angle_of(&end));
+            [angles[0].min(angles[1]), angles[0].max(angles[1])]
+        })
+        .collect();
     for _ in 0..3 {
         let before = to_rad;
-        for other in segments {
-            let off_px = other.ends.iter().map(|end| normal.dot(end).abs()).fold(0.0, f64::max) * px_per_rad;
-            if off_px < SAME_LINE_PX {
-                let angles = other.ends.map(|end| angle_of(&end));
-                let (near, far) = (angles[0].min(angles[1]), angles[0].max(angles[1]));
-                if near > 0.0 && near - to_rad < gap_rad && far > to_rad && far < 1.4 {
-                    to_rad = far;
-                }
+        for [near, far] in &in_line {
+            if *near > 0.0 && near - to_rad < gap_rad && *far > to_rad && *far < 1.4 {
+                to_rad = *far;
             }
         }
         if to_rad == before {
@@ -172,7 +175,7 @@ fn search_of(segments: &[Segment], ray: RayEnd, vertex: &Vector3<f64>, options: 
         }
     }
     let angles = [CLEAR_OF_VERTEX_PX / px_per_rad, to_rad - CLEAR_OF_END_PX / px_per_rad];
-    Some(gray_search(options, normal, on_line, angles))
+    Some(RaySearch { share_min: options.support_min_share, ..gray_search(options, normal, on_line, angles) })
 }
 
 /// The search for a ray of a grey image near a great circle, between two angles from the vertex.
@@ -191,6 +194,7 @@ fn gray_search(
         step_min: options.step_min,
         step_share_min: 0.0,
         threshold_px: options.threshold_px,
+        share_min: 0.0,
         erring_together: ERRING_TOGETHER,
         ray_sigma_px: options.ray_sigma_px,
     }

@@ -59,11 +59,10 @@ pub(crate) struct SegmentFinder {
 pub(crate) struct SegmentScratch {
     detector: RidgeDetector,
     ridge: RidgePixels,
-    /// The place among the ridge pixels, for each pixel of the image that is one.
-    owner: Vec<u32>,
     free: FreePixels,
     /// Places among the ridge pixels in the lower half, in the upper what is less for stronger ones.
     order: Vec<u64>,
+    spare: Vec<u64>,
     /// Directions of the ridge pixels' gradients.
     units: Vec<[f32; 2]>,
     members: Vec<u32>,
@@ -77,6 +76,9 @@ struct FreePixels {
     bits: Vec<u8>,
     /// Bytes from row to row, some more than the pixels need.
     stride: usize,
+    /// The same bits before any was taken, and how many ridge pixels come before each byte.
+    all: Vec<u8>,
+    before: Vec<u32>,
 }
 
 impl FreePixels {
@@ -87,6 +89,25 @@ impl FreePixels {
             self.bits.clear();
             self.bits.resize(stride * height, 0);
         }
+    }
+
+    /// Counts the pixels, once all are there.
+    fn count(&mut self) {
+        self.all.clone_from(&self.bits);
+        let mut before = 0;
+        self.before.clear();
+        self.before.extend(self.all.iter().map(|byte| {
+            let so_far = before;
+            before += byte.count_ones();
+            so_far
+        }));
+    }
+
+    /// The place among the ridge pixels, which are in the order of rows and columns, of a pixel that is one.
+    #[inline(always)]
+    fn number(&self, u: usize, v: usize) -> u32 {
+        let at = v * self.stride + u / 8;
+        self.before[at] + (u32::from(self.all[at]) & ((1 << (u % 8)) - 1)).count_ones()
     }
 
     #[inline(always)]
@@ -159,9 +180,9 @@ impl SegmentFinder {
         SegmentScratch {
             detector: RidgeDetector::new(&self.region, &self.edges),
             ridge: RidgePixels::default(),
-            owner: Vec::new(),
             free: FreePixels::default(),
             order: Vec::new(),
+            spare: Vec::new(),
             units: Vec::new(),
             members: Vec::new(),
             points: Vec::new(),
@@ -177,19 +198,17 @@ impl SegmentFinder {
         options: &GeneralOptions,
         scratch: &mut SegmentScratch,
     ) {
-        let SegmentScratch { detector, ridge, owner, free, order, units, members, points, segments } = scratch;
+        let SegmentScratch { detector, ridge, free, order, spare, units, members, points, segments } = scratch;
         detector.detect(image, &self.region, self.edges.gradient_min, None, ridge);
         let (slots, gx, gy) = (ridge.edges.slot(), ridge.edges.gx(), ridge.edges.gy());
-        let width = image.width();
-        owner.resize(width * image.height(), 0);
-        free.make(width, image.height());
+        free.make(image.width(), image.height());
         let places = ridge.edges.place();
         let place = |i: usize| column_and_row(places[i]);
         for i in 0..slots.len() {
             let (u, v) = place(i);
-            owner[v * width + u] = i as u32;
             free.add(u, v);
         }
+        free.count();
         units.resize(slots.len(), [0.0; 2]);
         directions(gx, gy, units);
         order.clear();
@@ -197,7 +216,7 @@ impl SegmentFinder {
             // Bits of numbers that are not negative are ordered as the numbers are.
             u64::from(!(x * x + y * y).to_bits()) << 32 | i as u64
         }));
-        order.sort_unstable();
+        sort_by_upper_half(order, spare);
         // Which pixel beside it a ridge pixel's edge is next to, by its shift along the row or the column.
         let shift = |i: usize| {
             let shift = f64::from(ridge.shift_px()[i]);
@@ -209,7 +228,7 @@ impl SegmentFinder {
             if !free.take(u, v) {
                 continue;
             }
-            let sum = grow(seed, width, (places, owner, units), free, members);
+            let sum = grow(seed, (places, units), free, members);
             if (members.len() as f64) < 0.7 * options.segment_min_px {
                 continue;
             }
@@ -235,6 +254,31 @@ impl SegmentFinder {
     }
 }
 
+/// Bits of a digit: three of them are the upper half of a key.
+const DIGIT: usize = 11;
+
+/// Sorts keys by their upper halves, those with the same in the order they are in.
+fn sort_by_upper_half(keys: &mut Vec<u64>, spare: &mut Vec<u64>) {
+    let digit = |key: u64, shift: usize| (key >> shift) as usize & ((1 << DIGIT) - 1);
+    for shift in [32, 32 + DIGIT, 32 + 2 * DIGIT] {
+        let mut next = [0_u32; 1 << DIGIT];
+        for key in keys.iter() {
+            next[digit(*key, shift)] += 1;
+        }
+        let mut before = 0;
+        for place in &mut next {
+            (*place, before) = (before, before + *place);
+        }
+        spare.resize(keys.len(), 0);
+        for key in keys.iter() {
+            let place = &mut next[digit(*key, shift)];
+            spare[*place as usize] = *key;
+            *place += 1;
+        }
+        std::mem::swap(keys, spare);
+    }
+}
+
 /// Column and row of a packed place.
 #[inline(always)]
 fn column_and_row(place: u32) -> (usize, usize) {
@@ -244,13 +288,7 @@ fn column_and_row(place: u32) -> (usize, usize) {
 /// Collects the free pixels that connect to a seed and whose gradients agree with those collected before; returns the sum of
 /// the gradients' directions.
 #[inline(always)]
-fn grow(
-    seed: u32,
-    width: usize,
-    (places, owner, units): (&[u32], &[u32], &[[f32; 2]]),
-    free: &mut FreePixels,
-    members: &mut Vec<u32>,
-) -> [f32; 2] {
+fn grow(seed: u32, (places, units): (&[u32], &[[f32; 2]]), free: &mut FreePixels, members: &mut Vec<u32>) -> [f32; 2] {
     members.clear();
     members.push(seed);
     let mut sum = units[seed as usize];
@@ -265,7 +303,7 @@ fn grow(
             let place = around.trailing_zeros() as usize;
             around &= around - 1;
             let (u, v) = (u - REACH + place % SPAN, v - REACH + place / SPAN);
-            let candidate = owner[v * width + u];
+            let candidate = free.number(u, v);
             let [x, y] = units[candidate as usize];
             if x * sum[0] + y * sum[1] > least {
                 free.take(u, v);

@@ -1,13 +1,13 @@
 //! Corners of which one image shows two edges, and corners of one image looked for in the other one.
 
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::{Matrix3, Vector2, Vector3};
 
 use super::agreement::{apart, fits, renamed};
 use super::estimator::{CornerPoseEstimator, Frame};
 use crate::corner::closed_form::attitude::corner_attitudes;
 use crate::corner::detector::CornerDetector;
 use crate::corner::feature::CornerFeature;
-use crate::corner::general::guided::ExpectedCorner;
+use crate::corner::general::guided::{EdgeSegments, ExpectedCorner};
 use crate::error::Result;
 use crate::geometry::RigidMotion;
 
@@ -25,6 +25,11 @@ const NEAR_LAST: f64 = 0.35;
 /// How far apart the places are at which a corner is looked for along its epipolar line, in pixels. The search reaches
 /// as far, so neighbours overlap by half.
 const EPIPOLAR_STEP_PX: f64 = 4.0;
+
+/// How far segments may be from where a ray is looked for to speak for it, in pixels: as far as the first and the second look for a ray
+/// reach together, 4 and 2.5, and a segment's pixels lie beside it, 1.2. With 6 pixels, 6 of 113 poses of a real box are lost, whose
+/// calibration is a quarter of a degree off; with 12 none is won.
+const SPEAKING_PX: f64 = 2.0 * EPIPOLAR_STEP_PX;
 
 impl CornerPoseEstimator {
     /// Adds the corners of which two edges were found and the third is known from an attitude in the left camera's frame.
@@ -79,11 +84,17 @@ impl CornerPoseEstimator {
                 });
                 let Some(near) = near else { continue };
                 let mut best: Option<CornerFeature> = None;
-                for distance_m in self.distances(detectors[other], &corner.vertex(), other_from_own) {
-                    let expected = ExpectedCorner::transferred(corner, &near.edges, distance_m, other_from_own);
-                    let seen = expected.and_then(|expected| {
-                        detectors[other].find_near(image, &expected, Some(EPIPOLAR_STEP_PX), &mut self.scratch[other])
-                    });
+                let edges = near.edges.map(|edge| other_from_own.rotation * edge);
+                let segments = EdgeSegments::new(detectors[other].segments(&self.scratch[other]), &edges, most_rad);
+                let distances = self.distances(detectors[other], &corner.vertex(), other_from_own);
+                let expected: Vec<ExpectedCorner> = distances
+                    .into_iter()
+                    .filter_map(|away_m| ExpectedCorner::transferred(corner, &near.edges, away_m, other_from_own))
+                    .filter(|expected| segments.speak_for(expected, SPEAKING_PX))
+                    .collect();
+                for expected in expected {
+                    let seen =
+                        detectors[other].find_near(image, &expected, Some(EPIPOLAR_STEP_PX), &mut self.scratch[other]);
                     let Some(seen) = seen.filter(|seen| fits(seen, &attitudes[other], most_rad)) else { continue };
                     if best.as_ref().is_none_or(|best| seen.support_score() > best.support_score()) {
                         best = Some(seen);
@@ -104,17 +115,37 @@ impl CornerPoseEstimator {
         let (nearest, farthest) = (self.options.distance_min_m, self.options.distance_max_m);
         let last = self.track.as_ref().and_then(|track| track.pose.vertex_m).map(|vertex| vertex.norm());
         let (near, far) = last.map_or((nearest, farthest), |last| (last * (1.0 - NEAR_LAST), last * (1.0 + NEAR_LAST)));
-        let mut out = Vec::new();
-        let mut before: Option<nalgebra::Vector2<f64>> = None;
-        for step in 0..=DISTANCES {
+        let distance_m = |step: u32| {
             let share = f64::from(step) / f64::from(DISTANCES);
-            let distance_m = 1.0 / (1.0 / far + share * (1.0 / near - 1.0 / far));
-            let Some(pixel) = other.camera().project(&other_from_own.point(&(bearing * distance_m))) else { continue };
-            let moved = before.is_none_or(|before| (pixel - before).norm() >= EPIPOLAR_STEP_PX);
-            if moved && other.camera().contains(&pixel) {
-                out.push(distance_m);
-                before = Some(pixel);
+            1.0 / (1.0 / far + share * (1.0 / near - 1.0 / far))
+        };
+        let pixel = |step: u32| other.camera().project(&other_from_own.point(&(bearing * distance_m(step))));
+        let mut out = Vec::new();
+        let mut before: Option<Vector2<f64>> = None;
+        // The steps from one distance to the next change slowly, so that the next one is near where the last was.
+        let (mut step, mut stride) = (0, 1);
+        while step <= DISTANCES {
+            let moved = |step: u32| {
+                let away =
+                    |pixel: &Vector2<f64>| before.is_none_or(|before| (pixel - before).norm() >= EPIPOLAR_STEP_PX);
+                pixel(step).filter(away)
+            };
+            let from = step;
+            step = (step + stride - 1).min(DISTANCES);
+            while step > from && moved(step - 1).is_some() {
+                step -= 1;
             }
+            while step < DISTANCES && moved(step).is_none() {
+                step += 1;
+            }
+            if let Some(pixel) = moved(step).filter(|pixel| other.camera().contains(pixel)) {
+                out.push(distance_m(step));
+                stride = if before.is_some() { step + 1 - from } else { 1 };
+                before = Some(pixel);
+            } else {
+                stride = 1;
+            }
+            step += 1;
         }
         out
     }
