@@ -59,13 +59,13 @@ _FEW: Final = 20
 """Sampled pixels, of 2000, below which a band's lightness is drawn to the mean, and its spread not told."""
 _VARIES: Final = 1.0
 """Grey levels by which a view varies at least, for one that does not."""
-WEIGHTS: Final = np.array([
+_WEIGHTS: Final = np.array([
     4.897, -0.3919, 1.937, -3.579, -2.262, 4.982, 0.9539, -2.97, -2.172, -2.282,
     -0.003112, -0.4236, -0.7259, -1.435, 2.215, 0.05672, 0.7524, 1.387,
     -1.946, 0.7086, 0.2233, 0.05972, 0.08465, -0.9837, -0.258, -3.007,
 ])  # fmt: skip
-"""Logarithm of the odds for each unit of a feature of one image: a conditional logit on sets of five views of 74
-buildings, by `tiltvp measure trust --weights`, which tells how well the weights of other buildings do."""
+"""Logarithm of the odds for each unit of a feature of one image: a conditional logit on views of half of the panoramas
+of `tiltvp measure trust`, by `tiltvp.lab.evaluation.setups`."""
 _SHARED: Final = 0.5
 """Images of one place err together: the logarithm of the odds of N images is that of N to this power of them. Of sets
 of five of one building, cross-validated by building, 97 % believe the right direction and each wrong one 6 %; 0.2 tells
@@ -148,9 +148,9 @@ def mounting_looking(direction: str) -> Matrix:
     return np.array([ahead, np.cross(up, ahead), up])
 
 
-def shares_of(features: Matrix, weights: Matrix = WEIGHTS) -> Matrix:
+def shares_of(features: Matrix, weights: Matrix | None = None) -> Matrix:
     """(6,): probabilities of the six directions by the features (N, 6, F) of images."""
-    log_odds = features.sum(axis=0) @ weights * len(features) ** (_SHARED - 1.0)
+    log_odds = features.sum(axis=0) @ (_WEIGHTS if weights is None else weights) * len(features) ** (_SHARED - 1.0)
     odds = np.exp(log_odds - log_odds.max())
     return np.asarray(odds / odds.sum())
 

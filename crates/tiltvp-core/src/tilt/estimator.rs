@@ -9,10 +9,12 @@ use super::estimate::{EdgeElement, TiltEstimate};
 use super::fit::Seen;
 use super::image_circle::CentreOff;
 use super::image_edges::{EdgeOrigin, ImageEdges};
+use super::lightness::LIGHTS;
 use super::methods::{Fitter, Prepared, Setting, TILT_MAX_RAD, edge_offset};
 use super::options::TiltOptions;
 use super::scratch::{Scratch, Work};
 use super::tables::PixelTables;
+use super::trust::ASPECT;
 use crate::camera::Camera;
 use crate::edges::{EdgeOptions, EdgePixels};
 use crate::error::{Error, Result};
@@ -153,7 +155,8 @@ impl TiltEstimator {
             Prepared::Pixels(method) => {
                 let Scratch { detector, edges, work, .. } = scratch;
                 detector.detect(image, &self.pixels.region, gradient_min, method.prefilter(), edges);
-                Ok(self.fit(&**method, edges, off_px, work))
+                let lights = method.trust().map_or([0.0; LIGHTS], |_| self.pixels.lightness.of(image));
+                Ok(self.fit(&**method, edges, (off_px, &lights), work))
             }
             Prepared::Segments(method) => Ok(method.estimate(image, &self.pixels, self.centre_off(off_px), scratch)),
         }
@@ -171,7 +174,8 @@ impl TiltEstimator {
         let Scratch { detector, edges, .. } = scratch;
         detector.detect(image, &self.pixels.region, self.options.edges.gradient_min, None, edges);
         ImageEdges::new(Arc::clone(&self.origin), edges.slot(), edges.gx(), edges.gy())?
-            .with_centre_off_px(self.centre_off_px(image))
+            .with_centre_off_px(self.centre_off_px(image))?
+            .with_lights(&self.pixels.lightness.of(image))
     }
 
     /// How far the image circle lies beside the calibration's, where both are seen.
@@ -195,7 +199,7 @@ impl TiltEstimator {
         self.check_scratch(scratch)?;
         let Scratch { edges, work, .. } = scratch;
         image_edges.copy_to(&self.origin, &self.pixels.region, edges)?;
-        Ok(self.fit(method, edges, image_edges.centre_off_px(), work))
+        Ok(self.fit(method, edges, (image_edges.centre_off_px(), image_edges.lights()), work))
     }
 
     /// The method, if it looks at edge pixels.
@@ -215,7 +219,7 @@ impl TiltEstimator {
         &self,
         method: &dyn Fitter,
         edges: &EdgePixels,
-        off_px: Option<Vector2<f64>>,
+        (off_px, lights): (Option<Vector2<f64>>, &[f64; LIGHTS]),
         work: &mut Work,
     ) -> TiltEstimate {
         let fit = method.fit(edges, &self.pixels, work);
@@ -225,6 +229,8 @@ impl TiltEstimator {
             prefiltered_pixels,
             pixels_per_rad: self.pixels.region.pixels_per_rad(),
             tilt_max_rad: self.options.tilt_max_rad.unwrap_or(TILT_MAX_RAD),
+            lights,
+            aspect: method.trust().map_or([0.0; ASPECT], |_| method.aspect(&self.pixels, work)),
             trust: method.trust(),
             centre_off: self.centre_off(off_px),
         };

@@ -8,10 +8,11 @@ use super::confidence;
 use super::corrected::Corrected;
 use super::estimate::{ALTERNATIVES, Alternative, TiltEstimate};
 use super::image_circle::CentreOff;
+use super::lightness::LIGHTS;
 use super::scratch::Work;
 use super::tables::PixelTables;
 use super::trained::TrainedCorrection;
-use super::trust::{self, Doubt, FEATURES, Trust};
+use super::trust::{ASPECT, Believed, Doubt, FEATURES, Trust, features};
 use crate::geometry::{Tilt, tangent_basis};
 use crate::robust::{FitReport, Stop};
 
@@ -72,7 +73,7 @@ impl Fit {
 
     /// The estimate of an image. A tilt of which the error is not known is none: nor one whose covariance is singular to rounding,
     /// for a direction in which an image tells nothing.
-    pub(super) fn into_estimate(self, seen: &Seen<'_>, features: &mut [f64; FEATURES]) -> TiltEstimate {
+    pub(super) fn into_estimate(self, seen: &Seen<'_>, trusted: &mut [f64; FEATURES]) -> TiltEstimate {
         let chosen = self.alternatives[0].map_or(1.0, |best| best.probability);
         let (covariance, off_rad) = self.with_centre_off(seen);
         let covariance = covariance.filter(|covariance| confidence::inverse_of_positive(covariance).is_some());
@@ -92,11 +93,12 @@ impl Fit {
             stop: undetermined.unwrap_or(self.stop),
             doubt: None,
         };
-        *features = trust::features(&estimate, seen.pixels_per_rad, seen.tilt_max_rad);
-        if let Some(trust) = seen.trust {
-            estimate.confidence *= trust.probability(features);
-        }
-        estimate.doubt = Doubt::of(&estimate, seen.pixels_per_rad, off_rad);
+        *trusted = features(&estimate, seen);
+        let small = estimate.confidence;
+        let believed = seen.trust.map_or(Believed::ALL, |trust| trust.believed(trusted));
+        estimate.confidence *= believed.vertical * believed.up;
+        let looks_up = believed.up >= small.min(believed.vertical);
+        estimate.doubt = Doubt::of(&estimate, seen.pixels_per_rad, off_rad, looks_up);
         estimate
     }
 
@@ -118,6 +120,10 @@ pub(super) struct Seen<'a> {
     pub pixels_per_rad: f64,
     /// The largest lean that is looked for.
     pub tilt_max_rad: f64,
+    /// How light the view is at each height.
+    pub lights: &'a [f64; LIGHTS],
+    /// Where what the method looks at stands.
+    pub aspect: [f64; ASPECT],
     /// How far the method's fits can be trusted to be of the vertical at all.
     pub trust: Option<&'static Trust>,
     /// A centre that is off.
@@ -211,26 +217,46 @@ impl Lean {
 mod tests {
     use super::*;
 
+    fn fit(covariance: Matrix2<f64>) -> Fit {
+        Fit {
+            tilt: Some(Tilt::from_alpha_beta(0.1, 0.3)),
+            covariance: Some(covariance),
+            inliers: 7,
+            ..Fit::failed(Stop::Converged { iterations: 3, change: 0.0, tolerance: 1e-6 })
+        }
+    }
+
+    fn seen(trust: Option<&'static Trust>) -> Seen<'static> {
+        Seen {
+            edge_pixels: 9,
+            prefiltered_pixels: 8,
+            pixels_per_rad: 100.0,
+            tilt_max_rad: 0.5,
+            lights: &[0.0; LIGHTS],
+            aspect: [0.0; ASPECT],
+            trust,
+            centre_off: None,
+        }
+    }
+
+    #[test]
+    fn what_is_least_probable_of_fit_and_mounting_is_the_doubt() {
+        static FIT: Trust = Trust::told(-1.0, 1.0);
+        static MOUNTING: Trust = Trust::told(1.0, -1.0);
+        let of = |trust| fit(Matrix2::identity() * 1e-5).into_estimate(&seen(Some(trust)), &mut [0.0; FEATURES]);
+        let (fit, mounting) = (of(&FIT), of(&MOUNTING));
+        assert!((fit.confidence - mounting.confidence).abs() < 1e-12 && (0.19..0.2).contains(&fit.confidence));
+        assert!(matches!(fit.doubt, Some(Doubt::FewEdges { pixels: 9 })));
+        assert_eq!(mounting.doubt, Some(Doubt::NotUp));
+        assert!(mounting.doubt.is_some_and(|doubt| doubt.to_string().contains("check the mounting")));
+    }
+
     #[test]
     fn a_tilt_whose_covariance_is_singular_to_rounding_is_none() {
         let estimate = |weak: f64, turn: f64| {
             let axes = *nalgebra::Rotation2::new(turn).matrix();
             let covariance = axes * Matrix2::from_diagonal(&Vector2::new(weak, 1e-5)) * axes.transpose();
-            let fit = Fit {
-                tilt: Some(Tilt::from_alpha_beta(0.1, 0.3)),
-                covariance: Some(covariance),
-                inliers: 7,
-                ..Fit::failed(Stop::Converged { iterations: 3, change: 0.0, tolerance: 1e-6 })
-            };
-            let seen = Seen {
-                edge_pixels: 9,
-                prefiltered_pixels: 8,
-                pixels_per_rad: 100.0,
-                tilt_max_rad: 0.5,
-                trust: None,
-                centre_off: None,
-            };
-            fit.into_estimate(&seen, &mut [0.0; FEATURES])
+            fit(covariance).into_estimate(&seen(None), &mut [0.0; FEATURES])
         };
         for turn in [0.0, 0.3, 0.8, 2.0] {
             let known = estimate(1e-4, turn);

@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use nalgebra::{Matrix3, Vector2};
 
+use super::lightness::LIGHTS;
 use crate::camera::Camera;
 use crate::edges::{EdgeOptions, EdgePixels, Mask, Region};
 use crate::error::{Error, Result};
@@ -61,6 +62,7 @@ pub struct ImageEdges {
     gx: Arc<[f32]>,
     gy: Arc<[f32]>,
     centre_off_px: Option<Vector2<f64>>,
+    lights: [f64; LIGHTS],
 }
 
 impl ImageEdges {
@@ -79,7 +81,14 @@ impl ImageEdges {
         if !gx.iter().chain(gy).all(|g| g.is_finite()) {
             return Err(Error::argument("edges", "gradients that are not finite", "finite gradients"));
         }
-        Ok(Self { origin, slots: slots.into(), gx: gx.into(), gy: gy.into(), centre_off_px: None })
+        Ok(Self {
+            origin,
+            slots: slots.into(),
+            gx: gx.into(),
+            gy: gy.into(),
+            centre_off_px: None,
+            lights: [0.0; LIGHTS],
+        })
     }
 
     /// The same with how far the image circle lies beside the calibration's, which no edge pixel tells.
@@ -91,6 +100,20 @@ impl ImageEdges {
             return Err(Error::argument("edges", format!("a centre off by {}, {} px", off.x, off.y), "finite pixels"));
         }
         self.centre_off_px = centre_off_px;
+        Ok(self)
+    }
+
+    /// The same with how light the image is at each height, as [`lights`](Self::lights) tells it.
+    ///
+    /// # Errors
+    /// [`Error::InvalidArgument`] unless there are sixteen finite numbers.
+    pub fn with_lights(mut self, lights: &[f64]) -> Result<Self> {
+        match <[f64; LIGHTS]>::try_from(lights) {
+            Ok(lights) if lights.iter().all(|x| x.is_finite()) => self.lights = lights,
+            _ => {
+                return Err(Error::argument("edges", "other numbers of lightness", format!("{LIGHTS} finite numbers")));
+            }
+        }
         Ok(self)
     }
 
@@ -127,6 +150,11 @@ impl ImageEdges {
     /// How far in pixels the image circle lies beside the calibration's; `None` where no dark surround tells.
     pub fn centre_off_px(&self) -> Option<Vector2<f64>> {
         self.centre_off_px
+    }
+
+    /// How light the image is in eight bands from straight down to straight up, and by how much each varies, in standard deviations.
+    pub fn lights(&self) -> &[f64; LIGHTS] {
+        &self.lights
     }
 
     /// Copies them to where the fits read them, if they are of this origin.

@@ -11,6 +11,7 @@ mod fit;
 mod image_circle;
 mod image_edges;
 mod level;
+mod lightness;
 mod methods;
 mod options;
 mod posterior;

@@ -6,6 +6,7 @@ use super::confidence::SECTORS;
 use super::correction::VanishingPoint;
 use super::image_circle::ImageCircle;
 use super::image_edges::EdgeOrigin;
+use super::lightness::Lightness;
 use super::methods::SharedTables;
 use crate::edges::Region;
 use crate::error::Result;
@@ -16,10 +17,14 @@ pub(super) struct PixelTables {
     pub region: Region,
     /// Sector of azimuth of each pixel.
     pub sectors: Vec<u8>,
+    /// Degrees of each pixel above the horizon.
+    pub heights_deg: Vec<i8>,
     /// Where the vertical of the upright robot is seen.
     pub vertical: Option<VanishingPoint>,
     /// Where the rim of the image circle is to be, if the calibration says so.
     pub circle: Option<ImageCircle>,
+    /// Where it is looked how light the view is.
+    pub lightness: Lightness,
     /// What the methods look up.
     pub shared: SharedTables,
 }
@@ -33,8 +38,11 @@ impl PixelTables {
             ((turn * SECTORS as f64) as usize).min(SECTORS - 1) as u8
         };
         let sectors = region.pixels().map(|(_, _, bearing)| sector(bearing)).collect();
+        let degrees = |bearing: Vector3<f64>| bearing.z.clamp(-1.0, 1.0).asin().to_degrees().round() as i8;
+        let heights_deg = region.pixels().map(|(_, _, bearing)| degrees(bearing)).collect();
         let vertical = VanishingPoint::new(camera, robot_from_camera);
         let circle = ImageCircle::new(camera);
-        Ok(Self { region, sectors, vertical, circle, shared: SharedTables::default() })
+        let lightness = Lightness::new(camera, robot_from_camera, mask.as_ref());
+        Ok(Self { region, sectors, heights_deg, vertical, circle, lightness, shared: SharedTables::default() })
     }
 }

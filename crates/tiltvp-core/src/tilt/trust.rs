@@ -3,30 +3,87 @@
 use std::fmt;
 
 use super::estimate::TiltEstimate;
+use super::fit::Seen;
+use super::lightness::LIGHTS;
 
-/// How many numbers tell whether a fit is of the vertical.
-pub(super) const FEATURES: usize = 8;
+/// How many numbers tell of a fit.
+const FIT: usize = 8;
 
-/// How a method's fits tell whether they are of the vertical and not of some other direction that edges share: a logistic
-/// regression on views whose cameras, mountings or scenes mislead, `tiltvp measure trust`, which prints it.
+/// The first of them tell how fine an image is, whichever way the camera is mounted.
+const FINENESS: usize = 2;
+
+/// How many numbers tell where what a method looks at stands; a method that tells less leaves the last ones zero.
+pub(super) const ASPECT: usize = 5;
+
+/// How many numbers tell whether an estimate is right.
+pub(super) const FEATURES: usize = FIT + LIGHTS + ASPECT;
+
+/// How it is told whether a method's fits are of the vertical: logistic regressions on views whose cameras, mountings or scenes
+/// mislead, `tiltvp measure trust`, which prints them.
 #[derive(Debug)]
 pub(super) struct Trust {
-    pub constant: f64,
-    pub weights: [f64; FEATURES],
+    /// Whether a fit is of the vertical and not of some other direction that edges share: told by the fit.
+    pub vertical: Logit<FIT>,
+    /// Whether the camera is mounted as told. A factor of its own: light from above makes no poor fit believable.
+    pub up: Logit<{ FEATURES - FINENESS }>,
 }
 
-impl Trust {
-    /// Probability that a fit is of the vertical.
-    pub(super) fn probability(&self, features: &[f64; FEATURES]) -> f64 {
+/// A logistic regression.
+#[derive(Debug)]
+pub(super) struct Logit<const N: usize> {
+    pub constant: f64,
+    pub weights: [f64; N],
+}
+
+impl<const N: usize> Logit<N> {
+    /// The probability by as many numbers as there are weights.
+    fn probability(&self, features: &[f64]) -> f64 {
         let log_odds: f64 =
             self.constant + features.iter().zip(self.weights).map(|(x, weight)| x * weight).sum::<f64>();
         1.0 / (1.0 + (-log_odds).exp())
     }
 }
 
-/// What tells it: the stated error, how much agrees of what might and of all, how fine the pixels are, how well it agrees, how much
-/// that is, and how near it is to the largest lean.
-pub(super) fn features(estimate: &TiltEstimate, pixels_per_rad: f64, tilt_max_rad: f64) -> [f64; FEATURES] {
+/// How probable it is that a fit is of the vertical, and that up is where it is told to be.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Believed {
+    pub vertical: f64,
+    pub up: f64,
+}
+
+impl Believed {
+    /// Without doubt.
+    pub(super) const ALL: Self = Self { vertical: 1.0, up: 1.0 };
+}
+
+impl Trust {
+    /// One whose logarithms of the odds are these, whatever is seen.
+    #[cfg(test)]
+    pub(super) const fn told(vertical: f64, up: f64) -> Self {
+        let vertical = Logit { constant: vertical, weights: [0.0; FIT] };
+        Self { vertical, up: Logit { constant: up, weights: [0.0; FEATURES - FINENESS] } }
+    }
+
+    /// The probabilities of a fit.
+    pub(super) fn believed(&self, features: &[f64; FEATURES]) -> Believed {
+        let (vertical, up) = (&features[..FIT], &features[FINENESS..]);
+        Believed { vertical: self.vertical.probability(vertical), up: self.up.probability(up) }
+    }
+}
+
+/// What tells it: the stated error, how fine the pixels are, how much agrees of what might and of all, how well it agrees, how much
+/// that is, and how near it is to the largest lean; then how light the view is at each height, and where edges stand.
+pub(super) fn features(estimate: &TiltEstimate, seen: &Seen<'_>) -> [f64; FEATURES] {
+    let mut all = [0.0; FEATURES];
+    let (of_fit, of_view) = all.split_at_mut(FIT);
+    of_fit.copy_from_slice(&fit_features(estimate, seen.pixels_per_rad, seen.tilt_max_rad));
+    let (lights, aspect) = of_view.split_at_mut(LIGHTS);
+    lights.copy_from_slice(seen.lights);
+    aspect.copy_from_slice(&seen.aspect);
+    all
+}
+
+fn fit_features(estimate: &TiltEstimate, pixels_per_rad: f64, tilt_max_rad: f64) -> [f64; FIT] {
     let [inliers, near, all] =
         [estimate.inlier_pixels, estimate.prefiltered_pixels, estimate.edge_pixels].map(|n| n as f64);
     let sigma_deg = estimate.covariance_rad2.trace().sqrt().to_degrees().clamp(0.1, 30.0);
@@ -34,10 +91,10 @@ pub(super) fn features(estimate: &TiltEstimate, pixels_per_rad: f64, tilt_max_ra
     let share = ((inliers + 1.0) / (all + 10.0)).ln();
     [
         sigma_deg.ln(),
+        (pixels_per_rad / 150.0).ln().min(0.0),
         ((inliers + 5.0) / (near + 50.0)).ln(),
         share,
         share * share,
-        (pixels_per_rad / 150.0).ln().min(0.0),
         if estimate.residual_rms.is_finite() { estimate.residual_rms.to_degrees() } else { 2.0 },
         (inliers / pixels_per_rad).ln_1p(),
         1.2 * lean,
@@ -73,6 +130,8 @@ pub enum Doubt {
         /// Pixels for each degree.
         per_deg: f64,
     },
+    /// The view does not look as it does where up is as told.
+    NotUp,
     /// There are few edges.
     FewEdges {
         /// Edge pixels.
@@ -97,7 +156,7 @@ pub enum Doubt {
 
 impl Doubt {
     /// What most likely is wrong with an image, if its estimate is not sure.
-    pub(super) fn of(estimate: &TiltEstimate, pixels_per_rad: f64, off_rad: f64) -> Option<Self> {
+    pub(super) fn of(estimate: &TiltEstimate, pixels_per_rad: f64, off_rad: f64, looks_up: bool) -> Option<Self> {
         if estimate.confidence >= SURE {
             return None;
         }
@@ -109,6 +168,8 @@ impl Doubt {
             Self::Decentred { off_rad }
         } else if per_deg < PIXELS_PER_DEG {
             Self::Coarse { per_deg }
+        } else if !looks_up {
+            Self::NotUp
         } else if (estimate.edge_pixels as f64) < EDGES * pixels_per_rad {
             Self::FewEdges { pixels: estimate.edge_pixels }
         } else if estimate.tilt.is_some() && share < AGREEING {
@@ -132,6 +193,9 @@ impl fmt::Display for Doubt {
                 off_rad.to_degrees()
             ),
             Self::Coarse { per_deg } => write!(f, "{per_deg:.1} pixels for each degree are coarse"),
+            Self::NotUp => {
+                write!(f, "what is light, and where edges stand, is unlike views with up as told: check the mounting")
+            }
             Self::FewEdges { pixels } => {
                 write!(f, "{pixels} edge pixels are few: little contrast, dark, over-exposed or blurred")
             }

@@ -57,7 +57,7 @@ impl ImageEdges {
         options: ([f64; 5], u32),
         mask: Option<&Bound<'_, PyAny>>,
         pixels: (PyReadonlyArray1<'_, u32>, [PyReadonlyArray1<'_, f32>; 2]),
-        centre_off_px: Option<[f64; 2]>,
+        seen: (Option<[f64; 2]>, Vec<f64>),
     ) -> PyResult<Self> {
         let ([gradient_min, smoothing_px, elevation_min_rad, elevation_max_rad, margin_px], row_stride) = options;
         let options = EdgeOptions { gradient_min, smoothing_px, elevation_min_rad, elevation_max_rad, margin_px };
@@ -73,9 +73,11 @@ impl ImageEdges {
             row_stride,
         };
         let (slots, gradients) = pixels;
+        let (centre_off_px, lights) = seen;
         let [gx, gy] = gradients.each_ref().map(|g| g.to_vec());
         let inner = core::ImageEdges::new(Arc::new(origin), &slots.to_vec()?, &gx?, &gy?)
-            .and_then(|edges| edges.with_centre_off_px(centre_off_px.map(Into::into)));
+            .and_then(|edges| edges.with_centre_off_px(centre_off_px.map(Into::into)))
+            .and_then(|edges| edges.with_lights(&lights));
         Ok(Self { inner: inner.map_err(|error| exception(&error))?, camera })
     }
 
@@ -89,7 +91,8 @@ impl ImageEdges {
         let slots = PyArray1::from_slice(py, this.inner.slots());
         let gradients = [this.inner.gx(), this.inner.gy()].map(|g| PyArray1::from_slice(py, g));
         let off = this.inner.centre_off_px().map(<[f64; 2]>::from);
-        let parts = (this.camera.clone_ref(py), rotation, options, mask, (slots, gradients), off);
+        let lights = this.inner.lights().to_vec();
+        let parts = (this.camera.clone_ref(py), rotation, options, mask, (slots, gradients), (off, lights));
         (slf.get_type().getattr("_from_parts")?, parts).into_pyobject(py)
     }
 }

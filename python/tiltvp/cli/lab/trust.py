@@ -18,7 +18,7 @@ def trust(
     /,
     *,
     count: Annotated[int, Parameter(validator=validators.Number(gte=1))] = 200,
-    sets: Annotated[int, Parameter(validator=validators.Number(gte=0))] = 8,
+    sets: Annotated[int, Parameter(validator=validators.Number(gte=0))] = 2,
     seed: Annotated[int, Parameter(validator=validators.Number(gte=0))] = 0,
     unseen: Switch = False,
     weights: Switch = False,
@@ -36,14 +36,14 @@ def trust(
     count
         Images of each case.
     sets
-        Sets of five images of each building that `check_setup` is asked about, weighed by what those of other buildings
-        train; with one or more, `check_lens` is asked too.
+        Sets of five images of each building that `check_setup` is asked about; with one or more, `check_lens` too.
     seed
         Seed of headings, leans and harm.
     unseen
         Only the half of the buildings on which nothing was set.
     weights
-        Also print the weights that the other half trains of the confidences, and all buildings of `check_setup`.
+        Show images of the other half alone, and also print the weights that it trains: of the confidences, and of
+        `check_setup`.
     out
         Also write the long table, one row for each image and method: .csv, .json or .parquet.
     """
@@ -62,22 +62,23 @@ def trust(
     ]
     places = len({panorama.location for panorama in chosen})
     with progress_bar(count * len(CASES) + 2 * places, "images") as bar:
-        images = hostile_images(chosen, count=count, seed=seed)
+        shown = [panorama for panorama in chosen if not weights or was_set_on(panorama.location)]
+        images = hostile_images(shown, count=count, seed=seed)
         table = judge_images(images, features=weights, advance=bar.advance)
         asked = image_sets(chosen, sets=sets, seed=seed, advance=bar.advance)
         lenses = judge_lenses(chosen, seed=seed, advance=bar.advance) if sets else None
     if out is not None:
         write_frame(table.select(column for column in table.columns if column != "features"), out)
-    title = f"Shares in per cent, of {count} images of each case, {len(chosen)} panoramas of {places} buildings"
+    title = f"Shares in per cent, of {count} images of each case, by {len(shown)} panoramas"
     show_frame(title, summarise_cases(table), ["method", "case"])
     for method in METHODS if weights else ():
-        constant, own = train_trust(table, method)
-        say(f"{method}: {constant:.4g}; {', '.join(f'{weight:.4g}' for weight in own)}")
+        for what, (constant, own) in zip(("vertical", "up"), train_trust(table, method), strict=True):
+            say(f"{method}, {what}: {constant:.4g}; {', '.join(f'{weight:.4g}' for weight in own)}")
     if asked:
         show_frame(
-            "Sets of five images of one building: which direction is up", summarise_sets(asked), ["weights", "setup"]
+            "Sets of five images of one building: which direction is up", summarise_sets(asked), ["half", "setup"]
         )
     if lenses is not None:
         show_frame("Sets of five images of one building: whether its lens is believed", lenses, ["setup", "told"])
-    if weights and asked:
-        say(f"check_setup: {', '.join(f'{weight:.4g}' for weight in train_setups(asked))}")
+    if weights and (told := [item for item in asked if was_set_on(item.location)]):
+        say(f"check_setup: {', '.join(f'{weight:.4g}' for weight in train_setups(told))}")

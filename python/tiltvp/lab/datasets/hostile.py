@@ -332,10 +332,19 @@ CASES: Final[dict[str, Make]] = {
     "bare wall": _bare(_wall),
     "portrait of a person": _bare(_portrait),
     "lean of 20 to 40 degrees": _leaning,
+    "downward": _told(UPWARD, DOWN, DOWN),
+    "fisheye ahead": _told(UPWARD, FORWARD, FORWARD),
+    "portrait": _told(AHEAD, FORWARD @ ROLLED, FORWARD @ ROLLED),
+    "downward read as ahead": _told(UPWARD, DOWN, FORWARD),
+    "fisheye ahead read as upward": _told(UPWARD, FORWARD, UP),
+    "fisheye ahead read as downward": _told(UPWARD, FORWARD, DOWN),
+    "fisheye upside down read as upright": _told(UPWARD, FORWARD @ ROLLED @ ROLLED, FORWARD),
 }
-"""What is done, by name; the first three are the views unharmed and read as they are."""
+"""What is done, by name."""
 
-UNHARMED: Final = ("upward", "ahead", "panorama")
+UNHARMED: Final = ("upward", "ahead", "panorama", "downward", "fisheye ahead", "portrait")
+"""The views that are not harmed and read as they are: each mounting that another is read as is among them, lest cameras
+tell what images are to tell."""
 
 
 def hostile_images(

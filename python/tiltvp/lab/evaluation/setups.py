@@ -23,8 +23,9 @@ from tiltvp.lab.datasets.hostile import (
 )
 from tiltvp.lab.datasets.panoramas import Panorama, PanoramaViews
 from tiltvp.lab.evaluation.choices import train_weights
+from tiltvp.lab.evaluation.trust import was_set_on
 from tiltvp.lens_check import check_lens
-from tiltvp.setup_check import BELIEVABLE, DIRECTIONS, WEIGHTS, setup_features, shares_of
+from tiltvp.setup_check import BELIEVABLE, DIRECTIONS, setup_features, shares_of
 from tiltvp.tilt import normal_from_alpha_beta
 
 if TYPE_CHECKING:
@@ -36,7 +37,6 @@ __all__ = ["IMAGES", "ImageSet", "image_sets", "judge_lenses", "summarise_sets",
 
 IMAGES: Final = 5
 """Images of a set."""
-FOLDS: Final = 5
 PENALTY: Final = 3.0
 """Of the squared weights of features that are scaled to a standard deviation of one."""
 SETUPS: Final = {
@@ -140,34 +140,23 @@ def train_setups(sets: Sequence[ImageSet]) -> NDArray[np.float64]:
     return train_weights([(image, item.up) for item in sets for image in item.features], PENALTY)
 
 
-def summarise_sets(sets: Sequence[ImageSet]) -> pl.DataFrame:
-    """One row for each way of weighing and each setup: sets, and in per cent of them those whose right direction is the
-    best, that believe the right one, and that believe each wrong one.
-
-    "unseen buildings" weighs by what the sets of other buildings train, in as many parts as there are folds; it wants
-    several sets of each building. "as shipped" weighs as the software does, which has seen them.
+def summarise_sets(sets: Sequence[ImageSet], weights: NDArray[np.float64] | None = None) -> pl.DataFrame:
+    """One row for each setup and half of the buildings: sets, and in per cent of them those whose right direction is
+    the best, that believe the right one, and that believe each wrong one. `weights` are those of the software.
     """
-    locations = np.random.default_rng(0).permutation(sorted({item.location for item in sets}))
-    fold = {location: k % FOLDS for k, location in enumerate(locations)}
-    others = {k: [item for item in sets if fold[item.location] != k] for k in set(fold.values())}
-    trained = {k: train_setups(told) for k, told in others.items() if told}
     rows = []
     for item in sets:
-        ways = {"unseen buildings": trained.get(fold[item.location]), "as shipped": WEIGHTS}
-        for name, weights in ways.items():
-            if weights is None:
-                continue
-            shares = shares_of(item.features, weights)
-            rows.append(
-                {
-                    "weights": name,
-                    "setup": item.setup,
-                    "right": int(shares.argmax()) == item.up,
-                    "right_believed": shares[item.up] >= BELIEVABLE,
-                    "wrong_believed": float(np.mean(np.delete(shares, item.up) >= BELIEVABLE)),
-                }
-            )
+        shares = shares_of(item.features, weights)
+        rows.append(
+            {
+                "setup": item.setup,
+                "half": "set" if was_set_on(item.location) else "unseen",
+                "right": int(shares.argmax()) == item.up,
+                "right_believed": shares[item.up] >= BELIEVABLE,
+                "wrong_believed": float(np.mean(np.delete(shares, item.up) >= BELIEVABLE)),
+            }
+        )
     table = pl.DataFrame(rows)
-    table = pl.concat([table.sort("weights", "setup"), table.with_columns(setup=pl.lit("all"))])
+    table = pl.concat([table.sort("half", "setup"), table.with_columns(setup=pl.lit("all"))])
     shares_ = [(100.0 * pl.col(name).mean()).alias(name) for name in ("right", "right_believed", "wrong_believed")]
-    return table.group_by("weights", "setup", maintain_order=True).agg(pl.len().alias("sets"), *shares_)
+    return table.group_by("half", "setup", maintain_order=True).agg(pl.len().alias("sets"), *shares_)

@@ -41,7 +41,7 @@ use super::image_edges::EdgeOrigin;
 use super::options::TiltOptions;
 use super::scratch::Work;
 use super::tables::PixelTables;
-use super::trust::Trust;
+use super::trust::{ASPECT, Trust};
 use crate::edges::{EdgeOptions, EdgePixels, Prefilter};
 use crate::error::Result;
 
@@ -121,6 +121,11 @@ pub(super) trait Fitter: Debug + Send + Sync {
     /// How its fits tell whether they are of the vertical at all, if that has been learned.
     fn trust(&self) -> Option<&'static Trust> {
         None
+    }
+
+    /// Where what the last fit looked at stands.
+    fn aspect(&self, _pixels: &PixelTables, _work: &Work) -> [f64; ASPECT] {
+        [0.0; ASPECT]
     }
 
     /// Unit normal in the robot frame of the great circle of an edge pixel, by its place in the region and its gradient, if the

@@ -15,7 +15,7 @@ use crate::tilt::fit::{Evidence, Fit};
 use crate::tilt::scratch::{Inliers, Work};
 use crate::tilt::tables::PixelTables;
 use crate::tilt::trained::TrainedCorrection;
-use crate::tilt::trust::Trust;
+use crate::tilt::trust::{ASPECT, Logit, Trust};
 
 options! {
     /// Options of the refined method. Angles are those between an edge's great circle and the vertical.
@@ -36,7 +36,16 @@ options! {
 pub(in crate::tilt) const TILT_MAX_RAD: f64 = 12f64.to_radians();
 
 /// How a fit tells whether it is of the vertical: `tiltvp measure trust --weights` prints it.
-static TRUST: Trust = Trust { constant: 5.304, weights: [-1.75, 4.583, 0.556, 0.09, -0.464, 0.255, 0.375, -1.192] };
+static TRUST: Trust = Trust {
+    vertical: Logit { constant: 4.474, weights: [-2.322, 0.1094, 5.713, -1.533, -0.4902, 2.116, -0.4649, -2.259] },
+    up: Logit {
+        constant: 10.05,
+        weights: [
+            1.319, 0.1789, -0.02544, -2.71, 0.8393, -2.963, -1.741, 0.08912, -1.261, -4.575, 1.085, 0.5173, -1.102,
+            1.953, 0.2501, -2.135, -1.813, -0.3016, 0.8395, -1.06, 1.047, -2.432, -7.03, 2.286, 0.0, 0.0, 0.0,
+        ],
+    },
+};
 
 impl TiltMethod for RefineOptions {
     fn edges(&self) -> EdgeOptions {
@@ -70,6 +79,22 @@ impl Fitter for Refined {
         Some(&TRUST)
     }
 
+    /// How high what agrees and what is near stand, in units of 45 degrees.
+    fn aspect(&self, pixels: &PixelTables, work: &Work) -> [f64; ASPECT] {
+        let Inliers::Within { model, threshold } = work.inliers else { return [0.0; ASPECT] };
+        let (model, stride) = (Vector3::from(model), (work.rows.len() / HEIGHTS).max(1));
+        let (mut of_near, mut of_inliers) = ([0.0; 2], [0.0; 2]);
+        for (row, slot) in work.slots.iter().enumerate().step_by(stride) {
+            let height = f64::from(pixels.heights_deg.get(*slot as usize).copied().unwrap_or(0)) / 45.0;
+            of_near = [of_near[0] + height, of_near[1] + 1.0];
+            if work.rows.get(row).is_some_and(|row| row.dot(&model).abs() <= threshold) {
+                of_inliers = [of_inliers[0] + height, of_inliers[1] + 1.0];
+            }
+        }
+        let [inliers, near] = [of_inliers, of_near].map(|[sum, count]| sum / f64::max(count, 1.0));
+        [inliers, near, 0.0, 0.0, 0.0]
+    }
+
     fn normal(&self, slot: usize, gx: f32, gy: f32) -> Option<[f32; 3]> {
         self.normals.normal(slot, gx, gy)
     }
@@ -88,6 +113,9 @@ impl Fitter for Refined {
 
 /// Scales of the soft gate within which a pixel is reported as an inlier: 95 % of a normal distribution.
 const INLIER_SCALES: f64 = 2.0;
+
+/// Rows of which the heights are looked at, or up to twice as many: their mean then errs by a degree or less.
+const HEIGHTS: usize = 500;
 
 /// Rounds in which the soft gate fades from one and a half scales to one.
 const FADING: u32 = 2;

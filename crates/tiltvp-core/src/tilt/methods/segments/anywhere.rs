@@ -4,8 +4,8 @@
 
 use nalgebra::{Matrix3, Matrix4, Rotation3, SMatrix, Vector3, Vector4};
 
+use super::any_lightness::Lightness;
 use super::choice::{FEATURES, features, log_odds};
-use super::lightness::Lightness;
 use crate::geometry::tangent_basis;
 
 /// Scatter of the edges of vertical and of horizontal things about their vanishing points, radians: beams sag, frames do not.

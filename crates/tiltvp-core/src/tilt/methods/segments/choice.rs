@@ -2,9 +2,10 @@
 
 use nalgebra::Vector3;
 
+use super::any_lightness::Lightness;
 use super::anywhere::{Edge, Hypothesis, Prior};
 use super::choice_weights::{BIASES, HIDDEN, LINEAR, MEANS, OUT, SCALES};
-use super::lightness::{BANDS, Lightness};
+use crate::tilt::lightness::BANDS;
 
 /// How many numbers of edges, and of edges and lightness, tell it.
 const OF_EDGES: usize = 19;

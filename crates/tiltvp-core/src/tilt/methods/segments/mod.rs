@@ -1,10 +1,11 @@
 //! The method of straight edges: the vertical by the odds that each segment of the image passes through it, fused with the vote of
 //! the edge pixels.
 
+mod any_lightness;
 mod anywhere;
+mod aspect;
 mod choice;
 mod choice_weights;
-mod lightness;
 mod near;
 
 use std::f64::consts::PI;
@@ -12,8 +13,9 @@ use std::sync::Arc;
 
 use nalgebra::{Matrix2, Matrix3, Vector3};
 
+use self::any_lightness::Sample;
 use self::anywhere::{Edge, Prior, Search};
-use self::lightness::Sample;
+use self::aspect::{Aspect, AspectWork};
 use self::near::{Near, NearWork};
 use super::refined::{Refined, TILT_MAX_RAD};
 use super::{Fitter, Prepared, RefineOptions, Setting, TiltMethod, edge_offset};
@@ -28,9 +30,10 @@ use crate::segments::{FinderScratch, SegmentDetectorOptions, SegmentFinder, Segm
 use crate::tilt::estimate::{ALTERNATIVES, Alternative, EdgeElement, TiltEstimate};
 use crate::tilt::fit::{Fit, Seen};
 use crate::tilt::image_circle::CentreOff;
+use crate::tilt::lightness::LIGHTS;
 use crate::tilt::scratch::{Scratch, Work};
 use crate::tilt::tables::PixelTables;
-use crate::tilt::trust::Trust;
+use crate::tilt::trust::{ASPECT, Logit, Trust};
 
 options! {
     /// Options of the method of straight edges.
@@ -64,7 +67,17 @@ const PIXELS_RAD: f64 = 0.7f64.to_radians();
 const ANYWHERE_GROWTH: f64 = 4.0;
 
 /// How a fit tells whether it is of the vertical: `tiltvp measure trust --weights` prints it.
-static TRUST: Trust = Trust { constant: 6.782, weights: [-1.164, 2.173, 1.694, 0.317, -0.112, 0.615, -0.279, -1.218] };
+static TRUST: Trust = Trust {
+    vertical: Logit { constant: 6.076, weights: [-1.849, -0.2967, 2.518, 1.689, 0.2796, 0.7166, 0.4877, -0.8669] },
+    up: Logit {
+        constant: 12.05,
+        weights: [
+            2.759, 0.4759, 0.1891, 0.01332, -1.238, -2.325, -2.188, -1.85, -0.8353, -4.988, 1.995, -0.7897, -0.7128,
+            1.461, -0.2784, -1.52, -0.3289, 0.4191, -1.169, -0.2596, 1.512, -3.021, -7.596, -0.475, 2.213, 0.9599,
+            -6.372,
+        ],
+    },
+};
 
 impl TiltMethod for SegmentsOptions {
     fn edges(&self) -> EdgeOptions {
@@ -97,6 +110,7 @@ impl TiltMethod for SegmentsOptions {
             robot_from_camera: origin.robot_from_camera,
             tilt_max_rad,
             near: Near::new(&origin.robot_from_camera, tilt_max_rad, *self),
+            aspect: Aspect::new(&origin.robot_from_camera),
             pixels: Refined::new(setting, refined),
             strong: usual,
             in_band,
@@ -113,6 +127,7 @@ pub(in crate::tilt) struct SegmentFit {
     robot_from_camera: Matrix3<f64>,
     tilt_max_rad: f64,
     near: Near,
+    aspect: Aspect,
     /// The method of the pixels, and which of them vote.
     pixels: Refined,
     strong: EdgeOptions,
@@ -135,6 +150,7 @@ pub(in crate::tilt) struct SegmentWork {
     /// Levels of the sample.
     levels: Vec<f32>,
     near: NearWork,
+    aspect: AspectWork,
 }
 
 impl SegmentWork {
@@ -194,6 +210,7 @@ impl SegmentFit {
                 search: Search::default(),
                 levels: Vec::new(),
                 near: NearWork::default(),
+                aspect: AspectWork::default(),
             })
         });
         self.finder.find(image, region, self.edges.gradient_min, None, &mut work.finder, &mut work.segments);
@@ -205,7 +222,11 @@ impl SegmentFit {
         };
         let considered = work.weighed.iter().map(|(i, _)| work.segments.list[*i as usize].support()).sum();
         let trust = (self.tilt_max_rad <= NEAR_MAX_RAD).then_some(&TRUST);
+        let lights = trust.map_or([0.0; LIGHTS], |_| tables.lightness.of(image));
+        let up = fit.tilt.filter(|_| trust.is_some()).map(|tilt| tilt.normal());
         let seen = Seen {
+            lights: &lights,
+            aspect: up.map_or([0.0; ASPECT], |up| self.aspect.of(&work.segments, &up, &mut work.aspect)),
             edge_pixels: work.segments.points.len(),
             prefiltered_pixels: considered,
             pixels_per_rad: region.pixels_per_rad(),

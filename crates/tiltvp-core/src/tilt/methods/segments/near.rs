@@ -21,10 +21,10 @@ const GRID: i32 = 12;
 const LEAN_SIGMA: f64 = 5.0 / 12.0;
 
 /// The scatter in radians at which a segment that passes through a direction is as likely to be of it as any other.
-const EVEN_RAD: f64 = 3f64.to_radians();
+pub(super) const EVEN_RAD: f64 = 3f64.to_radians();
 
 /// The length in radians of a segment that counts as two observations; others by the square root of their length.
-const LENGTH_RAD: f64 = 0.2;
+pub(super) const LENGTH_RAD: f64 = 0.2;
 
 /// Standard deviation in radians of azimuth within which edges are those of one object and err together.
 const OBJECT_RAD: f64 = 5f64.to_radians();
@@ -97,7 +97,7 @@ struct Sector {
 
 /// Rows by their numbers, for the grid: normals, half the inverse variances, logarithms of the odds, weights.
 #[derive(Debug, Clone, Default)]
-struct Columns {
+pub(super) struct Columns {
     x: Vec<f32>,
     y: Vec<f32>,
     z: Vec<f32>,
@@ -268,21 +268,31 @@ impl Near {
 impl Columns {
     /// The rows, with variances that are as much greater as half a step of the grid makes them.
     fn fill(&mut self, rows: &[Row], half_step: f64) {
-        let Self { x, y, z, half, log_odds, weight } = self;
-        [&mut *x, &mut *y, &mut *z, &mut *half, &mut *log_odds, &mut *weight].into_iter().for_each(Vec::clear);
+        self.clear();
         for row in rows {
             let variance = row.variance + half_step * half_step;
-            x.push(row.normal.x as f32);
-            y.push(row.normal.y as f32);
-            z.push(row.normal.z as f32);
-            half.push((0.5 / variance) as f32);
-            log_odds.push((row.odds * (row.variance / variance).sqrt()).ln() as f32);
-            weight.push(row.weight as f32);
+            self.push(&row.normal, variance, row.odds * (row.variance / variance).sqrt(), row.weight);
         }
     }
 
+    /// Removes all rows and keeps the memory.
+    pub(super) fn clear(&mut self) {
+        let Self { x, y, z, half, log_odds, weight } = self;
+        [x, y, z, half, log_odds, weight].into_iter().for_each(Vec::clear);
+    }
+
+    /// Appends a row with the odds that it has at no distance.
+    pub(super) fn push(&mut self, normal: &Vector3<f64>, variance: f64, odds: f64, weight: f64) {
+        self.x.push(normal.x as f32);
+        self.y.push(normal.y as f32);
+        self.z.push(normal.z as f32);
+        self.half.push((0.5 / variance) as f32);
+        self.log_odds.push(odds.ln() as f32);
+        self.weight.push(weight as f32);
+    }
+
     /// Sum of the weighted logarithms of the odds of a lean, of those above even.
-    fn score(&self, normal: &[f32; 3]) -> f32 {
+    pub(super) fn score(&self, normal: &[f32; 3]) -> f32 {
         let mut lanes = [0.0f32; 8];
         let Self { x, y, z, half, log_odds, weight } = self;
         let n = x.len();

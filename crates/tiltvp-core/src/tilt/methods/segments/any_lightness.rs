@@ -1,21 +1,16 @@
-//! How light a view is, by elevation above what may be level: lamps, ceilings and skies are above, floors below.
+//! How light a view is by height above any direction that may be up, as `tilt/lightness.rs` tells of the one that is told.
 
 use nalgebra::Vector3;
 
 use crate::edges::Region;
 use crate::image::ImageView;
-
-/// Bands of equal solid angle, four above the horizon: ceiling, lamps, windows, doors. Twelve tell no more.
-pub(super) const BANDS: usize = 8;
+use crate::tilt::lightness::{BANDS, VARIES};
 
 /// Pixels of a view that are looked at, about.
 const SAMPLED: f64 = 2000.0;
 
 /// Sampled pixels below which a band's lightness is drawn to the mean, and its spread not told.
 const FEW: f32 = 20.0;
-
-/// Grey levels by which a view varies at least, for one that does not.
-const VARIES: f32 = 1.0;
 
 /// A grid of a region's pixels.
 #[derive(Debug, Default)]
@@ -52,7 +47,7 @@ impl Sample {
         let mean = levels.iter().sum::<f32>() / n;
         let deviation = (levels.iter().map(|level| (level - mean).powi(2)).sum::<f32>() / n).sqrt();
         for level in &mut *levels {
-            *level = (*level - mean) / deviation.max(VARIES);
+            *level = (*level - mean) / deviation.max(VARIES as f32);
         }
         Lightness { bearings: &self.bearings, levels }
     }
