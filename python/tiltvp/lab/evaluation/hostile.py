@@ -49,7 +49,8 @@ CAUSES: Final = {
 TWINS: Final = ("upward read as downward", "downward read as upward")
 """Cases that only lightness and heights tell from the truth, and these seldom: they count less."""
 TWIN: Final = 0.3
-"""How much they count: at one, of right downward views a quarter fewer stay sure."""
+"""How much they count: at one, with as many right views sure over all six mountings, 64 % of the downward ones are so
+by `segments` where 69 % are, cross-validated by building."""
 HOPELESS: Final = 0.3
 """Confidence by the covariance below which an estimate is not sure anyway, and teaches nothing."""
 RIGHT: Final = {"refined": (2.0, 20.0), "segments": (1.5, 16.0)}
