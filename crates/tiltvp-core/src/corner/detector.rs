@@ -6,7 +6,7 @@ use super::closed_form::attitude::{IncludedAngle, corner_attitudes};
 use super::coloured::{self, ColouredScratch, Window};
 use super::estimate::Hypothesis;
 use super::feature::CornerFeature;
-use super::general::beginnings::begin_at_vertex;
+use super::general::beginnings::{Beginnings, beginnings};
 use super::general::completion::CornerCompletion;
 use super::general::edge_ends::{ObservedCorner, ObservedEnd, seen_ends};
 use super::general::guided::{ExpectedCorner, find_near};
@@ -193,13 +193,13 @@ impl CornerDetector {
         }
     }
 
-    /// How many rays of a corner begin at its vertex; all of the coloured front end's, which follows them from there.
-    pub(super) fn begin_at_vertex(&self, frame: &Frame<'_>, corner: &CornerFeature) -> usize {
+    /// Which rays of a corner begin at its vertex; all of the coloured front end's, which follows them from there.
+    pub(super) fn beginnings(&self, frame: &Frame<'_>, corner: &CornerFeature) -> Beginnings {
         match (&self.options.method, frame) {
             (CornerMethod::General(options), Frame::Gray(image)) => {
-                begin_at_vertex(&self.camera, image, &self.light, options, corner)
+                beginnings(&self.camera, image, &self.light, options, corner)
             }
-            _ => corner.rays().len(),
+            _ => Beginnings::ALL,
         }
     }
 
