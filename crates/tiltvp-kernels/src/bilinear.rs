@@ -129,7 +129,7 @@ mod tests {
                 }
             }
         }
-        let mut none = |data: &[u8], sizes, x: f64| along_line(data, sizes, &table, [x, 2.0], [0.5; 2], &mut [0.0; 3]);
+        let none = |data: &[u8], sizes, x: f64| along_line(data, sizes, &table, [x, 2.0], [0.5; 2], &mut [0.0; 3]);
         assert!(none(&data, sizes, 2.0));
         assert!(
             !none(&data[1..], [37, 29, 42], 2.0) && !none(&data, sizes, f64::NAN) && !none(&data, [42, 29, 41], 2.0)

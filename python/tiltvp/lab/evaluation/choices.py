@@ -57,6 +57,8 @@ def train_weights(told: Sequence[tuple[NDArray[np.float64], int]], penalty: floa
 
 _HEAD: Final = """//! The weights of the network in `choice.rs`: `tiltvp measure views --weights` prints this file.
 
+#![allow(clippy::unreadable_literal)]
+
 use super::choice::FEATURES;
 
 /// Hidden units.

@@ -1,5 +1,7 @@
 //! The weights of the network in `choice.rs`: `tiltvp measure views --weights` prints this file.
 
+#![allow(clippy::unreadable_literal)]
+
 use super::choice::FEATURES;
 
 /// Hidden units.
