@@ -29,7 +29,7 @@ pub(super) struct Lightness<'a> {
 
 impl Sample {
     pub(super) fn new(region: &Region) -> Self {
-        let step = ((region.len() as f64 / SAMPLED).sqrt() as usize).max(1);
+        let step = ((region.len() as f64 / SAMPLED).sqrt().round() as usize).max(1);
         let on_grid = |(u, v): (usize, usize)| u % step == step / 2 && v % step == step / 2;
         let (pixels, bearings) = region
             .pixels()
