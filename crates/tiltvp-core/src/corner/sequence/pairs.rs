@@ -31,8 +31,8 @@ const WELL: f64 = 0.4;
 const BEGIN_MIN: usize = 4;
 
 /// The misfit up to which a corner that was not there before is believed of which too few edges are shown to begin at its vertex: then
-/// nothing but where they pass each other in space speaks for it. On rooms that were looked at, such corners that are there have 0.55 and less, others
-/// 0.93 and more.
+/// nothing but where they pass each other in space speaks for it. On rooms that were looked at, most such corners that are there have 0.55 and
+/// less, those that are not have 0.93 and more.
 const MEETS: f64 = 0.7;
 
 /// The least probability of a hypothesis that is returned.
