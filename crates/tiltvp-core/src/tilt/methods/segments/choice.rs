@@ -14,7 +14,7 @@ pub(super) const FEATURES: usize = OF_EDGES + 2 * BANDS;
 /// Features that say what was expected before the image was seen: they count in proportion, so that no lean is ruled out.
 const EXPECTED: std::ops::Range<usize> = 1..4;
 
-/// Standard deviations beyond which a feature tells no more: views that taught had none farther.
+/// Standard deviations beyond which a feature tells no more, in training too.
 const FARTHEST: f64 = 4.0;
 
 /// The logarithm of the odds of a hypothesis, up to a constant: a line and a layer of hidden units, whose weights `tiltvp measure
