@@ -38,6 +38,7 @@ def lit(image: np.ndarray, seed: int) -> np.ndarray:
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("camera", [SMALL, LARGE], ids=["small", "large"])
 @pytest.mark.parametrize("seed", range(3))
 def test_the_body_is_found_and_the_world_is_left(camera: tiltvp.Camera, seed: int) -> None:
@@ -133,6 +134,7 @@ def test_bad_input_is_named() -> None:
         tiltvp.body_mask([np.zeros(3)], SMALL)
 
 
+@pytest.mark.slow
 def test_tilt_says_that_it_leaves_the_body_out(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     body = PaintedBody(SMALL, 2)
     SMALL.save(tmp_path / "camera.toml")

@@ -30,6 +30,7 @@ def samples_of(sequence: StereoSequence, seed: int) -> InertialSamples:
     return InertialSamples(imu.times_s, imu.rates_rad_s, imu.forces_m_s2)
 
 
+@pytest.mark.slow
 def test_turns_and_down_have_covariances_that_hold() -> None:
     """Of ten sensors, each with its own bias: mean squared errors by their covariances, of 3 and of 2."""
     left, right = zed_cameras()
@@ -53,6 +54,7 @@ def test_turns_and_down_have_covariances_that_hold() -> None:
     assert np.mean(downs) < 3
 
 
+@pytest.mark.slow
 def test_axes_of_the_sensor_are_taken_to_those_of_the_camera(sequence: StereoSequence) -> None:
     samples, turn = samples_of(sequence, 1), np.array(ROTATION_WORDS["forward"])
     assert samples.accelerations_m_s2 is not None
@@ -62,6 +64,7 @@ def test_axes_of_the_sensor_are_taken_to_those_of_the_camera(sequence: StereoSeq
     assert np.allclose(own["gravity"][0], same["gravity"][0])
 
 
+@pytest.mark.slow
 def test_what_samples_do_not_cover_is_not_told(sequence: StereoSequence) -> None:
     samples = samples_of(sequence, 1)
     assert samples.known(None, 0.05)["gyro"] is None
@@ -90,6 +93,7 @@ def test_tables_of_readings(tmp_path: Path) -> None:
             InertialSamples.read(table)
 
 
+@pytest.mark.slow
 def test_an_estimator_takes_what_is_known_of_a_frame(sequence: StereoSequence) -> None:
     left, right = sequence.cameras
     samples = samples_of(sequence, 1)
@@ -111,6 +115,7 @@ def test_an_estimator_takes_what_is_known_of_a_frame(sequence: StereoSequence) -
         told(*images, gravity=((0, 1, 0), 0.0))
 
 
+@pytest.mark.slow
 def test_one_grey_camera_takes_gravity_in_place_of_a_frame_before(sequence: StereoSequence) -> None:
     """What looks alike from two sides is told apart by down alone, in every frame for itself."""
     image = sequence.render(2)[0]
@@ -125,6 +130,7 @@ def test_one_grey_camera_takes_gravity_in_place_of_a_frame_before(sequence: Ster
     assert found.hypotheses != turned.hypotheses
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("cameras", [1, 2])
 def test_a_pose_that_gravity_contradicts_is_none(cameras: int) -> None:
     rotation, _ = pose()
@@ -137,6 +143,7 @@ def test_a_pose_that_gravity_contradicts_is_none(cameras: int) -> None:
         assert estimate.reason == ("" if found else "no corner that fits")
 
 
+@pytest.mark.slow
 def test_the_command_takes_readings(
     sequence: StereoSequence, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -176,6 +183,7 @@ def turning(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFac
     return bag.write(tmp_path_factory.mktemp("turning")), attitudes
 
 
+@pytest.mark.slow
 def test_the_command_takes_the_sensor_of_a_recording(
     turning: tuple[Path, list[np.ndarray]], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

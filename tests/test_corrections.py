@@ -179,6 +179,7 @@ def test_what_has_no_correction_is_refused(camera: tiltvp.Camera) -> None:
         tiltvp.train_correction(estimator, *draws(), kind="line")
 
 
+@pytest.mark.slow
 def test_a_correction_is_trained_and_read_on_the_command_line(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

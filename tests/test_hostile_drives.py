@@ -80,6 +80,7 @@ def test_readings_are_undone() -> None:
     assert len(READINGS) == 8
 
 
+@pytest.mark.slow
 def test_every_answer_counts_what_is_contradicted() -> None:
     drive = simulate_drive("alternating", seed=3)
     start = {"wheel_base_m": 0.4, "start": (0.2, 0.0, 0.0), "start_sigma": (0.2, 0.2, 0.6)}
@@ -95,6 +96,7 @@ def test_every_answer_counts_what_is_contradicted() -> None:
     assert not calibrator.estimate
 
 
+@pytest.mark.slow
 def test_noise_is_estimated_where_it_is_another_than_told() -> None:
     loud = whole("sigma told 5 times too small")
     assert math.degrees(loud.bearing_sigma_rad) == pytest.approx(2.5, rel=0.2)

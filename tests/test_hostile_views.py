@@ -55,6 +55,7 @@ def test_truths_are_those_of_the_mounting_as_told(stripes: Panorama) -> None:
         assert np.array_equal(images[case].image, upward.image)
 
 
+@pytest.mark.slow
 def test_unharmed_views_are_answered_rightly_and_a_wrong_camera_is_counted(stripes: Panorama) -> None:
     cases = ("upward", "panorama", "centre off by 10 px")
     table = judge_images(hostile_images([stripes], count=2, cases=cases))

@@ -143,6 +143,7 @@ def test_impossible_levellers_are_refused(camera: tiltvp.Camera) -> None:
         tiltvp.Unwrapper(camera, elevation_max_rad=-0.1)
 
 
+@pytest.mark.slow
 def test_strips_of_a_leaning_robot_are_those_of_the_upright(
     camera: tiltvp.Camera, render: Callable[..., RoomImage], upright_room: RoomImage
 ) -> None:

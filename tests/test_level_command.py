@@ -47,6 +47,7 @@ def lean_deg(path: Path) -> float:
     return math.degrees(estimate.alpha_rad)
 
 
+@pytest.mark.slow
 def test_a_photograph_is_level_and_says_so(photo: Path, tmp_path: Path) -> None:
     assert lean_deg(photo) == pytest.approx(12.0, abs=1.0)
     assert main(["level", str(photo), "--out", str(tmp_path / "level")]) == 0
@@ -60,6 +61,7 @@ def test_a_photograph_is_level_and_says_so(photo: Path, tmp_path: Path) -> None:
     assert np.abs(image[:, 0].astype(int) - image[:, -1]).mean() <= steps.max()
 
 
+@pytest.mark.slow
 def test_metadata_alone_leave_the_pixels_as_they_are(photo: Path, tmp_path: Path) -> None:
     assert main(["level", str(photo), "--out", str(tmp_path), "--metadata-only", "--overwrite"]) == 0
     written = (tmp_path / "photo.jpg").read_bytes()
@@ -73,6 +75,7 @@ def test_metadata_alone_leave_the_pixels_as_they_are(photo: Path, tmp_path: Path
     assert roll_deg == pytest.approx(math.degrees(math.atan2(normal[1], normal[2])), abs=1.0)
 
 
+@pytest.mark.slow
 def test_what_is_not_believed_is_said_and_left_out_or_copied(
     photo: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -92,6 +95,7 @@ def test_what_is_not_believed_is_said_and_left_out_or_copied(
     assert "copied as it is" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_views_of_a_photograph(photo: Path, tmp_path: Path) -> None:
     pinhole = ["--to", "pinhole", "--size", "320x240", "--field-of-view-deg", "80"]
     assert main(["level", str(photo), "--out", str(tmp_path / "pinhole"), *pinhole]) == 0
@@ -118,6 +122,7 @@ def test_a_video_is_level_at_its_own_rate(camera: tiltvp.Camera, room: RoomImage
     assert estimate.alpha_rad < math.radians(1.0)
 
 
+@pytest.mark.slow
 def test_a_panorama_is_a_camera_in_every_command(photo: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["tilt", str(photo), "--camera", "equirectangular:1024x512", "--method", "segments",
                  "--tilt-max-deg", "90", "--out", "-"]) == 0  # fmt: skip

@@ -87,6 +87,7 @@ def test_a_bomb_of_aliases_is_refused_and_common_aliases_are_read(tmp_path: Path
     assert tiltvp.Camera.load(path, camera=0) == tiltvp.Camera.load(path, camera=1)
 
 
+@pytest.mark.slow
 def test_an_image_that_says_too_many_pixels_is_not_decoded(tmp_path: Path) -> None:
     (tmp_path / "image.png").write_bytes(png(16_000, 16_000))
     with pytest.raises(ImageFileError, match="16000 x 16000 pixels, expected at most 200000000"):

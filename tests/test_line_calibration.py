@@ -18,6 +18,8 @@ from tiltvp.selfcalib import LogCalibration, calibrate
 from tiltvp.streams import Motion
 from tiltvp.synth import Drive, Room
 
+pytestmark = pytest.mark.slow
+
 MOUNT = (0.12, -0.07, 0.2)
 LEGS = [(0.0, 2.0), (0.8, 0.0), (0.0, -2.5), (0.5, 0.6)]
 

@@ -98,6 +98,7 @@ def test_wheels_are_as_recorded_or_as_the_motion_has_them(folder: Path, drive: D
     np.testing.assert_array_equal(displacements(bare, wheel_base_m=0.5), expected)
 
 
+@pytest.mark.slow
 def test_calibrate_from_images(folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     out, tracks = tmp_path / "found.json", tmp_path / "tracks.csv"
     words = [

@@ -239,6 +239,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("more", [[], ["--filter", "--sigma-max-deg", "5"]], ids=["each", "filter"])
 def test_the_command_writes_the_attitudes_of_its_table(
     folder: Path, tmp_path: Path, more: list[str], capsys: pytest.CaptureFixture[str]
@@ -268,6 +269,7 @@ def test_the_command_writes_the_attitudes_of_its_table(
 PAGE = (Path(__file__).parents[1] / "docs/outputs.md").read_text(encoding="utf-8")
 
 
+@pytest.mark.slow
 def test_the_python_of_the_page_runs(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -53,6 +53,7 @@ def topics(path: Path) -> dict[str, list[tuple[int, Any]]]:
     return found
 
 
+@pytest.mark.slow
 def test_the_same_arguments_give_the_same_bytes(drive: RecordedDrive, path: Path, room: Room, tmp_path: Path) -> None:
     again = RecordedDrive(
         room, paper_camera(), legs=LEGS_SHORT, mounting_rad=MOUNTING, floor_slope_rad=(0.02, 0.5), camera_delay_s=0.03,
@@ -167,6 +168,7 @@ def test_what_cannot_be_is_refused(room: Room, name: str, value: Any) -> None:
         RecordedDrive(room, paper_camera(), **{name: value})
 
 
+@pytest.mark.slow
 def test_the_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     out, camera = tmp_path / "drive.mcap", tmp_path / "camera.toml"
     words = ["lab", "drive", "--out", str(out), "--legs", "0.05,0", "--samples", "1", "--compressed"]

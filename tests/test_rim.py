@@ -42,6 +42,7 @@ def test_centre_and_radius(centre: tuple[float, float], radius: float, shape: tu
     assert 0.8 <= found.covered <= 1.0
 
 
+@pytest.mark.slow
 def test_of_an_image_without_a_rim_none_is_told() -> None:
     assert tiltvp.rim_circle(view((160.0, 120.0), 400.0)) is None
     assert tiltvp.rim_circle(np.full((240, 320), 90, np.uint8)) is None

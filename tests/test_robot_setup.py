@@ -16,6 +16,8 @@ from tiltvp.rotations import levelling
 from tiltvp.streams import Odometry, open_frames
 from tiltvp.synth import Room
 
+pytestmark = pytest.mark.slow
+
 CAMERA = Camera.equidistant(width=240, height=240, focal_px=72.0, cx=119.5, cy=119.5, max_theta_rad=math.radians(92))
 COUNT = 26
 STEP = 2.0 * math.pi / 24

@@ -94,6 +94,7 @@ def seen_sides(camera: tiltvp.Camera, normals: np.ndarray) -> np.ndarray:
     return np.array(seen)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("sigma", "levels"), [(2.0, (80.0, 180.0)), (12.0, (160.0, 90.0))])
 @pytest.mark.parametrize(("name", "centre"), CASES)
 def test_sides_are_found_as_well_as_they_say(name: str, centre: int, sigma: float, levels: tuple[float, float]) -> None:
@@ -129,6 +130,7 @@ def test_sides_are_found_as_well_as_they_say(name: str, centre: int, sigma: floa
     assert np.median(ends_px) < 3.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", CAMERAS)
 def test_what_belongs_together(name: str) -> None:
     camera = CAMERAS[name]
@@ -155,6 +157,7 @@ def test_what_belongs_together(name: str) -> None:
         assert np.median(np.abs(bearings @ found.normal[i])) < 0.01
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", CAMERAS)
 def test_negatives_have_opposite_normals(name: str) -> None:
     camera = CAMERAS[name]
@@ -178,6 +181,7 @@ def test_empty_images_have_no_edges(camera: tiltvp.Camera) -> None:
         assert type(found).from_dict(found.to_dict()) == found
 
 
+@pytest.mark.slow
 def test_any_threads_and_strides_have_the_same_bytes(camera: tiltvp.Camera, images: list[np.ndarray]) -> None:
     detector = tiltvp.SegmentDetector(camera)
     expected = [detector(image) for image in images]
@@ -302,6 +306,7 @@ def test_the_command_writes_rows_and_pictures(tmp_path: Path, capsys: pytest.Cap
 # --- the method of the tilt ----------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_rooms_have_their_lean(camera: tiltvp.Camera, render: Any) -> None:
     estimator = tiltvp.TiltEstimator(camera, method="segments")
     errors, squares = [], []

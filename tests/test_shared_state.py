@@ -52,6 +52,7 @@ def corner_estimator() -> tuple[Any, Callable[[Any], object], Callable[[Any], ob
 STATEFUL = [tracked, calibrator, tilt_filter, corner_estimator]
 
 
+@pytest.mark.slow
 @pytest.mark.timeout(60)
 @pytest.mark.parametrize("make", STATEFUL)
 def test_a_collector_that_lets_other_threads_run_blocks_nobody(make: Callable[[], Any]) -> None:
@@ -102,6 +103,7 @@ def log(steps: int) -> tuple[np.ndarray, np.ndarray]:
     return odometry, np.array(bearings)
 
 
+@pytest.mark.slow
 @pytest.mark.timeout(60)
 def test_what_is_read_while_a_log_is_followed_comes_at_once() -> None:
     one = tiltvp.SelfCalibrator(wheel_base_m=0.4)

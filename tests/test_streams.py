@@ -197,6 +197,7 @@ def test_images_that_are_not_what_they_say(change: dict[str, object], words: str
         image_from_message(SimpleNamespace(**(fields | change)))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", KINDS)
 def test_bags_that_are_cut_or_damaged_are_errors_of_ours(kind: str, tmp_path: Path) -> None:
     made = Bag(kind)

@@ -83,6 +83,7 @@ def test_every_option_is_listed_here(camera: tiltvp.Camera, method: str) -> None
 MATTERS_WITH_MANY_TRIALS = {("vector-consensus", "score")}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("method", "option"), [(method, option) for method in CHANGES for option in CHANGES[method]])
 def test_every_option_changes_something(
     camera: tiltvp.Camera, render: Callable[..., RoomImage], method: str, option: str

@@ -45,6 +45,7 @@ keys = texts.filter(lambda text: len(text) <= 100)
 tables = st.recursive(values | lists, lambda inner: st.dictionaries(keys, inner, min_size=1), max_leaves=12)
 
 
+@pytest.mark.slow
 @given(st.dictionaries(keys, tables, min_size=1))
 def test_what_is_written_is_read(table: dict[str, object]) -> None:
     text = yaml_of(table)
