@@ -8,14 +8,10 @@ use nalgebra::{Vector2, Vector3};
 use crate::encoders::wrapped;
 use crate::options::RoomKind;
 use crate::rng::Rng;
-use crate::world::World;
+use crate::world::{ROBOT_RADIUS_M, World};
 
 /// Size of a cell, metres: a third of the robot's radius.
 const CELL_M: f64 = 0.08;
-
-/// Radius of the free circle that a robot needs to stand, metres: a cleaning robot of 0.35 m across with room to turn
-/// (`ways_are_free_smooth_and_lead_far` holds the ways to it).
-pub(crate) const ROBOT_RADIUS_M: f64 = 0.22;
 
 /// The places where a robot can drive, as cells of a grid.
 pub(crate) struct Grid {

@@ -13,7 +13,6 @@ use crate::options::RoomOptions;
 use crate::outdoors::Outdoors;
 use crate::plan::Plan;
 use crate::rng::Rng;
-use crate::route::ROBOT_RADIUS_M;
 use crate::scene::{Contact, Scene};
 use crate::segment::Segment;
 use crate::texture::{Color, mix};
@@ -24,6 +23,9 @@ use crate::{furniture, laboratory, shell};
 /// would fray the edges of windows and lamps.
 const GLARE: f64 = 3.0;
 
+/// Radius of the free circle that a robot needs to stand, metres: a cleaning robot of 0.35 m across with room to turn
+/// (`ways_are_free_smooth_and_lead_far` holds the ways to it).
+pub(crate) const ROBOT_RADIUS_M: f64 = 0.22;
 /// Where a ray meets the world first.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Hit {

@@ -7,11 +7,11 @@ import sys
 from collections.abc import Sequence
 from contextlib import nullcontext
 
-from cyclopts import App, CycloptsError, Parameter
+from cyclopts import CycloptsError
 
-from tiltvp import __version__
 from tiltvp.cli import calibrate, camera_making, colmap, corner, demo, level, lines, mount, segments, setup, tilt, track
 from tiltvp.cli.lab import dataset, evaluate, measure, report, train
+from tiltvp.cli.root import app, run
 from tiltvp.cli.showing import RERUN
 from tiltvp.cli.sources import STDIN
 from tiltvp.cli.terminal import complain
@@ -19,19 +19,12 @@ from tiltvp.errors import MissingExtraError, OutputError, TiltvpError
 from tiltvp.files import keeping_existing
 from tiltvp.streams.outputs.viewer import VIEWER
 
+__all__ = ["app", "main"]
+
 _OVERWRITE = "--overwrite"
 """Anywhere in the line: every command that writes keeps what exists without it."""
-DONE, SOME_FAILED, WRONG_USE, INTERRUPTED = 0, 1, 2, 130
+SOME_FAILED, WRONG_USE, INTERRUPTED = 1, 2, 130
 
-app = App(
-    name="tiltvp",
-    help="Orientation and calibration from the straight lines of man-made places: a robot's tilt, vertical lines, "
-    "where a camera sits on a robot, and the pose of corners. Files and folders that exist are kept; with --overwrite, "
-    "which every command takes, its outputs replace them.",
-    version=__version__,
-    default_parameter=Parameter(negative_iterable=()),
-    suppress_keyboard_interrupt=False,
-)
 app.command(setup.setup)
 app.command(tilt.tilt)
 app.command(mount.mount)
@@ -49,12 +42,6 @@ app.command(train.app)
 app.command(evaluate.evaluate)
 app.command(measure.app)
 app.command(report.report)
-
-
-def run(words: Sequence[str]) -> int:
-    """Runs one command within another or for `main`: its exit code, and what is wrong with it as an exception."""
-    code = app(list(words), exit_on_error=False, print_error=False, result_action="return_value")
-    return code if isinstance(code, int) else DONE
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -4,9 +4,10 @@ use nalgebra::{Matrix2x3, RowVector3, Vector2, Vector3};
 
 use super::grid::PixelGrid;
 use super::lens::Lens;
-use super::parameters::Values;
 use super::rim::{NARROWEST_RAD, Rim};
-use super::schema::{CX, CY, FX, FY, LensSchema, Parameter, ParameterSchema, Parametric, Resize, scalars};
+use super::schema::{CX, CY, FX, FY, LensSchema, Parameter, ParameterSchema, Resize, scalars};
+use super::values::Parametric;
+use super::values::Values;
 use crate::error::{Error, Result};
 
 const NAME: &str = "double_sphere";

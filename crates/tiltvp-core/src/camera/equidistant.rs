@@ -5,9 +5,10 @@ use nalgebra::{Matrix2x3, Matrix3x2, Vector2, Vector3};
 use super::grid;
 use super::lens::{sane, seen};
 use super::model::CameraModel;
-use super::parameters::Values;
 use super::radial::{self, Radial};
-use super::schema::{CX, CY, LensSchema, Parameter, ParameterSchema, Parametric, Resize, scalars};
+use super::schema::{CX, CY, LensSchema, Parameter, ParameterSchema, Resize, scalars};
+use super::values::Parametric;
+use super::values::Values;
 use crate::error::Result;
 
 const NAME: &str = "equidistant";

@@ -6,8 +6,9 @@ use nalgebra::{Matrix2x3, Matrix3x2, RowVector3, Vector2, Vector3};
 
 use super::lens::{sane, seen};
 use super::model::CameraModel;
-use super::parameters::Values;
-use super::schema::{LensSchema, Parameter, Parametric};
+use super::schema::{LensSchema, Parameter};
+use super::values::Parametric;
+use super::values::Values;
 use crate::error::{Error, Result};
 
 const NAME: &str = "equirectangular";

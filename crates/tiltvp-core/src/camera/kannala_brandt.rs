@@ -1,11 +1,12 @@
 //! The fisheye of Kannala and Brandt, OpenCV's `fisheye` and Kalibr's `equidistant`, followed to where its image folds.
 
 use super::grid::{self, PixelGrid};
-use super::parameters::Values;
 use super::polynomial::evaluate;
 use super::profile::{Inverse, Profile};
 use super::rim::FOLD;
-use super::schema::{CX, CY, FX, FY, LensSchema, Parameter, ParameterSchema, Parametric, scalars};
+use super::schema::{CX, CY, FX, FY, LensSchema, Parameter, ParameterSchema, scalars};
+use super::values::Parametric;
+use super::values::Values;
 use crate::error::Result;
 
 const NAME: &str = "kannala_brandt";

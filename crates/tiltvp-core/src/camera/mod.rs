@@ -43,6 +43,7 @@ mod solve;
 mod sphere;
 mod table;
 mod unified;
+mod values;
 
 pub use calibrated::{Camera, LARGEST_SIDE_PX, MOST_PIXELS};
 pub use conformance::{Conformance, conformance};
@@ -60,8 +61,7 @@ pub use rays::PixelRays;
 pub use schema::{Kind, LensSchema, MOST_COEFFICIENTS, Parameter, ParameterSchema, Resize};
 pub use unified::Unified;
 
-use parameters::Values;
-use schema::Parametric;
+use values::{Parametric, Values};
 
 use crate::error::Result;
 

@@ -4,12 +4,13 @@ use nalgebra::{Matrix2, Matrix2x3, Matrix3x2, Vector2, Vector3};
 
 use super::grid::{self, PixelGrid};
 use super::lens::Lens;
-use super::parameters::Values;
 use super::polynomial::{evaluate, first_fall, product, root_bound, sum};
 use super::rim::FOLD;
-use super::schema::{CX, CY, Kind, LensSchema, Parameter, ParameterSchema, Parametric, Resize, scalars, too_many};
+use super::schema::{CX, CY, Kind, LensSchema, Parameter, ParameterSchema, Resize, scalars, too_many};
 use super::solve;
 use super::table::Table;
+use super::values::Parametric;
+use super::values::Values;
 use crate::error::{Error, Result};
 
 const NAME: &str = "ocam";

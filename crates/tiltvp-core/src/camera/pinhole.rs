@@ -5,9 +5,10 @@ use nalgebra::{Matrix2x3, Vector2, Vector3};
 use super::brown::{Brown, K1, K2, K3, P1, P2};
 use super::grid::PixelGrid;
 use super::lens::Lens;
-use super::parameters::Values;
 use super::rim::{NARROWEST_RAD, Rim};
-use super::schema::{CX, CY, FX, FY, LensSchema, Parameter, ParameterSchema, Parametric, scalars};
+use super::schema::{CX, CY, FX, FY, LensSchema, Parameter, ParameterSchema, scalars};
+use super::values::Parametric;
+use super::values::Values;
 use crate::error::{Error, Result};
 
 const NAME: &str = "pinhole";

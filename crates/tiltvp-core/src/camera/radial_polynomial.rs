@@ -3,11 +3,12 @@
 use nalgebra::Matrix2;
 
 use super::grid::{self, PixelGrid};
-use super::parameters::Values;
 use super::polynomial::evaluate;
 use super::profile::{Inverse, Profile};
 use super::rim::FOLD;
-use super::schema::{CX, CY, LensSchema, Parameter, ParameterSchema, Parametric, Resize, scalars};
+use super::schema::{CX, CY, LensSchema, Parameter, ParameterSchema, Resize, scalars};
+use super::values::Parametric;
+use super::values::Values;
 use crate::error::Result;
 
 const NAME: &str = "radial_polynomial";

@@ -1,6 +1,5 @@
 //! What a lens declares of itself: its name, its parameters in order, how it is made of them, and their values.
 
-use super::parameters::Values;
 use crate::error::{Error, Result};
 
 /// The most numbers in a list of a lens. Calibrations have up to 20; the rim of a polynomial is found by the roots of all its
@@ -78,18 +77,20 @@ pub enum Resize {
     Polynomial,
 }
 
-/// A lens that can be made of named parameters, and tells them.
-///
-/// The order of the parameters is that of the schema, in `build` and in `values` too.
-pub(super) trait Parametric: Sized {
-    /// The one declaration of the name and of the parameters.
-    const SCHEMA: LensSchema;
-
-    /// The lens of parameters that fit the schema.
-    fn build(given: &Values<'_>) -> Result<Self>;
-
-    /// The values of all parameters, in order.
-    fn values(&self) -> Vec<Parameter>;
+impl Resize {
+    /// The value for the image resized by a factor.
+    pub(super) fn apply(self, value: Parameter, factor: f64) -> Parameter {
+        let resized = |(i, x): (usize, f64)| match self {
+            Self::Fixed => x,
+            Self::Length => x * factor,
+            Self::Coordinate => (x + 0.5) * factor - 0.5,
+            Self::Polynomial => x * factor.powi(1 - i as i32),
+        };
+        match value {
+            Parameter::Scalar(x) => Parameter::Scalar(resized((0, x))),
+            Parameter::List(values) => Parameter::List(values.into_iter().enumerate().map(resized).collect()),
+        }
+    }
 }
 
 impl ParameterSchema {

@@ -1,6 +1,6 @@
 //! How lines are described: areas, bins, window, normalisation.
 
-use super::description::profile;
+use super::description::profile_rows;
 use crate::options::Above;
 use crate::{options, words};
 
@@ -55,7 +55,7 @@ impl DescriptorOptions {
     pub fn values(&self) -> usize {
         match self.kind {
             DescriptorKind::Areas => 2 * self.areas * self.bins,
-            DescriptorKind::Profile => profile::VALUES,
+            DescriptorKind::Profile => profile_rows::VALUES,
         }
     }
 

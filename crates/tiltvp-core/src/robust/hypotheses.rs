@@ -3,7 +3,7 @@
 use tiltvp_kernels::rows::ConsensusBound;
 
 use super::problem::Problem;
-use super::ransac::RansacOptions;
+use super::ransac_options::RansacOptions;
 use super::sampler::Sampler;
 use super::sampling::Score;
 

@@ -12,6 +12,7 @@ from typing import Annotated, Final
 
 from cyclopts import Parameter, validators
 
+from tiltvp.cli.root import run
 from tiltvp.cli.terminal import say
 
 DRIVE, CAMERA, ROBOT, MOUNTED, TILTS = "drive.mcap", "camera.toml", "robot.toml", "mounted.toml", "tilts.mcap"
@@ -78,8 +79,6 @@ def answered(robot: str) -> list[list[str]]:
 
 def _typed(words: Sequence[str]) -> int:
     """Prints a command and what it says, long tables by their first and their last line; its exit code."""
-    from tiltvp.cli.app import run
-
     say(f"$ tiltvp {shlex.join(words)}")
     with redirect_stdout(io.StringIO()) as told:
         code = run(words)

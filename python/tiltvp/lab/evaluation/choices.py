@@ -59,7 +59,7 @@ _HEAD: Final = """//! The weights of the network in `choice.rs`: `tiltvp measure
 
 #![allow(clippy::unreadable_literal)]
 
-use super::choice::FEATURES;
+use super::any_hypothesis::FEATURES;
 
 /// Hidden units.
 """

@@ -5,3 +5,4 @@ pub(super) mod dissimilarity;
 mod histogram;
 pub(super) mod patch;
 pub(super) mod profile;
+pub(super) mod profile_rows;

@@ -1,6 +1,6 @@
 //! How alike profiles of lines are at every shift of the logarithm of the height.
 
-use crate::lines::description::profile::{ABOVE, BELOW, ROWS, VALUES, elevation_rad};
+use crate::lines::description::profile_rows::{ABOVE, BELOW, ROWS, VALUES, elevation_rad};
 use crate::lines::line::Lines;
 
 /// Shifts to either side: with 0.06 a row distances up to 3.3 times as far.

@@ -6,7 +6,7 @@ mod motion;
 use self::likeness::{COURSE, Weighted, likenesses};
 use self::motion::{Motion, Search};
 use super::angles::wrap;
-use super::description::profile;
+use super::description::profile_rows;
 use super::line::Lines;
 use super::order::{Match, keep_cyclic_order};
 use crate::error::{Error, Result};
@@ -104,7 +104,7 @@ pub fn match_wide(
     options.validate()?;
     out.clear();
     for (name, image) in [("a", a), ("b", b)] {
-        let (lines, width) = (image.lines.lines.len(), profile::VALUES);
+        let (lines, width) = (image.lines.lines.len(), profile_rows::VALUES);
         if image.values.len() != lines * width {
             let got = format!("{} values for {lines} lines", image.values.len());
             let expected = format!("{width} for each line, as descriptor_kind \"profile\" has them");
@@ -220,7 +220,8 @@ mod tests {
         for (_, distance, edge) in &all {
             for side in 0..2 {
                 values.extend(
-                    (0..profile::ROWS).map(|row| level(*edge, side, distance * profile::elevation_rad(row).tan())),
+                    (0..profile_rows::ROWS)
+                        .map(|row| level(*edge, side, distance * profile_rows::elevation_rad(row).tan())),
                 );
             }
         }
@@ -268,7 +269,7 @@ mod tests {
             let course = &scores[(i * there.len() + j) * COURSE..][..COURSE];
             let best = (0..COURSE).max_by(|x, y| course[*x].total_cmp(&course[*y])).unwrap();
             let (u, v) = EDGES[*edge];
-            let ratio = (u.hypot(v) / (u - 1.1).hypot(v - 0.6)).ln() / profile::PITCH;
+            let ratio = (u.hypot(v) / (u - 1.1).hypot(v - 0.6)).ln() / profile_rows::PITCH;
             right += usize::from((best as f64 - likeness::SHIFTS as f64 - ratio).abs() <= 1.0);
         }
         assert!(right >= 10, "{right}");

@@ -8,7 +8,7 @@ use std::f64::consts::PI;
 
 use super::likeness::{COURSE, NEVER, SHIFTS};
 use crate::lines::angles::wrap;
-use crate::lines::description::profile::PITCH;
+use crate::lines::description::profile_rows::PITCH;
 
 /// Cells of the coarse search about the whole turn for each direction: every 5 degrees.
 const CELLS: usize = 72;

@@ -1,6 +1,6 @@
 //! The noise of a log, where its residuals say that it is another than told.
 
-use super::whole_log::solve;
+use super::descent::solve;
 use crate::selfcalib::bundle::{BundleProblem, DescentReport, FreeParameters};
 use crate::selfcalib::diagnosis::NoiseFactors;
 

@@ -5,14 +5,15 @@ use std::fmt;
 
 use nalgebra::{DMatrix, Matrix3};
 
-use super::incremental::{ROBUST_LOSS, incremental_problem, problem_along};
+use super::descent::{TOLERANCE, solve};
+use super::incremental::{incremental_problem, problem_along};
 use super::log::{LogBearing, LogOptions, SortedLog};
 use super::misreading::Misreading;
 use super::noise::solve_with_noise;
 use crate::error::{Error, Result};
 use crate::selfcalib::bundle::{BundleProblem, CholeskyFactor, DescentReport, FIRST_DAMPING, FreeParameters};
 use crate::selfcalib::estimate::MountingEstimate;
-use crate::selfcalib::model::{BearingLoss, Mounting, OUTLIER_SIGMAS, WheelMotion, Wheels};
+use crate::selfcalib::model::{Mounting, OUTLIER_SIGMAS, WheelMotion, Wheels};
 use crate::selfcalib::options::{CalibrationMethod, SelfCalibratorOptions};
 use crate::selfcalib::window::SlidingWindow;
 
@@ -68,13 +69,6 @@ impl fmt::Display for LogCalibration {
         self.misreading.map_or(Ok(()), |misreading| write!(f, "; {misreading}"))
     }
 }
-
-/// Fall of the cost below which a descent has converged: far below the 1/2 by which the cost rises at one standard deviation.
-const TOLERANCE: f64 = 1e-3;
-
-/// Most estimates of the landmarks' scatters, each followed by two descents. They stop by themselves once none changes by 20 %;
-/// the limit bounds the time where two solutions alternate.
-const SCATTER_ROUNDS: usize = 4;
 
 /// Share of outliers of a converged solution up to which no other start is tried: as many as single wrong bearings make. A solution
 /// with a loop that did not close has more.
@@ -217,27 +211,6 @@ fn started(log: &SortedLog<'_>, attempt: Attempt) -> Result<BundleProblem> {
         problem = problem.with_fixed_wheels(Wheels::new(options.filter.wheel_base_m));
     }
     Ok(problem)
-}
-
-/// Solves a problem with a robust loss, then without outliers, then with the scatters of the landmarks.
-pub(super) fn solve(problem: &mut BundleProblem, max_iterations: u32) -> DescentReport {
-    let descend = |problem: &mut BundleProblem, loss: BearingLoss| {
-        problem.loss = loss;
-        problem.levenberg_marquardt(max_iterations, TOLERANCE, FIRST_DAMPING)
-    };
-    let losses = [ROBUST_LOSS, BearingLoss::Truncated(OUTLIER_SIGMAS)];
-    let [robust, mut last] = losses.map(|loss| descend(problem, loss));
-    let mut iterations = robust.iterations + last.iterations;
-    for _ in 0..SCATTER_ROUNDS {
-        if !problem.estimate_scatters() {
-            break;
-        }
-        for loss in losses {
-            last = descend(problem, loss);
-            iterations += last.iterations;
-        }
-    }
-    DescentReport { iterations, ..last }
 }
 
 /// The problem of a sliding window that is never marginalised.

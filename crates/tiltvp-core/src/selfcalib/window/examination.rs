@@ -1,16 +1,7 @@
 //! The examination of the window: what its solution contradicts, and which assumption is most likely wrong.
 
-use super::state::{MOUNTING, SlidingWindow};
+use super::state::{Examination, MOUNTING, SlidingWindow};
 use super::tuning::{COST_TOLERANCE, ITERATIONS};
-use crate::selfcalib::diagnosis::{Contradictions, Suspect};
-
-/// What the last examination found.
-#[derive(Debug, Clone, PartialEq, Default)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub(crate) struct Examination {
-    pub(crate) contradictions: Contradictions,
-    pub(crate) suspect: Option<Suspect>,
-}
 
 impl SlidingWindow {
     /// Solves a copy of the window, and asks what it contradicts and what is suspect.

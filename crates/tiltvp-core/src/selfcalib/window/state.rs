@@ -2,12 +2,12 @@
 
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 
-use super::examination::Examination;
 use super::monitor::InnovationMonitor;
 use super::tuning::HUBER_SIGMAS;
 use crate::error::Result;
 use crate::filter::ChiSquareGate;
 use crate::selfcalib::bundle::{BundleProblem, FreeParameters, widening_factor};
+use crate::selfcalib::diagnosis::{Contradictions, Suspect};
 use crate::selfcalib::model::{BearingLoss, InverseDistanceLandmark, Prediction, Viewpoint};
 use crate::selfcalib::options::SelfCalibratorOptions;
 
@@ -17,6 +17,14 @@ pub(super) const LANDMARKS: usize = 6;
 
 /// The loss of bearings while the window is solved.
 pub(super) const ROBUST_LOSS: BearingLoss = BearingLoss::Huber(HUBER_SIGMAS);
+
+/// What the last examination found.
+#[derive(Debug, Clone, PartialEq, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub(crate) struct Examination {
+    pub(crate) contradictions: Contradictions,
+    pub(crate) suspect: Option<Suspect>,
+}
 
 /// An iterated extended Kalman filter on (pose, mounting, landmarks), and a sliding window of keyframes that is solved again, and
 /// relinearised, where the filter's Jacobians have become wrong.

@@ -2,24 +2,14 @@
 //!
 //! Edges alone tell three orthogonal directions and not which of them is up; what tells it, weakly, is learned (`choice.rs`).
 
-use nalgebra::{Matrix3, Matrix4, Rotation3, SMatrix, Vector3, Vector4};
+use nalgebra::{Matrix4, Rotation3, Vector3, Vector4};
 
+use super::any_hypothesis::{
+    EVEN_RAD, Edge, FEATURES, HORIZONTAL_RAD, Hypothesis, Odds, Prior, SKEW_RAD, VERTICAL_RAD,
+};
 use super::any_lightness::Lightness;
-use super::choice::{FEATURES, features, log_odds};
+use super::choice::{features, log_odds};
 use crate::geometry::tangent_basis;
-
-/// Scatter of the edges of vertical and of horizontal things about their vanishing points, radians: beams sag, frames do not.
-const VERTICAL_RAD: f64 = 0.3f64.to_radians();
-const HORIZONTAL_RAD: f64 = 0.4f64.to_radians();
-
-/// The scatter in radians at which a segment that passes through a direction is as likely to be of it as of any other.
-const EVEN_RAD: f64 = 0.03;
-
-/// The length in radians of a segment that counts as one observation; others by the square root of their length.
-const LENGTH_RAD: f64 = 0.2;
-
-/// Standard deviation in radians by which horizontal edges of one building miss the right angle.
-const SKEW_RAD: f64 = 1f64.to_radians();
 
 /// Segments that are weighed, the longest ones, and those of which pairs make directions.
 const WEIGHED: usize = 160;
@@ -52,79 +42,9 @@ const NONE_ODDS: f64 = 0.08;
 /// Least share of a probability at which an edge counts in a step. Only time depends on it.
 const NEGLIGIBLE: f64 = 1e-3;
 
-/// A segment in the robot frame.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Edge {
-    pub normal: Vector3<f64>,
-    pub middle: Vector3<f64>,
-    pub along: Vector3<f64>,
-    pub offset: f64,
-    pub slope: f64,
-    pub length_rad: f64,
-    weight: f64,
-}
-
-/// Odds that an edge is of a direction, and the variance of the angle by which its circle would miss it.
-#[derive(Debug, Clone, Copy)]
-struct Odds {
-    odds: f64,
-    variance: f64,
-}
-
-impl Edge {
-    pub(super) fn new(
-        robot_from_camera: &Matrix3<f64>,
-        normal: &Vector3<f64>,
-        middle: &Vector3<f64>,
-        [offset, slope]: [f64; 2],
-        length_rad: f64,
-    ) -> Self {
-        let (normal, middle) = (robot_from_camera * normal, robot_from_camera * middle);
-        let weight = (length_rad / LENGTH_RAD).sqrt();
-        Self { normal, middle, along: normal.cross(&middle), offset, slope, length_rad, weight }
-    }
-
-    pub(super) fn weight(&self) -> f64 {
-        self.weight
-    }
-
-    fn odds(&self, direction: &Vector3<f64>, scatter_rad: f64) -> Odds {
-        let (distance, across) = (self.normal.dot(direction), self.middle.dot(direction));
-        let turn = self.along.dot(direction);
-        let variance = self.offset * across * across + self.slope * turn * turn + scatter_rad * scatter_rad;
-        let chance = (1.0 - across * across).max(1e-3) / variance;
-        Odds { odds: EVEN_RAD * chance.sqrt() * (-0.5 * distance * distance / variance).exp(), variance }
-    }
-}
-
 /// Sum of the weighted logarithms of the odds that edges are of a direction.
 fn score(edges: &[Edge], direction: &Vector3<f64>) -> f64 {
-    edges.iter().map(|edge| edge.weight * edge.odds(direction, VERTICAL_RAD).odds.ln_1p()).sum()
-}
-
-/// Three orthogonal directions (the horizontals nearly so) that edges agree with.
-#[derive(Debug, Clone)]
-pub(super) struct Hypothesis {
-    /// Unit direction that would be up, towards what was expected.
-    pub up: Vector3<f64>,
-    /// Logarithm of the likelihood, up to a constant.
-    pub log_likelihood: f64,
-    /// The horizontals and `up` or its opposite.
-    pub axes: [Vector3<f64>; 3],
-    /// Information on the turn of the axes (three numbers, robot frame) and on the angle between the horizontals.
-    pub information: Matrix4<f64>,
-    /// What tells whether it is the right one.
-    pub features: [f64; FEATURES],
-    /// Probability of being the right one among all.
-    pub probability: f64,
-}
-
-/// Where the answer lies.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Prior {
-    /// Largest angle of the vertical from the robot's z, radians.
-    pub reach_rad: f64,
-    pub robot_from_camera: Matrix3<f64>,
+    edges.iter().map(|edge| edge.weight() * edge.odds(direction, VERTICAL_RAD).odds.ln_1p()).sum()
 }
 
 /// Memory.
@@ -245,7 +165,7 @@ impl Search {
             let second_turns = axes[2].cross(&axes[1]);
             for (edge, odds) in edges.iter().zip(odds.iter()) {
                 let sum = 1.0 + odds.iter().map(|odds| odds.odds).sum::<f64>();
-                likelihood += edge.weight * sum.ln();
+                likelihood += edge.weight() * sum.ln();
                 for (d, odds) in odds.iter().enumerate() {
                     let share = odds.odds / sum;
                     if share < NEGLIGIBLE {
@@ -254,7 +174,7 @@ impl Search {
                     let turn = axes[d].cross(&edge.normal);
                     let bend = if d == 1 { edge.normal.dot(&second_turns) } else { 0.0 };
                     let slope = Vector4::new(turn.x, turn.y, turn.z, bend);
-                    let weight = edge.weight * share / odds.variance;
+                    let weight = edge.weight() * share / odds.variance;
                     information += slope * slope.transpose() * weight;
                     pull += slope * (weight * edge.normal.dot(&axes[d]));
                 }
@@ -278,27 +198,6 @@ impl Search {
     }
 }
 
-impl Hypothesis {
-    /// Covariance of `up` in its tangent plane, in squared radians: what the edges tell, with no regard to which axis is up.
-    pub(super) fn covariance(&self) -> Option<nalgebra::Matrix2<f64>> {
-        let stiffness = Matrix4::from_diagonal(&Vector4::new(0.0, 0.0, 0.0, 1.0 / (SKEW_RAD * SKEW_RAD)));
-        // What no edge tells is left to a turn of one radian.
-        let inverse = (self.information + stiffness + Matrix4::identity()).try_inverse()?;
-        let turns: Matrix3<f64> = inverse.fixed_view::<3, 3>(0, 0).into();
-        let moves: SMatrix<f64, 2, 3> = -tangent_basis(&self.up).transpose() * self.up.cross_matrix();
-        let covariance = moves * turns * moves.transpose();
-        Some(0.5 * (covariance + covariance.transpose()))
-    }
-
-    /// Probabilities that an edge is of the two horizontals and of the vertical.
-    pub(super) fn shares(&self, edge: &Edge) -> [f64; 3] {
-        let scatters = [HORIZONTAL_RAD, HORIZONTAL_RAD, VERTICAL_RAD];
-        let odds = [0, 1, 2].map(|d| edge.odds(&self.axes[d], scatters[d]).odds);
-        let sum = 1.0 + odds.iter().sum::<f64>();
-        odds.map(|odds| odds / sum)
-    }
-}
-
 /// The heading of a horizontal that is most likely with another across it, given what is up, and the logarithm of its likelihood.
 fn best_heading(edges: &[Edge], up: &Vector3<f64>) -> (f64, Vector3<f64>) {
     const STEP: f64 = std::f64::consts::FRAC_PI_2 / BINS as f64;
@@ -307,7 +206,7 @@ fn best_heading(edges: &[Edge], up: &Vector3<f64>) -> (f64, Vector3<f64>) {
     let (mut bins, mut base) = ([0.0; BINS], 0.0);
     for edge in edges {
         let vertical = edge.odds(up, VERTICAL_RAD).odds;
-        let alone = edge.weight * vertical.ln_1p();
+        let alone = edge.weight() * vertical.ln_1p();
         base += alone;
         let meets = up.cross(&edge.normal);
         let length = meets.norm();
@@ -326,7 +225,7 @@ fn best_heading(edges: &[Edge], up: &Vector3<f64>) -> (f64, Vector3<f64>) {
             let place = nearest as f64 + k as f64 - reach as f64;
             let off = (place + 0.5) * STEP - heading;
             let both = vertical + odds * (-0.5 * off * off / variance).exp();
-            bins[(nearest + k + BINS - reach) % BINS] += edge.weight * both.ln_1p() - alone;
+            bins[(nearest + k + BINS - reach) % BINS] += edge.weight() * both.ln_1p() - alone;
         }
     }
     let best = (0..BINS).max_by(|i, k| bins[*i].total_cmp(&bins[*k])).unwrap_or(0);

@@ -2,14 +2,9 @@
 
 use nalgebra::Vector3;
 
+use super::any_hypothesis::{Edge, FEATURES, Hypothesis, OF_EDGES, Prior};
 use super::any_lightness::Lightness;
-use super::anywhere::{Edge, Hypothesis, Prior};
 use super::choice_weights::{BIASES, HIDDEN, LINEAR, MEANS, OUT, SCALES};
-use crate::tilt::lightness::BANDS;
-
-/// How many numbers of edges, and of edges and lightness, tell it.
-const OF_EDGES: usize = 19;
-pub(super) const FEATURES: usize = OF_EDGES + 2 * BANDS;
 
 /// Features that say what was expected before the image was seen: they count in proportion, so that no lean is ruled out.
 const EXPECTED: std::ops::Range<usize> = 1..4;

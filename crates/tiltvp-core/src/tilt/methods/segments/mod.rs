@@ -1,6 +1,7 @@
 //! The method of straight edges: the vertical by the odds that each segment of the image passes through it, fused with the vote of
 //! the edge pixels.
 
+mod any_hypothesis;
 mod any_lightness;
 mod anywhere;
 mod aspect;
@@ -13,8 +14,9 @@ use std::sync::Arc;
 
 use nalgebra::{Matrix2, Matrix3, Vector3};
 
+use self::any_hypothesis::{Edge, Prior};
 use self::any_lightness::Sample;
-use self::anywhere::{Edge, Prior, Search};
+use self::anywhere::Search;
 use self::aspect::{Aspect, AspectWork};
 use self::near::{Near, NearWork};
 use super::refined::{Refined, TILT_MAX_RAD};

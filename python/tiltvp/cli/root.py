@@ -1,0 +1,25 @@
+"""The command line without its commands, which `app` adds: what runs one, also from within another."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from cyclopts import App, Parameter
+
+from tiltvp import __version__
+
+app = App(
+    name="tiltvp",
+    help="Orientation and calibration from the straight lines of man-made places: a robot's tilt, vertical lines, "
+    "where a camera sits on a robot, and the pose of corners. Files and folders that exist are kept; with --overwrite, "
+    "which every command takes, its outputs replace them.",
+    version=__version__,
+    default_parameter=Parameter(negative_iterable=()),
+    suppress_keyboard_interrupt=False,
+)
+
+
+def run(words: Sequence[str]) -> int:
+    """Runs one command within another or for `main`: its exit code (0 for done), and what is wrong as an exception."""
+    code = app(list(words), exit_on_error=False, print_error=False, result_action="return_value")
+    return code if isinstance(code, int) else 0
