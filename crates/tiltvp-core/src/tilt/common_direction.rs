@@ -5,7 +5,8 @@ use std::f64::consts::{FRAC_PI_2, PI};
 use nalgebra::{Matrix2, Rotation3, Unit, Vector3};
 
 use super::confidence::inverse_of_positive;
-use super::methods::{RefineOptions, Subsample, refine};
+use super::methods::subsample::Subsample;
+use super::methods::{RefineOptions, refine};
 use crate::error::{Error, Result};
 use crate::geometry::tangent_basis;
 use crate::options;

@@ -2,7 +2,7 @@
 
 use nalgebra::{Matrix2, Vector3};
 
-use super::trust::Doubt;
+use super::doubt::Doubt;
 use crate::geometry::Tilt;
 use crate::robust::Stop;
 

@@ -6,15 +6,15 @@ use std::sync::Arc;
 use nalgebra::{Matrix3, Vector2, Vector3};
 
 use super::estimate::{EdgeElement, TiltEstimate};
-use super::fit::Seen;
 use super::image_circle::CentreOff;
 use super::image_edges::{EdgeOrigin, ImageEdges};
 use super::lightness::LIGHTS;
 use super::methods::{Fitter, Prepared, Setting, TILT_MAX_RAD, edge_offset};
 use super::options::TiltOptions;
-use super::scratch::{Scratch, Work};
+use super::scratch::Scratch;
 use super::tables::PixelTables;
-use super::trust::ASPECT;
+use super::trust::{ASPECT, Seen};
+use super::work::Work;
 use crate::camera::Camera;
 use crate::edges::{EdgeOptions, EdgePixels};
 use crate::error::{Error, Result};
@@ -52,7 +52,13 @@ impl TiltEstimator {
 
     /// The estimator of checked options.
     fn prepared(origin: Arc<EdgeOrigin>, options: TiltOptions, pixels: Arc<PixelTables>) -> Result<Self> {
-        let setting = Setting { origin: &origin, options: &options, pixels: &pixels };
+        let setting = Setting {
+            origin: &origin,
+            pixels: &pixels,
+            method: options.method.name(),
+            tilt_max_rad: options.tilt_max_rad,
+            seed: options.seed,
+        };
         let chosen = options.method.chosen();
         let limit = chosen.tilt_limit_rad();
         if let Some(tilt_max) = options.tilt_max_rad.filter(|tilt_max| *tilt_max >= limit && limit < PI) {

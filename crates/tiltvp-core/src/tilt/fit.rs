@@ -6,13 +6,12 @@ use nalgebra::{Matrix2, Vector2};
 
 use super::confidence;
 use super::corrected::Corrected;
+use super::doubt::Doubt;
 use super::estimate::{ALTERNATIVES, Alternative, TiltEstimate};
-use super::image_circle::CentreOff;
-use super::lightness::LIGHTS;
-use super::scratch::Work;
 use super::tables::PixelTables;
 use super::trained::TrainedCorrection;
-use super::trust::{ASPECT, Believed, Doubt, FEATURES, Trust, features};
+use super::trust::{Believed, FEATURES, Seen, features};
+use super::work::Work;
 use crate::geometry::{Tilt, tangent_basis};
 use crate::robust::{FitReport, Stop};
 
@@ -112,24 +111,6 @@ impl Fit {
     }
 }
 
-/// What is known of an image beside its fit.
-pub(super) struct Seen<'a> {
-    pub edge_pixels: usize,
-    /// Edge pixels that passed the prefilter.
-    pub prefiltered_pixels: usize,
-    pub pixels_per_rad: f64,
-    /// The largest lean that is looked for.
-    pub tilt_max_rad: f64,
-    /// How light the view is at each height.
-    pub lights: &'a [f64; LIGHTS],
-    /// Where what the method looks at stands.
-    pub aspect: [f64; ASPECT],
-    /// How far the method's fits can be trusted to be of the vertical at all.
-    pub trust: Option<&'static Trust>,
-    /// A centre that is off.
-    pub centre_off: Option<CentreOff<'a>>,
-}
-
 /// How the rows of a fit tell its error.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Evidence {
@@ -216,6 +197,8 @@ impl Lean {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::tilt::lightness::LIGHTS;
+    use crate::tilt::trust::{ASPECT, Trust};
 
     fn fit(covariance: Matrix2<f64>) -> Fit {
         Fit {

@@ -7,7 +7,7 @@ use super::correction::VanishingPoint;
 use super::image_circle::ImageCircle;
 use super::image_edges::EdgeOrigin;
 use super::lightness::Lightness;
-use super::methods::SharedTables;
+use super::shared_tables::SharedTables;
 use crate::edges::Region;
 use crate::error::Result;
 

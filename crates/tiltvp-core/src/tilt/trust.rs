@@ -1,9 +1,8 @@
 //! Whether a fit is of the vertical at all, and what most likely keeps an estimate from being sure.
 
-use std::fmt;
-
+use super::doubt::Doubt;
 use super::estimate::TiltEstimate;
-use super::fit::Seen;
+use super::image_circle::CentreOff;
 use super::lightness::LIGHTS;
 
 /// How many numbers tell of a fit.
@@ -17,6 +16,24 @@ pub(super) const ASPECT: usize = 5;
 
 /// How many numbers tell whether an estimate is right.
 pub(super) const FEATURES: usize = FIT + LIGHTS + ASPECT;
+
+/// What is known of an image beside its fit.
+pub(super) struct Seen<'a> {
+    pub edge_pixels: usize,
+    /// Edge pixels that passed the prefilter.
+    pub prefiltered_pixels: usize,
+    pub pixels_per_rad: f64,
+    /// The largest lean that is looked for.
+    pub tilt_max_rad: f64,
+    /// How light the view is at each height.
+    pub lights: &'a [f64; LIGHTS],
+    /// Where what the method looks at stands.
+    pub aspect: [f64; ASPECT],
+    /// How far the method's fits can be trusted to be of the vertical at all.
+    pub trust: Option<&'static Trust>,
+    /// A centre that is off.
+    pub centre_off: Option<CentreOff<'a>>,
+}
 
 /// How it is told whether a method's fits are of the vertical: logistic regressions on views whose cameras, mountings or scenes
 /// mislead, `tiltvp measure trust`, which prints them.
@@ -117,43 +134,6 @@ const EDGES: f64 = 20.0;
 /// Ratio of the stated errors in two directions from which on edges stand in too few directions.
 const UNLIKE: f64 = 3.0;
 
-/// What most likely keeps an estimate from being sure of itself.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Doubt {
-    /// The image circle is not where the calibration says.
-    Decentred {
-        /// By how much leans err if the calibration's centre is off as the circle is, in radians.
-        off_rad: f64,
-    },
-    /// The pixels are coarse.
-    Coarse {
-        /// Pixels for each degree.
-        per_deg: f64,
-    },
-    /// The view does not look as it does where up is as told.
-    NotUp,
-    /// There are few edges.
-    FewEdges {
-        /// Edge pixels.
-        pixels: usize,
-    },
-    /// Of the edges few agree.
-    FewAgree {
-        /// Share of the edge pixels, in `[0, 1]`.
-        share: f64,
-    },
-    /// The edges that agree stand in too few directions.
-    OneSided {
-        /// Ratio of the standard deviations in two directions.
-        ratio: f64,
-    },
-    /// What agrees strays.
-    Scattered {
-        /// Standard deviation of the estimate, in radians.
-        sigma_rad: f64,
-    },
-}
-
 impl Doubt {
     /// What most likely is wrong with an image, if its estimate is not sure.
     pub(super) fn of(estimate: &TiltEstimate, pixels_per_rad: f64, off_rad: f64, looks_up: bool) -> Option<Self> {
@@ -181,42 +161,5 @@ impl Doubt {
         } else {
             return None;
         })
-    }
-}
-
-impl fmt::Display for Doubt {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match *self {
-            Self::Decentred { off_rad } => write!(
-                f,
-                "the image circle is beside the calibration's, whose centre may be off by what makes {:.1} degrees",
-                off_rad.to_degrees()
-            ),
-            Self::Coarse { per_deg } => write!(f, "{per_deg:.1} pixels for each degree are coarse"),
-            Self::NotUp => {
-                write!(f, "what is light, and where edges stand, is unlike views with up as told: check the mounting")
-            }
-            Self::FewEdges { pixels } => {
-                write!(f, "{pixels} edge pixels are few: little contrast, dark, over-exposed or blurred")
-            }
-            Self::FewAgree { share } => write!(
-                f,
-                "only {:.0} % of the edge pixels agree: check mounting, calibration, mask and tilt_max_rad",
-                100.0 * share
-            ),
-            Self::OneSided { ratio } => {
-                write!(
-                    f,
-                    "the edges stand in few directions: {ratio:.0} times the error along one that it has along the other"
-                )
-            }
-            Self::Scattered { sigma_rad } => {
-                write!(
-                    f,
-                    "the edges stray: a standard deviation of {:.1} degrees (noise, blur, clutter)",
-                    sigma_rad.to_degrees()
-                )
-            }
-        }
     }
 }

@@ -1,6 +1,7 @@
 //! Sums of gated rows by group, in one pass: what a covariance is made of when the rows of a group err together.
 
-use super::simd::{Simd, TURNS, WIDTH, kernel};
+use super::kernel::kernel;
+use super::simd::{Simd, TURNS, WIDTH};
 use super::single::residual;
 
 /// Most groups: a power of two, so that a number of a group is found by a mask.

@@ -4,6 +4,7 @@ mod bound;
 mod double;
 mod gain;
 mod grouped;
+mod kernel;
 mod real;
 mod simd;
 mod single;

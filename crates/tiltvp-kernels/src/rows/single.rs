@@ -1,7 +1,8 @@
 //! Rows in single precision, sixteen at a time: counting, and sums of gated products, the same to the last bit with vectors of any
 //! width.
 
-use super::simd::{Simd, WIDTH, kernel};
+use super::kernel::kernel;
+use super::simd::{Simd, WIDTH};
 use super::{Gate, HARD, OPEN, REJECTED, SOFT, Sums, WITHIN, Weights};
 
 /// The last, partial sixteen of a column, filled up with `with`.

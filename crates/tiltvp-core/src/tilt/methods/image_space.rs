@@ -1,11 +1,11 @@
 //! What the image-space methods share: the gain of each pixel, the prefilter, and the tilt of a shift (Fleer 2017, section 2.1).
 
 use std::f64::consts::{FRAC_1_SQRT_2, FRAC_PI_2};
-use std::sync::{Arc, OnceLock};
+use std::sync::Arc;
 
 use nalgebra::{Vector2, Vector3};
 
-use super::Setting;
+use super::method::Setting;
 use super::offsets::offsets;
 use crate::edges::{EdgePixels, Prefilter};
 use crate::error::{Error, Result};
@@ -15,9 +15,9 @@ use crate::options::POSITIVE;
 use crate::robust::FitReport;
 use crate::tilt::correction::{Correction, Gains, VanishingPoint, closed_form_gains};
 use crate::tilt::fit::{Evidence, Fit, Lean, STRAY_RAD};
-use crate::tilt::scratch::{Inliers, Work};
 use crate::tilt::tables::PixelTables;
 use crate::tilt::trained::TrainedCorrection;
+use crate::tilt::work::{Inliers, Work};
 
 /// `s_max` in pixels of Fleer 2017, table 3.
 const PAPER_OFFSET_MAX_PX: f64 = 40.0;
@@ -33,13 +33,6 @@ const AXIS_COSINE_MIN: f64 = FRAC_1_SQRT_2;
 /// vertical, to a millionth of a pixel.
 fn offset_max_px_of(scale_px: f64) -> f64 {
     (PAPER_OFFSET_MAX_PX * scale_px / PAPER_SCALE_PX * 1e6).round() / 1e6
-}
-
-/// The closed-form gains, and the prefilter of edge offsets.
-#[derive(Debug, Default)]
-pub(super) struct Shared {
-    gains: OnceLock<Arc<Gains>>,
-    prefilter: OnceLock<Prefilter>,
 }
 
 options! {
@@ -90,7 +83,7 @@ impl ImageSpace {
             Correction::None | Correction::ClosedForm => TrainedCorrection::Factor(gains.mean),
         };
         let own_max_px = offset_max_px.unwrap_or_else(|| offset_max_px_of(vertical.scale));
-        let largest_px = setting.options.tilt_max_rad.map_or(own_max_px, |tilt| correction.shift_of(tilt));
+        let largest_px = setting.tilt_max_rad.map_or(own_max_px, |tilt| correction.shift_of(tilt));
         if correction.apply(largest_px) >= FRAC_PI_2 {
             return Err(lean_out_of_reach(&correction, largest_px, offset_max_px.is_some()));
         }
@@ -146,7 +139,7 @@ impl ImageSpace {
 
 /// Where the vertical is seen, for a lens that takes a lean for a shift of the image.
 fn vertical_of<'a>(setting: &Setting<'a>) -> Result<&'a VanishingPoint> {
-    let refused = |expected| Err(Error::option("method", setting.options.method.name(), expected));
+    let refused = |expected| Err(Error::option("method", setting.method, expected));
     let Some(vertical) = &setting.pixels.vertical else {
         return refused("a camera that can see the zenith or the nadir; use \"refined\" for others");
     };

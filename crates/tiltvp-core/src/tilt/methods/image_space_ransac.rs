@@ -3,16 +3,16 @@
 use std::sync::Arc;
 
 use super::image_space::{ImageSpace, ImageSpaceOptions};
+use super::method::{Fitter, Prepared, Setting, TiltMethod};
 use super::offsets::Offsets;
-use super::{Fitter, Prepared, Setting, TiltMethod};
 use crate::edges::{EdgeOptions, EdgePixels, Prefilter};
 use crate::error::Result;
 use crate::options;
 use crate::options::POSITIVE;
 use crate::robust::{RansacOptions, Sampling, ransac};
 use crate::tilt::fit::Fit;
-use crate::tilt::scratch::Work;
 use crate::tilt::tables::PixelTables;
+use crate::tilt::work::Work;
 
 options! {
     /// Options of the image-space method by random sampling; defaults are those of Fleer 2017, table 3.
@@ -35,7 +35,7 @@ impl TiltMethod for ImageSpaceRansacOptions {
         Ok(Prepared::Pixels(Arc::new(ImageSpaceRansac {
             space: ImageSpace::new(setting, &self.space)?,
             ransac: RansacOptions {
-                seed: setting.options.seed,
+                seed: setting.seed,
                 sampling: self.sampling,
                 ..RansacOptions::with_threshold(self.threshold_px)
             },

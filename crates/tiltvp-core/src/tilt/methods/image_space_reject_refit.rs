@@ -5,16 +5,16 @@ use std::sync::Arc;
 use nalgebra::Vector2;
 
 use super::image_space::{ImageSpace, ImageSpaceOptions};
+use super::method::{Fitter, Prepared, Setting, TiltMethod};
 use super::offsets::Offsets;
-use super::{Fitter, Prepared, Setting, TiltMethod};
 use crate::edges::{EdgeOptions, EdgePixels, Prefilter};
 use crate::error::Result;
 use crate::options;
 use crate::options::Between;
 use crate::robust::{RejectRefitOptions, reject_refit};
 use crate::tilt::fit::Fit;
-use crate::tilt::scratch::Work;
 use crate::tilt::tables::PixelTables;
+use crate::tilt::work::Work;
 
 options! {
     /// Options of the image-space method by repeated trimming; defaults are those of Fleer 2017, table 3.

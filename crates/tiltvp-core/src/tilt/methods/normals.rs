@@ -1,25 +1,18 @@
 //! What the methods on normals share: great circles of edge pixels, their prefilter, and the tilt of a common direction.
 
 use std::f64::consts::FRAC_PI_2;
-use std::sync::{Arc, OnceLock};
+use std::sync::Arc;
 
 use nalgebra::{Matrix2, Vector2, Vector3};
 
-use super::Setting;
+use super::method::Setting;
 use crate::edges::{EdgePixels, LiftTable, NormalKind, Prefilter};
 use crate::geometry::Tilt;
 use crate::robust::FitReport;
 use crate::tilt::fit::{Evidence, Fit, Lean};
-use crate::tilt::scratch::{Inliers, Work};
 use crate::tilt::tables::PixelTables;
 use crate::tilt::trained::TrainedCorrection;
-
-/// The maps from gradients to normals and their prefilters, by the kind of normal.
-#[derive(Debug, Default)]
-pub(super) struct Shared {
-    tangent: OnceLock<(Arc<LiftTable>, Prefilter)>,
-    gradient: OnceLock<(Arc<LiftTable>, Prefilter)>,
-}
+use crate::tilt::work::{Inliers, Work};
 
 /// Normals of edge pixels whose great circles pass near the robot's vertical.
 #[derive(Debug)]
@@ -32,7 +25,7 @@ pub(super) struct Normals {
 impl Normals {
     /// The normals of a kind for leans of up to `tilt_max_rad` of the options, or `default_max_rad` where there is none.
     pub(super) fn new(setting: &Setting<'_>, kind: NormalKind, default_max_rad: f64) -> Self {
-        let sin_max = setting.options.tilt_max_rad.unwrap_or(default_max_rad).sin();
+        let sin_max = setting.tilt_max_rad.unwrap_or(default_max_rad).sin();
         let shared = &setting.pixels.shared.normals;
         let made = match kind {
             NormalKind::Tangent => &shared.tangent,
@@ -112,8 +105,13 @@ mod tests {
         let refined = TiltOptions::for_method("refined").unwrap();
         let first = TiltEstimator::new(camera, nalgebra::Matrix3::identity(), refined.clone()).unwrap();
         let normals = |estimator: &TiltEstimator, kind| {
-            let setting =
-                Setting { origin: &estimator.origin, options: estimator.options(), pixels: &estimator.pixels };
+            let setting = Setting {
+                origin: &estimator.origin,
+                pixels: &estimator.pixels,
+                method: "any",
+                tilt_max_rad: None,
+                seed: 0,
+            };
             Normals::new(&setting, kind, 0.2)
         };
         let mut other = TiltOptions::for_method("vector-consensus").unwrap();

@@ -7,7 +7,7 @@ use tiltvp_kernels::vectorised;
 use crate::edges::EdgePixels;
 use crate::robust::{Moments, Problem, Rows, Weights};
 use crate::tilt::correction::VanishingPoint;
-use crate::tilt::scratch::Work;
+use crate::tilt::work::Work;
 
 /// Edge offsets `s = A cos phi + B sin phi` (eq. 19): rows `(g cos phi, g sin phi, -s)`, model `(A, B)`, residuals in pixels
 /// (eq. 33), weights one or zero. `g` is the relative closed-form gain of the pixel, or 1.

@@ -4,18 +4,19 @@ use std::sync::Arc;
 
 use nalgebra::Vector3;
 
+use super::method::{Fitter, Prepared, Setting, TiltMethod};
 use super::normals::{self, Normals};
-use super::{Fitter, Prepared, Setting, TiltMethod};
+use super::subsample::Subsample;
 use crate::edges::{EdgeOptions, EdgePixels, NormalKind, Prefilter};
 use crate::error::Result;
 use crate::options;
 use crate::options::{Between, NOT_NEGATIVE};
 use crate::robust::{Direction, FitReport, Real, RejectRefitOptions, ReweightOptions, Rows, reject_refit, reweight};
 use crate::tilt::fit::{Evidence, Fit};
-use crate::tilt::scratch::{Inliers, Work};
 use crate::tilt::tables::PixelTables;
 use crate::tilt::trained::TrainedCorrection;
 use crate::tilt::trust::{ASPECT, Logit, Trust};
+use crate::tilt::work::{Inliers, Work};
 
 options! {
     /// Options of the refined method. Angles are those between an edge's great circle and the vertical.
@@ -122,33 +123,6 @@ const FADING: u32 = 2;
 
 /// Most rounds of trimming: `N_E` of Fleer 2017, table 3.
 const TRIMMING_ROUNDS: u32 = 15;
-
-/// Rows that are enough to start from; of several times more only one in so many is taken. The direction of 2048 rows that
-/// stray by two degrees has a standard deviation of 0.06 degrees, far inside the soft gate that follows.
-const ENOUGH: usize = 2048;
-
-/// The rows that trimming works on.
-#[derive(Debug, Clone, Default)]
-pub(in crate::tilt) struct Subsample<T> {
-    rows: Rows<T>,
-    weights: Vec<f32>,
-}
-
-impl<T: Real> Subsample<T> {
-    /// Room for a subsample of `capacity` rows.
-    pub(in crate::tilt) fn with_capacity(capacity: usize) -> Self {
-        let most = capacity.min(2 * ENOUGH);
-        Self { rows: Rows::with_capacity(most), weights: Vec::with_capacity(most) }
-    }
-
-    fn take(&mut self, rows: &Rows<T>, weights: &[f32]) {
-        let stride = (rows.len() / ENOUGH).max(1);
-        self.rows.clear();
-        self.weights.clear();
-        self.rows.extend(rows, stride);
-        self.weights.extend(weights.iter().step_by(stride));
-    }
-}
 
 /// Trims from the upright prior until the residuals are no larger than half the final scale or nothing changes, on a sample
 /// of the rows where there are many, then reweights all of them with a gate that fades to the final scale.

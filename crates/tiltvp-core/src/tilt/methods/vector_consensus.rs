@@ -5,17 +5,17 @@ use std::sync::Arc;
 
 use nalgebra::Vector3;
 
+use super::method::{Fitter, Prepared, Setting, TiltMethod};
 use super::normals::{self, Normals};
-use super::{Fitter, Prepared, Setting, TiltMethod};
 use crate::edges::{EdgeOptions, EdgePixels, NormalKind, Prefilter};
 use crate::error::Result;
 use crate::options;
 use crate::options::{Between, Kind, OptionValue, POSITIVE, Value};
 use crate::robust::{Direction, RansacOptions, Sampling, ransac};
 use crate::tilt::fit::{Evidence, Fit, STRAY_RAD};
-use crate::tilt::scratch::{Inliers, Work};
 use crate::tilt::tables::PixelTables;
 use crate::tilt::trained::TrainedCorrection;
+use crate::tilt::work::{Inliers, Work};
 
 options! {
     /// Options of the vector-consensus method; defaults are those of Fleer 2017, table 3.
@@ -66,7 +66,7 @@ impl TiltMethod for VectorConsensusOptions {
             normals: Normals::new(setting, self.normal, TILT_MAX_RAD),
             plane: setting.origin.robot_from_camera * Vector3::new(1.0, 1.0, 1.0),
             ransac: RansacOptions {
-                seed: setting.options.seed,
+                seed: setting.seed,
                 sampling: self.sampling,
                 ..RansacOptions::with_threshold(self.threshold_rad.sin())
             },

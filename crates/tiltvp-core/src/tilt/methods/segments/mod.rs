@@ -8,47 +8,38 @@ mod aspect;
 mod choice;
 mod choice_weights;
 mod near;
+mod options;
+pub(in crate::tilt) mod work;
 
 use std::f64::consts::PI;
 use std::sync::Arc;
 
-use nalgebra::{Matrix2, Matrix3, Vector3};
+use nalgebra::{Matrix2, Matrix3};
 
 use self::any_hypothesis::{Edge, Prior};
 use self::any_lightness::Sample;
-use self::anywhere::Search;
-use self::aspect::{Aspect, AspectWork};
-use self::near::{Near, NearWork};
-use super::refined::{Refined, TILT_MAX_RAD};
-use super::{Fitter, Prepared, RefineOptions, Setting, TiltMethod, edge_offset};
+use self::aspect::Aspect;
+use self::near::Near;
+use self::options::FLOOR_RAD;
+pub use self::options::SegmentsOptions;
+use self::work::SegmentWork;
+use super::method::{Fitter, ImageFitter, Prepared, Setting, TiltMethod};
+use super::offsets::edge_offset;
+use super::refined::{RefineOptions, Refined, TILT_MAX_RAD};
 use crate::edges::{EdgeOptions, EdgePixels, RidgePixels};
 use crate::error::{Error, Result};
 use crate::geometry::{Tilt, tangent_basis};
 use crate::image::ImageView;
-use crate::options;
-use crate::options::Between;
 use crate::robust::Stop;
-use crate::segments::{FinderScratch, SegmentDetectorOptions, SegmentFinder, SegmentOptions, Segments};
+use crate::segments::{SegmentDetectorOptions, SegmentFinder};
 use crate::tilt::estimate::{ALTERNATIVES, Alternative, EdgeElement, TiltEstimate};
-use crate::tilt::fit::{Fit, Seen};
+use crate::tilt::fit::Fit;
 use crate::tilt::image_circle::CentreOff;
 use crate::tilt::lightness::LIGHTS;
-use crate::tilt::scratch::{Scratch, Work};
+use crate::tilt::scratch::Scratch;
 use crate::tilt::tables::PixelTables;
-use crate::tilt::trust::{ASPECT, Logit, Trust};
-
-options! {
-    /// Options of the method of straight edges.
-    #[derive(Copy)]
-    pub struct SegmentsOptions {
-        /// What a straight edge is: from 8 pixels on, for at the rim of an upward view doors are no longer.
-        [flat] segments: SegmentOptions = SegmentOptions { support_min_px: 8, ..SegmentOptions::default() };
-        /// Standard deviation in radians by which the edges of vertical things miss the vertical.
-        scatter_rad: f64 = 0.6f64.to_radians() => Between(0.0, 1.0), "an angle strictly between 0 and 1 radian";
-        /// The most segments that are weighed, the longest ones.
-        segments_max: usize = 64 => 2.0..=1e6, "a whole number from 2 to 1000000";
-    }
-}
+use crate::tilt::trust::{ASPECT, Logit, Seen, Trust};
+use crate::tilt::work::Work;
 
 /// The largest lean up to which edges near the vertical are looked at alone. Beyond it those of horizontal things may be as near,
 /// and frames of three directions are weighed.
@@ -56,9 +47,6 @@ const NEAR_MAX_RAD: f64 = 20f64.to_radians();
 
 /// Least probability of being the right one of all alternatives, below which there is no answer.
 const PROBABILITY_MIN: f64 = 0.5;
-
-/// Standard deviation in radians of what no image tells, a side: half the median error on every second location of 108 panoramas.
-const FLOOR_RAD: f64 = 0.1f64.to_radians();
 
 /// Standard deviation in radians, a side, by which the vote of the pixels errs beside what its covariance tells, by normals that
 /// are told by the gradients of single pixels: set on the same locations.
@@ -91,7 +79,7 @@ impl TiltMethod for SegmentsOptions {
     }
 
     fn prepare(&self, setting: &Setting<'_>) -> Result<Prepared> {
-        let Setting { origin, options, pixels } = *setting;
+        let Setting { origin, pixels, .. } = *setting;
         if origin.row_stride != 1 {
             return Err(Error::option(
                 "row_stride",
@@ -105,7 +93,7 @@ impl TiltMethod for SegmentsOptions {
         let usual = refined.edges();
         let heights = usual.elevation_min_rad.sin()..=usual.elevation_max_rad.sin();
         let in_band = pixels.region.pixels().map(|(_, _, bearing)| heights.contains(&bearing.z)).collect();
-        let tilt_max_rad = options.tilt_max_rad.unwrap_or(TILT_MAX_RAD);
+        let tilt_max_rad = setting.tilt_max_rad.unwrap_or(TILT_MAX_RAD);
         Ok(Prepared::Segments(Arc::new(SegmentFit {
             finder,
             edges: origin.options,
@@ -123,7 +111,7 @@ impl TiltMethod for SegmentsOptions {
 
 /// The method ready for images.
 #[derive(Debug)]
-pub(in crate::tilt) struct SegmentFit {
+struct SegmentFit {
     finder: SegmentFinder,
     edges: EdgeOptions,
     robot_from_camera: Matrix3<f64>,
@@ -137,29 +125,6 @@ pub(in crate::tilt) struct SegmentFit {
     in_band: Vec<bool>,
     /// Pixels whose levels tell what is up: none where the lean is small.
     sample: Sample,
-}
-
-/// The memory of one thread.
-#[derive(Debug, Clone)]
-pub(in crate::tilt) struct SegmentWork {
-    finder: FinderScratch,
-    segments: Segments,
-    /// The pixels that vote.
-    strong: EdgePixels,
-    /// Of the segments that are weighed: their numbers, and the probability of being vertical by the last fit.
-    weighed: Vec<(u32, f64)>,
-    search: Search,
-    /// Levels of the sample.
-    levels: Vec<f32>,
-    near: NearWork,
-    aspect: AspectWork,
-}
-
-impl SegmentWork {
-    /// The directions that may be up in the last image, and what tells which one is.
-    pub(in crate::tilt) fn hypotheses(&self) -> Vec<(Vector3<f64>, Vec<f64>)> {
-        self.search.hypotheses.iter().map(|h| (h.up, h.features.to_vec())).collect()
-    }
 }
 
 /// Determinant of a covariance in shares of its squared trace, about the ratio of its variances, below which rounding of a gain is seen
@@ -192,9 +157,8 @@ fn fused(fit: &Fit, vote: &Fit) -> Fit {
     Fit { tilt: Tilt::from_normal(&normal), covariance: Some(symmetric), ..*fit }
 }
 
-impl SegmentFit {
-    /// The tilt of an image.
-    pub(in crate::tilt) fn estimate(
+impl ImageFitter for SegmentFit {
+    fn estimate(
         &self,
         image: &ImageView<'_>,
         tables: &PixelTables,
@@ -203,18 +167,7 @@ impl SegmentFit {
     ) -> TiltEstimate {
         let region = &tables.region;
         let Scratch { work: pixel_work, segments, .. } = scratch;
-        let work = segments.get_or_insert_with(|| {
-            Box::new(SegmentWork {
-                finder: self.finder.scratch(region, &self.edges),
-                segments: Segments::default(),
-                strong: EdgePixels::default(),
-                weighed: Vec::new(),
-                search: Search::default(),
-                levels: Vec::new(),
-                near: NearWork::default(),
-                aspect: AspectWork::default(),
-            })
-        });
+        let work = segments.get_or_insert_with(|| Box::new(SegmentWork::new(self.finder.scratch(region, &self.edges))));
         self.finder.find(image, region, self.edges.gradient_min, None, &mut work.finder, &mut work.segments);
         let fit = if self.tilt_max_rad > NEAR_MAX_RAD {
             self.fit_anywhere(image, work)
@@ -239,6 +192,36 @@ impl SegmentFit {
         fit.into_estimate(&seen, &mut pixel_work.trusted)
     }
 
+    fn elements(&self, centre: (f32, f32), scratch: &Scratch) -> Vec<EdgeElement> {
+        let Some(work) = scratch.segments.as_deref() else { return Vec::new() };
+        let SegmentWork { segments, weighed, .. } = work;
+        let mut vertical = vec![None; segments.list.len()];
+        for (i, share) in weighed {
+            vertical[*i as usize] = Some(*share > 0.5);
+        }
+        let of_segment = |(segment, vertical): (&crate::segments::Segment, Option<bool>)| {
+            let normal = (self.robot_from_camera * segment.normal).cast::<f32>().into();
+            let points = segments.points_of(segment).iter();
+            let elements = points.map(move |point| {
+                let (u, v) = (point.pixel[0].round(), point.pixel[1].round());
+                let [cos, sin, offset] = edge_offset(u - centre.0, v - centre.1, point.gradient[0], point.gradient[1]);
+                EdgeElement {
+                    u: u as u16,
+                    v: v as u16,
+                    phi_rad: f64::from(sin).atan2(f64::from(cos)),
+                    offset_px: f64::from(offset),
+                    normal,
+                    prefiltered: vertical.is_some(),
+                    inlier: vertical == Some(true),
+                }
+            });
+            elements.collect::<Vec<_>>()
+        };
+        segments.list.iter().zip(vertical).flat_map(of_segment).collect()
+    }
+}
+
+impl SegmentFit {
     /// The most probable of the directions that may be up, unless none is more probable than all others together.
     fn fit_anywhere(&self, image: &ImageView<'_>, work: &mut SegmentWork) -> Fit {
         let SegmentWork { segments, weighed, search, levels, .. } = work;
@@ -288,35 +271,6 @@ impl SegmentFit {
         let least = (self.strong.gradient_min * self.strong.gradient_min) as f32;
         strong.refill_where(&ridge.edges, |slot, gx, gy| (gx * gx + gy * gy >= least) & self.in_band[slot as usize]);
         self.pixels.fit(strong, tables, work)
-    }
-
-    /// The edge pixels of the segments of the last image, in their order.
-    pub(in crate::tilt) fn elements(&self, centre: (f32, f32), scratch: &Scratch) -> Vec<EdgeElement> {
-        let Some(work) = scratch.segments.as_deref() else { return Vec::new() };
-        let SegmentWork { segments, weighed, .. } = work;
-        let mut vertical = vec![None; segments.list.len()];
-        for (i, share) in weighed {
-            vertical[*i as usize] = Some(*share > 0.5);
-        }
-        let of_segment = |(segment, vertical): (&crate::segments::Segment, Option<bool>)| {
-            let normal = (self.robot_from_camera * segment.normal).cast::<f32>().into();
-            let points = segments.points_of(segment).iter();
-            let elements = points.map(move |point| {
-                let (u, v) = (point.pixel[0].round(), point.pixel[1].round());
-                let [cos, sin, offset] = edge_offset(u - centre.0, v - centre.1, point.gradient[0], point.gradient[1]);
-                EdgeElement {
-                    u: u as u16,
-                    v: v as u16,
-                    phi_rad: f64::from(sin).atan2(f64::from(cos)),
-                    offset_px: f64::from(offset),
-                    normal,
-                    prefiltered: vertical.is_some(),
-                    inlier: vertical == Some(true),
-                }
-            });
-            elements.collect::<Vec<_>>()
-        };
-        segments.list.iter().zip(vertical).flat_map(of_segment).collect()
     }
 }
 

@@ -4,7 +4,7 @@ use std::f64::consts::{FRAC_PI_2, PI};
 
 use nalgebra::{Matrix2, Matrix3, Vector2, Vector3};
 
-use super::{FLOOR_RAD, SegmentsOptions};
+use super::options::{FLOOR_RAD, SegmentsOptions};
 use crate::geometry::{Tilt, tangent_basis};
 use crate::robust::Stop;
 use crate::segments::Segments;

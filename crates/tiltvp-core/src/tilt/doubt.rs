@@ -1,0 +1,77 @@
+//! What keeps an estimate from being sure of itself, in words.
+
+use std::fmt;
+
+/// What most likely keeps an estimate from being sure of itself.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Doubt {
+    /// The image circle is not where the calibration says.
+    Decentred {
+        /// By how much leans err if the calibration's centre is off as the circle is, in radians.
+        off_rad: f64,
+    },
+    /// The pixels are coarse.
+    Coarse {
+        /// Pixels for each degree.
+        per_deg: f64,
+    },
+    /// The view does not look as it does where up is as told.
+    NotUp,
+    /// There are few edges.
+    FewEdges {
+        /// Edge pixels.
+        pixels: usize,
+    },
+    /// Of the edges few agree.
+    FewAgree {
+        /// Share of the edge pixels, in `[0, 1]`.
+        share: f64,
+    },
+    /// The edges that agree stand in too few directions.
+    OneSided {
+        /// Ratio of the standard deviations in two directions.
+        ratio: f64,
+    },
+    /// What agrees strays.
+    Scattered {
+        /// Standard deviation of the estimate, in radians.
+        sigma_rad: f64,
+    },
+}
+
+impl fmt::Display for Doubt {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match *self {
+            Self::Decentred { off_rad } => write!(
+                f,
+                "the image circle is beside the calibration's, whose centre may be off by what makes {:.1} degrees",
+                off_rad.to_degrees()
+            ),
+            Self::Coarse { per_deg } => write!(f, "{per_deg:.1} pixels for each degree are coarse"),
+            Self::NotUp => {
+                write!(f, "what is light, and where edges stand, is unlike views with up as told: check the mounting")
+            }
+            Self::FewEdges { pixels } => {
+                write!(f, "{pixels} edge pixels are few: little contrast, dark, over-exposed or blurred")
+            }
+            Self::FewAgree { share } => write!(
+                f,
+                "only {:.0} % of the edge pixels agree: check mounting, calibration, mask and tilt_max_rad",
+                100.0 * share
+            ),
+            Self::OneSided { ratio } => {
+                write!(
+                    f,
+                    "the edges stand in few directions: {ratio:.0} times the error along one that it has along the other"
+                )
+            }
+            Self::Scattered { sigma_rad } => {
+                write!(
+                    f,
+                    "the edges stray: a standard deviation of {:.1} degrees (noise, blur, clutter)",
+                    sigma_rad.to_degrees()
+                )
+            }
+        }
+    }
+}

@@ -1,0 +1,45 @@
+//! What the method of straight edges works in.
+
+use nalgebra::Vector3;
+
+use super::anywhere::Search;
+use super::aspect::AspectWork;
+use super::near::NearWork;
+use crate::edges::EdgePixels;
+use crate::segments::{FinderScratch, Segments};
+
+/// The memory of one thread.
+#[derive(Debug, Clone)]
+pub(in crate::tilt) struct SegmentWork {
+    pub(super) finder: FinderScratch,
+    pub(super) segments: Segments,
+    /// The pixels that vote.
+    pub(super) strong: EdgePixels,
+    /// Of the segments that are weighed: their numbers, and the probability of being vertical by the last fit.
+    pub(super) weighed: Vec<(u32, f64)>,
+    pub(super) search: Search,
+    /// Levels of the sample.
+    pub(super) levels: Vec<f32>,
+    pub(super) near: NearWork,
+    pub(super) aspect: AspectWork,
+}
+
+impl SegmentWork {
+    pub(super) fn new(finder: FinderScratch) -> Self {
+        Self {
+            finder,
+            segments: Segments::default(),
+            strong: EdgePixels::default(),
+            weighed: Vec::new(),
+            search: Search::default(),
+            levels: Vec::new(),
+            near: NearWork::default(),
+            aspect: AspectWork::default(),
+        }
+    }
+
+    /// The directions that may be up in the last image, and what tells which one is.
+    pub(in crate::tilt) fn hypotheses(&self) -> Vec<(Vector3<f64>, Vec<f64>)> {
+        self.search.hypotheses.iter().map(|h| (h.up, h.features.to_vec())).collect()
+    }
+}
