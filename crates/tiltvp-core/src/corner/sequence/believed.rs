@@ -3,20 +3,15 @@
 use nalgebra::{Matrix3, Vector3};
 
 use super::agreement::SAME_VERTEX_RAD;
-use super::estimator::{CornerPoseEstimator, Frame};
+use super::estimator::CornerPoseEstimator;
+use super::seen_pair::SeenPair;
 use super::track::SAME_PLACE;
 use crate::corner::closed_form::attitude::IncludedAngle;
 use crate::corner::estimate::{BelievedCorner, CornerEstimate, EdgeAngle, Hypothesis};
 use crate::corner::feature::CornerFeature;
+use crate::corner::frame::Frame;
 use crate::corner::general::edge_ends::{EdgeEnd, edge_ends};
 use crate::geometry::RigidMotion;
-
-/// A feature of each image that may be one corner, and the poses that both admit, the likeliest first.
-pub(crate) struct SeenPair {
-    pub(crate) left: usize,
-    pub(crate) right: usize,
-    pub(crate) poses: Vec<Hypothesis>,
-}
 
 /// How much worse another match of a corner may fit and still leave it open which one is right: twice the misfit, of noise that has
 /// the same in both. What two matches share in misfit does not tell them apart.

@@ -3,9 +3,9 @@
 use nalgebra::{Matrix3, Matrix6, Vector3};
 
 use super::agreement::{SAME_VERTEX_RAD, agreement, fits, renamed};
-use super::believed::SeenPair;
-use super::knowledge::FrameKnowledge;
+use super::frame_knowledge::FrameKnowledge;
 use super::names::CornerNames;
+use super::seen_pair::SeenPair;
 use super::track::Track;
 use crate::corner::closed_form::attitude::IncludedAngle;
 use crate::corner::closed_form::resolve::{Alignment, View, resolve};
@@ -13,20 +13,11 @@ use crate::corner::detector::{CornerDetector, CornerScratch};
 use crate::corner::estimate::{BelievedCorner, CornerEstimate, CornerVerdict, Hypothesis, PlaceVerdict};
 use crate::corner::estimator_options::{EstimatorOptions, KnownEdge};
 use crate::corner::feature::CornerFeature;
+use crate::corner::frame::Frame;
 use crate::corner::general::guided::ExpectedCorner;
 use crate::corner::options::CornerMethod;
 use crate::error::{Error, Result};
 use crate::geometry::RigidMotion;
-use crate::image::{ColorView, ImageView};
-
-/// An image of the kind that the detector wants.
-#[derive(Debug, Clone, Copy)]
-pub enum Frame<'a> {
-    /// For the general front end.
-    Gray(ImageView<'a>),
-    /// For the coloured cuboid.
-    Color(ColorView<'a>),
-}
 
 /// Finds the pose of a corner in the frames of a sequence, by one camera (attitude alone) or by two.
 #[derive(Debug, Clone)]

@@ -1,84 +1,15 @@
-//! What an inertial sensor knows of a frame, and what it and the frames before say of the attitude.
+//! What an inertial sensor and the frames before say of the attitude in a frame.
 
-use nalgebra::{Matrix2, Matrix3, Matrix6, Vector3};
+use nalgebra::{Matrix3, Matrix6, Vector3};
 
 use super::estimator::CornerPoseEstimator;
+use super::frame_knowledge::{CameraTurn, GravityDirection, UNTOLD_RAD};
 use super::track::Track;
-use crate::corner::closed_form::prior::{AttitudePrior, VerticalSense};
+use crate::corner::closed_form::prior::AttitudePrior;
 use crate::corner::estimate::Hypothesis;
 use crate::corner::feature::CornerFeature;
-use crate::error::{Error, Result};
-use crate::filter::{positive_semidefinite, symmetric};
-use crate::geometry::{check_rotation, tangent_basis, tangent_log};
-
-/// Standard deviation of an attitude that its covariance does not tell, radians: the attitudes of a real cabinet scatter by 0.7
-/// degrees about the truth, where edges are not quite straight or parallel.
-const UNTOLD_RAD: f64 = 0.7 * std::f64::consts::PI / 180.0;
-
-/// The 99.9 % quantile of chi-square of 2: an upright edge that is farther from gravity's direction is none.
-const UPRIGHT_CHI_SQUARE: f64 = 13.8;
-
-/// What is known of one frame beside its images, in the left camera's frame.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct FrameKnowledge {
-    /// Which way is down.
-    pub gravity: Option<GravityDirection>,
-    /// How the camera has turned since the frame before.
-    pub turn: Option<CameraTurn>,
-}
-
-/// The direction down, as from an accelerometer.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct GravityDirection {
-    /// Unit vector that points down, left camera's frame.
-    pub down: Vector3<f64>,
-    /// Standard deviation in any one direction, radians.
-    pub sigma_rad: f64,
-}
-
-/// How a camera has turned from one frame to the next, as from the rates of a gyroscope.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct CameraTurn {
-    /// The rotation that takes vectors of the camera's frame now to that at the frame before.
-    pub before_from_now: Matrix3<f64>,
-    /// Covariance of the rotation vector of its error, camera's frame now, square radians.
-    pub covariance: Matrix3<f64>,
-}
-
-impl GravityDirection {
-    fn prior(&self) -> AttitudePrior {
-        AttitudePrior::Gravity { down: self.down, sigma_rad: self.sigma_rad, sense: VerticalSense::Either }
-    }
-
-    /// Whether the upright edge of a pose is along this direction, either way, by what both are known to.
-    fn is_along(&self, pose: &Hypothesis) -> bool {
-        let vertical = pose.camera_from_object.column(1).into_owned();
-        let off = tangent_log(&self.down, &(vertical * vertical.dot(&self.down).signum()));
-        let turn = tangent_basis(&self.down).transpose() * vertical.cross_matrix();
-        let own = turn * pose.covariance.fixed_view::<3, 3>(0, 0) * turn.transpose();
-        let spread = own + Matrix2::from_diagonal_element(self.sigma_rad.powi(2) + UNTOLD_RAD.powi(2));
-        spread.cholesky().is_some_and(|factor| off.dot(&factor.solve(&off)) <= UPRIGHT_CHI_SQUARE)
-    }
-}
-
-impl FrameKnowledge {
-    /// # Errors
-    /// [`Error::InvalidArgument`] for a direction that is no unit vector, a standard deviation that
-    /// is not positive, and matrices that are no rotation or no covariance.
-    pub fn validate(&self) -> Result<()> {
-        if let Some(gravity) = &self.gravity {
-            gravity.prior().validate()?;
-        }
-        if let Some(turn) = &self.turn {
-            check_rotation("before_from_now", &turn.before_from_now)?;
-            if !positive_semidefinite(&turn.covariance) {
-                let expected = "a covariance in square radians, symmetric and not negative";
-                return Err(Error::argument("gyro", "another matrix", expected));
-            }
-        }
-        Ok(())
-    }
-}
+use crate::filter::symmetric;
+use crate::geometry::tangent_basis;
 
 impl Track {
     /// Goes on to a frame: everything is turned as the camera has been; without its turn, it may have turned by any.

@@ -3,12 +3,14 @@
 mod agreement;
 mod believed;
 pub(super) mod estimator;
+pub(super) mod frame_knowledge;
 mod height;
-pub(super) mod knowledge;
+mod knowledge;
 pub(super) mod names;
 mod pairs;
 mod paper;
 mod rivals;
+mod seen_pair;
 mod shared_attitude;
 mod size;
 mod support;

@@ -3,15 +3,17 @@
 use nalgebra::{Matrix3, Vector3};
 
 use super::agreement::{apart, renamed};
-use super::believed::{OPEN, SeenPair};
-use super::estimator::{CornerPoseEstimator, Frame};
+use super::believed::OPEN;
+use super::estimator::CornerPoseEstimator;
 use super::rivals::{Rival, add_rivals};
+use super::seen_pair::SeenPair;
 use super::support::CornerSupport;
 use super::transfer::upright;
 use crate::corner::closed_form::attitude::{IncludedAngle, corner_attitudes};
 use crate::corner::closed_form::prior::AttitudePrior;
 use crate::corner::estimate::{CornerEstimate, Hypothesis};
 use crate::corner::feature::CornerFeature;
+use crate::corner::frame::Frame;
 use crate::corner::fusion::{FusedPose, KnownAttitude, fuse_rays, fuse_rays_with};
 use crate::corner::general::beginnings::Beginnings;
 use crate::corner::general::common_attitude::CommonAttitude;

@@ -3,11 +3,12 @@
 use nalgebra::{Matrix3, Vector3};
 
 use super::agreement::{SAME_VERTEX_RAD, apart, renamed};
-use super::estimator::{CornerPoseEstimator, Frame};
+use super::estimator::CornerPoseEstimator;
 use super::height::SHARE_MAX;
 use crate::corner::closed_form::attitude::{IncludedAngle, corner_attitudes};
 use crate::corner::estimate::{CornerEstimate, Hypothesis, PlaceVerdict};
 use crate::corner::feature::CornerFeature;
+use crate::corner::frame::Frame;
 use crate::corner::general::edge_ends::{EdgeEnd, along};
 use crate::corner::sized::{KnownLengths, SeenEnd, SizedPose, Unseen, fit_sized};
 

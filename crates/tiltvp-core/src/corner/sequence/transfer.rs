@@ -3,10 +3,11 @@
 use nalgebra::{Matrix3, Vector2, Vector3};
 
 use super::agreement::{apart, fits, renamed};
-use super::estimator::{CornerPoseEstimator, Frame};
+use super::estimator::CornerPoseEstimator;
 use crate::corner::closed_form::attitude::corner_attitudes;
 use crate::corner::detector::CornerDetector;
 use crate::corner::feature::CornerFeature;
+use crate::corner::frame::Frame;
 use crate::corner::general::guided::{EdgeSegments, ExpectedCorner};
 use crate::error::Result;
 use crate::geometry::RigidMotion;
