@@ -160,20 +160,4 @@ mod tests {
         assert!(along(11.0, 3.0, 0.0) && !along(12.0, 3.0, 0.0));
         assert!(along(11.0, 0.5, 3.0) && !along(12.0, 0.5, 3.0));
     }
-
-    #[test]
-    fn what_is_no_direction_or_turn_is_refused() {
-        let good = CameraTurn { before_from_now: Matrix3::identity(), covariance: Matrix3::zeros() };
-        let gravity = |down, sigma_rad| Some(GravityDirection { down, sigma_rad });
-        let known = FrameKnowledge { gravity: gravity(Vector3::y(), 0.1), turn: Some(good) };
-        assert!(known.validate().is_ok() && FrameKnowledge::default().validate().is_ok());
-        for wrong in [
-            FrameKnowledge { gravity: gravity(Vector3::zeros(), 0.1), ..known },
-            FrameKnowledge { gravity: gravity(Vector3::y(), 0.0), ..known },
-            FrameKnowledge { turn: Some(CameraTurn { before_from_now: Matrix3::zeros(), ..good }), ..known },
-            FrameKnowledge { turn: Some(CameraTurn { covariance: -Matrix3::identity(), ..good }), ..known },
-        ] {
-            assert!(wrong.validate().is_err(), "{wrong:?}");
-        }
-    }
 }
