@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import os
 import re
+import signal
 import threading
 import time
 
@@ -10,6 +12,7 @@ import cv2
 import numpy as np
 import pytest
 
+from tiltvp.cli.sources import ending_at_interrupt
 from tiltvp.errors import ImageFileError, InvalidInputError
 from tiltvp.streams import LiveCamera
 
@@ -70,6 +73,27 @@ def test_a_camera_unplugged_and_plugged_in(monkeypatch: pytest.MonkeyPatch) -> N
     assert [frame.name for frame in seen] == [f"camera 4#{k:06d}" for k in range(9)]
     assert "s, it was opened again" in str(seen[3].image)
     assert set(opened) == {4}
+
+
+def test_an_image_that_was_read_when_the_interrupt_came_is_a_frame(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("tiltvp.streams.live._AGAIN_S", 0.01)
+    opened: list[int] = []
+
+    class Interrupted(Capture):
+        def read(self) -> tuple[bool, np.ndarray | None]:
+            if len(opened) == 2 and self.left == 3:
+                os.kill(os.getpid(), signal.SIGINT)
+            return super().read()
+
+    def plugged(number: int) -> Capture:
+        opened.append(number)
+        return Interrupted(number)
+
+    monkeypatch.setattr(cv2, "VideoCapture", plugged)
+    with ending_at_interrupt(LiveCamera(0)) as frames:
+        seen = [frame.image for frame in frames]
+    # Three images, the gap, and the image that ended it.
+    assert [isinstance(image, ImageFileError) for image in seen] == [False, False, False, True, False]
 
 
 def test_nobody_waits_for_a_camera_after_the_end(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -181,15 +181,9 @@ def ending_at_interrupt(frames: Frames) -> Iterator[Iterator[Frame]]:
         stop.set()
         frames.end()
 
-    def until() -> Iterator[Frame]:
-        for frame in frames:
-            yield frame
-            if stop.is_set():
-                return
-
     before = signal.signal(signal.SIGINT, note)
     try:
-        yield until()
+        yield iter(frames)
     finally:
         signal.signal(signal.SIGINT, before)
 

@@ -24,6 +24,16 @@ options! {
         /// Largest angle in radians between the prior and the answer.
         max_angle_rad: f64 = 20f64.to_radians() => Between(0.0, FRAC_PI_2), "an angle strictly between 0 and pi/2";
     }
+    check prior_is_a_direction
+}
+
+fn prior_is_a_direction(options: &CommonDirectionOptions) -> Result<()> {
+    unit_prior(options).map(drop)
+}
+
+fn unit_prior(options: &CommonDirectionOptions) -> Result<Vector3<f64>> {
+    unit(&options.prior)
+        .ok_or_else(|| Error::argument("prior", format!("{:?}", options.prior), "a finite vector that is not zero"))
 }
 
 /// A direction orthogonal to most of the normals.
@@ -167,8 +177,7 @@ fn validate(
         }
     }
     options.validate()?;
-    unit(&options.prior)
-        .ok_or_else(|| Error::argument("prior", format!("{:?}", options.prior), "a finite vector that is not zero"))
+    unit_prior(options)
 }
 
 /// The unit vector of any finite vector but zero, however large or small.
@@ -211,6 +220,14 @@ mod tests {
         fn never_panics(values in proptest::collection::vec(-1e3..1e3f64, 0..60)) {
             let normals: Vec<_> = values.chunks_exact(3).map(|c| Vector3::new(c[0], c[1], c[2])).collect();
             let _ = common_direction(&normals, None, &CommonDirectionOptions::default());
+        }
+    }
+
+    #[test]
+    fn options_without_a_direction_are_none() {
+        for prior in [Vector3::new(-3.0, f64::NAN, -2.9), Vector3::new(f64::INFINITY, 0.0, 1.0), Vector3::zeros()] {
+            let error = CommonDirectionOptions { prior, ..CommonDirectionOptions::default() }.validate().unwrap_err();
+            assert!(error.to_string().contains("a finite vector that is not zero"), "{error}");
         }
     }
 
