@@ -25,6 +25,12 @@ impl Interrupt {
         self.0.store(true, Ordering::Relaxed);
     }
 
+    /// Whether anybody has asked.
+    #[cfg(test)]
+    pub(crate) fn is_asked(&self) -> bool {
+        self.0.load(Ordering::Relaxed)
+    }
+
     /// Runs `work` with this flag; `None` if it was ended. What it had borrowed mutably is then in no known state.
     pub fn run<T>(&self, work: impl FnOnce() -> T) -> Option<T> {
         let before = ASKED.replace(Some(self.clone()));

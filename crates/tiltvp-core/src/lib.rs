@@ -25,6 +25,7 @@ pub mod image;
 pub mod interrupt;
 pub mod lines;
 pub mod options;
+mod parallel;
 pub mod robust;
 pub mod segments;
 pub mod selfcalib;

@@ -9,6 +9,7 @@ use super::detect::EdgePixels;
 use super::prefilter::Prefilter;
 use super::region::Region;
 use crate::camera::Camera;
+use crate::parallel;
 use crate::robust::Rows;
 
 /// How the normal of an edge's great circle is made from the gradient.
@@ -34,26 +35,32 @@ impl LiftTable {
     /// One matrix for each pixel of the region, all divided by their root mean square, so that a gradient of one grey level
     /// per pixel gives a normal of a length about one: longer where the lens shows the edge's direction better.
     pub fn new(camera: &Camera, robot_from_camera: &Matrix3<f64>, region: &Region, kind: NormalKind) -> Self {
-        let map = |u: usize, v: usize| -> Matrix3x2<f64> {
-            let pixel = Vector2::new(u as f64, v as f64);
-            let matrix = camera.unproject_jacobian(&pixel).and_then(|(bearing, back)| match kind {
-                NormalKind::Tangent => camera.project_jacobian(&bearing).map(|(_, forward)| forward.transpose()),
-                NormalKind::Gradient => Some(back),
-            });
+        let map = |slot: usize| -> Matrix3x2<f64> {
+            let (u, v) = region.place(slot);
+            let pixel = Vector2::new(f64::from(u), f64::from(v));
+            let matrix = match kind {
+                NormalKind::Tangent => {
+                    let forward = camera.unproject(&pixel).and_then(|bearing| camera.project_jacobian(&bearing));
+                    forward.map(|(_, forward)| forward.transpose())
+                }
+                NormalKind::Gradient => camera.unproject_jacobian(&pixel).map(|(_, back)| back),
+            };
             matrix.map_or(Matrix3x2::zeros(), |matrix| robot_from_camera * matrix)
         };
         // Twice, as the matrices would take four times the memory of the table.
-        let matrices = || region.places().map(|(u, v)| map(u, v));
-        let (squares, largest) = matrices().fold((0.0, 0.0f64), |(squares, largest), matrix| {
-            (squares + matrix.norm_squared(), largest.max(matrix.amax()))
+        let measured = parallel::blocks(region.len(), |slots| {
+            slots.map(map).fold((0.0, 0.0f64), |(squares, largest), matrix| {
+                (squares + matrix.norm_squared(), largest.max(matrix.amax()))
+            })
         });
+        let (squares, largest) =
+            measured.iter().fold((0.0, 0.0f64), |(squares, largest), own| (squares + own.0, largest.max(own.1)));
         let mean_square = squares / (2 * region.len().max(1)) as f64;
         let scale = 1.0 / mean_square.sqrt().max(f64::MIN_POSITIVE);
         let unit = largest.max(f64::MIN_POSITIVE) / f64::from(i16::MAX);
         let entry = |m: &Matrix3x2<f64>, i: usize, j: usize| u32::from((m[(i, j)] / unit).round() as i16 as u16);
         let words = |m: Matrix3x2<f64>| std::array::from_fn(|i| entry(&m, i, 0) | (entry(&m, i, 1) << 16));
-        let mut maps = Vec::with_capacity(region.len());
-        maps.extend(matrices().map(words));
+        let maps = parallel::table(region.len(), |slot| words(map(slot)));
         Self { maps, unit: (unit * scale) as f32 }
     }
 
@@ -66,7 +73,7 @@ impl LiftTable {
             let largest = 0.5 * (xx + yy) + (0.25 * (xx - yy) * (xx - yy) + xy * xy).sqrt();
             if largest > 0.0 { [e / largest.sqrt(), f / largest.sqrt()] } else { [0.0; 2] }
         };
-        Prefilter::new(self.maps.iter().map(vector), sin_max)
+        Prefilter::new(self.maps.len(), |slot| vector(&self.maps[slot]), sin_max)
     }
 
     /// The unit normal that [`lift`](Self::lift) makes of one edge pixel: its place in the region and its gradient. None for

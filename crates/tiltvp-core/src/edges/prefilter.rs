@@ -5,6 +5,7 @@ use std::sync::Arc;
 use tiltvp_kernels::gradient::Directions;
 
 use super::region::{Region, Span};
+use crate::parallel;
 
 /// For each pixel of a region a vector `q`; a gradient `g` may belong to a vertical edge only if
 /// `(q . g)^2 <= limit |g|^2`.
@@ -43,11 +44,13 @@ const ROUNDED: f64 = std::f64::consts::FRAC_1_SQRT_2 + 1e-3;
 impl Prefilter {
     /// One vector for each pixel of the region, in slot order, and the limit of `|q . g| / |g|`. The vectors are asked for twice, as
     /// they would take twice the memory of what is kept of them.
-    pub(super) fn new(vectors: impl ExactSizeIterator<Item = [f32; 2]> + Clone, limit: f64) -> Self {
-        let largest = vectors.clone().flatten().fold(0.0, |most: f32, x| most.max(x.abs()));
+    pub(super) fn new(len: usize, vector: impl Fn(usize) -> [f32; 2] + Sync, limit: f64) -> Self {
+        let largest =
+            parallel::blocks(len, |slots| slots.flat_map(&vector).fold(0.0, |most: f32, x| most.max(x.abs())));
+        let largest = largest.into_iter().fold(0.0, f32::max);
         let unit = f64::from(largest.max(f32::MIN_POSITIVE)) / f64::from(i16::MAX);
         let whole = |vector: [f32; 2]| vector.map(|x| (f64::from(x) / unit).round() as i16);
-        let shape = Shape::Each(vectors.map(whole).collect());
+        let shape = Shape::Each(parallel::table(len, |slot| whole(vector(slot))));
         Self { vectors: Arc::new(Source { shape, unit }), limit: 0.0 }.with_limit(limit)
     }
 
@@ -61,12 +64,15 @@ impl Prefilter {
     /// Edges whose straight continuation passes within `offset_max_px` of a point, eq. 17.
     pub fn of_offsets(region: &Region, centre: (f64, f64), offset_max_px: f64) -> Self {
         let away = |(u, v): (usize, usize)| [u as f64 - centre.0, v as f64 - centre.1];
-        let most = |(u, v, _)| away((u, v)).into_iter().fold(0.0, |most: f64, x| most.max(x.abs()));
-        let largest = region.pixels().map(most).fold(1.0, f64::max);
+        let most = |place| away(place).into_iter().fold(0.0, |most: f64, x| most.max(x.abs()));
+        let largest = region.places().map(most).fold(1.0, f64::max);
         let parts = ((f64::from(i16::MAX) - 1.0) / largest).floor();
         if parts < 8.0 {
-            let vectors = region.places().map(|place| away(place).map(|x| x as f32));
-            return Self::new(vectors, offset_max_px);
+            let vector = |slot| {
+                let (u, v) = region.place(slot);
+                away((u.into(), v.into())).map(|x| x as f32)
+            };
+            return Self::new(region.len(), vector, offset_max_px);
         }
         let centre = [centre.0, centre.1].map(|x| (x * parts).round() as i32);
         let shape = Shape::From { centre, parts: parts as i16 };

@@ -6,6 +6,7 @@ use super::options::{EdgeOptions, Mask};
 use crate::camera::Camera;
 use crate::error::{Error, Result};
 use crate::interrupt::check;
+use crate::parallel;
 
 /// A run of pixels `first..end` of row `v`; `slot` numbers its first pixel among all pixels of the region.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -74,24 +75,17 @@ impl Region {
         }
         camera.check_memory(TABLE_BYTES + SCRATCH_BYTES)?;
         let (lowest, highest) = (options.elevation_min_rad.sin(), options.elevation_max_rad.sin());
-        let mut seen = vec![false; width * height];
-        let mut in_band = seen.clone();
-        for (i, (seen, in_band)) in seen.iter_mut().zip(&mut in_band).enumerate() {
+        let sight = parallel::table(width * height, |i| {
             let (u, v) = (i % width, i / width);
-            if u == 0 {
-                check();
+            if mask.is_some_and(|mask| !mask.usable(u, v)) {
+                return Sight::None;
             }
-            if mask.is_none_or(|mask| mask.usable(u, v)) {
-                let bearing = camera.unproject(&Vector2::new(u as f64, v as f64)).map(|b| robot_from_camera * b);
-                *seen = bearing.is_some();
-                *in_band = bearing.is_some_and(|b| (lowest..=highest).contains(&b.z));
-            }
-        }
-        let clear = erode(&seen, width, options.reach_px());
-        drop(seen);
-        let mut inside = in_band;
-        inside.iter_mut().zip(&clear).for_each(|(inside, clear)| *inside &= clear);
-        drop(clear);
+            let bearing = camera.unproject(&Vector2::new(u as f64, v as f64)).map(|b| robot_from_camera * b);
+            bearing.map_or(Sight::None, |b| if (lowest..=highest).contains(&b.z) { Sight::Band } else { Sight::World })
+        });
+        let mut inside = erode(&sight, width, options.reach_px());
+        inside.iter_mut().zip(&sight).for_each(|(inside, sight)| *inside &= *sight == Sight::Band);
+        drop(sight);
         let count = inside.iter().filter(|inside| **inside).count();
         let mut region = Self {
             camera: camera.clone(),
@@ -202,13 +196,17 @@ impl Region {
         self.places.get(slot).copied().unwrap_or_default()
     }
 
+    /// Unit bearing in the robot frame of the pixel `slot`.
+    #[inline]
+    pub(crate) fn bearing(&self, slot: usize) -> Vector3<f64> {
+        let (u, v) = self.place(slot);
+        let seen = self.camera.unproject(&Vector2::new(f64::from(u), f64::from(v)));
+        self.robot_from_camera * seen.unwrap_or_else(|| Vector3::repeat(f64::NAN))
+    }
+
     /// Each pixel `(u, v)` of the region with its bearing in the robot frame, in slot order.
     pub fn pixels(&self) -> impl Iterator<Item = (usize, usize, Vector3<f64>)> + '_ {
-        let bearing = |u: usize, v: usize| {
-            let seen = self.camera.unproject(&Vector2::new(u as f64, v as f64));
-            self.robot_from_camera * seen.unwrap_or_else(|| Vector3::repeat(f64::NAN))
-        };
-        self.places().map(move |(u, v)| (u, v, bearing(u, v)))
+        self.places().enumerate().map(|(slot, (u, v))| (u, v, self.bearing(slot)))
     }
 
     /// `(u, v)` of every pixel, in slot order.
@@ -222,19 +220,31 @@ impl Region {
     }
 }
 
-/// `true` where the whole square of `reach` pixels about a pixel is `true`; what lies outside the image is not.
-fn erode(inside: &[bool], width: usize, reach: usize) -> Vec<bool> {
-    let mut rows = vec![false; inside.len()];
-    for (source, row) in inside.chunks_exact(width).zip(rows.chunks_exact_mut(width)) {
+/// What a pixel sees.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+enum Sight {
+    /// Nothing of the world.
+    #[default]
+    None,
+    /// The world, outside the elevation band.
+    World,
+    /// The elevation band.
+    Band,
+}
+
+/// `true` where the whole square of `reach` pixels about a pixel sees the world; what lies outside the image does not.
+fn erode(sight: &[Sight], width: usize, reach: usize) -> Vec<bool> {
+    let mut rows = vec![false; sight.len()];
+    for (source, row) in sight.chunks_exact(width).zip(rows.chunks_exact_mut(width)) {
         let mut run = 0;
-        for (u, inside) in source.iter().enumerate() {
-            run = if *inside { run + 1 } else { 0 };
+        for (u, sight) in source.iter().enumerate() {
+            run = if *sight == Sight::None { 0 } else { run + 1 };
             if run > 2 * reach {
                 row[u - reach] = true;
             }
         }
     }
-    let mut out = vec![false; inside.len()];
+    let mut out = vec![false; sight.len()];
     let mut runs = vec![0; width];
     for (v, row) in rows.chunks_exact(width).enumerate() {
         check();

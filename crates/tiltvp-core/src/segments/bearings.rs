@@ -4,6 +4,7 @@ use nalgebra::{Matrix6, SMatrix, Vector2, Vector6};
 
 use super::chains::Window;
 use crate::camera::Camera;
+use crate::parallel;
 
 /// Pixels along a side of a square. Within it the third derivative of a lens is left out: half a square is a thirtieth of a radian or
 /// less of it, and a sixth of its cube a thousandth of a pixel.
@@ -11,6 +12,9 @@ const SIDE: usize = 8;
 
 /// Places along a side of a square at which the lens is asked.
 const SAMPLES: usize = 5;
+
+/// Squares that take about as long as the entries of a table between two looks whether to end: each asks the lens 25 times.
+const BLOCK: usize = 128;
 
 /// Least number of answers of the lens in a square, for six unknowns.
 const ANSWERS_MIN: usize = 8;
@@ -32,7 +36,7 @@ impl Bearings {
         let Window { left, top, width, height } = *window;
         let (across, down) = (width.div_ceil(SIDE), height.div_ceil(SIDE));
         let square = |i: usize| quadratic(camera, (left + i % across * SIDE) as f64, (top + i / across * SIDE) as f64);
-        let squares = (0..across * down).map(square).collect();
+        let squares = parallel::table_in_blocks(across * down, BLOCK, square);
         Self { squares, across, origin: [left as f32, top as f32] }
     }
 

@@ -7,6 +7,7 @@ use crate::camera::Camera;
 use crate::edges::Region;
 use crate::error::Result;
 use crate::options::{Kind, OptionValue, Value};
+use crate::parallel;
 
 /// How the image-space methods turn a shift in pixels into a lean (Fleer 2017, eqs. 26 and 30).
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -123,8 +124,9 @@ pub(super) fn closed_form_gains(
     region: &Region,
     centre: &VanishingPoint,
 ) -> Gains {
-    let gain = |u: usize, v: usize, bearing: Vector3<f64>| -> f64 {
-        let pixel = Vector2::new(u as f64, v as f64);
+    let gain = |slot: usize| -> f64 {
+        let ((u, v), bearing) = (region.place(slot), region.bearing(slot));
+        let pixel = Vector2::new(f64::from(u), f64::from(v));
         let Some((_, back)) = camera.unproject_jacobian(&pixel) else { return f64::NAN };
         let back = robot_from_camera * back;
         let Some(normal) = Vector3::z().cross(&bearing).try_normalize(1e-9) else { return f64::NAN };
@@ -132,7 +134,7 @@ pub(super) fn closed_form_gains(
         let across = (back.transpose() * normal).norm();
         ((back.transpose() * along).dot(&(pixel - centre.pixel)) / (along.z * across)).abs()
     };
-    let gains: Vec<f64> = region.pixels().map(|(u, v, bearing)| gain(u, v, bearing)).collect();
+    let gains = parallel::table(region.len(), gain);
     let usable = gains.iter().filter(|g| g.is_finite());
     let mean = usable.clone().sum::<f64>() / (usable.count().max(1) as f64);
     let relative = |g: &f64| if g.is_finite() && *g > 0.0 { (g / mean) as f32 } else { f32::NAN };

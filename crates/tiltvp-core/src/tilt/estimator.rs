@@ -36,7 +36,7 @@ pub struct TiltEstimator {
 }
 
 impl TiltEstimator {
-    /// Makes the tables. `robot_from_camera` is `R`, which takes bearings of the camera frame to the robot frame.
+    /// Makes the tables, on all cores. `robot_from_camera` is `R`, which takes bearings of the camera frame to the robot frame.
     ///
     /// # Errors
     /// [`Error::InvalidOption`] or [`Error::InvalidArgument`] if an option is out of its domain, `R` is no rotation, the mask

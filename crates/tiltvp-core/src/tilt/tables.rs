@@ -10,6 +10,7 @@ use super::lightness::Lightness;
 use super::shared_tables::SharedTables;
 use crate::edges::Region;
 use crate::error::Result;
+use crate::parallel;
 
 /// The pixels that are looked at, and what is known of each.
 #[derive(Debug)]
@@ -37,9 +38,12 @@ impl PixelTables {
             let turn = bearing.y.atan2(bearing.x) / std::f64::consts::TAU + 0.5;
             ((turn * SECTORS as f64) as usize).min(SECTORS - 1) as u8
         };
-        let sectors = region.pixels().map(|(_, _, bearing)| sector(bearing)).collect();
         let degrees = |bearing: Vector3<f64>| bearing.z.clamp(-1.0, 1.0).asin().to_degrees().round() as i8;
-        let heights_deg = region.pixels().map(|(_, _, bearing)| degrees(bearing)).collect();
+        let of_pixel = |slot: usize| {
+            let bearing = region.bearing(slot);
+            (sector(bearing), degrees(bearing))
+        };
+        let (sectors, heights_deg) = parallel::table(region.len(), of_pixel).into_iter().unzip();
         let vertical = VanishingPoint::new(camera, robot_from_camera);
         let circle = ImageCircle::new(camera);
         let lightness = Lightness::new(camera, robot_from_camera, mask.as_ref());

@@ -13,7 +13,7 @@ use source::{Token, paths, resolve, sources, tokens};
 /// The floors of the house, the ground first. Modules of one floor are sisters, which never import each other; only the
 /// ground floor is one.
 const FLOORS: [&[&str]; 6] = [
-    &["geometry", "error", "interrupt", "options", "simd"],
+    &["geometry", "error", "interrupt", "options", "parallel", "simd"],
     &["robust", "camera", "image", "filter"],
     &["edges"],
     &["segments"],

@@ -30,6 +30,7 @@ use crate::edges::{EdgeOptions, EdgePixels, RidgePixels};
 use crate::error::{Error, Result};
 use crate::geometry::{Tilt, tangent_basis};
 use crate::image::ImageView;
+use crate::parallel;
 use crate::robust::Stop;
 use crate::segments::{SegmentDetectorOptions, SegmentFinder};
 use crate::tilt::estimate::{ALTERNATIVES, Alternative, EdgeElement, TiltEstimate};
@@ -92,7 +93,8 @@ impl TiltMethod for SegmentsOptions {
         let refined = RefineOptions::default();
         let usual = refined.edges();
         let heights = usual.elevation_min_rad.sin()..=usual.elevation_max_rad.sin();
-        let in_band = pixels.region.pixels().map(|(_, _, bearing)| heights.contains(&bearing.z)).collect();
+        let in_band = |slot| heights.contains(&pixels.region.bearing(slot).z);
+        let in_band = parallel::table(pixels.region.len(), in_band);
         let tilt_max_rad = setting.tilt_max_rad.unwrap_or(TILT_MAX_RAD);
         Ok(Prepared::Segments(Arc::new(SegmentFit {
             finder,
