@@ -72,10 +72,17 @@ class Plan:
     given: int = 0
     wrong: int = 0
     gaps: int = 0
+    """Times without images, however often it was opened in vain."""
+    gone: bool = False
     missing: int = 0
     """Tries to open it that are still to fail."""
     interrupted_s: float = 0.0
     backwards: float = 0.0
+
+    def lose(self, missing: int) -> None:
+        """The camera gives no image, and cannot be opened so many times."""
+        self.gaps += not self.gone
+        self.gone, self.missing = True, missing
 
     def interrupt(self) -> None:
         self.interrupted_s = time.perf_counter()
@@ -104,18 +111,17 @@ def camera_of(plan: Plan) -> type:
             chance = plan.pool.random.random()
             if plan.given >= plan.frames:
                 if plan.unplugged_at_end and not plan.interrupted_s:
-                    plan.gaps += 1
-                    plan.missing = 10**9
+                    plan.lose(10**9)
                     threading.Timer(0.3, plan.interrupt).start()
                     plan.interrupted_s = -1.0
                     return False, None
                 if not plan.interrupted_s:
                     plan.interrupt()
             elif chance < 0.002 and plan.given:
-                plan.gaps += 1
-                plan.missing = int(plan.pool.random.integers(1, 4))
+                plan.lose(int(plan.pool.random.integers(1, 4)))
                 return False, None
             plan.given += 1
+            plan.gone = False
             image = plan.pool.images[int(plan.pool.random.integers(len(plan.pool.images)))]
             if 0.01 < chance < 0.02:
                 plan.wrong += 1

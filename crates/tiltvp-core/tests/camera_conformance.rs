@@ -199,6 +199,19 @@ fn a_limit_is_an_angle_from_the_axis_however_long_the_bearing() {
 }
 
 #[test]
+fn a_bearing_too_short_to_square_is_seen_with_and_without_jacobian_or_not_at_all() {
+    for (name, camera) in ZOO.iter() {
+        for length in [1e-100, 1e-153, 1e-160, 1e-300, 1e-320] {
+            for direction in [Vector3::z(), Vector3::new(0.1, 0.2, 0.8), Vector3::new(0.5, 0.0, -0.1)] {
+                let bearing = direction * length;
+                let seen = camera.project(&bearing);
+                assert_eq!(seen.is_some(), camera.project_jacobian(&bearing).is_some(), "{name} {bearing:?}");
+            }
+        }
+    }
+}
+
+#[test]
 fn a_panorama_must_fill_its_image() {
     let panorama = Model::from_parameters("equirectangular", 1024, 512, &[]).unwrap();
     assert!(matches!(Camera::new(1024, 513, panorama), Err(Error::InvalidCamera { .. })));

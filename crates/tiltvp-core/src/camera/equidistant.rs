@@ -75,7 +75,7 @@ impl CameraModel for Equidistant {
     }
 
     fn project_jacobian(&self, bearing: &Vector3<f64>) -> Option<(Vector2<f64>, Matrix2x3<f64>)> {
-        let (point, jacobian) = radial::project(self, bearing)?;
+        let (point, jacobian) = radial::project(self, sane(bearing)?)?;
         Some((point + Vector2::new(self.cx, self.cy), jacobian))
     }
 

@@ -74,9 +74,12 @@ pub fn restored<const N: usize>(matrix: &SMatrix<f64, N, N>) -> SMatrix<f64, N, 
     symmetric(&SMatrix::from_column_slice(axes.recompose().as_slice()))
 }
 
-/// In the dynamic form: nalgebra's fixed one has no bound for every N.
+/// In the dynamic form: nalgebra's fixed one has no bound for every N. Entries below what rounding leaves of rounding are zero: its
+/// rotations underflow where entries are 1e-139 of others.
 fn principal_axes<const N: usize>(matrix: &SMatrix<f64, N, N>) -> SymmetricEigen<f64, nalgebra::Dyn> {
-    SymmetricEigen::new(DMatrix::from_column_slice(N, N, symmetric(matrix).as_slice()))
+    let least = f64::EPSILON * f64::EPSILON * matrix.amax();
+    let seen = symmetric(matrix).map(|x| if x.abs() < least { 0.0 } else { x });
+    SymmetricEigen::new(DMatrix::from_column_slice(N, N, seen.as_slice()))
 }
 
 #[cfg(test)]
@@ -95,6 +98,20 @@ mod tests {
         assert_relative_eq!(step, SVector::from([1.0, 0.25]));
         assert_relative_eq!(after, Matrix2::new(2.0, 0.5, 0.5, 1.875), max_relative = 1e-12);
         assert!(positive_semidefinite(&after));
+    }
+
+    #[test]
+    fn a_covariance_of_variances_of_all_sizes_is_one() {
+        let cross = -3.527397481126418e-139;
+        let mut graded =
+            nalgebra::Matrix6::from_diagonal(&nalgebra::Vector6::new(0.03, 0.03, 0.0, 0.0, -cross, -cross));
+        for (i, j, x) in
+            [(0, 1, -4.3e-19), (0, 3, -8.9e-145), (1, 3, -1.9e-146), (0, 4, cross), (1, 4, 2.3e-156), (1, 5, cross)]
+        {
+            (graded[(i, j)], graded[(j, i)]) = (x, x);
+        }
+        assert!(positive_semidefinite(&graded));
+        assert!(!positive_semidefinite(&(graded - nalgebra::Matrix6::from_diagonal_element(1e-9))));
     }
 
     #[test]
