@@ -186,7 +186,8 @@ fuzz seconds="3600": nightly
             -max_total_time=$(({{seconds}} / 2 / $(wc -w <<< $targets) + 1)) -artifact_prefix=out/fuzz/$target- -print_final_stats=1
     done
 
-# The unit tests of kernels and core under AddressSanitizer, at each level of vectors that the machine has, and of the C interface.
+# The unit tests of kernels and core under AddressSanitizer, at each level of vectors that the machine has, and of the C interface; what
+# runs on several threads under ThreadSanitizer.
 sanitize: setup nightly
     #!/usr/bin/env bash
     set -euo pipefail
@@ -199,6 +200,9 @@ sanitize: setup nightly
     done
     echo "== AddressSanitizer, C interface"
     tests --package tiltvp-capi
+    echo "== ThreadSanitizer"
+    export RUSTFLAGS="-Zsanitizer=thread -Cunsafe-allow-abi-mismatch=sanitizer" TSAN_OPTIONS="suppressions=$PWD/fuzz/thread-sanitizer.supp"
+    tests --package tiltvp-core --package tiltvp-capi --test determinism
 
 # What is found is in out/mutants.out; `--in-place` changes the checkout and puts it back.
 # Mutation testing of the core's tests, by cargo-mutants: tilt, selfcalib and corner; one in 64 mutants, or other `--shard`s.
