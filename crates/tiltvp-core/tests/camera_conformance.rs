@@ -211,6 +211,21 @@ fn a_bearing_too_short_to_square_is_seen_with_and_without_jacobian_or_not_at_all
     }
 }
 
+/// Pixels far from the centre see rays that graze the rim, where a difference of nearly equal numbers tells the bearing least.
+#[test]
+fn grazing_rays_of_a_sphere_come_back() {
+    for away_px in [1e3, 1e5, 1e7] {
+        let parameters = [("xi", 0.501_861), ("fx", 500.0), ("fy", 500.0), ("cx", -away_px), ("cy", 480.0)];
+        let given = parameters.map(|(name, x)| (name.to_owned(), Parameter::Scalar(x)));
+        let camera = Camera::new(1280, 960, Model::from_parameters("unified", 1280, 960, &given).unwrap()).unwrap();
+        let pixel = Vector2::new(3.0, 700.0);
+        let back = camera.project(&camera.unproject(&pixel).unwrap()).unwrap();
+        // The bearing's rounding is seen enlarged by the square of the distance in focal lengths.
+        let allowed = 1e-13 * away_px * (1.0 + away_px / 500.0);
+        assert!((back - pixel).amax() < allowed, "{away_px} {back:?} {allowed:e}");
+    }
+}
+
 #[test]
 fn a_panorama_must_fill_its_image() {
     let panorama = Model::from_parameters("equirectangular", 1024, 512, &[]).unwrap();

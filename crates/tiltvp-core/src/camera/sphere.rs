@@ -88,7 +88,8 @@ impl ShiftedSphere {
     }
 
     /// The unit bearing that a point of the plane sees: with `s = beta |m|^2` and `d = 1`,
-    /// `z = (sqrt(1 + (b^2 - a^2) s) - a b s) / (1 + b^2 s)` and `(x, y) = m (a + b z)`.
+    /// `z = (sqrt(1 + (b^2 - a^2) s) - a b s) / (1 + b^2 s)` and `(x, y) = m (a + b z)`, of which the second factor is
+    /// `(a + b sqrt(1 + (b^2 - a^2) s)) / (1 + b^2 s)`: towards the rim `a + b z` alone is what rounding leaves of a difference.
     #[inline]
     pub(super) fn bearing(&self, point: &Vector2<f64>) -> Option<Vector3<f64>> {
         (point.norm_squared() <= self.rim.radius * self.rim.radius).then(|| self.raw_bearing(point))
@@ -98,8 +99,8 @@ impl ShiftedSphere {
     fn raw_bearing(&self, point: &Vector2<f64>) -> Vector3<f64> {
         let (a, b) = (self.a, self.b);
         let s = self.beta * point.norm_squared();
-        let z = ((1.0 + (b * b - a * a) * s).max(0.0).sqrt() - a * b * s) / (1.0 + b * b * s);
-        let xy = point * (a + b * z);
-        Vector3::new(xy.x, xy.y, z).normalize()
+        let (root, below) = ((1.0 + (b * b - a * a) * s).max(0.0).sqrt(), 1.0 + b * b * s);
+        let xy = point * ((a + b * root) / below);
+        Vector3::new(xy.x, xy.y, (root - a * b * s) / below).normalize()
     }
 }
