@@ -22,8 +22,8 @@ pub struct FittedRay {
     pub residual_rms_rad: f64,
 }
 
-/// Square radians beyond which products of variances are none of a float.
-const VARIANCE_MAX: f64 = 1e150;
+/// The sum of the variances, the same in any basis but for rounding, in square radians: beyond it products of two are none of a float.
+const VARIANCES_MAX: f64 = 1e150 * (1.0 + 1e-9);
 
 impl FittedRay {
     /// The weighted fit to unit bearings with the standard deviation of each across the ray, radians; `toward` is a bearing
@@ -95,7 +95,7 @@ impl FittedRay {
         let scale = self.covariance.amax();
         let c = if scale >= f64::MIN_POSITIVE { self.covariance / scale } else { self.covariance * 0.0 };
         c.iter().all(|x| x.is_finite())
-            && scale <= VARIANCE_MAX
+            && self.covariance.trace() <= VARIANCES_MAX
             && (c[(0, 1)] - c[(1, 0)]).abs() <= 1e-9
             && c[(0, 0)] >= 0.0
             && c[(1, 1)] >= 0.0
@@ -128,6 +128,15 @@ mod tests {
             let [a, b, c] = few;
             let thin = ray(Matrix2::new(a, b, b, c));
             assert!(thin.is_valid() && thin.reversed().is_valid(), "{few:?}");
+        }
+        // As large as may be, in a basis in which rounding enlarges it.
+        for turn in [0.0, 0.1, 0.7, 1.1] {
+            let normal = Vector3::new(-1.0, turn, -1.0).normalize();
+            let large = FittedRay { normal, ..ray(Matrix2::new(1e150, 0.0, 0.0, 1e-10)) };
+            assert!(
+                large.is_valid() && large.reversed().is_valid() && large.reversed().reversed().is_valid(),
+                "{turn}"
+            );
         }
         for wrong in [f64::NAN, f64::INFINITY, 1e160] {
             assert!(!ray(Matrix2::new(wrong, 0.0, 0.0, 1.0)).is_valid());
