@@ -335,7 +335,7 @@ measure-calibration *arguments: setup
 measure-calibration-images *arguments: setup
     {{bin}}/tiltvp measure calibration-images {{arguments}}
 
-# Time over pixels from 0.1 to 12 megapixels with the exponent, and a batch on one and on two threads.
+# Times of an image and of making its estimator, from 0.1 to 12 megapixels, with the exponent; a batch on one and on two threads.
 measure-growth *arguments: setup
     {{bin}}/python benches/peers/growth.py {{arguments}}
 
