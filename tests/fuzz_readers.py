@@ -107,7 +107,7 @@ def options(content: bytes) -> object:
         values = tomllib.loads(content[1:].decode())
     except (ValueError, RecursionError):
         return None
-    made = OPTIONED[content[0] % len(OPTIONED)]
+    made = OPTIONED[(content[0] if content else 0) % len(OPTIONED)]
     return made(**({"wheel_base_m": 0.4} | values if made is tiltvp.SelfCalibrator else values))
 
 
