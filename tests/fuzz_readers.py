@@ -13,6 +13,7 @@ import tempfile
 import tomllib
 from collections.abc import Callable
 from contextlib import suppress
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -39,15 +40,15 @@ import numpy as np
 from calibration_texts import SAMPLES
 
 FORMAT_NAMES = (None, *(one.name for one in FORMATS))
+VALUES = sorted(name for name in _core.__all__ if hasattr(getattr(_core, name), "from_dict") and name != "Camera")
+"""Without `Camera`, whose `mirror` of other types is a TypeError."""
+CAMERA = tiltvp.Camera.equidistant(width=32, height=24, focal_px=9.0, cx=15.5, cy=11.5)
 OPTIONED: tuple[Callable[..., object], ...] = (
     tiltvp.TiltFilter,
     tiltvp.SelfCalibrator,
     tiltvp.lines.LineTracker,
-    tiltvp.corner.CornerPoseEstimator,
+    partial(tiltvp.corner.CornerPoseEstimator, tiltvp.corner.CornerDetector(CAMERA)),
 )
-VALUES = sorted(name for name in _core.__all__ if hasattr(getattr(_core, name), "from_dict") and name != "Camera")
-"""Without `Camera`, whose `mirror` of other types is a TypeError."""
-CAMERA = tiltvp.Camera.equidistant(width=32, height=24, focal_px=9.0, cx=15.5, cy=11.5)
 
 
 def states() -> list[Any]:
