@@ -113,6 +113,12 @@ def test_unreadable_files_are_named(tmp_path: Path) -> None:
         assert "\n" not in str(refusal.value)
 
 
+def test_a_tiff_that_points_beyond_any_file_is_unreadable(tmp_path: Path) -> None:
+    (tmp_path / "far.tiff").write_bytes(b"II+\0\x08\0\0\0" + b"\xff" * 8)
+    with pytest.raises(ImageFileError, match=r"far\.tiff"):
+        read_image(tmp_path / "far.tiff")
+
+
 def test_unwritable_files_are_named(tmp_path: Path) -> None:
     (tmp_path / "file").touch()
     cases = ((tmp_path / "image.unknown", ImageFileError), (tmp_path / "file" / "image.png", OutputError))

@@ -24,7 +24,7 @@ def header_size(data: bytes) -> tuple[int, int] | None:
         if re.match(begin, data, re.DOTALL):
             try:
                 size = read(data)
-            except (struct.error, IndexError):
+            except (struct.error, IndexError, OverflowError):  # The last for a place in a BigTIFF that no file has.
                 return None
             return size if size is not None and min(size) > 0 else None
     return None
