@@ -18,7 +18,8 @@ EXAMPLES = ROOT / "crates" / "tiltvp-capi" / "examples"
 INCLUDE = ROOT / "crates" / "tiltvp-capi" / "include"
 # Memory that is still reachable at the end is that of the runtime of Rust.
 LEAKS = ["--leak-check=full", "--errors-for-leak-kinds=definite,indirect,possible"]
-VALGRIND = ["valgrind", "--quiet", "--error-exitcode=99", *LEAKS]
+SUPPRESSED = f"--suppressions={Path(__file__).with_name('valgrind.supp')}"
+VALGRIND = ["valgrind", "--quiet", "--error-exitcode=99", SUPPRESSED, *LEAKS]
 
 
 @pytest.fixture(scope="module")
