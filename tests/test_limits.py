@@ -94,6 +94,26 @@ def test_an_image_that_says_too_many_pixels_is_not_decoded(tmp_path: Path) -> No
         tiltvp.read_image(tmp_path / "image.png")
 
 
+WITHOUT_THREADS = """
+import os, resource
+import numpy as np
+import tiltvp
+camera = tiltvp.Camera.equidistant(width=320, height=240, focal_px=70.0, cx=159.5, cy=119.5)
+usual = tiltvp.TiltEstimator(camera)
+if os.getuid() == 0:  # Whom the limit does not bind.
+    os.setuid(65534)
+resource.setrlimit(resource.RLIMIT_NPROC, (1, 1))
+image = np.random.default_rng(0).integers(0, 255, (240, 320), np.uint8)
+print(tiltvp.TiltEstimator(camera)(image) == usual(image))
+"""
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="the limit is of users elsewhere")
+def test_a_system_that_starts_no_thread_makes_the_same_tables() -> None:
+    done = subprocess.run([sys.executable, "-c", WITHOUT_THREADS], capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stdout) == (0, "True\n"), done.stderr
+
+
 @pytest.mark.skipif(sys.platform == "win32", reason="pipes of POSIX")
 @pytest.mark.timeout(20)
 def test_pipes_and_devices_are_not_read(tmp_path: Path) -> None:

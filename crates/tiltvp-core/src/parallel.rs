@@ -5,6 +5,7 @@
 use std::num::NonZero;
 use std::ops::Range;
 use std::panic::resume_unwind;
+use std::sync::Mutex;
 use std::thread;
 
 use crate::interrupt::{Interrupt, check};
@@ -59,24 +60,29 @@ fn part_of(len: usize, block: usize) -> usize {
     block * blocks.div_ceil(threads.min(blocks.div_ceil(LEAST)).max(1)).max(1)
 }
 
-/// Each part on a thread of its own, the first on this one.
+/// Each part on a thread of its own, the first on this one, and so is each for which the system starts no thread.
 fn on_threads<P: Send, T: Send>(parts: impl Iterator<Item = P>, work: impl Fn(P) -> T + Sync) -> Vec<T> {
-    let mut parts = parts;
-    let Some(first) = parts.next() else { return Vec::new() };
-    let (flag, work) = (Interrupt::current(), &work);
-    thread::scope(|scope| {
+    let parts: Vec<_> = parts.map(|part| Mutex::new(Some(part))).collect();
+    let take = |part: &Mutex<Option<P>>| part.lock().ok().and_then(|mut part| part.take()).map(&work);
+    let (flag, take) = (Interrupt::current(), &take);
+    let made = thread::scope(|scope| {
         let start = |part| {
             let flag = flag.clone();
-            scope.spawn(move || {
+            let begin = move || {
                 Interrupt::adopt(flag.as_ref());
-                work(part)
-            })
+                take(part)
+            };
+            thread::Builder::new().spawn_scoped(scope, begin).ok()
         };
-        let others: Vec<_> = parts.map(start).collect();
-        let mut done = vec![work(first)];
-        done.extend(others.into_iter().map(|other| other.join().unwrap_or_else(|fault| resume_unwind(fault))));
-        done
-    })
+        let others: Vec<_> = parts.iter().skip(1).map(start).collect();
+        let mut made: Vec<_> = parts.iter().take(1).map(take).collect();
+        made.extend(others.into_iter().zip(parts.iter().skip(1)).map(|(thread, part)| match thread {
+            Some(thread) => thread.join().unwrap_or_else(|fault| resume_unwind(fault)),
+            None => take(part),
+        }));
+        made
+    });
+    made.into_iter().flatten().collect()
 }
 
 #[cfg(test)]

@@ -26,6 +26,7 @@ const GLARE: f64 = 3.0;
 /// Radius of the free circle that a robot needs to stand, metres: a cleaning robot of 0.35 m across with room to turn
 /// (`ways_are_free_smooth_and_lead_far` holds the ways to it).
 pub(crate) const ROBOT_RADIUS_M: f64 = 0.22;
+
 /// Where a ray meets the world first.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Hit {

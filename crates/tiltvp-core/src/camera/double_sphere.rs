@@ -6,8 +6,7 @@ use super::grid::PixelGrid;
 use super::lens::Lens;
 use super::rim::{NARROWEST_RAD, Rim};
 use super::schema::{CX, CY, FX, FY, LensSchema, Parameter, ParameterSchema, Resize, scalars};
-use super::values::Parametric;
-use super::values::Values;
+use super::values::{Parametric, Values};
 use crate::error::{Error, Result};
 
 const NAME: &str = "double_sphere";

@@ -7,8 +7,7 @@ use super::lens::{sane, seen};
 use super::model::CameraModel;
 use super::radial::{self, Radial};
 use super::schema::{CX, CY, LensSchema, Parameter, ParameterSchema, Resize, scalars};
-use super::values::Parametric;
-use super::values::Values;
+use super::values::{Parametric, Values};
 use crate::error::Result;
 
 const NAME: &str = "equidistant";

@@ -7,8 +7,7 @@ use nalgebra::{Matrix2x3, Matrix3x2, RowVector3, Vector2, Vector3};
 use super::lens::{sane, seen};
 use super::model::CameraModel;
 use super::schema::{LensSchema, Parameter};
-use super::values::Parametric;
-use super::values::Values;
+use super::values::{Parametric, Values};
 use crate::error::{Error, Result};
 
 const NAME: &str = "equirectangular";

@@ -6,8 +6,7 @@ use super::grid::{self, PixelGrid};
 use super::lens::Lens;
 use super::schema::{CX, CY, FX, FY, LensSchema, Parameter, ParameterSchema, Resize, scalars};
 use super::sphere::ShiftedSphere;
-use super::values::Parametric;
-use super::values::Values;
+use super::values::{Parametric, Values};
 use crate::error::{Error, Result};
 
 const NAME: &str = "extended_unified";

@@ -5,8 +5,7 @@ use super::polynomial::evaluate;
 use super::profile::{Inverse, Profile};
 use super::rim::FOLD;
 use super::schema::{CX, CY, FX, FY, LensSchema, Parameter, ParameterSchema, scalars};
-use super::values::Parametric;
-use super::values::Values;
+use super::values::{Parametric, Values};
 use crate::error::Result;
 
 const NAME: &str = "kannala_brandt";

@@ -9,8 +9,7 @@ use super::rim::FOLD;
 use super::schema::{CX, CY, Kind, LensSchema, Parameter, ParameterSchema, Resize, scalars, too_many};
 use super::solve;
 use super::table::Table;
-use super::values::Parametric;
-use super::values::Values;
+use super::values::{Parametric, Values};
 use crate::error::{Error, Result};
 
 const NAME: &str = "ocam";

@@ -7,8 +7,7 @@ use super::polynomial::evaluate;
 use super::profile::{Inverse, Profile};
 use super::rim::FOLD;
 use super::schema::{CX, CY, LensSchema, Parameter, ParameterSchema, Resize, scalars};
-use super::values::Parametric;
-use super::values::Values;
+use super::values::{Parametric, Values};
 use crate::error::Result;
 
 const NAME: &str = "radial_polynomial";

@@ -1,4 +1,4 @@
-//! What a lens declares of itself: its name, its parameters in order, how it is made of them, and their values.
+//! What a lens declares of itself: its name, its parameters in order, and what becomes of them when the image is resized.
 
 use crate::error::{Error, Result};
 

@@ -1,4 +1,5 @@
-//! Arrows point down: no module imports from its own floor or from one above, no files import each other in a circle, and the core prints, reads and clocks nothing.
+//! Arrows point down: no module imports from its own floor or from one above, no files import each other in a circle, and the
+//! core prints, reads and clocks nothing.
 
 #![allow(clippy::unwrap_used, clippy::panic)]
 
