@@ -99,11 +99,11 @@ import os, resource
 import numpy as np
 import tiltvp
 camera = tiltvp.Camera.equidistant(width=320, height=240, focal_px=70.0, cx=159.5, cy=119.5)
+image = np.random.default_rng(0).integers(0, 255, (240, 320), np.uint8)
 usual = tiltvp.TiltEstimator(camera)
 if os.getuid() == 0:  # Whom the limit does not bind.
     os.setuid(65534)
 resource.setrlimit(resource.RLIMIT_NPROC, (1, 1))
-image = np.random.default_rng(0).integers(0, 255, (240, 320), np.uint8)
 print(tiltvp.TiltEstimator(camera)(image) == usual(image))
 """
 
