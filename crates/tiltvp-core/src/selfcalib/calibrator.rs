@@ -172,3 +172,28 @@ fn check(motion: &WheelMotion, landmarks: &[u64], bearings_rad: &[f64], followed
     }
     Ok(())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_papers_filter_tells_the_last_innovation_that_there_was() {
+        let options = SelfCalibratorOptions { method: CalibrationMethod::Paper, ..SelfCalibratorOptions::default() };
+        let start = Mounting { x_m: 0.2, y_m: 0.0, yaw_rad: 0.0 };
+        let mut calibrator = SelfCalibrator::new(SelfCalibratorOptions { start, ..options }).unwrap();
+        let ahead = WheelMotion { left_m: 0.1, right_m: 0.1 };
+        let mut step = |bearings_rad: &[f64]| {
+            let landmarks: Vec<u64> = (0..bearings_rad.len() as u64).collect();
+            let step = calibrator.step(&ahead, &landmarks, bearings_rad).unwrap();
+            (step, calibrator.estimate().mean_nis)
+        };
+        assert_eq!(step(&[0.5, -0.8]).1, None);
+        let (second, nis) = step(&[0.52, -0.82]);
+        assert!(second.used == 2 && second.nis > 0.0);
+        assert_eq!(nis, Some(second.nis / 2.0));
+        // A step that sees nothing has none of its own.
+        let (third, nis) = step(&[]);
+        assert_eq!((third.used, nis), (0, Some(second.nis / 2.0)));
+    }
+}

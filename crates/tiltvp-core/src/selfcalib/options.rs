@@ -138,3 +138,25 @@ impl OptionValue for StartSigma {
         Vector3::from_value(value).map(squares).or_else(|| Matrix3::from_value(value)).map(Self)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::options::Options;
+
+    #[test]
+    fn each_method_has_its_own_options() {
+        let of = |method: CalibrationMethod| SelfCalibratorOptions { method, ..SelfCalibratorOptions::default() };
+        for (name, owner) in [
+            ("keyframes_max", CalibrationMethod::Default),
+            ("step_sigma_m", CalibrationMethod::Default),
+            ("start_distance_sigma_m", CalibrationMethod::Paper),
+            ("odometry_inflation", CalibrationMethod::Paper),
+        ] {
+            for method in [CalibrationMethod::Default, CalibrationMethod::Paper] {
+                assert_eq!(of(method).get(name).is_some(), method == owner, "{name} of {method:?}");
+            }
+        }
+        assert!(of(CalibrationMethod::Paper).get("odometry_k_m").is_some());
+    }
+}

@@ -69,7 +69,8 @@ def corners_real(folder: Path, /, *, overlay: Path | None = None) -> None:
         )
     for number in np.unique(box.objects):
         of = box.objects == number
-        medians = " x ".join(f"{np.nanmedian(values[of]):.1f}" for values in box.lengths_mm.values())
+        lengths = (values[of & np.isfinite(values)] for values in box.lengths_mm.values())
+        medians = " x ".join(f"{np.median(seen):.1f}" if seen.size else "none" for seen in lengths)
         table.add_row(f"corner {number}, {np.count_nonzero(of)} pairs: long x depth x height (mm)", medians)
     step_mm, turn_deg = real.steps(box)
     table.add_row(
