@@ -122,19 +122,18 @@ def test_rooms_are_counted_that_have_a_pose_in_nearly_all_frames() -> None:
 def test_in_rooms_axes_may_be_named_at_will_and_corners_lack_in_the_list() -> None:
     turn = np.array([[0.8, -0.6, 0.0], [0.6, 0.8, 0.0], [0.0, 0.0, 1.0]])
     listed = SceneCorner(np.array([0.2, 0.1, 2.0]), turn.T, np.ones(3), "solid")
+    front = SceneCorner(np.array([0.2, 0.1, 2.04]), turn.T, np.array([0.02, 0.3, 0.4]), "solid")
     sight = [0]
     sequence = SimpleNamespace(
-        corners=(listed,),
+        corners=(listed, front),
         times_s=np.zeros(1),
         poses_at=lambda _: np.eye(4)[None],
         truth=lambda _: SimpleNamespace(corners=sight),
     )
 
-    def seen(
-        rotation: np.ndarray, vertex: tuple[float, float, float], edges: np.ndarray = listed.edges
-    ) -> CornerHypothesis:
+    def seen(rotation: np.ndarray, vertex: tuple[float, float, float]) -> CornerHypothesis:
         return CornerHypothesis.from_dict({
-            "camera_from_object": rotation.tolist(), "edges": edges.tolist(), "vertex_m": list(vertex),
+            "camera_from_object": rotation.tolist(), "edges": listed.edges.tolist(), "vertex_m": list(vertex),
             "covariance": np.eye(6).tolist(), "probability": 1.0, "right_handed": True, "misfit": 0.0,
         })  # fmt: skip
 
@@ -144,9 +143,12 @@ def test_in_rooms_axes_may_be_named_at_will_and_corners_lack_in_the_list() -> No
     assert number == 0
     assert np.allclose(truth[:3, :3], over)
     assert np.allclose(truth[:3, 3], listed.position_m)
-    # The corner of something beside it has edges that run the other way, and one that is hidden is not seen.
-    beside = seen(over, (0.2, 0.1, 2.03), listed.edges * [[-1.0], [1.0], [1.0]])
-    assert truth_near(sequence, 0, beside, own)[0] == -1  # type: ignore[arg-type]
+    # What is 10 pixels beside it is something else; of two the nearer counts; one that is hidden is not seen.
+    assert truth_near(sequence, 0, seen(over, (0.23, 0.1, 2.0)), own)[0] == -1  # type: ignore[arg-type]
+    sight.append(1)
+    number, truth = truth_near(sequence, 0, seen(over, (0.2, 0.1, 2.03)), own)  # type: ignore[arg-type]
+    assert number == 1
+    assert np.allclose(truth[:3, 3], front.position_m)
     sight.clear()
     assert truth_near(sequence, 0, seen(over, (0.2, 0.1, 2.03)), own)[0] == -1  # type: ignore[arg-type]
     sight.append(0)

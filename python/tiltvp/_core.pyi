@@ -588,6 +588,7 @@ class CornerDetector:
         support_min_px: SupportsIndex = ...,
         residual_max_px: float = ...,
         gradient_min: float = ...,
+        gradient_start: float = ...,
         smoothing_px: float = ...,
         margin_px: float = ...,
         segment_min_px: float = ...,
@@ -655,7 +656,10 @@ class CornerDetector:
             method.
         gradient_min
             "general": Least gradient magnitude of an edge pixel, Scharr kernel (3, 10, 3) on 8-bit grey levels.
-            Default: 60.
+            Default: 30.
+        gradient_start
+            "general": Gradient magnitude of which an edge has a pixel at least; it is followed down to `gradient_min`.
+            Default: 50.
         smoothing_px
             "general": Standard deviation of the Gaussian before the kernel, in pixels. Default: 1.
         margin_px

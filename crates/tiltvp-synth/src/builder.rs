@@ -206,9 +206,9 @@ impl Builder {
             for corner in [origin, origin + a, origin + a + b, origin + b] {
                 self.edge(corner, c.z);
             }
-            if a.z.abs() < 1e-9 && b.z.abs() < 1e-9 {
-                self.corners.extend(corner::of_box(origin, edges));
-            }
+        }
+        if c.xy().norm() < 1e-9 && c.z > 0.0 && a.z.abs() < 1e-9 && b.z.abs() < 1e-9 {
+            self.corners.extend(corner::of_box(origin, edges));
         }
     }
 

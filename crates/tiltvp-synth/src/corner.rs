@@ -4,8 +4,11 @@ use nalgebra::{Matrix3, Vector3};
 
 use crate::plan::Plan;
 
-/// Least length of every edge of a corner that is kept, metres: shorter ones are a few pixels long from where hands hold cameras.
-const LEAST_EDGE_M: f64 = 0.15;
+/// Least length of every edge of a corner that is looked at, metres: shorter ones are a few pixels long from where hands hold cameras.
+const LARGE_EDGE_M: f64 = 0.15;
+
+/// Least length of every edge of a corner that is kept, metres: that of the fronts of drawers, which stand before the corners of their case.
+const LEAST_EDGE_M: f64 = 0.01;
 
 /// What a corner looks like from where it is seen.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -68,9 +71,13 @@ impl Corner {
         Matrix3::from_columns(&[x, y, x.cross(&y)])
     }
 
-    /// Whether its edges are long enough to be seen.
+    /// Whether its edges are long enough to be looked at.
     pub(crate) fn is_large(&self) -> bool {
-        self.lengths_m.iter().all(|length| *length >= LEAST_EDGE_M)
+        self.has_edges_from(LARGE_EDGE_M)
+    }
+
+    fn has_edges_from(&self, least_m: f64) -> bool {
+        self.lengths_m.iter().all(|length| *length >= least_m)
     }
 
     /// The unit direction, level, from the vertex to the middle of the places from which all its faces are seen.
@@ -96,7 +103,7 @@ pub(crate) fn of_box(origin: Vector3<f64>, edges: [Vector3<f64>; 3]) -> impl Ite
             let away = |edge: Vector3<f64>, far: bool| if far { -edge } else { edge };
             Corner::new(position, away(c, far[2]), [away(a, far[0]), away(b, far[1])], CornerKind::Solid)
         })
-        .filter(Corner::is_large)
+        .filter(|corner| corner.has_edges_from(LEAST_EDGE_M))
 }
 
 /// The corners of a room, at floor and ceiling.

@@ -106,7 +106,7 @@ impl Handheld {
     /// Whether the corner is one that such a motion can be around.
     pub(crate) fn suits(corner: &Corner) -> bool {
         // What stands on the floor shows no level face; from inside, a room's floor does.
-        corner.kind != CornerKind::Solid || corner.edges[1].z < 0.0
+        corner.is_large() && (corner.kind != CornerKind::Solid || corner.edges[1].z < 0.0)
     }
 }
 

@@ -100,10 +100,11 @@ impl World {
     fn lit(
         plan: Plan,
         mut builder: Builder,
-        corners: Vec<Corner>,
+        mut corners: Vec<Corner>,
         places: Vec<Footprint>,
         light_spacing_m: f64,
     ) -> Result<Self> {
+        corners.sort_by_key(|corner| !corner.is_large());
         let outdoors = plan.outdoors;
         let edges = std::mem::take(&mut builder.edges);
         let painted = std::mem::take(&mut builder.painted);
@@ -133,7 +134,7 @@ impl World {
     }
 
     /// Where an upright and two level edges of room and boxes meet, visible or not. In a laboratory the first is the coloured
-    /// cuboid's; in a room those of the room itself come first.
+    /// cuboid's; in a room those of the room itself come first. Those with an edge below 0.15 m, as of boards, come last.
     pub fn corners(&self) -> &[Corner] {
         &self.corners
     }

@@ -9,9 +9,9 @@ use super::feature::CornerFeature;
 use super::frame::Frame;
 use super::general::beginnings::{Beginnings, beginnings};
 use super::general::completion::CornerCompletion;
+use super::general::double_edges::double_edges_rad;
 use super::general::edge_ends::{ObservedCorner, ObservedEnd, seen_ends};
 use super::general::guided::{ExpectedCorner, find_near};
-use super::general::segments::{Segment, SegmentFinder};
 use super::general::{self, GeneralScratch};
 use super::options::{CornerMethod, DetectorOptions};
 use super::sized::{BoxView, SeenEnd, Unseen};
@@ -20,6 +20,7 @@ use crate::edges::Mask;
 use crate::error::{Error, Result};
 use crate::geometry::RigidMotion;
 use crate::image::{ColorView, ImageView, LightTable};
+use crate::segments::{Segment, SegmentDetector};
 
 /// Finds corners in single images of one camera.
 #[derive(Debug, Clone)]
@@ -28,7 +29,7 @@ pub struct CornerDetector {
     options: DetectorOptions,
     mask: Option<Mask>,
     light: LightTable,
-    finder: Option<SegmentFinder>,
+    segments: Option<SegmentDetector>,
 }
 
 /// Memory for one thread.
@@ -47,15 +48,17 @@ impl CornerDetector {
     pub fn new(camera: Camera, options: DetectorOptions, mask: Option<Mask>) -> Result<Self> {
         options.validate()?;
         let light = LightTable::new(options.display_gamma)?;
-        let finder = match &options.method {
+        let segments = match &options.method {
             CornerMethod::Coloured(_) | CornerMethod::Paper(_) if mask.is_some() => {
                 let got = format!("one for method \"{}\"", options.method.name());
                 return Err(Error::argument("mask", got, "a mask for method \"general\" alone"));
             }
             CornerMethod::Coloured(_) | CornerMethod::Paper(_) => None,
-            CornerMethod::General(general) => Some(SegmentFinder::new(&camera, general, mask.as_ref())?),
+            CornerMethod::General(general) => {
+                Some(SegmentDetector::new(camera.clone(), general.segments(mask.clone()))?)
+            }
         };
-        Ok(Self { camera, options, mask, light, finder })
+        Ok(Self { camera, options, mask, light, segments })
     }
 
     /// The camera.
@@ -77,7 +80,7 @@ impl CornerDetector {
     pub fn scratch(&self) -> CornerScratch {
         CornerScratch {
             coloured: ColouredScratch::default(),
-            general: self.finder.as_ref().map(|finder| GeneralScratch::new(finder.scratch())),
+            general: self.segments.as_ref().map(|detector| GeneralScratch::new(detector.scratch())),
         }
     }
 
@@ -137,8 +140,8 @@ impl CornerDetector {
         out: &mut Vec<CornerFeature>,
     ) -> Result<()> {
         self.check(image.width(), image.height())?;
-        let (CornerMethod::General(options), Some(finder), Some(memory)) =
-            (&self.options.method, &self.finder, &mut scratch.general)
+        let (CornerMethod::General(options), Some(detector), Some(memory)) =
+            (&self.options.method, &self.segments, &mut scratch.general)
         else {
             return Err(Error::argument("method", self.options.method.name(), "general, for grey images"));
         };
@@ -155,9 +158,8 @@ impl CornerDetector {
                 None => near(&Vector3::y()),
             }
         };
-        let search = general::Search { camera: &self.camera, finder, options, light: &self.light, vertical };
-        general::find(&search, image, closeness, memory, out);
-        Ok(())
+        let search = general::Search { camera: &self.camera, detector, options, light: &self.light, vertical };
+        general::find(&search, image, closeness, memory, out)
     }
 
     /// The corner near where it is expected; none if it is not there, and for coloured cuboids, which are found
@@ -201,6 +203,12 @@ impl CornerDetector {
             }
             _ => Beginnings::ALL,
         }
+    }
+
+    /// How far aside in the image that was looked at last with this scratch the edges of a corner may be meant, in radians; 0 for the
+    /// coloured front end.
+    pub(super) fn double_edges_rad(&self, corner: &CornerFeature, scratch: &CornerScratch) -> f64 {
+        double_edges_rad(corner, self.segments(scratch))
     }
 
     /// Where the edges of a corner end in the image that was looked at last with this scratch; none for the coloured front end.
@@ -257,6 +265,6 @@ impl CornerDetector {
 
     /// The line segments of the last grey image, the longest first; none for the coloured front end.
     pub fn segments<'a>(&self, scratch: &'a CornerScratch) -> &'a [Segment] {
-        scratch.general.as_ref().map_or(&[], |memory| &memory.segments.segments)
+        scratch.general.as_ref().map_or(&[], |memory| &memory.segments.list)
     }
 }

@@ -45,7 +45,6 @@ pub use self::feature::{CornerFeature, Edge};
 pub use self::frame::Frame;
 pub use self::fusion::{FusedPose, fuse_rays};
 pub use self::general::edge_ends::EdgeEnd;
-pub use self::general::segments::Segment;
 pub use self::options::{
     ColouredOptions, CornerMethod, DetectorOptions, EdgeLineOptions, GeneralOptions, OrientationChoice, PaperOptions,
 };

@@ -3,8 +3,13 @@
 use std::f64::consts::{FRAC_PI_2, PI};
 
 use super::segmentation::ColorOptions;
+use crate::edges::{EdgeOptions, Mask};
 use crate::error::Result;
+use crate::segments::{SegmentDetectorOptions, SegmentOptions};
 use crate::{methods, options, words};
+
+/// How long the pieces are of which segments are joined, at least, in lengths of the shortest segment.
+const PIECE_SHARE: f64 = 0.6;
 
 words! {
     /// Which way the cuboid's top may be in the image.
@@ -82,7 +87,9 @@ options! {
     #[derive(Copy)]
     pub struct GeneralOptions {
         /// Least gradient magnitude of an edge pixel, Scharr kernel (3, 10, 3) on 8-bit grey levels.
-        gradient_min: f64 = 60.0 => 1.0..=1e4, "a gradient magnitude from 1 to 10000";
+        gradient_min: f64 = 30.0 => 1.0..=1e4, "a gradient magnitude from 1 to 10000";
+        /// Gradient magnitude of which an edge has a pixel at least; it is followed down to `gradient_min`.
+        gradient_start: f64 = 50.0 => 0.0..=1e4, "a gradient magnitude from 0 to 10000";
         /// Standard deviation of the Gaussian before the kernel, in pixels.
         smoothing_px: f64 = 1.0 => 0.0..=10.0, "a standard deviation from 0 to 10 pixels";
         /// Pixels kept clear of the image's border and the mask.
@@ -146,6 +153,26 @@ options! {
         display_gamma: f64 = 2.2 => 0.5..=4.0, "an exponent from 0.5 to 4";
         /// The front end.
         [flat] method: CornerMethod = CornerMethod::Coloured(ColouredOptions::default());
+    }
+}
+
+impl GeneralOptions {
+    /// The straight edges of which corners are made.
+    pub(crate) fn segments(&self, mask: Option<Mask>) -> SegmentDetectorOptions {
+        let everywhere = SegmentDetectorOptions::default();
+        let edges = EdgeOptions {
+            gradient_min: self.gradient_min,
+            smoothing_px: self.smoothing_px,
+            margin_px: self.margin_px.max(everywhere.edges.margin_px),
+            ..everywhere.edges
+        };
+        let segments = SegmentOptions {
+            gradient_start: self.gradient_start,
+            stray_max_px: self.segment_threshold_px,
+            support_min_px: (PIECE_SHARE * self.segment_min_px).max(4.0) as u32,
+            ..everywhere.segments
+        };
+        SegmentDetectorOptions { edges, mask, segments }
     }
 }
 

@@ -14,7 +14,11 @@ const PLACE_SIGMA_MIN_PX: f64 = 0.05;
 
 /// Longest gap in a ray whose steps are alike, pixels: what comes after a longer one is another object. Between 6 and
 /// 24 the poses of the rendered cuboid are the same.
-const GAP_MAX_PX: usize = 12;
+const GAP_MAX_PX: f64 = 12.0;
+
+/// Profiles with which a long ray is known well enough: beyond them they are farther apart, as far at most as profiles err
+/// together.
+const PROFILES_ENOUGH: f64 = 128.0;
 
 /// The first pixels of a ray. They separate it from an edge that begins elsewhere and happens to point at the vertex.
 /// Halved, the attitude of a real box turns more from frame to frame (0.238 instead of 0.206 degrees).
@@ -129,32 +133,34 @@ pub(super) struct TraceScratch {
 }
 
 /// Follows a ray from its vertex: at each pixel along it the `signal` fills in a profile across it, the edge is found between
-/// samples, and a great circle is fitted robustly. None if less than `support_min` or a smaller share than that of the search agree. The signal is given the middle of the
+/// samples, and a great circle is fitted robustly. None if less than `support_min_px` or a smaller share than that of the search agree. The signal is given the middle of the
 /// profile, the step from sample to sample, and the samples, and says whether all of them are in the image.
 pub(super) fn trace(
     camera: &Camera,
     search: &RaySearch,
-    support_min: usize,
+    support_min_px: f64,
     signal: impl Fn(&Vector2<f64>, &Vector2<f64>, &mut [f64]) -> bool,
     scratch: &mut TraceScratch,
 ) -> Option<TracedRay> {
-    trace_every(1.0, camera, search, support_min, signal, scratch)
+    trace_every(1.0, camera, search, support_min_px, signal, scratch)
 }
 
-/// The same with places `stride_px` pixels apart along the ray.
+/// The same with places at least `stride_px` pixels apart along the ray.
 pub(super) fn trace_every(
     stride_px: f64,
     camera: &Camera,
     search: &RaySearch,
-    support_min: usize,
+    support_min_px: f64,
     signal: impl Fn(&Vector2<f64>, &Vector2<f64>, &mut [f64]) -> bool,
     scratch: &mut TraceScratch,
 ) -> Option<TracedRay> {
     let TraceScratch { rows, places, steps, weights, ransac: memory } = scratch;
     let along = search.along()?;
+    let length_px = (search.to_rad - search.from_rad) * search.profile(camera, search.from_rad)?.pace;
+    let stride_px = (length_px / PROFILES_ENOUGH).min(search.erring_together).max(stride_px);
     let looked_at = edge_points(stride_px, camera, (search, &along), signal, places);
     if search.step_share_min > 0.0 && !places.is_empty() {
-        keep_alike(places, search.step_share_min, support_min, steps);
+        keep_alike(places, search.step_share_min, support_min_px, stride_px, steps);
     }
     rows.clear();
     for place in places.iter() {
@@ -162,7 +168,9 @@ pub(super) fn trace_every(
         rows.push(place.along[0], place.along[1], place.shift_rad);
     }
     let share = |agree: usize, of: usize| agree as f64 / of.max(1) as f64;
-    let is_enough = |agree: usize| agree >= support_min.max(2) && share(agree, looked_at) >= search.share_min;
+    let is_enough = |agree: usize| {
+        agree >= 2 && agree as f64 * stride_px >= support_min_px && share(agree, looked_at) >= search.share_min
+    };
     // No more places agree than there are.
     if !is_enough(places.len()) {
         return None;
@@ -190,7 +198,7 @@ pub(super) fn trace_every(
     let chart = [search.vertex, along, search.normal];
     let normal = (chart[0] * model.x + chart[1] * model.y + chart[2] * model.z).try_normalize(1e-9)?;
     let agreeing_places = agreeing().map(|(place, weight)| (place.along, f64::from(*weight)));
-    let in_chart = plane_covariance(search, agreeing_places, [first, last], rms, rad_per_px)?;
+    let in_chart = plane_covariance(search, stride_px, agreeing_places, [first, last], rms, rad_per_px)?;
     // The chart's plane is tangent at the expected normal, which is close to the fitted one.
     let basis = tangent_basis(&normal);
     let turn = basis.transpose() * nalgebra::Matrix3x2::from_columns(&[chart[0], chart[1]]);
@@ -199,7 +207,7 @@ pub(super) fn trace_every(
         normal,
         covariance: turn * in_chart * turn.transpose(),
         toward: (toward - normal * normal.dot(&toward)).try_normalize(1e-9)?,
-        support,
+        support: (support as f64 * stride_px).round() as usize,
         residual_rms_rad: rms,
     };
     let first_profiles = ((FIRST_PX / stride_px) as usize).min(looked_at);
@@ -245,6 +253,7 @@ fn edge_points(
 /// places that agree, those of the first and the last one, and the root mean square of their distances.
 fn plane_covariance(
     search: &RaySearch,
+    stride_px: f64,
     agreeing: impl Iterator<Item = ([f64; 2], f64)>,
     ends: [[f64; 2]; 2],
     rms: f64,
@@ -256,7 +265,7 @@ fn plane_covariance(
         let at = Vector2::from(along);
         information += at * at.transpose() * weight;
     }
-    information /= sigma * sigma * search.erring_together;
+    information /= sigma * sigma * (search.erring_together / stride_px).max(1.0);
     let ends = ends.map(Vector2::from);
     let from_ends = Matrix2::from_rows(&[ends[0].transpose(), ends[1].transpose()]).try_inverse()?;
     let whole = from_ends * from_ends.transpose() * (search.ray_sigma_px * rad_per_px).powi(2);
@@ -264,14 +273,61 @@ fn plane_covariance(
 }
 
 /// Keeps the places whose steps are at least a share of the median of the first ones, up to the first gap.
-fn keep_alike(places: &mut Vec<EdgePoint>, step_share_min: f64, first: usize, steps: &mut Vec<f64>) {
+fn keep_alike(places: &mut Vec<EdgePoint>, step_share_min: f64, first_px: f64, stride_px: f64, steps: &mut Vec<f64>) {
     steps.clear();
-    steps.extend(places.iter().take(first.max(1)).map(|place| place.step));
+    steps.extend(places.iter().take(((first_px / stride_px) as usize).max(1)).map(|place| place.step));
     let middle = steps.len() / 2;
     let (_, median, _) = steps.select_nth_unstable_by(middle, f64::total_cmp);
     let median = *median;
     places.retain(|place| place.step * median >= step_share_min * median * median);
-    if let Some(gap) = places.windows(2).position(|pair| pair[1].profile - pair[0].profile > GAP_MAX_PX) {
+    if let Some(gap) =
+        places.windows(2).position(|pair| (pair[1].profile - pair[0].profile) as f64 * stride_px > GAP_MAX_PX)
+    {
         places.truncate(gap + 1);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_covariance_of_a_ray_is_that_of_its_places() {
+        let search = RaySearch {
+            normal: Vector3::z(),
+            vertex: Vector3::x(),
+            from_rad: 0.0,
+            to_rad: 0.2,
+            search_px: 2.5,
+            step_min: 1.0,
+            step_share_min: 0.0,
+            threshold_px: 0.7,
+            share_min: 0.0,
+            erring_together: 4.0,
+            ray_sigma_px: 0.0,
+        };
+        let rad_per_px = 1e-3;
+        let at = |angle: f64| [angle.cos(), angle.sin()];
+        let places = || (0..100).map(|k| (at(0.002 * f64::from(k)), 1.0));
+        let covariance = |search: &RaySearch, stride_px: f64, rms: f64| {
+            plane_covariance(search, stride_px, places(), [at(0.0), at(0.198)], rms, rad_per_px).unwrap()
+        };
+        // The regression of 100 places of which 4 err together, each with the scatter and the least standard deviation.
+        let moments: Matrix2<f64> = places().map(|(at, _)| Vector2::from(at) * Vector2::from(at).transpose()).sum();
+        let by_places = moments.try_inverse().unwrap() * 4.0;
+        let variance = |rms: f64| rms * rms + (PLACE_SIGMA_MIN_PX * rad_per_px).powi(2);
+        for rms in [0.0, 2e-4] {
+            let off = covariance(&search, 1.0, rms) / variance(rms) - by_places;
+            assert!(off.norm() < 1e-9 * by_places.norm(), "{off}");
+        }
+        // Places farther apart than profiles err together are independent of each other.
+        let apart = covariance(&search, 8.0, 2e-4) * 4.0 / variance(2e-4) - by_places;
+        assert!(apart.norm() < 1e-9 * by_places.norm());
+        // Either end of the whole ray may be off.
+        let whole = RaySearch { ray_sigma_px: 0.2, ..search };
+        let more = covariance(&whole, 1.0, 0.0) - covariance(&search, 1.0, 0.0);
+        for end in [at(0.0), at(0.198)].map(Vector2::from) {
+            assert!((end.dot(&(more * end)) - (0.2 * rad_per_px).powi(2)).abs() < 1e-15);
+        }
     }
 }

@@ -49,6 +49,11 @@ impl Segment {
         self.normal.cross(&self.middle)
     }
 
+    /// Length in pixels, at the image's scale across the edge.
+    pub fn length_px(&self) -> f64 {
+        self.length_rad * self.px_per_rad
+    }
+
     /// How many pixels support it.
     pub fn support(&self) -> usize {
         self.points.len()

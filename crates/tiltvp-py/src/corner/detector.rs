@@ -100,11 +100,11 @@ impl CornerDetector {
         let (mut found, mut rows) = (Vec::new(), Vec::new());
         self.with_scratch(py, |scratch| {
             inner.detect_general(&view, None, scratch, &mut found)?;
-            rows = inner
-                .segments(scratch)
-                .iter()
-                .map(|s| [s.ends_px[0].x, s.ends_px[0].y, s.ends_px[1].x, s.ends_px[1].y])
-                .collect();
+            let pixels = inner.segments(scratch).iter().filter_map(|segment| {
+                let [a, b] = segment.ends.map(|end| inner.camera().project(&end));
+                a.zip(b).map(|(a, b)| [a.x, a.y, b.x, b.y])
+            });
+            rows = pixels.collect();
             Ok(())
         })?;
         convert::to_rows(py, &rows, false)

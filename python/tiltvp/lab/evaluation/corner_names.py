@@ -41,9 +41,12 @@ _OTHER: Final = 0.04
 """A sighting is of another corner if it is farther from where its name is, as a share of its distance: twice what the
 estimator allows."""
 
+_SAME_EDGE: Final = 0.7
+"""Cosine of 45 degrees. A corner with an edge to another side is another one, as where a floor board ends there."""
+
 _SCHEMA: Final[dict[str, Any]] = {
     "frame": pl.UInt32, "part": pl.String, "id": pl.Int64, "x_m": pl.Float64, "y_m": pl.Float64, "z_m": pl.Float64,
-    "distance_m": pl.Float64, "u": pl.Float64, "v": pl.Float64,
+    "distance_m": pl.Float64, "u": pl.Float64, "v": pl.Float64, "edges": pl.Array(pl.Float64, (3, 3)),
 }  # fmt: skip
 
 
@@ -87,7 +90,7 @@ def names_seen(
 
 
 def name_sightings(sequence: StereoSequence, estimates: Sequence[CornerEstimate], hidden: range) -> pl.DataFrame:
-    """A row for each believed corner of each frame: its name, and its place in the world by the true motion.
+    """A row for each believed corner of each frame: its name, its place in the world by the true motion, and its edges.
 
     `part` says whether the frame is before the `hidden` ones, of them, or after.
     """
@@ -101,27 +104,31 @@ def name_sightings(sequence: StereoSequence, estimates: Sequence[CornerEstimate]
                 place = world_from_left[:3, :3] @ vertex + world_from_left[:3, 3]
                 u, v = sequence.cameras[0].project(vertex).tolist()
                 part = "before" if frame < hidden[0] else "hidden" if frame in hidden else "after"
-                rows.append((frame, part, corner.id, *place.tolist(), float(np.linalg.norm(vertex)), u, v))
+                edges = (corner.pose.edges @ world_from_left[:3, :3].T).tolist()
+                rows.append((frame, part, corner.id, *place.tolist(), float(np.linalg.norm(vertex)), u, v, edges))
     return pl.DataFrame(rows, schema=_SCHEMA, orient="row")
 
 
 def summarise_names(sightings: pl.DataFrame) -> dict[str, Any]:
     """How many sightings there are, how many of them have a name, how many names, which of these are of two corners
     (`shared`), how far sightings are from their name's place, and how many of the names from before what was hidden
-    are back after it (`kept`) of those at whose places something is seen again (`back`).
+    are back after it (`kept`) of those at whose places a corner with edges to the same sides is seen again (`back`).
     """
     named = sightings.drop_nulls("id")
     shares, kept, back, shared = [0.0], 0, 0, 0
     places: dict[int, NDArray[np.float64]] = {}
+    edges: dict[int, NDArray[np.float64]] = {}
     for (name,), part in named.partition_by("id", as_dict=True, maintain_order=True).items():
         at = part.select("x_m", "y_m", "z_m").to_numpy()
         places[int(name)] = np.median(at, axis=0)
+        edges[int(name)] = part["edges"][-1].to_numpy()
         off = np.linalg.norm(at - places[int(name)], axis=1) / part["distance_m"].to_numpy()
         shares.append(float(off.max()))
         shared += bool(off.max() > _OTHER)
     before, after = _sure(named, "before"), _sure(named, "after")
     for name in before:
-        near = [other for other in after if np.linalg.norm(places[other] - places[name]) < _OTHER * after[other]]
+        same_edges = [other for other in after if ((edges[other] @ edges[name].T).max(axis=1) > _SAME_EDGE).all()]
+        near = [other for other in same_edges if np.linalg.norm(places[other] - places[name]) < _OTHER * after[other]]
         back += bool(near)
         kept += name in near
     return {

@@ -17,10 +17,10 @@ if TYPE_CHECKING:
 __all__ = ["own_places", "surface_off", "truth_near"]
 
 _SAME_M: Final = 0.08
-"""An estimate is of the listed corner that is this near."""
+"""An estimate is of the listed corner that is this near"""
 
-_SAME_WAY_DEG: Final = 20.0
-"""An estimate is of a listed corner whose edges run the same ways, each within as much as another interpretation."""
+_SAME_PX: Final = 8.0
+"""and as near to it in the image: closer vertices are one to the detector. How far away it is remains to be judged."""
 
 _PIXEL_RAD: Final = 1.5e-3
 """A pixel of the cameras of `zed_cameras` at 1280 x 720."""
@@ -68,24 +68,15 @@ def surface_off(sequence: StereoSequence, frame: int, pose: CornerHypothesis) ->
     return float(np.nanmin(np.abs(surfaces - distance))) / sigma
 
 
-def _run_alike(edges: NDArray[np.float64], others: NDArray[np.float64]) -> bool:
-    """Whether each of three directions is near another one of the others."""
-    cosines = np.asarray(edges) @ others.T
-    return sorted(np.argmax(cosines, axis=1)) == [0, 1, 2] and float(cosines.max(axis=1).min()) >= np.cos(
-        np.radians(_SAME_WAY_DEG)
-    )
-
-
 def truth_near(
     sequence: StereoSequence, frame: int, pose: CornerHypothesis, own_place_m: NDArray[np.float64]
 ) -> tuple[int, NDArray[np.float64]]:
     """The listed corner that an estimate is of, or -1, and its pose (4, 4) in the left camera.
 
-    An estimate can be of corners that both cameras see, near it, with edges that run the same ways: beside a cabinet's
-    corner may be that of a table's frame, and before that of the room that of its skirting board, which the list lacks.
-    Where there is none the place is `own_place_m`, in the world, which tells how steady estimates are and not whether
-    they are right; the attitude is that of the room's walls or of a corner beside it. Axes are named as the estimate
-    has them.
+    It is of the nearest that both cameras see, near it in space and in the image, by whichever edges: boards that end
+    in one place have several. Where there is none the place is `own_place_m`, in the world, which tells how steady
+    estimates are and not whether they are right; the attitude is that of the room's walls or of a corner beside it.
+    Axes are named as the estimate has them.
     """
     assert pose.vertex_m is not None
     from_world = np.linalg.inv(sequence.poses_at([sequence.times_s[frame]])[0])
@@ -94,8 +85,10 @@ def truth_near(
     away = np.linalg.norm(vertices - pose.vertex_m, axis=1)
     number = int(np.argmin(away))
     truth = np.eye(4)
-    edges = pose.edges @ from_world[:3, :3]
-    same = [k for k in sequence.truth(frame).corners if away[k] <= _SAME_M and _run_alike(corners[k].edges, edges)]
+    towards = pose.vertex_m / np.linalg.norm(pose.vertex_m)
+    aside = np.linalg.norm(np.cross(vertices, towards), axis=1) / np.linalg.norm(vertices, axis=1)
+    near = (away <= _SAME_M) & (aside <= _SAME_PX * _PIXEL_RAD)
+    same = [k for k in sequence.truth(frame).corners if near[k]]
     if same:
         number = min(same, key=lambda k: float(away[k]))
         # Of corners in one place, as of stacked boxes, the one nearest to the estimate.

@@ -102,7 +102,7 @@ pub(crate) fn find(
             let search = search.as_ref()?;
             let trusts = trusts(camera, search, image, light, (a, b));
             let signal = difference(image, light, (a, b), trusts);
-            *traced = trace(camera, search, options.support_min_px as usize, signal, &mut scratch.trace);
+            *traced = trace(camera, search, f64::from(options.support_min_px), signal, &mut scratch.trace);
         }
         let [Some(x), Some(y), Some(z)] = traced else { return None };
         let traced = [x, y, z];

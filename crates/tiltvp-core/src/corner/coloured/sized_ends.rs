@@ -5,7 +5,7 @@ use nalgebra::{Vector2, Vector3};
 use super::segmentation::Primary;
 use super::{ColouredScratch, ERRING_TOGETHER, difference, profile};
 use crate::corner::options::ColouredOptions;
-use crate::corner::sized::{BoxLine, BoxView, PLACES_MIN, SeenEnd, Unseen};
+use crate::corner::sized::{BoxLine, BoxView, SUPPORT_MIN_PX, SeenEnd, Unseen};
 use crate::corner::trace::{RaySearch, trace};
 use crate::image::{ColorView, LightTable};
 
@@ -59,10 +59,10 @@ pub(in crate::corner) fn find_end(
     view.end(axis, &candidates, &mut |line, search| match line {
         BoxLine::Edge(own) => {
             let faces = (face(own, (own + 1) % 3), face(own, (own + 2) % 3));
-            trace(view.camera, search, PLACES_MIN, difference(image, light, faces, [1.0; 2]), memory)
+            trace(view.camera, search, SUPPORT_MIN_PX, difference(image, light, faces, [1.0; 2]), memory)
         }
         BoxLine::Far { end_of, along } => {
-            trace(view.camera, search, PLACES_MIN, outline(image, light, face(end_of, along)), memory)
+            trace(view.camera, search, SUPPORT_MIN_PX, outline(image, light, face(end_of, along)), memory)
         }
     })
 }

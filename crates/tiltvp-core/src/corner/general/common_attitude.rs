@@ -2,8 +2,8 @@
 
 use nalgebra::{Matrix3, Rotation3, Vector3};
 
-use super::segments::Segment;
 use crate::corner::closed_form::prior::rotation_vector;
+use crate::segments::Segment;
 
 /// Standard deviation of either end of a segment, in pixels. Doubled, the vertical of an office is 0.129 instead of
 /// 0.107 degrees off; halved, heights of a real box scatter more (0.280 instead of 0.244 degrees from frame to frame).
@@ -49,11 +49,26 @@ pub(crate) struct StraightEdge {
 impl StraightEdge {
     /// The lines of the segments of one image that are long enough.
     pub(crate) fn of<'a>(segments: &'a [Segment], left_from_own: &'a Matrix3<f64>) -> impl Iterator<Item = Self> + 'a {
-        segments.iter().filter(|segment| segment.length_px >= LENGTH_MIN_PX).map(move |segment| Self {
+        segments.iter().filter(|segment| segment.length_px() >= LENGTH_MIN_PX).map(move |segment| Self {
             normal: left_from_own * segment.normal,
-            sigma_rad: (END_SIGMA_PX * std::f64::consts::SQRT_2 / segment.length_px).hypot(PARALLEL_SIGMA_RAD),
+            sigma_rad: (END_SIGMA_PX * std::f64::consts::SQRT_2 / segment.length_px()).hypot(PARALLEL_SIGMA_RAD),
         })
     }
+}
+
+/// How many of the lines that do not pass within an angle of a vertex may be images of edges along the axes of an attitude, and how many
+/// there are. Of random ones it is 0.105.
+pub(crate) fn along_axes(
+    lines: &[StraightEdge],
+    attitude: &Matrix3<f64>,
+    vertex: &Vector3<f64>,
+    within_rad: f64,
+) -> (usize, usize) {
+    let others = lines.iter().filter(|line| line.normal.dot(vertex).abs() > within_rad);
+    others.fold((0, 0), |(along, all), line| {
+        let runs_along = attitude.tr_mul(&line.normal).abs().min() <= REACH_SINE;
+        (along + usize::from(runs_along), all + 1)
+    })
 }
 
 /// An attitude with covariance of its rotation vector, left camera's frame.
@@ -174,6 +189,26 @@ mod tests {
         let loose = common_attitude(&lines(&attitude, 12, &[0.008, -0.008]), &attitude).unwrap();
         assert!(loose.scatter > 3.0 && loose.covariance.trace() > 4.0 * steady.covariance.trace());
         assert!(loose.support < steady.support);
+    }
+
+    #[test]
+    fn a_tenth_of_random_edges_runs_along_axes() {
+        let attitude = *Rotation3::from_euler_angles(0.5, -0.3, 0.2).matrix();
+        let vertex = attitude * Vector3::new(0.3, 0.4, 0.866).normalize();
+        let own = lines(&attitude, 12, &[0.0]);
+        assert_eq!(along_axes(&own, &attitude, &vertex, 1e-6), (36, 36));
+        // Points evenly over a sphere.
+        let random: Vec<StraightEdge> = (0..2000)
+            .map(|k| {
+                let (height, turn) = ((f64::from(k) + 0.5) / 1000.0 - 1.0, 2.399_963 * f64::from(k));
+                let radius = (1.0 - height * height).sqrt();
+                let normal = Vector3::new(radius * turn.cos(), radius * turn.sin(), height);
+                StraightEdge { normal, sigma_rad: 0.002 }
+            })
+            .collect();
+        let (along, all) = along_axes(&random, &attitude, &vertex, 0.01);
+        assert!((1970..1990).contains(&all), "{all}");
+        assert!((0.095..0.115).contains(&(along as f64 / all as f64)), "{along}");
     }
 
     #[test]

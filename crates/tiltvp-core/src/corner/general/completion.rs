@@ -3,13 +3,13 @@
 use nalgebra::{Matrix3, Vector3};
 
 use super::junctions::{RayEnd, meeting};
-use super::segments::Segment;
 use crate::camera::Camera;
 use crate::corner::feature::CornerFeature;
 use crate::corner::general::{AXIS_SINE, CLEAR_OF_END_PX, CLEAR_OF_VERTEX_PX, GeneralScratch, gray_search};
 use crate::corner::options::GeneralOptions;
 use crate::corner::trace::{RaySearch, TraceScratch, TracedRay, trace_every};
 use crate::image::{ImageView, LightTable};
+use crate::segments::Segment;
 
 /// Most crossings that are followed up, those of the longest segments, which bounds the time.
 const CROSSINGS_MAX: usize = 60;
@@ -60,9 +60,9 @@ impl CornerCompletion<'_> {
     /// is followed from where these cross.
     pub(crate) fn run(&self, scratch: &mut GeneralScratch, out: &mut Vec<CornerFeature>) {
         let GeneralScratch { segments, trace: memory, .. } = scratch;
-        for crossing in &self.crossings(&segments.segments) {
+        for crossing in &self.crossings(&segments.list) {
             let Some(place) = self.camera.project_jacobian(&crossing.place) else { continue };
-            self.complete(crossing, place.1.norm() / 2f64.sqrt(), &segments.segments, memory, out);
+            self.complete(crossing, place.1.norm() / 2f64.sqrt(), &segments.list, memory, out);
         }
     }
 
@@ -83,7 +83,7 @@ impl CornerCompletion<'_> {
                 if a == b {
                     continue;
                 }
-                let shorter_px = segments[*first].length_px.min(segments[*second].length_px);
+                let shorter_px = segments[*first].length_px().min(segments[*second].length_px());
                 for (end, other) in [(0, 0), (0, 1), (1, 0), (1, 1)] {
                     let ends = [RayEnd { segment: *first, end }, RayEnd { segment: *second, end: other }];
                     if let Some(found) = meeting(segments, ends[0], ends[1], self.options) {
@@ -113,10 +113,10 @@ impl CornerCompletion<'_> {
         };
         let mut follow = |search: &RaySearch, stride_px: f64, share_min: f64| -> Option<TracedRay> {
             let signal = |at: &_, step: &_, out: &mut [f64]| self.light.gray_profile(self.image, at, step, out);
-            let profiles = (search.to_rad - search.from_rad) * px_per_rad;
-            let support_min = f64::from(options.support_min_px).min(SHORT_SHARE * profiles);
-            let (search, support_min) = (RaySearch { share_min, ..*search }, (support_min / stride_px) as usize);
-            trace_every(stride_px, self.camera, &search, support_min, signal, memory)
+            let length_px = (search.to_rad - search.from_rad) * px_per_rad;
+            let support_min_px = f64::from(options.support_min_px).min(SHORT_SHARE * length_px);
+            let search = RaySearch { share_min, ..*search };
+            trace_every(stride_px, self.camera, &search, support_min_px, signal, memory)
                 .filter(|found| stride_px > 1.0 || found.begins_at_vertex())
         };
         let share_min = options.support_min_share;

@@ -2,7 +2,6 @@
 
 use nalgebra::{Matrix2, Matrix3, Vector3};
 
-use super::segments::Segment;
 use crate::camera::Camera;
 use crate::corner::feature::CornerFeature;
 use crate::corner::general::{AXIS_SINE, CLEAR_OF_VERTEX_PX, GeneralScratch, gray_search};
@@ -11,6 +10,7 @@ use crate::corner::trace::{RaySearch, trace};
 use crate::corner::triangulation::{BearingObservation, triangulate};
 use crate::geometry::{RigidMotion, meeting};
 use crate::image::{ImageView, LightTable};
+use crate::segments::Segment;
 
 /// The far end of an edge.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -81,8 +81,8 @@ const LAST_PX: f64 = 20.0;
 /// Least share of the last pixels that show the edge. An edge that has ended shows background instead.
 const LAST_SHARE: f64 = 0.8;
 
-/// Least number of places of an edge: half of the last pixels.
-const PLACES_MIN: usize = 10;
+/// Least length of an edge that agrees with it, in pixels: half of the last pixels.
+const SUPPORT_MIN_PX: f64 = 10.0;
 
 /// How far apart the lengths from the two images may be, as a share of them: larger ones are ends of different edges.
 const LENGTHS_APART: f64 = 0.06;
@@ -109,7 +109,7 @@ fn meetings<'a>(
         let angle = crossing.dot(&along).atan2(crossing.dot(&vertex));
         let own_px = segment.px_per_rad;
         let aside = segment.ends.map(|end| end.angle(&crossing) * own_px);
-        let inside = aside[0].max(aside[1]) < segment.length_px;
+        let inside = aside[0].max(aside[1]) < segment.length_px();
         let off_px = aside[0].min(aside[1]);
         let widest = if inside { seen.options.overshoot_max_px } else { GAP_PX };
         if angle * px_per_rad >= EDGE_MIN_PX && off_px <= widest {
@@ -128,7 +128,7 @@ pub(crate) fn seen_ends(seen: &ObservedCorner<'_>, scratch: &mut GeneralScratch)
     let px_per_rad = jacobian.norm() / 2f64.sqrt();
     let GeneralScratch { segments, trace: memory, .. } = scratch;
     for (axis, out) in out.iter_mut().enumerate() {
-        let found = meetings(seen, &segments.segments, axis, px_per_rad);
+        let found = meetings(seen, &segments.list, axis, px_per_rad);
         let normal = seen.corner.rays()[axis].normal;
         let mut follow = |from_rad: f64, to_rad: f64, share_min: f64| {
             let along = gray_search(seen.options, normal, seen.corner.vertex(), [from_rad, to_rad]);
@@ -136,7 +136,7 @@ pub(crate) fn seen_ends(seen: &ObservedCorner<'_>, scratch: &mut GeneralScratch)
             trace(
                 seen.camera,
                 &search,
-                PLACES_MIN,
+                SUPPORT_MIN_PX,
                 |at, step, out| seen.light.gray_profile(seen.image, at, step, out),
                 memory,
             )
@@ -151,7 +151,7 @@ pub(crate) fn seen_ends(seen: &ObservedCorner<'_>, scratch: &mut GeneralScratch)
             let Some(whole) = follow(clear_rad, angle - clear_rad, seen.options.guided_min_share) else { continue };
             // Of lines that meet the edge next to each other the longest.
             let together = found[place..].iter().take_while(|(other, _)| (angle - other) * px_per_rad < SAME_END_PX);
-            let Some((_, line)) = together.max_by(|a, b| a.1.length_px.total_cmp(&b.1.length_px)) else { continue };
+            let Some((_, line)) = together.max_by(|a, b| a.1.length_px().total_cmp(&b.1.length_px())) else { continue };
             let Some(bearing) = meeting(&whole.ray.normal, &line.normal, &seen.corner.vertex()) else { continue };
             if let Some(length_m) = along(&seen.vertex_m, &seen.edges[axis], &bearing) {
                 *out = Some(ObservedEnd { bearing, sigma_rad: seen.options.ray_sigma_px / px_per_rad, length_m });

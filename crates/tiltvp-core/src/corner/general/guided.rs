@@ -4,12 +4,12 @@ use nalgebra::Vector3;
 
 use crate::camera::Camera;
 use crate::corner::feature::CornerFeature;
-use crate::corner::general::segments::Segment;
 use crate::corner::general::{CLEAR_OF_VERTEX_PX, gray_search};
 use crate::corner::options::GeneralOptions;
 use crate::corner::trace::{RaySearch, TraceScratch, trace_every};
 use crate::geometry::RigidMotion;
 use crate::image::{ImageView, LightTable};
+use crate::segments::Segment;
 
 /// How far beyond its end a ray is looked for, in pixels: what follows a ray must not shorten it from frame to frame,
 /// and each fit loses up to a pixel.
@@ -77,20 +77,27 @@ impl<'a> EdgeSegments<'a> {
         Self { along: edges.each_ref().map(along) }
     }
 
-    /// Whether enough of a corner's rays have segments in them, at most `reach_px` from where they are expected.
-    pub(crate) fn speak_for(&self, expected: &ExpectedCorner, reach_px: f64) -> bool {
+    /// How well segments agree with where a corner is expected: 1 for each ray that one lies in, 0 for one that is `reach_px` off,
+    /// summed; none where too few rays have segments.
+    pub(crate) fn speak_for(&self, expected: &ExpectedCorner, reach_px: f64) -> Option<f64> {
         let ExpectedCorner { vertex, far } = expected;
-        let is_seen = |(segments, far): &(&Vec<&Segment>, &Vector3<f64>)| {
-            let Some(normal) = vertex.cross(far).try_normalize(1e-6) else { return false };
+        let nearness = |axis: usize| {
+            let (segments, far) = (&self.along[axis], &far[axis]);
+            let normal = vertex.cross(far).try_normalize(1e-6)?;
             // Segments end beyond the vertex, and begin before the far end.
             let (onwards, back) = (normal.cross(vertex), far.cross(&normal));
-            segments.iter().any(|segment| {
-                segment.ends.iter().all(|end| normal.dot(end).abs() * segment.px_per_rad <= reach_px)
+            let near = segments.iter().filter_map(|segment| {
+                let off_px = segment.ends.map(|end| normal.dot(&end).abs() * segment.px_per_rad);
+                let farthest_px = off_px[0].max(off_px[1]);
+                (farthest_px <= reach_px
                     && segment.ends.iter().any(|end| onwards.dot(end) > 0.0)
-                    && segment.ends.iter().any(|end| back.dot(end) > 0.0)
-            })
+                    && segment.ends.iter().any(|end| back.dot(end) > 0.0))
+                .then(|| 1.0 - farthest_px / reach_px)
+            });
+            near.max_by(f64::total_cmp)
         };
-        self.along.iter().zip(far).filter(is_seen).count() >= SPEAKING_MIN
+        let near = [0, 1, 2].map(nearness);
+        (near.iter().flatten().count() >= SPEAKING_MIN).then(|| near.iter().flatten().sum())
     }
 }
 
@@ -128,8 +135,8 @@ pub(crate) fn find_near(
             let angles = [CLEAR_OF_VERTEX_PX / px_per_rad, lengths[axis] + BEYOND_END_PX / px_per_rad];
             let search = RaySearch { search_px, share_min, ..gray_search(options, normal, on_circle, angles) };
             let signal = |at: &_, step: &_, out: &mut [f64]| light.gray_profile(image, at, step, out);
-            let support_min = (f64::from(options.support_min_px) / stride_px) as usize;
-            rays[axis] = Some(trace_every(stride_px, camera, &search, support_min, signal, scratch)?.ray);
+            let support_min_px = f64::from(options.support_min_px);
+            rays[axis] = Some(trace_every(stride_px, camera, &search, support_min_px, signal, scratch)?.ray);
         }
         let [Some(x), Some(y), Some(z)] = rays else { return None };
         let corner = CornerFeature::from_rays([x, y, z])?;

@@ -2,10 +2,10 @@
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::segments::Segment;
 use crate::camera::Camera;
 use crate::corner::feature::length_score;
 use crate::corner::options::GeneralOptions;
+use crate::segments::Segment;
 
 /// One end of a segment, from which its ray runs to the other end.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -111,7 +111,7 @@ pub(crate) fn find(
 
 /// How far before its begin a segment may meet another one, in pixels.
 fn widest_px(segment: &Segment, options: &GeneralOptions) -> f64 {
-    options.gap_max_px.max(options.gap_max_share * segment.length_px)
+    options.gap_max_px.max(options.gap_max_share * segment.length_px())
 }
 
 /// How far from its begin it may, either way, in radians.
@@ -144,7 +144,7 @@ pub(crate) fn meeting(segments: &[Segment], a: RayEnd, b: RayEnd, options: &Gene
         if gap_px < -options.overshoot_max_px || gap_px > widest_px(segment, options) {
             return None;
         }
-        gap_share += gap_px.abs() / segment.length_px;
+        gap_share += gap_px.abs() / segment.length_px();
     }
     Some(Meeting { place, gap_share })
 }
@@ -174,6 +174,6 @@ fn junction(
         if angle < 0.0 { angle + std::f64::consts::TAU } else { angle }
     };
     let rays = if turn(&along[0]) > turn(&along[2]) { rays } else { [rays[2], rays[1], rays[0]] };
-    let lengths = rays.map(|ray| segments[ray.segment].length_px);
+    let lengths = rays.map(|ray| segments[ray.segment].length_px());
     Some(Junction { rays, vertex, score: length_score(&lengths) / (1.0 + gap_share) })
 }

@@ -3,23 +3,26 @@
 pub(super) mod beginnings;
 pub(super) mod common_attitude;
 pub(super) mod completion;
+pub(super) mod double_edges;
 pub(super) mod edge_ends;
 pub(super) mod guided;
 mod junctions;
-pub(super) mod segments;
 mod sized_ends;
+
+use std::f64::consts::PI;
 
 use nalgebra::Vector3;
 
 pub(super) use self::sized_ends::{box_search, find_end};
 
 use self::junctions::{Junction, RayEnd};
-use self::segments::{Segment, SegmentFinder, SegmentScratch};
 use super::feature::CornerFeature;
 use super::options::GeneralOptions;
 use super::trace::{RaySearch, TraceScratch, TracedRay, trace};
 use crate::camera::Camera;
+use crate::error::Result;
 use crate::image::{ImageView, LightTable};
+use crate::segments::{Segment, SegmentDetector, SegmentScratch, Segments};
 
 /// How far from the direction of its axis a segment's great circle may pass: the sine of 2.5 degrees, 0.9 pixels at one
 /// end of a segment of 20 pixels.
@@ -43,10 +46,19 @@ const SAME_LINE_PX: f64 = 1.5;
 /// as meeting.
 const SAME_VERTEX_PX: f64 = 8.0;
 
+/// Most segments of an image, which bounds the search for junctions to 320 ends.
+const SEGMENTS_MAX: usize = 160;
+
+/// Directions of segments in an image that are told apart where there are more: 15 degrees each, in which the edges along one axis
+/// of a room are a few.
+const DIRECTIONS: usize = 12;
+
 /// Memory of the front end.
 #[derive(Debug, Clone)]
 pub(crate) struct GeneralScratch {
-    pub(crate) segments: SegmentScratch,
+    detector: SegmentScratch,
+    /// The straight edges of the last image, the longest first.
+    pub(crate) segments: Segments,
     meetings: Vec<Vec<(usize, Vector3<f64>, f64)>>,
     junctions: Vec<Junction>,
     /// For each end of a segment, the vertices from which its ray was followed, and what came of it.
@@ -55,9 +67,10 @@ pub(crate) struct GeneralScratch {
 }
 
 impl GeneralScratch {
-    pub(crate) fn new(segments: SegmentScratch) -> Self {
+    pub(crate) fn new(detector: SegmentScratch) -> Self {
         Self {
-            segments,
+            detector,
+            segments: Segments::default(),
             meetings: Vec::new(),
             junctions: Vec::new(),
             traced: Vec::new(),
@@ -69,7 +82,7 @@ impl GeneralScratch {
 /// What corners are looked for with.
 pub(crate) struct Search<'a> {
     pub(crate) camera: &'a Camera,
-    pub(crate) finder: &'a SegmentFinder,
+    pub(crate) detector: &'a SegmentDetector,
     pub(crate) options: &'a GeneralOptions,
     pub(crate) light: &'a LightTable,
     /// A direction along the vertical, where it is known.
@@ -83,12 +96,14 @@ pub(crate) fn find(
     closeness: impl Fn(&CornerFeature) -> Option<f64>,
     scratch: &mut GeneralScratch,
     out: &mut Vec<CornerFeature>,
-) {
-    let Search { camera, finder, options, light, vertical } = *search;
+) -> Result<()> {
+    let Search { camera, detector, options, light, vertical } = *search;
     out.clear();
-    let GeneralScratch { segments, meetings, junctions, traced, trace: memory } = scratch;
-    finder.find(camera, image, options, segments);
-    let segments = &segments.segments;
+    let GeneralScratch { detector: edges, segments, meetings, junctions, traced, trace: memory } = scratch;
+    detector.detect(image, edges, segments)?;
+    segments.list.retain(|segment| segment.length_px() >= options.segment_min_px);
+    thin(&mut segments.list);
+    let segments = &segments.list;
     junctions::find(camera, segments, vertical, options, meetings, junctions);
     traced.iter_mut().for_each(Vec::clear);
     traced.resize(2 * segments.len(), Vec::new());
@@ -97,18 +112,18 @@ pub(crate) fn find(
         let mut rays = [None; 3];
         for (ray, end) in rays.iter_mut().zip(junction.rays) {
             let segment = &segments[end.segment];
-            let near_rad = SAME_VERTEX_PX * segment.ends[0].angle(&segment.ends[1]) / segment.length_px;
+            let near_rad = SAME_VERTEX_PX / segment.px_per_rad;
             let known = &mut traced[2 * end.segment + end.end];
             *ray = if let Some((_, found)) = known.iter().find(|(at, _)| at.angle(&junction.vertex) < near_rad) {
                 *found
             } else {
                 let search = search_of(segments, end, &junction.vertex, options);
-                let support_min = options.support_min_px as usize;
+                let support_min_px = f64::from(options.support_min_px);
                 let found = search.and_then(|search| {
                     trace(
                         camera,
                         &search,
-                        support_min,
+                        support_min_px,
                         |at, step, out| light.gray_profile(image, at, step, out),
                         memory,
                     )
@@ -142,6 +157,25 @@ pub(crate) fn find(
             out.push(corner);
         }
     }
+    Ok(())
+}
+
+/// Keeps [`SEGMENTS_MAX`] segments, the longest of each direction in turn: the stripes of a wall leave room for its edges.
+fn thin(segments: &mut Vec<Segment>) {
+    if segments.len() <= SEGMENTS_MAX {
+        return;
+    }
+    let mut of_direction = [0_usize; DIRECTIONS];
+    let rank = |segment: Segment| {
+        let turn = segment.normal.y.atan2(segment.normal.x).rem_euclid(PI) / PI;
+        let rank = &mut of_direction[(turn * DIRECTIONS as f64) as usize % DIRECTIONS];
+        *rank += 1;
+        (*rank, segment)
+    };
+    let mut ranked: Vec<(usize, Segment)> = segments.drain(..).map(rank).collect();
+    ranked.sort_by_key(|(rank, _)| *rank);
+    segments.extend(ranked.into_iter().take(SEGMENTS_MAX).map(|(_, segment)| segment));
+    segments.sort_by(|a, b| b.length_rad.total_cmp(&a.length_rad));
 }
 
 /// Where the ray that begins at an end of a segment runs: to the segment's far end, and on where other segments go on.
@@ -153,7 +187,7 @@ fn search_of(segments: &[Segment], ray: RayEnd, vertex: &Vector3<f64>, options: 
     let angle_of = |bearing: &Vector3<f64>| bearing.dot(&along).atan2(bearing.dot(&on_line));
     let px_per_rad = segment.px_per_rad;
     let mut to_rad = angle_of(ray.far(segments));
-    let gap_rad = options.gap_max_px.max(options.gap_max_share * segment.length_px) / px_per_rad;
+    let gap_rad = options.gap_max_px.max(options.gap_max_share * segment.length_px()) / px_per_rad;
     let in_line = |other: &&Segment| other.ends.iter().all(|end| normal.dot(end).abs() * px_per_rad < SAME_LINE_PX);
     let in_line: Vec<[f64; 2]> = segments
         .iter()
@@ -197,5 +231,66 @@ fn gray_search(
         share_min: 0.0,
         erring_together: ERRING_TOGETHER,
         ray_sigma_px: options.ray_sigma_px,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn segment(normal: Vector3<f64>, length_rad: f64) -> Segment {
+        Segment {
+            normal,
+            middle: Vector3::z(),
+            ends: [Vector3::z(); 2],
+            length_rad,
+            variances_rad2: [1e-6; 2],
+            contrast: 10.0,
+            rms_px: 0.2,
+            px_per_rad: 700.0,
+            points: 0..0,
+        }
+    }
+
+    #[test]
+    fn stripes_leave_room_for_edges_across_them() {
+        let stripes = (0..300_u32).map(|k| segment(Vector3::x(), 0.5 + 0.001 * f64::from(k)));
+        let mut segments: Vec<Segment> =
+            stripes.chain([segment(Vector3::y(), 0.1), segment(Vector3::y(), 0.2)]).collect();
+        segments.sort_by(|a, b| b.length_rad.total_cmp(&a.length_rad));
+        let longest = segments[..158].to_vec();
+        thin(&mut segments);
+        assert_eq!(segments[..158], longest[..]);
+        assert_eq!([segments[158].length_rad, segments[159].length_rad], [0.2, 0.1]);
+        assert_eq!(segments.len(), SEGMENTS_MAX);
+    }
+
+    /// A piece of the great circle x = 0 between two angles from the optical axis, 700 pixels a radian.
+    fn piece([from_rad, to_rad]: [f64; 2]) -> Segment {
+        let at = |angle: f64| Vector3::new(0.0, angle.sin(), angle.cos());
+        // From z to y is a positive turn about -x.
+        Segment { ends: [at(from_rad), at(to_rad)], ..segment(-Vector3::x(), to_rad - from_rad) }
+    }
+
+    #[test]
+    fn rays_go_on_along_pieces_of_their_line() {
+        let options = GeneralOptions::default();
+        let gap_rad = options.gap_max_px / 700.0;
+        let aside = Vector3::new(0.05, 1.0, 0.0).normalize();
+        let to_rad = |others: &[Segment]| {
+            let segments = [&[piece([0.02, 0.1])], others].concat();
+            let search = search_of(&segments, RayEnd { segment: 0, end: 0 }, &Vector3::z(), &options).unwrap();
+            search.to_rad + CLEAR_OF_END_PX / 700.0
+        };
+        let next = 0.1 + 0.9 * gap_rad;
+        assert!((to_rad(&[]) - 0.1).abs() < 1e-12);
+        assert!((to_rad(&[piece([next, 0.3])]) - 0.3).abs() < 1e-12);
+        // In any order, and from piece to piece.
+        assert!((to_rad(&[piece([0.3 + 0.9 * gap_rad, 0.5]), piece([next, 0.3])]) - 0.5).abs() < 1e-12);
+        // Not over a wider gap, behind the vertex, along another line, or as far as a quarter turn.
+        assert!((to_rad(&[piece([0.1 + 1.1 * gap_rad, 0.3])]) - 0.1).abs() < 1e-12);
+        assert!((to_rad(&[piece([-0.3, -0.01])]) - 0.1).abs() < 1e-12);
+        assert!((to_rad(&[Segment { ends: [Vector3::z(), aside], ..piece([next, 0.3]) }]) - 0.1).abs() < 1e-12);
+        assert!((to_rad(&[piece([next, 1.5])]) - 0.1).abs() < 1e-12);
     }
 }

@@ -5,7 +5,7 @@ use nalgebra::Vector3;
 use super::edge_ends::{EDGE_MIN_PX, GAP_PX};
 use super::{AXIS_SINE, GeneralScratch, gray_search};
 use crate::corner::options::GeneralOptions;
-use crate::corner::sized::{BoxView, PLACES_MIN, SeenEnd, Unseen};
+use crate::corner::sized::{BoxView, SUPPORT_MIN_PX, SeenEnd, Unseen};
 use crate::corner::trace::{RaySearch, trace};
 use crate::geometry::meeting;
 use crate::image::{ImageView, LightTable};
@@ -30,7 +30,7 @@ pub(in crate::corner) fn find_end(
     let (vertex, normal) = (view.corner.vertex(), view.corner.rays()[axis].normal);
     let along = normal.cross(&vertex);
     let mut angles = Vec::new();
-    for segment in &segments.segments {
+    for segment in &segments.list {
         let is_along = |other: usize| segment.normal.dot(&view.edges[other]).abs() < AXIS_SINE;
         if !(0..3).any(|other| other != axis && is_along(other)) {
             continue;
@@ -48,6 +48,6 @@ pub(in crate::corner) fn find_end(
     let candidates: Vec<f64> = angles.into_iter().map(|(angle, _)| angle).collect();
     view.end(axis, &candidates, &mut |_, search| {
         let signal = |at: &_, step: &_, out: &mut [f64]| light.gray_profile(image, at, step, out);
-        trace(view.camera, search, PLACES_MIN, signal, memory)
+        trace(view.camera, search, SUPPORT_MIN_PX, signal, memory)
     })
 }

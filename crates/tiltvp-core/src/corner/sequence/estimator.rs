@@ -178,6 +178,10 @@ impl CornerPoseEstimator {
         } else {
             self.by_one(&mut estimate)?;
         }
+        if estimate.hypotheses.first().is_some_and(|best| self.stands_alone(best)) {
+            estimate.hypotheses.clear();
+            (estimate.chosen_left, estimate.chosen_right) = (Vec::new(), None);
+        }
         if let Some(best) = estimate.hypotheses.first() {
             let decided = best.probability >= self.options.probability_min;
             estimate.verdict = if decided { CornerVerdict::Found } else { CornerVerdict::Ambiguous };

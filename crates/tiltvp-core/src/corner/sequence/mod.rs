@@ -9,7 +9,6 @@ mod knowledge;
 pub(super) mod names;
 mod pairs;
 mod paper;
-mod rivals;
 mod seen_pair;
 mod shared_attitude;
 mod size;

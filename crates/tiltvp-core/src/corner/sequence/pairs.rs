@@ -5,12 +5,12 @@ use nalgebra::{Matrix3, Vector3};
 use super::agreement::{apart, renamed};
 use super::believed::OPEN;
 use super::estimator::CornerPoseEstimator;
-use super::rivals::{Rival, add_rivals};
 use super::seen_pair::SeenPair;
 use super::support::CornerSupport;
 use super::transfer::upright;
 use crate::corner::closed_form::attitude::{IncludedAngle, corner_attitudes};
 use crate::corner::closed_form::prior::AttitudePrior;
+use crate::corner::detector::CornerDetector;
 use crate::corner::estimate::{CornerEstimate, Hypothesis};
 use crate::corner::feature::CornerFeature;
 use crate::corner::frame::Frame;
@@ -37,6 +37,12 @@ const BEGIN_MIN: usize = 4;
 /// less, those that are not have 0.93 and more.
 const MEETS: f64 = 0.7;
 
+/// By which factor chi-square of two vertices may exceed that of a corner that is believed: it is exact to first order only.
+const VERTEX_SLACK: f64 = 2.0;
+
+/// The standard deviation of a place between two edges, as a share of how far they are apart.
+const DOUBLE_SIGMA: f64 = 0.5;
+
 /// The least probability of a hypothesis that is returned.
 const PROBABILITY_MIN: f64 = 1e-9;
 
@@ -46,7 +52,7 @@ impl CornerPoseEstimator {
     fn pair_poses(
         &self,
         [left, right]: [&CornerFeature; 2],
-        left_from_right: &RigidMotion,
+        (detector, left_from_right): (&CornerDetector, &RigidMotion),
         priors: &[AttitudePrior],
         common: Option<&CommonAttitude>,
     ) -> Result<Vec<Hypothesis>> {
@@ -58,6 +64,20 @@ impl CornerPoseEstimator {
         };
         let seen = [observation(left, RigidMotion::identity()), observation(right, *left_from_right)];
         let Some(vertex) = triangulate(&seen) else { return Ok(Vec::new()) };
+        // All rays together miss by no less than the vertices alone. Most pairs are of different corners, and end here.
+        let freedom = common.map_or(FREEDOM_ALONE, |common| FREEDOM * common.scatter.powi(2));
+        if vertex.chi_square > VERTEX_SLACK * freedom * self.misfit_most().powi(2) {
+            return Ok(Vec::new());
+        }
+        // Where edges are double the place is known no better than they are apart: aside, as the distance is that of either.
+        let aside_rad = [(&self.left, left), (detector, right)]
+            .into_iter()
+            .zip(&self.scratch)
+            .map(|((detector, corner), scratch)| detector.double_edges_rad(corner, scratch))
+            .fold(0.0, f64::max);
+        let towards = vertex.point_m.normalize();
+        let aside_m2 = (Matrix3::identity() - towards * towards.transpose())
+            * (DOUBLE_SIGMA * aside_rad * vertex.point_m.norm()).powi(2);
         let mut found: Vec<(f64, Hypothesis)> = Vec::new();
         for (corner, rotation) in [(left, Matrix3::identity()), (right, left_from_right.rotation)] {
             for own in corner_attitudes(corner, &self.options.angle)?.iter() {
@@ -69,7 +89,7 @@ impl CornerPoseEstimator {
                 let Some(mut fused) = fuse_rays(&cameras, &self.options.angle, side, &start, &vertex.point_m) else {
                     continue;
                 };
-                let mut misfit = (fused.chi_square / 6.0).sqrt();
+                let mut misfit = (fused.chi_square / FREEDOM_ALONE).sqrt();
                 // Covariances do not include edges that do not quite meet, or belong to more than one object.
                 let mut inflation = if self.is_one_object() { 1.0 } else { (misfit * misfit).max(1.0) };
                 if let Some(common) = common.and_then(|common| self.parallel(common, &fused)) {
@@ -90,11 +110,14 @@ impl CornerPoseEstimator {
                 let scale = (0.25 * self.options.misfit_max).max(1.0).powi(2);
                 let (sin, cos) = self.options.angle.gamma_rad.sin_cos();
                 let edges = [Vector3::x(), Vector3::y(), Vector3::new(cos, 0.0, side * sin)];
+                let mut covariance = fused.covariance * inflation;
+                let mut of_place = covariance.fixed_view_mut::<3, 3>(3, 3);
+                of_place += aside_m2;
                 let pose = Hypothesis {
                     camera_from_object: fused.rig_from_object,
                     edges: edges.map(|edge| as_seen * edge),
                     vertex_m: Some(fused.vertex_m),
-                    covariance: fused.covariance * inflation,
+                    covariance,
                     probability: 0.0,
                     right_handed,
                     misfit,
@@ -162,13 +185,12 @@ impl CornerPoseEstimator {
         let (nearest, farthest) = (self.options.distance_min_m, self.options.distance_max_m);
         let misfit_most = self.misfit_most();
         let mut best: Option<(f64, Vec<Hypothesis>, usize, usize)> = None;
-        let mut rivals = Vec::new();
         let support = CornerSupport::new(&estimate.features, left_from_right);
         for (i, left) in estimate.features[0].iter().enumerate() {
             for (j, right) in estimate.features[1].iter().enumerate() {
                 let Some(shown) = ShownEdges::of([left, right], [&begin[0][i], &begin[1][j]]) else { continue };
                 let [own, other] = &shown.corners;
-                let poses = self.pair_poses([own, other], left_from_right, &priors, common)?;
+                let poses = self.pair_poses([own, other], (detector, left_from_right), &priors, common)?;
                 let Some((pose, vertex)) = poses.first().and_then(|pose| Some((pose, pose.vertex_m?))) else {
                     continue;
                 };
@@ -202,16 +224,12 @@ impl CornerPoseEstimator {
                     let turned = apart(&pose.camera_from_object, &track.pose.camera_from_object);
                     score /= 1.0 + (turned / self.turn_sigma_rad(track)).powi(2);
                 }
-                rivals.push(Rival { score, left: i, right: j, vertex_m: vertex });
                 if best.as_ref().is_none_or(|(most, ..)| score > *most) {
                     best = Some((score, poses, i, j));
                 }
             }
         }
-        if let Some((_, mut poses, i, j)) = best {
-            if !self.is_one_object() {
-                add_rivals(&mut poses, [i, j], &rivals, estimate);
-            }
+        if let Some((_, poses, i, j)) = best {
             estimate.hypotheses = poses;
             (estimate.chosen_left, estimate.chosen_right) = (vec![i], Some(j));
         }
@@ -263,5 +281,8 @@ fn fuse_with(
     Some((fused, (fused.chi_square / FREEDOM / variance).sqrt(), inflation(&fused)))
 }
 
-/// Degrees of freedom of twelve numbers of the rays and three of the attitude less six of the pose.
+/// Degrees of freedom of twelve numbers of the rays less six of the pose.
+const FREEDOM_ALONE: f64 = 6.0;
+
+/// The same with three numbers of a known attitude.
 const FREEDOM: f64 = 9.0;

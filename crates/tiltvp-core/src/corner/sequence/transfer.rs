@@ -28,9 +28,11 @@ const NEAR_LAST: f64 = 0.35;
 const EPIPOLAR_STEP_PX: f64 = 4.0;
 
 /// How far segments may be from where a ray is looked for to speak for it, in pixels: as far as the first and the second look for a ray
-/// reach together, 4 and 2.5, and a segment's pixels lie beside it, 1.2. With 6 pixels, 6 of 113 poses of a real box are lost, whose
-/// calibration is a quarter of a degree off; with 12 none is won.
+/// reach together, 4 and 2.5, and a segment's pixels lie beside it, 1.2.
 const SPEAKING_PX: f64 = 2.0 * EPIPOLAR_STEP_PX;
+
+/// Most places along an epipolar line at which a corner is looked for, those with which segments agree best, which bounds the time.
+const PLACES_MAX: usize = 5;
 
 impl CornerPoseEstimator {
     /// Adds the corners of which two edges were found and the third is known from an attitude in the left camera's frame.
@@ -88,15 +90,21 @@ impl CornerPoseEstimator {
                 let edges = near.edges.map(|edge| other_from_own.rotation * edge);
                 let segments = EdgeSegments::new(detectors[other].segments(&self.scratch[other]), &edges, most_rad);
                 let distances = self.distances(detectors[other], &corner.vertex(), other_from_own);
-                let expected: Vec<ExpectedCorner> = distances
-                    .into_iter()
-                    .filter_map(|away_m| ExpectedCorner::transferred(corner, &near.edges, away_m, other_from_own))
-                    .filter(|expected| segments.speak_for(expected, SPEAKING_PX))
-                    .collect();
-                for expected in expected {
+                let expected = distances.into_iter().enumerate().filter_map(|(step, away_m)| {
+                    let expected = ExpectedCorner::transferred(corner, &near.edges, away_m, other_from_own)?;
+                    Some((segments.speak_for(&expected, SPEAKING_PX)?, step, expected))
+                });
+                let mut expected: Vec<(f64, usize, ExpectedCorner)> = expected.collect();
+                expected.sort_by(|a, b| b.0.total_cmp(&a.0));
+                let mut found_at: Option<usize> = None;
+                for (_, step, expected) in expected.into_iter().take(PLACES_MAX) {
+                    if found_at.is_some_and(|at| at.abs_diff(step) > 1) {
+                        continue;
+                    }
                     let seen =
                         detectors[other].find_near(image, &expected, Some(EPIPOLAR_STEP_PX), &mut self.scratch[other]);
                     let Some(seen) = seen.filter(|seen| fits(seen, &attitudes[other], most_rad)) else { continue };
+                    found_at = found_at.or(Some(step));
                     if best.as_ref().is_none_or(|best| seen.support_score() > best.support_score()) {
                         best = Some(seen);
                     }

@@ -35,8 +35,8 @@ const LAST_PX: f64 = 20.0;
 /// The share of these pixels from which on the edge is seen: as of a ray. The best line through places of noise has a half.
 const EDGE_SHARE: f64 = 0.6;
 
-/// Least number of places of a line, below [`EDGE_SHARE`] of [`LAST_PX`], so that all that show an edge are counted.
-pub(crate) const PLACES_MIN: usize = 8;
+/// Least length of a line that agrees with it, in pixels, below [`EDGE_SHARE`] of [`LAST_PX`], so that all that show an edge are counted.
+pub(crate) const SUPPORT_MIN_PX: f64 = 8.0;
 
 /// A line of the box in the image.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

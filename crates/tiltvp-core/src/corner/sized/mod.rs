@@ -3,5 +3,5 @@
 mod far_edges;
 mod fit;
 
-pub(super) use self::far_edges::{BoxLine, BoxView, PLACES_MIN, SeenEnd, Unseen};
+pub(super) use self::far_edges::{BoxLine, BoxView, SUPPORT_MIN_PX, SeenEnd, Unseen};
 pub(super) use self::fit::{KnownLengths, SizedPose, fit_sized};
