@@ -13,6 +13,7 @@ from tiltvp.cli import main
 from tiltvp.corner import CornerHypothesis
 from tiltvp.errors import InvalidInputError
 from tiltvp.lab.evaluation.corner_closed_form import exact_poses, noisy_poses, summarise_exact, summarise_noisy
+from tiltvp.lab.evaluation.corner_markers import MarkerLooks
 from tiltvp.lab.evaluation.corner_rooms import truth_near
 from tiltvp.lab.evaluation.corners import (
     CORNER_SCENES,
@@ -38,6 +39,26 @@ def test_the_truth_is_among_the_hypotheses() -> None:
     assert summary["max_rad"] < 1e-9
     assert summary["hypotheses"] >= 2
     assert table.equals(exact_poses(5000, seed=3))
+
+
+def test_markers_are_looked_for_beside_corners() -> None:
+    options = {"distance_m": (1.0, 1.3), "samples": 2}
+    scene = CornerScene("markers", marker_m=0.2, options=options, known={"right_handed": True})
+    table, _ = measure_corners(CornerExperiment(frames=10, scenes=(scene,)), threads=2)
+    rms = {row["method"]: row for row in summarise_corners(table).iter_rows(named=True)}
+    by_markers = [row for method, row in rms.items() if method.startswith("cv2.aruco")]
+    assert len(by_markers) == 4
+    for row in by_markers:
+        assert row["found"] == 1.0
+        assert row["flips"] == 0
+        assert row["NEES of 6"] is None
+        # Markers where they are not, or the wrong way up, would be off by far more.
+        assert rms["coloured"]["attitude rms deg"] < row["attitude rms deg"] < 2.0
+        assert rms["coloured"]["position rms mm"] < row["position rms mm"] < 30.0
+    sequence = CornerScene("none", options=options).sequence(2, 5, 2)
+    looks = MarkerLooks(sequence, 0.2)
+    looks.look(sequence.render(0))
+    assert [pose for looked in looks.poses.values() for pose, _ in looked] == [None] * 4
 
 
 def test_noise_is_as_the_bound_says() -> None:

@@ -1512,6 +1512,7 @@ class Laboratory:
         threads: SupportsIndex | None = None,
         size_m: ArrayLike | None = None,
         gamma_rad: float | None = None,
+        marker_m: float | None = None,
         clutter: float | None = None,
         side_light: float | None = None,
         light_spacing_m: float | None = None,
@@ -1525,6 +1526,10 @@ class Laboratory:
             metres. Default: (0.4, 0.36, 0.34).
         gamma_rad
             The angle between the level edges `x` and `z`, radians. Default: 1.5708.
+        marker_m
+            Side of ArUco markers in the middle of the blue, the green and the red face (numbers 0, 1 and 2 of OpenCV's
+            `DICT_4X4_50`), metres; 0 for none. Their white cards are a third larger and 1 mm before the face. Default:
+            0.
         clutter
             How full the walls are with furniture. Default: 0.3.
         side_light
@@ -1544,6 +1549,10 @@ class Laboratory:
     @property
     def light_spacing_m(self) -> float:
         """Spacing of the points where light was gathered, metres."""
+
+    @property
+    def marker_m(self) -> float:
+        """Side of the ArUco markers on the coloured faces, metres; 0 for none."""
 
     @property
     def seed(self) -> int:

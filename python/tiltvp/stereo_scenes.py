@@ -46,9 +46,11 @@ class Laboratory(_core.Laboratory):
 
     The same arguments give the same room. Seen from the front, the cuboid's upper face is red, its left one green, its
     right one blue; the other faces are grey. `size_m` is how long its edges x (above the blue face), y (upright) and z
-    (above the green face) are, `gamma_rad` the angle between x and z. `clutter`, from 0 to 1, is how full the walls are
-    with furniture, and `side_light`, from 0 to 1, the power of the lamp beside it. `light_spacing_m` is how finely
-    light is gathered, on `threads` threads (None: one per core), which do not matter. None is for the default.
+    (above the green face) are, `gamma_rad` the angle between x and z. `marker_m` is the side of ArUco markers in the
+    middle of the blue, the green and the red face (numbers 0, 1 and 2 of OpenCV's `DICT_4X4_50`), on cards that are a
+    third larger and 1 mm before the face; 0 for none. `clutter`, from 0 to 1, is how full the walls are with furniture,
+    and `side_light`, from 0 to 1, the power of the lamp beside it. `light_spacing_m` is how finely light is gathered,
+    on `threads` threads (None: one per core), which do not matter. None is for the default.
 
     Comparable, hashable, and to be pickled. Raises `tiltvp.errors.InvalidInputError`.
     """

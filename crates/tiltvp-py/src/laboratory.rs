@@ -56,6 +56,8 @@ getters! {
         size_m: (f64, f64, f64) = own.options.size_m.into(),
         /// The angle between the cuboid's level edges, radians.
         gamma_rad: f64 = own.options.gamma_rad,
+        /// Side of the ArUco markers on the coloured faces, metres; 0 for none.
+        marker_m: f64 = own.options.marker_m,
         /// How full the walls are, from 0 to 1.
         clutter: f64 = own.options.clutter,
         /// Power of the lamp beside the cuboid, from 0 to 1.

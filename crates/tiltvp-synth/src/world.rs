@@ -89,7 +89,7 @@ impl World {
     /// # Errors
     /// If the options are outside their domains.
     pub fn laboratory(options: &LaboratoryOptions) -> Result<Self> {
-        options.validate()?;
+        laboratory::check(options)?;
         let mut builder = Builder::default();
         let plan = laboratory::build(options, &mut builder);
         let mut corners = std::mem::take(&mut builder.corners);

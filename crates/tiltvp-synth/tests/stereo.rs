@@ -148,6 +148,8 @@ fn what_makes_no_sense_is_refused() {
         LaboratoryOptions { gamma_rad: 0.1, ..Default::default() },
         LaboratoryOptions { size_m: [0.4, 0.4, f64::NAN], ..Default::default() },
         LaboratoryOptions { light_spacing_m: 0.0, ..Default::default() },
+        LaboratoryOptions { marker_m: 0.3, ..Default::default() },
+        LaboratoryOptions { marker_m: 0.2, gamma_rad: 1.2, ..Default::default() },
     ] {
         assert!(World::laboratory(&options).is_err());
     }

@@ -34,8 +34,8 @@ def corners(
     """Poses of corners: the closed form on random poses, and rendered sequences of a hand-held stereo pair.
 
     Tables have the closed form's error, errors with noise against the Cramer-Rao bound, errors of attitude and position
-    with flips in the sequences, of the published method beside ours, what an inertial sensor makes of the attitudes,
-    and whether names of corners in rooms last.
+    with flips in the sequences, of the published method and of OpenCV's ArUco markers beside ours, what an inertial
+    sensor makes of the attitudes, and whether names of corners in rooms last.
 
     Parameters
     ----------

@@ -18,6 +18,7 @@ from tiltvp.corner_images import CornerEstimate, CornerPoseEstimator
 from tiltvp.errors import InvalidInputError
 from tiltvp.lab.datasets.new import in_order
 from tiltvp.lab.evaluation.corner_inertial import IMAGE, InertialLooks, compare_inertial
+from tiltvp.lab.evaluation.corner_markers import MarkerLooks, MarkerPose
 from tiltvp.lab.evaluation.corner_rooms import own_places, surface_off, truth_near
 from tiltvp.synth import Laboratory, Room, StereoSequence, zed_cameras
 
@@ -90,6 +91,8 @@ class CornerScene:
     width: int = 1280
     gamma_deg: float = 90.0
     """Angle between the cuboid's level edges."""
+    marker_m: float = 0.0
+    """Side of ArUco markers on the cuboid's coloured faces, which OpenCV looks for; 0 for none."""
     options: dict[str, Any] = field(default_factory=dict)
     """Of `StereoSequence`."""
     known: dict[str, Any] = field(default_factory=dict)
@@ -110,7 +113,8 @@ class CornerScene:
         """The sequence."""
         scene: Laboratory | Room
         if self.kind == "laboratory":
-            scene = Laboratory(seed, gamma_rad=math.radians(self.gamma_deg), threads=threads)
+            gamma_rad = math.radians(self.gamma_deg)
+            scene = Laboratory(seed, gamma_rad=gamma_rad, marker_m=self.marker_m, threads=threads)
         else:
             scene = Room(self.kind, seed, threads=threads)
         left, right = zed_cameras(self.width)
@@ -130,8 +134,10 @@ CORNER_SCENES: tuple[CornerScene, ...] = (
     CornerScene("office", kind="office", share=0.1),
     CornerScene("living-room", kind="living-room", share=0.1),
     CornerScene("l-shaped", kind="l-shaped", share=0.1),
+    CornerScene("cuboid with markers", share=0.1, marker_m=0.2, known=_OUTER),
 )
-"""The paper's cuboid: with and without a word on its side, in full HD, blurred, of other angles; corners of rooms."""
+"""The paper's cuboid: with and without a word on its side, in full HD, blurred, of other angles; corners of
+rooms; and the cuboid with ArUco markers on it."""
 
 
 def fresh_rooms(count: int) -> tuple[CornerScene, ...]:
@@ -166,21 +172,23 @@ def measure_corners(
     Angles are components of the error's rotation vector in the left camera: pitch about x, yaw about y, roll about z.
     x_m, y_m, z_m are errors of the left camera's place in the corner's frame. `nees` is the squared error of attitude
     and vertex by its covariance, 6 on average at best. In rooms the truth is that of the listed corner near the
-    estimate, in whichever of eight ways its axes are named. Where none is near, as the list has no corners with an
-    edge below 0.15 m and none of furniture made of boards, `corner` is -1, the attitude is compared with that of the
+    estimate, in whichever of eight ways its axes are named. Where none is near, as the list has none of what
+    leans or runs into something else, `corner` is -1, the attitude is compared with that of the
     walls and of corners beside it, and the place, without `nees`, with the object's own median in the world. `surface`
-    is how far the vertex is from what is seen there (`surface_off`). `ms` is the processor time of one pair. `advance`
-    is called after each frame.
+    is how far the vertex is from what is seen there (`surface_off`). Poses by markers have neither. `ms` is the
+    processor time of one pair. `advance` is called after each frame.
     """
     rows: list[dict[str, Any]] = []
     inertial: list[pl.DataFrame] = []
     for k, (scene, frames) in enumerate(zip(experiment.scenes, experiment.lengths(), strict=True)):
         sequence = scene.sequence(frames, experiment.seed + k, threads)
         seen: dict[str, list[tuple[CornerEstimate, float]]] = {}
-        told = None
+        told, markers = None, None
+        if scene.marker_m:
+            markers = MarkerLooks(sequence, scene.marker_m)
         if scene.kind == "laboratory" and not inertial:
             told = InertialLooks(sequence, seed=experiment.seed, **scene.angle, **scene.known)
-        for looks in _estimates(scene, sequence, threads, told):
+        for looks in _estimates(scene, sequence, threads, told, markers):
             for method, look in looks.items():
                 seen.setdefault(method, []).append(look)
             advance()
@@ -190,6 +198,9 @@ def measure_corners(
             for frame, (estimate, ms) in enumerate(looked):
                 judged = _judged(scene, sequence, frame, estimate, places)
                 rows.append({"scene": scene.name, "method": method, "ms": ms} | judged)
+        for method, poses in ({} if markers is None else markers.poses).items():
+            for frame, (marker, ms) in enumerate(poses):
+                rows.append({"scene": scene.name, "method": method, "ms": ms} | _by_markers(sequence, frame, marker))
         attitudes = [None if one.pose is None else one.pose.camera_from_object for one, _ in seen[scene.methods[0]]]
         if told is not None and any(a is not None for a in attitudes):
             inertial.append(compare_inertial(sequence, {IMAGE: attitudes} | told.attitudes, seed=experiment.seed))
@@ -252,9 +263,15 @@ def summarise_rooms(table: pl.DataFrame, rooms: Sequence[CornerScene]) -> pl.Dat
 
 
 def _estimates(
-    scene: CornerScene, sequence: StereoSequence, threads: int, told: InertialLooks | None
+    scene: CornerScene,
+    sequence: StereoSequence,
+    threads: int,
+    told: InertialLooks | None,
+    markers: MarkerLooks | None,
 ) -> Iterator[dict[str, tuple[CornerEstimate, float]]]:
-    """What each method says of each frame in turn, and the processor time it took, milliseconds; `told` looks too."""
+    """What each method says of each frame in turn, and the processor time it took, milliseconds; `told` and `markers`
+    look too.
+    """
     angle = scene.angle
     known = angle | scene.known
     if scene.kind != "laboratory":
@@ -281,6 +298,8 @@ def _estimates(
                     looks[method] = _timed(CornerPoseEstimator(left, method="coloured", **known, **scale), pair[0])
             if told is not None:
                 told.look(frame, pair)
+            if markers is not None:
+                markers.look(pair)
             yield looks
 
 
@@ -315,32 +334,59 @@ def _judged(
     estimate: CornerEstimate,
     places: dict[int, NDArray[np.float64]],
 ) -> dict[str, Any]:
-    target = sequence.left_from_object(frame)
-    row: dict[str, Any] = {
-        "frame": frame,
-        "time_s": float(sequence.times_s[frame]),
-        "distance_m": float(np.linalg.norm(target[:3, 3])),
-        "found": estimate.pose is not None and estimate.pose.vertex_m is not None,
-        "corner": -1,
-        "hypotheses": len(estimate.hypotheses),
-        "reason": estimate.reason,
-    }
     pose = estimate.pose
+    found = pose is not None and pose.vertex_m is not None
+    row = _frame_row(sequence, frame, found=found) | {"hypotheses": len(estimate.hypotheses), "reason": estimate.reason}
     if pose is None or pose.vertex_m is None:
         return row | {"reason": estimate.place_reason or estimate.reason}
     row["probability"] = pose.probability
     if scene.kind == "laboratory":
-        number, truth = sequence.corner, target
+        number, truth = sequence.corner, sequence.left_from_object(frame)
     else:
         number, truth = truth_near(sequence, frame, pose, places[estimate.object])
-    row["corner"] = number
-    turn = _rotation_vector(truth[:3, :3] @ pose.camera_from_object.T)
-    shift = truth[:3, 3] - pose.vertex_m
-    error = np.concatenate([turn, shift])
-    place = truth[:3, :3].T @ truth[:3, 3] - pose.camera_from_object.T @ pose.vertex_m
+    error = np.concatenate([
+        _rotation_vector(truth[:3, :3] @ pose.camera_from_object.T), truth[:3, 3] - pose.vertex_m
+    ])  # fmt: skip
+    return (
+        row
+        | _errors(truth, pose.camera_from_object, pose.vertex_m)
+        | {
+            "corner": number,
+            "surface": surface_off(sequence, frame, pose),
+            "nees": float(error @ np.linalg.solve(pose.covariance, error)) if number >= 0 else None,
+        }
+    )
+
+
+def _by_markers(sequence: StereoSequence, frame: int, pose: MarkerPose | None) -> dict[str, Any]:
+    row = _frame_row(sequence, frame, found=pose is not None)
+    if pose is None:
+        return row | {"reason": "no marker in the left image"}
+    errors = _errors(sequence.left_from_object(frame), pose.camera_from_object, pose.vertex_m)
+    return row | errors | {"corner": sequence.corner, "hypotheses": 1, "reason": ""}
+
+
+def _frame_row(sequence: StereoSequence, frame: int, *, found: bool) -> dict[str, Any]:
+    """What is told of every frame, with a pose or without."""
+    return {
+        "frame": frame,
+        "time_s": float(sequence.times_s[frame]),
+        "distance_m": float(np.linalg.norm(sequence.left_from_object(frame)[:3, 3])),
+        "found": found,
+        "corner": -1,
+        "hypotheses": 0,
+    }
+
+
+def _errors(
+    truth: NDArray[np.float64], rotation: NDArray[np.float64], vertex_m: NDArray[np.float64]
+) -> dict[str, float]:
+    """How far a pose is from the true one, (4, 4)."""
+    turn = _rotation_vector(truth[:3, :3] @ rotation.T)
+    place = truth[:3, :3].T @ truth[:3, 3] - rotation.T @ vertex_m
     pitch, yaw, roll = np.degrees(turn).tolist()
     x, y, z = place.tolist()
-    return row | {
+    return {
         "attitude_deg": float(np.degrees(np.linalg.norm(turn))),
         "roll_deg": roll,
         "pitch_deg": pitch,
@@ -349,8 +395,6 @@ def _judged(
         "x_m": x,
         "y_m": y,
         "z_m": z,
-        "surface": surface_off(sequence, frame, pose),
-        "nees": float(error @ np.linalg.solve(pose.covariance, error)) if number >= 0 else None,
     }
 
 
