@@ -10,8 +10,9 @@ use crate::corner::trace::{RaySearch, trace};
 use crate::image::{ColorView, LightTable};
 
 /// Where an edge may end from where its ray does, in pixels: a ray is fitted up to 3 pixels before the last labels on both its
-/// sides, and these reach as far as the search width of 8 pixels beside it.
-const OFFSETS_PX: [f64; 4] = [4.0, 0.0, 10.0, -8.0];
+/// sides, which reach as far as the search width of 8 pixels beside it. The farthest first, as lines on the faces may seem to end an edge
+/// before; one look's reach apart, so that each sees one of two lines.
+const OFFSETS_PX: [f64; 7] = [16.0, 12.0, 8.0, 4.0, 0.0, -4.0, -8.0];
 
 /// How far either end of an outline may be off, in pixels: unlike an edge between two faces, of which one primary falls where the
 /// other rises, it has one bright side, and what lies behind it. Poses of rendered cuboids have a NEES of 2 of 6 with it.
@@ -34,7 +35,7 @@ pub(in crate::corner) fn box_search(options: &ColouredOptions) -> RaySearch {
     }
 }
 
-/// The end of an edge.
+/// The end of an edge, the farthest that holds.
 pub(in crate::corner) fn find_end(
     view: &BoxView<'_>,
     axis: usize,

@@ -10,7 +10,7 @@ use crate::corner::trace::{RaySearch, trace};
 use crate::geometry::meeting;
 use crate::image::{ImageView, LightTable};
 
-/// Ends that are closer than this are looked for together, in pixels: half of the width of the first look.
+/// Ends that are closer than this are looked for together, in pixels: the reach of the first look.
 const TOGETHER_PX: f64 = 4.0;
 
 /// The search for lines of a box, whose line and reach are set for each.

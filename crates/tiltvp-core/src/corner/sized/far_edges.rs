@@ -8,9 +8,10 @@ use crate::corner::ray::FittedRay;
 use crate::corner::trace::{RaySearch, TracedRay};
 use crate::geometry::meeting;
 
-/// How far from where an end is expected its further edges are looked for first, and again, in pixels: colours and segments end
-/// within the search width of 8 pixels of the edge, and a fit of 15 pixels and more leaves less than one.
-const SEARCH_PX: [f64; 2] = [8.0, 3.0];
+/// How far from where an end is expected its further edges are looked for first, and again, in pixels. Ends are tried 4 pixels apart, and
+/// of two lines that are farther apart, as a face's edge and that of a label on it, each look sees one. A fit of 15 pixels and
+/// more leaves less than one.
+const SEARCH_PX: [f64; 2] = [4.0, 3.0];
 
 /// Pixels about the end where the edges' gradients mix: as next to the vertex of the coloured cuboid.
 const CLEAR_PX: f64 = 5.0;
