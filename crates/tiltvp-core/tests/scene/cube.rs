@@ -56,3 +56,13 @@ pub(crate) fn cube(right_m: f64) -> Vec<u8> {
 pub(crate) fn view(bytes: &[u8]) -> ColorView<'_> {
     ColorView::new(bytes, 320, 180, 3 * 320).unwrap()
 }
+
+/// The bytes of the wall alone.
+pub(crate) fn wall() -> Vec<u8> {
+    COLOURS[3].map(|level| level as u8).repeat(320 * 180)
+}
+
+/// Where [`pinhole`] sees a place.
+pub(crate) fn project(place_m: Vector3<f64>) -> nalgebra::Vector2<f64> {
+    pinhole().project(&place_m).unwrap()
+}
