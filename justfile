@@ -343,10 +343,6 @@ measure-growth *arguments: setup
 measure-time *arguments: setup
     {{bin}}/python benches/peers/scharr.py {{arguments}}
 
-# Coloured cubes before a pair of cameras against marker cubes by OpenCV: errors and times, in one process on one thread.
-measure-markers *arguments: setup
-    {{bin}}/python benches/peers/corner.py {{arguments}}
-
 # A step of the self-calibration filters against a dense NumPy filter of the paper's equations, in one process.
 measure-calibration-time *arguments: setup
     OPENBLAS_NUM_THREADS=1 {{bin}}/python benches/peers/calibration_filter.py {{arguments}}
