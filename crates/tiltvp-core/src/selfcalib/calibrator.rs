@@ -134,17 +134,21 @@ impl SelfCalibrator {
                     return MountingEstimate::new(nowhere, infinite, start, self.last_nis, true);
                 };
                 let mounting = Mounting::from_polar(polar.x, polar.y, polar.z);
-                let j = Mounting { x_m: mounting.x_m, y_m: mounting.y_m, yaw_rad: 0.0 }.vector_by_polar();
-                let xy = j * covariance * j.transpose();
-                let mut estimate = MountingEstimate::new(mounting, xy, start, self.last_nis, false);
-                // A negative rho is the same place as a positive one with phi turned by pi.
-                if polar.y > 0.0 {
-                    estimate.covariance_phi_rho_psi = covariance;
-                }
-                estimate
+                let xy = vector_covariance(&polar, &covariance);
+                MountingEstimate::new(mounting, xy, start, self.last_nis, false)
             }
         }
     }
+}
+
+/// The covariance of (x, y, yaw) from that of (phi, rho, psi). A filter may go through rho = 0: a negative rho is the same place as
+/// a positive one with phi turned by pi.
+fn vector_covariance(polar: &Vector3<f64>, covariance: &Matrix3<f64>) -> Matrix3<f64> {
+    let mut jacobian = Mounting::from_polar(polar.x, polar.y, polar.z).vector_by_polar();
+    if polar.y < 0.0 {
+        jacobian.column_mut(1).neg_mut();
+    }
+    jacobian * covariance * jacobian.transpose()
 }
 
 /// Refuses a step that makes no sense.
@@ -176,6 +180,21 @@ fn check(motion: &WheelMotion, landmarks: &[u64], bearings_rad: &[f64], followed
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn covariances_go_through_the_axle() {
+        let covariance = Matrix3::new(4e-4, 1e-4, -2e-4, 1e-4, 9e-4, 1e-4, -2e-4, 1e-4, 5e-4);
+        for rho_m in [0.3, -0.3] {
+            let polar = Vector3::new(0.7, rho_m, 0.2);
+            let at = |polar: &Vector3<f64>| Mounting::from_polar(polar.x, polar.y, polar.z).vector();
+            let by = |axis: usize| {
+                (at(&(polar + Vector3::ith(axis, 1e-6))) - at(&(polar - Vector3::ith(axis, 1e-6)))) / 2e-6
+            };
+            let jacobian = Matrix3::from_columns(&[by(0), by(1), by(2)]);
+            let expected = jacobian * covariance * jacobian.transpose();
+            assert!((vector_covariance(&polar, &covariance) - expected).amax() < 1e-9, "{rho_m}");
+        }
+    }
 
     #[test]
     fn the_papers_filter_tells_the_last_innovation_that_there_was() {

@@ -159,4 +159,15 @@ mod tests {
         }
         assert!(of(CalibrationMethod::Paper).get("odometry_k_m").is_some());
     }
+    #[test]
+    fn a_start_above_the_axle_has_no_direction() {
+        let at = |method: CalibrationMethod, x_m: f64| {
+            let start = Mounting { x_m, ..Mounting::default() };
+            SelfCalibratorOptions { method, start, ..SelfCalibratorOptions::default() }.validate()
+        };
+        assert!(at(CalibrationMethod::Default, 0.0).is_ok());
+        for (x_m, is_possible) in [(0.0, false), (1e-7, false), (-1e-7, false), (1e-5, true), (-0.2, true)] {
+            assert_eq!(at(CalibrationMethod::Paper, x_m).is_ok(), is_possible, "{x_m}");
+        }
+    }
 }

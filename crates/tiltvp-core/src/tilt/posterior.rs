@@ -197,3 +197,27 @@ pub fn train_posterior(shift: &[f64], alpha_rad: &[f64], prior: PriorOfTilt) -> 
     }
     PosteriorCorrection::new(model, step, &means, &deviations)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_shift_beyond_the_table_has_the_answer_of_its_end() {
+        let model =
+            ShiftModel { factor: 100.0, spread: 3.0, spread_per_rad: 25.0, stray_share: 0.04, stray_max: 100.0 };
+        let table = PosteriorCorrection::new(model, 2.0, &[0.01, 0.02, 0.05], &[0.005, 0.006, 0.008]).unwrap();
+        for (shift, alpha_rad, slope, std_rad) in [
+            (0.0, 0.01, 0.005, 0.005),
+            (1.0, 0.015, 0.005, 0.0055),
+            (2.0, 0.02, 0.015, 0.006),
+            (4.0, 0.05, 0.015, 0.008),
+            (4.1, 0.05, 0.0, 0.008),
+            (90.0, 0.05, 0.0, 0.008),
+        ] {
+            let found = table.at(shift);
+            let off = [found.alpha_rad - alpha_rad, found.slope - slope, found.std_rad - std_rad];
+            assert!(off.iter().all(|off| off.abs() < 1e-12), "{shift}: {found:?}");
+        }
+    }
+}

@@ -80,8 +80,7 @@ impl TrainedCorrection {
             Self::Factor(factor) => Corrected { shift, alpha_rad: shift / factor, slope: 1.0 / factor, std_rad: 0.0 },
             Self::Affine(AffineCorrection { factor, offset_rad }) => {
                 let line = shift / factor + offset_rad;
-                let alpha_rad = if line < 0.0 { 0.0 } else { line };
-                Corrected { shift, alpha_rad, slope: 1.0 / factor, std_rad: 0.0 }
+                Corrected { shift, alpha_rad: line.clamp(0.0, f64::INFINITY), slope: 1.0 / factor, std_rad: 0.0 }
             }
             Self::Posterior(posterior) => posterior.at(shift),
         }
