@@ -163,3 +163,50 @@ impl Doubt {
         })
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::{Matrix2, Vector2};
+
+    use super::*;
+    use crate::geometry::Tilt;
+    use crate::robust::Stop;
+    use crate::tilt::estimate::ALTERNATIVES;
+
+    /// 150 pixels for a radian and upwards, 0.2 degrees.
+    fn unsure(sigmas_rad: [f64; 2]) -> TiltEstimate {
+        TiltEstimate {
+            tilt: Some(Tilt::from_alpha_beta(0.02, 0.3)),
+            covariance_rad2: Matrix2::from_diagonal(&Vector2::from(sigmas_rad.map(|sigma| sigma * sigma))),
+            confidence: 0.5,
+            edge_pixels: 6000,
+            prefiltered_pixels: 2000,
+            inlier_pixels: 1000,
+            shift_px: None,
+            alternatives: [None; ALTERNATIVES],
+            residual_rms: 0.01,
+            iterations: 1,
+            stop: Stop::Confident { trials: 1, needed: 1 },
+            doubt: None,
+        }
+    }
+
+    #[test]
+    fn the_first_cause_that_holds_is_named() {
+        let of = |estimate: &TiltEstimate| Doubt::of(estimate, 150.0, 0.0, true);
+        let even = unsure([0.02, 0.01]);
+        assert!(matches!(of(&even), Some(Doubt::Scattered { sigma_rad }) if (sigma_rad - 5e-4f64.sqrt()).abs() < 1e-9));
+        assert!(of(&TiltEstimate { confidence: 0.9, ..even.clone() }).is_none());
+        assert!(of(&TiltEstimate { tilt: None, ..even.clone() }).is_none());
+        let one_sided = unsure([0.04, 0.01]);
+        assert!(matches!(of(&one_sided), Some(Doubt::OneSided { ratio }) if (ratio - 4.0).abs() < 1e-9));
+        let few_agree = TiltEstimate { inlier_pixels: 300, ..one_sided.clone() };
+        assert!(matches!(of(&few_agree), Some(Doubt::FewAgree { share }) if (share - 0.05).abs() < 1e-9));
+        let few_edges = TiltEstimate { edge_pixels: 2900, ..few_agree.clone() };
+        assert!(matches!(of(&few_edges), Some(Doubt::FewEdges { pixels: 2900 })));
+        assert!(matches!(Doubt::of(&few_edges, 150.0, 0.0, false), Some(Doubt::NotUp)));
+        let coarse = Doubt::of(&few_edges, 50.0, 0.0, false);
+        assert!(matches!(coarse, Some(Doubt::Coarse { per_deg }) if (per_deg - 0.8727).abs() < 1e-3));
+        assert!(matches!(Doubt::of(&few_edges, 50.0, 0.01, false), Some(Doubt::Decentred { off_rad: 0.01 })));
+    }
+}
