@@ -139,7 +139,7 @@ fn cuboid(options: &LaboratoryOptions, place: Vector2<f64>, towards: f64, builde
         let [right, back, above] = [x, z, up].map(|edge| edge.normalize());
         let middle = foot + 0.5 * (x + z + up);
         let faces = [(-z, [right, above]), (-x, [-back, above]), (up, [right, back])];
-        for ((outwards, sides), modules) in faces.into_iter().zip(&MARKERS) {
+        for ((outwards, sides), modules) in faces.into_iter().zip(MARKERS) {
             marker(options.marker_m, modules, middle + 0.5 * outwards, sides, builder);
         }
     }
@@ -157,7 +157,7 @@ fn cuboid(options: &LaboratoryOptions, place: Vector2<f64>, towards: f64, builde
 /// A card with a marker, around a point of a face that `across` and `up` span.
 fn marker(
     side_m: f64,
-    modules: &[u16; 4],
+    modules: [u16; 4],
     middle: Vector3<f64>,
     [across, up]: [Vector3<f64>; 2],
     builder: &mut Builder,

@@ -196,13 +196,13 @@ mod tests {
         let of = |estimate: &TiltEstimate| Doubt::of(estimate, 150.0, 0.0, true);
         let even = unsure([0.02, 0.01]);
         assert!(matches!(of(&even), Some(Doubt::Scattered { sigma_rad }) if (sigma_rad - 5e-4f64.sqrt()).abs() < 1e-9));
-        assert!(of(&TiltEstimate { confidence: 0.9, ..even.clone() }).is_none());
-        assert!(of(&TiltEstimate { tilt: None, ..even.clone() }).is_none());
+        assert!(of(&TiltEstimate { confidence: 0.9, ..even }).is_none());
+        assert!(of(&TiltEstimate { tilt: None, ..even }).is_none());
         let one_sided = unsure([0.04, 0.01]);
         assert!(matches!(of(&one_sided), Some(Doubt::OneSided { ratio }) if (ratio - 4.0).abs() < 1e-9));
-        let few_agree = TiltEstimate { inlier_pixels: 300, ..one_sided.clone() };
+        let few_agree = TiltEstimate { inlier_pixels: 300, ..one_sided };
         assert!(matches!(of(&few_agree), Some(Doubt::FewAgree { share }) if (share - 0.05).abs() < 1e-9));
-        let few_edges = TiltEstimate { edge_pixels: 2900, ..few_agree.clone() };
+        let few_edges = TiltEstimate { edge_pixels: 2900, ..few_agree };
         assert!(matches!(of(&few_edges), Some(Doubt::FewEdges { pixels: 2900 })));
         assert!(matches!(Doubt::of(&few_edges, 150.0, 0.0, false), Some(Doubt::NotUp)));
         let coarse = Doubt::of(&few_edges, 50.0, 0.0, false);
