@@ -15,15 +15,8 @@ from tiltvp.errors import InvalidInputError
 from tiltvp.lab.evaluation.corner_closed_form import exact_poses, noisy_poses, summarise_exact, summarise_noisy
 from tiltvp.lab.evaluation.corner_markers import MarkerLooks
 from tiltvp.lab.evaluation.corner_rooms import truth_near
-from tiltvp.lab.evaluation.corners import (
-    CORNER_SCENES,
-    CornerExperiment,
-    CornerScene,
-    fresh_rooms,
-    measure_corners,
-    summarise_corners,
-    summarise_rooms,
-)
+from tiltvp.lab.evaluation.corner_scenes import CORNER_SCENES, CornerScene, fresh_rooms
+from tiltvp.lab.evaluation.corners import CornerExperiment, measure_corners, summarise_corners, summarise_rooms
 from tiltvp.lab.plots.corners import corner_errors, inertial_errors
 from tiltvp.lab.plots.picture import figure_picture
 from tiltvp.stereo_scenes import SceneCorner

@@ -14,7 +14,7 @@ from tiltvp.corner import BelievedCorner, CornerPoseEstimator, join_boxes
 from tiltvp.corner_tables import CORNER_COLUMNS, corner_rows
 from tiltvp.errors import InvalidInputError
 from tiltvp.lab.evaluation.corner_names import COVERS, names_seen, summarise_names
-from tiltvp.lab.evaluation.corners import down_in
+from tiltvp.lab.evaluation.corner_scenes import down_in
 from tiltvp.overlays.corners import draw_names
 from tiltvp.synth import Room, StereoSequence, zed_cameras
 

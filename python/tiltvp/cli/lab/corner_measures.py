@@ -17,7 +17,8 @@ from tiltvp.files import check_output_folder
 if TYPE_CHECKING:
     import polars as pl
 
-    from tiltvp.lab.evaluation.corners import CornerExperiment, CornerScene
+    from tiltvp.lab.evaluation.corner_scenes import CornerScene
+    from tiltvp.lab.evaluation.corners import CornerExperiment
 
 
 def corners(
@@ -77,7 +78,7 @@ def corners(
 
 def _scenes(names: tuple[str, ...], rooms: int) -> tuple[CornerScene, ...]:
     """What the options name."""
-    from tiltvp.lab.evaluation.corners import CORNER_SCENES, fresh_rooms
+    from tiltvp.lab.evaluation.corner_scenes import CORNER_SCENES, fresh_rooms
 
     if names and rooms:
         raise InvalidInputError(f"--scenes {' '.join(names)} and --rooms {rooms}, expected one of them")
@@ -125,7 +126,7 @@ def _names(experiment: CornerExperiment, threads: int) -> pl.DataFrame | None:
     import polars as pl
 
     from tiltvp.lab.evaluation.corner_names import names_seen, summarise_names
-    from tiltvp.lab.evaluation.corners import down_in
+    from tiltvp.lab.evaluation.corner_scenes import down_in
 
     rooms = [
         (scene, frames, experiment.seed + k)
