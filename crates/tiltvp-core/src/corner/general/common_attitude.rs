@@ -44,31 +44,29 @@ pub(crate) struct StraightEdge {
     normal: Vector3<f64>,
     /// Standard deviation of the angle between the plane and the edge's direction, radians.
     sigma_rad: f64,
+    /// How long it is seen, pixels.
+    length_px: f64,
 }
 
 impl StraightEdge {
     /// The lines of the segments of one image that are long enough.
     pub(crate) fn of<'a>(segments: &'a [Segment], left_from_own: &'a Matrix3<f64>) -> impl Iterator<Item = Self> + 'a {
-        segments.iter().filter(|segment| segment.length_px() >= LENGTH_MIN_PX).map(move |segment| Self {
+        let long = segments.iter().map(|segment| (segment, segment.length_px())).filter(|(_, px)| *px >= LENGTH_MIN_PX);
+        long.map(move |(segment, length_px)| Self {
             normal: left_from_own * segment.normal,
-            sigma_rad: (END_SIGMA_PX * std::f64::consts::SQRT_2 / segment.length_px()).hypot(PARALLEL_SIGMA_RAD),
+            sigma_rad: (END_SIGMA_PX * std::f64::consts::SQRT_2 / length_px).hypot(PARALLEL_SIGMA_RAD),
+            length_px,
         })
     }
 }
 
-/// How many of the lines that do not pass within an angle of a vertex may be images of edges along the axes of an attitude, and how many
-/// there are. Of random ones it is 0.105.
-pub(crate) fn along_axes(
-    lines: &[StraightEdge],
-    attitude: &Matrix3<f64>,
-    vertex: &Vector3<f64>,
-    within_rad: f64,
-) -> (usize, usize) {
-    let others = lines.iter().filter(|line| line.normal.dot(vertex).abs() > within_rad);
-    others.fold((0, 0), |(along, all), line| {
+/// The share of the lines' length that may be images of edges along the axes of an attitude. Of random ones it is 0.105.
+pub(crate) fn share_along_axes(lines: &[StraightEdge], attitude: &Matrix3<f64>) -> f64 {
+    let (along_px, all_px) = lines.iter().fold((0.0, 0.0), |(along_px, all_px), line| {
         let runs_along = attitude.tr_mul(&line.normal).abs().min() <= REACH_SINE;
-        (along + usize::from(runs_along), all + 1)
-    })
+        (along_px + f64::from(u8::from(runs_along)) * line.length_px, all_px + line.length_px)
+    });
+    along_px / all_px
 }
 
 /// An attitude with covariance of its rotation vector, left camera's frame.
@@ -157,7 +155,11 @@ mod tests {
                 let along = attitude.column(axis).into_owned();
                 let aside = Vector3::new(f64::from(k).sin(), f64::from(2 * k + 1).cos(), 1.5).cross(&along).normalize();
                 let miss = misses[out.len() % misses.len()];
-                out.push(StraightEdge { normal: aside * miss.cos() + along * miss.sin(), sigma_rad: 0.002 });
+                out.push(StraightEdge {
+                    normal: aside * miss.cos() + along * miss.sin(),
+                    sigma_rad: 0.002,
+                    length_px: 60.0,
+                });
             }
         }
         out
@@ -194,21 +196,24 @@ mod tests {
     #[test]
     fn a_tenth_of_random_edges_runs_along_axes() {
         let attitude = *Rotation3::from_euler_angles(0.5, -0.3, 0.2).matrix();
-        let vertex = attitude * Vector3::new(0.3, 0.4, 0.866).normalize();
         let own = lines(&attitude, 12, &[0.0]);
-        assert_eq!(along_axes(&own, &attitude, &vertex, 1e-6), (36, 36));
+        assert!((share_along_axes(&own, &attitude) - 1.0).abs() < 1e-12);
         // Points evenly over a sphere.
         let random: Vec<StraightEdge> = (0..2000)
             .map(|k| {
                 let (height, turn) = ((f64::from(k) + 0.5) / 1000.0 - 1.0, 2.399_963 * f64::from(k));
                 let radius = (1.0 - height * height).sqrt();
                 let normal = Vector3::new(radius * turn.cos(), radius * turn.sin(), height);
-                StraightEdge { normal, sigma_rad: 0.002 }
+                StraightEdge { normal, sigma_rad: 0.002, length_px: 50.0 }
             })
             .collect();
-        let (along, all) = along_axes(&random, &attitude, &vertex, 0.01);
-        assert!((1970..1990).contains(&all), "{all}");
-        assert!((0.095..0.115).contains(&(along as f64 / all as f64)), "{along}");
+        let share = share_along_axes(&random, &attitude);
+        assert!((0.095..0.115).contains(&share), "{share}");
+        // Three long edges of a corner beside them.
+        let corner = lines(&attitude, 1, &[0.0]).into_iter().map(|line| StraightEdge { length_px: 5000.0, ..line });
+        let both: Vec<StraightEdge> = random.iter().copied().chain(corner).collect();
+        let expected = (share * 100_000.0 + 15_000.0) / 115_000.0;
+        assert!((share_along_axes(&both, &attitude) - expected).abs() < 1e-9);
     }
 
     #[test]

@@ -1,25 +1,29 @@
 //! The attitude that most edges of a pair of images have in common, by which corners are completed and judged.
 
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::Matrix3;
 
-use super::agreement::{SAME_VERTEX_RAD, agreement};
+use super::agreement::agreement;
 use super::estimator::CornerPoseEstimator;
 use crate::corner::closed_form::attitude::IncludedAngle;
 use crate::corner::closed_form::resolve::{Alignment, View, resolve};
 use crate::corner::estimate::Hypothesis;
 use crate::corner::feature::CornerFeature;
-use crate::corner::general::common_attitude::{CommonAttitude, StraightEdge, along_axes, common_attitude, headings};
+use crate::corner::general::common_attitude::{
+    CommonAttitude, StraightEdge, common_attitude, headings, share_along_axes,
+};
 use crate::error::Result;
 
 /// The share of all edges along the axes of one attitude that is enough to trust it: random edges pass within 2 degrees
 /// of one of three axes in a tenth of all cases.
 const MOST: f64 = 0.4;
 
-/// The share of random edges that pass within 2 degrees of one of three axes.
-const AT_RANDOM: f64 = 0.1;
+/// The share of the edges' length that runs along the axes of a pose that they say nothing for: of random ones it is a tenth, and
+/// scatters by 0.04 for a hundred of them. Right poses of 36 rendered rooms have 0.34 and more; those of one with a wallpaper of
+/// diamonds, where nothing but the corner's own long edges runs along them, 0.18.
+const AT_RANDOM: f64 = 0.15;
 
-/// Least number of other edges of both images that speak against a pose which few of them are along.
-const OTHERS_MIN: usize = 40;
+/// Least number of edges of both images that speak against a pose which few of them are along.
+const EDGES_MIN: usize = 40;
 
 impl CornerPoseEstimator {
     /// The attitudes by which corners may be completed: the likeliest ones that one image's corners agree on, with their edges
@@ -48,7 +52,7 @@ impl CornerPoseEstimator {
     /// The attitude that most straight edges of both images have in common; where most have none, that near the first of `starts`.
     pub(crate) fn common(&self, starts: &[Matrix3<f64>]) -> Option<CommonAttitude> {
         self.right.as_ref()?;
-        let lines: Vec<StraightEdge> = self.lines().into_iter().flatten().collect();
+        let lines = self.lines();
         let of_corners = common_attitude(&lines, starts.first()?);
         let most = MOST * lines.len() as f64;
         if of_corners.as_ref().is_some_and(|common| common.support >= most) {
@@ -61,28 +65,23 @@ impl CornerPoseEstimator {
         best.filter(|common| common.support >= most).or(of_corners)
     }
 
-    /// Whether of the straight edges that do not pass its vertex no larger share runs along the axes of a pose than of random ones: then
-    /// nothing but its own three edges says that they are at right angles.
+    /// Whether no more of the straight edges runs along the axes of a pose than of random ones: then nothing but three short edges of
+    /// its own says that they are at right angles.
     pub(crate) fn stands_alone(&self, pose: &Hypothesis) -> bool {
-        let (Some((_, left_from_right)), Some(vertex_m)) = (&self.right, pose.vertex_m) else { return false };
-        if self.is_one_object() || self.options.angle != IncludedAngle::RIGHT {
+        if self.right.is_none() || self.is_one_object() || self.options.angle != IncludedAngle::RIGHT {
             return false;
         }
-        let (mut along, mut all) = (0, 0);
-        for (lines, from_m) in self.lines().iter().zip([Vector3::zeros(), left_from_right.translation_m]) {
-            let vertex = (vertex_m - from_m).normalize();
-            let of_image = along_axes(lines, &pose.camera_from_object, &vertex, SAME_VERTEX_RAD);
-            (along, all) = (along + of_image.0, all + of_image.1);
-        }
-        all >= OTHERS_MIN && along as f64 <= AT_RANDOM * all as f64
+        let lines = self.lines();
+        lines.len() >= EDGES_MIN && share_along_axes(&lines, &pose.camera_from_object) <= AT_RANDOM
     }
 
     /// The longer straight edges of the images that were looked at last.
-    fn lines(&self) -> [Vec<StraightEdge>; 2] {
-        let (left, right) = (self.left.segments(&self.scratch[0]), self.right.as_ref());
-        let of_right = right.map(|(detector, left_from_right)| {
-            StraightEdge::of(detector.segments(&self.scratch[1]), &left_from_right.rotation).collect()
-        });
-        [StraightEdge::of(left, &Matrix3::identity()).collect(), of_right.unwrap_or_default()]
+    fn lines(&self) -> Vec<StraightEdge> {
+        let mut lines: Vec<StraightEdge> =
+            StraightEdge::of(self.left.segments(&self.scratch[0]), &Matrix3::identity()).collect();
+        if let Some((detector, left_from_right)) = &self.right {
+            lines.extend(StraightEdge::of(detector.segments(&self.scratch[1]), &left_from_right.rotation));
+        }
+        lines
     }
 }
