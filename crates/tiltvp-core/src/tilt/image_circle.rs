@@ -137,6 +137,10 @@ impl ImageCircle {
             if agree > best.0 {
                 best = (agree, circle);
             }
+            // Few stray from it: no other is far from this one.
+            if agree * 8 >= count * 7 {
+                break;
+            }
         }
         let (mut agree, mut circle) = best;
         for _ in 0..2 {
