@@ -21,10 +21,10 @@ if TYPE_CHECKING:
 __all__ = ["MarkerLooks", "MarkerPose"]
 
 _REFINEMENTS: Final = {"": "CORNER_REFINE_SUBPIX", ", AprilTag's corners": "CORNER_REFINE_APRILTAG"}
-"""How corners are found between pixels: as is usual, and as was best of OpenCV's four ways, in 60 times as long."""
+"""How corners are found between pixels: as is usual, and as was best of OpenCV's four ways (12 frames at 1.1 m)."""
 
 _ITERATIONS: Final = 10
-"""Of Gauss and Newton's method, from one camera's pose: the last one moves nothing by a micrometre."""
+"""Of Gauss and Newton's method, from one camera's pose; no test of convergence."""
 
 _CARD_M: Final = 0.001
 """How far a marker is before its face (`tiltvp.synth.Laboratory`)."""
