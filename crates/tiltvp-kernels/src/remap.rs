@@ -13,28 +13,28 @@ const PLACE_BITS: u32 = 16;
 const WEIGHT_BITS: u32 = 8;
 const WEIGHT_MAX: i32 = (1 << WEIGHT_BITS) - 1;
 
-/// A few pixels of the new image, and where the first of each row and of each column is in the old one.
+/// A few pixels of the new image, and where they are in the old one.
 #[derive(Debug, Clone, Copy)]
 pub struct Patch {
     /// Columns and rows, from 1 to [`COLUMNS`] columns.
     pub size: [usize; 2],
-    /// Of the first pixel, of the one `reach` columns to its right, of the one `reach` rows below, and of the one after both:
-    /// column and row in the old image, less those of `origin`; below 2^15.
-    pub corners: [[f32; 2]; 4],
-    /// Columns and rows between corners, at least 1.
-    pub reach: [usize; 2],
+    /// Column and row in the old image, less those of `origin`, of the pixel in column i and row j: sums of these times
+    /// 1, i, j, i j, i^2, j^2, i^2 j, i j^2; from 0 to below 2^15.
+    pub places: [[f32; 8]; 2],
     /// A pixel of the old image, above and left of all places: its place in the data in bytes.
     pub origin: u32,
 }
 
 type Lanes = [i32; COLUMNS];
 
-/// Places over a patch along an axis, with [`PLACE_BITS`] behind the point: bilinear, so that two sums lead from a row to the next.
+/// Places over a patch along an axis, with [`PLACE_BITS`] behind the point: parabolas, so that sums lead from a row to the next.
 struct Axis {
     /// Of the pixels of the row.
     row: Lanes,
     /// From a row to the next.
     down: Lanes,
+    /// By how much that grows with each row.
+    bend: Lanes,
 }
 
 /// The places of a row of a patch: first bytes of pixels, and the weights of their right and lower neighbours.
@@ -48,21 +48,18 @@ struct Row {
 
 /// The places along an axis, relative to the origin.
 #[inline(always)]
-fn axis<const AXIS: usize>(patch: &Patch) -> Axis {
-    let [left_top, right_top, left_bottom, right_bottom] = &patch.corners;
-    let unit = (1 << PLACE_BITS) as f32;
-    let (across, down) = (unit / patch.reach[0] as f32, 1.0 / patch.reach[1] as f32);
-    let (top, bottom) = (right_top[AXIS] - left_top[AXIS], right_bottom[AXIS] - left_bottom[AXIS]);
+fn axis(terms: &[f32; 8], columns: usize) -> Axis {
+    const UNIT: f32 = (1 << PLACE_BITS) as f32;
     // Half a weight more, for weights are cut off.
-    let first = (left_top[AXIS] * unit) as i32 + (1 << (PLACE_BITS - WEIGHT_BITS - 1));
-    let step = (top * across) as i32;
-    let first_down = ((left_bottom[AXIS] - left_top[AXIS]) * unit * down) as i32;
-    let step_down = ((bottom - top) * across * down) as i32;
-    let mut places = Axis { row: [0; COLUMNS], down: [0; COLUMNS] };
-    for i in 0..COLUMNS {
-        let column = i.min(patch.size[0] - 1) as i32;
-        places.row[i] = first.wrapping_add(step.wrapping_mul(column));
-        places.down[i] = first_down.wrapping_add(step_down.wrapping_mul(column));
+    const HALF: i32 = 1 << (PLACE_BITS - WEIGHT_BITS - 1);
+    let [one, i, j, ij, ii, jj, iij, ijj] = *terms;
+    let mut places = Axis { row: [0; COLUMNS], down: [0; COLUMNS], bend: [0; COLUMNS] };
+    for k in 0..COLUMNS {
+        let column = k.min(columns - 1) as f32;
+        let bend = jj + ijj * column;
+        places.row[k] = ((one + (i + ii * column) * column) * UNIT) as i32 + HALF;
+        places.down[k] = ((j + (ij + iij * column) * column + bend) * UNIT) as i32;
+        places.bend[k] = (2.0 * bend * UNIT) as i32;
     }
     places
 }
@@ -83,6 +80,10 @@ fn places<const CHANNELS: usize>(u: &mut Axis, v: &mut Axis, origin: u32, stride
     for i in 0..COLUMNS {
         u.row[i] = u.row[i].wrapping_add(u.down[i]);
         v.row[i] = v.row[i].wrapping_add(v.down[i]);
+    }
+    for i in 0..COLUMNS {
+        u.down[i] = u.down[i].wrapping_add(u.bend[i]);
+        v.down[i] = v.down[i].wrapping_add(v.bend[i]);
     }
     found
 }
@@ -112,7 +113,7 @@ vectorised! {
     /// If a patch is wider than [`COLUMNS`], or `out` ends within it.
     pub fn fill_gray(data: &[u8], stride: usize, patch: &Patch, out: &mut [u8], out_stride: usize) -> bool {
         let columns = patch.size[0];
-        let (mut u, mut v) = (axis::<0>(patch), axis::<1>(patch));
+        let (mut u, mut v) = (axis(&patch.places[0], columns), axis(&patch.places[1], columns));
         let mut levels = [0; COLUMNS];
         for number in 0..patch.size[1] {
             let row = places::<1>(&mut u, &mut v, patch.origin, stride);
@@ -136,7 +137,7 @@ vectorised! {
     /// As [`fill_gray`].
     pub fn fill_color(data: &[u8], stride: usize, patch: &Patch, out: &mut [u8], out_stride: usize) -> bool {
         let columns = patch.size[0];
-        let (mut u, mut v) = (axis::<0>(patch), axis::<1>(patch));
+        let (mut u, mut v) = (axis(&patch.places[0], columns), axis(&patch.places[1], columns));
         for number in 0..patch.size[1] {
             let row = places::<3>(&mut u, &mut v, patch.origin, stride);
             let Some(words) = neighbours(data, stride, &row.first) else { return false };
@@ -205,20 +206,19 @@ mod tests {
     fn patches_are_what_interpolation_of_places_and_levels_says() {
         let gray: Vec<u8> = (0..40 * 40).map(|k| ((k * 7 + k / WIDTH * 31) % 251) as u8).collect();
         let color: Vec<u8> = (0..3 * 40 * 40).map(|k| ((k * 13 + k / 120 * 17) % 253) as u8).collect();
-        let corners = [[3.2, 2.5], [14.7, 5.1], [1.1, 13.9], [13.3, 17.4]];
+        let places =
+            [[3.2, 1.4, -0.3, 0.02, 0.03, 0.01, 0.002, -0.001], [2.5, 0.3, 1.6, 0.01, -0.02, 0.02, -0.001, 0.002]];
         for size in [[8, 8], [5, 8], [1, 1], [8, 3]] {
-            let reach = size.map(|n: usize| n.max(2) - 1);
-            let patch = Patch { size, corners, reach, origin: (4 * WIDTH + 6) as u32 };
+            let patch = Patch { size, places, origin: (4 * WIDTH + 6) as u32 };
             let (mut grays, mut colors) = ([0; 9 * 8], [0; 25 * 8]);
             assert!(fill_gray(&gray, WIDTH, &patch, &mut grays, 9));
             let patch = Patch { origin: 3 * patch.origin, ..patch };
             assert!(fill_color(&color, 3 * WIDTH, &patch, &mut colors, 25));
             for (row, column) in (0..size[1]).flat_map(|row| (0..size[0]).map(move |column| (row, column))) {
-                let (t, s) = (row as f32 / reach[1] as f32, column as f32 / reach[0] as f32);
-                let place: [f32; 2] = std::array::from_fn(|k| {
-                    let [a, b, c, d] = corners.map(|corner| corner[k]);
-                    let origin = [6.0, 4.0][k];
-                    origin + (a + (b - a) * s) * (1.0 - t) + (c + (d - c) * s) * t
+                let (i, j) = (column as f32, row as f32);
+                let powers = [1.0, i, j, i * j, i * i, j * j, i * i * j, i * j * j];
+                let place: [f32; 2] = std::array::from_fn(|axis| {
+                    [6.0, 4.0][axis] + places[axis].iter().zip(powers).map(|(term, power)| term * power).sum::<f32>()
                 });
                 // A weight is rounded to 1/256 on either axis, and neighbours differ by at most 253 levels.
                 let near =
@@ -235,15 +235,16 @@ mod tests {
     #[test]
     fn whole_places_are_copied_and_places_outside_the_data_are_told() {
         let data: Vec<u8> = (0..=255).collect();
-        let corners = [[0.0, 0.0], [7.0, 0.0], [0.0, 7.0], [7.0, 7.0]];
-        let patch = Patch { size: [8, 8], corners, reach: [7, 7], origin: 17 };
+        let mut places = [[0.0; 8]; 2];
+        (places[0][1], places[1][2]) = (1.0, 1.0);
+        let patch = Patch { size: [8, 8], places, origin: 17 };
         let mut out = [0; 64];
         assert!(fill_gray(&data, 16, &patch, &mut out, 8));
         assert!((0..64).all(|k| usize::from(out[k]) == 17 + k / 8 * 16 + k % 8));
         assert!(!fill_gray(&data, 16, &Patch { origin: 150, ..patch }, &mut out, 8));
         assert!(!fill_gray(&data, 16, &Patch { origin: u32::MAX, ..patch }, &mut out, 8));
         assert!(!fill_color(&data, 16, &Patch { origin: 120, ..patch }, &mut out, 8));
-        let back = corners.map(|corner| corner.map(|c| -2.0 * c));
-        assert!(!fill_gray(&data, 16, &Patch { corners: back, origin: 17, ..patch }, &mut out, 8));
+        let back = places.map(|axis| axis.map(|term| -2.0 * term));
+        assert!(!fill_gray(&data, 16, &Patch { places: back, origin: 17, ..patch }, &mut out, 8));
     }
 }

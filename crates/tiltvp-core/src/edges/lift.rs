@@ -38,12 +38,13 @@ impl LiftTable {
         let map = |slot: usize| -> Matrix3x2<f64> {
             let (u, v) = region.place(slot);
             let pixel = Vector2::new(f64::from(u), f64::from(v));
+            let back = camera.unproject_jacobian(&pixel).map(|(_, back)| back);
             let matrix = match kind {
+                // d pixel / d bearing is the pseudoinverse of d bearing / d pixel: neither has a part along the bearing.
                 NormalKind::Tangent => {
-                    let forward = camera.unproject(&pixel).and_then(|bearing| camera.project_jacobian(&bearing));
-                    forward.map(|(_, forward)| forward.transpose())
+                    back.and_then(|back| (back.transpose() * back).try_inverse().map(|inverse| back * inverse))
                 }
-                NormalKind::Gradient => camera.unproject_jacobian(&pixel).map(|(_, back)| back),
+                NormalKind::Gradient => back,
             };
             matrix.map_or(Matrix3x2::zeros(), |matrix| robot_from_camera * matrix)
         };

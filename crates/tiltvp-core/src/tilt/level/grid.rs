@@ -2,34 +2,47 @@
 
 use nalgebra::{Matrix3, Vector2, Vector3};
 
+use super::surface::Surface;
 use crate::camera::{Camera, Model};
 
-/// Pixels from one corner of a cell to the next: as many as the kernel works on together. Larger cells must be split in most of the
-/// image, smaller ones cost more projections.
-pub(super) const CELL: usize = 8;
+/// Pixels from one corner of a cell to the next: 1,271 corners are projected for a 640 x 480 image. With 8 pixels they are 4,941 and most
+/// of the time of an OCam lens; larger cells were not tried.
+pub(super) const CELL: usize = 16;
 
 /// Cells are split until they are so small; then each pixel is projected by itself.
-const SMALLEST: usize = 2;
+const SMALLEST: usize = 4;
 
-/// How far interpolation may be wrong, in pixels: a quarter of the bound that [`MAP_ERROR_PX`](super::MAP_ERROR_PX) promises, for the second
-/// differences that tell it are those at a cell's corners, not within it.
+/// How far interpolation may be wrong, in pixels: a quarter of the bound that [`MAP_ERROR_PX`](super::MAP_ERROR_PX) promises, for what
+/// tells it are differences at a cell's corners, or two of its places.
 const BEND_MAX_PX: f64 = 0.0125;
+
+/// How far wrong differences may say that it is where two places say that it is right. With twice as much, maps of lenses that fold are
+/// wrong by more than is promised (`maps_are_as_exact_as_they_say`).
+const FITTING_PX: f64 = 4.0 * BEND_MAX_PX;
+
+/// Beyond such errors differences do not tell those of smaller cells: without a limit two places were right and others 4 px off.
+const TOLD_PX: f64 = 8.0 * FITTING_PX;
+
+/// Part of a third difference that interpolation by second differences (Bessel's) is taken to be wrong by. It is 1/125 where fourth ones
+/// are nothing.
+const OF_THIRD: f64 = 1.0 / 32.0;
+
+/// Part of that error that one of half the size has, an eighth of the third difference, by second differences of one end (1/16 of it).
+const OF_HALF: f64 = 0.25;
 
 /// By how much more the map is taken to bend at the image's border than a cell's length before it: with it all lenses of the zoo stay
 /// within the bound.
 const BORDER: f64 = 4.0;
 
-/// Rows of a panorama beside its poles where columns turn too fast for a grid to tell.
-const POLE_PX: f64 = 2.0 * CELL as f64;
+/// Rows of a panorama beside its poles where columns turn too fast for a grid to tell. With half as many a map was 0.054 px off.
+const POLE_PX: f64 = 8.0;
 
-/// A rectangle of pixels of the new image, and the places of its corners: at its first pixel, and `reach` columns and rows from there.
+/// A rectangle of pixels of the new image, and where they are in the old one: in its pixels, on one side of its seam.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Cell {
     pub(super) first: [usize; 2],
     pub(super) size: [usize; 2],
-    pub(super) reach: [usize; 2],
-    /// Left above, right above, left below, right below; in pixels of the old image, on one side of its seam.
-    pub(super) corners: [Vector2<f64>; 4],
+    pub(super) places: Surface,
 }
 
 /// What is done with places.
@@ -68,18 +81,18 @@ impl<'a> Places<'a> {
         way
     }
 
-    /// What a line through three places in equal steps is wrong by in the middle of a step, in pixels; in a panorama a column counts as
-    /// much as it is wide there.
-    fn bend(&self, three: [&Vector2<f64>; 3]) -> f64 {
-        if self.is_polar(three[1]) {
-            return f64::INFINITY;
-        }
-        let mut second = self.between(three[1], three[2]) - self.between(three[0], three[1]);
+    /// The second difference over a step of three places, of which the last is `last` steps from the middle one.
+    fn second(&self, three: [&Vector2<f64>; 3], last: f64) -> Vector2<f64> {
+        (self.between(three[1], three[2]) / last - self.between(three[0], three[1])) * (2.0 / (1.0 + last))
+    }
+
+    /// How long a difference is in pixels; in a panorama a column counts as much as it is wide there.
+    fn length(&self, mut difference: Vector2<f64>, at: &Vector2<f64>) -> f64 {
         if self.period.is_some() {
             let height = f64::from(self.camera.height());
-            second.x *= (std::f64::consts::PI * ((three[1].y + 0.5) / height)).sin();
+            difference.x *= (std::f64::consts::PI * ((at.y + 0.5) / height)).sin();
         }
-        second.norm() / 8.0
+        difference.norm()
     }
 
     /// Whether a place is beside a pole of a panorama.
@@ -121,48 +134,100 @@ impl Corners {
         sink: &mut impl Sink,
     ) {
         let found = found_places(corner_rays, places);
-        let bends = self.bends(&found, places);
-        let [across, down] = self.counts;
-        for (j, i) in (0..down - 1).flat_map(|j| (0..across - 1).map(move |i| (j, i))) {
-            let at = j * across + i;
-            let four = [at, at + 1, at + across, at + across + 1];
+        let [across, down] = [0, 1].map(|axis| self.differences(axis, &found, places));
+        let [columns, rows] = self.counts;
+        for (j, i) in (0..rows - 1).flat_map(|j| (0..columns - 1).map(move |i| (j, i))) {
+            let at = j * columns + i;
+            let [a, b, c, d] = [at, at + 1, at + columns, at + columns + 1];
             let first = [i * CELL, j * CELL];
             let size = std::array::from_fn(|axis| CELL.min(self.image[axis] - first[axis]));
             let reach = std::array::from_fn(|axis| CELL.min(self.image[axis] - 1 - first[axis]).max(1));
-            let bend = four.iter().map(|k| bends[*k]).fold(0.0, f64::max);
-            let corners = four.map(|k| found[k]);
-            let whole = corners.iter().all(|corner| corner.x.is_finite());
-            if whole && bend <= BEND_MAX_PX {
-                sink.cell(&Cell { first, size, reach, corners: places.together(corners) });
+            let corners = [a, b, c, d].map(|k| found[k]);
+            let error = across.errors[a].max(across.errors[c]) + down.errors[a].max(down.errors[b]);
+            let is_own = across.is_own[a] && across.is_own[c] && down.is_own[a] && down.is_own[b];
+            let whole = corners.iter().all(|corner| corner.x.is_finite() && !places.is_polar(corner));
+            let surface = whole.then(|| {
+                let corners = places.together(corners);
+                Surface::new(
+                    corners,
+                    across.over([[a, b], [c, d]], reach[0]),
+                    down.over([[a, c], [b, d]], reach[1]),
+                    reach,
+                )
+            });
+            let surface = surface.filter(|surface| {
+                (is_own && error <= BEND_MAX_PX) || (error <= FITTING_PX && fits(surface, first, size, ray, places))
+            });
+            if let Some(places) = surface {
+                sink.cell(&Cell { first, size, places });
             } else if corners.iter().any(|corner| corner.x.is_finite()) || is_seen(ray, places, first, size) {
                 let corners = corners.map(|corner| corner.x.is_finite().then_some(corner));
-                split(first, size, (reach == size).then_some(corners), ray, places, sink);
+                let error = if is_own && error <= TOLD_PX { OF_HALF * error } else { f64::INFINITY };
+                split(first, size, (reach == size).then_some(corners), error, ray, places, sink);
             }
         }
     }
 
-    /// By how much interpolation errs about each corner; infinite where neighbours do not tell.
-    fn bends(&self, found: &[Vector2<f64>], places: &Places<'_>) -> Vec<f64> {
-        let [across, down] = self.counts;
-        let mut bends = vec![f64::INFINITY; found.len()];
-        if across < 4 || down < 4 {
-            return bends;
-        }
-        let (last_across, last_down) = (across - 3, down - 3);
-        for (j, i) in (1..=last_down).flat_map(|j| (1..=last_across).map(move |i| (j, i))) {
-            let at = j * across + i;
-            let along = |step: usize| places.bend([&found[at - step], &found[at], &found[at + step]]);
-            let bend = along(1) + along(across);
-            bends[at] = if bend.is_nan() { f64::INFINITY } else { bend };
-        }
-        // At the border, whose last corners are nearer to one another, lenses bend more than where the next corners are.
-        for (j, i) in (0..down).flat_map(|j| (0..across).map(move |i| (j, i))) {
-            let next = j.clamp(1, last_down) * across + i.clamp(1, last_across);
-            if next != j * across + i {
-                bends[j * across + i] = BORDER * bends[next];
+    /// How places bend from corner to corner along an axis.
+    fn differences(&self, axis: usize, found: &[Vector2<f64>], places: &Places<'_>) -> Differences {
+        let count = self.counts[axis];
+        let (stride, next) = if axis == 0 { (1, self.counts[0]) } else { (self.counts[0], 1) };
+        let mut made = Differences {
+            seconds: vec![Vector2::repeat(f64::NAN); found.len()],
+            errors: vec![f64::INFINITY; found.len()],
+            is_own: vec![false; found.len()],
+        };
+        let (mut seconds, mut errors) = (vec![Vector2::zeros(); count], vec![0.0; count]);
+        for line in 0..self.counts[1 - axis] {
+            let at = |k: usize| line * next + k * stride;
+            seconds.fill(Vector2::repeat(f64::NAN));
+            errors.fill(f64::NAN);
+            for k in 1..count.saturating_sub(1) {
+                seconds[k] = places.second([&found[at(k - 1)], &found[at(k)], &found[at(k + 1)]], self.step(axis, k));
+            }
+            for k in 1..count.saturating_sub(2) {
+                errors[k] = OF_THIRD * places.length(seconds[k + 1] - seconds[k], &found[at(k)]);
+            }
+            for k in 0..count {
+                let nearest = |is_known: &dyn Fn(usize) -> bool| {
+                    [k, k + 1, k.wrapping_sub(1), k + 2, k.wrapping_sub(2)]
+                        .into_iter()
+                        .find(|k| *k < count && is_known(*k))
+                };
+                if let Some(known) = nearest(&|k| seconds[k].x.is_finite()) {
+                    made.seconds[at(k)] = seconds[known];
+                }
+                let both = k + 1 < count && found[at(k)].x.is_finite() && found[at(k + 1)].x.is_finite();
+                if both && let Some(known) = nearest(&|k| errors[k].is_finite()) {
+                    made.errors[at(k)] = if known == k { errors[k] } else { BORDER * errors[known] };
+                    made.is_own[at(k)] = known == k;
+                }
             }
         }
-        bends
+        made
+    }
+
+    /// Pixels from a corner to the next along an axis, in [`CELL`]s: fewer for the last.
+    fn step(&self, axis: usize, k: usize) -> f64 {
+        (self.image[axis] - 1 - k * CELL).min(CELL) as f64 / CELL as f64
+    }
+}
+
+/// Differences between the corners of cells along an axis.
+struct Differences {
+    /// Second ones at each corner: its own, or where it has no neighbours those of the nearest that has.
+    seconds: Vec<Vector2<f64>>,
+    /// By how much interpolation with them errs from each corner to the next, in pixels; infinite where nothing tells.
+    errors: Vec<f64>,
+    /// Whether that is of this step, not of one beside it.
+    is_own: Vec<bool>,
+}
+
+impl Differences {
+    /// Mean second differences of two pairs of corners, over so many pixels.
+    fn over(&self, pairs: [[usize; 2]; 2], reach: usize) -> [Vector2<f64>; 2] {
+        let half = 0.5 * (reach as f64 / CELL as f64).powi(2);
+        pairs.map(|[one, other]| (self.seconds[one] + self.seconds[other]) * half)
     }
 }
 
@@ -176,11 +241,13 @@ fn is_seen(
     places.of(ray([first[0] + size[0] / 2, first[1] + size[1] / 2])).is_some()
 }
 
-/// Goes on with quarters of a cell if its corners, `size` apart, are given, and with its pixels if not.
+/// Goes on with quarters of a cell if its corners, `size` apart, are given, and with its pixels if not. `error` is what interpolation over
+/// quarters is wrong by, infinite if that is not known.
 fn split(
     first: [usize; 2],
     size: [usize; 2],
     corners: Option<[Option<Vector2<f64>>; 4]>,
+    error: f64,
     ray: &impl Fn([usize; 2]) -> Option<Vector3<f64>>,
     places: &Places<'_>,
     sink: &mut impl Sink,
@@ -202,23 +269,47 @@ fn split(
             _ => places.of(ray([first[0] + half * i, first[1] + half * j])),
         };
     }
-    let is_flat = nine.as_flattened().iter().all(Option::is_some) && {
-        let all = nine.map(|row| row.map(Option::unwrap_or_default));
-        let across = all.iter().map(|[a, b, c]| places.bend([a, b, c])).fold(0.0, f64::max);
-        let down = (0..3).map(|i| places.bend([&all[0][i], &all[1][i], &all[2][i]])).fold(0.0, f64::max);
-        across + down <= BEND_MAX_PX
+    let second = |three: [Option<Vector2<f64>>; 3]| match three {
+        [Some(a), Some(b), Some(c)] if !places.is_polar(&b) => Some(places.second([&a, &b, &c], 1.0)),
+        _ => None,
     };
+    let (across, down) = (nine.map(second), [0, 1, 2].map(|i| second([nine[0][i], nine[1][i], nine[2][i]])));
     for (j, i) in [(0, 0), (0, 1), (1, 0), (1, 1)] {
         let four = [nine[j][i], nine[j][i + 1], nine[j + 1][i], nine[j + 1][i + 1]];
         let (first, size) = ([first[0] + half * i, first[1] + half * j], [half; 2]);
-        match four {
-            [Some(a), Some(b), Some(c), Some(d)] if is_flat => {
-                sink.cell(&Cell { first, size, reach: size, corners: places.together([a, b, c, d]) });
+        let surface = match (four, [across[j], across[j + 1], down[i], down[i + 1]]) {
+            ([Some(a), Some(b), Some(c), Some(d)], [Some(above), Some(below), Some(left), Some(right)]) => {
+                let surface = Surface::new(places.together([a, b, c, d]), [above, below], [left, right], size);
+                let bend =
+                    [above, below, left, right].iter().map(|bend| places.length(*bend, &a) / 8.0).fold(0.0, f64::max);
+                (error.min(bend) <= FITTING_PX && fits(&surface, first, size, ray, places)).then_some(surface)
             }
-            [None, None, None, None] => {}
-            _ => split(first, size, Some(four), ray, places, sink),
+            _ => None,
+        };
+        match surface {
+            Some(places) => sink.cell(&Cell { first, size, places }),
+            None if four.iter().all(Option::is_none) => {}
+            None => split(first, size, Some(four), error / 8.0, ray, places, sink),
         }
     }
+}
+
+/// Whether a surface is where two pixels are, at which no errors of a third difference across and one down cancel each other.
+fn fits(
+    surface: &Surface,
+    first: [usize; 2],
+    size: [usize; 2],
+    ray: &impl Fn([usize; 2]) -> Option<Vector3<f64>>,
+    places: &Places<'_>,
+) -> bool {
+    let [across, down] = size.map(|side| side / 4);
+    [[across, down], [size[0] - across, down]].into_iter().all(|[column, row]| {
+        let column = column.min(size[0] - 1);
+        places.of(ray([first[0] + column, first[1] + row])).is_some_and(|exact| {
+            let found = surface.at([column, row]);
+            places.length(places.between(&found, &exact), &exact) <= BEND_MAX_PX
+        })
+    })
 }
 
 /// The places of corners, NaN where there is none.

@@ -3,5 +3,6 @@
 mod grid;
 mod leveller;
 mod pixels;
+mod surface;
 
 pub use leveller::{Leveller, MAP_ERROR_PX};

@@ -1,7 +1,7 @@
 //! What is done with places: levels of the old image are taken there, or the places are written down.
 
 use nalgebra::Vector2;
-use tiltvp_kernels::remap::{Patch, fill_color, fill_gray};
+use tiltvp_kernels::remap::{COLUMNS, Patch, fill_color, fill_gray};
 
 use super::grid::{Cell, Sink};
 
@@ -42,16 +42,21 @@ impl<const CHANNELS: usize> Source<'_, CHANNELS> {
             return None;
         }
         // As many steps from one pixel to the next as in the kernel, so that there is no seam between what the two have made.
-        let fixed = place.map(|at| (at * 256.0 + 0.5).floor() / 256.0);
-        let (u, v) = (fixed.x.floor(), fixed.y.floor());
-        let (right, below) = (fixed.x - u, fixed.y - v);
-        let (u, v) = (u as i64, v as i64);
+        let [u, v] = [place.x, place.y].map(|at| floor(at * 256.0 + 0.5));
+        let [right, below] = [u, v].map(|at| (at & 255) as f64 / 256.0);
+        let (u, v) = (u >> 8, v >> 8);
         let [a, b, c, d] = [(u, v), (u + 1, v), (u, v + 1), (u + 1, v + 1)].map(|(u, v)| self.at(u, v));
         Some(std::array::from_fn(|k| {
             let (above, under) = (a[k] + (b[k] - a[k]) * right, c[k] + (d[k] - c[k]) * right);
             (above + (under - above) * below + 0.5) as u8
         }))
     }
+}
+
+/// The same as the function of floats, by instructions that every processor has.
+fn floor(x: f64) -> i64 {
+    let cut = x as i64;
+    if (cut as f64) > x { cut - 1 } else { cut }
 }
 
 /// Fills an image.
@@ -64,26 +69,34 @@ pub(super) struct Fill<'a, const CHANNELS: usize> {
 impl<const CHANNELS: usize> Fill<'_, CHANNELS> {
     /// By the kernel, where all places have neighbours in the image.
     fn at_once(&mut self, cell: &Cell) -> bool {
-        let (low, high) = cell.corners[1..]
-            .iter()
-            .fold((cell.corners[0], cell.corners[0]), |(low, high), corner| (low.inf(corner), high.sup(corner)));
+        let (low, high) = cell.places.bounds(cell.size);
         let last = Vector2::new(self.source.width as f64 - 1.0, self.source.height as f64 - 1.0);
-        let origin = low.map(f64::floor);
+        let origin = low.map(|at| floor(at) as f64);
         let is_inside = low.min() >= 0.0 && (last - high).min() >= MARGIN_PX && (high - origin).max() < LARGEST_PX;
         if !is_inside {
             return false;
         }
         let place = (origin.y as usize * self.source.width + origin.x as usize) * CHANNELS;
         let Ok(origin_byte) = u32::try_from(place) else { return false };
-        let corners = cell.corners.map(|corner| [(corner.x - origin.x) as f32, (corner.y - origin.y) as f32]);
-        let patch = Patch { size: cell.size, corners, reach: cell.reach, origin: origin_byte };
         let (stride, out_stride) = (self.source.width * CHANNELS, self.width * CHANNELS);
-        let out = &mut self.out[(cell.first[1] * self.width + cell.first[0]) * CHANNELS..];
-        match CHANNELS {
-            1 => fill_gray(self.source.data, stride, &patch, out, out_stride),
-            3 => fill_color(self.source.data, stride, &patch, out, out_stride),
-            _ => false,
+        for column in (0..cell.size[0]).step_by(COLUMNS) {
+            let from_here = cell.places.starting_at(column);
+            let patch = Patch {
+                size: [COLUMNS.min(cell.size[0] - column), cell.size[1]],
+                places: [from_here.along(0, origin.x), from_here.along(1, origin.y)],
+                origin: origin_byte,
+            };
+            let out = &mut self.out[(cell.first[1] * self.width + cell.first[0] + column) * CHANNELS..];
+            let is_filled = match CHANNELS {
+                1 => fill_gray(self.source.data, stride, &patch, out, out_stride),
+                3 => fill_color(self.source.data, stride, &patch, out, out_stride),
+                _ => false,
+            };
+            if !is_filled {
+                return false;
+            }
         }
+        true
     }
 }
 
@@ -124,13 +137,7 @@ impl Sink for Map<'_> {
 
 /// Each pixel of a cell with its interpolated place.
 fn one_by_one(cell: &Cell, sink: &mut impl Sink) {
-    let [a, b, c, d] = cell.corners;
-    for row in 0..cell.size[1] {
-        let down = row as f64 / cell.reach[1] as f64;
-        let (left, right) = (a + (c - a) * down, b + (d - b) * down);
-        for column in 0..cell.size[0] {
-            let across = column as f64 / cell.reach[0] as f64;
-            sink.pixel([cell.first[0] + column, cell.first[1] + row], left + (right - left) * across);
-        }
+    for (row, column) in (0..cell.size[1]).flat_map(|row| (0..cell.size[0]).map(move |column| (row, column))) {
+        sink.pixel([cell.first[0] + column, cell.first[1] + row], cell.places.at([column, row]));
     }
 }
