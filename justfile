@@ -211,6 +211,10 @@ mutants shard="0/64" *arguments:
     PROPTEST_RNG_SEED=20171028 PROPTEST_CASES=32 CARGO_INCREMENTAL=1 target/tools/bin/cargo-mutants mutants \
         --in-place --baseline skip --timeout 120 --sharding round-robin --shard {{shard}} --output out {{arguments}}
 
+# Those that `just mutants` has found to be missed, tested by the kept answers, which need the extension: two minutes each.
+mutants-missed: setup
+    PYTHONPATH=tests {{bin}}/python tests/missed_mutants.py
+
 # The tests on real data, in the folder that TILTVP_DATA names.
 test-real *arguments: setup
     {{bin}}/pytest --quiet --numprocesses 2 --dist worksteal tests/real_data {{arguments}}

@@ -180,7 +180,7 @@ fn two_cameras_reach_the_bound_and_choose_rightly() {
     let (left_from_right, right_from_left) = right_camera();
     let cameras = [RigidMotion::identity(), right_from_left];
     let (mut squares, mut bounds, mut nees, mut chi) = ([0.0; 2], [0.0; 2], Vec::new(), Vec::new());
-    let (mut told, mut expected, mut right) = (0.0, 0.0, 0.0);
+    let (mut told, mut expected, mut right, mut chi_apart) = (0.0, 0.0, 0.0, Vec::new());
     let mut poses = 0;
     while poses < 1000 {
         let truth = Truth::random(&mut rng);
@@ -222,6 +222,8 @@ fn two_cameras_reach_the_bound_and_choose_rightly() {
         let all = SVector::<f64, 6>::from_iterator(off.iter().chain(away.iter()).copied());
         nees.push(squared_mahalanobis(&all, &best.covariance).unwrap());
         chi.push(best.chi_square);
+        let apart = corner_poses(&left, &other, &left_from_right, &CornerOptions { fuse: false, ..options }).unwrap();
+        chi_apart.extend(apart.iter().find(|pose| pose.case == best.case).map(|pose| pose.chi_square));
         assert_eq!(best.right_handed, truth.side > 0.0);
     }
     for (squares, bounds) in squares.iter().zip(bounds) {
@@ -232,6 +234,8 @@ fn two_cameras_reach_the_bound_and_choose_rightly() {
     let band = ConsistencyBand::of_mean(0.9999, 6, 1000).unwrap();
     assert!(band.holds(mean(&nees)), "nees {} {band:?}", mean(&nees));
     assert!(band.holds(mean(&chi)), "chi-square {} {band:?}", mean(&chi));
+    // Of attitudes and vertices apart there are as many: three of the attitudes, one of each feature and one of the vertex.
+    assert!(band.holds(mean(&chi_apart)), "chi-square apart {} {band:?}", mean(&chi_apart));
     // The probabilities are true: as often right as they say, within four standard deviations.
     let deviation = (expected * (1.0 - expected / 1000.0)).max(1.0).sqrt();
     assert!((right - expected).abs() < 4.0 * deviation + 1.0, "{right} right of {expected} expected, {told} told");

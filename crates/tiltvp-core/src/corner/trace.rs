@@ -291,6 +291,25 @@ fn keep_alike(places: &mut Vec<EdgePoint>, step_share_min: f64, first_px: f64, s
 mod tests {
     use super::*;
 
+    /// Steps of the first ten profiles are 40; of the others one is too weak, one is of the other sign, and one comes after a gap.
+    #[test]
+    fn places_are_kept_while_their_steps_are_alike() {
+        let place = |profile: usize, step: f64| EdgePoint {
+            profile,
+            along: [1.0, 0.0],
+            shift_rad: 0.0,
+            step,
+            rad_per_px: 1e-3,
+        };
+        let mut places: Vec<EdgePoint> = (0..10).map(|profile| place(profile, -40.0)).collect();
+        places.extend([place(10, -19.0), place(11, 40.0), place(12, -21.0), place(13, -400.0)]);
+        let gap = (GAP_MAX_PX / 2.0).ceil() as usize + 1;
+        places.push(place(13 + gap, -40.0));
+        keep_alike(&mut places, 0.5, 20.0, 2.0, &mut Vec::new());
+        let kept: Vec<usize> = places.iter().map(|place| place.profile).collect();
+        assert_eq!(kept, [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 12, 13]);
+    }
+
     #[test]
     fn the_covariance_of_a_ray_is_that_of_its_places() {
         let search = RaySearch {

@@ -182,6 +182,14 @@ mod tests {
     use super::*;
 
     #[test]
+    fn no_more_landmarks_are_followed_than_there_is_room_for() {
+        let ids: Vec<u64> = (0..3).collect();
+        let after = |followed: usize| check(&WheelMotion::default(), &ids, &[0.0; 3], followed);
+        assert!(after(MOST_LANDMARKS - 3).is_ok());
+        assert!(after(MOST_LANDMARKS - 2).is_err() && after(MOST_LANDMARKS).is_err());
+    }
+
+    #[test]
     fn covariances_go_through_the_axle() {
         let covariance = Matrix3::new(4e-4, 1e-4, -2e-4, 1e-4, 9e-4, 1e-4, -2e-4, 1e-4, 5e-4);
         for rho_m in [0.3, -0.3] {

@@ -148,6 +148,15 @@ mod tests {
     use crate::edges::EdgeOptions;
 
     #[test]
+    fn corrections_are_what_they_are_written_as() {
+        for correction in
+            [Correction::None, Correction::ClosedForm, Correction::Trained(TrainedCorrection::Factor(0.9))]
+        {
+            assert_eq!(Correction::from_value(&correction.to_value()), Some(correction));
+        }
+    }
+
+    #[test]
     fn gains_of_an_equidistant_lens_are_those_of_the_formula() {
         let lens = Equidistant::new(139.7, 319.5, 239.5).unwrap();
         let camera = Camera::new(640, 480, Model::Equidistant(lens)).unwrap();

@@ -222,6 +222,16 @@ mod tests {
         }
     }
 
+    /// The residuals of a model that is no answer are none of its own.
+    #[test]
+    fn a_lean_out_of_reach_is_no_answer() {
+        let stop = Stop::Converged { iterations: 4, change: 0.0, tolerance: 1e-6 };
+        let report = FitReport { model: Some(()), inliers: 30, rms: 0.4, iterations: 4, stop };
+        let fit = Fit::out_of_reach(1.7, &report);
+        assert!(fit.rms.is_nan() && fit.tilt.is_none() && fit.iterations == 4);
+        assert_eq!(fit.stop, Stop::OutOfReach { angle_rad: 1.7, limit_rad: FRAC_PI_2 });
+    }
+
     #[test]
     fn what_is_least_probable_of_fit_and_mounting_is_the_doubt() {
         static FIT: Trust = Trust::told(-1.0, 1.0);

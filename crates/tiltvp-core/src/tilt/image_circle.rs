@@ -234,6 +234,18 @@ mod tests {
     }
 
     #[test]
+    fn a_surround_may_be_lighter_on_one_side() {
+        let mut image = image(|u, v| 60 + (u * v % 150) as u8);
+        for (i, level) in image.iter_mut().enumerate() {
+            if *level < 60 && i % SIDE as usize >= 50 {
+                *level = 30;
+            }
+        }
+        let off = off_px(&camera(104.0, 98.0), &image).unwrap();
+        assert!((off - Vector2::new(-4.0, 0.0)).norm() < 0.4, "{off}");
+    }
+
+    #[test]
     fn without_a_dark_surround_or_with_another_rim_nothing_is_told() {
         let (all, lit) = (camera(100.0, 98.0), image(|_, _| 120));
         assert_eq!(off_px(&all, &vec![120; lit.len()]), None);

@@ -173,3 +173,20 @@ pub fn train_affine(shift: &[f64], alpha_rad: &[f64]) -> Result<AffineCorrection
     }
     Ok(AffineCorrection { factor, offset_rad: alpha_mean - l_mean / factor })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn shifts_are_those_of_leans() {
+        let affine = |offset_rad: f64| TrainedCorrection::Affine(AffineCorrection { factor: 210.0, offset_rad });
+        for trained in [TrainedCorrection::Factor(230.0), affine(0.02), affine(-0.01)] {
+            for alpha_rad in [0.03, 0.1, 0.4] {
+                assert!((trained.apply(trained.shift_of(alpha_rad)) - alpha_rad).abs() < 1e-12, "{trained:?}");
+            }
+        }
+        // No shift makes a lean below the offset; it still has one.
+        assert!(affine(0.02).shift_of(0.01) > 0.0);
+    }
+}

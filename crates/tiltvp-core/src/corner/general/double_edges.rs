@@ -23,10 +23,12 @@ pub(in crate::corner) fn double_edges_rad(corner: &CornerFeature, segments: &[Se
             let px_per_rad = segment.px_per_rad;
             let off_px = segment.ends.map(|end| ray.normal.dot(&end) * px_per_rad);
             let middle_rad = ray.normal.dot(&segment.middle).abs();
+            if off_px.iter().any(|off| off.abs() > BESIDE_PX) || middle_rad * px_per_rad <= SAME_LINE_PX {
+                return None;
+            }
             let at = segment.ends.map(|end| end.dot(&along).atan2(end.dot(&vertex)));
             let [near, far] = [at[0].min(at[1]), at[0].max(at[1])];
-            let is_beside = off_px.iter().all(|off| off.abs() <= BESIDE_PX) && middle_rad * px_per_rad > SAME_LINE_PX;
-            (is_beside && far > 0.0 && near < end_rad && near * px_per_rad < BEGINS_PX).then_some(middle_rad)
+            (far > 0.0 && near < end_rad && near * px_per_rad < BEGINS_PX).then_some(middle_rad)
         });
         aside.min_by(f64::total_cmp)
     };

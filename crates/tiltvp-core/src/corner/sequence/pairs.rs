@@ -69,15 +69,6 @@ impl CornerPoseEstimator {
         if vertex.chi_square > VERTEX_SLACK * freedom * self.misfit_most().powi(2) {
             return Ok(Vec::new());
         }
-        // Where edges are double the place is known no better than they are apart: aside, as the distance is that of either.
-        let aside_rad = [(&self.left, left), (detector, right)]
-            .into_iter()
-            .zip(&self.scratch)
-            .map(|((detector, corner), scratch)| detector.double_edges_rad(corner, scratch))
-            .fold(0.0, f64::max);
-        let towards = vertex.point_m.normalize();
-        let aside_m2 = (Matrix3::identity() - towards * towards.transpose())
-            * (DOUBLE_SIGMA * aside_rad * vertex.point_m.norm()).powi(2);
         let mut found: Vec<(f64, Hypothesis)> = Vec::new();
         for (corner, rotation) in [(left, Matrix3::identity()), (right, left_from_right.rotation)] {
             for own in corner_attitudes(corner, &self.options.angle)?.iter() {
@@ -110,20 +101,33 @@ impl CornerPoseEstimator {
                 let scale = (0.25 * self.options.misfit_max).max(1.0).powi(2);
                 let (sin, cos) = self.options.angle.gamma_rad.sin_cos();
                 let edges = [Vector3::x(), Vector3::y(), Vector3::new(cos, 0.0, side * sin)];
-                let mut covariance = fused.covariance * inflation;
-                let mut of_place = covariance.fixed_view_mut::<3, 3>(3, 3);
-                of_place += aside_m2;
                 let pose = Hypothesis {
                     camera_from_object: fused.rig_from_object,
                     edges: edges.map(|edge| as_seen * edge),
                     vertex_m: Some(fused.vertex_m),
-                    covariance,
+                    covariance: fused.covariance * inflation,
                     probability: 0.0,
                     right_handed,
                     misfit,
                 };
                 found.push((prior - 3.0 * misfit * misfit / scale, pose));
             }
+        }
+        if found.is_empty() {
+            return Ok(Vec::new());
+        }
+        // Where edges are double the place is known no better than they are apart: aside, as the distance is that of either.
+        let aside_rad = [(&self.left, left), (detector, right)]
+            .into_iter()
+            .zip(&self.scratch)
+            .map(|((detector, corner), scratch)| detector.double_edges_rad(corner, scratch))
+            .fold(0.0, f64::max);
+        let towards = vertex.point_m.normalize();
+        let aside_m2 = (Matrix3::identity() - towards * towards.transpose())
+            * (DOUBLE_SIGMA * aside_rad * vertex.point_m.norm()).powi(2);
+        for (_, pose) in &mut found {
+            let mut of_place = pose.covariance.fixed_view_mut::<3, 3>(3, 3);
+            of_place += aside_m2;
         }
         found.sort_by(|a, b| b.0.total_cmp(&a.0));
         let best = found.first().map_or(0.0, |(most, _)| *most);
