@@ -52,9 +52,7 @@ pub(crate) fn find(
     if lines.iter().any(|line| line.middle.z <= 0.0) {
         return None;
     }
-    let missed = in_plane.iter().map(|line| (line.normal.dot(&point) - line.offset).powi(2)).sum::<f64>();
-    let px_per_unit = camera.project_jacobian(&bearing).map(|(_, jacobian)| jacobian.norm() / 2f64.sqrt())? * bearing.z;
-    if (missed / 3.0).sqrt() * px_per_unit > options.residual_max_px {
+    if missed_px(&in_plane, &point, camera)? > options.residual_max_px {
         return None;
     }
     let mut rays = [None; 3];
@@ -63,6 +61,15 @@ pub(crate) fn find(
     }
     let [Some(x), Some(y), Some(z)] = rays else { return None };
     CornerFeature::from_rays([x, y, z])
+}
+
+/// How far lines of the plane z = 1 miss a point, root mean square, in pixels. None where the camera does not see it.
+fn missed_px(lines: &[PlaneLine; 3], point: &Vector2<f64>, camera: &Camera) -> Option<f64> {
+    let missed = lines.iter().map(|line| (line.normal.dot(point) - line.offset).powi(2)).sum::<f64>();
+    let bearing = Vector3::new(point.x, point.y, 1.0);
+    // The Jacobian is that of the unit bearing.
+    let (_, jacobian) = camera.project_jacobian(&bearing.normalize())?;
+    Some((missed / 3.0).sqrt() * jacobian.norm() / 2f64.sqrt() / bearing.norm())
 }
 
 /// Eq. 27: the point with the least sum of squared distances from the lines.
@@ -109,3 +116,22 @@ fn ray_through(
 /// From the vertex the midpoints lie on one side, but for a few that the gap's width brings about: the share of the longer side that
 /// the shorter one may have.
 const NEAR_SHARE_MAX: f64 = 0.3;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::camera::{Model, Pinhole};
+
+    #[test]
+    fn what_lines_miss_the_vertex_by_is_told_in_pixels() {
+        let lens = Pinhole::new([500.0, 500.0], [319.5, 239.5], &[]).unwrap();
+        let camera = Camera::new(640, 480, Model::Pinhole(lens)).unwrap();
+        // Through points 0.004 to the left and right of the axis, and one across both: they are 2, 2 and 0 pixels beside it.
+        let upright = |offset: f64| PlaneLine { normal: Vector2::x(), offset };
+        let lines = [upright(0.004), upright(-0.004), PlaneLine { normal: Vector2::y(), offset: 0.0 }];
+        let point = vertex(&lines).unwrap();
+        assert!(point.norm() < 1e-12);
+        let expected = (8.0f64 / 3.0).sqrt();
+        assert!((missed_px(&lines, &point, &camera).unwrap() - expected).abs() < 1e-9);
+    }
+}

@@ -77,3 +77,26 @@ fn outline(
     let own = face.byte();
     profile(image, light, move |levels| 1.5 * levels[own] - 0.5 * levels.iter().sum::<f64>())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_outline_is_of_the_primary_beyond_the_mean_of_the_others() {
+        let bytes: Vec<u8> = (0..12 * 12).flat_map(|k| if k % 12 < 6 { [10, 50, 90] } else { [40, 60, 80] }).collect();
+        let (image, light) = (ColorView::new(&bytes, 12, 12, 36).unwrap(), LightTable::new(1.0).unwrap());
+        for (face, expected) in
+            [(Primary::Red, [60.0, 30.0]), (Primary::Green, [0.0, 0.0]), (Primary::Blue, [-60.0, -30.0])]
+        {
+            let mut levels = [0.0; 5];
+            assert!(outline(&image, &light, face)(&Vector2::new(5.5, 6.0), &Vector2::x(), &mut levels));
+            let middle = 0.5 * (expected[0] + expected[1]);
+            let all = [expected[0], expected[0], middle, expected[1], expected[1]];
+            assert!(
+                levels.iter().zip(all).all(|(level, expected)| (level - expected).abs() < 1e-9),
+                "{face:?} {levels:?}"
+            );
+        }
+    }
+}

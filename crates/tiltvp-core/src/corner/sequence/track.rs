@@ -215,6 +215,16 @@ mod tests {
         assert_eq!(followed(SEEN_MIN - 1).likelihood(&pose(Vector3::new(0.52, 0.0, 2.0)), false), None);
     }
 
+    /// 0.01 of 2 metres in a frame; 0.06 in three frames, of which two had no pose.
+    #[test]
+    fn the_pace_is_the_share_of_the_distance_in_a_frame() {
+        let track = followed(3);
+        assert!((track.pace - 0.005).abs() < 1e-4);
+        let after = pose(Vector3::new(0.08, 0.0, 2.0));
+        let track = Track::next(Some(Track { age: 3, ..track }), &after, [Vec::new(), Vec::new()], 1, &[]);
+        assert!((track.pace - 0.01).abs() < 1e-4, "{}", track.pace);
+    }
+
     #[test]
     fn a_corner_that_stands_in_knows_the_one_before() {
         let track =

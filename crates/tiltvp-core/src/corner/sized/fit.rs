@@ -256,3 +256,18 @@ impl System {
         free
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_edge_z_turns_as_the_angle_opens() {
+        let rotation = *Rotation3::from_euler_angles(0.4, -0.3, 1.1).matrix();
+        for side in [1.0, -1.0] {
+            let at = |gamma: f64| State { rotation, vertex: Vector3::z(), gamma, lengths: [None; 3], side };
+            let difference = (at(1.2 + 1e-6).edges()[2] - at(1.2 - 1e-6).edges()[2]) / 2e-6;
+            assert!((at(1.2).opens() - difference).norm() < 1e-8, "{side}");
+        }
+    }
+}
