@@ -55,6 +55,20 @@ impl Region {
         options: &EdgeOptions,
         mask: Option<&Mask>,
     ) -> Result<Self> {
+        Self::with_notes(camera, robot_from_camera, options, mask, |_| ()).map(|(region, _)| region)
+    }
+
+    /// The same, with what is noted of the bearing of each of its pixels in the robot frame.
+    ///
+    /// # Errors
+    /// As [`new`](Self::new).
+    pub(crate) fn with_notes<T: Copy + Default + Send>(
+        camera: &Camera,
+        robot_from_camera: &Matrix3<f64>,
+        options: &EdgeOptions,
+        mask: Option<&Mask>,
+        note: impl Fn(&Vector3<f64>) -> T + Sync,
+    ) -> Result<(Self, Vec<T>)> {
         let (width, height) = (camera.width() as usize, camera.height() as usize);
         if let Some(mask) = mask
             && mask.size() != (width, height)
@@ -75,18 +89,24 @@ impl Region {
         }
         camera.check_memory(TABLE_BYTES + SCRATCH_BYTES)?;
         let (lowest, highest) = (options.elevation_min_rad.sin(), options.elevation_max_rad.sin());
-        let sight = parallel::table(width * height, |i| {
+        let seen = parallel::table(width * height, |i| {
             let (u, v) = (i % width, i / width);
             if mask.is_some_and(|mask| !mask.usable(u, v)) {
-                return Sight::None;
+                return (Sight::None, T::default());
             }
             let bearing = camera.unproject(&Vector2::new(u as f64, v as f64)).map(|b| robot_from_camera * b);
-            bearing.map_or(Sight::None, |b| if (lowest..=highest).contains(&b.z) { Sight::Band } else { Sight::World })
+            match bearing {
+                Some(b) if (lowest..=highest).contains(&b.z) => (Sight::Band, note(&b)),
+                Some(_) => (Sight::World, T::default()),
+                None => (Sight::None, T::default()),
+            }
         });
-        let mut inside = erode(&sight, width, options.reach_px());
-        inside.iter_mut().zip(&sight).for_each(|(inside, sight)| *inside &= *sight == Sight::Band);
-        drop(sight);
+        let mut inside = erode(&seen, width, options.reach_px());
+        inside.iter_mut().zip(&seen).for_each(|(inside, (sight, _))| *inside &= *sight == Sight::Band);
         let count = inside.iter().filter(|inside| **inside).count();
+        let mut notes = Vec::with_capacity(count);
+        notes.extend(inside.iter().zip(&seen).filter(|(inside, _)| **inside).map(|(_, (_, note))| *note));
+        drop(seen);
         let mut region = Self {
             camera: camera.clone(),
             robot_from_camera: *robot_from_camera,
@@ -122,7 +142,7 @@ impl Region {
             ));
         }
         region.pixels_per_rad = 1.0 / region.mean_solid_angle().sqrt();
-        Ok(region)
+        Ok((region, notes))
     }
 
     /// Every `stride`-th row of it: those whose number is a multiple. Pixels per radian fall as pixels do.
@@ -233,18 +253,18 @@ enum Sight {
 }
 
 /// `true` where the whole square of `reach` pixels about a pixel sees the world; what lies outside the image does not.
-fn erode(sight: &[Sight], width: usize, reach: usize) -> Vec<bool> {
-    let mut rows = vec![false; sight.len()];
-    for (source, row) in sight.chunks_exact(width).zip(rows.chunks_exact_mut(width)) {
+fn erode<T>(seen: &[(Sight, T)], width: usize, reach: usize) -> Vec<bool> {
+    let mut rows = vec![false; seen.len()];
+    for (source, row) in seen.chunks_exact(width).zip(rows.chunks_exact_mut(width)) {
         let mut run = 0;
-        for (u, sight) in source.iter().enumerate() {
+        for (u, (sight, _)) in source.iter().enumerate() {
             run = if *sight == Sight::None { 0 } else { run + 1 };
             if run > 2 * reach {
                 row[u - reach] = true;
             }
         }
     }
-    let mut out = vec![false; sight.len()];
+    let mut out = vec![false; seen.len()];
     let mut runs = vec![0; width];
     for (v, row) in rows.chunks_exact(width).enumerate() {
         check();

@@ -10,7 +10,6 @@ use super::lightness::Lightness;
 use super::shared_tables::SharedTables;
 use crate::edges::Region;
 use crate::error::Result;
-use crate::parallel;
 
 /// The pixels that are looked at, and what is known of each.
 #[derive(Debug)]
@@ -33,17 +32,17 @@ pub(super) struct PixelTables {
 impl PixelTables {
     pub(super) fn new(origin: &EdgeOrigin) -> Result<Self> {
         let EdgeOrigin { camera, robot_from_camera, options, mask, row_stride } = origin;
-        let region = Region::new(camera, robot_from_camera, options, mask.as_ref())?.every_row(*row_stride)?;
-        let sector = |bearing: Vector3<f64>| -> u8 {
+        let sector = |bearing: &Vector3<f64>| -> u8 {
             let turn = bearing.y.atan2(bearing.x) / std::f64::consts::TAU + 0.5;
             ((turn * SECTORS as f64) as usize).min(SECTORS - 1) as u8
         };
-        let degrees = |bearing: Vector3<f64>| bearing.z.clamp(-1.0, 1.0).asin().to_degrees().round() as i8;
-        let of_pixel = |slot: usize| {
-            let bearing = region.bearing(slot);
-            (sector(bearing), degrees(bearing))
-        };
-        let (sectors, heights_deg) = parallel::table(region.len(), of_pixel).into_iter().unzip();
+        let degrees = |bearing: &Vector3<f64>| bearing.z.clamp(-1.0, 1.0).asin().to_degrees().round() as i8;
+        let of_bearing = |bearing: &Vector3<f64>| (sector(bearing), degrees(bearing));
+        let (whole, notes) = Region::with_notes(camera, robot_from_camera, options, mask.as_ref(), of_bearing)?;
+        let of_kept = whole.places().zip(notes).filter(|((_, v), _)| (*v as u32).is_multiple_of(*row_stride));
+        let kept: Vec<_> = of_kept.map(|(_, note)| note).collect();
+        let region = whole.every_row(*row_stride)?;
+        let (sectors, heights_deg) = kept.into_iter().unzip();
         let vertical = VanishingPoint::new(camera, robot_from_camera);
         let circle = ImageCircle::new(camera);
         let lightness = Lightness::new(camera, robot_from_camera, mask.as_ref());

@@ -1,4 +1,5 @@
-//! The cluster-robust covariance of the mounting (Liang and Zeger 1986), for errors that a landmark's bearings share.
+//! The covariance of the mounting where a landmark's bearings share errors: cluster-robust (Liang and Zeger 1986), and that of errors
+//! that fade from one bearing to the next.
 
 use nalgebra::{DMatrix, Matrix3, RowVector3, SymmetricEigen, Vector3};
 
@@ -14,16 +15,17 @@ const CORRELATED_SIGMAS: f64 = 4.0;
 const MOUNTING_WIDTH: usize = 3;
 
 impl BundleProblem {
-    /// The factor `F` that widens the covariance `C` of the mounting to the cluster-robust `F C F^T`, which is in no direction
-    /// narrower. The identity where successive residuals of the landmarks are independent.
+    /// The factor `F` that widens the covariance `C` of the mounting to `F C F^T`, which is in no direction narrower. The identity where
+    /// successive residuals of the landmarks are independent.
     ///
     /// A bearing with residual `r`, Jacobian `J` and weight `w` moves the solution by `u = C J^T w r`. The part of `C` that comes
     /// from bearings is replaced by the sum over landmarks of `(sum u) (sum u)^T`, the sum being over the bearings of one
-    /// landmark. `covariance` is the inverse of the normal equations, with or without the last pose.
+    /// landmark. Where landmarks are few, the solution follows errors that last, and residuals show little of them: to `C` is also added
+    /// the sum of `(C J_i^T w_i) (C J_j^T w_j)^T rho^|i - j|` over pairs of bearings of one landmark, that of errors of which `rho` stays
+    /// from one to the next. The wider of the two counts. `covariance` is the inverse of the normal equations, with or without the last
+    /// pose.
     pub(crate) fn covariance_widening(&self, system: &ReducedSystem, covariance: &DMatrix<f64>) -> Matrix3<f64> {
-        if !self.residuals_are_correlated() {
-            return Matrix3::identity();
-        }
+        let Some(staying) = self.share_that_stays() else { return Matrix3::identity() };
         let (width, calibration_width) = (self.width(), self.free.width());
         let kept = covariance.nrows() - width;
         let columns: [_; MOUNTING_WIDTH] = std::array::from_fn(|k| {
@@ -36,6 +38,8 @@ impl BundleProblem {
         let own: Matrix3<f64> = covariance.fixed_view::<3, 3>(kept, kept).into();
         let points = self.homogeneous_landmarks();
         let (mut together, mut alone) = (vec![Vector3::zeros(); self.landmarks.len()], Matrix3::zeros());
+        // Of each landmark the sum over its bearings so far, of which less stays the longer they are past.
+        let (mut past, mut pairs) = (vec![RowVector3::zeros(); self.landmarks.len()], Matrix3::zeros());
         for (i, keyframe) in self.keyframes.iter().enumerate() {
             self.for_each_bearing_row(keyframe, &points, |row| {
                 let along = RowVector3::from_fn(|_, k| {
@@ -45,19 +49,28 @@ impl BundleProblem {
                     row.by_pose.dot(&poses[i]) + by_calibration + by_landmark
                 });
                 alone += along.transpose() * along * row.weight;
-                together[(row.at - calibration_width) / 2] += along.transpose() * (row.weight * row.residual);
+                let landmark = (row.at - calibration_width) / 2;
+                together[landmark] += along.transpose() * (row.weight * row.residual);
+                let now = along * row.weight;
+                let pair = now.transpose() * past[landmark];
+                pairs += pair + pair.transpose();
+                past[landmark] = (past[landmark] + now) * staying;
             });
         }
         let seen = together.iter().filter(|u| **u != Vector3::zeros()).count() as f64;
         let square = |u: &Vector3<f64>| u * u.transpose();
         let together = together.iter().map(square).sum::<Matrix3<f64>>() * (seen / (seen - 1.0).max(1.0));
-        widening_factor(&own, &(own - alone + together))
+        let by_clusters = widening_factor(&own, &(own - alone + together));
+        widening_factor(&(by_clusters * own * by_clusters.transpose()), &(own + pairs)) * by_clusters
     }
 
-    /// Whether successive residuals of the landmarks are positively correlated.
-    fn residuals_are_correlated(&self) -> bool {
+    /// The share of a bearing's error that stays to the next of its landmark. None if successive residuals are not positively correlated.
+    ///
+    /// It is told by how much residuals change, `E (r' - r)^2 = 2 (1 - rho)` in standard deviations: the solution follows what lasts, not
+    /// what changes.
+    fn share_that_stays(&self) -> Option<f64> {
         let mut before: Vec<Option<f64>> = vec![None; self.landmarks.len()];
-        let (mut sum, mut squares) = (0.0, 0.0);
+        let (mut sum, mut squares, mut changes, mut pairs) = (0.0, 0.0, 0.0, 0.0);
         for (observation, residual) in
             self.keyframes.iter().flat_map(|keyframe| &keyframe.observations).zip(self.residuals())
         {
@@ -65,9 +78,11 @@ impl BundleProblem {
             if let (Some(last), Some(now)) = (std::mem::replace(&mut before[observation.landmark], now), now) {
                 sum += last * now;
                 squares += (last * now).powi(2);
+                changes += (now - last).powi(2);
+                pairs += 1.0;
             }
         }
-        sum > CORRELATED_SIGMAS * squares.sqrt()
+        (sum > CORRELATED_SIGMAS * squares.sqrt()).then(|| (1.0 - 0.5 * changes / pairs).clamp(0.0, 1.0))
     }
 }
 

@@ -31,7 +31,7 @@ pub(crate) struct Keyframe {
     pub(crate) information: Matrix3<f64>,
     /// The readings that `odometry` was integrated from; kept only where the wheels are estimated.
     pub(crate) readings: Vec<WheelMotion>,
-    /// Motion per second on arrival, for the time offset.
+    /// Velocity on arrival in the frame of the robot there, for the time offset.
     pub(crate) velocity: Vector3<f64>,
     pub(crate) observations: Vec<Observation>,
 }

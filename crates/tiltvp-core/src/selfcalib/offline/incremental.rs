@@ -132,7 +132,7 @@ impl<'a> IncrementalProblem<'a> {
         }
         let problem = &mut self.problem;
         let odometry = RelativeMotion::from_wheels(reading, &problem.wheels, &problem.noise);
-        let velocity = if seconds > 0.0 { odometry.motion / seconds } else { Vector3::zeros() };
+        let velocity = if seconds > 0.0 { odometry.on_arrival() / seconds } else { Vector3::zeros() };
         let Some(last) = problem.keyframes.last_mut() else { return };
         let pose = compose(&last.pose, &odometry.motion);
         if self.has_bearings {

@@ -45,7 +45,7 @@ pub(super) struct SortedLog<'a> {
 /// A step of a log.
 pub(super) struct LogStep<'a> {
     pub(super) reading: &'a WheelMotion,
-    /// Time since the step before, 0 at the first step; without times steps count as seconds.
+    /// Time since the step before; without times steps count as seconds.
     pub(super) seconds: f64,
     pub(super) bearings: &'a [LogBearing],
 }
@@ -69,7 +69,9 @@ impl<'a> SortedLog<'a> {
     pub(super) fn steps(&self) -> impl Iterator<Item = LogStep<'_>> {
         let mut rest = self.bearings.as_slice();
         self.readings.iter().enumerate().map(move |(step, reading)| {
-            let seconds = self.times_s.map_or(1.0, |t| if step == 0 { 0.0 } else { t[step] - t[step - 1] });
+            // The first is taken to be as long as the next.
+            let interval = |t: &[f64]| t.get(step.max(1)).map_or(0.0, |end| end - t[step.max(1) - 1]);
+            let seconds = self.times_s.map_or(1.0, interval);
             let (bearings, later) = rest.split_at(rest.partition_point(|b| b.step <= step));
             rest = later;
             LogStep { reading, seconds, bearings }

@@ -19,10 +19,10 @@ impl SlidingWindow {
         let Some(last) = keyframes.last_mut() else { return };
         let pose = compose(&last.pose, &odometry.motion);
         if alone || !last.observations.is_empty() {
-            keyframes.push(Keyframe { velocity: odometry.motion, ..Keyframe::after(odometry, pose) });
+            keyframes.push(Keyframe { velocity: odometry.on_arrival(), ..Keyframe::after(odometry, pose) });
         } else {
             last.extend(&odometry, pose);
-            last.velocity = odometry.motion;
+            last.velocity = odometry.on_arrival();
         }
         let before = self.pose();
         self.mean.fixed_rows_mut::<3>(0).copy_from(&compose(&before, &odometry.motion));
