@@ -1,6 +1,7 @@
 """The mutants that Rust's tests missed, by the kept answers: each is built into the extension, which is asked again.
 
-It changes the sources of the checkout, one mutant after the other, and puts them back: `just mutants-missed`.
+It changes the sources of the checkout, one mutant after the other, and puts them back: `just mutants-missed`. The
+extension that it leaves is one of the profile quick.
 """
 
 from __future__ import annotations

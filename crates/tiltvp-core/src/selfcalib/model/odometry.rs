@@ -128,7 +128,7 @@ impl RelativeMotion {
         Self { motion, covariance, by_wheels: Matrix3x2::from_columns(&[by_imbalance, by_turn * -t]) }
     }
 
-    /// As the robot sees it on arrival: how it would go on along the same arc for no time at all, times the time that this took.
+    /// The chord in the frame of the robot on arrival, turned to straight ahead, and the turn: how it goes on along the same arc.
     pub(crate) fn on_arrival(&self) -> Vector3<f64> {
         let along = Rotation2::new(-0.5 * self.motion.z) * self.motion.xy();
         along.push(self.motion.z)
