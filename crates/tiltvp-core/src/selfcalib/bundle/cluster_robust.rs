@@ -40,13 +40,15 @@ impl BundleProblem {
         let (mut together, mut alone) = (vec![Vector3::zeros(); self.landmarks.len()], Matrix3::zeros());
         // Of each landmark the sum over its bearings so far, of which less stays the longer they are past.
         let (mut past, mut pairs) = (vec![RowVector3::zeros(); self.landmarks.len()], Matrix3::zeros());
-        for (i, keyframe) in self.keyframes.iter().enumerate() {
-            self.for_each_bearing_row(keyframe, &points, |row| {
+        for i in 0..self.keyframes.len() {
+            let neighbour = self.neighbour(i);
+            self.for_each_bearing_row(i, &points, |row| {
                 let along = RowVector3::from_fn(|_, k| {
                     let (shared, poses) = &columns[k];
                     let by_calibration: f64 = (0..calibration_width).map(|c| row.by_calibration[c] * shared[c]).sum();
                     let by_landmark = row.by_landmark[0] * shared[row.at] + row.by_landmark[1] * shared[row.at + 1];
-                    row.by_pose.dot(&poses[i]) + by_calibration + by_landmark
+                    let by_neighbour = neighbour.map_or(0.0, |other| row.by_neighbour.dot(&poses[other]));
+                    row.by_pose.dot(&poses[i]) + by_neighbour + by_calibration + by_landmark
                 });
                 alone += along.transpose() * along * row.weight;
                 let landmark = (row.at - calibration_width) / 2;

@@ -2,7 +2,7 @@
 
 use nalgebra::{Matrix3, Vector2, Vector3};
 
-use crate::selfcalib::model::{RelativeMotion, WheelMotion, information};
+use crate::selfcalib::model::{RelativeMotion, WheelMotion, along_arc, information};
 
 /// A bearing of a landmark, which is given by its place in the list of landmarks.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -31,8 +31,11 @@ pub(crate) struct Keyframe {
     pub(crate) information: Matrix3<f64>,
     /// The readings that `odometry` was integrated from; kept only where the wheels are estimated.
     pub(crate) readings: Vec<WheelMotion>,
-    /// Velocity on arrival in the frame of the robot there, for the time offset.
-    pub(crate) velocity: Vector3<f64>,
+    /// The time since the keyframe before, for the time offset.
+    pub(crate) seconds: f64,
+    /// By how much the wheels' velocities on departure from the keyframe before and on arrival are off the mean one; zero where one reading
+    /// led here.
+    pub(crate) unevenness: [Vector3<f64>; 2],
     pub(crate) observations: Vec<Observation>,
 }
 
@@ -44,20 +47,35 @@ impl Keyframe {
             odometry: RelativeMotion::none(),
             information: Matrix3::zeros(),
             readings: Vec::new(),
-            velocity: Vector3::zeros(),
+            seconds: 0.0,
+            unevenness: [Vector3::zeros(); 2],
             observations: Vec::new(),
         }
     }
 
-    /// A keyframe at the end of a motion.
-    pub(crate) fn after(odometry: RelativeMotion, pose: Vector3<f64>) -> Self {
-        Self { pose, odometry, information: information(&odometry.covariance), ..Self::anchor() }
+    /// A keyframe at the end of a motion that took so long.
+    pub(crate) fn after(odometry: RelativeMotion, pose: Vector3<f64>, seconds: f64) -> Self {
+        Self { pose, odometry, information: information(&odometry.covariance), seconds, ..Self::anchor() }
     }
 
     /// Moves a keyframe without bearings on by another motion, to `pose`.
-    pub(crate) fn extend(&mut self, odometry: &RelativeMotion, pose: Vector3<f64>) {
+    pub(crate) fn extend(&mut self, odometry: &RelativeMotion, pose: Vector3<f64>, seconds: f64) {
+        let departure = self.mean_velocity() + self.unevenness[0];
+        let arrival = per_second(&along_arc(&odometry.motion).0, seconds);
         self.odometry = self.odometry.then(odometry);
         self.information = information(&self.odometry.covariance);
+        self.seconds += seconds;
         self.pose = pose;
+        self.unevenness = [departure, arrival].map(|velocity| velocity - self.mean_velocity());
     }
+
+    /// The mean velocity since the keyframe before in the frame of the robot, as the wheels measured it.
+    pub(crate) fn mean_velocity(&self) -> Vector3<f64> {
+        per_second(&along_arc(&self.odometry.motion).0, self.seconds)
+    }
+}
+
+/// A velocity; zero where no time passes.
+pub(crate) fn per_second(along: &Vector3<f64>, seconds: f64) -> Vector3<f64> {
+    if seconds > 0.0 { along / seconds } else { Vector3::zeros() }
 }

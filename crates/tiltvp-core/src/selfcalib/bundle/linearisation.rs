@@ -2,9 +2,8 @@
 
 use nalgebra::{DMatrix, DVector, Matrix3, Matrix3x2, Vector3};
 
-use super::keyframe::Keyframe;
 use super::problem::BundleProblem;
-use crate::selfcalib::model::{HomogeneousLandmark, InverseDistanceLandmark, Viewpoint, between};
+use crate::selfcalib::model::{HomogeneousLandmark, InverseDistanceLandmark, Viewpoint, between, between_jacobians};
 
 /// Normal equations: `information step = rhs`.
 pub(crate) struct NormalEquations {
@@ -33,6 +32,8 @@ pub(crate) struct MotionBlocks {
 /// A row of the Jacobian: the whitened residual of a bearing, its derivatives, and its weight.
 pub(crate) struct BearingRow {
     pub(crate) by_pose: Vector3<f64>,
+    /// By the pose of the keyframe's [neighbour](BundleProblem::neighbour).
+    pub(crate) by_neighbour: Vector3<f64>,
     pub(crate) by_calibration: [f64; 6],
     /// The place of its landmark among the shared parameters.
     pub(crate) at: usize,
@@ -75,9 +76,7 @@ impl BundleProblem {
     pub(crate) fn motion_blocks(&self, from: usize, equations: &mut NormalEquations) -> MotionBlocks {
         let (keyframe, after) = (&self.keyframes[from], &self.keyframes[from + 1]);
         let b = between(&keyframe.pose, &after.pose);
-        let (sin, cos) = keyframe.pose.z.sin_cos();
-        let by_after = Matrix3::new(cos, sin, 0.0, -sin, cos, 0.0, 0.0, 0.0, 1.0);
-        let by_before = Matrix3::new(-cos, -sin, b.y, sin, -cos, -b.x, 0.0, 0.0, -1.0);
+        let (by_before, by_after) = between_jacobians(&keyframe.pose, &b);
         let r = b - after.odometry.motion;
         let squared = r.dot(&(after.information * r));
         let weighted = after.information * self.slip.weight(squared);
@@ -112,29 +111,31 @@ impl BundleProblem {
     #[inline]
     pub(crate) fn for_each_bearing_row(
         &self,
-        keyframe: &Keyframe,
+        at: usize,
         points: &[HomogeneousLandmark],
         mut each: impl FnMut(&BearingRow),
     ) {
-        let (pose, moved) = self.observation_pose(keyframe);
+        let (pose, by) = self.observation_pose(at);
         let view = Viewpoint::new(&pose, &self.mounting);
         let calibration_width = self.free.width();
-        for observation in &keyframe.observations {
+        for observation in &self.keyframes[at].observations {
             let point = &points[observation.landmark];
             let p = view.jacobians(point);
             let s = 1.0 / (self.bearing_sigma * self.scatters[observation.landmark]);
             let residual = view.residual(point, &observation.along) * s;
             let mut by_calibration = [0.0; 6];
             by_calibration[..3].copy_from_slice((p.by_mounting * s).as_slice());
-            let mut by_pose = p.by_pose * s;
-            if let Some((first, by_offset)) = &moved {
+            let (mut by_pose, mut by_neighbour) = (p.by_pose * s, Vector3::zeros());
+            if let Some(by) = &by {
                 if self.free.offset {
-                    by_calibration[self.free.offset_at()] = by_pose.dot(by_offset);
+                    by_calibration[self.free.offset_at()] = by_pose.dot(&by.offset);
                 }
-                by_pose = first.transpose() * by_pose;
+                by_neighbour = by.neighbour.transpose() * by_pose;
+                by_pose = by.pose.transpose() * by_pose;
             }
             each(&BearingRow {
                 by_pose,
+                by_neighbour,
                 by_calibration,
                 at: calibration_width + 2 * observation.landmark,
                 by_landmark: [p.by_landmark.x * s, p.by_landmark.y * s],

@@ -15,14 +15,18 @@ impl Coupling {
         Self { values: vec![0.0; 3 * width] }
     }
 
+    fn width(&self) -> usize {
+        self.values.len() / 3
+    }
+
     pub(crate) fn rows(&self) -> [&[f64]; 3] {
-        let (first, rest) = self.values.split_at(self.values.len() / 3);
+        let (first, rest) = self.values.split_at(self.width());
         let (second, third) = rest.split_at(first.len());
         [first, second, third]
     }
 
     fn rows_mut(&mut self) -> [&mut [f64]; 3] {
-        let width = self.values.len() / 3;
+        let width = self.width();
         let (first, rest) = self.values.split_at_mut(width);
         let (second, third) = rest.split_at_mut(width);
         [first, second, third]
@@ -63,12 +67,17 @@ impl PoseEquations {
         Self { own: Matrix3::zeros(), coupling: Coupling::new(width), rhs: Vector3::zeros() }
     }
 
-    /// Adds a bearing taken at this pose, whose landmark is at `at` in the coupling.
-    pub(crate) fn add_row(&mut self, row: &BearingRow, at: usize, calibration_width: usize) {
-        self.own += row.by_pose * row.by_pose.transpose() * row.weight;
-        self.rhs -= row.by_pose * (row.weight * row.residual);
+    /// The number of shared parameters that it is coupled to.
+    pub(crate) fn width(&self) -> usize {
+        self.coupling.width()
+    }
+
+    /// Adds a bearing with this derivative by the pose, whose landmark is at `at` in the coupling.
+    pub(crate) fn add_row(&mut self, row: &BearingRow, by_pose: &Vector3<f64>, at: usize, calibration_width: usize) {
+        self.own += by_pose * by_pose.transpose() * row.weight;
+        self.rhs -= by_pose * (row.weight * row.residual);
         for (k, values) in self.coupling.rows_mut().into_iter().enumerate() {
-            let scale = row.by_pose[k] * row.weight;
+            let scale = by_pose[k] * row.weight;
             for (value, by) in values[..calibration_width].iter_mut().zip(&row.by_calibration) {
                 *value += by * scale;
             }

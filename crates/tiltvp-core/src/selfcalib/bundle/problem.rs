@@ -4,8 +4,8 @@ use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 
 use super::keyframe::{Keyframe, Observation};
 use crate::selfcalib::model::{
-    BearingLoss, FitSummary, InverseDistanceLandmark, MotionLoss, MotionNoise, Viewpoint, Wheels, between, compose,
-    compose_jacobians, preintegrate,
+    BearingLoss, FitSummary, InverseDistanceLandmark, MotionLoss, MotionNoise, Viewpoint, Wheels, along_arc, arc,
+    between, between_jacobians, compose, compose_jacobians, preintegrate,
 };
 use crate::selfcalib::options::SelfCalibratorOptions;
 
@@ -39,6 +39,9 @@ pub(crate) struct BundleProblem {
     pub(crate) mounting: Vector3<f64>,
     pub(crate) wheels: Wheels,
     pub(crate) offset_s: f64,
+    /// Whether the time offset is that of late bearings, which were taken on the way to the next keyframe; else on that from the one before.
+    /// It does not change with the offset's sign in a descent, for which the cost would have a kink at zero.
+    pub(crate) late: bool,
     pub(crate) free: FreeParameters,
     pub(crate) noise: MotionNoise,
     pub(crate) landmarks: Vec<InverseDistanceLandmark>,
@@ -65,8 +68,15 @@ const OFFSET_SIGMA_S: f64 = 1.0;
 /// dimensions normal noise exceeds it 15 times in a million.
 const SLIP_SIGMAS: f64 = 5.0;
 
-/// Jacobians of the pose of an observation by the keyframe's pose and by the time offset.
-type ObservationPoseJacobians = (Matrix3<f64>, Vector3<f64>);
+/// Jacobians of the pose of an observation.
+pub(crate) struct ObservationPoseJacobians {
+    /// By the pose of its keyframe.
+    pub(crate) pose: Matrix3<f64>,
+    /// By that of the keyframe's [neighbour](BundleProblem::neighbour).
+    pub(crate) neighbour: Matrix3<f64>,
+    /// By the time offset.
+    pub(crate) offset: Vector3<f64>,
+}
 
 impl BundleProblem {
     /// A problem without motions and landmarks, with the prior of the options, at a guess of the mounting.
@@ -96,6 +106,7 @@ impl BundleProblem {
             mounting: *mounting,
             wheels: Wheels::new(options.wheel_base_m),
             offset_s: 0.0,
+            late: false,
             free,
             noise: options.motion_noise(),
             landmarks: Vec::new(),
@@ -213,18 +224,55 @@ impl BundleProblem {
         self.landmarks.len() - 1
     }
 
-    /// The pose at which the bearings of a keyframe were taken, with its Jacobians unless the time offset is zero and fixed.
-    pub(crate) fn observation_pose(&self, keyframe: &Keyframe) -> (Vector3<f64>, Option<ObservationPoseJacobians>) {
+    /// The keyframe towards which the robot was from another one when the bearings of that were taken: the next where they are late, else
+    /// the one before. None where there is none, and without a time offset.
+    pub(crate) fn neighbour(&self, at: usize) -> Option<usize> {
         if !self.free.offset && self.offset_s == 0.0 {
+            None
+        } else if self.late {
+            Some(at + 1).filter(|next| *next < self.keyframes.len())
+        } else {
+            at.checked_sub(1)
+        }
+    }
+
+    /// The pose at which the bearings of a keyframe were taken, with its Jacobians unless the time offset is zero and fixed: on the arc to
+    /// its [neighbour](Self::neighbour), or without one on that of the wheels.
+    pub(crate) fn observation_pose(&self, at: usize) -> (Vector3<f64>, Option<ObservationPoseJacobians>) {
+        let (keyframe, tau) = (&self.keyframes[at], self.offset_s);
+        if !self.free.offset && tau == 0.0 {
             return (keyframe.pose, None);
         }
-        let (tau, v) = (self.offset_s, keyframe.velocity);
-        let (sin, cos) = (0.5 * tau * v.z).sin_cos();
-        let turned = Vector3::new(cos * v.x - sin * v.y, sin * v.x + cos * v.y, v.z);
-        let moved = turned * tau;
+        let (velocity, by_poses) = match self.neighbour(at) {
+            Some(other) => self.velocity_between(at, other),
+            None => (keyframe.mean_velocity() + keyframe.unevenness[1], [Matrix3::zeros(); 2]),
+        };
+        let (moved, by_along) = arc(&(velocity * tau));
         let (first, second) = compose_jacobians(&keyframe.pose, &moved);
-        let slope = turned + Vector3::new(-turned.y, turned.x, 0.0) * (0.5 * tau * v.z);
-        (compose(&keyframe.pose, &moved), Some((first, second * slope)))
+        let by_velocity = second * by_along * tau;
+        let jacobians = ObservationPoseJacobians {
+            pose: first + by_velocity * by_poses[0],
+            neighbour: by_velocity * by_poses[1],
+            offset: second * by_along * velocity,
+        };
+        (compose(&keyframe.pose, &moved), Some(jacobians))
+    }
+
+    /// The velocity at a keyframe on the way to or from a neighbour, with its Jacobians by the poses of both.
+    fn velocity_between(&self, at: usize, neighbour: usize) -> (Vector3<f64>, [Matrix3<f64>; 2]) {
+        let (start, end) = (&self.keyframes[at.min(neighbour)], &self.keyframes[at.max(neighbour)]);
+        let motion = between(&start.pose, &end.pose);
+        let ((along, by_motion), (by_start, by_end)) = (along_arc(&motion), between_jacobians(&start.pose, &motion));
+        if end.seconds <= 0.0 {
+            return (Vector3::zeros(), [Matrix3::zeros(); 2]);
+        }
+        let [by_start, by_end] = [by_start, by_end].map(|by_pose| by_motion * by_pose / end.seconds);
+        let mean = along / end.seconds;
+        if at < neighbour {
+            (mean + end.unevenness[0], [by_start, by_end])
+        } else {
+            (mean + end.unevenness[1], [by_end, by_start])
+        }
     }
 
     /// Half the sum of the squared, whitened residuals.
@@ -258,8 +306,8 @@ impl BundleProblem {
     /// The whitened residuals of all bearings, in the order of keyframes and observations.
     pub(crate) fn residuals(&self) -> Vec<f64> {
         let (points, mut all) = (self.homogeneous_landmarks(), Vec::new());
-        for keyframe in &self.keyframes {
-            let view = Viewpoint::new(&self.observation_pose(keyframe).0, &self.mounting);
+        for (at, keyframe) in self.keyframes.iter().enumerate() {
+            let view = Viewpoint::new(&self.observation_pose(at).0, &self.mounting);
             let residual = |observation: &Observation| view.residual(&points[observation.landmark], &observation.along);
             all.extend(
                 keyframe.observations.iter().map(|s| residual(s) / (self.bearing_sigma * self.scatters[s.landmark])),

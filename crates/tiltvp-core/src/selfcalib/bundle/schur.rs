@@ -126,10 +126,12 @@ impl BundleProblem {
         let mut fit = FitSummary { cost: self.scatter_cost() - 0.5 * away.dot(&rhs), ..FitSummary::default() };
         let mut shared = NormalEquations { information: self.prior_information.clone(), rhs };
         let (points, mut predicted_reduction) = (self.homogeneous_landmarks(), 0.0);
-        self.for_each_bearing_row(&self.keyframes[0], &points, |row| {
-            fit.add(row.residual, self.loss);
-            row.add_to(&mut shared, row.at, calibration_width);
-        });
+        if self.neighbour(0).is_none() {
+            self.for_each_bearing_row(0, &points, |row| {
+                fit.add(row.residual, self.loss);
+                row.add_to(&mut shared, row.at, calibration_width);
+            });
+        }
         let mut at = PoseEquations::new(width);
         let (mut runs, mut between) = (Vec::new(), Vec::new());
         let (mut left, mut reach) = (0, calibration_width);
@@ -154,12 +156,6 @@ impl BundleProblem {
                 predicted_reduction += pose.predicted_reduction();
                 between.push((left, pose));
             }
-            self.for_each_bearing_row(&self.keyframes[right], &points, |row| {
-                fit.add(row.residual, self.loss);
-                row.add_to(&mut shared, row.at, calibration_width);
-                next.add_row(row, row.at, calibration_width);
-                reach = reach.max(row.at + 2);
-            });
             runs.push(run);
             (at, left) = (next, right);
         }
@@ -191,32 +187,23 @@ impl BundleProblem {
         damping: f64,
         points: &[HomogeneousLandmark],
     ) -> Option<(PoseRun, RunEquations)> {
-        let (calibration_width, wheels) = (self.free.width(), self.free.wheels);
-        let (columns, places) = self.columns_seen(left + 1..right);
+        let late = self.neighbour(left) == Some(left + 1);
+        let (columns, places) = self.columns_seen(if late { left } else { left + 1 }..right + 1);
         let width = columns.len();
         let mut shared = NormalEquations::zeros(width);
         let mut ends = PoseEquations::new(width);
         let mut poses = Vec::with_capacity(right - left - 1);
         let (mut fit, mut predicted_reduction) = (FitSummary::default(), 0.0);
-        let mut motion = self.motion_blocks(left, &mut shared);
-        fit.cost += motion.cost;
-        ends.add_motion(&motion, wheels);
+        let mut link = |from: usize, start: &mut PoseEquations, shared: &mut NormalEquations| {
+            self.link(from, points, &places, start, shared, &mut fit)
+        };
+        let (across, mut at) = link(left, &mut ends, &mut shared);
         // The coupling of the current pose to the one at the left end.
-        let mut before = motion.across.transpose();
-        let mut at = PoseEquations::after(&motion, width, wheels);
+        let mut before = across.transpose();
         for i in left + 1..right {
             check();
-            self.for_each_bearing_row(&self.keyframes[i], points, |row| {
-                fit.add(row.residual, self.loss);
-                let place = places[(row.at - calibration_width) / 2];
-                row.add_to(&mut shared, place, calibration_width);
-                at.add_row(row, place, calibration_width);
-            });
-            motion = self.motion_blocks(i, &mut shared);
-            fit.cost += motion.cost;
-            at.add_motion(&motion, wheels);
-            let mut next = PoseEquations::after(&motion, width, wheels);
-            let mut pose = eliminate_pose(at, motion.across, damping, &mut next, width, &mut shared)?;
+            let (across, mut next) = link(i, &mut at, &mut shared);
+            let mut pose = eliminate_pose(at, across, damping, &mut next, width, &mut shared)?;
             predicted_reduction += pose.predicted_reduction();
             if left > 0 {
                 pose.before = before;
@@ -232,6 +219,48 @@ impl BundleProblem {
         let across = before.transpose();
         let equations = RunEquations { left: ends, right: at, across, shared, fit, predicted_reduction };
         Some((PoseRun { left, columns, poses }, equations))
+    }
+
+    /// What couples a pose to the next one: the motion, and the bearings that depend on both. Adds its part to the equations of the pose at
+    /// its start and to the shared ones; returns the block across, and the equations of the pose at its end, with the bearings that depend
+    /// on that alone.
+    fn link(
+        &self,
+        from: usize,
+        points: &[HomogeneousLandmark],
+        places: &[usize],
+        start: &mut PoseEquations,
+        shared: &mut NormalEquations,
+        fit: &mut FitSummary,
+    ) -> (Matrix3<f64>, PoseEquations) {
+        let (calibration_width, wheels) = (self.free.width(), self.free.wheels);
+        let motion = self.motion_blocks(from, shared);
+        fit.cost += motion.cost;
+        start.add_motion(&motion, wheels);
+        let mut end = PoseEquations::after(&motion, start.width(), wheels);
+        let mut across = motion.across;
+        for at in [from, from + 1] {
+            let neighbour = self.neighbour(at);
+            // Others are of the link before or of the next one.
+            if at == from && neighbour != Some(from + 1) || at > from && neighbour == Some(at + 1) {
+                continue;
+            }
+            self.for_each_bearing_row(at, points, |row| {
+                fit.add(row.residual, self.loss);
+                let place = places[(row.at - calibration_width) / 2];
+                row.add_to(shared, place, calibration_width);
+                if neighbour.is_none() {
+                    end.add_row(row, &row.by_pose, place, calibration_width);
+                    return;
+                }
+                let (by_start, by_end) =
+                    if at == from { (&row.by_pose, &row.by_neighbour) } else { (&row.by_neighbour, &row.by_pose) };
+                start.add_row(row, by_start, place, calibration_width);
+                end.add_row(row, by_end, place, calibration_width);
+                across += by_start * by_end.transpose() * row.weight;
+            });
+        }
+        (across, end)
     }
 
     /// The columns of the calibration parameters and of the landmarks that some keyframes see, and the place of each landmark
@@ -293,9 +322,8 @@ mod tests {
                 Observation::new(*slot, p.bearing + 0.02 * (i as f64 + 3.0 * *slot as f64).cos())
             });
             let observations = observations.collect();
-            let velocity = odometry.motion;
-            let keyframe = Keyframe::after(odometry, pose);
-            problem.keyframes.push(Keyframe { readings: vec![reading], velocity, observations, ..keyframe });
+            let keyframe = Keyframe::after(odometry, pose, 1.0);
+            problem.keyframes.push(Keyframe { readings: vec![reading], observations, ..keyframe });
         }
         assert!(camera_position(&problem.keyframes[31].pose, &problem.mounting).norm() > 1.0);
         problem
@@ -303,9 +331,15 @@ mod tests {
 
     #[test]
     fn runs_of_any_length_leave_the_same() {
-        for free in [FreeParameters::default(), FreeParameters { wheels: true, offset: true }] {
-            let problem = drive(free);
+        let all = FreeParameters { wheels: true, offset: true };
+        for (free, late) in [(FreeParameters::default(), false), (all, false), (all, true)] {
+            let mut problem = drive(free);
+            (problem.offset_s, problem.late) = (if free.offset { 0.3 } else { 0.0 }, late);
             for (last, keep, damping) in [(31, false, 0.0), (31, true, 0.0), (17, true, 0.0)] {
+                if last == 17 && late {
+                    // The bearings of the last pose depend on the one after it.
+                    continue;
+                }
                 let whole = problem.eliminate_in_runs(last, keep, damping, usize::MAX).unwrap();
                 let step = whole.equations.information.clone().lu().solve(&whole.equations.rhs).unwrap();
                 for length in [1, 2, 7] {
@@ -324,6 +358,52 @@ mod tests {
                         assert!(a.iter().zip(&b).all(|(a, b)| (a - b).amax() < 1e-8), "{length}");
                     }
                 }
+            }
+        }
+    }
+
+    /// The residuals of a keyframe's bearings.
+    fn residuals(problem: &BundleProblem, at: usize) -> Vec<f64> {
+        let before: usize = problem.keyframes[..at].iter().map(|keyframe| keyframe.observations.len()).sum();
+        problem.residuals()[before..][..problem.keyframes[at].observations.len()].to_vec()
+    }
+
+    #[test]
+    fn rows_are_differences_by_pose_neighbour_and_time() {
+        let mut problem = drive(FreeParameters { wheels: true, offset: true });
+        let uneven = Vector3::new(0.01, 0.0, -0.02);
+        problem.keyframes[3].unevenness = [uneven, -uneven];
+        let h = 1e-6;
+        for late in [false, true] {
+            (problem.offset_s, problem.late) = (0.4, late);
+            for at in [0, 1, 3, 31] {
+                let difference = |change: &dyn Fn(&mut BundleProblem, f64)| -> Vec<f64> {
+                    let [more, less] = [h, -h].map(|by| {
+                        let mut changed = problem.clone();
+                        change(&mut changed, by);
+                        residuals(&changed, at)
+                    });
+                    more.iter().zip(less).map(|(more, less)| (more - less) / (2.0 * h)).collect()
+                };
+                let neighbour = problem.neighbour(at);
+                assert_eq!(neighbour.is_none(), at == if late { 31 } else { 0 });
+                let by_time = difference(&|problem, by| problem.offset_s += by);
+                let poses = [Some(at), neighbour].map(|pose| {
+                    pose.map(|pose| {
+                        [0, 1, 2].map(|axis| difference(&|problem, by| problem.keyframes[pose].pose[axis] += by))
+                    })
+                });
+                let mut row = 0;
+                problem.for_each_bearing_row(at, &problem.homogeneous_landmarks(), |given| {
+                    assert!((given.by_calibration[5] - by_time[row]).abs() < 1e-5);
+                    for (by_pose, given) in poses.iter().zip([given.by_pose, given.by_neighbour]) {
+                        let Some(by_pose) = by_pose else { continue };
+                        let by_pose = Vector3::from(by_pose.each_ref().map(|by_axis| by_axis[row]));
+                        assert!((given - by_pose).amax() < 1e-5 * (1.0 + by_pose.amax()), "{given} {by_pose}");
+                    }
+                    row += 1;
+                });
+                assert_eq!(row, problem.keyframes[at].observations.len());
             }
         }
     }

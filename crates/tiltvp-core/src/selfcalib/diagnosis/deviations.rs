@@ -17,9 +17,23 @@ pub(crate) struct Deviation {
 impl BundleProblem {
     /// The deviations of the imbalance, of the logarithm of the wheel base and of the time offset from what is assumed, each as
     /// if it alone were free too; `None` for what is free anyway. `covariance` is that of the mounting.
+    ///
+    /// Of the time offset it is the more significant one of early and of late bearings.
     pub(crate) fn deviations(&self, covariance: &Matrix3<f64>) -> [Option<Deviation>; 3] {
-        let all = FreeParameters { wheels: true, offset: true };
-        let problem = self.with_free(all);
+        let mut problem = self.with_free(FreeParameters { wheels: true, offset: true });
+        let early = self.deviations_of(&problem, covariance);
+        if self.free.offset {
+            return early;
+        }
+        problem.late = true;
+        let late = self.deviations_of(&problem, covariance);
+        let sigmas = |deviation: &Deviation| deviation.value.abs() / deviation.sigma;
+        let offset = [early[2], late[2]].into_iter().flatten().max_by(|a, b| sigmas(a).total_cmp(&sigmas(b)));
+        [early[0], early[1], offset]
+    }
+
+    /// The deviations where `problem` is this one with everything free.
+    fn deviations_of(&self, problem: &Self, covariance: &Matrix3<f64>) -> [Option<Deviation>; 3] {
         let Some(system) = problem.eliminate_poses(self.keyframes.len() - 1, false, 0.0) else { return [None; 3] };
         let asked = [self.free.wheels, self.free.wheels, self.free.offset];
         let information = covariance.try_inverse().unwrap_or_else(Matrix3::zeros);

@@ -14,4 +14,4 @@ pub(super) use self::loss::{BearingLoss, FitSummary, MotionLoss, OUTLIER_SIGMAS}
 pub use self::mounting::Mounting;
 pub use self::odometry::{MotionNoise, RelativeMotion, WheelMotion, Wheels};
 pub(super) use self::odometry::{information, preintegrate};
-pub(super) use self::planar_pose::{between, compose, compose_jacobians};
+pub(super) use self::planar_pose::{along_arc, arc, between, between_jacobians, compose, compose_jacobians};

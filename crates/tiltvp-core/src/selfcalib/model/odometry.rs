@@ -1,6 +1,6 @@
 //! From the displacements of two wheels to the motion of the robot, with its covariance (eqs. 14, 15 and 31).
 
-use nalgebra::{Matrix2, Matrix3, Matrix3x2, Rotation2, Vector2, Vector3};
+use nalgebra::{Matrix2, Matrix3, Matrix3x2, Vector2, Vector3};
 
 use super::planar_pose::{compose, compose_jacobians};
 
@@ -126,12 +126,6 @@ impl RelativeMotion {
             + Matrix3::from_diagonal(&step);
         let by_imbalance = by_right * true_motion.right_m - by_left * true_motion.left_m;
         Self { motion, covariance, by_wheels: Matrix3x2::from_columns(&[by_imbalance, by_turn * -t]) }
-    }
-
-    /// The chord in the frame of the robot on arrival, turned to straight ahead, and the turn: how it goes on along the same arc.
-    pub(crate) fn on_arrival(&self) -> Vector3<f64> {
-        let along = Rotation2::new(-0.5 * self.motion.z) * self.motion.xy();
-        along.push(self.motion.z)
     }
 
     /// This motion followed by another.

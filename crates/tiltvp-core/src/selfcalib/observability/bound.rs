@@ -46,8 +46,8 @@ pub fn cramer_rao_bound(
         if reading.left_m != 0.0 || reading.right_m != 0.0 {
             let alone = problem.keyframes.len() == 1;
             match problem.keyframes.last_mut() {
-                Some(last) if last.observations.is_empty() && !alone => last.extend(&odometry, *pose),
-                _ => problem.keyframes.push(Keyframe::after(odometry, *pose)),
+                Some(last) if last.observations.is_empty() && !alone => last.extend(&odometry, *pose, 0.0),
+                _ => problem.keyframes.push(Keyframe::after(odometry, *pose, 0.0)),
             }
         }
         for &landmark in seen {

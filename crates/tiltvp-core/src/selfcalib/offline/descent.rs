@@ -29,5 +29,14 @@ pub(super) fn solve(problem: &mut BundleProblem, max_iterations: u32) -> Descent
             iterations += last.iterations;
         }
     }
+    if problem.free.offset {
+        let mut other = problem.clone();
+        other.late = !problem.late;
+        let descent = descend(&mut other, losses[1]);
+        iterations += descent.iterations;
+        if descent.cost < last.cost {
+            (*problem, last) = (other, descent);
+        }
+    }
     DescentReport { iterations, ..last }
 }

@@ -132,17 +132,15 @@ impl<'a> IncrementalProblem<'a> {
         }
         let problem = &mut self.problem;
         let odometry = RelativeMotion::from_wheels(reading, &problem.wheels, &problem.noise);
-        let velocity = if seconds > 0.0 { odometry.on_arrival() / seconds } else { Vector3::zeros() };
         let Some(last) = problem.keyframes.last_mut() else { return };
         let pose = compose(&last.pose, &odometry.motion);
         if self.has_bearings {
-            let keyframe = Keyframe::after(odometry, pose);
-            problem.keyframes.push(Keyframe { readings: vec![*reading], velocity, ..keyframe });
+            let keyframe = Keyframe::after(odometry, pose, seconds);
+            problem.keyframes.push(Keyframe { readings: vec![*reading], ..keyframe });
             self.has_bearings = false;
         } else {
-            last.extend(&odometry, pose);
+            last.extend(&odometry, pose, seconds);
             last.readings.push(*reading);
-            last.velocity = velocity;
         }
     }
 
@@ -204,7 +202,7 @@ impl<'a> IncrementalProblem<'a> {
     /// disagreement in radians.
     fn triangulated(&self, seen: &[(usize, f64)]) -> (InverseDistanceLandmark, f64) {
         let problem = &self.problem;
-        let pose = |keyframe: usize| problem.observation_pose(&problem.keyframes[keyframe]).0;
+        let pose = |keyframe: usize| problem.observation_pose(keyframe).0;
         let (first, bearing) = seen[0];
         let first = pose(first);
         let anchor = camera_position(&first, &problem.mounting);

@@ -6,6 +6,9 @@ use super::state::SlidingWindow;
 use crate::selfcalib::bundle::Keyframe;
 use crate::selfcalib::model::{RelativeMotion, WheelMotion, compose, compose_jacobians};
 
+/// What is told of a time offset counts in steps: their times are not known here.
+const STEP: f64 = 1.0;
+
 impl SlidingWindow {
     /// Moves by the odometry of a step; nothing happens at a standstill.
     pub(super) fn predict(&mut self, motion: &WheelMotion) {
@@ -19,10 +22,9 @@ impl SlidingWindow {
         let Some(last) = keyframes.last_mut() else { return };
         let pose = compose(&last.pose, &odometry.motion);
         if alone || !last.observations.is_empty() {
-            keyframes.push(Keyframe { velocity: odometry.on_arrival(), ..Keyframe::after(odometry, pose) });
+            keyframes.push(Keyframe::after(odometry, pose, STEP));
         } else {
-            last.extend(&odometry, pose);
-            last.velocity = odometry.on_arrival();
+            last.extend(&odometry, pose, STEP);
         }
         let before = self.pose();
         self.mean.fixed_rows_mut::<3>(0).copy_from(&compose(&before, &odometry.motion));

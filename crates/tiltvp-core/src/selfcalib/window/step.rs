@@ -75,7 +75,7 @@ impl SlidingWindow {
     /// a slip of the wheels.
     fn recheck_rejected(&mut self, rejected: &[usize], outcome: &mut StepOutcome) {
         let Some(keyframe) = self.problem.keyframes.last() else { return };
-        let (pose, _) = self.problem.observation_pose(keyframe);
+        let (pose, _) = self.problem.observation_pose(self.problem.keyframes.len() - 1);
         if outcome.contradiction > 0.0 && self.problem.slipped(self.problem.keyframes.len() - 1) {
             (outcome.nis, outcome.used, outcome.rejected) = (outcome.contradiction, rejected.len(), 0);
             return;
