@@ -42,6 +42,9 @@ pub(crate) struct BundleProblem {
     /// Whether the time offset is that of late bearings, which were taken on the way to the next keyframe; else on that from the one before.
     /// It does not change with the offset's sign in a descent, for which the cost would have a kink at zero.
     pub(crate) late: bool,
+    /// Whether velocities are those of the wheels, in place of those of the estimated poses, which at the solution of a wrong time offset are
+    /// distorted by it.
+    pub(crate) as_wheels_read: bool,
     pub(crate) free: FreeParameters,
     pub(crate) noise: MotionNoise,
     pub(crate) landmarks: Vec<InverseDistanceLandmark>,
@@ -107,6 +110,7 @@ impl BundleProblem {
             wheels: Wheels::new(options.wheel_base_m),
             offset_s: 0.0,
             late: false,
+            as_wheels_read: false,
             free,
             noise: options.motion_noise(),
             landmarks: Vec::new(),
@@ -225,9 +229,9 @@ impl BundleProblem {
     }
 
     /// The keyframe towards which the robot was from another one when the bearings of that were taken: the next where they are late, else
-    /// the one before. None where there is none, and without a time offset.
+    /// the one before. None where there is none, where velocities are the wheels', and without a time offset.
     pub(crate) fn neighbour(&self, at: usize) -> Option<usize> {
-        if !self.free.offset && self.offset_s == 0.0 {
+        if self.as_wheels_read || !self.free.offset && self.offset_s == 0.0 {
             None
         } else if self.late {
             Some(at + 1).filter(|next| *next < self.keyframes.len())
@@ -245,7 +249,7 @@ impl BundleProblem {
         }
         let (velocity, by_poses) = match self.neighbour(at) {
             Some(other) => self.velocity_between(at, other),
-            None => (keyframe.mean_velocity() + keyframe.unevenness[1], [Matrix3::zeros(); 2]),
+            None => (self.velocity_read(at), [Matrix3::zeros(); 2]),
         };
         let (moved, by_along) = arc(&(velocity * tau));
         let (first, second) = compose_jacobians(&keyframe.pose, &moved);
@@ -256,6 +260,14 @@ impl BundleProblem {
             offset: second * by_along * velocity,
         };
         (compose(&keyframe.pose, &moved), Some(jacobians))
+    }
+
+    /// The velocity at a keyframe as the wheels read it: on departure where bearings are late, if it goes on, else on arrival.
+    fn velocity_read(&self, at: usize) -> Vector3<f64> {
+        match self.keyframes.get(at + 1).filter(|_| self.late) {
+            Some(next) => next.mean_velocity() + next.unevenness[0],
+            None => self.keyframes[at].mean_velocity() + self.keyframes[at].unevenness[1],
+        }
     }
 
     /// The velocity at a keyframe on the way to or from a neighbour, with its Jacobians by the poses of both.

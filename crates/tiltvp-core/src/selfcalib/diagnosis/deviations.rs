@@ -21,6 +21,7 @@ impl BundleProblem {
     /// Of the time offset it is the more significant one of early and of late bearings.
     pub(crate) fn deviations(&self, covariance: &Matrix3<f64>) -> [Option<Deviation>; 3] {
         let mut problem = self.with_free(FreeParameters { wheels: true, offset: true });
+        problem.as_wheels_read = !self.free.offset;
         let early = self.deviations_of(&problem, covariance);
         if self.free.offset {
             return early;
