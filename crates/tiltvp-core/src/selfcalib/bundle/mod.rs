@@ -7,6 +7,7 @@ mod descent;
 mod keyframe;
 mod landmark_distance;
 mod linearisation;
+mod link;
 mod pose_elimination;
 mod problem;
 mod scatter;
