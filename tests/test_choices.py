@@ -2,12 +2,20 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
-from tiltvp.lab.evaluation.choices import EXPECTED, Network, choice_shares, train_network, train_weights
+from tiltvp.lab.evaluation.choices import Network, choice_shares, train_network
 
 FEATURES = 6
 TOLD = 4
+PAST = 2
+"""A feature that goes past the hidden units."""
+
+
+def trained(told: list[tuple[np.ndarray, int]], line_alone: tuple[int, ...] | None = (PAST,)) -> Network:
+    return train_network(told, units=16, decay=0.01, line_alone=line_alone)
 
 
 def choices(seed: int, count: int) -> list[tuple[np.ndarray, int]]:
@@ -24,21 +32,40 @@ def right(network: Network, told: list[tuple[np.ndarray, int]]) -> float:
 
 def test_a_network_learns_what_no_line_tells() -> None:
     told, others = choices(1, 600), choices(2, 400)
-    network = train_network(told)
+    network = trained(told)
     assert right(network, others) > 0.85
-    line = train_weights(told, 5.0)
-    assert np.mean([(features @ line).argmax() == number for features, number in others]) < 0.5
+    without_units = replace(network, out=0.0 * network.out)
+    assert right(without_units, others) < 0.5
+
+
+def test_without_a_line_hidden_units_say_all() -> None:
+    network = trained(choices(1, 600), None)
+    assert not network.linear.any()
+    assert right(network, choices(2, 400)) > 0.85
+    written: dict[str, np.ndarray] = {}
+    exec(network.python(), written)
+    scaled = np.clip((network.means + network.scales - written["MEANS"]) / written["SCALES"], -4.0, 4.0)
+    log_odds = np.tanh(scaled @ written["HIDDEN"].T + written["BIASES"]) @ written["OUT"]
+    assert np.isclose(log_odds, network.log_odds((network.means + network.scales)[None])[0], atol=0.02)
+
+
+def test_choices_count_by_their_weights() -> None:
+    told = choices(5, 200)
+    others = [(features, (number + 1) % 3) for features, number in told]
+    weights = np.repeat([1.0, 0.0], 200)
+    network = train_network(told + others, units=16, decay=0.01, line_alone=None, weights=weights)
+    assert right(network, told) > 0.85
 
 
 def test_the_same_choices_make_the_same_network() -> None:
     told = choices(3, 100)
-    assert train_network(told).rust() == train_network(told).rust()
+    assert trained(told).rust() == trained(told).rust()
 
 
 def test_what_was_expected_counts_in_proportion() -> None:
-    network = train_network(choices(4, 200))
+    network = trained(choices(4, 200))
     rows = np.tile(network.means, (3, 1))
-    rows[:, EXPECTED[0]] += np.array([0.0, 10.0, 20.0]) * network.scales[EXPECTED[0]]
+    rows[:, PAST] += np.array([0.0, 10.0, 20.0]) * network.scales[PAST]
     low, middle, high = network.log_odds(rows)
     assert np.isclose(high - middle, middle - low, atol=1e-12)
     rows = np.tile(network.means, (2, 1))

@@ -4,17 +4,21 @@ from __future__ import annotations
 
 import json
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from tiltvp import Camera, Robot, check_turns, find_setup, frame_delay, tilt_error_rad
+from tiltvp import Camera, Robot, check_setup, check_turns, find_setup, frame_delay, tilt_error_rad
 from tiltvp.cli import main
 from tiltvp.errors import InvalidInputError
 from tiltvp.images import read_image, write_image
 from tiltvp.rotations import levelling
+from tiltvp.setup_check import opposite_direction
 from tiltvp.streams import Odometry, open_frames
+from tiltvp.streams.odometry import Motion
 from tiltvp.synth import Room
+from tiltvp.turning import turn_axis
 
 pytestmark = pytest.mark.slow
 
@@ -75,6 +79,30 @@ def test_setup_finds_that_images_are_mirrored(drive, tmp_path, capsys):
     code = run("setup", mirrored, *options(drive), "--out", tmp_path / "robot.toml")
     assert code == 1
     assert "the image is mirrored, or left and right" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("up", ["+z", "-z"])
+def test_turns_tell_which_way_is_up_where_looks_mislead(drive, monkeypatch, up):
+    frames = open_frames(str(drive / "frames"))
+    sense = 1.0 if up == "+z" else -1.0
+    motions = [Motion(sense * STEP if k else 0.0, 0.0) for k in range(COUNT)]
+    axis = turn_axis([frame.read() for frame in frames], [sense * STEP * k for k in range(COUNT)], CAMERA)
+    assert axis
+    assert axis.best == up
+    assert axis.check(up)
+    assert axis.check(opposite_direction(up)).reversed
+    looks = check_setup([frame.read() for frame in open_frames(str(drive / "frames"))][::5], CAMERA)
+    shares = {**dict.fromkeys(looks.probabilities, 0.02), opposite_direction(up): 0.6, up: 0.3, "+x": 0.06}
+    monkeypatch.setattr("tiltvp.robot_setup.check_setup", lambda *_, **__: replace(looks, probabilities=shares))
+    found = find_setup(frames, CAMERA, motions)
+    assert found.direction.best == up
+    assert found.direction.turns_about == up
+    assert found.direction.probabilities[up] == pytest.approx(0.3 * 0.95 / (0.3 * 0.95 + 0.6 * 0.05), abs=1e-3)
+    assert found.turns
+    told = found.direction.direction_reason
+    assert f"turn about the camera's {up}: up is" in told
+    assert f"or {opposite_direction(up)} (it looks" in told
+    assert told.endswith("if the image is mirrored, or left and right of the odometry are swapped")
 
 
 def test_mount_passes_and_fails_by_its_exit_code(drive, tmp_path, capsys):

@@ -11,7 +11,8 @@ import tiltvp
 from tiltvp.cli import main
 from tiltvp.errors import InvalidInputError
 from tiltvp.rotations import read_rotation
-from tiltvp.setup_check import DIRECTIONS
+from tiltvp.setup_check import DIRECTIONS, opposite_direction, shares_of
+from tiltvp.setup_features import ImageFeatures
 
 PINHOLE = tiltvp.Camera.pinhole(width=320, height=240, fx=190.0, fy=190.0, cx=159.5, cy=119.5)
 
@@ -48,6 +49,23 @@ def test_a_quarter_turn_and_an_upward_mounting_are_not_believed() -> None:
     upward = tiltvp.check_setup(IMAGES, PINHOLE)
     assert not upward
     assert upward.given == "+z"
+
+
+def test_an_image_upside_down_tells_of_the_opposite_directions() -> None:
+    features = ImageFeatures(PINHOLE)
+    upright, turned = features(IMAGES[0]), features(np.ascontiguousarray(IMAGES[0][::-1, ::-1]))
+    ahead_or_sideways = [opposite_direction(name) if name[1] != "z" else name for name in DIRECTIONS]
+    assert upright == pytest.approx(turned[[list(DIRECTIONS).index(name) for name in ahead_or_sideways]], abs=0.005)
+    assert np.abs(upright[0] - upright[1]).max() > 0.1
+
+
+def test_images_of_one_place_do_not_make_sure() -> None:
+    """Five tell as much as 24: they err together."""
+    features = ImageFeatures(PINHOLE)
+    seen = np.array([features(image) for image in IMAGES])
+    one, five, many = (shares_of(np.repeat(seen[:1], count, axis=0)).max() for count in (1, 5, 24))
+    assert one < five
+    assert five == pytest.approx(many, abs=0.01)
 
 
 def test_what_it_cannot_look_at_is_refused() -> None:

@@ -1,4 +1,4 @@
-"""Whether images turn as the odometry says: a mirrored image, and wheels that are swapped, turn the other way round."""
+"""Whether images turn as the odometry says, about which axis, and when."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import numpy as np
 
 from tiltvp.errors import InvalidInputError
 from tiltvp.images import gray_from
-from tiltvp.rotations import about_vertical
+from tiltvp.setup_check import DIRECTIONS, nearest_direction, opposite_direction
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
@@ -19,7 +19,9 @@ if TYPE_CHECKING:
     from tiltvp._core import Camera
     from tiltvp.streams.odometry import Odometry
 
-__all__ = ["FrameDelay", "TurnCheck", "check_turns", "frame_delay"]
+__all__ = [
+    "FrameDelay", "TurnAxis", "TurnCheck", "check_turns", "frame_delay", "made_small", "small_camera", "turn_axis",
+]  # fmt: skip
 
 _SIDE_PX: Final = 120
 """Longer side to which images are made smaller: what is near moves by less than a pixel while the robot drives on."""
@@ -99,25 +101,97 @@ def check_turns(
     the other way round; so do wheels that are swapped. Which of them it is cannot be told. The mounting (3, 3) has to
     be right about which way is up, not about its yaw. Raises `InvalidInputError` for sizes that do not fit.
     """
-    pictures = _Pictures(images, camera, robot_from_camera)
+    up = _up_of(robot_from_camera)
+    turned, scores = _turned_back(images, yaw_rad, camera, [up, -up])
+    if not len(scores):
+        return TurnCheck(0, turned, 0.0, 0.0, 0.0)
+    told, otherwise = (float(mean) for mean in scores.mean(axis=0))
+    return TurnCheck(len(scores), turned, told, otherwise, _lead(scores[:, 0] - scores[:, 1]))
+
+
+@dataclass(frozen=True)
+class TurnAxis:
+    """About which of the six directions images turn to the left where the odometry says so. True where they tell.
+
+    That is up, but where the image is mirrored, or left and right of the odometry are swapped: then it is down.
+    """
+
+    pairs: int
+    """Pairs of images that were compared."""
+    turned_rad: float
+    """How far the headings are apart at most."""
+    likeness: dict[str, float]
+    """Mean correlation of pairs turned back about each direction of `DIRECTIONS`."""
+    leads: dict[str, float]
+    """By how many of its standard errors each is ahead of the opposite one."""
+    sigmas: float
+    """The same of the best one and the next."""
+
+    @property
+    def best(self) -> str:
+        """The direction about which pairs are most alike."""
+        return max(self.likeness, key=lambda name: self.likeness[name])
+
+    def __bool__(self) -> bool:
+        return self.pairs >= _LEAST and self.turned_rad >= _TURNED_RAD and self.sigmas >= _SIGMAS
+
+    def check(self, up: str) -> TurnCheck:
+        """Whether images turn as told where that direction is up: what `check_turns` says."""
+        as_told, otherwise = self.likeness[up], self.likeness[opposite_direction(up)]
+        return TurnCheck(self.pairs, self.turned_rad, as_told, otherwise, self.leads[up])
+
+
+def turn_axis(
+    images: Iterable[ArrayLike], yaw_rad: ArrayLike, camera: Camera, robot_from_camera: ArrayLike | None = None
+) -> TurnAxis:
+    """About which of the camera's six directions images (N of them) turn as headings (N,) say, left positive.
+
+    With a mounting (3, 3) its own up and down stand for the directions that are nearest to them. Raises
+    `InvalidInputError` for sizes that do not fit.
+    """
+    axes = {name: np.array(direction) for name, direction in DIRECTIONS.items()}
+    if robot_from_camera is not None:
+        up = _up_of(robot_from_camera)
+        for sign in (1.0, -1.0):
+            axes[nearest_direction(sign * up)] = sign * up
+    turned, scores = _turned_back(images, yaw_rad, camera, list(axes.values()))
+    if not len(scores):
+        nothing = dict.fromkeys(DIRECTIONS, 0.0)
+        return TurnAxis(0, turned, nothing, nothing, 0.0)
+    of = dict(zip(DIRECTIONS, scores.T, strict=True))
+    likeness = {name: float(each.mean()) for name, each in of.items()}
+    leads = {name: _lead(each - of[opposite_direction(name)]) for name, each in of.items()}
+    best = max(likeness, key=lambda name: likeness[name])
+    sigmas = min(_lead(of[best] - each) for name, each in of.items() if name != best)
+    return TurnAxis(len(scores), turned, likeness, leads, sigmas)
+
+
+def _up_of(robot_from_camera: ArrayLike) -> NDArray[np.float64]:
+    """(3,): the robot's z axis in the camera frame."""
+    return np.array(np.asarray(robot_from_camera, dtype=np.float64)[2])
+
+
+def _turned_back(
+    images: Iterable[ArrayLike], yaw_rad: ArrayLike, camera: Camera, ups: list[NDArray[np.float64]]
+) -> tuple[float, NDArray[np.float64]]:
+    """How far headings are apart at most, and how alike pairs are, (P, U), turned back about each direction (3,)."""
+    pictures = _Pictures(images, camera)
     headings = np.asarray(yaw_rad, dtype=np.float64)
     if headings.shape != (len(pictures),) or not np.isfinite(headings).all():
         raise InvalidInputError(f"yaw_rad: shape {headings.shape}, expected ({len(pictures)},) of finite angles")
-    scores = [
-        [pictures.likeness(k, other, sign * float(headings[k] - headings[other])) for sign in (1.0, -1.0)]
+    scores = np.array([
+        [pictures.likeness(k, other, up * float(headings[k] - headings[other])) for up in ups]
         for k, other in _pairs(headings)
-    ]
-    scores = [pair for pair in scores if np.isfinite(pair).all()]
-    differences = [told - otherwise for told, otherwise in scores]
+    ]).reshape(-1, len(ups))  # fmt: skip
     turned = min(float(np.ptp(headings)) if len(headings) else 0.0, math.tau)
-    if not scores:
-        return TurnCheck(0, turned, 0.0, 0.0, 0.0)
-    mean = np.mean(scores, axis=0)
+    return turned, scores[np.isfinite(scores).all(axis=1)]
+
+
+def _lead(differences: NDArray[np.float64]) -> float:
+    """The mean of differences in its standard errors."""
     # Both pairs of an image err together.
     spread = float(np.std(differences)) / math.sqrt(max(1.0, len(differences) / _PARTNERS))
-    return TurnCheck(
-        len(scores), turned, float(mean[0]), float(mean[1]), float(np.mean(differences) / max(spread, 1e-6))
-    )
+    return float(np.mean(differences)) / max(spread, 1e-6)
 
 
 @dataclass(frozen=True)
@@ -155,7 +229,7 @@ def frame_delay(
     For each delay within `reach_s` images are turned back by what the odometry says of their true times, and compared.
     The mounting (3, 3) has to be right about which way is up. Raises `InvalidInputError` for sizes that do not fit.
     """
-    pictures = _Pictures(images, camera, robot_from_camera)
+    pictures, up = _Pictures(images, camera), _up_of(robot_from_camera)
     times = np.asarray(times_s, dtype=np.float64)
     if times.shape != (len(pictures),) or not np.isfinite(times).all():
         raise InvalidInputError(f"times_s: shape {times.shape}, expected ({len(pictures)},) of finite times")
@@ -169,7 +243,9 @@ def frame_delay(
         for column, delay in enumerate(delays):
             turned = odometry.at(times - delay).yaw_rad
             assert turned is not None  # As above.
-            found[:, column] = [pictures.likeness(k, other, float(turned[k] - turned[other])) for k, other in pairs]
+            found[:, column] = [
+                pictures.likeness(k, other, up * float(turned[k] - turned[other])) for k, other in pairs
+            ]
         return found
 
     coarse = np.arange(-reach_s, reach_s + 0.5 * _COARSE_STEP_S, _COARSE_STEP_S)
@@ -205,39 +281,50 @@ def _peak(delays: NDArray[np.floating], table: NDArray[np.float64]) -> tuple[flo
 class _Pictures:
     """Small images, and how alike two of them are after a turn of the robot."""
 
-    def __init__(self, images: Iterable[ArrayLike], camera: Camera, robot_from_camera: ArrayLike) -> None:
+    def __init__(self, images: Iterable[ArrayLike], camera: Camera) -> None:
         self._camera, self._grays = _small(images, camera)
-        self._mounting = np.asarray(robot_from_camera, dtype=np.float64)
         v, u = np.nonzero(self._camera.valid_mask())
         self._places = np.column_stack([u, v])
-        self._rays = self._camera.unproject(self._places.astype(np.float64)) @ self._mounting.T
+        self._rays = self._camera.unproject(self._places.astype(np.float64))
 
     def __len__(self) -> int:
         return len(self._grays)
 
-    def likeness(self, k: int, other: int, turn_rad: float) -> float:
-        """Correlation of two images where the robot turned so far to the left from the other to `k`; NaN: not known."""
-        if not math.isfinite(turn_rad):
+    def likeness(self, k: int, other: int, turn_rad: NDArray[np.float64]) -> float:
+        """Correlation of two images where the camera turned by a rotation vector (3,) from the other to `k`; NaN: not
+        known."""
+        import cv2
+
+        if not np.isfinite(turn_rad).all():
             return math.nan
-        # A direction that is seen here at ray r was seen there at Rz(turn) r.
-        there = self._rays @ about_vertical(turn_rad).T @ self._mounting
+        # A direction that is seen here at ray r was seen there at R r.
+        there = self._rays @ cv2.Rodrigues(turn_rad)[0].T
         here = self._grays[k][self._places[:, 1], self._places[:, 0]]
         return _correlation(here, self._grays[other], self._camera.project(there))
 
 
-def _small(images: Iterable[ArrayLike], camera: Camera) -> tuple[Camera, list[NDArray[np.float64]]]:
+def small_camera(camera: Camera) -> Camera:
+    """The camera of images made smaller by `made_small`."""
+    return camera.scaled(min(1.0, _SIDE_PX / max(camera.width, camera.height)))
+
+
+def made_small(image: NDArray[np.uint8], camera: Camera) -> NDArray[np.uint8]:
+    """A grey image of a camera as it is compared: turns are told at 120 pixels."""
     import cv2
 
-    scale = min(1.0, _SIDE_PX / max(camera.width, camera.height))
-    small = camera.scaled(scale)
+    small = small_camera(camera)
+    return np.asarray(cv2.resize(image, (small.width, small.height), interpolation=cv2.INTER_AREA))
+
+
+def _small(images: Iterable[ArrayLike], camera: Camera) -> tuple[Camera, list[NDArray[np.float64]]]:
     grays = []
     for number, image in enumerate(images):
         gray = gray_from(image, f"images[{number}]")
         if gray.shape != (camera.height, camera.width):
             expected = f"({camera.height}, {camera.width}), as the camera's images"
             raise InvalidInputError(f"images[{number}]: shape {gray.shape}, expected {expected}")
-        grays.append(cv2.resize(gray, (small.width, small.height), interpolation=cv2.INTER_AREA).astype(np.float64))
-    return small, grays
+        grays.append(made_small(gray, camera).astype(np.float64))
+    return small_camera(camera), grays
 
 
 def _pairs(headings: NDArray[np.float64]) -> list[tuple[int, int]]:

@@ -112,9 +112,9 @@ class PictureLog:
     def tilt(self) -> MountingTilt:
         """Roll and pitch of the mounting, by what stays of the images' leans when the robot turns."""
         from tiltvp.mounting import mounting_tilt
-        from tiltvp.robot_setup import METHOD, drive_tilts, measured_count
+        from tiltvp.robot_setup import TILT_OPTIONS, drive_tilts, measured_count
 
-        estimator = self.lines.mounted(self.camera, method=METHOD)
+        estimator = self.lines.mounted(self.camera, **TILT_OPTIONS)
         rotation = estimator.robot_from_camera
         with progress_bar(measured_count(self.frames), f"{self.name}: leans") as bar:
             tilts = drive_tilts(self.frames, estimator, self.moved.motions, advance=bar.advance)

@@ -51,12 +51,14 @@ class LineOptions(MountedOptions):
         """What tells the lean of a grey image: None with --tilt upright; raises `UnknownLeanError`."""
         from tiltvp import METHODS, TiltEstimator
         from tiltvp.line_logs import believed_leans
+        from tiltvp.robot_setup import TILT_OPTIONS
 
         check_word("--tilt", self.tilt, (_UPRIGHT, *METHODS))
         if self.tilt == _UPRIGHT:
             return lambda _: None
         mounting = self.rotation() if rotation is None else rotation
-        options: dict[str, Any] = {"method": self.tilt, "robot_from_camera": mounting}
+        own = TILT_OPTIONS if self.tilt == TILT_OPTIONS["method"] else {"method": self.tilt}
+        options: dict[str, Any] = {**own, "robot_from_camera": mounting}
         if self.mask is not None:
             options["mask"] = mask_from(self.mask)
         estimator, extractor = TiltEstimator(camera, **options), self.extractor(camera, rotation=mounting)

@@ -59,11 +59,11 @@ def mount(
         File for the result (.json).
     """
     from tiltvp.mounting import mounting_tilt
-    from tiltvp.robot_setup import METHOD, drive_tilts, measured_count
+    from tiltvp.robot_setup import TILT_OPTIONS, drive_tilts, measured_count
 
     if out is not None:
         check_output(out)
-    estimator = camera.complete(mounted).mounted(camera.load(), method=METHOD)
+    estimator = camera.complete(mounted).mounted(camera.load(), **TILT_OPTIONS)
     robot = camera.robot()
     frames = source.of_robot(robot, images).open(images)
     moved = motion.motions_of(robot, frames, wheel_base)

@@ -111,8 +111,8 @@ def _lines(found: RobotSetup) -> list[str]:
 def _draw(frames: Frames, camera: Camera, found: RobotSetup, path: Path) -> None:
     from tiltvp import write_image
     from tiltvp.overlays.setup import setup_picture
-    from tiltvp.robot_setup import METHOD, spread
+    from tiltvp.robot_setup import TILT_OPTIONS, spread
 
     _, image = next(spread(frames, camera, 1))
-    estimate = found.robot.estimator(method=METHOD)(image)
+    estimate = found.robot.estimator(**TILT_OPTIONS)(image)
     write_image(path, setup_picture(image, found.robot, estimate, found.given_robot_from_camera, found.mounting.reason))

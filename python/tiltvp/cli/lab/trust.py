@@ -36,14 +36,15 @@ def trust(
     count
         Images of each case.
     sets
-        Sets of five images of each building that `check_setup` is asked about; with one or more, `check_lens` too.
+        Sets of five images of each building that `check_setup` is asked about, by weights that other buildings trained;
+        with one or more, `check_lens` too.
     seed
         Seed of headings, leans and harm.
     unseen
         Only the half of the buildings on which nothing was set.
     weights
-        Show images of the other half alone, and also print the weights that it trains: of the confidences, and of
-        `check_setup`.
+        Show images of the other half alone, and also print the weights that it trains, of the confidences, and, of all
+        buildings, those of `check_setup`.
     out
         Also write the long table, one row for each image and method: .csv, .json or .parquet.
     """
@@ -75,10 +76,8 @@ def trust(
         for what, (constant, own) in zip(("vertical", "up"), train_trust(table, method), strict=True):
             say(f"{method}, {what}: {constant:.4g}; {', '.join(f'{weight:.4g}' for weight in own)}")
     if asked:
-        show_frame(
-            "Sets of five images of one building: which direction is up", summarise_sets(asked), ["half", "setup"]
-        )
+        show_frame("Sets of five images of one building: which direction is up", summarise_sets(asked), ["of", "setup"])
     if lenses is not None:
         show_frame("Sets of five images of one building: whether its lens is believed", lenses, ["setup", "told"])
-    if weights and (told := [item for item in asked if was_set_on(item.location)]):
-        say(f"check_setup: {', '.join(f'{weight:.4g}' for weight in train_setups(told))}")
+    if weights and asked:
+        print(train_setups(asked).python())

@@ -14,6 +14,7 @@ from tiltvp.extrinsics import Extrinsics
 from tiltvp.line_calibration import calibrate_lines
 from tiltvp.line_logs import SeenFrame, believed_leans, displacements, see_lines
 from tiltvp.lines import LineExtractor
+from tiltvp.robot_setup import TILT_OPTIONS
 from tiltvp.selfcalib import calibrate
 from tiltvp.streams import Motion
 from tiltvp.tilt import TiltEstimator
@@ -44,7 +45,7 @@ def judged_extrinsics(
     if not tilt:
         return nothing | {"reliable": False, "converged": False}
     camera, rotation = drive.camera, tilt.robot_from_camera
-    estimator = TiltEstimator(camera, method="segments", robot_from_camera=rotation)
+    estimator = TiltEstimator(camera, **TILT_OPTIONS, robot_from_camera=rotation)
     extractor = LineExtractor(camera, robot_from_camera=rotation)
     lean = believed_leans(estimator, extractor)
     told = [motion or Motion() for motion in motions]

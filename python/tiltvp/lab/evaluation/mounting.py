@@ -6,7 +6,7 @@ import math
 import tempfile
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 import polars as pl
@@ -17,7 +17,7 @@ from tiltvp.lab.datasets.panoramas import paper_camera
 from tiltvp.lab.datasets.recording import WHEEL_RADIUS_M, RecordedDrive
 from tiltvp.lab.evaluation.extrinsics import judged_extrinsics
 from tiltvp.mounting import MountingTilt, mounting_tilt
-from tiltvp.robot_setup import DriveTilts, drive_tilts, find_setup
+from tiltvp.robot_setup import TILT_OPTIONS, DriveTilts, drive_tilts, find_setup
 from tiltvp.rotations import read_rotation
 from tiltvp.streams import Wheels, frame_motions, open_frames
 from tiltvp.synth import ROOM_KINDS
@@ -37,6 +37,8 @@ CASES: Final = {"level": (0.0, 0.0), "1 degree": (1.0, 0.0), "1 degree, bumps": 
 """Floors by name: slope and greatest lean from bumps, degrees."""
 KINDS: Final = tuple(kind for kind in ROOM_KINDS if kind != "under-table")
 """Under tables no image tells which way is up."""
+METHODS: Final[dict[str, dict[str, Any]]] = {"segments": TILT_OPTIONS, "refined": {"method": "refined"}}
+"""Options of the estimator by the name of its method: those of `find_setup`, and beside it the pixels'."""
 _OFF_DEG: Final = 1.5
 """Roll and pitch of mountings are drawn up to this: as camera mounts of service robots are off (1 to 2 degrees)."""
 _QUANTILES: Final = {50: 1.386, 95: 5.991}
@@ -82,8 +84,8 @@ def _judged(path: Path, number: int, seed: int, looks: str, floor: str) -> dict[
         "sure": found.sure_of_direction, "turns": bool(found.turns), "reversed told": swapped.reversed,
         "turns wrong": bool(found.turns and found.turns.reversed) or bool(swapped),
     }  # fmt: skip
-    for method in ("segments", "refined"):
-        tilts = drive_tilts(frames, TiltEstimator(camera, method=method, robot_from_camera=nominal), motions)
+    for method, options in METHODS.items():
+        tilts = drive_tilts(frames, TiltEstimator(camera, **options, robot_from_camera=nominal), motions)
         mounting = mounting_tilt(tilts.estimates, tilts.motions, nominal)
         row |= _errors(f"{method} ", mounting, drive.robot_from_mounted_camera, nominal)
         row |= _leans(f"{method} ", tilts, drive, nominal)
@@ -131,7 +133,7 @@ def summarise_mountings(rows: pl.DataFrame) -> pl.DataFrame:
     """For each camera, floor and method: errors in degrees, regions that hold, answers; and in the median of the drives
     the rms errors of the tilt of a single image and of the filter."""
     tables = []
-    for method in ("segments", "refined"):
+    for method in METHODS:
         error, nees = pl.col(f"{method} error_deg"), pl.col(f"{method} nees")
         tables.append(
             rows.group_by("looks", "floor", maintain_order=True).agg(
