@@ -88,14 +88,31 @@ def test_the_place_is_told_by_motions_that_turn_and_drive(seen: list[SeenFrame])
 
 
 def test_what_does_not_settle_says_so(seen: list[SeenFrame], solve: partial[LogCalibration]) -> None:
-    away = calibrate_lines(seen, lambda bearings: moved(solve(bearings), x_m=30.0))
+    away = calibrate_lines(seen, lambda bearings, **_: moved(solve(bearings), x_m=30.0))
     assert not away.settled
+    assert "does not settle" in away.doubt
     places = iter(np.linspace(0.0, 0.4, 9))
-    assert not calibrate_lines(seen, lambda bearings: moved(solve(bearings), x_m=float(next(places)))).settled
+    assert not calibrate_lines(seen, lambda bearings, **_: moved(solve(bearings), x_m=float(next(places)))).settled
     with pytest.raises(InvalidInputError, match="no line is seen in 3 of 2 frames"):
         calibrate_lines(seen[:2], solve)
     with pytest.raises(InvalidInputError, match="no line is seen in 3 of 0 frames"):
         calibrate_lines([], solve)
+
+
+def test_a_mounting_that_hangs_on_one_line_is_doubted(seen: list[SeenFrame], solve: partial[LogCalibration]) -> None:
+    found = calibrate_lines(seen, solve)
+    assert not found.doubt
+    assert 0.0 < found.spread < 4.0
+    one = found.bearings[0, 1]
+
+    def hanging(bearings: np.ndarray, **start: object) -> LogCalibration:
+        whole = solve(bearings, **start)
+        return whole if one in bearings[:, 1] else moved(whole, y_m=whole.mounting.y_m + 0.1)
+
+    hung = calibrate_lines(seen, hanging)
+    assert hung.settled
+    assert hung.spread > 6.0
+    assert "without an eighth of the lines the mounting is another one" in hung.doubt
 
 
 def moved(whole: LogCalibration, **place: float) -> LogCalibration:

@@ -21,7 +21,8 @@ if TYPE_CHECKING:
     from tiltvp import LogCalibration, Robot
     from tiltvp.drive_logs import DriveLog
 
-    Solve: TypeAlias = Callable[[DriveLog], LogCalibration]
+    Solve: TypeAlias = Callable[..., LogCalibration]
+    """Of a `DriveLog`, and of where to start, if not as told."""
 
 __all__ = ["DriveOptions", "LogOptions", "Solved", "Tables", "other_readings", "sources_from"]
 

@@ -139,7 +139,7 @@ class PictureLog:
         try:
             with status(f"{self.name}: which line is which, and the whole log"):
                 found = calibrate_lines(
-                    seen, lambda bearings: solve(DriveLog(odometry, bearings, moved.times_s)),
+                    seen, lambda bearings, **start: solve(DriveLog(odometry, bearings, moved.times_s), **start),
                     start=self.drive.start_known, frames_min=self.pictures.track_frames_min,
                 )  # fmt: skip
         except InvalidInputError as error:
@@ -149,8 +149,7 @@ class PictureLog:
             table = track_table([(one.number, name, time_s, one.tracked) for (name, time_s), one in rows])
             write_table(table, self.pictures.tracks)
         say(f"{self.name}: {len(found.bearings)} bearings of {len(set(found.bearings[:, 1].tolist()))} lines")
-        doubt = "" if found.settled else "which line is which does not settle with the mounting"
-        return Solved(DriveLog(odometry, found.bearings, moved.times_s), found.whole, doubt)
+        return Solved(DriveLog(odometry, found.bearings, moved.times_s), found.whole, found.doubt)
 
     def _seen(
         self, moved: FrameMotions, rotation: NDArray[np.float64]

@@ -57,7 +57,9 @@ def judged_extrinsics(
         sigma_rad = float(np.median(np.concatenate([one.lines.sigma_rad for one in seen])))
         lines = calibrate_lines(
             seen,
-            lambda bearings: calibrate(odometry, bearings, wheel_base_m=base, bearing_sigma_rad=sigma_rad),
+            lambda bearings, **start: calibrate(
+                odometry, bearings, wheel_base_m=base, bearing_sigma_rad=sigma_rad, **start
+            ),
             frames_min=_FRAMES_MIN,
         )
     except InvalidInputError:
@@ -72,7 +74,7 @@ def judged_extrinsics(
     return row | {
         "nees": float(error @ np.linalg.solve(found.covariance, error)),
         "nees of place": float(error[[0, 1, 4]] @ np.linalg.solve(found.covariance[plane], error[[0, 1, 4]])),
-        "reliable": bool(found) and lines.settled,
+        "reliable": bool(found) and not lines.doubt,
         "converged": whole.converged,
     }
 
