@@ -49,14 +49,6 @@ def test_without_a_line_hidden_units_say_all() -> None:
     assert np.isclose(log_odds, network.log_odds((network.means + network.scales)[None])[0], atol=0.02)
 
 
-def test_choices_count_by_their_weights() -> None:
-    told = choices(5, 200)
-    others = [(features, (number + 1) % 3) for features, number in told]
-    weights = np.repeat([1.0, 0.0], 200)
-    network = train_network(told + others, units=16, decay=0.01, line_alone=None, weights=weights)
-    assert right(network, told) > 0.85
-
-
 def test_the_same_choices_make_the_same_network() -> None:
     told = choices(3, 100)
     assert trained(told).rust() == trained(told).rust()

@@ -131,10 +131,8 @@ def find_setup(
         rim, body = rim_and_body(frames, camera)
         mask = joined_mask(rim, body)
 
-    def images() -> Iterator[Image]:
-        return (image for _, image in spread(frames, camera, LOOKED_AT))
-
-    direction = check_setup(images(), camera, robot_from_camera, mask=mask)
+    looked_at = (image for _, image in spread(frames, camera, LOOKED_AT))
+    direction = check_setup(looked_at, camera, robot_from_camera, mask=mask)
     axis = None if motions is None else _turn_axis(frames, camera, motions, robot_from_camera)
     if axis:
         direction = _told_by_turns(direction, axis.best)

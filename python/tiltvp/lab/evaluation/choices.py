@@ -107,12 +107,11 @@ def train_network(
     units: int,
     decay: float,
     line_alone: tuple[int, ...] | None,
-    weights: NDArray[np.float64] | None = None,
 ) -> Network:
     """A network that makes the right ones of choices with features (K, F) likeliest. Same choices, same network.
 
     `decay` is of half the squared weights, beside the mean log-loss; the features `line_alone` go past the hidden
-    units, and without it there is no line; `weights` are those of the choices.
+    units, and without it there is no line.
     """
     rows = np.concatenate([features for features, _ in told])
     means, scales = rows.mean(axis=0), rows.std(axis=0) + 1e-9
@@ -126,8 +125,6 @@ def train_network(
     past = list(line_alone or ())
     hidden[:, past] = 0.0
     values = [np.zeros(count), np.zeros(units), rng.normal(0.0, 0.3 * units**-0.5, units), hidden]
-    share = np.ones(len(told)) if weights is None else weights
-    share = share / share.sum()
     moments = [np.zeros_like(value) for value in values]
     squares = [np.zeros_like(value) for value in values]
     for step in range(1, STEPS + 1):
@@ -137,7 +134,7 @@ def train_network(
         odds = np.exp(log_odds - np.maximum.reduceat(log_odds, starts)[choice])
         off = odds / np.add.reduceat(odds, starts)[choice]
         off[right] -= 1.0
-        off *= share[choice]
+        off /= len(told)
         back = np.outer(off, out) * (1.0 - seen**2)
         gradients = [off @ scaled, back.sum(axis=0), off @ seen, back.T @ scaled]
         gradients[3][:, past] = 0.0
