@@ -200,6 +200,25 @@ fn errors_that_stay_make_the_covariance_wider() {
     }
 }
 
+/// Leaving out posts in turn tells how wide it is.
+#[test]
+fn a_jackknife_over_the_landmarks_widens_what_errors_that_stay_leave_too_narrow() {
+    let jackknife = LogOptions { jackknife_parts: POSTS as u32, ..options() };
+    for kept in [0.9, 0.97] {
+        let drives: Vec<Drive> = (0..DRIVES).map(|seed| drive(seed, Errors { kept, ..NONE })).collect();
+        let [plain, wide] = [options(), jackknife]
+            .map(|options| -> Vec<LogCalibration> { drives.iter().map(|drive| whole(drive, &options)).collect() });
+        let [narrow, nees] = [&plain, &wide].map(|found| mean(found.iter().map(|found| nees(&found.estimate))));
+        println!("of errors of which {kept} stays the NEES is {narrow:.2} of 3, with a jackknife {nees:.2}");
+        assert!(nees < 0.8 * narrow, "{kept}: {narrow}, {nees}");
+        for (plain, wide) in plain.iter().zip(&wide) {
+            assert_eq!(plain.estimate.mounting, wide.estimate.mounting);
+            let more = wide.estimate.covariance_xy_yaw - plain.estimate.covariance_xy_yaw;
+            assert!(more.symmetric_eigenvalues().min() > -1e-12, "{more}");
+        }
+    }
+}
+
 #[test]
 fn wheels_and_a_delay_are_found_with_the_mounting() {
     let mut options = LogOptions { estimate_odometry: true, estimate_time_offset: true, ..options() };

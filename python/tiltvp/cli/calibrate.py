@@ -116,9 +116,9 @@ def _calibrated(
     def noise() -> dict[str, float]:
         return {} if one.sigma_rad is None else {"bearing_sigma_rad": one.sigma_rad}
 
-    def solve(log: DriveLog, **start: Any) -> LogCalibration:
+    def solve(log: DriveLog, **options: Any) -> LogCalibration:
         return calibrate_log(
-            log.odometry, log.bearings, **noise() | drive.of_whole_log() | start, times_s=log.times_s,
+            log.odometry, log.bearings, **noise() | drive.of_whole_log() | options, times_s=log.times_s,
             estimate_odometry=read.estimate_odometry, estimate_time_offset=read.estimate_time_offset,
         )  # fmt: skip
 

@@ -139,7 +139,7 @@ class PictureLog:
         try:
             with status(f"{self.name}: which line is which, and the whole log"):
                 found = calibrate_lines(
-                    seen, lambda bearings, **start: solve(DriveLog(odometry, bearings, moved.times_s), **start),
+                    seen, lambda bearings, **options: solve(DriveLog(odometry, bearings, moved.times_s), **options),
                     start=self.drive.start_known, frames_min=self.pictures.track_frames_min,
                 )  # fmt: skip
         except InvalidInputError as error:

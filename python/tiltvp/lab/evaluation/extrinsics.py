@@ -57,8 +57,8 @@ def judged_extrinsics(
         sigma_rad = float(np.median(np.concatenate([one.lines.sigma_rad for one in seen])))
         lines = calibrate_lines(
             seen,
-            lambda bearings, **start: calibrate(
-                odometry, bearings, wheel_base_m=base, bearing_sigma_rad=sigma_rad, **start
+            lambda bearings, **options: calibrate(
+                odometry, bearings, wheel_base_m=base, bearing_sigma_rad=sigma_rad, **options
             ),
             frames_min=_FRAMES_MIN,
         )

@@ -228,6 +228,26 @@ impl BundleProblem {
         self.landmarks.len() - 1
     }
 
+    /// This problem without some of its landmarks and their bearings, where it is now.
+    pub(crate) fn without_landmarks(&self, gone: impl Fn(usize) -> bool) -> Self {
+        let (mut problem, calibration) = (self.clone(), self.free.width());
+        let kept: Vec<usize> = (0..self.landmarks.len()).filter(|i| !gone(*i)).collect();
+        let of_kept = kept.iter().flat_map(|i| [0, 1].map(|k| calibration + 2 * i + k));
+        let rows: Vec<usize> = (0..calibration).chain(of_kept).collect();
+        problem.prior_mean = self.prior_mean.select_rows(&rows);
+        problem.prior_information = self.prior_information.select_rows(&rows).select_columns(&rows);
+        problem.landmarks = kept.iter().map(|i| self.landmarks[*i]).collect();
+        problem.scatters = kept.iter().map(|i| self.scatters[*i]).collect();
+        let mut places = vec![None; self.landmarks.len()];
+        kept.iter().enumerate().for_each(|(place, i)| places[*i] = Some(place));
+        for keyframe in &mut problem.keyframes {
+            let seen = keyframe.observations.iter();
+            keyframe.observations =
+                seen.filter_map(|seen| Some(Observation { landmark: places[seen.landmark]?, ..*seen })).collect();
+        }
+        problem
+    }
+
     /// The keyframe towards which the robot was from another one when the bearings of that were taken: the next where they are late, else
     /// the one before. None where there is none, where velocities are the wheels', and without a time offset.
     pub(crate) fn neighbour(&self, at: usize) -> Option<usize> {

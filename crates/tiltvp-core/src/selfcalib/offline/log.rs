@@ -31,7 +31,14 @@ options! {
         estimate_time_offset: bool = false;
         /// Most linearisations of each of the two descents (robust, then without outliers).
         max_iterations: u32 = 60;
+        /// Parts of the landmarks that are left out in turn: the covariance of the mounting is then no less than the scatter of
+        /// what the others tell. For landmarks that may be two things', as lines of images; 0 leaves none out.
+        jackknife_parts: u32 = 0 => none_or_several, "0, or a whole number from 2 to 1000";
     }
+}
+
+fn none_or_several(_: &LogOptions, parts: f64) -> bool {
+    parts == 0.0 || (2.0..=1000.0).contains(&parts)
 }
 
 /// A log that has been checked, with the bearings in the order of steps.

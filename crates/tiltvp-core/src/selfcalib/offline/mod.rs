@@ -2,6 +2,7 @@
 
 mod descent;
 mod incremental;
+mod jackknife;
 mod log;
 mod misreading;
 mod noise;

@@ -7,11 +7,14 @@ use nalgebra::{DMatrix, Matrix3};
 
 use super::descent::{TOLERANCE, solve};
 use super::incremental::{incremental_problem, problem_along};
+use super::jackknife::jackknife_covariance;
 use super::log::{LogBearing, LogOptions, SortedLog};
 use super::misreading::Misreading;
 use super::noise::solve_with_noise;
 use crate::error::{Error, Result};
-use crate::selfcalib::bundle::{BundleProblem, CholeskyFactor, DescentReport, FIRST_DAMPING, FreeParameters};
+use crate::selfcalib::bundle::{
+    BundleProblem, CholeskyFactor, DescentReport, FIRST_DAMPING, FreeParameters, widening_factor,
+};
 use crate::selfcalib::estimate::MountingEstimate;
 use crate::selfcalib::model::{Mounting, OUTLIER_SIGMAS, WheelMotion, Wheels};
 use crate::selfcalib::options::{CalibrationMethod, SelfCalibratorOptions};
@@ -262,7 +265,14 @@ fn report(
     });
     let covariance = covariance * scale;
     let mounting: Matrix3<f64> = covariance.fixed_view::<3, 3>(0, 0).into();
-    let mounting = widening * mounting * widening.transpose();
+    let mut mounting = widening * mounting * widening.transpose();
+    if converged && options.jackknife_parts > 0 {
+        let parts = options.jackknife_parts as usize;
+        // Of what one part alone tells no more is known than at the start.
+        let scatter = jackknife_covariance(problem, parts, options.max_iterations).unwrap_or(o.start_covariance);
+        let widening = widening_factor(&mounting, &scatter);
+        mounting = widening * mounting * widening.transpose();
+    }
     let counts = problem.contradictions();
     let suspect = problem.suspect(o, &counts, problem.noise_factors(), &mounting);
     let sigma = |at: usize| covariance[(at, at)].sqrt();
