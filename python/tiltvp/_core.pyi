@@ -2859,8 +2859,8 @@ class TiltEstimate:
 
     @property
     def alternatives(self) -> list[TiltAlternative]:
-        """Directions that may be up, the most probable first; only of the method "segments" where it looks anywhere
-        (`tilt_max_rad` above 20 degrees). The first is the tilt, where there is one.
+        """Directions that may be up, the most probable first; only of the method "segments". The first is the tilt,
+        where there is one.
         """
 
     @property
@@ -2869,7 +2869,9 @@ class TiltEstimate:
 
     @property
     def confidence(self) -> float:
-        """Probability, in [0, 1], that the error (eq. 44) is below two degrees, were it normal with that covariance."""
+        """Probability, in [0, 1], that the error (eq. 44) is below two degrees, were it normal with that covariance,
+        and that no alternative is right.
+        """
 
     @property
     def covariance_rad2(self) -> NDArray[np.float64]:
@@ -3068,9 +3070,9 @@ class TiltEstimator:
             0 joins none. Default: 1.
         scatter_rad
             "segments": Standard deviation in radians by which the edges of vertical things miss the vertical. Default:
-            0.010472.
+            0.00523599.
         segments_max
-            "segments": The most segments that are weighed, the longest ones. Default: 64.
+            "segments": The most segments that are weighed, the longest ones. Default: 160.
         """
 
     def _detect(self, image: NDArray[np.uint8]) -> ImageEdges:
@@ -3297,6 +3299,7 @@ def calibrate(
     estimate_odometry: bool | None = None,
     estimate_time_offset: bool | None = None,
     max_iterations: SupportsIndex | None = None,
+    jackknife_parts: SupportsIndex | None = None,
 ) -> LogCalibration:
     """The mounting from a whole log at once, by robust sparse least squares.
 
@@ -3338,6 +3341,10 @@ def calibrate(
         Whether the time by which bearings are later than the odometry is estimated; needs times. Default: False.
     max_iterations
         Most linearisations of each of the two descents (robust, then without outliers). Default: 60.
+    jackknife_parts
+        Parts of the landmarks that are left out in turn: the covariance of the mounting is then no less than the
+        scatter of what the others tell. For landmarks that may be two things', as lines of images; 0 leaves none out.
+        Default: 0.
     """
 
 def check_camera(

@@ -47,11 +47,8 @@ _OTHER_AXIS: Final = 1e-3
 """Probability of another axis than that about which images turn by three standard errors."""
 MEASURED: Final = 200
 """Images, spread over the drive, whose tilts tell the mounting. Of rendered drives 60 leave 0.02 degrees."""
-TILT_OPTIONS: Final[dict[str, Any]] = {"method": "segments", "tilt_max_rad": math.pi}
-"""Edges of level things tell the lean along the optical axis too, which vertical ones hardly do in a view ahead: of 18
-rendered drives the mounting is off by 0.06 degrees in the median with them and 0.12 without."""
-_LEAN_MAX_RAD: Final = math.radians(20.0)
-"""Most lean that is one of the mounting and of the floor; farther away another axis was taken for up."""
+TILT_OPTIONS: Final[dict[str, Any]] = {"method": "segments", "tilt_max_rad": math.radians(20.0)}
+"""Leans of the mounting and of the floor: farther away another axis may be taken for up."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -197,7 +194,7 @@ def drive_tilts(
     for frame in frames.sample(numbers):
         image = _usable(frame, estimator.camera)
         estimate = None if image is None else estimator(image)
-        estimates.append(estimate if estimate and estimate.alpha_rad <= _LEAN_MAX_RAD else None)
+        estimates.append(estimate if estimate else None)
         advance()
     return DriveTilts(estimates, _joined(motions, numbers))
 

@@ -36,10 +36,10 @@ pub struct TiltEstimate {
     pub inlier_pixels: usize,
     /// The shift `l` of the vanishing point in pixels (eq. 20) before any factor; only of the image-space methods.
     pub shift_px: Option<f64>,
-    /// Directions that may be up, the most probable first; only of the method of straight edges where it looks anywhere. The first
-    /// is the tilt, where there is one.
+    /// Directions that may be up, the most probable first; only of the method of straight edges. The first is the tilt, where there is
+    /// one.
     pub alternatives: [Option<Alternative>; ALTERNATIVES],
-    /// Root mean square residual of the inliers: radians, or pixels for the image-space methods; NaN without a tilt.
+    /// Root mean square residual of the inliers: radians, or pixels for the image-space methods; NaN without a tilt or an inlier.
     pub residual_rms: f64,
     /// Random samples or refits done.
     pub iterations: u32,

@@ -39,7 +39,8 @@ value! {
         /// clutter, a fifth of the lean for methods that approximate the lens, and 0.17 degrees a side for what no image
         /// tells.
         covariance_rad2: Matrix2<f64>,
-        /// Probability, in [0, 1], that the error (eq. 44) is below two degrees, were it normal with that covariance.
+        /// Probability, in [0, 1], that the error (eq. 44) is below two degrees, were it normal with that covariance, and that no
+        /// alternative is right.
         confidence: f64,
         /// Edge pixels in the elevation band; of the method of straight edges those that are part of one.
         edge_pixels: usize,
@@ -49,8 +50,8 @@ value! {
         inlier_pixels: usize,
         /// The shift l of the vanishing point in pixels (eq. 20), before any factor; None but for the image-space methods.
         shift_px: Option<f64>,
-        /// Directions that may be up, the most probable first; only of the method "segments" where it looks anywhere
-        /// (`tilt_max_rad` above 20 degrees). The first is the tilt, where there is one.
+        /// Directions that may be up, the most probable first; only of the method "segments". The first is the tilt, where
+        /// there is one.
         alternatives: Alternatives,
         /// How the fit went.
         report: Flat<FitReport>,

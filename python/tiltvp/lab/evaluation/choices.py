@@ -30,7 +30,7 @@ _HEAD: Final = """//! The weights of the network in `choice.rs`: `tiltvp measure
 
 #![allow(clippy::unreadable_literal)]
 
-use super::any_hypothesis::FEATURES;
+use super::hypothesis::FEATURES;
 
 /// Hidden units.
 """

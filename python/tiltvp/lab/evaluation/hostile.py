@@ -53,7 +53,7 @@ TWIN: Final = 0.3
 by `segments` where 69 % are, cross-validated by building."""
 HOPELESS: Final = 0.3
 """Confidence by the covariance below which an estimate is not sure anyway, and teaches nothing."""
-RIGHT: Final = {"refined": (2.0, 20.0), "segments": (1.5, 16.0)}
+RIGHT: Final = {"refined": (2.0, 20.0), "segments": (1.0, 8.0)}
 """How much a right estimate weighs against a wrong one, for whether a fit is of the vertical and for whether up is as
 told: so much that of the right ones of unharmed upward views nine in ten stay sure, cross-validated by building."""
 PENALTY: Final = 1.0

@@ -2,9 +2,10 @@
 
 use nalgebra::Vector3;
 
-use super::any_hypothesis::{Edge, FEATURES, Hypothesis, OF_EDGES, Prior};
 use super::any_lightness::Lightness;
 use super::choice_weights::{BIASES, HIDDEN, LINEAR, MEANS, OUT, SCALES};
+use super::frame::Edge;
+use super::hypothesis::{FEATURES, Hypothesis, OF_EDGES, Prior};
 
 /// Features that say what was expected before the image was seen: they count in proportion, so that no lean is ruled out.
 const EXPECTED: std::ops::Range<usize> = 1..4;
@@ -28,7 +29,7 @@ pub(super) fn log_odds(features: &[f64; FEATURES]) -> f64 {
 const LEAN_RAD: f64 = 30f64.to_radians();
 
 /// Cosine of 45 degrees: cameras whose axis is nearer to the vertical than that have no roll.
-const AHEAD_SIN: f64 = std::f64::consts::FRAC_1_SQRT_2;
+pub(super) const AHEAD_SIN: f64 = std::f64::consts::FRAC_1_SQRT_2;
 
 /// What tells whether a hypothesis is the right one: its likelihood; how far it is from what was expected, by roll and pitch of the
 /// camera; how much agrees with each of its axes, how long, how high and of which polarity that is; how light it is above and below.
@@ -50,8 +51,8 @@ fn of_edges(edges: &[Edge], hypothesis: &Hypothesis, prior: &Prior) -> [f64; OF_
     let (mut longest_vertical, mut longest_horizontal) = (0.0f64, 0.0f64);
     let (mut length_of_verticals, mut length_of_horizontals) = (0.0, 0.0);
     for edge in edges {
-        let [first, second, vertical] = hypothesis.shares(edge);
-        let (weight, horizontal) = (edge.weight(), first + second);
+        let [first, second, vertical] = hypothesis.frame.shares(edge);
+        let (weight, horizontal) = (edge.weight, first + second);
         for (sum, share) in of_axis.iter_mut().zip([first, second, vertical]) {
             *sum += weight * share;
         }
@@ -72,7 +73,7 @@ fn of_edges(edges: &[Edge], hypothesis: &Hypothesis, prior: &Prior) -> [f64; OF_
     let (more, less, horizontal) = (first.max(second), first.min(second), first + second);
     let (lean, roll, pitch) = leans(up, prior);
     [
-        0.1 * hypothesis.log_likelihood,
+        0.1 * hypothesis.frame.log_likelihood,
         lean * lean,
         roll * roll,
         pitch * pitch,
@@ -90,7 +91,7 @@ fn of_edges(edges: &[Edge], hypothesis: &Hypothesis, prior: &Prior) -> [f64; OF_
         longest_horizontal,
         length_of_verticals.ln_1p(),
         length_of_horizontals.ln_1p(),
-        hypothesis.log_likelihood / (5.0 + total),
+        hypothesis.frame.log_likelihood / (5.0 + total),
     ]
 }
 

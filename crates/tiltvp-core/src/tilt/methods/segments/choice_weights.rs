@@ -2,7 +2,7 @@
 
 #![allow(clippy::unreadable_literal)]
 
-use super::any_hypothesis::FEATURES;
+use super::hypothesis::FEATURES;
 
 /// Hidden units.
 const UNITS: usize = 16;

@@ -3,8 +3,8 @@
 use nalgebra::Vector3;
 
 use super::anywhere::Search;
-use super::aspect::AspectWork;
-use super::near::NearWork;
+use super::frame::Edge;
+use super::near::{Columns, NearWork};
 use crate::edges::EdgePixels;
 use crate::segments::{FinderScratch, Segments};
 
@@ -15,13 +15,15 @@ pub(in crate::tilt) struct SegmentWork {
     pub(super) segments: Segments,
     /// The pixels that vote.
     pub(super) strong: EdgePixels,
-    /// Of the segments that are weighed: their numbers, and the probability of being vertical by the last fit.
+    /// The segments that are weighed, in the robot frame.
+    pub(super) edges: Vec<Edge>,
+    /// Of those that may be vertical: their numbers, and the probability of being vertical by the last fit.
     pub(super) weighed: Vec<(u32, f64)>,
     pub(super) search: Search,
     /// Levels of the sample.
     pub(super) levels: Vec<f32>,
     pub(super) near: NearWork,
-    pub(super) aspect: AspectWork,
+    pub(super) columns: Columns,
 }
 
 impl SegmentWork {
@@ -30,11 +32,12 @@ impl SegmentWork {
             finder,
             segments: Segments::default(),
             strong: EdgePixels::default(),
+            edges: Vec::new(),
             weighed: Vec::new(),
             search: Search::default(),
             levels: Vec::new(),
             near: NearWork::default(),
-            aspect: AspectWork::default(),
+            columns: Columns::default(),
         }
     }
 
