@@ -39,7 +39,7 @@ pub struct TiltEstimate {
     /// Directions that may be up, the most probable first; only of the method of straight edges. The first is the tilt, where there is
     /// one.
     pub alternatives: [Option<Alternative>; ALTERNATIVES],
-    /// Root mean square residual of the inliers: radians, or pixels for the image-space methods; NaN without a tilt or an inlier.
+    /// Root mean square residual of the inliers: radians, or pixels for the image-space methods; NaN without a tilt.
     pub residual_rms: f64,
     /// Random samples or refits done.
     pub iterations: u32,

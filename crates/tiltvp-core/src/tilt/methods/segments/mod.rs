@@ -121,7 +121,7 @@ struct SegmentFit {
     sample: Sample,
 }
 
-/// The verticals of frames with their log-likelihoods, the most likely first, as alternatives; those that nearly coincide are one.
+/// The verticals of frames, the most likely first, as alternatives, the most probable first; those that nearly coincide are one.
 fn alternatives(frames: &[(f64, Frame)]) -> [Option<Alternative>; ALTERNATIVES] {
     let mut alternatives: [Option<Alternative>; ALTERNATIVES] = [None; ALTERNATIVES];
     let share = |log_likelihood: f64| ((log_likelihood - frames[0].0) / ALIKE).exp();
@@ -135,6 +135,8 @@ fn alternatives(frames: &[(f64, Frame)]) -> [Option<Alternative>; ALTERNATIVES] 
             *slot = Some(Alternative { normal, probability });
         }
     }
+    let probability = |one: &Option<Alternative>| one.map_or(-1.0, |one| one.probability);
+    alternatives.sort_by(|a, b| probability(b).total_cmp(&probability(a)));
     alternatives
 }
 
@@ -230,17 +232,21 @@ impl SegmentFit {
             Some((frame.log_likelihood + self.near.log_prior(&frame.axes[2])?, frame))
         }));
         refined.sort_unstable_by(|a, b| b.0.total_cmp(&a.0));
-        let Some((_, best)) = refined.first() else {
+        let alternatives = alternatives(refined);
+        let Some(chosen) = alternatives[0] else {
             return Fit::failed(Stop::NoModel { trials: frames.len() as u32 });
         };
-        let alternatives = alternatives(refined);
+        let best = refined.iter().find(|(_, frame)| frame.axes[2] == chosen.normal).map_or(refined[0].1, |best| best.1);
         let best = best.refined(edges);
         let (iterations, of) = (2 * STEPS, alternatives.iter().flatten().count());
-        let stop = match alternatives[0] {
-            Some(Alternative { probability, .. }) if of > 1 => Stop::Chosen { probability, of },
-            _ => Stop::IterationLimit { limit: iterations, change: best.change },
+        let stop = if of > 1 {
+            Stop::Chosen { probability: chosen.probability, of }
+        } else {
+            Stop::IterationLimit { limit: iterations, change: best.change }
         };
-        Fit { iterations, alternatives, ..fit_of(&best, &best.axes[2], work, stop) }.settled()
+        let fit = fit_of(&best, &best.axes[2], work, stop);
+        let covariance = fit.covariance.filter(|covariance| self.near.tells(covariance));
+        Fit { covariance, iterations, alternatives, ..fit }.settled()
     }
 
     /// The most probable of the directions that may be up, unless none is more probable than all others together.
@@ -268,24 +274,48 @@ impl SegmentFit {
     }
 }
 
-/// A frame whose vertical is up, and what agrees with it.
+/// A frame whose vertical is up, and what agrees with it. Where only level edges do, they are what the residuals are of.
 fn fit_of(frame: &Frame, up: &Vector3<f64>, work: &mut SegmentWork, stop: Stop) -> Fit {
     let SegmentWork { segments, edges, weighed, .. } = work;
-    let (mut squares, mut count, mut inliers) = (0.0, 0.0, 0);
+    let mean_square = |axis: usize| {
+        let agreeing = edges.iter().filter(|edge| frame.shares(edge)[axis] > 0.5);
+        let (count, sum) = agreeing
+            .fold((0.0, 0.0), |(count, sum), edge| (count + 1.0, sum + edge.normal.dot(&frame.axes[axis]).powi(2)));
+        (count > 0.0).then(|| sum / count)
+    };
+    let residual = [2, 0, 1].into_iter().find_map(mean_square);
+    let mut inliers = 0;
     for (i, share) in weighed.iter_mut() {
-        let edge = &edges[*i as usize];
-        *share = frame.shares(edge)[2];
+        *share = frame.shares(&edges[*i as usize])[2];
         if *share > 0.5 {
-            squares += edge.normal.dot(up).powi(2);
-            count += 1.0;
             inliers += segments.list[*i as usize].support();
         }
     }
     Fit {
         tilt: Tilt::from_normal(up),
-        covariance: frame.covariance(edges, up),
+        covariance: residual.and_then(|_| frame.covariance(edges, up)),
         inliers,
-        rms: (squares / count).sqrt(),
+        rms: residual.map_or(f64::NAN, f64::sqrt),
         ..Fit::failed(stop)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn alternatives_that_nearly_coincide_are_one_and_the_most_probable_is_first() {
+        let frame = |lean_deg: f64, log_likelihood: f64| {
+            let up = Tilt::from_alpha_beta(lean_deg.to_radians(), 0.0).normal();
+            (log_likelihood, Frame::about(&[], &up, 0.01))
+        };
+        let found = alternatives(&[frame(8.0, 40.0), frame(1.0, 39.0), frame(1.5, 38.0)]);
+        let [Some(first), Some(second), None, None] = found else { panic!("{found:?}") };
+        let [a, b, c] = [0.0, -1.0, -2.0].map(|log_likelihood: f64| (log_likelihood / ALIKE).exp());
+        assert!((first.probability - (b + c) / (a + b + c)).abs() < 1e-12, "{first:?}");
+        assert!((second.probability - a / (a + b + c)).abs() < 1e-12, "{second:?}");
+        assert!(first.normal.angle(&Tilt::from_alpha_beta(1f64.to_radians(), 0.0).normal()) < 1e-9, "{first:?}");
+        assert_eq!(alternatives(&[]), [None; ALTERNATIVES]);
     }
 }

@@ -2,7 +2,7 @@
 
 use std::f64::consts::FRAC_PI_2;
 
-use nalgebra::Vector3;
+use nalgebra::{Matrix2, Vector3};
 
 use super::frame::{Edge, Frame};
 
@@ -86,6 +86,11 @@ impl Near {
     pub(super) fn log_prior(&self, normal: &Vector3<f64>) -> Option<f64> {
         let lean = normal.z.clamp(-1.0, 1.0).acos();
         (lean <= self.tilt_max_rad + BEYOND_RAD).then(|| log_prior(lean, self.tilt_max_rad))
+    }
+
+    /// Whether a covariance tells anything in every direction: by less than the largest lean.
+    pub(super) fn tells(&self, covariance: &Matrix2<f64>) -> bool {
+        covariance.symmetric_eigenvalues().max() < self.tilt_max_rad.powi(2)
     }
 
     /// Whether the circle of an edge passes near a lean that is looked at.
