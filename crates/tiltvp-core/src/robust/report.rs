@@ -54,7 +54,7 @@ pub enum Stop {
         /// The angle within which an answer means something, in radians.
         limit_rad: f64,
     },
-    /// Of several models that observations agree with, one is more probable than all others together.
+    /// The most probable of several models that observations agree with.
     Chosen {
         /// Its probability.
         probability: f64,

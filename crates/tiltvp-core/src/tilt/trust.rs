@@ -4,6 +4,7 @@ use super::doubt::Doubt;
 use super::estimate::TiltEstimate;
 use super::image_circle::CentreOff;
 use super::lightness::LIGHTS;
+use crate::robust::Stop;
 
 /// How many numbers tell of a fit.
 const FIT: usize = 8;
@@ -156,6 +157,9 @@ impl Doubt {
             Self::FewAgree { share }
         } else if ratio > UNLIKE {
             Self::OneSided { ratio }
+        } else if matches!(estimate.stop, Stop::Chosen { probability, .. } if probability < SURE) {
+            // What speaks for others says so itself.
+            return None;
         } else if estimate.tilt.is_some() {
             Self::Scattered { sigma_rad: estimate.covariance_rad2.trace().sqrt() }
         } else {
@@ -170,7 +174,6 @@ mod tests {
 
     use super::*;
     use crate::geometry::Tilt;
-    use crate::robust::Stop;
     use crate::tilt::estimate::ALTERNATIVES;
 
     /// 150 pixels for a radian and upwards, 0.2 degrees.
@@ -198,6 +201,7 @@ mod tests {
         assert!(matches!(of(&even), Some(Doubt::Scattered { sigma_rad }) if (sigma_rad - 5e-4f64.sqrt()).abs() < 1e-9));
         assert!(of(&TiltEstimate { confidence: 0.9, ..even }).is_none());
         assert!(of(&TiltEstimate { tilt: None, ..even }).is_none());
+        assert!(of(&TiltEstimate { stop: Stop::Chosen { probability: 0.6, of: 2 }, ..even }).is_none());
         let one_sided = unsure([0.04, 0.01]);
         assert!(matches!(of(&one_sided), Some(Doubt::OneSided { ratio }) if (ratio - 4.0).abs() < 1e-9));
         let few_agree = TiltEstimate { inlier_pixels: 300, ..one_sided };

@@ -12,8 +12,8 @@ value! {
         ///
         /// "confident": random sampling has drawn as many samples as its confidence needs; "trial-limit": it has drawn all
         /// it may. "converged": the model has stopped changing; "settled": the residuals are small enough;
-        /// "iteration-limit": refitting has been repeated as often as it may. "chosen": of several alternatives one is more
-        /// probable than all others together; "ambiguous": none is. No answer comes of "too-few" observations,
+        /// "iteration-limit": refitting has been repeated as often as it may. "chosen": it is the most probable of several
+        /// alternatives; "ambiguous": of several none is probable enough. No answer comes of "too-few" observations,
         /// "no-model" (they are all alike), "undetermined" (they do not tell how far it may be off) and "out-of-reach" (an angle
         /// that the method cannot mean).
         stop: StopWord,
