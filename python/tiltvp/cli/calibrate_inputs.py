@@ -71,7 +71,9 @@ class DriveOptions(LibraryOptions):
 
     def of_filter(self) -> dict[str, Any]:
         """What `SelfCalibrator` takes."""
-        return {name: value for name, value in self.given().items() if name != "max_iterations"} | self._wheels()
+        own = [option_fields("SelfCalibrator", method) for method in CALIBRATION_METHODS]
+        known = {field["name"] for fields in own for field in fields}
+        return {name: value for name, value in self.given().items() if name in known} | self._wheels()
 
     def of_whole_log(self) -> dict[str, Any]:
         """What `calibrate` takes."""

@@ -66,7 +66,7 @@ impl<'a> SortedLog<'a> {
         times_s: Option<&'a [f64]>,
         bearings: &[LogBearing],
     ) -> Result<Self> {
-        options.filter.validate()?;
+        options.validate()?;
         check(options, readings, times_s, bearings)?;
         let mut bearings = bearings.to_vec();
         bearings.sort_by_key(|b| b.step);
