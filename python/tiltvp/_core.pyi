@@ -2119,14 +2119,15 @@ class MountingEstimate:
     @property
     def suspect(self) -> str | None:
         """What is most likely wrong where the log does not fit: "turns" (a sign or a unit), "outliers" (a bump, or
-        names), "bump", "slips", "bearing_sigma_rad", "odometry_k_m", "wheel_base_m", "right_over_left" or
-        "time_offset_s". None if nothing is.
+        names), "bump", "slips", "bearing_sigma_rad", "odometry_k_m", "wheel_base_m", "right_over_left", "time_offset_s"
+        or "drift" (motions of a part of the drive that err together). None if nothing is.
         """
 
     @property
     def suspect_value(self) -> float | None:
         """The value that would suit the log better, of what `suspect` names (a time offset in steps); of "turns",
-        "outliers" and "slips" their share, of "bump" its angle in radians.
+        "outliers" and "slips" their share, of "bump" its angle in radians, of "drift" the factor of a standard
+        deviation.
         """
 
     def to_dict(self) -> dict[str, Any]:

@@ -1,7 +1,7 @@
 //! The covariance of the mounting where a landmark's bearings share errors: cluster-robust (Liang and Zeger 1986), and that of errors
 //! that fade from one bearing to the next.
 
-use nalgebra::{DMatrix, Matrix3, RowVector3, SymmetricEigen, Vector3};
+use nalgebra::{DMatrix, Matrix3, RowVector3, SymmetricEigen, U3, Vector3};
 
 use super::problem::BundleProblem;
 use super::schur::ReducedSystem;
@@ -62,8 +62,8 @@ impl BundleProblem {
         let seen = together.iter().filter(|u| **u != Vector3::zeros()).count() as f64;
         let square = |u: &Vector3<f64>| u * u.transpose();
         let together = together.iter().map(square).sum::<Matrix3<f64>>() * (seen / (seen - 1.0).max(1.0));
-        let by_clusters = widening_factor(&own, &(own - alone + together));
-        widening_factor(&(by_clusters * own * by_clusters.transpose()), &(own + pairs)) * by_clusters
+        let clusters = own - alone + together;
+        widening_factor(&widened(&own, &clusters), &(own + pairs)) * widening_factor(&own, &clusters)
     }
 
     /// The share of a bearing's error that stays to the next of its landmark. None if successive residuals are not positively correlated.
@@ -88,18 +88,40 @@ impl BundleProblem {
     }
 }
 
+/// A covariance that is `wide`, but in no direction narrower than `own`.
+pub(crate) fn widened(own: &Matrix3<f64>, wide: &Matrix3<f64>) -> Matrix3<f64> {
+    let factor = widening_factor(own, wide);
+    factor * own * factor.transpose()
+}
+
+/// The largest ratio of standard deviations of `wide` to those of `own`, of all directions: at least 1.
+pub(crate) fn largest_ratio(own: &Matrix3<f64>, wide: &Matrix3<f64>) -> f64 {
+    Whitened::new(own, wide).map_or(1.0, |of| of.eigen.eigenvalues.max().max(1.0).sqrt())
+}
+
 /// `F` such that `F C F^T` is `wide`, but in no direction narrower than `C`.
-pub(crate) fn widening_factor(own: &Matrix3<f64>, wide: &Matrix3<f64>) -> Matrix3<f64> {
-    let Some(factor) = own.cholesky() else { return Matrix3::identity() };
-    let lower = factor.l();
-    let Some(inverse) = lower.try_inverse() else { return Matrix3::identity() };
-    let ratio = inverse * wide * inverse.transpose();
-    let eigen = SymmetricEigen::new(0.5 * (ratio + ratio.transpose()));
-    if !eigen.eigenvalues.iter().all(|value| value.is_finite()) {
-        return Matrix3::identity();
-    }
+fn widening_factor(own: &Matrix3<f64>, wide: &Matrix3<f64>) -> Matrix3<f64> {
+    let Some(Whitened { lower, inverse, eigen }) = Whitened::new(own, wide) else { return Matrix3::identity() };
     let root = Matrix3::from_diagonal(&eigen.eigenvalues.map(|value| value.max(1.0).sqrt()));
     lower * eigen.eigenvectors * root * eigen.eigenvectors.transpose() * inverse
+}
+
+/// A covariance in units of another one.
+struct Whitened {
+    /// The Cholesky factor of the other one, and its inverse.
+    lower: Matrix3<f64>,
+    inverse: Matrix3<f64>,
+    eigen: SymmetricEigen<f64, U3>,
+}
+
+impl Whitened {
+    fn new(own: &Matrix3<f64>, wide: &Matrix3<f64>) -> Option<Self> {
+        let lower = own.cholesky()?.l();
+        let inverse = lower.try_inverse()?;
+        let ratio = inverse * wide * inverse.transpose();
+        let eigen = SymmetricEigen::new(0.5 * (ratio + ratio.transpose()));
+        eigen.eigenvalues.iter().all(|value| value.is_finite()).then_some(Self { lower, inverse, eigen })
+    }
 }
 
 #[cfg(test)]
@@ -109,12 +131,11 @@ mod tests {
     #[test]
     fn widens_where_it_should_and_never_narrows() {
         let own = Matrix3::new(4.0, 1.0, 0.5, 1.0, 2.0, 0.3, 0.5, 0.3, 1.0);
-        let f = widening_factor(&own, &(own * 4.0));
-        assert!((f * own * f.transpose() - own * 4.0).amax() < 1e-12);
-        let f = widening_factor(&own, &(own * 0.25));
-        assert!((f * own * f.transpose() - own).amax() < 1e-12);
+        assert!((widened(&own, &(own * 4.0)) - own * 4.0).amax() < 1e-12);
+        assert!((largest_ratio(&own, &(own * 4.0)) - 2.0).abs() < 1e-12);
+        assert!((widened(&own, &(own * 0.25)) - own).amax() < 1e-12);
+        assert_eq!(largest_ratio(&own, &(own * 0.25)), 1.0);
         let more = own + Matrix3::from_diagonal(&Vector3::new(0.0, 3.0, 0.0));
-        let f = widening_factor(&own, &more);
-        assert!((f * own * f.transpose() - more).amax() < 1e-12);
+        assert!((widened(&own, &more) - more).amax() < 1e-12);
     }
 }

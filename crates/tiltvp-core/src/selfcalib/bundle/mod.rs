@@ -4,6 +4,7 @@
 mod cholesky;
 mod cluster_robust;
 mod descent;
+mod jackknife;
 mod keyframe;
 mod landmark_distance;
 mod linearisation;
@@ -14,7 +15,7 @@ mod scatter;
 mod schur;
 
 pub(super) use self::cholesky::{CholeskyFactor, combine, subtract_square};
-pub(super) use self::cluster_robust::widening_factor;
+pub(super) use self::cluster_robust::{largest_ratio, widened};
 pub(super) use self::descent::{DescentReport, FIRST_DAMPING, Solution};
 pub(super) use self::keyframe::{Keyframe, Observation};
 pub(super) use self::landmark_distance::{DISTANCE_STEP, DISTANCE_STEPS};

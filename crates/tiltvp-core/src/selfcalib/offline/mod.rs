@@ -2,7 +2,6 @@
 
 mod descent;
 mod incremental;
-mod jackknife;
 mod log;
 mod misreading;
 mod noise;

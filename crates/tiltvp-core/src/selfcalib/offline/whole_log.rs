@@ -7,14 +7,11 @@ use nalgebra::{DMatrix, Matrix3};
 
 use super::descent::{TOLERANCE, solve};
 use super::incremental::{incremental_problem, problem_along};
-use super::jackknife::jackknife_covariance;
 use super::log::{LogBearing, LogOptions, SortedLog};
 use super::misreading::Misreading;
 use super::noise::solve_with_noise;
 use crate::error::{Error, Result};
-use crate::selfcalib::bundle::{
-    BundleProblem, CholeskyFactor, DescentReport, FIRST_DAMPING, FreeParameters, widening_factor,
-};
+use crate::selfcalib::bundle::{BundleProblem, CholeskyFactor, DescentReport, FIRST_DAMPING, FreeParameters, widened};
 use crate::selfcalib::estimate::MountingEstimate;
 use crate::selfcalib::model::{Mounting, OUTLIER_SIGMAS, WheelMotion, Wheels};
 use crate::selfcalib::options::{CalibrationMethod, SelfCalibratorOptions};
@@ -265,16 +262,18 @@ fn report(
     });
     let covariance = covariance * scale;
     let mounting: Matrix3<f64> = covariance.fixed_view::<3, 3>(0, 0).into();
-    let mut mounting = widening * mounting * widening.transpose();
-    if converged && options.jackknife_parts > 0 {
+    let own = widening * mounting * widening.transpose();
+    let motions = if converged { problem.motion_scatter() } else { None };
+    let landmarks = (converged && options.jackknife_parts > 0).then(|| {
         let parts = options.jackknife_parts as usize;
         // Of what one part alone tells no more is known than at the start.
-        let scatter = jackknife_covariance(problem, parts, options.max_iterations).unwrap_or(o.start_covariance);
-        let widening = widening_factor(&mounting, &scatter);
-        mounting = widening * mounting * widening.transpose();
-    }
+        problem.landmark_scatter(parts, |without| solve(without, options.max_iterations)).unwrap_or(o.start_covariance)
+    });
+    let with = |scatter: Option<&Matrix3<f64>>, own| scatter.map_or(own, |scatter| widened(&own, scatter));
     let counts = problem.contradictions();
-    let suspect = problem.suspect(o, &counts, problem.noise_factors(), &mounting);
+    let by_landmarks = with(landmarks.as_ref(), own);
+    let suspect = problem.suspect(o, &counts, problem.noise_factors(), &by_landmarks, motions.as_ref());
+    let mounting = with(landmarks.as_ref(), with(motions.as_ref(), own));
     let sigma = |at: usize| covariance[(at, at)].sqrt();
     let (wheels, offset) = (options.estimate_odometry, options.estimate_time_offset);
     Ok(LogCalibration {

@@ -12,8 +12,9 @@ impl SlidingWindow {
         }
         let counts = now.contradictions();
         let covariance = self.covariance.fixed_view::<3, 3>(MOUNTING, MOUNTING).into();
-        let suspect = now.suspect(&self.options, &counts, now.noise_factors(), &covariance);
-        self.examination = Examination { contradictions: counts, suspect };
+        let motion_scatter = now.motion_scatter();
+        let suspect = now.suspect(&self.options, &counts, now.noise_factors(), &covariance, motion_scatter.as_ref());
+        self.examination = Examination { contradictions: counts, suspect, motion_scatter };
     }
 
     /// What the last examination found.

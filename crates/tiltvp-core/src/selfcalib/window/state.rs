@@ -6,7 +6,7 @@ use super::monitor::InnovationMonitor;
 use super::tuning::HUBER_SIGMAS;
 use crate::error::Result;
 use crate::filter::ChiSquareGate;
-use crate::selfcalib::bundle::{BundleProblem, FreeParameters, widening_factor};
+use crate::selfcalib::bundle::{BundleProblem, FreeParameters, widened};
 use crate::selfcalib::diagnosis::{Contradictions, Suspect};
 use crate::selfcalib::model::{BearingLoss, InverseDistanceLandmark, Prediction, Viewpoint};
 use crate::selfcalib::options::SelfCalibratorOptions;
@@ -24,6 +24,8 @@ pub(super) const ROBUST_LOSS: BearingLoss = BearingLoss::Huber(HUBER_SIGMAS);
 pub(crate) struct Examination {
     pub(crate) contradictions: Contradictions,
     pub(crate) suspect: Option<Suspect>,
+    /// Covariance of the mounting that errors make which motions of a part of the drive share.
+    pub(crate) motion_scatter: Option<Matrix3<f64>>,
 }
 
 /// An iterated extended Kalman filter on (pose, mounting, landmarks), and a sliding window of keyframes that is solved again, and
@@ -102,14 +104,17 @@ impl SlidingWindow {
     }
 
     /// The mounting with its covariance: that of the last solution, where information gained since may be spurious, and widened
-    /// for errors that a landmark's bearings share.
+    /// for errors that a landmark's bearings share, and for those that motions of the drive shared up to the last examination.
     pub(crate) fn mounting(&self) -> (Vector3<f64>, Matrix3<f64>) {
         let mut covariance: Matrix3<f64> = self.covariance.fixed_view::<3, 3>(MOUNTING, MOUNTING).into();
         if self.problem.keyframes.len() < self.spurious_until {
-            let factor = widening_factor(&covariance, &self.solved_covariance);
-            covariance = factor * covariance * factor.transpose();
+            covariance = widened(&covariance, &self.solved_covariance);
         }
-        (self.mean.fixed_rows::<3>(MOUNTING).into(), self.widening * covariance * self.widening.transpose())
+        covariance = self.widening * covariance * self.widening.transpose();
+        if let Some(scatter) = &self.examination.motion_scatter {
+            covariance = widened(&covariance, scatter);
+        }
+        (self.mean.fixed_rows::<3>(MOUNTING).into(), covariance)
     }
 
     /// The number of landmarks that are followed.

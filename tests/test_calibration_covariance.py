@@ -1,0 +1,40 @@
+"""The covariance of the mounting from a whole log where errors are not each on its own."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import tiltvp
+from tiltvp.errors import InvalidInputError
+from tiltvp.synth import simulate_drive
+
+START = {"wheel_base_m": 0.4, "start": (0.2, 0.0, 0.0), "start_sigma": (0.2, 0.2, 0.6)}
+
+
+def test_landmarks_left_out_in_turn_widen_the_covariance() -> None:
+    drive = simulate_drive("paper", seed=4)
+    plain = tiltvp.calibrate(drive.odometry, drive.bearings, **START).mounting
+    wide = tiltvp.calibrate(drive.odometry, drive.bearings, jackknife_parts=5, **START).mounting
+    assert (wide.x_m, wide.y_m, wide.yaw_rad) == (plain.x_m, plain.y_m, plain.yaw_rad)
+    assert np.linalg.eigvalsh(wide.covariance_xy_yaw - plain.covariance_xy_yaw).min() > -1e-15
+    assert np.trace(wide.covariance_xy_yaw) > np.trace(plain.covariance_xy_yaw)
+    for parts in (1, -2, 1001, 2.5):
+        with pytest.raises(InvalidInputError, match="jackknife_parts"):
+            tiltvp.calibrate(drive.odometry, drive.bearings, jackknife_parts=parts, **START)
+
+
+def test_motions_of_a_part_of_the_drive_that_err_together_are_named() -> None:
+    """A quarter of the drive is on a carpet, where wheels run 8 % too far."""
+    drive = simulate_drive("alternating", seed=2)
+    odometry, count = drive.odometry.copy(), len(drive.odometry)
+    odometry[count // 2 : 3 * count // 4] *= 1.08
+    found = tiltvp.calibrate(odometry, drive.bearings, **START)
+    assert not found
+    assert found.mounting.suspect == "drift"
+    assert found.mounting.suspect_value > 5.0
+    assert "err together" in found.reason
+    # The filter, which takes the noise of the wheels as told, names that.
+    calibrator = tiltvp.SelfCalibrator(**START)
+    calibrator.follow(odometry, drive.bearings)
+    assert calibrator.estimate.suspect == "odometry_k_m"
