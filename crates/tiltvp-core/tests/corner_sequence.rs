@@ -180,3 +180,20 @@ fn a_corner_whose_third_edge_is_short_is_completed() {
     let completed = found.corners.iter().find(is_here).unwrap();
     assert!(attitude_deg(&completed.hypotheses[0]) < 0.5 && place_off_m(&completed.hypotheses[0], 0.0) < 0.006);
 }
+
+#[test]
+fn knowledge_that_is_none_is_refused_by_name() {
+    let usual = EstimatorOptions::default();
+    for (options, expected) in [
+        (EstimatorOptions { camera_height_m: Some(0.0), ..usual.clone() }, "camera_height_m"),
+        (EstimatorOptions { edge_length_m: Some(f64::INFINITY), ..usual.clone() }, "edge_length_m"),
+        (EstimatorOptions { box_size_m: Some(Vector3::new(0.3, -0.3, 0.3)), ..usual.clone() }, "box_size_m"),
+        (EstimatorOptions { camera_height_m: Some(1.0), edge_length_m: Some(0.3), ..usual.clone() }, "one of them"),
+        (EstimatorOptions { down: Some(Vector3::new(0.0, 1.1, 0.0)), ..usual.clone() }, "a unit vector"),
+    ] {
+        let detector =
+            CornerDetector::new(cube::pinhole(), DetectorOptions::for_method("general").unwrap(), None).unwrap();
+        let told = CornerPoseEstimator::new(detector, None, options).unwrap_err().to_string();
+        assert!(told.contains(expected), "{told}");
+    }
+}

@@ -125,3 +125,39 @@ pub fn corner_poses(
     });
     Ok(poses.collect())
 }
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::Rotation3;
+
+    use super::*;
+
+    /// A small turn or step of the object moves the camera in the object's frame as the covariance says.
+    #[test]
+    fn the_camera_stands_in_the_object_where_the_object_stands_before_it() {
+        let camera_m = Vector3::new(0.7, -0.4, -2.0);
+        let rotation = Rotation3::from_euler_angles(0.3, -0.5, 1.1);
+        let pose = |turn: Vector3<f64>, step_m: Vector3<f64>, covariance: Matrix6<f64>| CornerPose {
+            camera_from_object: *(Rotation3::new(turn) * rotation).matrix(),
+            vertex_m: rotation * -camera_m + step_m,
+            covariance,
+            probability: 1.0,
+            mirrored: false,
+            case: CornerCase::AllAway,
+            right_handed: true,
+            chi_square: 0.0,
+            fused: true,
+        };
+        let at = |turn, step_m| pose(turn, step_m, Matrix6::zeros()).camera_in_object_m();
+        let still = Vector3::zeros();
+        assert!((at(still, still) - camera_m).norm() < 1e-12);
+        for (place, sigma) in [(0, 1e-5), (4, 1e-5)] {
+            let moved = Vector3::ith(place % 3, sigma);
+            let off = if place < 3 { at(moved, still) } else { at(still, moved) } - camera_m;
+            let mut covariance = Matrix6::zeros();
+            covariance[(place, place)] = sigma * sigma;
+            let told = pose(still, still, covariance).camera_in_object_covariance_m2();
+            assert!((told - off * off.transpose()).amax() < 1e-4 * told.amax(), "{told} {off}");
+        }
+    }
+}

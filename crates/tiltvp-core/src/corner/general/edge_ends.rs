@@ -208,3 +208,22 @@ pub(crate) fn edge_ends(
     }
     out
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The length of an edge across the line of sight is the distance times the tangent of the angle at which its end is seen.
+    #[test]
+    fn a_length_from_one_image_errs_by_its_end_and_by_the_distance() {
+        let (distance_m, length_m, sigma_rad, sigma_m) = (2.0f64, 0.6f64, 1e-3, 4e-3);
+        let angle_rad = (length_m / distance_m).atan();
+        let end = ObservedEnd { bearing: Vector3::new(angle_rad.sin(), 0.0, angle_rad.cos()), sigma_rad, length_m };
+        let covariance_m2 = Matrix3::from_diagonal(&Vector3::new(1.0, 1.0, sigma_m * sigma_m));
+        let found = end.alone(&Vector3::new(0.0, 0.0, distance_m), &covariance_m2);
+        let by_bearing = sigma_rad * distance_m / angle_rad.cos().powi(2);
+        let by_distance = sigma_m * angle_rad.tan();
+        assert!((found.sigma_m - by_bearing.hypot(by_distance)).abs() < 1e-9, "{found:?}");
+        assert_eq!((found.length_m, found.place_m), (length_m, None));
+    }
+}

@@ -150,3 +150,44 @@ pub(crate) fn find_near(
     }
     found
 }
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+
+    use nalgebra::{Matrix2, Matrix3, Rotation3};
+
+    use super::*;
+    use crate::corner::ray::FittedRay;
+
+    #[test]
+    fn another_camera_sees_vertex_and_ends_where_they_are() {
+        let turn = Rotation3::from_euler_angles(0.5, -0.7, 0.1);
+        let edges = [0, 1, 2].map(|axis| turn * Vector3::ith(axis, 1.0));
+        let vertex = Vector3::new(0.1, -0.05, 0.8);
+        let ends = edges.map(|edge| vertex + edge * 0.3);
+        let ray = |end: Vector3<f64>| FittedRay {
+            normal: vertex.cross(&end).normalize(),
+            covariance: Matrix2::identity() * 1e-8,
+            toward: end.normalize(),
+            support: 50,
+            residual_rms_rad: 1e-4,
+        };
+        let corner = CornerFeature::from_rays(ends.map(ray)).unwrap();
+        let other_from_own = RigidMotion {
+            rotation: *Rotation3::from_euler_angles(0.0, 0.2, 0.0).matrix(),
+            translation_m: Vector3::new(-0.3, 0.02, 0.1),
+        };
+        let found = ExpectedCorner::transferred(&corner, &edges, vertex.norm(), &other_from_own).unwrap();
+        assert!(found.vertex.angle(&other_from_own.point(&vertex)) < 1e-7, "{found:?}");
+        for (far, end) in found.far.iter().zip(&ends) {
+            assert!(far.angle(&other_from_own.point(end)) < 1e-7, "{found:?}");
+        }
+        // No point of an edge that goes the other way is seen where the ray is.
+        let away = edges.map(|edge| -edge);
+        assert!(ExpectedCorner::transferred(&corner, &away, vertex.norm(), &other_from_own).is_none());
+        // The other camera is where the vertex is.
+        let there = RigidMotion { rotation: Matrix3::identity(), translation_m: -vertex };
+        assert!(ExpectedCorner::transferred(&corner, &edges, vertex.norm(), &there).is_none());
+    }
+}
