@@ -226,6 +226,21 @@ fn a_carpet_makes_the_covariance_wider() {
     }
 }
 
+/// So do wheels and a delay that are estimated, each of which the carpet moves too.
+#[test]
+fn a_carpet_makes_deviations_of_wheels_and_delay_wider() {
+    let options = LogOptions { estimate_odometry: true, estimate_time_offset: true, ..options() };
+    let found: Vec<LogCalibration> =
+        (0..DRIVES).map(|seed| whole(&drive(seed, Errors { carpet: 0.05, ..NONE }), &options)).collect();
+    let squares = [
+        mean(found.iter().map(|found| (found.time_offset_s / found.time_offset_sigma_s).powi(2))),
+        mean(found.iter().map(|found| (found.wheels.imbalance / found.wheels_sigma[0]).powi(2))),
+        mean(found.iter().map(|found| ((found.wheels.base_m - BASE_M) / found.wheels_sigma[1]).powi(2))),
+    ];
+    println!("mean squared errors of delay, imbalance and wheel base in stated sigmas on a carpet: {squares:.2?}");
+    assert!(squares.iter().all(|square| *square < 4.0), "{squares:?}");
+}
+
 /// Leaving out posts in turn tells how wide it is.
 #[test]
 fn a_jackknife_over_the_landmarks_widens_what_errors_that_stay_leave_too_narrow() {

@@ -1,6 +1,6 @@
 //! How much a mounting hangs on its landmarks, and on the odometry of the parts of a drive.
 
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 
 use super::descent::{DescentReport, FIRST_DAMPING};
 use super::problem::BundleProblem;
@@ -18,12 +18,12 @@ const ITERATIONS: u32 = 30;
 const TOLERANCE: f64 = 1e-3;
 
 impl BundleProblem {
-    /// Covariance of x, y and yaw from how far a solution moves where the odometry of each part of the drive is doubted in turn. `None`
-    /// without motions, or if one of them has no solution.
+    /// Covariance of the calibration parameters, x, y and yaw first, from how far a solution moves where the odometry of each part of the
+    /// drive is doubted in turn. `None` without motions, or if one of them has no solution.
     ///
     /// Where motions err on their own it is what their noise makes. Where they err together, as on a carpet on which both wheels run too
     /// far, it is that much more, of which residuals say little: the solution follows what lasts.
-    pub(crate) fn motion_scatter(&self) -> Option<Matrix3<f64>> {
+    pub(crate) fn motion_scatter(&self) -> Option<DMatrix<f64>> {
         let motions = self.keyframes.len() - 1;
         let parts = PARTS.min(motions);
         let doubted = |part: usize| {
@@ -34,8 +34,11 @@ impl BundleProblem {
             let descent = problem.levenberg_marquardt(ITERATIONS, TOLERANCE, FIRST_DAMPING);
             self.moved(&problem, &descent)
         };
-        let moved = (0..parts).map(doubted).collect::<Option<Vec<_>>>()?;
-        (parts > 0).then(|| moved.iter().map(|off| off * off.transpose()).sum())
+        let width = self.free.width();
+        (0..parts)
+            .map(doubted)
+            .try_fold(DMatrix::zeros(width, width), |sum, off| off.map(|off| sum + &off * off.transpose()))
+            .filter(|_| parts > 0)
     }
 
     /// Covariance of x, y and yaw from the solutions without each of so many parts of the landmarks in turn: the delete-a-group
@@ -57,16 +60,18 @@ impl BundleProblem {
             let descent = solve(&mut problem);
             self.moved(&problem, &descent)
         };
-        let moved = (0..parts).map(left_out).collect::<Option<Vec<_>>>()?;
+        let mounting = |off: DVector<f64>| -> Vector3<f64> { off.fixed_rows::<3>(0).into() };
+        let moved = (0..parts).map(|part| left_out(part).map(mounting)).collect::<Option<Vec<_>>>()?;
         let mean = moved.iter().sum::<Vector3<f64>>() / parts as f64;
         let squares = moved.iter().map(|off| (off - mean) * (off - mean).transpose()).sum::<Matrix3<f64>>();
         Some(squares * (1.0 - 1.0 / parts as f64))
     }
 
-    /// How far the mounting of another solution is from this one's. `None` if it has none.
-    fn moved(&self, other: &Self, descent: &DescentReport) -> Option<Vector3<f64>> {
-        let mut off = other.mounting - self.mounting;
-        off.z = wrap_angle(off.z);
+    /// How far the calibration parameters of another solution are from this one's. `None` if it has none.
+    fn moved(&self, other: &Self, descent: &DescentReport) -> Option<DVector<f64>> {
+        let of = |problem: &Self| problem.shared().rows(0, problem.free.width()).into_owned();
+        let mut off = of(other) - of(self);
+        off[2] = wrap_angle(off[2]);
         Some(off).filter(|off| descent.cost.is_finite() && off.iter().all(|x| x.is_finite()))
     }
 }

@@ -263,7 +263,8 @@ fn report(
     let covariance = covariance * scale;
     let mounting: Matrix3<f64> = covariance.fixed_view::<3, 3>(0, 0).into();
     let own = widening * mounting * widening.transpose();
-    let motions = if converged { problem.motion_scatter() } else { None };
+    let scatter = if converged { problem.motion_scatter() } else { None };
+    let motions: Option<Matrix3<f64>> = scatter.as_ref().map(|scatter| scatter.fixed_view::<3, 3>(0, 0).into());
     let landmarks = (converged && options.jackknife_parts > 0).then(|| {
         let parts = options.jackknife_parts as usize;
         // Of what one part alone tells no more is known than at the start.
@@ -274,7 +275,10 @@ fn report(
     let by_landmarks = with(landmarks.as_ref(), own);
     let suspect = problem.suspect(o, &counts, problem.noise_factors(), &by_landmarks, motions.as_ref());
     let mounting = with(landmarks.as_ref(), with(motions.as_ref(), own));
-    let sigma = |at: usize| covariance[(at, at)].sqrt();
+    let sigma = |at: usize| {
+        let by_motions = scatter.as_ref().map_or(0.0, |scatter| scatter[(at, at)]);
+        covariance[(at, at)].max(by_motions).sqrt()
+    };
     let (wheels, offset) = (options.estimate_odometry, options.estimate_time_offset);
     Ok(LogCalibration {
         estimate: MountingEstimate::new(

@@ -12,7 +12,7 @@ impl SlidingWindow {
         }
         let counts = now.contradictions();
         let covariance = self.covariance.fixed_view::<3, 3>(MOUNTING, MOUNTING).into();
-        let motion_scatter = now.motion_scatter();
+        let motion_scatter = now.motion_scatter().map(|scatter| scatter.fixed_view::<3, 3>(0, 0).into());
         let suspect = now.suspect(&self.options, &counts, now.noise_factors(), &covariance, motion_scatter.as_ref());
         self.examination = Examination { contradictions: counts, suspect, motion_scatter };
     }
