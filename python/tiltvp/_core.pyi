@@ -2623,10 +2623,10 @@ class SelfCalibrator:
         """The mounting as it is believed to be now."""
 
     def examine(self) -> None:
-        """Looks now for what the drive so far contradicts and which assumption is likely wrong; `estimate` then says
-        so.
+        """Looks now for what the drive so far contradicts, which assumption is likely wrong, and how far motions that
+        err together, as on a carpet, may have moved the answer; `estimate` then says so.
 
-        That happens by itself at the end of `follow`, and not between steps, for it costs some ten solutions of the
+        That happens by itself at the end of `follow`, and not between steps, for it costs some twenty solutions of the
         window.
         """
 

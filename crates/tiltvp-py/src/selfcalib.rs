@@ -115,9 +115,10 @@ impl SelfCalibrator {
         self.inner.look(py, core::SelfCalibrator::estimate).into()
     }
 
-    /// Looks now for what the drive so far contradicts and which assumption is likely wrong; `estimate` then says so.
+    /// Looks now for what the drive so far contradicts, which assumption is likely wrong, and how far motions that err together, as on
+    /// a carpet, may have moved the answer; `estimate` then says so.
     ///
-    /// That happens by itself at the end of `follow`, and not between steps, for it costs some ten solutions of the window.
+    /// That happens by itself at the end of `follow`, and not between steps, for it costs some twenty solutions of the window.
     fn examine(&self, py: Python<'_>) -> PyResult<()> {
         self.inner.change(py, |calibrator| {
             calibrator.examine();

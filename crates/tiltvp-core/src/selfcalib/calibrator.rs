@@ -95,8 +95,8 @@ impl SelfCalibrator {
         Ok(CalibrationStep { nis, used, rejected, started })
     }
 
-    /// Looks for what the drive so far contradicts and which assumption is likely wrong; estimates then say so. It costs some ten solutions
-    /// of the window.
+    /// Looks for what the drive so far contradicts, which assumption is likely wrong, and how far motions that err together may have moved
+    /// the answer; estimates then say so. It costs some twenty solutions of the window.
     pub fn examine(&mut self) {
         if let Filter::SlidingWindow(filter) = &mut self.filter {
             filter.examine();

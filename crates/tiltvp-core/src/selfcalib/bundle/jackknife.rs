@@ -6,7 +6,7 @@ use super::descent::{DescentReport, FIRST_DAMPING};
 use super::problem::BundleProblem;
 use crate::geometry::wrap_angle;
 
-/// Parts of a drive whose odometry is doubted in turn. With 16 the covariances of drives with a carpet are the same within a tenth.
+/// Parts of a drive whose odometry is doubted in turn. With 16 deviations of drives with a carpet are the same within a sixth.
 const PARTS: usize = 8;
 
 /// The factor of its standard deviations meanwhile. With 3 wheels that run 5 % too far on a quarter of a drive are half seen; with 100
