@@ -166,3 +166,36 @@ pub(crate) fn upright(attitude: &Matrix3<f64>, vertical: &Vector3<f64>) -> Matri
     let axis = |k: usize| attitude.column((nearest + k) % 3).into_owned();
     Matrix3::from_columns(&[axis(2), axis(0), axis(1)])
 }
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+
+    use super::*;
+    use crate::camera::{Camera, Model, Pinhole};
+    use crate::corner::{DetectorOptions, EstimatorOptions};
+
+    #[test]
+    fn places_along_an_epipolar_line_are_a_step_apart_and_reach_from_near_to_far() {
+        let lens = Pinhole::new([700.0, 700.0], [639.5, 359.5], &[]).unwrap();
+        let camera = Camera::new(1280, 720, Model::Pinhole(lens)).unwrap();
+        let detector =
+            || CornerDetector::new(camera.clone(), DetectorOptions::for_method("general").unwrap(), None).unwrap();
+        let left_from_right =
+            RigidMotion { rotation: Matrix3::identity(), translation_m: Vector3::new(0.12, 0.0, 0.0) };
+        let options = EstimatorOptions { distance_min_m: 0.5, distance_max_m: 50.0, ..EstimatorOptions::default() };
+        let estimator = CornerPoseEstimator::new(detector(), Some((detector(), left_from_right)), options).unwrap();
+        let (bearing, right_from_left) = (Vector3::new(0.1, -0.05, 1.0).normalize(), left_from_right.inverse());
+        let distances = estimator.distances(&detector(), &bearing, &right_from_left);
+        let places: Vec<Vector2<f64>> = distances
+            .iter()
+            .map(|distance_m| camera.project(&right_from_left.point(&(bearing * *distance_m))).unwrap())
+            .collect();
+        for pair in places.windows(2) {
+            let apart_px = (pair[1] - pair[0]).norm();
+            assert!((EPIPOLAR_STEP_PX..1.1 * EPIPOLAR_STEP_PX).contains(&apart_px), "{apart_px}");
+        }
+        let (far, near) = (distances.first().unwrap(), distances.last().unwrap());
+        assert!((far - 50.0).abs() < 1e-9 && (0.5..0.52).contains(near), "{far} {near}");
+    }
+}

@@ -270,4 +270,34 @@ mod tests {
             assert!((at(1.2).opens() - difference).norm() < 1e-8, "{side}");
         }
     }
+
+    /// A Gauss-Newton step over what is known alone is onto what is known, and half the gradient of the sum of squares is the pull.
+    #[test]
+    fn what_is_known_pulls_by_its_deviation() {
+        let angle = IncludedAngle { gamma_rad: 1.2, sigma_rad: 0.02 };
+        let known = KnownLengths { lengths_m: [Some(0.4), None, Some(0.3)], sigma_m: 0.005 };
+        let state = |gamma: f64, length_m: f64| State {
+            rotation: Matrix3::identity(),
+            vertex: Vector3::z(),
+            gamma,
+            lengths: [Some(length_m), Some(0.7), None],
+            side: 1.0,
+        };
+        let of = |gamma: f64, length_m: f64| {
+            let mut system = System::new();
+            let free = system.add_known(&state(gamma, length_m), &known, &angle);
+            (system, free)
+        };
+        let (system, free) = of(1.23, 0.42);
+        for (place, off) in [(GAMMA, 0.03), (LENGTHS, 0.02)] {
+            assert!((system.pull[place] / system.information[(place, place)] - off).abs() < 1e-12, "{place}");
+        }
+        let slope = |more: f64, less: f64, by: f64| (more - less) / (4.0 * by);
+        let by_gamma = slope(of(1.231, 0.42).0.chi_square, of(1.229, 0.42).0.chi_square, 0.001);
+        let by_length = slope(of(1.23, 0.421).0.chi_square, of(1.23, 0.419).0.chi_square, 0.001);
+        assert!((by_gamma - system.pull[GAMMA]).abs() < 1e-6 && (by_length - system.pull[LENGTHS]).abs() < 1e-6);
+        // Only the edge whose end is not seen has no length.
+        let held: Vec<usize> = (0..UNKNOWNS).filter(|place| !free[*place]).collect();
+        assert_eq!((held, system.known), (vec![LENGTHS + 2], 2));
+    }
 }

@@ -134,3 +134,51 @@ fn median(values: impl Iterator<Item = f64>) -> Option<f64> {
     let at = values.len() / 2;
     (!values.is_empty()).then(|| *values.select_nth_unstable_by(at, f64::total_cmp).1)
 }
+
+#[cfg(test)]
+mod tests {
+    use std::f64::consts::TAU;
+
+    use nalgebra::{Vector2, Vector3};
+
+    use super::*;
+    use crate::selfcalib::SelfCalibratorOptions;
+    use crate::selfcalib::bundle::{FreeParameters, Keyframe};
+    use crate::selfcalib::model::{
+        BearingLoss, InverseDistanceLandmark, RelativeMotion, Viewpoint, WheelMotion, Wheels, compose,
+    };
+
+    /// Of bearings from poses that are known the mounting takes up three, and each landmark two, which do not count.
+    #[test]
+    fn the_redundancy_is_what_mounting_and_landmarks_leave() {
+        let options = SelfCalibratorOptions { odometry_k_m: 1e-12, ..SelfCalibratorOptions::default() };
+        let mounting = options.start.vector();
+        let mut problem =
+            BundleProblem::new(&options, &mounting, FreeParameters::default(), BearingLoss::Truncated(4.5));
+        for k in 0..4 {
+            let direction = TAU * f64::from(k) / 4.0 + 0.3;
+            let far = InverseDistanceLandmark { anchor: Vector2::zeros(), direction, log_inverse_distance: -1.0 };
+            problem.landmarks.push(far);
+            problem.scatters.push(1.0);
+        }
+        let width = problem.width();
+        problem.prior_mean = problem.shared();
+        problem.prior_information = problem.prior_information.clone().resize(width, width, 0.0);
+        let mut pose = Vector3::zeros();
+        for step in 0..50 {
+            let turn = if step % 20 < 10 { 0.1 } else { -0.05 };
+            let motion = WheelMotion::from_motion(0.08, turn, options.wheel_base_m);
+            let odometry = RelativeMotion::from_wheels(&motion, &Wheels::new(options.wheel_base_m), &problem.noise);
+            pose = compose(&pose, &odometry.motion);
+            let mut keyframe = Keyframe::after(odometry, pose, 1.0);
+            let view = Viewpoint::new(&pose, &mounting);
+            let seen = problem.landmarks.iter().map(|landmark| view.predict(&landmark.homogeneous()).bearing);
+            keyframe
+                .observations
+                .extend(seen.enumerate().map(|(landmark, bearing)| Observation::new(landmark, bearing)));
+            problem.keyframes.push(keyframe);
+        }
+        let redundancy = problem.redundancy();
+        assert!((redundancy - (1.0 - 3.0 / 200.0)).abs() < 0.03, "{redundancy}");
+    }
+}
