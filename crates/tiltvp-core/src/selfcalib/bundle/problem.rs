@@ -348,3 +348,29 @@ impl BundleProblem {
         all
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::selfcalib::model::{RelativeMotion, WheelMotion};
+
+    /// Between two keyframes the robot drives slowly, then three times as fast, straight on.
+    #[test]
+    fn velocities_as_read_are_those_of_the_first_and_the_last_reading() {
+        let options = SelfCalibratorOptions::default();
+        let free = FreeParameters::default();
+        let mut problem = BundleProblem::new(&options, &Vector3::zeros(), free, BearingLoss::Truncated(4.5));
+        let driven = |way_m: f64| {
+            let wheels = WheelMotion { left_m: way_m, right_m: way_m };
+            RelativeMotion::from_wheels(&wheels, &problem.wheels, &problem.noise)
+        };
+        let (slow, fast) = (driven(0.1), driven(0.3));
+        let mut keyframe = Keyframe::after(slow, Vector3::new(0.1, 0.0, 0.0), 1.0);
+        keyframe.extend(&fast, Vector3::new(0.4, 0.0, 0.0), 1.0);
+        problem.keyframes.push(keyframe);
+        for (late, at, expected) in [(false, 1, 0.3), (true, 0, 0.1)] {
+            problem.late = late;
+            assert!((problem.velocity_read(at) - Vector3::new(expected, 0.0, 0.0)).norm() < 1e-12, "{late}");
+        }
+    }
+}
