@@ -157,6 +157,30 @@ fn band() -> ConsistencyBand {
 }
 
 #[test]
+fn logs_that_make_no_sense_are_refused() {
+    let good = drive(0, NONE);
+    let delay = LogOptions { estimate_time_offset: true, ..options() };
+    let told = |options: &LogOptions, times: Option<&[f64]>, change: &dyn Fn(&mut Drive)| {
+        let mut drive = Drive { readings: good.readings.clone(), bearings: good.bearings.clone() };
+        change(&mut drive);
+        calibrate_log(options, &drive.readings, times, &drive.bearings).unwrap_err().to_string()
+    };
+    let times: Vec<f64> = (0..STEPS).map(|step| STEP_S * step as f64).collect();
+    let back: Vec<f64> = times.iter().rev().copied().collect();
+    for (said, expected) in [
+        (told(&delay, None, &|_| ()), "the time of each step"),
+        (told(&options(), Some(&times[1..]), &|_| ()), "one for each of 150 steps"),
+        (told(&options(), Some(&back), &|_| ()), "growing times"),
+        (told(&options(), None, &|drive| drive.readings[3].left_m = f64::NAN), "at step 3"),
+        (told(&options(), None, &|drive| drive.bearings[5].bearing_rad = f64::INFINITY), "in row 5"),
+        (told(&options(), None, &|drive| drive.bearings[5].step = STEPS), "steps below 150"),
+        (told(&options(), None, &|drive| drive.bearings.truncate(POSTS)), "no landmark seen twice"),
+    ] {
+        assert!(said.contains(expected), "{said}");
+    }
+}
+
+#[test]
 fn whole_logs_are_as_good_as_they_say() {
     let found: Vec<LogCalibration> = (0..DRIVES).map(|seed| whole(&drive(seed, NONE), &options())).collect();
     let nees = mean(found.iter().map(|found| nees(&found.estimate)));

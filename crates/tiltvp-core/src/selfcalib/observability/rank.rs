@@ -96,6 +96,22 @@ mod tests {
             prop_assert_eq!(observable_dimension(&s, PureMotion::Both, Far), 5);
         }
 
+        /// Of the bearing by eq. 30 where the robot is after driving on and turning.
+        #[test]
+        fn gradients_are_those_of_the_bearing(s in state(), way in -0.3..0.5f64, turn in -2.0..2.0f64) {
+            let bearing = |[distance, theta, phi, rho, psi]: [f64; 5]| {
+                let (x, y) = (distance + way * theta.cos(), way * theta.sin());
+                let (far, gamma) = (x.hypot(y), theta + turn - y.atan2(x) + phi);
+                (-rho * gamma.sin()).atan2(-far - rho * gamma.cos()) - gamma - psi
+            };
+            let found = gradient(&s, way, turn, FeatureRange::Close);
+            for k in 0..5 {
+                let moved = |by: f64| bearing(std::array::from_fn(|i| if i == k { s[i] + by } else { s[i] }));
+                let slope = crate::geometry::wrap_angle(moved(1e-6) - moved(-1e-6)) / 2e-6;
+                prop_assert!((found[k] - slope).abs() < 1e-6, "{}: {} {}", k, found[k], slope);
+            }
+        }
+
         #[test]
         fn the_determinant_of_a_1(d in 0.5..5.0f64, t in -3.0..3.0f64) {
             let m = Matrix3::new(
