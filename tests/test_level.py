@@ -137,6 +137,14 @@ def test_impossible_levellers_are_refused(camera: tiltvp.Camera) -> None:
     ):
         with pytest.raises(InvalidInputError, match=words):
             tiltvp.Leveller(camera, **options)
+    wide = tiltvp.Camera.equirectangular(width=32_768, height=16)
+    for refused in (
+        lambda: tiltvp.Leveller(wide),
+        lambda: tiltvp.Leveller(camera, to=wide),
+        lambda: tiltvp.Unwrapper(wide),
+    ):
+        with pytest.raises(InvalidInputError, match="at most 32765"):
+            refused()
     with pytest.raises(InvalidInputError, match="8 x 4"):
         tiltvp.Unwrapper(camera, size=(4, 4))
     with pytest.raises(InvalidInputError, match="rising"):
@@ -161,8 +169,28 @@ def test_other_types_are_the_same_picture(camera: tiltvp.Camera, room: RoomImage
     leveller = tiltvp.Leveller(camera)
     levelled = leveller(room.gray, (0.1, 1.0)).astype(float)
     other = leveller(room.gray.astype(dtype), (0.1, 1.0)).astype(float)
-    # OpenCV's weights have 5 bits, ours 8.
+    # Levels of bytes are rounded.
     assert np.abs(levelled - other).mean() < 0.5
+
+
+@pytest.mark.parametrize("channels", [1, 3])
+def test_a_level_panorama_has_all_of_it_and_no_seam(channels: int) -> None:
+    """Levels that go with the direction alone are as smooth at the seam and the poles as anywhere."""
+    camera = tiltvp.Camera.equirectangular(width=512, height=256)
+    v, u = np.indices((256, 512))
+    rays = camera.unproject(np.column_stack([u.ravel(), v.ravel()]).astype(float))
+    levels = (127.0 + rays @ [60.0, 50.0, -40.0]).reshape(256, 512)
+    image = np.stack([levels] * channels, axis=2).astype(np.float32)
+    normal = tiltvp.normal_from_alpha_beta(0.5, 1.0)
+    leveller = tiltvp.Leveller(camera, rotation_from("forward", "the mounting"))
+    level = leveller(image, normal)
+    # The map is exact to 0.05 pixels, between which levels are parabolas: a hundredth of a level.
+    places = leveller.map(normal).astype(float)
+    seen = camera.unproject(np.column_stack([places[:, :, 0].ravel() % 512.0, places[:, :, 1].ravel()]))
+    known = np.isfinite(seen[:, 0])
+    expected = 127.0 + seen[known] @ [60.0, 50.0, -40.0]
+    assert known.mean() > 0.99
+    assert np.abs(level.reshape(-1, channels)[known] - expected[:, None]).max() < 0.1
 
 
 def test_panoramas_look_ahead(camera: tiltvp.Camera, room: RoomImage) -> None:

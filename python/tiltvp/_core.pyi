@@ -52,6 +52,7 @@ __all__ = [
     "FitReport",
     "ImageEdges",
     "Laboratory",
+    "LevelMap",
     "Leveller",
     "LineExtractor",
     "LineTracker",
@@ -1567,6 +1568,21 @@ class Laboratory:
         """Lengths of the cuboid's edges x, y, z, metres."""
 
 @final
+class LevelMap:
+    """See `Leveller._map`."""
+
+    @property
+    def strip_rows(self) -> int:
+        """Rows that are written together."""
+
+    def write_strip(
+        self, number: SupportsIndex, columns: NDArray[np.float32], rows: NDArray[np.float32], unseen: float
+    ) -> None:
+        """Writes, for the pixels of the strip of that number, the columns and the rows (h W,) of those of the leaning
+        image that show the same; `unseen` for none.
+        """
+
+@final
 class Leveller:
     """Level images of one camera, as another camera would take them on the upright robot, or along given rays.
 
@@ -1586,11 +1602,8 @@ class Leveller:
         rays: ArrayLike | None = None,
         columns: SupportsIndex = 0,
     ) -> Self: ...
-    def _level(self, image: NDArray[np.uint8], normal: ArrayLike) -> NDArray[np.uint8]:
-        """(H, W) or (H, W, 3): the level image of one of the camera, C-contiguous uint8."""
-
-    def _map(self, normal: ArrayLike) -> NDArray[np.float32]:
-        """(H, W, 2): where each pixel (u, v) of the level image is in the leaning one; NaN where it was not seen."""
+    def _map(self, normal: Any) -> LevelMap:
+        """The map of level images by a tilt, which is given as the ground normal (3,) of the robot frame."""
 
     @property
     def camera(self) -> Camera:

@@ -13,6 +13,8 @@ from tiltvp.errors import InvalidInputError
 from tiltvp.tilt import FilteredTilt, TiltEstimate, TiltEstimator, normal_from_alpha_beta
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     from numpy.typing import ArrayLike, NDArray
 
     Tilt: TypeAlias = TiltEstimate | FilteredTilt | ArrayLike
@@ -27,6 +29,8 @@ _FIELD_OF_VIEW_RAD: Final = {"fisheye": math.pi, "pinhole": 0.5 * math.pi}
 _LEVELLED: Final = ("uint8", "uint16", "int16", "float32", "float64")
 _OUTSIDE_PX: Final = -1e6
 """Where OpenCV is sent for what was not seen."""
+_LARGEST_SIDE_PX: Final = 32_765
+"""What `cv2.remap` takes, less the column that is given twice."""
 _AHEAD: Final = ((0.0, 0.0, 1.0), (-1.0, 0.0, 0.0), (0.0, -1.0, 0.0))
 """The mounting "forward", as `tiltvp.rotations` has it, which would double the time of the import."""
 _UPRIGHT: Final = (0.0, 0.0, 1.0)
@@ -37,10 +41,10 @@ _ACROSS, _DOWN = 4, 2
 class Leveller:
     """Makes images of one camera level by their tilt: as it, or another, would take them on the upright robot.
 
-    The rays of the level image's pixels are made once. For a tilt, those at the corners of cells of 8 x 8 pixels are
+    The rays of the level image's pixels are made once. For a tilt, those at the corners of cells of 16 x 16 pixels are
     projected, and places between them interpolated where that is good to 0.05 pixels; all others are projected too.
-    Levels are interpolated between four pixels; black where nothing was seen. Panoramas are closed: neither their
-    sides nor their poles leave a seam. May be called from many threads at once, and pickled.
+    `cv2.remap` interpolates levels between four pixels; black where nothing was seen. The sides of panoramas leave no
+    seam. May be called from many threads at once, and pickled.
 
     Parameters
     ----------
@@ -68,9 +72,9 @@ class Leveller:
         field_of_view_rad: float | None = None,
         robot_from_output: ArrayLike | None = None,
     ) -> None:
-        self.camera: _core.Camera = camera
+        self.camera: _core.Camera = _not_too_large(camera)
         """Whose images are made level."""
-        self.output: _core.Camera = _output(camera, to, size, field_of_view_rad)
+        self.output: _core.Camera = _not_too_large(_output(camera, to, size, field_of_view_rad))
         """Whose images they become."""
         ahead = to == "panorama" and robot_from_output is None
         looks = _AHEAD if ahead else robot_from_output
@@ -86,31 +90,23 @@ class Leveller:
         """The level image of one (H, W) or (H, W, channels) of the camera, of the same dtype and channels.
 
         `tilt` is an estimate, a filter's or an image's, (alpha_rad, beta_rad), or the ground normal (3,) of the robot
-        frame. uint8 with one or three channels is
-        the fast way. Raises `InvalidInputError` for images of other sizes than the camera's, of other types than
+        frame. Raises `InvalidInputError` for images of other sizes than the camera's, of other types than
         uint8, uint16, int16 and float, and for an estimate without a tilt.
         """
-        array = _checked(image, self.camera)
-        normal = _normal(tilt)
-        if array.dtype == np.uint8 and (array.ndim == 2 or array.shape[2] == 3):
-            return self._core._level(np.ascontiguousarray(array), normal)
-        return self._remapped(array, self._core._map(normal))
-
-    def map(self, tilt: Tilt) -> NDArray[np.float32]:
-        """(H, W, 2): the pixel (u, v) of the leaning image that each pixel of the level one shows; NaN for none."""
-        return self._core._map(_normal(tilt))
-
-    def _remapped(self, array: NDArray[Any], places: NDArray[np.float32]) -> NDArray[Any]:
         import cv2
 
-        array = _closed(array, places, self.camera)
-        # Half a pixel beyond its edge an image goes on as it is there; farther out nothing was seen.
-        last = np.array(array.shape[1::-1], dtype=np.float32) - 1.0
-        seen = np.isfinite(places[:, :, 0]) & ((places >= -0.5) & (places < last + 0.5)).all(axis=2)
-        places = np.where(seen[:, :, None], np.clip(places, 0.0, last), _OUTSIDE_PX).astype(np.float32)
-        found = cv2.remap(array, *_maps(places), cv2.INTER_LINEAR)
-        # OpenCV drops an axis of length one.
-        return np.asarray(found).reshape(places.shape[:2] + array.shape[2:])
+        array = _closed(_checked(image, self.camera), self.camera)
+        level = np.empty((self.output.height, self.output.width, *array.shape[2:]), array.dtype)
+        for rows, u, v in _strips(self._core, tilt, unseen=_OUTSIDE_PX):
+            cv2.remap(array, u, v, cv2.INTER_LINEAR, dst=level[rows])
+        return level
+
+    def map(self, tilt: Tilt) -> NDArray[np.float32]:
+        """(H, W, 2): the pixel (u, v) of the leaning image that each pixel of the level one shows; NaN for none.
+
+        Both are from 0 to the last column and row, of a panorama to the one after it, which is its first.
+        """
+        return _places(self._core, tilt)
 
     def __reduce__(self) -> tuple[Any, ...]:
         return _again, self._given
@@ -181,6 +177,13 @@ def _panorama_size(camera: _core.Camera) -> tuple[int, int]:
     return 2 * height, height
 
 
+def _not_too_large(camera: _core.Camera) -> _core.Camera:
+    if max(camera.width, camera.height) > _LARGEST_SIDE_PX:
+        size = f"{camera.width} x {camera.height}"
+        raise InvalidInputError(f"camera: images of {size}, expected at most {_LARGEST_SIDE_PX} pixels a side")
+    return camera
+
+
 def _checked(image: ArrayLike, camera: _core.Camera) -> NDArray[Any]:
     array = np.asarray(image)
     if array.ndim not in (2, 3) or array.shape[:2] != (camera.height, camera.width):
@@ -208,20 +211,31 @@ def _normal(tilt: Tilt) -> NDArray[np.float64]:
     return numbers
 
 
-def _closed(array: NDArray[Any], places: NDArray[np.float32], camera: _core.Camera) -> NDArray[Any]:
-    """A panorama with the columns beside its seam given twice, and its places moved there; any other image as it is.
+def _closed(array: NDArray[Any], camera: _core.Camera) -> NDArray[Any]:
+    """A panorama with its first column behind the last one again, any other image as it is.
 
     OpenCV wraps rows and columns alike or not at all.
     """
     if camera.model != "equirectangular":
         return array
-    places[:, :, 0] += 1.0
-    return np.concatenate([array[:, -1:], array, array[:, :1]], axis=1)
+    return np.concatenate([array, array[:, :1]], axis=1)
 
 
-def _maps(places: NDArray[np.float32]) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """Columns and rows, each for itself, as OpenCV takes them."""
-    return np.ascontiguousarray(places[:, :, 0]), np.ascontiguousarray(places[:, :, 1])
+def _strips(
+    made: _core.Leveller, tilt: Tilt, *, unseen: float
+) -> Iterator[tuple[slice, NDArray[np.float32], NDArray[np.float32]]]:
+    """Rows of the level image, and the columns and rows (h, W) of its pixels in the leaning one."""
+    level_map, (height, width) = made._map(_normal(tilt)), made.shape
+    columns, rows = np.empty((2, level_map.strip_rows, width), np.float32)
+    for number, first in enumerate(range(0, height, level_map.strip_rows)):
+        count = min(level_map.strip_rows, height - first)
+        u, v = columns[:count], rows[:count]
+        level_map.write_strip(number, u.reshape(-1), v.reshape(-1), unseen)
+        yield slice(first, first + count), u, v
+
+
+def _places(made: _core.Leveller, tilt: Tilt) -> NDArray[np.float32]:
+    return np.concatenate([np.stack([u, v], axis=-1) for _, u, v in _strips(made, tilt, unseen=math.nan)])
 
 
 def level(
@@ -287,7 +301,7 @@ class Unwrapper:
         if not -math.pi / 2.0 <= elevation_min_rad < elevation_max_rad <= math.pi / 2.0:
             limits = f"{elevation_min_rad}, {elevation_max_rad}"
             raise InvalidInputError(f"elevation_min_rad, elevation_max_rad = {limits}, expected rising in +-pi/2")
-        self.camera: _core.Camera = camera
+        self.camera: _core.Camera = _not_too_large(camera)
         """Whose images are unwrapped."""
         self.size: tuple[int, int] = (width, height)
         """Columns and rows of strips."""
@@ -309,13 +323,14 @@ class Unwrapper:
         """
         import cv2
 
-        places = self._core._map(np.array(_UPRIGHT) if tilt is None else _normal(tilt))
-        array = _closed(_checked(image, self.camera), places, self.camera)
+        places = _places(self._core, np.array(_UPRIGHT) if tilt is None else tilt)
+        array = _closed(_checked(image, self.camera), self.camera)
         seen = np.isfinite(places[:, :, 0])
         # The number of the last row that is seen, from the top down to each row.
         rows = np.maximum.accumulate(np.where(seen, np.arange(places.shape[0])[:, None], 0), axis=0)
         places = np.nan_to_num(np.take_along_axis(places, rows[:, :, None], axis=0), nan=_OUTSIDE_PX)
-        fine = cv2.remap(array, *_maps(places), cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+        u, v = np.ascontiguousarray(np.moveaxis(places, 2, 0))
+        fine = cv2.remap(array, u, v, cv2.INTER_LINEAR)
         return np.asarray(cv2.resize(fine.astype(np.float32), self.size, interpolation=cv2.INTER_AREA))
 
     def __reduce__(self) -> tuple[Any, ...]:

@@ -1,8 +1,10 @@
-//! Level images: how exact their maps are over all lenses, and what becomes of levels.
+//! Level images: how exact their maps are over all lenses.
 
 #![allow(clippy::expect_used)]
 
-use nalgebra::{Matrix3, Rotation3, Vector2, Vector3};
+use std::sync::Arc;
+
+use nalgebra::{Matrix3, Rotation3, Vector2};
 use tiltvp_core::camera::{Camera, Equirectangular, Model, Pinhole};
 use tiltvp_core::geometry::Tilt;
 use tiltvp_core::testing::zoo;
@@ -22,14 +24,32 @@ fn distance(camera: &Camera, a: &Vector2<f64>, b: &Vector2<f64>) -> f64 {
     if !matches!(camera.model(), Model::Equirectangular(_)) {
         return (a - b).norm();
     }
+    // Right of the last column is the first one.
+    let first = |place: &Vector2<f64>| {
+        let width = f64::from(camera.width());
+        Vector2::new((place.x + 0.5).rem_euclid(width) - 0.5, place.y)
+    };
+    let (a, b) = (&first(a), &first(b));
     let (a, b) = (camera.unproject(a).expect("the whole sphere"), camera.unproject(b).expect("the whole sphere"));
     a.cross(&b).norm().atan2(a.dot(&b)) * f64::from(camera.width()) / std::f64::consts::TAU
 }
 
-/// Whether a place is in the image or within a pixel of it.
-fn is_near(camera: &Camera, place: &Vector2<f64>) -> bool {
-    let within = |at: f64, side: u32| (-1.0..=f64::from(side)).contains(&at);
+/// Whether a place is in the image, or beyond its edge by less than the half pixel that still counts as in it.
+fn is_inside(camera: &Camera, place: &Vector2<f64>) -> bool {
+    let within = |at: f64, side: u32| (0.0..=f64::from(side) - 1.0).contains(&at);
     within(place.x, camera.width()) && within(place.y, camera.height())
+}
+
+/// The whole map of a tilt, NaN where nothing is seen.
+fn map(leveller: Leveller, tilt: &Tilt) -> Vec<[f32; 2]> {
+    let (width, height) = (leveller.width(), leveller.height());
+    let map = Arc::new(leveller).map(tilt);
+    let (mut columns, mut rows) = (vec![0.0; width * height], vec![0.0; width * height]);
+    let length = width * map.strip_rows();
+    for (number, (columns, rows)) in columns.chunks_mut(length).zip(rows.chunks_mut(length)).enumerate() {
+        map.write_strip(number, [columns, rows], f32::NAN);
+    }
+    columns.into_iter().zip(rows).map(|(column, row)| [column, row]).collect()
 }
 
 /// Of how many pixels of a map one is compared with the exact place.
@@ -38,16 +58,17 @@ const LOOKED_AT: usize = 7;
 /// The largest error of a map, and which part of the pixels that are seen, or are not, it has otherwise.
 fn errors(camera: &Camera, shown: &Camera, tilt: &Tilt) -> (f64, f64) {
     let leveller = Leveller::new(camera.clone(), &mounting(), shown.clone(), &mounting()).expect("rotations");
-    let map = leveller.map(tilt);
+    let map = map(leveller, tilt);
     let rotation = mounting().transpose() * tilt.leaning_from_upright() * mounting();
     let (mut largest, mut other): (f64, usize) = (0.0, 0);
     // Widths are not multiples of 7: all columns and rows of cells have their turn.
     for (at, place) in map.iter().enumerate().step_by(LOOKED_AT) {
-        let pixel = Vector2::new((at % leveller.width()) as f64, (at / leveller.width()) as f64);
+        let width = shown.width() as usize;
+        let pixel = Vector2::new((at % width) as f64, (at / width) as f64);
         let exact = shown.unproject(&pixel).and_then(|ray| camera.project(&(rotation * ray)));
         match exact {
-            // What is far outside has no levels to show.
-            Some(exact) if !is_near(camera, &exact) => {}
+            // At the border places are brought into the image, and outside there are none.
+            Some(exact) if !is_inside(camera, &exact) => {}
             Some(exact) if place[0].is_finite() => {
                 let place = Vector2::new(f64::from(place[0]), f64::from(place[1]));
                 largest = largest.max(distance(camera, &place, &exact));
@@ -84,40 +105,36 @@ fn panoramas_are_exact_at_seams_and_poles_too() {
 }
 
 #[test]
-fn a_level_panorama_has_all_of_it_and_no_seam() {
+fn places_are_in_the_image_and_half_a_pixel_beyond_its_edge_still_counts() {
     let camera = panorama(512);
-    let leveller = Leveller::new(camera.clone(), &mounting(), camera.clone(), &mounting()).expect("rotations");
+    let ahead = Pinhole::new([100.0, 100.0], [31.5, 23.5], &[]).expect("a lens");
+    let pinhole = Camera::new(64, 48, ahead.into()).expect("a camera");
     let tilt = Tilt::from_alpha_beta(0.5, 1.0);
-    for channels in [1, 3] {
-        let level = leveller.level(&vec![200; 512 * 256 * channels], channels, &tilt).expect("an image");
-        assert!(level.len() == 512 * 256 * channels && level.iter().all(|level| *level == 200));
+    for (camera, last, seen) in [(&camera, [512.0, 255.0], 64 * 48), (&pinhole, [63.0, 47.0], 1)] {
+        let leveller = Leveller::new(camera.clone(), &mounting(), pinhole.clone(), &mounting()).expect("rotations");
+        let map = map(leveller, &tilt);
+        let places: Vec<_> = map.iter().filter(|place| place[0].is_finite()).collect();
+        assert!(places.len() >= seen, "{} of {seen}", places.len());
+        assert!(places.iter().all(|place| (0..2).all(|axis| (0.0..=last[axis]).contains(&place[axis]))));
     }
-    // Levels that go with the direction alone: they are as smooth at the seams and poles as anywhere.
-    let field = |ray: &Vector3<f64>| 127.0 + 60.0 * ray.x + 50.0 * ray.y - 40.0 * ray.z;
-    let image: Vec<u8> = (0..512 * 256)
-        .map(|k| field(&camera.unproject(&Vector2::new(f64::from(k % 512), f64::from(k / 512))).expect("a ray")) as u8)
-        .collect();
-    let rotation = mounting().transpose() * tilt.leaning_from_upright() * mounting();
-    let level = leveller.level(&image, 1, &tilt).expect("an image");
-    for (k, got) in level.iter().enumerate() {
-        let ray = camera.unproject(&Vector2::new((k % 512) as f64, (k / 512) as f64)).expect("a ray");
-        // The levels were cut off to whole ones, and are rounded again.
-        let expected = field(&(rotation * ray)) - 0.5;
-        assert!((f64::from(*got) - expected).abs() < 1.6, "{k}: {got} {expected}");
-    }
+    // Of the pixels that a turn about the axis by a hundredth takes out of the image those that leave it by half a pixel stay.
+    let turned = *Rotation3::from_euler_angles(0.0, 0.0, 0.01).matrix();
+    let leveller = Leveller::new(pinhole.clone(), &turned, pinhole, &Matrix3::identity()).expect("rotations");
+    let map = map(leveller, &Tilt::from_alpha_beta(0.0, 0.0));
+    assert!(map.iter().all(|place| place[0].is_finite()), "corners move by 0.3 pixels");
+    assert!(map[0].contains(&0.0) && map[64 * 48 - 1].iter().zip([63.0, 47.0]).any(|(at, last)| *at == last));
 }
 
 #[test]
-fn without_a_lean_every_level_stays() {
+fn without_a_lean_every_pixel_stays() {
     for (name, camera) in zoo().into_iter().chain([("panorama", panorama(300))]) {
-        let (width, height) = (camera.width() as usize, camera.height() as usize);
         let leveller = Leveller::new(camera.clone(), &mounting(), camera.clone(), &mounting()).expect("rotations");
-        let upright = Tilt::from_alpha_beta(0.0, 0.0);
-        for channels in [1, 3] {
-            let image: Vec<u8> = (0..width * height * channels).map(|k| (k % 251) as u8).collect();
-            let level = leveller.level(&image, channels, &upright).expect("an image");
-            let differ = (0..level.len()).filter(|k| level[*k] != image[*k] && level[*k] != 0).count();
-            assert_eq!(differ, 0, "{name}");
+        let width = leveller.width();
+        let map = map(leveller, &Tilt::from_alpha_beta(0.0, 0.0));
+        for (at, place) in map.iter().enumerate().filter(|(_, place)| place[0].is_finite()) {
+            let pixel = Vector2::new((at % width) as f64, (at / width) as f64);
+            let away = distance(&camera, &pixel, &Vector2::from(place.map(f64::from)));
+            assert!(away < 1e-2, "{name}: {pixel} {place:?}");
         }
     }
 }
@@ -129,8 +146,5 @@ fn wrong_questions_are_refused() {
     assert!(Leveller::new(camera.clone(), &(2.0 * identity), camera.clone(), &identity).is_err());
     assert!(Leveller::from_rays(camera.clone(), &identity, 3, vec![[0.0; 3]; 4]).is_err());
     let leveller = Leveller::from_rays(camera, &identity, 2, vec![[0.0, 0.0, 1.0]; 4]).expect("rays");
-    let upright = Tilt::from_alpha_beta(0.0, 0.0);
-    assert!(leveller.level(&[0; 64 * 32 - 1], 1, &upright).is_err());
-    assert!(leveller.level(&[0; 64 * 32 * 2], 2, &upright).is_err());
-    assert_eq!(leveller.level(&[9; 64 * 32], 1, &upright).expect("an image"), [9; 4]);
+    assert_eq!(map(leveller, &Tilt::from_alpha_beta(0.0, 0.0)).len(), 4);
 }

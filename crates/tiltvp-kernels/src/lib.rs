@@ -11,7 +11,7 @@ pub mod level;
 pub mod marks;
 pub mod normals;
 pub mod prefetch;
-pub mod remap;
 pub mod ridge;
 pub mod rows;
 pub mod smoothing;
+pub mod surface;

@@ -1,6 +1,8 @@
 //! `Leveller`: level images of one camera.
 
-use numpy::{PyArray1, PyArrayMethods, PyUntypedArrayMethods};
+use std::sync::Arc;
+
+use numpy::PyReadwriteArray1;
 use pyo3::prelude::*;
 use tiltvp_core::tilt as core;
 
@@ -18,7 +20,7 @@ use crate::reader;
 /// image of `columns` columns, NaN where it shows nothing.
 #[pyclass(frozen, module = "tiltvp._core")]
 pub(crate) struct Leveller {
-    inner: core::Leveller,
+    inner: Arc<core::Leveller>,
     camera: Py<Camera>,
 }
 
@@ -53,7 +55,7 @@ impl Leveller {
             }
             _ => return Err(invalid("shown, rays: both or none, expected one of them".to_owned())),
         };
-        Ok(Self { inner, camera: camera.clone().unbind() })
+        Ok(Self { inner: Arc::new(inner), camera: camera.clone().unbind() })
     }
 
     /// The camera whose images are made level.
@@ -74,41 +76,40 @@ impl Leveller {
         (self.inner.height(), self.inner.width())
     }
 
-    /// (H, W) or (H, W, 3): the level image of one of the camera, C-contiguous uint8.
-    #[pyo3(signature = (image: "NDArray[np.uint8]", normal: "ArrayLike") -> "NDArray[np.uint8]")]
-    fn _level<'py>(
-        &self,
-        py: Python<'py>,
-        image: &Bound<'py, PyAny>,
-        normal: &Bound<'py, PyAny>,
-    ) -> PyResult<Bound<'py, PyAny>> {
+    /// The map of level images by a tilt, which is given as the ground normal (3,) of the robot frame.
+    fn _map(&self, py: Python<'_>, normal: &Bound<'_, PyAny>) -> PyResult<LevelMap> {
         let tilt = convert::tilt(normal, "normal")?;
-        let (height, width) = self.shape();
-        let level = |data: &[u8], got: &[usize], channels: usize| {
-            let lens = self.inner.camera();
-            let expected = [lens.height() as usize, lens.width() as usize];
-            if got[..2] != expected {
-                return Err(invalid(format!("image: shape {got:?}, expected {expected:?}, as the camera's images")));
-            }
-            let level = call(py, || self.inner.level(data, channels, &tilt))?;
-            Ok(PyArray1::from_vec(py, level))
-        };
-        let slice = |error| invalid(format!("image: {error}"));
-        if let Ok(gray) = convert::gray(image, "image") {
-            let level = level(gray.as_slice().map_err(slice)?, gray.shape(), 1)?;
-            return Ok(level.reshape([height, width])?.into_any());
-        }
-        let color = convert::color(image, "image")?;
-        let level = level(color.as_slice().map_err(slice)?, color.shape(), 3)?;
-        Ok(level.reshape([height, width, 3])?.into_any())
+        call(py, || Ok(LevelMap(self.inner.map(&tilt))))
+    }
+}
+
+/// See `Leveller._map`.
+#[pyclass(frozen, module = "tiltvp._core")]
+pub(crate) struct LevelMap(core::LevelMap);
+
+#[pymethods]
+impl LevelMap {
+    /// Rows that are written together.
+    #[getter]
+    fn strip_rows(&self) -> usize {
+        self.0.strip_rows()
     }
 
-    /// (H, W, 2): where each pixel (u, v) of the level image is in the leaning one; NaN where it was not seen.
-    #[pyo3(signature = (normal: "ArrayLike") -> "NDArray[np.float32]")]
-    fn _map<'py>(&self, py: Python<'py>, normal: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
-        let tilt = convert::tilt(normal, "normal")?;
-        let map = call(py, || Ok(self.inner.map(&tilt)))?;
-        let (height, width) = self.shape();
-        Ok(PyArray1::from_slice(py, map.as_flattened()).reshape([height, width, 2])?.into_any())
+    /// Writes, for the pixels of the strip of that number, the columns and the rows (h W,) of those of the leaning image that
+    /// show the same; `unseen` for none.
+    #[pyo3(signature = (number, columns: "NDArray[np.float32]", rows: "NDArray[np.float32]", unseen))]
+    fn write_strip(
+        &self,
+        py: Python<'_>,
+        number: usize,
+        mut columns: PyReadwriteArray1<'_, f32>,
+        mut rows: PyReadwriteArray1<'_, f32>,
+        unseen: f32,
+    ) -> PyResult<()> {
+        let places = [columns.as_slice_mut()?, rows.as_slice_mut()?];
+        call(py, || {
+            self.0.write_strip(number, places, unseen);
+            Ok(())
+        })
     }
 }

@@ -60,7 +60,7 @@ mod _core {
     #[pymodule_export]
     use crate::laboratory::Laboratory;
     #[pymodule_export]
-    use crate::level::Leveller;
+    use crate::level::{LevelMap, Leveller};
     #[pymodule_export]
     use crate::lines::{
         LineExtractor, LineTracker, Lines, TrackedLines, descriptor_distances, match_descriptors, match_wide,

@@ -141,6 +141,22 @@ impl Camera {
         with_model!(&self.model, model => self.unproject_jacobian_by(model, pixel))
     }
 
+    /// As [`project`](Self::project), without the limit of [`with_max_theta_rad`](Self::with_max_theta_rad).
+    pub(crate) fn project_unlimited(&self, bearing: &Vector3<f64>) -> Option<Vector2<f64>> {
+        with_model!(&self.model, model => model.project(&self.reflect(bearing)))
+    }
+
+    /// As [`unproject`](Self::unproject), without that limit.
+    pub(crate) fn unproject_unlimited(&self, pixel: &Vector2<f64>) -> Option<Vector3<f64>> {
+        with_model!(&self.model, model => model.unproject(pixel)).map(|bearing| self.reflect(&bearing))
+    }
+
+    /// That limit, if there is one: bearings are seen whose component along an axis is at least so much.
+    pub(crate) fn limit(&self) -> Option<(Vector3<f64>, f64)> {
+        let axis = self.reflect(&Vector3::new(0.0, 0.0, self.axis_z.signum()));
+        self.limit.map(|_| (axis, self.max_theta_rad.cos()))
+    }
+
     #[inline]
     pub(super) fn project_by(&self, model: &impl CameraModel, bearing: &Vector3<f64>) -> Option<Vector2<f64>> {
         let bearing = self.reflect(bearing);

@@ -33,7 +33,7 @@ pub use estimate::{ALTERNATIVES, Alternative, EdgeElement, TiltEstimate};
 pub use estimator::TiltEstimator;
 pub use filter::{FilteredTilt, MountingOptions, TiltFilter, TiltFilterOptions, TiltFilterState, Verdict};
 pub use image_edges::{EdgeOrigin, ImageEdges};
-pub use level::{Leveller, MAP_ERROR_PX};
+pub use level::{LevelMap, Leveller, MAP_ERROR_PX};
 pub use methods::*;
 pub use options::TiltOptions;
 pub use posterior::{PosteriorCorrection, PriorOfTilt, train_posterior};

@@ -2,6 +2,8 @@
 
 use nalgebra::{Matrix3, Vector2, Vector3};
 
+use super::shown::Shown;
+use super::strip::Strip;
 use super::surface::Surface;
 use crate::camera::{Camera, Model};
 
@@ -45,31 +47,33 @@ pub(super) struct Cell {
     pub(super) places: Surface,
 }
 
-/// What is done with places.
-pub(super) trait Sink {
-    /// Pixels whose places are interpolated.
-    fn cell(&mut self, cell: &Cell);
-    /// A pixel with its exact place.
-    fn pixel(&mut self, pixel: [usize; 2], place: Vector2<f64>);
-}
-
 /// Where directions are in the old image.
+#[derive(Debug, Clone, Copy)]
 pub(super) struct Places<'a> {
-    pub(super) camera: &'a Camera,
+    camera: &'a Camera,
     /// Takes rays of the new image to those of the camera.
-    pub(super) rotation: Matrix3<f64>,
+    rotation: Matrix3<f64>,
     /// Columns after which the image begins anew, for panoramas.
-    pub(super) period: Option<f64>,
+    period: Option<f64>,
+    /// Of the camera's field of view: rays of the new image that are seen have such a component along an axis.
+    limit: Option<(Vector3<f64>, f64)>,
 }
 
 impl<'a> Places<'a> {
     pub(super) fn new(camera: &'a Camera, rotation: Matrix3<f64>) -> Self {
         let is_round = matches!(camera.model(), Model::Equirectangular(_));
-        Self { camera, rotation, period: is_round.then(|| f64::from(camera.width())) }
+        let limit = camera.limit().map(|(axis, least)| (rotation.transpose() * axis, least));
+        Self { camera, rotation, period: is_round.then(|| f64::from(camera.width())), limit }
     }
 
+    /// Where a ray is, or would be without the limit of the field of view.
     fn of(&self, ray: Option<Vector3<f64>>) -> Option<Vector2<f64>> {
-        ray.and_then(|ray| self.camera.project(&(self.rotation * ray)))
+        ray.and_then(|ray| self.camera.project_unlimited(&(self.rotation * ray)))
+    }
+
+    /// Whether a ray is within the limit of the field of view.
+    fn sees(&self, ray: Option<Vector3<f64>>) -> bool {
+        ray.is_some_and(|ray| self.limit.is_none_or(|(axis, least)| axis.dot(&ray) >= least))
     }
 
     /// From one place to another, the shorter way about a panorama.
@@ -112,35 +116,43 @@ impl<'a> Places<'a> {
 pub(super) struct Corners {
     image: [usize; 2],
     counts: [usize; 2],
+    /// In row order, and whether they are shown.
+    rays: Vec<(Option<Vector3<f64>>, bool)>,
 }
 
 impl Corners {
-    pub(super) fn new(image: [usize; 2]) -> Self {
-        Self { image, counts: image.map(|side| side.div_ceil(CELL) + 1) }
+    pub(super) fn new(shown: &Shown) -> Self {
+        let (image, counts) = (shown.size, shown.size.map(|side| side.div_ceil(CELL) + 1));
+        let at = |axis: usize, i: usize| (i * CELL).min(image[axis] - 1);
+        let pixels = (0..counts[1]).flat_map(|j| (0..counts[0]).map(move |i| [at(0, i), at(1, j)]));
+        let rays = pixels.map(|pixel| (shown.unlimited_ray(pixel), shown.ray(pixel).is_some())).collect();
+        Self { image, counts, rays }
     }
 
-    /// The pixels at the corners, in row order.
-    pub(super) fn pixels(&self) -> impl Iterator<Item = [usize; 2]> + '_ {
-        let at = |axis: usize, i: usize| (i * CELL).min(self.image[axis] - 1);
-        (0..self.counts[1]).flat_map(move |j| (0..self.counts[0]).map(move |i| [at(0, i), at(1, j)]))
+    /// Where the corners are and how places bend between them.
+    pub(super) fn found(&self, places: &Places<'_>) -> Found {
+        let corners: Vec<_> =
+            self.rays.iter().map(|(ray, _)| places.of(*ray).unwrap_or(Vector2::repeat(f64::NAN))).collect();
+        let is_seen = self.rays.iter().map(|(ray, is_shown)| *is_shown && places.sees(*ray)).collect();
+        let differences = [0, 1].map(|axis| self.differences(axis, &corners, places));
+        Found { corners, is_seen, differences }
     }
 
-    /// Gives every cell or pixel that is seen to the sink. `corner_rays` are those of [`pixels`](Self::pixels), `ray` is that of any.
-    pub(super) fn walk(
-        &self,
-        corner_rays: &[[f32; 3]],
-        ray: &impl Fn([usize; 2]) -> Option<Vector3<f64>>,
-        places: &Places<'_>,
-        sink: &mut impl Sink,
-    ) {
-        let found = found_places(corner_rays, places);
-        let [across, down] = [0, 1].map(|axis| self.differences(axis, &found, places));
-        let [columns, rows] = self.counts;
-        for (j, i) in (0..rows - 1).flat_map(|j| (0..columns - 1).map(move |i| (j, i))) {
+    /// Writes the places of all pixels of a strip.
+    pub(super) fn write(&self, found: &Found, shown: &Shown, places: &Places<'_>, strip: &mut Strip<'_>) {
+        let (Found { corners: found, is_seen, differences: [across, down] }, columns) = (found, self.counts[0]);
+        let rows = strip.rows();
+        let cells = rows.start / CELL..rows.end.div_ceil(CELL);
+        for (j, i) in cells.flat_map(|j| (0..columns - 1).map(move |i| (j, i))) {
             let at = j * columns + i;
             let [a, b, c, d] = [at, at + 1, at + columns, at + columns + 1];
             let first = [i * CELL, j * CELL];
-            let size = std::array::from_fn(|axis| CELL.min(self.image[axis] - first[axis]));
+            let size: [usize; 2] = std::array::from_fn(|axis| CELL.min(self.image[axis] - first[axis]));
+            let seen = [a, b, c, d].iter().filter(|k| is_seen[**k]).count();
+            if seen == 0 && !places.sees(shown.ray([first[0] + size[0] / 2, first[1] + size[1] / 2])) {
+                strip.clear(first, size);
+                continue;
+            }
             let reach = std::array::from_fn(|axis| CELL.min(self.image[axis] - 1 - first[axis]).max(1));
             let corners = [a, b, c, d].map(|k| found[k]);
             let error = across.errors[a].max(across.errors[c]) + down.errors[a].max(down.errors[b]);
@@ -156,14 +168,18 @@ impl Corners {
                 )
             });
             let surface = surface.filter(|surface| {
-                (is_own && error <= BEND_MAX_PX) || (error <= FITTING_PX && fits(surface, first, size, ray, places))
+                (is_own && error <= BEND_MAX_PX) || (error <= FITTING_PX && fits(surface, first, size, shown, places))
             });
             if let Some(places) = surface {
-                sink.cell(&Cell { first, size, places });
-            } else if corners.iter().any(|corner| corner.x.is_finite()) || is_seen(ray, places, first, size) {
+                strip.cell(&Cell { first, size, places });
+            } else {
+                strip.clear(first, size);
                 let corners = corners.map(|corner| corner.x.is_finite().then_some(corner));
-                let error = if is_own && error <= TOLD_PX { OF_HALF * error } else { f64::INFINITY };
-                split(first, size, (reach == size).then_some(corners), error, ray, places, sink);
+                let error = if error <= TOLD_PX { OF_HALF * error } else { f64::INFINITY };
+                split(&Part { first, size, reach, corners, error }, shown, places, strip);
+            }
+            if seen < 4 {
+                strip.keep(first, size, |pixel| places.sees(shown.ray(pixel)));
             }
         }
     }
@@ -213,7 +229,18 @@ impl Corners {
     }
 }
 
+/// What is made once of all corners for a tilt.
+#[derive(Debug, Clone)]
+pub(super) struct Found {
+    /// The places of corners, or where they would be without limits of fields of view; NaN where there is none.
+    corners: Vec<Vector2<f64>>,
+    /// Whether they are within the fields of view of both images.
+    is_seen: Vec<bool>,
+    differences: [Differences; 2],
+}
+
 /// Differences between the corners of cells along an axis.
+#[derive(Debug, Clone)]
 struct Differences {
     /// Second ones at each corner: its own, or where it has no neighbours those of the nearest that has.
     seconds: Vec<Vector2<f64>>,
@@ -231,93 +258,85 @@ impl Differences {
     }
 }
 
-/// Whether the middle of a cell of which no corner is seen is seen.
-fn is_seen(
-    ray: &impl Fn([usize; 2]) -> Option<Vector3<f64>>,
-    places: &Places<'_>,
-    first: [usize; 2],
-    size: [usize; 2],
-) -> bool {
-    places.of(ray([first[0] + size[0] / 2, first[1] + size[1] / 2])).is_some()
+/// Those of a rectangle in row order.
+fn pixels(first: [usize; 2], size: [usize; 2]) -> impl Iterator<Item = [usize; 2]> {
+    (0..size[1]).flat_map(move |v| (0..size[0]).map(move |u| [first[0] + u, first[1] + v]))
 }
 
-/// Goes on with quarters of a cell if its corners, `size` apart, are given, and with its pixels if not. `error` is what interpolation over
-/// quarters is wrong by, infinite if that is not known.
-fn split(
+/// A cell, or a part of one, that is to be split.
+struct Part {
     first: [usize; 2],
     size: [usize; 2],
-    corners: Option<[Option<Vector2<f64>>; 4]>,
+    /// From its first to its last corners: as many pixels as its size, or at the border of the image one less.
+    reach: [usize; 2],
+    corners: [Option<Vector2<f64>>; 4],
+    /// What interpolation over its quarters is wrong by, infinite if that is not known.
     error: f64,
-    ray: &impl Fn([usize; 2]) -> Option<Vector3<f64>>,
-    places: &Places<'_>,
-    sink: &mut impl Sink,
-) {
-    let Some(corners) = corners.filter(|_| size[0] > SMALLEST) else {
-        for (v, u) in (0..size[1]).flat_map(|v| (0..size[0]).map(move |u| (v, u))) {
-            let pixel = [first[0] + u, first[1] + v];
-            if let Some(place) = places.of(ray(pixel)) {
-                sink.pixel(pixel, place);
+}
+
+/// Goes on with the quarters of a part, in the end with its pixels.
+fn split(part: &Part, shown: &Shown, places: &Places<'_>, strip: &mut Strip<'_>) {
+    if part.size.iter().any(|side| *side <= SMALLEST) {
+        for pixel in pixels(part.first, part.size) {
+            if let Some(place) = places.of(shown.ray(pixel)) {
+                strip.pixel(pixel, place);
             }
         }
         return;
-    };
-    let half = size[0] / 2;
+    }
+    let halves = part.reach.map(|reach| [reach.div_ceil(2), reach / 2]);
+    let at = |axis: usize, k: usize| part.first[axis] + halves[axis][..k].iter().sum::<usize>();
     let mut nine = [[None; 3]; 3];
     for (j, i) in (0..3).flat_map(|j| (0..3).map(move |i| (j, i))) {
         nine[j][i] = match (j % 2, i % 2) {
-            (0, 0) => corners[j + i / 2],
-            _ => places.of(ray([first[0] + half * i, first[1] + half * j])),
+            (0, 0) => part.corners[j + i / 2],
+            _ => places.of(shown.unlimited_ray([at(0, i), at(1, j)])),
         };
     }
-    let second = |three: [Option<Vector2<f64>>; 3]| match three {
-        [Some(a), Some(b), Some(c)] if !places.is_polar(&b) => Some(places.second([&a, &b, &c], 1.0)),
+    // Of each axis, the second half over the first one.
+    let last = halves.map(|[first, second]| second as f64 / first as f64);
+    let second = |axis: usize, three: [Option<Vector2<f64>>; 3]| match three {
+        [Some(a), Some(b), Some(c)] if !places.is_polar(&b) => Some(places.second([&a, &b, &c], last[axis])),
         _ => None,
     };
-    let (across, down) = (nine.map(second), [0, 1, 2].map(|i| second([nine[0][i], nine[1][i], nine[2][i]])));
+    let across = nine.map(|three| second(0, three));
+    let down = [0, 1, 2].map(|i| second(1, [nine[0][i], nine[1][i], nine[2][i]]));
     for (j, i) in [(0, 0), (0, 1), (1, 0), (1, 1)] {
         let four = [nine[j][i], nine[j][i + 1], nine[j + 1][i], nine[j + 1][i + 1]];
-        let (first, size) = ([first[0] + half * i, first[1] + half * j], [half; 2]);
+        let (first, reach) = ([at(0, i), at(1, j)], [halves[0][i], halves[1][j]]);
+        let size = [0, 1].map(|axis| if [i, j][axis] == 0 { reach[axis] } else { part.size[axis] - halves[axis][0] });
         let surface = match (four, [across[j], across[j + 1], down[i], down[i + 1]]) {
             ([Some(a), Some(b), Some(c), Some(d)], [Some(above), Some(below), Some(left), Some(right)]) => {
-                let surface = Surface::new(places.together([a, b, c, d]), [above, below], [left, right], size);
+                let over = |axis: usize, pair: [Vector2<f64>; 2]| {
+                    pair.map(|second| second * if [i, j][axis] == 0 { 1.0 } else { last[axis].powi(2) })
+                };
+                let corners = places.together([a, b, c, d]);
+                let surface = Surface::new(corners, over(0, [above, below]), over(1, [left, right]), reach);
                 let bend =
                     [above, below, left, right].iter().map(|bend| places.length(*bend, &a) / 8.0).fold(0.0, f64::max);
-                (error.min(bend) <= FITTING_PX && fits(&surface, first, size, ray, places)).then_some(surface)
+                (part.error.min(bend) <= FITTING_PX && fits(&surface, first, size, shown, places)).then_some(surface)
             }
             _ => None,
         };
         match surface {
-            Some(places) => sink.cell(&Cell { first, size, places }),
+            Some(places) => strip.cell(&Cell { first, size, places }),
             None if four.iter().all(Option::is_none) => {}
-            None => split(first, size, Some(four), error / 8.0, ray, places, sink),
+            None => {
+                let quarter = Part { first, size, reach, corners: four, error: part.error / 8.0 };
+                split(&quarter, shown, places, strip);
+            }
         }
     }
 }
 
 /// Whether a surface is where two pixels are, at which no errors of a third difference across and one down cancel each other.
-fn fits(
-    surface: &Surface,
-    first: [usize; 2],
-    size: [usize; 2],
-    ray: &impl Fn([usize; 2]) -> Option<Vector3<f64>>,
-    places: &Places<'_>,
-) -> bool {
+fn fits(surface: &Surface, first: [usize; 2], size: [usize; 2], shown: &Shown, places: &Places<'_>) -> bool {
     let [across, down] = size.map(|side| side / 4);
     [[across, down], [size[0] - across, down]].into_iter().all(|[column, row]| {
         let column = column.min(size[0] - 1);
-        places.of(ray([first[0] + column, first[1] + row])).is_some_and(|exact| {
+        places.of(shown.unlimited_ray([first[0] + column, first[1] + row])).is_some_and(|exact| {
             let found = surface.at([column, row]);
             places.length(places.between(&found, &exact), &exact) <= BEND_MAX_PX
         })
     })
-}
-
-/// The places of corners, NaN where there is none.
-fn found_places(rays: &[[f32; 3]], places: &Places<'_>) -> Vec<Vector2<f64>> {
-    let turned: Vec<Vector3<f64>> =
-        rays.iter().map(|ray| places.rotation * Vector3::from(ray.map(f64::from))).collect();
-    let mut found = vec![Vector2::zeros(); turned.len()];
-    // Both are as long as there are corners.
-    let _ = places.camera.project_all(&turned, &mut found);
-    found
 }

@@ -1,8 +1,9 @@
-//! The image as the upright robot's camera would have seen it: where each of its pixels is found in the leaning one, and its levels.
+//! The image as the upright robot's camera would have seen it: where each of its pixels is found in the leaning one.
 
 mod grid;
 mod leveller;
-mod pixels;
+mod shown;
+mod strip;
 mod surface;
 
-pub use leveller::{Leveller, MAP_ERROR_PX};
+pub use leveller::{LevelMap, Leveller, MAP_ERROR_PX};

@@ -1,0 +1,95 @@
+//! Rows of the map from a level image to the leaning one, as they are written down.
+
+use std::ops::Range;
+
+use nalgebra::Vector2;
+use tiltvp_kernels::surface::{COLUMNS, Inside, Surface as Numbers, keep_inside, write};
+
+use super::grid::{CELL, Cell};
+use crate::camera::{Camera, Model};
+
+const _: () = assert!(CELL <= COLUMNS);
+
+/// From the border of the image: what is rounded where places are written must not reach beyond it unseen.
+const MARGIN_PX: f64 = 0.01;
+
+/// Columns and rows in the leaning image of some rows of the level one.
+pub(super) struct Strip<'a> {
+    /// Of the level image; those of whole cells.
+    rows: Range<usize>,
+    /// The column and the row of each pixel.
+    places: [&'a mut [f32]; 2],
+    /// Pixels in a row of the level image.
+    width: usize,
+    image: Inside,
+}
+
+impl<'a> Strip<'a> {
+    pub(super) fn new(
+        rows: Range<usize>,
+        places: [&'a mut [f32]; 2],
+        width: usize,
+        camera: &Camera,
+        unseen: f32,
+    ) -> Self {
+        let [columns, last_row] = [camera.width() as f32, camera.height() as f32 - 1.0];
+        let image = match camera.model() {
+            Model::Equirectangular(_) => Inside { last: [columns, last_row], period: columns, unseen },
+            _ => Inside { last: [columns - 1.0, last_row], period: 0.0, unseen },
+        };
+        Self { rows, places, width, image }
+    }
+
+    /// Those that are written, of the level image.
+    pub(super) fn rows(&self) -> Range<usize> {
+        self.rows.clone()
+    }
+
+    /// Leaves of some pixels those that are seen.
+    pub(super) fn keep(&mut self, first: [usize; 2], size: [usize; 2], is_seen: impl Fn([usize; 2]) -> bool) {
+        for row in 0..size[1] {
+            let at = self.at([first[0], first[1] + row]);
+            for column in (0..size[0]).filter(|column| !is_seen([first[0] + column, first[1] + row])) {
+                for numbers in &mut self.places {
+                    numbers[at + column] = self.image.unseen;
+                }
+            }
+        }
+    }
+
+    /// Pixels that are not seen.
+    pub(super) fn clear(&mut self, first: [usize; 2], size: [usize; 2]) {
+        let at = self.at(first);
+        for numbers in &mut self.places {
+            for row in numbers[at..].chunks_mut(self.width).take(size[1]) {
+                row[..size[0]].fill(self.image.unseen);
+            }
+        }
+    }
+
+    /// Pixels whose places are interpolated.
+    pub(super) fn cell(&mut self, cell: &Cell) {
+        let at = self.at(cell.first);
+        let [columns, rows] = &mut self.places;
+        for (axis, out) in [&mut *columns, &mut *rows].into_iter().enumerate() {
+            let (terms, origin) = cell.places.along(axis);
+            write(&Numbers { terms, origin }, cell.size, &mut out[at..], self.width);
+        }
+        let last = Vector2::from(self.image.last.map(f64::from));
+        if cell.places.low.min() < MARGIN_PX || (last - cell.places.high).min() < MARGIN_PX {
+            keep_inside(&self.image, cell.size, [&mut columns[at..], &mut rows[at..]], self.width);
+        }
+    }
+
+    /// A pixel with its place.
+    pub(super) fn pixel(&mut self, pixel: [usize; 2], place: Vector2<f64>) {
+        let at = self.at(pixel);
+        let [columns, rows] = &mut self.places;
+        (columns[at], rows[at]) = (place.x as f32, place.y as f32);
+        keep_inside(&self.image, [1, 1], [&mut columns[at..], &mut rows[at..]], self.width);
+    }
+
+    fn at(&self, [u, v]: [usize; 2]) -> usize {
+        (v - self.rows.start) * self.width + u
+    }
+}
