@@ -34,18 +34,24 @@ quick-extension:
 # Sets up; checks and tests everything that needs neither data nor programs of the system.
 test: setup check test-rust test-python
 
-# Debian's chromium, valgrind and Xvfb, by apt-get, if they are not there. (The only recipe that installs into the system.)
+# Debian's chromium, valgrind and Xvfb, by apt-get, if they are not there.
 system-programs:
     #!/usr/bin/env bash
     set -euo pipefail
     missing=""
     for name in chromium valgrind Xvfb; do command -v $name > /dev/null || missing="$missing ${name,,}"; done
-    [ -n "$missing" ] || exit 0
+    [ -z "$missing" ] || just install-packages $missing
+
+# The only recipe that installs into the system: this, what the tests of the system want, and ViSP for `measure-visp`.
+[private]
+install-packages +packages:
+    #!/usr/bin/env bash
+    set -euo pipefail
     root=""
     [ "$(id -u)" = 0 ] || root=sudo
-    echo "installing$missing"
+    echo "installing {{packages}}"
     $root apt-get update --quiet --quiet
-    DEBIAN_FRONTEND=noninteractive $root apt-get install --quiet --quiet --yes --no-install-recommends $missing > /dev/null
+    DEBIAN_FRONTEND=noninteractive $root apt-get install --quiet --quiet --yes --no-install-recommends {{packages}} > /dev/null
 
 # The wheel in a bare environment, the notebooks, and the tests that want a browser, a screen and valgrind: the page of a report, the
 # window of `--show`, and what an image costs in instructions.
@@ -322,6 +328,15 @@ measure-vertical-peers *arguments: setup
 # Corners of a real cabinet and a real box: attitude against motion capture, sizes, smoothness.
 measure-corners-real folder *arguments: setup
     {{bin}}/tiltvp measure corners-real {{folder}} --overwrite --overlay out/corners-real {{arguments}}
+
+# The tracker's headers include those of OpenCV's modules.
+# Corners of the real box beside ViSP's model-based tracker, which knows the box (Debian's ViSP, installed by apt-get if it is not there).
+measure-visp folder: setup
+    dpkg-query --show libvisp-mbt-dev libopencv-calib3d-dev libopencv-objdetect-dev > /dev/null 2>&1 || just install-packages \
+        g++ libvisp-mbt-dev libvisp-io-dev libopencv-highgui-dev libopencv-calib3d-dev libopencv-video-dev libopencv-objdetect-dev
+    mkdir -p out/peers
+    g++ -O2 -std=c++17 -I/usr/include/opencv4 benches/peers/visp_tracker.cpp -o out/peers/visp_tracker -lvisp_mbt -lvisp_io -lvisp_core
+    {{bin}}/python benches/peers/visp.py {{folder}} out/peers/visp_tracker
 
 # Poses of corners: the closed form on random poses, and rendered sequences of a hand-held stereo pair, with plots.
 measure-corners *arguments: setup
