@@ -2,9 +2,9 @@
 
 ViSP (Debian's libvisp-mbt-dev; the recipe `measure-visp` compiles `visp_tracker.cpp`) knows the box: its edges are
 those of the model that comes with the images. It begins with our first pose of which all three edges are seen, and
-follows by moving edges in both images. We know nothing of the box. Nobody knows the truth: printed are how far both move
-between neighbouring pairs, how far they are apart after one constant turn and shift for each of our corners, and the
-median time of the processor for a pair, ours with the decoding of its images.
+follows by moving edges in both images. We know nothing of the box. Nobody knows the truth: printed are how far both
+move between neighbouring pairs, how far they are apart after one constant turn and shift for each of our corners, and
+the median time of the processor for a pair, ours with the decoding of its images.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ LONG_M = 1e-3 * TEA_BOX_MM["long"]
 
 
 def model_pose(estimate: CornerEstimate) -> Matrix | None:
-    """(4, 4): the model in the left camera. Its corner has the long side along x, the depth along y, and hangs along -z."""
+    """(4, 4): the model in the left camera. Its corner has its long side along x, its depth along y, and hangs down."""
     if estimate.pose is None or estimate.pose.vertex_m is None or not np.isfinite(estimate.edge_ends_m).all():
         return None
     vertex = estimate.pose.vertex_m
