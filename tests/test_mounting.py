@@ -108,3 +108,36 @@ def test_what_does_not_fit_is_refused(template):
         mounting_tilt(estimates, motions[1:], np.eye(3))
     with pytest.raises(ValueError, match="robot_from_camera"):
         mounting_tilt(estimates, motions, np.diag([1.0, 1.0, -1.0]))
+
+
+def nees(found, lean):
+    """The error's square in stated variances; 2 in the mean where these are right."""
+    x, y = (found.lean.normal - lean)[:2]
+    off = np.array([y, -x])
+    return float(off @ np.linalg.solve(found.covariance_rad2, off))
+
+
+def test_deviations_are_those_of_what_images_scatter_by(template):
+    """Not of what they state: in a bright room they err by less."""
+    lean, slope = direction(1.2, -0.7), direction(0.0, 1.5)
+    sigmas = []
+    for stated in (SIGMA, 4.0 * SIGMA):
+        covariance = [[stated**2, 0.0], [0.0, stated**2]]
+        found = []
+        for seed in range(40):
+            estimates, motions = drive(template, lean, slope, TURNS, seed)
+            estimates = [TiltEstimate.from_dict(one.to_dict() | {"covariance_rad2": covariance}) for one in estimates]
+            found.append(mounting_tilt(estimates, motions, np.eye(3)))
+        # Images here have nothing in common that no turn averages out, as those of real places have.
+        assert 0.25 < np.mean([nees(one, lean) for one in found]) < 2.0, stated
+        sigmas.append(np.median([one.sigma_rad for one in found]))
+    assert sigmas[1] < 1.5 * sigmas[0]
+
+
+def test_at_one_heading_scatter_tells_nothing(template):
+    """Images of one view err alike, however well they agree."""
+    lean = direction(1.2, 0.3)
+    one, motions = drive(template, lean, direction(0.0, 0.0), np.zeros(60))
+    found = mounting_tilt([one[0]] * 60, motions, np.eye(3), level_floor=True)
+    assert found.sigma_rad >= SIGMA
+    assert found.shared_rad2[0, 0] == pytest.approx(SIGMA**2)

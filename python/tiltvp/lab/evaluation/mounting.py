@@ -41,6 +41,9 @@ METHODS: Final[dict[str, dict[str, Any]]] = {"segments": TILT_OPTIONS, "refined"
 """Options of the estimator by the name of its method: those of `find_setup`, and beside it the pixels'."""
 _OFF_DEG: Final = 1.5
 """Roll and pitch of mountings are drawn up to this: as camera mounts of service robots are off (1 to 2 degrees)."""
+_SAMPLES: Final = 2
+"""Rays along each side of a pixel: with one, edges that are nearly upright in the image break into upright pieces, and
+the roll of a camera that looks ahead errs by 0.04 to 0.07 degrees towards none. Real images do not do that."""
 _QUANTILES: Final = {50: 1.386, 95: 5.991}
 """Chi-square of two degrees of freedom."""
 
@@ -69,7 +72,7 @@ def _judged(path: Path, number: int, seed: int, looks: str, floor: str) -> dict[
     drive = RecordedDrive(
         drive_room(kind, seed + number), camera, robot_from_camera=nominal, mounting_rad=(roll, pitch),
         floor_slope_rad=(math.radians(slope_deg), rng.uniform(-math.pi, math.pi)),
-        bumps_max_rad=math.radians(bumps_deg), samples=1, seed=seed + number,
+        bumps_max_rad=math.radians(bumps_deg), samples=_SAMPLES, seed=seed + number,
     )  # fmt: skip
     drive.write(path)
     frames = open_frames(path)
