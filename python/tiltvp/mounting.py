@@ -32,8 +32,11 @@ _SHARED: Final = 0.2
 out. Of 50 real panoramas, seen at twelve headings by a camera that looks ahead, the mean of all headings is in the 95 %
 region of its jackknife in 90 %, with this in 94 %; looking up in nearly all either way."""
 _PARTS: Final = 8
-"""Of a drive, each left out in turn (Efron 1982): neighbouring images err alike, and over bumps lean alike. With 16
+"""Of a drive, each left out in turn: neighbouring images err alike, and over bumps lean alike. With 16
 parts stated deviations are half of the errors over bumps (`tiltvp measure mounting`, seeds 990 and 1600)."""
+_FEW_PARTS: Final = (_PARTS - 1) ** 2 / (_PARTS * (_PARTS - 4))
+"""Of the sum of squares by which an answer moves when each part is left out (n - 1) / n is its covariance (Efron 1982).
+From n parts that is known by few: two errors' square in its variances is (n - 1) / (n - 4) times 2 in the mean."""
 _PART_RAD_PER_M: Final = 0.25 * math.pi
 """A turn that shows as much that is new as a metre of the way does."""
 _AGREEMENT_MAX: Final = 0.1
@@ -179,7 +182,7 @@ def _filtered(estimates: Sequence[TiltEstimate | None], motions: Sequence[Motion
 def _scatter(
     estimates: Sequence[TiltEstimate | None], motions: Sequence[Motion], lean: FilteredTilt, *, level_floor: bool
 ) -> NDArray[np.float64] | None:
-    """(2, 2): how far the mounting moves when each part of the drive is left out in turn, the sum of squares.
+    """(2, 2): the covariance by how far the mounting moves when each part of the drive is left out in turn.
 
     None where what is left does not tell it.
     """
@@ -195,7 +198,7 @@ def _scatter(
             return None
         moves.append(np.asarray(other.normal)[:2] - np.asarray(lean.normal)[:2])
     together = np.array(moves)
-    scatter: NDArray[np.float64] = together.T @ together
+    scatter: NDArray[np.float64] = _FEW_PARTS * together.T @ together
     return scatter
 
 
