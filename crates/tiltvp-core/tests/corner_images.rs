@@ -54,6 +54,10 @@ fn the_corner_of_a_grey_cube_is_among_those_that_are_found() {
         detector.detect_general(&image, None, &mut scratch, &mut found).unwrap();
         let best = found.iter().map(|corner| errors(corner, right_m)).min_by(|a, b| a.0.total_cmp(&b.0)).unwrap();
         assert!(best.0 < 2.0 * CLOSE_RAD && best.1 < 0.01, "{right_m}: {best:?} of {}", found.len());
+        // Each vertex once: the others are 8 pixels away or more.
+        let near = |a: &CornerFeature, b: &CornerFeature| a.vertex().angle(&b.vertex()) < 60.0 * CLOSE_RAD;
+        let pairs = found.iter().enumerate().flat_map(|(k, a)| found[..k].iter().map(move |b| (a, b)));
+        assert_eq!(pairs.filter(|(a, b)| near(a, b)).count(), 0, "{right_m}: of {}", found.len());
     }
     let wall = vec![150; 320 * 180];
     let image = ImageView::new(&wall, 320, 180, 320).unwrap();

@@ -66,6 +66,13 @@ mod tests {
     }
 
     #[test]
+    fn the_last_reflection_counts_if_it_is_best() {
+        // Of the corners (1, 0), (0, 1) and (0, 0) the second is worst, and reflected lies lowest.
+        assert_eq!(minimise([0.0; 2], 1.0, 0.0, 1, |[x, y]| x + 2.0 * y), [1.0, -1.0]);
+        assert_eq!(minimise([0.0; 2], 1.0, 0.0, 1, |[x, y]| x * x + 2.0 * y * y), [0.0, 0.0]);
+    }
+
+    #[test]
     fn keeps_to_its_evaluations_and_away_from_nan() {
         let mut spent = 0;
         let found = minimise([3.0, 1.0, 2.0], 1.0, 0.0, 60, |x| {

@@ -170,3 +170,26 @@ pub(crate) fn gaussian(off: &Vector3<f64>, covariance: &Matrix3<f64>) -> (f64, f
 pub(crate) fn rotation_vector(rotation: &Matrix3<f64>) -> Vector3<f64> {
     UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(*rotation)).scaled_axis()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_elevation_weighs_by_its_own_variance_and_the_attitudes_about_the_level_axis() {
+        let (elevation_rad, sigma_rad) = (0.2, 0.1);
+        let prior = AttitudePrior::Elevation { elevation_rad, sigma_rad, sense: VerticalSense::Down };
+        // Of these only the variance about x, the axis that a nod turns about, moves the elevation of a camera held level.
+        for about_x in [0.0, 0.03] {
+            let covariance = Matrix3::from_diagonal(&Vector3::new(about_x, 5.0, 7.0));
+            let variance = sigma_rad * sigma_rad + about_x;
+            for nod in [0.0_f64, -0.2, 0.3] {
+                let rotation = *Rotation3::from_axis_angle(&Vector3::x_axis(), nod).matrix();
+                let off = -nod.sin().atan2(nod.cos()) - elevation_rad;
+                let expected = -0.5 * (off * off / variance + variance.ln());
+                let found = prior.ln_likelihood(&rotation, &covariance);
+                assert!((found - expected).abs() < 1e-12, "{about_x} {nod}: {found} {expected}");
+            }
+        }
+    }
+}

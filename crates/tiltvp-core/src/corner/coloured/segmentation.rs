@@ -212,6 +212,16 @@ mod tests {
     use super::*;
 
     #[test]
+    fn faces_are_told_by_three_letters() {
+        let faces = [Primary::Green, Primary::Blue, Primary::Red];
+        assert_eq!(faces.to_value(), Value::Text("gbr".to_owned()));
+        assert_eq!(<[Primary; 3]>::from_value(&faces.to_value()), Some(faces));
+        for word in ["", "gb", "gbrr", "gbx"] {
+            assert_eq!(<[Primary; 3]>::from_value(&Value::Text(word.to_owned())), None, "{word}");
+        }
+    }
+
+    #[test]
     fn pixels_are_labelled_by_share_and_value() {
         let bgr: [[u8; 3]; 8] = [
             [10, 20, 200],
