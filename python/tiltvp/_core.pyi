@@ -1577,9 +1577,10 @@ class LevelMap:
 
     def write_strip(
         self, number: SupportsIndex, columns: NDArray[np.float32], rows: NDArray[np.float32], unseen: float
-    ) -> None:
+    ) -> tuple[int, int]:
         """Writes, for the pixels of the strip of that number, the columns and the rows (h W,) of those of the leaning
-        image that show the same; `unseen` for none.
+        image that show the same; `unseen` for none. The first of the columns that may show something, and the one after
+        the last.
         """
 
 @final

@@ -96,9 +96,10 @@ class Leveller:
         import cv2
 
         array = _closed(_checked(image, self.camera), self.camera)
-        level = np.empty((self.output.height, self.output.width, *array.shape[2:]), array.dtype)
-        for rows, u, v in _strips(self._core, tilt, unseen=_OUTSIDE_PX):
-            cv2.remap(array, u, v, cv2.INTER_LINEAR, dst=level[rows])
+        level = np.zeros((self.output.height, self.output.width, *array.shape[2:]), array.dtype)
+        for rows, seen, u, v in _strips(self._core, tilt, unseen=_OUTSIDE_PX):
+            if seen.start < seen.stop:
+                cv2.remap(array, u[:, seen], v[:, seen], cv2.INTER_LINEAR, dst=level[rows, seen])
         return level
 
     def map(self, tilt: Tilt) -> NDArray[np.float32]:
@@ -223,19 +224,20 @@ def _closed(array: NDArray[Any], camera: _core.Camera) -> NDArray[Any]:
 
 def _strips(
     made: _core.Leveller, tilt: Tilt, *, unseen: float
-) -> Iterator[tuple[slice, NDArray[np.float32], NDArray[np.float32]]]:
-    """Rows of the level image, and the columns and rows (h, W) of its pixels in the leaning one."""
+) -> Iterator[tuple[slice, slice, NDArray[np.float32], NDArray[np.float32]]]:
+    """Rows of the level image, the columns beside which nothing is seen, and where its pixels (h, W) are in the leaning
+    one: columns and rows."""
     level_map, (height, width) = made._map(_normal(tilt)), made.shape
     columns, rows = np.empty((2, level_map.strip_rows, width), np.float32)
     for number, first in enumerate(range(0, height, level_map.strip_rows)):
         count = min(level_map.strip_rows, height - first)
         u, v = columns[:count], rows[:count]
-        level_map.write_strip(number, u.reshape(-1), v.reshape(-1), unseen)
-        yield slice(first, first + count), u, v
+        seen = level_map.write_strip(number, u.reshape(-1), v.reshape(-1), unseen)
+        yield slice(first, first + count), slice(*seen), u, v
 
 
 def _places(made: _core.Leveller, tilt: Tilt) -> NDArray[np.float32]:
-    return np.concatenate([np.stack([u, v], axis=-1) for _, u, v in _strips(made, tilt, unseen=math.nan)])
+    return np.concatenate([np.stack([u, v], axis=-1) for _, _, u, v in _strips(made, tilt, unseen=math.nan)])
 
 
 def level(

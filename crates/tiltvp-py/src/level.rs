@@ -96,7 +96,7 @@ impl LevelMap {
     }
 
     /// Writes, for the pixels of the strip of that number, the columns and the rows (h W,) of those of the leaning image that
-    /// show the same; `unseen` for none.
+    /// show the same; `unseen` for none. The first of the columns that may show something, and the one after the last.
     #[pyo3(signature = (number, columns: "NDArray[np.float32]", rows: "NDArray[np.float32]", unseen))]
     fn write_strip(
         &self,
@@ -105,11 +105,11 @@ impl LevelMap {
         mut columns: PyReadwriteArray1<'_, f32>,
         mut rows: PyReadwriteArray1<'_, f32>,
         unseen: f32,
-    ) -> PyResult<()> {
+    ) -> PyResult<(usize, usize)> {
         let places = [columns.as_slice_mut()?, rows.as_slice_mut()?];
         call(py, || {
-            self.0.write_strip(number, places, unseen);
-            Ok(())
+            let seen = self.0.write_strip(number, places, unseen);
+            Ok((seen.start, seen.end))
         })
     }
 }

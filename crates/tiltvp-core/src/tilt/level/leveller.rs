@@ -1,5 +1,6 @@
 //! `Leveller`: where pixels of level images of one camera are in its own, by tables that are made once.
 
+use std::ops::Range;
 use std::sync::Arc;
 
 use nalgebra::Matrix3;
@@ -122,14 +123,15 @@ impl LevelMap {
     }
 
     /// Writes the strip of that number: for each pixel of its rows, in row order, the column and the row of the pixel of the leaning
-    /// image that shows the same direction, or twice `unseen`. It has [`strip_rows`](Self::strip_rows), or those that are left.
+    /// image that shows the same direction, or twice `unseen`. It has [`strip_rows`](Self::strip_rows), or those that are left. Beside
+    /// the columns that are returned nothing is seen.
     ///
     /// They are from 0 to the last column and row, between which levels are to be interpolated. Right of a panorama's last column is
     /// its first one.
     ///
     /// # Panics
     /// If either of `places` has not as many numbers as the strip has pixels.
-    pub fn write_strip(&self, number: usize, places: [&mut [f32]; 2], unseen: f32) {
+    pub fn write_strip(&self, number: usize, places: [&mut [f32]; 2], unseen: f32) -> Range<usize> {
         let [first, end] = [number, number.saturating_add(1)]
             .map(|number| number.saturating_mul(self.strip_rows()).min(self.height()));
         let pixels = (end - first) * self.width();
@@ -138,5 +140,6 @@ impl LevelMap {
         let mut strip = Strip::new(first..end, places, self.width(), &leveller.camera, unseen);
         let camera = Places::new(&leveller.camera, self.rotation);
         leveller.corners.write(&self.found, &leveller.shown, &camera, &mut strip);
+        strip.seen()
     }
 }

@@ -22,6 +22,8 @@ pub(super) struct Strip<'a> {
     /// Pixels in a row of the level image.
     width: usize,
     image: Inside,
+    /// Columns of the level image that were written with more than that they are not seen.
+    seen: Range<usize>,
 }
 
 impl<'a> Strip<'a> {
@@ -37,7 +39,7 @@ impl<'a> Strip<'a> {
             Model::Equirectangular(_) => Inside { last: [columns, last_row], period: columns, unseen },
             _ => Inside { last: [columns - 1.0, last_row], period: 0.0, unseen },
         };
-        Self { rows, places, width, image }
+        Self { rows, places, width, image, seen: width..0 }
     }
 
     /// Those that are written, of the level image.
@@ -57,6 +59,11 @@ impl<'a> Strip<'a> {
         }
     }
 
+    /// Columns beside which nothing is seen.
+    pub(super) fn seen(&self) -> Range<usize> {
+        self.seen.start.min(self.seen.end)..self.seen.end
+    }
+
     /// Pixels that are not seen.
     pub(super) fn clear(&mut self, first: [usize; 2], size: [usize; 2]) {
         let at = self.at(first);
@@ -69,6 +76,7 @@ impl<'a> Strip<'a> {
 
     /// Pixels whose places are interpolated.
     pub(super) fn cell(&mut self, cell: &Cell) {
+        self.see(cell.first[0], cell.size[0]);
         let at = self.at(cell.first);
         let [columns, rows] = &mut self.places;
         for (axis, out) in [&mut *columns, &mut *rows].into_iter().enumerate() {
@@ -83,10 +91,15 @@ impl<'a> Strip<'a> {
 
     /// A pixel with its place.
     pub(super) fn pixel(&mut self, pixel: [usize; 2], place: Vector2<f64>) {
+        self.see(pixel[0], 1);
         let at = self.at(pixel);
         let [columns, rows] = &mut self.places;
         (columns[at], rows[at]) = (place.x as f32, place.y as f32);
         keep_inside(&self.image, [1, 1], [&mut columns[at..], &mut rows[at..]], self.width);
+    }
+
+    fn see(&mut self, first: usize, columns: usize) {
+        self.seen = self.seen.start.min(first)..self.seen.end.max(first + columns);
     }
 
     fn at(&self, [u, v]: [usize; 2]) -> usize {
