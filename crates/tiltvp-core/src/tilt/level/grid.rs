@@ -4,12 +4,8 @@ use nalgebra::{Matrix3, Vector2, Vector3};
 
 use super::shown::Shown;
 use super::strip::Strip;
-use super::surface::Surface;
+use super::surface::{CELL, Cell, Surface};
 use crate::camera::{Camera, Model};
-
-/// Pixels from one corner of a cell to the next: 1,271 corners are projected for a 640 x 480 image. With 8 pixels they are 4,941; with
-/// 20 so many cells are split that a map takes one and a half times as long.
-pub(super) const CELL: usize = 16;
 
 /// Cells are split until they are so small; then each pixel is projected by itself.
 const SMALLEST: usize = 4;
@@ -38,14 +34,6 @@ const BORDER: f64 = 4.0;
 
 /// Rows of a panorama beside its poles where columns turn too fast for a grid to tell. With half as many a map was 0.054 px off.
 const POLE_PX: f64 = 8.0;
-
-/// A rectangle of pixels of the new image, and where they are in the old one: in its pixels, on one side of its seam.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Cell {
-    pub(super) first: [usize; 2],
-    pub(super) size: [usize; 2],
-    pub(super) places: Surface,
-}
 
 /// Where directions are in the old image.
 #[derive(Debug, Clone, Copy)]

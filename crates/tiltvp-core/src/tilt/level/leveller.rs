@@ -5,9 +5,10 @@ use std::sync::Arc;
 
 use nalgebra::Matrix3;
 
-use super::grid::{CELL, Corners, Found, Places};
+use super::grid::{Corners, Found, Places};
 use super::shown::Shown;
 use super::strip::Strip;
+use super::surface::CELL;
 use crate::camera::Camera;
 use crate::error::Result;
 use crate::geometry::{Tilt, validate_rotation};

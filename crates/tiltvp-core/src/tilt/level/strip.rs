@@ -5,7 +5,7 @@ use std::ops::Range;
 use nalgebra::Vector2;
 use tiltvp_kernels::surface::{COLUMNS, Inside, Surface as Numbers, keep_inside, write};
 
-use super::grid::{CELL, Cell};
+use super::surface::{CELL, Cell};
 use crate::camera::{Camera, Model};
 
 const _: () = assert!(CELL <= COLUMNS);

@@ -2,6 +2,18 @@
 
 use nalgebra::Vector2;
 
+/// Pixels from one corner of a cell to the next: 1,271 corners are projected for a 640 x 480 image. With 8 pixels they are 4,941; with
+/// 20 so many cells are split that a map takes one and a half times as long.
+pub(super) const CELL: usize = 16;
+
+/// A rectangle of pixels of the new image, and where they are in the old one: in its pixels, on one side of its seam.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Cell {
+    pub(super) first: [usize; 2],
+    pub(super) size: [usize; 2],
+    pub(super) places: Surface,
+}
+
 /// Places that are a parabola along each row and each column.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Surface {
