@@ -98,8 +98,7 @@ class Leveller:
         array = _closed(_checked(image, self.camera), self.camera)
         level = np.zeros((self.output.height, self.output.width, *array.shape[2:]), array.dtype)
         for rows, seen, u, v in _strips(self._core, tilt, unseen=_OUTSIDE_PX):
-            if seen.start < seen.stop:
-                cv2.remap(array, u[:, seen], v[:, seen], cv2.INTER_LINEAR, dst=level[rows, seen])
+            cv2.remap(array, u, v, cv2.INTER_LINEAR, dst=level[rows, seen])
         return level
 
     def map(self, tilt: Tilt) -> NDArray[np.float32]:
@@ -225,19 +224,23 @@ def _closed(array: NDArray[Any], camera: _core.Camera) -> NDArray[Any]:
 def _strips(
     made: _core.Leveller, tilt: Tilt, *, unseen: float
 ) -> Iterator[tuple[slice, slice, NDArray[np.float32], NDArray[np.float32]]]:
-    """Rows of the level image, the columns beside which nothing is seen, and where its pixels (h, W) are in the leaning
-    one: columns and rows."""
+    """Rows and columns of the level image beside which nothing is seen, and where their pixels are in the leaning one:
+    columns and rows."""
     level_map, (height, width) = made._map(_normal(tilt)), made.shape
     columns, rows = np.empty((2, level_map.strip_rows, width), np.float32)
     for number, first in enumerate(range(0, height, level_map.strip_rows)):
         count = min(level_map.strip_rows, height - first)
         u, v = columns[:count], rows[:count]
-        seen = level_map.write_strip(number, u.reshape(-1), v.reshape(-1), unseen)
-        yield slice(first, first + count), slice(*seen), u, v
+        seen = slice(*level_map.write_strip(number, u.reshape(-1), v.reshape(-1), unseen))
+        if seen.start < seen.stop:
+            yield slice(first, first + count), seen, u[:, seen], v[:, seen]
 
 
 def _places(made: _core.Leveller, tilt: Tilt) -> NDArray[np.float32]:
-    return np.concatenate([np.stack([u, v], axis=-1) for _, _, u, v in _strips(made, tilt, unseen=math.nan)])
+    places = np.full((*made.shape, 2), np.nan, np.float32)
+    for rows, seen, u, v in _strips(made, tilt, unseen=math.nan):
+        places[rows, seen, 0], places[rows, seen, 1] = u, v
+    return places
 
 
 def level(

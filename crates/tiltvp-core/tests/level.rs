@@ -44,7 +44,7 @@ fn is_inside(camera: &Camera, place: &Vector2<f64>) -> bool {
 fn map(leveller: Leveller, tilt: &Tilt) -> Vec<[f32; 2]> {
     let (width, height) = (leveller.width(), leveller.height());
     let map = Arc::new(leveller).map(tilt);
-    let (mut columns, mut rows) = (vec![0.0; width * height], vec![0.0; width * height]);
+    let (mut columns, mut rows) = (vec![f32::NAN; width * height], vec![f32::NAN; width * height]);
     let length = width * map.strip_rows();
     for (number, (columns, rows)) in columns.chunks_mut(length).zip(rows.chunks_mut(length)).enumerate() {
         map.write_strip(number, [columns, rows], f32::NAN);
@@ -144,7 +144,7 @@ fn wrong_questions_are_refused() {
     let camera = panorama(64);
     let identity = Matrix3::identity();
     assert!(Leveller::new(camera.clone(), &(2.0 * identity), camera.clone(), &identity).is_err());
-    assert!(Leveller::from_rays(camera.clone(), &identity, 3, vec![[0.0; 3]; 4]).is_err());
-    let leveller = Leveller::from_rays(camera, &identity, 2, vec![[0.0, 0.0, 1.0]; 4]).expect("rays");
+    assert!(Leveller::from_rays(camera.clone(), &identity, 3, &[[0.0; 3]; 4]).is_err());
+    let leveller = Leveller::from_rays(camera, &identity, 2, &[[0.0, 0.0, 1.0]; 4]).expect("rays");
     assert_eq!(map(leveller, &Tilt::from_alpha_beta(0.0, 0.0)).len(), 4);
 }

@@ -83,6 +83,37 @@ vectorised! {
     }
 }
 
+vectorised! {
+    /// Leaves of places, column and row, those whose rays are within a field of view: they have at least such a component along an
+    /// axis. The others, and those whose rays are NaN, become twice `unseen`.
+    ///
+    /// # Panics
+    /// If rays or places end within `size`, with `stride` and `step` numbers from one row to the next.
+    pub fn keep_seen(
+        rays: [&[f32]; 3],
+        stride: usize,
+        size: [usize; 2],
+        view: ([f64; 3], f64),
+        places: [&mut [f32]; 2],
+        step: usize,
+        unseen: f32,
+    ) {
+        let ([x, y, z], [columns, rows], (axis, least)) = (rays, places, view);
+        let n = size[0];
+        for row in 0..size[1] {
+            let (from, to) = (row * stride, row * step);
+            let (x, y, z) = (&x[from..from + n], &y[from..from + n], &z[from..from + n]);
+            let (columns, rows) = (&mut columns[to..to + n], &mut rows[to..to + n]);
+            for i in 0..n {
+                let along = axis[0] * f64::from(x[i]) + axis[1] * f64::from(y[i]) + axis[2] * f64::from(z[i]);
+                let is_seen = along >= least;
+                columns[i] = if is_seen { columns[i] } else { unseen };
+                rows[i] = if is_seen { rows[i] } else { unseen };
+            }
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -106,6 +137,22 @@ mod tests {
                 let expected: f64 = terms.iter().zip(products).map(|(term, product)| f64::from(*term) * product).sum();
                 assert!((f64::from(*number) - 400.0 - expected).abs() < 1e-4, "{i} {j}");
             }
+        }
+    }
+
+    #[test]
+    fn places_stay_where_rays_are_within_the_field_of_view() {
+        // Rays turn away from the axis from column to column; of the last one nothing is known.
+        let ray = |at: usize| if at % 20 == 18 { f64::NAN } else { 0.1 * (at % 20) as f64 };
+        let rays =
+            [f64::sin, |_| 0.0, f64::cos].map(|along| (0..40).map(|at| along(ray(at)) as f32).collect::<Vec<_>>());
+        let rays = rays.each_ref().map(|values| &values[..]);
+        let (mut columns, mut rows) = (vec![3.0; 50], vec![5.0; 50]);
+        keep_seen(rays, 20, [19, 2], ([0.0, 0.0, 1.0], 0.55_f64.cos()), [&mut columns, &mut rows], 25, -7.0);
+        for at in 0..50 {
+            let (is_written, is_seen) = (at % 25 < 19, at % 25 <= 5);
+            let expected = if is_written && !is_seen { [-7.0; 2] } else { [3.0, 5.0] };
+            assert_eq!([columns[at], rows[at]], expected, "{at}");
         }
     }
 

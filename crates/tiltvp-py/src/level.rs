@@ -50,8 +50,8 @@ impl Leveller {
             }
             (None, Some(rays)) => {
                 let rays = convert::rows::<3>(rays, "rays")?.0;
-                let rays = rays.iter().map(|ray| ray.map(|x| x as f32)).collect();
-                core::Leveller::from_rays(lens, &mounting, columns, rays).map_err(|error| exception(&error))?
+                let rays: Vec<_> = rays.iter().map(|ray| ray.map(|x| x as f32)).collect();
+                core::Leveller::from_rays(lens, &mounting, columns, &rays).map_err(|error| exception(&error))?
             }
             _ => return Err(invalid("shown, rays: both or none, expected one of them".to_owned())),
         };
@@ -96,7 +96,8 @@ impl LevelMap {
     }
 
     /// Writes, for the pixels of the strip of that number, the columns and the rows (h W,) of those of the leaning image that
-    /// show the same; `unseen` for none. The first of the columns that may show something, and the one after the last.
+    /// show the same; `unseen` for none. Only those from the first column to before the last are written, the two that are
+    /// returned: nothing is seen beside them.
     #[pyo3(signature = (number, columns: "NDArray[np.float32]", rows: "NDArray[np.float32]", unseen))]
     fn write_strip(
         &self,

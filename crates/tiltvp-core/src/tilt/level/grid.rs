@@ -1,9 +1,11 @@
 //! Where the pixels of a new image are in an old one: exactly at the corners of cells, interpolated where that is good enough.
 
+use std::ops::Range;
+
 use nalgebra::{Matrix3, Vector2, Vector3};
 
 use super::shown::Shown;
-use super::strip::Strip;
+use super::strip::{Limit, Strip};
 use super::surface::{CELL, Cell, Surface};
 use crate::camera::{Camera, Model};
 
@@ -43,14 +45,14 @@ pub(super) struct Places<'a> {
     rotation: Matrix3<f64>,
     /// Columns after which the image begins anew, for panoramas.
     period: Option<f64>,
-    /// Of the camera's field of view: rays of the new image that are seen have such a component along an axis.
-    limit: Option<(Vector3<f64>, f64)>,
+    /// Of the camera's field of view, in the frame of the new image.
+    limit: Option<Limit>,
 }
 
 impl<'a> Places<'a> {
     pub(super) fn new(camera: &'a Camera, rotation: Matrix3<f64>) -> Self {
         let is_round = matches!(camera.model(), Model::Equirectangular(_));
-        let limit = camera.limit().map(|(axis, least)| (rotation.transpose() * axis, least));
+        let limit = camera.limit().map(|(axis, least)| Limit { axis: rotation.transpose() * axis, least });
         Self { camera, rotation, period: is_round.then(|| f64::from(camera.width())), limit }
     }
 
@@ -61,7 +63,7 @@ impl<'a> Places<'a> {
 
     /// Whether a ray is within the limit of the field of view.
     fn sees(&self, ray: Option<Vector3<f64>>) -> bool {
-        ray.is_some_and(|ray| self.limit.is_none_or(|(axis, least)| axis.dot(&ray) >= least))
+        ray.is_some_and(|ray| self.limit.is_none_or(|limit| limit.sees(&ray)))
     }
 
     /// From one place to another, the shorter way about a panorama.
@@ -104,71 +106,119 @@ impl<'a> Places<'a> {
 pub(super) struct Corners {
     image: [usize; 2],
     counts: [usize; 2],
-    /// In row order, and whether they are shown.
+    /// In row order, and whether they are shown; none also where no cell nearby is shown.
     rays: Vec<(Option<Vector3<f64>>, bool)>,
 }
 
 impl Corners {
     pub(super) fn new(shown: &Shown) -> Self {
         let (image, counts) = (shown.size, shown.size.map(|side| side.div_ceil(CELL) + 1));
-        let at = |axis: usize, i: usize| (i * CELL).min(image[axis] - 1);
-        let pixels = (0..counts[1]).flat_map(|j| (0..counts[0]).map(move |i| [at(0, i), at(1, j)]));
-        let rays = pixels.map(|pixel| (shown.unlimited_ray(pixel), shown.ray(pixel).is_some())).collect();
-        Self { image, counts, rays }
+        let mut made = Self { image, counts, rays: Vec::new() };
+        let corner = |axis: usize, i: usize| (i * CELL).min(image[axis] - 1);
+        let lattice = || pixels([0; 2], counts);
+        let is_shown: Vec<_> = lattice().map(|[i, j]| shown.ray([corner(0, i), corner(1, j)]).is_some()).collect();
+        let cells = made.seen(&is_shown, |middle| shown.ray(middle).is_some());
+        // Differences of a cell are told by corners up to one beyond its own.
+        let is_needed = |[i, j]: [usize; 2]| {
+            let near = |k: usize, count: usize| k.saturating_sub(2)..(k + 2).min(count - 1);
+            near(j, counts[1]).any(|j| cells[j * (counts[0] - 1)..][near(i, counts[0])].iter().any(|seen| *seen > 0))
+        };
+        let rays = lattice().zip(is_shown).map(|([i, j], is_shown)| {
+            let ray = is_needed([i, j]).then(|| shown.unlimited_ray([corner(0, i), corner(1, j)]));
+            (ray.flatten(), is_shown)
+        });
+        made.rays = rays.collect();
+        made
+    }
+
+    /// How many corners of each cell are seen, of the cells in row order; one, where none is and the middle of the cell is.
+    fn seen(&self, corners: &[bool], middle_is_seen: impl Fn([usize; 2]) -> bool) -> Vec<u8> {
+        let cells = pixels([0; 2], self.counts.map(|count| count - 1));
+        let seen = cells.map(|cell| {
+            let count = self.corners(cell).iter().map(|k| u8::from(corners[*k])).sum();
+            let middle = [0, 1].map(|axis| cell[axis] * CELL + self.side(axis, cell[axis]) / 2);
+            if count == 0 { u8::from(middle_is_seen(middle)) } else { count }
+        });
+        seen.collect()
+    }
+
+    /// Left above, right above, left below, right below.
+    fn corners(&self, [i, j]: [usize; 2]) -> [usize; 4] {
+        let at = j * self.counts[0] + i;
+        [at, at + 1, at + self.counts[0], at + self.counts[0] + 1]
+    }
+
+    /// Pixels of a cell along an axis.
+    fn side(&self, axis: usize, k: usize) -> usize {
+        CELL.min(self.image[axis] - k * CELL)
     }
 
     /// Where the corners are and how places bend between them.
-    pub(super) fn found(&self, places: &Places<'_>) -> Found {
+    pub(super) fn found(&self, shown: &Shown, places: &Places<'_>) -> Found {
         let corners: Vec<_> =
             self.rays.iter().map(|(ray, _)| places.of(*ray).unwrap_or(Vector2::repeat(f64::NAN))).collect();
-        let is_seen = self.rays.iter().map(|(ray, is_shown)| *is_shown && places.sees(*ray)).collect();
+        let is_seen: Vec<_> = self.rays.iter().map(|(ray, is_shown)| *is_shown && places.sees(*ray)).collect();
+        let seen = self.seen(&is_seen, |middle| places.sees(shown.ray(middle)));
         let differences = [0, 1].map(|axis| self.differences(axis, &corners, places));
-        Found { corners, is_seen, differences }
+        Found { corners, seen, differences }
     }
 
-    /// Writes the places of all pixels of a strip.
-    pub(super) fn write(&self, found: &Found, shown: &Shown, places: &Places<'_>, strip: &mut Strip<'_>) {
-        let (Found { corners: found, is_seen, differences: [across, down] }, columns) = (found, self.counts[0]);
-        let rows = strip.rows();
+    /// Writes the places of the pixels of a strip in the columns that are returned: all that is seen is in them.
+    pub(super) fn write(
+        &self,
+        found: &Found,
+        shown: &Shown,
+        places: &Places<'_>,
+        strip: &mut Strip<'_>,
+    ) -> Range<usize> {
+        let (rows, across) = (strip.rows(), self.counts[0] - 1);
         let cells = rows.start / CELL..rows.end.div_ceil(CELL);
-        for (j, i) in cells.flat_map(|j| (0..columns - 1).map(move |i| (j, i))) {
-            let at = j * columns + i;
-            let [a, b, c, d] = [at, at + 1, at + columns, at + columns + 1];
-            let first = [i * CELL, j * CELL];
-            let size: [usize; 2] = std::array::from_fn(|axis| CELL.min(self.image[axis] - first[axis]));
-            let seen = [a, b, c, d].iter().filter(|k| is_seen[**k]).count();
-            if seen == 0 && !places.sees(shown.ray([first[0] + size[0] / 2, first[1] + size[1] / 2])) {
-                strip.clear(first, size);
-                continue;
+        let seen = |j: usize| &found.seen[j * across..][..across];
+        let is_seen = |i: &usize| cells.clone().any(|j| seen(j)[*i] > 0);
+        let Some((first, last)) = (0..across).find(is_seen).zip((0..across).rfind(is_seen)) else { return 0..0 };
+        let columns = first * CELL..last * CELL + self.side(0, last);
+        for j in cells {
+            let (v, height) = (j * CELL, self.side(1, j));
+            let mut written = columns.start;
+            for i in (first..=last).filter(|i| seen(j)[*i] > 0) {
+                let (u, width) = (i * CELL, self.side(0, i));
+                if written < u {
+                    strip.clear([written, v], [u - written, height]);
+                }
+                written = u + width;
+                self.write_cell(found, [i, j], shown, places, strip);
+                if seen(j)[i] < 4 {
+                    strip.keep([u, v], [width, height], places.limit, shown);
+                }
             }
-            let reach = std::array::from_fn(|axis| CELL.min(self.image[axis] - 1 - first[axis]).max(1));
-            let corners = [a, b, c, d].map(|k| found[k]);
-            let error = across.errors[a].max(across.errors[c]) + down.errors[a].max(down.errors[b]);
-            let is_own = across.is_own[a] && across.is_own[c] && down.is_own[a] && down.is_own[b];
-            let whole = corners.iter().all(|corner| corner.x.is_finite() && !places.is_polar(corner));
-            let surface = whole.then(|| {
-                let corners = places.together(corners);
-                Surface::new(
-                    corners,
-                    across.over([[a, b], [c, d]], reach[0]),
-                    down.over([[a, c], [b, d]], reach[1]),
-                    reach,
-                )
-            });
-            let surface = surface.filter(|surface| {
-                (is_own && error <= BEND_MAX_PX) || (error <= FITTING_PX && fits(surface, first, size, shown, places))
-            });
-            if let Some(places) = surface {
-                strip.cell(&Cell { first, size, places });
-            } else {
-                strip.clear(first, size);
-                let corners = corners.map(|corner| corner.x.is_finite().then_some(corner));
-                let error = if error <= TOLD_PX { OF_HALF * error } else { f64::INFINITY };
-                split(&Part { first, size, reach, corners, error }, shown, places, strip);
-            }
-            if seen < 4 {
-                strip.keep(first, size, |pixel| places.sees(shown.ray(pixel)));
-            }
+            strip.clear([written, v], [columns.end - written, height]);
+        }
+        columns
+    }
+
+    /// Writes the places of the pixels of a cell.
+    fn write_cell(&self, found: &Found, cell: [usize; 2], shown: &Shown, places: &Places<'_>, strip: &mut Strip<'_>) {
+        let ([a, b, c, d], [across, down]) = (self.corners(cell), &found.differences);
+        let (first, size) = (cell.map(|k| k * CELL), [0, 1].map(|axis| self.side(axis, cell[axis])));
+        let reach = std::array::from_fn(|axis| CELL.min(self.image[axis] - 1 - first[axis]).max(1));
+        let corners = [a, b, c, d].map(|k| found.corners[k]);
+        let error = across.errors[a].max(across.errors[c]) + down.errors[a].max(down.errors[b]);
+        let is_own = across.is_own[a] && across.is_own[c] && down.is_own[a] && down.is_own[b];
+        let whole = corners.iter().all(|corner| corner.x.is_finite() && !places.is_polar(corner));
+        let surface = whole.then(|| {
+            let corners = places.together(corners);
+            Surface::new(corners, across.over([[a, b], [c, d]], reach[0]), down.over([[a, c], [b, d]], reach[1]), reach)
+        });
+        let surface = surface.filter(|surface| {
+            (is_own && error <= BEND_MAX_PX) || (error <= FITTING_PX && fits(surface, first, size, shown, places))
+        });
+        if let Some(places) = surface {
+            strip.cell(&Cell { first, size, places });
+        } else {
+            strip.clear(first, size);
+            let corners = corners.map(|corner| corner.x.is_finite().then_some(corner));
+            let error = if error <= TOLD_PX { OF_HALF * error } else { f64::INFINITY };
+            split(&Part { first, size, reach, corners, error }, shown, places, strip);
         }
     }
 
@@ -193,16 +243,11 @@ impl Corners {
                 errors[k] = OF_THIRD * places.length(seconds[k + 1] - seconds[k], &found[at(k)]);
             }
             for k in 0..count {
-                let nearest = |is_known: &dyn Fn(usize) -> bool| {
-                    [k, k + 1, k.wrapping_sub(1), k + 2, k.wrapping_sub(2)]
-                        .into_iter()
-                        .find(|k| *k < count && is_known(*k))
-                };
-                if let Some(known) = nearest(&|k| seconds[k].x.is_finite()) {
+                if let Some(known) = nearest(k, &seconds, |second| second.x.is_finite()) {
                     made.seconds[at(k)] = seconds[known];
                 }
                 let both = k + 1 < count && found[at(k)].x.is_finite() && found[at(k + 1)].x.is_finite();
-                if both && let Some(known) = nearest(&|k| errors[k].is_finite()) {
+                if both && let Some(known) = nearest(k, &errors, |error| error.is_finite()) {
                     made.errors[at(k)] = if known == k { errors[k] } else { BORDER * errors[known] };
                     made.is_own[at(k)] = known == k;
                 }
@@ -217,13 +262,18 @@ impl Corners {
     }
 }
 
+/// The place of what is known, at most two beside one place.
+fn nearest<T>(k: usize, values: &[T], is_known: impl Fn(&T) -> bool) -> Option<usize> {
+    [k, k + 1, k.wrapping_sub(1), k + 2, k.wrapping_sub(2)].into_iter().find(|k| values.get(*k).is_some_and(&is_known))
+}
+
 /// What is made once of all corners for a tilt.
 #[derive(Debug, Clone)]
 pub(super) struct Found {
     /// The places of corners, or where they would be without limits of fields of view; NaN where there is none.
     corners: Vec<Vector2<f64>>,
-    /// Whether they are within the fields of view of both images.
-    is_seen: Vec<bool>,
+    /// How many corners of each cell are within the fields of view of both images; see [`Corners::seen`].
+    seen: Vec<u8>,
     differences: [Differences; 2],
 }
 

@@ -59,7 +59,7 @@ impl Leveller {
         camera: Camera,
         robot_from_camera: &Matrix3<f64>,
         width: usize,
-        rays: Vec<[f32; 3]>,
+        rays: &[[f32; 3]],
     ) -> Result<Self> {
         Self::of(camera, robot_from_camera, Shown::of(rays, width)?)
     }
@@ -93,7 +93,7 @@ impl Leveller {
     /// The map of level images by one tilt.
     pub fn map(self: &Arc<Self>, tilt: &Tilt) -> LevelMap {
         let rotation = self.robot_from_camera.transpose() * tilt.leaning_from_upright();
-        let found = self.corners.found(&Places::new(&self.camera, rotation));
+        let found = self.corners.found(&self.shown, &Places::new(&self.camera, rotation));
         LevelMap { leveller: Arc::clone(self), rotation, found }
     }
 }
@@ -123,9 +123,9 @@ impl LevelMap {
         (STRIP / (CELL * self.width())).max(1) * CELL
     }
 
-    /// Writes the strip of that number: for each pixel of its rows, in row order, the column and the row of the pixel of the leaning
-    /// image that shows the same direction, or twice `unseen`. It has [`strip_rows`](Self::strip_rows), or those that are left. Beside
-    /// the columns that are returned nothing is seen.
+    /// Writes the strip of that number: for the pixels of its rows, in row order, the column and the row of the pixel of the leaning
+    /// image that shows the same direction, or twice `unseen`. It has [`strip_rows`](Self::strip_rows), or those that are left. Only
+    /// the columns that are returned are written: nothing is seen beside them.
     ///
     /// They are from 0 to the last column and row, between which levels are to be interpolated. Right of a panorama's last column is
     /// its first one.
@@ -140,7 +140,6 @@ impl LevelMap {
         let leveller = &*self.leveller;
         let mut strip = Strip::new(first..end, places, self.width(), &leveller.camera, unseen);
         let camera = Places::new(&leveller.camera, self.rotation);
-        leveller.corners.write(&self.found, &leveller.shown, &camera, &mut strip);
-        strip.seen()
+        leveller.corners.write(&self.found, &leveller.shown, &camera, &mut strip)
     }
 }

@@ -2,9 +2,10 @@
 
 use std::ops::Range;
 
-use nalgebra::Vector2;
-use tiltvp_kernels::surface::{COLUMNS, Inside, Surface as Numbers, keep_inside, write};
+use nalgebra::{Vector2, Vector3};
+use tiltvp_kernels::surface::{COLUMNS, Inside, Surface as Numbers, keep_inside, keep_seen, write};
 
+use super::shown::Shown;
 use super::surface::{CELL, Cell};
 use crate::camera::{Camera, Model};
 
@@ -12,6 +13,20 @@ const _: () = assert!(CELL <= COLUMNS);
 
 /// From the border of the image: what is rounded where places are written must not reach beyond it unseen.
 const MARGIN_PX: f64 = 0.01;
+
+/// Of a field of view: rays within it have such a component along an axis.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Limit {
+    pub(super) axis: Vector3<f64>,
+    pub(super) least: f64,
+}
+
+impl Limit {
+    /// Whether a ray is within it.
+    pub(super) fn sees(&self, ray: &Vector3<f64>) -> bool {
+        self.axis.dot(ray) >= self.least
+    }
+}
 
 /// Columns and rows in the leaning image of some rows of the level one.
 pub(super) struct Strip<'a> {
@@ -22,8 +37,6 @@ pub(super) struct Strip<'a> {
     /// Pixels in a row of the level image.
     width: usize,
     image: Inside,
-    /// Columns of the level image that were written with more than that they are not seen.
-    seen: Range<usize>,
 }
 
 impl<'a> Strip<'a> {
@@ -39,7 +52,7 @@ impl<'a> Strip<'a> {
             Model::Equirectangular(_) => Inside { last: [columns, last_row], period: columns, unseen },
             _ => Inside { last: [columns - 1.0, last_row], period: 0.0, unseen },
         };
-        Self { rows, places, width, image, seen: width..0 }
+        Self { rows, places, width, image }
     }
 
     /// Those that are written, of the level image.
@@ -47,21 +60,13 @@ impl<'a> Strip<'a> {
         self.rows.clone()
     }
 
-    /// Leaves of some pixels those that are seen.
-    pub(super) fn keep(&mut self, first: [usize; 2], size: [usize; 2], is_seen: impl Fn([usize; 2]) -> bool) {
-        for row in 0..size[1] {
-            let at = self.at([first[0], first[1] + row]);
-            for column in (0..size[0]).filter(|column| !is_seen([first[0] + column, first[1] + row])) {
-                for numbers in &mut self.places {
-                    numbers[at + column] = self.image.unseen;
-                }
-            }
-        }
-    }
-
-    /// Columns beside which nothing is seen.
-    pub(super) fn seen(&self) -> Range<usize> {
-        self.seen.start.min(self.seen.end)..self.seen.end
+    /// Leaves of the pixels of a cell those that are shown and within a limit.
+    pub(super) fn keep(&mut self, first: [usize; 2], size: [usize; 2], limit: Option<Limit>, shown: &Shown) {
+        let (axis, least) = limit.map_or(([0.0; 3], 0.0), |limit| (limit.axis.into(), limit.least));
+        let (at, mut made) = (self.at(first), [[0.0; CELL * CELL]; 3]);
+        let (rays, stride) = shown.rays(first, size, &mut made);
+        let places = self.places.each_mut().map(|numbers| &mut numbers[at..]);
+        keep_seen(rays, stride, size, (axis, least), places, self.width, self.image.unseen);
     }
 
     /// Pixels that are not seen.
@@ -76,7 +81,6 @@ impl<'a> Strip<'a> {
 
     /// Pixels whose places are interpolated.
     pub(super) fn cell(&mut self, cell: &Cell) {
-        self.see(cell.first[0], cell.size[0]);
         let at = self.at(cell.first);
         let [columns, rows] = &mut self.places;
         for (axis, out) in [&mut *columns, &mut *rows].into_iter().enumerate() {
@@ -91,15 +95,10 @@ impl<'a> Strip<'a> {
 
     /// A pixel with its place.
     pub(super) fn pixel(&mut self, pixel: [usize; 2], place: Vector2<f64>) {
-        self.see(pixel[0], 1);
         let at = self.at(pixel);
         let [columns, rows] = &mut self.places;
         (columns[at], rows[at]) = (place.x as f32, place.y as f32);
         keep_inside(&self.image, [1, 1], [&mut columns[at..], &mut rows[at..]], self.width);
-    }
-
-    fn see(&mut self, first: usize, columns: usize) {
-        self.seen = self.seen.start.min(first)..self.seen.end.max(first + columns);
     }
 
     fn at(&self, [u, v]: [usize; 2]) -> usize {
