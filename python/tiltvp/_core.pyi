@@ -1579,8 +1579,8 @@ class LevelMap:
         self, number: SupportsIndex, columns: NDArray[np.float32], rows: NDArray[np.float32], unseen: float
     ) -> tuple[int, int]:
         """Writes, for the pixels of the strip of that number, the columns and the rows (h W,) of those of the leaning
-        image that show the same; `unseen` for none. The first of the columns that may show something, and the one after
-        the last.
+        image that show the same; `unseen` for none. Only those from the first column to before the last are written,
+        the two that are returned: nothing is seen beside them.
         """
 
 @final

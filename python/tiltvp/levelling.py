@@ -227,13 +227,13 @@ def _strips(
     """Rows and columns of the level image beside which nothing is seen, and where their pixels are in the leaning one:
     columns and rows."""
     level_map, (height, width) = made._map(_normal(tilt)), made.shape
-    columns, rows = np.empty((2, level_map.strip_rows, width), np.float32)
+    places = np.empty((2, level_map.strip_rows * width), np.float32)
     for number, first in enumerate(range(0, height, level_map.strip_rows)):
         count = min(level_map.strip_rows, height - first)
-        u, v = columns[:count], rows[:count]
-        seen = slice(*level_map.write_strip(number, u.reshape(-1), v.reshape(-1), unseen))
+        u, v = places[:, : count * width]
+        seen = slice(*level_map.write_strip(number, u, v, unseen))
         if seen.start < seen.stop:
-            yield slice(first, first + count), seen, u[:, seen], v[:, seen]
+            yield slice(first, first + count), seen, u.reshape(count, width)[:, seen], v.reshape(count, width)[:, seen]
 
 
 def _places(made: _core.Leveller, tilt: Tilt) -> NDArray[np.float32]:

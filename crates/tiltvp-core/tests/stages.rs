@@ -7,7 +7,7 @@ mod scene;
 
 use std::sync::Arc;
 
-use nalgebra::{Matrix3, Rotation3, Vector3};
+use nalgebra::{Matrix3, Rotation3, Vector2, Vector3};
 use scene::{Image, constant, fisheye, noise, stripes};
 use tiltvp_core::edges::{EdgeOptions, Mask, NormalKind};
 use tiltvp_core::geometry::Tilt;
@@ -195,4 +195,7 @@ fn wrong_edges_are_refused() {
     assert!(estimator.estimate_edges(&beyond, &mut estimator.scratch()).unwrap_err().to_string().contains("below"));
     let none = make(&[], &[]).unwrap();
     assert!(none.is_empty() && estimator.estimate_edges(&none, &mut estimator.scratch()).unwrap().tilt.is_none());
+    let off = Vector2::new(3.0, -2.0);
+    assert_eq!(none.clone().with_centre_off_px(Some(off)).unwrap().centre_off_px(), Some(off));
+    assert!(none.with_centre_off_px(Some(off * f64::NAN)).unwrap_err().to_string().contains("centre"));
 }

@@ -1,50 +1,56 @@
-//! Numbers over a rectangle of pixels that are parabolas along its columns and rows.
+//! Numbers over a rectangle of pixels that are cubic along its columns and rows.
 
+use fearless_simd::{Simd, SimdBase as _, dispatch, f32x16};
+
+use crate::level::loops;
 use crate::vectorised;
 
-/// Columns of a rectangle at most, which are worked on together.
-pub const COLUMNS: usize = 16;
+/// Columns that are worked on together.
+const TOGETHER: usize = 16;
 
 /// A number at each of a few pixels.
 #[derive(Debug, Clone, Copy)]
 pub struct Surface {
-    /// Column i and row j have the sum of these times 1, i, j, i j, i^2, j^2, i^2 j, i j^2.
-    pub terms: [f32; 8],
+    /// Column i and row j have the sum of these times 1, i, j, i j, i^2, j^2, i^2 j, i j^2, i^3, j^3, i^3 j, i j^3.
+    pub terms: [f32; 12],
     /// What is added to that in the end, so that the terms need not tell large numbers.
     pub origin: f32,
 }
 
-vectorised! {
-    /// Writes down a surface over `size` columns and rows, with `stride` numbers from one row to the next, by sums that lead from row
-    /// to row: after 16 rows of numbers below 100 they are off by 1e-4 at most.
-    ///
-    /// # Panics
-    /// If it is wider than [`COLUMNS`], or `out` ends within it.
-    pub fn write(surface: &Surface, size: [usize; 2], out: &mut [f32], stride: usize) {
-        let [one, i, j, ij, ii, jj, iij, ijj] = surface.terms;
-        let [columns, rows] = size;
-        let (mut row, mut down, mut bend) = ([0.0; COLUMNS], [0.0; COLUMNS], [0.0; COLUMNS]);
-        // Plain loops: closures are compiled without the vector instructions of their caller.
-        for k in 0..COLUMNS {
-            let column = k as f32;
-            let second = jj + ijj * column;
-            row[k] = one + (i + ii * column) * column;
-            down[k] = j + (ij + iij * column) * column + second;
-            bend[k] = 2.0 * second;
-        }
-        for number in 0..rows {
-            let mut numbers = [0.0; COLUMNS];
-            for k in 0..COLUMNS {
-                numbers[k] = row[k] + surface.origin;
-                row[k] += down[k];
-                down[k] += bend[k];
-            }
-            let into = &mut out[number * stride..][..columns];
-            if columns == COLUMNS {
-                into.copy_from_slice(&numbers);
+/// Writes down a surface over `size` columns and rows, with `stride` numbers from one row to the next, by sums that lead from row to row:
+/// after 32 rows of numbers below 100 they are off by 2e-4 at most.
+///
+/// # Panics
+/// If `out` ends within it.
+pub fn write(surface: &Surface, size: [usize; 2], out: &mut [f32], stride: usize) {
+    dispatch!(loops(), simd => write_by(simd, surface, size, out, stride));
+}
+
+#[inline(always)]
+fn write_by<S: Simd>(simd: S, surface: &Surface, size: [usize; 2], out: &mut [f32], stride: usize) {
+    let splat = |number: f32| f32x16::splat(simd, number);
+    let [one, i, j, ij, ii, jj, iij, ijj, iii, jjj, iiij, ijjj] = surface.terms.map(splat);
+    let origin = splat(surface.origin);
+    for first in (0..size[0]).step_by(TOGETHER) {
+        let columns = TOGETHER.min(size[0] - first);
+        let column = f32x16::from_slice(simd, &std::array::from_fn::<f32, TOGETHER, _>(|k| (first + k) as f32));
+        let square = jj + ijj * column;
+        let cube = jjj + ijjj * column;
+        let mut row = one + (i + (ii + iii * column) * column) * column;
+        let mut down = j + (ij + (iij + iiij * column) * column) * column + square + cube;
+        let mut bend = splat(2.0) * square + splat(6.0) * cube;
+        let twist = splat(6.0) * cube;
+        for number in 0..size[1] {
+            let into = &mut out[number * stride + first..][..columns];
+            let numbers = row + origin;
+            if columns == TOGETHER {
+                numbers.store_slice(into);
             } else {
-                into.copy_from_slice(&numbers[..columns]);
+                into.copy_from_slice(&numbers.as_slice()[..columns]);
             }
+            row += down;
+            down += bend;
+            bend += twist;
         }
     }
 }
@@ -71,11 +77,16 @@ vectorised! {
         for number in 0..size[1] {
             let u = &mut columns[number * stride..][..size[0]];
             let v = &mut rows[number * stride..][..size[0]];
+            if image.period > 0.0 {
+                for u in &mut *u {
+                    let left = if *u < 0.0 { *u + image.period } else { *u };
+                    *u = if left > width { left - image.period } else { left };
+                }
+            }
             for (u, v) in u.iter_mut().zip(v) {
-                let left = if *u < 0.0 { *u + image.period } else { *u };
-                let column = if left > width { left - image.period } else { left };
-                let (inner_column, inner_row) = (column.clamp(0.0, width), v.clamp(0.0, height));
-                let seen = (column - inner_column).abs() <= 0.5 && (*v - inner_row).abs() <= 0.5;
+                let (inner_column, inner_row) = (u.clamp(0.0, width), v.clamp(0.0, height));
+                // Both are looked at, so that no pixel takes a branch.
+                let seen = ((*u - inner_column).abs() <= 0.5) & ((*v - inner_row).abs() <= 0.5);
                 *u = if seen { inner_column } else { image.unseen };
                 *v = if seen { inner_row } else { image.unseen };
             }
@@ -93,7 +104,7 @@ vectorised! {
         rays: [&[f32]; 3],
         stride: usize,
         size: [usize; 2],
-        view: ([f64; 3], f64),
+        view: ([f32; 3], f32),
         places: [&mut [f32]; 2],
         step: usize,
         unseen: f32,
@@ -105,7 +116,7 @@ vectorised! {
             let (x, y, z) = (&x[from..from + n], &y[from..from + n], &z[from..from + n]);
             let (columns, rows) = (&mut columns[to..to + n], &mut rows[to..to + n]);
             for i in 0..n {
-                let along = axis[0] * f64::from(x[i]) + axis[1] * f64::from(y[i]) + axis[2] * f64::from(z[i]);
+                let along = axis[0] * x[i] + axis[1] * y[i] + axis[2] * z[i];
                 let is_seen = along >= least;
                 columns[i] = if is_seen { columns[i] } else { unseen };
                 rows[i] = if is_seen { rows[i] } else { unseen };
@@ -120,11 +131,11 @@ mod tests {
 
     #[test]
     fn a_surface_is_its_sum_at_every_pixel_and_nothing_beside_it() {
-        let terms = [3.0, 0.9, -0.2, 0.05, 0.03, -0.02, 0.004, -0.003];
+        let terms = [3.0, 0.9, -0.2, 0.02, 0.01, -0.02, 4e-4, -3e-4, -2e-4, 3e-4, 6e-6, -5e-6];
         let surface = Surface { terms, origin: 400.0 };
-        for size in [[16, 16], [9, 5], [1, 1]] {
-            let stride = 20;
-            let mut out = vec![f32::NAN; stride * 16];
+        for size in [[32, 32], [16, 16], [17, 5], [1, 1]] {
+            let stride = 40;
+            let mut out = vec![f32::NAN; stride * 32];
             write(&surface, size, &mut out, stride);
             for (at, number) in out.iter().enumerate() {
                 let [i, j] = [at % stride, at / stride];
@@ -133,9 +144,10 @@ mod tests {
                     continue;
                 }
                 let (u, v) = (i as f64, j as f64);
-                let products = [1.0, u, v, u * v, u * u, v * v, u * u * v, u * v * v];
+                let cubes = [u * u * u, v * v * v, u * u * u * v, u * v * v * v];
+                let products = [1.0, u, v, u * v, u * u, v * v, u * u * v, u * v * v].into_iter().chain(cubes);
                 let expected: f64 = terms.iter().zip(products).map(|(term, product)| f64::from(*term) * product).sum();
-                assert!((f64::from(*number) - 400.0 - expected).abs() < 1e-4, "{i} {j}");
+                assert!((f64::from(*number) - 400.0 - expected).abs() < 2e-4, "{i} {j}");
             }
         }
     }
@@ -148,7 +160,7 @@ mod tests {
             [f64::sin, |_| 0.0, f64::cos].map(|along| (0..40).map(|at| along(ray(at)) as f32).collect::<Vec<_>>());
         let rays = rays.each_ref().map(|values| &values[..]);
         let (mut columns, mut rows) = (vec![3.0; 50], vec![5.0; 50]);
-        keep_seen(rays, 20, [19, 2], ([0.0, 0.0, 1.0], 0.55_f64.cos()), [&mut columns, &mut rows], 25, -7.0);
+        keep_seen(rays, 20, [19, 2], ([0.0, 0.0, 1.0], 0.55_f32.cos()), [&mut columns, &mut rows], 25, -7.0);
         for at in 0..50 {
             let (is_written, is_seen) = (at % 25 < 19, at % 25 <= 5);
             let expected = if is_written && !is_seen { [-7.0; 2] } else { [3.0, 5.0] };

@@ -189,4 +189,14 @@ mod tests {
         // No shift makes a lean below the offset; it still has one.
         assert!(affine(0.02).shift_of(0.01) > 0.0);
     }
+
+    #[test]
+    fn factors_are_positive_numbers() {
+        for factor in [0.0, -1.0, f64::NAN, f64::INFINITY] {
+            let affine = AffineCorrection { factor, offset_rad: 0.0 };
+            for wrong in [TrainedCorrection::Factor(factor), TrainedCorrection::Affine(affine)] {
+                assert!(wrong.validate().is_err(), "{wrong:?}");
+            }
+        }
+    }
 }

@@ -5,7 +5,8 @@ use std::sync::Arc;
 
 use nalgebra::Matrix3;
 
-use super::grid::{Corners, Found, Places};
+use super::grid::{Corners, Found};
+use super::places::Places;
 use super::shown::Shown;
 use super::strip::Strip;
 use super::surface::CELL;
@@ -66,7 +67,7 @@ impl Leveller {
 
     fn of(camera: Camera, robot_from_camera: &Matrix3<f64>, shown: Shown) -> Result<Self> {
         validate_rotation(robot_from_camera)?;
-        let corners = Corners::new(&shown);
+        let corners = Corners::new(&shown, &camera);
         Ok(Self { camera, robot_from_camera: *robot_from_camera, shown, corners })
     }
 

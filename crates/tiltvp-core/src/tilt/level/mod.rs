@@ -2,6 +2,8 @@
 
 mod grid;
 mod leveller;
+mod parts;
+mod places;
 mod shown;
 mod strip;
 mod surface;

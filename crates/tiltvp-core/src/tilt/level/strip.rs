@@ -2,31 +2,16 @@
 
 use std::ops::Range;
 
-use nalgebra::{Vector2, Vector3};
-use tiltvp_kernels::surface::{COLUMNS, Inside, Surface as Numbers, keep_inside, keep_seen, write};
+use nalgebra::Vector2;
+use tiltvp_kernels::surface::{Inside, Surface as Numbers, keep_inside, keep_seen, write};
 
+use super::places::{Limit, is_panorama};
 use super::shown::Shown;
 use super::surface::{CELL, Cell};
-use crate::camera::{Camera, Model};
-
-const _: () = assert!(CELL <= COLUMNS);
+use crate::camera::Camera;
 
 /// From the border of the image: what is rounded where places are written must not reach beyond it unseen.
 const MARGIN_PX: f64 = 0.01;
-
-/// Of a field of view: rays within it have such a component along an axis.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Limit {
-    pub(super) axis: Vector3<f64>,
-    pub(super) least: f64,
-}
-
-impl Limit {
-    /// Whether a ray is within it.
-    pub(super) fn sees(&self, ray: &Vector3<f64>) -> bool {
-        self.axis.dot(ray) >= self.least
-    }
-}
 
 /// Columns and rows in the leaning image of some rows of the level one.
 pub(super) struct Strip<'a> {
@@ -37,6 +22,8 @@ pub(super) struct Strip<'a> {
     /// Pixels in a row of the level image.
     width: usize,
     image: Inside,
+    /// Rays of a cell.
+    rays: [[f32; CELL * CELL]; 3],
 }
 
 impl<'a> Strip<'a> {
@@ -48,11 +35,12 @@ impl<'a> Strip<'a> {
         unseen: f32,
     ) -> Self {
         let [columns, last_row] = [camera.width() as f32, camera.height() as f32 - 1.0];
-        let image = match camera.model() {
-            Model::Equirectangular(_) => Inside { last: [columns, last_row], period: columns, unseen },
-            _ => Inside { last: [columns - 1.0, last_row], period: 0.0, unseen },
+        let image = if is_panorama(camera) {
+            Inside { last: [columns, last_row], period: columns, unseen }
+        } else {
+            Inside { last: [columns - 1.0, last_row], period: 0.0, unseen }
         };
-        Self { rows, places, width, image }
+        Self { rows, places, width, image, rays: [[0.0; CELL * CELL]; 3] }
     }
 
     /// Those that are written, of the level image.
@@ -62,9 +50,9 @@ impl<'a> Strip<'a> {
 
     /// Leaves of the pixels of a cell those that are shown and within a limit.
     pub(super) fn keep(&mut self, first: [usize; 2], size: [usize; 2], limit: Option<Limit>, shown: &Shown) {
-        let (axis, least) = limit.map_or(([0.0; 3], 0.0), |limit| (limit.axis.into(), limit.least));
-        let (at, mut made) = (self.at(first), [[0.0; CELL * CELL]; 3]);
-        let (rays, stride) = shown.rays(first, size, &mut made);
+        let (axis, least) = limit.map_or(([0.0; 3], 0.0), |limit| (limit.axis.cast().into(), limit.least as f32));
+        let at = self.at(first);
+        let (rays, stride) = shown.rays(first, size, &mut self.rays);
         let places = self.places.each_mut().map(|numbers| &mut numbers[at..]);
         keep_seen(rays, stride, size, (axis, least), places, self.width, self.image.unseen);
     }
