@@ -192,4 +192,17 @@ mod tests {
             }
         }
     }
+
+    #[test]
+    fn an_attitude_weighs_by_the_sum_of_both_covariances() {
+        let camera_from_object = *Rotation3::new(Vector3::new(0.3, -0.2, 0.5)).matrix();
+        let own = Matrix3::from_diagonal(&Vector3::new(0.02, 0.03, 0.05));
+        let covariance = Matrix3::new(0.01, 0.002, 0.0, 0.002, 0.04, -0.001, 0.0, -0.001, 0.09);
+        let prior = AttitudePrior::Attitude { camera_from_object, covariance: own };
+        let off = Vector3::new(0.05, -0.1, 0.02);
+        let found = prior.ln_likelihood(&(Rotation3::new(off).matrix() * camera_from_object), &covariance);
+        let sum = own + covariance;
+        let square = off.dot(&sum.lu().solve(&off).unwrap());
+        assert!((found + 0.5 * (square + sum.determinant().ln())).abs() < 1e-9, "{found}");
+    }
 }

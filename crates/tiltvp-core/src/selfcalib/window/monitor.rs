@@ -62,3 +62,24 @@ impl InnovationMonitor {
         self.alarmed
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// After so many steps of a hundred bearings with innovations as they should be, of which so many are rejected.
+    fn after(steps: usize, rejected: usize) -> InnovationMonitor {
+        let used = 100 - rejected;
+        let outcome = StepOutcome { nis: used as f64, used, rejected, ..StepOutcome::default() };
+        let mut monitor = InnovationMonitor::default();
+        (0..steps).for_each(|_| monitor.record(&outcome, 15.0));
+        monitor
+    }
+
+    #[test]
+    fn rejected_bearings_alarm_beyond_the_share_that_any_tracker_has_once_there_are_enough_steps() {
+        assert!(!after(2 * MONITOR_STEPS, 10).alarmed());
+        assert!(!after(MONITOR_STEPS - 1, 40).alarmed());
+        assert!(after(MONITOR_STEPS, 40).alarmed());
+    }
+}

@@ -67,14 +67,16 @@ pub(super) fn split(part: &Part, shown: &Shown, places: &Places<'_>, strip: &mut
             _ => Vector2::repeat(f64::NAN),
         });
         let part_of = (halves[axis][0] as f64 / part.reach[axis] as f64).powi(2);
-        let end = |line: usize, k: usize| {
-            let corner = |line: usize| if axis == 0 { line + k / 2 } else { k + line / 2 };
-            let own = 0.5
-                * part_of
-                * (part.seconds[axis][corner(line & 2)] + part.seconds[axis][corner(line.div_ceil(2) * 2)]);
-            if own.x.is_finite() { own } else { middle[line] }
-        };
-        [0, 1, 2].map(|line| [end(line, 0), middle[line], end(line, 2)])
+        let [firsts, lasts] = [0, 1].map(|end| {
+            let [one, other] =
+                [0, 1].map(|side| part.seconds[axis][if axis == 0 { 2 * side + end } else { 2 * end + side }]);
+            // Of the line between the sides the mean of theirs.
+            [one * part_of, (one + other) * (0.5 * part_of), other * part_of]
+        });
+        [0, 1, 2].map(|line| {
+            let told = |second: Vector2<f64>| if second.x.is_finite() { second } else { middle[line] };
+            [told(firsts[line]), middle[line], told(lasts[line])]
+        })
     });
     for (j, i) in [(0, 0), (0, 1), (1, 0), (1, 1)] {
         let four = [nine[j][i], nine[j][i + 1], nine[j + 1][i], nine[j + 1][i + 1]];

@@ -5,7 +5,7 @@ use nalgebra::Vector2;
 /// Pixels from one corner of a cell to the next: 336 corners are projected for a 640 x 480 image.
 pub(super) const CELL: usize = 32;
 
-/// The same in panoramas, in which places bend more beside the poles: with as many as in other images a map takes 1.7 times as long.
+/// The same in panoramas, in which places bend more beside the poles: with as many as in other images a map takes 1.6 times as long.
 pub(super) const PANORAMA_CELL: usize = 16;
 
 const _: () = assert!(CELL.is_multiple_of(PANORAMA_CELL), "strips are of whole cells");
