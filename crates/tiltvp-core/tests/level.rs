@@ -5,7 +5,7 @@
 use std::sync::Arc;
 
 use nalgebra::{Matrix3, Rotation3, Vector2};
-use tiltvp_core::camera::{Camera, Equirectangular, Model, Pinhole};
+use tiltvp_core::camera::{Camera, Equidistant, Equirectangular, Model, Pinhole};
 use tiltvp_core::geometry::Tilt;
 use tiltvp_core::testing::zoo;
 use tiltvp_core::tilt::{Leveller, MAP_ERROR_PX};
@@ -123,6 +123,25 @@ fn places_are_in_the_image_and_half_a_pixel_beyond_its_edge_still_counts() {
     let map = map(leveller, &Tilt::from_alpha_beta(0.0, 0.0));
     assert!(map.iter().all(|place| place[0].is_finite()), "corners move by 0.3 pixels");
     assert!(map[0].contains(&0.0) && map[64 * 48 - 1].iter().zip([63.0, 47.0]).any(|(at, last)| *at == last));
+}
+
+#[test]
+fn what_is_seen_between_the_corners_of_cells_is_shown() {
+    // A circle of two or six pixels' radius, that leans take to different places of the level image.
+    let lens = || Equidistant::new(40.0, 31.5, 31.5).expect("a lens");
+    let shown = Camera::new(64, 64, lens().into()).expect("a camera");
+    for (k, radius_rad) in (0..40).flat_map(|k| [(k, 0.05), (k, 0.15)]) {
+        let camera = shown.clone().with_max_theta_rad(radius_rad).expect("a field of view");
+        let (alpha, beta) = (0.012 * f64::from(k), 0.7 * f64::from(k));
+        let tilt = Tilt::from_alpha_beta(alpha, beta);
+        let identity = Matrix3::identity();
+        let leveller = Leveller::new(camera.clone(), &identity, shown.clone(), &identity).expect("rotations");
+        let found = map(leveller, &tilt).iter().filter(|place| place[0].is_finite()).count();
+        let pixels = (0..64 * 64).map(|at| Vector2::new(f64::from(at % 64), f64::from(at / 64)));
+        let rays = pixels.filter_map(|pixel| shown.unproject(&pixel));
+        let seen = rays.filter(|ray| camera.project(&(tilt.leaning_from_upright() * ray)).is_some()).count();
+        assert!(seen > 9 && found == seen, "leaning {alpha}: {found} of {seen}");
+    }
 }
 
 #[test]

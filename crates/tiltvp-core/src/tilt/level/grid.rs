@@ -26,6 +26,9 @@ const OF_MIXED: f64 = 1.0 / 64.0;
 /// within the bound.
 const BORDER: f64 = 4.0;
 
+/// Pixels along each side of a cell that are looked at where none of its corners is seen: not farther apart than 8.
+const LOOKED_AT: usize = 5;
+
 /// Where the corners of cells look, made once for an image: every so many pixels, and the last column and row.
 #[derive(Debug, Clone)]
 pub(super) struct Corners {
@@ -35,21 +38,27 @@ pub(super) struct Corners {
     counts: [usize; 2],
     /// In row order, and whether they are shown; none also where no cell nearby is shown.
     rays: Vec<(Option<Vector3<f64>>, bool)>,
+    /// How many corners of each cell are shown: see [`Self::seen`].
+    shown: Vec<u8>,
 }
 
 impl Corners {
     pub(super) fn new(shown: &Shown, camera: &Camera) -> Self {
         let cell = if is_panorama(camera) { PANORAMA_CELL } else { CELL };
         let (image, counts) = (shown.size, shown.size.map(|side| side.div_ceil(cell) + 1));
-        let mut made = Self { image, cell, counts, rays: Vec::new() };
+        let mut made = Self { image, cell, counts, rays: Vec::new(), shown: Vec::new() };
         let corner = |axis: usize, i: usize| (i * cell).min(image[axis] - 1);
         let lattice = || pixels([0; 2], counts);
         let is_shown: Vec<_> = lattice().map(|[i, j]| shown.ray([corner(0, i), corner(1, j)]).is_some()).collect();
-        let cells = made.seen(&is_shown, |middle| shown.ray(middle).is_some());
+        made.shown = made.seen(&is_shown, |cell| {
+            let (first, size) = made.pixels(cell);
+            pixels(first, size).any(|pixel| shown.ray(pixel).is_some())
+        });
         // Differences of a cell are told by corners up to two beyond its own.
         let is_needed = |[i, j]: [usize; 2]| {
             let near = |k: usize, count: usize| k.saturating_sub(3)..(k + 3).min(count - 1);
-            near(j, counts[1]).any(|j| cells[j * (counts[0] - 1)..][near(i, counts[0])].iter().any(|seen| *seen > 0))
+            near(j, counts[1])
+                .any(|j| made.shown[j * (counts[0] - 1)..][near(i, counts[0])].iter().any(|seen| *seen > 0))
         };
         let rays = lattice().zip(is_shown).map(|([i, j], is_shown)| {
             let ray = is_needed([i, j]).then(|| shown.unlimited_ray([corner(0, i), corner(1, j)]));
@@ -59,15 +68,49 @@ impl Corners {
         made
     }
 
-    /// How many corners of each cell are seen, of the cells in row order; one, where none is and the middle of the cell is.
-    fn seen(&self, corners: &[bool], middle_is_seen: impl Fn([usize; 2]) -> bool) -> Vec<u8> {
+    /// How many corners of each cell are seen, in row order; one, where none is and another of its pixels.
+    fn seen(&self, corners: &[bool], is_seen: impl Fn([usize; 2]) -> bool) -> Vec<u8> {
         let cells = pixels([0; 2], self.counts.map(|count| count - 1));
         let seen = cells.map(|cell| {
             let count = self.corners(cell).iter().map(|k| u8::from(corners[*k])).sum();
-            let middle = [0, 1].map(|axis| cell[axis] * self.cell + self.side(axis, cell[axis]) / 2);
-            if count == 0 { u8::from(middle_is_seen(middle)) } else { count }
+            if count == 0 { u8::from(is_seen(cell)) } else { count }
         });
         seen.collect()
+    }
+
+    /// The same of the cells that are shown, where the camera may see some of their pixels: what is seen of a cell without a corner reaches
+    /// into it from one beside it, or is looked for.
+    fn seen_by(&self, corners: &[bool], shown: &Shown, places: &Places<'_>) -> Vec<u8> {
+        let [columns, rows] = self.counts.map(|count| count - 1);
+        let is_shown = |[i, j]: [usize; 2]| self.shown[j * columns + i] > 0;
+        let mut seen = self.seen(corners, |cell| {
+            let (first, size) = self.pixels(cell);
+            let at = |axis: usize, k: usize| first[axis] + k * (size[axis] - 1) / (LOOKED_AT - 1);
+            is_shown(cell) && pixels([0; 2], [LOOKED_AT; 2]).any(|[i, j]| places.sees(shown.ray([at(0, i), at(1, j)])))
+        });
+        if seen.iter().all(|count| *count == 0) {
+            // Hardly anything is seen, or nothing.
+            seen = self.seen(corners, |cell| {
+                let (first, size) = self.pixels(cell);
+                is_shown(cell) && pixels(first, size).any(|pixel| places.sees(shown.ray(pixel)))
+            });
+        }
+        let beside = |k: usize, count: usize| k.saturating_sub(1)..(k + 2).min(count);
+        let reached: Vec<_> = pixels([0; 2], [columns, rows])
+            .filter(|[i, j]| seen[j * columns + i] == 0 && is_shown([*i, *j]))
+            .filter(|[i, j]| {
+                beside(*j, rows).any(|j| seen[j * columns..][beside(*i, columns)].iter().any(|seen| *seen > 0))
+            })
+            .collect();
+        for [i, j] in reached {
+            seen[j * columns + i] = 1;
+        }
+        seen
+    }
+
+    /// The first pixel of a cell, and how many it has along each axis.
+    fn pixels(&self, cell: [usize; 2]) -> ([usize; 2], [usize; 2]) {
+        (cell.map(|k| k * self.cell), [0, 1].map(|axis| self.side(axis, cell[axis])))
     }
 
     /// Left above, right above, left below, right below.
@@ -86,7 +129,7 @@ impl Corners {
         let corners: Vec<_> =
             self.rays.iter().map(|(ray, _)| places.of(*ray).unwrap_or(Vector2::repeat(f64::NAN))).collect();
         let is_seen: Vec<_> = self.rays.iter().map(|(ray, is_shown)| *is_shown && places.sees(*ray)).collect();
-        let seen = self.seen(&is_seen, |middle| places.sees(shown.ray(middle)));
+        let seen = self.seen_by(&is_seen, shown, places);
         let differences = [0, 1].map(|axis| self.differences(axis, &corners, places));
         let mixed = self.mixed(&differences[0], &corners, places);
         Found { corners, seen, differences, mixed }
@@ -128,7 +171,7 @@ impl Corners {
     /// Writes the places of the pixels of a cell.
     fn write_cell(&self, found: &Found, cell: [usize; 2], shown: &Shown, places: &Places<'_>, strip: &mut Strip<'_>) {
         let (four, [across, down]) = (self.corners(cell), &found.differences);
-        let (first, size) = (cell.map(|k| k * self.cell), [0, 1].map(|axis| self.side(axis, cell[axis])));
+        let (first, size) = self.pixels(cell);
         let reach = std::array::from_fn(|axis| self.cell.min(self.image[axis] - 1 - first[axis]).max(1));
         let ([a, b, c, _], corners) = (four, four.map(|k| found.corners[k]));
         let mixed = four.iter().map(|k| found.mixed[*k]).fold(f64::NAN, f64::max);
@@ -227,7 +270,7 @@ impl Corners {
 pub(super) struct Found {
     /// The places of corners, or where they would be without limits of fields of view; NaN where there is none.
     corners: Vec<Vector2<f64>>,
-    /// How many corners of each cell are within the fields of view of both images; see [`Corners::seen`].
+    /// How many corners of each cell are within the fields of view of both images; see [`Corners::seen_by`].
     seen: Vec<u8>,
     differences: [Differences; 2],
     /// See [`Corners::mixed`].
