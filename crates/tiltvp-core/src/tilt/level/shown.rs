@@ -69,6 +69,7 @@ impl Shown {
         }
     }
 
+    /// Writes where pixels of a row look from one on, by coordinates, NaN where they show nothing.
     fn write_row(&self, [first, v]: [usize; 2], rays: [&mut [f32]; 3]) {
         let [x, y, z] = rays;
         for (k, ((x, y), z)) in x.iter_mut().zip(y).zip(z).enumerate() {
