@@ -11,6 +11,7 @@ pub mod level;
 pub mod marks;
 pub mod normals;
 pub mod prefetch;
+pub mod quadratic;
 pub mod ridge;
 pub mod rows;
 pub mod smoothing;

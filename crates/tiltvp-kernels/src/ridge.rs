@@ -109,10 +109,12 @@ pub fn keep(around: &Around<'_>, places: &[u32], out: KeptRidge<'_>) {
     for (((gx, gy), ((before, middle), after)), place) in pixels {
         let i = *place as usize;
         let (x, y, here) = (around.gx[i], around.gy[i], &around.here[i..i + 3]);
+        // Chosen as whole numbers, for which there is an instruction that guesses nothing.
         let in_row = x.abs() >= y.abs();
+        let chosen =
+            |row: f32, column: f32| f32::from_bits(select_unpredictable(in_row, row.to_bits(), column.to_bits()));
         (*gx, *gy, *middle) = (x, y, here[1]);
-        *before = select_unpredictable(in_row, here[0], around.above[i]);
-        *after = select_unpredictable(in_row, here[2], around.below[i]);
+        (*before, *after) = (chosen(here[0], around.above[i]), chosen(here[2], around.below[i]));
     }
 }
 

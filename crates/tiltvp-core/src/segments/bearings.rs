@@ -1,14 +1,12 @@
 //! Bearings of places between pixel centres, from a quadratic for each small square of the image.
 
 use nalgebra::{Matrix6, SMatrix, Vector2, Vector6};
+use tiltvp_kernels::quadratic::{Grid, Located, PER_PIXEL, Quadratic, SIDE, evaluate};
 
 use super::chains::Window;
 use crate::camera::Camera;
+use crate::edges::RidgePixels;
 use crate::parallel;
-
-/// Pixels along a side of a square. Within it the third derivative of a lens is left out: half a square is a thirtieth of a radian or
-/// less of it, and a sixth of its cube a thousandth of a pixel.
-const SIDE: usize = 8;
 
 /// Places along a side of a square at which the lens is asked.
 const SAMPLES: usize = 5;
@@ -19,16 +17,11 @@ const BLOCK: usize = 128;
 /// Least number of answers of the lens in a square, for six unknowns.
 const ANSWERS_MIN: usize = 8;
 
-/// The six coefficients of 1, x, y, x^2, x y, y^2 for each coordinate, x and y in half squares from the middle; of four coordinates,
-/// of which the last is nothing, so that all are one vector.
-type Quadratic = [[f32; 4]; 6];
-
 /// The bearings of a window in the camera frame; NaN where the lens has no answer.
 #[derive(Debug, Clone)]
 pub(super) struct Bearings {
     squares: Vec<Quadratic>,
-    across: usize,
-    origin: [f32; 2],
+    grid: Grid,
 }
 
 impl Bearings {
@@ -37,35 +30,31 @@ impl Bearings {
         let (across, down) = (width.div_ceil(SIDE), height.div_ceil(SIDE));
         let square = |i: usize| quadratic(camera, (left + i % across * SIDE) as f64, (top + i / across * SIDE) as f64);
         let squares = parallel::table_in_blocks(across * down, BLOCK, square);
-        Self { squares, across, origin: [left as f32, top as f32] }
+        Self { squares, grid: Grid { origin: [left as u32, top as u32], across: across as u32 } }
     }
 
-    /// The unit bearing at a place of the window, but for some millionths, and its change by one pixel along a unit vector of the
-    /// image; of four coordinates each, of which the last says nothing.
-    #[inline(always)]
-    pub(super) fn at(&self, [u, v]: [f32; 2], unit: [f32; 2]) -> [[f32; 4]; 2] {
-        let (u, v) = (u - self.origin[0], v - self.origin[1]);
-        // Places are far below what 32 bits hold, and those are faster to make.
-        let (column, row) = (u as i32 as usize / SIDE, v as i32 as usize / SIDE);
-        let [c0, cx, cy, cxx, cxy, cyy] = &self.squares[row * self.across + column];
-        let (x, y) = (scaled(u - (column * SIDE) as f32), scaled(v - (row * SIDE) as f32));
-        let (mut bearing, mut change) = ([0.0; 4], [0.0; 4]);
-        for k in 0..4 {
-            bearing[k] = c0[k] + x * (cx[k] + x * cxx[k] + y * cxy[k]) + y * (cy[k] + y * cyy[k]);
-            let (du, dv) = (cx[k] + 2.0 * x * cxx[k] + y * cxy[k], cy[k] + 2.0 * y * cyy[k] + x * cxy[k]);
-            change[k] = (du * unit[0] + dv * unit[1]) * PER_PIXEL;
+    /// Writes down where the edge passes each ridge pixel.
+    pub(super) fn locate(&self, ridge: &RidgePixels, out: &mut Located) {
+        let edges = &ridge.edges;
+        out.locate(self.grid, edges.place(), ridge.shift_px(), [edges.gx(), edges.gy()]);
+    }
+
+    /// The unit bearings of some of these, but for some millionths, with the pixels in a radian across the edge as fourth coordinate, and
+    /// their changes by one pixel along the unit vector of each. `out` is scratch.
+    pub(super) fn of<'a>(
+        &self,
+        located: &Located,
+        units: &[[f32; 2]],
+        numbers: &[u32],
+        out: &'a mut Vec<[[f32; 4]; 2]>,
+    ) -> &'a [[[f32; 4]; 2]] {
+        if out.len() < numbers.len() {
+            out.resize(numbers.len(), [[0.0; 4]; 2]);
         }
-        [bearing, change]
+        let out = &mut out[..numbers.len()];
+        evaluate(&self.squares, located, units, numbers, out);
+        out
     }
-}
-
-/// Half squares in a pixel.
-const PER_PIXEL: f32 = 2.0 / SIDE as f32;
-
-/// Half squares from the middle of a square, whose pixels are the next whole numbers, `from_first` pixels from the first.
-#[inline(always)]
-fn scaled(from_first: f32) -> f32 {
-    (from_first - 0.5 * (SIDE - 1) as f32) * PER_PIXEL
 }
 
 /// Least squares of a square whose first pixel is `(u, v)`, over the places where the lens has an answer.

@@ -34,13 +34,17 @@ const TURN_COS: f32 = 0.8;
 /// A map from pixels to ridge pixels, and the chains of the last image.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Chains {
-    /// Number of the ridge pixel, and one more, at each pixel of the window that is one and is not yet in a chain; zero elsewhere,
-    /// and everywhere between images.
-    free: Vec<u32>,
+    /// One more than the step nearest to the edge's direction, with the brighter side to the right, at each pixel of the window that is a
+    /// ridge pixel and not yet in a chain; zero elsewhere, and everywhere between images. A byte, for chains wait for these.
+    free: Vec<u8>,
+    /// One more than the number of the ridge pixel, where there is one; anything elsewhere.
+    numbers: Vec<u32>,
     window: Window,
-    /// Unit gradients of the ridge pixels, each in the place one more than its number; in the first one of none, which goes on from nothing.
+    /// The ridge pixels' places in the window.
+    places: Vec<u32>,
+    /// Their unit gradients, each in the place one more than its number; in the first one of none, which goes on from nothing.
     units: Vec<[f32; 2]>,
-    /// The step nearest to the edge's direction, with the brighter side to the right, in the same places.
+    /// One more than the step nearest to the edge's direction.
     towards: Vec<u8>,
     /// Ridge pixels in the order of the chains.
     members: Vec<u32>,
@@ -70,51 +74,50 @@ impl Window {
             height: bottom - top + 4,
         }
     }
-
-    /// The place of a packed pixel.
-    #[inline(always)]
-    pub(super) fn place(&self, packed: u32) -> usize {
-        let (u, v) = ((packed & 0xffff) as usize, (packed >> 16) as usize);
-        (v - self.top) * self.width + u - self.left
-    }
 }
 
 impl Chains {
     /// Room for the chains of a region.
     pub(super) fn new(window: Window) -> Self {
-        Self { free: vec![0; window.width * window.height], window, ..Self::default() }
+        let pixels = window.width * window.height;
+        Self { free: vec![0; pixels], numbers: vec![0; pixels], window, ..Self::default() }
     }
 
     /// Links ridge pixels, from those with a squared gradient of at least `start` on, in the order of the pixels.
     pub(super) fn link(&mut self, ridge: &RidgePixels, start: f32) {
-        let Self { free, window, units, towards, members, starts } = self;
+        let Self { free, numbers, window, places, units, towards, members, starts } = self;
         let edges = &ridge.edges;
-        let (places, gx, gy) = (edges.place(), edges.gx(), edges.gy());
-        units.resize(places.len() + 1, [0.0; 2]);
-        towards.resize(places.len() + 1, 0);
+        let (gx, gy) = (edges.gx(), edges.gy());
+        let n = gx.len();
+        units.resize(n + 1, [0.0; 2]);
+        towards.resize(n, 0);
+        places.resize(n, 0);
         directions(gx, gy, &mut units[1..]);
-        nearest_steps(&units[1..], &mut towards[1..]);
-        for (number, place) in (1..).zip(places) {
-            free[window.place(*place)] = number;
+        nearest_steps(&units[1..], towards);
+        places_in(window, edges.place(), places);
+        let (free, numbers, units) = (&mut free[..], &mut numbers[..], &units[..]);
+        for ((place, towards), number) in places.iter().zip(&*towards).zip(1..) {
+            free[*place as usize] = *towards;
+            numbers[*place as usize] = number;
         }
         let steps = Step::of(window);
         members.clear();
         starts.clear();
         starts.push(0);
         for (((place, gx), gy), number) in places.iter().zip(gx).zip(gy).zip(1..) {
-            let at = window.place(*place);
-            if free[at] == 0 || gx * gx + gy * gy < start {
+            let place = *place as usize;
+            if free[place] == 0 || gx * gx + gy * gy < start {
                 continue;
             }
-            free[at] = 0;
+            let first = Here { place, towards: std::mem::replace(&mut free[place], 0), number };
             let begin = members.len();
             for way in [Way::Forward, Way::Back] {
-                let mut here = Here { number, place: at };
+                let mut here = first;
                 if way == Way::Back {
                     members[begin..].reverse();
                     members.push(number - 1);
                 }
-                while let Some(following) = next(free, units, towards, &steps, here, way) {
+                while let Some(following) = next(free, numbers, units, &steps, here, way) {
                     here = following;
                     free[here.place] = 0;
                     members.push(here.number - 1);
@@ -123,7 +126,7 @@ impl Chains {
             starts.push(members.len());
         }
         for place in places {
-            free[window.place(*place)] = 0;
+            free[*place as usize] = 0;
         }
     }
 
@@ -163,58 +166,61 @@ enum Way {
     Back,
 }
 
-/// A ridge pixel, by one more than its number.
+/// A ridge pixel: where it is, and one more than the step nearest to its edge's direction and than its number.
 #[derive(Debug, Clone, Copy)]
 struct Here {
-    number: u32,
     place: usize,
+    towards: u8,
+    number: u32,
 }
 
 /// The free ridge pixel that goes on from one along its edge, one way or the other. The gradient turns least there.
 #[inline(always)]
 fn next(
-    free: &[u32],
+    free: &[u8],
+    numbers: &[u32],
     units: &[[f32; 2]],
-    towards: &[u8],
     steps: &[[Step; 3]; 8],
     here: Here,
     way: Way,
 ) -> Option<Here> {
     let [x, y] = units[here.number as usize];
-    let (along, turned) = if way == Way::Forward { ([-y, x], 0) } else { ([y, -x], 4) };
-    let sides = &steps[usize::from(towards[here.number as usize] + turned) % 8];
+    let (along, turned) = if way == Way::Forward { ([-y, x], 7) } else { ([y, -x], 3) };
+    let sides = &steps[usize::from(here.towards + turned) % 8];
     // Along a diagonal a ridge may lack a pixel: of two neighbours one is judged by its row, one by its column, and each is beaten.
     for from in [here.place, here.place.wrapping_add_signed(sides[0].places)] {
-        let there: [Here; 3] = sides.map(|side| {
-            let place = from.wrapping_add_signed(side.places);
-            Here { number: free[place], place }
-        });
-        let weigh = |side: usize| {
-            let [p, q] = units[there[side].number as usize];
+        let places = sides.map(|side| from.wrapping_add_signed(side.places));
+        let towards = places.map(|place| free[place]);
+        let weigh = |side: usize, number: u32| {
+            let [p, q] = units[number as usize];
             let (turn, direction) = (x * p + y * q, sides[side].direction);
             let score = turn * (along[0] * direction[0] + along[1] * direction[1]);
             if turn >= TURN_COS { score } else { 0.0 }
         };
-        let [a, b, c] = there.map(|here| usize::from(here.number != 0));
+        let [a, b, c] = towards.map(|towards| usize::from(towards != 0));
         if a + b + c == 0 {
             continue;
         }
         if a + b + c == 1 {
             // Most often: who follows is known before it is known whether it does.
             let only = b + 2 * c;
-            if weigh(only) > 0.0 {
-                return Some(there[only]);
+            let place = select_unpredictable(a == 1, places[0], select_unpredictable(b == 1, places[1], places[2]));
+            let number = numbers[place];
+            if weigh(only, number) > 0.0 {
+                return Some(Here { place, towards: towards[0] | towards[1] | towards[2], number });
             }
             continue;
         }
         // All three are weighed, also where nobody is, and chosen from without a branch: none could be guessed.
-        let (mut best, mut chosen) = (0.0, Here { number: 0, place: 0 });
-        for (side, here) in there.iter().enumerate() {
-            let score = weigh(side);
+        let (mut best, mut chosen) = (0.0, Here { place: 0, towards: 0, number: 0 });
+        for (side, (place, towards)) in places.into_iter().zip(towards).enumerate() {
+            let number = select_unpredictable(towards != 0, numbers[place], 0);
+            let score = weigh(side, number);
             let better = score > best;
             best = select_unpredictable(better, score, best);
-            chosen.number = select_unpredictable(better, here.number, chosen.number);
-            chosen.place = select_unpredictable(better, here.place, chosen.place);
+            chosen.place = select_unpredictable(better, place, chosen.place);
+            chosen.towards = select_unpredictable(better, towards, chosen.towards);
+            chosen.number = select_unpredictable(better, number, chosen.number);
         }
         if chosen.number != 0 {
             return Some(chosen);
@@ -224,7 +230,17 @@ fn next(
 }
 
 vectorised! {
-    /// The steps nearest to the directions of edges: unit gradients turned by a quarter.
+    /// Where packed pixels are in a window.
+    fn places_in(window: &Window, packed: &[u32], out: &mut [u32]) {
+        let (width, first) = (window.width as u32, (window.top * window.width + window.left) as u32);
+        for (packed, out) in packed.iter().zip(out) {
+            *out = (packed >> 16) * width + (packed & 0xffff) - first;
+        }
+    }
+}
+
+vectorised! {
+    /// One more than the steps nearest to the directions of edges: unit gradients turned by a quarter.
     fn nearest_steps(units: &[[f32; 2]], out: &mut [u8]) {
         for ([gx, gy], out) in units.iter().zip(out) {
             let (x, y) = (-gy, *gx);
@@ -234,7 +250,7 @@ vectorised! {
             let upright = if down == 1 { 2 } else { 6 };
             let diagonal = if down == 1 { 3 - 2 * right } else { 5 + 2 * right };
             let steep = if a <= HALF_STEP * b { upright } else { diagonal };
-            *out = (if b <= HALF_STEP * a { level } else { steep }) as u8;
+            *out = (if b <= HALF_STEP * a { level } else { steep }) as u8 + 1;
         }
     }
 }

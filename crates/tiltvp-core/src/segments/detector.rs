@@ -1,9 +1,9 @@
 //! From an image to its straight edges: the tables of a camera, made once.
 
-use std::hint::select_unpredictable;
 use std::ops::Range;
 
 use nalgebra::{Matrix3, Vector3};
+use tiltvp_kernels::quadratic::Located;
 
 use super::bearings::Bearings;
 use super::chains::{Chains, Window};
@@ -13,7 +13,7 @@ use super::options::{SegmentDetectorOptions, SegmentOptions};
 use super::pieces::split;
 use super::segment::{EdgePoint, Segment, Segments};
 use crate::camera::Camera;
-use crate::edges::{EdgeOptions, Prefilter, Region, RidgeDetector, RidgePixels};
+use crate::edges::{EdgeOptions, EdgePixels, Prefilter, Region, RidgeDetector, RidgePixels};
 use crate::error::{Error, Result};
 use crate::image::ImageView;
 
@@ -32,7 +32,9 @@ pub(crate) struct FinderScratch {
     pub(crate) ridge: RidgePixels,
     chains: Chains,
     stack: Vec<Range<usize>>,
-    /// Bearings of a chain and their changes.
+    /// Where edges pass the ridge pixels.
+    located: Located,
+    /// Bearings of chains and their changes.
     lifted: Vec<[[f32; 4]; 2]>,
     /// Points of pieces, and the pieces as segments with the directions to their brighter sides.
     points: Vec<EdgePoint>,
@@ -68,6 +70,7 @@ impl SegmentFinder {
             ridge: RidgePixels::default(),
             chains: Chains::new(self.window),
             stack: Vec::new(),
+            located: Located::default(),
             lifted: Vec::new(),
             points: Vec::new(),
             pieces: Vec::new(),
@@ -87,7 +90,8 @@ impl SegmentFinder {
         scratch: &mut FinderScratch,
         out: &mut Segments,
     ) {
-        let FinderScratch { detector, ridge, chains, stack, lifted, points, pieces, toward, groups, cut } = scratch;
+        let FinderScratch { detector, ridge, chains, stack, located, lifted, points, pieces, toward, groups, cut } =
+            scratch;
         let SegmentOptions { gradient_start, stray_max_px, rms_max_px, support_min_px, gap_max } = self.options;
         let least = support_min_px as usize;
         detector.detect(image, region, gradient_min, prefilter, ridge);
@@ -95,14 +99,15 @@ impl SegmentFinder {
         points.clear();
         pieces.clear();
         toward.clear();
-        let lifter = Lifter::new(&self.bearings, ridge, chains.units());
+        self.bearings.locate(ridge, located);
         for chain in chains.of_at_least(least) {
             let begin = points.len();
-            lifter.lift(chain, lifted, points);
+            let lifted = self.bearings.of(located, chains.units(), chain, lifted);
+            append(chain, lifted, located, &ridge.edges, points);
             cut.clear();
             split(&points[begin..], stray_max_px as f32, least, stack, |piece| cut.push(piece));
             for piece in cut.iter() {
-                let brighter = lifter.brighter(&chain[piece.clone()]);
+                let brighter = brighter(&lifted[piece.clone()]);
                 let range = begin + piece.start..begin + piece.end;
                 if let Some(segment) = fit(&points[range.clone()], &brighter, range.start) {
                     pieces.push(segment);
@@ -136,65 +141,29 @@ impl SegmentFinder {
     }
 }
 
-/// What the points of ridge pixels are made of, by their numbers.
-struct Lifter<'a> {
-    bearings: &'a Bearings,
-    places: &'a [u32],
-    shifts: &'a [f32],
-    gradients: [&'a [f32]; 2],
-    slots: &'a [u32],
-    units: &'a [[f32; 2]],
+/// Appends the points of a chain, of bearings that were [lifted](Bearings::of).
+fn append(chain: &[u32], lifted: &[[[f32; 4]; 2]], located: &Located, edges: &EdgePixels, points: &mut Vec<EdgePoint>) {
+    let (slots, gx, gy) = (edges.slot(), edges.gx(), edges.gy());
+    points.extend(chain.iter().zip(lifted).map(|(i, [[x, y, z, px_per_rad], _])| {
+        let k = *i as usize;
+        EdgePoint {
+            bearing: [*x, *y, *z],
+            px_per_rad: *px_per_rad,
+            gradient: [gx[k], gy[k]],
+            pixel: located.pixel[k],
+            slot: slots[k],
+        }
+    }));
 }
 
-impl<'a> Lifter<'a> {
-    fn new(bearings: &'a Bearings, ridge: &'a RidgePixels, units: &'a [[f32; 2]]) -> Self {
-        let edges = &ridge.edges;
-        let (places, slots, gradients) = (edges.place(), edges.slot(), [edges.gx(), edges.gy()]);
-        Self { bearings, places, shifts: ridge.shift_px(), gradients, slots, units }
-    }
-
-    /// Where the edge passes a ridge pixel.
-    #[inline(always)]
-    fn pixel(&self, i: u32) -> [f32; 2] {
-        let k = i as usize;
-        let (packed, along) = (self.places[k], self.shifts[k]);
-        let in_row = self.gradients[0][k].abs() >= self.gradients[1][k].abs();
-        let shift = [select_unpredictable(in_row, along, 0.0), select_unpredictable(in_row, 0.0, along)];
-        [(packed & 0xffff) as f32 + shift[0], (packed >> 16) as f32 + shift[1]]
-    }
-
-    /// The bearing of a ridge pixel, and its change by one pixel along the gradient.
-    #[inline(always)]
-    fn bearing(&self, i: u32) -> [[f32; 4]; 2] {
-        self.bearings.at(self.pixel(i), self.units[i as usize])
-    }
-
-    /// Appends the points of a chain. Bearings are written first, as vectors of four, which the compiler takes apart otherwise.
-    fn lift(&self, chain: &[u32], lifted: &mut Vec<[[f32; 4]; 2]>, points: &mut Vec<EdgePoint>) {
-        lifted.clear();
-        lifted.extend(chain.iter().map(|i| self.bearing(*i)));
-        points.extend(chain.iter().zip(lifted).map(|(i, [[x, y, z, _], [p, q, r, _]])| {
-            let k = *i as usize;
-            let length = super::fit::dot([*p, *q, *r], [*p, *q, *r]).sqrt();
-            EdgePoint {
-                bearing: [*x, *y, *z],
-                px_per_rad: 1.0 / length,
-                gradient: self.gradients.map(|values| values[k]),
-                pixel: self.pixel(*i),
-                slot: self.slots[k],
-            }
-        }));
-    }
-
-    /// The direction across a piece of a chain to its brighter side: the sum of three points', for one may be noisy.
-    fn brighter(&self, piece: &[u32]) -> Vector3<f64> {
-        let n = piece.len();
-        let change = |i: usize| {
-            let [x, y, z, _] = self.bearing(piece[i])[1].map(f64::from);
-            Vector3::new(x, y, z)
-        };
-        change(n / 4) + change(n / 2) + change(3 * n / 4)
-    }
+/// The direction across a piece of a chain to its brighter side: the sum of three points', for one may be noisy.
+fn brighter(lifted: &[[[f32; 4]; 2]]) -> Vector3<f64> {
+    let n = lifted.len();
+    let change = |i: usize| {
+        let [x, y, z, _] = lifted[i][1].map(f64::from);
+        Vector3::new(x, y, z)
+    };
+    change(n / 4) + change(n / 2) + change(3 * n / 4)
 }
 
 /// Finds the straight edges of the images of one camera as arcs of great circles, in any central image.

@@ -37,12 +37,40 @@ pub(super) struct ImageCircle {
     radii: [f64; RAYS],
     /// How far a circle that is larger by one, or shifted by one along u or v, reaches farther along each ray.
     rows: [Vector3<f64>; RAYS],
-    /// The pixels of each ray from the outermost inwards, and how far outside of the rim each is; few beside the image's border.
-    rays: Vec<Vec<((u16, u16), f64)>>,
+    rays: Vec<Ray>,
     /// The mean of the radii.
     radius: f64,
     /// The bearing of the axis, and how bearings there change by pixels.
     axis: (Vector3<f64>, Matrix3x2<f64>),
+}
+
+/// Places on one ray from the outermost inwards; few beside the image's border.
+#[derive(Debug, Clone, Default)]
+struct Ray {
+    pixels: Vec<(u16, u16)>,
+    /// How far outside of the calibration's rim each is.
+    outside_px: Vec<f64>,
+}
+
+impl Ray {
+    /// How far outside the first of two lit places in a row is; `None` where that is the outermost.
+    #[inline(always)]
+    fn rim(&self, lit: impl Fn((u16, u16)) -> bool) -> Option<f64> {
+        // Of two in a row one is the second of a pair of places: the others are looked at beside lit ones alone.
+        for (pair, pixels) in self.pixels.chunks_exact(2).enumerate() {
+            let second = 2 * pair + 1;
+            if !lit(pixels[1]) {
+                continue;
+            }
+            if lit(pixels[0]) {
+                return (pair > 0).then(|| self.outside_px[second - 1]);
+            }
+            if self.pixels.get(second + 1).is_some_and(|pixel| lit(*pixel)) {
+                return Some(self.outside_px[second]);
+            }
+        }
+        None
+    }
 }
 
 impl ImageCircle {
@@ -53,7 +81,7 @@ impl ImageCircle {
         let pixel = seen(Vector3::z()).or_else(|| seen(-Vector3::z()))?;
         let axis = camera.unproject_jacobian(&pixel)?;
         let mut radii = [f64::NAN; RAYS];
-        let mut rays = vec![Vec::new(); RAYS];
+        let mut rays = vec![Ray::default(); RAYS];
         let rows = std::array::from_fn(|i| {
             let (sin, cos) = (std::f64::consts::TAU * i as f64 / RAYS as f64).sin_cos();
             Vector3::new(1.0, cos, sin)
@@ -74,7 +102,10 @@ impl ImageCircle {
             let step = (2.0 * REACH * inside / PLACES as f64).max(1.0);
             let distances = (0..PLACES).map(|k| inside * (1.0 + REACH) - step * k as f64);
             let within = distances.filter(|t| *t <= border && *t >= inside * (1.0 - REACH));
-            ray.extend(within.map(|t| ((at(t).x.round() as u16, at(t).y.round() as u16), t - inside)));
+            for t in within {
+                ray.pixels.push((at(t).x.round() as u16, at(t).y.round() as u16));
+                ray.outside_px.push(t - inside);
+            }
         }
         let held = radii.iter().filter(|radius| radius.is_finite());
         let count = held.clone().count();
@@ -87,8 +118,8 @@ impl ImageCircle {
         let level = |(u, v): (u16, u16)| image.row(usize::from(v)).get(usize::from(u)).copied().unwrap_or(u8::MAX);
         let mut outermost = [u8::MAX; RAYS];
         let mut count = 0;
-        for ray in self.rays.iter().filter_map(|ray| ray.first()) {
-            outermost[count] = level(ray.0);
+        for pixel in self.rays.iter().filter_map(|ray| ray.pixels.first()) {
+            outermost[count] = level(*pixel);
             count += 1;
         }
         let outermost = &mut outermost[..count];
@@ -101,16 +132,7 @@ impl ImageCircle {
         let seen = dark + ABOVE;
         let mut rim = [None; RAYS];
         for (rim, ray) in rim.iter_mut().zip(&self.rays) {
-            // The first of two lit places in a row.
-            let mut before = false;
-            for (k, (pixel, _)) in ray.iter().enumerate() {
-                let lit = level(*pixel) > seen;
-                if lit && before {
-                    *rim = (k > 1).then(|| ray[k - 1].1);
-                    break;
-                }
-                before = lit;
-            }
+            *rim = ray.rim(|pixel| level(pixel) > seen);
         }
         self.circle(&rim)
     }

@@ -3,6 +3,7 @@
 use std::f64::consts::FRAC_PI_2;
 
 use nalgebra::{Matrix2, Vector3};
+use tiltvp_kernels::vectorised;
 
 use super::frame::{Edge, Frame};
 
@@ -25,6 +26,9 @@ pub(super) const REFINED: usize = 3;
 /// By how much the sum of log odds of a start may be less than the greatest, as a share of that: of one in a hundred answers it is
 /// less by more.
 const GAP_MAX: f32 = 0.6;
+
+/// Sums that are added up side by side: a vector of 256 bits.
+const LANES: usize = 8;
 
 /// The leans that are tried.
 #[derive(Debug)]
@@ -152,13 +156,28 @@ impl Columns {
 
     /// Sum of the weighted logarithms of the odds of a direction, of those above even.
     pub(super) fn score(&self, normal: &[f32; 3]) -> f32 {
-        let mut lanes = [0.0f32; 8];
-        let Self { x, y, z, half, log_odds, weight } = self;
-        let n = x.len();
-        let (y, z, half, log_odds, weight) = (&y[..n], &z[..n], &half[..n], &log_odds[..n], &weight[..n]);
-        for i in 0..n {
-            let distance = x[i] * normal[0] + y[i] * normal[1] + z[i] * normal[2];
-            lanes[i % 8] += weight[i] * (log_odds[i] - distance * distance * half[i]).max(0.0);
+        sum_of_odds(self, *normal)
+    }
+}
+
+vectorised! {
+    fn sum_of_odds(columns: &Columns, [a, b, c]: [f32; 3]) -> f32 {
+        let Columns { x, y, z, half, log_odds, weight } = columns;
+        let chunks = |values| <[f32]>::as_chunks::<LANES>(values);
+        let [x, y, z, half, log_odds, weight] = [x, y, z, half, log_odds, weight].map(|values| chunks(values));
+        let mut lanes = [0.0f32; LANES];
+        let mut add = |lane: usize, [x, y, z, half, log_odds, weight]: [f32; 6]| {
+            let distance = x * a + y * b + z * c;
+            lanes[lane] += weight * (log_odds - distance * distance * half).max(0.0);
+        };
+        let whole = x.0.iter().zip(y.0).zip(z.0).zip(half.0.iter().zip(log_odds.0).zip(weight.0));
+        for (((x, y), z), ((half, log_odds), weight)) in whole {
+            for k in 0..LANES {
+                add(k, [x[k], y[k], z[k], half[k], log_odds[k], weight[k]]);
+            }
+        }
+        for k in 0..x.1.len() {
+            add(k, [x.1[k], y.1[k], z.1[k], half.1[k], log_odds.1[k], weight.1[k]]);
         }
         lanes.iter().sum()
     }
