@@ -75,3 +75,19 @@ impl BundleProblem {
         Some(off).filter(|off| descent.cost.is_finite() && off.iter().all(|x| x.is_finite()))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::selfcalib::bundle::FreeParameters;
+    use crate::selfcalib::model::BearingLoss;
+    use crate::selfcalib::options::SelfCalibratorOptions;
+
+    #[test]
+    fn a_robot_that_stands_has_no_motions_to_be_doubted() {
+        let options = SelfCalibratorOptions::default();
+        let loss = BearingLoss::Truncated(4.5);
+        let problem = BundleProblem::new(&options, &Vector3::zeros(), FreeParameters::default(), loss);
+        assert_eq!(problem.motion_scatter(), None);
+    }
+}

@@ -75,3 +75,33 @@ pub fn cramer_rao_bound(
     let covariance = CholeskyFactor::regularised(system.equations.information).ok_or_else(singular)?.inverse();
     Ok(covariance.fixed_view::<3, 3>(0, 0).into())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_bound_falls_with_what_is_seen_and_needs_a_pose_and_sights_for_each_step() {
+        let options = SelfCalibratorOptions::default();
+        let mounting = Mounting { x_m: 0.1, y_m: -0.05, yaw_rad: 0.3 };
+        // Around a circle of half a metre.
+        let (steps, step_rad) = (40, 0.2);
+        let (way_m, half) = (0.5 * step_rad, 0.5 * step_rad * options.wheel_base_m);
+        let readings = vec![WheelMotion { left_m: way_m - half, right_m: way_m + half }; steps];
+        let pose = |i: usize| {
+            let heading = step_rad * (i + 1) as f64;
+            Vector3::new(0.5 * heading.sin(), 0.5 * (1.0 - heading.cos()), heading)
+        };
+        let poses: Vec<_> = (0..steps).map(pose).collect();
+        let landmarks = [[3.0, 1.0], [-2.0, 2.5], [0.5, -3.0], [-2.5, -1.5]].map(|[x, y]| Vector2::new(x, y));
+        let bound = |seen: &[usize], poses: &[Vector3<f64>]| {
+            let observations = vec![seen.to_vec(); steps];
+            cramer_rao_bound(&options, &mounting, &readings, poses, &landmarks, &observations)
+        };
+        let (two, four) = (bound(&[0, 1], &poses).unwrap(), bound(&[0, 1, 2, 3], &poses).unwrap());
+        assert!(four.cholesky().is_some() && (two - four).symmetric_eigenvalues().min() > 0.0, "{two} {four}");
+        let said = |bound: Result<Matrix3<f64>>| bound.unwrap_err().to_string();
+        assert!(said(bound(&[0], &poses[1..])).contains("39 poses and 40 lists"));
+        assert!(said(bound(&[4], &poses)).contains("a place among 4"));
+    }
+}

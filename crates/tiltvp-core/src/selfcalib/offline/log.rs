@@ -136,3 +136,20 @@ fn check(
         None => Ok(()),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn as_many_landmarks_as_there_may_be_are_taken_and_not_one_more() {
+        let readings = [WheelMotion { left_m: 0.1, right_m: 0.1 }; 2];
+        let log = |landmarks: usize| {
+            let bearing = |i: usize| LogBearing { step: i % 2, landmark: i as u64 / 2, bearing_rad: 0.1 };
+            let bearings: Vec<_> = (0..2 * landmarks).map(bearing).collect();
+            check(&LogOptions::default(), &readings, None, &bearings)
+        };
+        assert!(log(MOST_LANDMARKS).is_ok());
+        assert!(log(MOST_LANDMARKS + 1).is_err());
+    }
+}

@@ -87,3 +87,24 @@ impl<'a> Places<'a> {
 pub(super) fn is_panorama(camera: &Camera) -> bool {
     matches!(camera.model(), Model::Equirectangular(_))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::camera::{Equidistant, Equirectangular};
+
+    #[test]
+    fn the_way_between_places_is_the_shorter_one_about_a_panorama() {
+        let panorama = Camera::new(360, 180, Equirectangular::new(360, 180).unwrap().into()).unwrap();
+        let fisheye = Camera::new(360, 180, Equidistant::new(60.0, 179.5, 89.5).unwrap().into()).unwrap();
+        for (from, to, about, within) in
+            [(350.0, 10.0, 20.0, -340.0), (10.0, 350.0, -20.0, 340.0), (10.0, 30.0, 20.0, 20.0)]
+        {
+            for (camera, expected) in [(&panorama, about), (&fisheye, within)] {
+                let places = Places::new(camera, Matrix3::identity());
+                let way = places.between(&Vector2::new(from, 40.0), &Vector2::new(to, 45.0));
+                assert_eq!(way, Vector2::new(expected, 5.0));
+            }
+        }
+    }
+}
