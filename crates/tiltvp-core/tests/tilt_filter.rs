@@ -58,6 +58,15 @@ fn a_step_is_followed_while_turning() {
 }
 
 #[test]
+fn what_the_gate_has_rejected_turns_with_the_robot() {
+    let mut filter = settled(TiltFilterOptions::default(), &Vector3::z());
+    assert_eq!(filter.update_normal(&lean(10.0, 0.3), &small()).unwrap().name(), "outside-gate");
+    filter.predict(FRAC_PI_2, 0.0).unwrap();
+    let (pending, _) = filter.state().pending.unwrap();
+    assert!(angle_between(&pending, &lean(10.0, 0.3 - FRAC_PI_2)) < 1e-9, "{pending}");
+}
+
+#[test]
 fn single_bad_images_change_nothing() {
     let truth = lean(1.0, -0.7);
     let mut filter = settled(TiltFilterOptions::default(), &truth);

@@ -173,7 +173,7 @@ mod tests {
 
     use super::*;
     use crate::camera::{Camera, Model, Pinhole};
-    use crate::corner::{DetectorOptions, EstimatorOptions};
+    use crate::corner::{DetectorOptions, EstimatorOptions, IncludedAngle};
 
     #[test]
     fn places_along_an_epipolar_line_are_a_step_apart_and_reach_from_near_to_far() {
@@ -197,5 +197,21 @@ mod tests {
         }
         let (far, near) = (distances.first().unwrap(), distances.last().unwrap());
         assert!((far - 50.0).abs() < 1e-9 && (0.5..0.52).contains(near), "{far} {near}");
+    }
+
+    #[test]
+    fn another_axis_is_upright_only_where_all_angles_are_right_and_there_may_be_several_corners() {
+        let lens = Pinhole::new([700.0; 2], [639.5, 359.5], &[]).unwrap();
+        let camera = Camera::new(1280, 720, Model::Pinhole(lens)).unwrap();
+        let upright = |method: &str, angle: IncludedAngle| {
+            let detector =
+                CornerDetector::new(camera.clone(), DetectorOptions::for_method(method).unwrap(), None).unwrap();
+            let options = EstimatorOptions { down: Some(Vector3::x()), angle, ..EstimatorOptions::default() };
+            CornerPoseEstimator::new(detector, None, options).unwrap().upright(Matrix3::identity())
+        };
+        assert_eq!(upright("general", IncludedAngle::RIGHT).column(1), Vector3::x());
+        for (method, angle) in [("coloured", IncludedAngle::RIGHT), ("general", IncludedAngle::exact(1.2))] {
+            assert_eq!(upright(method, angle), Matrix3::identity(), "{method}");
+        }
     }
 }

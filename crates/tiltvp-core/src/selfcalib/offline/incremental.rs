@@ -232,3 +232,20 @@ impl<'a> IncrementalProblem<'a> {
         (landmark, off(&landmark))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::selfcalib::model::WheelMotion;
+
+    #[test]
+    fn motions_after_the_last_bearings_are_left_out() {
+        let (options, readings) = (LogOptions::default(), [WheelMotion { left_m: 0.1, right_m: 0.1 }; 4]);
+        let bearings = [0, 1].map(|step| LogBearing { step, landmark: 7, bearing_rad: 0.5 });
+        let log = SortedLog::new(&options, &readings, None, &bearings).unwrap();
+        let mut growing = IncrementalProblem::new(&options, &Vector3::zeros(), FreeParameters::default(), usize::MAX);
+        growing.add_log(&log, false);
+        // The start, and one after each of the first two motions.
+        assert_eq!(growing.problem.keyframes.len(), 3);
+    }
+}
