@@ -27,7 +27,7 @@ quick: quick-extension check
 
 # The extension as the profile `quick` builds it, in place of that of `setup`.
 quick-extension:
-    test -x {{bin}}/pytest || just setup
+    test -x {{bin}}/pytest || {{just_executable()}} setup
     cargo build --locked --quiet --profile quick --package tiltvp-py
     cmp --quiet target/quick/lib_core.so python/tiltvp/_core.abi3.so || cp target/quick/lib_core.so python/tiltvp/_core.abi3.so
 
@@ -40,7 +40,7 @@ system-programs:
     set -euo pipefail
     missing=""
     for name in chromium valgrind Xvfb; do command -v $name > /dev/null || missing="$missing ${name,,}"; done
-    [ -z "$missing" ] || just install-packages $missing
+    [ -z "$missing" ] || {{just_executable()}} install-packages $missing
 
 # The only recipe that installs into the system: this, what the tests of the system want, and ViSP for `measure-visp`.
 [private]
@@ -332,7 +332,7 @@ measure-corners-real folder *arguments: setup
 # The tracker's headers include those of OpenCV's modules.
 # Corners of the real box beside ViSP's model-based tracker, which knows the box (Debian's ViSP, installed by apt-get if it is not there).
 measure-visp folder: setup
-    dpkg-query --show libvisp-mbt-dev libopencv-calib3d-dev libopencv-objdetect-dev > /dev/null 2>&1 || just install-packages \
+    dpkg-query --show libvisp-mbt-dev libopencv-calib3d-dev libopencv-objdetect-dev > /dev/null 2>&1 || {{just_executable()}} install-packages \
         g++ libvisp-mbt-dev libvisp-io-dev libopencv-highgui-dev libopencv-calib3d-dev libopencv-video-dev libopencv-objdetect-dev
     mkdir -p out/peers
     g++ -O2 -std=c++17 -I/usr/include/opencv4 benches/peers/visp_tracker.cpp -o out/peers/visp_tracker -lvisp_mbt -lvisp_io -lvisp_core

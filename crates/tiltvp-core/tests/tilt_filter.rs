@@ -61,9 +61,11 @@ fn a_step_is_followed_while_turning() {
 fn what_the_gate_has_rejected_turns_with_the_robot() {
     let mut filter = settled(TiltFilterOptions::default(), &Vector3::z());
     assert_eq!(filter.update_normal(&lean(10.0, 0.3), &small()).unwrap().name(), "outside-gate");
-    filter.predict(FRAC_PI_2, 0.0).unwrap();
-    let (pending, _) = filter.state().pending.unwrap();
-    assert!(angle_between(&pending, &lean(10.0, 0.3 - FRAC_PI_2)) < 1e-9, "{pending}");
+    let (_, before) = filter.state().pending.unwrap();
+    filter.predict(1.0, 0.0).unwrap();
+    let (pending, after) = filter.state().pending.unwrap();
+    assert!(angle_between(&pending, &lean(10.0, 0.3 - 1.0)) < 1e-9, "{pending}");
+    assert!((1.0..1.5).contains(&(after.trace() / before.trace())), "{before} {after}");
 }
 
 #[test]
