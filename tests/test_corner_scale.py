@@ -132,6 +132,36 @@ def test_a_grey_box_needs_no_names() -> None:
     assert all(one.vertex_m is None for one in unknown.hypotheses)
 
 
+def test_a_pose_does_not_tell_which_of_its_edges_is_upright() -> None:
+    """Not in any frame, unless it was told in one; and it is told for as long as the box is followed."""
+    rotation, vertex = pose()
+    image, down = seen(rotation, vertex, GREYS), rotation[:, 1]
+    for scale in ({"camera_height_m": float(down @ vertex)}, {"edge_length_m": SIZE_M}):
+        estimator = CornerPoseEstimator(CAMERA, method="general", right_handed=True, **scale)
+        for _ in range(3):
+            untold = estimator(image)
+            assert untold.pose is not None
+            assert untold.place_reason == "nothing tells which edge is the upright one"
+        again = pickle.loads(pickle.dumps(estimator))
+        for one in (estimator, again):
+            assert one(image, gravity=(down, 0.01)).place_reason == ""
+            assert one(image).place_reason == ""
+        assert pickle.loads(pickle.dumps(again))(image).place_reason == ""
+
+
+def test_a_corner_above_the_camera_has_no_height_below_it_in_any_frame() -> None:
+    rotation, vertex = pose()
+    down = rotation[:, 1]
+    known = {"camera_height_m": float(down @ vertex)}
+    for method, faces in (("general", GREYS), ("coloured", COLOURS)):
+        image = seen(rotation, vertex, faces)
+        estimator = CornerPoseEstimator(CAMERA, method=method, right_handed=True, down=-down, **known)
+        assert [estimator(image).place_reason for _ in range(3)] == ["the corner is not below the camera"] * 3
+        estimator = CornerPoseEstimator(CAMERA, method=method, right_handed=True, **known)
+        assert estimator(image, gravity=(-down, 0.01)).place_reason == "the corner is not below the camera"
+        assert estimator(image, gravity=(down, 0.01)).place_reason == ""
+
+
 def covered(image: np.ndarray, middle: np.ndarray, half_px: int, slope: float) -> np.ndarray:
     """The image with a grey board before a place."""
     board = np.array([[-1, -1], [1, -1 + slope], [1 - slope, 1], [-1 - slope, 1 - slope]]) * half_px + middle

@@ -12,7 +12,8 @@ use crate::convert;
 use crate::field::{Field, Value};
 
 /// Keys of the dict of what is kept.
-const KEYS: [&str; 8] = ["pose", "corners_left", "corners_right", "age", "object", "others", "pace", "turned"];
+const KEYS: [&str; 9] =
+    ["pose", "corners_left", "corners_right", "age", "object", "others", "pace", "turned", "y_is_down"];
 
 /// Plain numbers and lists.
 pub(super) fn to_dict<'py>(py: Python<'py>, track: &Track) -> PyResult<Bound<'py, PyDict>> {
@@ -28,6 +29,7 @@ pub(super) fn to_dict<'py>(py: Python<'py>, track: &Track) -> PyResult<Bound<'py
     dict.set_item("object", track.object)?;
     dict.set_item("pace", track.pace)?;
     track.turned.write(&dict, "turned")?;
+    dict.set_item("y_is_down", track.y_is_down)?;
     Ok(dict)
 }
 
@@ -47,6 +49,7 @@ pub(super) fn from_dict(values: &Bound<'_, PyDict>) -> PyResult<Track> {
         others: others.into_iter().map(known).collect(),
         pace: convert::item(values, "pace", "a share of the distance")?,
         turned: <Option<Matrix3<f64>> as Field>::take(values, "turned")?,
+        y_is_down: convert::item(values, "y_is_down", "whether the upright axis points down, or None")?,
     })
 }
 

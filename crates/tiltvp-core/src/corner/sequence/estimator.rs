@@ -194,7 +194,7 @@ impl CornerPoseEstimator {
             estimate.ends = self.ends_of(frames, &estimate, &own);
         }
         self.follow(&mut estimate, &seen);
-        self.place_by_scale(left, vertical.as_ref(), &mut estimate);
+        self.place_by_scale(left, &mut estimate);
         estimate.corners = self.believed(frames, &estimate, seen);
         self.name(&mut estimate.corners);
         Ok(estimate)
@@ -224,7 +224,10 @@ impl CornerPoseEstimator {
         };
         let corners = [parallel(0, pose.camera_from_object), parallel(1, turned * pose.camera_from_object)];
         let others: Vec<Hypothesis> = seen.iter().map(|pair| pair.poses[0]).collect();
-        self.track = Some(Track::next(self.track.take(), &pose, corners, estimate.object, &others));
+        let down = self.told_down();
+        let next = Track::next(self.track.take(), &pose, corners, estimate.object, &others);
+        let y_is_down = down.map(|down| down.dot(&pose.camera_from_object.column(1)) > 0.0);
+        self.track = Some(Track { y_is_down, ..next });
     }
 
     /// Gives the corners of a frame their names. The coloured cuboid is known by its colours.

@@ -15,20 +15,17 @@ impl CornerPoseEstimator {
     /// Gives the poses from one image the place that the known height above the vertex tells, each its own, and says why the first
     /// has none: where the vertex is not below the camera as far as that is known, where nothing told which edge is the vertical
     /// one, where the height tells too little, and beyond the limits of the distance.
-    pub(super) fn place_by_height(
-        &self,
-        vertical: Option<&Vector3<f64>>,
-        estimate: &mut CornerEstimate,
-    ) -> PlaceVerdict {
+    pub(super) fn place_by_height(&self, estimate: &mut CornerEstimate) -> PlaceVerdict {
         let (Some(height_m), Some(corner)) =
             (self.options.camera_height_m, estimate.chosen_left.first().and_then(|i| estimate.features[0].get(*i)))
         else {
             return PlaceVerdict::NoScale;
         };
-        if !self.is_one_object() && vertical.is_none() {
+        let down = self.told_down();
+        if !self.is_one_object() && down.is_none() {
             return PlaceVerdict::NotUpright;
         }
-        if !estimate.followed && self.options.down.is_some_and(|down| down.dot(&corner.vertex()) <= 0.0) {
+        if down.is_some_and(|down| down.dot(&corner.vertex()) <= 0.0) {
             return PlaceVerdict::NotBelow;
         }
         let mut verdicts = Vec::with_capacity(estimate.hypotheses.len());

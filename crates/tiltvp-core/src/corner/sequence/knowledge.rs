@@ -57,6 +57,16 @@ impl CornerPoseEstimator {
         self.known.gravity.map(|gravity| gravity.down).or(last).or(self.options.down)
     }
 
+    /// Which way is down in the left camera's frame, where it was told: in this frame, in one before, or before all. A pose alone
+    /// does not tell which of its edges is upright.
+    pub(super) fn told_down(&self) -> Option<Vector3<f64>> {
+        let last = self.track.as_ref().map(|track| {
+            let axis = track.pose.camera_from_object.column(1).into_owned();
+            track.y_is_down.map(|is_down| if is_down { axis } else { -axis })
+        });
+        self.known.gravity.map(|gravity| gravity.down).or_else(|| last.unwrap_or(self.options.down))
+    }
+
     /// Whether gravity, where this frame has it, bears a pose out. A corner without colours has an upright edge; the coloured
     /// cuboid may be held aslant.
     pub(super) fn is_upright(&self, pose: &Hypothesis) -> bool {

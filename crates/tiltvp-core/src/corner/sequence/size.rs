@@ -23,30 +23,20 @@ struct Candidate {
 
 impl CornerPoseEstimator {
     /// Gives the poses from one image the place that a known height or known lengths tell, and says why the first has none.
-    pub(super) fn place_by_scale(
-        &mut self,
-        frame: &Frame<'_>,
-        vertical: Option<&Vector3<f64>>,
-        estimate: &mut CornerEstimate,
-    ) {
+    pub(super) fn place_by_scale(&mut self, frame: &Frame<'_>, estimate: &mut CornerEstimate) {
         if self.right.is_some() || estimate.hypotheses.is_empty() {
             return;
         }
         estimate.place = match self.options.scales().first() {
             None => PlaceVerdict::NoScale,
-            Some(&"camera_height_m") => self.place_by_height(vertical, estimate),
-            Some(_) => self.place_by_size(frame, vertical, estimate),
+            Some(&"camera_height_m") => self.place_by_height(estimate),
+            Some(_) => self.place_by_size(frame, estimate),
         };
     }
 
     /// The same by lengths.
-    fn place_by_size(
-        &mut self,
-        frame: &Frame<'_>,
-        vertical: Option<&Vector3<f64>>,
-        estimate: &mut CornerEstimate,
-    ) -> PlaceVerdict {
-        let named = self.is_one_object() || vertical.is_some();
+    fn place_by_size(&mut self, frame: &Frame<'_>, estimate: &mut CornerEstimate) -> PlaceVerdict {
+        let named = self.is_one_object() || self.told_down().is_some();
         if !named && self.options.edge_length_m.is_some() {
             return PlaceVerdict::NotUpright;
         }

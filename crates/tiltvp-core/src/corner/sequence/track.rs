@@ -70,6 +70,8 @@ pub struct Track {
     /// Covariance of how the camera has turned since the last pose, its frame now, square radians: the pose is turned by it. None
     /// where that is not known of every frame since.
     pub turned: Option<Matrix3<f64>>,
+    /// Whether the upright axis of the pose points down, where it was ever told which way is down.
+    pub y_is_down: Option<bool>,
 }
 
 impl Track {
@@ -145,7 +147,7 @@ impl Track {
             others.sort_by_key(|other| std::cmp::Reverse(other.seen));
             others.truncate(OTHERS_MAX);
         }
-        Self { pose: *pose, corners, age: 0, object, others, pace, turned: Some(Matrix3::zeros()) }
+        Self { pose: *pose, corners, age: 0, object, others, pace, turned: Some(Matrix3::zeros()), y_is_down: None }
     }
 
     /// The other corners as seen from the one that a pose is of, which may be one of them.
