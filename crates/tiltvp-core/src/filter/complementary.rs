@@ -97,7 +97,11 @@ impl ComplementaryFilter {
         let share = -(-self.unseen_s / self.options.time_constant_s).exp_m1();
         self.attitude *= UnitQuaternion::from_scaled_axis(difference * share);
         self.attitude.renormalize();
-        self.bias_rad_s -= difference * (share / self.options.bias_time_constant_s);
+        if self.unseen_s > 0.0 {
+            // What one constant bias since the last reference explains of the difference is no more than all of it.
+            let learned = -(-self.unseen_s / self.options.bias_time_constant_s).exp_m1();
+            self.bias_rad_s -= difference * (share * learned / self.unseen_s);
+        }
         self.unseen_s = 0.0;
         Ok(difference)
     }
@@ -130,6 +134,24 @@ mod tests {
         let off = (truth.inverse() * Rotation3::from_matrix_unchecked(filter.attitude())).angle();
         assert!(off < 1e-3, "{off}");
         assert!((filter.bias_rad_s() - bias).norm() < 1e-4, "{}", filter.bias_rad_s());
+    }
+
+    /// Bias and attitude are found whatever the time from one reference to the next, and no single gap spoils the bias.
+    #[test]
+    fn rare_references_correct_as_well() {
+        let (bias, options) = (Vector3::new(0.01, 0.0, 0.0), ComplementaryOptions::default());
+        for gap_s in [0.5, 2.0, 5.0, 10.0, 30.0, 100.0] {
+            let mut filter = ComplementaryFilter::new(options, &Matrix3::identity()).unwrap();
+            for _ in 0..200 {
+                filter.predict(&bias, gap_s).unwrap();
+                filter.correct(&Matrix3::identity()).unwrap();
+                assert!(filter.bias_rad_s().x < 0.02, "{} at {gap_s}", filter.bias_rad_s());
+            }
+            assert!((filter.bias_rad_s() - bias).norm() < 1e-4, "{} at {gap_s}", filter.bias_rad_s());
+            // Twice without time between tells nothing new of the bias.
+            filter.correct(&Matrix3::identity()).unwrap();
+            assert!((filter.bias_rad_s() - bias).norm() < 1e-4);
+        }
     }
 
     #[test]
