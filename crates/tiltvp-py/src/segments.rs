@@ -163,10 +163,12 @@ impl Segments {
     /// (K, 2) float64: the places (u, v) of the edge in the pixels of segment `index`.
     ///
     /// Raises `IndexError` for a segment that is not there.
-    fn pixels<'py>(&self, py: Python<'py>, index: usize) -> PyResult<Array<'py, f64>> {
-        let Some(support) = self.support.get(index) else {
+    fn pixels<'py>(&self, py: Python<'py>, index: isize) -> PyResult<Array<'py, f64>> {
+        let Some((index, support)) = usize::try_from(index).ok().and_then(|i| Some((i, self.support.get(i)?))) else {
             let n = self.support.len();
-            return Err(pyo3::exceptions::PyIndexError::new_err(format!("index = {index}, expected less than {n}")));
+            return Err(pyo3::exceptions::PyIndexError::new_err(format!(
+                "index = {index}, expected at least 0 and less than {n}"
+            )));
         };
         let start: usize = self.support[..index].iter().map(|k| *k as usize).sum();
         self.points_px[start..start + *support as usize].to_vec().attribute(py)

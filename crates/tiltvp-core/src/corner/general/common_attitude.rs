@@ -140,7 +140,7 @@ const TURN_RAD: f64 = std::f64::consts::FRAC_PI_2 / 20.0;
 /// Attitudes with the vertical of `upright` and every heading, up to quarter turns.
 pub(crate) fn headings(upright: &Matrix3<f64>) -> impl Iterator<Item = Matrix3<f64>> {
     let turn = |k: u8| Rotation3::from_axis_angle(&Vector3::y_axis(), f64::from(k) * TURN_RAD);
-    (1..20).map(move |k| upright * turn(k).matrix())
+    (0..20).map(move |k| upright * turn(k).matrix())
 }
 
 #[cfg(test)]
@@ -222,6 +222,6 @@ mod tests {
         let turned: Vec<Matrix3<f64>> = headings(&attitude).collect();
         assert!(turned.iter().all(|turned| (turned.column(1) - attitude.column(1)).norm() < 1e-12));
         // Every heading is within the reach of one of them.
-        assert!(TURN_RAD / 2.0 <= 1.2 * REACH_SINE && (turned.len() + 1) as f64 * TURN_RAD > 1.57);
+        assert!(TURN_RAD / 2.0 <= 1.2 * REACH_SINE && turned.len() as f64 * TURN_RAD > 1.57);
     }
 }

@@ -12,6 +12,7 @@ use crate::corner::general::common_attitude::{
     CommonAttitude, StraightEdge, common_attitude, headings, share_along_axes,
 };
 use crate::error::Result;
+use crate::geometry::tangent_basis;
 
 /// The share of all edges along the axes of one attitude that is enough to trust it: random edges pass within 2 degrees
 /// of one of three axes in a tenth of all cases.
@@ -53,16 +54,27 @@ impl CornerPoseEstimator {
     pub(crate) fn common(&self, starts: &[Matrix3<f64>]) -> Option<CommonAttitude> {
         self.right.as_ref()?;
         let lines = self.lines();
-        let of_corners = common_attitude(&lines, starts.first()?);
+        let of_corners = starts.first().and_then(|start| common_attitude(&lines, start));
         let most = MOST * lines.len() as f64;
         if of_corners.as_ref().is_some_and(|common| common.support >= most) {
             return of_corners;
         }
-        // Corners may be false, or turned against most of the room.
-        let others = starts.iter().skip(1).copied().chain(headings(&starts[0]));
+        // Corners may be false, or turned against most of the room, or none may have been found.
+        let upright = starts.first().copied().or_else(|| self.about_vertical())?;
+        let others = starts.iter().skip(1).copied().chain(headings(&upright));
         let found = others.filter_map(|start| common_attitude(&lines, &start));
         let best = found.max_by(|a, b| a.support.total_cmp(&b.support));
         best.filter(|common| common.support >= most).or(of_corners)
+    }
+
+    /// An attitude whose second axis is along the vertical, where that is known and all angles are right.
+    fn about_vertical(&self) -> Option<Matrix3<f64>> {
+        if self.is_one_object() || self.options.angle != IncludedAngle::RIGHT {
+            return None;
+        }
+        let vertical = self.vertical()?.normalize();
+        let aside = tangent_basis(&vertical).column(0).into_owned();
+        Some(Matrix3::from_columns(&[aside, vertical, aside.cross(&vertical)]))
     }
 
     /// Whether no more of the straight edges runs along the axes of a pose than of random ones: then nothing but three short edges of
