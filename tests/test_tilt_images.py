@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import pickle
 from typing import Any
 
@@ -90,3 +91,14 @@ def test_arguments_are_not_altered_and_results_are_fresh(camera: tiltvp.Camera, 
         array[...] = 0
     estimator.options["mask"][:] = False
     assert estimator.with_edges(image) == (estimate, edges)
+
+
+def test_a_lean_beyond_the_largest_one_is_not_sure(camera: tiltvp.Camera, render: Any) -> None:
+    """Edges beyond `tilt_max_rad` are rejected, and those that are left agree on a smaller lean."""
+    for degrees in (12.0, 13.0, 14.0):
+        room = render(kind="living-room", seed=1, alpha_rad=math.radians(degrees), beta_rad=0.8)
+        cut, wide = (tiltvp.TiltEstimator(camera, tilt_max_rad=limit)(room.gray) for limit in (None, 0.35))
+        assert cut.alpha_rad < math.radians(degrees)
+        assert cut.confidence <= 0.5
+        assert "near tilt_max_rad (0.209, 12 degrees)" in cut.reason
+        assert "tilt_max_rad" not in wide.reason

@@ -17,6 +17,11 @@ pub enum Doubt {
     },
     /// The view does not look as it does where up is as told.
     NotUp,
+    /// The lean is near the largest one, beyond which edges are rejected: it may be larger.
+    NearLimit {
+        /// The largest lean that is looked for, in radians.
+        limit_rad: f64,
+    },
     /// There are few edges.
     FewEdges {
         /// Edge pixels.
@@ -51,6 +56,12 @@ impl fmt::Display for Doubt {
             Self::NotUp => {
                 write!(f, "what is light, and where edges stand, is unlike views with up as told: check the mounting")
             }
+            Self::NearLimit { limit_rad } => write!(
+                f,
+                "the lean is near tilt_max_rad ({:.3}, {:.0} degrees) and may be larger than it seems: raise tilt_max_rad",
+                limit_rad,
+                limit_rad.to_degrees()
+            ),
             Self::FewEdges { pixels } => {
                 write!(f, "{pixels} edge pixels are few: little contrast, dark, over-exposed or blurred")
             }

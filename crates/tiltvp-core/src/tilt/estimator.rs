@@ -235,6 +235,7 @@ impl TiltEstimator {
             prefiltered_pixels,
             pixels_per_rad: self.pixels.region.pixels_per_rad(),
             tilt_max_rad: self.options.tilt_max_rad.unwrap_or(TILT_MAX_RAD),
+            cut_rad: method.cut_rad(),
             lights,
             aspect: method.trust().map_or([0.0; ASPECT], |_| method.aspect(&self.pixels, work)),
             trust: method.trust(),

@@ -26,6 +26,8 @@ pub(super) struct Seen<'a> {
     pub pixels_per_rad: f64,
     /// The largest lean that is looked for.
     pub tilt_max_rad: f64,
+    /// How far below it leans begin that may be larger ones.
+    pub cut_rad: f64,
     /// How light the view is at each height.
     pub lights: &'a [f64; LIGHTS],
     /// Where what the method looks at stands.
@@ -137,7 +139,13 @@ const UNLIKE: f64 = 3.0;
 
 impl Doubt {
     /// What most likely is wrong with an image, if its estimate is not sure.
-    pub(super) fn of(estimate: &TiltEstimate, pixels_per_rad: f64, off_rad: f64, looks_up: bool) -> Option<Self> {
+    pub(super) fn of(
+        estimate: &TiltEstimate,
+        pixels_per_rad: f64,
+        off_rad: f64,
+        looks_up: bool,
+        limit_rad: Option<f64>,
+    ) -> Option<Self> {
         if estimate.confidence >= SURE {
             return None;
         }
@@ -151,6 +159,8 @@ impl Doubt {
             Self::Coarse { per_deg }
         } else if !looks_up {
             Self::NotUp
+        } else if let Some(limit_rad) = limit_rad {
+            Self::NearLimit { limit_rad }
         } else if (estimate.edge_pixels as f64) < EDGES * pixels_per_rad {
             Self::FewEdges { pixels: estimate.edge_pixels }
         } else if estimate.tilt.is_some() && share < AGREEING {
@@ -196,7 +206,7 @@ mod tests {
 
     #[test]
     fn the_first_cause_that_holds_is_named() {
-        let of = |estimate: &TiltEstimate| Doubt::of(estimate, 150.0, 0.0, true);
+        let of = |estimate: &TiltEstimate| Doubt::of(estimate, 150.0, 0.0, true, None);
         let even = unsure([0.02, 0.01]);
         assert!(matches!(of(&even), Some(Doubt::Scattered { sigma_rad }) if (sigma_rad - 5e-4f64.sqrt()).abs() < 1e-9));
         assert!(of(&TiltEstimate { confidence: 0.9, ..even }).is_none());
@@ -208,9 +218,11 @@ mod tests {
         assert!(matches!(of(&few_agree), Some(Doubt::FewAgree { share }) if (share - 0.05).abs() < 1e-9));
         let few_edges = TiltEstimate { edge_pixels: 2900, ..few_agree };
         assert!(matches!(of(&few_edges), Some(Doubt::FewEdges { pixels: 2900 })));
-        assert!(matches!(Doubt::of(&few_edges, 150.0, 0.0, false), Some(Doubt::NotUp)));
-        let coarse = Doubt::of(&few_edges, 50.0, 0.0, false);
+        assert!(matches!(Doubt::of(&few_edges, 150.0, 0.0, false, Some(0.2)), Some(Doubt::NotUp)));
+        let coarse = Doubt::of(&few_edges, 50.0, 0.0, false, None);
         assert!(matches!(coarse, Some(Doubt::Coarse { per_deg }) if (per_deg - 0.8727).abs() < 1e-3));
-        assert!(matches!(Doubt::of(&few_edges, 50.0, 0.01, false), Some(Doubt::Decentred { off_rad: 0.01 })));
+        let limited = Doubt::of(&few_edges, 150.0, 0.0, true, Some(0.2));
+        assert!(matches!(limited, Some(Doubt::NearLimit { limit_rad: 0.2 })));
+        assert!(matches!(Doubt::of(&few_edges, 50.0, 0.01, false, None), Some(Doubt::Decentred { off_rad: 0.01 })));
     }
 }

@@ -77,6 +77,12 @@ pub(in crate::tilt) trait Fitter: Debug + Send + Sync {
         None
     }
 
+    /// How far in radians the edges of vertical things stray, if the prefilter cuts those off that stray beyond the largest lean: what is
+    /// left of a lean that near to it, or beyond, agrees on a smaller one.
+    fn cut_rad(&self) -> f64 {
+        0.0
+    }
+
     /// Where what the last fit looked at stands.
     fn aspect(&self, _pixels: &PixelTables, _work: &Work) -> [f64; ASPECT] {
         [0.0; ASPECT]

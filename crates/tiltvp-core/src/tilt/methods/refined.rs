@@ -80,6 +80,10 @@ impl Fitter for Refined {
         Some(&TRUST)
     }
 
+    fn cut_rad(&self) -> f64 {
+        self.options.scale_rad
+    }
+
     /// How high what agrees and what is near stand, in units of 45 degrees.
     fn aspect(&self, pixels: &PixelTables, work: &Work) -> [f64; ASPECT] {
         let Inliers::Within { model, threshold } = work.inliers else { return [0.0; ASPECT] };
