@@ -17,8 +17,10 @@ import tiltvp
 from tiltvp.cli.app import main
 from tiltvp.errors import InvalidInputError
 from tiltvp.overlays.segments import draw_segments, segment_pixels
-from tiltvp.synth import RoomImage, mirror_camera
+from tiltvp.rotations import rotation_from
+from tiltvp.synth import Room, RoomImage, mirror_camera
 
+FORWARD = rotation_from("forward", "the mounting")
 CAMERAS = {
     "fisheye": tiltvp.Camera.equidistant(
         width=320, height=320, focal_px=94.0, cx=159.5, cy=159.5, max_theta_rad=math.radians(97)
@@ -146,8 +148,9 @@ def test_what_belongs_together(name: str) -> None:
     assert np.arcsin(turn) == pytest.approx(found.length_rad, abs=1e-9)
     assert len(found.points_px) == found.support.sum()
     assert np.concatenate([found.pixels(i) for i in range(len(found))]) == pytest.approx(found.points_px)
-    with pytest.raises(IndexError, match=f"index = {len(found)}, expected less than {len(found)}"):
-        found.pixels(len(found))
+    for index in (-1, len(found)):
+        with pytest.raises(IndexError, match=f"index = {index}, expected at least 0 and less than {len(found)}"):
+            found.pixels(index)
     for i in range(len(found)):
         along = np.cross(found.normal[i], found.middle[i])
         offset, slope = found.variances_rad2[i]
@@ -348,3 +351,31 @@ def test_blank_images_have_no_lean(camera: tiltvp.Camera) -> None:
     assert np.isnan(estimate.normal).all()
     assert "too few" in estimate.reason
     assert len(edges) == 0
+
+
+def test_the_first_alternative_is_the_tilt(camera: tiltvp.Camera, room: RoomImage) -> None:
+    for mounting in (np.eye(3), FORWARD):
+        estimate = tiltvp.TiltEstimator(camera, method="segments", robot_from_camera=mounting)(room.gray)
+        assert len(estimate.alternatives) > 0
+        assert not estimate or estimate.alternatives[0].normal == pytest.approx(estimate.normal, abs=1e-7)
+
+
+def test_either_side_of_an_axis_may_be_up_only_where_any_lean_may_be(camera: tiltvp.Camera, room: RoomImage) -> None:
+    """Edges are the same upside down, and what is light and which way they face tells little: nothing is sure."""
+    for limit, both in ((math.pi, True), (2.0, True), (math.pi / 2, False)):
+        options = {"method": "segments", "robot_from_camera": FORWARD, "tilt_max_rad": limit}
+        for image in (room.gray, np.ascontiguousarray(room.gray[::-1, ::-1])):
+            ups, _ = tiltvp.TiltEstimator(camera, **options)._hypotheses(image)
+            assert bool((ups[:, 2] < -0.01).any()) == both
+            assert (ups[:, 2] >= math.cos(limit) - 1e-12).all()
+            if limit == math.pi:
+                assert all((ups @ up < -0.999_999).any() for up in ups)
+
+
+def test_a_panorama_upside_down_is_right_or_not_sure() -> None:
+    camera = tiltvp.Camera.equirectangular(width=512, height=256)
+    estimator = tiltvp.TiltEstimator(camera, method="segments", robot_from_camera=FORWARD, tilt_max_rad=math.pi)
+    for seed in range(7, 11):
+        image = Room("office", seed).render_panorama(pose=(2.0, 2.0, 0.4), height=256, samples=2).gray
+        over = estimator(np.ascontiguousarray(image[::-1, ::-1]))
+        assert over.confidence < 0.9 or over.normal[2] < 0.0

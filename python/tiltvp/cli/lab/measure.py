@@ -91,7 +91,8 @@ def views(
     """The vertical of views that look anywhere, pinhole and fisheye, by the method of straight edges.
 
     Roll and pitch are within 45 degrees; which direction is up is chosen by a network that has not seen the building.
-    A second table is of views that lean by at most what the method is told.
+    A second table is of views that lean by at most what the method is told, a third of the views of the first, as held
+    and turned upside down, where any lean is allowed.
 
     Parameters
     ----------
@@ -101,13 +102,14 @@ def views(
         Largest lean of the views of the second table.
     """
     from tiltvp.lab.datasets.panoramas import read_panorama_index
-    from tiltvp.lab.evaluation.ahead import ahead_table, look_ahead, prior_table, train_choice
+    from tiltvp.lab.evaluation.ahead import ahead_table, any_lean_table, look_ahead, prior_table, train_choice
 
     check_ending(out)
     chosen = read_panorama_index(directory)[::every]
-    with progress_bar(2 * len(chosen), "panoramas") as bar:
+    with progress_bar(3 * len(chosen), "panoramas") as bar:
         seen = look_ahead(chosen, advance=bar.advance)
         told = prior_table(chosen, prior_deg, advance=bar.advance)
+        anyhow = any_lean_table(chosen, advance=bar.advance)
     table = ahead_table(seen)
     if out is not None:
         write_frame(table, out)
@@ -115,6 +117,7 @@ def views(
         "Area under the recall curve of roll and pitch, per cent, to 1, 5 and 10 degrees", table, ["camera", "choice"]
     )
     show_frame(f"Views that lean by at most {prior_deg:g} degrees, per cent and degrees", told, ["camera"])
+    show_frame("Views of which any lean is allowed, per cent and degrees", anyhow, ["camera", "held"])
     if weights:
         say(train_choice(seen).rust())
 

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 import polars as pl
 
-from tiltvp.lab.datasets.ahead import AHEAD_CAMERAS, ahead_views, roll_pitch
+from tiltvp.lab.datasets.ahead import AHEAD_CAMERAS, AheadView, ahead_views, roll_pitch
 from tiltvp.lab.evaluation.choices import Network, choice_shares, train_network
 from tiltvp.rotations import read_rotation
 from tiltvp.tilt import TiltEstimator
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
     from tiltvp.lab.datasets.panoramas import Panorama
 
-__all__ = ["REACH_RAD", "LearnedView", "ahead_table", "look_ahead", "prior_table", "train_choice"]
+__all__ = ["REACH_RAD", "LearnedView", "ahead_table", "any_lean_table", "look_ahead", "prior_table", "train_choice"]
 
 REACH_RAD: Final = float(np.deg2rad(60.0))
 """Roll and pitch of 45 degrees each lean by 60 together."""
@@ -65,10 +65,7 @@ def look_ahead(
 ) -> list[LearnedView]:
     """What "segments" finds in views of panoramas, in the camera frame. `advance` is called per panorama."""
     forward = np.array(read_rotation("forward"))
-    estimators = {
-        name: TiltEstimator(camera, method="segments", robot_from_camera=forward, tilt_max_rad=REACH_RAD)
-        for name, camera in AHEAD_CAMERAS.items()
-    }
+    estimators = _estimators(REACH_RAD)
     seen = []
     for number, panorama in enumerate(panoramas):
         for seed in seeds:
@@ -96,40 +93,72 @@ def prior_table(
     In per cent of all views: right (off by at most two degrees), answered, sure (a confidence of at least 0.9), sure
     and wrong; the median error of the answers.
     """
-    forward = np.array(read_rotation("forward"))
-    limit = float(np.deg2rad(prior_deg))
-    estimators = {
-        name: TiltEstimator(camera, method="segments", robot_from_camera=forward, tilt_max_rad=limit)
-        for name, camera in AHEAD_CAMERAS.items()
-    }
+    # Roll and pitch of the corner of a square lean by the square's half diagonal.
+    lean_max_deg = prior_deg / float(np.sqrt(2.0))
+    estimators = _estimators(float(np.deg2rad(prior_deg)))
     rows = []
     for number, panorama in enumerate(panoramas):
-        # Roll and pitch of the corner of a square lean by the square's half diagonal.
-        own = ahead_views(
-            panorama, number, lean_max_deg=prior_deg / np.sqrt(2.0), samples=samples, noise_sigma=noise_sigma
-        )
-        for view in own:
-            estimate = estimators[view.camera](view.image)
-            error = None
-            if estimate:
-                cosine = np.clip(np.asarray(estimate.normal) @ forward @ view.up, -1.0, 1.0)
-                error = float(np.rad2deg(np.arccos(cosine)))
-            rows.append({"camera": view.camera.split()[0], "error": error, "sure": estimate.confidence >= 0.9})
+        own = ahead_views(panorama, number, lean_max_deg=lean_max_deg, samples=samples, noise_sigma=noise_sigma)
+        rows += [_told(estimators[view.camera], view) for view in own]
         advance()
-    wrong = pl.col("error").is_not_null() & (pl.col("error") > 2.0)
-    shares = {
-        "right": pl.col("error").fill_null(180.0) <= 2.0,
-        "answered": pl.col("error").is_not_null(),
-        "sure": pl.col("sure"),
-        "sure_wrong": pl.col("sure") & wrong,
+    return _shares(rows)
+
+
+def any_lean_table(
+    panoramas: Sequence[Panorama],
+    *,
+    samples: int = 2,
+    noise_sigma: float = 2.0,
+    advance: Callable[[], None] = lambda: None,
+) -> pl.DataFrame:
+    """As `prior_table`, of views rolled and pitched by up to 45 degrees, as held and turned upside down, where any lean
+    is allowed. `opposite` are answers that take down for up.
+    """
+    estimators = _estimators(np.pi)
+    rows = []
+    for number, panorama in enumerate(panoramas):
+        for view in ahead_views(panorama, number, samples=samples, noise_sigma=noise_sigma):
+            # All lenses are about the middle of the image.
+            over = AheadView(view.camera, np.ascontiguousarray(view.image[::-1, ::-1]), view.up * [-1.0, -1.0, 1.0])
+            for held, one in (("as held", view), ("upside down", over)):
+                rows.append(_told(estimators[view.camera], one) | {"held": held})
+        advance()
+    return _shares(rows, "held", opposite=pl.col("error").fill_null(0.0) > 170.0)
+
+
+def _estimators(tilt_max_rad: float) -> dict[str, TiltEstimator]:
+    forward = np.array(read_rotation("forward"))
+    return {
+        name: TiltEstimator(camera, method="segments", robot_from_camera=forward, tilt_max_rad=tilt_max_rad)
+        for name, camera in AHEAD_CAMERAS.items()
     }
+
+
+def _told(estimator: TiltEstimator, view: AheadView) -> dict[str, Any]:
+    """What an estimator makes of a view."""
+    estimate, error = estimator(view.image), None
+    if estimate:
+        cosine = np.clip(np.asarray(estimate.normal) @ estimator.robot_from_camera @ view.up, -1.0, 1.0)
+        error = float(np.rad2deg(np.arccos(cosine)))
+    return {"camera": view.camera.split()[0], "error": error, "sure": estimate.confidence >= 0.9}
+
+
+def _shares(rows: Sequence[dict[str, Any]], *by: str, **more: pl.Expr) -> pl.DataFrame:
+    """Shares of views in per cent, by the kind of camera and other columns."""
+    error = pl.col("error")
+    shares = {
+        "right": error.fill_null(180.0) <= 2.0,
+        "answered": error.is_not_null(),
+        "sure": pl.col("sure"),
+        "sure_wrong": pl.col("sure") & (error.fill_null(0.0) > 2.0),
+    } | more
     return (
-        pl.DataFrame(rows, schema={"camera": pl.String, "error": pl.Float64, "sure": pl.Boolean})
-        .group_by("camera", maintain_order=True)
+        pl.DataFrame(rows, schema_overrides={"error": pl.Float64})
+        .group_by("camera", *by, maintain_order=True)
         .agg(
             pl.len().alias("views"),
             *((100.0 * share.mean()).alias(name) for name, share in shares.items()),
-            pl.col("error").median().alias("median"),
+            error.median().alias("median"),
         )
     )
 

@@ -78,10 +78,21 @@ impl Search {
                 hypotheses.push(hypothesis);
             }
         }
-        let best = hypotheses.iter().map(|h| log_odds(&h.features)).fold(f64::NEG_INFINITY, f64::max);
-        let total: f64 = hypotheses.iter().map(|h| (log_odds(&h.features) - best).exp()).sum::<f64>() + NONE_ODDS;
+        if prior.reach_rad > FRAC_PI_2 {
+            // The edges of an image are the same upside down: either side of an axis may be up.
+            for i in 0..hypotheses.len() {
+                let mut opposite = Hypothesis { up: -hypotheses[i].up, ..hypotheses[i].clone() };
+                if opposite.up.z >= cone {
+                    opposite.features = features(edges, &opposite, prior, lightness);
+                    hypotheses.push(opposite);
+                }
+            }
+        }
+        let odds = |hypothesis: &Hypothesis| log_odds(&hypothesis.features, prior);
+        let best = hypotheses.iter().map(odds).fold(f64::NEG_INFINITY, f64::max);
+        let total: f64 = hypotheses.iter().map(|h| (odds(h) - best).exp()).sum::<f64>() + NONE_ODDS;
         for hypothesis in hypotheses.iter_mut() {
-            hypothesis.probability = (log_odds(&hypothesis.features) - best).exp() / total;
+            hypothesis.probability = (odds(hypothesis) - best).exp() / total;
         }
         hypotheses.sort_unstable_by(|a, b| b.probability.total_cmp(&a.probability));
     }

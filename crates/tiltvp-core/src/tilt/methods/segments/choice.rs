@@ -1,5 +1,7 @@
 //! Which of several directions is up: what tells it, and how much each of it says.
 
+use std::f64::consts::FRAC_PI_2;
+
 use nalgebra::Vector3;
 
 use super::any_lightness::Lightness;
@@ -10,19 +12,29 @@ use super::hypothesis::{FEATURES, Hypothesis, OF_EDGES, Prior};
 /// Features that say what was expected before the image was seen: they count in proportion, so that no lean is ruled out.
 const EXPECTED: std::ops::Range<usize> = 1..4;
 
+/// How probable any lean is, as a share of none at all, where leans above a right angle are allowed: a camera that is held anyhow. Of 54
+/// views turned upside down by fisheyes and 108 by pinholes 3.7 and 4.6 % are sure (0.9) of the opposite with 0.01, 1.9 and 1.9 % with 0.03,
+/// none with this; of upright ones 7 and 10 % fewer are answered than with 0.01.
+const ANYHOW: f64 = 0.1;
+
 /// Standard deviations beyond which a feature tells no more, in training too.
 const FARTHEST: f64 = 4.0;
 
 /// The logarithm of the odds of a hypothesis, up to a constant: a line and a layer of hidden units, whose weights `tiltvp measure
 /// views` trains on views of panoramas; it tells how well they do on buildings that they have not seen.
-pub(super) fn log_odds(features: &[f64; FEATURES]) -> f64 {
+pub(super) fn log_odds(features: &[f64; FEATURES], prior: &Prior) -> f64 {
     let scaled: [f64; FEATURES] = std::array::from_fn(|i| {
         let own = (features[i] - MEANS[i]) / SCALES[i];
         if EXPECTED.contains(&i) { own } else { own.clamp(-FARTHEST, FARTHEST) }
     });
     let sum = |weights: &[f64; FEATURES]| weights.iter().zip(&scaled).map(|(weight, own)| weight * own).sum::<f64>();
     let hidden = HIDDEN.iter().zip(BIASES).zip(OUT).map(|((weights, bias), out)| out * (sum(weights) + bias).tanh());
-    sum(&LINEAR) + hidden.sum::<f64>()
+    let log_odds = sum(&LINEAR) + hidden.sum::<f64>();
+    if prior.reach_rad <= FRAC_PI_2 {
+        return log_odds;
+    }
+    let expected: f64 = EXPECTED.map(|i| LINEAR[i] * features[i] / SCALES[i]).sum();
+    log_odds + (ANYHOW * (-expected).exp()).ln_1p()
 }
 
 /// The unit of leans in radians.

@@ -175,6 +175,7 @@ impl ImageFitter for SegmentFit {
             prefiltered_pixels: considered,
             pixels_per_rad: region.pixels_per_rad(),
             tilt_max_rad: self.tilt_max_rad,
+            cut_rad: 0.0,
             trust,
             centre_off,
         };
@@ -232,12 +233,15 @@ impl SegmentFit {
             Some((frame.log_likelihood + self.near.log_prior(&frame.axes[2])?, frame))
         }));
         refined.sort_unstable_by(|a, b| b.0.total_cmp(&a.0));
-        let alternatives = alternatives(refined);
+        let mut alternatives = alternatives(refined);
         let Some(chosen) = alternatives[0] else {
             return Fit::failed(Stop::NoModel { trials: frames.len() as u32 });
         };
         let best = refined.iter().find(|(_, frame)| frame.axes[2] == chosen.normal).map_or(refined[0].1, |best| best.1);
         let best = best.refined(edges);
+        if let Some(first) = &mut alternatives[0] {
+            first.normal = best.axes[2];
+        }
         let (iterations, of) = (2 * STEPS, alternatives.iter().flatten().count());
         let stop = if of > 1 {
             Stop::Chosen { probability: chosen.probability, of }
