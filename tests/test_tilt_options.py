@@ -147,6 +147,10 @@ def test_options_in_force_are_keywords(camera: tiltvp.Camera, method: str) -> No
         ({"method": "image-space-ransac", "correction": "closed"}, ["closed-form"]),
         ({"method": "image-space-ransac", "correction": -3.0}, ["correction"]),
         ({"method": "image-space-ransac", "threshold_px": 0.0}, ["threshold_px"]),
+        (
+            {"method": "image-space-ransac", "offset_max_px": 5.0, "tilt_max_rad": 0.1},
+            ["offset_max_px = 5", "tilt_max_rad"],
+        ),
         ({"method": "vector-consensus", "normal": "radial"}, ["gradient", "tangent"]),
         ({"method": "vector-consensus", "threshold_rad": 5.0}, ["threshold_rad"]),
         ({"method": "vector-consensus", "correction": 0.0}, ["correction"]),

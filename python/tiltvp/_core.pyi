@@ -3019,7 +3019,7 @@ class TiltEstimator:
         tilt_max_rad
             Largest lean expected, in radians: edges that would need a larger one are rejected first. None for 12
             degrees of the refined method and 7 of vector consensus; the image-space methods have `offset_max_px`
-            instead, and this, where given, sets it to the shift of that lean. From 20 degrees on the method segments
+            instead, and this, where given, sets it to the shift of that lean. Above 20 degrees the method segments
             looks for the vertical anywhere. Default: None.
         mask
             Pixels that show the world and not the robot; none for all. Default: None.
