@@ -64,6 +64,24 @@ def test_the_command_line_chooses_the_method(tmp_path: Path, capsys: pytest.Capt
     assert "--method general" in run("greys", "--method", "coloured")
 
 
+def test_grey_frames_after_the_coloured_cuboid_are_skipped(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    StereoRig(CAMERA, CAMERA, LEFT_FROM_RIGHT).save(tmp_path / "rig.toml")
+    CAMERA.save(tmp_path / "one.toml")
+    for name in ("a", "b", "c"):
+        for side, image in zip(("left", "right"), pair(COLOURS), strict=True):
+            is_grey = name == "b" and side == "right"
+            tiltvp.write_image(tmp_path / side / f"{name}.png", image[..., 1] if is_grey else image)
+    left, right = str(tmp_path / "left"), str(tmp_path / "right")
+    for sides, rig in (([right], "one.toml"), ([left, right], "rig.toml")):
+        said = {}
+        for method in ("auto", "coloured"):
+            assert main(["corner", *sides, "--calibration", str(tmp_path / rig), "--method", method]) == 1
+            said[method] = capsys.readouterr()
+        assert said["auto"] == said["coloured"]
+        assert "2 frames, 1 skipped, 2 with a pose" in said["auto"].out
+        assert "b.png" in said["auto"].err
+
+
 @pytest.mark.parametrize(
     ("words", "complaint"),
     [

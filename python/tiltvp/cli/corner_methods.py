@@ -53,11 +53,15 @@ class Searches:
             self._chosen = None
 
     def __call__(self, *images: NDArray[np.uint8], **known: Any) -> CornerEstimate:
-        """The first pose that a method has, or the last one's reason for none; `known` is what a sensor tells."""
+        """The first pose that a method has, or the last one's reason for none; `known` is what a sensor tells.
+
+        Grey images are not for colours: of several methods these are passed over, and the one that goes on alone
+        raises `InvalidInputError`.
+        """
         for method, estimator in self._estimators.items():
             if self._chosen not in (None, method):
                 continue
-            if method != "general" and len(self._estimators) > 1 and any(image.ndim == 2 for image in images):
+            if self._chosen is None and method != "general" and any(image.ndim == 2 for image in images):
                 continue
             estimate = estimator(*images, **known)
             if estimate:
