@@ -64,6 +64,23 @@ def test_the_command_line_chooses_the_method(tmp_path: Path, capsys: pytest.Capt
     assert "--method general" in run("greys", "--method", "coloured")
 
 
+def test_a_trajectory_without_any_place_says_why_and_what_to_try(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    StereoRig(CAMERA, CAMERA, LEFT_FROM_RIGHT).save(tmp_path / "rig.toml")
+    for side in ("left", "right"):
+        tiltvp.write_image(tmp_path / side / "a.png", np.full((360, 480, 3), 128, np.uint8))
+    sides = [str(tmp_path / side) for side in ("left", "right")]
+    files = {name: tmp_path / name for name in ("poses.csv", "plot.png", "path.txt")}
+    words = ["--out", str(files["poses.csv"]), "--plot", str(files["plot.png"]), "--trajectory", str(files["path.txt"])]
+    assert main(["corner", *sides, "--calibration", str(tmp_path / "rig.toml"), *words]) == 2
+    said = capsys.readouterr()
+    assert "without a pose: no corner in the left image (1)" in said.out
+    assert "try: " in said.out
+    assert said.err == f"tiltvp: {files['path.txt']}: no frame has a pose with a place, expected one at least\n"
+    assert [file.exists() for file in files.values()] == [True, True, False]
+
+
 def test_grey_frames_after_the_coloured_cuboid_are_skipped(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     StereoRig(CAMERA, CAMERA, LEFT_FROM_RIGHT).save(tmp_path / "rig.toml")
     CAMERA.save(tmp_path / "one.toml")

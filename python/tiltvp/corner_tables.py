@@ -126,14 +126,12 @@ def corner_rows(estimates: Sequence[tuple[float, str, CornerEstimate]]) -> list[
 def write_trajectory(rows: Sequence[Mapping[str, Any]], path: str | os.PathLike[str]) -> None:
     """The poses of `pose_rows` in TUM's format: time x y z qx qy qz qw, a line for each; whole or not at all.
 
-    Raises `InvalidInputError` where no row has a position, `OutputError` where the file cannot be written.
+    Raises `InvalidInputError` where no row has a place, `OutputError` where the file cannot be written.
     """
     poses = [[row[name] for name in ("time_s", *_POSITION, *_QUATERNION)] for row in rows]
     placed = np.array([pose for pose in poses if None not in pose])
     if not len(placed):
-        raise InvalidInputError(
-            f"{path}: no pose has a position, expected images of two cameras, or of one with a known height or length"
-        )
+        raise InvalidInputError(f"{path}: no frame has a pose with a place, expected one at least")
     write_tum(path, placed[:, 0], placed[:, 1:4], placed[:, 4:], "of object_from_camera")
 
 

@@ -128,10 +128,10 @@ def corner(
         estimates = list(look.each(frames, others, frame_rate))
     if not estimates:
         raise InvalidInputError(f"{frames.source}: {look.bad} frames, none of which can be used")
-    results.write(estimates)
     tell(str(frames.source), estimator, look.bad, has_scale=has_scale, advice_for=(right is not None, known))
     if sensor is not None:
         say(sensor.summary())
+    results.write(estimates)
     return 1 if look.bad or frames.problems else 0
 
 

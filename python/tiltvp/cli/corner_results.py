@@ -61,14 +61,15 @@ class CornerResults:
             write_table(table, self.out)
         if self.corners is not None:
             write_table(Table(CORNER_COLUMNS, corner_rows(estimates)), self.corners)
-        if self.trajectory is not None:
-            write_trajectory(table.rows, self.trajectory)
         if self.plot is not None:
             from tiltvp.images import write_image
             from tiltvp.lab.plots.corner_poses import pose_plot
             from tiltvp.lab.plots.picture import figure_picture
 
             write_image(self.plot, figure_picture(pose_plot(table.frame())))
+        if self.trajectory is not None:
+            # Last, as it is refused where no frame has a place.
+            write_trajectory(table.rows, self.trajectory)
 
 
 def tell(
