@@ -156,6 +156,30 @@ def test_values_and_options() -> None:
     assert "left" in empty.reason
 
 
+def test_detectors_and_what_stands_beside_them_agree() -> None:
+    coloured, general = (CornerDetector(CAMERA, method=method) for method in ("coloured", "general"))
+    oblique = CornerDetector(CAMERA, method="general", gamma_rad=1.2)
+    for pair_of, beside, complaint in (
+        ((coloured,), {"method": "general"}, "method = 'general' beside a CornerDetector of 'coloured'"),
+        ((CAMERA, coloured, LEFT_FROM_RIGHT), {"method": "paper"}, "method = 'paper'"),
+        ((coloured, general, LEFT_FROM_RIGHT), {}, "method = 'coloured' beside a CornerDetector of 'general'"),
+        ((general,), {"gamma_rad": 1.2}, r"gamma_rad = 1\.2 beside a CornerDetector of 1\.57"),
+        ((oblique, general, LEFT_FROM_RIGHT), {}, r"gamma_rad = 1\.2 beside a CornerDetector of 1\.57"),
+        ((coloured,), {"faces": "rgb"}, "faces"),
+    ):
+        with pytest.raises(InvalidInputError, match=complaint):
+            CornerPoseEstimator(*pair_of, **beside)
+    for estimator in (
+        CornerPoseEstimator(oblique),
+        CornerPoseEstimator(oblique, method="general", gamma_rad=1.2),
+        CornerPoseEstimator(oblique, CAMERA, LEFT_FROM_RIGHT),
+        CornerPoseEstimator(CAMERA, method="general", gamma_rad=1.2),
+    ):
+        assert estimator.left == oblique
+        assert estimator.options["gamma_rad"] == 1.2
+    assert CornerPoseEstimator(coloured, gamma_rad=1.2).options["gamma_rad"] == 1.2
+
+
 def test_estimates_are_kept() -> None:
     seen = CornerPoseEstimator(CAMERA, CAMERA, LEFT_FROM_RIGHT)(*pair(COLOURS))
     blank = np.full((360, 480, 3), 128, np.uint8)

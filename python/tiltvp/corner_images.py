@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -60,12 +61,13 @@ class CornerDetector(_core.CornerDetector):
 class CornerPoseEstimator(_core.CornerPoseEstimator):
     """The pose of one camera, or of a pair, before a corner: `CornerPoseEstimator(left, right, left_from_right)`.
 
-    `left` and `right` are cameras or `CornerDetector`s; `left_from_right` (4, 4) is the right camera's pose in the left
-    one's frame, metres. Without `right` only the attitude is estimated, and with `camera_height_m` (the height of the
-    camera above the vertex), `edge_length_m` or `box_size_m` the place too; `place_reason` says why there is none.
-    Call it with the images of one frame after the other: the last pose is the prior for the next one. `gamma_rad` is
-    the angle between the corner's level edges, `down` (3,) the direction down in the left camera's frame as far as it
-    is known. Other options are the estimator's, or those of detectors that are made here for `method`. Comparable;
+    `left` and `right` are cameras or `CornerDetector`s, whose `method` and, of "general", `gamma_rad` are also the
+    estimator's: what is given beside them has to be the same. `left_from_right` (4, 4) is the right camera's pose in
+    the left one's frame, metres. Without `right` only the attitude is estimated, and with `camera_height_m` (the height
+    of the camera above the vertex), `edge_length_m` or `box_size_m` the place too; `place_reason` says why there is
+    none. Call it with the images of one frame after the other: the last pose is the prior for the next one. `gamma_rad`
+    is the angle between the corner's level edges, `down` (3,) the direction down in the left camera's frame as far as
+    it is known. Other options are the estimator's, or those of detectors that are made here for `method`. Comparable;
     copies and pickles go on from the same last pose.
     """
 
@@ -75,20 +77,26 @@ class CornerPoseEstimator(_core.CornerPoseEstimator):
         right: Camera | CornerDetector | None = None,
         left_from_right: ArrayLike | None = None,
         *,
-        method: str = CORNER_METHODS[0],
+        method: str | None = None,
         **options: Any,
     ) -> CornerPoseEstimator:
         own = {name: options.pop(name) for name in _OF_ESTIMATOR if name in options}
-        if method == "general" and "gamma_rad" in own:
-            options.setdefault("gamma_rad", own["gamma_rad"])
+        detectors = [one for one in (left, right) if isinstance(one, _core.CornerDetector)]
+        if detectors and options:
+            names = ", ".join(options)
+            raise InvalidInputError(f"options {names}: given beside a CornerDetector, expected with cameras only")
+        method = _shared("method", method, [one.method for one in detectors]) or CORNER_METHODS[0]
+        angles = [one.options["gamma_rad"] for one in detectors if one.method == "general"]
+        gamma_rad = _shared("gamma_rad", own.get("gamma_rad"), angles)
+        if gamma_rad is not None:
+            own["gamma_rad"] = gamma_rad
+            if method == "general":
+                options["gamma_rad"] = gamma_rad
 
         def detector(camera: Camera | CornerDetector) -> CornerDetector:
-            if not isinstance(camera, _core.CornerDetector):
-                return CornerDetector(camera, method=method, **options)
-            if options:
-                names = ", ".join(options)
-                raise InvalidInputError(f"options {names}: given beside a CornerDetector, expected with cameras only")
-            return camera
+            if isinstance(camera, _core.CornerDetector):
+                return camera
+            return CornerDetector(camera, method=method, **options)
 
         other = None if right is None else detector(right)
         return super().__new__(cls, detector(left), other, left_from_right, **own)
@@ -120,3 +128,13 @@ class CornerPoseEstimator(_core.CornerPoseEstimator):
         Empty where none is. It is `self(left, right, **known).corners`, and goes on from frame to frame alike.
         """
         return self(left, right, **known).corners
+
+
+def _shared(name: str, given: Any, told: Sequence[Any]) -> Any:
+    """What is given, or else what the detectors tell, which all have to tell the same."""
+    for one in told:
+        if given is None:
+            given = one
+        elif one != given:
+            raise InvalidInputError(f"{name} = {given!r} beside a CornerDetector of {one!r}, expected the same")
+    return given
