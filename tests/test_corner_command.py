@@ -110,6 +110,14 @@ def test_grey_frames_after_the_coloured_cuboid_are_skipped(tmp_path: Path, capsy
         (["--method", "coloured", "--mask", "mask.png"], "--method coloured with --mask (of general)"),
         (["--pitch", "3", "--down", "0", "1", "0"], "--pitch and --down"),
         (["--topic-right", "/right"], "--topic-right"),
+        (["--down-sigma-deg", "5"], "--down-sigma-deg without --pitch or --down, expected both"),
+        (
+            ["--camera-height-sigma-m", "0.1", "--edge-length-m", "1"],
+            "--camera-height-sigma-m without --camera-height-m",
+        ),
+        (["--length-sigma-m", "0.1"], "--length-sigma-m without --edge-length-m or --box-size-m, expected both"),
+        (["--known-edge", "x"], "--known-edge without --edge-length-m, expected both"),
+        (["--known-edge", "y", "--box-size-m", "1", "1", "1"], "--known-edge without --edge-length-m"),
         (["--trajectory", "t.txt"], "--camera-height-m"),
     ],
 )

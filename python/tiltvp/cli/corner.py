@@ -31,6 +31,14 @@ if TYPE_CHECKING:
     from tiltvp.streams import Frames
     from tiltvp.streams.outputs.viewer import Viewer
 
+_BELONGS_TO = {
+    "--down-sigma-deg": ("--pitch", "--down"),
+    "--camera-height-sigma-m": ("--camera-height-m",),
+    "--length-sigma-m": ("--edge-length-m", "--box-size-m"),
+    "--known-edge": ("--edge-length-m",),
+}
+"""Options that tell nothing without one of others."""
+
 
 @Parameter(name="*", group=Group("Corners", help="An option that is not given has the default of its method."))
 @dataclass(frozen=True, kw_only=True)
@@ -49,6 +57,9 @@ class CornerOptions(LibraryOptions):
 
     def given(self) -> dict[str, Any]:
         """The keywords of the library."""
+        for option, owners in _BELONGS_TO.items():
+            if self._has(option) and not any(map(self._has, owners)):
+                raise InvalidInputError(f"{option} without {' or '.join(owners)}, expected both")
         known = {"gamma_rad": math.radians(self.gamma)} | super().given()
         if self.pitch is not None:
             if "down" in known:
@@ -56,6 +67,9 @@ class CornerOptions(LibraryOptions):
             pitch_rad = math.radians(self.pitch)
             known["down"] = (0.0, math.cos(pitch_rad), -math.sin(pitch_rad))
         return known | ({} if self.mask is None else {"mask": mask_from(self.mask)})
+
+    def _has(self, option: str) -> bool:
+        return getattr(self, option.removeprefix("--").replace("-", "_")) is not None
 
 
 _OPTIONS, _SOURCE, _RESULTS, _WATCHING = CornerOptions(), SourceOptions(), CornerResults(), RerunOptions()
