@@ -99,6 +99,27 @@ def test_grey_frames_after_the_coloured_cuboid_are_skipped(tmp_path: Path, capsy
         assert "b.png" in said["auto"].err
 
 
+def test_the_file_that_is_wrong_is_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """A pair's file for one camera, and right images that cannot be used."""
+    StereoRig(CAMERA, CAMERA, LEFT_FROM_RIGHT).save(tmp_path / "rig.toml")
+    good, right = pair(COLOURS)
+    for name, image in (("a", right[..., 1]), ("b", right[:, ::2])):
+        tiltvp.write_image(tmp_path / "left" / f"{name}.png", good)
+        tiltvp.write_image(tmp_path / "right" / f"{name}.png", image)
+    (tmp_path / "right" / "c.png").write_bytes(b"nothing")
+    tiltvp.write_image(tmp_path / "left" / "c.png", good)
+    sides = [str(tmp_path / side) for side in ("left", "right")]
+    rig = ["--calibration", str(tmp_path / "rig.toml"), "--method", "coloured"]
+    assert main(["corner", *sides, *rig]) == 2
+    grey, small, broken, _ = capsys.readouterr().err.splitlines()
+    a, b = (f"{tmp_path / 'left' / name} and {tmp_path / 'right' / name}" for name in ("a.png", "b.png"))
+    assert grey.startswith(f"tiltvp: {a}: right: shape (360, 480), expected (H, W, 3")
+    assert small.startswith(f"tiltvp: {b}: image: got 360 x 240 pixels")
+    assert broken.startswith(f"tiltvp: {tmp_path / 'right' / 'c.png'}: not an image")
+    assert main(["corner", sides[0], *rig]) == 2
+    assert "rig.toml: is a pair of cameras, expected one camera" in capsys.readouterr().err
+
+
 @pytest.mark.parametrize(
     ("words", "complaint"),
     [

@@ -120,7 +120,9 @@ class CornerPoseEstimator(_core.CornerPoseEstimator):
         makes them of readings. Raises `InvalidInputError` for what is no direction, rotation or covariance.
         """
         made = bgr_from if self._coloured else gray_from
-        return self._observe(made(left), None if right is None else made(right), gravity, gyro)
+        if right is None:
+            return self._observe(made(left), None, gravity, gyro)
+        return self._observe(made(left, "left"), made(right, "right"), gravity, gyro)
 
     def poses(self, left: ArrayLike, right: ArrayLike | None = None, **known: Any) -> list[BelievedCorner]:
         """All corners of one frame that are believed, each with its `id`, `pose` and edges; that of the pose first.

@@ -179,7 +179,7 @@ class Look:
                     images = [one.read() for one in pair]
                     estimate = self._estimate(images, time_s)
                 except TiltvpError as error:
-                    bar.complain(named(frame.name, str(error)))
+                    bar.complain(_blamed([one.name for one in pair], str(error)))
                     self.bad += 1
                 else:
                     self._draw(name, number, time_s, images[0], estimate)
@@ -202,6 +202,11 @@ class Look:
             write_image(self.overlay / f"{name}.png", picture)
         if self.viewer is not None:
             send_corner(self.viewer, number, time_s, picture, estimate)
+
+
+def _blamed(names: Sequence[str], problem: str) -> str:
+    """The problem with the names of the images that it may be of in front, unless it names one."""
+    return problem if any(name in problem for name in names) else named(" and ".join(names), problem)
 
 
 def _searches(

@@ -28,6 +28,7 @@ from tiltvp.formats import (
     pyocamcalib,
     ros,
     stella_vslam,
+    stereo,
     vikit,
     woodscape,
 )
@@ -155,6 +156,13 @@ def _recognised(document: Document) -> Format:
     if fitting:
         names = " and ".join(one.name for one in fitting)
         document.fail(f"could be {names}", "format= to say which", "the whole file")
+    if stereo.is_own(document):
+        document.fail(
+            "is a pair of cameras",
+            "one camera (pairs are for StereoRig.load, and for tiltvp corner with right images)",
+            "the top of the file",
+            UnsupportedFormatError,
+        )
     why = f" (read as keys: {document.syntax_problem})" if document.syntax_problem else ""
     document.fail(
         f"no known calibration format{why}",

@@ -32,7 +32,7 @@ from tiltvp.formats.node import Node
 from tiltvp.formats.own import as_floats, camera_from, camera_table
 from tiltvp.formats.spec import CameraSpec, ImageSize
 
-__all__ = ["StereoSpec", "read_stereo", "write_stereo_toml"]
+__all__ = ["StereoSpec", "is_own", "read_stereo", "write_stereo_toml"]
 
 _FORMAT: Final = "tiltvp-stereo"
 _VERSION: Final = 1
@@ -50,12 +50,17 @@ class StereoSpec:
     """(4, 4): takes points of the right camera's frame to the left one's, metres."""
 
 
+def is_own(document: Document) -> bool:
+    """Whether it is our own TOML of a pair."""
+    return _MARK.search(document.text) is not None
+
+
 def read_stereo(path: str | os.PathLike[str], image_size: ImageSize | None = None) -> StereoSpec:
     """The pair of a file. Raises `tiltvp.errors.CalibrationError` that says what was wrong, what was expected and
     where.
     """
     document = Document.load(path)
-    if _MARK.search(document.text) is not None:
+    if is_own(document):
         return _own(document, image_size)
     if kalibr.recognise(document):
         return _camchain(document, image_size)
