@@ -135,6 +135,9 @@ def test_changed_options_are_as_good_as_new(camera: tiltvp.Camera, room: RoomIma
         start.with_options(gradient_minimum=3.0)
     with pytest.raises(InvalidInputError, match="gradient_min = -3"):
         start.with_options(gradient_min=-3.0)
+    for fixed in ({"camera": camera}, {"method": method}, {"robot_from_camera": np.eye(3)}):
+        with pytest.raises(InvalidInputError, match=f"{next(iter(fixed))}: given to with_options"):
+            start.with_options(**fixed)
 
 
 def test_a_sweep_is_cheap(room: RoomImage) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Any, Final, Self
 
 from tiltvp import _core
 from tiltvp._core import (
@@ -20,6 +20,7 @@ from tiltvp._core import (
     tilt_error_rad,
     tilt_from_wheel_heights,
 )
+from tiltvp.errors import InvalidInputError
 from tiltvp.images import gray_from
 
 if TYPE_CHECKING:
@@ -40,6 +41,9 @@ __all__ = [
     "tilt_error_rad",
     "tilt_from_wheel_heights",
 ]
+
+_FIXED: Final = ("camera", "method", "robot_from_camera")
+"""What `with_options` leaves as it is."""
 
 
 class TiltEstimator(_core.TiltEstimator):
@@ -85,8 +89,11 @@ class TiltEstimator(_core.TiltEstimator):
         """An estimator of the same camera, mounting and method with some options changed.
 
         It shares every table that the change leaves alone: one for each of many thresholds takes next to no time and
-        memory. Raises `InvalidInputError` as the constructor does.
+        memory. Raises `InvalidInputError` as the constructor does, and for another camera, mounting or method.
         """
+        fixed = ", ".join(name for name in _FIXED if name in options)
+        if fixed:
+            raise InvalidInputError(f"{fixed}: given to with_options, expected options alone: make a new TiltEstimator")
         return type(self)(self.camera, _like=self, **options)
 
     def with_edges(self, image: ArrayLike) -> tuple[TiltEstimate, EdgeElements]:
