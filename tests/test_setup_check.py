@@ -13,6 +13,7 @@ from tiltvp.errors import InvalidInputError
 from tiltvp.rotations import read_rotation
 from tiltvp.setup_check import DIRECTIONS, opposite_direction, shares_of
 from tiltvp.setup_features import ImageFeatures
+from tiltvp.turning import check_turns
 
 PINHOLE = tiltvp.Camera.pinhole(width=320, height=240, fx=190.0, fy=190.0, cx=159.5, cy=119.5)
 
@@ -71,8 +72,24 @@ def test_images_of_one_place_do_not_make_sure() -> None:
 def test_what_it_cannot_look_at_is_refused() -> None:
     with pytest.raises(InvalidInputError, match="images: none"):
         tiltvp.check_setup([], PINHOLE)
-    with pytest.raises(InvalidInputError, match=r"shape \(2, 2\)"):
-        tiltvp.check_setup(IMAGES, PINHOLE, np.eye(2))
+    for mounting, told in (
+        (np.eye(2), r"shape \(2, 2\), expected 3 x 3 numbers"),
+        (np.diag([1.0, 1.0, -1.0]), "a reflection"),
+        (2.0 * np.eye(3), "no rotation"),
+        (np.zeros((3, 3)), "no rotation"),
+        (np.full((3, 3), np.nan), "not finite"),
+        (1j * np.eye(3), "expected a list of numbers"),
+        ([[1.0, 0.0], [0.0]], "expected a list of numbers"),
+        ("forward", "'forward', expected a list of numbers"),
+    ):
+        for refused in (
+            lambda mounting: tiltvp.check_setup(IMAGES, PINHOLE, mounting),
+            lambda mounting: check_turns(IMAGES, np.zeros(5), PINHOLE, mounting),
+            lambda mounting: tiltvp.mounting_tilt([], [], mounting),
+            lambda mounting: tiltvp.level(IMAGES[0], tiltvp.TiltEstimator(PINHOLE), (0.1, 0.0), mounting),
+        ):
+            with pytest.raises(InvalidInputError, match=f"robot_from_camera: .*{told}"):
+                refused(mounting)
     with pytest.raises(InvalidInputError, match="as the camera's images"):
         tiltvp.check_setup([IMAGES[0][:-1]], PINHOLE)
 

@@ -257,10 +257,13 @@ def level(
     """
     if isinstance(seen_by, TiltEstimator):
         camera, own = seen_by.camera, seen_by.robot_from_camera
-        if robot_from_camera is not None and not np.allclose(own, np.asarray(robot_from_camera, dtype=np.float64)):
-            raise InvalidInputError(
-                "robot_from_camera: another one than that of the estimator, expected none beside it"
-            )
+        if robot_from_camera is not None:
+            from tiltvp.rotations import mounting_from
+
+            if not np.allclose(own, mounting_from(robot_from_camera), atol=1e-6):
+                raise InvalidInputError(
+                    "robot_from_camera: another one than that of the estimator, expected none beside it"
+                )
         robot_from_camera = own
     else:
         camera = seen_by

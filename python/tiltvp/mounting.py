@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from tiltvp.errors import InvalidInputError
-from tiltvp.rotations import levelling, rotation_from
+from tiltvp.rotations import levelling, mounting_from
 from tiltvp.tilt import TiltFilter
 
 if TYPE_CHECKING:
@@ -121,7 +121,7 @@ def mounting_tilt(
     level to 0.05 degrees, so that no turn is needed. Raises `InvalidInputError` for as many motions as there are not
     images, and for a matrix that is no rotation.
     """
-    rotation = rotation_from(np.asarray(robot_from_camera, dtype=np.float64).tolist(), "robot_from_camera")
+    rotation = mounting_from(robot_from_camera)
     given = list(estimates)
     if len(given) != len(motions):
         raise InvalidInputError(f"motions: {len(motions)}, expected {len(given)}, one for each image")

@@ -14,6 +14,7 @@ from tiltvp.errors import InvalidInputError, TiltvpError
 from tiltvp.images import gray_from
 from tiltvp.mounting import MountingTilt, mounting_tilt
 from tiltvp.robot import Robot
+from tiltvp.rotations import mounting_from
 from tiltvp.setup_check import SURE, SetupCheck, check_setup, mounting_looking, opposite_direction
 from tiltvp.streams.odometry import Motion
 from tiltvp.streams.wheels import Wheels
@@ -137,7 +138,7 @@ def find_setup(
         rotation = mounting_looking(direction.best)
         direction = replace(direction, given=direction.best)
     else:
-        rotation = np.asarray(robot_from_camera, dtype=np.float64)
+        rotation = mounting_from(robot_from_camera)
     turns = None if axis is None else axis.check(direction.given)
     estimator = TiltEstimator(camera, **TILT_OPTIONS, robot_from_camera=rotation, mask=mask)
     tilts = drive_tilts(frames, estimator, motions, advance=advance)

@@ -16,7 +16,7 @@ from tiltvp.errors import CalibrationError, CalibrationNotFoundError, InvalidInp
 from tiltvp.formats.document import Document
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
+    from numpy.typing import ArrayLike, NDArray
 
     Matrix = NDArray[np.float64]
 
@@ -24,6 +24,7 @@ __all__ = [
     "ROTATION_WORDS",
     "about_vertical",
     "levelling",
+    "mounting_from",
     "quaternion",
     "read_rotation",
     "rotation_from",
@@ -106,7 +107,22 @@ def rotation_from(value: object, where: str) -> Matrix:
                 f"{where}: {value!r}, expected one of {', '.join(ROTATION_WORDS)}, or a 3 x 3 matrix"
             )
         return np.array(ROTATION_WORDS[value])
-    array = _array(where, value)
+    return _from_rows(value, where)
+
+
+def mounting_from(robot_from_camera: ArrayLike) -> Matrix:
+    """The (3, 3) rotation that an argument of this name is: `R` of v_robot = R v_camera, to 1e-3.
+
+    Raises `InvalidInputError` for anything else.
+    """
+    try:
+        return _from_rows(np.asarray(robot_from_camera, dtype=object).tolist(), "robot_from_camera")
+    except CalibrationError as error:
+        raise InvalidInputError(str(error)) from None
+
+
+def _from_rows(rows: object, where: str) -> Matrix:
+    array = _array(where, rows)
     if array.shape != (3, 3):
         raise CalibrationError(f"{where}: shape {array.shape}, expected 3 x 3 numbers")
     return _rotation(array, where)

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from tiltvp.errors import InvalidInputError
 from tiltvp.images import gray_from
 from tiltvp.lens_check import LensCheck, check_lens
+from tiltvp.rotations import mounting_from
 from tiltvp.setup_features import DIRECTIONS, ImageFeatures
 from tiltvp.setup_weights import BIASES, HIDDEN, MEANS, OUT, SCALES
 
@@ -114,11 +114,10 @@ def check_setup(
     Five images from different places, or with different headings, are enough. `robot_from_camera` is (3, 3), by default
     the identity; `mask` (H, W) bool is True where images show the world. `check_lens` looks at the lens. A turn of the
     camera about the vertical, and an image that is mirrored, cannot be told from images alone. Raises
-    `InvalidInputError` for no images and for images of another size than the camera's.
+    `InvalidInputError` for no images, for images of another size than the camera's, and for a matrix that is no
+    rotation.
     """
-    rotation = np.eye(3) if robot_from_camera is None else np.asarray(robot_from_camera, dtype=np.float64)
-    if rotation.shape != (3, 3):
-        raise InvalidInputError(f"robot_from_camera: shape {rotation.shape}, expected (3, 3)")
+    rotation = np.eye(3) if robot_from_camera is None else mounting_from(robot_from_camera)
     grays = [gray_from(image, f"images[{number}]") for number, image in enumerate(images)]
     lens = check_lens(grays, camera, mask=mask)
     features = ImageFeatures(camera, mask=mask)

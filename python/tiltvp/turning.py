@@ -11,6 +11,7 @@ import numpy as np
 
 from tiltvp.errors import InvalidInputError
 from tiltvp.images import gray_from
+from tiltvp.rotations import mounting_from
 from tiltvp.setup_check import DIRECTIONS, nearest_direction, opposite_direction
 
 if TYPE_CHECKING:
@@ -168,7 +169,7 @@ def turn_axis(
 
 def _up_of(robot_from_camera: ArrayLike) -> NDArray[np.float64]:
     """(3,): the robot's z axis in the camera frame."""
-    return np.array(np.asarray(robot_from_camera, dtype=np.float64)[2])
+    return np.asarray(mounting_from(robot_from_camera)[2])
 
 
 def _turned_back(
