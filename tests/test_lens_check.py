@@ -98,8 +98,15 @@ def test_what_it_cannot_look_at_is_refused() -> None:
         tiltvp.check_lens([], fisheye())
     with pytest.raises(InvalidInputError, match="as the camera's images"):
         tiltvp.check_lens([image[:-1] for image in IMAGES], fisheye())
-    with pytest.raises(InvalidInputError, match="mask"):
-        tiltvp.check_lens(IMAGES, fisheye(), mask=np.ones((3, 3), dtype=bool))
+    shape = IMAGES[0].shape
+    for mask, told in (
+        (np.ones((3, 3), dtype=bool), r"shape \(3, 3\) of bool"),
+        (np.full(shape, 255, np.uint8), r"of uint8, expected \(\d+, \d+\) of bool"),
+        (np.zeros(shape, dtype=bool), "False everywhere"),
+    ):
+        for check in (tiltvp.check_lens, tiltvp.check_setup):
+            with pytest.raises(InvalidInputError, match=f"mask: .*{told}"):
+                check(IMAGES, fisheye(), mask=mask)
 
 
 def test_check_setup_and_tilt_warn_of_it(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

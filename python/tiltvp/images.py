@@ -16,7 +16,7 @@ from tiltvp.image_headers import header_size
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
-__all__ = ["bgr_from", "decode_image", "gray_from", "read_image", "write_image"]
+__all__ = ["bgr_from", "checked_mask", "decode_image", "gray_from", "read_image", "write_image"]
 
 LARGEST_IMAGE_BYTES: Final = 1 << 30
 """Of an image file: as many pixels as a camera may have, in three uncompressed colours, and a half more."""
@@ -66,6 +66,20 @@ def bgr_from(image: ArrayLike, name: str = "image") -> NDArray[np.uint8]:
     if array.ndim != 3 or array.shape[2] not in (3, 4) or array.size == 0:
         raise InvalidInputError(f"{name}: shape {array.shape}, expected {expected}")
     return np.ascontiguousarray(_bytes_from(array[:, :, :3], name))
+
+
+def checked_mask(mask: ArrayLike, camera: _core.Camera) -> NDArray[np.bool_]:
+    """The (H, W) bool array, True where images of the camera show the world.
+
+    Raises `InvalidInputError` for other types, such as uint8, for other shapes, and for one that is True nowhere.
+    """
+    array = np.asarray(mask)
+    if array.dtype != np.bool_ or array.shape != (camera.height, camera.width):
+        expected = f"({camera.height}, {camera.width}) of bool, as the camera's images"
+        raise InvalidInputError(f"mask: shape {array.shape} of {array.dtype}, expected {expected}")
+    if not array.any():
+        raise InvalidInputError("mask: False everywhere, expected True where images show the world")
+    return array
 
 
 def _bytes_from(array: NDArray[Any], name: str) -> NDArray[np.uint8]:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from tiltvp.errors import InvalidInputError
-from tiltvp.images import gray_from
+from tiltvp.images import checked_mask, gray_from
 from tiltvp.segments import SegmentDetector
 
 if TYPE_CHECKING:
@@ -118,12 +118,13 @@ def check_lens(images: Iterable[ArrayLike], camera: Camera, *, mask: ArrayLike |
     and scaled as the calibration says, whatever its model. Five images from different places, or with different
     headings, are enough. `mask` (H, W) bool is True where images show the world: the rims of a mirror are no straight
     edges.
-    Raises `InvalidInputError` for no images and for images of another size than the camera's.
+    Raises `InvalidInputError` for no images, for images and masks of another size than the camera's, and for masks of
+    another type than bool.
     """
     grays = [gray_from(image, f"images[{number}]") for number, image in enumerate(images)]
     if not grays:
         raise InvalidInputError("images: none, expected at least one")
-    known = None if mask is None else np.asarray(mask, dtype=bool)
+    known = None if mask is None else checked_mask(mask, camera)
     detector = SegmentDetector(camera, mask=known, stray_max_px=_STRAY_PX, rms_max_px=_RMS_PX)
     prior = np.append(camera.width * _WIDTHS[:2], _WIDTHS[2]) ** -2.0
     off, covariance, edges = np.zeros(3), np.diag(1.0 / prior), 0

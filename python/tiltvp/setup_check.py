@@ -114,8 +114,8 @@ def check_setup(
     Five images from different places, or with different headings, are enough. `robot_from_camera` is (3, 3), by default
     the identity; `mask` (H, W) bool is True where images show the world. `check_lens` looks at the lens. A turn of the
     camera about the vertical, and an image that is mirrored, cannot be told from images alone. Raises
-    `InvalidInputError` for no images, for images of another size than the camera's, and for a matrix that is no
-    rotation.
+    `InvalidInputError` for no images, for images and masks of another size than the camera's, for masks of another type
+    than bool, and for a matrix that is no rotation.
     """
     rotation = np.eye(3) if robot_from_camera is None else mounting_from(robot_from_camera)
     grays = [gray_from(image, f"images[{number}]") for number, image in enumerate(images)]

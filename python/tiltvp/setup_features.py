@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from tiltvp.images import checked_mask
 from tiltvp.segments import SegmentDetector
 
 if TYPE_CHECKING:
@@ -56,7 +57,7 @@ class ImageFeatures:
     """The features of the images of one camera. `mask` (H, W) bool is True where images show the world."""
 
     def __init__(self, camera: Camera, *, mask: ArrayLike | None = None) -> None:
-        shown = None if mask is None else np.asarray(mask, dtype=bool)
+        shown = None if mask is None else checked_mask(mask, camera)
         self._detector = SegmentDetector(camera, mask=shown)
         self._blocks = _Blocks(camera)
 
