@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -34,17 +35,24 @@ def test_a_camera_of_a_view(lens: str, law: Any) -> None:
 
 
 @pytest.mark.parametrize(
-    "wrong",
+    ("wrong", "told"),
     [
-        {"lens": "fisheye"},
-        {"view_rad": 0.0},
-        {"view_rad": 7.0},
-        {"radius_px": -1.0},
-        {"lens": "pinhole", "view_rad": 3.2},
+        ({"lens": "fisheye"}, "lens = 'fisheye'"),
+        ({"view_rad": 0.0}, "view_rad: 0 degrees"),
+        ({"view_rad": 7.0}, "view_rad: 401"),
+        ({"view_rad": "2"}, "view_rad = '2'"),
+        ({"radius_px": -1.0}, "radius_px = -1"),
+        ({"radius_px": "3"}, "radius_px = '3'"),
+        ({"centre_px": (1,)}, "centre_px = .1,."),
+        ({"centre_px": 5}, "centre_px = 5"),
+        ({"centre_px": "ab"}, "centre_px = 'a'"),
+        ({"width": 0}, "width, height = .0, 48."),
+        ({"height": 4.5}, "width, height = .64, 4.5."),
+        ({"lens": "pinhole", "view_rad": 3.2}, "view_rad: 183"),
     ],
 )
-def test_a_view_that_cannot_be(wrong: dict[str, Any]) -> None:
-    with pytest.raises(InvalidInputError, match="expected"):
+def test_a_view_that_cannot_be(wrong: dict[str, Any], told: str) -> None:
+    with pytest.raises(InvalidInputError, match=f"^{told}.*, expected"):
         Camera.from_view(**({"width": 64, "height": 48, "view_rad": 1.0} | wrong))
 
 
@@ -57,3 +65,11 @@ def test_a_part_of_an_image_sees_what_it_saw() -> None:
     assert whole.mirrored().cropped(0, 0, 640, 480) == whole.mirrored()
     with pytest.raises(InvalidInputError, match="equirectangular"):
         Camera.equirectangular(width=64, height=32).cropped(0, 0, 32, 32)
+
+
+@pytest.mark.parametrize("camera", [0.0, None, (0,)])
+def test_a_place_in_a_file_is_a_name_or_a_number(camera: Any, tmp_path: Path) -> None:
+    Camera.equirectangular(width=64, height=32).save(tmp_path / "one.toml")
+    assert Camera.load(tmp_path / "one.toml", camera=np.int64(0)).width == 64
+    with pytest.raises(InvalidInputError, match="expected a name or a whole number"):
+        Camera.load(tmp_path / "one.toml", camera=camera)

@@ -5,12 +5,14 @@ from __future__ import annotations
 import math
 import pickle
 from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 import pytest
 
 import tiltvp
 from tiltvp.errors import InvalidInputError
+from tiltvp.levelling import VIEWS
 from tiltvp.rotations import rotation_from
 from tiltvp.synth import RoomImage
 
@@ -127,6 +129,18 @@ def test_levellers_show_what_they_are_asked_for(camera: tiltvp.Camera, room: Roo
     assert tiltvp.Leveller(camera, to=pinhole.output)(room.gray, tilt).shape == (60, 90)
 
 
+def test_strips_have_the_size_and_the_channels_asked_for(camera: tiltvp.Camera, room: RoomImage) -> None:
+    made = tiltvp.Unwrapper(camera, size=(72.0, np.int64(40)))
+    assert made.size == (72, 40)
+    plain = made(room.gray)
+    assert plain.shape == (40, 72)
+    for channels in (1, 2, 3, 4):
+        strip = made(np.stack([room.gray] * channels, axis=2))
+        assert strip.shape == (40, 72, channels)
+        # OpenCV rounds places otherwise for several channels.
+        assert np.allclose(strip[:, :, -1], plain, atol=1.0)
+
+
 def test_impossible_levellers_are_refused(camera: tiltvp.Camera) -> None:
     for words, options in (
         ("expected one of same", {"to": "sphere"}),
@@ -145,6 +159,14 @@ def test_impossible_levellers_are_refused(camera: tiltvp.Camera) -> None:
     ):
         with pytest.raises(InvalidInputError, match="at most 32765"):
             refused()
+    for size in (640, "640x480", (640,), (64.5, 64), (0, 64), (math.nan, 64)):
+        for made in (tiltvp.Unwrapper, *(partial(tiltvp.Leveller, to=to) for to in VIEWS)):
+            with pytest.raises(InvalidInputError, match=r"size = .*expected \(width, height\)"):
+                made(camera, size=size)
+    with pytest.raises(InvalidInputError, match="field_of_view_rad = '2'"):
+        tiltvp.Leveller(camera, to="fisheye", field_of_view_rad="2")
+    with pytest.raises(InvalidInputError, match="elevation_min_rad = None"):
+        tiltvp.Unwrapper(camera, elevation_min_rad=None)
     with pytest.raises(InvalidInputError, match="8 x 4"):
         tiltvp.Unwrapper(camera, size=(4, 4))
     with pytest.raises(InvalidInputError, match="rising"):

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import math
+import operator
 import os
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Final, Self
 
+from tiltvp.arguments import number_from, pair_from, size_from
 from tiltvp.errors import CalibrationError, InvalidInputError
 from tiltvp.lenses import Lenses
 
@@ -56,14 +58,16 @@ class Camera(Lenses):
         """
         if lens not in VIEW_LENSES:
             raise InvalidInputError(f"lens = {lens!r}, expected one of {', '.join(VIEW_LENSES)}")
+        width, height = size_from((width, height), "width, height")
+        view_rad = number_from(view_rad, "view_rad")
         most = math.pi if lens == "pinhole" else 2.0 * math.pi
         if not 0.0 < view_rad < most:
             degrees = f"{math.degrees(view_rad):g} degrees"
             raise InvalidInputError(f"view_rad: {degrees}, expected more than 0 and less than {math.degrees(most):g}")
-        radius = 0.5 * width if radius_px is None else radius_px
+        radius = 0.5 * width if radius_px is None else number_from(radius_px, "radius_px")
         if not (math.isfinite(radius) and radius > 0.0):
             raise InvalidInputError(f"radius_px = {radius_px}, expected a positive number of pixels")
-        cx, cy = (0.5 * (width - 1), 0.5 * (height - 1)) if centre_px is None else centre_px
+        cx, cy = (0.5 * (width - 1), 0.5 * (height - 1)) if centre_px is None else pair_from(centre_px, "centre_px")
         half = 0.5 * view_rad
         common: dict[str, Any] = {
             "width": width, "height": height, "cx": cx, "cy": cy, "mirror": mirror,
@@ -119,10 +123,14 @@ class Camera(Lenses):
             if camera not in names:
                 raise InvalidInputError(f"{path}: no camera {camera!r}, expected one of {', '.join(names)}")
             camera = names.index(camera)
-        if not 0 <= camera < len(specs):
-            raise InvalidInputError(f"{path}: no camera number {camera}, expected 0 to {len(specs) - 1}")
         try:
-            found = cls.from_spec(specs[camera])
+            number = operator.index(camera)
+        except TypeError:
+            raise InvalidInputError(f"{path}: camera = {camera!r}, expected a name or a whole number") from None
+        if not 0 <= number < len(specs):
+            raise InvalidInputError(f"{path}: no camera number {number}, expected 0 to {len(specs) - 1}")
+        try:
+            found = cls.from_spec(specs[number])
             return found.mirrored() if mirror and not found.mirror else found
         except CalibrationError as error:
             raise CalibrationError(f"{path}: {error}") from error

@@ -9,7 +9,8 @@ from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import Final
 
-from tiltvp.errors import InvalidInputError, UnsupportedFormatError
+from tiltvp.arguments import size_from
+from tiltvp.errors import UnsupportedFormatError
 from tiltvp.files import write_whole
 from tiltvp.formats import (
     basalt,
@@ -83,7 +84,7 @@ def read_cameras(
     with the file, what is wrong, what was expected and where; `UnsupportedFormatError`, which is one, for a format or a
     lens model that is not supported; `CalibrationNotFoundError`, which is one and a `FileNotFoundError`.
     """
-    size = None if image_size is None else _checked_size(image_size)
+    size = None if image_size is None else size_from(image_size, "image_size")
     chosen = None if format is None else _named(format)
     document = Document.load(path)
     chosen = chosen or _recognised(document)
@@ -120,17 +121,6 @@ def _holding(specs: Sequence[CameraSpec]) -> list[str]:
                 one.written(specs)
                 names.append(one.name)
     return names
-
-
-def _checked_size(image_size: ImageSize) -> ImageSize:
-    try:
-        width, height = image_size
-        size = (int(width), int(height))
-    except (TypeError, ValueError, OverflowError):
-        raise InvalidInputError(f"image_size is {image_size!r}, expected (width, height) in pixels") from None
-    if size != (width, height) or min(size) < 1:
-        raise InvalidInputError(f"image_size is {image_size!r}, expected two whole numbers above 0")
-    return size
 
 
 def _named(name: str) -> Format:
