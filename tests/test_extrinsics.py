@@ -127,6 +127,38 @@ def test_the_start_counts_once() -> None:
         join_logs([Place(*start, prior)] * 2, start=start, start_sigma=np.array(sigma) / 2.0)
 
 
+def test_a_start_beyond_half_a_turn_is_the_same_start() -> None:
+    # The logs turn to 3.13 from a start of pi, which -pi is too.
+    places = [Place(0.2, -0.1, 3.13, PLANE), Place(0.201, -0.1, -3.14, PLANE)]
+    sigma = (0.05, 0.05, 0.03)
+    told = [join_logs(places, start=(0.2, 0.0, yaw), start_sigma=sigma).xy_yaw for yaw in (-math.pi, math.pi)]
+    np.testing.assert_allclose(told[0], told[1], rtol=0.0, atol=1e-9)
+    np.testing.assert_allclose(told[0][:2], [0.2005, -0.1], atol=1e-3)
+
+
+def test_the_start_may_have_a_covariance() -> None:
+    places = [Place(0.1, 0.0, 0.1, PLANE)] * 2
+    sigma = np.array([0.01, 0.02, 0.03])
+    by_sigma, by_covariance = (join_logs(places, start_sigma=told) for told in (sigma, np.diag(np.square(sigma))))
+    np.testing.assert_allclose(by_covariance.xy_yaw, by_sigma.xy_yaw, rtol=1e-12)
+    np.testing.assert_allclose(by_covariance.covariance, by_sigma.covariance, rtol=1e-12, atol=1e-20)
+    asymmetric = np.eye(3) + np.eye(3, k=1)
+    for other in (
+        (0.1, 0.1),
+        np.eye(2),
+        (0.1, 0.1, 0.0),
+        (0.1, 0.1, -0.1),
+        (0.1, 0.1, math.nan),
+        -np.eye(3),
+        asymmetric,
+    ):
+        with pytest.raises(InvalidInputError, match=r"start_sigma = .*, expected three positive"):
+            join_logs(places, start_sigma=other)
+    for start in ((0.1, 0.1), (0.1, 0.1, math.nan)):
+        with pytest.raises(InvalidInputError, match=r"start = .*, expected finite"):
+            join_logs(places, start=start)
+
+
 def test_tilts_are_joined_but_for_what_they_share() -> None:
     def tilted(x: float, y: float, known: bool = True) -> Tilt:
         rotation = levelling(np.array([x, y, math.sqrt(1.0 - x * x - y * y)])) @ read_rotation("forward")

@@ -195,21 +195,42 @@ def join_logs(
 ) -> JoinedLogs:
     """x, y and yaw of one camera from several logs, each weighed by its information.
 
-    What the logs were started from (`start`, `start_sigma` as for `tiltvp.calibrate`) counts once. Logs whose answers
-    are farther apart than chance has it once in a thousand times make the result false. Raises `InvalidInputError` for
-    no log, and for a log whose covariance is none.
+    What the logs were started from counts once: `start` and `start_sigma`, as for `tiltvp.calibrate`, are x, y and yaw
+    (3,) in metres and radians, and their standard deviations (3,) or covariance (3, 3). Logs whose answers are farther
+    apart than chance has it once in a thousand times make the result false. Raises `InvalidInputError` for no log, for
+    a log whose covariance is none, and for a start of other shapes.
     """
+    first, prior = _start(start, start_sigma)
     found = [log.mounting for log in logs]
     values = np.array([[one.x_m, one.y_m, one.yaw_rad] for one in found]).reshape(-1, 3)
     if len(values):
         # About the first, so that no two are a turn apart.
-        values[:, 2] = values[0, 2] + np.array([math.remainder(yaw - values[0, 2], math.tau) for yaw in values[:, 2]])
+        values[:, 2] = [_nearest(yaw, values[0, 2]) for yaw in values[:, 2]]
+        first[2] = _nearest(first[2], values[0, 2])
     covariances = np.array([one.covariance_xy_yaw for one in found]).reshape(-1, 3, 3)
-    prior = np.diag(1.0 / np.square(np.asarray(start_sigma, dtype=np.float64)))
-    first = np.asarray(start, dtype=np.float64)
     value, covariance, distance, limit, odd = _joined(values, covariances, "logs", start=first, prior=prior)
     value[2] = math.remainder(value[2], math.tau)
     return JoinedLogs(value, covariance, logs=len(found), distance=distance, limit=limit, odd=odd)
+
+
+def _start(start: ArrayLike, start_sigma: ArrayLike) -> tuple[Matrix, Matrix]:
+    """(3,) and (3, 3): where logs were started from, and the information of that."""
+    first, sigma = np.array(start, dtype=np.float64), np.asarray(start_sigma, dtype=np.float64)
+    if first.shape != (3,) or not np.isfinite(first).all():
+        raise InvalidInputError(f"start = {first.tolist()}, expected finite numbers (x_m, y_m, yaw_rad)")
+    covariance = np.diag(np.square(sigma)) if sigma.shape == (3,) and (sigma > 0.0).all() else sigma
+    fits = covariance.shape == (3, 3) and np.isfinite(covariance).all() and np.allclose(covariance, covariance.T)
+    if not fits or np.linalg.eigvalsh(covariance)[0] <= 0.0:
+        raise InvalidInputError(
+            f"start_sigma = {sigma.tolist()}, expected three positive standard deviations of (x_m, y_m, yaw_rad), or "
+            "their covariance (3, 3)"
+        )
+    return first, _inverse(covariance)
+
+
+def _nearest(angle: float, other: float) -> float:
+    """That angle within half a turn of another one."""
+    return other + math.remainder(angle - other, math.tau)
 
 
 def join_tilts(tilts: Sequence[MountingTilt]) -> JoinedTilts:
