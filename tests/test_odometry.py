@@ -130,6 +130,49 @@ def test_without_a_base_there_are_distances(tmp_path: Path) -> None:
     assert frame_motions(open_frames(tmp_path), path, wheels=WHEELS).turns_known
 
 
+RECORDED = {
+    "wheels-swapped": lambda steps: steps[:, ::-1],
+    "wheels-negated": lambda steps: -steps,
+    "left-wheel-negated": lambda steps: steps * [-1.0, 1.0],
+    "right-wheel-negated": lambda steps: steps * [1.0, -1.0],
+    "millimetres": lambda steps: 1e3 * steps,
+    "cumulative": lambda steps: np.cumsum(steps, axis=0),
+}
+"""How else the same wheels may be recorded."""
+
+
+@pytest.mark.parametrize("word", RECORDED)
+def test_wheels_of_other_conventions_are_mended_before_they_are_summed(word: str, tmp_path: Path) -> None:
+    right = np.stack(list(columns("wheels").values()), axis=1)
+    left, other = RECORDED[word](right).T
+    path = write(tmp_path / "odometry.csv", {"time_s": TIMES, "left_m": left, "right_m": other})
+    ours = read_odometry(path, wheels=WHEELS, read_as=[word])
+    np.testing.assert_allclose(ours.wheels_m, np.cumsum(right, axis=0), atol=1e-12)
+    # Frames between the rows, and frames that have a row each.
+    for k in range(3):
+        tiltvp.write_image(tmp_path / "images" / f"{k}.png", np.zeros((4, 4), np.uint8))
+    bare = write(tmp_path / "rows.csv", {"left_m": left[:3], "right_m": other[:3]})
+    frames = open_frames([str(tmp_path / "images")])
+    motions = frame_motions(frames, bare, wheels=WHEELS, read_as=[word]).motions
+    np.testing.assert_allclose([motion.wheels_m for motion in motions[1:]], right[1:3], atol=1e-12)
+    frames.times_s = np.array([0.5, 0.73, 1.21])
+    _, *motions = frame_motions(frames, path, wheels=WHEELS, read_as=[word]).motions
+    for motion, elapsed in zip(motions, (0.23, 0.48), strict=True):
+        assert motion.yaw_rad == pytest.approx(RATE * elapsed)
+        assert motion.distance_m == pytest.approx(SPEED * elapsed)
+
+
+def test_motions_without_wheels_are_read_by_those_that_they_have(tmp_path: Path) -> None:
+    path = write(tmp_path / "odometry.csv", {"time_s": TIMES} | columns("poses"))
+    ours = read_odometry(path, wheels=WHEELS, read_as=["wheels-swapped"]).between(0.5, 1.5)
+    assert (ours.yaw_rad, ours.distance_m) == pytest.approx((-RATE, SPEED))
+    for words, what in ((["clockwise"], "expected words about the wheels"), (["mirrored"], "no convention")):
+        with pytest.raises(InvalidInputError, match=what):
+            read_odometry(path, wheels=WHEELS, read_as=words)
+    with pytest.raises(InvalidInputError, match="expected a wheel base"):
+        read_odometry(path, read_as=["wheels-swapped"])
+
+
 def test_nothing_is_made_up_outside_and_in_gaps() -> None:
     times = np.array([0.0, 0.1, 0.2, 2.2, 2.3])
     odometry = Odometry.from_wheels(times, np.stack([times, times], axis=1), wheel_base_m=1.0)

@@ -70,12 +70,9 @@ def calibrate(
     opened: list[Tables | PictureLog] = []
     for source in sources:
         if isinstance(source, Tables):
-            opened.append(source.checked(with_times=read.estimate_time_offset))
+            opened.append(source.checked(read))
         else:
-            with_times = read.estimate_time_offset
-            opened.append(
-                PictureLog.open(source, pictures, motion, camera, options, drive, robot, with_times=with_times)
-            )
+            opened.append(PictureLog.open(source, pictures, motion, camera, options, drive, robot, read))
     measured = robot is not None and robot.covariance_rad2 is not None
     tilt = robot if measured else _joined_tilts([one for one in opened if isinstance(one, PictureLog)])
     found = [_calibrated(one, tilt, drive, read, method, watching) for one in opened]
@@ -122,7 +119,7 @@ def _calibrated(
             estimate_odometry=read.estimate_odometry, estimate_time_offset=read.estimate_time_offset,
         )  # fmt: skip
 
-    log, whole, doubt = one.solved(None if tilt is None else tilt.robot_from_camera, read.read_as, solve)
+    log, whole, doubt = one.solved(None if tilt is None else tilt.robot_from_camera, solve)
     calibrator = SelfCalibrator(**noise() | drive.of_filter(), method=method)
     with status(f"{one.name}: the filter, {len(log.bearings)} bearings"):
         history = calibrator.follow(log.odometry, log.bearings)

@@ -123,21 +123,20 @@ class Tables:
         """What it is called."""
         return str(self.bearings)
 
-    def checked(self, *, with_times: bool) -> Tables:
+    def checked(self, how: LogOptions) -> Tables:
         """The same, read. Raises `InvalidInputError` that names file and line."""
         from tiltvp.drive_logs import read_drive_log
 
         log = read_drive_log(self.odometry, self.bearings)
-        if with_times and log.times_s is None:
+        if how.estimate_time_offset and log.times_s is None:
             raise InvalidInputError(f"{self.odometry}: no column time_s, expected one with --estimate-time-offset")
-        return replace(self, read=log)
+        return replace(self, read=log.read_as(*how.read_as))
 
-    def solved(self, _: NDArray[Any] | None, read_as: Sequence[str], solve: Solve) -> Solved:
+    def solved(self, _: NDArray[Any] | None, solve: Solve) -> Solved:
         """What was read, and what it says; bearings are what they are, whatever the mounting."""
         assert self.read is not None  # As `checked` has it.
-        log = self.read.read_as(*read_as)
-        with status(f"{self.name}: the whole log, {len(log.bearings)} bearings"):
-            return Solved(log, solve(log))
+        with status(f"{self.name}: the whole log, {len(self.read.bearings)} bearings"):
+            return Solved(self.read, solve(self.read))
 
 
 def sources_from(words: Sequence[str]) -> list[Tables | str]:

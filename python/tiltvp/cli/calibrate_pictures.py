@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from tiltvp import Camera, MountingTilt, Robot
-    from tiltvp.cli.calibrate_inputs import DriveOptions, Solve
+    from tiltvp.cli.calibrate_inputs import DriveOptions, LogOptions, Solve
     from tiltvp.cli.line_options import LineOptions
     from tiltvp.line_logs import SeenFrame
     from tiltvp.streams import FrameMotions, Frames, Wheels
@@ -89,10 +89,12 @@ class PictureLog:
         lines: LineOptions,
         drive: DriveOptions,
         robot: Robot | None,
-        *,
-        with_times: bool,
+        read: LogOptions,
     ) -> PictureLog:
-        """Opens a drive. With times these are brought to the odometry's clock, by how the images turn."""
+        """Opens a drive, whose odometry is read as was told, before anything is made of it.
+
+        Where the time offset is asked for, times are brought to the odometry's clock, by how the images turn.
+        """
         if camera is None:
             raise InvalidInputError(f"{source}: pictures without --camera, expected the camera's calibration")
         if pictures.tracks is not None:
@@ -100,9 +102,9 @@ class PictureLog:
         looked = SourceOptions(topic=pictures.topic).of_robot(robot, [source])
         frames, lens = looked.open([source]), camera.load()
         motion = motion.of_robot(robot, frames)
-        if with_times:
-            _bring_to_clock(frames, motion, lens, lines.rotation(), drive.wheel_base)
-        moved = needed_turns(motion.motions(frames, drive.wheel_base))
+        if read.estimate_time_offset:
+            _bring_to_clock(frames, motion, lens, lines.rotation(), drive.wheel_base, read.read_as)
+        moved = needed_turns(motion.motions(frames, drive.wheel_base, read.read_as))
         if moved is None:
             raise InvalidInputError(f"{source}: pictures without odometry, expected --odometry FILE")
         named = {"images": looked.topic, "odometry": motion.odometry_topic}
@@ -120,7 +122,7 @@ class PictureLog:
             tilts = drive_tilts(self.frames, estimator, self.moved.motions, advance=bar.advance)
         return mounting_tilt(tilts.estimates, tilts.motions, rotation, level_floor=self.pictures.level_floor)
 
-    def solved(self, robot_from_camera: NDArray[np.float64] | None, read_as: Sequence[str], solve: Solve) -> Solved:
+    def solved(self, robot_from_camera: NDArray[np.float64] | None, solve: Solve) -> Solved:
         """The bearings of lines in the frame of the mounting (3, 3), or of that which was given, and what they say.
 
         Tracks are written where they are asked for.
@@ -130,12 +132,13 @@ class PictureLog:
         from tiltvp.line_logs import displacements
         from tiltvp.streams import Motion
 
-        moved = self._moved(read_as)
-        named, seen = self._seen(moved, self.lines.rotation() if robot_from_camera is None else robot_from_camera)
+        moved = self.moved
+        named, seen = self._seen(self.lines.rotation() if robot_from_camera is None else robot_from_camera)
         sigmas = np.concatenate([one.lines.sigma_rad for one in seen])
         self.sigma_rad = float(np.median(sigmas)) if len(sigmas) else None
         motions = [one or Motion() for one in moved.motions]
-        odometry = displacements(motions, wheel_base_m=self._base_m)
+        assert self.drive.wheel_base is not None  # As `settled` has it.
+        odometry = displacements(motions, wheel_base_m=self.drive.wheel_base)
         try:
             with status(f"{self.name}: which line is which, and the whole log"):
                 found = calibrate_lines(
@@ -152,13 +155,13 @@ class PictureLog:
         return Solved(DriveLog(odometry, found.bearings, moved.times_s), found.whole, found.doubt)
 
     def _seen(
-        self, moved: FrameMotions, rotation: NDArray[np.float64]
+        self, rotation: NDArray[np.float64]
     ) -> tuple[tuple[tuple[str, float | None], ...], tuple[SeenFrame, ...]]:
         """Names and times of the frames that can be used, and their lines, without the images: a drive's together are
         more than the memory holds."""
         extractor = self.lines.extractor(self.camera, rotation=rotation)
-        drive = Drive(extractor, self.lines.tilts(self.camera, rotation=rotation), moved)
-        count, nothing = len(moved.motions), np.zeros((0, 0), np.uint8)
+        drive = Drive(extractor, self.lines.tilts(self.camera, rotation=rotation), self.moved)
+        count, nothing = len(self.moved.motions), np.zeros((0, 0), np.uint8)
         with progress_bar(count, f"{self.name}: lines") as bar:
             seen = [
                 ((frame.name, frame.time_s), replace(one, gray=nothing))
@@ -172,29 +175,6 @@ class PictureLog:
         named, lines = zip(*seen, strict=True)
         return named, lines
 
-    def _moved(self, read_as: Sequence[str]) -> FrameMotions:
-        """What the robot did, by our conventions."""
-        from tiltvp.drive_logs import DriveLog
-        from tiltvp.line_logs import displacements
-        from tiltvp.streams import Motion
-
-        if not read_as:
-            return self.moved
-        recorded = displacements([one or Motion() for one in self.moved.motions], wheel_base_m=self._base_m)
-        log = DriveLog(recorded, np.array([[0.0, 0.0, 1.0]]), self.moved.times_s).read_as(*read_as)
-        if log.bearings[0, 2] != 1.0:
-            raise InvalidInputError(f"--read-as {' '.join(read_as)} with pictures, expected words about the wheels")
-        read = [
-            one and Motion((right - left) / self._base_m, 0.5 * (left + right), (left, right))
-            for one, (left, right) in zip(self.moved.motions, log.odometry.tolist(), strict=True)
-        ]
-        return replace(self.moved, motions=read)
-
-    @property
-    def _base_m(self) -> float:
-        assert self.drive.wheel_base is not None  # As `settled` has it.
-        return self.drive.wheel_base
-
     def robot(self) -> Robot:
         """The robot as far as it was told: camera, mounting as it was given, mask, wheels, topics."""
         from tiltvp import Robot
@@ -204,7 +184,12 @@ class PictureLog:
 
 
 def _bring_to_clock(
-    frames: Frames, motion: MotionOptions, camera: Camera, rotation: NDArray[np.float64], wheel_base_m: float | None
+    frames: Frames,
+    motion: MotionOptions,
+    camera: Camera,
+    rotation: NDArray[np.float64],
+    wheel_base_m: float | None,
+    read_as: Sequence[str],
 ) -> None:
     """Takes from the times of the frames by how much they are late. Raises `InvalidInputError` where nothing tells."""
     from tiltvp.streams import read_odometry
@@ -213,7 +198,8 @@ def _bring_to_clock(
     record = motion.odometry or frames.recording
     if frames.times_s is None or record is None:
         raise InvalidInputError(f"--estimate-time-offset with {frames.source}, whose times are not known")
-    odometry = read_odometry(record, topic=motion.odometry_topic, wheels=motion.wheels(wheel_base_m))
+    wheels = motion.wheels(wheel_base_m)
+    odometry = read_odometry(record, topic=motion.odometry_topic, wheels=wheels, read_as=read_as)
     count = min(_CLOCK_FRAMES, len(frames.times_s))
     images = (frame.read() for frame in frames.sample(range(count)))
     found = frame_delay(images, frames.times_s[:count], odometry, camera, rotation)

@@ -120,14 +120,14 @@ class MotionOptions:
         base = wheel_base_m if robot is None else wheel_base_m or robot.wheels.wheel_base_m
         return self.of_robot(robot, frames).motions(frames, base)
 
-    def motions(self, frames: Frames, wheel_base_m: float | None) -> FrameMotions | None:
+    def motions(self, frames: Frames, wheel_base_m: float | None, read_as: Sequence[str] = ()) -> FrameMotions | None:
         """What the robot did up to each frame, None without odometry; a line on stderr for what is noted."""
         from tiltvp.streams import frame_motions
 
         wheels = self.wheels(wheel_base_m)
         if self.odometry is None:
-            return self._of_recording(frames, wheels)
-        found = frame_motions(frames, self.odometry, topic=self.odometry_topic, wheels=wheels)
+            return self._of_recording(frames, wheels, read_as)
+        found = frame_motions(frames, self.odometry, topic=self.odometry_topic, wheels=wheels, read_as=read_as)
         tell(*found.notes)
         return found
 
@@ -140,7 +140,7 @@ class MotionOptions:
             joints=self.wheel_joints, gap_max_s=self.odometry_gap,
         )  # fmt: skip
 
-    def _of_recording(self, frames: Frames, wheels: Wheels) -> FrameMotions | None:
+    def _of_recording(self, frames: Frames, wheels: Wheels, read_as: Sequence[str]) -> FrameMotions | None:
         """What the recording of the frames tells; None where it tells nothing and nobody asked."""
         from tiltvp.streams import frame_motions
 
@@ -149,9 +149,9 @@ class MotionOptions:
                 raise InvalidInputError(f"--odometry-topic {self.odometry_topic}: no recording, expected --odometry")
             return None
         try:
-            found = frame_motions(frames, frames.recording, topic=self.odometry_topic, wheels=wheels)
+            found = frame_motions(frames, frames.recording, topic=self.odometry_topic, wheels=wheels, read_as=read_as)
         except InvalidInputError as error:
-            if self.odometry_topic is not None:
+            if self.odometry_topic is not None or read_as:
                 raise
             tell(f"no odometry: {error}")
             return None

@@ -7,6 +7,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+import numpy as np
+
+from tiltvp.drive_logs import DriveLog
 from tiltvp.errors import InvalidInputError
 from tiltvp.streams.bags import Recording, is_recording
 from tiltvp.streams.odometry import Motion, Odometry
@@ -14,7 +17,6 @@ from tiltvp.streams.odometry_tables import OdometryTable
 from tiltvp.streams.wheels import Wheels
 
 if TYPE_CHECKING:
-    import numpy as np
     from numpy.typing import NDArray
 
     from tiltvp.streams.frames import Frames
@@ -38,17 +40,24 @@ class FrameMotions:
     """Sentences that whoever uses it should know: frames left out, counters that began anew."""
 
 
-def read_odometry(source: str | os.PathLike[str], *, topic: str | None = None, wheels: Wheels = _DEFAULTS) -> Odometry:
+def read_odometry(
+    source: str | os.PathLike[str],
+    *,
+    topic: str | None = None,
+    wheels: Wheels = _DEFAULTS,
+    read_as: Sequence[str] = (),
+) -> Odometry:
     """The odometry of a recording, or of a table with the column `time_s`.
 
-    `topic` is that of a bag, by default the only one; `wheels` is what the record does not say of the wheels. Raises
-    `InvalidInputError` that says what is missing, or what is wrong in which line.
+    `topic` is that of a bag, by default the only one; `wheels` is what the record does not say of the wheels; `read_as`
+    names conventions about wheels by which it was recorded, as of `DriveLog.read_as`. Raises `InvalidInputError` that
+    says what is missing, or what is wrong in which line.
     """
     if is_recording(source):
         from tiltvp.streams.bag_motion import bag_odometry
 
-        return bag_odometry(Recording(source), topic, wheels)
-    return OdometryTable.read(source).odometry(wheels)
+        return _by_ours(bag_odometry(Recording(source), topic, wheels), wheels, read_as)
+    return _by_ours(OdometryTable.read(source).odometry(wheels), wheels, read_as)
 
 
 def frame_motions(
@@ -57,8 +66,9 @@ def frame_motions(
     *,
     topic: str | None = None,
     wheels: Wheels = _DEFAULTS,
+    read_as: Sequence[str] = (),
 ) -> FrameMotions:
-    """What the robot did up to each frame, by a recording or a table.
+    """What the robot did up to each frame, by a recording or a table; other arguments are those of `read_odometry`.
 
     A table with a column `file` has a row for each frame. Other records are interpolated at the frames' times; a table
     of as many rows as frames without times has one for each of these, in their order. Raises `InvalidInputError`.
@@ -66,21 +76,54 @@ def frame_motions(
     if frames.names is None:
         raise InvalidInputError(f"{frames.source}: frames of unknown number, expected a recording for odometry")
     if is_recording(source):
-        return _interpolated(frames, read_odometry(source, topic=topic, wheels=wheels))
+        return _interpolated(frames, read_odometry(source, topic=topic, wheels=wheels, read_as=read_as))
     table = OdometryTable.read(source)
     if table.times_s is not None and table.files is None:
         if frames.times_s is not None:
-            return _interpolated(frames, table.odometry(wheels))
+            return _interpolated(frames, _by_ours(table.odometry(wheels), wheels, read_as))
         if len(table) != len(frames.names):
             raise InvalidInputError(
                 f"{frames.source}: no times of the images, expected them in frames.csv (file, time_s) beside these, or "
                 f"as many rows in {table.name} as images"
             )
     motions, rows, turns = table.motions(frames.names, wheels)
+    if read_as:
+        steps = np.arange(len(motions), dtype=np.float64)
+        recorded = _by_ours(_summed(motions, turns, table.name), wheels, read_as)
+        motions, turns = [motion or Motion() for motion in recorded.motions(steps)], recorded.yaw_rad is not None
     times = frames.times_s
     if times is None and table.times_s is not None:
         times = table.times_s[rows]
     return FrameMotions(motions, turns, times, () if turns else (_no_turns(table.name),))
+
+
+def _by_ours(record: Odometry, wheels: Wheels, read_as: Sequence[str]) -> Odometry:
+    """A record of other conventions by ours, sample by sample; wheels that are not recorded are those of the motion."""
+    if not read_as:
+        return record
+    rolled = record.wheels_m
+    if rolled is None:
+        if record.yaw_rad is None or wheels.wheel_base_m is None:
+            raise InvalidInputError(f"{record.source}: no wheels to read as {' '.join(read_as)}, expected a wheel base")
+        aside = 0.5 * wheels.wheel_base_m * record.yaw_rad
+        rolled = np.stack([record.distance_m - aside, record.distance_m + aside], axis=1)
+    log = DriveLog(np.diff(rolled, axis=0, prepend=0.0), np.array([[0.0, 0.0, 1.0]]), None).read_as(*read_as)
+    if log.bearings[0, 2] != 1.0:
+        raise InvalidInputError(f"{record.source}: read as {' '.join(read_as)}, expected words about the wheels")
+    return Odometry.from_wheels(
+        record.times_s, np.cumsum(log.odometry, axis=0), wheel_base_m=wheels.wheel_base_m, source=record.source,
+        notes=record.notes, gap_max_s=record.gap_max_s,
+    )  # fmt: skip
+
+
+def _summed(motions: Sequence[Motion], turns_known: bool, source: str) -> Odometry:
+    """Motions, one a second."""
+    yaw = np.cumsum([motion.yaw_rad for motion in motions]) if turns_known else None
+    wheels = [motion.wheels_m for motion in motions if motion.wheels_m is not None]
+    return Odometry(
+        np.arange(len(motions), dtype=np.float64), np.cumsum([motion.distance_m for motion in motions]), yaw,
+        np.cumsum(wheels, axis=0) if len(wheels) == len(motions) else None, source,
+    )  # fmt: skip
 
 
 def _interpolated(frames: Frames, odometry: Odometry) -> FrameMotions:

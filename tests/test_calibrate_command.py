@@ -1,0 +1,52 @@
+"""`tiltvp calibrate`: what its options are taken for, and what is refused before any work is done."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import tiltvp
+from tiltvp.cli.calibrate_inputs import DriveOptions, LogOptions
+from tiltvp.cli.calibrate_pictures import PictureLog, PictureOptions
+from tiltvp.cli.line_options import DrivingLineOptions
+from tiltvp.cli.options import CameraOptions
+from tiltvp.cli.sources import MotionOptions
+
+CAMERA = tiltvp.Camera.equidistant(width=24, height=24, focal_px=8.0, cx=11.5, cy=11.5)
+FRAMES = 5
+STEPS = [(0.02, 0.03), (0.01, 0.05)] * 20
+"""Of the wheels, ten a second."""
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    """A drive: black images two a second, and wheels."""
+    CAMERA.save(tmp_path / "camera.toml")
+    for k in range(FRAMES):
+        tiltvp.write_image(tmp_path / "images" / f"{k}.png", np.zeros((24, 24), np.uint8))
+    rows = "".join(f"{k}.png,{0.5 * k}\n" for k in range(FRAMES))
+    (tmp_path / "images" / "frames.csv").write_text("file,time_s\n" + rows)
+    wheels(tmp_path / "odometry.csv", 1.0)
+    return tmp_path
+
+
+def wheels(path: Path, left: float) -> None:
+    rows = "".join(f"{0.1 * k},{left * step[0]},{step[1]}\n" for k, step in enumerate(STEPS))
+    path.write_text("time_s,left_m,right_m\n" + rows)
+
+
+def opened(folder: Path, *, odometry: str = "odometry.csv", read: LogOptions | None = None) -> PictureLog:
+    return PictureLog.open(
+        str(folder / "images"), PictureOptions(), MotionOptions(odometry=folder / odometry),
+        CameraOptions(camera=folder / "camera.toml"), DrivingLineOptions(), DriveOptions(wheel_base=0.4), None,
+        read or LogOptions(),
+    )  # fmt: skip
+
+
+def test_the_record_is_mended_before_anything_is_made_of_it(folder: Path) -> None:
+    wheels(folder / "negated.csv", -1.0)
+    mended = opened(folder, odometry="negated.csv", read=LogOptions(read_as=("left-wheel-negated",))).moved.motions
+    for ours, right in zip(mended, opened(folder).moved.motions, strict=True):
+        assert (ours.yaw_rad, ours.distance_m) == pytest.approx((right.yaw_rad, right.distance_m))
