@@ -12,9 +12,11 @@ import pytest
 import tiltvp
 from commands import Run
 from tiltvp.cli.line_options import LineOptions
+from tiltvp.cli.options import MethodOptions
 from tiltvp.errors import ImageFileError, InvalidInputError, UnknownLeanError
 from tiltvp.images import read_image, write_image
 from tiltvp.lab.plots.tracks import track_plot
+from tiltvp.rotations import read_rotation
 from tiltvp.streams import open_frames
 from tiltvp.synth import MIRROR_BLIND_RAD, Drive, Room, RoomImage, mirror_camera
 from tiltvp.videos import video_writer
@@ -41,6 +43,16 @@ def folder(tmp_path_factory: pytest.TempPathFactory, drive: Drive) -> Path:
     rows = [f"{k}.png,{turn!r}" for k, turn in enumerate(drive.motions[:, 1].tolist())]
     (root / "odometry.csv").write_text("\n".join(["file,yaw_rad", *rows]) + "\n")
     return root
+
+
+def test_panoramas_look_ahead_for_lines_as_for_tilts() -> None:
+    camera = tiltvp.Camera.equirectangular(width=80, height=40)
+    ahead = read_rotation("forward")
+    np.testing.assert_array_equal(LineOptions().extractor(camera).robot_from_camera, ahead)
+    np.testing.assert_array_equal(MethodOptions().estimator(camera).robot_from_camera, ahead)
+    told = LineOptions(robot_from_camera="up")
+    np.testing.assert_array_equal(told.extractor(camera).robot_from_camera, np.eye(3))
+    np.testing.assert_array_equal(LineOptions().extractor(mirror_camera()).robot_from_camera, np.eye(3))
 
 
 def test_lines_of_images(run: Run, folder: Path, tmp_path: Path) -> None:

@@ -103,7 +103,7 @@ class PictureLog:
         frames, lens = looked.open([source]), camera.load()
         motion = motion.of_robot(robot, frames)
         if read.estimate_time_offset:
-            _bring_to_clock(frames, motion, lens, lines.rotation(), drive.wheel_base, read.read_as)
+            _bring_to_clock(frames, motion, lens, lines.mounting(lens), drive.wheel_base, read.read_as)
         moved = needed_turns(motion.motions(frames, drive.wheel_base, read.read_as))
         if moved is None:
             raise InvalidInputError(f"{source}: pictures without odometry, expected --odometry FILE")
@@ -133,7 +133,7 @@ class PictureLog:
         from tiltvp.streams import Motion
 
         moved = self.moved
-        named, seen = self._seen(self.lines.rotation() if robot_from_camera is None else robot_from_camera)
+        named, seen = self._seen(self.lines.mounting(self.camera) if robot_from_camera is None else robot_from_camera)
         sigmas = np.concatenate([one.lines.sigma_rad for one in seen])
         self.sigma_rad = float(np.median(sigmas)) if len(sigmas) else None
         motions = [one or Motion() for one in moved.motions]
@@ -180,7 +180,7 @@ class PictureLog:
         from tiltvp import Robot
 
         mask: Any = None if self.lines.mask is None else mask_from(self.lines.mask)
-        return Robot(self.camera, self.lines.rotation(), mask=mask, wheels=self.wheels, topics=self.topics)
+        return Robot(self.camera, self.lines.mounting(self.camera), mask=mask, wheels=self.wheels, topics=self.topics)
 
 
 def _bring_to_clock(

@@ -10,7 +10,7 @@ from cyclopts import Group, Parameter, validators
 
 from tiltvp._core import LINE_METHODS
 from tiltvp.cli.declared_options import from_library, mask_from
-from tiltvp.cli.options import MountedOptions, check_word, rotation_of
+from tiltvp.cli.options import MountedOptions, check_word
 
 if TYPE_CHECKING:
     import numpy as np
@@ -43,7 +43,9 @@ class LineOptions(MountedOptions):
 
         check_word("--method", self.method or LINE_METHODS[0], LINE_METHODS)
         options = self.given() | ({} if self.method is None else {"method": self.method})
-        return LineExtractor(camera, robot_from_camera=self.rotation() if rotation is None else rotation, **options)
+        return LineExtractor(
+            camera, robot_from_camera=self.mounting(camera) if rotation is None else rotation, **options
+        )
 
     def tilts(
         self, camera: Camera, *, rotation: NDArray[np.float64] | None = None
@@ -56,7 +58,7 @@ class LineOptions(MountedOptions):
         check_word("--tilt", self.tilt, (_UPRIGHT, *METHODS))
         if self.tilt == _UPRIGHT:
             return lambda _: None
-        mounting = self.rotation() if rotation is None else rotation
+        mounting = self.mounting(camera) if rotation is None else rotation
         own = TILT_OPTIONS if self.tilt == TILT_OPTIONS["method"] else {"method": self.tilt}
         options: dict[str, Any] = {**own, "robot_from_camera": mounting}
         if self.mask is not None:
@@ -64,10 +66,6 @@ class LineOptions(MountedOptions):
         estimator, extractor = TiltEstimator(camera, **options), self.extractor(camera, rotation=mounting)
 
         return believed_leans(estimator, extractor, confidence_min=self.tilt_confidence_min)
-
-    def rotation(self) -> NDArray[np.float64]:
-        """The mounting that was given, or that of a camera that looks up."""
-        return rotation_of(self.robot_from_camera or "up")
 
 
 @Parameter(name="*", group=_LINES)

@@ -111,13 +111,15 @@ class MountedOptions(LibraryOptions):
     mask: Path | None = None
     """Image of the camera's size, white where the world is seen and black where the robot is."""
 
+    def mounting(self, camera: "Camera") -> "NDArray[np.float64]":
+        """(3, 3): the mounting that was given, or that of a camera that looks up, of a panorama's that looks ahead."""
+        return rotation_of(self.robot_from_camera or ("forward" if camera.model == "equirectangular" else "up"))
+
     def mounted(self, camera: "Camera", **options: Any) -> "TiltEstimator":
         """An estimator of that mounting and mask, with these options."""
         from tiltvp import TiltEstimator
 
-        mounting = self.robot_from_camera or ("forward" if camera.model == "equirectangular" else None)
-        if mounting is not None:
-            options["robot_from_camera"] = rotation_of(mounting)
+        options["robot_from_camera"] = self.mounting(camera)
         if self.mask is not None and "mask" not in options:
             options["mask"] = mask_from(self.mask)
         return TiltEstimator(camera, **options)
