@@ -171,6 +171,11 @@ def test_tilts_are_joined_but_for_what_they_share() -> None:
     assert not join_tilts([tilted(0.010, 0.02), tilted(0.06, 0.02)])
     with pytest.raises(InvalidInputError, match="a drive"):
         join_tilts([tilted(0.0, 0.0, known=False)])
+    one = tilted(0.010, 0.02)
+    for count in (1, 2):
+        alone = join_tilts([Tilt(one.robot_from_camera, LEAN, LEAN)] * count)
+        np.testing.assert_allclose(alone.covariance_rad2, LEAN)
+        np.testing.assert_allclose(alone.robot_from_camera, one.robot_from_camera, atol=1e-12)
     for nothing in (join_tilts, join_logs):
         with pytest.raises(InvalidInputError, match="none, expected one or more"):
             nothing([])

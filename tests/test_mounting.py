@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from tiltvp import Camera, TiltEstimate, TiltEstimator, mounting_tilt
+from tiltvp import Camera, TiltEstimate, TiltEstimator, join_tilts, mounting_tilt
 from tiltvp.errors import InvalidInputError
 from tiltvp.rotations import about_vertical, levelling
 from tiltvp.streams import Motion
@@ -141,3 +141,25 @@ def test_at_one_heading_scatter_tells_nothing(template):
     found = mounting_tilt([one[0]] * 60, motions, np.eye(3), level_floor=True)
     assert found.sigma_rad >= SIGMA
     assert found.shared_rad2[0, 0] == pytest.approx(SIGMA**2)
+
+
+def test_a_drive_of_few_images_is_joined_as_it_is(template):
+    """What its images share may be all that is known of it."""
+    estimates, motions = drive(template, direction(1.2, 0.3), direction(0.0, 0.0), np.zeros(12))
+    found = mounting_tilt(estimates, motions, np.eye(3), level_floor=True)
+    np.testing.assert_array_equal(found.covariance_rad2, found.shared_rad2)
+    for joined in (join_tilts([found]), join_tilts([found] * 3)):
+        assert joined
+        np.testing.assert_allclose(joined.covariance_rad2, found.covariance_rad2, rtol=1e-6)
+        np.testing.assert_allclose(joined.robot_from_camera, found.robot_from_camera, atol=1e-12)
+
+
+def test_deviations_are_no_less_than_the_filters_in_any_direction(template):
+    """Over a level floor, told to be so, without a turn: images that tell the pitch far better than the roll."""
+    estimates, motions = drive(template, direction(1.2, 0.3), direction(0.0, 0.0), np.zeros(60))
+    told = [[(0.01 * SIGMA) ** 2, 0.0], [0.0, SIGMA**2]]
+    estimates = [TiltEstimate.from_dict(one.to_dict() | {"covariance_rad2": told}) for one in [estimates[0]] * 60]
+    found = mounting_tilt(estimates, motions, np.eye(3), level_floor=True)
+    # A floor that is level to 0.05 degrees is all that tells the pitch.
+    assert math.degrees(math.sqrt(found.covariance_rad2[1, 1])) >= 0.0499
+    assert np.linalg.eigvalsh(found.covariance_rad2 - found.shared_rad2)[0] >= 0.0

@@ -29,6 +29,8 @@ _FALSE_ALARM: Final = 1e-3
 """How often logs that differ by chance alone, by their covariances, are said to contradict one another."""
 _START_SIGMA: Final = (0.3, 0.3, 0.5)
 """That of `tiltvp.calibrate`, by default."""
+_TRACE: Final = 1e-9
+"""Of what drives have in common: so much each is taken to have by itself, so that one that has no more has a weight."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -247,7 +249,8 @@ def join_tilts(tilts: Sequence[MountingTilt]) -> JoinedTilts:
     # Turns about the robot's axes from the first one's mounting to each.
     turns = [tilt.robot_from_camera @ tilts[0].robot_from_camera.T for tilt in tilts]
     values = np.array([[turn[2, 1], -turn[2, 0]] for turn in turns]).reshape(-1, 2)
-    value, covariance, distance, limit, odd = _joined(values, covariances - shared, "tilts", looked_at=covariances)
+    own = covariances - (1.0 - _TRACE) * shared
+    value, covariance, distance, limit, odd = _joined(values, own, "tilts", looked_at=covariances)
     about_x, about_y = value
     rotation = _small_turn(about_x, about_y) @ tilts[0].robot_from_camera
     covariance = covariance + shared.mean(axis=0)

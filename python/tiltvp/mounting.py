@@ -69,7 +69,8 @@ class MountingTilt:
     """Whether the floor was said to be level."""
     covariance_rad2: NDArray[np.float64]
     """(2, 2): of the errors of the mounting about the robot's x and y axes. The sum of `shared_rad2` and of what it
-    scatters by when eighths of the drive are left out; where there was not half a turn, the filter's if larger."""
+    scatters by when eighths of the drive are left out; where there was not half a turn, or too few images for that, no
+    less than the filter's in any direction."""
     shared_rad2: NDArray[np.float64]
     """(2, 2): what no turn averages out: a part of what images scatter by, without turns all that one may err by."""
 
@@ -141,7 +142,7 @@ def mounting_tilt(
         shared = share * np.median(whole.covariances, axis=0)
         scatter = _scatter(given, motions, lean, level_floor=level_floor) if used >= 2 * _PARTS else None
         stated = (1.0 if scatter is None else alike) * max(1.0, excess) * covariance
-        covariance = max(shared, stated, key=np.trace) + (0.0 if scatter is None else scatter)
+        covariance = shared + _beyond(stated, shared) + (0.0 if scatter is None else scatter)
     return MountingTilt(
         upright, lean, whole.floor, len(given), used, turned, level_floor, _about_axes(covariance), _about_axes(shared)
     )
@@ -200,6 +201,13 @@ def _scatter(
     together = np.array(moves)
     scatter: NDArray[np.float64] = _FEW_PARTS * together.T @ together
     return scatter
+
+
+def _beyond(larger: NDArray[np.float64], than: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(2, 2): by how much a covariance exceeds another one, in the directions in which it does."""
+    values, axes = np.linalg.eigh(larger - than)
+    exceeding: NDArray[np.float64] = axes * np.maximum(values, 0.0) @ axes.T
+    return exceeding
 
 
 def _about_axes(covariance: NDArray[np.float64]) -> NDArray[np.float64]:
