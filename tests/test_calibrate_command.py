@@ -8,14 +8,18 @@ import numpy as np
 import pytest
 
 import tiltvp
+from tiltvp import Robot
+from tiltvp.cli import main
 from tiltvp.cli.calibrate_inputs import DriveOptions, LogOptions
 from tiltvp.cli.calibrate_pictures import PictureLog, PictureOptions
 from tiltvp.cli.line_options import DrivingLineOptions
 from tiltvp.cli.options import CameraOptions
 from tiltvp.cli.sources import MotionOptions
+from tiltvp.synth import simulate_drive
 
 CAMERA = tiltvp.Camera.equidistant(width=24, height=24, focal_px=8.0, cx=11.5, cy=11.5)
 FRAMES = 5
+SURE = ("--start", "0.2", "0", "0", "--start-sigma", "0.1", "0.1", "0.3")
 STEPS = [(0.02, 0.03), (0.01, 0.05)] * 20
 """Of the wheels, ten a second."""
 
@@ -50,3 +54,28 @@ def test_the_record_is_mended_before_anything_is_made_of_it(folder: Path) -> Non
     mended = opened(folder, odometry="negated.csv", read=LogOptions(read_as=("left-wheel-negated",))).moved.motions
     for ours, right in zip(mended, opened(folder).moved.motions, strict=True):
         assert (ours.yaw_rad, ours.distance_m) == pytest.approx((right.yaw_rad, right.distance_m))
+
+
+@pytest.fixture(scope="module")
+def tables(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A log of a simulated drive, and a robot of which roll, pitch and height are known."""
+    folder, drive = tmp_path_factory.mktemp("tables"), simulate_drive("alternating", seed=4)
+    steps = "".join(f"{k},{left!r},{right!r}\n" for k, (left, right) in enumerate(drive.odometry.tolist()))
+    (folder / "wheels.csv").write_text("step,delta_left_m,delta_right_m\n" + steps)
+    seen = "".join(f"{int(step)},{int(landmark)},{angle!r}\n" for step, landmark, angle in drive.bearings.tolist())
+    (folder / "bearings.csv").write_text("step,landmark,bearing_rad\n" + seen)
+    measured = Robot(CAMERA, np.eye(3), covariance_rad2=1e-6 * np.eye(2), place_m=(0.2, 0.0), height_m=0.4)
+    measured.save(folder / "robot.toml")
+    return folder
+
+
+def calibrate(folder: Path, *words: object) -> int:
+    logs = (folder / "wheels.csv", folder / "bearings.csv")
+    return main([str(word) for word in ("calibrate", *logs, "--wheel-base", 0.4, *SURE, *words)])
+
+
+def test_the_height_of_a_robots_file_is_kept(tables: Path, tmp_path: Path) -> None:
+    robot, again = tables / "robot.toml", tmp_path / "again.toml"
+    for given, height in (((), 0.4), (("--height", "0.7"), 0.7)):
+        assert calibrate(tables, "--camera", robot, "--robot-out", again, "--overwrite", *given) == 0
+        assert Robot.load(again).height_m == height

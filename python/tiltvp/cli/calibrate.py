@@ -58,7 +58,7 @@ def calibrate(
     results.check(camera)
     watching.check()
     sources, robot = sources_from(logs), None if camera is None else camera.robot()
-    drive = drive.settled(robot)
+    drive, results = drive.settled(robot), results.settled(robot)
     if camera is not None:
         options = camera.complete(options)
     if any(isinstance(source, Tables) for source in sources):

@@ -6,7 +6,7 @@ import json
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 from cyclopts import Group, Parameter
@@ -55,7 +55,7 @@ class ResultOptions:
     """Name of the camera's frame, for transforms; default is camera_optical where roll and pitch are known, and
     otherwise camera_mount."""
     height: float | None = None
-    """Height of the camera in the robot's frame, metres: no drive tells it."""
+    """Height of the camera in the robot's frame, metres: no drive tells it; by default that of a robot's file."""
     transform: Path | None = None
     """File for the transform: .urdf (link and joint), .yaml, .kalibr.yaml, or .mcap (/tf_static of ROS 2)."""
     robot_out: Path | None = None
@@ -79,6 +79,10 @@ class ResultOptions:
         if self.transform is not None:
             check_transform(self.transform)
         check_plot("--plot", self.plot)
+
+    def settled(self, robot: Robot | None) -> Self:
+        """With the height that a robot's file knows, where none was given."""
+        return self if robot is None or self.height is not None else replace(self, height=robot.height_m)
 
     def tell(
         self,
