@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +16,8 @@ from tiltvp.cli.calibrate_pictures import PictureLog, PictureOptions
 from tiltvp.cli.line_options import DrivingLineOptions
 from tiltvp.cli.options import CameraOptions
 from tiltvp.cli.sources import MotionOptions
+from tiltvp.errors import OutputError
+from tiltvp.streams.outputs.transforms import StaticTransform
 from tiltvp.synth import simulate_drive
 
 CAMERA = tiltvp.Camera.equidistant(width=24, height=24, focal_px=8.0, cx=11.5, cy=11.5)
@@ -79,3 +82,36 @@ def test_the_height_of_a_robots_file_is_kept(tables: Path, tmp_path: Path) -> No
     for given, height in (((), 0.4), (("--height", "0.7"), 0.7)):
         assert calibrate(tables, "--camera", robot, "--robot-out", again, "--overwrite", *given) == 0
         assert Robot.load(again).height_m == height
+
+
+@pytest.mark.parametrize(
+    ("words", "hint"),
+    [
+        (("--child-frame", "camera-optical"), "child = 'camera-optical', expected the name of a frame"),
+        (("--child-frame", "base_link"), "child = 'base_link', expected another name than that of the parent"),
+        (("--parent-frame", "camera_optical"), "child = 'camera_optical', expected another name"),
+        (("--height", "nan"), "--height = nan, expected finite metres"),
+        (("--robot-out", "masked.toml"), "masked-mask.png: exists"),
+    ],
+)
+def test_what_cannot_be_written_is_refused_before_any_work(
+    tables: Path, words: tuple[str, ...], hint: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tables)
+    Robot(CAMERA, np.eye(3), mask=np.ones((24, 24), np.bool_)).save("told.toml")
+    tiltvp.write_image("masked-mask.png", np.zeros((24, 24), np.uint8))
+    monkeypatch.setattr(tiltvp, "calibrate", lambda *_, **__: pytest.fail("there was work"))
+    assert calibrate(tables, "--camera", "told.toml", *words) == 2
+    assert hint in capsys.readouterr().err
+
+
+def test_what_was_found_is_kept_where_the_transform_cannot_be_written(
+    tables: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def full(*_: object) -> None:
+        raise OutputError("disk full")
+
+    monkeypatch.setattr(StaticTransform, "write", full)
+    assert calibrate(tables, "--out", tmp_path / "found.json", "--transform", tmp_path / "camera.urdf") != 0
+    assert "disk full" in capsys.readouterr().err
+    assert json.loads((tmp_path / "found.json").read_text())["extrinsics"]["known"] is True

@@ -25,6 +25,9 @@ if TYPE_CHECKING:
 
 __all__ = ["Extrinsics", "JoinedLogs", "JoinedTilts", "join_logs", "join_tilts"]
 
+CHILD_FRAMES: Final = ("camera_mount", "camera_optical")
+"""Names of the camera's frame in transforms, if no other is given: of a level one, and of one whose roll and pitch mean
+something."""
 _FALSE_ALARM: Final = 1e-3
 """How often logs that differ by chance alone, by their covariances, are said to contradict one another."""
 _START_SIGMA: Final = (0.3, 0.3, 0.5)
@@ -165,12 +168,12 @@ class Extrinsics:
         """As a transform for ROS and for files; what is missing is 0 there, and named.
 
         The child is the camera's frame (`camera_optical`, z along the optical axis), or a level frame at the camera
-        (`camera_mount`) where roll and pitch mean nothing. Raises `InvalidInputError` for names that no frame can have
-        and for numbers that are not finite.
+        (`camera_mount`) where roll and pitch mean nothing. Raises `InvalidInputError` for names that no frame can have,
+        for one name of both, and for numbers that are not finite.
         """
         sigmas = zip(COVARIANCE_AXES, np.sqrt(np.diag(self.covariance)).tolist(), strict=True)
         return StaticTransform(
-            parent, child or ("camera_optical" if self.oriented else "camera_mount"),
+            parent, child or CHILD_FRAMES[self.oriented],
             np.array([*self.place_m, self.height_m or 0.0]), self.robot_from_camera, self.missing,
             tuple((name, sigma) for name, sigma in sigmas if not math.isnan(sigma)),
             self.covariance if self.measured else None,

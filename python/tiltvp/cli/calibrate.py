@@ -55,12 +55,12 @@ def calibrate(
     method
         The filter: default, or paper.
     """
-    results.check(camera)
     watching.check()
     sources, robot = sources_from(logs), None if camera is None else camera.robot()
     drive, results = drive.settled(robot), results.settled(robot)
     if camera is not None:
         options = camera.complete(options)
+    results.check(camera, options.mask)
     if any(isinstance(source, Tables) for source in sources):
         pictures.refuse(motion, camera if robot is None else None)
     of_one_log = {"--odometry": motion.odometry, "--tracks": pictures.tracks, RERUN: watching.rerun}

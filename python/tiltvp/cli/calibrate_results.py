@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -16,7 +17,7 @@ from tiltvp.cli.tables import check_plot, finite
 from tiltvp.cli.terminal import complain, new_table, say, show
 from tiltvp.errors import InvalidInputError
 from tiltvp.files import check_output, write_whole
-from tiltvp.streams.outputs.transforms import COVARIANCE_AXES, check_transform
+from tiltvp.streams.outputs.transforms import COVARIANCE_AXES, check_frames, check_transform
 
 if TYPE_CHECKING:
     from tiltvp import Extrinsics, JoinedTilts, LogCalibration, MountingEstimate, Robot, SelfCalibrator
@@ -67,8 +68,15 @@ class ResultOptions:
     plot: Path | None = None
     """Picture of the filter's convergence (.png)."""
 
-    def check(self, camera: CameraOptions | None) -> None:
-        """Refuses files that cannot be written, before any work is done."""
+    def check(self, camera: CameraOptions | None, mask: Path | None) -> None:
+        """Refuses what cannot be written, before any work is done; with a mask the robot's file has one beside it."""
+        from tiltvp.extrinsics import CHILD_FRAMES
+        from tiltvp.robot import mask_path
+
+        for child in CHILD_FRAMES if self.child_frame is None else [self.child_frame]:
+            check_frames(self.parent_frame, child)
+        if self.height is not None and not math.isfinite(self.height):
+            raise InvalidInputError(f"--height = {self.height}, expected finite metres")
         for name, path, ending in (("--out", self.out, ".json"), ("--robot-out", self.robot_out, ".toml")):
             if path is not None:
                 if path.suffix.lower() != ending:
@@ -76,6 +84,8 @@ class ResultOptions:
                 check_output(path)
         if self.robot_out is not None and camera is None:
             raise InvalidInputError(f"--robot-out {self.robot_out} without --camera, expected both")
+        if self.robot_out is not None and mask is not None:
+            check_output(mask_path(self.robot_out))
         if self.transform is not None:
             check_transform(self.transform)
         check_plot("--plot", self.plot)
@@ -95,7 +105,8 @@ class ResultOptions:
         for one in found:
             _show(one, several=len(found) > 1)
         known = self._joined(found, tilt, robot_from_camera, drive)
-        written: dict[str, Any] = {}
+        written: dict[str, Any] = {"logs": [_plain_log(one) for one in found]}
+        transform = None
         if known is not None:
             _show_extrinsics(known)
             written["extrinsics"] = _plain_extrinsics(known)
@@ -107,16 +118,15 @@ class ResultOptions:
             }  # fmt: skip
             for text in filter(None, (transform.ros_command(), transform.urdf_joint(), transform.note)):
                 say(text)
-            if self.transform is not None:
-                transform.write(self.transform)
         else:
             reasons = ["no log can be relied upon"] if known is None else known.reasons
             say(f"no transform: {'; '.join(reasons)}: --anyway prints it")
+        if self.out is not None:
+            write_whole(self.out, json.dumps(finite(written), indent=1, allow_nan=False) + "\n")
+        if self.transform is not None and transform is not None:
+            transform.write(self.transform)
         if self.plot is not None:
             _write_plot(found, self.plot)
-        if self.out is not None:
-            written = {"logs": [_plain_log(one) for one in found]} | written
-            write_whole(self.out, json.dumps(finite(written), indent=1, allow_nan=False) + "\n")
         return known
 
     def write_robot(self, known: Extrinsics, robot: Robot | None) -> None:

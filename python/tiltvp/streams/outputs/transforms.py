@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
     Matrix = NDArray[np.float64]
 
-__all__ = ["COVARIANCE_AXES", "TRANSFORM_ENDINGS", "StaticTransform", "check_transform"]
+__all__ = ["COVARIANCE_AXES", "TRANSFORM_ENDINGS", "StaticTransform", "check_frames", "check_transform"]
 
 TRANSFORM_ENDINGS: Final = (".mcap", ".urdf", ".kalibr.yaml", ".yaml")
 """Of the files that `StaticTransform.write` writes."""
@@ -48,10 +48,8 @@ class StaticTransform:
     """(5, 5): of the errors along and about the parent's axes, in the order of `COVARIANCE_AXES`."""
 
     def __post_init__(self) -> None:
-        """Raises `InvalidInputError` for names that no frame can have and for numbers that are not finite."""
-        for what, name in (("parent", self.parent), ("child", self.child)):
-            if re.fullmatch(r"[A-Za-z0-9_/]+", name) is None:
-                raise InvalidInputError(f"{what} = {name!r}, expected the name of a frame: letters, digits, _ and /")
+        """Raises `InvalidInputError` as `check_frames` does, and for numbers that are not finite."""
+        check_frames(self.parent, self.child)
         if not (np.isfinite(self.translation_m).all() and np.isfinite(self.rotation).all()):
             raise InvalidInputError(f"mounting: {self.translation_m}, {self.rotation}, expected finite numbers")
 
@@ -148,6 +146,15 @@ class StaticTransform:
                 with new_recording(path) as recording:
                     recording.write("/tf_static", 0, messages.transforms([one]), latched=True)
                     recording.write("/tiltvp/static_transform", 0, messages.text(self.yaml()), latched=True)
+
+
+def check_frames(parent: str, child: str) -> None:
+    """Raises `InvalidInputError` for names that no frame can have, and for one name of both."""
+    for what, name in (("parent", parent), ("child", child)):
+        if re.fullmatch(r"[A-Za-z0-9_/]+", name) is None:
+            raise InvalidInputError(f"{what} = {name!r}, expected the name of a frame: letters, digits, _ and /")
+    if parent == child:
+        raise InvalidInputError(f"child = {child!r}, expected another name than that of the parent")
 
 
 def check_transform(path: str | os.PathLike[str]) -> None:
