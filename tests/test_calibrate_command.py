@@ -17,6 +17,7 @@ from tiltvp.cli.line_options import DrivingLineOptions
 from tiltvp.cli.options import CameraOptions
 from tiltvp.cli.sources import MotionOptions
 from tiltvp.errors import OutputError
+from tiltvp.streams import Wheels
 from tiltvp.streams.outputs.transforms import StaticTransform
 from tiltvp.synth import simulate_drive
 
@@ -67,7 +68,14 @@ def tables(tmp_path_factory: pytest.TempPathFactory) -> Path:
     (folder / "wheels.csv").write_text("step,delta_left_m,delta_right_m\n" + steps)
     seen = "".join(f"{int(step)},{int(landmark)},{angle!r}\n" for step, landmark, angle in drive.bearings.tolist())
     (folder / "bearings.csv").write_text("step,landmark,bearing_rad\n" + seen)
-    measured = Robot(CAMERA, np.eye(3), covariance_rad2=1e-6 * np.eye(2), place_m=(0.2, 0.0), height_m=0.4)
+    measured = Robot(
+        CAMERA,
+        np.eye(3),
+        covariance_rad2=1e-6 * np.eye(2),
+        place_m=(0.2, 0.0),
+        height_m=0.4,
+        wheels=Wheels(wheel_base_m=0.4),
+    )
     measured.save(folder / "robot.toml")
     return folder
 
@@ -115,3 +123,34 @@ def test_what_was_found_is_kept_where_the_transform_cannot_be_written(
     assert calibrate(tables, "--out", tmp_path / "found.json", "--transform", tmp_path / "camera.urdf") != 0
     assert "disk full" in capsys.readouterr().err
     assert json.loads((tmp_path / "found.json").read_text())["extrinsics"]["known"] is True
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("--tilt", "refined"), ("--gradient-min", "3"), ("--level-floor",), ("--track-frames-min", "7"),
+        ("--lines-max", "5"), ("--mask", "nosuch.png"), ("--line-method", "radial"), ("--tracks", "t.csv"),
+        ("--topic", "/image"), ("--wheel-radius", "0.1"),
+    ],
+)  # fmt: skip
+def test_options_of_pictures_are_refused_with_tables(
+    tables: Path, words: tuple[str, ...], capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert calibrate(tables, *words) == 2
+    assert f"tiltvp: {words[0]} with" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("words", [("--robot-from-camera", "forward"), ("--level-floor",)])
+def test_what_a_robots_file_was_measured_to_be_is_not_told_again(
+    folder: Path, tables: Path, words: tuple[str, ...], capsys: pytest.CaptureFixture[str]
+) -> None:
+    given = ("calibrate", folder / "images", "--camera", tables / "robot.toml", "--wheel-base", 0.4, *words)
+    assert main([str(word) for word in given]) == 2
+    assert f"tiltvp: {words[0]} with {tables / 'robot.toml'}, expected no file" in capsys.readouterr().err
+
+
+def test_a_wheel_base_of_nothing_is_none(tables: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    logs = (tables / "wheels.csv", tables / "bearings.csv")
+    given = ("calibrate", *logs, "--camera", tables / "robot.toml", *SURE, "--wheel-base", 0)
+    assert main([str(word) for word in given]) == 2
+    assert "--wheel-base" in capsys.readouterr().err

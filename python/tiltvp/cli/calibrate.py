@@ -58,11 +58,18 @@ def calibrate(
     watching.check()
     sources, robot = sources_from(logs), None if camera is None else camera.robot()
     drive, results = drive.settled(robot), results.settled(robot)
+    if camera is not None and robot is None and any(isinstance(source, Tables) for source in sources):
+        raise InvalidInputError("--camera with a log of tables, expected a robot's file (tiltvp setup)")
+    if all(isinstance(source, Tables) for source in sources):
+        pictures.refuse(motion, options)
+    measured = robot is not None and robot.covariance_rad2 is not None
+    for word, given in (("--robot-from-camera", options.robot_from_camera), ("--level-floor", pictures.level_floor)):
+        if measured and given:
+            assert camera is not None  # It is the robot's file.
+            raise InvalidInputError(f"{word} with {camera.camera}, expected no file that tells roll and pitch")
     if camera is not None:
         options = camera.complete(options)
     results.check(camera, options.mask)
-    if any(isinstance(source, Tables) for source in sources):
-        pictures.refuse(motion, camera if robot is None else None)
     of_one_log = {"--odometry": motion.odometry, "--tracks": pictures.tracks, RERUN: watching.rerun}
     name = next((name for name, value in of_one_log.items() if value is not None), None)
     if len(sources) > 1 and name is not None:
@@ -73,7 +80,6 @@ def calibrate(
             opened.append(source.checked(read))
         else:
             opened.append(PictureLog.open(source, pictures, motion, camera, options, drive, robot, read))
-    measured = robot is not None and robot.covariance_rad2 is not None
     tilt = robot if measured else _joined_tilts([one for one in opened if isinstance(one, PictureLog)])
     found = [_calibrated(one, tilt, drive, read, method, watching) for one in opened]
     known = results.tell(found, tilt, options.robot_from_camera, drive)

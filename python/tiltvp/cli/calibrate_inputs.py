@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Final, NamedTuple, Self, TypeAlias
 
-from cyclopts import Group, Parameter
+from cyclopts import Group, Parameter, validators
 
 from tiltvp._core import CALIBRATION_METHODS, option_fields
 from tiltvp.cli.declared_options import LibraryOptions, from_library
@@ -46,7 +46,7 @@ _TABLE: Final = ".csv"
 class DriveOptions(LibraryOptions):
     """The robot, the mounting as it is thought to be, and how sure measurements are."""
 
-    wheel_base: float | None = None
+    wheel_base: Annotated[float | None, Parameter(validator=validators.Number(gt=0))] = None
     """Distance between the wheels, metres; by default that of a robot's file."""
     start: tuple[float, float, float] | None = None
     """x and y in metres and yaw in radians of the mounting as it is thought to be; by default x and y of a robot's
@@ -58,7 +58,9 @@ class DriveOptions(LibraryOptions):
 
     def settled(self, robot: Robot | None) -> Self:
         """With what a robot's file knows where nothing was given. Raises `InvalidInputError` without a wheel base."""
-        base = self.wheel_base or (None if robot is None else robot.wheels.wheel_base_m)
+        base = self.wheel_base
+        if base is None and robot is not None:
+            base = robot.wheels.wheel_base_m
         if base is None:
             raise InvalidInputError("--wheel-base: not given, expected the distance between the wheels in metres")
         place = (0.0, 0.0) if robot is None or robot.place_m is None else robot.place_m

@@ -12,7 +12,7 @@ from cyclopts import Group, Parameter, validators
 
 from tiltvp.cli.calibrate_inputs import Solved
 from tiltvp.cli.declared_options import mask_from
-from tiltvp.cli.options import CameraOptions, Switch
+from tiltvp.cli.options import CameraOptions, Switch, given_words
 from tiltvp.cli.sources import MotionOptions, SourceOptions
 from tiltvp.cli.tables import check_ending, write_table
 from tiltvp.cli.terminal import progress_bar, say, status
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
     from tiltvp import Camera, MountingTilt, Robot
     from tiltvp.cli.calibrate_inputs import DriveOptions, LogOptions, Solve
-    from tiltvp.cli.line_options import LineOptions
+    from tiltvp.cli.line_options import DrivingLineOptions, LineOptions
     from tiltvp.line_logs import SeenFrame
     from tiltvp.streams import FrameMotions, Frames, Wheels
 
@@ -48,13 +48,13 @@ class PictureOptions:
     level_floor: Switch = False
     """The floor is level within 0.05 degrees: roll and pitch need no turn."""
 
-    def refuse(self, motion: MotionOptions, camera: CameraOptions | None) -> None:
-        """Refuses what belongs to images where there is a log of tables."""
+    def refuse(self, motion: MotionOptions, lines: DrivingLineOptions) -> None:
+        """Refuses what belongs to images where all logs are tables, of which the mounting may be told all the same."""
         motion.refuse("pictures")
-        for name, value in (("--camera", camera), ("--tracks", self.tracks), ("--topic", self.topic)):
-            if value is not None:
-                told = "a robot's file (tiltvp setup)" if value is camera else "pictures, which it is for"
-                raise InvalidInputError(f"{name} with a log of tables, expected {told}")
+        words = [*given_words(self), *given_words(replace(lines, robot_from_camera=None, method=None))]
+        words += [] if lines.method is None else ["--line-method"]
+        if words:
+            raise InvalidInputError(f"{words[0]} with logs that are tables, expected pictures, which it is for")
 
 
 @dataclass(eq=False)

@@ -5,7 +5,7 @@
 import difflib
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
@@ -17,6 +17,7 @@ from tiltvp.errors import InvalidInputError
 
 if TYPE_CHECKING:
     import numpy as np
+    from _typeshed import DataclassInstance
     from numpy.typing import NDArray
 
     from tiltvp import Camera, Robot, TiltEstimator
@@ -158,6 +159,12 @@ def rotation_of(source: str) -> "NDArray[np.float64]":
     from tiltvp.streams import Recording, is_recording, robot_from_camera
 
     return robot_from_camera(Recording(source)) if is_recording(source) else read_rotation(source)
+
+
+def given_words(options: "DataclassInstance") -> list[str]:
+    """The words of those options that are not as they are by default."""
+    given = [field.name for field in fields(options) if getattr(options, field.name) != field.default]
+    return [f"--{name.replace('_', '-')}" for name in given]
 
 
 def check_word(option: str, word: str, known: Sequence[str]) -> None:

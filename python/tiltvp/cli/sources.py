@@ -7,12 +7,13 @@ import signal
 import threading
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Final, Self
 
 from cyclopts import Group, Parameter, validators
 
+from tiltvp.cli.options import given_words
 from tiltvp.cli.terminal import complain
 from tiltvp.errors import InvalidInputError
 
@@ -97,10 +98,9 @@ class MotionOptions:
 
     def refuse(self, needed: str, wheel_base_m: float | None = None) -> None:
         """Refuses options of odometry where the option that needs it is not given."""
-        given = [field.name for field in fields(self) if getattr(self, field.name) != field.default]
-        given += [] if wheel_base_m is None else ["wheel_base"]
+        given = given_words(self) + ([] if wheel_base_m is None else ["--wheel-base"])
         if given:
-            raise InvalidInputError(f"--{given[0].replace('_', '-')} without {needed}, expected both")
+            raise InvalidInputError(f"{given[0]} without {needed}, expected both")
 
     def of_robot(self, robot: Robot | None, frames: Frames) -> Self:
         """With what a robot's file knows of wheels and topics, where these are not given."""
