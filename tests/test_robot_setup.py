@@ -13,9 +13,9 @@ from tiltvp import Camera, Robot, check_setup, check_turns, find_setup, frame_de
 from tiltvp.cli import main
 from tiltvp.errors import InvalidInputError
 from tiltvp.images import read_image, write_image
-from tiltvp.rotations import levelling
+from tiltvp.rotations import about_vertical, levelling
 from tiltvp.setup_check import opposite_direction
-from tiltvp.streams import Odometry, open_frames
+from tiltvp.streams import Odometry, Wheels, open_frames
 from tiltvp.streams.odometry import Motion
 from tiltvp.synth import Room
 from tiltvp.turning import turn_axis
@@ -69,6 +69,45 @@ def test_setup_writes_a_robot_that_stands_upright(drive, tmp_path, capsys):
     assert run("tilt", drive / "frames", "--camera", out, "--method", "segments", "--out", answer) == 0
     alphas = [row["alpha_rad"] for row in json.loads(answer.read_text())]
     assert math.degrees(float(np.median(alphas))) < 0.4
+
+
+def test_a_robots_file_is_set_up_again_and_loses_nothing(drive, tmp_path, capsys):
+    wheels = tmp_path / "wheels.csv"
+    rows = "\n".join(f"{-0.175 * step},{0.175 * step}" for step in [0.0] + [STEP] * (COUNT - 1))
+    wheels.write_text(f"left_m,right_m\n{rows}\n")
+    covariance = np.diag([1e-6, 2e-6, 3e-2, 4e-2, 5e-6])
+    covariance[0, 4] = covariance[4, 0] = 1e-7
+    mask = np.ones((240, 240), np.bool_)
+    mask[:9, :9] = False
+    before = Robot(
+        CAMERA, about_vertical(0.4), covariance=covariance, mask=mask, place_m=(0.1, -0.2), height_m=0.5,
+        wheels=Wheels(wheel_base_m=0.35, wheel_radius_m=0.05), topics={"images": "/image", "inertial": "/imu"},
+    )  # fmt: skip
+    out = tmp_path / "robot.toml"
+    before.save(out)
+    words = ("setup", drive / "frames", "--camera", out, "--odometry", wheels, "--out", out, "--overwrite")
+    assert run(*words) == 0, capsys.readouterr()
+    after = Robot.load(out)
+    assert (after.place_m, after.height_m, after.topics) == (before.place_m, before.height_m, before.topics)
+    assert (after.wheels, after.mask.tolist()) == (before.wheels, mask.tolist())
+    up = after.robot_from_camera @ UP
+    assert math.degrees(tilt_error_rad(up, np.array([0.0, 0.0, 1.0]))) < 0.2
+    # The yaw stays, with its errors; roll and pitch are known anew.
+    turned = after.robot_from_camera[:, 1]
+    assert math.atan2(-turned[0], turned[1]) == pytest.approx(0.4, abs=0.01)
+    assert after.covariance[0, 4] == 1e-7
+    assert 0.0 < after.covariance[2, 2] < 1e-4
+    assert run(*words, "--robot-from-camera", "up") == 0
+    assert (Robot.load(out).covariance, Robot.load(out).place_m) == (None, before.place_m)
+
+
+def test_what_a_drive_does_not_tell_of_a_robot_stays(drive, tmp_path):
+    out, lean = tmp_path / "robot.toml", np.diag([1e-5, 2e-5])
+    Robot(CAMERA, levelling(UP), covariance_rad2=lean).save(out)
+    assert run("setup", drive / "frames", "--camera", out, "--out", out, "--overwrite") == 1
+    after = Robot.load(out)
+    np.testing.assert_array_equal(after.covariance_rad2, lean)
+    np.testing.assert_allclose(after.robot_from_camera, levelling(UP), atol=1e-12)
 
 
 def test_setup_finds_that_images_are_mirrored(drive, tmp_path, capsys):

@@ -95,6 +95,24 @@ class RobotSetup:
             found.append(self.turns.reason)
         return found if self.mounting else [*found, self.mounting.reason]
 
+    def again(self, robot: Robot) -> Robot:
+        """That robot, whose mounting was given, with what was found anew; all else is kept.
+
+        Its place and yaw have the errors that they had, independent of those of roll and pitch (see
+        `tiltvp.Extrinsics`). Where nothing tells roll and pitch they stay as they were.
+        """
+        covariance, lean = robot.covariance, robot.covariance_rad2
+        if self.mounting:
+            lean = self.robot.covariance_rad2
+            if covariance is not None:
+                covariance = np.array(covariance)
+                covariance[2:4] = covariance[:, 2:4] = 0.0
+                covariance[2:4, 2:4] = lean
+        return replace(
+            self.robot, covariance=covariance, covariance_rad2=lean, place_m=robot.place_m, height_m=robot.height_m,
+            topics=robot.topics | self.robot.topics,
+        )  # fmt: skip
+
     def __bool__(self) -> bool:
         return not self.reasons
 

@@ -12,6 +12,7 @@ from cyclopts import Group, Parameter, validators
 from tiltvp._core import CALIBRATION_METHODS, option_fields
 from tiltvp.cli.declared_options import LibraryOptions, from_library
 from tiltvp.cli.options import Switch
+from tiltvp.cli.sources import wheel_base_of
 from tiltvp.cli.terminal import status
 from tiltvp.errors import InvalidInputError
 
@@ -58,9 +59,7 @@ class DriveOptions(LibraryOptions):
 
     def settled(self, robot: Robot | None) -> Self:
         """With what a robot's file knows where nothing was given. Raises `InvalidInputError` without a wheel base."""
-        base = self.wheel_base
-        if base is None and robot is not None:
-            base = robot.wheels.wheel_base_m
+        base = wheel_base_of(robot, self.wheel_base)
         if base is None:
             raise InvalidInputError("--wheel-base: not given, expected the distance between the wheels in metres")
         place = (0.0, 0.0) if robot is None or robot.place_m is None else robot.place_m

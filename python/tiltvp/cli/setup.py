@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -9,8 +10,8 @@ from cyclopts import Parameter, validators
 
 from tiltvp.cli.declared_options import mask_from
 from tiltvp.cli.mount import mounting_lines
-from tiltvp.cli.options import CameraOptions, Switch, rotation_of
-from tiltvp.cli.sources import MotionOptions, SourceOptions
+from tiltvp.cli.options import CameraOptions, MountedOptions, Switch
+from tiltvp.cli.sources import MotionOptions, SourceOptions, wheel_base_of
 from tiltvp.cli.terminal import complain, progress_bar, say
 from tiltvp.errors import InvalidInputError
 from tiltvp.files import check_output
@@ -43,7 +44,7 @@ def setup(
     The image circle, the robot's own body, which way the camera looks, roll and pitch of its mounting, and whether
     images turn as the odometry says. The exit code is 1 where something keeps the file from being relied upon; it is
     written all the same, without what is not known. Its turn about the vertical, and where the camera sits, are left
-    to `tiltvp calibrate`.
+    to `tiltvp calibrate`. What a robot's file as --camera knows is used, and kept where nothing of it is found anew.
 
     Parameters
     ----------
@@ -52,12 +53,13 @@ def setup(
     out
         File for the robot (.toml); its mask goes beside it. Give it as --camera to other commands.
     wheel_base
-        Distance between the wheels, metres, for odometry of wheels.
+        Distance between the wheels, metres, for odometry of wheels; by default that of a robot's file.
     robot_from_camera
         How the camera sits on the robot, where it is known roughly: up, forward, or a file with a rotation. By default
-        the direction that is up is found.
+        that of a robot's file; without one the direction that is up is found.
     mask
-        Image of the camera's size, white where the world is seen. By default rim and body are looked for.
+        Image of the camera's size, white where the world is seen. By default that of a robot's file; without one rim
+        and body are looked for.
     level_floor
         The floor is level within 0.05 degrees: no turn is needed.
     picture
@@ -71,16 +73,19 @@ def setup(
     for file in (out, mask_path(out), picture):
         if file is not None:
             check_output(file)
-    lens = camera.load()
+    lens, known = camera.load(), camera.robot()
+    mounted = camera.complete(MountedOptions(robot_from_camera=robot_from_camera, mask=mask))
+    source = source.of_robot(known, recording)
     frames = source.open(recording)
+    motion, wheel_base = motion.of_robot(known, frames), wheel_base_of(known, wheel_base)
     moved = motion.motions(frames, wheel_base)
     with progress_bar(measured_count(frames), "images") as bar:
         found = find_setup(
             frames,
             lens,
             moved.motions if moved is not None and moved.turns_known else None,
-            robot_from_camera=None if robot_from_camera is None else rotation_of(robot_from_camera),
-            mask=None if mask is None else mask_from(mask),  # type: ignore[arg-type]
+            robot_from_camera=None if mounted.robot_from_camera is None else mounted.mounting(lens),
+            mask=None if mounted.mask is None else mask_from(mounted.mask),  # type: ignore[arg-type]
             level_floor=level_floor,
             wheels=motion.wheels(wheel_base),
             topics={k: v for k, v in (("images", source.topic), ("odometry", motion.odometry_topic)) if v is not None},
@@ -90,7 +95,10 @@ def setup(
         say(line)
     if picture is not None:
         _draw(frames, lens, found, picture)
-    found.robot.save(out)
+    if known is not None and robot_from_camera is not None:
+        known = replace(known, covariance=None, covariance_rad2=None)
+    robot = found.robot if known is None else found.again(known)
+    robot.save(out)
     for reason in found.reasons:
         complain(f"{out}: not to be relied upon: {reason}")
     return 0 if found else 1

@@ -29,6 +29,7 @@ __all__ = [
     "ending_at_interrupt",
     "picture_names",
     "tell",
+    "wheel_base_of",
 ]
 
 STDIN: Final = "/dev/stdin"
@@ -117,8 +118,7 @@ class MotionOptions:
 
     def motions_of(self, robot: Robot | None, frames: Frames, wheel_base_m: float | None) -> FrameMotions | None:
         """The same as `motions`, with what a robot's file knows where it is not given."""
-        base = wheel_base_m if robot is None else wheel_base_m or robot.wheels.wheel_base_m
-        return self.of_robot(robot, frames).motions(frames, base)
+        return self.of_robot(robot, frames).motions(frames, wheel_base_of(robot, wheel_base_m))
 
     def motions(self, frames: Frames, wheel_base_m: float | None, read_as: Sequence[str] = ()) -> FrameMotions | None:
         """What the robot did up to each frame, None without odometry; a line on stderr for what is noted."""
@@ -157,6 +157,11 @@ class MotionOptions:
             return None
         tell(f"--odometry: not given, that of {frames.recording} is taken", *found.notes)
         return found
+
+
+def wheel_base_of(robot: Robot | None, given_m: float | None) -> float | None:
+    """The distance between the wheels that was given, or else that of a robot's file."""
+    return given_m if robot is None or given_m is not None else robot.wheels.wheel_base_m
 
 
 def tell(*lines: str) -> None:
