@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Iterable
 from pathlib import Path
 
 import numpy as np
@@ -20,6 +21,7 @@ from tiltvp.errors import OutputError
 from tiltvp.streams import Wheels
 from tiltvp.streams.outputs.transforms import StaticTransform
 from tiltvp.synth import simulate_drive
+from tiltvp.turning import FrameDelay
 
 CAMERA = tiltvp.Camera.equidistant(width=24, height=24, focal_px=8.0, cx=11.5, cy=11.5)
 FRAMES = 5
@@ -58,6 +60,29 @@ def test_the_record_is_mended_before_anything_is_made_of_it(folder: Path) -> Non
     mended = opened(folder, odometry="negated.csv", read=LogOptions(read_as=("left-wheel-negated",))).moved.motions
     for ours, right in zip(mended, opened(folder).moved.motions, strict=True):
         assert (ours.yaw_rad, ours.distance_m) == pytest.approx((right.yaw_rad, right.distance_m))
+
+
+def test_the_clock_is_looked_for_where_the_robot_turns(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    CAMERA.save(tmp_path / "camera.toml")
+    for k in range(300):
+        tiltvp.write_image(tmp_path / "images" / f"{k:03d}.png", np.zeros((24, 24), np.uint8))
+    rows = "".join(f"{k:03d}.png,{0.2 * k + 0.1}\n" for k in range(300))
+    (tmp_path / "images" / "frames.csv").write_text("file,time_s\n" + rows)
+    turns = "".join(f"{0.1 * k},{0.05 if 500 < k < 540 else 0.0},0.01\n" for k in range(601))
+    (tmp_path / "odometry.csv").write_text("time_s,yaw_rad,distance_m\n" + turns)
+    looked_at = []
+
+    def delay(images: Iterable[object], times_s: np.ndarray, *_: object) -> FrameDelay:
+        looked_at.append((len(list(images)), times_s))
+        return FrameDelay(0.1, 0.005, 0.9, 50)
+
+    monkeypatch.setattr("tiltvp.turning.frame_delay", delay)
+    log = opened(tmp_path, read=LogOptions(estimate_time_offset=True))
+    ((count, times),) = looked_at
+    assert count == len(times) == 120
+    assert times[0] < 49.0
+    assert times[-1] > 55.0
+    np.testing.assert_allclose(log.frames.times_s, 0.2 * np.arange(300), atol=1e-9)
 
 
 @pytest.fixture(scope="module")

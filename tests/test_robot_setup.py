@@ -18,7 +18,7 @@ from tiltvp.setup_check import opposite_direction
 from tiltvp.streams import Odometry, Wheels, open_frames
 from tiltvp.streams.odometry import Motion
 from tiltvp.synth import Room
-from tiltvp.turning import turn_axis
+from tiltvp.turning import telling_frames, turn_axis
 
 pytestmark = pytest.mark.slow
 
@@ -188,6 +188,24 @@ def test_frames_that_are_stamped_late_are_found_where_turns_begin_and_end(drive)
         assert found, found.reason
         assert found.delay_s == pytest.approx(delay, abs=3.0 * found.sigma_s)
         assert found.sigma_s < 0.03
+
+
+def test_frames_that_tell_a_delay_are_where_turns_begin_and_end():
+    fine = np.arange(0.0, 120.0, 0.02)
+    # Nothing for 90 s, then a turn of 4 s; and a steady one from the beginning on, which tells nothing.
+    rates = np.where((fine > 90.0) & (fine < 94.0), 0.5, 0.0)
+    for steady, per_s in ((0.0, 5.0), (0.0, 30.0), (0.3, 30.0)):
+        told = Odometry.from_velocities(fine, 0.0 * fine, rates + np.where(fine < 60.0, steady, 0.0))
+        # Some frames are before the record begins.
+        times = np.arange(-5.0, 119.0, 1.0 / per_s)
+        numbers = telling_frames(times, told)
+        assert len(numbers) == 120
+        seen = times[numbers]
+        assert 0.5 * (seen[0] + seen[-1]) == pytest.approx(92.0, abs=1.0)
+        assert seen[-1] - seen[0] == pytest.approx(119 * 0.2, abs=0.5)
+    assert telling_frames(np.arange(50) / 5.0, told).tolist() == list(range(50))
+    # A short drive at a high rate is not thinned out.
+    assert np.diff(telling_frames(np.arange(130) / 30.0, told)).tolist() == [1] * 119
 
 
 def test_a_steady_turn_tells_no_delay(drive):

@@ -21,7 +21,8 @@ if TYPE_CHECKING:
     from tiltvp.streams.odometry import Odometry
 
 __all__ = [
-    "FrameDelay", "TurnAxis", "TurnCheck", "check_turns", "frame_delay", "made_small", "small_camera", "turn_axis",
+    "FrameDelay", "TurnAxis", "TurnCheck", "check_turns", "frame_delay", "made_small", "small_camera",
+    "telling_frames", "turn_axis",
 ]  # fmt: skip
 
 _SIDE_PX: Final = 120
@@ -47,6 +48,9 @@ _DELAY_FLOOR_S: Final = 0.005
 _DELAY_SIGMA_MAX_S: Final = 0.03
 _LIKENESS_MIN: Final = 0.3
 """Least mean correlation of a delay that is believed: pairs of unlike images have below 0.2."""
+_CLOCK_FRAMES: Final = 120
+_CLOCK_STEP_S: Final = 0.2
+"""How many frames tell a delay, and how far apart they are at most: 24 seconds, in which turns begin and end."""
 _PARTS: Final = 8
 """Of a drive, each of which is left out in turn."""
 
@@ -267,6 +271,34 @@ def frame_delay(
     # At the border of what is looked at there is no peak.
     sigma = math.inf if abs(rough) > reach_s - 0.5 * _COARSE_STEP_S else max(sigma, _DELAY_FLOOR_S)
     return FrameDelay(best, sigma, likeness, len(fine))
+
+
+def telling_frames(times_s: ArrayLike, odometry: Odometry) -> NDArray[np.intp]:
+    """Numbers of at most 120 of the frames at these times (N,), by which `frame_delay` tells most.
+
+    A delay turns the views of two frames apart by as much as the robot turned faster at the one than at the other: of
+    all stretches these are of that in which the rates of its turns differ most. Frames of more than 5 a second are
+    passed over as far as there are others.
+    """
+    times = np.asarray(times_s, dtype=np.float64)
+    step = float(np.median(np.diff(times))) if len(times) > 1 else _CLOCK_STEP_S
+    stride = max(1, min(len(times) // _CLOCK_FRAMES, int(_CLOCK_STEP_S / max(step, 1e-3))))
+    numbers = np.arange(0, len(times), stride)
+    headings = odometry.at(times[numbers]).yaw_rad
+    if headings is None or len(numbers) <= _CLOCK_FRAMES:
+        return numbers[:_CLOCK_FRAMES]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        rates = np.diff(headings) / np.diff(times[numbers])
+    known = np.isfinite(rates)
+    rates = np.where(known, rates, 0.0)
+    count, total, squares = (
+        np.convolve(values, np.ones(_CLOCK_FRAMES - 1), "valid") for values in (known.astype(float), rates, rates**2)
+    )
+    told = np.maximum(squares - total**2 / np.maximum(count, 1.0), 0.0)
+    # Of stretches that tell as much that in the middle, so that turns do not begin at their borders.
+    best = np.flatnonzero(told >= 0.99 * told.max())
+    first = best[len(best) // 2]
+    return numbers[first : first + _CLOCK_FRAMES]
 
 
 def _peak(delays: NDArray[np.floating], table: NDArray[np.float64]) -> tuple[float, float]:

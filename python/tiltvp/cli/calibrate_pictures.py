@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Final
+from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 from cyclopts import Group, Parameter, validators
@@ -29,9 +29,6 @@ if TYPE_CHECKING:
     from tiltvp.streams import FrameMotions, Frames, Wheels
 
 __all__ = ["PictureLog", "PictureOptions"]
-
-_CLOCK_FRAMES: Final = 120
-"""Frames by which the delay is told: at 5 a second the first 24 seconds of a drive."""
 
 
 @Parameter(name="*", group=Group("From pictures"))
@@ -193,16 +190,16 @@ def _bring_to_clock(
 ) -> None:
     """Takes from the times of the frames by how much they are late. Raises `InvalidInputError` where nothing tells."""
     from tiltvp.streams import read_odometry
-    from tiltvp.turning import frame_delay
+    from tiltvp.turning import frame_delay, telling_frames
 
     record = motion.odometry or frames.recording
     if frames.times_s is None or record is None:
         raise InvalidInputError(f"--estimate-time-offset with {frames.source}, whose times are not known")
     wheels = motion.wheels(wheel_base_m)
     odometry = read_odometry(record, topic=motion.odometry_topic, wheels=wheels, read_as=read_as)
-    count = min(_CLOCK_FRAMES, len(frames.times_s))
-    images = (frame.read() for frame in frames.sample(range(count)))
-    found = frame_delay(images, frames.times_s[:count], odometry, camera, rotation)
+    numbers = telling_frames(frames.times_s, odometry)
+    images = (frame.read() for frame in frames.sample(numbers.tolist()))
+    found = frame_delay(images, frames.times_s[numbers], odometry, camera, rotation)
     if not found:
         raise InvalidInputError(f"--estimate-time-offset with {frames.source}: {found.reason}")
     say(f"{frames.source}: frames are stamped {found.delay_s:.3f} +- {found.sigma_s:.3f} s late, which is mended first")
