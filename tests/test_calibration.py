@@ -317,6 +317,10 @@ def test_several_logs_of_one_robot(tmp_path: Path, capsys: pytest.CaptureFixture
         ("step,delta_left_m,delta_right_m\n1,0,0\n1,0,0\n", "line 3"),
         ("step,delta_left_m,delta_right_m\n0,0\n", "2 cells"),
         ("step,delta_left_m,delta_right_m\n", "no rows"),
+        (
+            "step,delta_left_m,delta_right_m,time_s\n0,0,0,1.5\n1,0,0,1.5\n2,0,0,1.25\n",
+            "line 4: time_s = 1.25 after 1.5",
+        ),
     ],
 )
 def test_bad_logs_are_refused_with_the_line(tmp_path: Path, text: str, words: str) -> None:
@@ -327,6 +331,16 @@ def test_bad_logs_are_refused_with_the_line(tmp_path: Path, text: str, words: st
     odometry.write_text(text)
     with pytest.raises(InvalidInputError, match=words):
         read_drive_log(odometry, bearings)
+
+
+def test_a_landmark_has_one_bearing_in_a_step(tmp_path: Path) -> None:
+    odometry, bearings = write_log(tmp_path, simulate_drive("paper", seed=1))
+    rows = ["7,3,0.1", "5,4,0.2", "5,3,0.3", "7,4,0.1", "5,3,0.4", "5,4,0.2"]
+    bearings.write_text("\n".join(["step,landmark,bearing_rad", *rows]) + "\n")
+    with pytest.raises(InvalidInputError, match=r"line 6: landmark 3 of step 5 again, expected one bearing"):
+        read_drive_log(odometry, bearings)
+    bearings.write_text("\n".join(["step,landmark,bearing_rad", *rows[:4]]) + "\n")
+    assert len(read_drive_log(odometry, bearings).bearings) == 4
 
 
 def test_answers_come_back_from_dicts_pickles_and_copies() -> None:

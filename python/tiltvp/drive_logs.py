@@ -76,7 +76,8 @@ def read_drive_log(odometry: str | os.PathLike[str], bearings: str | os.PathLike
 
     Columns of the odometry: `step`, `delta_left_m`, `delta_right_m`, and `time_s` if known; of the bearings: `step`,
     `landmark`, `bearing_rad`, taken at the end of that step's motion, in the sensor's frame, counter-clockwise. Steps
-    and landmarks are whole numbers, steps of the odometry grow. Raises `InvalidInputError` that names file and line.
+    and landmarks are whole numbers, steps of the odometry grow and times do not fall, and a landmark has one bearing
+    in a step. Raises `InvalidInputError` that names file and line.
     """
     table, columns = _table(odometry, _ODOMETRY, optional="time_s")
     order: dict[int, int] = {}
@@ -88,10 +89,15 @@ def read_drive_log(odometry: str | os.PathLike[str], bearings: str | os.PathLike
         order[step], last = len(order), step
         wheels.extend(table.number(line, name, cells[columns[name]]) for name in ("delta_left_m", "delta_right_m"))
         if "time_s" in columns:
-            times.append(table.number(line, "time_s", cells[columns["time_s"]]))
+            time = table.number(line, "time_s", cells[columns["time_s"]])
+            if times and time < times[-1]:
+                raise InvalidInputError(
+                    f"{table.where(line)}: time_s = {time} after {times[-1]}, expected rising times"
+                )
+            times.append(time)
     _refuse_nothing(table, len(order), _ODOMETRY)
     seen_from, columns = _table(bearings, _BEARINGS)
-    found = array("d")
+    found, lines = array("d"), array("q")
     for line, cells in seen_from.rows():
         step = _whole(seen_from, line, "step", cells[columns["step"]])
         if step not in order:
@@ -99,7 +105,9 @@ def read_drive_log(odometry: str | os.PathLike[str], bearings: str | os.PathLike
         landmark = _whole(seen_from, line, "landmark", cells[columns["landmark"]])
         bearing = seen_from.number(line, "bearing_rad", cells[columns["bearing_rad"]])
         found.extend((order[step], landmark, bearing))
+        lines.append(line)
     _refuse_nothing(seen_from, len(found), _BEARINGS)
+    _refuse_twice(seen_from, np.array(found, dtype=np.float64).reshape(-1, 3)[:, :2], lines, list(order))
     return DriveLog(
         np.array(wheels, dtype=np.float64).reshape(-1, 2),
         np.array(found, dtype=np.float64).reshape(-1, 3),
@@ -121,6 +129,18 @@ def _table(path: str | os.PathLike[str], names: tuple[str, ...], optional: str =
 def _refuse_nothing(table: CsvFile, rows: int, names: tuple[str, ...]) -> None:
     if not rows:
         raise InvalidInputError(f"{table.name}: no rows, expected {', '.join(names)}")
+
+
+def _refuse_twice(table: CsvFile, seen: NDArray[np.float64], lines: array[int], steps: list[int]) -> None:
+    """Refuses a second row of a step and a landmark (M, 2)."""
+    order = np.lexsort(seen.T)
+    again = order[1:][(np.diff(seen[order], axis=0) == 0.0).all(axis=1)]
+    if len(again):
+        at = int(again.min())
+        step, landmark = steps[int(seen[at, 0])], int(seen[at, 1])
+        raise InvalidInputError(
+            f"{table.where(lines[at])}: landmark {landmark} of step {step} again, expected one bearing of it in a step"
+        )
 
 
 def _whole(table: CsvFile, line: int, column: str, word: str) -> int:
