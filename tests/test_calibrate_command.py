@@ -17,7 +17,7 @@ from tiltvp.cli.calibrate_pictures import PictureLog, PictureOptions
 from tiltvp.cli.line_options import DrivingLineOptions
 from tiltvp.cli.options import CameraOptions
 from tiltvp.cli.sources import MotionOptions
-from tiltvp.errors import OutputError
+from tiltvp.errors import InvalidInputError, OutputError
 from tiltvp.streams import Wheels
 from tiltvp.streams.outputs.transforms import StaticTransform
 from tiltvp.synth import simulate_drive
@@ -60,6 +60,26 @@ def test_the_record_is_mended_before_anything_is_made_of_it(folder: Path) -> Non
     mended = opened(folder, odometry="negated.csv", read=LogOptions(read_as=("left-wheel-negated",))).moved.motions
     for ours, right in zip(mended, opened(folder).moved.motions, strict=True):
         assert (ours.yaw_rad, ours.distance_m) == pytest.approx((right.yaw_rad, right.distance_m))
+
+
+@pytest.mark.parametrize("times", [True, False])
+def test_turns_without_distances_are_no_robot_that_never_drives(folder: Path, times: bool) -> None:
+    rows = "".join(f"{0.5 * k},0.1\n" if times else "0.1\n" for k in range(FRAMES))
+    (folder / "turns.csv").write_text(("time_s,yaw_rad\n" if times else "yaw_rad\n") + rows)
+    with pytest.raises(InvalidInputError, match="odometry without distances"):
+        opened(folder, odometry="turns.csv")
+    # A turn in place has distances of 0.
+    rows = "".join(f"{0.5 * k},0.1,0.0\n" for k in range(FRAMES))
+    (folder / "turns.csv").write_text("time_s,yaw_rad,distance_m\n" + rows)
+    assert opened(folder, odometry="turns.csv").moved.distances_known
+
+
+def test_turns_beside_wheels_are_told(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    for more, told in ((0.0, False), (0.01, True)):
+        rows = "".join(f"0.02,0.04,{0.02 / 0.4 + more}\n" for _ in range(FRAMES))
+        (folder / "both.csv").write_text("left_m,right_m,yaw_rad\n" + rows)
+        opened(folder, odometry="both.csv")
+        assert ("turns beside wheels, up to 0.57 degrees apart" in capsys.readouterr().out) is told
 
 
 def test_the_clock_is_looked_for_where_the_robot_turns(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

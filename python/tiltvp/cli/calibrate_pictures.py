@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Final
 
 import numpy as np
 from cyclopts import Group, Parameter, validators
@@ -29,6 +29,9 @@ if TYPE_CHECKING:
     from tiltvp.streams import FrameMotions, Frames, Wheels
 
 __all__ = ["PictureLog", "PictureOptions"]
+
+_SAME_DEG: Final = 1e-3
+"""Turns that differ by less, as by their digits in a table, are the wheels' own."""
 
 
 @Parameter(name="*", group=Group("From pictures"))
@@ -104,6 +107,9 @@ class PictureLog:
         moved = needed_turns(motion.motions(frames, drive.wheel_base, read.read_as))
         if moved is None:
             raise InvalidInputError(f"{source}: pictures without odometry, expected --odometry FILE")
+        if not moved.distances_known:
+            raise InvalidInputError(f"{source}: odometry without distances, expected columns that tell them too")
+        _tell_other_turns(source, moved, drive.wheel_base)
         named = {"images": looked.topic, "odometry": motion.odometry_topic}
         topics = {name: word for name, word in named.items() if word is not None}
         return cls(frames, moved, lens, lines, drive, pictures, motion.wheels(drive.wheel_base), topics)
@@ -178,6 +184,19 @@ class PictureLog:
 
         mask: Any = None if self.lines.mask is None else mask_from(self.lines.mask)
         return Robot(self.camera, self.lines.mounting(self.camera), mask=mask, wheels=self.wheels, topics=self.topics)
+
+
+def _tell_other_turns(source: str, moved: FrameMotions, wheel_base_m: float | None) -> None:
+    """Says so where turns are recorded beside wheels that turn otherwise."""
+    assert wheel_base_m is not None  # As `settled` has it.
+    recorded = [(one.yaw_rad, *one.wheels_m) for one in moved.motions if one is not None and one.wheels_m is not None]
+    turns, left, right = np.array(recorded, dtype=np.float64).reshape(-1, 3).T
+    apart = np.degrees(np.abs(turns - (right - left) / wheel_base_m)).max(initial=0.0)
+    if apart > _SAME_DEG:
+        say(
+            f"{source}: turns beside wheels, up to {apart:.2f} degrees apart between two images: lines are followed by "
+            "the turns, the mounting is found by the wheels"
+        )
 
 
 def _bring_to_clock(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -38,6 +38,8 @@ class FrameMotions:
     """(N,): when each frame was taken; None where neither frames nor record tell."""
     notes: tuple[str, ...] = ()
     """Sentences that whoever uses it should know: frames left out, counters that began anew."""
+    distances_known: bool = True
+    """Whether `distance_m` of the motions means anything."""
 
 
 def read_odometry(
@@ -80,7 +82,8 @@ def frame_motions(
     table = OdometryTable.read(source)
     if table.times_s is not None and table.files is None:
         if frames.times_s is not None:
-            return _interpolated(frames, _by_ours(table.odometry(wheels), wheels, read_as))
+            found = _interpolated(frames, _by_ours(table.odometry(wheels), wheels, read_as))
+            return replace(found, distances_known=table.distances_known)
         if len(table) != len(frames.names):
             raise InvalidInputError(
                 f"{frames.source}: no times of the images, expected them in frames.csv (file, time_s) beside these, or "
@@ -94,7 +97,8 @@ def frame_motions(
     times = frames.times_s
     if times is None and table.times_s is not None:
         times = table.times_s[rows]
-    return FrameMotions(motions, turns, times, () if turns else (_no_turns(table.name),))
+    notes = () if turns else (_no_turns(table.name),)
+    return FrameMotions(motions, turns, times, notes, table.distances_known)
 
 
 def _by_ours(record: Odometry, wheels: Wheels, read_as: Sequence[str]) -> Odometry:

@@ -73,6 +73,11 @@ class OdometryTable:
         return self.columns.get("time_s")
 
     @property
+    def distances_known(self) -> bool:
+        """Whether it tells how far the robot drove, and not its turns alone."""
+        return self.kind != "increments" or "distance_m" in self.columns
+
+    @property
     def _yaw(self) -> NDArray[np.float64] | None:
         degrees = self.columns.get("yaw_deg")
         return self.columns.get("yaw_rad") if degrees is None else np.radians(degrees)
