@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 import tiltvp
 from commands import Run
-from tiltvp import Camera
+from tiltvp import Camera, Robot
+from tiltvp.rotations import read_rotation
+from tiltvp.streams import Wheels
 
 
 @pytest.fixture(scope="module")
@@ -104,6 +107,48 @@ def test_cameras_are_made_on_the_command_line(run: Run, tmp_path: Path) -> None:
         said = run("camera", *words, "--overwrite")
         assert said.code == 2
         assert told in said.err
+
+
+@pytest.fixture
+def robot(tmp_path: Path) -> Robot:
+    """robot.toml of one that looks ahead and sees itself in the lowest quarter of 64 x 48 pixels."""
+    mask = np.ones((48, 64), dtype=bool)
+    mask[36:, :20] = False
+    camera = Camera.equidistant(width=64, height=48, focal_px=20.0, cx=31.5, cy=23.5)
+    wheels, topics = Wheels(wheel_base_m=0.35), {"images": "/up"}
+    made = Robot(camera, read_rotation("forward"), mask=mask, wheels=wheels, topics=topics, place_m=(0.1, 0.0))
+    made.save(tmp_path / "robot.toml")
+    return made
+
+
+@pytest.mark.parametrize(
+    ("words", "camera", "mask"),
+    [
+        (["scale", "--to", "32x24"], lambda c: c.scaled(0.5), lambda m: m[::2, ::2]),
+        (["scale", "--factor", "2"], lambda c: c.scaled(2.0), lambda m: m.repeat(2, 0).repeat(2, 1)),
+        (["crop", "--at", "8", "4", "--size", "40x40"], lambda c: c.cropped(8, 4, 40, 40), lambda m: m[4:44, 8:48]),
+    ],
+)
+def test_a_robot_whose_images_change_stays_a_robot(
+    run: Run, tmp_path: Path, robot: Robot, words: list[str], camera: Any, mask: Any
+) -> None:
+    out = tmp_path / "made.toml"
+    said = run("camera", words[0], tmp_path / "robot.toml", out, *words[1:])
+    assert (said.code, said.err) == (0, "")
+    made = Robot.load(out)
+    assert made.camera == camera(robot.camera)
+    assert robot.mask is not None
+    np.testing.assert_array_equal(made.mask, mask(robot.mask))
+    np.testing.assert_array_equal(made.robot_from_camera, robot.robot_from_camera)
+    assert (made.wheels, made.topics, made.place_m) == (robot.wheels, robot.topics, robot.place_m)
+
+
+@pytest.mark.usefixtures("robot")
+def test_converting_a_robot_tells_what_is_left_out(run: Run, tmp_path: Path) -> None:
+    out = tmp_path / "camera.toml"
+    said = run("camera", "convert", tmp_path / "robot.toml", out)
+    assert said.code == 0
+    assert f"{out}: the camera alone, mask, mounting, wheels, topics of" in said.complaint
 
 
 @pytest.mark.parametrize(

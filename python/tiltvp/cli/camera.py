@@ -85,7 +85,8 @@ def convert(
 ) -> None:
     """Write the cameras of a file as a file of another tool, or as tiltvp's own TOML.
 
-    A lens that the other format cannot hold is refused, with the formats that can.
+    A lens that the other format cannot hold is refused, with the formats that can. Of a robot's file the camera alone
+    is written, and a line on stderr says so; `tiltvp camera crop` and `scale` write the robot.
 
     Parameters
     ----------
@@ -120,6 +121,8 @@ def convert(
     for spec in specs:
         _built(file, spec)
     write_cameras(specs, out, to or "tiltvp")
+    if left_out := _beside_camera(file):
+        complain(f"{out}: the camera alone, {', '.join(left_out)} of {file} are not in it")
     for spec in specs:
         if spec.max_theta_rad is not None and to not in (None, "tiltvp"):
             limit = f"{math.degrees(spec.max_theta_rad):.2f} deg from the axis"
@@ -165,6 +168,15 @@ def formats() -> None:
         what = f"The same as {family}, taken as a {kind} camera." if is_variant else words
         table.add_row(one.name, "yes" if one.written else "", what)
     show(table)
+
+
+def _beside_camera(file: Path) -> list[str]:
+    """What a robot's file says beside its camera; nothing for other calibrations."""
+    from tiltvp.formats.document import Document
+    from tiltvp.formats.own import ROBOT_KEYS, root_of
+    from tiltvp.robot import is_robot
+
+    return [key for key in ROBOT_KEYS if is_robot(file) and root_of(Document.load(file)).has(key)]
 
 
 def _built(file: Path, spec: CameraSpec, mirror: bool = False) -> Camera:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 import os
+from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -16,7 +18,12 @@ from tiltvp.errors import InvalidInputError, TiltvpError
 from tiltvp.files import check_output
 
 if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
     from tiltvp import Camera
+
+    Mask = NDArray[np.bool_]
 
 __all__ = ["app"]
 
@@ -99,12 +106,13 @@ def new(
         lens, width=size[0], height=size[1], view_rad=math.radians(view_deg), radius_px=radius_px, centre_px=centre,
         mirror=mirror,
     )  # fmt: skip
-    _write(camera, out)
+    camera.save(out)
+    _tell(out, camera)
 
 
 @app.command
 def crop(file: Path, out: Path, /, reading: FileOptions = _READING, *, at: tuple[int, int], size: str) -> None:
-    """Write the camera of a part of the images.
+    """Write the camera of a part of the images; of a robot's file the robot with it, the mask cropped alike.
 
     Parameters
     ----------
@@ -125,7 +133,7 @@ def crop(file: Path, out: Path, /, reading: FileOptions = _READING, *, at: tuple
     if min(u, v) < 0 or u + part[0] > whole.width or v + part[1] > whole.height:
         inside = f"a part of {whole.width} x {whole.height} pixels"
         raise InvalidInputError(f"--at {u} {v} --size {size}: reaches beyond the image, expected {inside}")
-    _write(whole.cropped(u, v, *part), out)
+    _write(file, out, whole.cropped(u, v, *part), lambda mask: mask[v : v + part[1], u : u + part[0]])
 
 
 @app.command
@@ -138,7 +146,7 @@ def scale(
     factor: Annotated[float | None, _ABOVE_0] = None,
     to: str | None = None,
 ) -> None:
-    """Write the camera of resized images.
+    """Write the camera of resized images; of a robot's file the robot with it, the mask resized alike.
 
     Parameters
     ----------
@@ -169,7 +177,8 @@ def scale(
     else:
         assert factor is not None  # One of them was given.
         camera = camera.scaled(factor)
-    _write(camera, out)
+    size = (camera.width, camera.height)
+    _write(file, out, camera, lambda mask: _resized(mask, size))
 
 
 def _check(out: Path, file: Path | None = None) -> None:
@@ -180,6 +189,26 @@ def _check(out: Path, file: Path | None = None) -> None:
     check_output(out)
 
 
-def _write(camera: Camera, out: Path) -> None:
-    camera.save(out)
+def _write(file: Path, out: Path, camera: Camera, of_mask: Callable[[Mask], Mask]) -> None:
+    """Writes a camera made of that of `file`; of a robot's file the robot with it, and what becomes of its mask."""
+    from tiltvp.robot import Robot, is_robot
+
+    if is_robot(file):
+        robot = Robot.load(file)
+        replace(robot, camera=camera, mask=None if robot.mask is None else of_mask(robot.mask)).save(out)
+    else:
+        camera.save(out)
+    _tell(out, camera)
+
+
+def _resized(mask: Mask, size: tuple[int, int]) -> Mask:
+    """True where more than half of a pixel of images of that size, (width, height), shows the world."""
+    import cv2
+    import numpy as np
+
+    way = cv2.INTER_AREA if size[0] < mask.shape[1] else cv2.INTER_LINEAR
+    return np.asarray(cv2.resize(mask.astype(np.float32), size, interpolation=way) > 0.5)
+
+
+def _tell(out: Path, camera: Camera) -> None:
     say(f"{out}: {camera.model}, {camera.width} x {camera.height} px")
