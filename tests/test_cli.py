@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -279,6 +280,26 @@ def test_results_that_cannot_be_written(run: Run, world: Path, tmp_path: Path) -
     said = run("tilt", world / "images/a.png", "--camera", world / "camera.toml", "--out", out)
     assert said.code == 1
     assert str(out) in said.complaint
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("verb", "ending"),
+    [("tilt", "csv"), ("tilt", "tum"), ("lines", "csv"), ("segments", "csv"), ("mount", "json")],
+)
+def test_results_are_written_though_nobody_reads_what_is_printed(
+    verb: str, ending: str, world: Path, tmp_path: Path
+) -> None:
+    read, write = os.pipe()
+    os.close(read)
+    out = tmp_path / f"r.{ending}"
+    words = (verb, world / "images", "--camera", world / "camera.toml", "--out", out)
+    try:
+        code = subprocess.run([sys.executable, "-m", "tiltvp", *words], stdout=write, check=False).returncode
+    finally:
+        os.close(write)
+    assert code == 1
+    assert out.stat().st_size > 0
 
 
 # --- demo --------------------------------------------------------------------------------------------------------

@@ -8,7 +8,6 @@ from typing import Final
 
 from tiltvp.cli.results import Outcome, outcome_table
 from tiltvp.cli.tables import ENDINGS, check_ending, write_table
-from tiltvp.cli.terminal import say
 from tiltvp.errors import InvalidInputError, TiltvpError
 from tiltvp.streams.outputs.tilts import TILT_ENDINGS, TILT_TOPIC, check_tilts, write_tilts
 
@@ -33,15 +32,15 @@ def check_answers(path: Path) -> None:
         raise type(error)(f"--out {error}") from None
 
 
-def write_answers(outcomes: Sequence[Outcome], method: str, path: Path, frame_rate: float | None) -> None:
-    """Writes the answers, the ending says how, and says what of them a file of attitudes has and lacks.
+def write_answers(outcomes: Sequence[Outcome], method: str, path: Path, frame_rate: float | None) -> str | None:
+    """Writes the answers, the ending says how. A line of what a file of attitudes has and lacks; None of tables.
 
     Attitudes are those of the filter where there is one, else the estimates that were accepted. `frame_rate` is how
     many frames there are in a second, None for the times that they tell themselves.
     """
     if path.suffix.lower() in ENDINGS:
         write_table(outcome_table(outcomes, method), path)
-        return
+        return None
     is_filtered = any(outcome.filtered is not None for outcome in outcomes)
     tilts = [
         outcome.filtered if is_filtered else None if outcome.accepted is False else outcome.estimate
@@ -60,4 +59,4 @@ def write_answers(outcomes: Sequence[Outcome], method: str, path: Path, frame_ra
     where = f" as sensor_msgs/Imu on {TILT_TOPIC}" if path.suffix.lower() == ".mcap" else ""
     lacking = len(outcomes) - count
     left_out = f"; {lacking} frames without one are left out" if lacking else ""
-    say(f"{path}: {count} {what}{where}, yaw 0, {clock}{left_out}")
+    return f"{path}: {count} {what}{where}, yaw 0, {clock}{left_out}"

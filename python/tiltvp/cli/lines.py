@@ -44,6 +44,8 @@ def lines(
         lambda gray, seen: draw_lines(gray, lens, seen, extractor.robot_from_camera),
     )
     table = line_table(found)
+    if results.out is not None:
+        write_table(table, results.out)
     printed = new_table(
         None, ("file", "line", "bearing deg", "1-sigma deg", "from deg", "to deg", "support px"), ["file"]
     )
@@ -52,8 +54,6 @@ def lines(
         bearing, sigma = degrees(row["bearing_rad"]), degrees(row["sigma_rad"], 3)
         printed.add_row(row["file"], str(row["line"]), bearing, sigma, low, high, str(row["support_px"]))
     show(printed)
-    if results.out is not None:
-        write_table(table, results.out)
     return 0 if well else 1
 
 

@@ -72,14 +72,14 @@ def mount(
         tilts = drive_tilts(frames, estimator, motions, advance=bar.advance)
     found = mounting_tilt(tilts.estimates, tilts.motions, estimator.robot_from_camera, level_floor=level_floor)
     verdict = None if within_deg is None else found.within(math.radians(within_deg))
+    if out is not None:
+        result = mounting_result(found) | {"tolerance_deg": within_deg, "within_tolerance": verdict}
+        write_whole(out, json.dumps(finite(result), indent=1, allow_nan=False) + "\n")
     for line in mounting_lines(found):
         say(line)
     if within_deg is not None and found:
         words = {True: "pass: within", False: "fail: beyond", None: "not told: about"}[verdict]
         say(f"{words} {within_deg:g} degrees, at 95 %")
-    if out is not None:
-        result = mounting_result(found) | {"tolerance_deg": within_deg, "within_tolerance": verdict}
-        write_whole(out, json.dumps(finite(result), indent=1, allow_nan=False) + "\n")
     if not found or (within_deg is not None and verdict is None):
         return NOT_TOLD
     return FAILED if verdict is False else DONE

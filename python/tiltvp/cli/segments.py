@@ -53,12 +53,12 @@ def segments(
     found, well = find_in_each(
         images, source, detector, results.overlay, lambda gray, seen: draw_segments(gray, lens, seen)
     )
+    if results.out is not None:
+        write_table(segment_table(found), results.out)
     printed = new_table(None, ("file", "edges", "pixels", "longest deg", "median deg", "median rms px"), ["file"])
     for image, seen in found:
         printed.add_row(image, *_summary(seen))
     show(printed)
-    if results.out is not None:
-        write_table(segment_table(found), results.out)
     return 0 if well else 1
 
 

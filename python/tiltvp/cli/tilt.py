@@ -160,8 +160,13 @@ class Answers:
             say(json_lines(outcome_table([outcome], self._method)))
 
     def conclude(self, source: str) -> None:
-        """What people read on stdout, and the answers as files."""
+        """The answers as files, and then what people read on stdout, of which nobody may take all."""
         outcomes = list(self._kept)
+        written = None
+        if self._out is not None and not self._rows_only:
+            written = write_answers(outcomes, self._method, self._out, self._frame_rate)
+        if self._filtering.filter_plot is not None:
+            _write_plot(outcomes, self._method, self._filtering.filter_plot)
         if self.bad and len(outcomes) < self.count:
             complain(f"{source}: {self.bad} of {self.count} frames could not be used")
         if not self._rows_only:
@@ -172,10 +177,8 @@ class Answers:
             show(people_table(outcomes, width()))
             if self._filtering.estimate_mounting:
                 say(mounting_words(outcomes))
-            if self._out is not None:
-                write_answers(outcomes, self._method, self._out, self._frame_rate)
-        if self._filtering.filter_plot is not None:
-            _write_plot(outcomes, self._method, self._filtering.filter_plot)
+            if written is not None:
+                say(written)
 
 
 def _checked(estimator: TiltEstimator, frames: Frames) -> TiltEstimator:
