@@ -5,17 +5,21 @@ from __future__ import annotations
 import json
 import math
 import os
+import re
 import subprocess
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 
 import cv2
 import numpy as np
 import polars as pl
 import pytest
+from cyclopts import App
 
 import tiltvp
 from commands import Run, Said
+from tiltvp.cli.app import app
 from tiltvp.synth import render_room
 
 ALPHA_RAD, BETA_RAD = math.radians(4.0), math.radians(30.0)
@@ -56,6 +60,23 @@ def test_help_is_quick_and_names_the_commands(run: Run) -> None:
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True, timeout=60)
     for heavy in ("polars", "matplotlib"):
         assert f"'{heavy}'" not in done.stdout
+
+
+def verbs(of: App, before: tuple[str, ...] = ()) -> Iterator[tuple[str, ...]]:
+    """The words of every command."""
+    names = [name for name in of if not name.startswith("-")]
+    if not names:
+        yield before
+    for name in names:
+        yield from verbs(of[name], (*before, name))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("words", list(verbs(app)), ids=" ".join)
+def test_options_have_no_name_of_a_parameter_before_theirs(run: Run, words: tuple[str, ...]) -> None:
+    said = run(*words, "--help")
+    assert said.code == 0
+    assert not re.findall(r"--[\w-]+\.\w+", said.out)
 
 
 @pytest.mark.slow
@@ -106,6 +127,7 @@ def test_installed_program(world: Path) -> None:
         (["camera", "convert", "camera.toml", "./camera.toml"], "another name"),
         (["camera", "info", "broken.png"], "broken.png"),
         (["demo", "--kind", "ofice"], "office"),
+        (["mount", "x.png", "--camera", "camera.toml", "--out", "out.csv"], "expected .json"),
     ],
 )
 def test_wrong_use_is_one_line_and_code_2(

@@ -15,6 +15,7 @@ from tiltvp.cli.results import degrees
 from tiltvp.cli.sources import MotionOptions, SourceOptions
 from tiltvp.cli.tables import finite
 from tiltvp.cli.terminal import progress_bar, say
+from tiltvp.errors import InvalidInputError
 from tiltvp.files import check_output, write_whole
 
 if TYPE_CHECKING:
@@ -62,6 +63,8 @@ def mount(
     from tiltvp.robot_setup import TILT_OPTIONS, drive_tilts, measured_count
 
     if out is not None:
+        if out.suffix.lower() != ".json":
+            raise InvalidInputError(f"--out {out}: ends in {out.suffix!r}, expected .json")
         check_output(out)
     estimator = camera.complete(mounted).mounted(camera.load(), **TILT_OPTIONS)
     robot = camera.robot()

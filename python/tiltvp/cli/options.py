@@ -102,6 +102,7 @@ class CameraOptions:
         return replace(options, **missing)  # type: ignore[type-var]
 
 
+@Parameter(name="*", group=_METHOD)
 @dataclass(frozen=True, kw_only=True)
 class MountedOptions(LibraryOptions):
     """How the camera sits on the robot, and where the robot sees itself."""
