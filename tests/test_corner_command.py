@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -9,7 +10,9 @@ import polars as pl
 import pytest
 
 import tiltvp
+from commands import Run
 from drawn_corners import CAMERA, COLOURS, GREYS, LEFT_FROM_RIGHT, pair, pose
+from recordings import START_S, Bag
 from tiltvp.cli import main
 from tiltvp.stereo_rigs import StereoRig
 
@@ -155,3 +158,59 @@ def test_impossible_combinations_are_refused_at_once(
     # There is no such image: what is wrong with the words is said before it is looked for.
     assert main(["corner", "none.png", "--calibration", "one.toml", *words]) == 2
     assert complaint in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("lefts", "rights", "told"),
+    [
+        ([0.0, 0.1, 0.2], [0.0, 0.1, 0.3], r"right .*#2: taken 0\.100 s after the left .*#2 \(1 such pairs\)"),
+        ([0.1, 0.2], [0.0, 0.1], r"right .*#0: taken 0\.100 s before the left .*#0 \(2 such pairs\)"),
+        ([0.0, 0.1], [0.0, 0.1, 0.2], "3 frames, expected 2 as in"),
+        ([0.0, 0.1], [0.04, 0.06], None),
+    ],
+)
+def test_frames_of_two_moments_are_no_pair(
+    lefts: list[float], rights: list[float], told: str | None, tmp_path: Path, run: Run
+) -> None:
+    StereoRig(CAMERA, CAMERA, LEFT_FROM_RIGHT).save(tmp_path / "rig.toml")
+    bag = Bag("mcap")
+    for topic, times_s in (("/left", lefts), ("/right", rights)):
+        for time_s in times_s:
+            bag.image(topic, START_S + time_s, np.zeros((360, 480), np.uint8), "mono8")
+    recording = bag.write(tmp_path)
+    words = ["corner", recording, recording, "--topic", "/left", "--calibration", tmp_path / "rig.toml"]
+    said = run(*words, "--topic-right", "/right")
+    if told is None:
+        assert said.code == 0
+    else:
+        assert said.code == 2
+        assert re.search(told, said.complaint)
+    # Who says how fast frames follow each other does not mean their times.
+    assert run(*words, "--topic-right", "/right", "--frame-rate", "10").code == (2 if len(lefts) != len(rights) else 0)
+    assert "expected one, by --topic-right" in run(*words).complaint
+
+
+@pytest.mark.parametrize(
+    ("lefts", "rights", "told"),
+    [
+        (("a", "b"), ("b", "c"), "b.png: beside"),
+        (("l0", "l1"), ("r0", "r1"), None),
+        (("a", "b"), ("a", "b"), None),
+    ],
+)
+def test_files_of_equal_names_are_pairs(
+    lefts: tuple[str, ...], rights: tuple[str, ...], told: str | None, tmp_path: Path, run: Run
+) -> None:
+    StereoRig(CAMERA, CAMERA, LEFT_FROM_RIGHT).save(tmp_path / "rig.toml")
+    for side, names in (("left", lefts), ("right", rights)):
+        for name in names:
+            tiltvp.write_image(tmp_path / side / f"{name}.png", np.zeros((360, 480), np.uint8))
+    said = run("corner", tmp_path / "left", tmp_path / "right", "--calibration", tmp_path / "rig.toml")
+    if told is None:
+        assert (said.code, said.err) == (0, "")
+    else:
+        assert said.code == 2
+        assert told in said.complaint
+    said = run("corner", "-", tmp_path / "right", "--calibration", tmp_path / "rig.toml")
+    assert said.code == 2
+    assert "whose frames can be counted" in said.complaint

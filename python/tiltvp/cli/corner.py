@@ -13,6 +13,7 @@ from cyclopts import Group, Parameter, validators
 from tiltvp._core import CORNER_METHODS
 from tiltvp.cli.corner_inertial import Inertial, InertialOptions
 from tiltvp.cli.corner_methods import AUTO, SCALES, Searches, methods_for
+from tiltvp.cli.corner_pairs import check_pairs
 from tiltvp.cli.corner_results import CornerResults, tell
 from tiltvp.cli.declared_options import LibraryOptions, from_library, mask_from
 from tiltvp.cli.options import image_size_from
@@ -108,7 +109,8 @@ def corner(
         Image, folder of images, glob pattern, video or recording of ROS of the left or only camera; or - for names of
         files on stdin.
     right
-        The same of the right camera, with as many frames.
+        The same of the right camera, with as many frames, each taken when the left one was: within half a frame where
+        both tell times, and under equal names where files of both folders have such.
     calibration
         Of two cameras: a camchain of Kalibr or a TOML of tiltvp with left, right and left_from_right. Of one camera:
         any format that `tiltvp camera formats` lists.
@@ -119,7 +121,8 @@ def corner(
         with red, green and blue faces; general: corners of rooms, boxes and buildings; paper: the cuboid by the method
         as it was published, to compare.
     frame_rate
-        Frames per second: by default the times that frames tell, and 25 for images that tell none.
+        Frames per second: by default the times that frames tell, and 25 for images that tell none. With it the times
+        of pairs are not compared.
     image_size
         WIDTHxHEIGHT in pixels, for calibrations that do not carry it.
     independent
@@ -134,9 +137,9 @@ def corner(
     sensor = inertial.knowledge()
     camera, estimator = _searches(calibration, right is not None, method, known, image_size_from(image_size))
     frames = source.open([] if left is None else [left])
-    others = None if right is None else SourceOptions(topic=topic_right).open([right])
-    if others is not None and (others.count != frames.count or frames.count is None):
-        raise InvalidInputError(f"{right}: {others.count} frames, expected {frames.count} as in {left}")
+    others = None if right is None else SourceOptions(topic=topic_right).open([right], topic_option="--topic-right")
+    if others is not None:
+        check_pairs(frames, others, timed=frame_rate is None)
     with watching.viewer() as viewer:
         look = Look(camera, estimator, independent, results.overlay, viewer, sensor)
         estimates = list(look.each(frames, others, frame_rate))

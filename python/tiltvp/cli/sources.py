@@ -58,8 +58,11 @@ class SourceOptions:
             return self
         return replace(self, topic=self.topic or robot.topics.get("images"))
 
-    def open(self, words: Sequence[str]) -> Frames:
-        """The frames that words and options name; a line on stderr for each that is not there and for what is noted."""
+    def open(self, words: Sequence[str], *, topic_option: str = "--topic") -> Frames:
+        """The frames that words and options name; a line on stderr for each that is not there and for what is noted.
+
+        `topic_option` is what chooses the topic.
+        """
         from tiltvp.streams import LiveCamera, NamedImages, RawImages, open_frames
         from tiltvp.streams.live import raw_size
 
@@ -73,7 +76,7 @@ class SourceOptions:
             raise InvalidInputError("no source, expected images, a video, a recording, - or --live")
         if list(words) == [STDIN]:
             return NamedImages() if self.raw is None else RawImages(raw_size(self.raw))
-        frames = open_frames(list(words), topic=self.topic)
+        frames = open_frames(list(words), topic=self.topic, option=topic_option)
         tell(*frames.problems, *frames.notes)
         return frames
 

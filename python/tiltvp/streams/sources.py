@@ -16,11 +16,15 @@ __all__ = ["open_frames"]
 
 
 def open_frames(
-    source: str | os.PathLike[str] | Sequence[str | os.PathLike[str]], *, topic: str | None = None
+    source: str | os.PathLike[str] | Sequence[str | os.PathLike[str]],
+    *,
+    topic: str | None = None,
+    option: str = "--topic",
 ) -> Frames:
     """The frames of image files, folders and glob patterns, of a video, or of a bag or MCAP of ROS.
 
-    Several sources may be given where all are images. `topic` is that of a recording's images, by default the only one.
+    Several sources may be given where all are images. `topic` is that of a recording's images, by default the only one,
+    and `option` what messages call it.
     What was asked for and is not there is in `Frames.problems`; raises `TiltvpError` where there are no frames at all.
     """
     words = [os.fspath(source)] if isinstance(source, str | os.PathLike) else [os.fspath(word) for word in source]
@@ -31,7 +35,7 @@ def open_frames(
         raise InvalidInputError(f"topic {topic!r} of {' '.join(words)}: no recording, expected a bag or MCAP")
     frames: Frames
     if others:
-        frames = _recorded(words[0], topic) if is_recording(words[0]) else open_video(Path(words[0]))
+        frames = _recorded(words[0], topic, option) if is_recording(words[0]) else open_video(Path(words[0]))
     else:
         frames = ImageFiles(words)
     if frames.count == 0:
@@ -45,7 +49,7 @@ def _is_video(word: str) -> bool:
     return Path(word).suffix.lower() in VIDEO_ENDINGS and not os.path.isdir(word)
 
 
-def _recorded(word: str, topic: str | None) -> Frames:
+def _recorded(word: str, topic: str | None, option: str) -> Frames:
     from tiltvp.streams.bag_images import BagFrames
 
-    return BagFrames(Recording(word), topic)
+    return BagFrames(Recording(word), topic, option=option)
