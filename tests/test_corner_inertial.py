@@ -160,6 +160,9 @@ def test_the_command_takes_readings(
     asked = ["corner", str(tmp_path / "left"), "--calibration", str(calibration), "--frame-rate", "25"]
     assert main([*asked, "--imu", str(tmp_path / "imu.csv")]) == 0
     assert "turns of 2, down of" in capsys.readouterr().out
+    # At a rate that nobody told, readings would be of other frames.
+    assert main([*asked[:-2], "--imu", str(tmp_path / "imu.csv")]) == 2
+    assert "0.png: tells no time, expected --frame-rate with --imu" in capsys.readouterr().err
     assert main([*asked, "--imu-topic", "/imu"]) != 0
     assert "--imu-topic without --imu" in capsys.readouterr().err
 

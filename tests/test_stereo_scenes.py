@@ -15,6 +15,7 @@ import tiltvp
 from tiltvp.cli import main
 from tiltvp.errors import InvalidInputError
 from tiltvp.lab.datasets.stereo import write_stereo
+from tiltvp.streams import InertialSamples
 from tiltvp.synth import Laboratory, Room, StereoSequence, zed_cameras
 
 pytestmark = pytest.mark.slow
@@ -185,6 +186,11 @@ def test_folders_are_whole_and_say_what_is_true(sequence: StereoSequence, tmp_pa
     assert np.allclose(trajectory[3, 1:4], np.linalg.inv(sequence.left_from_object(3))[:3, 3], atol=1e-7)
     with (tmp_path / "a" / "truth.csv").open(newline="") as file:
         assert {row["frame"] for row in csv.DictReader(file)} == {str(frame) for frame in range(FRAMES)}
+    samples, readings = sequence.imu(seed=sequence.seed), InertialSamples.read(tmp_path / "a" / "imu.csv")
+    np.testing.assert_allclose(readings.times_s, samples.times_s)
+    np.testing.assert_allclose(readings.rates_rad_s, samples.rates_rad_s)
+    assert readings.accelerations_m_s2 is not None
+    np.testing.assert_allclose(readings.accelerations_m_s2, samples.forces_m_s2)
     with pytest.raises(InvalidInputError, match="exists"):
         write_stereo(sequence, tmp_path / "a")
     wide = tiltvp.Camera.equidistant(width=64, height=48, focal_px=20.0, cx=31.5, cy=23.5)

@@ -121,8 +121,8 @@ def corner(
         with red, green and blue faces; general: corners of rooms, boxes and buildings; paper: the cuboid by the method
         as it was published, to compare.
     frame_rate
-        Frames per second: by default the times that frames tell, and 25 for images that tell none. With it the times
-        of pairs are not compared.
+        Frames per second: by default the times that frames tell, and 25 for images that tell none, but with --imu. With
+        it the times of pairs are not compared.
     image_size
         WIDTHxHEIGHT in pixels, for calibrations that do not carry it.
     independent
@@ -170,14 +170,18 @@ class Look:
     ) -> Iterator[tuple[float, str, CornerEstimate]]:
         """Time, name and estimate of the frames that can be used; the others are complained about.
 
-        Times are those of the frames, if `rate_hz` does not say how many there are in a second.
+        Times are those of the frames, if `rate_hz` does not say how many there are in a second. Raises
+        `InvalidInputError` for frames without a time where readings of a sensor have times.
         """
         with ending_at_interrupt(frames) as coming, progress_bar(frames.count or 0, "frames") as bar:
             pairs = ((frame,) for frame in coming) if others is None else zip(coming, others, strict=True)
             for number, (pair, name) in enumerate(zip(pairs, picture_names(frames), strict=False)):
                 frame = pair[0]
-                even_s = number / (rate_hz or frames.rate_hz)
-                time_s = even_s if rate_hz is not None or frame.time_s is None else frame.time_s
+                time_s = frame.time_s if rate_hz is None else number / rate_hz
+                if time_s is None:
+                    if self.sensor is not None:
+                        raise InvalidInputError(f"{frame.name}: tells no time, expected --frame-rate with --imu")
+                    time_s = number / frames.rate_hz
                 try:
                     images = [one.read() for one in pair]
                     estimate = self._estimate(images, time_s)

@@ -25,7 +25,7 @@ class InertialOptions:
 
     imu: Path | None = None
     """Table with time_s, rate_x_radps, rate_y_radps, rate_z_radps and, where there are any, acceleration_x_mps2 and
-    so on, or recording of ROS with sensor_msgs/Imu. Times are those of the frames."""
+    so on, or recording of ROS with sensor_msgs/Imu. Times are those of the frames, or from 0 with --frame-rate."""
     imu_topic: str | None = None
     """Its topic in a recording, where that has several."""
     camera_from_imu: str | None = None

@@ -14,10 +14,12 @@ from tiltvp.errors import InvalidInputError
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-__all__ = ["InertialSamples"]
+__all__ = ["INERTIAL_COLUMNS", "InertialSamples"]
 
 _RATES: Final = tuple(f"rate_{axis}_radps" for axis in "xyz")
 _FORCES: Final = tuple(f"acceleration_{axis}_mps2" for axis in "xyz")
+INERTIAL_COLUMNS: Final = ("time_s", *_RATES, *_FORCES)
+"""The columns of a table of readings that has all of them."""
 _NOISE_RAD_S: Final = float(np.radians(0.005))
 """Noise density of rates, rad/s per square root of Hz: of an MPU-6050, as `StereoSequence.imu` has it."""
 _BIAS_RAD_S: Final = float(np.radians(0.2))

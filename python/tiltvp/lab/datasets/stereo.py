@@ -18,6 +18,7 @@ from tiltvp.formats.yaml_text import yaml_of
 from tiltvp.images import write_image
 from tiltvp.lab.datasets.new import NewDataset, in_order, new_folder
 from tiltvp.rotations import quaternion
+from tiltvp.streams.inertial import INERTIAL_COLUMNS
 from tiltvp.synth import Laboratory, StereoSequence, StereoTruth
 
 __all__ = ["CALIBRATION", "POSES", "write_stereo"]
@@ -37,7 +38,6 @@ _TRUTH: Final = (
     "frame", "corner", "left_u_px", "left_v_px", "right_u_px", "right_v_px",
     *(f"{side}_{edge}_px" for side in ("left", "right") for edge in ("ex", "ey", "ez")),
 )  # fmt: skip
-_IMU: Final = ("time_s", "rate_x_rad_s", "rate_y_rad_s", "rate_z_rad_s", "force_x_m_s2", "force_y_m_s2", "force_z_m_s2")
 
 
 def write_stereo(
@@ -94,7 +94,8 @@ def _write_tables(sequence: StereoSequence, names: list[str], truth: list[tuple[
     new.write_table("corners.csv", _CORNERS, corners)
     new.write_table("truth.csv", _TRUTH, truth)
     imu = sequence.imu(seed=sequence.seed)
-    new.write_table("imu.csv", _IMU, np.column_stack([imu.times_s, imu.rates_rad_s, imu.forces_m_s2]).tolist())
+    readings = np.column_stack([imu.times_s, imu.rates_rad_s, imu.forces_m_s2])
+    new.write_table("imu.csv", INERTIAL_COLUMNS, readings.tolist())
 
 
 def _truth_rows(frame: int, seen: StereoTruth) -> list[tuple[object, ...]]:
