@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import subprocess
 import sys
 from collections import Counter
 from collections.abc import Callable
@@ -232,6 +233,34 @@ def test_without_rerun_and_wrong_words(run: Run, world: Path, monkeypatch: pytes
     code, _, complaints = run(*words, "--rerun", tmp_path / "a.rrd")
     assert code == 1
     assert "pip install 'tiltvp[rerun]'" in complaints
+    assert os.listdir(tmp_path) == []
+
+
+_FULL = """
+import resource, signal, sys
+import numpy as np
+from tiltvp.errors import OutputError
+from tiltvp.streams.outputs.viewer import open_viewer
+signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+resource.setrlimit(resource.RLIMIT_FSIZE, (100_000, 100_000))
+try:
+    with open_viewer(sys.argv[1]) as viewer:
+        for number in range(20):
+            viewer.at(number)
+            viewer.points("points", np.random.default_rng(number).random((1000, 3)))
+except OutputError as error:
+    print(error)
+"""
+"""What writes more than a file may hold, as on a full disk."""
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="limits of files")
+def test_a_recording_without_its_end_is_none(tmp_path: Path) -> None:
+    record = tmp_path / "a.rrd"
+    done = subprocess.run(
+        [sys.executable, "-c", _FULL, str(record)], capture_output=True, text=True, check=True, timeout=60
+    )
+    assert f"{record}: cannot be written" in done.stdout
     assert os.listdir(tmp_path) == []
 
 

@@ -20,6 +20,9 @@ __all__ = ["VIEWER", "Viewer", "check_viewer", "open_viewer"]
 VIEWER: Final = "viewer"
 """The word for the viewer itself, in place of a file."""
 _ENDING: Final = ".rrd"
+_END: Final = b"RRF2FOOT"
+_END_BYTES: Final = 64
+"""The mark of a recording's end, which is written last, and in how many last bytes it is."""
 _SINCE_1970_S: Final = 1e9
 """Times from here on (the year 2001) are taken for seconds since 1970, smaller ones for those of a clock of its own."""
 
@@ -66,8 +69,17 @@ def open_viewer(where: str | os.PathLike[str], name: str = "tiltvp") -> Iterator
                 yield Viewer(stream)
                 # What is not yet written is so before the file takes its name.
                 stream.disconnect()
+                _check_whole(part, where)
     finally:
         stream.disconnect()
+
+
+def _check_whole(part: Path, where: str) -> None:
+    """Refuses a recording without its end: Rerun tells of a full disk in its log alone. Raises `OutputError`."""
+    with open(part, "rb") as written:
+        written.seek(-min(_END_BYTES, part.stat().st_size), os.SEEK_END)
+        if _END not in written.read():
+            raise OutputError(f"{where}: cannot be written (its end is missing), expected a disk with room")
 
 
 class Viewer:
