@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import sqlite3
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -19,12 +20,14 @@ from tiltvp.streams import (
     NamedImages,
     RawImages,
     Recording,
+    Wheels,
     inertial_samples,
     open_frames,
     recorded_camera,
     robot_from_camera,
 )
 from tiltvp.streams.bag_images import image_from_message
+from tiltvp.streams.bag_motion import bag_odometry
 
 RNG = np.random.default_rng(5)
 TIMES_MS = np.cumsum([40, 13, 200, 57, 33, 90, 41, 150, 22, 71, 66, 34]).tolist()
@@ -222,6 +225,26 @@ def test_bags_that_are_cut_or_damaged_are_errors_of_ours(kind: str, tmp_path: Pa
             refused += str(path) in str(error)
             continue
     assert refused >= 8, "what is cut is refused"
+
+
+def test_messages_that_are_lost_within_a_bag_are_told(tmp_path: Path) -> None:
+    made = Bag("sqlite3")
+    for k in range(10):
+        made.image("/image", START_S + 0.1 * k, np.full((6, 8), k, np.uint8), "mono8")
+        made.odometry(START_S + 0.1 * k, 0.0, 0.0, 0.1 * k)
+        made.joints(START_S + 0.1 * k, ["left_wheel", "right_wheel"], [0.1 * k, 0.1 * k])
+    path = made.write(tmp_path)
+    assert open_frames(path).problems == ()
+    database = sqlite3.connect(next(path.glob("*.db3")), isolation_level=None)
+    database.execute("DELETE FROM messages WHERE id BETWEEN 10 AND 18")
+    database.close()
+    frames = open_frames(path)
+    assert frames.count == 7
+    assert frames.problems == (f"{path}: /image: 3 of 10 messages cannot be read (damaged?)",)
+    for topic in ("/odom", "/joint_states"):
+        wheels = Wheels(wheel_radius_m=0.05, wheel_base_m=0.3)
+        notes = bag_odometry(Recording(path), topic, wheels).notes
+        assert notes == (f"{path}: {topic}: 3 of 10 messages cannot be read (damaged?)",)
 
 
 @pytest.mark.parametrize("name", ["a.bag", "a.mcap", "a.db3", "a.mp4", "a.avi"])

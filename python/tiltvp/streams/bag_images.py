@@ -38,6 +38,7 @@ class BagFrames(Frames):
         digits = len(str(max(len(times) - 1, 0)))
         self.names = [f"{recording.path}#{k:0{digits}d}" for k in range(len(times))]
         self.times_s = np.array(times)
+        self.problems = recording.unread(self._topic, len(times))
         self.rate_hz = median_rate_hz(self.times_s)
 
     @property

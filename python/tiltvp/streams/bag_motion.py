@@ -37,6 +37,7 @@ def bag_odometry(recording: Recording, topic: str | None, wheels: Wheels) -> Odo
         return _from_joints(recording, chosen, wheels)
     more: dict[str, Any] = {"source": f"{recording.path} {chosen.name}", "gap_max_s": wheels.gap_max_s}
     rows = [(time_s, *_values(content, chosen.kind)) for time_s, content in recording.decoded(chosen)]
+    more["notes"] = recording.unread(chosen, len(rows))
     table = _rising(np.array(rows, dtype=np.float64), more["source"])
     if chosen.kind == _POSES:
         return Odometry.from_poses(*table.T, **more)
@@ -70,7 +71,9 @@ def _from_joints(recording: Recording, topic: Topic, wheels: Wheels) -> Odometry
         raise InvalidInputError(f"{source}: angles of wheels, expected their radius by --wheel-radius")
     rows: list[tuple[float, float, float]] = []
     names: tuple[str, str] | None = None
+    count = 0
     for time_s, content in recording.decoded(topic):
+        count += 1
         if names is None or not set(names) <= set(content.name):
             # Some robots send the joints of arms and wheels in turn.
             found = _wheel_joints(list(content.name), wheels.joints, source, must=False)
@@ -86,6 +89,7 @@ def _from_joints(recording: Recording, topic: Topic, wheels: Wheels) -> Odometry
         _wheel_joints(seen, wheels.joints, source, must=True)
     table = _rising(np.array(rows, dtype=np.float64), source)
     rolled, notes = cumulative_m(table[:, 1:], 2.0 * np.pi, wheels.wheel_radius_m, source)
+    notes = (*recording.unread(topic, count), *notes)
     return Odometry.from_wheels(
         table[:, 0], rolled, wheel_base_m=wheels.wheel_base_m, source=source, gap_max_s=wheels.gap_max_s, notes=notes
     )

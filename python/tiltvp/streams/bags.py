@@ -117,6 +117,11 @@ class Recording:
             for connection, time_ns, raw in reader.messages(connections):
                 yield Message(1e-9 * time_ns, raw, connection.msgtype, decode)
 
+    def unread(self, topic: Topic, read: int) -> tuple[str, ...]:
+        """A sentence where fewer messages of a topic were read than it has, as of a file that is damaged within."""
+        told = f"{self.path}: {topic.name}: {topic.count - read} of {topic.count} messages cannot be read (damaged?)"
+        return (told,) if read < topic.count else ()
+
     def decoded(self, topic: Topic) -> Iterator[tuple[float, Any]]:
         """The time and the content of each message of a topic, which has no damaged ones."""
         for number, message in enumerate(self.messages(topic)):
