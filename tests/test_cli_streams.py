@@ -18,6 +18,7 @@ import pytest
 import tiltvp
 from commands import Run
 from recordings import START_S, Bag, write_video
+from tiltvp.robot import Robot
 from tiltvp.synth import RoomImage
 
 pytestmark = pytest.mark.slow
@@ -72,6 +73,31 @@ def test_pictures_of_a_video_and_threads(run: Run, world: Path, tmp_path: Path) 
     one, three = (pl.read_csv(tmp_path / name).drop("time_s") for name in ("a.csv", "b.csv"))
     assert one.equals(three)
     assert one["taken_s"].to_list() == pytest.approx([0, 0.04, 0.2, 0.23, 0.5, 0.51], abs=1e-3)
+
+
+def test_of_several_cameras_the_chosen_one_counts(run: Run, world: Path, tmp_path: Path, room: RoomImage) -> None:
+    made = Bag("mcap")
+    height, width = room.gray.shape
+    for topic, frame in (("/up", "roof"), ("/ahead", "front")):
+        image = (height, width, "mono8", 0, width, room.gray.ravel())
+        made.add(topic, "sensor_msgs/Image", START_S, made.header(START_S, frame), *image)
+    made.static("base_link", "roof", [0, 0, 0, 1.0])
+    made.static("base_link", "front", [-0.5, 0.5, -0.5, 0.5])
+    bag, found = made.write(tmp_path), {}
+    for mounting in (bag, "up", "forward"):
+        out = tmp_path / "found.csv"
+        words = ("--camera", world / "camera.toml", "--robot-from-camera", mounting, "--out", out, "--overwrite")
+        assert run("tilt", bag, *words, "--topic", "/up").code == 0
+        found[mounting] = pl.read_csv(out)["normal_x"].to_list()
+    assert found[bag] == found["up"] != found["forward"]
+    assert run("lines", bag, *words[:2], "--robot-from-camera", bag, "--topic", "/up").code == 0
+    # The topic of other images is none of a recording that tells the mounting.
+    said = run("tilt", world / "drive_mcap", "--topic", "/image", *words[:2], "--robot-from-camera", bag)
+    assert said.code == 2
+    assert "/up: 1, /ahead: 1" in said.complaint or "/ahead: 1, /up: 1" in said.complaint
+    Robot(tiltvp.Camera.load(world / "camera.toml"), np.eye(3), topics={"images": "/ahead"}).save(tmp_path / "r.toml")
+    for verb in ("tilt", "lines", "segments"):
+        assert run(verb, bag, "--camera", tmp_path / "r.toml").code == 0
 
 
 @pytest.mark.parametrize("verb", ["lines", "segments"])

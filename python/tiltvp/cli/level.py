@@ -96,8 +96,10 @@ def level(
     from tiltvp.streams.image_files import ImageFiles
 
     filtering.check()
+    robot = None if camera is None else camera.robot()
+    source = source.of_robot(robot, images or [])
     if camera is not None:
-        method = camera.complete(method)
+        method = camera.complete(method.of_topic(source.topic))
     looks = Looks(None if camera is None else camera.load(), method, output.keywords(), metadata_only)
     work = Levelling(looks, filtering, copy_unlevelled)
     as_video = out.suffix.lower() in _VIDEOS and not out.is_dir()
@@ -105,8 +107,7 @@ def level(
         check_cluster(out, filter=filtering.filter)
     if cluster is None or not is_begun(out / TILTS):
         check_output(out) if as_video else check_output_folder(out)
-    robot = None if camera is None else camera.robot()
-    frames = source.of_robot(robot, images or []).open(images or [])
+    frames = source.open(images or [])
     of_files = isinstance(frames, ImageFiles)
     if metadata_only and (as_video or not of_files):
         raise InvalidInputError("--metadata-only with a video, expected photographs")

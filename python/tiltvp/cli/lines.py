@@ -34,7 +34,8 @@ def lines(
     from tiltvp.overlays.lines import draw_lines
 
     results.check()
-    lens, options = camera.load(), camera.complete(options)
+    source = source.of_robot(camera.robot(), images or [])
+    lens, options = camera.load(), camera.complete(options.of_topic(source.topic))
     extractor, tilt = options.extractor(lens), options.tilts(lens)
     found, well = find_in_each(
         images,

@@ -66,9 +66,10 @@ def mount(
         if out.suffix.lower() != ".json":
             raise InvalidInputError(f"--out {out}: ends in {out.suffix!r}, expected .json")
         check_output(out)
-    estimator = camera.complete(mounted).mounted(camera.load(), **TILT_OPTIONS)
     robot = camera.robot()
-    frames = source.of_robot(robot, images).open(images)
+    source = source.of_robot(robot, images)
+    estimator = camera.complete(mounted.of_topic(source.topic)).mounted(camera.load(), **TILT_OPTIONS)
+    frames = source.open(images)
     moved = motion.motions_of(robot, frames, wheel_base)
     motions = moved.motions if moved is not None and moved.turns_known else None
     with progress_bar(measured_count(frames), "images") as bar:

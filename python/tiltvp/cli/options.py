@@ -7,7 +7,7 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, TypeVar
+from typing import TYPE_CHECKING, Annotated, Any, Self, TypeVar
 
 from cyclopts import Group, Parameter
 
@@ -109,13 +109,20 @@ class MountedOptions(LibraryOptions):
 
     robot_from_camera: str | None = None
     """How the camera sits on the robot: up (the default, but for panoramas), forward, a file with a rotation, or a
-    recording of ROS whose /tf_static joins base_link to the frame of the only topic of images."""
+    recording of ROS whose /tf_static joins base_link to the frame of its images, of --topic or of the only topic."""
     mask: Path | None = None
     """Image of the camera's size, white where the world is seen and black where the robot is."""
+    topic: Annotated[str | None, Parameter(parse=False)] = None
+    """The topic of the images, where that is chosen: a recording's mounting is of their frame."""
+
+    def of_topic(self, topic: str | None) -> Self:
+        """The same for images of a topic."""
+        return replace(self, topic=topic)
 
     def mounting(self, camera: "Camera") -> "NDArray[np.float64]":
         """(3, 3): the mounting that was given, or that of a camera that looks up, of a panorama's that looks ahead."""
-        return rotation_of(self.robot_from_camera or ("forward" if camera.model == "equirectangular" else "up"))
+        default = "forward" if camera.model == "equirectangular" else "up"
+        return rotation_of(self.robot_from_camera or default, self.topic)
 
     def mounted(self, camera: "Camera", **options: Any) -> "TiltEstimator":
         """An estimator of that mounting and mask, with these options."""
@@ -154,12 +161,15 @@ class MethodOptions(MountedOptions):
         return self.mounted(camera, **options)
 
 
-def rotation_of(source: str) -> "NDArray[np.float64]":
-    """The (3, 3) rotation of a word, a file or a recording."""
+def rotation_of(source: str, topic: str | None = None) -> "NDArray[np.float64]":
+    """The (3, 3) rotation of a word, a file or a recording, of that of the frame of `topic` where it has it."""
     from tiltvp.rotations import read_rotation
     from tiltvp.streams import Recording, is_recording, robot_from_camera
 
-    return robot_from_camera(Recording(source)) if is_recording(source) else read_rotation(source)
+    if not is_recording(source):
+        return read_rotation(source)
+    recording = Recording(source)
+    return robot_from_camera(recording, topic=topic if topic in [one.name for one in recording.topics] else None)
 
 
 def given_words(options: "DataclassInstance") -> list[str]:

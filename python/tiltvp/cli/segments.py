@@ -48,6 +48,7 @@ def segments(
     from tiltvp.segments import SegmentDetector
 
     results.check()
+    source = source.of_robot(camera.robot(), images or [])
     lens = camera.load()
     detector = SegmentDetector(lens, **camera.complete(options).given())
     found, well = find_in_each(

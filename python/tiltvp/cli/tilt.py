@@ -97,8 +97,10 @@ def tilt(
     showing.check()
     if not filtering.filter:
         motion.refuse("--filter", wheel_base)
-    estimator, robot = camera.complete(method).estimator(camera.load()), camera.robot()
-    frames = source.of_robot(robot, images or []).open(images or [])
+    robot = camera.robot()
+    source = source.of_robot(robot, images or [])
+    estimator = camera.complete(method.of_topic(source.topic)).estimator(camera.load())
+    frames = source.open(images or [])
     moved = motion.motions_of(robot, frames, wheel_base) if filtering.filter else None
     motions: Iterable[Motion | None] = repeat(Motion()) if moved is None else moved.motions
     estimator = _checked(estimator, frames)

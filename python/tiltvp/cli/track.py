@@ -91,12 +91,13 @@ def track(
         check_output(video)
     check_plot("--plot", plot)
     watching.check()
-    lens, options = camera.load(), camera.complete(options)
-    extractor, tilt = options.extractor(lens), options.tilts(lens)
     robot, words = camera.robot(), [] if source is None else [source]
+    frames_of = frames_of.of_robot(robot, words)
+    lens, options = camera.load(), camera.complete(options.of_topic(frames_of.topic))
+    extractor, tilt = options.extractor(lens), options.tilts(lens)
     place = {} if robot is None or robot.place_m is None else {"camera_m": robot.place_m}
     tracker = LineTracker(**place | tracking.given())
-    frames = frames_of.of_robot(robot, words).open(words)
+    frames = frames_of.open(words)
     motions = needed_turns(motion.motions_of(robot, frames, wheel_base))
     drive = Drive(extractor, tilt, motions)
     showing = nullcontext() if video is None else video_writer(video, frame_rate or frames.rate_hz)

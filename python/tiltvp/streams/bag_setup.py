@@ -65,19 +65,23 @@ def _as_taken(camera: Camera, info: Any, source: str) -> Camera:
 
 
 def robot_from_camera(
-    recording: Recording, *, robot_frame: str = "base_link", camera_frame: str | None = None
+    recording: Recording,
+    *,
+    robot_frame: str = "base_link",
+    camera_frame: str | None = None,
+    topic: str | None = None,
 ) -> NDArray[np.float64]:
     """The (3, 3) rotation R in v_robot = R v_camera by the static transforms of a recording.
 
-    `camera_frame` is the optical frame, z ahead and x right; by default that of the headers of the only topic of
-    images. Raises `InvalidInputError` that names the frames there are, where they do not join the two.
+    `camera_frame` is the optical frame, z ahead and x right; by default that of the headers of images, of `topic` or of
+    the only one. Raises `InvalidInputError` that names the frames there are, where they do not join the two.
     """
     if camera_frame is None:
-        images = recording.choose(IMAGE_KINDS, "--topic")
+        images = recording.choose(IMAGE_KINDS, "--topic", topic)
         camera_frame = str(next(content for _, content in recording.decoded(images)).header.frame_id)
-    topic = recording.choose((_TRANSFORMS,), _STATIC, _STATIC)
+    static = recording.choose((_TRANSFORMS,), _STATIC, _STATIC)
     parents: dict[str, tuple[str, NDArray[np.float64]]] = {}
-    for _, content in recording.decoded(topic):
+    for _, content in recording.decoded(static):
         for one in content.transforms:
             parents[_plain(one.child_frame_id)] = (_plain(one.header.frame_id), _rotation(one, str(recording.path)))
     to_root, roots = {}, {}
