@@ -78,6 +78,8 @@ def test_levelling_keeps_the_sound(
         (".avi", "pcm_s16le", UNEVEN_S, "sound and picture are up to 0.60 s apart"),
         (".mp4", "wavpack", EVEN_S, "its sound (wavpack) is not copied into .mp4"),
         (".mp4", None, EVEN_S, None),
+        (".mp4", None, UNEVEN_S, None),
+        (".avi", None, UNEVEN_S, "time and picture are up to 0.60 s apart"),
     ],
 )
 def test_what_a_container_takes(
@@ -88,6 +90,8 @@ def test_what_a_container_takes(
         for time_s in times_s:
             video.add(np.full((64, 64, 3), 90, np.uint8), time_s)
     assert told in (video.note or "") if told else video.note is None
+    if ending == ".mp4":
+        assert open_frames(out).times_s == pytest.approx(times_s, abs=1e-3)
     assert open_frames(out).count == len(times_s)
     assert {file.name for file in tmp_path.iterdir()} == {source.name, out.name}
     kept = codec is not None and codec != "wavpack"

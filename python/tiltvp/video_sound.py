@@ -23,9 +23,9 @@ _APART_S: Final = 0.1
 def add_sound(path: Path, times_s: Sequence[float | None], source: str | os.PathLike[str], scratch: Path) -> str | None:
     """Copies the sound of `source` into the video `path`, whose frames were taken at `times_s` by the source's clock.
 
-    MP4 files keep the frames' times, so that sound and picture stay together; AVI has frames at even times only. What
-    could not be copied, or will not stay together, is told as a sentence; None where there is nothing to tell. Then the
-    video is as it was. `scratch` is a folder on the same disk.
+    MP4 files keep the frames' times, also without sound, so that both stay together; AVI has frames at even times only.
+    What could not be copied, or will not stay together, is told as a sentence; None where there is nothing to tell.
+    Then the video is as it was. `scratch` is a folder on the same disk.
     """
     try:
         import av
@@ -37,18 +37,19 @@ def add_sound(path: Path, times_s: Sequence[float | None], source: str | os.Path
         # As for frames, a name with a colon is no address.
         with av.open(f"file:{os.fspath(source)}") as heard, av.open(str(path)) as seen:
             copied = [stream.codec_context.name for stream in heard.streams.audio]
-            if not copied:
-                return None
             known = [time_s for time_s in times_s if time_s is not None]
             own = known if path.suffix.lower() != ".avi" and len(known) == len(times_s) else None
             rate = seen.streams.video[0].average_rate
+            apart = None if rate is None else _apart(known, float(rate), what="sound" if copied else "time")
+            if not copied and (own is None or apart is None):
+                return apart
             with av.open(str(joined), "w") as out:
                 _copy(heard, seen, own, out)
         os.replace(joined, path)
     except (av.FFmpegError, ValueError) as error:
         why = " ".join(str(getattr(error, "strerror", None) or error).split())
         return f"its sound ({', '.join(copied) or 'of unknown kind'}) is not copied into {path.suffix} ({why})"
-    return None if own is not None or rate is None else _apart(known, float(rate))
+    return None if own is not None else apart
 
 
 def _copy(heard: InputContainer, seen: InputContainer, times_s: Sequence[float] | None, out: Any) -> None:
@@ -68,7 +69,8 @@ def _copy(heard: InputContainer, seen: InputContainer, times_s: Sequence[float] 
             yield packet
 
     def sounds() -> Iterator[Any]:
-        for packet in heard.demux(list(heard.streams.audio)):
+        # Of no streams all would be told.
+        for packet in heard.demux(list(heard.streams.audio)) if sound else ():
             if packet.size and packet.dts is not None:
                 packet.stream = sound[packet.stream.index]
                 yield packet
@@ -77,9 +79,9 @@ def _copy(heard: InputContainer, seen: InputContainer, times_s: Sequence[float] 
         out.mux(packet)
 
 
-def _apart(times_s: Sequence[float], rate_hz: float) -> str | None:
-    """What to tell of frames that are shown at even times."""
+def _apart(times_s: Sequence[float], rate_hz: float, *, what: str) -> str | None:
+    """What to tell of frames that are shown at even times; `what` is what these run apart from."""
     apart = max((abs(time_s - times_s[0] - number / rate_hz) for number, time_s in enumerate(times_s)), default=0.0)
     if apart <= _APART_S:
         return None
-    return f"its frames are not even: sound and picture are up to {apart:.2f} s apart; .mp4 keeps them together"
+    return f"its frames are not even: {what} and picture are up to {apart:.2f} s apart; .mp4 keeps them together"
