@@ -122,6 +122,48 @@ def test_a_video_is_level_at_its_own_rate(camera: tiltvp.Camera, room: RoomImage
     assert estimate.alpha_rad < math.radians(1.0)
 
 
+@pytest.mark.parametrize("channels", [1, 3, 4])
+def test_depth_and_opacity_stay(channels: int, camera: tiltvp.Camera, room: RoomImage, tmp_path: Path) -> None:
+    camera.save(tmp_path / "camera.toml")
+    deep = room.gray.astype(np.uint16) * 257 + 3
+    image = deep if channels == 1 else np.dstack([deep] * 3 + [np.full_like(deep, 65_535)] * (channels - 3))
+    (tmp_path / "images").mkdir()
+    for name in ("a.png", "b.tiff"):
+        cv2.imwrite(str(tmp_path / "images" / name), image)
+    words = ["level", str(tmp_path / "images"), "--camera", str(tmp_path / "camera.toml"), "--out"]
+    assert main([*words, str(tmp_path / "out")]) == 0
+    for name in ("a.png", "b.png"):
+        level = cv2.imread(str(tmp_path / "out" / name), cv2.IMREAD_UNCHANGED)
+        assert (level.dtype, level.shape) == (np.uint16, image.shape)
+        assert len(np.unique(level)) > 300
+
+
+def test_a_video_has_a_filter_whose_options_and_plot_count(
+    camera: tiltvp.Camera, room: RoomImage, tmp_path: Path
+) -> None:
+    camera.save(tmp_path / "camera.toml")
+    with video_writer(tmp_path / "drive.avi", 12.0) as video:
+        for _ in range(3):
+            video.add(cv2.cvtColor(room.gray, cv2.COLOR_GRAY2BGR))
+    tiltvp.write_image(tmp_path / "images" / "a.png", room.gray)
+    options = ["--camera", str(tmp_path / "camera.toml"), "--lost-after", "3"]
+    for source, out, more in (("drive.avi", "level.avi", []), ("images", "level", ["--filter"])):
+        plot = tmp_path / f"{out}.png"
+        words = ["level", str(tmp_path / source), "--out", str(tmp_path / out), *options, "--filter-plot", str(plot)]
+        assert main([*words, *more]) == 0
+        assert plot.exists()
+    assert main(["level", str(tmp_path / "images"), "--out", str(tmp_path / "one"), *options]) == 2
+
+
+@pytest.mark.parametrize("name", ["level.mkv", "level.png"])
+def test_a_file_of_another_ending_is_no_folder(
+    name: str, photo: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["level", str(photo), "--out", str(tmp_path / name)]) == 2
+    assert "expected .mp4 or .avi, or a folder" in capsys.readouterr().err
+    assert list(tmp_path.iterdir()) == []
+
+
 @pytest.mark.slow
 def test_a_panorama_is_a_camera_in_every_command(photo: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["tilt", str(photo), "--camera", "equirectangular:1024x512", "--method", "segments",

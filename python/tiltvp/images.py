@@ -16,7 +16,7 @@ from tiltvp.image_headers import header_size
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
-__all__ = ["bgr_from", "checked_mask", "decode_image", "gray_from", "read_image", "write_image"]
+__all__ = ["bgr_from", "checked_mask", "decode_as_stored", "decode_image", "gray_from", "read_image", "write_image"]
 
 LARGEST_IMAGE_BYTES: Final = 1 << 30
 """Of an image file: as many pixels as a camera may have, in three uncompressed colours, and a half more."""
@@ -142,7 +142,14 @@ def _decode(data: bytes) -> NDArray[np.uint8] | None:
     return _bytes_from(np.asarray(image), "image")
 
 
-def write_image(path: str | os.PathLike[str], image: NDArray[np.uint8]) -> None:
+def decode_as_stored(data: bytes) -> NDArray[Any]:
+    """What `decode_image` takes, with its depth and opacity: (H, W) or (H, W, 3 or 4) uint8 or uint16, BGR or BGRA."""
+    import cv2
+
+    return np.asarray(cv2.imdecode(np.frombuffer(data, dtype=np.uint8), cv2.IMREAD_UNCHANGED))
+
+
+def write_image(path: str | os.PathLike[str], image: NDArray[Any]) -> None:
     """Writes an image file whole or not at all; the ending says the format.
 
     Raises `ImageFileError` for an image that the format cannot hold, `OutputError` where it cannot be written.

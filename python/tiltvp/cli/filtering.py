@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -10,7 +10,7 @@ from cyclopts import Group, Parameter
 
 from tiltvp.cli.declared_options import LibraryOptions, from_library
 from tiltvp.cli.options import Switch
-from tiltvp.cli.results import Outcome
+from tiltvp.cli.results import Outcome, outcome_table
 from tiltvp.cli.tables import check_plot
 from tiltvp.errors import InvalidInputError
 
@@ -68,9 +68,27 @@ class Judge:
 
     options: FilterOptions
     filter: TiltFilter | None
+    plotted: list[Outcome] = field(default_factory=list)
+    """What was made of all, where a plot is asked for."""
 
     def __call__(self, outcome: Outcome, motion: Motion | None) -> Outcome:
         """The outcome with what was made of it; `motion` is what the robot did since the last, None: nobody knows."""
+        judged = self._judged(outcome, motion)
+        if self.options.filter_plot is not None:
+            self.plotted.append(judged)
+        return judged
+
+    def plot(self) -> None:
+        """Writes the picture of all outcomes so far, where it is asked for."""
+        if self.options.filter_plot is None:
+            return
+        from tiltvp import write_image
+        from tiltvp.lab.plots.filtering import filtered_tilt
+        from tiltvp.lab.plots.picture import figure_picture
+
+        write_image(self.options.filter_plot, figure_picture(filtered_tilt(outcome_table(self.plotted, "").frame())))
+
+    def _judged(self, outcome: Outcome, motion: Motion | None) -> Outcome:
         if self.filter is not None:
             return _filtered(outcome, motion, self.filter)
         if self.options.confidence_min is not None:

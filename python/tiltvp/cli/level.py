@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import repeat
 from pathlib import Path
 from typing import Annotated, Literal, TypeAlias
@@ -95,14 +95,12 @@ def level(
     from tiltvp.streams import Motion
     from tiltvp.streams.image_files import ImageFiles
 
-    filtering.check()
     robot = None if camera is None else camera.robot()
     source = source.of_robot(robot, images or [])
     if camera is not None:
         method = camera.complete(method.of_topic(source.topic))
     looks = Looks(None if camera is None else camera.load(), method, output.keywords(), metadata_only)
-    work = Levelling(looks, filtering, copy_unlevelled)
-    as_video = out.suffix.lower() in _VIDEOS and not out.is_dir()
+    as_video = _is_video(out)
     if cluster is not None:
         check_cluster(out, filter=filtering.filter)
     if cluster is None or not is_begun(out / TILTS):
@@ -112,6 +110,9 @@ def level(
     if metadata_only and (as_video or not of_files):
         raise InvalidInputError("--metadata-only with a video, expected photographs")
     fused = filtering.filter or as_video or not of_files
+    filtering = replace(filtering, filter=fused)
+    filtering.check()
+    work = Levelling(looks, filtering, copy_unlevelled)
     if not fused:
         motion.refuse("--filter", wheel_base)
     moved = motion.motions_of(robot, frames, wheel_base) if fused else None
@@ -126,3 +127,16 @@ def level(
     of += len(frames.problems)
     say(f"{levelled} of {of} made level" + ("" if not metadata_only else ", by their metadata alone"))
     return 0 if levelled == of else 1
+
+
+def _is_video(out: Path) -> bool:
+    """Whether a video is written, not a folder. Raises `InvalidInputError` for the name of a file that is neither's."""
+    from tiltvp.streams.image_files import IMAGE_ENDINGS
+    from tiltvp.streams.video_files import VIDEO_ENDINGS
+
+    ending = out.suffix.lower()
+    if out.is_dir() or ending not in (*_VIDEOS, *VIDEO_ENDINGS, *IMAGE_ENDINGS):
+        return False
+    if ending not in _VIDEOS:
+        raise InvalidInputError(f"--out {out}: ends in {out.suffix!r}, expected {' or '.join(_VIDEOS)}, or a folder")
+    return True

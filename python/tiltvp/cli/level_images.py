@@ -157,6 +157,7 @@ def write_images(
             else:
                 bar.complain(named(Path(frame.name), problem))
             bar.advance()
+    judge.plot()
     return levelled, len(frames.files)
 
 
@@ -234,23 +235,25 @@ def _write(outcome: Outcome, image: NDArray[np.uint8], data: bytes, path: Path, 
     Raises `OutputError`, which all images would have.
     """
     from tiltvp.files import write_whole
-    from tiltvp.images import write_image
+    from tiltvp.images import decode_as_stored, write_image
     from tiltvp.photos import encode_like, is_jpeg, with_pose
 
     tilt = work.believed(outcome)
+    # PNG holds 16 bits and opacity, where edges are looked for in 8 bits of what is there.
+    stored = decode_as_stored(data) if path.suffix == ".png" and not is_jpeg(data) else image
     try:
         if tilt is None:
             if work.copies and path.suffix == outcome.file.suffix:
                 write_whole(path, data)
             elif work.copies:
-                write_image(path, image)
+                write_image(path, stored)
             return f"{work.why_not(outcome)}; {'copied as it is' if work.copies else 'left out'}"
         if work.looks.metadata_only:
             pitch_deg, roll_deg = math.degrees(tilt.pitch_rad), math.degrees(tilt.roll_rad)
             # GPano's pitch is how high the image's centre looks; ours is nose down positive.
             write_whole(path, with_pose(data, -pitch_deg, roll_deg, image.shape[1], image.shape[0]))
             return None
-        level = work.look(image).leveller(image, tilt)
+        level = work.look(image).leveller(stored, tilt)
         if is_jpeg(data):
             write_whole(path, encode_like(level, data, work.looks.are_panoramas))
         else:

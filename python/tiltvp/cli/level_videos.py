@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -21,7 +20,7 @@ if TYPE_CHECKING:
 
 
 def write_video(frames: Frames, motions: Iterable[Motion | None], path: Path, work: Levelling) -> tuple[int, int]:
-    """Writes a level video, whole or not at all, always by the filter; how many of how many frames are level.
+    """Writes a level video, whole or not at all, by the filter of `work`; how many of how many frames are level.
 
     Frames for which it has no tilt are black, so that time goes on, or as they are where that is asked for. The sound
     of a video file is copied; what cannot be is a line on stderr.
@@ -30,7 +29,6 @@ def write_video(frames: Frames, motions: Iterable[Motion | None], path: Path, wo
     from tiltvp.videos import video_writer
 
     sound_of = frames.source if Path(frames.source).suffix.lower() in VIDEO_ENDINGS else None
-    work = replace(work, filtering=replace(work.filtering, filter=True))
     judge, levelled, count, shape = work.filtering.judge(), 0, 0, None
     with (
         progress_bar(frames.count or 0, "frames") as bar,
@@ -56,6 +54,7 @@ def write_video(frames: Frames, motions: Iterable[Motion | None], path: Path, wo
             if shape is not None:
                 video.add(_black(shape) if shown is None else shown, frame.time_s)
             bar.advance()
+    judge.plot()
     if video.note is not None:
         complain(f"{frames.source}: {video.note}")
     return levelled, count

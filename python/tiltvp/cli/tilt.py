@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections import deque
-from collections.abc import Generator, Iterable, Iterator, Sequence
+from collections.abc import Generator, Iterable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import closing
 from itertools import repeat
@@ -120,6 +120,7 @@ def tilt(
                 work.write_level(frame, outcome, name)
             if watch is not None and not watch(frame, outcome, marked):
                 break
+    judge.plot()
     answers.conclude(frames.source)
     return 1 if frames.problems or answers.bad else 0
 
@@ -147,7 +148,7 @@ class Answers:
         self._rows_only = out == STDOUT
         # So that a stream may go on for ever in the same memory.
         most = 0 if self._rows_only else _LAST if out is None and not ends else None
-        self._kept: deque[Outcome] = deque(maxlen=None if filtering.filter_plot is not None else most)
+        self._kept: deque[Outcome] = deque(maxlen=most)
         self.count = 0
         """How many there were."""
         self.bad = 0
@@ -167,8 +168,6 @@ class Answers:
         written = None
         if self._out is not None and not self._rows_only:
             written = write_answers(outcomes, self._method, self._out, self._frame_rate)
-        if self._filtering.filter_plot is not None:
-            _write_plot(outcomes, self._method, self._filtering.filter_plot)
         if self.bad and len(outcomes) < self.count:
             complain(f"{source}: {self.bad} of {self.count} frames could not be used")
         if not self._rows_only:
@@ -215,14 +214,6 @@ def _checked(estimator: TiltEstimator, frames: Frames) -> TiltEstimator:
         suspect = "--camera" if found.believable else "--robot-from-camera"
         complain(f"{suspect}: {found.reason}")
     return estimator
-
-
-def _write_plot(outcomes: Sequence[Outcome], method: str, path: Path) -> None:
-    from tiltvp import write_image
-    from tiltvp.lab.plots.filtering import filtered_tilt
-    from tiltvp.lab.plots.picture import figure_picture
-
-    write_image(path, figure_picture(filtered_tilt(outcome_table(outcomes, method).frame())))
 
 
 def _done(work: Work, coming: Iterator[Frame], frames: Frames, threads: int) -> Generator[Named, None, None]:
