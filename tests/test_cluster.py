@@ -72,9 +72,9 @@ def test_nobody_answers(
 ) -> None:
     monkeypatch.setattr("tiltvp.lab.cluster._PATIENCE_S", 0.5)
     words = ["evaluate", str(dataset.directory), "--sweep", "table3", "--out", str(tmp_path / "run")]
-    for address in (NOBODY, "nowhere"):
+    for address, told in ((NOBODY, "no Dask scheduler answers"), ("nowhere", "no address of a Dask scheduler")):
         assert main([*words, "--cluster", address]) == 2
-        assert f"tiltvp: {address}: no Dask scheduler answers" in capsys.readouterr().err
+        assert f"tiltvp: {address}: {told}" in capsys.readouterr().err
 
 
 def test_without_dask(tmp_path: Path, dataset: TiltDataset, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -14,7 +14,7 @@ from tiltvp.cli.lab import dataset, evaluate, measure, report, train
 from tiltvp.cli.root import app, run
 from tiltvp.cli.showing import RERUN
 from tiltvp.cli.sources import STDIN
-from tiltvp.cli.terminal import complain
+from tiltvp.cli.terminal import complain, print_any_name
 from tiltvp.errors import MissingExtraError, OutputError, TiltvpError
 from tiltvp.files import keeping_existing
 from tiltvp.streams.outputs.viewer import VIEWER
@@ -49,18 +49,21 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
     0 done, 1 some failed, an extra is missing or an output cannot be written, 2 wrong use.
     """
+    print_any_name()
     words = list(sys.argv[1:] if arguments is None else arguments)
     overwrite = _OVERWRITE in words
-    if words[1:2] == ["-"]:
-        # Elsewhere a word that begins so is taken for an option, which its name should then be looked for among.
-        words[1] = STDIN
+    words = [word for word in words if word != _OVERWRITE]
+    for place in [place for place, word in enumerate(words) if word == "-"]:
+        if place and not words[place - 1].startswith("--"):
+            # A word that begins so is taken for an option, which its name would be looked for among.
+            words[place] = STDIN
     for place in [place for place, word in enumerate(words) if word == RERUN]:
         if not "".join(words[place + 1 : place + 2]).lower().endswith(".rrd"):
             # Without a file it is the viewer that is meant; an option takes a word, or none, not both.
             words[place] = f"{RERUN}={VIEWER}"
     try:
         with nullcontext() if overwrite else keeping_existing():
-            code = run([word for word in words if word != _OVERWRITE])
+            code = run(words)
         sys.stdout.flush()
         return code
     except CycloptsError as error:

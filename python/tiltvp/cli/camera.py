@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import os
 import sys
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 
     from tiltvp import Camera
     from tiltvp.formats import CameraSpec
+    from tiltvp.streams import Recording
 
 app = App(name="camera", help="Calibration files: their cameras, whether these are sound, and other formats.")
 
@@ -43,15 +44,21 @@ class FileOptions:
     """WIDTHxHEIGHT in pixels, for formats that do not carry it."""
 
     def specs(self, file: Path) -> list[CameraSpec]:
-        """The cameras of a file."""
+        """The cameras of a file, those of a recording named by their topics."""
         from tiltvp.formats import read_cameras
+        from tiltvp.streams import Recording, is_recording
 
+        if is_recording(file):
+            return _recorded(Recording(file))
         return read_cameras(file, self.format, image_size_from(self.image_size))
 
     def first(self, file: Path) -> Camera:
         """The first camera of a file."""
         from tiltvp import Camera
+        from tiltvp.streams import is_recording
 
+        if is_recording(file):
+            return Camera.from_spec(self.specs(file)[0])
         return Camera.load(file, self.format, image_size=image_size_from(self.image_size))
 
 
@@ -168,6 +175,16 @@ def formats() -> None:
         what = f"The same as {family}, taken as a {kind} camera." if is_variant else words
         table.add_row(one.name, "yes" if one.written else "", what)
     show(table)
+
+
+def _recorded(recording: Recording) -> list[CameraSpec]:
+    """The camera of each topic of CameraInfo, of which there is one at least."""
+    from tiltvp.streams.bag_setup import CAMERA_KINDS, recorded_camera
+
+    topics = [one.name for one in recording.topics if one.kind in CAMERA_KINDS and one.count]
+    if not topics:
+        recording.choose(CAMERA_KINDS, "--camera-name")  # It says what there is.
+    return [replace(recorded_camera(recording, name).to_spec(), name=name, format="ros") for name in topics]
 
 
 def _beside_camera(file: Path) -> list[str]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 from cyclopts import Group, Parameter
 
 from tiltvp.cli.corner_methods import Searches, advice, looked_for, shown
-from tiltvp.cli.tables import Table, check_ending, check_plot, write_table
+from tiltvp.cli.tables import Out, Table, check_ending, check_plot, write_table
 from tiltvp.cli.terminal import say
 from tiltvp.errors import InvalidInputError
 from tiltvp.files import check_output, check_output_folder
@@ -24,9 +25,9 @@ if TYPE_CHECKING:
 class CornerResults:
     """Where poses and pictures go."""
 
-    out: Path | None = None
+    out: Out | None = None
     """File for the poses, one row for each frame: .csv, .json or .parquet."""
-    corners: Path | None = None
+    corners: Out | None = None
     """File for all corners that are believed, with names that last, poses, covariances, and lengths and angles of their
     edges, one row for each hypothesis of each corner in each frame: .csv, .json or .parquet."""
     trajectory: Path | None = None
@@ -38,9 +39,14 @@ class CornerResults:
 
     def check(self, *, has_scale: bool) -> None:
         """Refuses what cannot be written, before any work is done; a trajectory wants poses that have a place."""
-        for file in (self.out, self.corners):
-            if file is not None:
-                check_ending(file)
+        check_ending(self.out)
+        check_ending(self.corners, "--corners")
+        named = {name: getattr(self, name) for name in ("out", "corners", "trajectory", "plot", "overlay")}
+        given = {name: os.path.realpath(path) for name, path in named.items() if path is not None}
+        for name, path in given.items():
+            other = next(one for one in given if given[one] == path)
+            if other != name:
+                raise InvalidInputError(f"--{other} and --{name} are both {named[name]}, expected two files")
         if self.trajectory is not None:
             if not has_scale:
                 expected = "expected two, or --camera-height-m, --edge-length-m or --box-size-m"

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 from cyclopts import Parameter
 
 from tiltvp.cli.sources import SourceOptions, ending_at_interrupt, picture_names
-from tiltvp.cli.tables import check_ending
+from tiltvp.cli.tables import Out, check_ending
 from tiltvp.cli.terminal import named, progress_bar
 from tiltvp.errors import OutputError, TiltvpError
 from tiltvp.files import check_output_folder
@@ -35,7 +35,7 @@ Found = TypeVar("Found")
 class FoundOptions:
     """Where what is found goes."""
 
-    out: Path | None = None
+    out: Out | None = None
     """File for what is found, angles in radians, one row for each: .csv, .json or .parquet."""
     overlay: Path | None = None
     """Folder for the images with what is found in colour."""

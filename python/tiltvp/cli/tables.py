@@ -6,10 +6,13 @@ import csv
 import io
 import json
 import math
-from collections.abc import Iterable, Mapping
+import os
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Annotated, Any, Final
+
+from cyclopts import Parameter
 
 from tiltvp.errors import InvalidInputError, MissingExtraError
 from tiltvp.files import check_output, write_whole
@@ -18,6 +21,8 @@ if TYPE_CHECKING:
     import polars as pl
 
 ENDINGS: Final = (".csv", ".json", ".parquet")
+Out = Annotated[Path, Parameter(allow_leading_hyphen=True)]
+"""A file for results, or `STDOUT`."""
 STDOUT: Final = Path("-")
 """The output of rows as they come, as JSON lines, for verbs that know it."""
 
@@ -35,21 +40,28 @@ class Table:
         for cells in zip(*(columns[name] for name in self.types), strict=True):
             self.rows.append(dict(zip(self.types, cells, strict=True)))
 
+    def cells(self) -> Iterator[dict[str, Any]]:
+        """The rows as files take them: names of files that are no UTF-8 have `\\xff` for such a byte."""
+        for row in self.rows:
+            yield {name: _printable(row[name]) for name in self.types}
+
     def frame(self) -> pl.DataFrame:
         """The same as a data frame, for Parquet and plots."""
         import polars as pl
 
-        return pl.DataFrame(self.rows, schema={name: getattr(pl, word) for name, word in self.types.items()})
+        return pl.DataFrame(list(self.cells()), schema={name: getattr(pl, word) for name, word in self.types.items()})
 
 
-def check_ending(path: Path | None) -> None:
+def check_ending(path: Path | None, option: str = "--out") -> None:
     """Refuses a file of results that cannot be written in its format, before any work is done."""
     if path is None:
         return
+    if path == STDOUT:
+        raise InvalidInputError(f"{option} -: only `tiltvp tilt` writes lines on stdout, expected a file")
     if path.suffix.lower() not in ENDINGS:
-        raise InvalidInputError(f"--out {path}: ends in {path.suffix!r}, expected one of {', '.join(ENDINGS)}")
+        raise InvalidInputError(f"{option} {path}: ends in {path.suffix!r}, expected one of {', '.join(ENDINGS)}")
     if path.suffix.lower() == ".parquet":
-        need_lab(f"--out {path}")
+        need_lab(f"{option} {path}")
     check_output(path)
 
 
@@ -100,8 +112,14 @@ def _csv(table: Table) -> str:
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(table.types)
-    writer.writerows([_word(row[name]) for name in table.types] for row in table.rows)
+    writer.writerows([_word(cell) for cell in row.values()] for row in table.cells())
     return text.getvalue()
+
+
+def _printable(cell: Any) -> Any:
+    if not isinstance(cell, str) or cell.isascii():
+        return cell
+    return os.fsencode(cell).decode("utf-8", "backslashreplace")
 
 
 def _word(cell: object) -> object:
@@ -112,14 +130,13 @@ def _word(cell: object) -> object:
 
 
 def _json(table: Table) -> str:
-    rows = [{name: finite(row[name]) for name in table.types} for row in table.rows]
+    rows = [finite(row) for row in table.cells()]
     return json.dumps(rows, allow_nan=False, ensure_ascii=False, separators=(",", ":"))
 
 
 def json_lines(table: Table) -> str:
     """A line of JSON for each row."""
-    rows = ({name: finite(row[name]) for name in table.types} for row in table.rows)
-    return "\n".join(json.dumps(row, allow_nan=False, ensure_ascii=False) for row in rows)
+    return "\n".join(json.dumps(finite(row), allow_nan=False, ensure_ascii=False) for row in table.cells())
 
 
 def finite(value: Any) -> Any:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import re
 import sys
 from collections.abc import Callable, Iterable, Iterator
@@ -14,6 +15,12 @@ if TYPE_CHECKING:
 
 _WIDTH_IN_FILES = 240
 """Columns that a table may take where there is no terminal to fit it into."""
+
+
+def print_any_name() -> None:
+    """Names of files that are no UTF-8 are printed on stdout as on stderr, with `\\udcff` for a byte 0xff."""
+    if isinstance(sys.stdout, io.TextIOWrapper):
+        sys.stdout.reconfigure(errors="backslashreplace")
 
 
 def show(*tables: Table) -> None:

@@ -20,7 +20,7 @@ from tiltvp.cli.options import CameraOptions, MethodOptions
 from tiltvp.cli.results import Outcome, mounting_words, outcome_table, people_table, summary_words
 from tiltvp.cli.showing import ShowOptions
 from tiltvp.cli.sources import MotionOptions, SourceOptions, ending_at_interrupt, picture_names
-from tiltvp.cli.tables import STDOUT, json_lines
+from tiltvp.cli.tables import STDOUT, Out, json_lines
 from tiltvp.cli.terminal import ProgressBar, complain, named, progress_bar, say, show, width
 from tiltvp.cli.tilt_work import Work, tilts_on_cluster
 from tiltvp.errors import InvalidInputError
@@ -54,7 +54,7 @@ def tilt(
     filtering: FilterOptions = _FILTER_DEFAULTS,
     motion: MotionOptions = _MOTION,
     wheel_base: Annotated[float | None, Parameter(validator=validators.Number(gt=0))] = None,
-    out: Annotated[Path | None, Parameter(allow_leading_hyphen=True)] = None,
+    out: Out | None = None,
     overlay: Path | None = None,
     level: Path | None = None,
     frame_rate: Annotated[float | None, Parameter(validator=validators.Number(gt=0))] = None,

@@ -17,7 +17,7 @@ from tiltvp.cli.options import CameraOptions
 from tiltvp.cli.rerun_views import send_lines
 from tiltvp.cli.showing import RerunOptions
 from tiltvp.cli.sources import MotionOptions, SourceOptions, ending_at_interrupt
-from tiltvp.cli.tables import Table, check_ending, check_plot, write_table
+from tiltvp.cli.tables import Out, Table, check_ending, check_plot, write_table
 from tiltvp.cli.terminal import ProgressBar, named, progress_bar, say
 from tiltvp.errors import InvalidInputError, TiltvpError, UnknownLeanError
 from tiltvp.files import check_output
@@ -55,7 +55,7 @@ def track(
     camera: CameraOptions,
     frames_of: SourceOptions = _SOURCE,
     options: LineOptions = _DEFAULTS,
-    out: Path,
+    out: Out,
     motion: MotionOptions = _MOTION,
     wheel_base: Annotated[float | None, Parameter(validator=validators.Number(gt=0))] = None,
     plot: Path | None = None,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterable, Iterator
 from importlib import import_module
 from itertools import islice
@@ -66,6 +67,9 @@ def _dask() -> Any:
 
 def _client(distributed: Any, address: str) -> Any:
     """A client of the scheduler, which has at least one worker."""
+    if re.search(r"^inproc://|:\d+$", address) is None:
+        # Dask would look for it at the port 0, and wait.
+        raise RunError(f"{address}: no address of a Dask scheduler, expected one with a port, as tcp://host:8786")
     try:
         client = distributed.Client(address, timeout=_PATIENCE_S, set_as_default=False)
     except (OSError, ValueError, TypeError) as error:

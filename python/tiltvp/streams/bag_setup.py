@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
@@ -19,9 +19,10 @@ from tiltvp.streams.bags import Recording
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-__all__ = ["recorded_camera", "robot_from_camera"]
+__all__ = ["CAMERA_KINDS", "recorded_camera", "robot_from_camera"]
 
-_INFO, _TRANSFORMS, _STATIC = "sensor_msgs/CameraInfo", "tf2_msgs/TFMessage", "/tf_static"
+CAMERA_KINDS: Final = ("sensor_msgs/CameraInfo",)
+_TRANSFORMS, _STATIC = "tf2_msgs/TFMessage", "/tf_static"
 
 
 def recorded_camera(recording: Recording, topic: str | None = None) -> Camera:
@@ -30,7 +31,7 @@ def recorded_camera(recording: Recording, topic: str | None = None) -> Camera:
     Raises `InvalidInputError` that lists the topics, `CalibrationError` for a lens that is not supported and for a
     camera that was not calibrated.
     """
-    chosen = recording.choose((_INFO,), "--camera-name", topic)
+    chosen = recording.choose(CAMERA_KINDS, "--camera-name", topic)
     source = f"{recording.path} {chosen.name}"
     info = next(content for _, content in recording.decoded(chosen))
     # ROS 1 has capitals.

@@ -160,6 +160,8 @@ class Recording:
                     )
             elif not self.path.is_file():
                 raise InvalidInputError(f"{self.path}: no such file, expected a bag")
+        except InvalidInputError:
+            raise
         except (OSError, ValueError) as error:
             raise InvalidInputError(f"{str(self.path)!r}: cannot be read ({error}), expected a bag") from error
 

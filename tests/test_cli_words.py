@@ -1,0 +1,87 @@
+"""The command line: words that stand for stdin and stdout, names that are no UTF-8, and outputs of one name."""
+
+from __future__ import annotations
+
+import io
+import os
+import sys
+from pathlib import Path
+from types import SimpleNamespace
+
+import polars as pl
+import pytest
+
+import tiltvp
+from commands import Run
+from recordings import START_S, Bag
+from tiltvp.synth import RoomImage
+
+pytestmark = pytest.mark.slow
+
+
+@pytest.fixture
+def world(tmp_path: Path, camera: tiltvp.Camera, room: RoomImage) -> Path:
+    """camera.toml, and an image whose name is no UTF-8 in the folder images."""
+    camera.save(tmp_path / "camera.toml")
+    tiltvp.write_image(tmp_path / "a.png", room.gray)
+    (tmp_path / "images").mkdir()
+    os.rename(tmp_path / "a.png", os.fsencode(tmp_path / "images") + b"/a\xff.png")
+    return tmp_path
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="names of files that are no text")
+@pytest.mark.parametrize("ending", ["csv", "json", "parquet"])
+def test_names_that_are_no_text(ending: str, run: Run, world: Path) -> None:
+    out = world / f"out.{ending}"
+    for verb in ("tilt", "lines", "segments"):
+        words = (verb, world / "images", "--camera", world / "camera.toml", "--out", out, "--overwrite")
+        assert run(*words, "--overlay", world / verb).code == 0
+        read = {"csv": pl.read_csv, "json": pl.read_json, "parquet": pl.read_parquet}[ending]
+        assert set(read(out)["file"]) == {f"{world}/images/a\\xff.png"}
+        assert os.listdir(os.fsencode(world / verb)) == [b"a\xff.png"]
+    assert f"{world}/images/a\\\\xff.png" in run("tilt", *words[1:4], "--out", "-").out
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="names of files that are no text")
+@pytest.mark.parametrize("before", [[], ["--overwrite"], ["--camera"]])
+def test_names_come_on_stdin_wherever_the_dash_stands(
+    before: list[str], run: Run, world: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    lines = io.BytesIO(os.fsencode(world / "images") + b"/a\xff.png\n")
+    monkeypatch.setattr(sys, "stdin", SimpleNamespace(buffer=lines))
+    camera = ["--camera", str(world / "camera.toml")]
+    said = run(
+        "tilt", *(camera if before == ["--camera"] else before), "-", *([] if before == ["--camera"] else camera)
+    )
+    assert (said.code, said.err) == (0, "")
+    assert "1 image: lean" in said.out
+
+
+@pytest.mark.parametrize("verb", ["lines", "segments", "track", "corner"])
+def test_only_tilt_writes_on_stdout(verb: str, run: Run, world: Path) -> None:
+    calibration = "--calibration" if verb == "corner" else "--camera"
+    said = run(verb, world / "images", calibration, world / "camera.toml", "--out", "-")
+    assert said.code == 2
+    assert "--out -: only `tiltvp tilt` writes lines on stdout" in said.complaint
+
+
+def test_outputs_of_one_name_are_refused_at_once(run: Run, world: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(world)
+    said = run("corner", "none.png", "--calibration", "none", "--out", "x.csv", "--corners", "./x.csv")
+    assert said.code == 2
+    assert "--out and --corners are both x.csv, expected two files" in said.complaint
+    assert "--corners x.txt: ends in" in run("corner", "n.png", "--calibration", "none", "--corners", "x.txt").complaint
+
+
+def test_cameras_of_a_recording(run: Run, tmp_path: Path) -> None:
+    made = Bag("mcap")
+    made.camera_info(START_S, 64, 48, "plumb_bob", [0.0] * 5, [50.0, 0, 32, 0, 50, 24, 0, 0, 1])
+    bag, out = made.write(tmp_path), tmp_path / "camera.toml"
+    said = run("camera", "info", bag)
+    assert said.code == 0
+    assert "/camera_info" in said.out
+    assert "64 x 48 px" in said.out
+    assert run("camera", "scale", bag, out, "--factor", "0.5").code == 0
+    assert tiltvp.Camera.load(out).width == 32
+    missing = run("camera", "info", tmp_path / "none.mcap").complaint
+    assert missing == f"tiltvp: {tmp_path}/none.mcap: no such file, expected a bag\n"
