@@ -22,6 +22,11 @@ __all__ = ["VIDEO_ENDINGS", "open_video"]
 
 VIDEO_ENDINGS: Final = (".mp4", ".avi", ".mkv", ".mov", ".webm", ".m4v", ".mpg", ".mpeg")
 _DAMAGED: Final = "cannot be decoded"
+_MATROSKA: Final = b"\x1a\x45\xdf\xa3"
+_SEGMENT: Final = b"\x18\x53\x80\x67"
+_SEGMENT_WITHIN: Final = 128
+"""Beginning of a Matroska file, beginning of all else in it (RFC 9559, 5.1), and in how many bytes that is: the head in
+front has some 40, of fixed fields."""
 
 
 def open_video(path: Path) -> Frames:
@@ -64,7 +69,7 @@ class _Video(Frames):
             self._stamps = sorted(stamp for stamp in stamps if stamp is not None)
             self.times_s = np.array([float(stamp * base) for stamp in self._stamps])
             self.rate_hz = median_rate_hz(self.times_s)
-        if not complete:
+        if not complete or _is_cut_off(path):
             notes.append(f"{path}: ends before its end, after {len(stamps)} frames (cut off?)")
         self.notes = tuple(notes)
 
@@ -161,6 +166,20 @@ def _stamps(container: Any, stream: Any) -> tuple[list[int | None], bool]:
     except av.FFmpegError:
         return found, False
     return found, True
+
+
+def _is_cut_off(path: Path) -> bool:
+    """Whether a Matroska file has fewer bytes than it says at its beginning: its reader takes what is there for all."""
+    with open(path, "rb") as stream:
+        head = stream.read(_SEGMENT_WITHIN)
+    at = head.find(_SEGMENT) + len(_SEGMENT)
+    if not head.startswith(_MATROSKA) or at < len(_SEGMENT) or at == len(head):
+        return False
+    # The zeros before its first one bit say how many bytes a number has; all ones: not known, as of a live recording.
+    length = 9 - head[at].bit_length()
+    most = (1 << 7 * length) - 1
+    size = int.from_bytes(head[at : at + length], "big") & most
+    return size != most and at + length + size > path.stat().st_size
 
 
 def _decoded(container: Any) -> Iterator[av.VideoFrame]:
