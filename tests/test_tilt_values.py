@@ -60,6 +60,7 @@ def test_values_that_differ_are_unequal(camera: tiltvp.Camera, room: RoomImage) 
     ("change", "words"),
     [
         ({"confidence": "high"}, "confidence"),
+        ({"confidence": 7.0}, "confidence.*from 0 to 1"),
         ({"edge_pixels": -1}, "edge_pixels"),
         ({"edge_pixels": 1.5}, "edge_pixels"),
         ({"iterations": 2**40}, "iterations"),

@@ -134,6 +134,10 @@ impl Region {
                 }
             }
         }
+        let shows_nothing = |mask: &Mask| (0..height).all(|v| (0..width).all(|u| !mask.usable(u, v)));
+        if region.places.is_empty() && mask.is_some_and(shows_nothing) {
+            return Err(Error::argument("mask", "False everywhere", "True where images show the world"));
+        }
         if region.places.is_empty() {
             return Err(Error::option(
                 "elevation_min_rad, elevation_max_rad",

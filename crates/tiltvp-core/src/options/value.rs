@@ -69,7 +69,7 @@ impl fmt::Display for Value {
             Self::Float(value) => write!(f, "{value}"),
             Self::Text(value) => write!(f, "'{}'", value.escape_debug()),
             Self::Array(shape, values) if shape.len() == 1 => write!(f, "{values:?}"),
-            Self::Array(shape, _) => write!(f, "an array of shape {shape:?}"),
+            Self::Array(shape, _) => write!(f, "numbers of shape {shape:?}"),
             Self::Mask(shape, _) => write!(f, "a mask of shape {shape:?}"),
             Self::Object(_) => write!(f, "an object"),
             Self::Other(look) => write!(f, "{look}"),

@@ -61,6 +61,9 @@ value! {
         if tilt.is_some_and(|tilt| tilt.normal() != normal) {
             return Err(invalid(format!("values[\"normal\"]: {:?}, expected a unit vector", normal.as_slice())));
         }
+        if !(0.0..=1.0).contains(&confidence) {
+            return Err(invalid(format!("values[\"confidence\"]: {confidence}, expected a probability from 0 to 1")));
+        }
     };
     repr if own.found() {
         format!(
