@@ -136,7 +136,7 @@ def test_options_in_force_are_keywords(camera: tiltvp.Camera, method: str) -> No
         ({"seed": 1.5}, ["seed"]),
         ({"mask": np.ones((3, 3), bool)}, ["mask", "256 x 256"]),
         ({"mask": np.ones((256, 256), np.uint8)}, ["mask = numbers of shape [256, 256]", "bool"]),
-        ({"mask": np.zeros((256, 256), bool)}, ["mask = False everywhere"]),
+        ({"mask": np.zeros((256, 256), bool)}, ["mask: got False everywhere"]),
         ({"mask": [[True]]}, ["mask", "bool"]),
         ({"keep_fraction": 1.0}, ["keep_fraction"]),
         ({"scale_rad": 0.0}, ["scale_rad"]),

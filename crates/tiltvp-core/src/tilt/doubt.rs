@@ -17,9 +17,9 @@ pub enum Doubt {
     },
     /// The view does not look as it does where up is as told.
     NotUp,
-    /// The lean is near the largest one, beyond which edges are rejected: it may be larger.
-    NearLimit {
-        /// The largest lean that is looked for, in radians.
+    /// The lean is beyond the largest one that is expected: edges beyond are rejected, so it may be larger.
+    Beyond {
+        /// The largest lean that is expected, in radians.
         limit_rad: f64,
     },
     /// There are few edges.
@@ -56,9 +56,9 @@ impl fmt::Display for Doubt {
             Self::NotUp => {
                 write!(f, "what is light, and where edges stand, is unlike views with up as told: check the mounting")
             }
-            Self::NearLimit { limit_rad } => write!(
+            Self::Beyond { limit_rad } => write!(
                 f,
-                "the lean is near tilt_max_rad ({:.3}, {:.0} degrees) and may be larger than it seems: raise tilt_max_rad",
+                "the lean is beyond tilt_max_rad ({:.3}, {:.0} degrees) and may be larger than it seems: raise tilt_max_rad",
                 limit_rad,
                 limit_rad.to_degrees()
             ),

@@ -9,7 +9,7 @@ use super::estimate::{EdgeElement, TiltEstimate};
 use super::image_circle::CentreOff;
 use super::image_edges::{EdgeOrigin, ImageEdges};
 use super::lightness::LIGHTS;
-use super::methods::{Fitter, Prepared, Setting, TILT_MAX_RAD, edge_offset};
+use super::methods::{Fitter, Prepared, Setting, edge_offset};
 use super::options::TiltOptions;
 use super::scratch::Scratch;
 use super::tables::PixelTables;
@@ -229,13 +229,14 @@ impl TiltEstimator {
         work: &mut Work,
     ) -> TiltEstimate {
         let fit = method.fit(edges, &self.pixels, work);
+        let [expected_max_rad, tilt_max_rad] = method.lean_limits_rad();
         let (edge_pixels, prefiltered_pixels) = (edges.strong(), work.rows.len());
         let seen = Seen {
             edge_pixels,
             prefiltered_pixels,
             pixels_per_rad: self.pixels.region.pixels_per_rad(),
-            tilt_max_rad: self.options.tilt_max_rad.unwrap_or(TILT_MAX_RAD),
-            cut_rad: method.cut_rad(),
+            tilt_max_rad,
+            expected_max_rad,
             lights,
             aspect: method.trust().map_or([0.0; ASPECT], |_| method.aspect(&self.pixels, work)),
             trust: method.trust(),

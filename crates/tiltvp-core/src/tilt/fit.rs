@@ -19,8 +19,8 @@ use crate::robust::{FitReport, Stop};
 /// default `scale_rad` of the refined method.
 pub(super) const STRAY_RAD: f64 = 2.0 * std::f64::consts::PI / 180.0;
 
-/// How probable it is that a lean near the largest one is as large as it seems: one in two of those of 11 to 15 degrees with a limit of
-/// 12 errs by more than a degree.
+/// How probable it is that a lean beyond the largest expected one is as large as it seems: one in two of those of 11 to 15 degrees, where 10
+/// are expected, errs by more than a degree.
 const AS_LARGE: f64 = 0.5;
 
 /// What a method finds in the edge pixels of one image.
@@ -101,12 +101,11 @@ impl Fit {
         let believed = seen.trust.map_or(Believed::ALL, |trust| trust.believed(trusted));
         estimate.confidence *= believed.vertical * believed.up;
         let looks_up = believed.up >= small.min(believed.vertical);
-        let near_limit =
-            seen.cut_rad > 0.0 && estimate.tilt.is_some_and(|tilt| tilt.alpha_rad() > seen.tilt_max_rad - seen.cut_rad);
-        if near_limit {
+        let is_beyond = estimate.tilt.is_some_and(|tilt| tilt.alpha_rad() > seen.expected_max_rad);
+        if is_beyond {
             estimate.confidence *= AS_LARGE;
         }
-        let limit_rad = near_limit.then_some(seen.tilt_max_rad);
+        let limit_rad = is_beyond.then_some(seen.expected_max_rad);
         estimate.doubt = Doubt::of(&estimate, seen.pixels_per_rad, off_rad, looks_up, limit_rad);
         estimate
     }
@@ -225,7 +224,7 @@ mod tests {
             prefiltered_pixels: 8,
             pixels_per_rad: 100.0,
             tilt_max_rad: 0.5,
-            cut_rad: 0.0,
+            expected_max_rad: 0.5,
             lights: &[0.0; LIGHTS],
             aspect: [0.0; ASPECT],
             trust,
@@ -256,15 +255,15 @@ mod tests {
     }
 
     #[test]
-    fn a_lean_near_the_largest_one_may_be_larger() {
-        let of = |cut_rad: f64| {
-            let seen = Seen { tilt_max_rad: 0.12, cut_rad, ..seen(None) };
+    fn a_lean_beyond_the_largest_expected_one_may_be_larger() {
+        let of = |expected_max_rad: f64| {
+            let seen = Seen { expected_max_rad, ..seen(None) };
             fit(Matrix2::identity() * 1e-5).into_estimate(&seen, &mut [0.0; FEATURES])
         };
-        let (far, near, segments) = (of(0.01), of(0.03), of(0.0));
-        assert!(far.doubt.is_none() && segments.doubt.is_none() && near.confidence == AS_LARGE * far.confidence);
-        assert_eq!(near.doubt, Some(Doubt::NearLimit { limit_rad: 0.12 }));
-        assert!(near.doubt.is_some_and(|doubt| doubt.to_string().contains("raise tilt_max_rad")));
+        let (within, beyond) = (of(0.11), of(0.09));
+        assert!(within.doubt.is_none() && beyond.confidence == AS_LARGE * within.confidence);
+        assert_eq!(beyond.doubt, Some(Doubt::Beyond { limit_rad: 0.09 }));
+        assert!(beyond.doubt.is_some_and(|doubt| doubt.to_string().contains("raise tilt_max_rad")));
     }
 
     #[test]

@@ -26,8 +26,8 @@ pub(super) struct Seen<'a> {
     pub pixels_per_rad: f64,
     /// The largest lean that is looked for.
     pub tilt_max_rad: f64,
-    /// How far below it leans begin that may be larger ones.
-    pub cut_rad: f64,
+    /// The largest lean that is expected: larger ones may be larger than they seem.
+    pub expected_max_rad: f64,
     /// How light the view is at each height.
     pub lights: &'a [f64; LIGHTS],
     /// Where what the method looks at stands.
@@ -160,7 +160,7 @@ impl Doubt {
         } else if !looks_up {
             Self::NotUp
         } else if let Some(limit_rad) = limit_rad {
-            Self::NearLimit { limit_rad }
+            Self::Beyond { limit_rad }
         } else if (estimate.edge_pixels as f64) < EDGES * pixels_per_rad {
             Self::FewEdges { pixels: estimate.edge_pixels }
         } else if estimate.tilt.is_some() && share < AGREEING {
@@ -222,7 +222,7 @@ mod tests {
         let coarse = Doubt::of(&few_edges, 50.0, 0.0, false, None);
         assert!(matches!(coarse, Some(Doubt::Coarse { per_deg }) if (per_deg - 0.8727).abs() < 1e-3));
         let limited = Doubt::of(&few_edges, 150.0, 0.0, true, Some(0.2));
-        assert!(matches!(limited, Some(Doubt::NearLimit { limit_rad: 0.2 })));
+        assert!(matches!(limited, Some(Doubt::Beyond { limit_rad: 0.2 })));
         assert!(matches!(Doubt::of(&few_edges, 50.0, 0.01, false, None), Some(Doubt::Decentred { off_rad: 0.01 })));
     }
 }

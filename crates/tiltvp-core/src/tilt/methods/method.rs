@@ -77,10 +77,10 @@ pub(in crate::tilt) trait Fitter: Debug + Send + Sync {
         None
     }
 
-    /// How far in radians the edges of vertical things stray, if the prefilter cuts those off that stray beyond the largest lean: what is
-    /// left of a lean that near to it, or beyond, agrees on a smaller one.
-    fn cut_rad(&self) -> f64 {
-        0.0
+    /// The largest lean that is expected, and that beyond which the prefilter rejects edges, in radians, if both matter: the edges that
+    /// are left of a larger lean than expected agree on a smaller one.
+    fn lean_limits_rad(&self) -> [f64; 2] {
+        [FRAC_PI_2; 2]
     }
 
     /// Where what the last fit looked at stands.

@@ -31,7 +31,7 @@ use self::method::TiltMethod;
 pub(super) use self::method::{Fitter, Prepared, Setting};
 pub(super) use self::offsets::edge_offset;
 pub use self::refined::RefineOptions;
-pub(super) use self::refined::{TILT_MAX_RAD, refine};
+pub(super) use self::refined::refine;
 pub use self::segments::SegmentsOptions;
 pub use self::vector_consensus::VectorConsensusOptions;
 

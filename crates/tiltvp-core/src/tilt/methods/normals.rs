@@ -23,9 +23,9 @@ pub(super) struct Normals {
 }
 
 impl Normals {
-    /// The normals of a kind for leans of up to `tilt_max_rad` of the options, or `default_max_rad` where there is none.
-    pub(super) fn new(setting: &Setting<'_>, kind: NormalKind, default_max_rad: f64) -> Self {
-        let sin_max = setting.tilt_max_rad.unwrap_or(default_max_rad).sin();
+    /// The normals of a kind for edges of leans of up to `limit_rad`.
+    pub(super) fn new(setting: &Setting<'_>, kind: NormalKind, limit_rad: f64) -> Self {
+        let sin_max = limit_rad.sin();
         let shared = &setting.pixels.shared.normals;
         let made = match kind {
             NormalKind::Tangent => &shared.tangent,

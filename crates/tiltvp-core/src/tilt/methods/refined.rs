@@ -1,5 +1,6 @@
 //! The refined method: exact normals weighted by their gradients, trimmed from the upright prior, then a fading soft gate.
 
+use std::f64::consts::FRAC_PI_2;
 use std::sync::Arc;
 
 use nalgebra::Vector3;
@@ -33,8 +34,8 @@ options! {
     }
 }
 
-/// Largest lean without `tilt_max_rad`: 10 degrees, and a `scale_rad` more for edges that stray.
-pub(in crate::tilt) const TILT_MAX_RAD: f64 = 12f64.to_radians();
+/// Largest lean that is expected without `tilt_max_rad`.
+const TILT_MAX_RAD: f64 = 10f64.to_radians();
 
 /// How a fit tells whether it is of the vertical: `tiltvp measure trust --weights` prints it.
 static TRUST: Trust = Trust {
@@ -63,11 +64,16 @@ impl TiltMethod for RefineOptions {
 pub(super) struct Refined {
     normals: Normals,
     options: RefineOptions,
+    lean_limits_rad: [f64; 2],
 }
 
 impl Refined {
     pub(super) fn new(setting: &Setting<'_>, options: RefineOptions) -> Self {
-        Self { normals: Normals::new(setting, NormalKind::Tangent, TILT_MAX_RAD), options }
+        let expected_rad = setting.tilt_max_rad.unwrap_or(TILT_MAX_RAD);
+        // Edges stray: those of the largest lean do to either side of it.
+        let edges_rad = (expected_rad + options.scale_rad).min(FRAC_PI_2);
+        let normals = Normals::new(setting, NormalKind::Tangent, edges_rad);
+        Self { normals, options, lean_limits_rad: [expected_rad, edges_rad] }
     }
 }
 
@@ -80,8 +86,8 @@ impl Fitter for Refined {
         Some(&TRUST)
     }
 
-    fn cut_rad(&self) -> f64 {
-        self.options.scale_rad
+    fn lean_limits_rad(&self) -> [f64; 2] {
+        self.lean_limits_rad
     }
 
     /// How high what agrees and what is near stand, in units of 45 degrees.

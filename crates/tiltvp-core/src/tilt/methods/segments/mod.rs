@@ -30,7 +30,6 @@ use self::vote::{Vote, fused};
 use self::work::SegmentWork;
 use super::method::{ImageFitter, Prepared, Setting, TiltMethod};
 use super::offsets::edge_offset;
-use super::refined::TILT_MAX_RAD;
 use crate::edges::EdgeOptions;
 use crate::error::{Error, Result};
 use crate::geometry::Tilt;
@@ -48,6 +47,9 @@ use crate::tilt::trust::{ASPECT, Logit, Seen, Trust};
 /// The largest lean up to which edges near the vertical are looked at alone. Beyond it those of horizontal things may be as near,
 /// and frames of three directions are weighed.
 const NEAR_MAX_RAD: f64 = 20f64.to_radians();
+
+/// Largest lean without `tilt_max_rad`.
+const TILT_MAX_RAD: f64 = 12f64.to_radians();
 
 /// Least probability of being the right one of all alternatives, below which there is no answer.
 const PROBABILITY_MIN: f64 = 0.5;
@@ -175,7 +177,7 @@ impl ImageFitter for SegmentFit {
             prefiltered_pixels: considered,
             pixels_per_rad: region.pixels_per_rad(),
             tilt_max_rad: self.tilt_max_rad,
-            cut_rad: 0.0,
+            expected_max_rad: PI,
             trust,
             centre_off,
         };
