@@ -50,8 +50,9 @@ def test_values_survive_copy_pickle_and_dict(camera: tiltvp.Camera, room: RoomIm
 def test_values_that_differ_are_unequal(camera: tiltvp.Camera, room: RoomImage) -> None:
     estimate = estimates(camera, room)[0]
     values = estimate.to_dict()
-    for key in ("confidence", "edge_pixels", "inlier_pixels", "iterations", "residual_rms"):
+    for key in ("edge_pixels", "inlier_pixels", "iterations", "residual_rms"):
         assert tiltvp.TiltEstimate.from_dict({**values, key: values[key] + 1}) != estimate
+    assert tiltvp.TiltEstimate.from_dict({**values, "confidence": 0.5 * values["confidence"]}) != estimate
     for key in ("stop", "reason"):
         assert tiltvp.TiltEstimate.from_dict({**values, key: "other"}) != estimate
 

@@ -125,10 +125,11 @@ class MountedOptions(LibraryOptions):
         return rotation_of(self.robot_from_camera or default, self.topic)
 
     def mounted(self, camera: "Camera", **options: Any) -> "TiltEstimator":
-        """An estimator of that mounting and mask, with these options."""
+        """An estimator of that mask and mounting, or of the one in these options where none was given."""
         from tiltvp import TiltEstimator
 
-        options["robot_from_camera"] = self.mounting(camera)
+        if self.robot_from_camera is not None or "robot_from_camera" not in options:
+            options["robot_from_camera"] = self.mounting(camera)
         if self.mask is not None and "mask" not in options:
             options["mask"] = mask_from(self.mask)
         return TiltEstimator(camera, **options)

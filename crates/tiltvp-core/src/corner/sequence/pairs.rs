@@ -1,5 +1,7 @@
 //! Poses from pairs of corners, one of each image.
 
+use std::f64::consts::SQRT_2;
+
 use nalgebra::{Matrix3, Vector3};
 
 use super::agreement::{apart, renamed};
@@ -42,6 +44,11 @@ const VERTEX_SLACK: f64 = 2.0;
 
 /// The standard deviation of a place between two edges, as a share of how far they are apart.
 const DOUBLE_SIGMA: f64 = 0.5;
+
+/// How far aside in the image a vertex may be without its rays telling, as a standard deviation in pixels: edges are rounded, and others run
+/// a few millimetres beside them. Without it 7.6 % of the places in rooms of seeds 10600 to 10629 have an NEES above 22.5, with it 1.8 %; with
+/// 0.2 and 0.4 pixels 1.8 and 1.3 %.
+const VERTEX_SIGMA_PX: f64 = 0.3;
 
 /// The least probability of a hypothesis that is returned.
 const PROBABILITY_MIN: f64 = 1e-9;
@@ -123,8 +130,12 @@ impl CornerPoseEstimator {
             .map(|((detector, corner), scratch)| detector.double_edges_rad(corner, scratch))
             .fold(0.0, f64::max);
         let towards = vertex.point_m.normalize();
+        let untold_rad = match self.left.camera().project_jacobian(&towards) {
+            Some((_, by_bearing)) if !self.is_one_object() => VERTEX_SIGMA_PX * SQRT_2 / by_bearing.norm(),
+            _ => 0.0,
+        };
         let aside_m2 = (Matrix3::identity() - towards * towards.transpose())
-            * (DOUBLE_SIGMA * aside_rad * vertex.point_m.norm()).powi(2);
+            * ((DOUBLE_SIGMA * aside_rad).hypot(untold_rad) * vertex.point_m.norm()).powi(2);
         for (_, pose) in &mut found {
             let mut of_place = pose.covariance.fixed_view_mut::<3, 3>(3, 3);
             of_place += aside_m2;
