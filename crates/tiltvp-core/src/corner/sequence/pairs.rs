@@ -123,19 +123,7 @@ impl CornerPoseEstimator {
         if found.is_empty() {
             return Ok(Vec::new());
         }
-        // Where edges are double the place is known no better than they are apart: aside, as the distance is that of either.
-        let aside_rad = [(&self.left, left), (detector, right)]
-            .into_iter()
-            .zip(&self.scratch)
-            .map(|((detector, corner), scratch)| detector.double_edges_rad(corner, scratch))
-            .fold(0.0, f64::max);
-        let towards = vertex.point_m.normalize();
-        let untold_rad = match self.left.camera().project_jacobian(&towards) {
-            Some((_, by_bearing)) if !self.is_one_object() => VERTEX_SIGMA_PX * SQRT_2 / by_bearing.norm(),
-            _ => 0.0,
-        };
-        let aside_m2 = (Matrix3::identity() - towards * towards.transpose())
-            * ((DOUBLE_SIGMA * aside_rad).hypot(untold_rad) * vertex.point_m.norm()).powi(2);
+        let aside_m2 = self.aside_m2([(&self.left, left), (detector, right)], &vertex.point_m);
         for (_, pose) in &mut found {
             let mut of_place = pose.covariance.fixed_view_mut::<3, 3>(3, 3);
             of_place += aside_m2;
@@ -149,6 +137,23 @@ impl CornerPoseEstimator {
             ..pose
         };
         Ok(found.into_iter().map(named).filter(|pose| pose.probability >= PROBABILITY_MIN).collect())
+    }
+
+    /// How far a place may be across the line of sight without its rays telling, square metres. Where edges are double the place is known
+    /// no better than they are apart: aside, as the distance is that of either.
+    fn aside_m2(&self, seen: [(&CornerDetector, &CornerFeature); 2], point_m: &Vector3<f64>) -> Matrix3<f64> {
+        let double_rad = seen
+            .into_iter()
+            .zip(&self.scratch)
+            .map(|((detector, corner), scratch)| detector.double_edges_rad(corner, scratch))
+            .fold(0.0, f64::max);
+        let towards = point_m.normalize();
+        let untold_rad = match self.left.camera().project_jacobian(&towards) {
+            Some((_, by_bearing)) if !self.is_one_object() => VERTEX_SIGMA_PX * SQRT_2 / by_bearing.norm(),
+            _ => 0.0,
+        };
+        (Matrix3::identity() - towards * towards.transpose())
+            * ((DOUBLE_SIGMA * double_rad).hypot(untold_rad) * point_m.norm()).powi(2)
     }
 
     /// The attitude that all edges of the frame have in common, named as a corner's own one that is near to it.
