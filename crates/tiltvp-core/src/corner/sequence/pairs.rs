@@ -306,3 +306,32 @@ const FREEDOM_ALONE: f64 = 6.0;
 
 /// The same with three numbers of a known attitude.
 const FREEDOM: f64 = 9.0;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::camera::{Camera, Model, Pinhole};
+    use crate::corner::estimator_options::EstimatorOptions;
+    use crate::corner::options::DetectorOptions;
+
+    #[test]
+    fn a_place_is_known_no_better_aside_than_edges_are_sharp() {
+        let camera =
+            Camera::new(1280, 720, Model::Pinhole(Pinhole::new([700.0; 2], [639.5, 359.5], &[]).unwrap())).unwrap();
+        let sigma_m = |method: &str, towards: Vector3<f64>| {
+            let detector =
+                CornerDetector::new(camera.clone(), DetectorOptions::for_method(method).unwrap(), None).unwrap();
+            let estimator = CornerPoseEstimator::new(detector.clone(), None, EstimatorOptions::default()).unwrap();
+            let vertex = Vector3::new(0.0, 0.0, 2.0);
+            let toward = [Vector3::x(), Vector3::y(), Vector3::new(-1.0, -1.0, -1.0)].map(|edge| vertex + 0.3 * edge);
+            let corner = CornerFeature::from_bearings(&vertex, &toward).unwrap();
+            let aside_m2 = estimator.aside_m2([(&detector, &corner), (&detector, &corner)], &vertex);
+            towards.dot(&(aside_m2 * towards)).sqrt()
+        };
+        let wanted_m = VERTEX_SIGMA_PX / 700.0 * 2.0;
+        assert!((sigma_m("general", Vector3::x()) - wanted_m).abs() < 1e-9);
+        assert!((sigma_m("general", Vector3::y()) - wanted_m).abs() < 1e-9);
+        assert_eq!(sigma_m("general", Vector3::z()), 0.0);
+        assert_eq!(sigma_m("coloured", Vector3::x()), 0.0);
+    }
+}

@@ -8,15 +8,9 @@ use crate::corner::closed_form::attitude::IncludedAngle;
 use crate::corner::closed_form::resolve::{Alignment, View, resolve};
 use crate::corner::estimate::Hypothesis;
 use crate::corner::feature::CornerFeature;
-use crate::corner::general::common_attitude::{
-    CommonAttitude, StraightEdge, common_attitude, headings, share_along_axes,
-};
+use crate::corner::general::common_attitude::{CommonAttitude, StraightEdge, attitude_of_most, share_along_axes};
 use crate::error::Result;
 use crate::geometry::tangent_basis;
-
-/// The share of all edges along the axes of one attitude that is enough to trust it: random edges pass within 2 degrees
-/// of one of three axes in a tenth of all cases.
-const MOST: f64 = 0.4;
 
 /// The share of the edges' length that runs along the axes of a pose that they say nothing for: of random ones it is a tenth, and
 /// should scatter by some 0.04 for a hundred of them. No pose of 36 rendered rooms has less than 0.32; a right one before a wallpaper
@@ -53,18 +47,7 @@ impl CornerPoseEstimator {
     /// The attitude that most straight edges of both images have in common; where most have none, that near the first of `starts`.
     pub(crate) fn common(&self, starts: &[Matrix3<f64>]) -> Option<CommonAttitude> {
         self.right.as_ref()?;
-        let lines = self.lines();
-        let of_corners = starts.first().and_then(|start| common_attitude(&lines, start));
-        let most = MOST * lines.len() as f64;
-        if of_corners.as_ref().is_some_and(|common| common.support >= most) {
-            return of_corners;
-        }
-        // Corners may be false, or turned against most of the room, or none may have been found.
-        let upright = starts.first().copied().or_else(|| self.about_vertical())?;
-        let others = starts.iter().skip(1).copied().chain(headings(&upright));
-        let found = others.filter_map(|start| common_attitude(&lines, &start));
-        let best = found.max_by(|a, b| a.support.total_cmp(&b.support));
-        best.filter(|common| common.support >= most).or(of_corners)
+        attitude_of_most(&self.lines(), starts, self.about_vertical())
     }
 
     /// An attitude whose second axis is along the vertical, where that is known and all angles are right.
@@ -95,5 +78,39 @@ impl CornerPoseEstimator {
             lines.extend(StraightEdge::of(detector.segments(&self.scratch[1]), &left_from_right.rotation));
         }
         lines
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::Vector3;
+
+    use super::*;
+    use crate::corner::closed_form::attitude::IncludedAngle;
+    use crate::corner::detector::CornerDetector;
+    use crate::corner::estimator_options::EstimatorOptions;
+    use crate::corner::options::DetectorOptions;
+    use crate::testing::zoo;
+
+    #[test]
+    fn the_vertical_is_the_second_axis_where_angles_are_right_and_there_may_be_several_corners() {
+        let camera = zoo().into_iter().next().unwrap().1;
+        let down = Vector3::new(0.1, 0.9, 0.4).normalize();
+        let about = |method: &str, angle: IncludedAngle, down: Option<Vector3<f64>>| {
+            let detector =
+                CornerDetector::new(camera.clone(), DetectorOptions::for_method(method).unwrap(), None).unwrap();
+            let options = EstimatorOptions { down, angle, ..EstimatorOptions::default() };
+            CornerPoseEstimator::new(detector, None, options).unwrap().about_vertical()
+        };
+        let attitude = about("general", IncludedAngle::RIGHT, Some(down)).unwrap();
+        assert!((attitude.column(1) - down).norm() < 1e-12 && (attitude.determinant() - 1.0).abs() < 1e-12);
+        assert!((attitude.tr_mul(&attitude) - Matrix3::identity()).norm() < 1e-12);
+        for (method, angle, down) in [
+            ("general", IncludedAngle::RIGHT, None),
+            ("general", IncludedAngle::exact(1.2), Some(down)),
+            ("coloured", IncludedAngle::RIGHT, Some(down)),
+        ] {
+            assert_eq!(about(method, angle, down), None, "{method}");
+        }
     }
 }
