@@ -8,7 +8,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tiltvp import Camera, Robot, TiltEstimator
+from tiltvp import Camera, Robot, TiltEstimator, write_image
+from tiltvp.cli.options import CameraOptions, MethodOptions
 from tiltvp.errors import CalibrationError, InvalidInputError
 from tiltvp.rotations import levelling, read_rotation
 from tiltvp.streams import Wheels
@@ -67,6 +68,14 @@ def test_it_is_a_calibration_and_a_mounting_too(tmp_path):
     robot().save(path)
     assert Camera.load(path) == CAMERA
     np.testing.assert_allclose(read_rotation(path), robot().robot_from_camera, atol=1e-15)
+
+
+def test_the_mask_of_a_file_that_was_renamed_is_the_one_that_it_names(tmp_path):
+    robot().save(tmp_path / "robot.toml")
+    (tmp_path / "robot.toml").rename(tmp_path / "old.toml")
+    write_image(tmp_path / "old-mask.png", np.zeros((48, 64), dtype=np.uint8))
+    taken = CameraOptions(camera=tmp_path / "old.toml").complete(MethodOptions())
+    assert taken.mask == tmp_path / "robot-mask.png"
 
 
 def test_its_estimator_has_its_mounting_and_its_mask():

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
     from tiltvp.tilt import TiltEstimator
 
-__all__ = ["TOPICS", "Robot", "is_robot", "mask_path"]
+__all__ = ["TOPICS", "Robot", "is_robot", "mask_path", "named_mask"]
 
 TOPICS: Final = ("images", "odometry", "joints", "inertial")
 """What a recording may have topics of."""
@@ -99,7 +99,7 @@ class Robot:
                 camera=Camera.from_spec(camera_from(cameras[0], None)),
                 robot_from_camera=np.reshape(mounting.need("robot_from_camera").numbers(9), (3, 3)),
                 covariance_rad2=None if lean is None else np.reshape(lean.numbers(4), (2, 2)),
-                mask=_mask_of(Path(path), root.get("mask")),
+                mask=_mask_of(named_mask(path)),
                 wheels=_wheels_of(root.get("wheels")),
                 topics=_topics_of(root.get("topics")),
                 place_m=None if place is None else _two(place),
@@ -156,17 +156,23 @@ def is_robot(path: str | os.PathLike[str]) -> bool:
 
 
 def mask_path(path: Path) -> Path:
-    """The image of the mask of a robot's file."""
+    """The image that `Robot.save` writes beside a robot's file for its mask."""
     return path.with_name(f"{path.stem}-mask.png")
 
 
-def _mask_of(path: Path, node: Node | None) -> NDArray[np.bool_] | None:
+def named_mask(path: str | os.PathLike[str]) -> Path | None:
+    """The image that a robot's file, whatever it is called by now, names as its mask; None where it names none."""
+    node = root_of(Document.load(path)).get("mask")
     if node is None:
         return None
     name = node.text()
     if Path(name).name != name:
         node.fail(f"found {name!r}", "the name of an image beside this file")
-    return np.asarray(gray_from(read_image(path.with_name(name)), name) > _BRIGHT)
+    return Path(path).with_name(name)
+
+
+def _mask_of(image: Path | None) -> NDArray[np.bool_] | None:
+    return None if image is None else np.asarray(gray_from(read_image(image), image.name) > _BRIGHT)
 
 
 def _wheels_of(node: Node | None) -> Wheels:

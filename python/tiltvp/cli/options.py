@@ -90,14 +90,13 @@ class CameraOptions:
 
     def complete(self, options: "M") -> "M":
         """Options with the mounting and the mask of a robot's file (`tiltvp setup`) where these are not given."""
-        from tiltvp.robot import mask_path
+        from tiltvp.robot import named_mask
 
-        robot = self.robot()
-        if robot is None:
+        if self.robot() is None:
             return options
         known: dict[str, Any] = {"robot_from_camera": str(self.camera)}
-        if robot.mask is not None:
-            known["mask"] = mask_path(self.camera)
+        if (mask := named_mask(self.camera)) is not None:
+            known["mask"] = mask
         missing = {name: value for name, value in known.items() if getattr(options, name, options) is None}
         return replace(options, **missing)  # type: ignore[type-var]
 
