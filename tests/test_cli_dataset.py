@@ -59,6 +59,16 @@ def test_render_and_check(run: Run, world: Path, tmp_path: Path) -> None:
     assert len(read_dataset(out).images) == 7
 
 
+def test_a_robots_file_tells_how_its_camera_is_held(run: Run, world: Path, tmp_path: Path) -> None:
+    turned = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+    tiltvp.Robot(tiltvp.Camera.load(world / "camera.toml"), turned).save(tmp_path / "robot.toml")
+    words = ("render", "--panoramas", world / "panos", "--camera", tmp_path / "robot.toml", "--tilts-deg", "2,0")
+    assert run(*words, "--out", tmp_path / "out")[0] == 0
+    assert np.array_equal(read_dataset(tmp_path / "out").robot_from_camera, turned)
+    assert run(*words, "--out", tmp_path / "up", "--robot-from-camera", "up")[0] == 0
+    assert np.array_equal(read_dataset(tmp_path / "up").robot_from_camera, np.eye(3))
+
+
 def test_tilts_of_a_file(run: Run, world: Path, tmp_path: Path) -> None:
     table = tmp_path / "tilts.csv"
     table.write_text("alpha_deg,beta_deg\n1,0\n\n2.5,-3\n")

@@ -124,6 +124,23 @@ def test_reading_everything(folder: Path) -> None:
     assert check_dataset(folder) == []
 
 
+def test_a_robots_file_brings_its_mounting_and_its_mask(folder: Path, small: tiltvp.Camera) -> None:
+    turned = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+    mask = np.arange(48 * 64).reshape(48, 64) < 1000
+    tiltvp.Robot(small, turned, mask=mask).save(folder / "robot.toml")
+    write(folder, 'camera = "robot.toml"', None)
+    dataset = read_dataset(folder)
+    assert np.array_equal(dataset.robot_from_camera, turned)
+    assert np.array_equal(dataset.mask, mask)
+    digest = dataset.digest()
+    tiltvp.write_image(folder / "robot-mask.png", np.full((48, 64), 255, dtype=np.uint8))
+    assert read_dataset(folder).digest() != digest
+    write(folder, 'camera = "robot.toml"\nrobot_from_camera = "up"', None)
+    assert np.array_equal(read_dataset(folder).robot_from_camera, np.eye(3))
+    (folder / "robot-mask.png").unlink()
+    assert "robot-mask.png" in str(check_dataset(folder)[0])
+
+
 def test_digest(folder: Path, tmp_path_factory: pytest.TempPathFactory) -> None:
     first = read_dataset(folder).digest()
     copy = tmp_path_factory.mktemp("copy") / "of"

@@ -57,13 +57,14 @@ class LensOptions:
     """Which camera looks, and how it is held."""
 
     camera: Path | None = None
-    """Calibration file; default is a 640 x 480 upward fisheye of 185 degrees like the paper's."""
+    """Calibration file, or a robot's file, whose rotation of the mounting is taken too; default is a 640 x 480 upward
+    fisheye of 185 degrees like the paper's."""
     camera_name: str | None = None
     """Name or number of the camera in a file of several; the first is 0."""
     resolution_scale: float = 1.0
     """Take a camera with so many times the pixels per side; 0.75 makes 480 x 360."""
     robot_from_camera: str | None = None
-    """How the camera sits in its mounting: up (the default), forward, or a file with a rotation."""
+    """How the camera sits in its mounting: up, forward, or a file with a rotation; default is a robot file's, or up."""
 
     def load(self) -> Camera:
         """The camera."""
@@ -71,10 +72,14 @@ class LensOptions:
         return lens if self.resolution_scale == 1.0 else lens.scaled(self.resolution_scale)
 
     def rotation(self) -> NDArray[np.float64] | None:
-        """(3, 3) `robot_from_camera`, where it was given."""
+        """(3, 3) `robot_from_camera`, where it was given or a robot's file tells it."""
+        from tiltvp.robot import is_robot
         from tiltvp.rotations import read_rotation
 
-        return None if self.robot_from_camera is None else read_rotation(self.robot_from_camera)
+        source = self.robot_from_camera
+        if source is None and self.camera is not None and is_robot(self.camera):
+            source = str(self.camera)
+        return None if source is None else read_rotation(source)
 
     @property
     def source(self) -> dict[str, str]:
@@ -97,7 +102,8 @@ class DriveLensOptions(LensOptions):
     """Which camera a robot drives with."""
 
     camera: Path = Path("mirror")
-    """mirror (a camera below a hyperbolic mirror), fisheye (like the tilt paper's), or a calibration file."""
+    """mirror (a camera below a hyperbolic mirror), fisheye (like the tilt paper's), a calibration file, or a robot's
+    file, whose rotation of the mounting is taken too."""
 
     def _lens(self) -> Camera:
         from tiltvp.lab.datasets.panoramas import paper_camera

@@ -14,6 +14,7 @@ from tiltvp.cameras import Camera
 from tiltvp.errors import CalibrationError, ImageFileError, TiltvpError
 from tiltvp.images import gray_from, read_image
 from tiltvp.lab.datasets.findings import Findings, near
+from tiltvp.robot import Robot, is_robot, named_mask
 from tiltvp.rotations import rotation_from
 
 if TYPE_CHECKING:
@@ -24,7 +25,7 @@ __all__ = ["DESCRIPTION", "Description", "Wheels", "read_description"]
 DESCRIPTION: Final = "dataset.toml"
 
 _KEYS: Final = {
-    "camera": "the name of a calibration file in this folder",
+    "camera": "the name of a calibration file or a robot's file in this folder",
     "camera_format": "the name of a format, as `tiltvp camera formats` lists them",
     "camera_name": "the name or number of a camera in that file",
     "image_size": "[width, height] in pixels",
@@ -71,19 +72,22 @@ def read_description(directory: Path, findings: Findings) -> Description:
         elif not _fits(key, value):
             findings.add(file, None, f"{key} = {value!r}", _KEYS[key])
     table = {key: value for key, value in table.items() if key in _KEYS and _fits(key, value)}
-    camera = _camera(file, table, findings)
-    rotation = np.eye(3)
+    camera, robot = _camera(file, table, findings)
+    rotation = np.eye(3) if robot is None else robot.robot_from_camera
+    mask_file = directory / table["mask"] if "mask" in table else None
+    if mask_file is None and robot is not None:
+        mask_file = named_mask(directory / table["camera"])
     if "robot_from_camera" in table:
         try:
             rotation = rotation_from(table["robot_from_camera"], "robot_from_camera")
         except CalibrationError as error:
             what, _, expected = str(error).partition(", expected ")
             findings.add(file, None, what, expected or _KEYS["robot_from_camera"])
-    files = [file, *(directory / str(table[key]) for key in ("camera", "mask") if key in table)]
+    files = [file, *([directory / table["camera"]] if "camera" in table else []), *filter(None, [mask_file])]
     return Description(
         camera=camera,
         robot_from_camera=rotation,
-        mask=_mask(directory, table, camera, findings),
+        mask=None if mask_file is None else _mask(mask_file, camera, findings),
         wheels=_wheels(file, table.get("wheels"), findings),
         source=table.get("source", {}),
         files=tuple(files),
@@ -116,32 +120,30 @@ def _fits(key: str, value: object) -> bool:
             return True
 
 
-def _camera(file: Path, table: dict[str, Any], findings: Findings) -> Camera | None:
+def _camera(file: Path, table: dict[str, Any], findings: Findings) -> tuple[Camera | None, Robot | None]:
+    """The camera, and the robot where the calibration is a robot's file."""
     if "camera" not in table:
         findings.add(file, None, "no key camera", _KEYS["camera"])
-        return None
+        return None, None
+    path = file.parent / table["camera"]
     size = table.get("image_size")
     name = table.get("camera_name", 0)
     try:
         camera = Camera.load(
-            file.parent / table["camera"],
+            path,
             table.get("camera_format"),
             camera=int(name) if isinstance(name, str) and name.isdecimal() else name,
             image_size=None if size is None else (size[0], size[1]),
         )
+        robot = Robot.load(path) if is_robot(path) else None
     except TiltvpError as error:
-        what, _, expected = str(error).removeprefix(f"{file.parent / table['camera']}: ").partition(", expected ")
+        what, _, expected = str(error).removeprefix(f"{path}: ").partition(", expected ")
         findings.add(file, None, f"camera {table['camera']!r}: {what}", expected or _KEYS["camera"])
-        return None
-    return camera.mirrored() if table.get("mirror", False) and not camera.mirror else camera
+        return None, None
+    return camera.mirrored() if table.get("mirror", False) and not camera.mirror else camera, robot
 
 
-def _mask(
-    directory: Path, table: dict[str, Any], camera: Camera | None, findings: Findings
-) -> NDArray[np.bool_] | None:
-    if "mask" not in table:
-        return None
-    file = directory / table["mask"]
+def _mask(file: Path, camera: Camera | None, findings: Findings) -> NDArray[np.bool_] | None:
     expected = "an image of the camera's size, white where the world is seen and black where the robot is"
     try:
         mask = gray_from(read_image(file), str(file)) > 127
