@@ -179,6 +179,33 @@ def test_what_has_no_correction_is_refused(camera: tiltvp.Camera) -> None:
         tiltvp.train_correction(estimator, *draws(), kind="line")
 
 
+def test_an_estimator_that_corrects_measures_no_raw_shifts(camera: tiltvp.Camera) -> None:
+    for method, correction in (("image-space-ransac", "closed-form"), ("vector-consensus", 1.8)):
+        estimator = tiltvp.TiltEstimator(camera, method=method, correction=correction)
+        with pytest.raises(InvalidInputError, match=f"correction = {correction!r}, expected"):
+            tiltvp.train_correction(estimator, *draws())
+
+
+@pytest.mark.parametrize("kind", tiltvp.corrections.CORRECTION_KINDS)
+def test_numbers_that_make_no_sense_train_nothing(camera: tiltvp.Camera, kind: str) -> None:
+    estimator = tiltvp.TiltEstimator(camera, method="image-space-ransac", correction=None)
+    shift, alpha = draws()
+    for measured, leans in (
+        (shift, alpha[1:]), (shift[:, None], alpha[:, None]), (["a"] * 400, alpha), (shift, [*alpha[1:], math.nan]),
+        (shift, -alpha), ([*shift[1:], math.inf], alpha),
+    ):  # fmt: skip
+        with pytest.raises(InvalidInputError, match="expected"):
+            tiltvp.train_correction(estimator, measured, leans, kind=kind)
+    trained = tiltvp.train_correction(estimator, [*shift, 1.0], [*alpha, 0.0], kind=kind)
+    assert trained.images == (400 if kind == "factor" else 401)
+
+
+def test_a_factor_of_any_number_is_written(camera: tiltvp.Camera, tmp_path: Path) -> None:
+    trained = tiltvp.TrainedCorrection(250, "image-space-ransac", {}, camera.to_dict())
+    trained.save(tmp_path / "correction.toml")
+    assert tiltvp.TrainedCorrection.load(tmp_path / "correction.toml") == trained
+
+
 @pytest.mark.slow
 def test_a_correction_is_trained_and_read_on_the_command_line(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]

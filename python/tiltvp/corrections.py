@@ -108,7 +108,8 @@ class TrainedCorrection:
 
         check_output(path)
         made = self.correction
-        values = {"factor": made} if isinstance(made, float) else made.to_dict()
+        curves = (AffineCorrection, PosteriorCorrection)
+        values = made.to_dict() if isinstance(made, curves) else {"factor": float(made)}
         tree = {
             "format": _FORMAT, "version": _VERSION, "kind": self.kind, "method": self.method, "images": self.images,
             "correction": values, "options": self.options, "camera": self.camera,
@@ -146,10 +147,11 @@ def train_correction(
     *,
     kind: str = "posterior",
 ) -> TrainedCorrection:
-    """A correction of an estimator from what it measured (N,), shifts or raw angles, at known leans (N,).
+    """A correction of an estimator from what it measured (N,), shifts or raw angles, at known leans (N,) in radians.
 
-    NaN is an image without an estimate, which is left out. Raises `InvalidInputError` for an unknown kind, for a method
-    that has no correction, and where the images do not determine one.
+    The estimator has no correction (`correction=None`), by which it would measure something else. NaN is an image
+    without an estimate, which is left out. Raises `InvalidInputError` for an unknown kind, for an estimator that cannot
+    have a correction or has one, and where the numbers do not determine one.
     """
     import numpy as np
 
@@ -157,13 +159,21 @@ def train_correction(
         raise InvalidInputError(f"kind = {kind!r}, expected one of {', '.join(CORRECTION_KINDS)}")
     if all(one["name"] != "correction" for one in option_fields("TiltEstimator", estimator.method)):
         raise InvalidInputError(f"method {estimator.method} has no correction, expected one of the paper's methods")
-    shifts, leans = np.asarray(measured, dtype=np.float64), np.asarray(alpha_rad, dtype=np.float64)
-    known = np.isfinite(shifts)
+    if (present := estimator.options["correction"]) is not None:
+        raise InvalidInputError(f"an estimator with correction = {present!r}, expected one that measures with None")
+    try:
+        shifts, leans = (np.asarray(values, dtype=np.float64) for values in (measured, alpha_rad))
+    except (TypeError, ValueError) as error:
+        raise InvalidInputError(f"measured, alpha_rad: {error}, expected numbers (N,)") from error
+    if shifts.ndim != 1 or shifts.shape != leans.shape:
+        raise InvalidInputError(f"measured, alpha_rad: shapes {shifts.shape} and {leans.shape}, expected (N,) of both")
+    # Upright images do not tell a factor.
+    known = ~np.isnan(shifts) & ((leans != 0.0) | (kind != "factor"))
     shifts, leans = shifts[known], leans[known]
     made: Correction
     match kind:
         case "factor":
-            made = train_factor(shifts[leans > 0.0], leans[leans > 0.0])
+            made = train_factor(shifts, leans)
         case "affine":
             made = train_affine(shifts, leans)
         case _:
