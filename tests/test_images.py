@@ -100,6 +100,21 @@ def test_files_of_16_bits_are_read_as_grey_levels(tmp_path: Path) -> None:
     assert np.array_equal(gray_from(tiltvp.read_image(path)), LEVELS)
 
 
+def test_what_is_written_is_what_was_meant(tmp_path: Path) -> None:
+    deep = LEVELS.astype(np.uint16) * np.uint16(257)
+    for image in (LEVELS / 255.0, (LEVELS / 255.0).astype(np.float32), deep):
+        tiltvp.write_image(tmp_path / "a.png", image)
+        assert np.array_equal(read_image(tmp_path / "a.png"), LEVELS)
+    tiltvp.write_image(tmp_path / "mask.png", LEVELS > 100)
+    assert np.array_equal(read_image(tmp_path / "mask.png"), np.where(LEVELS > 100, 255, 0))
+    tiltvp.write_image(tmp_path / "a.bmp", deep)
+    assert np.array_equal(read_image(tmp_path / "a.bmp"), LEVELS)
+    for other in (LEVELS.astype(np.int16), 1.0 * LEVELS, LEVELS.astype(complex)):
+        with pytest.raises(InvalidInputError, match=r"b\.png"):
+            tiltvp.write_image(tmp_path / "b.png", other)
+    assert not (tmp_path / "b.png").exists()
+
+
 def test_unreadable_files_are_named(tmp_path: Path) -> None:
     empty, text, cut = tmp_path / "empty.png", tmp_path / "text.png", tmp_path / "cut.png"
     empty.touch()

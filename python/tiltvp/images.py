@@ -23,6 +23,8 @@ LARGEST_IMAGE_BYTES: Final = 1 << 30
 _EXPECTED = "(H, W) or (H, W, 3 or 4 in BGR order) of uint8, uint16, or float in [0, 1]"
 _DEPTHS = (10, 12, 14, 16)
 """Bits that sensors have where files and arrays have 16."""
+_DEEP = (".png", ".tif", ".tiff", ".pgm", ".ppm", ".pnm", ".jp2")
+"""Endings of the files that hold 16 bits a value."""
 
 
 def gray_from(image: ArrayLike, name: str = "image") -> NDArray[np.uint8]:
@@ -150,15 +152,21 @@ def decode_as_stored(data: bytes) -> NDArray[Any]:
 
 
 def write_image(path: str | os.PathLike[str], image: NDArray[Any]) -> None:
-    """Writes an image file whole or not at all; the ending says the format.
+    """Writes an image (H, W) or (H, W, 3 or 4), colour in BGR order, whole or not at all; the ending says the format.
 
-    Raises `ImageFileError` for an image that the format cannot hold, `OutputError` where it cannot be written.
+    uint16 is kept where the format holds it. What else `gray_from` takes becomes uint8 as there: bool, so masks are
+    black and white, floats in [0, 1], and uint16. Raises `InvalidInputError` for other types, `ImageFileError` for an
+    image that the format cannot hold, `OutputError` where it cannot be written.
     """
     import cv2
 
     file = Path(path)
+    ending = file.suffix or ".png"
+    levels = np.asarray(image)
+    if levels.size and (levels.dtype != np.uint16 or ending.lower() not in _DEEP):
+        levels = _bytes_from(levels, os.fspath(file))
     try:
-        done, data = cv2.imencode(file.suffix or ".png", image)
+        done, data = cv2.imencode(ending, levels)
     except cv2.error as error:
         raise ImageFileError(
             f"{file}: cannot be encoded as {file.suffix!r}, expected .png, .jpg or the like"
