@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import copy
+import dataclasses
+import importlib
 import json
 import math
 import pickle
+import pkgutil
 from typing import Any
 
 import numpy as np
@@ -199,3 +202,18 @@ def test_remade_values(camera: tiltvp.Camera) -> None:
     assert hash(again) == hash(rays)
     assert copy.copy(rays) is rays
     assert rays != _core.PixelRays(camera, samples=1)
+
+
+def test_values_with_arrays_are_compared_without_an_error() -> None:
+    """Those of `dataclass` would compare arrays by ==, which has no truth."""
+    compared = []
+    for module in pkgutil.walk_packages(tiltvp.__path__, "tiltvp."):
+        if module.name.startswith(("tiltvp.cli", "tiltvp.lab", "tiltvp.__main__")):
+            continue
+        for name, kind in vars(importlib.import_module(module.name)).items():
+            if name.startswith("_") or not (isinstance(kind, type) and dataclasses.is_dataclass(kind)):
+                continue
+            has_arrays = any("NDArray" in str(field.type) for field in dataclasses.fields(kind))
+            if has_arrays and kind.__eq__ is not object.__eq__:
+                compared.append(name)
+    assert compared == []

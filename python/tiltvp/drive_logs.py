@@ -26,7 +26,7 @@ LARGEST_WHOLE: Final = 2**53 - 1
 """Of steps and landmarks: from the next on, two of them would be the same float."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class DriveLog:
     """What a robot has recorded."""
 

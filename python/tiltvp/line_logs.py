@@ -36,7 +36,7 @@ whole log takes time by the cube of their number, and the others say little: wit
 office gave an answer as near to the truth, with all 720 of a living room it took minutes."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class FollowedFrame:
     """An image of a drive and the lines in it."""
 
@@ -48,7 +48,7 @@ class FollowedFrame:
     """The lines and whose they are."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class SeenFrame:
     """An image of a drive, the lines in it, and what the robot did since the image before that could be used."""
 

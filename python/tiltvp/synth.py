@@ -62,7 +62,7 @@ def mirror_camera() -> Camera:
     )
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class RoomImage:
     """A leaning robot's view of a room: `gray` (H, W) and `bgr` (H, W, 3), both uint8, and the true lean."""
 
