@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections import defaultdict
 from pathlib import Path
 from typing import Any
@@ -62,6 +63,15 @@ def test_the_same_arguments_give_the_same_bytes(drive: RecordedDrive, path: Path
     other = tmp_path / "other_name.mcap"
     again.write(other, threads=1)
     assert other.read_bytes() == path.read_bytes()
+
+
+def test_the_python_of_the_guide_runs(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(path.parent)
+    guide = (Path(__file__).parents[1] / "docs/recordings.md").read_text(encoding="utf-8")
+    names: dict[str, Any] = {"tiltvp": tiltvp}
+    for program in re.findall(r"^```python\n(.*?)^```$", guide, re.MULTILINE | re.DOTALL):
+        exec(compile(program, "recordings.md", "exec"), names)
+    assert names["odometry"].between(*names["frames"].times_s[:2]) is not None
 
 
 def test_frames_are_in_step_with_the_truth(drive: RecordedDrive, topics: dict[str, list[tuple[int, Any]]]) -> None:
