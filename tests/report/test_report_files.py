@@ -122,6 +122,15 @@ def test_run_on_another_computer_is_figure_25(run: Path) -> None:
     assert (second / first).to_list() == pytest.approx([10.0] * 6, rel=0.1)
 
 
+def test_times_of_another_dataset_are_refused(run: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    whole = read_run(run)
+    dataset = whole.manifest["dataset"] | {"digest": "0" * 64}
+    with pytest.raises(RunError, match="different datasets"):
+        contents_of(whole, also=OtherRun(Run(whole.manifest | {"dataset": dataset}, whole.table), "a slow board"))
+    assert main(["report", str(run), "--out", str(tmp_path / "out"), "--label", "a slow board"]) == 2
+    assert "--label a slow board without --also" in capsys.readouterr().err
+
+
 def test_bad_runs_are_refused(run: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["report", str(tmp_path / "none"), "--out", str(tmp_path / "out")]) == 2
     assert "none" in capsys.readouterr().err
@@ -141,6 +150,10 @@ def test_other_files_are_not_lost(run: Path, tmp_path: Path, capsys: pytest.Capt
     assert main(["report", str(run), "--out", str(tmp_path)]) == 2
     assert "other files" in capsys.readouterr().err
     assert [path.name for path in tmp_path.iterdir()] == ["thesis.tex"]
+    (tmp_path / PAGE).write_text("earlier")
+    assert main(["report", str(run), "--out", str(tmp_path)]) == 2
+    assert "other files (thesis.tex)" in capsys.readouterr().err
+    assert len(list(tmp_path.iterdir())) == 2
 
 
 def test_failing_leaves_the_earlier_report(run: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

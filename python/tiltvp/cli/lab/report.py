@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from tiltvp.cli.terminal import say, status
+from tiltvp.errors import InvalidInputError
 from tiltvp.files import check_output_folder
 
 
@@ -27,6 +28,8 @@ def report(run: Path, /, *, out: Path, also: Path | None = None, label: str | No
     from tiltvp.lab.report.contents import OtherRun, contents_of, scaling_of
     from tiltvp.lab.report.files import check_target, write_report
 
+    if label is not None and also is None:
+        raise InvalidInputError(f"--label {label} without --also, expected both")
     check_target(out)
     check_output_folder(out)
     with status("reading") as say_what:

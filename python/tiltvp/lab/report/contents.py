@@ -49,9 +49,13 @@ def contents_of(
 
     `advance` is told what comes next.
 
-    Raises `RunError` for a table without the columns of a run, or without any method that the figures know.
+    Raises `RunError` for a table without the columns of a run, or without any method that the figures know, and for an
+    `also` of another dataset.
     """
     _check(run.table)
+    if also is not None and also.run.manifest["dataset"]["digest"] != run.manifest["dataset"]["digest"]:
+        names = " and ".join(str(each.manifest["dataset"]["path"]) for each in (run, also.run))
+        raise RunError(f"the runs are of different datasets ({names}), expected one on two computers")
     advance("tables")
     summary = errors(run.table)
     rows = best_rows(run.table, summary)

@@ -22,6 +22,8 @@ if TYPE_CHECKING:
 __all__ = ["DPI", "PAGE", "check_target", "write_report"]
 
 PAGE: Final = "report.html"
+_ENDINGS: Final = (".html", ".png", ".pdf", ".csv")
+"""Of the files of a report."""
 DPI: Final = 200.0
 """Pixels per inch of the PNG files, which are about seven inches wide."""
 
@@ -32,8 +34,11 @@ def check_target(directory: Path) -> None:
         return
     if not directory.is_dir():
         raise RunError(f"{directory}: is a file, expected a folder for the report")
-    if any(directory.iterdir()) and not (directory / PAGE).is_file():
-        raise RunError(f"{directory}: holds other files, expected an empty folder, an earlier report, or none")
+    there = list(directory.iterdir())
+    others = [path.name for path in there if path.suffix not in _ENDINGS or not path.is_file()]
+    if others or (there and not (directory / PAGE).is_file()):
+        what = f"holds other files ({min(others or [path.name for path in there])})"
+        raise RunError(f"{directory}: {what}, expected an empty folder, an earlier report alone, or none")
 
 
 def write_report(
