@@ -90,6 +90,15 @@ def test_links_lead_to_files(page: Path) -> None:
     assert [link for link in links if not (page.parent / link).exists()] == []
 
 
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.relative_to(ROOT).as_posix())
+def test_links_lead_to_headings(page: Path) -> None:
+    """By the names that GitHub gives them, which the site takes too."""
+    for link, heading in re.findall(r"\]\((?!https?:)([^)#]*\.md|)#([^)]*)\)", page.read_text(encoding="utf-8")):
+        text = (page.parent / link if link else page).read_text(encoding="utf-8")
+        titles = [title.lower().replace(" ", "-") for title in re.findall(r"^#+ (.*)$", text, re.MULTILINE)]
+        assert heading in [re.sub(r"[^\w-]", "", title) for title in titles], (link, heading)
+
+
 def guides() -> list[Path]:
     """The pages that the site lists as guides."""
     index = (ROOT / "docs" / "index.md").read_text(encoding="utf-8")
