@@ -179,7 +179,7 @@ def test_a_mounting_comes_back_from_its_file(tmp_path: Path, ending: str) -> Non
         np.testing.assert_allclose(robot_from_camera[:3, :3], rotation, atol=1e-8)
         np.testing.assert_allclose(robot_from_camera[:3, 3], [e.x_m, e.y_m, 0.3], atol=1e-8)
     elif ending == ".urdf":
-        joint = ET.fromstring(f"<robot>{path.read_text()}</robot>").find("joint")
+        joint = ET.parse(path).getroot().find("joint")
         assert joint is not None
         origin, child = joint.find("origin"), joint.find("child")
         assert origin is not None

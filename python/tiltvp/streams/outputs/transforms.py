@@ -131,13 +131,14 @@ class StaticTransform:
     def write(self, path: str | os.PathLike[str]) -> None:
         """As a file, whole or not at all: the ending says which.
 
-        .urdf is `urdf_joint`, .kalibr.yaml is `kalibr`, other .yaml is `yaml`, .mcap has the transform on /tf_static,
-        with the stamp 0, and `yaml` as text on /tiltvp/static_transform. Raises as `check_transform` does.
+        .urdf is `urdf_joint` in a `robot` of its own, for xacro to include; .kalibr.yaml is `kalibr`, other .yaml is
+        `yaml`, .mcap has the transform on /tf_static, with the stamp 0, and `yaml` as text on /tiltvp/static_transform.
+        Raises as `check_transform` does.
         """
         check_transform(path)
         match Path(path).suffix.lower():
             case ".urdf":
-                write_whole(path, self.urdf_joint() + "\n")
+                write_whole(path, f'<robot name="{self.child}">\n{self.urdf_joint()}\n</robot>\n')
             case ".yaml":
                 text = self.kalibr() if str(path).lower().endswith(".kalibr.yaml") else self.yaml()
                 write_whole(path, text + "\n")
