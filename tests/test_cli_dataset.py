@@ -125,6 +125,22 @@ def test_wrong_use(run: Run, world: Path, tmp_path: Path, words: tuple[str, ...]
     assert list(tmp_path.iterdir()) == []
 
 
+def test_panoramas_of_rooms_replace_nothing(run: Run, tmp_path: Path) -> None:
+    for words in (("--rooms", "0"), ("--places", "0")):
+        code, _, complaints = run("panoramas", "--out", tmp_path / "out", *words)
+        assert (code, f"{words[0][2:]} = 0, expected 1 or more" in complaints) == (2, True)
+    (tmp_path / "INDEX.csv").write_text("mine")
+    code, _, complaints = run("panoramas", "--out", tmp_path, "--rooms", "1", "--places", "1", "--height", "16")
+    assert (code, "exists, expected a new or empty folder" in complaints) == (2, True)
+    assert [path.name for path in tmp_path.iterdir()] == ["INDEX.csv"]
+
+
+def test_a_camera_without_a_file_has_no_name(run: Run, tmp_path: Path) -> None:
+    for words in (("synth",), ("drive", "--camera", "fisheye")):
+        code, _, complaints = run(*words, "--out", tmp_path / "out", "--camera-name", "left")
+        assert (code, "--camera-name left without a calibration file" in complaints) == (2, True)
+
+
 def test_findings_are_a_table(run: Run, world: Path, tmp_path: Path) -> None:
     (tmp_path / "dataset.toml").write_text('camera = "camera.toml"\nmirrored = true\n')
     (tmp_path / "images.csv").write_text("file,location,environment,alpha_deg,beta_deg\na.png,a,x,0,0\n")

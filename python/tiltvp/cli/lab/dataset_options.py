@@ -91,9 +91,14 @@ class LensOptions:
         from tiltvp.lab.datasets.panoramas import paper_camera
 
         if self.camera is None:
+            self._refuse_name()
             return paper_camera()
         name = self.camera_name or "0"
         return Camera.load(self.camera, camera=int(name) if name.isdecimal() else name)
+
+    def _refuse_name(self) -> None:
+        if self.camera_name is not None:
+            raise InvalidInputError(f"--camera-name {self.camera_name} without a calibration file, expected --camera")
 
 
 @Parameter(name="*")
@@ -111,7 +116,10 @@ class DriveLensOptions(LensOptions):
 
         known = {"mirror": mirror_camera, "fisheye": paper_camera}
         word = str(self.camera)
-        return known[word]() if word in known else super()._lens()
+        if word not in known:
+            return super()._lens()
+        self._refuse_name()
+        return known[word]()
 
     @property
     def blind_rad(self) -> float | None:

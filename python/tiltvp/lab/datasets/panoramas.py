@@ -101,12 +101,18 @@ class PanoramaViews:
         self, panorama: Panorama, camera: Camera, *, robot_from_camera: ArrayLike | None = None, samples: int = 2,
         upright: bool = True,
     ) -> None:  # fmt: skip
-        """`samples` x `samples` rays are averaged in each pixel; `upright` turns the panorama by its zenith first."""
+        """`samples` x `samples` rays are averaged in each pixel; `upright` turns the panorama by its zenith first.
+
+        Raises `ImageFileError`, and `InvalidInputError` for an image that shows no whole sphere.
+        """
         self._rays = _rays_of(camera, samples)
         self._pixels = self._rays.pixels
         self._shape = (camera.height, camera.width)
         image = gray_from(read_image(panorama.path), str(panorama.path))
         self._size = (image.shape[1], image.shape[0])
+        if self._size[0] != 2 * self._size[1]:
+            told = f"{self._size[0]} x {self._size[1]} pixels"
+            raise InvalidInputError(f"{panorama.path}: {told}, expected a panorama, twice as wide as high")
         # A few columns of each side on the other, so that interpolation goes round, and the poles' rows once more.
         self._image = np.pad(np.pad(image, ((0, 0), (_WRAP, _WRAP)), "wrap"), ((_WRAP, _WRAP), (0, 0)), "edge")
         zenith = panorama.zenith if upright and panorama.zenith is not None else (0.0, 0.0, 1.0)

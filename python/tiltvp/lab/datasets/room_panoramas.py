@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import csv
+import io
 import os
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
+from tiltvp.errors import InvalidInputError
+from tiltvp.files import check_output_folder, write_whole
 from tiltvp.images import write_image
 from tiltvp.synth import ROOM_KINDS, Room
 
@@ -26,10 +29,16 @@ def render_room_panoramas(
     """Writes panoramas of `places` places in each of `rooms` rooms of each kind, and their `INDEX.csv`.
 
     The index has the columns that `tiltvp.lab.datasets.panoramas.read_panorama_index` reads; a room is an environment.
-    `advance` is called after each panorama. Raises `InvalidInputError`, `ImageFileError` and `OSError`.
+    The index is written last. `advance` is called after each panorama. Raises `InvalidInputError` and `OutputError`.
     """
+    for name, value in (("rooms", rooms), ("places", places)):
+        if value < 1:
+            raise InvalidInputError(f"{name} = {value}, expected 1 or more")
+    check_output_folder(out)
     folder = Path(out)
-    rows = []
+    index = io.StringIO()
+    writer = csv.writer(index)
+    writer.writerow(("name", "environment", "tilt_x_deg", "tilt_z_deg"))
     for seed in range(first_seed, first_seed + rooms):
         for kind in kinds:
             room = Room(kind, seed)
@@ -37,9 +46,6 @@ def render_room_panoramas(
                 name = f"{kind}-{seed}-{place}"
                 image = room.render_panorama(pose=pose, height=height, samples=2, seed=place)
                 write_image(folder / f"{name}.jpg", image.gray)
-                rows.append((name, f"{kind} {seed}", 0.0, 0.0))
+                writer.writerow((name, f"{kind} {seed}", 0.0, 0.0))
                 advance()
-    with (folder / "INDEX.csv").open("w", newline="", encoding="utf-8") as lines:
-        writer = csv.writer(lines)
-        writer.writerow(("name", "environment", "tilt_x_deg", "tilt_z_deg"))
-        writer.writerows(rows)
+    write_whole(folder / "INDEX.csv", index.getvalue())
