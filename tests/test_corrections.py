@@ -184,6 +184,8 @@ def test_an_estimator_that_corrects_measures_no_raw_shifts(camera: tiltvp.Camera
         estimator = tiltvp.TiltEstimator(camera, method=method, correction=correction)
         with pytest.raises(InvalidInputError, match=f"correction = {correction!r}, expected"):
             tiltvp.train_correction(estimator, *draws())
+        raw = estimator.with_options(correction=None)
+        assert tiltvp.train_correction(raw, *draws()).method == method
 
 
 @pytest.mark.parametrize("kind", tiltvp.corrections.CORRECTION_KINDS)

@@ -159,7 +159,8 @@ def train_correction(
         raise InvalidInputError(f"kind = {kind!r}, expected one of {', '.join(CORRECTION_KINDS)}")
     if all(one["name"] != "correction" for one in option_fields("TiltEstimator", estimator.method)):
         raise InvalidInputError(f"method {estimator.method} has no correction, expected one of the paper's methods")
-    if (present := estimator.options["correction"]) is not None:
+    # The vector consensus as it is has the factor 1.
+    if (present := estimator.options["correction"]) not in (None, 1.0):
         raise InvalidInputError(f"an estimator with correction = {present!r}, expected one that measures with None")
     try:
         shifts, leans = (np.asarray(values, dtype=np.float64) for values in (measured, alpha_rad))
