@@ -119,6 +119,17 @@ def test_corner_in_a_mask(run: Run, world: Path, level: int, found: str) -> None
     assert "mask" in refused.stderr
 
 
+@pytest.mark.parametrize(("level", "found"), [(255, "true"), (0, "false")])
+def test_corner_in_the_mask_of_a_robots_file(run: Run, world: Path, level: int, found: str) -> None:
+    mask = np.full((CAMERA.height, CAMERA.width), 255, dtype=np.uint8)
+    mask[CAMERA.height // 8 :] = level
+    tiltvp.Robot(CAMERA, np.eye(3), mask=mask > 0).save(world / "robot.toml")
+    words = ("--method", "general", "--pitch", "-20", "--out", "robot.csv", "--overwrite")
+    done = run("corner", "grey-left", "--calibration", "robot.toml", *words)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert [row["found"] for row in rows_of(world / "robot.csv")] == [found]
+
+
 def test_camera(run: Run) -> None:
     for words in (
         ("info", "camera.toml"),

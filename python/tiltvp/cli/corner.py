@@ -113,7 +113,7 @@ def corner(
         both tell times, and under equal names where files of both folders have such.
     calibration
         Of two cameras: a camchain of Kalibr or a TOML of tiltvp with left, right and left_from_right. Of one camera:
-        any format that `tiltvp camera formats` lists.
+        any format that `tiltvp camera formats` lists, or a robot's file, whose mask `general` takes.
     topic_right
         The topic of the right camera's images, where its recording has several.
     method
@@ -221,12 +221,17 @@ def _searches(
 ) -> tuple[Camera, Searches]:
     from tiltvp import Camera
     from tiltvp.corner import CornerPoseEstimator
+    from tiltvp.robot import Robot, is_robot
     from tiltvp.stereo_rigs import StereoRig
 
     methods = methods_for(method, known)
     if not is_pair:
         camera = Camera.load(calibration, image_size=image_size)
-        return camera, Searches({name: CornerPoseEstimator(camera, method=name, **known) for name in methods})
+        mask = Robot.load(calibration).mask if is_robot(calibration) else None
+        # The cuboid is told from the robot's own body by its colours.
+        own = {name: {"mask": mask} if mask is not None and name == "general" else {} for name in methods}
+        found = {name: CornerPoseEstimator(camera, method=name, **(own[name] | known)) for name in methods}
+        return camera, Searches(found)
     rig = StereoRig.load(calibration, image_size=image_size)
     pair = (rig.left, rig.right, rig.left_from_right)
     return rig.left, Searches({name: CornerPoseEstimator(*pair, method=name, **known) for name in methods})
