@@ -9,6 +9,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import tiltvp
@@ -97,6 +98,19 @@ def test_links_lead_to_headings(page: Path) -> None:
         text = (page.parent / link if link else page).read_text(encoding="utf-8")
         titles = [title.lower().replace(" ", "-") for title in re.findall(r"^#+ (.*)$", text, re.MULTILINE)]
         assert heading in [re.sub(r"[^\w-]", "", title) for title in titles], (link, heading)
+
+
+def test_symptoms_are_what_is_said() -> None:
+    page = (ROOT / "docs" / "troubleshooting.md").read_text(encoding="utf-8")
+    camera = tiltvp.Camera.equidistant(width=640, height=480, focal_px=139.7, cx=319.5, cy=239.5)
+    estimator = tiltvp.TiltEstimator(camera)
+    said = [estimator(np.zeros((480, 640), np.uint8)).reason]
+    with pytest.raises(tiltvp.errors.InvalidInputError) as refusal:
+        estimator(np.zeros((240, 320), np.uint8))
+    said.append(str(refusal.value))
+    said.append(tiltvp.LensCheck((20.0, 0.0), 1.0, (0.1, 0.1, 0.01), 0.14, 5, 100).reason.split(" ", 1)[1])
+    for symptom in re.findall(r'^\| "([^"]*?)(?: \.\.\.)?"', page, re.MULTILINE):
+        assert any(message.startswith(symptom) for message in said), symptom
 
 
 def guides() -> list[Path]:
