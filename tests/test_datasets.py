@@ -367,13 +367,6 @@ def test_nothing_is_left_of_a_failure(small: tiltvp.Camera, tmp_path: Path) -> N
     assert (tmp_path / "mine" / "thesis.txt").exists()
 
 
-def test_a_photograph_is_no_panorama(small: tiltvp.Camera, tmp_path: Path) -> None:
-    tiltvp.write_image(tmp_path / "photos" / "a.png", np.zeros((48, 64), np.uint8))
-    with pytest.raises(InvalidInputError, match=r"a\.png: 64 x 48 pixels, expected a panorama, twice as wide as high"):
-        render_panoramas(find_panoramas(tmp_path / "photos"), small, tmp_path / "out")
-    assert not (tmp_path / "out").exists()
-
-
 def test_no_panoramas(tmp_path: Path) -> None:
     with pytest.raises(InvalidInputError, match="no images"):
         find_panoramas(tmp_path)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
 
 import cv2
 import numpy as np
@@ -96,3 +97,9 @@ def test_wrong_samples(lens: tiltvp.Camera) -> None:
     assert rays.panorama_map(np.eye(3), width=40, height=20).shape == (2, 4, len(rays.pixels))
     with pytest.raises(InvalidInputError, match="rotation"):
         rays.panorama_map(np.eye(2), width=40, height=20)
+
+
+def test_a_photograph_is_no_panorama(lens: tiltvp.Camera, tmp_path: Path) -> None:
+    tiltvp.write_image(tmp_path / "a.png", np.zeros((48, 64), np.uint8))
+    with pytest.raises(InvalidInputError, match=r"a\.png: 64 x 48 pixels, expected a panorama, twice as wide as high"):
+        PanoramaViews(Panorama("a", tmp_path / "a.png", "nowhere", None), lens)
