@@ -76,6 +76,16 @@ def test_what_samples_do_not_cover_is_not_told(sequence: StereoSequence) -> None
     assert shaken.known(0.0, 0.05)["gravity"] is None
 
 
+def test_readings_that_cannot_be_are_refused() -> None:
+    times, rates = np.array([0.0, 0.01, 0.02]), np.ones((3, 3))
+    for wrong in (
+        (times[::-1], rates, None), (times, rates[:2], None), (times, rates, rates[:, :2]),
+        (times, rates * np.nan, None), (times, rates, None, rates),
+    ):  # fmt: skip
+        with pytest.raises(InvalidInputError, match=r"inertial sensor: .*expected"):
+            InertialSamples(*wrong)
+
+
 def test_tables_of_readings(tmp_path: Path) -> None:
     table = tmp_path / "imu.csv"
     table.write_text("time_s,rate_x_radps,rate_y_radps,rate_z_radps\n0,0,0,1\n0.1,0,0,1\n")

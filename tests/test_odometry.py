@@ -182,6 +182,8 @@ def test_nothing_is_made_up_outside_and_in_gaps() -> None:
     assert np.isnan(there.distance_m).tolist() == (~there.known).tolist()
     assert odometry.between(0.15, 2.25).distance_m == pytest.approx(2.1), "wheels have counted through the gap"
     assert odometry.between(0.15, 1.0) is None
+    for start in (-5.0, 1.0, math.nan):
+        assert odometry.between(start, 2.25) is None, "nobody knows where it was"
     motions = odometry.motions([-0.1, 0.0, 1.0, 2.3])
     assert [motion and motion.distance_m for motion in motions] == [None, 0.0, None, 2.3]
     assert odometry.missing([-0.1, 0.0, 1.0, 2.4], ["a", "b", "c", "d"]) == (

@@ -55,6 +55,21 @@ class InertialSamples:
     source: str = "inertial sensor"
     """What messages call it."""
 
+    def __post_init__(self) -> None:
+        """Raises `InvalidInputError` for arrays that do not fit, values that are not finite, and times that fall."""
+        n = len(self.times_s)
+        for name, shape in (
+            ("times_s", (n,)),
+            ("rates_rad_s", (n, 3)),
+            ("accelerations_m_s2", (n, 3)),
+            ("orientations", (n, 4)),
+        ):
+            values = getattr(self, name)
+            if values is not None and (np.shape(values) != shape or not np.isfinite(values).all()):
+                raise InvalidInputError(f"{self.source}: {name} {np.shape(values)}, expected {shape} of finite numbers")
+        if (np.diff(self.times_s) <= 0.0).any():
+            raise InvalidInputError(f"{self.source}: times that fall or stay, expected rising ones")
+
     @classmethod
     def read(cls, path: str | os.PathLike[str]) -> Self:
         """Reads a CSV file with columns time_s, rate_x_radps, rate_y_radps, rate_z_radps, and alike

@@ -170,7 +170,8 @@ class Odometry:
 
     def between(self, start_s: float, end_s: float) -> Motion | None:
         """What the robot did from one instant to another; None where the record does not tell of one of them."""
-        return self.motions([start_s, end_s])[1]
+        before, motion = self.motions([start_s, end_s])
+        return None if before is None else motion
 
     def motions(self, times_s: ArrayLike) -> list[Motion | None]:
         """What the robot did up to each of these times since the last one before it that the record tells of.
