@@ -281,6 +281,9 @@ def test_wheels_are_lengths() -> None:
         for value in (0.0, -1.0, math.nan, math.inf):
             with pytest.raises(InvalidInputError, match=name):
                 Wheels(**{name: value})
+    for wrong in ({"wheel_base_m": "0.3"}, {"joints": ("left",)}, {"joints": "ab"}):
+        with pytest.raises(InvalidInputError, match=next(iter(wrong))):
+            Wheels(**wrong)
     with pytest.raises(InvalidInputError, match=r"expected \(N, 2\)"):
         Odometry.from_wheels([0, 1], [0, 1])
     with pytest.raises(InvalidInputError, match="wheel_base_m = 0"):

@@ -111,7 +111,9 @@ def test_what_cannot_be_is_refused(tmp_path, old, new, told):
     "values",
     [
         {"robot_from_camera": np.diag([1.0, 1.0, -1.0])},
+        {"robot_from_camera": "up"},
         {"mask": np.ones((4, 4), dtype=bool)},
+        {"mask": np.full((48, 64), 255, dtype=np.uint8)},
         {"covariance_rad2": np.diag([1.0, -1.0])},
         {"covariance_rad2": np.full((2, 2), math.nan)},
         {"topics": {"image": "/x"}},
@@ -121,5 +123,5 @@ def test_what_cannot_be_is_refused(tmp_path, old, new, told):
     ],
 )
 def test_a_robot_that_cannot_be(values):
-    with pytest.raises((InvalidInputError, CalibrationError)):
+    with pytest.raises((InvalidInputError, CalibrationError), match=r"expected|must|without"):
         robot(**values)

@@ -16,8 +16,8 @@ from tiltvp.files import check_output, write_whole
 from tiltvp.formats.document import Document
 from tiltvp.formats.node import Node
 from tiltvp.formats.own import ROBOT_FORMAT, VERSION, camera_from, camera_table, root_of
-from tiltvp.images import gray_from, read_image, write_image
-from tiltvp.rotations import rotation_from
+from tiltvp.images import checked_mask, gray_from, read_image, write_image
+from tiltvp.rotations import mounting_from
 from tiltvp.streams.wheels import Wheels
 
 if TYPE_CHECKING:
@@ -61,11 +61,9 @@ class Robot:
     """(5, 5): of the errors of x, y and the mounting about the robot's x, y and z axes (see `tiltvp.Extrinsics`)."""
 
     def __post_init__(self) -> None:
-        rotation = rotation_from(np.asarray(self.robot_from_camera, dtype=np.float64).tolist(), "robot_from_camera")
-        object.__setattr__(self, "robot_from_camera", rotation)
-        shape = (self.camera.height, self.camera.width)
-        if self.mask is not None and np.shape(self.mask) != shape:
-            raise InvalidInputError(f"mask: shape {np.shape(self.mask)}, expected {shape}, as the camera's images")
+        object.__setattr__(self, "robot_from_camera", mounting_from(self.robot_from_camera))
+        if self.mask is not None:
+            object.__setattr__(self, "mask", checked_mask(self.mask, self.camera))
         if self.covariance is not None:
             if self.place_m is None:
                 raise InvalidInputError("covariance: without place_m, expected both")

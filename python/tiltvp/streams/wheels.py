@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from tiltvp.arguments import number_from
 from tiltvp.errors import InvalidInputError
 from tiltvp.streams.odometry import GAP_MAX_S
 
@@ -35,11 +36,13 @@ class Wheels:
     """Longest time between two samples that is interpolated, seconds."""
 
     def __post_init__(self) -> None:
-        """Raises `InvalidInputError` for what is no length or count above 0."""
+        """Raises `InvalidInputError` for what is no length or count above 0, and for other than two joints."""
         for name in ("wheel_base_m", "wheel_radius_m", "ticks_per_turn", "gap_max_s"):
             value = getattr(self, name)
-            if value is not None and not (np.isfinite(value) and value > 0.0):
+            if value is not None and not 0.0 < number_from(value, name) < np.inf:
                 raise InvalidInputError(f"{name} = {value}, expected a number above 0")
+        if self.joints is not None and (isinstance(self.joints, str) or len(self.joints) != 2):
+            raise InvalidInputError(f"joints = {self.joints!r}, expected names of two, the left and the right wheel's")
 
 
 def cumulative_m(
