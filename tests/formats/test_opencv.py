@@ -76,6 +76,17 @@ def test_opencv_refuses_what_the_models_lack(read: Read) -> None:
     assert "expected 1 rows of 6" in message(read, storage("K", "D", 5, SIZE).replace("cols: 5", "cols: 6"))
 
 
+@pytest.mark.parametrize("name", ["dist_coefs", "distortion_coefs", "distCoeffs1", "radial_distortion", "D1", "coeffs"])
+def test_opencv_refuses_coefficients_under_a_name_that_is_not_read(read: Read, name: str) -> None:
+    text = storage("camera_matrix", name, 5, SIZE)
+    assert "expected distortion_coefficients or Distortion_Coefficients or" in message(read, text)
+    assert message(read, text).endswith(f"at {name}")
+    assert message(read, storage("K", "unread", 5, SIZE + "k1: -0.25\n")).endswith("at k1")
+    # Coefficients of 0, and what is no number, change no lens.
+    plain = "dist_type: none\nmarker_distance: [0.5, 0.5]\nundistorted_size: [64, 48]\ndist_coefs: [0, 0, 0, 0]\n"
+    assert read(storage("camera_matrix", "unread", 5, SIZE + plain))[0].model == "pinhole"
+
+
 def test_opencv_stereo_and_json(read: Read) -> None:
     two = storage("M1", "D1", 5, SIZE) + storage("M2", "D2", 8).split("---\n")[1]
     assert [camera.name for camera in read(two)] == ["cam0", "cam1"]

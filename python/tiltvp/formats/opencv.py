@@ -9,8 +9,10 @@ a fisheye is refused. The formats `opencv-pinhole` and `opencv-fisheye` say it o
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Sequence
 
+from tiltvp.errors import CalibrationError
 from tiltvp.formats import multicol
 from tiltvp.formats.coefficients import brown_conrady, camera_matrix, kannala_brandt, mei, refuse_skew
 from tiltvp.formats.document import Document
@@ -31,6 +33,7 @@ _COEFFICIENTS = (
     "dist",
     "D",
 )
+_LIKE_COEFFICIENTS = re.compile(r"(?!.*undist).*(dist(?!anc)|coef).*|d\d?|[kp][1-6]", re.ASCII | re.IGNORECASE)
 _WIDTH = ("image_width", "imageWidth", "image_Width", "img_width", "width", "Width")
 _HEIGHT = ("image_height", "imageHeight", "image_Height", "img_height", "height", "Height")
 _SIZE = ("image_size", "imageSize", "img_size", "resolution", "size")
@@ -104,6 +107,8 @@ def _parse(document: Document, image_size: ImageSize | None, kind: str | None) -
 def _camera(root: Node, tail: str, given: ImageSize | None, kind: str | None, name: str) -> CameraSpec:
     matrix = root.need(*(key + tail for key in _MATRIX))
     coefficients = root.get(*(key + tail for key in _COEFFICIENTS))
+    if coefficients is None:
+        _refuse_other_names(root)
     xi = root.get("xi" + tail, "Xi" + tail)
     size = _size(root, given)
     values, skew = camera_matrix(matrix)
@@ -128,6 +133,20 @@ def _camera(root: Node, tail: str, given: ImageSize | None, kind: str | None, na
             root.fail("the four coefficients of a fisheye are missing", " or ".join(_COEFFICIENTS))
         return root.spec("kannala_brandt", size, values | kannala_brandt(coefficients), name, *notes)
     return root.spec("pinhole", size, values | brown_conrady(coefficients), name, *notes)
+
+
+def _refuse_other_names(root: Node) -> None:
+    """Refuses coefficients that stand under a name that is not read: the lens would be one without distortion."""
+    for key in root.tree:
+        if not _LIKE_COEFFICIENTS.fullmatch(key):
+            continue
+        node = root.need(key)
+        try:
+            found = any(node.numbers())
+        except CalibrationError:  # A word about them.
+            continue
+        if found:
+            node.fail("looks like coefficients of a lens, under a name that is not read", " or ".join(_COEFFICIENTS))
 
 
 def _stated(root: Node, xi: Node | None) -> str | None:
