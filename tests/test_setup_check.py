@@ -69,6 +69,20 @@ def test_images_of_one_place_do_not_make_sure() -> None:
     assert five == pytest.approx(many, abs=0.01)
 
 
+@pytest.mark.parametrize("level", [0, 5, 128, 255])
+def test_images_without_edges_do_not_speak_against_a_mounting(level: int) -> None:
+    noise = np.random.default_rng(3).normal(level, 2.0, (5, 240, 320))
+    for mounting, given in ((None, "+z"), (read_rotation("forward"), "-y")):
+        found = tiltvp.check_setup(np.clip(noise, 0, 255).astype(np.uint8), PINHOLE, mounting)
+        assert found
+        assert found.best == found.given == given
+        assert set(found.probabilities.values()) == {1.0 / 6.0}
+        assert found.reason == "5 images without straight edges, which do not tell which direction is up"
+    # Among others they make less sure.
+    mixed = tiltvp.check_setup([*IMAGES, *np.zeros((5, 240, 320), np.uint8)], PINHOLE, read_rotation("forward"))
+    assert max(mixed.probabilities.values()) < max(tiltvp.check_setup(IMAGES, PINHOLE).probabilities.values())
+
+
 def test_what_it_cannot_look_at_is_refused() -> None:
     with pytest.raises(InvalidInputError, match="images: none"):
         tiltvp.check_setup([], PINHOLE)

@@ -11,7 +11,7 @@ import numpy as np
 from tiltvp.images import gray_from
 from tiltvp.lens_check import LensCheck, check_lens
 from tiltvp.rotations import mounting_from
-from tiltvp.setup_features import DIRECTIONS, ImageFeatures
+from tiltvp.setup_features import DIRECTIONS, EDGE_FEATURES, ImageFeatures
 from tiltvp.setup_weights import BIASES, HIDDEN, MEANS, OUT, SCALES
 
 if TYPE_CHECKING:
@@ -81,6 +81,8 @@ class SetupCheck:
     def direction_reason(self) -> str:
         """Which direction is up, in a sentence."""
         shares = self.probabilities
+        if len(set(shares.values())) == 1:
+            return f"{self.images} images without straight edges, which do not tell which direction is up"
         turns = f" that turn about the camera's {self.turns_about}" if self.turns_about else ""
         told = f"{self.images} images{turns}: up is the camera's {self.best} ({self._words(self.best)})"
         if self.best != self.given:
@@ -111,7 +113,8 @@ def check_setup(
 ) -> SetupCheck:
     """Which of the camera's six directions is up in some images, and whether mounting and calibration are believable.
 
-    Five images from different places, or with different headings, are enough. `robot_from_camera` is (3, 3), by default
+    Five images from different places, or with different headings, are enough; one without straight edges tells nothing
+    of a direction. `robot_from_camera` is (3, 3), by default
     the identity; `mask` (H, W) bool is True where images show the world. `check_lens` looks at the lens. A turn of the
     camera about the vertical, and an image that is mirrored, cannot be told from images alone. Raises
     `InvalidInputError` for no images, for images and masks of another size than the camera's, for masks of another type
@@ -124,7 +127,9 @@ def check_setup(
     seen = np.array([features(gray) for gray in grays])
     shares = {name: float(share) for name, share in zip(DIRECTIONS, shares_of(seen), strict=True)}
     up = rotation.T @ np.array([0.0, 0.0, 1.0])
-    return SetupCheck(nearest_direction(up), max(shares, key=lambda name: shares[name]), shares, len(seen), lens)
+    given = nearest_direction(up)
+    best = max(shares, key=lambda name: (shares[name], name == given))
+    return SetupCheck(given, best, shares, len(seen), lens)
 
 
 def nearest_direction(ray: Matrix) -> str:
@@ -145,7 +150,9 @@ def mounting_looking(direction: str) -> Matrix:
 
 
 def log_odds(features: Matrix) -> Matrix:
-    """(6,): of the features (6, F) of an image."""
+    """(6,): of the features (6, F) of an image; all alike for one without straight edges, which tells nothing."""
+    if not features[:, :EDGE_FEATURES].any():
+        return np.zeros(len(features))
     scaled = np.clip((features - MEANS) / SCALES, -_FARTHEST, _FARTHEST)
     return np.asarray(np.tanh(scaled @ HIDDEN.T + BIASES) @ OUT)
 

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     Matrix = NDArray[np.float64]
     Cells = NDArray[np.int64]
 
-__all__ = ["DIRECTIONS", "ImageFeatures"]
+__all__ = ["DIRECTIONS", "EDGE_FEATURES", "ImageFeatures"]
 
 DIRECTIONS: Final[dict[str, tuple[float, float, float]]] = {
     "-y": (0.0, -1.0, 0.0),
@@ -41,6 +41,8 @@ _LONGEST: Final = 120
 """Straight edges of an image that are looked at."""
 _BANDS: Final = 8
 """Of equal solid angle, from straight down to straight up; twelve tell no more."""
+EDGE_FEATURES: Final = 12 + 3 * _BANDS
+"""Of the features of a direction the first so many are of straight edges, 0 where there are none."""
 _BLOCKS: Final = 4800
 """Blocks of pixels of an image, about; of 8 x 8 at 640 x 480."""
 _FEW: Final = 0.01
@@ -103,7 +105,7 @@ class _Edges:
     def told(self, up: Matrix, axis: Matrix, vertical: Matrix, score: float, centre: float) -> list[float]:
         """What they tell of a direction; `centre` is the mean height of what is seen."""
         if not len(self.length):
-            return [0.0] * (12 + 3 * _BANDS)
+            return [0.0] * EDGE_FEATURES
         weight, length, level = self.weight, self.length, 1.0 - vertical
         total, upright = float(weight.sum()) + 1.0, float(weight @ vertical)
         height, brighter = self.middle @ up, self.normal @ up
