@@ -46,8 +46,8 @@ def test_centre_and_radius(centre: tuple[float, float], radius: float, shape: tu
 def test_of_an_image_without_a_rim_none_is_told() -> None:
     assert tiltvp.rim_circle(view((160.0, 120.0), 400.0)) is None
     assert tiltvp.rim_circle(np.full((240, 320), 90, np.uint8)) is None
-    for seed in range(5):
-        noise = np.random.default_rng(seed).integers(0, 256, (240, 320), dtype=np.uint8)
+    for seed, shape in [*((seed, (240, 320)) for seed in range(5)), (1, (480, 640)), (2, (480, 640)), (0, (720, 1280))]:
+        noise = np.random.default_rng(seed).integers(0, 256, shape, dtype=np.uint8)
         assert tiltvp.rim_circle(noise) is None
     # Lighter beyond: a lamp shade, not a rim.
     assert tiltvp.rim_circle(255 - view((160.0, 120.0), 100.0)) is None

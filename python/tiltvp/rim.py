@@ -20,6 +20,9 @@ _SECTORS: Final = 64
 _COVERED: Final = 0.8
 """Share of its directions that a circle must cover beyond chance. Of 50 photographs by mirrors and fisheyes 23 have
 0.81 or more, all of them right, wrong ones 0.75 at most; parts of panoramas, without a rim, 0.34, noise 0.63."""
+_CHANCE: Final = 0.5
+"""Share of directions that chance may cover at most: beyond, a few directions would decide. About rims that are found
+it is 0.17 at most, of noise in 640 x 480 pixels 0.9."""
 _BESIDE_PX: Final = (-12.0, -8.0, 8.0, 12.0)
 """Where circles lie beside it whose coverage is what chance makes."""
 _WITHIN: Final = 0.55
@@ -94,7 +97,9 @@ def rim_circle(image: ArrayLike) -> RimCircle | None:
     seen, within = edges.seen(centre, radius)
     others = [edges.seen(centre, radius + beside)[0][within] for beside in _BESIDE_PX]
     chance = float(np.mean(others)) if within.any() else 1.0
-    covered = (float(np.mean(seen[within])) - chance) / (1.0 - chance) if chance < 1.0 else 0.0
+    if chance > _CHANCE:
+        return None
+    covered = (float(np.mean(seen[within])) - chance) / (1.0 - chance)
     if covered < _COVERED or np.count_nonzero(within) < _WITHIN * _SECTORS:
         return None
     u, v = (centre + 0.5) / shrink - 0.5
