@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 import tiltvp
+from calibration_texts import SAMPLES
 from commands import Run
 from tiltvp import Camera, Robot
 from tiltvp.rotations import read_rotation
@@ -107,6 +108,22 @@ def test_cameras_are_made_on_the_command_line(run: Run, tmp_path: Path) -> None:
         said = run("camera", *words, "--overwrite")
         assert said.code == 2
         assert told in said.err
+
+
+def test_one_of_several_cameras_is_cropped_and_scaled(run: Run, tmp_path: Path) -> None:
+    chain, out = tmp_path / "camchain.yaml", tmp_path / "out.toml"
+    chain.write_text(SAMPLES["kalibr"].text)
+    whole = Camera.load(chain, camera="cam1")
+    for name in ("cam1", "1"):
+        said = run(
+            "camera", "crop", chain, out, "--at", "8", "4", "--size", "40x40", "--camera-name", name, "--overwrite"
+        )
+        assert (said.code, Camera.load(out)) == (0, whole.cropped(8, 4, 40, 40))
+        assert run("camera", "scale", chain, out, "--factor", "2", "--camera-name", name, "--overwrite").code == 0
+        assert Camera.load(out) == whole.scaled(2.0)
+    said = run("camera", "scale", chain, out, "--factor", "2", "--camera-name", "2", "--overwrite")
+    assert (said.code, Camera.load(out)) == (2, whole.scaled(2.0))
+    assert "no camera '2', expected one of cam0, cam1 or a number" in said.complaint
 
 
 @pytest.fixture

@@ -55,6 +55,17 @@ def test_panoramas_look_ahead_for_lines_as_for_tilts() -> None:
     np.testing.assert_array_equal(LineOptions().extractor(mirror_camera()).robot_from_camera, np.eye(3))
 
 
+def test_options_that_change_nothing_are_refused(run: Run, folder: Path) -> None:
+    frames, camera = folder / "frames", folder / "camera.toml"
+    said = run("lines", frames, "--camera", camera, "--method", "radial", "--tilt", "refined")
+    assert said.code == 2
+    assert "--tilt refined with the method radial, which knows no lean" in said.complaint
+    for words in (["--mirror"], ["--image-size", "80x40"], ["--camera-format", "ros"], ["--camera-name", "0"]):
+        said = run("lines", frames, "--camera", "equirectangular:80x40", *words)
+        assert said.code == 2
+        assert f"{words[0]} beside equirectangular:80x40, expected one of them" in said.complaint
+
+
 def test_lines_of_images(run: Run, folder: Path, tmp_path: Path) -> None:
     bad = tmp_path / "bad.png"
     bad.write_bytes(b"nothing")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import os
+import re
 import sys
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -11,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import App, Parameter
 
-from tiltvp.cli.options import Switch, image_size_from
+from tiltvp.cli.options import Switch, image_size_from, refuse_beside
 from tiltvp.cli.terminal import complain, named, new_table, say, show
 from tiltvp.errors import CalibrationError, InvalidInputError, TiltvpError
 from tiltvp.files import check_output
@@ -49,17 +50,20 @@ class FileOptions:
         from tiltvp.streams import Recording, is_recording
 
         if is_recording(file):
+            refuse_beside(self, ("format", "image_size"), f"{file}, a recording")
             return _recorded(Recording(file))
         return read_cameras(file, self.format, image_size_from(self.image_size))
 
-    def first(self, file: Path) -> Camera:
-        """The first camera of a file."""
-        from tiltvp import Camera
-        from tiltvp.streams import is_recording
-
-        if is_recording(file):
-            return Camera.from_spec(self.specs(file)[0])
-        return Camera.load(file, self.format, image_size=image_size_from(self.image_size))
+    def one(self, file: Path, name: str) -> CameraSpec:
+        """The camera of a file that has this name, or else this number, the first being 0."""
+        specs = self.specs(file)
+        chosen = [spec for spec in specs if spec.name == name]
+        if not chosen and re.fullmatch(r"\d{1,9}", name, re.ASCII):
+            chosen = specs[int(name) :][:1]
+        if not chosen:
+            names = ", ".join(spec.name for spec in specs)
+            raise InvalidInputError(f"{file}: no camera {name!r}, expected one of {names} or a number")
+        return chosen[0]
 
 
 _READING = FileOptions()
@@ -77,7 +81,7 @@ def info(file: Path, /, reading: FileOptions = _READING, *, mirror: Switch = Fal
         The image is seen in a mirror.
     """
     for spec in reading.specs(file):
-        show(_info_table(spec, _built(file, spec, mirror)))
+        show(_info_table(spec, built(file, spec, mirror)))
 
 
 @app.command
@@ -114,19 +118,9 @@ def convert(
     if os.path.realpath(out) == os.path.realpath(file):
         raise InvalidInputError(f"{out}: is the file to be read, expected another name")
     check_output(out)
-    specs = reading.specs(file)
-    if camera_name is not None:
-        names = [spec.name for spec in specs]
-        chosen = [spec for spec in specs if spec.name == camera_name]
-        if not chosen and camera_name.isdecimal():
-            chosen = specs[int(camera_name) :][:1]
-        if not chosen:
-            raise InvalidInputError(
-                f"{file}: no camera {camera_name!r}, expected one of {', '.join(names)} or a number"
-            )
-        specs = chosen[:1]
+    specs = reading.specs(file) if camera_name is None else [reading.one(file, camera_name)]
     for spec in specs:
-        _built(file, spec)
+        built(file, spec)
     write_cameras(specs, out, to or "tiltvp")
     if left_out := _beside_camera(file):
         complain(f"{out}: the camera alone, {', '.join(left_out)} of {file} are not in it")
@@ -154,7 +148,7 @@ def check(files: list[Path], /, reading: FileOptions = _READING) -> int:
     for file in files:
         try:
             for spec in reading.specs(file):
-                sound &= _check_row(table, file, spec, _built(file, spec))
+                sound &= _check_row(table, file, spec, built(file, spec))
         except TiltvpError as error:
             complain(named(file, str(error)))
             sound = False
@@ -196,7 +190,8 @@ def _beside_camera(file: Path) -> list[str]:
     return [key for key in ROBOT_KEYS if is_robot(file) and root_of(Document.load(file)).has(key)]
 
 
-def _built(file: Path, spec: CameraSpec, mirror: bool = False) -> Camera:
+def built(file: Path, spec: CameraSpec, mirror: bool = False) -> Camera:
+    """The camera that a file describes so. Raises `CalibrationError` with the name of both."""
     from tiltvp import Camera
 
     try:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter, validators
 
-from tiltvp.cli.camera import FileOptions, app
+from tiltvp.cli.camera import FileOptions, app, built
 from tiltvp.cli.options import Switch, image_size_from
 from tiltvp.cli.terminal import complain, named, new_table, say, show
 from tiltvp.errors import InvalidInputError, TiltvpError
@@ -111,7 +111,16 @@ def new(
 
 
 @app.command
-def crop(file: Path, out: Path, /, reading: FileOptions = _READING, *, at: tuple[int, int], size: str) -> None:
+def crop(
+    file: Path,
+    out: Path,
+    /,
+    reading: FileOptions = _READING,
+    *,
+    at: tuple[int, int],
+    size: str,
+    camera_name: str = "0",
+) -> None:
     """Write the camera of a part of the images; of a robot's file the robot with it, the mask cropped alike.
 
     Parameters
@@ -124,11 +133,13 @@ def crop(file: Path, out: Path, /, reading: FileOptions = _READING, *, at: tuple
         u and v of the part's first pixel.
     size
         WIDTHxHEIGHT of the part.
+    camera_name
+        Name or number of the camera in a file of several, the first being 0.
     """
     part = image_size_from(size, "--size")
     assert part is not None  # There is a text.
     _check(out, file)
-    whole = reading.first(file)
+    whole = built(file, reading.one(file, camera_name))
     u, v = at
     if min(u, v) < 0 or u + part[0] > whole.width or v + part[1] > whole.height:
         inside = f"a part of {whole.width} x {whole.height} pixels"
@@ -145,6 +156,7 @@ def scale(
     *,
     factor: Annotated[float | None, _ABOVE_0] = None,
     to: str | None = None,
+    camera_name: str = "0",
 ) -> None:
     """Write the camera of resized images; of a robot's file the robot with it, the mask resized alike.
 
@@ -158,11 +170,13 @@ def scale(
         By how much they were made larger.
     to
         WIDTHxHEIGHT that they have now, in place of a factor.
+    camera_name
+        Name or number of the camera in a file of several, the first being 0.
     """
     if (factor is None) == (to is None):
         raise InvalidInputError("--factor and --to: expected one of them")
     _check(out, file)
-    camera = reading.first(file)
+    camera = built(file, reading.one(file, camera_name))
     wanted = image_size_from(to, "--to")
     if wanted is not None:
         # Either side tells it to half a pixel; the longer one better.

@@ -11,6 +11,7 @@ from cyclopts import Group, Parameter, validators
 from tiltvp._core import LINE_METHODS
 from tiltvp.cli.declared_options import from_library, mask_from
 from tiltvp.cli.options import MountedOptions, check_word
+from tiltvp.errors import InvalidInputError
 
 if TYPE_CHECKING:
     import numpy as np
@@ -58,6 +59,8 @@ class LineOptions(MountedOptions):
         check_word("--tilt", self.tilt, (_UPRIGHT, *METHODS))
         if self.tilt == _UPRIGHT:
             return lambda _: None
+        if self.method == LINE_METHODS[1] and self.tilt != type(self).tilt:
+            raise InvalidInputError(f"--tilt {self.tilt} with the method radial, which knows no lean, expected upright")
         mounting = self.mounting(camera) if rotation is None else rotation
         own = TILT_OPTIONS if self.tilt == TILT_OPTIONS["method"] else {"method": self.tilt}
         options: dict[str, Any] = {**own, "robot_from_camera": mounting}

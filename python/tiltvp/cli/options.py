@@ -64,9 +64,11 @@ class CameraOptions:
         from tiltvp.streams import Recording, is_recording, recorded_camera
 
         if is_recording(self.camera):
+            refuse_beside(self, ("camera_format", "image_size"), f"{self.camera}, a recording")
             return self._mirrored(recorded_camera(Recording(self.camera), self.camera_name))
         word = str(self.camera)
         if word.startswith(_PANORAMA):
+            refuse_beside(self, ("camera_format", "camera_name", "image_size", "mirror"), word)
             size = image_size_from(word.removeprefix(_PANORAMA), f"--camera {_PANORAMA}")
             assert size is not None  # There is a text.
             return Camera.equirectangular(width=size[0], height=size[1])
@@ -176,6 +178,13 @@ def given_words(options: "DataclassInstance") -> list[str]:
     """The words of those options that are not as they are by default."""
     given = [field.name for field in fields(options) if getattr(options, field.name) != field.default]
     return [f"--{name.replace('_', '-')}" for name in given]
+
+
+def refuse_beside(options: object, names: Sequence[str], what: str) -> None:
+    """Refuses those of some options that were given beside what knows nothing of them."""
+    for name in names:
+        if getattr(options, name):
+            raise InvalidInputError(f"--{name.replace('_', '-')} beside {what}, expected one of them")
 
 
 def check_word(option: str, word: str, known: Sequence[str]) -> None:
