@@ -163,6 +163,10 @@ def test_cameras_that_are_not_known(
     tiltvp.formats.write_cameras([CAMERA.to_spec("cam2")], tmp_path / "other.txt", "colmap")
     assert run(path, views, "--cameras", tmp_path / "other.txt", "--overwrite") == 2
     assert "no camera 'cam2', expected one of cam1" in capsys.readouterr().err
+    tiltvp.formats.write_cameras([CAMERA.scaled(0.5).to_spec("cam1")], tmp_path / "small.bin", "colmap")
+    assert run(path, views, "--cameras", tmp_path / "small.bin", "--overwrite") == 2
+    assert "cam1 of 160 x 120 pixels, expected its 320 x 240" in capsys.readouterr().err
+    assert set(gravities(path)) == {"level.png"}
 
 
 def test_gravity_that_is_there_is_kept_and_so_are_positions(

@@ -80,9 +80,11 @@ class ColmapDatabase:
         _check_database(self.path)
         with _pycolmap(self.path).Database.open(str(self.path)) as opened:
             known = {_key(prior.corr_data_id): prior for prior in opened.read_all_pose_priors()}
+            cameras = opened.read_all_cameras()
             self.cameras: dict[int, CameraSpec | str] = {
-                camera.camera_id: _spec(camera, self.path) for camera in opened.read_all_cameras()
+                camera.camera_id: _spec(camera, self.path) for camera in cameras
             }
+            self._sizes = {camera.camera_id: (camera.width, camera.height) for camera in cameras}
             self.images = tuple(
                 ColmapImage(image.image_id, image.name, image.camera_id, _is_fine(known.get(_key(image.data_id))))
                 for image in sorted(opened.read_all_images(), key=lambda image: image.name)
@@ -98,6 +100,10 @@ class ColmapDatabase:
             if not number.isdecimal() or int(number) not in self.cameras:
                 known = ", ".join(f"cam{camera_id}" for camera_id in sorted(self.cameras))
                 raise InvalidInputError(f"{self.path}: no camera {spec.name!r}, expected one of {known}")
+            width, height = self._sizes[int(number)]
+            if (spec.width, spec.height) != (width, height):
+                given = f"{spec.width} x {spec.height} pixels"
+                raise InvalidInputError(f"{self.path}: {spec.name} of {given}, expected its {width} x {height}")
             self.cameras[int(number)] = spec
 
     def write(self, found: Sequence[ImageGravity]) -> None:
