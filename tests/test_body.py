@@ -128,8 +128,11 @@ def test_bad_input_is_named() -> None:
     images = [world(seed) for seed in range(COUNT)]
     with pytest.raises(tiltvp.errors.InvalidInputError, match=r"images\[1\]: shape \(239, 320\), expected"):
         tiltvp.body_mask([images[0], images[1][:-1]], SMALL)
-    with pytest.raises(tiltvp.errors.InvalidInputError, match=r"mask: shape \(320, 240\), expected \(240, 320\)"):
+    with pytest.raises(tiltvp.errors.InvalidInputError, match=r"mask: shape \(320, 240\) of bool, expected \(240"):
         tiltvp.body_mask(images, SMALL, mask=np.ones((320, 240), dtype=bool))
+    for mask in (np.full((240, 320), np.nan), np.full((240, 320), 3, np.uint8), np.zeros((240, 320), dtype=bool)):
+        with pytest.raises(tiltvp.errors.InvalidInputError, match=r"mask: .*, expected "):
+            tiltvp.body_mask(images, SMALL, mask=mask)
     with pytest.raises(tiltvp.errors.InvalidInputError, match=r"images\[0\]"):
         tiltvp.body_mask([np.zeros(3)], SMALL)
 

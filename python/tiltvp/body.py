@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from tiltvp.errors import InvalidInputError
-from tiltvp.images import gray_from
+from tiltvp.images import checked_mask, gray_from
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
@@ -64,18 +64,13 @@ def body_mask(images: Iterable[ArrayLike], camera: Camera, *, mask: ArrayLike | 
 
     At least 5 images from places, and with headings, that differ; 24 find more. `mask` (H, W) bool is True where images
     are looked at. What is alike in all images but has no edges is left in, for so is a ceiling. Images are taken one
-    after the other and not kept. Raises `InvalidInputError` for what is no image, and for images and masks of another
-    size than the camera's.
+    after the other and not kept. Raises `InvalidInputError` for what is no image, for images and masks of another size
+    than the camera's, and for masks of another type than bool.
     """
     import cv2
 
     shape = (camera.height, camera.width)
-    looked = camera.valid_mask()
-    if mask is not None:
-        given = np.asarray(mask, dtype=bool)
-        if given.shape != shape:
-            raise InvalidInputError(f"mask: shape {given.shape}, expected {shape}, as the camera's images")
-        looked = looked & given
+    looked = camera.valid_mask() & (True if mask is None else checked_mask(mask, camera))
     scale = min(1.0, _SIDE_PX / max(shape))
     size = (max(1, round(scale * shape[1])), max(1, round(scale * shape[0])))
     inside = cv2.erode(cv2.resize(looked.astype(np.uint8), size, interpolation=cv2.INTER_NEAREST), _disc()) > 0
