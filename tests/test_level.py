@@ -163,6 +163,8 @@ def test_impossible_levellers_are_refused(camera: tiltvp.Camera) -> None:
         for made in (tiltvp.Unwrapper, *(partial(tiltvp.Leveller, to=to) for to in VIEWS)):
             with pytest.raises(InvalidInputError, match=r"size = .*expected \(width, height\)"):
                 made(camera, size=size)
+    with pytest.raises(InvalidInputError, match="expected one of same, "):
+        tiltvp.Leveller(camera, to=np.eye(3))  # type: ignore[arg-type]
     with pytest.raises(InvalidInputError, match="field_of_view_rad = '2'"):
         tiltvp.Leveller(camera, to="fisheye", field_of_view_rad="2")
     with pytest.raises(InvalidInputError, match="elevation_min_rad = None"):

@@ -80,6 +80,15 @@ def test_lines_are_plain_frozen_values(room: RoomImage, camera: tiltvp.Camera) -
     assert str(n) in repr(lines)
 
 
+def test_a_lean_is_told_by_any_two_or_three_numbers(room: RoomImage, camera: tiltvp.Camera) -> None:
+    extractor = tl.LineExtractor(camera)
+    told = extractor(room.gray, (0.05, 0.3))
+    for lean in ([0.05, 0.3], np.array([0.05, 0.3]), tiltvp.normal_from_alpha_beta(0.05, 0.3)):
+        assert extractor(room.gray, lean) == told
+        assert extractor.lines_at(told.bearing_rad, lean) == extractor.lines_at(told.bearing_rad, (0.05, 0.3))
+    assert extractor(room.gray) != told
+
+
 def test_extractor_is_a_value_and_takes_any_usual_image(room: RoomImage, camera: tiltvp.Camera) -> None:
     extractor = tl.LineExtractor(camera, lines_max=7, descriptor_bins=16)
     assert extractor == pickle.loads(pickle.dumps(extractor)) != tl.LineExtractor(camera)
@@ -170,6 +179,8 @@ def test_wrong_arguments_are_refused(room: RoomImage, camera: tiltvp.Camera) -> 
         extractor(room.gray, tiltvp.TiltEstimator(camera)(np.zeros_like(room.gray)))
     with pytest.raises(InvalidInputError, match="normal"):
         extractor(room.gray, np.zeros(3))
+    with pytest.raises(InvalidInputError, match=r"expected an estimate, \(alpha_rad, beta_rad\) or a normal"):
+        extractor(room.gray, "forward")
     radial = tl.extract(room.gray, camera, method="radial", length_min=0.2)
     with pytest.raises(InvalidInputError, match="other method"):
         extractor.describe(room.gray, radial)

@@ -11,14 +11,14 @@ from tiltvp import _core
 from tiltvp.arguments import number_from, size_from
 from tiltvp.cameras import Camera
 from tiltvp.errors import InvalidInputError
-from tiltvp.tilt import FilteredTilt, TiltEstimate, TiltEstimator, normal_from_alpha_beta
+from tiltvp.tilt import TiltEstimator, normal_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from numpy.typing import ArrayLike, NDArray
 
-    Tilt: TypeAlias = TiltEstimate | FilteredTilt | ArrayLike
+    from tiltvp.tilt import Tilt
 
 __all__ = ["VIEWS", "Leveller", "Unwrapper", "level"]
 
@@ -132,7 +132,7 @@ def _output(
         if size is not None or field_of_view_rad is not None:
             raise InvalidInputError("size, field_of_view_rad: given beside a camera, expected neither: it has them")
         return to
-    if to not in VIEWS:
+    if not (isinstance(to, str) and to in VIEWS):
         raise InvalidInputError(f"to = {to!r}, expected one of {', '.join(VIEWS)}, or a tiltvp.Camera")
     if field_of_view_rad is not None and to not in _FIELD_OF_VIEW_RAD:
         raise InvalidInputError(f"field_of_view_rad: given with to={to!r}, expected it with fisheye or pinhole only")
@@ -198,22 +198,6 @@ def _checked(image: ArrayLike, camera: _core.Camera) -> NDArray[Any]:
     return array
 
 
-def _normal(tilt: Tilt) -> NDArray[np.float64]:
-    if isinstance(tilt, TiltEstimate | FilteredTilt):
-        if not tilt:
-            raise InvalidInputError(f"tilt: an estimate without a tilt ({tilt.reason}), expected one with a tilt")
-        return tilt.normal
-    try:
-        numbers = np.asarray(tilt, dtype=np.float64)
-    except (TypeError, ValueError):
-        numbers = np.empty(0)
-    if numbers.shape == (2,):
-        return normal_from_alpha_beta(*numbers.tolist())
-    if numbers.shape != (3,):
-        raise InvalidInputError(f"tilt = {tilt!r}, expected an estimate, (alpha_rad, beta_rad) or a normal (3,)")
-    return numbers
-
-
 def _closed(array: NDArray[Any], camera: _core.Camera) -> NDArray[Any]:
     """A panorama with its first column behind the last one again, any other image as it is.
 
@@ -229,7 +213,7 @@ def _strips(
 ) -> Iterator[tuple[slice, slice, NDArray[np.float32], NDArray[np.float32]]]:
     """Rows and columns of the level image beside which nothing is seen, and where their pixels are in the leaning one:
     columns and rows."""
-    level_map, (height, width) = made._map(_normal(tilt)), made.shape
+    level_map, (height, width) = made._map(normal_of(tilt)), made.shape
     places = np.empty((2, level_map.strip_rows * width), np.float32)
     for number, first in enumerate(range(0, height, level_map.strip_rows)):
         count = min(level_map.strip_rows, height - first)

@@ -16,21 +16,17 @@ from tiltvp._core import (
     TrackedLines,
     descriptor_distances,
     match_wide,
-    normal_from_alpha_beta,
     ssd_matrix,
     zncc_matrix,
 )
-from tiltvp.errors import InvalidInputError
 from tiltvp.images import gray_from
+from tiltvp.tilt import normal_of
 
 if TYPE_CHECKING:
-    from typing import TypeAlias
-
     from numpy.typing import ArrayLike, NDArray
 
     from tiltvp._core import Camera
-
-    Tilt: TypeAlias = TiltEstimate | FilteredTilt | ArrayLike
+    from tiltvp.tilt import Tilt
 
 __all__ = [
     "LINE_METHODS",
@@ -69,7 +65,7 @@ class LineExtractor(_core.LineExtractor):
         Bearings are azimuths about the vertical in the upright robot's frame. "radial" knows no tilt. Raises
         `InvalidInputError` for an image of another size than the camera's and for an estimate without a tilt.
         """
-        return self._extract(gray_from(image), _normal(tilt), _sigma_rad(tilt))
+        return self._extract(gray_from(image), None if tilt is None else normal_of(tilt), _sigma_rad(tilt))
 
     def believes(self, image: ArrayLike, tilt: TiltEstimate, *, confidence_min: float = 0.5) -> bool:
         """Whether an estimate of the lean is confident enough, and the lines of the image do not speak against it.
@@ -101,20 +97,7 @@ class LineExtractor(_core.LineExtractor):
 
     def lines_at(self, bearing_rad: ArrayLike, tilt: Tilt | None = None) -> Lines:
         """Lines at any bearings (N,), without support: to describe places where there may be no line."""
-        return self._lines_at(bearing_rad, _normal(tilt))
-
-
-def _normal(tilt: Any) -> ArrayLike | None:
-    """The ground normal of whatever tells a lean."""
-    if tilt is None:
-        return None
-    if isinstance(tilt, TiltEstimate | FilteredTilt):
-        if not tilt:
-            raise InvalidInputError(f"tilt: an estimate without a tilt ({tilt.reason}), expected one with a tilt")
-        return tilt.normal
-    if isinstance(tilt, tuple) and len(tilt) == 2:
-        return normal_from_alpha_beta(*tilt)
-    return tilt  # type: ignore[no-any-return]
+        return self._lines_at(bearing_rad, None if tilt is None else normal_of(tilt))
 
 
 def _sigma_rad(tilt: Any) -> float | None:

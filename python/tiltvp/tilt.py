@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any, Final, Self
 
+import numpy as np
+
 from tiltvp import _core
 from tiltvp._core import (
     CommonDirection,
@@ -24,7 +26,11 @@ from tiltvp.errors import InvalidInputError
 from tiltvp.images import gray_from
 
 if TYPE_CHECKING:
-    from numpy.typing import ArrayLike
+    from typing import TypeAlias
+
+    from numpy.typing import ArrayLike, NDArray
+
+    Tilt: TypeAlias = TiltEstimate | FilteredTilt | ArrayLike
 
 __all__ = [
     "CommonDirection",
@@ -38,12 +44,33 @@ __all__ = [
     "TiltFilter",
     "common_direction",
     "normal_from_alpha_beta",
+    "normal_of",
     "tilt_error_rad",
     "tilt_from_wheel_heights",
 ]
 
 _FIXED: Final = ("camera", "method", "robot_from_camera")
 """What `with_options` leaves as it is."""
+
+
+def normal_of(tilt: Tilt) -> NDArray[np.float64]:
+    """(3,): the ground normal of an estimate, a filter's or an image's, of (alpha_rad, beta_rad), or of a normal.
+
+    Raises `InvalidInputError` for an estimate without a tilt and for anything else.
+    """
+    if isinstance(tilt, TiltEstimate | FilteredTilt):
+        if not tilt:
+            raise InvalidInputError(f"tilt: an estimate without a tilt ({tilt.reason}), expected one with a tilt")
+        return tilt.normal
+    try:
+        numbers = np.asarray(tilt, dtype=np.float64)
+    except (TypeError, ValueError):
+        numbers = np.empty(0)
+    if numbers.shape == (2,):
+        return normal_from_alpha_beta(*numbers.tolist())
+    if numbers.shape != (3,):
+        raise InvalidInputError(f"tilt = {tilt!r}, expected an estimate, (alpha_rad, beta_rad) or a normal (3,)")
+    return numbers
 
 
 class TiltEstimator(_core.TiltEstimator):
