@@ -10,6 +10,7 @@ import pytest
 
 from tiltvp import Camera
 from tiltvp.errors import InvalidInputError
+from tiltvp.field_of_view import field_of_view
 
 
 @pytest.mark.parametrize(
@@ -65,6 +66,21 @@ def test_a_part_of_an_image_sees_what_it_saw() -> None:
     assert whole.mirrored().cropped(0, 0, 640, 480) == whole.mirrored()
     with pytest.raises(InvalidInputError, match="equirectangular"):
         Camera.equirectangular(width=64, height=32).cropped(0, 0, 32, 32)
+
+
+def test_the_view_of_a_part_without_the_axis_is_that_of_its_rays() -> None:
+    whole = Camera.pinhole(width=640, height=480, fx=300.0, fy=300.0, cx=319.5, cy=239.5)
+    part = whole.cropped(0, 40, 200, 400)
+    view = field_of_view(part)
+    left, right, top, bottom = part.unproject([[0.0, 199.5], [199.0, 199.5], [99.5, 0.0], [99.5, 399.0]])
+    assert view.horizontal_rad == pytest.approx(np.arccos(left @ right))
+    assert view.vertical_rad == pytest.approx(np.arccos(top @ bottom))
+    assert view.axis_px == pytest.approx((319.5, 199.5))
+    assert view.valid_radius_px == pytest.approx(np.hypot(319.5, 199.5))
+    corner = Camera.equidistant(width=640, height=480, focal_px=140.0, cx=319.5, cy=239.5).cropped(0, 0, 101, 101)
+    assert field_of_view(corner).horizontal_rad < 0.72
+    # Where the axis is in the image the view is that through it.
+    assert field_of_view(whole).horizontal_rad == pytest.approx(2.0 * np.arctan(319.5 / 300.0))
 
 
 @pytest.mark.parametrize("camera", [0.0, None, (0,)])

@@ -25,9 +25,10 @@ few of 220 degrees, which are named too."""
 class FieldOfView:
     """Full angles through the axis in radians (beyond pi where the lens sees behind itself), and the valid pixels.
 
-    `axis_px` is the pixel (u, v) of the optical axis, `valid_radius_px` the distance from it to the farthest pixel that
-    has a bearing, `valid_share` the share of pixels that have one; of images larger than 2048 pixels a grid of at most
-    2048 x 2048 pixels is looked at.
+    Where the axis is outside the image, as in a part of one, angles are those through the image's middle. `axis_px` is
+    the pixel (u, v) of the optical axis, `valid_radius_px` the distance from it to the farthest pixel that has a
+    bearing, `valid_share` the share of pixels that have one; of images larger than 2048 pixels a grid of at most 2048 x
+    2048 pixels is looked at.
     """
 
     horizontal_rad: float
@@ -39,19 +40,22 @@ class FieldOfView:
 
 
 def field_of_view(camera: Camera) -> FieldOfView:
-    """Measures a camera along row, column and diagonals through its axis, as far as pixels have bearings."""
-    sign = -1.0 if camera.mirror else 1.0
-    axis = np.asarray(camera.project([0.0, 0.0, sign]), dtype=np.float64)
+    """Measures a camera along row, column and diagonals through its axis or middle, as far as pixels have bearings."""
+    ahead = np.array([0.0, 0.0, -1.0 if camera.mirror else 1.0])
+    axis = np.asarray(camera.project(ahead), dtype=np.float64)
     last = np.array([camera.width - 1.0, camera.height - 1.0])
+    middle = axis
     if not (np.isfinite(axis).all() and (axis >= -0.5).all() and (axis <= last + 0.5).all()):
-        axis = last / 2.0
+        middle = last / 2.0
+        ahead = np.asarray(camera.unproject(middle), dtype=np.float64)
+        axis = axis if np.isfinite(axis).all() else middle
 
     def angles(border: NDArray[np.float64], steps: NDArray[np.float64]) -> NDArray[np.float64]:
-        bearings: NDArray[np.float64] = camera.unproject(axis + steps[:, None] * (border - axis))
-        return np.arctan2(np.hypot(bearings[:, 0], bearings[:, 1]), sign * bearings[:, 2])
+        bearings: NDArray[np.float64] = camera.unproject(middle + steps[:, None] * (border - middle))
+        return np.asarray(np.arctan2(np.linalg.norm(np.cross(bearings, ahead), axis=1), bearings @ ahead))
 
     def reach(u: float, v: float) -> float:
-        """The largest angle from the axis on the way to a pixel of the border."""
+        """The largest angle from the axis, or from the middle, on the way to a pixel of the border."""
         border, steps = np.array([u, v]), np.linspace(0.0, 1.0, _SAMPLES)
         seen = np.flatnonzero(np.isfinite(angles(border, steps)))
         if not seen.size:
@@ -60,7 +64,7 @@ def field_of_view(camera: Camera) -> FieldOfView:
         beyond = np.linspace(steps[last_seen], steps[min(last_seen + 1, _SAMPLES - 1)], _SAMPLES)
         return float(np.nanmax(angles(border, beyond)))
 
-    (u, v), (right, bottom) = axis, last
+    (u, v), (right, bottom) = middle, last
     step = -(-max(camera.width, camera.height) // _SAMPLES)
     columns, rows = np.arange(0, camera.width, step), np.arange(0, camera.height, step)
     farthest, seen = 0.0, 0
@@ -69,12 +73,13 @@ def field_of_view(camera: Camera) -> FieldOfView:
         within = columns[np.isfinite(camera.unproject(pixels)[:, 0])]
         seen += within.size
         # The farthest pixel of a row is its first or its last.
-        farthest = max([farthest, *(math.hypot(column - u, row - v) for column in within[[0, -1][: within.size]])])
+        ends = within[[0, -1][: within.size]]
+        farthest = max([farthest, *(math.hypot(column - axis[0], row - axis[1]) for column in ends)])
     return FieldOfView(
         horizontal_rad=reach(0.0, v) + reach(right, v),
         vertical_rad=reach(u, 0.0) + reach(u, bottom),
         diagonal_rad=max(reach(0.0, 0.0) + reach(right, bottom), reach(right, 0.0) + reach(0.0, bottom)),
-        axis_px=(float(u), float(v)),
+        axis_px=(float(axis[0]), float(axis[1])),
         valid_radius_px=farthest,
         valid_share=seen / (len(rows) * len(columns)),
     )
