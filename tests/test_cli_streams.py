@@ -219,6 +219,29 @@ def test_wrong_use(run: Run, world: Path, words: list[str], hint: str, monkeypat
     assert hint in complaints
 
 
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["tilt", "images", "--overlay", "images"],
+        ["tilt", "images/a.png", "--level", "../{}/images/"],
+        ["lines", "images", "--overlay", "images"],
+        ["segments", ".", "--overlay", "images"],
+        ["level", "images", "--out", "images"],
+        ["level", "drive.mp4", "--out", "drive.mp4"],
+        ["level", "drive.mp4", "--out", "."],
+        ["track", "drive.mp4", "--video", "drive.mp4", "--out", "tracks.csv"],
+    ],
+)
+def test_what_is_read_is_not_replaced(run: Run, world: Path, words: list[str], monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(world)
+    before = [(world / name).read_bytes() for name in ("drive.mp4", "images/a.png")]
+    said = run(*(word.format(world.name) for word in words), "--camera", "camera.toml", "--overwrite")
+    assert (said.code, said.out) == (2, "")
+    assert "is what is read, or holds it, expected another place" in said.err
+    assert [(world / name).read_bytes() for name in ("drive.mp4", "images/a.png")] == before
+    assert not (world / "tracks.csv").exists()
+
+
 def test_a_recording_tells_its_camera_and_mounting(run: Run, world: Path, tmp_path: Path, room: RoomImage) -> None:
     made = Bag("mcap")
     height, width = room.gray.shape

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
 from cyclopts import Parameter
 
-from tiltvp.cli.sources import SourceOptions, ending_at_interrupt, picture_names
+from tiltvp.cli.sources import SourceOptions, check_apart, ending_at_interrupt, picture_names
 from tiltvp.cli.tables import Out, check_ending
 from tiltvp.cli.terminal import named, progress_bar
 from tiltvp.errors import OutputError, TiltvpError
@@ -58,6 +58,7 @@ def find_in_each(
     from tiltvp.images import gray_from, write_image
 
     frames = source.open(images or [])
+    check_apart(frames, overlay)
     found: list[tuple[str, Found]] = []
     well = not frames.problems
     with ending_at_interrupt(frames) as coming, progress_bar(frames.count or 0, "images") as bar:

@@ -15,7 +15,7 @@ from tiltvp.cli.filtering import FilterOptions
 from tiltvp.cli.level_images import TILTS, Levelling, Looks, level_on_cluster, write_images
 from tiltvp.cli.level_videos import write_video
 from tiltvp.cli.options import CameraOptions, MethodOptions, Switch, image_size_from, rotation_of
-from tiltvp.cli.sources import MotionOptions, SourceOptions
+from tiltvp.cli.sources import MotionOptions, SourceOptions, check_apart
 from tiltvp.cli.terminal import say
 from tiltvp.errors import InvalidInputError
 from tiltvp.files import check_output, check_output_folder
@@ -107,6 +107,8 @@ def level(
         check_output(out) if as_video else check_output_folder(out)
     frames = source.open(images or [])
     of_files = isinstance(frames, ImageFiles)
+    path = out if as_video or of_files else out / f"{Path(frames.source).stem}.mp4"
+    check_apart(frames, path)
     if metadata_only and (as_video or not of_files):
         raise InvalidInputError("--metadata-only with a video, expected photographs")
     fused = filtering.filter or as_video or not of_files
@@ -122,7 +124,6 @@ def level(
     elif isinstance(frames, ImageFiles) and not as_video:
         levelled, of = write_images(frames, motions, out, work)
     else:
-        path = out if as_video else out / f"{Path(frames.source).stem}.mp4"
         levelled, of = write_video(frames, motions, path, work)
     of += len(frames.problems)
     say(f"{levelled} of {of} made level" + ("" if not metadata_only else ", by their metadata alone"))

@@ -25,6 +25,7 @@ __all__ = [
     "STDIN",
     "MotionOptions",
     "SourceOptions",
+    "check_apart",
     "distinct_names",
     "ending_at_interrupt",
     "picture_names",
@@ -165,6 +166,17 @@ class MotionOptions:
 def wheel_base_of(robot: Robot | None, given_m: float | None) -> float | None:
     """The distance between the wheels that was given, or else that of a robot's file."""
     return given_m if robot is None or given_m is not None else robot.wheels.wheel_base_m
+
+
+def check_apart(frames: Frames, *outputs: Path | None) -> None:
+    """Refuses a folder that holds images to be read, whose place pictures would take, and the video that is read."""
+    from tiltvp.streams.image_files import ImageFiles
+
+    read = {file.parent for file in frames.files} if isinstance(frames, ImageFiles) else {Path(frames.source)}
+    places = {os.path.realpath(path) for path in read}
+    for output in outputs:
+        if output is not None and os.path.realpath(output) in places:
+            raise InvalidInputError(f"{output}: is what is read, or holds it, expected another place")
 
 
 def tell(*lines: str) -> None:

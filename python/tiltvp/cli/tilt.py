@@ -19,7 +19,7 @@ from tiltvp.cli.filtering import FilterOptions
 from tiltvp.cli.options import CameraOptions, MethodOptions
 from tiltvp.cli.results import Outcome, mounting_words, outcome_table, people_table, summary_words
 from tiltvp.cli.showing import ShowOptions
-from tiltvp.cli.sources import MotionOptions, SourceOptions, ending_at_interrupt, picture_names
+from tiltvp.cli.sources import MotionOptions, SourceOptions, check_apart, ending_at_interrupt, picture_names
 from tiltvp.cli.tables import STDOUT, Out, json_lines
 from tiltvp.cli.terminal import ProgressBar, complain, named, progress_bar, say, show, width
 from tiltvp.cli.tilt_work import Work, tilts_on_cluster
@@ -101,6 +101,7 @@ def tilt(
     source = source.of_robot(robot, images or [])
     estimator = camera.complete(method.of_topic(source.topic)).estimator(camera.load())
     frames = source.open(images or [])
+    check_apart(frames, overlay, level)
     moved = motion.motions_of(robot, frames, wheel_base) if filtering.filter else None
     motions: Iterable[Motion | None] = repeat(Motion()) if moved is None else moved.motions
     estimator = _checked(estimator, frames)

@@ -16,7 +16,7 @@ from tiltvp.cli.lines import LINE_TYPES, line_columns
 from tiltvp.cli.options import CameraOptions
 from tiltvp.cli.rerun_views import send_lines
 from tiltvp.cli.showing import RerunOptions
-from tiltvp.cli.sources import MotionOptions, SourceOptions, ending_at_interrupt
+from tiltvp.cli.sources import MotionOptions, SourceOptions, check_apart, ending_at_interrupt
 from tiltvp.cli.tables import Out, Table, check_ending, check_plot, write_table
 from tiltvp.cli.terminal import ProgressBar, named, progress_bar, say
 from tiltvp.errors import InvalidInputError, TiltvpError, UnknownLeanError
@@ -98,6 +98,7 @@ def track(
     place = {} if robot is None or robot.place_m is None else {"camera_m": robot.place_m}
     tracker = LineTracker(**place | tracking.given())
     frames = frames_of.open(words)
+    check_apart(frames, video)
     motions = needed_turns(motion.motions_of(robot, frames, wheel_base))
     drive = Drive(extractor, tilt, motions)
     showing = nullcontext() if video is None else video_writer(video, frame_rate or frames.rate_hz)
