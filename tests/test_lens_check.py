@@ -93,6 +93,21 @@ def test_a_few_images_and_bare_ones_tell_nothing() -> None:
         assert "too few to tell" in found.reason
 
 
+@pytest.mark.parametrize("order", [1, -1])
+def test_images_without_edges_are_not_counted(order: int) -> None:
+    bare = np.full((480, 640), 90, np.uint8)
+    one = tiltvp.check_lens([IMAGES[0], bare, bare, bare, bare][::order], fisheye(du=9.0))
+    assert one
+    assert not one.told
+    assert one.images == 1
+    assert one.sigmas == pytest.approx((64.0, 64.0, 0.3))
+    assert "long straight edges of 1 images are too few" in one.reason
+    four = tiltvp.check_lens([*IMAGES[:4], bare][::order], fisheye(du=9.0))
+    assert not four
+    assert four.images == 4
+    assert four.sigmas[:2] == pytest.approx(tiltvp.check_lens(IMAGES[:4], fisheye(du=9.0)).sigmas[:2])
+
+
 def test_what_it_cannot_look_at_is_refused() -> None:
     with pytest.raises(InvalidInputError, match="images: none"):
         tiltvp.check_lens([], fisheye())

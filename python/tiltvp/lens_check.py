@@ -127,12 +127,14 @@ def check_lens(images: Iterable[ArrayLike], camera: Camera, *, mask: ArrayLike |
     known = None if mask is None else checked_mask(mask, camera)
     detector = SegmentDetector(camera, mask=known, stray_max_px=_STRAY_PX, rms_max_px=_RMS_PX)
     prior = np.append(camera.width * _WIDTHS[:2], _WIDTHS[2]) ** -2.0
-    off, covariance, edges = np.zeros(3), np.diag(1.0 / prior), 0
+    off, covariance, telling, edges = np.zeros(3), np.diag(1.0 / prior), len(grays), 0
     for _ in range(_ROUNDS if len(grays) >= _IMAGES else 0):
-        found = [list(_long_edges(detector, _as_told(gray, off))) for gray in grays]
+        found = [own for own in (list(_long_edges(detector, _as_told(gray, off))) for gray in grays) if own]
         count = sum(map(len, found))
-        edges = count if count >= _LEAST else edges or count
-        if count < _LEAST:
+        is_enough = count >= _LEAST and len(found) >= _IMAGES
+        if is_enough or not edges:
+            telling, edges = len(found), count
+        if not is_enough:
             break
         image_of = np.repeat(np.arange(len(found)), [len(own) for own in found])
         points = np.array([points for own in found for points in own])
@@ -147,7 +149,7 @@ def check_lens(images: Iterable[ArrayLike], camera: Camera, *, mask: ArrayLike |
         1.0 + scale,
         (sigma_u, sigma_v, sigma_scale),
         float(np.hypot(u, v)) / _per_rad(camera),
-        len(grays),
+        telling,
         edges,
     )
 
