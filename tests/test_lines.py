@@ -15,6 +15,7 @@ import tiltvp
 from tiltvp import lines as tl
 from tiltvp.errors import InvalidInputError
 from tiltvp.overlays.lines import draw_lines, line_pixels
+from tiltvp.rotations import read_rotation
 from tiltvp.synth import Room, RoomImage
 
 
@@ -300,6 +301,15 @@ def test_lines_are_drawn_where_they_are(room: RoomImage, camera: tiltvp.Camera) 
     assert np.ptp(picture[v, u].astype(int)) > 60
     with pytest.raises(InvalidInputError, match="tracks"):
         draw_lines(room.gray, camera, lines, tracks=[1])
+
+
+def test_a_line_across_the_seam_of_a_panorama_is_drawn_on_both_sides() -> None:
+    panorama, ahead = tiltvp.Camera.equirectangular(width=256, height=128), read_rotation("forward")
+    behind = tl.LineExtractor(panorama, robot_from_camera=ahead).lines_at([np.pi], (0.15, np.pi / 2.0))
+    drawn = draw_lines(np.zeros((128, 256), np.uint8), panorama, behind, ahead, labels=False).any(axis=(0, 2))
+    assert drawn[:3].any()
+    assert drawn[-3:].any()
+    assert not drawn[20:-20].any()
 
 
 def test_same_bytes_from_many_threads(room: RoomImage, camera: tiltvp.Camera, render: Callable[..., RoomImage]) -> None:

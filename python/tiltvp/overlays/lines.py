@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
     from tiltvp._core import Camera, Lines
 
-__all__ = ["draw_lines", "line_pixels", "track_colour"]
+__all__ = ["curves", "draw_lines", "line_pixels", "track_colour"]
 
 _POINTS = 32
 
@@ -48,6 +48,7 @@ def draw_lines(
 ) -> NDArray[np.uint8]:
     """The image in dimmed grey, (H, W, 3) BGR uint8, with each line in a colour of its own.
 
+    Lines that cross the seam of a panorama are drawn on both sides of it.
     `tracks` (N,) are the identities that colours and labels follow; without them they are the places among the lines.
     """
     import cv2
@@ -65,12 +66,18 @@ def draw_lines(
         if not len(seen):
             continue
         colour = track_colour(name)
-        curve = np.rint(seen * 16.0).astype(np.int32).reshape(-1, 1, 2)
-        cv2.polylines(canvas, [curve], False, colour, scale, cv2.LINE_AA, shift=4)
+        cv2.polylines(canvas, curves(camera, seen), False, colour, scale, cv2.LINE_AA, shift=4)
         if labels:
             place = (round(float(seen[-1, 0])), round(float(seen[-1, 1])))
             cv2.putText(canvas, str(name), place, cv2.FONT_HERSHEY_SIMPLEX, 0.35 * scale, colour, scale, cv2.LINE_AA)
     return canvas
+
+
+def curves(camera: Camera, seen: NDArray[np.float64]) -> list[NDArray[np.int32]]:
+    """What `cv2.polylines` draws with shift=4 along pixels (N, 2) of an edge: its parts beside a panorama's seam."""
+    # A step of half the image is a seam and no edge.
+    seams = np.flatnonzero(np.abs(np.diff(seen[:, 0])) > 0.5 * camera.width) + 1
+    return [np.rint(part * 16.0).astype(np.int32).reshape(-1, 1, 2) for part in np.split(seen, seams)]
 
 
 def track_colour(name: int) -> tuple[int, int, int]:

@@ -8,7 +8,7 @@ import numpy as np
 
 from tiltvp.errors import InvalidInputError
 from tiltvp.images import gray_from
-from tiltvp.overlays.lines import track_colour
+from tiltvp.overlays.lines import curves, track_colour
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
@@ -50,8 +50,5 @@ def draw_segments(image: ArrayLike, camera: Camera, segments: Segments) -> NDArr
         seen = pixels[np.isfinite(pixels).all(axis=1)]
         if len(seen) < 2:
             continue
-        # A step of half the image is a seam and no edge.
-        seams = np.flatnonzero(np.abs(np.diff(seen[:, 0])) > 0.5 * camera.width) + 1
-        curves = [np.rint(part * 16.0).astype(np.int32).reshape(-1, 1, 2) for part in np.split(seen, seams)]
-        cv2.polylines(canvas, curves, False, track_colour(i), scale, cv2.LINE_AA, shift=4)
+        cv2.polylines(canvas, curves(camera, seen), False, track_colour(i), scale, cv2.LINE_AA, shift=4)
     return canvas
