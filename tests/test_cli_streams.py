@@ -210,6 +210,10 @@ def test_a_live_camera_ends_at_an_interrupt(
         (["images", "--filter", "--odometry-topic", "/odom"], "no recording, expected --odometry"),
         (["images", "--wheel-base", "0.4"], "--wheel-base without --filter"),
         (["images", "--wheel-radius", "0.4"], "--wheel-radius without --filter"),
+        (["images", "--filter", "--wheel-base", "0.4"], "--wheel-base without --odometry"),
+        (["images", "--filter", "--odometry-gap", "2"], "--odometry-gap without --odometry"),
+        (["images", "--frame-rate", "5"], "--frame-rate without --out in .mcap or .tum"),
+        (["images", "--frame-rate", "5", "--out", "a.csv"], "--frame-rate without --out in .mcap or .tum"),
     ],
 )
 def test_wrong_use(run: Run, world: Path, words: list[str], hint: str, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -240,6 +244,20 @@ def test_what_is_read_is_not_replaced(run: Run, world: Path, words: list[str], m
     assert "is what is read, or holds it, expected another place" in said.err
     assert [(world / name).read_bytes() for name in ("drive.mp4", "images/a.png")] == before
     assert not (world / "tracks.csv").exists()
+
+
+@pytest.mark.parametrize(
+    ("words", "hint"),
+    [
+        (["--wheel-base", "0.4"], "--wheel-base without --odometry"),
+        (["--wheel-radius", "0.1"], "--wheel-radius without --odometry"),
+        (["--frame-rate", "5"], "--frame-rate without --video"),
+    ],
+)
+def test_track_refuses_options_of_what_is_not_there(run: Run, world: Path, words: list[str], hint: str) -> None:
+    out = world / "refused.csv"
+    said = run("track", world / "images", "--camera", world / "camera.toml", "--out", out, *words)
+    assert (said.code, hint in said.complaint, out.exists()) == (2, True, False)
 
 
 def test_a_recording_tells_its_camera_and_mounting(run: Run, world: Path, tmp_path: Path, room: RoomImage) -> None:

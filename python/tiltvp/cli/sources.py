@@ -121,8 +121,11 @@ class MotionOptions:
         )
 
     def motions_of(self, robot: Robot | None, frames: Frames, wheel_base_m: float | None) -> FrameMotions | None:
-        """The same as `motions`, with what a robot's file knows where it is not given."""
-        return self.of_robot(robot, frames).motions(frames, wheel_base_of(robot, wheel_base_m))
+        """The same as `motions`, with what a robot's file knows where it is not given; options need an odometry."""
+        found = self.of_robot(robot, frames).motions(frames, wheel_base_of(robot, wheel_base_m))
+        if found is None and frames.recording is None:
+            self.refuse("--odometry", wheel_base_m)
+        return found
 
     def motions(self, frames: Frames, wheel_base_m: float | None, read_as: Sequence[str] = ()) -> FrameMotions | None:
         """What the robot did up to each frame, None without odometry; a line on stderr for what is noted."""

@@ -25,6 +25,7 @@ from tiltvp.cli.terminal import ProgressBar, complain, named, progress_bar, say,
 from tiltvp.cli.tilt_work import Work, tilts_on_cluster
 from tiltvp.errors import InvalidInputError
 from tiltvp.files import check_output_folder
+from tiltvp.streams.outputs.tilts import TILT_ENDINGS
 
 if TYPE_CHECKING:
     import numpy as np
@@ -90,7 +91,7 @@ def tilt(
     """
     from tiltvp.streams import Motion
 
-    _check_outputs(out, overlay, level, cluster)
+    _check_outputs(out, overlay, level, cluster, frame_rate)
     if cluster is not None:
         check_cluster(out, filter=filtering.filter, show=showing.show, rerun=showing.rerun, frame_rate=frame_rate)
     filtering.check()
@@ -126,10 +127,14 @@ def tilt(
     return 1 if frames.problems or answers.bad else 0
 
 
-def _check_outputs(out: Path | None, overlay: Path | None, level: Path | None, cluster: str | None) -> None:
+def _check_outputs(
+    out: Path | None, overlay: Path | None, level: Path | None, cluster: str | None, frame_rate: float | None
+) -> None:
     """Refuses outputs that cannot be written, before any work is done."""
     if out is not None and out != STDOUT and cluster is None:
         check_answers(out)
+    if frame_rate is not None and cluster is None and (out is None or out.suffix.lower() not in TILT_ENDINGS):
+        raise InvalidInputError(f"--frame-rate without --out in {' or '.join(TILT_ENDINGS)}, expected both")
     if overlay is not None and level is not None and os.path.realpath(overlay) == os.path.realpath(level):
         raise InvalidInputError(f"--overlay and --level are both {overlay}, expected two folders")
     for folder in (overlay, level):

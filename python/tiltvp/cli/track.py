@@ -89,6 +89,8 @@ def track(
     check_ending(out)
     if video is not None:
         check_output(video)
+    elif frame_rate is not None:
+        raise InvalidInputError("--frame-rate without --video, expected both")
     check_plot("--plot", plot)
     watching.check()
     robot, words = camera.robot(), [] if source is None else [source]
