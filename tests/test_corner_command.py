@@ -42,6 +42,11 @@ def test_the_command_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) ->
     assert (tmp_path / "plot.png").exists()
     assert main(["corner", left, "--calibration", str(tmp_path / "one.toml"), "--out", str(out), "--overwrite"]) == 0
     assert main(["corner", left, right, "--calibration", str(tmp_path / "one.toml")]) == 2
+    for side in (left, right):
+        read = Path(side, "a.png").read_bytes()
+        assert main([*words, "--overlay", side, "--overwrite"]) == 2
+        assert "is what is read, or holds it" in capsys.readouterr().err
+        assert Path(side, "a.png").read_bytes() == read
 
 
 def test_the_command_line_chooses_the_method(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

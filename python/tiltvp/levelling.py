@@ -267,8 +267,8 @@ class Unwrapper:
     The lean goes into the map from strip to image, so that an image is resampled once whether it is made level or not.
     Column j is at the azimuth `2 pi j / width`, from the robot's front to its left. Row 0 is the highest; rows are
     equally spaced between the two elevations, half a step clear of both. Each pixel is the mean of 4 x 2 places. What
-    lies outside the camera's reach repeats the last row above that is seen at that azimuth. May be called from many
-    threads at once, and pickled.
+    lies outside the camera's reach repeats the last row above that is seen at that azimuth, and is black where none is.
+    May be called from many threads at once, and pickled.
 
     Parameters
     ----------

@@ -19,7 +19,7 @@ from tiltvp.cli.declared_options import LibraryOptions, from_library, mask_from
 from tiltvp.cli.options import image_size_from
 from tiltvp.cli.rerun_views import send_corner
 from tiltvp.cli.showing import RerunOptions
-from tiltvp.cli.sources import SourceOptions, ending_at_interrupt, picture_names
+from tiltvp.cli.sources import SourceOptions, check_apart, ending_at_interrupt, picture_names
 from tiltvp.cli.terminal import named, progress_bar, say
 from tiltvp.errors import InvalidInputError, TiltvpError
 
@@ -137,8 +137,10 @@ def corner(
     sensor = inertial.knowledge()
     camera, estimator = _searches(calibration, right is not None, method, known, image_size_from(image_size))
     frames = source.open([] if left is None else [left])
+    check_apart(frames, results.overlay)
     others = None if right is None else SourceOptions(topic=topic_right).open([right], topic_option="--topic-right")
     if others is not None:
+        check_apart(others, results.overlay)
         check_pairs(frames, others, timed=frame_rate is None)
     with watching.viewer() as viewer:
         look = Look(camera, estimator, independent, results.overlay, viewer, sensor)
