@@ -190,6 +190,16 @@ def test_gravity_that_is_there_is_kept_and_so_are_positions(
     assert sum(prior.has_position() for prior in priors) == 2
 
 
+def test_a_wrong_folder_takes_nothing_away(
+    database: Make, views: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = database("level.png")
+    assert run(path, views) == 0
+    assert run(path, tmp_path / "nowhere", "--overwrite") == 2
+    assert "none of the 1 images of" in capsys.readouterr().err
+    assert set(gravities(path)) == {"level.png"}
+
+
 def test_images_on_their_side_without_a_tag_are_not_believed(
     database: Make, views: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

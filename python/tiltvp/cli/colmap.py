@@ -11,6 +11,7 @@ from cyclopts import Parameter, validators
 
 from tiltvp.cli.options import MethodOptions
 from tiltvp.cli.terminal import complain, new_table, progress_bar, say, show
+from tiltvp.errors import InvalidInputError
 from tiltvp.files import check_replacing
 
 if TYPE_CHECKING:
@@ -40,7 +41,7 @@ def colmap(
     Cameras are those of the database. Images are taken as held upright, or as the orientation tag of a photograph says,
     within 60 degrees. Images that are not believed get no gravity, and are counted with the reason; positions stay.
     COLMAP uses the priors in global mapping, with rotation_averaging.use_gravity. The exit code is 1 if an image cannot
-    be read.
+    be read; where none can, nothing is written.
 
     Parameters
     ----------
@@ -72,9 +73,11 @@ def colmap(
 
     with progress_bar(len(opened.images), "images") as bar:
         found = image_gravities(opened, images, estimator_of, confidence_min=confidence_min, advance=bar.advance)
+    unread = [one.image.name for one in found if one.is_unreadable]
+    if unread and len(unread) == len(found):
+        raise InvalidInputError(f"{images}: none of the {len(unread)} images of {database} can be read there")
     opened.write(found)
     _show(found, database)
-    unread = [one.image.name for one in found if one.is_unreadable]
     for name in unread:
         complain(f"{images / name}: cannot be read")
     return 1 if unread else 0
