@@ -26,6 +26,11 @@ REFUSALS: dict[str, tuple[str, str]] = {
     ),
     "vikit count": (edited("vikit", (", 0.0, 1.0]", "]"), ("rows: 24", "rows: 22")), "22 numbers, expected 24"),
     "stella model": (edited("stella", ("equirectangular", "radial_division")), "'radial_division' is not supported"),
+    "orbslam k4 of a pinhole": (edited("orbslam", ("KannalaBrandt8", "PinHole")), "is not read of a PinHole camera"),
+    "orbslam k1 of no camera": (
+        edited("orbslam", ("Camera1.k1: 0.0125", "Camera1.k1: 0\nCamera.k1: 0.0125")),
+        "Camera.k1",
+    ),
     "orbslam type": (edited("orbslam", ("KannalaBrandt8", "Fov")), "'Fov' is not supported"),
     "boofcv model": (edited("boofcv", ("omnidirectional_universal", "kannala_brandt")), "is not supported"),
     "boofcv radial": (edited("boofcv", ("  - 0.0625", "  - 1\n  - 2\n  - 3")), "4 numbers"),

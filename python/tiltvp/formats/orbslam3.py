@@ -5,12 +5,18 @@
 
 from __future__ import annotations
 
+import re
+from collections.abc import Sequence
+from typing import Final
+
 from tiltvp.formats.document import Document
 from tiltvp.formats.node import Node
 from tiltvp.formats.spec import CameraSpec, ImageSize
 
 _TYPES = ("PinHole", "KannalaBrandt8", "Rectified")
 _AFFINE = ("fx", "fy", "cx", "cy")
+_COEFFICIENTS: Final = {"pinhole": ("k1", "k2", "p1", "p2", "k3"), "kannalabrandt8": ("k1", "k2", "k3", "k4")}
+_COEFFICIENT: Final = re.compile(r"(Camera[12]?)\.([kp]\d)", re.ASCII)
 
 
 def recognise(document: Document) -> bool:
@@ -32,16 +38,28 @@ def parse(document: Document, image_size: ImageSize | None) -> list[CameraSpec]:
     prefixes = [prefix for prefix in ("Camera1", "Camera2", "Camera") if root.has(f"{prefix}.fx")]
     if not prefixes:
         root.need("Camera1.fx", "Camera.fx")
+    _refuse_unread(root, prefixes, word)
     return [_camera(root, prefix, word.lower(), size, f"cam{index}") for index, prefix in enumerate(prefixes)]
+
+
+def _refuse_unread(root: Node, prefixes: Sequence[str], word: str) -> None:
+    """Refuses coefficients of another type of camera, and of a camera that is not there."""
+    read = _COEFFICIENTS.get(word.lower())
+    if read is None:
+        return
+    for key in root.tree:
+        found = _COEFFICIENT.fullmatch(key)
+        if found and (found[1] not in prefixes or found[2] not in read) and root.need(key).number() != 0.0:
+            root.need(key).fail(f"is not read of a {word} camera", f"{', '.join(read)} of {' and '.join(prefixes)}")
 
 
 def _camera(root: Node, prefix: str, word: str, size: ImageSize, name: str) -> CameraSpec:
     values = {key: root.need(f"{prefix}.{key}").number() for key in _AFFINE}
     if word == "kannalabrandt8":
-        values |= {key: root.need(f"{prefix}.{key}").number() for key in ("k1", "k2", "k3", "k4")}
+        values |= {key: root.need(f"{prefix}.{key}").number() for key in _COEFFICIENTS[word]}
         return root.spec("kannala_brandt", size, dict(values), name)
     if word == "pinhole":
-        for key in ("k1", "k2", "p1", "p2", "k3"):
+        for key in _COEFFICIENTS[word]:
             coefficient = root.get(f"{prefix}.{key}")
             if coefficient is not None:
                 values[key] = coefficient.number()
