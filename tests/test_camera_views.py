@@ -66,6 +66,8 @@ def test_a_part_of_an_image_sees_what_it_saw() -> None:
     assert whole.mirrored().cropped(0, 0, 640, 480) == whole.mirrored()
     with pytest.raises(InvalidInputError, match="equirectangular"):
         Camera.equirectangular(width=64, height=32).cropped(0, 0, 32, 32)
+    with pytest.raises(InvalidInputError, match="u = '80', expected a number"):
+        whole.cropped("80", 0, 32, 32)  # type: ignore[arg-type]
 
 
 def test_the_view_of_a_part_without_the_axis_is_that_of_its_rays() -> None:

@@ -89,12 +89,15 @@ class Camera(Lenses):
     def cropped(self, u: int, v: int, width: int, height: int) -> Self:
         """The camera of a part of the image, whose first pixel is (u, v). Parts beyond the image are black borders.
 
-        Raises `InvalidInputError` for an equirectangular camera, which covers the whole sphere.
+        Raises `InvalidInputError` for an equirectangular camera, which covers the sphere, and for what is no number.
         """
         parameters = self.parameters
         if not {"cx", "cy"} <= parameters.keys():
             raise InvalidInputError(f"a part of an image of model {self.model}, expected a model with a centre")
-        moved = {"cx": float(parameters["cx"]) - u, "cy": float(parameters["cy"]) - v}
+        moved = {
+            "cx": float(parameters["cx"]) - number_from(u, "u"),
+            "cy": float(parameters["cy"]) - number_from(v, "v"),
+        }
         spec = replace(
             self.to_spec(), width=width, height=height, parameters={**parameters, **moved}, max_theta_rad=None
         )
