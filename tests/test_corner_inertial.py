@@ -86,6 +86,25 @@ def test_readings_that_cannot_be_are_refused() -> None:
             InertialSamples(*wrong)
 
 
+def test_nothing_is_told_across_a_gap() -> None:
+    """A sensor that stands, then turns by 0.4 rad while its samples are lost: down of before is not down of now."""
+    times = np.arange(0.0, 4.0, 0.01)
+    lean, rates = np.clip(times - 1.0, 0.0, 0.4), np.zeros((len(times), 3))
+    rates[:, 0] = (times >= 1.0) & (times < 1.4)
+    forces = 9.81 * np.stack([np.zeros(len(times)), -np.cos(lean), np.sin(lean)], axis=1)
+    for keep, gap in ((times < 0.995, None), ((times < 0.995) | (times > 1.895), "0.910 s from 0.990 s on")):
+        samples = InertialSamples(times[keep], rates[keep], forces[keep])
+        assert samples.known(None, 0.95)["gravity"] is not None
+        assert [samples.known(None, now)["gravity"] for now in (1.15, 1.3, 1.4)] == [None] * 3
+        assert samples.gaps == (None if gap is None else f"1 gaps of over 0.1 s, the longest of {gap}")
+    assert InertialSamples(times, rates, forces).gaps is None
+    # At the frame, not at the sample next to it.
+    times = np.arange(0.0, 2.0, 0.05)
+    forces = 9.81 * np.stack([np.zeros(len(times)), -np.cos(times), np.sin(times)], axis=1)
+    down, _ = InertialSamples(times, np.tile([1.0, 0.0, 0.0], (len(times), 1)), forces).known(None, 1.02)["gravity"]
+    assert down == pytest.approx([0.0, np.cos(1.02), -np.sin(1.02)], abs=1e-3)
+
+
 def test_tables_of_readings(tmp_path: Path) -> None:
     table = tmp_path / "imu.csv"
     table.write_text("time_s,rate_x_radps,rate_y_radps,rate_z_radps\n0,0,0,1\n0.1,0,0,1\n")

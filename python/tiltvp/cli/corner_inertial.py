@@ -72,9 +72,10 @@ class Inertial:
         return known
 
     def summary(self) -> str:
-        """In how many frames it told something, and where its times are if in none."""
+        """In how many frames it told something, what of it is missing, and where its times are if in no frame."""
         told, times_s = self.told, self.samples.times_s
         text = f"{self.samples.source}: turns of {told['gyro']}, down of {told['gravity']} of {told['frames']} frames"
+        text = "; ".join([text, *filter(None, (self.samples.gaps, *self.samples.notes))])
         if told["gyro"] or told["gravity"] or self.first_s is None:
             return text
         spans = (times_s[0], times_s[-1], self.first_s, self.before_s)

@@ -135,7 +135,8 @@ def inertial_samples(recording: Recording, topic: str | None = None) -> Inertial
     norms = np.linalg.norm(table[:, 7:], axis=1)
     whole = told["orientation"] and bool((np.abs(norms - 1.0) < 1e-2).all())
     turns = table[:, 7:] / norms[:, None] if whole else None
-    return InertialSamples(table[:, 0], table[:, 1:4], table[:, 4:7], turns, frame, source)
+    lost = recording.unread(chosen, len(rows))
+    return InertialSamples(table[:, 0], table[:, 1:4], table[:, 4:7], turns, frame, source, lost)
 
 
 def _rising(table: NDArray[np.float64], source: str) -> NDArray[np.float64]:

@@ -10,6 +10,7 @@ import numpy as np
 
 from tiltvp.csv_files import CsvFile
 from tiltvp.errors import InvalidInputError
+from tiltvp.streams.odometry import gaps_told
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -35,7 +36,8 @@ _SWAY_S: Final = 0.5
 """How long before and after a frame accelerations are averaged: a hand sways for a second and more, and what stays the
 same for less than that passes for gravity."""
 _GAP_S: Final = 0.1
-"""The longest time between two samples over which turns are told: at 2 rad/s a tenth of a turn goes on unseen."""
+"""The longest time between two samples, or a sample and a frame, over which turns and down are told: at 2 rad/s the
+sensor turns by 0.2 rad unseen."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,6 +56,13 @@ class InertialSamples:
     """The frame of the sensor, by the name that the recording has for it."""
     source: str = "inertial sensor"
     """What messages call it."""
+    notes: tuple[str, ...] = ()
+    """Sentences about it that whoever uses it should know."""
+
+    @property
+    def gaps(self) -> str | None:
+        """A sentence about times without samples, over which nothing is told; None where there are none."""
+        return gaps_told(self.times_s, _GAP_S)
 
     def __post_init__(self) -> None:
         """Raises `InvalidInputError` for arrays that do not fit, values that are not finite, and times that fall."""
@@ -108,7 +117,8 @@ class InertialSamples:
         the rates, each held half-way to its neighbours, with the covariance of noise, bias and scale; None where
         samples do not cover the time. `gravity` is the mean acceleration within half a second, carried to the
         frame by the rates; its standard deviation has the sensor's bias, the scatter of accelerations and how far their
-        length is from gravity's. None where that is above 5 degrees, as of a sensor that is moved.
+        length is from gravity's. None where that is above 5 degrees, as of a sensor that is moved, and
+        where no sample is near the frame: those beyond a gap of 0.1 s tell nothing of it.
         """
         turn = np.eye(3) if camera_from_sensor is None else np.asarray(camera_from_sensor, dtype=np.float64)
         gyro = None if before_s is None else self._turned(before_s, now_s, turn)
@@ -143,14 +153,17 @@ class InertialSamples:
 
         if self.accelerations_m_s2 is None:
             return None
-        near = np.flatnonzero(np.abs(self.times_s - now_s) <= _SWAY_S)
-        if len(near) < 2:
+        nearest = int(np.argmin(np.abs(self.times_s - now_s)))
+        # Turns are known since the last gap and up to the next one.
+        unbroken = np.cumsum(np.diff(self.times_s, prepend=self.times_s[:1]) > _GAP_S)
+        near = np.flatnonzero((np.abs(self.times_s - now_s) <= _SWAY_S) & (unbroken == unbroken[nearest]))
+        if len(near) < 2 or abs(self.times_s[nearest] - now_s) > _GAP_S:
             return None
         times_s, rates = self.times_s[near], self.rates_rad_s[near]
         turns = [np.eye(3)]
         for vector in 0.5 * (rates[1:] + rates[:-1]) * np.diff(times_s)[:, None]:
             turns.append(turns[-1] @ cv2.Rodrigues(vector)[0])
-        now = turns[int(np.argmin(np.abs(times_s - now_s)))]
+        now = turns[nearest - near[0]] @ cv2.Rodrigues(self.rates_rad_s[nearest] * (now_s - self.times_s[nearest]))[0]
         # All in the axes at the frame.
         forces = np.einsum("ji,njk,nk->ni", now, np.stack(turns), self.accelerations_m_s2[near])
         mean = forces.mean(axis=0)

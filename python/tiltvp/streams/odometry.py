@@ -13,13 +13,15 @@ from tiltvp.errors import InvalidInputError
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
-__all__ = ["GAP_MAX_S", "Motion", "Odometry", "Travelled"]
+__all__ = ["GAP_MAX_S", "Motion", "Odometry", "Travelled", "gaps_told"]
 
 GAP_MAX_S: Final = 0.5
 """Longest time between two samples that is interpolated. A robot that changes its speed by 1 m/s in a second is then at
 most 1 * 0.5^2 / 8 = 3 cm from where the straight line between the samples has it."""
 _SAME_S: Final = 1e-6
 """Times closer than this are one: seconds since 1970 are told to 2.4e-7 s by a float, and clocks to less."""
+_LOST: Final = 3.0
+"""Steps of time by so many of which two samples are apart where some between them are lost: clocks jitter by less."""
 
 
 @dataclass(frozen=True)
@@ -211,3 +213,13 @@ class Odometry:
             return None
         span = f"from {self.times_s[0]:.3f} to {self.times_s[-1]:.3f} s"
         return f"{self.source}: {span}; {' and '.join(parts)}"
+
+
+def gaps_told(times_s: NDArray[np.float64], most_s: float) -> str | None:
+    """A sentence about the gaps in rising times (N,), longer than `most_s` and than steps of time are; None: none."""
+    steps = np.diff(times_s)
+    gaps = steps[steps > max(most_s, _LOST * float(np.median(steps)))] if len(steps) else steps
+    if not len(gaps):
+        return None
+    longest, begins = float(gaps.max()), float(times_s[int(np.argmax(steps))])
+    return f"{len(gaps)} gaps of over {most_s:g} s, the longest of {longest:.3f} s from {begins:.3f} s on"
