@@ -194,6 +194,27 @@ def test_nothing_is_made_up_outside_and_in_gaps() -> None:
         Odometry.from_velocities(times, times, times)
 
 
+def test_gaps_and_jumps_between_the_frames_are_told(tmp_path: Path) -> None:
+    """Also where no frame is in a gap, and of counters that a robot's driver has set anew."""
+    for k in range(3):
+        tiltvp.write_image(tmp_path / "images" / f"{k}.png", np.zeros((4, 4), np.uint8))
+    (tmp_path / "frames.csv").write_text("file,time_s\n0.png,0.5\n1.png,1.5\n2.png,3.5\n")
+    kept = (TIMES < 1.92) | (TIMES > 3.08)
+
+    def notes(rows: np.ndarray, **changed: np.ndarray) -> tuple[str, ...]:
+        table = {"time_s": TIMES} | columns("poses") | changed
+        path = write(tmp_path / "odometry.csv", {name: values[rows] for name, values in table.items()})
+        return frame_motions(open_frames(tmp_path), path).notes
+
+    name = tmp_path / "odometry.csv"
+    gap = "1 gaps of over 0.5 s, the longest of 1.200 s from 1.900 s on; the way in each is taken for one arc"
+    assert notes(kept) == (f"{name}: {gap}",)
+    assert notes(TIMES < 3.6) == notes(np.arange(len(TIMES)) % 20 == 10) == ()
+    anew = columns("poses")["x_m"] - np.where(TIMES > 2.0, 40.0, 0.0)
+    (told,) = notes(TIMES >= 0.0, x_m=anew)
+    assert "1 steps that no robot makes, the first after 2.000 s by " in told
+
+
 @given(st.integers(0, 2**32 - 1), st.floats(0.0, 1.0))
 def test_motions_add_up(seed: int, share: float) -> None:
     rng = np.random.default_rng(seed)
@@ -220,6 +241,37 @@ def test_counters_that_begin_anew_are_told(wrap: int, tmp_path: Path) -> None:
         f"the counter of the left wheel begins anew 4 times, at {wrap}",
         f"the counter of the right wheel begins anew 5 times, at {wrap}",
     ]
+
+
+@pytest.mark.parametrize("low", [-math.pi, 0.0])
+def test_angles_that_begin_anew_with_each_turn_are_told(low: float, tmp_path: Path) -> None:
+    """As absolute encoders have them: one turn of the wheel is all that they know."""
+    made, angles = Bag("mcap"), 0.2 * np.arange(200)
+    for k, angle in enumerate(angles.tolist()):
+        told = [(one - low) % math.tau + low for one in (angle, -angle)]
+        made.joints(START_S + 0.02 * k, ["left_wheel", "right_wheel"], told)
+    odometry = read_odometry(made.write(tmp_path), wheels=WHEELS)
+    assert odometry.wheels_m == pytest.approx(RADIUS_M * np.stack([angles, -angles], axis=1), abs=1e-9)
+    words = ["left wheel begins anew 6 times, at 6.283185307", "right wheel begins anew 7 times, at 6.283185307"]
+    assert [note.split("counter of the ")[1] for note in odometry.notes] == (
+        words if low == 0.0 else [words[0]] + [words[0].replace("left", "right")]
+    )
+    # A wheel that rolls most of a turn from row to row has not begun anew.
+    table = {"time_s": np.arange(3), "left_ticks": np.array([0, 600, 900]), "right_ticks": np.array([0, 600, 900])}
+    there = read_odometry(
+        write(tmp_path / "odometry.csv", table), wheels=Wheels(wheel_radius_m=1.0, ticks_per_turn=1000.0)
+    )
+    assert there.distance_m.tolist() == pytest.approx([0.0, 0.6 * math.tau, 0.9 * math.tau])
+
+
+def test_an_orientation_that_nobody_filled_in_is_no_heading(tmp_path: Path) -> None:
+    made = Bag("mcap")
+    for k in range(3):
+        made.odometry(START_S + k, 1.0 * k, 0.0, 0.1 * k)
+    turn = made.rows[1][3].pose.pose.orientation
+    turn.z = turn.w = 0.0
+    with pytest.raises(InvalidInputError, match="/odom, message 1: an orientation of length 0, expected a quaternion"):
+        read_odometry(made.write(tmp_path))
 
 
 @pytest.mark.parametrize(

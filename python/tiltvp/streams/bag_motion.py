@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from typing import TYPE_CHECKING, Any, Final
 
@@ -24,6 +25,8 @@ ODOMETRY_KINDS: Final = (_POSES, _JOINTS, *_TWISTS)
 _IMU: Final = "sensor_msgs/Imu"
 _SIDES: Final = (r"(^|[_/.\-])(l|left)([_/.\-]|$)|left", r"(^|[_/.\-])(r|right)([_/.\-]|$)|right")
 """What the names of joints of the left and of the right wheel have in them."""
+_UNIT_SLACK: Final = 1e-2
+"""Of a quaternion's length: by what those of few digits are off. One that nobody has filled in has length 0."""
 
 
 def bag_odometry(recording: Recording, topic: str | None, wheels: Wheels) -> Odometry:
@@ -36,7 +39,9 @@ def bag_odometry(recording: Recording, topic: str | None, wheels: Wheels) -> Odo
     if chosen.kind == _JOINTS:
         return _from_joints(recording, chosen, wheels)
     more: dict[str, Any] = {"source": f"{recording.path} {chosen.name}", "gap_max_s": wheels.gap_max_s}
-    rows = [(time_s, *_values(content, chosen.kind)) for time_s, content in recording.decoded(chosen)]
+    where = f"{recording.path}: {chosen.name}, message"
+    told = enumerate(recording.decoded(chosen))
+    rows = [(time_s, *_values(content, chosen.kind, f"{where} {k}")) for k, (time_s, content) in told]
     more["notes"] = recording.unread(chosen, len(rows))
     table = _rising(np.array(rows, dtype=np.float64), more["source"])
     if chosen.kind == _POSES:
@@ -55,11 +60,15 @@ def _chosen(recording: Recording, topic: str | None, wheels: Wheels) -> Topic:
     return recording.choose(order, "--odometry-topic")
 
 
-def _values(content: Any, kind: str) -> tuple[float, ...]:
+def _values(content: Any, kind: str, where: str) -> tuple[float, ...]:
     if kind == _POSES:
         place, q = content.pose.pose.position, content.pose.pose.orientation
-        yaw = np.arctan2(2.0 * (q.w * q.z + q.x * q.y), 1.0 - 2.0 * (q.y * q.y + q.z * q.z))
-        return place.x, place.y, float(yaw)
+        length = float(np.linalg.norm([q.x, q.y, q.z, q.w]))
+        if not abs(length - 1.0) <= _UNIT_SLACK:
+            raise InvalidInputError(
+                f"{where}: an orientation of length {length:.6g}, expected a quaternion of length 1"
+            )
+        return place.x, place.y, math.atan2(2.0 * (q.w * q.z + q.x * q.y), q.w**2 + q.x**2 - q.y**2 - q.z**2)
     twist = content.twist if hasattr(content, "twist") else content
     twist = twist.twist if hasattr(twist, "twist") else twist
     return twist.linear.x, twist.angular.z
@@ -133,7 +142,7 @@ def inertial_samples(recording: Recording, topic: str | None = None) -> Inertial
             raise InvalidInputError(f"{source}: a sensor that says it has no {name}, expected one that has")
     table = _rising(np.array(rows, dtype=np.float64), source)
     norms = np.linalg.norm(table[:, 7:], axis=1)
-    whole = told["orientation"] and bool((np.abs(norms - 1.0) < 1e-2).all())
+    whole = told["orientation"] and bool((np.abs(norms - 1.0) <= _UNIT_SLACK).all())
     turns = table[:, 7:] / norms[:, None] if whole else None
     lost = recording.unread(chosen, len(rows))
     return InertialSamples(table[:, 0], table[:, 1:4], table[:, 4:7], turns, frame, source, lost)

@@ -133,7 +133,7 @@ def _summed(motions: Sequence[Motion], turns_known: bool, source: str) -> Odomet
 def _interpolated(frames: Frames, odometry: Odometry) -> FrameMotions:
     if frames.times_s is None or frames.names is None:
         raise InvalidInputError(f"{frames.source}: no times of the images, expected them for {odometry.source}")
-    told = odometry.missing(frames.times_s, frames.names)
+    told, gaps = odometry.missing(frames.times_s, frames.names), odometry.gaps(frames.times_s)
     motions = odometry.motions(frames.times_s)
     if not any(motion is not None for motion in motions):
         first, last = frames.times_s[0], frames.times_s[-1]
@@ -141,8 +141,8 @@ def _interpolated(frames: Frames, odometry: Odometry) -> FrameMotions:
             f"{told}: none is left of {frames.source}, from {first:.3f} to {last:.3f} s; expected clocks that agree"
         )
     turns = odometry.yaw_rad is not None
-    notes = [*odometry.notes, *([] if turns else [_no_turns(odometry.source)]), *([] if told is None else [told])]
-    return FrameMotions(motions, turns, frames.times_s, tuple(notes))
+    notes = (*odometry.notes, None if turns else _no_turns(odometry.source), told, gaps, odometry.jumps)
+    return FrameMotions(motions, turns, frames.times_s, tuple(note for note in notes if note is not None))
 
 
 def _no_turns(source: str) -> str:

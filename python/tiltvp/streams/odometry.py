@@ -20,6 +20,9 @@ GAP_MAX_S: Final = 0.5
 most 1 * 0.5^2 / 8 = 3 cm from where the straight line between the samples has it."""
 _SAME_S: Final = 1e-6
 """Times closer than this are one: seconds since 1970 are told to 2.4e-7 s by a float, and clocks to less."""
+_FASTEST_M_S: Final = 50.0
+_FASTEST_RAD_S: Final = 50.0
+"""Beyond any vehicle that carries such a camera: twice a car on a motorway, eight turns a second."""
 _LOST: Final = 3.0
 """Steps of time by so many of which two samples are apart where some between them are lost: clocks jitter by less."""
 
@@ -213,6 +216,31 @@ class Odometry:
             return None
         span = f"from {self.times_s[0]:.3f} to {self.times_s[-1]:.3f} s"
         return f"{self.source}: {span}; {' and '.join(parts)}"
+
+    def gaps(self, times_s: ArrayLike) -> str | None:
+        """A sentence about its gaps between the first and the last of the times (M,), over which frames are joined all
+        the same: its counters and poses go on behind them. None where there are none.
+        """
+        first, last = np.min(times_s), np.max(times_s)
+        told = gaps_told(self.times_s[(self.times_s >= first) & (self.times_s <= last)], self.gap_max_s)
+        return None if told is None else f"{self.source}: {told}; the way in each is taken for one arc"
+
+    @property
+    def jumps(self) -> str | None:
+        """A sentence about steps that no robot makes, as of counters and poses that were set anew; None: none."""
+        steps_s = np.diff(self.times_s)
+        # Messages that are written down in bursts are nearer to each other than they were sent.
+        steps_s = np.maximum(steps_s, np.median(steps_s))
+        speeds = np.abs(np.diff(self.distance_m)) / steps_s
+        rates = np.zeros(len(steps_s)) if self.yaw_rad is None else np.abs(np.diff(self.yaw_rad)) / steps_s
+        places = np.flatnonzero((speeds > _FASTEST_M_S) | (rates > _FASTEST_RAD_S))
+        if not len(places):
+            return None
+        first = int(places[0])
+        return (
+            f"{self.source}: {len(places)} steps that no robot makes, the first after {self.times_s[first]:.3f} s by "
+            f"{speeds[first]:.3g} m/s and {rates[first]:.3g} rad/s: was it set anew, or is it in other units?"
+        )
 
 
 def gaps_told(times_s: NDArray[np.float64], most_s: float) -> str | None:

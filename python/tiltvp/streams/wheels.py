@@ -18,6 +18,8 @@ __all__ = ["Wheels", "cumulative_m"]
 
 _WRAPS: Final = (2**16, 2**32)
 """Counts after which counters of two and four bytes begin anew."""
+_EDGE: Final = 1e-6
+"""Share of a range by which angles go beyond its ends: those of floats of 32 bits beyond pi."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -50,21 +52,24 @@ def cumulative_m(
 ) -> tuple[NDArray[np.float64], tuple[str, ...]]:
     """(N, 2): how far both wheels had rolled, from counters (N, 2) of so many counts a turn; and what was noticed.
 
-    Whole counts of two or four bytes that fall or rise by more than half their range have begun anew.
+    Whole counts of two or four bytes that fall or rise by more than half their range have begun anew; and so have
+    those that never leave one turn, where each step is below a quarter of it or above three quarters.
     """
     steps = np.diff(counts, axis=0, prepend=counts[:1])
     notes: list[str] = []
-    if (counts == np.rint(counts)).all():
-        for k, side in enumerate(("left", "right")):
-            values = counts[:, k]
-            for wrap in _WRAPS:
-                low = -wrap // 2 if values.min() < 0 else 0
-                jumps = np.abs(steps[:, k]) > wrap // 2
-                if low <= values.min() and values.max() < low + wrap and jumps.any():
-                    steps[jumps, k] -= np.sign(steps[jumps, k]) * wrap
-                    notes.append(
-                        f"{source}: the counter of the {side} wheel begins anew {jumps.sum()} times, at {wrap}"
-                    )
-                    break
+    whole = bool((counts == np.rint(counts)).all())
+    for k, side in enumerate(("left", "right")):
+        values, far = counts[:, k], np.abs(steps[:, k])
+        within_turn = not ((far > 0.25 * per_turn) & (far < 0.75 * per_turn)).any()
+        for wrap in (*((per_turn,) if within_turn else ()), *(_WRAPS if whole else ())):
+            low = -0.5 * wrap if values.min() < 0.0 else 0.0
+            jumps = far > 0.5 * wrap
+            slack = _EDGE * wrap
+            if low - slack <= values.min() and values.max() <= low + wrap + slack and jumps.any():
+                steps[jumps, k] -= np.sign(steps[jumps, k]) * wrap
+                notes.append(
+                    f"{source}: the counter of the {side} wheel begins anew {jumps.sum()} times, at {wrap:.10g}"
+                )
+                break
     metres = 2.0 * np.pi * wheel_radius_m / per_turn
     return np.cumsum(steps, axis=0) * metres, tuple(notes)
