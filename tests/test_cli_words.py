@@ -43,7 +43,7 @@ def test_names_that_are_no_text(ending: str, run: Run, world: Path) -> None:
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="names of files that are no text")
-@pytest.mark.parametrize("before", [[], ["--overwrite"], ["--camera"]])
+@pytest.mark.parametrize("before", [[], ["--overwrite"], ["--camera"], ["--filter"], ["--threads=1"]])
 def test_names_come_on_stdin_wherever_the_dash_stands(
     before: list[str], run: Run, world: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

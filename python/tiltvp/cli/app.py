@@ -54,7 +54,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     overwrite = _OVERWRITE in words
     words = [word for word in words if word != _OVERWRITE]
     for place in [place for place, word in enumerate(words) if word == "-"]:
-        if place and not words[place - 1].startswith("--"):
+        if place and not _takes_a_word(words[place - 1], words):
             # A word that begins so is taken for an option, which its name would be looked for among.
             words[place] = STDIN
     for place in [place for place, word in enumerate(words) if word == RERUN]:
@@ -87,3 +87,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
         if not isinstance(error, BrokenPipeError):
             complain(f"{error.filename or 'the output'}: {error.strerror or error}")
         return SOME_FAILED
+
+
+def _takes_a_word(option: str, words: Sequence[str]) -> bool:
+    """Whether a word of the line is an option whose value comes next: no name, no switch, and none with its value."""
+    if not option.startswith("--") or "=" in option:
+        return False
+    arguments = app.parse_commands(words)[1][-1].assemble_argument_collection()
+    return not any(option in one.names and one.token_count()[0] == 0 for one in arguments)
