@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 import tiltvp
+from recordings import START_S, Bag
 from tiltvp.streams import open_frames
 from tiltvp.synth import RoomImage
 from tiltvp.videos import video_writer
@@ -98,6 +99,23 @@ def test_what_a_container_takes(
     assert [content for _, content in (packets(out) if kept else [])] == [
         content for _, content in (packets(source) if kept else [])
     ]
+
+
+@pytest.mark.parametrize("verb", ["level", "track"])
+def test_videos_of_a_recording_keep_its_times(
+    verb: str, run: Callable[..., tuple[int, str, str]], camera: tiltvp.Camera, room: RoomImage, tmp_path: Path
+) -> None:
+    camera.save(tmp_path / "camera.toml")
+    made = Bag("mcap")
+    for time_s in UNEVEN_S:
+        made.image("/image", START_S + time_s, room.gray, "mono8")
+    for ending, told in ((".mp4", ""), (".avi", "time and picture are up to 0.60 s apart")):
+        out = ["--out", tmp_path / f"out{ending}"]
+        if verb == "track":
+            out = ["--out", tmp_path / f"{ending}.csv", "--video", tmp_path / f"out{ending}"]
+        code, _, complaints = run(verb, made.write(tmp_path / ending), "--camera", tmp_path / "camera.toml", *out)
+        assert (code, told in complaints) == (0, True)
+    assert open_frames(tmp_path / "out.mp4").times_s == pytest.approx(UNEVEN_S, abs=1e-3)
 
 
 def test_a_source_that_is_no_video_is_told(tmp_path: Path) -> None:

@@ -1,11 +1,13 @@
-"""The sound of one video put beside the frames of another: packets are copied, nothing is encoded anew."""
+"""The times of a video's frames, and the sound of another beside them: packets are copied, nothing is encoded anew."""
 
 from __future__ import annotations
 
 import heapq
 import os
 from collections.abc import Iterator, Sequence
+from contextlib import nullcontext
 from fractions import Fraction
+from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
@@ -20,27 +22,37 @@ _APART_S: Final = 0.1
 """By how much sound may run apart from the picture unnoticed: ITU-R BT.1359 has 0.125 s as the first that is seen."""
 
 
-def add_sound(path: Path, times_s: Sequence[float | None], source: str | os.PathLike[str], scratch: Path) -> str | None:
+def add_sound(
+    path: Path, times_s: Sequence[float | None], rate_hz: float, source: str | os.PathLike[str] | None, scratch: Path
+) -> str | None:
     """Copies the sound of `source` into the video `path`, whose frames were taken at `times_s` by the source's clock.
 
-    MP4 files keep the frames' times, also without sound, so that both stay together; AVI has frames at even times only.
-    What could not be copied, or will not stay together, is told as a sentence; None where there is nothing to tell.
-    Then the video is as it was. `scratch` is a folder on the same disk.
+    MP4 files keep the frames' times, also without sound, so that both stay together; AVI has frames at even times only,
+    `rate_hz` a second. Without a source times begin with the first frame. What could not be copied, or will not stay
+    together, is told as a sentence; None where there is nothing to tell. Then the video is as it was. `scratch` is a
+    folder on the same disk.
     """
+    known = [time_s for time_s in times_s if time_s is not None]
+    rises = all(before < after for before, after in pairwise(known))
+    own = known if rises and path.suffix.lower() != ".avi" and len(known) == len(times_s) else None
+    apart = _apart(known, rate_hz, what="time")
+    if source is None and apart is None:
+        return None
     try:
         import av
     except ImportError:
-        return "its sound, if it has any, is not copied, expected `pip install 'tiltvp[video]'`"
+        return f"{apart or 'its sound, if it has any, is not copied'}, expected `pip install 'tiltvp[video]'`"
+    if source is None and own is not None:
+        own = [time_s - own[0] for time_s in own]
     joined = scratch / f"joined{path.suffix}"
     copied: list[str] = []
     try:
         # As for frames, a name with a colon is no address.
-        with av.open(f"file:{os.fspath(source)}") as heard, av.open(str(path)) as seen:
-            copied = [stream.codec_context.name for stream in heard.streams.audio]
-            known = [time_s for time_s in times_s if time_s is not None]
-            own = known if path.suffix.lower() != ".avi" and len(known) == len(times_s) else None
-            rate = seen.streams.video[0].average_rate
-            apart = None if rate is None else _apart(known, float(rate), what="sound" if copied else "time")
+        film = nullcontext(None) if source is None else av.open(f"file:{os.fspath(source)}")
+        with film as heard, av.open(str(path)) as seen:
+            copied = [] if heard is None else [stream.codec_context.name for stream in heard.streams.audio]
+            if copied:
+                apart = _apart(known, rate_hz, what="sound")
             if not copied and (own is None or apart is None):
                 return apart
             with av.open(str(joined), "w") as out:
@@ -52,13 +64,14 @@ def add_sound(path: Path, times_s: Sequence[float | None], source: str | os.Path
     return None if own is not None else apart
 
 
-def _copy(heard: InputContainer, seen: InputContainer, times_s: Sequence[float] | None, out: Any) -> None:
+def _copy(heard: InputContainer | None, seen: InputContainer, times_s: Sequence[float] | None, out: Any) -> None:
     """Writes the frames' packets and those of the sound, in the order of their times."""
     frames = seen.streams.video[0]
     video = out.add_stream_from_template(frames)
     if times_s is not None:
         video.time_base = _TICK_S
-    sound = {stream.index: out.add_stream_from_template(stream) for stream in heard.streams.audio}
+    streams = () if heard is None else heard.streams.audio
+    sound = {stream.index: out.add_stream_from_template(stream) for stream in streams}
 
     def pictures() -> Iterator[Any]:
         for number, packet in enumerate(packet for packet in seen.demux(frames) if packet.size):
@@ -70,7 +83,7 @@ def _copy(heard: InputContainer, seen: InputContainer, times_s: Sequence[float] 
 
     def sounds() -> Iterator[Any]:
         # Of no streams all would be told.
-        for packet in heard.demux(list(heard.streams.audio)) if sound else ():
+        for packet in heard.demux(list(streams)) if heard is not None and sound else ():
             if packet.size and packet.dts is not None:
                 packet.stream = sound[packet.stream.index]
                 yield packet

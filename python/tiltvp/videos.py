@@ -35,10 +35,10 @@ class VideoWriter:
         self.times_s: list[float | None] = []
         """When they were taken, None where nobody said."""
         self.note: str | None = None
-        """What of the sound was not copied, after the block."""
+        """What of times and sound was not kept, after the block."""
 
     def add(self, image: NDArray[np.uint8], time_s: float | None = None) -> None:
-        """The next frame, (H, W, 3) BGR uint8; `time_s` is by the clock of the video that the sound is of."""
+        """The next frame, (H, W, 3) BGR uint8; `time_s`, if known, by the clock of the video that the sound is of."""
         import cv2
 
         if self._writer is None:
@@ -65,7 +65,8 @@ def video_writer(
 ) -> Iterator[VideoWriter]:
     """A video (.mp4 or .avi) that appears when the block ends, unless an exception leaves it or it has no frames.
 
-    `sound_of` is a video whose sound is copied (`pip install 'tiltvp[video]'`); `VideoWriter.note` says what is not.
+    An .mp4 keeps the times of its frames where they are known, else there are `rate_hz` a second. `sound_of` is a video
+    whose sound is copied. Both want `pip install 'tiltvp[video]'`; `VideoWriter.note` says what is not kept.
     Raises `InvalidInputError` for other endings, `OutputError` where it cannot be written.
     """
     file = Path(path)
@@ -84,9 +85,9 @@ def video_writer(
             raise OutputError(
                 f"{file}: cannot be written (not all of {writer.count} frames), expected a place that can"
             )
-        elif sound_of is not None:
+        else:
             with scratch_folder(file) as folder:
-                writer.note = add_sound(part, writer.times_s, sound_of, folder)
+                writer.note = add_sound(part, writer.times_s, rate_hz, sound_of, folder)
 
 
 def _frames_in(path: Path) -> int:

@@ -18,7 +18,7 @@ from tiltvp.cli.rerun_views import send_lines
 from tiltvp.cli.showing import RerunOptions
 from tiltvp.cli.sources import MotionOptions, SourceOptions, check_apart, ending_at_interrupt
 from tiltvp.cli.tables import Out, Table, check_ending, check_plot, write_table
-from tiltvp.cli.terminal import ProgressBar, named, progress_bar, say
+from tiltvp.cli.terminal import ProgressBar, complain, named, progress_bar, say
 from tiltvp.errors import InvalidInputError, TiltvpError, UnknownLeanError
 from tiltvp.files import check_output
 
@@ -81,7 +81,7 @@ def track(
     video
         The frames with their lines in the colours of their tracks: .mp4 or .avi.
     frame_rate
-        Frames per second of that video: those of the source by default, 25 for images.
+        Frames per second of that video: by default the times that frames tell, 25 for images that tell none.
     """
     from tiltvp.lines import LineTracker
     from tiltvp.videos import video_writer
@@ -105,7 +105,9 @@ def track(
     drive = Drive(extractor, tilt, motions)
     showing = nullcontext() if video is None else video_writer(video, frame_rate or frames.rate_hz)
     with showing as film, watching.viewer() as viewer:
-        tracked = _follow(drive, tracker, frames, lens, film, viewer)
+        tracked = _follow(drive, tracker, frames, lens, film, viewer, timed=frame_rate is None)
+    if film is not None and film.note is not None:
+        complain(f"{video}: {film.note}")
     if not tracked:
         count = drive.bad + drive.leaning
         which = "none of which can be read" if not drive.leaning else f"{drive.told()}, and no other can be read"
@@ -124,9 +126,16 @@ def track(
 
 
 def _follow(
-    drive: Drive, tracker: LineTracker, frames: Frames, lens: Camera, film: VideoWriter | None, viewer: Viewer | None
+    drive: Drive,
+    tracker: LineTracker,
+    frames: Frames,
+    lens: Camera,
+    film: VideoWriter | None,
+    viewer: Viewer | None,
+    *,
+    timed: bool,
 ) -> list[Seen]:
-    """The lines of all frames that can be used; the film gets a picture of each, and so does the viewer."""
+    """The lines of all frames that can be used. Film, if `timed` at the frames' times, and viewer get a picture of each."""
     from tiltvp.overlays.lines import draw_lines
 
     found: list[Seen] = []
@@ -139,7 +148,7 @@ def _follow(
             tracks = seen.tracked.track.tolist()
             picture = draw_lines(seen.gray, lens, seen.tracked.lines, drive.robot_from_camera, tracks=tracks)
             if film is not None:
-                film.add(picture)
+                film.add(picture, frame.time_s if timed else None)
             if viewer is not None:
                 send_lines(viewer, seen.number, frame.time_s, picture, seen.tracked)
     return found
