@@ -14,6 +14,7 @@ from tiltvp import Robot
 from tiltvp.cli import main
 from tiltvp.cli.calibrate_inputs import DriveOptions, LogOptions
 from tiltvp.cli.calibrate_pictures import PictureLog, PictureOptions
+from tiltvp.cli.calibrate_results import Calibration, ResultOptions
 from tiltvp.cli.line_options import DrivingLineOptions
 from tiltvp.cli.options import CameraOptions
 from tiltvp.cli.sources import MotionOptions
@@ -103,6 +104,22 @@ def test_the_clock_is_looked_for_where_the_robot_turns(tmp_path: Path, monkeypat
     assert times[0] < 49.0
     assert times[-1] > 55.0
     np.testing.assert_allclose(log.frames.times_s, 0.2 * np.arange(300), atol=1e-9)
+    assert log.late_s == 0.1
+
+
+def test_by_how_much_frames_are_late_in_all_is_told(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    """Not only what is left once their times were brought to the odometry's clock."""
+    drive = simulate_drive("alternating", seed=4)
+    whole = tiltvp.calibrate(
+        drive.odometry, drive.bearings, wheel_base_m=0.4, start=(0.2, 0.0, 0.0), estimate_time_offset=True,
+        times_s=0.2 * np.arange(len(drive.odometry)),
+    )  # fmt: skip
+    found = Calibration("log", tiltvp.SelfCalibrator(wheel_base_m=0.4), [], whole, late_s=0.1)
+    ResultOptions(out=tmp_path / "out.json").tell([found], None, None, DriveOptions(wheel_base=0.4))
+    late_s = json.loads((tmp_path / "out.json").read_text())["logs"][0]["frames_late_s"]
+    assert late_s == pytest.approx(0.1 - whole.time_offset_s)
+    told = capsys.readouterr().out
+    assert f"frames are stamped {late_s:.4f} +- {whole.time_offset_sigma_s:.4f} s late in all" in told
 
 
 @pytest.fixture(scope="module")

@@ -134,4 +134,4 @@ def _calibrated(
             send_calibration(viewer, log, history, whole)
     for word in other_readings(whole.misreading):
         say(f"{one.name}: try {' '.join(f'--read-as {known}' for known in (*read.read_as, word))}")
-    return Calibration(one.name, calibrator, history, whole, doubt)
+    return Calibration(one.name, calibrator, history, whole, doubt, one.late_s)

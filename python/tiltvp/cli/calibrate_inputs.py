@@ -118,6 +118,7 @@ class Tables:
     read: DriveLog | None = None
     sigma_rad: float | None = None
     bad: int = 0
+    late_s: float = 0.0
 
     @property
     def name(self) -> str:

@@ -73,6 +73,8 @@ class PictureLog:
     """Median standard deviation of a bearing, once there is a log."""
     bad: int = 0
     """Images that could not be read."""
+    late_s: float = 0.0
+    """What was taken from the times of the frames, to bring them to the odometry's clock."""
 
     @property
     def name(self) -> str:
@@ -102,8 +104,9 @@ class PictureLog:
         looked = SourceOptions(topic=pictures.topic).of_robot(robot, [source])
         frames, lens = looked.open([source]), camera.load()
         motion = motion.of_robot(robot, frames)
+        late_s = 0.0
         if read.estimate_time_offset:
-            _bring_to_clock(frames, motion, lens, lines.mounting(lens), drive.wheel_base, read.read_as)
+            late_s = _bring_to_clock(frames, motion, lens, lines.mounting(lens), drive.wheel_base, read.read_as)
         moved = needed_turns(motion.motions(frames, drive.wheel_base, read.read_as))
         if moved is None:
             raise InvalidInputError(f"{source}: pictures without odometry, expected --odometry FILE")
@@ -112,7 +115,8 @@ class PictureLog:
         _tell_other_turns(source, moved, drive.wheel_base)
         named = {"images": looked.topic, "odometry": motion.odometry_topic}
         topics = {name: word for name, word in named.items() if word is not None}
-        return cls(frames, moved, lens, lines, drive, pictures, motion.wheels(drive.wheel_base), topics)
+        wheels = motion.wheels(drive.wheel_base)
+        return cls(frames, moved, lens, lines, drive, pictures, wheels, topics, late_s=late_s)
 
     def tilt(self) -> MountingTilt:
         """Roll and pitch of the mounting, by what stays of the images' leans when the robot turns."""
@@ -206,8 +210,11 @@ def _bring_to_clock(
     rotation: NDArray[np.float64],
     wheel_base_m: float | None,
     read_as: Sequence[str],
-) -> None:
-    """Takes from the times of the frames by how much they are late. Raises `InvalidInputError` where nothing tells."""
+) -> float:
+    """Takes from the times of the frames by how much they are late, and gives that.
+
+    Raises `InvalidInputError` where nothing tells.
+    """
     from tiltvp.streams import read_odometry
     from tiltvp.turning import frame_delay, telling_frames
 
@@ -223,3 +230,4 @@ def _bring_to_clock(
         raise InvalidInputError(f"--estimate-time-offset with {frames.source}: {found.reason}")
     say(f"{frames.source}: frames are stamped {found.delay_s:.3f} +- {found.sigma_s:.3f} s late, which is mended first")
     frames.times_s = frames.times_s - found.delay_s
+    return found.delay_s

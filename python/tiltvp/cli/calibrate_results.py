@@ -35,6 +35,13 @@ class Calibration:
     whole: LogCalibration
     doubt: str = ""
     """Why the whole log's answer cannot be relied upon, beside what it says itself."""
+    late_s: float = 0.0
+    """What was taken from the times of frames before; the whole log's time offset is what is left of it."""
+
+    @property
+    def frames_late_s(self) -> float | None:
+        """By how much frames are stamped late in all; None where that was not asked for."""
+        return self.late_s - self.whole.time_offset_s if self.whole.time_offset_sigma_s > 0.0 else None
 
     def __bool__(self) -> bool:
         return bool(self.whole) and not self.doubt
@@ -189,6 +196,7 @@ def _plain_log(one: Calibration) -> dict[str, object]:
         "name": one.name,
         "whole_log": one.whole.to_dict(),
         "doubt": one.doubt,
+        "frames_late_s": one.frames_late_s,
         "filter": one.calibrator.estimate.to_dict(),
         "options": {name: _plain(value) for name, value in one.calibrator.options.items()},
     }
@@ -257,6 +265,8 @@ def _show(one: Calibration, *, several: bool) -> None:
         )
     if whole.time_offset_sigma_s > 0.0:
         say(f"bearings are later by {whole.time_offset_s:.4f} +- {whole.time_offset_sigma_s:.4f} s")
+    if one.late_s and one.frames_late_s is not None:
+        say(f"frames are stamped {one.frames_late_s:.4f} +- {whole.time_offset_sigma_s:.4f} s late in all")
 
 
 def _cell(value: float, sigma: float) -> str:

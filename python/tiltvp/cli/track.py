@@ -135,7 +135,7 @@ def _follow(
     *,
     timed: bool,
 ) -> list[Seen]:
-    """The lines of all frames that can be used. Film, if `timed` at the frames' times, and viewer get a picture of each."""
+    """The lines of all frames that can be used. Film, if `timed` at their times, and viewer get a picture of each."""
     from tiltvp.overlays.lines import draw_lines
 
     found: list[Seen] = []
