@@ -208,6 +208,7 @@ def test_a_live_camera_ends_at_an_interrupt(
         (["a.png", "--topic", "/image"], "no recording"),
         (["none.bag"], "none.bag: no such file"),
         (["images", "--filter", "--odometry-topic", "/odom"], "no recording, expected --odometry"),
+        (["drive.mp4", "--filter", "--odometry", "odo.csv", "--odometry-topic", "/a"], "odo.csv: expected a recording"),
         (["images", "--wheel-base", "0.4"], "--wheel-base without --filter"),
         (["images", "--wheel-radius", "0.4"], "--wheel-radius without --filter"),
         (["images", "--filter", "--wheel-base", "0.4"], "--wheel-base without --odometry"),

@@ -11,10 +11,11 @@ import pytest
 
 from drawn_corners import CAMERA, GREYS, LEFT_FROM_RIGHT, drawn, pair, pose, turn
 from recordings import START_S, Bag
+from tiltvp import Robot
 from tiltvp.cli import main
 from tiltvp.corner import CornerPoseEstimator
 from tiltvp.errors import InvalidInputError
-from tiltvp.rotations import ROTATION_WORDS, rotation_from_quaternion
+from tiltvp.rotations import ROTATION_WORDS, quaternion, rotation_from_quaternion
 from tiltvp.streams import InertialSamples
 from tiltvp.synth import Laboratory, StereoSequence, zed_cameras
 
@@ -213,6 +214,26 @@ def turning(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFac
         bag.imu(time_s, rates, forces)
         bag.imu(time_s, on_board @ rates, on_board @ forces, "/board")
     return bag.write(tmp_path_factory.mktemp("turning")), attitudes
+
+
+@pytest.mark.slow
+def test_the_command_takes_axes_and_topics_that_are_known(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Of the sensor's axes those of /tf_static, of the topics those of a robot's file."""
+    bag, on_board = Bag("mcap"), np.array(ROTATION_WORDS["forward"])
+    rotation, vertex = pose(yaw=40.0, roll=70.0)
+    bag.image("/left", START_S, drawn(rotation, vertex, GREYS), "bgr8")
+    bag.image("/other", START_S, np.zeros((4, 4), np.uint8), "mono8")
+    for time_s in START_S + np.arange(-0.6, 0.6, 0.01):
+        bag.imu(time_s, np.zeros(3), on_board @ (-9.81 * rotation[:, 1]), "/board")
+        bag.imu(time_s, np.zeros(3), np.zeros(3), "/broken")
+    bag.static("imu", "camera", quaternion(on_board).tolist())
+    recording, robot = str(bag.write(tmp_path)), tmp_path / "robot.toml"
+    Robot(CAMERA, np.eye(3), topics={"images": "/left", "inertial": "/board"}).save(robot)
+    words = ["corner", recording, "--calibration", str(robot), "--method", "general", "--imu", recording]
+    assert main([*words, "--out", str(tmp_path / "poses.json")]) == 0
+    assert f"--camera-from-imu: not given, that of {recording} /tf_static is taken" in capsys.readouterr().err
+    (turn,) = pl.read_json(tmp_path / "poses.json").select("qx", "qy", "qz", "qw").rows()
+    assert abs((rotation.T @ rotation_from_quaternion(np.array(turn), "pose").T)[1, 1]) > 0.9999
 
 
 @pytest.mark.slow

@@ -10,9 +10,10 @@ import pytest
 
 from tiltvp import Camera, Robot, TiltEstimator, write_image
 from tiltvp.cli.options import CameraOptions, MethodOptions
+from tiltvp.cli.sources import MotionOptions
 from tiltvp.errors import CalibrationError, InvalidInputError
 from tiltvp.rotations import levelling, read_rotation
-from tiltvp.streams import Wheels
+from tiltvp.streams import Frames, Wheels
 
 CAMERA = Camera.equidistant(width=64, height=48, focal_px=20.0, cx=31.5, cy=23.5)
 
@@ -53,6 +54,18 @@ def test_where_the_camera_is_comes_back_too(tmp_path):
     np.testing.assert_array_equal(read.covariance, covariance)
     np.testing.assert_array_equal(read.covariance_rad2, np.diag([3e-6, 4e-6]))
     assert "covariance_rad2" not in path.read_text()
+
+
+def test_the_topic_of_the_joints_counts_where_the_wheels_radius_is_known(tmp_path):
+    (tmp_path / "a.mcap").touch()
+    frames = Frames()
+    frames.recording = tmp_path / "a.mcap"
+    topics = {"joints": "/joint_states", "odometry": "/odom"}
+    for known, expected in ((Wheels(wheel_radius_m=0.05), "/joint_states"), (Wheels(), "/odom")):
+        of = robot(wheels=known, topics=topics)
+        assert MotionOptions().of_robot(of, frames).odometry_topic == expected
+        assert MotionOptions(odometry=tmp_path / "odometry.csv").of_robot(of, frames).odometry_topic is None
+    assert MotionOptions().of_robot(robot(topics={"joints": "/joint_states"}), frames).odometry_topic == "/joint_states"
 
 
 def test_a_robot_of_which_little_is_known(tmp_path):

@@ -113,7 +113,8 @@ def corner(
         both tell times, and under equal names where files of both folders have such.
     calibration
         Of two cameras: a camchain of Kalibr or a TOML of tiltvp with left, right and left_from_right. Of one camera:
-        any format that `tiltvp camera formats` lists, or a robot's file, whose mask `general` takes.
+        any format that `tiltvp camera formats` lists, or a robot's file, whose topics of recordings are taken too, and
+        whose mask `general` takes.
     topic_right
         The topic of the right camera's images, where its recording has several.
     method
@@ -128,15 +129,20 @@ def corner(
     independent
         Look at every frame anew.
     """
+    from tiltvp.robot import Robot, is_robot
+
     known = options.given()
     has_scale = right is not None or not SCALES.isdisjoint(known)
     results.check(has_scale=has_scale)
     if topic_right is not None and right is None:
         raise InvalidInputError(f"--topic-right {topic_right} of one camera: expected two")
     watching.check()
-    sensor = inertial.knowledge()
+    words = [] if left is None else [left]
+    robot = Robot.load(calibration) if is_robot(calibration) else None
+    source = source.of_robot(robot, words)
+    sensor = inertial.of_robot(robot).knowledge(source.topic)
     camera, estimator = _searches(calibration, right is not None, method, known, image_size_from(image_size))
-    frames = source.open([] if left is None else [left])
+    frames = source.open(words)
     check_apart(frames, results.overlay)
     others = None if right is None else SourceOptions(topic=topic_right).open([right], topic_option="--topic-right")
     if others is not None:

@@ -2,20 +2,22 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 from cyclopts import Group, Parameter
 
+from tiltvp.cli.terminal import complain
 from tiltvp.errors import InvalidInputError
 from tiltvp.rotations import read_rotation
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from tiltvp.streams import InertialSamples
+    from tiltvp import Robot
+    from tiltvp.streams import InertialSamples, Recording
 
 
 @Parameter(name="*", group=Group("Inertial sensor"))
@@ -30,10 +32,18 @@ class InertialOptions:
     """Its topic in a recording, where that has several."""
     camera_from_imu: str | None = None
     """File with nine numbers, row by row: the rotation that takes vectors of the sensor's axes to the left camera's. By
-    default the axes are the same."""
+    default that of a recording's /tf_static; of others the axes are the same."""
 
-    def knowledge(self) -> Inertial | None:
-        """What tells each frame; None without a sensor."""
+    def of_robot(self, robot: Robot | None) -> Self:
+        """With the topic that a robot's file names, where the readings are a recording's and the topic is not given."""
+        from tiltvp.streams import is_recording
+
+        if robot is None or self.imu is None or not is_recording(self.imu):
+            return self
+        return replace(self, imu_topic=self.imu_topic or robot.topics.get("inertial"))
+
+    def knowledge(self, topic: str | None) -> Inertial | None:
+        """What tells each frame; None without a sensor. `topic` is that of the left images, where it is chosen."""
         from tiltvp.streams import InertialSamples, Recording, inertial_samples, is_recording
 
         if self.imu is None:
@@ -43,10 +53,31 @@ class InertialOptions:
             return None
         turn = np.eye(3) if self.camera_from_imu is None else read_rotation(self.camera_from_imu)
         if is_recording(self.imu):
-            return Inertial(inertial_samples(Recording(self.imu), self.imu_topic), turn)
+            recording = Recording(self.imu)
+            samples = inertial_samples(recording, self.imu_topic)
+            return Inertial(
+                samples, _recorded_turn(recording, samples, topic) if self.camera_from_imu is None else turn
+            )
         if self.imu_topic is not None:
             raise InvalidInputError(f"--imu-topic {self.imu_topic} of {self.imu}, expected a recording")
         return Inertial(InertialSamples.read(self.imu), turn)
+
+
+def _recorded_turn(recording: Recording, samples: InertialSamples, topic: str | None) -> NDArray[np.float64]:
+    """(3, 3): the rotation from the sensor's axes to the camera's by the static transforms of a recording; a line says
+    so, or why the axes are taken to be the same. Without such transforms they are."""
+    from tiltvp.streams import robot_from_camera
+
+    topics = [one.name for one in recording.topics]
+    if "/tf_static" not in topics:
+        return np.eye(3)
+    try:
+        found = robot_from_camera(recording, robot_frame=samples.frame, topic=topic if topic in topics else None)
+    except InvalidInputError as error:
+        complain(f"--camera-from-imu: not given, and the axes are taken to be the same: {error}")
+        return np.eye(3)
+    complain(f"--camera-from-imu: not given, that of {recording.path} /tf_static is taken")
+    return found.T
 
 
 @dataclass

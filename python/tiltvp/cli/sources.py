@@ -111,11 +111,18 @@ class MotionOptions:
         """With what a robot's file knows of wheels and topics, where these are not given."""
         if robot is None:
             return self
-        known = robot.wheels
+        from tiltvp.streams import is_recording
+
+        known, record, topic = robot.wheels, self.odometry or frames.recording, self.odometry_topic
+        radius = self.wheel_radius or known.wheel_radius_m
+        if topic is None and record is not None and is_recording(record):
+            # As without topics, angles of wheels are the choice where their radius is known.
+            kinds = ("joints", "odometry") if radius is not None else ("odometry", "joints")
+            topic = next((robot.topics[kind] for kind in kinds if kind in robot.topics), None)
         return replace(
             self,
-            odometry_topic=self.odometry_topic or (robot.topics.get("odometry") if frames.recording else None),
-            wheel_radius=self.wheel_radius or known.wheel_radius_m,
+            odometry_topic=topic,
+            wheel_radius=radius,
             ticks_per_turn=self.ticks_per_turn or known.ticks_per_turn,
             wheel_joints=self.wheel_joints or known.joints,
         )
@@ -129,9 +136,11 @@ class MotionOptions:
 
     def motions(self, frames: Frames, wheel_base_m: float | None, read_as: Sequence[str] = ()) -> FrameMotions | None:
         """What the robot did up to each frame, None without odometry; a line on stderr for what is noted."""
-        from tiltvp.streams import frame_motions
+        from tiltvp.streams import frame_motions, is_recording
 
-        wheels = self.wheels(wheel_base_m)
+        wheels, record = self.wheels(wheel_base_m), self.odometry or frames.recording
+        if self.odometry_topic is not None and record is not None and not is_recording(record):
+            raise InvalidInputError(f"--odometry-topic {self.odometry_topic} of {record}: expected a recording")
         if self.odometry is None:
             return self._of_recording(frames, wheels, read_as)
         found = frame_motions(frames, self.odometry, topic=self.odometry_topic, wheels=wheels, read_as=read_as)
