@@ -144,6 +144,19 @@ def test_turns_tell_which_way_is_up_where_looks_mislead(drive, monkeypatch, up):
     assert told.endswith("if the image is mirrored, or left and right of the odometry are swapped")
 
 
+def test_images_whose_heading_nobody_knows_tell_nothing(drive):
+    """As in a gap of the odometry: the last heading that is known is not that of the image."""
+    gap = range(5, 20)
+    motions = [None if k in gap else Motion(STEP * (len(gap) + 1 if k == gap[-1] + 1 else 1)) for k in range(COUNT)]
+    frames = open_frames(str(drive / "frames"))
+    found = find_setup(frames, CAMERA, motions, robot_from_camera=np.eye(3))
+    assert found.mounting.used <= COUNT - len(gap)
+    assert (
+        found.turns.pairs < find_setup(frames, CAMERA, [Motion(STEP)] * COUNT, robot_from_camera=np.eye(3)).turns.pairs
+    )
+    assert found.turns.as_told > 0.7
+
+
 def test_mount_passes_and_fails_by_its_exit_code(drive, tmp_path, capsys):
     out = tmp_path / "mounting.json"
     assert run("mount", drive / "frames", *options(drive), "--within-deg", 3, "--out", out) == 0

@@ -176,7 +176,12 @@ def _turn_axis(
     frames: Frames, camera: Camera, motions: Sequence[Motion | None], robot_from_camera: ArrayLike | None
 ) -> TurnAxis:
     headings = np.cumsum([0.0 if motion is None else motion.yaw_rad for motion in motions])
-    small = [(number, made_small(gray_from(image), camera)) for number, image in spread(frames, camera, TURNED)]
+    # Nobody knows the heading of a frame of whose time the odometry does not tell.
+    small = [
+        (number, made_small(gray_from(image), camera))
+        for number, image in spread(frames, camera, TURNED)
+        if motions[number] is not None
+    ]
     turned = headings[[number for number, _ in small]]
     return turn_axis((image for _, image in small), turned, small_camera(camera), robot_from_camera)
 
@@ -199,8 +204,8 @@ def drive_tilts(
     *,
     advance: Callable[[], None] = lambda: None,
 ) -> DriveTilts:
-    """The tilts of at most 200 images, spread over a drive of known length. What cannot be read, or leans more than 20
-    degrees, is None.
+    """The tilts of at most 200 images, spread over a drive of known length. What cannot be read, leans more than 20
+    degrees, or was taken where the odometry does not tell, is None.
 
     Without odometry (`motions` is None) the robot is taken not to have moved, so that nothing can tell floor and
     mounting apart.
@@ -210,8 +215,9 @@ def drive_tilts(
         raise InvalidInputError(f"{frames.source}: comes only once, expected images, a video or a recording")
     numbers = [int(number) for number in np.linspace(0, count - 1, measured_count(frames))]
     estimates: list[TiltEstimate | None] = []
-    for frame in frames.sample(numbers):
-        image = _usable(frame, estimator.camera)
+    for number, frame in zip(numbers, frames.sample(numbers), strict=False):
+        told = motions is None or motions[number] is not None
+        image = _usable(frame, estimator.camera) if told else None
         estimate = None if image is None else estimator(image)
         estimates.append(estimate if estimate else None)
         advance()

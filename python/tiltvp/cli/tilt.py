@@ -134,7 +134,7 @@ def _check_outputs(
     if out is not None and out != STDOUT and cluster is None:
         check_answers(out)
     if frame_rate is not None and cluster is None and (out is None or out.suffix.lower() not in TILT_ENDINGS):
-        raise InvalidInputError(f"--frame-rate without --out in {' or '.join(TILT_ENDINGS)}, expected both")
+        raise InvalidInputError(f"--frame-rate {frame_rate:g}, expected --out that ends in {' or '.join(TILT_ENDINGS)}")
     if overlay is not None and level is not None and os.path.realpath(overlay) == os.path.realpath(level):
         raise InvalidInputError(f"--overlay and --level are both {overlay}, expected two folders")
     for folder in (overlay, level):
