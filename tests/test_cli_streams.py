@@ -120,6 +120,13 @@ def test_lines_and_segments_of_a_bag(verb: str, run: Run, world: Path, tmp_path:
     assert (code, "no topic '/none'" in complaints) == (2, True)
 
 
+def test_images_that_are_called_rectified_are_told(run: Run, world: Path, room: RoomImage, tmp_path: Path) -> None:
+    made = Bag("mcap")
+    made.image("/camera/image_rect_color", START_S, room.gray, "mono8")
+    said = run("tilt", made.write(tmp_path), "--camera", world / "camera.toml")
+    assert (said.code, "/camera/image_rect_color is called rectified: its lens is P" in said.err) == (0, True)
+
+
 def test_tracks_of_a_bag_have_times(run: Run, world: Path, tmp_path: Path) -> None:
     words = (
         "track",
@@ -213,8 +220,8 @@ def test_a_live_camera_ends_at_an_interrupt(
         (["images", "--wheel-radius", "0.4"], "--wheel-radius without --filter"),
         (["images", "--filter", "--wheel-base", "0.4"], "--wheel-base without --odometry"),
         (["images", "--filter", "--odometry-gap", "2"], "--odometry-gap without --odometry"),
-        (["images", "--frame-rate", "5"], "--frame-rate without --out in .mcap or .tum"),
-        (["images", "--frame-rate", "5", "--out", "a.csv"], "--frame-rate without --out in .mcap or .tum"),
+        (["images", "--frame-rate", "5"], "--frame-rate 5, expected --out that ends in .mcap or .tum"),
+        (["images", "--frame-rate", "5", "--out", "a.csv"], "--frame-rate 5, expected --out that ends in .mcap or .tum"),
     ],
 )
 def test_wrong_use(run: Run, world: Path, words: list[str], hint: str, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -40,6 +40,9 @@ class BagFrames(Frames):
         self.times_s = np.array(times)
         self.problems = recording.unread(self._topic, len(times))
         self.rate_hz = median_rate_hz(self.times_s)
+        if "/image_rect" in self.topic:
+            words = "is called rectified: its lens is P of CameraInfo, not K and D, which recordings are read by"
+            self.notes = (f"{recording.path}: {self.topic} {words}",)
 
     @property
     def topic(self) -> str:
