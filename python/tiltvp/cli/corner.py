@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import itertools
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -13,7 +14,7 @@ from cyclopts import Group, Parameter, validators
 from tiltvp._core import CORNER_METHODS
 from tiltvp.cli.corner_inertial import Inertial, InertialOptions
 from tiltvp.cli.corner_methods import AUTO, SCALES, Searches, methods_for
-from tiltvp.cli.corner_pairs import check_pairs
+from tiltvp.cli.corner_pairs import pairs_of, partners_of
 from tiltvp.cli.corner_results import CornerResults, tell
 from tiltvp.cli.declared_options import LibraryOptions, from_library, mask_from
 from tiltvp.cli.options import image_size_from
@@ -29,7 +30,7 @@ if TYPE_CHECKING:
 
     from tiltvp import Camera
     from tiltvp.corner import CornerEstimate
-    from tiltvp.streams import Frames
+    from tiltvp.streams import Frame, Frames
     from tiltvp.streams.outputs.viewer import Viewer
 
 _BELONGS_TO = {
@@ -109,8 +110,8 @@ def corner(
         Image, folder of images, glob pattern, video or recording of ROS of the left or only camera; or - for names of
         files on stdin.
     right
-        The same of the right camera, with as many frames, each taken when the left one was: within half a frame where
-        both tell times, and under equal names where files of both folders have such.
+        The same of the right camera, with as many frames, or where both tell times those of the same times; under equal
+        names where files of both folders have such.
     calibration
         Of two cameras: a camchain of Kalibr or a TOML of tiltvp with left, right and left_from_right. Of one camera:
         any format that `tiltvp camera formats` lists, or a robot's file, whose topics of recordings are taken too, and
@@ -147,10 +148,10 @@ def corner(
     others = None if right is None else SourceOptions(topic=topic_right).open([right], topic_option="--topic-right")
     if others is not None:
         check_apart(others, results.overlay)
-        check_pairs(frames, others, timed=frame_rate is None)
+    partners = None if others is None else partners_of(frames, others, timed=frame_rate is None)
     with watching.viewer() as viewer:
         look = Look(camera, estimator, independent, results.overlay, viewer, sensor)
-        estimates = list(look.each(frames, others, frame_rate))
+        estimates = list(look.each(frames, others, partners, frame_rate))
     if not estimates:
         raise InvalidInputError(f"{frames.source}: {look.bad} frames, none of which can be used")
     tell(str(frames.source), estimator, look.bad, has_scale=has_scale, advice_for=(right is not None, known))
@@ -174,17 +175,20 @@ class Look:
     """How many frames could not be used so far."""
 
     def each(
-        self, frames: Frames, others: Frames | None, rate_hz: float | None
+        self, frames: Frames, others: Frames | None, partners: Sequence[int | None] | None, rate_hz: float | None
     ) -> Iterator[tuple[float, str, CornerEstimate]]:
-        """Time, name and estimate of the frames that can be used; the others are complained about.
+        """Time, name and estimate of the frames that can be used; the others are complained about. `partners` are those
+        of `partners_of`.
 
         Times are those of the frames, if `rate_hz` does not say how many there are in a second. Raises
         `InvalidInputError` for frames without a time where readings of a sensor have times.
         """
         with ending_at_interrupt(frames) as coming, progress_bar(frames.count or 0, "frames") as bar:
-            pairs = ((frame,) for frame in coming) if others is None else zip(coming, others, strict=True)
-            for number, (pair, name) in enumerate(zip(pairs, picture_names(frames), strict=False)):
-                frame = pair[0]
+            lefts = zip(itertools.count(), coming, picture_names(frames), strict=False)
+            pairs: Iterable[tuple[tuple[int, Frame, str], Frame | None]]
+            pairs = zip(lefts, itertools.repeat(None)) if others is None else pairs_of(lefts, others, partners or ())
+            for (number, frame, name), partner in pairs:
+                pair = [frame] if partner is None else [frame, partner]
                 time_s = frame.time_s if rate_hz is None else number / rate_hz
                 if time_s is None:
                     if self.sensor is not None:
