@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 import tiltvp
+from recordings import START_S, Bag
 from tiltvp import Robot
 from tiltvp.cli import main
 from tiltvp.cli.calibrate_inputs import DriveOptions, LogOptions
@@ -61,6 +62,18 @@ def test_the_record_is_mended_before_anything_is_made_of_it(folder: Path) -> Non
     mended = opened(folder, odometry="negated.csv", read=LogOptions(read_as=("left-wheel-negated",))).moved.motions
     for ours, right in zip(mended, opened(folder).moved.motions, strict=True):
         assert (ours.yaw_rad, ours.distance_m) == pytest.approx((right.yaw_rad, right.distance_m))
+
+
+def test_frames_that_overtake_each_other_are_refused_at_once(tmp_path: Path) -> None:
+    CAMERA.save(tmp_path / "camera.toml")
+    bag = Bag("mcap")
+    for k, time_s in enumerate((0.0, 0.2, 0.1, 0.3)):
+        bag.image("/image", START_S + time_s, np.zeros((24, 24), np.uint8), "mono8", late_s=0.1 * k - time_s)
+        bag.odometry(START_S + 0.1 * k, 0.1 * k, 0.0, 0.0)
+    recording = bag.write(tmp_path)
+    (tmp_path / "images").symlink_to(recording)
+    with pytest.raises(InvalidInputError, match=r"#2: taken before .*#1, expected frames in the order of their times"):
+        opened(tmp_path, odometry=recording.name)
 
 
 @pytest.mark.parametrize("times", [True, False])

@@ -264,6 +264,37 @@ def test_angles_that_begin_anew_with_each_turn_are_told(low: float, tmp_path: Pa
     assert there.distance_m.tolist() == pytest.approx([0.0, 0.6 * math.tau, 0.9 * math.tau])
 
 
+def test_a_clock_that_was_set_back_is_refused(tmp_path: Path) -> None:
+    """Sorted by their stamps two runs of a simulation would be one; messages that overtake each other are sorted."""
+    for back_s in (0.15, 5.0):
+        made = Bag("mcap")
+        for k in range(100):
+            stamp = START_S + 0.1 * k - (back_s if k >= 60 else 0.0)
+            made.odometry(stamp, 0.1 * k, 0.0, 0.0)
+            made.rows[-1] = (*made.rows[-1][:2], START_S + 0.1 * k, made.rows[-1][3])
+        folder = tmp_path / str(back_s)
+        folder.mkdir()
+        path = made.write(folder)
+        if back_s < 1.0:
+            assert read_odometry(path).times_s[0] == pytest.approx(START_S, abs=1e-6)
+            continue
+        with pytest.raises(
+            InvalidInputError, match=r"/odom: its clock goes back from 1700000005\.900 to 1700000001\.000 s"
+        ):
+            read_odometry(path)
+
+
+def test_images_of_a_folder_come_in_the_order_of_their_times(tmp_path: Path) -> None:
+    """Not in that of names without leading zeros."""
+    for k in range(1, 12):
+        tiltvp.write_image(tmp_path / "images" / f"{k}.png", np.full((4, 4), k, np.uint8))
+    (tmp_path / "frames.csv").write_text("file,time_s\n" + "".join(f"{k}.png,{0.5 * k}\n" for k in range(1, 12)))
+    frames = open_frames(tmp_path)
+    assert [frame.read()[0, 0] for frame in frames] == list(range(1, 12))
+    assert [Path(name).stem for name in frames.names or ()] == [str(k) for k in range(1, 12)]
+    assert "in the order of their times" in frames.notes[0]
+
+
 def test_an_orientation_that_nobody_filled_in_is_no_heading(tmp_path: Path) -> None:
     made = Bag("mcap")
     for k in range(3):

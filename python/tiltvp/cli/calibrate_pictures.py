@@ -112,6 +112,9 @@ class PictureLog:
             raise InvalidInputError(f"{source}: pictures without odometry, expected --odometry FILE")
         if not moved.distances_known:
             raise InvalidInputError(f"{source}: odometry without distances, expected columns that tell them too")
+        if moved.times_s is not None and (falls := np.flatnonzero(np.diff(moved.times_s) < 0.0)).size and frames.names:
+            before, after = frames.names[falls[0]], frames.names[falls[0] + 1]
+            raise InvalidInputError(f"{after}: taken before {before}, expected frames in the order of their times")
         _tell_other_turns(source, moved, drive.wheel_base)
         named = {"images": looked.topic, "odometry": motion.odometry_topic}
         topics = {name: word for name, word in named.items() if word is not None}

@@ -11,7 +11,7 @@ import numpy as np
 from tiltvp.errors import InvalidInputError
 from tiltvp.streams.bags import Recording, Topic
 from tiltvp.streams.inertial import InertialSamples
-from tiltvp.streams.odometry import Odometry
+from tiltvp.streams.odometry import GAP_MAX_S, Odometry
 from tiltvp.streams.wheels import Wheels, cumulative_m
 
 if TYPE_CHECKING:
@@ -149,9 +149,19 @@ def inertial_samples(recording: Recording, topic: str | None = None) -> Inertial
 
 
 def _rising(table: NDArray[np.float64], source: str) -> NDArray[np.float64]:
-    """The rows in the order of their times, the first of each time."""
+    """The rows in the order of their times, the first of each time.
+
+    Messages may overtake each other by a little. Raises `InvalidInputError` for a clock that was set back, as of a
+    simulation.
+    """
     if table.ndim != 2 or not np.isfinite(table).all():
         what = "no messages" if table.ndim != 2 else "numbers that are not finite"
         raise InvalidInputError(f"{source}: {what}, expected finite numbers")
+    falls = np.flatnonzero(np.diff(table[:, 0]) < -GAP_MAX_S)
+    if len(falls):
+        before, after = table[falls[0] : falls[0] + 2, 0]
+        raise InvalidInputError(
+            f"{source}: its clock goes back from {before:.3f} to {after:.3f} s, expected one that does not"
+        )
     order = np.unique(table[:, 0], return_index=True)[1]
     return table[order]

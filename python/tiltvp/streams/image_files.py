@@ -32,23 +32,28 @@ _SECONDS: Final = r"1\d{9}\.\d+"
 
 
 class ImageFiles(Frames):
-    """Image files in the order in which they are given; those of a folder or pattern in that of their names."""
+    """Image files in the order in which they are given; those of a folder or pattern in that of their names, or of the
+    times that the folder's table tells."""
 
     def __init__(self, words: Sequence[str]) -> None:
         """Finds the files, each once. Raises `InvalidInputError` for a table of times that is wrong."""
         self.source = " ".join(words)
         self.files, problems = find_images(words)
         self.problems = tuple(problems)
-        self.names = [str(file) for file in self.files]
         drive = _drive_folder(words)
         if drive is not None and (drive / _ODOMETRY).is_file():
             self.recording = drive / _ODOMETRY
         if drive is not None and (drive / _TIMES).is_file():
             self.times_s = _table_times(drive / _TIMES, self.files)
+            if self.times_s is not None and (np.diff(self.times_s) < 0.0).any():
+                order = np.argsort(self.times_s, kind="stable")
+                self.files, self.times_s = [self.files[place] for place in order], self.times_s[order]
+                self.notes = (f"{self.source}: images are taken in the order of their times, not of their names",)
         else:
             self.times_s = _times_of_names(self.files)
             if self.times_s is not None:
                 self.notes = (f"{self.source}: times are those that the names of the images tell",)
+        self.names = [str(file) for file in self.files]
         self.rate_hz = median_rate_hz(self.times_s)
 
     def __iter__(self) -> Iterator[Frame]:
