@@ -18,8 +18,10 @@ import pytest
 import tiltvp
 from commands import Run
 from recordings import START_S, Bag, write_video
+from tiltvp.cli.filtering import FilterOptions
 from tiltvp.robot import Robot
-from tiltvp.synth import RoomImage
+from tiltvp.streams import FrameMotions, Motion, open_frames
+from tiltvp.synth import RoomImage, render_room
 
 pytestmark = pytest.mark.slow
 
@@ -118,6 +120,42 @@ def test_lines_and_segments_of_a_bag(verb: str, run: Run, world: Path, tmp_path:
     assert len(list((tmp_path / "seen").iterdir())) == FRAMES
     code, _, complaints = run(*words, "--topic", "/none", "--overwrite")
     assert (code, "no topic '/none'" in complaints) == (2, True)
+
+
+@pytest.mark.parametrize(("times", "walk"), [(True, 0.05), (False, 0.1)])
+def test_a_floor_turns_with_a_robot_whose_turns_nobody_knows(times: bool, walk: float, world: Path) -> None:
+    """So the tilt walks by what a slope turns from image to image: it was stated with 0.3 degrees and 2.5 off."""
+    frames = open_frames(world / "images")
+    if times:
+        frames.times_s, frames.rate_hz = np.zeros(1), 2.0
+    own, asked = tiltvp.TiltFilter().options["walk_rad_per_sqrt_step"], FilterOptions(filter=True)
+    motions = [Motion()]
+    for moved, expected in (
+        (None, walk),
+        (FrameMotions(motions, turns_known=False, times_s=None), walk),
+        (FrameMotions(motions, turns_known=True, times_s=None), own),
+    ):
+        found = asked.following(frames, moved).make().options["walk_rad_per_sqrt_step"]
+        assert found == pytest.approx(expected)
+    given = FilterOptions(filter=True, walk_deg_per_sqrt_step=0.3)  # type: ignore[call-arg]
+    assert given.following(frames, None) == given
+
+
+def test_a_slope_is_followed_where_turns_are_not_known(run: Run, world: Path, tmp_path: Path) -> None:
+    """The robot leans to another side in each image, half a second later: none is outside the gate."""
+    folder = tmp_path / "drive"
+    for k in range(6):
+        gray = render_room(
+            tiltvp.Camera.load(world / "camera.toml"), seed=1, alpha_rad=0.06, beta_rad=-0.9 * k, samples=1
+        )
+        tiltvp.write_image(folder / "images" / f"{k}.png", gray.gray)
+    (folder / "frames.csv").write_text("file,time_s\n" + "".join(f"{k}.png,{0.5 * k}\n" for k in range(6)))
+    words = ["tilt", folder, "--camera", world / "camera.toml", "--method", "segments", "--filter", "--out", "-"]
+    rows = [json.loads(line) for line in run(*words).out.splitlines()]
+    for k, row in enumerate(rows):
+        truth = tiltvp.normal_from_alpha_beta(0.06, -0.9 * k)
+        found = [row[f"filtered_normal_{axis}"] for axis in "xyz"]
+        assert tiltvp.tilt_error_rad(found, truth) < 3.0 * row["filtered_sigma_rad"], k
 
 
 def test_images_that_are_called_rectified_are_told(run: Run, world: Path, room: RoomImage, tmp_path: Path) -> None:

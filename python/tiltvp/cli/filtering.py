@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, Final, Self
 
 from cyclopts import Group, Parameter
 
@@ -16,9 +17,13 @@ from tiltvp.errors import InvalidInputError
 
 if TYPE_CHECKING:
     from tiltvp import TiltFilter
-    from tiltvp.streams import Motion
+    from tiltvp.streams import FrameMotions, Frames, Motion
 
 _FILTER = Group("Abstaining and filtering")
+_WALK: Final = "walk_rad_per_sqrt_step"
+_TURNING_RAD_S: Final = 0.1
+"""By how much the tilt of a floor changes in a second where nobody knows the turns: of three degrees, at two radians a
+second. Frames that tell no time may be a second apart."""
 
 
 @Parameter(name="*", group=_FILTER)
@@ -46,6 +51,17 @@ class FilterOptions(LibraryOptions):
         check_plot("--filter-plot", self.filter_plot)
         if self.filter or self.confidence_min is not None:
             self.make()
+
+    def following(self, frames: Frames, moved: FrameMotions | None) -> Self:
+        """The same where turns are not known: the tilt of a floor that slopes then turns with the robot, as a walk."""
+        from tiltvp.streams import LiveCamera
+
+        if not self.filter or (moved is not None and moved.turns_known) or _WALK in self.given():
+            return self
+        timed = frames.times_s is not None or isinstance(frames, LiveCamera)
+        walk_rad = _TURNING_RAD_S / (frames.rate_hz if timed else 1.0)
+        changed: dict[str, Any] = {_WALK.replace("rad", "deg"): math.degrees(walk_rad)}
+        return replace(self, **changed)
 
     def make(self) -> TiltFilter:
         """The filter with the options that were given."""

@@ -104,6 +104,7 @@ def tilt(
     frames = source.open(images or [])
     check_apart(frames, overlay, level)
     moved = motion.motions_of(robot, frames, wheel_base) if filtering.filter else None
+    filtering = filtering.following(frames, moved)
     motions: Iterable[Motion | None] = repeat(Motion()) if moved is None else moved.motions
     estimator = _checked(estimator, frames)
     work, judge = Work(estimator, overlay, level, filtering, showing.asked), filtering.judge()
