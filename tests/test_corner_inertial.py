@@ -13,6 +13,7 @@ from drawn_corners import CAMERA, GREYS, LEFT_FROM_RIGHT, drawn, pair, pose, tur
 from recordings import START_S, Bag
 from tiltvp import Robot
 from tiltvp.cli import main
+from tiltvp.cli.corner_inertial import Inertial
 from tiltvp.corner import CornerPoseEstimator
 from tiltvp.errors import InvalidInputError
 from tiltvp.rotations import ROTATION_WORDS, quaternion, rotation_from_quaternion
@@ -104,6 +105,13 @@ def test_nothing_is_told_across_a_gap() -> None:
     forces = 9.81 * np.stack([np.zeros(len(times)), -np.cos(times), np.sin(times)], axis=1)
     down, _ = InertialSamples(times, np.tile([1.0, 0.0, 0.0], (len(times), 1)), forces).known(None, 1.02)["gravity"]
     assert down == pytest.approx([0.0, np.cos(1.02), -np.sin(1.02)], abs=1e-3)
+
+
+def test_accelerations_in_other_units_are_told() -> None:
+    times = np.arange(0.0, 1.0, 0.01)
+    sensor = Inertial(InertialSamples(times, np.zeros((100, 3)), np.tile([0.0, -1.0, 0.0], (100, 1))), np.eye(3))
+    assert sensor.known(0.5)["gravity"] is None
+    assert "down of 0 of 1 frames; its accelerations have 1 m/s^2 in the median, expected 9.81" in sensor.summary()
 
 
 def test_tables_of_readings(tmp_path: Path) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Any, Final, Self
 
 import numpy as np
 from cyclopts import Group, Parameter
@@ -18,6 +18,11 @@ if TYPE_CHECKING:
 
     from tiltvp import Robot
     from tiltvp.streams import InertialSamples, Recording
+
+_AT_REST_M_S2: Final = 9.81
+_OTHER_UNIT: Final = 0.1
+"""By which share accelerations are off in the median where their unit is another, or the sensor is not calibrated: a
+hand that holds a camera adds less."""
 
 
 @Parameter(name="*", group=Group("Inertial sensor"))
@@ -107,6 +112,10 @@ class Inertial:
         told, times_s = self.told, self.samples.times_s
         text = f"{self.samples.source}: turns of {told['gyro']}, down of {told['gravity']} of {told['frames']} frames"
         text = "; ".join([text, *filter(None, (self.samples.gaps, *self.samples.notes))])
+        forces = self.samples.accelerations_m_s2
+        length = _AT_REST_M_S2 if forces is None else float(np.median(np.linalg.norm(forces, axis=1)))
+        if abs(length / _AT_REST_M_S2 - 1.0) > _OTHER_UNIT:
+            text += f"; its accelerations have {length:.3g} m/s^2 in the median, expected {_AT_REST_M_S2:g} at rest"
         if told["gyro"] or told["gravity"] or self.first_s is None:
             return text
         spans = (times_s[0], times_s[-1], self.first_s, self.before_s)
