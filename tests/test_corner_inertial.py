@@ -15,7 +15,7 @@ from tiltvp import Robot
 from tiltvp.cli import main
 from tiltvp.cli.corner_inertial import Inertial
 from tiltvp.corner import CornerPoseEstimator
-from tiltvp.errors import InvalidInputError
+from tiltvp.errors import CalibrationError, InvalidInputError
 from tiltvp.rotations import ROTATION_WORDS, quaternion, rotation_from_quaternion
 from tiltvp.streams import InertialSamples
 from tiltvp.synth import Laboratory, StereoSequence, zed_cameras
@@ -105,6 +105,19 @@ def test_nothing_is_told_across_a_gap() -> None:
     forces = 9.81 * np.stack([np.zeros(len(times)), -np.cos(times), np.sin(times)], axis=1)
     down, _ = InertialSamples(times, np.tile([1.0, 0.0, 0.0], (len(times), 1)), forces).known(None, 1.02)["gravity"]
     assert down == pytest.approx([0.0, np.cos(1.02), -np.sin(1.02)], abs=1e-3)
+
+
+def test_samples_that_are_none_are_refused() -> None:
+    times, zeros = np.arange(5.0), np.zeros((5, 3))
+    for bad, told in (
+        ((times[::-1], zeros, None), "expected two or more of rising times"),
+        ((times, zeros[:4], None), r"rates_rad_s \(4, 3\)"),
+        ((times, zeros, np.full((5, 3), np.nan)), "accelerations_m_s2"),
+    ):
+        with pytest.raises(InvalidInputError, match=told):
+            InertialSamples(*bad)
+    with pytest.raises(CalibrationError, match="camera_from_sensor: no rotation"):
+        InertialSamples(times, zeros, None).known(0.0, 1.0, np.ones((3, 3)))
 
 
 def test_accelerations_in_other_units_are_told() -> None:

@@ -215,6 +215,18 @@ def test_gaps_and_jumps_between_the_frames_are_told(tmp_path: Path) -> None:
     assert "1 steps that no robot makes, the first after 2.000 s by " in told
 
 
+@pytest.mark.parametrize("short", [1, 2])
+def test_columns_of_other_lengths_are_refused(short: int) -> None:
+    """Of two numbers there is one step, which would stand for all."""
+    times, few = 0.1 * np.arange(5), np.arange(2.0)
+    columns: list[Any] = [times] * 3
+    columns[short] = few
+    with pytest.raises(InvalidInputError, match=r"\(2,\), expected \(5,\)"):
+        Odometry.from_velocities(*columns)
+    with pytest.raises(InvalidInputError, match=r"\(2,\), expected \(5,\)"):
+        Odometry.from_poses(*columns, times)
+
+
 @given(st.integers(0, 2**32 - 1), st.floats(0.0, 1.0))
 def test_motions_add_up(seed: int, share: float) -> None:
     rng = np.random.default_rng(seed)

@@ -18,7 +18,7 @@ import tiltvp
 from tiltvp import Camera, Extrinsics, Robot
 from tiltvp._core import leaning_from_upright
 from tiltvp.cli import main
-from tiltvp.errors import InvalidInputError, MissingExtraError, OutputError
+from tiltvp.errors import InvalidInputError, MissingExtraError, OutputError, TiltvpError
 from tiltvp.lab.datasets.panoramas import paper_camera
 from tiltvp.rotations import read_rotation
 from tiltvp.streams.outputs.tilts import TILT_TOPIC, YAW_VARIANCE_RAD2, attitude, write_tilts
@@ -214,6 +214,15 @@ def test_roll_pitch_yaw_are_those_of_urdf(angles: tuple[float, float, float]) ->
     np.testing.assert_allclose(turned(*found), rotation, atol=1e-9)
 
 
+def test_what_is_no_rotation_is_no_transform() -> None:
+    for place, turn, told in (
+        (np.zeros(2), np.eye(3), "three finite numbers"),
+        (np.zeros(3), np.ones((3, 3)), "no rotation"),
+    ):
+        with pytest.raises(TiltvpError, match=told):
+            StaticTransform("base_link", "camera", place, turn)
+
+
 def test_what_is_not_known_is_said() -> None:
     drive = simulate_drive("paper", seed=4)
     whole = tiltvp.calibrate(drive.odometry, drive.bearings, wheel_base_m=0.4)
@@ -240,7 +249,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("more", [[], ["--filter", "--sigma-max-deg", "5"]], ids=["each", "filter"])
+@pytest.mark.parametrize("more", [[], ["--filter", "--sigma-max-deg", "10"]], ids=["each", "filter"])
 def test_the_command_writes_the_attitudes_of_its_table(
     folder: Path, tmp_path: Path, more: list[str], capsys: pytest.CaptureFixture[str]
 ) -> None:

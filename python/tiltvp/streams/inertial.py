@@ -10,6 +10,7 @@ import numpy as np
 
 from tiltvp.csv_files import CsvFile
 from tiltvp.errors import InvalidInputError
+from tiltvp.rotations import rotation_from
 from tiltvp.streams.odometry import gaps_told
 
 if TYPE_CHECKING:
@@ -59,11 +60,6 @@ class InertialSamples:
     notes: tuple[str, ...] = ()
     """Sentences about it that whoever uses it should know."""
 
-    @property
-    def gaps(self) -> str | None:
-        """A sentence about times without samples, over which nothing is told; None where there are none."""
-        return gaps_told(self.times_s, _GAP_S)
-
     def __post_init__(self) -> None:
         """Raises `InvalidInputError` for arrays that do not fit, values that are not finite, and times that fall."""
         n = len(self.times_s)
@@ -76,8 +72,13 @@ class InertialSamples:
             values = getattr(self, name)
             if values is not None and (np.shape(values) != shape or not np.isfinite(values).all()):
                 raise InvalidInputError(f"{self.source}: {name} {np.shape(values)}, expected {shape} of finite numbers")
-        if (np.diff(self.times_s) <= 0.0).any():
-            raise InvalidInputError(f"{self.source}: times that fall or stay, expected rising ones")
+        if n < 2 or (np.diff(self.times_s) <= 0.0).any():
+            raise InvalidInputError(f"{self.source}: {n} samples, expected two or more of rising times")
+
+    @property
+    def gaps(self) -> str | None:
+        """A sentence about times without samples, over which nothing is told; None where there are none."""
+        return gaps_told(self.times_s, _GAP_S)
 
     @classmethod
     def read(cls, path: str | os.PathLike[str]) -> Self:
@@ -120,7 +121,9 @@ class InertialSamples:
         length is from gravity's. None where that is above 5 degrees, as of a sensor that is moved, and
         where no sample is near the frame: those beyond a gap of 0.1 s tell nothing of it.
         """
-        turn = np.eye(3) if camera_from_sensor is None else np.asarray(camera_from_sensor, dtype=np.float64)
+        turn = np.eye(3)
+        if camera_from_sensor is not None:
+            turn = rotation_from(np.asarray(camera_from_sensor, dtype=np.float64).tolist(), "camera_from_sensor")
         gyro = None if before_s is None else self._turned(before_s, now_s, turn)
         return {"gravity": self._down(now_s, turn), "gyro": gyro}
 

@@ -123,7 +123,7 @@ class Odometry:
 
         Raises `InvalidInputError` where samples are too far apart: what was driven meanwhile is not known.
         """
-        times = np.asarray(times_s, dtype=np.float64)
+        times, speeds, turns = _alike(source, times_s=times_s, speed_mps=speed_mps, yaw_rate_radps=yaw_rate_radps)
         steps = np.diff(times)
         if (steps > gap_max_s).any():
             k = int(np.argmax(steps > gap_max_s))
@@ -132,11 +132,10 @@ class Odometry:
                 f"{gap_max_s:g} s"
             )
 
-        def sums(values: ArrayLike) -> NDArray[np.float64]:
-            rates = np.asarray(values, dtype=np.float64)
+        def sums(rates: NDArray[np.float64]) -> NDArray[np.float64]:
             return np.concatenate([[0.0], np.cumsum(0.5 * (rates[1:] + rates[:-1]) * steps)])
 
-        return cls(times, sums(speed_mps), sums(yaw_rate_radps), None, source, notes, gap_max_s)
+        return cls(times, sums(speeds), sums(turns), None, source, notes, gap_max_s)
 
     @classmethod
     def from_poses(
@@ -147,8 +146,8 @@ class Odometry:
 
         A note says so where poses move sideways, which no axle does.
         """
-        x, y = (np.asarray(values, dtype=np.float64) for values in (x_m, y_m))
-        yaw = np.unwrap(np.asarray(yaw_rad, dtype=np.float64))
+        times, x, y, yaw = _alike(source, times_s=times_s, x_m=x_m, y_m=y_m, yaw_rad=yaw_rad)
+        yaw = np.unwrap(yaw)
         turns = np.diff(yaw)
         middle = yaw[:-1] + 0.5 * turns
         chord = np.diff(x) * np.cos(middle) + np.diff(y) * np.sin(middle)
@@ -159,7 +158,7 @@ class Odometry:
         if apart > max(_ASIDE_M, _ASIDE_SHARE * way):
             told = f"{source}: poses move sideways by {apart:.2f} m beside {way:.2f} m ahead, which is left out"
             notes = (*notes, f"{told}: are they of the middle of the axle, and of a robot of two wheels?")
-        return cls(np.asarray(times_s, dtype=np.float64), driven, yaw - yaw[:1], None, source, notes, gap_max_s)
+        return cls(times, driven, yaw - yaw[:1], None, source, notes, gap_max_s)
 
     def at(self, times_s: ArrayLike) -> Travelled:
         """How far it had come at these times (M,); NaN outside the record and in its gaps, where nothing is made up."""
@@ -253,6 +252,15 @@ class Odometry:
             f"{self.source}: {len(places)} steps that no robot makes, the first after {self.times_s[first]:.3f} s by "
             f"{speeds[first]:.3g} m/s and {rates[first]:.3g} rad/s: was it set anew, or is it in other units?"
         )
+
+
+def _alike(source: str, **columns: ArrayLike) -> tuple[NDArray[np.float64], ...]:
+    """Columns (N,) of one length. Raises `InvalidInputError` for others: shorter ones would be spread over all."""
+    arrays = tuple(np.asarray(values, dtype=np.float64) for values in columns.values())
+    for name, array in zip(columns, arrays, strict=True):
+        if array.ndim != 1 or len(array) != arrays[0].size:
+            raise InvalidInputError(f"{source}: {name} {array.shape}, expected ({arrays[0].size},)")
+    return arrays
 
 
 def gaps_told(times_s: NDArray[np.float64], most_s: float) -> str | None:

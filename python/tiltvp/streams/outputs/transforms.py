@@ -12,7 +12,7 @@ import numpy as np
 
 from tiltvp.errors import InvalidInputError
 from tiltvp.files import check_output, write_whole
-from tiltvp.rotations import quaternion
+from tiltvp.rotations import quaternion, rotation_from
 from tiltvp.streams.outputs import messages
 from tiltvp.streams.outputs.mcap import check_recording, new_recording
 
@@ -48,10 +48,11 @@ class StaticTransform:
     """(5, 5): of the errors along and about the parent's axes, in the order of `COVARIANCE_AXES`."""
 
     def __post_init__(self) -> None:
-        """Raises `InvalidInputError` as `check_frames` does, and for numbers that are not finite."""
+        """Raises `InvalidInputError` as `check_frames` does, and for no place, `CalibrationError` for no rotation."""
         check_frames(self.parent, self.child)
-        if not (np.isfinite(self.translation_m).all() and np.isfinite(self.rotation).all()):
-            raise InvalidInputError(f"mounting: {self.translation_m}, {self.rotation}, expected finite numbers")
+        if np.shape(self.translation_m) != (3,) or not np.isfinite(self.translation_m).all():
+            raise InvalidInputError(f"mounting: {self.translation_m}, expected three finite numbers")
+        rotation_from(np.asarray(self.rotation).tolist(), "mounting")
 
     @property
     def roll_pitch_yaw_rad(self) -> tuple[float, float, float]:
