@@ -130,6 +130,7 @@ def test_what_cannot_be_is_refused(tmp_path, old, new, told):
         {"covariance_rad2": np.diag([1.0, -1.0])},
         {"covariance_rad2": np.full((2, 2), math.nan)},
         {"topics": {"image": "/x"}},
+        {"topics": {"images": 3}},
         {"place_m": (0.1, math.nan)},
         {"covariance": np.eye(5)},
         {"place_m": (0.1, 0.2), "covariance": np.eye(4)},

@@ -74,9 +74,9 @@ class Robot:
         lengths = [*(self.place_m or ()), *(() if self.height_m is None else (self.height_m,))]
         if not np.isfinite(lengths).all() or len(self.place_m or (0, 0)) != 2:
             raise InvalidInputError(f"place_m, height_m: {self.place_m}, {self.height_m}, expected finite metres")
-        for name in self.topics:
-            if name not in TOPICS:
-                raise InvalidInputError(f"topics: {name!r}, expected one of {', '.join(TOPICS)}")
+        for name, topic in self.topics.items():
+            if name not in TOPICS or not isinstance(topic, str):
+                raise InvalidInputError(f"topics: {name!r}: {topic!r}, expected names of {', '.join(TOPICS)}")
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> Self:
