@@ -158,6 +158,21 @@ def test_a_slope_is_followed_where_turns_are_not_known(run: Run, world: Path, tm
         assert tiltvp.tilt_error_rad(found, truth) < 3.0 * row["filtered_sigma_rad"], k
 
 
+def test_times_of_several_cameras_in_one_table(tmp_path: Path) -> None:
+    """Files of equal names are told apart by their folders; the last row's time was taken for all."""
+    for side in ("left", "right"):
+        tiltvp.write_image(tmp_path / side / "0.png", np.zeros((4, 4), np.uint8))
+    table = tmp_path / "left" / "frames.csv"
+    table.write_text("file,time_s\nleft/0.png,1\nright/0.png,2\n")
+    frames = open_frames(tmp_path / "left")
+    assert frames.times_s is not None
+    assert frames.times_s.tolist() == [1.0]
+    for rows, told in (("a/0.png,1\nb/0.png,2\n", "2 times of "), ("0.png,1\n0.png,2\n", "line 3: file '0.png' again")):
+        table.write_text("file,time_s\n" + rows)
+        with pytest.raises(tiltvp.errors.InvalidInputError, match=told):
+            open_frames(tmp_path / "left")
+
+
 def test_images_that_are_called_rectified_are_told(run: Run, world: Path, room: RoomImage, tmp_path: Path) -> None:
     made = Bag("mcap")
     made.image("/camera/image_rect_color", START_S, room.gray, "mono8")

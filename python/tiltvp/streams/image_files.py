@@ -115,18 +115,34 @@ def _table_times(path: Path, files: Sequence[Path]) -> NDArray[np.float64] | Non
     if not {"file", "time_s"} <= set(table.header):
         return None
     which, when = table.header.index("file"), table.header.index("time_s")
-    times: dict[str, float] = {}
+    rows: dict[str, dict[str, float]] = {}
     for line, cells in table.rows():
         try:
-            times[Path(cells[which]).name] = float(cells[when])
+            when_s = float(cells[when])
         except ValueError:
             raise InvalidInputError(f"{table.where(line)}: time_s = {cells[when]!r}, expected a number") from None
-    missing = [str(file) for file in files if not np.isfinite(times.get(file.name, np.nan))]
+        named = rows.setdefault(Path(cells[which]).name, {})
+        if named.setdefault(Path(cells[which]).as_posix(), when_s) != when_s:
+            raise InvalidInputError(f"{table.where(line)}: file {cells[which]!r} again, expected one time of each")
+
+    def times_of(file: Path) -> set[float]:
+        """Of rows with its path, as a table of several cameras has them, else of those with its name."""
+        named = rows.get(file.name, {})
+        return {time_s for word, time_s in named.items() if f"/{file.as_posix()}".endswith(f"/{word}")} or {
+            *named.values()
+        }
+
+    found = [times_of(file) for file in files]
+    for file, one in zip(files, found, strict=True):
+        if len(one) > 1:
+            raise InvalidInputError(f"{path}: {len(one)} times of {file}, expected one, by its path")
+    times = [one.pop() if one else np.nan for one in found]
+    missing = [str(file) for file, time_s in zip(files, times, strict=True) if not np.isfinite(time_s)]
     if missing:
         raise InvalidInputError(
             f"{path}: no time of {missing[0]} ({len(missing)} missing), expected one for each image"
         )
-    return np.array([times[file.name] for file in files])
+    return np.array(times)
 
 
 def _times_of_names(files: Sequence[Path]) -> NDArray[np.float64] | None:
