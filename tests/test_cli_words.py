@@ -42,6 +42,17 @@ def test_names_that_are_no_text(ending: str, run: Run, world: Path) -> None:
     assert f"{world}/images/a\\\\xff.png" in run("tilt", *words[1:4], "--out", "-").out
 
 
+@pytest.mark.parametrize("words", [("bogus", "--x", "-"), ("camera", "--x", "-"), ("tilt", "--x", "-")])
+def test_a_dash_of_no_command_is_wrong_use(words: tuple[str, ...], run: Run) -> None:
+    said = run(*words)
+    assert (said.code, said.err.count("\n")) == (2, 1)
+
+
+@pytest.mark.parametrize("words", [("--version", "-"), ("tilt", "--help", "-")])
+def test_help_takes_a_dash(words: tuple[str, ...], run: Run) -> None:
+    assert run(*words).code == 0
+
+
 @pytest.mark.skipif(sys.platform != "linux", reason="names of files that are no text")
 @pytest.mark.parametrize("before", [[], ["--overwrite"], ["--camera"], ["--filter"], ["--threads=1"]])
 def test_names_come_on_stdin_wherever_the_dash_stands(

@@ -93,5 +93,9 @@ def _takes_a_word(option: str, words: Sequence[str]) -> bool:
     """Whether a word of the line is an option whose value comes next: no name, no switch, and none with its value."""
     if not option.startswith("--") or "=" in option:
         return False
-    arguments = app.parse_commands(words)[1][-1].assemble_argument_collection()
-    return not any(option in one.names and one.token_count()[0] == 0 for one in arguments)
+    names, verbs, _ = app.parse_commands(words)
+    verb = verbs[-1]
+    # Help and version are commands of their own there, and nobody asks for their options.
+    if verb.default_command is None or names[-1].startswith("-"):
+        return True
+    return not any(option in one.names and one.token_count()[0] == 0 for one in verb.assemble_argument_collection())
