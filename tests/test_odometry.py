@@ -274,6 +274,7 @@ def test_angles_that_begin_anew_with_each_turn_are_told(low: float, tmp_path: Pa
         write(tmp_path / "odometry.csv", table), wheels=Wheels(wheel_radius_m=1.0, ticks_per_turn=1000.0)
     )
     assert there.distance_m.tolist() == pytest.approx([0.0, 0.6 * math.tau, 0.9 * math.tau])
+    assert "never leaves one turn and jumps by over half" in there.notes[0]
 
 
 def test_a_clock_that_was_set_back_is_refused(tmp_path: Path) -> None:

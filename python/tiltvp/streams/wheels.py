@@ -71,5 +71,9 @@ def cumulative_m(
                     f"{source}: the counter of the {side} wheel begins anew {jumps.sum()} times, at {wrap:.10g}"
                 )
                 break
+        else:
+            if np.ptp(values) <= per_turn and (far > 0.5 * per_turn).any():
+                told = "never leaves one turn and jumps by over half of it: does it begin anew with each?"
+                notes.append(f"{source}: the counter of the {side} wheel {told}")
     metres = 2.0 * np.pi * wheel_radius_m / per_turn
     return np.cumsum(steps, axis=0) * metres, tuple(notes)
