@@ -180,6 +180,14 @@ def test_images_that_are_called_rectified_are_told(run: Run, world: Path, room: 
     assert (said.code, "/camera/image_rect_color is called rectified: its lens is P" in said.err) == (0, True)
 
 
+def test_stamps_that_stand_still_are_told(tmp_path: Path) -> None:
+    made = Bag("mcap")
+    for k in range(4):
+        made.image("/image", START_S + (0.1 if k else 0.0), np.zeros((4, 4), np.uint8), "mono8", late_s=0.1 * k)
+    (note,) = open_frames(made.write(tmp_path)).notes
+    assert "/image has 2 images that are stamped no later than those before" in note
+
+
 def test_tracks_of_a_bag_have_times(run: Run, world: Path, tmp_path: Path) -> None:
     words = (
         "track",

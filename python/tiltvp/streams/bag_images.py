@@ -40,9 +40,12 @@ class BagFrames(Frames):
         self.times_s = np.array(times)
         self.problems = recording.unread(self._topic, len(times))
         self.rate_hz = median_rate_hz(self.times_s)
+        told = []
         if "/image_rect" in self.topic:
-            words = "is called rectified: its lens is P of CameraInfo, not K and D, which recordings are read by"
-            self.notes = (f"{recording.path}: {self.topic} {words}",)
+            told.append("is called rectified: its lens is P of CameraInfo, not K and D, which recordings are read by")
+        if standing := int((np.diff(self.times_s) <= 0.0).sum()):
+            told.append(f"has {standing} images that are stamped no later than those before: what moved is not told")
+        self.notes = tuple(f"{recording.path}: {self.topic} {words}" for words in told)
 
     @property
     def topic(self) -> str:
