@@ -282,7 +282,10 @@ def test_a_live_camera_ends_at_an_interrupt(
         (["images", "--filter", "--wheel-base", "0.4"], "--wheel-base without --odometry"),
         (["images", "--filter", "--odometry-gap", "2"], "--odometry-gap without --odometry"),
         (["images", "--frame-rate", "5"], "--frame-rate 5, expected --out that ends in .mcap or .tum"),
-        (["images", "--frame-rate", "5", "--out", "a.csv"], "--frame-rate 5, expected --out that ends in .mcap or .tum"),
+        (
+            ["images", "--frame-rate", "5", "--out", "a.csv"],
+            "--frame-rate 5, expected --out that ends in .mcap or .tum",
+        ),
     ],
 )
 def test_wrong_use(run: Run, world: Path, words: list[str], hint: str, monkeypatch: pytest.MonkeyPatch) -> None:
