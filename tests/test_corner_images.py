@@ -27,6 +27,7 @@ from drawn_corners import (
 from tiltvp.corner import CornerDetector, CornerPoseEstimator
 from tiltvp.errors import CalibrationError, InvalidInputError
 from tiltvp.stereo_rigs import StereoRig
+from tiltvp.synth import Room, StereoSequence, zed_cameras
 
 pytestmark = pytest.mark.slow
 
@@ -315,3 +316,23 @@ def test_corners_of_one_image_that_contradict_each_other_are_no_pose() -> None:
         estimate = estimator(np.hstack([left[:, :240], right[:, 240:]]))
         assert len(estimate.features_left) >= 2
         assert (estimate.pose is not None) == found, (lean_deg, misfit_max)
+
+
+@pytest.mark.parametrize(
+    ("kind", "seed", "frame"),
+    [("living-room", 10710, 0), ("office", 10418, 0), ("l-shaped", 10714, 1)],
+    ids=["wallpaper with its pattern about the corner", "rounded edges that miss each other", "bare walls"],
+)
+def test_corners_of_rooms_that_show_little_of_themselves_are_found(kind: str, seed: int, frame: int) -> None:
+    left, right = zed_cameras(1280)
+    sequence = StereoSequence(Room(kind, seed), left=left, right=right, frames=10, seed=seed)
+    down = -sequence.imu(seed=seed).forces_m_s2.mean(axis=0)
+    estimator = CornerPoseEstimator(left, right, sequence.left_from_right, method="general", down=down)
+    estimate = estimator(*sequence.render(frame))
+    assert estimate, estimate.reason
+    assert estimate.pose is not None
+    truths = np.array([sequence.left_from_object(frame, n)[:3, 3] for n in range(len(sequence.corners))])
+    off = truths - estimate.pose.vertex_m
+    off = off[np.argmin(np.linalg.norm(off, axis=1))]
+    assert np.linalg.norm(off) < 0.01
+    assert off @ np.linalg.solve(estimate.pose.covariance[3:, 3:], off) < 16.3

@@ -139,6 +139,18 @@ impl CornerDetector {
         scratch: &mut CornerScratch,
         out: &mut Vec<CornerFeature>,
     ) -> Result<()> {
+        self.detect_fainter(image, 1.0, vertical, scratch, out)
+    }
+
+    /// The same with edges whose gradients are a `share` of what the options ask for.
+    pub(super) fn detect_fainter(
+        &self,
+        image: &ImageView<'_>,
+        share: f64,
+        vertical: Option<&Vector3<f64>>,
+        scratch: &mut CornerScratch,
+        out: &mut Vec<CornerFeature>,
+    ) -> Result<()> {
         self.check(image.width(), image.height())?;
         let (CornerMethod::General(options), Some(detector), Some(memory)) =
             (&self.options.method, &self.segments, &mut scratch.general)
@@ -158,7 +170,7 @@ impl CornerDetector {
                 None => near(&Vector3::y()),
             }
         };
-        let search = general::Search { camera: &self.camera, detector, options, light: &self.light, vertical };
+        let search = general::Search { camera: &self.camera, detector, options, light: &self.light, share, vertical };
         general::find(&search, image, closeness, memory, out)
     }
 

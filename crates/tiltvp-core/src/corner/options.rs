@@ -86,7 +86,8 @@ options! {
     /// Options of the general front end.
     #[derive(Copy)]
     pub struct GeneralOptions {
-        /// Least gradient magnitude of an edge pixel, Scharr kernel (3, 10, 3) on 8-bit grey levels.
+        /// Least gradient magnitude of an edge pixel, Scharr kernel (3, 10, 3) on 8-bit grey levels. Poses are also looked for at half
+        /// of this and of `gradient_start` where there is none.
         gradient_min: f64 = 30.0 => 1.0..=1e4, "a gradient magnitude from 1 to 10000";
         /// Gradient magnitude of which an edge has a pixel at least; it is followed down to `gradient_min`.
         gradient_start: f64 = 50.0 => 0.0..=1e4, "a gradient magnitude from 0 to 10000";

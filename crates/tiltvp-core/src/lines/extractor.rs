@@ -157,7 +157,8 @@ impl LineExtractor {
                 };
                 let reach = (MISS_MAX_RAD.max(options.plane_max_rad) + tilt.alpha_rad()).min(FRAC_PI_2);
                 let prefilter = self.tables.prefilter.with_limit(reach.sin());
-                finder.find(image, &self.tables.region, edges.gradient_min, Some(&prefilter), work, segments);
+                let gradients = finder.gradients(edges.gradient_min);
+                finder.find(image, &self.tables.region, gradients, Some(&prefilter), work, segments);
                 let frame = LineFrame { normal: tilt.normal(), center_px: None };
                 great_circle::find(&self.robot_from_camera, segments, frame, options, great_circle, out);
             }

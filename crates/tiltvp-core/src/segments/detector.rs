@@ -25,6 +25,15 @@ pub(crate) struct SegmentFinder {
     options: SegmentOptions,
 }
 
+/// The least gradients of an edge's pixels.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct LeastGradients {
+    /// Of each of them.
+    each: f64,
+    /// Of one of them at least.
+    one: f64,
+}
+
 /// Memory for one thread.
 #[derive(Debug, Clone)]
 pub(crate) struct FinderScratch {
@@ -80,22 +89,27 @@ impl SegmentFinder {
         }
     }
 
+    /// What the options ask for, the pixels being of at least `gradient_min`.
+    pub(crate) fn gradients(&self, gradient_min: f64) -> LeastGradients {
+        LeastGradients { each: gradient_min, one: self.options.gradient_start }
+    }
+
     /// Writes the segments of an image whose pixels pass a prefilter, the longest first. Allocates nothing once `scratch` and `out` have grown.
     pub(crate) fn find(
         &self,
         image: &ImageView<'_>,
         region: &Region,
-        gradient_min: f64,
+        gradients: LeastGradients,
         prefilter: Option<&Prefilter>,
         scratch: &mut FinderScratch,
         out: &mut Segments,
     ) {
         let FinderScratch { detector, ridge, chains, stack, located, lifted, points, pieces, toward, groups, cut } =
             scratch;
-        let SegmentOptions { gradient_start, stray_max_px, rms_max_px, support_min_px, gap_max } = self.options;
+        let SegmentOptions { stray_max_px, rms_max_px, support_min_px, gap_max, .. } = self.options;
         let least = support_min_px as usize;
-        detector.detect(image, region, gradient_min, prefilter, ridge);
-        chains.link(ridge, (gradient_start * gradient_start) as f32);
+        detector.detect(image, region, gradients.each, prefilter, ridge);
+        chains.link(ridge, (gradients.one * gradients.one) as f32);
         points.clear();
         pieces.clear();
         toward.clear();
@@ -219,6 +233,17 @@ impl SegmentDetector {
     /// # Errors
     /// [`Error::InvalidArgument`] if the image has another size than the camera's, or the scratch is another detector's.
     pub fn detect(&self, image: &ImageView<'_>, scratch: &mut SegmentScratch, out: &mut Segments) -> Result<()> {
+        self.detect_fainter(image, 1.0, scratch, out)
+    }
+
+    /// The same with edges whose gradients are a `share` of what the options ask for.
+    pub(crate) fn detect_fainter(
+        &self,
+        image: &ImageView<'_>,
+        share: f64,
+        scratch: &mut SegmentScratch,
+        out: &mut Segments,
+    ) -> Result<()> {
         if scratch.region_pixels != self.region.len() {
             return Err(Error::argument("scratch", "that of another detector", "one made by this detector"));
         }
@@ -228,7 +253,9 @@ impl SegmentDetector {
             let expected = format!("{height} x {width} (rows x columns), as the camera's images");
             return Err(Error::argument("image", got, expected));
         }
-        self.finder.find(image, &self.region, self.options.edges.gradient_min, None, &mut scratch.finder, out);
+        let LeastGradients { each, one } = self.finder.gradients(self.options.edges.gradient_min);
+        let gradients = LeastGradients { each: share * each, one: share * one };
+        self.finder.find(image, &self.region, gradients, None, &mut scratch.finder, out);
         Ok(())
     }
 }

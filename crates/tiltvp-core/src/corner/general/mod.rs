@@ -85,6 +85,8 @@ pub(crate) struct Search<'a> {
     pub(crate) detector: &'a SegmentDetector,
     pub(crate) options: &'a GeneralOptions,
     pub(crate) light: &'a LightTable,
+    /// The share of the options' least gradients that edges have.
+    pub(crate) share: f64,
     /// A direction along the vertical, where it is known.
     pub(crate) vertical: Option<&'a Vector3<f64>>,
 }
@@ -97,10 +99,10 @@ pub(crate) fn find(
     scratch: &mut GeneralScratch,
     out: &mut Vec<CornerFeature>,
 ) -> Result<()> {
-    let Search { camera, detector, options, light, vertical } = *search;
+    let Search { camera, detector, options, light, share, vertical } = *search;
     out.clear();
     let GeneralScratch { detector: edges, segments, meetings, junctions, traced, trace: memory } = scratch;
-    detector.detect(image, edges, segments)?;
+    detector.detect_fainter(image, share, edges, segments)?;
     segments.list.retain(|segment| segment.length_px() >= options.segment_min_px);
     thin(&mut segments.list);
     let segments = &segments.list;

@@ -138,14 +138,42 @@ impl CornerPoseEstimator {
         if self.track.as_ref().is_some_and(|track| track.age > self.options.forget_after) {
             self.track = None;
         }
+        let (mut estimate, mut seen) = self.look(left, right, 1.0)?;
+        if estimate.hypotheses.is_empty() && matches!(self.left.options().method, CornerMethod::General(_)) {
+            let fainter = self.look(left, right, FAINT)?;
+            if !fainter.0.hypotheses.is_empty() {
+                (estimate, seen) = fainter;
+            }
+        }
+        let frames = [left, right.unwrap_or(left)];
+        if let (Some(_), Some(left), Some(right)) =
+            (estimate.pose(), estimate.chosen_left.first(), estimate.chosen_right)
+        {
+            let own = SeenPair { left: *left, right, poses: estimate.hypotheses.clone() };
+            estimate.ends = self.ends_of(frames, &estimate, &own);
+        }
+        self.follow(&mut estimate, &seen);
+        self.place_by_scale(left, &mut estimate);
+        estimate.corners = self.believed(frames, &estimate, seen);
+        self.name(&mut estimate.corners);
+        Ok(estimate)
+    }
+
+    /// What a frame shows by edges whose gradients are a `share` of what the options ask for, and the pairs of features that are corners.
+    fn look(
+        &mut self,
+        left: &Frame<'_>,
+        right: Option<&Frame<'_>>,
+        share: f64,
+    ) -> Result<(CornerEstimate, Vec<SeenPair>)> {
         let vertical = self.vertical();
         let mut features = [Vec::new(), Vec::new()];
         let followed = self.track.as_ref().map_or(&[][..], |track| &track.corners[..]);
         let [of_left, of_right] = [0, 1].map(|side| followed.get(side).map_or(&[][..], Vec::as_slice));
-        detect(&self.left, left, vertical.as_ref(), of_left, &mut self.scratch[0], &mut features[0])?;
+        detect((&self.left, share), left, vertical.as_ref(), of_left, &mut self.scratch[0], &mut features[0])?;
         if let (Some((detector, left_from_right)), Some(right)) = (&self.right, right) {
             let vertical = vertical.map(|vertical| left_from_right.rotation.transpose() * vertical);
-            detect(detector, right, vertical.as_ref(), of_right, &mut self.scratch[1], &mut features[1])?;
+            detect((detector, share), right, vertical.as_ref(), of_right, &mut self.scratch[1], &mut features[1])?;
         }
         let mut estimate = CornerEstimate {
             hypotheses: Vec::new(),
@@ -186,18 +214,7 @@ impl CornerPoseEstimator {
             let decided = best.probability >= self.options.probability_min;
             estimate.verdict = if decided { CornerVerdict::Found } else { CornerVerdict::Ambiguous };
         }
-        let frames = [left, right.unwrap_or(left)];
-        if let (Some(_), Some(left), Some(right)) =
-            (estimate.pose(), estimate.chosen_left.first(), estimate.chosen_right)
-        {
-            let own = SeenPair { left: *left, right, poses: estimate.hypotheses.clone() };
-            estimate.ends = self.ends_of(frames, &estimate, &own);
-        }
-        self.follow(&mut estimate, &seen);
-        self.place_by_scale(left, &mut estimate);
-        estimate.corners = self.believed(frames, &estimate, seen);
-        self.name(&mut estimate.corners);
-        Ok(estimate)
+        Ok((estimate, seen))
     }
 
     /// Goes on to the pose of a frame, and to the corners beside it.
@@ -302,13 +319,17 @@ impl CornerPoseEstimator {
     }
 }
 
+/// The share of their least gradients by which edges are looked for where others make no corner: bare walls and ceilings differ little.
+const FAINT: f64 = 0.5;
+
 /// How far from where it was a corner is looked for first, in pixels: the fewer other edges are within reach the
 /// better. What is not found so is looked for at `follow_px`.
 const HARDLY_MOVED_PX: f64 = 3.0;
 
-/// The corners of an image: those that are near where they were, and those that are found anew.
+/// The corners of an image: those that are near where they were, and those that are found anew, by edges whose gradients are a share of
+/// what the options ask for.
 fn detect(
-    detector: &CornerDetector,
+    (detector, share): (&CornerDetector, f64),
     frame: &Frame<'_>,
     vertical: Option<&Vector3<f64>>,
     followed: &[CornerFeature],
@@ -317,7 +338,7 @@ fn detect(
 ) -> Result<()> {
     match frame {
         Frame::Gray(image) => {
-            detector.detect_general(image, vertical, scratch, out)?;
+            detector.detect_fainter(image, share, vertical, scratch, out)?;
             // Most hardly move, and the less is looked at the fewer other edges there are.
             let again = followed.iter().map(ExpectedCorner::of).filter_map(|last| {
                 let near = detector.find_near(image, &last, Some(HARDLY_MOVED_PX), scratch);

@@ -5,19 +5,14 @@ use std::f64::consts::SQRT_2;
 use nalgebra::{Matrix3, Vector3};
 
 use super::agreement::{apart, renamed};
-use super::believed::OPEN;
 use super::estimator::CornerPoseEstimator;
-use super::seen_pair::SeenPair;
-use super::support::CornerSupport;
 use super::transfer::upright;
 use crate::corner::closed_form::attitude::{IncludedAngle, corner_attitudes};
 use crate::corner::closed_form::prior::AttitudePrior;
 use crate::corner::detector::CornerDetector;
-use crate::corner::estimate::{CornerEstimate, Hypothesis};
+use crate::corner::estimate::Hypothesis;
 use crate::corner::feature::CornerFeature;
-use crate::corner::frame::Frame;
 use crate::corner::fusion::{FusedPose, KnownAttitude, fuse_rays, fuse_rays_with};
-use crate::corner::general::beginnings::Beginnings;
 use crate::corner::general::common_attitude::CommonAttitude;
 use crate::corner::triangulation::{BearingObservation, triangulate};
 use crate::error::Result;
@@ -26,18 +21,6 @@ use crate::geometry::RigidMotion;
 /// How far apart attitudes of different hypotheses are, radians: 2 degrees. Fits from two starts end far closer,
 /// different interpretations far apart.
 const SAME_POSE_RAD: f64 = 0.035;
-
-/// The share of the largest misfit up to which a corner is believed that was not seen in the frame before.
-const WELL: f64 = 0.4;
-
-/// How many of a corner's three rays in two images begin at its vertex at least: those of two edges. Where fewer do, edges of
-/// several things meet in the images alone.
-const BEGIN_MIN: usize = 4;
-
-/// The misfit up to which a corner that was not there before is believed of which too few edges are shown to begin at its vertex: then
-/// nothing but where they pass each other in space speaks for it. On rooms that were looked at, most such corners that are there have 0.55 and
-/// less, those that are not have 0.93 and more.
-const MEETS: f64 = 0.7;
 
 /// By which factor chi-square of two vertices may exceed that of a corner that is believed: it is exact to first order only.
 const VERTEX_SLACK: f64 = 2.0;
@@ -55,13 +38,15 @@ const PROBABILITY_MIN: f64 = 1e-9;
 
 impl CornerPoseEstimator {
     /// Every pose that the rays of one corner in both images admit, the likeliest first. The attitudes of either image start the
-    /// fit to all six rays, so that a view that alone is weak (two rays in line) does no harm.
-    fn pair_poses(
+    /// fit to all six rays, so that a view that alone is weak (two rays in line) does no harm. None of vertices that miss each other by
+    /// more than those of a pair of `misfit_most` do.
+    pub(super) fn pair_poses(
         &self,
         [left, right]: [&CornerFeature; 2],
         (detector, left_from_right): (&CornerDetector, &RigidMotion),
         priors: &[AttitudePrior],
         common: Option<&CommonAttitude>,
+        misfit_most: f64,
     ) -> Result<Vec<Hypothesis>> {
         let cameras = [(left, RigidMotion::identity()), (right, left_from_right.inverse())];
         let observation = |corner: &CornerFeature, rig_from_camera| BearingObservation {
@@ -73,7 +58,7 @@ impl CornerPoseEstimator {
         let Some(vertex) = triangulate(&seen) else { return Ok(Vec::new()) };
         // All rays together miss by no less than the vertices alone. Most pairs are of different corners, and end here.
         let freedom = common.map_or(FREEDOM_ALONE, |common| FREEDOM * common.scatter.powi(2));
-        if vertex.chi_square > VERTEX_SLACK * freedom * self.misfit_most().powi(2) {
+        if vertex.chi_square > VERTEX_SLACK * freedom * misfit_most.powi(2) {
             return Ok(Vec::new());
         }
         let mut found: Vec<(f64, Hypothesis)> = Vec::new();
@@ -172,110 +157,6 @@ impl CornerPoseEstimator {
             }
             _ => attitude,
         }
-    }
-
-    /// The largest misfit that is believed. The edges of a corner without colours miss each other as they did in the frame
-    /// before: one that fits far worse has another edge, as a table's top that continues in the leg behind.
-    fn misfit_most(&self) -> f64 {
-        let most = self.options.misfit_max;
-        if self.is_one_object() {
-            return most;
-        }
-        let before = self.track.as_ref().map_or(0.0, |track| OPEN * track.pose.misfit);
-        before.max(WELL * most).min(most)
-    }
-
-    /// The poses of the pair of features, one of each image, that fits best; of the corner that is followed or one that is known
-    /// beside it, where there is one. Where an `attitude` is known on which several corners agree, pairs that do not are left
-    /// out. Returns all pairs that fit well, chosen or not.
-    pub(crate) fn by_pair(
-        &self,
-        frames: [&Frame<'_>; 2],
-        attitude: Option<&Matrix3<f64>>,
-        common: Option<&CommonAttitude>,
-        estimate: &mut CornerEstimate,
-    ) -> Result<Vec<SeenPair>> {
-        let mut seen = Vec::new();
-        let Some((detector, left_from_right)) = &self.right else { return Ok(seen) };
-        let begin = [(&self.left, 0), (detector, 1)].map(|(detector, side)| -> Vec<Beginnings> {
-            let features = estimate.features[side].iter();
-            features.map(|corner| detector.beginnings(frames[side], corner)).collect()
-        });
-        let priors = self.priors(self.is_one_object());
-        let (nearest, farthest) = (self.options.distance_min_m, self.options.distance_max_m);
-        let misfit_most = self.misfit_most();
-        let mut best: Option<(f64, Vec<Hypothesis>, usize, usize)> = None;
-        let support = CornerSupport::new(&estimate.features, left_from_right);
-        for (i, left) in estimate.features[0].iter().enumerate() {
-            for (j, right) in estimate.features[1].iter().enumerate() {
-                let Some(shown) = ShownEdges::of([left, right], [&begin[0][i], &begin[1][j]]) else { continue };
-                let [own, other] = &shown.corners;
-                let poses = self.pair_poses([own, other], (detector, left_from_right), &priors, common)?;
-                let Some((pose, vertex)) = poses.first().and_then(|pose| Some((pose, pose.vertex_m?))) else {
-                    continue;
-                };
-                let misfit = pose.misfit;
-                let agrees = |attitude: &Matrix3<f64>| {
-                    let own = renamed(&pose.camera_from_object, attitude);
-                    apart(&own, attitude) <= self.options.agree_max_rad
-                };
-                if attitude.is_some_and(|attitude| !agrees(attitude)) {
-                    continue;
-                }
-                let is_known = self.track.as_ref().is_some_and(|track| track.likelihood(pose, false).is_some());
-                let misfit_most = if shown.is_enough || is_known { misfit_most } else { misfit_most.min(MEETS) };
-                let within = misfit <= misfit_most && (nearest..=farthest).contains(&vertex.norm());
-                if !within || !self.is_upright(pose) {
-                    continue;
-                }
-                let fits_well = misfit <= WELL * self.options.misfit_max;
-                if fits_well {
-                    seen.push(SeenPair { left: i, right: j, poses: poses.clone() });
-                }
-                let likely = match &self.track {
-                    Some(track) if !self.is_one_object() => track.likelihood(pose, fits_well),
-                    _ => Some(1.0),
-                };
-                let Some(likely) = likely else { continue };
-                let agreeing = support.of(pose);
-                let mut score =
-                    likely * agreeing * left.support_score().min(right.support_score()) / (1.0 + misfit * misfit);
-                if let Some(track) = &self.track {
-                    let turned = apart(&pose.camera_from_object, &track.pose.camera_from_object);
-                    score /= 1.0 + (turned / self.turn_sigma_rad(track)).powi(2);
-                }
-                if best.as_ref().is_none_or(|(most, ..)| score > *most) {
-                    best = Some((score, poses, i, j));
-                }
-            }
-        }
-        if let Some((_, poses, i, j)) = best {
-            estimate.hypotheses = poses;
-            (estimate.chosen_left, estimate.chosen_right) = (vec![i], Some(j));
-        }
-        Ok(seen)
-    }
-}
-
-/// A corner of both images, as far as its edges are shown to begin at its vertex.
-struct ShownEdges {
-    /// Whether at least two do in both images.
-    is_enough: bool,
-    /// The corner in either image. Edges that are not shown to begin at it, as that of a drawer's front below the top of its
-    /// case, tell its attitude and hardly its place, if the others are enough for that.
-    corners: [CornerFeature; 2],
-}
-
-impl ShownEdges {
-    /// None where edges of several things meet.
-    fn of(corners: [&CornerFeature; 2], ends: [&Beginnings; 2]) -> Option<Self> {
-        let shared = ends[0].shared(ends[1]);
-        if shared.iter().filter(|shared| **shared).count() >= 2 {
-            let [left, right] = [0, 1].map(|side| ends[side].loosened(corners[side], shared));
-            return Some(Self { is_enough: true, corners: [left?, right?] });
-        }
-        let begin = ends[0].count() + ends[1].count();
-        (begin >= BEGIN_MIN).then_some(Self { is_enough: false, corners: corners.map(|corner| *corner) })
     }
 }
 

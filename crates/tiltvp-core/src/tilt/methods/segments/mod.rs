@@ -153,7 +153,8 @@ impl ImageFitter for SegmentFit {
         let region = &tables.region;
         let Scratch { work: pixel_work, segments, .. } = scratch;
         let work = segments.get_or_insert_with(|| Box::new(SegmentWork::new(self.finder.scratch(region, &self.edges))));
-        self.finder.find(image, region, self.edges.gradient_min, None, &mut work.finder, &mut work.segments);
+        let gradients = self.finder.gradients(self.edges.gradient_min);
+        self.finder.find(image, region, gradients, None, &mut work.finder, &mut work.segments);
         let SegmentWork { segments, edges, .. } = &mut **work;
         edges.clear();
         let longest = segments.list.iter().take(self.options.segments_max);
