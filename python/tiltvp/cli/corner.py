@@ -142,7 +142,8 @@ def corner(
     robot = Robot.load(calibration) if is_robot(calibration) else None
     source = source.of_robot(robot, words)
     sensor = inertial.of_robot(robot).knowledge(source.topic)
-    camera, estimator = _searches(calibration, right is not None, method, known, image_size_from(image_size))
+    mask = None if robot is None else robot.mask
+    camera, estimator = _searches(calibration, right is not None, method, known, mask, image_size_from(image_size))
     frames = source.open(words)
     check_apart(frames, results.overlay)
     others = None if right is None else SourceOptions(topic=topic_right).open([right], topic_option="--topic-right")
@@ -229,17 +230,20 @@ def _blamed(names: Sequence[str], problem: str) -> str:
 
 
 def _searches(
-    calibration: Path, is_pair: bool, method: str, known: dict[str, Any], image_size: tuple[int, int] | None
+    calibration: Path,
+    is_pair: bool,
+    method: str,
+    known: dict[str, Any],
+    mask: NDArray[np.bool_] | None,
+    image_size: tuple[int, int] | None,
 ) -> tuple[Camera, Searches]:
     from tiltvp import Camera
     from tiltvp.corner import CornerPoseEstimator
-    from tiltvp.robot import Robot, is_robot
     from tiltvp.stereo_rigs import StereoRig
 
     methods = methods_for(method, known)
     if not is_pair:
         camera = Camera.load(calibration, image_size=image_size)
-        mask = Robot.load(calibration).mask if is_robot(calibration) else None
         # The cuboid is told from the robot's own body by its colours.
         own = {name: {"mask": mask} if mask is not None and name == "general" else {} for name in methods}
         found = {name: CornerPoseEstimator(camera, method=name, **(own[name] | known)) for name in methods}
