@@ -302,4 +302,26 @@ proptest! {
         let back = ocam.unproject(&pixel).and_then(|bearing| ocam.project(&bearing));
         prop_assert!(back.is_some_and(|p| (p - pixel).norm() <= 1e-12 * (1e6 + rho)), "{:?} {:?} {}", back, pixel, model.max_rho_px());
     }
+
+    #[test]
+    fn no_two_rays_of_a_unified_sphere_that_folds_share_a_pixel(
+        xi in 0.0..1.0f64, k1 in -0.2..-0.001f64, k2 in -0.2..0.0f64, phi in 0.0..6.3f64, beyond in 1e-6..1.0f64,
+    ) {
+        let numbers = [("xi", xi), ("fx", 300.0), ("fy", 300.0), ("cx", 320.0), ("cy", 240.0), ("k1", k1), ("k2", k2)];
+        let unified = camera("unified", [640, 480], &numbers, &[]);
+        let ray = |theta: f64| Vector3::new(theta.sin() * phi.cos(), theta.sin() * phi.sin(), theta.cos());
+        let rim = unified.max_theta_rad();
+        let mut last = -1.0;
+        for i in 0..100 {
+            let theta = rim * f64::from(i) / 100.0;
+            let pixel = unified.project(&ray(theta));
+            let away = pixel.map_or(f64::NAN, |pixel| (pixel - Vector2::new(320.0, 240.0)).norm());
+            prop_assert!(away > last, "{theta} of {rim}: {away} after {last}");
+            last = away;
+            let back = pixel.and_then(|pixel| unified.unproject(&pixel));
+            prop_assert!(back.is_some_and(|back| angle_between(&back, &ray(theta)) < 1e-9), "{theta} of {rim}: {back:?}");
+        }
+        let theta = rim + beyond * (std::f64::consts::PI - rim);
+        prop_assert!(unified.project(&ray(theta)).is_none(), "{theta} of {rim}");
+    }
 }

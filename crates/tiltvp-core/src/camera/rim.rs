@@ -37,7 +37,8 @@ impl Rim {
         let least = FOLD * profile(0.0).1;
         let inside = |theta: f64| {
             let (r, slope) = profile(theta);
-            r <= FARTHEST && slope >= least && slope.is_finite()
+            // Where the plane is infinite rounding may leave `r` on the far side of it, below zero.
+            (0.0..=FARTHEST).contains(&r) && slope >= least && slope.is_finite()
         };
         let (mut low, mut high) = (0.0, end);
         if inside(end) {
