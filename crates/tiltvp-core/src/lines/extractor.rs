@@ -50,14 +50,17 @@ impl LineExtractor {
     /// Makes the tables. `robot_from_camera` is `R`, which takes bearings of the camera frame to the robot frame.
     ///
     /// # Errors
-    /// [`Error::InvalidOption`] or [`Error::InvalidArgument`] if an option is out of its domain, `R` is no rotation, the mask
-    /// does not fit the camera, or no pixel sees the elevation band.
+    /// [`Error::InvalidOption`] or [`Error::InvalidArgument`] if an option is out of its domain, `R` is no rotation, the optical
+    /// axis is far from the vertical and the method radial, the mask does not fit the camera, or no pixel sees the elevation band.
     pub fn new(camera: Camera, robot_from_camera: Matrix3<f64>, options: LineOptions) -> Result<Self> {
         options.validate()?;
         crate::geometry::validate_rotation(&robot_from_camera)?;
-        if options.descriptor.kind == DescriptorKind::Profile && matches!(options.method, LineMethod::Radial(_)) {
-            let expected = "areas for radial lines, which know no elevations";
-            return Err(Error::option("descriptor_kind", DescriptorKind::Profile.to_value(), expected));
+        if matches!(options.method, LineMethod::Radial(_)) {
+            radial::check_axis(&robot_from_camera)?;
+            if options.descriptor.kind == DescriptorKind::Profile {
+                let expected = "areas for radial lines, which know no elevations";
+                return Err(Error::option("descriptor_kind", DescriptorKind::Profile.to_value(), expected));
+            }
         }
         let tables = LineTables::new(&camera, &robot_from_camera, &options)?;
         let radii = match &options.method {

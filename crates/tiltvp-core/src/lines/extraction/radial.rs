@@ -6,6 +6,7 @@ use nalgebra::{Matrix3, Vector2, Vector3};
 
 use super::rim_center::{CenterScratch, find_center};
 use crate::camera::Camera;
+use crate::error::{Error, Result};
 use crate::image::ImageView;
 use crate::lines::line::{Line, LineFrame, Lines};
 use crate::lines::options::RadialOptions;
@@ -38,6 +39,26 @@ struct Sector {
     rising: u32,
     nearest: f32,
     farthest: f32,
+}
+
+/// How far the optical axis may be from the vertical. Under an equidistant lens a lean of the axis turns a vertical that crosses the
+/// horizon from its radius by as much (`pi/2 - 2/pi` = 0.93 of it) and its bearing by `2/pi` of it: beyond the paper's 5 degrees of a
+/// gradient, verticals across the lean are lost.
+const AXIS_MAX_RAD: f64 = 5.0 * PI / 180.0;
+
+/// Refuses a mounting under which azimuths of the image are none of the robot.
+///
+/// # Errors
+/// [`Error::InvalidArgument`] if the optical axis is not along the vertical, up or down.
+pub(crate) fn check_axis(robot_from_camera: &Matrix3<f64>) -> Result<()> {
+    let axis = robot_from_camera.column(2);
+    let away = axis.xy().norm().atan2(axis.z.abs());
+    if away <= AXIS_MAX_RAD {
+        return Ok(());
+    }
+    let got = format!("an optical axis {:.1} degrees from the vertical", away.to_degrees());
+    let expected = "at most 5 for method \"radial\", which knows no other mounting; \"great-circle\" takes any";
+    Err(Error::argument("robot_from_camera", got, expected))
 }
 
 impl Radii {
