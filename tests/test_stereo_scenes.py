@@ -148,6 +148,16 @@ def test_the_filter_refuses_what_makes_no_sense() -> None:
     assert fusion.bias_rad_s[0] > 0
     assert fusion.bias_time_constant_s > 0
     assert np.allclose(fusion.reference_from_body @ fusion.reference_from_body.T, np.eye(3))
+    again = pickle.loads(pickle.dumps(fusion))
+    assert again == fusion
+    for one in (fusion, again):
+        one.predict([0.2, 0.1, 0.0], 0.5)
+        one.correct(np.eye(3))
+    assert again == fusion
+    for state in ((1.0, 0.0, 0.0, 1.0), (np.nan, 0.0, 0.0, 0.0)):
+        with pytest.raises(InvalidInputError, match="quaternion"):
+            again.__setstate__((state, (0.0, 0.0, 0.0), 0.0))
+    assert again == fusion
     for wrong in (lambda: fusion.predict([0, 0, 0], -1.0), lambda: fusion.correct(np.ones((3, 3)))):
         with pytest.raises(InvalidInputError):
             wrong()

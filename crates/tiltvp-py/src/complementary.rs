@@ -1,8 +1,8 @@
 //! `ComplementaryFilter`: rates of turn and a reference attitude, fused.
 
 use pyo3::prelude::*;
-use pyo3::types::PyDict;
-use tiltvp_core::filter::{ComplementaryFilter as Filter, ComplementaryOptions};
+use pyo3::types::{PyDict, PyTuple};
+use tiltvp_core::filter::{ComplementaryFilter as Filter, ComplementaryOptions, ComplementaryState};
 
 use crate::array::Array;
 use crate::call::exception;
@@ -72,5 +72,22 @@ impl ComplementaryFilter {
 
     fn __repr__(&self, py: Python<'_>) -> PyResult<String> {
         Ok(format!("ComplementaryFilter({})", options::shown(py, &self.inner.look(py, |filter| *filter.options()))?))
+    }
+
+    /// Sets what pickle has kept.
+    fn __setstate__(&self, py: Python<'_>, state: ([f64; 4], [f64; 3], f64)) -> PyResult<()> {
+        let (attitude, bias_rad_s, unseen_s) = state;
+        let state = ComplementaryState { attitude, bias_rad_s, unseen_s };
+        self.inner.change(py, |filter| {
+            *filter = Filter::with_state(*filter.options(), &state)?;
+            Ok(())
+        })
+    }
+
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyTuple>> {
+        let (py, this) = (slf.py(), slf.get());
+        let make = py.import("functools")?.getattr("partial")?.call((slf.get_type(),), Some(&this.options(py)?))?;
+        let state = this.inner.look(py, Filter::state);
+        (make, (this.reference_from_body(py)?,), (state.attitude, state.bias_rad_s, state.unseen_s)).into_pyobject(py)
     }
 }

@@ -3,7 +3,7 @@
 //! It is the explicit complementary filter of Mahony, Hamel and Pflimlin (2008) with corrections that arrive now and then:
 //! an attitude seen in an image, say, that is right on average, among readings of a gyroscope that drift.
 
-use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
+use nalgebra::{Matrix3, Quaternion, Rotation3, UnitQuaternion, Vector3};
 
 use crate::error::{Error, Result};
 use crate::geometry::check_rotation;
@@ -19,6 +19,17 @@ options! {
         /// Time over which a lasting difference becomes a bias of the rates, seconds.
         bias_time_constant_s: f64 = 4.0 => 1e-3..=1e9, "seconds in [1e-3, 1e9]";
     }
+}
+
+/// Everything that a filter knows.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ComplementaryState {
+    /// The attitude as the unit quaternion `[w, x, y, z]` of `reference_from_body`.
+    pub attitude: [f64; 4],
+    /// The bias of the rates, in the body's axes, rad/s.
+    pub bias_rad_s: [f64; 3],
+    /// Time since the reference was last seen, seconds.
+    pub unseen_s: f64,
 }
 
 /// A filter and its state: the attitude of a body, and the bias of the rates that turn it.
@@ -51,6 +62,28 @@ impl ComplementaryFilter {
         check_rotation("reference_from_body", attitude)?;
         let attitude = quaternion(attitude);
         Ok(Self { options, attitude, bias_rad_s: Vector3::zeros(), unseen_s: 0.0 })
+    }
+
+    /// A filter that goes on from what another one knew, to the last bit.
+    ///
+    /// # Errors
+    /// For options outside their domains; [`Error::InvalidArgument`] for a state that no filter can have.
+    pub fn with_state(options: ComplementaryOptions, state: &ComplementaryState) -> Result<Self> {
+        options.validate()?;
+        let [w, x, y, z] = state.attitude;
+        let attitude = Quaternion::new(w, x, y, z);
+        let finite = state.bias_rad_s.iter().all(|rate| rate.is_finite());
+        if !(finite && (attitude.norm() - 1.0).abs() < 1e-9 && (0.0..f64::INFINITY).contains(&state.unseen_s)) {
+            return Err(Error::argument("state", format!("{state:?}"), "a unit quaternion, finite rates, a time"));
+        }
+        let attitude = UnitQuaternion::new_unchecked(attitude);
+        Ok(Self { options, attitude, bias_rad_s: state.bias_rad_s.into(), unseen_s: state.unseen_s })
+    }
+
+    /// Everything that is known.
+    pub fn state(&self) -> ComplementaryState {
+        let attitude = [self.attitude.w, self.attitude.i, self.attitude.j, self.attitude.k];
+        ComplementaryState { attitude, bias_rad_s: self.bias_rad_s.into(), unseen_s: self.unseen_s }
     }
 
     /// How quickly it follows.
