@@ -163,7 +163,10 @@ def test_a_mask_keeps_lines_out(room: RoomImage, camera: tiltvp.Camera) -> None:
         ({"descriptor_clip": 0.0}, "clip"),
         ({"descriptor_normalisation": "none"}, "normalisation"),
         ({"method": "radial", "descriptor_kind": "profile"}, "radial lines"),
-        ({"method": "radial", "robot_from_camera": [[0, 0, 1], [-1, 0, 0], [0, -1, 0]]}, "90.0 degrees from the vertical"),
+        (
+            {"method": "radial", "robot_from_camera": [[0, 0, 1], [-1, 0, 0], [0, -1, 0]]},
+            "90.0 degrees from the vertical",
+        ),
         ({"robot_from_camera": np.zeros((3, 3))}, "rotation"),
         ({"method": "radial", "radius_min_px": 90.0, "radius_max_px": 80.0}, "radius_min_px"),
     ],

@@ -147,6 +147,10 @@ LONG = {
         camera = tiltvp.Camera.equidistant(width=8000, height=6000, focal_px=1746, cx=3999.5, cy=2999.5)
         call = lambda: tiltvp.lines.LineExtractor(camera)
     """,
+    "posterior": """
+        alpha = np.random.default_rng(1).uniform(0.0, 0.1, 3_000_000)
+        call = lambda: tiltvp.train_posterior(100.0 * alpha + 0.3, alpha, prior=tiltvp.PriorOfTilt.uniform(0.1))
+    """,
     "room": """
         call = lambda: tiltvp.synth.Room("office", 1, extent=4.0)
     """,

@@ -6,6 +6,7 @@ use super::corrected::Corrected;
 use super::shift_model::ShiftModel;
 use super::training_set::check_training;
 use crate::error::{Error, Result};
+use crate::interrupt::check;
 
 /// How leans are distributed where the robot goes, `P(alpha)`.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -174,7 +175,11 @@ pub fn train_posterior(shift: &[f64], alpha_rad: &[f64], prior: PriorOfTilt) -> 
 
     let count = (4.0 * alpha_max * model.factor / width).clamp(96.0, 600.0) as usize;
     let alphas: Vec<f64> = (0..count).map(|i| (i as f64 + 0.5) / count as f64 * alpha_max).collect();
-    let weights: Vec<f64> = alphas.iter().map(|alpha| prior_density(*alpha)).collect();
+    let weigh = |alpha: &f64| {
+        check();
+        prior_density(*alpha)
+    };
+    let weights: Vec<f64> = alphas.iter().map(weigh).collect();
 
     let largest = shift.iter().copied().fold(0.0, f64::max);
     let end = largest.max(model.factor * alpha_max + 6.0 * model.spread_at(alpha_max));

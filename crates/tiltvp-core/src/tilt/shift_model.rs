@@ -2,6 +2,7 @@
 
 use super::simplex::minimise;
 use crate::error::{Error, Result};
+use crate::interrupt::check;
 
 /// The shift `l` as the length of a plane vector with mean length `factor alpha` and, in each direction, a normal error of
 /// standard deviation `sqrt(spread^2 + (spread_per_rad alpha)^2)`: a Rice distribution, which is not zero on average where the
@@ -108,6 +109,7 @@ impl ShiftModel {
             }
         };
         let cost = |x: &[f64; 4]| -> f64 {
+            check();
             let model = model(x);
             // A weak prior bounds the parameters that the images do not determine.
             let drift = 1e-3 * x.iter().map(|x| x * x).sum::<f64>();

@@ -5,7 +5,7 @@ use pyo3::prelude::*;
 use pyo3::types::PyTuple;
 use tiltvp_core::tilt::{self as core, ShiftModel, TrainedCorrection};
 
-use crate::call::{call, exception, invalid};
+use crate::call::{call, call_long, exception, invalid};
 use crate::convert::{self, Number};
 use crate::value::{frozen, value};
 
@@ -207,7 +207,7 @@ pub(crate) fn train_posterior(
             Err(_) => return Err(invalid(format!("prior = {}, expected a tiltvp.PriorOfTilt or None", prior.repr()?))),
         },
     };
-    Ok(PosteriorCorrection { inner: call(py, || core::train_posterior(&shift, &alpha, prior))? })
+    Ok(PosteriorCorrection { inner: call_long(py, || core::train_posterior(&shift, &alpha, prior))? })
 }
 
 /// (N,): the leans in radians of shifts or raw angles (N,) of zero or more, as an estimator so corrected has them.
