@@ -211,8 +211,7 @@ def test_gaps_and_jumps_between_the_frames_are_told(tmp_path: Path) -> None:
     assert notes(kept) == (f"{name}: {gap}",)
     assert notes(TIMES < 3.6) == notes(np.arange(len(TIMES)) % 20 == 10) == ()
     anew = columns("poses")["x_m"] - np.where(TIMES > 2.0, 40.0, 0.0)
-    told = notes(TIMES >= 0.0, x_m=anew)[-1]
-    assert "1 steps that no robot makes, the first after 2.000 s by " in told
+    assert "1 steps that no robot makes, the first after 2.000 s by " in notes(TIMES >= 0.0, x_m=anew)[-1]
 
 
 @pytest.mark.parametrize("short", [1, 2])

@@ -134,8 +134,8 @@ def test_a_mirror_is_served_by_its_antipodal_vanishing_point(
 
 
 @pytest.mark.parametrize(
-    ("alpha", "beta"), [(4.0, 90.0), (-0.1, 0.0), (math.nan, 0.0), (0.1, math.nan), (0.1, math.inf)]
+    ("alpha", "beta"), [(4.0, 90.0), (-4.0, 0.0), (math.nan, 0.0), (0.1, math.nan), (0.1, math.inf)]
 )
 def test_a_lean_that_is_none_in_radians_is_refused(alpha: float, beta: float) -> None:
-    with pytest.raises(InvalidInputError, match="expected radians, alpha from 0 to pi"):
+    with pytest.raises(InvalidInputError, match="expected radians, alpha from -pi to pi"):
         tiltvp.normal_from_alpha_beta(alpha, beta)

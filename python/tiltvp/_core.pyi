@@ -656,8 +656,8 @@ class CornerDetector:
             Largest root mean square distance of the vertex from the three rays, in pixels. The default depends on the
             method.
         gradient_min
-            "general": Least gradient magnitude of an edge pixel, Scharr kernel (3, 10, 3) on 8-bit grey levels.
-            Default: 30.
+            "general": Least gradient magnitude of an edge pixel, Scharr kernel (3, 10, 3) on 8-bit grey levels. Poses
+            are also looked for at half of this and of `gradient_start` where there is none. Default: 30.
         gradient_start
             "general": Gradient magnitude of which an edge has a pixel at least; it is followed down to `gradient_min`.
             Default: 50.
@@ -3511,8 +3511,7 @@ def match_wide(
 def normal_from_alpha_beta(alpha_rad: float, beta_rad: float) -> NDArray[np.float64]:
     """(3,): the ground normal of a lean, (-sin a cos b, -sin a sin b, cos a) (eq. 1).
 
-    Raises `tiltvp.errors.InvalidInputError` for an alpha outside [0, pi], as of degrees, and angles that are not
-    finite.
+    Raises `tiltvp.errors.InvalidInputError` for an alpha beyond pi, as of degrees, and angles that are not finite.
     """
 
 def option_fields(owner: str, method: str | None = None) -> list[dict[str, Any]]:

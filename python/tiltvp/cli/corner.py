@@ -30,6 +30,7 @@ if TYPE_CHECKING:
 
     from tiltvp import Camera
     from tiltvp.corner import CornerEstimate
+    from tiltvp.robot import Robot
     from tiltvp.streams import Frame, Frames
     from tiltvp.streams.outputs.viewer import Viewer
 
@@ -142,13 +143,11 @@ def corner(
     robot = Robot.load(calibration) if is_robot(calibration) else None
     source = source.of_robot(robot, words)
     sensor = inertial.of_robot(robot).knowledge(source.topic)
-    mask = None if robot is None else robot.mask
-    camera, estimator = _searches(calibration, right is not None, method, known, mask, image_size_from(image_size))
+    camera, estimator = _searches(calibration, right is not None, method, known, robot, image_size_from(image_size))
     frames = source.open(words)
     check_apart(frames, results.overlay)
     others = None if right is None else SourceOptions(topic=topic_right).open([right], topic_option="--topic-right")
-    if others is not None:
-        check_apart(others, results.overlay)
+    check_apart(others, results.overlay)
     partners = None if others is None else partners_of(frames, others, timed=frame_rate is None)
     with watching.viewer() as viewer:
         look = Look(camera, estimator, independent, results.overlay, viewer, sensor)
@@ -234,7 +233,7 @@ def _searches(
     is_pair: bool,
     method: str,
     known: dict[str, Any],
-    mask: NDArray[np.bool_] | None,
+    robot: Robot | None,
     image_size: tuple[int, int] | None,
 ) -> tuple[Camera, Searches]:
     from tiltvp import Camera
@@ -245,6 +244,7 @@ def _searches(
     if not is_pair:
         camera = Camera.load(calibration, image_size=image_size)
         # The cuboid is told from the robot's own body by its colours.
+        mask = None if robot is None else robot.mask
         own = {name: {"mask": mask} if mask is not None and name == "general" else {} for name in methods}
         found = {name: CornerPoseEstimator(camera, method=name, **(own[name] | known)) for name in methods}
         return camera, Searches(found)

@@ -180,10 +180,12 @@ def wheel_base_of(robot: Robot | None, given_m: float | None) -> float | None:
     return given_m if robot is None or given_m is not None else robot.wheels.wheel_base_m
 
 
-def check_apart(frames: Frames, *outputs: Path | None) -> None:
+def check_apart(frames: Frames | None, *outputs: Path | None) -> None:
     """Refuses a folder that holds images to be read, whose place pictures would take, and the video that is read."""
     from tiltvp.streams.image_files import ImageFiles
 
+    if frames is None:
+        return
     read = {file.parent for file in frames.files} if isinstance(frames, ImageFiles) else {Path(frames.source)}
     places = {os.path.realpath(path) for path in read}
     for output in outputs:

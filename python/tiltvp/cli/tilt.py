@@ -106,8 +106,7 @@ def tilt(
     moved = motion.motions_of(robot, frames, wheel_base) if filtering.filter else None
     filtering = filtering.following(frames, moved)
     motions: Iterable[Motion | None] = repeat(Motion()) if moved is None else moved.motions
-    estimator = _checked(estimator, frames)
-    work, judge = Work(estimator, overlay, level, filtering, showing.asked), filtering.judge()
+    work, judge = Work(_checked(estimator, frames), overlay, level, filtering, showing.asked), filtering.judge()
     if cluster is not None and out is not None:
         return tilts_on_cluster(cluster, files_of(frames), work, out)
     answers = Answers(frames.count is not None, estimator.method, out, filtering, frame_rate)

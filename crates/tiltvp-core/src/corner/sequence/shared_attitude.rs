@@ -99,7 +99,7 @@ mod tests {
         let about = |method: &str, angle: IncludedAngle, down: Option<Vector3<f64>>| {
             let detector =
                 CornerDetector::new(camera.clone(), DetectorOptions::for_method(method).unwrap(), None).unwrap();
-            let options = EstimatorOptions { down, angle, ..EstimatorOptions::default() };
+            let options = EstimatorOptions { angle, down, ..EstimatorOptions::default() };
             CornerPoseEstimator::new(detector, None, options).unwrap().about_vertical()
         };
         let attitude = about("general", IncludedAngle::RIGHT, Some(down)).unwrap();
