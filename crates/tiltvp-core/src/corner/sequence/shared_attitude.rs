@@ -86,15 +86,16 @@ mod tests {
     use nalgebra::Vector3;
 
     use super::*;
+    use crate::camera::{Camera, Model, Pinhole};
     use crate::corner::closed_form::attitude::IncludedAngle;
     use crate::corner::detector::CornerDetector;
     use crate::corner::estimator_options::EstimatorOptions;
     use crate::corner::options::DetectorOptions;
-    use crate::testing::zoo;
 
     #[test]
     fn the_vertical_is_the_second_axis_where_angles_are_right_and_there_may_be_several_corners() {
-        let camera = zoo().into_iter().next().unwrap().1;
+        let lens = Pinhole::new([700.0; 2], [639.5, 359.5], &[]).unwrap();
+        let camera = Camera::new(1280, 720, Model::Pinhole(lens)).unwrap();
         let down = Vector3::new(0.1, 0.9, 0.4).normalize();
         let about = |method: &str, angle: IncludedAngle, down: Option<Vector3<f64>>| {
             let detector =
