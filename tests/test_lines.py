@@ -88,6 +88,8 @@ def test_a_lean_is_told_by_any_two_or_three_numbers(room: RoomImage, camera: til
         assert extractor(room.gray, lean) == told
         assert extractor.lines_at(told.bearing_rad, lean) == extractor.lines_at(told.bearing_rad, (0.05, 0.3))
     assert extractor(room.gray) != told
+    with pytest.raises(InvalidInputError, match="alpha = 4, expected radians"):
+        extractor(room.gray, (4.0, 17.0))
 
 
 def test_extractor_is_a_value_and_takes_any_usual_image(room: RoomImage, camera: tiltvp.Camera) -> None:

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 import tiltvp
-from tiltvp.errors import InvalidInputError
 from tiltvp.synth import RoomImage
 
 LARGEST_ERROR_DEG = {
@@ -131,11 +130,3 @@ def test_a_mirror_is_served_by_its_antipodal_vanishing_point(
         assert seen.normal == pytest.approx(plain.normal * [-1.0, -1.0, 1.0], abs=1e-6)
         turned = tiltvp.TiltEstimator(mirror, robot_from_camera=down)(image)
         assert turned.normal == pytest.approx(plain.normal * [1.0, -1.0, 1.0], abs=1e-6)
-
-
-@pytest.mark.parametrize(
-    ("alpha", "beta"), [(4.0, 90.0), (-4.0, 0.0), (math.nan, 0.0), (0.1, math.nan), (0.1, math.inf)]
-)
-def test_a_lean_that_is_none_in_radians_is_refused(alpha: float, beta: float) -> None:
-    with pytest.raises(InvalidInputError, match="expected radians, alpha from -pi to pi"):
-        tiltvp.normal_from_alpha_beta(alpha, beta)

@@ -3509,10 +3509,7 @@ def match_wide(
     """
 
 def normal_from_alpha_beta(alpha_rad: float, beta_rad: float) -> NDArray[np.float64]:
-    """(3,): the ground normal of a lean, (-sin a cos b, -sin a sin b, cos a) (eq. 1).
-
-    Raises `tiltvp.errors.InvalidInputError` for an alpha beyond pi, as of degrees, and angles that are not finite.
-    """
+    """(3,): the ground normal of a lean, (-sin a cos b, -sin a sin b, cos a) (eq. 1)."""
 
 def option_fields(owner: str, method: str | None = None) -> list[dict[str, Any]]:
     """The options of a class or function, and of one of its methods; a `Drive` has "legs" as a method.

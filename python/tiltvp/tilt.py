@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any, Final, Self
 
@@ -56,7 +57,7 @@ _FIXED: Final = ("camera", "method", "robot_from_camera")
 def normal_of(tilt: Tilt) -> NDArray[np.float64]:
     """(3,): the ground normal of an estimate, a filter's or an image's, of (alpha_rad, beta_rad), or of a normal.
 
-    Raises `InvalidInputError` for an estimate without a tilt and for anything else.
+    Raises `InvalidInputError` for an estimate without a tilt, an alpha beyond pi, as of degrees, and for anything else.
     """
     if isinstance(tilt, TiltEstimate | FilteredTilt):
         if not tilt:
@@ -67,6 +68,8 @@ def normal_of(tilt: Tilt) -> NDArray[np.float64]:
     except (TypeError, ValueError):
         numbers = np.empty(0)
     if numbers.shape == (2,):
+        if abs(numbers[0]) > math.pi:
+            raise InvalidInputError(f"tilt: alpha = {numbers[0]:g}, expected radians, at most pi")
         return normal_from_alpha_beta(*numbers.tolist())
     if numbers.shape != (3,):
         raise InvalidInputError(f"tilt = {tilt!r}, expected an estimate, (alpha_rad, beta_rad) or a normal (3,)")

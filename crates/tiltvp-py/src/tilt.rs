@@ -9,7 +9,6 @@ mod image_edges;
 mod report;
 mod values;
 
-use std::f64::consts::PI;
 use std::sync::Arc;
 
 use numpy::{PyArray1, PyArrayMethods};
@@ -225,14 +224,11 @@ pub(crate) fn tilt_error_rad(a: &Bound<'_, PyAny>, b: &Bound<'_, PyAny>) -> PyRe
 }
 
 /// (3,): the ground normal of a lean, (-sin a cos b, -sin a sin b, cos a) (eq. 1).
-///
-/// Raises `tiltvp.errors.InvalidInputError` for an alpha beyond pi, as of degrees, and angles that are not finite.
 #[pyfunction]
 pub(crate) fn normal_from_alpha_beta(py: Python<'_>, alpha_rad: Number, beta_rad: Number) -> PyResult<Array<'_, f64>> {
     let (alpha_rad, beta_rad) = (alpha_rad.0, beta_rad.0);
-    if !((-PI..=PI).contains(&alpha_rad) && beta_rad.is_finite()) {
-        let expected = "expected radians, alpha from -pi to pi and beta finite";
-        return Err(invalid(format!("alpha_rad, beta_rad = {alpha_rad}, {beta_rad}, {expected}")));
+    if !(alpha_rad.is_finite() && beta_rad.is_finite()) {
+        return Err(invalid(format!("alpha_rad, beta_rad = {alpha_rad}, {beta_rad}, expected finite angles")));
     }
     convert::to_matrix(py, &Tilt::from_alpha_beta(alpha_rad, beta_rad).normal())
 }
