@@ -159,11 +159,13 @@ impl PairSearch<'_> {
         if !within || !estimator.is_upright(pose) {
             return Ok(None);
         }
-        // What is not shown to begin at a vertex may be beside it.
-        let poses = match (&shown, [0, 1].map(|side| begin[side].loosened(features[side], [false; 3]))) {
-            (Some(_), _) => poses,
-            (None, [Some(left), Some(right)]) => of(&[left, right], misfit_most)?,
-            (None, _) => return Ok(None),
+        let poses = if shown.is_some() {
+            poses
+        } else {
+            // What is not shown to begin at a vertex may be beside it.
+            let loose = [0, 1].map(|side| begin[side].loosened(features[side], [false; 3]));
+            let [Some(left), Some(right)] = loose else { return Ok(None) };
+            of(&[left, right], misfit_most)?
         };
         let Some(pose) = poses.first() else { return Ok(None) };
         let fits_well = misfit <= WELL * estimator.options.misfit_max;
