@@ -51,6 +51,10 @@ def corners_real(folder: Path, /, *, overlay: Path | None = None) -> None:
             f"after one turn {words}: rms, median, largest (deg)", f"{rms:.2f} {median:.2f} {errors.max():.2f}"
         )
     table.add_row("vertical of the cabinet from that of the capture (deg)", f"{found.lean_deg:.2f}")
+    median, most = np.quantile(found.nees, [0.5, 0.9])
+    table.add_row("NEES of 3, with the capture's own errors: median, 90 %", f"{median:.1f} {most:.0f}")
+    own, told = np.nanmedian(found.edges_off_deg, axis=0)
+    table.add_row("LSD's edges off the axes: as estimated, as captured (deg)", f"{own:.2f} {told:.2f}")
     show(table)
 
     box_folder = folder / "visp_teabox_stereo"

@@ -10,6 +10,7 @@ from itertools import product
 from pathlib import Path
 from typing import Final
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -44,6 +45,10 @@ TEA_BOX_MM: Final = {"long": 165.0, "depth": 68.0, "height": 80.0}
 """By ViSP's model of the box."""
 _INTRINSICS: Final = (535.4, 539.2, 320.1, 247.6)
 _LONG_MM: Final = 110.0
+_LINE_PX: Final = 25.0
+"""Shorter lines tell a direction to a degree."""
+_NEAR_DEG: Final = 4.0
+"""Lines farther from the axes of both attitudes than the larger of their differences are of other things."""
 
 
 @dataclass(frozen=True)
@@ -59,6 +64,11 @@ class Cabinet:
     """(N,): the same after one constant turn about any axis."""
     lean_deg: float
     """How far the cabinet's vertical is from that of the motion capture."""
+    nees: Matrix
+    """(N,): `error_deg` squared by the stated covariance, 3 on average at best."""
+    edges_off_deg: Matrix
+    """(N, 2): how far edges of OpenCV's LSD are off their axes, their median by length, where the axes are as estimated,
+    and as the capture has them. We do not find these edges, so that they tell which of the two is wrong."""
 
 
 @dataclass(frozen=True)
@@ -88,7 +98,7 @@ def cabinet(folder: Path, advance: Callable[[], None] = lambda: None, show: Show
     if not files or len(files) != len(truth):
         raise InvalidInputError(f"{folder}: {len(files)} images and {len(truth)} poses, expected as many of both")
     estimator = CornerPoseEstimator(cabinet_camera(), method="general", down=_down(CABINET_PITCH_DEG))
-    places, seen = [], []
+    places, seen, looks = [], [], []
     for place, file in enumerate(files):
         image = read_image(file)
         estimate = estimator(image)
@@ -97,6 +107,7 @@ def cabinet(folder: Path, advance: Callable[[], None] = lambda: None, show: Show
         if estimate.pose is not None:
             places.append(place)
             seen.append(_rotation(truth[place, 4:8]) @ estimate.pose.camera_from_object)
+            looks.append((_line_normals(image), estimate.pose.covariance[:3, :3]))
         advance()
     if not seen:
         raise InvalidInputError(f"{folder}: no corner in any image")
@@ -113,7 +124,45 @@ def cabinet(folder: Path, advance: Callable[[], None] = lambda: None, show: Show
     for _ in range(5):
         level = level @ _exp(np.array([0.0, np.mean([_log(level.T @ turn)[1] for turn in renamed]), 0.0]))
     errors = [[np.degrees(np.linalg.norm(_log(one.T @ turn))) for turn in renamed] for one in (level, mean)]
-    return Cabinet(len(files), np.array(places), np.array(errors[0]), np.array(errors[1]), math.degrees(lean))
+    nees, edges = [], []
+    for place, turn, (lines, covariance) in zip(places, renamed, looks, strict=True):
+        from_capture = _rotation(truth[place, 4:8]).T
+        own, told = from_capture @ turn, from_capture @ level
+        error = _log(own @ told.T)
+        nees.append(error @ np.linalg.solve(covariance, error))
+        edges.append(_off_axes_deg(*lines, (own, told)))
+    return Cabinet(
+        len(files),
+        np.array(places),
+        np.array(errors[0]),
+        np.array(errors[1]),
+        math.degrees(lean),
+        np.array(nees),
+        np.array(edges),
+    )
+
+
+def _line_normals(image: NDArray[np.uint8]) -> tuple[Matrix, Matrix]:
+    """The normals (K, 3) of the great circles of OpenCV's line segments in an image of the cabinet, and their lengths, pixels."""
+    found = cv2.createLineSegmentDetector().detect(image if image.ndim == 2 else image.mean(axis=2).astype(np.uint8))[0]
+    ends = np.zeros((0, 2, 2)) if found is None else np.float64(found.reshape(-1, 2, 2))
+    lengths = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
+    ends, lengths = ends[lengths >= _LINE_PX], lengths[lengths >= _LINE_PX]
+    lens = cabinet_camera()
+    normals = np.cross(lens.unproject(ends[:, 0]), lens.unproject(ends[:, 1]))
+    return normals / np.linalg.norm(normals, axis=1, keepdims=True), lengths
+
+
+def _off_axes_deg(normals: Matrix, lengths: Matrix, attitudes: tuple[Matrix, Matrix]) -> tuple[float, float]:
+    """How far lines are from the nearest axis of either attitude, medians by length, of those near one of both."""
+    off = np.degrees([np.arcsin(np.abs(normals @ attitude).min(axis=1)) for attitude in attitudes])
+    near = off.max(axis=0) <= _NEAR_DEG
+    medians = []
+    for one in off[:, near]:
+        order = np.argsort(one)
+        half = np.searchsorted(np.cumsum(lengths[near][order]), 0.5 * lengths[near].sum())
+        medians.append(float(one[order][half]) if near.any() else math.nan)
+    return medians[0], medians[1]
 
 
 def cabinet_camera() -> Camera:

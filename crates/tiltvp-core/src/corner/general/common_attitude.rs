@@ -13,7 +13,7 @@ const END_SIGMA_PX: f64 = 0.3;
 
 /// How parallel edges of buildings and furniture are at best: 0.03 degrees, half a millimetre on a metre. Halved, a
 /// real box turns 0.286 instead of 0.244 degrees from frame to frame.
-const PARALLEL_SIGMA_RAD: f64 = 0.03 * std::f64::consts::PI / 180.0;
+pub(crate) const PARALLEL_SIGMA_RAD: f64 = 0.03 * std::f64::consts::PI / 180.0;
 
 /// How far the attitude from which the search begins may be off, as a standard deviation: 3 degrees, below the 4
 /// degrees at which corners still agree.

@@ -2,13 +2,13 @@
 
 use nalgebra::{Matrix3, Matrix6, Vector3};
 
-use super::agreement::{SAME_VERTEX_RAD, agreement, fits, renamed};
+use super::agreement::{SAME_VERTEX_RAD, agreement, as_scattered, fits, renamed};
 use super::frame_knowledge::FrameKnowledge;
 use super::names::CornerNames;
 use super::seen_pair::SeenPair;
 use super::track::Track;
 use crate::corner::closed_form::attitude::IncludedAngle;
-use crate::corner::closed_form::resolve::{Alignment, View, resolve};
+use crate::corner::closed_form::resolve::{Alignment, ResolvedAttitude, View, resolve};
 use crate::corner::detector::{CornerDetector, CornerScratch};
 use crate::corner::estimate::{BelievedCorner, CornerEstimate, CornerVerdict, Hypothesis, PlaceVerdict};
 use crate::corner::estimator_options::{EstimatorOptions, KnownEdge};
@@ -285,12 +285,16 @@ impl CornerPoseEstimator {
         let views: Vec<View<'_>> = agreed.attitudes.iter().map(view).collect();
         let alignment = if views.len() > 1 { Alignment::Manhattan } else { Alignment::Same };
         let resolved = resolve(&views, alignment, self.right_handed(), &priors)?;
+        let of = |attitude: &ResolvedAttitude| match self.is_one_object() {
+            true => attitude.covariance,
+            false => as_scattered(attitude, views.len()),
+        };
         let hypotheses: Vec<Hypothesis> = resolved
             .iter()
             .filter_map(|resolved| {
                 let chosen = agreed.attitudes.first()?.get(*resolved.choice.first()?)?;
                 let mut covariance = Matrix6::zeros();
-                covariance.fixed_view_mut::<3, 3>(0, 0).copy_from(&resolved.covariance);
+                covariance.fixed_view_mut::<3, 3>(0, 0).copy_from(&of(resolved));
                 Some(Hypothesis {
                     camera_from_object: self.named(resolved.common_from_object),
                     edges: chosen.edges,

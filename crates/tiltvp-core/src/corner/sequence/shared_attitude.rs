@@ -1,4 +1,4 @@
-//! The attitude that most edges of a pair of images have in common, by which corners are completed and judged.
+//! The attitude that most edges of the images have in common, by which corners are completed and judged.
 
 use nalgebra::Matrix3;
 
@@ -17,7 +17,7 @@ use crate::geometry::tangent_basis;
 /// of diamonds, where nothing but the corner's own long edges runs along them, 0.18.
 const AT_RANDOM: f64 = 0.15;
 
-/// Least number of edges of both images that speak against a pose which few of them are along.
+/// Least number of edges of all images that speak against a pose which few of them are along.
 const EDGES_MIN: usize = 40;
 
 impl CornerPoseEstimator {
@@ -63,7 +63,7 @@ impl CornerPoseEstimator {
     /// Whether no more of the straight edges runs along the axes of a pose than of random ones: then nothing but three short edges of
     /// its own says that they are at right angles.
     pub(crate) fn stands_alone(&self, pose: &Hypothesis) -> bool {
-        if self.right.is_none() || self.is_one_object() || self.options.angle != IncludedAngle::RIGHT {
+        if self.is_one_object() || self.options.angle != IncludedAngle::RIGHT {
             return false;
         }
         let lines = self.lines();
