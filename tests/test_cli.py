@@ -159,6 +159,14 @@ def test_tilt_writes_the_same_numbers_as_the_library(run: Run, world: Path, tmp_
         assert row["normal_z"] == expected.normal[2]
         assert row["inlier_pixels"] == expected.inlier_pixels
         assert (row["method"], row["reason"], row["error"]) == ("refined", expected.report.reason, None)
+        told = expected.to_dict()
+        several = ["normal", "covariance_rad2"]
+        assert [name for name in told if name not in row] == several, "a field without a column in cli/results.py"
+        assert {name: row[name] for name in told if name not in several} == {
+            name: value for name, value in told.items() if name not in several
+        }
+        unfilled = [name for name, value in row.items() if value is None]
+        assert unfilled == ["shift_px", "error"], "a column of cli/results.py that no field fills"
         true = tiltvp.normal_from_alpha_beta(ALPHA_RAD, BETA_RAD)
         assert tiltvp.tilt_error_rad(expected.normal, true) < math.radians(2.0)
     assert f"{math.degrees(table['alpha_rad'][0]):.2f}" in said.out

@@ -201,10 +201,7 @@ def _row(outcome: Outcome) -> dict[str, object]:
     e = outcome.estimate
     if e is None:
         return {"error": outcome.error}
-    row = _numbers(e)
-    row |= {name: getattr(e, name) for name in ("edge_pixels", "prefiltered_pixels", "inlier_pixels", "shift_px")}
-    row |= e.report.to_dict()
-    return row | {"time_s": outcome.time_s}
+    return e.to_dict() | _numbers(e) | {"time_s": outcome.time_s}
 
 
 def _judged(outcome: Outcome) -> dict[str, object]:
