@@ -29,6 +29,13 @@ CAMERAS = {
     "double-sphere": tiltvp.Camera.double_sphere(
         width=320, height=240, fx=120.0, fy=120.0, cx=160.0, cy=119.0, xi=-0.2, alpha=0.55
     ),
+    "extended-unified": tiltvp.Camera.extended_unified(
+        width=320, height=240, fx=110.0, fy=111.0, cx=160.0, cy=119.0, alpha=0.6, beta=1.05
+    ),
+    "radial-polynomial": tiltvp.Camera.radial_polynomial(
+        width=320, height=240, k1=85.0, k2=-8.0, k3=12.0, k4=-1.8, cx=160.0, cy=119.0, aspect_ratio=1.02,
+        max_theta_rad=1.6,
+    ),
     "ocam": tiltvp.Camera.ocam(
         width=320, height=240, polynomial=[-70.0, 0.0, 2e-3, -3e-6, 2e-8], cx=160.0, cy=119.0, max_theta_rad=1.6
     ),
