@@ -19,6 +19,11 @@ from tiltvp.errors import (
 from tiltvp.formats import FORMATS, CameraSpec, read_cameras
 
 
+def test_every_format_has_a_sample() -> None:
+    known = {sample.format for sample in SAMPLES.values()} | {"opencv-pinhole", "opencv-fisheye"}  # Never recognised.
+    assert [one.name for one in FORMATS if one.name not in known] == [], "no file of it in calibration_texts.py"
+
+
 @pytest.mark.parametrize("key", SAMPLES)
 @pytest.mark.parametrize("explicit", [False, True])
 def test_reads_model_and_numbers(read: Read, key: str, explicit: bool) -> None:
