@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import os
+import re
 import sys
 from pathlib import Path
 from types import SimpleNamespace
@@ -14,6 +15,7 @@ import pytest
 import tiltvp
 from commands import Run
 from recordings import START_S, Bag
+from tiltvp import _core
 from tiltvp.synth import RoomImage
 
 pytestmark = pytest.mark.slow
@@ -66,6 +68,21 @@ def test_names_come_on_stdin_wherever_the_dash_stands(
     )
     assert (said.code, said.err) == (0, "")
     assert "1 image: lean" in said.out
+
+
+@pytest.mark.parametrize(
+    ("verb", "methods"),
+    [
+        ("tilt", _core.METHODS),
+        ("lines", _core.LINE_METHODS),
+        ("track", _core.LINE_METHODS),
+        ("corner", _core.CORNER_METHODS),
+        ("calibrate", _core.CALIBRATION_METHODS),
+    ],
+)
+def test_help_names_every_method(run: Run, verb: str, methods: list[str]) -> None:
+    told = re.findall(r"--(?:line-)?method STR(.*?)(?=--|╰)", run(verb, "--help").out, re.DOTALL)[0]
+    assert [method for method in methods if method not in told] == [], told
 
 
 @pytest.mark.parametrize("verb", ["lines", "segments", "track", "corner"])

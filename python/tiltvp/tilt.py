@@ -103,6 +103,8 @@ class TiltEstimator(_core.TiltEstimator):
     sampling, local_optimization, score
         Of "image-space-ransac" and "vector-consensus": "uniform" (default) or "progressive"; a bool; "count" (default)
         or "msac".
+    gradient_start, stray_max_px, rms_max_px, support_min_px, gap_max, scatter_rad, segments_max
+        Of "segments"; it takes every row: `row_stride` is 1.
     """
 
     __slots__ = ()
