@@ -1,9 +1,11 @@
-"""What a command leaves, for the tests of the command line."""
+"""What a command leaves, and which there are, for the tests of the command line."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import NamedTuple
+
+from cyclopts import App
 
 
 class Said(NamedTuple):
@@ -23,3 +25,12 @@ class Said(NamedTuple):
 
 
 Run = Callable[..., Said]
+
+
+def verbs(of: App, before: tuple[str, ...] = ()) -> Iterator[tuple[str, ...]]:
+    """The words of every command."""
+    names = [name for name in of if not name.startswith("-")]
+    if not names:
+        yield before
+    for name in names:
+        yield from verbs(of[name], (*before, name))

@@ -8,17 +8,15 @@ import os
 import re
 import subprocess
 import sys
-from collections.abc import Iterator
 from pathlib import Path
 
 import cv2
 import numpy as np
 import polars as pl
 import pytest
-from cyclopts import App
 
 import tiltvp
-from commands import Run, Said
+from commands import Run, Said, verbs
 from tiltvp.cli.app import app
 from tiltvp.synth import render_room
 
@@ -60,15 +58,6 @@ def test_help_is_quick_and_names_the_commands(run: Run) -> None:
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True, timeout=60)
     for heavy in ("polars", "matplotlib"):
         assert f"'{heavy}'" not in done.stdout
-
-
-def verbs(of: App, before: tuple[str, ...] = ()) -> Iterator[tuple[str, ...]]:
-    """The words of every command."""
-    names = [name for name in of if not name.startswith("-")]
-    if not names:
-        yield before
-    for name in names:
-        yield from verbs(of[name], (*before, name))
 
 
 @pytest.mark.slow

@@ -13,6 +13,8 @@ import numpy as np
 import pytest
 
 import tiltvp
+from commands import verbs
+from tiltvp.cli.app import app
 from tiltvp.formats import FORMATS
 
 ROOT = Path(__file__).parents[1]
@@ -56,6 +58,35 @@ def test_commands_and_their_options_exist(command: str) -> None:
     assert done.returncode == 0, done.stderr
     for option in (word for word in words if word.startswith("--")):
         assert re.search(rf"{option}\b", done.stdout), option
+
+
+def commands_of(page: Path) -> list[list[str]]:
+    """The words of the commands on a page: of consoles, and within a line."""
+    text = page.read_text(encoding="utf-8")
+    consoles = re.findall(r"^```console\n(.*?)^```$", text.replace("\\\n", " "), re.MULTILINE | re.DOTALL)
+    lines = [line for console in consoles for line in console.splitlines() if line.startswith("tiltvp ")]
+    lines += re.findall(r"`(tiltvp [^`]+)`", text)
+    return [re.split(r" [|>&#]", line)[0].split()[1:] for line in lines]
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.relative_to(ROOT).as_posix())
+def test_the_commands_of_a_page_have_such_options(page: Path) -> None:
+    if page.name == "CHANGELOG.md":  # It tells of some that are gone.
+        return
+    for words in commands_of(page):
+        _, commands, rest = app.parse_commands(words)
+        if commands[-1].default_command is None:
+            assert rest == [], words
+            continue
+        known = {name for one in commands[-1].assemble_argument_collection() for name in one.names} | {"--overwrite"}
+        given = [word.partition("=")[0] for word in rest if word.startswith("--")]
+        assert [word for word in given if word not in known] == [], words
+
+
+def test_every_verb_is_in_a_guide_or_in_a_recipe() -> None:
+    told = "\n".join(page.read_text(encoding="utf-8") for page in [*(ROOT / "docs").glob("*.md"), ROOT / "justfile"])
+    missing = [verb for verb in map(" ".join, verbs(app)) if not re.search(rf"tiltvp {verb}\b", told)]
+    assert missing == [], "on no page of docs/, and in no recipe of the justfile"
 
 
 def test_recipes_exist() -> None:
