@@ -53,8 +53,8 @@ install-packages +packages:
     $root apt-get update --quiet --quiet
     DEBIAN_FRONTEND=noninteractive $root apt-get install --quiet --quiet --yes --no-install-recommends {{packages}} > /dev/null
 
-# The wheel in a bare environment, the notebooks, and the tests that want a browser, a screen and valgrind: the page of a report, the
-# window of `--show`, and what an image costs in instructions.
+# Those are the page of a report, the window of `--show`, and what an image costs in instructions.
+# The wheel in a bare environment, the notebooks, and the tests that want a browser, a screen and valgrind.
 test-system *arguments: setup system-programs smoke notebooks
     {{bin}}/pytest --quiet --numprocesses 2 --dist loadfile tests/system {{arguments}}
     cargo test --locked --workspace --test instructions --quiet
@@ -83,8 +83,8 @@ deny *arguments:
 crates *arguments:
     cargo publish --dry-run --locked --package tiltvp-kernels --package tiltvp-core {{arguments}}
 
-# The core for 64-bit ARM, by the compiler alone. (Not among the tests: it needs the target's standard library, `rustup target add
-# aarch64-unknown-linux-gnu`.)
+# Not among the tests: it needs the target's standard library, `rustup target add aarch64-unknown-linux-gnu`.
+# The core for 64-bit ARM, by the compiler alone.
 check-aarch64:
     cargo check --locked --package tiltvp-core --target aarch64-unknown-linux-gnu
 
@@ -192,8 +192,8 @@ fuzz seconds="3600": nightly
             -max_total_time=$(({{seconds}} / 2 / $(wc -w <<< $targets) + 1)) -artifact_prefix=out/fuzz/$target- -print_final_stats=1
     done
 
-# The unit tests of kernels and core under AddressSanitizer, at each level of vectors that the machine has, and of the C interface; what
-# runs on several threads under ThreadSanitizer.
+# Kernels and core are tested at each level of vectors that the machine has.
+# The unit tests of kernels, core and C interface under AddressSanitizer; what runs on several threads under ThreadSanitizer.
 sanitize: setup nightly
     #!/usr/bin/env bash
     set -euo pipefail
@@ -233,8 +233,8 @@ measure-panoramas *arguments: setup
 measure-views *arguments: setup
     {{bin}}/tiltvp measure views "$TILTVP_DATA/panos" {{arguments}}
 
-# The paper's sweep on views of all panoramas of TILTVP_DATA and on rendered rooms, as they are and made harder: the tables,
-# how far covariance and confidence can be trusted, and the report. Remove out/database to begin anew.
+# The tables, how far covariance and confidence can be trusted, and the report. Remove out/database to begin anew.
+# The paper's sweep on views of all panoramas of TILTVP_DATA and on rendered rooms, as they are and made harder.
 measure-database *arguments: setup
     test -d out/database/panoramas || {{bin}}/tiltvp dataset render --panoramas "$TILTVP_DATA/panos" --out out/database/panoramas
     test -d out/database/rooms || {{bin}}/tiltvp dataset synth --rooms 18 --locations-per-room 2 --samples 2 --out out/database/rooms
@@ -404,8 +404,8 @@ measure-install: smoke
 bench *arguments:
     cargo bench --locked --package tiltvp-benches {{arguments}}
 
-# What every submission must pass.
-ci: test test-system
+# What every submission must pass, as .ci/run has it.
+ci: test test-system test-real
 
 # Writes formatted sources.
 format:

@@ -95,6 +95,21 @@ def test_recipes_exist() -> None:
         assert named <= RECIPES, (page.name, named - RECIPES)
 
 
+def test_recipes_are_told_in_the_one_line_that_is_listed() -> None:
+    """`just --list` has the last line above a recipe, so no sentence may begin before it."""
+    lines = (ROOT / "justfile").read_text(encoding="utf-8").splitlines()
+    comments = [line if line.startswith("#") else "" for line in lines]
+    told = {
+        line: comments[i - 2 : i]
+        for i, line in enumerate(lines)
+        if re.match(r"[a-z][a-z0-9-]*(?: [^:]*)?:(?!=)", line) and lines[i - 1] != "[private]"
+    }
+    assert len(told) > 50
+    for recipe, (before, line) in told.items():
+        assert re.match(r"# [A-Z0-9`].*\.\)?$", line), recipe
+        assert re.match(r"(#.*[.)])?$", before), recipe
+
+
 def test_how_to_install_and_the_two_commands() -> None:
     assert "pip install ." in CONSOLE
     lines = [line for line in CONSOLE if "rust-just" in line]
