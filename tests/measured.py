@@ -1,13 +1,15 @@
 """Runs of the measurements that are kept in `docs/measured/`: `just record RECIPE` runs one and keeps what it prints.
 
 A kept run carries the date and the hash of the golden answers that its numbers rest on. When an answer changes, so does
-the hash, and tests/test_measured.py asks for a new run.
+the hash, and tests/test_measured.py asks for a new run. Questions and fields that are new change no answer: `just
+golden` writes the new hash into the runs.
 """
 
 from __future__ import annotations
 
 import datetime
 import hashlib
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -45,6 +47,19 @@ def answers_hash(recipe: str) -> str:
     for group in RESTS_ON[recipe]:
         digest.update((ROOT / "tests" / "golden" / f"{group}.json").read_bytes())
     return digest.hexdigest()[:16]
+
+
+def is_of_kept_answers(recipe: str) -> bool:
+    """Whether there is a kept run, of the answers that are kept now."""
+    path = RUNS / f"{recipe}.txt"
+    return path.exists() and f"\nanswers: {answers_hash(recipe)}\n" in path.read_text(encoding="utf-8")
+
+
+def stamp(recipe: str) -> None:
+    """Says of a kept run that it is of the answers that are kept now."""
+    path = RUNS / f"{recipe}.txt"
+    said = f"\nanswers: {answers_hash(recipe)}\n"
+    path.write_text(re.sub(r"\nanswers: .*\n", said, path.read_text(encoding="utf-8"), count=1), encoding="utf-8")
 
 
 def header(recipe: str, arguments: list[str]) -> str:
