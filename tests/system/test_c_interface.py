@@ -14,7 +14,6 @@ import tiltvp
 
 ROOT = Path(__file__).parents[2]
 GUIDE = (ROOT / "docs" / "c.md").read_text(encoding="utf-8")
-EXAMPLES = ROOT / "crates" / "tiltvp-capi" / "examples"
 INCLUDE = ROOT / "crates" / "tiltvp-capi" / "include"
 # Memory that is still reachable at the end is that of the runtime of Rust.
 LEAKS = ["--leak-check=full", "--errors-for-leak-kinds=definite,indirect,possible"]

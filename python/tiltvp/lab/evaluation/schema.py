@@ -6,13 +6,10 @@ from typing import Final
 
 import polars as pl
 
-__all__ = ["COLUMNS", "CORRECTIONS", "TIMES", "UNCORRECTED", "sorted_rows", "without_times"]
-
-UNCORRECTED: Final = ("none", "closed-form")
-"""The corrections of rows that a fit gives: the paper's angle before any factor, and the gain of each pixel."""
+__all__ = ["COLUMNS", "CORRECTIONS", "TIMES", "sorted_rows", "without_times"]
 
 CORRECTIONS: Final = ("none", "factor", "affine", "posterior", "closed-form")
-"""All of them, in the order of rows: those in the middle are trained on the other locations."""
+"""The corrections in the order of rows: those in the middle are trained on the other locations."""
 
 COLUMNS: Final[dict[str, type[pl.DataType]]] = {
     # The image: number in the dataset, and the true lean. `yaw_rad` is the heading of the view.
