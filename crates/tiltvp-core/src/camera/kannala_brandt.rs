@@ -1,7 +1,7 @@
 //! The fisheye of Kannala and Brandt, OpenCV's `fisheye` and Kalibr's `equidistant`, followed to where its image folds.
 
 use super::grid::{self, PixelGrid};
-use super::polynomial::evaluate;
+use super::polynomial::{evaluate, fold_rad};
 use super::profile::{Inverse, Profile};
 use super::rim::FOLD;
 use super::schema::{CX, CY, FX, FY, LensSchema, Parameter, ParameterSchema, scalars};
@@ -60,7 +60,8 @@ impl KannalaBrandt {
         let [k1, k2, k3, k4] = coefficients;
         let factor = [1.0, k1, k2, k3, k4];
         let slope = [1.0 - FOLD, 0.0, 3.0 * k1, 0.0, 5.0 * k2, 0.0, 7.0 * k3, 0.0, 9.0 * k4];
-        let inverse = Inverse::new(NAME, coefficients, &slope, |theta| profile(&factor, theta))?;
+        let inverse =
+            Inverse::new(NAME, ("k1 .. k4", &coefficients), fold_rad(&slope), |theta| profile(&factor, theta))?;
         Ok(Self { grid, factor, inverse })
     }
 

@@ -9,8 +9,9 @@
 //! 3. `testing.rs`: one calibration or more in the zoo, which `tests/camera_conformance.rs` holds to its promises; a test
 //!    fails for a lens that is not there.
 //! 4. `docs/cameras.md`: its row, with the formula; a test compares the parameters.
-//! 5. `python/tiltvp/formats/`: a reader, if files of other programs have the lens.
-//! 6. `CHANGELOG.md`.
+//! 5. `tests/golden/cases.py`: a camera, whose answers `just golden cameras` keeps.
+//! 6. `python/tiltvp/formats/`: a reader, if files of other programs have the lens.
+//! 7. `CHANGELOG.md`.
 //!
 //! Its constructor in Python, the reader and writer of our own files, resizing and the refusals follow from the schema; `just stub`
 //! writes the stub of the constructors.

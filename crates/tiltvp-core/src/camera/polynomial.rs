@@ -1,5 +1,7 @@
 //! Polynomials with real coefficients, lowest power first: values, slopes and the first place where one falls to zero.
 
+use std::f64::consts::PI;
+
 /// `(p(x), p'(x))` by Horner's rule.
 #[inline]
 pub(super) fn evaluate(coefficients: &[f64], x: f64) -> (f64, f64) {
@@ -53,6 +55,11 @@ pub(super) fn first_fall(coefficients: &[f64], end: f64) -> Option<f64> {
         low = knot;
     }
     None
+}
+
+/// How far from the axis a profile grows: to where its slope, a polynomial in `theta` less that of the fold, falls to zero, or to pi.
+pub(super) fn fold_rad(slope: &[f64]) -> f64 {
+    first_fall(slope, PI).unwrap_or(PI)
 }
 
 /// Every real root in `(0, end)` where the sign changes, in order.

@@ -1,12 +1,9 @@
 //! Lenses that are round about their axis and whose radius has no inverse in closed form: a root, from a table's guess.
 
-use std::f64::consts::PI;
-
 use nalgebra::{Matrix2x3, Matrix3x2, Vector2, Vector3};
 
 use super::grid::PixelGrid;
 use super::lens::Lens;
-use super::polynomial::first_fall;
 use super::radial::{self, Radial};
 use super::rim::NARROWEST_RAD;
 use super::solve;
@@ -32,22 +29,21 @@ pub(super) struct Inverse {
 }
 
 impl Inverse {
-    /// The inverse of a profile up to its fold or pi, where a polynomial in `theta`, its slope less that of the fold, falls
-    /// below zero.
+    /// The inverse of a profile that grows up to `max_theta`: its fold, or pi.
     ///
     /// # Errors
-    /// [`Error::InvalidCamera`] if the profile does not grow at first; `model` and `coefficients` are for the message.
+    /// [`Error::InvalidCamera`] if the profile does not grow at first; the model, and the coefficients with what they are called
+    /// together, are for the message.
     pub(super) fn new(
         model: &'static str,
-        coefficients: [f64; 4],
-        slope: &[f64],
+        (names, coefficients): (&'static str, &[f64]),
+        max_theta: f64,
         profile: impl Fn(f64) -> (f64, f64),
     ) -> Result<Self> {
-        let max_theta = first_fall(slope, PI).unwrap_or(PI);
         let max_radius = profile(max_theta).0;
         let refused = || {
             let expected = "coefficients under which the radius grows with the angle at first";
-            Error::camera(model, "k1 .. k4", format!("{coefficients:?}"), expected)
+            Error::camera(model, names, format!("{coefficients:?}"), expected)
         };
         if max_theta <= NARROWEST_RAD || !max_radius.is_finite() {
             return Err(refused());

@@ -3,7 +3,7 @@
 use nalgebra::Matrix2;
 
 use super::grid::{self, PixelGrid};
-use super::polynomial::evaluate;
+use super::polynomial::{evaluate, fold_rad};
 use super::profile::{Inverse, Profile};
 use super::rim::FOLD;
 use super::schema::{CX, CY, LensSchema, Parameter, ParameterSchema, Resize, scalars};
@@ -64,7 +64,7 @@ impl RadialPolynomial {
         grid::finite(NAME, ["k2", "k3", "k4"], [k2, k3, k4])?;
         let rho = [0.0, k1, k2, k3, k4];
         let slope = [k1 - FOLD * k1, 2.0 * k2, 3.0 * k3, 4.0 * k4];
-        let inverse = Inverse::new(NAME, coefficients, &slope, |theta| evaluate(&rho, theta))?;
+        let inverse = Inverse::new(NAME, ("k1 .. k4", &coefficients), fold_rad(&slope), |theta| evaluate(&rho, theta))?;
         Ok(Self { grid, rho, inverse })
     }
 

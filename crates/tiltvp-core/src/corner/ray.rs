@@ -62,13 +62,6 @@ impl FittedRay {
         Some(Self { normal: fit.normal, covariance: fit.covariance, toward, support, residual_rms_rad: fit.rms_rad })
     }
 
-    /// The same ray with a covariance `factor` times as large, for errors that neighbouring pixels share.
-    #[must_use]
-    pub fn with_covariance_scaled(mut self, factor: f64) -> Self {
-        self.covariance *= factor;
-        self
-    }
-
     /// The same ray with the normal reversed.
     #[must_use]
     pub fn reversed(mut self) -> Self {

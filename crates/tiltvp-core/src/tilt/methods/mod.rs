@@ -6,11 +6,17 @@
 //!    `method.rs` for the options, and `Fitter` for the tables of a method of edge pixels. Take what the others share where it
 //!    fits: `normals.rs` for great circles, `image_space.rs` for edge offsets, `sampling.rs` for random samples.
 //! 2. This file: the module, and one entry in the list of `tilt_methods!`.
-//! 3. `tests/options.rs`: a second value for each option.
-//! 4. `docs/tilt.md`: how it works and when to choose it.
-//! 5. `CHANGELOG.md`.
+//! 3. The tests of the core: `tests/options.rs` has a second value for each option, and matches on the methods, as in
+//!    `tests/allocation.rs`, name it until they have it.
+//! 4. The package: the docs of `TiltEstimator` in `python/tiltvp/tilt.py`, and the help of `--method` in `cli/options.py`.
+//! 5. Its tests: the largest error in `tests/test_tilt.py`, the options in `tests/test_tilt_options.py`, a line in
+//!    `tests/golden/cases.py`, whose answers `just golden tilt` keeps.
+//! 6. For evaluations `tiltvp/lab`: `evaluation/combinations.py`, the order in `evaluation/summary.py`, its name in `report/sheets.py`.
+//! 7. `docs/tilt.md`: how it works and when to choose it.
+//! 8. `CHANGELOG.md`.
 //!
-//! Names, the refusal of unknown ones, options by name, bindings and the command line follow from the list.
+//! Names, the refusal of unknown ones, options by name, bindings, the options of the command line, `just stub` and `just options`
+//! follow from the list.
 
 mod image_space;
 mod image_space_ransac;
