@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
@@ -16,7 +17,16 @@ from tiltvp.image_headers import header_size
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
-__all__ = ["bgr_from", "checked_mask", "decode_as_stored", "decode_image", "gray_from", "read_image", "write_image"]
+__all__ = [
+    "bgr_from",
+    "checked_mask",
+    "decode_as_stored",
+    "decode_image",
+    "gray_from",
+    "grays_from",
+    "read_image",
+    "write_image",
+]
 
 LARGEST_IMAGE_BYTES: Final = 1 << 30
 """Of an image file: as many pixels as a camera may have, in three uncompressed colours, and a half more."""
@@ -55,6 +65,13 @@ def gray_from(image: ArrayLike, name: str = "image") -> NDArray[np.uint8]:
     return np.ascontiguousarray(levels)
 
 
+def grays_from(images: Iterable[ArrayLike]) -> list[NDArray[np.uint8]]:
+    """`gray_from` of each, by its number; copies where `images` is no sequence: drivers write into one buffer."""
+    kept = isinstance(images, Sequence | np.ndarray)
+    grays = (gray_from(image, f"images[{number}]") for number, image in enumerate(images))
+    return [gray if kept else gray.copy() for gray in grays]
+
+
 def bgr_from(image: ArrayLike, name: str = "image") -> NDArray[np.uint8]:
     """A C-contiguous (H, W, 3) uint8 array in BGR order from a colour image of any usual kind; never altered.
 
@@ -87,7 +104,7 @@ def checked_mask(mask: ArrayLike, camera: _core.Camera) -> NDArray[np.bool_]:
 def _bytes_from(array: NDArray[Any], name: str) -> NDArray[np.uint8]:
     if array.dtype == np.uint8:
         return array
-    if array.dtype == np.uint16:
+    if array.dtype.kind == "u" and array.dtype.itemsize == 2:  # Of either byte order.
         white = 2 ** _bits_of(int(array.max())) - 1
         return np.asarray((array.astype(np.uint32) * 255 + white // 2) // white, dtype=np.uint8)
     if array.dtype == np.bool_:

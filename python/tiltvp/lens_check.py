@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from tiltvp.errors import InvalidInputError
-from tiltvp.images import checked_mask, gray_from
+from tiltvp.images import checked_mask, grays_from
 from tiltvp.segments import SegmentDetector
 
 if TYPE_CHECKING:
@@ -121,7 +121,7 @@ def check_lens(images: Iterable[ArrayLike], camera: Camera, *, mask: ArrayLike |
     Raises `InvalidInputError` for no images, for images and masks of another size than the camera's, and for masks of
     another type than bool.
     """
-    grays = [gray_from(image, f"images[{number}]") for number, image in enumerate(images)]
+    grays = grays_from(images)
     if not grays:
         raise InvalidInputError("images: none, expected at least one")
     known = None if mask is None else checked_mask(mask, camera)

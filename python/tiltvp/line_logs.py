@@ -118,7 +118,8 @@ def see_lines(
             continue
         turn, distance = None if motions is None else turn_rad, distance_m if drives else None
         turn_rad, distance_m = 0.0, 0.0
-        yield SeenFrame(number, gray, lines, extractor.describe(gray, lines), turn, distance)
+        # A copy is kept: drivers write one image after the other into the same memory.
+        yield SeenFrame(number, gray.copy(), lines, extractor.describe(gray, lines), turn, distance)
 
 
 def follow_lines(

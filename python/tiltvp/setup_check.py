@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from tiltvp.images import gray_from
+from tiltvp.images import grays_from
 from tiltvp.lens_check import LensCheck, check_lens
 from tiltvp.rotations import mounting_from
 from tiltvp.setup_features import DIRECTIONS, EDGE_FEATURES, ImageFeatures
@@ -121,7 +121,7 @@ def check_setup(
     than bool, and for a matrix that is no rotation.
     """
     rotation = np.eye(3) if robot_from_camera is None else mounting_from(robot_from_camera)
-    grays = [gray_from(image, f"images[{number}]") for number, image in enumerate(images)]
+    grays = grays_from(images)
     lens = check_lens(grays, camera, mask=mask)
     features = ImageFeatures(camera, mask=mask)
     seen = np.array([features(gray) for gray in grays])

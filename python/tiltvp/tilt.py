@@ -24,7 +24,7 @@ from tiltvp._core import (
     tilt_from_wheel_heights,
 )
 from tiltvp.errors import InvalidInputError
-from tiltvp.images import gray_from
+from tiltvp.images import gray_from, grays_from
 
 if TYPE_CHECKING:
     from typing import TypeAlias
@@ -134,5 +134,4 @@ class TiltEstimator(_core.TiltEstimator):
 
     def estimate_many(self, images: Iterable[ArrayLike], *, threads: int = 1) -> list[TiltEstimate]:
         """The tilts of many images, in their order, the same for any number of threads."""
-        grays = [gray_from(image, f"images[{i}]") for i, image in enumerate(images)]
-        return self._estimate_many(grays, threads=threads)
+        return self._estimate_many(grays_from(images), threads=threads)
