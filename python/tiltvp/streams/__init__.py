@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from tiltvp.streams.bag_images import image_from_message
 from tiltvp.streams.bag_motion import inertial_samples
 from tiltvp.streams.bag_setup import recorded_camera, robot_from_camera
 from tiltvp.streams.bags import Recording, Topic, is_recording
@@ -28,6 +29,7 @@ __all__ = [
     "Travelled",
     "Wheels",
     "frame_motions",
+    "image_from_message",
     "inertial_samples",
     "is_recording",
     "open_frames",

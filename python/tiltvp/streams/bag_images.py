@@ -23,7 +23,11 @@ _DEPTH_8: Final = {"mono8": 1, "8UC1": 1, "rgb8": 3, "bgr8": 3, "8UC3": 3, "rgba
 _DEPTH_16: Final = {"mono16": 1, "16UC1": 1, "rgb16": 3, "bgr16": 3, "rgba16": 4, "bgra16": 4}
 _BAYER: Final = ("rggb", "bggr", "gbrg", "grbg")
 """Which colours the first two pixels of the first two rows have."""
-_EXPECTED: Final = "mono8, mono16, rgb8, bgr8, rgba8, bgra8, the same with 16, bayer_rggb8 and the like"
+_YUV: Final = ("uyvy", "yuv422", "yuyv", "yuv422_yuy2")
+"""Two values a pixel, of which two pixels share the colour; the first two names are of one order."""
+_EXPECTED: Final = (
+    f"mono8, mono16, rgb8, bgr8, rgba8, bgra8, the same with 16, bayer_rggb8 and the like, {', '.join(_YUV)}"
+)
 
 
 class BagFrames(Frames):
@@ -79,11 +83,14 @@ def _stamp_s(message: Message) -> float:
 
 
 def image_from_message(message: Any) -> NDArray[np.uint8]:
-    """(H, W) or (H, W, 3) uint8, colour in BGR order, of a decoded sensor_msgs/Image or CompressedImage.
+    """(H, W) or (H, W, 3) uint8, colour in BGR order, of a sensor_msgs/Image or CompressedImage.
 
-    16 bits a value are scaled as files of 16 bits are. Raises `ImageFileError` that says what does not fit.
+    The message is one of a recording, of rclpy or of rospy; the image has memory of its own. 16 bits a value are scaled
+    as files of 16 bits are. Raises `ImageFileError` that says what does not fit.
     """
-    data = np.asarray(message.data, dtype=np.uint8)
+    # Those of rospy are bytes.
+    raw = message.data
+    data = np.frombuffer(raw, np.uint8) if isinstance(raw, bytes) else np.asarray(raw, dtype=np.uint8)
     if not hasattr(message, "encoding"):
         return decode_image(data.tobytes(), "an image")
     width, height, encoding = int(message.width), int(message.height), str(message.encoding)
@@ -91,7 +98,7 @@ def image_from_message(message: Any) -> NDArray[np.uint8]:
         raise ImageFileError(f"{width} x {height} pixels, expected 1 to {_core.MOST_PIXELS} in all")
     bayer = encoding.removeprefix("bayer_")
     sixteen = encoding in _DEPTH_16 or (bayer[:-2] in _BAYER and bayer.endswith("16"))
-    channels = _DEPTH_8.get(encoding) or _DEPTH_16.get(encoding)
+    channels = _DEPTH_8.get(encoding) or _DEPTH_16.get(encoding) or (2 if encoding in _YUV else None)
     if channels is None and bayer.rstrip("168") in _BAYER and bayer != encoding:
         channels = 1
     if channels is None:
@@ -119,6 +126,9 @@ def _bgr(levels: NDArray[Any], encoding: str) -> NDArray[np.uint8]:
             "rggb": cv2.COLOR_BayerBG2BGR, "bggr": cv2.COLOR_BayerRG2BGR,
             "gbrg": cv2.COLOR_BayerGR2BGR, "grbg": cv2.COLOR_BayerGB2BGR,
         }[encoding[6:10]]  # fmt: skip
+        levels = np.asarray(cv2.cvtColor(levels, code))
+    elif encoding in _YUV:
+        code = cv2.COLOR_YUV2BGR_UYVY if encoding in _YUV[:2] else cv2.COLOR_YUV2BGR_YUY2
         levels = np.asarray(cv2.cvtColor(levels, code))
     elif encoding.startswith("rgb"):
         levels = levels[:, :, 2::-1]

@@ -140,7 +140,10 @@ def inertial_samples(recording: Recording, topic: str | None = None) -> Inertial
     for name in ("angular_velocity", "linear_acceleration"):
         if not told[name]:
             raise InvalidInputError(f"{source}: a sensor that says it has no {name}, expected one that has")
-    table = _rising(np.array(rows, dtype=np.float64), source)
+    table = np.array(rows, dtype=np.float64)
+    if not told["orientation"] and len(rows):
+        table[:, 7:] = 0.0  # Of a sensor without orientation some drivers send NaN.
+    table = _rising(table, source)
     norms = np.linalg.norm(table[:, 7:], axis=1)
     whole = told["orientation"] and bool((np.abs(norms - 1.0) <= _UNIT_SLACK).all())
     turns = table[:, 7:] / norms[:, None] if whole else None
@@ -154,9 +157,14 @@ def _rising(table: NDArray[np.float64], source: str) -> NDArray[np.float64]:
     Messages may overtake each other by a little. Raises `InvalidInputError` for a clock that was set back, as of a
     simulation.
     """
-    if table.ndim != 2 or not np.isfinite(table).all():
-        what = "no messages" if table.ndim != 2 else "numbers that are not finite"
-        raise InvalidInputError(f"{source}: {what}, expected finite numbers")
+    if table.ndim != 2:
+        raise InvalidInputError(f"{source}: no messages, expected some")
+    bad = np.flatnonzero(~np.isfinite(table).all(axis=1))
+    if len(bad):
+        raise InvalidInputError(
+            f"{source}: {len(bad)} of {len(table)} messages with numbers that are not finite, the first at "
+            f"{table[bad[0], 0]:.3f} s, expected finite numbers"
+        )
     falls = np.flatnonzero(np.diff(table[:, 0]) < -GAP_MAX_S)
     if len(falls):
         before, after = table[falls[0] : falls[0] + 2, 0]
