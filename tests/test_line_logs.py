@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import collections
 import json
+import re
 from pathlib import Path
 from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any
@@ -11,6 +13,7 @@ import numpy as np
 import polars as pl
 import pytest
 
+import tiltvp
 from recordings import motions_of
 from tiltvp import Camera, Robot
 from tiltvp.cli import main
@@ -87,6 +90,26 @@ def test_frames_that_cannot_be_used_are_told_and_their_motion_kept(drive: Drive)
     assert bearing_log([]).shape == (0, 3)
     with pytest.raises(InvalidInputError, match="expected one for each image"):
         list(follow_lines(images, LineExtractor(drive.camera), LineTracker(), motions=motions[:2]))
+
+
+def test_the_loop_of_the_guide_runs_and_loses_no_motion(drive: Drive, capsys: pytest.CaptureFixture[str]) -> None:
+    guide = (Path(__file__).parents[1] / "docs/live.md").read_text(encoding="utf-8")
+    (loop,) = re.findall(r"^```python\n(.*?)^```$", guide, re.MULTILINE | re.DOTALL)
+    images: list[Any] = [drive.render(k).gray for k in range(len(drive))]
+    images[4], images[7] = None, images[7][1:]
+    steps = drive.odometry.tolist()
+    robot = [(image, *step) for image, step in zip(images, steps, strict=True)]
+    names: dict[str, Any] = {"tiltvp": tiltvp, "np": np, "collections": collections}
+    names |= {"camera": drive.camera, "rotation": np.eye(3), "robot": robot}
+    exec(loop, names)
+    said = capsys.readouterr().out.splitlines()
+    assert len(said) == 3
+    assert "image: shape ()" in said[0]
+    assert "as the camera's images" in said[1]
+    assert said[2] == names["calibrator"].estimate.reason
+    assert names["tracker"].next_frame == len(drive) - 2
+    assert names["calibrator"].landmarks > 5
+    assert names["tilts"].estimate
 
 
 def test_wheels_are_as_recorded_or_as_the_motion_has_them(folder: Path, drive: Drive) -> None:
