@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import polars as pl
@@ -118,6 +119,32 @@ def test_samples_that_are_none_are_refused() -> None:
             InertialSamples(*bad)
     with pytest.raises(CalibrationError, match="camera_from_sensor: no rotation"):
         InertialSamples(times, zeros, None).known(0.0, 1.0, np.ones((3, 3)))
+
+
+def test_samples_are_taken_as_a_program_collects_them() -> None:
+    times, rates, forces = [0.0, 0.05, 0.1], [(0, 0, 1)] * 3, [[0.0, 9.81, 0.0]] * 3
+    told = InertialSamples(times, rates, forces).known(0.0, 0.1)  # type: ignore[arg-type]
+    assert told["gyro"][0][1, 0] == pytest.approx(np.sin(0.1))
+    assert told["gravity"] is not None
+    with pytest.raises(InvalidInputError, match="inertial sensor: rates_rad_s: no array of numbers"):
+        InertialSamples(times, ["a", "b", "c"], None)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("known", "words"),
+    [
+        ({"gravity": "down"}, "gravity = 'down', expected a direction"),
+        ({"gravity": (0.0, 1.0, 0.0)}, "expected a direction"),
+        ({"gravity": ((0.0, 1.0, 0.0), "a")}, "gravity: sigma_rad = 'a', expected a number"),
+        ({"gyro": np.eye(3)}, "gyro = .*expected a rotation"),
+    ],
+)
+def test_what_is_no_knowledge_of_a_frame_is_refused(known: dict[str, Any], words: str) -> None:
+    estimator = CornerPoseEstimator(zed_cameras()[0], method="general")
+    image = np.zeros((estimator.left.camera.height, estimator.left.camera.width), np.uint8)
+    with pytest.raises(InvalidInputError, match=f"(?s){words}"):
+        estimator(image, **known)
+    estimator(image, gravity=[(0.0, 1.0, 0.0), 0.1], gyro=[np.eye(3), 1e-4 * np.eye(3)])  # type: ignore[arg-type]
 
 
 def test_accelerations_in_other_units_are_told() -> None:

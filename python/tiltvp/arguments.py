@@ -2,9 +2,24 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
 from tiltvp.errors import InvalidInputError
 
-__all__ = ["number_from", "pair_from", "size_from"]
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike, NDArray
+
+__all__ = ["array_from", "number_from", "pair_from", "size_from", "two_from"]
+
+
+def array_from(values: ArrayLike, name: str) -> NDArray[np.float64]:
+    """An array of real numbers, of any shape, which may be NaN. Raises `InvalidInputError`."""
+    try:
+        return np.asarray(values, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise InvalidInputError(f"{name}: no array of numbers, expected one") from None
 
 
 def size_from(size: tuple[int, int], name: str) -> tuple[int, int]:
@@ -31,8 +46,14 @@ def number_from(value: float, name: str) -> float:
 
 def pair_from(pair: tuple[float, float], name: str) -> tuple[float, float]:
     """Two real numbers. Raises `InvalidInputError`."""
+    first, second = two_from(pair, name, "two numbers")
+    return number_from(first, name), number_from(second, name)
+
+
+def two_from(pair: Any, name: str, expected: str) -> tuple[Any, Any]:
+    """Two things of any kind. Raises `InvalidInputError`."""
     try:
         first, second = pair
     except (TypeError, ValueError):
-        raise InvalidInputError(f"{name} = {pair!r}, expected two numbers") from None
-    return number_from(first, name), number_from(second, name)
+        raise InvalidInputError(f"{name} = {pair!r}, expected {expected}") from None
+    return first, second

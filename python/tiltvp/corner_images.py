@@ -9,6 +9,7 @@ import numpy as np
 
 from tiltvp import _core
 from tiltvp._core import CORNER_METHODS, BelievedCorner, CornerEstimate, CornerFeature, CornerHypothesis
+from tiltvp.arguments import number_from, two_from
 from tiltvp.errors import InvalidInputError
 from tiltvp.images import bgr_from, gray_from
 
@@ -119,6 +120,11 @@ class CornerPoseEstimator(_core.CornerPoseEstimator):
         between interpretations and say where to look; they do not move a pose. `tiltvp.streams.InertialSamples.known`
         makes them of readings. Raises `InvalidInputError` for what is no direction, rotation or covariance.
         """
+        if gravity is not None:
+            down, sigma_rad = two_from(gravity, "gravity", "a direction (3,) and its standard deviation")
+            gravity = (down, number_from(sigma_rad, "gravity: sigma_rad"))
+        if gyro is not None:
+            gyro = two_from(gyro, "gyro", "a rotation (3, 3) and its covariance (3, 3)")
         made = bgr_from if self._coloured else gray_from
         if right is None:
             return self._observe(made(left), None, gravity, gyro)

@@ -11,7 +11,7 @@ import numpy as np
 from tiltvp.csv_files import CsvFile
 from tiltvp.errors import InvalidInputError
 from tiltvp.rotations import rotation_from
-from tiltvp.streams.odometry import gaps_told
+from tiltvp.streams.odometry import finite_array, gaps_told
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -62,16 +62,15 @@ class InertialSamples:
 
     def __post_init__(self) -> None:
         """Raises `InvalidInputError` for arrays that do not fit, values that are not finite, and times that fall."""
-        n = len(self.times_s)
+        n = np.size(self.times_s)
         for name, shape in (
             ("times_s", (n,)),
             ("rates_rad_s", (n, 3)),
             ("accelerations_m_s2", (n, 3)),
             ("orientations", (n, 4)),
         ):
-            values = getattr(self, name)
-            if values is not None and (np.shape(values) != shape or not np.isfinite(values).all()):
-                raise InvalidInputError(f"{self.source}: {name} {np.shape(values)}, expected {shape} of finite numbers")
+            if getattr(self, name) is not None:
+                finite_array(self, name, shape)
         if n < 2 or (np.diff(self.times_s) <= 0.0).any():
             raise InvalidInputError(f"{self.source}: {n} samples, expected two or more of rising times")
 

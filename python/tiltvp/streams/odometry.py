@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
+from tiltvp.arguments import array_from, number_from
 from tiltvp.errors import InvalidInputError
 
 if TYPE_CHECKING:
@@ -85,14 +86,10 @@ class Odometry:
 
     def __post_init__(self) -> None:
         """Raises `InvalidInputError` for arrays that do not fit, values that are not finite, and times that fall."""
-        n = len(self.times_s)
-        arrays: list[tuple[str, NDArray[np.float64], tuple[int, ...]]]
-        arrays = [("times_s", self.times_s, (n,)), ("distance_m", self.distance_m, (n,))]
-        arrays += [("yaw_rad", self.yaw_rad, (n,))] if self.yaw_rad is not None else []
-        arrays += [("wheels_m", self.wheels_m, (n, 2))] if self.wheels_m is not None else []
-        for name, values, shape in arrays:
-            if values.shape != shape or not np.isfinite(values).all():
-                raise InvalidInputError(f"{self.source}: {name} {values.shape}, expected {shape} of finite numbers")
+        n = np.size(self.times_s)
+        for name, shape in (("times_s", (n,)), ("distance_m", (n,)), ("yaw_rad", (n,)), ("wheels_m", (n, 2))):
+            if getattr(self, name) is not None:
+                finite_array(self, name, shape)
         if n < 2 or (np.diff(self.times_s) <= 0.0).any():
             raise InvalidInputError(f"{self.source}: {n} samples, expected two or more of rising times")
         if not self.gap_max_s > 0.0:
@@ -104,15 +101,15 @@ class Odometry:
         notes: tuple[str, ...] = (), gap_max_s: float = GAP_MAX_S,
     ) -> Odometry:  # fmt: skip
         """From how far both wheels (N, 2) had rolled. Without the distance between them turns are not known."""
-        wheels = np.asarray(wheels_m, dtype=np.float64)
+        wheels = array_from(wheels_m, "wheels_m")
         if wheels.ndim != 2 or wheels.shape[1:] != (2,):
             raise InvalidInputError(f"wheels_m: {wheels.shape}, expected (N, 2)")
         yaw = None
         if wheel_base_m is not None:
-            if not (np.isfinite(wheel_base_m) and wheel_base_m > 0.0):
+            if not 0.0 < number_from(wheel_base_m, "wheel_base_m") < np.inf:
                 raise InvalidInputError(f"wheel_base_m = {wheel_base_m}, expected a length above 0")
             yaw = (wheels[:, 1] - wheels[:, 0]) / wheel_base_m
-        return cls(np.asarray(times_s, dtype=np.float64), wheels.mean(axis=1), yaw, wheels, source, notes, gap_max_s)
+        return cls(array_from(times_s, "times_s"), wheels.mean(axis=1), yaw, wheels, source, notes, gap_max_s)
 
     @classmethod
     def from_velocities(
@@ -254,9 +251,17 @@ class Odometry:
         )
 
 
+def finite_array(of: Any, name: str, shape: tuple[int, ...]) -> None:
+    """Makes a field of a frozen record an array of finite numbers of that shape. Raises `InvalidInputError`."""
+    values = array_from(getattr(of, name), f"{of.source}: {name}")
+    if values.shape != shape or not np.isfinite(values).all():
+        raise InvalidInputError(f"{of.source}: {name} {values.shape}, expected {shape} of finite numbers")
+    object.__setattr__(of, name, values)
+
+
 def _alike(source: str, **columns: ArrayLike) -> tuple[NDArray[np.float64], ...]:
     """Columns (N,) of one length. Raises `InvalidInputError` for others: shorter ones would be spread over all."""
-    arrays = tuple(np.asarray(values, dtype=np.float64) for values in columns.values())
+    arrays = tuple(array_from(values, f"{source}: {name}") for name, values in columns.items())
     for name, array in zip(columns, arrays, strict=True):
         if array.ndim != 1 or len(array) != arrays[0].size:
             raise InvalidInputError(f"{source}: {name} {array.shape}, expected ({arrays[0].size},)")
