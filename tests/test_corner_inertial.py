@@ -121,15 +121,6 @@ def test_samples_that_are_none_are_refused() -> None:
         InertialSamples(times, zeros, None).known(0.0, 1.0, np.ones((3, 3)))
 
 
-def test_samples_are_taken_as_a_program_collects_them() -> None:
-    times, rates, forces = [0.0, 0.05, 0.1], [(0, 0, 1)] * 3, [[0.0, 9.81, 0.0]] * 3
-    told = InertialSamples(times, rates, forces).known(0.0, 0.1)  # type: ignore[arg-type]
-    assert told["gyro"][0][1, 0] == pytest.approx(np.sin(0.1))
-    assert told["gravity"] is not None
-    with pytest.raises(InvalidInputError, match="inertial sensor: rates_rad_s: no array of numbers"):
-        InertialSamples(times, ["a", "b", "c"], None)  # type: ignore[arg-type]
-
-
 @pytest.mark.parametrize(
     ("known", "words"),
     [

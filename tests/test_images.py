@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator
 from pathlib import Path
 
 import cv2
@@ -14,8 +13,6 @@ import tiltvp
 from tiltvp.cli.sources import distinct_names
 from tiltvp.errors import ImageFileError, InvalidInputError, OutputError
 from tiltvp.images import gray_from, read_image
-from tiltvp.line_logs import see_lines
-from tiltvp.lines import LineExtractor
 from tiltvp.streams.image_files import find_images
 
 LEVELS = np.arange(256, dtype=np.uint8).reshape(16, 16)
@@ -33,24 +30,6 @@ def test_grey_levels_are_kept() -> None:
         assert gray.dtype == np.uint8
         assert gray.flags.c_contiguous
         assert np.array_equal(gray, LEVELS)
-
-
-def test_images_of_a_driver_that_writes_into_one_buffer_are_told_apart(
-    camera: tiltvp.Camera, images: list[np.ndarray]
-) -> None:
-    buffer = np.empty_like(images[0])
-
-    def driver() -> Iterator[np.ndarray]:
-        for image in images:
-            buffer[:] = image
-            yield buffer
-
-    estimator = tiltvp.TiltEstimator(camera)
-    assert estimator.estimate_many(driver()) == estimator.estimate_many(images)
-    assert tiltvp.check_setup(driver(), camera) == tiltvp.check_setup(images, camera)
-    assert tiltvp.check_lens(driver(), camera) == tiltvp.check_lens(images, camera)
-    seen = list(see_lines(driver(), LineExtractor(camera)))
-    assert all(np.array_equal(one.gray, image) for one, image in zip(seen, images, strict=True))  # type: ignore[union-attr]
 
 
 def test_rounds_to_the_nearest_level() -> None:

@@ -214,17 +214,6 @@ def test_gaps_and_jumps_between_the_frames_are_told(tmp_path: Path) -> None:
     assert "1 steps that no robot makes, the first after 2.000 s by " in notes(TIMES >= 0.0, x_m=anew)[-1]
 
 
-def test_columns_are_taken_as_a_program_collects_them() -> None:
-    assert Odometry([0.0, 0.1], [0.0, 1.0], [0, 1]).between(0.0, 0.1) == Motion(1.0, 1.0)  # type: ignore[arg-type]
-    for refused in (
-        lambda: Odometry.from_wheels([0.0, 0.1], [[0, 0], [1, 1]], wheel_base_m="a"),  # type: ignore[arg-type]
-        lambda: Odometry.from_velocities([0.0, 0.1], ["a", 1.0], [0.0, 0.0]),
-        lambda: Odometry([0.0, 0.1], "a", None),  # type: ignore[arg-type]
-    ):
-        with pytest.raises(InvalidInputError, match="number"):
-            refused()
-
-
 @pytest.mark.parametrize("short", [1, 2])
 def test_columns_of_other_lengths_are_refused(short: int) -> None:
     """Of two numbers there is one step, which would stand for all."""

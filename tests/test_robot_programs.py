@@ -1,0 +1,86 @@
+"""What a robot's own program hands over: images of its drivers, messages of ROS, odometry and readings in lists."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from pathlib import Path
+from types import SimpleNamespace
+
+import cv2
+import numpy as np
+import pytest
+
+import tiltvp
+from recordings import START_S, Bag
+from tiltvp.errors import InvalidInputError
+from tiltvp.line_logs import see_lines
+from tiltvp.lines import LineExtractor
+from tiltvp.streams import InertialSamples, Motion, Odometry, Recording, image_from_message, inertial_samples
+
+
+@pytest.mark.parametrize(("encoding", "luma"), [("uyvy", 1), ("yuv422", 1), ("yuyv", 0), ("yuv422_yuy2", 0)])
+def test_images_as_cameras_on_usb_send_them(encoding: str, luma: int) -> None:
+    bgr = np.zeros((4, 8, 3), np.uint8)
+    bgr[:, :4], bgr[:, 4:] = (40, 120, 200), (220, 90, 30)
+    yuv = cv2.cvtColor(bgr, cv2.COLOR_BGR2YUV).astype(float)
+    values = np.zeros((4, 8, 2), np.uint8)
+    # Of limited range (ITU-R BT.601): 16 to 235 and, for colours, 224 levels about 128; U before V. OpenCV's BGR2YUV
+    # has U and V larger by 0.492 / 0.564 and 0.877 / 0.713.
+    values[:, :, luma] = np.rint(16.0 + yuv[:, :, 0] * 219.0 / 255.0)
+    chroma = np.rint(128.0 + (yuv[:, :, 1:] - 128.0) * [0.564 / 0.492, 0.713 / 0.877] * 224.0 / 255.0)
+    values[:, ::2, 1 - luma], values[:, 1::2, 1 - luma] = chroma[:, ::2, 0], chroma[:, 1::2, 1]
+    # Of rospy, whose data is bytes.
+    message = SimpleNamespace(width=8, height=4, encoding=encoding, step=16, is_bigendian=0, data=values.tobytes())
+    assert np.abs(image_from_message(message).astype(int) - bgr).max() <= 3
+
+
+def test_a_sensor_without_orientation_may_send_anything_for_it(tmp_path: Path) -> None:
+    made = Bag("mcap")
+    for k in range(40):
+        made.imu(START_S + 0.05 * k, [0, 0, 0.4], [0, 0, 9.81])
+        made.rows[-1][3].orientation.w = math.nan
+    samples = inertial_samples(Recording(made.write(tmp_path)))
+    assert (len(samples.times_s), samples.orientations) == (40, None)
+    made.rows[7][3].angular_velocity.x = math.nan
+    (tmp_path / "bad").mkdir()
+    with pytest.raises(InvalidInputError, match=r"/imu: 1 of 40 .* not finite, the first at 1700000000\.350 s"):
+        inertial_samples(Recording(made.write(tmp_path / "bad")))
+
+
+def test_columns_are_taken_as_a_program_collects_them() -> None:
+    assert Odometry([0.0, 0.1], [0.0, 1.0], [0, 1]).between(0.0, 0.1) == Motion(1.0, 1.0)  # type: ignore[arg-type]
+    for refused in (
+        lambda: Odometry.from_wheels([0.0, 0.1], [[0, 0], [1, 1]], wheel_base_m="a"),  # type: ignore[arg-type]
+        lambda: Odometry.from_velocities([0.0, 0.1], ["a", 1.0], [0.0, 0.0]),
+        lambda: Odometry([0.0, 0.1], "a", None),  # type: ignore[arg-type]
+    ):
+        with pytest.raises(InvalidInputError, match="number"):
+            refused()
+
+
+def test_samples_are_taken_as_a_program_collects_them() -> None:
+    times, rates, forces = [0.0, 0.05, 0.1], [(0, 0, 1)] * 3, [[0.0, 9.81, 0.0]] * 3
+    told = InertialSamples(times, rates, forces).known(0.0, 0.1)  # type: ignore[arg-type]
+    assert told["gyro"][0][1, 0] == pytest.approx(np.sin(0.1))
+    assert told["gravity"] is not None
+    with pytest.raises(InvalidInputError, match="inertial sensor: rates_rad_s: no array of numbers"):
+        InertialSamples(times, ["a", "b", "c"], None)  # type: ignore[arg-type]
+
+
+def test_images_of_a_driver_that_writes_into_one_buffer_are_told_apart(
+    camera: tiltvp.Camera, images: list[np.ndarray]
+) -> None:
+    buffer = np.empty_like(images[0])
+
+    def driver() -> Iterator[np.ndarray]:
+        for image in images:
+            buffer[:] = image
+            yield buffer
+
+    estimator = tiltvp.TiltEstimator(camera)
+    assert estimator.estimate_many(driver()) == estimator.estimate_many(images)
+    assert tiltvp.check_setup(driver(), camera) == tiltvp.check_setup(images, camera)
+    assert tiltvp.check_lens(driver(), camera) == tiltvp.check_lens(images, camera)
+    seen = list(see_lines(driver(), LineExtractor(camera)))
+    assert all(np.array_equal(one.gray, image) for one, image in zip(seen, images, strict=True))  # type: ignore[union-attr]
