@@ -13,7 +13,7 @@ import pytest
 
 import tiltvp
 from recordings import START_S, Bag
-from tiltvp.errors import InvalidInputError
+from tiltvp.errors import ImageFileError, InvalidInputError
 from tiltvp.line_logs import see_lines
 from tiltvp.lines import LineExtractor
 from tiltvp.streams import InertialSamples, Motion, Odometry, Recording, image_from_message, inertial_samples
@@ -33,6 +33,15 @@ def test_images_as_cameras_on_usb_send_them(encoding: str, luma: int) -> None:
     # Of rospy, whose data is bytes.
     message = SimpleNamespace(width=8, height=4, encoding=encoding, step=16, is_bigendian=0, data=values.tobytes())
     assert np.abs(image_from_message(message).astype(int) - bgr).max() <= 3
+    message.width, message.step = 7, 14
+    with pytest.raises(ImageFileError, match="expected an even width"):
+        image_from_message(message)
+
+
+def test_what_is_no_image_s_message_is_refused() -> None:
+    for other in (None, SimpleNamespace(format="jpeg", data=b"")):
+        with pytest.raises(ImageFileError):
+            image_from_message(other)
 
 
 def test_a_sensor_without_orientation_may_send_anything_for_it(tmp_path: Path) -> None:

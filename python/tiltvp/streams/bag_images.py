@@ -88,6 +88,8 @@ def image_from_message(message: Any) -> NDArray[np.uint8]:
     The message is one of a recording, of rclpy or of rospy; the image has memory of its own. 16 bits a value are scaled
     as files of 16 bits are. Raises `ImageFileError` that says what does not fit.
     """
+    if not hasattr(message, "data"):
+        raise ImageFileError(f"a {type(message).__name__}, expected a message of {' or '.join(IMAGE_KINDS)}")
     # Those of rospy are bytes.
     raw = message.data
     data = np.frombuffer(raw, np.uint8) if isinstance(raw, bytes) else np.asarray(raw, dtype=np.uint8)
@@ -103,6 +105,8 @@ def image_from_message(message: Any) -> NDArray[np.uint8]:
         channels = 1
     if channels is None:
         raise ImageFileError(f"encoding {encoding!r}, expected {_EXPECTED}")
+    if encoding in _YUV and width % 2:
+        raise ImageFileError(f"{width} x {height} {encoding}, expected an even width: two pixels share a colour")
     row = width * channels * (2 if sixteen else 1)
     step = int(message.step) or row
     if step < row or len(data) < step * (height - 1) + row:
