@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import dataclasses
 import json
 import math
 import pickle
@@ -15,6 +16,7 @@ import pytest
 import tiltvp
 from tiltvp.cli import main
 from tiltvp.errors import CalibrationError, InvalidInputError
+from tiltvp.rotations import about_vertical
 from tiltvp.synth import RoomImage
 
 PAPERS = [method for method in tiltvp.METHODS if method not in ("refined", "segments")]
@@ -206,6 +208,53 @@ def test_a_factor_of_any_number_is_written(camera: tiltvp.Camera, tmp_path: Path
     trained = tiltvp.TrainedCorrection(250, "image-space-ransac", {}, camera.to_dict())
     trained.save(tmp_path / "correction.toml")
     assert tiltvp.TrainedCorrection.load(tmp_path / "correction.toml") == trained
+
+
+def test_a_correction_is_for_the_mounting_of_its_training(
+    camera: tiltvp.Camera, room: RoomImage, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    leaning = tilted(40.0)
+    estimator = tiltvp.TiltEstimator(camera, method="image-space-ransac", correction=None, robot_from_camera=leaning)
+    path, old = tmp_path / "correction.toml", tmp_path / "old.toml"
+    tiltvp.train_correction(estimator, *draws(), kind="factor").save(path)
+    trained = tiltvp.TrainedCorrection.load(path)
+    options = trained.estimator_options(camera, {}, None)
+    assert np.allclose(tiltvp.TiltEstimator(camera, **options).robot_from_camera, leaning)
+    trained.estimator_options(camera, {"robot_from_camera": about_vertical(2.0) @ tilted(40.5)}, None)
+    with pytest.raises(InvalidInputError, match=r"mounted 38\.0 degrees otherwise"):
+        trained.estimator_options(camera, {"robot_from_camera": tilted(2.0)}, None)
+    image, calibration = tmp_path / "a.png", tmp_path / "camera.toml"
+    tiltvp.write_image(image, room.gray)
+    camera.save(calibration)
+    told = ["tilt", str(image), "--camera", str(calibration), "--robot-from-camera", "up"]
+    assert main([*told, "--correction", str(path)]) == 2
+    assert f"{path}: robot_from_camera: a correction of a camera mounted 40.0" in " ".join(
+        capsys.readouterr().err.split()
+    )
+    dataclasses.replace(trained, robot_from_camera=None).save(old)
+    assert main([*told, "--correction", str(old)]) == 0
+
+
+def tilted(angle_deg: float) -> np.ndarray:
+    c, s = math.cos(math.radians(angle_deg)), math.sin(math.radians(angle_deg))
+    return np.array([[c, 0.0, s], [0.0, 1.0, 0.0], [-s, 0.0, c]])
+
+
+def test_what_is_wrong_with_a_correction_names_its_file(
+    camera: tiltvp.Camera, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    estimator = tiltvp.TiltEstimator(camera, method="image-space-ransac", correction=None)
+    path = tmp_path / "correction.toml"
+    tiltvp.train_correction(estimator, *draws(), kind="factor").save(path)
+    camera.scaled(0.5).save(tmp_path / "half.toml")
+    assert main(["tilt", "a.png", "--camera", str(tmp_path / "half.toml"), "--correction", str(path)]) == 2
+    assert "correction.toml: a correction of another camera" in " ".join(capsys.readouterr().err.split())
+    text = path.read_text()
+    for old, new in (("threshold_px", "treshold_px"), ("width = 256", "width = 0")):
+        assert old in text
+        path.write_text(text.replace(old, new))
+        with pytest.raises(CalibrationError, match=str(path)):
+            tiltvp.TrainedCorrection.load(path)
 
 
 @pytest.mark.slow

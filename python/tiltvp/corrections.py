@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -12,21 +13,21 @@ from tiltvp._core import (
     AffineCorrection,
     PosteriorCorrection,
     PriorOfTilt,
+    TiltEstimator,
     apply_correction,
     option_fields,
     train_affine,
     train_factor,
     train_posterior,
 )
-from tiltvp.errors import CalibrationError, InvalidInputError
+from tiltvp.errors import CalibrationError, InvalidInputError, TiltvpError
 from tiltvp.files import check_output, write_whole
 
 if TYPE_CHECKING:
     import numpy as np
-    from numpy.typing import NDArray
+    from numpy.typing import ArrayLike, NDArray
 
     from tiltvp._core import Camera
-    from tiltvp.tilt import TiltEstimator
 
 __all__ = [
     "CORRECTION_KINDS",
@@ -47,9 +48,13 @@ CORRECTION_KINDS: Final = ("posterior", "affine", "factor")
 """What `train_correction` trains: P(alpha | l) of section 5.1 of Fleer 2017, a and b of section 4, a of eq. 30 or a' of
 eq. 45."""
 _FORMAT: Final = "tiltvp-correction"
+_MOUNTING: Final = "robot_from_camera"
 _VERSION: Final = 1
-_FREE: Final = ("correction", "mask", "seed", "robot_from_camera")
-"""Options that a correction does not depend on, or that it is."""
+_FREE: Final = ("correction", "mask", "seed", _MOUNTING)
+"""Options that a correction does not depend on, or that it is, and the mounting, which is compared as one."""
+_SAME_MOUNTING_RAD: Final = math.radians(1.0)
+"""Between the verticals of mountings that count as one: a few percent of a lean, as a factor went from 169 to 292 over
+40 degrees."""
 
 
 @dataclass(frozen=True)
@@ -64,11 +69,16 @@ class TrainedCorrection:
     """As `Camera.to_dict` gives it."""
     images: int = 0
     """How many images it was trained on."""
+    robot_from_camera: list[list[float]] | None = None
+    """The rows of the mounting, (3, 3); None in files from before it was kept."""
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> Self:
         """The correction of a file of `save`. Raises `CalibrationError` that says what was wrong and where."""
         # Importing the package would take longer with them.
+        import numpy as np
+
+        from tiltvp.cameras import Camera
         from tiltvp.formats.document import Document
         from tiltvp.formats.node import Node
 
@@ -76,7 +86,7 @@ class TrainedCorrection:
         root = Node(document, document.toml("a file written by `tiltvp lab train`"))
         if not root.has("format") or root.need("format").text() != _FORMAT:
             root.fail("it is no correction", f'format = "{_FORMAT}"')
-        root.only("format", "version", "kind", "method", "images", "correction", "options", "camera")
+        root.only("format", "version", "kind", "method", "images", "correction", "options", "camera", _MOUNTING)
         version = root.need("version")
         if version.integer() != _VERSION:
             version.refuse(f"version {version.integer()} is not supported", f"version {_VERSION}")
@@ -99,8 +109,20 @@ class TrainedCorrection:
             raise
         except (InvalidInputError, KeyError, TypeError, ValueError) as error:
             raise CalibrationError(f"{path}: {error}, expected a {kind.text()} correction, at correction") from error
-        options, camera = dict(root.need("options").tree), dict(root.need("camera").tree)
-        return cls(made, method.text(), options, camera, root.need("images").integer())
+        trained = cls(
+            made,
+            method.text(),
+            dict(root.need("options").tree),
+            dict(root.need("camera").tree),
+            root.need("images").integer(),
+            None if (mounting := root.get(_MOUNTING)) is None else np.reshape(mounting.numbers(9), (3, 3)).tolist(),
+        )
+        try:
+            camera = Camera.from_dict(trained.camera)
+            TiltEstimator(camera, **trained.estimator_options(camera, {}, None))
+        except (TiltvpError, TypeError) as error:
+            raise CalibrationError(f"{path}: {error}, at camera, options or {_MOUNTING}") from error
+        return trained
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Writes it as TOML, whole or not at all. Raises `OutputError`."""
@@ -114,6 +136,8 @@ class TrainedCorrection:
             "format": _FORMAT, "version": _VERSION, "kind": self.kind, "method": self.method, "images": self.images,
             "correction": values, "options": self.options, "camera": self.camera,
         }  # fmt: skip
+        if self.robot_from_camera is not None:
+            tree[_MOUNTING] = self.robot_from_camera
         write_whole(path, tomli_w.dumps(tree))
 
     @property
@@ -125,7 +149,8 @@ class TrainedCorrection:
     def estimator_options(self, camera: Camera, given: dict[str, Any], method: str | None) -> dict[str, Any]:
         """The keywords of an estimator that it corrects: what was given, and for the rest what it was trained with.
 
-        Raises `InvalidInputError` for another method, for an option that was given otherwise, and for another camera.
+        Raises `InvalidInputError` for another method, for an option that was given otherwise, for another camera and
+        for a mounting that sees the vertical more than a degree elsewhere.
         """
         if method is not None and method != self.method:
             raise InvalidInputError(f"a correction of {self.method} with the method {method}, expected {self.method}")
@@ -137,7 +162,25 @@ class TrainedCorrection:
             raise InvalidInputError(
                 f"a correction of another camera ({', '.join(sorted(names))} differ), expected that of its training"
             )
-        return {**self.options, **given, "method": self.method, "correction": self.correction}
+        known = self.options if self.robot_from_camera is None else {**self.options, _MOUNTING: self.robot_from_camera}
+        if _MOUNTING in given and self.robot_from_camera is not None:
+            angle_rad = _between_verticals(given[_MOUNTING], self.robot_from_camera)
+            if angle_rad > _SAME_MOUNTING_RAD:
+                raise InvalidInputError(
+                    f"{_MOUNTING}: a correction of a camera mounted {math.degrees(angle_rad):.1f} degrees otherwise, "
+                    f"expected that of its training, {self.robot_from_camera}"
+                )
+        return {**known, **given, "method": self.method, "correction": self.correction}
+
+
+def _between_verticals(mounting: ArrayLike, other: ArrayLike) -> float:
+    """The angle between the robot's z axes, as the camera sees them, of two mountings (3, 3)."""
+    import numpy as np
+
+    from tiltvp.rotations import mounting_from
+
+    here, there = mounting_from(mounting)[2], mounting_from(other)[2]
+    return math.atan2(float(np.linalg.norm(np.cross(here, there))), float(here @ there))
 
 
 def train_correction(
@@ -180,4 +223,6 @@ def train_correction(
         case _:
             made = train_posterior(shifts, leans)
     options = {name: value for name, value in estimator.options.items() if name not in _FREE and value is not None}
-    return TrainedCorrection(made, estimator.method, options, estimator.camera.to_dict(), len(shifts))
+    return TrainedCorrection(
+        made, estimator.method, options, estimator.camera.to_dict(), len(shifts), estimator.robot_from_camera.tolist()
+    )

@@ -146,7 +146,7 @@ class MethodOptions(MountedOptions):
     """refined, image-space-ransac, image-space-reject-refit, vector-consensus or segments."""
     correction: str | None = None
     """closed-form, none or a number, the factor from shift (or raw angle) to angle; or a file of `tiltvp lab train`,
-    which brings its method and options."""
+    which brings its method, options and mounting."""
 
     def estimator(self, camera: "Camera", **otherwise: Any) -> "TiltEstimator":
         """The estimator with the options that were given, and others where they were not."""
@@ -155,8 +155,14 @@ class MethodOptions(MountedOptions):
             from tiltvp.corrections import TrainedCorrection
 
             trained = TrainedCorrection.load(self.correction)
-            del options["correction"]
-            return self.mounted(camera, **trained.estimator_options(camera, options, self.method))
+            options = {name: value for name, value in options.items() if name not in ("method", "correction")}
+            if self.robot_from_camera is not None:
+                options["robot_from_camera"] = self.mounting(camera)
+            try:
+                options = trained.estimator_options(camera, options, self.method)
+            except InvalidInputError as error:
+                raise InvalidInputError(f"--correction {self.correction}: {error}") from error
+            return self.mounted(camera, **options)
         if self.method is not None:
             check_word("--method", self.method, METHODS)
             options["method"] = self.method
