@@ -156,6 +156,11 @@ def test_a_slope_is_followed_where_turns_are_not_known(run: Run, world: Path, tm
         truth = tiltvp.normal_from_alpha_beta(0.06, -0.9 * k)
         found = [row[f"filtered_normal_{axis}"] for axis in "xyz"]
         assert tiltvp.tilt_error_rad(found, truth) < 3.0 * row["filtered_sigma_rad"], k
+    words[0], words[-1] = "level", tmp_path / "level"
+    assert run(*words).code == 0
+    estimator = tiltvp.TiltEstimator(tiltvp.Camera.load(world / "camera.toml"), method="segments")
+    left = [estimator(tiltvp.read_image(tmp_path / "level" / f"{k}.png")).alpha_rad for k in range(6)]
+    assert max(left) < 0.02
 
 
 def test_times_of_several_cameras_in_one_table(tmp_path: Path) -> None:

@@ -114,10 +114,10 @@ def level(
     fused = filtering.filter or as_video or not of_files
     filtering = replace(filtering, filter=fused)
     filtering.check()
-    work = Levelling(looks, filtering, copy_unlevelled)
     if not fused:
         motion.refuse("--filter", wheel_base)
     moved = motion.motions_of(robot, frames, wheel_base) if fused else None
+    work = Levelling(looks, filtering.following(frames, moved), copy_unlevelled)
     motions = repeat(Motion()) if moved is None else moved.motions
     if cluster is not None:
         levelled, of = level_on_cluster(cluster, files_of(frames), out, work)
