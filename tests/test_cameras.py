@@ -224,6 +224,8 @@ def test_values_survive_copy_pickle_dict_and_file(key: str, tmp_path: Path) -> N
         assert (twin.max_theta_rad, twin.mirror) == (camera.max_theta_rad, camera.mirror)
     assert camera != camera.mirrored()
     assert camera != "camera"
+    with pytest.raises(InvalidInputError, match=r"'\.yaml', expected \.toml"):
+        camera.save(tmp_path / "camera.yaml")
     with pytest.raises(AttributeError):
         camera.width = 3  # type: ignore[misc]
 

@@ -26,6 +26,7 @@ from drawn_corners import (
 )
 from tiltvp.corner import CornerDetector, CornerPoseEstimator
 from tiltvp.errors import CalibrationError, InvalidInputError
+from tiltvp.rotations import rotation_from_quaternion
 from tiltvp.stereo_rigs import StereoRig
 from tiltvp.synth import Room, StereoSequence, zed_cameras
 
@@ -298,12 +299,27 @@ def test_rigs_come_back_from_disk(tmp_path: Path) -> None:
     CAMERA.save(tmp_path / "one.toml")
     with pytest.raises(CalibrationError, match="pair of cameras"):
         StereoRig.load(tmp_path / "one.toml")
+    with pytest.raises(InvalidInputError, match=r"'\.yaml', expected \.toml"):
+        rig.save(tmp_path / "rig.yaml")
     lens = "camera_model: pinhole, distortion_model: none, distortion_coeffs: [], intrinsics: [400, 400, 240, 180]"
     camera = f"{{{lens}, resolution: [480, 360]"
     motion = np.linalg.inv(LEFT_FROM_RIGHT).tolist()
     (tmp_path / "chain.yaml").write_text(f"cam0: {camera}}}\ncam1: {camera}, T_cn_cnm1: {motion}}}\n")
     chain = StereoRig.load(tmp_path / "chain.yaml")
     assert np.allclose(chain.left_from_right, LEFT_FROM_RIGHT, atol=1e-12)
+
+
+def test_rigs_are_of_two_places_and_a_rotation() -> None:
+    rounded = LEFT_FROM_RIGHT.copy()
+    rounded[:3, :3] = np.round(rotation_from_quaternion(np.array([0.6, 0.0, 0.48, 0.64]), "q"), 5)
+    kept = StereoRig(CAMERA, CAMERA, rounded.tolist()).left_from_right
+    assert np.allclose(kept, rounded, atol=1e-4)
+    assert np.allclose(kept[:3, :3] @ kept[:3, :3].T, np.eye(3), atol=1e-14)
+    mirrored, still = LEFT_FROM_RIGHT.copy(), np.eye(4)
+    mirrored[0, 0] = -1.0
+    for wrong in (np.eye(3), mirrored, still, LEFT_FROM_RIGHT * np.nan, 2.0 * LEFT_FROM_RIGHT, 1e308 * mirrored, "up"):
+        with pytest.raises(InvalidInputError, match=r"left_from_right: .*, expected"):
+            StereoRig(CAMERA, CAMERA, wrong)
 
 
 def test_corners_of_one_image_that_contradict_each_other_are_no_pose() -> None:

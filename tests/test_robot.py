@@ -43,6 +43,8 @@ def test_what_is_written_is_read(tmp_path):
     np.testing.assert_array_equal(read.mask, robot().mask)
     assert (read.wheels, read.topics) == (robot().wheels, {"images": "/camera/image_raw"})
     assert sorted(file.name for file in tmp_path.iterdir()) == ["robot-mask.png", "robot.toml"]
+    with pytest.raises(InvalidInputError, match=r"ends in '', expected \.toml"):
+        robot().save(tmp_path / "robot")
 
 
 def test_where_the_camera_is_comes_back_too(tmp_path):

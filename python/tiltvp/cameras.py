@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, Final, Self
 
 from tiltvp.arguments import number_from, pair_from, size_from
 from tiltvp.errors import CalibrationError, InvalidInputError
+from tiltvp.files import check_toml
 from tiltvp.lenses import Lenses
 
 if TYPE_CHECKING:
@@ -139,7 +140,11 @@ class Camera(Lenses):
             raise CalibrationError(f"{path}: {error}") from error
 
     def save(self, path: str | os.PathLike[str], name: str = "cam0") -> None:
-        """Writes the camera as TOML, whole or not at all; `load` gives an equal camera back."""
+        """Writes the camera as TOML, whole or not at all; `load` gives an equal camera back.
+
+        Raises `InvalidInputError` where `path` does not end in .toml: other formats are of `formats.write_cameras`.
+        """
+        check_toml(path)
         from tiltvp.formats import write_toml
 
         write_toml(self.to_spec(name), path)

@@ -21,7 +21,7 @@ from tiltvp._core import (
     train_posterior,
 )
 from tiltvp.errors import CalibrationError, InvalidInputError, TiltvpError
-from tiltvp.files import check_output, write_whole
+from tiltvp.files import check_output, check_toml, write_whole
 
 if TYPE_CHECKING:
     import numpy as np
@@ -125,9 +125,10 @@ class TrainedCorrection:
         return trained
 
     def save(self, path: str | os.PathLike[str]) -> None:
-        """Writes it as TOML, whole or not at all. Raises `OutputError`."""
+        """Writes it as TOML (.toml), whole or not at all. Raises `InvalidInputError` and `OutputError`."""
         import tomli_w
 
+        check_toml(path)
         check_output(path)
         made = self.correction
         curves = (AffineCorrection, PosteriorCorrection)

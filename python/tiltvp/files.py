@@ -19,6 +19,7 @@ __all__ = [
     "check_output",
     "check_output_folder",
     "check_replacing",
+    "check_toml",
     "keeping_existing",
     "read_bytes",
     "read_text",
@@ -85,6 +86,15 @@ def check_output(path: str | os.PathLike[str]) -> None:
         raise OutputError(f"{os.fspath(path)}: cannot be written (is {what}), expected a file")
     if _KEEPS.get():
         raise InvalidInputError(f"{os.fspath(path)}: exists, expected a new file, or --overwrite to replace it")
+
+
+def check_toml(path: str | os.PathLike[str]) -> None:
+    """Refuses a name that promises another format than our own. Raises `InvalidInputError`."""
+    ending = Path(path).suffix
+    if ending.lower() != ".toml":
+        raise InvalidInputError(
+            f"{os.fspath(path)}: ends in {ending!r}, expected .toml (tiltvp.formats.write_cameras has other formats)"
+        )
 
 
 def check_replacing(what: str) -> None:

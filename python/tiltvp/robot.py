@@ -12,7 +12,7 @@ import numpy as np
 
 from tiltvp.cameras import Camera
 from tiltvp.errors import CalibrationError, InvalidInputError
-from tiltvp.files import check_output, write_whole
+from tiltvp.files import check_output, check_toml, write_whole
 from tiltvp.formats.document import Document
 from tiltvp.formats.node import Node
 from tiltvp.formats.own import ROBOT_FORMAT, VERSION, camera_from, camera_table, root_of
@@ -110,10 +110,14 @@ class Robot:
             raise CalibrationError(f"{path}: {error}") from error
 
     def save(self, path: str | os.PathLike[str]) -> None:
-        """Writes the file, and the mask as an image beside it. Raises `OutputError`; nothing half-written is left."""
+        """Writes the file (.toml), and the mask as an image beside it; nothing half-written is left.
+
+        Raises `InvalidInputError` for another ending, and `OutputError`.
+        """
         import tomli_w
 
         file = Path(path)
+        check_toml(file)
         check_output(file)
         tree: dict[str, Any] = {"format": ROBOT_FORMAT, "version": VERSION}
         if self.mask is not None:

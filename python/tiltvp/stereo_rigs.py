@@ -4,25 +4,34 @@ from __future__ import annotations
 
 import os
 from dataclasses import dataclass
-from typing import Self
+from typing import NoReturn, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tiltvp.cameras import Camera
-from tiltvp.formats.stereo import StereoSpec, read_stereo, write_stereo_toml
+from tiltvp.errors import InvalidInputError
+from tiltvp.files import check_toml
+from tiltvp.formats.stereo import StereoSpec, read_stereo, rigid_motion, write_stereo_toml
 
 __all__ = ["StereoRig"]
 
 
 @dataclass(frozen=True, eq=False)
 class StereoRig:
-    """Two cameras of any lens models."""
+    """Two cameras of any lens models.
+
+    Raises `tiltvp.errors.InvalidInputError` for a `left_from_right` that is no rigid motion between two places; what is
+    one to 1e-3, as in files, is taken as the nearest.
+    """
 
     left: Camera
     right: Camera
     left_from_right: NDArray[np.float64]
     """(4, 4): the right camera's pose in the left one's frame, metres."""
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "left_from_right", rigid_motion(self.left_from_right, _fail))
 
     @classmethod
     def load(cls, path: str | os.PathLike[str], *, image_size: tuple[int, int] | None = None) -> Self:
@@ -34,6 +43,11 @@ class StereoRig:
         return cls(Camera.from_spec(spec.left), Camera.from_spec(spec.right), spec.left_from_right)
 
     def save(self, path: str | os.PathLike[str]) -> None:
-        """Writes our own TOML, whole or not at all."""
+        """Writes our own TOML, whole or not at all. Raises `InvalidInputError` where `path` does not end in .toml."""
+        check_toml(path)
         spec = StereoSpec(self.left.to_spec("left"), self.right.to_spec("right"), self.left_from_right)
         write_stereo_toml(spec, path)
+
+
+def _fail(problem: str, expected: str) -> NoReturn:
+    raise InvalidInputError(f"left_from_right: {problem}, expected {expected}")

@@ -18,13 +18,13 @@ from __future__ import annotations
 
 import os
 import re
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Final
+from typing import Final, NoReturn
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tiltvp.errors import CalibrationError
 from tiltvp.files import write_whole
 from tiltvp.formats import kalibr
 from tiltvp.formats.document import Document
@@ -32,7 +32,7 @@ from tiltvp.formats.node import Node
 from tiltvp.formats.own import as_floats, camera_from, camera_table
 from tiltvp.formats.spec import CameraSpec, ImageSize
 
-__all__ = ["StereoSpec", "is_own", "read_stereo", "write_stereo_toml"]
+__all__ = ["StereoSpec", "is_own", "read_stereo", "rigid_motion", "write_stereo_toml"]
 
 _FORMAT: Final = "tiltvp-stereo"
 _VERSION: Final = 1
@@ -96,24 +96,29 @@ def _camchain(document: Document, image_size: ImageSize | None) -> StereoSpec:
 
 
 def _motion(node: Node) -> NDArray[np.float64]:
-    """A (4, 4) rigid motion; a rotation to the digits that files have is made one to all."""
+    return rigid_motion(node.value, node.fail)
+
+
+def rigid_motion(value: object, fail: Callable[[str, str], NoReturn]) -> NDArray[np.float64]:
+    """A (4, 4) motion between two places; a rotation to the digits that files have is made one to all.
+
+    `fail` raises for anything else, with what was wrong and what expected.
+    """
     try:
-        matrix = np.array(node.value, dtype=np.float64)
+        matrix = np.array(value, dtype=np.float64)
     except (ValueError, TypeError, OverflowError):
         matrix = np.zeros(0)
     if matrix.shape != (4, 4) or not np.isfinite(matrix).all():
-        node.fail("is no (4, 4) matrix of numbers", "four rows of four numbers")
+        fail("is no (4, 4) matrix of numbers", "four rows of four numbers")
     u, _, v = np.linalg.svd(matrix[:3, :3])
     nearest = u @ v
     off = float(np.abs(nearest - matrix[:3, :3]).max())
     if off > 1e-3 or np.linalg.det(nearest) < 0.0 or not np.array_equal(matrix[3], [0.0, 0.0, 0.0, 1.0]):
-        node.fail(
-            f"is no rigid motion (its rotation is off by {off:.1e})", "a rotation, a translation, and 0 0 0 1 below"
-        )
+        fail(f"is no rigid motion (its rotation is off by {off:.1e})", "a rotation, a translation, and 0 0 0 1 below")
     motion = np.eye(4)
     motion[:3, :3], motion[:3, 3] = nearest, matrix[:3, 3]
     if not np.linalg.norm(motion[:3, 3]) > 0.0:
-        raise CalibrationError(f"{node.document.path}: no baseline, expected two places, at {node.at}")
+        fail("no baseline", "two places")
     return motion
 
 

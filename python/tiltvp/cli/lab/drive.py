@@ -76,7 +76,7 @@ def drive(
     threads
         How many threads; default is one per core.
     """
-    from tiltvp.files import check_output
+    from tiltvp.files import check_output, check_toml
     from tiltvp.lab.datasets.driving import drive_room
     from tiltvp.lab.datasets.recording import LEGS, MOUNT, RecordedDrive
     from tiltvp.lab.datasets.recording import Mount as CameraMount
@@ -84,6 +84,7 @@ def drive(
 
     check_recording(out)
     if camera_out is not None:
+        check_toml(camera_out)
         check_output(camera_out)
     count = (os.cpu_count() or 1) if threads is None else threads
     camera = lens.load()
