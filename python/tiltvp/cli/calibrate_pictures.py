@@ -102,7 +102,7 @@ class PictureLog:
         if pictures.tracks is not None:
             check_ending(pictures.tracks)
         looked = SourceOptions(topic=pictures.topic).of_robot(robot, [source])
-        frames, lens = looked.open([source]), camera.load()
+        frames, lens = looked.open([source]), camera.load(looked.topic)
         motion = motion.of_robot(robot, frames)
         late_s = 0.0
         if read.estimate_time_offset:

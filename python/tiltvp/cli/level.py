@@ -99,7 +99,7 @@ def level(
     source = source.of_robot(robot, images or [])
     if camera is not None:
         method = camera.complete(method.of_topic(source.topic))
-    looks = Looks(None if camera is None else camera.load(), method, output.keywords(), metadata_only)
+    looks = Looks(None if camera is None else camera.load(source.topic), method, output.keywords(), metadata_only)
     as_video = _is_video(out)
     if cluster is not None:
         check_cluster(out, filter=filtering.filter)

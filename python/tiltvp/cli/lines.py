@@ -35,7 +35,7 @@ def lines(
 
     results.check()
     source = source.of_robot(camera.robot(), images or [])
-    lens, options = camera.load(), camera.complete(options.of_topic(source.topic))
+    lens, options = camera.load(source.topic), camera.complete(options.of_topic(source.topic))
     extractor, tilt = options.extractor(lens), options.tilts(lens)
     found, well = find_in_each(
         images,

@@ -68,7 +68,7 @@ def mount(
         check_output(out)
     robot = camera.robot()
     source = source.of_robot(robot, images)
-    estimator = camera.complete(mounted.of_topic(source.topic)).mounted(camera.load(), **TILT_OPTIONS)
+    estimator = camera.complete(mounted.of_topic(source.topic)).mounted(camera.load(source.topic), **TILT_OPTIONS)
     frames = source.open(images)
     moved = motion.motions_of(robot, frames, wheel_base)
     motions = moved.motions if moved is not None and moved.turns_known else None

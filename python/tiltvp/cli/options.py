@@ -58,14 +58,14 @@ class CameraOptions:
     mirror: Switch = False
     """The image is seen in a mirror."""
 
-    def load(self) -> "Camera":
-        """The camera."""
+    def load(self, topic: str | None = None) -> "Camera":
+        """The camera, of a recording that of its images of `topic`, by default of its only images."""
         from tiltvp import Camera
         from tiltvp.streams import Recording, is_recording, recorded_camera
 
         if is_recording(self.camera):
             refuse_beside(self, ("camera_format", "image_size"), f"{self.camera}, a recording")
-            return self._mirrored(recorded_camera(Recording(self.camera), self.camera_name))
+            return self._mirrored(recorded_camera(Recording(self.camera), self.camera_name, images=topic))
         word = str(self.camera)
         if word.startswith(_PANORAMA):
             refuse_beside(self, ("camera_format", "camera_name", "image_size", "mirror"), word)

@@ -49,7 +49,7 @@ def segments(
 
     results.check()
     source = source.of_robot(camera.robot(), images or [])
-    lens = camera.load()
+    lens = camera.load(source.topic)
     detector = SegmentDetector(lens, **camera.complete(options).given())
     found, well = find_in_each(
         images, source, detector, results.overlay, lambda gray, seen: draw_segments(gray, lens, seen)

@@ -73,9 +73,10 @@ def setup(
     for file in (out, mask_path(out), picture):
         if file is not None:
             check_output(file)
-    lens, known = camera.load(), camera.robot()
-    mounted = camera.complete(MountedOptions(robot_from_camera=robot_from_camera, mask=mask))
+    known = camera.robot()
     source = source.of_robot(known, recording)
+    lens = camera.load(source.topic)
+    mounted = camera.complete(MountedOptions(robot_from_camera=robot_from_camera, mask=mask))
     frames = source.open(recording)
     motion, wheel_base = motion.of_robot(known, frames), wheel_base_of(known, wheel_base)
     moved = motion.motions(frames, wheel_base)

@@ -100,7 +100,7 @@ def tilt(
         motion.refuse("--filter", wheel_base)
     robot = camera.robot()
     source = source.of_robot(robot, images or [])
-    estimator = camera.complete(method.of_topic(source.topic)).estimator(camera.load())
+    estimator = camera.complete(method.of_topic(source.topic)).estimator(camera.load(source.topic))
     frames = source.open(images or [])
     check_apart(frames, overlay, level)
     moved = motion.motions_of(robot, frames, wheel_base) if filtering.filter else None

@@ -95,7 +95,7 @@ def track(
     watching.check()
     robot, words = camera.robot(), [] if source is None else [source]
     frames_of = frames_of.of_robot(robot, words)
-    lens, options = camera.load(), camera.complete(options.of_topic(frames_of.topic))
+    lens, options = camera.load(frames_of.topic), camera.complete(options.of_topic(frames_of.topic))
     extractor, tilt = options.extractor(lens), options.tilts(lens)
     place = {} if robot is None or robot.place_m is None else {"camera_m": robot.place_m}
     tracker = LineTracker(**place | tracking.given())

@@ -16,7 +16,7 @@ from tiltvp.streams.frames import Frame, Frames, median_rate_hz
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-__all__ = ["IMAGE_KINDS", "BagFrames", "image_from_message"]
+__all__ = ["IMAGE_KINDS", "BagFrames", "image_from_message", "is_rectified"]
 
 IMAGE_KINDS: Final = ("sensor_msgs/Image", "sensor_msgs/CompressedImage")
 _DEPTH_8: Final = {"mono8": 1, "8UC1": 1, "rgb8": 3, "bgr8": 3, "8UC3": 3, "rgba8": 4, "bgra8": 4, "8UC4": 4}
@@ -28,6 +28,11 @@ _YUV: Final = ("uyvy", "yuv422", "yuyv", "yuv422_yuy2")
 _EXPECTED: Final = (
     f"mono8, mono16, rgb8, bgr8, rgba8, bgra8, the same with 16, bayer_rggb8 and the like, {', '.join(_YUV)}"
 )
+
+
+def is_rectified(topic: str) -> bool:
+    """Whether images of a topic are called rectified, as those of image_proc and stereo_image_proc are."""
+    return "/image_rect" in topic
 
 
 class BagFrames(Frames):
@@ -45,8 +50,8 @@ class BagFrames(Frames):
         self.problems = recording.unread(self._topic, len(times))
         self.rate_hz = median_rate_hz(self.times_s)
         told = []
-        if "/image_rect" in self.topic:
-            told.append("is called rectified: its lens is P of CameraInfo, not K and D, which recordings are read by")
+        if is_rectified(self.topic):
+            told.append("is called rectified: its lens is P of CameraInfo, as of a recording as --camera, not K and D")
         if standing := int((np.diff(self.times_s) <= 0.0).sum()):
             told.append(f"has {standing} images that are stamped no later than those before: what moved is not told")
         self.notes = tuple(f"{recording.path}: {self.topic} {words}" for words in told)

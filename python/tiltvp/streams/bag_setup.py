@@ -13,7 +13,7 @@ from tiltvp.errors import CalibrationError, InvalidInputError
 from tiltvp.formats.document import Document
 from tiltvp.formats.ros import parse
 from tiltvp.rotations import rotation_from_quaternion
-from tiltvp.streams.bag_images import IMAGE_KINDS
+from tiltvp.streams.bag_images import IMAGE_KINDS, is_rectified
 from tiltvp.streams.bags import Recording
 
 if TYPE_CHECKING:
@@ -25,8 +25,11 @@ CAMERA_KINDS: Final = ("sensor_msgs/CameraInfo",)
 _TRANSFORMS, _STATIC = "tf2_msgs/TFMessage", "/tf_static"
 
 
-def recorded_camera(recording: Recording, topic: str | None = None) -> Camera:
+def recorded_camera(recording: Recording, topic: str | None = None, *, images: str | None = None) -> Camera:
     """The camera of a topic of CameraInfo, or of the only one: of its first message.
+
+    `images` is the topic of its images, by default the only one: where they are called rectified (`image_rect`) their
+    lens is the pinhole of P, else that of K and D.
 
     Raises `InvalidInputError` that lists the topics, `CalibrationError` for a lens that is not supported and for a
     camera that was not calibrated.
@@ -34,16 +37,26 @@ def recorded_camera(recording: Recording, topic: str | None = None) -> Camera:
     chosen = recording.choose(CAMERA_KINDS, "--camera-name", topic)
     source = f"{recording.path} {chosen.name}"
     info = next(content for _, content in recording.decoded(chosen))
-    # ROS 1 has capitals.
-    matrix = [float(x) for x in np.ravel(getattr(info, "k", getattr(info, "K", [])))]
+    if images is None:
+        seen = [one.name for one in recording.topics if one.kind in IMAGE_KINDS and one.count > 0]
+        images = seen[0] if len(seen) == 1 else ""
+    model, coefficients = str(info.distortion_model), _numbers(info, "D")
+    matrix = _numbers(info, "K")
+    if is_rectified(images):
+        model, coefficients = "none", []
+        matrix = np.reshape(_numbers(info, "P"), (3, 4))[:, :3].ravel().tolist()
     if not any(matrix):
         raise CalibrationError(f"{source}: a camera that was not calibrated, expected a matrix that is not 0")
     tree: dict[str, object] = {
         "image_width": int(info.width), "image_height": int(info.height), "camera_name": "cam0",
-        "distortion_model": str(info.distortion_model), "K": [matrix[k : k + 3] for k in (0, 3, 6)],
-        "D": [float(x) for x in np.ravel(getattr(info, "d", getattr(info, "D", [])))],
+        "distortion_model": model, "K": [matrix[k : k + 3] for k in (0, 3, 6)], "D": coefficients,
     }  # fmt: skip
     return _as_taken(Camera.from_spec(parse(Document(Path(source), json.dumps(tree)), None)[0]), info, source)
+
+
+def _numbers(info: Any, name: str) -> list[float]:
+    """Those of a field of CameraInfo, which ROS 1 writes with a capital."""
+    return [float(x) for x in np.ravel(getattr(info, name.lower(), getattr(info, name, [])))]
 
 
 def _as_taken(camera: Camera, info: Any, source: str) -> Camera:
