@@ -19,8 +19,9 @@ import tiltvp
 from commands import Run
 from recordings import START_S, Bag, write_video
 from tiltvp.cli.filtering import FilterOptions
+from tiltvp.errors import CalibrationError
 from tiltvp.robot import Robot
-from tiltvp.streams import FrameMotions, Motion, open_frames
+from tiltvp.streams import FrameMotions, Motion, Recording, open_frames, recorded_camera
 from tiltvp.synth import RoomImage, render_room
 
 pytestmark = pytest.mark.slow
@@ -183,6 +184,23 @@ def test_images_that_are_called_rectified_are_told(run: Run, world: Path, room: 
     made.image("/camera/image_rect_color", START_S, room.gray, "mono8")
     said = run("tilt", made.write(tmp_path), "--camera", world / "camera.toml")
     assert (said.code, "/camera/image_rect_color is called rectified: its lens is P" in said.err) == (0, True)
+
+
+def test_the_lens_of_rectified_images_is_p(tmp_path: Path) -> None:
+    """It was K and D, whose lens bends where these images do not."""
+    k, p = [300.0, 0, 40, 0, 300, 30, 0, 0, 1], [200.0, 0, 41, -24, 0, 210, 31, 0, 0, 0, 1, 0]
+    for name in ("/left/image_rect", "/left/image_raw"):
+        made = Bag("mcap")
+        made.camera_info(START_S, 80, 60, "plumb_bob", [-0.3, 0.1, 0, 0, 0], k, p=p)
+        made.image(name, START_S, np.zeros((60, 80), np.uint8), "mono8")
+        recording = Recording(made.write(tmp_path / name[-4:]))
+        rectified = recorded_camera(recording, images="/left/image_rect")
+        assert rectified == tiltvp.Camera.pinhole(width=80, height=60, fx=200.0, fy=210.0, cx=41.0, cy=31.0)
+        assert (recorded_camera(recording) == rectified) == (name == "/left/image_rect")
+    blank = Bag("mcap")
+    blank.camera_info(START_S, 80, 60, "plumb_bob", [0.0] * 5, k)
+    with pytest.raises(CalibrationError, match="not calibrated"):
+        recorded_camera(Recording(blank.write(tmp_path / "blank")), images="/image_rect")
 
 
 def test_stamps_that_stand_still_are_told(tmp_path: Path) -> None:

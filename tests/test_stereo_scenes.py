@@ -14,8 +14,9 @@ import yaml
 import tiltvp
 from tiltvp.cli import main
 from tiltvp.errors import InvalidInputError
+from tiltvp.lab.datasets.check import check_dataset
 from tiltvp.lab.datasets.stereo import write_stereo
-from tiltvp.streams import InertialSamples
+from tiltvp.streams import InertialSamples, open_frames
 from tiltvp.synth import Laboratory, Room, StereoSequence, zed_cameras
 
 pytestmark = pytest.mark.slow
@@ -201,6 +202,16 @@ def test_folders_are_whole_and_say_what_is_true(sequence: StereoSequence, tmp_pa
     np.testing.assert_allclose(readings.rates_rad_s, samples.rates_rad_s)
     assert readings.accelerations_m_s2 is not None
     np.testing.assert_allclose(readings.accelerations_m_s2, samples.forces_m_s2)
+    times_s = open_frames(tmp_path / "a" / "right").times_s
+    assert times_s is not None
+    assert times_s.tolist() == pytest.approx(sequence.times_s)
+    assert check_dataset(tmp_path / "a") == []
+    (tmp_path / "a" / "right" / "000002.png").unlink()
+    tiltvp.write_image(tmp_path / "a" / "left" / "000001.png", np.zeros((3, 4), np.uint8))
+    told = [str(one) for one in check_dataset(tmp_path / "a")]
+    assert len(told) == 2
+    assert "left/000001.png: 4 x 3 pixels" in told[0]
+    assert "000002.png of one side alone" in told[1]
     with pytest.raises(InvalidInputError, match="exists"):
         write_stereo(sequence, tmp_path / "a")
     wide = tiltvp.Camera.equidistant(width=64, height=48, focal_px=20.0, cx=31.5, cy=23.5)

@@ -98,23 +98,6 @@ def test_the_camera_of_a_region_that_is_binned(tmp_path: Path) -> None:
         recorded_camera(Recording(odd.write(tmp_path / "odd")))
 
 
-def test_the_lens_of_rectified_images_is_p(tmp_path: Path) -> None:
-    """It was K and D, whose lens bends where these images do not."""
-    k, p = [300.0, 0, 40, 0, 300, 30, 0, 0, 1], [200.0, 0, 41, -24, 0, 210, 31, 0, 0, 0, 1, 0]
-    for name in ("/left/image_rect", "/left/image_raw"):
-        made = Bag("mcap")
-        made.camera_info(START_S, 80, 60, "plumb_bob", [-0.3, 0.1, 0, 0, 0], k, p=p)
-        made.image(name, START_S, np.zeros((60, 80), np.uint8), "mono8")
-        recording = Recording(made.write(tmp_path / name[-4:]))
-        rectified = recorded_camera(recording, images="/left/image_rect")
-        assert rectified == tiltvp.Camera.pinhole(width=80, height=60, fx=200.0, fy=210.0, cx=41.0, cy=31.0)
-        assert (recorded_camera(recording) == rectified) == (name == "/left/image_rect")
-    blank = Bag("mcap")
-    blank.camera_info(START_S, 80, 60, "plumb_bob", [0.0] * 5, k)
-    with pytest.raises(CalibrationError, match="not calibrated"):
-        recorded_camera(Recording(blank.write(tmp_path / "blank")), images="/image_rect")
-
-
 def test_single_files_of_ros_2_bags_are_read_too(bag: Path) -> None:
     for file in (*bag.glob("*.mcap"), *bag.glob("*.db3")):
         assert [frame.read()[0, 0] for frame in open_frames(file)] == list(range(20))

@@ -25,6 +25,7 @@ IMAGE_ENDINGS: Final = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".pgm"
 _INNER: Final = ("images", "frames")
 """Folders in which the images of a drive's folder are: that of `tiltvp dataset drive`, and a usual other name."""
 _TIMES, _ODOMETRY = "frames.csv", "odometry.csv"
+_TABLE: Final = "a table of frames with the columns file and time_s"
 _NANOSECONDS: Final = r"1\d{18}"
 """Names of images as EuRoC's tools write them: nanoseconds since 1970, of the years 2001 to 2033."""
 _SECONDS: Final = r"1\d{9}\.\d+"
@@ -43,8 +44,8 @@ class ImageFiles(Frames):
         drive = _drive_folder(words)
         if drive is not None and (drive / _ODOMETRY).is_file():
             self.recording = drive / _ODOMETRY
-        if drive is not None and (drive / _TIMES).is_file():
-            self.times_s = _table_times(drive / _TIMES, self.files)
+        if drive is not None and (table := _table_of(drive)) is not None:
+            self.times_s = _table_times(*table, self.files)
             if self.times_s is not None and (np.diff(self.times_s) < 0.0).any():
                 order = np.argsort(self.times_s, kind="stable")
                 self.files, self.times_s = [self.files[place] for place in order], self.times_s[order]
@@ -109,12 +110,21 @@ def _drive_folder(words: Sequence[str]) -> Path | None:
     return Path(words[0]) if len(words) == 1 and Path(words[0]).is_dir() else None
 
 
-def _table_times(path: Path, files: Sequence[Path]) -> NDArray[np.float64] | None:
-    """(N,): the times that a table of columns `file` and `time_s` tells; None for a table without these columns."""
-    table = CsvFile(path, "a table of frames with the columns file and time_s")
-    if not {"file", "time_s"} <= set(table.header):
+def _table_of(folder: Path) -> tuple[Path, str] | None:
+    """The table of times of a folder and its column of files: its own, or that above with a column of its name, as a
+    stereo pair's has left and right."""
+    if (folder / _TIMES).is_file():
+        return folder / _TIMES, "file"
+    name, above = folder.resolve().name, folder.resolve().parent / _TIMES
+    return (above, name) if above.is_file() and name in CsvFile(above, _TABLE).header else None
+
+
+def _table_times(path: Path, column: str, files: Sequence[Path]) -> NDArray[np.float64] | None:
+    """(N,): the times that a table of a column of files and `time_s` tells; None for a table without these columns."""
+    table = CsvFile(path, _TABLE)
+    if not {column, "time_s"} <= set(table.header):
         return None
-    which, when = table.header.index("file"), table.header.index("time_s")
+    which, when = table.header.index(column), table.header.index("time_s")
     rows: dict[str, dict[str, float]] = {}
     for line, cells in table.rows():
         try:
@@ -123,7 +133,7 @@ def _table_times(path: Path, files: Sequence[Path]) -> NDArray[np.float64] | Non
             raise InvalidInputError(f"{table.where(line)}: time_s = {cells[when]!r}, expected a number") from None
         named = rows.setdefault(Path(cells[which]).name, {})
         if named.setdefault(Path(cells[which]).as_posix(), when_s) != when_s:
-            raise InvalidInputError(f"{table.where(line)}: file {cells[which]!r} again, expected one time of each")
+            raise InvalidInputError(f"{table.where(line)}: {column} {cells[which]!r} again, expected one time of each")
 
     def times_of(file: Path) -> set[float]:
         """Of rows with its path, as a table of several cameras has them, else of those with its name."""

@@ -27,9 +27,9 @@ def check(directory: Path, /) -> int:
     Parameters
     ----------
     directory
-        Folder with dataset.toml, images.csv, a calibration file and images.
+        Folder with dataset.toml, images.csv, a calibration file and images, or with a stereo sequence.
     """
-    from tiltvp.lab.datasets.check import check_dataset
+    from tiltvp.lab.datasets.check import check_dataset, is_stereo
     from tiltvp.lab.datasets.findings import Findings
     from tiltvp.lab.datasets.folder import find_dataset
 
@@ -50,6 +50,8 @@ def check(directory: Path, /) -> int:
         environments = {image.environment for image in dataset.images}
         counts = f"{len(dataset.images)} images, {len(locations)} locations, {len(environments)} environments"
         say(f"{directory}: {counts}, {len(findings)} warnings")
+    elif is_stereo(directory) and not errors:
+        say(f"{directory}: a stereo sequence, in order")
     return 1 if errors else 0
 
 

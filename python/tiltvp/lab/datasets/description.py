@@ -20,9 +20,11 @@ from tiltvp.rotations import rotation_from
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-__all__ = ["DESCRIPTION", "Description", "Wheels", "read_description"]
+__all__ = ["CALIBRATION", "DESCRIPTION", "Description", "Wheels", "read_description"]
 
 DESCRIPTION: Final = "dataset.toml"
+CALIBRATION: Final = "camchain.yaml"
+"""Of a stereo sequence: both cameras and how they sit to each other, as Kalibr writes it."""
 
 _KEYS: Final = {
     "camera": "the name of a calibration file or a robot's file in this folder",

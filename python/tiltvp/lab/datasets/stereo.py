@@ -16,15 +16,13 @@ from tiltvp import _core
 from tiltvp.errors import InvalidInputError
 from tiltvp.formats.yaml_text import yaml_of
 from tiltvp.images import write_image
+from tiltvp.lab.datasets.description import CALIBRATION
 from tiltvp.lab.datasets.new import NewDataset, in_order, new_folder
 from tiltvp.rotations import quaternion
 from tiltvp.streams.inertial import INERTIAL_COLUMNS
 from tiltvp.synth import Laboratory, StereoSequence, StereoTruth
 
 __all__ = ["CALIBRATION", "POSES", "write_stereo"]
-
-CALIBRATION: Final = "camchain.yaml"
-"""Both cameras and how they sit to each other, as Kalibr writes it."""
 
 POSES: Final = "poses.txt"
 """The true `object_from_left` of each frame in the object frame of the corner that is looked at: TUM's format."""
