@@ -82,6 +82,9 @@ def test_opencv_refuses_coefficients_under_a_name_that_is_not_read(read: Read, n
     assert "expected distortion_coefficients or Distortion_Coefficients or" in message(read, text)
     assert message(read, text).endswith(f"at {name}")
     assert message(read, storage("K", "unread", 5, SIZE + "k1: -0.25\n")).endswith("at k1")
+    # Matrices of a pair are none.
+    pair = storage("K1", "R", 9, SIZE) + storage("K2", "P1", 12).split("---\n")[1]
+    assert [camera.parameters["fx"] for camera in read(pair)] == [50.0, 50.0]
     # Coefficients of 0, and what is no number, change no lens.
     plain = "dist_type: none\nmarker_distance: [0.5, 0.5]\nundistorted_size: [64, 48]\ndist_coefs: [0, 0, 0, 0]\n"
     assert read(storage("camera_matrix", "unread", 5, SIZE + plain))[0].model == "pinhole"

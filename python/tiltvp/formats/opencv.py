@@ -34,6 +34,8 @@ _COEFFICIENTS = (
     "D",
 )
 _LIKE_COEFFICIENTS = re.compile(r"(?!.*undist).*(dist(?!anc)|coef).*|d\d?|[kp][1-6]", re.ASCII | re.IGNORECASE)
+_MATRICES = re.compile(r"[KP]\d")
+"""Of a stereo pair: the camera matrices, and the projections (3, 4) of rectified images."""
 _WIDTH = ("image_width", "imageWidth", "image_Width", "img_width", "width", "Width")
 _HEIGHT = ("image_height", "imageHeight", "image_Height", "img_height", "height", "Height")
 _SIZE = ("image_size", "imageSize", "img_size", "resolution", "size")
@@ -142,10 +144,10 @@ def _refuse_other_names(root: Node) -> None:
             continue
         node = root.need(key)
         try:
-            found = any(node.numbers())
+            numbers = node.numbers()
         except CalibrationError:  # A word about them.
             continue
-        if found:
+        if any(numbers) and not (_MATRICES.fullmatch(key) and len(numbers) in (9, 12)):
             node.fail("looks like coefficients of a lens, under a name that is not read", " or ".join(_COEFFICIENTS))
 
 
