@@ -19,6 +19,7 @@ import tiltvp
 import tiltvp.lines
 from hostile import aliases, own, png
 from tiltvp import _core
+from tiltvp.colmap import ColmapDatabase
 from tiltvp.drive_logs import read_drive_log
 from tiltvp.errors import (
     LONGEST_MESSAGE,
@@ -29,8 +30,10 @@ from tiltvp.errors import (
     TiltvpError,
 )
 from tiltvp.files import keeping_existing, whole_file, write_whole
-from tiltvp.formats import document
+from tiltvp.formats import document, write_cameras
+from tiltvp.rotations import read_rotation
 from tiltvp.stereo_rigs import StereoRig
+from tiltvp.streams import InertialSamples, Recording, open_frames, read_odometry
 
 ROOT = Path(__file__).resolve().parent.parent
 ROW = re.compile(r"^\| .+ \| (\d+) \| `(\S+)` \|$", re.MULTILINE)
@@ -223,3 +226,16 @@ def test_arguments_that_no_float_can_hold_are_refused_by_name(value: Any) -> Non
             ask()
         assert len(str(caught.value)) <= LONGEST_MESSAGE
         assert caught.value.__notes__ == [f"while processing '{name}'"]
+
+
+@pytest.mark.parametrize("path", [b"a.toml", None, 3.5])
+def test_what_is_no_path_is_refused(path: Any) -> None:
+    camera = tiltvp.Camera.equidistant(width=64, height=48, focal_px=20.0, cx=31.5, cy=23.5)
+    for door in (
+        tiltvp.Camera.load, camera.save, tiltvp.Robot.load, tiltvp.Robot(camera, np.eye(3)).save, StereoRig.load,
+        tiltvp.read_image, lambda one: tiltvp.write_image(one, np.zeros((4, 4), np.uint8)), read_rotation,
+        lambda one: write_cameras([camera.to_spec()], one), Recording, open_frames, lambda one: open_frames([one]),
+        read_odometry, InertialSamples.read, ColmapDatabase, lambda one: write_whole(one, ""),
+    ):  # fmt: skip
+        with pytest.raises(TiltvpError, match="expected a"):
+            door(path)

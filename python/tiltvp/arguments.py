@@ -1,7 +1,9 @@
-"""Arguments that many functions take, checked alike: sizes of images, numbers and pairs of them."""
+"""Arguments that many functions take, checked alike: paths, sizes of images, numbers and pairs of them."""
 
 from __future__ import annotations
 
+import os
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -11,7 +13,7 @@ from tiltvp.errors import InvalidInputError
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
-__all__ = ["array_from", "number_from", "pair_from", "size_from", "two_from"]
+__all__ = ["array_from", "number_from", "pair_from", "path_from", "size_from", "two_from"]
 
 
 def array_from(values: ArrayLike, name: str) -> NDArray[np.float64]:
@@ -20,6 +22,13 @@ def array_from(values: ArrayLike, name: str) -> NDArray[np.float64]:
         return np.asarray(values, dtype=np.float64)
     except (TypeError, ValueError):
         raise InvalidInputError(f"{name}: no array of numbers, expected one") from None
+
+
+def path_from(path: str | os.PathLike[str]) -> Path:
+    """A path; bytes are none. Raises `InvalidInputError`."""
+    if isinstance(path, str | os.PathLike) and isinstance(name := os.fspath(path), str):
+        return Path(name)
+    raise InvalidInputError(f"path = {path!r}, expected a str or an os.PathLike")
 
 
 def size_from(size: tuple[int, int], name: str) -> tuple[int, int]:

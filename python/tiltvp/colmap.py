@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
+from tiltvp.arguments import path_from
 from tiltvp.cameras import Camera
 from tiltvp.errors import CalibrationError, ImageFileError, InvalidInputError, MissingExtraError, OutputError
 from tiltvp.formats import CameraSpec
@@ -76,7 +77,7 @@ class ColmapDatabase:
     """
 
     def __init__(self, path: str | os.PathLike[str]) -> None:
-        self.path = Path(path)
+        self.path = path_from(path)
         _check_database(self.path)
         with _pycolmap(self.path).Database.open(str(self.path)) as opened:
             known = {_key(prior.corr_data_id): prior for prior in opened.read_all_pose_priors()}

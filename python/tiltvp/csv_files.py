@@ -9,6 +9,7 @@ import os
 from collections.abc import Iterator
 from typing import Final
 
+from tiltvp.arguments import path_from
 from tiltvp.errors import InvalidInputError
 from tiltvp.files import read_text
 
@@ -23,7 +24,7 @@ class CsvFile:
 
     def __init__(self, path: str | os.PathLike[str], expected: str) -> None:
         """Reads the header. `expected` is what the file should be, for messages. Raises `InvalidInputError`."""
-        self.name = os.fspath(path)
+        self.name = str(path_from(path))
         self._expected = expected
         try:
             text = read_text(path, LARGEST_CSV_BYTES)

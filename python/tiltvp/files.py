@@ -13,6 +13,7 @@ from contextvars import ContextVar
 from pathlib import Path
 from typing import Final
 
+from tiltvp.arguments import path_from
 from tiltvp.errors import InvalidInputError, OutputError, TiltvpError
 
 __all__ = [
@@ -75,8 +76,9 @@ def check_output(path: str | os.PathLike[str]) -> None:
 
     Raises `OutputError` or `InvalidInputError`.
     """
+    file = path_from(path)
     try:
-        state = os.stat(path)
+        state = os.stat(file)
     except FileNotFoundError:
         return
     except (OSError, ValueError) as error:
@@ -90,7 +92,7 @@ def check_output(path: str | os.PathLike[str]) -> None:
 
 def check_toml(path: str | os.PathLike[str]) -> None:
     """Refuses a name that promises another format than our own. Raises `InvalidInputError`."""
-    ending = Path(path).suffix
+    ending = path_from(path).suffix
     if ending.lower() != ".toml":
         raise InvalidInputError(
             f"{os.fspath(path)}: ends in {ending!r}, expected .toml (tiltvp.formats.write_cameras has other formats)"
@@ -105,7 +107,7 @@ def check_replacing(what: str) -> None:
 
 def check_output_folder(path: str | os.PathLike[str]) -> None:
     """Refuses a file, and a folder that is to be kept: one that holds anything. Raises `InvalidInputError`."""
-    folder = Path(path)
+    folder = path_from(path)
     if folder.exists() and not folder.is_dir():
         raise InvalidInputError(f"{folder}: is a file, expected a folder")
     if _KEEPS.get() and folder.is_dir() and any(folder.iterdir()):
@@ -176,7 +178,7 @@ def _part_of(path: str | os.PathLike[str], make: Callable[[Path], int], *, follo
     """
     part = None
     try:
-        target = Path(os.path.realpath(path)) if follow else Path(path).absolute()
+        target = Path(os.path.realpath(path)) if follow else path_from(path).absolute()
         target.parent.mkdir(parents=True, exist_ok=True)
         part, handle = _locked_beside(target, target.suffix if follow else "", make)
         try:

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterable, Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
 from tiltvp import _core
+from tiltvp.arguments import path_from
 from tiltvp.errors import ImageFileError, InvalidInputError
 from tiltvp.files import read_bytes, write_whole
 from tiltvp.image_headers import header_size
@@ -129,7 +129,7 @@ def read_image(path: str | os.PathLike[str]) -> NDArray[np.uint8]:
     Pixels stay where the sensor has them: a calibration knows nothing of the orientation tag of a photograph. Files of
     16 bits a value are scaled as arrays of uint16 are.
     """
-    file = Path(path)
+    file = path_from(path)
     try:
         data = read_bytes(file, LARGEST_IMAGE_BYTES)
     except OSError as error:
@@ -177,7 +177,7 @@ def write_image(path: str | os.PathLike[str], image: NDArray[Any]) -> None:
     """
     import cv2
 
-    file = Path(path)
+    file = path_from(path)
     ending = file.suffix or ".png"
     levels = np.asarray(image)
     if levels.size and (levels.dtype != np.uint16 or ending.lower() not in _DEEP):

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, Final, Self
 
 import numpy as np
 
+from tiltvp.arguments import path_from
 from tiltvp.cameras import Camera
 from tiltvp.errors import CalibrationError, InvalidInputError
 from tiltvp.files import check_output, check_toml, write_whole
@@ -116,7 +117,7 @@ class Robot:
         """
         import tomli_w
 
-        file = Path(path)
+        file = path_from(path)
         check_toml(file)
         check_output(file)
         tree: dict[str, Any] = {"format": ROBOT_FORMAT, "version": VERSION}

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from tiltvp.arguments import path_from
 from tiltvp.errors import CalibrationError, CalibrationNotFoundError, InvalidInputError
 from tiltvp.formats.document import Document
 
@@ -81,7 +82,7 @@ def read_rotation(source: str | os.PathLike[str]) -> Matrix:
     """
     if isinstance(source, str) and source in ROTATION_WORDS:
         return np.array(ROTATION_WORDS[source])
-    file = Path(source)
+    file = path_from(source)
     if not file.exists():
         raise _missing(str(source), is_word=file.name == str(source) and not file.suffix)
     if file.is_dir():

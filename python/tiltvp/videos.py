@@ -8,6 +8,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from tiltvp.arguments import path_from
 from tiltvp.errors import InvalidInputError, OutputError
 from tiltvp.files import scratch_folder, whole_file
 from tiltvp.video_sound import add_sound
@@ -69,7 +70,7 @@ def video_writer(
     whose sound is copied. Both want `pip install 'tiltvp[video]'`; `VideoWriter.note` says what is not kept.
     Raises `InvalidInputError` for other endings, `OutputError` where it cannot be written.
     """
-    file = Path(path)
+    file = path_from(path)
     if file.suffix.lower() not in _CODECS:
         raise InvalidInputError(f"{file}: ends in {file.suffix!r}, expected {' or '.join(_CODECS)}")
     with whole_file(file) as part:

@@ -9,7 +9,7 @@ from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import Final
 
-from tiltvp.arguments import size_from
+from tiltvp.arguments import path_from, size_from
 from tiltvp.errors import UnsupportedFormatError
 from tiltvp.files import write_whole
 from tiltvp.formats import (
@@ -105,7 +105,7 @@ def write_cameras(specs: Sequence[CameraSpec], path: str | os.PathLike[str], for
         raise UnsupportedFormatError(f"{path}: {chosen.name} is not written, expected one of {known}")
     checked = own.checked(specs, path)
     try:
-        is_binary = chosen.name == "colmap" and os.fspath(path).lower().endswith(".bin")
+        is_binary = chosen.name == "colmap" and str(path_from(path)).lower().endswith(".bin")
         content = colmap.written_binary(checked) if is_binary else chosen.written(checked)
     except UnsupportedFormatError as error:
         raise UnsupportedFormatError(f"{path}: {error}; {', '.join(_holding(checked))} can hold it") from None

@@ -6,9 +6,9 @@ import os
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
+from tiltvp.arguments import path_from
 from tiltvp.errors import InvalidInputError, MissingExtraError, TiltvpError
 from tiltvp.images import LARGEST_IMAGE_BYTES
 
@@ -25,7 +25,7 @@ MOST_METADATA_BYTES: Final = 16 << 20
 
 def is_recording(path: str | os.PathLike[str]) -> bool:
     """Whether it looks like a bag: a file with such an ending, or a folder with a bag's metadata."""
-    file = Path(path)
+    file = path_from(path)
     try:
         return (file.suffix.lower() in BAG_ENDINGS and not file.is_dir()) or (file / _METADATA).is_file()
     except ValueError:
@@ -77,7 +77,7 @@ class Recording:
 
         Raises `InvalidInputError` with the path for what is no recording, `MissingExtraError` without rosbags.
         """
-        self.path = Path(path)
+        self.path = path_from(path)
         with self._opened() as reader:
             found = [
                 Topic(name, _short(info.msgtype or "of several types"), info.msgcount)

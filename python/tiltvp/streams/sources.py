@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 
+from tiltvp.arguments import path_from
 from tiltvp.errors import InvalidInputError
 from tiltvp.streams.bags import Recording, is_recording
 from tiltvp.streams.frames import Frames
@@ -27,7 +28,8 @@ def open_frames(
     and `option` what messages call it.
     What was asked for and is not there is in `Frames.problems`; raises `TiltvpError` where there are no frames at all.
     """
-    words = [os.fspath(source)] if isinstance(source, str | os.PathLike) else [os.fspath(word) for word in source]
+    given = source if isinstance(source, Iterable) and not isinstance(source, str | bytes) else [source]
+    words = [os.fspath(word) for word in given if path_from(word)]
     others = [word for word in words if is_recording(word) or _is_video(word)]
     if others and len(words) > 1:
         raise InvalidInputError(f"{others[0]}: beside other sources, expected one video or recording, or any images")

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
 
+from tiltvp.arguments import path_from
 from tiltvp.errors import InvalidInputError, MissingExtraError
 from tiltvp.files import check_output, scratch_folder, whole_file
 
@@ -96,7 +97,7 @@ def check_recording(path: str | os.PathLike[str]) -> None:
     Raises `InvalidInputError` for another ending than .mcap, `MissingExtraError` without the packages of the extra
     `bags`, and as `check_output` does.
     """
-    name = os.fspath(path)
+    name = str(path_from(path))
     if not name.lower().endswith(_ENDING):
         raise InvalidInputError(f"{name}: expected a name that ends in {_ENDING}")
     try:

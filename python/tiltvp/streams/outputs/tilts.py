@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING, Final, Protocol
 
 import numpy as np
 
 from tiltvp._core import leaning_from_upright
+from tiltvp.arguments import path_from
 from tiltvp.errors import InvalidInputError
 from tiltvp.files import check_output
 from tiltvp.rotations import quaternion
@@ -76,7 +76,7 @@ def attitude(tilt: Tilt) -> tuple[Matrix, Matrix]:
 
 def check_tilts(path: str | os.PathLike[str]) -> None:
     """Refuses what `write_tilts` cannot write, before any work is done. Raises as it does."""
-    match Path(path).suffix.lower():
+    match path_from(path).suffix.lower():
         case ".mcap":
             check_recording(path)
         case ".tum":
@@ -109,7 +109,7 @@ def write_tilts(
     if len(bad):
         raise InvalidInputError(f"times_s[{bad[0]}] = {times[bad[0]]}, expected seconds from 0 to 2^31")
     known = [(float(time_s), *attitude(tilt)) for time_s, tilt in zip(times, tilts, strict=True) if tilt]
-    if Path(path).suffix.lower() == ".tum":
+    if path_from(path).suffix.lower() == ".tum":
         quaternions = np.array([quaternion(rotation) for _, rotation, _ in known]).reshape(-1, 4)
         about = f"of world_from_{frame}: orientation alone, with yaw 0; x, y and z are not known"
         write_tum(path, [time_s for time_s, _, _ in known], np.zeros((len(known), 3)), quaternions, about)

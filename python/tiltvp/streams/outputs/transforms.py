@@ -5,11 +5,11 @@ from __future__ import annotations
 import os
 import re
 from dataclasses import dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from tiltvp.arguments import path_from
 from tiltvp.errors import InvalidInputError
 from tiltvp.files import check_output, write_whole
 from tiltvp.rotations import quaternion, rotation_from
@@ -137,7 +137,7 @@ class StaticTransform:
         Raises as `check_transform` does.
         """
         check_transform(path)
-        match Path(path).suffix.lower():
+        match path_from(path).suffix.lower():
             case ".urdf":
                 write_whole(path, f'<robot name="{self.child}">\n{self.urdf_joint()}\n</robot>\n')
             case ".yaml":
@@ -165,7 +165,7 @@ def check_transform(path: str | os.PathLike[str]) -> None:
     Raises `InvalidInputError` for another ending than those of `TRANSFORM_ENDINGS`, `MissingExtraError` for .mcap
     without the packages of the extra `bags`, and as `check_output` does.
     """
-    ending = Path(path).suffix.lower()
+    ending = path_from(path).suffix.lower()
     if ending not in TRANSFORM_ENDINGS:
         raise InvalidInputError(f"{path}: ends in {ending!r}, expected one of {', '.join(TRANSFORM_ENDINGS)}")
     if ending == ".mcap":
