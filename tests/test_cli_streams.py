@@ -136,10 +136,13 @@ def test_a_floor_turns_with_a_robot_whose_turns_nobody_knows(times: bool, walk: 
         (FrameMotions(motions, turns_known=False, times_s=None), walk),
         (FrameMotions(motions, turns_known=True, times_s=None), own),
     ):
-        found = asked.following(frames, moved).make().options["walk_rad_per_sqrt_step"]
+        found = asked.following(frames, moved, None).make().options["walk_rad_per_sqrt_step"]
         assert found == pytest.approx(expected)
     given = FilterOptions(filter=True, walk_deg_per_sqrt_step=0.3)  # type: ignore[call-arg]
-    assert given.following(frames, None) == given
+    assert given.following(frames, None, None) == given
+    assert given.following(frames, None, 0.6).make().options["half_track_m"] == 0.3
+    own_wheels = FilterOptions(filter=True, half_track_m=0.2)  # type: ignore[call-arg]
+    assert own_wheels.following(frames, None, 0.6).make().options["half_track_m"] == 0.2
 
 
 def test_a_slope_is_followed_where_turns_are_not_known(run: Run, world: Path, tmp_path: Path) -> None:

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 
 _FILTER = Group("Abstaining and filtering")
 _WALK: Final = "walk_rad_per_sqrt_step"
+_HALF_TRACK: Final = "half_track_m"
 _TURNING_RAD_S: Final = 0.1
 """By how much the tilt of a floor changes in a second where nobody knows the turns: of three degrees, at two radians a
 second. Frames that tell no time may be a second apart."""
@@ -52,15 +53,20 @@ class FilterOptions(LibraryOptions):
         if self.filter or self.confidence_min is not None:
             self.make()
 
-    def following(self, frames: Frames, moved: FrameMotions | None) -> Self:
-        """The same where turns are not known: the tilt of a floor that slopes then turns with the robot, as a walk."""
+    def following(self, frames: Frames, moved: FrameMotions | None, wheel_base_m: float | None) -> Self:
+        """The same with the robot's wheels, where these are known, and a walk where turns are not: the tilt of a floor
+        that slopes then turns with the robot."""
         from tiltvp.streams import LiveCamera
 
-        if not self.filter or (moved is not None and moved.turns_known) or _WALK in self.given():
+        if not self.filter:
             return self
-        timed = frames.times_s is not None or isinstance(frames, LiveCamera)
-        walk_rad = _TURNING_RAD_S / (frames.rate_hz if timed else 1.0)
-        changed: dict[str, Any] = {_WALK.replace("rad", "deg"): math.degrees(walk_rad)}
+        given, changed = self.given(), dict[str, Any]()
+        if wheel_base_m is not None and _HALF_TRACK not in given:
+            changed[_HALF_TRACK] = 0.5 * wheel_base_m
+        if (moved is None or not moved.turns_known) and _WALK not in given:
+            timed = frames.times_s is not None or isinstance(frames, LiveCamera)
+            walk_rad = _TURNING_RAD_S / (frames.rate_hz if timed else 1.0)
+            changed[_WALK.replace("rad", "deg")] = math.degrees(walk_rad)
         return replace(self, **changed)
 
     def make(self) -> TiltFilter:

@@ -15,7 +15,7 @@ from tiltvp.cli.filtering import FilterOptions
 from tiltvp.cli.level_images import TILTS, Levelling, Looks, level_on_cluster, write_images
 from tiltvp.cli.level_videos import write_video
 from tiltvp.cli.options import CameraOptions, MethodOptions, Switch, image_size_from, rotation_of
-from tiltvp.cli.sources import MotionOptions, SourceOptions, check_apart
+from tiltvp.cli.sources import MotionOptions, SourceOptions, check_apart, wheel_base_of
 from tiltvp.cli.terminal import say
 from tiltvp.errors import InvalidInputError
 from tiltvp.files import check_output, check_output_folder
@@ -117,7 +117,8 @@ def level(
     if not fused:
         motion.refuse("--filter", wheel_base)
     moved = motion.motions_of(robot, frames, wheel_base) if fused else None
-    work = Levelling(looks, filtering.following(frames, moved), copy_unlevelled)
+    filtering = filtering.following(frames, moved, wheel_base_of(robot, wheel_base))
+    work = Levelling(looks, filtering, copy_unlevelled)
     motions = repeat(Motion()) if moved is None else moved.motions
     if cluster is not None:
         levelled, of = level_on_cluster(cluster, files_of(frames), out, work)

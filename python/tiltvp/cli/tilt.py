@@ -19,7 +19,14 @@ from tiltvp.cli.filtering import FilterOptions
 from tiltvp.cli.options import CameraOptions, MethodOptions
 from tiltvp.cli.results import Outcome, mounting_words, outcome_table, people_table, summary_words
 from tiltvp.cli.showing import ShowOptions
-from tiltvp.cli.sources import MotionOptions, SourceOptions, check_apart, ending_at_interrupt, picture_names
+from tiltvp.cli.sources import (
+    MotionOptions,
+    SourceOptions,
+    check_apart,
+    ending_at_interrupt,
+    picture_names,
+    wheel_base_of,
+)
 from tiltvp.cli.tables import STDOUT, Out, json_lines
 from tiltvp.cli.terminal import ProgressBar, complain, named, progress_bar, say, show, width
 from tiltvp.cli.tilt_work import Work, tilts_on_cluster
@@ -104,7 +111,7 @@ def tilt(
     frames = source.open(images or [])
     check_apart(frames, overlay, level)
     moved = motion.motions_of(robot, frames, wheel_base) if filtering.filter else None
-    filtering = filtering.following(frames, moved)
+    filtering = filtering.following(frames, moved, wheel_base_of(robot, wheel_base))
     motions: Iterable[Motion | None] = repeat(Motion()) if moved is None else moved.motions
     work, judge = Work(_checked(estimator, frames), overlay, level, filtering, showing.asked), filtering.judge()
     if cluster is not None and out is not None:
