@@ -51,7 +51,7 @@ def test_render_and_check(run: Run, world: Path, tmp_path: Path) -> None:
     assert dataset.source["made_by"] == "tiltvp dataset render"
     assert dataset.source["camera"] == "camera.toml"
     assert dataset.source["tilts_deg"] == "0,0 2,-90"
-    assert run("check", out) == (0, f"{out}: 4 images, 2 locations, 1 environments, 0 warnings\n", "")
+    assert run("check", out) == (0, f"{out}: 4 images, 2 locations, 1 environment, 0 warnings\n", "")
     code, _, complaints = run(*words)
     assert code == 2
     assert "exists, expected a new folder" in complaints

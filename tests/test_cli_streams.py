@@ -53,7 +53,7 @@ def test_tilt_of_a_bag_with_the_odometry_of_the_same(run: Run, world: Path, tmp_
     code, said, complaints = run("tilt", bag, "--camera", world / "camera.toml", "--filter", "--out", out)
     assert code == 0
     assert f"--odometry: not given, that of {bag} is taken" in complaints
-    assert f"1 frames outside its span ({bag}#0)" in complaints
+    assert f"1 frame outside its span ({bag}#0)" in complaints
     assert "no-odometry" in said
     table = pl.read_csv(out)
     assert table["taken_s"].to_list() == pytest.approx([START_S + k - 1 for k in range(FRAMES)], abs=1e-6)
@@ -227,7 +227,7 @@ def test_tracks_of_a_bag_have_times(run: Run, world: Path, tmp_path: Path) -> No
     )
     code, said, complaints = run(*words)
     assert code == 0
-    assert "1 frames outside its span" in complaints
+    assert "1 frame outside its span" in complaints
     assert f"{FRAMES - 1} frames, " in said
     table = pl.read_csv(tmp_path / "t.csv")
     assert table["frame"].unique().sort().to_list() == list(range(1, FRAMES))

@@ -180,7 +180,7 @@ def test_gravity_that_is_there_is_kept_and_so_are_positions(
             opened.write_pose_prior(prior)
     assert run(path, views) == 2
     # That of the tag of an upright photograph is none that is lost.
-    assert "1 images have a gravity, expected none, or --overwrite" in capsys.readouterr().err
+    assert "1 image with a gravity, expected none, or --overwrite" in capsys.readouterr().err
     assert set(gravities(path)) == {"level.png", "dark.png"}
     assert run(path, views, "--overwrite") == 0
     assert set(gravities(path)) == {"level.png", "drawn.png"}

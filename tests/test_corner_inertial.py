@@ -99,7 +99,7 @@ def test_nothing_is_told_across_a_gap() -> None:
         samples = InertialSamples(times[keep], rates[keep], forces[keep])
         assert samples.known(None, 0.95)["gravity"] is not None
         assert [samples.known(None, now)["gravity"] for now in (1.15, 1.3, 1.4)] == [None] * 3
-        assert samples.gaps == (None if gap is None else f"1 gaps of over 0.1 s, the longest of {gap}")
+        assert samples.gaps == (None if gap is None else f"1 gap of over 0.1 s, the longest of {gap}")
     assert InertialSamples(times, rates, forces).gaps is None
     # At the frame, not at the sample next to it.
     times = np.arange(0.0, 2.0, 0.05)
@@ -155,7 +155,7 @@ def test_tables_of_readings(tmp_path: Path) -> None:
     for text, problem in (
         ("time_s,rate_x_radps\n0,0\n", "no column rate_y_radps"),
         ("time_s,rate_x_radps,rate_y_radps,rate_z_radps\n1,0,0,1\n1,0,0,1\n", "after 1"),
-        ("time_s,rate_x_radps,rate_y_radps,rate_z_radps\n1,0,0,1\n", "1 rows"),
+        ("time_s,rate_x_radps,rate_y_radps,rate_z_radps\n1,0,0,1\n", "1 row"),
     ):
         table.write_text(text)
         with pytest.raises(InvalidInputError, match=problem):

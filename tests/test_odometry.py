@@ -187,7 +187,7 @@ def test_nothing_is_made_up_outside_and_in_gaps() -> None:
     motions = odometry.motions([-0.1, 0.0, 1.0, 2.3])
     assert [motion and motion.distance_m for motion in motions] == [None, 0.0, None, 2.3]
     assert odometry.missing([-0.1, 0.0, 1.0, 2.4], ["a", "b", "c", "d"]) == (
-        "odometry: from 0.000 to 2.300 s; 2 frames outside its span (a to d) and 1 frames in gaps of over 0.5 s (c)"
+        "odometry: from 0.000 to 2.300 s; 2 frames outside its span (a to d) and 1 frame in gaps of over 0.5 s (c)"
     )
     assert odometry.missing([0.0, 0.2], ["a", "b"]) is None
     with pytest.raises(InvalidInputError, match=r"no velocities from 0\.200 to 2\.200 s"):
@@ -207,11 +207,11 @@ def test_gaps_and_jumps_between_the_frames_are_told(tmp_path: Path) -> None:
         return frame_motions(open_frames(tmp_path), path).notes
 
     name = tmp_path / "odometry.csv"
-    gap = "1 gaps of over 0.5 s, the longest of 1.200 s from 1.900 s on; the way in each is taken for one arc"
+    gap = "1 gap of over 0.5 s, the longest of 1.200 s from 1.900 s on; the way in each is taken for one arc"
     assert notes(kept) == (f"{name}: {gap}",)
     assert notes(TIMES < 3.6) == notes(np.arange(len(TIMES)) % 20 == 10) == ()
     anew = columns("poses")["x_m"] - np.where(TIMES > 2.0, 40.0, 0.0)
-    assert "1 steps that no robot makes, the first after 2.000 s by " in notes(TIMES >= 0.0, x_m=anew)[-1]
+    assert "1 step that no robot makes, the first after 2.000 s by " in notes(TIMES >= 0.0, x_m=anew)[-1]
 
 
 @pytest.mark.parametrize("short", [1, 2])
@@ -340,7 +340,7 @@ def test_an_orientation_that_nobody_filled_in_is_no_heading(tmp_path: Path) -> N
         ("time_s\n1\n2\n", "line 1: no motion"),
         ("time_s,left_m,delta_left_m,right_m\n", "column 'left_m' twice"),
         ("time_s,yaw_rad\n0,0\n1,0\n1,0\n", "line 4: time_s = 1.0 after 1.0"),
-        ("time_s,yaw_rad\n0,0\n", "1 samples, expected two or more"),
+        ("time_s,yaw_rad\n0,0\n", "1 sample, expected two or more"),
         ("time_s,yaw_rad\n", "0 samples, expected two or more"),
         ("time_s,yaw_rad\n0,0\nnan,0\n", "line 3: time_s = 'nan'"),
         ("time_s,left_ticks,right_ticks\n0,0,0\n1,1,1\n", "expected --wheel-radius and --ticks-per-turn"),

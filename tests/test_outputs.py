@@ -272,7 +272,7 @@ def test_the_command_writes_the_attitudes_of_its_table(
     if more:
         assert said == f"{out}: 3 filtered tilts as sensor_msgs/Imu on {TILT_TOPIC}, yaw 0, at 5 frames a second from 0"
     else:
-        assert said.endswith("yaw 0, at 5 frames a second from 0; 1 frames without one are left out")
+        assert said.endswith("yaw 0, at 5 frames a second from 0; 1 frame without one left out")
 
 
 PAGE = (Path(__file__).parents[1] / "docs/outputs.md").read_text(encoding="utf-8")

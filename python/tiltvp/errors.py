@@ -22,6 +22,11 @@ def _shortened(text: str) -> str:
     return f"{text[:begin]} ... ({len(text) - begin - end} characters) ... {text[-end:]}"
 
 
+def counted(count: int, things: str) -> str:
+    """Words of a message for so many things, which are given in the plural: "1 gap", "2 gaps"."""
+    return f"{count} {things.removesuffix('s') if count == 1 else things}"
+
+
 class InvalidInputError(TiltvpError, ValueError):
     """An argument has the wrong shape, type or value."""
 

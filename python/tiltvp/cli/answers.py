@@ -8,7 +8,7 @@ from typing import Final
 
 from tiltvp.cli.results import Outcome, outcome_table
 from tiltvp.cli.tables import ENDINGS, check_ending, write_table
-from tiltvp.errors import InvalidInputError, TiltvpError
+from tiltvp.errors import InvalidInputError, TiltvpError, counted
 from tiltvp.streams.outputs.tilts import TILT_ENDINGS, TILT_TOPIC, check_tilts, write_tilts
 
 __all__ = ["check_answers", "write_answers"]
@@ -58,5 +58,5 @@ def write_answers(outcomes: Sequence[Outcome], method: str, path: Path, frame_ra
     what = "filtered tilts" if is_filtered else "tilts"
     where = f" as sensor_msgs/Imu on {TILT_TOPIC}" if path.suffix.lower() == ".mcap" else ""
     lacking = len(outcomes) - count
-    left_out = f"; {lacking} frames without one are left out" if lacking else ""
+    left_out = f"; {counted(lacking, 'frames')} without one left out" if lacking else ""
     return f"{path}: {count} {what}{where}, yaw 0, {clock}{left_out}"

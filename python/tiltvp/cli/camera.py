@@ -14,7 +14,7 @@ from cyclopts import App, Parameter
 
 from tiltvp.cli.options import Switch, image_size_from, refuse_beside
 from tiltvp.cli.terminal import complain, named, new_table, say, show
-from tiltvp.errors import CalibrationError, InvalidInputError, TiltvpError
+from tiltvp.errors import CalibrationError, InvalidInputError, TiltvpError, counted
 from tiltvp.files import check_output
 
 if TYPE_CHECKING:
@@ -128,7 +128,7 @@ def convert(
         if spec.max_theta_rad is not None and to not in (None, "tiltvp"):
             limit = f"{math.degrees(spec.max_theta_rad):.2f} deg from the axis"
             complain(f"{out}: {spec.name}: the limit of {limit} is not in it, {to} has no word for that")
-    say(f"{out}: {len(specs)} camera{'s' if len(specs) > 1 else ''}, {', '.join(spec.model for spec in specs)}")
+    say(f"{out}: {counted(len(specs), 'cameras')}, {', '.join(spec.model for spec in specs)}")
 
 
 @app.command

@@ -11,7 +11,7 @@ from cyclopts import Parameter, validators
 
 from tiltvp.cli.options import MethodOptions
 from tiltvp.cli.terminal import complain, new_table, progress_bar, say, show
-from tiltvp.errors import InvalidInputError
+from tiltvp.errors import InvalidInputError, counted
 from tiltvp.files import check_replacing
 
 if TYPE_CHECKING:
@@ -61,7 +61,7 @@ def colmap(
     opened = ColmapDatabase(database)
     told = sum(image.has_gravity for image in opened.images)
     if told:
-        check_replacing(f"{database}: {told} images have a gravity")
+        check_replacing(f"{database}: {counted(told, 'images')} with a gravity")
     if cameras is not None:
         opened.use_cameras(read_cameras(cameras, "colmap"))
 

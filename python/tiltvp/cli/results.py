@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Final
 
 from tiltvp.cli.tables import Table, finite
 from tiltvp.cli.terminal import new_table
+from tiltvp.errors import counted
 
 if TYPE_CHECKING:
     from rich.table import Table as PrintedTable
@@ -116,7 +117,7 @@ def summary_words(outcomes: Sequence[Outcome]) -> str:
 
     The time is the median of all but the first, which finds nothing in the processor's caches.
     """
-    count = f"{len(outcomes)} image{'s' if len(outcomes) != 1 else ''}"
+    count = counted(len(outcomes), "images")
     given = [outcome.estimate for outcome in outcomes if outcome.estimate is not None]
     leans = sorted(estimate.alpha_rad for estimate in given if estimate)
     if leans:

@@ -19,7 +19,7 @@ from tiltvp.cli.showing import RerunOptions
 from tiltvp.cli.sources import MotionOptions, SourceOptions, check_apart, ending_at_interrupt
 from tiltvp.cli.tables import Out, Table, check_ending, check_plot, write_table
 from tiltvp.cli.terminal import ProgressBar, complain, named, progress_bar, say
-from tiltvp.errors import InvalidInputError, TiltvpError, UnknownLeanError
+from tiltvp.errors import InvalidInputError, TiltvpError, UnknownLeanError, counted
 from tiltvp.files import check_output
 
 if TYPE_CHECKING:
@@ -111,7 +111,7 @@ def track(
     if not tracked:
         count = drive.bad + drive.leaning
         which = "none of which can be read" if not drive.leaning else f"{drive.told()}, and no other can be read"
-        raise InvalidInputError(f"{frames.source}: {count} frames, {which}")
+        raise InvalidInputError(f"{frames.source}: {counted(count, 'frames')}, {which}")
     table = track_table(tracked)
     write_table(table, out)
     if plot is not None:
@@ -121,7 +121,8 @@ def track(
 
         write_image(plot, figure_picture(track_plot(table.frame())))
     skipped = "".join([f", {drive.bad} skipped" if drive.bad else "", f", {drive.told()}" if drive.leaning else ""])
-    say(f"{out}: {len(tracked)} frames{skipped}, {len(table.rows)} lines, {tracker.track_count} tracks")
+    lines, tracks = counted(len(table.rows), "lines"), counted(tracker.track_count, "tracks")
+    say(f"{out}: {counted(len(tracked), 'frames')}{skipped}, {lines}, {tracks}")
     return 1 if drive.bad or frames.problems else 0
 
 

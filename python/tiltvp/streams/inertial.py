@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Final, Self
 import numpy as np
 
 from tiltvp.csv_files import CsvFile
-from tiltvp.errors import InvalidInputError
+from tiltvp.errors import InvalidInputError, counted
 from tiltvp.rotations import rotation_from
 from tiltvp.streams.odometry import finite_array, gaps_told
 
@@ -72,7 +72,7 @@ class InertialSamples:
             if getattr(self, name) is not None:
                 finite_array(self, name, shape)
         if n < 2 or (np.diff(self.times_s) <= 0.0).any():
-            raise InvalidInputError(f"{self.source}: {n} samples, expected two or more of rising times")
+            raise InvalidInputError(f"{self.source}: {counted(n, 'samples')}, expected two or more of rising times")
 
     @property
     def gaps(self) -> str | None:
@@ -102,7 +102,7 @@ class InertialSamples:
             before = values[0]
             numbers.append(values)
         if len(numbers) < 2:
-            raise InvalidInputError(f"{table.name}: {len(numbers)} rows, expected two or more")
+            raise InvalidInputError(f"{table.name}: {counted(len(numbers), 'rows')}, expected two or more")
         columns = np.array(numbers, dtype=np.float64)
         forces = columns[:, 4:7] if has_forces else None
         return cls(columns[:, 0], columns[:, 1:4], forces, source=table.name)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from tiltvp.arguments import array_from, number_from
-from tiltvp.errors import InvalidInputError
+from tiltvp.errors import InvalidInputError, counted
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
@@ -91,7 +91,7 @@ class Odometry:
             if getattr(self, name) is not None:
                 finite_array(self, name, shape)
         if n < 2 or (np.diff(self.times_s) <= 0.0).any():
-            raise InvalidInputError(f"{self.source}: {n} samples, expected two or more of rising times")
+            raise InvalidInputError(f"{self.source}: {counted(n, 'samples')}, expected two or more of rising times")
         if not self.gap_max_s > 0.0:
             raise InvalidInputError(f"gap_max_s = {self.gap_max_s}, expected more than 0")
 
@@ -219,7 +219,7 @@ class Odometry:
             places = np.flatnonzero(flags)
             if len(places):
                 to = f" to {names[places[-1]]}" if len(places) > 1 else ""
-                parts.append(f"{len(places)} frames {why} ({names[places[0]]}{to})")
+                parts.append(f"{counted(len(places), 'frames')} {why} ({names[places[0]]}{to})")
         if not parts:
             return None
         span = f"from {self.times_s[0]:.3f} to {self.times_s[-1]:.3f} s"
@@ -246,8 +246,9 @@ class Odometry:
             return None
         first = int(places[0])
         return (
-            f"{self.source}: {len(places)} steps that no robot makes, the first after {self.times_s[first]:.3f} s by "
-            f"{speeds[first]:.3g} m/s and {rates[first]:.3g} rad/s: was it set anew, or is it in other units?"
+            f"{self.source}: {counted(len(places), 'steps')} that no robot makes, the first after "
+            f"{self.times_s[first]:.3f} s by {speeds[first]:.3g} m/s and {rates[first]:.3g} rad/s: "
+            "was it set anew, or is it in other units?"
         )
 
 
@@ -275,4 +276,4 @@ def gaps_told(times_s: NDArray[np.float64], most_s: float) -> str | None:
     if not len(gaps):
         return None
     longest, begins = float(gaps.max()), float(times_s[int(np.argmax(steps))])
-    return f"{len(gaps)} gaps of over {most_s:g} s, the longest of {longest:.3f} s from {begins:.3f} s on"
+    return f"{counted(len(gaps), 'gaps')} of over {most_s:g} s, the longest of {longest:.3f} s from {begins:.3f} s on"

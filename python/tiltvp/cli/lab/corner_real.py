@@ -55,6 +55,8 @@ def corners_real(folder: Path, /, *, overlay: Path | None = None) -> None:
     table.add_row("NEES of 3, with the capture's own errors: median, 90 %", f"{median:.1f} {most:.0f}")
     own, told = np.nanmedian(found.edges_off_deg, axis=0)
     table.add_row("LSD's edges off the axes: as estimated, as captured (deg)", f"{own:.2f} {told:.2f}")
+    nearer = int((found.edges_off_deg[:, 0] < found.edges_off_deg[:, 1]).sum())
+    table.add_row("images in which they are nearer to the estimated ones", f"{nearer} of {len(found.places)}")
     show(table)
 
     box_folder = folder / "visp_teabox_stereo"

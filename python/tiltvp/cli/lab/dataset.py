@@ -11,6 +11,7 @@ from tiltvp.cli.lab.dataset_drives import drive, stereo
 from tiltvp.cli.lab.dataset_options import LensOptions, MakingOptions, Words, made_by, tilts_from
 from tiltvp.cli.options import Switch
 from tiltvp.cli.terminal import new_table, progress_bar, say, show
+from tiltvp.errors import counted
 
 app = App(name="dataset", help="Folders of images with known lean: check them, or make them.")
 app.command(drive)
@@ -48,8 +49,11 @@ def check(directory: Path, /) -> int:
     if dataset is not None and not errors:
         locations = {image.location for image in dataset.images}
         environments = {image.environment for image in dataset.images}
-        counts = f"{len(dataset.images)} images, {len(locations)} locations, {len(environments)} environments"
-        say(f"{directory}: {counts}, {len(findings)} warnings")
+        counts = ", ".join(
+            counted(len(many), what)
+            for many, what in ((dataset.images, "images"), (locations, "locations"), (environments, "environments"))
+        )
+        say(f"{directory}: {counts}, {counted(len(findings), 'warnings')}")
     elif is_stereo(directory) and not errors:
         say(f"{directory}: a stereo sequence, in order")
     return 1 if errors else 0

@@ -67,8 +67,8 @@ class Cabinet:
     nees: Matrix
     """(N,): `error_deg` squared by the stated covariance, 3 on average at best."""
     edges_off_deg: Matrix
-    """(N, 2): how far edges of OpenCV's LSD are off their axes, their median by length, where the axes are as estimated,
-    and as the capture has them. We do not find these edges, so that they tell which of the two is wrong."""
+    """(N, 2): how far edges of OpenCV's LSD are off their axes, medians by length, with the axes as estimated, and as the
+    capture has them. We do not find these edges, so that they tell which of the two is wrong."""
 
 
 @dataclass(frozen=True)
@@ -143,7 +143,7 @@ def cabinet(folder: Path, advance: Callable[[], None] = lambda: None, show: Show
 
 
 def _line_normals(image: NDArray[np.uint8]) -> tuple[Matrix, Matrix]:
-    """The normals (K, 3) of the great circles of OpenCV's line segments in an image of the cabinet, and their lengths, pixels."""
+    """The normals (K, 3) of OpenCV's line segments in an image of the cabinet, and their lengths, pixels."""
     found = cv2.createLineSegmentDetector().detect(image if image.ndim == 2 else image.mean(axis=2).astype(np.uint8))[0]
     ends = np.zeros((0, 2, 2)) if found is None else np.float64(found.reshape(-1, 2, 2))
     lengths = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
