@@ -6,10 +6,9 @@ import numpy as np
 import pytest
 
 import tiltvp
+from test_calibration import START
 from tiltvp.errors import InvalidInputError
 from tiltvp.synth import simulate_drive
-
-START = {"wheel_base_m": 0.4, "start": (0.2, 0.0, 0.0), "start_sigma": (0.2, 0.2, 0.6)}
 
 
 def test_landmarks_left_out_in_turn_widen_the_covariance() -> None:
