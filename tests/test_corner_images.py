@@ -7,6 +7,7 @@ import json
 import pickle
 from pathlib import Path
 
+import cv2
 import numpy as np
 import pytest
 
@@ -21,6 +22,7 @@ from drawn_corners import (
     off_deg,
     off_px,
     pair,
+    photographed,
     pose,
     turn,
 )
@@ -352,3 +354,35 @@ def test_corners_of_rooms_that_show_little_of_themselves_are_found(kind: str, se
     off = off[np.argmin(np.linalg.norm(off, axis=1))]
     assert np.linalg.norm(off) < 0.01
     assert off @ np.linalg.solve(estimate.pose.covariance[3:, 3:], off) < 16.3
+
+
+def test_three_lines_of_one_image_are_no_corner_amid_edges_that_run_otherwise() -> None:
+    """Any three lines that meet are a corner with right angles to one camera."""
+    rng = np.random.default_rng(2)
+    picture, centre = np.full((1440, 1920), 150, np.uint8), np.array([960, 720])
+    tips = [centre + 480 * np.array([np.cos(t), np.sin(t)]) for t in (np.pi / 2 + 0.05, np.pi + 0.5, -0.45)]
+    for side, grey in enumerate((60, 110, 200)):
+        cv2.fillPoly(picture, [np.array([centre, tips[side], tips[(side + 1) % 3]]).astype(np.int32)], (grey,))
+    for _ in range(120):
+        while True:
+            middle, angle = rng.uniform([0, 0], [1920, 1440]), rng.uniform(0, np.pi)
+            half = 150 * np.array([np.cos(angle), np.sin(angle)])
+            if min(np.hypot(*(point - centre)) for point in (middle - half, middle, middle + half)) > 560:
+                break
+        ends = [tuple((middle + sign * half).astype(int).tolist()) for sign in (-1, 1)]
+        cv2.line(picture, ends[0], ends[1], (int(rng.integers(0, 90)),), 8)
+    image = photographed(np.repeat(picture[..., None], 3, 2), 1.0, 2)
+    estimate = CornerPoseEstimator(CAMERA, method="general", down=(0.0, 1.0, 0.0))(image)
+    assert estimate.features_left
+    assert not estimate.hypotheses
+
+
+def test_a_frame_that_is_refused_leaves_all_as_it_was() -> None:
+    left, right = pair(GREYS)
+    estimator = CornerPoseEstimator(CAMERA, CAMERA, LEFT_FROM_RIGHT, method="general")
+    assert estimator(left, right)
+    before = copy.deepcopy(estimator)
+    for images in ((left, right[:-1]), (left[:-1], right)):
+        with pytest.raises(InvalidInputError, match="pixels"):
+            estimator(*images)
+        assert estimator == before

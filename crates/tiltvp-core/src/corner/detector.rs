@@ -84,7 +84,8 @@ impl CornerDetector {
         }
     }
 
-    fn check(&self, width: usize, height: usize) -> Result<()> {
+    /// Refuses images of another size than the camera's.
+    pub(super) fn check(&self, (width, height): (usize, usize)) -> Result<()> {
         let expected = (self.camera.width() as usize, self.camera.height() as usize);
         if (width, height) == expected {
             return Ok(());
@@ -107,7 +108,7 @@ impl CornerDetector {
         window: Option<&Window>,
         scratch: &mut CornerScratch,
     ) -> Result<Option<CornerFeature>> {
-        self.check(image.width(), image.height())?;
+        self.check((image.width(), image.height()))?;
         let whole = Window { columns: 0..image.width(), rows: 0..image.height() };
         let window = window.map_or(whole.clone(), |window| Window {
             columns: window.columns.start.min(whole.columns.end)..window.columns.end.min(whole.columns.end),
@@ -151,7 +152,7 @@ impl CornerDetector {
         scratch: &mut CornerScratch,
         out: &mut Vec<CornerFeature>,
     ) -> Result<()> {
-        self.check(image.width(), image.height())?;
+        self.check((image.width(), image.height()))?;
         let (CornerMethod::General(options), Some(detector), Some(memory)) =
             (&self.options.method, &self.segments, &mut scratch.general)
         else {

@@ -10,3 +10,13 @@ pub enum Frame<'a> {
     /// For the coloured cuboid.
     Color(ColorView<'a>),
 }
+
+impl Frame<'_> {
+    /// Width and height.
+    pub(super) fn size(&self) -> (usize, usize) {
+        match self {
+            Self::Gray(image) => (image.width(), image.height()),
+            Self::Color(image) => (image.width(), image.height()),
+        }
+    }
+}

@@ -48,7 +48,7 @@ _LONG_MM: Final = 110.0
 _LINE_PX: Final = 25.0
 """Shorter lines tell a direction to a degree."""
 _NEAR_DEG: Final = 4.0
-"""Lines farther from the axes of both attitudes than the larger of their differences are of other things."""
+"""Lines farther from the axes of either attitude are of other things; the attitudes differ by less."""
 
 
 @dataclass(frozen=True)
@@ -67,8 +67,8 @@ class Cabinet:
     nees: Matrix
     """(N,): `error_deg` squared by the stated covariance, 3 on average at best."""
     edges_off_deg: Matrix
-    """(N, 2): how far edges of OpenCV's LSD are off their axes, medians by length, with the axes as estimated, and as the
-    capture has them. We do not find these edges, so that they tell which of the two is wrong."""
+    """(N, 2): how far edges of OpenCV's LSD are off their axes, medians by length, with the axes as estimated and as
+    captured. We do not find these edges, so that they tell which of the two is wrong."""
 
 
 @dataclass(frozen=True)
@@ -145,7 +145,7 @@ def cabinet(folder: Path, advance: Callable[[], None] = lambda: None, show: Show
 def _line_normals(image: NDArray[np.uint8]) -> tuple[Matrix, Matrix]:
     """The normals (K, 3) of OpenCV's line segments in an image of the cabinet, and their lengths, pixels."""
     found = cv2.createLineSegmentDetector().detect(image if image.ndim == 2 else image.mean(axis=2).astype(np.uint8))[0]
-    ends = np.zeros((0, 2, 2)) if found is None else np.float64(found.reshape(-1, 2, 2))
+    ends = np.zeros((0, 2, 2)) if found is None else np.asarray(found, dtype=np.float64).reshape(-1, 2, 2)
     lengths = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
     ends, lengths = ends[lengths >= _LINE_PX], lengths[lengths >= _LINE_PX]
     lens = cabinet_camera()
@@ -154,8 +154,8 @@ def _line_normals(image: NDArray[np.uint8]) -> tuple[Matrix, Matrix]:
 
 
 def _off_axes_deg(normals: Matrix, lengths: Matrix, attitudes: tuple[Matrix, Matrix]) -> tuple[float, float]:
-    """How far lines are from the nearest axis of either attitude, medians by length, of those near one of both."""
-    off = np.degrees([np.arcsin(np.abs(normals @ attitude).min(axis=1)) for attitude in attitudes])
+    """How far lines are from the nearest axis of either attitude, medians by length, of those that are near both."""
+    off = np.degrees(np.array([np.arcsin(np.abs(normals @ attitude).min(axis=1)) for attitude in attitudes]))
     near = off.max(axis=0) <= _NEAR_DEG
     medians = []
     for one in off[:, near]:

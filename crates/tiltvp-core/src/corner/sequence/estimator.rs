@@ -117,7 +117,7 @@ impl CornerPoseEstimator {
     ///
     /// # Errors
     /// [`Error::InvalidArgument`] for images of another size or kind than the detectors', for one image too many or few, and of
-    /// [`FrameKnowledge::validate`].
+    /// [`FrameKnowledge::validate`]. Nothing has happened then.
     pub fn observe(
         &mut self,
         left: &Frame<'_>,
@@ -128,6 +128,10 @@ impl CornerPoseEstimator {
         if right.is_some() != self.right.is_some() {
             let (got, expected) = if right.is_some() { ("an image", "none") } else { ("none", "an image") };
             return Err(Error::argument("right image", got, format!("{expected}, as there are cameras")));
+        }
+        self.left.check(left.size())?;
+        if let (Some((detector, _)), Some(right)) = (&self.right, right) {
+            detector.check(right.size())?;
         }
         self.known = *known;
         let right_from_left =
@@ -206,7 +210,8 @@ impl CornerPoseEstimator {
         } else {
             self.by_one(&mut estimate)?;
         }
-        if estimate.hypotheses.first().is_some_and(|best| self.stands_alone(best)) {
+        let corners = estimate.chosen_left.len();
+        if estimate.hypotheses.first().is_some_and(|best| self.stands_alone(best, corners)) {
             estimate.hypotheses.clear();
             (estimate.chosen_left, estimate.chosen_right) = (Vec::new(), None);
         }

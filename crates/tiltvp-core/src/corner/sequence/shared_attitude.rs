@@ -17,6 +17,10 @@ use crate::geometry::tangent_basis;
 /// of diamonds, where nothing but the corner's own long edges runs along them, 0.18.
 const AT_RANDOM: f64 = 0.15;
 
+/// The same of a corner that one image has alone: any three lines are a corner with right angles then. Of 42 such corners in rooms of
+/// seeds 10400 to 10729 ten are 2.9 to 22 degrees off, with 0.09 to 0.48 along their axes, and 29 of the 32 others have more than 0.5.
+const AT_RANDOM_ALONE: f64 = 0.5;
+
 /// Least number of edges of all images that speak against a pose which few of them are along.
 const EDGES_MIN: usize = 40;
 
@@ -60,14 +64,16 @@ impl CornerPoseEstimator {
         Some(Matrix3::from_columns(&[aside, vertical, aside.cross(&vertical)]))
     }
 
-    /// Whether no more of the straight edges runs along the axes of a pose than of random ones: then nothing but three short edges of
-    /// its own says that they are at right angles.
-    pub(crate) fn stands_alone(&self, pose: &Hypothesis) -> bool {
-        if self.is_one_object() || self.options.angle != IncludedAngle::RIGHT {
+    /// Whether too few of the straight edges run along the axes of a pose: then nothing but three short edges of its own says that they
+    /// are at right angles, unless others of the `corners` of one image that agree on it do.
+    pub(crate) fn stands_alone(&self, pose: &Hypothesis, corners: usize) -> bool {
+        let from_one = self.right.is_none();
+        if from_one && corners > 1 || self.is_one_object() || self.options.angle != IncludedAngle::RIGHT {
             return false;
         }
         let lines = self.lines();
-        lines.len() >= EDGES_MIN && share_along_axes(&lines, &pose.camera_from_object) <= AT_RANDOM
+        let at_random = if from_one { AT_RANDOM_ALONE } else { AT_RANDOM };
+        lines.len() >= EDGES_MIN && share_along_axes(&lines, &pose.camera_from_object) <= at_random
     }
 
     /// The longer straight edges of the images that were looked at last.
