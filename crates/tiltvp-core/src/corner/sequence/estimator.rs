@@ -290,16 +290,15 @@ impl CornerPoseEstimator {
         let views: Vec<View<'_>> = agreed.attitudes.iter().map(view).collect();
         let alignment = if views.len() > 1 { Alignment::Manhattan } else { Alignment::Same };
         let resolved = resolve(&views, alignment, self.right_handed(), &priors)?;
-        let of = |attitude: &ResolvedAttitude| match self.is_one_object() {
-            true => attitude.covariance,
-            false => as_scattered(attitude, views.len()),
+        let covariance_of = |attitude: &ResolvedAttitude| {
+            if self.is_one_object() { attitude.covariance } else { as_scattered(attitude, views.len()) }
         };
         let hypotheses: Vec<Hypothesis> = resolved
             .iter()
             .filter_map(|resolved| {
                 let chosen = agreed.attitudes.first()?.get(*resolved.choice.first()?)?;
                 let mut covariance = Matrix6::zeros();
-                covariance.fixed_view_mut::<3, 3>(0, 0).copy_from(&of(resolved));
+                covariance.fixed_view_mut::<3, 3>(0, 0).copy_from(&covariance_of(resolved));
                 Some(Hypothesis {
                     camera_from_object: self.named(resolved.common_from_object),
                     edges: chosen.edges,
