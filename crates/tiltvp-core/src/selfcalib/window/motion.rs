@@ -3,6 +3,7 @@
 use nalgebra::{Matrix3, Vector3};
 
 use super::state::SlidingWindow;
+use super::tuning::{TREMOR_M, TREMOR_SIGMAS};
 use crate::selfcalib::bundle::Keyframe;
 use crate::selfcalib::model::{RelativeMotion, WheelMotion, compose, compose_jacobians};
 
@@ -10,13 +11,16 @@ use crate::selfcalib::model::{RelativeMotion, WheelMotion, compose, compose_jaco
 const STEP: f64 = 1.0;
 
 impl SlidingWindow {
-    /// Moves by the odometry of a step; nothing happens at a standstill.
+    /// Moves by the odometry of a step; nothing happens at a standstill, until what it tells adds up to a motion.
     pub(super) fn predict(&mut self, motion: &WheelMotion) {
         self.motion_noise = Matrix3::zeros();
-        if motion.left_m == 0.0 && motion.right_m == 0.0 {
+        self.standing.left_m += motion.left_m;
+        self.standing.right_m += motion.right_m;
+        if self.stands() {
             return;
         }
-        let odometry = RelativeMotion::from_wheels(motion, &self.problem.wheels, &self.problem.noise);
+        let motion = std::mem::take(&mut self.standing);
+        let odometry = RelativeMotion::from_wheels(&motion, &self.problem.wheels, &self.problem.noise);
         let keyframes = &mut self.problem.keyframes;
         let alone = keyframes.len() == 1;
         let Some(last) = keyframes.last_mut() else { return };
@@ -44,5 +48,41 @@ impl SlidingWindow {
                 self.covariance[(c, r)] = self.covariance[(r, c)];
             }
         }
+    }
+
+    /// Whether the odometry since the last motion is no more than encoders, and poses that are fused of several sensors, tremble by.
+    fn stands(&self) -> bool {
+        let WheelMotion { left_m, right_m } = self.standing;
+        let turn_rad = self.standing.turn_rad(self.problem.wheels.base_m);
+        (left_m == 0.0 && right_m == 0.0)
+            || left_m.abs().max(right_m.abs()) < TREMOR_M && turn_rad.abs() < TREMOR_SIGMAS * self.problem.bearing_sigma
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::selfcalib::SelfCalibratorOptions;
+
+    #[test]
+    fn wheels_that_tremble_make_no_keyframes_and_what_they_creep_is_not_lost() {
+        let options = SelfCalibratorOptions { wheel_base_m: 0.4, ..SelfCalibratorOptions::default() };
+        let mut filter = SlidingWindow::new(&options).unwrap();
+        let step = |left_m: f64, right_m: f64| WheelMotion { left_m, right_m };
+        filter.step(&step(0.05, 0.06), &[(1, 0.3), (2, 1.2)]);
+        let (keyframes, pose, covariance) = (filter.problem.keyframes.len(), filter.pose(), filter.covariance.clone());
+        for k in 0..1000 {
+            let to_and_fro = if k % 2 == 0 { 1e-4 } else { -1e-4 };
+            filter.step(&step(to_and_fro, -to_and_fro), &[(1, 0.3), (2, 1.2)]);
+        }
+        assert_eq!((filter.problem.keyframes.len(), filter.pose()), (keyframes, pose));
+        assert_eq!(filter.covariance, covariance);
+        // A millimetre in tenths is two motions.
+        for _ in 0..10 {
+            filter.step(&step(1e-4, 1e-4), &[(1, 0.3), (2, 1.2)]);
+        }
+        assert_eq!(filter.problem.keyframes.len(), keyframes + 2);
+        let moved = (filter.pose() - pose).fixed_rows::<2>(0).norm();
+        assert!((moved - 1e-3).abs() < 2e-4, "{moved}");
     }
 }

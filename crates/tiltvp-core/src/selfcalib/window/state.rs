@@ -8,7 +8,7 @@ use crate::error::Result;
 use crate::filter::ChiSquareGate;
 use crate::selfcalib::bundle::{BundleProblem, FreeParameters, widened};
 use crate::selfcalib::diagnosis::{Contradictions, Suspect};
-use crate::selfcalib::model::{BearingLoss, InverseDistanceLandmark, Prediction, Viewpoint};
+use crate::selfcalib::model::{BearingLoss, InverseDistanceLandmark, Prediction, Viewpoint, WheelMotion};
 use crate::selfcalib::options::SelfCalibratorOptions;
 
 /// The places of the mounting and of the first landmark in the state (pose, mounting, landmarks).
@@ -55,6 +55,8 @@ pub(crate) struct SlidingWindow {
     pub(super) spurious_until: usize,
     /// The factor that widens the covariance of the mounting for errors that a landmark's bearings share.
     pub(super) widening: Matrix3<f64>,
+    /// The odometry since the robot stands, which is none that counts yet.
+    pub(super) standing: WheelMotion,
     /// Covariance that the last motion added to the pose.
     pub(super) motion_noise: Matrix3<f64>,
     pub(super) monitor: InnovationMonitor,
@@ -83,6 +85,7 @@ impl SlidingWindow {
             solved_covariance: options.start_covariance,
             spurious_until: 0,
             widening: Matrix3::identity(),
+            standing: WheelMotion::default(),
             motion_noise: Matrix3::zeros(),
             monitor: InnovationMonitor::default(),
             examination: Examination::default(),
