@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import pickle
 from pathlib import Path
 
@@ -14,6 +15,7 @@ from drawn_corners import CAMERA, COLOURS, GREYS, LEFT_FROM_RIGHT, photographed,
 from tiltvp.cli.app import main
 from tiltvp.corner import CornerPoseEstimator
 from tiltvp.errors import InvalidInputError
+from tiltvp.synth import Room, StereoSequence, zed_cameras
 
 pytestmark = pytest.mark.slow
 
@@ -257,3 +259,17 @@ def test_the_command_line_takes_lengths(tmp_path: Path, capsys: pytest.CaptureFi
     assert main([*words, "--box-size-m", "0.3", "0.3", "0.2"]) == 0
     assert "without a place: the edges do not fit the known lengths (1)" in capsys.readouterr().out
     assert main([*words, "--edge-length-m", "0.3", "--camera-height-m", "1"]) == 2
+
+
+def test_one_image_has_the_attitude_of_most_of_its_edges() -> None:
+    """By its corners alone it is 0.5 degrees off."""
+    left, right = zed_cameras(1280)
+    sequence = StereoSequence(Room("office", 10806), left=left, right=right, frames=10, seed=10806)
+    down = -sequence.imu(seed=10806).forces_m_s2.mean(axis=0)
+    found = CornerPoseEstimator(left, method="general", down=down)(sequence.render(0)[0]).pose
+    assert found is not None
+    room = sequence.poses[0][:3, :3].T @ sequence.corners[0].world_from_object
+    # Which level edge of a corner is its first is not told: axes are compared, not their names.
+    cosines = np.abs(room.T @ found.camera_from_object)
+    assert math.degrees(math.acos(min(1.0, float(cosines.max(axis=0).min())))) < 0.1
+    assert math.degrees(math.sqrt(np.trace(found.covariance[:3, :3]))) < 0.2

@@ -27,6 +27,7 @@ def film(path: Path, times_s: tuple[float, ...], codec: str | None, gray: np.nda
     seen = np.full((64, 64), 90, np.uint8) if gray is None else gray
     with av.open(str(path), "w") as out:
         video = out.add_stream("mpeg4", rate=30)
+        video.bit_rate = 20_000_000  # By less the tilt of some frames is not believed.
         video.time_base = video.codec_context.time_base = base
         video.height, video.width, video.pix_fmt = *seen.shape, "yuv420p"
         sound = None if codec is None else out.add_stream(codec, rate=RATE_HZ, layout="mono")

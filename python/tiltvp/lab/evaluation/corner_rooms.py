@@ -14,7 +14,7 @@ from tiltvp.synth import StereoSequence
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-__all__ = ["own_places", "surface_off", "truth_near"]
+__all__ = ["attitude_near", "own_places", "surface_off", "truth_near"]
 
 _SAME_M: Final = 0.08
 """An estimate is of the listed corner that is this near"""
@@ -104,3 +104,13 @@ def truth_near(
     ]
     nearest, truth[:3, :3] = max(every, key=lambda one: float(np.trace(one[1] @ pose.camera_from_object.T)))
     return (number if number < 0 else nearest), truth
+
+
+def attitude_near(sequence: StereoSequence, frame: int, camera_from_object: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The attitude (3, 3) of a listed corner that is nearest to an estimate's, its axes named as the estimate has them:
+    that of one camera, which tells no place.
+    """
+    from_world = np.linalg.inv(sequence.poses_at([sequence.times_s[frame]])[0])[:3, :3]
+    listed = np.unique(np.round([corner.world_from_object for corner in sequence.corners], 9), axis=0)
+    every = [from_world @ attitude @ naming for attitude in listed for naming in _NAMINGS]
+    return max(every, key=lambda one: float(np.trace(one @ camera_from_object.T)))

@@ -293,7 +293,7 @@ impl CornerPoseEstimator {
         let covariance_of = |attitude: &ResolvedAttitude| {
             if self.is_one_object() { attitude.covariance } else { as_scattered(attitude, views.len()) }
         };
-        let hypotheses: Vec<Hypothesis> = resolved
+        let mut hypotheses: Vec<Hypothesis> = resolved
             .iter()
             .filter_map(|resolved| {
                 let chosen = agreed.attitudes.first()?.get(*resolved.choice.first()?)?;
@@ -310,6 +310,9 @@ impl CornerPoseEstimator {
                 })
             })
             .collect();
+        if let Some(pose) = hypotheses.first_mut() {
+            self.take_common(pose);
+        }
         if hypotheses.first().is_some_and(|pose| pose.misfit <= self.options.misfit_max && self.is_upright(pose)) {
             (estimate.hypotheses, estimate.chosen_left) = (hypotheses, agreed.members);
         }

@@ -2,7 +2,7 @@
 
 use nalgebra::Matrix3;
 
-use super::agreement::agreement;
+use super::agreement::{agreement, apart, renamed};
 use super::estimator::CornerPoseEstimator;
 use crate::corner::closed_form::attitude::IncludedAngle;
 use crate::corner::closed_form::resolve::{Alignment, View, resolve};
@@ -62,6 +62,19 @@ impl CornerPoseEstimator {
         let vertical = self.vertical()?.normalize();
         let aside = tangent_basis(&vertical).column(0).into_owned();
         Some(Matrix3::from_columns(&[aside, vertical, aside.cross(&vertical)]))
+    }
+
+    /// Takes the attitude of corners of one image from most of its straight edges, where these have one near to it.
+    pub(crate) fn take_common(&self, pose: &mut Hypothesis) {
+        if self.is_one_object() || self.options.angle != IncludedAngle::RIGHT {
+            return;
+        }
+        let Some(common) = attitude_of_most(&self.lines(), &[pose.camera_from_object], None) else { return };
+        let named = renamed(&common.camera_from_object, &pose.camera_from_object);
+        if apart(&named, &pose.camera_from_object) <= self.options.parallel_max_rad {
+            pose.camera_from_object = named;
+            pose.covariance.fixed_view_mut::<3, 3>(0, 0).copy_from(&common.covariance);
+        }
     }
 
     /// Whether too few of the straight edges run along the axes of a pose: then nothing but three short edges of its own says that they
