@@ -8,10 +8,13 @@ from collections.abc import Callable
 from functools import partial
 
 import numpy as np
+import polars as pl
 import pytest
 
 import tiltvp
 from tiltvp.errors import InvalidInputError
+from tiltvp.lab.evaluation.imu import summarise_inertial
+from tiltvp.lab.evaluation.levelling import summarise_turned
 from tiltvp.levelling import VIEWS
 from tiltvp.rotations import rotation_from
 from tiltvp.synth import RoomImage
@@ -220,3 +223,21 @@ def test_a_level_panorama_has_all_of_it_and_no_seam(channels: int) -> None:
 def test_panoramas_look_ahead(camera: tiltvp.Camera, room: RoomImage) -> None:
     ahead = tiltvp.Leveller(camera, to="panorama", robot_from_output=rotation_from("forward", "the mounting"))
     assert np.array_equal(tiltvp.Leveller(camera, to="panorama")(room.gray, (0.1, 0.2)), ahead(room.gray, (0.1, 0.2)))
+
+
+def test_differences_from_a_sensor_are_all_in_their_standard_deviation() -> None:
+    forward = np.array([0.1, -0.1, 0.2, -0.2, 0.0, 0.1, -0.1, 3.0])
+    table = pl.DataFrame({"forward": 10.0 + forward, "left": -forward})
+    table = table.with_columns(imu_forward=pl.lit(9.0), imu_left=pl.lit(0.0))
+    every, near = summarise_inertial(table).rows(named=True)
+    assert every["sd forward"] == pytest.approx(forward.std(ddof=1))
+    assert every["sd left"] == pytest.approx(forward.std(ddof=1))
+    assert every["offset forward"] == pytest.approx(1.05)
+    # None leans as little by the sensor.
+    assert (near["count"], near["mean"]) == (0, None)
+
+
+def test_of_panoramas_that_are_not_believed_nothing_is_told() -> None:
+    rows = {"method": ["refined"] * 2, "error_deg": [math.nan, 1.0], "confidence": [0.0, 0.1], "time_ms": [1.0, 3.0]}
+    row = summarise_turned(pl.DataFrame(rows)).row(0, named=True)
+    assert (row["count"], row["believed"], row["median"], row["largest"], row["ms"]) == (2, 0, None, None, 2.0)

@@ -68,17 +68,23 @@ def estimate_leaning(
 
 
 def summarise_inertial(table: pl.DataFrame) -> pl.DataFrame:
-    """The differences in degrees without their median, the constant offset between lens and sensor."""
+    """The differences in degrees without their median, the constant offset between lens and sensor; their standard
+    deviations are about the mean, of all of them.
+    """
     found = table.filter(pl.col("forward").is_finite())
-    rows = []
+    rows: list[dict[str, object]] = []
     for label, part in (
         ("all", found),
         ("lean below 5 degrees", found.filter((pl.col("imu_forward") ** 2 + pl.col("imu_left") ** 2).sqrt() < 5.0)),
     ):
+        if part.is_empty():
+            rows.append({"panoramas": label, "count": 0})
+            continue
         differences = np.stack(
             [(part["forward"] - part["imu_forward"]).to_numpy(), (part["left"] - part["imu_left"]).to_numpy()], axis=1
         )
         offset = np.median(differences, axis=0)
+        sd = differences.std(axis=0, ddof=1) if len(part) > 1 else np.full(2, np.nan)
         lengths = np.linalg.norm(differences - offset, axis=1)
         rows.append(
             {
@@ -86,11 +92,11 @@ def summarise_inertial(table: pl.DataFrame) -> pl.DataFrame:
                 "count": len(part),
                 "offset forward": float(offset[0]),
                 "offset left": float(offset[1]),
-                "sd forward": float(1.4826 * np.median(np.abs(differences[:, 0] - offset[0]))),
-                "sd left": float(1.4826 * np.median(np.abs(differences[:, 1] - offset[1]))),
+                "sd forward": float(sd[0]),
+                "sd left": float(sd[1]),
                 "mean": float(lengths.mean()),
                 "median": float(np.median(lengths)),
                 "p95": float(np.percentile(lengths, 95)),
             }
         )
-    return pl.DataFrame(rows)
+    return pl.DataFrame(rows, infer_schema_length=None)

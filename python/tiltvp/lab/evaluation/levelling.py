@@ -106,14 +106,14 @@ def summarise_turned(table: pl.DataFrame) -> pl.DataFrame:
                 "method": method,
                 "count": len(part),
                 "believed": len(believed),
-                "median": float(np.median(errors)),
-                "p95": float(np.percentile(errors, 95)),
-                "largest": float(errors.max()),
+                "median": float(np.median(errors)) if len(errors) else None,
+                "p95": float(np.percentile(errors, 95)) if len(errors) else None,
+                "largest": float(errors.max()) if len(errors) else None,
                 "above 5": int((errors > 5.0).sum()),
                 "ms": float(np.median(part["time_ms"].to_numpy())),
             }
         )
-    return pl.DataFrame(rows)
+    return pl.DataFrame(rows, infer_schema_length=None)
 
 
 def lean_against_sensor(
