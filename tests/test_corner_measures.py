@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from types import SimpleNamespace
 
+import cv2
 import numpy as np
 import polars as pl
 import pytest
 
+from tiltvp.cameras import Camera
 from tiltvp.cli import main
 from tiltvp.corner import CornerHypothesis
 from tiltvp.errors import InvalidInputError
@@ -40,7 +43,7 @@ def test_markers_are_looked_for_beside_corners() -> None:
     table, _ = measure_corners(CornerExperiment(frames=10, scenes=(scene,)), threads=2)
     rms = {row["method"]: row for row in summarise_corners(table).iter_rows(named=True)}
     by_markers = [row for method, row in rms.items() if method.startswith("cv2.aruco")]
-    assert len(by_markers) == 4
+    assert len(by_markers) == 6
     for row in by_markers:
         assert row["found"] == 1.0
         assert row["flips"] == 0
@@ -51,7 +54,33 @@ def test_markers_are_looked_for_beside_corners() -> None:
     sequence = CornerScene("none", options=options).sequence(2, 5, 2)
     looks = MarkerLooks(sequence, 0.2)
     looks.look(sequence.render(0))
-    assert [pose for looked in looks.poses.values() for pose, _ in looked] == [None] * 4
+    assert [pose for looked in looks.poses.values() for pose, _ in looked] == [None] * 6
+
+
+def test_corners_of_markers_are_where_they_are_drawn() -> None:
+    camera = Camera.pinhole(width=320, height=240, fx=300.0, fy=300.0, cx=159.5, cy=119.5)
+    looks = MarkerLooks(CornerScene("none").sequence(2, 5, 2), 0.2)
+    marker = cv2.aruco.generateImageMarker(cv2.aruco.getPredefinedDictionary(cv2.aruco.DICT_4X4_50), 0, 600)
+    edge = np.array([[-0.5, -0.5], [599.5, -0.5], [599.5, 599.5], [-0.5, 599.5]], np.float32)
+    off: dict[str, list[np.ndarray]] = {name: [] for name in looks._detectors}
+    rng = np.random.default_rng(0)
+    for turn in np.linspace(-0.4, 0.4, 8):
+        along = 80.0 * np.array([math.cos(turn), math.sin(turn)])
+        across = np.array([-along[1], along[0]])
+        corners = np.array([120.0, 70.0]) + rng.uniform(0.0, 1.0, 2) + [np.zeros(2), along, along + across, across]
+        to = cv2.getPerspectiveTransform(edge, (16.0 * (corners + 0.5) - 0.5).astype(np.float32))
+        drawn = cv2.warpPerspective(marker, to, (16 * 320, 16 * 240), borderValue=255, flags=cv2.INTER_NEAREST)
+        light = cv2.GaussianBlur(cv2.resize(drawn, (320, 240), interpolation=cv2.INTER_AREA) / 255.0, (0, 0), 0.8)
+        image = np.rint(20.0 + 200.0 * (0.02 + 0.98 * light) ** (1 / 2.2)).astype(np.uint8)
+        for name, detector in looks._detectors.items():
+            found = looks._corners(detector, camera, image)[0]
+            off[name].append(300.0 * found + [159.5, 119.5] - corners)
+    for name, each in off.items():
+        assert np.abs(np.mean(each, axis=(0, 1))).max() < 0.1, name
+    # Black on white looks smaller by the display curve, along both sides of each corner.
+    inwards = {name: float(np.mean(np.mean(each, axis=0)[0])) for name, each in off.items()}
+    assert inwards[", AprilTag's corners"] > 0.15
+    assert abs(inwards[", AprilTag's corners, linear light"]) < 0.1
 
 
 def test_noise_is_as_the_bound_says() -> None:

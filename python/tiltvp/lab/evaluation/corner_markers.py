@@ -20,8 +20,20 @@ if TYPE_CHECKING:
 
 __all__ = ["MarkerLooks", "MarkerPose"]
 
-_REFINEMENTS: Final = {"": "CORNER_REFINE_SUBPIX", ", AprilTag's corners": "CORNER_REFINE_APRILTAG"}
-"""How corners are found between pixels: as is usual, and as was best of OpenCV's four ways (12 frames at 1.1 m)."""
+_APRILTAG_SHIFT_PX: Final = 0.45
+"""By how much AprilTag's corners are too far to the right and below, in the mean over drawn squares (OpenCV 5.0)."""
+
+_WAYS: Final = {
+    "": ("CORNER_REFINE_SUBPIX", 0.0, False),
+    ", AprilTag's corners": ("CORNER_REFINE_APRILTAG", _APRILTAG_SHIFT_PX, False),
+    ", AprilTag's corners, linear light": ("CORNER_REFINE_APRILTAG", _APRILTAG_SHIFT_PX, True),
+}
+"""How corners are found between pixels, by how much they are shifted, and whether levels are made proportional to light
+first: as is usual, and as was best of OpenCV's four ways (12 frames at 1.1 m), of images as they are and without their
+display curve, by which what is black on white looks smaller where it is blurred."""
+
+_LIGHT: Final = np.rint(255.0 * (np.arange(256) / 255.0) ** 2.2).astype(np.uint8)
+"""Of grey levels: without the display curve of rendered images."""
 
 _ITERATIONS: Final = 10
 """Of Gauss and Newton's method, from one camera's pose; no test of convergence."""
@@ -49,10 +61,10 @@ class MarkerLooks:
 
         dictionary = cv2.aruco.getPredefinedDictionary(cv2.aruco.DICT_4X4_50)
         self._detectors = {}
-        for name, refinement in _REFINEMENTS.items():
+        for name, (refinement, shift_px, linear) in _WAYS.items():
             parameters = cv2.aruco.DetectorParameters()
             parameters.cornerRefinementMethod = getattr(cv2.aruco, refinement)
-            self._detectors[name] = cv2.aruco.ArucoDetector(dictionary, parameters)
+            self._detectors[name] = (cv2.aruco.ArucoDetector(dictionary, parameters), shift_px, linear)
         self._cameras = sequence.cameras
         right_from_left = np.linalg.inv(sequence.left_from_right)
         self._to_right = (cv2.Rodrigues(right_from_left[:3, :3])[0], right_from_left[:3, 3:])
@@ -81,12 +93,13 @@ class MarkerLooks:
             for cameras, pose, took in (("one camera", one, between - start), ("two cameras", both, end - start)):
                 self.poses.setdefault(f"cv2.aruco, {cameras}{name}", []).append((pose, 1000.0 * took))
 
-    def _corners(self, detector: Any, camera: Camera, image: NDArray[np.uint8]) -> Corners:
+    def _corners(self, detector: tuple[Any, float, bool], camera: Camera, image: NDArray[np.uint8]) -> Corners:
         """(4, 2) of each marker: its corners on the plane at distance 1."""
-        corners, names, _ = detector.detectMarkers(image)
+        finder, shift_px, linear = detector
+        corners, names, _ = finder.detectMarkers(_LIGHT[image] if linear else image)
         out = {}
         for name, at in zip(() if names is None else np.ravel(names).tolist(), corners, strict=True):
-            rays = camera.unproject(np.asarray(at, dtype=np.float64).reshape(4, 2))
+            rays = camera.unproject(np.asarray(at, dtype=np.float64).reshape(4, 2) - shift_px)
             out[name] = np.asarray(rays[:, :2] / rays[:, 2:], dtype=np.float64)
         return {name: at for name, at in out.items() if name in self._places}
 
