@@ -8,6 +8,7 @@ from typing import Annotated
 
 from cyclopts import Parameter, validators
 
+from tiltvp.cli.lab.panorama_options import Out
 from tiltvp.cli.lab.tables import show_frame
 from tiltvp.cli.tables import check_ending, write_frame
 from tiltvp.cli.terminal import progress_bar
@@ -17,7 +18,14 @@ _LINES = (1, 2, 5, 10, 20)
 """How many vertical lines are seen, for how soon a calibration is right."""
 
 
-def calibration(odometry: Path | None = None, /, *, runs: int = 1000, only: str = "", out: Path | None = None) -> None:
+def calibration(
+    odometry: Path | None = None,
+    /,
+    *,
+    runs: Annotated[int, Parameter(validator=validators.Number(gte=1))] = 1000,
+    only: str = "",
+    out: Out = None,
+) -> None:
     """Self-calibration on simulated drives, both filters, against the Cramer-Rao bound; by how many lines are seen, how
     soon it is right; and on real logs.
 
@@ -32,7 +40,7 @@ def calibration(odometry: Path | None = None, /, *, runs: int = 1000, only: str 
         default", "simulated alternating paper" (trajectory and method), "lines paper", "lines alternating",
         "victoria_park", "brenner_lego", "censi lstraight", "censi l90", "censi lmov".
     out
-        Also write the table of all simulated runs as Parquet.
+        Also write the table of all simulated runs: .csv, .json or .parquet.
     """
     import polars as pl
 
@@ -46,6 +54,7 @@ def calibration(odometry: Path | None = None, /, *, runs: int = 1000, only: str 
     )
     from tiltvp.selfcalib import consistency_band
 
+    check_ending(out)
     drives = [
         (kind, method)
         for kind in ("paper", "alternating")
@@ -56,6 +65,8 @@ def calibration(odometry: Path | None = None, /, *, runs: int = 1000, only: str 
     logs = [name for name in LOGS if only in name] if odometry is not None else []
     if not drives and not counted and not logs:
         raise InvalidInputError(f'--only {only}: no part of that name, expected for example "simulated" or "victoria"')
+    if out is not None and not drives:
+        raise InvalidInputError(f"--out {out}: --only {only} leaves out the simulated drives, of which it is the table")
     parts, summaries = [], []
     if drives:
         with progress_bar(len(drives) * runs, "drives") as bar:

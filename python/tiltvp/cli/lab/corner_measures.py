@@ -59,7 +59,14 @@ def corners(
         Folder for the tables (Parquet) and the plots of errors over time (PNG).
     """
     from tiltvp.lab.evaluation import corner_closed_form as closed
+    from tiltvp.lab.evaluation.corners import CornerExperiment
 
+    chosen = _scenes(scenes, rooms)
+    experiment = CornerExperiment(frames=frames, scenes=chosen, seed=seed) if frames else None
+    if experiment is None and (scenes or rooms or out is not None):
+        raise InvalidInputError("--scenes, --rooms and --out with --frames 0, expected frames")
+    if out is not None:
+        check_output_folder(out)
     if poses:
         with progress_bar(-(-poses // closed.BATCH), "batches of poses") as bar:
             exact = closed.exact_poses(poses, advance=bar.advance)
@@ -69,10 +76,7 @@ def corners(
             noisy = closed.noisy_poses(noisy_poses, advance=bar.advance)
         title = "Closed form, 0.3 px of noise on rays of 200 px, against the Cramer-Rao bound"
         show_frame(title, closed.summarise_noisy(noisy), [])
-    if frames:
-        from tiltvp.lab.evaluation.corners import CornerExperiment
-
-        experiment = CornerExperiment(frames=frames, scenes=_scenes(scenes, rooms), seed=seed)
+    if experiment is not None:
         _sequences(experiment, threads or os.cpu_count() or 1, out, has_rooms=rooms > 0)
 
 
@@ -96,8 +100,6 @@ def _sequences(experiment: CornerExperiment, threads: int, out: Path | None, *, 
     from tiltvp.lab.plots.corners import corner_errors, inertial_errors
     from tiltvp.lab.plots.picture import figure_picture
 
-    if out is not None:
-        check_output_folder(out)
     with progress_bar(sum(experiment.lengths()), "frames") as bar:
         table, inertial = measure_corners(experiment, threads=threads, advance=bar.advance)
     show_frame("Rendered sequences, errors of poses", summarise_corners(table), ["scene", "method"])

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from tiltvp.cli.corner import drawn
 from tiltvp.cli.terminal import new_table, progress_bar, show
+from tiltvp.errors import InvalidInputError
 
 if TYPE_CHECKING:
     import numpy as np
@@ -37,6 +38,9 @@ def corners_real(folder: Path, /, *, overlay: Path | None = None) -> None:
         if overlay is not None:
             write_image(overlay / name / f"{place:04d}.png", drawn(image, camera, estimate))
 
+    for name in ("cube_slam_cabinet/truth_cam_poses.txt", "visp_teabox_stereo/cRightMcLeft.txt"):
+        if not (folder / name).is_file():
+            raise InvalidInputError(f"{folder / name}: no such file, expected the images of the cabinet and the box")
     lens = real.cabinet_camera()
     with progress_bar(58, "images") as bar:
         found = real.cabinet(

@@ -8,6 +8,7 @@ from tiltvp.cli.lab.panorama_options import Every
 from tiltvp.cli.lab.tables import show_frame
 from tiltvp.cli.tables import check_ending, write_frame
 from tiltvp.cli.terminal import progress_bar
+from tiltvp.errors import InvalidInputError
 
 _PHOTOS = 12
 """As many are timed, more or less."""
@@ -39,6 +40,10 @@ def level(
     )
 
     check_ending(out)
+    if directory is None and out is not None:
+        raise InvalidInputError(f"--out {out}: is of turned panoramas, expected a folder of panoramas too")
+    if directory is None and inertial is None and every > 1:
+        raise InvalidInputError(f"--every {every}: expected a folder of panoramas or --inertial too")
     with progress_bar(6, "times") as bar:
         times = remap_times(advance=bar.advance)
     show_frame("A level image by a new tilt beside cv2.remap with ready maps, one thread", times, ["image"])

@@ -106,6 +106,8 @@ def views(
 
     check_ending(out)
     chosen = read_panorama_index(directory)[::every]
+    if len({panorama.location for panorama in chosen}) < 2:
+        raise InvalidInputError(f"{directory}: panoramas of one building, expected more, as networks learn from others")
     with progress_bar(3 * len(chosen), "panoramas") as bar:
         seen = look_ahead(chosen, advance=bar.advance)
         told = prior_table(chosen, prior_deg, advance=bar.advance)
@@ -223,7 +225,7 @@ def sampling(
     every: Every = 4,
     rooms: Rooms = 4,
     kind: str | None = None,
-    seeds: int = 5,
+    seeds: Annotated[int, Parameter(validator=validators.Number(gte=1))] = 5,
     samples: int = 2,
     noise_sigma: float = 2.0,
     out: Path | None = None,

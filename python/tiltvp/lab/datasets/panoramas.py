@@ -124,8 +124,11 @@ class PanoramaViews:
     ) -> NDArray[np.uint8]:
         """(H, W) uint8: seen by a robot whose ground normal is `normal` (3,); noise in grey levels, outside black.
 
-        `yaw_rad` is the robot's heading, counter-clockwise from the middle of the panorama.
+        `yaw_rad` is the robot's heading, counter-clockwise from the middle of the panorama. Raises `InvalidInputError`
+        for noise that is none.
         """
+        if not 0.0 <= noise_sigma <= 255.0:
+            raise InvalidInputError(f"noise_sigma = {noise_sigma}, expected grey levels from 0 to 255")
         levels = self.levels(normal, yaw_rad=yaw_rad)
         if noise_sigma > 0.0:
             levels += np.random.default_rng(seed).normal(0.0, noise_sigma, levels.shape).astype(np.float32)

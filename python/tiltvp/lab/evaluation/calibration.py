@@ -123,7 +123,7 @@ def convergence(
 
 
 def summarise_drives(table: pl.DataFrame) -> dict[str, float | int]:
-    """Counts, mean NEES, and rms error over the bound's, of the runs that did not diverge."""
+    """Counts of all runs; mean NEES, and rms error over the bound's, of those that did not diverge."""
     good = table.filter(~pl.col("diverged"))
     ratio = {
         f"rms / bound {n}": math.sqrt(
@@ -134,7 +134,7 @@ def summarise_drives(table: pl.DataFrame) -> dict[str, float | int]:
         for n in ("x", "y", "yaw", "phi", "rho", "psi")
     }
     nees = float(np.mean(good["nees"].to_numpy())) if good.height else math.nan
-    silent = good.filter((pl.col("nees") > 16.27) & ~pl.col("alarm")).height
+    silent = table.filter((pl.col("nees") > 16.27) & ~pl.col("alarm")).height
     return {
         "runs": table.height,
         "diverged": table.height - good.height,
@@ -216,22 +216,22 @@ def _logs(folder: Path, only: str) -> Iterator[_Log]:
 
 
 def _json(path: Path) -> dict[str, Any]:
-    try:
-        found: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
-        raise InvalidInputError(f"{path}: cannot be read ({error}), expected JSON") from error
-    return found
+    return _records(path)[0]
 
 
 def _records(path: Path) -> list[dict[str, Any]]:
     """The JSON values of a file, one after the other."""
-    text, at, found = path.read_text(encoding="utf-8").strip(), 0, []
-    decoder = json.JSONDecoder()
-    while at < len(text):
-        value, at = decoder.raw_decode(text, at)
-        while at < len(text) and text[at].isspace():
-            at += 1
-        found.append(value)
+    found: list[dict[str, Any]] = []
+    at, decoder = 0, json.JSONDecoder()
+    try:
+        text = path.read_text(encoding="utf-8").strip()
+        while at < len(text) or not found:
+            value, at = decoder.raw_decode(text, at)
+            while at < len(text) and text[at].isspace():
+                at += 1
+            found.append(value)
+    except (OSError, ValueError) as error:
+        raise InvalidInputError(f"{path}: cannot be read ({error}), expected JSON") from error
     return found
 
 

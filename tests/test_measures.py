@@ -1,0 +1,59 @@
+"""What tables of `tiltvp measure` count, and what its verbs refuse."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import cv2
+import numpy as np
+import polars as pl
+import pytest
+
+from commands import Run
+from tiltvp.lab.evaluation.calibration import simulated_drives, summarise_drives
+
+
+def test_diverged_runs_without_an_alarm_are_silent() -> None:
+    table = simulated_drives("alternating", "paper", 40)
+    counted = summarise_drives(table)
+    beyond = table.filter((pl.col("nees") > 16.27) & ~pl.col("alarm"))
+    assert beyond.filter("diverged").height > 0
+    assert counted["beyond 99.9 % unalarmed"] == beyond.height
+
+
+@pytest.fixture
+def panoramas(tmp_path: Path) -> Path:
+    """Two panoramas of one building."""
+    rows = ["name,environment,tilt_x_deg,tilt_z_deg"]
+    for name in ("first", "second"):
+        cv2.imwrite(str(tmp_path / f"{name}.jpg"), np.full((64, 128), 90, np.uint8))
+        rows.append(f"{name},house,0,0")
+    (tmp_path / "INDEX.csv").write_text("\n".join(rows), encoding="utf-8")
+    return tmp_path
+
+
+@pytest.mark.parametrize(
+    ("words", "problem"),
+    [
+        (["calibration", "--runs", "0"], "--runs"),
+        (["calibration", "--only", "lines", "--runs", "1", "--out", "x.csv"], "leaves out the simulated drives"),
+        (["calibration", "--only", "simulated", "--out", "x.txt"], "ends in '.txt'"),
+        (["calibration", "nowhere", "--only", "lmov"], "lmov_results.json: cannot be read"),
+        (["corners", "--poses", "0", "--noisy-poses", "0", "--frames", "0", "--out", "x"], "with --frames 0"),
+        (["corners", "--frames", "0", "--scenes", "nosuch"], "--scenes 'nosuch'"),
+        (["corners", "--frames", "5"], "frames = 5, expected 10 or more"),
+        (["corners-real", "nowhere"], "truth_cam_poses.txt: no such file"),
+        (["level", "--out", "x.csv"], "expected a folder of panoramas"),
+        (["level", "--every", "2"], "expected a folder of panoramas or --inertial"),
+        (["sampling", "--seeds", "0"], "--seeds"),
+        (["views", "PANORAMAS"], "panoramas of one building"),
+        (["panoramas", "PANORAMAS", "--noise-sigma", "-1"], "noise_sigma = -1"),
+        (["panoramas", "PANORAMAS", "--noise-sigma", "nan"], "noise_sigma = nan"),
+    ],
+    ids=lambda value: " ".join(value)[:40] if isinstance(value, list) else None,
+)  # fmt: skip
+def test_what_cannot_be_measured_is_refused_at_once(run: Run, panoramas: Path, words: list[str], problem: str) -> None:
+    said = run("measure", *(panoramas if word == "PANORAMAS" else word for word in words))
+    assert said.code == 2
+    assert problem in said.err.replace("\n", " ")
+    assert not said.out
