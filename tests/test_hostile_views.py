@@ -78,6 +78,7 @@ def test_the_table_counts_who_was_wrong_and_sure() -> None:
         ("dark", "refined", 3.0, 0.91, "converged"),
         ("dark", "refined", 1.5, 0.5, "converged; 3 edge pixels are few: little contrast, dark"),
         ("upward", "refined", 5.0, 0.99, "converged"),
+        ("lean of 20 to 40 degrees", "refined", None, 0.0, "nothing within tilt_max_rad"),
     ]
     table = pl.DataFrame(rows, schema=["case", "method", "error_deg", "confidence", "reason"], orient="row")
     table = summarise_cases(table.with_columns(pl.col("error_deg").cast(pl.Float64)))
@@ -88,8 +89,11 @@ def test_the_table_counts_who_was_wrong_and_sure() -> None:
     assert dark["wrong_and_sure"] == pytest.approx(100 / 3)
     assert dark["sure_of_right"] == pytest.approx(50.0)
     assert dark["cause_named"] == pytest.approx(100.0)
+    assert table.filter(case="lean of 20 to 40 degrees")["cause_named"].item() == pytest.approx(100.0)
+    # A sky has no cause that could be named, and does not count among those that are.
+    assert sky["cause_named"] is None
     # Unharmed views do not count as misleading.
-    assert table.filter(case="all that mislead")["wrong_and_sure"].item() == pytest.approx(100 * 2 / 6)
+    assert table.filter(case="all that mislead")["wrong_and_sure"].item() == pytest.approx(100 * 2 / 7)
 
 
 @pytest.mark.slow

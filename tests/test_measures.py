@@ -11,6 +11,7 @@ import pytest
 
 from commands import Run
 from tiltvp.lab.evaluation.calibration import simulated_drives, summarise_drives
+from tiltvp.lab.evaluation.corners import summarise_corners
 
 
 def test_diverged_runs_without_an_alarm_are_silent() -> None:
@@ -19,6 +20,19 @@ def test_diverged_runs_without_an_alarm_are_silent() -> None:
     beyond = table.filter((pl.col("nees") > 16.27) & ~pl.col("alarm"))
     assert beyond.filter("diverged").height > 0
     assert counted["beyond 99.9 % unalarmed"] == beyond.height
+
+
+def test_places_of_corners_are_those_with_a_truth_and_flips_count() -> None:
+    told = {"scene": "office", "method": "general", "found": True, "distance_m": 2.0, "surface": 0.0, "ms": 1.0}
+    listed = told | {"corner": 3, "attitude_deg": 0.1, "position_m": 0.02, "nees": 4.0}
+    flipped = told | {"corner": 3, "attitude_deg": 90.0, "position_m": 0.02, "nees": 100.0}
+    # What the list lacks is beside its own median.
+    other = told | {"corner": -1, "attitude_deg": 0.1, "position_m": 0.0001, "nees": None}
+    row = summarise_corners(pl.DataFrame([listed, flipped, other, other])).row(0, named=True)
+    assert row["listed corner"] == 0.5
+    assert row["position rms mm"] == pytest.approx(20.0)
+    assert row["% of distance"] == pytest.approx(1.0)
+    assert (row["flips"], row["NEES of 6"]) == (1, 52.0)
 
 
 @pytest.fixture

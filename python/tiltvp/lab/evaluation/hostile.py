@@ -34,16 +34,16 @@ CAUSES: Final = {
     "centre": "calibration",
     "rim": "rim",
     "robot": "mask",
-    "160": "pixels for each degree",
-    "80": "pixels for each degree",
-    "40": "pixels for each degree",
+    "160 x": "pixels for each degree",
+    "80 x": "pixels for each degree",
+    "40 x": "pixels for each degree",
     "dark": "contrast",
     "over": "contrast",
     "blurred": "blur",
     "hidden": "directions",
     "lean": "tilt_max_rad",
 }
-"""What a reason names the cause by, for each case whose name begins with or holds the words; others by any reason."""
+"""What a reason names the cause by, for each case whose name begins with or holds the words; others have none to name."""
 
 
 TWINS: Final = ("upward read as downward", "downward read as upward")
@@ -106,7 +106,8 @@ def _judged(estimate: TiltEstimate, item: HostileImage) -> dict[str, object]:
 
 def summarise_cases(table: pl.DataFrame) -> pl.DataFrame:
     """One row for each method and case, and for all hostile ones together: images, and in per cent of them answers,
-    sure ones, and those wrong and sure; of what was right, how much is sure; of the rest, how much names its cause.
+    sure ones, and those wrong and sure; of what was right, how much is sure; of what is not sure, how much names its
+    cause, null where a case has none to name.
     """
     right = pl.col("error_deg").is_not_nan() & (pl.col("error_deg") <= WRONG_DEG)
     judged = table.with_columns(
@@ -133,9 +134,9 @@ def summarise_cases(table: pl.DataFrame) -> pl.DataFrame:
     )
 
 
-def _names_cause(row: dict[str, str]) -> bool:
+def _names_cause(row: dict[str, str]) -> bool | None:
     causes = [cause for words, cause in CAUSES.items() if row["case"].startswith(words) or f" {words}" in row["case"]]
-    return all(re.search(cause, row["reason"]) for cause in causes)
+    return all(re.search(cause, row["reason"]) for cause in causes) if causes else None
 
 
 def train_trust(table: pl.DataFrame, method: str) -> list[tuple[float, NDArray[np.float64]]]:
