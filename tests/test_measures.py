@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
 
 import cv2
@@ -10,6 +11,9 @@ import polars as pl
 import pytest
 
 from commands import Run
+from tiltvp.lab.datasets.ahead import AheadView
+from tiltvp.lab.datasets.panoramas import Panorama
+from tiltvp.lab.evaluation import ahead
 from tiltvp.lab.evaluation.calibration import simulated_drives, summarise_drives
 from tiltvp.lab.evaluation.corners import summarise_corners
 
@@ -33,6 +37,26 @@ def test_places_of_corners_are_those_with_a_truth_and_flips_count() -> None:
     assert row["position rms mm"] == pytest.approx(20.0)
     assert row["% of distance"] == pytest.approx(1.0)
     assert (row["flips"], row["NEES of 6"]) == (1, 52.0)
+
+
+def test_the_softwares_network_is_not_judged_by_views_that_trained_it(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    seeds: list[int] = []
+
+    def views(_: Panorama, number: int, **__: object) -> Iterator[AheadView]:
+        seeds.append(number)
+        yield AheadView("pinhole 80", np.full((480, 640), 90, np.uint8), np.array([0.0, -1.0, 0.0]))
+
+    monkeypatch.setattr(ahead, "ahead_views", views)
+    rooms = [Panorama(f"room {k}", Path("nowhere.jpg"), f"house {k}", None) for k in range(3)]
+    ahead.look_ahead(rooms)
+    trained = set(seeds)
+    seeds.clear()
+    assert ahead.prior_table(rooms, 15.0)["views"].to_list() == [3]
+    assert ahead.any_lean_table(rooms)["views"].to_list() == [3, 3]
+    assert len(seeds) == 6
+    assert trained.isdisjoint(seeds)
 
 
 @pytest.fixture

@@ -71,6 +71,16 @@ def test_the_table_has_a_row_for_each_way_and_says_what_pays() -> None:
     assert plain["mean"][0] == pytest.approx(np.rad2deg(own["error_rad"].mean()))
 
 
+def test_views_of_a_room_have_noise_of_their_own() -> None:
+    plain, noisy = (
+        [view.image.astype(float) for view in room_views(1, CAMERA, samples=1, kinds=("corridor",), noise_sigma=sigma)]
+        for sigma in (0.0, 6.0)
+    )
+    first, second = (noisy[k] - plain[k] for k in (0, 1))
+    assert first.std() > 2.0
+    assert abs(np.corrcoef(first.ravel(), second.ravel())[0, 1]) < 0.1
+
+
 def test_what_pays_is_judged_by_standard_errors_and_times() -> None:
     rng = np.random.default_rng(1)
     rows = []

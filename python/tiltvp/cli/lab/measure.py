@@ -91,8 +91,9 @@ def views(
     """The vertical of views that look anywhere, pinhole and fisheye, by the method of straight edges.
 
     Roll and pitch are within 45 degrees; which direction is up is chosen by a network that has not seen the building.
-    A second table is of views that lean by at most what the method is told, a third of the views of the first, as held
-    and turned upside down, where any lean is allowed.
+    A second table is of views that lean by at most what the method is told, a third of views as of the first, as held
+    and turned upside down, where any lean is allowed: these are other views than those that trained the software's
+    network, but of its buildings.
 
     Parameters
     ----------

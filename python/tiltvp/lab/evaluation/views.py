@@ -62,11 +62,11 @@ def room_views(
         for seed in range(rooms):
             room = Room(kind, seed)
             pose = room.free_poses(1, seed)[0]
-            for alpha_deg, beta_deg in TABLE_1_TILTS_DEG:
+            for place, (alpha_deg, beta_deg) in enumerate(TABLE_1_TILTS_DEG):
                 alpha, beta = float(np.deg2rad(alpha_deg)), float(np.deg2rad(beta_deg))
                 image = room.render(
                     camera, pose=pose, alpha_rad=alpha, beta_rad=beta, noise_sigma=noise_sigma, samples=samples,
-                    seed=seed,
+                    seed=1000 * seed + place,
                 )  # fmt: skip
                 yield View(image.gray, f"{kind} {seed}", alpha, beta)
 
