@@ -137,8 +137,9 @@ def measure_corners(
 
 
 def summarise_corners(table: pl.DataFrame) -> pl.DataFrame:
-    """Found rate, root mean square errors and flips of each scene and method that tells places. Places are those of listed
-    corners: others are beside their own median, which tells how steady they are and not how right.
+    """Found rate, root mean square errors and flips of each scene and method that tells places.
+
+    Places are those of listed corners: others are beside their own median, which tells how steady they are.
     """
     table = table.filter(pl.col("method") != _ONE_GREY)
     attitude, position = pl.col("attitude_deg"), pl.col("position_m").filter(pl.col("corner") >= 0)

@@ -43,7 +43,7 @@ CAUSES: Final = {
     "hidden": "directions",
     "lean": "tilt_max_rad",
 }
-"""What a reason names the cause by, for each case whose name begins with or holds the words; others have none to name."""
+"""What a reason names the cause by, for each case whose name begins with or holds the words; others have none."""
 
 
 TWINS: Final = ("upward read as downward", "downward read as upward")
