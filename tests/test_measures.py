@@ -59,6 +59,22 @@ def test_the_softwares_network_is_not_judged_by_views_that_trained_it(
     assert trained.isdisjoint(seeds)
 
 
+def test_a_view_without_a_hypothesis_is_not_taken_for_level() -> None:
+    level, rolled = np.array([0.0, -1.0, 0.0]), np.array([-1.0, 0.0, 0.0])
+    features = np.array([[1.0, 0.0, 0.0, 0.0, 1.0], [0.0, 0.0, 0.0, 0.0, 0.0]])
+
+    def view(number: int, ups: np.ndarray) -> ahead.LearnedView:
+        return ahead.LearnedView(
+            ("pinhole 80", "fisheye 120")[number % 2], f"house {number}", level, ups, features, None, 0.0
+        )
+
+    views = [view(number, np.array([level, rolled])) for number in range(12)]
+    views += [view(number, np.zeros((0, 3))) for number in (12, 13)]
+    for row in ahead.ahead_table(views).iter_rows(named=True):
+        assert row["roll 10"] == row["pitch 10"] == pytest.approx(100.0 * 6 / 7)
+        assert row["above 5 deg"] == pytest.approx(100.0 / 7)
+
+
 @pytest.fixture
 def panoramas(tmp_path: Path) -> Path:
     """Two panoramas of one building."""

@@ -24,6 +24,7 @@ def draws(seed: int, promised: float = 1.0) -> pl.DataFrame:
             "variant": "refined",
             "image": np.arange(400, dtype=np.uint32),
             "location": [f"place {k // 4}" for k in range(400)],
+            "environment": [f"building {k // 8}" for k in range(400)],
             "yaw_rad": np.zeros(400),
             "error_rad": np.linalg.norm(errors, axis=1),
             "offset_x_rad": errors[:, 0],
@@ -56,6 +57,12 @@ def test_an_alarm_that_knows_and_one_that_cannot_ring() -> None:
     assert knowing["roc_area"] == pytest.approx(1.0)
     accepted = np.sort(np.rad2deg(rows["error_rad"].to_numpy()))[:360]
     assert knowing["accepted_p99_deg"] == pytest.approx(np.percentile(accepted, 99))
+    # What knows the failures of the buildings alone that it was set on.
+    on = pl.col("environment").map_elements(was_set_on, return_dtype=pl.Boolean)
+    told = pl.when(on).then(1.0 - pl.col("error_rad")).otherwise(pl.col("error_rad"))
+    memory = trust({"run": rows.with_columns(confidence=told)}).row(0, named=True)
+    assert memory["held_roc_area"] == pytest.approx(0.0)
+    assert memory["roc_area"] > 0.2
     never = trust({"run": rows.with_columns(error_rad=0.1 * pl.col("error_rad"))}).row(0, named=True)
     assert never["failures"] == 0
     assert never["roc_area"] is None

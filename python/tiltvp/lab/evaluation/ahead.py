@@ -183,7 +183,7 @@ def ahead_table(views: Sequence[LearnedView], *, rng_seed: int = 0) -> pl.DataFr
     locations = np.random.default_rng(rng_seed).permutation(sorted({view.location for view in views}))
     fold = {location: k % FOLDS for k, location in enumerate(locations)}
     networks = [train_choice([view for view in views if fold[view.location] != k]) for k in range(FOLDS)]
-    nothing = np.array([0.0, -1.0, 0.0])
+    nothing = np.full(3, np.nan)
 
     def unseen(view: LearnedView) -> tuple[NDArray[np.float64], float]:
         if not len(view.ups):
@@ -208,6 +208,8 @@ def ahead_table(views: Sequence[LearnedView], *, rng_seed: int = 0) -> pl.DataFr
             roll, pitch = (np.rad2deg(np.abs(a - b)) for a, b in zip(roll_pitch(ups), roll_pitch(truth), strict=True))
             roll = np.minimum(roll, 360.0 - roll)
             error = np.rad2deg(np.arccos(np.clip(np.sum(ups * truth, axis=1), -1.0, 1.0)))
+            # A view without a hypothesis is off by more than any limit.
+            roll, pitch, error = (np.nan_to_num(off, nan=np.inf) for off in (roll, pitch, error))
             row: dict[str, str | int | float | None] = {"camera": kind, "choice": name, "views": len(own)}
             for what, errors in (("roll", roll), ("pitch", pitch)):
                 row |= {f"{what} {limit}": _area(errors, limit) for limit in (1, 5, 10)}

@@ -23,7 +23,7 @@ TOGETHER: Final = "all together"
 
 
 def was_set_on(location: str) -> bool:
-    """Whether covariance and confidence were set on this location; those of the other half check them."""
+    """Whether the covariance was set on this panorama, and the confidence on this building; others check them."""
     return hashlib.md5(location.encode(), usedforsecurity=False).digest()[-1] % 2 == 0
 
 
@@ -31,7 +31,8 @@ def trust(runs: Mapping[str, pl.DataFrame]) -> pl.DataFrame:
     """One row for each run and variant, and for all runs together.
 
     `runs` holds rows as `tiltvp.lab.evaluation.variants.best_rows` gives them. Columns: `run`, `variant`, `images`,
-    `failures` (errors above two degrees, or no estimate), `roc_area` (null where all or none fail), `accepted_p99_deg`
+    `failures` (errors above two degrees, or no estimate), `roc_area` (null where all or none fail) and `held_roc_area`,
+    of the environments (of panoramas: buildings) on which the confidence was not set, `accepted_p99_deg`
     (99th percentile of the error of the most confident `ACCEPTED_SHARE`), and for the two halves of the locations the
     shares of truths inside the regions of `LEVELS`: `set_50`, ..., `held_50`, ... (null without covariances).
     """
@@ -48,14 +49,15 @@ def trust(runs: Mapping[str, pl.DataFrame]) -> pl.DataFrame:
 
 def _row(part: pl.DataFrame) -> dict[str, object]:
     errors = part["error_rad"].fill_null(np.inf)
-    areas = alarm_areas(alarm_curves(part))["area"]
+    unseen = part.filter(~pl.col("environment").map_elements(was_set_on, return_dtype=pl.Boolean))
     ranked = part.sort(pl.col("confidence").fill_null(0.0), descending=True, maintain_order=True)
     accepted = ranked.head(round(ACCEPTED_SHARE * len(ranked)))["error_rad"].drop_nulls().to_numpy()
     row: dict[str, object] = {
         "variant": part["variant"][0],
         "images": len(part),
         "failures": int((errors > FAILURE_RAD).sum()),
-        "roc_area": areas[0] if len(areas) else None,
+        "roc_area": _area(part),
+        "held_roc_area": _area(unseen),
         "accepted_p99_deg": float(np.rad2deg(np.percentile(accepted, 99))) if len(accepted) else None,
     }
     on = part["location"].map_elements(was_set_on, return_dtype=pl.Boolean)
@@ -63,3 +65,8 @@ def _row(part: pl.DataFrame) -> dict[str, object]:
         shares = region_shares(rows, np.array(LEVELS))["share"].to_list() or [None] * len(LEVELS)
         row |= {f"{half}_{100 * level:.0f}": share for level, share in zip(LEVELS, shares, strict=True)}
     return row
+
+
+def _area(part: pl.DataFrame) -> float | None:
+    areas = alarm_areas(alarm_curves(part))["area"]
+    return areas[0] if len(areas) else None
