@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import json
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -154,4 +155,9 @@ def test_the_table_counts_as_it_says() -> None:
     assert summary["drives"].to_list() == [2, 2]
     assert summary["wrong and sure"].to_list() == [0.0, 0.0]
     assert summary["answers"].to_list() == [100.0, 100.0]
+    # What has no cause to name names none, also where it cannot be solved.
+    undisturbed = one(UNDISTURBED)
+    refused = judge_drives([replace(undisturbed, bearings=undisturbed.bearings[:3])])
+    assert refused["named"].to_list() == [None, None]
+    assert refused["answered"].to_list() == [False, False]
     assert main(["measure", "trust-calibration", "--only", "no such case"]) == 2

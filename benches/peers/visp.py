@@ -121,7 +121,7 @@ def main() -> None:
     print(f"{'median, 95 %':28}{'pairs':>8}{'mm':>14}{'degrees':>14}{'ms':>8}")
     rows = [
         ("corners, from pair to pair", len(ours.places), *steps(ours), 1e3 * np.diff(times)),
-        ("ViSP, in the same pairs", len(poses), *steps(theirs), took),
+        ("ViSP, in the same pairs", int(chosen.sum()), *steps(theirs), took),
         ("both apart", int(chosen.sum()), *apart(ours, poses, first), None),
     ]
     for name, count, mm, degrees, ms in rows:

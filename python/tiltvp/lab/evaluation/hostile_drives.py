@@ -77,7 +77,8 @@ def _whole_log(item: HostileDrive) -> dict[str, Any]:
     try:
         whole = calibrate(item.odometry, item.bearings, **item.options)
     except InvalidInputError as error:
-        named = _cause(item) in str(error)
+        cause = _cause(item)
+        named = cause in str(error) if cause else None
         return _columns(item, "whole log", math.nan, math.nan) | {"named": named, "reason": str(error)}
     row = _row(item, "whole log", whole, whole.mounting)
     # What was estimated need not be named.
