@@ -11,8 +11,9 @@ import polars as pl
 import pytest
 
 from commands import Run
+from tiltvp.errors import InvalidInputError
 from tiltvp.lab.datasets.ahead import AheadView
-from tiltvp.lab.datasets.panoramas import Panorama
+from tiltvp.lab.datasets.panoramas import Panorama, read_panorama_index
 from tiltvp.lab.evaluation import ahead
 from tiltvp.lab.evaluation.calibration import simulated_drives, summarise_drives
 from tiltvp.lab.evaluation.corners import summarise_corners
@@ -101,6 +102,8 @@ def panoramas(tmp_path: Path) -> Path:
         (["level", "--every", "2"], "expected a folder of panoramas or --inertial"),
         (["sampling", "--seeds", "0"], "--seeds"),
         (["views", "PANORAMAS"], "panoramas of one building"),
+        (["trust", "PANORAMAS", "--unseen", "--weights"], "expected one of them"),
+        (["trust", "PANORAMAS", "--weights"], "no building of the half"),
         (["panoramas", "PANORAMAS", "--noise-sigma", "-1"], "noise_sigma = -1"),
         (["panoramas", "PANORAMAS", "--noise-sigma", "nan"], "noise_sigma = nan"),
     ],
@@ -111,3 +114,14 @@ def test_what_cannot_be_measured_is_refused_at_once(run: Run, panoramas: Path, w
     assert said.code == 2
     assert problem in said.err.replace("\n", " ")
     assert not said.out
+
+
+@pytest.mark.parametrize(
+    ("row", "problem"),
+    [("third,house,nan,0", "not finite"), ("third,house,0,inf", "not finite"), ("first,other,0,0", "first once more")],
+)
+def test_rows_of_an_index_that_tell_no_panorama_are_named(panoramas: Path, row: str, problem: str) -> None:
+    index = panoramas / "INDEX.csv"
+    index.write_text(f"{index.read_text(encoding='utf-8')}\n{row}", encoding="utf-8")
+    with pytest.raises(InvalidInputError, match=rf"INDEX.csv, line 4: .*{problem}"):
+        read_panorama_index(panoramas)

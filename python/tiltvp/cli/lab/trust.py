@@ -11,6 +11,7 @@ from tiltvp.cli.lab.tables import show_frame
 from tiltvp.cli.options import Switch
 from tiltvp.cli.tables import check_ending, write_frame
 from tiltvp.cli.terminal import progress_bar, say
+from tiltvp.errors import InvalidInputError
 
 
 def trust(
@@ -61,9 +62,13 @@ def trust(
         for panorama in read_panorama_index(folder)
         if not (unseen and was_set_on(panorama.location))
     ]
+    if unseen and weights:
+        raise InvalidInputError("--weights with --unseen: what trains them is left out, expected one of them")
+    shown = [panorama for panorama in chosen if not weights or was_set_on(panorama.location)]
+    if not shown:
+        raise InvalidInputError(f"{', '.join(map(str, panoramas))}: no building of the half that is asked for")
     places = len({panorama.location for panorama in chosen})
     with progress_bar(count * len(CASES) + 2 * places, "images") as bar:
-        shown = [panorama for panorama in chosen if not weights or was_set_on(panorama.location)]
         images = hostile_images(shown, count=count, seed=seed)
         table = judge_images(images, features=weights, advance=bar.advance)
         asked = image_sets(chosen, sets=sets, seed=seed, advance=bar.advance)

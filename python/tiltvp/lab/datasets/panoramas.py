@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import functools
+import math
 import os
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -75,16 +76,25 @@ def read_panorama_index(directory: str | os.PathLike[str]) -> list[Panorama]:
 def read_index(
     directory: str | os.PathLike[str], columns: Sequence[str], make: Callable[[dict[str, str], Path], Item]
 ) -> list[Item]:
-    """`make(row, folder)` of each row of a folder's `INDEX.csv`; what it cannot read is named with file and line."""
+    """`make(row, folder)` of each row of a folder's `INDEX.csv`; what it cannot read is named with file and line.
+
+    Angles (`..._deg`) that are not finite cannot, nor names that were there before.
+    """
     index = Path(directory) / "INDEX.csv"
     try:
         with index.open(newline="", encoding="utf-8") as lines:
             rows = list(csv.DictReader(lines))
     except OSError as error:
         raise InvalidInputError(f"{index}: {error.strerror or error}, expected an index of panoramas") from error
-    items = []
+    items: list[Item] = []
+    names: set[str] = set()
     for number, row in enumerate(rows, start=2):
         try:
+            if not all(math.isfinite(float(row[key])) for key in columns if key.endswith("_deg")):
+                raise ValueError("an angle that is not finite")
+            if row["name"] in names:
+                raise ValueError(f"{row['name']} once more")
+            names.add(row["name"])
             items.append(make(row, index.parent))
         except (KeyError, ValueError, TypeError) as error:
             expected = f"the columns {', '.join(columns)}"
