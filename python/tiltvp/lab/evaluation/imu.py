@@ -45,7 +45,10 @@ def estimate_leaning(
     noise_sigma: float = 2.0,
     advance: Callable[[], None] = lambda: None,
 ) -> pl.DataFrame:
-    """One row for each panorama: the refined lean and the sensor's, as forward and leftward components in degrees."""
+    """One row for each panorama: how far to the front and left `refined` and the sensor see the vertical, in degrees.
+
+    A camera that leans to the front sees it behind, at less than 0.
+    """
     estimator = TiltEstimator(camera, method="refined", tilt_max_rad=_TILT_MAX_RAD)
     rows = []
     for number, item in enumerate(panoramas):
