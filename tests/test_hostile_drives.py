@@ -13,10 +13,11 @@ import pytest
 
 import tiltvp
 from tiltvp.cli import main
-from tiltvp.drive_logs import READINGS, DriveLog
+from tiltvp.drive_logs import READINGS, DriveLog, doubled_rows
 from tiltvp.errors import InvalidInputError
 from tiltvp.lab.datasets.hostile_drives import UNDISTURBED, HostileDrive, hostile_drives
 from tiltvp.lab.evaluation.hostile_drives import judge_drives, summarise_drive_cases
+from tiltvp.streams import read_odometry
 from tiltvp.synth import simulate_drive
 
 
@@ -79,6 +80,34 @@ def test_readings_are_undone() -> None:
     with pytest.raises(InvalidInputError, match="mirrored"):
         log.read_as("mirrored")
     assert len(READINGS) == 8
+
+
+@pytest.mark.slow
+def test_motions_that_are_written_down_twice_are_doubted(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    drive, rng = one(UNDISTURBED, seed=5), np.random.default_rng(5)
+    noise = np.sqrt(1e-5 * np.abs(drive.odometry)) * rng.standard_normal(drive.odometry.shape)
+    times = np.where(rng.random(len(noise)) < 0.02, 2, 1)
+    steps = np.cumsum(times)[drive.bearings[:, 0].astype(int)] - 1.0
+    bearings = np.column_stack([steps, drive.bearings[:, 1:]])
+    odometry = np.repeat(drive.odometry + noise, times, axis=0)
+    assert tiltvp.calibrate(odometry, bearings, **drive.options)
+    assert main(write(tmp_path, replace(drive, odometry=odometry, bearings=bearings))) == 1
+    assert f"whole log: {(times == 2).sum()} of {len(odometry)} motions repeat" in capsys.readouterr().out
+    table = tmp_path / "wheels.csv"
+    rows = [f"{0.02 * k},{left!r},{right!r}" for k, (left, right) in enumerate(odometry.tolist())]
+    table.write_text("time_s,left_m,right_m\n" + "\n".join(rows))
+    assert "written down twice" in " ".join(read_odometry(table).notes)
+    # Of counters that are read one after the other a message that comes twice is no motion.
+    assert read_odometry(table, read_as=["cumulative"]).notes == ()
+
+
+@pytest.mark.parametrize(("resolution_m", "rate_hz"), [(1.5e-4, 50.0), (1e-3, 10.0), (1e-5, 100.0)])
+def test_wheels_that_run_evenly_are_not_doubted(resolution_m: float, rate_hz: float) -> None:
+    times_s = np.arange(0.0, 60.0, 1.0 / rate_hz)
+    speed, turn = 0.3 * np.clip(2.0 * np.sin(times_s / 4.0), 0.0, 1.0), 0.1 * np.sin(times_s / 3.0)
+    counts = np.rint(np.cumsum(np.stack([speed - turn, speed + turn], axis=1), axis=0) / rate_hz / resolution_m)
+    assert doubled_rows(np.diff(counts, axis=0) * resolution_m) == ""
+    assert doubled_rows(np.tile([0.01, 0.02], (100, 1))) == doubled_rows(np.zeros((0, 2))) == ""
 
 
 @pytest.mark.slow

@@ -18,12 +18,18 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-__all__ = ["READINGS", "DriveLog", "read_drive_log"]
+__all__ = ["READINGS", "DriveLog", "doubled_rows", "read_drive_log"]
 
 _ODOMETRY = ("step", "time_s", "delta_left_m", "delta_right_m")
 _BEARINGS = ("step", "landmark", "bearing_rad")
 LARGEST_WHOLE: Final = 2**53 - 1
 """Of steps and landmarks: from the next on, two of them would be the same float."""
+_LAGS: Final = range(2, 11)
+"""Rows so far apart show how often two are equal by chance, as of counters and at an even speed."""
+_BEYOND: Final = 5.0
+"""Deviations of that chance: of logs whose rows never repeat two that do are told, and one is not."""
+_COARSE: Final = 10.0
+"""Finest steps of a counter by which rows change at least, in the median: slower changes take two rows for a step."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,6 +119,22 @@ def read_drive_log(odometry: str | os.PathLike[str], bearings: str | os.PathLike
         np.array(found, dtype=np.float64).reshape(-1, 3),
         np.array(times, dtype=np.float64) if times else None,
     )
+
+
+def doubled_rows(rows: NDArray[np.float64]) -> str:
+    """A sentence about motions (N, D) that repeat the one before more often than chance has it; empty: none."""
+    changes = np.abs(np.diff(rows, axis=0)).ravel()
+    changes = changes[changes > 0.0]
+    if not len(changes) or np.median(changes) < _COARSE * changes.min():
+        return ""
+
+    def equal(lag: int) -> int:
+        return int(((rows[lag:] == rows[:-lag]).all(axis=1) & rows[lag:].any(axis=1)).sum())
+
+    count, chance = equal(1), (sum(map(equal, _LAGS)) + 1) / len(_LAGS)
+    if count <= chance + _BEYOND * math.sqrt(chance):
+        return ""
+    return f"{count} of {len(rows)} motions repeat the one before to the last digit: were messages written down twice?"
 
 
 def _table(path: str | os.PathLike[str], names: tuple[str, ...], optional: str = "") -> tuple[CsvFile, dict[str, int]]:

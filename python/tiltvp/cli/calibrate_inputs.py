@@ -136,9 +136,11 @@ class Tables:
 
     def solved(self, _: NDArray[Any] | None, solve: Solve) -> Solved:
         """What was read, and what it says; bearings are what they are, whatever the mounting."""
+        from tiltvp.drive_logs import doubled_rows
+
         assert self.read is not None  # As `checked` has it.
         with status(f"{self.name}: the whole log, {len(self.read.bearings)} bearings"):
-            return Solved(self.read, solve(self.read))
+            return Solved(self.read, solve(self.read), doubled_rows(self.read.odometry))
 
 
 def sources_from(words: Sequence[str]) -> list[Tables | str]:

@@ -162,7 +162,8 @@ class PictureLog:
             table = track_table([(one.number, name, time_s, one.tracked) for (name, time_s), one in rows])
             write_table(table, self.pictures.tracks)
         say(f"{self.name}: {len(found.bearings)} bearings of {len(set(found.bearings[:, 1].tolist()))} lines")
-        return Solved(DriveLog(odometry, found.bearings, moved.times_s), found.whole, found.doubt)
+        doubt = "; ".join(filter(None, (moved.doubt, found.doubt)))
+        return Solved(DriveLog(odometry, found.bearings, moved.times_s), found.whole, doubt)
 
     def _seen(
         self, rotation: NDArray[np.float64]

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from tiltvp.drive_logs import DriveLog
+from tiltvp.drive_logs import DriveLog, doubled_rows
 from tiltvp.errors import InvalidInputError
 from tiltvp.streams.bags import Recording, is_recording
 from tiltvp.streams.odometry import Motion, Odometry
@@ -40,6 +40,8 @@ class FrameMotions:
     """Sentences that whoever uses it should know: frames left out, counters that began anew."""
     distances_known: bool = True
     """Whether `distance_m` of the motions means anything."""
+    doubt: str = ""
+    """Why they cannot be relied upon, which is among the notes too; empty where nothing speaks against it."""
 
 
 def read_odometry(
@@ -59,7 +61,7 @@ def read_odometry(
         from tiltvp.streams.bag_motion import bag_odometry
 
         return _by_ours(bag_odometry(Recording(source), topic, wheels), wheels, read_as)
-    return _by_ours(OdometryTable.read(source).odometry(wheels), wheels, read_as)
+    return _of_table(OdometryTable.read(source), wheels, read_as)[0]
 
 
 def frame_motions(
@@ -82,8 +84,8 @@ def frame_motions(
     table = OdometryTable.read(source)
     if table.times_s is not None and table.files is None:
         if frames.times_s is not None:
-            found = _interpolated(frames, _by_ours(table.odometry(wheels), wheels, read_as))
-            return replace(found, distances_known=table.distances_known)
+            record, doubt = _of_table(table, wheels, read_as)
+            return replace(_interpolated(frames, record), distances_known=table.distances_known, doubt=doubt)
         if len(table) != len(frames.names):
             raise InvalidInputError(
                 f"{frames.source}: no times of the images, expected them in frames.csv (file, time_s) beside these, or "
@@ -99,6 +101,17 @@ def frame_motions(
         times = table.times_s[rows]
     notes = () if turns else (_no_turns(table.name),)
     return FrameMotions(motions, turns, times, notes, table.distances_known)
+
+
+def _of_table(table: OdometryTable, wheels: Wheels, read_as: Sequence[str]) -> tuple[Odometry, str]:
+    """The record of a table with times, and what speaks against relying on it."""
+    record = _by_ours(table.odometry(wheels), wheels, read_as)
+    steps = None if "cumulative" in read_as else table.steps
+    told = "" if steps is None else doubled_rows(steps)
+    if not told:
+        return record, ""
+    doubt = f"{table.name}: {told}"
+    return replace(record, notes=(*record.notes, doubt)), doubt
 
 
 def _by_ours(record: Odometry, wheels: Wheels, read_as: Sequence[str]) -> Odometry:

@@ -73,6 +73,13 @@ class OdometryTable:
         return self.columns.get("time_s")
 
     @property
+    def steps(self) -> NDArray[np.float64] | None:
+        """(N, D): what each row tells since the row before; None where rows tell poses, counters or velocities."""
+        if self.kind not in ("wheels", "increments"):
+            return None
+        return np.stack([values for name, values in self.columns.items() if name not in _KEYS], axis=1)
+
+    @property
     def distances_known(self) -> bool:
         """Whether it tells how far the robot drove, and not its turns alone."""
         return self.kind != "increments" or "distance_m" in self.columns
