@@ -1,8 +1,16 @@
 //! From the displacements of two wheels to the motion of the robot, with its covariance (eqs. 14, 15 and 31).
 
+use std::ops::AddAssign;
+
 use nalgebra::{Matrix2, Matrix3, Matrix3x2, Vector2, Vector3};
 
 use super::planar_pose::{compose, compose_jacobians};
+
+/// How far a wheel of a robot that stands seems to move at most, metres, and by how many standard deviations of a bearing the robot seems to
+/// turn: a tick or two of an encoder. Each motion makes a keyframe, in which the bearings of all landmarks count anew, though at a
+/// standstill their errors are the same: with 0.1 mm to and fro the filter was wrong and sure after a minute.
+const TREMOR_M: f64 = 5e-4;
+const TREMOR_SIGMAS: f64 = 0.5;
 
 /// The displacements of the wheels in one step, metres, forward positive.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -31,9 +39,28 @@ impl WheelMotion {
         (self.right_m - self.left_m) / wheel_base_m
     }
 
+    /// Whether it is no more than encoders, and poses that are fused of several sensors, tremble by where the robot stands.
+    pub(crate) fn is_tremor(&self, wheel_base_m: f64, bearing_sigma_rad: f64) -> bool {
+        let turn_rad = self.turn_rad(wheel_base_m);
+        (self.left_m == 0.0 && self.right_m == 0.0)
+            || self.largest_m() < TREMOR_M && turn_rad.abs() < TREMOR_SIGMAS * bearing_sigma_rad
+    }
+
+    /// How far the wheel that moves farther moves.
+    pub(crate) fn largest_m(&self) -> f64 {
+        self.left_m.abs().max(self.right_m.abs())
+    }
+
     /// The covariance of (right, left) by Chong and Kleeman (eq. 31): variances `k |displacement|`, `k` in metres.
     pub fn covariance(&self, k_m: f64) -> Matrix2<f64> {
         Matrix2::from_diagonal(&Vector2::new(k_m * self.right_m.abs(), k_m * self.left_m.abs()))
+    }
+}
+
+impl AddAssign for WheelMotion {
+    fn add_assign(&mut self, next: Self) {
+        self.left_m += next.left_m;
+        self.right_m += next.right_m;
     }
 }
 

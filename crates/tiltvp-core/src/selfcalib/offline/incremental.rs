@@ -10,7 +10,8 @@ use crate::selfcalib::bundle::{
     BundleProblem, DISTANCE_STEP, DISTANCE_STEPS, FIRST_DAMPING, FreeParameters, Keyframe, Observation,
 };
 use crate::selfcalib::model::{
-    BearingLoss, InverseDistanceLandmark, RelativeMotion, camera_position, compose, landmark_from_bearing, predict,
+    BearingLoss, InverseDistanceLandmark, RelativeMotion, WheelMotion, camera_position, compose, landmark_from_bearing,
+    predict,
 };
 
 /// Keyframes after which the log so far is solved: a fifth of those that there are, at least 5, at most 50. A fifth makes the work
@@ -61,6 +62,8 @@ struct IncrementalProblem<'a> {
     gap: usize,
     /// Whether bearings were taken at the last keyframe.
     has_bearings: bool,
+    /// The odometry since the robot stands, which is none that counts yet, and how long that is.
+    standing: (WheelMotion, f64),
 }
 
 /// The problem of the whole log, solved roughly as it grows. `free` is what is estimated meanwhile.
@@ -96,7 +99,15 @@ pub(super) fn problem_along(log: &SortedLog<'_>, other: &BundleProblem, free: Fr
 impl<'a> IncrementalProblem<'a> {
     fn new(options: &'a LogOptions, guess: &Vector3<f64>, free: FreeParameters, gap: usize) -> Self {
         let problem = BundleProblem::new(&options.filter, guess, free, ROBUST_LOSS);
-        Self { options, problem, initialised: BTreeMap::new(), candidates: Candidates::new(), gap, has_bearings: true }
+        Self {
+            options,
+            problem,
+            initialised: BTreeMap::new(),
+            candidates: Candidates::new(),
+            gap,
+            has_bearings: true,
+            standing: <(WheelMotion, f64)>::default(),
+        }
     }
 
     /// Adds a log. If `solve`, landmarks are initialised and the problem is solved in stages.
@@ -124,23 +135,29 @@ impl<'a> IncrementalProblem<'a> {
         self.problem.levenberg_marquardt(STAGE_ITERATIONS, STAGE_TOLERANCE, FIRST_DAMPING);
     }
 
-    /// Adds the motion of a step.
+    /// Adds the motion of a step; nothing happens at a standstill, until what it tells adds up to a motion.
     fn add_motion(&mut self, step: &LogStep<'_>) {
-        let LogStep { reading, seconds, .. } = *step;
-        if reading.left_m == 0.0 && reading.right_m == 0.0 {
+        let filter = &self.options.filter;
+        self.standing.0 += *step.reading;
+        self.standing.1 += step.seconds;
+        // Wheels that are estimated change meanwhile, and with them which steps make keyframes.
+        if self.standing.0.is_tremor(filter.wheel_base_m, filter.bearing_sigma_rad) {
             return;
         }
+        let (reading, seconds) = std::mem::take(&mut self.standing);
+        // Where it stood before, no longer than it takes as fast as in the last step.
+        let seconds = seconds.min(step.seconds * (reading.largest_m() / step.reading.largest_m()));
         let problem = &mut self.problem;
-        let odometry = RelativeMotion::from_wheels(reading, &problem.wheels, &problem.noise);
+        let odometry = RelativeMotion::from_wheels(&reading, &problem.wheels, &problem.noise);
         let Some(last) = problem.keyframes.last_mut() else { return };
         let pose = compose(&last.pose, &odometry.motion);
         if self.has_bearings {
             let keyframe = Keyframe::after(odometry, pose, seconds);
-            problem.keyframes.push(Keyframe { readings: vec![*reading], ..keyframe });
+            problem.keyframes.push(Keyframe { readings: vec![reading], ..keyframe });
             self.has_bearings = false;
         } else {
             last.extend(&odometry, pose, seconds);
-            last.readings.push(*reading);
+            last.readings.push(reading);
         }
     }
 
@@ -236,7 +253,6 @@ impl<'a> IncrementalProblem<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::selfcalib::model::WheelMotion;
 
     #[test]
     fn motions_after_the_last_bearings_are_left_out() {
@@ -247,5 +263,28 @@ mod tests {
         growing.add_log(&log, false);
         // The start, and one after each of the first two motions.
         assert_eq!(growing.problem.keyframes.len(), 3);
+    }
+
+    #[test]
+    fn wheels_that_tremble_make_the_keyframes_of_wheels_that_stand() {
+        let options = LogOptions::default();
+        let keyframes = |tremor_m: f64| {
+            let mut readings = vec![WheelMotion { left_m: 0.1, right_m: 0.1 }; 102];
+            for (k, reading) in readings[1..101].iter_mut().enumerate() {
+                let to_and_fro = if k % 2 == 0 { tremor_m } else { -tremor_m };
+                *reading = WheelMotion { left_m: to_and_fro, right_m: -to_and_fro };
+            }
+            let bearings: Vec<_> = (0..102).map(|step| LogBearing { step, landmark: 7, bearing_rad: 0.5 }).collect();
+            let log = SortedLog::new(&options, &readings, None, &bearings).unwrap();
+            let mut growing =
+                IncrementalProblem::new(&options, &Vector3::zeros(), FreeParameters::default(), usize::MAX);
+            growing.add_log(&log, false);
+            growing.problem.keyframes
+        };
+        for tremor_m in [0.0, 1e-9, 1e-4] {
+            let found = keyframes(tremor_m);
+            assert_eq!(found.len(), 3, "{tremor_m}");
+            assert!((found[2].seconds - 1.0).abs() < 0.01, "{tremor_m}: {} s", found[2].seconds);
+        }
     }
 }

@@ -3,7 +3,6 @@
 use nalgebra::{Matrix3, Vector3};
 
 use super::state::SlidingWindow;
-use super::tuning::{TREMOR_M, TREMOR_SIGMAS};
 use crate::selfcalib::bundle::Keyframe;
 use crate::selfcalib::model::{RelativeMotion, WheelMotion, compose, compose_jacobians};
 
@@ -14,9 +13,8 @@ impl SlidingWindow {
     /// Moves by the odometry of a step; nothing happens at a standstill, until what it tells adds up to a motion.
     pub(super) fn predict(&mut self, motion: &WheelMotion) {
         self.motion_noise = Matrix3::zeros();
-        self.standing.left_m += motion.left_m;
-        self.standing.right_m += motion.right_m;
-        if self.stands() {
+        self.standing += *motion;
+        if self.standing.is_tremor(self.problem.wheels.base_m, self.problem.bearing_sigma) {
             return;
         }
         let motion = std::mem::take(&mut self.standing);
@@ -48,14 +46,6 @@ impl SlidingWindow {
                 self.covariance[(c, r)] = self.covariance[(r, c)];
             }
         }
-    }
-
-    /// Whether the odometry since the last motion is no more than encoders, and poses that are fused of several sensors, tremble by.
-    fn stands(&self) -> bool {
-        let WheelMotion { left_m, right_m } = self.standing;
-        let turn_rad = self.standing.turn_rad(self.problem.wheels.base_m);
-        (left_m == 0.0 && right_m == 0.0)
-            || left_m.abs().max(right_m.abs()) < TREMOR_M && turn_rad.abs() < TREMOR_SIGMAS * self.problem.bearing_sigma
     }
 }
 

@@ -106,9 +106,3 @@ pub(super) const INCONSISTENT_EXCESS: f64 = 1.5;
 
 /// Share of rejected bearings from which on it counts as inconsistent: 200 times that of the default gate.
 pub(super) const INCONSISTENT_REJECTED_SHARE: f64 = 0.02;
-
-/// How far a wheel of a robot that stands seems to move at most, metres, and by how many standard deviations of a bearing the robot seems to
-/// turn: a tick or two of an encoder. Each motion makes a keyframe, in which the bearings of all landmarks count anew, though at a
-/// standstill their errors are the same: with 0.1 mm to and fro the mounting was wrong and sure after a minute.
-pub(super) const TREMOR_M: f64 = 5e-4;
-pub(super) const TREMOR_SIGMAS: f64 = 0.5;
