@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import struct
 from pathlib import Path
 
 import cv2
@@ -12,6 +13,7 @@ import pytest
 import tiltvp
 from tiltvp.cli.sources import distinct_names
 from tiltvp.errors import ImageFileError, InvalidInputError, OutputError
+from tiltvp.image_headers import header_size
 from tiltvp.images import gray_from, read_image
 from tiltvp.streams.image_files import find_images
 
@@ -133,6 +135,13 @@ def test_a_tiff_that_points_beyond_any_file_is_unreadable(tmp_path: Path) -> Non
     (tmp_path / "far.tiff").write_bytes(b"II+\0\x08\0\0\0" + b"\xff" * 8)
     with pytest.raises(ImageFileError, match=r"far\.tiff"):
         read_image(tmp_path / "far.tiff")
+
+
+@pytest.mark.parametrize("order", "<>")
+def test_the_size_of_a_big_tiff_is_in_its_header(order: str) -> None:
+    entries = struct.pack(order + "HHQQ", 257, 16, 1, 300) + struct.pack(order + "HHQQ", 256, 16, 1, 70_000)
+    begin = (b"II" if order == "<" else b"MM") + struct.pack(order + "HHHQ", 43, 8, 0, 16)
+    assert header_size(begin + struct.pack(order + "Q", 2) + entries + bytes(8)) == (70_000, 300)
 
 
 def test_unwritable_files_are_named(tmp_path: Path) -> None:

@@ -1,0 +1,30 @@
+"""Motions that recordings tell."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from recordings import START_S, Bag
+from tiltvp.streams import read_odometry
+
+
+def test_headings_of_robots_that_lean_are_where_their_x_axis_points(tmp_path: Path) -> None:
+    made = Bag("mcap")
+    quaternions = np.array([(0.0, 0.0, 0.0, 1.0), (0.3, -0.2, 0.4, 0.8), (-0.2, 0.35, 0.5, 0.7)])
+    quaternions /= np.linalg.norm(quaternions, axis=1, keepdims=True)
+    headings = []
+    for k, (x, y, z, w) in enumerate(quaternions.tolist()):
+        made.odometry(START_S + 0.1 * k, 0.0, 0.0, 0.0)
+        turn = made.rows[-1][3].pose.pose.orientation
+        turn.x, turn.y, turn.z, turn.w = x, y, z, w
+        angle = 2 * math.atan2(math.hypot(x, y, z), w)
+        axis = np.array([x, y, z]) / (math.hypot(x, y, z) or 1.0)
+        ahead = cv2.Rodrigues(angle * axis)[0][:, 0]
+        headings.append(math.atan2(ahead[1], ahead[0]))
+    found = read_odometry(made.write(tmp_path)).yaw_rad
+    assert found == pytest.approx(headings, abs=1e-9)
