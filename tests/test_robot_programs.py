@@ -13,10 +13,18 @@ import pytest
 
 import tiltvp
 from recordings import START_S, Bag
-from tiltvp.errors import ImageFileError, InvalidInputError
+from tiltvp.errors import CalibrationError, ImageFileError, InvalidInputError
 from tiltvp.line_logs import see_lines
 from tiltvp.lines import LineExtractor
-from tiltvp.streams import InertialSamples, Motion, Odometry, Recording, image_from_message, inertial_samples
+from tiltvp.streams import (
+    InertialSamples,
+    Motion,
+    Odometry,
+    Recording,
+    camera_from_message,
+    image_from_message,
+    inertial_samples,
+)
 
 
 @pytest.mark.parametrize(("encoding", "luma"), [("uyvy", 1), ("yuv422", 1), ("yuyv", 0), ("yuv422_yuy2", 0)])
@@ -42,6 +50,28 @@ def test_what_is_no_image_s_message_is_refused() -> None:
     for other in (None, SimpleNamespace(format="jpeg", data=b"")):
         with pytest.raises(ImageFileError):
             image_from_message(other)
+
+
+@pytest.mark.parametrize("capital", [False, True], ids=["rclpy", "rospy"])
+def test_the_camera_of_a_message(capital: bool) -> None:
+    matrix, projection = [300.0, 0, 319.5, 0, 310, 239.5, 0, 0, 1], [250.0, 0, 320, -30, 0, 250, 240, 0, 0, 0, 1, 0]
+    numbers = {"k": np.array(matrix), "d": np.array([-0.2, 0.05, 0.0, 0.0, 0.0]), "p": np.array(projection)}
+    fields = {name.upper() if capital else name: values for name, values in numbers.items()}
+    whole = SimpleNamespace(x_offset=0, y_offset=0, width=0, height=0)
+    message = SimpleNamespace(
+        width=640, height=480, distortion_model="plumb_bob", roi=whole, binning_x=0, binning_y=0, **fields
+    )
+    pixels = np.array([[20.0, 30.0], [500.0, 400.0]])
+    rays = camera_from_message(message).unproject(pixels)
+    plane = cv2.undistortPoints(pixels, np.reshape(matrix, (3, 3)), numbers["d"])[:, 0]
+    assert rays[:, :2] / rays[:, 2:] == pytest.approx(plane, abs=1e-4)
+    rays = camera_from_message(message, rectified=True).unproject(pixels)
+    assert rays[:, :2] / rays[:, 2:] == pytest.approx((pixels - [320.0, 240.0]) / 250.0, abs=1e-12)
+    with pytest.raises(InvalidInputError, match="a SimpleNamespace, expected a message of sensor_msgs/CameraInfo"):
+        camera_from_message(SimpleNamespace(width=640, height=480))
+    message.distortion_model = "unheard_of"
+    with pytest.raises(CalibrationError, match="unheard_of"):
+        camera_from_message(message)
 
 
 def test_a_sensor_without_orientation_may_send_anything_for_it(tmp_path: Path) -> None:

@@ -3232,7 +3232,10 @@ class TiltFilter:
         """The options in force, by name, defaults included; a fresh dict, good as keywords."""
 
     def predict(self, yaw_rad: float | None = None, distance_m: float | None = None) -> None:
-        """The robot has turned (left positive) and driven (either way) since the last call; None: it has not."""
+        """The robot has turned (left positive) and driven (either way) since the last call; None: it has not.
+
+        Where turns are not known, `walk_rad_per_sqrt_step` of 0.1 rad for each second between calls stands for them.
+        """
 
     @property
     def rejected(self) -> int:

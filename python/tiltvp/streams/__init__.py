@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from tiltvp.streams.bag_images import image_from_message
 from tiltvp.streams.bag_motion import inertial_samples
-from tiltvp.streams.bag_setup import recorded_camera, robot_from_camera
+from tiltvp.streams.bag_setup import camera_from_message, recorded_camera, robot_from_camera
 from tiltvp.streams.bags import Recording, Topic, is_recording
 from tiltvp.streams.frames import Frame, Frames
 from tiltvp.streams.inertial import InertialSamples
@@ -28,6 +28,7 @@ __all__ = [
     "Topic",
     "Travelled",
     "Wheels",
+    "camera_from_message",
     "frame_motions",
     "image_from_message",
     "inertial_samples",

@@ -19,7 +19,7 @@ from tiltvp.streams.bags import Recording
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-__all__ = ["CAMERA_KINDS", "recorded_camera", "robot_from_camera"]
+__all__ = ["CAMERA_KINDS", "camera_from_message", "recorded_camera", "robot_from_camera"]
 
 CAMERA_KINDS: Final = ("sensor_msgs/CameraInfo",)
 _TRANSFORMS, _STATIC = "tf2_msgs/TFMessage", "/tf_static"
@@ -35,23 +35,35 @@ def recorded_camera(recording: Recording, topic: str | None = None, *, images: s
     camera that was not calibrated.
     """
     chosen = recording.choose(CAMERA_KINDS, "--camera-name", topic)
-    source = f"{recording.path} {chosen.name}"
-    info = next(content for _, content in recording.decoded(chosen))
     if images is None:
         seen = [one.name for one in recording.topics if one.kind in IMAGE_KINDS and one.count > 0]
         images = seen[0] if len(seen) == 1 else ""
-    model, coefficients = str(info.distortion_model), _numbers(info, "D")
-    matrix = _numbers(info, "K")
-    if is_rectified(images):
+    info = next(content for _, content in recording.decoded(chosen))
+    return camera_from_message(info, rectified=is_rectified(images), source=f"{recording.path} {chosen.name}")
+
+
+def camera_from_message(message: Any, *, rectified: bool = False, source: str = "CameraInfo") -> Camera:
+    """The camera of a sensor_msgs/CameraInfo, of a recording, of rclpy or of rospy.
+
+    Its lens is that of K and D, of `rectified` images (`image_rect`) the pinhole of P. `source` begins what errors say.
+
+    Raises `InvalidInputError` for what is no such message, `CalibrationError` for a lens that is not supported and for
+    a camera that was not calibrated.
+    """
+    if not all(hasattr(message, name) for name in ("width", "height", "distortion_model", "roi", "binning_x")):
+        raise InvalidInputError(f"{source}: a {type(message).__name__}, expected a message of {CAMERA_KINDS[0]}")
+    model, coefficients = str(message.distortion_model), _numbers(message, "D")
+    matrix = _numbers(message, "K")
+    if rectified:
         model, coefficients = "none", []
-        matrix = np.reshape(_numbers(info, "P"), (3, 4))[:, :3].ravel().tolist()
+        matrix = np.reshape(_numbers(message, "P"), (3, 4))[:, :3].ravel().tolist()
     if not any(matrix):
         raise CalibrationError(f"{source}: a camera that was not calibrated, expected a matrix that is not 0")
     tree: dict[str, object] = {
-        "image_width": int(info.width), "image_height": int(info.height), "camera_name": "cam0",
+        "image_width": int(message.width), "image_height": int(message.height), "camera_name": "cam0",
         "distortion_model": model, "K": [matrix[k : k + 3] for k in (0, 3, 6)], "D": coefficients,
     }  # fmt: skip
-    return _as_taken(Camera.from_spec(parse(Document(Path(source), json.dumps(tree)), None)[0]), info, source)
+    return _as_taken(Camera.from_spec(parse(Document(Path(source), json.dumps(tree)), None)[0]), message, source)
 
 
 def _numbers(info: Any, name: str) -> list[float]:

@@ -54,6 +54,8 @@ impl TiltFilter {
     }
 
     /// The robot has turned (left positive) and driven (either way) since the last call; None: it has not.
+    ///
+    /// Where turns are not known, `walk_rad_per_sqrt_step` of 0.1 rad for each second between calls stands for them.
     #[pyo3(signature = (yaw_rad: "float | None" = None, distance_m: "float | None" = None))]
     fn predict(
         &self,
