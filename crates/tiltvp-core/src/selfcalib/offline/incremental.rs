@@ -140,7 +140,7 @@ impl<'a> IncrementalProblem<'a> {
         let filter = &self.options.filter;
         self.standing.0 += *step.reading;
         self.standing.1 += step.seconds;
-        // Wheels that are estimated change meanwhile, and with them which steps make keyframes.
+        // By the wheels that are told: `problem_along` has to make the same keyframes, and estimated ones change meanwhile.
         if self.standing.0.is_tremor(filter.wheel_base_m, filter.bearing_sigma_rad) {
             return;
         }
