@@ -1,7 +1,5 @@
 //! The attitude that the straight edges of a frame have in common, whether they meet at corners or not.
 
-use std::f64::consts::FRAC_PI_2;
-
 use nalgebra::{Matrix3, Rotation3, Vector3};
 
 use crate::corner::closed_form::prior::rotation_vector;
@@ -19,12 +17,11 @@ pub(crate) const PARALLEL_SIGMA_RAD: f64 = 0.03 * std::f64::consts::PI / 180.0;
 /// degrees at which corners still agree.
 const START_SIGMA_RAD: f64 = 3.0 * std::f64::consts::PI / 180.0;
 
-/// How far from the direction of its axis an edge may pass at first: the sine of 2 degrees. The test of headings holds
-/// it to half of their distance.
-const REACH_SINE: f64 = 0.0349;
+/// How far from the direction of its axis an edge may pass at first: the sine of 2 degrees.
+pub(super) const REACH_SINE: f64 = 0.0349;
 
 /// Edges that miss their axis by this many standard deviations count half (Cauchy weights; 2.4 has 95 % efficiency).
-const HALF_SIGMAS: f64 = 2.0;
+pub(super) const HALF_SIGMAS: f64 = 2.0;
 
 /// Least length of a segment, in pixels: shorter ones are off by more than half a degree and add only other things'
 /// edges.
@@ -36,10 +33,6 @@ const ERRING_TOGETHER: f64 = 4.0;
 /// Least number of segments along the three axes: twice a corner's own three in two images.
 const LINES_MIN: usize = 12;
 
-/// The share of all edges along the axes of one attitude that is enough to trust it: random edges pass within 2 degrees
-/// of one of three axes in a tenth of all cases.
-const MOST: f64 = 0.4;
-
 /// Gauss-Newton steps, each with weights of its own; the scatter is estimated after the first half.
 const STEPS: usize = 10;
 
@@ -47,11 +40,11 @@ const STEPS: usize = 10;
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct StraightEdge {
     /// Unit normal of its great circle, left camera's frame.
-    normal: Vector3<f64>,
+    pub(super) normal: Vector3<f64>,
     /// Standard deviation of the angle between the plane and the edge's direction, radians.
-    sigma_rad: f64,
+    pub(super) sigma_rad: f64,
     /// How long it is seen, pixels.
-    length_px: f64,
+    pub(super) length_px: f64,
 }
 
 impl StraightEdge {
@@ -139,41 +132,14 @@ fn rotation_from(from: &Matrix3<f64>, to: &Matrix3<f64>) -> Vector3<f64> {
     rotation_vector(&(to * from.transpose()))
 }
 
-/// How far apart attitudes about one vertical are tried, radians: 4.5 degrees, of which each reaches 2 to either side.
-/// The test of headings covers the quarter turn with them.
-const TURN_RAD: f64 = FRAC_PI_2 / 20.0;
-
-/// The attitude that most lines have in common; where most have none, that near the first of `starts`, which may be false, or turned
-/// against most of the room. Where there are none, headings about the second axis of `upright` are tried.
-pub(crate) fn attitude_of_most(
-    lines: &[StraightEdge],
-    starts: &[Matrix3<f64>],
-    upright: Option<Matrix3<f64>>,
-) -> Option<CommonAttitude> {
-    let of_first = starts.first().and_then(|start| common_attitude(lines, start));
-    let most = MOST * lines.len() as f64;
-    if of_first.as_ref().is_some_and(|common| common.support >= most) {
-        return of_first;
-    }
-    let upright = starts.first().copied().or(upright)?;
-    let others = starts.iter().skip(1).copied().chain(headings(&upright));
-    let found = others.filter_map(|start| common_attitude(lines, &start));
-    let best = found.max_by(|a, b| a.support.total_cmp(&b.support));
-    best.filter(|common| common.support >= most).or(of_first)
-}
-
-/// Attitudes with the vertical of `upright` and every heading, up to quarter turns.
-fn headings(upright: &Matrix3<f64>) -> impl Iterator<Item = Matrix3<f64>> {
-    let turn = |k: u8| Rotation3::from_axis_angle(&Vector3::y_axis(), f64::from(k) * TURN_RAD);
-    (0..20).map(move |k| upright * turn(k).matrix())
-}
-
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
+    use std::f64::consts::FRAC_PI_2;
+
     use super::*;
 
     /// `count` lines along each axis of an attitude, off by the given misses in turn, seen from many sides.
-    fn lines(attitude: &Matrix3<f64>, count: u32, misses: &[f64]) -> Vec<StraightEdge> {
+    pub(crate) fn lines(attitude: &Matrix3<f64>, count: u32, misses: &[f64]) -> Vec<StraightEdge> {
         let mut out = Vec::new();
         for axis in 0..3 {
             for k in 0..count {
@@ -188,6 +154,12 @@ mod tests {
             }
         }
         out
+    }
+
+    /// How far an attitude is off, however its level axes are named.
+    pub(crate) fn off_in_any_naming_rad(found: &Matrix3<f64>, attitude: &Matrix3<f64>) -> f64 {
+        let turns = (0..4).map(|k| Rotation3::from_axis_angle(&Vector3::y_axis(), f64::from(k) * FRAC_PI_2));
+        turns.map(|turn| rotation_from(&(attitude * turn.matrix()), found).norm()).fold(f64::INFINITY, f64::min)
     }
 
     fn off_rad(found: &CommonAttitude, attitude: &Matrix3<f64>) -> f64 {
@@ -207,23 +179,6 @@ mod tests {
         let both: Vec<StraightEdge> = true_ones.iter().copied().chain(lines(&other, 4, &[0.0])).collect();
         assert!(off_rad(&common_attitude(&both, &start).unwrap(), &attitude) < 2e-3);
         assert!(common_attitude(&true_ones[..9], &start).is_none());
-    }
-
-    #[test]
-    fn lines_of_a_known_vertical_tell_their_attitude_without_a_start() {
-        for heading in [0.0, 0.3, 0.8, 1.4] {
-            let attitude = *(Rotation3::from_euler_angles(0.5, -0.3, 0.2)
-                * Rotation3::from_axis_angle(&Vector3::y_axis(), heading))
-            .matrix();
-            let upright = *Rotation3::from_euler_angles(0.5, -0.3, 0.2).matrix();
-            let lines = lines(&attitude, 12, &[0.001, -0.001, 0.0]);
-            assert!(attitude_of_most(&lines, &[], None).is_none());
-            let found = attitude_of_most(&lines, &[], Some(upright)).unwrap();
-            // In whichever of four ways its level axes are named.
-            let turns = (0..4).map(|k| Rotation3::from_axis_angle(&Vector3::y_axis(), f64::from(k) * FRAC_PI_2));
-            let off = turns.map(|turn| off_rad(&found, &(attitude * turn.matrix()))).fold(f64::INFINITY, f64::min);
-            assert!(off < 2e-3, "{off} at {heading}");
-        }
     }
 
     #[test]
@@ -256,14 +211,5 @@ mod tests {
         let both: Vec<StraightEdge> = random.iter().copied().chain(corner).collect();
         let expected = (share * 100_000.0 + 15_000.0) / 115_000.0;
         assert!((share_along_axes(&both, &attitude) - expected).abs() < 1e-9);
-    }
-
-    #[test]
-    fn headings_keep_the_vertical() {
-        let attitude = *Rotation3::from_euler_angles(0.5, -0.3, 0.2).matrix();
-        let turned: Vec<Matrix3<f64>> = headings(&attitude).collect();
-        assert!(turned.iter().all(|turned| (turned.column(1) - attitude.column(1)).norm() < 1e-12));
-        // Every heading is within the reach of one of them.
-        assert!(TURN_RAD / 2.0 <= 1.2 * REACH_SINE && turned.len() as f64 * TURN_RAD > 1.57);
     }
 }

@@ -1,5 +1,7 @@
 //! The general front end: line segments joined at vertices, each ray then fitted between pixels.
 
+mod askew;
+pub(super) mod attitude_of_most;
 pub(super) mod beginnings;
 pub(super) mod common_attitude;
 pub(super) mod completion;
@@ -7,6 +9,7 @@ pub(super) mod double_edges;
 pub(super) mod edge_ends;
 pub(super) mod guided;
 mod junctions;
+mod manhattan;
 mod sized_ends;
 
 use std::f64::consts::PI;

@@ -14,6 +14,7 @@ use crate::corner::estimate::{BelievedCorner, CornerEstimate, CornerVerdict, Hyp
 use crate::corner::estimator_options::{EstimatorOptions, KnownEdge};
 use crate::corner::feature::CornerFeature;
 use crate::corner::frame::Frame;
+use crate::corner::general::common_attitude::CommonAttitude;
 use crate::corner::general::guided::ExpectedCorner;
 use crate::corner::options::CornerMethod;
 use crate::error::{Error, Result};
@@ -191,12 +192,13 @@ impl CornerPoseEstimator {
             followed: self.track.is_some(),
             object: self.objects,
         };
-        let starts = if self.right.is_some() { self.attitudes(&estimate.features)? } else { Vec::new() };
+        let starts = self.attitudes(&estimate.features)?;
         let common = self.common(&starts);
-        let attitude = common.map(|common| common.camera_from_object).or(starts.first().copied());
-        if let Some(attitude) = &attitude {
-            self.add_completed(left, right, attitude, &mut estimate.features);
-            self.add_transferred([left, right.unwrap_or(left)], attitude, &mut estimate.features)?;
+        let attitude = common.map(|common| common.camera_from_object).or(starts.attitudes.first().copied());
+        // Of one image no corner but those that were found without an attitude says that it is one.
+        if let (Some(attitude), Some(right)) = (&attitude, right) {
+            self.add_completed([left, right], attitude, &mut estimate.features);
+            self.add_transferred([left, right], attitude, &mut estimate.features)?;
         }
         let mut seen = Vec::new();
         if estimate.features[0].is_empty() {
@@ -208,7 +210,7 @@ impl CornerPoseEstimator {
         } else if self.right.is_some() {
             seen = self.by_pair([left, right.unwrap_or(left)], attitude.as_ref(), common.as_ref(), &mut estimate)?;
         } else {
-            self.by_one(&mut estimate)?;
+            self.by_one(common.as_ref(), &mut estimate)?;
         }
         let corners = estimate.chosen_left.len();
         if estimate.hypotheses.first().is_some_and(|best| self.stands_alone(best, corners)) {
@@ -280,10 +282,11 @@ impl CornerPoseEstimator {
 
     /// Attitudes from one image: of all features that agree with one another; none where the likeliest one's features contradict
     /// each other or gravity.
-    fn by_one(&self, estimate: &mut CornerEstimate) -> Result<()> {
-        let features = &estimate.features[0];
+    fn by_one(&self, common: Option<&CommonAttitude>, estimate: &mut CornerEstimate) -> Result<()> {
+        let members = self.parallel_to(common, &estimate.features[0]);
+        let features: Vec<CornerFeature> = members.iter().map(|member| estimate.features[0][*member]).collect();
         let priors = self.priors(self.is_one_object());
-        let Some(agreed) = agreement(features, &self.options.angle, self.options.agree_max_rad, &priors)? else {
+        let Some(agreed) = agreement(&features, &self.options.angle, self.options.agree_max_rad, &priors)? else {
             return Ok(());
         };
         let view = |attitudes| View { attitudes, common_from_camera: Matrix3::identity() };
@@ -310,11 +313,12 @@ impl CornerPoseEstimator {
                 })
             })
             .collect();
-        if let Some(pose) = hypotheses.first_mut() {
-            self.take_common(pose);
-        }
-        if hypotheses.first().is_some_and(|pose| pose.misfit <= self.options.misfit_max && self.is_upright(pose)) {
-            (estimate.hypotheses, estimate.chosen_left) = (hypotheses, agreed.members);
+        let Some(pose) = hypotheses.first_mut() else { return Ok(()) };
+        let corners: Vec<&CornerFeature> = agreed.members.iter().map(|member| &features[*member]).collect();
+        let may_be = self.take_common(pose, common, &corners);
+        if may_be && pose.misfit <= self.options.misfit_max && self.is_upright(pose) {
+            let chosen_left = agreed.members.iter().map(|member| members[*member]).collect();
+            (estimate.hypotheses, estimate.chosen_left) = (hypotheses, chosen_left);
         }
         Ok(())
     }

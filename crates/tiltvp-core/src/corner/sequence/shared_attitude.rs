@@ -1,16 +1,16 @@
 //! The attitude that most edges of the images have in common, by which corners are completed and judged.
 
-use nalgebra::Matrix3;
+use nalgebra::{Matrix3, Vector3};
 
-use super::agreement::{agreement, apart, renamed};
+use super::agreement::{agreement, fits, renamed};
 use super::estimator::CornerPoseEstimator;
 use crate::corner::closed_form::attitude::IncludedAngle;
 use crate::corner::closed_form::resolve::{Alignment, View, resolve};
 use crate::corner::estimate::Hypothesis;
 use crate::corner::feature::CornerFeature;
-use crate::corner::general::common_attitude::{CommonAttitude, StraightEdge, attitude_of_most, share_along_axes};
+use crate::corner::general::attitude_of_most::{Starts, attitude_of_most};
+use crate::corner::general::common_attitude::{CommonAttitude, StraightEdge, share_along_axes};
 use crate::error::Result;
-use crate::geometry::tangent_basis;
 
 /// The share of the edges' length that runs along the axes of a pose that they say nothing for: of random ones it is a tenth, and
 /// should scatter by some 0.04 for a hundred of them. No pose of 36 rendered rooms has less than 0.32; a right one before a wallpaper
@@ -27,8 +27,8 @@ const EDGES_MIN: usize = 40;
 impl CornerPoseEstimator {
     /// The attitudes by which corners may be completed: the likeliest ones that one image's corners agree on, with their edges
     /// at right angles, and that of the frame before.
-    pub(crate) fn attitudes(&self, features: &[Vec<CornerFeature>; 2]) -> Result<Vec<Matrix3<f64>>> {
-        let mut out = Vec::new();
+    pub(crate) fn attitudes(&self, features: &[Vec<CornerFeature>; 2]) -> Result<Starts> {
+        let mut out = Starts::default();
         if self.is_one_object() || self.options.angle != IncludedAngle::RIGHT {
             return Ok(out);
         }
@@ -39,42 +39,58 @@ impl CornerPoseEstimator {
             let Some(agreed) = agreement(features, &self.options.angle, self.options.agree_max_rad, priors)? else {
                 continue;
             };
+            out.lone = self.right.is_none() && agreed.members.len() == 1;
             let view = |attitudes| View { attitudes, common_from_camera: rotation };
             let views: Vec<View<'_>> = agreed.attitudes.iter().map(view).collect();
             let resolved = resolve(&views, Alignment::Manhattan, self.right_handed(), &self.priors(false))?;
-            out.extend(resolved.first().map(|best| self.upright(best.common_from_object)));
+            out.attitudes.extend(resolved.first().map(|best| self.upright(best.common_from_object)));
         }
-        out.extend(self.track.as_ref().map(|track| track.pose.camera_from_object));
+        out.attitudes.extend(self.track.as_ref().map(|track| track.pose.camera_from_object));
         Ok(out)
     }
 
-    /// The attitude that most straight edges of both images have in common; where most have none, that near the first of `starts`.
-    pub(crate) fn common(&self, starts: &[Matrix3<f64>]) -> Option<CommonAttitude> {
-        self.right.as_ref()?;
-        attitude_of_most(&self.lines(), starts, self.about_vertical())
+    /// The attitude that most straight edges of the images have in common; where most have none, that near the first of `starts`.
+    pub(crate) fn common(&self, starts: &Starts) -> Option<CommonAttitude> {
+        attitude_of_most(&self.lines(), starts, self.vertical_of_room())
     }
 
-    /// An attitude whose second axis is along the vertical, where that is known and all angles are right.
-    fn about_vertical(&self) -> Option<Matrix3<f64>> {
+    /// The vertical, where it is known, all angles are right and there may be several corners.
+    fn vertical_of_room(&self) -> Option<Vector3<f64>> {
         if self.is_one_object() || self.options.angle != IncludedAngle::RIGHT {
             return None;
         }
-        let vertical = self.vertical()?.normalize();
-        let aside = tangent_basis(&vertical).column(0).into_owned();
-        Some(Matrix3::from_columns(&[aside, vertical, aside.cross(&vertical)]))
+        self.vertical()
     }
 
-    /// Takes the attitude of corners of one image from most of its straight edges, where these have one near to it.
-    pub(crate) fn take_common(&self, pose: &mut Hypothesis) {
-        if self.is_one_object() || self.options.angle != IncludedAngle::RIGHT {
-            return;
+    /// Which of the corners of one image run along the axes of the common attitude; all of them where none do.
+    pub(crate) fn parallel_to(&self, common: Option<&CommonAttitude>, corners: &[CornerFeature]) -> Vec<usize> {
+        let parallel = |k: &usize| common.is_some_and(|common| self.runs_along(common, &corners[*k]));
+        let found: Vec<usize> = (0..corners.len()).filter(parallel).collect();
+        if found.is_empty() { (0..corners.len()).collect() } else { found }
+    }
+
+    fn runs_along(&self, common: &CommonAttitude, corner: &CornerFeature) -> bool {
+        fits(corner, &common.camera_from_object, self.options.agree_max_rad)
+    }
+
+    /// Takes the common attitude for that of corners of one image, if the best of them runs along it. Any three lines are a corner with
+    /// right angles: a lone one that does not is contradicted, and the answer is false.
+    pub(crate) fn take_common(
+        &self,
+        pose: &mut Hypothesis,
+        common: Option<&CommonAttitude>,
+        corners: &[&CornerFeature],
+    ) -> bool {
+        let Some(common) = common else { return true };
+        if !corners.first().is_some_and(|best| self.runs_along(common, best)) {
+            return corners.len() > 1;
         }
-        let Some(common) = attitude_of_most(&self.lines(), &[pose.camera_from_object], None) else { return };
         let named = renamed(&common.camera_from_object, &pose.camera_from_object);
-        if apart(&named, &pose.camera_from_object) <= self.options.parallel_max_rad {
-            pose.camera_from_object = named;
-            pose.covariance.fixed_view_mut::<3, 3>(0, 0).copy_from(&common.covariance);
-        }
+        let turn = named * pose.camera_from_object.transpose();
+        pose.edges = pose.edges.map(|edge| turn * edge);
+        pose.camera_from_object = named;
+        pose.covariance.fixed_view_mut::<3, 3>(0, 0).copy_from(&common.covariance);
+        true
     }
 
     /// Whether too few of the straight edges run along the axes of a pose: then nothing but three short edges of its own says that they
@@ -102,35 +118,79 @@ impl CornerPoseEstimator {
 
 #[cfg(test)]
 mod tests {
-    use nalgebra::Vector3;
+    use nalgebra::{Matrix6, Rotation3};
 
     use super::*;
     use crate::camera::{Camera, Model, Pinhole};
-    use crate::corner::closed_form::attitude::IncludedAngle;
     use crate::corner::detector::CornerDetector;
     use crate::corner::estimator_options::EstimatorOptions;
     use crate::corner::options::DetectorOptions;
 
-    #[test]
-    fn the_vertical_is_the_second_axis_where_angles_are_right_and_there_may_be_several_corners() {
+    /// One camera that knows down, where it is told.
+    fn estimator(method: &str, angle: IncludedAngle, down: Option<Vector3<f64>>) -> CornerPoseEstimator {
         let lens = Pinhole::new([700.0; 2], [639.5, 359.5], &[]).unwrap();
         let camera = Camera::new(1280, 720, Model::Pinhole(lens)).unwrap();
+        let detector = CornerDetector::new(camera, DetectorOptions::for_method(method).unwrap(), None).unwrap();
+        let options = EstimatorOptions { angle, down, ..EstimatorOptions::default() };
+        CornerPoseEstimator::new(detector, None, options).unwrap()
+    }
+
+    #[test]
+    fn rooms_have_a_vertical_where_angles_are_right_and_there_may_be_several_corners() {
         let down = Vector3::new(0.1, 0.9, 0.4).normalize();
-        let about = |method: &str, angle: IncludedAngle, down: Option<Vector3<f64>>| {
-            let detector =
-                CornerDetector::new(camera.clone(), DetectorOptions::for_method(method).unwrap(), None).unwrap();
-            let options = EstimatorOptions { angle, down, ..EstimatorOptions::default() };
-            CornerPoseEstimator::new(detector, None, options).unwrap().about_vertical()
-        };
-        let attitude = about("general", IncludedAngle::RIGHT, Some(down)).unwrap();
-        assert!((attitude.column(1) - down).norm() < 1e-12 && (attitude.determinant() - 1.0).abs() < 1e-12);
-        assert!((attitude.tr_mul(&attitude) - Matrix3::identity()).norm() < 1e-12);
+        let of = |method: &str, angle: IncludedAngle, down| estimator(method, angle, down).vertical_of_room();
+        let told = of("general", IncludedAngle::RIGHT, Some(down)).unwrap();
+        assert!((told.normalize() - down).norm() < 1e-12);
         for (method, angle, down) in [
             ("general", IncludedAngle::RIGHT, None),
             ("general", IncludedAngle::exact(1.2), Some(down)),
             ("coloured", IncludedAngle::RIGHT, Some(down)),
         ] {
-            assert_eq!(about(method, angle, down), None, "{method}");
+            assert_eq!(of(method, angle, down), None, "{method}");
         }
+    }
+
+    #[test]
+    fn a_lone_corner_that_most_edges_contradict_is_none_and_one_that_they_run_along_has_their_attitude() {
+        let estimator = estimator("general", IncludedAngle::RIGHT, None);
+        let rotated = |turn_rad: f64| *Rotation3::from_euler_angles(0.6, 0.5 + turn_rad, 0.0).matrix();
+        let corner = |attitude: &Matrix3<f64>| {
+            let vertex = Vector3::new(0.1, 0.0, 2.0);
+            let toward = [0, 1, 2].map(|axis| vertex + 0.3 * attitude.column(axis));
+            CornerFeature::from_bearings(&vertex, &toward).unwrap()
+        };
+        let common = CommonAttitude {
+            camera_from_object: rotated(0.0),
+            covariance: Matrix3::from_diagonal_element(1e-6),
+            scatter: 1.0,
+            support: 50.0,
+        };
+        let pose_of = |attitude: Matrix3<f64>| Hypothesis {
+            camera_from_object: attitude,
+            edges: [0, 1, 2].map(|axis| attitude.column(axis).into_owned()),
+            vertex_m: None,
+            covariance: Matrix6::identity(),
+            probability: 1.0,
+            right_handed: true,
+            misfit: 0.0,
+        };
+        let (near, far) = (corner(&rotated(0.02)), corner(&rotated(0.4)));
+        let features = [far, near];
+        assert_eq!(estimator.parallel_to(Some(&common), &features), [1]);
+        assert_eq!(estimator.parallel_to(Some(&common), &features[..1]), [0]);
+        assert_eq!(estimator.parallel_to(None, &features), [0, 1]);
+        let mut pose = pose_of(rotated(0.02));
+        assert!(estimator.take_common(&mut pose, Some(&common), &[&near]));
+        assert!((pose.camera_from_object - rotated(0.0)).norm() < 1e-12);
+        assert_eq!(pose.covariance.fixed_view::<3, 3>(0, 0), common.covariance);
+        for (axis, edge) in pose.edges.iter().enumerate() {
+            assert!((edge - rotated(0.0).column(axis)).norm() < 1e-12);
+        }
+        let alone = pose_of(rotated(0.4));
+        let mut pose = alone;
+        assert!(!estimator.take_common(&mut pose, Some(&common), &[&far]));
+        assert!(estimator.take_common(&mut pose, Some(&common), &[&far, &far]));
+        assert!(estimator.take_common(&mut pose, None, &[&far]));
+        assert_eq!(pose, alone);
     }
 }

@@ -38,8 +38,7 @@ impl CornerPoseEstimator {
     /// Adds the corners of which two edges were found and the third is known from an attitude in the left camera's frame.
     pub(crate) fn add_completed(
         &mut self,
-        left: &Frame<'_>,
-        right: Option<&Frame<'_>>,
+        [left, right]: [&Frame<'_>; 2],
         attitude: &Matrix3<f64>,
         features: &mut [Vec<CornerFeature>; 2],
     ) {
@@ -56,7 +55,7 @@ impl CornerPoseEstimator {
                 }
             };
         add(&self.left, left, attitude, &mut self.scratch[0], 0);
-        if let (Some((detector, motion)), Some(right)) = (&self.right, right) {
+        if let Some((detector, motion)) = &self.right {
             add(detector, right, motion.rotation.transpose() * attitude, &mut self.scratch[1], 1);
         }
     }

@@ -1,0 +1,80 @@
+//! Which attitude most straight edges of a frame have, and how sure that is.
+
+use nalgebra::{Matrix3, Vector3};
+
+use super::askew::askew;
+use super::common_attitude::{CommonAttitude, StraightEdge, common_attitude};
+use super::manhattan::manhattan;
+
+/// The share of all edges along the axes of one attitude that is enough to trust it: random edges pass within 2 degrees
+/// of one of three axes in a tenth of all cases.
+const MOST: f64 = 0.4;
+
+/// Attitudes about which the common one may be.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Starts {
+    /// The likeliest first.
+    pub(crate) attitudes: Vec<Matrix3<f64>>,
+    /// Whether the first is that of one corner in one image, which any three lines make.
+    pub(crate) lone: bool,
+}
+
+/// The attitude that most lines have in common; where most have none, that near the first of `starts`, which may be turned against most
+/// of the room. That of a lone corner is held against the others in any case. Beside them one is found by lines alone, upright near
+/// `down`, else as the first start is.
+pub(crate) fn attitude_of_most(
+    lines: &[StraightEdge],
+    starts: &Starts,
+    down: Option<Vector3<f64>>,
+) -> Option<CommonAttitude> {
+    let common = most_common(lines, starts, down)?;
+    Some(CommonAttitude { covariance: common.covariance + askew(lines, &common), ..common })
+}
+
+/// That attitude, as if all edges were of things that stand parallel.
+fn most_common(
+    lines: &[StraightEdge],
+    Starts { attitudes, lone }: &Starts,
+    down: Option<Vector3<f64>>,
+) -> Option<CommonAttitude> {
+    let of_first = attitudes.first().and_then(|start| common_attitude(lines, start));
+    let most = MOST * lines.len() as f64;
+    let of_corners = of_first.as_ref().map_or(0.0, |first| first.support);
+    if !lone && of_corners >= most {
+        return of_first;
+    }
+    let down = down.or(attitudes.first().map(|start| start.column(1).into_owned()))?;
+    let others = attitudes.iter().skip(1).copied().chain(manhattan(lines, &down));
+    let found = others.filter_map(|start| common_attitude(lines, &start));
+    let best = found.max_by(|a, b| a.support.total_cmp(&b.support));
+    // A count scatters by its root: with less than that more, the corners' own one is as good.
+    let better = |other: &CommonAttitude| other.support >= most && other.support - of_corners > other.support.sqrt();
+    best.filter(better).or(of_first)
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::Rotation3;
+
+    use super::super::common_attitude::tests::{lines, off_in_any_naming_rad};
+    use super::*;
+
+    #[test]
+    fn corners_have_their_own_attitude_unless_another_has_clearly_more_lines() {
+        let [own, other] = [0.0, 0.8].map(|turn_rad| {
+            let turn = Rotation3::from_axis_angle(&Vector3::y_axis(), turn_rad);
+            *(Rotation3::from_euler_angles(0.5, -0.3, 0.2) * turn).matrix()
+        });
+        let found = |of_own: u32, of_other: u32, lone: bool| {
+            let both = [lines(&own, of_own, &[0.001, -0.001]), lines(&other, of_other, &[0.001, -0.001])].concat();
+            let found = attitude_of_most(&both, &Starts { attitudes: vec![own], lone }, None).unwrap();
+            [own, other].map(|of| off_in_any_naming_rad(&found.camera_from_object, &of) < 5e-3)
+        };
+        assert_eq!(found(12, 6, true), [true, false]);
+        assert_eq!(found(12, 13, true), [true, false]);
+        assert_eq!(found(12, 17, true), [false, true]);
+        assert_eq!(found(12, 17, false), [true, false]);
+        assert_eq!(found(6, 40, false), [false, true]);
+        assert!(attitude_of_most(&lines(&own, 12, &[0.0]), &Starts::default(), None).is_none());
+    }
+}
