@@ -283,6 +283,7 @@ impl CornerPoseEstimator {
     /// Attitudes from one image: of all features that agree with one another; none where the likeliest one's features contradict
     /// each other or gravity.
     fn by_one(&self, common: Option<&CommonAttitude>, estimate: &mut CornerEstimate) -> Result<()> {
+        let common = common.filter(|_| self.options.parallel_max_rad > 0.0);
         let members = self.parallel_to(common, &estimate.features[0]);
         let features: Vec<CornerFeature> = members.iter().map(|member| estimate.features[0][*member]).collect();
         let priors = self.priors(self.is_one_object());

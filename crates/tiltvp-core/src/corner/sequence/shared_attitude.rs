@@ -70,7 +70,7 @@ impl CornerPoseEstimator {
     }
 
     fn runs_along(&self, common: &CommonAttitude, corner: &CornerFeature) -> bool {
-        fits(corner, &common.camera_from_object, self.options.agree_max_rad)
+        fits(corner, &common.camera_from_object, self.options.parallel_max_rad)
     }
 
     /// Takes the common attitude for that of corners of one image, if the best of them runs along it. Any three lines are a corner with
