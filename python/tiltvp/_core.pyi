@@ -1038,9 +1038,8 @@ class CornerPoseEstimator:
         agree_max_rad
             How far attitudes of several features of one image may be apart, radians. Default: 0.0698132.
         parallel_max_rad
-            How far a corner's own attitude may be from that which all straight edges of a pair of images have in
-            common, radians, for its edges to be taken as parallel to them; 0 takes none as parallel. Default:
-            0.0698132.
+            How far a corner's own attitude may be from that which most straight edges of the images have in common,
+            radians, for its edges to be taken as parallel to them; 0 takes none as parallel. Default: 0.0698132.
         misfit_max
             How far the attitudes of one corner in both images may be apart, those of several corners in one image, and
             the rays from the fused pose, in standard deviations of the covariances as they are: root mean square per

@@ -39,7 +39,7 @@ options! {
         forget_after: u32 = 10;
         /// How far attitudes of several features of one image may be apart, radians.
         agree_max_rad: f64 = 4f64.to_radians() => POSITIVE, "a positive angle";
-        /// How far a corner's own attitude may be from that which all straight edges of a pair of images have in common, radians,
+        /// How far a corner's own attitude may be from that which most straight edges of the images have in common, radians,
         /// for its edges to be taken as parallel to them; 0 takes none as parallel.
         parallel_max_rad: f64 = 4f64.to_radians() => 0.0..=PI, "an angle from 0 to pi";
         /// How far the attitudes of one corner in both images may be apart, those of several corners in one image, and the rays

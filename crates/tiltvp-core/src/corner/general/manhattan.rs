@@ -4,16 +4,16 @@ use nalgebra::{Matrix3, Vector3};
 
 use super::common_attitude::StraightEdge;
 
-/// How far the vertical may be from what is told of it: the sine of 20 degrees. What a camera on a robot is told is often how it is
-/// mounted, and boards are carried 15 degrees aslant.
+/// How far the vertical may be from what is told of it: the sine of 20 degrees, a little more than the 15 that
+/// `down_sigma_rad` says where nobody does.
 const DOWN_SINE: f64 = 0.342;
 
-/// How many lines, the longest, are tried with one another for the vertical and for a level axis. They have the least errors; of 40 two
-/// are along any axis that a tenth of the lines has.
+/// How many lines, the longest, are tried with one another for the vertical and for a level axis. They have the least errors; of 40 four
+/// are along an axis that a tenth of the lines has.
 const TRIED: usize = 40;
 
-/// How far lines may pass from a direction that two others of them have, to count half, radians: 0.25 degrees, what a pair of
-/// [`LENGTH_MIN_PX`](super::common_attitude) tells. The attitude is refined afterwards.
+/// How far lines may pass from a direction that two others of them have, to count half, radians: 0.25 degrees, what two of
+/// 100 pixels tell. The attitude is refined afterwards.
 const NEAR_RAD: f64 = 0.004_36;
 
 /// The attitude whose second axis is the direction near `down` along which most lines run, and whose others are those level ones.
