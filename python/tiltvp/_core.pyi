@@ -1970,6 +1970,12 @@ class LogCalibration:
     def converged(self) -> bool:
         """Whether the descent came to rest."""
 
+    @property
+    def doubted(self) -> NDArray[np.float64]:
+        """Fresh (N, 2) float64: the parts of the drive whose motions the bearings contradict, as on a carpet, each from
+        which share of it to which, 0 to 1. Their odometry is taken to have ten times its standard deviations.
+        """
+
     @classmethod
     def from_dict(cls, values: dict[str, Any]) -> Self:
         """The value of a dict as `to_dict` makes it, equal to the last bit."""

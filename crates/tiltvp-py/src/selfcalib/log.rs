@@ -1,5 +1,6 @@
 //! What a whole log tells, as a frozen Python value.
 
+use nalgebra::Vector2;
 use pyo3::prelude::*;
 use tiltvp_core::selfcalib as core;
 
@@ -45,6 +46,9 @@ value! {
         /// How the log may have been meant, where it fits that way only: "reflected" (wheels swapped, both negated, or bearings
         /// clockwise), "left wheel negated", "right wheel negated", "degrees", "millimetres" or "cumulative". None if it fits.
         misreading: Option<String> = own.misreading.map(|misreading| misreading.name().to_owned()),
+        /// Fresh (N, 2) float64: the parts of the drive whose motions the bearings contradict, as on a carpet, each from which share of it
+        /// to which, 0 to 1. Their odometry is taken to have ten times its standard deviations.
+        doubted: Vec<Vector2<f64>>,
         /// Whether the answer can be relied upon, and what speaks against it, in a sentence.
         reason: String = own.to_string(),
     }
@@ -62,6 +66,7 @@ value! {
         bearing_sigma_rad,
         odometry_k_m,
         misreading: misread(misreading.as_deref())?,
+        doubted,
     };
     repr format!(
         "LogCalibration({}, residual_rms={:.3}, bearings={}, outliers={}, converged={})",

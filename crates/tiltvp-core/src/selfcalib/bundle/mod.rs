@@ -17,6 +17,7 @@ mod schur;
 pub(super) use self::cholesky::{CholeskyFactor, combine, subtract_square};
 pub(super) use self::cluster_robust::{largest_ratio, widened};
 pub(super) use self::descent::{DescentReport, FIRST_DAMPING, Solution};
+pub(super) use self::jackknife::DoubtedParts;
 pub(super) use self::keyframe::{Keyframe, Observation};
 pub(super) use self::landmark_distance::{DISTANCE_STEP, DISTANCE_STEPS};
 pub(super) use self::problem::{BundleProblem, FreeParameters};

@@ -317,22 +317,28 @@ impl BundleProblem {
         let away = self.shared() - &self.prior_mean;
         let cost = 0.5 * away.dot(&(&self.prior_information * &away)) + self.scatter_cost();
         let mut fit = FitSummary { cost, ..FitSummary::default() };
-        for pair in self.keyframes.windows(2) {
-            let [before, keyframe] = pair else { continue };
-            let r = between(&before.pose, &keyframe.pose) - keyframe.odometry.motion;
-            fit.cost += self.slip.cost(r.dot(&(keyframe.information * r)));
-        }
+        fit.cost += (1..self.keyframes.len()).map(|to| self.motion_cost(to)).sum::<f64>();
         for residual in self.residuals() {
             fit.add(residual, self.loss);
         }
         fit
     }
 
+    /// What the motion to a keyframe adds to the cost.
+    pub(crate) fn motion_cost(&self, to: usize) -> f64 {
+        self.slip.cost(self.motion_misfit(to))
+    }
+
     /// Whether the motion to a keyframe differs so much from its odometry that the wheels must have slipped.
     pub(crate) fn slipped(&self, to: usize) -> bool {
+        self.slip.weight(self.motion_misfit(to)) < 1.0
+    }
+
+    /// The squared Mahalanobis distance of the motion to a keyframe from its odometry.
+    fn motion_misfit(&self, to: usize) -> f64 {
         let (before, keyframe) = (&self.keyframes[to - 1], &self.keyframes[to]);
         let r = between(&before.pose, &keyframe.pose) - keyframe.odometry.motion;
-        self.slip.weight(r.dot(&(keyframe.information * r))) < 1.0
+        r.dot(&(keyframe.information * r))
     }
 
     /// The whitened residuals of all bearings, in the order of keyframes and observations.

@@ -3,7 +3,7 @@
 use nalgebra::{Matrix3, Vector3};
 
 use crate::selfcalib::bundle::{BundleProblem, Observation};
-use crate::selfcalib::model::{OUTLIER_SIGMAS, between, information};
+use crate::selfcalib::model::{OUTLIER_SIGMAS, between};
 
 /// Random probes of the redundancies: their error is then some 10 % where fifty motions are redundant.
 const PROBES: usize = 4;
@@ -141,7 +141,7 @@ impl BundleProblem {
         self.noise.step_sigma_rad *= factors.motions.sqrt();
         for keyframe in self.keyframes.iter_mut().skip(1) {
             keyframe.odometry.covariance *= factors.motions;
-            keyframe.information = information(&keyframe.odometry.covariance);
+            keyframe.information /= factors.motions;
         }
         self.scatters.fill(1.0);
     }

@@ -3,15 +3,18 @@
 use std::collections::BTreeMap;
 use std::fmt;
 
-use nalgebra::{DMatrix, Matrix3};
+use nalgebra::{DMatrix, Matrix3, Vector2};
 
 use super::descent::{TOLERANCE, solve};
 use super::incremental::{incremental_problem, problem_along};
 use super::log::{LogBearing, LogOptions, SortedLog};
 use super::misreading::Misreading;
-use super::noise::solve_with_noise;
+use super::noise::{solve_with_doubt, solve_with_noise};
 use crate::error::{Error, Result};
-use crate::selfcalib::bundle::{BundleProblem, CholeskyFactor, DescentReport, FIRST_DAMPING, FreeParameters, widened};
+use crate::selfcalib::bundle::{
+    BundleProblem, CholeskyFactor, DescentReport, DoubtedParts, FIRST_DAMPING, FreeParameters, widened,
+};
+use crate::selfcalib::diagnosis::Cause;
 use crate::selfcalib::estimate::MountingEstimate;
 use crate::selfcalib::model::{Mounting, OUTLIER_SIGMAS, WheelMotion, Wheels};
 use crate::selfcalib::options::{CalibrationMethod, SelfCalibratorOptions};
@@ -47,12 +50,21 @@ pub struct LogCalibration {
     pub odometry_k_m: f64,
     /// How the log may have been meant, where it fits that way only.
     pub misreading: Option<Misreading>,
+    /// The parts of the drive whose motions the bearings contradict, as on a carpet, each from which share of it to which. Their odometry is
+    /// taken to have ten times its standard deviations.
+    pub doubted: Vec<Vector2<f64>>,
 }
 
 impl LogCalibration {
     /// Whether the answer can be relied upon: the descent came to rest, the mounting can be relied upon, and the log was not misread.
     pub fn reliable(&self) -> bool {
         self.converged && self.misreading.is_none() && self.estimate.reliable()
+    }
+
+    /// Whether motions of a part of the drive may err together: nothing is suspect, or what they make so.
+    fn may_drift(&self) -> bool {
+        let causes = [Cause::Drift, Cause::OdometryK, Cause::WheelBase, Cause::Wheels];
+        self.misreading.is_none() && self.estimate.suspect.is_none_or(|suspect| causes.contains(&suspect.cause))
     }
 }
 
@@ -65,6 +77,9 @@ impl fmt::Display for LogCalibration {
         write!(f, "{}", self.estimate)?;
         if !self.converged {
             write!(f, "; not converged")?;
+        }
+        for part in &self.doubted {
+            write!(f, "; odometry from {:.0} to {:.0} % of the drive doubted", 100.0 * part.x, 100.0 * part.y)?;
         }
         self.misreading.map_or(Ok(()), |misreading| write!(f, "; {misreading}"))
     }
@@ -115,10 +130,19 @@ pub fn calibrate_log(
     if !fits(&problem, MISREAD_SHARE) {
         misreading = fitting_misreading(options, readings, times_s, bearings);
     }
+    // More noise for all motions would explain what is wrong with those of a part.
+    let as_told = problem.clone();
     if misreading.is_none() && !problem.contradictions().most_turns() {
         descent = solve_with_noise(&mut problem, options.max_iterations).unwrap_or(descent);
     }
-    report(options, &problem, &descent, misreading).map_err(|error| match misreading {
+    let mut answer = report(options, &problem, &descent, misreading);
+    if let Ok(told) = &answer
+        && told.may_drift()
+        && let Some(without) = without_contradicted_parts(options, as_told)
+    {
+        answer = Ok(without);
+    }
+    answer.map_err(|error| match misreading {
         Some(misreading) => {
             Error::argument("odometry", format!("a log that determines nothing; {misreading}"), "metres and radians")
         }
@@ -154,6 +178,14 @@ fn solved(log: &SortedLog<'_>) -> Result<Option<(BundleProblem, DescentReport)>>
         }
     }
     Ok(best)
+}
+
+/// The answer without the odometry of the parts of the drive that the bearings contradict, where nothing is wrong then.
+fn without_contradicted_parts(options: &LogOptions, mut problem: BundleProblem) -> Option<LogCalibration> {
+    let (mut descent, doubted) = solve_with_doubt(&mut problem, options.max_iterations)?;
+    descent = solve_with_noise(&mut problem, options.max_iterations).unwrap_or(descent);
+    let answer = report(options, &problem, &descent, None).ok()?;
+    (answer.converged && answer.estimate.suspect.is_none()).then_some(LogCalibration { doubted, ..answer })
 }
 
 /// Whether at most a share of the turns is contradicted, and of the motions and bearings.
@@ -263,8 +295,8 @@ fn report(
     let covariance = covariance * scale;
     let mounting: Matrix3<f64> = covariance.fixed_view::<3, 3>(0, 0).into();
     let own = widening * mounting * widening.transpose();
-    let scatter = if converged { problem.motion_scatter() } else { None };
-    let motions: Option<Matrix3<f64>> = scatter.as_ref().map(|scatter| scatter.fixed_view::<3, 3>(0, 0).into());
+    let doubted = if converged { problem.doubted_parts() } else { None };
+    let motions = doubted.as_ref().map(DoubtedParts::scatter_of_mounting);
     let landmarks = (converged && options.jackknife_parts > 0).then(|| {
         let parts = options.jackknife_parts as usize;
         // Of what one part alone tells no more is known than at the start.
@@ -273,8 +305,9 @@ fn report(
     let with = |scatter: Option<&Matrix3<f64>>, own| scatter.map_or(own, |scatter| widened(&own, scatter));
     let counts = problem.contradictions();
     let by_landmarks = with(landmarks.as_ref(), own);
-    let suspect = problem.suspect(o, &counts, problem.noise_factors(), &by_landmarks, motions.as_ref());
+    let suspect = problem.suspect(o, &counts, problem.noise_factors(), &by_landmarks, doubted.as_ref());
     let mounting = with(landmarks.as_ref(), with(motions.as_ref(), own));
+    let scatter = doubted.as_ref().map(DoubtedParts::scatter);
     let sigma = |at: usize| {
         let by_motions = scatter.as_ref().map_or(0.0, |scatter| scatter[(at, at)]);
         covariance[(at, at)].max(by_motions).sqrt()
@@ -301,5 +334,6 @@ fn report(
         bearing_sigma_rad: problem.bearing_sigma,
         odometry_k_m: problem.noise.k_m,
         misreading,
+        doubted: Vec::new(),
     })
 }

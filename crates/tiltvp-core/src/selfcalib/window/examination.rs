@@ -12,8 +12,9 @@ impl SlidingWindow {
         }
         let counts = now.contradictions();
         let covariance = self.covariance.fixed_view::<3, 3>(MOUNTING, MOUNTING).into();
-        let motion_scatter = now.motion_scatter().map(|scatter| scatter.fixed_view::<3, 3>(0, 0).into());
-        let suspect = now.suspect(&self.options, &counts, now.noise_factors(), &covariance, motion_scatter.as_ref());
+        let doubted = now.doubted_parts();
+        let suspect = now.suspect(&self.options, &counts, now.noise_factors(), &covariance, doubted.as_ref());
+        let motion_scatter = doubted.map(|parts| parts.scatter_of_mounting());
         self.examination = Examination { contradictions: counts, suspect, motion_scatter };
     }
 
