@@ -13,6 +13,7 @@ import pytest
 
 import tiltvp
 from tiltvp import lines as tl
+from tiltvp._core import option_fields
 from tiltvp.errors import InvalidInputError
 from tiltvp.overlays.lines import draw_lines, line_pixels
 from tiltvp.rotations import read_rotation
@@ -142,6 +143,41 @@ def test_every_option_changes_something(
         return [lines.to_dict(), extractor.describe(room.gray, lines).tolist()]
 
     assert seen(**change) != seen()
+
+
+def test_every_option_is_listed_here() -> None:
+    for method in tl.LINE_METHODS:
+        shared = {name for _, change in OTHER_VALUES for name in change}
+        names = {field["name"] for field in option_fields("LineExtractor", method)}
+        assert names <= shared | {"method", "mask"}, "OTHER_VALUES needs another value of each option"
+
+
+OTHER_MATCHING: dict[str, dict[str, object]] = {
+    "match_descriptors": {"f1": 0.2, "f2": 0.2, "f3": 0.3, "mutual": False, "ordered": True},
+    "match_wide": {"confidence_min": 0.99, "likeness_min": 2.0, "motion_sigma_rad": 0.5},
+}
+
+
+@pytest.mark.slow
+def test_every_option_of_matching_changes_something(mirror: tiltvp.Camera, office: Room) -> None:
+    x, y, yaw = office.free_poses(1, 4)[0]
+    images = [office.render(mirror, pose=(x + step, y, yaw), samples=2).gray for step in (0.0, 0.6)]
+    areas, profiles = (tl.LineExtractor(mirror, descriptor_kind=kind) for kind in ("areas", "profile"))
+    described = [areas.describe(image, areas(image)) for image in images]
+    profiled = [thing for image in images for thing in (profiles(image), profiles.describe(image, profiles(image)))]
+
+    def answer(owner: str, **options: object) -> list[object]:
+        if owner == "match_descriptors":
+            # The other way round they are in no order.
+            return tl.match(described[0], described[1][::-1].copy(), **options).tolist()
+        # The way is told aslant, as odometry might.
+        pairs, confidences = tl.match_wide(*profiled, ahead_rad=(0.3 - yaw, 0.3 - yaw), **options)
+        return [pairs.tolist(), confidences.tolist()]
+
+    for owner, others in OTHER_MATCHING.items():
+        assert {field["name"] for field in option_fields(owner)} == set(others)
+        for name, value in others.items():
+            assert answer(owner, **{name: value}) != answer(owner), f"{name} changes nothing"
 
 
 def test_a_mask_keeps_lines_out(room: RoomImage, camera: tiltvp.Camera) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import pickle
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
@@ -12,6 +13,7 @@ import pytest
 import yaml
 
 import tiltvp
+from tiltvp._core import option_fields
 from tiltvp.cli import main
 from tiltvp.errors import InvalidInputError
 from tiltvp.lab.datasets.check import check_dataset
@@ -164,6 +166,18 @@ def test_the_filter_refuses_what_makes_no_sense() -> None:
             wrong()
     with pytest.raises(InvalidInputError, match="time_constant_s"):
         tiltvp.ComplementaryFilter(np.eye(3), time_constant_s=0.0)
+
+
+@pytest.mark.parametrize("field", option_fields("ComplementaryFilter"), ids=lambda field: field["name"])
+def test_every_option_of_the_filter_changes_something(field: dict[str, Any]) -> None:
+    def answer(**options: float) -> list[float]:
+        fusion = tiltvp.ComplementaryFilter(np.eye(3), **options)
+        for _ in range(3):
+            fusion.predict([0.1, 0.0, 0.0], 1.0)
+            fusion.correct(np.eye(3))
+        return [*fusion.reference_from_body.ravel(), *fusion.bias_rad_s]
+
+    assert answer(**{field["name"]: 2.0 * field["default"]}) != answer()
 
 
 def test_rooms_have_corners_to_look_at() -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
@@ -28,7 +28,14 @@ __all__ = [
     "CornerPoseEstimator",
 ]
 
-_OF_ESTIMATOR = tuple(field["name"] for field in _core.option_fields("CornerPoseEstimator"))
+_OF_ESTIMATOR = {field["name"]: field["default"] for field in _core.option_fields("CornerPoseEstimator")}
+_BESIDE: Final = {
+    "down_sigma_rad": ("down",),
+    "camera_height_sigma_m": ("camera_height_m",),
+    "length_sigma_m": ("edge_length_m", "box_size_m"),
+    "known_edge": ("edge_length_m",),
+}
+"""Options that tell nothing without one of others."""
 
 
 class CornerDetector(_core.CornerDetector):
@@ -100,7 +107,12 @@ class CornerPoseEstimator(_core.CornerPoseEstimator):
             return CornerDetector(camera, method=method, **options)
 
         other = None if right is None else detector(right)
-        return super().__new__(cls, detector(left), other, left_from_right, **own)
+        made = super().__new__(cls, detector(left), other, left_from_right, **own)
+        in_force = made.options
+        for name, owners in _BESIDE.items():
+            if in_force[name] != _OF_ESTIMATOR[name] and all(in_force[owner] is None for owner in owners):
+                raise InvalidInputError(f"{name} = {in_force[name]!r} without {' or '.join(owners)}, expected both")
+        return made
 
     def __call__(
         self,
