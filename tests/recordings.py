@@ -99,13 +99,13 @@ class Bag:
     def camera_info(
         self, time_s: float, width: int, height: int, model: str, d: Sequence[float], k: Sequence[float],
         binning: tuple[int, int] = (0, 0), part: tuple[int, int, int, int] = (0, 0, 0, 0),
-        p: Sequence[float] = (0.0,) * 12,
+        p: Sequence[float] = (0.0,) * 12, r: Sequence[float] = (1, 0, 0, 0, 1, 0, 0, 0, 1),
     ) -> None:  # fmt: skip
         """`part` is x_offset, y_offset, height and width, in the message's order."""
         region = self.make("sensor_msgs/RegionOfInterest", *part, False)
         self.add(
             "/camera_info", "sensor_msgs/CameraInfo", time_s, self.header(time_s), height, width, model,
-            np.array(d), np.array(k), np.eye(3).ravel(), np.array(p), *binning, region,
+            np.array(d), np.array(k), np.array(r, dtype=float), np.array(p), *binning, region,
         )  # fmt: skip
 
     def static(self, parent: str, child: str, xyzw: Sequence[float], topic: str = "/tf_static") -> None:

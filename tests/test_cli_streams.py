@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import json
+import math
 import os
 import signal
 import sys
@@ -204,6 +205,20 @@ def test_the_lens_of_rectified_images_is_p(tmp_path: Path) -> None:
     blank.camera_info(START_S, 80, 60, "plumb_bob", [0.0] * 5, k)
     with pytest.raises(CalibrationError, match="not calibrated"):
         recorded_camera(Recording(blank.write(tmp_path / "blank")), images="/image_rect")
+
+
+def test_a_turn_of_rectified_images_is_told(tmp_path: Path) -> None:
+    """Their frame is another one than the raw images', which have the same frame in their headers."""
+    c, s = math.cos(math.radians(3.0)), math.sin(math.radians(3.0))
+    for kind, r, told in (("mcap", (1, 0, 0, 0, c, -s, 0, s, c), True), ("ros1", (0,) * 9, False)):
+        made = Bag(kind)
+        made.camera_info(START_S, 80, 60, "plumb_bob", [0.0] * 5, [200.0, 0, 40, 0, 200, 30, 0, 0, 1], r=r)
+        for name in ("/left/image_rect_color", "/left/image_raw"):
+            made.image(name, START_S, np.zeros((60, 80), np.uint8), "mono8")
+        path = made.write(tmp_path)
+        words = "/left/image_rect_color is turned by 3.0 degrees against the raw images"
+        assert (words in "".join(open_frames(path, topic="/left/image_rect_color").notes)) == told
+        assert not open_frames(path, topic="/left/image_raw").notes
 
 
 def test_stamps_that_stand_still_are_told(tmp_path: Path) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING, Any, Final
 
@@ -16,9 +17,12 @@ from tiltvp.streams.frames import Frame, Frames, median_rate_hz
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-__all__ = ["IMAGE_KINDS", "BagFrames", "image_from_message", "is_rectified"]
+__all__ = ["CAMERA_KINDS", "IMAGE_KINDS", "BagFrames", "image_from_message", "is_rectified"]
 
 IMAGE_KINDS: Final = ("sensor_msgs/Image", "sensor_msgs/CompressedImage")
+CAMERA_KINDS: Final = ("sensor_msgs/CameraInfo",)
+_TURN_TOLD_DEG: Final = 0.1
+"""A turn of rectified images that is told: what a tilt of one image is off by."""
 _DEPTH_8: Final = {"mono8": 1, "8UC1": 1, "rgb8": 3, "bgr8": 3, "8UC3": 3, "rgba8": 4, "bgra8": 4, "8UC4": 4}
 _DEPTH_16: Final = {"mono16": 1, "16UC1": 1, "rgb16": 3, "bgr16": 3, "rgba16": 4, "bgra16": 4}
 _BAYER: Final = ("rggb", "bggr", "gbrg", "grbg")
@@ -30,9 +34,27 @@ _EXPECTED: Final = (
 )
 
 
+_RECTIFIED: Final = "/image_rect"
+
+
 def is_rectified(topic: str) -> bool:
     """Whether images of a topic are called rectified, as those of image_proc and stereo_image_proc are."""
-    return "/image_rect" in topic
+    return _RECTIFIED in topic
+
+
+def _turned_deg(recording: Recording, topic: str) -> float:
+    """How far rectified images are turned against the raw ones, degrees; 0 where CameraInfo does not tell."""
+    infos = [one for one in recording.topics if one.kind in CAMERA_KINDS and one.count > 0]
+    beside = [one for one in infos if one.name == topic.split(_RECTIFIED)[0] + "/camera_info"] or infos
+    if len(beside) != 1:
+        return 0.0
+    try:
+        _, info = next(recording.decoded(beside[0]))
+    except InvalidInputError:
+        return 0.0
+    turn = np.reshape(getattr(info, "r", getattr(info, "R", np.eye(3))), (3, 3))
+    sine = math.hypot(turn[2, 1] - turn[1, 2], turn[0, 2] - turn[2, 0], turn[1, 0] - turn[0, 1])
+    return math.degrees(math.atan2(sine, np.trace(turn) - 1.0)) if turn.any() else 0.0
 
 
 class BagFrames(Frames):
@@ -52,6 +74,11 @@ class BagFrames(Frames):
         told = []
         if is_rectified(self.topic):
             told.append("is called rectified: its lens is P of CameraInfo, as of a recording as --camera, not K and D")
+            if (turned_deg := _turned_deg(recording, self.topic)) > _TURN_TOLD_DEG:
+                told.append(
+                    f"is turned by {turned_deg:.1f} degrees against the raw images (R of CameraInfo): "
+                    "a mounting by /tf_static is taken for theirs, as image_geometry takes it"
+                )
         if standing := int((np.diff(self.times_s) <= 0.0).sum()):
             told.append(f"has {standing} images that are stamped no later than those before: what moved is not told")
         self.notes = tuple(f"{recording.path}: {self.topic} {words}" for words in told)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -13,7 +13,7 @@ from tiltvp.errors import CalibrationError, InvalidInputError
 from tiltvp.formats.document import Document
 from tiltvp.formats.ros import parse
 from tiltvp.rotations import rotation_from_quaternion
-from tiltvp.streams.bag_images import IMAGE_KINDS, is_rectified
+from tiltvp.streams.bag_images import CAMERA_KINDS, IMAGE_KINDS, is_rectified
 from tiltvp.streams.bags import Recording
 
 if TYPE_CHECKING:
@@ -21,7 +21,6 @@ if TYPE_CHECKING:
 
 __all__ = ["CAMERA_KINDS", "camera_from_message", "recorded_camera", "robot_from_camera"]
 
-CAMERA_KINDS: Final = ("sensor_msgs/CameraInfo",)
 _TRANSFORMS, _STATIC = "tf2_msgs/TFMessage", "/tf_static"
 
 
