@@ -9,7 +9,9 @@ import pytest
 
 from calibration_reading import Read, message
 from calibration_texts import AFFINE
+from tiltvp.errors import CalibrationError
 from tiltvp.formats import read_cameras
+from tiltvp.formats.stereo import read_stereo
 
 
 def storage(matrix: str, coefficients: str, count: int, extra: str = "") -> str:
@@ -98,6 +100,16 @@ def test_opencv_stereo_and_json(read: Read) -> None:
         ' "dt": "d", "data": [50, 0, 32, 0, 51, 24, 0, 0, 1]}}'
     )
     assert read(text)[0].parameters == {"fx": 50.0, "fy": 51.0, "cx": 32.0, "cy": 24.0}
+
+
+def test_what_opencv_tells_of_a_pair_alone_is_no_camera(read: Read, tmp_path: Path) -> None:
+    """As the sample of cv::stereoCalibrate writes its extrinsics.yml; it was no known format."""
+    said = message(read, storage("P1", "P2", 12, SIZE))
+    assert "P1 and P2, projections of rectified images, without the cameras' own K1, D1, K2 and D2" in said
+    path = tmp_path / "extrinsics.yml"
+    path.write_text(storage("R", "T", 3))
+    with pytest.raises(CalibrationError, match="pair of OpenCV, which is not read: its T may be in metres, milli"):
+        read_stereo(path)
 
 
 def test_written_by_opencv_itself(read: Read, tmp_path: Path) -> None:

@@ -60,9 +60,9 @@ _MODEL_OF_WORD = {
 
 
 def recognise(document: Document) -> bool:
-    """It has a camera matrix at the top and no ROS `distortion_model`, or MultiCol-SLAM's `Camera.a0`."""
+    """It has a camera matrix at the top and no ROS `distortion_model`, P1 and P2, or MultiCol-SLAM's `Camera.a0`."""
     tree = _storage(document)
-    if "Camera.a0" in tree:
+    if "Camera.a0" in tree or _is_rectified_pair(tree):
         return True
     return "distortion_model" not in tree and any(key + tail in tree for key in _MATRIX for tail in _SUFFIXES)
 
@@ -88,6 +88,16 @@ def never(document: Document) -> bool:
     return False
 
 
+def is_pair(document: Document) -> bool:
+    """Whether it is what cv::stereoCalibrate or cv::stereoRectify tells of two cameras."""
+    tree = _storage(document)
+    return {"R", "T"} <= tree.keys() or _is_rectified_pair(tree)
+
+
+def _is_rectified_pair(tree: dict[str, object]) -> bool:
+    return {"P1", "P2"} <= tree.keys()
+
+
 def _storage(document: Document) -> dict[str, object]:
     tree = document.tree.get("opencv_storage", document.tree)
     return {str(key): value for key, value in tree.items()} if isinstance(tree, dict) else {}
@@ -99,6 +109,11 @@ def _parse(document: Document, image_size: ImageSize | None, kind: str | None) -
     if kind is None and root.has("Camera.a0"):
         return [multicol.parse(root, image_size)]
     tails = [tail for tail in _SUFFIXES if any(root.has(key + tail) for key in _MATRIX)]
+    if not tails and _is_rectified_pair(root.tree):
+        root.fail(
+            "P1 and P2, projections of rectified images, without the cameras' own K1, D1, K2 and D2",
+            "those; or for rectified images a file with K, the first three columns of P1 or P2, alone",
+        )
     if not tails:
         root.need(*_MATRIX)
     name = root.get("camera_name", "cameraName", "name")

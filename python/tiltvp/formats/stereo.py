@@ -26,7 +26,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tiltvp.files import write_whole
-from tiltvp.formats import kalibr
+from tiltvp.formats import kalibr, opencv
 from tiltvp.formats.document import Document
 from tiltvp.formats.node import Node
 from tiltvp.formats.own import as_floats, camera_from, camera_table
@@ -64,6 +64,12 @@ def read_stereo(path: str | os.PathLike[str], image_size: ImageSize | None = Non
         return _own(document, image_size)
     if kalibr.recognise(document):
         return _camchain(document, image_size)
+    if opencv.is_pair(document):
+        document.fail(
+            "a pair of OpenCV, which is not read: its T may be in metres, millimetres or squares of its board",
+            f"{_EXPECTED}; StereoRig(left, right, left_from_right).save(path) writes one",
+            "the top of the file",
+        )
     document.fail("is no calibration of a pair of cameras", _EXPECTED, "the top of the file")
 
 
