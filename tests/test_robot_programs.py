@@ -46,6 +46,21 @@ def test_images_as_cameras_on_usb_send_them(encoding: str, luma: int) -> None:
         image_from_message(message)
 
 
+@pytest.mark.parametrize("encoding", ["nv12", "nv21"])
+def test_images_as_hardware_decoders_send_them(encoding: str) -> None:
+    """Grey levels, then the colours of each four pixels, U before V in NV12; rows may be padded."""
+    bgr = np.zeros((4, 8, 3), np.uint8)
+    bgr[:, :4], bgr[:, 4:] = (40, 120, 200), (220, 90, 30)
+    planes = cv2.cvtColor(bgr, cv2.COLOR_BGR2YUV_I420)
+    colours = planes[4:].reshape(2, 8)[:: 1 if encoding == "nv12" else -1]
+    rows = np.pad(np.vstack([planes[:4], colours.T.reshape(2, 8)]), ((0, 0), (0, 2)))
+    message = SimpleNamespace(width=8, height=4, encoding=encoding, step=10, is_bigendian=0, data=rows.tobytes())
+    assert np.abs(image_from_message(message).astype(int) - bgr).max() <= 3
+    for change, words in (({"height": 3}, "expected even numbers"), ({"data": rows.tobytes()[:40]}, "6 rows of 8")):
+        with pytest.raises(ImageFileError, match=words):
+            image_from_message(SimpleNamespace(**(vars(message) | change)))
+
+
 def test_what_is_no_image_s_message_is_refused() -> None:
     for other in (None, SimpleNamespace(format="jpeg", data=b"")):
         with pytest.raises(ImageFileError):

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "bgr_from",
+    "bits_of",
     "checked_mask",
     "decode_as_stored",
     "decode_image",
@@ -37,13 +38,13 @@ _DEEP = (".png", ".tif", ".tiff", ".pgm", ".ppm", ".pnm", ".jp2")
 """Endings of the files that hold 16 bits a value."""
 
 
-def gray_from(image: ArrayLike, name: str = "image") -> NDArray[np.uint8]:
+def gray_from(image: ArrayLike, name: str = "image", *, bits: int | None = None) -> NDArray[np.uint8]:
     """A C-contiguous (H, W) uint8 array from an image of any usual kind; the argument is never altered.
 
     Colour is taken in OpenCV's order (BGR or BGRA). uint16 is scaled so that the greatest value of 10, 12, 14 or 16
     bits becomes 255: of the least of these depths that holds all values of the image, for sensors have fewer bits than
-    their files. Floats in [0, 1] are scaled by 255. All are rounded. Raises `InvalidInputError` for other shapes and
-    types, empty images, NaN, and floats outside [0, 1].
+    their files; or that of `bits`, where they are known. Floats in [0, 1] are scaled by 255. All are rounded. Raises
+    `InvalidInputError` for other shapes and types, empty images, NaN, floats outside [0, 1], and values above `bits`.
     """
     try:
         array = np.asarray(image)
@@ -53,7 +54,7 @@ def gray_from(image: ArrayLike, name: str = "image") -> NDArray[np.uint8]:
         raise InvalidInputError(f"{name}: shape {array.shape}, expected {_EXPECTED}")
     if array.size == 0:
         raise InvalidInputError(f"{name}: shape {array.shape} is empty, expected {_EXPECTED}")
-    levels = _bytes_from(array, name)
+    levels = _bytes_from(array, name, bits)
     if levels.ndim == 3:
         if levels.shape[2] == 1:
             levels = levels[:, :, 0]
@@ -72,7 +73,7 @@ def grays_from(images: Iterable[ArrayLike]) -> list[NDArray[np.uint8]]:
     return [gray if kept else gray.copy() for gray in grays]
 
 
-def bgr_from(image: ArrayLike, name: str = "image") -> NDArray[np.uint8]:
+def bgr_from(image: ArrayLike, name: str = "image", *, bits: int | None = None) -> NDArray[np.uint8]:
     """A C-contiguous (H, W, 3) uint8 array in BGR order from a colour image of any usual kind; never altered.
 
     As `gray_from`; grey images are refused too.
@@ -84,7 +85,7 @@ def bgr_from(image: ArrayLike, name: str = "image") -> NDArray[np.uint8]:
         raise InvalidInputError(f"{name}: cannot be made an array ({error}), expected {expected}") from error
     if array.ndim != 3 or array.shape[2] not in (3, 4) or array.size == 0:
         raise InvalidInputError(f"{name}: shape {array.shape}, expected {expected}")
-    return np.ascontiguousarray(_bytes_from(array[:, :, :3], name))
+    return np.ascontiguousarray(_bytes_from(array[:, :, :3], name, bits))
 
 
 def checked_mask(mask: ArrayLike, camera: _core.Camera) -> NDArray[np.bool_]:
@@ -101,11 +102,14 @@ def checked_mask(mask: ArrayLike, camera: _core.Camera) -> NDArray[np.bool_]:
     return array
 
 
-def _bytes_from(array: NDArray[Any], name: str) -> NDArray[np.uint8]:
+def _bytes_from(array: NDArray[Any], name: str, bits: int | None = None) -> NDArray[np.uint8]:
     if array.dtype == np.uint8:
         return array
     if array.dtype.kind == "u" and array.dtype.itemsize == 2:  # Of either byte order.
-        white = 2 ** _bits_of(int(array.max())) - 1
+        least = bits_of(array)
+        if bits is not None and least > bits:
+            raise InvalidInputError(f"{name}: a value of {array.max()}, expected at most {2**bits - 1} ({bits} bits)")
+        white = 2 ** (bits or least) - 1
         return np.asarray((array.astype(np.uint32) * 255 + white // 2) // white, dtype=np.uint8)
     if array.dtype == np.bool_:
         return array.astype(np.uint8) * np.uint8(255)
@@ -118,8 +122,9 @@ def _bytes_from(array: NDArray[Any], name: str) -> NDArray[np.uint8]:
     raise InvalidInputError(f"{name}: dtype {array.dtype}, expected {_EXPECTED}")
 
 
-def _bits_of(greatest: int) -> int:
-    """The depth of a sensor whose values stand in 16 bits, by the greatest of them."""
+def bits_of(array: NDArray[np.uint16]) -> int:
+    """The depth of a sensor whose values stand in 16 bits: the least of 10, 12, 14 and 16 that holds them all."""
+    greatest = int(array.max())
     return next(bits for bits in _DEPTHS if greatest < 2**bits)
 
 

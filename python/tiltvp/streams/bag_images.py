@@ -10,7 +10,7 @@ import numpy as np
 
 from tiltvp import _core
 from tiltvp.errors import ImageFileError, InvalidInputError, TiltvpError
-from tiltvp.images import bgr_from, decode_image, gray_from
+from tiltvp.images import bgr_from, bits_of, decode_image, gray_from
 from tiltvp.streams.bags import Message, Recording
 from tiltvp.streams.frames import Frame, Frames, median_rate_hz
 
@@ -29,8 +29,10 @@ _BAYER: Final = ("rggb", "bggr", "gbrg", "grbg")
 """Which colours the first two pixels of the first two rows have."""
 _YUV: Final = ("uyvy", "yuv422", "yuyv", "yuv422_yuy2")
 """Two values a pixel, of which two pixels share the colour; the first two names are of one order."""
+_PLANAR: Final = ("nv12", "nv21")
+"""Rows of grey levels, then half as many of the colours that four pixels share."""
 _EXPECTED: Final = (
-    f"mono8, mono16, rgb8, bgr8, rgba8, bgra8, the same with 16, bayer_rggb8 and the like, {', '.join(_YUV)}"
+    f"mono8, mono16, rgb8, bgr8, rgba8, bgra8, the same with 16, bayer_rggb8 and the like, {', '.join(_YUV + _PLANAR)}"
 )
 
 
@@ -65,7 +67,11 @@ class BagFrames(Frames):
         self._recording = recording
         self._topic = recording.choose(IMAGE_KINDS, option, topic)
         self.source, self.recording = str(recording.path), recording.path
-        times = [_stamp_s(message) for message in recording.messages(self._topic)]
+        times, self._bits = [], 0
+        for message in recording.messages(self._topic):
+            time_s, bits = _seen(message)
+            times.append(time_s)
+            self._bits = max(self._bits, bits)
         digits = len(str(max(len(times) - 1, 0)))
         self.names = [f"{recording.path}#{k:0{digits}d}" for k in range(len(times))]
         self.times_s = np.array(times)
@@ -93,67 +99,94 @@ class BagFrames(Frames):
         assert self.times_s is not None
         messages = self._recording.messages(self._topic)
         for name, time_s, message in zip(self.names, self.times_s.tolist(), messages, strict=False):
-            yield Frame(name, time_s, _reading(name, message))
+            yield Frame(name, time_s, _reading(name, message, self._bits or None))
 
 
-def _reading(name: str, message: Message) -> Callable[[], NDArray[np.uint8]]:
+def _reading(name: str, message: Message, bits: int | None) -> Callable[[], NDArray[np.uint8]]:
     def read() -> NDArray[np.uint8]:
         try:
-            return image_from_message(message.decode())
+            return image_from_message(message.decode(), bits=bits)
         except TiltvpError as error:
             raise ImageFileError(f"{name}: {error}") from error
 
     return read
 
 
-def _stamp_s(message: Message) -> float:
-    """The time of an image; that of its writing where the message is damaged."""
+def _seen(message: Message) -> tuple[float, int]:
+    """The time of an image, that of its writing where the message is damaged, and how many bits its values have.
+
+    The bits are 0 where the encoding tells them.
+    """
     try:
-        return message.stamp_s(message.decode())
+        content = message.decode()
+        time_s = message.stamp_s(content)
     except InvalidInputError:
-        return message.time_s
+        return message.time_s, 0
+    try:
+        deep = _is_deep(getattr(content, "encoding", ""))
+        return time_s, bits_of(np.atleast_3d(_levels(content))[:, :, :3]) if deep else 0
+    except ImageFileError:  # It is told where it is read.
+        return time_s, 0
 
 
-def image_from_message(message: Any) -> NDArray[np.uint8]:
+def _is_deep(encoding: str) -> bool:
+    """Whether values have 16 bits, of which sensors may use fewer."""
+    bayer = encoding.removeprefix("bayer_")
+    return encoding in _DEPTH_16 or (bayer[:-2] in _BAYER and bayer.endswith("16"))
+
+
+def image_from_message(message: Any, *, bits: int | None = None) -> NDArray[np.uint8]:
     """(H, W) or (H, W, 3) uint8, colour in BGR order, of a sensor_msgs/Image or CompressedImage.
 
-    The message is one of a recording, of rclpy or of rospy; the image has memory of its own. 16 bits a value are scaled
-    as files of 16 bits are. Raises `ImageFileError` that says what does not fit.
+    The message is one of a recording, of rclpy or of rospy; the image has memory of its own. Of encodings with 16 bits
+    a value `bits` is how many the sensor has: without it images are scaled one by one, as files of 16 bits are. Raises
+    `ImageFileError` that says what does not fit, `InvalidInputError` for values of more than `bits`.
     """
     if not hasattr(message, "data"):
         raise ImageFileError(f"a {type(message).__name__}, expected a message of {' or '.join(IMAGE_KINDS)}")
+    if not hasattr(message, "encoding"):
+        return decode_image(_data(message).tobytes(), "an image")
+    return _bgr(_levels(message), str(message.encoding), bits)
+
+
+def _data(message: Any) -> NDArray[np.uint8]:
     # Those of rospy are bytes.
     raw = message.data
-    data = np.frombuffer(raw, np.uint8) if isinstance(raw, bytes) else np.asarray(raw, dtype=np.uint8)
-    if not hasattr(message, "encoding"):
-        return decode_image(data.tobytes(), "an image")
+    return np.frombuffer(raw, np.uint8) if isinstance(raw, bytes) else np.asarray(raw, dtype=np.uint8)
+
+
+def _levels(message: Any) -> NDArray[Any]:
+    """The values of a sensor_msgs/Image, as its encoding has them: (rows, width) or (rows, width, channels)."""
+    data = _data(message)
     width, height, encoding = int(message.width), int(message.height), str(message.encoding)
     if not 0 < width * height <= _core.MOST_PIXELS:
         raise ImageFileError(f"{width} x {height} pixels, expected 1 to {_core.MOST_PIXELS} in all")
-    bayer = encoding.removeprefix("bayer_")
-    sixteen = encoding in _DEPTH_16 or (bayer[:-2] in _BAYER and bayer.endswith("16"))
+    bayer, sixteen = encoding.removeprefix("bayer_"), _is_deep(encoding)
     channels = _DEPTH_8.get(encoding) or _DEPTH_16.get(encoding) or (2 if encoding in _YUV else None)
-    if channels is None and bayer.rstrip("168") in _BAYER and bayer != encoding:
+    if encoding in _PLANAR or (bayer.rstrip("168") in _BAYER and bayer != encoding):
         channels = 1
     if channels is None:
         raise ImageFileError(f"encoding {encoding!r}, expected {_EXPECTED}")
     if encoding in _YUV and width % 2:
         raise ImageFileError(f"{width} x {height} {encoding}, expected an even width: two pixels share a colour")
+    if encoding in _PLANAR and (width % 2 or height % 2):
+        raise ImageFileError(f"{width} x {height} {encoding}, expected even numbers: four pixels share a colour")
+    rows = height + (height // 2 if encoding in _PLANAR else 0)
     row = width * channels * (2 if sixteen else 1)
     step = int(message.step) or row
-    if step < row or len(data) < step * (height - 1) + row:
+    if step < row or len(data) < step * (rows - 1) + row:
         raise ImageFileError(
-            f"{len(data)} bytes in rows of {step}, expected {height} rows of {row} ({width} x {height} {encoding})"
+            f"{len(data)} bytes in rows of {step}, expected {rows} rows of {row} ({width} x {height} {encoding})"
         )
-    whole = np.zeros(step * height, np.uint8)
-    whole[: min(len(data), step * height)] = data[: step * height]
-    levels: NDArray[Any] = np.ascontiguousarray(whole.reshape(height, step)[:, :row])
+    whole = np.zeros(step * rows, np.uint8)
+    whole[: min(len(data), step * rows)] = data[: step * rows]
+    levels: NDArray[Any] = np.ascontiguousarray(whole.reshape(rows, step)[:, :row])
     if sixteen:
         levels = levels.view(">u2" if message.is_bigendian else "<u2").astype(np.uint16)
-    return _bgr(levels.reshape((height, width, channels) if channels > 1 else (height, width)), encoding)
+    return levels.reshape((rows, width, channels) if channels > 1 else (rows, width))
 
 
-def _bgr(levels: NDArray[Any], encoding: str) -> NDArray[np.uint8]:
+def _bgr(levels: NDArray[Any], encoding: str, bits: int | None) -> NDArray[np.uint8]:
     import cv2
 
     if encoding.startswith("bayer_"):
@@ -166,8 +199,11 @@ def _bgr(levels: NDArray[Any], encoding: str) -> NDArray[np.uint8]:
     elif encoding in _YUV:
         code = cv2.COLOR_YUV2BGR_UYVY if encoding in _YUV[:2] else cv2.COLOR_YUV2BGR_YUY2
         levels = np.asarray(cv2.cvtColor(levels, code))
+    elif encoding in _PLANAR:
+        code = cv2.COLOR_YUV2BGR_NV12 if encoding == "nv12" else cv2.COLOR_YUV2BGR_NV21
+        levels = np.asarray(cv2.cvtColor(levels, code))
     elif encoding.startswith("rgb"):
         levels = levels[:, :, 2::-1]
     elif levels.ndim == 3:
         levels = levels[:, :, :3]
-    return gray_from(levels) if levels.ndim == 2 else bgr_from(levels)
+    return gray_from(levels, bits=bits) if levels.ndim == 2 else bgr_from(levels, bits=bits)
