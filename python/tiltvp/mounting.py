@@ -112,6 +112,7 @@ def mounting_tilt(
     robot_from_camera: ArrayLike,
     *,
     level_floor: bool = False,
+    half_track_m: float | None = None,
 ) -> MountingTilt:
     """Roll and pitch of a mounting from the tilts of a drive's images and what the robot did between them.
 
@@ -119,14 +120,18 @@ def mounting_tilt(
     of method "segments"; None where there is no image. `motions` say of each how far the robot had turned and driven
     since the one before. A floor that is plane but not level turns with the robot, the mounting does not: a
     `TiltFilter` with `estimate_mounting` tells them apart where the robot turns. `level_floor` says that the floor is
-    level to 0.05 degrees, so that no turn is needed. Raises `InvalidInputError` for as many motions as there are not
-    images, and for a matrix that is no rotation.
+    level to 0.05 degrees, so that no turn is needed. `half_track_m` is half of the distance between the wheels, by
+    default that of `TiltFilter`: of a robot that is wider the floor changes more in a turn. Raises `InvalidInputError`
+    for as many motions as there are not images, and for a matrix that is no rotation.
     """
     rotation = mounting_from(robot_from_camera)
     given = list(estimates)
     if len(given) != len(motions):
         raise InvalidInputError(f"motions: {len(motions)}, expected {len(given)}, one for each image")
-    whole = _filtered(given, motions, level_floor=level_floor)
+    told = dict(_LEVEL) if level_floor else {}
+    if half_track_m is not None:
+        told["half_track_m"] = half_track_m
+    whole = _filtered(given, motions, told)
     lean, used = whole.lean, len(whole.covariances)
     headings = np.cumsum([0.0, *(motion.yaw_rad for motion in motions[1:])])
     turned = min(float(np.ptp(headings)), math.tau)
@@ -140,7 +145,7 @@ def mounting_tilt(
         alike = max(0.0, 1.0 - turned / math.pi)
         share = alike * max(1.0, excess) + (1.0 - alike) * _SHARED**2 * max(_AGREEMENT_MAX**2, excess)
         shared = share * np.median(whole.covariances, axis=0)
-        scatter = _scatter(given, motions, lean, level_floor=level_floor) if used >= 2 * _PARTS else None
+        scatter = _scatter(given, motions, lean, told) if used >= 2 * _PARTS else None
         stated = (1.0 if scatter is None else alike) * max(1.0, excess) * covariance
         covariance = shared + _beyond(stated, shared) + (0.0 if scatter is None else scatter)
     return MountingTilt(
@@ -160,10 +165,9 @@ class _Filtered:
     """Normalised innovations squared."""
 
 
-def _filtered(estimates: Sequence[TiltEstimate | None], motions: Sequence[Motion], *, level_floor: bool) -> _Filtered:
+def _filtered(estimates: Sequence[TiltEstimate | None], motions: Sequence[Motion], told: dict[str, Any]) -> _Filtered:
     held = TiltFilter(
-        estimate_mounting=True, mounting_prior_rad=_PRIOR_RAD, mounting_walk_rad_per_sqrt_m=0.0,
-        **(_LEVEL if level_floor else {}),
+        estimate_mounting=True, mounting_prior_rad=_PRIOR_RAD, mounting_walk_rad_per_sqrt_m=0.0, **told
     )  # fmt: skip
     covariances, surprises = [], []
     for estimate, motion in zip(estimates, motions, strict=True):
@@ -181,7 +185,7 @@ def _filtered(estimates: Sequence[TiltEstimate | None], motions: Sequence[Motion
 
 
 def _scatter(
-    estimates: Sequence[TiltEstimate | None], motions: Sequence[Motion], lean: FilteredTilt, *, level_floor: bool
+    estimates: Sequence[TiltEstimate | None], motions: Sequence[Motion], lean: FilteredTilt, told: dict[str, Any]
 ) -> NDArray[np.float64] | None:
     """(2, 2): the covariance by how far the mounting moves when each part of the drive is left out in turn.
 
@@ -194,7 +198,7 @@ def _scatter(
     moves = []
     for part in range(_PARTS):
         rest = [None if own == part else estimate for own, estimate in zip(parts, estimates, strict=True)]
-        other = _filtered(rest, motions, level_floor=level_floor).lean
+        other = _filtered(rest, motions, told).lean
         if not other:
             return None
         moves.append(np.asarray(other.normal)[:2] - np.asarray(lean.normal)[:2])

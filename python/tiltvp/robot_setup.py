@@ -160,13 +160,16 @@ def find_setup(
     turns = None if axis is None else axis.check(direction.given)
     estimator = TiltEstimator(camera, **TILT_OPTIONS, robot_from_camera=rotation, mask=mask)
     tilts = drive_tilts(frames, estimator, motions, advance=advance)
-    mounting = mounting_tilt(tilts.estimates, tilts.motions, rotation, level_floor=level_floor)
+    wheels = wheels or Wheels()
+    mounting = mounting_tilt(
+        tilts.estimates, tilts.motions, rotation, level_floor=level_floor, half_track_m=wheels.half_track_m
+    )
     robot = Robot(
         camera,
         mounting.robot_from_camera,
         covariance_rad2=mounting.covariance_rad2 if mounting else None,
         mask=mask,
-        wheels=wheels or Wheels(),
+        wheels=wheels,
         topics=topics or {},
     )
     return RobotSetup(robot, rotation, direction, rim is not None, body, turns, mounting)

@@ -130,7 +130,10 @@ class PictureLog:
         rotation = estimator.robot_from_camera
         with progress_bar(measured_count(self.frames), f"{self.name}: leans") as bar:
             tilts = drive_tilts(self.frames, estimator, self.moved.motions, advance=bar.advance)
-        return mounting_tilt(tilts.estimates, tilts.motions, rotation, level_floor=self.pictures.level_floor)
+        return mounting_tilt(
+            tilts.estimates, tilts.motions, rotation,
+            level_floor=self.pictures.level_floor, half_track_m=self.wheels.half_track_m,
+        )  # fmt: skip
 
     def solved(self, robot_from_camera: NDArray[np.float64] | None, solve: Solve) -> Solved:
         """The bearings of lines in the frame of the mounting (3, 3), or of that which was given, and what they say.

@@ -12,7 +12,7 @@ from cyclopts import Parameter, validators
 
 from tiltvp.cli.options import CameraOptions, MountedOptions, Switch
 from tiltvp.cli.results import degrees
-from tiltvp.cli.sources import MotionOptions, SourceOptions
+from tiltvp.cli.sources import MotionOptions, SourceOptions, wheel_base_of
 from tiltvp.cli.tables import finite
 from tiltvp.cli.terminal import progress_bar, say
 from tiltvp.errors import InvalidInputError
@@ -51,7 +51,7 @@ def mount(
     images
         Images, a video or a recording of a drive with turns.
     wheel_base
-        Distance between the wheels, metres, for odometry of wheels.
+        Distance between the wheels, metres: for odometry of wheels, and how much the floor may change in a turn.
     level_floor
         The floor is level within 0.05 degrees: no turn is needed.
     within_deg
@@ -74,7 +74,11 @@ def mount(
     motions = moved.motions if moved is not None and moved.turns_known else None
     with progress_bar(measured_count(frames), "images") as bar:
         tilts = drive_tilts(frames, estimator, motions, advance=bar.advance)
-    found = mounting_tilt(tilts.estimates, tilts.motions, estimator.robot_from_camera, level_floor=level_floor)
+    wheels = motion.wheels(wheel_base_of(robot, wheel_base))
+    found = mounting_tilt(
+        tilts.estimates, tilts.motions, estimator.robot_from_camera,
+        level_floor=level_floor, half_track_m=wheels.half_track_m,
+    )  # fmt: skip
     verdict = None if within_deg is None else found.within(math.radians(within_deg))
     if out is not None:
         result = mounting_result(found) | {"tolerance_deg": within_deg, "within_tolerance": verdict}

@@ -46,6 +46,11 @@ class Wheels:
         if self.joints is not None and (isinstance(self.joints, str) or len(self.joints) != 2):
             raise InvalidInputError(f"joints = {self.joints!r}, expected names of two, the left and the right wheel's")
 
+    @property
+    def half_track_m(self) -> float | None:
+        """Half the distance between the wheels, metres, as `TiltFilter` takes it."""
+        return None if self.wheel_base_m is None else 0.5 * self.wheel_base_m
+
 
 def cumulative_m(
     counts: NDArray[np.float64], per_turn: float, wheel_radius_m: float, source: str
