@@ -23,6 +23,7 @@ from tiltvp.lab.plots.report.errors import errors_by_environment
 from tiltvp.lab.report.choice import choose_examples
 from tiltvp.lab.report.contents import OtherRun, contents_of, scaling_of
 from tiltvp.lab.report.files import PAGE, write_report
+from tiltvp.lab.report.sheets import other_sheet
 
 DPI = 72.0
 PICTURES = {f"figure-{number}" for number in (10, 11, 12, 13, 14, 17, 18, 27)}
@@ -73,6 +74,12 @@ def test_tables_are_in_the_order_of_the_paper(report: Path) -> None:
     order = ["image-space-ransac", "image-space-reject-refit", "vector-consensus", "refined"]
     assert methods == [method for method in order if method in methods]
     assert tuple(variant.name for variant in VARIANTS) == style.KNOWN
+
+
+def test_a_method_without_a_name_for_people_is_in_the_table(run: Path) -> None:
+    """As a new one, or that of another version: its rows were left out."""
+    summary = errors(read_run(run).table).with_columns(pl.col("method").replace("refined", "another"))
+    assert "another" in other_sheet(summary).cells["method"].to_list()
 
 
 def test_same_run_gives_the_same_bytes(run: Path, report: Path, tmp_path: Path) -> None:

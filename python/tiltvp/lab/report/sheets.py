@@ -46,7 +46,8 @@ def other_sheet(summary: pl.DataFrame) -> Sheet:
     chosen = table_3(summary)
     best = best_of(summary).select("combination", "correction")
     others = chosen.join(best, on=["combination", "correction"], how="anti", maintain_order="left")
-    parts = [others.filter(pl.col("method") == method) for method in _METHODS]
+    methods = dict.fromkeys([*_METHODS, *others["method"]])
+    parts = [others.filter(pl.col("method") == method) for method in methods]
     paper = [name for name in others.columns if name.startswith("paper_")]
     return _errors(
         pl.concat(parts).drop(paper), "table-3-others", "Table 3, continued",
@@ -132,11 +133,11 @@ def q_sheet(summary: pl.DataFrame) -> Sheet:
 
 
 def _names(row: dict[str, Any]) -> dict[str, str]:
-    method, variant = _METHODS[row["method"]]
+    method, variant = _METHODS.get(row["method"], (row["method"], ""))
     return {
         "method": method,
         "variant": variant,
-        "correction": _CORRECTIONS[row["correction"]],
+        "correction": _CORRECTIONS.get(row["correction"], row["correction"]),
         "parameters": row["label"].partition(", ")[2] or "defaults",
     }
 
