@@ -110,6 +110,35 @@ def test_wheels_that_run_evenly_are_not_doubted(resolution_m: float, rate_hz: fl
     assert doubled_rows(np.tile([0.01, 0.02], (100, 1))) == doubled_rows(np.zeros((0, 2))) == ""
 
 
+def test_motions_that_repeat_one_of_their_time_are_doubted() -> None:
+    """Of coarse counters many motions are equal; those of one time as well were driven once."""
+    rng = np.random.default_rng(5)
+    rows = 2e-3 * rng.integers(4, 8, (300, 2))
+    times_s = np.cumsum(rng.uniform(0.09, 0.11, 300))
+    again = np.sort(np.concatenate([np.arange(300), rng.choice(300, 8, replace=False)]))
+    assert doubled_rows(rows[again]) == doubled_rows(rows, times_s) == ""
+    assert doubled_rows(rows[again], times_s[again]).startswith("8 of 308 motions repeat the one before and its time")
+    # A clock of whole seconds, a robot that stands, and one that drives evenly tell nothing.
+    assert doubled_rows(rows[again], np.floor(times_s[again])) == ""
+    assert doubled_rows(np.zeros((10, 2)), np.zeros(10)) == ""
+    assert doubled_rows(np.full((300, 2), 0.01), np.floor(times_s)) == ""
+
+
+@pytest.mark.slow
+def test_the_command_knows_motions_of_one_time(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    drive, rng = one(UNDISTURBED, seed=5), np.random.default_rng(6)
+    ticks = 2e-3 * np.diff(np.rint(np.cumsum(drive.odometry, axis=0) / 2e-3), axis=0, prepend=0.0)
+    times = np.where(rng.random(len(ticks)) < 0.06, 2, 1)
+    steps = np.cumsum(times)[drive.bearings[:, 0].astype(int)] - 1.0
+    bearings = np.column_stack([steps, drive.bearings[:, 1:]])
+    words = write(tmp_path, replace(drive, odometry=np.repeat(ticks, times, axis=0), bearings=bearings))
+    table = tmp_path / "odometry.csv"
+    taken = ["time_s", *(str(0.1 * step) for step in np.repeat(np.arange(len(ticks)), times).tolist())]
+    table.write_text("\n".join(",".join(cells) for cells in zip(table.read_text().split(), taken, strict=True)))
+    assert main(words) == 1
+    assert "motions repeat the one before and its time" in capsys.readouterr().out
+
+
 @pytest.mark.slow
 def test_every_answer_counts_what_is_contradicted() -> None:
     drive = simulate_drive("alternating", seed=3)

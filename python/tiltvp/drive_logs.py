@@ -31,6 +31,9 @@ _BEYOND: Final = 5.0
 _COARSE: Final = 10.0
 """Finest steps of a counter by which rows change at least, in the median: slower changes take two rows for a step."""
 
+_CHANCE: Final = 1e-3
+"""Probability that all motions of equal times are equal although each was driven, where a clock is coarse."""
+
 
 @dataclass(frozen=True, eq=False)
 class DriveLog:
@@ -121,8 +124,13 @@ def read_drive_log(odometry: str | os.PathLike[str], bearings: str | os.PathLike
     )
 
 
-def doubled_rows(rows: NDArray[np.float64]) -> str:
-    """A sentence about motions (N, D) that repeat the one before more often than chance has it; empty: none."""
+def doubled_rows(rows: NDArray[np.float64], times_s: NDArray[np.float64] | None = None) -> str:
+    """A sentence about motions (N, D) that repeat the one before more often than chance has it; empty: none.
+
+    With times (N,) also where they have the one before's time, as coarse counters do not tell otherwise.
+    """
+    if times_s is not None and (count := _doubled_at_once(rows, times_s)):
+        return f"{count} of {len(rows)} motions repeat the one before and its time: were messages written down twice?"
     changes = np.abs(np.diff(rows, axis=0)).ravel()
     changes = changes[changes > 0.0]
     if not len(changes) or np.median(changes) < _COARSE * changes.min():
@@ -135,6 +143,15 @@ def doubled_rows(rows: NDArray[np.float64]) -> str:
     if count <= chance + _BEYOND * math.sqrt(chance):
         return ""
     return f"{count} of {len(rows)} motions repeat the one before to the last digit: were messages written down twice?"
+
+
+def _doubled_at_once(rows: NDArray[np.float64], times_s: NDArray[np.float64]) -> int:
+    """How many motions repeat one of their own time; 0 where others of equal times differ, as of a coarse clock."""
+    moved, equal, at_once = rows[1:].any(axis=1), (rows[1:] == rows[:-1]).all(axis=1), np.diff(times_s) == 0.0
+    often, rest = moved & at_once, moved & ~at_once
+    chance = (int((equal & rest).sum()) + 1) / (int(rest.sum()) + 1)
+    count = int(often.sum())
+    return count if count and equal[often].all() and chance**count < _CHANCE else 0
 
 
 def _table(path: str | os.PathLike[str], names: tuple[str, ...], optional: str = "") -> tuple[CsvFile, dict[str, int]]:

@@ -140,7 +140,7 @@ class Tables:
 
         assert self.read is not None  # As `checked` has it.
         with status(f"{self.name}: the whole log, {len(self.read.bearings)} bearings"):
-            return Solved(self.read, solve(self.read), doubled_rows(self.read.odometry))
+            return Solved(self.read, solve(self.read), doubled_rows(self.read.odometry, self.read.times_s))
 
 
 def sources_from(words: Sequence[str]) -> list[Tables | str]:
