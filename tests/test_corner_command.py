@@ -11,7 +11,7 @@ import pytest
 
 import tiltvp
 from commands import Run
-from drawn_corners import CAMERA, COLOURS, GREYS, LEFT_FROM_RIGHT, pair, pose
+from drawn_corners import CAMERA, COLOURS, GREYS, LEFT_FROM_RIGHT, pair, pose, turn
 from recordings import START_S, Bag
 from tiltvp.cli import main
 from tiltvp.cli.corner_pairs import pairs_of, partners_of
@@ -72,6 +72,12 @@ def test_the_command_line_chooses_the_method(tmp_path: Path, capsys: pytest.Capt
     assert "looked for the coloured cuboid, else corners of straight edges" in said
     assert "try: " in said
     assert "--method general" in run("greys", "--method", "coloured")
+    # Edges near that direction are looked at alone, however rough it is said to be.
+    rough = [str(x) for x in turn("x", 25.0) @ pose()[0][:, 1]]
+    said = run("greys", "--down", *rough, "--down-sigma-deg", "30")
+    assert "try: " in said
+    assert "a larger --vertical-max-deg where --pitch or --down is off by more" in said
+    assert "1 with a pose" in run("greys", "--down", *rough, "--vertical-max-deg", "40")
 
 
 def test_a_trajectory_without_any_place_says_why_and_what_to_try(

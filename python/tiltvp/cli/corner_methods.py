@@ -126,6 +126,8 @@ def advice(reason: str, methods: tuple[str, ...], *, is_pair: bool, given: Mappi
             tries = "--faces for a cuboid of other colours, a smaller --gradient-min for faint edges"
         else:
             tries = "--method general where there is no cuboid with faces in red, green and blue, --faces for its order"
+        if "general" in methods and given.get("down") is not None:
+            tries += ", a larger --vertical-max-deg where --pitch or --down is off by more"
         return tries + (", that left and right are not exchanged" if is_pair and "right" in reason else "")
     if reason.startswith("several"):
         helps = [] if given.get("down") is not None else ["--pitch or --down, roughly"]
