@@ -146,27 +146,6 @@ def test_every_encoding(kind: str, tmp_path: Path) -> None:
     assert np.array_equal(found[-1], COLOURS[:, :, 1])
 
 
-@pytest.mark.parametrize("encoding", ["mono16", "bgra16", "bayer_rggb16"])
-def test_images_of_one_sensor_are_scaled_alike(encoding: str, tmp_path: Path) -> None:
-    """A dark image of 12 bits was made four times as bright as those beside it that had a bright spot."""
-    made = Bag("mcap")
-    shape = (6, 8, 4) if encoding == "bgra16" else (6, 8)
-    for k, bright in enumerate((800, 4000, 800)):
-        pixels = np.full(shape, 800, np.uint16)
-        pixels[0, 0] = bright
-        if pixels.ndim == 3:
-            pixels[:, :, 3] = 65535
-        made.image("/image", START_S + k, pixels, encoding)
-    frames = list(open_frames(made.write(tmp_path)))
-    assert [frame.read()[5, 7].max() for frame in frames] == [50, 50, 50]
-    dark = SimpleNamespace(
-        width=8, height=6, encoding="16UC1", step=16, is_bigendian=0, data=np.full((6, 8), 800, "<u2").tobytes()
-    )
-    assert (image_from_message(dark).max(), image_from_message(dark, bits=12).max()) == (199, 50)
-    with pytest.raises(InvalidInputError, match=r"a value of 800, expected at most 255 \(8 bits\)"):
-        image_from_message(dark, bits=8)
-
-
 @pytest.mark.parametrize("pattern", ["rggb", "bggr", "gbrg", "grbg"])
 def test_bayer_patterns_give_the_colours_of_the_scene(pattern: str) -> None:
     colour = dict(zip("bgr", (40, 120, 200), strict=True))
