@@ -10,7 +10,8 @@ import numpy as np
 import polars as pl
 import pytest
 
-from drawn_corners import CAMERA, GREYS, LEFT_FROM_RIGHT, drawn, pair, pose, turn
+import tiltvp
+from drawn_corners import CAMERA, GREYS, LEFT_FROM_RIGHT, drawn, off_deg, pair, pose, turn
 from recordings import START_S, Bag
 from tiltvp import Robot
 from tiltvp.cli import main
@@ -141,7 +142,9 @@ def test_what_is_no_knowledge_of_a_frame_is_refused(known: dict[str, Any], words
 def test_accelerations_in_other_units_are_told() -> None:
     times = np.arange(0.0, 1.0, 0.01)
     sensor = Inertial(InertialSamples(times, np.zeros((100, 3)), np.tile([0.0, -1.0, 0.0], (100, 1))), np.eye(3))
-    assert sensor.known(0.5)["gravity"] is None
+    known = sensor.known(0.5)
+    assert known["gravity"] is None
+    sensor.took(0.5, known)
     assert "down of 0 of 1 frames; its accelerations have 1 m/s^2 in the median, expected 9.81" in sensor.summary()
 
 
@@ -234,6 +237,28 @@ def test_the_command_takes_readings(
     assert "0.png: tells no time, expected --frame-rate with --imu" in capsys.readouterr().err
     assert main([*asked, "--imu-topic", "/imu"]) != 0
     assert "--imu-topic without --imu" in capsys.readouterr().err
+
+
+@pytest.mark.slow
+def test_the_turn_over_a_frame_that_is_refused_is_kept(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Of a camera that rolls by 30 degrees from frame to frame only the turn since the one before last tells which edge
+    is upright."""
+    CAMERA.save(tmp_path / "camera.toml")
+    for frame in range(3):
+        image = drawn(*pose(roll=4.0 + 30.0 * frame), GREYS)
+        tiltvp.write_image(tmp_path / "left" / f"{frame}.png", image if frame != 1 else image[:50, :50])
+    times_s = np.arange(0.0, 2.01, 0.01)
+    rows = np.column_stack([times_s, np.zeros((len(times_s), 2)), np.full(len(times_s), -np.radians(30.0))])
+    header = "time_s,rate_x_radps,rate_y_radps,rate_z_radps"
+    np.savetxt(tmp_path / "imu.csv", rows, delimiter=",", header=header, comments="")
+    words = ["corner", str(tmp_path / "left"), "--calibration", str(tmp_path / "camera.toml"), "--method", "general"]
+    words += ["--pitch", "-28", "--frame-rate", "1", "--imu", str(tmp_path / "imu.csv")]
+    assert main([*words, "--out", str(tmp_path / "poses.json")]) == 1
+    assert "turns of 1, down of 0 of 2 frames" in capsys.readouterr().out
+    turns = pl.read_json(tmp_path / "poses.json").select("qx", "qy", "qz", "qw").rows()
+    for one, roll in zip(turns, (4.0, 64.0), strict=True):
+        found = rotation_from_quaternion(np.array(one), "pose").T
+        assert off_deg(found, pose(roll=roll)[0]) < 1.0
 
 
 @pytest.fixture(scope="module", params=["ros1", "mcap"])

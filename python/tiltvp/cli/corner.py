@@ -208,8 +208,12 @@ class Look:
     def _estimate(self, images: Sequence[NDArray[np.uint8]], time_s: float) -> CornerEstimate:
         if self.independent:
             self.estimator.reset()
-        known = {} if self.sensor is None else self.sensor.known(time_s)
-        return self.estimator(*images, **known)
+        if self.sensor is None:
+            return self.estimator(*images)
+        known = self.sensor.known(time_s)
+        estimate = self.estimator(*images, **known)
+        self.sensor.took(time_s, known)
+        return estimate
 
     def _draw(self, name: str, number: int, time_s: float, image: NDArray[np.uint8], estimate: CornerEstimate) -> None:
         from tiltvp.images import write_image

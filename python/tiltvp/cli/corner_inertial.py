@@ -87,7 +87,7 @@ def _recorded_turn(recording: Recording, samples: InertialSamples, topic: str | 
 
 @dataclass
 class Inertial:
-    """A sensor, and the time of the frame before."""
+    """A sensor, and the time of the frame before that was not refused."""
 
     samples: InertialSamples
     camera_from_sensor: NDArray[np.float64]
@@ -99,13 +99,15 @@ class Inertial:
 
     def known(self, now_s: float) -> dict[str, Any]:
         """The keywords of the estimator for the frame of a time."""
-        known = self.samples.known(self.before_s, now_s, self.camera_from_sensor)
+        return self.samples.known(self.before_s, now_s, self.camera_from_sensor)
+
+    def took(self, now_s: float, known: dict[str, Any]) -> None:
+        """The estimator has taken this frame: the next one's turn is since it."""
         self.before_s = now_s
         self.first_s = now_s if self.first_s is None else self.first_s
         self.told["frames"] += 1
         for name, value in known.items():
             self.told[name] += value is not None
-        return known
 
     def summary(self) -> str:
         """In how many frames it told something, what of it is missing, and where its times are if in no frame."""
