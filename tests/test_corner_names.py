@@ -90,9 +90,14 @@ def test_what_a_believed_corner_tells() -> None:
 
 def test_corners_without_a_place_have_no_name() -> None:
     rotation, vertex = pose()
-    [one] = CornerPoseEstimator(CAMERA, method="general", down=rotation[:, 1], right_handed=True).poses(
+    estimate = CornerPoseEstimator(CAMERA, method="general", down=rotation[:, 1], right_handed=True)(
         drawn(rotation, vertex, GREYS)
     )
+    [one] = estimate.corners
+    # What is not known of a place has no variance of 0 in tables.
+    [row] = corner_rows([(0.0, "a.png", estimate)])
+    assert row["cov_rz_rz"] == one.pose.covariance[2, 2] > 0.0
+    assert [row["cov_rx_x"], row["cov_rz_z"], row["cov_x_x"], row["cov_z_z"]] == [None] * 4
     assert one.id is None
     assert one.pose.vertex_m is None
     assert np.isnan(one.edge_angles_rad).all()

@@ -93,9 +93,10 @@ def corner_rows(estimates: Sequence[tuple[float, str, CornerEstimate]]) -> list[
     """One row for each hypothesis of each corner that is believed in each frame, that of the pose first.
 
     `hypothesis` counts from 0, the likeliest. qx..qw are `object_from_camera`, the vertex is in the left camera's
-    frame, cov_rx_rx..cov_z_z are the upper triangle of its `covariance`. Lengths and angles of edges are of the corner,
-    not of the hypothesis. `box` is the number of its cuboid in the frame, from 1 (`join_boxes`), with its sizes along
-    the edges of the first corner of it. None where something is not told.
+    frame, cov_rx_rx..cov_z_z are the upper triangle of its `covariance`, without a place that of the attitude alone.
+    Lengths and angles of edges are of the corner, not of the hypothesis. `box` is the number of its cuboid in the
+    frame, from 1 (`join_boxes`), with its sizes along the edges of the first corner of it. None where something is not
+    told.
     """
     rows = []
     upper = np.triu_indices(6)
@@ -117,9 +118,13 @@ def corner_rows(estimates: Sequence[tuple[float, str, CornerEstimate]]) -> list[
                 row |= {"time_s": time_s, "file": file, "id": corner.id, "hypothesis": number}
                 row |= {"probability": pose.probability, "right_handed": pose.right_handed, "misfit": pose.misfit}
                 row |= dict(zip(_QUATERNION, quaternion(pose.camera_from_object.T).tolist(), strict=True))
-                if pose.vertex_m is not None:
+                covariance = np.full((6, 6), None, dtype=object)
+                if pose.vertex_m is None:
+                    covariance[:3, :3] = pose.covariance[:3, :3]
+                else:
+                    covariance[:] = pose.covariance
                     row |= dict(zip(_VERTEX, pose.vertex_m.tolist(), strict=True))
-                rows.append(row | edges | dict(zip(_COVARIANCE, pose.covariance[upper].tolist(), strict=True)))
+                rows.append(row | edges | dict(zip(_COVARIANCE, covariance[upper].tolist(), strict=True)))
     return rows
 
 
