@@ -156,6 +156,7 @@ def test_the_file_that_is_wrong_is_named(tmp_path: Path, capsys: pytest.CaptureF
         (["--known-edge", "x"], "--known-edge without --edge-length-m, expected both"),
         (["--known-edge", "y", "--box-size-m", "1", "1", "1"], "--known-edge without --edge-length-m"),
         (["--trajectory", "t.txt"], "--camera-height-m"),
+        (["--frame-rate", "inf"], '"inf" for --frame-rate'),
     ],
 )
 def test_impossible_combinations_are_refused_at_once(

@@ -3,13 +3,14 @@
 # Annotations are evaluated: other files inherit these options, and there cyclopts would not find the names of types.
 
 import difflib
+import math
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Self, TypeVar
 
-from cyclopts import Group, Parameter
+from cyclopts import Group, Parameter, validators
 
 from tiltvp._core import METHODS
 from tiltvp.cli.declared_options import LibraryOptions, from_library, mask_from
@@ -26,6 +27,7 @@ _CAMERA = Group("Camera")
 _METHOD = Group("Method", help="An option that is not given has the default of its method.")
 M = TypeVar("M", bound=LibraryOptions)
 Switch = Annotated[bool, Parameter(negative="", show_default=False)]
+FrameRate = Annotated[float | None, Parameter(validator=validators.Number(gt=0, lt=math.inf))]
 
 
 _PANORAMA = "equirectangular:"

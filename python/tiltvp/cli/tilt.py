@@ -16,7 +16,7 @@ from cyclopts import Parameter, validators
 from tiltvp.cli.answers import check_answers, write_answers
 from tiltvp.cli.cluster import check_cluster, files_of, is_begun
 from tiltvp.cli.filtering import FilterOptions
-from tiltvp.cli.options import CameraOptions, MethodOptions
+from tiltvp.cli.options import CameraOptions, FrameRate, MethodOptions
 from tiltvp.cli.results import Outcome, mounting_words, outcome_table, people_table, summary_words
 from tiltvp.cli.showing import ShowOptions
 from tiltvp.cli.sources import (
@@ -65,7 +65,7 @@ def tilt(
     out: Out | None = None,
     overlay: Path | None = None,
     level: Path | None = None,
-    frame_rate: Annotated[float | None, Parameter(validator=validators.Number(gt=0))] = None,
+    frame_rate: FrameRate = None,
     threads: Annotated[int, Parameter(validator=validators.Number(gte=1))] = 1,
     showing: ShowOptions = _SHOWING,
     cluster: str | None = None,

@@ -13,7 +13,7 @@ from cyclopts import Group, Parameter, validators
 from tiltvp.cli.declared_options import LibraryOptions, from_library
 from tiltvp.cli.line_options import LineOptions
 from tiltvp.cli.lines import LINE_TYPES, line_columns
-from tiltvp.cli.options import CameraOptions
+from tiltvp.cli.options import CameraOptions, FrameRate
 from tiltvp.cli.rerun_views import send_lines
 from tiltvp.cli.showing import RerunOptions
 from tiltvp.cli.sources import MotionOptions, SourceOptions, check_apart, ending_at_interrupt
@@ -60,7 +60,7 @@ def track(
     wheel_base: Annotated[float | None, Parameter(validator=validators.Number(gt=0))] = None,
     plot: Path | None = None,
     video: Path | None = None,
-    frame_rate: Annotated[float | None, Parameter(validator=validators.Number(gt=0))] = None,
+    frame_rate: FrameRate = None,
     tracking: TrackerOptions = _TRACKER,
     watching: RerunOptions = _WATCHING,
 ) -> int:
