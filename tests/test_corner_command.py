@@ -97,6 +97,21 @@ def test_a_trajectory_without_any_place_says_why_and_what_to_try(
     assert [file.exists() for file in files.values()] == [True, True, False]
 
 
+def test_a_trajectory_before_several_corners_says_so(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """With --independent corners without colours have new names in each frame, the coloured one keeps its."""
+    StereoRig(CAMERA, CAMERA, LEFT_FROM_RIGHT).save(tmp_path / "rig.toml")
+    for faces, told in ((GREYS, True), (COLOURS, False)):
+        for name in ("a", "b", "c"):
+            for side, image in zip(("left", "right"), pair(faces), strict=True):
+                tiltvp.write_image(tmp_path / side / f"{name}.png", image)
+        words = ["corner", str(tmp_path / "left"), str(tmp_path / "right"), "--calibration", str(tmp_path / "rig.toml")]
+        words += ["--overwrite", "--trajectory", str(tmp_path / "path.txt")]
+        assert main([*words, "--independent"]) == 0
+        assert ("from 2 frames on its origin is another corner" in capsys.readouterr().out) == told
+        assert main(words) == 0
+        assert "its origin" not in capsys.readouterr().out
+
+
 def test_grey_frames_after_the_coloured_cuboid_are_skipped(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     StereoRig(CAMERA, CAMERA, LEFT_FROM_RIGHT).save(tmp_path / "rig.toml")
     CAMERA.save(tmp_path / "one.toml")

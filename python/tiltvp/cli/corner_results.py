@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -13,7 +14,7 @@ from cyclopts import Group, Parameter
 from tiltvp.cli.corner_methods import Searches, advice, looked_for, shown
 from tiltvp.cli.tables import Out, Table, check_ending, check_plot, write_table
 from tiltvp.cli.terminal import say
-from tiltvp.errors import InvalidInputError
+from tiltvp.errors import InvalidInputError, counted
 from tiltvp.files import check_output, check_output_folder
 
 if TYPE_CHECKING:
@@ -76,6 +77,20 @@ class CornerResults:
         if self.trajectory is not None:
             # Last, as it is refused where no frame has a place.
             write_trajectory(table.rows, self.trajectory)
+            jumps = _jumps(table.rows)
+            if jumps:
+                what = "its origin is another corner than before, or not known to be the same"
+                say(f"{self.trajectory}: from {counted(jumps, 'frames')} on {what} (columns object and id of --out)")
+
+
+def _jumps(rows: Sequence[Mapping[str, Any]]) -> int:
+    """In how many rows with a place the origin is not known to be that of the one before.
+
+    Names tell it. `object` does not, from one camera and where frames are looked at anew.
+    """
+    placed = [row for row in rows if row["x_m"] is not None]
+    pairs = [[(one["id"], one["object"]) for one in pair] for pair in pairwise(placed)]
+    return sum(a != b if None not in (a, b) else before != now for (a, before), (b, now) in pairs)
 
 
 def tell(
