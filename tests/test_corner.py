@@ -229,6 +229,13 @@ def test_bad_input_is_refused(pose: tuple[Array, Array, float]) -> None:
         corner.resolve([feature], priors=[corner.GravityPrior((0, 2, 0), 0.1)])
     with pytest.raises(InvalidInputError, match="camera_from_object"):
         corner.KnownAttitude.of([[1, 2], [3, 4]], 0.1)
+    with pytest.raises(InvalidInputError, match="camera_from_object: no array of numbers"):
+        corner.KnownAttitude.of([[1, 2], [3]], 0.1)
+    for sigma in (-0.1, math.nan, math.inf, "0.1"):
+        with pytest.raises(InvalidInputError, match="sigma_rad = "):
+            corner.KnownAttitude.of(np.eye(3), sigma)  # type: ignore[arg-type]
+    with pytest.raises(InvalidInputError, match="right_handed = 'yes', expected True, False or None"):
+        corner.resolve([feature], right_handed="yes")  # type: ignore[arg-type]
     with pytest.raises(InvalidInputError, match="rotation"):
         corner.resolve([feature], priors=[corner.KnownAttitude.of(np.eye(3) * 2, 0.1)])
     with pytest.raises(InvalidInputError, match="common_from_camera"):

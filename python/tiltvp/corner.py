@@ -14,6 +14,7 @@ import numpy as np
 
 from tiltvp import _core
 from tiltvp._core import CornerAttitude, CornerAttitudes, CornerFeature, CornerPose, ResolvedAttitude
+from tiltvp.arguments import array_from, number_from
 from tiltvp.corner_boxes import CornerBox, join_boxes
 from tiltvp.corner_images import (
     CORNER_METHODS,
@@ -109,11 +110,13 @@ class KnownAttitude:
 
     @classmethod
     def of(cls, camera_from_object: ArrayLike, sigma_rad: float) -> KnownAttitude:
-        """From a (3, 3) rotation that may be off by `sigma_rad` about any axis."""
-        rotation = np.asarray(camera_from_object)
-        if rotation.shape != (3, 3) or rotation.dtype.kind not in "fiu":
-            got = f"shape {rotation.shape} of {rotation.dtype}"
-            raise InvalidInputError(f"camera_from_object: {got}, expected an array (3, 3) of real numbers")
+        """From a (3, 3) rotation that may be off by `sigma_rad` about any axis. Raises `InvalidInputError`."""
+        rotation = array_from(camera_from_object, "camera_from_object")
+        if rotation.shape != (3, 3):
+            raise InvalidInputError(f"camera_from_object: shape {rotation.shape}, expected an array (3, 3)")
+        sigma_rad = number_from(sigma_rad, "sigma_rad")
+        if not 0.0 <= sigma_rad < math.inf:
+            raise InvalidInputError(f"sigma_rad = {sigma_rad}, expected a standard deviation, finite and not negative")
         rows = tuple(tuple(float(x) for x in row) for row in rotation)
         return cls(rows, tuple(tuple(float(x) for x in row) for row in np.eye(3) * sigma_rad**2))
 
@@ -230,6 +233,8 @@ def poses(
 def _known_beforehand(
     gamma_rad: float, gamma_sigma_rad: float, right_handed: bool | None, priors: Sequence[Prior]
 ) -> dict[str, object]:
+    if not isinstance(right_handed, bool | np.bool_ | None):
+        raise InvalidInputError(f"right_handed = {right_handed!r}, expected True, False or None")
     return {
         "gamma_rad": gamma_rad, "gamma_sigma_rad": gamma_sigma_rad, "right_handed": right_handed, "priors": priors,
     }  # fmt: skip
