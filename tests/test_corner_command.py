@@ -14,6 +14,7 @@ from commands import Run
 from drawn_corners import CAMERA, COLOURS, GREYS, LEFT_FROM_RIGHT, pair, pose, turn
 from recordings import START_S, Bag
 from tiltvp.cli import main
+from tiltvp.cli.corner_methods import advice
 from tiltvp.cli.corner_pairs import pairs_of, partners_of
 from tiltvp.stereo_rigs import StereoRig
 from tiltvp.streams import open_frames
@@ -57,8 +58,8 @@ def test_the_command_line_chooses_the_method(tmp_path: Path, capsys: pytest.Capt
         for side, image in zip(("left", "right"), pair(faces), strict=True):
             tiltvp.write_image(tmp_path / name / side / "a.png", image)
 
-    def run(name: str, *words: str) -> str:
-        sides = [str(tmp_path / name / side) for side in ("left", "right")]
+    def run(name: str, *words: str, order: tuple[str, str] = ("left", "right")) -> str:
+        sides = [str(tmp_path / name / side) for side in order]
         assert main(["corner", *sides, "--calibration", str(tmp_path / "rig.toml"), *words]) == 0
         return capsys.readouterr().out
 
@@ -76,8 +77,15 @@ def test_the_command_line_chooses_the_method(tmp_path: Path, capsys: pytest.Capt
     rough = [str(x) for x in turn("x", 25.0) @ pose()[0][:, 1]]
     said = run("greys", "--down", *rough, "--down-sigma-deg", "30")
     assert "try: " in said
-    assert "a larger --vertical-max-deg where --pitch or --down is off by more" in said
+    assert "another --pitch or --down, or a larger --vertical-max-deg where it is rough" in said
     assert "1 with a pose" in run("greys", "--down", *rough, "--vertical-max-deg", "40")
+    said = run("colours", "--pitch", "-28", order=("right", "left"))
+    assert "no corner that fits (1)" in said
+    assert "try: that left and right are not exchanged, of one moment" in said
+    for reason in ("no corner in the left image", "no corner that fits"):
+        for given, told in (({}, False), ({"down": (0.0, 1.0, 0.0)}, True)):
+            tries = advice(reason, ("coloured", "general"), is_pair=False, given=given)
+            assert ("another --pitch or --down" in tries) == told
 
 
 def test_a_trajectory_without_any_place_says_why_and_what_to_try(

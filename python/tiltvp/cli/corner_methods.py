@@ -127,12 +127,14 @@ def advice(reason: str, methods: tuple[str, ...], *, is_pair: bool, given: Mappi
         else:
             tries = "--method general where there is no cuboid with faces in red, green and blue, --faces for its order"
         if "general" in methods and given.get("down") is not None:
-            tries += ", a larger --vertical-max-deg where --pitch or --down is off by more"
+            tries += ", another --pitch or --down, or a larger --vertical-max-deg where it is rough"
         return tries + (", that left and right are not exchanged" if is_pair and "right" in reason else "")
     if reason.startswith("several"):
         helps = [] if given.get("down") is not None else ["--pitch or --down, roughly"]
         helps += [] if given.get("right_handed") is not None else ["--right-handed for the outside of a box"]
         helps += [] if is_pair else ["a second camera"]
         return ", ".join(helps) or "a smaller --down-sigma-deg if the direction down is known well"
-    tries_of_pair = "that left and right are of one moment and of this calibration, a larger --misfit-max, "
-    return (tries_of_pair if is_pair else "") + "--gamma for level edges at another angle"
+    pair = "that left and right are not exchanged, of one moment and of this calibration"
+    causes = [pair, "a larger --misfit-max"] if is_pair else []
+    causes += [] if given.get("down") is None else ["another --pitch or --down"]
+    return ", ".join([*causes, "--gamma for level edges at another angle"])
