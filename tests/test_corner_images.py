@@ -149,6 +149,8 @@ def test_values_and_options() -> None:
         CornerDetector(CAMERA)(np.zeros((10, 10, 3), np.uint8))
     with pytest.raises(InvalidInputError, match="shape"):
         CornerDetector(CAMERA)(np.zeros((360, 480), np.uint8))
+    with pytest.raises(InvalidInputError, match="vertical: got one for method 'coloured'"):
+        CornerDetector(CAMERA)(np.zeros((360, 480, 3), np.uint8), (0.0, 1.0, 0.0))
     with pytest.raises(InvalidInputError, match="left_from_right"):
         CornerPoseEstimator(CAMERA, CAMERA)
     with pytest.raises(InvalidInputError, match="misfit_max"):

@@ -55,9 +55,11 @@ class CornerDetector(_core.CornerDetector):
 
         `vertical` (3,), for "general", is a direction along the vertical in the camera frame, up or down: it says
         which of the three rays is the vertical one. Without it that is the one nearest to the image's columns. Raises
-        `InvalidInputError` for an image of another size than the camera's.
+        `InvalidInputError` for an image of another size than the camera's, and for a `vertical` beside colours.
         """
         if self.method != "general":
+            if vertical is not None:
+                raise InvalidInputError(f"vertical: got one for method {self.method!r}, expected none")
             return self._detect_color(bgr_from(image))
         return self._detect_gray(gray_from(image), vertical)
 
