@@ -168,6 +168,22 @@ def test_images_are_found_once_and_named_apart(tmp_path: Path) -> None:
     assert distinct_names([Path("p/a.png"), Path("P/A.png"), Path("p_a.png")]) == ["p_a", "P_A_2", "p_a_3"]
 
 
+@pytest.mark.parametrize(
+    "names",
+    [
+        ["1.png", "2.png", "9.png", "10.png", "100.png"],
+        ["a-2_9.png", "a-2_10.png", "a-10_1.png"],
+        ["0.05.png", "0.10.png", "0.2.png", "10.1.png"],
+        ["a.png", "a2.png", "a10.png", "b.png"],
+    ],
+)
+def test_numbers_in_names_are_in_their_order(tmp_path: Path, names: list[str]) -> None:
+    for name in reversed(names):
+        (tmp_path / name).write_bytes(b"")
+    for word in (str(tmp_path), f"{tmp_path}/*.png"):
+        assert [file.name for file in find_images([word])[0]] == names
+
+
 @pytest.mark.parametrize("bits", [10, 12, 14, 16])
 def test_values_of_sensors_with_fewer_bits_are_not_black(tmp_path: Path, bits: int) -> None:
     white = 2**bits - 1

@@ -26,6 +26,8 @@ _INNER: Final = ("images", "frames")
 """Folders in which the images of a drive's folder are: that of `tiltvp dataset drive`, and a usual other name."""
 _TIMES, _ODOMETRY = "frames.csv", "odometry.csv"
 _TABLE: Final = "a table of frames with the columns file and time_s"
+_NUMBER: Final = r"((?<![0-9])(?<![0-9]\.)[0-9]+)"
+"""A whole number in a name; decimals after it are text, which is in their order."""
 _NANOSECONDS: Final = r"1\d{18}"
 """Names of images as EuRoC's tools write them: nanoseconds since 1970, of the years 2001 to 2033."""
 _SECONDS: Final = r"1\d{9}\.\d+"
@@ -72,7 +74,8 @@ def find_images(words: Sequence[str]) -> tuple[list[Path], list[str]]:
     """The image files that files, folders and glob patterns name, each once, and what is wrong with the words.
 
     A folder stands for the images directly in it, or, if there are none, in its folder `images` or `frames`; a pattern
-    for what it matches (`**` for folders below), both sorted.
+    for what it matches (`**` for folders below), both sorted by their names, in which numbers count as such: 2 comes
+    before 10, and 0.10 before 0.2.
     """
     files: list[Path] = []
     problems: list[str] = []
@@ -88,7 +91,8 @@ def find_images(words: Sequence[str]) -> tuple[list[Path], list[str]]:
         elif path.exists() or not glob.has_magic(word):
             found = [path]
         else:
-            found = [Path(match) for match in sorted(glob.glob(word, recursive=True)) if not os.path.isdir(match)]
+            found = [Path(match) for match in glob.glob(word, recursive=True) if not os.path.isdir(match)]
+            found.sort(key=_by_name)
             if not found:
                 problems.append(f"{word}: no file fits this pattern")
         files.extend(found)
@@ -101,8 +105,15 @@ def _images_of(folder: Path) -> list[Path]:
         if place.is_dir():
             found = [file for file in place.iterdir() if file.suffix.lower() in IMAGE_ENDINGS and file.is_file()]
             if found:
-                return sorted(found)
+                return sorted(found, key=_by_name)
     return []
+
+
+def _by_name(file: Path) -> tuple[list[str | int], str]:
+    # Numbers are at odd places, so that only like is compared with like.
+    parts: list[str | int] = [*re.split(_NUMBER, str(file.with_suffix("")))]
+    parts[1::2] = map(int, parts[1::2])
+    return parts, str(file)
 
 
 def _drive_folder(words: Sequence[str]) -> Path | None:
