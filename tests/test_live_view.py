@@ -93,6 +93,22 @@ def test_bands_are_those_of_the_covariance(tilt: tiltvp.TiltEstimate) -> None:
     assert np.isnan(roll_and_pitch(None)).all()
 
 
+@pytest.mark.parametrize("pitch", [0.0, -0.8, 1.2])
+def test_bands_hold_roll_and_pitch_of_robots_that_lean_far(pitch: float) -> None:
+    """Half of a band is the difference that a small error of the normal makes, whichever way it is."""
+    normal = np.array([-np.sin(pitch), np.sin(0.3) * np.cos(pitch), np.cos(0.3) * np.cos(pitch)])
+    lean: Any = SimpleNamespace(normal=normal, roll_rad=0.3, pitch_rad=pitch, covariance_rad2=1e-8 * np.eye(2))
+    differences = []
+    for axis in np.cross(np.eye(3), normal):
+        n = normal + 1e-4 * axis
+        angles = [np.arctan2(n[1], n[2]), -np.arcsin(n[0] / np.linalg.norm(n))]
+        differences.append(np.degrees(np.array(angles) - [0.3, pitch]))
+    _, _, ends = roll_and_pitch(lean).T
+    # The three differences have the covariance of equal errors in the tangent plane.
+    half = 1.96 * np.sqrt((np.array(differences) ** 2).sum(axis=0))
+    assert np.allclose(ends - np.degrees([0.3, pitch]), half, rtol=1e-3)
+
+
 def test_time_that_goes_back_begins_a_new_chart(tilt: tiltvp.TiltEstimate, room: RoomImage) -> None:
     view, fresh = TiltView(), TiltView()
     for time_s in (0.0, 1.0, 100.0, 3.0):
