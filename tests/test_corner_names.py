@@ -5,13 +5,14 @@ from __future__ import annotations
 import math
 import pickle
 
+import cv2
 import numpy as np
 import polars as pl
 import pytest
 
 from drawn_corners import CAMERA, COLOURS, GREYS, LEFT_FROM_RIGHT, drawn, pair, pose
 from tiltvp.corner import BelievedCorner, CornerPoseEstimator, join_boxes
-from tiltvp.corner_tables import CORNER_COLUMNS, corner_rows
+from tiltvp.corner_tables import CORNER_COLUMNS, corner_rows, pose_rows
 from tiltvp.errors import InvalidInputError
 from tiltvp.lab.evaluation.corner_names import COVERS, names_seen, summarise_names
 from tiltvp.lab.evaluation.corner_scenes import down_in
@@ -86,6 +87,20 @@ def test_what_a_believed_corner_tells() -> None:
     canvas = np.zeros((360, 480, 3), np.uint8)
     draw_names(canvas, CAMERA, estimate.features_left, estimate.corners)
     assert canvas.max() == 255
+
+
+def test_rows_have_the_deviations_of_the_places_beside_them() -> None:
+    estimate = CornerPoseEstimator(CAMERA, CAMERA, LEFT_FROM_RIGHT)(*pair(COLOURS))
+    [row] = pose_rows([(0.0, "a.png", estimate)])
+    found = estimate.pose
+    assert found is not None
+    assert found.vertex_m is not None
+    errors = np.random.default_rng(1).multivariate_normal(np.zeros(6), found.covariance, 20_000)
+    places = [
+        -(cv2.Rodrigues(error[:3])[0] @ found.camera_from_object).T @ (found.vertex_m + error[3:]) for error in errors
+    ]
+    assert np.allclose([row[f"sigma_{axis}_m"] for axis in "xyz"], np.std(places, axis=0), rtol=0.05)
+    assert np.allclose([row[f"sigma_r{axis}_rad"] for axis in "xyz"], np.std(errors[:, :3], axis=0), rtol=0.05)
 
 
 def test_corners_without_a_place_have_no_name() -> None:

@@ -16,7 +16,7 @@ from tiltvp.streams.outputs.tum import write_tum
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from tiltvp._core import CornerEstimate
+    from tiltvp._core import CornerEstimate, CornerHypothesis
 
 __all__ = ["CORNER_COLUMNS", "POSE_COLUMNS", "corner_rows", "pose_rows", "roll_pitch_yaw", "write_trajectory"]
 
@@ -39,9 +39,9 @@ def pose_rows(estimates: Sequence[tuple[float, str, CornerEstimate]]) -> list[di
     """One row for each frame: time_s, file, found, the camera in the object's frame, how sure it is, and its name.
 
     qx..qw and x_m..z_m are `object_from_camera`; the object's frame has y along the vertical edge away from the vertex.
-    roll, pitch and yaw are those of `object_from_camera` about the camera's z, x and y axis. The standard deviations
-    are of the rotation vector and of the vertex in the camera's frame. None where there is no pose, and where it has
-    no position, which `place_reason` says why.
+    roll, pitch and yaw are those of `object_from_camera` about the camera's z, x and y axis. sigma_x_m..sigma_z_m are
+    the standard deviations of x_m..z_m, those before them of the rotation vector in the camera's frame. None where
+    there is no pose, and where it has no position, which `place_reason` says why.
     """
     rows = []
     for time_s, file, estimate in estimates:
@@ -58,14 +58,22 @@ def pose_rows(estimates: Sequence[tuple[float, str, CornerEstimate]]) -> list[di
             row |= dict(zip(_ANGLES, angles.tolist(), strict=True))
             row |= dict(zip(_QUATERNION, quaternion(turn).tolist(), strict=True))
             sigmas = np.sqrt(np.diag(pose.covariance))
+            row |= dict(zip(_SIGMAS[:3], sigmas[:3].tolist(), strict=True))
             place = pose.camera_in_object_m
-            count = 3 if place is None else 6
-            row |= dict(zip(_SIGMAS[:count], sigmas[:count].tolist(), strict=True))
             if place is not None:
                 row |= dict(zip(_POSITION, place.tolist(), strict=True))
+                row |= dict(zip(_SIGMAS[3:], _place_sigmas(pose).tolist(), strict=True))
             row["misfit"] = pose.misfit
         rows.append(row)
     return rows
+
+
+def _place_sigmas(pose: CornerHypothesis) -> NDArray[np.float64]:
+    """(3,): the standard deviations of `camera_in_object_m`, -R^T v of the vertex v, to first order, metres."""
+    vertex = pose.vertex_m
+    assert vertex is not None
+    by = pose.camera_from_object.T @ np.hstack([np.cross(np.eye(3), vertex), np.eye(3)])
+    return np.asarray(np.sqrt(np.diag(by @ pose.covariance @ by.T)))
 
 
 _AXES: Final = ("rx", "ry", "rz", "x", "y", "z")
