@@ -120,6 +120,10 @@ def test_samples_that_are_none_are_refused() -> None:
             InertialSamples(*bad)
     with pytest.raises(CalibrationError, match="camera_from_sensor: no rotation"):
         InertialSamples(times, zeros, None).known(0.0, 1.0, np.ones((3, 3)))
+    wrong: Any
+    for wrong, words in (((0.0, 1.0, "up"), "camera_from_sensor"), ((0.0, "1"), "now_s"), (("0", 1.0), "before_s")):
+        with pytest.raises(InvalidInputError, match=words):
+            InertialSamples(times, zeros, None).known(*wrong)
 
 
 @pytest.mark.parametrize(

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, Final, Self
 
 import numpy as np
 
+from tiltvp.arguments import array_from, number_from
 from tiltvp.csv_files import CsvFile
 from tiltvp.errors import InvalidInputError, counted
 from tiltvp.rotations import rotation_from
@@ -119,10 +120,14 @@ class InertialSamples:
         frame by the rates; its standard deviation has the sensor's bias, the scatter of accelerations and how far their
         length is from gravity's. None where that is above 5 degrees, as of a sensor that is moved, and
         where no sample is near the frame: those beyond a gap of 0.1 s tell nothing of it.
+
+        Raises `InvalidInputError` for what is no number, `CalibrationError` for what is no rotation.
         """
         turn = np.eye(3)
         if camera_from_sensor is not None:
-            turn = rotation_from(np.asarray(camera_from_sensor, dtype=np.float64).tolist(), "camera_from_sensor")
+            turn = rotation_from(array_from(camera_from_sensor, "camera_from_sensor").tolist(), "camera_from_sensor")
+        now_s = number_from(now_s, "now_s")
+        before_s = None if before_s is None else number_from(before_s, "before_s")
         gyro = None if before_s is None else self._turned(before_s, now_s, turn)
         return {"gravity": self._down(now_s, turn), "gyro": gyro}
 
