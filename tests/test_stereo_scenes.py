@@ -108,6 +108,9 @@ def test_the_truth_is_where_the_images_have_it(sequence: StereoSequence) -> None
         assert (truth.edges_px[at] > 4).all()
     with pytest.raises(InvalidInputError, match="corner"):
         sequence.left_from_object(0, corner=10_000)
+    for wrong in (-1, len(sequence), 0.5, "0"):
+        with pytest.raises(InvalidInputError, match=r"frame = .*, expected a whole number below"):
+            sequence.left_from_object(wrong)  # type: ignore[arg-type]
 
 
 def test_an_image_attitude_fuses_with_the_gyroscope(laboratory: Laboratory) -> None:

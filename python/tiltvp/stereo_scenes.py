@@ -163,8 +163,9 @@ class StereoSequence(_core.StereoSequence):
     def left_from_object(self, frame: int, corner: int | None = None) -> NDArray[np.float64]:
         """(4, 4): the pose in the left camera of a corner's object frame (None: of the corner that is looked at)."""
         number = self.corner if corner is None else corner
-        if not 0 <= number < len(self.corners):
-            raise InvalidInputError(f"corner = {number}, expected a number below {len(self.corners)}")
+        for name, value, count in (("frame", frame, len(self)), ("corner", number, len(self.corners))):
+            if not isinstance(value, int | np.integer) or not 0 <= value < count:
+                raise InvalidInputError(f"{name} = {value!r}, expected a whole number below {count}")
         chosen = self.corners[number]
         world_from_left = self.poses_at([self.times_s[frame]])[0]
         pose = np.eye(4)
