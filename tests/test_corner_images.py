@@ -186,6 +186,16 @@ def test_detectors_and_what_stands_beside_them_agree() -> None:
     assert CornerPoseEstimator(coloured, gamma_rad=1.2).options["gamma_rad"] == 1.2
 
 
+@pytest.mark.parametrize("gamma_rad", [1.5708, 1.57])
+def test_a_right_angle_in_few_digits_is_one(gamma_rad: float) -> None:
+    """Much is known of right angles alone, as which edges are parallel and where they end."""
+    right = CornerPoseEstimator(CAMERA, method="general")
+    assert CornerPoseEstimator(CAMERA, method="general", gamma_rad=gamma_rad) == right
+    assert CornerPoseEstimator(CornerDetector(CAMERA, method="general"), gamma_rad=gamma_rad) == right
+    other = CornerPoseEstimator(CAMERA, method="general", gamma_rad=1.568)
+    assert other.options["gamma_rad"] == other.left.options["gamma_rad"] == 1.568
+
+
 def test_estimates_are_kept() -> None:
     seen = CornerPoseEstimator(CAMERA, CAMERA, LEFT_FROM_RIGHT)(*pair(COLOURS))
     blank = np.full((360, 480, 3), 128, np.uint8)

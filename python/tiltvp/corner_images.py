@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, Final
 
@@ -28,6 +29,8 @@ __all__ = [
     "CornerPoseEstimator",
 ]
 
+_RIGHT_WITHIN_RAD: Final = 1e-3
+"""How far an angle may be from the right one and be meant as such: 1.5708 is, and 1.57."""
 _OF_ESTIMATOR = {field["name"]: field["default"] for field in _core.option_fields("CornerPoseEstimator")}
 _BESIDE: Final = {
     "down_sigma_rad": ("down",),
@@ -76,9 +79,9 @@ class CornerPoseEstimator(_core.CornerPoseEstimator):
     the left one's frame, metres. Without `right` only the attitude is estimated, and with `camera_height_m` (the height
     of the camera above the vertex), `edge_length_m` or `box_size_m` the place too; `place_reason` says why there is
     none. Call it with the images of one frame after the other: the last pose is the prior for the next one. `gamma_rad`
-    is the angle between the corner's level edges, `down` (3,) the direction down in the left camera's frame as far as
-    it is known. Other options are the estimator's, or those of detectors that are made here for `method`. Comparable;
-    copies and pickles go on from the same last pose.
+    is the angle between the corner's level edges, within 0.001 of pi / 2 the right angle, `down` (3,) the direction
+    down in the left camera's frame as far as it is known. Other options are the estimator's, or those of detectors that
+    are made here for `method`. Comparable; copies and pickles go on from the same last pose.
     """
 
     def __new__(
@@ -96,8 +99,8 @@ class CornerPoseEstimator(_core.CornerPoseEstimator):
             names = ", ".join(options)
             raise InvalidInputError(f"options {names}: given beside a CornerDetector, expected with cameras only")
         method = _shared("method", method, [one.method for one in detectors]) or CORNER_METHODS[0]
-        angles = [one.options["gamma_rad"] for one in detectors if one.method == "general"]
-        gamma_rad = _shared("gamma_rad", own.get("gamma_rad"), angles)
+        angles = [_right(one.options["gamma_rad"]) for one in detectors if one.method == "general"]
+        gamma_rad = _shared("gamma_rad", _right(own.get("gamma_rad")), angles)
         if gamma_rad is not None:
             own["gamma_rad"] = gamma_rad
             if method == "general":
@@ -150,6 +153,12 @@ class CornerPoseEstimator(_core.CornerPoseEstimator):
         Empty where none is. It is `self(left, right, **known).corners`, and goes on from frame to frame alike.
         """
         return self(left, right, **known).corners
+
+
+def _right(gamma_rad: Any) -> Any:
+    """An angle as it is given, but for those that stand for the right one."""
+    is_number = isinstance(gamma_rad, int | float | np.number)
+    return math.pi / 2 if is_number and abs(gamma_rad - math.pi / 2) <= _RIGHT_WITHIN_RAD else gamma_rad
 
 
 def _shared(name: str, given: Any, told: Sequence[Any]) -> Any:
