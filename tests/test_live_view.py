@@ -232,6 +232,8 @@ def test_corner_poses_in_rerun(run: Run, tmp_path: Path) -> None:
     assert code == 0, complaints
     curves = [f"/corner/{name}" for name in ("roll_deg", "pitch_deg", "yaw_deg", "confidence")]
     assert rows_of(record) == dict.fromkeys([*curves, "/image", "/world/camera"], 2)
+    # The images tell no times.
+    assert all("time" not in chunk.timeline_names for chunk in RrdReader(record).stream())
     code, _, complaints = run(*words)
     assert (code, "--rerun" in complaints, "expected a new file, or --overwrite" in complaints) == (2, True, True)
 

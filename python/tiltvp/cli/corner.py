@@ -201,7 +201,7 @@ class Look:
                     bar.complain(_blamed([one.name for one in pair], str(error)))
                     self.bad += 1
                 else:
-                    self._draw(name, number, time_s, images[0], estimate)
+                    self._draw(name, number, frame.time_s if rate_hz is None else time_s, images[0], estimate)
                     yield time_s, frame.name, estimate
                 bar.advance()
 
@@ -215,7 +215,9 @@ class Look:
         self.sensor.took(time_s, known)
         return estimate
 
-    def _draw(self, name: str, number: int, time_s: float, image: NDArray[np.uint8], estimate: CornerEstimate) -> None:
+    def _draw(
+        self, name: str, number: int, time_s: float | None, image: NDArray[np.uint8], estimate: CornerEstimate
+    ) -> None:
         from tiltvp.images import write_image
 
         if self.overlay is None and self.viewer is None:

@@ -75,13 +75,13 @@ def send_calibration(viewer: Viewer, log: DriveLog, history: Sequence[MountingEs
         viewer.points("world/seen", places, colours=[rgb(track_colour(landmark)) for landmark in shown], radius=0.08)
 
 
-def send_corner(viewer: Viewer, number: int, time_s: float, picture: Picture, estimate: CornerEstimate) -> None:
+def send_corner(viewer: Viewer, number: int, time_s: float | None, picture: Picture, estimate: CornerEstimate) -> None:
     """A frame with its corner, the camera's pose in the object's frame, and its angles."""
     from tiltvp.corner_tables import pose_rows
 
     viewer.at(number, time_s)
     viewer.picture("image", picture)
-    row = pose_rows([(time_s, "", estimate)])[0]
+    row = pose_rows([(0.0, "", estimate)])[0]
     for name in ("roll_deg", "pitch_deg", "yaw_deg", "confidence"):
         value = row[name]
         viewer.curves(f"corner/{name}", [float("nan") if value is None else value], [name])
