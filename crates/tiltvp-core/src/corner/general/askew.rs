@@ -32,9 +32,9 @@ pub(super) fn askew(lines: &[StraightEdge], common: &CommonAttitude) -> Matrix3<
                 along += 1.0;
                 continue;
             }
-            // Turning the axis a about b by t changes normal . a by t normal . (b x a).
+            // Turning the axis a about b by t changes normal . a by t normal . (b x a); the sense of all turns does not matter.
             let by_turn = line.normal.dot(&turn_axis.cross(&rotation.column(axis)));
-            let turn_rad = -off[axis] / by_turn;
+            let turn_rad = off[axis] / by_turn;
             if turn_rad.abs() <= REACH_SINE {
                 turns.push((turn_rad, line.sigma_rad / by_turn.abs()));
             }
@@ -80,5 +80,12 @@ mod tests {
         // As many lines of another thing, further off.
         let desk = attitude * Rotation3::from_axis_angle(&Vector3::z_axis(), 0.3).matrix();
         assert_eq!(added(8, &desk), Matrix3::zeros());
+        // As many lines that agree on no turn.
+        let stray = |k: usize| {
+            let turned = attitude * Rotation3::from_axis_angle(&Vector3::z_axis(), 0.006 * (k as f64 - 3.5)).matrix();
+            lines(&turned, 1, &[0.0])[0]
+        };
+        let all: Vec<StraightEdge> = picture.iter().copied().chain((0..8).map(stray)).collect();
+        assert_eq!(askew(&all, &common_attitude(&all, &attitude).unwrap()), Matrix3::zeros());
     }
 }
