@@ -297,13 +297,13 @@ def test_a_clock_that_was_set_back_is_refused(tmp_path: Path) -> None:
 
 
 def test_images_of_a_folder_come_in_the_order_of_their_times(tmp_path: Path) -> None:
-    """Not in that of names without leading zeros."""
+    """Not in that of their names."""
     for k in range(1, 12):
         tiltvp.write_image(tmp_path / "images" / f"{k}.png", np.full((4, 4), k, np.uint8))
-    (tmp_path / "frames.csv").write_text("file,time_s\n" + "".join(f"{k}.png,{0.5 * k}\n" for k in range(1, 12)))
+    (tmp_path / "frames.csv").write_text("file,time_s\n" + "".join(f"{k}.png,{6.0 - 0.5 * k}\n" for k in range(1, 12)))
     frames = open_frames(tmp_path)
-    assert [frame.read()[0, 0] for frame in frames] == list(range(1, 12))
-    assert [Path(name).stem for name in frames.names or ()] == [str(k) for k in range(1, 12)]
+    assert [frame.read()[0, 0] for frame in frames] == list(range(11, 0, -1))
+    assert [Path(name).stem for name in frames.names or ()] == [str(k) for k in range(11, 0, -1)]
     assert "in the order of their times" in frames.notes[0]
 
 
