@@ -15,7 +15,7 @@ const DOUBTED_MAX: usize = 3;
 /// The probability that bearings contradict a part of the motions as much by chance, below which it is doubted for good: a part that is
 /// doubted for nothing costs little. The largest error of drives with a carpet (seeds 302000, 303000, 310000 and 330000 of
 /// `just measure-trust-calibration --only carpet`) is 2.0 deviations of the bound rms with 0.01, 2.1 with 0.004, 2.3 with 0.001 and 2.7
-/// without doubt; those of drives whose motions err alone are the same.
+/// without doubt (where nothing is stricter); those of drives whose motions err alone are the same.
 const DOUBTED_BY_CHANCE: f64 = 0.01;
 
 /// The same where the noise of all motions seems to be larger than told, and where the wheels are estimated, which follow a part of what
