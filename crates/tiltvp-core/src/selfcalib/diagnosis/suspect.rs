@@ -27,11 +27,6 @@ const DEVIATION_SHIFT: f64 = 1.0;
 /// same throughout. Of 300 simulated drives whose motions err alone none is above 3.8.
 const MOST_DRIFT: f64 = 5.0;
 
-/// The probability that bearings contradict a part of the motions as much by chance, below which it is said. Of 200 simulated drives whose
-/// motions err alone (seeds 302000 and 310000 of "as told" of `just measure-trust-calibration`) the filter doubts one for it, with 0.01
-/// twenty.
-const CONTRADICTED_BY_CHANCE: f64 = 1e-3;
-
 words! {
     /// What is most likely wrong with a log or with what is told of the robot.
     #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -157,9 +152,7 @@ impl BundleProblem {
         if let Some(angle) = self.possible_bump(options, covariance) {
             return found(Cause::Bump, angle);
         }
-        let doubted = doubted?;
-        let drift = largest_ratio(covariance, &doubted.scatter_of_mounting());
-        (drift > MOST_DRIFT || doubted.contradicted(CONTRADICTED_BY_CHANCE).is_some())
-            .then_some(Suspect { cause: Cause::Drift, value: drift })
+        let drift = largest_ratio(covariance, &doubted?.scatter_of_mounting());
+        (drift > MOST_DRIFT).then_some(Suspect { cause: Cause::Drift, value: drift })
     }
 }

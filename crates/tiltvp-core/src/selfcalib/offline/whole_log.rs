@@ -14,7 +14,7 @@ use crate::error::{Error, Result};
 use crate::selfcalib::bundle::{
     BundleProblem, CholeskyFactor, DescentReport, DoubtedParts, FIRST_DAMPING, FreeParameters, widened,
 };
-use crate::selfcalib::diagnosis::{Cause, Suspect};
+use crate::selfcalib::diagnosis::Cause;
 use crate::selfcalib::estimate::MountingEstimate;
 use crate::selfcalib::model::{Mounting, OUTLIER_SIGMAS, WheelMotion, Wheels};
 use crate::selfcalib::options::{CalibrationMethod, SelfCalibratorOptions};
@@ -61,11 +61,10 @@ impl LogCalibration {
         self.converged && self.misreading.is_none() && self.estimate.reliable()
     }
 
-    /// Whether motions of a part of the drive may err together: what they make so is suspect, or nothing although their noise is as told.
-    fn may_drift(&self, told_k_m: f64) -> bool {
+    /// Whether motions of a part of the drive may err together: nothing is suspect, or what they make so.
+    fn may_drift(&self) -> bool {
         let causes = [Cause::Drift, Cause::OdometryK, Cause::WheelBase, Cause::Wheels];
-        let is_possible = |suspect: Suspect| causes.contains(&suspect.cause);
-        self.misreading.is_none() && self.estimate.suspect.map_or(self.odometry_k_m == told_k_m, is_possible)
+        self.misreading.is_none() && self.estimate.suspect.is_none_or(|suspect| causes.contains(&suspect.cause))
     }
 }
 
@@ -138,7 +137,7 @@ pub fn calibrate_log(
     }
     let mut answer = report(options, &problem, &descent, misreading);
     if let Ok(told) = &answer
-        && told.may_drift(as_told.noise.k_m)
+        && told.may_drift()
         && let Some(without) = without_contradicted_parts(options, as_told)
     {
         answer = Ok(without);
