@@ -28,8 +28,6 @@ pub(crate) struct DoubtedParts {
     moved: Vec<DVector<f64>>,
     /// By how much the cost falls, but for what single slips add to it.
     falls: Vec<f64>,
-    /// By what factor the variances of all motions seem to be larger than told.
-    excess: f64,
 }
 
 impl DoubtedParts {
@@ -49,14 +47,14 @@ impl DoubtedParts {
 
     /// The keyframes of the part that the bearings contradict the most, if by chance they contradict one as much with less than a
     /// probability: twice the fall of the cost is chi-square of as many numbers of its motions as the bearings tell, which is what it is
-    /// where most parts are doubted.
-    pub(crate) fn contradicted(&self, by_chance: f64) -> Option<Range<usize>> {
+    /// where most parts are doubted. By `excess` the variances of all motions seem to be larger than told.
+    pub(crate) fn contradicted(&self, excess: f64, by_chance: f64) -> Option<Range<usize>> {
         let mut sorted = self.falls.clone();
         sorted.sort_by(f64::total_cmp);
         let most = sorted[sorted.len() / 2];
         let worst = (0..self.falls.len()).max_by(|a, b| self.falls[*a].total_cmp(&self.falls[*b]))?;
-        let told = (2.0 * most / self.excess).max(1.0).round() as u32;
-        let probable = chi_square_cdf(2.0 * self.falls[worst] / self.excess, told);
+        let told = (2.0 * most / excess).max(1.0).round() as u32;
+        let probable = chi_square_cdf(2.0 * self.falls[worst] / excess, told);
         (probable > 1.0 - by_chance).then(|| self.keyframes[worst].clone())
     }
 }
@@ -78,7 +76,7 @@ impl BundleProblem {
             Some((self.moved(&problem, &descent)?, cost - descent.cost - slips))
         };
         let (moved, falls) = keyframes.iter().map(solved).collect::<Option<(Vec<_>, Vec<_>)>>()?;
-        (parts > 0).then(|| DoubtedParts { keyframes, moved, falls, excess: self.noise_factors().motions.max(1.0) })
+        (parts > 0).then_some(DoubtedParts { keyframes, moved, falls })
     }
 
     /// Doubts the odometry that leads to keyframes.
@@ -137,12 +135,12 @@ mod tests {
         let problem = BundleProblem::new(&options, &Vector3::zeros(), FreeParameters::default(), loss);
         assert!(problem.doubted_parts().is_none());
     }
+
     #[test]
     fn bearings_contradict_a_part_where_the_cost_falls_farther_than_by_chance() {
         let contradicted = |falls: [f64; 5]| {
             let keyframes = (0..5).map(|part| 1 + 4 * part..5 + 4 * part).collect();
-            DoubtedParts { keyframes, moved: vec![DVector::zeros(3); 5], falls: falls.to_vec(), excess: 1.0 }
-                .contradicted(1e-3)
+            DoubtedParts { keyframes, moved: vec![DVector::zeros(3); 5], falls: falls.to_vec() }.contradicted(1.0, 1e-3)
         };
         // Of 18 numbers chi-square is above 42.31 once in a thousand times, of one above 10.83.
         assert_eq!(contradicted([9.0, 4.0, 12.0, 21.2, 8.0]), Some(13..17));

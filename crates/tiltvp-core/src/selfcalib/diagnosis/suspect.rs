@@ -7,7 +7,7 @@ use nalgebra::Matrix3;
 use super::contradictions::Contradictions;
 use super::deviations::Deviation;
 use super::noise::NoiseFactors;
-use crate::selfcalib::bundle::{BundleProblem, DoubtedParts, largest_ratio};
+use crate::selfcalib::bundle::{BundleProblem, largest_ratio};
 use crate::selfcalib::model::OUTLIER_SIGMAS;
 use crate::selfcalib::options::SelfCalibratorOptions;
 use crate::words;
@@ -106,14 +106,15 @@ impl fmt::Display for Suspect {
 }
 
 impl BundleProblem {
-    /// What is most likely wrong at this solution, whose mounting has that covariance.
+    /// What is most likely wrong at this solution, whose mounting has that covariance, and another one as motions of parts of the drive
+    /// scatter.
     pub(crate) fn suspect(
         &self,
         options: &SelfCalibratorOptions,
         counts: &Contradictions,
         factors: NoiseFactors,
         covariance: &Matrix3<f64>,
-        doubted: Option<&DoubtedParts>,
+        motion_scatter: Option<&Matrix3<f64>>,
     ) -> Option<Suspect> {
         let share = |part: usize, whole: usize| part as f64 / whole.max(1) as f64;
         let found = |cause, value| Some(Suspect { cause, value });
@@ -152,7 +153,7 @@ impl BundleProblem {
         if let Some(angle) = self.possible_bump(options, covariance) {
             return found(Cause::Bump, angle);
         }
-        let drift = largest_ratio(covariance, &doubted?.scatter_of_mounting());
+        let drift = largest_ratio(covariance, motion_scatter?);
         (drift > MOST_DRIFT).then_some(Suspect { cause: Cause::Drift, value: drift })
     }
 }

@@ -58,11 +58,13 @@ pub(super) fn solve_with_doubt(
     max_iterations: u32,
 ) -> Option<(DescentReport, Vec<Vector2<f64>>)> {
     let motions = (problem.keyframes.len() - 1) as f64;
-    let is_strict = problem.free.wheels || problem.noise_factors().motions > 1.0;
+    let excess = |problem: &BundleProblem| problem.noise_factors().motions.max(1.0);
+    let is_strict = problem.free.wheels || excess(problem) > 1.0;
     let by_chance = if is_strict { DOUBTED_STRICTLY } else { DOUBTED_BY_CHANCE };
     let (mut last, mut parts) = (None, Vec::new());
     while parts.len() < DOUBTED_MAX
-        && let Some(keyframes) = problem.doubted_parts().and_then(|parts| parts.contradicted(by_chance))
+        && let Some(keyframes) =
+            problem.doubted_parts().and_then(|parts| parts.contradicted(excess(problem), by_chance))
     {
         parts.push(Vector2::new((keyframes.start - 1) as f64, (keyframes.end - 1) as f64) / motions);
         problem.doubt(keyframes);

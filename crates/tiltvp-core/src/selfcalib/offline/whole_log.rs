@@ -305,7 +305,7 @@ fn report(
     let with = |scatter: Option<&Matrix3<f64>>, own| scatter.map_or(own, |scatter| widened(&own, scatter));
     let counts = problem.contradictions();
     let by_landmarks = with(landmarks.as_ref(), own);
-    let suspect = problem.suspect(o, &counts, problem.noise_factors(), &by_landmarks, doubted.as_ref());
+    let suspect = problem.suspect(o, &counts, problem.noise_factors(), &by_landmarks, motions.as_ref());
     let mounting = with(landmarks.as_ref(), with(motions.as_ref(), own));
     let scatter = doubted.as_ref().map(DoubtedParts::scatter);
     let sigma = |at: usize| {

@@ -12,9 +12,8 @@ impl SlidingWindow {
         }
         let counts = now.contradictions();
         let covariance = self.covariance.fixed_view::<3, 3>(MOUNTING, MOUNTING).into();
-        let doubted = now.doubted_parts();
-        let suspect = now.suspect(&self.options, &counts, now.noise_factors(), &covariance, doubted.as_ref());
-        let motion_scatter = doubted.map(|parts| parts.scatter_of_mounting());
+        let motion_scatter = now.doubted_parts().map(|parts| parts.scatter_of_mounting());
+        let suspect = now.suspect(&self.options, &counts, now.noise_factors(), &covariance, motion_scatter.as_ref());
         self.examination = Examination { contradictions: counts, suspect, motion_scatter };
     }
 
