@@ -283,6 +283,22 @@ def test_a_known_height_places_one_camera() -> None:
         assert np.linalg.eigvalsh(exact.covariance).min() > -1e-15
 
 
+def test_a_height_is_above_the_corners_that_stand_on_the_floor() -> None:
+    """Of a grey box the upper corners are often the best ones, but things stand below them."""
+    for k in range(10):
+        rotation, vertex = pose(yaw=25.0 + 4.0 * k, pitch=14.0 + 2.5 * k, roll=-6.0 + k)
+        vertex = vertex + (0.0, -0.08, 0.0)
+        feet = vertex + [0.3 * rotation @ (x, 1.0, z) for x, z in ((0.0, 0.0), (1.0, 0.0), (0.0, 1.0))]
+        known = {"camera_height_m": float(rotation[:, 1] @ feet[0]), "camera_height_sigma_m": 0.002}
+        estimate = CornerPoseEstimator(CAMERA, method="general", down=rotation[:, 1], **known)(
+            drawn(rotation, vertex, GREYS, fine=4)
+        )
+        assert estimate.pose is not None
+        off = min((foot - estimate.pose.vertex_m for foot in feet), key=np.linalg.norm)
+        assert off @ np.linalg.solve(estimate.pose.covariance[3:, 3:], off) < 16.3
+        assert any(np.abs(estimate.pose.edges + rotation[:, 1]).max(axis=1) < 0.02)
+
+
 def test_what_a_height_does_not_tell() -> None:
     rotation, vertex = pose()
     image = drawn(rotation, vertex, COLOURS)

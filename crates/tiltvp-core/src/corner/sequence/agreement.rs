@@ -2,7 +2,7 @@
 
 use nalgebra::{Matrix3, Rotation3, Vector3};
 
-use crate::corner::closed_form::attitude::{CornerAttitudes, IncludedAngle, corner_attitudes};
+use crate::corner::closed_form::attitude::{CornerAttitude, CornerAttitudes, IncludedAngle, corner_attitudes};
 use crate::corner::closed_form::prior::AttitudePrior;
 use crate::corner::closed_form::resolve::ResolvedAttitude;
 use crate::corner::feature::CornerFeature;
@@ -51,6 +51,18 @@ pub(crate) fn fits(feature: &CornerFeature, attitude: &Matrix3<f64>, most_rad: f
 pub(crate) fn apart(a: &Matrix3<f64>, b: &Matrix3<f64>) -> f64 {
     // |a - b| = 2 sqrt 2 sin(angle / 2), exact for small angles.
     2.0 * ((a - b).norm() / 8f64.sqrt()).min(1.0).asin()
+}
+
+/// The attitude of a feature that is nearest to another attitude, however its edges are named; none farther away than `most_rad`.
+pub(crate) fn attitude_near(
+    feature: &CornerFeature,
+    angle: &IncludedAngle,
+    attitude: &Matrix3<f64>,
+    most_rad: f64,
+) -> Option<CornerAttitude> {
+    let off = |own: &CornerAttitude| apart(&renamed(&own.camera_from_object, attitude), attitude);
+    let found = corner_attitudes(feature, angle).ok()?;
+    found.iter().min_by(|a, b| off(a).total_cmp(&off(b))).filter(|near| off(near) <= most_rad).copied()
 }
 
 /// The features that agree, the best supported one first, and the attitudes of each.

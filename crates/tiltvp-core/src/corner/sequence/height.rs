@@ -2,6 +2,7 @@
 
 use nalgebra::{Matrix3, Matrix6, Vector3};
 
+use super::agreement::attitude_near;
 use super::estimator::CornerPoseEstimator;
 use crate::corner::closed_form::attitude::with_vertex;
 use crate::corner::estimate::{CornerEstimate, Hypothesis, PlaceVerdict};
@@ -16,15 +17,17 @@ impl CornerPoseEstimator {
     /// has none: where the vertex is not below the camera as far as that is known, where nothing told which edge is the vertical
     /// one, where the height tells too little, and beyond the limits of the distance.
     pub(super) fn place_by_height(&self, estimate: &mut CornerEstimate) -> PlaceVerdict {
+        let down = self.told_down();
+        match &down {
+            Some(down) if !self.is_one_object() => self.take_lowest(estimate, down),
+            None if !self.is_one_object() => return PlaceVerdict::NotUpright,
+            _ => {}
+        }
         let (Some(height_m), Some(corner)) =
             (self.options.camera_height_m, estimate.chosen_left.first().and_then(|i| estimate.features[0].get(*i)))
         else {
             return PlaceVerdict::NoScale;
         };
-        let down = self.told_down();
-        if !self.is_one_object() && down.is_none() {
-            return PlaceVerdict::NotUpright;
-        }
         if down.is_some_and(|down| down.dot(&corner.vertex()) <= 0.0) {
             return PlaceVerdict::NotBelow;
         }
@@ -44,6 +47,31 @@ impl CornerPoseEstimator {
         }
         verdicts.first().copied().unwrap_or(PlaceVerdict::Told)
     }
+
+    /// Makes the poses those of the best corner that may stand on the floor, if there is one: its upright edge rises from the vertex. A
+    /// corner whose upright edge goes down has something below it.
+    fn take_lowest(&self, estimate: &mut CornerEstimate, down: &Vector3<f64>) {
+        let features = &estimate.features[0];
+        let Some(at @ 1..) = estimate.chosen_left.iter().position(|corner| rises(&features[*corner], down)) else {
+            return;
+        };
+        estimate.chosen_left[..=at].rotate_right(1);
+        let (lowest, angle) = (&features[estimate.chosen_left[0]], &self.options.angle);
+        for pose in &mut estimate.hypotheses {
+            let near = attitude_near(lowest, angle, &pose.camera_from_object, self.options.agree_max_rad);
+            if let Some(own) = near {
+                (pose.edges, pose.right_handed) = (own.edges, own.is_right_handed());
+            }
+        }
+    }
+}
+
+/// Whether the upright edge of a corner, the one that is the most parallel to the direction down, goes up from its vertex.
+fn rises(corner: &CornerFeature, down: &Vector3<f64>) -> bool {
+    let vertex = corner.pencil.vertex;
+    let falls = (down - vertex * down.dot(&vertex)).normalize();
+    let along = corner.pencil.along.map(|along| along.dot(&falls));
+    along.iter().copied().max_by(|a, b| a.abs().total_cmp(&b.abs())).is_some_and(|upright| upright < 0.0)
 }
 
 /// The vertex at the distance `h / (v . u)` along its bearing `v`, with `u` the direction down, and the covariance of attitude and

@@ -1,11 +1,11 @@
 //! The place of a corner before one camera that knows the length of an edge, or the size of the box.
 
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::Vector3;
 
-use super::agreement::{SAME_VERTEX_RAD, apart, renamed};
+use super::agreement::{SAME_VERTEX_RAD, attitude_near, renamed};
 use super::estimator::CornerPoseEstimator;
 use super::height::SHARE_MAX;
-use crate::corner::closed_form::attitude::{IncludedAngle, corner_attitudes};
+use crate::corner::closed_form::attitude::IncludedAngle;
 use crate::corner::estimate::{CornerEstimate, Hypothesis, PlaceVerdict};
 use crate::corner::feature::CornerFeature;
 use crate::corner::frame::Frame;
@@ -109,10 +109,8 @@ impl CornerPoseEstimator {
         let edges = if estimate.chosen_left.first() == Some(&corner) {
             pose.edges
         } else {
-            let found = corner_attitudes(feature, &self.options.angle).ok()?;
-            let off = |own: &Matrix3<f64>| apart(&renamed(own, &pose.camera_from_object), &pose.camera_from_object);
-            let near = found.iter().min_by(|a, b| off(&a.camera_from_object).total_cmp(&off(&b.camera_from_object)))?;
-            (off(&near.camera_from_object) <= self.options.agree_max_rad).then_some(near.edges)?
+            let angle = &self.options.angle;
+            attitude_near(feature, angle, &pose.camera_from_object, self.options.agree_max_rad)?.edges
         };
         let mut candidate = Candidate { corner, edges, ends: Vec::new(), outside: false };
         for axis in 0..3 {
