@@ -221,6 +221,8 @@ def test_bad_input_is_refused(pose: tuple[Array, Array, float]) -> None:
         corner.poses(feature, feature, np.eye(3))
     with pytest.raises(InvalidInputError, match="left_from_right"):
         corner.poses(feature, feature, np.eye(4) * 2)
+    with pytest.raises(InvalidInputError, match=r"left_from_right.*no baseline"):
+        corner.poses(feature, feature, np.eye(4))
     with pytest.raises(InvalidInputError, match="sense"):
         corner.resolve([feature], priors=[corner.GravityPrior((0, 1, 0), 0.1, "sideways")])  # type: ignore[arg-type]
     with pytest.raises(InvalidInputError, match="priors"):
@@ -244,5 +246,7 @@ def test_bad_input_is_refused(pose: tuple[Array, Array, float]) -> None:
         corner.resolve([feature], alignment="skew")  # type: ignore[arg-type]
     with pytest.raises(InvalidInputError, match="vertical"):
         corner.included_angle(feature, [0, 0, 2])
+    with pytest.raises(InvalidInputError, match="vertical_covariance_rad2: no covariance"):
+        corner.included_angle(feature, [0, 0, 1], -np.eye(3))
     with pytest.raises(InvalidInputError, match="corner = 3"):
         corner.solve_many([vertex], *([r] for r in rays)).of(3)

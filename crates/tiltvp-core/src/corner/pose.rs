@@ -9,7 +9,7 @@ use super::closed_form::standard_model::CornerCase;
 use super::feature::CornerFeature;
 use super::fusion::fuse_rays;
 use super::triangulation::{BearingObservation, triangulate};
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::geometry::RigidMotion;
 
 /// What is known of a corner before it is looked at.
@@ -72,19 +72,32 @@ impl CornerPose {
     }
 }
 
+/// That two cameras are not at one place, from which nothing has a distance.
+///
+/// # Errors
+/// [`Error::InvalidArgument`](crate::Error::InvalidArgument) where they are.
+pub(crate) fn check_baseline(left_from_right: &RigidMotion) -> Result<()> {
+    if left_from_right.translation_m.norm() <= 0.0 {
+        return Err(Error::argument("left_from_right", "no baseline", "two cameras at different places"));
+    }
+    Ok(())
+}
+
 /// Every pose that explains the features of both cameras, the likeliest first; their probabilities add up to 1, but for those below 1e-9
 /// that are left out.
 ///
 /// Empty where either feature is no corner of that angle (or hand), and where the vertex is before neither camera.
 ///
 /// # Errors
-/// [`Error::InvalidArgument`](crate::Error::InvalidArgument) for an included angle, priors or a mounting that are none.
+/// [`Error::InvalidArgument`](crate::Error::InvalidArgument) for an included angle, priors or a mounting that are none, and for cameras at one
+/// place.
 pub fn corner_poses(
     left: &CornerFeature,
     right: &CornerFeature,
     left_from_right: &RigidMotion,
     options: &CornerOptions,
 ) -> Result<Vec<CornerPose>> {
+    check_baseline(left_from_right)?;
     let of_left = corner_attitudes(left, &options.angle)?;
     let of_right = corner_attitudes(right, &options.angle)?;
     let views = [

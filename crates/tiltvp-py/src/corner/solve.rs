@@ -5,6 +5,7 @@ use pyo3::prelude::*;
 use tiltvp_core::corner::{
     self as core, Alignment, BearingObservation, CornerOptions, FittedRay, IncludedAngle, Screening, View,
 };
+use tiltvp_core::filter::positive_semidefinite;
 
 use super::attitude::{CornerAttitude, CornerAttitudes};
 use super::feature::CornerFeature;
@@ -181,6 +182,11 @@ pub(crate) fn included_angle(
         return Err(invalid(format!("vertical: of length {}, expected a unit vector", vertical.norm())));
     }
     let covariance = convert::matrix3(vertical_covariance_rad2, "vertical_covariance_rad2")?;
+    if !positive_semidefinite(&covariance) {
+        return Err(invalid(
+            "vertical_covariance_rad2: no covariance, expected symmetric and positive semidefinite".to_owned(),
+        ));
+    }
     let found = core::included_angle(&feature.get().inner, &vertical, &covariance);
     Ok(found.map(|angle| (angle.gamma_rad, angle.sigma_rad)))
 }
@@ -294,8 +300,10 @@ pub(crate) fn triangulate<'py>(
             return Err(invalid(format!("bearings: {row:?}, expected unit vectors")));
         }
         let covariance: Matrix2<f64> = convert::matrix(covariance, "covariances_rad2")?;
-        if !(tiltvp_core::filter::positive_semidefinite(&covariance)) {
-            return Err(invalid("covariances_rad2: a matrix that is no covariance".to_owned()));
+        if !positive_semidefinite(&covariance) {
+            return Err(invalid(
+                "covariances_rad2: no covariance, expected symmetric and positive semidefinite".to_owned(),
+            ));
         }
         sightings.push(BearingObservation {
             bearing,

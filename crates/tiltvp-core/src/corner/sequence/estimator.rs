@@ -17,6 +17,7 @@ use crate::corner::frame::Frame;
 use crate::corner::general::common_attitude::CommonAttitude;
 use crate::corner::general::guided::ExpectedCorner;
 use crate::corner::options::CornerMethod;
+use crate::corner::pose::check_baseline;
 use crate::error::{Error, Result};
 use crate::geometry::RigidMotion;
 
@@ -55,9 +56,7 @@ impl CornerPoseEstimator {
                 let expected = "none for two cameras, which tell the distance themselves";
                 return Err(Error::argument(scale, "given", expected));
             }
-            if left_from_right.translation_m.norm() <= 0.0 {
-                return Err(Error::argument("left_from_right", "no baseline", "two cameras at different places"));
-            }
+            check_baseline(left_from_right)?;
         }
         let is_coloured = matches!(left.options().method, CornerMethod::Coloured(_));
         if options.edge_length_m.is_some() && options.known_edge != KnownEdge::Y && !is_coloured {
