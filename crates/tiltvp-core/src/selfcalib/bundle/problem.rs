@@ -69,7 +69,7 @@ const OFFSET_SIGMA_S: f64 = 1.0;
 
 /// Standard deviations by which a motion may differ from its odometry before the wheels are taken to have slipped. In three
 /// dimensions normal noise exceeds it 15 times in a million.
-const SLIP_SIGMAS: f64 = 5.0;
+pub(crate) const SLIP_SIGMAS: f64 = 5.0;
 
 /// Jacobians of the pose of an observation.
 pub(crate) struct ObservationPoseJacobians {
@@ -120,7 +120,7 @@ impl BundleProblem {
             bearing_sigma: options.bearing_sigma_rad,
             scatters: Vec::new(),
             loss,
-            slip: MotionLoss(SLIP_SIGMAS),
+            slip: MotionLoss::Logarithmic(SLIP_SIGMAS),
         }
     }
 

@@ -13,6 +13,9 @@ const MOST_JUMPS: usize = 5;
 /// Twice the logarithm of the likelihood ratio by which a slip must explain a jump better than a bump: some three thousand to one.
 const SURE: f64 = 16.0;
 
+/// Squared Mahalanobis distance of two mountings up to which they may be the same: chi-square of three numbers is below with 99.9 %.
+const SAME: f64 = 16.27;
+
 /// Standard deviations of the mounting within which a bump would leave it right enough.
 const HARMLESS_SIGMAS: f64 = 2.0;
 
@@ -60,7 +63,7 @@ impl BundleProblem {
         off.z = wrap_angle(off.z);
         let Some(information) = (early.1 + late.1).try_inverse() else { return false };
         let squared = |away: Vector3<f64>| away.dot(&(information * away));
-        squared(off - bump) - squared(off) > SURE
+        squared(off) <= SAME && squared(off - bump) - squared(off) > SURE
     }
 
     /// The part of the log before a keyframe.

@@ -35,25 +35,50 @@ impl BearingLoss {
 /// some 10,000 bearings loses none that is right.
 pub(crate) const OUTLIER_SIGMAS: f64 = 4.5;
 
-/// The robust loss of a motion: logarithmic (as Cauchy's) beyond a number of standard deviations, since wheels slip.
+/// The robust loss of a motion, since wheels slip. Thresholds are standard deviations.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub(crate) struct MotionLoss(pub(crate) f64);
+pub(crate) enum MotionLoss {
+    /// Logarithmic beyond the threshold (as Cauchy's): what is far off still pulls.
+    Logarithmic(f64),
+    /// The same, and in the end constant: beyond [`FAR`] thresholds it hardly pulls.
+    Redescending(f64),
+}
+
+/// From how many thresholds on a motion that differs from its odometry has slipped: thirty standard deviations. Of 200 drives with three
+/// slips (seeds 360000 and 370000 of `just measure-trust-calibration --only slip`) the mean NEES of the whole logs that are answered is
+/// 6.5 with a logarithmic loss alone, of as many with this 2.8.
+const FAR: f64 = 6.0;
 
 impl MotionLoss {
     /// Wheels that never slip.
-    pub(crate) const NEVER: Self = Self(f64::INFINITY);
+    pub(crate) const NEVER: Self = Self::Logarithmic(f64::INFINITY);
+
+    /// The squares of the threshold, and of the distance from which the loss tends to a constant.
+    fn limits(self) -> (f64, f64) {
+        match self {
+            Self::Logarithmic(k) => (k * k, f64::INFINITY),
+            Self::Redescending(k) => (k * k, FAR * FAR * k * k),
+        }
+    }
 
     /// Half the squared Mahalanobis distance, and less beyond the threshold.
     pub(crate) fn cost(self, squared: f64) -> f64 {
-        let limit = self.0 * self.0;
-        if squared > limit { 0.5 * limit * (1.0 + (squared / limit).ln()) } else { 0.5 * squared }
+        let (limit, far) = self.limits();
+        if squared > far {
+            0.5 * limit * (2.0 + (far / limit).ln() - far / squared)
+        } else if squared > limit {
+            0.5 * limit * (1.0 + (squared / limit).ln())
+        } else {
+            0.5 * squared
+        }
     }
 
     /// The same weight, as a factor of the motion's information.
     pub(crate) fn weight(self, squared: f64) -> f64 {
-        let limit = self.0 * self.0;
-        if squared > limit { limit / squared } else { 1.0 }
+        let (limit, far) = self.limits();
+        let share = |limit: f64| if squared > limit { limit / squared } else { 1.0 };
+        share(limit) * share(far)
     }
 }
 
@@ -92,16 +117,18 @@ mod tests {
 
     proptest! {
         #[test]
-        fn the_weight_is_the_slope(r in 0.01..20.0f64) {
+        fn the_weight_is_the_slope(r in 0.01..60.0f64) {
             let h = 1e-6;
             for loss in [BearingLoss::Huber(2.0), BearingLoss::Truncated(2.0)] {
                 prop_assume!((r - 2.0).abs() > 1e-3);
                 let slope = (loss.cost(r + h) - loss.cost(r - h)) / (2.0 * h);
                 prop_assert!((slope - loss.weight(r) * r).abs() < 1e-6);
             }
-            let slip = MotionLoss(5.0);
-            let slope = (slip.cost((r + h).powi(2)) - slip.cost((r - h).powi(2))) / (2.0 * h);
-            prop_assert!((slope - slip.weight(r * r) * r).abs() < 1e-5);
+            for slip in [MotionLoss::Logarithmic(5.0), MotionLoss::Redescending(5.0)] {
+                let slope = (slip.cost((r + h).powi(2)) - slip.cost((r - h).powi(2))) / (2.0 * h);
+                prop_assert!((slope - slip.weight(r * r) * r).abs() < 1e-5);
+            }
+            prop_assert!(MotionLoss::Redescending(5.0).cost(1e4 * r * r) < 12.5 * (2.0 + 36f64.ln()));
         }
     }
 }

@@ -6,15 +6,15 @@ use super::state::{MOUNTING, ROBUST_LOSS, SlidingWindow};
 use super::tuning::{
     COST_TOLERANCE, EVERY_STEP_KEYFRAMES, FIXED_OUTLIER_ITERATIONS, OUTLIER_SHARE, RESTART_KEYFRAMES, RESTART_YAWS,
 };
-use crate::selfcalib::bundle::{CholeskyFactor, FIRST_DAMPING, Solution};
-use crate::selfcalib::model::{BearingLoss, FitSummary, OUTLIER_SIGMAS};
+use crate::selfcalib::bundle::{CholeskyFactor, FIRST_DAMPING, SLIP_SIGMAS, Solution};
+use crate::selfcalib::model::{BearingLoss, FitSummary, MotionLoss, OUTLIER_SIGMAS};
 
 impl SlidingWindow {
     /// Solves the window and linearises it there, for mean and covariance. The search starts from the filter's mean if that is
     /// `trusted`, and from the last solution otherwise.
     pub(super) fn relinearise(&mut self, iterations: u32, trusted: bool) {
         let before = self.problem.landmarks.clone();
-        self.problem.loss = ROBUST_LOSS;
+        (self.problem.loss, self.problem.slip) = (ROBUST_LOSS, MotionLoss::Logarithmic(SLIP_SIGMAS));
         let settled = self.problem.keyframes.len() >= EVERY_STEP_KEYFRAMES;
         let from_filter = trusted && settled && !self.monitor.is_inconsistent();
         if from_filter {
@@ -28,6 +28,10 @@ impl SlidingWindow {
         if fit.is_some_and(|fit| fit.outliers > 0 && few(fit)) {
             solution = self.solve_without_outliers(iterations);
         } else if settled && fit.is_some_and(few) && self.problem.estimate_scatters() {
+            solution = self.problem.gauss_newton(iterations, COST_TOLERANCE, false);
+        }
+        if solution.is_some() && (1..self.problem.keyframes.len()).any(|to| self.problem.slipped(to)) {
+            self.problem.slip = MotionLoss::Redescending(SLIP_SIGMAS);
             solution = self.problem.gauss_newton(iterations, COST_TOLERANCE, false);
         }
         if !solution.is_some_and(|solution| self.adopt(&solution)) {
