@@ -51,7 +51,7 @@ def wheels(path: Path, left: float) -> None:
 
 def opened(folder: Path, *, odometry: str = "odometry.csv", read: LogOptions | None = None) -> PictureLog:
     return PictureLog.open(
-        str(folder / "images"), PictureOptions(), MotionOptions(odometry=folder / odometry),
+        str(folder / "images"), PictureOptions(), MotionOptions(odometry=folder / odometry, wheel_base=0.4),
         CameraOptions(camera=folder / "camera.toml"), DrivingLineOptions(), DriveOptions(wheel_base=0.4), None,
         read or LogOptions(),
     )  # fmt: skip

@@ -57,7 +57,7 @@ def calibrate(
     """
     watching.check()
     sources, robot = sources_from(logs), None if camera is None else camera.robot()
-    drive, results = drive.settled(robot), results.settled(robot)
+    drive, results = drive.settled(robot, motion.wheel_base), results.settled(robot)
     if camera is not None and robot is None and any(isinstance(source, Tables) for source in sources):
         raise InvalidInputError("--camera with a log of tables, expected a robot's file (tiltvp setup)")
     if all(isinstance(source, Tables) for source in sources):

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Final, NamedTuple, Self, TypeAlias
 
-from cyclopts import Group, Parameter, validators
+from cyclopts import Group, Parameter
 
 from tiltvp._core import CALIBRATION_METHODS, option_fields
 from tiltvp.cli.declared_options import LibraryOptions, from_library
@@ -47,8 +47,8 @@ _TABLE: Final = ".csv"
 class DriveOptions(LibraryOptions):
     """The robot, the mounting as it is thought to be, and how sure measurements are."""
 
-    wheel_base: Annotated[float | None, Parameter(validator=validators.Number(gt=0))] = None
-    """Distance between the wheels, metres; by default that of a robot's file."""
+    wheel_base: Annotated[float | None, Parameter(parse=False)] = None
+    """Distance between the wheels, metres, as `settled` has it."""
     start: tuple[float, float, float] | None = None
     """x and y in metres and yaw in radians of the mounting as it is thought to be; by default x and y of a robot's
     file, or 0 0 0."""
@@ -57,9 +57,9 @@ class DriveOptions(LibraryOptions):
     bearing_sigma_deg: float | None = None
     """Standard deviation of a bearing; for images by default the median of what the lines' own are."""
 
-    def settled(self, robot: Robot | None) -> Self:
+    def settled(self, robot: Robot | None, wheel_base: float | None) -> Self:
         """With what a robot's file knows where nothing was given. Raises `InvalidInputError` without a wheel base."""
-        base = wheel_base_of(robot, self.wheel_base)
+        base = wheel_base_of(robot, wheel_base)
         if base is None:
             raise InvalidInputError("--wheel-base: not given, expected the distance between the wheels in metres")
         place = (0.0, 0.0) if robot is None or robot.place_m is None else robot.place_m

@@ -50,7 +50,7 @@ class PictureOptions:
 
     def refuse(self, motion: MotionOptions, lines: DrivingLineOptions) -> None:
         """Refuses what belongs to images where all logs are tables, of which the mounting may be told all the same."""
-        motion.refuse("pictures")
+        replace(motion, wheel_base=None).refuse("pictures")
         words = [*given_words(self), *given_words(replace(lines, robot_from_camera=None, method=None))]
         words += [] if lines.method is None else ["--line-method"]
         if words:
@@ -106,8 +106,8 @@ class PictureLog:
         motion = motion.of_robot(robot, frames)
         late_s = 0.0
         if read.estimate_time_offset:
-            late_s = _bring_to_clock(frames, motion, lens, lines.mounting(lens), drive.wheel_base, read.read_as)
-        moved = needed_turns(motion.motions(frames, drive.wheel_base, read.read_as))
+            late_s = _bring_to_clock(frames, motion, lens, lines.mounting(lens), read.read_as)
+        moved = needed_turns(motion.motions(frames, read.read_as))
         if moved is None:
             raise InvalidInputError(f"{source}: pictures without odometry, expected --odometry FILE")
         if not moved.distances_known:
@@ -118,7 +118,7 @@ class PictureLog:
         _tell_other_turns(source, moved, drive.wheel_base)
         named = {"images": looked.topic, "odometry": motion.odometry_topic}
         topics = {name: word for name, word in named.items() if word is not None}
-        wheels = motion.wheels(drive.wheel_base)
+        wheels = motion.wheels()
         return cls(frames, moved, lens, lines, drive, pictures, wheels, topics, late_s=late_s)
 
     def tilt(self) -> MountingTilt:
@@ -215,7 +215,6 @@ def _bring_to_clock(
     motion: MotionOptions,
     camera: Camera,
     rotation: NDArray[np.float64],
-    wheel_base_m: float | None,
     read_as: Sequence[str],
 ) -> float:
     """Takes from the times of the frames by how much they are late, and gives that.
@@ -228,7 +227,7 @@ def _bring_to_clock(
     record = motion.odometry or frames.recording
     if frames.times_s is None or record is None:
         raise InvalidInputError(f"--estimate-time-offset with {frames.source}, whose times are not known")
-    wheels = motion.wheels(wheel_base_m)
+    wheels = motion.wheels()
     odometry = read_odometry(record, topic=motion.odometry_topic, wheels=wheels, read_as=read_as)
     numbers = telling_frames(frames.times_s, odometry)
     images = (frame.read() for frame in frames.sample(numbers.tolist()))

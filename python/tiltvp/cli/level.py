@@ -6,9 +6,9 @@ import math
 from dataclasses import dataclass, replace
 from itertools import repeat
 from pathlib import Path
-from typing import Annotated, Literal, TypeAlias
+from typing import Literal, TypeAlias
 
-from cyclopts import Group, Parameter, validators
+from cyclopts import Group, Parameter
 
 from tiltvp.cli.cluster import check_cluster, files_of, is_begun
 from tiltvp.cli.filtering import FilterOptions
@@ -63,7 +63,6 @@ def level(
     method: MethodOptions = _METHOD_DEFAULTS,
     filtering: FilterOptions = _FILTER_DEFAULTS,
     motion: MotionOptions = _MOTION,
-    wheel_base: Annotated[float | None, Parameter(validator=validators.Number(gt=0))] = None,
     metadata_only: Switch = False,
     copy_unlevelled: Switch = False,
     cluster: str | None = None,
@@ -82,8 +81,6 @@ def level(
     out
         Folder for level images, or a video (.mp4 or .avi) of the frames in their order. Of a video, a recording or a
         live camera a folder gets a video.
-    wheel_base
-        Distance between the wheels, metres, for odometry of wheels.
     metadata_only
         Of 360-degree JPEG photographs: write pitch and roll as GPano metadata, and leave the pixels' bytes untouched.
     copy_unlevelled
@@ -115,9 +112,9 @@ def level(
     filtering = replace(filtering, filter=fused)
     filtering.check()
     if not fused:
-        motion.refuse("--filter", wheel_base)
-    moved = motion.motions_of(robot, frames, wheel_base) if fused else None
-    filtering = filtering.following(frames, moved, wheel_base_of(robot, wheel_base))
+        motion.refuse("--filter")
+    moved = motion.motions_of(robot, frames) if fused else None
+    filtering = filtering.following(frames, moved, wheel_base_of(robot, motion.wheel_base))
     work = Levelling(looks, filtering, copy_unlevelled)
     motions = repeat(Motion()) if moved is None else moved.motions
     if cluster is not None:

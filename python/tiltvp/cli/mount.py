@@ -12,7 +12,7 @@ from cyclopts import Parameter, validators
 
 from tiltvp.cli.options import CameraOptions, MountedOptions, Switch
 from tiltvp.cli.results import degrees
-from tiltvp.cli.sources import MotionOptions, SourceOptions, wheel_base_of
+from tiltvp.cli.sources import MotionOptions, SourceOptions
 from tiltvp.cli.tables import finite
 from tiltvp.cli.terminal import progress_bar, say
 from tiltvp.errors import InvalidInputError
@@ -25,7 +25,6 @@ DONE, FAILED, NOT_TOLD = 0, 1, 3
 _MOUNTED = MountedOptions()
 _SOURCE = SourceOptions()
 _MOTION = MotionOptions()
-_ABOVE_0 = Parameter(validator=validators.Number(gt=0))
 
 
 def mount(
@@ -36,9 +35,8 @@ def mount(
     source: SourceOptions = _SOURCE,
     mounted: MountedOptions = _MOUNTED,
     motion: MotionOptions = _MOTION,
-    wheel_base: Annotated[float | None, _ABOVE_0] = None,
     level_floor: Switch = False,
-    within_deg: Annotated[float | None, _ABOVE_0] = None,
+    within_deg: Annotated[float | None, Parameter(validator=validators.Number(gt=0))] = None,
     out: Path | None = None,
 ) -> int:
     """Measure roll and pitch of a camera's mounting on a drive: what stays when the robot turns is not the floor's.
@@ -50,8 +48,6 @@ def mount(
     ----------
     images
         Images, a video or a recording of a drive with turns.
-    wheel_base
-        Distance between the wheels, metres: for odometry of wheels, and how much the floor may change in a turn.
     level_floor
         The floor is level within 0.05 degrees: no turn is needed.
     within_deg
@@ -70,14 +66,13 @@ def mount(
     source = source.of_robot(robot, images)
     estimator = camera.complete(mounted.of_topic(source.topic)).mounted(camera.load(source.topic), **TILT_OPTIONS)
     frames = source.open(images)
-    moved = motion.motions_of(robot, frames, wheel_base)
+    moved = motion.motions_of(robot, frames)
     motions = moved.motions if moved is not None and moved.turns_known else None
     with progress_bar(measured_count(frames), "images") as bar:
         tilts = drive_tilts(frames, estimator, motions, advance=bar.advance)
-    wheels = motion.wheels(wheel_base_of(robot, wheel_base))
     found = mounting_tilt(
         tilts.estimates, tilts.motions, estimator.robot_from_camera,
-        level_floor=level_floor, half_track_m=wheels.half_track_m,
+        level_floor=level_floor, half_track_m=motion.of_robot(robot, frames).wheels().half_track_m,
     )  # fmt: skip
     verdict = None if within_deg is None else found.within(math.radians(within_deg))
     if out is not None:

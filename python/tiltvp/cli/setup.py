@@ -4,14 +4,12 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
-
-from cyclopts import Parameter, validators
+from typing import TYPE_CHECKING
 
 from tiltvp.cli.declared_options import mask_from
 from tiltvp.cli.mount import mounting_lines
 from tiltvp.cli.options import CameraOptions, MountedOptions, Switch
-from tiltvp.cli.sources import MotionOptions, SourceOptions, wheel_base_of
+from tiltvp.cli.sources import MotionOptions, SourceOptions
 from tiltvp.cli.terminal import complain, progress_bar, say
 from tiltvp.errors import InvalidInputError
 from tiltvp.files import check_output
@@ -33,7 +31,6 @@ def setup(
     out: Path,
     source: SourceOptions = _SOURCE,
     motion: MotionOptions = _MOTION,
-    wheel_base: Annotated[float | None, Parameter(validator=validators.Number(gt=0))] = None,
     robot_from_camera: str | None = None,
     mask: Path | None = None,
     level_floor: Switch = False,
@@ -52,8 +49,6 @@ def setup(
         Images, a video or a recording of a drive with turns, best a turn in place.
     out
         File for the robot (.toml); its mask goes beside it. Give it as --camera to other commands.
-    wheel_base
-        Distance between the wheels, metres, for odometry of wheels; by default that of a robot's file.
     robot_from_camera
         How the camera sits on the robot, where it is known roughly: up, forward, or a file with a rotation. By default
         that of a robot's file; without one the direction that is up is found.
@@ -78,8 +73,8 @@ def setup(
     lens = camera.load(source.topic)
     mounted = camera.complete(MountedOptions(robot_from_camera=robot_from_camera, mask=mask))
     frames = source.open(recording)
-    motion, wheel_base = motion.of_robot(known, frames), wheel_base_of(known, wheel_base)
-    moved = motion.motions(frames, wheel_base)
+    motion = motion.of_robot(known, frames)
+    moved = motion.motions(frames)
     with progress_bar(measured_count(frames), "images") as bar:
         found = find_setup(
             frames,
@@ -88,7 +83,7 @@ def setup(
             robot_from_camera=None if mounted.robot_from_camera is None else mounted.mounting(lens),
             mask=None if mounted.mask is None else mask_from(mounted.mask),  # type: ignore[arg-type]
             level_floor=level_floor,
-            wheels=motion.wheels(wheel_base),
+            wheels=motion.wheels(),
             topics={k: v for k, v in (("images", source.topic), ("odometry", motion.odometry_topic)) if v is not None},
             advance=bar.advance,
         )

@@ -92,6 +92,9 @@ class MotionOptions:
     the frames are from, if there is one."""
     odometry_topic: str | None = None
     """Its topic in a recording, where that has several: Odometry, JointState or Twist."""
+    wheel_base: Annotated[float | None, _ABOVE_0] = None
+    """Distance between the wheels, metres, for odometry of wheels, and for how much the floor may change in a turn; by
+    default that of a robot's file."""
     wheel_radius: Annotated[float | None, _ABOVE_0] = None
     """Radius of the wheels, metres, for ticks and the angles of a JointState."""
     ticks_per_turn: Annotated[float | None, _ABOVE_0] = None
@@ -101,10 +104,9 @@ class MotionOptions:
     odometry_gap: Annotated[float, _ABOVE_0] = 0.5
     """Longest time between two samples that is interpolated, seconds."""
 
-    def refuse(self, needed: str, wheel_base_m: float | None = None) -> None:
+    def refuse(self, needed: str) -> None:
         """Refuses options of odometry where the option that needs it is not given."""
-        given = given_words(self) + ([] if wheel_base_m is None else ["--wheel-base"])
-        if given:
+        if given := given_words(self):
             raise InvalidInputError(f"{given[0]} without {needed}, expected both")
 
     def of_robot(self, robot: Robot | None, frames: Frames) -> Self:
@@ -122,23 +124,24 @@ class MotionOptions:
         return replace(
             self,
             odometry_topic=topic,
+            wheel_base=wheel_base_of(robot, self.wheel_base),
             wheel_radius=radius,
             ticks_per_turn=self.ticks_per_turn or known.ticks_per_turn,
             wheel_joints=self.wheel_joints or known.joints,
         )
 
-    def motions_of(self, robot: Robot | None, frames: Frames, wheel_base_m: float | None) -> FrameMotions | None:
+    def motions_of(self, robot: Robot | None, frames: Frames) -> FrameMotions | None:
         """The same as `motions`, with what a robot's file knows where it is not given; options need an odometry."""
-        found = self.of_robot(robot, frames).motions(frames, wheel_base_of(robot, wheel_base_m))
+        found = self.of_robot(robot, frames).motions(frames)
         if found is None and frames.recording is None:
-            self.refuse("--odometry", wheel_base_m)
+            self.refuse("--odometry")
         return found
 
-    def motions(self, frames: Frames, wheel_base_m: float | None, read_as: Sequence[str] = ()) -> FrameMotions | None:
+    def motions(self, frames: Frames, read_as: Sequence[str] = ()) -> FrameMotions | None:
         """What the robot did up to each frame, None without odometry; a line on stderr for what is noted."""
         from tiltvp.streams import frame_motions, is_recording
 
-        wheels, record = self.wheels(wheel_base_m), self.odometry or frames.recording
+        wheels, record = self.wheels(), self.odometry or frames.recording
         if self.odometry_topic is not None and record is not None and not is_recording(record):
             raise InvalidInputError(f"--odometry-topic {self.odometry_topic} of {record}: expected a recording")
         if self.odometry is None:
@@ -147,12 +150,12 @@ class MotionOptions:
         tell(*found.notes)
         return found
 
-    def wheels(self, wheel_base_m: float | None) -> Wheels:
+    def wheels(self) -> Wheels:
         """What was said of the wheels."""
         from tiltvp.streams import Wheels
 
         return Wheels(
-            wheel_base_m=wheel_base_m, wheel_radius_m=self.wheel_radius, ticks_per_turn=self.ticks_per_turn,
+            wheel_base_m=self.wheel_base, wheel_radius_m=self.wheel_radius, ticks_per_turn=self.ticks_per_turn,
             joints=self.wheel_joints, gap_max_s=self.odometry_gap,
         )  # fmt: skip
 

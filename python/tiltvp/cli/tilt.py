@@ -61,7 +61,6 @@ def tilt(
     method: MethodOptions = _METHOD_DEFAULTS,
     filtering: FilterOptions = _FILTER_DEFAULTS,
     motion: MotionOptions = _MOTION,
-    wheel_base: Annotated[float | None, Parameter(validator=validators.Number(gt=0))] = None,
     out: Out | None = None,
     overlay: Path | None = None,
     level: Path | None = None,
@@ -79,8 +78,6 @@ def tilt(
     images
         Image files, folders of images and glob patterns; or one video or recording of ROS; or -, for names of files
         on stdin.
-    wheel_base
-        Distance between the wheels, metres, for odometry of wheels with --filter.
     out
         File for the results in radians: .csv, .json or .parquet; for attitudes with yaw 0: .mcap (sensor_msgs/Imu of
         ROS 2) or .tum; - for a line of JSON on stdout as each image is done.
@@ -104,14 +101,14 @@ def tilt(
     filtering.check()
     showing.check()
     if not filtering.filter:
-        motion.refuse("--filter", wheel_base)
+        motion.refuse("--filter")
     robot = camera.robot()
     source = source.of_robot(robot, images or [])
     estimator = camera.complete(method.of_topic(source.topic)).estimator(camera.load(source.topic))
     frames = source.open(images or [])
     check_apart(frames, overlay, level)
-    moved = motion.motions_of(robot, frames, wheel_base) if filtering.filter else None
-    filtering = filtering.following(frames, moved, wheel_base_of(robot, wheel_base))
+    moved = motion.motions_of(robot, frames) if filtering.filter else None
+    filtering = filtering.following(frames, moved, wheel_base_of(robot, motion.wheel_base))
     motions: Iterable[Motion | None] = repeat(Motion()) if moved is None else moved.motions
     work, judge = Work(_checked(estimator, frames), overlay, level, filtering, showing.asked), filtering.judge()
     if cluster is not None and out is not None:

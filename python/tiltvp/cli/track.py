@@ -6,9 +6,9 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
-from cyclopts import Group, Parameter, validators
+from cyclopts import Group, Parameter
 
 from tiltvp.cli.declared_options import LibraryOptions, from_library
 from tiltvp.cli.line_options import LineOptions
@@ -57,7 +57,6 @@ def track(
     options: LineOptions = _DEFAULTS,
     out: Out,
     motion: MotionOptions = _MOTION,
-    wheel_base: Annotated[float | None, Parameter(validator=validators.Number(gt=0))] = None,
     plot: Path | None = None,
     video: Path | None = None,
     frame_rate: FrameRate = None,
@@ -74,8 +73,6 @@ def track(
         Folder of images, glob pattern, video or recording of ROS; or - for names of files on stdin.
     out
         File for the tracks in radians, one row for each line of each frame: .csv, .json or .parquet.
-    wheel_base
-        Distance between the wheels, metres, for odometry of wheels.
     plot
         Picture of the bearings over the frames, one colour for each track (.png).
     video
@@ -101,7 +98,7 @@ def track(
     tracker = LineTracker(**place | tracking.given())
     frames = frames_of.open(words)
     check_apart(frames, video)
-    motions = needed_turns(motion.motions_of(robot, frames, wheel_base))
+    motions = needed_turns(motion.motions_of(robot, frames))
     drive = Drive(extractor, tilt, motions)
     showing = nullcontext() if video is None else video_writer(video, frame_rate or frames.rate_hz)
     with showing as film, watching.viewer() as viewer:
