@@ -108,7 +108,7 @@ def test_synth(run: Run, world: Path, tmp_path: Path) -> None:
         (("--tilts-deg", "1,2,3"), "expected ALPHA,BETA in degrees"),
         (("--tilts-deg", "95,2"), "alpha from 0 to 90"),
         (("--resolution-scale", "0"), "factor: got 0"),
-        (("--threads", "0"), "threads = 0"),
+        (("--threads", "0"), "--threads. Must be >= 1"),
         (("--robot-from-camera", "upp"), "did you mean up"),
         (("--limit", "0"), "limit = 0"),
         (("--samples", "99"), "samples = 99"),

@@ -4,6 +4,7 @@
 
 import difflib
 import math
+import os
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
@@ -28,6 +29,10 @@ _METHOD = Group("Method", help="An option that is not given has the default of i
 M = TypeVar("M", bound=LibraryOptions)
 Switch = Annotated[bool, Parameter(negative="", show_default=False)]
 FrameRate = Annotated[float | None, Parameter(validator=validators.Number(gt=0, lt=math.inf))]
+AtLeast0 = Annotated[int, Parameter(validator=validators.Number(gte=0))]
+AtLeast1 = Annotated[int, Parameter(validator=validators.Number(gte=1))]
+ALL_CORES = os.cpu_count() or 1
+Threads = Annotated[AtLeast1, Parameter(help="How many at the same time; all cores by default.", show_default=False)]
 
 
 _PANORAMA = "equirectangular:"

@@ -9,14 +9,12 @@ from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import closing
 from itertools import repeat
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Final
-
-from cyclopts import Parameter, validators
+from typing import TYPE_CHECKING, Final
 
 from tiltvp.cli.answers import check_answers, write_answers
 from tiltvp.cli.cluster import check_cluster, files_of, is_begun
 from tiltvp.cli.filtering import FilterOptions
-from tiltvp.cli.options import CameraOptions, FrameRate, MethodOptions
+from tiltvp.cli.options import AtLeast1, CameraOptions, FrameRate, MethodOptions
 from tiltvp.cli.results import Outcome, mounting_words, outcome_table, people_table, summary_words
 from tiltvp.cli.showing import ShowOptions
 from tiltvp.cli.sources import (
@@ -65,7 +63,7 @@ def tilt(
     overlay: Path | None = None,
     level: Path | None = None,
     frame_rate: FrameRate = None,
-    threads: Annotated[int, Parameter(validator=validators.Number(gte=1))] = 1,
+    threads: AtLeast1 = 1,
     showing: ShowOptions = _SHOWING,
     cluster: str | None = None,
 ) -> int:

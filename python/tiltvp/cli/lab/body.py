@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
-
-from cyclopts import Parameter, validators
 
 from tiltvp.cli.lab.tables import show_frame
+from tiltvp.cli.options import AtLeast0
 from tiltvp.cli.terminal import progress_bar
 
 
@@ -15,8 +13,8 @@ def body(
     directory: Path | None = None,
     /,
     *,
-    rooms: Annotated[int, Parameter(validator=validators.Number(gte=0))] = 1,
-    seed: Annotated[int, Parameter(validator=validators.Number(gte=0))] = 500,
+    rooms: AtLeast0 = 1,
+    seed: AtLeast0 = 500,
 ) -> None:
     """The mask of `body_mask` on rendered drives with a body painted in, and the tilts without it, with it and with it
     left out.

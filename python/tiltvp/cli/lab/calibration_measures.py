@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 from typing import Annotated
 
-from cyclopts import Parameter, validators
+from cyclopts import Parameter
 
 from tiltvp.cli.lab.panorama_options import Out
 from tiltvp.cli.lab.tables import show_frame
+from tiltvp.cli.options import ALL_CORES, AtLeast0, AtLeast1, Threads
 from tiltvp.cli.tables import check_ending, write_frame
 from tiltvp.cli.terminal import progress_bar
 from tiltvp.errors import InvalidInputError
@@ -22,7 +22,7 @@ def calibration(
     odometry: Path | None = None,
     /,
     *,
-    runs: Annotated[int, Parameter(validator=validators.Number(gte=1))] = 1000,
+    runs: AtLeast1 = 1000,
     only: str = "",
     out: Out = None,
 ) -> None:
@@ -93,13 +93,13 @@ def calibration(
 
 def calibration_images(
     *,
-    drives: Annotated[int, Parameter(validator=validators.Number(gte=1))] = 2,
+    drives: AtLeast1 = 2,
     kinds: Annotated[tuple[str, ...], Parameter(consume_multiple=True)] = ("hall", "corridor"),
     leans_deg: Annotated[tuple[float, ...], Parameter(consume_multiple=True)] = (0.0, 3.0),
     trajectory: str = "paper",
-    seed: Annotated[int, Parameter(validator=validators.Number(gte=0))] = 9101,
-    threads: Annotated[int | None, Parameter(validator=validators.Number(gte=1))] = None,
-    out: Path | None = None,
+    seed: AtLeast0 = 9101,
+    threads: Threads = ALL_CORES,
+    out: Out = None,
 ) -> None:
     """Self-calibration from the pictures of rendered drives: tilt, lines, tracks, mounting; errors in degrees and mm.
 
@@ -115,10 +115,6 @@ def calibration_images(
         paper or alternating.
     seed
         Seed of the first room and drive.
-    threads
-        Frames rendered at the same time; all cores by default.
-    out
-        Also write the table: .csv, .json or .parquet.
     """
     from tiltvp.lab.evaluation.calibration_images import PictureExperiment, picture_drives
 
@@ -127,7 +123,7 @@ def calibration_images(
         kinds=kinds, leans_max_deg=leans_deg, drives=drives, seed=seed, trajectory=trajectory
     )
     with progress_bar(len(experiment.cases), "drives") as bar:
-        table = picture_drives(experiment, threads=threads or os.cpu_count() or 1, advance=bar.advance)
+        table = picture_drives(experiment, threads=threads, advance=bar.advance)
     if out is not None:
         write_frame(table, out)
     show_frame(f"From pictures, errors along the {trajectory} trajectory, degrees and mm", table, ["kind", "by"])
@@ -135,8 +131,8 @@ def calibration_images(
 
 def trust_calibration(
     *,
-    drives: Annotated[int, Parameter(validator=validators.Number(gte=1))] = 100,
-    seed: Annotated[int, Parameter(validator=validators.Number(gte=0))] = 100_000,
+    drives: AtLeast1 = 100,
+    seed: AtLeast0 = 100_000,
     only: str = "",
     out: Path | None = None,
 ) -> None:

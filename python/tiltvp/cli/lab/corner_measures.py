@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-from cyclopts import Parameter, validators
+from cyclopts import Parameter
 
 from tiltvp.cli.lab.tables import show_frame
+from tiltvp.cli.options import ALL_CORES, AtLeast0, Threads
 from tiltvp.cli.tables import write_frame
 from tiltvp.cli.terminal import progress_bar, say
 from tiltvp.errors import InvalidInputError
@@ -23,13 +23,13 @@ if TYPE_CHECKING:
 
 def corners(
     *,
-    poses: Annotated[int, Parameter(validator=validators.Number(gte=0))] = 100_000,
-    noisy_poses: Annotated[int, Parameter(validator=validators.Number(gte=0))] = 2000,
-    frames: Annotated[int, Parameter(validator=validators.Number(gte=0))] = 1000,
+    poses: AtLeast0 = 100_000,
+    noisy_poses: AtLeast0 = 2000,
+    frames: AtLeast0 = 1000,
     scenes: Annotated[tuple[str, ...], Parameter(consume_multiple=True)] = (),
-    rooms: Annotated[int, Parameter(validator=validators.Number(gte=0))] = 0,
-    seed: Annotated[int, Parameter(validator=validators.Number(gte=0))] = 7001,
-    threads: Annotated[int | None, Parameter(validator=validators.Number(gte=1))] = None,
+    rooms: AtLeast0 = 0,
+    seed: AtLeast0 = 7001,
+    threads: Threads = ALL_CORES,
     out: Path | None = None,
 ) -> None:
     """Poses of corners: the closed form on random poses, and rendered sequences of a hand-held stereo pair.
@@ -53,8 +53,6 @@ def corners(
         table over them.
     seed
         Seed of the first scene and motion.
-    threads
-        Frames rendered at the same time; all cores by default.
     out
         Folder for the tables (Parquet) and the plots of errors over time (PNG).
     """
@@ -77,7 +75,7 @@ def corners(
         title = "Closed form, 0.3 px of noise on rays of 200 px, against the Cramer-Rao bound"
         show_frame(title, closed.summarise_noisy(noisy), [])
     if experiment is not None:
-        _sequences(experiment, threads or os.cpu_count() or 1, out, has_rooms=rooms > 0)
+        _sequences(experiment, threads, out, has_rooms=rooms > 0)
 
 
 def _scenes(names: tuple[str, ...], rooms: int) -> tuple[CornerScene, ...]:

@@ -9,6 +9,7 @@ from cyclopts import App
 
 from tiltvp.cli.lab.dataset_drives import drive, stereo
 from tiltvp.cli.lab.dataset_options import LensOptions, MakingOptions, Words, made_by, tilts_from
+from tiltvp.cli.lab.panorama_options import NoiseSigma, Samples
 from tiltvp.cli.options import Switch
 from tiltvp.cli.terminal import new_table, progress_bar, say, show
 from tiltvp.errors import counted
@@ -90,8 +91,8 @@ def render(
     *,
     panoramas: Path,
     tilts_deg: Words = None,
-    noise_sigma: float = 2.0,
-    samples: int = 2,
+    noise_sigma: NoiseSigma = 2.0,
+    samples: Samples = 2,
     turn: Switch = False,
     limit: int | None = None,
 ) -> None:
@@ -104,10 +105,6 @@ def render(
         equirectangular images.
     tilts_deg
         Leans as ALPHA,BETA ALPHA,BETA ... or a CSV file of columns alpha_deg, beta_deg; default is the paper's seven.
-    noise_sigma
-        Gaussian noise in grey levels.
-    samples
-        Rays per pixel and side.
     turn
         Give each view a heading of its own.
     limit
@@ -127,7 +124,7 @@ def render(
             noise_sigma=noise_sigma,
             turn=turn,
             seed=making.seed,
-            threads=making.thread_count,
+            threads=making.threads,
             source=made_by("render") | {"panoramas": panoramas.absolute().name} | lens.source,
             force=making.force,
             advance=bar.advance,
@@ -145,7 +142,7 @@ def synth(
     locations_per_room: int = 4,
     camera_height_m: float | None = None,
     tilts_deg: Words = None,
-    noise_sigma: float = 2.0,
+    noise_sigma: NoiseSigma = 2.0,
     samples: int | None = None,
 ) -> None:
     """Make a dataset of views of rendered rooms. A location is a place in a room, an environment a kind of room.
@@ -162,8 +159,6 @@ def synth(
         Height of the camera above the floor; default 0.3 metres.
     tilts_deg
         Leans as ALPHA,BETA ALPHA,BETA ... or a CSV file of columns alpha_deg, beta_deg; default is the paper's seven.
-    noise_sigma
-        Gaussian noise in grey levels.
     samples
         Rays per pixel and side; default 3.
     """
@@ -183,7 +178,7 @@ def synth(
             samples=samples,
             noise_sigma=noise_sigma,
             seed=making.seed,
-            threads=making.thread_count,
+            threads=making.threads,
             source=made_by("synth") | lens.source,
             force=making.force,
             advance=bar.advance,
@@ -213,7 +208,7 @@ def degrade(
             dataset,
             making.out,
             seed=making.seed,
-            threads=making.thread_count,
+            threads=making.threads,
             source=made_by("degrade"),
             force=making.force,
             advance=bar.advance,

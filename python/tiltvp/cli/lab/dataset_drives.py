@@ -51,9 +51,8 @@ def drive(
     from tiltvp.lab.datasets.driving import drive_room, write_drive
     from tiltvp.synth import Drive
 
-    count = making.thread_count
     room = drive_room(
-        kind, making.seed, extent=extent, floor_gloss=floor_gloss, wall_pattern=wall_pattern, threads=count
+        kind, making.seed, extent=extent, floor_gloss=floor_gloss, wall_pattern=wall_pattern, threads=making.threads
     )
     made = Drive(
         room,
@@ -69,11 +68,11 @@ def drive(
         lighting=lighting,
         samples=rendering.samples,
         noise_sigma=rendering.noise_sigma,
-        threads=count,
+        threads=making.threads,
     )
     with progress_bar(len(made), "frames") as bar:
         source = made_by("drive") | lens.source
-        write_drive(made, making.out, threads=count, source=source, force=making.force, advance=bar.advance)
+        write_drive(made, making.out, threads=making.threads, source=source, force=making.force, advance=bar.advance)
     say(f"{making.out}: {len(made)} frames of a drive of {made.motions[:, 0].sum():.1f} m")
 
 
@@ -118,14 +117,13 @@ def stereo(
     from tiltvp.lab.datasets.stereo import write_stereo
     from tiltvp.synth import Laboratory, Room, StereoSequence, zed_cameras
 
-    count = making.thread_count
     left, right = zed_cameras(width)
     if kind != "laboratory" and gamma_deg != 90.0:
         raise InvalidInputError(f"--gamma-deg {gamma_deg}, expected it with --kind laboratory alone")
     scene = (
-        Laboratory(making.seed, gamma_rad=math.radians(gamma_deg), clutter=clutter, threads=count)
+        Laboratory(making.seed, gamma_rad=math.radians(gamma_deg), clutter=clutter, threads=making.threads)
         if kind == "laboratory"
-        else Room(kind, making.seed, clutter=clutter, threads=count)
+        else Room(kind, making.seed, clutter=clutter, threads=making.threads)
     )
     sequence = StereoSequence(
         scene,
@@ -139,10 +137,15 @@ def stereo(
         noise_sigma=rendering.noise_sigma,
         blur_sigma_px=blur_sigma,
         exposure_s=exposure_ms / 1000.0,
-        threads=count,
+        threads=making.threads,
     )
     with progress_bar(len(sequence), "frames") as bar:
         write_stereo(
-            sequence, making.out, threads=count, source=made_by("stereo"), force=making.force, advance=bar.advance
+            sequence,
+            making.out,
+            threads=making.threads,
+            source=made_by("stereo"),
+            force=making.force,
+            advance=bar.advance,
         )
     say(f"{making.out}: {len(sequence)} pairs of images")

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import csv
 import math
-import os
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -12,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 import numpy as np
 from cyclopts import Parameter
 
-from tiltvp.cli.options import Switch
+from tiltvp.cli.options import ALL_CORES, AtLeast0, Switch, Threads
 from tiltvp.errors import InvalidInputError
 
 if TYPE_CHECKING:
@@ -21,11 +20,6 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from tiltvp import Camera
-
-
-def _not_negative(_: object, number: int) -> None:
-    if number < 0:
-        raise ValueError("expected 0 or more")
 
 
 Words = Annotated[list[str] | None, Parameter(consume_multiple=True, negative="")]
@@ -38,17 +32,11 @@ class MakingOptions:
 
     out: Path
     """Folder to make. It appears when it is whole."""
-    seed: Annotated[int, Parameter(validator=_not_negative)] = 0
+    seed: AtLeast0 = 0
     """Seed of whatever is random."""
-    threads: int | None = None
-    """How many threads; default is one per core."""
+    threads: Threads = ALL_CORES
     force: Switch = False
     """Replace a dataset that is there."""
-
-    @property
-    def thread_count(self) -> int:
-        """Threads to use."""
-        return (os.cpu_count() or 1) if self.threads is None else self.threads
 
 
 @Parameter(name="*")

@@ -10,8 +10,9 @@ from contextlib import chdir, redirect_stdout
 from pathlib import Path
 from typing import Annotated, Final
 
-from cyclopts import Parameter, validators
+from cyclopts import Parameter
 
+from tiltvp.cli.options import AtLeast0
 from tiltvp.cli.root import run
 from tiltvp.cli.terminal import say
 
@@ -23,7 +24,7 @@ _LINES_MAX: Final = 30
 def demo(
     *,
     out: Path = Path("out/demo-drive"),
-    seed: Annotated[int, Parameter(validator=validators.Number(gte=0))] = 0,
+    seed: AtLeast0 = 0,
     resolution_scale: Annotated[float, Parameter(show=False)] = 1.0,
 ) -> None:
     """Make a recording of a drive, and from it a robot's file, a mounting, a level video and attitudes for ROS.

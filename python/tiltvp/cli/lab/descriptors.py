@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 from typing import Annotated
 
-from cyclopts import Parameter, validators
+from cyclopts import Parameter
 
 from tiltvp.cli.lab.tables import show_frame
+from tiltvp.cli.options import ALL_CORES, AtLeast0, Threads
 from tiltvp.cli.tables import write_frame
 from tiltvp.cli.terminal import progress_bar, say
 from tiltvp.errors import InvalidInputError
@@ -20,10 +20,10 @@ def descriptors(
     /,
     *,
     out: Path,
-    frame: Annotated[int, Parameter(validator=validators.Number(gte=0))] = 0,
-    tracked: Annotated[int, Parameter(validator=validators.Number(gte=0))] = 240,
-    seed: Annotated[int, Parameter(validator=validators.Number(gte=0))] = 0,
-    threads: Annotated[int | None, Parameter(validator=validators.Number(gte=1))] = None,
+    frame: AtLeast0 = 0,
+    tracked: AtLeast0 = 240,
+    seed: AtLeast0 = 0,
+    threads: Threads = ALL_CORES,
 ) -> None:
     """How well the descriptor of vertical lines tells them apart, on drives of known edges (sections 5 and 6).
 
@@ -42,8 +42,6 @@ def descriptors(
         How many frames of the first drive are followed for the plot of tracks.
     seed
         Seed of the noise that is added.
-    threads
-        Frames at the same time; all cores by default.
     """
     from tiltvp.images import write_image
     from tiltvp.lab.datasets.driven import read_drive
@@ -59,7 +57,7 @@ def descriptors(
         raise InvalidInputError(f"--frame {frame}, expected one of the {len(known[0])} frames of {drives[0]}")
     experiment = DescriptorExperiment(seed=seed)
     with progress_bar(experiment.steps * len(known), "settings") as bar:
-        tables = measure_descriptors(known, experiment, threads=threads or os.cpu_count() or 1, advance=bar.advance)
+        tables = measure_descriptors(known, experiment, threads=threads, advance=bar.advance)
     directions = similarity(known[0], frame)
     followed = follow(known[0], tracked)
     frames = {

@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import math
-import os
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
 
-from cyclopts import App, Parameter, validators
+from cyclopts import App, Parameter
 
 from tiltvp.cli.lab.dataset_options import LensOptions, Mount, RenderingOptions, WayOptions, Words, legs_from
-from tiltvp.cli.options import Switch
+from tiltvp.cli.options import ALL_CORES, AtLeast0, Switch, Threads
 from tiltvp.cli.terminal import progress_bar, say
 
 app = App(name="lab", help="What the laboratory makes to try the package on.")
@@ -49,8 +47,8 @@ def drive(
     camera_delay_s: float = 0.0,
     compressed: Switch = False,
     rendering: RenderingOptions = _RENDERING,
-    seed: Annotated[int, Parameter(validator=validators.Number(gte=0))] = 0,
-    threads: int | None = None,
+    seed: AtLeast0 = 0,
+    threads: Threads = ALL_CORES,
 ) -> None:
     """Make a recording of a robot's drive through a room, as its sensors tell of it: an MCAP file for ROS 2.
 
@@ -73,8 +71,6 @@ def drive(
         Frames as PNG, on /camera/image_raw/compressed.
     seed
         Seed of room, way and noise.
-    threads
-        How many threads; default is one per core.
     """
     from tiltvp.files import check_output, check_toml
     from tiltvp.lab.datasets.driving import drive_room
@@ -86,10 +82,9 @@ def drive(
     if camera_out is not None:
         check_toml(camera_out)
         check_output(camera_out)
-    count = (os.cpu_count() or 1) if threads is None else threads
     camera = lens.load()
     made = RecordedDrive(
-        drive_room(kind, seed, threads=count),
+        drive_room(kind, seed, threads=threads),
         camera,
         legs=LEGS if way.legs is None else legs_from(way.legs),
         robot_from_camera=lens.rotation(),
@@ -105,7 +100,7 @@ def drive(
         seed=seed,
     )
     with progress_bar(len(made), "frames") as bar:
-        made.write(out, threads=count, advance=bar.advance)
+        made.write(out, threads=threads, advance=bar.advance)
     if camera_out is not None:
         camera.save(camera_out)
     wheels = made.description()["wheels"]

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-from cyclopts import Parameter, validators
+from cyclopts import Parameter
 
 from tiltvp.cli.lab.tables import show_frame
+from tiltvp.cli.options import ALL_CORES, AtLeast0, Threads
 from tiltvp.cli.terminal import progress_bar, say
 
 if TYPE_CHECKING:
@@ -22,9 +22,9 @@ def evaluate(
     out: Path,
     sweep: str = "paper",
     methods: Annotated[list[str] | None, Parameter(consume_multiple=True)] = None,
-    threads: Annotated[int | None, Parameter(validator=validators.Number(gte=1))] = None,
+    threads: Threads = ALL_CORES,
     cluster: str | None = None,
-    seed: Annotated[int, Parameter(validator=validators.Number(gte=0))] = 0,
+    seed: AtLeast0 = 0,
 ) -> None:
     """Run the methods over a dataset, train the corrections location by location, and print the paper's tables.
 
@@ -40,8 +40,6 @@ def evaluate(
         What is tried. paper: all combinations of table 2, and ours; table3: the best of them.
     methods
         Only these methods of the sweep.
-    threads
-        Images at the same time; all cores by default.
     cluster
         Address of a Dask scheduler whose workers do the work. They see the dataset at the same path.
     seed
@@ -56,11 +54,10 @@ def evaluate(
         done = experiment.images - len(experiment.missing())
         if done:
             say(f"{out}: {done} of {experiment.images} images were done before")
-        workers = threads or os.cpu_count() or 1
         with progress_bar(experiment.images, "images", done=done) as bar:
-            experiment.estimate(threads=workers, cluster=cluster, advance=bar.advance)
+            experiment.estimate(threads=threads, cluster=cluster, advance=bar.advance)
         with progress_bar(len(combinations), "corrections") as bar:
-            run = experiment.conclude(threads=workers, advance=bar.advance)
+            run = experiment.conclude(threads=threads, advance=bar.advance)
     show_tables(run)
 
 

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 from typing import Annotated
 
 from cyclopts import Parameter, validators
 
 from tiltvp.cli.lab.tables import show_frame
+from tiltvp.cli.options import ALL_CORES, AtLeast0, AtLeast1, Threads
 from tiltvp.cli.tables import check_ending, write_frame
 from tiltvp.cli.terminal import progress_bar
 
@@ -18,9 +18,9 @@ def lines(
     frames: Annotated[int, Parameter(validator=validators.Number(gte=2))] = 400,
     kinds: Annotated[tuple[str, ...], Parameter(consume_multiple=True)] = ("corridor", "hall"),
     leans_deg: Annotated[tuple[float, ...], Parameter(consume_multiple=True)] = (0.0, 5.0),
-    seed: Annotated[int, Parameter(validator=validators.Number(gte=0))] = 9001,
-    samples: Annotated[int, Parameter(validator=validators.Number(gte=1))] = 2,
-    threads: Annotated[int | None, Parameter(validator=validators.Number(gte=1))] = None,
+    seed: AtLeast0 = 9001,
+    samples: AtLeast1 = 2,
+    threads: Threads = ALL_CORES,
     out: Path | None = None,
 ) -> None:
     """How well vertical lines are found and followed on rendered drives below a mirror, by us and as the paper has it.
@@ -40,8 +40,6 @@ def lines(
         Seed of the first room and drive.
     samples
         Rays per pixel and side where surfaces meet.
-    threads
-        Frames rendered at the same time; all cores by default.
     out
         Also write the long table, one row for each frame and variant: .csv, .json or .parquet.
     """
@@ -50,7 +48,7 @@ def lines(
     check_ending(out)
     experiment = LineExperiment(frames=frames, kinds=kinds, leans_max_deg=leans_deg, seed=seed, samples=samples)
     with progress_bar(experiment.steps, "frames") as bar:
-        table = measure_lines(experiment, threads=threads or os.cpu_count() or 1, advance=bar.advance)
+        table = measure_lines(experiment, threads=threads, advance=bar.advance)
     if out is not None:
         write_frame(table, out)
     show_frame(f"Vertical lines on {experiment.steps} frames, angles in degrees", summarise_lines(table), ["variant"])

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 from typing import Annotated
 
-from cyclopts import App, Parameter, validators
+from cyclopts import App, Parameter
 
 from tiltvp.cli.lab.body import body
 from tiltvp.cli.lab.calibration_measures import calibration, calibration_images, trust_calibration
@@ -17,11 +16,12 @@ from tiltvp.cli.lab.descriptors import descriptors
 from tiltvp.cli.lab.levelling import level
 from tiltvp.cli.lab.line_measures import lines
 from tiltvp.cli.lab.mounting import mounting
-from tiltvp.cli.lab.panorama_options import Every, Out, Panoramas, PanoramasIfAny, Rooms
+from tiltvp.cli.lab.panorama_options import Every, NoiseSigma, Out, Panoramas, PanoramasIfAny, Rooms, Samples
 from tiltvp.cli.lab.planar_pose import planar_pose
 from tiltvp.cli.lab.striding import striding
 from tiltvp.cli.lab.tables import show_frame
 from tiltvp.cli.lab.trust import trust
+from tiltvp.cli.options import ALL_CORES, AtLeast1, Threads
 from tiltvp.cli.tables import check_ending, write_frame
 from tiltvp.cli.terminal import progress_bar, say
 from tiltvp.errors import InvalidInputError
@@ -49,8 +49,8 @@ def panoramas(
     /,
     *,
     every: Every = 1,
-    samples: int = 2,
-    noise_sigma: float = 2.0,
+    samples: Samples = 2,
+    noise_sigma: NoiseSigma = 2.0,
     turn: Annotated[bool, Parameter(negative="")] = False,
     out: Path | None = None,
 ) -> None:
@@ -58,10 +58,6 @@ def panoramas(
 
     Parameters
     ----------
-    samples
-        Rays per pixel and side.
-    noise_sigma
-        Gaussian noise in grey levels.
     turn
         Give each view a heading of its own.
     out
@@ -126,15 +122,13 @@ def views(
 
 
 @app.command
-def inertial(directory: Path, /, *, samples: int = 2) -> None:
+def inertial(directory: Path, /, *, samples: Samples = 2) -> None:
     """The refined method on panoramas as they were taken, against the camera's own inertial sensor.
 
     Parameters
     ----------
     directory
         Folder with the panoramas and an INDEX.csv of columns name, environment, imu_pitch_deg, imu_roll_deg.
-    samples
-        Rays per pixel and side.
     """
     from tiltvp.lab.datasets.panoramas import paper_camera
     from tiltvp.lab.evaluation.imu import estimate_leaning, read_inertial_index, summarise_inertial
@@ -151,7 +145,7 @@ def scaling(
     images: Annotated[tuple[int, ...], Parameter(consume_multiple=True)] = (21, 42, 84, 168),
     scales: Annotated[tuple[float, ...], Parameter(consume_multiple=True)] = (0.25, 0.5, 1.0, 2.0, 4.0),
     sweep: str = "paper",
-    threads: Annotated[int | None, Parameter(validator=validators.Number(gte=1))] = None,
+    threads: Threads = ALL_CORES,
     out: Out = None,
 ) -> None:
     """The time that an evaluation of rendered rooms takes, over the number of images and over their pixels.
@@ -164,8 +158,6 @@ def scaling(
         Pixels of an image, in multiples of 640 x 480.
     sweep
         What is tried: paper or table3.
-    threads
-        Images at the same time; all cores by default.
     """
     from tiltvp.lab.datasets.panoramas import paper_camera
     from tiltvp.lab.evaluation.combinations import choose
@@ -175,7 +167,7 @@ def scaling(
     combinations = choose(sweep)
     with progress_bar(len(images) + len(scales), "evaluations") as bar:
         table = measure_scaling(
-            paper_camera(), combinations, images=images, scales=scales, threads=threads or os.cpu_count() or 1,
+            paper_camera(), combinations, images=images, scales=scales, threads=threads,
             advance=bar.advance,
         )  # fmt: skip
     if out is not None:
@@ -226,9 +218,9 @@ def sampling(
     every: Every = 4,
     rooms: Rooms = 4,
     kind: str | None = None,
-    seeds: Annotated[int, Parameter(validator=validators.Number(gte=1))] = 5,
-    samples: int = 2,
-    noise_sigma: float = 2.0,
+    seeds: AtLeast1 = 5,
+    samples: Samples = 2,
+    noise_sigma: NoiseSigma = 2.0,
     out: Path | None = None,
 ) -> None:
     """Each option of the sampling loop, alone and together, against plain RANSAC: errors, trials, times, what pays.
@@ -239,10 +231,6 @@ def sampling(
         Rooms of this kind alone.
     seeds
         Seeds for each image.
-    samples
-        Rays per pixel and side.
-    noise_sigma
-        Gaussian noise in grey levels.
     out
         Also write the long table, one row for each image, method, way and seed: .csv, .json or .parquet.
     """

@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-from typing import Annotated
-
-from cyclopts import Parameter, validators
-
 from tiltvp.cli.lab.tables import show_frame
+from tiltvp.cli.options import AtLeast0, AtLeast1
 from tiltvp.cli.terminal import progress_bar
 
 
 def mounting(
     *,
-    drives: Annotated[int, Parameter(validator=validators.Number(gte=1))] = 6,
-    seed: Annotated[int, Parameter(validator=validators.Number(gte=0))] = 900,
+    drives: AtLeast1 = 6,
+    seed: AtLeast0 = 900,
 ) -> None:
     """What `tiltvp setup` and `calibrate` find on rendered recordings of drives: level and sloping floors, and bumps.
 

@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
-
-from cyclopts import Parameter, validators
 
 from tiltvp.cli.lab.tables import show_frame
+from tiltvp.cli.options import ALL_CORES, AtLeast0, AtLeast1, Threads
 from tiltvp.cli.tables import check_ending, write_frame
 from tiltvp.cli.terminal import progress_bar
 from tiltvp.errors import InvalidInputError
@@ -18,9 +16,9 @@ _PAIRS_OF_A_ROOM = 12
 
 def planar_pose(
     *,
-    pairs: Annotated[int, Parameter(validator=validators.Number(gte=1))] = 180,
-    seed: Annotated[int, Parameter(validator=validators.Number(gte=0))] = 0,
-    threads: Annotated[int | None, Parameter(validator=validators.Number(gte=1))] = None,
+    pairs: AtLeast1 = 180,
+    seed: AtLeast0 = 0,
+    threads: Threads = ALL_CORES,
     out: Path | None = None,
     plot: Path | None = None,
 ) -> None:
@@ -34,8 +32,6 @@ def planar_pose(
         Pairs of places, rounded up to whole rooms of twelve; at least two rooms.
     seed
         Seed of rooms, places, headings, leans and noise.
-    threads
-        Rooms worked on at once; by default one for each core.
     out
         Also write the long table, one row for each pair, lean and correction: .parquet, .csv or .json.
     plot

@@ -4,13 +4,10 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
-from typing import Annotated
-
-from cyclopts import Parameter, validators
 
 from tiltvp.cli.lab.demo import demo
 from tiltvp.cli.lab.drive import app
-from tiltvp.cli.options import MethodOptions
+from tiltvp.cli.options import ALL_CORES, MethodOptions, Threads
 from tiltvp.cli.terminal import progress_bar, say
 from tiltvp.errors import InvalidInputError
 
@@ -30,7 +27,7 @@ def train(
     out: Path,
     kind: str = "posterior",
     options: MethodOptions = _OPTIONS,
-    threads: Annotated[int | None, Parameter(validator=validators.Number(gte=1))] = None,
+    threads: Threads = ALL_CORES,
 ) -> None:
     """Train what takes a method's shift or raw angle to the lean, on a dataset of known lean.
 
@@ -47,11 +44,7 @@ def train(
         posterior (the mean lean given the shift), affine, or factor.
     options
         The method, image-space-ransac if none is given, and its options.
-    threads
-        Images at the same time; all cores by default.
     """
-    import os
-
     from tiltvp.corrections import train_correction
     from tiltvp.files import check_output
     from tiltvp.lab.datasets.folder import read_dataset
@@ -70,7 +63,7 @@ def train(
         known.camera, correction=None, robot_from_camera=known.robot_from_camera, mask=known.mask
     )
     with progress_bar(len(known.images), "images") as bar:
-        shifts = measured_shifts(known, estimator, threads=threads or os.cpu_count() or 1, advance=bar.advance)
+        shifts = measured_shifts(known, estimator, threads=threads, advance=bar.advance)
     trained = train_correction(estimator, shifts, [image.alpha_rad for image in known.images], kind=kind)
     trained.save(out)
     say(f"{out}: {kind} of {method}, trained on {trained.images} of {len(known.images)} images")

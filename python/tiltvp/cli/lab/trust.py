@@ -5,10 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated
 
-from cyclopts import Parameter, validators
+from cyclopts import Parameter
 
 from tiltvp.cli.lab.tables import show_frame
-from tiltvp.cli.options import Switch
+from tiltvp.cli.options import AtLeast0, AtLeast1, Switch
 from tiltvp.cli.tables import check_ending, write_frame
 from tiltvp.cli.terminal import progress_bar, say
 from tiltvp.errors import InvalidInputError
@@ -18,9 +18,9 @@ def trust(
     panoramas: Annotated[list[Path], Parameter(consume_multiple=True)],
     /,
     *,
-    count: Annotated[int, Parameter(validator=validators.Number(gte=1))] = 200,
-    sets: Annotated[int, Parameter(validator=validators.Number(gte=0))] = 2,
-    seed: Annotated[int, Parameter(validator=validators.Number(gte=0))] = 0,
+    count: AtLeast1 = 200,
+    sets: AtLeast0 = 2,
+    seed: AtLeast0 = 0,
     unseen: Switch = False,
     weights: Switch = False,
     out: Path | None = None,
