@@ -51,7 +51,7 @@ def test_names_last_while_a_corner_is_hidden(walk: StereoSequence) -> None:
 
 
 def test_what_a_believed_corner_tells() -> None:
-    rotation, _ = pose()
+    rotation, vertex = pose()
     estimator = CornerPoseEstimator(
         CAMERA, CAMERA, LEFT_FROM_RIGHT, method="general", down=rotation[:, 1], right_handed=True
     )
@@ -65,10 +65,14 @@ def test_what_a_believed_corner_tells() -> None:
     off = (first.edge_lengths_m - 0.3) / first.edge_length_sigmas_m
     assert np.isfinite(off).any()
     assert np.nanmax(np.abs(off)) < 4.0
-    # A short baseline: what angles there are fit, and each has its standard deviation.
-    told = np.isfinite(first.edge_angles_rad)
-    assert np.array_equal(told, np.isfinite(first.edge_angle_sigmas_rad))
-    assert (np.abs(first.edge_angles_rad - math.pi / 2)[told] < 4.0 * first.edge_angle_sigmas_rad[told]).all()
+    # Places 0.12 m apart tell no angle, 0.4 m apart all of them.
+    assert np.isnan([first.edge_angles_rad, first.edge_angle_sigmas_rad]).all()
+    apart = LEFT_FROM_RIGHT.copy()
+    apart[0, 3] = 0.4
+    wide = CornerPoseEstimator(CAMERA, CAMERA, apart, method="general", down=rotation[:, 1], right_handed=True)
+    told, *_ = wide.poses(images[0], drawn(rotation, vertex - apart[:3, 3], GREYS))
+    assert (np.abs(told.edge_angles_rad - math.pi / 2) < 4.0 * told.edge_angle_sigmas_rad).all()
+    assert (told.edge_angle_sigmas_rad < math.radians(5.0)).all()
     assert pickle.loads(pickle.dumps(first)) == first
     # Names go on in copies, and `poses` is the same list.
     copy = pickle.loads(pickle.dumps(estimator))

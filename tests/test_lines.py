@@ -321,7 +321,8 @@ def test_lines_match_after_more_than_a_metre(mirror: tiltvp.Camera, office: Room
     # A line stays on its side of the way, and turns away from where the camera goes.
     first, second = (np.angle(np.exp(1j * (lines.bearing_rad - at))) for lines, at in zip(seen[::2], told, strict=True))
     assert (first[pairs[:, 0]] * second[pairs[:, 1]] > -0.1).all()
-    same, _ = tl.match_wide(*seen[:2], *seen[:2], ahead_rad=told)
+    same, _ = tl.match_wide(*seen[:2], *seen[:2], ahead_rad=told[:1] * 2)
+    assert len(same) == len(seen[0])
     assert (same[:, 0] == same[:, 1]).all()
     with pytest.raises(InvalidInputError, match="190 for each line"):
         tl.match_wide(seen[0], seen[1][:, 1:], seen[2], seen[3])
