@@ -255,7 +255,10 @@ def test_what_makes_no_sense_is_refused(laboratory: Laboratory) -> None:
 
 
 def test_the_command_refuses_before_it_renders(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    for words in (["--width", "640"], ["--kind", "office", "--gamma-deg", "80"], ["--kind", "attic"], ["--seed", "-1"]):
+    for said, *words in (
+        ("expected", "--width", "640"), ("expected", "--kind", "office", "--gamma-deg", "80"),
+        ("expected", "--kind", "attic"), ("Must be >= 0", "--seed", "-1"),
+    ):  # fmt: skip
         assert main(["dataset", "stereo", "--out", str(tmp_path / "set"), *words]) != 0
-        assert "expected" in capsys.readouterr().err
+        assert said in capsys.readouterr().err
     assert not list(tmp_path.iterdir())
