@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from tiltvp.errors import InvalidInputError
-from tiltvp.images import checked_mask, gray_from
+from tiltvp.images import camera_grays, checked_mask
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
@@ -75,10 +74,7 @@ def body_mask(images: Iterable[ArrayLike], camera: Camera, *, mask: ArrayLike | 
     size = (max(1, round(scale * shape[1])), max(1, round(scale * shape[0])))
     inside = cv2.erode(cv2.resize(looked.astype(np.uint8), size, interpolation=cv2.INTER_NEAREST), _disc()) > 0
     sums, seen, count = np.zeros((2, *inside.shape), np.float32), np.zeros(inside.shape, np.float32), 0
-    for number, image in enumerate(images):
-        gray = gray_from(image, f"images[{number}]")
-        if gray.shape != shape:
-            raise InvalidInputError(f"images[{number}]: shape {gray.shape}, expected {shape}, as the camera's images")
+    for gray in camera_grays(images, camera):
         small = np.asarray(cv2.resize(gray, size, interpolation=cv2.INTER_AREA), dtype=np.uint8)
         at, directions = _edges_of(small, inside)
         sums.reshape(2, -1)[:, at] += directions

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
@@ -88,6 +89,19 @@ def bgr_from(image: ArrayLike, name: str = "image", *, bits: int | None = None) 
     return np.ascontiguousarray(_bytes_from(array[:, :, :3], name, bits))
 
 
+def camera_grays(images: Iterable[ArrayLike], camera: _core.Camera) -> Iterator[NDArray[np.uint8]]:
+    """Each image of a camera as `gray_from` makes it, (H, W), one after the other.
+
+    Raises `InvalidInputError` with the number of what is no image, or one of another size than the camera's.
+    """
+    shape = (camera.height, camera.width)
+    for number, image in enumerate(images):
+        gray = gray_from(image, f"images[{number}]")
+        if gray.shape != shape:
+            raise InvalidInputError(f"images[{number}]: shape {gray.shape}, expected {shape}, as the camera's images")
+        yield gray
+
+
 def checked_mask(mask: ArrayLike, camera: _core.Camera) -> NDArray[np.bool_]:
     """The (H, W) bool array, True where images of the camera show the world.
 
@@ -135,11 +149,15 @@ def read_image(path: str | os.PathLike[str]) -> NDArray[np.uint8]:
     16 bits a value are scaled as arrays of uint16 are.
     """
     file = path_from(path)
+    return decode_image(image_bytes(file), str(file))
+
+
+def image_bytes(file: Path) -> bytes:
+    """The content of an image file. Raises `ImageFileError` with the path."""
     try:
-        data = read_bytes(file, LARGEST_IMAGE_BYTES)
+        return read_bytes(file, LARGEST_IMAGE_BYTES)
     except OSError as error:
         raise ImageFileError(f"{file}: {error.strerror or error}") from error
-    return decode_image(data, str(file))
 
 
 def decode_image(data: bytes, name: str) -> NDArray[np.uint8]:

@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from tiltvp.errors import InvalidInputError
-from tiltvp.images import gray_from
+from tiltvp.images import camera_grays
 from tiltvp.rim import circle_through
 
 if TYPE_CHECKING:
@@ -41,12 +40,8 @@ def surround_mask(images: Iterable[ArrayLike], camera: Camera) -> NDArray[np.boo
     if not camera.valid_mask().all():
         return None
     lightest: NDArray[np.uint8] | None = None
-    for number, image in enumerate(images):
-        gray = gray_from(image, f"images[{number}]")
-        if gray.shape != (camera.height, camera.width):
-            expected = f"({camera.height}, {camera.width}), as the camera's images"
-            raise InvalidInputError(f"images[{number}]: shape {gray.shape}, expected {expected}")
-        gray = np.asarray(cv2.medianBlur(gray, 5), dtype=np.uint8)
+    for image in camera_grays(images, camera):
+        gray = np.asarray(cv2.medianBlur(image, 5), dtype=np.uint8)
         lightest = gray if lightest is None else np.maximum(lightest, gray)
     if lightest is None:
         return None

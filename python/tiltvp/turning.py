@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from tiltvp.errors import InvalidInputError
-from tiltvp.images import gray_from
+from tiltvp.images import camera_grays
 from tiltvp.rotations import mounting_from
 from tiltvp.setup_check import DIRECTIONS, nearest_direction, opposite_direction
 
@@ -350,13 +350,7 @@ def made_small(image: NDArray[np.uint8], camera: Camera) -> NDArray[np.uint8]:
 
 
 def _small(images: Iterable[ArrayLike], camera: Camera) -> tuple[Camera, list[NDArray[np.float64]]]:
-    grays = []
-    for number, image in enumerate(images):
-        gray = gray_from(image, f"images[{number}]")
-        if gray.shape != (camera.height, camera.width):
-            expected = f"({camera.height}, {camera.width}), as the camera's images"
-            raise InvalidInputError(f"images[{number}]: shape {gray.shape}, expected {expected}")
-        grays.append(made_small(gray, camera).astype(np.float64))
+    grays = [made_small(gray, camera).astype(np.float64) for gray in camera_grays(images, camera)]
     return small_camera(camera), grays
 
 

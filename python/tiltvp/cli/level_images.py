@@ -211,15 +211,11 @@ def _ending(file: Path) -> str:
 
 def _read(frame: Frame, work: Levelling) -> tuple[NDArray[np.uint8], bytes]:
     """An image and its file's bytes. Raises `ImageFileError` for what is no panorama where one is expected."""
-    from tiltvp.files import read_bytes
-    from tiltvp.images import LARGEST_IMAGE_BYTES
+    from tiltvp.images import image_bytes
     from tiltvp.photos import is_jpeg, panorama_kind
 
     file, image = Path(frame.name), frame.read()
-    try:
-        data = read_bytes(file, LARGEST_IMAGE_BYTES)
-    except OSError as error:
-        raise ImageFileError(f"{file}: {error.strerror or error}") from error
+    data = image_bytes(file)
     if work.looks.camera is None:
         kind = panorama_kind(data, image.shape[1], image.shape[0])
         if not kind.is_whole:

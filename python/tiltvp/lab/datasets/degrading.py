@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 import os
 from collections.abc import Callable
-from contextlib import closing
 from threading import Event
 from typing import TYPE_CHECKING, Any, Final
 
@@ -103,7 +102,7 @@ def degrade_dataset(
                 yaw_rad=image.yaw_rad,
             )
 
-        with closing(in_order(work, list(enumerate(dataset.images)), threads, stop)) as images:
+        with in_order(work, list(enumerate(dataset.images)), threads, stop) as images:
             for image in images:
                 new.images.append(image)
                 advance()

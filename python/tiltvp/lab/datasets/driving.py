@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 from collections.abc import Callable
 from concurrent.futures import CancelledError
-from contextlib import closing
 from threading import Event
 from typing import Any, Final
 
@@ -108,7 +107,7 @@ def write_drive(
             return image, drive.truth(frame, threads=1)
 
         truth: list[tuple[object, ...]] = []
-        with closing(in_order(render, range(len(drive)), threads, stop)) as results:
+        with in_order(render, range(len(drive)), threads, stop) as results:
             for frame, (image, seen) in enumerate(results):
                 new.images.append(image)
                 truth.extend(_truth_rows(frame, seen))

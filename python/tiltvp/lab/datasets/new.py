@@ -6,7 +6,7 @@ import csv
 import io
 import math
 import os
-from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from pathlib import Path
@@ -109,18 +109,19 @@ def new_folder(directory: str | os.PathLike[str], *, force: bool = False) -> Ite
         _refuse_taken(target, force)
 
 
+@contextmanager
 def in_order(
     work: Callable[[Job], Result], jobs: Sequence[Job], threads: int, stop: Event
-) -> Generator[Result, None, None]:
+) -> Iterator[Iterator[Result]]:
     """`work(job)` of each job, in their order, on several threads.
 
-    When one fails, or the caller goes away, what has not begun never does, and `stop` is set for what has.
+    When one fails, or the caller leaves, what has not begun never does, and `stop` is set for what has.
     """
     if threads < 1:
         raise InvalidInputError(f"threads = {threads}, expected 1 or more")
     pool = ThreadPoolExecutor(min(threads, max(1, len(jobs))))
     try:
-        yield from pool.map(work, jobs)
+        yield pool.map(work, jobs)
     finally:
         stop.set()
         pool.shutdown(wait=True, cancel_futures=True)

@@ -6,7 +6,7 @@ import math
 import os
 from collections.abc import Callable, Iterator
 from concurrent.futures import CancelledError
-from contextlib import closing, suppress
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
 from threading import Event
@@ -159,7 +159,7 @@ class RecordedDrive:
             return self.drive.render_at(frame, pose=pose, alpha_rad=alpha, beta_rad=beta, threads=1).gray
 
         events = sorted(self._events(), key=lambda event: event[0])
-        with new_recording(out) as recording, closing(in_order(render, range(len(self)), threads, stop)) as images:
+        with new_recording(out) as recording, in_order(render, range(len(self)), threads, stop) as images:
             self._write_constants(recording)
             for stamp, topic, message in events:
                 if message is None:

@@ -6,7 +6,6 @@ import math
 import os
 from collections.abc import Callable, Sequence
 from concurrent.futures import CancelledError
-from contextlib import closing
 from pathlib import Path
 from threading import Event
 from typing import TYPE_CHECKING, Any, Final, TypeVar
@@ -212,7 +211,7 @@ def _fill(
     stop: Event,
     advance: Callable[[], None],
 ) -> None:
-    with closing(in_order(render, jobs, threads, stop)) as results:
+    with in_order(render, jobs, threads, stop) as results:
         for images in results:
             new.images.extend(images)
             advance()

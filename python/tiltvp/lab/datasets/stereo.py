@@ -6,7 +6,6 @@ import math
 import os
 from collections.abc import Callable
 from concurrent.futures import CancelledError
-from contextlib import closing
 from threading import Event
 from typing import Any, Final
 
@@ -71,7 +70,7 @@ def write_stereo(
             return sequence.truth(frame, threads=1)
 
         truth: list[tuple[object, ...]] = []
-        with closing(in_order(render, range(len(sequence)), threads, stop)) as results:
+        with in_order(render, range(len(sequence)), threads, stop) as results:
             for frame, seen in enumerate(results):
                 truth.extend(_truth_rows(frame, seen))
                 advance()

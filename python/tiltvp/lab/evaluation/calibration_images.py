@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
-from contextlib import closing
 from dataclasses import dataclass
 from functools import partial
 from threading import Event
@@ -114,7 +113,7 @@ def _seen(drive: Drive, threads: int) -> Iterator[SeenFrame]:
         estimate = estimator(gray)
         return estimate if estimate else None
 
-    with closing(in_order(lambda k: drive.render(k, threads=1), range(len(drive)), threads, Event())) as views:
+    with in_order(lambda k: drive.render(k, threads=1), range(len(drive)), threads, Event()) as views:
         for seen in see_lines((view.gray for view in views), extractor, tilt=tilt, motions=motions):
             if isinstance(seen, Exception):
                 raise seen

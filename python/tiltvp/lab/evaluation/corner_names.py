@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from concurrent.futures import CancelledError
-from contextlib import closing
 from threading import Event
 from typing import TYPE_CHECKING, Any, Final
 
@@ -75,7 +74,7 @@ def names_seen(
 
     place: NDArray[np.float64] | None = None
     poses = sequence.poses_at(sequence.times_s)
-    with closing(in_order(render, range(len(sequence)), threads, stop)) as pairs:
+    with in_order(render, range(len(sequence)), threads, stop) as pairs:
         for frame, pair in enumerate(pairs):
             for cover, estimator in estimators.items():
                 images = pair

@@ -5,7 +5,6 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import CancelledError
-from contextlib import closing
 from dataclasses import dataclass
 from threading import Event
 from typing import TYPE_CHECKING, Any, Final
@@ -226,7 +225,7 @@ def _estimates(
             raise CancelledError
         return sequence.render(frame, threads=1)
 
-    with closing(in_order(render, range(len(sequence)), threads, stop)) as pairs:
+    with in_order(render, range(len(sequence)), threads, stop) as pairs:
         for frame, pair in enumerate(pairs):
             looks = {method: _timed(estimator, *pair) for method, estimator in estimators.items()}
             if scene.kind == "laboratory":

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import closing
 from dataclasses import dataclass, field
 from threading import Event
 from typing import TYPE_CHECKING, Any, Final, TypeVar
@@ -235,7 +234,7 @@ def _extractor(drive: DrivenFrames, options: dict[str, Any], method: str = "grea
 
 def _in_frames(work: Callable[[int], Result], drive: DrivenFrames, threads: int) -> Iterator[Result]:
     """`work(frame)` of all frames, in order."""
-    with closing(in_order(work, range(len(drive)), threads, Event())) as results:
+    with in_order(work, range(len(drive)), threads, Event()) as results:
         yield from results
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Callable, Iterable
 from pathlib import Path
@@ -11,7 +12,7 @@ import polars as pl
 
 from tiltvp.cameras import Camera
 from tiltvp.lab.datasets.panoramas import Panorama, PanoramaViews, read_index
-from tiltvp.tilt import TiltEstimator
+from tiltvp.tilt import TiltEstimate, TiltEstimator
 
 __all__ = ["InertialPanorama", "estimate_leaning", "read_inertial_index", "summarise_inertial"]
 
@@ -45,29 +46,32 @@ def estimate_leaning(
     noise_sigma: float = 2.0,
     advance: Callable[[], None] = lambda: None,
 ) -> pl.DataFrame:
-    """One row for each panorama: how far to the front and left `refined` and the sensor see the vertical, in degrees.
-
-    A camera that leans to the front sees it behind, at less than 0.
-    """
+    """One row for each panorama, by `refined`: `against_sensor`."""
     estimator = TiltEstimator(camera, method="refined", tilt_max_rad=_TILT_MAX_RAD)
     rows = []
     for number, item in enumerate(panoramas):
         views = PanoramaViews(item.panorama, camera, samples=samples, upright=False)
         estimate = estimator(views.render((0.0, 0.0, 1.0), noise_sigma=noise_sigma, seed=number))
-        x, y, z = estimate.normal
-        rows.append(
-            {
-                "name": item.panorama.name,
-                "location": item.panorama.location,
-                "forward": float(np.rad2deg(np.arctan2(x, z))),
-                "left": float(np.rad2deg(np.arctan2(y, z))),
-                "imu_forward": item.pitch_deg,
-                "imu_left": item.roll_deg,
-                "confidence": estimate.confidence,
-            }
-        )
+        rows.append(against_sensor(item, estimate))
         advance()
     return pl.DataFrame(rows)
+
+
+def against_sensor(item: InertialPanorama, estimate: TiltEstimate) -> dict[str, object]:
+    """How far to the front and left a method and the sensor see the vertical, in degrees.
+
+    A camera that leans to the front sees it behind, at less than 0.
+    """
+    x, y, z = estimate.normal
+    return {
+        "name": item.panorama.name,
+        "location": item.panorama.location,
+        "forward": math.degrees(math.atan2(x, z)),
+        "left": math.degrees(math.atan2(y, z)),
+        "imu_forward": item.pitch_deg,
+        "imu_left": item.roll_deg,
+        "confidence": estimate.confidence,
+    }
 
 
 def summarise_inertial(table: pl.DataFrame) -> pl.DataFrame:

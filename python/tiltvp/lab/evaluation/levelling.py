@@ -15,7 +15,7 @@ import polars as pl
 from tiltvp.cameras import Camera
 from tiltvp.images import gray_from, read_image
 from tiltvp.lab.datasets.panoramas import Panorama, PanoramaViews, paper_camera
-from tiltvp.lab.evaluation.imu import InertialPanorama
+from tiltvp.lab.evaluation.imu import InertialPanorama, against_sensor
 from tiltvp.levelling import Leveller
 from tiltvp.photos import PHOTO_TILT_MAX_RAD, encode_like
 from tiltvp.rotations import rotation_from
@@ -124,18 +124,7 @@ def lean_against_sensor(
     rows = []
     for item in panoramas:
         estimate = _seen(one, gray_from(read_image(item.panorama.path)))
-        x, y, z = estimate.normal
-        rows.append(
-            {
-                "name": item.panorama.name,
-                "location": item.panorama.location,
-                "forward": math.degrees(math.atan2(x, z)),
-                "left": math.degrees(math.atan2(y, z)),
-                "imu_forward": item.pitch_deg,
-                "imu_left": item.roll_deg,
-                "confidence": estimate.confidence,
-            }
-        )
+        rows.append(against_sensor(item, estimate))
         advance()
     return pl.DataFrame(rows)
 

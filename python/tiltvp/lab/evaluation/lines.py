@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Iterator
-from contextlib import closing
 from dataclasses import asdict, dataclass, field
 from threading import Event
 from typing import TYPE_CHECKING, Any, Final, Literal
@@ -138,7 +137,7 @@ def measure_lines(
         def render(frame: int, drive: Drive = drive, stop: Event = stop) -> tuple[NDArray[np.uint8], DriveTruth] | None:
             return None if stop.is_set() else (drive.render(frame, threads=1).gray, drive.truth(frame, threads=1))
 
-        with closing(in_order(render, range(len(drive)), threads, stop)) as results:
+        with in_order(render, range(len(drive)), threads, stop) as results:
             for frame, seen in enumerate(results):
                 if seen is None:
                     break
