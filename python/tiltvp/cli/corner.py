@@ -17,7 +17,7 @@ from tiltvp.cli.corner_methods import AUTO, SCALES, Searches, methods_for
 from tiltvp.cli.corner_pairs import pairs_of, partners_of
 from tiltvp.cli.corner_results import CornerResults, tell
 from tiltvp.cli.declared_options import LibraryOptions, from_library, mask_from
-from tiltvp.cli.options import FrameRate, image_size_from
+from tiltvp.cli.options import FrameRate, Switch, image_size_from
 from tiltvp.cli.rerun_views import send_corner
 from tiltvp.cli.showing import RerunOptions
 from tiltvp.cli.sources import SourceOptions, check_apart, ending_at_interrupt, picture_names
@@ -92,7 +92,7 @@ def corner(
     results: CornerResults = _RESULTS,
     frame_rate: FrameRate = None,
     image_size: str | None = None,
-    independent: Annotated[bool, Parameter(negative="")] = False,
+    independent: Switch = False,
     inertial: InertialOptions = _INERTIAL,
     watching: RerunOptions = _WATCHING,
 ) -> int:

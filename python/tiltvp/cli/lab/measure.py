@@ -21,7 +21,7 @@ from tiltvp.cli.lab.planar_pose import planar_pose
 from tiltvp.cli.lab.striding import striding
 from tiltvp.cli.lab.tables import show_frame
 from tiltvp.cli.lab.trust import trust
-from tiltvp.cli.options import ALL_CORES, AtLeast1, Threads
+from tiltvp.cli.options import ALL_CORES, AtLeast1, Switch, Threads
 from tiltvp.cli.tables import check_ending, write_frame
 from tiltvp.cli.terminal import progress_bar, say
 from tiltvp.errors import InvalidInputError
@@ -51,7 +51,7 @@ def panoramas(
     every: Every = 1,
     samples: Samples = 2,
     noise_sigma: NoiseSigma = 2.0,
-    turn: Annotated[bool, Parameter(negative="")] = False,
+    turn: Switch = False,
     out: Path | None = None,
 ) -> None:
     """Every method on views of upright panoramas through an upward fisheye, at the seven leans of the paper's table 1.
@@ -82,7 +82,7 @@ def panoramas(
 
 @app.command
 def views(
-    directory: Panoramas, /, *, every: Every = 1, weights: bool = False, prior_deg: float = 15.0, out: Out = None
+    directory: Panoramas, /, *, every: Every = 1, weights: Switch = False, prior_deg: float = 15.0, out: Out = None
 ) -> None:
     """The vertical of views that look anywhere, pinhole and fisheye, by the method of straight edges.
 
