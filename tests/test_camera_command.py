@@ -13,6 +13,9 @@ import tiltvp
 from calibration_texts import SAMPLES
 from commands import Run
 from tiltvp import Camera, Robot
+from tiltvp.cli.lab.dataset_options import LensOptions
+from tiltvp.cli.options import CameraOptions
+from tiltvp.formats import write_toml
 from tiltvp.rotations import read_rotation
 from tiltvp.streams import Wheels
 
@@ -124,6 +127,16 @@ def test_one_of_several_cameras_is_cropped_and_scaled(run: Run, tmp_path: Path) 
     said = run("camera", "scale", chain, out, "--factor", "2", "--camera-name", "2", "--overwrite")
     assert (said.code, Camera.load(out)) == (2, whole.scaled(2.0))
     assert "no camera '2', expected one of cam0, cam1 or a number" in said.complaint
+
+
+def test_a_name_that_is_a_number_is_a_name(run: Run, tmp_path: Path) -> None:
+    file, out = tmp_path / "cameras.toml", tmp_path / "out.toml"
+    one, other = (Camera.pinhole(width=64, height=48, fx=focal, fy=focal, cx=32.0, cy=24.0) for focal in (50.0, 70.0))
+    write_toml([one.to_spec("1"), other.to_spec("0")], file)
+    assert run("camera", "crop", file, out, "--at", "0", "0", "--size", "64x48", "--camera-name", "1").code == 0
+    told = Camera.load(out), CameraOptions(camera=file, camera_name="1").load(), Camera.load(file, camera="1")
+    assert told == (one,) * 3
+    assert (CameraOptions(camera=file).load(), LensOptions(camera=file, camera_name="0").load()) == (one, other)
 
 
 @pytest.fixture

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import operator
 import os
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Final, Self
@@ -115,26 +114,16 @@ class Camera(Lenses):
         """The camera of a calibration file.
 
         The format is recognised by its content unless `format` names it (`tiltvp.formats.FORMATS` lists them). `camera`
-        picks one by its name or place where the file has several. `image_size`, (width, height) in pixels, is for the
-        files that do not carry it. `mirror` says that the images are seen in a mirror, where the file does not.
-        Raises `tiltvp.errors.CalibrationError` that says what was wrong, what was expected and where.
+        picks one by its name, or else its number from 0, where the file has several. `image_size`, (width, height) in
+        pixels, is for the files that do not carry it. `mirror` says that the images are seen in a mirror, where the
+        file does not. Raises `tiltvp.errors.CalibrationError` that says what was wrong, what was expected and where.
         """
         from tiltvp.formats import read_cameras
+        from tiltvp.formats.spec import chosen_spec
 
-        specs = read_cameras(path, format, image_size)
-        names = [spec.name for spec in specs]
-        if isinstance(camera, str):
-            if camera not in names:
-                raise InvalidInputError(f"{path}: no camera {camera!r}, expected one of {', '.join(names)}")
-            camera = names.index(camera)
+        spec = chosen_spec(read_cameras(path, format, image_size), camera, path)
         try:
-            number = operator.index(camera)
-        except TypeError:
-            raise InvalidInputError(f"{path}: camera = {camera!r}, expected a name or a whole number") from None
-        if not 0 <= number < len(specs):
-            raise InvalidInputError(f"{path}: no camera number {number}, expected 0 to {len(specs) - 1}")
-        try:
-            found = cls.from_spec(specs[number])
+            found = cls.from_spec(spec)
             return found.mirrored() if mirror and not found.mirror else found
         except CalibrationError as error:
             raise CalibrationError(f"{path}: {error}") from error

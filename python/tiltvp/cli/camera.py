@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import os
-import re
 import sys
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -54,16 +53,11 @@ class FileOptions:
             return _recorded(Recording(file))
         return read_cameras(file, self.format, image_size_from(self.image_size))
 
-    def one(self, file: Path, name: str) -> CameraSpec:
-        """The camera of a file that has this name, or else this number, the first being 0."""
-        specs = self.specs(file)
-        chosen = [spec for spec in specs if spec.name == name]
-        if not chosen and re.fullmatch(r"\d{1,9}", name, re.ASCII):
-            chosen = specs[int(name) :][:1]
-        if not chosen:
-            names = ", ".join(spec.name for spec in specs)
-            raise InvalidInputError(f"{file}: no camera {name!r}, expected one of {names} or a number")
-        return chosen[0]
+    def one(self, file: Path, name: str | None) -> CameraSpec:
+        """The camera of a file that has this name, or else this number, by default the first, 0."""
+        from tiltvp.formats.spec import chosen_spec
+
+        return chosen_spec(self.specs(file), name or 0, file)
 
 
 _READING = FileOptions()

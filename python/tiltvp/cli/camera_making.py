@@ -119,7 +119,7 @@ def crop(
     *,
     at: tuple[int, int],
     size: str,
-    camera_name: str = "0",
+    camera_name: str | None = None,
 ) -> None:
     """Write the camera of a part of the images; of a robot's file the robot with it, the mask cropped alike.
 
@@ -156,7 +156,7 @@ def scale(
     *,
     factor: Annotated[float | None, _ABOVE_0] = None,
     to: str | None = None,
-    camera_name: str = "0",
+    camera_name: str | None = None,
 ) -> None:
     """Write the camera of resized images; of a robot's file the robot with it, the mask resized alike.
 

@@ -76,16 +76,11 @@ class CameraOptions:
         word = str(self.camera)
         if word.startswith(_PANORAMA):
             refuse_beside(self, ("camera_format", "camera_name", "image_size", "mirror"), word)
-            size = image_size_from(word.removeprefix(_PANORAMA), f"--camera {_PANORAMA}")
-            assert size is not None  # There is a text.
-            return Camera.equirectangular(width=size[0], height=size[1])
-        name = self.camera_name or "0"
-        camera = Camera.load(
-            self.camera,
-            self.camera_format,
-            camera=int(name) if name.isdecimal() else name,
-            image_size=image_size_from(self.image_size),
-        )
+            whole = image_size_from(word.removeprefix(_PANORAMA), f"--camera {_PANORAMA}")
+            assert whole is not None  # There is a text.
+            return Camera.equirectangular(width=whole[0], height=whole[1])
+        size = image_size_from(self.image_size)
+        camera = Camera.load(self.camera, self.camera_format, camera=self.camera_name or 0, image_size=size)
         return self._mirrored(camera)
 
     def _mirrored(self, camera: "Camera") -> "Camera":

@@ -6,9 +6,13 @@ right and y down. The core says which parameters a model has and what they mean 
 
 from __future__ import annotations
 
+import operator
+import re
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 from tiltvp import _core
+from tiltvp.errors import InvalidInputError
 
 Parameters = dict[str, "float | list[float]"]
 ImageSize = tuple[int, int]
@@ -35,3 +39,21 @@ class CameraSpec:
     def check(self) -> None:
         """Raises what the camera of these numbers raises: `tiltvp.errors.TiltvpError` for what no such lens has."""
         _core.check_camera(self.model, self.width, self.height, self.parameters, self.max_theta_rad)
+
+
+def chosen_spec(specs: Sequence[CameraSpec], camera: str | int, where: object) -> CameraSpec:
+    """The camera of that name, or else of that number, the first being 0. Raises `InvalidInputError` with `where`."""
+    names = [spec.name for spec in specs]
+    if isinstance(camera, str):
+        if camera in names:
+            return specs[names.index(camera)]
+        if not re.fullmatch(r"\d{1,9}", camera, re.ASCII) or int(camera) >= len(specs):
+            raise InvalidInputError(f"{where}: no camera {camera!r}, expected one of {', '.join(names)} or a number")
+        return specs[int(camera)]
+    try:
+        number = operator.index(camera)
+    except TypeError:
+        raise InvalidInputError(f"{where}: camera = {camera!r}, expected a name or a whole number") from None
+    if not 0 <= number < len(specs):
+        raise InvalidInputError(f"{where}: no camera number {number}, expected 0 to {len(specs) - 1}")
+    return specs[number]

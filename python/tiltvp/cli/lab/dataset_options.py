@@ -81,8 +81,7 @@ class LensOptions:
         if self.camera is None:
             self._refuse_name()
             return paper_camera()
-        name = self.camera_name or "0"
-        return Camera.load(self.camera, camera=int(name) if name.isdecimal() else name)
+        return Camera.load(self.camera, camera=self.camera_name or 0)
 
     def _refuse_name(self) -> None:
         if self.camera_name is not None:

@@ -129,12 +129,11 @@ def _camera(file: Path, table: dict[str, Any], findings: Findings) -> tuple[Came
         return None, None
     path = file.parent / table["camera"]
     size = table.get("image_size")
-    name = table.get("camera_name", 0)
     try:
         camera = Camera.load(
             path,
             table.get("camera_format"),
-            camera=int(name) if isinstance(name, str) and name.isdecimal() else name,
+            camera=table.get("camera_name", 0),
             image_size=None if size is None else (size[0], size[1]),
         )
         robot = Robot.load(path) if is_robot(path) else None
