@@ -45,16 +45,14 @@ class Bag:
         """A message that is written down at that time."""
         self.rows.append((topic, name.replace("/", "/msg/", 1), written_s, self.make(name, *values)))
 
-    def image(
-        self, topic: str, time_s: float, pixels: np.ndarray, encoding: str, *, late_s: float = 0.0, step: int = 0
-    ) -> None:
+    def image(self, topic: str, time_s: float, pixels: np.ndarray, encoding: str, *, late_s: float = 0.0) -> None:
         big = int(pixels.dtype.byteorder == ">")
         data = np.frombuffer(pixels.tobytes(), np.uint8)
         height, width = pixels.shape[:2]
-        row = step or data.size // height
         self.add(
-            topic, "sensor_msgs/Image", time_s + late_s, self.header(time_s), height, width, encoding, big, row, data
-        )
+            topic, "sensor_msgs/Image", time_s + late_s, self.header(time_s), height, width, encoding, big,
+            data.size // height, data,
+        )  # fmt: skip
 
     def compressed(self, topic: str, time_s: float, content: bytes) -> None:
         data = np.frombuffer(content, np.uint8)

@@ -83,12 +83,12 @@ Made = tuple["NDArray[Any]", Camera, "Matrix", "Matrix | None"]
 Make = Callable[[_Place, np.random.Generator], Made]
 
 
-def _told(camera: Camera, mounting: Matrix, told: Matrix, told_camera: Camera | None = None) -> Make:
+def _told(camera: Camera, mounting: Matrix, told: Matrix) -> Make:
     """Seen by a camera in a mounting, and told to be in another."""
 
     def make(place: _Place, _: np.random.Generator) -> Made:
         normal = told @ mounting.T @ place.lean
-        return place.view(camera, mounting), told_camera or camera, told, normal
+        return place.view(camera, mounting), camera, told, normal
 
     return make
 
