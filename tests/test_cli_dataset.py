@@ -141,7 +141,7 @@ def test_a_camera_without_a_file_has_no_name(run: Run, tmp_path: Path) -> None:
         assert (code, "--camera-name left without a calibration file" in complaints) == (2, True)
 
 
-def test_findings_are_a_table(run: Run, world: Path, tmp_path: Path) -> None:
+def test_findings_are_a_table(run: Run, tmp_path: Path) -> None:
     (tmp_path / "dataset.toml").write_text('camera = "camera.toml"\nmirrored = true\n')
     (tmp_path / "images.csv").write_text("file,location,environment,alpha_deg,beta_deg\na.png,a,x,0,0\n")
     code, said, complaints = run("check", tmp_path)

@@ -89,7 +89,7 @@ def test_a_drive_is_followed(driven: pl.DataFrame) -> None:
     assert fused["error_rad"].mean() < fused["image_error_rad"].mean()
 
 
-def test_the_picture_of_a_drive(driven: pl.DataFrame, tmp_path: Path) -> None:
+def test_the_picture_of_a_drive(driven: pl.DataFrame) -> None:
     figure = filtered_tilt(driven)
     upper, lower = figure.axes
     assert upper.get_ylabel() == "roll (degrees)"

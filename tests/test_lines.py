@@ -6,7 +6,6 @@ import copy
 import json
 import math
 import pickle
-from collections.abc import Callable
 
 import numpy as np
 import pytest
@@ -355,7 +354,7 @@ def test_a_line_across_the_seam_of_a_panorama_is_drawn_on_both_sides() -> None:
     assert not drawn[20:-20].any()
 
 
-def test_same_bytes_from_many_threads(room: RoomImage, camera: tiltvp.Camera, render: Callable[..., RoomImage]) -> None:
+def test_same_bytes_from_many_threads(room: RoomImage, camera: tiltvp.Camera) -> None:
     from concurrent.futures import ThreadPoolExecutor
 
     extractor = tl.LineExtractor(camera)

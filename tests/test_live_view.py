@@ -198,7 +198,7 @@ def test_a_mounting_that_converges_in_rerun(run: Run, tmp_path: Path) -> None:
     assert half[-1] < 0.2 * half[0]
 
 
-def test_landmarks_are_where_they_were(tmp_path: Path) -> None:
+def test_landmarks_are_where_they_were() -> None:
     """Exact bearings of known places, from a camera that is turned and off the axis."""
     wheels = np.tile([[0.10, 0.13]], (60, 1))
     poses = robot_poses(wheels, wheel_base_m=0.4)

@@ -173,7 +173,7 @@ def test_mount_passes_and_fails_by_its_exit_code(drive, tmp_path, capsys):
     assert level == 0
 
 
-def test_too_few_images_are_refused(drive, tmp_path):
+def test_too_few_images_are_refused(drive):
     frames = open_frames([str(drive / "frames" / f"{k:02d}.png") for k in range(4)])
     with pytest.raises(InvalidInputError, match="4 images of the camera's size, expected 5 or more"):
         find_setup(frames, CAMERA)

@@ -101,7 +101,7 @@ def test_wrong_views(small: tiltvp.Camera, office: Room, keywords: dict[str, obj
         office.render(small, **{"pose": office.free_poses(1, 0)[0], **keywords})  # type: ignore[arg-type]
 
 
-def test_wrong_rooms(office: Room) -> None:
+def test_wrong_rooms() -> None:
     with pytest.raises(InvalidInputError, match="narrow, under-table"):
         Room("garage", 0)
     with pytest.raises(InvalidInputError, match="seed = 'a'"):

@@ -140,7 +140,7 @@ def test_changed_options_are_as_good_as_new(camera: tiltvp.Camera, room: RoomIma
             start.with_options(**fixed)
 
 
-def test_a_sweep_is_cheap(room: RoomImage) -> None:
+def test_a_sweep_is_cheap() -> None:
     """126 estimators of a large camera: made one by one they would take several seconds."""
     large = tiltvp.Camera.equidistant(width=640, height=480, focal_px=139.7, cx=319.5, cy=239.5, max_theta_rad=1.61)
     image = np.random.default_rng(0).integers(0, 256, (480, 640), np.uint8)
