@@ -218,7 +218,9 @@ def test_crossing_is_where_the_gain_stays() -> None:
     }  # fmt: skip
 
 
-def test_command_refuses_before_it_works(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_command_refuses_before_it_works(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
     assert main(["measure", "planar-pose", "--out", str(tmp_path / "a.txt")]) == 2
     assert main(["measure", "planar-pose", "--plot", str(tmp_path / "a.txt")]) == 2
     assert main(["measure", "planar-pose", "--pairs", "0"]) == 2
@@ -226,6 +228,9 @@ def test_command_refuses_before_it_works(tmp_path: Path, capsys: pytest.CaptureF
     assert "--out" in said
     assert "--plot" in said
     assert not list(tmp_path.iterdir())
+    (tmp_path / "kept.png").touch()
+    monkeypatch.setattr("tiltvp.lab.evaluation.planar_pose.measure_planar_pose", None)
+    assert main(["measure", "planar-pose", "--plot", str(tmp_path / "kept.png")]) == 2
 
 
 @pytest.mark.slow

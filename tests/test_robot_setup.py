@@ -71,6 +71,16 @@ def test_setup_writes_a_robot_that_stands_upright(drive, tmp_path, capsys):
     assert math.degrees(float(np.median(alphas))) < 0.4
 
 
+def test_a_picture_that_cannot_be_is_refused_before_any_work(drive, tmp_path, capsys):
+    words = ("setup", drive / "frames", *options(drive), "--out", tmp_path / "robot.toml", "--picture", "found.xyz")
+    assert run(*words) == 2
+    told = capsys.readouterr()
+    assert (told.out, "--picture found.xyz: ends in '.xyz', expected one of .png, .jpg, .jpeg" in told.err) == (
+        "",
+        True,
+    )
+
+
 def test_a_robots_file_is_set_up_again_and_loses_nothing(drive, tmp_path, capsys):
     wheels = tmp_path / "wheels.csv"
     rows = "\n".join(f"{-0.175 * step},{0.175 * step}" for step in [0.0] + [STEP] * (COUNT - 1))

@@ -13,7 +13,7 @@ import numpy as np
 from cyclopts import Group, Parameter
 
 from tiltvp.cli.options import Switch, rotation_of
-from tiltvp.cli.tables import check_plot, finite
+from tiltvp.cli.tables import check_file, check_plot, finite
 from tiltvp.cli.terminal import complain, new_table, say, show
 from tiltvp.errors import InvalidInputError
 from tiltvp.files import check_output, write_whole
@@ -84,11 +84,8 @@ class ResultOptions:
             check_frames(self.parent_frame, child)
         if self.height is not None and not math.isfinite(self.height):
             raise InvalidInputError(f"--height = {self.height}, expected finite metres")
-        for name, path, ending in (("--out", self.out, ".json"), ("--robot-out", self.robot_out, ".toml")):
-            if path is not None:
-                if path.suffix.lower() != ending:
-                    raise InvalidInputError(f"{name} {path}: ends in {path.suffix!r}, expected {ending}")
-                check_output(path)
+        check_file("--out", self.out, ".json")
+        check_file("--robot-out", self.robot_out, ".toml")
         if self.robot_out is not None and camera is None:
             raise InvalidInputError(f"--robot-out {self.robot_out} without --camera, expected both")
         if self.robot_out is not None and mask is not None:

@@ -13,10 +13,10 @@ from typing import TYPE_CHECKING, Annotated, Any, Final
 from cyclopts import Parameter
 
 from tiltvp.cli.results import degrees
+from tiltvp.cli.tables import check_file
 from tiltvp.cli.terminal import new_table, progress_bar, say, show, status
 from tiltvp.cli.tilt_work import words_of
-from tiltvp.errors import InvalidInputError
-from tiltvp.files import check_output, check_output_folder, write_whole
+from tiltvp.files import check_output_folder, write_whole
 
 if TYPE_CHECKING:
     import numpy as np
@@ -113,9 +113,7 @@ def demo(
 def _write_page(path: Path, kind: str, seed: int) -> None:
     from tiltvp.cli.demo_page import LEANS_DEG, page
 
-    if path.suffix.lower() != ".html":
-        raise InvalidInputError(f"--page {path}: ends in {path.suffix!r}, expected .html")
-    check_output(path)
+    check_file("--page", path, ".html")
     with progress_bar(len(LEANS_DEG) ** 2, "leans") as bar:
         text = page(kind, seed, advance=bar.advance)
     write_whole(path, text)

@@ -13,10 +13,9 @@ from cyclopts import Parameter, validators
 from tiltvp.cli.options import CameraOptions, MountedOptions, Switch
 from tiltvp.cli.results import degrees
 from tiltvp.cli.sources import MotionOptions, SourceOptions
-from tiltvp.cli.tables import finite
+from tiltvp.cli.tables import check_file, finite
 from tiltvp.cli.terminal import progress_bar, say
-from tiltvp.errors import InvalidInputError
-from tiltvp.files import check_output, write_whole
+from tiltvp.files import write_whole
 
 if TYPE_CHECKING:
     from tiltvp.mounting import MountingTilt
@@ -58,10 +57,7 @@ def mount(
     from tiltvp.mounting import mounting_tilt
     from tiltvp.robot_setup import TILT_OPTIONS, drive_tilts, measured_count
 
-    if out is not None:
-        if out.suffix.lower() != ".json":
-            raise InvalidInputError(f"--out {out}: ends in {out.suffix!r}, expected .json")
-        check_output(out)
+    check_file("--out", out, ".json")
     robot = camera.robot()
     source = source.of_robot(robot, images)
     estimator = camera.complete(mounted.of_topic(source.topic)).mounted(camera.load(source.topic), **TILT_OPTIONS)

@@ -10,8 +10,8 @@ from tiltvp.cli.declared_options import mask_from
 from tiltvp.cli.mount import mounting_lines
 from tiltvp.cli.options import CameraOptions, MountedOptions, Switch
 from tiltvp.cli.sources import MotionOptions, SourceOptions
+from tiltvp.cli.tables import PICTURES, check_file
 from tiltvp.cli.terminal import complain, progress_bar, say
-from tiltvp.errors import InvalidInputError
 from tiltvp.files import check_output
 
 if TYPE_CHECKING:
@@ -63,11 +63,9 @@ def setup(
     from tiltvp.robot import mask_path
     from tiltvp.robot_setup import find_setup, measured_count
 
-    if out.suffix.lower() != ".toml":
-        raise InvalidInputError(f"--out {out}: ends in {out.suffix!r}, expected .toml")
-    for file in (out, mask_path(out), picture):
-        if file is not None:
-            check_output(file)
+    check_file("--out", out, ".toml")
+    check_output(mask_path(out))
+    check_file("--picture", picture, *PICTURES)
     known = camera.robot()
     source = source.of_robot(known, recording)
     lens = camera.load(source.topic)

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     import polars as pl
 
 ENDINGS: Final = (".csv", ".json", ".parquet")
+PICTURES: Final = (".png", ".jpg", ".jpeg")
 Out = Annotated[Path, Parameter(allow_leading_hyphen=True)]
 """A file for results, or `STDOUT`."""
 STDOUT: Final = Path("-")
@@ -58,20 +59,25 @@ def check_ending(path: Path | None, option: str = "--out") -> None:
         return
     if path == STDOUT:
         raise InvalidInputError(f"{option} -: only `tiltvp tilt` writes lines on stdout, expected a file")
-    if path.suffix.lower() not in ENDINGS:
-        raise InvalidInputError(f"{option} {path}: ends in {path.suffix!r}, expected one of {', '.join(ENDINGS)}")
+    check_file(option, path, *ENDINGS)
     if path.suffix.lower() == ".parquet":
         need_lab(f"{option} {path}")
-    check_output(path)
 
 
 def check_plot(option: str, path: Path | None) -> None:
     """Refuses a plot that cannot be drawn, before any work is done."""
+    check_file(option, path, ".png")
+    if path is not None:
+        need_lab(f"{option} {path}")
+
+
+def check_file(option: str, path: Path | None, *endings: str) -> None:
+    """Refuses a file that is to end otherwise, or that cannot be written, before any work is done."""
     if path is None:
         return
-    if path.suffix.lower() != ".png":
-        raise InvalidInputError(f"{option} {path}: ends in {path.suffix!r}, expected .png")
-    need_lab(f"{option} {path}")
+    if path.suffix.lower() not in endings:
+        expected = f"one of {', '.join(endings)}" if len(endings) > 1 else endings[0]
+        raise InvalidInputError(f"{option} {path}: ends in {path.suffix!r}, expected {expected}")
     check_output(path)
 
 

@@ -6,11 +6,9 @@ from pathlib import Path
 
 from tiltvp.cli.lab.tables import show_frame
 from tiltvp.cli.options import ALL_CORES, AtLeast0, AtLeast1, Threads
-from tiltvp.cli.tables import check_ending, write_frame
+from tiltvp.cli.tables import PICTURES, check_ending, check_file, write_frame
 from tiltvp.cli.terminal import progress_bar
-from tiltvp.errors import InvalidInputError
 
-_PICTURES = (".png", ".jpg", ".jpeg")
 _PAIRS_OF_A_ROOM = 12
 
 
@@ -41,8 +39,7 @@ def planar_pose(
     from tiltvp.lab.evaluation.planar_summary import crossings, summarise_planar_pose
 
     check_ending(out)
-    if plot is not None and plot.suffix.lower() not in _PICTURES:
-        raise InvalidInputError(f"--plot {plot}: ends in {plot.suffix!r}, expected one of {', '.join(_PICTURES)}")
+    check_file("--plot", plot, *PICTURES)
     experiment = PlanarPoseExperiment(rooms=max(2, -(-pairs // _PAIRS_OF_A_ROOM)), seed=seed)
     with progress_bar(experiment.steps, "places") as bar:
         table = measure_planar_pose(experiment, threads=threads, advance=bar.advance)

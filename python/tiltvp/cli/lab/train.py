@@ -8,6 +8,7 @@ from pathlib import Path
 from tiltvp.cli.lab.demo import demo
 from tiltvp.cli.lab.drive import app
 from tiltvp.cli.options import ALL_CORES, MethodOptions, Threads
+from tiltvp.cli.tables import check_file
 from tiltvp.cli.terminal import progress_bar, say
 from tiltvp.errors import InvalidInputError
 
@@ -46,13 +47,10 @@ def train(
         The method, image-space-ransac if none is given, and its options.
     """
     from tiltvp.corrections import train_correction
-    from tiltvp.files import check_output
     from tiltvp.lab.datasets.folder import read_dataset
     from tiltvp.lab.evaluation.training import measured_shifts
 
-    if out.suffix.lower() != ".toml":
-        raise InvalidInputError(f"--out {out}: ends in {out.suffix!r}, expected .toml")
-    check_output(out)
+    check_file("--out", out, ".toml")
     for name in ("correction", "robot_from_camera", "mask"):
         if getattr(options, name) is not None:
             told = f"--{name.replace('_', '-')}"
