@@ -9,10 +9,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-from cyclopts import Parameter, validators
-
 from tiltvp.cli.camera import FileOptions, app, built
-from tiltvp.cli.options import Switch, image_size_from
+from tiltvp.cli.options import ABOVE_0, Switch, image_size_from
 from tiltvp.cli.terminal import complain, named, new_table, say, show
 from tiltvp.errors import InvalidInputError, TiltvpError
 from tiltvp.files import check_output
@@ -28,7 +26,6 @@ if TYPE_CHECKING:
 __all__ = ["app"]
 
 _READING = FileOptions()
-_ABOVE_0 = Parameter(validator=validators.Number(gt=0))
 
 
 @app.command
@@ -70,10 +67,10 @@ def new(
     /,
     *,
     image_size: str,
-    view_deg: Annotated[float, _ABOVE_0],
+    view_deg: Annotated[float, ABOVE_0],
     lens: str = "equidistant",
     centre: tuple[float, float] | None = None,
-    radius_px: Annotated[float | None, _ABOVE_0] = None,
+    radius_px: Annotated[float | None, ABOVE_0] = None,
     mirror: Switch = False,
 ) -> None:
     """Write the camera of an ideal lens, where there is no calibration: from a field of view, or an image circle.
@@ -154,7 +151,7 @@ def scale(
     /,
     reading: FileOptions = _READING,
     *,
-    factor: Annotated[float | None, _ABOVE_0] = None,
+    factor: Annotated[float | None, ABOVE_0] = None,
     to: str | None = None,
     camera_name: str | None = None,
 ) -> None:

@@ -8,9 +8,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-from cyclopts import Parameter, validators
-
-from tiltvp.cli.options import CameraOptions, MountedOptions, Switch
+from tiltvp.cli.options import ABOVE_0, CameraOptions, MountedOptions, Switch
 from tiltvp.cli.results import degrees
 from tiltvp.cli.sources import MotionOptions, SourceOptions
 from tiltvp.cli.tables import check_file, finite
@@ -35,7 +33,7 @@ def mount(
     mounted: MountedOptions = _MOUNTED,
     motion: MotionOptions = _MOTION,
     level_floor: Switch = False,
-    within_deg: Annotated[float | None, Parameter(validator=validators.Number(gt=0))] = None,
+    within_deg: Annotated[float | None, ABOVE_0] = None,
     out: Path | None = None,
 ) -> int:
     """Measure roll and pitch of a camera's mounting on a drive: what stays when the robot turns is not the floor's.

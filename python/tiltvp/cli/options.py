@@ -29,6 +29,7 @@ _METHOD = Group("Method", help="An option that is not given has the default of i
 M = TypeVar("M", bound=LibraryOptions)
 Switch = Annotated[bool, Parameter(negative="", show_default=False)]
 FrameRate = Annotated[float | None, Parameter(validator=validators.Number(gt=0, lt=math.inf))]
+ABOVE_0 = Parameter(validator=validators.Number(gt=0))
 AtLeast0 = Annotated[int, Parameter(validator=validators.Number(gte=0))]
 AtLeast1 = Annotated[int, Parameter(validator=validators.Number(gte=1))]
 ALL_CORES = os.cpu_count() or 1

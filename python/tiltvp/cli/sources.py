@@ -11,9 +11,9 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Final, Self
 
-from cyclopts import Group, Parameter, validators
+from cyclopts import Group, Parameter
 
-from tiltvp.cli.options import given_words
+from tiltvp.cli.options import ABOVE_0, AtLeast0, given_words
 from tiltvp.cli.terminal import complain
 from tiltvp.errors import InvalidInputError
 
@@ -36,7 +36,6 @@ __all__ = [
 STDIN: Final = "/dev/stdin"
 """What - stands for as the source of a verb."""
 _SOURCE = Group("Source", help="Images, a video, or a recording of ROS: docs/recordings.md.")
-_ABOVE_0 = Parameter(validator=validators.Number(gt=0))
 
 
 @Parameter(name="*", group=_SOURCE)
@@ -46,7 +45,7 @@ class SourceOptions:
 
     topic: str | None = None
     """The topic of a recording's images, where it has several."""
-    live: Annotated[int | None, Parameter(validator=validators.Number(gte=0))] = None
+    live: AtLeast0 | None = None
     """A camera by its number, in place of files; Ctrl-C ends it."""
     raw: str | None = None
     """WIDTHxHEIGHT or WIDTHxHEIGHTxCHANNELS of images that come as bytes, BGR, on stdin (-)."""
@@ -92,16 +91,16 @@ class MotionOptions:
     the frames are from, if there is one."""
     odometry_topic: str | None = None
     """Its topic in a recording, where that has several: Odometry, JointState or Twist."""
-    wheel_base: Annotated[float | None, _ABOVE_0] = None
+    wheel_base: Annotated[float | None, ABOVE_0] = None
     """Distance between the wheels, metres, for odometry of wheels, and for how much the floor may change in a turn; by
     default that of a robot's file."""
-    wheel_radius: Annotated[float | None, _ABOVE_0] = None
+    wheel_radius: Annotated[float | None, ABOVE_0] = None
     """Radius of the wheels, metres, for ticks and the angles of a JointState."""
-    ticks_per_turn: Annotated[float | None, _ABOVE_0] = None
+    ticks_per_turn: Annotated[float | None, ABOVE_0] = None
     """What the counter of a wheel counts in one turn."""
     wheel_joints: tuple[str, str] | None = None
     """Names of the joints of the left and the right wheel, where these do not tell."""
-    odometry_gap: Annotated[float, _ABOVE_0] = 0.5
+    odometry_gap: Annotated[float, ABOVE_0] = 0.5
     """Longest time between two samples that is interpolated, seconds."""
 
     def refuse(self, needed: str) -> None:
