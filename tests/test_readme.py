@@ -61,11 +61,9 @@ def test_commands_and_their_options_exist(command: str) -> None:
 
 
 def commands_of(page: Path) -> list[list[str]]:
-    """The words of the commands on a page: of consoles, and within a line."""
-    text = page.read_text(encoding="utf-8")
-    consoles = re.findall(r"^```console\n(.*?)^```$", text.replace("\\\n", " "), re.MULTILINE | re.DOTALL)
-    lines = [line for console in consoles for line in console.splitlines() if line.startswith("tiltvp ")]
-    lines += re.findall(r"`(tiltvp [^`]+)`", text)
+    """The words of the commands on a page: on lines of their own, indented or after a prompt too, and within one."""
+    text = page.read_text(encoding="utf-8").replace("\\\n", " ")
+    lines = re.findall(r"^(?:\$ |    )?(tiltvp .*)$", text, re.MULTILINE) + re.findall(r"`(tiltvp [^`]+)`", text)
     return [re.split(r" [|>&#]", line)[0].split()[1:] for line in lines]
 
 
