@@ -7,7 +7,7 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from tiltvp.cli.lab.panorama_options import Out
+from tiltvp.cli.lab.measure_options import Out
 from tiltvp.cli.lab.tables import show_frame
 from tiltvp.cli.options import ALL_CORES, AtLeast0, AtLeast1, Threads
 from tiltvp.cli.tables import check_ending, write_frame

@@ -8,7 +8,7 @@ from typing import Annotated
 from cyclopts import Parameter, validators
 
 from tiltvp.cli.colmap import BELIEVED_MIN
-from tiltvp.cli.lab.panorama_options import Out
+from tiltvp.cli.lab.measure_options import Out
 from tiltvp.cli.lab.tables import show_frame
 from tiltvp.cli.tables import check_ending, write_frame
 from tiltvp.cli.terminal import progress_bar

@@ -9,7 +9,7 @@ from cyclopts import App
 
 from tiltvp.cli.lab.dataset_drives import drive, stereo
 from tiltvp.cli.lab.dataset_options import LensOptions, MakingOptions, Words, made_by, tilts_from
-from tiltvp.cli.lab.panorama_options import NoiseSigma, Samples
+from tiltvp.cli.lab.measure_options import NoiseSigma, Samples
 from tiltvp.cli.options import Switch
 from tiltvp.cli.terminal import new_table, progress_bar, say, show
 from tiltvp.errors import counted

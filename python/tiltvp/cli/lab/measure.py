@@ -15,8 +15,8 @@ from tiltvp.cli.lab.corner_real import corners_real
 from tiltvp.cli.lab.descriptors import descriptors
 from tiltvp.cli.lab.levelling import level
 from tiltvp.cli.lab.line_measures import lines
+from tiltvp.cli.lab.measure_options import Every, NoiseSigma, Out, Panoramas, PanoramasIfAny, Rooms, Samples
 from tiltvp.cli.lab.mounting import mounting
-from tiltvp.cli.lab.panorama_options import Every, NoiseSigma, Out, Panoramas, PanoramasIfAny, Rooms, Samples
 from tiltvp.cli.lab.planar_pose import planar_pose
 from tiltvp.cli.lab.striding import striding
 from tiltvp.cli.lab.tables import show_frame

@@ -1,4 +1,4 @@
-"""The words that measures on panoramas and rendered rooms share."""
+"""The options that measures and makers of datasets share."""
 
 from pathlib import Path
 from typing import Annotated
