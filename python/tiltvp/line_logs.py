@@ -74,7 +74,7 @@ class SeenFrame:
 def believed_leans(
     estimator: TiltEstimator, extractor: LineExtractor, *, confidence_min: float = 0.5
 ) -> Callable[[NDArray[np.uint8]], TiltEstimate]:
-    """What tells the lean of a grey image for its lines; raises `UnknownLeanError` where it is not believed."""
+    """What tells the lean of a grey image (H, W) for its lines; raises `UnknownLeanError` where it is not believed."""
 
     def lean(gray: NDArray[np.uint8]) -> TiltEstimate:
         estimate = estimator(gray)

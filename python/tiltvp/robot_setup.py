@@ -233,13 +233,15 @@ def measured_count(frames: Frames) -> int:
 
 
 def rim_and_body(frames: Frames, camera: _core.Camera) -> tuple[NDArray[np.bool_] | None, BodyMask]:
-    """The image circle, where a dark surround shows one that the camera does not know, and the robot's own body."""
+    """The image circle, (H, W) True within it where a dark surround shows one that the camera does not know; and the
+    robot's own body.
+    """
     rim = surround_mask((image for _, image in spread(frames, camera, LEAST)), camera)
     return rim, body_mask((image for _, image in spread(frames, camera, LOOKED_AT)), camera, mask=rim)
 
 
 def joined_mask(rim: NDArray[np.bool_] | None, body: BodyMask) -> NDArray[np.bool_] | None:
-    """Where images show the world; None: everywhere."""
+    """(H, W), True where images show the world; None: everywhere."""
     if not body:
         return rim
     return body.mask if rim is None else rim & np.asarray(body.mask)

@@ -36,7 +36,9 @@ __all__ = [
 
 
 def convergence_table(estimates: Sequence[MountingEstimate]) -> dict[str, NDArray[Any]]:
-    """Columns with a value for each step: phi_rad, rho_m, psi_rad, x_m, y_m, yaw_rad, `variance_...` of each, alarm."""
+    """Columns (N,) with a value for each step: phi_rad, rho_m, psi_rad, x_m, y_m, yaw_rad, alarm, and `variance_...` of
+    phi, rho, psi, x, y and yaw in squares of their units.
+    """
     names = ("phi_rad", "rho_m", "psi_rad", "x_m", "y_m", "yaw_rad")
     columns = {name: np.array([getattr(e, name) for e in estimates], dtype=np.float64) for name in names}
     for matrix, of in (("covariance_phi_rho_psi", ("phi", "rho", "psi")), ("covariance_xy_yaw", ("x", "y", "yaw"))):

@@ -342,7 +342,7 @@ def small_camera(camera: Camera) -> Camera:
 
 
 def made_small(image: NDArray[np.uint8], camera: Camera) -> NDArray[np.uint8]:
-    """A grey image of a camera as it is compared: turns are told at 120 pixels."""
+    """A grey image (H, W) of a camera as it is compared: turns are told at 120 pixels."""
     import cv2
 
     small = small_camera(camera)

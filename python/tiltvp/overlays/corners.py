@@ -73,7 +73,9 @@ def draw_box(
 def draw_names(
     canvas: NDArray[np.uint8], camera: Camera, features: Sequence[CornerFeature], corners: Iterable[BelievedCorner]
 ) -> None:
-    """Writes the names of corners beside their vertices, as in the left image; those without one have none."""
+    """Writes the names of corners into a picture (H, W, 3) of the left image, beside their vertices; those without one
+    have none.
+    """
     import cv2
 
     for corner in corners:

@@ -93,7 +93,7 @@ class Frames:
 
 
 def median_rate_hz(times_s: NDArray[np.float64] | None) -> float:
-    """Frames per second by the median of the steps of time; 25 where these do not tell."""
+    """Frames per second by the median of the steps of times (N,) in seconds; 25 where these do not tell."""
     import numpy as np
 
     steps = np.diff(times_s) if times_s is not None else np.zeros(0)
