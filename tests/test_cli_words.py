@@ -16,6 +16,7 @@ import tiltvp
 from commands import Run
 from recordings import START_S, Bag
 from tiltvp import _core
+from tiltvp.cli.app import app
 from tiltvp.synth import RoomImage
 
 pytestmark = pytest.mark.slow
@@ -48,6 +49,11 @@ def test_names_that_are_no_text(ending: str, run: Run, world: Path) -> None:
 def test_a_dash_of_no_command_is_wrong_use(words: tuple[str, ...], run: Run) -> None:
     said = run(*words)
     assert (said.code, said.err.count("\n")) == (2, 1)
+
+
+def test_the_pages_of_commands_tell_no_option_that_is_refused(run: Run) -> None:
+    told = set(re.findall(r"--empty-[\w-]+", app.generate_docs()))
+    assert (told, run("camera", "new", "x.toml", "--empty-centre").code) == (set(), 2)
 
 
 @pytest.mark.parametrize("words", [("--version", "-"), ("tilt", "--help", "-")])

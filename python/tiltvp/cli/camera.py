@@ -9,9 +9,10 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-from cyclopts import App, Parameter
+from cyclopts import Parameter
 
 from tiltvp.cli.options import Switch, image_size_from, refuse_beside
+from tiltvp.cli.root import group
 from tiltvp.cli.terminal import complain, named, new_table, say, show
 from tiltvp.errors import CalibrationError, InvalidInputError, TiltvpError, counted
 from tiltvp.files import check_output
@@ -23,7 +24,7 @@ if TYPE_CHECKING:
     from tiltvp.formats import CameraSpec
     from tiltvp.streams import Recording
 
-app = App(name="camera", help="Calibration files: their cameras, whether these are sound, and other formats.")
+app = group("camera", "Calibration files: their cameras, whether these are sound, and other formats.")
 
 LARGEST_ROUND_TRIP_PX = 1e-6
 LARGEST_JACOBIAN_ERROR = 1e-6

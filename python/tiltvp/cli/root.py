@@ -8,15 +8,23 @@ from cyclopts import App, Parameter
 
 from tiltvp import __version__
 
+_PARAMETER = Parameter(negative_iterable=())
+"""No `--empty-...` beside an option of several words."""
+
 app = App(
     name="tiltvp",
     help="Orientation and calibration from the straight lines of man-made places: a robot's tilt, vertical lines, "
     "where a camera sits on a robot, and the pose of corners. Files and folders that exist are kept; with --overwrite, "
     "which every command takes, its outputs replace them.",
     version=__version__,
-    default_parameter=Parameter(negative_iterable=()),
+    default_parameter=_PARAMETER,
     suppress_keyboard_interrupt=False,
 )
+
+
+def group(name: str, help: str) -> App:
+    """Several commands behind one word; the pages of the site do not inherit what `app` says of options."""
+    return App(name=name, help=help, default_parameter=_PARAMETER)
 
 
 def run(words: Sequence[str]) -> int:

@@ -5,16 +5,15 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
-from cyclopts import App
-
 from tiltvp.cli.lab.dataset_drives import drive, stereo
 from tiltvp.cli.lab.dataset_options import LensOptions, MakingOptions, Words, made_by, tilts_from
 from tiltvp.cli.lab.measure_options import NoiseSigma, Samples
 from tiltvp.cli.options import Switch
+from tiltvp.cli.root import group
 from tiltvp.cli.terminal import new_table, progress_bar, say, show
 from tiltvp.errors import counted
 
-app = App(name="dataset", help="Folders of images with known lean: check them, or make them.")
+app = group("dataset", "Folders of images with known lean: check them, or make them.")
 app.command(drive)
 app.command(stereo)
 _LENS = LensOptions()

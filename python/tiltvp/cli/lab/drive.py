@@ -6,13 +6,14 @@ import math
 from dataclasses import dataclass
 from pathlib import Path
 
-from cyclopts import App, Parameter
+from cyclopts import Parameter
 
 from tiltvp.cli.lab.dataset_options import LensOptions, Mount, RenderingOptions, WayOptions, Words, legs_from
 from tiltvp.cli.options import ALL_CORES, AtLeast0, Switch, Threads
+from tiltvp.cli.root import group
 from tiltvp.cli.terminal import progress_bar, say
 
-app = App(name="lab", help="What the laboratory makes to try the package on.")
+app = group("lab", "What the laboratory makes to try the package on.")
 
 
 @Parameter(name="*")

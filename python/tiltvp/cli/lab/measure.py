@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated
 
-from cyclopts import App, Parameter
+from cyclopts import Parameter
 
 from tiltvp.cli.lab.body import body
 from tiltvp.cli.lab.calibration_measures import calibration, calibration_images, trust_calibration
@@ -22,11 +22,12 @@ from tiltvp.cli.lab.striding import striding
 from tiltvp.cli.lab.tables import show_frame
 from tiltvp.cli.lab.trust import trust
 from tiltvp.cli.options import ALL_CORES, AtLeast1, Switch, Threads
+from tiltvp.cli.root import group
 from tiltvp.cli.tables import check_ending, write_frame
 from tiltvp.cli.terminal import progress_bar, say
 from tiltvp.errors import InvalidInputError
 
-app = App(name="measure", help="Measure how well all this works, where the truth is known.")
+app = group("measure", "Measure how well all this works, where the truth is known.")
 app.command(body)
 app.command(calibration)
 app.command(calibration_images)
