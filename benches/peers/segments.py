@@ -73,10 +73,11 @@ class Arcs:
     arc: np.ndarray
 
     @classmethod
-    def through(cls, camera: Camera, ends: np.ndarray) -> Arcs:
+    def through(cls, camera: Camera, ends: np.ndarray, normal: np.ndarray | None = None) -> Arcs:
         """Those between (N, 2, 3) bearings."""
-        normal = np.cross(ends[:, 0], ends[:, 1])
-        normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+        if normal is None:
+            normal = np.cross(ends[:, 0], ends[:, 1])
+            normal /= np.linalg.norm(normal, axis=1, keepdims=True)
         along = np.cross(normal, ends[:, 0])
         angle = np.arctan2(np.sum(along * ends[:, 1], axis=1), np.sum(ends[:, 0] * ends[:, 1], axis=1))
         middle = ends.sum(axis=1) / np.linalg.norm(ends.sum(axis=1), axis=1, keepdims=True)
