@@ -12,7 +12,7 @@ import pytest
 import tiltvp
 from tiltvp.cli import main
 from tiltvp.photos import panorama_kind
-from tiltvp.rotations import rotation_from
+from tiltvp.rotations import about_vertical, rotation_from
 from tiltvp.streams import open_frames
 from tiltvp.synth import RoomImage
 from tiltvp.videos import video_writer
@@ -73,6 +73,41 @@ def test_metadata_alone_leave_the_pixels_as_they_are(photo: Path, tmp_path: Path
     normal = tiltvp.normal_from_alpha_beta(*LEAN)
     assert pitch_deg == pytest.approx(math.degrees(math.asin(normal[0])), abs=1.0)
     assert roll_deg == pytest.approx(math.degrees(math.atan2(normal[1], normal[2])), abs=1.0)
+
+
+@pytest.mark.slow
+def test_a_pose_is_the_cameras_however_it_is_mounted(photo: Path, tmp_path: Path) -> None:
+    aside = tmp_path / "aside.txt"
+    np.savetxt(aside, about_vertical(0.5 * math.pi) @ FORWARD)
+    outputs: dict[str, list[str]] = {
+        "as it is": ["--metadata-only"],
+        "aside": ["--metadata-only", "--robot-from-camera", str(aside)],
+        "up": ["--robot-from-output", "up"],
+    }
+    poses = {}
+    for name, words in outputs.items():
+        assert main(["level", str(photo), "--out", str(tmp_path / name), *words]) == 0
+        written = (tmp_path / name / "photo.jpg").read_bytes()
+        poses[name] = [float(written.split(b'Pose%bDegrees="' % key)[1].split(b'"')[0]) for key in (b"Pitch", b"Roll")]
+    assert poses["aside"] == pytest.approx(poses["as it is"], abs=0.1)
+    assert poses["up"] == [90.0, 0.0]
+
+
+@pytest.mark.slow
+def test_masks_and_pixels_are_those_of_photographs(
+    photo: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    large = tmp_path / "large.png"
+    tiltvp.write_image(large, cv2.resize(tiltvp.read_image(photo), (2048, 1024)))
+    seen = np.ones((1024, 2048), np.bool_)
+    seen[800:] = False
+    for name, mask in (("mask", seen), ("narrow", seen[:, :1000])):
+        tiltvp.write_image(tmp_path / f"{name}.png", mask)
+    words = ["level", str(large), "--out", str(tmp_path / "level"), "--overwrite", "--margin-px", "20", "--mask"]
+    assert main([*words, str(tmp_path / "mask.png")]) == 0
+    assert lean_deg(tmp_path / "level" / "large.png") < 1.0
+    assert main([*words, str(tmp_path / "narrow.png")]) == 2
+    assert "mask: shape (1024, 1000)" in capsys.readouterr().err
 
 
 @pytest.mark.slow

@@ -92,9 +92,14 @@ def test_quality_sampling_and_metadata_are_kept(quality: int) -> None:
     assert b"MPF\0" not in written
     assert b'GPano:PosePitchDegrees="0.00"' in written
     assert np.abs(decoded(written).astype(int) - 90).max() <= 2
-    flat = encode_like(image[:, :100], data, pose=False)
+    flat = encode_like(image[:, :100], data, None)
     assert XMP not in flat
     assert EXIF in flat
+    # Headings are those of where the original looks.
+    turned = encode_like(image, data, (90.0, 0.0), turned=True)
+    assert b'GPano:PosePitchDegrees="90.00"' in turned
+    assert b"PoseHeading" in written
+    assert b"PoseHeading" not in turned
     gray = encode_like(image[:, :, 0], data)
     assert decoded(gray).ndim == 2
 

@@ -88,6 +88,12 @@ class Leveller:
         """(3, 3): R of v_robot = R v_camera."""
         return self._core.robot_from_camera
 
+    @property
+    def robot_from_output(self) -> NDArray[np.float64]:
+        """(3, 3): where the level image looks."""
+        looks = self._given[3]
+        return self.robot_from_camera if looks is None else np.asarray(looks, dtype=np.float64)
+
     def __call__(self, image: ArrayLike, tilt: Tilt) -> NDArray[Any]:
         """The level image of one (H, W) or (H, W, channels) of the camera, of the same dtype and channels.
 

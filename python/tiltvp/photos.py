@@ -15,7 +15,9 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-__all__ = ["PHOTO_TILT_MAX_RAD", "PanoramaKind", "encode_like", "jpeg_quality", "panorama_kind", "with_pose"]
+__all__ = [
+    "PHOTO_TILT_MAX_RAD", "PanoramaKind", "encode_like", "jpeg_quality", "panorama_kind", "pose_deg", "with_pose",
+]  # fmt: skip
 
 PHOTO_TILT_MAX_RAD: Final = math.radians(60.0)
 """How far a 360-degree camera leans at most in a hand: without a limit three of 108 panoramas were taken, and believed,
@@ -133,6 +135,14 @@ def _value(packet: str, name: str) -> str | None:
     return found and found[1].strip().strip("\"'")
 
 
+def pose_deg(robot_from_camera: NDArray[np.floating], normal: NDArray[np.floating]) -> tuple[float, float]:
+    """Pitch and roll, as `with_pose` takes them, of a camera with that mounting (3, 3) where the robot has the ground
+    normal (3,)."""
+    right, down, ahead = (float(value) for value in robot_from_camera.T @ normal)
+    # Straight up, where there is no roll, it is that of 0, not of -0.
+    return math.degrees(math.atan2(ahead, math.hypot(right, down))), math.degrees(math.atan2(0.0 - right, 0.0 - down))
+
+
 def with_pose(data: bytes, pitch_deg: float, roll_deg: float, width: int, height: int) -> bytes:
     """The JPEG file with PosePitchDegrees and PoseRollDegrees of GPano, everything else left as it is, bit for bit.
 
@@ -214,12 +224,15 @@ def _apart(ours: Sequence[int], theirs: Sequence[int]) -> int:
     return sum(abs(a - b) for a, b in zip(ours, theirs, strict=True))
 
 
-def encode_like(image: NDArray[np.uint8], original: bytes, pose: bool = True) -> bytes:
+def encode_like(
+    image: NDArray[np.uint8], original: bytes, pose: tuple[float, float] | None = (0.0, 0.0), *, turned: bool = False
+) -> bytes:
     """(H, W) or (H, W, 3) BGR as a JPEG file of the quality, sampling and metadata of another one.
 
-    EXIF, colour profile and comments are kept. With `pose` it is a level panorama: its GPano metadata are those of the
-    original, if it is of this size, with a pose of no pitch and no roll; without, it is no panorama, and XMP is left
-    out. So are pictures that stand behind the first in the file. Raises `ImageFileError`.
+    EXIF, colour profile and comments are kept. With a `pose`, pitch and roll as of `with_pose`, it is a panorama: its
+    GPano metadata are those of the original, if it is of this size and not `turned` against it, with that pose;
+    without, it is no panorama, and XMP is left out. So are pictures that stand behind the first in the file. Raises
+    `ImageFileError`.
     """
     import cv2
 
@@ -243,11 +256,12 @@ def encode_like(image: NDArray[np.uint8], original: bytes, pose: bool = True) ->
     kept = [segment for segment in jpeg.head if _is_kept(segment)]
     written = [segment for segment in own.head if not (segment.marker == _APP0 and kept)]
     joined = bytes(_Jpeg((*kept, *written), own.pixels))
-    if not pose:
+    if pose is None:
         return joined
-    packet = [s for s in jpeg.head if s.marker == _APP1 and s.content.startswith(_XMP)] if same_size else []
+    like = same_size and not turned
+    packet = [s for s in jpeg.head if s.marker == _APP1 and s.content.startswith(_XMP)] if like else []
     joined = bytes(_Jpeg((*kept, *packet, *written), own.pixels))
-    return with_pose(joined, 0.0, 0.0, *_size(image))
+    return with_pose(joined, *pose, *_size(image))
 
 
 def _size(image: NDArray[Any]) -> tuple[int, int]:

@@ -8,11 +8,15 @@ import inspect
 import math
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Annotated, Any, ClassVar, TypeVar
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, TypeVar
 
 from cyclopts import Parameter
 
 from tiltvp._core import option_fields
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
 
 T = TypeVar("T")
 
@@ -130,7 +134,7 @@ def _to_library(keyword: str, value: Any) -> Any:
     return math.radians(value) if _is_angle(keyword) and isinstance(value, float) else value
 
 
-def mask_from(path: Path) -> object:
+def mask_from(path: Path) -> "NDArray[np.bool_]":
     """Where an image is bright."""
     from tiltvp import read_image
     from tiltvp.images import gray_from

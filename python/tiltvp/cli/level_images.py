@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from tiltvp.cli.cluster import Task, on_cluster
+from tiltvp.cli.declared_options import mask_from
 from tiltvp.cli.filtering import FilterOptions, Judge
 from tiltvp.cli.options import MethodOptions
 from tiltvp.cli.results import Outcome, outcome_table
@@ -75,8 +75,10 @@ class Looks:
         if self.camera is not None:
             self.of(self.camera.width, self.camera.height)
         else:
-            # What is wrong with all sizes is so with a small one, and is told before any work is done.
-            self._look(Camera.equirectangular(width=64, height=32), size=None)
+            # What is wrong with all sizes is so with that in which edges are looked for, or with the mask's, and told
+            # before any work is done.
+            width = _WIDTH_PX if self.method.mask is None else mask_from(self.method.mask).shape[1]
+            self._look(Camera.equirectangular(width=width, height=max(1, width // 2)), size=None)
 
     @property
     def are_panoramas(self) -> bool:
@@ -101,16 +103,29 @@ class Looks:
 
     def _look(self, camera: Camera, **other: Any) -> Look:
         from tiltvp import Camera, Leveller
+        from tiltvp.images import checked_mask
         from tiltvp.photos import PHOTO_TILT_MAX_RAD
 
-        seen_by, otherwise = camera, {}
+        seen_by, method, otherwise = camera, self.method, dict[str, Any]()
         if camera.model == "equirectangular":
             width = min(camera.width, _WIDTH_PX)
             seen_by = Camera.equirectangular(width=width, height=width // 2)
-            if self.method.method is None:
-                otherwise = {"method": "segments", "tilt_max_rad": PHOTO_TILT_MAX_RAD}
-        estimator = self.method.estimator(seen_by, **otherwise)
+            if method.method is None:
+                otherwise |= {"method": "segments", "tilt_max_rad": PHOTO_TILT_MAX_RAD}
+            if method.mask is not None:
+                otherwise["mask"] = _shrunk(checked_mask(mask_from(method.mask), camera), seen_by)
+                method = replace(method, mask=None)
+        estimator = method.estimator(seen_by, **otherwise)
         return Look(estimator, Leveller(camera, estimator.robot_from_camera, **(self.keywords | other)))
+
+
+def _shrunk(mask: NDArray[np.bool_], camera: Camera) -> NDArray[np.bool_]:
+    """A mask for images of a camera of fewer pixels: True where all of a pixel shows the world."""
+    import cv2
+    import numpy as np
+
+    size = (camera.width, camera.height)
+    return np.asarray(cv2.resize(mask.astype(np.float32), size, interpolation=cv2.INTER_AREA) > 0.999)
 
 
 @dataclass(frozen=True)
@@ -230,9 +245,11 @@ def _write(outcome: Outcome, image: NDArray[np.uint8], data: bytes, path: Path, 
 
     Raises `OutputError`, which all images would have.
     """
+    import numpy as np
+
     from tiltvp.files import write_whole
     from tiltvp.images import decode_as_stored, write_image
-    from tiltvp.photos import encode_like, is_jpeg, with_pose
+    from tiltvp.photos import encode_like, is_jpeg, pose_deg, with_pose
 
     tilt = work.believed(outcome)
     # PNG holds 16 bits and opacity, where edges are looked for in 8 bits of what is there.
@@ -244,14 +261,17 @@ def _write(outcome: Outcome, image: NDArray[np.uint8], data: bytes, path: Path, 
             elif work.copies:
                 write_image(path, stored)
             return f"{work.why_not(outcome)}; {'copied as it is' if work.copies else 'left out'}"
+        leveller = work.look(image).leveller
         if work.looks.metadata_only:
-            pitch_deg, roll_deg = math.degrees(tilt.pitch_rad), math.degrees(tilt.roll_rad)
-            # GPano's pitch is how high the image's centre looks; ours is nose down positive.
-            write_whole(path, with_pose(data, -pitch_deg, roll_deg, image.shape[1], image.shape[0]))
+            pose = pose_deg(leveller.robot_from_camera, tilt.normal)
+            write_whole(path, with_pose(data, *pose, image.shape[1], image.shape[0]))
             return None
-        level = work.look(image).leveller(stored, tilt)
+        level = leveller(stored, tilt)
         if is_jpeg(data):
-            write_whole(path, encode_like(level, data, work.looks.are_panoramas))
+            looks = leveller.robot_from_output
+            turned = not np.allclose(looks, leveller.robot_from_camera, atol=1e-6)
+            shown = pose_deg(looks, np.array([0.0, 0.0, 1.0])) if work.looks.are_panoramas else None
+            write_whole(path, encode_like(level, data, shown, turned=turned))
         else:
             write_image(path, level)
     except OutputError:

@@ -79,7 +79,7 @@ def setup(
             lens,
             moved.motions if moved is not None and moved.turns_known else None,
             robot_from_camera=None if mounted.robot_from_camera is None else mounted.mounting(lens),
-            mask=None if mounted.mask is None else mask_from(mounted.mask),  # type: ignore[arg-type]
+            mask=None if mounted.mask is None else mask_from(mounted.mask),
             level_floor=level_floor,
             wheels=motion.wheels(),
             topics={k: v for k, v in (("images", source.topic), ("odometry", motion.odometry_topic)) if v is not None},
