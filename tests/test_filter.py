@@ -15,10 +15,12 @@ import pytest
 import tiltvp
 from recordings import motions_of
 from tiltvp.cli import main
+from tiltvp.cli.filtering import FilterOptions
+from tiltvp.cli.results import Outcome
 from tiltvp.errors import InvalidInputError
 from tiltvp.lab.plots.filtering import filtered_tilt
 from tiltvp.lab.plots.picture import figure_picture
-from tiltvp.streams import Motion
+from tiltvp.streams import FrameMotions, Frames, Motion
 from tiltvp.synth import RoomImage
 
 Array = np.ndarray
@@ -229,6 +231,22 @@ def test_wrong_estimates_are_refused(estimate: Any, words: str) -> None:
 def test_wrong_options_are_refused(options: dict[str, Any], words: str) -> None:
     with pytest.raises(InvalidInputError, match=words):
         tiltvp.TiltFilter(**options)
+
+
+@pytest.mark.parametrize("turns_known", [False, True])
+def test_time_without_images_makes_the_tilt_unknown(turns_known: bool) -> None:
+    """Where turns are: after ten seconds two images were outside the gate, and answers 6 degrees off, 0.5 stated."""
+    frames, motion = Frames(), Motion()
+    frames.times_s = np.array([*np.arange(50) / 25.0, 12.0])
+    moved = FrameMotions([motion] * 51, turns_known=turns_known, times_s=None)
+    judge = FilterOptions(filter=True).following(frames, moved, None).judge()
+    for number, time_s in enumerate(frames.times_s):
+        seen: Any = (lean(3.0, 0.0 if number < 50 else math.pi), COVARIANCE)
+        found = judge(Outcome(Path(), seen, taken_s=float(time_s)), motion)
+    assert found.filtered is not None
+    assert found.accepted is not turns_known
+    error = tiltvp.tilt_error_rad(found.filtered.normal, lean(3.0, 0.0 if turns_known else math.pi))
+    assert error < SIGMA_RAD
 
 
 def test_wrong_motions_are_refused() -> None:

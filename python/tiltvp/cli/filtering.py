@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final, Self
+from typing import TYPE_CHECKING, Annotated, Any, Final, Self
 
 from cyclopts import Group, Parameter
 
@@ -42,6 +42,8 @@ class FilterOptions(LibraryOptions):
     mounting_... of the table."""
     filter_plot: Path | None = None
     """Picture of the tilt over the images, estimated and filtered (.png)."""
+    step_s: Annotated[float | None, Parameter(parse=False)] = None
+    """Seconds that the walk of one prediction stands for, where it is that of a floor under turns that nobody knows."""
 
     def check(self) -> None:
         """Refuses what cannot be, before any work is done."""
@@ -65,8 +67,9 @@ class FilterOptions(LibraryOptions):
             changed[_HALF_TRACK] = 0.5 * wheel_base_m
         if (moved is None or not moved.turns_known) and _WALK not in given:
             timed = frames.times_s is not None or isinstance(frames, LiveCamera)
-            walk_rad = _TURNING_RAD_S / (frames.rate_hz if timed else 1.0)
-            changed[_WALK.replace("rad", "deg")] = math.degrees(walk_rad)
+            step_s = 1.0 / frames.rate_hz if timed else 1.0
+            changed[_WALK.replace("rad", "deg")] = math.degrees(_TURNING_RAD_S * step_s)
+            changed["step_s"] = step_s
         return replace(self, **changed)
 
     def make(self) -> TiltFilter:
@@ -84,7 +87,7 @@ class FilterOptions(LibraryOptions):
         return Judge(self, self.make() if self.filter else None)
 
 
-@dataclass(frozen=True)
+@dataclass
 class Judge:
     """Makes the verdict of each outcome."""
 
@@ -92,6 +95,8 @@ class Judge:
     filter: TiltFilter | None
     plotted: list[Outcome] = field(default_factory=list)
     """What was made of all, where a plot is asked for."""
+    before_s: float | None = None
+    """When the image of the last prediction was taken, where that is known."""
 
     def __call__(self, outcome: Outcome, motion: Motion | None) -> Outcome:
         """The outcome with what was made of it; `motion` is what the robot did since the last, None: nobody knows."""
@@ -112,10 +117,21 @@ class Judge:
 
     def _judged(self, outcome: Outcome, motion: Motion | None) -> Outcome:
         if self.filter is not None:
-            return _filtered(outcome, motion, self.filter)
+            return _filtered(outcome, motion, self.filter, self._steps(outcome) if motion is not None else 0)
         if self.options.confidence_min is not None:
             return self._marked(outcome, self.options.confidence_min)
         return outcome
+
+    def _steps(self, outcome: Outcome) -> int:
+        """How many predictions stand for the time since the last image, if turns are not known: the tilt walks by as
+        much as it is long, the variances of predictions add up. No more than make it as unknown as it was at first."""
+        step_s, before_s, now_s = self.options.step_s, self.before_s, outcome.taken_s
+        self.before_s = now_s
+        if self.filter is None or step_s is None or before_s is None or now_s is None:
+            return 1
+        options = self.filter.options
+        most = float(options["prior_rad"] / options[_WALK]) ** 2
+        return max(1, round(min(most, ((now_s - before_s) / step_s) ** 2)))
 
     def _marked(self, outcome: Outcome, least: float) -> Outcome:
         e = outcome.estimate
@@ -129,11 +145,13 @@ class Judge:
         return replace(outcome, accepted=False, verdict="low-confidence", verdict_reason=words)
 
 
-def _filtered(outcome: Outcome, motion: Motion | None, filter_: TiltFilter) -> Outcome:
+def _filtered(outcome: Outcome, motion: Motion | None, filter_: TiltFilter, steps: int) -> Outcome:
     if motion is None:
         words = "the odometry does not tell of its time"
         return replace(outcome, accepted=False, verdict="no-odometry", verdict_reason=words)
     filter_.predict(motion.yaw_rad, motion.distance_m)
+    for _ in range(steps - 1):
+        filter_.predict()
     if outcome.estimate is None:
         told = replace(outcome, accepted=False, verdict="no-image", verdict_reason=outcome.error)
     else:
