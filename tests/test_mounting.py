@@ -102,6 +102,17 @@ def test_images_without_a_tilt_are_counted(template):
     assert "no image tells a tilt" in nothing.reason
 
 
+def test_images_of_which_nobody_knows_the_way_are_left_out(template):
+    """As `frame_motions` tells of those in a gap of the odometry; the next motion is that since the last known."""
+    estimates, motions = drive(template, direction(1.0, 0.0), direction(0.0, 1.0), TURNS)
+    motions[12] = Motion(yaw_rad=3.0 * TURNS[0], distance_m=1.5)
+    without = mounting_tilt(estimates[:10] + estimates[12:], motions[:10] + motions[12:], np.eye(3))
+    motions[10] = motions[11] = None
+    found = mounting_tilt(estimates, motions, np.eye(3))
+    assert (found.images, found.used) == (60, 58)
+    assert found.lean == without.lean
+
+
 def test_wide_robots_roll_far_in_a_turn(template):
     """A floor changes with the way of the wheels: of half a metre beside the middle it seemed to jump in each step."""
     lean, half_track_m, step = direction(1.2, -0.7), 0.5, math.tau / 36

@@ -58,6 +58,17 @@ def test_where_the_camera_is_comes_back_too(tmp_path):
     assert "covariance_rad2" not in path.read_text()
 
 
+def test_numbers_of_numpy_are_numbers(tmp_path):
+    half, path = np.float32(0.5), tmp_path / "robot.toml"
+    wheels = Wheels(wheel_base_m=half, ticks_per_turn=np.int64(100))
+    robot(place_m=np.array([half, 0.25]), height_m=half, covariance_rad2=[[1e-6, 0], [0, 1e-6]], wheels=wheels).save(
+        path
+    )
+    read = Robot.load(path)
+    assert (read.place_m, read.height_m, read.wheels) == ((0.5, 0.25), 0.5, wheels)
+    np.testing.assert_array_equal(read.covariance_rad2, np.diag([1e-6, 1e-6]))
+
+
 def test_the_topic_of_the_joints_counts_where_the_wheels_radius_is_known(tmp_path):
     (tmp_path / "a.mcap").touch()
     frames = Frames()
@@ -134,6 +145,10 @@ def test_what_cannot_be_is_refused(tmp_path, old, new, told):
         {"topics": {"image": "/x"}},
         {"topics": {"images": 3}},
         {"place_m": (0.1, math.nan)},
+        {"place_m": ("here", 0.1)},
+        {"height_m": "0.4"},
+        {"covariance_rad2": "none"},
+        {"camera": "camera.toml"},
         {"covariance": np.eye(5)},
         {"place_m": (0.1, 0.2), "covariance": np.eye(4)},
     ],

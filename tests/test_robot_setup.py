@@ -197,6 +197,18 @@ def test_turns_are_not_told_without_turning(drive):
     assert "not told" in found.reason
     with pytest.raises(InvalidInputError, match="yaw_rad"):
         check_turns(images[:6], np.zeros(5), CAMERA, np.eye(3))
+    with pytest.raises(InvalidInputError, match="yaw_rad"):
+        check_turns(images[:6], ["north"] * 6, CAMERA, np.eye(3))
+
+
+def test_headings_of_a_compass_are_those_of_turns(drive):
+    """From pi on they are negative: ten degrees about it were taken for nearly a whole turn."""
+    images = [frame.read() for frame in open_frames(str(drive / "frames"))]
+    headings = math.pi - 5.5 * STEP + np.arange(len(images)) * STEP
+    of_compass = np.arctan2(np.sin(headings), np.cos(headings))
+    assert check_turns(images, of_compass, CAMERA, np.eye(3)) == check_turns(images, headings, CAMERA, np.eye(3))
+    few = [np.pi - 0.1, 0.1 - np.pi] * 3
+    assert check_turns(images[:6], few, CAMERA, np.eye(3)).turned_rad == pytest.approx(0.2)
 
 
 def odometry(steps_s: np.ndarray) -> tuple[np.ndarray, Odometry]:

@@ -108,7 +108,7 @@ class MountingTilt:
 
 def mounting_tilt(
     estimates: Iterable[TiltEstimate | None],
-    motions: Sequence[Motion],
+    motions: Sequence[Motion | None],
     robot_from_camera: ArrayLike,
     *,
     level_floor: bool = False,
@@ -118,22 +118,25 @@ def mounting_tilt(
 
     `estimates` are those of a `TiltEstimator` with the mounting `robot_from_camera` (3, 3), in the images' order, best
     of method "segments"; None where there is no image. `motions` say of each how far the robot had turned and driven
-    since the one before. A floor that is plane but not level turns with the robot, the mounting does not: a
-    `TiltFilter` with `estimate_mounting` tells them apart where the robot turns. `level_floor` says that the floor is
-    level to 0.05 degrees, so that no turn is needed. `half_track_m` is half of the distance between the wheels, by
-    default that of `TiltFilter`: of a robot that is wider the floor changes more in a turn. Raises `InvalidInputError`
-    for as many motions as there are not images, and for a matrix that is no rotation.
+    since the one before; an image of which nobody knows that, None, is left out. A floor that is plane but not level
+    turns with the robot, the mounting does not: a `TiltFilter` with `estimate_mounting` tells them apart where the
+    robot turns. `level_floor` says that the floor is level to 0.05 degrees, so that no turn is needed. `half_track_m`
+    is half of the distance between the wheels, by default that of `TiltFilter`: of a robot that is wider the floor
+    changes more in a turn. Raises `InvalidInputError` for as many motions as there are not images, and for a matrix
+    that is no rotation.
     """
     rotation = mounting_from(robot_from_camera)
-    given = list(estimates)
-    if len(given) != len(motions):
-        raise InvalidInputError(f"motions: {len(motions)}, expected {len(given)}, one for each image")
+    images = list(estimates)
+    if len(images) != len(motions):
+        raise InvalidInputError(f"motions: {len(motions)}, expected {len(images)}, one for each image")
+    known = [(image, motion) for image, motion in zip(images, motions, strict=True) if motion is not None]
+    given, driven = [image for image, _ in known], [motion for _, motion in known]
     told = dict(_LEVEL) if level_floor else {}
     if half_track_m is not None:
         told["half_track_m"] = half_track_m
-    whole = _filtered(given, motions, told)
+    whole = _filtered(given, driven, told)
     lean, used = whole.lean, len(whole.covariances)
-    headings = np.cumsum([0.0, *(motion.yaw_rad for motion in motions[1:])])
+    headings = np.cumsum([0.0, *(motion.yaw_rad for motion in driven[1:])])
     turned = min(float(np.ptp(headings)), math.tau)
     upright = levelling(lean.normal) @ rotation if lean else rotation
     shared, covariance = np.zeros((2, 2)), np.asarray(lean.covariance_rad2)
@@ -145,11 +148,11 @@ def mounting_tilt(
         alike = max(0.0, 1.0 - turned / math.pi)
         share = alike * max(1.0, excess) + (1.0 - alike) * _SHARED**2 * max(_AGREEMENT_MAX**2, excess)
         shared = share * np.median(whole.covariances, axis=0)
-        scatter = _scatter(given, motions, lean, told) if used >= 2 * _PARTS else None
+        scatter = _scatter(given, driven, lean, told) if used >= 2 * _PARTS else None
         stated = (1.0 if scatter is None else alike) * max(1.0, excess) * covariance
         covariance = shared + _beyond(stated, shared) + (0.0 if scatter is None else scatter)
     return MountingTilt(
-        upright, lean, whole.floor, len(given), used, turned, level_floor, _about_axes(covariance), _about_axes(shared)
+        upright, lean, whole.floor, len(images), used, turned, level_floor, _about_axes(covariance), _about_axes(shared)
     )
 
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Final, Self
 
 import numpy as np
 
-from tiltvp.arguments import path_from
+from tiltvp.arguments import array_from, number_from, pair_from, path_from
 from tiltvp.cameras import Camera
 from tiltvp.errors import CalibrationError, InvalidInputError
 from tiltvp.files import check_output, check_toml, write_whole
@@ -22,7 +22,7 @@ from tiltvp.rotations import mounting_from
 from tiltvp.streams.wheels import Wheels
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
+    from numpy.typing import ArrayLike, NDArray
 
     from tiltvp.tilt import TiltEstimator
 
@@ -62,18 +62,24 @@ class Robot:
     """(5, 5): of the errors of x, y and the mounting about the robot's x, y and z axes (see `tiltvp.Extrinsics`)."""
 
     def __post_init__(self) -> None:
+        if not isinstance(self.camera, Camera):
+            raise InvalidInputError(f"camera = {self.camera!r}, expected a tiltvp.Camera")
         object.__setattr__(self, "robot_from_camera", mounting_from(self.robot_from_camera))
         if self.mask is not None:
             object.__setattr__(self, "mask", checked_mask(self.mask, self.camera))
         if self.covariance is not None:
             if self.place_m is None:
                 raise InvalidInputError("covariance: without place_m, expected both")
-            _check_covariance("covariance", np.asarray(self.covariance, dtype=np.float64), 5)
-            object.__setattr__(self, "covariance_rad2", np.asarray(self.covariance, dtype=np.float64)[2:4, 2:4])
+            object.__setattr__(self, "covariance", _covariance("covariance", self.covariance, 5))
+            object.__setattr__(self, "covariance_rad2", np.asarray(self.covariance)[2:4, 2:4])
         elif self.covariance_rad2 is not None:
-            _check_covariance("covariance_rad2", np.asarray(self.covariance_rad2, dtype=np.float64), 2)
-        lengths = [*(self.place_m or ()), *(() if self.height_m is None else (self.height_m,))]
-        if not np.isfinite(lengths).all() or len(self.place_m or (0, 0)) != 2:
+            object.__setattr__(self, "covariance_rad2", _covariance("covariance_rad2", self.covariance_rad2, 2))
+        # Numbers of any kind, as NumPy's, are those that a file takes.
+        if self.place_m is not None:
+            object.__setattr__(self, "place_m", pair_from(self.place_m, "place_m"))
+        if self.height_m is not None:
+            object.__setattr__(self, "height_m", number_from(self.height_m, "height_m"))
+        if not np.isfinite([*(self.place_m or ()), self.height_m or 0.0]).all():
             raise InvalidInputError(f"place_m, height_m: {self.place_m}, {self.height_m}, expected finite metres")
         for name, topic in self.topics.items():
             if name not in TOPICS or not isinstance(topic, str):
@@ -131,9 +137,9 @@ class Robot:
         if self.height_m is not None:
             mounting["height_m"] = self.height_m
         if self.covariance is not None:
-            mounting["covariance"] = np.asarray(self.covariance).tolist()
+            mounting["covariance"] = self.covariance.tolist()
         elif self.covariance_rad2 is not None:
-            mounting["covariance_rad2"] = np.asarray(self.covariance_rad2).tolist()
+            mounting["covariance_rad2"] = self.covariance_rad2.tolist()
         tree["mounting"] = mounting
         known = {name: getattr(self.wheels, name) for name in (*_WHEELS, "joints")}
         known = {name: value for name, value in known.items() if value is not None}
@@ -203,7 +209,8 @@ def _two(node: Node) -> tuple[float, float]:
     return first, second
 
 
-def _check_covariance(name: str, covariance: NDArray[np.float64], size: int) -> None:
+def _covariance(name: str, values: ArrayLike, size: int) -> NDArray[np.float64]:
+    covariance = array_from(values, name)
     fits = covariance.shape == (size, size) and bool(np.isfinite(covariance).all())
     # One that is nearly singular may by rounding have a value just below zero.
     if fits:
@@ -211,3 +218,4 @@ def _check_covariance(name: str, covariance: NDArray[np.float64], size: int) -> 
         fits = bool(values[0] >= -1e-9 * values[-1] and values[-1] >= 0.0)
     if not fits:
         raise InvalidInputError(f"{name}: {covariance.tolist()}, expected a covariance ({size}, {size})")
+    return covariance

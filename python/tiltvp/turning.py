@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from tiltvp.arguments import array_from
 from tiltvp.errors import InvalidInputError
 from tiltvp.images import camera_grays
 from tiltvp.rotations import mounting_from
@@ -102,9 +103,10 @@ def check_turns(
 ) -> TurnCheck:
     """Whether images (N of them, taken one after the other) turn as headings (N,) say, left positive.
 
-    A mirrored image, or a camera whose calibration says wrongly that it is one, leaves a consistent world that turns
-    the other way round; so do wheels that are swapped. Which of them it is cannot be told. The mounting (3, 3) has to
-    be right about which way is up, not about its yaw. Raises `InvalidInputError` for sizes that do not fit.
+    Headings of a compass, within a turn, are followed across its end. A mirrored image, or a camera whose calibration
+    says wrongly that it is one, leaves a consistent world that turns the other way round; so do wheels that are
+    swapped. Which of them it is cannot be told. The mounting (3, 3) has to be right about which way is up, not about
+    its yaw. Raises `InvalidInputError` for sizes that do not fit.
     """
     up = _up_of(robot_from_camera)
     turned, scores = _turned_back(images, yaw_rad, camera, [up, -up])
@@ -181,9 +183,10 @@ def _turned_back(
 ) -> tuple[float, NDArray[np.float64]]:
     """How far headings are apart at most, and how alike pairs are, (P, U), turned back about each direction (3,)."""
     pictures = _Pictures(images, camera)
-    headings = np.asarray(yaw_rad, dtype=np.float64)
+    headings = array_from(yaw_rad, "yaw_rad")
     if headings.shape != (len(pictures),) or not np.isfinite(headings).all():
         raise InvalidInputError(f"yaw_rad: shape {headings.shape}, expected ({len(pictures)},) of finite angles")
+    headings = np.unwrap(headings)  # Those of a compass jump by a turn, which is none.
     scores = np.array([
         [pictures.likeness(k, other, up * float(headings[k] - headings[other])) for up in ups]
         for k, other in _pairs(headings)
@@ -235,7 +238,7 @@ def frame_delay(
     The mounting (3, 3) has to be right about which way is up. Raises `InvalidInputError` for sizes that do not fit.
     """
     pictures, up = _Pictures(images, camera), _up_of(robot_from_camera)
-    times = np.asarray(times_s, dtype=np.float64)
+    times = array_from(times_s, "times_s")
     if times.shape != (len(pictures),) or not np.isfinite(times).all():
         raise InvalidInputError(f"times_s: shape {times.shape}, expected ({len(pictures)},) of finite times")
     headings = odometry.at(times).yaw_rad

@@ -40,8 +40,10 @@ class Wheels:
     def __post_init__(self) -> None:
         """Raises `InvalidInputError` for what is no length or count above 0, and for other than two joints."""
         for name in ("wheel_base_m", "wheel_radius_m", "ticks_per_turn", "gap_max_s"):
-            value = getattr(self, name)
-            if value is not None and not 0.0 < number_from(value, name) < np.inf:
+            if (value := getattr(self, name)) is None:
+                continue
+            object.__setattr__(self, name, number_from(value, name))
+            if not 0.0 < getattr(self, name) < np.inf:
                 raise InvalidInputError(f"{name} = {value}, expected a number above 0")
         if self.joints is not None and (isinstance(self.joints, str) or len(self.joints) != 2):
             raise InvalidInputError(f"joints = {self.joints!r}, expected names of two, the left and the right wheel's")
