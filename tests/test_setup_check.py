@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -13,6 +14,7 @@ from tiltvp.errors import InvalidInputError
 from tiltvp.rotations import read_rotation
 from tiltvp.setup_check import DIRECTIONS, opposite_direction, shares_of
 from tiltvp.setup_features import ImageFeatures
+from tiltvp.streams import Frames
 from tiltvp.turning import check_turns
 
 PINHOLE = tiltvp.Camera.pinhole(width=320, height=240, fx=190.0, fy=190.0, cx=159.5, cy=119.5)
@@ -106,6 +108,21 @@ def test_what_it_cannot_look_at_is_refused() -> None:
                 refused(mounting)
     with pytest.raises(InvalidInputError, match="as the camera's images"):
         tiltvp.check_setup([IMAGES[0][:-1]], PINHOLE)
+
+
+@pytest.mark.parametrize("camera", ["camera.toml", None, tiltvp.Robot(PINHOLE, np.eye(3))])
+def test_what_is_no_camera_is_refused(camera: Any) -> None:
+    for refused in (
+        lambda: tiltvp.check_setup(IMAGES, camera),
+        lambda: check_turns(IMAGES, np.zeros(5), camera, np.eye(3)),
+        lambda: tiltvp.find_setup(Frames(), camera),
+        lambda: tiltvp.body_mask(IMAGES, camera),
+        lambda: tiltvp.surround_mask(IMAGES, camera),
+        lambda: tiltvp.Leveller(camera),
+        lambda: tiltvp.Unwrapper(camera),
+    ):
+        with pytest.raises(InvalidInputError, match=r"expected a tiltvp\.Camera"):
+            refused()
 
 
 def test_tilt_warns_in_one_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

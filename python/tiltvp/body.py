@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from tiltvp.images import camera_grays, checked_mask
+from tiltvp.images import camera_grays, checked_camera, checked_mask
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
@@ -63,11 +63,12 @@ def body_mask(images: Iterable[ArrayLike], camera: Camera, *, mask: ArrayLike | 
 
     At least 5 images from places, and with headings, that differ; 24 find more. `mask` (H, W) bool is True where images
     are looked at. What is alike in all images but has no edges is left in, for so is a ceiling. Images are taken one
-    after the other and not kept. Raises `InvalidInputError` for what is no image, for images and masks of another size
-    than the camera's, and for masks of another type than bool.
+    after the other and not kept. Raises `InvalidInputError` for what is no image or camera, for images and masks of
+    another size than the camera's, and for masks of another type than bool.
     """
     import cv2
 
+    checked_camera(camera)
     shape = (camera.height, camera.width)
     looked = camera.valid_mask() & (True if mask is None else checked_mask(mask, camera))
     scale = min(1.0, _SIDE_PX / max(shape))

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 __all__ = [
     "bgr_from",
     "bits_of",
+    "checked_camera",
     "checked_mask",
     "decode_as_stored",
     "decode_image",
@@ -100,6 +101,12 @@ def camera_grays(images: Iterable[ArrayLike], camera: _core.Camera) -> Iterator[
         if gray.shape != shape:
             raise InvalidInputError(f"images[{number}]: shape {gray.shape}, expected {shape}, as the camera's images")
         yield gray
+
+
+def checked_camera(camera: object) -> None:
+    """Raises `InvalidInputError` for what is no camera, such as the path of one or a `Robot`."""
+    if not isinstance(camera, _core.Camera):
+        raise InvalidInputError(f"camera: {type(camera).__name__}, expected a tiltvp.Camera")
 
 
 def checked_mask(mask: ArrayLike, camera: _core.Camera) -> NDArray[np.bool_]:

@@ -11,6 +11,7 @@ from tiltvp import _core
 from tiltvp.arguments import number_from, size_from
 from tiltvp.cameras import Camera
 from tiltvp.errors import InvalidInputError
+from tiltvp.images import checked_camera
 from tiltvp.tilt import TiltEstimator, normal_of
 
 if TYPE_CHECKING:
@@ -187,6 +188,7 @@ def _panorama_size(camera: _core.Camera) -> tuple[int, int]:
 
 
 def _not_too_large(camera: _core.Camera) -> _core.Camera:
+    checked_camera(camera)
     if max(camera.width, camera.height) > _LARGEST_SIDE_PX:
         size = f"{camera.width} x {camera.height}"
         raise InvalidInputError(f"camera: images of {size}, expected at most {_LARGEST_SIDE_PX} pixels a side")

@@ -17,7 +17,7 @@ from tiltvp.files import check_output, check_toml, write_whole
 from tiltvp.formats.document import Document
 from tiltvp.formats.node import Node
 from tiltvp.formats.own import ROBOT_FORMAT, VERSION, camera_from, camera_table, root_of
-from tiltvp.images import checked_mask, gray_from, read_image, write_image
+from tiltvp.images import checked_camera, checked_mask, gray_from, read_image, write_image
 from tiltvp.rotations import mounting_from
 from tiltvp.streams.wheels import Wheels
 
@@ -62,8 +62,7 @@ class Robot:
     """(5, 5): of the errors of x, y and the mounting about the robot's x, y and z axes (see `tiltvp.Extrinsics`)."""
 
     def __post_init__(self) -> None:
-        if not isinstance(self.camera, Camera):
-            raise InvalidInputError(f"camera = {self.camera!r}, expected a tiltvp.Camera")
+        checked_camera(self.camera)
         object.__setattr__(self, "robot_from_camera", mounting_from(self.robot_from_camera))
         if self.mask is not None:
             object.__setattr__(self, "mask", checked_mask(self.mask, self.camera))

@@ -11,7 +11,7 @@ import numpy as np
 
 from tiltvp.body import BodyMask, body_mask
 from tiltvp.errors import InvalidInputError, TiltvpError
-from tiltvp.images import gray_from
+from tiltvp.images import checked_camera, gray_from
 from tiltvp.mounting import MountingTilt, mounting_tilt
 from tiltvp.robot import Robot
 from tiltvp.rotations import mounting_from
@@ -138,6 +138,7 @@ def find_setup(
     for `mounting_tilt`. `advance` is called after each image. Raises `InvalidInputError` for frames that come only once
     and for fewer than 5 images of the camera's size.
     """
+    checked_camera(camera)
     usable = sum(1 for _ in spread(frames, camera, LOOKED_AT))
     if usable < LEAST:
         expected = f"{LEAST} or more of {camera.width} x {camera.height} pixels"

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from tiltvp.images import camera_grays
+from tiltvp.images import camera_grays, checked_camera
 from tiltvp.rim import circle_through
 
 if TYPE_CHECKING:
@@ -33,10 +33,11 @@ def surround_mask(images: Iterable[ArrayLike], camera: Camera) -> NDArray[np.boo
     """(H, W), True within the image circle; None without a dark surround, and where the camera knows its rim.
 
     At least three corners are dark in every image, and what is not dark has a round rim. Five images of different
-    places tell a surround from shadows. Raises `InvalidInputError` for what is no image.
+    places tell a surround from shadows. Raises `InvalidInputError` for what is no image or camera.
     """
     import cv2
 
+    checked_camera(camera)
     if not camera.valid_mask().all():
         return None
     lightest: NDArray[np.uint8] | None = None

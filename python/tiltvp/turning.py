@@ -11,7 +11,7 @@ import numpy as np
 
 from tiltvp.arguments import array_from
 from tiltvp.errors import InvalidInputError
-from tiltvp.images import camera_grays
+from tiltvp.images import camera_grays, checked_camera
 from tiltvp.rotations import mounting_from
 from tiltvp.setup_check import DIRECTIONS, nearest_direction, opposite_direction
 
@@ -353,6 +353,7 @@ def made_small(image: NDArray[np.uint8], camera: Camera) -> NDArray[np.uint8]:
 
 
 def _small(images: Iterable[ArrayLike], camera: Camera) -> tuple[Camera, list[NDArray[np.float64]]]:
+    checked_camera(camera)
     grays = [made_small(gray, camera).astype(np.float64) for gray in camera_grays(images, camera)]
     return small_camera(camera), grays
 
