@@ -23,8 +23,12 @@ def view(seed: int, radius: float | None = 105.0) -> np.ndarray:
     return np.asarray(np.clip(image + rng.normal(0.0, 2.0, image.shape), 0, 255), dtype=np.uint8)
 
 
-def test_the_circle_is_found_and_what_lies_within_is_left() -> None:
-    mask = tiltvp.surround_mask([view(seed) for seed in range(5)], WHOLE)
+@pytest.mark.parametrize("focal_px", [70.0, 60.0])
+def test_the_circle_is_found_and_what_lies_within_is_left(focal_px: float) -> None:
+    """Also where the corners are farther out than the formula of the lens reaches, which tells nothing of the rim."""
+    camera = tiltvp.Camera.equidistant(width=320, height=240, focal_px=focal_px, cx=159.5, cy=119.5)
+    assert camera.valid_mask().all() == (focal_px == 70.0)
+    mask = tiltvp.surround_mask([view(seed) for seed in range(5)], camera)
     assert mask is not None
     v, u = np.nonzero(mask)
     assert (u.min() + u.max()) / 2 == pytest.approx(163.0, abs=1.5)

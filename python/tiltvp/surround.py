@@ -27,6 +27,9 @@ _ROUND: Final = 0.02
 """Share of the radius by which the rim may stray from a circle."""
 _INSIDE: Final = 0.03
 """Share of the radius that is left out within the circle, where lenses darken."""
+_KNOWN: Final = 0.03
+"""Share of the circle's area that the calibration may see beyond it and yet know the rim: centres that are off by four
+pixels in a hundred of radius. Formulas that end somewhere in the corners do not know it."""
 
 
 def surround_mask(images: Iterable[ArrayLike], camera: Camera) -> NDArray[np.bool_] | None:
@@ -38,8 +41,6 @@ def surround_mask(images: Iterable[ArrayLike], camera: Camera) -> NDArray[np.boo
     import cv2
 
     checked_camera(camera)
-    if not camera.valid_mask().all():
-        return None
     lightest: NDArray[np.uint8] | None = None
     for image in camera_grays(images, camera):
         gray = np.asarray(cv2.medianBlur(image, 5), dtype=np.uint8)
@@ -71,7 +72,9 @@ def surround_mask(images: Iterable[ArrayLike], camera: Camera) -> NDArray[np.boo
         return None
     centre, radius = circle
     v, u = np.indices(lightest.shape)
-    return np.asarray(np.hypot(u - centre[0], v - centre[1]) <= (1.0 - _INSIDE) * radius)
+    away = np.hypot(u - centre[0], v - centre[1])
+    beyond = np.count_nonzero(camera.valid_mask() & (away > (1.0 + _ROUND) * radius))
+    return away <= (1.0 - _INSIDE) * radius if beyond > _KNOWN * np.count_nonzero(away <= radius) else None
 
 
 def _circle(rim: NDArray[np.float64]) -> tuple[NDArray[np.float64], float] | None:
