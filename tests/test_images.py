@@ -9,12 +9,13 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
+from PIL import Image
 
 import tiltvp
 from tiltvp.cli.sources import distinct_names
 from tiltvp.errors import ImageFileError, InvalidInputError, OutputError
 from tiltvp.image_headers import header_size
-from tiltvp.images import gray_from, read_image
+from tiltvp.images import decode_as_stored, gray_from, read_image
 from tiltvp.streams.image_files import find_images
 
 LEVELS = np.arange(256, dtype=np.uint8).reshape(16, 16)
@@ -135,6 +136,16 @@ def test_a_tiff_that_points_beyond_any_file_is_unreadable(tmp_path: Path) -> Non
     (tmp_path / "far.tiff").write_bytes(b"II+\0\x08\0\0\0" + b"\xff" * 8)
     with pytest.raises(ImageFileError, match=r"far\.tiff"):
         read_image(tmp_path / "far.tiff")
+
+
+@pytest.mark.parametrize("channels", [1, 3])
+@pytest.mark.parametrize("turn", range(1, 9))
+def test_pixels_are_where_the_sensor_has_them(turn: int, channels: int, tmp_path: Path) -> None:
+    """Whatever the orientation tag says: OpenCV turns TIFF files by it also where it is told not to."""
+    pixels, path = np.random.default_rng(0).integers(0, 256, (6, 8, channels), np.uint8).squeeze(), tmp_path / "a.tiff"
+    Image.fromarray(pixels[..., ::-1] if channels == 3 else pixels).save(path, tiffinfo={0x0112: turn})
+    np.testing.assert_array_equal(read_image(path), pixels)
+    np.testing.assert_array_equal(decode_as_stored(path.read_bytes()), pixels)
 
 
 @pytest.mark.parametrize("order", "<>")

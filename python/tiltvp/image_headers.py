@@ -5,16 +5,17 @@ from __future__ import annotations
 
 import re
 import struct
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import Final
 
-__all__ = ["header_size", "orientation"]
+__all__ = ["header_size", "orientation", "unturned"]
 
 # Compiled at the first file and not at the import, a tenth of whose time that would be; `re` keeps them.
 _PNM: Final = rb"P[1-7](?:\s|#[^\n]*\n)+"
 _PNM_NUMBER: Final = rb"(?:\s|#[^\n]*\n)*(\d{1,9})"
 _PAM_SIDE: Final = rb"(?m)^(WIDTH|HEIGHT)[ \t]+(\d{1,9})\s*$"
 _JPEG_FRAMES: Final = frozenset(range(0xC0, 0xD0)) - {0xC4, 0xC8, 0xCC}
+_TIFF: Final = rb"II[\x2a\x2b]\x00|MM\x00[\x2a\x2b]"
 _TIFF_TYPES: Final = {1: "B", 3: "H", 4: "I", 16: "Q"}
 
 
@@ -42,6 +43,16 @@ def orientation(data: bytes) -> int:
     except (struct.error, IndexError):
         pass
     return 1
+
+
+def unturned(data: bytes) -> bytes:
+    """A TIFF file, of a header that `header_size` reads, without the turn of its orientation tag, which OpenCV makes
+    whatever it is told; any other file as it is."""
+    for order, tag, kind, at in _tiff_entries(data) if re.match(_TIFF, data) else ():
+        upright = struct.pack(order + "H", 1)
+        if (tag, kind) == (0x0112, 3) and data[at : at + 2] != upright:
+            return data[:at] + upright + data[at + 2 :]
+    return data
 
 
 def _orientation_of(tiff: bytes) -> int:
@@ -95,18 +106,23 @@ def _pnm(data: bytes) -> tuple[int, int] | None:
 
 
 def _tiff(data: bytes) -> tuple[int, int] | None:
+    sides: dict[int, int] = {}
+    for order, tag, kind, at in _tiff_entries(data):
+        if tag in (256, 257) and kind in _TIFF_TYPES:
+            sides[tag] = max(sides.get(tag, 0), int(struct.unpack_from(order + _TIFF_TYPES[kind], data, at)[0]))
+    return (sides[256], sides[257]) if len(sides) == 2 else None
+
+
+def _tiff_entries(data: bytes) -> Iterator[tuple[str, int, int, int]]:
+    """The order of bytes, and of each entry of the first directory its tag, its type and where its value is."""
     order = "<" if data[:2] == b"II" else ">"
     big = struct.unpack_from(order + "H", data, 2)[0] == 43
     place = int(struct.unpack_from(order + ("Q" if big else "I"), data, 8 if big else 4)[0])
     count = int(struct.unpack_from(order + ("Q" if big else "H"), data, place)[0])
     entries, each = place + (8 if big else 2), 20 if big else 12
-    sides: dict[int, int] = {}
     for k in range(min(count, 4096)):
         tag, kind = struct.unpack_from(order + "HH", data, entries + each * k)
-        if tag in (256, 257) and kind in _TIFF_TYPES:
-            value = struct.unpack_from(order + _TIFF_TYPES[kind], data, entries + each * k + (12 if big else 8))[0]
-            sides[tag] = max(sides.get(tag, 0), int(value))
-    return (sides[256], sides[257]) if len(sides) == 2 else None
+        yield order, tag, kind, entries + each * k + (12 if big else 8)
 
 
 def _webp(data: bytes) -> tuple[int, int] | None:
@@ -136,7 +152,7 @@ _READERS: Final[tuple[tuple[bytes, Callable[[bytes], tuple[int, int] | None]], .
     (rb"\xff\xd8\xff", _jpeg),
     (rb"BM", _bmp),
     (rb"P[1-7][\s#]", _pnm),
-    (rb"II[\x2a\x2b]\x00|MM\x00[\x2a\x2b]", _tiff),
+    (_TIFF, _tiff),
     (rb"RIFF....WEBP", _webp),
     (rb"\x00\x00\x00\x0cjP  |\xff\x4f\xff\x51", _jpeg2000),
 )

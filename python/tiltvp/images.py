@@ -13,7 +13,7 @@ from tiltvp import _core
 from tiltvp.arguments import path_from
 from tiltvp.errors import ImageFileError, InvalidInputError
 from tiltvp.files import read_bytes, write_whole
-from tiltvp.image_headers import header_size
+from tiltvp.image_headers import header_size, unturned
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
@@ -183,7 +183,7 @@ def _decode(data: bytes) -> NDArray[np.uint8] | None:
 
     try:
         depths = cv2.IMREAD_ANYCOLOR | cv2.IMREAD_ANYDEPTH | cv2.IMREAD_IGNORE_ORIENTATION
-        image = cv2.imdecode(np.frombuffer(data, dtype=np.uint8), depths)
+        image = cv2.imdecode(np.frombuffer(unturned(data), dtype=np.uint8), depths)
     except (cv2.error, MemoryError):
         return None
     if image is None or image.dtype not in (np.uint8, np.uint16):
@@ -195,7 +195,7 @@ def decode_as_stored(data: bytes) -> NDArray[Any]:
     """What `decode_image` takes, with its depth and opacity: (H, W) or (H, W, 3 or 4) uint8 or uint16, BGR or BGRA."""
     import cv2
 
-    return np.asarray(cv2.imdecode(np.frombuffer(data, dtype=np.uint8), cv2.IMREAD_UNCHANGED))
+    return np.asarray(cv2.imdecode(np.frombuffer(unturned(data), dtype=np.uint8), cv2.IMREAD_UNCHANGED))
 
 
 def write_image(path: str | os.PathLike[str], image: NDArray[Any]) -> None:
