@@ -15,7 +15,7 @@ from tiltvp.errors import InvalidInputError
 from tiltvp.images import read_image, write_image
 from tiltvp.rotations import about_vertical, levelling
 from tiltvp.setup_check import opposite_direction
-from tiltvp.streams import Odometry, Wheels, open_frames
+from tiltvp.streams import NamedImages, Odometry, Wheels, open_frames
 from tiltvp.streams.odometry import Motion
 from tiltvp.synth import Room
 from tiltvp.turning import telling_frames, turn_axis
@@ -187,6 +187,17 @@ def test_too_few_images_are_refused(drive):
     frames = open_frames([str(drive / "frames" / f"{k:02d}.png") for k in range(4)])
     with pytest.raises(InvalidInputError, match="4 images of the camera's size, expected 5 or more"):
         find_setup(frames, CAMERA)
+
+
+def test_frames_and_motions_that_do_not_fit_are_refused(drive):
+    frames = open_frames(str(drive / "frames"))
+    for motions in ([Motion()] * 10, [Motion()] * (COUNT + 1)):
+        with pytest.raises(InvalidInputError, match=f"motions: {len(motions)}, expected {COUNT}"):
+            find_setup(frames, CAMERA, motions)
+    with pytest.raises(InvalidInputError, match="frames: str, expected what"):
+        find_setup(str(drive / "frames"), CAMERA)
+    with pytest.raises(InvalidInputError, match="comes only once"):
+        find_setup(NamedImages(), CAMERA)
 
 
 def test_turns_are_not_told_without_turning(drive):

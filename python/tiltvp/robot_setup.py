@@ -16,6 +16,7 @@ from tiltvp.mounting import MountingTilt, mounting_tilt
 from tiltvp.robot import Robot
 from tiltvp.rotations import mounting_from
 from tiltvp.setup_check import SURE, SetupCheck, check_setup, mounting_looking, opposite_direction
+from tiltvp.streams.frames import Frames
 from tiltvp.streams.odometry import Motion
 from tiltvp.streams.wheels import Wheels
 from tiltvp.surround import surround_mask
@@ -27,7 +28,7 @@ if TYPE_CHECKING:
 
     from tiltvp import _core
     from tiltvp.cameras import Camera
-    from tiltvp.streams.frames import Frame, Frames
+    from tiltvp.streams.frames import Frame
 
     Image = NDArray[np.uint8]
 
@@ -135,10 +136,11 @@ def find_setup(
     None where nobody knows, and none of them without odometry. Where `robot_from_camera` (3, 3) is not given, the
     direction that is up is found; its turn about the vertical is left as of a camera that looks along the robot.
     `mask` (H, W) bool is True where images show the world; without it rim and body are looked for. `level_floor` is as
-    for `mounting_tilt`. `advance` is called after each image. Raises `InvalidInputError` for frames that come only once
-    and for fewer than 5 images of the camera's size.
+    for `mounting_tilt`. `advance` is called after each image. Raises `InvalidInputError` for frames that come only
+    once, for as many motions as there are not frames, and for fewer than 5 images of the camera's size.
     """
     checked_camera(camera)
+    _count_of(frames, motions)
     usable = sum(1 for _ in spread(frames, camera, LOOKED_AT))
     if usable < LEAST:
         expected = f"{LEAST} or more of {camera.width} x {camera.height} pixels"
@@ -214,9 +216,7 @@ def drive_tilts(
     Without odometry (`motions` is None) the robot is taken not to have moved, so that nothing can tell floor and
     mounting apart.
     """
-    count = frames.count
-    if count is None:
-        raise InvalidInputError(f"{frames.source}: comes only once, expected images, a video or a recording")
+    count = _count_of(frames, motions)
     numbers = [int(number) for number in np.linspace(0, count - 1, measured_count(frames))]
     estimates: list[TiltEstimate | None] = []
     for number, frame in zip(numbers, frames.sample(numbers), strict=False):
@@ -226,6 +226,17 @@ def drive_tilts(
         estimates.append(estimate if estimate else None)
         advance()
     return DriveTilts(estimates, _joined(motions, numbers))
+
+
+def _count_of(frames: Frames, motions: Sequence[Motion | None] | None) -> int:
+    """How many frames there are, each with its motion. Raises `InvalidInputError`."""
+    if not isinstance(frames, Frames):
+        raise InvalidInputError(f"frames: {type(frames).__name__}, expected what tiltvp.streams.open_frames opens")
+    if frames.count is None:
+        raise InvalidInputError(f"{frames.source}: comes only once, expected images, a video or a recording")
+    if motions is not None and len(motions) != frames.count:
+        raise InvalidInputError(f"motions: {len(motions)}, expected {frames.count}, one for each frame")
+    return frames.count
 
 
 def measured_count(frames: Frames) -> int:
