@@ -62,6 +62,9 @@ def test_tilt_of_a_bag_with_the_odometry_of_the_same(run: Run, world: Path, tmp_
     # With turns that are known the images of one lean agree.
     assert table["nis"].drop_nulls()[1:].max() < 9.0
     assert table["file"][3] == f"{bag}#3"
+    # Whoever reads lines finds the same keys in all.
+    _, lines, _ = run("tilt", bag, "--camera", world / "camera.toml", "--filter", "--out", "-")
+    assert {tuple(json.loads(line)) for line in lines.splitlines()} == {tuple(table.columns)}
 
 
 def test_pictures_of_a_video_and_threads(run: Run, world: Path, tmp_path: Path) -> None:

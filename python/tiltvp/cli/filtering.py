@@ -148,7 +148,9 @@ class Judge:
 def _filtered(outcome: Outcome, motion: Motion | None, filter_: TiltFilter, steps: int) -> Outcome:
     if motion is None:
         words = "the odometry does not tell of its time"
-        return replace(outcome, accepted=False, verdict="no-odometry", verdict_reason=words)
+        told = replace(outcome, accepted=False, verdict="no-odometry", verdict_reason=words, mounting=filter_.mounting)
+        # Of a place that nobody knows as much is known as at first.
+        return replace(told, filtered=type(filter_)(**filter_.options).estimate)
     filter_.predict(motion.yaw_rad, motion.distance_m)
     for _ in range(steps - 1):
         filter_.predict()
