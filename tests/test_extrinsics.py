@@ -13,6 +13,7 @@ from tiltvp import Camera, Extrinsics, Robot, join_logs, join_tilts
 from tiltvp.errors import InvalidInputError
 from tiltvp.rotations import about_vertical, levelling, read_rotation
 from tiltvp.selfcalib import consistency_band
+from tiltvp.streams import Motion
 from tiltvp.synth import simulate_drive
 
 CAMERA = Camera.equidistant(width=64, height=48, focal_px=20.0, cx=31.5, cy=23.5)
@@ -112,6 +113,25 @@ def test_logs_are_weighed_and_compared() -> None:
     one = join_logs(places[:1])
     assert one
     np.testing.assert_allclose(one.covariance, PLANE, rtol=1e-9, atol=1e-15)
+
+
+def test_what_is_not_to_be_relied_upon_stays_so() -> None:
+    """A log or a drive that says so of itself makes no answer that can be relied upon."""
+    drive = simulate_drive("alternating", seed=4)
+    seen = drive.bearings[drive.bearings[:, 0] < 20]
+    whole = tiltvp.calibrate(drive.odometry, drive.bearings, wheel_base_m=0.4)
+    short = tiltvp.calibrate(drive.odometry[:20], seen, wheel_base_m=0.4)
+    assert whole
+    assert not short
+    joined = join_logs([whole, short])
+    assert joined.distance < joined.limit
+    assert not joined
+    assert joined.reason.endswith("they agree; log 2 by itself is not to be relied upon")
+    assert not Extrinsics.of(join_logs([short]))
+    untold = tiltvp.mounting_tilt([None] * 3, [Motion(distance_m=0.1)] * 3, np.eye(3))
+    found = Extrinsics.of(whole, untold)
+    assert found.reasons == (untold.reason,)
+    assert found.robot(Robot(CAMERA, np.eye(3))).covariance is None
 
 
 def test_the_start_counts_once() -> None:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, ClassVar, Final
 import numpy as np
 
 from tiltvp.errors import InvalidInputError
+from tiltvp.mounting import MountingTilt
 from tiltvp.rotations import about_vertical, rotation_from
 from tiltvp.selfcalib import consistency_band
 from tiltvp.streams.outputs.transforms import COVARIANCE_AXES, StaticTransform
@@ -17,7 +18,6 @@ from tiltvp.streams.outputs.transforms import COVARIANCE_AXES, StaticTransform
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
-    from tiltvp.mounting import MountingTilt
     from tiltvp.robot import Robot
     from tiltvp.selfcalib import LogCalibration
 
@@ -61,7 +61,7 @@ class _Joined:
             return f"{self._what} of one log: nothing to compare it with"
         apart = f"{self.distance:.1f} squared standard deviations apart, by chance below {self.limit:.1f}"
         found = f"{self._what} of {self.logs} logs: {apart}"
-        if self:
+        if self.distance <= self.limit:
             return f"{found}: they agree"
         blame = "" if self.odd is None else f"; without log {self.odd + 1} the others agree"
         return f"{found}: the logs contradict one another, as when the camera was moved between them{blame}"
@@ -69,14 +69,28 @@ class _Joined:
 
 @dataclass(frozen=True, eq=False)
 class JoinedLogs(_Joined):
-    """x, y and yaw as all logs of one robot together have them. False where they contradict one another."""
+    """x, y and yaw as all logs of one robot together have them.
+
+    False where they contradict one another, and where one of them cannot be relied upon by itself.
+    """
 
     xy_yaw: Matrix
     """(3,): metres and radians, yaw in (-pi, pi]."""
     covariance: Matrix
     """(3, 3): of x, y and yaw. What all logs have in common, such as a wrong wheel base, is not in it."""
+    unreliable: tuple[int, ...] = ()
+    """The places of the logs that cannot be relied upon by themselves, from 0."""
 
     _what = "x, y and yaw"
+
+    def __bool__(self) -> bool:
+        return super().__bool__() and not self.unreliable
+
+    @property
+    def reason(self) -> str:
+        """Whether the logs agree, and which cannot be relied upon, in a sentence."""
+        doubts = [f"log {place + 1} by itself is not to be relied upon" for place in self.unreliable]
+        return "; ".join([super().reason, *doubts])
 
 
 @dataclass(frozen=True, eq=False)
@@ -138,7 +152,7 @@ class Extrinsics:
             (x, y, yaw), plane = (one.x_m, one.y_m, one.yaw_rad), one.covariance_xy_yaw
         reasons = [] if place else [place.reason]
         lean = None if tilt is None else tilt.covariance_rad2
-        if isinstance(tilt, JoinedTilts) and not tilt:
+        if isinstance(tilt, JoinedTilts | MountingTilt) and not tilt:
             reasons.append(tilt.reason)
         turn = about_vertical(yaw)
         covariance = np.full((5, 5), np.nan)
@@ -202,8 +216,8 @@ def join_logs(
 
     What the logs were started from counts once: `start` and `start_sigma`, as for `tiltvp.calibrate`, are x, y and yaw
     (3,) in metres and radians, and their standard deviations (3,) or covariance (3, 3). Logs whose answers are farther
-    apart than chance has it once in a thousand times make the result false. Raises `InvalidInputError` for no log, for
-    a log whose covariance is none, and for a start of other shapes.
+    apart than chance has it once in a thousand times make the result false, and so does one that is false itself.
+    Raises `InvalidInputError` for no log, for a log whose covariance is none, and for a start of other shapes.
     """
     first, prior = _start(start, start_sigma)
     found = [log.mounting for log in logs]
@@ -215,7 +229,8 @@ def join_logs(
     covariances = np.array([one.covariance_xy_yaw for one in found]).reshape(-1, 3, 3)
     value, covariance, distance, limit, odd = _joined(values, covariances, "logs", start=first, prior=prior)
     value[2] = math.remainder(value[2], math.tau)
-    return JoinedLogs(value, covariance, logs=len(found), distance=distance, limit=limit, odd=odd)
+    unreliable = tuple(place for place, log in enumerate(logs) if not log)
+    return JoinedLogs(value, covariance, unreliable, logs=len(found), distance=distance, limit=limit, odd=odd)
 
 
 def _start(start: ArrayLike, start_sigma: ArrayLike) -> tuple[Matrix, Matrix]:
