@@ -3,22 +3,26 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 import tiltvp
 from recordings import START_S, Bag
-from tiltvp import Robot
+from tiltvp import LogCalibration, Robot
 from tiltvp.cli import main
-from tiltvp.cli.calibrate_inputs import DriveOptions, LogOptions
+from tiltvp.cli.calibrate import _calibrated
+from tiltvp.cli.calibrate_inputs import DriveOptions, LogOptions, Solved
 from tiltvp.cli.calibrate_pictures import PictureLog, PictureOptions
 from tiltvp.cli.calibrate_results import Calibration, ResultOptions
 from tiltvp.cli.line_options import DrivingLineOptions
 from tiltvp.cli.options import CameraOptions
+from tiltvp.cli.showing import RerunOptions
 from tiltvp.cli.sources import MotionOptions
+from tiltvp.drive_logs import DriveLog
 from tiltvp.errors import InvalidInputError, OutputError
 from tiltvp.streams import Wheels
 from tiltvp.streams.outputs.transforms import StaticTransform
@@ -49,10 +53,16 @@ def wheels(path: Path, left: float) -> None:
     path.write_text("time_s,left_m,right_m\n" + rows)
 
 
-def opened(folder: Path, *, odometry: str = "odometry.csv", read: LogOptions | None = None) -> PictureLog:
+def opened(
+    folder: Path,
+    *,
+    odometry: str = "odometry.csv",
+    read: LogOptions | None = None,
+    lines: DrivingLineOptions | None = None,
+) -> PictureLog:
     return PictureLog.open(
         str(folder / "images"), PictureOptions(), MotionOptions(odometry=folder / odometry, wheel_base=0.4),
-        CameraOptions(camera=folder / "camera.toml"), DrivingLineOptions(), DriveOptions(wheel_base=0.4), None,
+        CameraOptions(camera=folder / "camera.toml"), lines or DrivingLineOptions(), DriveOptions(wheel_base=0.4), None,
         read or LogOptions(),
     )  # fmt: skip
 
@@ -175,6 +185,8 @@ def test_the_height_of_a_robots_file_is_kept(tables: Path, tmp_path: Path) -> No
         (("--parent-frame", "camera_optical"), "child = 'camera_optical', expected another name"),
         (("--height", "nan"), "--height = nan, expected finite metres"),
         (("--robot-out", "masked.toml"), "masked-mask.png: exists"),
+        (("--method", "other"), "method = 'other', expected"),
+        (("--gate-probability", "2"), "gate_probability = 2, expected"),
     ],
 )
 def test_what_cannot_be_written_is_refused_before_any_work(
@@ -229,3 +241,64 @@ def test_a_wheel_base_of_nothing_is_none(tables: Path, capsys: pytest.CaptureFix
     given = ("calibrate", *logs, "--camera", tables / "robot.toml", *SURE, "--wheel-base", 0)
     assert main([str(word) for word in given]) == 2
     assert "--wheel-base" in capsys.readouterr().err
+
+
+def test_a_robots_file_has_the_wheels_that_its_mounting_was_found_by(
+    folder: Path, tables: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Not those of the file that was given, where others were told."""
+    Robot(
+        CAMERA, np.eye(3), covariance_rad2=1e-6 * np.eye(2), wheels=Wheels(wheel_base_m=0.5, ticks_per_turn=7.0),
+        topics={"odometry": "/odom", "joints": "/joints"},
+    ).save(tmp_path / "robot.toml")  # fmt: skip
+    told = ("--camera", tmp_path / "robot.toml", "--robot-out", tmp_path / "again.toml", "--estimate-odometry")
+    assert calibrate(tables, *told) == 0
+    assert Robot.load(tmp_path / "again.toml").wheels == Wheels(wheel_base_m=0.4, ticks_per_turn=7.0)
+    assert "its wheel base is as told, 0.4 m, not as estimated" in capsys.readouterr().out
+    log = opened(folder)
+    log.topics.update(images="/image", odometry="/joints")
+    again = log.robot(Robot.load(tmp_path / "robot.toml"))
+    assert again.wheels.wheel_base_m == 0.4
+    assert again.topics == {"odometry": "/odom", "joints": "/joints", "images": "/image"}
+
+
+def test_parts_that_are_told_are_left_out_of_pictures_too(monkeypatch: pytest.MonkeyPatch) -> None:
+    drive = simulate_drive("alternating", seed=4)
+    log = DriveLog(drive.odometry, drive.bearings, None)
+
+    class Pictures:
+        name, sigma_rad, late_s = "pictures", None, 0.0
+
+        def solved(self, _: object, solve: Callable[..., LogCalibration]) -> Solved:
+            return Solved(log, solve(log, jackknife_parts=8))
+
+    taken = []
+    solve = tiltvp.calibrate
+    monkeypatch.setattr(tiltvp, "calibrate", lambda *a, **k: taken.append(k["jackknife_parts"]) or solve(*a, **k))
+    for told, parts in ((None, 8), (2, 2), (0, 0)):
+        options = DriveOptions(wheel_base=0.4, jackknife_parts=told)
+        _calibrated(Pictures(), None, options, LogOptions(), "default", RerunOptions())
+        assert taken.pop() == parts
+
+
+@pytest.mark.parametrize(
+    ("options", "hint"),
+    [
+        ({"tilt": "other"}, "--tilt 'other', expected"),
+        ({"method": "other"}, "--line-method 'other', expected"),
+        ({"length_min_deg": -5.0}, "length_min_rad = -0.08"),
+        ({"tilt": "upright", "tilt_confidence_min": 0.9}, "--tilt-confidence-min with --tilt upright"),
+    ],
+)
+def test_options_of_lines_are_refused_before_leans_are_looked_at(
+    folder: Path, options: dict[str, Any], hint: str
+) -> None:
+    with pytest.raises(InvalidInputError, match=hint):
+        opened(folder, lines=DrivingLineOptions(**options))
+
+
+def test_a_confidence_without_leans_is_refused(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    for words in (("lines",), ("track", "--out", folder / "tracks.csv")):
+        given = (*words, folder / "images", "--camera", folder / "camera.toml", "--tilt-confidence-min", 0.9)
+        assert main([str(word) for word in given]) == 2
+        assert "--tilt-confidence-min with --tilt upright" in capsys.readouterr().err

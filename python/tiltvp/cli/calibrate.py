@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from tiltvp.cli.calibrate_inputs import DriveOptions, LogOptions, Tables, other_readings, sources_from
@@ -55,9 +56,12 @@ def calibrate(
     method
         The filter: default, or paper.
     """
+    from tiltvp import SelfCalibrator
+
     watching.check()
     sources, robot = sources_from(logs), None if camera is None else camera.robot()
     drive, results = drive.settled(robot, motion.wheel_base), results.settled(robot)
+    SelfCalibrator(**drive.of_filter(), method=method)  # Refuses options before there is any work.
     if camera is not None and robot is None and any(isinstance(source, Tables) for source in sources):
         raise InvalidInputError("--camera with a log of tables, expected a robot's file (tiltvp setup)")
     if all(isinstance(source, Tables) for source in sources):
@@ -85,8 +89,14 @@ def calibrate(
     known = results.tell(found, tilt, options.robot_from_camera, drive)
     if known is not None and results.robot_out is not None:
         looked = next((one for one in opened if isinstance(one, PictureLog)), None)
-        results.write_robot(known, robot or (None if looked is None else looked.robot()))
+        told = _with_wheels(robot, drive) if looked is None else looked.robot(robot)
+        results.write_robot(known, told, estimated=read.estimate_odometry)
     return 0 if known and not any(one.bad for one in opened) else NOT_RELIABLE
+
+
+def _with_wheels(robot: Robot | None, drive: DriveOptions) -> Robot | None:
+    """The robot of a file with the wheel base that its mounting was found by."""
+    return robot and replace(robot, wheels=replace(robot.wheels, wheel_base_m=drive.wheel_base))
 
 
 def _joined_tilts(logs: Sequence[PictureLog]) -> JoinedTilts | None:
@@ -121,7 +131,7 @@ def _calibrated(
 
     def solve(log: DriveLog, **options: Any) -> LogCalibration:
         return calibrate_log(
-            log.odometry, log.bearings, **noise() | drive.of_whole_log() | options, times_s=log.times_s,
+            log.odometry, log.bearings, **noise() | options | drive.of_whole_log(), times_s=log.times_s,
             estimate_odometry=read.estimate_odometry, estimate_time_offset=read.estimate_time_offset,
         )  # fmt: skip
 

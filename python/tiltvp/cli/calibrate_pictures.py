@@ -103,6 +103,7 @@ class PictureLog:
             check_ending(pictures.tracks)
         looked = SourceOptions(topic=pictures.topic).of_robot(robot, [source])
         frames, lens = looked.open([source]), camera.load(looked.topic)
+        lines.extractor(lens), lines.tilts(lens)  # Refuses options before there is any work.
         motion = motion.of_robot(robot, frames)
         late_s = 0.0
         if read.estimate_time_offset:
@@ -189,12 +190,14 @@ class PictureLog:
         named, lines = zip(*seen, strict=True)
         return named, lines
 
-    def robot(self) -> Robot:
-        """The robot as far as it was told: camera, mounting as it was given, mask, wheels, topics."""
+    def robot(self, known: Robot | None) -> Robot:
+        """The robot as far as it was told: camera, mounting as it was given, mask, wheels; topics also as known."""
         from tiltvp import Robot
 
         mask: Any = None if self.lines.mask is None else mask_from(self.lines.mask)
-        return Robot(self.camera, self.lines.mounting(self.camera), mask=mask, wheels=self.wheels, topics=self.topics)
+        before = {} if known is None else known.topics
+        topics = before | {name: topic for name, topic in self.topics.items() if topic not in before.values()}
+        return Robot(self.camera, self.lines.mounting(self.camera), mask=mask, wheels=self.wheels, topics=topics)
 
 
 def _tell_other_turns(source: str, moved: FrameMotions, wheel_base_m: float | None) -> None:

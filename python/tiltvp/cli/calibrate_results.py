@@ -133,8 +133,8 @@ class ResultOptions:
             _write_plot(found, self.plot)
         return known
 
-    def write_robot(self, known: Extrinsics, robot: Robot | None) -> None:
-        """Writes the robot's file, or says why it is not written."""
+    def write_robot(self, known: Extrinsics, robot: Robot | None, *, estimated: bool) -> None:
+        """Writes the robot's file, or says why it is not written, and so where wheels were estimated."""
         assert self.robot_out is not None  # Else nobody asks.
         assert robot is not None  # There is a camera.
         reasons = [*known.reasons, *([] if known.measured else ["roll and pitch were not measured"])]
@@ -144,6 +144,8 @@ class ResultOptions:
         known.robot(robot).save(self.robot_out)
         without = "" if not reasons else ", without covariance, since it cannot be relied upon"
         say(f"{self.robot_out}: the robot's file{without}")
+        if estimated:
+            say(f"{self.robot_out}: its wheel base is as told, {robot.wheels.wheel_base_m:g} m, not as estimated")
 
     def _joined(
         self,

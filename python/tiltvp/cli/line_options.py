@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 from cyclopts import Group, Parameter, validators
 
@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 
 _LINES = Group("Lines", help="An option that is not given has the default of its method.")
 _UPRIGHT = "upright"
+_LINE_METHOD = "--line-method"
 
 
 @Parameter(name="*", group=_LINES)
@@ -30,6 +31,7 @@ _UPRIGHT = "upright"
 class LineOptions(MountedOptions):
     """How lines are found."""
 
+    _METHOD: ClassVar[str] = "--method"
     method: str | None = None
     """great-circle (the default) or radial, the paper's."""
     tilt: str = _UPRIGHT
@@ -42,7 +44,7 @@ class LineOptions(MountedOptions):
         """The extractor with the options that were given, for their mounting or another."""
         from tiltvp.lines import LineExtractor
 
-        check_word("--method", self.method or LINE_METHODS[0], LINE_METHODS)
+        check_word(self._METHOD, self.method or LINE_METHODS[0], LINE_METHODS)
         options = self.given() | ({} if self.method is None else {"method": self.method})
         return LineExtractor(
             camera, robot_from_camera=self.mounting(camera) if rotation is None else rotation, **options
@@ -58,6 +60,9 @@ class LineOptions(MountedOptions):
 
         check_word("--tilt", self.tilt, (_UPRIGHT, *METHODS))
         if self.tilt == _UPRIGHT:
+            if self.tilt_confidence_min != type(self).tilt_confidence_min:
+                told = f"--tilt-confidence-min with --tilt {_UPRIGHT}, which estimates no lean"
+                raise InvalidInputError(f"{told}, expected another method")
             return lambda _: None
         if self.method == LINE_METHODS[1] and self.tilt != type(self).tilt:
             raise InvalidInputError(f"--tilt {self.tilt} with the method radial, which knows no lean, expected upright")
@@ -76,7 +81,8 @@ class LineOptions(MountedOptions):
 class DrivingLineOptions(LineOptions):
     """How lines are found on a robot whose lean matters."""
 
-    method: Annotated[str | None, Parameter(name="--line-method")] = None
+    _METHOD: ClassVar[str] = _LINE_METHOD
+    method: Annotated[str | None, Parameter(name=_LINE_METHOD)] = None
     """How lines are found: great-circle (the default) or radial, the paper's."""
     tilt: str = "segments"
     """How the lean of each frame is estimated: segments or another method of `tiltvp tilt`, or upright: the robot
