@@ -302,3 +302,10 @@ def test_a_confidence_without_leans_is_refused(folder: Path, capsys: pytest.Capt
         given = (*words, folder / "images", "--camera", folder / "camera.toml", "--tilt-confidence-min", 0.9)
         assert main([str(word) for word in given]) == 2
         assert "--tilt-confidence-min with --tilt upright" in capsys.readouterr().err
+
+
+def test_a_log_that_is_named_twice_is_no_second_one(tables: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    again = tables / ".." / tables.name / "bearings.csv"
+    logs = (tables / "wheels.csv", tables / "bearings.csv", tables / "wheels.csv", again)
+    assert main([str(word) for word in ("calibrate", *logs, "--wheel-base", 0.4, *SURE)]) == 2
+    assert f"{again}: given twice, expected logs of different drives" in capsys.readouterr().err

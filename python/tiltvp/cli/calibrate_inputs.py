@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -144,7 +145,8 @@ class Tables:
 
 
 def sources_from(words: Sequence[str]) -> list[Tables | str]:
-    """The logs that words name: tables come in pairs, all else is pictures."""
+    """The logs that words name: tables come in pairs, all else is pictures. Raises `InvalidInputError`, also for one
+    that is named twice."""
     from tiltvp.streams.image_files import IMAGE_ENDINGS
 
     found: list[Tables | str] = []
@@ -161,6 +163,11 @@ def sources_from(words: Sequence[str]) -> list[Tables | str]:
             raise InvalidInputError(f"{word}: a table without another one, expected {_FORMS}")
     if not found:
         raise InvalidInputError(f"calibrate: no log, expected {_FORMS}")
+    seen: set[str] = set()
+    for name in (one.name if isinstance(one, Tables) else one for one in found):
+        if os.path.realpath(name) in seen:
+            raise InvalidInputError(f"{name}: given twice, expected logs of different drives: each counts as one")
+        seen.add(os.path.realpath(name))
     return found
 
 
