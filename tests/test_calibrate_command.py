@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any
@@ -24,7 +25,7 @@ from tiltvp.cli.showing import RerunOptions
 from tiltvp.cli.sources import MotionOptions
 from tiltvp.drive_logs import DriveLog
 from tiltvp.errors import InvalidInputError, OutputError
-from tiltvp.streams import Wheels
+from tiltvp.streams import Wheels, read_odometry
 from tiltvp.streams.outputs.transforms import StaticTransform
 from tiltvp.synth import simulate_drive
 from tiltvp.turning import FrameDelay
@@ -72,6 +73,15 @@ def test_the_record_is_mended_before_anything_is_made_of_it(folder: Path) -> Non
     mended = opened(folder, odometry="negated.csv", read=LogOptions(read_as=("left-wheel-negated",))).moved.motions
     for ours, right in zip(mended, opened(folder).moved.motions, strict=True):
         assert (ours.yaw_rad, ours.distance_m) == pytest.approx((right.yaw_rad, right.distance_m))
+
+
+def test_of_a_record_in_millimetres_turns_stay_as_they_are(tmp_path: Path) -> None:
+    """Poses on a circle of a metre."""
+    angles = np.arange(0.0, 3.0, 0.1).tolist()
+    rows = "".join(f"{a},{1e3 * math.sin(a)},{1e3 * (1.0 - math.cos(a))},{a}\n" for a in angles)
+    (tmp_path / "poses.csv").write_text("time_s,x_m,y_m,yaw_rad\n" + rows)
+    read = read_odometry(tmp_path / "poses.csv", wheels=Wheels(wheel_base_m=0.4), read_as=["millimetres"])
+    assert (read.distance_m[-1], read.yaw_rad[-1]) == pytest.approx((angles[-1], angles[-1]))
 
 
 def test_frames_that_overtake_each_other_are_refused_at_once(tmp_path: Path) -> None:

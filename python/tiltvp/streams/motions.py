@@ -122,7 +122,9 @@ def _by_ours(record: Odometry, wheels: Wheels, read_as: Sequence[str]) -> Odomet
     if rolled is None:
         if record.yaw_rad is None or wheels.wheel_base_m is None:
             raise InvalidInputError(f"{record.source}: no wheels to read as {' '.join(read_as)}, expected a wheel base")
-        aside = 0.5 * wheels.wheel_base_m * record.yaw_rad
+        # Turns that were told by themselves have no unit of length, and those of the wheels will be divided by it.
+        per_metre = 1e3 ** list(read_as).count("millimetres")
+        aside = 0.5 * wheels.wheel_base_m * per_metre * record.yaw_rad
         rolled = np.stack([record.distance_m - aside, record.distance_m + aside], axis=1)
     log = DriveLog(np.diff(rolled, axis=0, prepend=0.0), np.array([[0.0, 0.0, 1.0]]), None).read_as(*read_as)
     if log.bearings[0, 2] != 1.0:
