@@ -319,3 +319,25 @@ def test_a_log_that_is_named_twice_is_no_second_one(tables: Path, capsys: pytest
     logs = (tables / "wheels.csv", tables / "bearings.csv", tables / "wheels.csv", again)
     assert main([str(word) for word in ("calibrate", *logs, "--wheel-base", 0.4, *SURE)]) == 2
     assert f"{again}: given twice, expected logs of different drives" in capsys.readouterr().err
+
+
+def test_pictures_that_there_are_not_are_told_to_be_none(tables: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    words = ("calibrate", "no-such-drive", "--camera", tables / "robot.toml")
+    assert main([str(word) for word in words]) == 2
+    assert "no-such-drive: no such file or folder, expected" in capsys.readouterr().err
+
+
+def test_no_output_takes_the_place_of_another_or_of_what_is_read(
+    folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out, bag = tmp_path / "out.json", Bag("mcap")
+    given = ("--camera", folder / "camera.toml", "--wheel-base", 0.4, "--odometry", folder / "odometry.csv")
+    words = ("calibrate", folder / "images", *given, "--out", out, "--tracks", out)
+    assert main([str(word) for word in words]) == 2
+    assert f"--out and --tracks are both {out}, expected two files" in capsys.readouterr().err
+    for k in range(3):
+        bag.image("/image", 0.5 * (k + 1), np.zeros((24, 24), np.uint8), "mono8")
+    (recording,) = bag.write(tmp_path).glob("*.mcap")
+    words = ("calibrate", recording, *given, "--transform", recording, "--overwrite")
+    assert main([str(word) for word in words]) == 2
+    assert f"{recording}: is what is read" in capsys.readouterr().err

@@ -13,7 +13,7 @@ from tiltvp.cli.line_options import DrivingLineOptions
 from tiltvp.cli.options import CameraOptions
 from tiltvp.cli.rerun_views import send_calibration
 from tiltvp.cli.showing import RERUN, RerunOptions
-from tiltvp.cli.sources import MotionOptions
+from tiltvp.cli.sources import MotionOptions, check_apart
 from tiltvp.cli.terminal import say, status
 from tiltvp.errors import InvalidInputError
 
@@ -74,6 +74,8 @@ def calibrate(
     if camera is not None:
         options = camera.complete(options)
     results.check(camera, options.mask)
+    if pictures.tracks is not None and pictures.tracks == results.out:
+        raise InvalidInputError(f"--out and --tracks are both {results.out}, expected two files")
     of_one_log = {"--odometry": motion.odometry, "--tracks": pictures.tracks, RERUN: watching.rerun}
     name = next((name for name, value in of_one_log.items() if value is not None), None)
     if len(sources) > 1 and name is not None:
@@ -83,7 +85,9 @@ def calibrate(
         if isinstance(source, Tables):
             opened.append(source.checked(read))
         else:
-            opened.append(PictureLog.open(source, pictures, motion, camera, options, drive, robot, read))
+            log = PictureLog.open(source, pictures, motion, camera, options, drive, robot, read)
+            check_apart(log.frames, results.transform)
+            opened.append(log)
     tilt = robot if measured else _joined_tilts([one for one in opened if isinstance(one, PictureLog)])
     found = [_calibrated(one, tilt, drive, read, method, watching) for one in opened]
     known = results.tell(found, tilt, options.robot_from_camera, drive)

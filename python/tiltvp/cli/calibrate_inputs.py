@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import glob
 import os
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -156,6 +157,8 @@ def sources_from(words: Sequence[str]) -> list[Tables | str]:
         if Path(word).suffix.lower() in IMAGE_ENDINGS and Path(word).is_file():
             raise InvalidInputError(f"{word}: one image, expected the folder of a drive's, or a pattern in quotes")
         if Path(word).suffix.lower() != _TABLE:
+            if not (Path(word).exists() or glob.has_magic(word)):
+                raise InvalidInputError(f"{word}: no such file or folder, expected {_FORMS}")
             found.append(word)
         elif rest and Path(rest[0]).suffix.lower() == _TABLE:
             found.append(Tables(Path(word), Path(rest.pop(0))))
