@@ -147,7 +147,7 @@ def test_calibrate_from_images(folder: Path, tmp_path: Path, capsys: pytest.Capt
     for told, wrong in (
         ("expected --odometry", [words[0], str(alone), *words[2:]]),
         ("without another one", [*words[:2], "log.csv", *words[2:], *odometry]),
-        ("expected one log", [*words[:2], *words[1:], *odometry]),
+        ("expected one log", [*words[:2], str(folder / "images" / "*.png"), *words[2:], *odometry]),
         ("--wheel-base", [*words[:-2], *odometry]),
         ("without --camera", [*words[:2], *words[-2:]]),
         ("expected the folder", ["calibrate", str(next((folder / "images").iterdir())), *words[2:]]),
