@@ -13,7 +13,7 @@ import pytest
 
 import tiltvp
 from recordings import START_S, Bag
-from tiltvp import LogCalibration, Robot, wheel_displacements
+from tiltvp import LogCalibration, Robot
 from tiltvp.cli import main
 from tiltvp.cli.calibrate import _calibrated
 from tiltvp.cli.calibrate_inputs import DriveOptions, LogOptions, Solved
@@ -270,41 +270,6 @@ def test_a_robots_file_has_the_wheels_that_its_mounting_was_found_by(
     again = log.robot(Robot.load(tmp_path / "robot.toml"))
     assert again.wheels.wheel_base_m == 0.4
     assert again.topics == {"odometry": "/odom", "joints": "/joints", "images": "/image"}
-
-
-def turning_in_place() -> DriveLog:
-    """Straight on, half a turn in place, and straight on, past a dozen landmarks."""
-    rng = np.random.default_rng(1)
-    motions = [(0.05, 0.0)] * 60 + [(0.0, math.pi / 40)] * 40 + [(0.05, 0.0)] * 60
-    wheels = wheel_displacements(*np.array(motions).T, wheel_base_m=0.4)
-    places, bearings, (x, y, heading) = rng.uniform(-4.0, 4.0, (12, 2)), [], (0.0, 0.0, 0.0)
-    for step, (distance, turn) in enumerate(motions):
-        x, y, heading = x + distance * math.cos(heading), y + distance * math.sin(heading), heading + turn
-        camera = np.array([x + 0.2 * math.cos(heading), y + 0.2 * math.sin(heading)])
-        for landmark, (ahead, aside) in enumerate(places - camera):
-            if 0.3 < math.hypot(ahead, aside) < 5.0:
-                error = rng.normal(scale=0.005)
-                bearings.append([step, landmark, math.remainder(math.atan2(aside, ahead) - heading + error, math.tau)])
-    return DriveLog(wheels + rng.normal(size=wheels.shape) * np.sqrt(1e-5 * np.abs(wheels)), np.array(bearings), None)
-
-
-def test_a_wrong_wheel_base_is_no_carpet_where_the_robot_turns() -> None:
-    log = turning_in_place()
-
-    class Tables:
-        name, sigma_rad, late_s = "tables", 0.005, 0.0
-
-        def solved(self, _: object, solve: Callable[..., LogCalibration]) -> Solved:
-            return Solved(log, solve(log))
-
-    def found(base_m: float, **options: bool) -> Calibration:
-        drive = DriveOptions(wheel_base=base_m)
-        return _calibrated(Tables(), None, drive, LogOptions(**options), "default", RerunOptions())
-
-    assert found(0.4)
-    assert not found(0.44)
-    assert "wheel_base_m" in found(0.44).reason
-    assert found(0.44, estimate_odometry=True)
 
 
 def test_parts_that_are_told_are_left_out_of_pictures_too(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any
 
 from tiltvp.cli.calibrate_inputs import DriveOptions, LogOptions, Tables, other_readings, sources_from
 from tiltvp.cli.calibrate_pictures import PictureLog, PictureOptions
@@ -22,9 +22,6 @@ if TYPE_CHECKING:
     from tiltvp.drive_logs import DriveLog
 
 NOT_RELIABLE = 1
-_WHEELS: Final = ("wheel_base_m", "right_over_left")
-"""What explains doubted parts of the odometry as well. The filter suspects it in none of 32 drives on a carpet (from
-seed 360000 on), and in all of 120 with a turn or two in place and a wheel base, or both wheels, 5 % off."""
 _DRIVE, _READ, _MOTION = DriveOptions(), LogOptions(), MotionOptions()
 _PICTURES, _LINES, _RESULTS = PictureOptions(), DrivingLineOptions(), ResultOptions()
 _WATCHING = RerunOptions()
@@ -146,10 +143,6 @@ def _calibrated(
     calibrator = SelfCalibrator(**noise() | drive.of_filter(), method=method)
     with status(f"{one.name}: the filter, {len(log.bearings)} bearings"):
         history = calibrator.follow(log.odometry, log.bearings)
-    suspect = calibrator.estimate.suspect
-    if len(whole.doubted) and suspect in _WHEELS and not read.estimate_odometry:
-        wheels = f"parts of the odometry are doubted, but the filter suspects {suspect}: try --estimate-odometry"
-        doubt = "; ".join(filter(None, (doubt, wheels)))
     with watching.viewer() as viewer:
         if viewer is not None:
             send_calibration(viewer, log, history, whole)
