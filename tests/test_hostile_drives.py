@@ -175,6 +175,36 @@ def test_a_wrong_wheel_base_is_named() -> None:
         type(e).from_dict(e.to_dict() | {"suspect": "moon"})
 
 
+def turning_in_place(seed: int) -> tuple[np.ndarray, np.ndarray]:
+    """Straight on, half a turn in place, and straight on, past a dozen landmarks, with the camera 0.2 m ahead."""
+    rng = np.random.default_rng(seed)
+    motions = [(0.05, 0.0)] * 60 + [(0.0, math.pi / 40)] * 40 + [(0.05, 0.0)] * 60
+    wheels = tiltvp.wheel_displacements(*np.array(motions).T, wheel_base_m=0.4)
+    places, bearings, (x, y, heading) = rng.uniform(-4.0, 4.0, (12, 2)), [], (0.0, 0.0, 0.0)
+    for step, (distance, turn) in enumerate(motions):
+        x, y, heading = x + distance * math.cos(heading), y + distance * math.sin(heading), heading + turn
+        camera = np.array([x + 0.2 * math.cos(heading), y + 0.2 * math.sin(heading)])
+        for landmark, (ahead, aside) in enumerate(places - camera):
+            if 0.3 < math.hypot(ahead, aside) < 5.0:
+                error = rng.normal(scale=0.005)
+                bearings.append([step, landmark, math.remainder(math.atan2(aside, ahead) - heading + error, math.tau)])
+    return wheels + rng.normal(size=wheels.shape) * np.sqrt(1e-5 * np.abs(wheels)), np.array(bearings)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_a_wrong_wheel_base_is_no_carpet_where_the_robot_turns(seed: int) -> None:
+    odometry, bearings = turning_in_place(seed)
+    known = {"bearing_sigma_rad": 0.005}
+    assert tiltvp.calibrate(odometry, bearings, wheel_base_m=0.4, **known).mounting.suspect != "wheel_base_m"
+    for wrong_m in (0.44, 0.36):
+        whole = tiltvp.calibrate(odometry, bearings, wheel_base_m=wrong_m, **known)
+        assert not whole
+        assert whole.mounting.suspect == "wheel_base_m"
+        assert whole.mounting.suspect_value == pytest.approx(0.4, abs=0.01)
+        free = tiltvp.calibrate(odometry, bearings, wheel_base_m=wrong_m, estimate_odometry=True, **known)
+        assert free.wheel_base_m == pytest.approx(0.4, abs=0.01)
+
+
 @pytest.mark.parametrize("seed", [100002, 100003, 370003])
 def test_a_bump_may_be_behind_a_jump(seed: int) -> None:
     (bumped,) = hostile_drives("camera bumped", range(seed, seed + 1))

@@ -8,4 +8,5 @@ mod suspect;
 
 pub use self::contradictions::Contradictions;
 pub(super) use self::noise::NoiseFactors;
+pub(super) use self::suspect::DEVIATION_SIGMAS;
 pub use self::suspect::{Cause, Suspect};

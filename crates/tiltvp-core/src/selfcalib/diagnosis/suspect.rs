@@ -20,7 +20,7 @@ const MOST_CONTRADICTED: f64 = 0.1;
 
 /// Standard deviations of a deviation of the wheels or the clock beyond which it is not chance, and of the mounting by which it
 /// would move, below which it does not matter where the noise is as told.
-const DEVIATION_SIGMAS: f64 = 5.0;
+pub(crate) const DEVIATION_SIGMAS: f64 = 5.0;
 const DEVIATION_SHIFT: f64 = 1.0;
 
 /// Ratio of a standard deviation as motions of parts of the drive scatter to what their noise makes, beyond which the drive is not the

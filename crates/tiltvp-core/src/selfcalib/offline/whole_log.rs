@@ -14,7 +14,7 @@ use crate::error::{Error, Result};
 use crate::selfcalib::bundle::{
     BundleProblem, CholeskyFactor, DescentReport, DoubtedParts, FIRST_DAMPING, FreeParameters, widened,
 };
-use crate::selfcalib::diagnosis::Cause;
+use crate::selfcalib::diagnosis::{Cause, DEVIATION_SIGMAS};
 use crate::selfcalib::estimate::MountingEstimate;
 use crate::selfcalib::model::{Mounting, OUTLIER_SIGMAS, WheelMotion, Wheels};
 use crate::selfcalib::options::{CalibrationMethod, SelfCalibratorOptions};
@@ -180,12 +180,29 @@ fn solved(log: &SortedLog<'_>) -> Result<Option<(BundleProblem, DescentReport)>>
     Ok(best)
 }
 
-/// The answer without the odometry of the parts of the drive that the bearings contradict, where nothing is wrong then.
+/// The answer without the odometry of the parts of the drive that the bearings contradict, where nothing is wrong then, and the wheels are
+/// as told.
 fn without_contradicted_parts(options: &LogOptions, mut problem: BundleProblem) -> Option<LogCalibration> {
+    let as_told = problem.clone();
     let (mut descent, doubted) = solve_with_doubt(&mut problem, options.max_iterations)?;
+    if !options.estimate_odometry && wheels_are_others(options, &as_told) {
+        return None;
+    }
     descent = solve_with_noise(&mut problem, options.max_iterations).unwrap_or(descent);
     let answer = report(options, &problem, &descent, None).ok()?;
     (answer.converged && answer.estimate.suspect.is_none()).then_some(LogCalibration { doubted, ..answer })
+}
+
+/// Whether a log tells other wheels than it was told, as far as motions of all its parts tell them. A wrong wheel base contradicts the
+/// parts in which the robot turns.
+fn wheels_are_others(options: &LogOptions, as_told: &BundleProblem) -> bool {
+    let options = LogOptions { estimate_odometry: true, ..*options };
+    let mut problem = as_told.with_free(FreeParameters { wheels: true, ..as_told.free });
+    let descent = solve(&mut problem, options.max_iterations);
+    let Ok(answer) = report(&options, &problem, &descent, None) else { return false };
+    let [imbalance, base_m] = answer.wheels_sigma.map(|sigma| DEVIATION_SIGMAS * sigma);
+    let (wheels, told) = (answer.wheels, as_told.wheels);
+    (wheels.imbalance - told.imbalance).abs() > imbalance || (wheels.base_m - told.base_m).abs() > base_m
 }
 
 /// Whether at most a share of the turns is contradicted, and of the motions and bearings.
