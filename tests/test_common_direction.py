@@ -173,3 +173,19 @@ def test_any_normals_have_an_answer_or_a_refusal(values: list[tuple[float, float
         assert any(not any(row) or not np.linalg.norm(row) for row in values)
     else:
         assert bool(found) == bool(np.isfinite(found.direction).all())
+        assert bool(found) == bool(np.isfinite(found.covariance_rad2).all())
+
+
+def test_what_has_no_finite_covariance_is_no_answer() -> None:
+    """Circles that stray five times as far as told, with clutter: some of the fits end where nothing holds them."""
+    truth = np.array([0.02, 0.03, 1.0]) / np.linalg.norm([0.02, 0.03, 1.0])
+    refused = 0
+    for seed in range(3800, 4000):
+        rng = np.random.default_rng(seed)
+        normals = np.cross(truth, rng.normal(size=(40, 3)))
+        normals /= np.linalg.norm(normals, axis=1)[:, np.newaxis]
+        normals += 0.01 * rng.normal(size=(40, 1)) * truth
+        found = tiltvp.common_direction(np.vstack([normals, rng.normal(size=(10, 3))]), sigma_rad=0.002)
+        assert bool(found) == bool(np.isfinite(found.covariance_rad2).all())
+        refused += not found
+    assert 0 < refused < 20

@@ -3332,7 +3332,8 @@ def calibrate(
     `estimate_time_offset`. Bearings have no scale: with `estimate_odometry` the mean displacement of both wheels stays
     as reported. Other options are those of `SelfCalibrator`.
 
-    Raises `tiltvp.errors.InvalidInputError` for numbers that make no sense and logs that determine nothing.
+    Raises `tiltvp.errors.InvalidInputError` for numbers that make no sense, two bearings of a landmark at one step, and
+    logs that determine nothing.
 
     The options, by keyword.
 

@@ -190,7 +190,8 @@ fn log(odometry: &Bound<'_, PyAny>, bearings: &Bound<'_, PyAny>) -> PyResult<(Ve
 /// `estimate_time_offset`. Bearings have no scale: with `estimate_odometry` the mean displacement of both wheels stays
 /// as reported. Other options are those of `SelfCalibrator`.
 ///
-/// Raises `tiltvp.errors.InvalidInputError` for numbers that make no sense and logs that determine nothing.
+/// Raises `tiltvp.errors.InvalidInputError` for numbers that make no sense, two bearings of a landmark at one step, and
+/// logs that determine nothing.
 #[pyfunction]
 #[pyo3(signature = (
     odometry: "ArrayLike", bearings: "ArrayLike", *, wheel_base_m, times_s: "ArrayLike | None" = None,

@@ -39,7 +39,7 @@ fn unit_prior(options: &CommonDirectionOptions) -> Result<Vector3<f64>> {
 /// A direction orthogonal to most of the normals.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CommonDirection {
-    /// Unit direction on the prior's side, `None` if the normals do not determine one.
+    /// Unit direction on the prior's side, `None` if the normals do not determine one, with a finite covariance.
     pub direction: Option<Vector3<f64>>,
     /// Covariance in squared radians in the tangent plane, in the basis of [`tangent_basis`]; infinite without a direction.
     pub covariance_rad2: Matrix2<f64>,
@@ -94,7 +94,12 @@ pub fn common_direction(
         (Some(o), None) => Stop::OutOfReach { angle_rad: o.xy().norm().atan2(o.z), limit_rad: options.max_angle_rad },
         _ => report.stop,
     };
-    let Some(upright) = found else {
+    let known = |upright: &Vector3<f64>| {
+        let covariance = covariance(&kept, &row_weights, upright, &upright_from_user, options.sigma_rad);
+        covariance.iter().all(|x| x.is_finite()).then_some(covariance)
+    };
+    // Where residuals curve nowhere to a minimum there is no answer, however the descent ended.
+    let Some((upright, covariance_rad2)) = found.and_then(|upright| Some((upright, known(&upright)?))) else {
         return Ok(CommonDirection {
             direction: None,
             covariance_rad2: Matrix2::repeat(f64::INFINITY),
@@ -108,7 +113,7 @@ pub fn common_direction(
     let reach = (3.0 * options.sigma_rad).min(FRAC_PI_2).sin();
     Ok(CommonDirection {
         direction: Some(direction),
-        covariance_rad2: covariance(&kept, &row_weights, &upright, &upright_from_user, options.sigma_rad),
+        covariance_rad2,
         inliers: normals.iter().map(|n| unit(n).unwrap_or_default().dot(&direction).abs() <= reach).collect(),
         residual_rms_rad: report.rms,
         iterations: report.iterations,

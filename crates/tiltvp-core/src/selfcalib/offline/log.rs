@@ -117,6 +117,12 @@ fn check(
     if again == 0 {
         return Err(Error::argument("bearings", "no landmark seen twice", "landmarks seen from several poses"));
     }
+    let mut seen: Vec<_> = bearings.iter().map(|b| (b.step, b.landmark)).collect();
+    seen.sort_unstable();
+    if let Some(twice) = seen.windows(2).find(|pair| pair[0] == pair[1]) {
+        let got = format!("two of landmark {} at step {}", twice[0].1, twice[0].0);
+        return Err(Error::argument("bearings", got, "one of each landmark"));
+    }
     if first.len() > MOST_LANDMARKS {
         let expected = format!("at most {MOST_LANDMARKS}");
         return Err(Error::argument("bearings", format!("{} landmarks", first.len()), expected));
@@ -151,5 +157,16 @@ mod tests {
         };
         assert!(log(MOST_LANDMARKS).is_ok());
         assert!(log(MOST_LANDMARKS + 1).is_err());
+    }
+    #[test]
+    fn a_landmark_has_one_bearing_a_step() {
+        let readings = [WheelMotion { left_m: 0.1, right_m: 0.1 }; 3];
+        let log = |steps: &[usize]| {
+            let bearing = |step: &usize| LogBearing { step: *step, landmark: 7, bearing_rad: 0.1 };
+            check(&LogOptions::default(), &readings, None, &steps.iter().map(bearing).collect::<Vec<_>>())
+        };
+        assert!(log(&[2, 0, 1]).is_ok());
+        let error = log(&[2, 0, 2]).unwrap_err().to_string();
+        assert!(error.contains("two of landmark 7 at step 2"), "{error}");
     }
 }

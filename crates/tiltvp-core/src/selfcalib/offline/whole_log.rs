@@ -114,8 +114,8 @@ enum Attempt {
 ///
 /// # Errors
 /// [`Error::InvalidOption`] for options that make no sense, [`Error::InvalidArgument`] for numbers that are not finite, steps
-/// that do not exist, times that do not grow or are missing, more than [`MOST_LANDMARKS`](crate::selfcalib::MOST_LANDMARKS), and
-/// logs without a landmark that is seen twice.
+/// that do not exist, times that do not grow or are missing, two bearings of a landmark at one step, more than
+/// [`MOST_LANDMARKS`](crate::selfcalib::MOST_LANDMARKS), and logs without a landmark that is seen from two steps.
 pub fn calibrate_log(
     options: &LogOptions,
     readings: &[WheelMotion],
