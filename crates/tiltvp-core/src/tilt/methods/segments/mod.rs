@@ -100,7 +100,7 @@ impl TiltMethod for SegmentsOptions {
             tilt_max_rad,
             options: *self,
             near: Near::new(tilt_max_rad),
-            aspect: Aspect::new(),
+            aspect: Aspect::new(&origin.robot_from_camera),
             vote: looks_up.then(|| Vote::new(setting)),
             sample: if tilt_max_rad > NEAR_MAX_RAD { Sample::new(&pixels.region) } else { Sample::default() },
         })))
