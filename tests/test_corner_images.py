@@ -297,6 +297,11 @@ def test_a_height_is_above_the_corners_that_stand_on_the_floor() -> None:
         off = min((foot - estimate.pose.vertex_m for foot in feet), key=np.linalg.norm)
         assert off @ np.linalg.solve(estimate.pose.covariance[3:, 3:], off) < 16.3
         assert any(np.abs(estimate.pose.edges + rotation[:, 1]).max(axis=1) < 0.02)
+        hidden = drawn(rotation, vertex, GREYS, fine=4)
+        hidden[round(vertex[1] / vertex[2] * 400.0 + 180.0) + 60 :] = 150
+        upper = CornerPoseEstimator(CAMERA, method="general", down=rotation[:, 1], **known)(hidden)
+        assert upper.pose.vertex_m is None
+        assert upper.place_reason == "no upright edge rises from a corner, as of what stands on the floor"
 
 
 def test_what_a_height_does_not_tell() -> None:

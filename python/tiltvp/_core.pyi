@@ -1049,9 +1049,9 @@ class CornerPoseEstimator:
         distance_max_m
             The largest distance of a vertex, metres. Default: 100.
         camera_height_m
-            How far one camera is above the level plane through the vertex, metres, as above the floor for a corner on
-            the floor: it tells the place. Without colours the vertex is of a corner whose upright edge rises from it,
-            if one is seen. None where that is not known, and for two cameras, which tell it themselves. Default: None.
+            How far one camera is above the level plane through the vertex, metres: it tells the place. Without colours
+            the vertex is of a corner whose upright edge rises from it, as of what stands on the floor. None where that
+            is not known, and for two cameras, which tell it themselves. Default: None.
         camera_height_sigma_m
             Standard deviation of that height, metres. Default: 0.
         edge_length_m

@@ -47,6 +47,8 @@ pub enum PlaceVerdict {
     NotUpright,
     /// The known height is above what is not below the camera.
     NotBelow,
+    /// The known height is above the floor, and what is seen hangs or stands above it.
+    NotStanding,
     /// What is known tells too little of it.
     Uncertain,
     /// It would be nearer or farther than a vertex may be.
@@ -65,11 +67,12 @@ pub enum PlaceVerdict {
 
 impl PlaceVerdict {
     /// All of them.
-    pub const ALL: [Self; 11] = [
+    pub const ALL: [Self; 12] = [
         Self::Told,
         Self::NoScale,
         Self::NotUpright,
         Self::NotBelow,
+        Self::NotStanding,
         Self::Uncertain,
         Self::OutOfReach,
         Self::EndHidden,
@@ -86,6 +89,7 @@ impl PlaceVerdict {
             Self::NoScale => "one camera, of which neither its height nor a length is known",
             Self::NotUpright => "nothing tells which edge is the upright one",
             Self::NotBelow => "the corner is not below the camera",
+            Self::NotStanding => "no upright edge rises from a corner, as of what stands on the floor",
             Self::Uncertain => "the distance would be known to less than a tenth",
             Self::OutOfReach => "beyond distance_min_m or distance_max_m",
             Self::EndHidden => "no edge of known length is seen up to its end",

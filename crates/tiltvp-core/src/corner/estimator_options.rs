@@ -50,9 +50,9 @@ options! {
         /// The largest distance of a vertex, metres.
         distance_max_m: f64 = 100.0
             => |o: &EstimatorOptions, x| x > o.distance_min_m, "a number of metres above distance_min_m";
-        /// How far one camera is above the level plane through the vertex, metres, as above the floor for a corner on the floor: it
-        /// tells the place. Without colours the vertex is of a corner whose upright edge rises from it, if one is seen. None where that
-        /// is not known, and for two cameras, which tell it themselves.
+        /// How far one camera is above the level plane through the vertex, metres: it tells the place. Without colours the vertex is of
+        /// a corner whose upright edge rises from it, as of what stands on the floor. None where that is not known, and for two
+        /// cameras, which tell it themselves.
         camera_height_m: Option<f64> = None;
         /// Standard deviation of that height, metres.
         camera_height_sigma_m: f64 = 0.0 => NOT_NEGATIVE, "a number of metres from 0";

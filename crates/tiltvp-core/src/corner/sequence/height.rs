@@ -15,13 +15,14 @@ pub(super) const SHARE_MAX: f64 = 0.1;
 impl CornerPoseEstimator {
     /// Gives the poses from one image the place that the known height above the vertex tells, each its own, and says why the first
     /// has none: where the vertex is not below the camera as far as that is known, where nothing told which edge is the vertical
-    /// one, where the height tells too little, and beyond the limits of the distance.
+    /// one or none rises from a corner, where the height tells too little, and beyond the limits of the distance.
     pub(super) fn place_by_height(&self, estimate: &mut CornerEstimate) -> PlaceVerdict {
         let down = self.told_down();
-        match &down {
-            Some(down) if !self.is_one_object() => self.take_lowest(estimate, down),
-            None if !self.is_one_object() => return PlaceVerdict::NotUpright,
-            _ => {}
+        if !self.is_one_object() {
+            let Some(down) = &down else { return PlaceVerdict::NotUpright };
+            if !self.take_standing(estimate, down) {
+                return PlaceVerdict::NotStanding;
+            }
         }
         let (Some(height_m), Some(corner)) =
             (self.options.camera_height_m, estimate.chosen_left.first().and_then(|i| estimate.features[0].get(*i)))
@@ -50,19 +51,23 @@ impl CornerPoseEstimator {
 
     /// Makes the poses those of the best corner that may stand on the floor, if there is one: its upright edge rises from the vertex. A
     /// corner whose upright edge goes down has something below it.
-    fn take_lowest(&self, estimate: &mut CornerEstimate, down: &Vector3<f64>) {
+    fn take_standing(&self, estimate: &mut CornerEstimate, down: &Vector3<f64>) -> bool {
         let features = &estimate.features[0];
-        let Some(at @ 1..) = estimate.chosen_left.iter().position(|corner| rises(&features[*corner], down)) else {
-            return;
+        let Some(at) = estimate.chosen_left.iter().position(|corner| rises(&features[*corner], down)) else {
+            return false;
         };
+        if at == 0 {
+            return true;
+        }
         estimate.chosen_left[..=at].rotate_right(1);
-        let (lowest, angle) = (&features[estimate.chosen_left[0]], &self.options.angle);
+        let (standing, angle) = (&features[estimate.chosen_left[0]], &self.options.angle);
         for pose in &mut estimate.hypotheses {
-            let near = attitude_near(lowest, angle, &pose.camera_from_object, self.options.agree_max_rad);
+            let near = attitude_near(standing, angle, &pose.camera_from_object, self.options.agree_max_rad);
             if let Some(own) = near {
                 (pose.edges, pose.right_handed) = (own.edges, own.is_right_handed());
             }
         }
+        true
     }
 }
 
