@@ -13,7 +13,7 @@ const MOST_JUMPS: usize = 5;
 /// Twice the logarithm of the likelihood ratio by which a slip must explain a jump better than a bump: some three thousand to one.
 const SURE: f64 = 16.0;
 
-/// Squared Mahalanobis distance of two mountings up to which they may be the same: chi-square of three numbers is below with 99.9 %.
+/// Squared Mahalanobis distance of two mountings up to which they may be the same: the 99.9 % quantile of chi-square of three numbers.
 const SAME: f64 = 16.27;
 
 /// Standard deviations of the mounting within which a bump would leave it right enough.
