@@ -329,6 +329,11 @@ impl BundleProblem {
         self.slip.cost(self.motion_misfit(to))
     }
 
+    /// Whether there is a motion whose wheels must have slipped.
+    pub(crate) fn any_slipped(&self) -> bool {
+        (1..self.keyframes.len()).any(|to| self.slipped(to))
+    }
+
     /// Whether the motion to a keyframe differs so much from its odometry that the wheels must have slipped.
     pub(crate) fn slipped(&self, to: usize) -> bool {
         self.slip.weight(self.motion_misfit(to)) < 1.0

@@ -47,7 +47,7 @@ pub(crate) enum MotionLoss {
 
 /// From how many thresholds on a motion that differs from its odometry has slipped: thirty standard deviations. Of 200 drives with three
 /// slips (seeds 360000 and 370000 of `just measure-trust-calibration --only slip`) the mean NEES of the whole logs that are answered is
-/// 6.5 with a logarithmic loss alone, of as many with this 2.8.
+/// 6.5 with a logarithmic loss alone, and 2.8 with this.
 const FAR: f64 = 6.0;
 
 impl MotionLoss {

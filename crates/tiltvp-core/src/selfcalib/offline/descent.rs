@@ -1,4 +1,4 @@
-//! The descent of a whole log's problem: robustly, then without outliers and slips, then with the scatters of the landmarks.
+//! The descent of a whole log's problem: robustly, then without outliers, then with the scatters of the landmarks; and without slips.
 
 use super::incremental::ROBUST_LOSS;
 use crate::selfcalib::bundle::{BundleProblem, DescentReport, FIRST_DAMPING, SLIP_SIGMAS};
@@ -11,16 +11,14 @@ pub(super) const TOLERANCE: f64 = 1e-3;
 /// the limit bounds the time where two solutions alternate.
 const SCATTER_ROUNDS: usize = 4;
 
-/// Solves a problem with robust losses, then without outliers and slips, then with the scatters of the landmarks.
+/// Solves a problem with robust losses, then without outliers, then with the scatters of the landmarks.
 pub(super) fn solve(problem: &mut BundleProblem, max_iterations: u32) -> DescentReport {
-    let descend = |problem: &mut BundleProblem, losses: (BearingLoss, MotionLoss)| {
-        (problem.loss, problem.slip) = losses;
+    problem.slip = MotionLoss::Logarithmic(SLIP_SIGMAS);
+    let descend = |problem: &mut BundleProblem, loss: BearingLoss| {
+        problem.loss = loss;
         problem.levenberg_marquardt(max_iterations, TOLERANCE, FIRST_DAMPING)
     };
-    let losses = [
-        (ROBUST_LOSS, MotionLoss::Logarithmic(SLIP_SIGMAS)),
-        (BearingLoss::Truncated(OUTLIER_SIGMAS), MotionLoss::Redescending(SLIP_SIGMAS)),
-    ];
+    let losses = [ROBUST_LOSS, BearingLoss::Truncated(OUTLIER_SIGMAS)];
     let [robust, mut last] = losses.map(|loss| descend(problem, loss));
     let mut iterations = robust.iterations + last.iterations;
     for _ in 0..SCATTER_ROUNDS {
@@ -42,4 +40,13 @@ pub(super) fn solve(problem: &mut BundleProblem, max_iterations: u32) -> Descent
         }
     }
     DescentReport { iterations, ..last }
+}
+
+/// Solves a problem that was solved again without the pull of motions that have slipped, if there are any.
+pub(super) fn solve_without_slips(problem: &mut BundleProblem, max_iterations: u32) -> Option<DescentReport> {
+    if !problem.any_slipped() {
+        return None;
+    }
+    problem.slip = MotionLoss::Redescending(SLIP_SIGMAS);
+    Some(problem.levenberg_marquardt(max_iterations, TOLERANCE, FIRST_DAMPING))
 }

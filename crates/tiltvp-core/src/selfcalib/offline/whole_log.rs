@@ -5,7 +5,7 @@ use std::fmt;
 
 use nalgebra::{DMatrix, Matrix3, Vector2};
 
-use super::descent::{TOLERANCE, solve};
+use super::descent::{TOLERANCE, solve, solve_without_slips};
 use super::incremental::{incremental_problem, problem_along};
 use super::log::{LogBearing, LogOptions, SortedLog};
 use super::misreading::Misreading;
@@ -278,14 +278,17 @@ fn whole_window(log: &SortedLog<'_>) -> Result<BundleProblem> {
     Ok(window.into_problem())
 }
 
-/// The answer: the solution with its covariance, scaled by the residuals where these are larger than assumed.
+/// The answer: the solution with its covariance, scaled by the residuals where these are larger than assumed. What is suspect is told by the
+/// solution that slips pull: they may be what a delay makes of turns.
 fn report(
     options: &LogOptions,
-    problem: &BundleProblem,
+    pulled: &BundleProblem,
     descent: &DescentReport,
     misreading: Option<Misreading>,
 ) -> Result<LogCalibration> {
     let o = &options.filter;
+    let mut problem = pulled.clone();
+    let descent = solve_without_slips(&mut problem, options.max_iterations).unwrap_or(*descent);
     let residuals = problem.residuals();
     let kept: Vec<f64> = residuals.iter().copied().filter(|r| r.abs() <= OUTLIER_SIGMAS).collect();
     let free = kept.len().saturating_sub(problem.width()).max(1) as f64;
@@ -317,12 +320,16 @@ fn report(
     let landmarks = (converged && options.jackknife_parts > 0).then(|| {
         let parts = options.jackknife_parts as usize;
         // Of what one part alone tells no more is known than at the start.
-        problem.landmark_scatter(parts, |without| solve(without, options.max_iterations)).unwrap_or(o.start_covariance)
+        let solve_part = |part: &mut BundleProblem| {
+            let descent = solve(part, options.max_iterations);
+            solve_without_slips(part, options.max_iterations).unwrap_or(descent)
+        };
+        problem.landmark_scatter(parts, solve_part).unwrap_or(o.start_covariance)
     });
     let with = |scatter: Option<&Matrix3<f64>>, own| scatter.map_or(own, |scatter| widened(&own, scatter));
-    let counts = problem.contradictions();
+    let counts = pulled.contradictions();
     let by_landmarks = with(landmarks.as_ref(), own);
-    let suspect = problem.suspect(o, &counts, problem.noise_factors(), &by_landmarks, motions.as_ref());
+    let suspect = pulled.suspect(o, &counts, pulled.noise_factors(), &by_landmarks, motions.as_ref());
     let mounting = with(landmarks.as_ref(), with(motions.as_ref(), own));
     let scatter = doubted.as_ref().map(DoubtedParts::scatter);
     let sigma = |at: usize| {

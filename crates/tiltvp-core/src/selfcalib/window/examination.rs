@@ -2,11 +2,15 @@
 
 use super::state::{Examination, MOUNTING, SlidingWindow};
 use super::tuning::{COST_TOLERANCE, ITERATIONS};
+use crate::selfcalib::bundle::SLIP_SIGMAS;
+use crate::selfcalib::model::MotionLoss;
 
 impl SlidingWindow {
     /// Solves a copy of the window, and asks what it contradicts and what is suspect.
     pub(crate) fn examine(&mut self) {
         let mut now = self.problem.clone();
+        // What slips do not pull tells nothing of a delay.
+        now.slip = MotionLoss::Logarithmic(SLIP_SIGMAS);
         if now.keyframes.len() < 3 || now.gauss_newton(ITERATIONS, COST_TOLERANCE, false).is_none() {
             return;
         }

@@ -30,7 +30,7 @@ impl SlidingWindow {
         } else if settled && fit.is_some_and(few) && self.problem.estimate_scatters() {
             solution = self.problem.gauss_newton(iterations, COST_TOLERANCE, false);
         }
-        if solution.is_some() && (1..self.problem.keyframes.len()).any(|to| self.problem.slipped(to)) {
+        if solution.is_some() && self.problem.any_slipped() {
             self.problem.slip = MotionLoss::Redescending(SLIP_SIGMAS);
             solution = self.problem.gauss_newton(iterations, COST_TOLERANCE, false);
         }
