@@ -1,4 +1,4 @@
-"""One camera that knows the length of an edge or the size of a box: its place, how sure it is, where it abstains."""
+"""One camera that knows its height, the length of an edge or the size of a box: its place, and where it abstains."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import tiltvp
-from drawn_corners import CAMERA, COLOURS, GREYS, LEFT_FROM_RIGHT, photographed, pose
+from drawn_corners import CAMERA, COLOURS, GREYS, LEFT_FROM_RIGHT, drawn, photographed, pose
 from tiltvp.cli.app import main
 from tiltvp.corner import CornerPoseEstimator
 from tiltvp.errors import InvalidInputError
@@ -56,6 +56,70 @@ def errors(found: object, rotation: np.ndarray, vertex: np.ndarray) -> np.ndarra
     """(6,): rotation vector and vertex."""
     turn = cv2.Rodrigues(rotation @ found.camera_from_object.T)[0].ravel()
     return np.concatenate([turn, vertex - found.vertex_m])
+
+
+def test_a_known_height_places_one_camera() -> None:
+    """How well covariances are met is measured on rendered frames, in test_corner_measures.py."""
+    for k in range(0, 20, 4):
+        rotation, vertex = pose(yaw=25.0 + 2.0 * k, pitch=20.0 + 1.3 * k, roll=-8.0 + k)
+        above = float(rotation[:, 1] @ vertex)
+        image = drawn(rotation, vertex, COLOURS, fine=4)
+        exact, measured = (
+            CornerPoseEstimator(CAMERA, camera_height_m=above, camera_height_sigma_m=sigma)(image).pose
+            for sigma in (0.0, 0.005)
+        )
+        assert exact is not None
+        assert measured is not None
+        assert np.linalg.norm(exact.vertex_m - vertex) < 0.03 * np.linalg.norm(vertex)
+        # A height that is wrong moves the vertex along its line of sight, and does nothing to the attitude.
+        upright = exact.camera_from_object[:, 1]
+        assert np.isclose(upright @ exact.vertex_m, above)
+        seen = np.zeros(6)
+        seen[3:] = exact.vertex_m * 0.005 / above
+        assert np.allclose(measured.covariance - exact.covariance, np.outer(seen, seen), atol=1e-15)
+        assert np.linalg.eigvalsh(exact.covariance).min() > -1e-15
+
+
+def test_a_height_is_above_the_corners_that_stand_on_the_floor() -> None:
+    """Of a grey box the upper corners are often the best ones, but things stand below them."""
+    for k in range(10):
+        rotation, vertex = pose(yaw=25.0 + 4.0 * k, pitch=14.0 + 2.5 * k, roll=-6.0 + k)
+        vertex = vertex + (0.0, -0.08, 0.0)
+        feet = vertex + [0.3 * rotation @ (x, 1.0, z) for x, z in ((0.0, 0.0), (1.0, 0.0), (0.0, 1.0))]
+        known = {"camera_height_m": float(rotation[:, 1] @ feet[0]), "camera_height_sigma_m": 0.002}
+        estimate = CornerPoseEstimator(CAMERA, method="general", down=rotation[:, 1], **known)(
+            drawn(rotation, vertex, GREYS, fine=4)
+        )
+        assert estimate.pose is not None
+        off = min((foot - estimate.pose.vertex_m for foot in feet), key=np.linalg.norm)
+        assert off @ np.linalg.solve(estimate.pose.covariance[3:, 3:], off) < 16.3
+        assert any(np.abs(estimate.pose.edges + rotation[:, 1]).max(axis=1) < 0.02)
+        hidden = drawn(rotation, vertex, GREYS, fine=4)
+        hidden[round(vertex[1] / vertex[2] * 400.0 + 180.0) + 60 :] = 150
+        upper = CornerPoseEstimator(CAMERA, method="general", down=rotation[:, 1], **known)(hidden)
+        assert upper.pose.vertex_m is None
+        assert upper.place_reason == "no upright edge rises from a corner, as of what stands on the floor"
+
+
+def test_what_a_height_does_not_tell() -> None:
+    rotation, vertex = pose()
+    image = drawn(rotation, vertex, COLOURS)
+    above = float(rotation[:, 1] @ vertex)
+    for known in ({}, {"camera_height_m": above, "down": -rotation[:, 1]}, {"camera_height_m": 500.0}):
+        estimate = CornerPoseEstimator(CAMERA, **known)(image)
+        assert estimate
+        assert estimate.pose.vertex_m is None
+        assert not estimate.pose.covariance[3:].any()
+    # Which edge of a grey corner is the upright one is not known without the direction down.
+    grey = drawn(rotation, vertex, GREYS)
+    down = {"down": rotation[:, 1], "right_handed": True}
+    assert CornerPoseEstimator(CAMERA, method="general", camera_height_m=above, **down)(grey).pose.vertex_m is not None
+    unknown = CornerPoseEstimator(CAMERA, method="general", camera_height_m=above, right_handed=True)(grey)
+    assert all(one.vertex_m is None for one in unknown.hypotheses)
+    with pytest.raises(InvalidInputError, match=r"camera_height_m.*two cameras"):
+        CornerPoseEstimator(CAMERA, CAMERA, LEFT_FROM_RIGHT, camera_height_m=1.0)
+    with pytest.raises(InvalidInputError, match="camera_height_m"):
+        CornerPoseEstimator(CAMERA, camera_height_m=0.0)
 
 
 KNOWN = [
