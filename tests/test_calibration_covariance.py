@@ -55,3 +55,15 @@ def test_motions_of_most_of_the_drive_that_err_together_are_named() -> None:
     assert found.mounting.suspect == "drift"
     assert found.mounting.suspect_value > 5.0
     assert "err together" in found.reason
+
+
+@pytest.mark.parametrize("kind", ["paper", "alternating"])
+def test_steps_without_bearings_tell_the_filter_nothing(kind: str) -> None:
+    """The first of them made the mounting up to five times surer until the next bearings came."""
+    drive = simulate_drive(kind, seed=1)
+    seen = drive.bearings[drive.bearings[:, 0] % 4 == 0]
+    told = tiltvp.SelfCalibrator(**START).follow(drive.odometry, seen)  # type: ignore[arg-type]
+    # At the end the filter is examined.
+    for step in range(1, len(told) - 1):
+        if step % 4:
+            assert np.array_equal(told[step].covariance_xy_yaw, told[step - 1].covariance_xy_yaw)

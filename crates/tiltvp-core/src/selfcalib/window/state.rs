@@ -110,7 +110,9 @@ impl SlidingWindow {
     /// for errors that a landmark's bearings share, and for those that motions of the drive shared up to the last examination.
     pub(crate) fn mounting(&self) -> (Vector3<f64>, Matrix3<f64>) {
         let mut covariance: Matrix3<f64> = self.covariance.fixed_view::<3, 3>(MOUNTING, MOUNTING).into();
-        if self.problem.keyframes.len() < self.spurious_until {
+        // A keyframe without bearings was not asked yet whether the window has to be solved.
+        let unseen = self.problem.keyframes.last().is_some_and(|last| last.observations.is_empty());
+        if self.problem.keyframes.len() < self.spurious_until + usize::from(unseen) {
             covariance = widened(&covariance, &self.solved_covariance);
         }
         covariance = self.widening * covariance * self.widening.transpose();
