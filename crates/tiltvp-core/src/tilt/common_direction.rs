@@ -90,16 +90,20 @@ pub fn common_direction(
     };
     let report = refine(&rows, &refining, &mut row_weights, &mut Subsample::default());
     let found = report.model.filter(|o| o.z >= options.max_angle_rad.cos());
-    let stop = match (report.model, found) {
-        (Some(o), None) => Stop::OutOfReach { angle_rad: o.xy().norm().atan2(o.z), limit_rad: options.max_angle_rad },
-        _ => report.stop,
-    };
     let known = |upright: &Vector3<f64>| {
         let covariance = covariance(&kept, &row_weights, upright, &upright_from_user, options.sigma_rad);
         covariance.iter().all(|x| x.is_finite()).then_some(covariance)
     };
     // Where residuals curve nowhere to a minimum there is no answer, however the descent ended.
-    let Some((upright, covariance_rad2)) = found.and_then(|upright| Some((upright, known(&upright)?))) else {
+    let told = found.and_then(|upright| Some((upright, known(&upright)?)));
+    let stop = match (report.model, found, told) {
+        (Some(o), None, _) => {
+            Stop::OutOfReach { angle_rad: o.xy().norm().atan2(o.z), limit_rad: options.max_angle_rad }
+        }
+        (_, Some(_), None) => Stop::Undetermined { agreeing: report.inliers },
+        _ => report.stop,
+    };
+    let Some((upright, covariance_rad2)) = told else {
         return Ok(CommonDirection {
             direction: None,
             covariance_rad2: Matrix2::repeat(f64::INFINITY),
