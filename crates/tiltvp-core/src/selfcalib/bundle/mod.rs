@@ -20,5 +20,5 @@ pub(super) use self::descent::{DescentReport, FIRST_DAMPING, Solution};
 pub(super) use self::jackknife::DoubtedParts;
 pub(super) use self::keyframe::{Keyframe, Observation};
 pub(super) use self::landmark_distance::{DISTANCE_STEP, DISTANCE_STEPS};
-pub(super) use self::problem::{BundleProblem, FreeParameters, SLIP_SIGMAS};
+pub(super) use self::problem::{BundleProblem, FreeParameters};
 pub(super) use self::schur::ReducedSystem;

@@ -67,10 +67,6 @@ pub(crate) struct BundleProblem {
 const WHEELS_SIGMA: [f64; 2] = [0.2, 0.2];
 const OFFSET_SIGMA_S: f64 = 1.0;
 
-/// Standard deviations by which a motion may differ from its odometry before the wheels are taken to have slipped. In three
-/// dimensions normal noise exceeds it 15 times in a million.
-pub(crate) const SLIP_SIGMAS: f64 = 5.0;
-
 /// Jacobians of the pose of an observation.
 pub(crate) struct ObservationPoseJacobians {
     /// By the pose of its keyframe.
@@ -120,7 +116,7 @@ impl BundleProblem {
             bearing_sigma: options.bearing_sigma_rad,
             scatters: Vec::new(),
             loss,
-            slip: MotionLoss::Logarithmic(SLIP_SIGMAS),
+            slip: MotionLoss::Logarithmic,
         }
     }
 

@@ -35,14 +35,20 @@ impl BearingLoss {
 /// some 10,000 bearings loses none that is right.
 pub(crate) const OUTLIER_SIGMAS: f64 = 4.5;
 
-/// The robust loss of a motion, since wheels slip. Thresholds are standard deviations.
+/// Standard deviations by which a motion may differ from its odometry before the wheels are taken to have slipped. In three
+/// dimensions normal noise exceeds it 15 times in a million.
+const SLIP_SIGMAS: f64 = 5.0;
+
+/// The loss of a motion, robust since wheels slip.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) enum MotionLoss {
-    /// Logarithmic beyond the threshold (as Cauchy's): what is far off still pulls.
-    Logarithmic(f64),
-    /// The same, and in the end constant: beyond [`FAR`] thresholds it hardly pulls.
-    Redescending(f64),
+    /// That of wheels that never slip.
+    Quadratic,
+    /// Logarithmic beyond [`SLIP_SIGMAS`] (as Cauchy's): what is far off still pulls.
+    Logarithmic,
+    /// The same, and in the end constant: beyond [`FAR`] times that it hardly pulls.
+    Redescending,
 }
 
 /// From how many thresholds on a motion that differs from its odometry has slipped: thirty standard deviations. Of 200 drives with three
@@ -51,14 +57,13 @@ pub(crate) enum MotionLoss {
 const FAR: f64 = 6.0;
 
 impl MotionLoss {
-    /// Wheels that never slip.
-    pub(crate) const NEVER: Self = Self::Logarithmic(f64::INFINITY);
-
     /// The squares of the threshold, and of the distance from which the loss tends to a constant.
     fn limits(self) -> (f64, f64) {
+        let limit = SLIP_SIGMAS * SLIP_SIGMAS;
         match self {
-            Self::Logarithmic(k) => (k * k, f64::INFINITY),
-            Self::Redescending(k) => (k * k, FAR * FAR * k * k),
+            Self::Quadratic => (f64::INFINITY, f64::INFINITY),
+            Self::Logarithmic => (limit, f64::INFINITY),
+            Self::Redescending => (limit, FAR * FAR * limit),
         }
     }
 
@@ -124,11 +129,11 @@ mod tests {
                 let slope = (loss.cost(r + h) - loss.cost(r - h)) / (2.0 * h);
                 prop_assert!((slope - loss.weight(r) * r).abs() < 1e-6);
             }
-            for slip in [MotionLoss::Logarithmic(5.0), MotionLoss::Redescending(5.0)] {
+            for slip in [MotionLoss::Quadratic, MotionLoss::Logarithmic, MotionLoss::Redescending] {
                 let slope = (slip.cost((r + h).powi(2)) - slip.cost((r - h).powi(2))) / (2.0 * h);
                 prop_assert!((slope - slip.weight(r * r) * r).abs() < 1e-5);
             }
-            prop_assert!(MotionLoss::Redescending(5.0).cost(1e4 * r * r) < 12.5 * (2.0 + 36f64.ln()));
+            prop_assert!(MotionLoss::Redescending.cost(1e4 * r * r) < 12.5 * (2.0 + 36f64.ln()));
         }
     }
 }

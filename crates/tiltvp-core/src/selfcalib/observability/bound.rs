@@ -39,7 +39,7 @@ pub fn cramer_rao_bound(
     // The information of a bearing depends on its residual only by the weight of a robust loss.
     let without_loss = BearingLoss::Huber(f64::INFINITY);
     let mut problem = BundleProblem::new(options, &truth, FreeParameters::default(), without_loss);
-    problem.slip = MotionLoss::NEVER;
+    problem.slip = MotionLoss::Quadratic;
     let mut slots = vec![None; landmarks_m.len()];
     for ((reading, pose), seen) in readings.iter().zip(poses).zip(observations) {
         let odometry = RelativeMotion::from_wheels(reading, &problem.wheels, &problem.noise);

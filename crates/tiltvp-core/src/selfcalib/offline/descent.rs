@@ -1,7 +1,7 @@
 //! The descent of a whole log's problem: robustly, then without outliers, then with the scatters of the landmarks; and without slips.
 
 use super::incremental::ROBUST_LOSS;
-use crate::selfcalib::bundle::{BundleProblem, DescentReport, FIRST_DAMPING, SLIP_SIGMAS};
+use crate::selfcalib::bundle::{BundleProblem, DescentReport, FIRST_DAMPING};
 use crate::selfcalib::model::{BearingLoss, MotionLoss, OUTLIER_SIGMAS};
 
 /// Fall of the cost below which a descent has converged: far below the 1/2 by which the cost rises at one standard deviation.
@@ -13,7 +13,7 @@ const SCATTER_ROUNDS: usize = 4;
 
 /// Solves a problem with robust losses, then without outliers, then with the scatters of the landmarks.
 pub(super) fn solve(problem: &mut BundleProblem, max_iterations: u32) -> DescentReport {
-    problem.slip = MotionLoss::Logarithmic(SLIP_SIGMAS);
+    problem.slip = MotionLoss::Logarithmic;
     let descend = |problem: &mut BundleProblem, loss: BearingLoss| {
         problem.loss = loss;
         problem.levenberg_marquardt(max_iterations, TOLERANCE, FIRST_DAMPING)
@@ -47,6 +47,6 @@ pub(super) fn solve_without_slips(problem: &mut BundleProblem, max_iterations: u
     if !problem.any_slipped() {
         return None;
     }
-    problem.slip = MotionLoss::Redescending(SLIP_SIGMAS);
+    problem.slip = MotionLoss::Redescending;
     Some(problem.levenberg_marquardt(max_iterations, TOLERANCE, FIRST_DAMPING))
 }

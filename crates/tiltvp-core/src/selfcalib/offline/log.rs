@@ -158,6 +158,7 @@ mod tests {
         assert!(log(MOST_LANDMARKS).is_ok());
         assert!(log(MOST_LANDMARKS + 1).is_err());
     }
+
     #[test]
     fn a_landmark_has_one_bearing_a_step() {
         let readings = [WheelMotion { left_m: 0.1, right_m: 0.1 }; 3];

@@ -196,7 +196,7 @@ fn without_contradicted_parts(options: &LogOptions, mut problem: BundleProblem) 
 /// Whether a log tells other wheels than it was told, as far as motions of all its parts tell them. A wrong wheel base contradicts the
 /// parts in which the robot turns.
 fn wheels_are_others(options: &LogOptions, as_told: &BundleProblem) -> bool {
-    let options = LogOptions { estimate_odometry: true, ..*options };
+    let options = LogOptions { estimate_odometry: true, jackknife_parts: 0, ..*options };
     let mut problem = as_told.with_free(FreeParameters { wheels: true, ..as_told.free });
     let descent = solve(&mut problem, options.max_iterations);
     let Ok(answer) = report(&options, &problem, &descent, None) else { return false };

@@ -2,7 +2,6 @@
 
 use super::state::{Examination, MOUNTING, SlidingWindow};
 use super::tuning::{COST_TOLERANCE, ITERATIONS};
-use crate::selfcalib::bundle::SLIP_SIGMAS;
 use crate::selfcalib::model::MotionLoss;
 
 impl SlidingWindow {
@@ -10,7 +9,7 @@ impl SlidingWindow {
     pub(crate) fn examine(&mut self) {
         let mut now = self.problem.clone();
         // What slips do not pull tells nothing of a delay.
-        now.slip = MotionLoss::Logarithmic(SLIP_SIGMAS);
+        now.slip = MotionLoss::Logarithmic;
         if now.keyframes.len() < 3 || now.gauss_newton(ITERATIONS, COST_TOLERANCE, false).is_none() {
             return;
         }

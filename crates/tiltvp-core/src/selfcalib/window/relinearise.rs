@@ -6,7 +6,7 @@ use super::state::{MOUNTING, ROBUST_LOSS, SlidingWindow};
 use super::tuning::{
     COST_TOLERANCE, EVERY_STEP_KEYFRAMES, FIXED_OUTLIER_ITERATIONS, OUTLIER_SHARE, RESTART_KEYFRAMES, RESTART_YAWS,
 };
-use crate::selfcalib::bundle::{CholeskyFactor, FIRST_DAMPING, SLIP_SIGMAS, Solution};
+use crate::selfcalib::bundle::{CholeskyFactor, FIRST_DAMPING, Solution};
 use crate::selfcalib::model::{BearingLoss, FitSummary, MotionLoss, OUTLIER_SIGMAS};
 
 impl SlidingWindow {
@@ -14,7 +14,7 @@ impl SlidingWindow {
     /// `trusted`, and from the last solution otherwise.
     pub(super) fn relinearise(&mut self, iterations: u32, trusted: bool) {
         let before = self.problem.landmarks.clone();
-        (self.problem.loss, self.problem.slip) = (ROBUST_LOSS, MotionLoss::Logarithmic(SLIP_SIGMAS));
+        (self.problem.loss, self.problem.slip) = (ROBUST_LOSS, MotionLoss::Logarithmic);
         let settled = self.problem.keyframes.len() >= EVERY_STEP_KEYFRAMES;
         let from_filter = trusted && settled && !self.monitor.is_inconsistent();
         if from_filter {
@@ -31,7 +31,7 @@ impl SlidingWindow {
             solution = self.problem.gauss_newton(iterations, COST_TOLERANCE, false);
         }
         if solution.is_some() && self.problem.any_slipped() {
-            self.problem.slip = MotionLoss::Redescending(SLIP_SIGMAS);
+            self.problem.slip = MotionLoss::Redescending;
             solution = self.problem.gauss_newton(iterations, COST_TOLERANCE, false);
         }
         if !solution.is_some_and(|solution| self.adopt(&solution)) {
