@@ -72,7 +72,9 @@ def test_tracks_from_a_wrong_place_are_short_and_lead_to_a_wrong_one(
     bearings = bearing_log([one.followed(tracker) for one in seen], frames_min=3)
     found = calibrate_lines(seen, solve)
     assert len(bearings) < 0.9 * len(found.bearings)
-    assert np.linalg.norm(errors(solve(bearings))[:2]) > 2.0 * np.linalg.norm(errors(found.whole)[:2])
+    assert np.linalg.norm(errors(solve(bearings, estimate_centre=True))[:2]) > 2.0 * np.linalg.norm(
+        errors(found.whole)[:2]
+    )
 
 
 def test_the_place_is_told_by_motions_that_turn_and_drive(seen: list[SeenFrame]) -> None:
@@ -99,9 +101,23 @@ def test_what_does_not_settle_says_so(seen: list[SeenFrame], solve: partial[LogC
         calibrate_lines([], solve)
 
 
+def test_an_image_centre_that_is_off_does_not_move_the_mounting(drive: Drive, solve: partial[LogCalibration]) -> None:
+    told = Camera.equidistant(width=360, height=360, focal_px=105.0, cx=181.5, cy=179.5, max_theta_rad=1.6)
+    motions = [Motion(turn, distance) for distance, turn in drive.motions.tolist()]
+    images = (drive.render(frame).gray for frame in range(len(drive)))
+    seen = [one for one in see_lines(images, LineExtractor(told), motions=motions) if isinstance(one, SeenFrame)]
+    found = calibrate_lines(seen, solve)
+    plain = solve(found.bearings)
+    assert found.whole
+    assert np.abs(errors(found.whole)[:2]).max() < 0.004 < 0.02 < np.linalg.norm(errors(plain)[:2])
+    assert plain.mounting.suspect == "centre"
+    forward, left = found.whole.centre_off_rad
+    assert math.hypot(forward, left) > 5.0 * math.hypot(*found.whole.centre_off_sigma_rad)
+
+
 def test_lines_are_left_out_in_turn_for_the_covariance(seen: list[SeenFrame], solve: partial[LogCalibration]) -> None:
     found = calibrate_lines(seen, solve)
-    plain, wide = solve(found.bearings).mounting, found.whole.mounting
+    plain, wide = solve(found.bearings, estimate_centre=True).mounting, found.whole.mounting
     more = wide.covariance_xy_yaw - plain.covariance_xy_yaw
     assert (wide.x_m, wide.y_m, wide.yaw_rad) == (plain.x_m, plain.y_m, plain.yaw_rad)
     assert np.linalg.eigvalsh(more).min() > -1e-15

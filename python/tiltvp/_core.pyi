@@ -1967,6 +1967,17 @@ class LogCalibration:
         """Bearings that were used; of those taken at a standstill only the first."""
 
     @property
+    def centre_off_rad(self) -> NDArray[np.float64]:
+        """How far the image centre about which the bearings were taken is off, along bearings 0 and 90 degrees, in
+        units of the radius at which lines are seen: radians, (x, y); 0 where it was not estimated. A camera that leans
+        errs alike.
+        """
+
+    @property
+    def centre_off_sigma_rad(self) -> NDArray[np.float64]:
+        """Standard deviations of it; 0 where it was not estimated."""
+
+    @property
     def converged(self) -> bool:
         """Whether the descent came to rest."""
 
@@ -2139,15 +2150,16 @@ class MountingEstimate:
     @property
     def suspect(self) -> str | None:
         """What is most likely wrong where the log does not fit: "turns" (a sign or a unit), "outliers" (a bump, or
-        names), "bump", "slips", "bearing_sigma_rad", "odometry_k_m", "wheel_base_m", "right_over_left", "time_offset_s"
-        or "drift" (motions of a part of the drive that err together). None if nothing is.
+        names), "bump", "slips", "bearing_sigma_rad", "odometry_k_m", "wheel_base_m", "right_over_left",
+        "time_offset_s", "centre" (another image centre, or a camera that leans) or "drift" (motions of a part of the
+        drive that err together). None if nothing is.
         """
 
     @property
     def suspect_value(self) -> float | None:
         """The value that would suit the log better, of what `suspect` names (a time offset in steps); of "turns",
-        "outliers" and "slips" their share, of "bump" its angle in radians, of "drift" the factor of a standard
-        deviation.
+        "outliers" and "slips" their share, of "bump" its angle and of "centre" the largest error of a bearing in
+        radians, of "drift" the factor of a standard deviation.
         """
 
     def to_dict(self) -> dict[str, Any]:
@@ -3322,6 +3334,7 @@ def calibrate(
     step_sigma_rad: float | None = None,
     estimate_odometry: bool | None = None,
     estimate_time_offset: bool | None = None,
+    estimate_centre: bool | None = None,
     max_iterations: SupportsIndex | None = None,
     jackknife_parts: SupportsIndex | None = None,
 ) -> LogCalibration:
@@ -3364,8 +3377,11 @@ def calibrate(
         displacement of both wheels stays as reported. Default: False.
     estimate_time_offset
         Whether the time by which bearings are later than the odometry is estimated; needs times. Default: False.
+    estimate_centre
+        Whether an error of the bearings that goes once round the camera is estimated too: what another image centre
+        makes, or a camera that leans. Default: False.
     max_iterations
-        Most linearisations of each of the two descents (robust, then without outliers). Default: 60.
+        Most linearisations of each of the two descents (robust, then without outliers). Default: 100.
     jackknife_parts
         Parts of the landmarks that are left out in turn: the covariance of the mounting is then no less than the
         scatter of what the others tell. For landmarks that may be two things', as lines of images; 0 leaves none out.

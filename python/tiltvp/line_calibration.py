@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
@@ -80,11 +80,21 @@ def calibrate_lines(
 
     `solve` makes the mounting of bearings (M, 3) in the frame of the lines, with options of `tiltvp.calibrate` by
     keyword; `start` is x, y in metres and yaw in radians, as far as they are known; lines that are seen in `frames_min`
-    frames count. The covariance is no less than what leaving out lines in turn tells. Raises `InvalidInputError` if
-    there are none, and what `solve` raises.
+    frames count. The image centre is estimated too where lines are seen all round the camera. The covariance is no less
+    than what leaving out lines in turn tells. Raises `InvalidInputError` if there are none, and what `solve` raises.
     """
-    found = _in_turns(seen, solve, start, frames_min)
-    return replace(found, whole=solve(found.bearings, jackknife_parts=_PARTS))
+
+    def solved(bearings: NDArray[np.float64], **options: Any) -> LogCalibration:
+        return solve(bearings, estimate_centre=_are_all_round(bearings[:, 2]), **options)
+
+    found = _in_turns(seen, solved, start, frames_min)
+    return replace(found, whole=solved(found.bearings, jackknife_parts=_PARTS))
+
+
+def _are_all_round(bearings_rad: NDArray[np.float64]) -> bool:
+    """Whether no quarter of the circle is without bearings: of a part of it another centre is as another yaw."""
+    ascending = np.sort(bearings_rad % math.tau)
+    return bool(np.diff(ascending, append=ascending[0] + math.tau).max() < math.pi / 2.0)
 
 
 def _in_turns(

@@ -245,6 +245,7 @@ def calibrations() -> Iterator[tuple[str, Any]]:
             drive.odometry, drive.bearings, **start, estimate_odometry=True, estimate_time_offset=True, times_s=times
         ),
     )
+    yield f"{kind} {seed} centre", tiltvp.calibrate(drive.odometry, drive.bearings, **start, estimate_centre=True)
     yield "cramer-rao", drive.cramer_rao_bound(start_sigma=(0.2, 0.2, 0.6))
 
 

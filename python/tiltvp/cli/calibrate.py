@@ -135,8 +135,9 @@ def _calibrated(
 
     def solve(log: DriveLog, **options: Any) -> LogCalibration:
         return calibrate_log(
-            log.odometry, log.bearings, **noise() | options | drive.of_whole_log(), times_s=log.times_s,
+            log.odometry, log.bearings, times_s=log.times_s,
             estimate_odometry=read.estimate_odometry, estimate_time_offset=read.estimate_time_offset,
+            **{"estimate_centre": read.estimate_centre} | noise() | options | drive.of_whole_log(),
         )  # fmt: skip
 
     log, whole, doubt = one.solved(None if tilt is None else tilt.robot_from_camera, solve)

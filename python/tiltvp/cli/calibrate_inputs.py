@@ -44,7 +44,7 @@ _TABLE: Final = ".csv"
 @from_library(
     {"SelfCalibrator": CALIBRATION_METHODS, "calibrate": ()},
     words={"odometry_k_m": "--odometry-k", "step_sigma_m": "--step-sigma", "start_distance_m": "--start-distance"},
-    but=("wheel_base_m", "method", "estimate_odometry", "estimate_time_offset"),
+    but=("wheel_base_m", "method", "estimate_odometry", "estimate_time_offset", "estimate_centre"),
 )
 class DriveOptions(LibraryOptions):
     """The robot, the mounting as it is thought to be, and how sure measurements are."""
@@ -100,6 +100,9 @@ class LogOptions:
     """From each whole log also the wheel base and which wheel runs farther."""
     estimate_time_offset: Switch = False
     """From each whole log also by how much the bearings are later than the odometry."""
+    estimate_centre: Switch = False
+    """From each whole log also how far the image centre is off, which a camera that leans looks like. From pictures
+    with lines all round it always is."""
 
 
 class Solved(NamedTuple):

@@ -264,6 +264,10 @@ def _show(one: Calibration, *, several: bool) -> None:
         )
     if whole.time_offset_sigma_s > 0.0:
         say(f"bearings are later by {whole.time_offset_s:.4f} +- {whole.time_offset_sigma_s:.4f} s")
+    if whole.centre_off_sigma_rad[0] > 0.0:
+        both = np.degrees([whole.centre_off_rad, whole.centre_off_sigma_rad]).T
+        forward, left = (f"{off:.3f} +- {sigma:.3f}" for off, sigma in both)
+        say(f"image centre: off by {forward} degrees of a bearing forward in the camera, by {left} to its left")
     if one.late_s and one.frames_late_s is not None:
         say(f"frames are stamped {one.frames_late_s:.4f} +- {whole.time_offset_sigma_s:.4f} s late in all")
 

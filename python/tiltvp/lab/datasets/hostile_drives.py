@@ -122,6 +122,17 @@ def _slips(log: _Log) -> None:
         log.odometry[step, log.rng.integers(2)] += log.rng.uniform(0.05, 0.15)
 
 
+def _off_centre(off_px: float) -> _Case:
+    """Bearings are taken about a centre that is so far off where lines are seen at a radius of 150 pixels."""
+
+    def harm(log: _Log) -> None:
+        way, radii = log.rng.uniform(-math.pi, math.pi), off_px / 150.0
+        sine, cosine = np.sin(log.bearings[:, 2]), np.cos(log.bearings[:, 2])
+        log.bearings[:, 2] = np.arctan2(sine - radii * math.sin(way), cosine - radii * math.cos(way))
+
+    return _Case(harm)
+
+
 def _carpet(log: _Log) -> None:
     """For a quarter of the drive both wheels run up to a tenth farther than the robot goes, each for itself."""
     count = len(log.odometry)
@@ -156,6 +167,8 @@ DRIVE_CASES: Final = {
     "a tenth of the names wrong": _Case(_confused),
     "two landmarks merged": _Case(_merged),
     "camera bumped": _Case(_bumped),
+    "image centre off by 0.5 px": _off_centre(0.5),
+    "image centre off by 2 px": _off_centre(2.0),
     "wheels slip": _Case(_slips),
     "carpet": _Case(_carpet),
     "straight on only": _Case(kinds=("straight",)),

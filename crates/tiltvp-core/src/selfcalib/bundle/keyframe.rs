@@ -19,6 +19,20 @@ impl Observation {
         let (sin, cos) = bearing.sin_cos();
         Self { landmark, bearing, along: Vector2::new(cos, sin) }
     }
+
+    /// This bearing as it would be about the true image centre, of which the one it was taken about is off by so many radii.
+    pub(crate) fn about(&self, off: &Vector2<f64>) -> Self {
+        if *off == Vector2::zeros() {
+            *self
+        } else {
+            Self::new(self.landmark, self.bearing - off.dot(&self.by_centre()))
+        }
+    }
+
+    /// The derivative of the bearing by the image centre, in radii.
+    pub(crate) fn by_centre(&self) -> Vector2<f64> {
+        Vector2::new(self.along.y, -self.along.x)
+    }
 }
 
 /// A pose of the robot at which bearings were taken, with the odometry since the keyframe before.

@@ -47,7 +47,7 @@ impl BundleProblem {
         let mut seen: Vec<Vec<(Vector3<f64>, f64)>> = vec![Vec::new(); self.landmarks.len()];
         for keyframe in &self.keyframes {
             for observation in &keyframe.observations {
-                seen[observation.landmark].push((keyframe.pose, observation.bearing));
+                seen[observation.landmark].push((keyframe.pose, observation.about(&self.centre).bearing));
             }
         }
         for (i, seen) in seen.iter().enumerate() {

@@ -34,7 +34,7 @@ pub(crate) struct BearingRow {
     pub(crate) by_pose: Vector3<f64>,
     /// By the pose of the keyframe's [neighbour](BundleProblem::neighbour).
     pub(crate) by_neighbour: Vector3<f64>,
-    pub(crate) by_calibration: [f64; 6],
+    pub(crate) by_calibration: [f64; 8],
     /// The place of its landmark among the shared parameters.
     pub(crate) at: usize,
     pub(crate) by_landmark: [f64; 2],
@@ -122,8 +122,8 @@ impl BundleProblem {
             let point = &points[observation.landmark];
             let p = view.jacobians(point);
             let s = 1.0 / (self.bearing_sigma * self.scatters[observation.landmark]);
-            let residual = view.residual(point, &observation.along) * s;
-            let mut by_calibration = [0.0; 6];
+            let residual = view.residual(point, &observation.about(&self.centre).along) * s;
+            let mut by_calibration = [0.0; 8];
             by_calibration[..3].copy_from_slice((p.by_mounting * s).as_slice());
             let (mut by_pose, mut by_neighbour) = (p.by_pose * s, Vector3::zeros());
             if let Some(by) = &by {
@@ -132,6 +132,10 @@ impl BundleProblem {
                 }
                 by_neighbour = by.neighbour.transpose() * by_pose;
                 by_pose = by.pose.transpose() * by_pose;
+            }
+            if self.free.centre {
+                let at = self.free.centre_at();
+                by_calibration[at..at + 2].copy_from_slice((observation.by_centre() * s).as_slice());
             }
             each(&BearingRow {
                 by_pose,

@@ -1,6 +1,6 @@
 //! The bundle-adjustment problem: its unknowns, its prior and its cost.
 
-use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
+use nalgebra::{DMatrix, DVector, Matrix3, Vector2, Vector3};
 
 use super::keyframe::{Keyframe, Observation};
 use crate::selfcalib::model::{
@@ -15,22 +15,31 @@ use crate::selfcalib::options::SelfCalibratorOptions;
 pub(crate) struct FreeParameters {
     pub(crate) wheels: bool,
     pub(crate) offset: bool,
+    #[cfg_attr(feature = "serde", serde(default))]
+    pub(crate) centre: bool,
 }
 
 impl FreeParameters {
+    pub(crate) const ALL: Self = Self { wheels: true, offset: true, centre: true };
+
     /// The number of calibration parameters; those of the landmarks follow.
     pub(crate) fn width(self) -> usize {
-        3 + 2 * usize::from(self.wheels) + usize::from(self.offset)
+        self.centre_at() + 2 * usize::from(self.centre)
     }
 
     /// The place of the time offset among them.
     pub(crate) fn offset_at(self) -> usize {
         3 + 2 * usize::from(self.wheels)
     }
+
+    /// The place of the image centre among them.
+    pub(crate) fn centre_at(self) -> usize {
+        self.offset_at() + usize::from(self.offset)
+    }
 }
 
-/// A chain of keyframes from a fixed first one, and the parameters that they share: mounting, wheels and time offset if free,
-/// then landmarks.
+/// A chain of keyframes from a fixed first one, and the parameters that they share: mounting, wheels, time offset and
+/// image centre if free, then landmarks.
 ///
 /// The cost is half the sum of the squared, whitened residuals of odometry and bearings (with robust losses) and of the prior.
 #[derive(Debug, Clone, PartialEq)]
@@ -39,6 +48,10 @@ pub(crate) struct BundleProblem {
     pub(crate) mounting: Vector3<f64>,
     pub(crate) wheels: Wheels,
     pub(crate) offset_s: f64,
+    /// How far the image centre about which bearings were taken is off, forward and left in the camera, in units of the radius at which
+    /// lines are seen.
+    #[cfg_attr(feature = "serde", serde(default))]
+    pub(crate) centre: Vector2<f64>,
     /// Whether the time offset is that of late bearings, which were taken on the way to the next keyframe; else on that from the one before.
     /// It does not change with the offset's sign in a descent, for which the cost would have a kink at zero.
     pub(crate) late: bool,
@@ -61,11 +74,12 @@ pub(crate) struct BundleProblem {
     pub(crate) slip: MotionLoss,
 }
 
-/// Standard deviations of the weak priors on (imbalance, logarithm of the wheel base) and on the time offset, seconds. Wheels
-/// are known to 20 % and clocks to a second at worst. A drive determines both a hundred times better, so that the priors only
-/// keep the equations regular.
+/// Standard deviations of the weak priors on (imbalance, logarithm of the wheel base), on the time offset, seconds, and on the image
+/// centre. Wheels are known to 20 %, clocks to a second and centres to a tenth of the radius at worst. A drive determines them a
+/// hundred times better, so that the priors only keep the equations regular.
 const WHEELS_SIGMA: [f64; 2] = [0.2, 0.2];
 const OFFSET_SIGMA_S: f64 = 1.0;
+const CENTRE_SIGMA: f64 = 0.1;
 
 /// Jacobians of the pose of an observation.
 pub(crate) struct ObservationPoseJacobians {
@@ -101,10 +115,16 @@ impl BundleProblem {
             let at = free.offset_at();
             prior_information[(at, at)] = 1.0 / (OFFSET_SIGMA_S * OFFSET_SIGMA_S);
         }
+        if free.centre {
+            for k in 0..2 {
+                prior_information[(free.centre_at() + k, free.centre_at() + k)] = 1.0 / (CENTRE_SIGMA * CENTRE_SIGMA);
+            }
+        }
         Self {
             mounting: *mounting,
             wheels: Wheels::new(options.wheel_base_m),
             offset_s: 0.0,
+            centre: Vector2::zeros(),
             late: false,
             as_wheels_read: false,
             free,
@@ -135,6 +155,9 @@ impl BundleProblem {
         }
         if self.free.offset {
             g[self.free.offset_at()] = self.offset_s;
+        }
+        if self.free.centre {
+            g.fixed_rows_mut::<2>(self.free.centre_at()).copy_from(&self.centre);
         }
         for (i, landmark) in self.landmarks.iter().enumerate() {
             let at = self.free.width() + 2 * i;
@@ -168,6 +191,11 @@ impl BundleProblem {
             insert(problem.free.offset_at(), &[(problem.offset_s, OFFSET_SIGMA_S)]);
             problem.free.offset = true;
         }
+        if free.centre && !problem.free.centre {
+            let [x, y] = problem.centre.into();
+            insert(problem.free.centre_at(), &[(x, CENTRE_SIGMA), (y, CENTRE_SIGMA)]);
+            problem.free.centre = true;
+        }
         problem
     }
 
@@ -196,6 +224,9 @@ impl BundleProblem {
         }
         if self.free.offset {
             self.offset_s = g[self.free.offset_at()];
+        }
+        if self.free.centre {
+            self.centre = g.fixed_rows::<2>(self.free.centre_at()).into();
         }
         for (i, landmark) in self.landmarks.iter_mut().enumerate() {
             let at = self.free.width() + 2 * i;
@@ -347,7 +378,7 @@ impl BundleProblem {
         let (points, mut all) = (self.homogeneous_landmarks(), Vec::new());
         for (at, keyframe) in self.keyframes.iter().enumerate() {
             let view = Viewpoint::new(&self.observation_pose(at).0, &self.mounting);
-            let residual = |observation: &Observation| view.residual(&points[observation.landmark], &observation.along);
+            let residual = |seen: &Observation| view.residual(&points[seen.landmark], &seen.about(&self.centre).along);
             all.extend(
                 keyframe.observations.iter().map(|s| residual(s) / (self.bearing_sigma * self.scatters[s.landmark])),
             );

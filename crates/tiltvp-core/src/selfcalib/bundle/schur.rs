@@ -289,7 +289,7 @@ mod tests {
 
     #[test]
     fn runs_of_any_length_leave_the_same() {
-        let all = FreeParameters { wheels: true, offset: true };
+        let all = FreeParameters::ALL;
         for (free, late) in [(FreeParameters::default(), false), (all, false), (all, true)] {
             let mut problem = drive(free);
             (problem.offset_s, problem.late) = (if free.offset { 0.3 } else { 0.0 }, late);
@@ -328,7 +328,7 @@ mod tests {
 
     #[test]
     fn rows_are_differences_by_pose_neighbour_and_time() {
-        let mut problem = drive(FreeParameters { wheels: true, offset: true });
+        let mut problem = drive(FreeParameters::ALL);
         let uneven = Vector3::new(0.01, 0.0, -0.02);
         problem.keyframes[3].unevenness = [uneven, -uneven];
         let h = 1e-6;

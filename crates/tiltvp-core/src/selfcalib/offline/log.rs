@@ -29,8 +29,11 @@ options! {
         estimate_odometry: bool = false;
         /// Whether the time by which bearings are later than the odometry is estimated; needs times.
         estimate_time_offset: bool = false;
+        /// Whether an error of the bearings that goes once round the camera is estimated too: what another image centre makes, or a
+        /// camera that leans.
+        estimate_centre: bool = false;
         /// Most linearisations of each of the two descents (robust, then without outliers).
-        max_iterations: u32 = 60;
+        max_iterations: u32 = 100;
         /// Parts of the landmarks that are left out in turn: the covariance of the mounting is then no less than the scatter of
         /// what the others tell. For landmarks that may be two things', as lines of images; 0 leaves none out.
         jackknife_parts: u32 = 0 => none_or_several, "0, or a whole number from 2 to 1000";

@@ -26,12 +26,12 @@ const DOUBTED_STRICTLY: f64 = 0.001;
 
 /// Solves a problem again with the noise that its residuals tell where that is more than was told; `None` where it is not.
 ///
-/// Wheels and clock are free meanwhile, so that what they are wrong by does not count as noise.
+/// Wheels, clock and image centre are free meanwhile, so that what they are wrong by does not count as noise.
 pub(super) fn solve_with_noise(problem: &mut BundleProblem, max_iterations: u32) -> Option<DescentReport> {
     if problem.noise_factors() == NoiseFactors::ONE {
         return None;
     }
-    let mut free = problem.with_free(FreeParameters { wheels: true, offset: true });
+    let mut free = problem.with_free(FreeParameters::ALL);
     let mut total = NoiseFactors::ONE;
     for _ in 0..NOISE_ROUNDS {
         solve(&mut free, max_iterations);

@@ -33,6 +33,11 @@ pub struct LogCalibration {
     pub time_offset_s: f64,
     /// Its standard deviation.
     pub time_offset_sigma_s: f64,
+    /// How far the image centre about which the bearings were taken is off, along bearings 0 and 90 degrees, in units of the radius at
+    /// which lines are seen: radians; 0 where not estimated.
+    pub centre_off_rad: Vector2<f64>,
+    /// Its standard deviations.
+    pub centre_off_sigma_rad: Vector2<f64>,
     /// Bearings that were used. Of those of one landmark at a standstill only the first is.
     pub bearings: usize,
     /// Bearings farther from their prediction than 4.5 standard deviations, which have no weight.
@@ -243,7 +248,11 @@ fn fitting_misreading(
 /// The problem that an attempt starts from, with the parameters free that the options ask for.
 fn started(log: &SortedLog<'_>, attempt: Attempt) -> Result<BundleProblem> {
     let options = log.options;
-    let asked = FreeParameters { wheels: options.estimate_odometry, offset: options.estimate_time_offset };
+    let asked = FreeParameters {
+        wheels: options.estimate_odometry,
+        offset: options.estimate_time_offset,
+        centre: options.estimate_centre,
+    };
     let with_wheels = FreeParameters { wheels: true, ..asked };
     let start = options.filter.start.vector();
     let mut problem = match attempt {
@@ -336,7 +345,7 @@ fn report(
         let by_motions = scatter.as_ref().map_or(0.0, |scatter| scatter[(at, at)]);
         covariance[(at, at)].max(by_motions).sqrt()
     };
-    let (wheels, offset) = (options.estimate_odometry, options.estimate_time_offset);
+    let free = problem.free;
     Ok(LogCalibration {
         estimate: MountingEstimate::new(
             Mounting::from_vector(&problem.mounting),
@@ -347,9 +356,11 @@ fn report(
         )
         .judged(counts, suspect),
         wheels: problem.wheels,
-        wheels_sigma: if wheels { [sigma(3), sigma(4) * problem.wheels.base_m] } else { [0.0; 2] },
+        wheels_sigma: if free.wheels { [sigma(3), sigma(4) * problem.wheels.base_m] } else { [0.0; 2] },
         time_offset_s: problem.offset_s,
-        time_offset_sigma_s: if offset { sigma(if wheels { 5 } else { 3 }) } else { 0.0 },
+        time_offset_sigma_s: if free.offset { sigma(free.offset_at()) } else { 0.0 },
+        centre_off_rad: problem.centre,
+        centre_off_sigma_rad: Vector2::from_fn(|k, _| if free.centre { sigma(free.centre_at() + k) } else { 0.0 }),
         bearings: residuals.len(),
         outliers: residuals.len() - kept.len(),
         residual_rms: (sum / kept.len().max(1) as f64).sqrt(),
