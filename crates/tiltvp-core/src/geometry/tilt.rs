@@ -32,15 +32,6 @@ impl Tilt {
         unit(normal).map(|normal| Self { normal })
     }
 
-    /// From roll about `x` (to the right positive) and pitch about `y` (nose down positive), in radians: the lean of a
-    /// robot whose attitude is `Rz(yaw) Ry(pitch) Rx(roll)`, the usual aerospace order in the `x` forward, `y` left,
-    /// `z` up frame (ROS REP 103).
-    pub fn from_roll_pitch(roll_rad: f64, pitch_rad: f64) -> Self {
-        let (sin_r, cos_r) = roll_rad.sin_cos();
-        let (sin_p, cos_p) = pitch_rad.sin_cos();
-        Self { normal: Vector3::new(-sin_p, sin_r * cos_p, cos_r * cos_p) }
-    }
-
     /// The ground normal in the robot frame, a unit vector.
     pub fn normal(&self) -> Vector3<f64> {
         self.normal
@@ -86,6 +77,7 @@ impl Tilt {
 mod tests {
     use super::*;
     use approx::assert_relative_eq;
+    use nalgebra::Rotation3;
     use proptest::prelude::*;
     use std::f64::consts::FRAC_PI_2;
 
@@ -108,8 +100,9 @@ mod tests {
         }
 
         #[test]
-        fn roll_pitch_round_trip(roll in -1.5..1.5f64, pitch in -1.5..1.5f64) {
-            let tilt = Tilt::from_roll_pitch(roll, pitch);
+        fn roll_and_pitch_are_those_of_the_attitude(roll in -1.5..1.5f64, pitch in -1.5..1.5f64, yaw in -3.0..3.0f64) {
+            let ground_from_robot = Rotation3::from_euler_angles(roll, pitch, yaw);
+            let tilt = Tilt::from_normal(&(ground_from_robot.inverse() * Vector3::z())).unwrap();
             prop_assert!((tilt.roll_rad() - roll).abs() < 1e-9);
             prop_assert!((tilt.pitch_rad() - pitch).abs() < 1e-9);
         }
