@@ -250,7 +250,7 @@ fn search_of(
     let [low, high] = line.reach.map(|angle| angle - at);
     let forwards = high.abs() >= low.abs();
     let (near, far) = if forwards { (low, high) } else { (-high, -low) };
-    // ObservedCorner from the vertex the candidates lie on one side, but for a few that the gap's width brings about.
+    // Seen from the vertex the candidates lie on one side, but for a few that the gap's width brings about.
     if near < -0.3 * far || far <= 0.0 {
         return None;
     }
@@ -259,12 +259,8 @@ fn search_of(
         vertex: on_line,
         from_rad: CLEAR_OF_VERTEX_PX / px_per_rad,
         to_rad: far - CLEAR_OF_END_PX / px_per_rad,
-        search_px: options.search_px,
-        step_min: options.step_min,
         step_share_min: STEP_SHARE_MIN,
-        threshold_px: options.threshold_px,
-        share_min: 0.0,
-        erring_together: ERRING_TOGETHER,
         ray_sigma_px: options.ray_sigma_px,
+        ..box_search(options)
     })
 }
