@@ -10,7 +10,7 @@ use crate::call::invalid;
 use crate::camera::Camera;
 use crate::convert;
 use crate::options;
-use crate::synth::{Pictures, Room, call_on_threads, pictures};
+use crate::synth::{Pictures, Room, call_on_threads, frame_from, pictures};
 use crate::value::{frozen, getters};
 
 type Rows<'py> = Array<'py, f64>;
@@ -136,7 +136,7 @@ impl Drive {
         frame: &Bound<'py, PyAny>,
         threads: Option<&Bound<'py, PyAny>>,
     ) -> PyResult<Pictures<'py>> {
-        let frame = self.frame(frame)?;
+        let frame = frame_from(frame, self.__len__())?;
         let image = call_on_threads(py, threads, || self.inner.render(frame))?;
         pictures(py, image)
     }
@@ -167,7 +167,7 @@ impl Drive {
         frame: &Bound<'py, PyAny>,
         threads: Option<&Bound<'py, PyAny>>,
     ) -> PyResult<Sightings<'py>> {
-        let frame = self.frame(frame)?;
+        let frame = frame_from(frame, self.__len__())?;
         let seen = call_on_threads(py, threads, || self.inner.sightings(frame))?;
         let column = |value: fn(&tiltvp_synth::EdgeSighting) -> f64| {
             Array::new(PyArray1::from_vec(py, seen.iter().map(value).collect()))
@@ -222,9 +222,3 @@ frozen!(Drive, |own| (&own.room.get().options, own.inner.camera(), own.inner.opt
     own.frames(),
     own.inner.options().seed
 ));
-
-impl Drive {
-    fn frame(&self, frame: &Bound<'_, PyAny>) -> PyResult<usize> {
-        convert::whole(frame, "frame", &format!("a whole number below {}", self.inner.trajectory().poses.len()))
-    }
-}

@@ -17,7 +17,7 @@ use crate::camera::Camera;
 use crate::convert;
 use crate::laboratory::Laboratory;
 use crate::options;
-use crate::synth::{Room, call_on_threads};
+use crate::synth::{Room, call_on_threads, frame_from};
 use crate::value::{frozen, getters, of_class};
 
 /// Position, directions of the edges x, y, z in rows, their lengths, and the kind, of a corner.
@@ -131,7 +131,7 @@ impl StereoSequence {
         frame: &Bound<'py, PyAny>,
         threads: Option<&Bound<'py, PyAny>>,
     ) -> PyResult<(Picture<'py>, Picture<'py>)> {
-        let frame = self.frame(frame)?;
+        let frame = frame_from(frame, self.__len__())?;
         let [left, right] = call_on_threads(py, threads, || self.inner.render(frame))?;
         Ok((picture(py, left)?, picture(py, right)?))
     }
@@ -144,7 +144,7 @@ impl StereoSequence {
         frame: &Bound<'py, PyAny>,
         threads: Option<&Bound<'py, PyAny>>,
     ) -> PyResult<Sightings<'py>> {
-        let frame = self.frame(frame)?;
+        let frame = frame_from(frame, self.__len__())?;
         let seen = call_on_threads(py, threads, || self.inner.sightings(frame))?;
         let vertices = |s: &CornerSighting| Matrix2::from_columns(&s.vertex_px).transpose();
         let lengths = |s: &CornerSighting| Matrix2x3::from_row_slice(s.edges_px.as_flattened());
@@ -164,7 +164,7 @@ impl StereoSequence {
         frame: &Bound<'py, PyAny>,
         bearings: &Bound<'py, PyAny>,
     ) -> PyResult<Array<'py, f64>> {
-        let pose = self.inner.pose(self.frame(frame)?).map_err(|error| exception(&error))?;
+        let pose = self.inner.pose(frame_from(frame, self.__len__())?).map_err(|error| exception(&error))?;
         let (bearings, _) = convert::rows::<3>(bearings, "bearings")?;
         let world = world_of(self.scene.bind(py))?;
         let distance = |bearing: [f64; 3]| {
@@ -226,10 +226,6 @@ impl StereoSequence {
             let room = of_class::<Room>(scene).map(|room| room.options.clone());
             (room, of_class::<Laboratory>(scene).map(|laboratory| laboratory.options.clone()))
         })
-    }
-
-    fn frame(&self, frame: &Bound<'_, PyAny>) -> PyResult<usize> {
-        convert::whole(frame, "frame", &format!("a whole number below {}", self.inner.options().frames))
     }
 }
 

@@ -189,6 +189,11 @@ pub(crate) fn seed_from(seed: &Bound<'_, PyAny>) -> PyResult<u64> {
     convert::whole(seed, "seed", "a whole number from 0 to 2^64 - 1")
 }
 
+/// The number of one of so many frames; one that is too great is left to who asks for it.
+pub(crate) fn frame_from(frame: &Bound<'_, PyAny>, frames: usize) -> PyResult<usize> {
+    convert::whole(frame, "frame", &format!("a whole number below {frames}"))
+}
+
 /// As [`call_long`], on that many threads; without a number on one per core.
 pub(crate) fn call_on_threads<T: Send>(
     py: Python<'_>,
