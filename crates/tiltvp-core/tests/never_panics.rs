@@ -12,11 +12,13 @@ use nalgebra::{Matrix3, Rotation3, Vector3};
 use proptest::prelude::*;
 use scene::{Image, constant, fisheye, noise, random, shrunk, stripes};
 use tiltvp_core::camera::{Camera, Equidistant, Model};
+use tiltvp_core::corner::{CornerDetector, DetectorOptions};
 use tiltvp_core::edges::{EdgeOptions, Mask, NormalKind};
 use tiltvp_core::geometry::Tilt;
 use tiltvp_core::image::ImageView;
+use tiltvp_core::lines::{LineExtractor, LineOptions, Lines};
 use tiltvp_core::robust::{LocalOptimization, SampleOrder, Sampling, Score};
-use tiltvp_core::segments::SegmentOptions;
+use tiltvp_core::segments::{SegmentDetector, SegmentDetectorOptions, SegmentOptions, Segments};
 use tiltvp_core::testing::zoo;
 use tiltvp_core::tilt::{
     CommonDirectionOptions, Correction, ImageSpaceOptions, ImageSpaceRansacOptions, ImageSpaceRejectRefitOptions,
@@ -321,4 +323,46 @@ fn scratch_of_another_estimator_is_refused() {
     for same in [EdgeOptions::default(), strict] {
         assert!(own.estimate(&image.view(), &mut make(120, same).scratch()).is_ok());
     }
+}
+
+/// The left or the right half of an image of even width: as many pixels of a fisheye, elsewhere.
+fn half(side: usize, right: bool) -> Option<Mask> {
+    let usable = (0..side * side).map(|i| (i % side >= side / 2) == right).collect();
+    Some(Mask::new(side, side, usable).unwrap())
+}
+
+#[test]
+fn scratch_of_another_detector_or_extractor_is_refused() {
+    let camera = fisheye(120);
+    let image = noise(&camera, 1);
+    let smooth = EdgeOptions { smoothing_px: 2.0, ..EdgeOptions::default() };
+    let segments = |edges, mask| {
+        let options = SegmentDetectorOptions { edges, mask, ..SegmentDetectorOptions::default() };
+        SegmentDetector::new(camera.clone(), options).unwrap()
+    };
+    let [left, right] = [false, true].map(|right| half(120, right));
+    let own = segments(EdgeOptions::default(), left.clone());
+    for other in [segments(smooth, left.clone()), segments(EdgeOptions::default(), right.clone())] {
+        let refused = own.detect(&image.view(), &mut other.scratch(), &mut Segments::default());
+        assert!(refused.unwrap_err().to_string().starts_with("scratch"));
+    }
+    let lines = |method, edges, mask| {
+        let options = LineOptions { edges, mask, ..LineOptions::for_method(method).unwrap() };
+        LineExtractor::new(camera.clone(), Matrix3::identity(), options).unwrap()
+    };
+    let own = lines("great-circle", EdgeOptions::default(), left.clone());
+    let others = [
+        lines("great-circle", smooth, left.clone()),
+        lines("great-circle", EdgeOptions::default(), right),
+        lines("radial", EdgeOptions::default(), left),
+    ];
+    for other in others {
+        let refused = own.extract(&image.view(), None, None, &mut other.scratch(), &mut Lines::default());
+        assert!(refused.unwrap_err().to_string().starts_with("scratch"));
+    }
+    let corners =
+        |method| CornerDetector::new(camera.clone(), DetectorOptions::for_method(method).unwrap(), None).unwrap();
+    let refused =
+        corners("general").detect_general(&image.view(), None, &mut corners("coloured").scratch(), &mut Vec::new());
+    assert!(refused.unwrap_err().to_string().starts_with("scratch"));
 }

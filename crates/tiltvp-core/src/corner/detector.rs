@@ -132,7 +132,8 @@ impl CornerDetector {
     /// may be any, which all the same leaves the attitude of a corner with right angles but for the names of its edges.
     ///
     /// # Errors
-    /// [`Error::InvalidArgument`] if the image has another size than the camera's, or the detector is for coloured images.
+    /// [`Error::InvalidArgument`] if the image has another size than the camera's, the detector is for coloured images, or the
+    /// scratch is another detector's.
     pub fn detect_general(
         &self,
         image: &ImageView<'_>,
@@ -153,10 +154,11 @@ impl CornerDetector {
         out: &mut Vec<CornerFeature>,
     ) -> Result<()> {
         self.check((image.width(), image.height()))?;
-        let (CornerMethod::General(options), Some(detector), Some(memory)) =
-            (&self.options.method, &self.segments, &mut scratch.general)
-        else {
+        let (CornerMethod::General(options), Some(detector)) = (&self.options.method, &self.segments) else {
             return Err(Error::argument("method", self.options.method.name(), "general, for grey images"));
+        };
+        let Some(memory) = &mut scratch.general else {
+            return Err(Error::argument("scratch", "that of another detector", "one made by this detector"));
         };
         let (angle, least) = (IncludedAngle::exact(options.gamma_rad), options.vertical_max_rad.cos());
         // The vertical is the edge nearest to the prior, or to the image's columns where there is none.

@@ -1,6 +1,7 @@
 //! From pixels to edge elements to great circles.
 
 mod detect;
+mod extent;
 mod lift;
 mod options;
 mod prefilter;
@@ -8,6 +9,7 @@ mod region;
 mod ridge;
 
 pub use detect::{Detector, EdgePixels};
+pub(crate) use extent::Extent;
 pub use lift::{LiftTable, NormalKind};
 pub use options::{EdgeOptions, Mask};
 pub use prefilter::Prefilter;

@@ -43,7 +43,6 @@ pub struct LineScratch {
     great_circle: GreatCircleScratch,
     radial: RadialScratch,
     descriptor: DescriptorScratch,
-    region_pixels: usize,
 }
 
 impl LineExtractor {
@@ -111,12 +110,15 @@ impl LineExtractor {
             great_circle: GreatCircleScratch::default(),
             radial: RadialScratch::default(),
             descriptor: DescriptorScratch::default(),
-            region_pixels: self.tables.region.len(),
         }
     }
 
     fn check(&self, image: &ImageView<'_>, scratch: &LineScratch) -> Result<()> {
-        if scratch.region_pixels != self.tables.region.len() {
+        let serves = match &scratch.finder {
+            Some(work) => self.finder.is_some() && work.serves(&self.tables.region, &self.options.edges),
+            None => self.finder.is_none(),
+        };
+        if !serves {
             return Err(Error::argument("scratch", "that of another extractor", "one made by this extractor"));
         }
         let (width, height) = (self.tables.width, self.tables.height);

@@ -13,7 +13,7 @@ use super::options::{SegmentDetectorOptions, SegmentOptions};
 use super::pieces::split;
 use super::segment::{EdgePoint, Segment, Segments};
 use crate::camera::Camera;
-use crate::edges::{EdgeOptions, EdgePixels, Prefilter, Region, RidgeDetector, RidgePixels};
+use crate::edges::{EdgeOptions, EdgePixels, Extent, Prefilter, Region, RidgeDetector, RidgePixels};
 use crate::error::{Error, Result};
 use crate::image::ImageView;
 
@@ -37,6 +37,7 @@ pub(crate) struct LeastGradients {
 /// Memory for one thread.
 #[derive(Debug, Clone)]
 pub(crate) struct FinderScratch {
+    made_for: Extent,
     detector: RidgeDetector,
     pub(crate) ridge: RidgePixels,
     chains: Chains,
@@ -51,6 +52,13 @@ pub(crate) struct FinderScratch {
     toward: Vec<Vector3<f64>>,
     groups: Groups,
     cut: Vec<Range<usize>>,
+}
+
+impl FinderScratch {
+    /// Whether it is that of a finder of such a region.
+    pub(crate) fn serves(&self, region: &Region, edges: &EdgeOptions) -> bool {
+        self.made_for == Extent::new(region, edges)
+    }
 }
 
 impl SegmentFinder {
@@ -75,6 +83,7 @@ impl SegmentFinder {
     /// Memory for one thread.
     pub(crate) fn scratch(&self, region: &Region, edges: &EdgeOptions) -> FinderScratch {
         FinderScratch {
+            made_for: Extent::new(region, edges),
             detector: RidgeDetector::new(region, edges),
             ridge: RidgePixels::default(),
             chains: Chains::new(self.window),
@@ -104,8 +113,9 @@ impl SegmentFinder {
         scratch: &mut FinderScratch,
         out: &mut Segments,
     ) {
-        let FinderScratch { detector, ridge, chains, stack, located, lifted, points, pieces, toward, groups, cut } =
-            scratch;
+        let FinderScratch {
+            detector, ridge, chains, stack, located, lifted, points, pieces, toward, groups, cut, ..
+        } = scratch;
         let SegmentOptions { stray_max_px, rms_max_px, support_min_px, gap_max, .. } = self.options;
         let least = support_min_px as usize;
         detector.detect(image, region, gradients.each, prefilter, ridge);
@@ -193,7 +203,6 @@ pub struct SegmentDetector {
 #[derive(Debug, Clone)]
 pub struct SegmentScratch {
     finder: FinderScratch,
-    region_pixels: usize,
 }
 
 impl SegmentDetector {
@@ -222,10 +231,7 @@ impl SegmentDetector {
 
     /// Memory for one thread.
     pub fn scratch(&self) -> SegmentScratch {
-        SegmentScratch {
-            finder: self.finder.scratch(&self.region, &self.options.edges),
-            region_pixels: self.region.len(),
-        }
+        SegmentScratch { finder: self.finder.scratch(&self.region, &self.options.edges) }
     }
 
     /// Writes the straight edges of an image, the longest first. Allocates nothing once `scratch` and `out` have grown.
@@ -244,7 +250,7 @@ impl SegmentDetector {
         scratch: &mut SegmentScratch,
         out: &mut Segments,
     ) -> Result<()> {
-        if scratch.region_pixels != self.region.len() {
+        if !scratch.finder.serves(&self.region, &self.options.edges) {
             return Err(Error::argument("scratch", "that of another detector", "one made by this detector"));
         }
         let (width, height) = (self.camera.width() as usize, self.camera.height() as usize);

@@ -2,7 +2,7 @@
 
 use super::methods::segments::work::SegmentWork;
 use super::work::Work;
-use crate::edges::{Detector, EdgeOptions, EdgePixels, Region};
+use crate::edges::{Detector, EdgeOptions, EdgePixels, Extent, Region};
 
 /// The memory that one thread works in; estimates after the first allocate nothing.
 ///
@@ -17,24 +17,6 @@ pub struct Scratch {
     pub(super) work: Work,
     /// Of the method of straight edges, once it has been used.
     pub(super) segments: Option<Box<SegmentWork>>,
-}
-
-/// What an estimator's scratch depends on.
-#[derive(Debug, Clone, PartialEq)]
-struct Extent {
-    pixels: usize,
-    columns: std::ops::Range<usize>,
-    smoothing_px: f64,
-    first: (u16, u16),
-    last: (u16, u16),
-}
-
-impl Extent {
-    fn new(region: &Region, options: &EdgeOptions) -> Self {
-        let (pixels, last) = (region.len(), region.len().saturating_sub(1));
-        let (first, last) = (region.place(0), region.place(last));
-        Self { pixels, columns: region.columns(), smoothing_px: options.smoothing_px, first, last }
-    }
 }
 
 impl Scratch {
