@@ -611,8 +611,8 @@ class CornerDetector:
         Parameters
         ----------
         display_gamma
-            The exponent of the images' display curve, `level = light^(1 / gamma)`; 1 for linear images. The published
-            method takes levels as they are. Default: 2.2.
+            "coloured", "general": The exponent of the images' display curve, `level = light^(1 / gamma)`; 1 for linear
+            images. The published method takes levels as they are. Default: 2.2.
         chromaticity_min
             "coloured", "paper": Least share of the face's own primary in the sum of all three. Default: 0.45.
         intensity_min

@@ -151,10 +151,15 @@ options! {
     /// Options of a corner detector.
     pub struct DetectorOptions {
         /// The exponent of the images' display curve, `level = light^(1 / gamma)`; 1 for linear images. The published method takes levels as they are.
-        display_gamma: f64 = 2.2 => 0.5..=4.0, "an exponent from 0.5 to 4";
+        [where undoes_display, "it is one of method \"coloured\" and \"general\""] display_gamma: f64 = 2.2
+            => 0.5..=4.0, "an exponent from 0.5 to 4";
         /// The front end.
         [flat] method: CornerMethod = CornerMethod::Coloured(ColouredOptions::default());
     }
+}
+
+fn undoes_display(options: &DetectorOptions) -> bool {
+    !matches!(options.method, CornerMethod::Paper(_))
 }
 
 impl GeneralOptions {
