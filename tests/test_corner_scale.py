@@ -198,6 +198,23 @@ def test_a_grey_box_needs_no_names() -> None:
     assert all(one.vertex_m is None for one in unknown.hypotheses)
 
 
+def test_another_corner_is_another_object() -> None:
+    """Its number did not grow: what is followed has no place."""
+    rotation, vertex = pose()
+    places = [vertex, vertex, vertex + 0.25 * rotation[:, 0], vertex + 0.25 * rotation[:, 0]]
+    known = {"down": rotation[:, 1], "right_handed": True, "method": "general", "edge_length_m": SIZE_M}
+    estimator, names, objects = CornerPoseEstimator(CAMERA, **known), [], []
+    for place in places:
+        found = estimator(seen(rotation, place, GREYS))
+        names.append(found.corners[0].id)
+        objects.append(found.object)
+        estimator = pickle.loads(pickle.dumps(estimator))
+    assert names[0] is not None
+    assert names == [names[0], names[0], names[2], names[2]]
+    assert names[2] not in (None, names[0])
+    assert objects == [1, 1, 2, 2]
+
+
 def test_a_pose_does_not_tell_which_of_its_edges_is_upright() -> None:
     """Not in any frame, unless it was told in one; and it is told for as long as the box is followed."""
     rotation, vertex = pose()

@@ -86,7 +86,7 @@ class CornerResults:
 def _jumps(rows: Sequence[Mapping[str, Any]]) -> int:
     """In how many rows with a place the origin is not known to be that of the one before.
 
-    Names tell it. `object` does not, from one camera and where frames are looked at anew.
+    Names tell it. `object` does not where frames are looked at anew.
     """
     placed = [row for row in rows if row["x_m"] is not None]
     pairs = [[(one["id"], one["object"]) for one in pair] for pair in pairwise(placed)]

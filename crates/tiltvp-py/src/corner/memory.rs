@@ -12,8 +12,8 @@ use crate::convert;
 use crate::field::{Field, Value};
 
 /// Keys of the dict of what is kept.
-const KEYS: [&str; 9] =
-    ["pose", "corners_left", "corners_right", "age", "object", "others", "pace", "turned", "y_is_down"];
+const KEYS: [&str; 10] =
+    ["pose", "corners_left", "corners_right", "age", "object", "others", "pace", "turned", "y_is_down", "id"];
 
 /// Plain numbers and lists.
 pub(super) fn to_dict<'py>(py: Python<'py>, track: &Track) -> PyResult<Bound<'py, PyDict>> {
@@ -30,6 +30,7 @@ pub(super) fn to_dict<'py>(py: Python<'py>, track: &Track) -> PyResult<Bound<'py
     dict.set_item("pace", track.pace)?;
     track.turned.write(&dict, "turned")?;
     dict.set_item("y_is_down", track.y_is_down)?;
+    dict.set_item("id", track.id)?;
     Ok(dict)
 }
 
@@ -50,6 +51,7 @@ pub(super) fn from_dict(values: &Bound<'_, PyDict>) -> PyResult<Track> {
         pace: convert::item(values, "pace", "a share of the distance")?,
         turned: <Option<Matrix3<f64>> as Field>::take(values, "turned")?,
         y_is_down: convert::item(values, "y_is_down", "whether the upright axis points down, or None")?,
+        id: convert::item(values, "id", "a whole number, or None")?,
     })
 }
 

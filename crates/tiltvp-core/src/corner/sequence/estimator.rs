@@ -160,6 +160,7 @@ impl CornerPoseEstimator {
         self.place_by_scale(left, &mut estimate);
         estimate.corners = self.believed(frames, &estimate, seen);
         self.name(&mut estimate.corners);
+        self.count_by_name(&mut estimate);
         Ok(estimate)
     }
 
@@ -247,10 +248,10 @@ impl CornerPoseEstimator {
         };
         let corners = [parallel(0, pose.camera_from_object), parallel(1, turned * pose.camera_from_object)];
         let others: Vec<Hypothesis> = seen.iter().map(|pair| pair.poses[0]).collect();
-        let down = self.told_down();
+        let (down, id) = (self.told_down(), self.track.as_ref().and_then(|track| track.id));
         let next = Track::next(self.track.take(), &pose, corners, estimate.object, &others);
         let y_is_down = down.map(|down| down.dot(&pose.camera_from_object.column(1)) > 0.0);
-        self.track = Some(Track { y_is_down, ..next });
+        self.track = Some(Track { y_is_down, id, ..next });
     }
 
     /// Gives the corners of a frame their names. The coloured cuboid is known by its colours.
@@ -260,6 +261,17 @@ impl CornerPoseEstimator {
         }
         for corner in corners {
             corner.id = Some(1);
+        }
+    }
+
+    /// Counts the object of one camera where its name is another than before: the pose is followed before it has a place.
+    fn count_by_name(&mut self, estimate: &mut CornerEstimate) {
+        if let (None, Some(track), Some(id)) =
+            (&self.right, &mut self.track, estimate.corners.first().and_then(|corner| corner.id))
+            && track.id.replace(id).is_some_and(|before| before != id)
+        {
+            self.objects += 1;
+            (estimate.object, track.object) = (self.objects, self.objects);
         }
     }
 

@@ -72,6 +72,8 @@ pub struct Track {
     pub turned: Option<Matrix3<f64>>,
     /// Whether the upright axis of the pose points down, where it was ever told which way is down.
     pub y_is_down: Option<bool>,
+    /// The name of the corner that is the object, where one camera knows it.
+    pub id: Option<u32>,
 }
 
 impl Track {
@@ -147,7 +149,8 @@ impl Track {
             others.sort_by_key(|other| std::cmp::Reverse(other.seen));
             others.truncate(OTHERS_MAX);
         }
-        Self { pose: *pose, corners, age: 0, object, others, pace, turned: Some(Matrix3::zeros()), y_is_down: None }
+        let (turned, y_is_down, id) = (Some(Matrix3::zeros()), None, None);
+        Self { pose: *pose, corners, age: 0, object, others, pace, turned, y_is_down, id }
     }
 
     /// The other corners as seen from the one that a pose is of, which may be one of them.
