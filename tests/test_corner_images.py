@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 import json
+import math
 import pickle
 from pathlib import Path
 
@@ -194,6 +195,18 @@ def test_a_right_angle_in_few_digits_is_one(gamma_rad: float) -> None:
     assert CornerPoseEstimator(CornerDetector(CAMERA, method="general"), gamma_rad=gamma_rad) == right
     other = CornerPoseEstimator(CAMERA, method="general", gamma_rad=1.568)
     assert other.options["gamma_rad"] == other.left.options["gamma_rad"] == 1.568
+
+
+@pytest.mark.parametrize("told_deg", [80.0, 110.0])
+def test_a_corner_whose_angle_is_not_the_one_told_is_none(told_deg: float) -> None:
+    """That of two images: of a right-angled one poses by these angles were 80 degrees off, and sure."""
+    (rotation, vertex), gamma_rad = pose(), math.radians(told_deg)
+    such = np.column_stack([*np.eye(3)[:2], (math.cos(gamma_rad), 0.0, math.sin(gamma_rad))])
+    for edges, reason in ((such, ""), (np.eye(3), "no corner that fits")):
+        images = [drawn(rotation @ edges, vertex - side, GREYS) for side in (np.zeros(3), LEFT_FROM_RIGHT[:3, 3])]
+        estimator = CornerPoseEstimator(CAMERA, CAMERA, LEFT_FROM_RIGHT, method="general", gamma_rad=gamma_rad)
+        found = estimator(*images)
+        assert ((found.pose is not None), found.reason) == (not reason, reason)
 
 
 def test_estimates_are_kept() -> None:

@@ -1,6 +1,6 @@
 //! Poses from pairs of corners, one of each image.
 
-use std::f64::consts::SQRT_2;
+use std::f64::consts::{FRAC_PI_2, SQRT_2};
 
 use nalgebra::{Matrix3, Vector3};
 
@@ -32,6 +32,13 @@ const DOUBLE_SIGMA: f64 = 0.5;
 /// a few millimetres beside them. Without it 7.6 % of the places in rooms of seeds 10600 to 10629 have an NEES above 22.5, with it 1.8 %; with
 /// 0.2 and 0.4 pixels 1.8 and 1.3 %.
 const VERTEX_SIGMA_PX: f64 = 0.3;
+
+/// The standard deviation of an included angle of which nothing is known, radians.
+const ANY_ANGLE_RAD: f64 = 1.0;
+
+/// How far the included angle that rays tell may be from that of the options, in standard deviations: one in 100 of those that are right
+/// is farther off.
+const ANGLE_OFF_SIGMAS: f64 = 2.6;
 
 /// The least probability of a hypothesis that is returned.
 const PROBABILITY_MIN: f64 = 1e-9;
@@ -72,6 +79,9 @@ impl CornerPoseEstimator {
                 let Some(mut fused) = fuse_rays(&cameras, &self.options.angle, side, &start, &vertex.point_m) else {
                     continue;
                 };
+                if self.is_of_another_angle(&cameras, side, &fused) {
+                    continue;
+                }
                 let mut misfit = (fused.chi_square / FREEDOM_ALONE).sqrt();
                 // Covariances do not include edges that do not quite meet, or belong to more than one object.
                 let mut inflation = if self.is_one_object() { 1.0 } else { (misfit * misfit).max(1.0) };
@@ -122,6 +132,24 @@ impl CornerPoseEstimator {
             ..pose
         };
         Ok(found.into_iter().map(named).filter(|pose| pose.probability >= PROBABILITY_MIN).collect())
+    }
+
+    /// Whether the rays of both images contradict the included angle: they fit any other far better, or better a right one, which
+    /// corners of rooms have.
+    fn is_of_another_angle(&self, cameras: &[(&CornerFeature, RigidMotion)], side: f64, pose: &FusedPose) -> bool {
+        let told = self.options.angle;
+        let with = |angle: &IncludedAngle| {
+            let fused = fuse_rays(cameras, angle, side, &pose.rig_from_object, &pose.vertex_m);
+            fused.map_or(f64::INFINITY, |fused| fused.chi_square)
+        };
+        let far_better = |any: f64| {
+            let scatter = (any / (FREEDOM_ALONE - 1.0)).max(1.0);
+            pose.chi_square - any > ANGLE_OFF_SIGMAS.powi(2) * scatter
+        };
+        let may_be_right = (FRAC_PI_2 - told.gamma_rad).abs() <= ANGLE_OFF_SIGMAS * told.sigma_rad;
+        told != IncludedAngle::RIGHT
+            && (far_better(with(&IncludedAngle { sigma_rad: ANY_ANGLE_RAD, ..told }))
+                || (!may_be_right && with(&IncludedAngle::RIGHT) < pose.chi_square))
     }
 
     /// How far a place may be across the line of sight without its rays telling, square metres. Where edges are double the place is known
