@@ -29,10 +29,12 @@ impl FittedRay {
     /// The weighted fit to unit bearings with the standard deviation of each across the ray, radians; `toward` is a bearing
     /// near the far end, which is moved onto the circle.
     ///
-    /// `None` where no great circle fits (see [`fit_great_circle`]) or `toward` is its pole.
+    /// `None` where no great circle fits (see [`fit_great_circle`]), `toward` is its pole, or there are not as many standard
+    /// deviations as bearings.
     pub fn fit(bearings: &[Vector3<f64>], sigma_rad: &[f64], toward: &Vector3<f64>) -> Option<Self> {
         let weighted = bearings.iter().zip(sigma_rad).map(|(bearing, sigma)| (*bearing, sigma.powi(-2)));
-        Self::from_fit(&fit_great_circle(weighted)?, toward, bearings.len().min(sigma_rad.len()))
+        let fit = fit_great_circle(weighted).filter(|_| bearings.len() == sigma_rad.len())?;
+        Self::from_fit(&fit, toward, bearings.len())
     }
 
     /// The fit to pixels whose places have the standard deviation `sigma_px` in every direction, through a camera; pixels
@@ -102,6 +104,14 @@ impl FittedRay {
 mod tests {
     use super::*;
     use proptest::prelude::*;
+
+    #[test]
+    fn each_bearing_has_a_standard_deviation() {
+        let bearings = [0.0, 0.1, 0.2].map(|x: f64| Vector3::new(x, 0.0, 1.0).normalize());
+        let fit = |sigmas_rad: &[f64]| FittedRay::fit(&bearings, sigmas_rad, &bearings[2]);
+        assert_eq!(fit(&[1e-3; 3]).unwrap().support, 3);
+        assert!(fit(&[1e-3; 2]).is_none() && fit(&[1e-3; 4]).is_none());
+    }
 
     #[test]
     fn covariances_are_judged_whatever_their_unit() {
