@@ -138,7 +138,7 @@ fn check(
             let expected = format!("one for each of {} steps", readings.len());
             Err(Error::argument("times_s", format!("{} times", times.len()), expected))
         }
-        Some(times) => match times.windows(2).position(|t| !(t[1] >= t[0] && t[1].is_finite())) {
+        Some(times) => match times.windows(2).position(|t| !(t[1] >= t[0] && t.iter().all(|t| t.is_finite()))) {
             Some(i) => Err(Error::argument("times_s", format!("{} after {}", times[i + 1], times[i]), "growing times")),
             None => Ok(()),
         },
@@ -160,6 +160,18 @@ mod tests {
         };
         assert!(log(MOST_LANDMARKS).is_ok());
         assert!(log(MOST_LANDMARKS + 1).is_err());
+    }
+
+    #[test]
+    fn times_are_finite_and_grow() {
+        let (readings, bearing) =
+            ([WheelMotion::default(); 3], |step| LogBearing { step, landmark: 7, bearing_rad: 0.1 });
+        let log = |times_s: [f64; 3]| check(&LogOptions::default(), &readings, Some(&times_s), &[0, 1].map(bearing));
+        assert!(log([0.0, 1.0, 1.0]).is_ok());
+        for times_s in [[f64::NEG_INFINITY, 0.0, 1.0], [0.0, f64::NAN, 1.0], [0.0, 1.0, f64::INFINITY], [1.0, 0.0, 2.0]]
+        {
+            assert!(log(times_s).is_err(), "{times_s:?}");
+        }
     }
 
     #[test]
