@@ -326,9 +326,9 @@ fn scratch_of_another_estimator_is_refused() {
 }
 
 /// The left or the right half of an image of even width: as many pixels of a fisheye, elsewhere.
-fn half(side: usize, right: bool) -> Option<Mask> {
+fn half(side: usize, right: bool) -> Mask {
     let usable = (0..side * side).map(|i| (i % side >= side / 2) == right).collect();
-    Some(Mask::new(side, side, usable).unwrap())
+    Mask::new(side, side, usable).unwrap()
 }
 
 #[test]
@@ -340,7 +340,7 @@ fn scratch_of_another_detector_or_extractor_is_refused() {
         let options = SegmentDetectorOptions { edges, mask, ..SegmentDetectorOptions::default() };
         SegmentDetector::new(camera.clone(), options).unwrap()
     };
-    let [left, right] = [false, true].map(|right| half(120, right));
+    let [left, right] = [false, true].map(|right| Some(half(120, right)));
     let own = segments(EdgeOptions::default(), left.clone());
     for other in [segments(smooth, left.clone()), segments(EdgeOptions::default(), right.clone())] {
         let refused = own.detect(&image.view(), &mut other.scratch(), &mut Segments::default());
@@ -365,4 +365,20 @@ fn scratch_of_another_detector_or_extractor_is_refused() {
     let refused =
         corners("general").detect_general(&image.view(), None, &mut corners("coloured").scratch(), &mut Vec::new());
     assert!(refused.unwrap_err().to_string().starts_with("scratch"));
+}
+
+#[test]
+fn a_lean_of_no_angles_has_no_lines() {
+    let extractor =
+        LineExtractor::new(fisheye(120), Matrix3::identity(), LineOptions::for_method("great-circle").unwrap())
+            .unwrap();
+    let (image, mut scratch) = (noise(extractor.camera(), 1), extractor.scratch());
+    for alpha_rad in [f64::NAN, f64::INFINITY] {
+        let tilt = Tilt::from_alpha_beta(alpha_rad, 0.2);
+        let refused = extractor.extract(&image.view(), Some(&tilt), None, &mut scratch, &mut Lines::default());
+        assert!(refused.unwrap_err().to_string().starts_with("tilt"));
+        let lines = extractor.lines_at(&[0.5], Some(&tilt));
+        let refused = extractor.describe(&image.view(), &lines, &mut scratch, &mut Vec::new());
+        assert!(refused.unwrap_err().to_string().starts_with("lines"));
+    }
 }

@@ -146,6 +146,7 @@ fn images_that_say_nothing_are_left_out() {
     assert_eq!(unsure, Verdict::LowConfidence { confidence: 0.49, limit: 0.5 });
     assert!(unsure.to_string().contains("0.490") && unsure.to_string().contains("0.500"));
     assert!(!filter.update(&image(Some(Tilt::UPRIGHT), 0.01, f64::NAN)).accepted());
+    assert!(!filter.update(&image(Some(Tilt::from_alpha_beta(f64::NAN, 0.0)), 0.01, 0.99)).accepted());
     assert_eq!(filter, before);
     assert!(filter.update(&image(Some(Tilt::UPRIGHT), 0.01, 0.51)).accepted());
 }

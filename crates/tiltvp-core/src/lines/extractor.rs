@@ -134,8 +134,8 @@ impl LineExtractor {
     /// radial variant has neither.
     ///
     /// # Errors
-    /// [`Error::InvalidArgument`] if the image has another size than the camera's, the scratch is another extractor's, or the
-    /// standard deviation is not an angle above 0.
+    /// [`Error::InvalidArgument`] if the image has another size than the camera's, the scratch is another extractor's, the tilt
+    /// is of no finite angles, or the standard deviation is not an angle above 0.
     pub fn extract(
         &self,
         image: &ImageView<'_>,
@@ -147,6 +147,9 @@ impl LineExtractor {
         self.check(image, scratch)?;
         if let Some(sigma) = tilt_sigma_rad.filter(|sigma| !(sigma.is_finite() && *sigma > 0.0)) {
             return Err(Error::argument("tilt_sigma_rad", sigma, "an angle above 0"));
+        }
+        if tilt.is_some_and(|tilt| Tilt::from_normal(&tilt.normal()).is_none()) {
+            return Err(Error::argument("tilt", "angles that are not finite", "a lean"));
         }
         let edges = &self.options.edges;
         let LineScratch { finder: work, segments, great_circle, radial, .. } = scratch;
@@ -197,6 +200,9 @@ impl LineExtractor {
     }
 
     fn check_frame(&self, frame: &LineFrame) -> Result<()> {
+        if Tilt::from_normal(&frame.normal).is_none() {
+            return Err(Error::argument("lines", format!("a ground normal of {:?}", frame.normal), "a finite one"));
+        }
         if frame.center_px.is_some() == self.radii.is_some() {
             return Ok(());
         }
@@ -208,7 +214,7 @@ impl LineExtractor {
     ///
     /// # Errors
     /// [`Error::InvalidArgument`] if the image has another size than the camera's, the scratch is another extractor's, or the
-    /// lines are of the other method.
+    /// lines are of the other method or of no ground normal.
     pub fn describe(
         &self,
         image: &ImageView<'_>,

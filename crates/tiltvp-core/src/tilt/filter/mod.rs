@@ -148,9 +148,9 @@ impl TiltFilter {
         self.update_tilt(estimate.tilt, &estimate.covariance_rad2, estimate.confidence)
     }
 
-    /// [`update`](Self::update) by what it looks at: the tilt, its covariance and its confidence.
+    /// [`update`](Self::update) by what it looks at: the tilt, its covariance and its confidence. One of no finite angles is none.
     pub fn update_tilt(&mut self, tilt: Option<Tilt>, covariance_rad2: &Matrix2<f64>, confidence: f64) -> Verdict {
-        match tilt {
+        match tilt.and_then(|tilt| Tilt::from_normal(&tilt.normal())) {
             Some(tilt) if is_of_angles(covariance_rad2) => self.fuse(tilt.normal(), covariance_rad2, confidence),
             _ => Verdict::NoTilt,
         }
