@@ -179,7 +179,7 @@ enum TiltvpStatus tiltvp_self_calibrator_step(const struct TiltvpSelfCalibrator 
                                               size_t count,
                                               struct TiltvpCalibrationStep *step);
 
-// Looks for what the drive so far contradicts and which assumption is likely wrong; estimates then say so. It costs some ten
+// Looks for what the drive so far contradicts and which assumption is likely wrong; estimates then say so. It costs some twenty
 // solutions of the window: call it before an estimate that decides something, not after every step.
 enum TiltvpStatus tiltvp_self_calibrator_examine(const struct TiltvpSelfCalibrator *calibrator);
 

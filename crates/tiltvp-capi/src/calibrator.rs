@@ -113,7 +113,7 @@ pub unsafe extern "C" fn tiltvp_self_calibrator_step(
     })
 }
 
-/// Looks for what the drive so far contradicts and which assumption is likely wrong; estimates then say so. It costs some ten
+/// Looks for what the drive so far contradicts and which assumption is likely wrong; estimates then say so. It costs some twenty
 /// solutions of the window: call it before an estimate that decides something, not after every step.
 #[unsafe(no_mangle)]
 pub extern "C" fn tiltvp_self_calibrator_examine(calibrator: Option<&SelfCalibrator>) -> Status {
