@@ -1,6 +1,6 @@
 //! Corners: where one upright and two level edges of a world meet, the truth behind corner features.
 
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::Vector3;
 
 use crate::plan::Plan;
 
@@ -63,12 +63,6 @@ impl Corner {
     /// The angle between the two level edges, radians.
     pub fn gamma_rad(&self) -> f64 {
         tiltvp_core::geometry::angle_between(&self.edges[0], &self.edges[2])
-    }
-
-    /// The rotation from the object's frame: its `y` along the upright edge, `x` along the edge `x`, `z = x` cross `y`.
-    pub fn world_from_object(&self) -> Matrix3<f64> {
-        let [x, y, _] = self.edges;
-        Matrix3::from_columns(&[x, y, x.cross(&y)])
     }
 
     /// Whether its edges are long enough to be looked at.
