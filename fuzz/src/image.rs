@@ -2,6 +2,7 @@
 
 use std::cell::RefCell;
 use std::collections::HashMap;
+use std::sync::Arc;
 
 use nalgebra::{Matrix3, Vector3};
 use tiltvp_core::camera::Camera;
@@ -10,7 +11,7 @@ use tiltvp_core::filter::positive_semidefinite;
 use tiltvp_core::geometry::Tilt;
 use tiltvp_core::image::{ColorView, ImageView, LightTable};
 use tiltvp_core::lines::{LineExtractor, LineMethod, LineOptions, LineScratch, Lines};
-use tiltvp_core::tilt::{Leveller, METHODS, Scratch, TiltEstimate, TiltEstimator, TiltOptions};
+use tiltvp_core::tilt::{LevelMap, Leveller, METHODS, Scratch, TiltEstimate, TiltEstimator, TiltOptions};
 
 use crate::bytes::Bytes;
 use crate::picture::{Picture, SMALL};
@@ -47,14 +48,8 @@ pub fn image(data: &[u8]) {
             }
             Looker::Corners(detector, scratch) => corners(detector, scratch, &mut bytes),
             Looker::Level(leveller) => {
-                let channels = if bytes.flag() { 3 } else { 1 };
-                let picture = Picture::of(camera, channels, &mut bytes);
                 let tilt = Tilt::from_alpha_beta(bytes.mostly(0.0, 0.5), bytes.mostly(-3.2, 3.2));
-                let packed = picture.packed();
-                let level = leveller.level(&packed, channels, &tilt).expect("an image of the camera");
-                assert_eq!(level.len(), leveller.width() * leveller.height() * channels);
-                let cut = bytes.below(packed.len().min(200)) + 1;
-                assert!(leveller.level(&packed[cut..], channels, &tilt).is_err(), "an image that ends too early");
+                level(&leveller.map(&tilt), leveller.camera());
             }
         }
     });
@@ -65,7 +60,7 @@ enum Looker {
     Tilt(Box<TiltEstimator>, Scratch),
     Lines(Box<LineExtractor>, LineScratch),
     Corners(Box<CornerDetector>, CornerScratch),
-    Level(Box<Leveller>),
+    Level(Arc<Leveller>),
 }
 
 /// How many look at the pictures of one camera.
@@ -103,6 +98,20 @@ fn looker(camera: &Camera, kind: usize) -> Option<Looker> {
         return Some(Looker::Corners(detector.into(), scratch));
     }
     Leveller::new(camera.clone(), &upright, camera, &upright).ok().map(|leveller| Looker::Level(leveller.into()))
+}
+
+/// A map whose places are of the camera's pixels, or of none, where it says that something is seen.
+fn level(map: &LevelMap, camera: &Camera) {
+    let last = [camera.width(), camera.height()].map(|side| (side - 1) as f32);
+    for (number, first) in (0..map.height()).step_by(map.strip_rows()).enumerate() {
+        let pixels = map.strip_rows().min(map.height() - first) * map.width();
+        let (mut u, mut v) = (vec![f32::NAN; pixels], vec![f32::NAN; pixels]);
+        let seen = map.write_strip(number, [&mut u, &mut v], -1.0);
+        for (place, (u, v)) in u.into_iter().zip(v).enumerate().filter(|(at, _)| seen.contains(&(at % map.width()))) {
+            let is_place = (0.0..=last[0]).contains(&u) && (0.0..=last[1]).contains(&v);
+            assert!(is_place || (u, v) == (-1.0, -1.0), "({u}, {v}) at {place} of strip {number} of {camera:?}");
+        }
+    }
 }
 
 /// Any bytes as an image of any size.

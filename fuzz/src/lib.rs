@@ -15,8 +15,13 @@
 //! numbers of executions. Checks that take as long as what they check are left to some of the executions, which a byte chooses.
 //! What is kept has served other inputs: where an input alone does not show a finding again, the folder of all does.
 
+#![allow(clippy::expect_used, clippy::missing_panics_doc, reason = "a panic is a finding")]
+#![allow(clippy::large_enum_variant, clippy::type_complexity, reason = "what is kept is made once")]
+
 mod bytes;
 mod corner;
+#[cfg(test)]
+mod corpus;
 mod image;
 mod lens;
 mod options;

@@ -30,7 +30,7 @@ static KEPT: LazyLock<Vec<Vec<u8>>> = LazyLock::new(|| {
                 kept.push(postcard::to_stdvec(&calibrator).expect("bytes"));
             }
             let turn = f64::from(k) * 0.05;
-            let motion = WheelMotion { left_m: 0.04, right_m: 0.06, ..WheelMotion::default() };
+            let motion = WheelMotion { left_m: 0.04, right_m: 0.06 };
             calibrator.step(&motion, &[1, 2, 3], &[0.1 - turn, 1.2 - turn, -2.0 - turn]).expect("a step");
         }
     }
@@ -57,8 +57,7 @@ pub fn calibrator(data: &[u8]) {
     let read = postcard::from_bytes::<SelfCalibrator>(&kept).ok();
     let Some(mut calibrator) = read.filter(SelfCalibrator::is_well_formed) else { return };
     for _ in 0..bytes.byte() % 4 {
-        let motion =
-            WheelMotion { left_m: bytes.mostly(-0.2, 0.2), right_m: bytes.mostly(-0.2, 0.2), ..WheelMotion::default() };
+        let motion = WheelMotion { left_m: bytes.mostly(-0.2, 0.2), right_m: bytes.mostly(-0.2, 0.2) };
         let landmarks: Vec<u64> = (0..bytes.byte() % 5).map(|_| bytes.byte().into()).collect();
         let bearings: Vec<f64> = landmarks.iter().map(|_| bytes.mostly(-3.2, 3.2)).collect();
         let before = calibrator.clone();
@@ -150,7 +149,7 @@ fn tracker(bytes: &mut Bytes<'_>) {
     }
     let Ok(mut tracker) = LineTracker::with_state(TrackerOptions::default(), state) else { return };
     let mut out = Vec::new();
-    for _ in 0..1 + bytes.byte() % 3 {
+    for _ in 0..=bytes.byte() % 3 {
         let mut lines = Lines::default();
         for _ in 0..bytes.byte() % 5 {
             lines.lines.push(Line {
