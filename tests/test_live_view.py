@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import socket
 import sys
 from collections import Counter
 from collections.abc import Callable
@@ -240,13 +241,22 @@ def test_corner_poses_in_rerun(run: Run, tmp_path: Path) -> None:
 
 def test_without_rerun_and_wrong_words(run: Run, world: Path, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     words = ("tilt", world / "images", "--camera", world / "camera.toml")
-    spawned: list[Any] = []
-    monkeypatch.setattr("rerun.RecordingStream.spawn", lambda stream: spawned.append(stream))
-    run(*words, "--rerun")
-    assert len(spawned) == 1
-    code, _, complaints = run(*words, "--rerun=answers.csv")
-    assert code == 2
-    assert "--rerun answers.csv: ends in '.csv', expected .rrd or viewer" in complaints
+    spawned: list[int] = []
+    monkeypatch.setattr("rerun.RecordingStream.spawn", lambda _, port: spawned.append(port))
+    with socket.create_server(("127.0.0.1", 0)) as listening:
+        monkeypatch.setattr("tiltvp.streams.outputs.viewer._PORT", listening.getsockname()[1])
+        for order in ((*words, "--rerun"), (words[0], "--rerun", *words[1:]), (*words, "--rerun", "viewer")):
+            # One of the images is broken.
+            assert run(*order)[0] == 1
+    assert len(spawned) == 3
+    # Without a screen the viewer that was begun has ended already.
+    code, _, complaints = run(*words, "--rerun")
+    assert (code, complaints.count("\n")) == (1, 1)
+    assert "the viewer of Rerun cannot be begun" in complaints
+    for wrong in (["--rerun=answers.csv"], ["--rerun", "answers.csv"]):
+        code, _, complaints = run(*words, *wrong)
+        assert code == 2
+        assert "--rerun answers.csv: ends in '.csv', expected .rrd or viewer" in complaints
     monkeypatch.setitem(sys.modules, "rerun", None)
     code, _, complaints = run(*words, "--rerun", tmp_path / "a.rrd")
     assert code == 1

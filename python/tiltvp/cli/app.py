@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import glob
 import os
 import sys
 from collections.abc import Sequence
@@ -58,7 +59,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
             # A word that begins so is taken for an option, which its name would be looked for among.
             words[place] = STDIN
     for place in [place for place, word in enumerate(words) if word == RERUN]:
-        if not "".join(words[place + 1 : place + 2]).lower().endswith(".rrd"):
+        following = "".join(words[place + 1 : place + 2])
+        if following.startswith("-") or (_is_there(following) and not following.lower().endswith(".rrd")):
             # Without a file it is the viewer that is meant; an option takes a word, or none, not both.
             words[place] = f"{RERUN}={VIEWER}"
     try:
@@ -87,6 +89,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
         if not isinstance(error, BrokenPipeError):
             complain(f"{error.filename or 'the output'}: {error.strerror or error}")
         return SOME_FAILED
+
+
+def _is_there(word: str) -> bool:
+    """Whether a word is a source that can be read, or none at all."""
+    return not word or os.path.lexists(word) or bool(glob.glob(word, recursive=True))
 
 
 def _takes_a_word(option: str, words: Sequence[str]) -> bool:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import socket
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -23,6 +24,10 @@ _ENDING: Final = ".rrd"
 _END: Final = b"RRF2FOOT"
 _END_BYTES: Final = 64
 """The mark of a recording's end, which is written last, and in how many last bytes it is."""
+_PORT: Final = 9876
+"""Where the viewer listens, as Rerun has it."""
+_ANSWER_S: Final = 5.0
+"""Seconds for its answer, as many as Rerun waits for a viewer that begins."""
 _SINCE_1970_S: Final = 1e9
 """Times from here on (the year 2001) are taken for seconds since 1970, smaller ones for those of a clock of its own."""
 
@@ -59,7 +64,9 @@ def open_viewer(where: str | os.PathLike[str], name: str = "tiltvp") -> Iterator
     try:
         if where == VIEWER:
             try:
-                stream.spawn()
+                stream.spawn(port=_PORT)
+                # One that finds no screen ends at once, which Rerun tells in its log alone.
+                socket.create_connection(("127.0.0.1", _PORT), _ANSWER_S).close()
             except (RuntimeError, OSError) as error:
                 raise OutputError(f"the viewer of Rerun cannot be begun ({error}), expected a file in .rrd") from None
             yield Viewer(stream)
