@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+import subprocess
+import sys
 from itertools import pairwise
 from pathlib import Path
 
@@ -163,6 +165,31 @@ def small() -> PlanarPoseExperiment:
     )
     kinds = ("living-room", "corridor")
     return PlanarPoseExperiment(rooms=2, kinds=kinds, places=2, tilts_deg=(0.0, 5.0), camera=camera)
+
+
+def test_what_is_interrupted_begins_nothing_more(small: PlanarPoseExperiment) -> None:
+    """Rooms that others work on went on to their end, for minutes."""
+    steps = iter(range(100))
+
+    def advance() -> None:
+        if next(steps) == 0:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        measure_planar_pose(small, threads=2, advance=advance)
+    assert next(steps) <= 2
+
+
+def test_ctrl_c_is_heard_while_others_work() -> None:
+    """Polars has a wait for another thread go on after an interrupt."""
+    script = (
+        "import os, signal, sys, threading, time\nimport polars\nfrom tiltvp.lab.datasets.new import in_order\n"
+        "stop = threading.Event()\n"
+        "threading.Timer(0.5, os.kill, (os.getpid(), signal.SIGINT)).start()\nbegun = time.monotonic()\n"
+        "try:\n    with in_order(lambda job: stop.wait(20.0), [0], 1, stop) as done:\n        list(done)\n"
+        "except KeyboardInterrupt:\n    sys.exit(time.monotonic() - begun > 10.0)\n"
+    )
+    assert subprocess.run([sys.executable, "-c", script], check=False).returncode == 0
 
 
 @pytest.fixture(scope="module")

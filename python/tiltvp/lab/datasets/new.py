@@ -6,8 +6,9 @@ import csv
 import io
 import math
 import os
+from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import Future, ThreadPoolExecutor, wait
 from contextlib import contextmanager
 from pathlib import Path
 from threading import Event
@@ -32,6 +33,8 @@ __all__ = ["NewDataset", "in_order", "new_dataset", "new_folder"]
 
 _CAMERA: Final = "camera.toml"
 _IMAGES: Final = "images"
+_HEARS_S: Final = 0.2
+"""After which a wait looks for Ctrl-C: half of what an interrupt may take."""
 
 Job = TypeVar("Job")
 Result = TypeVar("Result")
@@ -121,10 +124,20 @@ def in_order(
         raise InvalidInputError(f"threads = {threads}, expected 1 or more")
     pool = ThreadPoolExecutor(min(threads, max(1, len(jobs))))
     try:
-        yield pool.map(work, jobs)
+        yield _results(deque(pool.submit(work, job) for job in jobs))
     finally:
         stop.set()
         pool.shutdown(wait=True, cancel_futures=True)
+
+
+def _results(waiting: deque[Future[Result]]) -> Iterator[Result]:
+    """What comes of each, and is not kept. A wait without end hears of no Ctrl-C once Polars, whose handler has waits
+    go on, is imported."""
+    while waiting:
+        future = waiting.popleft()
+        while not wait((future,), _HEARS_S).done:
+            pass
+        yield future.result()
 
 
 def _refuse_taken(target: Path, force: bool) -> None:

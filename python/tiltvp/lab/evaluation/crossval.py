@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
+from threading import Event
 from typing import TYPE_CHECKING, Final, TypeAlias
 
 import numpy as np
@@ -19,6 +19,7 @@ from tiltvp._core import (
     train_posterior,
 )
 from tiltvp.errors import InvalidInputError
+from tiltvp.lab.datasets.new import in_order
 from tiltvp.lab.evaluation.combinations import PAPER_METHODS
 from tiltvp.lab.evaluation.metrics import offset_rad, turned
 from tiltvp.lab.evaluation.schema import COLUMNS, sorted_rows
@@ -55,13 +56,10 @@ def cross_validated(rows: pl.DataFrame, *, threads: int = 1, advance: Callable[[
         return [_corrected(part, kind) for kind in TRAINED] if trainable else []
 
     tables = [rows]
-    pool = ThreadPoolExecutor(threads)
-    try:
-        for more in pool.map(corrected, rows.partition_by("combination", maintain_order=True)):
+    with in_order(corrected, rows.partition_by("combination", maintain_order=True), threads, Event()) as found:
+        for more in found:
             tables.extend(more)
             advance()
-    finally:
-        pool.shutdown(cancel_futures=True)
     return sorted_rows(pl.concat(tables))
 
 

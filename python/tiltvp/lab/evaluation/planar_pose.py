@@ -9,14 +9,16 @@ from __future__ import annotations
 import itertools
 import os
 from collections.abc import Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import CancelledError
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, TypeVar
+from threading import Event
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import polars as pl
 
 from tiltvp.errors import InvalidInputError
+from tiltvp.lab.datasets.new import in_order
 from tiltvp.lab.datasets.panoramas import paper_camera
 from tiltvp.lab.evaluation.planar.panorama import PanoramaGrid
 from tiltvp.lab.evaluation.planar.warping import MinWarping, bearing_and_orientation
@@ -35,7 +37,6 @@ CORRECTIONS: tuple[str, ...] = ("none", "reject-refit, trained a", "reject-refit
 """By what panoramas are made level: the paper's image-space method is there with the factor of eqs. 30 and 31,
 trained on all other rooms, and with the closed-form gain. An image without an estimate is left as it is."""
 
-Result = TypeVar("Result")
 
 KINDS: tuple[str, ...] = tuple(kind for kind in ROOM_KINDS if kind != "under-table")
 """Under a table the world looks much the same after half a turn: upright min-warping takes one for the other in a
@@ -116,19 +117,20 @@ def measure_planar_pose(
     Errors are the angles between true and estimated directions. `threads` (None: one per core) share the rooms; the
     table does not depend on them. All images are in memory at once, 0.3 MB each at the default size.
     """
-    with ThreadPoolExecutor(threads or os.cpu_count() or 1) as pool:
+    stop, rooms, at_once = Event(), range(experiment.rooms), threads or os.cpu_count() or 1
 
-        def for_each(work: Callable[[int], Result]) -> list[Result]:
-            futures = [pool.submit(work, number) for number in range(experiment.rooms)]
-            try:
-                return [future.result() for future in futures]
-            except BaseException:
-                pool.shutdown(wait=False, cancel_futures=True)
-                raise
+    def noted() -> None:
+        if stop.is_set():
+            raise CancelledError
+        advance()
 
-        groups = for_each(lambda number: _look_around(experiment, number, advance))
-        matcher = _Matcher(experiment)
-        parts = for_each(lambda number: matcher.rows(groups[number], _trained_factor(groups, number), advance))
+    with in_order(lambda number: _look_around(experiment, number, noted), rooms, at_once, stop) as seen:
+        groups = list(seen)
+    stop.clear()
+    matcher = _Matcher(experiment)
+    factors = [_trained_factor(groups, number) for number in rooms]
+    with in_order(lambda number: matcher.rows(groups[number], factors[number], noted), rooms, at_once, stop) as rows:
+        parts = list(rows)
     return pl.DataFrame(list(itertools.chain(*parts)), schema=_SCHEMA)
 
 

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
+from threading import Event
 from typing import TYPE_CHECKING
+
+from tiltvp.lab.datasets.new import in_order
 
 if TYPE_CHECKING:
     from tiltvp.lab.datasets.folder import TiltDataset
@@ -29,11 +31,8 @@ def measured_shifts(
         return measured if estimate else math.nan
 
     found = []
-    pool = ThreadPoolExecutor(threads)
-    try:
-        for measured in pool.map(one, dataset.images):
+    with in_order(one, dataset.images, threads, Event()) as shifts:
+        for measured in shifts:
             found.append(measured)
             advance()
-    finally:
-        pool.shutdown(cancel_futures=True)
     return found
