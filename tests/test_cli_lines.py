@@ -187,8 +187,17 @@ def _write(path: Path, *shapes: tuple[int, int, int]) -> None:
 def test_the_plot_breaks_where_bearings_wrap() -> None:
     bearings = [math.radians(angle) for angle in (170.0, -170.0, -150.0)]
     table = pl.DataFrame({"frame": [0, 1, 2], "track": [7, 7, 7], "bearing_rad": bearings})
+    assert _gaps(table) == [False, True, False, False]
     (axes,) = track_plot(table).axes
-    line = np.asarray(axes.lines[0].get_ydata(), dtype=float)
-    assert np.isnan(line).tolist() == [False, True, False, False]
     assert [text.get_text() for text in axes.texts] == ["7"]
+    # Another is away while all turn by -220 degrees: from 170 to -50 it passes no end, from -100 to 40 it passes -180.
+    bearings = [110.0, 50.0, -10.0, -65.0, -110.0, 170.0, -50.0, -100.0, 40.0]
+    rows = {"frame": [0, 1, 2, 3, 4, 0, 4, 0, 4], "track": [0] * 5 + [1] * 2 + [2] * 2}
+    table = pl.DataFrame(rows | {"bearing_rad": [math.radians(angle) for angle in bearings]})
+    assert [_gaps(table, line) for line in (0, 2, 4)] == [[False] * 5, [False] * 2, [False, True, False]]
     track_plot(table.clear())
+
+
+def _gaps(table: pl.DataFrame, line: int = 0) -> list[bool]:
+    (axes,) = track_plot(table).axes
+    return np.isnan(np.asarray(axes.lines[line].get_ydata(), dtype=float)).tolist()

@@ -22,9 +22,10 @@ _LABELS_MAX = 120
 
 def draw_tracks(axes: Axes, table: pl.DataFrame) -> None:
     """Columns `frame`, `track`, `bearing_rad`: a dot where a line was seen, a line along its track, its number where
-    it begins. Tracks break where they pass from -180 to 180 degrees.
+    it begins. Tracks break where they pass from -180 to 180 degrees, also while nobody sees them.
     """
     parts = [part for _, part in table.sort("track", "frame").group_by("track", maintain_order=True)]
+    turned = _turned(parts)
     longest = sorted((part.height for part in parts), reverse=True)
     least = max(longest[min(_LABELS_MAX, len(longest)) - 1] if longest else 0, 2)
     for part in parts:
@@ -33,7 +34,8 @@ def draw_tracks(axes: Axes, table: pl.DataFrame) -> None:
         bearings = np.degrees(part["bearing_rad"].to_numpy())
         blue, green, red = (0.8 * value / 255.0 for value in track_colour(track))
         colour = (red, green, blue)
-        axes.plot(*_broken(frames, bearings), "-", color=colour, linewidth=0.8, zorder=2)
+        way = _broken(frames, bearings, turned[part["frame"].to_numpy()])
+        axes.plot(*way, "-", color=colour, linewidth=0.8, zorder=2)
         axes.plot(frames, bearings, "o", color=colour, markersize=1.8, markeredgewidth=0.0, zorder=3)
         if part.height >= least:
             axes.annotate(
@@ -57,9 +59,27 @@ def track_plot(table: pl.DataFrame) -> Figure:
     return figure
 
 
+def _turned(parts: list[pl.DataFrame]) -> NDArray[np.float64]:
+    """(frames,): degrees by which bearings have changed up to each frame, in the median of those that follow on."""
+    steps: dict[int, list[float]] = {}
+    for part in parts:
+        frames, bearings = part["frame"].to_numpy().astype(int), np.degrees(part["bearing_rad"].to_numpy())
+        for frame, gap, step in zip(frames[1:].tolist(), np.diff(frames), _within(np.diff(bearings)), strict=True):
+            if gap == 1:
+                steps.setdefault(frame, []).append(step)
+    count = max((int(part["frame"].to_numpy()[-1]) for part in parts), default=-1) + 1
+    return np.cumsum([np.median(steps.get(frame, [0.0])) for frame in range(count)])
+
+
+def _within(angles: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The same in [-180, 180)."""
+    return (angles + 180.0) % 360.0 - 180.0
+
+
 def _broken(
-    frames: NDArray[np.float64], bearings: NDArray[np.float64]
+    frames: NDArray[np.float64], bearings: NDArray[np.float64], turned: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """The track with a gap at each jump over 180 degrees."""
-    jumps = np.flatnonzero(np.abs(np.diff(bearings)) > 180.0) + 1
+    """The track with a gap where its change, that nearest to how far all `turned`, is not that of the numbers."""
+    shown, told = np.diff(bearings), np.diff(turned)
+    jumps = np.flatnonzero(np.abs(shown - told - _within(shown - told)) > 1.0) + 1
     return np.insert(frames, jumps, np.nan), np.insert(bearings, jumps, np.nan)
