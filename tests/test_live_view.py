@@ -57,6 +57,14 @@ def rows_of(path: Path) -> Counter[str]:
     return counts
 
 
+def gone_of(path: Path, entity: str) -> list[int]:
+    """The frames from which on nothing is shown at an entity."""
+    batches = [one.to_record_batch() for one in RrdReader(path).stream() if str(one.entity_path) == entity]
+    return [
+        frame for batch in batches if "Clear:is_recursive" in batch.schema.names for frame in batch["frame"].to_pylist()
+    ]
+
+
 def values_of(path: Path, entity: str) -> np.ndarray:
     """(N, k): the values of the curves of an entity, by their frames."""
     rows: dict[int, list[float]] = {}
@@ -160,9 +168,10 @@ def test_tilt_in_rerun(run: Run, world: Path, tmp_path: Path, threads: int) -> N
     words = ("--camera", world / "camera.toml", "--threads", threads, "--out", table)
     code, _, _ = run("tilt", "--rerun", record, world / "images", *words)
     assert code == 1  # One file is no image.
-    expected = {"/image": FRAMES, "/level": FRAMES - 1, "/log": 1}
-    each = ("/tilt/roll_deg", "/tilt/pitch_deg", "/confidence", "/frame_rate_hz")
-    assert rows_of(record) == expected | dict.fromkeys(each, FRAMES + 1)
+    each = ("/image", "/level", "/tilt/roll_deg", "/tilt/pitch_deg", "/confidence", "/frame_rate_hz")
+    assert rows_of(record) == {"/log": 1} | dict.fromkeys(each, FRAMES + 1)
+    # Of the black frame nothing is level, and the last one is no image: the pictures before them do not stay.
+    assert (gone_of(record, "/image"), gone_of(record, "/level")) == ([5], [2, 5])
     rolls = [row.split(",")[4] for row in table.read_text().splitlines()[1:]]
     values = values_of(record, "/tilt/roll_deg")
     assert values[[0, 1, 3, 4], 0] == pytest.approx(np.degrees([float(rolls[k]) for k in (0, 1, 3, 4)]))
@@ -227,12 +236,15 @@ def test_corner_poses_in_rerun(run: Run, tmp_path: Path) -> None:
     for side, image in zip(("left", "right"), pair(COLOURS), strict=True):
         for name in "ab":
             tiltvp.write_image(tmp_path / side / f"{name}.png", image)
+        tiltvp.write_image(tmp_path / side / "c.png", np.zeros_like(image))
     record = tmp_path / "corner.rrd"
     words = ("corner", tmp_path / "left", tmp_path / "right", "--calibration", tmp_path / "rig.toml", "--rerun", record)
     code, _, complaints = run(*words)
     assert code == 0, complaints
     curves = [f"/corner/{name}" for name in ("roll_deg", "pitch_deg", "yaw_deg", "confidence")]
-    assert rows_of(record) == dict.fromkeys([*curves, "/image", "/world/camera"], 2)
+    assert rows_of(record) == dict.fromkeys([*curves, "/image", "/world/camera"], 3) | {"/log": 1}
+    # Where nobody knows the pose the one before does not stay.
+    assert gone_of(record, "/world/camera") == [2]
     # The images tell no times.
     assert all("time" not in chunk.timeline_names for chunk in RrdReader(record).stream())
     code, _, complaints = run(*words)

@@ -88,6 +88,7 @@ def send_corner(viewer: Viewer, number: int, time_s: float | None, picture: Pict
     pose = estimate.pose
     if pose is None:
         viewer.say(f"frame {number}: {estimate.reason}", warns=True)
+        viewer.gone("world/camera")
         return
     # From one camera the place is not known, and stays at the vertex.
     place = np.zeros(3) if pose.camera_in_object_m is None else pose.camera_in_object_m

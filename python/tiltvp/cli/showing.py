@@ -135,10 +135,11 @@ class TiltWatch:
         from tiltvp.overlays.live import PITCH, ROLL, roll_and_pitch
 
         viewer.at(self._number, outcome.taken_s)
-        if marked is not None:
-            viewer.picture("image", marked)
-        if level is not None:
-            viewer.picture("level", level)
+        for name, picture in (("image", marked), ("level", level)):
+            if picture is None:
+                viewer.gone(name)
+            else:
+                viewer.picture(name, picture)
         for name, colour, row in zip(("roll", "pitch"), (ROLL, PITCH), roll_and_pitch(tilt).tolist(), strict=True):
             pale = [(channel + 255) // 2 for channel in rgb(colour)]
             viewer.curves(

@@ -143,6 +143,10 @@ class Viewer:
         rerun = self._rerun
         self._stream.log(path, rerun.Transform3D(translation=place, mat3x3=turn), rerun.TransformAxes3D(axes_m))
 
+    def gone(self, path: str) -> None:
+        """Nothing is there from now on; else the viewer goes on to show what came last."""
+        self._stream.log(path, self._rerun.Clear(recursive=False))
+
     def say(self, words: str, *, warns: bool = False) -> None:
         """A line in the log."""
         level = self._rerun.TextLogLevel.WARN if warns else self._rerun.TextLogLevel.INFO
