@@ -104,6 +104,9 @@ def test_the_picture_of_a_drive(driven: pl.DataFrame) -> None:
     assert picture.std() > 10.0
     bare = filtered_tilt(driven.drop("roll_true_rad", "pitch_true_rad").head(1))
     assert figure_picture(bare, dpi=40.0).size
+    blue = next(each for each in bare.axes[0].containers if each[0].get_color() == "tab:blue")
+    assert blue[0].get_ydata() == pytest.approx(np.degrees(driven["filtered_roll_rad"].to_numpy()[:1]))
+    assert all(float(tick).is_integer() for tick in bare.axes[1].get_xticks())
 
 
 def test_values_may_be_kept_compared_and_pickled() -> None:

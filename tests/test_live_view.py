@@ -93,6 +93,18 @@ def test_the_picture_has_three_parts(tilt: tiltvp.TiltEstimate, room: RoomImage)
     assert live_words(None, 0.0, np.nan) == "no tilt; - frames/s"
 
 
+def test_a_tilt_between_frames_without_one_is_seen(tilt: tiltvp.TiltEstimate, room: RoomImage) -> None:
+    """Where every second frame had no tilt the chart was empty."""
+    reds = []
+    for tilts in ((None, tilt), (None, None)):
+        view = TiltView()
+        for k in range(40):
+            view.add(0.1 * k, tilts[k % 2])
+        chart = view.picture(room.bgr, None, "")[460:].astype(int)
+        reds.append(np.count_nonzero((chart[:, :, 2] > 150) & (chart[:, :, 0] < 80)))
+    assert reds[0] - reds[1] >= 20
+
+
 def test_bands_are_those_of_the_covariance(tilt: tiltvp.TiltEstimate) -> None:
     roll, pitch = np.radians(roll_and_pitch(tilt))
     sigmas = np.sqrt(np.diag(tilt.covariance_rad2))
@@ -148,6 +160,11 @@ def test_closing_the_window_ends(run: Run, world: Path, tmp_path: Path, monkeypa
     # The black frame has no tilt: the right panel is black too.
     assert shown[2][100:350, 850:1050].max() == 0
     assert shown[3][100:350, 850:1050].max() > 100
+    # What is no image is told, and whether the window is still open is asked.
+    shown.clear()
+    images = [world / "images" / name for name in ("0.png", "9.png")]
+    assert run("tilt", *images, "--camera", world / "camera.toml", "--show")[0] == 1
+    assert [picture[100:350, 200:400].max() > 100 for picture in shown] == [True, False]
 
 
 def test_no_screen(run: Run, world: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -117,8 +117,7 @@ class TiltWatch:
             # Sources without times are shown by when they are done.
             self._view.add(self._done_s[-1] if outcome.taken_s is None else outcome.taken_s, tilt)
             words = live_words(tilt, tilt.confidence if tilt else 0.0, self.rate_hz)
-            if marked is not None:
-                self._window.show(self._view.picture(marked, level, words))
+            self._window.show(self._view.picture(marked, level, words))
         self._number += 1
         return self._window is None or self._window.is_open
 

@@ -76,12 +76,12 @@ class Chart:
         return self._low + (values - low) / (high - low) * (self._high - self._low)
 
     def curve(self, x: Any, y: Any, colour: str, *, width: int = 1, dashed: bool = False) -> None:
-        """A line through the values; what lies outside of the frame is cut off."""
+        """A line through the values, of one a point; what lies outside of the frame is cut off."""
         import cv2
 
         places = np.rint(self.places(x, y)).astype(int).tolist()
         box = self._box()
-        for i, (start, end) in enumerate(pairwise(places)):
+        for i, (start, end) in enumerate(pairwise(places if len(places) != 1 else 2 * places)):
             seen, a, b = cv2.clipLine(box, start, end)
             if seen and not (dashed and i % 10 >= 6):
                 cv2.line(self.picture, a, b, bgr_of(colour), width, cv2.LINE_AA)

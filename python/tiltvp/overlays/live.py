@@ -61,14 +61,15 @@ class TiltView:
         while self._rows[0][0] < time_s - _SPAN_S:
             self._rows.popleft()
 
-    def picture(self, seen: Picture, level: Picture | None, words: str) -> Picture:
-        """The marked frame, beside it the level image (None: there is none), below them the chart with words."""
+    def picture(self, seen: Picture | None, level: Picture | None, words: str) -> Picture:
+        """The marked frame, beside it the level image (None: there is none of either), below them the chart."""
         import cv2
 
-        shown = np.zeros((*seen.shape[:2], 3), np.uint8) if level is None else level
+        black = np.zeros((*(_PANEL if seen is None else seen.shape[:2]), 3), np.uint8)
+        shown = black if level is None else level
         if shown.ndim == 2:
             shown = np.asarray(cv2.cvtColor(shown, cv2.COLOR_GRAY2BGR), dtype=np.uint8)
-        left = titled(seen, _PANEL, "inlier edges and horizon")
+        left = titled(black, _PANEL, "no image") if seen is None else titled(seen, _PANEL, "inlier edges and horizon")
         right = titled(shown, _PANEL, "level" if level is not None else "no tilt, not level")
         return np.vstack([np.hstack([left, right]), self._chart(words)])
 

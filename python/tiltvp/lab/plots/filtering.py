@@ -48,6 +48,10 @@ def draw_filtered_component(axes: Axes, table: pl.DataFrame, name: str) -> None:
         )  # fmt: skip
     axes.fill_between(frames, line - band, line + band, color=_FILTERED, alpha=0.22, linewidth=0, zorder=1)
     axes.plot(frames, line, color=_FILTERED, linewidth=1.8, label="filtered, 2 sigma", zorder=3)
+    known = np.concatenate([[False], np.isfinite(line), [False]])
+    alone = known[1:-1] & ~known[:-2] & ~known[2:]
+    # Of one frame there is neither a line nor a band.
+    axes.errorbar(frames[alone], line[alone], band[alone], fmt="o", color=_FILTERED, markersize=4, zorder=3)
     if f"{name}_true_rad" in table.columns:
         axes.plot(frames, _true(table, name), color=_TRUE, linewidth=1.0, linestyle="--", label="true", zorder=5)
     axes.set_ylabel(f"{name} (degrees)")
@@ -62,6 +66,7 @@ def filtered_tilt(table: pl.DataFrame) -> Figure:
     draw_filtered_component(upper, table, "roll")
     draw_filtered_component(lower, table, "pitch")
     lower.set_xlabel("image")
+    lower.xaxis.get_major_locator().set_params(integer=True, min_n_ticks=1)
     lower.set_xlim(-0.5, max(table.height - 0.5, 0.5))
     handles, labels = upper.get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside upper center", ncols=len(labels), frameon=False)
