@@ -7,7 +7,7 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from tiltvp.cli.lab.measure_options import Out
+from tiltvp.cli.lab.measure_options import Saved
 from tiltvp.cli.lab.tables import show_frame
 from tiltvp.cli.options import ALL_CORES, AtLeast0, AtLeast1, Threads
 from tiltvp.cli.tables import check_ending, write_frame
@@ -24,7 +24,7 @@ def calibration(
     *,
     runs: AtLeast1 = 1000,
     only: str = "",
-    out: Out = None,
+    out: Saved = None,
 ) -> None:
     """Self-calibration on simulated drives, both filters, against the Cramer-Rao bound; by how many lines are seen, how
     soon it is right; and on real logs.
@@ -99,7 +99,7 @@ def calibration_images(
     trajectory: str = "paper",
     seed: AtLeast0 = 9101,
     threads: Threads = ALL_CORES,
-    out: Out = None,
+    out: Saved = None,
 ) -> None:
     """Self-calibration from the pictures of rendered drives: tilt, lines, tracks, mounting; errors in degrees and mm.
 

@@ -8,7 +8,7 @@ from typing import Annotated
 from cyclopts import Parameter, validators
 
 from tiltvp.cli.colmap import BELIEVED_MIN
-from tiltvp.cli.lab.measure_options import Out
+from tiltvp.cli.lab.measure_options import Saved
 from tiltvp.cli.lab.tables import show_frame
 from tiltvp.cli.tables import check_ending, write_frame
 from tiltvp.cli.terminal import progress_bar
@@ -22,7 +22,7 @@ def colmap(
     kinds: Annotated[tuple[str, ...], Parameter(consume_multiple=True)] = ("office", "living-room"),
     seed: int = 5,
     views: Annotated[int, Parameter(validator=validators.Number(gte=3))] = 24,
-    out: Out = None,
+    out: Saved = None,
 ) -> None:
     """COLMAP on views of rendered rooms: errors of gravity of its reconstructions, without priors and with them.
 

@@ -15,7 +15,7 @@ from tiltvp.cli.lab.corner_real import corners_real
 from tiltvp.cli.lab.descriptors import descriptors
 from tiltvp.cli.lab.levelling import level
 from tiltvp.cli.lab.line_measures import lines
-from tiltvp.cli.lab.measure_options import Every, NoiseSigma, Out, Panoramas, PanoramasIfAny, Rooms, Samples
+from tiltvp.cli.lab.measure_options import Every, NoiseSigma, Panoramas, PanoramasIfAny, Rooms, Samples, Saved
 from tiltvp.cli.lab.mounting import mounting
 from tiltvp.cli.lab.planar_pose import planar_pose
 from tiltvp.cli.lab.striding import striding
@@ -83,7 +83,13 @@ def panoramas(
 
 @app.command
 def views(
-    directory: Panoramas, /, *, every: Every = 1, weights: Switch = False, prior_deg: float = 15.0, out: Out = None
+    directory: Panoramas,
+    /,
+    *,
+    every: Every = 1,
+    weights: Switch = False,
+    prior_deg: float = 15.0,
+    out: Saved = None,
 ) -> None:
     """The vertical of views that look anywhere, pinhole and fisheye, by the method of straight edges.
 
@@ -147,7 +153,7 @@ def scaling(
     scales: Annotated[tuple[float, ...], Parameter(consume_multiple=True)] = (0.25, 0.5, 1.0, 2.0, 4.0),
     sweep: str = "paper",
     threads: Threads = ALL_CORES,
-    out: Out = None,
+    out: Saved = None,
 ) -> None:
     """The time that an evaluation of rendered rooms takes, over the number of images and over their pixels.
 
@@ -182,7 +188,7 @@ def confidence(
     runs: Annotated[list[Path], Parameter(consume_multiple=True)],
     /,
     *,
-    out: Out = None,
+    out: Saved = None,
 ) -> None:
     """How far covariance and confidence can be trusted: the truths that regions hold, and failures that were foreseen.
 
