@@ -107,7 +107,9 @@ def test_a_robots_file_is_set_up_again_and_loses_nothing(drive, tmp_path, capsys
     assert math.atan2(-turned[0], turned[1]) == pytest.approx(0.4, abs=0.01)
     assert after.covariance[0, 4] == 1e-7
     assert 0.0 < after.covariance[2, 2] < 1e-4
+    capsys.readouterr()
     assert run(*words, "--robot-from-camera", "up") == 0
+    assert "rim: a mask was given\nbody: a mask was given\n" in capsys.readouterr().out
     assert (Robot.load(out).covariance, Robot.load(out).place_m) == (None, before.place_m)
 
 
@@ -184,9 +186,10 @@ def test_mount_passes_and_fails_by_its_exit_code(drive, tmp_path, capsys):
 
 
 def test_too_few_images_are_refused(drive):
-    frames = open_frames([str(drive / "frames" / f"{k:02d}.png") for k in range(4)])
-    with pytest.raises(InvalidInputError, match="4 images of the camera's size, expected 5 or more"):
-        find_setup(frames, CAMERA)
+    for count, words in ((4, "4 images of"), (1, "1 image of")):
+        frames = open_frames([str(drive / "frames" / f"{k:02d}.png") for k in range(count)])
+        with pytest.raises(InvalidInputError, match=f"{words} the camera's size, expected 5 or more"):
+            find_setup(frames, CAMERA)
 
 
 def test_frames_and_motions_that_do_not_fit_are_refused(drive):

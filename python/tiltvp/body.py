@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from tiltvp.errors import counted
 from tiltvp.images import camera_grays, checked_camera, checked_mask
 
 if TYPE_CHECKING:
@@ -82,7 +83,7 @@ def body_mask(images: Iterable[ArrayLike], camera: Camera, *, mask: ArrayLike | 
         seen.ravel()[at] += 1.0
         count += 1
     if count < _LEAST:
-        return BodyMask(None, count, f"{count} images, expected at least {_LEAST} from different places")
+        return BodyMask(None, count, f"{counted(count, 'images')}, expected at least {_LEAST} from different places")
     length = np.hypot(*sums)
     staying = _staying(length / count, _share_of(count))
     apart = ~staying

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from tiltvp.body import BodyMask, body_mask
-from tiltvp.errors import InvalidInputError, TiltvpError
+from tiltvp.errors import InvalidInputError, TiltvpError, counted
 from tiltvp.images import checked_camera, gray_from
 from tiltvp.mounting import MountingTilt, mounting_tilt
 from tiltvp.robot import Robot
@@ -71,8 +71,8 @@ class RobotSetup:
     """(3, 3): the mounting that was given, or that of the direction that is up, before roll and pitch."""
     direction: SetupCheck
     """Which way is up, and whether the lens is as told."""
-    rim: bool
-    """Whether a dark surround was found that the calibration does not know."""
+    rim: bool | None
+    """Whether a dark surround was found that the calibration does not know; None where a mask was given."""
     body: BodyMask
     """The robot's own body in view."""
     turns: TurnCheck | None
@@ -143,12 +143,12 @@ def find_setup(
     _count_of(frames, motions)
     usable = sum(1 for _ in spread(frames, camera, LOOKED_AT))
     if usable < LEAST:
-        expected = f"{LEAST} or more of {camera.width} x {camera.height} pixels"
-        raise InvalidInputError(f"{frames.source}: {usable} images of the camera's size, expected {expected}")
+        words = f"{counted(usable, 'images')} of the camera's size, expected {LEAST} or more"
+        raise InvalidInputError(f"{frames.source}: {words} of {camera.width} x {camera.height} pixels")
     rim, body = None, BodyMask(None, 0, "a mask was given")
     if mask is None:
-        rim, body = rim_and_body(frames, camera)
-        mask = joined_mask(rim, body)
+        inside, body = rim_and_body(frames, camera)
+        rim, mask = inside is not None, joined_mask(inside, body)
 
     looked_at = (image for _, image in spread(frames, camera, LOOKED_AT))
     direction = check_setup(looked_at, camera, robot_from_camera, mask=mask)
@@ -175,7 +175,7 @@ def find_setup(
         wheels=wheels,
         topics=topics or {},
     )
-    return RobotSetup(robot, rotation, direction, rim is not None, body, turns, mounting)
+    return RobotSetup(robot, rotation, direction, rim, body, turns, mounting)
 
 
 def _turn_axis(

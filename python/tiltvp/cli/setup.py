@@ -101,9 +101,8 @@ def setup(
 def _lines(found: RobotSetup) -> list[str]:
     """What was found, for people."""
     lines = [found.direction.direction_reason, f"lens: {found.direction.lens.reason}"]
-    lines.append(
-        "rim: a dark surround that the calibration does not know is left out" if found.rim else "rim: none found"
-    )
+    rim = {True: "a dark surround that the calibration does not know is left out", False: "none found"}
+    lines.append(f"rim: {found.body.reason if found.rim is None else rim[found.rim]}")
     lines.append(f"body: {found.body.reason}")
     lines.append("turns: no odometry" if found.turns is None else f"turns: {found.turns.reason}")
     first, *others = mounting_lines(found.mounting)
