@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import os
 import socket
 import sys
@@ -277,7 +278,10 @@ def test_without_rerun_and_wrong_words(run: Run, world: Path, monkeypatch: pytes
         for order in ((*words, "--rerun"), (words[0], "--rerun", *words[1:]), (*words, "--rerun", "viewer")):
             # One of the images is broken.
             assert run(*order)[0] == 1
-    assert len(spawned) == 3
+        # The images' names come on stdin.
+        monkeypatch.setattr(sys, "stdin", SimpleNamespace(buffer=io.BytesIO(str(world / "images/0.png").encode())))
+        assert run("tilt", "--rerun", "-", *words[2:])[0] == 0
+    assert len(spawned) == 4
     # Without a screen the viewer that was begun has ended already.
     code, _, complaints = run(*words, "--rerun")
     assert (code, complaints.count("\n")) == (1, 1)

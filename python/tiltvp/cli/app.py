@@ -54,15 +54,15 @@ def main(arguments: Sequence[str] | None = None) -> int:
     words = list(sys.argv[1:] if arguments is None else arguments)
     overwrite = _OVERWRITE in words
     words = [word for word in words if word != _OVERWRITE]
-    for place in [place for place, word in enumerate(words) if word == "-"]:
-        if place and not _takes_a_word(words[place - 1], words):
-            # A word that begins so is taken for an option, which its name would be looked for among.
-            words[place] = STDIN
     for place in [place for place, word in enumerate(words) if word == RERUN]:
         following = "".join(words[place + 1 : place + 2])
         if following.startswith("-") or (_is_there(following) and not following.lower().endswith(".rrd")):
             # Without a file it is the viewer that is meant; an option takes a word, or none, not both.
             words[place] = f"{RERUN}={VIEWER}"
+    for place in [place for place, word in enumerate(words) if word == "-"]:
+        if place and not _takes_a_word(words[place - 1], words):
+            # A word that begins so is taken for an option, which its name would be looked for among.
+            words[place] = STDIN
     try:
         with nullcontext() if overwrite else keeping_existing():
             code = run(words)
