@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import csv
 import math
+import os
 import re
+import shutil
 import xml.etree.ElementTree as ET
 from pathlib import Path
 from typing import Any
@@ -293,3 +295,24 @@ def test_the_python_of_the_page_runs(
 def test_the_command_says_which_endings_there_are(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["tilt", str(folder), "--camera", str(folder / "camera.toml"), "--out", "a.bag"]) == 2
     assert ".parquet, .mcap, .tum" in capsys.readouterr().err
+
+
+def test_times_that_no_stamp_can_be_are_refused_before_any_work(
+    folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    shutil.copytree(folder, tmp_path / "drive")
+    files = sorted(tmp_path.glob("drive/*.png"))
+    rows = "".join(f"{file.name},{number - 1}\n" for number, file in enumerate(files))
+    (tmp_path / "drive/frames.csv").write_text(f"file,time_s\n{rows}")
+    words = [
+        "tilt",
+        str(tmp_path / "drive"),
+        "--camera",
+        str(folder / "camera.toml"),
+        "--overlay",
+        str(tmp_path / "seen"),
+    ]
+    assert main([*words, "--out", str(tmp_path / "a.mcap")]) == 2
+    assert "a.mcap: times_s[0] = -1.0, expected seconds from 0 to 2^31, or --frame-rate\n" in capsys.readouterr().err
+    assert os.listdir(tmp_path) == ["drive"]
+    assert main([*words, "--out", str(tmp_path / "a.mcap"), "--frame-rate", "5"]) == 0

@@ -4,17 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Final
+from typing import TYPE_CHECKING
 
 from tiltvp.cli.results import Outcome, outcome_table
 from tiltvp.cli.tables import ENDINGS, check_ending, write_table
 from tiltvp.errors import InvalidInputError, TiltvpError, counted
-from tiltvp.streams.outputs.tilts import TILT_ENDINGS, TILT_TOPIC, check_tilts, write_tilts
+from tiltvp.streams.frames import DEFAULT_RATE_HZ
+from tiltvp.streams.outputs.tilts import TILT_ENDINGS, TILT_TOPIC, check_tilts, check_times, write_tilts
 
-__all__ = ["check_answers", "write_answers"]
+if TYPE_CHECKING:
+    from tiltvp.streams import Frames
 
-_RATE_HZ: Final = 25.0
-"""Frames per second where nothing tells: that of a film, as for `tiltvp corner`."""
+__all__ = ["check_answers", "check_stamps", "write_answers"]
 
 
 def check_answers(path: Path) -> None:
@@ -30,6 +31,16 @@ def check_answers(path: Path) -> None:
         check_tilts(path)
     except TiltvpError as error:
         raise type(error)(f"--out {error}") from None
+
+
+def check_stamps(path: Path | None, frames: Frames, frame_rate: float | None) -> None:
+    """Refuses times of frames that attitudes cannot have, before any work is done."""
+    if path is None or path.suffix.lower() not in TILT_ENDINGS or frame_rate is not None or frames.times_s is None:
+        return
+    try:
+        check_times(frames.times_s)
+    except InvalidInputError as error:
+        raise InvalidInputError(f"--out {path}: {error}, or --frame-rate") from None
 
 
 def write_answers(outcomes: Sequence[Outcome], method: str, path: Path, frame_rate: float | None) -> str | None:
@@ -50,7 +61,7 @@ def write_answers(outcomes: Sequence[Outcome], method: str, path: Path, frame_ra
     if frame_rate is None and len(known) == len(outcomes):
         times, clock = known, "at the frames' own times"
     else:
-        rate_hz = frame_rate or _RATE_HZ
+        rate_hz = frame_rate or DEFAULT_RATE_HZ
         times = [number / rate_hz for number in range(len(outcomes))]
         clock = f"at {rate_hz:g} frames a second from 0"
         clock += "" if frame_rate else ", as not all tell a time: --frame-rate"

@@ -11,7 +11,7 @@ from itertools import repeat
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
-from tiltvp.cli.answers import check_answers, write_answers
+from tiltvp.cli.answers import check_answers, check_stamps, write_answers
 from tiltvp.cli.cluster import check_cluster, files_of, is_begun
 from tiltvp.cli.filtering import FilterOptions
 from tiltvp.cli.options import AtLeast1, CameraOptions, FrameRate, MethodOptions
@@ -105,6 +105,7 @@ def tilt(
     estimator = camera.complete(method.of_topic(source.topic)).estimator(camera.load(source.topic))
     frames = source.open(images or [])
     check_apart(frames, overlay, level)
+    check_stamps(out, frames, frame_rate)
     moved = motion.motions_of(robot, frames) if filtering.filter else None
     filtering = filtering.following(frames, moved, wheel_base_of(robot, motion.wheel_base))
     motions: Iterable[Motion | None] = repeat(Motion()) if moved is None else moved.motions

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
     Matrix = NDArray[np.float64]
 
-__all__ = ["TILT_ENDINGS", "TILT_TOPIC", "YAW_VARIANCE_RAD2", "attitude", "check_tilts", "write_tilts"]
+__all__ = ["TILT_ENDINGS", "TILT_TOPIC", "YAW_VARIANCE_RAD2", "attitude", "check_tilts", "check_times", "write_tilts"]
 
 TILT_ENDINGS: Final = (".mcap", ".tum")
 """Of the files that `write_tilts` writes."""
@@ -85,6 +85,14 @@ def check_tilts(path: str | os.PathLike[str]) -> None:
             raise InvalidInputError(f"{path}: ends in {other!r}, expected {' or '.join(TILT_ENDINGS)}")
 
 
+def check_times(times_s: ArrayLike) -> None:
+    """Refuses times (N,), seconds, that no stamp can be. Raises `InvalidInputError`."""
+    times = np.asarray(times_s, dtype=np.float64)
+    bad = np.flatnonzero(~((times >= 0.0) & (times < _LAST_S)))
+    if len(bad):
+        raise InvalidInputError(f"times_s[{bad[0]}] = {times[bad[0]]}, expected seconds from 0 to 2^31")
+
+
 def write_tilts(
     path: str | os.PathLike[str],
     times_s: ArrayLike,
@@ -105,9 +113,7 @@ def write_tilts(
     times = np.asarray(times_s, dtype=np.float64)
     if times.shape != (len(tilts),):
         raise InvalidInputError(f"times_s: shape {times.shape}, expected ({len(tilts)},), one for each tilt")
-    bad = np.flatnonzero(~((times >= 0.0) & (times < _LAST_S)))
-    if len(bad):
-        raise InvalidInputError(f"times_s[{bad[0]}] = {times[bad[0]]}, expected seconds from 0 to 2^31")
+    check_times(times)
     known = [(float(time_s), *attitude(tilt)) for time_s, tilt in zip(times, tilts, strict=True) if tilt]
     if path_from(path).suffix.lower() == ".tum":
         quaternions = np.array([quaternion(rotation) for _, rotation, _ in known]).reshape(-1, 4)
