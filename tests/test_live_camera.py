@@ -52,6 +52,15 @@ def test_a_live_camera(monkeypatch: pytest.MonkeyPatch) -> None:
         LiveCamera(5)
 
 
+def test_a_camera_that_is_not_there_is_told_by_one_sentence(capfd: pytest.CaptureFixture[str]) -> None:
+    """OpenCV printed two lines of its own, and while a camera was waited for ten a second."""
+    before = cv2.utils.logging.getLogLevel()
+    with pytest.raises(ImageFileError, match="camera 97: cannot be opened"):
+        LiveCamera(97)
+    assert capfd.readouterr() == ("", "")
+    assert cv2.utils.logging.getLogLevel() == before
+
+
 def test_a_camera_unplugged_and_plugged_in(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("tiltvp.streams.live._AGAIN_S", 0.01)
     opened: list[int] = []

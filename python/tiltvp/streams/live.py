@@ -17,6 +17,7 @@ from tiltvp.images import read_image
 from tiltvp.streams.frames import Frame, Frames
 
 if TYPE_CHECKING:
+    import cv2
     from numpy.typing import NDArray
 
 __all__ = ["LiveCamera", "NamedImages", "RawImages", "raw_size"]
@@ -46,7 +47,7 @@ class LiveCamera(Frames):
         self.source = f"camera {number}"
         self._number, self._patience_s = number, patience_s
         self._ended = threading.Event()
-        self._capture = cv2.VideoCapture(number)
+        self._capture = _capture(number)
         if not self._capture.isOpened():
             raise ImageFileError(f"{self.source}: cannot be opened, expected the number of a camera, from 0")
         rate = float(self._capture.get(cv2.CAP_PROP_FPS))
@@ -87,16 +88,27 @@ class LiveCamera(Frames):
 
     def _awaited(self, since_s: float) -> NDArray[np.uint8] | None:
         """The first image of the camera after it has come back; None where it does not, or nobody waits any more."""
-        import cv2
-
         while time.monotonic() - since_s < self._patience_s and not self._ended.wait(_AGAIN_S):
             self._capture.release()
-            self._capture = cv2.VideoCapture(self._number)
+            self._capture = _capture(self._number)
             if self._capture.isOpened():
                 image = self._image()
                 if image is not None:
                     return image
         return None
+
+
+def _capture(number: int) -> cv2.VideoCapture:
+    """A camera, or what is no open one, without the lines that OpenCV prints of it: while a camera that has gone is
+    waited for they would be ten a second."""
+    import cv2
+
+    before = cv2.utils.logging.getLogLevel()
+    cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_ERROR)
+    try:
+        return cv2.VideoCapture(number)
+    finally:
+        cv2.utils.logging.setLogLevel(before)
 
 
 class NamedImages(Frames):
