@@ -212,7 +212,8 @@ def test_snippets_and_convergence() -> None:
     table = convergence_table(history)
     assert len(table["alarm"]) == len(drive.odometry)
     assert table["variance_psi"][-1] < 1e-3 < table["variance_psi"][5]
-    figure = convergence({"a drive": table, "the same": table}, {"a drive": history[-1]})
+    figure = convergence({"a drive": table, "_$x$": table}, {"a drive": history[-1]})
+    assert figure.axes[0].get_legend().get_texts()[1].get_text() == "_$x$"
     assert [axes.get_ylabel() for axes in figure.axes[::2]] == ["x (m)", "y (m)", "yaw (deg)"]
     for axes in figure.axes[1::2]:
         low, high = axes.get_ylim()

@@ -18,6 +18,7 @@ from tiltvp.lab.evaluation import curves
 from tiltvp.lab.evaluation.runs import Run, read_run
 from tiltvp.lab.evaluation.summary import errors
 from tiltvp.lab.evaluation.variants import VARIANTS, best_of, best_rows, variant_points
+from tiltvp.lab.plots.picture import figure_picture
 from tiltvp.lab.plots.report import style
 from tiltvp.lab.plots.report.errors import errors_by_environment
 from tiltvp.lab.report.choice import choose_examples
@@ -190,6 +191,18 @@ def test_page_is_safe_from_names(run: Path) -> None:
     contents = contents_of(Run(whole.manifest, table))
     page = page_of(contents, {item.stem: b"" for section in contents.sections for item in section.items})
     assert evil not in page
+
+
+def test_names_are_no_mathematics(run: Path, tmp_path: Path) -> None:
+    """Between two dollars they were set as such, or were none that could be, and there was no report."""
+    whole = read_run(run)
+    name = r"$\frac{1$"
+    table = whole.table.filter(pl.col("method") == "refined").with_columns(environment=pl.lit(name))
+    odd = Run(whole.manifest, table)
+    contents = contents_of(odd, also=OtherRun(odd, name))
+    assert write_report(contents, tmp_path / "out", dpi=20.0).is_file()
+    many = pl.DataFrame({"variant": "one", "environment": [f"{k} {name}" for k in range(20)], "mean_deg": 1.0})
+    figure_picture(errors_by_environment(many, pl.DataFrame({"variant": ["one"], "mean_deg": [1.0]})))
 
 
 def test_examples_follow_their_rule(run: Path) -> None:

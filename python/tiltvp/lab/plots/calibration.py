@@ -64,7 +64,10 @@ def convergence(
     axes[0][0].set_title("filter, two standard deviations" + ("" if answers is None else "; dashed: the whole log"))
     axes[0][1].set_title("how sure the filter is")
     if len(tables) > 1:
-        axes[0][0].legend(fontsize="small")
+        logs = [line for line in axes[0][0].get_lines() if line.get_label() in tables]
+        # Given by hand names that begin with _ are shown too; names of others are no mathematics.
+        for text in axes[0][0].legend(logs, list(tables), fontsize="small").get_texts():
+            text.set_parse_math(False)
     return figure
 
 

@@ -77,7 +77,9 @@ def errors_by_environment(table: pl.DataFrame, overall: pl.DataFrame) -> Figure:
         axes.axhline(means[variant], color=look.colour, linestyle=look.line, linewidth=1.0, alpha=0.45)
     longest = max((len(place) for place in places), default=0)
     slanted = len(places) * longest > 75
-    axes.set_xticks(range(len(places)), places, rotation=30 if slanted else 0, ha="right" if slanted else "center")
+    turned, side = (30, "right") if slanted else (0, "center")
+    # Names of others are no mathematics.
+    axes.set_xticks(range(len(places)), places, rotation=turned, ha=side, parse_math=False)
     axes.set_ylim(bottom=0.0)
     tidy(axes, "environment", "mean error (degrees)")
     axes.grid(visible=False, axis="x")
@@ -95,7 +97,7 @@ def _marks_by_environment(table: pl.DataFrame, overall: pl.DataFrame, places: li
         across = [by_place.get(place, np.nan) for place in places]
         axes.plot(across, range(len(places)), look.marker, color=look.colour, markersize=6, label=variant)
         axes.axvline(means[variant], color=look.colour, linestyle=look.line, linewidth=1.0, alpha=0.45)
-    axes.set_yticks(range(len(places)), places, fontsize=8)
+    axes.set_yticks(range(len(places)), places, fontsize=8, parse_math=False)
     axes.set_ylim(len(places) - 0.5, -0.5)
     axes.set_xlim(left=0.0)
     tidy(axes, "mean error (degrees)", "environment")

@@ -30,9 +30,10 @@ def table_figure(cells: pl.DataFrame) -> Figure:
     at = 0
     for i, width in enumerate(widths):
         x, side = (at + 0.5, "left") if words[i] else (at + width - 0.5, "right")
-        axes.text(x, 0.5, columns[i], ha=side, va="center", weight="bold", fontsize=9)
+        # Names of others are no mathematics.
+        axes.text(x, 0.5, columns[i], ha=side, va="center", weight="bold", fontsize=9, parse_math=False)
         for line, row in enumerate(rows):
-            axes.text(x, line + 1.5, row[i], ha=side, va="center", fontsize=9)
+            axes.text(x, line + 1.5, row[i], ha=side, va="center", fontsize=9, parse_math=False)
         at += width
     for y, thickness in ((0.0, 1.2), (1.0, 0.7), (float(lines), 1.2)):
         axes.plot([0, total], [y, y], color="black", linewidth=thickness, clip_on=False)
