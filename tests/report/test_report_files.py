@@ -290,6 +290,9 @@ def test_tilts_come_in_few_classes(count: int) -> None:
     assert table.height == (5 if count == 5 else 12)
     assert table["images"].sum() == count
     assert table["mean_deg"].to_list() == pytest.approx(table["alpha_true_deg"].to_list(), abs=0.01)
+    # The mean is that of as many images as are told.
+    unknown = rows.with_columns(pl.when(pl.col("image") > 1).then(pl.col("error_rad")))
+    assert curves.errors_by_tilt(unknown)["images"].sum() == count - 2
 
 
 def test_cost_is_on_the_page_if_the_run_has_it(run: Path, tmp_path: Path) -> None:

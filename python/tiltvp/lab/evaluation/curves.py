@@ -25,7 +25,7 @@ _CLASS_DEG: Final = 0.5
 
 
 def overall_errors(rows: pl.DataFrame) -> pl.DataFrame:
-    """`variant`, `mean_deg` over all images with an estimate, `images`; the variants in their order."""
+    """`variant`, `mean_deg` over all images with an estimate, their number `images`; the variants in their order."""
     return _means(rows, ["variant"])
 
 
@@ -40,7 +40,7 @@ def errors_by_environment(rows: pl.DataFrame) -> pl.DataFrame:
 
 
 def _means(rows: pl.DataFrame, keys: list[str]) -> pl.DataFrame:
-    numbers = {"mean_deg": pl.col("error_rad").mean().degrees(), "images": pl.len()}
+    numbers = {"mean_deg": pl.col("error_rad").mean().degrees(), "images": pl.col("error_rad").count()}
     return rows.group_by(keys, maintain_order=True).agg(**numbers).drop_nulls("mean_deg")
 
 

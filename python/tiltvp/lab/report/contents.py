@@ -262,20 +262,20 @@ def _honesty(rows: pl.DataFrame) -> Section:
         items.append(
             Panel(
                 "confidence", "Confidence as an alarm",
-                "Estimates whose confidence is below a threshold are rejected: the share of failures (errors above 2°) "
-                "that are found, against the share of good estimates that are lost, for every threshold. The number is "
-                "the area under the curve.",
+                "Estimates whose confidence is below a threshold are rejected: the share of failures (errors above 2°, "
+                "and images without an estimate) that are found, against the share of good estimates that are lost, "
+                "for every threshold. The number is the area under the curve.",
                 quality.confidence_roc(alarms, curves.alarm_areas(alarms)),
             )
         )  # fmt: skip
     silent = [name for name in dict.fromkeys(rows["variant"]) if name not in alarms["variant"]]
     if silent:
-        words = f"Without a curve of alarms, because no error is above 2° or all are: {', '.join(silent)}."
+        words = f"Without a curve of alarms, because no image is a failure or all are: {', '.join(silent)}."
     items.append(
         Panel(
             "abstaining", "Abstaining",
-            "The error of the estimates that are accepted when the least confident ones are rejected: mean and 99th "
-            "percentile.",
+            "The error of the estimates that are accepted when the least confident images are rejected, first those "
+            "without an estimate: mean and 99th percentile.",
             quality.errors_over_rejection(curves.rejection_curves(rows)),
         )
     )  # fmt: skip
