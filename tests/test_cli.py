@@ -18,6 +18,7 @@ import pytest
 import tiltvp
 from commands import Run, Said, verbs
 from tiltvp.cli.app import app
+from tiltvp.overlays.offsets import lean_chart
 from tiltvp.synth import render_room
 
 ALPHA_RAD, BETA_RAD = math.radians(4.0), math.radians(30.0)
@@ -337,6 +338,9 @@ def test_demo(run: Run, tmp_path: Path) -> None:
     assert pictures["input.png"].shape == (180, 240, 3)
     assert pictures["levelled.png"].shape == (180, 480, 3)
     assert pictures["plot.png"].std() > 20.0
+    # The chart of leans says how many degrees its rings are.
+    leans = lean_chart((400, 400), (0.1, 0.5), [("one", 0.1, 0.5)])
+    assert (leans[40:340, 25:55].min(), leans[360:372, 70:380].min()) == (0, 0)
     row = next(line for line in said.out.splitlines() if line.split()[:1] == ["refined"])
     alpha, beta, error = (float(word) for word in row.split()[1:4])
     true = tiltvp.normal_from_alpha_beta(math.radians(3.0), math.radians(-60.0))

@@ -22,6 +22,8 @@ __all__ = ["COLOURS", "Cosine", "cosine_of_tilt", "error_chart", "lean_chart", "
 BLUE, ORANGE, RED = "#1f77b4", "#ff7f0e", "#d62728"
 COLOURS = (BLUE, ORANGE, "#2ca02c", "#9467bd", "#8c564b", "#e377c2", "#bcbd22", "#17becf")
 """Those of methods, in their order."""
+_STEPS_DEG = (1, 2, 5, 10, 20, 50)
+"""Between the rings of leans, of which there are up to ten across."""
 
 
 @dataclass(frozen=True)
@@ -122,21 +124,26 @@ def lean_chart(size: tuple[int, int], true: tuple[float, float], leans: Sequence
     low, high = finite.min(axis=0), finite.max(axis=0)
     reach = 0.5 * float((high - low).max()) + 0.7
     (x, y) = (low + high) / 2.0
+    step = next((step for step in _STEPS_DEG if reach <= 5.0 * step), _STEPS_DEG[-1])
     chart = Chart(
         size, (x - reach, x + reach), (y - reach, y + reach),
         labels=("true and estimated lean", "lean to the right (degrees)", "lean forward (degrees)"),
+        ticks=(_between(x - reach, x + reach, step), _between(y - reach, y + reach, step)),
     )  # fmt: skip
     turn = np.linspace(0.0, 2.0 * np.pi, 361)
-    for radius in range(1, int(math.hypot(abs(x) + reach, abs(y) + reach)) + 1):
+    for radius in range(step, int(math.hypot(abs(x) + reach, abs(y) + reach)) + 1, step):
         chart.curve(radius * np.cos(turn), radius * np.sin(turn), PALE)
-    chart.curve((x - reach, x + reach), (0.0, 0.0), PALE)
-    chart.curve((0.0, 0.0), (y - reach, y + reach), PALE)
     for i, spot in enumerate(spots[1:]):
         if np.isfinite(spot).all():
             chart.dot(*spot, COLOURS[i % len(COLOURS)])
     chart.cross(*spots[0], RED)
     chart.words(*spots[0], "true", across_px=12.0)
     return chart.framed()
+
+
+def _between(low: float, high: float, step: int) -> list[int]:
+    """The multiples of a step within limits."""
+    return [step * k for k in range(math.ceil(low / step), math.floor(high / step) + 1)]
 
 
 def _spot(alpha_rad: float, beta_rad: float) -> tuple[float, float]:
