@@ -20,6 +20,7 @@ from tiltvp.lab.evaluation.corner_markers import MarkerLooks
 from tiltvp.lab.evaluation.corner_rooms import truth_near
 from tiltvp.lab.evaluation.corner_scenes import CORNER_SCENES, CornerScene, fresh_rooms
 from tiltvp.lab.evaluation.corners import CornerExperiment, measure_corners, summarise_corners, summarise_rooms
+from tiltvp.lab.plots.corner_poses import pose_plot
 from tiltvp.lab.plots.corners import corner_errors, inertial_errors
 from tiltvp.lab.plots.picture import figure_picture
 from tiltvp.stereo_scenes import SceneCorner
@@ -207,6 +208,15 @@ def test_in_rooms_axes_may_be_named_at_will_and_corners_lack_in_the_list() -> No
     assert number == -1
     assert np.allclose(truth[:3, :3], over)
     assert np.allclose(truth[:3, 3], own)
+
+
+def test_a_plot_of_poses_without_a_place_has_none() -> None:
+    """Of one camera there were three empty panels of 5 centimetres."""
+    known = {name: [0.0, 1.0] for name in ("time_s", "roll_deg", "pitch_deg", "yaw_deg", "x_m")}
+    table = pl.DataFrame(known | {name: [None, None] for name in ("y_m", "z_m")})
+    assert [axes.get_ylabel() for axes in pose_plot(table).axes] == [
+        "roll (degrees)", "pitch (degrees)", "yaw (degrees)", "x (m)",
+    ]  # fmt: skip
 
 
 def test_plots_show_what_the_tables_hold(measured: tuple[pl.DataFrame, pl.DataFrame]) -> None:

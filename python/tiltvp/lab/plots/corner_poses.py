@@ -15,9 +15,11 @@ __all__ = ["pose_plot"]
 def pose_plot(table: pl.DataFrame, truth: bool = False) -> Figure:
     """Attitude and position over time as in section IV: columns time_s, roll_deg, pitch_deg, yaw_deg, x_m, y_m, z_m.
 
-    With `truth` also columns of the same names with `true_` in front, and below each the difference.
+    A position that no row has, as from one camera, is left out. With `truth` also columns of the same names with
+    `true_` in front, and beside each the difference.
     """
-    names = [name for name in ("roll_deg", "pitch_deg", "yaw_deg", "x_m", "y_m", "z_m") if name in table.columns]
+    names = ["roll_deg", "pitch_deg", "yaw_deg"]
+    names += [name for name in ("x_m", "y_m", "z_m") if name in table.columns and table[name].count()]
     figure = Figure(figsize=(11.0, 1.6 * len(names) + 0.8), layout="constrained")
     columns = 2 if truth else 1
     panels = figure.subplots(len(names), columns, sharex=True, squeeze=False)
