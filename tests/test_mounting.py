@@ -111,6 +111,9 @@ def test_images_of_which_nobody_knows_the_way_are_left_out(template):
     found = mounting_tilt(estimates, motions, np.eye(3))
     assert (found.images, found.used) == (60, 58)
     assert found.lean == without.lean
+    nothing = mounting_tilt(estimates, [None] * 60, np.eye(3))
+    assert (bool(nothing), nothing.images, nothing.driven, nothing.used) == (False, 60, 0, 0)
+    assert "the odometry tells of the time of none" in nothing.reason
 
 
 def test_wide_robots_roll_far_in_a_turn(template):

@@ -61,8 +61,10 @@ class MountingTilt:
     """The floor's tilt after the last image, in the frame of the wheels."""
     images: int
     """How many images were given."""
+    driven: int
+    """Of how many of them it was said what the robot had done."""
     used: int
-    """How many of them had a tilt that agreed with the others'."""
+    """How many of these had a tilt that agreed with the others'."""
     turned_rad: float
     """How far the headings are apart at most, at least 0 and at most 2 pi."""
     level_floor: bool
@@ -87,6 +89,8 @@ class MountingTilt:
         """What was found, or why nothing was, in a sentence."""
         told = f"{self.used} of {self.images} images, headings within {math.degrees(self.turned_rad):.0f} degrees"
         if not self:
+            if not self.driven:
+                return f"{told}: the odometry tells of the time of none"
             if not self.used:
                 return f"{told}: no image tells a tilt"
             need = "expected a robot that turns in place, or a floor that is said to be level"
@@ -152,8 +156,9 @@ def mounting_tilt(
         stated = (1.0 if scatter is None else alike) * max(1.0, excess) * covariance
         covariance = shared + _beyond(stated, shared) + (0.0 if scatter is None else scatter)
     return MountingTilt(
-        upright, lean, whole.floor, len(images), used, turned, level_floor, _about_axes(covariance), _about_axes(shared)
-    )
+        upright, lean, whole.floor, len(images), len(known), used, turned, level_floor, _about_axes(covariance),
+        _about_axes(shared),
+    )  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)

@@ -58,7 +58,8 @@ class DriveTilts:
     """The tilts of images spread over a drive, and what the robot did from each to the next."""
 
     estimates: list[TiltEstimate | None]
-    motions: list[Motion]
+    motions: list[Motion | None]
+    """None where the odometry does not tell."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -283,13 +284,16 @@ def _usable(frame: Frame, camera: _core.Camera) -> Image | None:
     return image
 
 
-def _joined(motions: Sequence[Motion | None] | None, numbers: Sequence[int]) -> list[Motion]:
-    """What the robot did between frames of these numbers."""
+def _joined(motions: Sequence[Motion | None] | None, numbers: Sequence[int]) -> list[Motion | None]:
+    """What the robot did up to frames of these numbers since the last one that the odometry tells of."""
     if motions is None:
         return [Motion() for _ in numbers]
-    joined = []
+    joined: list[Motion | None] = []
     before = numbers[0] if numbers else 0
     for number in numbers:
+        if motions[number] is None:
+            joined.append(None)
+            continue
         parts = [motion for motion in motions[before + 1 : number + 1] if motion is not None]
         joined.append(Motion(sum(part.yaw_rad for part in parts), sum(abs(part.distance_m) for part in parts)))
         before = number

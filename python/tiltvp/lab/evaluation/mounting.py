@@ -117,7 +117,8 @@ def _leans(prefix: str, tilts: DriveTilts, drive: RecordedDrive, nominal: NDArra
     true = drive.tilts @ (nominal @ drive.robot_from_mounted_camera.T).T
     filtered, errors = TiltFilter(estimate_mounting=True), []
     for estimate, motion, normal in zip(tilts.estimates, tilts.motions, true, strict=True):
-        filtered.predict(motion.yaw_rad, motion.distance_m)
+        if motion is not None:
+            filtered.predict(motion.yaw_rad, motion.distance_m)
         if estimate is None:
             continue
         filtered.update(estimate)
