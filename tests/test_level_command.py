@@ -190,6 +190,21 @@ def test_a_video_has_a_filter_whose_options_and_plot_count(
     assert main(["level", str(tmp_path / "images"), "--out", str(tmp_path / "one"), *options]) == 2
 
 
+def test_what_a_filter_does_not_tell_is_not_laid_to_the_image(
+    camera: tiltvp.Camera, room: RoomImage, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Of one that was sure of itself it was said that it is not believed, confidence 0.99."""
+    camera.save(tmp_path / "camera.toml")
+    images = tmp_path / "images"
+    for name in "ab":
+        tiltvp.write_image(images / f"{name}.png", room.gray)
+    (images / "frames.csv").write_text("file,time_s\na.png,0\nb.png,9\n")
+    (images / "odometry.csv").write_text("time_s,distance_m,yaw_rad\n0,0,0\n0.4,0,0\n")
+    words = ["level", str(images), "--camera", str(tmp_path / "camera.toml"), "--out", str(tmp_path / "out")]
+    assert main([*words, "--filter"]) == 1
+    assert "b.png: no filtered tilt: the odometry does not tell of its time; left out\n" in capsys.readouterr().err
+
+
 @pytest.mark.parametrize("name", ["level.mkv", "level.png"])
 def test_a_file_of_another_ending_is_no_folder(
     name: str, photo: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]

@@ -156,6 +156,8 @@ class Levelling:
             return str(outcome.error)
         if not estimate:
             return f"no tilt: {estimate.reason}"
+        if outcome.filtered is not None:
+            return f"no filtered tilt: {outcome.filtered.reason if outcome.accepted else outcome.verdict_reason}"
         return f"its tilt is not believed, confidence {estimate.confidence:.2f}"
 
 
