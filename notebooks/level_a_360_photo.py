@@ -30,7 +30,7 @@ AHEAD = ((0.0, 0.0, 1.0), (-1.0, 0.0, 0.0), (0.0, -1.0, 0.0))
 camera = tiltvp.Camera.equirectangular(width=1024, height=512)
 room = Room("living-room", 5, light_spacing_m=0.5)
 pose = room.free_poses(1, 2)[0]
-upright = room.render_panorama(pose=pose, height=512, camera_height_m=1.4, noise_sigma=2.0, samples=2, seed=1)
+upright = room.render_panorama(pose=pose, height=camera.height, camera_height_m=1.4, noise_sigma=2.0, samples=2, seed=1)
 
 # %% [markdown]
 # The panorama is turned by a known lean of 20 degrees. `level` turns the other way round if it is given the lean of
@@ -65,7 +65,7 @@ level = tiltvp.level(askew, estimator, estimate)
 figure, axes = plt.subplots(2, 1, figsize=(9, 9.2), layout="constrained")
 for axis, picture, title in zip(axes, (askew, level), ("as it was taken", "level"), strict=True):
     axis.imshow(picture[:, :, ::-1])
-    axis.axhline(255.5, color="white", linewidth=0.6)
+    axis.axhline(0.5 * (camera.height - 1), color="white", linewidth=0.6)
     axis.set(title=title, xticks=[], yticks=[])
 
 again = estimator(level)
