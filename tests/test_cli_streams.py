@@ -350,15 +350,20 @@ def test_wrong_use(run: Run, world: Path, words: list[str], hint: str, monkeypat
         ["level", "drive.mp4", "--out", "drive.mp4"],
         ["level", "drive.mp4", "--out", "."],
         ["track", "drive.mp4", "--video", "drive.mp4", "--out", "tracks.csv"],
+        ["track", "images", "--plot", "images/a.png", "--out", "tracks.csv"],
+        ["tilt", "images", "--filter", "--filter-plot", "images/a.png"],
+        ["tilt", "drive_mcap/drive_mcap.mcap", "--out", "drive_mcap/drive_mcap.mcap"],
     ],
 )
 def test_what_is_read_is_not_replaced(run: Run, world: Path, words: list[str], monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(world)
-    before = [(world / name).read_bytes() for name in ("drive.mp4", "images/a.png")]
+    before = [(world / name).read_bytes() for name in ("drive.mp4", "images/a.png", "drive_mcap/drive_mcap.mcap")]
     said = run(*(word.format(world.name) for word in words), "--camera", "camera.toml", "--overwrite")
     assert (said.code, said.out) == (2, "")
     assert "is what is read, or holds it, expected another place" in said.err
-    assert [(world / name).read_bytes() for name in ("drive.mp4", "images/a.png")] == before
+    assert [
+        (world / name).read_bytes() for name in ("drive.mp4", "images/a.png", "drive_mcap/drive_mcap.mcap")
+    ] == before
     assert not (world / "tracks.csv").exists()
 
 

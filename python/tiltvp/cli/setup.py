@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from tiltvp.cli.declared_options import mask_from
 from tiltvp.cli.mount import mounting_lines
 from tiltvp.cli.options import CameraOptions, MountedOptions, Switch
-from tiltvp.cli.sources import MotionOptions, SourceOptions
+from tiltvp.cli.sources import MotionOptions, SourceOptions, check_apart
 from tiltvp.cli.tables import PICTURES, check_file
 from tiltvp.cli.terminal import complain, progress_bar, say
 from tiltvp.files import check_output
@@ -71,6 +71,7 @@ def setup(
     lens = camera.load(source.topic)
     mounted = camera.complete(MountedOptions(robot_from_camera=robot_from_camera, mask=mask))
     frames = source.open(recording)
+    check_apart(frames, picture, mask_path(out))
     motion = motion.of_robot(known, frames)
     moved = motion.motions(frames)
     with progress_bar(measured_count(frames), "images") as bar:

@@ -183,13 +183,16 @@ def wheel_base_of(robot: Robot | None, given_m: float | None) -> float | None:
 
 
 def check_apart(frames: Frames | None, *outputs: Path | None) -> None:
-    """Refuses a folder that holds images to be read, whose place pictures would take, and the video that is read."""
+    """Refuses what is read, images, video, recording or odometry, and a folder that holds images, whose place pictures
+    would take."""
     from tiltvp.streams.image_files import ImageFiles
 
-    if frames is None:
+    if frames is None or frames.count is None:
         return
-    read = {file.parent for file in frames.files} if isinstance(frames, ImageFiles) else {Path(frames.source)}
-    places = {os.path.realpath(path) for path in read}
+    places = {os.path.realpath(path) for path in (frames.source, frames.recording) if path is not None}
+    if isinstance(frames, ImageFiles):
+        folders = {file.parent: os.path.realpath(file.parent) for file in frames.files}
+        places = places | set(folders.values()) | {os.path.join(folders[one.parent], one.name) for one in frames.files}
     for output in outputs:
         if output is not None and os.path.realpath(output) in places:
             raise InvalidInputError(f"{output}: is what is read, or holds it, expected another place")
