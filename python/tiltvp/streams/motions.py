@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
@@ -24,6 +24,8 @@ if TYPE_CHECKING:
 __all__ = ["FrameMotions", "frame_motions", "read_odometry"]
 
 _DEFAULTS = Wheels()
+_UNITS: Final = ("millimetres", "cumulative")
+"""Readings of `DriveLog.read_as` that are not about which wheel is which."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,24 +117,44 @@ def _of_table(table: OdometryTable, wheels: Wheels, read_as: Sequence[str]) -> t
 
 
 def _by_ours(record: Odometry, wheels: Wheels, read_as: Sequence[str]) -> Odometry:
-    """A record of other conventions by ours, sample by sample; wheels that are not recorded are those of the motion."""
+    """A record of other conventions by ours, sample by sample; wheels that are not recorded are those of the motion.
+
+    Turns and ways that are told beside wheels know nothing of which wheel is which: only their units are read.
+    """
     if not read_as:
         return record
-    rolled = record.wheels_m
+    base, rolled = wheels.wheel_base_m, record.wheels_m
     if rolled is None:
-        if record.yaw_rad is None or wheels.wheel_base_m is None:
+        if record.yaw_rad is None or base is None:
             raise InvalidInputError(f"{record.source}: no wheels to read as {' '.join(read_as)}, expected a wheel base")
-        # Turns that were told by themselves have no unit of length, and those of the wheels will be divided by it.
-        per_metre = 1e3 ** list(read_as).count("millimetres")
-        aside = 0.5 * wheels.wheel_base_m * per_metre * record.yaw_rad
-        rolled = np.stack([record.distance_m - aside, record.distance_m + aside], axis=1)
-    log = DriveLog(np.diff(rolled, axis=0, prepend=0.0), np.array([[0.0, 0.0, 1.0]]), None).read_as(*read_as)
-    if log.bearings[0, 2] != 1.0:
-        raise InvalidInputError(f"{record.source}: read as {' '.join(read_as)}, expected words about the wheels")
-    return Odometry.from_wheels(
-        record.times_s, np.cumsum(log.odometry, axis=0), wheel_base_m=wheels.wheel_base_m, source=record.source,
-        notes=record.notes, gap_max_s=record.gap_max_s,
-    )  # fmt: skip
+        rolled = _wheels_of(record, base, read_as)
+
+    def of_wheels(rolled: NDArray[np.float64], base: float | None, words: Sequence[str]) -> Odometry:
+        log = DriveLog(np.diff(rolled, axis=0, prepend=0.0), np.array([[0.0, 0.0, 1.0]]), None).read_as(*words)
+        if log.bearings[0, 2] != 1.0:
+            raise InvalidInputError(f"{record.source}: read as {' '.join(words)}, expected words about the wheels")
+        return Odometry.from_wheels(
+            record.times_s, np.cumsum(log.odometry, axis=0), wheel_base_m=base, source=record.source,
+            notes=record.notes, gap_max_s=record.gap_max_s,
+        )  # fmt: skip
+
+    ours = of_wheels(rolled, base, read_as)
+    if record.wheels_m is None:
+        return ours
+    units = [word for word in read_as if word in _UNITS]
+    told, derived = of_wheels(_wheels_of(record, 1.0, units), 1.0, units), of_wheels(rolled, base, ())
+    if record.yaw_rad is not None and (derived.yaw_rad is None or not np.allclose(record.yaw_rad, derived.yaw_rad)):
+        ours = replace(ours, yaw_rad=told.yaw_rad)
+    return ours if np.allclose(record.distance_m, derived.distance_m) else replace(ours, distance_m=told.distance_m)
+
+
+def _wheels_of(record: Odometry, base: float, read_as: Sequence[str]) -> NDArray[np.float64]:
+    """(N, 2): how far wheels so far apart would have rolled."""
+    # Turns that were told by themselves have no unit of length, and those of the wheels will be divided by it.
+    per_metre = 1e3 ** list(read_as).count("millimetres")
+    yaw = np.zeros(len(record.times_s)) if record.yaw_rad is None else record.yaw_rad
+    aside = 0.5 * base * per_metre * yaw
+    return np.stack([record.distance_m - aside, record.distance_m + aside], axis=1)
 
 
 def _summed(motions: Sequence[Motion], turns_known: bool, source: str) -> Odometry:
