@@ -132,6 +132,23 @@ def test_levellers_show_what_they_are_asked_for(camera: tiltvp.Camera, room: Roo
     assert tiltvp.Leveller(camera, to=pinhole.output)(room.gray, tilt).shape == (60, 90)
 
 
+def test_matrices_are_taken_as_they_are_when_they_are_given(camera: tiltvp.Camera, room: RoomImage) -> None:
+    turned = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+    for make in (
+        lambda matrix: tiltvp.Leveller(camera, matrix, to="pinhole", robot_from_output=matrix),
+        partial(tiltvp.Unwrapper, camera),
+    ):
+        matrix = np.eye(3)
+        one = make(matrix)
+        seen = one(room.gray, (0.1, 0.7))
+        matrix[:] = turned
+        again = pickle.loads(pickle.dumps(one))
+        assert np.array_equal(again(room.gray, (0.1, 0.7)), seen)
+        if isinstance(one, tiltvp.Leveller):
+            one.robot_from_output[:] = turned
+            assert np.array_equal(one.robot_from_output, np.eye(3))
+
+
 def test_strips_have_the_size_and_the_channels_asked_for(camera: tiltvp.Camera, room: RoomImage) -> None:
     made = tiltvp.Unwrapper(camera, size=(72.0, np.int64(40)))
     assert made.size == (72, 40)

@@ -188,6 +188,13 @@ def test_motions_without_wheels_are_read_by_those_that_they_have(tmp_path: Path)
         read_odometry(path, read_as=["wheels-swapped"])
 
 
+def test_a_buffer_that_is_filled_anew_does_not_change_the_record() -> None:
+    times = np.array([0.0, 0.1, 0.2])
+    odometry = Odometry.from_wheels(times, np.stack([times, times], axis=1), wheel_base_m=1.0)
+    times += 7.0
+    np.testing.assert_array_equal(odometry.times_s, [0.0, 0.1, 0.2])
+
+
 def test_nothing_is_made_up_outside_and_in_gaps() -> None:
     times = np.array([0.0, 0.1, 0.2, 2.2, 2.3])
     odometry = Odometry.from_wheels(times, np.stack([times, times], axis=1), wheel_base_m=1.0)

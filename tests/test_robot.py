@@ -47,6 +47,14 @@ def test_what_is_written_is_read(tmp_path):
         robot().save(tmp_path / "robot")
 
 
+def test_arrays_that_change_later_are_not_its_own():
+    mask, covariance = np.ones((48, 64), dtype=bool), np.eye(2)
+    made = robot(mask=mask, covariance_rad2=covariance)
+    mask[:], covariance[:] = False, 0.0
+    assert made.mask.all()
+    np.testing.assert_array_equal(made.covariance_rad2, np.eye(2))
+
+
 def test_where_the_camera_is_comes_back_too(tmp_path):
     path = tmp_path / "robot.toml"
     covariance = np.diag([1e-6, 2e-6, 3e-6, 4e-6, 5e-6])

@@ -17,9 +17,9 @@ __all__ = ["array_from", "number_from", "pair_from", "path_from", "size_from", "
 
 
 def array_from(values: ArrayLike, name: str) -> NDArray[np.float64]:
-    """An array of real numbers, of any shape, which may be NaN. Raises `InvalidInputError`."""
+    """A fresh array of real numbers, of any shape, which may be NaN. Raises `InvalidInputError`."""
     try:
-        return np.asarray(values, dtype=np.float64)
+        return np.array(values, dtype=np.float64)
     except (TypeError, ValueError):
         raise InvalidInputError(f"{name}: no array of numbers, expected one") from None
 

@@ -110,11 +110,11 @@ def checked_camera(camera: object) -> None:
 
 
 def checked_mask(mask: ArrayLike, camera: _core.Camera) -> NDArray[np.bool_]:
-    """The (H, W) bool array, True where images of the camera show the world.
+    """A fresh (H, W) bool array, True where images of the camera show the world.
 
     Raises `InvalidInputError` for other types, such as uint8, for other shapes, and for one that is True nowhere.
     """
-    array = np.asarray(mask)
+    array = np.array(mask)
     if array.dtype != np.bool_ or array.shape != (camera.height, camera.width):
         expected = f"({camera.height}, {camera.width}) of bool, as the camera's images"
         raise InvalidInputError(f"mask: shape {array.shape} of {array.dtype}, expected {expected}")

@@ -81,8 +81,8 @@ class Leveller:
         """Whose images they become."""
         ahead = to == "panorama" and robot_from_output is None
         looks = _AHEAD if ahead else robot_from_output
-        self._given = (camera, robot_from_camera, self.output, looks)
         self._core = _core.Leveller(camera, self.output, robot_from_camera=robot_from_camera, robot_from_shown=looks)
+        self._looks = None if looks is None else np.array(looks, dtype=np.float64)
 
     @property
     def robot_from_camera(self) -> NDArray[np.float64]:
@@ -92,8 +92,7 @@ class Leveller:
     @property
     def robot_from_output(self) -> NDArray[np.float64]:
         """(3, 3): where the level image looks."""
-        looks = self._given[3]
-        return self.robot_from_camera if looks is None else np.asarray(looks, dtype=np.float64)
+        return self.robot_from_camera if self._looks is None else self._looks.copy()
 
     def __call__(self, image: ArrayLike, tilt: Tilt) -> NDArray[Any]:
         """The level image of one (H, W) or (H, W, channels) of the camera, of the same dtype and channels.
@@ -118,7 +117,7 @@ class Leveller:
         return _places(self._core, tilt)
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return _again, self._given
+        return _again, (self.camera, self.robot_from_camera, self.output, self._looks)
 
     def __repr__(self) -> str:
         return f"Leveller({self.camera!r}, to={self.output!r})"
@@ -310,7 +309,7 @@ class Unwrapper:
         """Whose images are unwrapped."""
         self.size: tuple[int, int] = (width, height)
         """Columns and rows of strips."""
-        self._given = (camera, robot_from_camera, self.size, elevation_min_rad, elevation_max_rad)
+        self._elevations = (elevation_min_rad, elevation_max_rad)
         azimuth = (np.arange(_ACROSS * width) + 0.5 - 0.5 * _ACROSS) * (2.0 * np.pi / (_ACROSS * width))
         rows = _DOWN * height
         reach = elevation_max_rad - elevation_min_rad
@@ -341,7 +340,7 @@ class Unwrapper:
         return np.asarray(strip, dtype=np.float32).reshape(self.size[1], self.size[0], *array.shape[2:])
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return _unwrapper, self._given
+        return _unwrapper, (self.camera, self._core.robot_from_camera, self.size, *self._elevations)
 
     def __repr__(self) -> str:
         return f"Unwrapper({self.camera!r}, size={self.size})"
