@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import struct
+from collections.abc import Callable
 from pathlib import Path
 
 import cv2
@@ -15,7 +16,7 @@ import tiltvp
 from tiltvp.cli.sources import distinct_names
 from tiltvp.errors import ImageFileError, InvalidInputError, OutputError
 from tiltvp.image_headers import header_size
-from tiltvp.images import decode_as_stored, gray_from, read_image
+from tiltvp.images import bgr_from, decode_as_stored, gray_from, read_image
 from tiltvp.streams.image_files import find_images
 
 LEVELS = np.arange(256, dtype=np.uint8).reshape(16, 16)
@@ -117,6 +118,51 @@ def test_what_is_written_is_what_was_meant(tmp_path: Path) -> None:
         with pytest.raises(InvalidInputError, match=r"b\.png"):
             tiltvp.write_image(tmp_path / "b.png", other)
     assert not (tmp_path / "b.png").exists()
+
+
+def test_what_is_no_image_is_not_written(tmp_path: Path) -> None:
+    for image in (LEVELS[0], LEVELS[:0], np.dstack([LEVELS] * 2), np.dstack([LEVELS] * 5), None, [[1], [2, 3]]):
+        with pytest.raises(InvalidInputError, match=r"a\.png.*expected \(H, W\) or"):
+            tiltvp.write_image(tmp_path / "a.png", image)  # type: ignore[arg-type]
+    assert not list(tmp_path.iterdir())
+
+
+def test_the_byte_order_of_an_array_does_not_matter(tmp_path: Path) -> None:
+    deep = LEVELS.astype(np.uint16) * np.uint16(255)
+    tiltvp.write_image(tmp_path / "a.png", deep.astype(">u2"))
+    assert np.array_equal(decode_as_stored((tmp_path / "a.png").read_bytes()), deep)
+    camera = tiltvp.Camera.equidistant(width=16, height=16, focal_px=5.0, cx=7.5, cy=7.5)
+    levelled = tiltvp.level(deep.astype(">u2"), camera, (0.1, 0.7), np.eye(3))
+    assert np.array_equal(levelled, tiltvp.level(deep, camera, (0.1, 0.7), np.eye(3)))
+
+
+def test_masked_values_are_no_pixels() -> None:
+    camera = tiltvp.Camera.equidistant(width=16, height=16, focal_px=5.0, cx=7.5, cy=7.5)
+    hidden = np.ma.masked_array(LEVELS, mask=LEVELS > 100)
+    calls = [
+        gray_from,
+        tiltvp.TiltEstimator(camera, elevation_min_rad=0.2),
+        lambda image: tiltvp.level(image, camera, (0.1, 0.7), np.eye(3)),
+        lambda image: tiltvp.body_mask([image] * 5, camera),
+        lambda image: tiltvp.write_image("a.png", image),
+        lambda image: bgr_from(np.ma.dstack([image] * 3)),
+    ]
+    for call in calls:
+        with pytest.raises(InvalidInputError, match="masked values, expected one without"):
+            call(hidden)
+    assert np.array_equal(gray_from(np.ma.masked_array(LEVELS)), LEVELS)
+
+
+@pytest.mark.parametrize("check", [tiltvp.body_mask, tiltvp.check_lens, tiltvp.check_setup, tiltvp.surround_mask])
+def test_what_are_no_images_or_no_camera_is_said(check: Callable[..., object]) -> None:
+    camera = tiltvp.Camera.equidistant(width=16, height=16, focal_px=5.0, cx=7.5, cy=7.5)
+    with pytest.raises(InvalidInputError, match=r"images: NoneType, expected several images"):
+        check(None, camera)
+    if check is not tiltvp.surround_mask:
+        with pytest.raises(InvalidInputError, match=r"camera: str, expected a tiltvp\.Camera"):
+            check([LEVELS] * 5, "camera.toml", mask=LEVELS > 3)
+        with pytest.raises(InvalidInputError, match=r"mask: cannot be made an array"):
+            check([LEVELS] * 5, camera, mask=[[True], [True, False]])
 
 
 def test_unreadable_files_are_named(tmp_path: Path) -> None:

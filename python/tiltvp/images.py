@@ -27,6 +27,7 @@ __all__ = [
     "decode_image",
     "gray_from",
     "grays_from",
+    "pixels_from",
     "read_image",
     "write_image",
 ]
@@ -48,15 +49,7 @@ def gray_from(image: ArrayLike, name: str = "image", *, bits: int | None = None)
     their files; or that of `bits`, where they are known. Floats in [0, 1] are scaled by 255. All are rounded. Raises
     `InvalidInputError` for other shapes and types, empty images, NaN, floats outside [0, 1], and values above `bits`.
     """
-    try:
-        array = np.asarray(image)
-    except ValueError as error:
-        raise InvalidInputError(f"{name}: cannot be made an array ({error}), expected {_EXPECTED}") from error
-    if array.ndim not in (2, 3) or (array.ndim == 3 and array.shape[2] not in (1, 3, 4)):
-        raise InvalidInputError(f"{name}: shape {array.shape}, expected {_EXPECTED}")
-    if array.size == 0:
-        raise InvalidInputError(f"{name}: shape {array.shape} is empty, expected {_EXPECTED}")
-    levels = _bytes_from(array, name, bits)
+    levels = _bytes_from(_image_from(image, name), name, bits)
     if levels.ndim == 3:
         if levels.shape[2] == 1:
             levels = levels[:, :, 0]
@@ -68,11 +61,42 @@ def gray_from(image: ArrayLike, name: str = "image", *, bits: int | None = None)
     return np.ascontiguousarray(levels)
 
 
+def pixels_from(image: ArrayLike, name: str, expected: str) -> NDArray[Any]:
+    """The array of an image or a mask, of the machine's byte order.
+
+    Raises `InvalidInputError` for what is none, and for one with masked values: they would be pixels like others.
+    """
+    if np.ma.is_masked(image):
+        raise InvalidInputError(f"{name}: an array with masked values, expected one without: {expected}")
+    try:
+        array = np.asarray(image)
+    except ValueError as error:
+        raise InvalidInputError(f"{name}: cannot be made an array ({error}), expected {expected}") from error
+    return array.astype(array.dtype.newbyteorder("="), copy=False)
+
+
+def _image_from(image: ArrayLike, name: str) -> NDArray[Any]:
+    """The array of an image, of a shape that one may have."""
+    array = pixels_from(image, name, _EXPECTED)
+    if array.ndim not in (2, 3) or (array.ndim == 3 and array.shape[2] not in (1, 3, 4)):
+        raise InvalidInputError(f"{name}: shape {array.shape}, expected {_EXPECTED}")
+    if array.size == 0:
+        raise InvalidInputError(f"{name}: shape {array.shape} is empty, expected {_EXPECTED}")
+    return array
+
+
 def grays_from(images: Iterable[ArrayLike]) -> list[NDArray[np.uint8]]:
     """`gray_from` of each, by its number; copies where `images` is no sequence: drivers write into one buffer."""
     kept = isinstance(images, Sequence | np.ndarray)
-    grays = (gray_from(image, f"images[{number}]") for number, image in enumerate(images))
+    grays = (gray_from(image, name) for name, image in _named(images))
     return [gray if kept else gray.copy() for gray in grays]
+
+
+def _named(images: Iterable[ArrayLike]) -> Iterator[tuple[str, ArrayLike]]:
+    """Images with the names that messages call them."""
+    if not isinstance(images, Iterable):
+        raise InvalidInputError(f"images: {type(images).__name__}, expected several images")
+    return ((f"images[{number}]", image) for number, image in enumerate(images))
 
 
 def bgr_from(image: ArrayLike, name: str = "image", *, bits: int | None = None) -> NDArray[np.uint8]:
@@ -81,10 +105,7 @@ def bgr_from(image: ArrayLike, name: str = "image", *, bits: int | None = None) 
     As `gray_from`; grey images are refused too.
     """
     expected = "(H, W, 3 or 4 in BGR order) of uint8, uint16, or float in [0, 1]"
-    try:
-        array = np.asarray(image)
-    except ValueError as error:
-        raise InvalidInputError(f"{name}: cannot be made an array ({error}), expected {expected}") from error
+    array = pixels_from(image, name, expected)
     if array.ndim != 3 or array.shape[2] not in (3, 4) or array.size == 0:
         raise InvalidInputError(f"{name}: shape {array.shape}, expected {expected}")
     return np.ascontiguousarray(_bytes_from(array[:, :, :3], name, bits))
@@ -96,10 +117,10 @@ def camera_grays(images: Iterable[ArrayLike], camera: _core.Camera) -> Iterator[
     Raises `InvalidInputError` with the number of what is no image, or one of another size than the camera's.
     """
     shape = (camera.height, camera.width)
-    for number, image in enumerate(images):
-        gray = gray_from(image, f"images[{number}]")
+    for name, image in _named(images):
+        gray = gray_from(image, name)
         if gray.shape != shape:
-            raise InvalidInputError(f"images[{number}]: shape {gray.shape}, expected {shape}, as the camera's images")
+            raise InvalidInputError(f"{name}: shape {gray.shape}, expected {shape}, as the camera's images")
         yield gray
 
 
@@ -114,9 +135,10 @@ def checked_mask(mask: ArrayLike, camera: _core.Camera) -> NDArray[np.bool_]:
 
     Raises `InvalidInputError` for other types, such as uint8, for other shapes, and for one that is True nowhere.
     """
-    array = np.array(mask)
+    checked_camera(camera)
+    expected = f"({camera.height}, {camera.width}) of bool, as the camera's images"
+    array = pixels_from(mask, "mask", expected).copy()
     if array.dtype != np.bool_ or array.shape != (camera.height, camera.width):
-        expected = f"({camera.height}, {camera.width}) of bool, as the camera's images"
         raise InvalidInputError(f"mask: shape {array.shape} of {array.dtype}, expected {expected}")
     if not array.any():
         raise InvalidInputError("mask: False everywhere, expected True where images show the world")
@@ -126,7 +148,7 @@ def checked_mask(mask: ArrayLike, camera: _core.Camera) -> NDArray[np.bool_]:
 def _bytes_from(array: NDArray[Any], name: str, bits: int | None = None) -> NDArray[np.uint8]:
     if array.dtype == np.uint8:
         return array
-    if array.dtype.kind == "u" and array.dtype.itemsize == 2:  # Of either byte order.
+    if array.dtype == np.uint16:
         least = bits_of(array)
         if bits is not None and least > bits:
             raise InvalidInputError(f"{name}: a value of {array.max()}, expected at most {2**bits - 1} ({bits} bits)")
@@ -202,15 +224,15 @@ def write_image(path: str | os.PathLike[str], image: NDArray[Any]) -> None:
     """Writes an image (H, W) or (H, W, 3 or 4), colour in BGR order, whole or not at all; the ending says the format.
 
     uint16 is kept where the format holds it. What else `gray_from` takes becomes uint8 as there: bool, so masks are
-    black and white, floats in [0, 1], and uint16. Raises `InvalidInputError` for other types, `ImageFileError` for an
-    image that the format cannot hold, `OutputError` where it cannot be written.
+    black and white, floats in [0, 1], and uint16. Raises `InvalidInputError` for other types and shapes,
+    `ImageFileError` for an image that the format cannot hold, `OutputError` where it cannot be written.
     """
     import cv2
 
     file = path_from(path)
     ending = file.suffix or ".png"
-    levels = np.asarray(image)
-    if levels.size and (levels.dtype != np.uint16 or ending.lower() not in _DEEP):
+    levels = _image_from(image, os.fspath(file))
+    if levels.dtype != np.uint16 or ending.lower() not in _DEEP:
         levels = _bytes_from(levels, os.fspath(file))
     try:
         done, data = cv2.imencode(ending, levels)

@@ -11,7 +11,7 @@ from tiltvp import _core
 from tiltvp.arguments import number_from, size_from
 from tiltvp.cameras import Camera
 from tiltvp.errors import InvalidInputError
-from tiltvp.images import checked_camera
+from tiltvp.images import checked_camera, pixels_from
 from tiltvp.tilt import TiltEstimator, normal_of
 
 if TYPE_CHECKING:
@@ -195,9 +195,9 @@ def _not_too_large(camera: _core.Camera) -> _core.Camera:
 
 
 def _checked(image: ArrayLike, camera: _core.Camera) -> NDArray[Any]:
-    array = np.asarray(image)
+    expected = f"({camera.height}, {camera.width}) or ({camera.height}, {camera.width}, channels)"
+    array = pixels_from(image, "image", expected)
     if array.ndim not in (2, 3) or array.shape[:2] != (camera.height, camera.width):
-        expected = f"({camera.height}, {camera.width}) or ({camera.height}, {camera.width}, channels)"
         raise InvalidInputError(f"image: shape {array.shape}, expected {expected}, as the camera's images")
     if array.dtype not in _LEVELLED or (array.ndim == 3 and not 1 <= array.shape[2] <= 4):
         kinds = ", ".join(_LEVELLED)
