@@ -18,7 +18,7 @@ from tiltvp.drive_logs import READINGS, DriveLog, doubled_rows
 from tiltvp.errors import InvalidInputError
 from tiltvp.lab.datasets.hostile_drives import UNDISTURBED, HostileDrive, hostile_drives
 from tiltvp.lab.evaluation.hostile_drives import judge_drives, summarise_drive_cases
-from tiltvp.streams import read_odometry
+from tiltvp.streams import Wheels, read_odometry
 from tiltvp.synth import simulate_drive
 
 
@@ -81,6 +81,27 @@ def test_readings_are_undone() -> None:
     with pytest.raises(InvalidInputError, match="mirrored"):
         log.read_as("mirrored")
     assert len(READINGS) == 8
+
+
+@pytest.mark.parametrize("base_m", [None, 0.4])
+def test_turns_beside_wheels_stay_as_they_are_told(base_m: float | None, tmp_path: Path) -> None:
+    steps, told = simulate_drive("paper", seed=4).odometry, 0.02
+    others = {
+        "wheels-swapped": steps[:, ::-1], "wheels-negated": -steps, "left-wheel-negated": steps * [-1.0, 1.0],
+        "right-wheel-negated": steps * [1.0, -1.0], "millimetres": 1e3 * steps,
+        "cumulative": np.cumsum(steps, axis=0),
+    }  # fmt: skip
+    for word, wheels in others.items():
+        rows = enumerate(wheels.tolist(), start=1)
+        table = [
+            f"{0.1 * k},{left!r},{right!r},{k * told if word == 'cumulative' else told}" for k, (left, right) in rows
+        ]
+        (tmp_path / "odometry.csv").write_text("\n".join(["time_s,left_m,right_m,yaw_rad", *table]))
+        ours = read_odometry(tmp_path / "odometry.csv", wheels=Wheels(wheel_base_m=base_m), read_as=[word])
+        # A gyroscope knows nothing of which wheel is which, and its turns are none of these wheels'.
+        np.testing.assert_allclose(ours.wheels_m, np.cumsum(steps, axis=0), atol=1e-9)
+        np.testing.assert_allclose(ours.distance_m, np.cumsum(steps.mean(axis=1)), atol=1e-9)
+        np.testing.assert_allclose(ours.yaw_rad, told * np.arange(1, len(steps) + 1), atol=1e-9)
 
 
 @pytest.mark.slow

@@ -162,21 +162,6 @@ def test_wheels_of_other_conventions_are_mended_before_they_are_summed(word: str
         assert motion.distance_m == pytest.approx(SPEED * elapsed)
 
 
-@pytest.mark.parametrize("word", RECORDED)
-def test_turns_beside_wheels_stay_as_they_are_told(word: str, tmp_path: Path) -> None:
-    right = np.stack(list(columns("wheels").values()), axis=1)
-    # A gyroscope knows nothing of which wheel is which, and its turns are none of these wheels'.
-    told = np.linspace(0.01, 0.03, len(right))
-    turns = np.cumsum(told) if word == "cumulative" else told
-    left, other = RECORDED[word](right).T
-    path = write(tmp_path / "odometry.csv", {"time_s": TIMES, "left_m": left, "right_m": other, "yaw_rad": turns})
-    for wheels in (WHEELS, Wheels()):
-        ours = read_odometry(path, wheels=wheels, read_as=[word])
-        np.testing.assert_allclose(ours.wheels_m, np.cumsum(right, axis=0), atol=1e-12)
-        np.testing.assert_allclose(ours.distance_m, np.cumsum(right.mean(axis=1)), atol=1e-12)
-        np.testing.assert_allclose(ours.yaw_rad, np.cumsum(told), atol=1e-12)
-
-
 def test_motions_without_wheels_are_read_by_those_that_they_have(tmp_path: Path) -> None:
     path = write(tmp_path / "odometry.csv", {"time_s": TIMES} | columns("poses"))
     ours = read_odometry(path, wheels=WHEELS, read_as=["wheels-swapped"]).between(0.5, 1.5)
@@ -186,13 +171,6 @@ def test_motions_without_wheels_are_read_by_those_that_they_have(tmp_path: Path)
             read_odometry(path, wheels=WHEELS, read_as=words)
     with pytest.raises(InvalidInputError, match="expected a wheel base"):
         read_odometry(path, read_as=["wheels-swapped"])
-
-
-def test_a_buffer_that_is_filled_anew_does_not_change_the_record() -> None:
-    times = np.array([0.0, 0.1, 0.2])
-    odometry = Odometry.from_wheels(times, np.stack([times, times], axis=1), wheel_base_m=1.0)
-    times += 7.0
-    np.testing.assert_array_equal(odometry.times_s, [0.0, 0.1, 0.2])
 
 
 def test_nothing_is_made_up_outside_and_in_gaps() -> None:

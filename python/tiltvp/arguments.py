@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -17,11 +18,15 @@ __all__ = ["array_from", "number_from", "pair_from", "path_from", "size_from", "
 
 
 def array_from(values: ArrayLike, name: str) -> NDArray[np.float64]:
-    """A fresh array of real numbers, of any shape, which may be NaN. Raises `InvalidInputError`."""
-    try:
-        return np.array(values, dtype=np.float64)
-    except (TypeError, ValueError):
-        raise InvalidInputError(f"{name}: no array of numbers, expected one") from None
+    """A fresh array of real numbers, of any shape, which may be NaN. Raises `InvalidInputError`.
+
+    Texts, bools, complex numbers and dates are none, nor are arrays with masked values.
+    """
+    with suppress(TypeError, ValueError, OverflowError):
+        array = np.asarray(values)
+        if array.dtype.kind in "iufO" and not np.ma.is_masked(values):
+            return np.array(array, dtype=np.float64)
+    raise InvalidInputError(f"{name}: no array of numbers, expected one")
 
 
 def path_from(path: str | os.PathLike[str]) -> Path:
@@ -44,12 +49,10 @@ def size_from(size: tuple[int, int], name: str) -> tuple[int, int]:
 
 
 def number_from(value: float, name: str) -> float:
-    """A real number, which may be NaN; a text is none. Raises `InvalidInputError`."""
-    try:
-        if not isinstance(value, str | bytes):
+    """A real number, which may be NaN; texts, bools and complex numbers are none. Raises `InvalidInputError`."""
+    if not isinstance(value, str | bytes | bool | np.bool_ | complex) and not np.ma.is_masked(value):
+        with suppress(TypeError, ValueError, OverflowError):
             return float(value)
-    except (TypeError, ValueError, OverflowError):
-        pass
     raise InvalidInputError(f"{name} = {value!r}, expected a number")
 
 

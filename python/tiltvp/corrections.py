@@ -20,6 +20,7 @@ from tiltvp._core import (
     train_factor,
     train_posterior,
 )
+from tiltvp.arguments import array_from
 from tiltvp.errors import CalibrationError, InvalidInputError, TiltvpError
 from tiltvp.files import check_output, check_toml, write_whole
 
@@ -206,10 +207,7 @@ def train_correction(
     # The vector consensus as it is has the factor 1.
     if (present := estimator.options["correction"]) not in (None, 1.0):
         raise InvalidInputError(f"an estimator with correction = {present!r}, expected one that measures with None")
-    try:
-        shifts, leans = (np.asarray(values, dtype=np.float64) for values in (measured, alpha_rad))
-    except (TypeError, ValueError) as error:
-        raise InvalidInputError(f"measured, alpha_rad: {error}, expected numbers (N,)") from error
+    shifts, leans = array_from(measured, "measured"), array_from(alpha_rad, "alpha_rad")
     if shifts.ndim != 1 or shifts.shape != leans.shape:
         raise InvalidInputError(f"measured, alpha_rad: shapes {shifts.shape} and {leans.shape}, expected (N,) of both")
     # Upright images do not tell a factor.

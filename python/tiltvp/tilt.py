@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
+from contextlib import suppress
 from typing import TYPE_CHECKING, Any, Final, Self
 
 import numpy as np
@@ -23,6 +24,7 @@ from tiltvp._core import (
     tilt_error_rad,
     tilt_from_wheel_heights,
 )
+from tiltvp.arguments import array_from
 from tiltvp.errors import InvalidInputError
 from tiltvp.images import gray_from, grays_from
 
@@ -63,10 +65,9 @@ def normal_of(tilt: Tilt) -> NDArray[np.float64]:
         if not tilt:
             raise InvalidInputError(f"tilt: an estimate without a tilt ({tilt.reason}), expected one with a tilt")
         return tilt.normal
-    try:
-        numbers = np.asarray(tilt, dtype=np.float64)
-    except (TypeError, ValueError):
-        numbers = np.empty(0)
+    numbers = np.empty(0)
+    with suppress(InvalidInputError):
+        numbers = array_from(tilt, "tilt")
     if numbers.shape == (2,):
         if abs(numbers[0]) > math.pi:
             raise InvalidInputError(f"tilt: alpha = {numbers[0]:g}, expected radians, at most pi")

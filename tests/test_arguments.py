@@ -1,0 +1,62 @@
+"""Numbers that functions take: what is none is refused before it is taken for one."""
+
+from __future__ import annotations
+
+from decimal import Decimal
+from typing import Any
+
+import numpy as np
+import pytest
+
+import tiltvp
+from tiltvp.arguments import array_from, number_from
+from tiltvp.errors import InvalidInputError
+from tiltvp.streams import Odometry
+from tiltvp.tilt import normal_of
+
+CAMERA = tiltvp.Camera.equidistant(width=64, height=48, focal_px=20.0, cx=31.5, cy=23.5)
+NONE = {
+    "texts": ["0.1", "0.2"],
+    "bytes": np.array([b"1", b"2"]),
+    "complex": np.array([0.1 + 2j, 0.2]),
+    "bools": [True, False],
+    "dates": np.array(["2020-01-01", "2020-01-02"], "datetime64[ns]"),
+    "times": np.array([1, 2], "timedelta64[ns]"),
+    "masked": np.ma.masked_array([0.1, 0.2], mask=[True, False]),
+    "huge": [10**400, 1],
+    "ragged": [[1.0], [2.0, 3.0]],
+}
+
+
+@pytest.mark.parametrize("values", NONE.values(), ids=NONE)
+def test_what_are_no_numbers(values: Any) -> None:
+    with pytest.raises(InvalidInputError, match="x: no array of numbers"):
+        array_from(values, "x")
+    with pytest.raises(InvalidInputError, match="tilt = "):
+        normal_of(values)
+    # Nanoseconds of a table would be seconds.
+    with pytest.raises(InvalidInputError, match="times_s: no array of numbers"):
+        Odometry.from_wheels(values, np.zeros((2, 2)))
+
+
+def test_numbers_of_any_kind_are_numbers() -> None:
+    for values in ([1, 0.5], np.array([1, 0.5], np.float16), [Decimal(1), 0.5], np.ma.masked_array([1.0, 0.5])):
+        np.testing.assert_array_equal(array_from(values, "x"), [1.0, 0.5])
+    assert np.isnan(array_from([np.nan], "x"))
+    for one in (2, np.float32(2), np.int8(2), np.array(2.0), Decimal(2)):
+        assert number_from(one, "x") == 2.0
+
+
+@pytest.mark.parametrize("value", ["2", b"2", True, np.True_, 2 + 0j, np.complex128(2), np.ma.masked, None, 10**400])
+def test_what_is_no_number(value: Any) -> None:
+    with pytest.raises(InvalidInputError, match=r"x = .*, expected a number"):
+        number_from(value, "x")
+    with pytest.raises(InvalidInputError, match=r"u = .*, expected a number"):
+        CAMERA.cropped(value, 0, 10, 10)
+
+
+def test_a_buffer_that_is_filled_anew_does_not_change_what_was_made_of_it() -> None:
+    times = np.array([0.0, 0.1, 0.2])
+    odometry = Odometry.from_wheels(times, np.stack([times, times], axis=1), wheel_base_m=1.0)
+    times += 7.0
+    np.testing.assert_array_equal(odometry.times_s, [0.0, 0.1, 0.2])
