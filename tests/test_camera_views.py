@@ -11,6 +11,7 @@ import pytest
 from tiltvp import Camera
 from tiltvp.errors import InvalidInputError
 from tiltvp.field_of_view import field_of_view
+from tiltvp.formats import read_cameras, write_cameras
 
 
 @pytest.mark.parametrize(
@@ -50,6 +51,9 @@ def test_a_camera_of_a_view(lens: str, law: Any) -> None:
         ({"width": 0}, "width, height = .0, 48."),
         ({"height": 4.5}, "width, height = .64, 4.5."),
         ({"lens": "pinhole", "view_rad": 3.2}, "view_rad: 183"),
+        ({"lens": "pinhole", "view_rad": 5e-324}, "view_rad: "),
+        ({"lens": np.ones(2)}, "lens = "),
+        ({"mirror": "no"}, "mirror = 'no'"),
     ],
 )
 def test_a_view_that_cannot_be(wrong: dict[str, Any], told: str) -> None:
@@ -68,6 +72,41 @@ def test_a_part_of_an_image_sees_what_it_saw() -> None:
         Camera.equirectangular(width=64, height=32).cropped(0, 0, 32, 32)
     with pytest.raises(InvalidInputError, match="u = '80', expected a number"):
         whole.cropped("80", 0, 32, 32)  # type: ignore[arg-type]
+    assert whole.cropped(0, 0, 100.0, 50.0) == whole.cropped(0, 0, 100, 50)  # type: ignore[arg-type]
+    with pytest.raises(InvalidInputError, match=r"width, height = \(100.5, 50\), expected .* whole numbers"):
+        whole.cropped(0, 0, 100.5, 50)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("factor", ["a", None, True, [2.0], 10**400])
+def test_what_is_no_factor_is_said(factor: Any) -> None:
+    with pytest.raises(InvalidInputError, match=r"factor = .*, expected a number"):
+        Camera.equirectangular(width=64, height=32).scaled(factor)
+
+
+def test_a_camera_in_a_mirror_is_told_by_true_or_false(tmp_path: Path) -> None:
+    path, camera = tmp_path / "one.toml", Camera.pinhole(width=64, height=48, fx=30.0, fy=30.0, cx=31.5, cy=23.5)
+    camera.save(path)
+    assert Camera.load(path, mirror=np.True_) == camera.mirrored()
+    for mirror in ("no", 1, None, np.ones(2)):
+        with pytest.raises(InvalidInputError, match=r"mirror = .*, expected True or False"):
+            Camera.load(path, mirror=mirror)  # type: ignore[arg-type]
+
+
+def test_what_is_no_spec_is_neither_read_nor_written(tmp_path: Path) -> None:
+    camera = Camera.equirectangular(width=64, height=32)
+    write_cameras(camera.to_spec(), tmp_path / "one.toml")
+    assert Camera.load(tmp_path / "one.toml") == camera
+    for format in ("tiltvp", "kalibr"):
+        for given, told in (
+            (camera, "spec: Camera, expected CameraSpec"),
+            ([camera], "spec: Camera, expected CameraSpec"),
+            (camera.to_spec(None), "name = None, expected a text"),  # type: ignore[arg-type]
+        ):
+            with pytest.raises(InvalidInputError, match=told):
+                write_cameras(given, tmp_path / "two.toml", format)  # type: ignore[arg-type]
+    assert not (tmp_path / "two.toml").exists()
+    with pytest.raises(InvalidInputError, match="spec: list, expected one CameraSpec"):
+        Camera.from_spec(read_cameras(tmp_path / "one.toml"))  # type: ignore[arg-type]
 
 
 def test_the_view_of_a_part_without_the_axis_is_that_of_its_rays() -> None:

@@ -14,7 +14,7 @@ from tiltvp.errors import InvalidInputError
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
-__all__ = ["array_from", "number_from", "pair_from", "path_from", "size_from", "two_from"]
+__all__ = ["array_from", "flag_from", "number_from", "pair_from", "path_from", "size_from", "two_from"]
 
 
 def array_from(values: ArrayLike, name: str) -> NDArray[np.float64]:
@@ -54,6 +54,13 @@ def number_from(value: float, name: str) -> float:
         with suppress(TypeError, ValueError, OverflowError):
             return float(value)
     raise InvalidInputError(f"{name} = {value!r}, expected a number")
+
+
+def flag_from(value: bool, name: str) -> bool:
+    """True or False; no other values that are true or false. Raises `InvalidInputError`."""
+    if not isinstance(value, bool | np.bool_):
+        raise InvalidInputError(f"{name} = {value!r}, expected True or False")
+    return bool(value)
 
 
 def pair_from(pair: tuple[float, float], name: str) -> tuple[float, float]:

@@ -7,7 +7,7 @@ import os
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Final, Self
 
-from tiltvp.arguments import number_from, pair_from, size_from
+from tiltvp.arguments import flag_from, number_from, pair_from, size_from
 from tiltvp.errors import CalibrationError, InvalidInputError
 from tiltvp.files import check_toml
 from tiltvp.lenses import Lenses
@@ -38,7 +38,11 @@ class Camera(Lenses):
 
     @classmethod
     def from_spec(cls, spec: CameraSpec) -> Self:
-        """The camera that a reader of calibration files describes."""
+        """The camera that a reader of calibration files describes. Raises `InvalidInputError` for what is no spec."""
+        from tiltvp.formats.spec import CameraSpec
+
+        if not isinstance(spec, CameraSpec):
+            raise InvalidInputError(f"spec: {type(spec).__name__}, expected one CameraSpec, as read_cameras gives them")
         return cls(
             spec.model, width=spec.width, height=spec.height, max_theta_rad=spec.max_theta_rad, mirror=spec.mirror,
             **spec.parameters,
@@ -56,21 +60,20 @@ class Camera(Lenses):
         if none is given. How far a real lens is from its ideal it does not know: calibrate where you can. Raises
         `InvalidInputError` for an unknown lens and for angles and lengths that cannot be.
         """
-        if lens not in VIEW_LENSES:
+        if not (isinstance(lens, str) and lens in VIEW_LENSES):
             raise InvalidInputError(f"lens = {lens!r}, expected one of {', '.join(VIEW_LENSES)}")
         width, height = size_from((width, height), "width, height")
         view_rad = number_from(view_rad, "view_rad")
-        most = math.pi if lens == "pinhole" else 2.0 * math.pi
-        if not 0.0 < view_rad < most:
+        half, most = 0.5 * view_rad, math.pi if lens == "pinhole" else 2.0 * math.pi
+        if not (half > 0.0 and view_rad < most):
             degrees = f"{math.degrees(view_rad):g} degrees"
             raise InvalidInputError(f"view_rad: {degrees}, expected more than 0 and less than {math.degrees(most):g}")
         radius = 0.5 * width if radius_px is None else number_from(radius_px, "radius_px")
         if not (math.isfinite(radius) and radius > 0.0):
             raise InvalidInputError(f"radius_px = {radius_px}, expected a positive number of pixels")
         cx, cy = (0.5 * (width - 1), 0.5 * (height - 1)) if centre_px is None else pair_from(centre_px, "centre_px")
-        half = 0.5 * view_rad
         common: dict[str, Any] = {
-            "width": width, "height": height, "cx": cx, "cy": cy, "mirror": mirror,
+            "width": width, "height": height, "cx": cx, "cy": cy, "mirror": flag_from(mirror, "mirror"),
             "max_theta_rad": None if radius_px is None else half,
         }  # fmt: skip
         if lens == "equidistant":
@@ -86,10 +89,19 @@ class Camera(Lenses):
         focal = radius / math.tan(half)
         return cls("pinhole", fx=focal, fy=focal, **common)
 
-    def cropped(self, u: int, v: int, width: int, height: int) -> Self:
-        """The camera of a part of the image, whose first pixel is (u, v). Parts beyond the image are black borders.
+    def scaled(self, factor: float) -> Self:
+        """The camera of the image resized by `factor`: what was at u is at factor (u + 1/2) - 1/2.
 
-        Raises `InvalidInputError` for an equirectangular camera, which covers the sphere, and for what is no number.
+        The size is rounded to whole pixels. Raises `InvalidInputError` for a factor that is not positive.
+        """
+        return super().scaled(number_from(factor, "factor"))
+
+    def cropped(self, u: int, v: int, width: int, height: int) -> Self:
+        """The camera of a part of the image, whose first pixel is (u, v).
+
+        What of it is beyond the image is a border that shows nothing, which no camera knows, and whose edges are as
+        straight as those of a room: leave it out of what is looked at by `mask`. Raises `InvalidInputError` for an
+        equirectangular camera, which covers the sphere, and for what is no number.
         """
         parameters = self.parameters
         if not {"cx", "cy"} <= parameters.keys():
@@ -98,6 +110,7 @@ class Camera(Lenses):
             "cx": float(parameters["cx"]) - number_from(u, "u"),
             "cy": float(parameters["cy"]) - number_from(v, "v"),
         }
+        width, height = size_from((width, height), "width, height")
         spec = replace(
             self.to_spec(), width=width, height=height, parameters={**parameters, **moved}, max_theta_rad=None
         )
@@ -124,7 +137,7 @@ class Camera(Lenses):
         spec = chosen_spec(read_cameras(path, format, image_size), camera, path)
         try:
             found = cls.from_spec(spec)
-            return found.mirrored() if mirror and not found.mirror else found
+            return found.mirrored() if flag_from(mirror, "mirror") and not found.mirror else found
         except CalibrationError as error:
             raise CalibrationError(f"{path}: {error}") from error
 

@@ -91,13 +91,15 @@ def read_cameras(
     return [replace(spec, format=chosen.name) for spec in chosen.parse(document, size)]
 
 
-def write_cameras(specs: Sequence[CameraSpec], path: str | os.PathLike[str], format: str = "tiltvp") -> None:
-    """Writes cameras as a calibration file of `format`; the file appears whole or not at all.
+def write_cameras(
+    specs: CameraSpec | Sequence[CameraSpec], path: str | os.PathLike[str], format: str = "tiltvp"
+) -> None:
+    """Writes one camera, or several, as a calibration file of `format`; the file appears whole or not at all.
 
     Formats that are written are those of `FORMATS` with `written`. COLMAP's is binary if `path` ends in .bin. A limit
     `max_theta_rad` is kept by our own format alone. Raises `CalibrationError` for what no camera can be,
-    `UnsupportedFormatError`, which is one, for a lens or a number of cameras that the format cannot hold, with those
-    that can, and `OutputError`.
+    `InvalidInputError` for what is no spec, `UnsupportedFormatError` for a lens or a number of cameras that the format
+    cannot hold, with those that can, and `OutputError`.
     """
     chosen = _named(format)
     if chosen.written is None:

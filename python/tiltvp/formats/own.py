@@ -23,7 +23,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import Final
 
-from tiltvp.errors import CalibrationError, TiltvpError
+from tiltvp.errors import CalibrationError, InvalidInputError, TiltvpError
 from tiltvp.files import write_whole
 from tiltvp.formats.document import Document
 from tiltvp.formats.node import Node
@@ -66,14 +66,22 @@ def root_of(document: Document) -> Node:
 
 def write_toml(spec: CameraSpec | Sequence[CameraSpec], path: str | os.PathLike[str]) -> None:
     """Writes one camera, or several, to `path`; the file appears whole or not at all. Raises `OutputError`."""
-    write_whole(path, written(checked([spec] if isinstance(spec, CameraSpec) else spec, path)))
+    write_whole(path, written(checked(spec, path)))
 
 
-def checked(specs: Sequence[CameraSpec], path: str | os.PathLike[str]) -> list[CameraSpec]:
-    """The cameras with plain numbers, before they are written. Raises `CalibrationError` for what no camera can be."""
+def checked(given: CameraSpec | Sequence[CameraSpec], path: str | os.PathLike[str]) -> list[CameraSpec]:
+    """One camera or several with plain numbers, before they are written.
+
+    Raises `CalibrationError` for what no camera can be, `InvalidInputError` for what is no spec.
+    """
+    specs = list(given) if isinstance(given, Sequence) else [given]
     if not specs:
         raise CalibrationError(f"{path}: there is no camera to write, expected one or more, at spec")
     for one in specs:
+        if not isinstance(one, CameraSpec):
+            raise InvalidInputError(f"spec: {type(one).__name__}, expected CameraSpec, as Camera.to_spec() gives it")
+        if not isinstance(one.name, str):
+            raise InvalidInputError(f"name = {one.name!r}, expected a text")
         try:
             one.check()
         except TiltvpError as error:
