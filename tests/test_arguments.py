@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import tiltvp
+from tiltvp import corner, lines
 from tiltvp.arguments import array_from, number_from
 from tiltvp.errors import InvalidInputError
 from tiltvp.streams import Odometry
@@ -60,3 +61,44 @@ def test_a_buffer_that_is_filled_anew_does_not_change_what_was_made_of_it() -> N
     odometry = Odometry.from_wheels(times, np.stack([times, times], axis=1), wheel_base_m=1.0)
     times += 7.0
     np.testing.assert_array_equal(odometry.times_s, [0.0, 0.1, 0.2])
+
+
+IMAGE = np.random.default_rng(0).integers(0, 255, (48, 64), dtype=np.uint8)
+EXTRACTOR, ESTIMATOR = lines.LineExtractor(CAMERA), tiltvp.TiltEstimator(CAMERA)
+ESTIMATE, EDGES = ESTIMATOR.with_edges(IMAGE)
+SEGMENTS = tiltvp.SegmentDetector(CAMERA)(IMAGE)
+ALONG = np.linspace(0.02, 0.3, 20)[:, None]
+FEATURE = corner.fit(
+    *(
+        ray / np.linalg.norm(ray, axis=1, keepdims=True)
+        for ray in [0.5, 0.0, 2.0] + ALONG * np.array([[[0.7, 0.1, 0.7]], [[0.0, 1.0, 0.2]], [[-0.7, 0.1, 0.7]]])
+    ),
+    sigma_rad=1e-3,
+)
+
+
+@pytest.mark.parametrize(
+    ("call", "told"),
+    [
+        (lambda: EXTRACTOR.believes(IMAGE, (0.1, 0.2)), "tilt: tuple, expected an estimate"),
+        (lambda: EXTRACTOR.believes(IMAGE, ESTIMATE, confidence_min="a"), "confidence_min = 'a', expected a number"),
+        (lambda: EXTRACTOR.describe(IMAGE, None), "lines: NoneType, expected Lines"),
+        (lambda: EXTRACTOR.patches(IMAGE, IMAGE), "lines: ndarray, expected Lines"),
+        (lambda: lines.describe(IMAGE, CAMERA, []), "lines: list, expected Lines"),
+        (lambda: tiltvp.draw_edges(IMAGE, ESTIMATOR.detect(IMAGE)), "edges: ImageEdges, expected EdgeElements"),
+        (lambda: tiltvp.draw_edges(IMAGE, EDGES, offset_max_px="a"), "offset_max_px = 'a', expected a number"),
+        (lambda: tiltvp.draw_edges(IMAGE, EDGES, only=["all"]), "only = .'all'., expected one of"),
+        (lambda: tiltvp.draw_segments(IMAGE, SEGMENTS, CAMERA), "camera: Segments, expected a tiltvp.Camera"),
+        (lambda: tiltvp.draw_segments(IMAGE, CAMERA, CAMERA), "segments: Camera, expected Segments"),
+        (lambda: corner.attitudes("a"), "feature: str, expected a CornerFeature"),
+        (lambda: corner.screen(None), "feature: NoneType, expected a CornerFeature"),
+        (lambda: corner.included_angle(1, [0.0, 1.0, 0.0]), "feature: int, expected a CornerFeature"),
+        (lambda: corner.resolve(FEATURE), "features: CornerFeature, expected several CornerFeature"),
+        (lambda: corner.resolve([FEATURE], gamma_rad="a"), "gamma_rad = 'a', expected a number"),
+        (lambda: corner.resolve([FEATURE], gamma_sigma_rad=[]), "gamma_sigma_rad = .., expected a number"),
+        (lambda: corner.poses(FEATURE, None, np.eye(4)), "feature: NoneType, expected a CornerFeature"),
+    ],
+)
+def test_what_is_of_another_kind_is_named(call: Any, told: str) -> None:
+    with pytest.raises(InvalidInputError, match=f"^{told}"):
+        call()

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from contextlib import suppress
 from pathlib import Path
+from types import UnionType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -14,7 +15,7 @@ from tiltvp.errors import InvalidInputError
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
-__all__ = ["array_from", "flag_from", "number_from", "pair_from", "path_from", "size_from", "two_from"]
+__all__ = ["array_from", "flag_from", "number_from", "pair_from", "path_from", "refuse_unless", "size_from", "two_from"]
 
 
 def array_from(values: ArrayLike, name: str) -> NDArray[np.float64]:
@@ -61,6 +62,12 @@ def flag_from(value: bool, name: str) -> bool:
     if not isinstance(value, bool | np.bool_):
         raise InvalidInputError(f"{name} = {value!r}, expected True or False")
     return bool(value)
+
+
+def refuse_unless(value: object, kinds: type | UnionType, name: str, expected: str) -> None:
+    """Raises `InvalidInputError` for what is of none of the kinds."""
+    if not isinstance(value, kinds):
+        raise InvalidInputError(f"{name}: {type(value).__name__}, expected {expected}")
 
 
 def pair_from(pair: tuple[float, float], name: str) -> tuple[float, float]:

@@ -7,7 +7,7 @@ import os
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Final, Self
 
-from tiltvp.arguments import flag_from, number_from, pair_from, size_from
+from tiltvp.arguments import flag_from, number_from, pair_from, refuse_unless, size_from
 from tiltvp.errors import CalibrationError, InvalidInputError
 from tiltvp.files import check_toml
 from tiltvp.lenses import Lenses
@@ -41,8 +41,7 @@ class Camera(Lenses):
         """The camera that a reader of calibration files describes. Raises `InvalidInputError` for what is no spec."""
         from tiltvp.formats.spec import CameraSpec
 
-        if not isinstance(spec, CameraSpec):
-            raise InvalidInputError(f"spec: {type(spec).__name__}, expected one CameraSpec, as read_cameras gives them")
+        refuse_unless(spec, CameraSpec, "spec", "one CameraSpec, as read_cameras gives them")
         return cls(
             spec.model, width=spec.width, height=spec.height, max_theta_rad=spec.max_theta_rad, mirror=spec.mirror,
             **spec.parameters,

@@ -7,6 +7,7 @@ along the edge x, z = x cross y. The edges x and z include `gamma_rad`.
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final, Literal
 
@@ -14,7 +15,7 @@ import numpy as np
 
 from tiltvp import _core
 from tiltvp._core import CornerAttitude, CornerAttitudes, CornerFeature, CornerPose, ResolvedAttitude
-from tiltvp.arguments import array_from, number_from
+from tiltvp.arguments import array_from, number_from, refuse_unless
 from tiltvp.corner_boxes import CornerBox, join_boxes
 from tiltvp.corner_images import (
     CORNER_METHODS,
@@ -27,7 +28,6 @@ from tiltvp.corner_images import (
 from tiltvp.errors import InvalidInputError
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
     from typing import TypeAlias
 
     from numpy.typing import ArrayLike, NDArray
@@ -118,7 +118,7 @@ class KnownAttitude:
         if not 0.0 <= sigma_rad < math.inf:
             raise InvalidInputError(f"sigma_rad = {sigma_rad}, expected a standard deviation, finite and not negative")
         rows = tuple(tuple(float(x) for x in row) for row in rotation)
-        return cls(rows, tuple(tuple(float(x) for x in row) for row in np.eye(3) * sigma_rad**2))
+        return cls(rows, tuple(tuple(float(x) for x in row) for row in np.eye(3) * sigma_rad * sigma_rad))
 
     def to_dict(self) -> dict[str, Any]:
         """The attributes by name."""
@@ -162,11 +162,13 @@ def attitudes(
     feature: CornerFeature, gamma_rad: float = _RIGHT, *, gamma_sigma_rad: float = 0.0
 ) -> list[CornerAttitude]:
     """Every attitude that a feature admits, with the covariance that its rays' covariances and gamma's bring."""
+    _checked([feature])
     return _core.corner_attitudes(feature, gamma_rad, gamma_sigma_rad)
 
 
 def screen(feature: CornerFeature, gamma_rad: float = _RIGHT) -> str | None:
     """Why no corner of that angle looks like the feature (section II-A3), in a sentence; None if one does."""
+    _checked([feature])
     return _core.screen_corner(feature, gamma_rad)
 
 
@@ -179,6 +181,7 @@ def included_angle(
     `vertical_covariance_rad2` (3, 3) is the covariance of the rotation vector of its error. None where the vertex is
     seen horizontally, when both edges' planes hold the line of sight and nothing tells the angle.
     """
+    _checked([feature])
     covariance = np.zeros((3, 3)) if vertical_covariance_rad2 is None else vertical_covariance_rad2
     return _core.included_angle(feature, vertical, covariance)
 
@@ -202,9 +205,10 @@ def resolve(
     with priors or without. Nothing is guessed: what cannot be told apart is returned as it is. Empty where one of them
     is no corner of that angle.
     """
-    cameras = [np.eye(3)] * len(features) if common_from_camera is None else list(common_from_camera)
+    corners = _checked(features)
+    cameras = [np.eye(3)] * len(corners) if common_from_camera is None else list(common_from_camera)
     known = _known_beforehand(gamma_rad, gamma_sigma_rad, right_handed, priors)
-    return _core.resolve_corners(list(features), cameras, known, alignment)
+    return _core.resolve_corners(corners, cameras, known, alignment)
 
 
 def poses(
@@ -226,8 +230,17 @@ def poses(
     `right_handed` and by `priors` (left camera's frame). With `fuse` the six rays are fused by least squares from
     there. Empty where either feature is no corner of that angle, and where the vertex is before neither camera.
     """
+    _checked([left, right])
     known = _known_beforehand(gamma_rad, gamma_sigma_rad, right_handed, priors)
     return _core.corner_poses(left, right, left_from_right, known, fuse)
+
+
+def _checked(features: Iterable[CornerFeature]) -> list[CornerFeature]:
+    refuse_unless(features, Iterable, "features", "several CornerFeature")
+    found = list(features)
+    for one in found:
+        refuse_unless(one, CornerFeature, "feature", "a CornerFeature, as fit gives it")
+    return found
 
 
 def _known_beforehand(
@@ -236,7 +249,8 @@ def _known_beforehand(
     if not isinstance(right_handed, bool | np.bool_ | None):
         raise InvalidInputError(f"right_handed = {right_handed!r}, expected True, False or None")
     return {
-        "gamma_rad": gamma_rad, "gamma_sigma_rad": gamma_sigma_rad, "right_handed": right_handed, "priors": priors,
+        "gamma_rad": number_from(gamma_rad, "gamma_rad"), "right_handed": right_handed, "priors": priors,
+        "gamma_sigma_rad": number_from(gamma_sigma_rad, "gamma_sigma_rad"),
     }  # fmt: skip
 
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from tiltvp import _core
-from tiltvp.arguments import path_from
+from tiltvp.arguments import path_from, refuse_unless
 from tiltvp.errors import ImageFileError, InvalidInputError
 from tiltvp.files import read_bytes, write_whole
 from tiltvp.image_headers import header_size, unturned
@@ -94,8 +94,7 @@ def grays_from(images: Iterable[ArrayLike]) -> list[NDArray[np.uint8]]:
 
 def _named(images: Iterable[ArrayLike]) -> Iterator[tuple[str, ArrayLike]]:
     """Images with the names that messages call them."""
-    if not isinstance(images, Iterable):
-        raise InvalidInputError(f"images: {type(images).__name__}, expected several images")
+    refuse_unless(images, Iterable, "images", "several images")
     return ((f"images[{number}]", image) for number, image in enumerate(images))
 
 
@@ -126,8 +125,7 @@ def camera_grays(images: Iterable[ArrayLike], camera: _core.Camera) -> Iterator[
 
 def checked_camera(camera: object) -> None:
     """Raises `InvalidInputError` for what is no camera, such as the path of one or a `Robot`."""
-    if not isinstance(camera, _core.Camera):
-        raise InvalidInputError(f"camera: {type(camera).__name__}, expected a tiltvp.Camera")
+    refuse_unless(camera, _core.Camera, "camera", "a tiltvp.Camera")
 
 
 def checked_mask(mask: ArrayLike, camera: _core.Camera) -> NDArray[np.bool_]:

@@ -19,6 +19,7 @@ from tiltvp._core import (
     ssd_matrix,
     zncc_matrix,
 )
+from tiltvp.arguments import number_from, refuse_unless
 from tiltvp.images import gray_from
 from tiltvp.tilt import normal_of
 
@@ -72,9 +73,10 @@ class LineExtractor(_core.LineExtractor):
 
         Under a true lean verticals are lines; edges that mislead the estimate make fewer: the edge pixels on lines must
         be at least three quarters of those of an upright robot. Costs two extractions. False for an estimate without
-        a tilt.
+        a tilt. Raises `InvalidInputError` for what is no estimate.
         """
-        if not tilt or tilt.confidence < confidence_min:
+        refuse_unless(tilt, TiltEstimate | FilteredTilt, "tilt", "an estimate")
+        if not (tilt and tilt.confidence >= number_from(confidence_min, "confidence_min")):
             return False
         # Both may slant by the same.
         leaning, upright = (int(self(image, lean).support_px.sum()) for lean in (tilt.normal, None))
@@ -85,6 +87,7 @@ class LineExtractor(_core.LineExtractor):
 
         `lines` carry the frame that they were found in. Raises `InvalidInputError` for lines of the other method.
         """
+        refuse_unless(lines, Lines, "lines", "Lines")
         return self._describe(gray_from(image), lines)
 
     def patches(self, image: ArrayLike, lines: Lines) -> NDArray[np.float32]:
@@ -93,6 +96,7 @@ class LineExtractor(_core.LineExtractor):
         Rows run along the line, from low to high, columns across it; NaN where the world is not seen. Reshape to
         (N, -1) for the matrices.
         """
+        refuse_unless(lines, Lines, "lines", "Lines")
         return self._patches(gray_from(image), lines)
 
     def lines_at(self, bearing_rad: ArrayLike, tilt: Tilt | None = None) -> Lines:
@@ -128,6 +132,7 @@ def describe(
     **options: Any,
 ) -> NDArray[np.float32]:
     """(N, 192) float32: the descriptors of lines; for many images of one camera make a `LineExtractor`."""
+    refuse_unless(lines, Lines, "lines", "Lines")
     method = LINE_METHODS[0] if lines.center_px is None else LINE_METHODS[1]
     return LineExtractor(camera, method=method, robot_from_camera=robot_from_camera, **options).describe(image, lines)
 

@@ -23,6 +23,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import Final
 
+from tiltvp.arguments import refuse_unless
 from tiltvp.errors import CalibrationError, InvalidInputError, TiltvpError
 from tiltvp.files import write_whole
 from tiltvp.formats.document import Document
@@ -78,8 +79,7 @@ def checked(given: CameraSpec | Sequence[CameraSpec], path: str | os.PathLike[st
     if not specs:
         raise CalibrationError(f"{path}: there is no camera to write, expected one or more, at spec")
     for one in specs:
-        if not isinstance(one, CameraSpec):
-            raise InvalidInputError(f"spec: {type(one).__name__}, expected CameraSpec, as Camera.to_spec() gives it")
+        refuse_unless(one, CameraSpec, "spec", "CameraSpec, as Camera.to_spec() gives it")
         if not isinstance(one.name, str):
             raise InvalidInputError(f"name = {one.name!r}, expected a text")
         try:

@@ -6,13 +6,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from tiltvp._core import EdgeElements
+from tiltvp.arguments import number_from, refuse_unless
 from tiltvp.errors import InvalidInputError
 from tiltvp.images import gray_from
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
-    from tiltvp._core import EdgeElements
 
 __all__ = ["draw_edges"]
 
@@ -28,10 +29,11 @@ def draw_edges(
     import cv2
 
     gray = gray_from(image)
+    refuse_unless(edges, EdgeElements, "edges", "EdgeElements, as with_edges gives them")
     picks = {"prefiltered": edges.prefiltered, "inlier": edges.inlier, "all": np.ones(len(edges), dtype=bool)}
-    if only not in picks:
+    if not (isinstance(only, str) and only in picks):
         raise InvalidInputError(f"only = {only!r}, expected one of {', '.join(picks)}")
-    if not offset_max_px > 0.0:
+    if not number_from(offset_max_px, "offset_max_px") > 0.0:
         raise InvalidInputError(f"offset_max_px = {offset_max_px}, expected a positive number of pixels")
     chosen = picks[only]
     u, v = edges.u[chosen], edges.v[chosen]
@@ -41,7 +43,7 @@ def draw_edges(
     phi = np.nan_to_num(edges.phi_rad[chosen], nan=0.0)
     hsv = np.empty((len(u), 1, 3), dtype=np.uint8)
     hsv[:, 0, 0] = np.minimum(phi / np.pi * 180.0, 179.0).astype(np.uint8)
-    hsv[:, 0, 1] = (255.0 * np.clip(1.0 - offset / offset_max_px, 0.0, 1.0)).astype(np.uint8)
+    hsv[:, 0, 1] = (255.0 * (1.0 - np.minimum(offset, offset_max_px) / offset_max_px)).astype(np.uint8)
     hsv[:, 0, 2] = 255
     canvas = np.asarray(cv2.cvtColor(gray, cv2.COLOR_GRAY2BGR), dtype=np.uint8)
     if len(u):

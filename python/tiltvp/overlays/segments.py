@@ -6,14 +6,16 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from tiltvp._core import Segments
+from tiltvp.arguments import refuse_unless
 from tiltvp.errors import InvalidInputError
-from tiltvp.images import gray_from
+from tiltvp.images import checked_camera, gray_from
 from tiltvp.overlays.lines import curves, track_colour
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
-    from tiltvp._core import Camera, Segments
+    from tiltvp._core import Camera
 
 __all__ = ["draw_segments", "segment_pixels"]
 
@@ -41,6 +43,8 @@ def draw_segments(image: ArrayLike, camera: Camera, segments: Segments) -> NDArr
     """
     import cv2
 
+    checked_camera(camera)
+    refuse_unless(segments, Segments, "segments", "Segments")
     gray = gray_from(image)
     if gray.shape != (camera.height, camera.width):
         raise InvalidInputError(f"image: shape {gray.shape}, expected ({camera.height}, {camera.width})")
