@@ -12,7 +12,7 @@ import tiltvp
 from tiltvp import corner, lines
 from tiltvp.arguments import array_from, number_from
 from tiltvp.errors import InvalidInputError
-from tiltvp.streams import Odometry
+from tiltvp.streams import InertialSamples, Motion, Odometry, Wheels
 from tiltvp.tilt import normal_of
 
 CAMERA = tiltvp.Camera.equidistant(width=64, height=48, focal_px=20.0, cx=31.5, cy=23.5)
@@ -67,6 +67,14 @@ IMAGE = np.random.default_rng(0).integers(0, 255, (48, 64), dtype=np.uint8)
 EXTRACTOR, ESTIMATOR = lines.LineExtractor(CAMERA), tiltvp.TiltEstimator(CAMERA)
 ESTIMATE, EDGES = ESTIMATOR.with_edges(IMAGE)
 SEGMENTS = tiltvp.SegmentDetector(CAMERA)(IMAGE)
+TIMES = np.linspace(0.0, 1.0, 11)
+ODOMETRY = Odometry.from_wheels(TIMES, np.stack([TIMES, TIMES], axis=1), wheel_base_m=1.0)
+
+
+def delay(odometry: Any = ODOMETRY, reach_s: Any = 0.1) -> Any:
+    return tiltvp.frame_delay([IMAGE] * 11, TIMES, odometry, CAMERA, np.eye(3), reach_s=reach_s)
+
+
 ALONG = np.linspace(0.02, 0.3, 20)[:, None]
 FEATURE = corner.fit(
     *(
@@ -96,9 +104,37 @@ FEATURE = corner.fit(
         (lambda: corner.resolve(FEATURE), "features: CornerFeature, expected several CornerFeature"),
         (lambda: corner.resolve([FEATURE], gamma_rad="a"), "gamma_rad = 'a', expected a number"),
         (lambda: corner.resolve([FEATURE], gamma_sigma_rad=[]), "gamma_sigma_rad = .., expected a number"),
+        (lambda: Odometry(TIMES, None, None), r"odometry: distance_m \(\), expected \(11,\)"),
+        (lambda: Odometry([[0.0], [1.0, 2.0]], TIMES, None), "odometry: times_s: no array of numbers"),
+        (lambda: Odometry(TIMES, TIMES, TIMES, gap_max_s="a"), "gap_max_s = 'a', expected a number"),
+        (lambda: Odometry.from_velocities(TIMES, TIMES, TIMES, gap_max_s=[]), "gap_max_s = .., expected a number"),
+        (lambda: ODOMETRY.at("a"), "times_s: no array of numbers"),
+        (lambda: ODOMETRY.at(np.zeros((2, 2))), r"times_s: shape \(2, 2\), expected \(M,\)"),
+        (lambda: ODOMETRY.between(0.1, [[0.2], [0.1, 0.3]]), "times_s: no array of numbers"),
+        (lambda: InertialSamples(TIMES, None, None), r"inertial sensor: rates_rad_s \(\), expected"),
+        (lambda: Wheels(joints=3), "joints = 3, expected names of two"),
+        (lambda: Wheels(joints=(1, 2)), r"joints = \(1, 2\), expected names of two"),
+        (lambda: tiltvp.Robot(CAMERA, np.eye(3), wheels=None), "wheels: NoneType, expected tiltvp.streams.Wheels"),
+        (lambda: tiltvp.Robot(CAMERA, np.eye(3), topics="/image"), "topics: str, expected a dict"),
+        (lambda: delay(odometry="drive.mcap"), "odometry: str, expected a tiltvp.streams.Odometry"),
+        (lambda: delay(reach_s=-1.0), "reach_s = -1.0, expected a finite number of seconds above 0"),
+        (lambda: delay(reach_s="a"), "reach_s = 'a', expected a number"),
+        (
+            lambda: tiltvp.mounting_tilt([None], [Motion()], np.eye(3), level_floor="no"),
+            "level_floor = 'no', expected True",
+        ),
+        (
+            lambda: tiltvp.mounting_tilt([None], [Motion()], np.eye(3)).within("a"),
+            "tolerance_rad = 'a', expected a number",
+        ),
+        (lambda: tiltvp.join_logs([], start="a"), "start: no array of numbers"),
         (lambda: corner.poses(FEATURE, None, np.eye(4)), "feature: NoneType, expected a CornerFeature"),
     ],
 )
 def test_what_is_of_another_kind_is_named(call: Any, told: str) -> None:
     with pytest.raises(InvalidInputError, match=f"^{told}"):
         call()
+
+
+def test_times_far_beyond_a_record_are_outside() -> None:
+    assert ODOMETRY.at([-1e308, 0.5, 1e308, np.nan]).outside.tolist() == [True, False, True, True]

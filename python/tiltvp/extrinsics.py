@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, ClassVar, Final
 
 import numpy as np
 
+from tiltvp.arguments import array_from
 from tiltvp.errors import InvalidInputError
 from tiltvp.mounting import MountingTilt
 from tiltvp.rotations import about_vertical, rotation_from
@@ -235,7 +236,7 @@ def join_logs(
 
 def _start(start: ArrayLike, start_sigma: ArrayLike) -> tuple[Matrix, Matrix]:
     """(3,) and (3, 3): where logs were started from, and the information of that."""
-    first, sigma = np.array(start, dtype=np.float64), np.asarray(start_sigma, dtype=np.float64)
+    first, sigma = array_from(start, "start"), array_from(start_sigma, "start_sigma")
     if first.shape != (3,) or not np.isfinite(first).all():
         raise InvalidInputError(f"start = {first.tolist()}, expected finite numbers (x_m, y_m, yaw_rad)")
     covariance = np.diag(np.square(sigma)) if sigma.shape == (3,) and (sigma > 0.0).all() else sigma

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
+from tiltvp.arguments import flag_from, number_from
 from tiltvp.errors import InvalidInputError
 from tiltvp.rotations import levelling, mounting_from
 from tiltvp.tilt import TiltFilter
@@ -100,7 +101,7 @@ class MountingTilt:
 
     def within(self, tolerance_rad: float) -> bool | None:
         """Whether the mounting that was given is off by at most so much, at 95 %; None where that is not told."""
-        if not (math.isfinite(tolerance_rad) and tolerance_rad > 0.0):
+        if not 0.0 < number_from(tolerance_rad, "tolerance_rad") < math.inf:
             raise InvalidInputError(f"tolerance_rad = {tolerance_rad}, expected a positive number of radians")
         if not self:
             return None
@@ -135,7 +136,7 @@ def mounting_tilt(
         raise InvalidInputError(f"motions: {len(motions)}, expected {len(images)}, one for each image")
     known = [(image, motion) for image, motion in zip(images, motions, strict=True) if motion is not None]
     given, driven = [image for image, _ in known], [motion for _, motion in known]
-    told = dict(_LEVEL) if level_floor else {}
+    told = dict(_LEVEL) if flag_from(level_floor, "level_floor") else {}
     if half_track_m is not None:
         told["half_track_m"] = half_track_m
     whole = _filtered(given, driven, told)

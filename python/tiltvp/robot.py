@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Final, Self
 
 import numpy as np
 
-from tiltvp.arguments import array_from, number_from, pair_from, path_from
+from tiltvp.arguments import array_from, number_from, pair_from, path_from, refuse_unless
 from tiltvp.cameras import Camera
 from tiltvp.errors import CalibrationError, InvalidInputError
 from tiltvp.files import check_output, check_toml, write_whole
@@ -63,6 +63,8 @@ class Robot:
 
     def __post_init__(self) -> None:
         checked_camera(self.camera)
+        refuse_unless(self.wheels, Wheels, "wheels", "tiltvp.streams.Wheels")
+        refuse_unless(self.topics, dict, "topics", "a dict")
         object.__setattr__(self, "robot_from_camera", mounting_from(self.robot_from_camera))
         if self.mask is not None:
             object.__setattr__(self, "mask", checked_mask(self.mask, self.camera))

@@ -9,17 +9,17 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from tiltvp.arguments import array_from
+from tiltvp.arguments import array_from, number_from, refuse_unless
 from tiltvp.errors import InvalidInputError
 from tiltvp.images import camera_grays, checked_camera
 from tiltvp.rotations import mounting_from
 from tiltvp.setup_check import DIRECTIONS, nearest_direction, opposite_direction
+from tiltvp.streams.odometry import Odometry
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
     from tiltvp._core import Camera
-    from tiltvp.streams.odometry import Odometry
 
 __all__ = [
     "FrameDelay", "TurnAxis", "TurnCheck", "check_turns", "frame_delay", "made_small", "small_camera",
@@ -237,6 +237,9 @@ def frame_delay(
     For each delay within `reach_s` images are turned back by what the odometry says of their true times, and compared.
     The mounting (3, 3) has to be right about which way is up. Raises `InvalidInputError` for sizes that do not fit.
     """
+    refuse_unless(odometry, Odometry, "odometry", "a tiltvp.streams.Odometry")
+    if not 0.0 < number_from(reach_s, "reach_s") < math.inf:
+        raise InvalidInputError(f"reach_s = {reach_s}, expected a finite number of seconds above 0")
     pictures, up = _Pictures(images, camera), _up_of(robot_from_camera)
     times = array_from(times_s, "times_s")
     if times.shape != (len(pictures),) or not np.isfinite(times).all():

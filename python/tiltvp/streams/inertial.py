@@ -63,14 +63,14 @@ class InertialSamples:
 
     def __post_init__(self) -> None:
         """Raises `InvalidInputError` for arrays that do not fit, values that are not finite, and times that fall."""
-        n = np.size(self.times_s)
+        n = array_from(self.times_s, f"{self.source}: times_s").size
         for name, shape in (
             ("times_s", (n,)),
             ("rates_rad_s", (n, 3)),
             ("accelerations_m_s2", (n, 3)),
             ("orientations", (n, 4)),
         ):
-            if getattr(self, name) is not None:
+            if name in ("times_s", "rates_rad_s") or getattr(self, name) is not None:
                 finite_array(self, name, shape)
         if n < 2 or (np.diff(self.times_s) <= 0.0).any():
             raise InvalidInputError(f"{self.source}: {counted(n, 'samples')}, expected two or more of rising times")

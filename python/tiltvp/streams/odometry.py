@@ -86,14 +86,13 @@ class Odometry:
 
     def __post_init__(self) -> None:
         """Raises `InvalidInputError` for arrays that do not fit, values that are not finite, and times that fall."""
-        n = np.size(self.times_s)
+        n = array_from(self.times_s, f"{self.source}: times_s").size
         for name, shape in (("times_s", (n,)), ("distance_m", (n,)), ("yaw_rad", (n,)), ("wheels_m", (n, 2))):
-            if getattr(self, name) is not None:
+            if name not in ("yaw_rad", "wheels_m") or getattr(self, name) is not None:
                 finite_array(self, name, shape)
         if n < 2 or (np.diff(self.times_s) <= 0.0).any():
             raise InvalidInputError(f"{self.source}: {counted(n, 'samples')}, expected two or more of rising times")
-        if not self.gap_max_s > 0.0:
-            raise InvalidInputError(f"gap_max_s = {self.gap_max_s}, expected more than 0")
+        _gap_from(self.gap_max_s)
 
     @classmethod
     def from_wheels(
@@ -122,7 +121,7 @@ class Odometry:
         """
         times, speeds, turns = _alike(source, times_s=times_s, speed_mps=speed_mps, yaw_rate_radps=yaw_rate_radps)
         steps = np.diff(times)
-        if (steps > gap_max_s).any():
+        if (steps > _gap_from(gap_max_s)).any():
             k = int(np.argmax(steps > gap_max_s))
             raise InvalidInputError(
                 f"{source}: no velocities from {times[k]:.3f} to {times[k + 1]:.3f} s, expected gaps of at most "
@@ -158,14 +157,19 @@ class Odometry:
         return cls(times, driven, yaw - yaw[:1], None, source, notes, gap_max_s)
 
     def at(self, times_s: ArrayLike) -> Travelled:
-        """How far it had come at these times (M,); NaN outside the record and in its gaps, where nothing is made up."""
-        times = np.atleast_1d(np.asarray(times_s, dtype=np.float64))
+        """How far it had come at these times (M,); NaN outside the record and in its gaps, where nothing is made up.
+
+        Raises `InvalidInputError` for what are no times.
+        """
+        times = np.atleast_1d(array_from(times_s, "times_s"))
+        if times.ndim != 1:
+            raise InvalidInputError(f"times_s: shape {times.shape}, expected (M,)")
         after = np.clip(np.searchsorted(self.times_s, times), 1, len(self.times_s) - 1)
         low, high = self.times_s[after - 1], self.times_s[after]
         outside = ~((times >= self.times_s[0] - _SAME_S) & (times <= self.times_s[-1] + _SAME_S))
         at_sample = np.minimum(np.abs(times - low), np.abs(times - high)) <= _SAME_S
         in_gap = ~outside & ~at_sample & (high - low > self.gap_max_s)
-        share = np.clip((times - low) / (high - low), 0.0, 1.0)
+        share = (np.clip(times, low, high) - low) / (high - low)
         share[outside | in_gap] = np.nan
 
         def between(values: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -250,6 +254,13 @@ class Odometry:
             f"{self.times_s[first]:.3f} s by {speeds[first]:.3g} m/s and {rates[first]:.3g} rad/s: "
             "was it set anew, or is it in other units?"
         )
+
+
+def _gap_from(gap_max_s: float) -> float:
+    gap_max_s = number_from(gap_max_s, "gap_max_s")
+    if not gap_max_s > 0.0:
+        raise InvalidInputError(f"gap_max_s = {gap_max_s}, expected more than 0")
+    return gap_max_s
 
 
 def finite_array(of: Any, name: str, shape: tuple[int, ...]) -> None:

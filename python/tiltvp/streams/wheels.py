@@ -45,7 +45,10 @@ class Wheels:
             object.__setattr__(self, name, number_from(value, name))
             if not 0.0 < getattr(self, name) < np.inf:
                 raise InvalidInputError(f"{name} = {value}, expected a number above 0")
-        if self.joints is not None and (isinstance(self.joints, str) or len(self.joints) != 2):
+        joints = self.joints
+        if joints is not None and not (
+            isinstance(joints, tuple | list) and len(joints) == 2 and all(isinstance(joint, str) for joint in joints)
+        ):
             raise InvalidInputError(f"joints = {self.joints!r}, expected names of two, the left and the right wheel's")
 
     @property
