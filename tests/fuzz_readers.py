@@ -172,7 +172,7 @@ def seeds() -> list[bytes]:
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "file.toml"
         trained = tiltvp.train_affine([1.0, 2.0, 3.0, 4.5], [0.1, 0.2, 0.3, 0.4])
-        TrainedCorrection(trained, "shift", {}, CAMERA.to_dict(), 4).save(path)
+        TrainedCorrection(trained, "image-space-ransac", {}, CAMERA.to_dict(), 4).save(path)
         made.append((3, path.read_bytes()))
         Robot(CAMERA, np.eye(3), place_m=(0.1, 0.2), height_m=0.5).save(path)
         made.append((7, path.read_bytes()))

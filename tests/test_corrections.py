@@ -176,6 +176,8 @@ def test_a_trained_correction_is_a_file(camera: tiltvp.Camera, tmp_path: Path, k
 def test_what_has_no_correction_is_refused(camera: tiltvp.Camera) -> None:
     with pytest.raises(InvalidInputError, match="no correction"):
         tiltvp.train_correction(tiltvp.TiltEstimator(camera), *draws())
+    with pytest.raises(InvalidInputError, match="estimator: Camera, expected a TiltEstimator"):
+        tiltvp.train_correction(camera, *draws())  # type: ignore[arg-type]
     estimator = tiltvp.TiltEstimator(camera, method="vector-consensus", correction=None)
     with pytest.raises(InvalidInputError, match="expected one of"):
         tiltvp.train_correction(estimator, *draws(), kind="line")
@@ -208,6 +210,28 @@ def test_a_factor_of_any_number_is_written(camera: tiltvp.Camera, tmp_path: Path
     trained = tiltvp.TrainedCorrection(250, "image-space-ransac", {}, camera.to_dict())
     trained.save(tmp_path / "correction.toml")
     assert tiltvp.TrainedCorrection.load(tmp_path / "correction.toml") == trained
+
+
+def test_what_could_not_be_read_again_is_not_written(camera: tiltvp.Camera, tmp_path: Path) -> None:
+    path, own = tmp_path / "correction.toml", camera.to_dict()
+    for values, told in (
+        ({"method": "shift"}, "found 'shift', expected one of"),
+        ({"camera": {}}, "at camera, options or robot_from_camera"),
+        ({"options": {"threshold_px": -1.0}}, "threshold_px = -1"),
+        ({"options": {"threshold_px": None}}, "expected plain numbers"),
+        ({"images": "many"}, "images"),
+        ({"correction": "strong"}, "correction = 'strong', expected a number"),
+        ({"correction": -3.0}, "correction = -3"),
+        ({"robot_from_camera": np.ones((3, 3))}, "robot_from_camera"),
+        ({"robot_from_camera": "up"}, "robot_from_camera: no array of numbers"),
+    ):
+        whole: dict[str, Any] = {"correction": 250.0, "method": "image-space-ransac", "camera": own} | values
+        with pytest.raises((CalibrationError, InvalidInputError), match=told):
+            tiltvp.TrainedCorrection(**whole).save(path)
+    assert not list(tmp_path.iterdir())
+    mounted = tiltvp.TrainedCorrection(250, "image-space-ransac", {}, own, robot_from_camera=np.eye(3))  # type: ignore[arg-type]
+    mounted.save(path)
+    assert tiltvp.TrainedCorrection.load(path) == mounted
 
 
 def test_a_correction_is_for_the_mounting_of_its_training(

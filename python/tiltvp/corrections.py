@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, Final, Self, TypeAlias
 from tiltvp._core import (
     METHODS,
     AffineCorrection,
+    Camera,
     PosteriorCorrection,
     PriorOfTilt,
     TiltEstimator,
@@ -20,7 +21,7 @@ from tiltvp._core import (
     train_factor,
     train_posterior,
 )
-from tiltvp.arguments import array_from
+from tiltvp.arguments import array_from, number_from, path_from, refuse_unless
 from tiltvp.errors import CalibrationError, InvalidInputError, TiltvpError
 from tiltvp.files import check_output, check_toml, write_whole
 
@@ -28,7 +29,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import ArrayLike, NDArray
 
-    from tiltvp._core import Camera
+    from tiltvp.formats.document import Document
 
 __all__ = [
     "CORRECTION_KINDS",
@@ -73,17 +74,26 @@ class TrainedCorrection:
     robot_from_camera: list[list[float]] | None = None
     """The rows of the mounting, (3, 3); None in files from before it was kept."""
 
+    def __post_init__(self) -> None:
+        if self.robot_from_camera is not None:
+            rows: list[list[float]] = array_from(self.robot_from_camera, _MOUNTING).tolist()
+            object.__setattr__(self, _MOUNTING, rows)
+
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> Self:
         """The correction of a file of `save`. Raises `CalibrationError` that says what was wrong and where."""
+        from tiltvp.formats.document import Document
+
+        return cls._read(Document.load(path))
+
+    @classmethod
+    def _read(cls, document: Document) -> Self:
         # Importing the package would take longer with them.
         import numpy as np
 
-        from tiltvp.cameras import Camera
-        from tiltvp.formats.document import Document
         from tiltvp.formats.node import Node
 
-        document = Document.load(path)
+        path = document.path
         root = Node(document, document.toml("a file written by `tiltvp lab train`"))
         if not root.has("format") or root.need("format").text() != _FORMAT:
             root.fail("it is no correction", f'format = "{_FORMAT}"')
@@ -126,21 +136,32 @@ class TrainedCorrection:
         return trained
 
     def save(self, path: str | os.PathLike[str]) -> None:
-        """Writes it as TOML (.toml), whole or not at all. Raises `InvalidInputError` and `OutputError`."""
+        """Writes it as TOML (.toml), whole or not at all.
+
+        Raises `InvalidInputError` for another ending and for what is no TOML, `CalibrationError` for what could not be
+        read again, and `OutputError`.
+        """
         import tomli_w
+
+        from tiltvp.formats.document import Document
 
         check_toml(path)
         check_output(path)
         made = self.correction
         curves = (AffineCorrection, PosteriorCorrection)
-        values = made.to_dict() if isinstance(made, curves) else {"factor": float(made)}
+        values = made.to_dict() if isinstance(made, curves) else {"factor": number_from(made, "correction")}
         tree = {
             "format": _FORMAT, "version": _VERSION, "kind": self.kind, "method": self.method, "images": self.images,
             "correction": values, "options": self.options, "camera": self.camera,
         }  # fmt: skip
         if self.robot_from_camera is not None:
             tree[_MOUNTING] = self.robot_from_camera
-        write_whole(path, tomli_w.dumps(tree))
+        try:
+            text = tomli_w.dumps(tree)
+        except TypeError as error:
+            raise InvalidInputError(f"{path}: {error}, expected plain numbers, texts, lists and dicts") from error
+        self._read(Document(path_from(path), text))
+        write_whole(path, text)
 
     @property
     def kind(self) -> str:
@@ -154,6 +175,7 @@ class TrainedCorrection:
         Raises `InvalidInputError` for another method, for an option that was given otherwise, for another camera and
         for a mounting that sees the vertical more than a degree elsewhere.
         """
+        refuse_unless(camera, Camera, "camera", "a tiltvp.Camera")
         if method is not None and method != self.method:
             raise InvalidInputError(f"a correction of {self.method} with the method {method}, expected {self.method}")
         for name, value in given.items():
@@ -200,7 +222,8 @@ def train_correction(
     """
     import numpy as np
 
-    if kind not in CORRECTION_KINDS:
+    refuse_unless(estimator, TiltEstimator, "estimator", "a TiltEstimator")
+    if not (isinstance(kind, str) and kind in CORRECTION_KINDS):
         raise InvalidInputError(f"kind = {kind!r}, expected one of {', '.join(CORRECTION_KINDS)}")
     if all(one["name"] != "correction" for one in option_fields("TiltEstimator", estimator.method)):
         raise InvalidInputError(f"method {estimator.method} has no correction, expected one of the paper's methods")
