@@ -191,6 +191,11 @@ def test_impossible_levellers_are_refused(camera: tiltvp.Camera) -> None:
         tiltvp.Unwrapper(camera, elevation_min_rad=None)
     with pytest.raises(InvalidInputError, match="8 x 4"):
         tiltvp.Unwrapper(camera, size=(4, 4))
+    with pytest.raises(InvalidInputError, match="size = 1000000 x 1000000, expected at most 25000000 pixels"):
+        tiltvp.Unwrapper(camera, size=(10**6, 10**6))
+    for view in ("pinhole", "fisheye"):
+        with pytest.raises(InvalidInputError, match="field_of_view_rad = 5e-324"):
+            tiltvp.Leveller(camera, to=view, field_of_view_rad=5e-324)
     with pytest.raises(InvalidInputError, match="rising"):
         tiltvp.Unwrapper(camera, elevation_max_rad=-0.1)
 

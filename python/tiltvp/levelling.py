@@ -151,7 +151,7 @@ def _output(
     width, height = size or (camera.width, camera.height)
     angle = _FIELD_OF_VIEW_RAD[to] if field_of_view_rad is None else number_from(field_of_view_rad, "field_of_view_rad")
     most = math.pi if to == "pinhole" else 2.0 * math.pi
-    if not 0.0 < angle <= most or (to == "pinhole" and angle == most):
+    if not 0.0 < 0.5 * angle <= 0.5 * most or (to == "pinhole" and angle == most):
         raise InvalidInputError(f"field_of_view_rad = {angle}, expected an angle in (0, {most:.4f}) of a {to}")
     cx, cy = (width - 1) / 2.0, (height - 1) / 2.0
     if to == "pinhole":
@@ -282,7 +282,8 @@ class Unwrapper:
     camera : tiltvp.Camera
     robot_from_camera : (3, 3) rotation R, v_robot = R v_camera; default identity: an upward camera, columns to the
         front.
-    size : (width, height) in pixels, at least 8 x 4; default (72, 40), five degrees for a column.
+    size : (width, height) in pixels, at least 8 x 4, and at most 25 million in all; default (72, 40), five degrees for
+        a column.
     elevation_min_rad, elevation_max_rad : of the lowest and highest row's border, in [-pi/2, pi/2]; default 0 and pi/3.
 
     Raises `tiltvp.errors.InvalidInputError` for anything else.
@@ -302,6 +303,9 @@ class Unwrapper:
         elevation_max_rad = number_from(elevation_max_rad, "elevation_max_rad")
         if width < 8 or height < 4:
             raise InvalidInputError(f"size = {width} x {height}, expected at least 8 x 4 pixels")
+        if _ACROSS * width * _DOWN * height > _core.MOST_PIXELS:
+            most = _core.MOST_PIXELS // (_ACROSS * _DOWN)
+            raise InvalidInputError(f"size = {width} x {height}, expected at most {most} pixels in all")
         if not -math.pi / 2.0 <= elevation_min_rad < elevation_max_rad <= math.pi / 2.0:
             limits = f"{elevation_min_rad}, {elevation_max_rad}"
             raise InvalidInputError(f"elevation_min_rad, elevation_max_rad = {limits}, expected rising in +-pi/2")
