@@ -7,13 +7,16 @@ import json
 from pathlib import Path
 
 import numpy as np
+import polars as pl
 import pytest
 from rich.console import Console
 
 import tiltvp
 import tiltvp.cli.tilt as verb
 from tiltvp.cli import main
-from tiltvp.cli.results import Outcome, people_table, summary_words
+from tiltvp.cli.results import Outcome, outcome_table, people_table, summary_words
+from tiltvp.cli.tables import write_table
+from tiltvp.rotations import ROTATION_WORDS
 
 CAMERA = tiltvp.Camera.equidistant(width=160, height=120, focal_px=35.0, cx=79.5, cy=59.5)
 ESTIMATOR = tiltvp.TiltEstimator(CAMERA)
@@ -85,3 +88,22 @@ def test_rows_come_as_lines_of_json_as_soon_as_they_are_there(
     assert lines == kept
     assert [Path(row["file"]).name for row in lines] == ["a.png", "b.png", "c.png"]
     assert lines[1]["error"]
+
+
+@pytest.mark.parametrize("ending", [".csv", ".json", ".parquet"])
+def test_files_have_the_directions_that_may_be_up(ending: str, tmp_path: Path) -> None:
+    forward = np.array(ROTATION_WORDS["forward"])
+    options = {"method": "segments", "robot_from_camera": forward, "tilt_max_rad": np.pi}
+    pinhole = tiltvp.Camera.pinhole(width=320, height=240, fx=190.0, fy=190.0, cx=159.5, cy=119.5)
+    seen = tiltvp.synth.render_room(pinhole, seed=1, alpha_rad=0.07, beta_rad=0.5, robot_from_camera=forward).gray
+    found = [tiltvp.TiltEstimator(pinhole, **options)(image) for image in (seen, np.zeros_like(seen))]
+    assert len(found[0].alternatives) > 1
+    rows = [Outcome(Path("a.png"), found[0]), Outcome(Path("b.png"), found[1]), Outcome(Path("c.png"), error="none")]
+    path = tmp_path / f"rows{ending}"
+    write_table(outcome_table(rows, "segments"), path)
+    read = {".csv": pl.read_csv, ".json": pl.read_json, ".parquet": pl.read_parquet}[ending]
+    texts = read(path)["alternatives"].to_list()
+    kept = [tiltvp._core.TiltAlternative.from_dict(one) for one in json.loads(texts[0])]
+    assert kept == found[0].alternatives
+    assert texts[1:] == ["[]", None]
+    assert "alternatives" not in outcome_table(outcomes(), "refined").types

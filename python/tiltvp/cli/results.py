@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 import os
 from collections import Counter
@@ -178,13 +179,15 @@ def outcome_table(outcomes: Sequence[Outcome], method: str) -> Table:
     `taken_s` is there where images tell when they were taken. Judged outcomes have `accepted`, `verdict` and
     `verdict_reason`; those of a filter also `nis`, and the filtered tilt in columns `filtered_...`, None where the
     filter abstains but for covariance, sigma and confidence. The lean of the robot itself, where it was asked for, is
-    in columns `mounting_...`.
+    in columns `mounting_...`. Of the method "segments" there are `alternatives`, as a text of JSON.
     """
     types = {"file": "String", "method": "String"}
     if any(outcome.taken_s is not None for outcome in outcomes):
         types |= {"taken_s": "Float64"}
     types |= dict.fromkeys(_NUMBERS, "Float64") | dict.fromkeys(_COUNTS, "Int64")
     types |= dict.fromkeys(_MORE_NUMBERS, "Float64") | dict.fromkeys(_WORDS, "String")
+    if method == "segments":
+        types |= {"alternatives": "String"}
     if any(outcome.accepted is not None for outcome in outcomes):
         types |= {"accepted": "Boolean", "verdict": "String", "verdict_reason": "String"}
     if any(outcome.filtered is not None for outcome in outcomes):
@@ -202,7 +205,8 @@ def _row(outcome: Outcome) -> dict[str, object]:
     e = outcome.estimate
     if e is None:
         return {"error": outcome.error}
-    return e.to_dict() | _numbers(e) | {"time_s": outcome.time_s}
+    alternatives = json.dumps([one.to_dict() for one in e.alternatives])
+    return e.to_dict() | _numbers(e) | {"time_s": outcome.time_s, "alternatives": alternatives}
 
 
 def _judged(outcome: Outcome) -> dict[str, object]:
