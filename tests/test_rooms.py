@@ -87,6 +87,9 @@ def test_panorama(office: Room) -> None:
         ({"pose": (1e3, 0.0, 0.0)}, "a place in the room"),
         ({"pose": (1.0, 2.0)}, r"pose = \[1.0, 2.0\], expected 3 numbers"),
         ({"alpha_rad": math.nan}, "alpha_rad"),
+        ({"alpha_rad": None}, "alpha_rad = None, expected a number"),
+        ({"beta_rad": 10**400}, "beta_rad = .*, expected a number"),
+        ({"camera": "camera.toml"}, r"camera: str, expected a tiltvp\.Camera"),
         ({"samples": 0}, "samples"),
         ({"seed": -1}, "seed = -1"),
         ({"threads": 0}, "threads = 0"),
@@ -98,7 +101,7 @@ def test_panorama(office: Room) -> None:
 )
 def test_wrong_views(small: tiltvp.Camera, office: Room, keywords: dict[str, object], words: str) -> None:
     with pytest.raises(InvalidInputError, match=words):
-        office.render(small, **{"pose": office.free_poses(1, 0)[0], **keywords})  # type: ignore[arg-type]
+        office.render(**{"camera": small, "pose": office.free_poses(1, 0)[0], **keywords})  # type: ignore[arg-type]
 
 
 def test_wrong_rooms() -> None:

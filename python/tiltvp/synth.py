@@ -10,7 +10,9 @@ import numpy as np
 
 from tiltvp import _core
 from tiltvp._core import SimulatedDrive, drive_legs, simulate_drive
+from tiltvp.arguments import number_from
 from tiltvp.cameras import Camera
+from tiltvp.images import checked_camera
 from tiltvp.stereo_scenes import ImuLog, Laboratory, SceneCorner, StereoSequence, StereoTruth, zed_cameras
 
 if TYPE_CHECKING:
@@ -106,6 +108,8 @@ class Room(_core.Room):
         side (None: 3), `seed` that of ray places and noise. The same arguments give the same bytes for any `threads`
         (None: one per core). Raises `tiltvp.errors.InvalidInputError`, also for a place outside the room.
         """
+        checked_camera(camera)
+        alpha_rad, beta_rad = number_from(alpha_rad, "alpha_rad"), number_from(beta_rad, "beta_rad")
         gray, rgb = self._render(
             camera,
             pose=pose,
@@ -225,6 +229,7 @@ class Drive(_core.Drive):
         `pose` is (x_m, y_m, yaw_rad); any number from 0 is a `frame`, of which light and noise are taken. Raises
         `tiltvp.errors.InvalidInputError`, also for a place outside the room.
         """
+        alpha_rad, beta_rad = number_from(alpha_rad, "alpha_rad"), number_from(beta_rad, "beta_rad")
         gray, rgb = self._render_at(frame, pose, _core.normal_from_alpha_beta(alpha_rad, beta_rad), threads=threads)
         return RoomImage(gray, np.ascontiguousarray(rgb[:, :, ::-1]), alpha_rad, beta_rad)
 
