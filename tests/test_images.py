@@ -36,6 +36,13 @@ def test_grey_levels_are_kept() -> None:
         assert np.array_equal(gray, LEVELS)
 
 
+def test_what_resizing_makes_of_white_is_white() -> None:
+    white = cv2.resize(np.ones((480, 640)), (213, 160), interpolation=cv2.INTER_AREA)
+    assert white.max() > 1.0
+    assert (gray_from(white) == 255).all()
+    assert (gray_from(np.full((4, 4), -1e-9, np.float32)) == 0).all()
+
+
 def test_rounds_to_the_nearest_level() -> None:
     assert gray_from(np.array([[0, 128, 129, 65535, 65406]], np.uint16)).tolist() == [[0, 0, 1, 255, 254]]
     assert gray_from(np.array([[0.0, 0.5 / 255 - 1e-9, 0.5 / 255 + 1e-9, 1.0]])).tolist() == [[0, 0, 1, 255]]

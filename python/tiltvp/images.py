@@ -37,6 +37,8 @@ LARGEST_IMAGE_BYTES: Final = 1 << 30
 _EXPECTED = "(H, W) or (H, W, 3 or 4 in BGR order) of uint8, uint16, or float in [0, 1]"
 _DEPTHS = (10, 12, 14, 16)
 """Bits that sensors have where files and arrays have 16."""
+_BEYOND: Final = 1e-6
+"""By how much floats may be beyond [0, 1]: OpenCV's INTER_AREA makes 1 + 3e-8 of white, and 32 bits as much."""
 _DEEP = (".png", ".tif", ".tiff", ".pgm", ".ppm", ".pnm", ".jp2")
 """Endings of the files that hold 16 bits a value."""
 
@@ -156,7 +158,7 @@ def _bytes_from(array: NDArray[Any], name: str, bits: int | None = None) -> NDAr
         return array.astype(np.uint8) * np.uint8(255)
     if array.dtype.kind == "f":
         low, high = float(array.min()), float(array.max())
-        if not (low >= 0.0 and high <= 1.0):
+        if not (low >= -_BEYOND and high <= 1.0 + _BEYOND):
             what = "NaN" if np.isnan(low) else f"values from {low:g} to {high:g}"
             raise InvalidInputError(f"{name}: floats with {what}, expected floats in [0, 1]")
         return np.asarray(np.rint(array * 255.0), dtype=np.uint8)
