@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
+from tiltvp.arguments import refuse_unless
 from tiltvp.body import BodyMask, body_mask
 from tiltvp.errors import InvalidInputError, TiltvpError, counted
 from tiltvp.images import checked_camera, gray_from
@@ -231,8 +232,7 @@ def drive_tilts(
 
 def _count_of(frames: Frames, motions: Sequence[Motion | None] | None) -> int:
     """How many frames there are, each with its motion. Raises `InvalidInputError`."""
-    if not isinstance(frames, Frames):
-        raise InvalidInputError(f"frames: {type(frames).__name__}, expected what tiltvp.streams.open_frames opens")
+    refuse_unless(frames, Frames, "frames", "what tiltvp.streams.open_frames opens")
     if frames.count is None:
         raise InvalidInputError(f"{frames.source}: comes only once, expected images, a video or a recording")
     if motions is not None and len(motions) != frames.count:

@@ -9,6 +9,8 @@ from typing import NoReturn, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from tiltvp import _core
+from tiltvp.arguments import refuse_unless
 from tiltvp.cameras import Camera
 from tiltvp.errors import InvalidInputError
 from tiltvp.files import check_toml
@@ -21,8 +23,8 @@ __all__ = ["StereoRig"]
 class StereoRig:
     """Two cameras of any lens models.
 
-    Raises `tiltvp.errors.InvalidInputError` for a `left_from_right` that is no rigid motion between two places; what is
-    one to 1e-3, as in files, is taken as the nearest.
+    Raises `tiltvp.errors.InvalidInputError` for what is no camera, and for a `left_from_right` that is no rigid motion
+    between two places; what is one to 1e-3, as in files, is taken as the nearest.
     """
 
     left: Camera
@@ -31,6 +33,8 @@ class StereoRig:
     """(4, 4): the right camera's pose in the left one's frame, metres."""
 
     def __post_init__(self) -> None:
+        refuse_unless(self.left, _core.Camera, "left", "a tiltvp.Camera")
+        refuse_unless(self.right, _core.Camera, "right", "a tiltvp.Camera")
         object.__setattr__(self, "left_from_right", rigid_motion(self.left_from_right, _fail))
 
     @classmethod

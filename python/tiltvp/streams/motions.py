@@ -9,9 +9,11 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from tiltvp.arguments import refuse_unless
 from tiltvp.drive_logs import DriveLog, doubled_rows
 from tiltvp.errors import InvalidInputError
 from tiltvp.streams.bags import Recording, is_recording
+from tiltvp.streams.frames import Frames
 from tiltvp.streams.odometry import Motion, Odometry
 from tiltvp.streams.odometry_tables import OdometryTable
 from tiltvp.streams.wheels import Wheels
@@ -19,7 +21,6 @@ from tiltvp.streams.wheels import Wheels
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from tiltvp.streams.frames import Frames
 
 __all__ = ["FrameMotions", "frame_motions", "read_odometry"]
 
@@ -59,6 +60,7 @@ def read_odometry(
     names conventions about wheels by which it was recorded, as of `DriveLog.read_as`. Raises `InvalidInputError` that
     says what is missing, or what is wrong in which line.
     """
+    refuse_unless(wheels, Wheels, "wheels", "tiltvp.streams.Wheels")
     if is_recording(source):
         from tiltvp.streams.bag_motion import bag_odometry
 
@@ -79,6 +81,8 @@ def frame_motions(
     A table with a column `file` has a row for each frame. Other records are interpolated at the frames' times; a table
     of as many rows as frames without times has one for each of these, in their order. Raises `InvalidInputError`.
     """
+    refuse_unless(frames, Frames, "frames", "what tiltvp.streams.open_frames opens")
+    refuse_unless(wheels, Wheels, "wheels", "tiltvp.streams.Wheels")
     if frames.names is None:
         raise InvalidInputError(f"{frames.source}: frames of unknown number, expected a recording for odometry")
     if is_recording(source):
