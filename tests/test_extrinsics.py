@@ -218,3 +218,25 @@ def test_joined_logs_of_simulated_drives_are_consistent() -> None:
         low, high = consistency_band(0.999, 3, 20)
         assert low < np.mean(values) < high
     assert agreed >= 19
+
+
+def test_a_log_that_is_given_twice_is_no_second_drive() -> None:
+    drive = simulate_drive("alternating", seed=3)
+    once, again = (tiltvp.calibrate(drive.odometry, drive.bearings, wheel_base_m=0.4) for _ in range(2))
+    with pytest.raises(
+        InvalidInputError, match=r"logs\[1\]: the same as one before, expected logs of different drives"
+    ):
+        join_logs([once, again])
+
+
+@pytest.mark.parametrize(
+    ("values", "told"),
+    [
+        ({"robot_from_camera": "forward"}, "robot_from_camera"),
+        ({"robot_from_camera": np.ones((3, 3))}, "robot_from_camera: no rotation"),
+        ({"height_m": "a"}, "height_m = 'a', expected a number"),
+    ],
+)
+def test_what_is_no_mounting_or_height_is_said(values: dict[str, object], told: str) -> None:
+    with pytest.raises(InvalidInputError, match=told):
+        Extrinsics.of(Place(*TRUE, PLANE), **values)  # type: ignore[arg-type]

@@ -9,18 +9,17 @@ from typing import TYPE_CHECKING, ClassVar, Final
 
 import numpy as np
 
-from tiltvp.arguments import array_from
+from tiltvp.arguments import array_from, number_from
 from tiltvp.errors import InvalidInputError
 from tiltvp.mounting import MountingTilt
-from tiltvp.rotations import about_vertical, rotation_from
-from tiltvp.selfcalib import consistency_band
+from tiltvp.rotations import about_vertical, mounting_from
+from tiltvp.selfcalib import LogCalibration, consistency_band
 from tiltvp.streams.outputs.transforms import COVARIANCE_AXES, StaticTransform
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
     from tiltvp.robot import Robot
-    from tiltvp.selfcalib import LogCalibration
 
     Matrix = NDArray[np.float64]
 
@@ -163,9 +162,10 @@ class Extrinsics:
             covariance[2:4, 2:4] = turn[:2, :2] @ np.asarray(lean) @ turn[:2, :2].T
             covariance[np.ix_(_PLANE, _PLANE)] = plane
         given = np.eye(3) if robot_from_camera is None else robot_from_camera
-        rotation = np.asarray(given if tilt is None else tilt.robot_from_camera, dtype=np.float64)
+        rotation = mounting_from(given if tilt is None else tilt.robot_from_camera)
+        height_m = None if height_m is None else number_from(height_m, "height_m")
         return cls(
-            turn @ rotation_from(rotation.tolist(), "robot_from_camera"), np.array([x, y]), covariance, height_m,
+            turn @ rotation, np.array([x, y]), covariance, height_m,
             tilt is not None or robot_from_camera is not None, tuple(reasons),
         )  # fmt: skip
 
@@ -218,8 +218,12 @@ def join_logs(
     What the logs were started from counts once: `start` and `start_sigma`, as for `tiltvp.calibrate`, are x, y and yaw
     (3,) in metres and radians, and their standard deviations (3,) or covariance (3, 3). Logs whose answers are farther
     apart than chance has it once in a thousand times make the result false, and so does one that is false itself.
-    Raises `InvalidInputError` for no log, for a log whose covariance is none, and for a start of other shapes.
+    Raises `InvalidInputError` for no log, for one that is given twice, for a log whose covariance is none, and for a
+    start of other shapes.
     """
+    for number, log in enumerate(logs):
+        if isinstance(log, LogCalibration) and log in logs[:number]:
+            raise InvalidInputError(f"logs[{number}]: the same as one before, expected logs of different drives")
     first, prior = _start(start, start_sigma)
     found = [log.mounting for log in logs]
     values = np.array([[one.x_m, one.y_m, one.yaw_rad] for one in found]).reshape(-1, 3)
