@@ -14,6 +14,7 @@ from tiltvp.arguments import array_from, number_from
 from tiltvp.errors import InvalidInputError
 from tiltvp.stereo_rigs import StereoRig
 from tiltvp.streams import InertialSamples, Motion, Odometry, Wheels, frame_motions, read_odometry
+from tiltvp.streams.outputs.transforms import StaticTransform
 from tiltvp.tilt import normal_of
 
 CAMERA = tiltvp.Camera.equidistant(width=64, height=48, focal_px=20.0, cx=31.5, cy=23.5)
@@ -131,6 +132,7 @@ FEATURE = corner.fit(
         (lambda: StereoRig("left.yaml", CAMERA, np.eye(4)), "left: str, expected a tiltvp.Camera"),
         (lambda: read_odometry("odometry.csv", wheels=0.4), "wheels: float, expected tiltvp.streams.Wheels"),
         (lambda: frame_motions([IMAGE], "odometry.csv"), "frames: list, expected what tiltvp.streams.open_frames"),
+        (lambda: StaticTransform("base", 3, np.zeros(3), np.eye(3)), "child = 3, expected the name of a frame"),
         (lambda: tiltvp.join_logs([], start="a"), "start: no array of numbers"),
         (lambda: corner.poses(FEATURE, None, np.eye(4)), "feature: NoneType, expected a CornerFeature"),
     ],

@@ -165,6 +165,8 @@ def test_what_are_no_images_or_no_camera_is_said(check: Callable[..., object]) -
     camera = tiltvp.Camera.equidistant(width=16, height=16, focal_px=5.0, cx=7.5, cy=7.5)
     with pytest.raises(InvalidInputError, match=r"images: NoneType, expected several images"):
         check(None, camera)
+    with pytest.raises(InvalidInputError, match=r"images = 'drive/', expected several images, as tiltvp\.read_image"):
+        check("drive/", camera)
     if check is not tiltvp.surround_mask:
         with pytest.raises(InvalidInputError, match=r"camera: str, expected a tiltvp\.Camera"):
             check([LEVELS] * 5, "camera.toml", mask=LEVELS > 3)

@@ -97,6 +97,8 @@ def grays_from(images: Iterable[ArrayLike]) -> list[NDArray[np.uint8]]:
 def _named(images: Iterable[ArrayLike]) -> Iterator[tuple[str, ArrayLike]]:
     """Images with the names that messages call them."""
     refuse_unless(images, Iterable, "images", "several images")
+    if isinstance(images, str | bytes):
+        raise InvalidInputError(f"images = {images!r}, expected several images, as tiltvp.read_image reads them")
     return ((f"images[{number}]", image) for number, image in enumerate(images))
 
 

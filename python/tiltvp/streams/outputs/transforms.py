@@ -153,7 +153,7 @@ class StaticTransform:
 def check_frames(parent: str, child: str) -> None:
     """Raises `InvalidInputError` for names that no frame can have, and for one name of both."""
     for what, name in (("parent", parent), ("child", child)):
-        if re.fullmatch(r"[A-Za-z0-9_/]+", name) is None:
+        if not isinstance(name, str) or re.fullmatch(r"[A-Za-z0-9_/]+", name) is None:
             raise InvalidInputError(f"{what} = {name!r}, expected the name of a frame: letters, digits, _ and /")
     if parent == child:
         raise InvalidInputError(f"child = {child!r}, expected another name than that of the parent")
