@@ -85,7 +85,8 @@ class LineExtractor(_core.LineExtractor):
     def describe(self, image: ArrayLike, lines: Lines) -> NDArray[np.float32]:
         """(N, 192) float32: the descriptors of the lines of an image, eqs. 2 to 5; other options, other widths.
 
-        `lines` carry the frame that they were found in. Raises `InvalidInputError` for lines of the other method.
+        `lines` carry the vertical that they were found about, in the robot frame, but neither camera nor mounting: of
+        another one of these they are other places. Raises `InvalidInputError` for lines of the other method.
         """
         refuse_unless(lines, Lines, "lines", "Lines")
         return self._describe(gray_from(image), lines)
@@ -131,7 +132,10 @@ def describe(
     robot_from_camera: ArrayLike | None = None,
     **options: Any,
 ) -> NDArray[np.float32]:
-    """(N, 192) float32: the descriptors of lines; for many images of one camera make a `LineExtractor`."""
+    """(N, 192) float32: the descriptors of lines; for many images of one camera make a `LineExtractor`.
+
+    `robot_from_camera` is the mounting that the lines were found with, without which they are other places.
+    """
     refuse_unless(lines, Lines, "lines", "Lines")
     method = LINE_METHODS[0] if lines.center_px is None else LINE_METHODS[1]
     return LineExtractor(camera, method=method, robot_from_camera=robot_from_camera, **options).describe(image, lines)
