@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import cv2
@@ -127,3 +128,11 @@ def test_written_by_opencv_itself(tmp_path: Path) -> None:
         spec = read_cameras(path)[0]
         assert spec.model == "unified"
         assert spec.parameters == {"xi": 1.375, **AFFINE, "k1": 0.0125, "k2": -3.5e-3, "p1": 1e-5, "p2": -2.5e-06}
+
+
+def test_numbers_that_are_shares_of_the_image_are_no_pixels(tmp_path: Path) -> None:
+    path = tmp_path / "normalised.json"
+    numbers = {"camera_matrix": [[0.6, 0, 0.5], [0, 0.8, 0.5], [0, 0, 1]], "distortion_coefficients": [0, 0, 0, 0, 0]}
+    path.write_text(json.dumps(numbers | {"image_width": 640, "image_height": 480}))
+    with pytest.raises(CalibrationError, match=r"0\.5\] of 640 x 480 pixels, expected pixels, not shares of the image"):
+        read_cameras(path)

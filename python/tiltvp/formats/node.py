@@ -18,6 +18,9 @@ _NUMBER: Final = re.compile(r"[+-]?(\d+(\.\d*)?|\.\d+)([eE][+-]?\d+)?", re.ASCII
 _DEEPEST: Final = 4
 MOST_NUMBERS: Final = 10_000
 """Of a list or a matrix; the largest that a camera has are 20."""
+_SHARES: Final = 4.0
+"""Below this focal lengths and centre are shares of the image's sides, as some tools have them: of a lens that sees 40
+degrees the focal length is 1.4 of a side."""
 LONGEST_NUMBER: Final = 400
 """Characters of a number: the longest decimals of a double have 327."""
 
@@ -187,6 +190,9 @@ class Node:
 
     def spec(self, model: str, size: ImageSize, parameters: Parameters, name: str, *notes: str) -> CameraSpec:
         """The camera of these numbers, which the core has checked."""
+        four = [parameters.get(key, math.inf) for key in ("fx", "fy", "cx", "cy")]
+        if min(size) > _SHARES and all(isinstance(value, float) and abs(value) < _SHARES for value in four):
+            self.fail(f"fx, fy, cx, cy = {four} of {size[0]} x {size[1]} pixels", "pixels, not shares of the image")
         return self.checked(CameraSpec(model, size[0], size[1], parameters, name=name, notes=notes))
 
     def checked(self, spec: CameraSpec) -> CameraSpec:
