@@ -7,6 +7,31 @@
 //! `closed_form` solves for the attitude from three rays. `coloured` and `general` find corners in images. `sequence`
 //! estimates poses in image sequences, with data association and tracking. Files beside these rooms are what they share.
 //!
+//! ```
+//! use nalgebra::{Matrix3, Vector3};
+//! use tiltvp_core::camera::{Camera, Model, Pinhole};
+//! use tiltvp_core::corner::{CornerDetector, CornerPoseEstimator, DetectorOptions, EstimatorOptions, Frame, FrameKnowledge};
+//! use tiltvp_core::geometry::RigidMotion;
+//! use tiltvp_core::image::ImageView;
+//!
+//! # fn main() -> tiltvp_core::Result<()> {
+//! let camera = Camera::new(320, 240, Model::Pinhole(Pinhole::new([250.0; 2], [159.5, 119.5], &[])?))?;
+//! let detector = CornerDetector::new(camera, DetectorOptions::for_method("general")?, None)?;
+//! let left_from_right = RigidMotion::new("left_from_right", Matrix3::identity(), Vector3::new(0.12, 0.0, 0.0))?;
+//! let right = Some((detector.clone(), left_from_right));
+//! let mut estimator = CornerPoseEstimator::new(detector, right, EstimatorOptions::default())?;
+//!
+//! let pixels = vec![128u8; 320 * 240];
+//! let image = Frame::Gray(ImageView::new(&pixels, 320, 240, 320)?);
+//! let found = estimator.observe(&image, Some(&image), &FrameKnowledge::default())?;
+//! match found.pose() {
+//!     Some(pose) => println!("{:?} from the camera, {}", pose.vertex_m, pose.camera_from_object),
+//!     None => assert_eq!(found.verdict.reason(), "no corner in the left image"), // A grey wall has none.
+//! }
+//! # Ok(())
+//! # }
+//! ```
+//!
 //! [Liu et al. 2018]: https://deepai.org/publication/trove-feature-detection-for-online-pose-recovery-by-binocular-cameras
 
 mod closed_form;
