@@ -99,6 +99,7 @@ vectors-aarch64:
 check:
     cargo fmt --all --check
     cargo clippy --locked --workspace --all-targets --quiet -- --deny warnings
+    RUSTDOCFLAGS="--deny warnings" cargo doc --locked --quiet --no-deps --package tiltvp-kernels --package tiltvp-core --package tiltvp-synth
     {{bin}}/ruff check --quiet
     {{bin}}/ruff format --check --quiet
 

@@ -3,7 +3,7 @@
 //! The floors of the house, from the ground up; a module imports only from floors below its own, and any of them from
 //! [`tiltvp_kernels`], which holds all vector code and its `unsafe`:
 //!
-//! 1. [`error`], [`geometry`], [`interrupt`], [`options`]
+//! 1. [`error`], [`geometry`], [`interrupt`], [`options`](mod@options)
 //! 2. [`camera`], [`image`], [`robust`], [`filter`]
 //! 3. [`edges`]
 //! 4. [`segments`]

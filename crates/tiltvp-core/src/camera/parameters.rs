@@ -14,7 +14,7 @@ impl Model {
     /// What the model of a name declares: its parameters in order, with defaults and meanings.
     ///
     /// # Errors
-    /// [`Error::InvalidCamera`] if no model has this name; the near ones and all are named.
+    /// [`Error::InvalidCamera`](crate::Error::InvalidCamera) if no model has this name; the near ones and all are named.
     pub fn schema_of(name: &str) -> Result<&'static LensSchema> {
         entry(name).map(|entry| entry.schema)
     }
@@ -22,8 +22,8 @@ impl Model {
     /// The model of a name with named parameters, for images of `width` x `height` pixels.
     ///
     /// # Errors
-    /// [`Error::InvalidCamera`] if the model or a parameter has no such name (the near ones and all are named), a
-    /// parameter is missing, given twice, a list where a number belongs, or a number that no such lens has.
+    /// [`Error::InvalidCamera`](crate::Error::InvalidCamera) if the model or a parameter has no such name (the near
+    /// ones and all are named), a parameter is missing, given twice, a list where a number belongs, or a number that no such lens has.
     pub fn from_parameters(name: &str, width: u32, height: u32, parameters: &[(String, Parameter)]) -> Result<Self> {
         let entry = entry(name)?;
         (entry.build)(&Values::read(entry.schema, parameters, [width, height])?)

@@ -114,10 +114,10 @@ impl CornerAttitudes {
 
 /// Every attitude under which a vertical and two horizontal edges that include `angle` look like the feature's rays.
 ///
-/// None means that there is no such attitude (see [`Screening`](super::Screening) for why).
+/// None means that there is no such attitude (see [`Screening`](crate::corner::Screening) for why).
 ///
 /// # Errors
-/// [`Error::InvalidArgument`] for an included angle that is none.
+/// [`Error::InvalidArgument`](crate::Error::InvalidArgument) for an included angle that is none.
 pub fn corner_attitudes(feature: &CornerFeature, angle: &IncludedAngle) -> Result<CornerAttitudes> {
     angle.validate()?;
     let pencil = &feature.pencil;

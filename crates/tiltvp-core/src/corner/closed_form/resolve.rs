@@ -11,7 +11,7 @@ use crate::geometry::validate_rotation;
 /// The attitudes that one feature admits, and where its camera looks.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct View<'a> {
-    /// What [`corner_attitudes`](super::corner_attitudes) found.
+    /// What [`corner_attitudes`](crate::corner::corner_attitudes) found.
     pub attitudes: &'a CornerAttitudes,
     /// The rotation from the feature's camera to the frame that all views share; the priors are in that frame.
     pub common_from_camera: Matrix3<f64>,

@@ -41,7 +41,7 @@ impl Screening {
         matches!(self, Self::Passes)
     }
 
-    /// Screens a feature: passes exactly where [`corner_attitudes`](super::corner_attitudes) finds some.
+    /// Screens a feature: passes exactly where [`corner_attitudes`](crate::corner::corner_attitudes) finds some.
     ///
     /// # Errors
     /// [`Error::InvalidArgument`](crate::Error::InvalidArgument) for an included angle that is none.

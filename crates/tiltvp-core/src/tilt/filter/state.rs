@@ -8,11 +8,11 @@ use super::options::TiltFilterOptions;
 use crate::error::{Error, Result};
 use crate::filter::{positive_semidefinite, restored};
 
-/// What a [`TiltFilter`] knows, but for its options: everything the next answer depends on.
+/// What a [`TiltFilter`](super::TiltFilter) knows, but for its options: everything the next answer depends on.
 ///
 /// The covariance is that of the error state (floor, mounting, scene), two numbers each: walks from the floor's and the
-/// mounting's normal in the basis of [`tangent_basis`] there, and the error that successive images share, in radians along
-/// the robot's `x` and `y`.
+/// mounting's normal in the basis of [`tangent_basis`](crate::geometry::tangent_basis) there, and the
+/// error that successive images share, in radians along the robot's `x` and `y`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TiltFilterState {
     /// The ground normal in the frame of the wheels, `f`.

@@ -119,7 +119,7 @@ impl LevelMap {
         self.leveller.height()
     }
 
-    /// Rows that are written together: those of whole cells, about [`STRIP`] pixels.
+    /// Rows that are written together: those of whole cells, about 65,536 pixels.
     pub fn strip_rows(&self) -> usize {
         (STRIP / (CELL * self.width())).max(1) * CELL
     }
