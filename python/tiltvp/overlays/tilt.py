@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -63,9 +62,8 @@ def draw_tilt(
         if _inside(canvas, place):
             cv2.circle(canvas, _whole(place), 6 * scale, colour, scale, cv2.LINE_AA)
             cv2.circle(canvas, _whole(place), scale, colour, -1, cv2.LINE_AA)
-    for start, end in _horizon(camera, up):
-        if _inside(canvas, start) and _inside(canvas, end):
-            cv2.line(canvas, _whole(start), _whole(end), colour, scale, cv2.LINE_AA)
+    for part in _horizon(camera, up):
+        cv2.polylines(canvas, [part], False, colour, scale, cv2.LINE_AA)
     return canvas
 
 
@@ -98,19 +96,19 @@ def _ink(words: str) -> Picture:
     return strip[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1] if rows.size else strip
 
 
-def _horizon(camera: Camera, up: NDArray[np.float64]) -> list[tuple[NDArray[np.float64], NDArray[np.float64]]]:
-    """Short pieces of the curve on which bearings are orthogonal to `up`; jumps (panoramas) are left out."""
+def _horizon(camera: Camera, up: NDArray[np.float64]) -> list[NDArray[np.int32]]:
+    """Pixels along the parts in the image of the curve on which bearings are orthogonal to `up`; jumps (panoramas)
+    are left out."""
     helper = np.eye(3)[int(np.argmin(np.abs(up)))]
     first = np.cross(up, helper)
     first /= np.linalg.norm(first)
     turn = np.linspace(0.0, 2.0 * np.pi, _HORIZON_POINTS + 1)[:, None]
     places: NDArray[np.float64] = camera.project(np.cos(turn) * first + np.sin(turn) * np.cross(up, first))
-    far = 0.1 * max(camera.width, camera.height)
-    return [
-        (a, b)
-        for a, b in itertools.pairwise(places)
-        if np.isfinite(a).all() and np.isfinite(b).all() and np.abs(b - a).max() < far
-    ]
+    seen = np.all((places > -1.0) & (places < [camera.width, camera.height]), axis=1)
+    places[~seen] = 0.0
+    jumps = np.abs(np.diff(places, axis=0)).max(axis=1) >= 0.1 * max(camera.width, camera.height)
+    parts = np.split(np.rint(places).astype(np.int32), np.flatnonzero(jumps | ~seen[:-1] | ~seen[1:]) + 1)
+    return [part for part in parts if len(part) > 1]
 
 
 def _inside(picture: Picture, place: NDArray[np.float64]) -> bool:
