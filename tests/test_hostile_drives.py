@@ -266,6 +266,21 @@ def test_the_filter_of_the_command_is_that_of_method(tmp_path: Path, capsys: pyt
     assert "method" in capsys.readouterr().err
 
 
+def test_the_filter_of_the_command_has_the_centre_of_the_whole_log(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    drive, out = one("image centre off by 2 px"), tmp_path / "out.json"
+    assert main(write(tmp_path, drive)) == 1
+    assert "about another image centre or from a camera that leans: try estimate_centre" in capsys.readouterr().out
+    assert main([*write(tmp_path, drive), "--estimate-centre", "--out", str(out)]) == 0
+    assert "image centre: off by" in capsys.readouterr().out
+    for answer in ("filter", "whole_log"):
+        found = json.loads(out.read_text())["logs"][0][answer]
+        found = found.get("mounting", found)
+        error = np.array([found["x_m"], found["y_m"], found["yaw_rad"]]) - drive.truth
+        assert float(error @ np.linalg.solve(found["covariance_xy_yaw"], error)) < 16.3
+
+
 def test_the_table_counts_as_it_says() -> None:
     table = judge_drives(hostile_drives(UNDISTURBED, range(2)))
     summary = summarise_drive_cases(table)

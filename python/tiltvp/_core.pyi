@@ -1968,14 +1968,14 @@ class LogCalibration:
 
     @property
     def centre_off_rad(self) -> NDArray[np.float64]:
-        """How far the image centre about which the bearings were taken is off, along bearings 0 and 90 degrees, in
-        units of the radius at which lines are seen: radians, (x, y); 0 where it was not estimated. A camera that leans
-        errs alike.
+        """Fresh (2,) float64: how far the image centre about which the bearings were taken is off, along bearings 0 and
+        90 degrees, in units of the radius at which lines are seen: radians; 0 where it was not estimated. A camera that
+        leans errs alike.
         """
 
     @property
     def centre_off_sigma_rad(self) -> NDArray[np.float64]:
-        """Standard deviations of it; 0 where it was not estimated."""
+        """Fresh (2,) float64: standard deviations of it; 0 where it was not estimated."""
 
     @property
     def converged(self) -> bool:

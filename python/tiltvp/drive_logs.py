@@ -58,6 +58,13 @@ class DriveLog:
             log = READINGS[name](log)
         return log
 
+    def about_centre(self, off_rad: NDArray[np.float64]) -> DriveLog:
+        """This log about the true image centre, where that is off by `LogCalibration.centre_off_rad`."""
+        bearings = self.bearings.copy()
+        forward, left = off_rad
+        bearings[:, 2] += left * np.cos(self.bearings[:, 2]) - forward * np.sin(self.bearings[:, 2])
+        return replace(self, bearings=bearings)
+
 
 def _wheels(left: float, right: float) -> Callable[[DriveLog], DriveLog]:
     return lambda log: replace(log, odometry=log.odometry * [left, right])

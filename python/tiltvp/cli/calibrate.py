@@ -143,7 +143,8 @@ def _calibrated(
     log, whole, doubt = one.solved(None if tilt is None else tilt.robot_from_camera, solve)
     calibrator = SelfCalibrator(**noise() | drive.of_filter(), method=method)
     with status(f"{one.name}: the filter, {len(log.bearings)} bearings"):
-        history = calibrator.follow(log.odometry, log.bearings)
+        # The filter does not estimate the image centre.
+        history = calibrator.follow(log.odometry, log.about_centre(whole.centre_off_rad).bearings)
     with watching.viewer() as viewer:
         if viewer is not None:
             send_calibration(viewer, log, history, whole)

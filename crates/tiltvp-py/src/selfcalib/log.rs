@@ -29,10 +29,10 @@ value! {
         time_offset_s: f64,
         /// Standard deviation of it; 0 where it was not estimated.
         time_offset_sigma_s: f64,
-        /// How far the image centre about which the bearings were taken is off, along bearings 0 and 90 degrees, in units of the radius at
-        /// which lines are seen: radians, (x, y); 0 where it was not estimated. A camera that leans errs alike.
+        /// Fresh (2,) float64: how far the image centre about which the bearings were taken is off, along bearings 0 and 90 degrees, in
+        /// units of the radius at which lines are seen: radians; 0 where it was not estimated. A camera that leans errs alike.
         centre_off_rad: Vector2<f64>,
-        /// Standard deviations of it; 0 where it was not estimated.
+        /// Fresh (2,) float64: standard deviations of it; 0 where it was not estimated.
         centre_off_sigma_rad: Vector2<f64>,
         /// Bearings that were used; of those taken at a standstill only the first.
         bearings: usize,
