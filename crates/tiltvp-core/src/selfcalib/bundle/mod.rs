@@ -4,6 +4,7 @@
 mod cholesky;
 mod cluster_robust;
 mod descent;
+mod free_parameters;
 mod jackknife;
 mod keyframe;
 mod landmark_distance;
@@ -17,8 +18,9 @@ mod schur;
 pub(super) use self::cholesky::{CholeskyFactor, combine, subtract_square};
 pub(super) use self::cluster_robust::{largest_ratio, widened};
 pub(super) use self::descent::{DescentReport, FIRST_DAMPING, Solution};
+pub(super) use self::free_parameters::FreeParameters;
 pub(super) use self::jackknife::DoubtedParts;
 pub(super) use self::keyframe::{Keyframe, Observation};
 pub(super) use self::landmark_distance::{DISTANCE_STEP, DISTANCE_STEPS};
-pub(super) use self::problem::{BundleProblem, FreeParameters};
+pub(super) use self::problem::BundleProblem;
 pub(super) use self::schur::ReducedSystem;

@@ -240,8 +240,8 @@ impl BundleProblem {
 
 #[cfg(test)]
 mod tests {
+    use super::super::free_parameters::FreeParameters;
     use super::super::keyframe::{Keyframe, Observation};
-    use super::super::problem::FreeParameters;
     use super::*;
     use crate::selfcalib::model::{
         BearingLoss, InverseDistanceLandmark, MotionNoise, RelativeMotion, WheelMotion, camera_position, compose,
