@@ -368,7 +368,7 @@ mod tests {
 
     #[test]
     fn the_step_is_downhill_and_comes_to_rest() {
-        let mut problem = drive(FreeParameters { wheels: true, offset: false });
+        let mut problem = drive(FreeParameters { wheels: true, ..FreeParameters::default() });
         let before = problem.cost();
         let descent = problem.levenberg_marquardt(50, 1e-9, 1e-3);
         assert!(descent.converged && descent.cost < before);
