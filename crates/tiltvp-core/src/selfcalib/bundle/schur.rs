@@ -327,13 +327,13 @@ mod tests {
     }
 
     #[test]
-    fn rows_are_differences_by_pose_neighbour_and_time() {
+    fn rows_are_differences_by_pose_neighbour_time_and_centre() {
         let mut problem = drive(FreeParameters::ALL);
         let uneven = Vector3::new(0.01, 0.0, -0.02);
         problem.keyframes[3].unevenness = [uneven, -uneven];
         let h = 1e-6;
         for late in [false, true] {
-            (problem.offset_s, problem.late) = (0.4, late);
+            (problem.offset_s, problem.late, problem.centre) = (0.4, late, Vector2::new(0.02, -0.01));
             for at in [0, 1, 3, 31] {
                 let difference = |change: &dyn Fn(&mut BundleProblem, f64)| -> Vec<f64> {
                     let [more, less] = [h, -h].map(|by| {
@@ -346,6 +346,7 @@ mod tests {
                 let neighbour = problem.neighbour(at);
                 assert_eq!(neighbour.is_none(), at == if late { 31 } else { 0 });
                 let by_time = difference(&|problem, by| problem.offset_s += by);
+                let by_centre = [0, 1].map(|axis| difference(&|problem, by| problem.centre[axis] += by));
                 let poses = [Some(at), neighbour].map(|pose| {
                     pose.map(|pose| {
                         [0, 1, 2].map(|axis| difference(&|problem, by| problem.keyframes[pose].pose[axis] += by))
@@ -354,6 +355,9 @@ mod tests {
                 let mut row = 0;
                 problem.for_each_bearing_row(at, &problem.homogeneous_landmarks(), |given| {
                     assert!((given.by_calibration[5] - by_time[row]).abs() < 1e-5);
+                    for (axis, by_axis) in by_centre.iter().enumerate() {
+                        assert!((given.by_calibration[6 + axis] - by_axis[row]).abs() < 1e-5);
+                    }
                     for (by_pose, given) in poses.iter().zip([given.by_pose, given.by_neighbour]) {
                         let Some(by_pose) = by_pose else { continue };
                         let by_pose = Vector3::from(by_pose.each_ref().map(|by_axis| by_axis[row]));
