@@ -75,15 +75,11 @@ impl Fit {
     }
 
     /// The estimate of an image. A tilt of which the error is not known is none: nor one whose covariance is singular to rounding,
-    /// for a direction in which an image tells nothing, or beyond the largest lean expected, which tells less than was known.
+    /// for a direction in which an image tells nothing.
     pub(super) fn into_estimate(self, seen: &Seen<'_>, trusted: &mut [f64; FEATURES]) -> TiltEstimate {
         let chosen = self.alternatives[0].map_or(1.0, |best| best.probability);
         let (covariance, off_rad) = self.with_centre_off(seen);
-        let tells = |covariance: &Matrix2<f64>| {
-            confidence::inverse_of_positive(covariance).is_some()
-                && covariance.symmetric_eigenvalues().max() < seen.expected_max_rad.powi(2)
-        };
-        let covariance = covariance.filter(tells);
+        let covariance = covariance.filter(|covariance| confidence::inverse_of_positive(covariance).is_some());
         let undetermined = self.tilt.is_some() && covariance.is_none();
         let undetermined = undetermined.then_some(Stop::Undetermined { agreeing: self.inliers });
         let mut estimate = TiltEstimate {
@@ -268,20 +264,6 @@ mod tests {
         assert!(within.doubt.is_none() && beyond.confidence == AS_LARGE * within.confidence);
         assert_eq!(beyond.doubt, Some(Doubt::Beyond { limit_rad: 0.09 }));
         assert!(beyond.doubt.is_some_and(|doubt| doubt.to_string().contains("raise tilt_max_rad")));
-    }
-
-    #[test]
-    fn a_covariance_beyond_the_largest_lean_expected_is_no_answer() {
-        let of = |expected_max_rad: f64| {
-            let seen = Seen { expected_max_rad, ..seen(None) };
-            fit(Matrix2::from_diagonal(&Vector2::new(1e-6, 1e-5))).into_estimate(&seen, &mut [0.0; FEATURES])
-        };
-        assert!(of(0.0032).tilt.is_some());
-        for expected_max_rad in [0.0031, 1e-9] {
-            let found = of(expected_max_rad);
-            assert_eq!((found.tilt, found.confidence), (None, 0.0));
-            assert_eq!(found.stop, Stop::Undetermined { agreeing: 7 });
-        }
     }
 
     #[test]
