@@ -71,17 +71,18 @@ def test_importing_needs_numpy_alone(topic: str) -> None:
 
 @pytest.mark.slow
 def test_importing_is_quick() -> None:
-    """The limit is for the processor's time: other programs of a busy machine do not count."""
+    """It takes at most half as long again as NumPy by the processor, side by side: machines are slow and busy by turns."""
     # By the process's own clock: the times of children are counted in ticks of ten milliseconds.
-    script = "import time, numpy; start = time.process_time(); import tiltvp; print(time.process_time() - start)"
+    clock = "; from time import process_time as now; times.append(now())"
+    script = f"times = []{clock}; import numpy{clock}; import tiltvp{clock}; a, b, c = times; print((c - b) / (b - a))"
     environment = os.environ | {"OPENBLAS_NUM_THREADS": "1"}
-    times = []
+    ratios = []
     for _ in range(5):
         done = subprocess.run(
             [sys.executable, "-c", script], capture_output=True, text=True, timeout=60, check=True, env=environment
         )
-        times.append(float(done.stdout))
-    assert min(times) < 0.1
+        ratios.append(float(done.stdout))
+    assert min(ratios) < 1.5
 
 
 def test_one_import_brings_the_topics() -> None:
