@@ -71,7 +71,7 @@ def test_importing_needs_numpy_alone(topic: str) -> None:
 
 @pytest.mark.slow
 def test_importing_is_quick() -> None:
-    """It takes at most half as long again as NumPy by the processor, side by side: machines are slow and busy by turns."""
+    """It takes at most half as long again as NumPy by the processor: machines are slow and busy by turns."""
     # By the process's own clock: the times of children are counted in ticks of ten milliseconds.
     clock = "; from time import process_time as now; times.append(now())"
     script = f"times = []{clock}; import numpy{clock}; import tiltvp{clock}; a, b, c = times; print((c - b) / (b - a))"
