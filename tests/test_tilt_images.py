@@ -104,6 +104,19 @@ def test_a_lean_beyond_the_largest_one_is_not_sure(camera: tiltvp.Camera, render
         assert "tilt_max_rad" not in wide.reason
 
 
+@pytest.mark.parametrize("method", tiltvp.METHODS)
+def test_a_larger_lean_than_is_told_is_found_and_doubted(camera: tiltvp.Camera, render: Any, method: str) -> None:
+    """Of the edges near the vertical alone any narrow limit would make a sure answer."""
+    told, untold = (
+        tiltvp.TiltEstimator(camera, method=method, tilt_max_rad=limit) for limit in (math.radians(2.0), None)
+    )
+    for degrees in (4.0, 6.0, 12.0, 20.0):
+        room = render(kind="living-room", seed=1, alpha_rad=math.radians(degrees), beta_rad=0.8)
+        doubted, other = told(room.gray), untold(room.gray)
+        assert doubted.confidence <= 0.5
+        assert math.degrees(tiltvp.tilt_error_rad(doubted.normal, other.normal)) < 0.2 or degrees > 6.0
+
+
 def test_the_largest_lean_is_found(camera: tiltvp.Camera, render: Any) -> None:
     """Its edges stray to either side of it, and most are kept."""
     for degrees in (3.0, 6.0, 10.0):

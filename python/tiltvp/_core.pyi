@@ -3035,10 +3035,11 @@ class TiltEstimator:
             Pixels kept clear of the lens' rim, the image border and the mask, beside those the kernels reach. The
             default depends on the method.
         tilt_max_rad
-            Largest lean expected, in radians: edges that would need a larger one, of the refined method by more than
-            `scale_rad`, are rejected first. None for 10 degrees of the refined method, 12 of segments and 7 of vector
-            consensus; the image-space methods have `offset_max_px` instead, and this, where given, sets it to the shift
-            of that lean. Above 20 degrees the method segments looks for the vertical anywhere. Default: None.
+            Largest lean expected, in radians: a larger one that is told here and found is doubted. Edges that would
+            need a larger one, of the refined method by more than `scale_rad`, are rejected first, but none that 10
+            degrees of the refined method, 12 of segments and 7 of vector consensus allow, which None stands for; the
+            image-space methods have `offset_max_px` instead, and this, where given, raises it to the shift of that
+            lean. Above 20 degrees the method segments looks for the vertical anywhere. Default: None.
         mask
             Pixels that show the world and not the robot; none for all. Default: None.
         row_stride

@@ -229,14 +229,14 @@ impl TiltEstimator {
         work: &mut Work,
     ) -> TiltEstimate {
         let fit = method.fit(edges, &self.pixels, work);
-        let [expected_max_rad, tilt_max_rad] = method.lean_limits_rad();
+        let [own_max_rad, tilt_max_rad] = method.lean_limits_rad();
         let (edge_pixels, prefiltered_pixels) = (edges.strong(), work.rows.len());
         let seen = Seen {
             edge_pixels,
             prefiltered_pixels,
             pixels_per_rad: self.pixels.region.pixels_per_rad(),
             tilt_max_rad,
-            expected_max_rad,
+            expected_max_rad: self.options.tilt_max_rad.unwrap_or(own_max_rad),
             lights,
             aspect: method.trust().map_or([0.0; ASPECT], |_| method.aspect(&self.pixels, work)),
             trust: method.trust(),

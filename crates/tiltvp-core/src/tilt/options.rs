@@ -12,10 +12,11 @@ options! {
     pub struct TiltOptions {
         /// Which pixels are edges.
         [flat] edges: EdgeOptions = EdgeOptions { smoothing_px: 0.6, ..EdgeOptions::default() };
-        /// Largest lean expected, in radians: edges that would need a larger one, of the refined method by more than `scale_rad`, are
-        /// rejected first. None for 10 degrees of the refined method, 12 of segments and 7 of vector consensus; the image-space
-        /// methods have `offset_max_px` instead, and this, where given, sets it to the shift of that lean. Above 20 degrees the method
-        /// segments looks for the vertical anywhere.
+        /// Largest lean expected, in radians: a larger one that is told here and found is doubted. Edges that would need a larger one,
+        /// of the refined method by more than `scale_rad`, are rejected first, but none that 10 degrees of the refined method, 12 of
+        /// segments and 7 of vector consensus allow, which None stands for; the image-space methods have `offset_max_px` instead,
+        /// and this, where given, raises it to the shift of that lean. Above 20 degrees the method segments looks for the vertical
+        /// anywhere.
         tilt_max_rad: Option<f64> = None
             => |_: &TiltOptions, x| x > 0.0 && x <= PI,
             "an angle above 0 and at most pi, below pi/2 but for the method segments";

@@ -43,6 +43,14 @@ pub(in crate::tilt) struct Setting<'a> {
     pub seed: u64,
 }
 
+impl Setting<'_> {
+    /// Up to which lean edges are looked at: the largest one expected, but no less than a method's own. Those that are left of a
+    /// larger lean agree on a smaller one: told 2 degrees, six of nine views that leaned by 18 were 16 off and sure.
+    pub(super) fn searched_rad(&self, own_max_rad: f64) -> f64 {
+        self.tilt_max_rad.map_or(own_max_rad, |told| told.max(own_max_rad))
+    }
+}
+
 /// A method ready for the images of one camera, by what it looks at.
 #[derive(Debug, Clone)]
 pub(in crate::tilt) enum Prepared {
@@ -77,7 +85,7 @@ pub(in crate::tilt) trait Fitter: Debug + Send + Sync {
         None
     }
 
-    /// The largest lean that is expected, and that beyond which the prefilter rejects edges, in radians, if both matter: the edges that
+    /// The largest lean that is expected where none is told, and that beyond which the prefilter rejects edges, in radians, if both matter: the edges that
     /// are left of a larger lean than expected agree on a smaller one.
     fn lean_limits_rad(&self) -> [f64; 2] {
         [FRAC_PI_2; 2]

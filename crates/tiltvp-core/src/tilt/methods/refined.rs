@@ -69,11 +69,10 @@ pub(super) struct Refined {
 
 impl Refined {
     pub(super) fn new(setting: &Setting<'_>, options: RefineOptions) -> Self {
-        let expected_rad = setting.tilt_max_rad.unwrap_or(TILT_MAX_RAD);
         // Edges stray: those of the largest lean do to either side of it.
-        let edges_rad = (expected_rad + options.scale_rad).min(FRAC_PI_2);
+        let edges_rad = (setting.searched_rad(TILT_MAX_RAD) + options.scale_rad).min(FRAC_PI_2);
         let normals = Normals::new(setting, NormalKind::Tangent, edges_rad);
-        Self { normals, options, lean_limits_rad: [expected_rad, edges_rad] }
+        Self { normals, options, lean_limits_rad: [TILT_MAX_RAD, edges_rad] }
     }
 }
 

@@ -63,7 +63,7 @@ impl TiltMethod for VectorConsensusOptions {
 
     fn prepare(&self, setting: &Setting<'_>) -> Result<Prepared> {
         Ok(Prepared::Pixels(Arc::new(VectorConsensus {
-            normals: Normals::new(setting, self.normal, setting.tilt_max_rad.unwrap_or(TILT_MAX_RAD)),
+            normals: Normals::new(setting, self.normal, setting.searched_rad(TILT_MAX_RAD)),
             plane: setting.origin.robot_from_camera * Vector3::new(1.0, 1.0, 1.0),
             ransac: RansacOptions {
                 seed: setting.seed,

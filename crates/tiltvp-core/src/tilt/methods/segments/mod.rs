@@ -92,14 +92,15 @@ impl TiltMethod for SegmentsOptions {
         SegmentFinder::check_margin(&origin.options)?;
         let finder = SegmentFinder::new(&origin.camera, &pixels.region, self.segments);
         let looks_up = (origin.robot_from_camera * Vector3::z()).z.abs() >= AHEAD_SIN;
-        let tilt_max_rad = setting.tilt_max_rad.unwrap_or(TILT_MAX_RAD);
+        let tilt_max_rad = setting.searched_rad(TILT_MAX_RAD);
         Ok(Prepared::Segments(Arc::new(SegmentFit {
             finder,
             edges: origin.options,
             robot_from_camera: origin.robot_from_camera,
+            expected_max_rad: setting.tilt_max_rad.unwrap_or(PI),
             tilt_max_rad,
             options: *self,
-            near: Near::new(tilt_max_rad),
+            near: Near::new(setting.tilt_max_rad.unwrap_or(TILT_MAX_RAD), tilt_max_rad),
             aspect: Aspect::new(&origin.robot_from_camera),
             vote: looks_up.then(|| Vote::new(setting)),
             sample: if tilt_max_rad > NEAR_MAX_RAD { Sample::new(&pixels.region) } else { Sample::default() },
@@ -113,6 +114,8 @@ struct SegmentFit {
     finder: SegmentFinder,
     edges: EdgeOptions,
     robot_from_camera: Matrix3<f64>,
+    /// Beyond which a lean is doubted.
+    expected_max_rad: f64,
     tilt_max_rad: f64,
     options: SegmentsOptions,
     near: Near,
@@ -178,7 +181,7 @@ impl ImageFitter for SegmentFit {
             prefiltered_pixels: considered,
             pixels_per_rad: region.pixels_per_rad(),
             tilt_max_rad: self.tilt_max_rad,
-            expected_max_rad: PI,
+            expected_max_rad: self.expected_max_rad,
             trust,
             centre_off,
         };

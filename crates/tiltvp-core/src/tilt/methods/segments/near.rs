@@ -33,6 +33,7 @@ const LANES: usize = 8;
 /// The leans that are tried.
 #[derive(Debug)]
 pub(super) struct Near {
+    expected_max_rad: f64,
     tilt_max_rad: f64,
     /// Distance of neighbouring leans.
     step_rad: f64,
@@ -70,10 +71,10 @@ pub(super) struct Columns {
 }
 
 impl Near {
-    /// The leans up to the largest one.
-    pub(super) fn new(tilt_max_rad: f64) -> Self {
+    /// The leans up to the largest one that is looked for, of which leans up to another are expected.
+    pub(super) fn new(expected_max_rad: f64, tilt_max_rad: f64) -> Self {
         let step_rad = tilt_max_rad / f64::from(GRID);
-        let mut near = Self { tilt_max_rad, step_rad, leans: Vec::new() };
+        let mut near = Self { expected_max_rad, tilt_max_rad, step_rad, leans: Vec::new() };
         let places = (-GRID..=GRID).flat_map(|i| (-GRID..=GRID).map(move |k| (i, k)));
         let within = places.filter(|(i, k)| i * i + k * k <= GRID * GRID);
         near.leans.extend(within.map(|(i, k)| {
@@ -81,7 +82,7 @@ impl Near {
             let lean = x.hypot(y);
             let sine = if lean > 0.0 { lean.sin() / lean } else { 1.0 };
             let normal = Vector3::new(x * sine, y * sine, lean.cos());
-            Lean { normal: normal.cast::<f32>().into(), prior: log_prior(lean, tilt_max_rad) as f32 }
+            Lean { normal: normal.cast::<f32>().into(), prior: log_prior(lean, expected_max_rad) as f32 }
         }));
         near
     }
@@ -89,12 +90,12 @@ impl Near {
     /// Logarithm of what was expected of a normal, up to a constant; `None` beyond the largest lean.
     pub(super) fn log_prior(&self, normal: &Vector3<f64>) -> Option<f64> {
         let lean = normal.z.clamp(-1.0, 1.0).acos();
-        (lean <= self.tilt_max_rad + BEYOND_RAD).then(|| log_prior(lean, self.tilt_max_rad))
+        (lean <= self.tilt_max_rad + BEYOND_RAD).then(|| log_prior(lean, self.expected_max_rad))
     }
 
     /// Whether a covariance tells anything in every direction: by less than the largest lean.
     pub(super) fn tells(&self, covariance: &Matrix2<f64>) -> bool {
-        covariance.symmetric_eigenvalues().max() < self.tilt_max_rad.powi(2)
+        covariance.symmetric_eigenvalues().max() < self.expected_max_rad.powi(2)
     }
 
     /// Whether the circle of an edge passes near a lean that is looked at.
@@ -132,8 +133,8 @@ impl Near {
     }
 }
 
-fn log_prior(lean_rad: f64, tilt_max_rad: f64) -> f64 {
-    -0.5 * (lean_rad / (LEAN_SIGMA * tilt_max_rad)).powi(2)
+fn log_prior(lean_rad: f64, expected_max_rad: f64) -> f64 {
+    -0.5 * (lean_rad / (LEAN_SIGMA * expected_max_rad)).powi(2)
 }
 
 impl Columns {
