@@ -54,7 +54,8 @@ fn second(method: &str, name: &str, default: &Value) -> Value {
         "elevation_min_rad" => Value::Float(0.2),
         "elevation_max_rad" => Value::Float(0.5),
         "margin_px" => Value::Float(6.0),
-        "tilt_max_rad" | "stray_max_px" | "rms_max_px" => Value::Float(0.1),
+        "stray_max_px" | "rms_max_px" => Value::Float(0.1),
+        "tilt_max_rad" => Value::Float(0.3),
         "row_stride" => Value::Int(2),
         "mask" => {
             let n = SIDE as usize;
