@@ -39,6 +39,11 @@ pub(crate) struct NoiseFactors {
 impl NoiseFactors {
     pub(crate) const ONE: Self = Self { bearings: 1.0, motions: 1.0 };
 
+    /// The larger of both where noise is larger than told.
+    pub(crate) fn excess(self) -> f64 {
+        self.motions.max(self.bearings).max(1.0)
+    }
+
     /// These factors after others.
     pub(crate) fn times(self, other: Self) -> Self {
         Self { bearings: self.bearings * other.bearings, motions: self.motions * other.motions }

@@ -23,9 +23,9 @@ const MOST_CONTRADICTED: f64 = 0.1;
 pub(crate) const DEVIATION_SIGMAS: f64 = 5.0;
 const DEVIATION_SHIFT: f64 = 1.0;
 
-/// The same of the image centre: 99.9 % of two normal numbers are within. The mounting follows it more than anything else, by two standard
+/// The same of the image centre: 99 % of two normal numbers are within. The mounting follows it more than anything else, by two standard
 /// deviations for each of its own.
-const CENTRE_SIGMAS: f64 = 3.717;
+const CENTRE_SIGMAS: f64 = 3.035;
 
 /// Ratio of a standard deviation as motions of parts of the drive scatter to what their noise makes, beyond which the drive is not the
 /// same throughout. Of 300 simulated drives whose motions err alone none is above 3.8.
@@ -117,13 +117,13 @@ impl fmt::Display for Suspect {
 }
 
 impl BundleProblem {
-    /// What is most likely wrong at this solution, whose mounting has that covariance, and another one as motions of parts of the drive
-    /// scatter.
+    /// What is most likely wrong at this solution with these deviations, whose mounting has that covariance, and another one as motions
+    /// of parts of the drive scatter.
     pub(crate) fn suspect(
         &self,
         options: &SelfCalibratorOptions,
         counts: &Contradictions,
-        factors: NoiseFactors,
+        (factors, deviations): (NoiseFactors, &[Deviation]),
         covariance: &Matrix3<f64>,
         motion_scatter: Option<&Matrix3<f64>>,
     ) -> Option<Suspect> {
@@ -133,11 +133,10 @@ impl BundleProblem {
         if counts.most_turns() {
             return found(Cause::Turns, share(counts.contradicted_turns, counts.turns));
         }
-        let excess = factors.motions.max(factors.bearings).max(1.0);
-        let deviations = self.deviations(&(covariance * excess));
+        let excess = factors.excess();
         let most = |d: &Deviation| if d.of == Assumed::Centre { CENTRE_SIGMAS } else { DEVIATION_SIGMAS };
         let worst = deviations
-            .into_iter()
+            .iter()
             .filter(|d| d.sigmas > most(d) * excess.sqrt() && (excess > 1.0 || d.shift > DEVIATION_SHIFT))
             .max_by(|a, b| a.sigmas.total_cmp(&b.sigmas));
         if let Some(d) = worst {

@@ -14,7 +14,7 @@ use crate::error::{Error, Result};
 use crate::selfcalib::bundle::{
     BundleProblem, CholeskyFactor, DescentReport, DoubtedParts, FIRST_DAMPING, FreeParameters, widened,
 };
-use crate::selfcalib::diagnosis::{Cause, DEVIATION_SIGMAS};
+use crate::selfcalib::diagnosis::{Cause, DEVIATION_SIGMAS, doubted_centre};
 use crate::selfcalib::estimate::MountingEstimate;
 use crate::selfcalib::model::{Mounting, OUTLIER_SIGMAS, WheelMotion, Wheels};
 use crate::selfcalib::options::{CalibrationMethod, SelfCalibratorOptions};
@@ -68,7 +68,7 @@ impl LogCalibration {
 
     /// Whether motions of a part of the drive may err together: nothing is suspect, or what they make so.
     fn may_drift(&self) -> bool {
-        let causes = [Cause::Drift, Cause::OdometryK, Cause::WheelBase, Cause::Wheels];
+        let causes = [Cause::Drift, Cause::OdometryK, Cause::WheelBase, Cause::Wheels, Cause::Centre];
         self.misreading.is_none() && self.estimate.suspect.is_none_or(|suspect| causes.contains(&suspect.cause))
     }
 }
@@ -185,8 +185,8 @@ fn solved(log: &SortedLog<'_>) -> Result<Option<(BundleProblem, DescentReport)>>
     Ok(best)
 }
 
-/// The answer without the odometry of the parts of the drive that the bearings contradict, where nothing is wrong then, and the wheels are
-/// as told.
+/// The answer without the odometry of the parts of the drive that the bearings contradict, where nothing but the image centre is suspect
+/// then, and the wheels are as told.
 fn without_contradicted_parts(options: &LogOptions, mut problem: BundleProblem) -> Option<LogCalibration> {
     let as_told = problem.clone();
     let (mut descent, doubted) = solve_with_doubt(&mut problem, options.max_iterations)?;
@@ -195,7 +195,8 @@ fn without_contradicted_parts(options: &LogOptions, mut problem: BundleProblem) 
     }
     descent = solve_with_noise(&mut problem, options.max_iterations).unwrap_or(descent);
     let answer = report(options, &problem, &descent, None).ok()?;
-    (answer.converged && answer.estimate.suspect.is_none()).then_some(LogCalibration { doubted, ..answer })
+    let fits = answer.estimate.suspect.is_none_or(|suspect| suspect.cause == Cause::Centre);
+    (answer.converged && fits).then_some(LogCalibration { doubted, ..answer })
 }
 
 /// Whether a log tells other wheels than it was told, as far as motions of all its parts tell them. A wrong wheel base contradicts the
@@ -338,8 +339,11 @@ fn report(
     let with = |scatter: Option<&Matrix3<f64>>, own| scatter.map_or(own, |scatter| widened(&own, scatter));
     let counts = pulled.contradictions();
     let by_landmarks = with(landmarks.as_ref(), own);
-    let suspect = pulled.suspect(o, &counts, pulled.noise_factors(), &by_landmarks, motions.as_ref());
-    let mounting = with(landmarks.as_ref(), with(motions.as_ref(), own));
+    let factors = pulled.noise_factors();
+    let deviations = pulled.deviations(&by_landmarks, factors.excess());
+    let suspect = pulled.suspect(o, &counts, (factors, &deviations), &by_landmarks, motions.as_ref());
+    let centre = doubted_centre(&deviations, factors.excess());
+    let mounting = with(landmarks.as_ref(), with(motions.as_ref(), with(centre.as_ref(), own)));
     let scatter = doubted.as_ref().map(DoubtedParts::scatter);
     let sigma = |at: usize| {
         let by_motions = scatter.as_ref().map_or(0.0, |scatter| scatter[(at, at)]);

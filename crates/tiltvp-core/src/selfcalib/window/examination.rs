@@ -2,6 +2,7 @@
 
 use super::state::{Examination, MOUNTING, SlidingWindow};
 use super::tuning::{COST_TOLERANCE, ITERATIONS};
+use crate::selfcalib::diagnosis::doubted_centre;
 use crate::selfcalib::model::MotionLoss;
 
 impl SlidingWindow {
@@ -16,8 +17,11 @@ impl SlidingWindow {
         let counts = now.contradictions();
         let covariance = self.covariance.fixed_view::<3, 3>(MOUNTING, MOUNTING).into();
         let motion_scatter = now.doubted_parts().map(|parts| parts.scatter_of_mounting());
-        let suspect = now.suspect(&self.options, &counts, now.noise_factors(), &covariance, motion_scatter.as_ref());
-        self.examination = Examination { contradictions: counts, suspect, motion_scatter };
+        let factors = now.noise_factors();
+        let deviations = now.deviations(&covariance, factors.excess());
+        let suspect = now.suspect(&self.options, &counts, (factors, &deviations), &covariance, motion_scatter.as_ref());
+        let centre_scatter = doubted_centre(&deviations, factors.excess());
+        self.examination = Examination { contradictions: counts, suspect, motion_scatter, centre_scatter };
     }
 
     /// What the last examination found.

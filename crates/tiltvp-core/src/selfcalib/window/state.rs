@@ -26,6 +26,9 @@ pub(crate) struct Examination {
     pub(crate) suspect: Option<Suspect>,
     /// Covariance of the mounting that errors make which motions of a part of the drive share.
     pub(crate) motion_scatter: Option<Matrix3<f64>>,
+    /// The same that an image centre makes which is doubted.
+    #[cfg_attr(feature = "serde", serde(default))]
+    pub(crate) centre_scatter: Option<Matrix3<f64>>,
 }
 
 /// An iterated extended Kalman filter on (pose, mounting, landmarks), and a sliding window of keyframes that is solved again, and
@@ -107,7 +110,8 @@ impl SlidingWindow {
     }
 
     /// The mounting with its covariance: that of the last solution, where information gained since may be spurious, and widened
-    /// for errors that a landmark's bearings share, and for those that motions of the drive shared up to the last examination.
+    /// for errors that a landmark's bearings share, and for those that up to the last examination motions of the drive shared, or an
+    /// image centre made that is doubted.
     pub(crate) fn mounting(&self) -> (Vector3<f64>, Matrix3<f64>) {
         let mut covariance: Matrix3<f64> = self.covariance.fixed_view::<3, 3>(MOUNTING, MOUNTING).into();
         // A keyframe without bearings was not asked yet whether the window has to be solved.
@@ -116,7 +120,8 @@ impl SlidingWindow {
             covariance = widened(&covariance, &self.solved_covariance);
         }
         covariance = self.widening * covariance * self.widening.transpose();
-        if let Some(scatter) = &self.examination.motion_scatter {
+        let Examination { motion_scatter, centre_scatter, .. } = &self.examination;
+        for scatter in motion_scatter.iter().chain(centre_scatter) {
             covariance = widened(&covariance, scatter);
         }
         (self.mean.fixed_rows::<3>(MOUNTING).into(), covariance)
