@@ -1910,6 +1910,9 @@ class Lines:
     def __eq__(self, other: object, /) -> bool: ...
     def __hash__(self) -> int: ...
     def __len__(self) -> int: ...
+    def _check_seen_by(self, camera: Camera, robot_from_camera: ArrayLike | None) -> None:
+        """Refuses a camera, or a mounting of it, other than that which found the lines."""
+
     @property
     def bearing_rad(self) -> NDArray[np.float64]:
         """(N,) float64: azimuth about the vertical in the upright robot's frame, radians."""
@@ -1937,6 +1940,12 @@ class Lines:
     @property
     def polarity(self) -> NDArray[np.float64]:
         """(N,) in [-1, 1]: share of the pixels that are brighter towards greater azimuth minus that of the others."""
+
+    @property
+    def seen_by(self) -> int | None:
+        """Tells the camera and the mounting that found the lines from others, 32 bits; None where they are not
+        known.
+        """
 
     @property
     def sigma_rad(self) -> NDArray[np.float64]:

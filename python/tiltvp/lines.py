@@ -85,8 +85,8 @@ class LineExtractor(_core.LineExtractor):
     def describe(self, image: ArrayLike, lines: Lines) -> NDArray[np.float32]:
         """(N, 192) float32: the descriptors of the lines of an image, eqs. 2 to 5; other options, other widths.
 
-        `lines` carry the vertical that they were found about, in the robot frame, but neither camera nor mounting: of
-        another one of these they are other places. Raises `InvalidInputError` for lines of the other method.
+        `lines` carry the vertical that they were found about, in the robot frame. Raises `InvalidInputError` for lines
+        of the other method, and for those that were found with another camera or mounting (`Lines.seen_by`).
         """
         refuse_unless(lines, Lines, "lines", "Lines")
         return self._describe(gray_from(image), lines)
@@ -134,7 +134,7 @@ def describe(
 ) -> NDArray[np.float32]:
     """(N, 192) float32: the descriptors of lines; for many images of one camera make a `LineExtractor`.
 
-    `robot_from_camera` is the mounting that the lines were found with, without which they are other places.
+    `robot_from_camera` is the mounting that the lines were found with: others are refused.
     """
     refuse_unless(lines, Lines, "lines", "Lines")
     method = LINE_METHODS[0] if lines.center_px is None else LINE_METHODS[1]

@@ -23,7 +23,11 @@ _POINTS = 32
 
 
 def line_pixels(camera: Camera, lines: Lines, robot_from_camera: ArrayLike | None = None) -> NDArray[np.float64]:
-    """(N, 32, 2): pixels (u, v) along each line from its lower to its upper end; NaN where the camera sees none."""
+    """(N, 32, 2): pixels (u, v) along each line from its lower to its upper end; NaN where the camera sees none.
+
+    Raises `InvalidInputError` for another camera or mounting than that which found the lines.
+    """
+    lines._check_seen_by(camera, robot_from_camera)
     turn = np.eye(3) if robot_from_camera is None else np.asarray(robot_from_camera, dtype=np.float64)
     camera_from_upright = turn.T @ leaning_from_upright(lines.normal)
     share = np.linspace(0.0, 1.0, _POINTS)

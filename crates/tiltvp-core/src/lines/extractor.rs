@@ -10,7 +10,7 @@ use super::description::profile;
 use super::descriptor_options::DescriptorKind;
 use super::extraction::great_circle::{self, GreatCircleScratch, MISS_MAX_RAD};
 use super::extraction::radial::{self, RadialScratch, Radii};
-use super::line::{Line, LineFrame, Lines};
+use super::line::{Line, LineFrame, Lines, fingerprint};
 use super::options::{GreatCircleOptions, LineMethod, LineOptions};
 use super::tables::LineTables;
 use crate::camera::Camera;
@@ -33,6 +33,7 @@ pub struct LineExtractor {
     tables: LineTables,
     finder: Option<SegmentFinder>,
     radii: Option<Radii>,
+    seen_by: u32,
 }
 
 /// Memory for one thread.
@@ -79,7 +80,8 @@ impl LineExtractor {
             let got = format!("[{:.1}, {:.1}]", radii.inner, radii.outer);
             return Err(Error::option("radius_min_px, radius_max_px", got, "radii at least 6 pixels apart"));
         }
-        Ok(Self { camera, robot_from_camera, options, tables, finder, radii })
+        let seen_by = fingerprint(&camera, &robot_from_camera, radii.is_some());
+        Ok(Self { camera, robot_from_camera, options, tables, finder, radii, seen_by })
     }
 
     /// The camera.
@@ -167,11 +169,12 @@ impl LineExtractor {
                 let prefilter = self.tables.prefilter.with_limit(reach.sin());
                 let gradients = finder.gradients(edges.gradient_min);
                 finder.find(image, &self.tables.region, gradients, Some(&prefilter), work, segments);
-                let frame = LineFrame { normal: tilt.normal(), center_px: None };
+                let frame = LineFrame { normal: tilt.normal(), ..LineFrame::default() };
                 great_circle::find(&self.robot_from_camera, segments, frame, options, great_circle, out);
             }
             _ => {}
         }
+        out.frame.seen_by = Some(self.seen_by);
         Ok(())
     }
 
@@ -188,7 +191,8 @@ impl LineExtractor {
         };
         let center_px = self.radii.map(|radii| radii.center);
         let normal = tilt.filter(|_| center_px.is_none()).unwrap_or(&Tilt::UPRIGHT).normal();
-        Lines { lines: bearings_rad.iter().map(line).collect(), frame: LineFrame { normal, center_px } }
+        let frame = LineFrame { normal, center_px, seen_by: Some(self.seen_by) };
+        Lines { lines: bearings_rad.iter().map(line).collect(), frame }
     }
 
     /// Where along lines of a frame descriptors reach: elevations, or radii in pixels.
@@ -203,10 +207,14 @@ impl LineExtractor {
         if Tilt::from_normal(&frame.normal).is_none() {
             return Err(Error::argument("lines", format!("a ground normal of {:?}", frame.normal), "a finite one"));
         }
-        if frame.center_px.is_some() == self.radii.is_some() {
-            return Ok(());
+        if frame.center_px.is_some() != self.radii.is_some() {
+            return Err(Error::argument(
+                "lines",
+                "lines of the other method",
+                "lines that this extractor's method found",
+            ));
         }
-        Err(Error::argument("lines", "lines of the other method", "lines that this extractor's method found"))
+        frame.check_seen_by(self.seen_by)
     }
 
     /// The descriptors of the lines of an image, one after the other (Scaramuzza, Siegwart and Martinelli 2009, section 3): along the lines' great circles, or
@@ -214,7 +222,7 @@ impl LineExtractor {
     ///
     /// # Errors
     /// [`Error::InvalidArgument`] if the image has another size than the camera's, the scratch is another extractor's, or the
-    /// lines are of the other method or of no ground normal.
+    /// lines are of the other method, of another camera or mounting, or of no ground normal.
     pub fn describe(
         &self,
         image: &ImageView<'_>,

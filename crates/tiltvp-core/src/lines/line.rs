@@ -2,6 +2,9 @@
 
 use nalgebra::{Matrix3, Vector2, Vector3};
 
+use crate::camera::Camera;
+use crate::error::{Error, Result};
+
 /// A vertical line of the world as one image shows it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Line {
@@ -26,6 +29,8 @@ pub struct LineFrame {
     pub normal: Vector3<f64>,
     /// Where the lines of the radial variant meet, in pixels; none for great circles.
     pub center_px: Option<Vector2<f64>>,
+    /// The [`fingerprint`] of the camera and the mounting that the lines were found with; none where that is not known.
+    pub seen_by: Option<u32>,
 }
 
 impl LineFrame {
@@ -34,11 +39,41 @@ impl LineFrame {
         crate::geometry::Tilt::from_normal(&self.normal)
             .map_or_else(Matrix3::identity, |tilt| tilt.leaning_from_upright())
     }
+
+    /// Whether the camera and the mounting of that [`fingerprint`] see the lines of this frame where they are.
+    ///
+    /// # Errors
+    /// [`Error::InvalidArgument`] if they were found with others.
+    pub fn check_seen_by(&self, fingerprint: u32) -> Result<()> {
+        if self.seen_by.is_none_or(|own| own == fingerprint) {
+            return Ok(());
+        }
+        let expected = "lines that were found with this camera and this mounting";
+        Err(Error::argument("lines", "lines of another camera or mounting", expected))
+    }
+}
+
+/// A number that tells a camera and its mounting from others, by what pixels all over the image see, to a millionth.
+///
+/// Images of another size are the same to great circles; radial lines meet in a pixel.
+pub fn fingerprint(camera: &Camera, robot_from_camera: &Matrix3<f64>, is_radial: bool) -> u32 {
+    const STEPS: u32 = 16;
+    let size = if is_radial { [camera.width(), camera.height()] } else { [0; 2] };
+    let place = |i: u32, side: u32| (f64::from(i) + 0.5) / f64::from(STEPS) * f64::from(side) - 0.5;
+    let rays = (0..STEPS * STEPS).flat_map(|i| {
+        let pixel = Vector2::new(place(i % STEPS, camera.width()), place(i / STEPS, camera.height()));
+        let ray = camera.unproject(&pixel).map_or_else(Vector3::zeros, |ray| robot_from_camera * ray);
+        [ray.x, ray.y, ray.z].map(|x| (x * 1e6).round() as i32 as u32)
+    });
+    // Fowler, Noll and Vo's hash (FNV-1a), of words.
+    size.into_iter()
+        .chain(rays)
+        .fold(0x811c_9dc5, |hash: u32, word| (hash ^ word).wrapping_mul(0x0100_0193).rotate_left(5))
 }
 
 impl Default for LineFrame {
     fn default() -> Self {
-        Self { normal: Vector3::z(), center_px: None }
+        Self { normal: Vector3::z(), center_px: None, seen_by: None }
     }
 }
 

@@ -54,7 +54,7 @@ mod wide;
 pub use self::description::dissimilarity::{descriptor_distances, ssd_matrix, zncc_matrix};
 pub use self::descriptor_options::{DescriptorKind, DescriptorOptions, Normalisation};
 pub use self::extractor::{LineExtractor, LineScratch};
-pub use self::line::{Line, LineFrame, Lines};
+pub use self::line::{Line, LineFrame, Lines, fingerprint};
 pub use self::matcher::{BearingGate, MatchOptions, MatchScratch, match_descriptors};
 pub use self::options::{GreatCircleOptions, LineMethod, LineOptions, RadialOptions};
 pub use self::order::Match;

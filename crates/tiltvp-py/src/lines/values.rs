@@ -4,7 +4,8 @@ use nalgebra::Vector3;
 use pyo3::prelude::*;
 use tiltvp_core::lines::{self as core, Line, LineFrame};
 
-use crate::call::invalid;
+use crate::call::{exception, invalid};
+use crate::reader;
 use crate::value::value;
 
 value! {
@@ -29,6 +30,8 @@ value! {
         normal: Vector3<f64> = own.frame.normal,
         /// Where radial lines meet, (u, v); None but for the method "radial".
         center_px: Option<(f64, f64)> = own.frame.center_px.map(|center| (center.x, center.y)),
+        /// Tells the camera and the mounting that found the lines from others, 32 bits; None where they are not known.
+        seen_by: Option<u32> = own.frame.seen_by,
     }
     make {
         let n = bearing_rad.len();
@@ -44,7 +47,7 @@ value! {
             elevation_max_rad: elevation_max_rad[i],
             polarity: polarity[i],
         };
-        let frame = LineFrame { normal, center_px: center_px.map(|(u, v)| [u, v].into()) };
+        let frame = LineFrame { normal, center_px: center_px.map(|(u, v)| [u, v].into()), seen_by };
         core::Lines { lines: (0..n).map(line).collect(), frame }
     };
     repr {
@@ -61,5 +64,14 @@ fn column<T>(lines: &core::Lines, pick: fn(&Line) -> T) -> Vec<T> {
 impl Lines {
     fn __len__(&self) -> usize {
         self.inner.lines.len()
+    }
+
+    /// Refuses a camera, or a mounting of it, other than that which found the lines.
+    #[pyo3(signature = (camera: "Camera", robot_from_camera: "ArrayLike | None"))]
+    fn _check_seen_by(&self, camera: &Bound<'_, PyAny>, robot_from_camera: Option<&Bound<'_, PyAny>>) -> PyResult<()> {
+        let (camera, rotation) = (reader::camera(camera)?, reader::robot_from_camera(robot_from_camera)?);
+        let frame = &self.inner.frame;
+        let own = core::fingerprint(&camera.get().inner, &rotation, frame.center_px.is_some());
+        frame.check_seen_by(own).map_err(|error| exception(&error))
     }
 }

@@ -115,7 +115,7 @@ pub(crate) fn find(
     }
     keep_radial((gx, gy, magnitude), tables, radii, &center, gradient_min, options, radial);
     fill_sectors((gx, gy, radial), tables.width, &center, options.sectors, sectors);
-    out.frame = LineFrame { normal: Vector3::z(), center_px: Some(center) };
+    out.frame = LineFrame { center_px: Some(center), ..LineFrame::default() };
     lines_of(sectors, tables, radii, &center, options.length_min, &mut out.lines);
 }
 
