@@ -6,6 +6,7 @@ use super::model::CameraModel;
 use super::rim::Rim;
 use super::{Model, with_model};
 use crate::error::{Error, Result};
+use crate::geometry::squarable;
 
 /// The longest side of an image. No camera and no panorama has so many pixels a side: a longer one is a slip in a file, and
 /// tables of its pixels would not fit into memory (`every_model_refuses_an_impossible_size`).
@@ -159,7 +160,7 @@ impl Camera {
 
     #[inline]
     pub(super) fn project_by(&self, model: &impl CameraModel, bearing: &Vector3<f64>) -> Option<Vector2<f64>> {
-        let bearing = self.reflect(bearing);
+        let (bearing, _) = squarable(&self.reflect(bearing));
         self.within(&bearing).then(|| model.project(&bearing)).flatten()
     }
 
@@ -175,8 +176,9 @@ impl Camera {
         model: &impl CameraModel,
         bearing: &Vector3<f64>,
     ) -> Option<(Vector2<f64>, Matrix2x3<f64>)> {
-        let bearing = self.reflect(bearing);
+        let (bearing, shorter) = squarable(&self.reflect(bearing));
         let (pixel, mut jacobian) = self.within(&bearing).then(|| model.project_jacobian(&bearing)).flatten()?;
+        jacobian /= shorter;
         if self.mirror {
             jacobian.column_mut(2).neg_mut();
         }

@@ -14,11 +14,16 @@ pub fn angle_between(a: &Vector3<f64>, b: &Vector3<f64>) -> f64 {
 /// far from the ends of the floats, 1e-308 and 1e308.
 const SQUARES: std::ops::RangeInclusive<f64> = 1e-150..=1e150;
 
+/// The same vector, or where squares would lose digits one along it, and how many times shorter that is; NaN along zeros.
+#[inline]
+pub(crate) fn squarable(v: &Vector3<f64>) -> (Vector3<f64>, f64) {
+    let largest = v.amax();
+    if SQUARES.contains(&largest) { (*v, 1.0) } else { (v / largest, largest) }
+}
+
 /// The unit vector along a vector of any length; none of zeros and of what is not finite.
 pub fn unit(v: &Vector3<f64>) -> Option<Vector3<f64>> {
-    let largest = v.amax();
-    let scaled = if SQUARES.contains(&largest) { *v } else { v / largest };
-    scaled.try_normalize(0.0).filter(|unit| unit.iter().all(|x| x.is_finite()))
+    squarable(v).0.try_normalize(0.0).filter(|unit| unit.iter().all(|x| x.is_finite()))
 }
 
 /// Two unit vectors `e1`, `e2` that span the plane orthogonal to a unit bearing `n`, with `e1 x e2 = n`.

@@ -9,6 +9,7 @@ mod tilt;
 mod wheels;
 
 pub use angle::wrap_angle;
+pub(crate) use bearing::squarable;
 pub use bearing::{angle_between, tangent_basis, tangent_exp, tangent_log, tangent_transport, unit};
 pub(crate) use great_circle::meeting;
 pub use great_circle::{GreatCircleFit, fit_great_circle};
