@@ -106,7 +106,7 @@ fn level(map: &LevelMap, camera: &Camera) {
     for (number, first) in (0..map.height()).step_by(map.strip_rows()).enumerate() {
         let pixels = map.strip_rows().min(map.height() - first) * map.width();
         let (mut u, mut v) = (vec![f32::NAN; pixels], vec![f32::NAN; pixels]);
-        let seen = map.write_strip(number, [&mut u, &mut v], -1.0);
+        let seen = map.write_strip(number, [&mut u, &mut v], -1.0).expect("as many numbers as pixels");
         for (place, (u, v)) in u.into_iter().zip(v).enumerate().filter(|(at, _)| seen.contains(&(at % map.width()))) {
             let is_place = (0.0..=last[0]).contains(&u) && (0.0..=last[1]).contains(&v);
             assert!(is_place || (u, v) == (-1.0, -1.0), "({u}, {v}) at {place} of strip {number} of {camera:?}");

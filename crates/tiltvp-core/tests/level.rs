@@ -47,7 +47,7 @@ fn map(leveller: Leveller, tilt: &Tilt) -> Vec<[f32; 2]> {
     let (mut columns, mut rows) = (vec![f32::NAN; width * height], vec![f32::NAN; width * height]);
     let length = width * map.strip_rows();
     for (number, (columns, rows)) in columns.chunks_mut(length).zip(rows.chunks_mut(length)).enumerate() {
-        map.write_strip(number, [columns, rows], f32::NAN);
+        map.write_strip(number, [columns, rows], f32::NAN).expect("as many numbers as pixels");
     }
     columns.into_iter().zip(rows).map(|(column, row)| [column, row]).collect()
 }
@@ -166,4 +166,18 @@ fn wrong_questions_are_refused() {
     assert!(Leveller::from_rays(camera.clone(), &identity, 3, &[[0.0; 3]; 4]).is_err());
     let leveller = Leveller::from_rays(camera, &identity, 2, &[[0.0, 0.0, 1.0]; 4]).expect("rays");
     assert_eq!(map(leveller, &Tilt::from_alpha_beta(0.0, 0.0)).len(), 4);
+}
+
+#[test]
+fn strips_of_another_size_are_refused() {
+    let camera = panorama(64);
+    let leveller = Leveller::new(camera.clone(), &mounting(), camera, &mounting()).expect("rotations");
+    let map = Arc::new(leveller).map(&Tilt::UPRIGHT);
+    let pixels = map.width() * map.strip_rows().min(map.height());
+    for (number, sizes) in [(0, [pixels, pixels - 1]), (0, [pixels + 1; 2]), (1, [pixels; 2]), (usize::MAX, [1; 2])] {
+        let [mut columns, mut rows] = sizes.map(|size| vec![7.0; size]);
+        let refused = map.write_strip(number, [&mut columns, &mut rows], f32::NAN).expect_err("another size");
+        assert!(refused.to_string().starts_with("places: got "), "{refused}");
+        assert!(columns.iter().chain(&rows).all(|number| *number == 7.0));
+    }
 }

@@ -109,7 +109,7 @@ impl LevelMap {
     ) -> PyResult<(usize, usize)> {
         let places = [columns.as_slice_mut()?, rows.as_slice_mut()?];
         call(py, || {
-            let seen = self.0.write_strip(number, places, unseen);
+            let seen = self.0.write_strip(number, places, unseen)?;
             Ok((seen.start, seen.end))
         })
     }

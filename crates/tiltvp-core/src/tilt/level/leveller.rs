@@ -11,7 +11,7 @@ use super::shown::Shown;
 use super::strip::Strip;
 use super::surface::CELL;
 use crate::camera::Camera;
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::geometry::{Tilt, validate_rotation};
 
 /// How far from where it is a pixel may be looked for, in pixels of the leaning image (`maps_are_as_exact_as_they_say`).
@@ -38,9 +38,6 @@ impl Leveller {
     ///
     /// # Errors
     /// [`Error::InvalidArgument`] if a mounting is no rotation, [`Error::InvalidCamera`] where the memory does not suffice.
-    ///
-    /// [`Error::InvalidArgument`]: crate::Error::InvalidArgument
-    /// [`Error::InvalidCamera`]: crate::Error::InvalidCamera
     pub fn new(
         camera: Camera,
         robot_from_camera: &Matrix3<f64>,
@@ -54,8 +51,6 @@ impl Leveller {
     ///
     /// # Errors
     /// [`Error::InvalidArgument`] if the mounting is no rotation, or there are not `width * height` rays, at least one.
-    ///
-    /// [`Error::InvalidArgument`]: crate::Error::InvalidArgument
     pub fn from_rays(
         camera: Camera,
         robot_from_camera: &Matrix3<f64>,
@@ -131,16 +126,20 @@ impl LevelMap {
     /// They are from 0 to the last column and row, between which levels are to be interpolated. Right of a panorama's last column is
     /// its first one.
     ///
-    /// # Panics
-    /// If either of `places` has not as many numbers as the strip has pixels.
-    pub fn write_strip(&self, number: usize, places: [&mut [f32]; 2], unseen: f32) -> Range<usize> {
+    /// # Errors
+    /// [`Error::InvalidArgument`] if either of `places` has not as many numbers as the strip has pixels.
+    pub fn write_strip(&self, number: usize, places: [&mut [f32]; 2], unseen: f32) -> Result<Range<usize>> {
         let [first, end] = [number, number.saturating_add(1)]
             .map(|number| number.saturating_mul(self.strip_rows()).min(self.height()));
         let pixels = (end - first) * self.width();
-        assert_eq!(places.each_ref().map(|numbers| numbers.len()), [pixels; 2], "as many numbers as pixels");
+        let given = places.each_ref().map(|numbers| numbers.len());
+        if given != [pixels; 2] {
+            let expected = format!("{pixels} each, the pixels of strip {number}");
+            return Err(Error::argument("places", format!("{given:?} numbers"), expected));
+        }
         let leveller = &*self.leveller;
         let mut strip = Strip::new(first..end, places, self.width(), &leveller.camera, unseen);
         let camera = Places::new(&leveller.camera, self.rotation);
-        leveller.corners.write(&self.found, &leveller.shown, &camera, &mut strip)
+        Ok(leveller.corners.write(&self.found, &leveller.shown, &camera, &mut strip))
     }
 }
