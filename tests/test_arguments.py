@@ -58,6 +58,17 @@ def test_what_is_no_number(value: Any) -> None:
         CAMERA.cropped(value, 0, 10, 10)
 
 
+@pytest.mark.parametrize("value", [10**400, -(10**400), 10**5000, -(10**39)], ids=["400", "-400", "5000", "-39"])
+def test_whole_numbers_that_no_option_can_hold_are_refused(value: int) -> None:
+    for option in ("gradient_min", "seed"):
+        with pytest.raises(InvalidInputError, match=f"option {option} = "):
+            tiltvp.TiltEstimator(CAMERA, **{option: value})
+
+
+def test_a_large_whole_number_is_that_number() -> None:
+    assert tiltvp.TiltEstimator(CAMERA, gradient_min=10**39).options["gradient_min"] == 1e39
+
+
 def test_a_buffer_that_is_filled_anew_does_not_change_what_was_made_of_it() -> None:
     times = np.array([0.0, 0.1, 0.2])
     odometry = Odometry.from_wheels(times, np.stack([times, times], axis=1), wheel_base_m=1.0)

@@ -177,7 +177,7 @@ impl<'py> FromPyObject<'_, 'py> for Number {
 }
 
 /// How a refusal shows a value.
-fn shown(value: &Bound<'_, PyAny>) -> String {
+pub(crate) fn shown(value: &Bound<'_, PyAny>) -> String {
     value.repr().map_or_else(|_| "an object".to_owned(), |repr| repr.to_string())
 }
 

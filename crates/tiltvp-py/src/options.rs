@@ -15,6 +15,7 @@ use tiltvp_core::{Error, corner};
 use tiltvp_synth::{BearingDriveOptions, DriveOptions, ImuOptions, LaboratoryOptions, RoomOptions, StereoOptions};
 
 use crate::call::{exception, invalid};
+use crate::convert;
 use crate::tilt::correction;
 
 /// Sets the user's values.
@@ -85,13 +86,13 @@ fn to_value(value: &Bound<'_, PyAny>) -> PyResult<Value> {
     if let Some(correction) = correction::object(value) {
         return Ok(Value::Object(Arc::new(correction)));
     }
-    let look = || Ok(Value::Other(value.repr()?.to_string()));
+    let look = || Ok(Value::Other(convert::shown(value)));
     let is_sequence = value.is_instance_of::<PyList>() || value.is_instance_of::<PyTuple>();
     if is_sequence || value.cast::<PyUntypedArray>().is_ok_and(|array| array.ndim() > 0) {
         return array(value, is_sequence)?.map_or_else(look, Ok);
     }
-    if let Ok(whole) = value.call_method0("__index__") {
-        return Ok(whole.extract().map_or(Value::Int(i128::MAX), Value::Int));
+    if let Ok(whole) = value.call_method0("__index__").and_then(|whole| whole.extract()) {
+        return Ok(Value::Int(whole));
     }
     value.extract::<f64>().map_or_else(|_| look(), |number| Ok(Value::Float(number)))
 }
