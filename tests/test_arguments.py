@@ -58,6 +58,37 @@ def test_what_is_no_number(value: Any) -> None:
         CAMERA.cropped(value, 0, 10, 10)
 
 
+MASKED = np.ma.masked_array(np.eye(3), mask=np.eye(3) > 0.0)
+HIDDEN = np.ma.masked_array(np.ones((48, 64), bool), mask=np.eye(48, 64) > 0.0)
+DESCRIPTORS = np.ma.masked_array(np.eye(3, 192, dtype=np.float32), mask=np.eye(3, 192) > 0.0)
+
+
+@pytest.mark.parametrize(
+    "call",
+    [
+        lambda: CAMERA.project(MASKED),
+        lambda: CAMERA.unproject(MASKED[:, :2]),
+        lambda: tiltvp.common_direction(MASKED),
+        lambda: tiltvp.TiltEstimator(CAMERA, robot_from_camera=MASKED),
+        lambda: tiltvp.TiltEstimator(CAMERA, mask=HIDDEN),
+        lambda: tiltvp.tilt_error_rad(MASKED[0], np.ones(3)),
+        lambda: EXTRACTOR.lines_at(MASKED[0]),
+        lambda: lines.match(DESCRIPTORS, DESCRIPTORS),
+        lambda: lines.ssd_matrix(DESCRIPTORS, np.zeros((3, 192), np.float32)),
+        lambda: tiltvp.SelfCalibrator(wheel_base_m=0.4, start=MASKED[0]),
+    ],
+)
+def test_arrays_with_masked_values_are_refused_in_the_core(call: Any) -> None:
+    with pytest.raises(InvalidInputError, match="masked"):
+        call()
+
+
+def test_arrays_without_masked_values_are_arrays() -> None:
+    plain = np.ma.masked_array(np.eye(3))
+    np.testing.assert_array_equal(CAMERA.project(plain), CAMERA.project(np.eye(3)))
+    assert tiltvp.TiltEstimator(CAMERA, robot_from_camera=plain) == tiltvp.TiltEstimator(CAMERA)
+
+
 @pytest.mark.parametrize("value", [10**400, -(10**400), 10**5000, -(10**39)], ids=["400", "-400", "5000", "-39"])
 def test_whole_numbers_that_no_option_can_hold_are_refused(value: int) -> None:
     for option in ("gradient_min", "seed"):

@@ -14,8 +14,24 @@ use tiltvp_core::image::{ColorView, ImageView};
 use crate::array::Array;
 use crate::call::{exception, invalid};
 
+/// Whether an array has masked values, which would be taken like others.
+pub(crate) fn is_masked(value: &Bound<'_, PyAny>) -> PyResult<bool> {
+    // What is plainly an array has no mask.
+    Ok(!value.is_exact_instance_of::<PyUntypedArray>()
+        && value.py().import("numpy.ma")?.call_method1("is_masked", (value,))?.is_truthy()?)
+}
+
+/// Refuses an array with masked values.
+pub(crate) fn refuse_masked(value: &Bound<'_, PyAny>, name: &str, expected: &str) -> PyResult<()> {
+    if is_masked(value)? {
+        return Err(invalid(format!("{name}: an array with masked values, expected {expected} without")));
+    }
+    Ok(())
+}
+
 /// `numpy.asarray(value)`, refused unless it holds plain numbers.
 fn numbers<'py>(value: &Bound<'py, PyAny>, name: &str, expected: &str) -> PyResult<Bound<'py, PyUntypedArray>> {
+    refuse_masked(value, name, expected)?;
     let numpy = value.py().import("numpy")?;
     let array = numpy
         .call_method1("asarray", (value,))
@@ -51,6 +67,7 @@ pub(crate) fn rows<const K: usize>(value: &Bound<'_, PyAny>, name: &str) -> PyRe
 
 /// A vector `(N,)`.
 pub(crate) fn vector(value: &Bound<'_, PyAny>, name: &str) -> PyResult<Vec<f64>> {
+    refuse_masked(value, name, "an array (N,)")?;
     // Arrays as they mostly come are read without a detour through numpy.
     if let Some(values) = value.cast::<PyArray1<f64>>().ok().and_then(|array| array.to_vec().ok()) {
         return Ok(values);
@@ -103,6 +120,7 @@ pub(crate) fn rigid_motion(value: &Bound<'_, PyAny>, name: &'static str) -> PyRe
 
 /// A C-contiguous `(H, W)` array of bytes.
 pub(crate) fn gray<'py>(value: &Bound<'py, PyAny>, name: &str) -> PyResult<PyReadonlyArray2<'py, u8>> {
+    refuse_masked(value, name, "a (H, W) array of uint8")?;
     let Ok(array) = value.cast::<PyArray2<u8>>() else {
         return Err(invalid(format!("{name}: {}, expected a (H, W) array of uint8", describe(value))));
     };
@@ -122,6 +140,7 @@ pub(crate) fn view<'a>(image: &'a PyReadonlyArray2<'_, u8>) -> PyResult<ImageVie
 
 /// A C-contiguous `(H, W, 3)` array of bytes.
 pub(crate) fn color<'py>(value: &Bound<'py, PyAny>, name: &str) -> PyResult<PyReadonlyArray3<'py, u8>> {
+    refuse_masked(value, name, "a (H, W, 3) array of uint8")?;
     let array = value.cast::<PyArray3<u8>>().ok().filter(|array| array.shape()[2] == 3);
     let Some(array) = array else {
         return Err(invalid(format!("{name}: {}, expected a (H, W, 3) array of uint8", describe(value))));
@@ -142,6 +161,7 @@ pub(crate) fn color_view<'a>(image: &'a PyReadonlyArray3<'_, u8>) -> PyResult<Co
 
 /// A `(H, W)` array of bool, with its shape.
 pub(crate) fn mask(value: &Bound<'_, PyAny>, name: &str) -> PyResult<(usize, usize, Vec<bool>)> {
+    refuse_masked(value, name, "a (H, W) array of bool")?;
     let Ok(array) = value.cast::<PyArray2<bool>>() else {
         return Err(invalid(format!("{name}: {}, expected a (H, W) array of bool", describe(value))));
     };

@@ -99,6 +99,9 @@ fn to_value(value: &Bound<'_, PyAny>) -> PyResult<Value> {
 
 /// An array of numbers or of truth values; nothing if it holds anything else. A mask must be an array, not a list.
 fn array(value: &Bound<'_, PyAny>, is_sequence: bool) -> PyResult<Option<Value>> {
+    if convert::is_masked(value)? {
+        return Ok(None);
+    }
     let Ok(made) = value.py().import("numpy")?.call_method1("asarray", (value,)) else { return Ok(None) };
     let made = made.cast_into::<PyUntypedArray>()?;
     let (shape, kind) = (made.shape().to_vec(), made.dtype().getattr("kind")?.extract::<String>()?);
