@@ -6,6 +6,7 @@ import copy
 import json
 import math
 import pickle
+from typing import Any
 
 import numpy as np
 import pytest
@@ -329,6 +330,28 @@ def test_lines_match_after_more_than_a_metre(mirror: tiltvp.Camera, office: Room
         tl.match_wide(*seen, ahead_rad=[0.0])
     with pytest.raises(InvalidInputError, match="match_wide"):
         tl.match(seen[1], seen[3])
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [{"bearing_rad": [math.nan]}, {"bearing_rad": [math.inf]}, {"sigma_rad": [math.nan]}, {"sigma_rad": [-1.0]},
+     {"sigma_rad": [1e300]}],
+)  # fmt: skip
+def test_what_are_no_bearings_are_neither_followed_nor_matched(camera: tiltvp.Camera, wrong: dict[str, Any]) -> None:
+    line = tl.LineExtractor(camera).lines_at([0.5])
+    none, tracker = tl.Lines.from_dict({**line.to_dict(), **wrong}), tl.LineTracker()
+    tracker.update(line, np.ones((1, 192), np.float32), yaw_change_rad=0.0, distance_m=0.0)
+    before = copy.copy(tracker)
+    with pytest.raises(InvalidInputError, match="lines: got a bearing of"):
+        tracker.update(none, np.ones((1, 192), np.float32), yaw_change_rad=0.0, distance_m=0.0)
+    with pytest.raises(InvalidInputError, match="lines: got a bearing of"):
+        tl.match_wide(line, np.ones((1, 190), np.float32), none, np.ones((1, 190), np.float32))
+    with pytest.raises(InvalidInputError, match="distance_m"):
+        tracker.update(line, np.ones((1, 192), np.float32), yaw_change_rad=0.0, distance_m=1e200)
+    assert tracker == before
+    ones = np.ones((1, 192), np.float32)
+    with pytest.raises(InvalidInputError, match="gate_rad"):
+        tl.match(ones, ones, expected_rad=[0.0], seen_rad=[0.0], gate_rad=-0.1)
 
 
 def test_lines_are_drawn_where_they_are(room: RoomImage, camera: tiltvp.Camera) -> None:

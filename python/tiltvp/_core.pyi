@@ -1894,7 +1894,7 @@ class LineTracker:
 
         `yaw_change_rad` is its turn, positive to the left, `distance_m` how far the middle between its wheels went
         along the arc, negative backwards. Raises `tiltvp.errors.InvalidInputError` for descriptors of another number or
-        width, motions that are not finite, and a distance without a turn; the tracker is as before then.
+        width, bearings and motions that are none, and a distance without a turn; the tracker is as before then.
         """
 
 @final

@@ -1,5 +1,7 @@
 //! A vertical line of one image, and all lines of it with the frame that their bearings are in.
 
+use std::f64::consts::PI;
+
 use nalgebra::{Matrix3, Vector2, Vector3};
 
 use crate::camera::Camera;
@@ -50,6 +52,23 @@ impl LineFrame {
         }
         let expected = "lines that were found with this camera and this mounting";
         Err(Error::argument("lines", "lines of another camera or mounting", expected))
+    }
+}
+
+impl Lines {
+    /// Whether all bearings are angles, and known as well as angles can be.
+    ///
+    /// # Errors
+    /// [`Error::InvalidArgument`] for a line with another one.
+    pub(super) fn check_bearings(&self) -> Result<()> {
+        let is_angle = |line: &Line| line.bearing_rad.is_finite() && (0.0..=PI).contains(&line.sigma_rad);
+        match self.lines.iter().find(|line| !is_angle(line)) {
+            Some(Line { bearing_rad, sigma_rad, .. }) => {
+                let got = format!("a bearing of {bearing_rad} with a standard deviation of {sigma_rad} radians");
+                Err(Error::argument("lines", got, "finite bearings, known to 0 to pi"))
+            }
+            None => Ok(()),
+        }
     }
 }
 

@@ -46,7 +46,8 @@ pub struct MatchScratch {
 /// ordering constraint.
 ///
 /// # Errors
-/// [`Error::InvalidOption`], or [`Error::InvalidArgument`] unless both hold whole rows and a gate has a bearing for each.
+/// [`Error::InvalidOption`], or [`Error::InvalidArgument`] unless both hold whole rows and a gate has a bearing for each
+/// and is an angle from 0.
 pub fn match_descriptors(
     a: &[f32],
     b: &[f32],
@@ -60,6 +61,9 @@ pub fn match_descriptors(
     descriptor_distances(a, b, width, &mut scratch.distances)?;
     let (n, m) = (a.len() / width, b.len() / width);
     if let Some(gate) = gate {
+        if gate.gate_rad.is_nan() || gate.gate_rad < 0.0 {
+            return Err(Error::argument("gate_rad", gate.gate_rad, "an angle from 0"));
+        }
         for (name, bearings, lines) in [("bearings of a", gate.expected_rad, n), ("bearings of b", gate.seen_rad, m)] {
             if bearings.len() != lines {
                 return Err(Error::argument(name, format!("{} values", bearings.len()), format!("{lines}")));

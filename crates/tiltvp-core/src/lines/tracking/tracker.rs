@@ -12,6 +12,9 @@ use crate::lines::matcher::{MatchScratch, select};
 use crate::lines::order::Match;
 use crate::lines::tracker_options::TrackerOptions;
 
+/// Farther no robot goes between two frames; the fourth power, which covariances have, is far from the end of the floats.
+const DISTANCE_MAX_M: f64 = 1e9;
+
 /// Tracks lines through successive frames (Scaramuzza, Siegwart and Martinelli 2009, section 9.1). The same calls give the same answers.
 #[derive(Debug, Clone, Default)]
 pub struct LineTracker {
@@ -65,8 +68,8 @@ impl LineTracker {
     /// predicted after it.
     ///
     /// # Errors
-    /// [`Error::InvalidArgument`] unless there is a descriptor for each line, as wide as those before, the motion is finite, and
-    /// there are numbers left for the frame and its lines; the tracker is as before.
+    /// [`Error::InvalidArgument`] unless there is a descriptor for each line, as wide as those before, bearings are angles, the motion
+    /// is one, and there are numbers left for the frame and its lines; the tracker is as before.
     pub fn update(
         &mut self,
         lines: &Lines,
@@ -74,6 +77,7 @@ impl LineTracker {
         motion: Option<&Motion>,
         out: &mut Vec<TrackedLine>,
     ) -> Result<()> {
+        lines.check_bearings()?;
         let lines = &lines.lines;
         let width = self.check(lines, descriptors, motion)?;
         let continued = match motion {
@@ -223,8 +227,8 @@ impl LineTracker {
             if !motion.turn_rad.is_finite() {
                 return Err(Error::argument("yaw_change_rad", motion.turn_rad, "a finite angle, or none"));
             }
-            if let Some(distance) = motion.distance_m.filter(|distance| !distance.is_finite()) {
-                return Err(Error::argument("distance_m", distance, "a finite distance, or none"));
+            if let Some(distance) = motion.distance_m.filter(|distance| !(distance.abs() <= DISTANCE_MAX_M)) {
+                return Err(Error::argument("distance_m", distance, "a distance of at most 1e9 metres, or none"));
             }
         }
         let width = descriptors.len().checked_div(lines.len()).unwrap_or(0);
