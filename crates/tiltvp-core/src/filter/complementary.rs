@@ -104,7 +104,7 @@ impl ComplementaryFilter {
     /// Turns on by a rate, in the body's axes, that holds for some time: `R <- R exp((rate - bias) dt)`.
     ///
     /// # Errors
-    /// [`Error::InvalidArgument`] for a rate or a time that is not finite, or a negative time.
+    /// [`Error::InvalidArgument`] for a rate, a time or a turn that is not finite, or a negative time.
     pub fn predict(&mut self, rate_rad_s: &Vector3<f64>, duration_s: f64) -> Result<()> {
         if !rate_rad_s.iter().all(|rate| rate.is_finite()) {
             let got = format!("{:?}", rate_rad_s.as_slice());
@@ -113,9 +113,18 @@ impl ComplementaryFilter {
         if !(duration_s >= 0.0 && duration_s.is_finite()) {
             return Err(Error::argument("duration_s", duration_s, "seconds, finite and not negative"));
         }
-        self.attitude *= UnitQuaternion::from_scaled_axis((rate_rad_s - self.bias_rad_s) * duration_s);
+        let (turn, unseen_s) = ((rate_rad_s - self.bias_rad_s) * duration_s, self.unseen_s + duration_s);
+        if !(turn.norm_squared() + unseen_s).is_finite() {
+            let got = format!("{:?} for {duration_s} s", rate_rad_s.as_slice());
+            return Err(Error::argument(
+                "rate_rad_s, duration_s",
+                got,
+                "a turn whose square is a float, as the time is",
+            ));
+        }
+        self.attitude *= UnitQuaternion::from_scaled_axis(turn);
         self.attitude.renormalize();
-        self.unseen_s += duration_s;
+        self.unseen_s = unseen_s;
         Ok(())
     }
 
