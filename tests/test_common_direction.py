@@ -191,3 +191,13 @@ def test_what_has_no_finite_covariance_is_no_answer() -> None:
             assert "do not tell how far it may be off" in found.report.reason
             refused += 1
     assert 0 < refused < 20
+
+
+@pytest.mark.parametrize("n", [3, 10, 100])
+def test_normals_that_agree_by_chance_have_no_direction(n: int) -> None:
+    rng = np.random.default_rng(7)
+    found = [tiltvp.common_direction(rng.normal(size=(n, 3))) for _ in range(300)]
+    assert sum(bool(one) for one in found) <= 3
+    assert any(one.report.stop == "undetermined" for one in found)
+    true = normals_about(np.array([0.05, 0.02, 1.0]), n=5)
+    assert tiltvp.common_direction(np.vstack([true, rng.normal(size=(5, 3))]))

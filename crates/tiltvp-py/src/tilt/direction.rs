@@ -51,7 +51,8 @@ impl CommonDirection {
 /// is the cross product of the bearings of its ends. `weights` (N,) are zero or more; None: all 1.
 ///
 /// Raises `tiltvp.errors.InvalidInputError` for wrong shapes, zero or non-finite rows, negative weights and options out
-/// of their domain. Too few or degenerate normals give an answer without a direction, and a reason.
+/// of their domain. Too few or degenerate normals, and those of which no more agree than would by chance, give an
+/// answer without a direction, and a reason.
 #[pyfunction]
 #[pyo3(signature = (normals: "ArrayLike", *, weights: "ArrayLike | None" = None, **options: "Option | None"))]
 pub(crate) fn common_direction(
