@@ -162,7 +162,7 @@ const char *tiltvp_last_error(void);
 const char *tiltvp_version(void);
 
 // A calibrator that has seen nothing. `options` is a text in TOML with the options of `SelfCalibrator` in docs/options.md, NULL for
-// the defaults; `wheel_base_m` has none that suits.
+// the defaults; `wheel_base_m` is none of them here.
 enum TiltvpStatus tiltvp_self_calibrator_new(double wheel_base_m,
                                              const char *options,
                                              struct TiltvpSelfCalibrator **calibrator);

@@ -5,6 +5,7 @@ use std::mem::MaybeUninit;
 use std::sync::{Mutex, MutexGuard};
 
 use nalgebra::Matrix3;
+use tiltvp_core::Error;
 use tiltvp_core::selfcalib::{self as core, SelfCalibratorOptions, WheelMotion};
 
 use crate::border::{Failure, Outcome, Status, answer, end, given, make, run};
@@ -69,7 +70,7 @@ pub struct MountingEstimate {
 }
 
 /// A calibrator that has seen nothing. `options` is a text in TOML with the options of `SelfCalibrator` in docs/options.md, NULL for
-/// the defaults; `wheel_base_m` has none that suits.
+/// the defaults; `wheel_base_m` is none of them here.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn tiltvp_self_calibrator_new(
     wheel_base_m: f64,
@@ -80,8 +81,11 @@ pub unsafe extern "C" fn tiltvp_self_calibrator_new(
         // SAFETY: a text of the caller's, or NULL.
         let text = unsafe { maybe_text(options, "options") }?;
         let usual = SelfCalibratorOptions { wheel_base_m, ..SelfCalibratorOptions::default() };
-        let inner = core::SelfCalibrator::new(self::options(text, |method| with_method(usual, method))?)?;
-        Ok(SelfCalibrator { inner: Mutex::new(inner) })
+        let given = self::options(text, |method| with_method(usual, method))?;
+        if given.wheel_base_m.to_bits() != wheel_base_m.to_bits() {
+            return Err(Error::option("wheel_base_m", given.wheel_base_m, "it as an argument alone").into());
+        }
+        Ok(SelfCalibrator { inner: Mutex::new(core::SelfCalibrator::new(given)?) })
     })
 }
 
@@ -248,9 +252,10 @@ mod tests {
                 tiltvp_self_calibrator_new(0.0, ptr::null(), Some(&mut handle)),
                 tiltvp_self_calibrator_new(0.4, c"gate_probability = 2".as_ptr(), Some(&mut handle)),
                 tiltvp_self_calibrator_new(0.4, c"method = 'none'".as_ptr(), Some(&mut handle)),
+                tiltvp_self_calibrator_new(0.4, c"wheel_base_m = 0.5".as_ptr(), Some(&mut handle)),
             ]
         };
-        assert_eq!(statuses, [Status::InvalidOption; 3]);
+        assert_eq!(statuses, [Status::InvalidOption; 4]);
         let (here, one) = (calibrator(ptr::null()), [0u64; 2]);
         // SAFETY: so many of each, or NULL.
         let statuses = unsafe {
