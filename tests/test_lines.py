@@ -335,7 +335,7 @@ def test_lines_match_after_more_than_a_metre(mirror: tiltvp.Camera, office: Room
 @pytest.mark.parametrize(
     "wrong",
     [{"bearing_rad": [math.nan]}, {"bearing_rad": [math.inf]}, {"sigma_rad": [math.nan]}, {"sigma_rad": [-1.0]},
-     {"sigma_rad": [1e300]}],
+     {"sigma_rad": [1e300]}, {"polarity": [math.nan]}, {"polarity": [-2.0]}],
 )  # fmt: skip
 def test_what_are_no_bearings_are_neither_followed_nor_matched(camera: tiltvp.Camera, wrong: dict[str, Any]) -> None:
     line = tl.LineExtractor(camera).lines_at([0.5])

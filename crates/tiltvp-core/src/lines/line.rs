@@ -56,16 +56,18 @@ impl LineFrame {
 }
 
 impl Lines {
-    /// Whether all bearings are angles, and known as well as angles can be.
+    /// Whether all bearings are angles, and known as well as angles can be, and all polarities are from -1 to 1.
     ///
     /// # Errors
-    /// [`Error::InvalidArgument`] for a line with another one.
-    pub(super) fn check_bearings(&self) -> Result<()> {
-        let is_angle = |line: &Line| line.bearing_rad.is_finite() && (0.0..=PI).contains(&line.sigma_rad);
-        match self.lines.iter().find(|line| !is_angle(line)) {
-            Some(Line { bearing_rad, sigma_rad, .. }) => {
-                let got = format!("a bearing of {bearing_rad} with a standard deviation of {sigma_rad} radians");
-                Err(Error::argument("lines", got, "finite bearings, known to 0 to pi"))
+    /// [`Error::InvalidArgument`] for a line with others.
+    pub(super) fn check(&self) -> Result<()> {
+        let is_line = |line: &Line| {
+            line.bearing_rad.is_finite() && (0.0..=PI).contains(&line.sigma_rad) && line.polarity.abs() <= 1.0
+        };
+        match self.lines.iter().find(|line| !is_line(line)) {
+            Some(Line { bearing_rad, sigma_rad, polarity, .. }) => {
+                let got = format!("a bearing of {bearing_rad} known to {sigma_rad} radians, of polarity {polarity}");
+                Err(Error::argument("lines", got, "finite bearings, known to 0 to pi, and polarities from -1 to 1"))
             }
             None => Ok(()),
         }

@@ -77,7 +77,7 @@ impl LineTracker {
         motion: Option<&Motion>,
         out: &mut Vec<TrackedLine>,
     ) -> Result<()> {
-        lines.check_bearings()?;
+        lines.check()?;
         let lines = &lines.lines;
         let width = self.check(lines, descriptors, motion)?;
         let continued = match motion {

@@ -110,7 +110,7 @@ pub fn match_wide(
             let expected = format!("{width} for each line, as descriptor_kind \"profile\" has them");
             return Err(Error::argument(name, got, expected));
         }
-        image.lines.check_bearings()?;
+        image.lines.check()?;
     }
     if ahead.is_some_and(|ahead| ahead.iter().any(|angle| !angle.is_finite())) {
         return Err(Error::argument("ahead", "an angle that is not finite", "two bearings"));
