@@ -227,7 +227,8 @@ impl LineTracker {
             if !motion.turn_rad.is_finite() {
                 return Err(Error::argument("yaw_change_rad", motion.turn_rad, "a finite angle, or none"));
             }
-            if let Some(distance) = motion.distance_m.filter(|distance| !(distance.abs() <= DISTANCE_MAX_M)) {
+            let within = -DISTANCE_MAX_M..=DISTANCE_MAX_M;
+            if let Some(distance) = motion.distance_m.filter(|distance| !within.contains(distance)) {
                 return Err(Error::argument("distance_m", distance, "a distance of at most 1e9 metres, or none"));
             }
         }
