@@ -5,7 +5,7 @@ use std::collections::HashMap;
 use std::sync::Arc;
 
 use nalgebra::{Matrix3, Vector3};
-use tiltvp_core::camera::Camera;
+use tiltvp_core::camera::{Camera, Model};
 use tiltvp_core::corner::{CornerDetector, CornerFeature, CornerScratch, DetectorOptions};
 use tiltvp_core::filter::positive_semidefinite;
 use tiltvp_core::geometry::Tilt;
@@ -102,7 +102,9 @@ fn looker(camera: &Camera, kind: usize) -> Option<Looker> {
 
 /// A map whose places are of the camera's pixels, or of none, where it says that something is seen.
 fn level(map: &LevelMap, camera: &Camera) {
-    let last = [camera.width(), camera.height()].map(|side| (side - 1) as f32);
+    // Right of a panorama's last column is its first one.
+    let beyond = u32::from(matches!(camera.model(), Model::Equirectangular(_)));
+    let last = [camera.width() - 1 + beyond, camera.height() - 1].map(|side| side as f32);
     for (number, first) in (0..map.height()).step_by(map.strip_rows()).enumerate() {
         let pixels = map.strip_rows().min(map.height() - first) * map.width();
         let (mut u, mut v) = (vec![f32::NAN; pixels], vec![f32::NAN; pixels]);

@@ -9,6 +9,10 @@
 //! | [`point`] | bearings, covariances and cameras of any numbers | points are finite and have covariances |
 //! | [`options`] | values and names of the options of every class, with tables made of some | refusals by name; options are told as they were taken |
 //! | [`state`] | states of tilt filters and line trackers of any numbers; then steps | refusals; a state that was taken can be taken again |
+//! | [`matching`] | lines, descriptors, profiles and motions of any numbers, matched and followed | no line is two; a refused frame changes nothing |
+//! | [`sequence`] | pictures one after the other before estimators of corners' poses, with gravity and turns of any numbers | rotations and probabilities are such |
+//! | [`log`] | logs of short drives of any numbers | refusals; what can be relied upon is finite |
+//! | [`training`] | shifts and leans of any numbers | refusals; corrections are finite |
 //! | [`calibrator`] | states of calibrators of any bytes; then steps | refusals; a refused step changes nothing |
 //!
 //! Cameras are small and what is costly is made once and kept, so that an execution takes a fraction of a millisecond: coverage guides by
@@ -23,15 +27,21 @@ mod corner;
 #[cfg(test)]
 mod corpus;
 mod image;
+mod learning;
 mod lens;
+mod matching;
 mod options;
 mod picture;
 mod segments;
+mod sequence;
 mod state;
 
 pub use corner::{corner, point};
 pub use image::image;
+pub use learning::{log, training};
 pub use lens::lens;
+pub use matching::matching;
 pub use options::options;
 pub use segments::segments;
+pub use sequence::sequence;
 pub use state::{calibrator, state};
