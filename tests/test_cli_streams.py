@@ -353,6 +353,11 @@ def test_wrong_use(run: Run, world: Path, words: list[str], hint: str, monkeypat
         ["track", "images", "--plot", "images/a.png", "--out", "tracks.csv"],
         ["tilt", "images", "--filter", "--filter-plot", "images/a.png"],
         ["tilt", "drive_mcap/drive_mcap.mcap", "--out", "drive_mcap/drive_mcap.mcap"],
+        ["tilt", "drive_mcap", "--out", "drive_mcap/drive_mcap.mcap"],
+        ["segments", "drive_mcap", "--out", "drive_mcap/edges.csv"],
+        ["tilt", "images", "--out", "images/frames.csv"],
+        ["lines", ".", "--out", "odometry.csv"],
+        ["track", "images", "--odometry", "wheels.csv", "--out", "wheels.csv"],
     ],
 )
 def test_what_is_read_is_not_replaced(run: Run, world: Path, words: list[str], monkeypatch: pytest.MonkeyPatch) -> None:

@@ -86,7 +86,8 @@ def calibrate(
             opened.append(source.checked(read))
         else:
             log = PictureLog.open(source, pictures, motion, camera, options, drive, robot, read)
-            check_apart(log.frames, results.transform, results.plot, pictures.tracks)
+            written = (results.out, results.robot_out, results.transform, results.plot, pictures.tracks)
+            check_apart(log.frames, *written, beside=motion.odometry)
             opened.append(log)
     tilt = robot if measured else _joined_tilts([one for one in opened if isinstance(one, PictureLog)])
     found = [_calibrated(one, tilt, drive, read, method, watching) for one in opened]

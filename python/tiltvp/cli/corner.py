@@ -145,9 +145,9 @@ def corner(
     sensor = inertial.of_robot(robot).knowledge(source.topic)
     camera, estimator = _searches(calibration, right is not None, method, known, robot, image_size_from(image_size))
     frames = source.open(words)
-    check_apart(frames, results.overlay, results.plot)
     others = None if right is None else SourceOptions(topic=topic_right).open([right], topic_option="--topic-right")
-    check_apart(others, results.overlay, results.plot)
+    for side in (frames, others):
+        check_apart(side, *results.files.values(), beside=inertial.imu)
     partners = None if others is None else partners_of(frames, others, timed=frame_rate is None)
     with watching.viewer() as viewer:
         look = Look(camera, estimator, independent, results.overlay, viewer, sensor)

@@ -38,16 +38,20 @@ class CornerResults:
     plot: Path | None = None
     """Picture of attitude and position over time (.png)."""
 
+    @property
+    def files(self) -> dict[str, Path | None]:
+        """What is written, by the names of the options."""
+        return {name: getattr(self, name) for name in ("out", "corners", "trajectory", "plot", "overlay")}
+
     def check(self, *, has_scale: bool) -> None:
         """Refuses what cannot be written, before any work is done; a trajectory wants poses that have a place."""
         check_ending(self.out)
         check_ending(self.corners, "--corners")
-        named = {name: getattr(self, name) for name in ("out", "corners", "trajectory", "plot", "overlay")}
-        given = {name: os.path.realpath(path) for name, path in named.items() if path is not None}
+        given = {name: os.path.realpath(path) for name, path in self.files.items() if path is not None}
         for name, path in given.items():
             other = next(one for one in given if given[one] == path)
             if other != name:
-                raise InvalidInputError(f"--{other} and --{name} are both {named[name]}, expected two files")
+                raise InvalidInputError(f"--{other} and --{name} are both {self.files[name]}, expected two files")
         if self.trajectory is not None:
             if not has_scale:
                 expected = "expected two, or --camera-height-m, --edge-length-m or --box-size-m"

@@ -51,14 +51,14 @@ def find_in_each(
     images: list[str] | None,
     source: SourceOptions,
     look: Callable[[Image], Found],
-    overlay: Path | None,
+    results: FoundOptions,
     draw: Callable[[Image, Found], Image],
 ) -> tuple[list[tuple[str, Found]], bool]:
-    """What `look` finds in each gray frame, with its name, drawn into the folder `overlay`; whether all went well."""
+    """What `look` finds in each gray frame, with its name, drawn into a folder if asked; whether all went well."""
     from tiltvp.images import gray_from, write_image
 
-    frames = source.open(images or [])
-    check_apart(frames, overlay)
+    frames, overlay = source.open(images or []), results.overlay
+    check_apart(frames, overlay, results.out)
     found: list[tuple[str, Found]] = []
     well = not frames.problems
     with ending_at_interrupt(frames) as coming, progress_bar(frames.count or 0, "images") as bar:

@@ -105,7 +105,7 @@ def level(
     frames = source.open(images or [])
     of_files = isinstance(frames, ImageFiles)
     path = out if as_video or of_files else out / f"{Path(frames.source).stem}.mp4"
-    check_apart(frames, path, filtering.filter_plot)
+    check_apart(frames, path, filtering.filter_plot, beside=motion.odometry)
     if metadata_only and (as_video or not of_files):
         raise InvalidInputError("--metadata-only with a video, expected photographs")
     fused = filtering.filter or as_video or not of_files

@@ -41,7 +41,7 @@ def lines(
         images,
         source,
         lambda gray: extractor(gray, tilt(gray)),
-        results.overlay,
+        results,
         lambda gray, seen: draw_lines(gray, lens, seen, extractor.robot_from_camera),
     )
     table = line_table(found)

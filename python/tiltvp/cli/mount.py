@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from tiltvp.cli.options import ABOVE_0, CameraOptions, MountedOptions, Switch
 from tiltvp.cli.results import degrees
-from tiltvp.cli.sources import MotionOptions, SourceOptions
+from tiltvp.cli.sources import MotionOptions, SourceOptions, check_apart
 from tiltvp.cli.tables import check_file, finite
 from tiltvp.cli.terminal import progress_bar, say
 from tiltvp.files import write_whole
@@ -60,6 +60,7 @@ def mount(
     source = source.of_robot(robot, images)
     estimator = camera.complete(mounted.of_topic(source.topic)).mounted(camera.load(source.topic), **TILT_OPTIONS)
     frames = source.open(images)
+    check_apart(frames, out, beside=motion.odometry)
     moved = motion.motions_of(robot, frames)
     motions = moved.motions if moved is not None and moved.turns_known else None
     with progress_bar(measured_count(frames), "images") as bar:

@@ -46,7 +46,13 @@ class ImageFiles(Frames):
         drive = _drive_folder(words)
         if drive is not None and (drive / _ODOMETRY).is_file():
             self.recording = drive / _ODOMETRY
-        if drive is not None and (table := _table_of(drive)) is not None:
+        table = None if drive is None else _table_of(drive)
+        folders = {file.parent.resolve() for file in self.files}
+        folders |= {folder.parent for folder in folders if folder.name in _INNER}
+        self.tables = [folder / name for folder in folders for name in (_TIMES, _ODOMETRY)]
+        """Where tables are that are read with the images of a folder, or would be if they were there."""
+        if table is not None:
+            self.tables.append(table[0])
             self.times_s = _table_times(*table, self.files)
             if self.times_s is not None and (np.diff(self.times_s) < 0.0).any():
                 order = np.argsort(self.times_s, kind="stable")
