@@ -22,6 +22,7 @@ from tiltvp.cli.sources import (
     SourceOptions,
     check_apart,
     ending_at_interrupt,
+    exit_code,
     picture_names,
     wheel_base_of,
 )
@@ -127,7 +128,7 @@ def tilt(
                 break
     judge.plot()
     answers.conclude(frames.source)
-    return 1 if frames.problems or answers.bad else 0
+    return exit_code(frames, well=not answers.bad)
 
 
 def _check_outputs(
