@@ -203,8 +203,13 @@ def test_outputs_are_kept_where_that_is_asked_and_parts_of_the_dead_are_swept(tm
         write_whole(out, "second")
         assert part.exists()
     assert out.read_text() == "third"
-    with pytest.raises(ZeroDivisionError), whole_file(out):
-        raise ZeroDivisionError
+    for fault in (ZeroDivisionError, ValueError):
+        with pytest.raises(fault, match="the block's own"), whole_file(out):
+            raise fault("the block's own")
+    with pytest.raises(OutputError, match="cannot be written"):
+        write_whole(out, "\udcff")
+    with pytest.raises(OutputError, match="cannot be written"):
+        write_whole(tmp_path / "a\0b", "lost")
     assert [path.name for path in tmp_path.iterdir()] == ["out.txt"]
     with pytest.raises(OutputError, match="no regular file"):
         write_whole("/dev/null", "lost")

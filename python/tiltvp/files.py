@@ -188,6 +188,8 @@ def _part_of(path: str | os.PathLike[str], make: Callable[[Path], int], *, follo
     except TiltvpError:
         raise
     except (OSError, ValueError) as error:
+        if part is not None and not isinstance(error, OSError | UnicodeError):
+            raise  # Nothing of files: of a name that cannot be there would be no part.
         raise _failed(path, error) from error
     finally:
         if part is not None:
