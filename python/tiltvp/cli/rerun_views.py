@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
@@ -27,15 +27,23 @@ _BAND_SIGMAS: Final = 1.96
 """Half the width of a band that holds 95 % of a normal distribution."""
 
 
-def send_lines(viewer: Viewer, number: int, time_s: float | None, picture: Picture, found: TrackedLines) -> None:
-    """A frame with its lines, and the bearing of each track, in the colours of the picture."""
+def send_lines(
+    viewer: Viewer, number: int, time_s: float | None, picture: Picture, found: TrackedLines, before: Iterable[int]
+) -> Sequence[int]:
+    """A frame with its lines, and the bearing of each track, in the colours of the picture; the tracks that it has.
+
+    The curves of those that the frame `before` had, and this one has not, have a gap here.
+    """
     from tiltvp.overlays.lines import track_colour
 
     viewer.at(number, time_s)
     viewer.picture("image", picture)
-    for track, bearing_rad in zip(found.track.tolist(), found.lines.bearing_rad.tolist(), strict=True):
+    bearings_rad = dict.fromkeys(before, np.nan) | dict(zip(found.track.tolist(), found.lines.bearing_rad, strict=True))
+    for track, bearing_rad in bearings_rad.items():
         colour = rgb(track_colour(track))
         viewer.curves(f"tracks/{track}/bearing_deg", [float(np.degrees(bearing_rad))], [f"track {track}"], [colour])
+    tracks: Sequence[int] = found.track.tolist()
+    return tracks
 
 
 def send_calibration(viewer: Viewer, log: DriveLog, history: Sequence[MountingEstimate], whole: LogCalibration) -> None:

@@ -137,6 +137,7 @@ def _follow(
     from tiltvp.overlays.lines import draw_lines
 
     found: list[Seen] = []
+    shown: Sequence[int] = ()
     with ending_at_interrupt(frames) as coming, progress_bar(frames.count or 0, "frames") as bar:
         for frame, one in drive.seen(coming, bar):
             seen = one.followed(tracker)
@@ -148,7 +149,7 @@ def _follow(
             if film is not None:
                 film.add(picture, frame.time_s if timed else None)
             if viewer is not None:
-                send_lines(viewer, seen.number, frame.time_s, picture, seen.tracked)
+                shown = send_lines(viewer, seen.number, frame.time_s, picture, seen.tracked, shown)
     return found
 
 
