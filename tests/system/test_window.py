@@ -53,8 +53,10 @@ def test_pictures_are_seen_until_escape(screen: Path) -> None:
         while (pixels_of(screen) == picture[0, 0]).all(axis=2).sum() != 300 * 400:
             assert time.monotonic() < until, "the picture is not on the screen"
             window.show(picture)
+    assert window.attend()
     window._root.focus_force()
     window._root.update()
     window._root.event_generate("<Escape>")
     assert not window.is_open
     window.show(picture)
+    assert not window.attend()

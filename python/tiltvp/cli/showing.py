@@ -8,6 +8,7 @@ from collections import deque
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, ExitStack, contextmanager, nullcontext
 from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING, Any, Final
 
 from cyclopts import Group, Parameter
@@ -21,7 +22,7 @@ if TYPE_CHECKING:
     from tiltvp import FilteredTilt, Leveller, TiltEstimate
     from tiltvp.cli.results import Outcome
     from tiltvp.cli.window import Window
-    from tiltvp.streams import Frame
+    from tiltvp.streams import Frame, Frames, LiveCamera
     from tiltvp.streams.outputs.viewer import Viewer
 
     Picture = NDArray[np.uint8]
@@ -77,8 +78,13 @@ class ShowOptions(RerunOptions):
         return self.show or self.rerun is not None
 
     @contextmanager
-    def watch(self, leveller: Callable[[], Leveller]) -> Iterator[TiltWatch | None]:
-        """What shows the frames, None where nothing was asked for; the leveller is made only then."""
+    def watch(self, frames: Frames, leveller: Callable[[], Leveller]) -> Iterator[TiltWatch | None]:
+        """What shows the frames, None where nothing was asked for; the leveller is made only then.
+
+        A window can be closed while a live camera that has gone is waited for, which ends it.
+        """
+        from tiltvp.streams import LiveCamera
+
         if not self.asked:
             yield None
             return
@@ -90,7 +96,14 @@ class ShowOptions(RerunOptions):
 
                 window = Window("tiltvp tilt")
                 stack.callback(window.close)
+                if isinstance(frames, LiveCamera):
+                    frames.meanwhile = partial(_ended_with, window, frames)
             yield TiltWatch(leveller(), window, viewer)
+
+
+def _ended_with(window: Window, frames: LiveCamera) -> None:
+    if not window.attend():
+        frames.end()
 
 
 class TiltWatch:

@@ -115,7 +115,7 @@ def tilt(
         return tilts_on_cluster(cluster, files_of(frames), work, out)
     answers = Answers(frames.count is not None, estimator.method, out, filtering, frame_rate)
     with (
-        showing.watch(lambda: work.leveller) as watch,
+        showing.watch(frames, lambda: work.leveller) as watch,
         ending_at_interrupt(frames) as coming,
         closing(_done(work, coming, frames, threads)) as done,
     ):

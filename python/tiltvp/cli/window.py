@@ -53,10 +53,19 @@ class Window:
                 self._label.configure(image=self._photo)
             else:
                 self._photo.configure(data=content, format="PPM")
-            self._root.update()
         except self._tk.TclError:
             # The desktop has taken it away.
             self.is_open = False
+        self.attend()
+
+    def attend(self) -> bool:
+        """Lets it answer its user, also while there is no new picture; whether it is open after that."""
+        try:
+            if self.is_open:
+                self._root.update()
+        except self._tk.TclError:
+            self.is_open = False
+        return self.is_open
 
     def close(self) -> None:
         """Takes it away."""

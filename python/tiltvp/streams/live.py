@@ -6,7 +6,7 @@ import re
 import sys
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING, BinaryIO, Final
 
 import numpy as np
@@ -47,6 +47,8 @@ class LiveCamera(Frames):
         self.source = f"camera {number}"
         self._number, self._patience_s = number, patience_s
         self._ended = threading.Event()
+        self.meanwhile: Callable[[], object] = lambda: None
+        """Called five times a second while a camera that has gone is waited for; may call `end`."""
         self._capture = _capture(number)
         if not self._capture.isOpened():
             raise ImageFileError(f"{self.source}: cannot be opened, expected the number of a camera, from 0")
@@ -88,7 +90,10 @@ class LiveCamera(Frames):
 
     def _awaited(self, since_s: float) -> NDArray[np.uint8] | None:
         """The first image of the camera after it has come back; None where it does not, or nobody waits any more."""
-        while time.monotonic() - since_s < self._patience_s and not self._ended.wait(_AGAIN_S):
+        while time.monotonic() - since_s < self._patience_s:
+            self.meanwhile()
+            if self._ended.wait(_AGAIN_S):
+                break
             self._capture.release()
             self._capture = _capture(self._number)
             if self._capture.isOpened():
