@@ -81,6 +81,12 @@ def test_images_of_one_sensor_are_scaled_alike(encoding: str, tmp_path: Path) ->
     assert (image_from_message(dark).max(), image_from_message(dark, bits=12).max()) == (199, 50)
     with pytest.raises(InvalidInputError, match=r"a value of 800, expected at most 255 \(8 bits\)"):
         image_from_message(dark, bits=8)
+    # Values that fit were refused where the sensor's depth is none of 10, 12, 14 and 16: expected at most 2047.
+    bright = SimpleNamespace(**(vars(dark) | {"data": np.full((6, 8), 1500, "<u2").tobytes()}))
+    assert image_from_message(bright, bits=11).max() == round(255 * 1500 / 2047)
+    for wrong in ("a", 0, 17, 12.5, True):
+        with pytest.raises(InvalidInputError, match=r"bits = .*, expected a whole number from 1 to 16"):
+            image_from_message(dark, bits=wrong)
 
 
 def test_what_is_no_image_s_message_is_refused() -> None:

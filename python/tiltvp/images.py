@@ -151,10 +151,12 @@ def _bytes_from(array: NDArray[Any], name: str, bits: int | None = None) -> NDAr
     if array.dtype == np.uint8:
         return array
     if array.dtype == np.uint16:
-        least = bits_of(array)
-        if bits is not None and least > bits:
-            raise InvalidInputError(f"{name}: a value of {array.max()}, expected at most {2**bits - 1} ({bits} bits)")
-        white = 2 ** (bits or least) - 1
+        deep = bits_of(array) if bits is None else bits
+        if isinstance(deep, bool) or not isinstance(deep, int) or not 1 <= deep <= _DEPTHS[-1]:
+            raise InvalidInputError(f"bits = {bits!r}, expected a whole number from 1 to {_DEPTHS[-1]}")
+        white = 2**deep - 1
+        if array.max() > white:
+            raise InvalidInputError(f"{name}: a value of {array.max()}, expected at most {white} ({bits} bits)")
         return np.asarray((array.astype(np.uint32) * 255 + white // 2) // white, dtype=np.uint8)
     if array.dtype == np.bool_:
         return array.astype(np.uint8) * np.uint8(255)
