@@ -16,6 +16,7 @@ from recordings import START_S, Bag
 from tiltvp.cli import main
 from tiltvp.cli.corner_methods import advice
 from tiltvp.cli.corner_pairs import pairs_of, partners_of
+from tiltvp.robot import Robot
 from tiltvp.stereo_rigs import StereoRig
 from tiltvp.streams import open_frames
 
@@ -86,6 +87,21 @@ def test_the_command_line_chooses_the_method(tmp_path: Path, capsys: pytest.Capt
         for given, told in (({}, False), ({"down": (0.0, 1.0, 0.0)}, True)):
             tries = advice(reason, ("coloured", "general"), is_pair=False, given=given)
             assert ("another --pitch or --down" in tries) == told
+
+
+def test_the_mounting_of_a_robot_says_which_way_is_down(run: Run, tmp_path: Path) -> None:
+    """Nothing told which edge is the upright one, and a camera with an edge's length had no place."""
+    rotation, vertex = pose()
+    up = -rotation[:, 1]
+    ahead = np.cross(np.cross(up, [0.0, 0.0, 1.0]), up) / np.hypot(up[0], up[1])
+    Robot(CAMERA, np.array([ahead, np.cross(up, ahead), up])).save(tmp_path / "robot.toml")
+    tiltvp.write_image(tmp_path / "a.png", pair(GREYS)[0])
+    words = ("corner", tmp_path / "a.png", "--calibration", tmp_path / "robot.toml", "--edge-length-m", 0.3)
+    assert run(*words, "--out", tmp_path / "poses.csv").code == 0
+    [row] = pl.read_csv(tmp_path / "poses.csv").iter_rows(named=True)
+    assert np.allclose([row[name] for name in ("x_m", "y_m", "z_m")], -rotation.T @ vertex, atol=0.01)
+    # What is given counts all the same.
+    assert "another --pitch or --down" in run(*words, "--pitch", 80).out
 
 
 def test_a_trajectory_without_any_place_says_why_and_what_to_try(

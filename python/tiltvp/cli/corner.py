@@ -115,8 +115,8 @@ def corner(
         names where files of both folders have such.
     calibration
         Of two cameras: a camchain of Kalibr or a TOML of tiltvp with left, right and left_from_right. Of one camera:
-        any format that `tiltvp camera formats` lists, or a robot's file, whose topics of recordings are taken too, and
-        whose mask `general` takes.
+        any format that `tiltvp camera formats` lists, or a robot's file, whose topics of recordings are taken too,
+        whose mounting says where --pitch and --down do not which way is down, and whose mask `general` takes.
     topic_right
         The topic of the right camera's images, where its recording has several.
     method
@@ -141,6 +141,8 @@ def corner(
     watching.check()
     words = [] if left is None else [left]
     robot = Robot.load(calibration) if is_robot(calibration) else None
+    if robot is not None:
+        known = {"down": tuple(-robot.robot_from_camera[2])} | known
     source = source.of_robot(robot, words)
     sensor = inertial.of_robot(robot).knowledge(source.topic)
     camera, estimator = _searches(calibration, right is not None, method, known, robot, image_size_from(image_size))
