@@ -158,6 +158,7 @@ FEATURE = corner.fit(
         (lambda: InertialSamples(TIMES, None, None), r"inertial sensor: rates_rad_s \(\), expected"),
         (lambda: Wheels(joints=3), "joints = 3, expected names of two"),
         (lambda: Wheels(joints=(1, 2)), r"joints = \(1, 2\), expected names of two"),
+        (lambda: Wheels(joints=("a", "a")), r"joints = \('a', 'a'\), expected names of two"),
         (lambda: tiltvp.Robot(CAMERA, np.eye(3), wheels=None), "wheels: NoneType, expected tiltvp.streams.Wheels"),
         (lambda: tiltvp.Robot(CAMERA, np.eye(3), topics="/image"), "topics: str, expected a dict"),
         (lambda: delay(odometry="drive.mcap"), "odometry: str, expected a tiltvp.streams.Odometry"),

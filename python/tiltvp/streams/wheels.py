@@ -47,7 +47,10 @@ class Wheels:
                 raise InvalidInputError(f"{name} = {value}, expected a number above 0")
         joints = self.joints
         if joints is not None and not (
-            isinstance(joints, tuple | list) and len(joints) == 2 and all(isinstance(joint, str) for joint in joints)
+            isinstance(joints, tuple | list)
+            and len(joints) == 2
+            and all(isinstance(joint, str) for joint in joints)
+            and joints[0] != joints[1]
         ):
             raise InvalidInputError(f"joints = {self.joints!r}, expected names of two, the left and the right wheel's")
 
