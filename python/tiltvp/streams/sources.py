@@ -41,6 +41,10 @@ def open_frames(
     else:
         frames = ImageFiles(words)
     if frames.count == 0:
+        folders = [Path(word) for word in words if os.path.isdir(word)]
+        bags = sorted(str(file) for folder in folders for file in folder.iterdir() if is_recording(file))
+        if bags:
+            raise InvalidInputError(f"{frames.source}: a folder of recordings, expected one of them: {', '.join(bags)}")
         told = "; ".join(frames.problems) or f"{frames.source}: no frames"
         kinds = f"images ({' '.join(IMAGE_ENDINGS)}), a video or a bag"
         raise InvalidInputError(told if frames.problems else f"{told}, expected {kinds}")
