@@ -119,6 +119,14 @@ def test_videos_of_a_recording_keep_its_times(
     assert open_frames(tmp_path / "out.mp4").times_s == pytest.approx(UNEVEN_S, abs=1e-3)
 
 
+def test_times_that_go_back_are_no_video_s(tmp_path: Path) -> None:
+    """An .mp4 was told to want .mp4."""
+    with video_writer(tmp_path / "back.mp4", 10.0) as video:
+        for time_s in (0.0, 0.1, 0.2, -5.0, -4.9):
+            video.add(np.zeros((48, 64, 3), np.uint8), time_s)
+    assert video.note == "its frames are not even: time and picture are up to 5.30 s apart, as their times do not rise"
+
+
 def test_a_source_that_is_no_video_is_told(tmp_path: Path) -> None:
     (tmp_path / "no.mp4").write_text("no video")
     with video_writer(tmp_path / "out.mp4", sound_of=tmp_path / "no.mp4") as video:

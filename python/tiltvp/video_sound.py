@@ -33,8 +33,7 @@ def add_sound(
     folder on the same disk.
     """
     known = [time_s for time_s in times_s if time_s is not None]
-    rises = all(before < after for before, after in pairwise(known))
-    own = known if rises and path.suffix.lower() != ".avi" and len(known) == len(times_s) else None
+    own = known if _rise(known) and path.suffix.lower() != ".avi" and len(known) == len(times_s) else None
     apart = _apart(known, rate_hz, what="time")
     if source is None and apart is None:
         return None
@@ -97,4 +96,9 @@ def _apart(times_s: Sequence[float], rate_hz: float, *, what: str) -> str | None
     apart = max((abs(time_s - times_s[0] - number / rate_hz) for number, time_s in enumerate(times_s)), default=0.0)
     if apart <= _APART_S:
         return None
-    return f"its frames are not even: {what} and picture are up to {apart:.2f} s apart; .mp4 keeps them together"
+    told = f"its frames are not even: {what} and picture are up to {apart:.2f} s apart"
+    return f"{told}; .mp4 keeps them together" if _rise(times_s) else f"{told}, as their times do not rise"
+
+
+def _rise(times_s: Sequence[float]) -> bool:
+    return all(before < after for before, after in pairwise(times_s))
