@@ -7,14 +7,18 @@ import re
 import signal
 import threading
 import time
+from pathlib import Path
 
 import cv2
 import numpy as np
 import pytest
 
+import tiltvp
+from commands import Run
 from tiltvp.cli.sources import ending_at_interrupt
 from tiltvp.errors import ImageFileError, InvalidInputError
 from tiltvp.streams import LiveCamera
+from tiltvp.synth import RoomImage
 
 
 class Capture:
@@ -116,3 +120,46 @@ def test_nobody_waits_for_a_camera_after_the_end(monkeypatch: pytest.MonkeyPatch
     assert time.monotonic() - start_s < 5.0
     assert str(seen[3].image).endswith("nobody waits for it")
     assert len(seen) == 4
+
+
+def test_the_window_is_closed_while_a_camera_that_has_gone_is_waited_for(
+    run: Run, camera: tiltvp.Camera, room: RoomImage, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It was frozen for a minute."""
+
+    class Gone:
+        def __init__(self, _: int) -> None:
+            self.left = 0 if asked else 2
+
+        def isOpened(self) -> bool:  # noqa: N802
+            return self.left > 0
+
+        def get(self, _: int) -> float:
+            return 0.0
+
+        def read(self) -> tuple[bool, np.ndarray | None]:
+            self.left -= 1
+            return (True, room.bgr) if self.left >= 0 else (False, None)
+
+        def release(self) -> None:
+            asked.append(0)
+
+    class Window:
+        is_open = True
+
+        def attend(self) -> bool:
+            asked.append(1)
+            self.is_open = sum(asked) < 3
+            return self.is_open
+
+        __init__ = close = show = lambda self, *_: None
+
+    asked: list[int] = []
+    camera.save(tmp_path / "camera.toml")
+    monkeypatch.setattr(cv2, "VideoCapture", Gone)
+    monkeypatch.setattr("tiltvp.cli.window.Window", Window)
+    start_s = time.monotonic()
+    code, said, complaints = run("tilt", "--live", "0", "--camera", tmp_path / "camera.toml", "--show")
+    assert time.monotonic() - start_s < 30.0
+    assert (code, said.splitlines()[0][:9], sum(asked)) == (1, "3 images:", 3)
+    assert "nobody waits for it" in complaints

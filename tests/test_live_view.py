@@ -6,14 +6,12 @@ import io
 import os
 import socket
 import sys
-import time
 from collections import Counter
 from collections.abc import Callable
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
-import cv2
 import numpy as np
 import pytest
 from rerun.chunk import RrdReader
@@ -168,48 +166,6 @@ def test_closing_the_window_ends(run: Run, world: Path, tmp_path: Path, monkeypa
     images = [world / "images" / name for name in ("0.png", "9.png")]
     assert run("tilt", *images, "--camera", world / "camera.toml", "--show")[0] == 1
     assert [picture[100:350, 200:400].max() > 100 for picture in shown] == [True, False]
-
-
-def test_the_window_is_closed_while_a_camera_that_has_gone_is_waited_for(
-    run: Run, world: Path, room: RoomImage, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """It was frozen for a minute."""
-
-    class Capture:
-        def __init__(self, _: int) -> None:
-            self.left = 0 if asked else 2
-
-        def isOpened(self) -> bool:  # noqa: N802
-            return self.left > 0
-
-        def get(self, _: int) -> float:
-            return 0.0
-
-        def read(self) -> tuple[bool, np.ndarray | None]:
-            self.left -= 1
-            return (True, room.bgr) if self.left >= 0 else (False, None)
-
-        def release(self) -> None:
-            asked.append(0)
-
-    class Window:
-        is_open = True
-
-        def attend(self) -> bool:
-            asked.append(1)
-            self.is_open = sum(asked) < 3
-            return self.is_open
-
-        __init__ = close = show = lambda self, *_: None
-
-    asked: list[int] = []
-    monkeypatch.setattr(cv2, "VideoCapture", Capture)
-    monkeypatch.setattr("tiltvp.cli.window.Window", Window)
-    start_s = time.monotonic()
-    code, said, complaints = run("tilt", "--live", "0", "--camera", world / "camera.toml", "--show")
-    assert time.monotonic() - start_s < 30.0
-    assert (code, said.splitlines()[0][:9], sum(asked)) == (1, "3 images:", 3)
-    assert "nobody waits for it" in complaints
 
 
 def test_no_screen(run: Run, world: Path, monkeypatch: pytest.MonkeyPatch) -> None:

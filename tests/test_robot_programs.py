@@ -166,3 +166,9 @@ def test_images_of_a_driver_that_writes_into_one_buffer_are_told_apart(
     assert tiltvp.check_lens(driver(), camera) == tiltvp.check_lens(images, camera)
     seen = list(see_lines(driver(), LineExtractor(camera)))
     assert all(np.array_equal(one.gray, image) for one, image in zip(seen, images, strict=True))  # type: ignore[union-attr]
+
+
+def test_the_folder_of_a_recorder_that_was_killed_has_no_metadata(tmp_path: Path) -> None:
+    (tmp_path / "drive_0.mcap").touch()
+    with pytest.raises(InvalidInputError, match=r"a folder of recordings, expected one of them: .*drive_0\.mcap"):
+        open_frames(tmp_path)

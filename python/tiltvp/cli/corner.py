@@ -131,8 +131,6 @@ def corner(
     independent
         Look at every frame anew.
     """
-    from tiltvp.robot import Robot, is_robot
-
     known = options.given()
     has_scale = right is not None or not SCALES.isdisjoint(known)
     results.check(has_scale=has_scale)
@@ -140,9 +138,7 @@ def corner(
         raise InvalidInputError(f"--topic-right {topic_right} of one camera: expected two")
     watching.check()
     words = [] if left is None else [left]
-    robot = Robot.load(calibration) if is_robot(calibration) else None
-    if robot is not None:
-        known = {"down": tuple(-robot.robot_from_camera[2])} | known
+    robot, known = _robot_of(calibration, known)
     source = source.of_robot(robot, words)
     sensor = inertial.of_robot(robot).knowledge(source.topic)
     camera, estimator = _searches(calibration, right is not None, method, known, robot, image_size_from(image_size))
@@ -229,6 +225,16 @@ class Look:
             write_image(self.overlay / f"{name}.png", picture)
         if self.viewer is not None:
             send_corner(self.viewer, number, time_s, picture, estimate)
+
+
+def _robot_of(calibration: Path, known: dict[str, Any]) -> tuple[Robot | None, dict[str, Any]]:
+    """The robot of a file of one, and what is known with the direction down by its mounting, unless that is given."""
+    from tiltvp.robot import Robot, is_robot
+
+    if not is_robot(calibration):
+        return None, known
+    robot = Robot.load(calibration)
+    return robot, {"down": tuple(-robot.robot_from_camera[2])} | known
 
 
 def _blamed(names: Sequence[str], problem: str) -> str:
