@@ -153,6 +153,8 @@ def test_demo(run: Run, world: Path) -> None:
         ("dataset", "synth", "--rooms", 1, "--locations-per-room", 1, "--out", "set"),
         ("evaluate", "set", "--out", "run"),
         ("measure", "lines"),
+        ("measure", "striding"),
+        ("measure", "mounting"),
         ("report", "run", "--out", "report"),
         ("tilt", "images", "--camera", "camera.toml", "--out", "tilt.parquet"),
         ("tilt", "images", "--camera", "camera.toml", "--filter", "--filter-plot", "filter.png"),

@@ -29,5 +29,11 @@ def group(name: str, help: str) -> App:
 
 def run(words: Sequence[str]) -> int:
     """Runs one command within another or for `main`: its exit code (0 for done), and what is wrong as an exception."""
-    code = app(list(words), exit_on_error=False, print_error=False, result_action="return_value")
+    try:
+        code = app(list(words), exit_on_error=False, print_error=False, result_action="return_value")
+    except ModuleNotFoundError:
+        # Verbs of the laboratory begin with its packages; where these are not installed, it says so.
+        import tiltvp.lab  # noqa: F401
+
+        raise
     return code if isinstance(code, int) else 0
