@@ -56,3 +56,9 @@ def test_every_wheel_is_tried_before_it_is_published() -> None:
     assert built == tested
     assert set(jobs["publish"]["needs"]) == set(jobs) - {"publish"}
     assert all("tests/smoke.py" in str(jobs[job]["steps"]) for job in ("test", "test-musl", "sdist"))
+
+
+def test_the_container_reads_what_robots_record() -> None:
+    extras = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]["optional-dependencies"]
+    (installed,) = re.findall(r"\.whl\)\[(.*)\]", (ROOT / "Dockerfile").read_text(encoding="utf-8"))
+    assert {"bags", "video"} <= set(installed.split(",")) <= set(extras)
