@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from recordings import START_S, Bag
+from tiltvp.errors import InvalidInputError
 from tiltvp.streams import read_odometry
 
 
@@ -28,3 +29,18 @@ def test_headings_of_robots_that_lean_are_where_their_x_axis_points(tmp_path: Pa
         headings.append(math.atan2(ahead[1], ahead[0]))
     found = read_odometry(made.write(tmp_path)).yaw_rad
     assert found == pytest.approx(headings, abs=1e-9)
+
+
+def test_odometry_of_velocities_alone_is_no_robot_that_stands(tmp_path: Path) -> None:
+    for speed_mps in (0.5, 0.01):
+        made = Bag("mcap")
+        for k in range(20):
+            made.odometry(START_S + 0.1 * k, 0.0, 0.0, 0.0)
+            made.rows[-1][3].twist.twist.linear.x = speed_mps if k > 5 else 0.0
+        (tmp_path / f"{speed_mps}").mkdir()
+        bag = made.write(tmp_path / f"{speed_mps}")
+        if speed_mps > 0.1:
+            with pytest.raises(InvalidInputError, match=r"poses that never change beside velocities of up to 0\.5 m/s"):
+                read_odometry(bag)
+        else:
+            assert read_odometry(bag).distance_m.max() == 0.0

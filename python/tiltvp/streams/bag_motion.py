@@ -25,6 +25,8 @@ ODOMETRY_KINDS: Final = (_POSES, _JOINTS, *_TWISTS)
 _IMU: Final = "sensor_msgs/Imu"
 _SIDES: Final = (r"(^|[_/.\-])(l|left)([_/.\-]|$)|left", r"(^|[_/.\-])(r|right)([_/.\-]|$)|right")
 """What the names of joints of the left and of the right wheel have in them."""
+_MOVES: Final = 0.05
+"""Metres or radians a second that are more than what robots that stand tremble by: for what sends velocities alone."""
 _UNIT_SLACK: Final = 1e-2
 """Of a quaternion's length: by what those of few digits are off. One that nobody has filled in has length 0."""
 
@@ -40,8 +42,15 @@ def bag_odometry(recording: Recording, topic: str | None, wheels: Wheels) -> Odo
         return _from_joints(recording, chosen, wheels)
     more: dict[str, Any] = {"source": f"{recording.path} {chosen.name}", "gap_max_s": wheels.gap_max_s}
     where = f"{recording.path}: {chosen.name}, message"
-    told = enumerate(recording.decoded(chosen))
-    rows = [(time_s, *_values(content, chosen.kind, f"{where} {k}")) for k, (time_s, content) in told]
+    rows, fastest = [], 0.0
+    for k, (time_s, content) in enumerate(recording.decoded(chosen)):
+        rows.append((time_s, *_values(content, chosen.kind, f"{where} {k}")))
+        fastest = max(fastest, *map(abs, _velocity(content)))
+    if chosen.kind == _POSES and len({row[1:] for row in rows}) == 1 and fastest > _MOVES:
+        raise InvalidInputError(
+            f"{more['source']}: poses that never change beside velocities of up to {fastest:.3g} m/s or rad/s, "
+            "expected a topic of poses, or one of Twist"
+        )
     more["notes"] = recording.unread(chosen, len(rows))
     table = _rising(np.array(rows, dtype=np.float64), more["source"])
     if chosen.kind == _POSES:
@@ -69,6 +78,10 @@ def _values(content: Any, kind: str, where: str) -> tuple[float, ...]:
                 f"{where}: an orientation of length {length:.6g}, expected a quaternion of length 1"
             )
         return place.x, place.y, math.atan2(2.0 * (q.w * q.z + q.x * q.y), q.w**2 + q.x**2 - q.y**2 - q.z**2)
+    return _velocity(content)
+
+
+def _velocity(content: Any) -> tuple[float, float]:
     twist = content.twist if hasattr(content, "twist") else content
     twist = twist.twist if hasattr(twist, "twist") else twist
     return twist.linear.x, twist.angular.z
