@@ -138,7 +138,7 @@ def alarm_areas(curves: pl.DataFrame) -> pl.DataFrame:
     rows = [
         {
             "variant": part["variant"][0],
-            "area": float(np.trapezoid(part["found"].to_numpy(), part["false_alarms"].to_numpy())),
+            "area": _area(part["false_alarms"].to_numpy(), part["found"].to_numpy()),
         }
         for part in curves.partition_by("variant", maintain_order=True)
     ]
@@ -150,7 +150,8 @@ def rejection_curves(rows: pl.DataFrame, *, steps: int = 100) -> pl.DataFrame:
     out = []
     for part in rows.partition_by("variant", maintain_order=True):
         order = pl.col("confidence").fill_null(0.0)
-        ranked = part.sort(order, "image", descending=[True, False])["error_rad"].degrees()
+        ordered = part.sort(order, "image", descending=[True, False])
+        ranked = ordered.select(pl.col("error_rad").degrees()).to_series()
         for step in range(steps):
             accepted = ranked.head(len(ranked) - round(len(ranked) * step / steps)).drop_nulls().to_numpy()
             if len(accepted):
@@ -163,3 +164,8 @@ def rejection_curves(rows: pl.DataFrame, *, steps: int = 100) -> pl.DataFrame:
 def _failures(part: pl.DataFrame, failure_rad: float) -> tuple[NDArray[np.bool_], NDArray[np.float64]]:
     failed = part["error_rad"].fill_null(np.inf).to_numpy() > failure_rad
     return failed, part["confidence"].fill_null(0.0).to_numpy()
+
+
+def _area(x: NDArray[np.float64], y: NDArray[np.float64]) -> float:
+    """That below a curve of straight pieces; NumPy has it by one name before 2.0, and by another since."""
+    return float(0.5 * np.diff(x) @ (y[1:] + y[:-1]))
