@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import sys
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -14,8 +15,9 @@ import pytest
 from tiltvp.cameras import Camera
 from tiltvp.cli import main
 from tiltvp.corner import CornerHypothesis
-from tiltvp.errors import InvalidInputError
+from tiltvp.errors import InvalidInputError, MissingExtraError
 from tiltvp.lab.evaluation.corner_closed_form import exact_poses, noisy_poses, summarise_exact, summarise_noisy
+from tiltvp.lab.evaluation.corner_inertial import conventional_angles
 from tiltvp.lab.evaluation.corner_markers import MarkerLooks
 from tiltvp.lab.evaluation.corner_rooms import truth_near
 from tiltvp.lab.evaluation.corner_scenes import CORNER_SCENES, CornerScene, fresh_rooms
@@ -247,3 +249,9 @@ def test_the_command_measures_and_refuses(tmp_path: Path, capsys: pytest.Capture
     assert "expected a folder" in capsys.readouterr().err
     with pytest.raises(InvalidInputError, match="frames"):
         CornerExperiment(frames=1)
+
+
+def test_without_the_inertial_package_its_extra_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "ahrs.filters", None)
+    with pytest.raises(MissingExtraError, match=r"pip install 'tiltvp\[imu\]'"):
+        conventional_angles(SimpleNamespace(), "complementary", 0.5)

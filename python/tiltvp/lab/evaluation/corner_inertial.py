@@ -10,7 +10,7 @@ import polars as pl
 
 from tiltvp._core import ComplementaryFilter
 from tiltvp.corner_images import CornerPoseEstimator
-from tiltvp.errors import InvalidInputError
+from tiltvp.errors import InvalidInputError, MissingExtraError
 from tiltvp.rotations import ROTATION_WORDS
 from tiltvp.streams import InertialSamples
 
@@ -85,8 +85,8 @@ def compare_inertial(
     accelerometer and gyroscope, at the readings of a simulated sensor (`StereoSequence.imu` of that seed). The latter
     know no yaw; each has the time constant that suits the truth best. The level edges of a corner without colours have
     no names, so that the yaw of one grey camera is up to quarter turns. Angles are those of the board that holds the
-    cameras, x forward and z up (ROS REP 103). Raises `InvalidInputError` where the package is missing or no frame has
-    an attitude of `IMAGE`.
+    cameras, x forward and z up (ROS REP 103). Raises `MissingExtraError` where the package is missing,
+    `InvalidInputError` where no frame has an attitude of `IMAGE`.
     """
     imu = sequence.imu(seed=seed)
     corner = sequence.corners[sequence.corner]
@@ -157,7 +157,7 @@ def conventional_angles(imu: ImuLog, method: str, time_constant_s: float) -> NDA
     try:
         from ahrs.filters import Complementary, Mahony  # type: ignore[import-untyped]
     except ImportError as error:
-        raise InvalidInputError("ahrs: not installed, expected pip install 'tiltvp[imu]'") from error
+        raise MissingExtraError("ahrs: not installed, expected `pip install 'tiltvp[imu]'`") from error
 
     step_s = float(np.median(np.diff(imu.times_s)))
     rates, forces = imu.rates_rad_s @ _FORWARD.T, imu.forces_m_s2 @ _FORWARD.T
