@@ -80,8 +80,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except TiltvpError as error:
         complain(str(error))
         return WRONG_USE
-    except KeyboardInterrupt as error:
-        complain(str(error) or "interrupted")
+    except KeyboardInterrupt:
+        complain("interrupted")
         return INTERRUPTED
     except OSError as error:
         # Nothing more may be written to the output, not even at exit. Whoever reads a pipe may have seen enough.

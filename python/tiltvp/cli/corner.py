@@ -20,7 +20,7 @@ from tiltvp.cli.declared_options import LibraryOptions, from_library, mask_from
 from tiltvp.cli.options import FrameRate, Switch, image_size_from
 from tiltvp.cli.rerun_views import send_corner
 from tiltvp.cli.showing import RerunOptions
-from tiltvp.cli.sources import SourceOptions, check_apart, ending_at_interrupt, exit_code, picture_names
+from tiltvp.cli.sources import SourceOptions, check_apart, ending_at_interrupt, picture_names
 from tiltvp.cli.terminal import named, progress_bar, say
 from tiltvp.errors import InvalidInputError, TiltvpError
 
@@ -156,7 +156,7 @@ def corner(
     if sensor is not None:
         say(sensor.summary())
     results.write(estimates)
-    return exit_code(frames, well=not look.bad)
+    return 1 if look.bad or frames.problems else 0
 
 
 @dataclass

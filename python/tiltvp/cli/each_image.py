@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
 from cyclopts import Parameter
 
-from tiltvp.cli.sources import SourceOptions, check_apart, ending_at_interrupt, exit_code, picture_names
+from tiltvp.cli.sources import SourceOptions, check_apart, ending_at_interrupt, picture_names
 from tiltvp.cli.tables import Out, check_ending
 from tiltvp.cli.terminal import named, progress_bar
 from tiltvp.errors import OutputError, TiltvpError
@@ -54,15 +53,14 @@ def find_in_each(
     look: Callable[[Image], Found],
     results: FoundOptions,
     draw: Callable[[Image, Found], Image],
-) -> tuple[list[tuple[str, Found]], Callable[[], int]]:
-    """What `look` finds in each gray frame, with its name, drawn into a folder if asked; what gives the exit code once
-    that is written."""
+) -> tuple[list[tuple[str, Found]], bool]:
+    """What `look` finds in each gray frame, with its name, drawn into a folder if asked; whether all went well."""
     from tiltvp.images import gray_from, write_image
 
     frames, overlay = source.open(images or []), results.overlay
     check_apart(frames, overlay, results.out)
     found: list[tuple[str, Found]] = []
-    well = True
+    well = not frames.problems
     with ending_at_interrupt(frames) as coming, progress_bar(frames.count or 0, "images") as bar:
         for frame, name in zip(coming, picture_names(frames), strict=False):
             try:
@@ -77,4 +75,4 @@ def find_in_each(
                 bar.complain(named(frame.name, str(error)))
                 well = False
             bar.advance()
-    return found, partial(exit_code, frames, well=well)
+    return found, well

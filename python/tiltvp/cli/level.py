@@ -15,7 +15,7 @@ from tiltvp.cli.filtering import FilterOptions
 from tiltvp.cli.level_images import TILTS, Levelling, Looks, level_on_cluster, write_images
 from tiltvp.cli.level_videos import write_video
 from tiltvp.cli.options import CameraOptions, MethodOptions, Switch, image_size_from, rotation_of
-from tiltvp.cli.sources import MotionOptions, SourceOptions, check_apart, exit_code, wheel_base_of
+from tiltvp.cli.sources import MotionOptions, SourceOptions, check_apart, wheel_base_of
 from tiltvp.cli.terminal import say
 from tiltvp.errors import InvalidInputError
 from tiltvp.files import check_output, check_output_folder
@@ -123,9 +123,9 @@ def level(
         levelled, of = write_images(frames, motions, out, work)
     else:
         levelled, of = write_video(frames, motions, path, work)
-    by = "" if not metadata_only else ", by their metadata alone"
-    say(f"{levelled} of {of + len(frames.problems)} made level{by}")
-    return exit_code(frames, well=levelled == of)
+    of += len(frames.problems)
+    say(f"{levelled} of {of} made level" + ("" if not metadata_only else ", by their metadata alone"))
+    return 0 if levelled == of else 1
 
 
 def _is_video(out: Path) -> bool:

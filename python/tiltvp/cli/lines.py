@@ -37,7 +37,7 @@ def lines(
     source = source.of_robot(camera.robot(), images or [])
     lens, options = camera.load(source.topic), camera.complete(options.of_topic(source.topic))
     extractor, tilt = options.extractor(lens), options.tilts(lens)
-    found, code = find_in_each(
+    found, well = find_in_each(
         images,
         source,
         lambda gray: extractor(gray, tilt(gray)),
@@ -55,7 +55,7 @@ def lines(
         bearing, sigma = degrees(row["bearing_rad"]), degrees(row["sigma_rad"], 3)
         printed.add_row(row["file"], str(row["line"]), bearing, sigma, low, high, str(row["support_px"]))
     show(printed)
-    return code()
+    return 0 if well else 1
 
 
 LINE_TYPES: Final = {"bearing_rad": "Float64", "sigma_rad": "Float64", "support_px": "UInt32"} | dict.fromkeys(

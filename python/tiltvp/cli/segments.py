@@ -51,14 +51,14 @@ def segments(
     source = source.of_robot(camera.robot(), images or [])
     lens = camera.load(source.topic)
     detector = SegmentDetector(lens, **camera.complete(options).given())
-    found, code = find_in_each(images, source, detector, results, lambda gray, seen: draw_segments(gray, lens, seen))
+    found, well = find_in_each(images, source, detector, results, lambda gray, seen: draw_segments(gray, lens, seen))
     if results.out is not None:
         write_table(segment_table(found), results.out)
     printed = new_table(None, ("file", "edges", "pixels", "longest deg", "median deg", "median rms px"), ["file"])
     for image, seen in found:
         printed.add_row(image, *_summary(seen))
     show(printed)
-    return code()
+    return 0 if well else 1
 
 
 def _summary(seen: Segments) -> list[str]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 import os
 import signal
 import threading
@@ -29,7 +28,6 @@ __all__ = [
     "check_apart",
     "distinct_names",
     "ending_at_interrupt",
-    "exit_code",
     "picture_names",
     "tell",
     "wheel_base_of",
@@ -212,20 +210,10 @@ def tell(*lines: str) -> None:
 
 @contextmanager
 def ending_at_interrupt(frames: Frames) -> Iterator[Iterator[Frame]]:
-    """The frames, which end at the first Ctrl-C once one is done, so that what was found till then is written; of a
-    live camera what is begun is finished. `exit_code` tells."""
+    """The frames; those of a live camera end at the first Ctrl-C, after which what is begun is finished."""
     from tiltvp.streams import LiveCamera
 
-    if not isinstance(frames, LiveCamera):
-        taken = itertools.count()
-        try:
-            yield (frame for frame, _ in zip(frames, taken, strict=False))
-        except KeyboardInterrupt:
-            if next(taken) < 2:
-                raise
-            frames.interrupted = True
-        return
-    if threading.current_thread() is not threading.main_thread():
+    if not isinstance(frames, LiveCamera) or threading.current_thread() is not threading.main_thread():
         yield iter(frames)
         return
     stop = threading.Event()
@@ -241,14 +229,6 @@ def ending_at_interrupt(frames: Frames) -> Iterator[Iterator[Frame]]:
         yield iter(frames)
     finally:
         signal.signal(signal.SIGINT, before)
-
-
-def exit_code(frames: Frames, *, well: bool) -> int:
-    """That of a verb that has written what it found, `well` if of all frames. Raises `KeyboardInterrupt` where somebody
-    has ended the frames."""
-    if frames.interrupted:
-        raise KeyboardInterrupt(f"{frames.source}: interrupted: what is told and written is of the frames till then")
-    return 0 if well and not frames.problems else 1
 
 
 def picture_names(frames: Frames) -> Iterator[str]:

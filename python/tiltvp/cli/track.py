@@ -16,7 +16,7 @@ from tiltvp.cli.lines import LINE_TYPES, line_columns
 from tiltvp.cli.options import CameraOptions, FrameRate
 from tiltvp.cli.rerun_views import send_lines
 from tiltvp.cli.showing import RerunOptions
-from tiltvp.cli.sources import MotionOptions, SourceOptions, check_apart, ending_at_interrupt, exit_code
+from tiltvp.cli.sources import MotionOptions, SourceOptions, check_apart, ending_at_interrupt
 from tiltvp.cli.tables import Out, Table, check_ending, check_plot, write_table
 from tiltvp.cli.terminal import ProgressBar, complain, named, progress_bar, say
 from tiltvp.errors import InvalidInputError, TiltvpError, UnknownLeanError, counted
@@ -120,7 +120,7 @@ def track(
     skipped = "".join([f", {drive.bad} skipped" if drive.bad else "", f", {drive.told()}" if drive.leaning else ""])
     lines, tracks = counted(len(table.rows), "lines"), counted(tracker.track_count, "tracks")
     say(f"{out}: {counted(len(tracked), 'frames')}{skipped}, {lines}, {tracks}")
-    return exit_code(frames, well=not drive.bad)
+    return 1 if drive.bad or frames.problems else 0
 
 
 def _follow(

@@ -66,8 +66,6 @@ class Frames:
     """Sentences about the source that whoever uses it should know."""
     problems: tuple[str, ...] = ()
     """What was asked for and is not there, a sentence each."""
-    interrupted: bool = False
-    """Whether somebody has ended them before their end."""
     recording: Path | None = None
     """Where the odometry of the same drive is: a bag, or the table of a folder; None where nobody knows of any."""
 
