@@ -168,6 +168,7 @@ DRIVE_CASES: Final = {
     "two landmarks merged": _Case(_merged),
     "camera bumped": _Case(_bumped),
     "image centre off by 0.5 px": _off_centre(0.5),
+    "image centre off by 1 px": _off_centre(1.0),
     "image centre off by 2 px": _off_centre(2.0),
     "wheels slip": _Case(_slips),
     "carpet": _Case(_carpet),
