@@ -188,7 +188,7 @@ def test_options_reach_the_core(run: Run, world: Path, tmp_path: Path) -> None:
         ("--margin-px", "4"),
         ("--gradient-min", "300"),
         ("--smoothing-px", "1"),
-        ("--tilt-max-deg", "6"),
+        ("--tilt-max-deg", "16"),
         ("--keep-fraction", "0.6"),
         ("--scale-deg", "1"),
         ("--mask", tmp_path / "mask.png"),
