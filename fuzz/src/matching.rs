@@ -58,7 +58,8 @@ fn follow(bytes: &mut Bytes<'_>) {
     }
 }
 
-fn lines(bytes: &mut Bytes<'_>) -> Lines {
+/// A few lines of any numbers, in the order of their bearings.
+pub(crate) fn lines(bytes: &mut Bytes<'_>) -> Lines {
     let mut lines = Lines::default();
     for _ in 0..bytes.byte() % 6 {
         lines.lines.push(Line {

@@ -4,13 +4,12 @@ use std::sync::LazyLock;
 
 use nalgebra::{Matrix2, Matrix6, Vector3};
 use tiltvp_core::geometry::Tilt;
-use tiltvp_core::lines::{
-    Followed, FrameMemory, Line, LineTracker, Lines, Motion, Parallax, TrackerOptions, TrackerState,
-};
+use tiltvp_core::lines::{Followed, FrameMemory, LineTracker, Motion, Parallax, TrackerOptions, TrackerState};
 use tiltvp_core::selfcalib::{CalibrationMethod, Mounting, SelfCalibrator, SelfCalibratorOptions, WheelMotion};
 use tiltvp_core::tilt::{MountingOptions, TiltFilter, TiltFilterOptions};
 
 use crate::bytes::Bytes;
+use crate::matching::lines;
 
 /// A tilt filter or a line tracker.
 pub fn state(data: &[u8]) {
@@ -150,17 +149,7 @@ fn tracker(bytes: &mut Bytes<'_>) {
     let Ok(mut tracker) = LineTracker::with_state(TrackerOptions::default(), state) else { return };
     let mut out = Vec::new();
     for _ in 0..=bytes.byte() % 3 {
-        let mut lines = Lines::default();
-        for _ in 0..bytes.byte() % 5 {
-            lines.lines.push(Line {
-                bearing_rad: bytes.mostly(-3.1, 3.1),
-                sigma_rad: bytes.mostly(1e-4, 0.1),
-                support_px: bytes.byte().into(),
-                elevation_min_rad: bytes.mostly(-0.5, 0.0),
-                elevation_max_rad: bytes.mostly(0.0, 0.5),
-                polarity: bytes.mostly(-1.0, 1.0),
-            });
-        }
+        let lines = lines(&mut *bytes);
         let descriptors: Vec<f32> = (0..lines.lines.len() * width).map(|_| bytes.mostly(0.0, 1.0) as f32).collect();
         let motion = bytes.flag().then(|| Motion {
             turn_rad: bytes.mostly(-1.0, 1.0),

@@ -83,7 +83,7 @@ impl ImageSpace {
             Correction::None | Correction::ClosedForm => TrainedCorrection::Factor(gains.mean),
         };
         if let (Some(offset_px), Some(_)) = (offset_max_px, setting.tilt_max_rad) {
-            return Err(Error::option("offset_max_px", *offset_px, "none beside tilt_max_rad, which sets it"));
+            return Err(Error::option("offset_max_px", *offset_px, "none beside tilt_max_rad, which raises its own"));
         }
         let own_max_px = offset_max_px.unwrap_or_else(|| offset_max_px_of(vertical.scale));
         let largest_px = setting.tilt_max_rad.map_or(own_max_px, |tilt| correction.shift_of(tilt).max(own_max_px));
