@@ -216,7 +216,7 @@ unsafe fn pixels(mut bits: u64) -> __m512i {
 #[inline(always)]
 unsafe fn vectors_of<L: Level + VectorLevel>(each: &[[i16; 2]], block: &PixelBlock) -> [__m512i; 4] {
     let each = each.get(block.slot as usize..).unwrap_or(&[]);
-    let there = u64::MAX >> BLOCK.saturating_sub(each.len()).min(BLOCK - 1);
+    let there = u64::MAX.checked_shr(BLOCK.saturating_sub(each.len()) as u32).unwrap_or(0);
     let from: *const i32 = each.as_ptr().cast();
     // SAFETY: the caller vouches for the machine; what the masks leave out is not read.
     unsafe {

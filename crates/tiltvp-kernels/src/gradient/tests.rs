@@ -34,7 +34,8 @@ fn compare<L: GradientLevel>(data: &[L], at_least: i32) {
                 cut.map(|k| PixelBlock { own: own(k), slot: k as u32, place: place(1, first + k) }).collect()
             };
             let from = Directions::From { centre: [9000, -8000], parts: 91 };
-            for directions in [Directions::None, Directions::Each(&each[..n]), from] {
+            let fewer = Directions::Each(&each[..n / 2]);
+            for directions in [Directions::None, Directions::Each(&each[..n]), fewer, from] {
                 for at_least in [1, at_least, i32::MAX] {
                     let threshold = Threshold { at_least, directions, limit: 1e8 };
                     let plain = found(|kept| {
