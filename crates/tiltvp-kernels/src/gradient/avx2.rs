@@ -20,6 +20,9 @@ use crate::prefetch::prefetch;
 /// Gradients of a block: four vectors along `u`, and four along `v`.
 type Gradients = [[__m256i; 4]; 2];
 
+/// Gradients of a block along both axes, in rows in which every byte is a place.
+type Placed = [[i16; 256]; 2];
+
 /// Marks of a block, ones in all bits: of the lower quarters of each vector's gradients, and of the upper.
 type Marks = [[__m256i; 2]; 4];
 
@@ -28,7 +31,7 @@ const AHEAD: usize = 6;
 
 /// Pixels that are compacted at once, whether there are so many or not: the loop's end is guessed wrong less often. Only time depends
 /// on it.
-const AT_ONCE: usize = 4;
+const AT_ONCE: usize = 8;
 
 /// A level of which many are read at once.
 pub(super) trait Level256: Level {
@@ -36,15 +39,15 @@ pub(super) trait Level256: Level {
     const FIRST: [usize; 4];
     /// From a vector's first pixel to that of its upper half.
     const HALF: usize;
-    /// Where the gradient of each pixel is in the vectors.
-    const PLACES: [u8; BLOCK] = places(Self::FIRST, Self::HALF);
+    /// Where the gradient of each pixel is in the vectors; that of none may be any.
+    const PLACES: [u8; BLOCK + 1] = places(Self::FIRST, Self::HALF);
 
     /// The gradients of the pixels between the levels.
     fn gradients(token: Avx2, rows: [&[Self; REACH]; 3]) -> Gradients;
 }
 
-const fn places(first: [usize; 4], half: usize) -> [u8; BLOCK] {
-    let mut places = [0; BLOCK];
+const fn places(first: [usize; 4], half: usize) -> [u8; BLOCK + 1] {
+    let mut places = [0; BLOCK + 1];
     let mut i = 0;
     while i < BLOCK {
         places[first[i / 16] + half * (i / 8 % 2) + i % 8] = i as u8;
@@ -94,30 +97,33 @@ fn bytes_from<const AT: usize>(token: Avx2, a: &[u8; REACH], m: &[u8; REACH], b:
     let (a0, a1, a2) = (read(a, 0), read(a, 1), read(a, 2));
     let (m0, m2) = (read(m, 0), read(m, 2));
     let (b0, b1, b2) = (read(b, 0), read(b, 1), read(b, 2));
-    [weighted_bytes([(a0, a2), (b0, b2), (m0, m2)]), weighted_bytes([(a0, b0), (a2, b2), (a1, b1)])]
-}
-
-/// Three parts of the first two differences and ten of the last.
-#[inline]
-#[target_feature(enable = "avx2")]
-fn weighted_bytes([p, q, r]: [(__m256i, __m256i); 3]) -> [__m256i; 2] {
     // Minus in the lower byte of a pair.
     let (three, ten) = (_mm256_set1_epi16(0x03fd), _mm256_set1_epi16(0x0af6));
-    let low = _mm256_add_epi16(
-        _mm256_add_epi16(
-            _mm256_maddubs_epi16(_mm256_unpacklo_epi8(p.0, p.1), three),
-            _mm256_maddubs_epi16(_mm256_unpacklo_epi8(q.0, q.1), three),
-        ),
-        _mm256_maddubs_epi16(_mm256_unpacklo_epi8(r.0, r.1), ten),
-    );
-    let high = _mm256_add_epi16(
-        _mm256_add_epi16(
-            _mm256_maddubs_epi16(_mm256_unpackhi_epi8(p.0, p.1), three),
-            _mm256_maddubs_epi16(_mm256_unpackhi_epi8(q.0, q.1), three),
-        ),
-        _mm256_maddubs_epi16(_mm256_unpackhi_epi8(r.0, r.1), ten),
-    );
-    [low, high]
+    let (falling, rising) = (differences(a0, b2, three), differences(b0, a2, three));
+    let (along, down) = (differences(m0, m2, ten), differences(a1, b1, ten));
+    let [x0, y0] = scharr(falling[0], rising[0], along[0], down[0]);
+    let [x1, y1] = scharr(falling[1], rising[1], along[1], down[1]);
+    [[x0, x1], [y0, y1]]
+}
+
+/// Of bytes 0 to 7 of every 16, and of 8 to 15: weighted differences, by pairs of weights.
+#[inline]
+#[target_feature(enable = "avx2")]
+fn differences(less: __m256i, more: __m256i, weights: __m256i) -> [__m256i; 2] {
+    [
+        _mm256_maddubs_epi16(_mm256_unpacklo_epi8(less, more), weights),
+        _mm256_maddubs_epi16(_mm256_unpackhi_epi8(less, more), weights),
+    ]
+}
+
+/// Gradients, of three parts of the differences along both diagonals and ten of those along the axes.
+#[inline]
+#[target_feature(enable = "avx2")]
+fn scharr(falling: __m256i, rising: __m256i, along: __m256i, down: __m256i) -> [__m256i; 2] {
+    [
+        _mm256_add_epi16(_mm256_add_epi16(falling, rising), along),
+        _mm256_add_epi16(_mm256_sub_epi16(falling, rising), down),
+    ]
 }
 
 fearless_simd::kernel! {
@@ -142,12 +148,14 @@ fn words_from<const AT: usize>(token: Avx2, a: &[i16; REACH], m: &[i16; REACH], 
     let (a0, a2, b0, b2) = (read(a, 0), read(a, 2), read(b, 0), read(b, 2));
     let along = _mm256_sub_epi16(read(m, 2), read(m, 0));
     let down = _mm256_sub_epi16(read(b, 1), read(a, 1));
-    // Of the corners' differences, half of the sum and half of the difference of both diagonals.
     let (falling, rising) = (_mm256_sub_epi16(b2, a0), _mm256_sub_epi16(a2, b0));
     let (three, ten) = (_mm256_set1_epi16(3), _mm256_set1_epi16(10));
-    let x = _mm256_mullo_epi16(_mm256_add_epi16(falling, rising), three);
-    let y = _mm256_mullo_epi16(_mm256_sub_epi16(falling, rising), three);
-    [_mm256_add_epi16(x, _mm256_mullo_epi16(along, ten)), _mm256_add_epi16(y, _mm256_mullo_epi16(down, ten))]
+    scharr(
+        _mm256_mullo_epi16(falling, three),
+        _mm256_mullo_epi16(rising, three),
+        _mm256_mullo_epi16(along, ten),
+        _mm256_mullo_epi16(down, ten),
+    )
 }
 
 fearless_simd::kernel! {
@@ -193,6 +201,7 @@ fn threshold_blocks<L: Level256>(
         _ => none,
     };
     let mut rest = [[L::default(); REACH]; 3];
+    let mut placed: Placed = [[0; 256]; 2];
     for block in blocks {
         if levels.places == usize::MAX {
             // An image is rarely in the nearest cache.
@@ -237,7 +246,7 @@ fn threshold_blocks<L: Level256>(
             }
         }
         if passing != 0 {
-            keep::<L>(token, block, passing, [x, y], kept);
+            keep::<L>(token, block, passing, [x, y], &mut placed, kept);
         }
     }
 }
@@ -308,26 +317,38 @@ fn vectors<L: Level256>(token: Avx2, each: &[[i16; 2]; BLOCK]) -> Marks {
 /// Appends the pixels of the mask.
 #[inline]
 #[target_feature(enable = "avx2,bmi1,bmi2,popcnt")]
-fn keep<L: Level256>(token: Avx2, block: &PixelBlock, passing: u64, g: Gradients, kept: &mut KeptPixels<'_>) {
-    let (mut x, mut y) = ([0i16; BLOCK], [0i16; BLOCK]);
-    for (k, (x, y)) in x.as_chunks_mut::<16>().0.iter_mut().zip(y.as_chunks_mut::<16>().0).enumerate() {
-        let gradients: [i16x16<Avx2>; 2] = [g[0][k].simd_into(token), g[1][k].simd_into(token)];
-        gradients[0].store_slice(x);
-        gradients[1].store_slice(y);
+fn keep<L: Level256>(
+    token: Avx2,
+    block: &PixelBlock,
+    passing: u64,
+    g: Gradients,
+    placed: &mut Placed,
+    kept: &mut KeptPixels<'_>,
+) {
+    for (g, to) in g.into_iter().zip(placed.iter_mut()) {
+        for (g, to) in g.into_iter().zip(to.as_chunks_mut::<16>().0) {
+            let g: i16x16<Avx2> = g.simd_into(token);
+            g.store_slice(to);
+        }
     }
+    let [x, y] = placed;
     let room = kept.len..kept.len + BLOCK;
-    let (slots, places) = (&mut kept.slots[room.clone()], &mut kept.places[room.clone()]);
-    let (gx, gy) = (&mut kept.gx[room.clone()], &mut kept.gy[room]);
-    let (mut waiting, mut n) = (passing, 0);
-    while waiting != 0 {
-        for _ in 0..AT_ONCE {
-            // When none waits any longer the first is written, where it does not count.
-            let (i, to) = (waiting.trailing_zeros() % BLOCK as u32, n % BLOCK);
-            let from = usize::from(L::PLACES[i as usize]) % BLOCK;
-            (slots[to], places[to]) = (block.slot + i, block.place + i);
-            (gx[to], gy[to]) = (x[from], y[from]);
+    let slots = kept.slots[room.clone()].as_chunks_mut::<AT_ONCE>().0;
+    let places = kept.places[room.clone()].as_chunks_mut::<AT_ONCE>().0;
+    let gx = kept.gx[room.clone()].as_chunks_mut::<AT_ONCE>().0;
+    let gy = kept.gy[room].as_chunks_mut::<AT_ONCE>().0;
+    let mut waiting = passing;
+    for ((slots, places), (gx, gy)) in slots.iter_mut().zip(places).zip(gx.iter_mut().zip(gy)) {
+        for k in 0..AT_ONCE {
+            // When none waits any longer, what is written does not count.
+            let i = waiting.trailing_zeros();
+            let from = usize::from(L::PLACES[i as usize]);
+            (slots[k], places[k]) = (block.slot.wrapping_add(i), block.place.wrapping_add(i));
+            (gx[k], gy[k]) = (x[from], y[from]);
             waiting &= waiting.wrapping_sub(1);
-            n += 1;
+        }
+        if waiting == 0 {
+            break;
         }
     }
     kept.len += passing.count_ones() as usize;

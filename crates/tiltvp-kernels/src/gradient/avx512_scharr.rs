@@ -79,7 +79,13 @@ impl VectorLevel for u8 {
             let b0 = _mm512_loadu_si512(b.cast());
             let b1 = _mm512_loadu_si512(b.add(1).cast());
             let b2 = _mm512_loadu_si512(b.add(2).cast());
-            [weighted_bytes([(a0, a2), (b0, b2), (m0, m2)]), weighted_bytes([(a0, b0), (a2, b2), (a1, b1)])]
+            // Minus in the lower byte of a pair.
+            let (three, ten) = (_mm512_set1_epi16(0x03fd), _mm512_set1_epi16(0x0af6));
+            let (falling, rising) = (differences(a0, b2, three), differences(b0, a2, three));
+            let (along, down) = (differences(m0, m2, ten), differences(a1, b1, ten));
+            let [x0, y0] = scharr(falling[0], rising[0], along[0], down[0]);
+            let [x1, y1] = scharr(falling[1], rising[1], along[1], down[1]);
+            [[x0, x1], [y0, y1]]
         }
     }
 
@@ -99,31 +105,33 @@ impl VectorLevel for u8 {
     }
 }
 
-/// Three parts of the first two differences and ten of the last: of bytes 0 to 7 of every 16, and of 8 to 15.
+/// Of bytes 0 to 7 of every 16, and of 8 to 15: weighted differences, by pairs of weights.
 ///
 /// # Safety
 /// The machine must be as [`is_available`] asks.
 #[inline(always)]
-unsafe fn weighted_bytes([p, q, r]: [(__m512i, __m512i); 3]) -> [__m512i; 2] {
+unsafe fn differences(less: __m512i, more: __m512i, weights: __m512i) -> [__m512i; 2] {
     // SAFETY: the caller vouches for the machine.
     unsafe {
-        // Minus in the lower byte of a pair.
-        let (three, ten) = (_mm512_set1_epi16(0x03fd), _mm512_set1_epi16(0x0af6));
-        let low = _mm512_add_epi16(
-            _mm512_add_epi16(
-                _mm512_maddubs_epi16(_mm512_unpacklo_epi8(p.0, p.1), three),
-                _mm512_maddubs_epi16(_mm512_unpacklo_epi8(q.0, q.1), three),
-            ),
-            _mm512_maddubs_epi16(_mm512_unpacklo_epi8(r.0, r.1), ten),
-        );
-        let high = _mm512_add_epi16(
-            _mm512_add_epi16(
-                _mm512_maddubs_epi16(_mm512_unpackhi_epi8(p.0, p.1), three),
-                _mm512_maddubs_epi16(_mm512_unpackhi_epi8(q.0, q.1), three),
-            ),
-            _mm512_maddubs_epi16(_mm512_unpackhi_epi8(r.0, r.1), ten),
-        );
-        [low, high]
+        [
+            _mm512_maddubs_epi16(_mm512_unpacklo_epi8(less, more), weights),
+            _mm512_maddubs_epi16(_mm512_unpackhi_epi8(less, more), weights),
+        ]
+    }
+}
+
+/// Gradients, of three parts of the differences along both diagonals and ten of those along the axes.
+///
+/// # Safety
+/// The machine must be as [`is_available`] asks.
+#[inline(always)]
+unsafe fn scharr(falling: __m512i, rising: __m512i, along: __m512i, down: __m512i) -> [__m512i; 2] {
+    // SAFETY: the caller vouches for the machine.
+    unsafe {
+        [
+            _mm512_add_epi16(_mm512_add_epi16(falling, rising), along),
+            _mm512_add_epi16(_mm512_sub_epi16(falling, rising), down),
+        ]
     }
 }
 
@@ -170,12 +178,14 @@ unsafe fn gradients_of_words(a: *const i16, m: *const i16, b: *const i16) -> [__
         let (b0, b2) = (_mm512_loadu_si512(b.cast()), _mm512_loadu_si512(b.add(2).cast()));
         let along = _mm512_sub_epi16(_mm512_loadu_si512(m.add(2).cast()), _mm512_loadu_si512(m.cast()));
         let down = _mm512_sub_epi16(_mm512_loadu_si512(b.add(1).cast()), _mm512_loadu_si512(a.add(1).cast()));
-        // Of the corners' differences, half of the sum and half of the difference of both diagonals.
         let (falling, rising) = (_mm512_sub_epi16(b2, a0), _mm512_sub_epi16(a2, b0));
         let (three, ten) = (_mm512_set1_epi16(3), _mm512_set1_epi16(10));
-        let x = _mm512_mullo_epi16(_mm512_add_epi16(falling, rising), three);
-        let y = _mm512_mullo_epi16(_mm512_sub_epi16(falling, rising), three);
-        [_mm512_add_epi16(x, _mm512_mullo_epi16(along, ten)), _mm512_add_epi16(y, _mm512_mullo_epi16(down, ten))]
+        scharr(
+            _mm512_mullo_epi16(falling, three),
+            _mm512_mullo_epi16(rising, three),
+            _mm512_mullo_epi16(along, ten),
+            _mm512_mullo_epi16(down, ten),
+        )
     }
 }
 
