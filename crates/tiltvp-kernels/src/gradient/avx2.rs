@@ -29,10 +29,6 @@ type Marks = [[__m256i; 2]; 4];
 /// Rows that are asked for before they are needed. Only time depends on it.
 const AHEAD: usize = 6;
 
-/// Pixels that are compacted at once, whether there are so many or not: the loop's end is guessed wrong less often. Only time depends
-/// on it.
-const AT_ONCE: usize = 8;
-
 /// A level of which many are read at once.
 pub(super) trait Level256: Level {
     /// The first pixel of each vector of gradients.
@@ -246,7 +242,13 @@ fn threshold_blocks<L: Level256>(
             }
         }
         if passing != 0 {
-            keep::<L>(token, block, passing, [x, y], &mut placed, kept);
+            for (g, placed) in [x, y].into_iter().zip(&mut placed) {
+                for (g, placed) in g.into_iter().zip(placed.as_chunks_mut::<16>().0) {
+                    let g: i16x16<Avx2> = g.simd_into(token);
+                    g.store_slice(placed);
+                }
+            }
+            kept.append(block, passing, placed.each_ref(), &L::PLACES);
         }
     }
 }
@@ -312,44 +314,4 @@ fn vectors<L: Level256>(token: Avx2, each: &[[i16; 2]; BLOCK]) -> Marks {
         }
     }
     q
-}
-
-/// Appends the pixels of the mask.
-#[inline]
-#[target_feature(enable = "avx2,bmi1,bmi2,popcnt")]
-fn keep<L: Level256>(
-    token: Avx2,
-    block: &PixelBlock,
-    passing: u64,
-    g: Gradients,
-    placed: &mut Placed,
-    kept: &mut KeptPixels<'_>,
-) {
-    for (g, to) in g.into_iter().zip(placed.iter_mut()) {
-        for (g, to) in g.into_iter().zip(to.as_chunks_mut::<16>().0) {
-            let g: i16x16<Avx2> = g.simd_into(token);
-            g.store_slice(to);
-        }
-    }
-    let [x, y] = placed;
-    let room = kept.len..kept.len + BLOCK;
-    let slots = kept.slots[room.clone()].as_chunks_mut::<AT_ONCE>().0;
-    let places = kept.places[room.clone()].as_chunks_mut::<AT_ONCE>().0;
-    let gx = kept.gx[room.clone()].as_chunks_mut::<AT_ONCE>().0;
-    let gy = kept.gy[room].as_chunks_mut::<AT_ONCE>().0;
-    let mut waiting = passing;
-    for ((slots, places), (gx, gy)) in slots.iter_mut().zip(places).zip(gx.iter_mut().zip(gy)) {
-        for k in 0..AT_ONCE {
-            // When none waits any longer, what is written does not count.
-            let i = waiting.trailing_zeros();
-            let from = usize::from(L::PLACES[i as usize]);
-            (slots[k], places[k]) = (block.slot.wrapping_add(i), block.place.wrapping_add(i));
-            (gx[k], gy[k]) = (x[from], y[from]);
-            waiting &= waiting.wrapping_sub(1);
-        }
-        if waiting == 0 {
-            break;
-        }
-    }
-    kept.len += passing.count_ones() as usize;
 }

@@ -38,6 +38,10 @@ pub(super) fn threshold_blocks<L: Level>(
 ) {
     let mut all = Gradients::default();
     let mut rest = [[L::default(); REACH]; 3];
+    let mut along = [[0; 2]; BLOCK];
+    if let Directions::From { parts, .. } = threshold.directions {
+        along = std::array::from_fn(|i| [parts.wrapping_mul(i as i16), 0]);
+    }
     for block in blocks {
         gradients_of(levels.around(block, &mut rest), &mut all);
         let mut passing = all.strong(threshold.at_least) & block.own;
@@ -59,23 +63,26 @@ pub(super) fn threshold_blocks<L: Level>(
             }
             Directions::From { centre: [u, v], parts } => {
                 let away = |x: u32, centre: i32| (x as i32 * i32::from(parts)).wrapping_sub(centre) as i16;
-                let (first, y) = (away(block.place & 0xffff, u), away(block.place >> 16, v));
-                let mut line = [[0, y]; BLOCK];
-                for (i, vector) in line.iter_mut().enumerate() {
-                    vector[0] = first.wrapping_add(parts.wrapping_mul(i as i16));
-                }
-                passing &= all.directed(&line, threshold.limit);
+                let first = [away(block.place & 0xffff, u), away(block.place >> 16, v)];
+                passing &= all.directed(&along.map(|[x, _]| [first[0].wrapping_add(x), first[1]]), threshold.limit);
             }
         }
-        while passing != 0 {
-            let (i, len) = (passing.trailing_zeros(), kept.len);
-            (kept.slots[len], kept.places[len]) = (block.slot + i, block.place + i);
-            (kept.gx[len], kept.gy[len]) = (all.gx[i as usize], all.gy[i as usize]);
-            kept.len += 1;
-            passing &= passing - 1;
+        if passing != 0 {
+            kept.append(block, passing, [&all.gx, &all.gy], &IN_ORDER);
         }
     }
 }
+
+/// The places of gradients that are in the order of the pixels.
+const IN_ORDER: [u8; BLOCK + 1] = {
+    let mut places = [0; BLOCK + 1];
+    let mut i = 0;
+    while i < BLOCK {
+        places[i] = i as u8;
+        i += 1;
+    }
+    places
+};
 
 /// The gradients of some pixels and their squares.
 struct Gradients {
@@ -211,13 +218,10 @@ impl Gradients {
 fn gradients_of<L: Level>([a, m, b]: [&[L; REACH]; 3], all: &mut Gradients) {
     // What lies beside a span may be anything.
     let less = |a: L, b: L| a.signed().wrapping_sub(b.signed());
-    let weighted = |sides: i16, middle: i16| sides.wrapping_mul(3).wrapping_add(middle.wrapping_mul(10));
+    let weighted = |diagonals: i16, middle: i16| diagonals.wrapping_mul(3).wrapping_add(middle.wrapping_mul(10));
     for i in 0..BLOCK {
-        let sides = less(a[i + 2], a[i]).wrapping_add(less(b[i + 2], b[i]));
-        all.gx[i] = weighted(sides, less(m[i + 2], m[i]));
-    }
-    for i in 0..BLOCK {
-        let sides = less(b[i], a[i]).wrapping_add(less(b[i + 2], a[i + 2]));
-        all.gy[i] = weighted(sides, less(b[i + 1], a[i + 1]));
+        let (falling, rising) = (less(b[i + 2], a[i]), less(a[i + 2], b[i]));
+        all.gx[i] = weighted(falling.wrapping_add(rising), less(m[i + 2], m[i]));
+        all.gy[i] = weighted(falling.wrapping_sub(rising), less(b[i + 1], a[i + 1]));
     }
 }
