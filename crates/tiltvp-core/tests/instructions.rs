@@ -26,14 +26,14 @@ use tiltvp_core::tilt::{METHODS, Scratch, TiltEstimate, TiltEstimator, TiltOptio
 /// the names that valgrind shows: a twentieth to a tenth more than when they were last looked at.
 const LIMITS: [(&str, u64); 11] = [
     // The tilt of one image of 240 x 240 pixels.
-    ("refined_image", 2750),
-    ("sampled_image", 1340),
-    ("trimmed_image", 1260),
-    ("consensus_image", 585),
-    ("segments_image", 10_000),
+    ("refined_image", 2300),
+    ("sampled_image", 1080),
+    ("trimmed_image", 1010),
+    ("consensus_image", 525),
+    ("segments_image", 4100),
     // Its lines, and their descriptors.
-    ("extracted_lines", 4120),
-    ("described_lines", 32_200),
+    ("extracted_lines", 2660),
+    ("described_lines", 30_800),
     // Two images of 320 x 180 pixels to the corner of the coloured cube in each.
     ("segmented_pair", 4740),
     // The same in grey, by straight edges, to the poses before both.
