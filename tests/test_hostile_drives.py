@@ -266,6 +266,16 @@ def test_the_filter_of_the_command_is_that_of_method(tmp_path: Path, capsys: pyt
     assert "method" in capsys.readouterr().err
 
 
+def test_an_image_centre_whose_doubt_leaves_the_mounting_undetermined_is_named() -> None:
+    drive = one("image centre off by 0.5 px", 410000)
+    calibrator = tiltvp.SelfCalibrator(**drive.options)
+    calibrator.follow(drive.odometry, drive.bearings)
+    for found in (tiltvp.calibrate(drive.odometry, drive.bearings, **drive.options).mounting, calibrator.estimate):
+        assert "not determined: phi, psi" in found.reason
+        assert found.suspect == "centre"
+
+
+
 def test_the_filter_of_the_command_has_the_centre_of_the_whole_log(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

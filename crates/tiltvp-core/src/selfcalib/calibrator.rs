@@ -116,7 +116,7 @@ impl SelfCalibrator {
         let start = &self.options.start_covariance;
         match &self.filter {
             Filter::SlidingWindow(filter) => {
-                let (mounting, covariance) = filter.mounting();
+                let ((mounting, covariance), examination) = (filter.mounting(), filter.examination());
                 let nis = filter.monitor().mean_nis();
                 MountingEstimate::new(
                     Mounting::from_vector(&mounting),
@@ -125,7 +125,8 @@ impl SelfCalibrator {
                     nis,
                     filter.monitor().alarmed(),
                 )
-                .judged(filter.examination().contradictions, filter.examination().suspect)
+                .judged(examination.contradictions, examination.suspect)
+                .doubting(examination.doubted_centre.as_ref(), &filter.covariance_by_centre(), start)
             }
             Filter::Paper(filter) => {
                 let Some((polar, covariance)) = filter.mounting() else {

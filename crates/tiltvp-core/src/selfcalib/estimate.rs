@@ -4,7 +4,7 @@ use std::fmt;
 
 use nalgebra::Matrix3;
 
-use super::diagnosis::{Contradictions, Suspect};
+use super::diagnosis::{Cause, Contradictions, Deviation, Suspect};
 use super::model::Mounting;
 use super::observability::Observability;
 
@@ -57,6 +57,18 @@ impl MountingEstimate {
     /// This estimate with what its solution says of the log.
     pub(crate) fn judged(self, contradictions: Contradictions, suspect: Option<Suspect>) -> Self {
         Self { contradictions, suspect, ..self }
+    }
+
+    /// This estimate with the image centre suspect, where its doubt alone is why not everything is determined: with the covariance
+    /// `known` of a centre as told, and that at the start, everything is.
+    pub(crate) fn doubting(self, centre: Option<&Deviation>, known: &Matrix3<f64>, start: &Matrix3<f64>) -> Self {
+        let determined = || Observability::new(&self.mounting, known, start).complete();
+        match centre {
+            Some(centre) if self.suspect.is_none() && !self.observability.complete() && determined() => {
+                Self { suspect: Some(Suspect { cause: Cause::Centre, value: centre.value }), ..self }
+            }
+            _ => self,
+        }
     }
 
     /// Whether the estimate can be relied upon: everything determined, no alarm, nothing suspected, finite.

@@ -7,6 +7,7 @@ use crate::selfcalib::model::{BearingLoss, OUTLIER_SIGMAS};
 
 /// What is assumed and may be otherwise.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) enum Assumed {
     Imbalance,
     WheelBase,
@@ -16,6 +17,7 @@ pub(crate) enum Assumed {
 
 /// What one of them would be if it were free.
 #[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) struct Deviation {
     pub(crate) of: Assumed,
     /// How far it is off: of the wheel base the logarithm, of the centre the distance.
@@ -33,11 +35,10 @@ pub(crate) struct Deviation {
 /// what 99.9 % are within, with this 5.
 const DOUBTED_CENTRE_SIGMAS: f64 = 2.0;
 
-/// The second moments of the mounting's error that a centre makes which is doubted. Noise has so many times the variance that is told.
-pub(crate) fn doubted_centre(deviations: &[Deviation], excess: f64) -> Option<Matrix3<f64>> {
+/// That of the image centre, where it is doubted. Noise has so many times the variance that is told.
+pub(crate) fn doubted_centre(deviations: &[Deviation], excess: f64) -> Option<&Deviation> {
     let mut of_centre = deviations.iter().filter(|deviation| deviation.of == Assumed::Centre);
-    let centre = of_centre.find(|deviation| deviation.sigmas > DOUBTED_CENTRE_SIGMAS * excess.sqrt())?;
-    Some(centre.scatter)
+    of_centre.find(|deviation| deviation.sigmas > DOUBTED_CENTRE_SIGMAS * excess.sqrt())
 }
 
 impl BundleProblem {

@@ -343,7 +343,9 @@ fn report(
     let deviations = pulled.deviations(&by_landmarks, factors.excess());
     let suspect = pulled.suspect(o, &counts, (factors, &deviations), &by_landmarks, motions.as_ref());
     let centre = doubted_centre(&deviations, factors.excess());
-    let mounting = with(landmarks.as_ref(), with(motions.as_ref(), with(centre.as_ref(), own)));
+    let widened_by = |centre| with(landmarks.as_ref(), with(motions.as_ref(), with(centre, own)));
+    let mounting = widened_by(centre.map(|centre| &centre.scatter));
+    let start = o.start_covariance * scale;
     let scatter = doubted.as_ref().map(DoubtedParts::scatter);
     let sigma = |at: usize| {
         let by_motions = scatter.as_ref().map_or(0.0, |scatter| scatter[(at, at)]);
@@ -354,11 +356,12 @@ fn report(
         estimate: MountingEstimate::new(
             Mounting::from_vector(&problem.mounting),
             mounting,
-            &(o.start_covariance * scale),
+            &start,
             Some(sum / kept.len().max(1) as f64),
             false,
         )
-        .judged(counts, suspect),
+        .judged(counts, suspect)
+        .doubting(centre, &widened_by(None), &start),
         wheels: problem.wheels,
         wheels_sigma: if free.wheels { [sigma(3), sigma(4) * problem.wheels.base_m] } else { [0.0; 2] },
         time_offset_s: problem.offset_s,

@@ -20,8 +20,8 @@ impl SlidingWindow {
         let factors = now.noise_factors();
         let deviations = now.deviations(&covariance, factors.excess());
         let suspect = now.suspect(&self.options, &counts, (factors, &deviations), &covariance, motion_scatter.as_ref());
-        let centre_scatter = doubted_centre(&deviations, factors.excess());
-        self.examination = Examination { contradictions: counts, suspect, motion_scatter, centre_scatter };
+        let doubted_centre = doubted_centre(&deviations, factors.excess()).cloned();
+        self.examination = Examination { contradictions: counts, suspect, motion_scatter, doubted_centre };
     }
 
     /// What the last examination found.

@@ -7,7 +7,7 @@ use super::tuning::HUBER_SIGMAS;
 use crate::error::Result;
 use crate::filter::ChiSquareGate;
 use crate::selfcalib::bundle::{BundleProblem, FreeParameters, widened};
-use crate::selfcalib::diagnosis::{Contradictions, Suspect};
+use crate::selfcalib::diagnosis::{Contradictions, Deviation, Suspect};
 use crate::selfcalib::model::{BearingLoss, InverseDistanceLandmark, Prediction, Viewpoint, WheelMotion};
 use crate::selfcalib::options::SelfCalibratorOptions;
 
@@ -26,9 +26,9 @@ pub(crate) struct Examination {
     pub(crate) suspect: Option<Suspect>,
     /// Covariance of the mounting that errors make which motions of a part of the drive share.
     pub(crate) motion_scatter: Option<Matrix3<f64>>,
-    /// The same that an image centre makes which is doubted.
+    /// That of the image centre, where it is doubted.
     #[cfg_attr(feature = "serde", serde(default))]
-    pub(crate) centre_scatter: Option<Matrix3<f64>>,
+    pub(crate) doubted_centre: Option<Deviation>,
 }
 
 /// An iterated extended Kalman filter on (pose, mounting, landmarks), and a sliding window of keyframes that is solved again, and
@@ -109,10 +109,19 @@ impl SlidingWindow {
             && problem.observations().all(|observation| observation.landmark < count)
     }
 
-    /// The mounting with its covariance: that of the last solution, where information gained since may be spurious, and widened
-    /// for errors that a landmark's bearings share, and for those that up to the last examination motions of the drive shared, or an
-    /// image centre made that is doubted.
+    /// The mounting with its covariance, as [`covariance_by_centre`](Self::covariance_by_centre) tells and widened for an image centre
+    /// that was doubted at the last examination.
     pub(crate) fn mounting(&self) -> (Vector3<f64>, Matrix3<f64>) {
+        let known = self.covariance_by_centre();
+        let doubted = self.examination.doubted_centre.as_ref();
+        let covariance = doubted.map_or(known, |centre| widened(&known, &centre.scatter));
+        (self.mean.fixed_rows::<3>(MOUNTING).into(), covariance)
+    }
+
+    /// The covariance of the mounting if the image centre is as told: that of the last solution, where information gained since may be
+    /// spurious, and widened for errors that a landmark's bearings share, and for those that up to the last examination motions of the
+    /// drive shared.
+    pub(crate) fn covariance_by_centre(&self) -> Matrix3<f64> {
         let mut covariance: Matrix3<f64> = self.covariance.fixed_view::<3, 3>(MOUNTING, MOUNTING).into();
         // A keyframe without bearings was not asked yet whether the window has to be solved.
         let unseen = self.problem.keyframes.last().is_some_and(|last| last.observations.is_empty());
@@ -120,11 +129,7 @@ impl SlidingWindow {
             covariance = widened(&covariance, &self.solved_covariance);
         }
         covariance = self.widening * covariance * self.widening.transpose();
-        let Examination { motion_scatter, centre_scatter, .. } = &self.examination;
-        for scatter in motion_scatter.iter().chain(centre_scatter) {
-            covariance = widened(&covariance, scatter);
-        }
-        (self.mean.fixed_rows::<3>(MOUNTING).into(), covariance)
+        self.examination.motion_scatter.as_ref().map_or(covariance, |scatter| widened(&covariance, scatter))
     }
 
     /// The number of landmarks that are followed.
