@@ -22,6 +22,8 @@ if TYPE_CHECKING:
 __all__ = ["CAMERA_KINDS", "camera_from_message", "recorded_camera", "robot_from_camera"]
 
 _TRANSFORMS, _STATIC = "tf2_msgs/TFMessage", "/tf_static"
+_ALIKE = 1e-6
+"""Radians by which transforms that were sent twice may differ: quaternions of floats of 32 bits do."""
 
 
 def recorded_camera(recording: Recording, topic: str | None = None, *, images: str | None = None) -> Camera:
@@ -99,34 +101,48 @@ def robot_from_camera(
     """The (3, 3) rotation R in v_robot = R v_camera by the static transforms of a recording.
 
     `camera_frame` is the optical frame, z ahead and x right; by default that of the headers of images, of `topic` or of
-    the only one. Raises `InvalidInputError` that names the frames there are, where they do not join the two.
+    the only one. Raises `InvalidInputError` that names the frames there are, where they do not join the two, and where
+    two transforms of one frame between them contradict each other.
     """
     if camera_frame is None:
         images = recording.choose(IMAGE_KINDS, "--topic", topic)
         camera_frame = str(next(content for _, content in recording.decoded(images)).header.frame_id)
     static = recording.choose((_TRANSFORMS,), _STATIC, _STATIC)
     parents: dict[str, tuple[str, NDArray[np.float64]]] = {}
+    several: set[str] = set()
     for _, content in recording.decoded(static):
         for one in content.transforms:
-            parents[_plain(one.child_frame_id)] = (_plain(one.header.frame_id), _rotation(one, str(recording.path)))
-    to_root, roots = {}, {}
-    for frame in (_plain(robot_frame), _plain(camera_frame)):
-        rotation, at = np.eye(3), frame
-        for _ in parents:
-            if at not in parents:
-                break
-            at, step = parents[at]
-            rotation = step @ rotation
-        to_root[frame], roots[frame] = rotation, at
+            frame, told = _plain(one.child_frame_id), (_plain(one.header.frame_id), _rotation(one, str(recording.path)))
+            first = parents.setdefault(frame, told)
+            if first[0] != told[0] or not np.allclose(first[1], told[1], atol=_ALIKE):
+                several.add(frame)
     robot, camera = _plain(robot_frame), _plain(camera_frame)
+    robot_up, camera_up = _up(robot, parents), _up(camera, parents)
+    common = next((frame for frame in camera_up if frame in robot_up), None)
     known = sorted({*parents, *(parent for parent, _ in parents.values())})
-    if roots[robot] != roots[camera] or robot not in known or camera not in known:
+    if common is None or robot not in known or camera not in known:
         raise InvalidInputError(
             f"{recording.path}: {_STATIC} does not join {robot!r} and {camera!r}, expected both among its frames: "
             + (", ".join(known) or "none")
         )
-    found: NDArray[np.float64] = to_root[robot].T @ to_root[camera]
+    for way in (robot_up, camera_up):
+        for frame in [*way][: [*way].index(common)]:
+            if frame in several:
+                raise InvalidInputError(
+                    f"{recording.path}: {_STATIC} has transforms of {frame!r} that contradict each other, expected one"
+                )
+    found: NDArray[np.float64] = robot_up[common].T @ camera_up[common]
     return found
+
+
+def _up(frame: str, parents: dict[str, tuple[str, NDArray[np.float64]]]) -> dict[str, NDArray[np.float64]]:
+    """A frame and those above it in turn, each with the rotation of the frame's vectors to it."""
+    up = {frame: np.eye(3)}
+    while frame in parents and parents[frame][0] not in up:
+        above, step = parents[frame]
+        up[above] = step @ up[frame]
+        frame = above
+    return up
 
 
 def _plain(frame: object) -> str:

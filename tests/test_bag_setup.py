@@ -1,0 +1,35 @@
+"""What recordings tell of their camera and its mounting."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+import tiltvp
+from recordings import Bag
+from tiltvp.errors import InvalidInputError
+from tiltvp.streams import Recording, robot_from_camera
+
+AHEAD = (0.5, -0.5, 0.5, -0.5)
+UP = (0.0, 0.0, 0.0, 1.0)
+
+
+@pytest.mark.parametrize("again", [("mast", UP), ("base_link", AHEAD)], ids=["turned", "elsewhere"])
+def test_transforms_that_contradict_each_other_are_refused(
+    again: tuple[str, tuple[float, ...]], tmp_path: Path
+) -> None:
+    made = Bag("mcap")
+    made.static("odom", "base_link", UP)
+    made.static("map", "base_link", AHEAD)
+    made.static("base_link", "mast", UP)
+    made.static("mast", "camera", AHEAD)
+    made.static("mast", "camera", AHEAD)
+    made.static("mast", "other", AHEAD)
+    parent, turn = again
+    made.static(parent, "other", turn)
+    recording = Recording(made.write(tmp_path))
+    with pytest.raises(InvalidInputError, match=r"/tf_static has transforms of 'other' that contradict each other"):
+        robot_from_camera(recording, camera_frame="other")
+    found = robot_from_camera(recording, camera_frame="camera")
+    assert found == pytest.approx(tiltvp.rotations.read_rotation("forward"), abs=1e-12), "sent twice, and apart"
