@@ -11,7 +11,7 @@ import pytest
 
 from recordings import START_S, Bag
 from tiltvp.errors import InvalidInputError
-from tiltvp.streams import read_odometry
+from tiltvp.streams import Odometry, read_odometry
 
 
 def test_headings_of_robots_that_lean_are_where_their_x_axis_points(tmp_path: Path) -> None:
@@ -44,3 +44,17 @@ def test_odometry_of_velocities_alone_is_no_robot_that_stands(tmp_path: Path) ->
                 read_odometry(bag)
         else:
             assert read_odometry(bag).distance_m.max() == 0.0
+
+
+@pytest.mark.parametrize("anew", [(3.0, 0.0), (1.2, 0.0), (0.0, 2.0)], ids=["far", "near", "turned"])
+@pytest.mark.parametrize("hz", [5.0, 20.0])
+def test_poses_that_were_set_anew_are_told(hz: float, anew: tuple[float, float]) -> None:
+    times = np.arange(0.0, 12.0, 1.0 / hz)
+    speeds = 0.5 * np.clip(times - 1.0, 0.0, 1.0)
+    ways, turns = np.cumsum(speeds) / hz, np.cumsum(np.where(times > 6.0, 0.8, 0.0)) / hz
+    late = times + np.where(np.arange(len(times)) % 3 == 1, 0.5 / hz, 0.0)
+    assert Odometry(late, ways, turns).jumps is None, "a robot that starts, and messages that are late"
+    after = times > 8.0
+    jumps = Odometry(late, ways - anew[0] * after, turns + anew[1] * after).jumps
+    assert jumps is not None
+    assert "1 step that no robot makes, the first after 8." in jumps

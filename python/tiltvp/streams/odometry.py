@@ -28,6 +28,11 @@ degrees, make less. A frame that is 5 cm off the axle moves by 31 cm in a turn."
 _FASTEST_M_S: Final = 50.0
 _FASTEST_RAD_S: Final = 50.0
 """Beyond any vehicle that carries such a camera: twice a car on a motorway, eight turns a second."""
+_JUMP: Final = 0.2
+_JUMP_PER_S2: Final = 10.0
+_JUMP_SHARE: Final = 3.0
+"""Metres or radians of a step that jumps, as of a pose that was set anew, beyond so many steps as those around it
+(messages may be late) and what tyres of friction 1 speed up by. A localisation corrects itself by less."""
 _LOST: Final = 3.0
 """Steps of time by so many of which two samples are apart where some between them are lost: clocks jitter by less."""
 
@@ -245,7 +250,8 @@ class Odometry:
         steps_s = np.maximum(steps_s, np.median(steps_s))
         speeds = np.abs(np.diff(self.distance_m)) / steps_s
         rates = np.zeros(len(steps_s)) if self.yaw_rad is None else np.abs(np.diff(self.yaw_rad)) / steps_s
-        places = np.flatnonzero((speeds > _FASTEST_M_S) | (rates > _FASTEST_RAD_S))
+        odd = (speeds > _FASTEST_M_S) | (rates > _FASTEST_RAD_S) | _jumps(speeds, steps_s) | _jumps(rates, steps_s)
+        places = np.flatnonzero(odd)
         if not len(places):
             return None
         first = int(places[0])
@@ -254,6 +260,14 @@ class Odometry:
             f"{self.times_s[first]:.3f} s by {speeds[first]:.3g} m/s and {rates[first]:.3g} rad/s: "
             "was it set anew, or is it in other units?"
         )
+
+
+def _jumps(speeds: NDArray[np.float64], steps_s: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """(N,): whether a step of this speed and time is far longer than the two before and the two after it let expect."""
+    around = np.median(np.lib.stride_tricks.sliding_window_view(np.pad(speeds, 2, mode="reflect"), 5), axis=1)
+    most = _JUMP + (_JUMP_SHARE * around + _JUMP_PER_S2 * steps_s) * steps_s
+    jumps: NDArray[np.bool_] = speeds * steps_s > most
+    return jumps
 
 
 def _gap_from(gap_max_s: float) -> float:
