@@ -11,7 +11,7 @@ import pytest
 
 from recordings import START_S, Bag
 from tiltvp.errors import InvalidInputError
-from tiltvp.streams import Odometry, read_odometry
+from tiltvp.streams import Odometry, frame_motions, open_frames, read_odometry
 
 
 def test_headings_of_robots_that_lean_are_where_their_x_axis_points(tmp_path: Path) -> None:
@@ -58,3 +58,21 @@ def test_poses_that_were_set_anew_are_told(hz: float, anew: tuple[float, float])
     jumps = Odometry(late, ways - anew[0] * after, turns + anew[1] * after).jumps
     assert jumps is not None
     assert "1 step that no robot makes, the first after 8." in jumps
+
+
+@pytest.mark.parametrize("back_s", [0.15, 2.0])
+def test_images_of_a_clock_that_was_set_back_have_no_odometry(back_s: float, tmp_path: Path) -> None:
+    """The robot would drive backwards where it was set back."""
+    made = Bag("mcap")
+    for k in range(100):
+        made.odometry(START_S + 0.1 * k, 0.1 * k, 0.0, 0.0)
+    for k in range(20):
+        behind = back_s if k >= 12 else 0.0
+        made.image("/image", START_S + 3.0 + 0.2 * k - behind, np.zeros((4, 4), np.uint8), "mono8", late_s=behind)
+    bag = made.write(tmp_path)
+    frames = open_frames(bag)
+    if back_s < 1.0:
+        assert frame_motions(frames, bag).motions[12] is not None, "messages that overtake each other"
+        return
+    with pytest.raises(InvalidInputError, match=r"its clock goes back from 1700000005\.200 to 1700000003\.400 s"):
+        frame_motions(frames, bag)

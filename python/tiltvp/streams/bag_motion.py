@@ -11,7 +11,7 @@ import numpy as np
 from tiltvp.errors import InvalidInputError
 from tiltvp.streams.bags import Recording, Topic
 from tiltvp.streams.inertial import InertialSamples
-from tiltvp.streams.odometry import GAP_MAX_S, Odometry
+from tiltvp.streams.odometry import Odometry, refuse_set_back
 from tiltvp.streams.wheels import Wheels, cumulative_m
 
 if TYPE_CHECKING:
@@ -178,11 +178,6 @@ def _rising(table: NDArray[np.float64], source: str) -> NDArray[np.float64]:
             f"{source}: {len(bad)} of {len(table)} messages with numbers that are not finite, the first at "
             f"{table[bad[0], 0]:.3f} s, expected finite numbers"
         )
-    falls = np.flatnonzero(np.diff(table[:, 0]) < -GAP_MAX_S)
-    if len(falls):
-        before, after = table[falls[0] : falls[0] + 2, 0]
-        raise InvalidInputError(
-            f"{source}: its clock goes back from {before:.3f} to {after:.3f} s, expected one that does not"
-        )
+    refuse_set_back(table[:, 0], source)
     order = np.unique(table[:, 0], return_index=True)[1]
     return table[order]

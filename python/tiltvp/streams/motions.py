@@ -14,7 +14,7 @@ from tiltvp.drive_logs import DriveLog, doubled_rows
 from tiltvp.errors import InvalidInputError
 from tiltvp.streams.bags import Recording, is_recording
 from tiltvp.streams.frames import Frames
-from tiltvp.streams.odometry import Motion, Odometry
+from tiltvp.streams.odometry import Motion, Odometry, refuse_set_back
 from tiltvp.streams.odometry_tables import OdometryTable
 from tiltvp.streams.wheels import Wheels
 
@@ -174,6 +174,7 @@ def _summed(motions: Sequence[Motion], turns_known: bool, source: str) -> Odomet
 def _interpolated(frames: Frames, odometry: Odometry) -> FrameMotions:
     if frames.times_s is None or frames.names is None:
         raise InvalidInputError(f"{frames.source}: no times of the images, expected them for {odometry.source}")
+    refuse_set_back(frames.times_s, frames.source)
     told, gaps = odometry.missing(frames.times_s, frames.names), odometry.gaps(frames.times_s)
     motions = odometry.motions(frames.times_s)
     if not any(motion is not None for motion in motions):

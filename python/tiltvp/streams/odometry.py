@@ -277,6 +277,16 @@ def _gap_from(gap_max_s: float) -> float:
     return gap_max_s
 
 
+def refuse_set_back(times_s: NDArray[np.float64], source: str) -> None:
+    """Raises `InvalidInputError` where times (N,) go back by more than messages overtake each other."""
+    falls = np.flatnonzero(np.diff(times_s) < -GAP_MAX_S)
+    if len(falls):
+        before, after = times_s[falls[0] : falls[0] + 2]
+        raise InvalidInputError(
+            f"{source}: its clock goes back from {before:.3f} to {after:.3f} s, expected one that does not"
+        )
+
+
 def finite_array(of: Any, name: str, shape: tuple[int, ...]) -> None:
     """Makes a field of a frozen record an array of finite numbers of that shape. Raises `InvalidInputError`."""
     values = array_from(getattr(of, name), f"{of.source}: {name}")
