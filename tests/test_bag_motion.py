@@ -11,7 +11,7 @@ import pytest
 
 from recordings import START_S, Bag
 from tiltvp.errors import InvalidInputError
-from tiltvp.streams import Odometry, frame_motions, open_frames, read_odometry
+from tiltvp.streams import Odometry, Wheels, frame_motions, open_frames, read_odometry
 
 
 def test_headings_of_robots_that_lean_are_where_their_x_axis_points(tmp_path: Path) -> None:
@@ -76,3 +76,23 @@ def test_images_of_a_clock_that_was_set_back_have_no_odometry(back_s: float, tmp
         return
     with pytest.raises(InvalidInputError, match=r"its clock goes back from 1700000005\.200 to 1700000003\.400 s"):
         frame_motions(frames, bag)
+
+
+@pytest.mark.parametrize("still", [{"left_wheel"}, {"left_wheel", "right_wheel"}], ids=["one", "both"])
+def test_wheels_that_stand_beside_velocities_of_theirs_are_no_robot_that_stands(
+    still: set[str], tmp_path: Path
+) -> None:
+    names = ["left_wheel", "right_wheel"]
+    for moves in (True, False):
+        made = Bag("mcap")
+        for k in range(20):
+            made.joints(START_S + 0.1 * k, names, [0.0 if name in still else 0.2 * k for name in names])
+            made.rows[-1][3].velocity = np.array([2.0 if moves or name not in still else 0.0 for name in names])
+        (tmp_path / f"{moves}").mkdir()
+        bag = made.write(tmp_path / f"{moves}")
+        if not moves:
+            assert read_odometry(bag, wheels=Wheels(wheel_radius_m=0.1)).wheels_m is not None
+            continue
+        told = r"/joint_states: angles of left_wheel that never change beside velocities of up to 2 m/s or rad/s"
+        with pytest.raises(InvalidInputError, match=told):
+            read_odometry(bag, wheels=Wheels(wheel_radius_m=0.1))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Set
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
@@ -46,10 +47,9 @@ def bag_odometry(recording: Recording, topic: str | None, wheels: Wheels) -> Odo
     for k, (time_s, content) in enumerate(recording.decoded(chosen)):
         rows.append((time_s, *_values(content, chosen.kind, f"{where} {k}")))
         fastest = max(fastest, *map(abs, _velocity(content)))
-    if chosen.kind == _POSES and len({row[1:] for row in rows}) == 1 and fastest > _MOVES:
-        raise InvalidInputError(
-            f"{more['source']}: poses that never change beside velocities of up to {fastest:.3g} m/s or rad/s, "
-            "expected a topic of poses, or one of Twist"
+    if chosen.kind == _POSES:
+        _refuse_standing(
+            {row[1:] for row in rows}, fastest, more["source"], "poses", "a topic of poses, or one of Twist"
         )
     more["notes"] = recording.unread(chosen, len(rows))
     table = _rising(np.array(rows, dtype=np.float64), more["source"])
@@ -87,13 +87,22 @@ def _velocity(content: Any) -> tuple[float, float]:
     return twist.linear.x, twist.angular.z
 
 
+def _refuse_standing(values: Set[object], fastest: float, source: str, what: str, expected: str) -> None:
+    """Refuses what has one value, as where nobody fills it in, beside velocities of up to `fastest`."""
+    if len(values) == 1 and fastest > _MOVES:
+        raise InvalidInputError(
+            f"{source}: {what} that never change beside velocities of up to {fastest:.3g} m/s or rad/s, "
+            f"expected {expected}"
+        )
+
+
 def _from_joints(recording: Recording, topic: Topic, wheels: Wheels) -> Odometry:
     source = f"{recording.path} {topic.name}"
     if wheels.wheel_radius_m is None:
         raise InvalidInputError(f"{source}: angles of wheels, expected their radius by --wheel-radius")
     rows: list[tuple[float, float, float]] = []
     names: tuple[str, str] | None = None
-    count = 0
+    count, fastest = 0, [0.0, 0.0]
     for time_s, content in recording.decoded(topic):
         count += 1
         if names is None or not set(names) <= set(content.name):
@@ -106,9 +115,15 @@ def _from_joints(recording: Recording, topic: Topic, wheels: Wheels) -> Odometry
         if not set(names) <= set(angles):
             raise InvalidInputError(f"{source}: no positions of {' and '.join(names)}, expected the angles of wheels")
         rows.append((time_s, angles[names[0]], angles[names[1]]))
+        speeds = dict(zip(content.name, np.asarray(content.velocity).tolist(), strict=False))
+        fastest = [max(most, abs(speeds.get(name, 0.0))) for most, name in zip(fastest, names, strict=True)]
     if names is None:
         seen = sorted({name for _, content in recording.decoded(topic) for name in content.name})
         _wheel_joints(seen, wheels.joints, source, must=True)
+    for k, name in enumerate(names or ()):
+        _refuse_standing(
+            {row[k + 1] for row in rows}, fastest[k], source, f"angles of {name}", "those of a wheel that turns"
+        )
     table = _rising(np.array(rows, dtype=np.float64), source)
     rolled, notes = cumulative_m(table[:, 1:], 2.0 * np.pi, wheels.wheel_radius_m, source)
     notes = (*recording.unread(topic, count), *notes)
