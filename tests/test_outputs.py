@@ -20,9 +20,10 @@ import tiltvp
 from tiltvp import Camera, Extrinsics, Robot
 from tiltvp._core import leaning_from_upright
 from tiltvp.cli import main
-from tiltvp.errors import InvalidInputError, MissingExtraError, OutputError, TiltvpError
+from tiltvp.cli.options import rotation_of as mounting_of
+from tiltvp.errors import CalibrationError, InvalidInputError, MissingExtraError, OutputError, TiltvpError
 from tiltvp.lab.datasets.panoramas import paper_camera
-from tiltvp.rotations import read_rotation
+from tiltvp.rotations import about_vertical, read_rotation
 from tiltvp.streams.outputs.tilts import TILT_TOPIC, YAW_VARIANCE_RAD2, attitude, write_tilts
 from tiltvp.streams.outputs.transforms import StaticTransform
 from tiltvp.synth import render_room, simulate_drive
@@ -316,3 +317,15 @@ def test_times_that_no_stamp_can_be_are_refused_before_any_work(
     assert "a.mcap: times_s[0] = -1.0, expected seconds from 0 to 2^31, or --frame-rate\n" in capsys.readouterr().err
     assert os.listdir(tmp_path) == ["drive"]
     assert main([*words, "--out", str(tmp_path / "a.mcap"), "--frame-rate", "5"]) == 0
+
+
+@pytest.mark.parametrize("ending", [".yaml", ".mcap"])
+def test_a_transform_is_read_as_the_mounting(ending: str, tmp_path: Path) -> None:
+    rotation = about_vertical(0.3) @ read_rotation("forward")
+    place = np.array([0.1, 0.2, 0.3])
+    known, not_known = tmp_path / f"known{ending}", tmp_path / f"not_known{ending}"
+    StaticTransform("robot", "eye", place, rotation).write(known)
+    assert mounting_of(str(known)) == pytest.approx(rotation, abs=1e-5)
+    StaticTransform("robot", "camera_mount", place, rotation, missing=("z", "roll", "pitch")).write(not_known)
+    with pytest.raises(CalibrationError, match="roll and pitch among not_known, expected a rotation that is known"):
+        mounting_of(str(not_known))

@@ -29,6 +29,7 @@ __all__ = [
     "quaternion",
     "read_rotation",
     "rotation_from",
+    "rotation_from_document",
     "rotation_from_quaternion",
 ]
 
@@ -39,6 +40,8 @@ ROTATION_WORDS: Final[dict[str, tuple[tuple[float, float, float], ...]]] = {
 """`up`: the camera looks up, image columns point forward. `forward`: it looks forward, image rows point down."""
 
 _KEYS: Final = ("robot_from_camera", "quaternion")
+_NOT_KNOWN: Final = "not_known"
+"""Of a transform's file: what of it is 0 as nobody knows it."""
 _EXPECTED: Final = (
     "nine numbers in rows, or the key robot_from_camera with a 3x3 matrix, or the key quaternion with [x, y, z, w]"
 )
@@ -76,7 +79,8 @@ def read_rotation(source: str | os.PathLike[str]) -> Matrix:
     """The (3, 3) rotation `R` of v_robot = R v_camera that a word of `ROTATION_WORDS` or a file names.
 
     A file is nine numbers as text (white space or commas), or JSON, TOML or YAML with the key `robot_from_camera`, or
-    `quaternion` in the order [x, y, z, w]; or a robot's file, of `tiltvp setup`. What is within 1e-3 of a rotation is
+    `quaternion` in the order [x, y, z, w] or with these names, as the .yaml of `StaticTransform` has it; or a robot's
+    file, of `tiltvp setup`. What is within 1e-3 of a rotation is
     taken as the nearest rotation. Raises `CalibrationError` with the file, what is wrong and what was expected;
     `InvalidInputError` for an unknown word.
     """
@@ -87,13 +91,17 @@ def read_rotation(source: str | os.PathLike[str]) -> Matrix:
         raise _missing(str(source), is_word=file.name == str(source) and not file.suffix)
     if file.is_dir():
         raise CalibrationError(f"{file}: is a folder, expected a file with a rotation")
-    document = Document.load(file)
+    return rotation_from_document(Document.load(file))
+
+
+def rotation_from_document(document: Document) -> Matrix:
+    """The (3, 3) rotation of what is written in a file. Raises as `read_rotation` does."""
     numbers = _plain_numbers(document.text)
     if numbers is not None:
         if len(numbers) != 9:
-            raise CalibrationError(f"{file}: {len(numbers)} numbers, expected {_EXPECTED}")
-        return _rotation(np.reshape(numbers, (3, 3)), file)
-    return _from_keys(file, _tree(document))
+            raise CalibrationError(f"{document.path}: {len(numbers)} numbers, expected {_EXPECTED}")
+        return _rotation(np.reshape(numbers, (3, 3)), document.path)
+    return _from_keys(document.path, _tree(document))
 
 
 def rotation_from(value: object, where: str) -> Matrix:
@@ -164,10 +172,13 @@ def _from_keys(file: Path, tree: dict[str, object]) -> Matrix:
     if len(found) != 1:
         what = "both keys" if found else f"the keys {', '.join(list(tree)[:6])}"
         raise CalibrationError(f"{file}: {what}, expected one of the keys {' and '.join(_KEYS)}")
+    unknown = [name for name in ("roll", "pitch") if name in str(tree.get(_NOT_KNOWN))]
+    if unknown:
+        raise CalibrationError(f"{file}: {' and '.join(unknown)} among {_NOT_KNOWN}, expected a rotation that is known")
     key = found[0]
     value = tree[key]
     if isinstance(value, dict):
-        value = value.get("data", value)
+        value = list(value.values()) if [*value] == [*"xyzw"] else value.get("data", value)
     array = _array(f"{file}: {key}", value)
     if array.shape == (4,):
         return rotation_from_quaternion(array, f"{file}: {key}")

@@ -12,9 +12,10 @@ from tiltvp.cameras import Camera
 from tiltvp.errors import CalibrationError, InvalidInputError
 from tiltvp.formats.document import Document
 from tiltvp.formats.ros import parse
-from tiltvp.rotations import rotation_from_quaternion
+from tiltvp.rotations import rotation_from_document, rotation_from_quaternion
 from tiltvp.streams.bag_images import CAMERA_KINDS, IMAGE_KINDS, is_rectified
 from tiltvp.streams.bags import Recording
+from tiltvp.streams.outputs.transforms import TRANSFORM_TOPIC
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -101,9 +102,14 @@ def robot_from_camera(
     """The (3, 3) rotation R in v_robot = R v_camera by the static transforms of a recording.
 
     `camera_frame` is the optical frame, z ahead and x right; by default that of the headers of images, of `topic` or of
-    the only one. Raises `InvalidInputError` that names the frames there are, where they do not join the two, and where
-    two transforms of one frame between them contradict each other.
+    the only one; of a file without images that `StaticTransform.write` has written it is that of the transform. Raises
+    `InvalidInputError` that names the frames there are, where they do not join the two, and where two transforms of one
+    frame between them contradict each other.
     """
+    written = [one for one in recording.topics if one.name == TRANSFORM_TOPIC]
+    if camera_frame is None and written and not any(one.kind in IMAGE_KINDS for one in recording.topics):
+        text = str(next(content for _, content in recording.decoded(written[0])).data)
+        return rotation_from_document(Document(recording.path, text))
     if camera_frame is None:
         images = recording.choose(IMAGE_KINDS, "--topic", topic)
         camera_frame = str(next(content for _, content in recording.decoded(images)).header.frame_id)

@@ -21,8 +21,17 @@ if TYPE_CHECKING:
 
     Matrix = NDArray[np.float64]
 
-__all__ = ["COVARIANCE_AXES", "TRANSFORM_ENDINGS", "StaticTransform", "check_frames", "check_transform"]
+__all__ = [
+    "COVARIANCE_AXES",
+    "TRANSFORM_ENDINGS",
+    "TRANSFORM_TOPIC",
+    "StaticTransform",
+    "check_frames",
+    "check_transform",
+]
 
+TRANSFORM_TOPIC: Final = "/tiltvp/static_transform"
+"""Of a recording that `StaticTransform.write` writes: what its `yaml` is on."""
 TRANSFORM_ENDINGS: Final = (".mcap", ".urdf", ".kalibr.yaml", ".yaml")
 """Of the files that `StaticTransform.write` writes."""
 COVARIANCE_AXES: Final = ("x", "y", "roll", "pitch", "yaw")
@@ -147,7 +156,7 @@ class StaticTransform:
                 one = messages.transform(0, self.parent, self.child, self.translation_m, self.rotation)
                 with new_recording(path) as recording:
                     recording.write("/tf_static", 0, messages.transforms([one]), latched=True)
-                    recording.write("/tiltvp/static_transform", 0, messages.text(self.yaml()), latched=True)
+                    recording.write(TRANSFORM_TOPIC, 0, messages.text(self.yaml()), latched=True)
 
 
 def check_frames(parent: str, child: str) -> None:
