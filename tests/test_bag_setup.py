@@ -7,9 +7,9 @@ from pathlib import Path
 import pytest
 
 import tiltvp
-from recordings import Bag
-from tiltvp.errors import InvalidInputError
-from tiltvp.streams import Recording, robot_from_camera
+from recordings import START_S, Bag
+from tiltvp.errors import CalibrationError, InvalidInputError
+from tiltvp.streams import Recording, recorded_camera, robot_from_camera
 
 AHEAD = (0.5, -0.5, 0.5, -0.5)
 UP = (0.0, 0.0, 0.0, 1.0)
@@ -33,3 +33,15 @@ def test_transforms_that_contradict_each_other_are_refused(
         robot_from_camera(recording, camera_frame="other")
     found = robot_from_camera(recording, camera_frame="camera")
     assert found == pytest.approx(tiltvp.rotations.read_rotation("forward"), abs=1e-12), "sent twice, and apart"
+
+
+@pytest.mark.parametrize("fifth", [0.0, 0.01])
+def test_drivers_of_fisheyes_write_a_fifth_zero(fifth: float, tmp_path: Path) -> None:
+    made, lens = Bag("mcap"), [0.01, -0.02, 0.003, -0.001]
+    made.camera_info(START_S, 64, 48, "equidistant", [*lens, fifth], [30.0, 0, 31.5, 0, 30, 23.5, 0, 0, 1])
+    recording = Recording(made.write(tmp_path))
+    if fifth:
+        with pytest.raises(CalibrationError, match="more than four coefficients are not supported"):
+            recorded_camera(recording)
+    else:
+        assert [recorded_camera(recording).parameters[f"k{k}"] for k in (1, 2, 3, 4)] == lens

@@ -52,9 +52,12 @@ def mei(node: Node | None) -> Parameters:
     return dict(zip(_BROWN, node.numbers(0, 4, 5), strict=False))
 
 
-def kannala_brandt(node: Node) -> Parameters:
-    """k1 k2 k3 k4 of theta + k1 theta^3 + k2 theta^5 + k3 theta^7 + k4 theta^9."""
-    return dict(zip(("k1", "k2", "k3", "k4"), node.numbers(4), strict=True))
+def kannala_brandt(node: Node, *more: int) -> Parameters:
+    """k1 k2 k3 k4 of theta + k1 theta^3 + k2 theta^5 + k3 theta^7 + k4 theta^9, and zeros where there may be `more`."""
+    values = node.numbers(4, *more)
+    if any(values[4:]):
+        node.refuse("more than four coefficients are not supported", "zeros after the fourth")
+    return dict(zip(("k1", "k2", "k3", "k4"), values, strict=False))
 
 
 def unified_from_alpha(node: Node, fx: float, fy: float, alpha: float) -> Parameters:

@@ -1,8 +1,8 @@
 """ROS camera_info, as the YAML of camera_calibration_parsers or as a printed sensor_msgs/CameraInfo.
 
 `K` and the coefficients describe the raw image, so rectification, projection, binning and region are not looked at.
-`plumb_bob` is k1 k2 p1 p2 [k3], `rational_polynomial` OpenCV's eight, `equidistant` and `fisheye` cv::fisheye's four.
-Pixel centres are at integers, as in image_geometry and OpenCV.
+`plumb_bob` is k1 k2 p1 p2 [k3], `rational_polynomial` OpenCV's eight, `equidistant` and `fisheye` cv::fisheye's four,
+to which drivers add a zero. Pixel centres are at integers, as in image_geometry and OpenCV.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ def parse(document: Document, image_size: ImageSize | None) -> list[CameraSpec]:
     coefficients = root.get(*_COEFFICIENTS)
     values = without_skew(root.need(*_MATRIX), f"the distortion model {word!r}")
     if word in _FISHEYE:
-        values |= kannala_brandt(root.need(*_COEFFICIENTS))
+        values |= kannala_brandt(root.need(*_COEFFICIENTS), 5)
         return [root.spec("kannala_brandt", size, values, title)]
     if word not in _BROWN:
         known = [*_FISHEYE, *(key for key in _BROWN if key)]
