@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import shutil
 import subprocess
 import sys
 import tomllib
@@ -47,6 +48,25 @@ def test_the_workflows_run_the_commands_of_the_readme() -> None:
     steps = [step.get("run") for step in jobs["test"]["steps"]]
     assert len(commands) == 2
     assert [command for command in commands if command not in steps] == []
+
+
+def test_links_of_the_readme_lead_somewhere_from_a_package_index(tmp_path: Path) -> None:
+    """Wheels and sdist are built with it; whether the files are there test_readme knows of the relative ones."""
+    for name in ("README.md", "pyproject.toml"):
+        shutil.copy(ROOT / name, tmp_path)
+    for _ in range(2):  # Once more changes nothing.
+        subprocess.run([sys.executable, str(ROOT / "crates" / "tiltvp-py" / "readme.py"), str(tmp_path)], check=True)
+        links = re.findall(r"(!?)\[[^]]*\]\(([^)]*)\)", (tmp_path / "README.md").read_text(encoding="utf-8"))
+        assert len(links) > 20
+        assert [link for _, link in links if not link.startswith("https://")] == []
+        home = "https://github.com/tiltvp/tiltvp/"
+        assert [link for is_picture, link in links if is_picture] == [f"{home}raw/main/docs/images/demo.png"]
+        assert ("", f"{home}blob/main/docs/tilt.md") in links
+    jobs = yaml.safe_load((WORKFLOWS / "wheels.yml").read_text(encoding="utf-8"))["jobs"]
+    for job in ("build", "sdist"):
+        steps = [step.get("run", step.get("uses")) for step in jobs[job]["steps"]]
+        before = steps[next(k for k, step in enumerate(steps) if step.startswith("PyO3/maturin")) - 1]
+        assert before.endswith("crates/tiltvp-py/readme.py")
 
 
 def test_every_wheel_is_tried_before_it_is_published() -> None:
