@@ -7,6 +7,7 @@ from pathlib import Path
 from tiltvp.cli.lab.tables import show_frame
 from tiltvp.cli.options import AtLeast0
 from tiltvp.cli.terminal import progress_bar
+from tiltvp.errors import InvalidInputError, counted
 
 
 def body(
@@ -46,6 +47,9 @@ def body(
     buildings = list({panorama.location: panorama for panorama in found}.values())
     places = [place for _ in range(rooms) for place in PLACES]
     total = len(CAMERAS) * IMAGES * (len(places) + len(buildings) // IMAGES)
+    if not total:
+        told = "no folder" if directory is None else f"{counted(len(buildings), 'buildings')} in {directory}"
+        raise InvalidInputError(f"--rooms {rooms} and {told}, expected rooms, or panoramas of {IMAGES} buildings")
     with progress_bar(total, "images") as bar:
         sources = {"drives": drives(places, seed, advance=bar.advance)}
         if buildings:

@@ -9,11 +9,12 @@ from cyclopts import Parameter
 
 from tiltvp.cli.lab.measure_options import Saved
 from tiltvp.cli.lab.tables import show_frame
-from tiltvp.cli.options import ALL_CORES, AtLeast0, AtLeast1, Threads
+from tiltvp.cli.options import ALL_CORES, AtLeast0, AtLeast1, Threads, check_word
 from tiltvp.cli.tables import check_ending, write_frame
 from tiltvp.cli.terminal import progress_bar
 from tiltvp.errors import InvalidInputError
 
+_TRAJECTORIES = ("paper", "alternating")
 _LINES = (1, 2, 5, 10, 20)
 """How many vertical lines are seen, for how soon a calibration is right."""
 
@@ -46,8 +47,8 @@ def calibration(
 
     from tiltvp.lab.evaluation.calibration import (
         LOG_PARTS,
-        LOGS,
         convergence,
+        read_logs,
         real_logs,
         simulated_drives,
         summarise_drives,
@@ -57,12 +58,12 @@ def calibration(
     check_ending(out)
     drives = [
         (kind, method)
-        for kind in ("paper", "alternating")
+        for kind in _TRAJECTORIES
         for method in ("default", "paper")
         if only in f"simulated {kind} {method}"
     ]
-    counted = [kind for kind in ("paper", "alternating") if only in f"lines {kind}"]
-    logs = [name for name in LOGS if only in name] if odometry is not None else []
+    counted = [kind for kind in _TRAJECTORIES if only in f"lines {kind}"]
+    logs = [] if odometry is None else read_logs(odometry, only=only)
     if not drives and not counted and not logs:
         raise InvalidInputError(f'--only {only}: no part of that name, expected for example "simulated" or "victoria"')
     if out is not None and not drives:
@@ -85,9 +86,9 @@ def calibration(
         with progress_bar(len(counted) * len(_LINES) * few, "drives") as bar:
             rows = [convergence(kind, lines, few, advance=bar.advance) for kind in counted for lines in _LINES]
         show_frame("How far to drive until errors stay below 10 mm and 0.5 degrees", pl.DataFrame(rows), ["trajectory"])
-    if odometry is not None and logs:
+    if logs:
         with progress_bar(LOG_PARTS * len(logs), "logs") as bar:
-            table = real_logs(odometry, only=only, advance=bar.advance)
+            table = real_logs(logs, advance=bar.advance)
         show_frame("Real logs: error against the nominal mounting", table, ["log"])
 
 
@@ -119,6 +120,7 @@ def calibration_images(
     from tiltvp.lab.evaluation.calibration_images import PictureExperiment, picture_drives
 
     check_ending(out)
+    check_word("--trajectory", trajectory, _TRAJECTORIES)
     experiment = PictureExperiment(
         kinds=kinds, leans_max_deg=leans_deg, drives=drives, seed=seed, trajectory=trajectory
     )

@@ -63,6 +63,8 @@ def corners(
     experiment = CornerExperiment(frames=frames, scenes=chosen, seed=seed) if frames else None
     if experiment is None and (scenes or rooms or out is not None):
         raise InvalidInputError("--scenes, --rooms and --out with --frames 0, expected frames")
+    if experiment is None and not poses and not noisy_poses:
+        raise InvalidInputError("--poses 0, --noisy-poses 0 and --frames 0, expected some of them")
     if out is not None:
         check_output_folder(out)
     if poses:

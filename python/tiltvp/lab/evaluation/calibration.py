@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -21,10 +21,8 @@ if TYPE_CHECKING:
 
     from tiltvp.synth import SimulatedDrive
 
-__all__ = ["LOGS", "LOG_PARTS", "convergence", "real_logs", "simulated_drives", "summarise_drives"]
+__all__ = ["LOG_PARTS", "convergence", "read_logs", "real_logs", "simulated_drives", "summarise_drives"]
 
-LOGS = ("victoria_park", "victoria_park", "brenner_lego", "censi lstraight", "censi l90", "censi lmov")
-"""The real logs, one with two starts."""
 LOG_PARTS = 3
 """Answers for each log: the filter's, the whole log's, and that with the wheels estimated too."""
 _WHOLE_DRIVE = 100_000
@@ -156,14 +154,13 @@ def _wrapped(angle: float) -> float:
     return math.remainder(angle, math.tau)
 
 
-def real_logs(folder: Path, *, only: str = "", advance: Callable[[], None] = lambda: None) -> pl.DataFrame:
-    """Victoria Park from two starts, the LEGO robot, and Censi's three mountings, by the filter and from the whole log.
+def real_logs(logs: Sequence[Log], *, advance: Callable[[], None] = lambda: None) -> pl.DataFrame:
+    """Each log by the filter and from the whole log: errors against the nominal mounting in mm and degrees.
 
-    `folder` holds victoria_park, brenner_lego and censi_khepera. Errors against the nominal mounting in mm and degrees.
-    `only` picks the logs whose names hold it; `advance` is called `LOG_PARTS` times for each.
+    `advance` is called `LOG_PARTS` times for each.
     """
     rows = []
-    for name, start, odometry, bearings, truth, options in _logs(folder, only):
+    for name, start, odometry, bearings, truth, options in logs:
         calibrator = SelfCalibrator(**options, start=start, keyframes_max=_WHOLE_DRIVE)
         calibrator.follow(odometry, bearings)
         rows.append(_row(name, "filter", calibrator.estimate, truth))
@@ -184,12 +181,20 @@ def real_logs(folder: Path, *, only: str = "", advance: Callable[[], None] = lam
     return pl.DataFrame(rows, infer_schema_length=None)
 
 
-_Log = tuple[
+Log = tuple[
     str, tuple[float, float, float], "NDArray[np.float64]", "NDArray[np.float64]", "NDArray[np.float64]", dict[str, Any]
 ]
 
 
-def _logs(folder: Path, only: str) -> Iterator[_Log]:
+def read_logs(folder: Path, *, only: str = "") -> list[Log]:
+    """Victoria Park from two starts, the LEGO robot, and Censi's three mountings: those whose names hold `only`.
+
+    `folder` holds victoria_park, brenner_lego and censi_khepera. Raises `InvalidInputError` for what is not there.
+    """
+    return list(_logs(folder, only))
+
+
+def _logs(folder: Path, only: str) -> Iterator[Log]:
     for name, starts, options in (
         (
             "victoria_park",
@@ -235,7 +240,7 @@ def _records(path: Path) -> list[dict[str, Any]]:
     return found
 
 
-def _censi(folder: Path, name: str) -> _Log:
+def _censi(folder: Path, name: str) -> Log:
     """A log of wheel rates, with bearings of invented landmarks as the sensor's recorded motions have them.
 
     The landmarks stand still against the sensor's recorded path, all seen from every pose; what the scan matcher got

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import polars as pl
 
+from tiltvp.errors import InvalidInputError
 from tiltvp.lab.datasets.folder import TiltDataset, read_dataset
 from tiltvp.lab.datasets.new import new_dataset
 from tiltvp.lab.datasets.panoramas import TABLE_1_TILTS_DEG
@@ -54,7 +55,10 @@ def measure_scaling(
     One row for each number of images with the camera as it is (`over` is "images"), and one for each scale of its
     pixels with the smallest of these numbers (`over` is "pixels"); `edge_pixels` is the mean of the estimates. The
     seconds are in all, until the first image (digests, tables), for the images, and for the corrections.
+    Raises `InvalidInputError` for numbers that are not above 0.
     """
+    if not (len(images) and min(images) >= 1 and all(0.0 < scale < math.inf for scale in scales)):
+        raise InvalidInputError(f"images {images} and scales {scales}, expected numbers above 0")
     rows: list[dict[str, object]] = []
     jobs = [("images", count, camera) for count in images]
     jobs += [("pixels", min(images), camera.scaled(math.sqrt(scale))) for scale in scales]
