@@ -17,7 +17,7 @@ from tiltvp.cli import main
 from tiltvp.corner import CornerHypothesis
 from tiltvp.errors import InvalidInputError, MissingExtraError
 from tiltvp.lab.evaluation.corner_closed_form import exact_poses, noisy_poses, summarise_exact, summarise_noisy
-from tiltvp.lab.evaluation.corner_inertial import conventional_angles
+from tiltvp.lab.evaluation.corner_inertial import IMAGE, compare_inertial, conventional_angles
 from tiltvp.lab.evaluation.corner_markers import MarkerLooks
 from tiltvp.lab.evaluation.corner_rooms import truth_near
 from tiltvp.lab.evaluation.corner_scenes import CORNER_SCENES, CornerScene, fresh_rooms
@@ -249,6 +249,21 @@ def test_the_command_measures_and_refuses(tmp_path: Path, capsys: pytest.Capture
     assert "expected a folder" in capsys.readouterr().err
     with pytest.raises(InvalidInputError, match="frames"):
         CornerExperiment(frames=1)
+
+
+def test_the_corner_of_one_grey_camera_may_be_along_the_walls() -> None:
+    """The cuboid stands askew in the room, so that its yaw is no error of a corner there."""
+    sequence = CornerScene("cuboid").sequence(12, 8401, 2)
+    poses = sequence.poses_at(sequence.times_s)
+    cuboid = [pose[:3, :3].T @ sequence.corners[sequence.corner].world_from_object for pose in poses]
+    along = np.array([[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]])
+    walls = [pose[:3, :3].T @ along for pose in poses]
+    off = [np.degrees(np.arccos(0.5 * (np.trace(a.T @ b) - 1.0))) % 90.0 for a, b in zip(cuboid, walls, strict=True)]
+    assert 20.0 < off[0] < 70.0
+    table = compare_inertial(sequence, {IMAGE: cuboid, "image, one grey camera": [*cuboid[:6], *walls[6:]]})
+    errors = table.filter(pl.col("method").str.starts_with("image")).select("roll", "pitch", "yaw").to_numpy()
+    assert errors.shape == (24, 3)
+    assert np.abs(errors).max() < 1e-6
 
 
 def test_without_the_inertial_package_its_extra_is_named(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -46,6 +46,8 @@ _INTEGRAL_SHARE: Final = 0.05
 
 _FORWARD: Final = np.array(ROTATION_WORDS["forward"])
 """From a camera to the board that holds it, and alike from an object's frame, y downwards, to one with z upwards."""
+_WALLS: Final = np.array(((1.0, 0.0, 0.0), (0.0, 0.0, 1.0), (0.0, -1.0, 0.0)))
+"""From such a frame along a room's walls to the world's."""
 
 
 class InertialLooks:
@@ -84,7 +86,8 @@ def compare_inertial(
     these, at the frames; `ComplementaryFilter` with `IMAGE` as its reference, and `CONVENTIONAL`, filters of
     accelerometer and gyroscope, at the readings of a simulated sensor (`StereoSequence.imu` of that seed). The latter
     know no yaw; each has the time constant that suits the truth best. The level edges of a corner without colours have
-    no names, so that the yaw of one grey camera is up to quarter turns. Angles are those of the board that holds the
+    no names, so that the yaw of one grey camera is up to quarter turns, and its corner is the cuboid's or one along the
+    walls: of both the nearer counts. Angles are those of the board that holds the
     cameras, x forward and z up (ROS REP 103). Raises `MissingExtraError` where the package is missing,
     `InvalidInputError` where no frame has an attitude of `IMAGE`.
     """
@@ -102,9 +105,10 @@ def compare_inertial(
         if seen:
             frames = np.array(list(seen))
             images = np.stack([_FORWARD @ a.T @ _FORWARD.T for a in seen.values()])
-            at_frames = _board_angles(_level(sequence.poses_at(frames), corner.world_from_object))
-            quarters = method.startswith(_GRAY)
-            tables.append(_errors(method, frames, _board_angles(images), at_frames, quarters=quarters))
+            poses = sequence.poses_at(frames)
+            at_frames = _board_angles(_level(poses, corner.world_from_object))
+            walls = _board_angles(_level(poses, _WALLS))[:, 2] if method.startswith(_GRAY) else None
+            tables.append(_errors(method, frames, _board_angles(images), at_frames, walls))
     fused = filter_attitudes(imu, by_time[IMAGE])
     known = np.isfinite(fused).all(axis=(1, 2))
     level = np.einsum("ij,njk,lk->nil", _FORWARD, fused[known], _FORWARD)
@@ -199,12 +203,13 @@ def _errors(
     times: NDArray[np.float64],
     angles: NDArray[np.float64],
     truth: NDArray[np.float64],
-    *,
-    quarters: bool = False,
+    walls_yaw: NDArray[np.float64] | None = None,
 ) -> pl.DataFrame:
     errors = np.degrees(_wrapped(angles - truth))
-    if quarters:
-        errors[:, 2] = (errors[:, 2] + 45.0) % 90.0 - 45.0
+    if walls_yaw is not None:
+        yaws = np.stack([errors[:, 2], np.degrees(angles[:, 2] - walls_yaw)], axis=1)
+        yaws = (yaws + 45.0) % 90.0 - 45.0
+        errors[:, 2] = np.take_along_axis(yaws, np.abs(yaws).argmin(axis=1)[:, None], axis=1)[:, 0]
     columns: dict[str, Any] = {"method": [method] * len(times), "time_s": times}
     columns |= {name: errors[:, k] for k, name in enumerate(("roll", "pitch", "yaw"))}
     return pl.DataFrame(columns).with_columns(pl.col("roll", "pitch", "yaw").fill_nan(None))
