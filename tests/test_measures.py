@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -121,6 +122,13 @@ def test_what_cannot_be_measured_is_refused_at_once(run: Run, panoramas: Path, w
     assert said.code == 2
     assert problem in said.err.replace("\n", " ")
     assert not said.out
+
+
+def test_numbers_that_are_not_nothing_are_not_shown_as_0(run: Run) -> None:
+    said = run("measure", "corners", "--poses", "1000", "--noisy-poses", "0", "--frames", "0")
+    heading, _, row = said.out.splitlines()[1:4]
+    assert "above 1e-9 " in heading
+    assert re.search(r"\d\.\de-1\d +\d\.\de-1\d +\d\.\de-\d\d +\d+ ", row), row
 
 
 @pytest.mark.parametrize(

@@ -33,4 +33,6 @@ def _cell(value: object) -> str:
         return ""
     if not isinstance(value, float):
         return str(value)
+    if 0.0 < abs(value) < 5e-4:
+        return f"{value:.1e}"
     return f"{value:.3f}" if abs(value) < 100.0 else f"{value:.1f}"

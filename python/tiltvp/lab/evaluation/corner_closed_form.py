@@ -79,7 +79,7 @@ def summarise_exact(table: pl.DataFrame) -> pl.DataFrame:
         median_rad=error.median(),
         p999_rad=error.quantile(0.999),
         max_rad=error.max(),
-        above_1e_9=(error > 1e-9).sum(),
+        **{"above 1e-9": (error > 1e-9).sum()},
         sensitivity_at_max=pl.col("sensitivity").sort_by(error).last(),
     )
 
