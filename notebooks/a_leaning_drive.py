@@ -95,10 +95,10 @@ axis.set(xlabel="frame, each a turn of 15 degrees", ylabel="error, degrees", yli
 axis.grid(alpha=0.3)
 axis.legend()
 
-assert np.isfinite(alone).mean() > 0.9
-assert np.nanmedian(filtered) < np.nanmedian(alone)
-assert floor[-1] < 0.7
-assert own[-1] < 0.7
+assert np.isfinite(alone).mean() > 0.9, "more than one frame in ten has no tilt"
+assert np.nanmedian(filtered) < np.nanmedian(alone), "the filter is no better than single images"
+assert floor[-1] < 0.7, f"the floor is {floor[-1]:.2f} degrees off at the end"
+assert own[-1] < 0.7, f"the mounting is {own[-1]:.2f} degrees off at the end"
 
 # %% [markdown]
 # Before the robot has turned nothing tells floor and mounting apart, and neither is answered:
@@ -108,9 +108,9 @@ standing = tiltvp.TiltFilter(estimate_mounting=True)
 for view in pictures[:1] * 5:
     standing.step(estimator(view.gray))
 print(bool(standing.estimate), bool(standing.floor), bool(standing.mounting))
-assert standing.estimate
-assert not standing.floor
-assert not standing.mounting
+assert standing.estimate, "the filter tells no tilt"
+assert not standing.floor, "floor and mounting were told apart without a turn"
+assert not standing.mounting, "floor and mounting were told apart without a turn"
 
 # %% [markdown]
 # ## Level pictures
@@ -125,5 +125,7 @@ for column, frame in zip(axes.T, chosen, strict=True):
         axis.imshow(picture[:, :, ::-1])
         axis.set(title=title, xticks=[], yticks=[])
     left = estimator(level)
-    assert left
-    assert math.degrees(left.alpha_rad) < 1.0
+    assert left, f"frame {frame} made level: {left.reason}"
+    assert math.degrees(left.alpha_rad) < 1.0, (
+        f"frame {frame} made level still leans by {math.degrees(left.alpha_rad):.2f} degrees"
+    )

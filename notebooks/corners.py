@@ -49,7 +49,7 @@ for attitude in found:
     print("mirrored" if attitude.mirrored else "plain", "right-handed" if attitude.right_handed else "left-handed")
 nearest = min(np.linalg.norm(attitude.camera_from_object - truth) for attitude in found)
 print(f"the nearest is {nearest:.1e} from the truth")
-assert nearest < 1e-9
+assert nearest < 1e-9, "no hypothesis is the truth"
 
 # %% [markdown]
 # ## In images, by a pair of cameras
@@ -76,9 +76,9 @@ for frame in range(len(sequence)):
     places_mm.append(1e3 * np.linalg.norm(error[3:]))
 angle_deg, place_mm = np.median(angles_deg), np.median(places_mm)
 print(f"{len(angles_deg)} of {len(sequence)} frames, {angle_deg:.3f} degrees, {place_mm:.2f} mm")
-assert len(angles_deg) == len(sequence)
-assert max(angles_deg) < 0.5
-assert max(places_mm) < 15.0
+assert len(angles_deg) == len(sequence), "frames without a pose"
+assert max(angles_deg) < 0.5, f"an attitude is {max(angles_deg):.2f} degrees off"
+assert max(places_mm) < 15.0, f"a place is {max(places_mm):.1f} mm off"
 
 # %%
 canvas = draw_corners(pictures[0], left, estimate.features_left, estimate.chosen_left)
@@ -97,7 +97,7 @@ _ = axis.set(title="the last left picture: rays x red, y green, z blue, and the 
 
 # %%
 print(f"mean squared error over covariance: {np.mean(squares):.1f} of 6")
-assert 1.0 < np.mean(squares) < 15.0
+assert 1.0 < np.mean(squares) < 15.0, "the covariance is not that of the errors"
 
 # %% [markdown]
 # ## One camera and gravity
@@ -109,9 +109,9 @@ world_from_left = sequence.poses_at(sequence.times_s)[:, :3, :3]
 single = corner.CornerPoseEstimator(left, down=-world_from_left[0][2])
 alone = single(sequence.render(0)[0])
 print(bool(alone), alone.reason)
-assert alone
-assert alone.pose.vertex_m is None
+assert alone, alone.reason
+assert alone.pose.vertex_m is None, "one camera has told a place"
 turn = alone.pose.camera_from_object @ sequence.left_from_object(0)[:3, :3].T
 error_deg = math.degrees(math.acos(min(1.0, 0.5 * (np.trace(turn) - 1.0))))
 print(f"the attitude is off by {error_deg:.2f} degrees, the place is not told")
-assert error_deg < 1.0
+assert error_deg < 1.0, f"the attitude of one camera is {error_deg:.2f} degrees off"

@@ -39,8 +39,8 @@ print(f"known to {max(sigma_deg):.2f} degrees, confidence {estimate.confidence:.
 truth = tiltvp.normal_from_alpha_beta(room.alpha_rad, room.beta_rad)
 error_deg = math.degrees(tiltvp.tilt_error_rad(estimate.normal, truth))
 print(f"the error is {error_deg:.2f} degrees")
-assert estimate
-assert error_deg < 0.5
+assert estimate, estimate.reason
+assert error_deg < 0.5, f"the tilt is {error_deg:.2f} degrees off"
 
 # %% [markdown]
 # ## What it saw, and the picture made level
@@ -64,7 +64,7 @@ for axis, (title, picture) in zip(axes, pictures.items(), strict=True):
 # %%
 again = estimator(level)
 print(f"{math.degrees(again.alpha_rad):.2f} degrees are left")
-assert math.degrees(again.alpha_rad) < 0.5
+assert math.degrees(again.alpha_rad) < 0.5, f"the level picture leans by {math.degrees(again.alpha_rad):.2f} degrees"
 
 # %% [markdown]
 # ## An image that tells nothing
@@ -74,6 +74,6 @@ assert math.degrees(again.alpha_rad) < 0.5
 # %%
 wall = estimator(room.gray * 0 + 128)
 print(bool(wall), wall.reason)
-assert not wall
-assert math.isnan(wall.alpha_rad)
-assert wall.confidence == 0.0
+assert not wall, "a picture without edges has a tilt"
+assert math.isnan(wall.alpha_rad), "an estimate that is false has an angle"
+assert wall.confidence == 0.0, "an estimate that is false is confident"

@@ -54,8 +54,8 @@ error_deg = math.degrees(tiltvp.tilt_error_rad(estimate.normal, truth))
 alpha_deg = math.degrees(estimate.alpha_rad)
 print(f"leans by {alpha_deg:.1f} degrees, confidence {estimate.confidence:.2f}: {estimate.reason}")
 print(f"the error is {error_deg:.2f} degrees")
-assert estimate
-assert error_deg < 1.0
+assert estimate, estimate.reason
+assert error_deg < 1.0, f"the lean is {error_deg:.2f} degrees off"
 
 # %% [markdown]
 # ## Turn it level
@@ -71,7 +71,7 @@ for axis, picture, title in zip(axes, (askew, level), ("as it was taken", "level
 again = estimator(level)
 left_deg = math.degrees(again.alpha_rad)
 print(f"{left_deg:.2f} degrees are left")
-assert left_deg < 1.0
+assert left_deg < 1.0, f"the level photo leans by {left_deg:.2f} degrees"
 
 # %% [markdown]
 # The level panorama is the one that was rendered, but for what two resamplings have blurred:
@@ -81,4 +81,4 @@ small = [cv2.GaussianBlur(picture, None, 3.0).astype(float) for picture in (upri
 inside = np.s_[60:-60, 20:-20]
 levelled, crooked = (float(np.abs(other[inside] - small[0][inside]).mean()) for other in small[1:])
 print(f"mean difference: {levelled:.1f} grey levels, before {crooked:.1f}")
-assert levelled < 0.3 * crooked
+assert levelled < 0.3 * crooked, "the level photo is not like the upright one"

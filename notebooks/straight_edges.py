@@ -92,8 +92,8 @@ for (name, (camera, mounting)), (left, right) in zip(cameras.items(), axes, stri
     right.imshow(tiltvp.draw_segments(picture.bgr, camera, ours)[:, :, ::-1])
     right.set(title=f"SegmentDetector, {len(ours)} edges", xticks=[], yticks=[])
 
-assert all(own > 0.5 for own, _ in shares.values())
-assert all(own > lsd_share for own, lsd_share in shares.values())
+assert all(own > 0.5 for own, _ in shares.values()), f"less than half of the edges are found: {shares}"
+assert all(own > lsd_share for own, lsd_share in shares.values()), f"LSD finds more: {shares}"
 
 # %% [markdown]
 # Each edge comes with its error: `covariance` of the normal, sideways and turned about the middle.
@@ -108,4 +108,4 @@ axis.loglog(np.degrees(edges.length_rad), turned, ".", label="turned")
 axis.set(xlabel="length, degrees", ylabel="standard deviation, degrees", title="long edges are known better")
 axis.legend()
 longest = np.argsort(edges.length_rad)
-assert np.median(turned[longest[-20:]]) < 0.5 * np.median(turned[longest[:20]])
+assert np.median(turned[longest[-20:]]) < 0.5 * np.median(turned[longest[:20]]), "long edges are not known better"

@@ -44,8 +44,8 @@ found = tiltvp.calibrate(straight.odometry, straight.bearings, wheel_base_m=WHEE
 print(bool(found), "-", found.reason)
 print("determined:", found.determined)
 print("advice:", found.advice)
-assert not found
-assert "rho" not in found.determined
+assert not found, "a straight drive has told the mounting"
+assert "rho" not in found.determined, "a straight drive has told rho"
 
 # %% [markdown]
 # ## Straight on, then turning
@@ -77,9 +77,9 @@ axes[-1].set_xlabel("step")
 final = calibrator.estimate
 errors = np.array([final.x_m, final.y_m, final.yaw_rad]) - mounting
 print(f"errors: {1e3 * errors[0]:.1f} mm, {1e3 * errors[1]:.1f} mm, {math.degrees(errors[2]):.2f} degrees")
-assert final
-assert 0 < first < len(told) - 1
-assert (np.abs(errors) < 4 * told[-1, 3:6]).all()
+assert final, final.reason
+assert 0 < first < len(told) - 1, f"relied upon from step {first} on"
+assert (np.abs(errors) < 4 * told[-1, 3:6]).all(), "errors are beyond four standard deviations"
 
 # %% [markdown]
 # ## A wheel base that is wrong
@@ -89,9 +89,9 @@ assert (np.abs(errors) < 4 * told[-1, 3:6]).all()
 # %%
 wrong = tiltvp.calibrate(drive.odometry, drive.bearings, wheel_base_m=1.3 * WHEEL_BASE_M).mounting
 print(wrong.reason)
-assert not wrong
-assert wrong.suspect == "wheel_base_m"
-assert abs(wrong.suspect_value / WHEEL_BASE_M - 1.0) < 0.03
+assert not wrong, "a wrong wheel base is relied upon"
+assert wrong.suspect == "wheel_base_m", f"the cause is said to be {wrong.suspect}"
+assert abs(wrong.suspect_value / WHEEL_BASE_M - 1.0) < 0.03, f"the base is said to be {wrong.suspect_value:.3f} m"
 
 # %% [markdown]
 # ## From pictures
@@ -120,10 +120,10 @@ print(f"{len(way)} images, {len(np.unique(log[:, 1]))} tracks")
 print(whole.reason)
 errors = np.array([whole.mounting.x_m, whole.mounting.y_m, whole.mounting.yaw_rad]) - way.mount[:3]
 print(f"errors: {1e3 * errors[0]:.1f} mm, {1e3 * errors[1]:.1f} mm, {math.degrees(errors[2]):.2f} degrees")
-assert whole
-assert found.settled
-assert np.abs(errors[:2]).max() < 0.03
-assert abs(math.degrees(errors[2])) < 1.0
+assert whole, whole.reason
+assert found.settled, "lines and mounting do not settle"
+assert np.abs(errors[:2]).max() < 0.03, f"the place is off by {errors[:2]} m"
+assert abs(math.degrees(errors[2])) < 1.0, f"the yaw is {math.degrees(errors[2]):.2f} degrees off"
 
 figure, axis = plt.subplots(figsize=(8, 3.6), layout="constrained")
 for track in np.unique(log[:, 1]):

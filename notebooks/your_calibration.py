@@ -70,8 +70,8 @@ else:
 view = field_of_view(camera)
 wide_deg, high_deg = math.degrees(view.horizontal_rad), math.degrees(view.vertical_rad)
 print(f"{wide_deg:.0f} x {high_deg:.0f} degrees, axis at {view.axis_px}")
-assert 250.0 < wide_deg < 275.0
-assert view.valid_share > 0.9
+assert 250.0 < wide_deg < 275.0, f"{wide_deg:.0f} degrees wide"
+assert view.valid_share > 0.9, f"a share of {view.valid_share:.2f} of the pixels sees something"
 
 pixels = np.column_stack([np.linspace(0.0, 639.0, 200), np.full(200, 239.5)])
 bearings = camera.unproject(pixels)
@@ -80,7 +80,7 @@ axis.plot(pixels[:, 0], np.degrees(np.arctan2(bearings[:, 0], bearings[:, 2])))
 axis.set(xlabel="column, pixels", ylabel="angle from the axis, degrees", title="one row of the image")
 axis.grid(alpha=0.3)
 round_trip_px = float(np.abs(camera.project(bearings) - pixels).max())
-assert round_trip_px < 1e-9
+assert round_trip_px < 1e-9, f"pixels come back {round_trip_px:.1e} px off"
 
 # %% [markdown]
 # ## Does the camera sit as it is said to?
@@ -100,9 +100,9 @@ told_right = tiltvp.check_setup(pictures, pinhole, AHEAD)
 told_wrong = tiltvp.check_setup(pictures, pinhole, UP)
 print(told_right.reason)
 print(told_wrong.reason)
-assert told_right
-assert not told_wrong
-assert told_wrong.best == "-y"
+assert told_right, told_right.reason
+assert not told_wrong, "a wrong mounting is believed"
+assert told_wrong.best == "-y", f"the camera is said to see up along {told_wrong.best}"
 
 figure, (left, right) = plt.subplots(1, 2, figsize=(10, 3.2), layout="constrained")
 left.imshow(pictures[2][:, :, ::-1])
@@ -125,4 +125,4 @@ for name, one in {"the pinhole": pinhole, "the mirror, as it is": mirror, "the m
     sees = field_of_view(one)
     told = looks_like_a_mirror(one, sees)
     print(f"{name}: {math.degrees(sees.horizontal_rad):.0f} degrees, looks like a mirror that is not said: {told}")
-    assert told == (one is unsaid)
+    assert told == (one is unsaid), f"{name}: {told}"
