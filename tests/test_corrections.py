@@ -299,3 +299,13 @@ def test_a_correction_is_trained_and_read_on_the_command_line(
     assert row["alpha_rad"] == pytest.approx(estimator(tiltvp.read_image(image)).alpha_rad, abs=1e-12)
     assert main(["tilt", image, "--camera", camera, "--correction", str(out), "--method", "vector-consensus"]) == 2
     assert "expected image-space-ransac" in capsys.readouterr().err
+
+
+def test_a_dataset_that_is_too_small_to_train_on_is_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    data = tmp_path / "small"
+    size = ["--rooms", "1", "--locations-per-room", "1", "--samples", "1"]
+    assert main(["dataset", "synth", *size, "--out", str(data)]) == 0
+    capsys.readouterr()
+    assert main(["lab", "train", str(data), "--out", str(tmp_path / "correction.toml")]) == 2
+    assert "small, 7 images: alpha_rad: got 7" in " ".join(capsys.readouterr().err.split())
+    assert not (tmp_path / "correction.toml").exists()

@@ -10,7 +10,7 @@ from tiltvp.cli.lab.drive import app
 from tiltvp.cli.options import ALL_CORES, MethodOptions, Threads
 from tiltvp.cli.tables import check_file
 from tiltvp.cli.terminal import progress_bar, say
-from tiltvp.errors import InvalidInputError
+from tiltvp.errors import InvalidInputError, counted
 
 __all__ = ["app"]
 
@@ -62,6 +62,9 @@ def train(
     )
     with progress_bar(len(known.images), "images") as bar:
         shifts = measured_shifts(known, estimator, threads=threads, advance=bar.advance)
-    trained = train_correction(estimator, shifts, [image.alpha_rad for image in known.images], kind=kind)
+    try:
+        trained = train_correction(estimator, shifts, [image.alpha_rad for image in known.images], kind=kind)
+    except InvalidInputError as error:
+        raise InvalidInputError(f"{dataset}, {counted(len(known.images), 'images')}: {error}") from error
     trained.save(out)
     say(f"{out}: {kind} of {method}, trained on {trained.images} of {len(known.images)} images")
