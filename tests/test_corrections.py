@@ -301,6 +301,7 @@ def test_a_correction_is_trained_and_read_on_the_command_line(
     assert "expected image-space-ransac" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_a_dataset_that_is_too_small_to_train_on_is_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     data = tmp_path / "small"
     size = ["--rooms", "1", "--locations-per-room", "1", "--samples", "1"]
