@@ -275,7 +275,6 @@ def test_an_image_centre_whose_doubt_leaves_the_mounting_undetermined_is_named()
         assert found.suspect == "centre"
 
 
-
 def test_the_filter_of_the_command_has_the_centre_of_the_whole_log(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
