@@ -263,3 +263,11 @@ def test_of_panoramas_that_are_not_believed_nothing_is_told() -> None:
     rows = {"method": ["refined"] * 2, "error_deg": [math.nan, 1.0], "confidence": [0.0, 0.1], "time_ms": [1.0, 3.0]}
     row = summarise_turned(pl.DataFrame(rows)).row(0, named=True)
     assert (row["count"], row["believed"], row["median"], row["largest"], row["ms"]) == (2, 0, None, None, 2.0)
+
+
+def test_what_was_made_for_a_camera_is_not_told_another(camera: tiltvp.Camera) -> None:
+    """The camera could be set, and levels went on as before."""
+    leveller, unwrapper = tiltvp.Leveller(camera), tiltvp.Unwrapper(camera)
+    for one, name in ((leveller, "camera"), (leveller, "output"), (unwrapper, "camera"), (unwrapper, "size")):
+        with pytest.raises(AttributeError, match=name):
+            setattr(one, name, getattr(one, name))

@@ -75,14 +75,22 @@ class Leveller:
         field_of_view_rad: float | None = None,
         robot_from_output: ArrayLike | None = None,
     ) -> None:
-        self.camera: _core.Camera = _not_too_large(camera)
-        """Whose images are made level."""
-        self.output: _core.Camera = _not_too_large(_output(camera, to, size, field_of_view_rad))
-        """Whose images they become."""
+        _not_too_large(camera)
+        self._output = _not_too_large(_output(camera, to, size, field_of_view_rad))
         ahead = to == "panorama" and robot_from_output is None
         looks = _AHEAD if ahead else robot_from_output
-        self._core = _core.Leveller(camera, self.output, robot_from_camera=robot_from_camera, robot_from_shown=looks)
+        self._core = _core.Leveller(camera, self._output, robot_from_camera=robot_from_camera, robot_from_shown=looks)
         self._looks = None if looks is None else np.array(looks, dtype=np.float64)
+
+    @property
+    def camera(self) -> _core.Camera:
+        """Whose images are made level."""
+        return self._core.camera
+
+    @property
+    def output(self) -> _core.Camera:
+        """Whose images they become."""
+        return self._output
 
     @property
     def robot_from_camera(self) -> NDArray[np.float64]:
@@ -309,10 +317,8 @@ class Unwrapper:
         if not -math.pi / 2.0 <= elevation_min_rad < elevation_max_rad <= math.pi / 2.0:
             limits = f"{elevation_min_rad}, {elevation_max_rad}"
             raise InvalidInputError(f"elevation_min_rad, elevation_max_rad = {limits}, expected rising in +-pi/2")
-        self.camera: _core.Camera = _not_too_large(camera)
-        """Whose images are unwrapped."""
-        self.size: tuple[int, int] = (width, height)
-        """Columns and rows of strips."""
+        _not_too_large(camera)
+        self._size = (width, height)
         self._elevations = (elevation_min_rad, elevation_max_rad)
         azimuth = (np.arange(_ACROSS * width) + 0.5 - 0.5 * _ACROSS) * (2.0 * np.pi / (_ACROSS * width))
         rows = _DOWN * height
@@ -322,6 +328,16 @@ class Unwrapper:
         self._core = _core.Leveller(
             camera, robot_from_camera=robot_from_camera, rays=rays.reshape(-1, 3), columns=across.shape[1]
         )
+
+    @property
+    def camera(self) -> _core.Camera:
+        """Whose images are unwrapped."""
+        return self._core.camera
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """Columns and rows of strips."""
+        return self._size
 
     def __call__(self, image: ArrayLike, tilt: Tilt | None = None) -> NDArray[np.float32]:
         """(height, width) or (height, width, channels) levels of an image of the camera, made level by its tilt.
