@@ -200,3 +200,15 @@ def test_masked_pixels_are_not_looked_at(camera: tiltvp.Camera, room: RoomImage)
     assert estimator(other) == estimator(room.gray)
     fortran = np.asfortranarray(HALF)
     assert tiltvp.TiltEstimator(camera, mask=fortran) == estimator
+
+
+def test_a_small_factor_goes_with_a_largest_lean(camera: tiltvp.Camera, room: RoomImage) -> None:
+    """The methods' own largest offset was taken beside the lean that was told, and refused for its own lean."""
+    small = tiltvp.AffineCorrection(factor=10.0, offset_rad=0.0)
+    with pytest.raises(InvalidInputError, match="option correction = 10"):
+        tiltvp.TiltEstimator(camera, method="image-space-ransac", correction=small)
+    told = tiltvp.TiltEstimator(camera, method="image-space-ransac", correction=small, tilt_max_rad=0.5)
+    given = tiltvp.TiltEstimator(camera, method="image-space-ransac", correction=small, offset_max_px=5.0)
+    assert told(room.gray).inlier_pixels == given(room.gray).inlier_pixels > 0
+    with pytest.raises(InvalidInputError, match="option tilt_max_rad"):
+        tiltvp.TiltEstimator(camera, method="image-space-ransac", correction=small, tilt_max_rad=1.6)

@@ -86,7 +86,12 @@ impl ImageSpace {
             return Err(Error::option("offset_max_px", *offset_px, "none beside tilt_max_rad, which raises its own"));
         }
         let own_max_px = offset_max_px.unwrap_or_else(|| offset_max_px_of(vertical.scale));
-        let largest_px = setting.tilt_max_rad.map_or(own_max_px, |tilt| correction.shift_of(tilt).max(own_max_px));
+        let largest_px = match setting.tilt_max_rad {
+            // Its own may be a lean beyond a right angle by a small factor.
+            Some(tilt) if correction.apply(own_max_px) < FRAC_PI_2 => correction.shift_of(tilt).max(own_max_px),
+            Some(tilt) => correction.shift_of(tilt),
+            None => own_max_px,
+        };
         if correction.apply(largest_px) >= FRAC_PI_2 {
             return Err(lean_out_of_reach(&correction, largest_px, offset_max_px.is_some()));
         }
