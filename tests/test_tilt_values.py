@@ -97,3 +97,11 @@ def test_estimators_are_values_too(camera: tiltvp.Camera, room: RoomImage, metho
     assert "\n" not in repr(estimator)
     assert estimator.camera == camera
     assert type(estimator.camera) is tiltvp.Camera
+
+
+def test_copies_show_the_same_options(camera: tiltvp.Camera) -> None:
+    """What pickle had made again showed all options, as if each had been given."""
+    estimator = tiltvp.TiltEstimator(camera, method="segments", tilt_max_rad=0.2)
+    assert repr(estimator).endswith(', method="segments", tilt_max_rad=0.2)')
+    assert repr(pickle.loads(pickle.dumps(estimator))) == repr(estimator)
+    assert repr(estimator.with_options(tilt_max_rad=None)) == repr(tiltvp.TiltEstimator(camera, method="segments"))

@@ -66,7 +66,11 @@ pub(crate) fn shown_beside(py: Python<'_>, options: &dyn Options, usual: &dyn Op
     let mut text = String::new();
     for field in options.fields() {
         if usual.get(&field.name).as_ref() != Some(&field.value) {
-            text.extend([", ", &field.name, "=", &from_value(py, &field.value)?.repr()?.to_string()]);
+            let value = match &field.value {
+                Value::Mask(..) => "<mask>".to_owned(),
+                value => from_value(py, value)?.repr()?.to_string(),
+            };
+            text.extend([", ", &field.name, "=", &value]);
         }
     }
     Ok(text)

@@ -49,8 +49,6 @@ use crate::scratch::ScratchPool;
 pub(crate) struct TiltEstimator {
     inner: core::TiltEstimator,
     camera: Py<Camera>,
-    /// The options that the user has named.
-    given: Vec<String>,
     /// Shared by the estimators that look at the same pixels.
     scratch: Arc<ScratchPool<Scratch>>,
 }
@@ -80,8 +78,7 @@ impl TiltEstimator {
         options::set(&mut parsed, options)?;
         let lens = camera.get().inner.clone();
         let inner = call_long(py, move || core::TiltEstimator::new(lens, rotation, parsed))?;
-        let given = options.map_or(Ok(Vec::new()), |options| options.keys().extract())?;
-        Ok(Self { inner, camera: camera.clone().unbind(), given, scratch: Arc::default() })
+        Ok(Self { inner, camera: camera.clone().unbind(), scratch: Arc::default() })
     }
 
     /// Fresh (3, 3) float64: the rotation R in v_robot = R v_camera.
@@ -183,15 +180,9 @@ impl TiltEstimator {
     }
 
     fn __repr__(&self, py: Python<'_>) -> PyResult<String> {
-        let mut text = format!("TiltEstimator({}, method=\"{}\"", self.camera.bind(py).repr()?, self.method());
-        let options = self.options(py)?;
-        for key in &self.given {
-            let value = convert::raw_item(&options, key)?;
-            let is_mask = key == "mask" && !value.is_none();
-            let value = if is_mask { "<mask>".to_owned() } else { value.repr()?.to_string() };
-            text.extend([", ", key, "=", &value]);
-        }
-        Ok(text + ")")
+        let usual = core::TiltOptions::for_method(self.method()).map_err(|error| exception(&error))?;
+        let others = options::shown_beside(py, self.inner.options(), &usual)?;
+        Ok(format!("TiltEstimator({}, method=\"{}\"{others})", self.camera.bind(py).repr()?, self.method()))
     }
 }
 
@@ -203,16 +194,9 @@ impl TiltEstimator {
         let mut options = self.inner.options().clone();
         options::set(&mut options, changes)?;
         let inner = call_long(py, || self.inner.with_options(options))?;
-        let mut given = self.given.clone();
-        for key in changes.into_iter().flat_map(PyDictMethods::keys) {
-            let key: String = key.extract()?;
-            if !given.contains(&key) {
-                given.push(key);
-            }
-        }
         let shares = inner.shares_scratch_with(&self.inner);
         let scratch = if shares { Arc::clone(&self.scratch) } else { Arc::default() };
-        Ok(Self { inner, camera: self.camera.clone_ref(py), given, scratch })
+        Ok(Self { inner, camera: self.camera.clone_ref(py), scratch })
     }
 }
 
