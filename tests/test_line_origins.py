@@ -1,9 +1,11 @@
-"""Lines tell the camera and the mounting that found them: of others they are refused."""
+"""Lines tell the camera and the mounting that found them: of others they are refused, and so is what is no line."""
 
 from __future__ import annotations
 
+import copy
 import json
 import math
+import pickle
 
 import numpy as np
 import pytest
@@ -47,3 +49,48 @@ def test_lines_are_those_of_images_of_any_size_but_for_radial_ones(room: RoomIma
     assert tl.describe(small, half, tl.extract(room.gray, camera)).shape[1] == 192
     with pytest.raises(InvalidInputError, match="lines of another camera or mounting"):
         tl.describe(small, half, tl.extract(room.gray, camera, method="radial", length_min=0.2))
+
+
+def test_lines_of_two_origins_are_not_followed_or_matched_as_if_of_one(room: RoomImage, camera: tiltvp.Camera) -> None:
+    """A tracker went on with the lines of a camera that was turned by a degree: their bearings were another robot's."""
+    turned = tl.LineExtractor(camera, robot_from_camera=about_vertical(math.radians(1.0)))
+    extractor = tl.LineExtractor(camera)
+    own, other = extractor(room.gray), turned(room.gray)
+    values, others = extractor.describe(room.gray, own), turned.describe(room.gray, other)
+    profiles = [np.zeros((len(lines), 190), np.float32) for lines in (own, other)]
+    tl.match_wide(own, profiles[0], own, profiles[0])
+    with pytest.raises(InvalidInputError, match="lines of another camera or mounting"):
+        tl.match_wide(own, profiles[0], other, profiles[1])
+    tracker = tl.LineTracker()
+    tracker.update(own, values)
+    unknown = tl.Lines.from_dict({**own.to_dict(), "seen_by": None})
+    for before in (tracker, pickle.loads(pickle.dumps(tracker))):
+        kept = copy.copy(before)
+        with pytest.raises(InvalidInputError, match="lines of another camera or mounting"):
+            before.update(other, others)
+        assert before == kept
+        assert len(before.update(unknown, values)) == len(own)
+        with pytest.raises(InvalidInputError, match="lines of another camera or mounting"):
+            before.update(other, others)
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [("bearing_rad", math.nan), ("sigma_rad", -1.0), ("polarity", 2.0), ("elevation_max_rad", math.inf)],
+)
+def test_lines_that_are_none_are_no_lines(room: RoomImage, camera: tiltvp.Camera, name: str, value: float) -> None:
+    told = tl.extract(room.gray, camera).to_dict()
+    with pytest.raises(InvalidInputError, match="lines: "):
+        tl.Lines.from_dict({**told, name: [value, *told[name][1:]]})
+    with pytest.raises(InvalidInputError, match="ground normal"):
+        tl.Lines.from_dict({**told, "normal": [0.0, 0.0, 0.0]})
+
+
+def test_lines_in_another_order_are_refused_where_order_counts(room: RoomImage, camera: tiltvp.Camera) -> None:
+    extractor = tl.LineExtractor(camera, descriptor_kind="profile")
+    lines = extractor.lines_at([2.0, 1.0])
+    assert pickle.loads(pickle.dumps(lines)) == lines
+    values = extractor.describe(room.gray, lines)
+    for use in (lambda: tl.match_wide(lines, values, lines, values), lambda: tl.LineTracker().update(lines, values)):
+        with pytest.raises(InvalidInputError, match="rising bearing"):
+            use()

@@ -203,18 +203,16 @@ impl LineExtractor {
         }
     }
 
-    fn check_frame(&self, frame: &LineFrame) -> Result<()> {
-        if Tilt::from_normal(&frame.normal).is_none() {
-            return Err(Error::argument("lines", format!("a ground normal of {:?}", frame.normal), "a finite one"));
-        }
-        if frame.center_px.is_some() != self.radii.is_some() {
+    fn check_lines(&self, lines: &Lines) -> Result<()> {
+        lines.check()?;
+        if lines.frame.center_px.is_some() != self.radii.is_some() {
             return Err(Error::argument(
                 "lines",
                 "lines of the other method",
                 "lines that this extractor's method found",
             ));
         }
-        frame.check_seen_by(self.seen_by)
+        lines.frame.check_seen_by(self.seen_by)
     }
 
     /// The descriptors of the lines of an image, one after the other (Scaramuzza, Siegwart and Martinelli 2009, section 3): along the lines' great circles, or
@@ -222,7 +220,7 @@ impl LineExtractor {
     ///
     /// # Errors
     /// [`Error::InvalidArgument`] if the image has another size than the camera's, the scratch is another extractor's, or the
-    /// lines are of the other method, of another camera or mounting, or of no ground normal.
+    /// lines are of the other method or of another camera or mounting, or fail [`Lines::check`].
     pub fn describe(
         &self,
         image: &ImageView<'_>,
@@ -231,7 +229,7 @@ impl LineExtractor {
         out: &mut Vec<f32>,
     ) -> Result<()> {
         self.check(image, scratch)?;
-        self.check_frame(&lines.frame)?;
+        self.check_lines(lines)?;
         let chart = Chart::new(&self.camera, &self.robot_from_camera, &lines.frame);
         if self.options.descriptor.kind == DescriptorKind::Profile {
             profile::describe(image, &self.tables, &chart, lines, out);
@@ -257,7 +255,7 @@ impl LineExtractor {
         out: &mut Vec<f32>,
     ) -> Result<(usize, usize)> {
         self.check(image, scratch)?;
-        self.check_frame(&lines.frame)?;
+        self.check_lines(lines)?;
         let chart = Chart::new(&self.camera, &self.robot_from_camera, &lines.frame);
         let (low, high) = self.range(&lines.frame);
         let (rows, columns) = (6 * SAMPLES + 1, 2 * SAMPLES + 1);

@@ -6,6 +6,7 @@ use nalgebra::{Matrix3, Vector2, Vector3};
 
 use crate::camera::Camera;
 use crate::error::{Error, Result};
+use crate::geometry::unit;
 
 /// A vertical line of the world as one image shows it.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -50,27 +51,46 @@ impl LineFrame {
         if self.seen_by.is_none_or(|own| own == fingerprint) {
             return Ok(());
         }
-        let expected = "lines that were found with this camera and this mounting";
+        let expected = "lines that were found with the same camera and mounting";
         Err(Error::argument("lines", "lines of another camera or mounting", expected))
     }
 }
 
 impl Lines {
-    /// Whether all bearings are angles, and known as well as angles can be, and all polarities are from -1 to 1.
+    /// Whether all bearings are angles, and known as well as angles can be, all elevations are angles, all polarities are from -1 to 1,
+    /// and the ground normal is a direction.
     ///
     /// # Errors
-    /// [`Error::InvalidArgument`] for a line with others.
-    pub(super) fn check(&self) -> Result<()> {
+    /// [`Error::InvalidArgument`] for others.
+    pub fn check(&self) -> Result<()> {
+        let normal = &self.frame.normal;
+        if unit(normal).is_none() {
+            return Err(Error::argument("lines", format!("a ground normal of {normal:?}"), "a finite one"));
+        }
         let is_line = |line: &Line| {
-            line.bearing_rad.is_finite() && (0.0..=PI).contains(&line.sigma_rad) && line.polarity.abs() <= 1.0
+            let angles = [line.bearing_rad, line.elevation_min_rad, line.elevation_max_rad];
+            let known = (0.0..=PI).contains(&line.sigma_rad);
+            known && angles.iter().all(|angle| angle.is_finite()) && line.polarity.abs() <= 1.0
         };
         match self.lines.iter().find(|line| !is_line(line)) {
-            Some(Line { bearing_rad, sigma_rad, polarity, .. }) => {
-                let got = format!("a bearing of {bearing_rad} known to {sigma_rad} radians, of polarity {polarity}");
-                Err(Error::argument("lines", got, "finite bearings, known to 0 to pi, and polarities from -1 to 1"))
+            Some(line) => {
+                let expected = "finite bearings, known to 0 to pi, and elevations, and polarities from -1 to 1";
+                Err(Error::argument("lines", format!("{line:?}"), expected))
             }
             None => Ok(()),
         }
+    }
+
+    /// Whether they are lines by rising bearing of what is perhaps known to have found others.
+    ///
+    /// # Errors
+    /// Those of [`check`](Self::check), and [`Error::InvalidArgument`] for another order, camera or mounting.
+    pub(super) fn check_after(&self, seen_by: Option<u32>) -> Result<()> {
+        self.check()?;
+        if !self.lines.is_sorted_by(|a, b| a.bearing_rad <= b.bearing_rad) {
+            return Err(Error::argument("lines", "bearings in another order", "lines by rising bearing"));
+        }
+        seen_by.map_or(Ok(()), |seen_by| self.frame.check_seen_by(seen_by))
     }
 }
 

@@ -76,7 +76,8 @@ impl LineTracker {
     ///
     /// `yaw_change_rad` is its turn, positive to the left, `distance_m` how far the middle between its wheels went
     /// along the arc, negative backwards. Raises `tiltvp.errors.InvalidInputError` for descriptors of another number or
-    /// width, bearings and motions that are none, and a distance without a turn; the tracker is as before then.
+    /// width, lines of another camera or mounting than those before, bearings and motions that are none, and a distance without a
+    /// turn; the tracker is as before then.
     #[pyo3(signature = (lines, descriptors: "NDArray[np.float32]", *, yaw_change_rad=None, distance_m=None))]
     fn update(
         &self,
@@ -111,8 +112,8 @@ impl LineTracker {
     }
 
     /// Sets what pickle has kept.
-    fn __setstate__(&self, py: Python<'_>, state: (u64, u64, Vec<Memory>, Vec<Edge>)) -> PyResult<()> {
-        let (next_frame, next_track, frames, followed) = state;
+    fn __setstate__(&self, py: Python<'_>, state: (u64, u64, Vec<Memory>, Vec<Edge>, Option<u32>)) -> PyResult<()> {
+        let (next_frame, next_track, frames, followed, seen_by) = state;
         let frames = frames.into_iter().map(|(tracks, descriptors)| FrameMemory { tracks, descriptors }).collect();
         let edge =
             |((track, seen), (bearing_rad, inverse_distance, covariance, is_metric), polarity, descriptor): Edge| {
@@ -120,7 +121,7 @@ impl LineTracker {
                 Followed { track, seen, parallax, polarity, descriptor }
             };
         let followed = followed.into_iter().map(edge).collect();
-        let state = TrackerState { next_frame, next_track, frames, followed };
+        let state = TrackerState { next_frame, next_track, frames, followed, seen_by };
         self.inner.change(py, |tracker| {
             *tracker = core::LineTracker::with_state(*tracker.options(), state)?;
             Ok(())
@@ -139,7 +140,8 @@ impl LineTracker {
         let state = tracker.state();
         let frames: Vec<Memory> = state.frames.iter().map(|f| (f.tracks.clone(), f.descriptors.clone())).collect();
         let followed: Vec<Edge> = state.followed.iter().map(edge).collect();
-        (make, PyTuple::empty(py), (state.next_frame, state.next_track, frames, followed)).into_pyobject(py)
+        (make, PyTuple::empty(py), (state.next_frame, state.next_track, frames, followed, state.seen_by))
+            .into_pyobject(py)
     }
 }
 

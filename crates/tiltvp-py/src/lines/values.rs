@@ -48,7 +48,9 @@ value! {
             polarity: polarity[i],
         };
         let frame = LineFrame { normal, center_px: center_px.map(|(u, v)| [u, v].into()), seen_by };
-        core::Lines { lines: (0..n).map(line).collect(), frame }
+        let made = core::Lines { lines: (0..n).map(line).collect(), frame };
+        made.check().map_err(|error| exception(&error))?;
+        made
     };
     repr {
         let degrees: Vec<String> = own.lines.iter().map(|l| format!("{:.1}", l.bearing_rad.to_degrees())).collect();

@@ -68,8 +68,9 @@ impl LineTracker {
     /// predicted after it.
     ///
     /// # Errors
-    /// [`Error::InvalidArgument`] unless there is a descriptor for each line, as wide as those before, bearings are angles, the motion
-    /// is one, and there are numbers left for the frame and its lines; the tracker is as before.
+    /// [`Error::InvalidArgument`] unless there is a descriptor for each line, as wide as those before, bearings are angles that rise, of
+    /// the camera and mounting of those before, the motion is one, and there are numbers left for the frame and its lines; the tracker
+    /// is as before.
     pub fn update(
         &mut self,
         lines: &Lines,
@@ -77,7 +78,8 @@ impl LineTracker {
         motion: Option<&Motion>,
         out: &mut Vec<TrackedLine>,
     ) -> Result<()> {
-        lines.check()?;
+        lines.check_after(self.state.seen_by)?;
+        let seen_by = lines.frame.seen_by.or(self.state.seen_by);
         let lines = &lines.lines;
         let width = self.check(lines, descriptors, motion)?;
         let continued = match motion {
@@ -92,6 +94,7 @@ impl LineTracker {
             out.push(TrackedLine { frame, track, frames_back, line: *line });
         }
         self.remember(descriptors, width, motion, out);
+        self.state.seen_by = seen_by;
         Ok(())
     }
 

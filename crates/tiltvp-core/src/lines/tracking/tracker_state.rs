@@ -54,6 +54,9 @@ pub struct TrackerState {
     pub frames: VecDeque<FrameMemory>,
     /// Tracks of the frames since the motion is known, and of the one before.
     pub followed: Vec<Followed>,
+    /// The [`fingerprint`](crate::lines::fingerprint) of the camera and the mounting that all lines were found with; none where that is
+    /// not known.
+    pub seen_by: Option<u32>,
 }
 
 /// The largest number of a frame or a track, half of what a number can be: whoever counts to there will not see the end.
