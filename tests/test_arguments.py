@@ -11,10 +11,11 @@ import pytest
 import tiltvp
 from tiltvp import corner, lines
 from tiltvp.arguments import array_from, number_from
-from tiltvp.errors import InvalidInputError
+from tiltvp.errors import InvalidInputError, TiltvpError
 from tiltvp.stereo_rigs import StereoRig
 from tiltvp.streams import InertialSamples, Motion, Odometry, Wheels, frame_motions, read_odometry
 from tiltvp.streams.outputs.transforms import StaticTransform
+from tiltvp.synth import Room, simulate_drive
 from tiltvp.tilt import normal_of
 
 CAMERA = tiltvp.Camera.equidistant(width=64, height=48, focal_px=20.0, cx=31.5, cy=23.5)
@@ -187,3 +188,35 @@ def test_what_is_of_another_kind_is_named(call: Any, told: str) -> None:
 
 def test_times_far_beyond_a_record_are_outside() -> None:
     assert ODOMETRY.at([-1e308, 0.5, 1e308, np.nan]).outside.tolist() == [True, False, True, True]
+
+
+@pytest.mark.parametrize("word", [None, 3, b"refined", "", object])
+@pytest.mark.parametrize(
+    ("call", "expected"),
+    [
+        (lambda word: tiltvp.TiltEstimator(CAMERA, method=word), '"refined", "image-space-ransac"'),
+        (lambda word: lines.LineExtractor(CAMERA, method=word), '"great-circle" or "radial"'),
+        (lambda word: corner.CornerDetector(CAMERA, method=word), '"coloured", "general" or "paper"'),
+        (lambda word: corner.CornerPoseEstimator(CAMERA, method=word or ""), '"coloured", "general" or "paper"'),
+        (lambda word: tiltvp.Camera(word, width=3, height=3), "expected one of: .*equidistant"),
+        (lambda word: Room(word, 1), "office"),
+        (lambda word: simulate_drive(word), "paper"),
+    ],
+)
+def test_what_is_no_word_is_told_the_words(call: Any, expected: str, word: Any) -> None:
+    with pytest.raises(TiltvpError, match=expected):
+        call(word)
+
+
+@pytest.mark.parametrize("value", ["a", 3, None, []])
+def test_what_is_no_dict_is_named(value: Any) -> None:
+    for made in (tiltvp.Camera, lines.Lines):
+        with pytest.raises(InvalidInputError, match=rf"values: {type(value).__name__}, expected a dict"):
+            made.from_dict(value)
+
+
+def test_descriptors_of_another_kind_are_told_which() -> None:
+    with pytest.raises(
+        InvalidInputError, match=r"a: shape \[2, 192\] of float64, expected an \(N, K\) array of float32"
+    ):
+        lines.match(np.zeros((2, 192)), np.zeros((2, 192)))  # type: ignore[arg-type]

@@ -98,7 +98,8 @@ class CornerPoseEstimator(_core.CornerPoseEstimator):
         if detectors and options:
             names = ", ".join(options)
             raise InvalidInputError(f"options {names}: given beside a CornerDetector, expected with cameras only")
-        method = _shared("method", method, [one.method for one in detectors]) or CORNER_METHODS[0]
+        method = _shared("method", method, [one.method for one in detectors])
+        method = CORNER_METHODS[0] if method is None else method
         angles = [_right(one.options["gamma_rad"]) for one in detectors if one.method == "general"]
         gamma_rad = _shared("gamma_rad", _right(own.get("gamma_rad")), angles)
         if gamma_rad is not None:

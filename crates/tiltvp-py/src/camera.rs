@@ -9,7 +9,7 @@ use tiltvp_core::interrupt::check;
 
 use crate::array::Array;
 use crate::call::{call, call_long, exception, invalid};
-use crate::convert::{self, Number};
+use crate::convert::{self, Number, Word};
 use crate::value::{frozen, getters};
 
 /// Points and their Jacobians.
@@ -35,7 +35,7 @@ impl Camera {
         model, *, width: "int", height: "int", max_theta_rad=None, mirror=false, **parameters: "ArrayLike | None"
     ))]
     fn new(
-        model: &str,
+        model: Word,
         width: &Bound<'_, PyAny>,
         height: &Bound<'_, PyAny>,
         max_theta_rad: Option<Number>,
@@ -55,7 +55,7 @@ impl Camera {
             named.push((key, parameter));
         }
         let build = || {
-            let model = Model::from_parameters(model, width, height, &named)?;
+            let model = Model::from_parameters(&model.0, width, height, &named)?;
             let camera = core::Camera::new(width, height, model)?;
             let camera = match max_theta_rad {
                 Some(limit) => camera.with_max_theta_rad(limit)?,
@@ -191,7 +191,8 @@ impl Camera {
     /// The camera of a dict as `to_dict` makes it.
     #[classmethod]
     #[pyo3(signature = (values: "dict[str, Any]") -> "Self")]
-    fn from_dict<'py>(cls: &Bound<'py, PyType>, values: &Bound<'py, PyDict>) -> PyResult<Bound<'py, PyAny>> {
+    fn from_dict<'py>(cls: &Bound<'py, PyType>, values: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
+        let values = convert::dict(values, "values")?;
         for key in ["model", "width", "height"] {
             if !values.contains(key)? {
                 return Err(invalid(format!("values: \"{key}\" is missing, expected a dict as to_dict makes it")));
@@ -247,7 +248,7 @@ fn parameter(value: &Bound<'_, PyAny>, name: &str) -> PyResult<Parameter> {
 #[pyfunction]
 #[pyo3(signature = (model, width: "int", height: "int", parameters: "Mapping[str, ArrayLike]", max_theta_rad=None))]
 pub(crate) fn check_camera(
-    model: &str,
+    model: Word,
     width: &Bound<'_, PyAny>,
     height: &Bound<'_, PyAny>,
     parameters: &Bound<'_, PyDict>,

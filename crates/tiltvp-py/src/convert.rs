@@ -196,6 +196,27 @@ impl<'py> FromPyObject<'_, 'py> for Number {
     }
 }
 
+/// A word as an argument of Python. Anything else is a word too, its look, which no choice has: who looks for the choice says what
+/// there is to choose.
+pub(crate) struct Word(pub(crate) String);
+
+impl<'py> FromPyObject<'_, 'py> for Word {
+    type Error = PyErr;
+
+    #[cfg(feature = "stub")]
+    const INPUT_TYPE: pyo3::inspect::PyStaticExpr = <String as FromPyObject<'_, 'py>>::INPUT_TYPE;
+
+    fn extract(value: Borrowed<'_, 'py, PyAny>) -> PyResult<Self> {
+        Ok(Self(value.extract().unwrap_or_else(|_| shown(&value))))
+    }
+}
+
+impl From<&str> for Word {
+    fn from(word: &str) -> Self {
+        Self(word.to_owned())
+    }
+}
+
 /// How a refusal shows a value.
 pub(crate) fn shown(value: &Bound<'_, PyAny>) -> String {
     value.repr().map_or_else(|_| "an object".to_owned(), |repr| repr.to_string())
@@ -207,6 +228,11 @@ where
     T: for<'a> FromPyObject<'a, 'py>,
 {
     value.extract().map_err(|_| invalid(format!("{name} = {}, expected {expected}", shown(value))))
+}
+
+/// A dict as `to_dict` makes it.
+pub(crate) fn dict<'a, 'py>(values: &'a Bound<'py, PyAny>, name: &str) -> PyResult<&'a Bound<'py, PyDict>> {
+    values.cast().map_err(|_| invalid(format!("{name}: {}, expected a dict as to_dict makes it", describe(values))))
 }
 
 /// An item of a dict as `to_dict` makes it.
@@ -235,7 +261,7 @@ pub(crate) fn known_keys(values: &Bound<'_, PyDict>, keys: &[&str]) -> PyResult<
 }
 
 /// What a value is, for a message.
-fn describe(value: &Bound<'_, PyAny>) -> String {
+pub(crate) fn describe(value: &Bound<'_, PyAny>) -> String {
     match value.cast::<PyUntypedArray>() {
         Ok(array) => format!("shape {:?} of {}", array.shape(), array.dtype()),
         Err(_) => value.get_type().name().map_or_else(|_| "an object".to_owned(), |name| name.to_string()),

@@ -9,7 +9,6 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
 pub(crate) use self::words::{StopWord, VerdictWord};
-use crate::call::invalid;
 use crate::convert;
 
 /// How one field of a value crosses to Python and back.
@@ -74,7 +73,7 @@ pub(crate) trait Value: Clone + for<'py> IntoPyObject<'py> {
 
     /// Reads what [`dict`](Self::dict) wrote; refuses anything else. `name` is for messages.
     fn from_values(values: &Bound<'_, PyAny>, name: &str) -> PyResult<Self> {
-        let values = values.cast::<PyDict>().map_err(|_| invalid(format!("{name}: expected a dict")))?;
+        let values = convert::dict(values, name)?;
         convert::known_keys(values, &Self::all_keys())?;
         Self::read_all(values)
     }

@@ -15,7 +15,7 @@ pub(crate) use self::values::Lines;
 use crate::array::Array;
 use crate::call::{call_long, exception, invalid};
 use crate::camera::Camera;
-use crate::convert::{self, Number};
+use crate::convert::{self, Number, Word};
 use crate::options;
 use crate::reader::{self, image_reader};
 use crate::scratch::ScratchPool;
@@ -43,19 +43,19 @@ pub(crate) struct LineExtractor {
 impl LineExtractor {
     #[new]
     #[pyo3(signature = (
-        camera: "Camera", *, method=core::LineMethod::NAMES[0], robot_from_camera: "ArrayLike | None" = None,
+        camera: "Camera", *, method=core::LineMethod::NAMES[0].into(), robot_from_camera: "ArrayLike | None" = None,
         **options: "Option"
     ))]
     fn new(
         py: Python<'_>,
         camera: &Bound<'_, PyAny>,
-        method: &str,
+        method: Word,
         robot_from_camera: Option<&Bound<'_, PyAny>>,
         options: Option<&Bound<'_, PyDict>>,
     ) -> PyResult<Self> {
         let camera = reader::camera(camera)?;
         let rotation = reader::robot_from_camera(robot_from_camera)?;
-        let mut parsed = core::LineOptions::for_method(method).map_err(|error| exception(&error))?;
+        let mut parsed = core::LineOptions::for_method(&method.0).map_err(|error| exception(&error))?;
         options::set(&mut parsed, options)?;
         let lens = camera.get().inner.clone();
         let inner = call_long(py, move || core::LineExtractor::new(lens, rotation, parsed))?;

@@ -14,7 +14,7 @@ use tiltvp_synth::{Image, Lens, RenderOptions, RobotPose, RoomKind, RoomOptions,
 use crate::array::Array;
 use crate::call::{call_long, exception, invalid};
 use crate::camera::Camera;
-use crate::convert::{self, Number};
+use crate::convert::{self, Number, Word};
 use crate::options;
 use crate::value::{frozen, getters};
 
@@ -39,12 +39,12 @@ impl Room {
     ))]
     fn new(
         py: Python<'_>,
-        kind: &str,
+        kind: Word,
         seed: &Bound<'_, PyAny>,
         threads: Option<&Bound<'_, PyAny>>,
         options: Option<&Bound<'_, PyDict>>,
     ) -> PyResult<Self> {
-        let kind: RoomKind = kind.parse().map_err(|error| exception(&error))?;
+        let kind: RoomKind = kind.0.parse().map_err(|error| exception(&error))?;
         let options = options::given(RoomOptions::new(kind, seed_from(seed)?), options)?;
         let world = call_on_threads(py, threads, || World::new(&options))?;
         Ok(Self { options, world: Arc::new(world) })

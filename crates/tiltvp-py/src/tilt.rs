@@ -29,7 +29,7 @@ pub(crate) use self::report::FitReport;
 use crate::array::Array;
 use crate::call::{call_long, exception, invalid};
 use crate::camera::Camera;
-use crate::convert::{self, Number};
+use crate::convert::{self, Number, Word};
 use crate::options;
 use crate::reader::{self, image_reader};
 use crate::scratch::ScratchPool;
@@ -57,14 +57,14 @@ pub(crate) struct TiltEstimator {
 impl TiltEstimator {
     #[new]
     #[pyo3(signature = (
-        camera: "Camera", *, method=core::METHODS[0], robot_from_camera: "ArrayLike | None" = None, _like=None,
+        camera: "Camera", *, method=core::METHODS[0].into(), robot_from_camera: "ArrayLike | None" = None, _like=None,
         **options: "Option"
     ))]
     #[expect(clippy::used_underscore_binding, reason = "a keyword of the package's own")]
     fn new(
         py: Python<'_>,
         camera: &Bound<'_, PyAny>,
-        method: &str,
+        method: Word,
         robot_from_camera: Option<&Bound<'_, PyAny>>,
         _like: Option<&Bound<'_, Self>>,
         options: Option<&Bound<'_, PyDict>>,
@@ -74,7 +74,7 @@ impl TiltEstimator {
         }
         let camera = reader::camera(camera)?;
         let rotation = reader::robot_from_camera(robot_from_camera)?;
-        let mut parsed = core::TiltOptions::for_method(method).map_err(|error| exception(&error))?;
+        let mut parsed = core::TiltOptions::for_method(&method.0).map_err(|error| exception(&error))?;
         options::set(&mut parsed, options)?;
         let lens = camera.get().inner.clone();
         let inner = call_long(py, move || core::TiltEstimator::new(lens, rotation, parsed))?;

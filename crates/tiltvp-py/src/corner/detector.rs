@@ -9,7 +9,7 @@ use super::feature::CornerFeature;
 use crate::array::Array;
 use crate::call::{call_long, exception, invalid};
 use crate::camera::Camera;
-use crate::convert;
+use crate::convert::{self, Word};
 use crate::options;
 use crate::reader::{self, image_reader};
 use crate::scratch::ScratchPool;
@@ -29,18 +29,18 @@ pub(crate) struct CornerDetector {
 impl CornerDetector {
     #[new]
     #[pyo3(signature = (
-        camera: "Camera", *, method=core::CornerMethod::NAMES[0], mask: "NDArray[np.bool_] | None" = None,
+        camera: "Camera", *, method=core::CornerMethod::NAMES[0].into(), mask: "NDArray[np.bool_] | None" = None,
         **options: "Option"
     ))]
     fn new(
         py: Python<'_>,
         camera: &Bound<'_, PyAny>,
-        method: &str,
+        method: Word,
         mask: Option<&Bound<'_, PyAny>>,
         options: Option<&Bound<'_, PyDict>>,
     ) -> PyResult<Self> {
         let camera = reader::camera(camera)?;
-        let mut parsed = core::DetectorOptions::for_method(method).map_err(|error| exception(&error))?;
+        let mut parsed = core::DetectorOptions::for_method(&method.0).map_err(|error| exception(&error))?;
         options::set(&mut parsed, options)?;
         let mask = mask.map(|mask| -> PyResult<Mask> {
             let (height, width, usable) = convert::mask(mask, "mask")?;

@@ -13,10 +13,9 @@ use crate::options;
 /// `(N, K)` numbers as `f32` in row order, and K.
 pub(super) fn descriptors(value: &Bound<'_, PyAny>, name: &str) -> PyResult<(Vec<f32>, usize, usize)> {
     convert::refuse_masked(value, name, "an (N, K) array of float32")?;
-    let array = value.cast::<PyArray2<f32>>().map_err(|_| {
-        let kind = value.get_type();
-        invalid(format!("{name}: {kind}, expected an (N, K) array of float32"))
-    })?;
+    let array = value
+        .cast::<PyArray2<f32>>()
+        .map_err(|_| invalid(format!("{name}: {}, expected an (N, K) array of float32", convert::describe(value))))?;
     let (n, width) = (array.readonly().as_array().nrows(), array.readonly().as_array().ncols());
     let values: Vec<f32> = array.readonly().as_array().iter().copied().collect();
     Ok((values, n, width))

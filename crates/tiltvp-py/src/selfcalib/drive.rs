@@ -9,7 +9,7 @@ use tiltvp_synth::{BearingDrive, BearingDriveKind, BearingDriveOptions};
 
 use crate::array::Array;
 use crate::call::{call_long, exception, invalid};
-use crate::convert;
+use crate::convert::{self, Word};
 use crate::options;
 use crate::value::frozen;
 
@@ -100,14 +100,14 @@ frozen!(SimulatedDrive, |own| own.options, |own| (own.options.kind.name(), own.o
 /// `mounting` is (x_m, y_m, yaw_rad), None: the paper's phi = -0.34, rho = 0.23, psi = 0.33. The noise is that of the
 /// defaults of `SelfCalibrator`, wheels are 0.4 m apart, `outliers` is the share of bearings that are of nothing.
 #[pyfunction]
-#[pyo3(signature = (kind="paper", **options: "Option | None"))]
+#[pyo3(signature = (kind="paper".into(), **options: "Option | None"))]
 pub(crate) fn simulate_drive(
     py: Python<'_>,
-    kind: &str,
+    kind: Word,
     options: Option<&Bound<'_, PyDict>>,
 ) -> PyResult<SimulatedDrive> {
     let options =
-        options::given(BearingDriveOptions { kind: kind_from(kind)?, ..BearingDriveOptions::default() }, options)?;
+        options::given(BearingDriveOptions { kind: kind_from(&kind.0)?, ..BearingDriveOptions::default() }, options)?;
     options.validate().map_err(|error| exception(&error))?;
     let drive = call_long(py, || Ok::<_, Error>(BearingDrive::new(&options)))?;
     Ok(SimulatedDrive { options, drive })
