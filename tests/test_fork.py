@@ -6,9 +6,11 @@ import multiprocessing
 import os
 import signal
 import sys
+import threading
 import time
 import warnings
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 import pytest
@@ -84,3 +86,44 @@ def test_a_pool_of_fresh_workers(camera: tiltvp.Camera, images: list[np.ndarray]
     estimator = tiltvp.TiltEstimator(camera)
     with multiprocessing.get_context("spawn").Pool(1) as pool:
         assert pool.map_async(estimator, images[:2]).get(LONGEST_S) == [estimator(image) for image in images[:2]]
+
+
+def following() -> tuple[Callable[[], object], Callable[[], object]]:
+    one = tiltvp.SelfCalibrator(wheel_base_m=0.4)
+    odometry = np.full((100, 2), 0.04)
+    bearings = np.array([[step, name, 0.1 * name] for step in range(100) for name in range(12)])
+    return lambda: one.follow(odometry, bearings), lambda: one.step(0.04, 0.05, [1, 2], [0.1, 0.2])
+
+
+def filtering() -> tuple[Callable[[], object], Callable[[], object]]:
+    one, measured = tiltvp.TiltFilter(), ([0.01, 0.02, 1.0], np.diag([1e-4, 1e-4]))
+    return lambda: one.step(measured), lambda: one.step(measured)
+
+
+def cornering() -> tuple[Callable[[], object], Callable[[], object]]:
+    noise = np.random.default_rng(7).integers(0, 255, (240, 320), dtype=np.uint8)
+    lens = tiltvp.Camera.equidistant(width=320, height=240, focal_px=70.0, cx=159.5, cy=119.5)
+    one = tiltvp.corner.CornerPoseEstimator(lens, method="general")
+    return lambda: one(noise), lambda: one(noise)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("make", [following, filtering, cornering])
+def test_fork_while_another_thread_changes_the_object(make: Callable[[], Any]) -> None:
+    """Locks of the thread, which is not in the child, were held there for ever: one of two children never ended."""
+    change, use = make()
+    done = threading.Event()
+
+    def work() -> None:
+        while not done.is_set():
+            change()
+
+    worker = threading.Thread(target=work)
+    worker.start()
+    try:
+        for pause in range(8):
+            time.sleep(0.003 * pause)
+            assert in_a_child(lambda: use() is not None)
+    finally:
+        done.set()
+        worker.join()

@@ -8,6 +8,7 @@ mod convert;
 mod corner;
 mod drive;
 mod field;
+mod forks;
 mod laboratory;
 mod level;
 mod lines;
@@ -107,6 +108,7 @@ mod _core {
             tiltvp_core::cap_simd_level(SIMD_VARIABLE, &word.to_string_lossy())
                 .map_err(|error| crate::call::exception(&error))?;
         }
+        crate::forks::watch(module.py())?;
         module.add("METHODS", tiltvp_core::tilt::METHODS.to_vec())?;
         module.add("CALIBRATION_METHODS", tiltvp_core::selfcalib::CalibrationMethod::NAMES.to_vec())?;
         module.add("CORNER_METHODS", tiltvp_core::corner::CornerMethod::NAMES.to_vec())?;

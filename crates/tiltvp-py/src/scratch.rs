@@ -1,11 +1,12 @@
 //! `ScratchPool`: the scratch of as many threads as have called at once.
 
-use std::sync::{Mutex, PoisonError};
+use std::sync::Mutex;
 
 use pyo3::prelude::*;
 use tiltvp_core::Error;
 
 use crate::call::call;
+use crate::forks::guarded;
 
 /// Scratch that no thread is using.
 pub(crate) struct ScratchPool<T>(Mutex<Vec<T>>);
@@ -24,12 +25,11 @@ impl<T: Send> ScratchPool<T> {
         new: impl FnOnce() -> T + Send,
         work: impl FnOnce(&mut T) -> Result<R, Error> + Send,
     ) -> PyResult<R> {
-        let free = || self.0.lock().unwrap_or_else(PoisonError::into_inner);
         call(py, || {
-            let taken = free().pop();
+            let taken = guarded(&self.0, Vec::pop);
             let mut scratch = taken.unwrap_or_else(new);
             let outcome = work(&mut scratch);
-            free().push(scratch);
+            guarded(&self.0, |free| free.push(scratch));
             outcome
         })
     }

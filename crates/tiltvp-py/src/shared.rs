@@ -1,25 +1,22 @@
 //! `Shared`: the state of an object that several threads use.
 
-use std::sync::{Mutex, MutexGuard, PoisonError, TryLockError};
+use std::sync::{Arc, Mutex, TryLockError};
 
 use pyo3::prelude::*;
 use tiltvp_core::Error;
 
 use crate::call::{call, call_long};
+use crate::forks::{forks, guarded, lock};
 
 /// State behind locks that nobody waits for, and nobody holds, with the interpreter in hand.
 ///
 /// With one of them held no Python object is made: that may run a collector, which may let another thread run, which may wait for
 /// the lock.
 pub(crate) struct Shared<T> {
-    /// Held by whoever changes the state, however long it takes.
-    turn: Mutex<()>,
+    /// Held by whoever changes the state, however long it takes; another one after a fork, when who held it is gone.
+    turn: Mutex<(u32, Arc<Mutex<()>>)>,
     /// Held while the state is looked at, copied or set, or changed by something short.
     state: Mutex<T>,
-}
-
-fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
-    mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 impl<T: Send> Shared<T> {
@@ -32,8 +29,17 @@ impl<T: Send> Shared<T> {
         match self.state.try_lock() {
             Ok(state) => look(&state),
             Err(TryLockError::Poisoned(state)) => look(&state.into_inner()),
-            Err(TryLockError::WouldBlock) => py.detach(|| look(&lock(&self.state))),
+            Err(TryLockError::WouldBlock) => py.detach(|| guarded(&self.state, |state| look(state))),
         }
+    }
+
+    fn turn(&self) -> Arc<Mutex<()>> {
+        guarded(&self.turn, |turn| {
+            if turn.0 != forks() {
+                *turn = (forks(), Arc::default());
+            }
+            Arc::clone(&turn.1)
+        })
     }
 
     /// Changes the state by something that takes no longer than a step. Whether an error leaves it as it was is for `change` to say.
@@ -43,8 +49,9 @@ impl<T: Send> Shared<T> {
         change: impl FnOnce(&mut T) -> Result<R, Error> + Send,
     ) -> PyResult<R> {
         call(py, || {
-            let _turn = lock(&self.turn);
-            change(&mut lock(&self.state))
+            let turn = self.turn();
+            let _turn = lock(&turn);
+            guarded(&self.state, change)
         })
     }
 }
@@ -62,11 +69,12 @@ impl<T: Clone + Send> Shared<T> {
         change: impl FnOnce(&mut T) -> Result<R, Error> + Send,
     ) -> PyResult<R> {
         call_long(py, || {
-            let _turn = lock(&self.turn);
-            let mut next = lock(&self.state).clone();
+            let turn = self.turn();
+            let _turn = lock(&turn);
+            let mut next = guarded(&self.state, |state| state.clone());
             let answer = change(&mut next)?;
             tiltvp_core::interrupt::check();
-            *lock(&self.state) = next;
+            guarded(&self.state, |state| *state = next);
             Ok(answer)
         })
     }
