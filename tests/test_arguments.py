@@ -220,3 +220,16 @@ def test_descriptors_of_another_kind_are_told_which() -> None:
         InvalidInputError, match=r"a: shape \[2, 192\] of float64, expected an \(N, K\) array of float32"
     ):
         lines.match(np.zeros((2, 192)), np.zeros((2, 192)))  # type: ignore[arg-type]
+
+
+def test_numbers_between_other_bytes_are_numbers() -> None:
+    """As fields of a table of records are, which no address is a multiple of their size."""
+    records = np.zeros(3, np.dtype([("name", "u1"), ("ray", "f8", 3), ("bearing", "f8"), ("values", "f4", 192)]))
+    rng = np.random.default_rng(1)
+    for name in ("ray", "bearing", "values"):
+        records[name] = rng.uniform(0.1, 1.0, records[name].shape)
+        assert not records[name].flags.aligned
+    plain = {name: records[name].copy() for name in ("ray", "bearing", "values")}
+    np.testing.assert_array_equal(CAMERA.project(records["ray"]), CAMERA.project(plain["ray"]))
+    assert EXTRACTOR.lines_at(records["bearing"]) == EXTRACTOR.lines_at(plain["bearing"])
+    np.testing.assert_array_equal(lines.match(records["values"], plain["values"])[:, 0], range(3))

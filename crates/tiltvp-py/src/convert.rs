@@ -46,9 +46,7 @@ fn numbers<'py>(value: &Bound<'py, PyAny>, name: &str, expected: &str) -> PyResu
 
 /// The values of an array as `f64` in row order.
 fn values(array: &Bound<'_, PyUntypedArray>) -> PyResult<Vec<f64>> {
-    let keywords = PyDict::new(array.py());
-    keywords.set_item("dtype", "float64")?;
-    let flat = array.py().import("numpy")?.call_method("ascontiguousarray", (array,), Some(&keywords))?;
+    let flat = array.py().import("numpy")?.call_method1("require", (array, "float64", "CA"))?;
     flat.call_method1("reshape", (-1,))?.cast_into::<PyArray1<f64>>()?.to_vec().map_err(Into::into)
 }
 

@@ -1,6 +1,6 @@
 //! Matches and dissimilarities of arrays of descriptors and patches.
 
-use numpy::{PyArray1, PyArray2, PyArrayMethods};
+use numpy::{PyArray1, PyArray2, PyArrayMethods, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use tiltvp_core::lines::{self as core, BearingGate, MatchOptions, Profiles, WideOptions};
@@ -16,9 +16,8 @@ pub(super) fn descriptors(value: &Bound<'_, PyAny>, name: &str) -> PyResult<(Vec
     let array = value
         .cast::<PyArray2<f32>>()
         .map_err(|_| invalid(format!("{name}: {}, expected an (N, K) array of float32", convert::describe(value))))?;
-    let (n, width) = (array.readonly().as_array().nrows(), array.readonly().as_array().ncols());
-    let values: Vec<f32> = array.readonly().as_array().iter().copied().collect();
-    Ok((values, n, width))
+    let aligned = value.py().import("numpy")?.call_method1("require", (array, "float32", "CA"))?;
+    Ok((aligned.cast::<PyArray2<f32>>()?.to_vec()?, array.shape()[0], array.shape()[1]))
 }
 
 /// Two sets of rows of equal width.
