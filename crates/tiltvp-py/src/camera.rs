@@ -54,8 +54,8 @@ impl Camera {
             let parameter = parameter(&value, &key)?;
             named.push((key, parameter));
         }
-        let build = || {
-            let model = Model::from_parameters(&model.0, width, height, &named)?;
+        let build = |model: &str| {
+            let model = Model::from_parameters(model, width, height, &named)?;
             let camera = core::Camera::new(width, height, model)?;
             let camera = match max_theta_rad {
                 Some(limit) => camera.with_max_theta_rad(limit)?,
@@ -63,7 +63,7 @@ impl Camera {
             };
             Ok(if mirror { camera.mirrored() } else { camera })
         };
-        Ok(Self { inner: build().map_err(|error| exception(&error))? })
+        Ok(Self { inner: model.choose(build)? })
     }
 
     /// The model's parameters by name, defaults included: numbers and lists of numbers.

@@ -7,6 +7,7 @@ use numpy::{
 };
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
+use tiltvp_core::Error;
 use tiltvp_core::edges::Mask;
 use tiltvp_core::geometry::{RigidMotion, Tilt};
 use tiltvp_core::image::{ColorView, ImageView};
@@ -196,7 +197,7 @@ impl<'py> FromPyObject<'_, 'py> for Number {
 
 /// A word as an argument of Python. Anything else is a word too, its look, which no choice has: who looks for the choice says what
 /// there is to choose.
-pub(crate) struct Word(pub(crate) String);
+pub(crate) struct Word(String);
 
 impl<'py> FromPyObject<'_, 'py> for Word {
     type Error = PyErr;
@@ -206,6 +207,13 @@ impl<'py> FromPyObject<'_, 'py> for Word {
 
     fn extract(value: Borrowed<'_, 'py, PyAny>) -> PyResult<Self> {
         Ok(Self(value.extract().unwrap_or_else(|_| shown(&value))))
+    }
+}
+
+impl Word {
+    /// What it stands for.
+    pub(crate) fn choose<T>(self, choice: impl FnOnce(&str) -> Result<T, Error>) -> PyResult<T> {
+        choice(&self.0).map_err(|error| exception(&error))
     }
 }
 

@@ -13,7 +13,7 @@ pub(crate) use self::matching::{descriptor_distances, match_descriptors, match_w
 pub(crate) use self::tracker::{LineTracker, TrackedLines};
 pub(crate) use self::values::Lines;
 use crate::array::Array;
-use crate::call::{call_long, exception, invalid};
+use crate::call::{call_long, invalid};
 use crate::camera::Camera;
 use crate::convert::{self, Number, Word};
 use crate::options;
@@ -55,7 +55,7 @@ impl LineExtractor {
     ) -> PyResult<Self> {
         let camera = reader::camera(camera)?;
         let rotation = reader::robot_from_camera(robot_from_camera)?;
-        let mut parsed = core::LineOptions::for_method(&method.0).map_err(|error| exception(&error))?;
+        let mut parsed = method.choose(core::LineOptions::for_method)?;
         options::set(&mut parsed, options)?;
         let lens = camera.get().inner.clone();
         let inner = call_long(py, move || core::LineExtractor::new(lens, rotation, parsed))?;

@@ -12,7 +12,7 @@ use tiltvp_core::geometry::Tilt;
 use tiltvp_synth::{Image, Lens, RenderOptions, RobotPose, RoomKind, RoomOptions, Segment, View, World, on_threads};
 
 use crate::array::Array;
-use crate::call::{call_long, exception, invalid};
+use crate::call::{call_long, invalid};
 use crate::camera::Camera;
 use crate::convert::{self, Number, Word};
 use crate::options;
@@ -44,7 +44,7 @@ impl Room {
         threads: Option<&Bound<'_, PyAny>>,
         options: Option<&Bound<'_, PyDict>>,
     ) -> PyResult<Self> {
-        let kind: RoomKind = kind.0.parse().map_err(|error| exception(&error))?;
+        let kind: RoomKind = kind.choose(str::parse)?;
         let options = options::given(RoomOptions::new(kind, seed_from(seed)?), options)?;
         let world = call_on_threads(py, threads, || World::new(&options))?;
         Ok(Self { options, world: Arc::new(world) })

@@ -74,7 +74,7 @@ impl TiltEstimator {
         }
         let camera = reader::camera(camera)?;
         let rotation = reader::robot_from_camera(robot_from_camera)?;
-        let mut parsed = core::TiltOptions::for_method(&method.0).map_err(|error| exception(&error))?;
+        let mut parsed = method.choose(core::TiltOptions::for_method)?;
         options::set(&mut parsed, options)?;
         let lens = camera.get().inner.clone();
         let inner = call_long(py, move || core::TiltEstimator::new(lens, rotation, parsed))?;

@@ -40,7 +40,7 @@ impl CornerDetector {
         options: Option<&Bound<'_, PyDict>>,
     ) -> PyResult<Self> {
         let camera = reader::camera(camera)?;
-        let mut parsed = core::DetectorOptions::for_method(&method.0).map_err(|error| exception(&error))?;
+        let mut parsed = method.choose(core::DetectorOptions::for_method)?;
         options::set(&mut parsed, options)?;
         let mask = mask.map(|mask| -> PyResult<Mask> {
             let (height, width, usable) = convert::mask(mask, "mask")?;

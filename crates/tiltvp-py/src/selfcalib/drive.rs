@@ -8,7 +8,7 @@ use tiltvp_core::selfcalib::{self as core, SelfCalibratorOptions};
 use tiltvp_synth::{BearingDrive, BearingDriveKind, BearingDriveOptions};
 
 use crate::array::Array;
-use crate::call::{call_long, exception, invalid};
+use crate::call::{call_long, exception};
 use crate::convert::{self, Word};
 use crate::options;
 use crate::value::frozen;
@@ -106,8 +106,10 @@ pub(crate) fn simulate_drive(
     kind: Word,
     options: Option<&Bound<'_, PyDict>>,
 ) -> PyResult<SimulatedDrive> {
-    let options =
-        options::given(BearingDriveOptions { kind: kind_from(&kind.0)?, ..BearingDriveOptions::default() }, options)?;
+    let options = options::given(
+        BearingDriveOptions { kind: kind.choose(kind_from)?, ..BearingDriveOptions::default() },
+        options,
+    )?;
     options.validate().map_err(|error| exception(&error))?;
     let drive = call_long(py, || Ok::<_, Error>(BearingDrive::new(&options)))?;
     Ok(SimulatedDrive { options, drive })
@@ -115,13 +117,13 @@ pub(crate) fn simulate_drive(
 
 /// (L, 2): distance in metres and turn in radians of the legs of a trajectory of `simulate_drive`.
 #[pyfunction]
-#[pyo3(signature = (kind="paper"))]
-pub(crate) fn drive_legs<'py>(py: Python<'py>, kind: &str) -> PyResult<Array<'py, f64>> {
-    let rows: Vec<[f64; 2]> = kind_from(kind)?.legs().into_iter().map(Into::into).collect();
+#[pyo3(signature = (kind="paper".into()))]
+pub(crate) fn drive_legs(py: Python<'_>, kind: Word) -> PyResult<Array<'_, f64>> {
+    let rows: Vec<[f64; 2]> = kind.choose(kind_from)?.legs().into_iter().map(Into::into).collect();
     convert::to_rows(py, &rows, false)
 }
 
-fn kind_from(name: &str) -> PyResult<BearingDriveKind> {
-    BearingDriveKind::from_name(name)
-        .ok_or_else(|| invalid(format!("kind = {name:?}, expected one of {}", BearingDriveKind::NAMES.join(", "))))
+fn kind_from(name: &str) -> Result<BearingDriveKind, Error> {
+    let expected = || format!("one of {}", BearingDriveKind::NAMES.join(", "));
+    BearingDriveKind::from_name(name).ok_or_else(|| Error::argument("kind", format!("{name:?}"), expected()))
 }
