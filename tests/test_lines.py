@@ -335,17 +335,19 @@ def test_lines_match_after_more_than_a_metre(mirror: tiltvp.Camera, office: Room
 @pytest.mark.parametrize(
     "wrong",
     [{"bearing_rad": [math.nan]}, {"bearing_rad": [math.inf]}, {"sigma_rad": [math.nan]}, {"sigma_rad": [-1.0]},
-     {"sigma_rad": [1e300]}, {"polarity": [math.nan]}, {"polarity": [-2.0]}],
+     {"sigma_rad": [1e300]}, {"polarity": [math.nan]}, {"polarity": [-2.0]}, {"elevation_max_rad": [math.inf]},
+     {"normal": [0.0, 0.0, 0.0]}],
 )  # fmt: skip
-def test_what_are_no_bearings_are_neither_followed_nor_matched(camera: tiltvp.Camera, wrong: dict[str, Any]) -> None:
+def test_what_is_no_line_is_not_made_one(camera: tiltvp.Camera, wrong: dict[str, Any]) -> None:
     line = tl.LineExtractor(camera).lines_at([0.5])
-    none, tracker = tl.Lines.from_dict({**line.to_dict(), **wrong}), tl.LineTracker()
+    with pytest.raises(InvalidInputError, match="lines: got"):
+        tl.Lines.from_dict({**line.to_dict(), **wrong})
+
+
+def test_numbers_that_tell_no_motion_are_refused(camera: tiltvp.Camera) -> None:
+    line, tracker = tl.LineExtractor(camera).lines_at([0.5]), tl.LineTracker()
     tracker.update(line, np.ones((1, 192), np.float32), yaw_change_rad=0.0, distance_m=0.0)
     before = copy.copy(tracker)
-    with pytest.raises(InvalidInputError, match="lines: got a bearing of"):
-        tracker.update(none, np.ones((1, 192), np.float32), yaw_change_rad=0.0, distance_m=0.0)
-    with pytest.raises(InvalidInputError, match="lines: got a bearing of"):
-        tl.match_wide(line, np.ones((1, 190), np.float32), none, np.ones((1, 190), np.float32))
     with pytest.raises(InvalidInputError, match="distance_m"):
         tracker.update(line, np.ones((1, 192), np.float32), yaw_change_rad=0.0, distance_m=1e200)
     assert tracker == before

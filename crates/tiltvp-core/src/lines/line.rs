@@ -81,13 +81,13 @@ impl Lines {
         }
     }
 
-    /// Whether they are lines by rising bearing of what is perhaps known to have found others.
+    /// Whether they are lines of what is perhaps known to have found others, where `ordered` by rising bearing.
     ///
     /// # Errors
-    /// Those of [`check`](Self::check), and [`Error::InvalidArgument`] for another order, camera or mounting.
-    pub(super) fn check_after(&self, seen_by: Option<u32>) -> Result<()> {
+    /// Those of [`check`](Self::check), and [`Error::InvalidArgument`] for another camera, mounting or order.
+    pub(super) fn check_after(&self, seen_by: Option<u32>, ordered: bool) -> Result<()> {
         self.check()?;
-        if !self.lines.is_sorted_by(|a, b| a.bearing_rad <= b.bearing_rad) {
+        if ordered && !self.lines.is_sorted_by(|a, b| a.bearing_rad <= b.bearing_rad) {
             return Err(Error::argument("lines", "bearings in another order", "lines by rising bearing"));
         }
         seen_by.map_or(Ok(()), |seen_by| self.frame.check_seen_by(seen_by))

@@ -68,8 +68,8 @@ impl LineTracker {
     /// predicted after it.
     ///
     /// # Errors
-    /// [`Error::InvalidArgument`] unless there is a descriptor for each line, as wide as those before, bearings are angles that rise, of
-    /// the camera and mounting of those before, the motion is one, and there are numbers left for the frame and its lines; the tracker
+    /// [`Error::InvalidArgument`] unless there is a descriptor for each line, as wide as those before, bearings are angles, which rise
+    /// where matches are `ordered`, of the camera and mounting of those before, the motion is one, and there are numbers left for the frame and its lines; the tracker
     /// is as before.
     pub fn update(
         &mut self,
@@ -78,7 +78,7 @@ impl LineTracker {
         motion: Option<&Motion>,
         out: &mut Vec<TrackedLine>,
     ) -> Result<()> {
-        lines.check_after(self.state.seen_by)?;
+        lines.check_after(self.state.seen_by, self.options.matching.ordered)?;
         let seen_by = lines.frame.seen_by.or(self.state.seen_by);
         let lines = &lines.lines;
         let width = self.check(lines, descriptors, motion)?;
