@@ -151,6 +151,12 @@ LONG = {
         alpha = np.random.default_rng(1).uniform(0.0, 0.1, 3_000_000)
         call = lambda: tiltvp.train_posterior(100.0 * alpha + 0.3, alpha, prior=tiltvp.PriorOfTilt.uniform(0.1))
     """,
+    "wide": """
+        lines = tiltvp.lines.LineExtractor(tiltvp.Camera.equidistant(
+            width=640, height=480, focal_px=139.7, cx=319.5, cy=239.5)).lines_at(np.linspace(-3.0, 3.0, 500))
+        values = np.random.default_rng(1).uniform(0, 255, (500, 190)).astype(np.float32)
+        call = lambda: tiltvp.lines.match_wide(lines, values, lines, values)
+    """,
     "room": """
         call = lambda: tiltvp.synth.Room("office", 1, extent=4.0)
     """,

@@ -7,7 +7,7 @@ use pyo3::prelude::*;
 use tiltvp_core::tilt as core;
 
 use crate::array::Array;
-use crate::call::{call, call_long, exception, invalid};
+use crate::call::{call, call_long, invalid};
 use crate::camera::Camera;
 use crate::convert;
 use crate::reader;
@@ -51,7 +51,7 @@ impl Leveller {
             (None, Some(rays)) => {
                 let rays = convert::rows::<3>(rays, "rays")?.0;
                 let rays: Vec<_> = rays.iter().map(|ray| ray.map(|x| x as f32)).collect();
-                core::Leveller::from_rays(lens, &mounting, columns, &rays).map_err(|error| exception(&error))?
+                call_long(py, || core::Leveller::from_rays(lens, &mounting, columns, &rays))?
             }
             _ => return Err(invalid("shown, rays: both or none, expected one of them".to_owned())),
         };

@@ -5,7 +5,7 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use tiltvp_core::lines::{self as core, BearingGate, MatchOptions, Profiles, WideOptions};
 
-use crate::call::{call, invalid};
+use crate::call::{call, call_long, invalid};
 use crate::convert::{self, Number};
 use crate::lines::values::Lines;
 use crate::options;
@@ -121,7 +121,7 @@ pub(crate) fn match_wide<'py>(
         }
     };
     let (first, second) = (&lines_a.get().inner, &lines_b.get().inner);
-    let matches = call(py, || {
+    let matches = call_long(py, || {
         let (mut scratch, mut out) = (core::WideScratch::default(), Vec::new());
         let (a, b) = (Profiles { lines: first, values: &a }, Profiles { lines: second, values: &b });
         core::match_wide(&a, &b, ahead, &parsed, &mut scratch, &mut out)?;

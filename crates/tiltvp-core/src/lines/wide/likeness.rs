@@ -1,5 +1,6 @@
 //! How alike profiles of lines are at every shift of the logarithm of the height.
 
+use crate::interrupt::check;
 use crate::lines::description::profile_rows::{ABOVE, BELOW, ROWS, VALUES, elevation_rad};
 use crate::lines::line::Lines;
 
@@ -125,6 +126,7 @@ pub(super) fn likenesses(a: &Weighted, b: &Weighted, same: impl Fn(usize, usize)
     out.clear();
     out.reserve(n * m * COURSE);
     for i in 0..n {
+        check();
         for j in 0..m {
             if same(i, j) {
                 out.extend((0..COURSE).map(|k| likeness(a.line(i), b.line(j), k as isize - SHIFTS as isize)));

@@ -92,7 +92,8 @@ const RIVAL_TOLD: f64 = 0.4;
 /// second as the one and the other see it, a bearing in each, where it is known, as by odometry.
 ///
 /// # Errors
-/// [`Error::InvalidOption`], or [`Error::InvalidArgument`] unless both have a whole profile for each line, and one camera and mounting.
+/// [`Error::InvalidOption`], or [`Error::InvalidArgument`] unless both have a whole profile for each line, rise, and are of one camera
+/// and mounting.
 pub fn match_wide(
     a: &Profiles<'_>,
     b: &Profiles<'_>,
@@ -110,7 +111,7 @@ pub fn match_wide(
             let expected = format!("{width} for each line, as descriptor_kind \"profile\" has them");
             return Err(Error::argument(name, got, expected));
         }
-        image.lines.check_after(a.lines.frame.seen_by)?;
+        image.lines.check_after(a.lines.frame.seen_by, true)?;
     }
     if ahead.is_some_and(|ahead| ahead.iter().any(|angle| !angle.is_finite())) {
         return Err(Error::argument("ahead", "an angle that is not finite", "two bearings"));

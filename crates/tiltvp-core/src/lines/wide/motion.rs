@@ -7,6 +7,7 @@
 use std::f64::consts::PI;
 
 use super::likeness::{COURSE, NEVER, SHIFTS};
+use crate::interrupt::check;
 use crate::lines::angles::wrap;
 use crate::lines::description::profile_rows::PITCH;
 
@@ -100,6 +101,7 @@ impl Search {
 
     /// How much a motion explains: the sum over lines of what their best pair scores above `least`, of the image where it is less.
     fn total(&mut self, a: &[f64], b: &[f64], motion: &mut Motion, coarse: bool, least: f32) {
+        check();
         self.under(a, b, motion, coarse);
         let Self { scores, columns, .. } = self;
         columns.clear();
