@@ -1894,7 +1894,8 @@ class LineTracker:
 
         `yaw_change_rad` is its turn, positive to the left, `distance_m` how far the middle between its wheels went
         along the arc, negative backwards. Raises `tiltvp.errors.InvalidInputError` for descriptors of another number or
-        width, bearings and motions that are none, and a distance without a turn; the tracker is as before then.
+        width, lines of another camera or mounting than those before, bearings and motions that are none, and a distance
+        without a turn; the tracker is as before then.
         """
 
 @final
@@ -3449,7 +3450,7 @@ def corner_poses(
 def descriptor_distances(a: NDArray[np.float32], b: NDArray[np.float32]) -> NDArray[np.float64]:
     """(N_A, N_B): Euclidean distances of descriptors, eq. 6 (Scaramuzza 2009)."""
 
-def drive_legs(kind: str = "paper") -> NDArray[np.float64]:
+def drive_legs(kind: str = ...) -> NDArray[np.float64]:
     """(L, 2): distance in metres and turn in radians of the legs of a trajectory of `simulate_drive`."""
 
 def fit_corner(x: ArrayLike, y: ArrayLike, z: ArrayLike, sigma_rad: float) -> CornerFeature:
@@ -3599,7 +3600,7 @@ def simd_level() -> str:
     """
 
 def simulate_drive(
-    kind: str = "paper",
+    kind: str = ...,
     *,
     seed: SupportsIndex | None = None,
     mounting: ArrayLike | None = None,
