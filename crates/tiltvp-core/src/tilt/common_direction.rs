@@ -8,7 +8,7 @@ use super::confidence::inverse_of_positive;
 use super::methods::subsample::Subsample;
 use super::methods::{RefineOptions, refine};
 use crate::error::{Error, Result};
-use crate::geometry::{tangent_basis, unit};
+use crate::geometry::tangent_basis;
 use crate::options;
 use crate::options::Between;
 use crate::robust::{Gate, Rows, Stop};
@@ -222,6 +222,12 @@ fn validate(
     }
     options.validate()?;
     unit_prior(options)
+}
+
+/// The unit vector of any finite vector but zero, however large or small.
+fn unit(vector: &Vector3<f64>) -> Option<Vector3<f64>> {
+    let largest = vector.amax();
+    (vector.iter().all(|x| x.is_finite()) && largest > 0.0).then(|| (vector / largest).normalize())
 }
 
 #[cfg(test)]
