@@ -2649,7 +2649,7 @@ class SelfCalibrator:
             "default": Probability with which a bearing passes the gate if its covariance is right. Default: 0.9999.
         keyframes_max
             "default": Size of the sliding window: keyframes that are kept and relinearised. The older half is
-            marginalised when there are more. Default: 400.
+            marginalised when there are more, or 300 landmarks with one bearing each. Default: 400.
         step_sigma_m
             "default": Standard deviation of every step's motion in either direction, beside eq. 31, metres. Default: 0.
         step_sigma_rad

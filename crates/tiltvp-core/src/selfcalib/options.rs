@@ -48,7 +48,7 @@ options! {
         /// Probability with which a bearing passes the gate if its covariance is right.
         [where is_default, "it is one of method \"default\""] gate_probability: f64 = 0.9999
             => Between(0.0, 1.0), "a probability strictly between 0 and 1";
-        /// Size of the sliding window: keyframes that are kept and relinearised. The older half is marginalised when there are more.
+        /// Size of the sliding window: keyframes that are kept and relinearised. The older half is marginalised when there are more, or 300 landmarks with one bearing each.
         [where is_default, "it is one of method \"default\""] keyframes_max: u32 = 400 => 8.0..=1e5, "a whole number from 8 to 100000";
         /// Standard deviation of every step's motion in either direction, beside eq. 31, metres.
         [where is_default, "it is one of method \"default\""] step_sigma_m: f64 = 0.0 => NOT_NEGATIVE, "a number from 0";

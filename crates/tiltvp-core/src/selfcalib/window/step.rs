@@ -5,8 +5,8 @@ use nalgebra::Vector3;
 use super::state::{MOUNTING, SlidingWindow};
 use super::tuning::{
     DISPUTED_REJECTIONS, EVERY_STEP_KEYFRAMES, GROWTH, INCONSISTENT_GROWTH, INCONSISTENT_MOVED_SIGMAS, ITERATIONS,
-    LOOP_KEYFRAMES, LOST_REJECTIONS, MOVED_SIGMAS, SIGMA_RATIO, SPURIOUS_KEYFRAMES, SPURIOUS_SHARE, TRUSTED_SIGMAS,
-    UNTRUSTED_ITERATIONS,
+    LOOP_KEYFRAMES, LOST_REJECTIONS, MOVED_SIGMAS, SEEN_ONCE_MAX, SIGMA_RATIO, SPURIOUS_KEYFRAMES, SPURIOUS_SHARE,
+    TRUSTED_SIGMAS, UNTRUSTED_ITERATIONS,
 };
 use super::update::MatchedBearing;
 use crate::geometry::wrap_angle;
@@ -35,7 +35,9 @@ impl SlidingWindow {
             let every_step = keyframes < EVERY_STEP_KEYFRAMES;
             self.relinearise(if every_step || !trusted { UNTRUSTED_ITERATIONS } else { ITERATIONS }, trusted);
             self.recheck_rejected(&rejected, &mut recorded);
-            if keyframes > self.options.keyframes_max as usize {
+            // Half of the window is not to be solved at every step.
+            let crowded = keyframes >= 2 * EVERY_STEP_KEYFRAMES && self.landmarks_seen_once() > SEEN_ONCE_MAX;
+            if keyframes > self.options.keyframes_max as usize || crowded {
                 self.marginalise(keyframes / 2);
             }
             self.schedule(shrunk && !self.any_sigma_below(&(solved * SIGMA_RATIO)));
@@ -58,6 +60,13 @@ impl SlidingWindow {
         self.next_relinearisation = grown.max(keyframes + 1);
         let soon = keyframes + (keyframes / SPURIOUS_SHARE).max(SPURIOUS_KEYFRAMES);
         self.spurious_until = if spurious { soon } else { self.spurious_until.min(soon) };
+    }
+
+    /// How many landmarks have one bearing in the window.
+    fn landmarks_seen_once(&self) -> usize {
+        let mut bearings = vec![0; self.problem.landmarks.len()];
+        self.problem.observations().for_each(|observation| bearings[observation.landmark] += 1);
+        bearings.iter().filter(|count| **count == 1).count()
     }
 
     /// Whether a standard deviation of the mounting is below its limit.
@@ -165,5 +174,19 @@ mod tests {
             solved = filter.solved_keyframes;
         }
         assert!(solutions < steps / 4, "{solutions} solutions in {steps} steps");
+    }
+
+    /// Names that are seen once, as of tracks that break, are dropped.
+    #[test]
+    fn names_that_are_seen_once_do_not_fill_the_window() {
+        let options = SelfCalibratorOptions { wheel_base_m: 0.4, ..SelfCalibratorOptions::default() };
+        let mut filter = SlidingWindow::new(&options).unwrap();
+        let mut most = 0;
+        for step in 0..150u64 {
+            let seen: Vec<(u64, f64)> = (0..5).map(|k| (5 * step + k, wrap_angle((5 * step + k) as f64))).collect();
+            filter.step(&WheelMotion::from_motion(0.05, 0.02, 0.4), &seen);
+            most = most.max(filter.landmarks());
+        }
+        assert!((SEEN_ONCE_MAX..500).contains(&most), "{most}");
     }
 }

@@ -16,6 +16,11 @@ pub(super) const GROWTH: f64 = 2.0;
 /// The same growth while the filter is inconsistent: some 25 solutions for every factor of 30 instead of 5.
 pub(super) const INCONSISTENT_GROWTH: f64 = 1.15;
 
+/// Landmarks with one bearing in the window, as of tracks that break, above which its older half is marginalised early, with those
+/// that are not seen any more. With five new names a step, of 500, a step took 115 ms in the mean and 17 s at most, with this 10 and
+/// 0.96 s, and errors are the same. Of the logs measured here none has so many.
+pub(super) const SEEN_ONCE_MAX: usize = 300;
+
 /// Standard deviations by which the mounting may move from the last solution. At one the solution is about as far from the point
 /// of linearisation as from the truth. With half or twice of it errors of simulated drives stay the same within 4 %.
 pub(super) const MOVED_SIGMAS: f64 = 1.0;
