@@ -69,8 +69,8 @@ impl LineTracker {
     ///
     /// # Errors
     /// [`Error::InvalidArgument`] unless there is a descriptor for each line, as wide as those before, bearings are angles, which rise
-    /// where matches are `ordered`, of the camera and mounting of those before, the motion is one, and there are numbers left for the frame and its lines; the tracker
-    /// is as before.
+    /// where matches are `ordered`, lines are of the camera and mounting of those before, the motion is one, and there are numbers left
+    /// for the frame and its lines; the tracker is as before.
     pub fn update(
         &mut self,
         lines: &Lines,
