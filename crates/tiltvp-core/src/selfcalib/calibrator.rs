@@ -126,7 +126,7 @@ impl SelfCalibrator {
                     filter.monitor().alarmed(),
                 )
                 .judged(examination.contradictions, examination.suspect)
-                .doubting(examination.doubted_centre.as_ref(), &filter.covariance_by_centre(), start)
+                .doubting(examination.doubted_centre.as_ref(), || filter.covariance_by_centre(), start)
             }
             Filter::Paper(filter) => {
                 let Some((polar, covariance)) = filter.mounting() else {

@@ -61,8 +61,13 @@ impl MountingEstimate {
 
     /// This estimate with the image centre suspect, where its doubt alone is why not everything is determined: with the covariance
     /// `known` of a centre as told, and that at the start, everything is.
-    pub(crate) fn doubting(self, centre: Option<&Deviation>, known: &Matrix3<f64>, start: &Matrix3<f64>) -> Self {
-        let determined = || Observability::new(&self.mounting, known, start).complete();
+    pub(crate) fn doubting(
+        self,
+        centre: Option<&Deviation>,
+        known: impl FnOnce() -> Matrix3<f64>,
+        start: &Matrix3<f64>,
+    ) -> Self {
+        let determined = || Observability::new(&self.mounting, &known(), start).complete();
         match centre {
             Some(centre) if self.suspect.is_none() && !self.observability.complete() && determined() => {
                 Self { suspect: Some(Suspect { cause: Cause::Centre, value: centre.value }), ..self }

@@ -361,7 +361,7 @@ fn report(
             false,
         )
         .judged(counts, suspect)
-        .doubting(centre, &widened_by(None), &start),
+        .doubting(centre, || widened_by(None), &start),
         wheels: problem.wheels,
         wheels_sigma: if free.wheels { [sigma(3), sigma(4) * problem.wheels.base_m] } else { [0.0; 2] },
         time_offset_s: problem.offset_s,

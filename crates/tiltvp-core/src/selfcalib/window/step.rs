@@ -35,7 +35,7 @@ impl SlidingWindow {
             let every_step = keyframes < EVERY_STEP_KEYFRAMES;
             self.relinearise(if every_step || !trusted { UNTRUSTED_ITERATIONS } else { ITERATIONS }, trusted);
             self.recheck_rejected(&rejected, &mut recorded);
-            // Half of the window is not to be solved at every step.
+            // Not so soon that what is left is solved at every step.
             let crowded = keyframes >= 2 * EVERY_STEP_KEYFRAMES && self.landmarks_seen_once() > SEEN_ONCE_MAX;
             if keyframes > self.options.keyframes_max as usize || crowded {
                 self.marginalise(keyframes / 2);

@@ -17,8 +17,8 @@ pub(super) const GROWTH: f64 = 2.0;
 pub(super) const INCONSISTENT_GROWTH: f64 = 1.15;
 
 /// Landmarks with one bearing in the window, as of tracks that break, above which its older half is marginalised early, with those
-/// that are not seen any more. With five new names a step, of 500, a step took 115 ms in the mean and 17 s at most, with this 10 and
-/// 0.96 s, and errors are the same. Of the logs measured here none has so many.
+/// that are not seen any more. With five new names a step, of 500, a step took 115 ms in the mean and 17 s at most, with this 13 and
+/// 1.0 s, and errors are the same. Of the logs measured here none has so many.
 pub(super) const SEEN_ONCE_MAX: usize = 300;
 
 /// Standard deviations by which the mounting may move from the last solution. At one the solution is about as far from the point
