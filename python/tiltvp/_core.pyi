@@ -2014,6 +2014,10 @@ class LogCalibration:
         """Linearisations."""
 
     @property
+    def merged_landmarks(self) -> list[int]:
+        """Names of landmarks whose bearings are those of two places, which were taken apart."""
+
+    @property
     def misreading(self) -> str | None:
         """How the log may have been meant, where it fits that way only: "reflected" (wheels swapped, both negated, or
         bearings clockwise), "left wheel negated", "right wheel negated", "degrees", "millimetres" or "cumulative". None

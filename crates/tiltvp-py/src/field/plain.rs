@@ -73,6 +73,10 @@ same_object! {
         bits.push(x.len() as u64);
         bits.extend(x.iter().map(|n| *n as u64));
     }, Some(format!("{x:?}"));
+    Vec<u64>, "whole numbers", |x, bits| {
+        bits.push(x.len() as u64);
+        bits.extend(x);
+    }, Some(format!("{x:?}"));
     [usize; 3], "three whole numbers", |x, bits| bits.extend(x.map(|n| n as u64)), Some(format!("{x:?}"));
     [f64; 3], "three numbers", |x, bits| bits.extend(x.map(number_bits)), Some(in_brackets(x.iter().map(|x| number(*x))));
 }

@@ -54,6 +54,8 @@ value! {
         /// Fresh (N, 2) float64: the parts of the drive whose motions the bearings contradict, as on a carpet, each from which share of it
         /// to which, 0 to 1. Their odometry is taken to have ten times its standard deviations.
         doubted: Vec<Vector2<f64>>,
+        /// Names of landmarks whose bearings are those of two places, which were taken apart.
+        merged_landmarks: Vec<u64>,
         /// Whether the answer can be relied upon, and what speaks against it, in a sentence.
         reason: String = own.to_string(),
     }
@@ -74,6 +76,7 @@ value! {
         odometry_k_m,
         misreading: misread(misreading.as_deref())?,
         doubted,
+        merged_landmarks,
     };
     repr format!(
         "LogCalibration({}, residual_rms={:.3}, bearings={}, outliers={}, converged={})",

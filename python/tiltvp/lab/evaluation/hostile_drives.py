@@ -34,6 +34,7 @@ CAUSES: Final = {
     "K told": "odometry_k_m",
     "bearings 0.2 s late": "later than the odometry",
     "camera bumped": "bump",
+    "two landmarks merged": "under one name",
     "image centre": "image centre",
     "straight": "rotate in place",
     "rotation": "drive straight",

@@ -5,14 +5,10 @@ use std::collections::BTreeMap;
 use nalgebra::Vector3;
 
 use super::log::{LogBearing, LogOptions, LogStep, SortedLog};
+use super::triangulation::triangulated;
 use crate::geometry::wrap_angle;
-use crate::selfcalib::bundle::{
-    BundleProblem, DISTANCE_STEP, DISTANCE_STEPS, FIRST_DAMPING, FreeParameters, Keyframe, Observation,
-};
-use crate::selfcalib::model::{
-    BearingLoss, InverseDistanceLandmark, RelativeMotion, WheelMotion, camera_position, compose, landmark_from_bearing,
-    predict,
-};
+use crate::selfcalib::bundle::{BundleProblem, FIRST_DAMPING, FreeParameters, Keyframe, Observation};
+use crate::selfcalib::model::{BearingLoss, RelativeMotion, WheelMotion, compose};
 
 /// Keyframes after which the log so far is solved: a fifth of those that there are, at least 5, at most 50. A fifth makes the work
 /// of all stages six times that of the last. At most 50 keep the drift between stages below what a loop closure can mend.
@@ -36,9 +32,6 @@ const MOST_OBSERVATIONS: usize = 12;
 /// of an early stage explains, and standard deviations, which only two landmarks with one identifier exceed.
 const DISAGREEMENT_SHARE: f64 = 0.1;
 const DISAGREEMENT_SIGMAS: f64 = 6.0;
-
-/// Step of the second line search over the distance, which covers one step of the first to either side.
-const FINE_DISTANCE_STEP: f64 = 0.05;
 
 /// Iterations and tolerance of the cost with which the problem is solved while it grows: the next stage goes on from there.
 const STAGE_ITERATIONS: u32 = 6;
@@ -66,6 +59,9 @@ struct IncrementalProblem<'a> {
     standing: (WheelMotion, f64),
 }
 
+/// A problem, and the identifiers of its landmarks.
+pub(super) type NamedProblem = (BundleProblem, Vec<u64>);
+
 /// The problem of the whole log, solved roughly as it grows. `free` is what is estimated meanwhile.
 ///
 /// Where `loops` are closed a landmark keeps its place when it is seen again; otherwise it counts as another one after some
@@ -75,25 +71,23 @@ pub(super) fn incremental_problem(
     guess: &Vector3<f64>,
     free: FreeParameters,
     loops: bool,
-) -> BundleProblem {
+) -> NamedProblem {
     let mut growing = IncrementalProblem::new(log.options, guess, free, if loops { usize::MAX } else { LOOP_GAP });
     growing.add_log(log, true);
     growing.initialise_landmarks(LEAST_OBSERVATIONS, PARALLAX_RAD);
     growing.solve();
     growing.problem.reanchor();
-    growing.initialise_landmarks(1, 0.0);
-    growing.problem
+    growing.named()
 }
 
 /// The problem of the whole log with the mounting and the poses of another problem, as far as that goes.
-pub(super) fn problem_along(log: &SortedLog<'_>, other: &BundleProblem, free: FreeParameters) -> BundleProblem {
+pub(super) fn problem_along(log: &SortedLog<'_>, other: &BundleProblem, free: FreeParameters) -> NamedProblem {
     let mut growing = IncrementalProblem::new(log.options, &other.mounting, free, usize::MAX);
     growing.add_log(log, false);
     for (keyframe, other) in growing.problem.keyframes.iter_mut().zip(&other.keyframes) {
         keyframe.pose = other.pose;
     }
-    growing.initialise_landmarks(1, 0.0);
-    growing.problem
+    growing.named()
 }
 
 impl<'a> IncrementalProblem<'a> {
@@ -128,6 +122,16 @@ impl<'a> IncrementalProblem<'a> {
         if !self.has_bearings && self.problem.keyframes.len() > 1 {
             self.problem.keyframes.pop();
         }
+    }
+
+    /// The problem with all landmarks.
+    fn named(mut self) -> NamedProblem {
+        self.initialise_landmarks(1, 0.0);
+        let mut names = vec![0; self.problem.landmarks.len()];
+        for (name, (slot, _)) in self.initialised {
+            names[slot] = name;
+        }
+        (self.problem, names)
     }
 
     fn solve(&mut self) {
@@ -188,7 +192,7 @@ impl<'a> IncrementalProblem<'a> {
         for id in ids {
             let Some(seen) = self.candidates.get(&id).filter(|seen| seen.len() >= observations) else { continue };
             let angle = self.parallax(seen);
-            let (landmark, off) = self.triangulated(seen);
+            let (landmark, off) = triangulated(&self.problem, &self.options.filter, seen);
             let agree = off <= DISAGREEMENT_SHARE * angle + DISAGREEMENT_SIGMAS * self.problem.bearing_sigma;
             if !(observations == 1 || angle >= parallax && agree || seen.len() >= MOST_OBSERVATIONS) {
                 continue;
@@ -213,40 +217,6 @@ impl<'a> IncrementalProblem<'a> {
             (low.min(d), high.max(d))
         });
         high - low
-    }
-
-    /// The landmark in the direction of its first bearing, at the distance of the least mean disagreement of all bearings, and that
-    /// disagreement in radians.
-    fn triangulated(&self, seen: &[(usize, f64)]) -> (InverseDistanceLandmark, f64) {
-        let problem = &self.problem;
-        let pose = |keyframe: usize| problem.observation_pose(keyframe).0;
-        let (first, bearing) = seen[0];
-        let first = pose(first);
-        let anchor = camera_position(&first, &problem.mounting);
-        let off = |landmark: &InverseDistanceLandmark| {
-            let one = |(keyframe, bearing): &(usize, f64)| {
-                wrap_angle(predict(&pose(*keyframe), &problem.mounting, landmark).bearing - bearing).abs()
-            };
-            seen.iter().map(one).sum::<f64>() / seen.len() as f64
-        };
-        let at = |inverse: f64| landmark_from_bearing(anchor, inverse, &first, &problem.mounting, bearing);
-        let direction = bearing + first.z + problem.mounting.z;
-        let prior = -self.options.filter.start_distance_m.ln();
-        let unlikely = |inverse: f64| {
-            let sigmas = (inverse - prior) / self.options.filter.start_distance_log_sigma;
-            0.5 * sigmas * sigmas * problem.bearing_sigma / seen.len() as f64
-        };
-        let mut best = prior;
-        for step in [DISTANCE_STEP, FINE_DISTANCE_STEP] {
-            let near = best;
-            best = (-DISTANCE_STEPS..=DISTANCE_STEPS)
-                .map(|k| near + step * f64::from(k))
-                .filter_map(|inverse| Some((inverse, off(&at(inverse)?) + unlikely(inverse))))
-                .min_by(|a, b| a.1.total_cmp(&b.1))
-                .map_or(near, |(inverse, _)| inverse);
-        }
-        let landmark = InverseDistanceLandmark { anchor, direction, log_inverse_distance: best };
-        (landmark, off(&landmark))
     }
 }
 

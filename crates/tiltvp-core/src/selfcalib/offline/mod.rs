@@ -3,8 +3,10 @@
 mod descent;
 mod incremental;
 mod log;
+mod merged_landmarks;
 mod misreading;
 mod noise;
+mod triangulation;
 mod whole_log;
 
 pub use self::log::{LogBearing, LogOptions};

@@ -6,8 +6,9 @@ use std::fmt;
 use nalgebra::{DMatrix, Matrix3, Vector2};
 
 use super::descent::{TOLERANCE, solve, solve_without_slips};
-use super::incremental::{incremental_problem, problem_along};
+use super::incremental::{NamedProblem, incremental_problem, problem_along};
 use super::log::{LogBearing, LogOptions, SortedLog};
+use super::merged_landmarks::solve_with_splits;
 use super::misreading::Misreading;
 use super::noise::{solve_with_doubt, solve_with_noise};
 use crate::error::{Error, Result};
@@ -58,6 +59,8 @@ pub struct LogCalibration {
     /// The parts of the drive whose motions the bearings contradict, as on a carpet, each from which share of it to which. Their odometry is
     /// taken to have ten times its standard deviations.
     pub doubted: Vec<Vector2<f64>>,
+    /// Identifiers of landmarks whose bearings are those of two places, which were taken apart.
+    pub merged_landmarks: Vec<u64>,
 }
 
 impl LogCalibration {
@@ -85,6 +88,10 @@ impl fmt::Display for LogCalibration {
         }
         for part in &self.doubted {
             write!(f, "; odometry from {:.0} to {:.0} % of the drive doubted", 100.0 * part.x, 100.0 * part.y)?;
+        }
+        if !self.merged_landmarks.is_empty() {
+            let names: Vec<String> = self.merged_landmarks.iter().map(u64::to_string).collect();
+            write!(f, "; two landmarks under one name, taken apart: {}", names.join(", "))?;
         }
         self.misreading.map_or(Ok(()), |misreading| write!(f, "; {misreading}"))
     }
@@ -128,12 +135,19 @@ pub fn calibrate_log(
     bearings: &[LogBearing],
 ) -> Result<LogCalibration> {
     let log = SortedLog::new(options, readings, times_s, bearings)?;
-    let Some((mut problem, mut descent)) = solved(&log)? else {
+    let Some(((mut problem, names), mut descent)) = solved(&log)? else {
         return Err(Error::argument("bearings", "a problem without a solution", "a drive past landmarks"));
     };
     let mut misreading = None;
     if !fits(&problem, MISREAD_SHARE) {
         misreading = fitting_misreading(options, readings, times_s, bearings);
+    }
+    let mut merged_landmarks = Vec::new();
+    if misreading.is_none()
+        && let Some((split, merged)) = solve_with_splits(&mut problem, options)
+    {
+        descent = split;
+        merged_landmarks = merged.into_iter().map(|landmark| names[landmark]).collect();
     }
     // More noise for all motions would explain what is wrong with those of a part.
     let as_told = problem.clone();
@@ -147,7 +161,7 @@ pub fn calibrate_log(
     {
         answer = Ok(without);
     }
-    answer.map_err(|error| match misreading {
+    answer.map(|found| LogCalibration { merged_landmarks, ..found }).map_err(|error| match misreading {
         Some(misreading) => {
             Error::argument("odometry", format!("a log that determines nothing; {misreading}"), "metres and radians")
         }
@@ -156,27 +170,27 @@ pub fn calibrate_log(
 }
 
 /// The best solution of several starts.
-fn solved(log: &SortedLog<'_>) -> Result<Option<(BundleProblem, DescentReport)>> {
+fn solved(log: &SortedLog<'_>) -> Result<Option<(NamedProblem, DescentReport)>> {
     let options = log.options;
-    let mut best: Option<(BundleProblem, DescentReport)> = None;
+    let mut best: Option<(NamedProblem, DescentReport)> = None;
     for attempt in [Attempt::FreeWheels, Attempt::Window, Attempt::Start, Attempt::WithoutLoops] {
         if matches!(attempt, Attempt::Start) && options.estimate_odometry {
             // The wheels were free in the first attempt and would be again.
             continue;
         }
         if matches!(attempt, Attempt::Window)
-            && best.as_ref().is_some_and(|(problem, _)| problem.contradictions().most_turns())
+            && best.as_ref().is_some_and(|((problem, _), _)| problem.contradictions().most_turns())
         {
             // No start mends an odometry that turns otherwise, and the filter's is the dearest.
             continue;
         }
-        let mut problem = started(log, attempt)?;
+        let (mut problem, names) = started(log, attempt)?;
         let descent = solve(&mut problem, options.max_iterations);
         let residuals = problem.residuals();
         let outliers = residuals.iter().filter(|r| r.abs() > OUTLIER_SIGMAS).count();
         let good = descent.converged && (outliers as f64) < OUTLIER_SHARE * residuals.len() as f64;
         if descent.cost.is_finite() && best.as_ref().is_none_or(|(_, best)| descent.cost < best.cost) {
-            best = Some((problem, descent));
+            best = Some(((problem, names), descent));
         }
         if good {
             break;
@@ -233,7 +247,7 @@ fn fitting_misreading(
 ) -> Option<Misreading> {
     let cost = |(readings, bearings): (Vec<WheelMotion>, Vec<LogBearing>)| {
         let log = SortedLog::new(options, &readings, times_s, &bearings).ok()?;
-        let mut problem = started(&log, Attempt::FreeWheels).ok()?;
+        let (mut problem, _) = started(&log, Attempt::FreeWheels).ok()?;
         let descent = solve(&mut problem, options.max_iterations);
         // A reading that leaves nearly no motion fits anything.
         let turns = problem.contradictions().turns >= LEAST_TURNS;
@@ -247,7 +261,7 @@ fn fitting_misreading(
 }
 
 /// The problem that an attempt starts from, with the parameters free that the options ask for.
-fn started(log: &SortedLog<'_>, attempt: Attempt) -> Result<BundleProblem> {
+fn started(log: &SortedLog<'_>, attempt: Attempt) -> Result<NamedProblem> {
     let options = log.options;
     let asked = FreeParameters {
         wheels: options.estimate_odometry,
@@ -256,12 +270,12 @@ fn started(log: &SortedLog<'_>, attempt: Attempt) -> Result<BundleProblem> {
     };
     let with_wheels = FreeParameters { wheels: true, ..asked };
     let start = options.filter.start.vector();
-    let mut problem = match attempt {
+    let (mut problem, names) = match attempt {
         Attempt::FreeWheels => incremental_problem(log, &start, with_wheels, true),
         Attempt::Window => return Ok(problem_along(log, &whole_window(log)?, asked)),
         Attempt::Start => return Ok(incremental_problem(log, &start, asked, true)),
         Attempt::WithoutLoops => {
-            let mounting = incremental_problem(log, &start, with_wheels, false).mounting;
+            let mounting = incremental_problem(log, &start, with_wheels, false).0.mounting;
             incremental_problem(log, &mounting, with_wheels, true)
         }
     };
@@ -269,7 +283,7 @@ fn started(log: &SortedLog<'_>, attempt: Attempt) -> Result<BundleProblem> {
         problem.levenberg_marquardt(options.max_iterations, TOLERANCE, FIRST_DAMPING);
         problem = problem.with_fixed_wheels(Wheels::new(options.filter.wheel_base_m));
     }
-    Ok(problem)
+    Ok((problem, names))
 }
 
 /// The problem of a sliding window that is never marginalised.
@@ -337,8 +351,7 @@ fn report(
         problem.landmark_scatter(parts, solve_part).unwrap_or(o.start_covariance)
     });
     let with = |scatter: Option<&Matrix3<f64>>, own| scatter.map_or(own, |scatter| widened(&own, scatter));
-    let counts = pulled.contradictions();
-    let by_landmarks = with(landmarks.as_ref(), own);
+    let (counts, by_landmarks) = (pulled.contradictions(), with(landmarks.as_ref(), own));
     let factors = pulled.noise_factors();
     let deviations = pulled.deviations(&by_landmarks, factors.excess());
     let suspect = pulled.suspect(o, &counts, (factors, &deviations), &by_landmarks, motions.as_ref());
@@ -377,5 +390,6 @@ fn report(
         odometry_k_m: problem.noise.k_m,
         misreading,
         doubted: Vec::new(),
+        merged_landmarks: Vec::new(),
     })
 }
