@@ -40,8 +40,6 @@ ROTATION_WORDS: Final[dict[str, tuple[tuple[float, float, float], ...]]] = {
 """`up`: the camera looks up, image columns point forward. `forward`: it looks forward, image rows point down."""
 
 _KEYS: Final = ("robot_from_camera", "quaternion")
-_NOT_KNOWN: Final = "not_known"
-"""Of a transform's file: what of it is 0 as nobody knows it."""
 _EXPECTED: Final = (
     "nine numbers in rows, or the key robot_from_camera with a 3x3 matrix, or the key quaternion with [x, y, z, w]"
 )
@@ -79,10 +77,9 @@ def read_rotation(source: str | os.PathLike[str]) -> Matrix:
     """The (3, 3) rotation `R` of v_robot = R v_camera that a word of `ROTATION_WORDS` or a file names.
 
     A file is nine numbers as text (white space or commas), or JSON, TOML or YAML with the key `robot_from_camera`, or
-    `quaternion` in the order [x, y, z, w] or with these names, as the .yaml of `StaticTransform` has it; or a robot's
-    file, of `tiltvp setup`. What is within 1e-3 of a rotation is
-    taken as the nearest rotation. Raises `CalibrationError` with the file, what is wrong and what was expected;
-    `InvalidInputError` for an unknown word.
+    `quaternion` in the order [x, y, z, w]; a robot's file, of `tiltvp setup`; or what `StaticTransform.write` writes.
+    What is within 1e-3 of a rotation is taken as the nearest rotation. Raises `CalibrationError` with the file, what is
+    wrong and what was expected; `InvalidInputError` for an unknown word.
     """
     if isinstance(source, str) and source in ROTATION_WORDS:
         return np.array(ROTATION_WORDS[source])
@@ -101,7 +98,11 @@ def rotation_from_document(document: Document) -> Matrix:
         if len(numbers) != 9:
             raise CalibrationError(f"{document.path}: {len(numbers)} numbers, expected {_EXPECTED}")
         return _rotation(np.reshape(numbers, (3, 3)), document.path)
-    return _from_keys(document.path, _tree(document))
+    tree = _tree(document)
+    noted = " ".join([str(tree.get("not_known")), *re.findall("not known, and set to 0: .*", document.text)])
+    if unknown := [name for name in ("roll", "pitch") if name in noted]:
+        raise CalibrationError(f"{document.path}: {' and '.join(unknown)} not known, expected a rotation that is known")
+    return _from_keys(document.path, tree)
 
 
 def rotation_from(value: object, where: str) -> Matrix:
@@ -160,9 +161,32 @@ def _plain_numbers(text: str) -> list[float] | None:
 def _tree(document: Document) -> dict[str, object]:
     if document.path.suffix.lower() == ".toml":
         return document.toml(_EXPECTED)
+    if document.is_xml:
+        return {"robot_from_camera": _of_joint(document).tolist()}
     if not document.tree:
         raise CalibrationError(f"{document.path}: no rotation ({document.syntax_problem}), expected {_EXPECTED}")
+    match document.tree:
+        # Of Kalibr's own files, which have more keys, the sensor's axes are not the robot's.
+        case {"cam0": {"T_cam_imu": [[*x, _], [*y, _], [*z, _], _], **others}} if not others:
+            return {"robot_from_camera": [list(row) for row in zip(x, y, z, strict=False)]}
     return document.tree
+
+
+def _of_joint(document: Document) -> Matrix:
+    """(3, 3): of the child in the parent of the only joint, where the robot has the child's name: then it is ours."""
+    root = document.xml
+    joints = [] if root is None else root.findall("joint")
+    child, origin = (joints[0].find(name) if len(joints) == 1 else None for name in ("child", "origin"))
+    if root is None or child is None or origin is None or child.get("link") != root.get("name"):
+        found = document.syntax_problem or "other XML"
+        raise CalibrationError(f"{document.path}: {found}, expected {_EXPECTED}, or the .urdf of a transform")
+    angles = _array(f"{document.path}: rpy", origin.get("rpy", "").split())
+    if angles.shape != (3,) or not np.isfinite(angles).all():
+        raise CalibrationError(f"{document.path}: rpy: {angles}, expected three angles")
+    roll, pitch, yaw = angles.tolist()
+    cr, sr, cp, sp = math.cos(roll), math.sin(roll), math.cos(pitch), math.sin(pitch)
+    rolled: Matrix = np.array([[cp, sp * sr, sp * cr], [0.0, cr, -sr], [-sp, cp * sr, cp * cr]])
+    return about_vertical(yaw) @ rolled
 
 
 def _from_keys(file: Path, tree: dict[str, object]) -> Matrix:
@@ -172,9 +196,6 @@ def _from_keys(file: Path, tree: dict[str, object]) -> Matrix:
     if len(found) != 1:
         what = "both keys" if found else f"the keys {', '.join(list(tree)[:6])}"
         raise CalibrationError(f"{file}: {what}, expected one of the keys {' and '.join(_KEYS)}")
-    unknown = [name for name in ("roll", "pitch") if name in str(tree.get(_NOT_KNOWN))]
-    if unknown:
-        raise CalibrationError(f"{file}: {' and '.join(unknown)} among {_NOT_KNOWN}, expected a rotation that is known")
     key = found[0]
     value = tree[key]
     if isinstance(value, dict):

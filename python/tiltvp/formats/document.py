@@ -89,6 +89,11 @@ class Document:
         """Whether the text begins as XML does."""
         return self.text.lstrip().startswith("<")
 
+    @property
+    def xml(self) -> ElementTree.Element | None:
+        """The element at the top of XML; None where `syntax_problem` says why."""
+        return _xml_root(self.text) if self.is_xml and self.tree else None
+
     def toml(self, expected: str) -> Tree:
         """The content as TOML; what is none is refused."""
         problem = None
@@ -116,7 +121,8 @@ class Document:
         try:
             start = self.text.lstrip()[:1]
             if start == "<":
-                tree = _from_xml(self.text)
+                root = _xml_root(self.text)
+                tree: object = {root.tag: _from_element(root)}
             elif start in "{[":
                 tree = json.loads(self.text, object_pairs_hook=_from_pairs)
             else:
@@ -149,11 +155,10 @@ def _from_pairs(pairs: list[tuple[str, object]]) -> Tree:
     return tree
 
 
-def _from_xml(text: str) -> object:
+def _xml_root(text: str) -> ElementTree.Element:
     if "<!DOCTYPE" in text or "<!ENTITY" in text:
         raise ValueError("found a document type declaration")
-    root = ElementTree.fromstring(text)
-    return {root.tag: _from_element(root)}
+    return ElementTree.fromstring(text)
 
 
 def _from_element(element: ElementTree.Element) -> object:
