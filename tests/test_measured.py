@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import re
+from pathlib import Path
 
 import pytest
 
+import measured
 from measured import RESTS_ON, ROOT, RUNS, answers_hash
 
 PAGE = (ROOT / "docs" / "measured.md").read_text(encoding="utf-8").partition("## Not yet held")[0]
@@ -32,3 +34,14 @@ def test_rows_say_what_the_kept_run_printed(what: str, recipe: str, date: str, r
         at = float(word)
         near = any(round(number, places) == at or f"{number:.{places}e}" == f"{at:.{places}e}" for number in numbers)
         assert near, f"{what}: {word} is not in docs/measured/{recipe}.txt"
+
+
+def test_a_recipe_that_fails_is_told_in_a_line(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    just = tmp_path / "just"
+    just.write_text("#!/bin/sh\necho 1.5\nexit 3\n")
+    just.chmod(0o755)
+    monkeypatch.setenv("PATH", str(tmp_path))
+    monkeypatch.setattr(measured, "RUNS", tmp_path / "kept")
+    with pytest.raises(SystemExit, match="just measure-time: exit code 3, nothing is kept"):
+        measured.record("measure-time")
+    assert not (tmp_path / "kept").exists()
