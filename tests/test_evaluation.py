@@ -358,6 +358,17 @@ def test_cost_over_images_and_pixels(camera: tiltvp.Camera) -> None:
     fitted = exponents(made)
     assert fitted["seconds"].to_list() == pytest.approx([1.0, 2.0])
     assert fitted["edge_pixels"].to_list() == pytest.approx([0.0, 0.0], abs=1e-12)
+    assert exponents(pl.concat([made[:1]] * 2)).is_empty()
+
+
+@pytest.mark.slow
+def test_one_size_has_no_exponent(capfd: pytest.CaptureFixture[str]) -> None:
+    from tiltvp.cli import main
+
+    assert main(["measure", "scaling", "--images", "1", "1", "--scales", "1", "--sweep", "table3"]) == 0
+    printed = capfd.readouterr().out
+    assert "Seconds of an evaluation" in printed
+    assert "Exponents" not in printed
 
 
 @pytest.mark.slow

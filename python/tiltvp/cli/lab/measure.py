@@ -180,7 +180,8 @@ def scaling(
     if out is not None:
         write_frame(table, out)
     show_frame(f"Seconds of an evaluation of {len(combinations)} combinations", table, ["over"])
-    show_frame("Exponents of growth: 1 is linear", exponents(table), ["over"])
+    if len(fitted := exponents(table)):
+        show_frame("Exponents of growth: 1 is linear", fitted, ["over"])
 
 
 @app.command

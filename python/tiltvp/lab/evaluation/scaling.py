@@ -85,13 +85,14 @@ def measure_scaling(
 def exponents(table: pl.DataFrame) -> pl.DataFrame:
     """The slopes of the logarithms of seconds and of edge pixels over those of images and of pixels; 1 is linear.
 
-    Of a table of `measure_scaling`. Columns: over, seconds (in all), seconds_images, edge_pixels.
+    Of a table of `measure_scaling`; what was measured at one size alone has no row. Columns: over, seconds (in all),
+    seconds_images, edge_pixels.
     """
     measures = ("seconds", "seconds_images", "edge_pixels")
     rows = []
     for (over,), part in table.group_by("over", maintain_order=True):
         size = np.log((part["images"] * part["megapixels"]).to_numpy())
-        if len(part) > 1:
+        if np.ptp(size) > 0.0:
             slopes = {name: float(np.polyfit(size, np.log(part[name].to_numpy()), 1)[0]) for name in measures}
             rows.append({"over": over} | slopes)
     return pl.DataFrame(rows, schema={"over": pl.String} | dict.fromkeys(measures, pl.Float64))
