@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import re
 import signal
 import subprocess
 import sys
@@ -21,7 +22,7 @@ from tiltvp.lab.datasets.new import new_dataset
 from tiltvp.lab.datasets.panoramas import Panorama
 from tiltvp.lab.evaluation import runs
 from tiltvp.lab.evaluation.combinations import PIXEL_METHODS, SWEEPS, TABLE_3, Combination, choose, paper_sweep
-from tiltvp.lab.evaluation.crossval import cross_validated
+from tiltvp.lab.evaluation.crossval import TRAINED, cross_validated
 from tiltvp.lab.evaluation.experiment import open_experiment
 from tiltvp.lab.evaluation.metrics import offset_rad, relative_errors_rad, turned
 from tiltvp.lab.evaluation.panoramas import evaluate_views
@@ -385,3 +386,15 @@ def test_views_of_panoramas_without_files(tmp_path: Path, camera: tiltvp.Camera)
     assert table["yaw_rad"].n_unique() == 2
     refined = table.filter(pl.col("method") == "refined")
     assert refined["error_rad"].max() < math.radians(5.0)
+
+
+def test_what_one_location_does_not_train_is_said_and_not_shown(whole: Run, capfd: pytest.CaptureFixture[str]) -> None:
+    from tiltvp.cli.lab.evaluate import show_tables
+
+    untrained = whole.table.filter(~pl.col("correction").is_in(TRAINED), location=whole.table["location"][0])
+    table = cross_validated(untrained)
+    assert set(table["correction"]) == {"none", "closed-form", *TRAINED}
+    show_tables(Run(whole.manifest, table))
+    printed = capfd.readouterr().out
+    assert "trained corrections are left out: images of other locations, which train them, are too few" in printed
+    assert not re.search(r" factor +\d", printed)

@@ -12,6 +12,8 @@ from tiltvp.cli.options import ALL_CORES, AtLeast0, Threads
 from tiltvp.cli.terminal import progress_bar, say
 
 if TYPE_CHECKING:
+    import polars as pl
+
     from tiltvp.lab.evaluation.runs import Run
 
 
@@ -63,9 +65,9 @@ def evaluate(
 
 def show_tables(run: Run) -> None:
     """The tables of a run on stdout."""
-    from tiltvp.lab.evaluation.summary import advantage, errors, reading_of_q, table_3, table_4
+    from tiltvp.lab.evaluation.summary import advantage, reading_of_q, table_3, table_4
 
-    summary = errors(run.table)
+    summary = determined_errors(run.table)
     images = run.manifest["dataset"]["images"]
     chosen = f"Table 3: errors in degrees (eq. 44) on {images} images, with the parameters of least mean error"
     for title, frame in (
@@ -76,3 +78,14 @@ def show_tables(run: Run) -> None:
     ):
         if len(frame):
             show_frame(title, frame, ["label", "correction", "reading"], hidden=["method", "combination", "group"])
+
+
+def determined_errors(table: pl.DataFrame) -> pl.DataFrame:
+    """The errors of a long table, without the corrections that its locations do not determine, of which it says so."""
+    from tiltvp.lab.evaluation.summary import determined, errors
+
+    summary = errors(table)
+    shown = determined(summary)
+    if left := len(summary) - len(shown):
+        say(f"{left} trained corrections are left out: images of other locations, which train them, are too few")
+    return shown

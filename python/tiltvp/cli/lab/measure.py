@@ -13,6 +13,7 @@ from tiltvp.cli.lab.colmap import colmap
 from tiltvp.cli.lab.corner_measures import corners
 from tiltvp.cli.lab.corner_real import corners_real
 from tiltvp.cli.lab.descriptors import descriptors
+from tiltvp.cli.lab.evaluate import determined_errors
 from tiltvp.cli.lab.levelling import level
 from tiltvp.cli.lab.line_measures import lines
 from tiltvp.cli.lab.measure_options import Every, NoiseSigma, Panoramas, PanoramasIfAny, Rooms, Samples, Saved
@@ -67,7 +68,7 @@ def panoramas(
     from tiltvp.lab.datasets.panoramas import paper_camera, read_panorama_index
     from tiltvp.lab.evaluation.combinations import choose
     from tiltvp.lab.evaluation.panoramas import evaluate_views
-    from tiltvp.lab.evaluation.summary import errors, variants
+    from tiltvp.lab.evaluation.summary import variants
 
     check_ending(out)
     chosen = read_panorama_index(directory)[::every]
@@ -78,7 +79,8 @@ def panoramas(
         )  # fmt: skip
     if out is not None:
         write_frame(table, out)
-    show_frame(f"Errors in degrees (eq. 44), {len(chosen)} panoramas", variants(errors(table)), ["variant"])
+    summary = determined_errors(table)
+    show_frame(f"Errors in degrees (eq. 44), {len(chosen)} panoramas", variants(summary), ["variant"])
 
 
 @app.command

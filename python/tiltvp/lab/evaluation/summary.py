@@ -6,7 +6,19 @@ from typing import Final
 
 import polars as pl
 
-__all__ = ["PAPER_TABLE_3", "PAPER_TIMES_MS", "advantage", "errors", "reading_of_q", "table_3", "table_4", "variants"]
+from tiltvp.lab.evaluation.crossval import TRAINED
+
+__all__ = [
+    "PAPER_TABLE_3",
+    "PAPER_TIMES_MS",
+    "advantage",
+    "determined",
+    "errors",
+    "reading_of_q",
+    "table_3",
+    "table_4",
+    "variants",
+]
 
 PAPER_TABLE_3: Final = pl.DataFrame(
     [
@@ -86,6 +98,11 @@ def errors(table: pl.DataFrame) -> pl.DataFrame:
         )
         .sort("combination", _rank("correction", _CORRECTION_ORDER))
     )
+
+
+def determined(summary: pl.DataFrame) -> pl.DataFrame:
+    """Of a table of `errors`: without the corrections that no images of other locations determine."""
+    return summary.filter(~pl.col("correction").is_in(TRAINED) | pl.col("factor_min").is_not_null())
 
 
 def table_3(summary: pl.DataFrame) -> pl.DataFrame:
