@@ -56,6 +56,13 @@ def test_a_live_camera(monkeypatch: pytest.MonkeyPatch) -> None:
         LiveCamera(5)
 
 
+@pytest.mark.parametrize("number", [-1, 100, 10**12, "0"])
+def test_what_is_no_number_of_a_camera_is_refused(number: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(cv2, "VideoCapture", Capture)  # At -1 the real one ends the process.
+    with pytest.raises(InvalidInputError, match=r"number = .*, expected the number of a camera, from 0 to 99"):
+        LiveCamera(number)
+
+
 def test_a_camera_that_is_not_there_is_told_by_one_sentence(capfd: pytest.CaptureFixture[str]) -> None:
     """OpenCV printed two lines of its own, and while a camera was waited for ten a second."""
     before = cv2.utils.logging.getLogLevel()

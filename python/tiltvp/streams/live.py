@@ -24,10 +24,10 @@ __all__ = ["LiveCamera", "NamedImages", "RawImages", "raw_size"]
 
 LONGEST_NAME: Final = 4096
 """Bytes of a file's name on the standard input: the longest path that Linux knows."""
-
-
 _AGAIN_S: Final = 0.2
 """After which a camera that has gone is opened again: half of what an interrupt may take."""
+_CAMERAS: Final = 100
+"""From this on OpenCV takes the hundreds for what the camera is opened by; at -1 it crashes."""
 
 
 class LiveCamera(Frames):
@@ -40,10 +40,12 @@ class LiveCamera(Frames):
     def __init__(self, number: int, *, patience_s: float = 60.0) -> None:
         """Opens the camera. `patience_s` is how long one that has gone is waited for; then frames end.
 
-        Raises `ImageFileError` where there is none.
+        Raises `ImageFileError` where there is none, `InvalidInputError` for what is no number of a camera.
         """
         import cv2
 
+        if not isinstance(number, int | np.integer) or not 0 <= number < _CAMERAS:
+            raise InvalidInputError(f"number = {number!r}, expected the number of a camera, from 0 to {_CAMERAS - 1}")
         self.source = f"camera {number}"
         self._number, self._patience_s = number, patience_s
         self._ended = threading.Event()
