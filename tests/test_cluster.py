@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import os
 import signal
+import subprocess
 import sys
 from collections.abc import Iterator
+from itertools import count
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +17,7 @@ from dask.distributed import LocalCluster
 from evaluations import evaluated, same_bytes
 from tiltvp.cli import main
 from tiltvp.errors import RunError
+from tiltvp.lab.cluster import results_of
 from tiltvp.lab.datasets.folder import TiltDataset
 from tiltvp.lab.evaluation import cluster as module
 from tiltvp.lab.evaluation.combinations import choose
@@ -72,9 +75,33 @@ def test_nobody_answers(
 ) -> None:
     monkeypatch.setattr("tiltvp.lab.cluster._PATIENCE_S", 0.5)
     words = ["evaluate", str(dataset.directory), "--sweep", "table3", "--out", str(tmp_path / "run")]
-    for address, told in ((NOBODY, "no Dask scheduler answers"), ("nowhere", "no address of a Dask scheduler")):
+    for address, told in (
+        (NOBODY, "no Dask scheduler answers"),
+        ("nowhere", "no address of a Dask scheduler"),
+        ("http://127.0.0.1:9", "no address of a Dask scheduler"),
+    ):
         assert main([*words, "--cluster", address]) == 2
         assert f"tiltvp: {address}: {told}" in capsys.readouterr().err
+
+
+SCHEDULER = """
+from dask.distributed import LocalCluster
+cluster = LocalCluster(n_workers=1, threads_per_worker=1, processes=False, protocol="tcp://", dashboard_address=":0")
+print(cluster.scheduler_address, flush=True)
+input()
+"""
+
+
+def test_a_scheduler_that_dies(capfd: pytest.CaptureFixture[str]) -> None:
+    with subprocess.Popen([sys.executable, "-c", SCHEDULER], stdin=-1, stdout=-1, stderr=-3, text=True) as process:
+        assert process.stdout is not None
+        address = process.stdout.readline().strip()
+        made = results_of(address, max, 1, ((number, 2) for number in count()))
+        assert next(made)[1] == 2
+        process.kill()
+        with pytest.raises(RunError, match="the scheduler has gone"):
+            list(made)
+    assert "Traceback" not in capfd.readouterr().err
 
 
 def test_without_dask(tmp_path: Path, dataset: TiltDataset, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import re
 from collections.abc import Callable, Iterable, Iterator
 from importlib import import_module
@@ -31,8 +32,8 @@ def results_of(
 ) -> Iterator[tuple[int, Made]]:
     """The numbers of the chunks and what `task(job, chunk)` made of each, as they come.
 
-    Raises `RunError` if Dask is not installed, the scheduler does not answer or has no workers, and where a task has
-    ended one worker after the other.
+    Raises `RunError` if Dask is not installed, the scheduler does not answer, has no workers or has gone, and where a
+    task has ended one worker after the other.
     """
     distributed = _dask()
     client = _client(distributed, address)
@@ -49,12 +50,27 @@ def results_of(
         submit(_WAITING)
         try:
             for future, made in done:
+                if future.cancelled():  # What Dask made of it is then an error, or nothing.
+                    raise distributed.CancelledError("its tasks are cancelled")
                 yield numbers.pop(future.key), made
                 submit(1)
         except distributed.KilledWorker as error:
             raise RunError(f"{address}: {error}, expected workers that live") from error
+        except (distributed.CancelledError, distributed.client.ClosedClientError) as error:
+            raise RunError(f"{address}: the scheduler has gone ({error}), expected one that lives") from error
     finally:
+        _close(client)
+
+
+def _close(client: Any) -> None:
+    """Without the traceback that Dask logs where the scheduler has gone."""
+    log = logging.getLogger("distributed.client")
+    before = log.level
+    log.setLevel(logging.CRITICAL)
+    try:
         client.close()
+    finally:
+        log.setLevel(before)
 
 
 def _dask() -> Any:
@@ -67,8 +83,8 @@ def _dask() -> Any:
 
 def _client(distributed: Any, address: str) -> Any:
     """A client of the scheduler, which has at least one worker."""
-    if re.search(r"^inproc://|:\d+$", address) is None:
-        # Dask would look for it at the port 0, and wait.
+    if re.search(r"^inproc://|^((tcp|tls|ucx|wss?)://)?[^/]+:\d+$", address) is None:
+        # Dask would look for it at the port 0, and wait, or leave a client that it cannot close.
         raise RunError(f"{address}: no address of a Dask scheduler, expected one with a port, as tcp://host:8786")
     try:
         client = distributed.Client(address, timeout=_PATIENCE_S, set_as_default=False)
@@ -77,6 +93,6 @@ def _client(distributed: Any, address: str) -> Any:
     try:
         client.wait_for_workers(1, timeout=_WORKERS_S)
     except TimeoutError as error:
-        client.close()
+        _close(client)
         raise RunError(f"{address}: a scheduler without workers for {_WORKERS_S:g} s, expected one or more") from error
     return client
