@@ -89,18 +89,35 @@ from dask.distributed import LocalCluster
 cluster = LocalCluster(n_workers=1, threads_per_worker=1, processes=False, protocol="tcp://", dashboard_address=":0")
 print(cluster.scheduler_address, flush=True)
 input()
+cluster.scale(0)
+input()
 """
 
 
-def test_a_scheduler_that_dies(capfd: pytest.CaptureFixture[str]) -> None:
-    with subprocess.Popen([sys.executable, "-c", SCHEDULER], stdin=-1, stdout=-1, stderr=-3, text=True) as process:
+@pytest.mark.parametrize(
+    ("lost", "told"), [("scheduler", "the scheduler has gone"), ("workers", "without workers for 0.5 s")]
+)
+def test_what_is_lost_in_the_middle(
+    lost: str, told: str, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr("tiltvp.lab.cluster._WORKERS_S", 0.5)
+    pipe, null = subprocess.PIPE, subprocess.DEVNULL
+    with subprocess.Popen(
+        [sys.executable, "-c", SCHEDULER], stdin=pipe, stdout=pipe, stderr=null, text=True
+    ) as process:
         assert process.stdout is not None
-        address = process.stdout.readline().strip()
-        made = results_of(address, max, 1, ((number, 2) for number in count()))
-        assert next(made)[1] == 2
-        process.kill()
-        with pytest.raises(RunError, match="the scheduler has gone"):
-            list(made)
+        assert process.stdin is not None
+        made = results_of(process.stdout.readline().strip(), max, 1, ((number, 2) for number in count()))
+        try:
+            assert next(made)[1] == 2
+            if lost == "scheduler":
+                process.kill()
+            else:
+                print(file=process.stdin, flush=True)
+            with pytest.raises(RunError, match=told):
+                list(made)
+        finally:
+            process.kill()
     assert "Traceback" not in capfd.readouterr().err
 
 

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import logging
 import re
+import time
 from collections.abc import Callable, Iterable, Iterator
+from contextlib import suppress
 from importlib import import_module
 from itertools import islice
 from typing import Any, Final, TypeVar
@@ -17,7 +19,10 @@ _PATIENCE_S = 20.0
 """How long the scheduler may take to answer."""
 
 _WORKERS_S = 120.0
-"""How long the first worker may take to join."""
+"""How long there may be no worker."""
+
+_POLL_S = 0.01
+"""Between two looks for a result: little beside what a task takes."""
 
 _WAITING: Final = 1024
 """Tasks that the scheduler holds at once, so that it and this process need the same memory for any number of them. A
@@ -49,7 +54,7 @@ def results_of(
 
         submit(_WAITING)
         try:
-            for future, made in done:
+            for future, made in _as_they_come(done, client, address):
                 if future.cancelled():  # What Dask made of it is then an error, or nothing.
                     raise distributed.CancelledError("its tasks are cancelled")
                 yield numbers.pop(future.key), made
@@ -60,6 +65,25 @@ def results_of(
             raise RunError(f"{address}: the scheduler has gone ({error}), expected one that lives") from error
     finally:
         _close(client)
+
+
+def _as_they_come(done: Any, client: Any, address: str) -> Iterator[tuple[Any, Any]]:
+    """What `done` has; Dask itself waits for ever where no worker is left."""
+    while not done.is_empty():
+        seen_s = asked_s = time.monotonic()
+        while not done.has_ready():
+            time.sleep(_POLL_S)
+            if time.monotonic() > asked_s + 1.0:
+                asked_s = time.monotonic()
+                with suppress(OSError):  # A scheduler that has gone: the tasks tell it.
+                    seen_s = asked_s if client.nthreads() else seen_s
+                if asked_s > seen_s + _WORKERS_S:
+                    raise _without_workers(address)
+        yield next(done)
+
+
+def _without_workers(address: str) -> RunError:
+    return RunError(f"{address}: a scheduler without workers for {_WORKERS_S:g} s, expected one or more")
 
 
 def _close(client: Any) -> None:
@@ -94,5 +118,5 @@ def _client(distributed: Any, address: str) -> Any:
         client.wait_for_workers(1, timeout=_WORKERS_S)
     except TimeoutError as error:
         _close(client)
-        raise RunError(f"{address}: a scheduler without workers for {_WORKERS_S:g} s, expected one or more") from error
+        raise _without_workers(address) from error
     return client
