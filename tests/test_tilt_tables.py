@@ -107,3 +107,12 @@ def test_files_have_the_directions_that_may_be_up(ending: str, tmp_path: Path) -
     assert kept == found[0].alternatives
     assert texts[1:] == ["[]", None]
     assert "alternatives" not in outcome_table(outcomes(), "refined").types
+
+
+@pytest.mark.parametrize("ending", [".csv", ".json", ".parquet"])
+def test_a_covariance_that_is_not_known_is_null_as_a_whole(ending: str, tmp_path: Path) -> None:
+    path = tmp_path / f"rows{ending}"
+    write_table(outcome_table(outcomes(), "refined"), path)
+    read = {".csv": pl.read_csv, ".json": pl.read_json, ".parquet": pl.read_parquet}[ending]
+    for name in ("xx", "xy", "yy"):
+        assert read(path)[f"covariance_{name}_rad2"].is_null().to_list() == [False, False, True, True]

@@ -226,5 +226,6 @@ def _numbers(e: TiltEstimate | FilteredTilt) -> dict[str, object]:
     }
     row |= {f"normal_{axis}": float(normal[i]) for i, axis in enumerate("xyz")}
     places = {"xx": (0, 0), "xy": (0, 1), "yy": (1, 1)}
-    row |= {f"covariance_{name}_rad2": float(covariance[place]) for name, place in places.items()}
+    known = all(map(math.isfinite, covariance.flat))  # Without a tilt the variances are infinite, and 0 between them.
+    row |= {f"covariance_{name}_rad2": float(covariance[place]) if known else None for name, place in places.items()}
     return row | {"sigma_rad": sigma_rad(e)}
