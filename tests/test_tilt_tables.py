@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import json
+import math
 from pathlib import Path
 
 import numpy as np
@@ -15,7 +16,7 @@ import tiltvp
 import tiltvp.cli.tilt as verb
 from tiltvp.cli import main
 from tiltvp.cli.results import Outcome, outcome_table, people_table, summary_words
-from tiltvp.cli.tables import write_table
+from tiltvp.cli.tables import Table, write_frame, write_table
 from tiltvp.rotations import ROTATION_WORDS
 
 CAMERA = tiltvp.Camera.equidistant(width=160, height=120, focal_px=35.0, cx=79.5, cy=59.5)
@@ -116,3 +117,15 @@ def test_a_covariance_that_is_not_known_is_null_as_a_whole(ending: str, tmp_path
     read = {".csv": pl.read_csv, ".json": pl.read_json, ".parquet": pl.read_parquet}[ending]
     for name in ("xx", "xy", "yy"):
         assert read(path)[f"covariance_{name}_rad2"].is_null().to_list() == [False, False, True, True]
+
+
+@pytest.mark.parametrize("ending", [".csv", ".json", ".parquet"])
+def test_what_is_no_number_is_null_in_every_format(ending: str, tmp_path: Path) -> None:
+    read = {".csv": pl.read_csv, ".json": pl.read_json, ".parquet": pl.read_parquet}[ending]
+    columns = {"frame": [0, 1, 2], "error_deg": [1.5, math.nan, None]}
+    write_frame(pl.DataFrame(columns), tmp_path / f"frame{ending}")
+    table = Table({"frame": "Int64", "error_deg": "Float64"})
+    table.add(columns)
+    write_table(table, tmp_path / f"table{ending}")
+    for name in ("frame", "table"):
+        assert read(tmp_path / f"{name}{ending}")["error_deg"].to_list() == [1.5, None, None]

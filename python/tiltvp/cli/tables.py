@@ -101,8 +101,11 @@ def write_table(table: Table, path: Path) -> None:
 
 
 def write_frame(frame: pl.DataFrame, path: Path) -> None:
-    """Writes a data frame whole or not at all; the ending says the format."""
+    """Writes a data frame whole or not at all, null for NaN as in every format; the ending says the format."""
+    import polars.selectors as cs
+
     check_ending(path)
+    frame = frame.with_columns(cs.float().fill_nan(None))
     memory = io.BytesIO()
     match path.suffix.lower():
         case ".csv":
@@ -129,10 +132,10 @@ def _printable(cell: Any) -> Any:
 
 
 def _word(cell: object) -> object:
-    """Booleans and NaN as Polars and most programs spell them."""
+    """Booleans as Polars and most programs spell them, and nothing for NaN."""
     if isinstance(cell, bool):
         return "true" if cell else "false"
-    return "NaN" if isinstance(cell, float) and math.isnan(cell) else cell
+    return None if isinstance(cell, float) and math.isnan(cell) else cell
 
 
 def _json(table: Table) -> str:
