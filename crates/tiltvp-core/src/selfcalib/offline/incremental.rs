@@ -51,6 +51,8 @@ struct IncrementalProblem<'a> {
     /// Slot and last keyframe of the landmarks that have been initialised.
     initialised: BTreeMap<u64, (usize, usize)>,
     candidates: Candidates,
+    /// The keyframe of each step.
+    keyframes: Vec<usize>,
     /// Keyframes after which a landmark counts as another one.
     gap: usize,
     /// Whether bearings were taken at the last keyframe.
@@ -59,8 +61,14 @@ struct IncrementalProblem<'a> {
     standing: (WheelMotion, f64),
 }
 
-/// A problem, and the identifiers of its landmarks.
-pub(super) type NamedProblem = (BundleProblem, Vec<u64>);
+/// A problem, and what of the log is what in it.
+pub(super) struct NamedProblem {
+    pub(super) problem: BundleProblem,
+    /// The identifier of each landmark.
+    pub(super) names: Vec<u64>,
+    /// The keyframe of each step.
+    pub(super) keyframes: Vec<usize>,
+}
 
 /// The problem of the whole log, solved roughly as it grows. `free` is what is estimated meanwhile.
 ///
@@ -98,6 +106,7 @@ impl<'a> IncrementalProblem<'a> {
             problem,
             initialised: BTreeMap::new(),
             candidates: Candidates::new(),
+            keyframes: Vec::new(),
             gap,
             has_bearings: true,
             standing: <(WheelMotion, f64)>::default(),
@@ -115,6 +124,7 @@ impl<'a> IncrementalProblem<'a> {
                 solved = self.problem.keyframes.len();
             }
             self.add_motion(&step);
+            self.keyframes.push(self.problem.keyframes.len() - 1);
             for bearing in step.bearings {
                 self.add_bearing(bearing);
             }
@@ -131,7 +141,7 @@ impl<'a> IncrementalProblem<'a> {
         for (name, (slot, _)) in self.initialised {
             names[slot] = name;
         }
-        (self.problem, names)
+        NamedProblem { problem: self.problem, names, keyframes: self.keyframes }
     }
 
     fn solve(&mut self) {

@@ -45,6 +45,7 @@ fn none_or_several(_: &LogOptions, parts: f64) -> bool {
 }
 
 /// A log that has been checked, with the bearings in the order of steps.
+#[derive(Clone)]
 pub(super) struct SortedLog<'a> {
     pub(super) options: &'a LogOptions,
     readings: &'a [WheelMotion],
@@ -74,6 +75,12 @@ impl<'a> SortedLog<'a> {
         let mut bearings = bearings.to_vec();
         bearings.sort_by_key(|b| b.step);
         Ok(Self { options, readings, times_s, bearings })
+    }
+
+    /// This log with bearings of other landmarks.
+    pub(super) fn renamed(&self, name: impl Fn(&LogBearing) -> u64) -> Self {
+        let bearings = self.bearings.iter().map(|b| LogBearing { landmark: name(b), ..*b }).collect();
+        Self { bearings, ..*self }
     }
 
     pub(super) fn steps(&self) -> impl Iterator<Item = LogStep<'_>> {

@@ -1,5 +1,6 @@
 //! The mounting from a whole log: bundle adjustment over everything.
 
+mod attempts;
 mod descent;
 mod incremental;
 mod log;

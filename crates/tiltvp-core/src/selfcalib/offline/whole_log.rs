@@ -1,25 +1,20 @@
 //! The mounting from a whole log: robust bundle adjustment from several starts, optionally with the wheels and a time offset.
 
-use std::collections::BTreeMap;
 use std::fmt;
 
 use nalgebra::{DMatrix, Matrix3, Vector2};
 
-use super::descent::{TOLERANCE, solve, solve_without_slips};
-use super::incremental::{NamedProblem, incremental_problem, problem_along};
+use super::attempts::{Attempt, solved, started};
+use super::descent::{solve, solve_without_slips};
 use super::log::{LogBearing, LogOptions, SortedLog};
-use super::merged_landmarks::solve_with_splits;
+use super::merged_landmarks::take_apart;
 use super::misreading::Misreading;
 use super::noise::{solve_with_doubt, solve_with_noise};
 use crate::error::{Error, Result};
-use crate::selfcalib::bundle::{
-    BundleProblem, CholeskyFactor, DescentReport, DoubtedParts, FIRST_DAMPING, FreeParameters, widened,
-};
+use crate::selfcalib::bundle::{BundleProblem, CholeskyFactor, DescentReport, DoubtedParts, FreeParameters, widened};
 use crate::selfcalib::diagnosis::{Cause, DEVIATION_SIGMAS, doubted_centre};
 use crate::selfcalib::estimate::MountingEstimate;
 use crate::selfcalib::model::{Mounting, OUTLIER_SIGMAS, WheelMotion, Wheels};
-use crate::selfcalib::options::{CalibrationMethod, SelfCalibratorOptions};
-use crate::selfcalib::window::SlidingWindow;
 
 /// The answer of [`calibrate_log`].
 #[derive(Debug, Clone, PartialEq)]
@@ -97,10 +92,6 @@ impl fmt::Display for LogCalibration {
     }
 }
 
-/// Share of outliers of a converged solution up to which no other start is tried: as many as single wrong bearings make. A solution
-/// with a loop that did not close has more.
-const OUTLIER_SHARE: f64 = 0.03;
-
 /// Share of turns, motions and bearings that may be contradicted before other readings of the log are tried, and with which such a
 /// reading fits: a wrong sign or unit contradicts nearly all of one kind, slips and strays few of all.
 const MISREAD_SHARE: f64 = 0.3;
@@ -108,19 +99,6 @@ const FITTING_SHARE: f64 = 0.2;
 
 /// Turns by some 0.1 rad that a reading must leave to be believed: signs and units are told by turns.
 const LEAST_TURNS: usize = 3;
-
-/// Where an attempt starts, and what is free until the loops are closed.
-#[derive(Clone, Copy)]
-enum Attempt {
-    /// The start of the options. Wheels that may give a little let loops close.
-    FreeWheels,
-    /// The mounting and the poses of the sliding window.
-    Window,
-    /// The start of the options.
-    Start,
-    /// The mounting of the log without loops, for a start that is far off. Wheels as in the first attempt.
-    WithoutLoops,
-}
 
 /// The mounting from a whole log.
 ///
@@ -135,20 +113,18 @@ pub fn calibrate_log(
     bearings: &[LogBearing],
 ) -> Result<LogCalibration> {
     let log = SortedLog::new(options, readings, times_s, bearings)?;
-    let Some(((mut problem, names), mut descent)) = solved(&log)? else {
+    let Some((mut named, mut descent)) = solved(&log)? else {
         return Err(Error::argument("bearings", "a problem without a solution", "a drive past landmarks"));
     };
     let mut misreading = None;
-    if !fits(&problem, MISREAD_SHARE) {
+    if !fits(&named.problem, MISREAD_SHARE) {
         misreading = fitting_misreading(options, readings, times_s, bearings);
     }
     let mut merged_landmarks = Vec::new();
-    if misreading.is_none()
-        && let Some((split, merged)) = solve_with_splits(&mut problem, options)
-    {
-        descent = split;
-        merged_landmarks = merged.into_iter().map(|landmark| names[landmark]).collect();
+    if misreading.is_none() {
+        merged_landmarks = take_apart(&mut named, &mut descent, &log)?;
     }
+    let mut problem = named.problem;
     // More noise for all motions would explain what is wrong with those of a part.
     let as_told = problem.clone();
     if misreading.is_none() && !problem.contradictions().most_turns() {
@@ -167,36 +143,6 @@ pub fn calibrate_log(
         }
         None => error,
     })
-}
-
-/// The best solution of several starts.
-fn solved(log: &SortedLog<'_>) -> Result<Option<(NamedProblem, DescentReport)>> {
-    let options = log.options;
-    let mut best: Option<(NamedProblem, DescentReport)> = None;
-    for attempt in [Attempt::FreeWheels, Attempt::Window, Attempt::Start, Attempt::WithoutLoops] {
-        if matches!(attempt, Attempt::Start) && options.estimate_odometry {
-            // The wheels were free in the first attempt and would be again.
-            continue;
-        }
-        if matches!(attempt, Attempt::Window)
-            && best.as_ref().is_some_and(|((problem, _), _)| problem.contradictions().most_turns())
-        {
-            // No start mends an odometry that turns otherwise, and the filter's is the dearest.
-            continue;
-        }
-        let (mut problem, names) = started(log, attempt)?;
-        let descent = solve(&mut problem, options.max_iterations);
-        let residuals = problem.residuals();
-        let outliers = residuals.iter().filter(|r| r.abs() > OUTLIER_SIGMAS).count();
-        let good = descent.converged && (outliers as f64) < OUTLIER_SHARE * residuals.len() as f64;
-        if descent.cost.is_finite() && best.as_ref().is_none_or(|(_, best)| descent.cost < best.cost) {
-            best = Some(((problem, names), descent));
-        }
-        if good {
-            break;
-        }
-    }
-    Ok(best)
 }
 
 /// The answer without the odometry of the parts of the drive that the bearings contradict, where nothing but the image centre is suspect
@@ -247,7 +193,7 @@ fn fitting_misreading(
 ) -> Option<Misreading> {
     let cost = |(readings, bearings): (Vec<WheelMotion>, Vec<LogBearing>)| {
         let log = SortedLog::new(options, &readings, times_s, &bearings).ok()?;
-        let (mut problem, _) = started(&log, Attempt::FreeWheels).ok()?;
+        let mut problem = started(&log, Attempt::FreeWheels).ok()?.problem;
         let descent = solve(&mut problem, options.max_iterations);
         // A reading that leaves nearly no motion fits anything.
         let turns = problem.contradictions().turns >= LEAST_TURNS;
@@ -258,48 +204,6 @@ fn fitting_misreading(
         Some((misreading, misreading.logs(readings, bearings).into_iter().filter_map(cost).min_by(f64::total_cmp)?))
     });
     fitting.min_by(|a, b| a.1.total_cmp(&b.1)).map(|(misreading, _)| misreading)
-}
-
-/// The problem that an attempt starts from, with the parameters free that the options ask for.
-fn started(log: &SortedLog<'_>, attempt: Attempt) -> Result<NamedProblem> {
-    let options = log.options;
-    let asked = FreeParameters {
-        wheels: options.estimate_odometry,
-        offset: options.estimate_time_offset,
-        centre: options.estimate_centre,
-    };
-    let with_wheels = FreeParameters { wheels: true, ..asked };
-    let start = options.filter.start.vector();
-    let (mut problem, names) = match attempt {
-        Attempt::FreeWheels => incremental_problem(log, &start, with_wheels, true),
-        Attempt::Window => return Ok(problem_along(log, &whole_window(log)?, asked)),
-        Attempt::Start => return Ok(incremental_problem(log, &start, asked, true)),
-        Attempt::WithoutLoops => {
-            let mounting = incremental_problem(log, &start, with_wheels, false).0.mounting;
-            incremental_problem(log, &mounting, with_wheels, true)
-        }
-    };
-    if asked != with_wheels {
-        problem.levenberg_marquardt(options.max_iterations, TOLERANCE, FIRST_DAMPING);
-        problem = problem.with_fixed_wheels(Wheels::new(options.filter.wheel_base_m));
-    }
-    Ok((problem, names))
-}
-
-/// The problem of a sliding window that is never marginalised.
-fn whole_window(log: &SortedLog<'_>) -> Result<BundleProblem> {
-    let method = CalibrationMethod::Default;
-    let mut window =
-        SlidingWindow::new(&SelfCalibratorOptions { method, keyframes_max: u32::MAX, ..log.options.filter })?;
-    for step in log.steps() {
-        let mut seen: BTreeMap<u64, f64> = BTreeMap::new();
-        for b in step.bearings {
-            seen.entry(b.landmark).or_insert(b.bearing_rad);
-        }
-        let seen: Vec<(u64, f64)> = seen.into_iter().collect();
-        window.step(step.reading, &seen);
-    }
-    Ok(window.into_problem())
 }
 
 /// The answer: the solution with its covariance, scaled by the residuals where these are larger than assumed. What is suspect is told by the
