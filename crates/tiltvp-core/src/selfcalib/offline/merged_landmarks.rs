@@ -11,10 +11,11 @@ use crate::selfcalib::model::{BearingLoss, OUTLIER_SIGMAS, Viewpoint};
 /// Bearings that tell another place: enough that by chance no mistaken ones agree on it, and for a scatter of their own.
 const LEAST_BEARINGS: usize = 12;
 
-/// Standard deviations within which they agree on it before the problem is solved with it.
+/// Standard deviations within which they agree on it before the log is solved with it: poses may still be bent by both places, and a
+/// direction that is wrong by chance is as near once in sixty times at half a degree.
 const AGREEING_SIGMAS: f64 = 6.0;
 
-/// Share of the bearings of each place that may not fit it.
+/// Share of the bearings of each place that may not fit it: single strays may be among them, another place's may not.
 const OUTLIER_SHARE: f64 = 0.1;
 
 /// Most rounds in which each bearing goes to the place that it fits better, as in k-means: nearly all do in the first.
@@ -112,8 +113,8 @@ fn apart<'a>(
     }))
 }
 
-/// Keyframes and angles of the bearings of a landmark with such sizes of their residuals, in standard deviations as told: a landmark of
-/// two places seems to scatter.
+/// Keyframes and angles of the bearings of a landmark with such sizes of their whitened residuals. Lines of images scatter, each in its
+/// way, and are not two places for that.
 fn bearings(problem: &BundleProblem, landmark: usize, such: impl Fn(f64) -> bool) -> Vec<(usize, f64)> {
     let mut found = Vec::new();
     let point = problem.landmarks[landmark].homogeneous();
@@ -121,7 +122,7 @@ fn bearings(problem: &BundleProblem, landmark: usize, such: impl Fn(f64) -> bool
         let Some(seen) = keyframe.observations.iter().find(|seen| seen.landmark == landmark) else { continue };
         let view = Viewpoint::new(&problem.observation_pose(at).0, &problem.mounting);
         let residual = view.residual(&point, &seen.about(&problem.centre).along);
-        if such(residual.abs() / problem.bearing_sigma) {
+        if such(residual.abs() / (problem.bearing_sigma * problem.scatters[landmark])) {
             found.push((at, seen.bearing));
         }
     }
