@@ -57,7 +57,7 @@ class PictureExperiment:
 def picture_drives(
     experiment: PictureExperiment, *, threads: int = 1, advance: Callable[[], None] = lambda: None
 ) -> pl.DataFrame:
-    """Two rows for each drive, of the filter and the whole log: errors of phi, rho, psi, x, y, yaw, and their sigmas.
+    """Two rows for each drive, of the filter and the whole log: errors of phi, rho, psi, x, y, yaw, sigmas, NEES.
 
     Angles in degrees, lengths in mm. The mounting is the paper's with a start as far off as in the simulated drives;
     the tilt of each frame is estimated by `refined`. `advance` is called after each drive.
@@ -90,8 +90,9 @@ def picture_drives(
         calibrator = SelfCalibrator(**options)
         calibrator.follow(drive.odometry, bearings)
         case = {"kind": kind, "lean max": lean_deg, "seed": seed, "frames": len(drive), "bearings": len(bearings)}
-        for name, estimate in (("filter", calibrator.estimate), ("whole log", whole.mounting)):
-            rows.append(case | {"by": name} | _errors(estimate))
+        latest = calibrator.estimate
+        for name, verdict, mounting in (("filter", latest, latest), ("whole log", whole, whole.mounting)):
+            rows.append(case | {"by": name, "relied upon": "yes" if verdict else ""} | _errors(mounting))
         advance()
     return pl.DataFrame(rows)
 
@@ -123,15 +124,17 @@ def _seen(drive: Drive, threads: int) -> Iterator[SeenFrame]:
 def _errors(e: MountingEstimate) -> dict[str, float | str]:
     x, y, yaw = _RHO_M * math.cos(_PHI_RAD), _RHO_M * math.sin(_PHI_RAD), _PHI_RAD + _PSI_RAD
     plane = np.sqrt(np.diag(e.covariance_xy_yaw))
+    error = np.array([e.x_m - x, e.y_m - y, math.remainder(e.yaw_rad - yaw, math.tau)])
     return {
         "phi": math.degrees(math.remainder(e.phi_rad - _PHI_RAD, math.tau)),
         "rho": 1e3 * (e.rho_m - _RHO_M),
         "psi": math.degrees(math.remainder(e.psi_rad - _PSI_RAD, math.tau)),
-        "x": 1e3 * (e.x_m - x),
-        "y": 1e3 * (e.y_m - y),
-        "yaw": math.degrees(math.remainder(e.yaw_rad - yaw, math.tau)),
+        "x": 1e3 * float(error[0]),
+        "y": 1e3 * float(error[1]),
+        "yaw": math.degrees(error[2]),
         "sigma x": 1e3 * float(plane[0]),
         "sigma y": 1e3 * float(plane[1]),
         "sigma yaw": math.degrees(float(plane[2])),
+        "NEES": float(error @ np.linalg.solve(e.covariance_xy_yaw, error)),
         "alarm": "yes" if e.alarm else "",
     }

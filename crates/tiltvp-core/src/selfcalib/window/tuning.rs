@@ -83,6 +83,10 @@ pub(super) const UPDATE_ITERATIONS: u32 = 4;
 pub(super) const UPDATE_MOVED_SIGMAS: f64 = 0.05;
 pub(super) const UPDATE_LEAST_SIGMA: f64 = 1e-6;
 
+/// Fewer than one in so many bearings that the others contradict are wrong; of more it is not said who is right. With a half nine
+/// rendered drives had the same alarms.
+pub(super) const MINORITY: usize = 3;
+
 /// Bearings of a step from which on a majority of rejections means that the wheels slipped: two of two may be wrong by chance.
 pub(super) const SLIP_BEARINGS: usize = 3;
 

@@ -3,7 +3,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::state::{LANDMARKS, SlidingWindow};
-use super::tuning::{SLIP_BEARINGS, SLIP_FACTOR, UPDATE_ITERATIONS, UPDATE_LEAST_SIGMA, UPDATE_MOVED_SIGMAS};
+use super::tuning::{MINORITY, SLIP_BEARINGS, SLIP_FACTOR, UPDATE_ITERATIONS, UPDATE_LEAST_SIGMA, UPDATE_MOVED_SIGMAS};
 use crate::geometry::wrap_angle;
 use crate::selfcalib::bundle::{CholeskyFactor, combine, subtract_square};
 use crate::selfcalib::model::Prediction;
@@ -64,24 +64,34 @@ impl SlidingWindow {
             passes = self.gated(&rows, &cross);
         }
         let mut rejected = Vec::new();
-        for (row, passed) in rows.iter().zip(&passes) {
-            let rejections = &mut self.rejections[row.slot];
-            *rejections = if *passed { 0 } else { *rejections + 1 };
-            if !passed {
-                rejected.push(row.slot);
-            }
-        }
-        outcome.rejected = rejected.len();
+        self.reject(&mut rows, &passes, &mut rejected, outcome);
         if outcome.rejected > 0 {
-            let mut kept = passes.iter();
-            rows.retain(|_| *kept.next().unwrap_or(&false));
             cross = self.cross_covariance(&rows);
         }
         if !rows.is_empty() {
-            outcome.used = rows.len();
             self.iterate(rows, cross, outcome, &mut rejected);
         }
         rejected
+    }
+
+    /// Takes away the bearings that do not pass, and counts them.
+    fn reject(
+        &mut self,
+        rows: &mut Vec<MatchedBearing>,
+        passes: &[bool],
+        rejected: &mut Vec<usize>,
+        outcome: &mut StepOutcome,
+    ) {
+        let mut passed = passes.iter();
+        rows.retain(|row| {
+            let passed = *passed.next().unwrap_or(&false);
+            if !passed {
+                self.rejections[row.slot] += 1;
+                rejected.push(row.slot);
+            }
+            passed
+        });
+        (outcome.used, outcome.rejected) = (rows.len(), rejected.len());
     }
 
     /// The iterated update. Bearings that contradict one another are all rejected.
@@ -106,6 +116,12 @@ impl SlidingWindow {
             let whitened = factor.whiten(std::mem::replace(&mut cross, DMatrix::zeros(0, 0)));
             let Some(y) = factor.whitened(&innovation) else { return };
             if iteration == 0 {
+                if let Some(passes) = self.jointly_gated(&factor, &innovation, &y) {
+                    self.reject(&mut rows, &passes, rejected, outcome);
+                    let cross = self.cross_covariance(&rows);
+                    return self.iterate(rows, cross, outcome, rejected);
+                }
+                rows.iter().for_each(|row| self.rejections[row.slot] = 0);
                 outcome.nis = y.norm_squared();
                 // Each bearing may pass the gate, but all of them together do not.
                 if outcome.nis > self.gate.limit() * rows.len() as f64 {
@@ -129,6 +145,39 @@ impl SlidingWindow {
                 row.p = self.predict_bearing(row.slot, &viewpoint);
             }
         }
+    }
+
+    /// Which bearings pass the gate given the others, if a minority does not: the worst is left out until the rest agree (after the joint
+    /// compatibility of Neira and Tardos 2001). Where the pose is uncertain each passes by itself. `whitened` are the innovations, each
+    /// given those before it.
+    fn jointly_gated(
+        &self,
+        factor: &CholeskyFactor,
+        innovation: &DVector<f64>,
+        whitened: &DVector<f64>,
+    ) -> Option<Vec<bool>> {
+        if whitened.iter().all(|y| self.gate.passes(y * y)) {
+            return None;
+        }
+        let mut information = factor.inverse();
+        let mut weighed = &information * innovation;
+        let mut passes = vec![true; innovation.len()];
+        loop {
+            // The square of each given the others kept: the part of the sum of squares that goes with it.
+            let part = |i: usize| weighed[i] * weighed[i] / information[(i, i)];
+            let kept = (0..passes.len()).filter(|i| passes[*i]);
+            let worst = kept.max_by(|i, j| part(*i).total_cmp(&part(*j)))?;
+            if self.gate.passes(part(worst)) {
+                break;
+            }
+            passes[worst] = false;
+            let column = information.column(worst).into_owned();
+            let scale = 1.0 / column[worst];
+            weighed.axpy(-scale * weighed[worst], &column, 1.0);
+            information.ger(-scale, &column, &column, 1.0);
+        }
+        let failed = passes.iter().filter(|passed| !**passed).count();
+        (failed > 0 && MINORITY * failed < passes.len()).then_some(passes)
     }
 
     /// `S = H P H^T + R`, of which only the lower triangle is filled.
@@ -168,4 +217,45 @@ fn product(row: &MatchedBearing, vector: &[f64]) -> f64 {
     let first = p.by_pose.x * head[0] + p.by_pose.y * head[1] + p.by_pose.z * head[2];
     let second = p.by_mounting.x * head[3] + p.by_mounting.y * head[4] + p.by_mounting.z * head[5];
     first + second + (p.by_landmark.x * own[0] + p.by_landmark.y * own[1])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::selfcalib::SelfCalibratorOptions;
+    use crate::selfcalib::model::WheelMotion;
+
+    /// After a turn that the wheels tell badly, bearings of nine landmarks tell where the robot looks, and that those of two others, each
+    /// no further off than the turn may be, are wrong.
+    #[test]
+    fn bearings_that_the_others_contradict_are_rejected_though_each_passes_the_gate() {
+        let (posts, turn, base) = (11, 0.2, 0.4);
+        let options = SelfCalibratorOptions {
+            wheel_base_m: base,
+            odometry_k_m: 2e-3,
+            bearing_sigma_rad: 2e-3,
+            ..Default::default()
+        };
+        let mut filter = SlidingWindow::new(&options).unwrap();
+        let start = options.start;
+        let seen = |heading: f64, wrong: f64| -> Vec<(u64, f64)> {
+            let camera = start.yaw_rad + heading;
+            let place = [
+                start.x_m * heading.cos() - start.y_m * heading.sin(),
+                start.x_m * heading.sin() + start.y_m * heading.cos(),
+            ];
+            let bearing = |k: u64| {
+                let (far, around) = (3.0 + 0.2 * k as f64, 0.55 * k as f64);
+                let ray = [far * around.cos() - place[0], far * around.sin() - place[1]];
+                wrap_angle(ray[1].atan2(ray[0]) - camera + if k < 2 { wrong } else { 0.0 })
+            };
+            (0..posts).map(|k| (k, bearing(k))).collect()
+        };
+        let motion = WheelMotion::from_motion(0.0, turn, base);
+        for step in 0..20 {
+            filter.step(&motion, &seen(turn * step as f64, 0.0));
+        }
+        let outcome = filter.step(&motion, &seen(turn * 20.0, 0.03));
+        assert_eq!((outcome.used, outcome.rejected), (9, 2), "{outcome:?}");
+    }
 }
