@@ -157,6 +157,14 @@ LONG = {
         values = np.random.default_rng(1).uniform(0, 255, (500, 190)).astype(np.float32)
         call = lambda: tiltvp.lines.match_wide(lines, values, lines, values)
     """,
+    "match": """
+        values = np.random.default_rng(1).normal(size=(4000, 1000)).astype(np.float32)
+        call = lambda: tiltvp.lines.match(values, values)
+    """,
+    "correlations": """
+        values = np.random.default_rng(1).normal(size=(4000, 200)).astype(np.float32)
+        call = lambda: tiltvp.lines.zncc_matrix(values, values)
+    """,
     "room": """
         call = lambda: tiltvp.synth.Room("office", 1, extent=4.0)
     """,

@@ -4,6 +4,7 @@ use super::angles::wrap;
 use super::description::dissimilarity::descriptor_distances;
 use super::order::{Match, keep_cyclic_order};
 use crate::error::{Error, Result};
+use crate::interrupt::check;
 use crate::options;
 use crate::options::{Above, POSITIVE};
 
@@ -100,11 +101,13 @@ pub(super) fn select(
     if options.mutual {
         nearest.clear();
         nearest.extend((0..m).map(|j| {
+            check();
             let rows = (0..n).filter(|i| allowed(*i, j));
             rows.min_by(|x, y| distances[x * m + j].total_cmp(&distances[y * m + j])).unwrap_or(usize::MAX)
         }));
     }
     for i in 0..n {
+        check();
         let row = &distances[i * m..(i + 1) * m];
         let (mut best, mut second) = (None, f64::INFINITY);
         for (j, distance) in row.iter().enumerate().filter(|(j, _)| allowed(i, *j)) {

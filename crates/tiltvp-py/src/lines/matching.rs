@@ -5,7 +5,7 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use tiltvp_core::lines::{self as core, BearingGate, MatchOptions, Profiles, WideOptions};
 
-use crate::call::{call, call_long, invalid};
+use crate::call::{call_long, call_of, invalid};
 use crate::convert::{self, Number};
 use crate::lines::values::Lines;
 use crate::options;
@@ -26,6 +26,13 @@ struct Pair {
     b: Vec<f32>,
     rows: [usize; 2],
     width: usize,
+}
+
+impl Pair {
+    /// What each with each takes.
+    fn products(&self) -> usize {
+        self.a.len().saturating_mul(self.rows[1])
+    }
 }
 
 fn pair(a: &Bound<'_, PyAny>, b: &Bound<'_, PyAny>) -> PyResult<Pair> {
@@ -57,7 +64,7 @@ pub(crate) fn match_descriptors<'py>(
     options: Option<&Bound<'py, PyDict>>,
 ) -> PyResult<Bound<'py, PyArray2<i64>>> {
     let gate_rad = gate_rad.map(|number| number.0);
-    let Pair { a, b, width, .. } = pair(a, b)?;
+    let pair = pair(a, b)?;
     let mut parsed = MatchOptions::default();
     options::set(&mut parsed, options)?;
     let bearings = match (expected_rad, seen_rad, gate_rad) {
@@ -67,14 +74,14 @@ pub(crate) fn match_descriptors<'py>(
         (None, None, None) => None,
         _ => return Err(invalid("expected_rad, seen_rad, gate_rad: expected all three or none".to_owned())),
     };
-    let matches = call(py, || {
+    let matches = call_of(py, pair.products(), || {
         let gate = bearings.as_ref().map(|(expected_rad, seen_rad, gate_rad)| BearingGate {
             expected_rad,
             seen_rad,
             gate_rad: *gate_rad,
         });
         let (mut scratch, mut out) = (core::MatchScratch::default(), Vec::new());
-        core::match_descriptors(&a, &b, width, &parsed, gate.as_ref(), &mut scratch, &mut out)?;
+        core::match_descriptors(&pair.a, &pair.b, pair.width, &parsed, gate.as_ref(), &mut scratch, &mut out)?;
         Ok(out)
     })?;
     pairs(py, matches.iter().map(|found| [found.a, found.b]))
@@ -137,9 +144,9 @@ fn matrix<'py>(
     b: &Bound<'py, PyAny>,
     of: impl FnOnce(&[f32], &[f32], usize) -> Result<Vec<f64>, tiltvp_core::Error> + Send,
 ) -> PyResult<Bound<'py, PyArray2<f64>>> {
-    let Pair { a, b, rows, width } = pair(a, b)?;
-    let values = call(py, || of(&a, &b, width))?;
-    PyArray1::from_vec(py, values).reshape(rows)
+    let pair = pair(a, b)?;
+    let values = call_of(py, pair.products(), || of(&pair.a, &pair.b, pair.width))?;
+    PyArray1::from_vec(py, values).reshape(pair.rows)
 }
 
 /// (N_A, N_B): Euclidean distances of descriptors, eq. 6 (Scaramuzza 2009).

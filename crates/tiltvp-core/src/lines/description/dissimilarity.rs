@@ -1,6 +1,7 @@
 //! How unlike descriptors and patches are: Euclidean distance (eq. 6), and SSD and ZNCC to compare with (eqs. 12 and 13).
 
 use crate::error::{Error, Result};
+use crate::interrupt::check;
 
 /// How many rows of `width` values there are.
 fn rows_of(name: &'static str, values: &[f32], width: usize) -> Result<usize> {
@@ -16,6 +17,7 @@ fn matrix(a: &[f32], b: &[f32], width: usize, pair: impl Fn(&[f32], &[f32]) -> f
     out.clear();
     out.reserve(n * m);
     for a in a.chunks_exact(width) {
+        check();
         out.extend(b.chunks_exact(width).map(|b| pair(a, b)));
     }
     Ok(())
