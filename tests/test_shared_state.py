@@ -14,6 +14,7 @@ import threading
 import time
 from collections.abc import Callable
 from typing import Any
+from unittest.mock import ANY
 
 import numpy as np
 import pytest
@@ -93,6 +94,13 @@ def test_a_collector_that_lets_other_threads_run_blocks_nobody(make: Callable[[]
         gc.set_threshold(*before)
     assert not any(thread.is_alive() for thread in threads)
     assert not failures
+
+
+@pytest.mark.parametrize("make", STATEFUL)
+def test_what_knows_more_of_equality_is_asked(make: Callable[[], Any]) -> None:
+    one, _, _ = make()
+    assert one == ANY
+    assert one != 1
 
 
 def log(steps: int) -> tuple[np.ndarray, np.ndarray]:

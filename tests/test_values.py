@@ -10,6 +10,7 @@ import math
 import pickle
 import pkgutil
 from typing import Any
+from unittest.mock import ANY
 
 import numpy as np
 import pytest
@@ -130,6 +131,7 @@ def test_values_keep_their_promises(values: dict[str, list[Any]], name: str) -> 
             assert str(twin.to_dict()) == str(plain)
         assert twins[0] is value
         assert value != 1
+        assert value == ANY
         assert repr(value).startswith(name)
         assert "\n" not in repr(value)
         with pytest.raises(AttributeError):

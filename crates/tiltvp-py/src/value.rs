@@ -175,11 +175,11 @@ macro_rules! frozen {
     ($class:ident, |$own:ident| $same:expr, |$hashed:ident| $hash:expr) => {
         #[pyo3::pymethods]
         impl $class {
-            fn __eq__(&self, other: &pyo3::Bound<'_, pyo3::PyAny>) -> bool {
+            fn __eq__(&self, other: &pyo3::Bound<'_, Self>) -> bool {
                 fn same($own: &$class) -> impl PartialEq + use<'_> {
                     $same
                 }
-                $crate::value::of_class::<Self>(other).is_some_and(|other| same(self) == same(other))
+                same(self) == same(other.get())
             }
 
             fn __hash__(&self) -> u64 {
@@ -249,14 +249,13 @@ macro_rules! changing {
                 }
             )*)?
 
-            fn __eq__(&self, py: pyo3::Python<'_>, other: &pyo3::Bound<'_, pyo3::PyAny>) -> bool {
+            fn __eq__(&self, py: pyo3::Python<'_>, other: &pyo3::Bound<'_, Self>) -> bool {
                 fn same($own: &$($inner)::+) -> impl PartialEq + use<'_> {
                     $same
                 }
-                let Some(other) = $crate::value::of_class::<Self>(other) else { return false };
                 // One at a time: it may be compared with itself.
                 let own = self.inner.copied(py);
-                other.inner.look(py, |other| same(&own) == same(other))
+                other.get().inner.look(py, |other| same(&own) == same(other))
             }
 
             fn __copy__(&self, py: pyo3::Python<'_>) -> Self {

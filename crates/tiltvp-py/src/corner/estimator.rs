@@ -149,8 +149,7 @@ impl CornerPoseEstimator {
         })
     }
 
-    fn __eq__(&self, py: Python<'_>, other: &Bound<'_, PyAny>) -> PyResult<bool> {
-        let Ok(other) = other.cast::<Self>() else { return Ok(false) };
+    fn __eq__(&self, py: Python<'_>, other: &Bound<'_, Self>) -> PyResult<bool> {
         let other = other.get();
         let right = match (&self.right, &other.right) {
             (Some(own), Some(other)) => own.bind(py).eq(other)?,
