@@ -18,6 +18,7 @@ import pytest
 import tiltvp
 from tiltvp import _core, corner
 from tiltvp import lines as tl
+from tiltvp.cli.tables import finite
 from tiltvp.errors import InvalidInputError
 from tiltvp.synth import RoomImage, simulate_drive
 
@@ -136,6 +137,15 @@ def test_values_keep_their_promises(values: dict[str, list[Any]], name: str) -> 
         assert "\n" not in repr(value)
         with pytest.raises(AttributeError):
             setattr(value, next(iter(plain)), None)
+
+
+@pytest.mark.parametrize("name", CLASSES)
+def test_what_json_knows_of_a_value_is_read(values: dict[str, list[Any]], name: str) -> None:
+    """The command line writes null for NaN and infinity; both are NaN afterwards."""
+    for value in values[name]:
+        written = finite(value.to_dict())
+        read = type(value).from_dict(json.loads(json.dumps(written, allow_nan=False)))
+        assert finite(read.to_dict()) == json.loads(json.dumps(written))
 
 
 @pytest.mark.parametrize("name", CLASSES)

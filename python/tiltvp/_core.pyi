@@ -140,7 +140,7 @@ class AffineCorrection:
 
     @classmethod
     def from_dict(cls, values: dict[str, Any]) -> Self:
-        """The value of a dict as `to_dict` makes it, equal to the last bit."""
+        """The value of a dict as `to_dict` makes it, equal to the last bit; None for a number, as of JSON, is NaN."""
 
     @property
     def offset_rad(self) -> float:
@@ -188,7 +188,7 @@ class BelievedCorner:
 
     @classmethod
     def from_dict(cls, values: dict[str, Any]) -> Self:
-        """The value of a dict as `to_dict` makes it, equal to the last bit."""
+        """The value of a dict as `to_dict` makes it, equal to the last bit; None for a number, as of JSON, is NaN."""
 
     @property
     def hypotheses(self) -> list[CornerHypothesis]:
@@ -226,7 +226,7 @@ class CalibrationStep:
     def __hash__(self) -> int: ...
     @classmethod
     def from_dict(cls, values: dict[str, Any]) -> Self:
-        """The value of a dict as `to_dict` makes it, equal to the last bit."""
+        """The value of a dict as `to_dict` makes it, equal to the last bit; None for a number, as of JSON, is NaN."""
 
     @property
     def nis(self) -> float:
@@ -365,7 +365,7 @@ class CommonDirection:
 
     @classmethod
     def from_dict(cls, values: dict[str, Any]) -> Self:
-        """The value of a dict as `to_dict` makes it, equal to the last bit."""
+        """The value of a dict as `to_dict` makes it, equal to the last bit; None for a number, as of JSON, is NaN."""
 
     @property
     def inliers(self) -> NDArray[np.bool_]:
@@ -470,7 +470,7 @@ class CornerAttitude:
 
     @classmethod
     def from_dict(cls, values: dict[str, Any]) -> Self:
-        """The value of a dict as `to_dict` makes it, equal to the last bit."""
+        """The value of a dict as `to_dict` makes it, equal to the last bit; None for a number, as of JSON, is NaN."""
 
     @property
     def ln_volume(self) -> float:
@@ -533,7 +533,7 @@ class CornerAttitudes:
 
     @classmethod
     def from_dict(cls, values: dict[str, Any]) -> Self:
-        """The value of a dict as `to_dict` makes it, equal to the last bit."""
+        """The value of a dict as `to_dict` makes it, equal to the last bit; None for a number, as of JSON, is NaN."""
 
     @property
     def mirrored(self) -> NDArray[np.bool_]:
@@ -780,7 +780,7 @@ class CornerEstimate:
 
     @classmethod
     def from_dict(cls, values: dict[str, Any]) -> Self:
-        """The value of a dict as `to_dict` makes it, equal to the last bit."""
+        """The value of a dict as `to_dict` makes it, equal to the last bit; None for a number, as of JSON, is NaN."""
 
     @property
     def hypotheses(self) -> list[CornerHypothesis]:
@@ -820,7 +820,7 @@ class CornerFeature:
     def __hash__(self) -> int: ...
     @classmethod
     def from_dict(cls, values: dict[str, Any]) -> Self:
-        """The value of a dict as `to_dict` makes it, equal to the last bit."""
+        """The value of a dict as `to_dict` makes it, equal to the last bit; None for a number, as of JSON, is NaN."""
 
     @property
     def meets_probability(self) -> float:
@@ -896,7 +896,7 @@ class CornerHypothesis:
 
     @classmethod
     def from_dict(cls, values: dict[str, Any]) -> Self:
-        """The value of a dict as `to_dict` makes it, equal to the last bit."""
+        """The value of a dict as `to_dict` makes it, equal to the last bit; None for a number, as of JSON, is NaN."""
 
     @property
     def misfit(self) -> float:
@@ -955,7 +955,7 @@ class CornerPose:
 
     @classmethod
     def from_dict(cls, values: dict[str, Any]) -> Self:
-        """The value of a dict as `to_dict` makes it, equal to the last bit."""
+        """The value of a dict as `to_dict` makes it, equal to the last bit; None for a number, as of JSON, is NaN."""
 
     @property
     def fused(self) -> bool:
@@ -1279,7 +1279,7 @@ class EdgeElements:
     def __len__(self) -> int: ...
     @classmethod
     def from_dict(cls, values: dict[str, Any]) -> Self:
-        """The value of a dict as `to_dict` makes it, equal to the last bit."""
+        """The value of a dict as `to_dict` makes it, equal to the last bit; None for a number, as of JSON, is NaN."""
 
     @property
     def inlier(self) -> NDArray[np.bool_]:
@@ -1338,7 +1338,7 @@ class FilterStep:
 
     @classmethod
     def from_dict(cls, values: dict[str, Any]) -> Self:
-        """The value of a dict as `to_dict` makes it, equal to the last bit."""
+        """The value of a dict as `to_dict` makes it, equal to the last bit; None for a number, as of JSON, is NaN."""
 
     @property
     def nis(self) -> float | None:
@@ -1393,7 +1393,7 @@ class FilteredTilt:
 
     @classmethod
     def from_dict(cls, values: dict[str, Any]) -> Self:
-        """The value of a dict as `to_dict` makes it, equal to the last bit."""
+        """The value of a dict as `to_dict` makes it, equal to the last bit; None for a number, as of JSON, is NaN."""
 
     @property
     def normal(self) -> NDArray[np.float64]:
@@ -1432,7 +1432,7 @@ class FitReport:
     def __hash__(self) -> int: ...
     @classmethod
     def from_dict(cls, values: dict[str, Any]) -> Self:
-        """The value of a dict as `to_dict` makes it, equal to the last bit."""
+        """The value of a dict as `to_dict` makes it, equal to the last bit; None for a number, as of JSON, is NaN."""
 
     @property
     def iterations(self) -> int:
@@ -1932,7 +1932,7 @@ class Lines:
 
     @classmethod
     def from_dict(cls, values: dict[str, Any]) -> Self:
-        """The value of a dict as `to_dict` makes it, equal to the last bit."""
+        """The value of a dict as `to_dict` makes it, equal to the last bit; None for a number, as of JSON, is NaN."""
 
     @property
     def normal(self) -> NDArray[np.float64]:
@@ -1999,7 +1999,7 @@ class LogCalibration:
 
     @classmethod
     def from_dict(cls, values: dict[str, Any]) -> Self:
-        """The value of a dict as `to_dict` makes it, equal to the last bit."""
+        """The value of a dict as `to_dict` makes it, equal to the last bit; None for a number, as of JSON, is NaN."""
 
     @property
     def imbalance(self) -> float:
@@ -2115,7 +2115,7 @@ class MountingEstimate:
 
     @classmethod
     def from_dict(cls, values: dict[str, Any]) -> Self:
-        """The value of a dict as `to_dict` makes it, equal to the last bit."""
+        """The value of a dict as `to_dict` makes it, equal to the last bit; None for a number, as of JSON, is NaN."""
 
     @property
     def mean_nis(self) -> float | None:
@@ -2240,7 +2240,7 @@ class PosteriorCorrection:
 
     @classmethod
     def from_dict(cls, values: dict[str, Any]) -> Self:
-        """The value of a dict as `to_dict` makes it, equal to the last bit."""
+        """The value of a dict as `to_dict` makes it, equal to the last bit; None for a number, as of JSON, is NaN."""
 
     @property
     def mean_rad(self) -> NDArray[np.float64]:
@@ -2327,7 +2327,7 @@ class ResolvedAttitude:
 
     @classmethod
     def from_dict(cls, values: dict[str, Any]) -> Self:
-        """The value of a dict as `to_dict` makes it, equal to the last bit."""
+        """The value of a dict as `to_dict` makes it, equal to the last bit; None for a number, as of JSON, is NaN."""
 
     @property
     def probability(self) -> float:
@@ -2553,7 +2553,7 @@ class Segments:
 
     @classmethod
     def from_dict(cls, values: dict[str, Any]) -> Self:
-        """The value of a dict as `to_dict` makes it, equal to the last bit."""
+        """The value of a dict as `to_dict` makes it, equal to the last bit; None for a number, as of JSON, is NaN."""
 
     @property
     def length_rad(self) -> NDArray[np.float64]:
@@ -2873,7 +2873,7 @@ class TiltAlternative:
     def __hash__(self) -> int: ...
     @classmethod
     def from_dict(cls, values: dict[str, Any]) -> Self:
-        """The value of a dict as `to_dict` makes it, equal to the last bit."""
+        """The value of a dict as `to_dict` makes it, equal to the last bit; None for a number, as of JSON, is NaN."""
 
     @property
     def normal(self) -> NDArray[np.float64]:
@@ -2936,7 +2936,7 @@ class TiltEstimate:
 
     @classmethod
     def from_dict(cls, values: dict[str, Any]) -> Self:
-        """The value of a dict as `to_dict` makes it, equal to the last bit."""
+        """The value of a dict as `to_dict` makes it, equal to the last bit; None for a number, as of JSON, is NaN."""
 
     @property
     def inlier_pixels(self) -> int:
@@ -3312,7 +3312,7 @@ class TrackedLines:
 
     @classmethod
     def from_dict(cls, values: dict[str, Any]) -> Self:
-        """The value of a dict as `to_dict` makes it, equal to the last bit."""
+        """The value of a dict as `to_dict` makes it, equal to the last bit; None for a number, as of JSON, is NaN."""
 
     @property
     def lines(self) -> Lines:

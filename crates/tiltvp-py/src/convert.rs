@@ -5,8 +5,9 @@ use numpy::{
     PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray2, PyReadonlyArray3, PyUntypedArray,
     PyUntypedArrayMethods,
 };
+use pyo3::IntoPyObjectExt;
 use pyo3::prelude::*;
-use pyo3::types::PyDict;
+use pyo3::types::{PyDict, PyList};
 use tiltvp_core::Error;
 use tiltvp_core::edges::Mask;
 use tiltvp_core::geometry::{RigidMotion, Tilt};
@@ -93,6 +94,24 @@ pub(crate) fn matrix<const R: usize, const C: usize>(
         return Err(invalid(format!("{name}: shape {:?}, expected {expected}", array.shape())));
     }
     Ok(SMatrix::from_row_slice(&values(&array)?))
+}
+
+/// Lists as `to_dict` makes them, with NaN for None: JSON has no other number for what is not finite.
+fn with_nan<'py>(value: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
+    let py = value.py();
+    if value.is_none() {
+        return f64::NAN.into_bound_py_any(py);
+    }
+    let Ok(list) = value.cast::<PyList>() else { return Ok(value.clone()) };
+    list.iter().map(|item| with_nan(&item)).collect::<PyResult<Vec<_>>>()?.into_bound_py_any(py)
+}
+
+/// What `read` makes of an item of a dict, where it must be with NaN for None.
+pub(crate) fn nullable<'py, T>(
+    value: &Bound<'py, PyAny>,
+    read: impl Fn(&Bound<'py, PyAny>) -> PyResult<T>,
+) -> PyResult<T> {
+    read(value).or_else(|error| read(&with_nan(value)?).map_err(|_| error))
 }
 
 /// A `(3, 3)` matrix.

@@ -135,7 +135,7 @@ macro_rules! value {
                 $crate::field::Value::dict(self, py)
             }
 
-            /// The value of a dict as `to_dict` makes it, equal to the last bit.
+            /// The value of a dict as `to_dict` makes it, equal to the last bit; None for a number, as of JSON, is NaN.
             #[classmethod]
             #[pyo3(signature = (values: "dict[str, Any]"))]
             fn from_dict(
