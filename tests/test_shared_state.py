@@ -143,6 +143,12 @@ LONG = {
             one.follow(odometry, bearings)
         check = lambda: pickle.dumps(one) == state
     """,
+    "step": """
+        one = tiltvp.SelfCalibrator(wheel_base_m=0.4)
+        state, bearings = pickle.dumps(one), np.random.default_rng(1).uniform(-3.0, 3.0, 3000)
+        call = lambda: one.step(0.04, 0.05, np.arange(3000), bearings)
+        check = lambda: pickle.dumps(one) == state
+    """,
     "calibrate": """
         odometry, bearings = log(1500)
         call = lambda: tiltvp.calibrate(odometry, bearings, wheel_base_m=0.4)

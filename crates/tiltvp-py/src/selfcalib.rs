@@ -23,6 +23,9 @@ use crate::options;
 use crate::shared::Shared;
 use crate::value::changing;
 
+/// Landmarks beyond which a step may take longer than a person waits: of 200 it took 0.05 s, of 1,200 24 s.
+const MANY_LANDMARKS: usize = 200;
+
 /// Estimates where a camera sits on a robot, step by step while it drives past landmarks. Changes as it goes.
 ///
 /// `method` is "default", which does not diverge, or "paper", the filter of Scaramuzza 2009 exactly. `start` and
@@ -71,7 +74,10 @@ impl SelfCalibrator {
             .map(|name| landmark(name, "landmark_ids"))
             .collect::<PyResult<Vec<u64>>>()?;
         let bearings = convert::vector(bearings_rad, "bearings_rad")?;
-        self.inner.change(py, |calibrator| calibrator.step(&motion, &names, &bearings)).map(CalibrationStep::from)
+        let step = |calibrator: &mut core::SelfCalibrator| calibrator.step(&motion, &names, &bearings);
+        let long = names.len() + self.landmarks(py) > MANY_LANDMARKS;
+        let done = if long { self.inner.change_long(py, step) } else { self.inner.change(py, step) };
+        done.map(CalibrationStep::from)
     }
 
     /// Steps through a log, (N, 2) left and right, (M, 3) step, landmark, bearing: the estimate after each step.
@@ -120,7 +126,7 @@ impl SelfCalibrator {
     ///
     /// That happens by itself at the end of `follow`, and not between steps, for it costs some twenty solutions of the window.
     fn examine(&self, py: Python<'_>) -> PyResult<()> {
-        self.inner.change(py, |calibrator| {
+        self.inner.change_long(py, |calibrator| {
             calibrator.examine();
             Ok(())
         })

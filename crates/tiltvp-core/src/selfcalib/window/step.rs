@@ -10,6 +10,7 @@ use super::tuning::{
 };
 use super::update::MatchedBearing;
 use crate::geometry::wrap_angle;
+use crate::interrupt::check;
 use crate::selfcalib::bundle::Observation;
 use crate::selfcalib::model::{OUTLIER_SIGMAS, WheelMotion, predict};
 use crate::selfcalib::step_outcome::StepOutcome;
@@ -125,6 +126,7 @@ impl SlidingWindow {
         }
         let rejected = self.fuse(matched, outcome);
         for (id, bearing) in new {
+            check();
             self.initialise_landmark(id, bearing);
             outcome.started += 1;
         }
