@@ -80,6 +80,15 @@ def test_every_option_changes_something() -> None:
     normals = np.vstack([normals_about(TRUTH, 60, 0.01), normals_about(np.array([-0.2, 0.0, 1.0]), 60, 0.01, seed=2)])
     plain = tiltvp.common_direction(normals)
     assert tiltvp.common_direction(normals, weights=np.linspace(0.0, 1.0, 120)) != plain
+
+
+@pytest.mark.parametrize("scale", [1e-300, 1e-44, 1e100])
+def test_weights_count_by_their_ratios(scale: float) -> None:
+    """As likelihoods have them, beyond single precision too."""
+    normals, weights = normals_about(TRUTH, sigma_rad=0.01), np.linspace(0.0, 2.0, 120)
+    plain, scaled = (tiltvp.common_direction(normals, weights=w) for w in (weights, scale * weights))
+    assert angle(plain.direction, scaled.direction) < 1e-8
+    assert np.allclose(plain.covariance_rad2, scaled.covariance_rad2, rtol=1e-5, atol=0.0)
     assert tiltvp.common_direction(normals, sigma_rad=0.1) != plain
     assert tiltvp.common_direction(normals, max_angle_rad=0.1) != plain
     assert tiltvp.common_direction(normals, prior=(-0.2, 0.0, 1.0), max_angle_rad=0.1) != plain

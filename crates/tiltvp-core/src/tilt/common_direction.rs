@@ -71,12 +71,14 @@ pub fn common_direction(
     let upright_from_user = Rotation3::rotation_between(&prior, &Vector3::z())
         .unwrap_or_else(|| Rotation3::from_axis_angle(&Unit::new_unchecked(Vector3::x()), PI));
     let limit = options.max_angle_rad.sin();
+    // Weights such as likelihoods may all be smaller than single precision knows.
+    let heaviest = weights.map_or(1.0, |weights| weights.iter().copied().fold(f64::MIN_POSITIVE, f64::max));
     let mut rows = Rows::<f64>::with_capacity(normals.len());
     let mut kept = Vec::with_capacity(normals.len());
     let mut row_weights = Vec::with_capacity(normals.len());
     for (i, normal) in normals.iter().enumerate() {
         let row = upright_from_user * unit(normal).unwrap_or_default();
-        let weight = weights.map_or(1.0, |weights| weights[i]) as f32;
+        let weight = weights.map_or(1.0, |weights| weights[i] / heaviest) as f32;
         if row.z.abs() <= limit && weight > 0.0 {
             rows.push(row.x, row.y, row.z);
             row_weights.push(weight);
@@ -212,7 +214,7 @@ fn validate(
                 format!("{} values", normals.len()),
             ));
         }
-        if let Some(i) = weights.iter().position(|w| !(w.is_finite() && *w >= 0.0 && *w <= f64::from(f32::MAX))) {
+        if let Some(i) = weights.iter().position(|w| !(w.is_finite() && *w >= 0.0)) {
             return Err(Error::argument(
                 "weights",
                 format!("{} in row {i}", weights[i]),
