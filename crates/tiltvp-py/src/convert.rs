@@ -1,5 +1,8 @@
 //! The one door for arrays: what comes in is checked for type, shape and content, what goes out is fresh.
 
+use std::num::NonZero;
+use std::thread;
+
 use nalgebra::{Matrix3, SMatrix, Vector3};
 use numpy::{
     PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray2, PyReadonlyArray3, PyUntypedArray,
@@ -253,6 +256,15 @@ where
     T: for<'a> FromPyObject<'a, 'py>,
 {
     value.extract().map_err(|_| invalid(format!("{name} = {}, expected {expected}", shown(value))))
+}
+
+/// How many threads were asked for, but no more than four for each core: no answer depends on it, and thousands take longer to start
+/// than all work.
+pub(crate) fn threads(value: Option<&Bound<'_, PyAny>>) -> PyResult<Option<usize>> {
+    let Some(value) = value else { return Ok(None) };
+    let asked: NonZero<usize> = whole(value, "threads", "a whole number from 1")?;
+    let cores = thread::available_parallelism().map_or(1, NonZero::get);
+    Ok(Some(asked.get().min(4 * cores)))
 }
 
 /// A dict as `to_dict` makes it.

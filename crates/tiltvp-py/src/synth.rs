@@ -200,17 +200,8 @@ pub(crate) fn call_on_threads<T: Send>(
     threads: Option<&Bound<'_, PyAny>>,
     work: impl FnOnce() -> Result<T, Error> + Send,
 ) -> PyResult<T> {
-    let threads = threads_from(threads)?;
+    let threads = convert::threads(threads)?.unwrap_or(0);
     call_long(py, || on_threads(threads, work)?)
-}
-
-/// How many threads; 0 for one per core.
-fn threads_from(threads: Option<&Bound<'_, PyAny>>) -> PyResult<usize> {
-    let Some(threads) = threads else { return Ok(0) };
-    match convert::whole(threads, "threads", "a whole number from 1")? {
-        0 => Err(invalid("threads = 0, expected a whole number from 1".to_owned())),
-        threads => Ok(threads),
-    }
 }
 
 tiltvp_core::options! {

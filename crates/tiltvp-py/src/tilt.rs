@@ -171,7 +171,7 @@ impl TiltEstimator {
         images: Vec<Bound<'_, PyAny>>,
         threads: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Vec<TiltEstimate>> {
-        let threads = threads.map_or(Ok(1), |threads| convert::whole(threads, "threads", "a whole number from 1"))?;
+        let threads = convert::threads(threads)?.unwrap_or(1);
         let named = images.iter().enumerate().map(|(i, image)| convert::gray(image, &format!("images[{i}]")));
         let arrays = named.collect::<PyResult<Vec<_>>>()?;
         let views = arrays.iter().map(convert::view).collect::<PyResult<Vec<_>>>()?;
