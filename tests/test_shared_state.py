@@ -171,6 +171,12 @@ LONG = {
         values = np.random.default_rng(1).uniform(0, 255, (500, 190)).astype(np.float32)
         call = lambda: tiltvp.lines.match_wide(lines, values, lines, values)
     """,
+    "segments": """
+        camera = tiltvp.Camera.equidistant(width=8000, height=6000, focal_px=1746, cx=3999.5, cy=2999.5)
+        find = tiltvp.SegmentDetector(camera)
+        image = np.random.default_rng(1).integers(0, 255, (6000, 8000), dtype=np.uint8)
+        call = lambda: find(image)
+    """,
     "match": """
         values = np.random.default_rng(1).normal(size=(4000, 1000)).astype(np.float32)
         call = lambda: tiltvp.lines.match(values, values)

@@ -17,9 +17,6 @@ import_exception!(tiltvp.errors, InternalError);
 /// How often a long call asks whether a signal has come.
 const POLL: Duration = Duration::from_millis(50);
 
-/// Products above which work may take longer than a person waits: a thread of its own, 50 us, is then less than a hundredth.
-const MANY_PRODUCTS: usize = 1 << 26;
-
 /// Memory of the stack of the thread of a long call: what the main thread has on Linux.
 const STACK_BYTES: usize = 8 << 20;
 
@@ -69,13 +66,13 @@ pub(crate) fn call_long<T: Send>(py: Python<'_>, work: impl FnOnce() -> Result<T
     )
 }
 
-/// As [`call_long`] where there are many products to sum, as [`call`] where a thread would cost more than they do.
-pub(crate) fn call_of<T: Send>(
+/// As [`call_long`] for work that is long, as [`call`] for other work, a good part of which 50 us for a thread would be.
+pub(crate) fn call_by<T: Send>(
     py: Python<'_>,
-    products: usize,
+    is_long: bool,
     work: impl FnOnce() -> Result<T, Error> + Send,
 ) -> PyResult<T> {
-    if products < MANY_PRODUCTS { call(py, work) } else { call_long(py, work) }
+    if is_long { call_long(py, work) } else { call(py, work) }
 }
 
 /// The answer, or the exception for an error or a panic.

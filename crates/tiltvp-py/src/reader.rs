@@ -53,7 +53,7 @@ macro_rules! image_reader {
                 py: pyo3::Python<'_>,
                 work: impl FnOnce(&mut $scratch) -> Result<R, tiltvp_core::Error> + Send,
             ) -> pyo3::PyResult<R> {
-                self.scratch.with(py, || self.inner.scratch(), work)
+                self.scratch.with(py, self.inner.camera(), || self.inner.scratch(), work)
             }
         }
     };

@@ -4,9 +4,13 @@ use std::sync::Mutex;
 
 use pyo3::prelude::*;
 use tiltvp_core::Error;
+use tiltvp_core::camera::Camera;
 
-use crate::call::call;
+use crate::call::call_by;
 use crate::forks::guarded;
+
+/// Pixels above which an image may take longer than a person waits: 12 million of noise take seconds.
+const LARGE_PX: u64 = 1 << 21;
 
 /// Scratch that no thread is using.
 pub(crate) struct ScratchPool<T>(Mutex<Vec<T>>);
@@ -18,14 +22,17 @@ impl<T> Default for ScratchPool<T> {
 }
 
 impl<T: Send> ScratchPool<T> {
-    /// Runs `work` without the interpreter, with a scratch that no other thread has. After a panic the scratch is dropped.
+    /// Runs `work` on an image of a camera without the interpreter, with a scratch that no other thread has. After a panic, and after
+    /// a signal, which ends work on large images, the scratch is dropped.
     pub(crate) fn with<R: Send>(
         &self,
         py: Python<'_>,
+        camera: &Camera,
         new: impl FnOnce() -> T + Send,
         work: impl FnOnce(&mut T) -> Result<R, Error> + Send,
     ) -> PyResult<R> {
-        call(py, || {
+        let is_large = u64::from(camera.width()) * u64::from(camera.height()) > LARGE_PX;
+        call_by(py, is_large, || {
             let taken = guarded(&self.0, Vec::pop);
             let mut scratch = taken.unwrap_or_else(new);
             let outcome = work(&mut scratch);

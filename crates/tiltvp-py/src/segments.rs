@@ -65,7 +65,7 @@ impl SegmentDetector {
             let mut found = core::Segments::default();
             inner.detect(&view, scratch, &mut found).map(|()| found)
         };
-        Ok(Segments::from(&self.scratch.with(py, || inner.scratch(), work)?))
+        Ok(Segments::from(&self.scratch.with(py, inner.camera(), || inner.scratch(), work)?))
     }
 
     fn __repr__(&self, py: Python<'_>) -> PyResult<String> {

@@ -9,6 +9,7 @@ use super::options::EdgeOptions;
 use super::prefilter::Prefilter;
 use super::region::Region;
 use crate::image::{ImageView, Smoother};
+use crate::interrupt::check;
 
 /// Edge pixels of greatest gradient magnitude across their edge, in slot order.
 #[derive(Debug, Clone, Default)]
@@ -90,6 +91,7 @@ impl RidgeDetector {
         let inner = region.columns().len() + 2;
         let (mut next_row, mut next_gradient) = (0, 0);
         for span in region.spans() {
+            check();
             for row in next_gradient.max(span.v.saturating_sub(1))..=span.v + 1 {
                 for v in next_row.max(row.saturating_sub(1))..=row + 1 {
                     self.smoother.row(image, v, left, &mut self.smoothed[v % 3][..inner + 2]);

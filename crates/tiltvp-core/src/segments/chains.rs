@@ -5,6 +5,7 @@ use std::hint::select_unpredictable;
 use tiltvp_kernels::vectorised;
 
 use crate::edges::{Region, RidgePixels};
+use crate::interrupt::check;
 
 /// The eight neighbours, by turns of 45 degrees from `u` towards `v`.
 const STEPS: [(i32, i32); 8] = [(1, 0), (1, 1), (0, 1), (-1, 1), (-1, 0), (-1, -1), (0, -1), (1, -1)];
@@ -109,6 +110,7 @@ impl Chains {
             if free[place] == 0 || gx * gx + gy * gy < start {
                 continue;
             }
+            check();
             let first = Here { place, towards: std::mem::replace(&mut free[place], 0), number };
             let begin = members.len();
             for way in [Way::Forward, Way::Back] {

@@ -16,6 +16,7 @@ use crate::camera::Camera;
 use crate::edges::{EdgeOptions, EdgePixels, Extent, Prefilter, Region, RidgeDetector, RidgePixels};
 use crate::error::{Error, Result};
 use crate::image::ImageView;
+use crate::interrupt::check;
 
 /// Finds the straight edges of the region of a camera's images.
 #[derive(Debug, Clone)]
@@ -125,6 +126,7 @@ impl SegmentFinder {
         toward.clear();
         self.bearings.locate(ridge, located);
         for chain in chains.of_at_least(least) {
+            check();
             let begin = points.len();
             let lifted = self.bearings.of(located, chains.units(), chain, lifted);
             append(chain, lifted, located, &ridge.edges, points);

@@ -5,6 +5,7 @@ use tiltvp_kernels::marks::{BEYOND, MARK, places};
 use tiltvp_kernels::vectorised;
 
 use super::segment::Segment;
+use crate::interrupt::check;
 
 /// Cosine of the largest angle between the normals of pieces of one edge, 14 degrees: short ones turn by noise.
 const NORMALS_COS: f64 = 0.97;
@@ -60,6 +61,7 @@ impl Groups {
             if std::mem::replace(&mut taken[rank], true) {
                 continue;
             }
+            check();
             members.push(*longest);
             let base = &pieces[*longest as usize];
             if gap_max > 0.0 {

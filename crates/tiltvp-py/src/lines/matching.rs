@@ -5,7 +5,7 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use tiltvp_core::lines::{self as core, BearingGate, MatchOptions, Profiles, WideOptions};
 
-use crate::call::{call_long, call_of, invalid};
+use crate::call::{call_by, call_long, invalid};
 use crate::convert::{self, Number};
 use crate::lines::values::Lines;
 use crate::options;
@@ -29,9 +29,9 @@ struct Pair {
 }
 
 impl Pair {
-    /// What each with each takes.
-    fn products(&self) -> usize {
-        self.a.len().saturating_mul(self.rows[1])
+    /// Whether to compare each with each may take longer than a person waits.
+    fn is_long(&self) -> bool {
+        self.a.len().saturating_mul(self.rows[1]) > 1 << 26
     }
 }
 
@@ -74,7 +74,7 @@ pub(crate) fn match_descriptors<'py>(
         (None, None, None) => None,
         _ => return Err(invalid("expected_rad, seen_rad, gate_rad: expected all three or none".to_owned())),
     };
-    let matches = call_of(py, pair.products(), || {
+    let matches = call_by(py, pair.is_long(), || {
         let gate = bearings.as_ref().map(|(expected_rad, seen_rad, gate_rad)| BearingGate {
             expected_rad,
             seen_rad,
@@ -145,7 +145,7 @@ fn matrix<'py>(
     of: impl FnOnce(&[f32], &[f32], usize) -> Result<Vec<f64>, tiltvp_core::Error> + Send,
 ) -> PyResult<Bound<'py, PyArray2<f64>>> {
     let pair = pair(a, b)?;
-    let values = call_of(py, pair.products(), || of(&pair.a, &pair.b, pair.width))?;
+    let values = call_by(py, pair.is_long(), || of(&pair.a, &pair.b, pair.width))?;
     PyArray1::from_vec(py, values).reshape(pair.rows)
 }
 
