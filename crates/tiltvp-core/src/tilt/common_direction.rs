@@ -57,7 +57,7 @@ pub struct CommonDirection {
 ///
 /// Normals whose great circles do not pass within `max_angle_rad` of the prior cannot agree with an answer there and are
 /// left out first. The answer is independent of the signs of the normals and turns with them. Where no more agree than would by
-/// chance there is none.
+/// chance there is none; of two normals the direction that they always have in common is one.
 ///
 /// # Errors
 /// [`Error::InvalidArgument`] if a normal or weight is not finite, a normal is zero, a weight negative, or their numbers differ;

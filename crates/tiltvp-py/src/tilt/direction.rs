@@ -52,7 +52,8 @@ impl CommonDirection {
 ///
 /// Raises `tiltvp.errors.InvalidInputError` for wrong shapes, zero or non-finite rows, negative weights and options out
 /// of their domain. Too few or degenerate normals, and those of which no more agree than would by chance, give an
-/// answer without a direction, and a reason.
+/// answer without a direction, and a reason. Two always have a direction in common, which no third one bears out: of pairs
+/// at random 6 % have one within 20 degrees of the prior, and an answer.
 #[pyfunction]
 #[pyo3(signature = (normals: "ArrayLike", *, weights: "ArrayLike | None" = None, **options: "Option | None"))]
 pub(crate) fn common_direction(
