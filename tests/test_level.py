@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import math
 import pickle
 from collections.abc import Callable
@@ -130,6 +131,20 @@ def test_levellers_show_what_they_are_asked_for(camera: tiltvp.Camera, room: Roo
     assert pinhole(room.gray, tilt).shape == (60, 90)
     assert tiltvp.Leveller(camera, size=(128, 128))(room.gray, tilt).shape == (128, 128)
     assert tiltvp.Leveller(camera, to=pinhole.output)(room.gray, tilt).shape == (60, 90)
+
+
+class OwnLeveller(tiltvp.Leveller):
+    """A class of a user's."""
+
+
+class OwnUnwrapper(tiltvp.Unwrapper):
+    """Another one."""
+
+
+@pytest.mark.parametrize("kind", [OwnLeveller, OwnUnwrapper])
+def test_copies_are_of_the_same_class(camera: tiltvp.Camera, kind: type) -> None:
+    one = kind(camera)
+    assert [type(twin) for twin in (pickle.loads(pickle.dumps(one)), copy.deepcopy(one))] == [kind, kind]
 
 
 def test_matrices_are_taken_as_they_are_when_they_are_given(camera: tiltvp.Camera, room: RoomImage) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import partial
 from typing import TYPE_CHECKING, Any, Final, Literal, TypeAlias
 
 import numpy as np
@@ -125,14 +126,11 @@ class Leveller:
         return _places(self._core, tilt)
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return _again, (self.camera, self.robot_from_camera, self.output, self._looks)
+        make = partial(type(self), to=self.output, robot_from_output=self._looks)
+        return make, (self.camera, self.robot_from_camera)
 
     def __repr__(self) -> str:
         return f"Leveller({self.camera!r}, to={self.output!r})"
-
-
-def _again(camera: _core.Camera, robot_from_camera: Any, output: _core.Camera, looks: Any) -> Leveller:
-    return Leveller(camera, robot_from_camera, to=output, robot_from_output=looks)
 
 
 def _output(
@@ -360,13 +358,9 @@ class Unwrapper:
         return np.asarray(strip, dtype=np.float32).reshape(self.size[1], self.size[0], *array.shape[2:])
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return _unwrapper, (self.camera, self._core.robot_from_camera, self.size, *self._elevations)
+        low, high = self._elevations
+        make = partial(type(self), size=self.size, elevation_min_rad=low, elevation_max_rad=high)
+        return make, (self.camera, self._core.robot_from_camera)
 
     def __repr__(self) -> str:
         return f"Unwrapper({self.camera!r}, size={self.size})"
-
-
-def _unwrapper(
-    camera: _core.Camera, robot_from_camera: Any, size: tuple[int, int], low: float, high: float
-) -> Unwrapper:
-    return Unwrapper(camera, robot_from_camera, size=size, elevation_min_rad=low, elevation_max_rad=high)
