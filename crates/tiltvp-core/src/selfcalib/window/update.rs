@@ -121,7 +121,9 @@ impl SlidingWindow {
                     let cross = self.cross_covariance(&rows);
                     return self.iterate(rows, cross, outcome, rejected);
                 }
-                rows.iter().for_each(|row| self.rejections[row.slot] = 0);
+                for row in &rows {
+                    self.rejections[row.slot] = 0;
+                }
                 outcome.nis = y.norm_squared();
                 // Each bearing may pass the gate, but all of them together do not.
                 if outcome.nis > self.gate.limit() * rows.len() as f64 {
