@@ -11,9 +11,24 @@ import pytest
 import tiltvp
 from tiltvp import corner, lines
 from tiltvp.arguments import array_from, number_from
+from tiltvp.colmap import gravity_from
+from tiltvp.corner_tables import roll_pitch_yaw
 from tiltvp.errors import InvalidInputError, TiltvpError
+from tiltvp.field_of_view import field_of_view
+from tiltvp.line_calibration import place_of_longest_tracks
+from tiltvp.line_logs import bearing_log, displacements
+from tiltvp.rotations import about_vertical, levelling, quaternion
 from tiltvp.stereo_rigs import StereoRig
-from tiltvp.streams import InertialSamples, Motion, Odometry, Wheels, frame_motions, read_odometry
+from tiltvp.streams import (
+    InertialSamples,
+    Motion,
+    Odometry,
+    Wheels,
+    frame_motions,
+    outputs,
+    read_odometry,
+    recorded_camera,
+)
 from tiltvp.streams.outputs.transforms import StaticTransform
 from tiltvp.synth import Room, simulate_drive
 from tiltvp.tilt import normal_of
@@ -179,6 +194,30 @@ FEATURE = corner.fit(
         (lambda: StaticTransform("base", 3, np.zeros(3), np.eye(3)), "child = 3, expected the name of a frame"),
         (lambda: tiltvp.join_logs([], start="a"), "start: no array of numbers"),
         (lambda: corner.poses(FEATURE, None, np.eye(4)), "feature: NoneType, expected a CornerFeature"),
+        (lambda: tiltvp.join_logs(3), "logs: int, expected several LogCalibration"),
+        (lambda: tiltvp.join_logs("ab"), r"logs\[0\]: str, expected a LogCalibration"),
+        (lambda: tiltvp.join_tilts([None]), r"tilts\[0\]: NoneType, expected a MountingTilt"),
+        (lambda: tiltvp.Extrinsics.of(3), "place: int, expected a LogCalibration or JoinedLogs"),
+        (lambda: tiltvp.mounting_tilt([None], [3], np.eye(3)), r"motions\[0\]: int, expected a Motion or None"),
+        (lambda: corner.join_boxes(FEATURE), "corners: CornerFeature, expected several BelievedCorner"),
+        (lambda: corner.triangulate("a", [], []), "bearings: no array of numbers"),
+        (
+            lambda: corner.triangulate(np.eye(3)[:2], [np.eye(2)], []),
+            r"covariances_rad2: shape \(1, 2, 2\), expected \(2, 2, 2\)",
+        ),
+        (lambda: roll_pitch_yaw(3), r"object_from_camera: shape \(\), expected \(3, 3\)"),
+        (lambda: about_vertical("a"), "angle_rad = 'a', expected a number"),
+        (lambda: levelling([0.0, 1.0]), r"normal: shape \(2,\), expected \(3,\)"),
+        (lambda: quaternion([[]] * 2 + [[1]]), "rotation: no array of numbers"),
+        (lambda: field_of_view("a.yaml"), "camera: str, expected a tiltvp.Camera"),
+        (lambda: ODOMETRY.gaps("a"), "times_s: no array of numbers"),
+        (lambda: recorded_camera("drive.mcap"), "recording: str, expected a tiltvp.streams.Recording"),
+        (lambda: outputs.attitude((0.1, 0.2)), "tilt: tuple, expected an estimate of a tilt"),
+        (lambda: outputs.write_tum("a.tum", 3, [], [], ""), r"times_s: shape \(\), expected \(N,\)"),
+        (lambda: bearing_log([SEGMENTS]), r"frames\[0\]: Segments, expected a FollowedFrame"),
+        (lambda: displacements([0.1], wheel_base_m=0.4), r"motions\[0\]: float, expected a Motion"),
+        (lambda: place_of_longest_tracks([], 3), r"start: shape \(\), expected \(3,\)"),
+        (lambda: gravity_from(ESTIMATE, "up"), "robot_from_camera: no array of numbers"),
     ],
 )
 def test_what_is_of_another_kind_is_named(call: Any, told: str) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Iterable
 from contextlib import suppress
 from pathlib import Path
 from types import UnionType
@@ -15,7 +16,18 @@ from tiltvp.errors import InvalidInputError
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
-__all__ = ["array_from", "flag_from", "number_from", "pair_from", "path_from", "refuse_unless", "size_from", "two_from"]
+__all__ = [
+    "array_from",
+    "each_from",
+    "flag_from",
+    "number_from",
+    "pair_from",
+    "path_from",
+    "refuse_unless",
+    "shaped_from",
+    "size_from",
+    "two_from",
+]
 
 
 def array_from(values: ArrayLike, name: str) -> NDArray[np.float64]:
@@ -28,6 +40,25 @@ def array_from(values: ArrayLike, name: str) -> NDArray[np.float64]:
         if array.dtype.kind in "iufO" and not np.ma.is_masked(values):
             return np.array(array, dtype=np.float64)
     raise InvalidInputError(f"{name}: no array of numbers, expected one")
+
+
+def shaped_from(values: Any, name: str, *shape: int | None) -> NDArray[np.float64]:
+    """`array_from` of that shape, in which None is any length. Raises `InvalidInputError`."""
+    array = array_from(values, name)
+    if array.ndim != len(shape) or any(want not in (None, has) for want, has in zip(shape, array.shape, strict=True)):
+        expected = str(tuple("N" if want is None else want for want in shape)).replace("'", "")
+        raise InvalidInputError(f"{name}: shape {array.shape}, expected {expected}")
+    return array
+
+
+def each_from(values: Any, name: str, has: str, kind: str, *, or_none: bool = False) -> list[Any]:
+    """Several things of one kind, which an attribute tells. Raises `InvalidInputError` with the number of another."""
+    refuse_unless(values, Iterable, name, f"several {kind}")
+    found = list(values)
+    for number, one in enumerate(found):
+        if not (hasattr(one, has) or (or_none and one is None)):
+            raise InvalidInputError(f"{name}[{number}]: {type(one).__name__}, expected a {kind}")
+    return found
 
 
 def path_from(path: str | os.PathLike[str]) -> Path:

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from tiltvp.arguments import path_from
+from tiltvp.arguments import path_from, shaped_from
 from tiltvp.cameras import Camera
 from tiltvp.errors import CalibrationError, ImageFileError, InvalidInputError, MissingExtraError, OutputError
 from tiltvp.formats import CameraSpec
@@ -135,7 +135,7 @@ class ColmapDatabase:
 
 def gravity_from(estimate: TiltEstimate, robot_from_camera: NDArray[np.float64]) -> NDArray[np.float64]:
     """(3,): where things fall, in the camera frame, by the tilt of a robot on which the camera sits so."""
-    return -np.asarray(estimate.normal) @ np.asarray(robot_from_camera)
+    return -np.asarray(estimate.normal) @ shaped_from(robot_from_camera, "robot_from_camera", 3, 3)
 
 
 def image_gravities(

@@ -15,7 +15,7 @@ import numpy as np
 
 from tiltvp import _core
 from tiltvp._core import CornerAttitude, CornerAttitudes, CornerFeature, CornerPose, ResolvedAttitude
-from tiltvp.arguments import array_from, number_from, refuse_unless
+from tiltvp.arguments import number_from, refuse_unless, shaped_from
 from tiltvp.corner_boxes import CornerBox, join_boxes
 from tiltvp.corner_images import (
     CORNER_METHODS,
@@ -111,9 +111,7 @@ class KnownAttitude:
     @classmethod
     def of(cls, camera_from_object: ArrayLike, sigma_rad: float) -> KnownAttitude:
         """From a (3, 3) rotation that may be off by `sigma_rad` about any axis. Raises `InvalidInputError`."""
-        rotation = array_from(camera_from_object, "camera_from_object")
-        if rotation.shape != (3, 3):
-            raise InvalidInputError(f"camera_from_object: shape {rotation.shape}, expected an array (3, 3)")
+        rotation = shaped_from(camera_from_object, "camera_from_object", 3, 3)
         sigma_rad = number_from(sigma_rad, "sigma_rad")
         if not 0.0 <= sigma_rad < math.inf:
             raise InvalidInputError(f"sigma_rad = {sigma_rad}, expected a standard deviation, finite and not negative")
@@ -262,4 +260,7 @@ def triangulate(
     (N, 3) unit bearings, each with its (2, 2) covariance in its tangent plane and the (4, 4) place of its camera. None
     where the lines of sight are parallel or the point would be behind a camera.
     """
-    return _core.triangulate(bearings, list(covariances_rad2), list(rig_from_camera))
+    rays = shaped_from(bearings, "bearings", None, 3)
+    spread = shaped_from(covariances_rad2, "covariances_rad2", len(rays), 2, 2)
+    places = shaped_from(rig_from_camera, "rig_from_camera", len(rays), 4, 4)
+    return _core.triangulate(rays, list(spread), list(places))

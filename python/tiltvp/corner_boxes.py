@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from tiltvp.arguments import each_from
+
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
@@ -49,6 +51,7 @@ def join_boxes(corners: Sequence[BelievedCorner]) -> list[CornerBox]:
     seen up to their ends. Whether it is full or hollow is not asked: a room is one too. Corners without a place, and
     those whose edges are not at right angles, are of none.
     """
+    corners = each_from(corners, "corners", "pose", "BelievedCorner")
     usable = [place for place, corner in enumerate(corners) if _is_right(corner)]
     groups: dict[int, set[int]] = {place: {place} for place in usable}
     for a in usable:

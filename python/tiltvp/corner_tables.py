@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
+from tiltvp.arguments import shaped_from
 from tiltvp.corner_boxes import join_boxes
 from tiltvp.errors import InvalidInputError
 from tiltvp.rotations import quaternion
@@ -153,6 +154,6 @@ def roll_pitch_yaw(object_from_camera: NDArray[np.float64]) -> NDArray[np.float6
 
     All zero where the camera's axes are the object's, the paper's initial orientation.
     """
-    r = object_from_camera
+    r = shaped_from(object_from_camera, "object_from_camera", 3, 3)
     pitch = np.arctan2(-r[1, 2], np.hypot(r[0, 2], r[2, 2]))
     return np.array([np.arctan2(r[1, 0], r[1, 1]), pitch, np.arctan2(r[0, 2], r[2, 2])])

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, ClassVar, Final
 
 import numpy as np
 
-from tiltvp.arguments import array_from, number_from
+from tiltvp.arguments import array_from, each_from, number_from
 from tiltvp.errors import InvalidInputError
 from tiltvp.mounting import MountingTilt
 from tiltvp.rotations import about_vertical, mounting_from
@@ -148,6 +148,8 @@ class Extrinsics:
         if isinstance(place, JoinedLogs):
             (x, y, yaw), plane = place.xy_yaw, place.covariance
         else:
+            if not hasattr(place, "mounting"):
+                raise InvalidInputError(f"place: {type(place).__name__}, expected a LogCalibration or JoinedLogs")
             one = place.mounting
             (x, y, yaw), plane = (one.x_m, one.y_m, one.yaw_rad), one.covariance_xy_yaw
         reasons = [] if place else [place.reason]
@@ -221,6 +223,7 @@ def join_logs(
     Raises `InvalidInputError` for no log, for one that is given twice, for a log whose covariance is none, and for a
     start of other shapes.
     """
+    logs = each_from(logs, "logs", "mounting", "LogCalibration")
     for number, log in enumerate(logs):
         if isinstance(log, LogCalibration) and log in logs[:number]:
             raise InvalidInputError(f"logs[{number}]: the same as one before, expected logs of different drives")
@@ -264,6 +267,7 @@ def join_tilts(tilts: Sequence[MountingTilt]) -> JoinedTilts:
     What no turn averages out (`MountingTilt.shared_rad2`) is taken to be the same in all drives. Raises
     `InvalidInputError` for no drive, and for one that does not tell.
     """
+    tilts = each_from(tilts, "tilts", "shared_rad2", "MountingTilt")
     for number, tilt in enumerate(tilts):
         if not tilt:
             raise InvalidInputError(f"tilts[{number}]: {tilt.reason}")

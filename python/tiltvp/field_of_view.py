@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from tiltvp.images import checked_camera
+
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
@@ -41,6 +43,7 @@ class FieldOfView:
 
 def field_of_view(camera: Camera) -> FieldOfView:
     """Measures a camera along row, column and diagonals through its axis or middle, as far as pixels have bearings."""
+    checked_camera(camera)
     ahead = np.array([0.0, 0.0, -1.0 if camera.mirror else 1.0])
     axis = np.asarray(camera.project(ahead), dtype=np.float64)
     last = np.array([camera.width - 1.0, camera.height - 1.0])

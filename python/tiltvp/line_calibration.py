@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
+from tiltvp.arguments import each_from, shaped_from
 from tiltvp.errors import InvalidInputError
 from tiltvp.line_logs import FollowedFrame, SeenFrame, bearing_log
 from tiltvp.lines import LineTracker
@@ -129,7 +130,8 @@ def place_of_longest_tracks(seen: Sequence[SeenFrame], start: Place) -> tuple[fl
     Looks at the stretch in which the robot both turns and drives most: a turn alone does not tell how far away lines
     are. The start where there is none.
     """
-    seen = _apart(seen)
+    shaped_from(start, "start", 3)
+    seen = _apart(each_from(seen, "seen", "turn_rad", "SeenFrame"))
     turn, way = np.abs([(one.turn_rad or 0.0, one.distance_m or 0.0) for one in seen]).reshape(-1, 2).T
     count = min(_FRAMES, len(seen))
     if not count:

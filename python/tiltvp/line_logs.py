@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from tiltvp.arguments import each_from
 from tiltvp.errors import InvalidInputError, TiltvpError, UnknownLeanError
 from tiltvp.images import gray_from
 from tiltvp.selfcalib import wheel_displacements
@@ -100,6 +101,8 @@ def see_lines(
     next. Raises `InvalidInputError` if there are more images than motions.
     """
     # Motions without any distance tell turns only.
+    if motions is not None:
+        motions = each_from(motions, "motions", "yaw_rad", "Motion")
     drives = motions is not None and any(motion.distance_m for motion in motions)
     turn_rad, distance_m = 0.0, 0.0
     for number, image in enumerate(images):
@@ -140,6 +143,7 @@ def bearing_log(frames: Sequence[FollowedFrame], *, frames_min: int = 2) -> NDAr
 
     Of more than 150 tracks, or than there are frames, those that are seen in most.
     """
+    frames = each_from(frames, "frames", "tracked", "FollowedFrame")
     rows = [
         (frame.number, track, bearing)
         for frame in frames
@@ -153,6 +157,7 @@ def bearing_log(frames: Sequence[FollowedFrame], *, frames_min: int = 2) -> NDAr
 
 def displacements(motions: Sequence[Motion], *, wheel_base_m: float) -> NDArray[np.float64]:
     """(N, 2): how far left and right wheels rolled up to each frame: as recorded, or as distance and turn have it."""
+    motions = each_from(motions, "motions", "yaw_rad", "Motion")
     derived = wheel_displacements(
         [motion.distance_m for motion in motions], [motion.yaw_rad for motion in motions], wheel_base_m=wheel_base_m
     )

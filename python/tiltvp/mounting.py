@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from tiltvp.arguments import flag_from, number_from
+from tiltvp.arguments import each_from, flag_from, number_from
 from tiltvp.errors import InvalidInputError
 from tiltvp.rotations import levelling, mounting_from
 from tiltvp.tilt import TiltFilter
@@ -131,7 +131,8 @@ def mounting_tilt(
     that is no rotation.
     """
     rotation = mounting_from(robot_from_camera)
-    images = list(estimates)
+    images = each_from(estimates, "estimates", "normal", "TiltEstimate or None", or_none=True)
+    motions = each_from(motions, "motions", "yaw_rad", "Motion or None", or_none=True)
     if len(images) != len(motions):
         raise InvalidInputError(f"motions: {len(motions)}, expected {len(images)}, one for each image")
     known = [(image, motion) for image, motion in zip(images, motions, strict=True) if motion is not None]

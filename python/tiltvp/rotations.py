@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from tiltvp.arguments import path_from
+from tiltvp.arguments import number_from, path_from, shaped_from
 from tiltvp.errors import CalibrationError, CalibrationNotFoundError, InvalidInputError
 from tiltvp.formats.document import Document
 
@@ -49,20 +49,20 @@ _SLACK: Final = 1e-3
 
 def about_vertical(angle_rad: float) -> Matrix:
     """(3, 3): the turn to the left about the robot's z axis."""
-    c, s = math.cos(angle_rad), math.sin(angle_rad)
+    c, s = math.cos(angle := number_from(angle_rad, "angle_rad")), math.sin(angle)
     return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
 
 
 def levelling(normal: NDArray[np.floating]) -> Matrix:
     """(3, 3): the smallest rotation that takes a unit vector (3,), not straight down, to the robot's z axis."""
-    x, y, z = (float(value) for value in normal)
+    x, y, z = shaped_from(normal, "normal", 3).tolist()
     scale = 1.0 / (1.0 + z)
     return np.array([[1.0 - x * x * scale, -x * y * scale, -x], [-x * y * scale, 1.0 - y * y * scale, -y], [x, y, z]])
 
 
 def quaternion(rotation: NDArray[np.floating]) -> Matrix:
     """(4,): x, y, z, w of a rotation (3, 3), w not negative: the main eigenvector of Bar-Itzhack's matrix."""
-    (xx, xy, xz), (yx, yy, yz), (zx, zy, zz) = rotation
+    (xx, xy, xz), (yx, yy, yz), (zx, zy, zz) = shaped_from(rotation, "rotation", 3, 3).tolist()
     symmetric = np.array([
         [xx - yy - zz, xy + yx, xz + zx, zy - yz],
         [xy + yx, yy - xx - zz, yz + zy, xz - zx],

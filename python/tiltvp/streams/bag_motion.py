@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
+from tiltvp.arguments import refuse_unless
 from tiltvp.errors import InvalidInputError
 from tiltvp.streams.bags import Recording, Topic
 from tiltvp.streams.inertial import InertialSamples
@@ -154,6 +155,7 @@ def inertial_samples(recording: Recording, topic: str | None = None) -> Inertial
 
     Raises `InvalidInputError` that lists the topics, and for a sensor without rates or accelerations.
     """
+    refuse_unless(recording, Recording, "recording", "a tiltvp.streams.Recording")
     chosen = recording.choose((_IMU,), "--imu-topic", topic)
     source, frame = f"{recording.path} {chosen.name}", ""
     rows = []

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from tiltvp.arguments import refuse_unless
 from tiltvp.cameras import Camera
 from tiltvp.errors import CalibrationError, InvalidInputError
 from tiltvp.formats.document import Document
@@ -36,6 +37,7 @@ def recorded_camera(recording: Recording, topic: str | None = None, *, images: s
     Raises `InvalidInputError` that lists the topics, `CalibrationError` for a lens that is not supported and for a
     camera that was not calibrated.
     """
+    refuse_unless(recording, Recording, "recording", "a tiltvp.streams.Recording")
     chosen = recording.choose(CAMERA_KINDS, "--camera-name", topic)
     if images is None:
         seen = [one.name for one in recording.topics if one.kind in IMAGE_KINDS and one.count > 0]
@@ -106,6 +108,7 @@ def robot_from_camera(
     `InvalidInputError` that names the frames there are, where they do not join the two, and where two transforms of one
     frame between them contradict each other.
     """
+    refuse_unless(recording, Recording, "recording", "a tiltvp.streams.Recording")
     written = [one for one in recording.topics if one.name == TRANSFORM_TOPIC]
     if camera_frame is None and written and not any(one.kind in IMAGE_KINDS for one in recording.topics):
         text = str(next(content for _, content in recording.decoded(written[0])).data)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from tiltvp.arguments import array_from, number_from
+from tiltvp.arguments import array_from, number_from, shaped_from
 from tiltvp.errors import InvalidInputError, counted
 
 if TYPE_CHECKING:
@@ -105,9 +105,7 @@ class Odometry:
         notes: tuple[str, ...] = (), gap_max_s: float = GAP_MAX_S,
     ) -> Odometry:  # fmt: skip
         """From how far both wheels (N, 2) had rolled. Without the distance between them turns are not known."""
-        wheels = array_from(wheels_m, "wheels_m")
-        if wheels.ndim != 2 or wheels.shape[1:] != (2,):
-            raise InvalidInputError(f"wheels_m: {wheels.shape}, expected (N, 2)")
+        wheels = shaped_from(wheels_m, "wheels_m", None, 2)
         yaw = None
         if wheel_base_m is not None:
             if not 0.0 < number_from(wheel_base_m, "wheel_base_m") < np.inf:
@@ -238,7 +236,8 @@ class Odometry:
         """A sentence about its gaps between the first and the last of the times (M,), over which frames are joined all
         the same: its counters and poses go on behind them. None where there are none.
         """
-        first, last = np.min(times_s), np.max(times_s)
+        times = array_from(times_s, "times_s")
+        first, last = np.min(times, initial=np.inf), np.max(times, initial=-np.inf)
         told = gaps_told(self.times_s[(self.times_s >= first) & (self.times_s <= last)], self.gap_max_s)
         return None if told is None else f"{self.source}: {told}; the way in each is taken for one arc"
 

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Final, Protocol
+from typing import TYPE_CHECKING, Final, Protocol, runtime_checkable
 
 import numpy as np
 
 from tiltvp._core import leaning_from_upright
-from tiltvp.arguments import path_from
+from tiltvp.arguments import path_from, refuse_unless
 from tiltvp.errors import InvalidInputError
 from tiltvp.files import check_output
 from tiltvp.rotations import quaternion
@@ -34,6 +34,7 @@ _LAST_S: Final = 2.0**31
 """Seconds in a stamp of ROS 2, a signed number of 32 bits."""
 
 
+@runtime_checkable
 class Tilt(Protocol):
     """An estimate of one image or of a filter; false where there is none."""
 
@@ -62,6 +63,7 @@ def attitude(tilt: Tilt) -> tuple[Matrix, Matrix]:
     The error is a rotation vector in the world's axes, which are level: x is where the robot heads, z up. About x and y
     it is that of the tilt, about z `YAW_VARIANCE_RAD2`. Raises `InvalidInputError` for an estimate without a tilt.
     """
+    refuse_unless(tilt, Tilt, "tilt", "an estimate of a tilt")
     if not tilt:
         raise InvalidInputError("tilt: an estimate without a tilt, expected one with a tilt")
     world_from_robot = _about_y(tilt.pitch_rad) @ _about_x(tilt.roll_rad)

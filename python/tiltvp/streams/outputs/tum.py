@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from tiltvp.arguments import shaped_from
 from tiltvp.files import write_whole
 
 if TYPE_CHECKING:
@@ -22,7 +23,9 @@ def write_tum(
 
     `times_s` (N,), `positions_m` (N, 3), `quaternions` (N, 4) as x, y, z, w. Raises `OutputError`.
     """
-    columns = [np.asarray(times_s)[:, None], np.asarray(positions_m), np.asarray(quaternions)]
+    times = shaped_from(times_s, "times_s", None)
+    positions = shaped_from(positions_m, "positions_m", len(times), 3)
+    columns = [times[:, None], positions, shaped_from(quaternions, "quaternions", len(times), 4)]
     lines = [f"# time_s x_m y_m z_m qx qy qz qw {about}"]
     lines += [" ".join(f"{value:.9f}" for value in row) for row in np.hstack(columns).tolist()]
     write_whole(path, "\n".join(lines) + "\n")
