@@ -76,7 +76,7 @@ def test_rows_of_an_image_are_the_estimators_own_answers(camera: tiltvp.Camera, 
         assert (row["alpha_rad"], row["beta_rad"]) == (estimate.alpha_rad, estimate.beta_rad)
         assert row["alpha_raw_rad"] == row["alpha_rad"]
         assert (row["shift_px"], row["confidence"]) == (estimate.shift_px, estimate.confidence)
-        assert row["covariance_xy"] == estimate.covariance_rad2[0, 1]
+        assert row["covariance_xy_rad2"] == estimate.covariance_rad2[0, 1]
         assert row["error_rad"] == pytest.approx(tiltvp.tilt_error_rad(estimate.normal, true), abs=1e-12)
         assert (row["edge_pixels"], row["iterations"]) == (estimate.edge_pixels, estimate.report.iterations)
         assert row["gradient_min"] == estimator.options["gradient_min"]
@@ -88,7 +88,7 @@ def test_rows_of_an_image_are_the_estimators_own_answers(camera: tiltvp.Camera, 
 
 def test_an_image_without_edges_has_no_numbers(camera: tiltvp.Camera) -> None:
     rows = ImageRunner(camera, choose("table3"))(np.full((camera.height, camera.width), 90, dtype=np.uint8), VIEW)
-    for name in ("alpha_rad", "beta_rad", "error_rad", "offset_x_rad", "covariance_xx"):
+    for name in ("alpha_rad", "beta_rad", "error_rad", "offset_x_rad", "covariance_xx_rad2"):
         assert rows[name].null_count() == len(rows), name
     assert rows["confidence"].to_list() == [0.0] * len(rows)
     assert set(rows["stop"]) == {"too-few"}
@@ -134,7 +134,7 @@ def test_rows_of_a_run(whole: Run, dataset: TiltDataset) -> None:
     blank = whole.table.filter(pl.col("image") == 5)
     assert blank["error_rad"].null_count() == len(blank)
     trained = whole.table.filter(pl.col("correction").is_in(["factor", "affine", "posterior"]))
-    assert trained["covariance_xx"].null_count() == len(trained)
+    assert trained["covariance_xx_rad2"].null_count() == len(trained)
     own = trained.filter((pl.col("group") == "paper") & (pl.col("method") == "image-space-reject-refit"))
     assert own["factor"].null_count() == 0
     assert own.filter(pl.col("correction") == "affine")["offset_rad"].null_count() == 0

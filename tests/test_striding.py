@@ -25,7 +25,7 @@ def test_the_table_has_a_row_for_each_method_and_stride() -> None:
     truth = tiltvp.normal_from_alpha_beta(views[2].alpha_rad, views[2].beta_rad)
     row = table.filter(view=2, method="refined", row_stride=3).row(0, named=True)
     assert row["error_rad"] == pytest.approx(tiltvp.tilt_error_rad(estimate.normal, truth), abs=1e-12)
-    assert row["covariance_xy"] == estimate.covariance_rad2[0, 1]
+    assert row["covariance_xy_rad2"] == estimate.covariance_rad2[0, 1]
     summary = summarise_strides(table)
     assert summary["method"].to_list() == [method for method in PIXEL_METHODS for _ in range(2)]
     first = summary.filter(row_stride=1)

@@ -29,9 +29,9 @@ def draws(seed: int, promised: float = 1.0) -> pl.DataFrame:
             "error_rad": np.linalg.norm(errors, axis=1),
             "offset_x_rad": errors[:, 0],
             "offset_y_rad": errors[:, 1],
-            "covariance_xx": promised * sigma**2,
-            "covariance_xy": np.zeros(400),
-            "covariance_yy": promised * sigma**2,
+            "covariance_xx_rad2": promised * sigma**2,
+            "covariance_xy_rad2": np.zeros(400),
+            "covariance_yy_rad2": promised * sigma**2,
             "confidence": 1.0 - np.exp(-0.5 * (np.deg2rad(2.0) / sigma) ** 2),
         }
     )

@@ -77,6 +77,15 @@ def test_tables_are_in_the_order_of_the_paper(report: Path) -> None:
     assert tuple(variant.name for variant in VARIANTS) == style.KNOWN
 
 
+def test_a_run_of_another_version_is_refused(run: Path, tmp_path: Path) -> None:
+    """As those were whose covariances had no unit in their names."""
+    (tmp_path / "manifest.json").write_bytes((run / "manifest.json").read_bytes())
+    table = pl.read_parquet(run / "estimates.parquet").rename({"covariance_xx_rad2": "covariance_xx"})
+    table.write_parquet(tmp_path / "estimates.parquet")
+    with pytest.raises(RunError, match="no columns covariance_xx_rad2, expected a run of this version"):
+        read_run(tmp_path)
+
+
 def test_a_method_without_a_name_for_people_is_in_the_table(run: Path) -> None:
     """As a new one, or that of another version: its rows were left out."""
     summary = errors(read_run(run).table).with_columns(pl.col("method").replace("refined", "another"))
@@ -237,9 +246,9 @@ def _rows(error_rad: np.ndarray, confidence: np.ndarray | None = None, **columns
     n = len(error_rad)
     plain = {
         "yaw_rad": np.zeros(n),
-        "covariance_xx": np.ones(n),
-        "covariance_xy": np.zeros(n),
-        "covariance_yy": np.ones(n),
+        "covariance_xx_rad2": np.ones(n),
+        "covariance_xy_rad2": np.zeros(n),
+        "covariance_yy_rad2": np.ones(n),
     }
     known = {"variant": ["one"] * n, "image": np.arange(n), "error_rad": error_rad}
     known |= {"confidence": np.ones(n) if confidence is None else confidence}
@@ -255,9 +264,9 @@ def test_regions_of_a_true_covariance_hold_what_they_promise() -> None:
     x = np.cos(yaw) * drawn[:, 0] - np.sin(yaw) * drawn[:, 1]
     y = np.sin(yaw) * drawn[:, 0] + np.cos(yaw) * drawn[:, 1]
     entries = {
-        "covariance_xx": np.full(4000, 4e-4),
-        "covariance_xy": np.full(4000, 1e-4),
-        "covariance_yy": np.full(4000, 1e-4),
+        "covariance_xx_rad2": np.full(4000, 4e-4),
+        "covariance_xy_rad2": np.full(4000, 1e-4),
+        "covariance_yy_rad2": np.full(4000, 1e-4),
     }
     rows = _rows(np.hypot(x, y), offset_x_rad=x, offset_y_rad=y, yaw_rad=yaw, **entries)
     shares = curves.region_shares(rows, np.array([0.5, 0.9, 0.95]))["share"].to_numpy()

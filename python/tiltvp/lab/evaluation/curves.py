@@ -84,7 +84,7 @@ def region_shares(rows: pl.DataFrame, levels: NDArray[np.float64] | None = None)
     grid = np.arange(1, 100) / 100.0 if levels is None else levels
     parts = []
     for part in rows.partition_by("variant", maintain_order=True):
-        known = part.drop_nulls(["error_rad", "covariance_xx"])
+        known = part.drop_nulls(["error_rad", "covariance_xx_rad2"])
         if known.is_empty():
             continue
         inside = _squared_distances(known)[None, :] <= -2.0 * np.log1p(-grid)[:, None]
@@ -100,7 +100,7 @@ def _squared_distances(rows: pl.DataFrame) -> NDArray[np.float64]:
     cos, sin = np.cos(rows["yaw_rad"].to_numpy()), np.sin(rows["yaw_rad"].to_numpy())
     x0, y0 = rows["offset_x_rad"].to_numpy(), rows["offset_y_rad"].to_numpy()
     x, y = cos * x0 + sin * y0, cos * y0 - sin * x0
-    xx, xy, yy = (rows[f"covariance_{pair}"].to_numpy() for pair in ("xx", "xy", "yy"))
+    xx, xy, yy = (rows[f"covariance_{pair}_rad2"].to_numpy() for pair in ("xx", "xy", "yy"))
     finite = np.isfinite(xx) & np.isfinite(xy) & np.isfinite(yy)
     xx, xy, yy = (np.where(finite, entry, entry_open) for entry, entry_open in ((xx, 1.0), (xy, 0.0), (yy, 1.0)))
     return np.where(finite, (yy * x * x - 2.0 * xy * x * y + xx * y * y) / (xx * yy - xy * xy), 0.0)

@@ -23,6 +23,7 @@ import polars as pl
 from tiltvp import _core
 from tiltvp.errors import OutputError, RunError
 from tiltvp.files import write_whole
+from tiltvp.lab.evaluation.schema import COLUMNS
 
 __all__ = ["Run", "RunFolder", "kept", "new_manifest", "open_run", "read_run", "versions"]
 
@@ -154,9 +155,12 @@ def read_run(directory: str | os.PathLike[str]) -> Run:
         done, images = len(list((folder / _PARTS).glob("[0-9]*.parquet"))), manifest["dataset"]["images"]
         raise RunError(f"{folder}: {done} of {images} images are done, expected a whole run: evaluate once more")
     try:
-        return Run(manifest, pl.read_parquet(folder / _TABLE))
+        table = pl.read_parquet(folder / _TABLE)
     except (OSError, pl.exceptions.PolarsError) as error:
         raise RunError(f"{folder / _TABLE}: cannot be read ({error}), expected the table of a run") from error
+    if missing := [name for name in COLUMNS if name not in table.columns]:
+        raise RunError(f"{folder / _TABLE}: no columns {', '.join(missing)}, expected a run of this version of tiltvp")
+    return Run(manifest, table)
 
 
 def _read_manifest(directory: Path) -> dict[str, Any]:

@@ -43,9 +43,9 @@ COLUMNS: Final[dict[str, type[pl.DataType]]] = {
     "offset_x_rad": pl.Float64,
     "offset_y_rad": pl.Float64,
     # What the estimate says about itself; the covariance is null in rows corrected afterwards and without an estimate.
-    "covariance_xx": pl.Float64,
-    "covariance_xy": pl.Float64,
-    "covariance_yy": pl.Float64,
+    "covariance_xx_rad2": pl.Float64,
+    "covariance_xy_rad2": pl.Float64,
+    "covariance_yy_rad2": pl.Float64,
     "confidence": pl.Float64,
     "edge_pixels": pl.UInt32,
     "prefiltered_pixels": pl.UInt32,

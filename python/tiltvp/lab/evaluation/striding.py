@@ -63,9 +63,9 @@ def stride_views(
                     "offset_x_rad": float(error[0]),
                     "offset_y_rad": float(error[1]),
                     "error_rad": float(np.linalg.norm(error)),
-                    "covariance_xx": float(covariance[0, 0]),
-                    "covariance_xy": float(covariance[0, 1]),
-                    "covariance_yy": float(covariance[1, 1]),
+                    "covariance_xx_rad2": float(covariance[0, 0]),
+                    "covariance_xy_rad2": float(covariance[0, 1]),
+                    "covariance_yy_rad2": float(covariance[1, 1]),
                 }
             rows.append(row)
         advance()
