@@ -54,7 +54,8 @@ def test_render_and_check(run: Run, world: Path, tmp_path: Path) -> None:
     assert run("check", out) == (0, f"{out}: 4 images, 2 locations, 1 environment, 0 warnings\n", "")
     code, _, complaints = run(*words)
     assert code == 2
-    assert "exists, expected a new folder" in complaints
+    assert "exists, expected a new folder, or --overwrite to replace a dataset" in complaints
+    assert run(*words, "--limit", "1", "--overwrite")[0] == 0
     assert run(*words, "--force", "--turn", "--limit", "1")[0] == 0
     assert len(read_dataset(out).images) == 7
 

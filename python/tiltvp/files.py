@@ -22,6 +22,7 @@ __all__ = [
     "check_replacing",
     "check_toml",
     "keeping_existing",
+    "keeps_existing",
     "read_bytes",
     "read_text",
     "scratch_folder",
@@ -71,6 +72,11 @@ def keeping_existing() -> Iterator[None]:
         _KEEPS.reset(token)
 
 
+def keeps_existing() -> bool:
+    """Whether outputs that exist are refused."""
+    return _KEEPS.get()
+
+
 def check_output(path: str | os.PathLike[str]) -> None:
     """Refuses what no file can be written to, before any work is done: what is no regular file, and what is to be kept.
 
@@ -86,7 +92,7 @@ def check_output(path: str | os.PathLike[str]) -> None:
     if not stat.S_ISREG(state.st_mode):
         what = "a folder" if stat.S_ISDIR(state.st_mode) else "no regular file"
         raise OutputError(f"{os.fspath(path)}: cannot be written (is {what}), expected a file")
-    if _KEEPS.get():
+    if keeps_existing():
         raise InvalidInputError(f"{os.fspath(path)}: exists, expected a new file, or --overwrite to replace it")
 
 
@@ -101,7 +107,7 @@ def check_toml(path: str | os.PathLike[str]) -> None:
 
 def check_replacing(what: str) -> None:
     """Refuses to replace what a file has within it where outputs are kept. Raises `InvalidInputError`."""
-    if _KEEPS.get():
+    if keeps_existing():
         raise InvalidInputError(f"{what}, expected none, or --overwrite to replace it")
 
 
@@ -110,7 +116,7 @@ def check_output_folder(path: str | os.PathLike[str]) -> None:
     folder = path_from(path)
     if folder.exists() and not folder.is_dir():
         raise InvalidInputError(f"{folder}: is a file, expected a folder")
-    if _KEEPS.get() and folder.is_dir() and any(folder.iterdir()):
+    if keeps_existing() and folder.is_dir() and any(folder.iterdir()):
         raise InvalidInputError(f"{folder}: exists, expected a new or empty folder, or --overwrite to replace it")
 
 

@@ -15,7 +15,7 @@ app = App(
     name="tiltvp",
     help="Orientation and calibration from the straight lines of man-made places: a robot's tilt, vertical lines, "
     "where a camera sits on a robot, and the pose of corners. Files and folders that exist are kept; with --overwrite, "
-    "which every command takes, its outputs replace them.",
+    "which every command takes, its outputs replace them; a run of evaluate goes on.",
     version=__version__,
     default_parameter=_PARAMETER,
     suppress_keyboard_interrupt=False,

@@ -125,7 +125,7 @@ def render(
             seed=making.seed,
             threads=making.threads,
             source=made_by("render") | {"panoramas": panoramas.absolute().name} | lens.source,
-            force=making.force,
+            force=making.replaces,
             advance=bar.advance,
         )
     _say_made(making.out)
@@ -179,7 +179,7 @@ def synth(
             seed=making.seed,
             threads=making.threads,
             source=made_by("synth") | lens.source,
-            force=making.force,
+            force=making.replaces,
             advance=bar.advance,
         )
     _say_made(making.out)
@@ -209,7 +209,7 @@ def degrade(
             seed=making.seed,
             threads=making.threads,
             source=made_by("degrade"),
-            force=making.force,
+            force=making.replaces,
             advance=bar.advance,
         )
     _say_made(making.out)

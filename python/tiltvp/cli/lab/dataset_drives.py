@@ -72,7 +72,7 @@ def drive(
     )
     with progress_bar(len(made), "frames") as bar:
         source = made_by("drive") | lens.source
-        write_drive(made, making.out, threads=making.threads, source=source, force=making.force, advance=bar.advance)
+        write_drive(made, making.out, threads=making.threads, source=source, force=making.replaces, advance=bar.advance)
     say(f"{making.out}: {len(made)} frames of a drive of {made.motions[:, 0].sum():.1f} m")
 
 
@@ -145,7 +145,7 @@ def stereo(
             making.out,
             threads=making.threads,
             source=made_by("stereo"),
-            force=making.force,
+            force=making.replaces,
             advance=bar.advance,
         )
     say(f"{making.out}: {len(sequence)} pairs of images")

@@ -13,6 +13,7 @@ from cyclopts import Parameter
 
 from tiltvp.cli.options import ALL_CORES, AtLeast0, Switch, Threads
 from tiltvp.errors import InvalidInputError
+from tiltvp.files import keeps_existing
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -36,7 +37,12 @@ class MakingOptions:
     """Seed of whatever is random."""
     threads: Threads = ALL_CORES
     force: Switch = False
-    """Replace a dataset that is there."""
+    """Replace a dataset that is there, as --overwrite does."""
+
+    @property
+    def replaces(self) -> bool:
+        """Whether a dataset that is there makes room."""
+        return self.force or not keeps_existing()
 
 
 @Parameter(name="*")

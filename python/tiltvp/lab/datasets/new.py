@@ -145,7 +145,7 @@ def _refuse_taken(target: Path, force: bool) -> None:
         return
     is_ours = target.is_dir() and ((target / DESCRIPTION).is_file() or not any(target.iterdir()))
     if not force:
-        raise InvalidInputError(f"{target}: exists, expected a new folder, or --force to replace a dataset")
+        raise InvalidInputError(f"{target}: exists, expected a new folder, or --overwrite to replace a dataset")
     if not is_ours:
         raise InvalidInputError(f"{target}: is no dataset, expected a folder with {DESCRIPTION}, or an empty one")
 
