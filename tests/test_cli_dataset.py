@@ -60,6 +60,19 @@ def test_render_and_check(run: Run, world: Path, tmp_path: Path) -> None:
     assert len(read_dataset(out).images) == 7
 
 
+def test_degrading_a_drive_says_what_is_left_out(run: Run, world: Path, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    words = ("render", "--panoramas", world / "panos", "--out", out, "--camera", world / "camera.toml")
+    assert run(*words, "--tilts-deg", "1,0")[0] == 0
+    assert run("degrade", out, "--out", tmp_path / "hard")[::2] == (0, "")
+    (out / "odometry.csv").write_text("file,left_m,right_m\n")
+    code, _, complaints = run("degrade", out, "--out", tmp_path / "hard", "--overwrite")
+    assert (code, "hard: without odometry.csv of" in complaints) == (0, True)
+    # A dataset is not replaced by what is made of it.
+    code, _, complaints = run("degrade", out, "--out", out, "--overwrite")
+    assert (code, "is the dataset that is read, expected another folder" in complaints) == (2, True)
+
+
 def test_a_robots_file_tells_how_its_camera_is_held(run: Run, world: Path, tmp_path: Path) -> None:
     turned = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
     tiltvp.Robot(tiltvp.Camera.load(world / "camera.toml"), turned).save(tmp_path / "robot.toml")

@@ -10,7 +10,7 @@ from tiltvp.cli.lab.dataset_options import LensOptions, MakingOptions, Words, ma
 from tiltvp.cli.lab.measure_options import NoiseSigma, Samples
 from tiltvp.cli.options import Switch
 from tiltvp.cli.root import group
-from tiltvp.cli.terminal import new_table, progress_bar, say, show
+from tiltvp.cli.terminal import complain, new_table, progress_bar, say, show
 from tiltvp.errors import counted
 
 app = group("dataset", "Folders of images with known lean: check them, or make them.")
@@ -213,6 +213,9 @@ def degrade(
             advance=bar.advance,
         )
     _say_made(making.out)
+    known = {*dataset.files, *(image.path for image in dataset.images)}
+    if left := sorted(file.name for file in directory.iterdir() if file.is_file() and file not in known):
+        complain(f"{making.out}: without {', '.join(left)} of {directory}, as its images have other names")
 
 
 def _say_made(out: Path) -> None:

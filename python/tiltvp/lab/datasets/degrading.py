@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, Final
 import cv2
 import numpy as np
 
+from tiltvp.arguments import path_from
 from tiltvp.errors import InvalidInputError
 from tiltvp.lab.datasets.folder import TiltDataset
 from tiltvp.lab.datasets.new import in_order, new_dataset
@@ -73,10 +74,13 @@ def degrade_dataset(
 ) -> None:
     """Writes the dataset again with a hardship for each image, drawn by `seed` and the image's place in the table.
 
-    Locations, environments and truth stay. `advance` is called after each image. Raises `InvalidInputError`.
+    Locations, environments and truth stay, tables beside these are left out. `advance` is called after each image.
+    Raises `InvalidInputError`.
     """
     if dataset.mask is not None:
         raise InvalidInputError(f"{dataset.directory}: has a mask, expected a dataset without one")
+    if path_from(out).resolve() == dataset.directory.resolve():
+        raise InvalidInputError(f"{os.fspath(out)}: is the dataset that is read, expected another folder")
     stop = Event()
     about = {"kind": "degraded", "hardships": list(HARDSHIPS), "seed": seed, "of": dict(dataset.source)}
     with new_dataset(
