@@ -55,7 +55,7 @@ def test_render_and_check(run: Run, world: Path, tmp_path: Path) -> None:
     code, _, complaints = run(*words)
     assert code == 2
     assert "exists, expected a new folder, or --overwrite to replace a dataset" in complaints
-    assert run(*words, "--limit", "1", "--overwrite")[0] == 0
+    assert run(*words, "--limit", "1", "--tilts-deg", "1,0", "--overwrite")[1] == f"{out}: 1 image of 1 location\n"
     assert run(*words, "--force", "--turn", "--limit", "1")[0] == 0
     assert len(read_dataset(out).images) == 7
 

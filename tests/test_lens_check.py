@@ -101,7 +101,7 @@ def test_images_without_edges_are_not_counted(order: int) -> None:
     assert not one.told
     assert one.images == 1
     assert one.sigmas == pytest.approx((64.0, 64.0, 0.3))
-    assert "long straight edges of 1 images are too few" in one.reason
+    assert "long straight edges of 1 image are too few" in one.reason
     four = tiltvp.check_lens([*IMAGES[:4], bare][::order], fisheye(du=9.0))
     assert not four
     assert four.images == 4

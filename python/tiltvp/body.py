@@ -89,19 +89,19 @@ def body_mask(images: Iterable[ArrayLike], camera: Camera, *, mask: ArrayLike | 
     apart = ~staying
     total, others = float(seen.sum()), float(seen[apart].sum())
     if total == 0.0:
-        return BodyMask(None, count, f"{count} images without an edge")
+        return BodyMask(None, count, f"{counted(count, 'images')} without an edge")
     share = 1.0 - others / total
     if share > _STAYING_MAX:
         what = f"{100 * share:.0f} % of their edges stay in place, expected at most {100 * _STAYING_MAX:.0f} %"
-        return BodyMask(None, count, f"{count} images: {what}: they are not from different places")
+        return BodyMask(None, count, f"{counted(count, 'images')}: {what}: they are not from different places")
     alike = (float(np.sum(length[apart] ** 2)) / others - 1.0) / (count - 1)
     if alike > _ALIKE_MAX:
         what = f"two of them share {100 * alike:.0f} % of their edges, expected at most {100 * _ALIKE_MAX:.0f} %"
-        return BodyMask(None, count, f"{count} images: {what}: they are not from different places")
+        return BodyMask(None, count, f"{counted(count, 'images')}: {what}: they are not from different places")
     large = cv2.resize(staying.astype(np.uint8), (shape[1], shape[0]), interpolation=cv2.INTER_NEAREST) > 0
     covered = 100.0 * float(np.sum(large & looked)) / max(1, int(looked.sum()))
     found = f"edges that stay in place cover {covered:.1f} %" if covered > 0.0 else "no edges stay in place"
-    return BodyMask(~large, count, f"{count} images: {found}")
+    return BodyMask(~large, count, f"{counted(count, 'images')}: {found}")
 
 
 def _edges_of(gray: NDArray[np.uint8], inside: NDArray[np.bool_]) -> tuple[NDArray[np.int64], NDArray[np.float32]]:

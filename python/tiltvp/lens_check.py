@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from tiltvp.errors import InvalidInputError
+from tiltvp.errors import InvalidInputError, counted
 from tiltvp.images import checked_mask, grays_from
 from tiltvp.segments import SegmentDetector
 
@@ -90,8 +90,8 @@ class LensCheck:
         """What was found, in a sentence."""
         if not self.told:
             return (
-                f"{self.edges} long straight edges of {self.images} images are too few to tell whether the calibration "
-                f"fits, expected {_LEAST} of {_IMAGES} at least"
+                f"{self.edges} long straight edges of {counted(self.images, 'images')} are too few to tell whether the "
+                f"calibration fits, expected {_LEAST} of {_IMAGES} at least"
             )
         off = []
         if not self.centre_believable:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from tiltvp.arguments import each_from, flag_from, number_from
-from tiltvp.errors import InvalidInputError
+from tiltvp.errors import InvalidInputError, counted
 from tiltvp.rotations import levelling, mounting_from
 from tiltvp.tilt import TiltFilter
 
@@ -88,7 +88,8 @@ class MountingTilt:
     @property
     def reason(self) -> str:
         """What was found, or why nothing was, in a sentence."""
-        told = f"{self.used} of {self.images} images, headings within {math.degrees(self.turned_rad):.0f} degrees"
+        told = f"{self.used} of {counted(self.images, 'images')}"
+        told += f", headings within {math.degrees(self.turned_rad):.0f} degrees"
         if not self:
             if not self.driven:
                 return f"{told}: the odometry tells of the time of none"

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from tiltvp.errors import counted
 from tiltvp.images import grays_from
 from tiltvp.lens_check import LensCheck, check_lens
 from tiltvp.rotations import mounting_from
@@ -82,9 +83,9 @@ class SetupCheck:
         """Which direction is up, in a sentence."""
         shares = self.probabilities
         if len(set(shares.values())) == 1:
-            return f"{self.images} images without straight edges, which do not tell which direction is up"
+            return f"{counted(self.images, 'images')} without straight edges, which do not tell which direction is up"
         turns = f" that turn about the camera's {self.turns_about}" if self.turns_about else ""
-        told = f"{self.images} images{turns}: up is the camera's {self.best} ({self._words(self.best)})"
+        told = f"{counted(self.images, 'images')}{turns}: up is the camera's {self.best} ({self._words(self.best)})"
         if self.best != self.given:
             told += f", where the mounting says {self.given} ({self._words(self.given)})"
         else:

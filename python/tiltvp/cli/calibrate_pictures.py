@@ -17,7 +17,7 @@ from tiltvp.cli.sources import MotionOptions, SourceOptions
 from tiltvp.cli.tables import check_ending, write_table
 from tiltvp.cli.terminal import progress_bar, say, status
 from tiltvp.cli.track import Drive, needed_turns, track_table
-from tiltvp.errors import InvalidInputError
+from tiltvp.errors import InvalidInputError, counted
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -165,7 +165,8 @@ class PictureLog:
             rows = zip(named, found.frames, strict=True)
             table = track_table([(one.number, name, time_s, one.tracked) for (name, time_s), one in rows])
             write_table(table, self.pictures.tracks)
-        say(f"{self.name}: {len(found.bearings)} bearings of {len(set(found.bearings[:, 1].tolist()))} lines")
+        lines = counted(len(np.unique(found.bearings[:, 1])), "lines")
+        say(f"{self.name}: {counted(len(found.bearings), 'bearings')} of {lines}")
         doubt = "; ".join(filter(None, (moved.doubt, found.doubt)))
         return Solved(DriveLog(odometry, found.bearings, moved.times_s), found.whole, doubt)
 
@@ -184,9 +185,9 @@ class PictureLog:
             ]
         self.bad = drive.bad
         if drive.leaning:
-            say(f"{self.name}: of {count} frames {drive.told()}")
+            say(f"{self.name}: of {counted(count, 'frames')} {drive.told()}")
         if not seen:
-            raise InvalidInputError(f"{self.name}: no line is seen in {count} frames, {drive.told()}")
+            raise InvalidInputError(f"{self.name}: no line is seen in {counted(count, 'frames')}, {drive.told()}")
         named, lines = zip(*seen, strict=True)
         return named, lines
 

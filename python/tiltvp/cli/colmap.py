@@ -85,7 +85,7 @@ def colmap(
 
 def _show(found: Sequence[ImageGravity], database: Path) -> None:
     """How many images have gravity now, and why the others have none."""
-    say(f"{database}: gravity of {sum(map(bool, found))} of {len(found)} images")
+    say(f"{database}: gravity of {sum(map(bool, found))} of {counted(len(found), 'images')}")
     reasons = Counter(one.reason for one in found if not one)
     if reasons:
         table = new_table(None, ("images", "without gravity, because"), ("without gravity, because",))

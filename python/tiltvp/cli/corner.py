@@ -22,7 +22,7 @@ from tiltvp.cli.rerun_views import send_corner
 from tiltvp.cli.showing import RerunOptions
 from tiltvp.cli.sources import SourceOptions, check_apart, ending_at_interrupt, picture_names
 from tiltvp.cli.terminal import named, progress_bar, say
-from tiltvp.errors import InvalidInputError, TiltvpError
+from tiltvp.errors import InvalidInputError, TiltvpError, counted
 
 if TYPE_CHECKING:
     import numpy as np
@@ -151,7 +151,7 @@ def corner(
         look = Look(camera, estimator, independent, results.overlay, viewer, sensor)
         estimates = list(look.each(frames, others, partners, frame_rate))
     if not estimates:
-        raise InvalidInputError(f"{frames.source}: {look.bad} frames, none of which can be used")
+        raise InvalidInputError(f"{frames.source}: {counted(look.bad, 'frames')}, none of which can be used")
     tell(str(frames.source), estimator, look.bad, has_scale=has_scale, advice_for=(right is not None, known))
     if sensor is not None:
         say(sensor.summary())

@@ -104,7 +104,7 @@ def tell(
     found, without = estimator.found.total(), estimator.without.total()
     skipped = f", {bad} skipped" if bad else ""
     by = f" ({looked_for(estimator.found)})" if found else ""
-    say(f"{source}: {found + without} frames{skipped}, {found} with a pose{by}")
+    say(f"{source}: {counted(found + without, 'frames')}{skipped}, {found} with a pose{by}")
     if without:
         say(f"without a pose: {shown(estimator.without)}")
     if has_scale and estimator.placeless:

@@ -28,7 +28,7 @@ from tiltvp.cli.sources import (
 from tiltvp.cli.tables import STDOUT, Out, json_lines
 from tiltvp.cli.terminal import ProgressBar, complain, named, progress_bar, say, show, width
 from tiltvp.cli.tilt_work import Work, tilts_on_cluster
-from tiltvp.errors import InvalidInputError
+from tiltvp.errors import InvalidInputError, counted
 from tiltvp.files import check_output_folder
 from tiltvp.streams.outputs.tilts import TILT_ENDINGS
 
@@ -178,10 +178,10 @@ class Answers:
         if self._out is not None and not self._rows_only:
             written = write_answers(outcomes, self._method, self._out, self._frame_rate)
         if self.bad and len(outcomes) < self.count:
-            complain(f"{source}: {self.bad} of {self.count} frames could not be used")
+            complain(f"{source}: {self.bad} of {counted(self.count, 'frames')} could not be used")
         if not self._rows_only:
             if len(outcomes) < self.count:
-                say(f"{source}: {self.count} frames, of which the last {len(outcomes)} are shown")
+                say(f"{source}: {counted(self.count, 'frames')}, of which the last {len(outcomes)} are shown")
             if outcomes:
                 say(summary_words(outcomes))
             show(people_table(outcomes, width()))

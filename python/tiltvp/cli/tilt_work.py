@@ -14,7 +14,7 @@ from tiltvp.cli.filtering import FilterOptions
 from tiltvp.cli.results import Outcome, degrees, outcome_table
 from tiltvp.cli.tables import Table
 from tiltvp.cli.terminal import say
-from tiltvp.errors import OutputError, TiltvpError
+from tiltvp.errors import OutputError, TiltvpError, counted
 
 if TYPE_CHECKING:
     import numpy as np
@@ -137,5 +137,5 @@ def tilts_on_cluster(address: str, frames: ImageFiles, work: Work, out: Path) ->
     counts = table.select(images=pl.len(), bad=pl.col("error").count(), tilts=pl.col("alpha_rad").count())
     images, bad, tilts = counts.collect().row(0)
     done_before = f", {before} of them before" if before else ""
-    say(f"{out}: {images} images{done_before}; {tilts} with a tilt, {bad} could not be used")
+    say(f"{out}: {counted(images, 'images')}{done_before}; {tilts} with a tilt, {bad} could not be used")
     return 1 if bad or frames.problems else 0

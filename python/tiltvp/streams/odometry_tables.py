@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from tiltvp.csv_files import CsvFile
-from tiltvp.errors import InvalidInputError
+from tiltvp.errors import InvalidInputError, counted
 from tiltvp.streams.odometry import Motion, Odometry
 from tiltvp.streams.wheels import Wheels, cumulative_m
 
@@ -124,7 +124,8 @@ class OdometryTable:
         """
         rows = list(range(len(self))) if self.files is None else self._rows_of(names)
         if len(rows) != len(names):
-            raise InvalidInputError(f"{self.name}: {len(self)} rows, expected {len(names)}, one for each image")
+            told = counted(len(self), "rows")
+            raise InvalidInputError(f"{self.name}: {told}, expected {len(names)}, one for each image")
         if self.kind == "velocities":
             raise InvalidInputError(f"{self.name}: velocities without times of the images, expected these to be known")
         if self.kind in ("poses", "ticks"):
@@ -179,7 +180,7 @@ class OdometryTable:
             known = places.get(word, [])
             where = f"{self.name}, line {line}: file {word!r}"
             if len(known) != 1:
-                what = "is no image given" if not known else f"is the name of {len(known)} images"
+                what = "is no image given" if not known else f"is the name of {counted(len(known), 'images')}"
                 raise InvalidInputError(f"{where} {what}, expected the name or path of one image")
             if known[0] in found:
                 raise InvalidInputError(f"{where} again, expected one row for each image")

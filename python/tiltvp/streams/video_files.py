@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from tiltvp import _core
-from tiltvp.errors import ImageFileError, TiltvpError
+from tiltvp.errors import ImageFileError, TiltvpError, counted
 from tiltvp.streams.frames import DEFAULT_RATE_HZ, Frame, Frames, median_rate_hz
 
 if TYPE_CHECKING:
@@ -70,7 +70,7 @@ class _Video(Frames):
             self.times_s = np.array([float(stamp * base) for stamp in self._stamps])
             self.rate_hz = median_rate_hz(self.times_s)
         if not complete or _is_cut_off(path):
-            notes.append(f"{path}: ends before its end, after {len(stamps)} frames (cut off?)")
+            notes.append(f"{path}: ends before its end, after {counted(len(stamps), 'frames')} (cut off?)")
         self.notes = tuple(notes)
 
     def __iter__(self) -> Iterator[Frame]:

@@ -222,4 +222,4 @@ def _say_made(out: Path) -> None:
     from tiltvp.lab.datasets.folder import read_dataset
 
     images = read_dataset(out).images
-    say(f"{out}: {len(images)} images of {len({image.location for image in images})} locations")
+    say(f"{out}: {counted(len(images), 'images')} of {counted(len({image.location for image in images}), 'locations')}")

@@ -13,7 +13,7 @@ from tiltvp.cli.lab.dataset_options import (
     made_by,
 )
 from tiltvp.cli.terminal import progress_bar, say
-from tiltvp.errors import InvalidInputError
+from tiltvp.errors import InvalidInputError, counted
 
 _LENS, _WAY, _RENDERING = DriveLensOptions(), WayOptions(), RenderingOptions()
 
@@ -73,7 +73,7 @@ def drive(
     with progress_bar(len(made), "frames") as bar:
         source = made_by("drive") | lens.source
         write_drive(made, making.out, threads=making.threads, source=source, force=making.replaces, advance=bar.advance)
-    say(f"{making.out}: {len(made)} frames of a drive of {made.motions[:, 0].sum():.1f} m")
+    say(f"{making.out}: {counted(len(made), 'frames')} of a drive of {made.motions[:, 0].sum():.1f} m")
 
 
 def stereo(
@@ -148,4 +148,4 @@ def stereo(
             force=making.replaces,
             advance=bar.advance,
         )
-    say(f"{making.out}: {len(sequence)} pairs of images")
+    say(f"{making.out}: {counted(len(sequence), 'pairs')} of images")

@@ -67,4 +67,4 @@ def train(
     except InvalidInputError as error:
         raise InvalidInputError(f"{dataset}, {counted(len(known.images), 'images')}: {error}") from error
     trained.save(out)
-    say(f"{out}: {kind} of {method}, trained on {trained.images} of {len(known.images)} images")
+    say(f"{out}: {kind} of {method}, trained on {trained.images} of {counted(len(known.images), 'images')}")
