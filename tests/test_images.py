@@ -17,6 +17,7 @@ from tiltvp.cli.sources import distinct_names
 from tiltvp.errors import ImageFileError, InvalidInputError, OutputError
 from tiltvp.image_headers import header_size
 from tiltvp.images import bgr_from, decode_as_stored, gray_from, read_image
+from tiltvp.streams import open_frames
 from tiltvp.streams.image_files import find_images
 
 LEVELS = np.arange(256, dtype=np.uint8).reshape(16, 16)
@@ -226,8 +227,10 @@ def test_images_are_found_once_and_named_apart(tmp_path: Path) -> None:
         path.parent.mkdir(exist_ok=True)
         path.write_bytes(b"")
     os.symlink(tmp_path / "x" / "a.png", tmp_path / "x" / "link.png")
-    files, problems = find_images([str(tmp_path / "x/a.png"), str(tmp_path / "x"), f"{tmp_path}/*/[aB].png"])
+    files, problems, repeated = find_images([str(tmp_path / "x/a.png"), str(tmp_path / "x"), f"{tmp_path}/*/[aB].png"])
     assert not problems
+    assert repeated == [(tmp_path / "x/link.png", tmp_path / "x/a.png")]
+    assert "x/link.png leads to " in open_frames([str(tmp_path / "x")]).notes[0]
     assert [str(file.relative_to(tmp_path)) for file in files] == ["x/a.png", "x/a.jpg", "y/B.png", "y/a.png"]
     names = distinct_names(files)
     assert names == ["x_a_png", "x_a_jpg", "B", "y_a_png"]

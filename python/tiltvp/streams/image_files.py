@@ -41,7 +41,7 @@ class ImageFiles(Frames):
     def __init__(self, words: Sequence[str]) -> None:
         """Finds the files, each once. Raises `InvalidInputError` for a table of times that is wrong."""
         self.source = " ".join(words)
-        self.files, problems = find_images(words)
+        self.files, problems, repeated = find_images(words)
         self.problems = tuple(problems)
         drive = _drive_folder(words)
         if drive is not None and (drive / _ODOMETRY).is_file():
@@ -62,6 +62,9 @@ class ImageFiles(Frames):
             self.times_s = _times_of_names(self.files)
             if self.times_s is not None:
                 self.notes = (f"{self.source}: times are those that the names of the images tell",)
+        if repeated:
+            (other, file), such = repeated[0], f" ({len(repeated)} such)" if len(repeated) > 1 else ""
+            self.notes += (f"{self.source}: {other} leads to {file}, which is taken once{such}",)
         self.names = [str(file) for file in self.files]
         self.rate_hz = median_rate_hz(self.times_s)
 
@@ -76,8 +79,9 @@ class ImageFiles(Frames):
             yield Frame(str(file), time_s, lambda file=file: read_image(file))  # type: ignore[misc]
 
 
-def find_images(words: Sequence[str]) -> tuple[list[Path], list[str]]:
-    """The image files that files, folders and glob patterns name, each once, and what is wrong with the words.
+def find_images(words: Sequence[str]) -> tuple[list[Path], list[str], list[tuple[Path, Path]]]:
+    """The image files that files, folders and glob patterns name, each once; what is wrong with the words; and what
+    links have left out, each with the file of them that is there.
 
     A folder stands for the images directly in it, or, if there are none, in its folder `images` or `frames`; a pattern
     for what it matches (`**` for folders below), both sorted by their names, in which numbers count as such: 2 comes
@@ -103,7 +107,9 @@ def find_images(words: Sequence[str]) -> tuple[list[Path], list[str]]:
                 problems.append(f"{word}: no file fits this pattern")
         files.extend(found)
     once = {os.path.realpath(file): file for file in reversed(files)}
-    return [file for file in dict.fromkeys(files) if once[os.path.realpath(file)] is file], problems
+    first = {file: once[os.path.realpath(file)] for file in files}
+    repeated = [(file, one) for file, one in first.items() if os.path.abspath(file) != os.path.abspath(one)]
+    return [file for file, one in first.items() if one is file], problems, repeated
 
 
 def _images_of(folder: Path) -> list[Path]:
