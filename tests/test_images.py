@@ -204,6 +204,16 @@ def test_pixels_are_where_the_sensor_has_them(turn: int, channels: int, tmp_path
     np.testing.assert_array_equal(decode_as_stored(path.read_bytes()), pixels)
 
 
+def test_a_photograph_that_was_turned_is_told_to_stay_as_it_is(tmp_path: Path) -> None:
+    turned = Image.Exif()
+    turned[0x0112] = 3
+    Image.fromarray(LEVELS).save(tmp_path / "a.jpg", exif=turned)
+    [note] = open_frames([str(tmp_path)]).notes
+    assert "a.jpg: its orientation tag 3 is not followed: pixels stay where the sensor has them" in note
+    Image.fromarray(LEVELS).save(tmp_path / "a.jpg")
+    assert open_frames([str(tmp_path)]).notes == ()
+
+
 @pytest.mark.parametrize("order", "<>")
 def test_the_size_of_a_big_tiff_is_in_its_header(order: str) -> None:
     entries = struct.pack(order + "HHQQ", 257, 16, 1, 300) + struct.pack(order + "HHQQ", 256, 16, 1, 70_000)

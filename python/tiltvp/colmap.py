@@ -20,7 +20,7 @@ from tiltvp.cameras import Camera
 from tiltvp.errors import CalibrationError, ImageFileError, InvalidInputError, MissingExtraError, OutputError
 from tiltvp.formats import CameraSpec
 from tiltvp.formats.colmap import spec_of
-from tiltvp.image_headers import orientation
+from tiltvp.image_headers import file_orientation
 from tiltvp.images import gray_from, read_image
 from tiltvp.setup_check import check_setup, mounting_looking
 from tiltvp.tilt import TiltEstimate, TiltEstimator
@@ -34,8 +34,6 @@ _TABLES: Final = frozenset(("cameras", "images", "two_view_geometries"))
 _UP_OF_TAG: Final = {1: "-y", 3: "+y", 6: "-x", 8: "+x"}
 """Which direction of the camera frame is up, by the orientation tag of a photograph (Exif 2.3); the other four values
 are of mirrored images."""
-_HEAD_BYTES: Final = 1 << 17
-"""Of a photograph, among which its orientation tag is: it has to be in the first 64 kB of segments."""
 _UNREADABLE: Final = "it cannot be read"
 _SETUP_IMAGES: Final = 5
 """Images of one camera that are asked whether they stand upright: enough for `check_setup`."""
@@ -228,8 +226,7 @@ class _Group:
 def _up_of(path: Path) -> str:
     """A direction of the camera frame, or why there is none."""
     try:
-        with path.open("rb") as file:
-            tag = orientation(file.read(_HEAD_BYTES))
+        tag = file_orientation(path)
     except (OSError, ValueError):
         return _UNREADABLE
     return _UP_OF_TAG.get(tag, f"its orientation tag {tag} is that of a mirrored image")

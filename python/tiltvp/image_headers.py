@@ -3,12 +3,13 @@ photograph was held."""
 
 from __future__ import annotations
 
+import os
 import re
 import struct
 from collections.abc import Callable, Iterator
 from typing import Final
 
-__all__ = ["header_size", "orientation", "unturned"]
+__all__ = ["file_orientation", "header_size", "orientation", "unturned"]
 
 # Compiled at the first file and not at the import, a tenth of whose time that would be; `re` keeps them.
 _PNM: Final = rb"P[1-7](?:\s|#[^\n]*\n)+"
@@ -16,6 +17,8 @@ _PNM_NUMBER: Final = rb"(?:\s|#[^\n]*\n)*(\d{1,9})"
 _PAM_SIDE: Final = rb"(?m)^(WIDTH|HEIGHT)[ \t]+(\d{1,9})\s*$"
 _JPEG_FRAMES: Final = frozenset(range(0xC0, 0xD0)) - {0xC4, 0xC8, 0xCC}
 _TIFF: Final = rb"II[\x2a\x2b]\x00|MM\x00[\x2a\x2b]"
+_HEAD_BYTES: Final = 1 << 17
+"""Of a photograph, among which its orientation tag is: it has to be in the first 64 kB of segments."""
 _TIFF_TYPES: Final = {1: "B", 3: "H", 4: "I", 16: "Q"}
 
 
@@ -43,6 +46,12 @@ def orientation(data: bytes) -> int:
     except (struct.error, IndexError):
         pass
     return 1
+
+
+def file_orientation(path: str | os.PathLike[str]) -> int:
+    """`orientation` of a file. Raises `OSError`, and `ValueError` for what is no name."""
+    with open(path, "rb") as file:
+        return orientation(file.read(_HEAD_BYTES))
 
 
 def unturned(data: bytes) -> bytes:

@@ -6,6 +6,7 @@ import glob
 import os
 import re
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
@@ -13,6 +14,7 @@ import numpy as np
 
 from tiltvp.csv_files import CsvFile
 from tiltvp.errors import InvalidInputError
+from tiltvp.image_headers import file_orientation
 from tiltvp.images import read_image
 from tiltvp.streams.frames import Frame, Frames, median_rate_hz
 
@@ -65,6 +67,9 @@ class ImageFiles(Frames):
         if repeated:
             (other, file), such = repeated[0], f" ({len(repeated)} such)" if len(repeated) > 1 else ""
             self.notes += (f"{self.source}: {other} leads to {file}, which is taken once{such}",)
+        if self.files and (tag := _orientation(self.files[0])) != 1:
+            told = f"{self.files[0]}: its orientation tag {tag} is not followed"
+            self.notes += (f"{told}: pixels stay where the sensor has them, as those of the calibration have to",)
         self.names = [str(file) for file in self.files]
         self.rate_hz = median_rate_hz(self.times_s)
 
@@ -110,6 +115,13 @@ def find_images(words: Sequence[str]) -> tuple[list[Path], list[str], list[tuple
     first = {file: once[os.path.realpath(file)] for file in files}
     repeated = [(file, one) for file, one in first.items() if os.path.abspath(file) != os.path.abspath(one)]
     return [file for file, one in first.items() if one is file], problems, repeated
+
+
+def _orientation(file: Path) -> int:
+    """Its orientation tag; 1, upright, of what cannot be read, which reading it tells."""
+    with suppress(OSError, ValueError):
+        return file_orientation(file) if file.is_file() else 1
+    return 1
 
 
 def _images_of(folder: Path) -> list[Path]:
