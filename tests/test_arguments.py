@@ -213,6 +213,8 @@ FEATURE = corner.fit(
         (lambda: ODOMETRY.gaps("a"), "times_s: no array of numbers"),
         (lambda: recorded_camera("drive.mcap"), "recording: str, expected a tiltvp.streams.Recording"),
         (lambda: outputs.attitude((0.1, 0.2)), "tilt: tuple, expected an estimate of a tilt"),
+        (lambda: outputs.write_tilts("a.tum", ["a"], [ESTIMATE]), "times_s: no array of numbers"),
+        (lambda: outputs.write_tilts("a.tum", [0.0], ESTIMATE), "tilts: TiltEstimate, expected several tilt or None"),
         (lambda: outputs.write_tum("a.tum", 3, [], [], ""), r"times_s: shape \(\), expected \(N,\)"),
         (lambda: bearing_log([SEGMENTS]), r"frames\[0\]: Segments, expected a FollowedFrame"),
         (lambda: displacements([0.1], wheel_base_m=0.4), r"motions\[0\]: float, expected a Motion"),

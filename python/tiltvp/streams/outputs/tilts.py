@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Final, Protocol, runtime_checkable
 import numpy as np
 
 from tiltvp._core import leaning_from_upright
-from tiltvp.arguments import path_from, refuse_unless
+from tiltvp.arguments import array_from, each_from, path_from, refuse_unless, shaped_from
 from tiltvp.errors import InvalidInputError
 from tiltvp.files import check_output
 from tiltvp.rotations import quaternion
@@ -89,7 +89,7 @@ def check_tilts(path: str | os.PathLike[str]) -> None:
 
 def check_times(times_s: ArrayLike) -> None:
     """Refuses times (N,), seconds, that no stamp can be. Raises `InvalidInputError`."""
-    times = np.asarray(times_s, dtype=np.float64)
+    times = shaped_from(times_s, "times_s", None)
     bad = np.flatnonzero(~((times >= 0.0) & (times < _LAST_S)))
     if len(bad):
         raise InvalidInputError(f"times_s[{bad[0]}] = {times[bad[0]]}, expected seconds from 0 to 2^31")
@@ -112,7 +112,8 @@ def write_tilts(
     `OutputError` where the file cannot be written.
     """
     check_tilts(path)
-    times = np.asarray(times_s, dtype=np.float64)
+    tilts = each_from(tilts, "tilts", "normal", "tilt or None", or_none=True)
+    times = array_from(times_s, "times_s")
     if times.shape != (len(tilts),):
         raise InvalidInputError(f"times_s: shape {times.shape}, expected ({len(tilts)},), one for each tilt")
     check_times(times)
