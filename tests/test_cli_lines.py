@@ -118,6 +118,11 @@ def test_track_a_folder(run: Run, folder: Path, tmp_path: Path) -> None:
     assert table.filter(pl.col("frame") == 0)["frames_back"].to_list() == [0] * (table["frame"] == 0).sum()
     assert read_image(plot).shape[2] == 3
     assert [frame.read().shape for frame in open_frames(film)] == [(288, 384, 3)] * FRAMES
+    # As a pattern that the shell makes words of.
+    files = sorted((folder / "frames").glob("*.png"))
+    odometry = ("--odometry", folder / "odometry.csv", "--overwrite")
+    assert run("track", *files, *words[2:], *odometry)[:2] == (0, said)
+    assert pl.read_csv(out).equals(table)
     again = tmp_path / "again.csv"
     code, said, complaints = run("track", film, "--camera", folder / "camera.toml", "--out", again)
     assert (code, complaints) == (0, "")

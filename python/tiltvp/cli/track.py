@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, Final
 from cyclopts import Group, Parameter
 
 from tiltvp.cli.declared_options import LibraryOptions, from_library
+from tiltvp.cli.each_image import Images
 from tiltvp.cli.line_options import LineOptions
 from tiltvp.cli.lines import LINE_TYPES, line_columns
 from tiltvp.cli.options import CameraOptions, FrameRate
@@ -49,7 +50,7 @@ _WATCHING = RerunOptions()
 
 
 def track(
-    source: str | None = None,
+    images: Images = None,
     /,
     *,
     camera: CameraOptions,
@@ -63,14 +64,12 @@ def track(
     tracking: TrackerOptions = _TRACKER,
     watching: RerunOptions = _WATCHING,
 ) -> int:
-    """Follow vertical lines through the images of a folder, in the order of their names, or through a video.
+    """Follow vertical lines through images, those of a folder in the order of their names, or through a video.
 
     Frames that cannot be read are named on stderr and skipped, and the exit code is 1.
 
     Parameters
     ----------
-    source
-        Folder of images, glob pattern, video or recording of ROS; or - for names of files on stdin.
     out
         File for the tracks in radians, one row for each line of each frame: .csv, .json or .parquet.
     plot
@@ -90,7 +89,7 @@ def track(
         raise InvalidInputError("--frame-rate without --video, expected both")
     check_plot("--plot", plot)
     watching.check()
-    robot, words = camera.robot(), [] if source is None else [source]
+    robot, words = camera.robot(), images or []
     frames_of = frames_of.of_robot(robot, words)
     lens, options = camera.load(frames_of.topic), camera.complete(options.of_topic(frames_of.topic))
     extractor, tilt = options.extractor(lens), options.tilts(lens)
