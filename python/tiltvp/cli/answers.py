@@ -66,8 +66,8 @@ def write_answers(outcomes: Sequence[Outcome], method: str, path: Path, frame_ra
         clock = f"at {rate_hz:g} frames a second from 0"
         clock += "" if frame_rate else ", as not all tell a time: --frame-rate"
     count = write_tilts(path, times, tilts)
-    what = "filtered tilts" if is_filtered else "tilts"
+    what = counted(count, "filtered tilts" if is_filtered else "tilts")
     where = f" as sensor_msgs/Imu on {TILT_TOPIC}" if path.suffix.lower() == ".mcap" else ""
     lacking = len(outcomes) - count
     left_out = f"; {counted(lacking, 'frames')} without one left out" if lacking else ""
-    return f"{path}: {count} {what}{where}, yaw 0, {clock}{left_out}"
+    return f"{path}: {what}{where}, yaw 0, {clock}{left_out}"
