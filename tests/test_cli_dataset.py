@@ -60,6 +60,12 @@ def test_render_and_check(run: Run, world: Path, tmp_path: Path) -> None:
     assert len(read_dataset(out).images) == 7
 
 
+def test_a_panoramas_camera_is_a_word_here_too(run: Run, world: Path, tmp_path: Path) -> None:
+    words = ("render", "--panoramas", world / "panos", "--limit", "1", "--tilts-deg", "2,0", "--out", tmp_path / "out")
+    assert run(*words, "--camera", "equirectangular:64x32")[0] == 0
+    assert read_dataset(tmp_path / "out").camera.model == "equirectangular"
+
+
 def test_degrading_a_drive_says_what_is_left_out(run: Run, world: Path, tmp_path: Path) -> None:
     out = tmp_path / "out"
     words = ("render", "--panoramas", world / "panos", "--out", out, "--camera", world / "camera.toml")

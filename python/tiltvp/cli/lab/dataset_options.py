@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 import numpy as np
 from cyclopts import Parameter
 
-from tiltvp.cli.options import ALL_CORES, AtLeast0, Switch, Threads
+from tiltvp.cli.options import ALL_CORES, AtLeast0, CameraOptions, Switch, Threads
 from tiltvp.errors import InvalidInputError
 from tiltvp.files import keeps_existing
 
@@ -51,8 +51,8 @@ class LensOptions:
     """Which camera looks, and how it is held."""
 
     camera: Path | None = None
-    """Calibration file, or a robot's file, whose rotation of the mounting is taken too; default is a 640 x 480 upward
-    fisheye of 185 degrees like the paper's."""
+    """Calibration file, equirectangular:WIDTHxHEIGHT, or a robot's file, whose rotation of the mounting is taken too;
+    default is a 640 x 480 upward fisheye of 185 degrees like the paper's."""
     camera_name: str | None = None
     """Name or number of the camera in a file of several; the first is 0."""
     resolution_scale: float = 1.0
@@ -81,13 +81,12 @@ class LensOptions:
         return {"camera": "like the paper's" if self.camera is None else self.camera.name}
 
     def _lens(self) -> Camera:
-        from tiltvp import Camera
         from tiltvp.lab.datasets.panoramas import paper_camera
 
         if self.camera is None:
             self._refuse_name()
             return paper_camera()
-        return Camera.load(self.camera, camera=self.camera_name or 0)
+        return CameraOptions(camera=self.camera, camera_name=self.camera_name).load()
 
     def _refuse_name(self) -> None:
         if self.camera_name is not None:
