@@ -16,7 +16,7 @@ import tiltvp
 from tiltvp.cli.sources import distinct_names
 from tiltvp.errors import ImageFileError, InvalidInputError, OutputError
 from tiltvp.image_headers import header_size
-from tiltvp.images import bgr_from, decode_as_stored, gray_from, read_image
+from tiltvp.images import bgr_from, decode_as_stored, gray_from, read_image, read_mask
 from tiltvp.streams import open_frames
 from tiltvp.streams.image_files import find_images
 
@@ -120,6 +120,12 @@ def test_what_is_written_is_what_was_meant(tmp_path: Path) -> None:
         assert np.array_equal(read_image(tmp_path / "a.png"), LEVELS)
     tiltvp.write_image(tmp_path / "mask.png", LEVELS > 100)
     assert np.array_equal(read_image(tmp_path / "mask.png"), np.where(LEVELS > 100, 255, 0))
+    assert np.array_equal(read_mask(tmp_path / "mask.png"), LEVELS > 100)
+    cv2.imwrite(str(tmp_path / "mask.jpg"), np.where(LEVELS > 100, 255, 0), [cv2.IMWRITE_JPEG_QUALITY, 50])
+    assert np.array_equal(read_mask(tmp_path / "mask.jpg"), LEVELS > 100)
+    tiltvp.write_image(tmp_path / "photograph.png", LEVELS)
+    with pytest.raises(InvalidInputError, match=r"photograph\.png: .* other than two tones, expected a mask: white"):
+        read_mask(tmp_path / "photograph.png")
     tiltvp.write_image(tmp_path / "a.bmp", deep)
     assert np.array_equal(read_image(tmp_path / "a.bmp"), LEVELS)
     for other in (LEVELS.astype(np.int16), 1.0 * LEVELS, LEVELS.astype(complex)):

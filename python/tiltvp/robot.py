@@ -17,7 +17,7 @@ from tiltvp.files import check_output, check_toml, write_whole
 from tiltvp.formats.document import Document
 from tiltvp.formats.node import Node
 from tiltvp.formats.own import ROBOT_FORMAT, VERSION, camera_from, camera_table, root_of
-from tiltvp.images import checked_camera, checked_mask, gray_from, read_image, write_image
+from tiltvp.images import checked_camera, checked_mask, read_mask, write_image
 from tiltvp.rotations import mounting_from
 from tiltvp.streams.wheels import Wheels
 
@@ -32,8 +32,6 @@ TOPICS: Final = ("images", "odometry", "joints", "inertial")
 """What a recording may have topics of."""
 _WHEELS: Final = ("wheel_base_m", "wheel_radius_m", "ticks_per_turn")
 _MARK: Final = re.compile(rf"^[^\S\n]*format[^\S\n]*=[^\S\n]*[\"']{ROBOT_FORMAT}[\"']", re.MULTILINE)
-_BRIGHT: Final = 127
-"""Grey level above which a mask's image shows the world."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -182,7 +180,7 @@ def named_mask(path: str | os.PathLike[str]) -> Path | None:
 
 
 def _mask_of(image: Path | None) -> NDArray[np.bool_] | None:
-    return None if image is None else np.asarray(gray_from(read_image(image), image.name) > _BRIGHT)
+    return None if image is None else read_mask(image)
 
 
 def _wheels_of(node: Node | None) -> Wheels:

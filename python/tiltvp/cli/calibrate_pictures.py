@@ -11,13 +11,13 @@ import numpy as np
 from cyclopts import Group, Parameter, validators
 
 from tiltvp.cli.calibrate_inputs import Solved
-from tiltvp.cli.declared_options import mask_from
 from tiltvp.cli.options import CameraOptions, Switch, given_words
 from tiltvp.cli.sources import MotionOptions, SourceOptions
 from tiltvp.cli.tables import check_ending, write_table
 from tiltvp.cli.terminal import progress_bar, say, status
 from tiltvp.cli.track import Drive, needed_turns, track_table
 from tiltvp.errors import InvalidInputError, counted
+from tiltvp.images import read_mask
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -195,7 +195,7 @@ class PictureLog:
         """The robot as far as it was told: camera, mounting as it was given, mask, wheels; topics also as known."""
         from tiltvp import Robot
 
-        mask: Any = None if self.lines.mask is None else mask_from(self.lines.mask)
+        mask: Any = None if self.lines.mask is None else read_mask(self.lines.mask)
         before = {} if known is None else known.topics
         topics = before | {name: topic for name, topic in self.topics.items() if topic not in before.values()}
         return Robot(self.camera, self.lines.mounting(self.camera), mask=mask, wheels=self.wheels, topics=topics)

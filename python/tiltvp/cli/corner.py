@@ -16,13 +16,14 @@ from tiltvp.cli.corner_inertial import Inertial, InertialOptions
 from tiltvp.cli.corner_methods import AUTO, SCALES, Searches, methods_for
 from tiltvp.cli.corner_pairs import pairs_of, partners_of
 from tiltvp.cli.corner_results import CornerResults, tell
-from tiltvp.cli.declared_options import LibraryOptions, from_library, mask_from
+from tiltvp.cli.declared_options import LibraryOptions, from_library
 from tiltvp.cli.options import FrameRate, Switch, image_size_from
 from tiltvp.cli.rerun_views import send_corner
 from tiltvp.cli.showing import RerunOptions
 from tiltvp.cli.sources import SourceOptions, check_apart, ending_at_interrupt, picture_names
 from tiltvp.cli.terminal import named, progress_bar, say
 from tiltvp.errors import InvalidInputError, TiltvpError, counted
+from tiltvp.images import read_mask
 
 if TYPE_CHECKING:
     import numpy as np
@@ -69,7 +70,7 @@ class CornerOptions(LibraryOptions):
                 raise InvalidInputError("--pitch and --down: expected one of them")
             pitch_rad = math.radians(self.pitch)
             known["down"] = (0.0, math.cos(pitch_rad), -math.sin(pitch_rad))
-        return known | ({} if self.mask is None else {"mask": mask_from(self.mask)})
+        return known | ({} if self.mask is None else {"mask": read_mask(self.mask)})
 
     def _has(self, option: str) -> bool:
         return getattr(self, option.removeprefix("--").replace("-", "_")) is not None

@@ -8,15 +8,12 @@ import inspect
 import math
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, TypeVar
+from typing import Annotated, Any, ClassVar, TypeVar
 
 from cyclopts import Parameter
 
 from tiltvp._core import option_fields
-
-if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
+from tiltvp.images import read_mask
 
 T = TypeVar("T")
 
@@ -128,18 +125,10 @@ def _name(keyword: str) -> str:
 
 def _to_library(keyword: str, value: Any) -> Any:
     if keyword == "mask":
-        return mask_from(value)
+        return read_mask(value)
     if keyword == "correction":
         return _correction_from(value)
     return math.radians(value) if _is_angle(keyword) and isinstance(value, float) else value
-
-
-def mask_from(path: Path) -> "NDArray[np.bool_]":
-    """Where an image is bright."""
-    from tiltvp import read_image
-    from tiltvp.images import gray_from
-
-    return gray_from(read_image(path), str(path)) > 127
 
 
 def _correction_from(word: str) -> str | float | None:

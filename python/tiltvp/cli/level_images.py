@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from tiltvp.cli.cluster import Task, on_cluster
-from tiltvp.cli.declared_options import mask_from
 from tiltvp.cli.filtering import FilterOptions, Judge
 from tiltvp.cli.options import MethodOptions
 from tiltvp.cli.results import Outcome, outcome_table
@@ -16,6 +15,7 @@ from tiltvp.cli.sources import picture_names
 from tiltvp.cli.tables import Table
 from tiltvp.cli.terminal import named, progress_bar
 from tiltvp.errors import ImageFileError, InvalidInputError, OutputError, TiltvpError
+from tiltvp.images import read_mask
 
 if TYPE_CHECKING:
     import numpy as np
@@ -77,7 +77,7 @@ class Looks:
         else:
             # What is wrong with all sizes is so with that in which edges are looked for, or with the mask's, and told
             # before any work is done.
-            width = _WIDTH_PX if self.method.mask is None else mask_from(self.method.mask).shape[1]
+            width = _WIDTH_PX if self.method.mask is None else read_mask(self.method.mask).shape[1]
             self._look(Camera.equirectangular(width=width, height=max(1, width // 2)), size=None)
 
     @property
@@ -113,7 +113,7 @@ class Looks:
             if method.method is None:
                 otherwise |= {"method": "segments", "tilt_max_rad": PHOTO_TILT_MAX_RAD}
             if method.mask is not None:
-                otherwise["mask"] = _shrunk(checked_mask(mask_from(method.mask), camera), seen_by)
+                otherwise["mask"] = _shrunk(checked_mask(read_mask(method.mask), camera), seen_by)
                 method = replace(method, mask=None)
         estimator = method.estimator(seen_by, **otherwise)
         return Look(estimator, Leveller(camera, estimator.robot_from_camera, **(self.keywords | other)))

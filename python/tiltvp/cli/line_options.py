@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 from cyclopts import Group, Parameter, validators
 
 from tiltvp._core import LINE_METHODS
-from tiltvp.cli.declared_options import from_library, mask_from
+from tiltvp.cli.declared_options import from_library
 from tiltvp.cli.options import MountedOptions, check_word
 from tiltvp.errors import InvalidInputError
+from tiltvp.images import read_mask
 
 if TYPE_CHECKING:
     import numpy as np
@@ -70,7 +71,7 @@ class LineOptions(MountedOptions):
         own = TILT_OPTIONS if self.tilt == TILT_OPTIONS["method"] else {"method": self.tilt}
         options: dict[str, Any] = {**own, "robot_from_camera": mounting}
         if self.mask is not None:
-            options["mask"] = mask_from(self.mask)
+            options["mask"] = read_mask(self.mask)
         estimator, extractor = TiltEstimator(camera, **options), self.extractor(camera, rotation=mounting)
 
         return believed_leans(estimator, extractor, confidence_min=self.tilt_confidence_min)

@@ -14,8 +14,9 @@ from typing import TYPE_CHECKING, Annotated, Any, Self, TypeVar
 from cyclopts import Group, Parameter, validators
 
 from tiltvp._core import METHODS
-from tiltvp.cli.declared_options import LibraryOptions, from_library, mask_from
+from tiltvp.cli.declared_options import LibraryOptions, from_library
 from tiltvp.errors import InvalidInputError
+from tiltvp.images import read_mask
 
 if TYPE_CHECKING:
     import numpy as np
@@ -135,7 +136,7 @@ class MountedOptions(LibraryOptions):
         if self.robot_from_camera is not None or "robot_from_camera" not in options:
             options["robot_from_camera"] = self.mounting(camera)
         if self.mask is not None and "mask" not in options:
-            options["mask"] = mask_from(self.mask)
+            options["mask"] = read_mask(self.mask)
         return TiltEstimator(camera, **options)
 
 

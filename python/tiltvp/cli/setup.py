@@ -6,13 +6,13 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from tiltvp.cli.declared_options import mask_from
 from tiltvp.cli.mount import mounting_lines
 from tiltvp.cli.options import CameraOptions, MountedOptions, Switch
 from tiltvp.cli.sources import MotionOptions, SourceOptions, check_apart
 from tiltvp.cli.tables import PICTURES, check_file
 from tiltvp.cli.terminal import complain, progress_bar, say
 from tiltvp.files import check_output
+from tiltvp.images import read_mask
 
 if TYPE_CHECKING:
     from tiltvp import Camera
@@ -80,7 +80,7 @@ def setup(
             lens,
             moved.motions if moved is not None and moved.turns_known else None,
             robot_from_camera=None if mounted.robot_from_camera is None else mounted.mounting(lens),
-            mask=None if mounted.mask is None else mask_from(mounted.mask),
+            mask=None if mounted.mask is None else read_mask(mounted.mask),
             level_floor=level_floor,
             wheels=motion.wheels(),
             topics={k: v for k, v in (("images", source.topic), ("odometry", motion.odometry_topic)) if v is not None},

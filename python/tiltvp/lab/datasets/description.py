@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from tiltvp.cameras import Camera
-from tiltvp.errors import CalibrationError, ImageFileError, TiltvpError
-from tiltvp.images import gray_from, read_image
+from tiltvp.errors import CalibrationError, ImageFileError, InvalidInputError, TiltvpError
+from tiltvp.images import read_mask
 from tiltvp.lab.datasets.findings import Findings, near
 from tiltvp.robot import Robot, is_robot, named_mask
 from tiltvp.rotations import rotation_from
@@ -147,8 +147,8 @@ def _camera(file: Path, table: dict[str, Any], findings: Findings) -> tuple[Came
 def _mask(file: Path, camera: Camera | None, findings: Findings) -> NDArray[np.bool_] | None:
     expected = "an image of the camera's size, white where the world is seen and black where the robot is"
     try:
-        mask = gray_from(read_image(file), str(file)) > 127
-    except ImageFileError as error:
+        mask = read_mask(file)
+    except (ImageFileError, InvalidInputError) as error:
         findings.add(file, None, str(error).removeprefix(f"{file}: "), expected)
         return None
     if camera is not None and mask.shape != (camera.height, camera.width):
