@@ -51,6 +51,11 @@ def test_a_dash_of_no_command_is_wrong_use(words: tuple[str, ...], run: Run) -> 
     assert (said.code, said.err.count("\n")) == (2, 1)
 
 
+def test_what_is_not_given_is_said_to_be_that(run: Run) -> None:
+    assert run("tilt", "images").err == 'tiltvp: Command "tilt" parameter --camera is not given. Try `tiltvp --help`.\n'
+    assert "--camera requires an argument." in run("tilt", "images", "--camera").err
+
+
 def test_the_pages_of_commands_tell_no_option_that_is_refused(run: Run) -> None:
     told = set(re.findall(r"--empty-[\w-]+", app.generate_docs()))
     assert (told, run("camera", "new", "x.toml", "--empty-centre").code) == (set(), 2)

@@ -8,7 +8,7 @@ import sys
 from collections.abc import Sequence
 from contextlib import nullcontext
 
-from cyclopts import CycloptsError
+from cyclopts import CycloptsError, MissingArgumentError
 
 from tiltvp.cli import calibrate, camera_making, colmap, corner, demo, level, lines, mount, segments, setup, tilt, track
 from tiltvp.cli.lab import dataset, evaluate, measure, report, train
@@ -69,7 +69,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
         sys.stdout.flush()
         return code
     except CycloptsError as error:
-        complain(f"{error} Try `tiltvp --help`.")
+        said = str(error)
+        if isinstance(error, MissingArgumentError) and error.keyword is None:
+            said = said.replace(" requires an argument.", " is not given.")
+        complain(f"{said} Try `tiltvp --help`.")
         return WRONG_USE
     except (MissingExtraError, OutputError) as error:
         complain(str(error))
