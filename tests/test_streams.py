@@ -15,7 +15,7 @@ import pytest
 
 import tiltvp
 from recordings import KINDS, START_S, Bag, write_video
-from tiltvp.errors import CalibrationError, ImageFileError, InvalidInputError, MissingExtraError, TiltvpError
+from tiltvp.errors import CalibrationError, ImageFileError, InvalidInputError, MissingExtraError, TiltvpError, counted
 from tiltvp.streams import (
     NamedImages,
     RawImages,
@@ -327,7 +327,7 @@ def test_a_video_that_is_damaged_within_keeps_its_frames_in_their_places(tmp_pat
     path.write_bytes(bytes(content[: len(content) // 3]))
     frames = open_frames(path)
     assert 0 < frames.count < 12
-    assert frames.notes == (f"{path}: ends before its end, after {frames.count} frames (cut off?)",)
+    assert frames.notes == (f"{path}: ends before its end, after {counted(frames.count, 'frames')} (cut off?)",)
     assert len(list(frames)) == frames.count
 
 
