@@ -210,6 +210,14 @@ def test_pixels_are_where_the_sensor_has_them(turn: int, channels: int, tmp_path
     np.testing.assert_array_equal(decode_as_stored(path.read_bytes()), pixels)
 
 
+def test_a_file_of_floats_is_read_as_an_array_of_them(tmp_path: Path) -> None:
+    cv2.imwrite(str(tmp_path / "a.tif"), (LEVELS / 255.0).astype(np.float32))
+    np.testing.assert_array_equal(read_image(tmp_path / "a.tif"), LEVELS)
+    cv2.imwrite(str(tmp_path / "a.tif"), LEVELS.astype(np.float32))
+    with pytest.raises(ImageFileError, match=r"a\.tif: floats with values from 0 to 255, expected floats in \[0, 1\]"):
+        read_image(tmp_path / "a.tif")
+
+
 def test_a_photograph_that_was_turned_is_told_to_stay_as_it_is(tmp_path: Path) -> None:
     turned = Image.Exif()
     turned[0x0112] = 3

@@ -184,7 +184,7 @@ def read_image(path: str | os.PathLike[str]) -> NDArray[np.uint8]:
     """The image file as (H, W) or (H, W, 3) uint8, colour in BGR order. Raises `ImageFileError` with the path.
 
     Pixels stay where the sensor has them: a calibration knows nothing of the orientation tag of a photograph. Files of
-    16 bits a value are scaled as arrays of uint16 are.
+    16 bits a value are scaled as arrays of uint16 are, those of floats as arrays of floats.
     """
     file = path_from(path)
     return decode_image(image_bytes(file), str(file))
@@ -223,20 +223,20 @@ def decode_image(data: bytes, name: str) -> NDArray[np.uint8]:
     image = None if size is None else _decode(data)
     if image is None:
         raise ImageFileError(f"{name}: not an image that can be decoded ({len(data)} bytes)")
-    return image
+    try:
+        return _bytes_from(image, name)
+    except InvalidInputError as error:
+        raise ImageFileError(str(error)) from None
 
 
-def _decode(data: bytes) -> NDArray[np.uint8] | None:
+def _decode(data: bytes) -> NDArray[Any] | None:
     import cv2
 
     try:
         depths = cv2.IMREAD_ANYCOLOR | cv2.IMREAD_ANYDEPTH | cv2.IMREAD_IGNORE_ORIENTATION
-        image = cv2.imdecode(np.frombuffer(unturned(data), dtype=np.uint8), depths)
+        return cv2.imdecode(np.frombuffer(unturned(data), dtype=np.uint8), depths)
     except (cv2.error, MemoryError):
         return None
-    if image is None or image.dtype not in (np.uint8, np.uint16):
-        return None
-    return _bytes_from(np.asarray(image), "image")
 
 
 def decode_as_stored(data: bytes) -> NDArray[Any]:
