@@ -209,6 +209,7 @@ FEATURE = corner.fit(
         (lambda: about_vertical("a"), "angle_rad = 'a', expected a number"),
         (lambda: levelling([0.0, 1.0]), r"normal: shape \(2,\), expected \(3,\)"),
         (lambda: quaternion([[]] * 2 + [[1]]), "rotation: no array of numbers"),
+        (lambda: quaternion(np.full((3, 3), np.nan)), "rotation: numbers that are not finite, expected a rotation"),
         (lambda: field_of_view("a.yaml"), "camera: str, expected a tiltvp.Camera"),
         (lambda: ODOMETRY.gaps("a"), "times_s: no array of numbers"),
         (lambda: recorded_camera("drive.mcap"), "recording: str, expected a tiltvp.streams.Recording"),

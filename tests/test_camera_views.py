@@ -48,6 +48,7 @@ def test_a_camera_of_a_view(lens: str, law: Any) -> None:
         ({"centre_px": (1,)}, "centre_px = .1,."),
         ({"centre_px": 5}, "centre_px = 5"),
         ({"centre_px": "ab"}, "centre_px = 'a'"),
+        ({"centre_px": (90, 20), "radius_px": 20}, "centre_px = .90, 20., radius_px = 20: no pixel is within"),
         ({"width": 0}, "width, height = .0, 48."),
         ({"height": 4.5}, "width, height = .64, 4.5."),
         ({"lens": "pinhole", "view_rad": 3.2}, "view_rad: 183"),

@@ -57,7 +57,8 @@ class Camera(Lenses):
         With the centre (u, v) and the radius of the image circle it is the camera of Fleer 2017 (2.1.1), which ends at
         the circle; without a radius the view is that across the width of the image, and the centre is that of the image
         if none is given. How far a real lens is from its ideal it does not know: calibrate where you can. Raises
-        `InvalidInputError` for an unknown lens and for angles and lengths that cannot be.
+        `InvalidInputError` for an unknown lens, for angles and lengths that cannot be, and for a circle outside the
+        image.
         """
         if not (isinstance(lens, str) and lens in VIEW_LENSES):
             raise InvalidInputError(f"lens = {lens!r}, expected one of {', '.join(VIEW_LENSES)}")
@@ -71,6 +72,11 @@ class Camera(Lenses):
         if not (math.isfinite(radius) and radius > 0.0):
             raise InvalidInputError(f"radius_px = {radius_px}, expected a positive number of pixels")
         cx, cy = (0.5 * (width - 1), 0.5 * (height - 1)) if centre_px is None else pair_from(centre_px, "centre_px")
+        outside = (max(0.0, -0.5 - c, c + 0.5 - side) for c, side in ((cx, width), (cy, height)))
+        if radius_px is not None and math.hypot(*outside) >= radius:
+            raise InvalidInputError(
+                f"centre_px = ({cx:g}, {cy:g}), radius_px = {radius:g}: no pixel is within, expected another circle"
+            )
         common: dict[str, Any] = {
             "width": width, "height": height, "cx": cx, "cy": cy, "mirror": flag_from(mirror, "mirror"),
             "max_theta_rad": None if radius_px is None else half,

@@ -62,7 +62,10 @@ def levelling(normal: NDArray[np.floating]) -> Matrix:
 
 def quaternion(rotation: NDArray[np.floating]) -> Matrix:
     """(4,): x, y, z, w of a rotation (3, 3), w not negative: the main eigenvector of Bar-Itzhack's matrix."""
-    (xx, xy, xz), (yx, yy, yz), (zx, zy, zz) = shaped_from(rotation, "rotation", 3, 3).tolist()
+    matrix = shaped_from(rotation, "rotation", 3, 3)
+    if not np.isfinite(matrix).all():
+        raise InvalidInputError("rotation: numbers that are not finite, expected a rotation")
+    (xx, xy, xz), (yx, yy, yz), (zx, zy, zz) = matrix.tolist()
     symmetric = np.array([
         [xx - yy - zz, xy + yx, xz + zx, zy - yz],
         [xy + yx, yy - xx - zz, yz + zy, xz - zx],
