@@ -71,3 +71,6 @@ def test_rotation_that_is_not_there(tmp_path: Path) -> None:
     for source in (tmp_path, tmp_path / "none.txt", "fwd"):
         with pytest.raises(TiltvpError):
             read_rotation(source)
+    # It is read for several options, so that no name of one begins it.
+    with pytest.raises(TiltvpError, match=r"^'foward' is no file and no word \(did you mean forward\?\)"):
+        read_rotation("foward")

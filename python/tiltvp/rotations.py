@@ -147,7 +147,7 @@ def _missing(source: str, *, is_word: bool) -> Exception:
     meant = f" (did you mean {near[0]}?)" if near else ""
     if is_word:
         return InvalidInputError(
-            f"robot_from_camera: {source!r} is no file and no word{meant}, expected a file or one of {words}"
+            f"{source!r} is no file and no word{meant}, expected a file with a rotation, or one of {words}"
         )
     return CalibrationNotFoundError(f"{source}: no such file, expected a file with a rotation, or one of {words}")
 
