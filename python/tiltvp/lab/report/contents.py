@@ -13,7 +13,6 @@ from tiltvp.errors import RunError, TiltvpError
 from tiltvp.lab.datasets.folder import read_dataset
 from tiltvp.lab.evaluation import curves
 from tiltvp.lab.evaluation.runs import Run
-from tiltvp.lab.evaluation.schema import COLUMNS
 from tiltvp.lab.evaluation.summary import errors
 from tiltvp.lab.evaluation.variants import best_rows, variant_points
 from tiltvp.lab.plots.report import angles, quality, times, web
@@ -52,7 +51,6 @@ def contents_of(
     Raises `RunError` for a table without the columns of a run, or without any method that the figures know, and for an
     `also` of another dataset.
     """
-    _check(run.table)
     if also is not None and also.run.manifest["dataset"]["digest"] != run.manifest["dataset"]["digest"]:
         names = " and ".join(str(each.manifest["dataset"]["path"]) for each in (run, also.run))
         raise RunError(f"the runs are of different datasets ({names}), expected one on two computers")
@@ -94,12 +92,6 @@ def scaling_of(directory: Path) -> pl.DataFrame | None:
                 raise RunError(f"{path}: no column {', '.join(missing)}, expected a table of `tiltvp measure scaling`")
             return table
     return None
-
-
-def _check(table: pl.DataFrame) -> None:
-    missing = [name for name in COLUMNS if name not in table.columns]
-    if missing:
-        raise RunError(f"the run's table has no column {', '.join(missing)}, expected those of an evaluation")
 
 
 def _filled(*sheets: Sheet) -> list[Sheet]:
