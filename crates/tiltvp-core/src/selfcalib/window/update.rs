@@ -255,7 +255,7 @@ mod tests {
         };
         let motion = WheelMotion::from_motion(0.0, turn, base);
         for step in 0..20 {
-            filter.step(&motion, &seen(turn * step as f64, 0.0));
+            filter.step(&motion, &seen(turn * f64::from(step), 0.0));
         }
         let outcome = filter.step(&motion, &seen(turn * 20.0, 0.03));
         assert_eq!((outcome.used, outcome.rejected), (9, 2), "{outcome:?}");
