@@ -38,8 +38,6 @@ _LAST_S: Final = 2.0**31
 class Tilt(Protocol):
     """An estimate of one image or of a filter; false where there is none."""
 
-    def __bool__(self) -> bool: ...
-
     @property
     def roll_rad(self) -> float:
         """About x, right side down positive."""
