@@ -10,10 +10,11 @@ import polars as pl
 import pytest
 
 import tiltvp
+from tiltvp import METHODS
 from tiltvp.cli import main
 from tiltvp.lab.datasets.hostile import CASES, UNHARMED, hostile_images
 from tiltvp.lab.datasets.panoramas import Panorama, read_panorama_index
-from tiltvp.lab.evaluation.hostile import judge_images, summarise_cases
+from tiltvp.lab.evaluation.hostile import SURE, judge_images, summarise_cases
 
 
 @pytest.fixture(scope="module")
@@ -59,7 +60,8 @@ def test_truths_are_those_of_the_mounting_as_told(stripes: Panorama) -> None:
 def test_unharmed_views_are_answered_rightly_and_a_wrong_camera_is_counted(stripes: Panorama) -> None:
     cases = ("upward", "panorama", "centre off by 10 px")
     table = judge_images(hostile_images([stripes], count=2, cases=cases))
-    assert len(table) == 2 * 3 * 2
+    assert len(table) == 2 * 3 * len(METHODS)
+    table = table.filter(pl.col("method").is_in(["refined", "segments"]))
     unharmed = table.filter(pl.col("case").is_in(UNHARMED))
     assert unharmed["error_deg"].max() < 1.0
     # The dark rim of the image circle is not where the calibration says.
@@ -67,6 +69,13 @@ def test_unharmed_views_are_answered_rightly_and_a_wrong_camera_is_counted(strip
     assert off["error_deg"].min() > 2.0
     assert off["confidence"].max() < 0.6
     assert all("the image circle is beside the calibration's" in reason for reason in off["reason"])
+
+
+@pytest.mark.slow
+def test_no_method_is_sure_of_noise(stripes: Panorama) -> None:
+    table = judge_images(hostile_images([stripes], count=18, cases=("texture", "noise alone")))
+    assert set(table["method"]) == set(METHODS)
+    assert table["confidence"].max() < SURE
 
 
 def test_the_table_counts_who_was_wrong_and_sure() -> None:
@@ -101,4 +110,4 @@ def test_the_command(stripes: Panorama, tmp_path: Path, capsys: pytest.CaptureFi
     out = tmp_path / "trust.csv"
     assert main(["measure", "trust", str(stripes.path.parent), "--count", "1", "--out", str(out)]) == 0
     assert "upward read as ahead" in capsys.readouterr().out
-    assert len(pl.read_csv(out)) == 2 * len(CASES)
+    assert len(pl.read_csv(out)) == len(METHODS) * len(CASES)

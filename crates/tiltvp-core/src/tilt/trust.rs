@@ -44,8 +44,9 @@ pub(super) struct Seen<'a> {
 pub(super) struct Trust {
     /// Whether a fit is of the vertical and not of some other direction that edges share: told by the fit.
     pub vertical: Logit<FIT>,
-    /// Whether the camera is mounted as told. A factor of its own: light from above makes no poor fit believable.
-    pub up: Logit<{ FEATURES - FINENESS }>,
+    /// Whether the camera is mounted as told, if that has been learned. A factor of its own: light from above makes no poor fit
+    /// believable.
+    pub up: Option<Logit<{ FEATURES - FINENESS }>>,
 }
 
 /// A logistic regression.
@@ -81,13 +82,16 @@ impl Trust {
     #[cfg(test)]
     pub(super) const fn told(vertical: f64, up: f64) -> Self {
         let vertical = Logit { constant: vertical, weights: [0.0; FIT] };
-        Self { vertical, up: Logit { constant: up, weights: [0.0; FEATURES - FINENESS] } }
+        Self { vertical, up: Some(Logit { constant: up, weights: [0.0; FEATURES - FINENESS] }) }
     }
 
     /// The probabilities of a fit.
     pub(super) fn believed(&self, features: &[f64; FEATURES]) -> Believed {
         let (vertical, up) = (&features[..FIT], &features[FINENESS..]);
-        Believed { vertical: self.vertical.probability(vertical), up: self.up.probability(up) }
+        Believed {
+            vertical: self.vertical.probability(vertical),
+            up: self.up.as_ref().map_or(Believed::ALL.up, |logit| logit.probability(up)),
+        }
     }
 }
 

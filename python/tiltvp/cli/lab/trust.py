@@ -49,9 +49,10 @@ def trust(
     out
         Also write the long table, one row for each image and method: .csv, .json or .parquet.
     """
+    from tiltvp._core import METHODS
     from tiltvp.lab.datasets.hostile import CASES, hostile_images
     from tiltvp.lab.datasets.panoramas import read_panorama_index
-    from tiltvp.lab.evaluation.hostile import METHODS, judge_images, summarise_cases, train_trust
+    from tiltvp.lab.evaluation.hostile import judge_images, summarise_cases, train_trust
     from tiltvp.lab.evaluation.setups import image_sets, judge_lenses, summarise_sets, train_setups
     from tiltvp.lab.evaluation.trust import was_set_on
 
@@ -78,7 +79,7 @@ def trust(
     title = f"Shares in per cent, of {count} images of each case, by {len(shown)} panoramas"
     show_frame(title, summarise_cases(table), ["method", "case"])
     for method in METHODS if weights else ():
-        for what, (constant, own) in zip(("vertical", "up"), train_trust(table, method), strict=True):
+        for what, (constant, own) in train_trust(table, method).items():
             say(f"{method}, {what}: {constant:.4g}; {', '.join(f'{weight:.4g}' for weight in own)}")
     if asked:
         show_frame("Sets of five images of one building: which direction is up", summarise_sets(asked), ["of", "setup"])

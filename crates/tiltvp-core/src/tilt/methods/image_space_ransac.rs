@@ -12,6 +12,7 @@ use crate::options::POSITIVE;
 use crate::robust::{RansacOptions, Sampling, ransac};
 use crate::tilt::fit::Fit;
 use crate::tilt::tables::PixelTables;
+use crate::tilt::trust::{Logit, Trust};
 use crate::tilt::work::Work;
 
 options! {
@@ -25,6 +26,12 @@ options! {
         [flat] sampling: Sampling = Sampling::default();
     }
 }
+
+/// How a fit tells whether it is of the vertical: `tiltvp measure trust --weights` prints it.
+static TRUST: Trust = Trust {
+    vertical: Logit { constant: 13.21, weights: [-2.814, 3.473, 5.022, -0.8808, -0.3197, -0.015_63, -0.025_72, 0.0] },
+    up: None,
+};
 
 impl TiltMethod for ImageSpaceRansacOptions {
     fn edges(&self) -> EdgeOptions {
@@ -53,6 +60,10 @@ struct ImageSpaceRansac {
 impl Fitter for ImageSpaceRansac {
     fn prefilter(&self) -> Option<&Prefilter> {
         Some(self.space.prefilter())
+    }
+
+    fn trust(&self) -> Option<&'static Trust> {
+        Some(&TRUST)
     }
 
     fn fit(&self, edges: &EdgePixels, pixels: &PixelTables, work: &mut Work) -> Fit {

@@ -14,6 +14,7 @@ use crate::options::Between;
 use crate::robust::{RejectRefitOptions, reject_refit};
 use crate::tilt::fit::Fit;
 use crate::tilt::tables::PixelTables;
+use crate::tilt::trust::{Logit, Trust};
 use crate::tilt::work::Work;
 
 options! {
@@ -30,6 +31,12 @@ options! {
 
 /// Change of the shift in pixels below which trimming has converged (Fleer 2017, section 2.1.4).
 const SHIFT_TOLERANCE_PX: f64 = 0.1;
+
+/// How a fit tells whether it is of the vertical: `tiltvp measure trust --weights` prints it.
+static TRUST: Trust = Trust {
+    vertical: Logit { constant: 12.07, weights: [-3.386, 1.413, 0.3265, 2.693, 0.2243, -0.007_856, -0.3203, 0.0] },
+    up: None,
+};
 
 impl TiltMethod for ImageSpaceRejectRefitOptions {
     fn edges(&self) -> EdgeOptions {
@@ -59,6 +66,10 @@ struct ImageSpaceRejectRefit {
 impl Fitter for ImageSpaceRejectRefit {
     fn prefilter(&self) -> Option<&Prefilter> {
         Some(self.space.prefilter())
+    }
+
+    fn trust(&self) -> Option<&'static Trust> {
+        Some(&TRUST)
     }
 
     fn fit(&self, edges: &EdgePixels, pixels: &PixelTables, work: &mut Work) -> Fit {

@@ -85,10 +85,10 @@ pub(in crate::tilt) trait Fitter: Debug + Send + Sync {
         None
     }
 
-    /// The largest lean that is expected where none is told, and that beyond which the prefilter rejects edges, in radians, if both
-    /// matter: the edges that are left of a larger lean agree on a smaller one.
+    /// The largest lean that is expected where none is told, and that beyond which the prefilter rejects edges, in radians: the
+    /// edges that are left of a larger lean agree on a smaller one. Infinite where that is not so.
     fn lean_limits_rad(&self) -> [f64; 2] {
-        [FRAC_PI_2; 2]
+        [f64::INFINITY; 2]
     }
 
     /// Where what the last fit looked at stands.

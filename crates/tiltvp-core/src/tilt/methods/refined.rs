@@ -40,13 +40,13 @@ const TILT_MAX_RAD: f64 = 10f64.to_radians();
 /// How a fit tells whether it is of the vertical: `tiltvp measure trust --weights` prints it.
 static TRUST: Trust = Trust {
     vertical: Logit { constant: 4.474, weights: [-2.322, 0.1094, 5.713, -1.533, -0.4902, 2.116, -0.4649, -2.259] },
-    up: Logit {
+    up: Some(Logit {
         constant: 10.05,
         weights: [
             1.319, 0.1789, -0.02544, -2.71, 0.8393, -2.963, -1.741, 0.08912, -1.261, -4.575, 1.085, 0.5173, -1.102,
             1.953, 0.2501, -2.135, -1.813, -0.3016, 0.8395, -1.06, 1.047, -2.432, -7.03, 2.286, 0.0, 0.0, 0.0,
         ],
-    },
+    }),
 };
 
 impl TiltMethod for RefineOptions {

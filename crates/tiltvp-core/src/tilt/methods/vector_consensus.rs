@@ -15,6 +15,7 @@ use crate::robust::{Direction, RansacOptions, Sampling, ransac};
 use crate::tilt::fit::{Evidence, Fit, STRAY_RAD};
 use crate::tilt::tables::PixelTables;
 use crate::tilt::trained::TrainedCorrection;
+use crate::tilt::trust::{Logit, Trust};
 use crate::tilt::work::{Inliers, Work};
 
 options! {
@@ -56,6 +57,12 @@ impl OptionValue for NormalKind {
 /// Largest lean without `tilt_max_rad`: `alpha_max` of Fleer 2017, section 2.2.2.
 const TILT_MAX_RAD: f64 = 7f64.to_radians();
 
+/// How a fit tells whether it is of the vertical: `tiltvp measure trust --weights` prints it.
+static TRUST: Trust = Trust {
+    vertical: Logit { constant: 1.049, weights: [-1.455, -0.4428, 4.54, -3.762, -1.19, 0.6169, -0.7533, 0.0] },
+    up: None,
+};
+
 impl TiltMethod for VectorConsensusOptions {
     fn edges(&self) -> EdgeOptions {
         EdgeOptions { gradient_min: 600.0, ..EdgeOptions::default() }
@@ -94,6 +101,10 @@ struct VectorConsensus {
 impl Fitter for VectorConsensus {
     fn prefilter(&self) -> Option<&Prefilter> {
         Some(self.normals.prefilter())
+    }
+
+    fn trust(&self) -> Option<&'static Trust> {
+        Some(&TRUST)
     }
 
     fn normal(&self, slot: usize, gx: f32, gy: f32) -> Option<[f32; 3]> {

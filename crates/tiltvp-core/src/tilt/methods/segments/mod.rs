@@ -61,14 +61,14 @@ const ALIKE: f64 = 4.0;
 /// How a fit tells whether it is of the vertical: `tiltvp measure trust --weights --count 300 --seed 3` prints it.
 static TRUST: Trust = Trust {
     vertical: Logit { constant: 6.056, weights: [-2.161, -0.1014, 0.3615, 1.165, -0.007_445, 2.224, 0.049_94, -1.929] },
-    up: Logit {
+    up: Some(Logit {
         constant: 7.651,
         weights: [
             1.683, -0.2377, -0.076_62, 3.541, -1.117, -3.369, -2.491, 0.6217, -2.228, -3.596, 1.778, 0.9131, -0.5774,
             1.54, -0.9502, 0.8788, -0.6593, 1.237, -0.6818, 0.2208, -0.4533, -1.336, -3.774, -0.6081, 2.7, 7.729,
             -11.6,
         ],
-    },
+    }),
 };
 
 impl TiltMethod for SegmentsOptions {
