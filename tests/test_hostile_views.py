@@ -76,6 +76,8 @@ def test_no_method_is_sure_of_noise(stripes: Panorama) -> None:
     table = judge_images(hostile_images([stripes], count=18, cases=("texture", "noise alone")))
     assert set(table["method"]) == set(METHODS)
     assert table["confidence"].max() < SURE
+    reasons = table.filter(method="refined")["reason"]
+    assert reasons.str.contains("% of the pixels are edges, by noise or texture").mean() > 0.8
 
 
 def test_the_table_counts_who_was_wrong_and_sure() -> None:

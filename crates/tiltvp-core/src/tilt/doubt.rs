@@ -27,6 +27,11 @@ pub enum Doubt {
         /// Edge pixels.
         pixels: usize,
     },
+    /// So many pixels are edges that they are hardly of things.
+    Noisy {
+        /// Share of the pixels that are looked at, in `[0, 1]`.
+        share: f64,
+    },
     /// Of the edges few agree.
     FewAgree {
         /// Share of the edge pixels, in `[0, 1]`.
@@ -65,6 +70,11 @@ impl fmt::Display for Doubt {
             Self::FewEdges { pixels } => {
                 write!(f, "{pixels} edge pixels are few: little contrast, dark, over-exposed or blurred")
             }
+            Self::Noisy { share } => write!(
+                f,
+                "{:.0} % of the pixels are edges, by noise or texture: raise smoothing_px, or take the method segments",
+                100.0 * share
+            ),
             Self::FewAgree { share } => write!(
                 f,
                 "only {:.0} % of the edge pixels agree: check mounting, calibration, mask and tilt_max_rad",

@@ -233,6 +233,7 @@ impl TiltEstimator {
         let (edge_pixels, prefiltered_pixels) = (edges.strong(), work.rows.len());
         let seen = Seen {
             edge_pixels,
+            pixels: self.pixels.region.len(),
             prefiltered_pixels,
             pixels_per_rad: self.pixels.region.pixels_per_rad(),
             tilt_max_rad,

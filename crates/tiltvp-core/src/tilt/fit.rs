@@ -106,7 +106,7 @@ impl Fit {
             estimate.confidence *= AS_LARGE;
         }
         let limit_rad = is_beyond.then_some(seen.expected_max_rad);
-        estimate.doubt = Doubt::of(&estimate, seen.pixels_per_rad, off_rad, looks_up, limit_rad);
+        estimate.doubt = Doubt::of(&estimate, seen, off_rad, looks_up, limit_rad);
         estimate
     }
 
@@ -221,6 +221,7 @@ mod tests {
     fn seen(trust: Option<&'static Trust>) -> Seen<'static> {
         Seen {
             edge_pixels: 9,
+            pixels: 1000,
             prefiltered_pixels: 8,
             pixels_per_rad: 100.0,
             tilt_max_rad: 0.5,

@@ -43,6 +43,9 @@ CAUSES: Final = {
     "dark": "contrast",
     "over": "contrast",
     "blurred": "blur",
+    "noisy": "noise",
+    "noise": "noise",
+    "texture": "texture",
     "hidden": "directions",
     "lean": "tilt_max_rad",
 }

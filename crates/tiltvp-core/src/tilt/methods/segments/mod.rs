@@ -178,6 +178,7 @@ impl ImageFitter for SegmentFit {
             lights: &lights,
             aspect: up.map_or([0.0; ASPECT], |up| self.aspect.of(&work.edges, &up, &mut work.columns)),
             edge_pixels: work.segments.points.len(),
+            pixels: region.len(),
             prefiltered_pixels: considered,
             pixels_per_rad: region.pixels_per_rad(),
             tilt_max_rad: self.tilt_max_rad,
