@@ -149,6 +149,8 @@ def test_symptoms_are_what_is_said() -> None:
     camera = tiltvp.Camera.equidistant(width=640, height=480, focal_px=139.7, cx=319.5, cy=239.5)
     estimator = tiltvp.TiltEstimator(camera)
     said = [estimator(np.zeros((480, 640), np.uint8)).reason]
+    noise = np.random.default_rng(1).normal(110.0, 30.0, (480, 640)).clip(0.0, 255.0).astype(np.uint8)
+    said.append(estimator(noise).reason.partition(" % of the ")[2])
     with pytest.raises(tiltvp.errors.InvalidInputError) as refusal:
         estimator(np.zeros((240, 320), np.uint8))
     said.append(str(refusal.value))

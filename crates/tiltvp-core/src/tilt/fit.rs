@@ -74,6 +74,14 @@ impl Fit {
         }
     }
 
+    /// The fit with the error of a lean that edges which do not agree draw to the upright robot. So many passed the prefilter; for
+    /// `as_near` see [`confidence::diluted_share`].
+    pub(super) fn diluted(self, near: usize, as_near: f64) -> Self {
+        let (Some(tilt), Some(covariance)) = (self.tilt, self.covariance) else { return self };
+        let share = confidence::diluted_share(self.inliers, near, as_near);
+        Self { covariance: Some(confidence::with_lean_error(covariance, &tilt, share)), ..self }
+    }
+
     /// The estimate of an image. A tilt of which the error is not known is none: nor one whose covariance is singular to rounding,
     /// for a direction in which an image tells nothing.
     pub(super) fn into_estimate(self, seen: &Seen<'_>, trusted: &mut [f64; FEATURES]) -> TiltEstimate {
@@ -241,6 +249,23 @@ mod tests {
         let fit = Fit::out_of_reach(1.7, &report);
         assert!(fit.rms.is_nan() && fit.tilt.is_none() && fit.iterations == 4);
         assert_eq!(fit.stop, Stop::OutOfReach { angle_rad: 1.7, limit_rad: FRAC_PI_2 });
+    }
+
+    /// Of a lean of 0.1 rad towards 0.3 rad, of which 995 edges agree.
+    #[test]
+    fn a_lean_is_as_uncertain_as_edges_draw_it_that_do_not_agree() {
+        let of = |near, as_near| {
+            let fit = Fit { inliers: 995, ..fit(Matrix2::identity() * 1e-6) }.diluted(near, as_near);
+            let (along, covariance) = (Vector2::new(0.3f64.cos(), 0.3f64.sin()), fit.covariance.unwrap());
+            let across = Vector2::new(-along.y, along.x);
+            [along, across].map(|direction| (direction.dot(&(covariance * direction)) - 1e-6).max(0.0).sqrt())
+        };
+        let [clear, _] = of(1450, 1.0);
+        assert!(clear < 1e-4, "{clear}");
+        for [along, across] in [of(2450, 1.0), of(3950, 0.5)] {
+            assert!((along - 0.1).abs() < 1e-4 && across < 1e-6, "{along} {across}");
+        }
+        assert_eq!(of(1_000_000, 1.0), of(10_000_000, 1.0));
     }
 
     #[test]

@@ -39,12 +39,12 @@ const TILT_MAX_RAD: f64 = 10f64.to_radians();
 
 /// How a fit tells whether it is of the vertical: `tiltvp measure trust --weights` prints it.
 static TRUST: Trust = Trust {
-    vertical: Logit { constant: 4.474, weights: [-2.322, 0.1094, 5.713, -1.533, -0.4902, 2.116, -0.4649, -2.259] },
+    vertical: Logit { constant: 3.855, weights: [-2.494, 0.4482, 2.147, -0.8832, -0.2784, 1.235, -0.2442, -2.42] },
     up: Some(Logit {
-        constant: 10.05,
+        constant: 10.37,
         weights: [
-            1.319, 0.1789, -0.02544, -2.71, 0.8393, -2.963, -1.741, 0.08912, -1.261, -4.575, 1.085, 0.5173, -1.102,
-            1.953, 0.2501, -2.135, -1.813, -0.3016, 0.8395, -1.06, 1.047, -2.432, -7.03, 2.286, 0.0, 0.0, 0.0,
+            1.139, 0.7491, 0.1555, -2.709, 0.8037, -2.814, -1.46, -0.1345, -0.9677, -4.201, 1.153, 0.6285, -0.7748,
+            2.129, 0.3655, -1.859, -1.869, -0.2662, 0.7099, -1.037, 1.193, -2.354, -6.008, 1.225, 0.0, 0.0, 0.0,
         ],
     }),
 };
@@ -65,14 +65,30 @@ pub(super) struct Refined {
     normals: Normals,
     options: RefineOptions,
     lean_limits_rad: [f64; 2],
+    /// Share of the edges that pass the prefilter that would pass that of `TILT_MAX_RAD`, if they stand evenly.
+    as_near: f64,
 }
 
 impl Refined {
     pub(super) fn new(setting: &Setting<'_>, options: RefineOptions) -> Self {
         // Edges stray: those of the largest lean do to either side of it.
-        let edges_rad = (setting.searched_rad(TILT_MAX_RAD) + options.scale_rad).min(FRAC_PI_2);
+        let searched_rad = setting.searched_rad(TILT_MAX_RAD);
+        let edges_rad = (searched_rad + options.scale_rad).min(FRAC_PI_2);
         let normals = Normals::new(setting, NormalKind::Tangent, edges_rad);
-        Self { normals, options, lean_limits_rad: [TILT_MAX_RAD, edges_rad] }
+        let as_near = TILT_MAX_RAD / searched_rad;
+        Self { normals, options, lean_limits_rad: [TILT_MAX_RAD, edges_rad], as_near }
+    }
+
+    /// The fit with the error that the edges which agree tell.
+    pub(super) fn fit_alone(&self, edges: &EdgePixels, pixels: &PixelTables, work: &mut Work) -> Fit {
+        self.normals.lift(edges, work);
+        let report = refine(&work.rows, &self.options, &mut work.weights, &mut work.subsample);
+        let scale = self.options.scale_rad;
+        let threshold = INLIER_SCALES * scale;
+        let within = |direction: Vector3<f64>| Inliers::Within { model: direction.into(), threshold };
+        work.inliers = report.model.map_or(Inliers::None, within);
+        let evidence = Evidence { scale, weighted: true, approximate: false };
+        normals::conclude(&report, &TrainedCorrection::IDENTITY, &evidence, pixels, work)
     }
 }
 
@@ -110,14 +126,7 @@ impl Fitter for Refined {
     }
 
     fn fit(&self, edges: &EdgePixels, pixels: &PixelTables, work: &mut Work) -> Fit {
-        self.normals.lift(edges, work);
-        let report = refine(&work.rows, &self.options, &mut work.weights, &mut work.subsample);
-        let scale = self.options.scale_rad;
-        let threshold = INLIER_SCALES * scale;
-        let within = |direction: Vector3<f64>| Inliers::Within { model: direction.into(), threshold };
-        work.inliers = report.model.map_or(Inliers::None, within);
-        let evidence = Evidence { scale, weighted: true, approximate: false };
-        normals::conclude(&report, &TrainedCorrection::IDENTITY, &evidence, pixels, work)
+        self.fit_alone(edges, pixels, work).diluted(work.rows.len(), self.as_near)
     }
 }
 

@@ -6,7 +6,7 @@ use crate::edges::{EdgeOptions, EdgePixels, RidgePixels};
 use crate::geometry::{Tilt, tangent_basis};
 use crate::parallel;
 use crate::tilt::fit::Fit;
-use crate::tilt::methods::method::{Fitter, Setting, TiltMethod};
+use crate::tilt::methods::method::{Setting, TiltMethod};
 use crate::tilt::methods::refined::{RefineOptions, Refined};
 use crate::tilt::tables::PixelTables;
 use crate::tilt::work::Work;
@@ -45,7 +45,7 @@ impl Vote {
     ) -> Fit {
         let least = (self.strong.gradient_min * self.strong.gradient_min) as f32;
         strong.refill_where(&ridge.edges, |slot, gx, gy| (gx * gx + gy * gy >= least) & self.in_band[slot as usize]);
-        self.pixels.fit(strong, tables, work)
+        self.pixels.fit_alone(strong, tables, work)
     }
 }
 
