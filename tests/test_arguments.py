@@ -11,16 +11,20 @@ import pytest
 import tiltvp
 from tiltvp import corner, lines
 from tiltvp.arguments import array_from, number_from
-from tiltvp.colmap import gravity_from
-from tiltvp.corner_tables import roll_pitch_yaw
+from tiltvp.colmap import gravity_from, image_gravities
+from tiltvp.corner_tables import corner_rows, pose_rows, roll_pitch_yaw, write_trajectory
 from tiltvp.errors import InvalidInputError, TiltvpError
-from tiltvp.field_of_view import field_of_view
-from tiltvp.line_calibration import place_of_longest_tracks
-from tiltvp.line_logs import bearing_log, displacements
+from tiltvp.field_of_view import field_of_view, looks_like_a_mirror
+from tiltvp.formats import CameraSpec
+from tiltvp.line_calibration import calibrate_lines, place_of_longest_tracks
+from tiltvp.line_logs import bearing_log, believed_leans, displacements, follow_lines, see_lines
 from tiltvp.rotations import about_vertical, levelling, quaternion
+from tiltvp.selfcalib import convergence_table
 from tiltvp.stereo_rigs import StereoRig
 from tiltvp.streams import (
+    Frames,
     InertialSamples,
+    LiveCamera,
     Motion,
     Odometry,
     Wheels,
@@ -30,7 +34,7 @@ from tiltvp.streams import (
     recorded_camera,
 )
 from tiltvp.streams.outputs.transforms import StaticTransform
-from tiltvp.synth import Room, simulate_drive
+from tiltvp.synth import Drive, Room, StereoSequence, simulate_drive, zed_cameras
 from tiltvp.tilt import normal_of
 
 CAMERA = tiltvp.Camera.equidistant(width=64, height=48, focal_px=20.0, cx=31.5, cy=23.5)
@@ -135,6 +139,15 @@ def delay(odometry: Any = ODOMETRY, reach_s: Any = 0.1) -> Any:
     return tiltvp.frame_delay([IMAGE] * 11, TIMES, odometry, CAMERA, np.eye(3), reach_s=reach_s)
 
 
+def transform(**parts: Any) -> StaticTransform:
+    return StaticTransform("base", "camera", np.zeros(3), np.eye(3), **parts)
+
+
+CORNERS = corner.solve_many([[0, 0, 1]], [[0.1, 0, 1]], [[0, 0.1, 1]], [[-0.1, 0, 1]])
+LINES, FEW, VIEW = EXTRACTOR.lines_at([]), np.zeros((0, 190), np.float32), field_of_view(CAMERA)
+FRAMES = Frames()
+FRAMES.names = []
+LOGS = tiltvp.JoinedLogs(np.zeros(3), np.eye(3), logs=1, distance=0.0, limit=1.0)
 ALONG = np.linspace(0.02, 0.3, 20)[:, None]
 FEATURE = corner.fit(
     *(
@@ -221,6 +234,62 @@ FEATURE = corner.fit(
         (lambda: displacements([0.1], wheel_base_m=0.4), r"motions\[0\]: float, expected a Motion"),
         (lambda: place_of_longest_tracks([], 3), r"start: shape \(\), expected \(3,\)"),
         (lambda: gravity_from(ESTIMATE, "up"), "robot_from_camera: no array of numbers"),
+        (lambda: gravity_from(None, np.eye(3)), "estimate: NoneType, expected a TiltEstimate"),
+        (lambda: image_gravities(None, ".", None, confidence_min=0.5), "database: NoneType, expected a ColmapDatabase"),
+        (lambda: pose_rows(None), "estimates: NoneType, expected several"),
+        (lambda: pose_rows([(0.0, "a", None)]), r"estimates\[0\]\[2\]: NoneType, expected the last of"),
+        (lambda: corner_rows([3]), r"estimates\[0\] = 3, expected .time_s, file, CornerEstimate"),
+        (lambda: write_trajectory([3], "a.tum"), r"rows\[0\]: int, expected a row of pose_rows"),
+        (lambda: write_trajectory([{"time_s": 0.0}], "a.tum"), r"rows\[0\]: no x_m, expected a row of pose_rows"),
+        (lambda: list(see_lines(None, EXTRACTOR)), "images: NoneType, expected several images"),
+        (lambda: list(see_lines([IMAGE], None)), "extractor: NoneType, expected a LineExtractor"),
+        (lambda: list(see_lines([IMAGE], EXTRACTOR, tilt=3)), "tilt: int, expected what tells the lean"),
+        (lambda: list(follow_lines([IMAGE], EXTRACTOR, None)), "tracker: NoneType, expected a LineTracker"),
+        (lambda: bearing_log([], frames_min="a"), "frames_min = 'a', expected a number"),
+        (lambda: believed_leans(None, EXTRACTOR), "estimator: NoneType, expected a TiltEstimator"),
+        (lambda: believed_leans(ESTIMATOR, "a"), "extractor: str, expected a LineExtractor"),
+        (lambda: calibrate_lines([], None), "solve: NoneType, expected what makes a LogCalibration"),
+        (lambda: looks_like_a_mirror("a.yaml", VIEW), "camera: str, expected a tiltvp.Camera"),
+        (lambda: looks_like_a_mirror(CAMERA, 2.0), "view: float, expected what field_of_view measures"),
+        (lambda: about_vertical(np.inf), "angle_rad = inf, expected radians"),
+        (lambda: tiltvp.find_setup(FRAMES, CAMERA, 3), "motions: int, expected several Motion or None"),
+        (lambda: tiltvp.find_setup(FRAMES, CAMERA, wheels=[]), "wheels: list, expected tiltvp.streams.Wheels"),
+        (lambda: tiltvp.find_setup(FRAMES, CAMERA, topics=[]), "topics: list, expected a dict"),
+        (lambda: next(FRAMES.sample(3)), "numbers: int, expected several numbers of frames"),
+        (lambda: next(FRAMES.sample([-1])), "numbers: -1, expected whole numbers from 0 below 0"),
+        (lambda: convergence_table(3), "estimates: int, expected several MountingEstimate"),
+        (lambda: tiltvp.Extrinsics.of(LOGS, 3), "tilt: int, expected a JoinedTilts, MountingTilt or Robot"),
+        (lambda: tiltvp.Extrinsics.of(LOGS).robot(CAMERA), "robot: Camera, expected a tiltvp.Robot"),
+        (lambda: tiltvp.Extrinsics.of(LOGS).transform(child=""), "child = '', expected the name of a frame"),
+        (lambda: transform(sigmas=3), "sigmas: int, expected several pair"),
+        (lambda: transform(missing="z"), "missing = 'z', expected a tuple of x, y, z"),
+        (lambda: transform(covariance=np.eye(3)), r"covariance: shape \(3, 3\), expected \(5, 5\)"),
+        (lambda: outputs.write_tilts("a.mcap", [0.0], [ESTIMATE], frame=3), "frame: int, expected the name of a frame"),
+        (lambda: outputs.write_tilts("a.tum", [0.0], [ESTIMATE], topic=None), "topic: NoneType, expected the name"),
+        (lambda: read_odometry("odometry.csv", read_as=None), "read_as: NoneType, expected names of conventions"),
+        (lambda: CameraSpec("equidistant", 8, 8, None).check(), "parameters: NoneType, expected a dict"),
+        (lambda: CameraSpec("equidistant", 8, 8, {}, mirror="no").check(), "mirror = 'no', expected True or False"),
+        (lambda: StereoRig.load("a.toml", image_size="x"), "image_size = 'x', expected .width, height. in pixels"),
+        (lambda: LiveCamera(True), "number = True, expected the number of a camera"),
+        (lambda: tiltvp.Camera("equidistant", width=8, height=8, mirror=None), "None: expected True or False"),
+        (lambda: zed_cameras([1280]), r"width = \[1280\], expected a number"),
+        (lambda: Drive(None, camera=CAMERA), "room: NoneType, expected a tiltvp.synth.Room"),
+        (lambda: Drive(Room("office", 1), camera=3), "camera: int, expected a tiltvp.Camera"),
+        (lambda: StereoSequence(Room("office", 1), left=CAMERA, right=3), "right: int, expected a tiltvp.Camera"),
+        (
+            lambda: Room("office", 1).straight_edges(None, pose=np.zeros(3)),
+            "camera: NoneType, expected a tiltvp.Camera",
+        ),
+        (lambda: lines.match_wide(LINES, FEW, 3, FEW), "lines_b: int, expected Lines"),
+        (lambda: lines.LineTracker().update(None, FEW), "lines: NoneType, expected Lines"),
+        (lambda: SEGMENTS.pixels(1.5), "index = 1.5, expected a whole number"),
+        (lambda: CORNERS.of(-1), "corner = -1, expected a number below 1"),
+        (lambda: corner.resolve([FEATURE], alignment=3), "alignment: got 3, expected one of same, manhattan, vertical"),
+        (
+            lambda: corner.resolve([FEATURE], common_from_camera=3),
+            "common_from_camera: int, expected several rotations",
+        ),
+        (lambda: corner.poses(FEATURE, FEATURE, np.eye(4), fuse=1), "fuse = 1, expected True or False"),
     ],
 )
 def test_what_is_of_another_kind_is_named(call: Any, told: str) -> None:

@@ -23,6 +23,7 @@ __all__ = [
     "number_from",
     "pair_from",
     "path_from",
+    "refuse_uncallable",
     "refuse_unless",
     "shaped_from",
     "size_from",
@@ -98,6 +99,12 @@ def flag_from(value: bool, name: str) -> bool:
 def refuse_unless(value: object, kinds: type | UnionType, name: str, expected: str) -> None:
     """Raises `InvalidInputError` for what is of none of the kinds."""
     if not isinstance(value, kinds):
+        raise InvalidInputError(f"{name}: {type(value).__name__}, expected {expected}")
+
+
+def refuse_uncallable(value: object, name: str, expected: str) -> None:
+    """Raises `InvalidInputError` for what cannot be called."""
+    if not callable(value):
         raise InvalidInputError(f"{name}: {type(value).__name__}, expected {expected}")
 
 

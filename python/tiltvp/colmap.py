@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from tiltvp.arguments import path_from, shaped_from
+from tiltvp.arguments import number_from, path_from, refuse_uncallable, refuse_unless, shaped_from
 from tiltvp.cameras import Camera
 from tiltvp.errors import CalibrationError, ImageFileError, InvalidInputError, MissingExtraError, OutputError
 from tiltvp.formats import CameraSpec
@@ -133,6 +133,7 @@ class ColmapDatabase:
 
 def gravity_from(estimate: TiltEstimate, robot_from_camera: NDArray[np.float64]) -> NDArray[np.float64]:
     """(3,): where things fall, in the camera frame, by the tilt of a robot on which the camera sits so."""
+    refuse_unless(estimate, TiltEstimate, "estimate", "a TiltEstimate")
     return -np.asarray(estimate.normal) @ shaped_from(robot_from_camera, "robot_from_camera", 3, 3)
 
 
@@ -150,11 +151,14 @@ def image_gravities(
     with the side of the image up that the photograph's orientation tag tells, upright without one; it may take another
     mounting. Images of one camera and tag that speak against it are not believed. `advance` is called per image.
     """
+    refuse_unless(database, ColmapDatabase, "database", "a ColmapDatabase")
+    folder, confidence_min = path_from(folder), number_from(confidence_min, "confidence_min")
+    refuse_uncallable(estimator_of, "estimator_of", "what makes an estimator of a camera and a mounting")
     groups: dict[tuple[int, str], list[ColmapImage]] = {}
     found: dict[int, ImageGravity] = {}
     for image in database.images:
         spec = database.cameras.get(image.camera_id, "its camera is not in the database")
-        up = spec if isinstance(spec, str) else _up_of(Path(folder) / image.name)
+        up = spec if isinstance(spec, str) else _up_of(folder / image.name)
         if up in _UP_OF_TAG.values():
             groups.setdefault((image.camera_id, up), []).append(image)
         else:
@@ -164,7 +168,7 @@ def image_gravities(
     for (camera_id, up), images in groups.items():
         spec = database.cameras[camera_id]
         assert isinstance(spec, CameraSpec)
-        group = _Group(estimator_of(Camera.from_spec(spec), mounting_looking(up)), Path(folder), confidence_min)
+        group = _Group(estimator_of(Camera.from_spec(spec), mounting_looking(up)), folder, confidence_min)
         speaks_against = group.speaks_against(images)
         for image in images:
             one = group.look(image)

@@ -15,7 +15,7 @@ import numpy as np
 
 from tiltvp import _core
 from tiltvp._core import CornerAttitude, CornerAttitudes, CornerFeature, CornerPose, ResolvedAttitude
-from tiltvp.arguments import number_from, refuse_unless, shaped_from
+from tiltvp.arguments import flag_from, number_from, refuse_unless, shaped_from
 from tiltvp.corner_boxes import CornerBox, join_boxes
 from tiltvp.corner_images import (
     CORNER_METHODS,
@@ -204,9 +204,11 @@ def resolve(
     is no corner of that angle.
     """
     corners = _checked(features)
-    cameras = [np.eye(3)] * len(corners) if common_from_camera is None else list(common_from_camera)
+    if common_from_camera is None:
+        common_from_camera = [np.eye(3)] * len(corners)
+    refuse_unless(common_from_camera, Iterable, "common_from_camera", "several rotations (3, 3)")
     known = _known_beforehand(gamma_rad, gamma_sigma_rad, right_handed, priors)
-    return _core.resolve_corners(corners, cameras, known, alignment)
+    return _core.resolve_corners(corners, list(common_from_camera), known, alignment)
 
 
 def poses(
@@ -230,7 +232,7 @@ def poses(
     """
     _checked([left, right])
     known = _known_beforehand(gamma_rad, gamma_sigma_rad, right_handed, priors)
-    return _core.corner_poses(left, right, left_from_right, known, fuse)
+    return _core.corner_poses(left, right, left_from_right, known, flag_from(fuse, "fuse"))
 
 
 def _checked(features: Iterable[CornerFeature]) -> list[CornerFeature]:

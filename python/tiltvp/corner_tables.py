@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from tiltvp.arguments import shaped_from
+from tiltvp._core import CornerEstimate
+from tiltvp.arguments import each_from, refuse_unless, shaped_from
 from tiltvp.corner_boxes import join_boxes
 from tiltvp.errors import InvalidInputError
 from tiltvp.rotations import quaternion
@@ -17,7 +18,7 @@ from tiltvp.streams.outputs.tum import write_tum
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from tiltvp._core import CornerEstimate, CornerHypothesis
+    from tiltvp._core import CornerHypothesis
 
 __all__ = ["CORNER_COLUMNS", "POSE_COLUMNS", "corner_rows", "pose_rows", "roll_pitch_yaw", "write_trajectory"]
 
@@ -45,7 +46,7 @@ def pose_rows(estimates: Sequence[tuple[float, str, CornerEstimate]]) -> list[di
     there is no pose, and where it has no position, which `place_reason` says why.
     """
     rows = []
-    for time_s, file, estimate in estimates:
+    for time_s, file, estimate in _each(estimates):
         row: dict[str, Any] = dict.fromkeys(POSE_COLUMNS)
         row |= {"time_s": time_s, "file": file, "found": bool(estimate), "confidence": estimate.confidence}
         row |= {"hypotheses": len(estimate.hypotheses), "reason": estimate.reason, "object": estimate.object}
@@ -67,6 +68,18 @@ def pose_rows(estimates: Sequence[tuple[float, str, CornerEstimate]]) -> list[di
             row["misfit"] = pose.misfit
         rows.append(row)
     return rows
+
+
+def _each(estimates: Iterable[tuple[float, str, CornerEstimate]]) -> Iterator[tuple[float, str, CornerEstimate]]:
+    """Each frame's, as it should be. Raises `InvalidInputError` with the number of another."""
+    expected = "(time_s, file, CornerEstimate)"
+    refuse_unless(estimates, Iterable, "estimates", f"several {expected}")
+    for number, one in enumerate(estimates):
+        name = f"estimates[{number}]"
+        if not isinstance(one, Sequence) or len(one) != 3:
+            raise InvalidInputError(f"{name} = {one!r}, expected {expected}")
+        refuse_unless(one[2], CornerEstimate, f"{name}[2]", f"the last of {expected}")
+        yield one
 
 
 def _place_sigmas(pose: CornerHypothesis) -> NDArray[np.float64]:
@@ -109,7 +122,7 @@ def corner_rows(estimates: Sequence[tuple[float, str, CornerEstimate]]) -> list[
     """
     rows = []
     upper = np.triu_indices(6)
-    for time_s, file, estimate in estimates:
+    for time_s, file, estimate in _each(estimates):
         boxes: dict[int, dict[str, Any]] = {}
         for number, box in enumerate(join_boxes(estimate.corners), start=1):
             sizes: dict[str, Any] = dict(zip(_SIZES, box.sizes_m.tolist(), strict=True))
@@ -142,7 +155,12 @@ def write_trajectory(rows: Sequence[Mapping[str, Any]], path: str | os.PathLike[
 
     Raises `InvalidInputError` where no row has a place, `OutputError` where the file cannot be written.
     """
-    poses = [[row[name] for name in ("time_s", *_POSITION, *_QUATERNION)] for row in rows]
+    names = ("time_s", *_POSITION, *_QUATERNION)
+    rows = each_from(rows, "rows", "keys", "row of pose_rows")
+    for number, row in enumerate(rows):
+        if missing := [name for name in names if name not in row]:
+            raise InvalidInputError(f"rows[{number}]: no {missing[0]}, expected a row of pose_rows")
+    poses = [[row[name] for name in names] for row in rows]
     placed = np.array([pose for pose in poses if None not in pose])
     if not len(placed):
         raise InvalidInputError(f"{path}: no frame has a pose with a place, expected one at least")

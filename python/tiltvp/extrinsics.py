@@ -9,17 +9,16 @@ from typing import TYPE_CHECKING, ClassVar, Final
 
 import numpy as np
 
-from tiltvp.arguments import array_from, each_from, number_from
+from tiltvp.arguments import array_from, each_from, number_from, refuse_unless
 from tiltvp.errors import InvalidInputError
 from tiltvp.mounting import MountingTilt
+from tiltvp.robot import Robot
 from tiltvp.rotations import about_vertical, mounting_from
 from tiltvp.selfcalib import LogCalibration, consistency_band
 from tiltvp.streams.outputs.transforms import COVARIANCE_AXES, StaticTransform
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
-
-    from tiltvp.robot import Robot
 
     Matrix = NDArray[np.float64]
 
@@ -153,6 +152,8 @@ class Extrinsics:
             one = place.mounting
             (x, y, yaw), plane = (one.x_m, one.y_m, one.yaw_rad), one.covariance_xy_yaw
         reasons = [] if place else [place.reason]
+        if tilt is not None:
+            refuse_unless(tilt, JoinedTilts | MountingTilt | Robot, "tilt", "a JoinedTilts, MountingTilt or Robot")
         lean = None if tilt is None else tilt.covariance_rad2
         if isinstance(tilt, JoinedTilts | MountingTilt) and not tilt:
             reasons.append(tilt.reason)
@@ -190,7 +191,7 @@ class Extrinsics:
         """
         sigmas = zip(COVARIANCE_AXES, np.sqrt(np.diag(self.covariance)).tolist(), strict=True)
         return StaticTransform(
-            parent, child or CHILD_FRAMES[self.oriented],
+            parent, CHILD_FRAMES[self.oriented] if child is None else child,
             np.array([*self.place_m, self.height_m or 0.0]), self.robot_from_camera, self.missing,
             tuple((name, sigma) for name, sigma in sigmas if not math.isnan(sigma)),
             self.covariance if self.measured else None,
@@ -198,6 +199,7 @@ class Extrinsics:
 
     def robot(self, robot: Robot) -> Robot:
         """That robot with these extrinsics; without covariance where they cannot be relied upon."""
+        refuse_unless(robot, Robot, "robot", "a tiltvp.Robot")
         x, y = self.place_m.tolist()
         return replace(
             robot, robot_from_camera=self.robot_from_camera, place_m=(x, y), height_m=self.height_m,

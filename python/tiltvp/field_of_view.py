@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from tiltvp.arguments import refuse_unless
 from tiltvp.images import checked_camera
 
 if TYPE_CHECKING:
@@ -94,6 +95,8 @@ def looks_like_a_mirror(camera: Camera, view: FieldOfView) -> bool:
     Only lens models that mirrors are calibrated with are looked at: `ocam`, whose a0 is then short beside the radius of
     the image, and `unified` with a xi of at most 1: mirrors have no more (Geyer and Daniilidis 2000).
     """
+    checked_camera(camera)
+    refuse_unless(view, FieldOfView, "view", "what field_of_view measures of the camera")
     all_round = min(view.horizontal_rad, view.vertical_rad) > _MIRROR_RAD
     xi = camera.parameters.get("xi", 0.0)
     of_mirrors = camera.model == "ocam" or (camera.model == "unified" and isinstance(xi, float) and xi <= 1.0)

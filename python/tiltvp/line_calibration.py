@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from tiltvp.arguments import each_from, shaped_from
+from tiltvp.arguments import each_from, refuse_uncallable, shaped_from
 from tiltvp.errors import InvalidInputError
 from tiltvp.line_logs import FollowedFrame, SeenFrame, bearing_log
 from tiltvp.lines import LineTracker
@@ -84,6 +84,7 @@ def calibrate_lines(
     frames count. The image centre is estimated too where lines are seen all round the camera. The covariance is no less
     than what leaving out lines in turn tells. Raises `InvalidInputError` if there are none, and what `solve` raises.
     """
+    refuse_uncallable(solve, "solve", "what makes a LogCalibration of bearings")
 
     def solved(bearings: NDArray[np.float64], **options: Any) -> LogCalibration:
         return solve(bearings, estimate_centre=_are_all_round(bearings[:, 2]), **options)

@@ -8,16 +8,18 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from tiltvp.arguments import each_from
+from tiltvp._core import LineTracker
+from tiltvp.arguments import each_from, number_from, refuse_uncallable, refuse_unless
 from tiltvp.errors import InvalidInputError, TiltvpError, UnknownLeanError
 from tiltvp.images import gray_from
+from tiltvp.lines import LineExtractor
 from tiltvp.selfcalib import wheel_displacements
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
     from tiltvp._core import TiltEstimate
-    from tiltvp.lines import LineExtractor, Lines, LineTracker, TrackedLines
+    from tiltvp.lines import Lines, TrackedLines
     from tiltvp.streams.odometry import Motion
     from tiltvp.tilt import TiltEstimator
 
@@ -68,6 +70,7 @@ class SeenFrame:
 
     def followed(self, tracker: LineTracker) -> FollowedFrame:
         """The lines as `tracker` has them, which has seen the frames before."""
+        refuse_unless(tracker, LineTracker, "tracker", "a LineTracker")
         tracked = tracker.update(self.lines, self.descriptors, yaw_change_rad=self.turn_rad, distance_m=self.distance_m)
         return FollowedFrame(self.number, self.gray, tracked)
 
@@ -76,6 +79,8 @@ def believed_leans(
     estimator: TiltEstimator, extractor: LineExtractor, *, confidence_min: float = 0.5
 ) -> Callable[[NDArray[np.uint8]], TiltEstimate]:
     """What tells the lean of a grey image (H, W) for its lines; raises `UnknownLeanError` where it is not believed."""
+    refuse_uncallable(estimator, "estimator", "a TiltEstimator")
+    refuse_unless(extractor, LineExtractor, "extractor", "a LineExtractor")
 
     def lean(gray: NDArray[np.uint8]) -> TiltEstimate:
         estimate = estimator(gray)
@@ -100,6 +105,9 @@ def see_lines(
     image, what the robot did since the one before. The motion of a frame that cannot be used is added to that of the
     next. Raises `InvalidInputError` if there are more images than motions.
     """
+    refuse_unless(images, Iterable, "images", "several images")
+    refuse_unless(extractor, LineExtractor, "extractor", "a LineExtractor")
+    refuse_uncallable(tilt, "tilt", "what tells the lean of an image")
     # Motions without any distance tell turns only.
     if motions is not None:
         motions = each_from(motions, "motions", "yaw_rad", "Motion")
@@ -138,12 +146,12 @@ def follow_lines(
         yield seen if isinstance(seen, TiltvpError) else seen.followed(tracker)
 
 
-def bearing_log(frames: Sequence[FollowedFrame], *, frames_min: int = 2) -> NDArray[np.float64]:
+def bearing_log(frames: Sequence[FollowedFrame], *, frames_min: float = 2) -> NDArray[np.float64]:
     """(M, 3): number of the frame, track, bearing in radians, of tracks seen in at least `frames_min` frames.
 
     Of more than 150 tracks, or than there are frames, those that are seen in most.
     """
-    frames = each_from(frames, "frames", "tracked", "FollowedFrame")
+    frames, frames_min = each_from(frames, "frames", "tracked", "FollowedFrame"), number_from(frames_min, "frames_min")
     rows = [
         (frame.number, track, bearing)
         for frame in frames

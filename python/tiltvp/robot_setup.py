@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from tiltvp.arguments import refuse_unless
+from tiltvp.arguments import each_from, refuse_unless
 from tiltvp.body import BodyMask, body_mask
 from tiltvp.errors import InvalidInputError, TiltvpError, counted
 from tiltvp.images import checked_camera, gray_from
@@ -143,6 +143,9 @@ def find_setup(
     """
     checked_camera(camera)
     _count_of(frames, motions)
+    wheels, topics = Wheels() if wheels is None else wheels, {} if topics is None else topics
+    refuse_unless(wheels, Wheels, "wheels", "tiltvp.streams.Wheels")
+    refuse_unless(topics, dict, "topics", "a dict")
     usable = sum(1 for _ in spread(frames, camera, LOOKED_AT))
     if usable < LEAST:
         words = f"{counted(usable, 'images')} of the camera's size, expected {LEAST} or more"
@@ -165,7 +168,6 @@ def find_setup(
     turns = None if axis is None else axis.check(direction.given)
     estimator = TiltEstimator(camera, **TILT_OPTIONS, robot_from_camera=rotation, mask=mask)
     tilts = drive_tilts(frames, estimator, motions, advance=advance)
-    wheels = wheels or Wheels()
     mounting = mounting_tilt(
         tilts.estimates, tilts.motions, rotation, level_floor=level_floor, half_track_m=wheels.half_track_m
     )
@@ -175,7 +177,7 @@ def find_setup(
         covariance_rad2=mounting.covariance_rad2 if mounting else None,
         mask=mask,
         wheels=wheels,
-        topics=topics or {},
+        topics=topics,
     )
     return RobotSetup(robot, rotation, direction, rim, body, turns, mounting)
 
@@ -235,8 +237,10 @@ def _count_of(frames: Frames, motions: Sequence[Motion | None] | None) -> int:
     refuse_unless(frames, Frames, "frames", "what tiltvp.streams.open_frames opens")
     if frames.count is None:
         raise InvalidInputError(f"{frames.source}: comes only once, expected images, a video or a recording")
-    if motions is not None and len(motions) != frames.count:
-        raise InvalidInputError(f"motions: {len(motions)}, expected {frames.count}, one for each frame")
+    if motions is not None:
+        told = len(each_from(motions, "motions", "yaw_rad", "Motion or None", or_none=True))
+        if told != frames.count:
+            raise InvalidInputError(f"motions: {told}, expected {frames.count}, one for each frame")
     return frames.count
 
 

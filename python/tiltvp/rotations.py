@@ -49,7 +49,9 @@ _SLACK: Final = 1e-3
 
 def about_vertical(angle_rad: float) -> Matrix:
     """(3, 3): the turn to the left about the robot's z axis."""
-    c, s = math.cos(angle := number_from(angle_rad, "angle_rad")), math.sin(angle)
+    if math.isinf(angle := number_from(angle_rad, "angle_rad")):
+        raise InvalidInputError(f"angle_rad = {angle}, expected radians")
+    c, s = math.cos(angle), math.sin(angle)
     return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
 
 
@@ -226,6 +228,9 @@ def rotation_from_quaternion(q: Matrix, where: str) -> Matrix:
 
     Raises `CalibrationError` that begins with `where`.
     """
+    q = _array(where, np.asarray(q, dtype=object).tolist())
+    if q.shape != (4,):
+        raise CalibrationError(f"{where}: shape {q.shape}, expected [x, y, z, w]")
     norm = math.sqrt(float(q @ q))
     if not abs(norm - 1.0) <= _SLACK:
         raise CalibrationError(f"{where}: a quaternion of length {norm:.6g}, expected [x, y, z, w] of length 1")

@@ -16,6 +16,7 @@ from tiltvp._core import (
     consistency_band,
     wheel_displacements,
 )
+from tiltvp.arguments import each_from
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -39,6 +40,7 @@ def convergence_table(estimates: Sequence[MountingEstimate]) -> dict[str, NDArra
     """Columns (N,) with a value for each step: phi_rad, rho_m, psi_rad, x_m, y_m, yaw_rad, alarm, and `variance_...` of
     phi, rho, psi, x, y and yaw in squares of their units.
     """
+    estimates = each_from(estimates, "estimates", "phi_rad", "MountingEstimate")
     names = ("phi_rad", "rho_m", "psi_rad", "x_m", "y_m", "yaw_rad")
     columns = {name: np.array([getattr(e, name) for e in estimates], dtype=np.float64) for name in names}
     for matrix, of in (("covariance_phi_rho_psi", ("phi", "rho", "psi")), ("covariance_xy_yaw", ("x", "y", "yaw"))):

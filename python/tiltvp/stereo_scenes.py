@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from tiltvp import _core
+from tiltvp.arguments import number_from
 from tiltvp.cameras import Camera
 from tiltvp.errors import InvalidInputError
 
@@ -25,7 +26,7 @@ def zed_cameras(width: int = 1280) -> tuple[Camera, Camera]:
     by `tiltvp.errors.InvalidInputError`.
     """
     sizes = {1280: (720, 702.0), 1920: (1080, 1049.0)}
-    if width not in sizes:
+    if number_from(width, "width") not in sizes:
         raise InvalidInputError(f"width = {width}, expected 1280 or 1920")
     height, focal_px = sizes[width]
     grown = focal_px / 702.0

@@ -218,7 +218,7 @@ class Drive(_core.Drive):
     def render(self, frame: int, *, threads: int | None = None) -> RoomImage:
         """The image of one frame, on so many threads (None: one per core)."""
         gray, rgb = self._render(frame, threads=threads)
-        alpha, beta = self.tilts[frame]
+        alpha, beta = self.tilts[int(frame)]
         return RoomImage(gray, np.ascontiguousarray(rgb[:, :, ::-1]), float(alpha), float(beta))
 
     def render_at(

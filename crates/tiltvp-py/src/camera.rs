@@ -32,14 +32,14 @@ pub(crate) struct Camera {
 impl Camera {
     #[new]
     #[pyo3(signature = (
-        model, *, width: "int", height: "int", max_theta_rad=None, mirror=false, **parameters: "ArrayLike | None"
+        model, *, width: "int", height: "int", max_theta_rad=None, mirror: "bool" = false, **parameters: "ArrayLike | None"
     ))]
     fn new(
         model: Word,
         width: &Bound<'_, PyAny>,
         height: &Bound<'_, PyAny>,
         max_theta_rad: Option<Number>,
-        mirror: bool,
+        #[pyo3(from_py_with = convert::flag)] mirror: bool,
         parameters: Option<&Bound<'_, PyDict>>,
     ) -> PyResult<Self> {
         let max_theta_rad = max_theta_rad.map(|number| number.0);

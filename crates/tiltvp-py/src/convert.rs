@@ -8,9 +8,9 @@ use numpy::{
     PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray2, PyReadonlyArray3, PyUntypedArray,
     PyUntypedArrayMethods,
 };
-use pyo3::IntoPyObjectExt;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
+use pyo3::{IntoPyObjectExt, PyTypeCheck};
 use tiltvp_core::Error;
 use tiltvp_core::edges::Mask;
 use tiltvp_core::geometry::{RigidMotion, Tilt};
@@ -295,6 +295,20 @@ pub(crate) fn known_keys(values: &Bound<'_, PyDict>, keys: &[&str]) -> PyResult<
         }
     }
     Ok(())
+}
+
+/// An object of a class of ours, such as `expected` says.
+pub(crate) fn object<'a, 'py, T: PyTypeCheck>(
+    value: &'a Bound<'py, PyAny>,
+    name: &str,
+    expected: &str,
+) -> PyResult<&'a Bound<'py, T>> {
+    value.cast().map_err(|_| invalid(format!("{name}: {}, expected {expected}", describe(value))))
+}
+
+/// True or False, and no other value that is true or false.
+pub(crate) fn flag(value: &Bound<'_, PyAny>) -> PyResult<bool> {
+    value.extract().map_err(|_| invalid(format!("{}: expected True or False", shown(value))))
 }
 
 /// What a value is, for a message.

@@ -10,6 +10,7 @@ use crate::call::invalid;
 use crate::camera::Camera;
 use crate::convert;
 use crate::options;
+use crate::reader;
 use crate::synth::{Pictures, Room, call_on_threads, frame_from, pictures};
 use crate::value::{frozen, getters};
 
@@ -30,13 +31,15 @@ pub(crate) struct Drive {
 #[pymethods]
 impl Drive {
     #[new]
-    #[pyo3(signature = (room, *, camera, threads: "SupportsIndex | None" = None, **options: "Option | None"))]
+    #[pyo3(signature = (room: "Room", *, camera: "Camera", threads: "SupportsIndex | None" = None, **options: "Option | None"))]
     fn new(
-        room: &Bound<'_, Room>,
-        camera: &Bound<'_, Camera>,
+        room: &Bound<'_, PyAny>,
+        camera: &Bound<'_, PyAny>,
         threads: Option<&Bound<'_, PyAny>>,
         options: Option<&Bound<'_, PyDict>>,
     ) -> PyResult<Self> {
+        let room: &Bound<'_, Room> = convert::object(room, "room", "a tiltvp.synth.Room")?;
+        let camera = reader::camera(camera)?;
         let has =
             |name| options.is_some_and(|given| given.get_item(name).is_ok_and(|v| v.is_some_and(|v| !v.is_none())));
         if has("frames") && has("legs") {

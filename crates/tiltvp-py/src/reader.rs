@@ -4,7 +4,6 @@ use nalgebra::Matrix3;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyTuple, PyType};
 
-use crate::call::invalid;
 use crate::camera::Camera;
 use crate::convert;
 
@@ -73,10 +72,7 @@ pub(crate) fn remade<'py>(
 
 /// The camera that a constructor was given.
 pub(crate) fn camera<'a, 'py>(camera: &'a Bound<'py, PyAny>) -> PyResult<&'a Bound<'py, Camera>> {
-    let Ok(camera) = camera.cast::<Camera>() else {
-        return Err(invalid(format!("camera: {}, expected a tiltvp.Camera", camera.get_type().name()?)));
-    };
-    Ok(camera)
+    convert::object(camera, "camera", "a tiltvp.Camera")
 }
 
 /// The rotation that was given, or the identity.

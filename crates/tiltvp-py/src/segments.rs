@@ -11,6 +11,7 @@ use crate::camera::Camera;
 use crate::convert;
 use crate::field::Field;
 use crate::options;
+use crate::reader;
 use crate::scratch::ScratchPool;
 use crate::value::{frozen, value};
 
@@ -34,9 +35,7 @@ impl SegmentDetector {
     #[new]
     #[pyo3(signature = (camera: "Camera", **options: "Option"))]
     fn new(py: Python<'_>, camera: &Bound<'_, PyAny>, options: Option<&Bound<'_, PyDict>>) -> PyResult<Self> {
-        let Ok(camera) = camera.cast::<Camera>() else {
-            return Err(invalid(format!("camera: {}, expected a tiltvp.Camera", camera.get_type().name()?)));
-        };
+        let camera = reader::camera(camera)?;
         let mut parsed = core::SegmentDetectorOptions::default();
         options::set(&mut parsed, options)?;
         let lens = camera.get().inner.clone();
@@ -163,7 +162,9 @@ impl Segments {
     /// (K, 2) float64: the places (u, v) of the edge in the pixels of segment `index`.
     ///
     /// Raises `IndexError` for a segment that is not there.
-    fn pixels<'py>(&self, py: Python<'py>, index: isize) -> PyResult<Array<'py, f64>> {
+    #[pyo3(signature = (index: "SupportsIndex"))]
+    fn pixels<'py>(&self, py: Python<'py>, index: &Bound<'py, PyAny>) -> PyResult<Array<'py, f64>> {
+        let index: isize = convert::whole(index, "index", "a whole number")?;
         let Some((index, support)) = usize::try_from(index).ok().and_then(|i| Some((i, self.support.get(i)?))) else {
             let n = self.support.len();
             return Err(pyo3::exceptions::PyIndexError::new_err(format!(

@@ -49,19 +49,21 @@ pub(crate) struct StereoSequence {
 impl StereoSequence {
     #[new]
     #[pyo3(signature = (
-        scene: "Laboratory | Room", *, left, right, threads: "SupportsIndex | None" = None,
+        scene: "Laboratory | Room", *, left: "Camera", right: "Camera", threads: "SupportsIndex | None" = None,
         **options: "Option | None"
     ))]
     fn new(
         py: Python<'_>,
         scene: &Bound<'_, PyAny>,
-        left: &Bound<'_, Camera>,
-        right: &Bound<'_, Camera>,
+        left: &Bound<'_, PyAny>,
+        right: &Bound<'_, PyAny>,
         threads: Option<&Bound<'_, PyAny>>,
         options: Option<&Bound<'_, PyDict>>,
     ) -> PyResult<Self> {
         let parsed = options::given(StereoOptions::default(), options)?;
         let world = world_of(scene)?;
+        let left: &Bound<'_, Camera> = convert::object(left, "left", "a tiltvp.Camera")?;
+        let right: &Bound<'_, Camera> = convert::object(right, "right", "a tiltvp.Camera")?;
         let cameras = [left.get().inner.clone(), right.get().inner.clone()];
         let inner = call_on_threads(py, threads, || tiltvp_synth::StereoSequence::new(world, cameras, parsed))?;
         Ok(Self { scene: scene.clone().unbind(), left: left.clone().unbind(), right: right.clone().unbind(), inner })

@@ -13,9 +13,9 @@ use tiltvp_synth::{Image, Lens, RenderOptions, RobotPose, RoomKind, RoomOptions,
 
 use crate::array::Array;
 use crate::call::{call_long, invalid};
-use crate::camera::Camera;
 use crate::convert::{self, Number, Word};
 use crate::options;
+use crate::reader;
 use crate::value::{frozen, getters};
 
 pub(crate) type Pictures<'py> = (Array<'py, u8>, Array<'py, u8>);
@@ -89,17 +89,17 @@ impl Room {
     }
 
     /// Grey (H, W) and RGB (H, W, 3) images of the room.
-    #[pyo3(signature = (camera, *, threads: "SupportsIndex | None", **options: "Any"))]
+    #[pyo3(signature = (camera: "Camera", *, threads: "SupportsIndex | None", **options: "Any"))]
     fn _render<'py>(
         &self,
         py: Python<'py>,
-        camera: &Bound<'py, Camera>,
+        camera: &Bound<'py, PyAny>,
         threads: Option<&Bound<'py, PyAny>>,
         options: Option<&Bound<'py, PyDict>>,
     ) -> PyResult<Pictures<'py>> {
         let shot = options::given(Shot::default(), options)?;
         shot.check()?;
-        let camera = &camera.get().inner;
+        let camera = &reader::camera(camera)?.get().inner;
         let seen = call_on_threads(py, threads, || {
             let lens = |x: f64, y: f64| camera.unproject(&Vector2::new(x, y));
             tiltvp_synth::render(&self.world, &shot.view(&lens, camera), &shot.rendering)
@@ -127,18 +127,18 @@ impl Room {
     }
 
     /// (N, 2, 3) bearings of the ends in the camera frame and (N,) contrasts of the straight edges in sight.
-    #[pyo3(signature = (camera, contrast_min, **options: "Any"))]
+    #[pyo3(signature = (camera: "Camera", contrast_min, **options: "Any"))]
     fn _straight_edges<'py>(
         &self,
         py: Python<'py>,
-        camera: &Bound<'py, Camera>,
+        camera: &Bound<'py, PyAny>,
         contrast_min: Number,
         options: Option<&Bound<'py, PyDict>>,
     ) -> PyResult<(Array<'py, f64>, Array<'py, f64>)> {
         let contrast_min = contrast_min.0;
         let shot = options::given(Shot::default(), options)?;
         shot.check()?;
-        let camera = &camera.get().inner;
+        let camera = &reader::camera(camera)?.get().inner;
         let edges = call_long(py, || {
             let view = shot.view(&|_, _| None, camera);
             self.world.straight_edges(camera, &view, contrast_min)

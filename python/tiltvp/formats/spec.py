@@ -12,6 +12,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 from tiltvp import _core
+from tiltvp.arguments import flag_from, refuse_unless
 from tiltvp.errors import InvalidInputError
 
 Parameters = dict[str, "float | list[float]"]
@@ -38,6 +39,8 @@ class CameraSpec:
 
     def check(self) -> None:
         """Raises what the camera of these numbers raises: `tiltvp.errors.TiltvpError` for what no such lens has."""
+        refuse_unless(self.parameters, dict, "parameters", "a dict")
+        flag_from(self.mirror, "mirror")
         _core.check_camera(self.model, self.width, self.height, self.parameters, self.max_theta_rad)
 
 

@@ -25,6 +25,7 @@ from typing import Final, NoReturn
 import numpy as np
 from numpy.typing import NDArray
 
+from tiltvp.arguments import size_from
 from tiltvp.files import write_whole
 from tiltvp.formats import kalibr, opencv
 from tiltvp.formats.document import Document
@@ -59,6 +60,7 @@ def read_stereo(path: str | os.PathLike[str], image_size: ImageSize | None = Non
     """The pair of a file. Raises `tiltvp.errors.CalibrationError` that says what was wrong, what was expected and
     where.
     """
+    image_size = None if image_size is None else size_from(image_size, "image_size")
     document = Document.load(path)
     if is_own(document):
         return _own(document, image_size)

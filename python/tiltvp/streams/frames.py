@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+import numpy as np
+
+from tiltvp.arguments import refuse_unless
 from tiltvp.errors import InvalidInputError, TiltvpError
 
 if TYPE_CHECKING:
     from pathlib import Path
 
-    import numpy as np
     from numpy.typing import NDArray
 
 __all__ = ["DEFAULT_RATE_HZ", "Frame", "Frames"]
@@ -80,22 +82,30 @@ class Frames:
     def sample(self, numbers: Sequence[int]) -> Iterator[Frame]:
         """The frames of these numbers, which rise, without decoding others where the source allows.
 
-        Raises `InvalidInputError` for a source that can be read only once.
+        Raises `InvalidInputError` for a source that can be read only once, and for frames that are not there.
         """
         if self.names is None:
             raise InvalidInputError(f"{self.source}: can be read only once, expected a source of known length")
-        wanted = set(numbers)
+        wanted = set(self._these(numbers))
         for number, frame in enumerate(self):
             if number in wanted:
                 yield frame
             if number >= max(wanted, default=-1):
                 return
 
+    def _these(self, numbers: Sequence[int]) -> list[int]:
+        """Numbers of frames that are there. Raises `InvalidInputError`."""
+        count = self.count or 0
+        refuse_unless(numbers, Iterable, "numbers", "several numbers of frames")
+        found = list(numbers)
+        for one in found:
+            if not (isinstance(one, int | np.integer) and 0 <= one < count):
+                raise InvalidInputError(f"numbers: {one!r}, expected whole numbers from 0 below {count}")
+        return found
+
 
 def median_rate_hz(times_s: NDArray[np.float64] | None) -> float:
     """Frames per second by the median of the steps of times (N,) in seconds; 25 where these do not tell."""
-    import numpy as np
-
     steps = np.diff(times_s) if times_s is not None else np.zeros(0)
     steps = steps[np.isfinite(steps) & (steps > 0.0)]
     return float(1.0 / np.median(steps)) if len(steps) else DEFAULT_RATE_HZ

@@ -78,7 +78,7 @@ class ImageFiles(Frames):
 
     def sample(self, numbers: Sequence[int]) -> Iterator[Frame]:
         """Those frames."""
-        for number in numbers:
+        for number in self._these(numbers):
             file = self.files[number]
             time_s = None if self.times_s is None else float(self.times_s[number])
             yield Frame(str(file), time_s, lambda file=file: read_image(file))  # type: ignore[misc]

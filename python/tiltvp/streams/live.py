@@ -44,7 +44,7 @@ class LiveCamera(Frames):
         """
         import cv2
 
-        if not isinstance(number, int | np.integer) or not 0 <= number < _CAMERAS:
+        if isinstance(number, bool) or not isinstance(number, int | np.integer) or not 0 <= number < _CAMERAS:
             raise InvalidInputError(f"number = {number!r}, expected the number of a camera, from 0 to {_CAMERAS - 1}")
         self.source = f"camera {number}"
         self._number, self._patience_s = number, patience_s

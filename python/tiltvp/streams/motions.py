@@ -61,6 +61,7 @@ def read_odometry(
     says what is missing, or what is wrong in which line.
     """
     refuse_unless(wheels, Wheels, "wheels", "tiltvp.streams.Wheels")
+    refuse_unless(read_as, Sequence, "read_as", "names of conventions")
     if is_recording(source):
         from tiltvp.streams.bag_motion import bag_odometry
 
@@ -83,6 +84,7 @@ def frame_motions(
     """
     refuse_unless(frames, Frames, "frames", "what tiltvp.streams.open_frames opens")
     refuse_unless(wheels, Wheels, "wheels", "tiltvp.streams.Wheels")
+    refuse_unless(read_as, Sequence, "read_as", "names of conventions")
     if frames.names is None:
         raise InvalidInputError(f"{frames.source}: frames of unknown number, expected a recording for odometry")
     if is_recording(source):

@@ -84,7 +84,7 @@ class _Video(Frames):
             return
         with _opened(self._path) as container:
             stream = container.streams.video[0]
-            for number in numbers:
+            for number in self._these(numbers):
                 container.seek(self._stamps[number], stream=stream, backward=True)
                 yield from self._filled(_decoded(container), number, number + 1)
 

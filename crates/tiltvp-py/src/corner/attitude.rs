@@ -180,7 +180,9 @@ impl CornerAttitudes {
     }
 
     /// The attitudes of one corner, by its number.
-    fn of(&self, corner: usize) -> PyResult<Vec<CornerAttitude>> {
+    #[pyo3(signature = (corner: "SupportsIndex"))]
+    fn of(&self, corner: &Bound<'_, PyAny>) -> PyResult<Vec<CornerAttitude>> {
+        let corner: usize = convert::whole(corner, "corner", &format!("a number below {}", self.corners))?;
         if corner >= self.corners {
             return Err(invalid(format!("corner = {corner}, expected a number below {}", self.corners)));
         }

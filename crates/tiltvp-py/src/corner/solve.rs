@@ -2,6 +2,7 @@
 
 use nalgebra::{Matrix2, Matrix3, Vector3};
 use pyo3::prelude::*;
+use tiltvp_core::Error;
 use tiltvp_core::corner::{
     self as core, Alignment, BearingObservation, CornerOptions, FittedRay, IncludedAngle, Screening, View,
 };
@@ -14,7 +15,7 @@ use super::prior;
 use super::resolved::ResolvedAttitude;
 use crate::array::Array;
 use crate::call::{call, exception, invalid};
-use crate::convert::{self, Number};
+use crate::convert::{self, Number, Word};
 
 /// A feature from exact bearings, or what is wrong with them.
 fn exact(vertex: [f64; 3], rays: [[f64; 3]; 3], place: &str) -> PyResult<core::CornerFeature> {
@@ -224,12 +225,13 @@ pub(crate) fn resolve_corners(
     features: Vec<Bound<'_, CornerFeature>>,
     common_from_camera: Vec<Bound<'_, PyAny>>,
     known: KnownBeforehand<'_>,
-    alignment: &str,
+    alignment: Word,
 ) -> PyResult<Vec<ResolvedAttitude>> {
     let names = Alignment::ALL.map(Alignment::name).join(", ");
-    let Some(alignment) = Alignment::ALL.into_iter().find(|known| known.name() == alignment) else {
-        return Err(invalid(format!("alignment = {alignment:?}, expected one of {names}")));
-    };
+    let alignment = alignment.choose(|word| {
+        let found = Alignment::ALL.into_iter().find(|known| known.name() == word);
+        found.ok_or_else(|| Error::argument("alignment", word, format!("one of {names}")))
+    })?;
     if features.len() != common_from_camera.len() {
         let (a, b) = (features.len(), common_from_camera.len());
         return Err(invalid(format!("common_from_camera: {b} rotations, expected {a}, one of each feature")));

@@ -110,9 +110,9 @@ type WideMatches<'py> = (Bound<'py, PyArray2<i64>>, Bound<'py, PyArray1<f64>>);
 ) -> "tuple[NDArray[np.int64], NDArray[np.float64]]")]
 pub(crate) fn match_wide<'py>(
     py: Python<'py>,
-    lines_a: &Bound<'py, Lines>,
+    lines_a: &Bound<'py, PyAny>,
     a: &Bound<'py, PyAny>,
-    lines_b: &Bound<'py, Lines>,
+    lines_b: &Bound<'py, PyAny>,
     b: &Bound<'py, PyAny>,
     ahead_rad: Option<&Bound<'py, PyAny>>,
     options: Option<&Bound<'py, PyDict>>,
@@ -127,7 +127,9 @@ pub(crate) fn match_wide<'py>(
             return Err(invalid(format!("ahead_rad: {} values, expected two bearings", other.len())));
         }
     };
-    let (first, second) = (&lines_a.get().inner, &lines_b.get().inner);
+    let first: &Bound<'_, Lines> = convert::object(lines_a, "lines_a", "Lines")?;
+    let second: &Bound<'_, Lines> = convert::object(lines_b, "lines_b", "Lines")?;
+    let (first, second) = (&first.get().inner, &second.get().inner);
     let matches = call_long(py, || {
         let (mut scratch, mut out) = (core::WideScratch::default(), Vec::new());
         let (a, b) = (Profiles { lines: first, values: &a }, Profiles { lines: second, values: &b });

@@ -7,7 +7,7 @@ use tiltvp_core::lines::{self as core, Followed, FrameMemory, Motion, Parallax, 
 use super::matching;
 use super::values::Lines;
 use crate::call::{exception, invalid};
-use crate::convert::Number;
+use crate::convert::{self, Number};
 use crate::options;
 use crate::shared::Shared;
 use crate::value::{changing, value};
@@ -78,15 +78,16 @@ impl LineTracker {
     /// along the arc, negative backwards. Raises `tiltvp.errors.InvalidInputError` for descriptors of another number or
     /// width, lines of another camera or mounting than those before, bearings and motions that are none, and a distance without a
     /// turn; the tracker is as before then.
-    #[pyo3(signature = (lines, descriptors: "NDArray[np.float32]", *, yaw_change_rad=None, distance_m=None))]
+    #[pyo3(signature = (lines: "Lines", descriptors: "NDArray[np.float32]", *, yaw_change_rad=None, distance_m=None))]
     fn update(
         &self,
         py: Python<'_>,
-        lines: &Bound<'_, Lines>,
+        lines: &Bound<'_, PyAny>,
         descriptors: &Bound<'_, PyAny>,
         yaw_change_rad: Option<Number>,
         distance_m: Option<Number>,
     ) -> PyResult<TrackedLines> {
+        let lines: &Bound<'_, Lines> = convert::object(lines, "lines", "Lines")?;
         let (yaw_change_rad, distance_m) = (yaw_change_rad.map(|number| number.0), distance_m.map(|number| number.0));
         if yaw_change_rad.is_none() && distance_m.is_some() {
             return Err(invalid("distance_m: given without yaw_change_rad, expected both or neither".to_owned()));

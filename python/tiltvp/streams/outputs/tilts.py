@@ -110,6 +110,8 @@ def write_tilts(
     `OutputError` where the file cannot be written.
     """
     check_tilts(path)
+    refuse_unless(frame, str, "frame", "the name of a frame")
+    refuse_unless(topic, str, "topic", "the name of a topic")
     tilts = each_from(tilts, "tilts", "normal", "tilt or None", or_none=True)
     times = array_from(times_s, "times_s")
     if times.shape != (len(tilts),):

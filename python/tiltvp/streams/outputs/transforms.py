@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from tiltvp.arguments import path_from
+from tiltvp.arguments import each_from, number_from, path_from, shaped_from, two_from
 from tiltvp.errors import InvalidInputError
 from tiltvp.files import check_output, write_whole
 from tiltvp.rotations import quaternion, rotation_from
@@ -62,6 +62,13 @@ class StaticTransform:
         if np.shape(self.translation_m) != (3,) or not np.isfinite(self.translation_m).all():
             raise InvalidInputError(f"mounting: {self.translation_m}, expected three finite numbers")
         rotation_from(np.asarray(self.rotation).tolist(), "mounting")
+        if not isinstance(self.missing, tuple) or not set(self.missing) <= {*_AXES}:
+            raise InvalidInputError(f"missing = {self.missing!r}, expected a tuple of {', '.join(_AXES)}")
+        for sigma in each_from(self.sigmas, "sigmas", "index", "pair of an axis and a number"):
+            axis, value = two_from(sigma, "sigmas", "pairs of an axis and a number")
+            number_from(value, f"sigmas: {axis}")
+        if self.covariance is not None:
+            shaped_from(self.covariance, "covariance", 5, 5)
 
     @property
     def roll_pitch_yaw_rad(self) -> tuple[float, float, float]:
