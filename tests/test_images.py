@@ -222,8 +222,14 @@ def test_a_photograph_that_was_turned_is_told_to_stay_as_it_is(tmp_path: Path) -
     turned = Image.Exif()
     turned[0x0112] = 3
     Image.fromarray(LEVELS).save(tmp_path / "a.jpg", exif=turned)
+    Image.fromarray(LEVELS).save(tmp_path / "0.png")
+    Image.fromarray(LEVELS).save(tmp_path / "1.jpg")
     [note] = open_frames([str(tmp_path)]).notes
     assert "a.jpg: its orientation tag 3 is not followed: pixels stay where the sensor has them" in note
+    Image.fromarray(LEVELS).save(tmp_path / "b.jpg", exif=turned)
+    [note] = open_frames([str(tmp_path)]).notes
+    assert "a.jpg: its orientation tag 3 is not followed (2 such): pixels stay" in note
+    (tmp_path / "b.jpg").unlink()
     Image.fromarray(LEVELS).save(tmp_path / "a.jpg")
     assert open_frames([str(tmp_path)]).notes == ()
 

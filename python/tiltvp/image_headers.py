@@ -50,8 +50,10 @@ def orientation(data: bytes) -> int:
 
 def file_orientation(path: str | os.PathLike[str]) -> int:
     """`orientation` of a file. Raises `OSError`, and `ValueError` for what is no name."""
-    with open(path, "rb") as file:
-        return orientation(file.read(_HEAD_BYTES))
+    # Of other files, which may be many, no more is read than shows what they are.
+    with open(path, "rb", buffering=0) as file:
+        begin = file.read(2)
+        return orientation(begin + file.read(_HEAD_BYTES)) if begin == b"\xff\xd8" else 1
 
 
 def unturned(data: bytes) -> bytes:

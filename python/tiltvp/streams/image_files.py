@@ -67,8 +67,9 @@ class ImageFiles(Frames):
         if repeated:
             (other, file), such = repeated[0], f" ({len(repeated)} such)" if len(repeated) > 1 else ""
             self.notes += (f"{self.source}: {other} leads to {file}, which is taken once{such}",)
-        if self.files and (tag := _orientation(self.files[0])) != 1:
-            told = f"{self.files[0]}: its orientation tag {tag} is not followed"
+        if turned := [(file, tag) for file in self.files if (tag := _orientation(file)) != 1]:
+            (file, tag), such = turned[0], f" ({len(turned)} such)" if len(turned) > 1 else ""
+            told = f"{file}: its orientation tag {tag} is not followed{such}"
             self.notes += (f"{told}: pixels stay where the sensor has them, as those of the calibration have to",)
         self.names = [str(file) for file in self.files]
         self.rate_hz = median_rate_hz(self.times_s)
