@@ -234,6 +234,19 @@ def test_a_photograph_that_was_turned_is_told_to_stay_as_it_is(tmp_path: Path) -
     assert open_frames([str(tmp_path)]).notes == ()
 
 
+def test_files_of_16_bits_for_values_of_8_are_told(tmp_path: Path) -> None:
+    """They are read as of 10 bits, a quarter as bright."""
+    for name in ("a.png", "b.png"):
+        cv2.imwrite(str(tmp_path / name), LEVELS.astype(np.uint16))
+    [note] = open_frames([str(tmp_path)]).notes
+    assert "a.png: no value of its 16 bits is above 255: it is read as one of 10 bits, expected files of 8" in note
+    for levels in (LEVELS, LEVELS.astype(np.uint16) * 4):
+        cv2.imwrite(str(tmp_path / "a.png"), levels)
+        assert open_frames([str(tmp_path)]).notes == ()
+    (tmp_path / "a.png").write_bytes(b"none")
+    assert open_frames([str(tmp_path)]).notes == ()
+
+
 @pytest.mark.parametrize("order", "<>")
 def test_the_size_of_a_big_tiff_is_in_its_header(order: str) -> None:
     entries = struct.pack(order + "HHQQ", 257, 16, 1, 300) + struct.pack(order + "HHQQ", 256, 16, 1, 70_000)

@@ -11,7 +11,7 @@ import numpy as np
 
 from tiltvp import _core
 from tiltvp.arguments import path_from, refuse_unless
-from tiltvp.errors import ImageFileError, InvalidInputError
+from tiltvp.errors import ImageFileError, InvalidInputError, TiltvpError
 from tiltvp.files import read_bytes, write_whole
 from tiltvp.image_headers import header_size, unturned
 
@@ -27,6 +27,7 @@ __all__ = [
     "decode_image",
     "gray_from",
     "grays_from",
+    "is_shallow",
     "pixels_from",
     "read_image",
     "read_mask",
@@ -217,16 +218,35 @@ def image_bytes(file: Path) -> bytes:
 
 def decode_image(data: bytes, name: str) -> NDArray[np.uint8]:
     """The content of an image file as `read_image` gives it. Raises `ImageFileError` that begins with `name`."""
+    try:
+        return _bytes_from(_decoded(data, name), name)
+    except InvalidInputError as error:
+        raise ImageFileError(str(error)) from None
+
+
+def is_shallow(file: Path) -> bool:
+    """Whether an image file of 16 bits a value has none above 255; not what cannot be read."""
+    if file.suffix.lower() not in _DEEP:
+        return False
+    try:
+        data = image_bytes(file)
+        # A PNG tells its bits in the header; others, which are rare, are decoded.
+        if data[12:16] == b"IHDR" and data[24:25] != b"\x10":
+            return False
+        pixels = _decoded(data, str(file))
+    except (TiltvpError, ValueError):
+        return False
+    return pixels.dtype == np.uint16 and int(pixels.max()) <= 255
+
+
+def _decoded(data: bytes, name: str) -> NDArray[Any]:
     size = header_size(data)
     if size is not None and size[0] * size[1] > _core.MOST_PIXELS:
         raise ImageFileError(f"{name}: {size[0]} x {size[1]} pixels, expected at most {_core.MOST_PIXELS} in all")
     image = None if size is None else _decode(data)
     if image is None:
         raise ImageFileError(f"{name}: not an image that can be decoded ({len(data)} bytes)")
-    try:
-        return _bytes_from(image, name)
-    except InvalidInputError as error:
-        raise ImageFileError(str(error)) from None
+    return image
 
 
 def _decode(data: bytes) -> NDArray[Any] | None:

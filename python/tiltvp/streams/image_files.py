@@ -15,7 +15,7 @@ import numpy as np
 from tiltvp.csv_files import CsvFile
 from tiltvp.errors import InvalidInputError
 from tiltvp.image_headers import file_orientation
-from tiltvp.images import read_image
+from tiltvp.images import is_shallow, read_image
 from tiltvp.streams.frames import Frame, Frames, median_rate_hz
 
 if TYPE_CHECKING:
@@ -71,6 +71,9 @@ class ImageFiles(Frames):
             (file, tag), such = turned[0], f" ({len(turned)} such)" if len(turned) > 1 else ""
             told = f"{file}: its orientation tag {tag} is not followed{such}"
             self.notes += (f"{told}: pixels stay where the sensor has them, as those of the calibration have to",)
+        if self.files and is_shallow(self.files[0]):
+            told = f"{self.files[0]}: no value of its 16 bits is above 255"
+            self.notes += (f"{told}: it is read as one of 10 bits, expected files of 8 bits for values of 8",)
         self.names = [str(file) for file in self.files]
         self.rate_hz = median_rate_hz(self.times_s)
 
