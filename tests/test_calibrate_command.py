@@ -190,13 +190,13 @@ def test_the_height_of_a_robots_file_is_kept(tables: Path, tmp_path: Path) -> No
 @pytest.mark.parametrize(
     ("words", "hint"),
     [
-        (("--child-frame", "camera-optical"), "child = 'camera-optical', expected the name of a frame"),
-        (("--child-frame", "base_link"), "child = 'base_link', expected another name than that of the parent"),
-        (("--parent-frame", "camera_optical"), "child = 'camera_optical', expected another name"),
+        (("--child-frame", "camera-optical"), "--child-frame = 'camera-optical', expected the name of a frame"),
+        (("--child-frame", "base_link"), "--child-frame = 'base_link', expected another name than that of the parent"),
+        (("--parent-frame", "camera_optical"), "--child-frame = 'camera_optical', expected another name"),
         (("--height", "nan"), "--height = nan, expected finite metres"),
         (("--robot-out", "masked.toml"), "masked-mask.png: exists"),
         (("--method", "other"), "method = 'other', expected"),
-        (("--gate-probability", "2"), "gate_probability = 2, expected"),
+        (("--gate-probability", "2"), "--gate-probability = 2, expected"),
     ],
 )
 def test_what_cannot_be_written_is_refused_before_any_work(

@@ -9,6 +9,7 @@ import sys
 from pathlib import Path
 from types import SimpleNamespace
 
+import numpy as np
 import polars as pl
 import pytest
 
@@ -17,6 +18,7 @@ from commands import Run
 from recordings import START_S, Bag
 from tiltvp import _core
 from tiltvp.cli.app import app
+from tiltvp.streams import Wheels
 from tiltvp.synth import RoomImage
 
 pytestmark = pytest.mark.slow
@@ -124,3 +126,52 @@ def test_cameras_of_a_recording(run: Run, tmp_path: Path) -> None:
     assert tiltvp.Camera.load(out).width == 32
     missing = run("camera", "info", tmp_path / "none.mcap").complaint
     assert missing == f"tiltvp: {tmp_path}/none.mcap: no such file, expected a bag\n"
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        ("--tilt-max-deg 400", "--tilt-max-deg = 400 degrees (6.98132 radians), expected an angle above 0 and at most"),
+        (
+            "--elevation-max-deg -1",
+            "(-0.0174533 radians), expected an angle above --elevation-min-deg and at most pi/2",
+        ),
+        ("--camera-format x", ", at --format or --camera-format"),
+        ("--gradient-min -1", "tiltvp: --gradient-min = -1, expected a positive gradient magnitude"),
+        (
+            "--gap-max 3",
+            '--gap-max: unknown to method "refined" (it is one of method "segments"), expected one of --grad',
+        ),
+        ("--gap-max 3", "--tilt-max-deg, --mask, --row-stride, --seed, "),
+        (
+            "--filter --mounting-prior-deg 1",
+            "--mounting-prior-deg: unknown (given without --estimate-mounting), expected",
+        ),
+        ("--filter --wheel-base 350", 'Invalid value "350.0" for --wheel-base. Must be <= 200.'),
+    ],
+)
+def test_options_are_called_as_they_are_typed(run: Run, world: Path, words: str, told: str) -> None:
+    said = run("tilt", world / "images", "--camera", world / "camera.toml", *words.split())
+    assert said.code == 2
+    assert told in said.complaint
+
+
+def test_a_robot_of_millimetres_is_refused(run: Run, world: Path, camera: tiltvp.Camera) -> None:
+    tiltvp.Robot(camera, np.eye(3), wheels=Wheels(wheel_base_m=0.35)).save(world / "robot.toml")
+    text = (world / "robot.toml").read_text()
+    (world / "robot.toml").write_text(text.replace("0.35", "350.0"))
+    said = run("mount", world / "images", "--camera", world / "robot.toml")
+    assert said.code == 2
+    assert "wheel_base_m = 350.0, expected metres, at most 200" in said.complaint
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        ("--to same", "--field-of-view-deg: given with --to same, expected it with fisheye or pinhole only"),
+        ("--to pinhole", "--field-of-view-deg = 400 degrees (6.98132 radians), expected an angle in (0, "),
+    ],
+)
+def test_the_view_of_level_images_is_called_as_it_is_typed(run: Run, world: Path, words: str, told: str) -> None:
+    files = (world / "images", "--camera", world / "camera.toml", "--out", world / "level")
+    assert told in run("level", *files, "--field-of-view-deg", "400", *words.split()).complaint

@@ -389,7 +389,7 @@ def test_the_command_abstains(folder: Path, tmp_path: Path, capfd: pytest.Captur
         (["--estimate-mounting"], "--estimate-mounting without --filter"),
         (["--filter-plot", "x.png"], "--filter-plot without --filter"),
         (["--filter", "--filter-plot", "x.txt"], ".png"),
-        (["--confidence-min", "1.5"], "confidence_min"),
+        (["--confidence-min", "1.5"], "--confidence-min = 1.5, expected"),
         (["--filter", "--odometry", "none.csv"], "none.csv"),
     ],
 )

@@ -303,7 +303,7 @@ def test_the_command_writes_rows_and_pictures(tmp_path: Path, capsys: pytest.Cap
     assert len(rows) == 1 + len(found)
     assert rows[0].startswith("file,edge,normal_x")
     assert main([*arguments, "--support-min-px", "2"]) == 2
-    assert "support_min_px" in capsys.readouterr().err
+    assert "--support-min-px = 2, expected" in capsys.readouterr().err
 
 
 # --- the method of the tilt ----------------------------------------------------------------------------------------

@@ -24,6 +24,9 @@ _TYPES: dict[str, Any] = {
     "npt.NDArray[np.bool_]": Path,
 }  # fmt: skip
 
+KEYWORDS = set[str]()
+"""The keywords of the library that are options here."""
+
 
 class LibraryOptions:
     """What was given of the options that `from_library` adds to a class."""
@@ -61,6 +64,7 @@ def from_library(
                     further = (words or {}).get(keyword)
                     cls.__annotations__[name] = _annotation(name, field, helps, further, several=len(methods) > 1)
                     setattr(cls, name, None)
+        KEYWORDS.update(keywords.values())
         cls._keywords = keywords  # type: ignore[attr-defined]
         return cls
 
@@ -82,7 +86,7 @@ def _annotation(
 ) -> Any:
     plain = field["type"].removesuffix(" | None")
     kind = _TYPES.get(plain, str)
-    flag = f"--{name.replace('_', '-')}"
+    flag = flag_of(name)
     names = [flag] if further is None else [further, flag]
     off = "" if plain == "bool" and field["default"] is False else None
     shown = Parameter(name=names, help=_help(field, defaults, several=several), negative=off, show_default=False)
@@ -109,13 +113,19 @@ def _shown(field: Mapping[str, Any]) -> str:
     if isinstance(value, bool):
         return "yes" if value else "no"
     if isinstance(value, float):
-        return f"{math.degrees(value) if _is_angle(name) else value:.4g}"
+        return f"{math.degrees(value) if is_angle(name) else value:.4g}"
     if isinstance(value, str | int):
         return str(value)
     return " ".join(f"{x:.4g}" for x in value) if isinstance(value, tuple) else "as said"
 
 
-def _is_angle(keyword: str) -> bool:
+def flag_of(keyword: str) -> str:
+    """The name of an option of the library, or of its field here, on the command line."""
+    return f"--{_name(keyword).replace('_', '-')}"
+
+
+def is_angle(keyword: str) -> bool:
+    """Whether an option of the library is in radians."""
     return "rad" in keyword.split("_")
 
 
@@ -128,7 +138,7 @@ def _to_library(keyword: str, value: Any) -> Any:
         return read_mask(value)
     if keyword == "correction":
         return _correction_from(value)
-    return math.radians(value) if _is_angle(keyword) and isinstance(value, float) else value
+    return math.radians(value) if is_angle(keyword) and isinstance(value, float) else value
 
 
 def _correction_from(word: str) -> str | float | None:

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Final, Self
 
-from cyclopts import Group, Parameter
+from cyclopts import Group, Parameter, validators
 
 from tiltvp.cli.options import ABOVE_0, AtLeast0, given_words
 from tiltvp.cli.terminal import complain
@@ -91,7 +91,7 @@ class MotionOptions:
     the frames are from, if there is one."""
     odometry_topic: str | None = None
     """Its topic in a recording, where that has several: Odometry, JointState or Twist."""
-    wheel_base: Annotated[float | None, ABOVE_0] = None
+    wheel_base: Annotated[float | None, Parameter(validator=validators.Number(gt=0, lte=200))] = None
     """Distance between the wheels, metres, for odometry of wheels, and for how much the floor may change in a turn; by
     default that of a robot's file."""
     wheel_radius: Annotated[float | None, ABOVE_0] = None

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import math
 import re
 import sys
 from collections.abc import Callable, Iterable, Iterator
@@ -58,10 +59,33 @@ def complain(problem: str) -> None:
 
 def _line(problem: str) -> str:
     """One line, in the words of the command line where the library speaks of its arguments."""
-    words = " ".join(problem.split())
+    words = _of_option(" ".join(problem.split()))
     words = words.replace("image_size=(width, height) from the caller", "--image-size WIDTHxHEIGHT")
     words = words.replace("format= to say which", "--format or --camera-format to say which")
+    words = words.replace(", at format=", ", at --format or --camera-format")
+    words = re.sub(r"given with to='(\w+)'", r"given with --to \1", words)
+    words = re.sub(r"^(parent|child) = ", r"--\1-frame = ", words)
     return f"tiltvp: {words}{_remedy(words)}"
+
+
+def _of_option(problem: str) -> str:
+    """What is wrong with an option of the library, by the names and in the degrees that are typed; else as it is."""
+    found = re.match(r"(?:option |(?=field_of_view_rad\b))(\w+)(?: = ([^ ,]+),)?(?=[ :])", problem)
+    if found is None:
+        return problem
+    from tiltvp.cli.declared_options import KEYWORDS, flag_of, is_angle
+
+    (keyword, value), rest = found.groups(), problem[found.end() :]
+    told = "" if value is None else f" = {value},"
+    if value is not None and is_angle(keyword):
+        told = f" = {math.degrees(float(value)):.6g} degrees ({float(value):.6g} radians),"
+    # Words in quotes are values, and such as "mask" are words of sentences too, but for those of a list of names.
+    before, listed, names = rest.partition(", expected one of ")
+    if before.startswith(": unknown"):
+        names = ", ".join(map(flag_of, names.split(", ")))
+    typed = r'"[^"]*"|\b([a-z]+(?:_[a-z]+)+)\b(?:=True)?'
+    rest = re.sub(typed, lambda word: flag_of(word[1]) if word[1] in KEYWORDS else word[0], before + listed + names)
+    return f"{flag_of(keyword)}{told}{rest}"
 
 
 def _remedy(problem: str) -> str:
