@@ -62,6 +62,15 @@ def test_images_as_hardware_decoders_send_them(encoding: str) -> None:
             image_from_message(SimpleNamespace(**(vars(message) | change)))
 
 
+def test_topics_of_16_bits_for_values_of_8_are_told(tmp_path: Path) -> None:
+    made = Bag("mcap")
+    for k in range(2):
+        made.image("/image", START_S + k, np.full((6, 8), 200, np.uint16), "mono16")
+    source = open_frames(made.write(tmp_path))
+    assert "/image has no value above 255 in its 16 bits: it is read as of 10 bits, a quarter" in source.notes[0]
+    assert [frame.read().max() for frame in source] == [50, 50]
+
+
 @pytest.mark.parametrize("encoding", ["mono16", "bgra16", "bayer_rggb16"])
 def test_images_of_one_sensor_are_scaled_alike(encoding: str, tmp_path: Path) -> None:
     """A dark image of 12 bits was made four times as bright as those beside it that had a bright spot."""
@@ -73,8 +82,9 @@ def test_images_of_one_sensor_are_scaled_alike(encoding: str, tmp_path: Path) ->
         if pixels.ndim == 3:
             pixels[:, :, 3] = 65535
         made.image("/image", START_S + k, pixels, encoding)
-    frames = list(open_frames(made.write(tmp_path)))
-    assert [frame.read()[5, 7].max() for frame in frames] == [50, 50, 50]
+    source = open_frames(made.write(tmp_path))
+    assert source.notes == ()
+    assert [frame.read()[5, 7].max() for frame in source] == [50, 50, 50]
     dark = SimpleNamespace(
         width=8, height=6, encoding="16UC1", step=16, is_bigendian=0, data=np.full((6, 8), 800, "<u2").tobytes()
     )

@@ -87,6 +87,9 @@ class BagFrames(Frames):
                 )
         if standing := int((np.diff(self.times_s) <= 0.0).sum()):
             told.append(f"has {standing} images that are stamped no later than those before: what moved is not told")
+        if self._bits == 8:
+            self._bits = 10
+            told.append("has no value above 255 in its 16 bits: it is read as of 10 bits, a quarter as bright as of 8")
         self.notes = tuple(f"{recording.path}: {self.topic} {words}" for words in told)
 
     @property
@@ -124,7 +127,10 @@ def _seen(message: Message) -> tuple[float, int]:
         return message.time_s, 0
     try:
         deep = _is_deep(getattr(content, "encoding", ""))
-        return time_s, bits_of(np.atleast_3d(_levels(content))[:, :, :3]) if deep else 0
+        if not deep:
+            return time_s, 0
+        levels = np.atleast_3d(_levels(content))[:, :, :3]
+        return time_s, 8 if levels.max() <= 255 else bits_of(levels)
     except ImageFileError:  # It is told where it is read.
         return time_s, 0
 
