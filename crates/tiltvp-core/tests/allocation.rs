@@ -15,6 +15,7 @@ use tiltvp_core::geometry::Tilt;
 use tiltvp_core::lines::{LineExtractor, LineOptions, Lines};
 use tiltvp_core::robust::{LocalOptimization, SampleOrder, Sampling, Score};
 use tiltvp_core::segments::{SegmentDetector, SegmentDetectorOptions, Segments};
+use tiltvp_core::selfcalib::{SelfCalibrator, SelfCalibratorOptions, WheelMotion};
 use tiltvp_core::tilt::{Correction, METHODS, Method, TiltEstimator, TiltOptions, TrainedCorrection};
 
 thread_local! {
@@ -178,6 +179,20 @@ fn no_extraction_of_lines_allocates_once_lists_have_grown() {
     }
     // A stable sort allocates from some twenty on.
     assert!(most > 25, "{most} lines");
+}
+
+/// Were the matrices moved for each, two thousand in one step would take twenty seconds.
+#[test]
+fn landmarks_that_begin_in_one_step_are_given_room_at_once() {
+    let taken = [50, 400].map(|n: u32| {
+        let options = SelfCalibratorOptions { wheel_base_m: 0.4, ..SelfCalibratorOptions::default() };
+        let mut filter = SelfCalibrator::new(options).unwrap();
+        let bearings: Vec<f64> = (0..n).map(|i| 6.0 * f64::from(i) / f64::from(n) - 3.0).collect();
+        let names: Vec<u64> = (0..n.into()).collect();
+        let motion = WheelMotion { left_m: 0.1, right_m: 0.1 };
+        allocations(|| assert_eq!(filter.step(&motion, &names, &bearings).unwrap().started, names.len()))
+    });
+    assert!(taken[1] < taken[0] + 100, "{taken:?}");
 }
 
 #[test]

@@ -207,6 +207,15 @@ impl BundleProblem {
         }
     }
 
+    /// Makes the prior as large as so many more landmarks want, so that adding them moves it no more.
+    pub(crate) fn make_room(&mut self, landmarks: usize) {
+        let n = self.width() + 2 * landmarks;
+        let mean = std::mem::replace(&mut self.prior_mean, DVector::zeros(0));
+        self.prior_mean = mean.resize_vertically(n, 0.0);
+        let information = std::mem::replace(&mut self.prior_information, DMatrix::zeros(0, 0));
+        self.prior_information = information.resize(n, n, 0.0);
+    }
+
     /// Adds a landmark whose direction is unknown and whose distance is known by `log_inverse_distance +- sigma`.
     pub(crate) fn add_landmark(
         &mut self,
@@ -214,13 +223,12 @@ impl BundleProblem {
         log_inverse_distance: f64,
         sigma: f64,
     ) -> usize {
-        let n = self.prior_mean.len();
-        let mean = std::mem::replace(&mut self.prior_mean, DVector::zeros(0));
-        self.prior_mean = mean.insert_rows(n, 2, 0.0);
+        let n = self.width();
+        if n == self.prior_mean.len() {
+            self.make_room(1);
+        }
         self.prior_mean[n] = landmark.direction;
         self.prior_mean[n + 1] = log_inverse_distance;
-        let information = std::mem::replace(&mut self.prior_information, DMatrix::zeros(0, 0));
-        self.prior_information = information.insert_rows(n, 2, 0.0).insert_columns(n, 2, 0.0);
         self.prior_information[(n + 1, n + 1)] = 1.0 / (sigma * sigma);
         self.landmarks.push(landmark);
         self.scatters.push(1.0);

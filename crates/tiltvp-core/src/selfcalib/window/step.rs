@@ -10,7 +10,6 @@ use super::tuning::{
 };
 use super::update::MatchedBearing;
 use crate::geometry::wrap_angle;
-use crate::interrupt::check;
 use crate::selfcalib::bundle::Observation;
 use crate::selfcalib::model::{OUTLIER_SIGMAS, WheelMotion, predict};
 use crate::selfcalib::step_outcome::StepOutcome;
@@ -125,11 +124,8 @@ impl SlidingWindow {
             keyframe.observations.extend(matched.iter().map(|seen| Observation::new(seen.slot, seen.bearing)));
         }
         let rejected = self.fuse(matched, outcome);
-        for (id, bearing) in new {
-            check();
-            self.initialise_landmark(id, bearing);
-            outcome.started += 1;
-        }
+        self.initialise_landmarks(&new);
+        outcome.started += new.len();
         rejected
     }
 }
