@@ -180,6 +180,13 @@ LONG = {
         image = np.random.default_rng(1).integers(0, 255, (6000, 8000), dtype=np.uint8)
         call = lambda: find(image)
     """,
+    "corner": """
+        camera = tiltvp.Camera.equidistant(width=4000, height=3000, focal_px=873, cx=1999.5, cy=1499.5)
+        one = tiltvp.corner.CornerPoseEstimator(camera, camera, np.eye(4) + 0.1 * np.eye(4, k=3), method="general")
+        image, state = np.random.default_rng(1).integers(0, 255, (3000, 4000), dtype=np.uint8), pickle.dumps(one)
+        call = lambda: one(image, image)
+        check = lambda: pickle.dumps(one) == state
+    """,
     "match": """
         values = np.random.default_rng(1).normal(size=(4000, 1000)).astype(np.float32)
         call = lambda: tiltvp.lines.match(values, values)

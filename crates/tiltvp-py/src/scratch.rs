@@ -9,8 +9,13 @@ use tiltvp_core::camera::Camera;
 use crate::call::call_by;
 use crate::forks::guarded;
 
-/// Pixels above which an image may take longer than a person waits: 12 million of noise take seconds.
+/// Pixels above which an image is large: 12 million of noise take seconds.
 const LARGE_PX: u64 = 1 << 21;
+
+/// Whether an image of a camera may take longer than a person waits.
+pub(crate) fn is_large(camera: &Camera) -> bool {
+    u64::from(camera.width()) * u64::from(camera.height()) > LARGE_PX
+}
 
 /// Scratch that no thread is using.
 pub(crate) struct ScratchPool<T>(Mutex<Vec<T>>);
@@ -31,8 +36,7 @@ impl<T: Send> ScratchPool<T> {
         new: impl FnOnce() -> T + Send,
         work: impl FnOnce(&mut T) -> Result<R, Error> + Send,
     ) -> PyResult<R> {
-        let is_large = u64::from(camera.width()) * u64::from(camera.height()) > LARGE_PX;
-        call_by(py, is_large, || {
+        call_by(py, is_large(camera), || {
             let taken = guarded(&self.0, Vec::pop);
             let mut scratch = taken.unwrap_or_else(new);
             let outcome = work(&mut scratch);

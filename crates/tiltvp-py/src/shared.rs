@@ -5,7 +5,7 @@ use std::sync::{Arc, Mutex, TryLockError};
 use pyo3::prelude::*;
 use tiltvp_core::Error;
 
-use crate::call::{call, call_long};
+use crate::call::{call_by, call_long};
 use crate::forks::{forks, guarded, lock};
 
 /// State behind locks that nobody waits for, and nobody holds, with the interpreter in hand.
@@ -48,7 +48,18 @@ impl<T: Send> Shared<T> {
         py: Python<'_>,
         change: impl FnOnce(&mut T) -> Result<R, Error> + Send,
     ) -> PyResult<R> {
-        call(py, || {
+        self.change_by(py, false, change)
+    }
+
+    /// As [`change`](Self::change), by something that is long at times: a signal ends it then, and the state is what `change` leaves when
+    /// it is unwound.
+    pub(crate) fn change_by<R: Send>(
+        &self,
+        py: Python<'_>,
+        is_long: bool,
+        change: impl FnOnce(&mut T) -> Result<R, Error> + Send,
+    ) -> PyResult<R> {
+        call_by(py, is_long, || {
             let turn = self.turn();
             let _turn = lock(&turn);
             guarded(&self.state, change)

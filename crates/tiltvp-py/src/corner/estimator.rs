@@ -1,13 +1,17 @@
 //! `CornerPoseEstimator`: poses from the images of one camera or a pair, frame after frame.
 
+use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
+
 use nalgebra::{Matrix4, Vector3};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyTuple};
+use tiltvp_core::Error;
 use tiltvp_core::corner::{
     self as core, CameraTurn, CornerMethod, CornerNames, EstimatorOptions, Frame, FrameKnowledge, GravityDirection,
     Track,
 };
 use tiltvp_core::geometry::RigidMotion;
+use tiltvp_core::interrupt::check;
 
 use super::detector::CornerDetector;
 use super::estimate::CornerEstimate;
@@ -16,6 +20,7 @@ use crate::array::Array;
 use crate::call::{call_long, invalid};
 use crate::convert;
 use crate::options;
+use crate::scratch::is_large;
 use crate::shared::Shared;
 
 /// Poses from the images of one camera or a pair; `tiltvp.corner.CornerPoseEstimator` takes cameras and any images.
@@ -124,9 +129,9 @@ impl CornerPoseEstimator {
         gyro: Option<(Bound<'_, PyAny>, Bound<'_, PyAny>)>,
     ) -> PyResult<CornerEstimate> {
         let known = knowledge(gravity, gyro)?;
-        let inner = &self.inner;
         let observe = |left: Frame<'_>, right: Option<Frame<'_>>| {
-            inner.change(py, |estimator| estimator.observe(&left, right.as_ref(), &known)).map(CornerEstimate::from)
+            let change = |estimator: &mut _| observe(estimator, &left, right.as_ref(), &known);
+            self.inner.change_by(py, is_large(self.left.get().inner().camera()), change).map(CornerEstimate::from)
         };
         if self.coloured {
             let left = convert::color(left, "left")?;
@@ -203,11 +208,34 @@ fn knowledge(
     Ok(FrameKnowledge { gravity: gravity.transpose()?, turn: turn.transpose()? })
 }
 
+/// What a frame tells. Where that is ended the estimator is one that has not begun with the frame.
+fn observe(
+    estimator: &mut core::CornerPoseEstimator,
+    left: &Frame<'_>,
+    right: Option<&Frame<'_>>,
+    known: &FrameKnowledge,
+) -> Result<core::CornerEstimate, Error> {
+    let (objects, track, names) = owned(estimator.state());
+    let look = || {
+        let seen = estimator.observe(left, right, known)?;
+        check();
+        Ok(seen)
+    };
+    catch_unwind(AssertUnwindSafe(look)).unwrap_or_else(|ended| {
+        let (left, right) = (estimator.left().clone(), estimator.right().cloned());
+        *estimator = core::CornerPoseEstimator::new(left, right, estimator.options().clone())?;
+        estimator.set_state(objects, track, names);
+        resume_unwind(ended)
+    })
+}
+
+fn owned((objects, track, names): (u32, Option<&Track>, &CornerNames)) -> (u32, Option<Track>, CornerNames) {
+    (objects, track.cloned(), names.clone())
+}
+
 impl CornerPoseEstimator {
     /// The number of objects so far, the track of the last one, and the corners that have a name.
     fn state(&self, py: Python<'_>) -> (u32, Option<Track>, CornerNames) {
-        let owned =
-            |(objects, track, names): (u32, Option<&Track>, &CornerNames)| (objects, track.cloned(), names.clone());
         self.inner.look(py, |estimator| owned(estimator.state()))
     }
 }
