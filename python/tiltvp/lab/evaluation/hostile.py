@@ -67,7 +67,7 @@ RIGHT: Final[dict[str, dict[str, float]]] = {
 """How much a right estimate weighs against a wrong one, for whether a fit is of the vertical and for whether up is as
 told: so much that of the right ones of unharmed upward views nine in ten stay sure, cross-validated by building. Of
 the paper's methods, whose stated errors are larger, half and fewer were sure before; whether up is as told is not
-learned of them, for they err too much to tell."""
+learned of them, for it would change little."""
 KEPT: Final = 32
 """Estimators of a method that are kept for the next images: more than the pairs of a camera and a mounting that come
 again. Cameras with a centre that is off do not."""
