@@ -245,7 +245,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("images")
     camera = paper_camera()
     camera.save(folder / "camera.toml")
-    image = render_room(camera, seed=2, alpha_rad=0.1, beta_rad=0.5, samples=1).gray
+    image = render_room(camera, seed=2, alpha_rad=0.1, beta_rad=0.5, samples=2).gray
     for name, gray in (("a", image), ("b", image), ("c", np.full_like(image, 90))):
         tiltvp.images.write_image(folder / f"{name}.png", gray)
     return folder

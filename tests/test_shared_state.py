@@ -145,11 +145,10 @@ LONG = {
     """,
     "step": """
         one = tiltvp.SelfCalibrator(wheel_base_m=0.4)
-        bearings = np.random.default_rng(1).uniform(-3.0, 3.0, 3000)
-        def call():
-            global state
-            state = pickle.dumps(one)
-            one.step(0.04, 0.05, np.arange(3000), bearings)
+        bearings = np.random.default_rng(1).uniform(-3.0, 3.0, 1200)
+        one.step(0.04, 0.05, np.arange(1200), bearings)
+        state = pickle.dumps(one)
+        call = lambda: one.step(0.04, 0.05, np.arange(1200), bearings)
         check = lambda: pickle.dumps(one) == state
     """,
     "calibrate": """
