@@ -237,6 +237,7 @@ def test_an_interrupt_ends_a_long_call(name: str) -> None:
     os.kill(process.pid, signal.SIGINT)
     said = process.communicate(timeout=60)[0].split()
     assert said[0] == "interrupted", said
-    # Of the processor, so that a busy machine changes nothing; a batch has two threads.
-    assert float(said[1]) - asked < (1.0 if name in ("batch", "room") else 0.5)
+    # Of the processor, so that a busy machine changes little.
+    # A batch has two threads, an estimator of corners makes its tables anew.
+    assert float(said[1]) - asked < (1.0 if name in ("batch", "room", "corner") else 0.5)
     assert said[2] == "True"
