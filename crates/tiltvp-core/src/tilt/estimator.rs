@@ -161,7 +161,8 @@ impl TiltEstimator {
             Prepared::Pixels(method) => {
                 let Scratch { detector, edges, work, .. } = scratch;
                 detector.detect(image, &self.pixels.region, gradient_min, method.prefilter(), edges);
-                let lights = method.trust().map_or([0.0; LIGHTS], |_| self.pixels.lightness.of(image));
+                let of_up = method.trust().and_then(|trust| trust.up.as_ref());
+                let lights = of_up.map_or([0.0; LIGHTS], |_| self.pixels.lightness.of(image));
                 Ok(self.fit(&**method, edges, (off_px, &lights), work))
             }
             Prepared::Segments(method) => Ok(method.estimate(image, &self.pixels, self.centre_off(off_px), scratch)),
