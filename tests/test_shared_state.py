@@ -238,6 +238,6 @@ def test_an_interrupt_ends_a_long_call(name: str) -> None:
     said = process.communicate(timeout=60)[0].split()
     assert said[0] == "interrupted", said
     # Of the processor, so that a busy machine changes little.
-    # A batch has two threads, an estimator of corners makes its tables anew.
-    assert float(said[1]) - asked < (1.0 if name in ("batch", "room", "corner") else 0.5)
+    # A batch has two threads, an estimator of corners makes its tables anew, a pass over 48 million pixels takes 0.3 s.
+    assert float(said[1]) - asked < (1.0 if name in ("batch", "room", "corner", "segments") else 0.5)
     assert said[2] == "True"
