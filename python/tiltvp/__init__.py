@@ -38,7 +38,6 @@ from tiltvp.selfcalib import (
     calibrate,
     wheel_displacements,
 )
-from tiltvp.setup_check import SetupCheck, check_setup
 from tiltvp.surround import surround_mask
 from tiltvp.tilt import (
     CommonDirection,
@@ -62,6 +61,7 @@ if TYPE_CHECKING:
     from tiltvp.mounting import MountingTilt, mounting_tilt
     from tiltvp.robot import Robot
     from tiltvp.robot_setup import RobotSetup, find_setup
+    from tiltvp.setup_check import SetupCheck, check_setup
     from tiltvp.turning import FrameDelay, TurnCheck, check_turns, frame_delay
 
 __version__ = "0.2.0"
@@ -142,9 +142,9 @@ __all__ = [
 _MODULES = ("corner", "streams", "synth")
 _HOMES = {
     "Extrinsics": "extrinsics", "FrameDelay": "turning", "JoinedLogs": "extrinsics", "JoinedTilts": "extrinsics",
-    "MountingTilt": "mounting", "Robot": "robot", "RobotSetup": "robot_setup", "TurnCheck": "turning",
-    "check_turns": "turning", "find_setup": "robot_setup", "frame_delay": "turning", "join_logs": "extrinsics",
-    "join_tilts": "extrinsics", "mounting_tilt": "mounting",
+    "MountingTilt": "mounting", "Robot": "robot", "RobotSetup": "robot_setup", "SetupCheck": "setup_check",
+    "TurnCheck": "turning", "check_setup": "setup_check", "check_turns": "turning", "find_setup": "robot_setup",
+    "frame_delay": "turning", "join_logs": "extrinsics", "join_tilts": "extrinsics", "mounting_tilt": "mounting",
 }  # fmt: skip
 
 
