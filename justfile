@@ -267,6 +267,10 @@ measure-mounting *arguments: setup
 measure-trust-calibration *arguments: setup
     {{bin}}/tiltvp measure trust-calibration {{arguments}}
 
+# The same from the pictures of rendered drives.
+measure-trust-pictures *arguments: setup
+    {{bin}}/tiltvp measure trust-pictures {{arguments}}
+
 # What an evaluation costs over the number of images and over their pixels.
 measure-scaling *arguments: setup
     {{bin}}/tiltvp measure scaling {{arguments}}

@@ -10,9 +10,11 @@ import numpy as np
 import pytest
 
 from tiltvp import Camera
+from tiltvp.drive_logs import DriveLog
 from tiltvp.errors import InvalidInputError
 from tiltvp.line_calibration import calibrate_lines, place_of_longest_tracks
 from tiltvp.line_logs import SeenFrame, bearing_log, see_lines
+from tiltvp.line_turns import line_turns
 from tiltvp.lines import LineExtractor, LineTracker
 from tiltvp.selfcalib import LogCalibration, calibrate
 from tiltvp.streams import Motion
@@ -122,6 +124,67 @@ def test_lines_are_left_out_in_turn_for_the_covariance(seen: list[SeenFrame], so
     assert (wide.x_m, wide.y_m, wide.yaw_rad) == (plain.x_m, plain.y_m, plain.yaw_rad)
     assert np.linalg.eigvalsh(more).min() > -1e-15
     assert np.trace(more) > 0.0
+
+
+def told(seen: list[SeenFrame], odometry: np.ndarray, base_m: float) -> list[SeenFrame]:
+    """The frames with the motions of other odometry (N, 2)."""
+    turns, ways = (odometry[:, 1] - odometry[:, 0]) / base_m, odometry.mean(axis=1)
+    motions = zip(seen, turns.tolist(), ways.tolist(), strict=True)
+    return [replace(one, turn_rad=turn, distance_m=way) for one, turn, way in motions]
+
+
+@pytest.mark.parametrize(
+    ("reading", "misreading"),
+    [
+        ("wheels-swapped", "reflected"),
+        ("wheels-negated", "reflected"),
+        ("left-wheel-negated", "left wheel negated"),
+        ("right-wheel-negated", "right wheel negated"),
+        ("millimetres", "millimetres"),
+        ("cumulative", "cumulative"),
+    ],
+)
+def test_lines_tell_how_the_odometry_was_meant(
+    drive: Drive, seen: list[SeenFrame], reading: str, misreading: str
+) -> None:
+    as_recorded = {"millimetres": 1e3 * drive.odometry, "cumulative": np.cumsum(drive.odometry, axis=0)}
+    nothing = np.zeros((0, 3))
+    harmed = as_recorded.get(reading)
+    if harmed is None:  # What undoes the harm does it.
+        harmed = DriveLog(drive.odometry, nothing, None).read_as(reading).odometry
+    turns = line_turns(told(seen, harmed, drive.wheel_base_m))
+    assert turns.misreading == misreading
+    assert turns.turned_rad == pytest.approx(sum(abs(turn) for _, turn in LEGS), abs=0.4)
+    assert turns.missed_rad[misreading] < 0.3 * turns.turned_rad
+    read = DriveLog(harmed, nothing, None).read_as(reading).odometry
+    assert line_turns(told(seen, read, drive.wheel_base_m)).misreading is None
+
+
+def test_turns_that_are_as_told_or_not_known_are_no_misreading(drive: Drive, seen: list[SeenFrame]) -> None:
+    for base in (0.7, 1.0, 1.3):
+        turns = line_turns(told(seen, drive.odometry, base * drive.wheel_base_m))
+        assert (turns.misreading, turns.reason) == (None, "")
+    reversed_ = [replace(one, turn_rad=-(one.turn_rad or 0.0), distance_m=None) for one in seen]
+    turns = line_turns(reversed_)
+    assert turns.misreading == "reflected"
+    assert set(turns.missed_rad) == {"", "reflected", "millimetres", "cumulative"}
+    # Of a twentieth of a turn, of frames without lines, of none, and without odometry nothing is told.
+    blind = [replace(one, lines=seen[0].lines, descriptors=0.0 * seen[0].descriptors) for one in reversed_]
+    unknown = [replace(one, turn_rad=None) for one in seen]
+    for few in (reversed_[:3], blind, seen[:1], [], unknown):
+        assert line_turns(few).misreading is None
+
+
+def test_wheels_that_are_swapped_are_named(drive: Drive, seen: list[SeenFrame]) -> None:
+    swapped = drive.odometry[:, ::-1].copy()
+    solve = partial(
+        calibrate, swapped, wheel_base_m=drive.wheel_base_m, bearing_sigma_rad=math.radians(0.05)
+    )  # fmt: skip
+    found = calibrate_lines(told(seen, swapped, drive.wheel_base_m), solve)
+    assert not found.settled
+    assert found.misreading == "reflected"
+    for words in ("otherwise than the odometry tells", "wheels swapped", "the image mirrored"):
+        assert words in found.doubt
 
 
 def moved(whole: LogCalibration, **place: float) -> LogCalibration:

@@ -3551,6 +3551,12 @@ def match_wide(
         Default: 0.0349066.
     """
 
+def misreading_clause(name: str) -> str:
+    """A clause: what a log fits with that was misread, by one of the names of `LogCalibration.misreading`.
+
+    Raises `tiltvp.errors.InvalidInputError` for another name.
+    """
+
 def normal_from_alpha_beta(alpha_rad: float, beta_rad: float) -> NDArray[np.float64]:
     """(3,): the ground normal of a lean, (-sin a cos b, -sin a sin b, cos a) (eq. 1)."""
 

@@ -16,6 +16,7 @@ import numpy as np
 from tiltvp.arguments import each_from, refuse_uncallable, shaped_from
 from tiltvp.errors import InvalidInputError
 from tiltvp.line_logs import FollowedFrame, SeenFrame, bearing_log
+from tiltvp.line_turns import LineTurns, line_turns
 from tiltvp.lines import LineTracker
 
 if TYPE_CHECKING:
@@ -61,10 +62,19 @@ class LineCalibration:
     """The mounting from that log."""
     settled: bool
     """Whether tracks followed from this mounting lead to it again, within its standard deviations."""
+    turns: LineTurns
+    """Whether lines turn as the odometry says. Where they do not, nothing is looked for in turns."""
+
+    @property
+    def misreading(self) -> str | None:
+        """How the odometry was meant, by the turns of the lines or the whole log: see `LogCalibration.misreading`."""
+        return self.turns.misreading or self.whole.misreading
 
     @property
     def doubt(self) -> str:
         """Why it cannot be relied upon, though the log may fit; empty where nothing speaks against it."""
+        if self.turns.misreading is not None:
+            return self.turns.reason
         if not self.settled:
             return "which line is which does not settle with the mounting"
         return ""
@@ -89,7 +99,10 @@ def calibrate_lines(
     def solved(bearings: NDArray[np.float64], **options: Any) -> LogCalibration:
         return solve(bearings, estimate_centre=_are_all_round(bearings[:, 2]), **options)
 
-    found = _in_turns(seen, solved, start, frames_min)
+    turns = line_turns(seen)
+    if turns.misreading is not None:
+        return replace(_in_turns(seen, solved, start, frames_min, turns, rounds=1), settled=False)
+    found = _in_turns(seen, solved, start, frames_min, turns)
     return replace(found, whole=solved(found.bearings, jackknife_parts=_PARTS))
 
 
@@ -104,19 +117,21 @@ def _in_turns(
     solve: Callable[..., LogCalibration],
     start: Place,
     frames_min: int,
+    turns: LineTurns,
+    rounds: int = _ROUNDS,
 ) -> LineCalibration:
     """Lines followed from the mounting that they tell, until that does not change any more."""
     (x, y), yaw, before = place_of_longest_tracks(seen, start), start[2], None
-    for _ in range(_ROUNDS):
+    for _ in range(rounds):
         frames = _followed(seen, LineTracker(camera_m=(x, y), camera_yaw_rad=yaw))
         bearings = bearing_log(frames, frames_min=frames_min)
         if not len(bearings):
             raise InvalidInputError(f"no line is seen in {frames_min} of {len(seen)} frames")
         if before is not None and np.array_equal(bearings, before.bearings):
-            return LineCalibration(frames, bearings, before.whole, settled=True)
-        found = LineCalibration(frames, bearings, solve(bearings), settled=False)
+            return LineCalibration(frames, bearings, before.whole, True, turns)
+        found = LineCalibration(frames, bearings, solve(bearings), False, turns)
         if before is not None and _agree(before.whole, found.whole):
-            return LineCalibration(frames, bearings, found.whole, settled=True)
+            return LineCalibration(frames, bearings, found.whole, True, turns)
         before, mounting = found, found.whole.mounting
         x, y, yaw = mounting.x_m, mounting.y_m, mounting.yaw_rad
         if not math.hypot(x, y) < _FARTHEST_M:

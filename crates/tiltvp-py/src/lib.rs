@@ -76,7 +76,7 @@ mod _core {
     #[pymodule_export]
     use crate::selfcalib::{
         CalibrationStep, LogCalibration, MountingEstimate, SelfCalibrator, SimulatedDrive, calibrate, consistency_band,
-        drive_legs, simulate_drive, wheel_displacements,
+        drive_legs, misreading_clause, simulate_drive, wheel_displacements,
     };
     #[pymodule_export]
     use crate::stereo::{StereoSequence, read_imu};

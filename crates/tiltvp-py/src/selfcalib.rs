@@ -13,7 +13,7 @@ use tiltvp_core::interrupt::check;
 use tiltvp_core::selfcalib::{self as core, LogBearing, LogOptions, SelfCalibratorOptions, WheelMotion};
 
 pub(crate) use self::drive::{SimulatedDrive, drive_legs, simulate_drive};
-pub(crate) use self::log::LogCalibration;
+pub(crate) use self::log::{LogCalibration, misreading_clause};
 pub(crate) use self::mounting::MountingEstimate;
 pub(crate) use self::step::CalibrationStep;
 use crate::array::Array;

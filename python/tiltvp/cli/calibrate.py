@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
-from tiltvp.cli.calibrate_inputs import DriveOptions, LogOptions, Tables, other_readings, sources_from
+from tiltvp.cli.calibrate_inputs import DriveOptions, LogOptions, Tables, sources_from
 from tiltvp.cli.calibrate_pictures import PictureLog, PictureOptions
 from tiltvp.cli.calibrate_results import Calibration, ResultOptions
 from tiltvp.cli.line_options import DrivingLineOptions
@@ -141,7 +141,7 @@ def _calibrated(
             **{"estimate_centre": read.estimate_centre} | noise() | options | drive.of_whole_log(),
         )  # fmt: skip
 
-    log, whole, doubt = one.solved(None if tilt is None else tilt.robot_from_camera, solve)
+    log, whole, doubt, remedies = one.solved(None if tilt is None else tilt.robot_from_camera, solve)
     calibrator = SelfCalibrator(**noise() | drive.of_filter(), method=method)
     with status(f"{one.name}: the filter, {len(log.bearings)} bearings"):
         # The filter does not estimate the image centre.
@@ -149,6 +149,6 @@ def _calibrated(
     with watching.viewer() as viewer:
         if viewer is not None:
             send_calibration(viewer, log, history, whole)
-    for word in other_readings(whole.misreading):
+    for word in remedies:
         say(f"{one.name}: try {' '.join(f'--read-as {known}' for known in (*read.read_as, word))}")
     return Calibration(one.name, calibrator, history, whole, doubt, one.late_s)

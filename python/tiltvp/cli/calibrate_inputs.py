@@ -112,6 +112,8 @@ class Solved(NamedTuple):
     whole: LogCalibration
     doubt: str = ""
     """Why the mounting cannot be relied upon, beside what it says itself."""
+    remedies: tuple[str, ...] = ()
+    """Words of `--read-as` to try."""
 
 
 @dataclass(frozen=True)
@@ -145,7 +147,9 @@ class Tables:
 
         assert self.read is not None  # As `checked` has it.
         with status(f"{self.name}: the whole log, {len(self.read.bearings)} bearings"):
-            return Solved(self.read, solve(self.read), doubled_rows(self.read.odometry, self.read.times_s))
+            whole = solve(self.read)
+        doubt = doubled_rows(self.read.odometry, self.read.times_s)
+        return Solved(self.read, whole, doubt, other_readings(whole.misreading))
 
 
 def sources_from(words: Sequence[str]) -> list[Tables | str]:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Final
 import numpy as np
 from cyclopts import Group, Parameter, validators
 
-from tiltvp.cli.calibrate_inputs import Solved
+from tiltvp.cli.calibrate_inputs import Solved, other_readings
 from tiltvp.cli.options import CameraOptions, Switch, given_words
 from tiltvp.cli.sources import MotionOptions, SourceOptions
 from tiltvp.cli.tables import check_ending, write_table
@@ -168,7 +168,9 @@ class PictureLog:
         lines = counted(len(np.unique(found.bearings[:, 1])), "lines")
         say(f"{self.name}: {counted(len(found.bearings), 'bearings')} of {lines}")
         doubt = "; ".join(filter(None, (moved.doubt, found.doubt)))
-        return Solved(DriveLog(odometry, found.bearings, moved.times_s), found.whole, doubt)
+        # Bearings of images are not written down: only what is said of the wheels can be.
+        remedies = tuple(word for word in other_readings(found.misreading) if word != "clockwise")
+        return Solved(DriveLog(odometry, found.bearings, moved.times_s), found.whole, doubt, remedies)
 
     def _seen(
         self, rotation: NDArray[np.float64]

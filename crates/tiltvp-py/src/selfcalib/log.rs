@@ -74,7 +74,7 @@ value! {
         converged,
         bearing_sigma_rad,
         odometry_k_m,
-        misreading: misread(misreading.as_deref())?,
+        misreading: misread("values[\"misreading\"]", misreading.as_deref())?,
         doubted,
         merged_landmarks,
     };
@@ -88,12 +88,20 @@ fn right_over_left(log: &core::LogCalibration) -> f64 {
     (2.0 * log.wheels.imbalance).exp()
 }
 
-/// The misreading of a name.
-fn misread(name: Option<&str>) -> PyResult<Option<core::Misreading>> {
+/// A clause: what a log fits with that was misread, by one of the names of `LogCalibration.misreading`.
+///
+/// Raises `tiltvp.errors.InvalidInputError` for another name.
+#[pyfunction]
+pub(crate) fn misreading_clause(name: &str) -> PyResult<String> {
+    Ok(misread("name", Some(name))?.map(|misreading| misreading.to_string()).unwrap_or_default())
+}
+
+/// The misreading of a name; `argument` is what has it.
+fn misread(argument: &str, name: Option<&str>) -> PyResult<Option<core::Misreading>> {
     let found = name.map(|name| core::Misreading::from_name(name).ok_or(name)).transpose();
     found.map_err(|name| {
         let expected = core::Misreading::NAMES.join(", ");
-        invalid(format!("values[\"misreading\"]: unknown name {name:?}, expected {expected}"))
+        invalid(format!("{argument}: unknown name {name:?}, expected {expected}"))
     })
 }
 

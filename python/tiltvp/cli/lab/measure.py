@@ -8,7 +8,7 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from tiltvp.cli.lab.body import body
-from tiltvp.cli.lab.calibration_measures import calibration, calibration_images, trust_calibration
+from tiltvp.cli.lab.calibration_measures import calibration, calibration_images, trust_calibration, trust_pictures
 from tiltvp.cli.lab.colmap import colmap
 from tiltvp.cli.lab.corner_measures import corners
 from tiltvp.cli.lab.corner_real import corners_real
@@ -43,6 +43,7 @@ app.command(planar_pose)
 app.command(striding)
 app.command(trust)
 app.command(trust_calibration)
+app.command(trust_pictures)
 
 
 @app.command

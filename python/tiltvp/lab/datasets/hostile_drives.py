@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
     Table = NDArray[np.float64]
 
-__all__ = ["DRIVE_CASES", "UNDISTURBED", "HostileDrive", "hostile_drives"]
+__all__ = ["DRIVE_CASES", "TOO_SHORT", "UNDISTURBED", "HostileDrive", "harmed_odometry", "hostile_drives"]
 
 UNDISTURBED: Final = "as told"
 BASE_M: Final = 0.4
@@ -28,6 +28,7 @@ START_SIGMA: Final = (0.3, 0.3, 0.5)
 RHO_M: Final = (0.05, 0.35)
 YAW_SIGMA_RAD: Final = 0.3
 TOO_SHORT: Final = 15
+"""Steps of a drive that tells nothing."""
 LATE_STEPS: Final = 2
 """0.2 s at ten steps a second."""
 
@@ -52,7 +53,7 @@ class _Log:
     odometry: Table
     bearings: Table
     rng: np.random.Generator
-    drive: SimulatedDrive
+    drive: SimulatedDrive | None
     mounting: Table
     options: dict[str, Any]
 
@@ -194,3 +195,10 @@ def hostile_drives(case: str, seeds: range) -> Iterator[HostileDrive]:
         bound = drive.cramer_rao_bound(start_sigma=START_SIGMA)
         options = log.options | made.told
         yield HostileDrive(case, seed, log.odometry, log.bearings, options, log.mounting, bound)
+
+
+def harmed_odometry(case: str, odometry: Table, rng: np.random.Generator) -> Table:
+    """(N, 2): the odometry of a drive as a case has it that harms nothing else."""
+    log = _Log(odometry.copy(), np.zeros((0, 3)), rng, None, np.zeros(3), {})
+    DRIVE_CASES[case].harm(log)
+    return log.odometry

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from functools import partial
 from threading import Event
@@ -25,13 +25,20 @@ from tiltvp.tilt import TiltEstimator
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-__all__ = ["PictureExperiment", "picture_drives"]
+    from tiltvp._core import Camera
+
+__all__ = [
+    "MOUNTING", "START_SIGMA", "PictureExperiment", "drive_images", "lines_of", "picture_drives", "picture_start",
+    "room_drive",
+]  # fmt: skip
 
 _PHI_RAD, _RHO_M, _PSI_RAD = -0.34, 0.23, 0.33
 """The paper's mounting."""
 _START_ERRORS = (0.34, 0.03, 0.33)
 """Standard deviations of the errors of phi, rho, psi at the start, as in the simulated drives."""
-_START_SIGMA = (0.2, 0.2, 0.6)
+START_SIGMA = (0.2, 0.2, 0.6)
+MOUNTING = (_RHO_M * math.cos(_PHI_RAD), _RHO_M * math.sin(_PHI_RAD), _PHI_RAD + _PSI_RAD)
+"""The same as x and y in metres and yaw in radians."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -64,26 +71,13 @@ def picture_drives(
     """
     rows = []
     for kind, lean_deg, seed in experiment.cases:
-        room = drive_room(kind, seed, threads=threads)
-        drive = Drive(
-            room,
-            camera=mirror_camera(),
-            mount=(_RHO_M * math.cos(_PHI_RAD), _RHO_M * math.sin(_PHI_RAD), _PHI_RAD + _PSI_RAD, 0.4),
-            blind_rad=MIRROR_BLIND_RAD,
-            legs=drive_legs(experiment.trajectory),
-            step_m=experiment.step_m,
-            turn_max_rad=experiment.turn_max_rad,
-            bumps_max_rad=math.radians(lean_deg),
-            samples=experiment.samples,
-            seed=seed,
-            threads=threads,
-        )
-        start = _start(seed)
-        seen = list(_seen(drive, threads))
+        drive, start = room_drive(experiment, kind, lean_deg, seed, threads=threads), picture_start(seed)
+        images = drive_images(drive, threads)
+        seen = list(lines_of(images, drive.camera, drive.odometry, drive.wheel_base_m))
         sigma_rad = float(np.median(np.concatenate([one.lines.sigma_rad for one in seen])))
         options: dict[str, Any] = {
             "wheel_base_m": drive.wheel_base_m, "bearing_sigma_rad": sigma_rad,
-            "start": start, "start_sigma": _START_SIGMA,
+            "start": start, "start_sigma": START_SIGMA,
         }  # fmt: skip
         found = calibrate_lines(seen, partial(calibrate, drive.odometry, **options), start=start)
         bearings, whole = found.bearings, found.whole
@@ -97,32 +91,66 @@ def picture_drives(
     return pl.DataFrame(rows)
 
 
-def _start(seed: int) -> tuple[float, float, float]:
+def room_drive(
+    experiment: PictureExperiment,
+    kind: str,
+    lean_max_deg: float,
+    seed: int,
+    *,
+    threads: int,
+    mounting: tuple[float, float, float] = MOUNTING,
+    legs: Any = None,
+) -> Drive:
+    """A drive through a room of a kind, with another mounting or other legs than the experiment's."""
+    return Drive(
+        drive_room(kind, seed, threads=threads),
+        camera=mirror_camera(),
+        mount=(*mounting, 0.4),
+        blind_rad=MIRROR_BLIND_RAD,
+        legs=drive_legs(experiment.trajectory) if legs is None else legs,
+        step_m=experiment.step_m,
+        turn_max_rad=experiment.turn_max_rad,
+        bumps_max_rad=math.radians(lean_max_deg),
+        samples=experiment.samples,
+        seed=seed,
+        threads=threads,
+    )
+
+
+def drive_images(drive: Drive, threads: int) -> list[NDArray[np.uint8]]:
+    """The frames (H, W) of a drive, rendered on so many threads."""
+    with in_order(lambda k: drive.render(k, threads=1).gray, range(len(drive)), threads, Event()) as images:
+        return list(images)
+
+
+def picture_start(seed: int) -> tuple[float, float, float]:
+    """Where the camera of a drive is thought to be: x and y in metres, yaw in radians."""
     phi, rho, psi = np.random.default_rng(seed).normal((_PHI_RAD, _RHO_M, _PSI_RAD), _START_ERRORS)
     return max(rho, 0.05) * math.cos(phi), max(rho, 0.05) * math.sin(phi), phi + psi
 
 
-def _seen(drive: Drive, threads: int) -> Iterator[SeenFrame]:
-    """The frames of a drive, rendered on so many threads, and their lines in the frame of the camera."""
-    estimator, extractor = TiltEstimator(drive.camera), LineExtractor(drive.camera)
+def lines_of(
+    grays: Iterable[NDArray[np.uint8]], camera: Camera, odometry: NDArray[np.float64], wheel_base_m: float
+) -> Iterator[SeenFrame]:
+    """The lines of the images (H, W) of a drive in the frame of the camera, about the vertical that each tells, with
+    what the wheels say (N, 2)."""
+    estimator, extractor = TiltEstimator(camera), LineExtractor(camera)
     motions = [
-        Motion(yaw, distance, (left, right))
-        for (distance, yaw), (left, right) in zip(drive.motions.tolist(), drive.odometry.tolist(), strict=True)
+        Motion((right - left) / wheel_base_m, 0.5 * (left + right), (left, right)) for left, right in odometry.tolist()
     ]
 
     def tilt(gray: NDArray[np.uint8]) -> Any:
         estimate = estimator(gray)
         return estimate if estimate else None
 
-    with in_order(lambda k: drive.render(k, threads=1), range(len(drive)), threads, Event()) as views:
-        for seen in see_lines((view.gray for view in views), extractor, tilt=tilt, motions=motions):
-            if isinstance(seen, Exception):
-                raise seen
-            yield seen
+    for seen in see_lines(grays, extractor, tilt=tilt, motions=motions):
+        if isinstance(seen, Exception):
+            raise seen
+        yield seen
 
 
 def _errors(e: MountingEstimate) -> dict[str, float | str]:
-    x, y, yaw = _RHO_M * math.cos(_PHI_RAD), _RHO_M * math.sin(_PHI_RAD), _PHI_RAD + _PSI_RAD
+    x, y, yaw = MOUNTING
     plane = np.sqrt(np.diag(e.covariance_xy_yaw))
     error = np.array([e.x_m - x, e.y_m - y, math.remainder(e.yaw_rad - yaw, math.tau)])
     return {

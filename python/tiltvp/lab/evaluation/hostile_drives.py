@@ -13,7 +13,7 @@ from tiltvp.errors import InvalidInputError
 from tiltvp.lab.datasets.hostile_drives import HostileDrive
 from tiltvp.selfcalib import LogCalibration, MountingEstimate, SelfCalibrator, calibrate
 
-__all__ = ["judge_drives", "summarise_drive_cases"]
+__all__ = ["judge_drives", "judged", "judged_refusal", "summarise_drive_cases"]
 
 NEES_LIMIT: Final = 16.27
 """99.9 % quantile of chi-square with three degrees of freedom."""
@@ -33,9 +33,12 @@ CAUSES: Final = {
     "sigma": "bearing_sigma_rad",
     "K told": "odometry_k_m",
     "bearings 0.2 s late": "later than the odometry",
+    "images 0.2 s late": "later than the odometry",
+    "images mirrored": "wheels swapped",
     "camera bumped": "bump",
     "two landmarks merged": "under one name",
     "image centre": "image centre",
+    "focal": "focal length",
     "straight": "rotate in place",
     "rotation": "drive straight",
     "too short": "drive straight",
@@ -53,7 +56,7 @@ def judge_drives(drives: Iterable[HostileDrive], *, advance: Callable[[], None] 
     for item in drives:
         calibrator = SelfCalibrator(**item.options)
         calibrator.follow(item.odometry, item.bearings)
-        rows.append(_row(item, "filter", calibrator.estimate, calibrator.estimate))
+        rows.append(judged(item, "filter", calibrator.estimate, calibrator.estimate))
         rows.append(_whole_log(item))
         advance()
     return pl.DataFrame(rows)
@@ -79,15 +82,8 @@ def _whole_log(item: HostileDrive) -> dict[str, Any]:
     try:
         whole = calibrate(item.odometry, item.bearings, **item.options)
     except InvalidInputError as error:
-        cause = _cause(item)
-        named = cause in str(error) if cause else None
-        return _columns(item, "whole log", math.nan, math.nan) | {"named": named, "reason": str(error)}
-    row = _row(item, "whole log", whole, whole.mounting)
-    # What was estimated need not be named.
-    told = SelfCalibrator(**item.options).options
-    own = {"bearing_sigma_rad": whole.bearing_sigma_rad, "odometry_k_m": whole.odometry_k_m}
-    estimated = own.get(_cause(item)) not in (None, told.get(_cause(item)))
-    return row | {"named": row["named"] or estimated if row["named"] is not None else None}
+        return judged_refusal(item, "whole log", error)
+    return judged(item, "whole log", whole, whole.mounting)
 
 
 def _cause(item: HostileDrive) -> str:
@@ -100,9 +96,16 @@ def _columns(item: HostileDrive, by: str, nees: float, worst: float) -> dict[str
     return columns | {"wrong": True, "named": False, "reason": ""}
 
 
-def _row(
-    item: HostileDrive, by: str, verdict: LogCalibration | MountingEstimate, e: MountingEstimate
+def judged_refusal(item: HostileDrive, by: str, error: Exception) -> dict[str, Any]:
+    """The row of a drive without an answer."""
+    cause, reason = _cause(item), str(error)
+    return _columns(item, by, math.nan, math.nan) | {"named": cause in reason if cause else None, "reason": reason}
+
+
+def judged(
+    item: HostileDrive, by: str, verdict: LogCalibration | MountingEstimate, e: MountingEstimate, *, doubt: str = ""
 ) -> dict[str, Any]:
+    """The row of an answer; `doubt` is why it cannot be relied upon, beside what it says itself."""
     error = np.array([e.x_m, e.y_m, e.yaw_rad]) - item.truth
     error[2] = math.remainder(error[2], math.tau)
     try:
@@ -110,10 +113,19 @@ def _row(
     except np.linalg.LinAlgError:
         nees = math.inf
     worst = float(np.max(np.abs(error) / np.sqrt(np.diag(item.bound))))
-    cause = _cause(item)
+    cause, reason = _cause(item), "; ".join(filter(None, (doubt, verdict.reason)))
     return _columns(item, by, nees, worst) | {
-        "answered": bool(verdict),
+        "answered": bool(verdict) and not doubt,
         "wrong": not (nees <= NEES_LIMIT and worst <= BOUND_SIGMAS),
-        "named": cause in verdict.reason if cause else None,
-        "reason": verdict.reason,
+        "named": cause in reason or _is_estimated(item, verdict, cause) if cause else None,
+        "reason": reason,
     }
+
+
+def _is_estimated(item: HostileDrive, verdict: LogCalibration | MountingEstimate, cause: str) -> bool:
+    """Whether the cause is an option that the whole log estimates, which need not be named."""
+    if not isinstance(verdict, LogCalibration):
+        return False
+    told = SelfCalibrator(**item.options).options
+    own = {"bearing_sigma_rad": verdict.bearing_sigma_rad, "odometry_k_m": verdict.odometry_k_m}
+    return own.get(cause) not in (None, told.get(cause))
