@@ -89,6 +89,7 @@ __all__ = [
     "lens_schema",
     "match_descriptors",
     "match_wide",
+    "misreading_clause",
     "normal_from_alpha_beta",
     "option_fields",
     "read_imu",

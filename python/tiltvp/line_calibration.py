@@ -6,9 +6,11 @@ turns, or taken for their neighbours, and what is left says that the camera is n
 
 from __future__ import annotations
 
+import copy
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
@@ -123,7 +125,7 @@ def _in_turns(
     """Lines followed from the mounting that they tell, until that does not change any more."""
     (x, y), yaw, before = place_of_longest_tracks(seen, start), start[2], None
     for _ in range(rounds):
-        frames = _followed(seen, LineTracker(camera_m=(x, y), camera_yaw_rad=yaw))
+        frames = _followed(seen, LineTracker(camera_m=(x, y), camera_yaw_rad=yaw), turns.jumps_rad)
         bearings = bearing_log(frames, frames_min=frames_min)
         if not len(bearings):
             raise InvalidInputError(f"no line is seen in {frames_min} of {len(seen)} frames")
@@ -194,8 +196,21 @@ def _apart(seen: Sequence[SeenFrame]) -> list[SeenFrame]:
     return kept
 
 
-def _followed(seen: Sequence[SeenFrame], tracker: LineTracker) -> list[FollowedFrame]:
-    return [one.followed(tracker) for one in seen]
+def _followed(
+    seen: Sequence[SeenFrame], tracker: LineTracker, jumps_rad: Mapping[int, float] = MappingProxyType({})
+) -> list[FollowedFrame]:
+    """The lines of all frames. After a jump they are followed by the turn that they tell, where more tracks go on by
+    that: of a camera that was bumped none would, and nothing be left to speak against the log."""
+    frames = []
+    for k, one in enumerate(seen):
+        if k in jumps_rad:
+            known, other = tracker.track_count, copy.copy(tracker)
+            ways = [(one.followed(tracker), tracker), (replace(one, turn_rad=jumps_rad[k]).followed(other), other)]
+            frame, tracker = max(ways, key=lambda way: np.count_nonzero(way[0].tracked.track < known))
+        else:
+            frame = one.followed(tracker)
+        frames.append(frame)
+    return frames
 
 
 def _agree(before: LogCalibration, now: LogCalibration) -> bool:

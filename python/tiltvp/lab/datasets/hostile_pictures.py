@@ -53,7 +53,7 @@ class PictureCase:
     legs: tuple[tuple[float, float], ...] | None = None
     """Arcs, metres and radians, that are driven instead."""
     is_bumped: bool = False
-    """Half-way the camera moves by 3 cm and turns by four degrees."""
+    """Half-way the camera turns by four degrees."""
 
 
 def _mirrored(drive: PictureDrive, _: np.random.Generator) -> PictureDrive:

@@ -98,14 +98,15 @@ def room_drive(
     seed: int,
     *,
     threads: int,
-    mounting: tuple[float, float, float] = MOUNTING,
+    robot_from_camera: NDArray[np.float64] | None = None,
     legs: Any = None,
 ) -> Drive:
-    """A drive through a room of a kind, with another mounting or other legs than the experiment's."""
+    """A drive through a room of a kind, with a camera that is turned, or other legs than the experiment's."""
     return Drive(
         drive_room(kind, seed, threads=threads),
         camera=mirror_camera(),
-        mount=(*mounting, 0.4),
+        mount=(*MOUNTING, 0.4),
+        robot_from_camera=robot_from_camera,
         blind_rad=MIRROR_BLIND_RAD,
         legs=drive_legs(experiment.trajectory) if legs is None else legs,
         step_m=experiment.step_m,

@@ -19,6 +19,8 @@ NEES_LIMIT: Final = 16.27
 """99.9 % quantile of chi-square with three degrees of freedom."""
 BOUND_SIGMAS: Final = 5.0
 """Errors beyond so many standard deviations of the Cramer-Rao bound are wrong."""
+SURELY: Final = 3.0
+"""Standard deviations by which a centre that is off is known to be."""
 
 CAUSES: Final = {
     "wheels swapped": "wheels swapped",
@@ -38,7 +40,6 @@ CAUSES: Final = {
     "camera bumped": "bump",
     "two landmarks merged": "under one name",
     "image centre": "image centre",
-    "focal": "focal length",
     "straight": "rotate in place",
     "rotation": "drive straight",
     "too short": "drive straight",
@@ -123,9 +124,12 @@ def judged(
 
 
 def _is_estimated(item: HostileDrive, verdict: LogCalibration | MountingEstimate, cause: str) -> bool:
-    """Whether the cause is an option that the whole log estimates, which need not be named."""
+    """Whether the cause is something that the whole log estimates, which need not be named."""
     if not isinstance(verdict, LogCalibration):
         return False
+    if cause == "image centre":
+        off, sigma = verdict.centre_off_rad, verdict.centre_off_sigma_rad
+        return bool(np.hypot(*off) > SURELY * np.hypot(*sigma))
     told = SelfCalibrator(**item.options).options
     own = {"bearing_sigma_rad": verdict.bearing_sigma_rad, "odometry_k_m": verdict.odometry_k_m}
     return own.get(cause) not in (None, told.get(cause))

@@ -27,11 +27,12 @@ from tiltvp.lab.evaluation.calibration_images import (
 )
 from tiltvp.lab.evaluation.hostile_drives import judged, judged_refusal
 from tiltvp.line_calibration import calibrate_lines
+from tiltvp.rotations import about_vertical
 from tiltvp.selfcalib import SelfCalibrator, calibrate
 
 __all__ = ["judge_picture_drives"]
 
-_BUMP_M, _BUMP_RAD = 0.03, math.radians(4.0)
+_BUMP_RAD = math.radians(4.0)
 
 
 def judge_picture_drives(
@@ -77,12 +78,12 @@ def _rendered(
 
 
 def _bumped(driven: PictureDrive, rendered: Callable[..., PictureDrive], seed: int) -> PictureDrive:
-    rng = np.random.default_rng((seed, 18))
-    way, turn = rng.uniform(-math.pi, math.pi), _BUMP_RAD * rng.choice([-1.0, 1.0])
-    moved = driven.mounting + [_BUMP_M * math.cos(way), _BUMP_M * math.sin(way), turn]
-    after = rendered(mounting=tuple(moved))
-    half = len(driven.images) // 2
-    return replace(driven, images=[*driven.images[:half], *after.images[half:]], mounting=moved)
+    """The camera turned half-way; not moved, for a drive is planned so that the camera fits in."""
+    turn = _BUMP_RAD * float(np.random.default_rng((seed, 18)).choice([-1.0, 1.0]))
+    after, half = rendered(robot_from_camera=about_vertical(turn)), len(driven.images) // 2
+    return replace(
+        driven, images=[*driven.images[:half], *after.images[half:]], mounting=driven.mounting + [0.0, 0.0, turn]
+    )
 
 
 def _judged(drive: PictureDrive, case: str, seed: int) -> list[dict[str, Any]]:
