@@ -155,6 +155,11 @@ LONG = {
         odometry, bearings = log(1500)
         call = lambda: tiltvp.calibrate(odometry, bearings, wheel_base_m=0.4)
     """,
+    "bearings": """
+        camera = tiltvp.Camera("pinhole", width=640, height=480, fx=400, fy=400, cx=320, cy=240, k1=-0.1, k2=0.01)
+        pixels = np.random.default_rng(1).uniform(0.0, 480.0, (4_000_000, 2))
+        call = lambda: camera.unproject_jacobian(pixels)
+    """,
     "estimator": """
         camera = tiltvp.Camera.equidistant(width=8000, height=6000, focal_px=1746, cx=3999.5, cy=2999.5)
         call = lambda: tiltvp.TiltEstimator(camera)

@@ -1,16 +1,22 @@
 //! `Camera`: the core's camera over arrays, by name and keyword.
 
+use std::ops::Range;
+
 use nalgebra::{Matrix2x3, Matrix3x2, Vector2};
 use numpy::{PyArray1, PyArrayMethods};
 use pyo3::prelude::*;
-use pyo3::types::{PyBool, PyDict, PyList, PyTuple, PyType};
+use pyo3::types::{PyDict, PyList, PyTuple, PyType};
+use tiltvp_core::Error;
 use tiltvp_core::camera::{self as core, Kind, Model, Parameter};
 use tiltvp_core::interrupt::check;
 
 use crate::array::Array;
-use crate::call::{call, call_long, exception, invalid};
+use crate::call::{call_by, call_long, exception, invalid};
 use crate::convert::{self, Number, Word};
 use crate::value::{frozen, getters};
+
+/// Rows of a part, for which the slowest lens takes some 50 ms.
+const PART: usize = 1 << 16;
 
 /// Points and their Jacobians.
 type Jacobians<'py> = (Array<'py, f64>, Array<'py, f64>);
@@ -44,7 +50,7 @@ impl Camera {
     ) -> PyResult<Self> {
         let max_theta_rad = max_theta_rad.map(|number| number.0);
         let pixels = format!("1 to {} pixels", core::LARGEST_SIDE_PX);
-        let (width, height) = (convert::whole(width, "width", &pixels)?, convert::whole(height, "height", &pixels)?);
+        let (width, height) = (convert::number(width, "width", &pixels)?, convert::number(height, "height", &pixels)?);
         let mut named = Vec::new();
         for (key, value) in parameters.into_iter().flat_map(PyDictMethods::iter) {
             let key: String = key.extract()?;
@@ -87,7 +93,7 @@ impl Camera {
     fn project<'py>(&self, py: Python<'py>, bearings: &Bound<'py, PyAny>) -> PyResult<Array<'py, f64>> {
         let (bearings, single) = convert::rows::<3>(bearings, "bearings")?;
         let mut pixels = vec![[0.0; 2]; bearings.len()];
-        call(py, || self.inner.project_all(&bearings, &mut pixels))?;
+        in_parts(py, &bearings, |rows, places| self.inner.project_all(rows, &mut pixels[places]))?;
         convert::to_rows(py, &pixels, single)
     }
 
@@ -98,7 +104,7 @@ impl Camera {
     fn unproject<'py>(&self, py: Python<'py>, pixels: &Bound<'py, PyAny>) -> PyResult<Array<'py, f64>> {
         let (pixels, single) = convert::rows::<2>(pixels, "pixels")?;
         let mut bearings = vec![[0.0; 3]; pixels.len()];
-        call(py, || self.inner.unproject_all(&pixels, &mut bearings))?;
+        in_parts(py, &pixels, |rows, places| self.inner.unproject_all(rows, &mut bearings[places]))?;
         convert::to_rows(py, &bearings, single)
     }
 
@@ -108,7 +114,9 @@ impl Camera {
         let (bearings, single) = convert::rows::<3>(bearings, "bearings")?;
         let mut pixels = vec![[0.0; 2]; bearings.len()];
         let mut jacobians = vec![Matrix2x3::zeros(); bearings.len()];
-        call(py, || self.inner.project_jacobian_all(&bearings, &mut pixels, &mut jacobians))?;
+        in_parts(py, &bearings, |rows, places| {
+            self.inner.project_jacobian_all(rows, &mut pixels[places.clone()], &mut jacobians[places])
+        })?;
         Ok((convert::to_rows(py, &pixels, single)?, convert::to_matrices(py, &jacobians, single)?))
     }
 
@@ -118,7 +126,9 @@ impl Camera {
         let (pixels, single) = convert::rows::<2>(pixels, "pixels")?;
         let mut bearings = vec![[0.0; 3]; pixels.len()];
         let mut jacobians = vec![Matrix3x2::zeros(); pixels.len()];
-        call(py, || self.inner.unproject_jacobian_all(&pixels, &mut bearings, &mut jacobians))?;
+        in_parts(py, &pixels, |rows, places| {
+            self.inner.unproject_jacobian_all(rows, &mut bearings[places.clone()], &mut jacobians[places])
+        })?;
         Ok((convert::to_rows(py, &bearings, single)?, convert::to_matrices(py, &jacobians, single)?))
     }
 
@@ -233,9 +243,24 @@ getters! {
 
 frozen!(Camera, |own| &own.inner, |own| (own.model(), own.width(), own.height()));
 
+/// Works on many rows part by part, between which a signal is heard.
+fn in_parts<R: Sync>(
+    py: Python<'_>,
+    rows: &[R],
+    mut work: impl FnMut(&[R], Range<usize>) -> Result<(), Error> + Send,
+) -> PyResult<()> {
+    call_by(py, rows.len() > PART, || {
+        for (part, first) in rows.chunks(PART).zip((0..).step_by(PART)) {
+            check();
+            work(part, first..first + part.len())?;
+        }
+        Ok(())
+    })
+}
+
 /// A number, or numbers in order. A truth value is neither.
 fn parameter(value: &Bound<'_, PyAny>, name: &str) -> PyResult<Parameter> {
-    if value.is_instance_of::<PyBool>() {
+    if convert::is_truth(value) {
         return Err(invalid(format!("{name}: {value}, expected one number or an array (N,)")));
     }
     match value.extract::<f64>() {

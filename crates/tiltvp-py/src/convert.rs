@@ -9,7 +9,7 @@ use numpy::{
     PyUntypedArrayMethods,
 };
 use pyo3::prelude::*;
-use pyo3::types::{PyDict, PyList};
+use pyo3::types::{PyDict, PyFloat, PyList};
 use pyo3::{IntoPyObjectExt, PyTypeCheck};
 use tiltvp_core::Error;
 use tiltvp_core::edges::Mask;
@@ -210,10 +210,8 @@ impl<'py> FromPyObject<'_, 'py> for Number {
     const INPUT_TYPE: pyo3::inspect::PyStaticExpr = <f64 as FromPyObject<'_, 'py>>::INPUT_TYPE;
 
     fn extract(value: Borrowed<'_, 'py, PyAny>) -> PyResult<Self> {
-        value
-            .extract()
-            .map(Self)
-            .map_err(|_| invalid(format!("{}: expected a number that a float can hold", shown(&value))))
+        let number = value.extract().ok().filter(|_| !is_truth(&value)).map(Self);
+        number.ok_or_else(|| invalid(format!("{}: expected a number that a float can hold", shown(&value))))
     }
 }
 
@@ -250,8 +248,24 @@ pub(crate) fn shown(value: &Bound<'_, PyAny>) -> String {
     value.repr().map_or_else(|_| "an object".to_owned(), |repr| repr.to_string())
 }
 
-/// A whole number that the type can hold.
-pub(crate) fn whole<'py, T>(value: &Bound<'py, PyAny>, name: &str, expected: &str) -> PyResult<T>
+/// Whether a value is True or False, which Python would take for 1 and 0, and which are no numbers here.
+pub(crate) fn is_truth(value: &Bound<'_, PyAny>) -> bool {
+    !value.is_exact_instance_of::<PyFloat>() && value.extract::<bool>().is_ok()
+}
+
+/// A number that the type can hold.
+pub(crate) fn number<'py, T>(value: &Bound<'py, PyAny>, name: &str, expected: &str) -> PyResult<T>
+where
+    T: for<'a> FromPyObject<'a, 'py>,
+{
+    if is_truth(value) {
+        return Err(invalid(format!("{name} = {value}, expected {expected}")));
+    }
+    taken(value, name, expected)
+}
+
+/// What the type can hold.
+pub(crate) fn taken<'py, T>(value: &Bound<'py, PyAny>, name: &str, expected: &str) -> PyResult<T>
 where
     T: for<'a> FromPyObject<'a, 'py>,
 {
@@ -262,7 +276,7 @@ where
 /// than all work.
 pub(crate) fn threads(value: Option<&Bound<'_, PyAny>>) -> PyResult<Option<usize>> {
     let Some(value) = value else { return Ok(None) };
-    let asked: NonZero<usize> = whole(value, "threads", "a whole number from 1")?;
+    let asked: NonZero<usize> = number(value, "threads", "a whole number from 1")?;
     let cores = thread::available_parallelism().map_or(1, NonZero::get);
     Ok(Some(asked.get().min(4 * cores)))
 }

@@ -154,7 +154,7 @@ impl Drive {
         normal: &Bound<'py, PyAny>,
         threads: Option<&Bound<'py, PyAny>>,
     ) -> PyResult<Pictures<'py>> {
-        let frame = convert::whole(frame, "frame", "a whole number from 0")?;
+        let frame = convert::number(frame, "frame", "a whole number from 0")?;
         let [x_m, y_m, yaw_rad] = convert::vector3(pose, "pose")?.into();
         let tilt = convert::tilt(normal, "normal")?;
         let pose = RobotPose { x_m, y_m, yaw_rad };

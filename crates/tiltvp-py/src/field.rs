@@ -183,7 +183,7 @@ impl<T: Value> Field for Vec<T> {
     }
 
     fn read(value: &Bound<'_, PyAny>, name: &str) -> PyResult<Self> {
-        let values: Vec<Bound<'_, PyAny>> = convert::whole(value, name, "a list of dicts")?;
+        let values: Vec<Bound<'_, PyAny>> = convert::taken(value, name, "a list of dicts")?;
         values.iter().map(|values| T::from_values(values, name)).collect()
     }
 

@@ -25,7 +25,7 @@ impl PixelRays {
     #[new]
     #[pyo3(signature = (camera, *, samples: "SupportsIndex"))]
     fn new(py: Python<'_>, camera: &Bound<'_, Camera>, samples: &Bound<'_, PyAny>) -> PyResult<Self> {
-        let samples = convert::whole(samples, "samples", "rays per pixel and side from 1 to 16")?;
+        let samples = convert::number(samples, "samples", "rays per pixel and side from 1 to 16")?;
         let lens = &camera.get().inner;
         let inner = call_long(py, || core::PixelRays::new(lens, samples))?;
         Ok(Self { inner, camera: camera.clone().unbind() })
@@ -59,7 +59,7 @@ impl PixelRays {
     ) -> PyResult<Bound<'py, PyArray3<f32>>> {
         let rotation = convert::matrix3(rotation, "rotation")?;
         let pixels = "a whole number of pixels";
-        let (width, height) = (convert::whole(width, "width", pixels)?, convert::whole(height, "height", pixels)?);
+        let (width, height) = (convert::number(width, "width", pixels)?, convert::number(height, "height", pixels)?);
         let map = call_long(py, || {
             let mut map = vec![0.0; 2 * self.inner.len()];
             let (u, v) = map.split_at_mut(self.inner.len());

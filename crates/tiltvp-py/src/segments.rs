@@ -164,7 +164,7 @@ impl Segments {
     /// Raises `IndexError` for a segment that is not there.
     #[pyo3(signature = (index: "SupportsIndex"))]
     fn pixels<'py>(&self, py: Python<'py>, index: &Bound<'py, PyAny>) -> PyResult<Array<'py, f64>> {
-        let index: isize = convert::whole(index, "index", "a whole number")?;
+        let index: isize = convert::number(index, "index", "a whole number")?;
         let Some((index, support)) = usize::try_from(index).ok().and_then(|i| Some((i, self.support.get(i)?))) else {
             let n = self.support.len();
             return Err(pyo3::exceptions::PyIndexError::new_err(format!(

@@ -259,7 +259,7 @@ pub(crate) fn consistency_band(
     samples: &Bound<'_, PyAny>,
 ) -> PyResult<(f64, f64)> {
     let probability = probability.0;
-    let count = |value, name| convert::whole::<u32>(value, name, "a whole number from 1 to 2^32 - 1");
+    let count = |value, name| convert::number::<u32>(value, name, "a whole number from 1 to 2^32 - 1");
     let (dof, samples) = (count(dof, "dof")?, count(samples, "samples")?);
     ConsistencyBand::of_mean(probability, dof, samples).map(|band| (band.low, band.high)).ok_or_else(|| {
         invalid(format!(

@@ -81,7 +81,7 @@ impl Room {
         count: &Bound<'py, PyAny>,
         seed: &Bound<'py, PyAny>,
     ) -> PyResult<Array<'py, f64>> {
-        let count = convert::whole(count, "count", "a whole number")?;
+        let count = convert::number(count, "count", "a whole number")?;
         let seed = seed_from(seed)?;
         let poses = call_long(py, || self.world.free_poses(count, seed))?;
         let rows: Vec<[f64; 3]> = poses.iter().map(|pose| [pose.x_m, pose.y_m, pose.yaw_rad]).collect();
@@ -118,7 +118,7 @@ impl Room {
     ) -> PyResult<Pictures<'py>> {
         let shot = options::given(Shot::default(), options)?;
         let pose = shot.pose();
-        let height: u16 = convert::whole(height, "height", "a whole number of pixels")?;
+        let height: u16 = convert::number(height, "height", "a whole number of pixels")?;
         let seen = call_on_threads(py, threads, || {
             let up = shot.camera_height_m.unwrap_or_else(|| View::new(&|_, _| None, 1, 1, pose).camera_height_m);
             tiltvp_synth::render_panorama(&self.world, pose, up, usize::from(height), &shot.rendering)
@@ -186,12 +186,12 @@ getters! {
 frozen!(Room, |own| &own.options, |own| (own.options.kind as u64, own.options.seed));
 
 pub(crate) fn seed_from(seed: &Bound<'_, PyAny>) -> PyResult<u64> {
-    convert::whole(seed, "seed", "a whole number from 0 to 2^64 - 1")
+    convert::number(seed, "seed", "a whole number from 0 to 2^64 - 1")
 }
 
 /// The number of one of so many frames; one that is too great is left to who asks for it.
 pub(crate) fn frame_from(frame: &Bound<'_, PyAny>, frames: usize) -> PyResult<usize> {
-    convert::whole(frame, "frame", &format!("a whole number below {frames}"))
+    convert::number(frame, "frame", &format!("a whole number below {frames}"))
 }
 
 /// As [`call_long`], on that many threads; without a number on one per core.

@@ -69,7 +69,7 @@ impl Field for CornerCase {
 
     fn read(value: &Bound<'_, PyAny>, name: &str) -> PyResult<Self> {
         let names = CornerCase::ALL.map(CornerCase::name).join(", ");
-        let given: String = convert::whole(value, name, &names)?;
+        let given: String = convert::taken(value, name, &names)?;
         let known = CornerCase::ALL.into_iter().find(|case| case.name() == given);
         known.ok_or_else(|| invalid(format!("{name} = {given:?}, expected one of {names}")))
     }
@@ -182,7 +182,7 @@ impl CornerAttitudes {
     /// The attitudes of one corner, by its number.
     #[pyo3(signature = (corner: "SupportsIndex"))]
     fn of(&self, corner: &Bound<'_, PyAny>) -> PyResult<Vec<CornerAttitude>> {
-        let corner: usize = convert::whole(corner, "corner", &format!("a number below {}", self.corners))?;
+        let corner: usize = convert::number(corner, "corner", &format!("a number below {}", self.corners))?;
         if corner >= self.corners {
             return Err(invalid(format!("corner = {corner}, expected a number below {}", self.corners)));
         }

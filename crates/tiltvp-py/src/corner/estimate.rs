@@ -224,7 +224,7 @@ macro_rules! of_edges {
             }
 
             fn read(value: &Bound<'_, PyAny>, name: &str) -> PyResult<Self> {
-                let [x, y, z]: [Bound<'_, PyAny>; 3] = convert::whole(value, name, $expected)?;
+                let [x, y, z]: [Bound<'_, PyAny>; 3] = convert::taken(value, name, $expected)?;
                 Ok([Option::read(&x, name)?, Option::read(&y, name)?, Option::read(&z, name)?])
             }
 

@@ -54,7 +54,7 @@ impl<const R: usize, const C: usize> Field for Vec<SMatrix<f64, R, C>> {
     }
 
     fn read(value: &Bound<'_, PyAny>, name: &str) -> PyResult<Self> {
-        let parts: Vec<Bound<'_, PyAny>> = convert::whole(value, name, "lists of numbers")?;
+        let parts: Vec<Bound<'_, PyAny>> = convert::taken(value, name, "lists of numbers")?;
         parts.iter().map(|part| Field::read(part, name)).collect()
     }
 
@@ -85,7 +85,7 @@ impl<const N: usize, const R: usize, const C: usize> Field for [SMatrix<f64, R, 
     }
 
     fn read(value: &Bound<'_, PyAny>, name: &str) -> PyResult<Self> {
-        let parts: [Bound<'_, PyAny>; N] = convert::whole(value, name, &format!("{N} lists of numbers"))?;
+        let parts: [Bound<'_, PyAny>; N] = convert::taken(value, name, &format!("{N} lists of numbers"))?;
         let mut read = [SMatrix::zeros(); N];
         for (own, part) in read.iter_mut().zip(&parts) {
             *own = Field::read(part, name)?;
@@ -136,8 +136,8 @@ macro_rules! columns {
 
 columns! {
     f64 => |value, name| convert::nullable(value, |value| convert::vector(value, name)), |x| number_bits(*x);
-    bool => |value, name| convert::whole(value, name, "a list of bool"), |x| u64::from(*x);
-    i64 => |value, name| convert::whole(value, name, "a list of whole numbers"), |x| *x as u64;
-    u16 => |value, name| convert::whole(value, name, "a list of whole numbers from 0"), |x| u64::from(*x);
-    u32 => |value, name| convert::whole(value, name, "a list of whole numbers from 0"), |x| u64::from(*x);
+    bool => |value, name| convert::taken(value, name, "a list of bool"), |x| u64::from(*x);
+    i64 => |value, name| convert::taken(value, name, "a list of whole numbers"), |x| *x as u64;
+    u16 => |value, name| convert::taken(value, name, "a list of whole numbers from 0"), |x| u64::from(*x);
+    u32 => |value, name| convert::taken(value, name, "a list of whole numbers from 0"), |x| u64::from(*x);
 }

@@ -37,7 +37,7 @@ macro_rules! same_object {
             }
 
             fn read(value: &Bound<'_, PyAny>, name: &str) -> PyResult<Self> {
-                convert::nullable(value, |value| convert::whole(value, name, $expected))
+                convert::nullable(value, |value| convert::taken(value, name, $expected))
             }
 
             fn bits(&self, $bits: &mut Vec<u64>) {
@@ -96,7 +96,7 @@ macro_rules! pairs {
             }
 
             fn read(value: &Bound<'_, PyAny>, name: &str) -> PyResult<Self> {
-                convert::nullable(value, |value| convert::whole::<[$type; 2]>(value, name, $expected)).map(Into::into)
+                convert::nullable(value, |value| convert::taken::<[$type; 2]>(value, name, $expected)).map(Into::into)
             }
 
             fn bits(&self, bits: &mut Vec<u64>) {

@@ -101,7 +101,7 @@ impl Field for Box<[usize]> {
     }
 
     fn read(value: &Bound<'_, PyAny>, name: &str) -> PyResult<Self> {
-        convert::whole::<Vec<usize>>(value, name, "whole numbers").map(Into::into)
+        convert::taken::<Vec<usize>>(value, name, "whole numbers").map(Into::into)
     }
 
     fn bits(&self, bits: &mut Vec<u64>) {

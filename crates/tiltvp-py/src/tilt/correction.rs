@@ -14,11 +14,8 @@ pub(super) fn parse(value: &Bound<'_, PyAny>, name: &str) -> PyResult<TrainedCor
     if let Some(trained) = object(value) {
         return Ok(trained);
     }
-    let shown = || value.repr().map_or_else(|_| String::new(), |r| r.to_string());
-    value.extract::<f64>().map(TrainedCorrection::Factor).map_err(|_| {
-        let expected = "a number (a factor), an AffineCorrection or a PosteriorCorrection";
-        invalid(format!("{name} = {}, expected {expected}", shown()))
-    })
+    let expected = "a number (a factor), an AffineCorrection or a PosteriorCorrection";
+    convert::number(value, name, expected).map(TrainedCorrection::Factor)
 }
 
 /// A correction from one of the classes here.

@@ -256,7 +256,7 @@ impl Field for Vec<[f32; 3]> {
     }
 
     fn read(value: &Bound<'_, PyAny>, name: &str) -> PyResult<Self> {
-        convert::whole(value, name, "rows of three numbers")
+        convert::taken(value, name, "rows of three numbers")
     }
 
     fn bits(&self, bits: &mut Vec<u64>) {

@@ -167,7 +167,7 @@ fn motion(yaw_rad: Option<&Bound<'_, PyAny>>, distance_m: Option<&Bound<'_, PyAn
 }
 
 fn number(value: &Bound<'_, PyAny>, name: &str) -> PyResult<f64> {
-    convert::whole(value, name, "a number")
+    convert::number(value, name, "a number")
 }
 
 fn written_state<'py>(py: Python<'py>, state: &TiltFilterState) -> PyResult<Bound<'py, PyDict>> {
