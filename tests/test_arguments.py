@@ -78,6 +78,27 @@ def test_what_is_no_number(value: Any) -> None:
         CAMERA.cropped(value, 0, 10, 10)
 
 
+@pytest.mark.parametrize("value", [True, np.True_], ids=["True", "numpy"])
+@pytest.mark.parametrize(
+    "call",
+    [
+        lambda value: tiltvp.Camera.equidistant(width=value, height=48, focal_px=20.0, cx=31.5, cy=23.5),
+        lambda value: tiltvp.Camera.equidistant(width=64, height=48, focal_px=value, cx=31.5, cy=23.5),
+        lambda value: tiltvp.Camera("equidistant", width=64, height=48, focal_px=20, cx=31, cy=23, max_theta_rad=value),
+        lambda value: ESTIMATOR.estimate_many([IMAGE], threads=value),
+        lambda value: tiltvp.SelfCalibrator(wheel_base_m=value),
+        lambda value: tiltvp.TiltFilter().predict(value),
+        lambda value: Room("office", value),
+        lambda value: corner.attitudes(FEATURE, gamma_rad=value),
+        lambda value: SEGMENTS.pixels(value),
+        lambda value: tiltvp.TiltEstimator(CAMERA, smoothing_px=value),
+    ],
+)
+def test_truth_values_are_no_numbers_of_the_core(call: Any, value: Any) -> None:
+    with pytest.raises(TiltvpError, match=r"True.*expected"):
+        call(value)
+
+
 MASKED = np.ma.masked_array(np.eye(3), mask=np.eye(3) > 0.0)
 HIDDEN = np.ma.masked_array(np.ones((48, 64), bool), mask=np.eye(48, 64) > 0.0)
 DESCRIPTORS = np.ma.masked_array(np.eye(3, 192, dtype=np.float32), mask=np.eye(3, 192) > 0.0)
@@ -139,6 +160,11 @@ def delay(odometry: Any = ODOMETRY, reach_s: Any = 0.1) -> Any:
     return tiltvp.frame_delay([IMAGE] * 11, TIMES, odometry, CAMERA, np.eye(3), reach_s=reach_s)
 
 
+def poses(**words: Any) -> Odometry:
+    """Of a way to the side, which a note tells."""
+    return Odometry.from_poses(TIMES, TIMES, 10.0 * TIMES, 0.0 * TIMES, **words)
+
+
 def transform(**parts: Any) -> StaticTransform:
     return StaticTransform("base", "camera", np.zeros(3), np.eye(3), **parts)
 
@@ -191,7 +217,8 @@ FEATURE = corner.fit(
         (lambda: tiltvp.Robot(CAMERA, np.eye(3), wheels=None), "wheels: NoneType, expected tiltvp.streams.Wheels"),
         (lambda: tiltvp.Robot(CAMERA, np.eye(3), topics="/image"), "topics: str, expected a dict"),
         (lambda: delay(odometry="drive.mcap"), "odometry: str, expected a tiltvp.streams.Odometry"),
-        (lambda: delay(reach_s=-1.0), "reach_s = -1.0, expected a finite number of seconds above 0"),
+        (lambda: delay(reach_s=-1.0), "reach_s = -1.0, expected seconds above 0, at most 60"),
+        (lambda: delay(reach_s=1e30), r"reach_s = 1e\+30, expected seconds above 0, at most 60"),
         (lambda: delay(reach_s="a"), "reach_s = 'a', expected a number"),
         (
             lambda: tiltvp.mounting_tilt([None], [Motion()], np.eye(3), level_floor="no"),
@@ -249,6 +276,16 @@ FEATURE = corner.fit(
         (lambda: believed_leans(None, EXTRACTOR), "estimator: NoneType, expected a TiltEstimator"),
         (lambda: believed_leans(ESTIMATOR, "a"), "extractor: str, expected a LineExtractor"),
         (lambda: calibrate_lines([], None), "solve: NoneType, expected what makes a LogCalibration"),
+        (lambda: calibrate_lines([], tiltvp.LogCalibration), "solve: the class LogCalibration, expected what makes"),
+        (lambda: list(see_lines([IMAGE], EXTRACTOR, tilt=tiltvp.TiltEstimator)), "tilt: the class TiltEstimator"),
+        (lambda: poses(notes=None), "notes = None, expected a tuple of texts"),
+        (lambda: poses(notes="late"), "notes = 'late', expected a tuple of texts"),
+        (lambda: poses(source=None), "source: NoneType, expected a text"),
+        (lambda: Odometry(TIMES, TIMES, TIMES, notes=[3]), r"notes = \[3\], expected a tuple of texts"),
+        (lambda: InertialSamples(TIMES, np.zeros((11, 3)), None, notes=3), "notes = 3, expected a tuple of texts"),
+        (lambda: InertialSamples(TIMES, np.zeros((11, 3)), None, frame=3), "frame: int, expected a text"),
+        (lambda: CameraSpec("equidistant", 8, 8, {}, notes=3).check(), "notes = 3, expected a tuple of texts"),
+        (lambda: CameraSpec("equidistant", 8, 8, {}, name=3).check(), "name: int, expected a text"),
         (lambda: looks_like_a_mirror("a.yaml", VIEW), "camera: str, expected a tiltvp.Camera"),
         (lambda: looks_like_a_mirror(CAMERA, 2.0), "view: float, expected what field_of_view measures"),
         (lambda: about_vertical(np.inf), "angle_rad = inf, expected radians"),

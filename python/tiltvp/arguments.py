@@ -27,6 +27,7 @@ __all__ = [
     "refuse_unless",
     "shaped_from",
     "size_from",
+    "texts_from",
     "two_from",
 ]
 
@@ -103,9 +104,21 @@ def refuse_unless(value: object, kinds: type | UnionType, name: str, expected: s
 
 
 def refuse_uncallable(value: object, name: str, expected: str) -> None:
-    """Raises `InvalidInputError` for what cannot be called."""
+    """Raises `InvalidInputError` for what cannot be called, and for a class, which is called for one of its own."""
+    if isinstance(value, type):
+        raise InvalidInputError(f"{name}: the class {value.__name__}, expected {expected}")
     if not callable(value):
         raise InvalidInputError(f"{name}: {type(value).__name__}, expected {expected}")
+
+
+def texts_from(values: Any, name: str) -> tuple[str, ...]:
+    """Several texts; a single one is none. Raises `InvalidInputError`."""
+    if not isinstance(values, str):
+        with suppress(TypeError):
+            found = tuple(values)
+            if all(isinstance(one, str) for one in found):
+                return found
+    raise InvalidInputError(f"{name} = {values!r}, expected a tuple of texts")
 
 
 def pair_from(pair: tuple[float, float], name: str) -> tuple[float, float]:

@@ -39,6 +39,8 @@ _TURNED_RAD: Final = math.radians(45.0)
 _SIGMAS: Final = 3.0
 """By how many of its standard errors the mean difference has to be off zero."""
 _LEAST: Final = 4
+_REACH_MAX_S: Final = 60.0
+"""Farthest delay that is looked at: clocks of one robot that are a minute apart are not set at all."""
 _COARSE_STEP_S: Final = 0.1
 _FINE_STEPS: Final = 7
 """To both sides of the best coarse one: a step of these and two more."""
@@ -238,8 +240,8 @@ def frame_delay(
     The mounting (3, 3) has to be right about which way is up. Raises `InvalidInputError` for sizes that do not fit.
     """
     refuse_unless(odometry, Odometry, "odometry", "a tiltvp.streams.Odometry")
-    if not 0.0 < number_from(reach_s, "reach_s") < math.inf:
-        raise InvalidInputError(f"reach_s = {reach_s}, expected a finite number of seconds above 0")
+    if not 0.0 < number_from(reach_s, "reach_s") <= _REACH_MAX_S:
+        raise InvalidInputError(f"reach_s = {reach_s}, expected seconds above 0, at most {_REACH_MAX_S:g}")
     pictures, up = _Pictures(images, camera), _up_of(robot_from_camera)
     times = array_from(times_s, "times_s")
     if times.shape != (len(pictures),) or not np.isfinite(times).all():

@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 from tiltvp import _core
-from tiltvp.arguments import flag_from, refuse_unless
+from tiltvp.arguments import flag_from, refuse_unless, texts_from
 from tiltvp.errors import InvalidInputError
 
 Parameters = dict[str, "float | list[float]"]
@@ -41,6 +41,9 @@ class CameraSpec:
         """Raises what the camera of these numbers raises: `tiltvp.errors.TiltvpError` for what no such lens has."""
         refuse_unless(self.parameters, dict, "parameters", "a dict")
         flag_from(self.mirror, "mirror")
+        for name in ("name", "format"):
+            refuse_unless(getattr(self, name), str, name, "a text")
+        texts_from(self.notes, "notes")
         _core.check_camera(self.model, self.width, self.height, self.parameters, self.max_theta_rad)
 
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Final, Self
 
 import numpy as np
 
-from tiltvp.arguments import array_from, number_from
+from tiltvp.arguments import array_from, number_from, refuse_unless, texts_from
 from tiltvp.csv_files import CsvFile
 from tiltvp.errors import InvalidInputError, counted
 from tiltvp.rotations import rotation_from
@@ -63,6 +63,9 @@ class InertialSamples:
 
     def __post_init__(self) -> None:
         """Raises `InvalidInputError` for arrays that do not fit, values that are not finite, and times that fall."""
+        for name in ("frame", "source"):
+            refuse_unless(getattr(self, name), str, name, "a text")
+        object.__setattr__(self, "notes", texts_from(self.notes, "notes"))
         n = array_from(self.times_s, f"{self.source}: times_s").size
         for name, shape in (
             ("times_s", (n,)),

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from tiltvp.arguments import array_from, number_from, shaped_from
+from tiltvp.arguments import array_from, number_from, refuse_unless, shaped_from, texts_from
 from tiltvp.errors import InvalidInputError, counted
 
 if TYPE_CHECKING:
@@ -91,6 +91,8 @@ class Odometry:
 
     def __post_init__(self) -> None:
         """Raises `InvalidInputError` for arrays that do not fit, values that are not finite, and times that fall."""
+        refuse_unless(self.source, str, "source", "a text")
+        object.__setattr__(self, "notes", texts_from(self.notes, "notes"))
         n = array_from(self.times_s, f"{self.source}: times_s").size
         for name, shape in (("times_s", (n,)), ("distance_m", (n,)), ("yaw_rad", (n,)), ("wheels_m", (n, 2))):
             if name not in ("yaw_rad", "wheels_m") or getattr(self, name) is not None:
@@ -156,7 +158,8 @@ class Odometry:
         apart, way = float(np.ptp(aside)) if len(aside) else 0.0, float(np.abs(np.diff(driven)).sum())
         if apart > max(_ASIDE_M, _ASIDE_SHARE * way):
             told = f"{source}: poses move sideways by {apart:.2f} m beside {way:.2f} m ahead, which is left out"
-            notes = (*notes, f"{told}: are they of the middle of the axle, and of a robot of two wheels?")
+            asked = "are they of the middle of the axle, and of a robot of two wheels?"
+            notes = (*texts_from(notes, "notes"), f"{told}: {asked}")
         return cls(times, driven, yaw - yaw[:1], None, source, notes, gap_max_s)
 
     def at(self, times_s: ArrayLike) -> Travelled:
