@@ -12,9 +12,10 @@ from types import SimpleNamespace
 import numpy as np
 import polars as pl
 import pytest
+from cyclopts import CoercionError, Token
 
 import tiltvp
-from commands import Run
+from commands import Run, verbs
 from recordings import START_S, Bag
 from tiltvp import _core
 from tiltvp.cli.app import app
@@ -175,3 +176,14 @@ def test_a_robot_of_millimetres_is_refused(run: Run, world: Path, camera: tiltvp
 def test_the_view_of_level_images_is_called_as_it_is_typed(run: Run, world: Path, words: str, told: str) -> None:
     files = (world / "images", "--camera", world / "camera.toml", "--out", world / "level")
     assert told in run("level", *files, "--field-of-view-deg", "400", *words.split()).complaint
+
+
+@pytest.mark.parametrize("verb", sorted(verbs(app)), ids=" ".join)
+def test_whole_numbers_are_not_rounded(verb: tuple[str, ...]) -> None:
+    """As cyclopts would: 2 threads of 1.5, another seed than was asked for."""
+    for one in app.parse_commands(verb)[1][-1].assemble_argument_collection():
+        if one.parse and "int" in re.findall(r"\w+", str(one.hint)):
+            for place in range(max(1, one.token_count()[0])):
+                one.append(Token(keyword=one.name, value="1.5", source="cli", index=place))
+            with pytest.raises(CoercionError, match=r'unable to convert "1\.5" into int'):
+                one.convert()

@@ -11,6 +11,8 @@ import numpy as np
 from cyclopts import Group, Parameter, validators
 
 from tiltvp.cli.calibrate_inputs import Solved, other_readings
+from tiltvp.cli.calibrate_inputs import Solved
+from tiltvp.cli.declared_options import Whole
 from tiltvp.cli.options import CameraOptions, Switch, given_words
 from tiltvp.cli.sources import MotionOptions, SourceOptions
 from tiltvp.cli.tables import check_ending, write_table
@@ -41,7 +43,7 @@ class PictureOptions:
 
     topic: str | None = None
     """The topic of a recording's images, where it has several."""
-    track_frames_min: Annotated[int, Parameter(validator=validators.Number(gte=2))] = 3
+    track_frames_min: Annotated[Whole, Parameter(validator=validators.Number(gte=2))] = 3
     """A line counts if it is seen in so many images."""
     tracks: Path | None = None
     """Also write the lines of all images, as `tiltvp track` does: .csv, .json or .parquet."""

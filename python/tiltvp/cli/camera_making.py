@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from tiltvp.cli.camera import FileOptions, app, built
+from tiltvp.cli.declared_options import Whole
 from tiltvp.cli.options import ABOVE_0, Switch, image_size_from
 from tiltvp.cli.terminal import complain, named, new_table, say, show
 from tiltvp.errors import InvalidInputError, TiltvpError
@@ -114,7 +115,7 @@ def crop(
     /,
     reading: FileOptions = _READING,
     *,
-    at: tuple[int, int],
+    at: tuple[Whole, Whole],
     size: str,
     camera_name: str | None = None,
 ) -> None:

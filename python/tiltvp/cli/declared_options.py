@@ -10,15 +10,26 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, TypeVar
 
-from cyclopts import Parameter
+from cyclopts import CoercionError, Parameter, Token
 
 from tiltvp._core import option_fields
 from tiltvp.images import read_mask
 
 T = TypeVar("T")
 
+
+def _whole_from(_: object, tokens: Sequence[Token]) -> int:
+    """A whole number; of 1.5 cyclopts would make 2."""
+    try:
+        return int(tokens[0].value)
+    except ValueError:
+        raise CoercionError(token=tokens[0], target_type=int) from None
+
+
+Whole = Annotated[int, Parameter(converter=_whole_from)]
+
 _TYPES: dict[str, Any] = {
-    "bool": bool, "int": int, "float": float, "str": str,
+    "bool": bool, "int": Whole, "float": float, "str": str,
     "tuple[float, float]": tuple[float, float],
     "tuple[float, float, float]": tuple[float, float, float],
     "npt.NDArray[np.bool_]": Path,

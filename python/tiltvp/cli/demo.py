@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Final
 
 from cyclopts import Parameter
 
+from tiltvp.cli.declared_options import Whole
 from tiltvp.cli.results import degrees
 from tiltvp.cli.tables import check_file
 from tiltvp.cli.terminal import new_table, progress_bar, say, show, status
@@ -59,12 +60,12 @@ def demo(
     *,
     out: Path = Path("out/demo"),
     page: Path | None = None,
-    seed: int = 8,
+    seed: Whole = 8,
     alpha_deg: float = 4.0,
     beta_deg: float = 30.0,
     kind: str = "office",
-    width: Annotated[int, Parameter(show=False)] = 640,
-    height: Annotated[int, Parameter(show=False)] = 480,
+    width: Annotated[Whole, Parameter(show=False)] = 640,
+    height: Annotated[Whole, Parameter(show=False)] = 480,
 ) -> None:
     """Render a room through a 185-degree fisheye at a known tilt and estimate it with every method.
 

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Self, TypeVar
 from cyclopts import Group, Parameter, validators
 
 from tiltvp._core import METHODS
-from tiltvp.cli.declared_options import LibraryOptions, from_library
+from tiltvp.cli.declared_options import LibraryOptions, Whole, from_library
 from tiltvp.errors import InvalidInputError
 from tiltvp.images import read_mask
 
@@ -31,8 +31,8 @@ M = TypeVar("M", bound=LibraryOptions)
 Switch = Annotated[bool, Parameter(negative="", show_default=False)]
 FrameRate = Annotated[float | None, Parameter(validator=validators.Number(gt=0, lt=math.inf))]
 ABOVE_0 = Parameter(validator=validators.Number(gt=0))
-AtLeast0 = Annotated[int, Parameter(validator=validators.Number(gte=0))]
-AtLeast1 = Annotated[int, Parameter(validator=validators.Number(gte=1))]
+AtLeast0 = Annotated[Whole, Parameter(validator=validators.Number(gte=0))]
+AtLeast1 = Annotated[Whole, Parameter(validator=validators.Number(gte=1))]
 ALL_CORES = os.cpu_count() or 1
 Threads = Annotated[AtLeast1, Parameter(help="How many at the same time; all cores by default.", show_default=False)]
 

@@ -8,6 +8,7 @@ from typing import Annotated
 from cyclopts import Parameter, validators
 
 from tiltvp.cli.colmap import BELIEVED_MIN
+from tiltvp.cli.declared_options import Whole
 from tiltvp.cli.lab.measure_options import Saved
 from tiltvp.cli.lab.tables import show_frame
 from tiltvp.cli.tables import check_ending, write_frame
@@ -20,8 +21,8 @@ _WAYS = 3
 def colmap(
     *,
     kinds: Annotated[tuple[str, ...], Parameter(consume_multiple=True)] = ("office", "living-room"),
-    seed: int = 5,
-    views: Annotated[int, Parameter(validator=validators.Number(gte=3))] = 24,
+    seed: Whole = 5,
+    views: Annotated[Whole, Parameter(validator=validators.Number(gte=3))] = 24,
     out: Saved = None,
 ) -> None:
     """COLMAP on views of rendered rooms: errors of gravity of its reconstructions, without priors and with them.

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
+from tiltvp.cli.declared_options import Whole
 from tiltvp.cli.lab.dataset_drives import drive, stereo
 from tiltvp.cli.lab.dataset_options import LensOptions, MakingOptions, Words, made_by, tilts_from
 from tiltvp.cli.lab.measure_options import NoiseSigma, Samples
@@ -60,7 +61,7 @@ def check(directory: Path, /) -> int:
 
 
 @app.command
-def panoramas(*, out: Path, rooms: int = 4, places: int = 2, height: int = 640, seed: int = 0) -> None:
+def panoramas(*, out: Path, rooms: Whole = 4, places: Whole = 2, height: Whole = 640, seed: Whole = 0) -> None:
     """Render upright panoramas of rooms, with the index that folders of panoramas have.
 
     Parameters
@@ -93,7 +94,7 @@ def render(
     noise_sigma: NoiseSigma = 2.0,
     samples: Samples = 2,
     turn: Switch = False,
-    limit: int | None = None,
+    limit: Whole | None = None,
 ) -> None:
     """Make a dataset of views of upright panoramas. A location is a panorama.
 
@@ -137,12 +138,12 @@ def synth(
     lens: LensOptions = _LENS,
     *,
     kinds: Words = None,
-    rooms: int = 6,
-    locations_per_room: int = 4,
+    rooms: Whole = 6,
+    locations_per_room: Whole = 4,
     camera_height_m: float | None = None,
     tilts_deg: Words = None,
     noise_sigma: NoiseSigma = 2.0,
-    samples: int | None = None,
+    samples: Whole | None = None,
 ) -> None:
     """Make a dataset of views of rendered rooms. A location is a place in a room, an environment a kind of room.
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+from tiltvp.cli.declared_options import Whole
 from tiltvp.cli.lab.dataset_options import (
     DriveLensOptions,
     MakingOptions,
@@ -23,7 +24,7 @@ def drive(
     lens: DriveLensOptions = _LENS,
     *,
     kind: str = "corridor",
-    frames: int | None = None,
+    frames: Whole | None = None,
     way: WayOptions = _WAY,
     lighting: float | None = None,
     floor_gloss: float | None = None,
@@ -80,11 +81,11 @@ def stereo(
     making: MakingOptions,
     *,
     kind: str = "laboratory",
-    frames: int | None = None,
-    width: int = 1280,
+    frames: Whole | None = None,
+    width: Whole = 1280,
     distance: tuple[float, float] | None = None,
     gamma_deg: float = 90.0,
-    corner: int | None = None,
+    corner: Whole | None = None,
     clutter: float | None = None,
     exposure_ms: float = 0.0,
     blur_sigma: float | None = None,

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 import numpy as np
 from cyclopts import Parameter
 
+from tiltvp.cli.declared_options import Whole
 from tiltvp.cli.options import ALL_CORES, AtLeast0, CameraOptions, Switch, Threads
 from tiltvp.errors import InvalidInputError
 from tiltvp.files import keeps_existing
@@ -155,7 +156,7 @@ class RenderingOptions:
 
     noise_sigma: float | None = None
     """Gaussian noise in grey levels; default 2."""
-    samples: int | None = None
+    samples: Whole | None = None
     """Rays per pixel and side where surfaces meet; default 3."""
 
 

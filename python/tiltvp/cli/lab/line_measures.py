@@ -7,6 +7,7 @@ from typing import Annotated
 
 from cyclopts import Parameter, validators
 
+from tiltvp.cli.declared_options import Whole
 from tiltvp.cli.lab.tables import show_frame
 from tiltvp.cli.options import ALL_CORES, AtLeast0, AtLeast1, Threads
 from tiltvp.cli.tables import check_ending, write_frame
@@ -15,7 +16,7 @@ from tiltvp.cli.terminal import progress_bar
 
 def lines(
     *,
-    frames: Annotated[int, Parameter(validator=validators.Number(gte=2))] = 400,
+    frames: Annotated[Whole, Parameter(validator=validators.Number(gte=2))] = 400,
     kinds: Annotated[tuple[str, ...], Parameter(consume_multiple=True)] = ("corridor", "hall"),
     leans_deg: Annotated[tuple[float, ...], Parameter(consume_multiple=True)] = (0.0, 5.0),
     seed: AtLeast0 = 9001,

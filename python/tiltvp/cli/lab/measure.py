@@ -7,6 +7,7 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
+from tiltvp.cli.declared_options import Whole
 from tiltvp.cli.lab.body import body
 from tiltvp.cli.lab.calibration_measures import calibration, calibration_images, trust_calibration, trust_pictures
 from tiltvp.cli.lab.colmap import colmap
@@ -152,7 +153,7 @@ def inertial(directory: Path, /, *, samples: Samples = 2) -> None:
 @app.command
 def scaling(
     *,
-    images: Annotated[tuple[int, ...], Parameter(consume_multiple=True)] = (21, 42, 84, 168),
+    images: Annotated[tuple[Whole, ...], Parameter(consume_multiple=True)] = (21, 42, 84, 168),
     scales: Annotated[tuple[float, ...], Parameter(consume_multiple=True)] = (0.25, 0.5, 1.0, 2.0, 4.0),
     sweep: str = "paper",
     threads: Threads = ALL_CORES,

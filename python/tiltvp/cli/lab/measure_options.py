@@ -5,6 +5,7 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
+from tiltvp.cli.declared_options import Whole
 from tiltvp.cli.options import AtLeast0, AtLeast1
 
 _INDEX = "Folder with the panoramas and an INDEX.csv of columns name, environment, tilt_x_deg, tilt_z_deg"
@@ -13,6 +14,6 @@ Panoramas = Annotated[Path, Parameter(help=f"{_INDEX}.")]
 PanoramasIfAny = Annotated[Path | None, Parameter(help=f"{_INDEX}; without one, rendered rooms alone are measured.")]
 Every = Annotated[AtLeast1, Parameter(help="Take one panorama in so many.")]
 Rooms = Annotated[AtLeast0, Parameter(help="Rendered rooms of each kind; 0 for none.")]
-Samples = Annotated[int, Parameter(help="Rays per pixel and side.")]
+Samples = Annotated[Whole, Parameter(help="Rays per pixel and side.")]
 NoiseSigma = Annotated[float, Parameter(help="Gaussian noise in grey levels.")]
 Saved = Annotated[Path | None, Parameter(help="Also write the table: .csv, .json or .parquet.")]
