@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import re
 from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any
@@ -25,7 +26,7 @@ from tiltvp.cli.showing import RerunOptions
 from tiltvp.cli.sources import MotionOptions
 from tiltvp.drive_logs import DriveLog
 from tiltvp.errors import InvalidInputError, OutputError
-from tiltvp.streams import Wheels, read_odometry
+from tiltvp.streams import Wheels, frame_motions, open_frames, read_odometry
 from tiltvp.streams.outputs.transforms import StaticTransform
 from tiltvp.synth import simulate_drive
 from tiltvp.turning import FrameDelay
@@ -325,6 +326,31 @@ def test_pictures_that_there_are_not_are_told_to_be_none(tables: Path, capsys: p
     words = ("calibrate", "no-such-drive", "--camera", tables / "robot.toml")
     assert main([str(word) for word in words]) == 2
     assert "no-such-drive: no such file or folder, expected" in capsys.readouterr().err
+
+
+def test_a_camera_that_cannot_be_read_is_no_lack_of_a_wheel_base(
+    folder: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    (folder / "empty.toml").write_text("")
+    for name, told in (("no-such.toml", "no such file"), ("empty.toml", "is empty"), ("camera.toml", "--wheel-base:")):
+        assert main(["calibrate", str(folder / "images"), "--camera", str(folder / name)]) == 2
+        assert told in capfd.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("column", "step", "told"),
+    [
+        ("yaw_rad", 5.0, "rad, the first to .*1.png by 5 rad: are they in degrees"),
+        ("distance_m", 80.0, "in millimetres"),
+    ],
+)
+def test_steps_that_no_robot_makes_are_told(folder: Path, column: str, step: float, told: str) -> None:
+    columns = ("yaw_rad", "distance_m")
+    for odd in (step, 0.5):
+        rows = [",".join(str(odd if name == column and k == 1 else 0.1) for name in columns) for k in range(FRAMES)]
+        (folder / "steps.csv").write_text("\n".join([",".join(columns), *rows, ""]))
+        notes = frame_motions(open_frames(folder / "images"), folder / "steps.csv").notes
+        assert bool(re.search(told, " ".join(notes))) is (odd == step)
 
 
 def test_no_output_takes_the_place_of_another_or_of_what_is_read(

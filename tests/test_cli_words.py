@@ -148,6 +148,7 @@ def test_cameras_of_a_recording(run: Run, tmp_path: Path) -> None:
             "--filter --mounting-prior-deg 1",
             "--mounting-prior-deg: unknown (given without --estimate-mounting), expected",
         ),
+        ("--filter --wheel-radius 50", 'Invalid value "50.0" for --wheel-radius. Must be <= 10.'),
         ("--filter --wheel-base 350", 'Invalid value "350.0" for --wheel-base. Must be <= 200.'),
     ],
 )

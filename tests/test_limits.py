@@ -31,6 +31,7 @@ from tiltvp.errors import (
 )
 from tiltvp.files import keeping_existing, whole_file, write_whole
 from tiltvp.formats import document, write_cameras
+from tiltvp.lab.datasets.folder import read_dataset
 from tiltvp.rotations import read_rotation
 from tiltvp.stereo_rigs import StereoRig
 from tiltvp.streams import InertialSamples, Recording, open_frames, read_odometry
@@ -126,6 +127,19 @@ def test_pipes_and_devices_are_not_read(tmp_path: Path) -> None:
         for read in (tiltvp.Camera.load, tiltvp.read_image, lambda path: read_drive_log(path, path)):
             with pytest.raises(TiltvpError, match="is no regular file"):
                 read(path)
+    (tmp_path / "drive.mcap").symlink_to("pipe")
+    with pytest.raises(InvalidInputError, match="is no regular file"):
+        assert Recording(tmp_path / "drive.mcap").topics
+
+
+def test_names_that_are_too_long_are_errors_of_ours() -> None:
+    """As of a content that is given for its file."""
+    long = "1 0 0 " * 1000
+    for read in (tiltvp.Camera.load, read_rotation, read_odometry, read_dataset, lambda word: Recording(word).topics):
+        with pytest.raises(TiltvpError):
+            read(long)
+    with pytest.raises(TiltvpError):
+        next(open_frames(long).sample([0])).read()
 
 
 def test_names_and_numbers_that_python_refuses_are_errors_of_ours(tmp_path: Path) -> None:
@@ -137,7 +151,7 @@ def test_names_and_numbers_that_python_refuses_are_errors_of_ours(tmp_path: Path
     with pytest.raises(InvalidInputError):
         _core.consistency_band(0.95, 3, 2**62)
     (tmp_path / "odometry.csv").write_text("step,delta_left_m,delta_right_m\n0,0,0\n1,1,1\n")
-    for landmark in ("9" * 400, str(2**53), "1" * 200_000):
+    for landmark in ("9" * 400, str(2**53), "1" * 200_000, "3_1"):
         (tmp_path / "bearings.csv").write_text(f"step,landmark,bearing_rad\n0,{landmark},0.1\n")
         with pytest.raises(InvalidInputError):
             read_drive_log(tmp_path / "odometry.csv", tmp_path / "bearings.csv")

@@ -55,7 +55,8 @@ class CsvFile:
     def number(self, line: int, column: str, word: str) -> float:
         """A finite number of a cell. Raises `InvalidInputError` that names its place."""
         try:
-            value = float(word)
+            # Python would read 1_0, the name of a part of something, as 10.
+            value = math.nan if "_" in word else float(word)
         except ValueError:
             value = math.nan
         if not math.isfinite(value):

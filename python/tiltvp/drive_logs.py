@@ -192,7 +192,7 @@ def _refuse_twice(table: CsvFile, seen: NDArray[np.float64], lines: array[int], 
 def _whole(table: CsvFile, line: int, column: str, word: str) -> int:
     try:
         # The longest within the limit has 16 digits and a sign.
-        value = int(word) if len(word) < 20 else None
+        value = int(word) if len(word) < 20 and "_" not in word else None
     except ValueError:
         value = None
     if value is None or abs(value) > LARGEST_WHOLE:

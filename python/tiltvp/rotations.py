@@ -89,7 +89,7 @@ def read_rotation(source: str | os.PathLike[str]) -> Matrix:
     if isinstance(source, str) and source in ROTATION_WORDS:
         return np.array(ROTATION_WORDS[source])
     file = path_from(source)
-    if not file.exists():
+    if not os.path.exists(file):
         raise _missing(str(source), is_word=file.name == str(source) and not file.suffix)
     if file.is_dir():
         raise CalibrationError(f"{file}: is a folder, expected a file with a rotation")

@@ -60,6 +60,8 @@ def calibrate(
 
     watching.check()
     sources, robot = sources_from(logs), None if camera is None else camera.robot()
+    if camera is not None and robot is None and motion.wheel_base is None:
+        camera.load(pictures.topic)  # Says what is wrong with a file that would tell the wheel base.
     drive, results = drive.settled(robot, motion.wheel_base), results.settled(robot)
     SelfCalibrator(**drive.of_filter(), method=method)  # Refuses options before there is any work.
     if camera is not None and robot is None and any(isinstance(source, Tables) for source in sources):

@@ -94,7 +94,7 @@ class MotionOptions:
     wheel_base: Annotated[float | None, Parameter(validator=validators.Number(gt=0, lte=200))] = None
     """Distance between the wheels, metres, for odometry of wheels, and for how much the floor may change in a turn; by
     default that of a robot's file."""
-    wheel_radius: Annotated[float | None, ABOVE_0] = None
+    wheel_radius: Annotated[float | None, Parameter(validator=validators.Number(gt=0, lte=10))] = None
     """Radius of the wheels, metres, for ticks and the angles of a JointState."""
     ticks_per_turn: Annotated[float | None, ABOVE_0] = None
     """What the counter of a wheel counts in one turn."""

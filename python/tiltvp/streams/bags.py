@@ -26,10 +26,8 @@ MOST_METADATA_BYTES: Final = 16 << 20
 def is_recording(path: str | os.PathLike[str]) -> bool:
     """Whether it looks like a bag: a file with such an ending, or a folder with a bag's metadata."""
     file = path_from(path)
-    try:
-        return (file.suffix.lower() in BAG_ENDINGS and not file.is_dir()) or (file / _METADATA).is_file()
-    except ValueError:
-        return False
+    # As `Path` does not, these say of names that no file can have that there is none.
+    return (file.suffix.lower() in BAG_ENDINGS and not os.path.isdir(file)) or os.path.isfile(file / _METADATA)
 
 
 @dataclass(frozen=True)
@@ -159,7 +157,8 @@ class Recording:
                         f"{self.path}: {_METADATA} of {size} bytes, expected at most {MOST_METADATA_BYTES}"
                     )
             elif not self.path.is_file():
-                raise InvalidInputError(f"{self.path}: no such file, expected a bag")
+                what = "is no regular file" if self.path.exists() else "no such file"
+                raise InvalidInputError(f"{self.path}: {what}, expected a bag")
         except InvalidInputError:
             raise
         except (OSError, ValueError) as error:

@@ -102,12 +102,12 @@ def find_images(words: Sequence[str]) -> tuple[list[Path], list[str], list[tuple
         if "\0" in word:
             raise InvalidInputError(f"{word!r}: a name with a zero byte, expected a file, folder or pattern")
         path = Path(word)
-        if path.is_dir():
+        if os.path.isdir(path):
             found = _images_of(path)
             if not found:
                 inner = ", nor in a folder images or frames in it"
                 problems.append(f"{word}: a folder without images, expected files in {' '.join(IMAGE_ENDINGS)}{inner}")
-        elif path.exists() or not glob.has_magic(word):
+        elif os.path.exists(path) or not glob.has_magic(word):
             found = [path]
         else:
             found = [Path(match) for match in glob.glob(word, recursive=True) if not os.path.isdir(match)]
@@ -146,7 +146,7 @@ def _by_name(file: Path) -> tuple[list[str | int], str]:
 
 def _drive_folder(words: Sequence[str]) -> Path | None:
     """The one folder that was given, where tables may be beside the images."""
-    return Path(words[0]) if len(words) == 1 and Path(words[0]).is_dir() else None
+    return Path(words[0]) if len(words) == 1 and os.path.isdir(words[0]) else None
 
 
 def _table_of(folder: Path) -> tuple[Path, str] | None:

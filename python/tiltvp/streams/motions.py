@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import math
 import os
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Final
 
@@ -11,7 +12,7 @@ import numpy as np
 
 from tiltvp.arguments import refuse_unless
 from tiltvp.drive_logs import DriveLog, doubled_rows
-from tiltvp.errors import InvalidInputError
+from tiltvp.errors import InvalidInputError, counted
 from tiltvp.streams.bags import Recording, is_recording
 from tiltvp.streams.frames import Frames
 from tiltvp.streams.odometry import Motion, Odometry, refuse_set_back
@@ -27,6 +28,8 @@ __all__ = ["FrameMotions", "frame_motions", "read_odometry"]
 _DEFAULTS = Wheels()
 _UNITS: Final = ("millimetres", "cumulative")
 """Readings of `DriveLog.read_as` that are not about which wheel is which."""
+_FARTHEST_M: Final = 50.0
+"""Between two images: lines of a room are not followed over a tenth of it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,7 +110,7 @@ def frame_motions(
     times = frames.times_s
     if times is None and table.times_s is not None:
         times = table.times_s[rows]
-    notes = () if turns else (_no_turns(table.name),)
+    notes = (*(() if turns else (_no_turns(table.name),)), *_far_steps(motions, frames.names, table.name))
     return FrameMotions(motions, turns, times, notes, table.distances_known)
 
 
@@ -187,6 +190,18 @@ def _interpolated(frames: Frames, odometry: Odometry) -> FrameMotions:
     turns = odometry.yaw_rad is not None
     notes = (*odometry.notes, None if turns else _no_turns(odometry.source), told, gaps, odometry.jumps)
     return FrameMotions(motions, turns, frames.times_s, tuple(note for note in notes if note is not None))
+
+
+def _far_steps(motions: Sequence[Motion], names: Sequence[str], source: str) -> Iterator[str]:
+    """Sentences about steps from image to image that no robot makes, as of other units, or of rows that are sums."""
+    for what, most, unit, told in (
+        ("yaw_rad", math.pi, "rad", "degrees"), ("distance_m", _FARTHEST_M, "m", "millimetres")
+    ):  # fmt: skip
+        far = [k for k, motion in enumerate(motions) if abs(getattr(motion, what)) > most]
+        if far:
+            steps = f"{counted(len(far), 'steps')} of more than {most:.3g} {unit}"
+            first = f"the first to {names[far[0]]} by {getattr(motions[far[0]], what):.3g} {unit}"
+            yield f"{source}: {steps}, {first}: are they in {told}, or summed up?"
 
 
 def _no_turns(source: str) -> str:

@@ -21,8 +21,9 @@ _WRAPS: Final = (2**16, 2**32)
 _EDGE: Final = 1e-6
 """Share of a range by which angles go beyond its ends: those of floats of 32 bits beyond pi."""
 
-_LONGEST_BASE_M: Final = 200.0
-"""Twice the longest `half_track_m` of `tiltvp.TiltFilter`: what is beyond is millimetres."""
+_LONGEST_M: Final = {"wheel_base_m": 200.0, "wheel_radius_m": 10.0}
+"""Twice the longest `half_track_m` of `tiltvp.TiltFilter`, and thrice the largest tyres: what is beyond is
+millimetres."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -48,8 +49,8 @@ class Wheels:
             object.__setattr__(self, name, number_from(value, name))
             if not 0.0 < getattr(self, name) < np.inf:
                 raise InvalidInputError(f"{name} = {value}, expected a number above 0")
-        if self.wheel_base_m is not None and self.wheel_base_m > _LONGEST_BASE_M:
-            raise InvalidInputError(f"wheel_base_m = {self.wheel_base_m}, expected metres, at most {_LONGEST_BASE_M:g}")
+            if getattr(self, name) > (most := _LONGEST_M.get(name, np.inf)):
+                raise InvalidInputError(f"{name} = {value}, expected metres, at most {most:g}")
         joints = self.joints
         if joints is not None and not (
             isinstance(joints, tuple | list)

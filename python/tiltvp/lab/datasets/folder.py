@@ -85,7 +85,7 @@ def read_dataset(directory: str | os.PathLike[str]) -> TiltDataset:
 
 def find_dataset(directory: Path, findings: Findings) -> TiltDataset | None:
     """The dataset as far as it can be read; what is wrong goes to `findings`. None without a camera."""
-    if not directory.is_dir():
+    if not os.path.isdir(directory):
         findings.add(directory, None, "is no folder", "a dataset: a folder with dataset.toml and images.csv")
         return None
     description = read_description(directory, findings)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import math
+import os
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
@@ -133,7 +134,7 @@ class _Reading:
         path = PurePosixPath(name)
         if path.is_absolute() or ".." in path.parts:
             self._add(line, f"file {name!r}", "the path of an image in this folder, from this folder on")
-        elif not (self._directory / name).is_file():
+        elif not os.path.isfile(self._directory / name):
             self._add(line, f"no file {name!r}", "an image in this folder")
         first = self._line_of_file.setdefault(str(path), line)
         if first != line:
