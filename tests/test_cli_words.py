@@ -188,3 +188,17 @@ def test_whole_numbers_are_not_rounded(verb: tuple[str, ...]) -> None:
                 one.append(Token(keyword=one.name, value="1.5", source="cli", index=place))
             with pytest.raises(CoercionError, match=r'unable to convert "1\.5" into int'):
                 one.convert()
+
+
+@pytest.mark.parametrize(
+    ("words", "named"),
+    [
+        (["", "--camera", "c.toml"], "an argument"),
+        (["images", "--camera", ""], "--camera"),
+        (["images", "--camera", "c.toml", "--topic="], "--topic"),
+    ],
+)
+def test_words_of_variables_that_are_not_set_are_refused(run: Run, words: list[str], named: str) -> None:
+    """They were the working folder, and options as if they were not given."""
+    said = run("tilt", *words)
+    assert (said.code, said.complaint.startswith(f"tiltvp: {named}: an empty word, expected one")) == (2, True)

@@ -247,7 +247,7 @@ def test_arguments_that_no_float_can_hold_are_refused_by_name(value: Any) -> Non
         assert caught.value.__notes__ == [f"while processing '{name}'"]
 
 
-@pytest.mark.parametrize("path", [b"a.toml", None, 3.5])
+@pytest.mark.parametrize("path", [b"a.toml", None, 3.5, ""])
 def test_what_is_no_path_is_refused(path: Any) -> None:
     camera = tiltvp.Camera.equidistant(width=64, height=48, focal_px=20.0, cx=31.5, cy=23.5)
     for door in (

@@ -64,10 +64,13 @@ def each_from(values: Any, name: str, has: str, kind: str, *, or_none: bool = Fa
 
 
 def path_from(path: str | os.PathLike[str]) -> Path:
-    """A path; bytes are none. Raises `InvalidInputError`."""
-    if isinstance(path, str | os.PathLike) and isinstance(name := os.fspath(path), str):
+    """A path; bytes are none, nor is an empty text, of which `Path` would make the working folder.
+
+    Raises `InvalidInputError`.
+    """
+    if isinstance(path, str | os.PathLike) and isinstance(name := os.fspath(path), str) and name:
         return Path(name)
-    raise InvalidInputError(f"path = {path!r}, expected a str or an os.PathLike")
+    raise InvalidInputError(f"path = {path!r}, expected a str or an os.PathLike that is not empty")
 
 
 def size_from(size: tuple[int, int], name: str) -> tuple[int, int]:

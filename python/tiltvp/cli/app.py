@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import glob
 import os
+import re
 import sys
 from collections.abc import Sequence
 from contextlib import nullcontext
@@ -16,7 +17,7 @@ from tiltvp.cli.root import app, run
 from tiltvp.cli.showing import RERUN
 from tiltvp.cli.sources import STDIN
 from tiltvp.cli.terminal import complain, print_any_name
-from tiltvp.errors import MissingExtraError, OutputError, TiltvpError
+from tiltvp.errors import InvalidInputError, MissingExtraError, OutputError, TiltvpError
 from tiltvp.files import keeping_existing
 from tiltvp.streams.outputs.viewer import VIEWER
 
@@ -64,6 +65,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             # A word that begins so is taken for an option, which its name would be looked for among.
             words[place] = STDIN
     try:
+        _refuse_empty(words)
         with nullcontext() if overwrite else keeping_existing():
             code = run(words)
         sys.stdout.flush()
@@ -92,6 +94,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
         if not isinstance(error, BrokenPipeError):
             complain(f"{error.filename or 'the output'}: {error.strerror or error}")
         return SOME_FAILED
+
+
+def _refuse_empty(words: Sequence[str]) -> None:
+    """Refuses words without a letter, which would be the working folder, or as if the option were not given."""
+    for before, word in zip(("", *words), words, strict=False):
+        if word == "" or re.fullmatch("--[^=]+=", word):
+            option = word.removesuffix("=") or (before if before.startswith("--") else "an argument")
+            raise InvalidInputError(f"{option}: an empty word, expected one that is not (a variable that is not set?)")
 
 
 def _is_there(word: str) -> bool:
